@@ -80,10 +80,11 @@ class CodeBuilder:
         self.unknown(place, text, may_move)
         assigned = ASSIGNED.match(text)
         if assigned is not None:
-            name = assigned[1].upper() if folds else assigned[1]
-            self.add(
-                syntax.Assign(place, syntax.Variable(name), syntax.Constant(syntax.Unclear(name)), text, local=False)
-            )
+            self.unclear(place, assigned[1].upper() if folds else assigned[1])
+
+    def unclear(self, place: Place, name: str) -> None:
+        """A variable of which nothing is known from here."""
+        self.add(syntax.Assign(place, syntax.Variable(name), syntax.Constant(syntax.Unclear(name)), name))
 
     def inside(self, *kinds: str) -> bool:
         """Whether the innermost block is one of these."""

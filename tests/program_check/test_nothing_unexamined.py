@@ -921,3 +921,32 @@ def test_whether_a_nested_function_shares_a_variable_of_a_routine_that_the_file_
         assert codes(check(tmp_path, settled)) == {}
     (motion,) = motions(tmp_path, nested)
     np.testing.assert_allclose(motion.target.joints, FAR, atol=1e-8)
+
+
+@pytest.mark.parametrize("lines", ["$TOOL=TOOL_DATA[1]\n$ACT_TOOL=2", "$BASE=$NULLFRAME\n$ACT_BASE=3"])
+def test_a_number_beside_the_frame_of_another_is_named(tmp_path, lines):
+    found = check(tmp_path, f"DEF a( )\n{FRAMES}{lines}\nPTP {axes(NEAR)}\nEND\n", "a.src")
+    assert found.level == "caution"
+    assert "program_not_understood" in codes(found)
+
+
+@pytest.mark.parametrize("line", ["turn=500", "$TOOL={X 0,Y 0,Z 900,A 0,B 0,C 0}"])
+def test_what_a_trigger_sets_is_not_known_after_it(tmp_path, line):
+    body = f"DECL REAL turn\nturn=0\n{FRAMES}PTP {axes(NEAR)}\nTRIGGER WHEN DISTANCE=0 DELAY=0 DO {line}"
+    body += "\nPTP_REL {A1 1}\nPTP_REL {A1 turn}\nLIN_REL {Z 1} #TOOL"
+    found = check(tmp_path, f"DEF a( )\n{body}\nEND\n", "a.src")
+    assert found.level == "fail"
+    assert {"target_not_given", "frame_not_given"} & codes(found).keys()
+
+
+def test_a_variable_that_an_interrupt_sets_itself_is_named(tmp_path):
+    body = f"DECL INT hit\nINTERRUPT DECL 4 WHEN $IN[1] DO hit=3\nPTP {axes(NEAR)}"
+    assert codes(check(tmp_path, f"DEF a( )\n{body}\nEND\n", "a.src"))["program_not_understood"] == [3]
+
+
+def test_a_variable_of_a_nested_function_is_not_global_however_the_program_begins(tmp_path):
+    inner = "def inner():\ny = 3\nend\n"
+    text = f"def main():\ndef outer():\ny = 0\n{inner}inner()\nmovej([y, 0, 0, 0, -1, 0])\nend\nouter()\nend\n"
+    assert codes(check(tmp_path, text))["program_not_understood"] == [5]
+    shared = f"def main():\ny = 0\n{inner}inner()\nend\n"
+    assert "program_not_understood" not in codes(check(tmp_path, shared))

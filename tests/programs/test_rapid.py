@@ -240,6 +240,10 @@ COURSES = {  # instructions, x of the targets in their order, relative to p
         "FOR i FROM 1 TO 2 DO inside; #i; ENDFOR MORE PROC inside() FOR i FROM 8 TO 9 DO n:=i; ENDFOR ENDPROC",
         [1, 2],
     ),
+    "counters_hide_data": (
+        "FOR n FROM n TO n+1 DO FOR n FROM 7 TO 7 DO #n; told; ENDFOR #n; ENDFOR #n; MORE PROC told() #n; ENDPROC",
+        [7, 3, 3, 7, 3, 4, 3],
+    ),
     "exit": ("MoveL p,@; EXIT; #1;", [0]),
     "called_at_the_end": ('MoveLSync p,v100,z10,tool0,"mark"; #n; MORE PROC mark() n:=9; ENDPROC', [0, 9]),
 }

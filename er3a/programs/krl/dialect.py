@@ -429,8 +429,8 @@ SORI_TYPE SCIRC_TYPE
 OF_SETTINGS = frozenset(OF_SETTINGS_TEXT.split())
 """Functions behind WITH, which :func:`keep_setting` reads."""
 HARMLESS_VARIABLES_TEXT = """
-$ACCU_STATE $ADVANCE $AXWORKSPACE $CMD $CP_STATMON $CP_VEL_TYPE $CYCFLAG $CYCLE $DATE
-$ECO_LEVEL $ERR $EXT $FLAG $GEAR_JERK $H_POS $I_O_ACT $JERK $LOOP_MSG $MSG_T $OUT_NODRIVE $OV_APPL $OV_PRO $OV_ROB
+$ACCU_STATE $ADVANCE $ANOUT $AXWORKSPACE $CMD $CP_STATMON $CP_VEL_TYPE $CYCFLAG $CYCLE $DATE
+$ECO_LEVEL $ERR $EXT $FLAG $GEAR_JERK $H_POS $I_O_ACT $JERK $LOOP_MSG $MSG_T $OUT $OUT_NODRIVE $OV_APPL $OV_PRO $OV_ROB
 $PERI_RDY $PRO_ACT $PRO_MODE $PRO_STATE $RED_VEL $SOFT_PLCBOOL $SOFT_PLCINT $SOFT_PLCREAL $STOPNOAPROX $TIMER
 $TIMER_FLAG $TIMER_STOP $TORQMON $TORQMON_COM $TORQMON_DEF $TRACE $WBOXDISABLE $WORKSPACE
 """
@@ -467,11 +467,24 @@ class Settings(NamedTuple):
 
 
 def _set_alone(code: tuple[syntax.Operation, ...], number: str, frame: str) -> bool:
-    """Whether somewhere a variable is set and another is not, right before or behind it."""
-    names = [variable_of(each.target) if isinstance(each, syntax.Assign) else "" for each in code]
+    """Whether somewhere a number is set, and no frame right after it, nor the frame of that number right before."""
+    sets = [(variable_of(each.target), each.value) if isinstance(each, syntax.Assign) else ("", None) for each in code]
     return any(
-        name == number and frame not in names[max(i - BESIDE, 0) : i + BESIDE + 1] for i, name in enumerate(names)
+        name == number
+        and frame not in (other for other, _ in sets[i : i + BESIDE + 1])
+        and not any(other == frame and _of_number(value, given) for other, value in sets[max(i - BESIDE, 0) : i])
+        for i, (name, given) in enumerate(sets)
     )
+
+
+def _of_number(frame: syntax.Expression | None, number: syntax.Expression | None) -> bool:
+    """Whether a frame can be that of a number: not ``TOOL_DATA[1]`` for 2, nor $NULLFRAME for a number above 0."""
+    match frame, number:
+        case syntax.Variable(name="$NULLFRAME"), syntax.Constant(value=int(given)):
+            return given <= 0
+        case syntax.Element(of=syntax.Variable(name="TOOL_DATA" | "BASE_DATA"), indices=(index,)), _:
+            return index == number or (isinstance(index, syntax.Variable) and index.name in ("$ACT_TOOL", "$ACT_BASE"))
+    return True
 
 
 class KrlDialect(Dialect):

@@ -13,7 +13,16 @@ from pathlib import Path
 
 from er3a.errors import InputError
 from er3a.programs import syntax
-from er3a.programs.code_builder import CodeBuilder, fault, lacks_data, linked, mapped, not_understood, within
+from er3a.programs.code_builder import (
+    CodeBuilder,
+    fault,
+    lacks_data,
+    linked,
+    mapped,
+    not_understood,
+    variable_of,
+    within,
+)
 from er3a.programs.instructions import Place
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, data_file_of, read_program_text
 from er3a.programs.program_findings import DataFileMissing, NameTwice, ProgramFinding
@@ -214,7 +223,7 @@ class _Statement:
 
     def _assignment(self) -> None:
         words = self.words
-        left = self._known(words.expression())
+        left = self.known(words.expression())
         if words.accept("="):
             value = words.expression()
             words.finish()
@@ -225,7 +234,7 @@ class _Statement:
             raise MisreadError("neither an assignment nor a call")
         self.builder.add(syntax.Doing(self.place, left, self.text))
 
-    def _known(self, expression: syntax.Expression) -> syntax.Expression:
+    def known(self, expression: syntax.Expression) -> syntax.Expression:
         """The signal that a name stands for."""
         if isinstance(expression, syntax.Variable):
             return self.signals.get(expression.name, expression)
@@ -321,13 +330,16 @@ def _return(reading: _Statement) -> None:
 def _interrupt(reading: _Statement) -> None:
     """``INTERRUPT DECL priority WHEN condition DO routine()``; ``INTERRUPT ON`` and the like change only when."""
     if reading.words.accept("DECL"):
-        _do(reading)
+        _do(reading, at_any_time=True)
     else:
         reading.builder.aside(reading.place, reading.text)
 
 
-def _do(reading: _Statement) -> None:
-    """A routine behind DO, which runs whenever a condition holds; or an assignment of a TRIGGER."""
+def _do(reading: _Statement, at_any_time: bool = False) -> None:
+    """A routine behind DO, which runs whenever a condition holds; or an assignment, from which on the value is unclear.
+
+    An interrupt (``at_any_time``) may assign again and again: it is named.
+    """
     asked = re.search(r"(?i)\bDO\b(.*?)(\bPRIO\s*=.*)?$", reading.text)
     if asked is None:
         raise MisreadError("no DO")
@@ -337,7 +349,11 @@ def _do(reading: _Statement) -> None:
         words.finish()
         reading.builder.beside(reading.place, what, reading.text, "interrupt")
     elif words.accept("="):
-        reading.builder.aside(reading.place, reading.text)
+        if at_any_time:
+            reading.builder.unknown(reading.place, reading.text, may_move=False)
+        else:
+            reading.builder.aside(reading.place, reading.text)
+        reading.builder.unclear(reading.place, variable_of(reading.known(what)))
     else:
         raise MisreadError("DO calls no routine and sets nothing")
 
@@ -372,7 +388,7 @@ HANDLERS: dict[str, Handler] = {
     "HALT": lambda reading: reading.builder.add(syntax.Waiting(reading.place, "operator", None, "HALT")),
     "WAIT": _wait,
     "INTERRUPT": _interrupt,
-    "TRIGGER": _do,
+    "TRIGGER": lambda reading: _do(reading),
     "RESUME": lambda reading: reading.builder.unknown(reading.place, reading.text),  # the arm stops where it is
     "SPLINE": lambda reading: _spline(reading),
     "PTP_SPLINE": lambda reading: _spline(reading),

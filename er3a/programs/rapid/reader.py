@@ -15,7 +15,7 @@ from pathlib import Path
 
 from er3a.errors import InputError
 from er3a.programs import syntax
-from er3a.programs.code_builder import CodeBuilder, fault, linked, within
+from er3a.programs.code_builder import CodeBuilder, fault, linked, mapped, within
 from er3a.programs.instructions import Place
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, read_program_text
 from er3a.programs.program_findings import NameTwice, NotSimulated, NotUnderstood, ProgramFinding
@@ -867,10 +867,35 @@ def _for(body: _BodyReader, place: Place) -> None:
         words.finish()
     except MisreadError as error:
         raise fault(place, f"this FOR can't be read ({error})", "Write FOR i FROM 1 TO 9 DO") from None
+    own, code = set(body.scope.own), body.builder.code
+    before = len(code)
     body.scope.own.add(name)
     body.builder.add(syntax.Assign(place, syntax.Variable(name), None, "", local=True))
     body.builder.open_for(place, name, first, last, step, cursor.text(tokens))
+    inside = len(code) - 1
     _inside(body, place, "for", "ENDFOR")
+    body.scope.own &= own
+    _hide(code, before, inside, name)
+
+
+def _hide(code: list[syntax.Operation], before: int, inside: int, name: str) -> None:
+    """Give a loop's counter a name of its own: it hides data of its name in the loop alone.
+
+    Parameters
+    ----------
+    before, inside : numbers of the loop's first operation, and of the first that evaluates the counter
+    """
+    counter = syntax.Variable(f"{name}%{before}")
+
+    def each(expression: syntax.Expression) -> syntax.Expression:
+        return counter if expression == syntax.Variable(name) else within(expression, each)
+
+    for at, operation in enumerate(code[before:], before):
+        if at >= inside:
+            operation = mapped(operation, each)
+        code[at] = (
+            replace(operation, target=each(operation.target)) if isinstance(operation, syntax.Assign) else operation
+        )
 
 
 def _inside(body: _BodyReader, place: Place, kind: str, end: str) -> None:

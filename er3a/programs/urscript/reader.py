@@ -172,10 +172,12 @@ class _UrReader:
         .. [1] Universal Robots, *Script manual*, section Scoping rules.
         """
         top = self.open[0].code
-        if any(isinstance(each, syntax.Call) and each.result == syntax.START for each in top):
-            return
+        started = {each.routine for each in top if isinstance(each, syntax.Call) and each.result == syntax.START}
+        first = [each for routine in self.routines if routine.name in started for each in routine.code]
         every = [*top, *(each for routine in self.routines for each in routine.code)]
-        shared = {variable_of(each.target) for each in top if isinstance(each, syntax.Assign)}
+        shared = {
+            variable_of(each.target) for each in (*top, *first) if isinstance(each, syntax.Assign) and not each.local
+        }
         shared |= {
             variable_of(each.target) for each in every if isinstance(each, syntax.Assign) and each.type_name == "global"
         }
