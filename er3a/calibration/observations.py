@@ -391,9 +391,11 @@ class PointObservations:
         return replace(self, deviation_mm=np.full(len(self), deviation_mm))
 
     def rich(self, robot: Robot) -> PointObservations:
-        """The same points, with their coordinates, at poses all over the joint range."""
+        """The same points, with the coordinates that were measured of any, at poses all over the joint range."""
         points = np.unique(self.on_tool)
-        return self._at(robot, np.repeat(np.array(spread(robot)), len(points), axis=0), np.tile(points, RICH_POSES))
+        every = self._at(robot, np.repeat(np.array(spread(robot)), len(points), axis=0), np.tile(points, RICH_POSES))
+        seen = np.broadcast_to(self.seen[self.touched < 0].any(axis=0), every.seen.shape)
+        return replace(every, seen=seen, values_mm=np.zeros(seen.sum()), deviation_mm=every.deviation_mm[: seen.sum()])
 
     def flange_at(self, robot: Robot, poses: Sequence[Pose]) -> PointObservations:
         """The flange at poses."""

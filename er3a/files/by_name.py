@@ -31,6 +31,7 @@ from er3a.identifiability.evidence import evidence_of
 from er3a.numerics.arrays import Reals
 from er3a.references.quantities import Pose
 from er3a.references.reference import Document, Documents, Reference, ReferenceSet
+from er3a.robots.joint_limits import meant
 from er3a.robots.robot import MOST_JOINTS, Robot, Source
 
 _NUMBER = CsvColumn(float)
@@ -104,6 +105,25 @@ def load_measurements(path: str | Path, robot: Robot | None = None) -> tuple[Mea
     _check_contradictions(path, rows)
     _check_lengths(path, rows)
     return tuple(rows)
+
+
+def load_joint_values(path: str | Path, robot: Robot) -> Reals:
+    """Joint values (P, n), rad or m, of a table with the joints' columns of measured positions; its other columns may
+    be there, and are not read.
+
+    Raises
+    ------
+    InputError
+        naming file, row and column: a number missing or not finite, radians, or a value outside the joint limits
+    """
+    path, units = Path(path), ["mm" if slides else "deg" for slides in robot.slides]
+    unread = {name: replace(each, optional=True, always=False) for name, each in measurement_columns(units).items()}
+    joints = [f"q{joint}_{unit}" for joint, unit in enumerate(units, 1)]
+    table = read_csv(path, unread | dict.fromkeys(joints, _NUMBER))
+    rows = [Measurement(each["row"], tuple(each[q] for q in joints), "tool", (None, None, None)) for each in table]
+    _check_units(path, rows, units)
+    check_poses(rows, robot, path)
+    return meant(robot, np.array([row.pose for row in rows], dtype=float).reshape(-1, robot.joints))
 
 
 def _check_lengths(path: Path, rows: list[Measurement]) -> None:

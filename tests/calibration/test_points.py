@@ -3,6 +3,7 @@ what is no noise is said."""
 
 from __future__ import annotations
 
+import csv
 import json
 from dataclasses import replace
 from itertools import cycle
@@ -16,7 +17,7 @@ from typer.testing import CliRunner
 import er3a
 from er3a.calibration.fit import Fit, covariance_by_poses
 from er3a.calibration.observations import Measurement, PointObservations
-from er3a.calibration.outcomes import CalibrationError, NotToldApart
+from er3a.calibration.outcomes import CalibrationError, MovesNothing, NotToldApart
 from er3a.calibration.parameters import coupled, settles
 from er3a.calibration.plan import plan
 from er3a.calibration.terms import JointErrors, JointTerm, candidates, starting_table
@@ -80,7 +81,11 @@ def four() -> er3a.Robot:
     )
 
 
-TOUCHING = ARMS | {"gantry": gantry, "four": four}
+def planar() -> er3a.Robot:
+    return er3a.Robot.from_dh([0.4, 0.3, 0.2], np.zeros(3), [0.1, 0, 0], lower=[-2.8] * 3, upper=[2.8] * 3)
+
+
+TOUCHING = ARMS | {"gantry": gantry, "four": four, "planar": planar}
 
 
 class Bench:
@@ -215,6 +220,19 @@ def test_what_is_a_choice_between_base_tool_and_table_is_said(random):
         er3a.calibrate(bench.robot, rows, fixed="base")
 
 
+def test_a_coordinate_that_was_never_measured_leaves_open_what_moves_it_alone(random):
+    """Positions of a planar arm in its plane, as a camera above sees them."""
+    bench = Bench("planar", random)
+    rows = [replace(row, xyz_mm=(*row.xyz_mm[:2], None)) for row in bench.measured(60, 0.02)]
+    found = er3a.calibrate(bench.robot, rows)
+    corrections = {each.name: each for each in found.estimates}
+    for k in range(2):
+        own = corrections[f"a{k + 1}"]
+        assert own.correction == pytest.approx(1000 * (bench.truth.a - bench.robot.a)[k], abs=0.1)
+    assert {MovesNothing("base_z"), MovesNothing("d1")} <= set(found.held)
+    assert found.more is None
+
+
 def test_a_stated_deviation_is_kept(random):
     bench = Bench("six", random)
     rows = [Measurement(r.row, r.pose, r.point, r.xyz_mm, 0.5) for r in bench.measured(60, 0.05)]
@@ -287,6 +305,11 @@ def test_the_command_tells_positions_held_back(tmp_path):
     assert text.index("mine_model.json: written; the whole model: er3a.load_calibration") < text.index("mine.yaml: wri")
     written = json.loads((tmp_path / "mine_model.json").read_text(encoding="utf-8"))
     assert written | {"output": None} == found
+    words = ["predict", str(tmp_path / "mine_model.json"), str(held), "--robot", str(MEASUREMENTS / "wam.yaml")]
+    assert f"er3a {' '.join(words).replace(str(held), 'JOINTS.csv')}" in text
+    printed = list(csv.DictReader(CliRunner().invoke(app, words).stdout.splitlines()))
+    by_command = np.array([[float(line[f"{c}_mm"]) for c in "xyz"] for line in printed])
+    assert by_command == pytest.approx(np.array([each["xyz_mm"] for each in found["held_back"]["rows"]]), abs=1e-5)
     mine, rows = load_robot(tmp_path / "mine.yaml"), load_measurements(held, robot)
     model, q = er3a.load_calibration(record, robot), np.radians([row.pose for row in rows])
     for name, T in (("xyz_mm", model.forward(q)), ("table_xyz_mm", er3a.forward(mine, q))):

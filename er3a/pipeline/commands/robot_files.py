@@ -250,6 +250,31 @@ def calibrate(
 
 
 @options.app.command(rich_help_panel=options.ROBOT_FILES)
+def predict(
+    model: Annotated[Path, typer.Argument(help="NAME_model.json, which er3a calibrate --output NAME.yaml writes")],
+    joints: Annotated[Path, typer.Argument(help="a CSV with the columns q1_deg ... (q3_mm of a joint that slides)")],
+    robot: Annotated[str, typer.Option(help="the robot that the calibration started from: a name or file")],
+):
+    """Print where a calibrated arm's tool is at commanded joint values, by the whole model with all its terms: a CSV
+    with position and roll, pitch and yaw."""
+    import numpy as np
+
+    from er3a.files.by_name import load_calibration, load_joint_values
+    from er3a.files.robot_library import load_robot
+    from er3a.geometry.transforms import rpy_of
+    from er3a.robots.joint_limits import shown
+
+    arm = load_robot(robot)
+    q = load_joint_values(joints, arm)
+    T = load_calibration(model, arm).forward(q)
+    names = [f"q{joint}_{'mm' if slides else 'deg'}" for joint, slides in enumerate(arm.slides, 1)]
+    print(",".join([*names, "x_mm", "y_mm", "z_mm", "roll_deg", "pitch_deg", "yaw_deg"]))
+    for values, pose in zip(shown(arm, q), T):
+        numbers = [*values, *1000 * pose[:3, 3], *np.degrees(rpy_of(pose))]
+        print(",".join(f"{number:.6f}" for number in numbers))
+
+
+@options.app.command(rich_help_panel=options.ROBOT_FILES)
 def hand_eye(
     file: Annotated[
         Path, typer.Argument(callback=options.given_files, help="a calibration set (YAML, kind: hand_eye)")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -110,7 +111,8 @@ def kept_lines(found: Calibration, robot: str, output: Path | None, model: Path 
     python = f"er3a.load_calibration('{model or 'FILE_model.json'}', er3a.load_robot('{robot}')).forward(q)"
     if output is None or model is None:
         return [f"keep it: --output FILE.yaml writes the robot file, and FILE_model.json for {python} in Python"]
-    lines = [f"{model}: written; the whole model: {python} in Python"]
+    lines = [f"{model}: written; the whole model: {python} in Python, or"]
+    lines.append(f"    er3a predict {shlex.quote(str(model))} JOINTS.csv --robot {shlex.quote(robot)}")
     lines.append(f"{output}: written" + (f"; {text}" if (text := file_text(found)) else ""))
     if found.ratios:
         lines.append(
