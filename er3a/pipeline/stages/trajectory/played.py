@@ -14,6 +14,7 @@ from er3a.pipeline.messages.programs import remedy, say
 from er3a.pipeline.messages.say import joined, sentence
 from er3a.pipeline.messages.trajectory import (
     IF_ASSUMED,
+    SoundEnd,
     advice,
     cause_text,
     end_text,
@@ -25,11 +26,15 @@ from er3a.pipeline.messages.trajectory import (
 from er3a.pipeline.player.motions import Fault, Mark, PlayedEvent, PlayedMotion, Weight, address_of
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.viewing.numbers import fixed
+from er3a.planning.motion_faults import joints_of
 from er3a.planning.names import PathVerdict
 from er3a.program_check.program_check_findings import ClearOfAssumed
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
+LIMIT_MARGIN = 2.0  # deg, or mm where a joint slides, between an end that is advised and a limit that the path leaves
+REACH_MARGIN = 0.02  # m of the path before it leaves the reach
+SPEED_MARGIN = 0.9  # of a joint's speed limit
 WEIGHTS: dict[PathVerdict, Weight] = {
     "safe": "plain",
     "near-singular": "caution",
@@ -124,18 +129,18 @@ def _to_do(
         return repair, (name, address_of("trajectory", name, 0.0, path.name))
     if path.verdict == "safe" and (near := near_assumed(path, summary)):
         return remedy(near), None
-    last = last_sound(path, rows)
+    last = last_sound(path, rows, summary.joint_limits)
     if last is None:
-        todo = advised(path, rows)
+        todo = advised(path, rows, summary.joint_limits)
         return sentence("finding", finding=todo) if todo else "", None
     name = tr("{path}, up to {time} s", path=path.name, time=fixed(last[0], 3))
-    end = end_text(path, last[1], summary.verdict.shapes)
+    end = end_text(path, last, summary.verdict.shapes)
     return end, (name, address_of("trajectory", path.name, last[0], path.name, last[0]))
 
 
-def advised(path: model.PathSummary, rows: model.PathChecks, limits: model.LimitsUsed | None = None) -> str | None:
+def advised(path: model.PathSummary, rows: model.PathChecks, limits: model.LimitsUsed) -> str | None:
     """What to do about a path; None where nothing is to be done. ``rows``, ``limits``: of the path, of the joints."""
-    sound = last_sound(path, rows)
+    sound = last_sound(path, rows, limits)
     text = advice(path if sound else replace(path, clear_until=None), sound, limits)
     if text is None or path.chosen:
         return text
@@ -150,11 +155,12 @@ def repaired(path: model.PathSummary) -> str:
     return tr("{path}, repaired", path=path.name)
 
 
-def last_sound(path: model.PathSummary, rows: model.PathChecks) -> tuple[float, tuple[float, ...]] | None:
-    """Time (s) and place (mm) of the last point (of ``rows``, or where the margin is kept) before anything is wrong, or
-    a path of the tool is near-singular.
+def last_sound(path: model.PathSummary, rows: model.PathChecks, limits: model.LimitsUsed) -> SoundEnd | None:
+    """The last point (of ``rows``, or where a collision's margin is kept) at which a path may end.
 
-    None where something is wrong at once, no point of a path that collides keeps the margin, or none was planned.
+    Before anything is wrong, or a path of the tool is near-singular, twice the time is left that the joints take to
+    stop there at their ``limits``, and ``LIMIT_MARGIN``, ``REACH_MARGIN`` and ``SPEED_MARGIN`` are kept. None where no
+    point of a path has that, it keeps no margin of collisions anywhere, or none was planned.
     """
     until = path.clear_until
     if path.no_way or (path.collisions and until is None):
@@ -162,10 +168,21 @@ def last_sound(path: model.PathSummary, rows: model.PathChecks) -> tuple[float, 
     others = path.unreachable, path.out_of_limits, path.too_fast, path.undecided
     starts = [part.t0_s for stretches in others for part in stretches] + _singular_times(path)
     starts += [] if path.in_joint_space else rows.t_s[rows.near_singular][:1].tolist()
-    if until and until.t_s < min(starts, default=np.inf):
-        return until.t_s, until.xyz_mm
-    sound = rows.take(rows.reachable & (rows.t_s < min(starts, default=0.0)))
-    return (float(sound.t_s[-1]), tuple(sound.xyz_mm[-1].tolist())) if len(sound) else None
+    first = min(starts, default=np.inf)
+    stop = (np.abs(rows.q_deg_s) / limits.acceleration_deg_s2).max(axis=1)
+    kept = rows.reachable & (rows.t_s + 2 * stop <= first) & (np.nan_to_num(rows.speed_ratio) <= SPEED_MARGIN)
+    for part in path.out_of_limits:
+        joints, at = [j - 1 for j in joints_of(part.cause)], int(np.argmin(np.abs(rows.t_s - part.t0_s)))
+        kept &= np.abs(rows.q_deg[:, joints] - rows.q_deg[at, joints]).max(axis=1) >= LIMIT_MARGIN
+    for lost in path.unreachable:
+        kept &= rows.s_m <= lost.s0_m - REACH_MARGIN
+    if until and (np.isinf(first) or kept[rows.t_s <= until.t_s][-1:].any()):
+        return SoundEnd(until.t_s, until.xyz_mm)
+    ends = np.flatnonzero(kept & (rows.t_s < first) & (rows.t_s <= (until.t_s if until else np.inf)))
+    if not starts or not len(ends):
+        return None
+    k = ends[-1]
+    return SoundEnd(float(rows.t_s[k]), tuple(rows.xyz_mm[k].tolist()), float(first - rows.t_s[k]), float(stop[k]))
 
 
 def shown_verdict(path: model.PathSummary, near: ClearOfAssumed | None) -> tuple[Weight, str]:
