@@ -74,7 +74,9 @@ class SoundEnd(NamedTuple):
 
 TEXTS = texts(
     {
-        "trajectory.paths": Plural("count", "{safe} of {count} path is safe", "{safe} of {count} paths are safe"),
+        "trajectory.paths": Plural(
+            "count", "{safe} of {count} path passes in the model", "{safe} of {count} paths pass in the model"
+        ),
         "trajectory.not_followed": "{count} not followed to the end ({names})",
         "trajectory.fault": "{count} {word} ({names})",
         "dependent_axes": "axes {axes} dependent",
@@ -140,13 +142,16 @@ TEXTS = texts(
         ),
         "advice.end#clear": "End it there, with the tool at x, y, z = {xyz} mm: {margin:.1f} mm clear.",
         "advice.end#assumed": (
-            "End it there, with the tool at x, y, z = {xyz} mm: {margin:.1f} mm clear of assumed shapes; {left:.1f} mm "
-            "if these are wrong by {wrong:g} mm, braking distance not included."
+            "End it there, with the tool at x, y, z = {xyz} mm: {margin:.1f} mm clear of assumed shapes, and {left:.1f} "
+            "mm if the true shapes are {wrong:g} mm larger; the way that braking takes comes off that."
         ),
         "advice.chosen": "{way}: {tool}; {time}",
         "advice.chosen#clear": "{way}: {tool}; {time}; the arm keeps {clearance:.1f} mm of clearance",
         "advice.instead": "The path itself can't be driven",
-        "advice.slowly": "Run it in a cleared cell and no faster than the {programmed:.2f} s programmed",
+        "advice.slowly": (
+            "This is its shortest time: run it in a cleared cell, and slower, in the {programmed:.2f} s programmed or "
+            "more"
+        ),
         "advice.near": "Run no part of it: the arm is near-singular at the start",
         "advice.region": "It still passes near the singular pose",
         "advice.full_speed": "A joint moves at full speed: start slowly",
@@ -392,7 +397,9 @@ def advice(
 def _until(path: model.PathSummary, sound: SoundEnd | None) -> str:
     """Up to where a path may be run: to the last point with the margin, unless something else is wrong before."""
     if sound and not (path.clear_until and sound.t_s >= path.clear_until.t_s):
-        return sentence("advice.sound", t=sound.t_s, xyz=_numbers(sound.xyz_mm, 1), left=sound.left_s, stop=sound.stop_s)
+        return sentence(
+            "advice.sound", t=sound.t_s, xyz=_numbers(sound.xyz_mm, 1), left=sound.left_s, stop=sound.stop_s
+        )
     return _clear(path)
 
 
@@ -405,7 +412,11 @@ def end_text(path: model.PathSummary, end: SoundEnd, assumed: ShapesAssumed | No
             left = max(0.0, path.clear_until.margin_mm - assumed.margin_mm)
             return sentence("advice.end#assumed", wrong=assumed.margin_mm, left=left, **parts)
         return sentence("advice.end#clear", **parts)
-    return sentence("advice.end", xyz=_numbers(end.xyz_mm, 1), left=end.left_s, stop=end.stop_s)
+    return sentence("advice.end", **_end(end))
+
+
+def _end(end: SoundEnd) -> dict[str, Any]:
+    return {"xyz": _numbers(end.xyz_mm, 1), "left": end.left_s, "stop": end.stop_s}
 
 
 def _slower_throughout(path: model.PathSummary) -> str:

@@ -596,8 +596,12 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         "decision": decision(table, [*failed.values()], instead, unproven=unproven, same_arm=same_arm),
         "settled": settled,
         "instead": {instead: f"#{instead}"} if instead else {},
-        "simulated": [stage for stage, head in heads.items() if _misses(head, "real_camera")],
         "answers": [*_answers(heads, robot)],
+        "notes": {stage: _note(stage, head, stored[stage].results) for stage, head in heads.items()},
+        "bare": any(
+            _misses(heads[stage], "carried") or _misses(heads[stage], "tool") for stage in RUNS if stage in heads
+        ),
+        "bodies": [each.name for each in scene.solids] if (scene := study.scene(name, "trajectory")) else [],
         "runs": [
             _run(stage, stored[stage].results)
             for stage in RUNS
@@ -716,7 +720,17 @@ def _run(stage: str, results: TrajectoryResults | ProgramsResults) -> dict[str, 
         "sound": sound,
         "faults": faults,
         "open": left_out,
+        "more": len(results.summary.not_examined) - len(left_out),
     }
+
+
+def _note(stage: str, head: Head, results: Any) -> str:
+    """What stands beside a stage's name: how many of its paths or programs pass, where some do not, or that its camera
+    is simulated."""
+    if stage in RUNS and head.status != "not_computed":
+        run = _run(stage, results)
+        return tr("{sound} of {count}", sound=len(run["sound"]), count=run["count"]) if run["faults"] else ""
+    return tr("simulated") if _misses(head, "real_camera") else ""
 
 
 def _cell(head: Head) -> dict[str, Any]:

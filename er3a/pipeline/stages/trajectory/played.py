@@ -78,7 +78,7 @@ def faults(results: model.TrajectoryResults) -> list[Fault]:
         if model.is_safe(path, results.summary.verdict.shapes):
             continue
         clearance = path.clearance if path.verdict == "safe" else None
-        what, t = (say(near), clearance.t_s) if clearance else _first_fault(path)
+        first, t, later = (say(near), clearance.t_s, "") if clearance else _first_fault(path)
         status, verdict = shown_verdict(path, near)
         to_do, instead = _to_do(path, results.checks.take(results.checks.path == path.name), results.summary)
         found.append(
@@ -89,23 +89,24 @@ def faults(results: model.TrajectoryResults) -> list[Fault]:
                 verdict,
                 path.expect == path.verdict != "safe",
                 "" if t is None else tr("{time} s", time=fixed(t, 3)),
-                what,
+                joined([first, later]),
                 to_do,
                 address_of("trajectory", path.name, t or 0.0, path.name),
                 instead,
+                first,
             )
         )
     return found
 
 
-def _first_fault(path: model.PathSummary) -> tuple[str, float | None]:
+def _first_fault(path: model.PathSummary) -> tuple[str, float | None, str]:
     """What is wrong first with a path that is not safe, and when (s), if it has a time; then what is wrong later."""
     found = [] if path.no_way else first_faults(path)
     if (path.verdict in ("singular", "near-singular") and len(found) <= 1) or not found:
         times = [] if path.no_way else _singular_times(path) or [event.t_s for event in path.singularities]
-        return path_text(path), min(times, default=None)
+        return path_text(path), min(times, default=None), ""
     later = [tr("at t = {time} s: {text}", time=fixed(t, 3), text=text) for t, text in found[1:]]
-    return joined([found[0][1], *later]), found[0][0]
+    return found[0][1], found[0][0], joined(later)
 
 
 def _singular_times(path: model.PathSummary) -> list[float]:
