@@ -80,7 +80,7 @@ GLOSSARY = {
     N_("settled"): N_(
         "of a table entry: what independent documents leave open for it moves the tool by less than the tolerance"
     ),
-    N_("up to signs"): N_(
+    N_("but for signs"): N_(
         "of a settled table entry: keep it; should an open entry turn out otherwise, another sign or half turn here "
         "may fit as well"
     ),

@@ -142,8 +142,8 @@ TEXTS = texts(
         ),
         "advice.end#clear": "End it there, with the tool at x, y, z = {xyz} mm: {margin:.1f} mm clear.",
         "advice.end#assumed": (
-            "End it there, with the tool at x, y, z = {xyz} mm: {margin:.1f} mm clear of assumed shapes, and {left:.1f} "
-            "mm if the true shapes are {wrong:g} mm larger; the way that braking takes comes off that."
+            "End it there, with the tool at x, y, z = {xyz} mm: {margin:.1f} mm clear of assumed shapes, and "
+            "{left:.1f} mm if the true shapes are {wrong:g} mm larger; the way that braking takes comes off that."
         ),
         "advice.chosen": "{way}: {tool}; {time}",
         "advice.chosen#clear": "{way}: {tool}; {time}; the arm keeps {clearance:.1f} mm of clearance",

@@ -398,9 +398,7 @@ def void_text(summary: Summary, *, confirmed: bool = True) -> str:
         finding, model.VoidAtShoulder | model.VoidUnexpected
     ):
         return ""
-    voids = summary.enclosed_voids
-    unexpected = (void for void in voids if void.status == "proven_empty" and not void.holds_shoulder)
-    judged = next(unexpected, voids[0])
+    voids, judged = summary.enclosed_voids, judged_void(summary)
     where = sentence("void.shoulder" if judged.holds_shoulder else "void.away", **_void_parts(judged))
     cause = sentence("void.cause#it" if is_predicate(judged.cause) else "void.cause#noun", cause=say(judged.cause))
     expected = ""
@@ -412,6 +410,13 @@ def void_text(summary: Summary, *, confirmed: bool = True) -> str:
     pocket = max(summary.voids, key=lambda void: void.volume_m3.upper)
     open_one = sentence("void.pocket", **_void_parts(pocket)) if pocket.kind == "open" else ""
     return joined([where, cause, expected, more, open_one], " ")
+
+
+def judged_void(summary: model.WorkspaceSummary) -> model.VoidSummary:
+    """The enclosed void that the verdict tells of."""
+    voids = summary.enclosed_voids
+    unexpected = (void for void in voids if void.status == "proven_empty" and not void.holds_shoulder)
+    return next(unexpected, voids[0])
 
 
 def _resting_on(cause: VoidCause) -> str:

@@ -41,7 +41,7 @@ from er3a.pipeline.messages.validation import (
     shortened,
     unconfirmed,
 )
-from er3a.pipeline.messages.workspace import box_text, void_text
+from er3a.pipeline.messages.workspace import box_text, judged_void, void_text
 from er3a.pipeline.results import (
     AbsentResults,
     Input,
@@ -669,7 +669,9 @@ def _answers(heads: Mapping[str, Head], robot: Robot) -> Iterator[tuple[str, str
     summary = heads["dynamics"].summary if "dynamics" in heads else None
     yield tr("Payload"), payload_text(summary, robot), "dynamics.html#payload" if summary else ""
     if workspace:
-        place = "#table-voids" if getattr(workspace, "voids", ()) else ""
+        place = ""
+        if isinstance(workspace, WorkspaceSummary) and workspace.enclosed_voids:
+            place = f"#void-{workspace.voids.index(judged_void(workspace)) + 1}"
         yield tr("Void"), void_text(workspace, confirmed=_limits_confirmed(heads)), f"workspace.html{place}"
 
 
