@@ -47,8 +47,8 @@ def test_what_nothing_confirms_is_named_entry_by_entry_or_as_a_whole():
     names = "alpha 6, offset 6, direction 1, 2, 3, 4, 5, 6, all limits"
     assert unconfirmed(FOUND.parts, FOUND.unbounded) == names
     assert settled_parts(FOUND) == (
-        "Confirmed by independent documents: 16 of 17 lengths and twists (10 of them up to signs), 5 of 12 zeros and "
-        f"directions (5 of them up to signs). Not confirmed: {names}."
+        "Confirmed by independent documents: 16 of 17 lengths and twists (10 of them but for signs), 5 of 12 zeros and "
+        f"directions (5 of them but for signs). Not confirmed: {names}."
     )
     assert names in _condition(FOUND.parts, FOUND.unbounded)
     nothing = tuple(replace(part, settled=0, up_to_signs=0) for part in FOUND.parts)
