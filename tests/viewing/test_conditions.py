@@ -70,10 +70,10 @@ def test_a_turned_flange_moves_the_tip_of_a_tool():
     assert first.startswith(
         "If an open or weak entry (alpha 6, offset 6) is wrong, the tool point (without a tool: the"
     )
-    assert "up to 2 L off. Run no Cartesian target with a tool" in first
+    assert "off by up to 2 times its distance from there. Run no Cartesian target with a tool" in first
     (quarter, _) = how_far_off(replace(FOUND, off=ToolOff(0.0, 90.0)))
     chord = np.linalg.norm(np.array([1.0, 0.0]) - [0.0, 1.0])  # of a quarter turn
-    assert f"{chord:.2g} L off" in quarter
+    assert f"{chord:.2g} times its distance" in quarter
     weak = replace(FOUND, parts=(replace(FOUND.parts[0], settled=5), *FOUND.parts[1:]))
     assert "If an open or weak entry is wrong" in how_far_off(weak)[0]  # one more is not settled, and has no name here
 

@@ -654,7 +654,8 @@ def _settled(finding: object) -> tuple[bool, str]:
     if not isinstance(finding, LeftOpen):
         return False, ""
     part = next((part for part in finding.parts if part.part == "geometry"), None)
-    said = joined([settled_parts(finding), *how_far_off(finding)], " ")
+    conflict = say(finding.contradiction) if finding.contradiction else ""
+    said = joined([settled_parts(finding), *how_far_off(finding), conflict], " ")
     return part is not None and not (part.settled or part.up_to_signs), said
 
 

@@ -107,7 +107,7 @@ def _section(
         verdict=verdict,
         kind=kind_word(path.kind),
         text=joined([path_text(path), say(near) if near else ""]),
-        clear=_clear_of(path),
+        distance=_clear_of(path),
         advice=advised(path, rows, summary.joint_limits),
         near=joined([say(near), remedy(near).rstrip(".。")], ". ") if near else "",
         branches=[branch_word(label) for label in path.branches],
