@@ -112,7 +112,7 @@ def test_a_path_that_ends_where_its_advice_says_keeps_the_margin(tmp_path, name)
     end = {"xyz_mm": [float(x) for x in xyz.split(", ")], "rpy_deg": [float(x) for x in rpy.split(", ")]}
     shown = end_text(path, SoundEnd(0.0, path.clear_until.xyz_mm), ShapesAssumed(given=True, margin_mm=20.0, near=()))
     left = path.clear_until.margin_mm - 20
-    assert f"{left:.1f} mm if these are wrong by 20 mm, braking distance not included" in shown
+    assert f"{left:.1f} mm if the true shapes are 20 mm larger; the way that braking takes comes off that" in shown
     (shorter,) = paths_of(tmp_path, name, end=end, duration_s=path.duration_s * path.clear_until.s_m / path.length_m)
     assert not shorter.collisions
     assert not shorter.out_of_limits
