@@ -39,7 +39,7 @@ CARRIED_OUT = {
     "remedy.zone_too_large": OF_PROGRAMS,
     "remedy.limit#above": OF_PROGRAMS,
     "remedy.limit#below": OF_PROGRAMS,
-    **{f"remedy.collision#{form}": OF_PROGRAMS for form in ("solid", "links")},
+    **{f"remedy.collision#{form}": OF_PROGRAMS for form in ("solid", "links", "solid_at_target")},
     **{f"remedy.joint_jumps#{form}": OF_PROGRAMS for form in ("stays", "moves")},
     "remedy.slower": "test_a_line_at_the_pace_advised_passes",
     "remedy.clear_of_assumed": "test_a_motion_that_passes_near_assumed_shapes_is_a_caution",

@@ -172,12 +172,16 @@ class ConfigurationGuessed(Finding):
 
 
 class BodiesTouch(Finding):
-    """Two bodies that overlap on the way, from a time (s) of the motion on, and a place of a line; how deep at most."""
+    """Two bodies that overlap on the way, from a time (s) of the motion on, and a place of a line; how deep at most.
+
+    ``at_target``: whether they overlap at the motion's end.
+    """
 
     pair: Pair
     t_s: float
     at_mm: float | None
     depth_mm: float
+    at_target: bool = False
 
 
 class MotionCollides(Finding):

@@ -820,9 +820,13 @@ class StepChecker:
         if not along.contacts:
             return self._clear(replace(motion, clearance=least), along)
         touches: dict[Pair, found_in.BodiesTouch] = {}
+        last = way.q[np.isfinite(way.q).all(axis=1)][-1:]
+        at_target = {bodies.pairs[k] for k in np.flatnonzero(bodies.overlaps(last)[0])}
         for touch in (each for contact in along.contacts for each in contact.touches):  # in the order of time
             at = None if motion.kind == "joint" else way.along_mm(touch.start)
-            first = touches.get(touch.pair, found_in.BodiesTouch(touch.pair, touch.start, at, 0.0))
+            first = touches.get(
+                touch.pair, found_in.BodiesTouch(touch.pair, touch.start, at, 0.0, touch.pair in at_target)
+            )
             touches[touch.pair] = replace(first, depth_mm=max(first.depth_mm, touch.depth * 1000))
         hit = found_in.MotionCollides(tuple(touches.values()))
         moments = {**motion.moments, hit: along.contacts[0].start}

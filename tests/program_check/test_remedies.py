@@ -276,7 +276,14 @@ MENDED = {
     "speed_not_given": ("DEF a( )\nPTP {A1 5}\nEND\n", krl("PTP {A1 5}")),
     "above_limit": (krl("PTP {A1 170}"), krl(f"PTP {{A1 {np.degrees(ROBOT.upper[0]):g}}}")),
     "below_limit": (krl("PTP {A1 -170}"), krl(f"PTP {{A1 {np.degrees(ROBOT.lower[0]):g}}}")),
-    "motion_collides": (
+    "motion_collides.solid": (  # round the post, by the via point that was found
+        (krl("PTP {A1 100}"), {"scene": SCENE}),
+        lambda before: (
+            krl(*(f"PTP {axes(np.radians(move))}" for each in before.findings for move in each.joint_moves)),
+            {"scene": SCENE},
+        ),
+    ),
+    "motion_collides.solid_at_target": (
         (krl(f"LIN {{X 400,Y 0,Z 400,{DOWN}}}", "LIN {Z -50}"), {"scene": SCENE}),
         (krl(f"LIN {{X 400,Y 0,Z 400,{DOWN}}}", "LIN {Z 300}"), {"scene": SCENE}),
     ),
@@ -335,7 +342,9 @@ def form(finding) -> str:
     """Which of several remedies is that of a finding."""
     match finding:
         case MotionCollides():
-            return "links" if isinstance(finding.touches[0].pair, LinkPair) else "solid"
+            if isinstance(finding.touches[0].pair, LinkPair):
+                return "links"
+            return "solid_at_target" if any(touch.at_target for touch in finding.touches) else "solid"
         case JointJumps():
             return "stays" if finding.moved_mm < STAYS_MM else "moves"
     return getattr(finding, "kind", getattr(finding, "type", ""))

@@ -47,8 +47,8 @@ def test_what_nothing_confirms_is_named_entry_by_entry_or_as_a_whole():
     names = "alpha 6, offset 6, direction 1, 2, 3, 4, 5, 6, all limits"
     assert unconfirmed(FOUND.parts, FOUND.unbounded) == names
     assert settled_parts(FOUND) == (
-        "Confirmed by independent documents: 16 of 17 lengths and twists (10 of them up to signs), 5 of 12 zeros and "
-        f"directions (5 of them up to signs). Not confirmed: {names}."
+        "Confirmed by independent documents: 16 of 17 lengths and twists (10 of them but for signs), 5 of 12 zeros and "
+        f"directions (5 of them but for signs). Not confirmed: {names}."
     )
     assert names in _condition(FOUND.parts, FOUND.unbounded)
     nothing = tuple(replace(part, settled=0, up_to_signs=0) for part in FOUND.parts)
@@ -70,10 +70,10 @@ def test_a_turned_flange_moves_the_tip_of_a_tool():
     assert first.startswith(
         "If an open or weak entry (alpha 6, offset 6) is wrong, the tool point (without a tool: the"
     )
-    assert "up to 2 L off. Run no Cartesian target with a tool" in first
+    assert "off by up to 2 times its distance from there. Run no Cartesian target with a tool" in first
     (quarter, _) = how_far_off(replace(FOUND, off=ToolOff(0.0, 90.0)))
     chord = np.linalg.norm(np.array([1.0, 0.0]) - [0.0, 1.0])  # of a quarter turn
-    assert f"{chord:.2g} L off" in quarter
+    assert f"{chord:.2g} times its distance" in quarter
     weak = replace(FOUND, parts=(replace(FOUND.parts[0], settled=5), *FOUND.parts[1:]))
     assert "If an open or weak entry is wrong" in how_far_off(weak)[0]  # one more is not settled, and has no name here
 

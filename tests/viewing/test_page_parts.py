@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -40,14 +41,21 @@ def test_the_first_of_a_name_leads_on_and_texts_stay_texts():
 
 def test_the_table_to_use_is_whole_and_as_its_file_gives_it():
     real, article = er3a.load_robot("er3a_c60"), er3a.load_robot("er3a_c60_article")
-    section = table_to_use(article, real, "alpha 6, all limits")
-    rows = [[value for value, _ in cells] for _, cells in section["rows"]]
-    assert section["text"].endswith("Not confirmed: alpha 6, all limits.")
+    open_ones = [
+        EntryEvidence("alpha6", 0.0, "deg", "open", None, (), (), None),
+        EntryEvidence("a2", 270.0, "mm", "settled", None, (), (), None),
+    ]
+    section = table_to_use(article, real, "alpha 6, all limits", SimpleNamespace(entries=open_ones))
+    rows = [[value for value, *_ in cells] for _, cells in section["rows"]]
+    assert "Not confirmed: alpha 6, all limits. Marks: = only the source of er3a_c60 gives it" in section["text"]
+    assert [mark for _, cells in section["rows"] for *_, mark in cells if mark] == ["?"]
+    assert section["rows"][5][1][1][2] == "?"
     assert section["page"] == "../er3a_c60/validation.html"
     assert rows[1] == ["270", "0", "0", "−90", "−1", "−130", "90"]
-    marked = np.array([[differs for _, differs in cells] for _, cells in section["rows"]])
+    marked = np.array([[differs for _, differs, _ in cells] for _, cells in section["rows"]])
     assert marked[1].tolist() == [True, False, False, True, True, True, True]
-    assert not np.array([[differs for _, differs in cells] for _, cells in table_to_use(real, real, "")["rows"]]).any()
+    same = table_to_use(real, real, "", None)["rows"]
+    assert not any(differs or mark for _, cells in same for _, differs, mark in cells)
 
 
 @pytest.mark.parametrize(

@@ -17,9 +17,18 @@ FOUNDATIONS: Mapping[str, str] = {
         "Never use this table: evidence contradicts it. These results hold for the table, not for the robot: run no "
         "path, repair or program that was made by it."
     ),
-    "caution": N_("Part of this D-H table is not settled: these results are only as good as the table."),
-    "no_reference": N_("This D-H table was compared with no data: these results are only as good as the table."),
-    "not_computed": N_("This D-H table was not validated: these results are only as good as the table."),
+    "caution": N_(
+        "Part of this D-H table is not settled: what passes here passes in the model. Run none of it on the arm before "
+        "the table is confirmed."
+    ),
+    "no_reference": N_(
+        "This D-H table was compared with no data: what passes here passes in the model. Run none of it on the arm "
+        "before the table is confirmed."
+    ),
+    "not_computed": N_(
+        "This D-H table was not validated: what passes here passes in the model. Run none of it on the arm before the "
+        "table is confirmed."
+    ),
 }
 GRADE_NAMES = {
     "official": N_("official"),
@@ -71,7 +80,7 @@ GLOSSARY = {
     N_("settled"): N_(
         "of a table entry: what independent documents leave open for it moves the tool by less than the tolerance"
     ),
-    N_("up to signs"): N_(
+    N_("but for signs"): N_(
         "of a settled table entry: keep it; should an open entry turn out otherwise, another sign or half turn here "
         "may fit as well"
     ),

@@ -138,7 +138,9 @@ FIGURES = {
 TEXTS = texts(
     {
         "programs.none": "The robot's list of programs is empty.",
-        "programs.programs": Plural("count", "{passed} of {count} program passes", "{passed} of {count} programs pass"),
+        "programs.programs": Plural(
+            "count", "{passed} of {count} program passes in the model", "{passed} of {count} programs pass in the model"
+        ),
         "programs.not_examined": "not all examined ({names})",
         "programs.fault": "{count} {word} ({names})",
         "frame_not_given": by(
@@ -329,8 +331,14 @@ TEXTS = texts(
         "remedy.clear_of_assumed": (
             "Keep {margin:g} mm between {pair}, or give shapes from a drawing or model in the robot's file."
         ),
-        "remedy.joint_move": "Go there by a joint move to ({end}) deg: it passes these checks.",
-        "remedy.joint_moves": "Go there by joint moves to ({via}) deg, then ({end}) deg: they pass these checks.",
+        "remedy.joint_move": (
+            "From where this line starts, go by a joint move to ({end}) deg: in the model it is within limits, speeds "
+            "and clear, at the joint speed assumed here."
+        ),
+        "remedy.joint_moves": (
+            "From where this line starts, go by joint moves to ({via}) deg, then ({end}) deg: in the model they are "
+            "within limits, speeds and clear, at the joint speed assumed here."
+        ),
         "remedy.zone_too_large": "Make the zone {half:.1f} mm at most.",
         "remedy.limit#above": (
             "Give J{joint} {limit:g} {unit} at most; if the target is a pose, turn the tool otherwise there, or move "
@@ -340,10 +348,8 @@ TEXTS = texts(
             "Give J{joint} {limit:g} {unit} at least; if the target is a pose, turn the tool otherwise there, or move "
             "the target."
         ),
-        "remedy.collision#solid": (
-            "If the arm overlaps {name} at the target, move the target away; if only on the way there, add a via point "
-            "around it."
-        ),
+        "remedy.collision#solid": "Add a via point around {name}: the way meets it, the target does not.",
+        "remedy.collision#solid_at_target": "The arm overlaps {name} at the target: move the target away.",
         "remedy.collision#links": (
             "Keep these links apart: give the target another place, tool orientation or configuration, or add a via "
             "point."
@@ -518,9 +524,10 @@ def _(found: AboveLimit | BelowLimit) -> str:
 
 @remedy.register
 def _(found: MotionCollides) -> str:
-    pair = found.touches[0].pair
+    there = next((touch for touch in found.touches if touch.at_target), None)
+    pair = (there or found.touches[0]).pair
     if isinstance(pair, LinkAndSolid):
-        return sentence("remedy.collision#solid", name=pair.solid)
+        return sentence("remedy.collision#solid_at_target" if there else "remedy.collision#solid", name=pair.solid)
     return sentence("remedy.collision#links")
 
 

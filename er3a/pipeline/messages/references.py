@@ -31,7 +31,7 @@ LABELS = {"abs_x": "|x|"}
 check_complete("words for groups of references", GROUPS, GROUP_WORDS)
 STATUS_WORDS = {
     "settled": N_("settled"),
-    "settled_up_to_signs": N_("settled up to signs"),
+    "settled_up_to_signs": N_("settled but for signs"),
     "weak": N_("weak"),
     "contradicted": N_("contradicted"),
     "consistent": N_("consistent"),
@@ -118,7 +118,7 @@ TEXTS = texts(
         ),
         "not_the_robot_described": (
             "This is not the robot that these describe: {against:; }. Positions differ by up to {mismatch_mm:.0f} mm; "
-            "the best correction of one or two entries (of {tried} tried) still leaves {left_mm:.1f} mm."
+            "no correction of one or two entries leaves less than {left_mm:.1f} mm ({tried} were tried)."
         ),
         "measure_angle#offset": (
             "measure the angle {own_entry} of joint {joint} at the zero mark, to ±{half_width:g} deg"
@@ -142,7 +142,7 @@ TEXTS = texts(
         ),
         "inconsistent_with_own_text": (
             "The table contradicts its own text ({against:; }): to agree with it, {entry} would have to be {needed:g} "
-            "{unit} instead of {given:g}. This is no evidence about a real robot."
+            "{unit} instead of {given:g}. The text is no evidence about a real robot."
         ),
         "inconsistent_unexplained": (
             "The table contradicts its own text: {own_documents}; no single sign or quarter turn makes them agree."

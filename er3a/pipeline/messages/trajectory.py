@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.pairs import LinkAndSolid, ShapesAssumed
@@ -60,9 +60,23 @@ IF_ASSUMED = "_if_assumed"  # ends the codes of faults against assumed limits
 PACE_MARGIN = 1.01  # by which a slower pace stays below the limits
 
 
+class SoundEnd(NamedTuple):
+    """Where a path may end: time (s), place (mm), how long before a fault (s), and how long a stop there takes (s).
+
+    The last two are None where something comes too near first, from which it is clear by a margin.
+    """
+
+    t_s: float
+    xyz_mm: tuple[float, ...]
+    left_s: float | None = None
+    stop_s: float | None = None
+
+
 TEXTS = texts(
     {
-        "trajectory.paths": Plural("count", "{safe} of {count} path is safe", "{safe} of {count} paths are safe"),
+        "trajectory.paths": Plural(
+            "count", "{safe} of {count} path passes in the model", "{safe} of {count} paths pass in the model"
+        ),
         "trajectory.not_followed": "{count} not followed to the end ({names})",
         "trajectory.fault": "{count} {word} ({names})",
         "dependent_axes": "axes {axes} dependent",
@@ -118,20 +132,23 @@ TEXTS = texts(
             "From t = {first:.4g} s: {what}; from t = {t:.4g} s ({far:.1f} mm of the path) it is out of reach besides"
         ),
         "advice.sound": (
-            "The last point computed before anything is wrong is at t = {t:.4g} s, the tool at x, y, z = {xyz} mm: end "
-            "it there, or move the path"
+            "End it at t = {t:.4g} s, with the tool at x, y, z = {xyz} mm, {left:.2f} s before the first fault (a stop "
+            "takes {stop:.2f} s), or move the path"
         ),
         "advice.no_part": "No part of it may be run as it is",
-        "advice.end": "End it there, with the tool at x, y, z = {xyz} mm.",
+        "advice.end": (
+            "End it there, with the tool at x, y, z = {xyz} mm: {left:.2f} s before the first fault (a stop takes "
+            "{stop:.2f} s)."
+        ),
         "advice.end#clear": "End it there, with the tool at x, y, z = {xyz} mm: {margin:.1f} mm clear.",
         "advice.end#assumed": (
-            "End it there, with the tool at x, y, z = {xyz} mm: {margin:.1f} mm clear of assumed shapes; {left:.1f} mm "
-            "if these are wrong by {wrong:g} mm, braking distance not included."
+            "End it there, with the tool at x, y, z = {xyz} mm: {margin:.1f} mm clear of assumed shapes, and "
+            "{left:.1f} mm if the true shapes are {wrong:g} mm larger; the way that braking takes comes off that."
         ),
         "advice.chosen": "{way}: {tool}; {time}",
         "advice.chosen#clear": "{way}: {tool}; {time}; the arm keeps {clearance:.1f} mm of clearance",
         "advice.instead": "The path itself can't be driven",
-        "advice.slowly": "It is another motion, and quicker than the {programmed:.2f} s programmed",
+        "advice.slowly": "This is its shortest time, quicker than the {programmed:.2f} s programmed: another motion",
         "advice.near": "No part of it is safe: the arm is near-singular at the start",
         "advice.region": "It still passes near the singular pose",
         "advice.full_speed": "A joint moves at full speed: start slowly",
@@ -347,11 +364,11 @@ def _until_when(part: model.Stretch[RateCause]) -> str:
 
 def advice(
     path: model.PathSummary,
-    sound: tuple[float, tuple[float, ...]] | None = None,
+    sound: SoundEnd | None = None,
     limits: model.LimitsUsed | None = None,
 ) -> str | None:
-    """What to do about a path; None where nothing is to be done. ``sound``: time (s) and place (mm) of the last point
-    before anything is wrong; ``limits``: of the joints, whose assumed ones are named."""
+    """What to do about a path; None where nothing is to be done. ``sound``: where it may end before
+    anything is wrong; ``limits``: of the joints, whose assumed ones are named."""
     if not path.avoidance:
         return None
     if path.chosen:
@@ -374,23 +391,29 @@ def advice(
     return joined([none, _until(path, sound)], ". ")
 
 
-def _until(path: model.PathSummary, sound: tuple[float, tuple[float, ...]] | None) -> str:
+def _until(path: model.PathSummary, sound: SoundEnd | None) -> str:
     """Up to where a path may be run: to the last point with the margin, unless something else is wrong before."""
-    if sound and not (path.clear_until and sound[0] >= path.clear_until.t_s):
-        return sentence("advice.sound", t=sound[0], xyz=_numbers(sound[1], 1))
+    if sound and not (path.clear_until and sound.t_s >= path.clear_until.t_s):
+        return sentence(
+            "advice.sound", t=sound.t_s, xyz=_numbers(sound.xyz_mm, 1), left=sound.left_s, stop=sound.stop_s
+        )
     return _clear(path)
 
 
-def end_text(path: model.PathSummary, xyz_mm: tuple[float, ...], assumed: ShapesAssumed | None) -> str:
-    """That a path may be run to a point of it (mm), and by how much it is clear up to there, if that was measured; of
+def end_text(path: model.PathSummary, end: SoundEnd, assumed: ShapesAssumed | None) -> str:
+    """That a path may be run to a point of it, and by how much it is clear up to there, if that was measured; of
     ``assumed`` shapes by how much these may be wrong."""
     if path.clear_until:
-        parts = {"xyz": _numbers(xyz_mm, 1), "margin": path.clear_until.margin_mm}
+        parts = {"xyz": _numbers(end.xyz_mm, 1), "margin": path.clear_until.margin_mm}
         if assumed:
             left = max(0.0, path.clear_until.margin_mm - assumed.margin_mm)
             return sentence("advice.end#assumed", wrong=assumed.margin_mm, left=left, **parts)
         return sentence("advice.end#clear", **parts)
-    return sentence("advice.end", xyz=_numbers(xyz_mm, 1))
+    return sentence("advice.end", **_end(end))
+
+
+def _end(end: SoundEnd) -> dict[str, Any]:
+    return {"xyz": _numbers(end.xyz_mm, 1), "left": end.left_s, "stop": end.stop_s}
 
 
 def _slower_throughout(path: model.PathSummary) -> str:

@@ -104,13 +104,13 @@ TEXTS = texts(
         ),
         "validation.left_open#turned": (
             "If {entry} is wrong, the tool point (without a tool: the flange's centre) is where it should be, but "
-            "turned by up to {deg:.0f} deg; the tip of what reaches L beyond it is then up to {factor:.2g} L off. Run "
-            "no Cartesian target with a tool before these are checked."
+            "turned by up to {deg:.0f} deg; a tool's tip is then off by up to {factor:.2g} times its distance from "
+            "there. Run no Cartesian target with a tool before these are checked."
         ),
         "validation.left_open#turned_at_least": (
             "If {entry} is wrong, the tool point (without a tool: the flange's centre) is where it should be, but "
-            "turned by {deg:.0f} deg or more; the tip of what reaches L beyond it is then up to 2 L off. Run no "
-            "Cartesian target with a tool before these are checked."
+            "turned by {deg:.0f} deg or more; a tool's tip is then off by up to twice its distance from there. Run "
+            "no Cartesian target with a tool before these are checked."
         ),
         "validation.left_open#entry": "an open or weak entry",
         "validation.left_open#uncovered": "No independent document covers this table ({checks}).",
@@ -155,11 +155,11 @@ TEXTS = texts(
         "part_found#all": "all {part}",
         "part_found#some": "{settled} of {entries} {part}",
         "part_found#more": "{more} more of the {part}",
-        "part_found#up_to_signs": "{count} of them up to signs",
+        "part_found#up_to_signs": "{count} of them but for signs",
         "part_found#excluded": "{names} (contradicted)",
         "validation.no_reference": "There is no official, CAD or exported data to compare this model with.",
         "validation.model_unsound": "The model fails its internal checks: {check} {value}.",
-        "validation.another_arm": "Contradicted entries: {names}.",
+        "validation.another_arm": "Contradicted entries that move the tool (for limits see the table): {names}.",
         "contradiction#more": (
             "The references contradict each other about the {subject} ({stated}) and {more} more, which is not "
             "counted against the model: measure that on the arm before you rely on either."

@@ -155,7 +155,7 @@ TEXTS = texts(
             "The tool point can't reach {lower:.3g} to {upper:.3g} L away from the shoulder: {extent} mm, centre "
             "({centre}) mm."
         ),
-        "void.cause#it": "The void {cause}.",
+        "void.cause#it": "A joint limit makes it: it {cause}; never widen a limit for it.",
         "void.cause#noun": "Its cause: {cause}.",
         "void.expected": "This is normal for the arm: no target there can be reached.",
         "void.rests": "The bounds hold for {limits}, which nothing confirms.",
@@ -186,10 +186,17 @@ TEXTS = texts(
             "or program was checked with it: before you run any there, put the box into the study's scene file and run "
             "again."
         ),
-        "box.proven#all": "the tool point reaches all of it (proven)",
-        "box.proven#upper": "the tool point reaches all of it except the lowest {served_from} mm (proven)",
-        "box.sampled#all": "the tool point reaches all points sampled in it",
-        "box.sampled#upper": "the tool point reaches all points sampled in it except the lowest {served_from} mm",
+        "box.proven#all": "the tool point, {tilt}, reaches all of it (proven); {unchecked}",
+        "box.proven#upper": (
+            "the tool point, {tilt}, reaches all of it except the lowest {served_from} mm (proven); {unchecked}"
+        ),
+        "box.sampled#all": "the tool point, {tilt}, reaches all points sampled in it; {unchecked}",
+        "box.sampled#upper": (
+            "the tool point, {tilt}, reaches all points sampled in it except the lowest {served_from} mm; {unchecked}"
+        ),
+        "box.tilt#down": "tilted up to {cone:g} deg from straight down",
+        "box.tilt#along": "tilted up to {cone:g} deg from ({axis})",
+        "box.unchecked": "clearance was sampled, collisions with the box and what it stands on were not checked",
         "workspace.tool_points_elsewhere": (
             "Nowhere: the arm can't tilt its tool, which points along ({x:.2f}, {y:.2f}, {z:.2f}) and not within the "
             "cone."
@@ -359,7 +366,7 @@ def box_text(summary: Summary) -> str:
     parts = {
         "box": sentence("box.size#turned" if place.turned else "box.size#as_given", box=asked, xyz=edges),
         "centre": millimetres(place.centre_m),
-        "reached": sentence(f"box.{place.status}#{form}", served_from=millimetres([served_from])),
+        "reached": _reached(placement, place.status, form, served_from),
     }
     if stand:
         return sentence("box.put#on", name=stand.name, **parts)
@@ -369,6 +376,16 @@ def box_text(summary: Summary) -> str:
         parts |= {"none": ", ".join(each.name for each in placement.stands)}
         return sentence("box.put#over", name=over.name, **parts)
     return sentence("box.put#free", **parts)
+
+
+def _reached(placement: model.PlacementSummary, status: str, form: str, served_from_m: float) -> str:
+    """How much of a box the tool reaches, how it is tilted there, and what was not checked."""
+    axis, cone = placement.task.tool_direction, placement.task.cone_deg
+    down = tuple(round(each, 6) for each in axis) == (0, 0, -1)
+    tilt = sentence("box.tilt#down" if down else "box.tilt#along", cone=cone, axis=", ".join(f"{x:g}" for x in axis))
+    unchecked = sentence("box.unchecked")
+    served = millimetres([served_from_m])
+    return sentence(f"box.{status}#{form}", tilt=tilt, unchecked=unchecked, served_from=served)
 
 
 def void_text(summary: Summary, *, confirmed: bool = True) -> str:
@@ -381,9 +398,7 @@ def void_text(summary: Summary, *, confirmed: bool = True) -> str:
         finding, model.VoidAtShoulder | model.VoidUnexpected
     ):
         return ""
-    voids = summary.enclosed_voids
-    unexpected = (void for void in voids if void.status == "proven_empty" and not void.holds_shoulder)
-    judged = next(unexpected, voids[0])
+    voids, judged = summary.enclosed_voids, judged_void(summary)
     where = sentence("void.shoulder" if judged.holds_shoulder else "void.away", **_void_parts(judged))
     cause = sentence("void.cause#it" if is_predicate(judged.cause) else "void.cause#noun", cause=say(judged.cause))
     expected = ""
@@ -395,6 +410,13 @@ def void_text(summary: Summary, *, confirmed: bool = True) -> str:
     pocket = max(summary.voids, key=lambda void: void.volume_m3.upper)
     open_one = sentence("void.pocket", **_void_parts(pocket)) if pocket.kind == "open" else ""
     return joined([where, cause, expected, more, open_one], " ")
+
+
+def judged_void(summary: model.WorkspaceSummary) -> model.VoidSummary:
+    """The enclosed void that the verdict tells of."""
+    voids = summary.enclosed_voids
+    unexpected = (void for void in voids if void.status == "proven_empty" and not void.holds_shoulder)
+    return next(unexpected, voids[0])
 
 
 def _resting_on(cause: VoidCause) -> str:
@@ -430,7 +452,7 @@ def stand_text(stand: model.StandSummary, placement: model.PlacementSummary) -> 
     named = {"name": stand.name, "height": millimetres([stand.height_m])}
     if stand.place and stand.served_from_m is not None:
         form = "upper" if stand.served_from_m > SERVED_ALL_M else "all"
-        reached = sentence(f"box.{stand.place.status}#{form}", served_from=millimetres([stand.served_from_m]))
+        reached = _reached(placement, stand.place.status, form, stand.served_from_m)
         return sentence("stand.fits", reached=reached, centre=millimetres(stand.place.centre_m), **named)
     margin, lowest = as_text(placement.margin_mm, "g"), as_text(placement.task.lowest_mm, "g")
     why = sentence(f"stand.{stand.why_none}", margin=margin, lowest=lowest, **named)

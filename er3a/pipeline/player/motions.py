@@ -41,6 +41,7 @@ class Mark:
 class Fault:
     """Why a path or a program may not be run as it is: what fails first, when or in which line, and what to do instead.
 
+    ``first``: what fails first alone, without what fails later.
     ``status`` and ``verdict``: of all of it; ``meant``: whether its file expects that; ``address``: of the place on the
     robot's pages, which the player shows there. ``instead``: a motion that may be run, and where the player shows it.
     """
@@ -55,6 +56,7 @@ class Fault:
     to_do: str
     address: str
     instead: tuple[str, str] | None = None
+    first: str = ""
 
 
 def address_of(page: str, motion: str, t: float, place: str, until: float | None = None) -> str:

@@ -121,6 +121,7 @@ function draw() {
     picture.line([from, point ? add(to, [0, 0, 1e-3 * data.size]) : to], data.colours.mark, point ? 9 : 3);
     picture.word(text, point ? add(from, [0, 0, 0.08 * data.size]) : scaled(add(from, to), 0.5), page.ink, page.halo);
   }
+  picture.names(surroundings, page.ink, page.halo);
   for (const { poses } of shown) toolFrame(poses.at(-1));
   for (const { text, at } of data.signs) picture.word(text, at, page.ink, page.halo);
 }

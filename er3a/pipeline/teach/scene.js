@@ -168,6 +168,14 @@ export class Picture {
     context.fillText(text, u, v);
   }
 
+  /** The names of solids that stand around the arm, each at the middle of its points. */
+  names(solids, colour, halo) {
+    for (const { name, points } of solids) {
+      const sum = points.reduce((all, point) => all.map((value, i) => value + point[i]), [0, 0, 0]);
+      if (points.length) this.word(name, sum.map((value) => value / points.length), colour, halo);
+    }
+  }
+
   #trace(points) {
     this.#join(points.map((point) => this.seen(point)));
   }

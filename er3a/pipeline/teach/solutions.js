@@ -75,7 +75,8 @@ export class SolutionList {
     const overlap = this.overlap(first.q); // whole turns change nothing
     for (const row of turns) row.overlap = overlap;
     const joints = element("span", "row-joints", "", first.q.map((value, k) => element("span", "", fixed(shown(this.data.table, k, value)))));
-    const verdict = element("span", first.withinLimits ? "row-verdict pass" : "row-verdict fail", this.#verdict(first));
+    const state = !first.withinLimits ? "fail" : this.#atLimit(first).length ? "near" : "pass";
+    const verdict = element("span", `row-verdict ${state}`, this.#verdict(first));
     const collision = overlap ? [element("span", "row-verdict fail", overlap)] : [];
     const button = this.#button(first, [element("b", "", this.#label(first)), joints, verdict, ...collision]);
     const item = element("li", "branch", "", [button]);
@@ -96,8 +97,16 @@ export class SolutionList {
     return element("li", "branch missing", "", [element("b", "", labels[slot]), element("span", "row-verdict", reason)]);
   }
 
+  /** Names of the joints that stand at a limit. */
+  #atLimit({ q }) {
+    const { table, joint_names: names } = this.data;
+    return names.filter((_, k) => !table.continuous[k] && Math.min(q[k] - table.lower[k], table.upper[k] - q[k]) < SAME_ARM);
+  }
+
   #verdict(row) {
     const { words } = this.data;
+    const at = this.#atLimit(row).join(", ");
+    if (row.withinLimits && at) return fill(words.within_at, { joints: at });
     return row.withinLimits ? words.within : fill(words.leaves, { reasons: beyondLimits(this.data, row.q) });
   }
 
@@ -119,6 +128,7 @@ export class SolutionList {
   #step(by) {
     const order = this.buttons.map((button) => Number(button.dataset.row)).filter((row) => this.rows[row].withinLimits);
     const at = order.indexOf(this.current);
+    write(byId("refused"), "");
     this.choose(this.rows[order[(at + by + order.length) % order.length]].q);
   }
 }

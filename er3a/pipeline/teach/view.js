@@ -54,6 +54,7 @@ export class ArmView extends Orbit {
     if (numbers.length) this.#tableFrames(tableFrames(this.table, poses.slice(1)), numbers);
     else this.#axes(poses);
     this.#toolFrame(poses.at(-1));
+    picture.names(this.surroundings, page.ink, page.halo);
     if (nearest?.text) this.#nearest(nearest);
   }
 

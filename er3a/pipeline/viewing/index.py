@@ -41,7 +41,7 @@ from er3a.pipeline.messages.validation import (
     shortened,
     unconfirmed,
 )
-from er3a.pipeline.messages.workspace import box_text, void_text
+from er3a.pipeline.messages.workspace import box_text, judged_void, void_text
 from er3a.pipeline.results import (
     AbsentResults,
     Input,
@@ -596,8 +596,12 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         "decision": decision(table, [*failed.values()], instead, unproven=unproven, same_arm=same_arm),
         "settled": settled,
         "instead": {instead: f"#{instead}"} if instead else {},
-        "simulated": [stage for stage, head in heads.items() if _misses(head, "real_camera")],
         "answers": [*_answers(heads, robot)],
+        "notes": {stage: _note(stage, head, stored[stage].results) for stage, head in heads.items()},
+        "bare": any(
+            _misses(heads[stage], "carried") or _misses(heads[stage], "tool") for stage in RUNS if stage in heads
+        ),
+        "bodies": [each.name for each in scene.solids] if (scene := study.scene(name, "trajectory")) else [],
         "runs": [
             _run(stage, stored[stage].results)
             for stage in RUNS
@@ -650,7 +654,8 @@ def _settled(finding: object) -> tuple[bool, str]:
     if not isinstance(finding, LeftOpen):
         return False, ""
     part = next((part for part in finding.parts if part.part == "geometry"), None)
-    said = joined([settled_parts(finding), *how_far_off(finding)], " ")
+    conflict = say(finding.contradiction) if finding.contradiction else ""
+    said = joined([settled_parts(finding), *how_far_off(finding), conflict], " ")
     return part is not None and not (part.settled or part.up_to_signs), said
 
 
@@ -665,7 +670,9 @@ def _answers(heads: Mapping[str, Head], robot: Robot) -> Iterator[tuple[str, str
     summary = heads["dynamics"].summary if "dynamics" in heads else None
     yield tr("Payload"), payload_text(summary, robot), "dynamics.html#payload" if summary else ""
     if workspace:
-        place = "#table-voids" if getattr(workspace, "voids", ()) else ""
+        place = ""
+        if isinstance(workspace, WorkspaceSummary) and workspace.enclosed_voids:
+            place = f"#void-{workspace.voids.index(judged_void(workspace)) + 1}"
         yield tr("Void"), void_text(workspace, confirmed=_limits_confirmed(heads)), f"workspace.html{place}"
 
 
@@ -716,7 +723,17 @@ def _run(stage: str, results: TrajectoryResults | ProgramsResults) -> dict[str, 
         "sound": sound,
         "faults": faults,
         "open": left_out,
+        "more": len(results.summary.not_examined) - len(left_out),
     }
+
+
+def _note(stage: str, head: Head, results: Any) -> str:
+    """What stands beside a stage's name: how many of its paths or programs pass, where some do not, or that its camera
+    is simulated."""
+    if stage in RUNS and head.status != "not_computed":
+        run = _run(stage, results)
+        return tr("{sound} of {count}", sound=len(run["sound"]), count=run["count"]) if run["faults"] else ""
+    return tr("simulated") if _misses(head, "real_camera") else ""
 
 
 def _cell(head: Head) -> dict[str, Any]:

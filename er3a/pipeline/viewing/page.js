@@ -672,7 +672,7 @@ addEventListener("beforeprint", () => document.querySelectorAll(".provenance, de
 
 // On a phone each row of such a table is a card: its cells stand below one another, each after its column's name.
 function nameCells(table) {
-  const names = [...table.tHead.rows[0].cells].map((header) => header.innerText.replace(/\s+/g, " ").trim());
+  const names = [...table.tHead.rows[0].cells].map((header) => (header.innerText || header.textContent).replace(/\s+/g, " ").trim());
   for (const row of table.tBodies[0].rows) [...row.cells].forEach((cell, column) => (cell.dataset.column = names[column]));
   table.classList.add("named");
 }

@@ -285,6 +285,7 @@ def render(
         "own": language.own_title,
         "sentence": whole_sentence,
         "led": led,
+        "first_sentence": first_sentence,
         "linked": linked,
         "breakable": breakable,
         "grade": partial(word, "grade", GRADE_NAMES),
@@ -366,6 +367,12 @@ def led(text: str) -> tuple[str, str]:
     if first[-1] in ".。":
         return first, rest
     return whole_sentence(first[:-1]), rest[:1].upper() + rest[1:]  # a clause becomes a sentence
+
+
+def first_sentence(text: str) -> tuple[str, str]:
+    """A text up to the end of its first sentence, and the rest."""
+    end = re.search(r"\.(?= )|。", text)
+    return (text[: end.end()], text[end.end() :].strip()) if end else (text, "")
 
 
 def linked(text: str, links: Mapping[str, str]) -> Markup:

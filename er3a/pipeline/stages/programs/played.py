@@ -70,6 +70,7 @@ def faults(results: ProgramsResults) -> list[Fault]:
                 joined([say_first(first.finding), *later]),
                 " ".join(dict.fromkeys(text for each in told for text in remedies_of(program, each)[:1])),
                 address_of("programs", program.name, first.program_s or 0.0, line_id(program.name, first.line * own)),
+                first=say_first(first.finding),
             )
         )
     return found

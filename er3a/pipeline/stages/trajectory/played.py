@@ -14,6 +14,7 @@ from er3a.pipeline.messages.programs import remedy, say
 from er3a.pipeline.messages.say import joined, sentence
 from er3a.pipeline.messages.trajectory import (
     IF_ASSUMED,
+    SoundEnd,
     advice,
     cause_text,
     end_text,
@@ -25,11 +26,15 @@ from er3a.pipeline.messages.trajectory import (
 from er3a.pipeline.player.motions import Fault, Mark, PlayedEvent, PlayedMotion, Weight, address_of
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.viewing.numbers import fixed
+from er3a.planning.motion_faults import joints_of
 from er3a.planning.names import PathVerdict
 from er3a.program_check.program_check_findings import ClearOfAssumed
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
+LIMIT_MARGIN = 2.0  # deg, or mm where a joint slides, between an end that is advised and a limit that the path leaves
+REACH_MARGIN = 0.02  # m of the path before it leaves the reach
+SPEED_MARGIN = 0.9  # of a joint's speed limit
 WEIGHTS: dict[PathVerdict, Weight] = {
     "safe": "plain",
     "near-singular": "caution",
@@ -73,7 +78,7 @@ def faults(results: model.TrajectoryResults) -> list[Fault]:
         if model.is_safe(path, results.summary.verdict.shapes):
             continue
         clearance = path.clearance if path.verdict == "safe" else None
-        what, t = (say(near), clearance.t_s) if clearance else _first_fault(path)
+        first, t, later = (say(near), clearance.t_s, "") if clearance else _first_fault(path)
         status, verdict = shown_verdict(path, near)
         to_do, instead = _to_do(path, results.checks.take(results.checks.path == path.name), results.summary)
         found.append(
@@ -84,23 +89,24 @@ def faults(results: model.TrajectoryResults) -> list[Fault]:
                 verdict,
                 path.expect == path.verdict != "safe",
                 "" if t is None else tr("{time} s", time=fixed(t, 3)),
-                what,
+                joined([first, later]),
                 to_do,
                 address_of("trajectory", path.name, t or 0.0, path.name),
                 instead,
+                first,
             )
         )
     return found
 
 
-def _first_fault(path: model.PathSummary) -> tuple[str, float | None]:
+def _first_fault(path: model.PathSummary) -> tuple[str, float | None, str]:
     """What is wrong first with a path that is not safe, and when (s), if it has a time; then what is wrong later."""
     found = [] if path.no_way else first_faults(path)
     if (path.verdict in ("singular", "near-singular") and len(found) <= 1) or not found:
         times = [] if path.no_way else _singular_times(path) or [event.t_s for event in path.singularities]
-        return path_text(path), min(times, default=None)
+        return path_text(path), min(times, default=None), ""
     later = [tr("at t = {time} s: {text}", time=fixed(t, 3), text=text) for t, text in found[1:]]
-    return joined([found[0][1], *later]), found[0][0]
+    return found[0][1], found[0][0], joined(later)
 
 
 def _singular_times(path: model.PathSummary) -> list[float]:
@@ -124,18 +130,18 @@ def _to_do(
         return repair, (name, address_of("trajectory", name, 0.0, path.name))
     if path.verdict == "safe" and (near := near_assumed(path, summary)):
         return remedy(near), None
-    last = last_sound(path, rows)
+    last = last_sound(path, rows, summary.joint_limits)
     if last is None:
-        todo = advised(path, rows)
+        todo = advised(path, rows, summary.joint_limits)
         return sentence("finding", finding=todo) if todo else "", None
     name = tr("{path}, up to {time} s", path=path.name, time=fixed(last[0], 3))
-    end = end_text(path, last[1], summary.verdict.shapes)
+    end = end_text(path, last, summary.verdict.shapes)
     return end, (name, address_of("trajectory", path.name, last[0], path.name, last[0]))
 
 
-def advised(path: model.PathSummary, rows: model.PathChecks, limits: model.LimitsUsed | None = None) -> str | None:
+def advised(path: model.PathSummary, rows: model.PathChecks, limits: model.LimitsUsed) -> str | None:
     """What to do about a path; None where nothing is to be done. ``rows``, ``limits``: of the path, of the joints."""
-    sound = last_sound(path, rows)
+    sound = last_sound(path, rows, limits)
     text = advice(path if sound else replace(path, clear_until=None), sound, limits)
     if text is None or path.chosen:
         return text
@@ -150,11 +156,12 @@ def repaired(path: model.PathSummary) -> str:
     return tr("{path}, repaired", path=path.name)
 
 
-def last_sound(path: model.PathSummary, rows: model.PathChecks) -> tuple[float, tuple[float, ...]] | None:
-    """Time (s) and place (mm) of the last point (of ``rows``, or where the margin is kept) before anything is wrong, or
-    a path of the tool is near-singular.
+def last_sound(path: model.PathSummary, rows: model.PathChecks, limits: model.LimitsUsed) -> SoundEnd | None:
+    """The last point (of ``rows``, or where a collision's margin is kept) at which a path may end.
 
-    None where something is wrong at once, no point of a path that collides keeps the margin, or none was planned.
+    Before anything is wrong, or a path of the tool is near-singular, twice the time is left that the joints take to
+    stop there at their ``limits``, and ``LIMIT_MARGIN``, ``REACH_MARGIN`` and ``SPEED_MARGIN`` are kept. None where no
+    point of a path has that, it keeps no margin of collisions anywhere, or none was planned.
     """
     until = path.clear_until
     if path.no_way or (path.collisions and until is None):
@@ -162,16 +169,29 @@ def last_sound(path: model.PathSummary, rows: model.PathChecks) -> tuple[float, 
     others = path.unreachable, path.out_of_limits, path.too_fast, path.undecided
     starts = [part.t0_s for stretches in others for part in stretches] + _singular_times(path)
     starts += [] if path.in_joint_space else rows.t_s[rows.near_singular][:1].tolist()
-    if until and until.t_s < min(starts, default=np.inf):
-        return until.t_s, until.xyz_mm
-    sound = rows.take(rows.reachable & (rows.t_s < min(starts, default=0.0)))
-    return (float(sound.t_s[-1]), tuple(sound.xyz_mm[-1].tolist())) if len(sound) else None
+    first = min(starts, default=np.inf)
+    stop = (np.abs(rows.q_deg_s) / limits.acceleration_deg_s2).max(axis=1)
+    kept = rows.reachable & (rows.t_s + 2 * stop <= first) & (np.nan_to_num(rows.speed_ratio) <= SPEED_MARGIN)
+    for part in path.out_of_limits:
+        joints, at = [j - 1 for j in joints_of(part.cause)], int(np.argmin(np.abs(rows.t_s - part.t0_s)))
+        kept &= np.abs(rows.q_deg[:, joints] - rows.q_deg[at, joints]).max(axis=1) >= LIMIT_MARGIN
+    for lost in path.unreachable:
+        kept &= rows.s_m <= lost.s0_m - REACH_MARGIN
+    if until and (np.isinf(first) or kept[rows.t_s <= until.t_s][-1:].any()):
+        return SoundEnd(until.t_s, until.xyz_mm)
+    ends = np.flatnonzero(kept & (rows.t_s < first) & (rows.t_s <= (until.t_s if until else np.inf)))
+    if not starts or not len(ends):
+        return None
+    k = ends[-1]
+    return SoundEnd(float(rows.t_s[k]), tuple(rows.xyz_mm[k].tolist()), float(first - rows.t_s[k]), float(stop[k]))
 
 
 def shown_verdict(path: model.PathSummary, near: ClearOfAssumed | None) -> tuple[Weight, str]:
     """A path's verdict in colour and words; ``near`` as of :func:`near_assumed`."""
     if path.verdict == "safe" and near:
         return "caution", tr("clear of assumed shapes only")
+    if path.verdict == "safe":
+        return "plain", tr("safe in the model")
     collides = outcome_word("collides") if path.collisions and path.verdict != "collides" else ""
     return WEIGHTS[path.verdict], joined([outcome_word(path.verdict), collides], ", ")
 

@@ -107,6 +107,7 @@ def _section(
         verdict=verdict,
         kind=kind_word(path.kind),
         text=joined([path_text(path), say(near) if near else ""]),
+        distance=_clear_of(path),
         advice=advised(path, rows, summary.joint_limits),
         near=joined([say(near), remedy(near).rstrip(".。")], ". ") if near else "",
         branches=[branch_word(label) for label in path.branches],
@@ -119,6 +120,14 @@ def _section(
         shortest="–" if (shortest := _shortest(path)) is None else fixed(shortest, 2),
         figure=figure,
     )
+
+
+def _clear_of(path: model.PathSummary) -> str:
+    """How near a path that passes comes to anything; empty where that is not known."""
+    if path.clearance is None or path.verdict != "safe":
+        return ""
+    far = number(path.clearance.least_mm, 3)
+    return tr("{far} mm clear: {pair}.", far=far, pair=say(path.clearance.between))
 
 
 def _shortest(path: model.PathSummary) -> float | None:

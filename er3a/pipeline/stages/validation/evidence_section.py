@@ -7,10 +7,14 @@ from dataclasses import asdict
 from math import pi
 from typing import Any
 
+import numpy as np
 from markupsafe import Markup
 
+from er3a.geometry.transforms import rpy_of
 from er3a.identifiability.entries import column_of
 from er3a.identifiability.entry_evidence import EntryEvidence, OtherReading, Status
+from er3a.identifiability.proposals import MeasureAngle
+from er3a.kinematics.forward import forward
 from er3a.pipeline.messages.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.references import STATUS_MEANINGS, STATUS_WORDS
 from er3a.pipeline.messages.say import joined, say, sentence, word
@@ -65,6 +69,8 @@ OFF_COLUMNS = (
 OTHER_COLUMNS = ("a", "alpha", "d", "beta", "offset", "direction")
 LIMITS = ("lower", "upper")
 DIFFERS = 2e-3
+BENT, BENT_BY = 5, pi / 6  # a joint (from 1) that is not at 0 where two tables are told apart, and its angle
+STEEP = 85.0  # deg, from which pitch on roll and yaw are not unique enough to compare
 IN_UNIT = {"a": MM, "d": MM, "direction": 1.0} | dict.fromkeys(("alpha", "beta", "offset", *LIMITS), 180 / pi)
 OTHER_TITLES = {
     "described": N_("The table that independent documents describe"),
@@ -81,7 +87,7 @@ OTHER_TEXTS = {
 }
 
 
-def evidence_section(evidence: TableEvidence | None) -> dict[str, Any] | None:
+def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, Any] | None:
     """What the page shows of a table's evidence: the table by rows (a cell is None where it has no such entry), its
     legend, and the entries in words; rows of entries begin with the name, which is the address on the page."""
     if evidence is None:
@@ -92,7 +98,14 @@ def evidence_section(evidence: TableEvidence | None) -> dict[str, Any] | None:
     everything = [*evidence.entries, *evidence.combinations]
     numbers = [each for each in everything if each.value is not None]
     left = [each for each in numbers if each.status not in SETTLED]
-    proposals = {proposal.entry: say(proposal) for proposal in evidence.proposals}
+    read = _read_pose(robot, evidence)
+    by_pose = tr("{measurement}; or read the pose on the pendant, as below the other table")
+    proposals = {
+        proposal.entry: by_pose.format(measurement=say(proposal))
+        if read and isinstance(proposal, MeasureAngle)
+        else say(proposal)
+        for proposal in evidence.proposals
+    }
     present = dict.fromkeys(each.status for each in numbers)
     return dict(
         columns=[tr(COLUMNS[kind]) for kind in kinds],
@@ -109,14 +122,37 @@ def evidence_section(evidence: TableEvidence | None) -> dict[str, Any] | None:
         open_rows=[[*_row(each), proposals.get(each.entry, "–")] for each in left],
         settled_rows=[_row(each) for each in numbers if each.status in SETTLED],
         unmet=not evidence.table_meets and evidence.other is None,
-        other=_other(evidence) if evidence.other else None,
+        other=_other(evidence, read) if evidence.other else None,
         tolerance=tr(
             "{mm} mm and {deg} deg", mm=number(evidence.tolerance.mm, 2), deg=number(evidence.tolerance.deg, 2)
         ),
     )
 
 
-def _other(evidence: TableEvidence) -> dict[str, Any] | None:
+def _read_pose(robot: Robot, evidence: TableEvidence) -> str:
+    """By what a pendant shows at a pose the table can be told from another that fits every document; empty where there
+    is none, or its orientation is the same or has no unique angles there."""
+    other = other_robot(robot, evidence)
+    if other is None or evidence.other is None or evidence.other.code != "allowed" or robot.joints < BENT:
+        return ""
+    q = np.zeros(robot.joints)
+    q[BENT - 1] = BENT_BY if robot.upper[BENT - 1] >= BENT_BY else -BENT_BY
+    shown = [np.degrees(rpy_of(forward(each, q))).round(1) + 0.0 for each in (robot, other)]
+    if max(abs(angles[1]) for angles in shown) > STEEP or np.abs(shown[0] - shown[1]).max() < 1:
+        return ""
+    here, there = (", ".join(fixed(angle, 1) for angle in angles) for angles in shown)
+    return tr(
+        "To tell them apart, set no tool and no base, move J{joint} to {angle} deg and all other joints to 0: on the "
+        "pendant roll, pitch, yaw (about fixed x, y, z; A, B, C is yaw, pitch, roll) are {here} deg by the table of "
+        "this page and {there} deg by this one.",
+        joint=BENT,
+        angle=fixed(np.degrees(q[BENT - 1]), 0),
+        here=here,
+        there=there,
+    )
+
+
+def _other(evidence: TableEvidence, read: str) -> dict[str, Any] | None:
     found = evidence.other
     if found is None:
         return None
@@ -130,15 +166,17 @@ def _other(evidence: TableEvidence) -> dict[str, Any] | None:
         for kind in kinds:
             each = by_name.get(f"{kind}{joint}")
             if each is None:  # a limit of a joint that turns on and on
-                cells.append(("–", False))
+                cells.append(("–", False, ""))
                 continue
             given = each.value or 0.0
             value = _limit(each) if kind in LIMITS else getattr(found.table, kind)[joint - 1] * IN_UNIT[kind]
             value = _roundest(value, each)
-            cells.append((_plain(value), abs(value - given) > DIFFERS))
+            cells.append((_plain(value), abs(value - given) > DIFFERS, ""))
         rows.append((joint, cells))
     title, text = (word(found.code, words, found.code) for words in (OTHER_TITLES, OTHER_TEXTS))
-    return dict(title=title, text=text, page="", columns=[tr(COLUMNS[kind]) for kind in kinds], rows=rows)
+    return dict(
+        title=title, text=joined([text, read], " "), page="", columns=[tr(COLUMNS[kind]) for kind in kinds], rows=rows
+    )
 
 
 def _limit(each: EntryEvidence) -> float:
@@ -156,10 +194,11 @@ def _roundest(value: float, each: EntryEvidence) -> float:
     return next((rounded for k in range(3) if low <= (rounded := round(value, k)) <= high), round(value, 3))
 
 
-def table_to_use(robot: Robot, other: Robot, unconfirmed: str) -> dict[str, Any]:
+def table_to_use(robot: Robot, other: Robot, unconfirmed: str, evidence: TableEvidence | None) -> dict[str, Any]:
     """The whole table of another robot of the study, limits included, as its file gives it: by joint its values, and
     whether they differ, which is marked where both tables are of one convention. ``unconfirmed``: what of it nothing
-    settles."""
+    settles; ``evidence``: of its entries, of which those that are not settled are marked."""
+    known = {each.entry: each.status for each in evidence.entries} if evidence else {}
     kinds = [kind for kind in OTHER_COLUMNS if kind != "beta" or other.beta.any()]
     comparable = robot.convention == other.convention and robot.rows == other.rows and robot.joints == other.joints
     rows = []
@@ -167,12 +206,13 @@ def table_to_use(robot: Robot, other: Robot, unconfirmed: str) -> dict[str, Any]
         cells = []
         for kind in (*kinds, *LIMITS):
             if kind in LIMITS and k >= other.joints:
-                cells.append(("–", False))
+                cells.append(("–", False, ""))
                 continue
             unit = MM if kind in LIMITS and other.slides[k] else IN_UNIT[kind]
             value = round(float(getattr(other, kind)[k]) * unit, 3)
             differs = comparable and abs(value - float(getattr(robot, kind)[k]) * unit) > DIFFERS
-            cells.append((_plain(value), differs))
+            status = known.get(f"{kind}{k + 1}", "settled")
+            cells.append((_plain(value), differs, "" if status in SETTLED else MARKS[status]))
         rows.append((k + 1, cells))
     source = other.sources.get("dh")
     parts = [tr("Source: {source}.", source=own_title(source.source))] if source else []
@@ -180,6 +220,13 @@ def table_to_use(robot: Robot, other: Robot, unconfirmed: str) -> dict[str, Any]
         parts.append(tr("What differs is marked."))
     if unconfirmed:
         parts.append(sentence("validation.left_open#open", names=unconfirmed))
+        parts.append(
+            tr(
+                "Marks: = only the source of {robot} gives it, which may contradict another table but confirms none of "
+                "its own values; ? and ~ no document settles it. Check all of these on the arm.",
+                robot=other.name,
+            )
+        )
     return dict(
         title=tr("The table to use: {robot}", robot=other.name),
         text=joined(parts, " "),

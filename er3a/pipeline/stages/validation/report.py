@@ -262,8 +262,8 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
         head=_head(stored, instead),
         robot=robot,
         fold=contradicted,
-        to_use=table_to_use(robot, study.robot(instead), _unconfirmed(stored, instead)) if instead else None,
-        table_evidence=evidence_section(summary.evidence),
+        to_use=table_to_use(robot, study.robot(instead), *_known(stored, instead)) if instead else None,
+        table_evidence=evidence_section(robot, summary.evidence),
         frames=_frames_picture(robot, summary),
         formulas=formulas(robot),
         sets=[_set_story(found, judged, results.key_poses) for found in summary.sets],
@@ -291,13 +291,13 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
     )
 
 
-def _unconfirmed(stored: Stored[model.ValidationResults], other: str) -> str:
-    """What nothing settles of the table of another robot of the study."""
+def _known(stored: Stored[model.ValidationResults], other: str) -> tuple[str, model.TableEvidence | None]:
+    """What nothing settles of the table of another robot of the study, and the evidence of its entries."""
     if stored.folder is None:
-        return ""
+        return "", None
     summary = read_stage(stored.folder.parents[1] / other / "validation", STAGES["validation"]).results.summary
     parts = summary.evidence.parts if summary.evidence else ()
-    return unconfirmed(parts, getattr(summary.verdict.finding, "unbounded", ()))
+    return unconfirmed(parts, getattr(summary.verdict.finding, "unbounded", ())), summary.evidence
 
 
 def _head(stored: Stored[model.ValidationResults], instead: str | None) -> Head:

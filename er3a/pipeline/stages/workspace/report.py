@@ -104,7 +104,7 @@ def _rule(enclosed: list[model.VoidSummary]) -> str:
     elsewhere = [void for void in enclosed if not void.holds_shoulder]
     if not elsewhere:
         return tr(
-            "The rule that an unexpected hole points to a wrong limit or direction of joint 2 or 3 was applied: no "
+            "An enclosed void away from the shoulder would suggest a wrong limit or direction of joint 2 or 3: no "
             "enclosed void lies away from the shoulder, so no table entry is indicated."
         )
     named = sum(bool(joints_after(void.cause) & {2, 3}) for void in elsewhere)
