@@ -17,6 +17,7 @@ import numpy as np
 
 from er3a.by_value import ByValue
 from er3a.comparison import mechanism
+from er3a.comparison.mechanism import TOLERANCE_DEG, TOLERANCE_MM
 from er3a.errors import RobotError
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.chain import row_values
@@ -184,7 +185,9 @@ class Comparison(ByValue):
         return len(self.geometry.differences) if self.geometry else 1000
 
 
-def compare(robot_a: Robot, robot_b: Robot, *, tolerance_mm: float = 0.5, tolerance_deg: float = 0.1) -> Comparison:
+def compare(
+    robot_a: Robot, robot_b: Robot, *, tolerance_mm: float = TOLERANCE_MM, tolerance_deg: float = TOLERANCE_DEG
+) -> Comparison:
     """Compare two arms: geometry, zero, directions, base, flange, couplings, then limits and speeds.
 
     Parameters
@@ -225,7 +228,7 @@ def _compared(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances, 
         found.invariants,
         1000 * found.unexplained,
     )
-    moved = np.abs(found.zeros) > np.where(a.sliding, tolerances.length, tolerances.angle)
+    moved = tolerances.exceeded(found.zeros, a.sliding)
     scale = np.where(a.sliding, 1000.0, np.degrees(1.0))
     turned = same and explain and bool(moved.any() or found.reverses.any())
     slips = tuple(_causes_of_zeros(robot_a, b, found, tolerances)) if turned else ()
@@ -247,7 +250,11 @@ def _compared(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances, 
 
 
 def best_of(
-    robot: Robot, others: Mapping[str, Robot], *, tolerance_mm: float = 0.5, tolerance_deg: float = 0.1
+    robot: Robot,
+    others: Mapping[str, Robot],
+    *,
+    tolerance_mm: float = TOLERANCE_MM,
+    tolerance_deg: float = TOLERANCE_DEG,
 ) -> list[tuple[str, Comparison]]:
     """A robot compared with several, the one that fits best first: fewest entries, then the smallest differences.
 
@@ -277,10 +284,13 @@ def _other_kinds(robot: Robot, kinds: Reals) -> GeometryLayer:
     return GeometryLayer(False, 0.0, 0.0, found)
 
 
+ANGLES = "alpha", "beta", "theta"
+
+
 def _named(robot: Robot, found: mechanism.EntryDifference) -> Difference:
     """A difference by its name, values and unit in A's own table."""
     column, link = found.column, found.link
-    angle = column in ("alpha", "beta", "theta")
+    angle = column in ANGLES
     scale = np.degrees(1.0) if angle else 1000.0
     one, other = (float(np.round(scale * value, 6)) + 0.0 for value in (found.one, found.other))
     alike = tuple(_name(robot, *each) for each in found.alike)
@@ -530,10 +540,10 @@ def _corrected(
     named = "a", "alpha", "beta", "d", "offset", "direction"
     columns: dict[str, Any] = {key: np.array(getattr(robot_a, key)) for key in named}
     for each in found.differences:
-        angle = each.column in ("alpha", "beta", "theta")
+        angle = each.column in ANGLES
         column = "offset" if each.column == "theta" else each.column
         columns[column][_row_of(robot_a, column, each.link)] = _rounded(each.other, angle)
-    moved = np.abs(found.zeros) > np.where(robot_a.sliding, tolerances.length, tolerances.angle)
+    moved = tolerances.exceeded(found.zeros, robot_a.sliding)
     columns["direction"] = np.where(found.reverses, -1.0, 1.0) * robot_a.direction
     for k in np.flatnonzero(moved).tolist():
         column = "d" if robot_a.sliding[k] else "offset"

@@ -53,12 +53,19 @@ HALF_TURN = rot_x(math.pi)
 HALF_TURN_AT_MOST = math.radians(185.0)
 
 
+TOLERANCE_MM, TOLERANCE_DEG = 0.5, 0.1
+
+
 @dataclass(frozen=True)
 class Tolerances:
     """By how much entries may differ and still agree: m and rad."""
 
-    length: float = 0.5e-3
-    angle: float = math.radians(0.1)
+    length: float = TOLERANCE_MM / 1000
+    angle: float = math.radians(TOLERANCE_DEG)
+
+    def exceeded(self, zeros: Reals, sliding: Flags) -> Flags:
+        """Which zeros (m,), rad or m, of rows that turn or slide, differ by more."""
+        return np.asarray(np.abs(zeros) > np.where(sliding, self.length, self.angle))
 
 
 @dataclass(frozen=True, eq=False)
@@ -517,7 +524,7 @@ def _settled_at(
     flange = translation(*(-right_end)) @ rot_z(last_turn) @ other.flange
     placed = one.base @ np.linalg.inv(base), np.linalg.inv(one.flange) @ flange
     reverses = one.direction * other.direction < 0
-    moved = np.abs(zeros) > np.where(one.sliding, tolerances.length, tolerances.angle)
+    moved = tolerances.exceeded(zeros, one.sliding)
     ends = sum(
         int(np.linalg.norm(T[:3, 3]) > tolerances.length) + TURNED_END * (turn_of(T) > tolerances.angle) for T in placed
     )

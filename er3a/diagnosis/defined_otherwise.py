@@ -53,10 +53,8 @@ from er3a.references.quantities import (
     AxisAngle,
     AxisCoordinate,
     FlangeTurn,
-    Limit,
     PointCoordinate,
     Pose,
-    PoseOutside,
 )
 from er3a.references.reference import Reference, expected_of, quantities_of
 from er3a.robots.robot import Robot
@@ -105,7 +103,7 @@ def conventions_of(robot: Robot, references: Sequence[Reference], meets: float) 
     """
     if robot.coupling is not None or robot.rows != robot.joints or robot.sliding.any():
         return None
-    stated = [r for r in references if not isinstance(r.quantity, Limit | PoseOutside)]
+    stated = [r for r in references if r.quantity.depends_on_table]
     lines = _lines(stated, robot.joints)
     if lines is not None:
         found = (_conventions(robot, stated, lines, meets, finer) for finer in FINER)
@@ -129,7 +127,7 @@ def counted_from_ground(
     """
     if robot.coupling is not None or robot.sliding.any():
         return []
-    if limits_besides and all(isinstance(r.quantity, Limit | PoseOutside) for r in references):
+    if limits_besides and not any(r.quantity.depends_on_table for r in references):
         return []
     axes, found = frames(robot, np.zeros(robot.joints))[:-1, :3, 2], dict[Fault, Conventions]()
     quantities, (expected, uncertainty) = quantities_of(references), expected_of(references)

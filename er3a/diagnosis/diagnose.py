@@ -306,7 +306,7 @@ def extremes_missed(robot: Robot, references: ReferenceSet | Sequence[Reference]
         return ()
     every = references.checkable if isinstance(references, ReferenceSet) else references
     stated = [r for r in every if r.expected is not None and isinstance(r.quantity, Extreme)]
-    stated = [r for r in stated if r.authoritative] or stated
+    stated = [r for r in stated if r.is_authoritative] or stated
     contradicted = {i for pair in conflicts(stated) for i in pair}
     found = []
     for i, reference in enumerate(stated):

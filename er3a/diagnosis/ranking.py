@@ -35,7 +35,7 @@ from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.table_batch import Tables, join, tables_of
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.references.predict import predict_tables
-from er3a.references.quantities import Extreme, Limit, PoseOutside, Speed, Unit
+from er3a.references.quantities import Extreme, Speed, Unit
 from er3a.references.reference import Reference, ReferenceSet, conflicts, expected_of, quantities_of
 from er3a.robots.robot import Robot
 
@@ -114,7 +114,7 @@ class Case:
 
     @cached_property
     def _about_shape(self) -> Flags:
-        return np.array([not isinstance(each.quantity, Limit | PoseOutside) for each in self.references])
+        return np.array([each.quantity.depends_on_table for each in self.references])
 
     def search(self, starts: Tables) -> fitting.Search:
         """A search from start tables; what is said about limits depends on no free number and is left out."""
@@ -346,7 +346,7 @@ def usable(references: ReferenceSet | Sequence[Reference]) -> tuple[Reference, .
     """
     every = references.checkable if isinstance(references, ReferenceSet) else references
     stated = [r for r in every if r.expected is not None and not isinstance(r.quantity, Extreme | Speed)]
-    authoritative = [r for r in stated if r.authoritative]
+    authoritative = [r for r in stated if r.is_authoritative]
     resting = tuple(authoritative or stated)
     contradicted = {i for pair in conflicts(resting) for i in pair}
     return tuple(reference for i, reference in enumerate(resting) if i not in contradicted)

@@ -159,7 +159,7 @@ class _Judge:
         self.reacts = reactions(robot, self.references, self.entries)
         self.tool = ToolRange(robot, self.table)
         self.gauge: Gauge = gauge_of(robot, self.free)
-        trusted = [i for i, reference in enumerate(self.references) if reference.authoritative]
+        trusted = [i for i, reference in enumerate(self.references) if reference.is_authoritative]
         self.trusted = tuple(trusted or range(len(self.references)))
         self._asked: dict[tuple[int, ...], Asked] = {}
         self._alternatives: dict[tuple[int, ...], list[Alternative]] = {}

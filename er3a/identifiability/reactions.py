@@ -86,14 +86,14 @@ def bases_of(robot: Robot, references: Sequence[Reference], documents: Documents
         touched = [entry for entry, own in zip(entries, row) if own]
         free = [e for e in touched if documents.independent(reference.document, document_of(robot, e))]
         related = [e for e in free if documents.same_publisher(reference.document, document_of(robot, e))]
-        kind: CheckKind = "claim" if not reference.authoritative else "independent" if free else "consistency"
+        kind: CheckKind = "claim" if not reference.is_authoritative else "independent" if free else "consistency"
         found.append(CheckBasis(kind, _names(touched), _names(free), _names(related)))
     return found
 
 
 def undeclared_bases(references: Sequence[Reference]) -> list[CheckBasis]:
     """Likewise for arms whose entries are not varied: nothing is called independent."""
-    return [CheckBasis("consistency" if each.authoritative else "claim", (), (), ()) for each in references]
+    return [CheckBasis("consistency" if each.is_authoritative else "claim", (), (), ()) for each in references]
 
 
 def reactions(robot: Robot, references: Sequence[Reference], entries: Sequence[TableNumber]) -> Flags:

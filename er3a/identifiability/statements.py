@@ -80,7 +80,7 @@ def not_the_robot_described(robot: Robot, references: ReferenceSet) -> NotTheRob
     foreign = [
         reference
         for reference in references.checkable
-        if reference.authoritative and not made_from_table(robot, reference.document, references.documents)
+        if reference.is_authoritative and not made_from_table(robot, reference.document, references.documents)
     ]
     ranking = rank(robot, foreign) if foreign else None
     if ranking is None:
@@ -105,7 +105,7 @@ def inconsistent_with_own_text(robot: Robot, references: ReferenceSet) -> Incons
     own = [
         reference
         for i, reference in enumerate(stated)
-        if i not in contested and not reference.authoritative and _own_text(robot, reference, references.documents)
+        if i not in contested and not reference.is_authoritative and _own_text(robot, reference, references.documents)
     ]
     asked = Asked(robot, requirements_of(own))
     if not len(asked):

@@ -145,8 +145,8 @@ class _Stated:
         if self.met[i]:
             return "pass"
         rivals = [b if a == i else a for a, b in self.pairs if i in (a, b)]
-        weak = not self.references[i].authoritative
-        excused = any(self.met[k] and (weak or self.references[k].authoritative) for k in rivals)
+        weak = not self.references[i].is_authoritative
+        excused = any(self.met[k] and (weak or self.references[k].is_authoritative) for k in rivals)
         return "conflict" if excused else "fail"
 
 
