@@ -3,7 +3,7 @@
 If references state the line of every joint axis, these lines describe an arm, and the table is matched with it
 (:mod:`er3a.comparison.mechanism`): geometry first. Zeros, directions, base and flange, any number of them at once, are
 taken from the match and fitted to all references about the arm's shape and place. If all of these are met, the table
-describes the same arm. If up to ``MOST_WRONG`` entries of the geometry are wrong as well, it is a faulty table of that
+describes the same arm. If up to ``MAX_WRONG`` entries of the geometry are wrong as well, it is a faulty table of that
 arm.
 """
 
@@ -63,10 +63,10 @@ Misfit = Callable[[Robot], Reals]
 Lines = tuple[Reals, Reals, list[bool], Tolerances]
 """Directions and points (n, 3), m, of all axes, which of these directions are of positive rotation, and how exactly."""
 
-MOST_WRONG = 3
+MAX_WRONG = 3
 SLIGHT_LENGTH, SLIGHT_ANGLE = 1e-3, math.radians(0.2)
 FINER = (1.0, 0.3, 0.1)
-LEAST_LENGTH, LEAST_ANGLE = 1e-5, math.radians(1e-3)
+MIN_LENGTH, MIN_ANGLE = 1e-5, math.radians(1e-3)
 LEVER = 0.3  # m, over which an axis' direction says where it is
 SPREAD = 3.0  # times its uncertainty, that what is derived from two lines may be off
 ROUNDS = 8
@@ -78,7 +78,7 @@ SCANNED_AT = 8  # poses at most: 28 distances, for up to 5 zeros and the flange'
 KEPT_OF_SCAN, FITTED = 24, 576
 """Starts that are kept of each way of the joints' directions, and fitted of all. With 4 kept, 2 of 15 random cases were
 lost, with 1 five; with 64 fitted one."""
-MOST_SCANNED = 7  # joints
+MAX_SCANNED = 7  # joints
 SIGNS: tuple[Literal[1, -1], ...] = (-1, 1)
 
 
@@ -166,7 +166,7 @@ def _conventions(
     found = match(mechanism_of(robot.without_tool()), other, tolerances)
     if any(each.column not in ("a", "d", "alpha") for each in found.differences):
         return None
-    if found.unexplained or sum(_gross(each) for each in found.differences) > MOST_WRONG:
+    if found.unexplained or sum(_gross(each) for each in found.differences) > MAX_WRONG:
         return None
     later = int(robot.convention == "modified")  # rows of a and alpha are those of the next joint
     wrong = [(each.column, each.link + later * (each.column != "d")) for each in found.differences]
@@ -220,14 +220,14 @@ def _from_poses(robot: Robot, stated: Sequence[Reference], meets: float) -> Conv
     points, turns = _stated_flanges(stated)
     poses, inner = list(points), list(range(1, robot.joints - 1))
     known = 3 * (len(points) + sum(pose in turns for pose in poses)) - 12 - len(inner)
-    if robot.joints > MOST_SCANNED or known < 2 * robot.joints:
+    if robot.joints > MAX_SCANNED or known < 2 * robot.joints:
         return None
     xyz, R = (
         np.array([points[pose] for pose in poses]),
         np.array([turns.get(pose, np.full((3, 3), np.nan)) for pose in poses]),
     )
     q, table = joints_of(robot, poses), tables_of(robot)
-    steps = np.arange(0, 2 * np.pi, SCAN if robot.joints < MOST_SCANNED else 2 * SCAN)
+    steps = np.arange(0, 2 * np.pi, SCAN if robot.joints < MAX_SCANNED else 2 * SCAN)
     turned = np.array(list(itertools.product(steps, repeat=len(inner))))
     many = table[np.zeros(len(turned), dtype=int)].with_column("offset", inner, table.offset[:, inner] + turned)
 
@@ -337,7 +337,7 @@ def _lines(stated: Sequence[Reference], joints: int) -> Lines | None:
     """Directions, points (n, 3), m, of all joint axes, which directions are of positive rotation, and how exactly."""
     toward = dict[int, AxisAngle]()
     points = dict[int, tuple[float, float, float]]()
-    length, angle = LEAST_LENGTH, LEAST_ANGLE
+    length, angle = MIN_LENGTH, MIN_ANGLE
     for reference in stated:
         quantity, uncertainty = reference.quantity, float(expected_of([reference])[1][0])
         if isinstance(quantity, AxisAngle) and (quantity.joint not in toward or quantity.signed):

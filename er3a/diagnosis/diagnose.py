@@ -30,7 +30,7 @@ from er3a.references.reference import (
 from er3a.robots.robot import Robot
 
 STEP_DEG = 45.0
-MOST_COMPARED = 60
+MAX_COMPARED = 60
 APART_MM = 1.0
 APART_RAD = 1e-3
 REACH_STARTS = 40
@@ -52,7 +52,7 @@ def deciding_measurement(tables: Tables, robot: Robot) -> conclusions.NextMeasur
     """
     if len(tables) < 2:
         return None
-    tables = tables[:MOST_COMPARED]
+    tables = tables[:MAX_COMPARED]
     poses = _candidates(robot)
     flanges = frames_of(tables, robot, np.radians(poses))[:, :, -1]
     points = flanges[..., :3, 3] * MM
@@ -158,7 +158,7 @@ def distinguishability(case: Case, ranking: Ranking) -> float | None:
     group = ranking.groups[0]
     difference = ranking.pool.difference / case.uncertainty
     factors = []
-    for row in group[1:MOST_COMPARED]:
+    for row in group[1:MAX_COMPARED]:
         apart = difference[row] - difference[group[0]]
         slopes = _slopes(case, ranking, row)
         if slopes.shape[1]:

@@ -41,11 +41,11 @@ from er3a.robots.robot import Robot
 
 FREE_NUMBER = 1.5
 UNCHANGED = 1e-9
-LEAST_SCALE = 1e-3
+MIN_SCALE = 1e-3
 DECIMALS = 12
 SAME_ANGLE, SAME_LENGTH = 0.1, 0.02  # rad; of the arm's length
 FEW_PASSES, MANY_PASSES, ALL_PASSES = 3, 10, 40
-MOST_PROMISING = 400
+MAX_PROMISING = 400
 
 Difference = Callable[[Tables], Reals]
 
@@ -208,7 +208,7 @@ def _refined(search: fitting.Search, fits: fitting.Fits, thorough: bool) -> fitt
     if thorough:
         return fitting.meet(search, fitting.descend(search, fits, ALL_PASSES))
     fits = fitting.descend(search, fits, FEW_PASSES)
-    best = np.sort(np.argsort(fits.squares, kind="stable")[:MOST_PROMISING])
+    best = np.sort(np.argsort(fits.squares, kind="stable")[:MAX_PROMISING])
     return fitting.meet(search, fits.with_rows(best, fitting.descend(search, fits[best], MANY_PASSES)))
 
 
@@ -252,7 +252,7 @@ def _distinct(case: Case, starts: Tables, fits: fitting.Fits) -> fitting.Fits:
     amounts = np.where(is_angle, wrap_to_pi(values + fits.amounts) - values, fits.amounts)
     changes: Flags = np.all(np.abs(np.where(is_angle, wrap_to_pi(amounts), amounts)) > UNCHANGED, axis=1)
     is_scale = np.array([number.column is None for number in case.numbers])[fits.which]
-    changes &= ~(is_scale & (1 + amounts < LEAST_SCALE)).any(axis=1)
+    changes &= ~(is_scale & (1 + amounts < MIN_SCALE)).any(axis=1)
     fits = fitting.Fits(fits.start, fits.which, amounts, fits.left)
     order = np.lexsort((fits.greatest, *fits.which.T[::-1], fits.start))
     fits, is_angle, kept = fits[order], is_angle[order], changes[order]

@@ -187,8 +187,8 @@ def torque_caps(robot: Robot, row: int, behind: Hanging, gravity: float) -> Real
 CLOSE = 1e-3
 """Bounds nearer than that to what is found, in parts of it, are near enough; levers, of few joints, get nearer."""
 CLOSE_LEVER = 1e-5
-MOST_CORNERS = 12_000_000
-MOST_BOXES = 60_000
+MAX_CORNERS = 12_000_000
+MAX_BOXES = 60_000
 BATCH_CORNERS = 300_000
 ROUNDING = 1e-9
 IDLE = 1e-12
@@ -285,12 +285,12 @@ def _branch_and_bound(
     bound, joint = _bounds(robot, at_corners, used, low, high)
     best, q = start.found, start.q
     each = 3 ** int(used.sum())
-    batch, left, dropped = max(1, BATCH_CORNERS // each), MOST_CORNERS // each, 0.0
+    batch, left, dropped = max(1, BATCH_CORNERS // each), MAX_CORNERS // each, 0.0
     while True:
         open_ = bound > best * (1 + close)
         dropped = max(dropped, float(bound[~open_].max(initial=0.0)))
         low, high, bound, joint = low[open_], high[open_], bound[open_], joint[open_]
-        if not len(bound) or left <= 0 or len(bound) > MOST_BOXES or best > useless:
+        if not len(bound) or left <= 0 or len(bound) > MAX_BOXES or best > useless:
             break
         order = np.argsort(-bound, kind="stable")
         taken, kept = order[:batch], order[batch:]
@@ -369,7 +369,7 @@ POSES = 1000
 CLIMBS = 4
 GRID = 21
 REFINEMENTS = 3
-MOST_ROUNDS = 12
+MAX_ROUNDS = 12
 NO_BETTER = 1e-9
 
 
@@ -397,7 +397,7 @@ def max_over_poses(robot: Robot, objective: Callable[[Reals], Reals]) -> Maxima:
     best = np.argsort(-values, axis=0, kind="stable")[:CLIMBS]
     targets = np.broadcast_to(np.arange(k), best.shape).ravel()
     poses, reached = q[best.ravel()], values[best.ravel(), targets]
-    for _ in range(MOST_ROUNDS):
+    for _ in range(MAX_ROUNDS):
         before = reached
         for joint in range(robot.joints):
             poses, reached = _along(robot, objective, poses, targets, joint)

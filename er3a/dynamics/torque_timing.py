@@ -31,7 +31,7 @@ from er3a.numerics.arrays import Reals
 from er3a.planning import timing
 from er3a.planning.piecewise import polynomial_motion
 
-MOST_ROUNDS = 30
+MAX_ROUNDS = 30
 GAIN = 1e-4
 SLOWEST = 1e-3
 SLACK = 1e-3  # by which a speed that no motion exceeds is kept above the one found, because TOPP-RA's is rounded
@@ -122,7 +122,7 @@ class TorquesAlong:
     def least_time(self) -> tuple[float, Reals]:
         """A time (s) that no motion undercuts, and s' at the nodes (N,) that none exceeds."""
         ceiling, least = self.greatest, 0.0
-        for _ in range(MOST_ROUNDS):
+        for _ in range(MAX_ROUNDS):
             pace, t = self._solved(self._relaxed(ceiling), ceiling)
             gained, least = t[-1] > least * (1 + GAIN), max(least, float(t[-1]))
             ceiling = np.clip(pace * (1 + SLACK), SLOWEST * self.greatest, ceiling)
@@ -133,7 +133,7 @@ class TorquesAlong:
     def fastest(self, ceiling: Reals) -> tuple[Reals, Reals]:
         """Speeds s' and times (s) at the nodes (N,) of a motion that keeps the limits; ``ceiling`` of all motions."""
         around, best = self.slow, np.inf
-        for _ in range(MOST_ROUNDS):
+        for _ in range(MAX_ROUNDS):
             pace, t = self._solved(self._kept(around, ceiling), ceiling)
             gained, best = t[-1] < best * (1 - GAIN), float(t[-1])
             around = np.maximum(pace, SLOWEST * self.slow)

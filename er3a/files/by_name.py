@@ -25,13 +25,13 @@ from er3a.diagnosis.diagnose import Hypotheses
 from er3a.errors import ArgumentError, InputError
 from er3a.files.csv_file import CsvColumn, read_csv, read_header
 from er3a.files.reference_sets import check_robot_origins, load_references
-from er3a.files.units import LEAST_SPAN_MM, WIDEST_IN_RADIANS
+from er3a.files.units import MIN_SPAN_MM, WIDEST_IN_RADIANS
 from er3a.identifiability.entry_evidence import Evidence, Tolerance
 from er3a.identifiability.evidence import evidence_of
 from er3a.numerics.arrays import Reals
 from er3a.references.quantities import Pose
 from er3a.references.reference import Document, Documents, Reference, ReferenceSet
-from er3a.robots.robot import MOST_JOINTS, Robot, Source
+from er3a.robots.robot import MAX_JOINTS, Robot, Source
 
 _NUMBER = CsvColumn(float)
 SAME = 1e-9  # m, rad, kg
@@ -127,16 +127,16 @@ def _check_lengths(path: Path, rows: list[Measurement]) -> None:
 def _units_in(path: Path) -> list[str]:
     """Units of the joints that a header names; six angles if it names none."""
     named = {int(found[1]): found[2] for name in read_header(path) if (found := JOINT_COLUMN.fullmatch(name))}
-    if max(named, default=0) > MOST_JOINTS:
+    if max(named, default=0) > MAX_JOINTS:
         column = f"q{max(named)}_{named[max(named)]}"
-        raise InputError(path, f"column {column}", f"er3a supports at most {MOST_JOINTS} joints", "Remove it")
+        raise InputError(path, f"column {column}", f"er3a supports at most {MAX_JOINTS} joints", "Remove it")
     return [named.get(joint, "deg") for joint in range(1, max(named, default=6) + 1)]
 
 
 def _check_units(path: Path, rows: list[Measurement], units: Sequence[str]) -> None:
     for row in rows:
         span = max((abs(value) for value in row.xyz_mm if value is not None), default=0.0)
-        if None not in row.xyz_mm and span < LEAST_SPAN_MM:
+        if None not in row.xyz_mm and span < MIN_SPAN_MM:
             problem = f"the point is {span:g} mm from the base's origin at most, which can only be metres"
             raise InputError(path, f"row {row.row}, columns x_mm, y_mm, z_mm", problem, "Multiply by 1000")
     angles = [abs(value) for row in rows for value, unit in zip(row.pose, units) if unit == "deg"]

@@ -24,9 +24,9 @@ from typing import Any, Literal
 from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn, Lines, check_widths, read_csv, read_lines
 from er3a.files.robot_file import SHORTEST_PLAIN_LENGTH_MM, RobotFile, far_normals
-from er3a.files.units import MOST_DEG, RADIANS_BELOW_DEG, look_like_radians
+from er3a.files.units import MAX_DEG, RADIANS_BELOW_DEG, look_like_radians
 from er3a.files.yaml_file import parse
-from er3a.robots.robot import CONVENTIONS, MOST_JOINTS, Convention, Grade
+from er3a.robots.robot import CONVENTIONS, MAX_JOINTS, Convention, Grade
 
 _NUMBER, _OF_KIND = CsvColumn(float), CsvColumn(float, optional=True)
 NEEDED = {"joint": CsvColumn(int), "a_mm": _NUMBER, "alpha_deg": _NUMBER, "d_mm": _NUMBER}
@@ -115,9 +115,9 @@ def read_dh_table(
         if len(pair := given & {f"lower_{unit}", f"upper_{unit}"}) == 1:
             missing = ({f"lower_{unit}", f"upper_{unit}"} - pair).pop()
             raise InputError(path, f"column {missing}", "missing beside the other limit", "Give both limits, or none")
-    if [row["joint"] for row in rows] != list(range(1, len(rows) + 1)) or not 1 <= len(rows) <= MOST_JOINTS:
+    if [row["joint"] for row in rows] != list(range(1, len(rows) + 1)) or not 1 <= len(rows) <= MAX_JOINTS:
         problem = f"the joints are {', '.join(str(row['joint']) for row in rows) or 'none'}"
-        remedy = f"er3a models 1 to {MOST_JOINTS} joints: write one row for each, from 1 on in order"
+        remedy = f"er3a models 1 to {MAX_JOINTS} joints: write one row for each, from 1 on in order"
         raise InputError(path, "column joint", problem, remedy)
     for row in rows:
         _check_kind(path, row, given)
@@ -185,7 +185,7 @@ def _in_own_units(
     elif angle_unit == "deg":
         turned = set()
     in_degrees = "alpha_deg" not in own | turned
-    twice = [row for row in rows if in_degrees and abs(row["alpha_deg"]) > MOST_DEG]
+    twice = [row for row in rows if in_degrees and abs(row["alpha_deg"]) > MAX_DEG]
     for row in rows:
         for column, value in row.items():
             if column not in own and isinstance(value, float):

@@ -133,7 +133,7 @@ def _check_millimetres(path: Path, rows: list[dict[str, Any]], stream: str, posi
 STREAM_SAMPLES = 60
 SHOWN_HEADER = 60
 EXAMPLE = "flange_x_mm, .., flange_qw, .., flange_qz, target_x_mm, .., target_qz (lengths in mm)"
-LEAST_SQUARE_MM = 0.5
+MIN_SQUARE_MM = 0.5
 EPOCH_DIGITS = 10  # of the seconds since 1970, which recorders write
 POINTS = {f"{part}_{c}_mm": CsvColumn() for part in ("seen", "touched") for c in "xyz"}
 
@@ -163,7 +163,7 @@ class BoardEntry(StrictModel):
 
     @model_validator(mode="after")
     def _in_mm(self) -> Self:
-        if self.square_mm < LEAST_SQUARE_MM:
+        if self.square_mm < MIN_SQUARE_MM:
             raise ValueError(f"square_mm: {self.square_mm:g} mm can only be metres | Multiply by 1000")
         return self
 

@@ -16,13 +16,13 @@ from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn, Written, read_csv
 from er3a.files.kept_files import names, own_or_shipped
 from er3a.files.robot_file import NAME_PATTERN
-from er3a.files.units import LEAST_SPAN_MM, WIDEST_IN_RADIANS, suspect
+from er3a.files.units import MIN_SPAN_MM, WIDEST_IN_RADIANS, suspect
 from er3a.numerics.arrays import Reals
 from er3a.references.quantities import ZERO_POSE, NotOfArm, Pose, Quantity, Rotation3, not_of_arm
 from er3a.references.reference import NO_DOCUMENT, Document, Documents, Reference, ReferenceSet, Row, conflicts
 from er3a.references.rows import ENVELOPE_CORNERS, ENVELOPE_EXTENTS, KINDS, check_complete, reference_set
 from er3a.references.seen import COARSE_DEG, SEEN
-from er3a.robots.robot import GRADES, MOST_JOINTS, Robot
+from er3a.robots.robot import GRADES, MAX_JOINTS, Robot
 
 Fields = dict[str, Any]
 Fault = tuple[str, str, str]
@@ -58,7 +58,7 @@ ORIENTATIONS: dict[str, tuple[str, ...]] = {
 ORIENTATION_COLUMNS = tuple(column for columns in ORIENTATIONS.values() for column in columns)
 NOT_RIGID = 2e-3
 _POSE = tuple(f"q{joint}_deg" for joint in range(1, len(ZERO_POSE) + 1))
-_FURTHER = tuple(f"q{joint}_deg" for joint in range(len(ZERO_POSE) + 1, MOST_JOINTS + 1))
+_FURTHER = tuple(f"q{joint}_deg" for joint in range(len(ZERO_POSE) + 1, MAX_JOINTS + 1))
 _POSE_COLUMNS = dict.fromkeys(_POSE, _NUMBER) | dict.fromkeys(_FURTHER, CsvColumn(Written, always=False))
 
 
@@ -587,8 +587,8 @@ def _check_row(path: Path, format: Format, fields: Fields) -> None:
         if value <= 0:
             remedy = "Half the last digit that the source prints, if it gives none"
             faults.append((column, f"{value:g} is not positive", remedy))
-    if fields.get("joint", 1) not in range(1, MOST_JOINTS + 1):
-        faults.append(("joint", f"there is no joint {fields['joint']}", f"Write a number from 1 to {MOST_JOINTS}"))
+    if fields.get("joint", 1) not in range(1, MAX_JOINTS + 1):
+        faults.append(("joint", f"there is no joint {fields['joint']}", f"Write a number from 1 to {MAX_JOINTS}"))
     for column, problem, remedy in (*faults, *format.faults(fields)):
         raise InputError(path, f"row {fields['row']}, column {column}", problem, remedy)
 
@@ -597,7 +597,7 @@ def _check_units(path: Path, format: Format, table: list[Fields]) -> None:
     """Refuse values in metres or radians, but where a person has checked the units of every row."""
     if all(fields[UNITS_CHECKED] for fields in table):
         return
-    _check_span(path, table, LENGTHS, LEAST_SPAN_MM, METRES)
+    _check_span(path, table, LENGTHS, MIN_SPAN_MM, METRES)
     if format.mixed_lengths:
         _check_mixed(path, table, LENGTHS, SHORTEST_BESIDE_LONG_MM, LONG_MM, METRES)
     if format.mixed_limits:

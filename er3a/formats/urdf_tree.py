@@ -46,7 +46,7 @@ MOVING = ("revolute", "continuous", "prismatic")
 FREE = ("floating", "planar")
 SNAP_RAD = 1e-4
 ROUNDED_RAD = 2e-3  # an angle so near to a right one may be that, rounded: 1.57, 1.571, 3.14
-MOST_BYTES = 20_000_000
+MAX_BYTES = 20_000_000
 ARM_JOINTS = 4  # so many joints before a branching make what follows a hand rather than an arm
 FINGER_JOINTS = 4
 GRIPPER = re.compile("gripper|finger|jaw", re.IGNORECASE)
@@ -55,7 +55,7 @@ EXPAND = "Expand it first: xacro FILE > arm.urdf"
 DEFINITIONS = ("property", "arg")  # of xacro
 PREFIXED = re.compile(r"(</?[\w.-]+):([\w.-]+)")
 WHOLE_TURN = 2 * math.pi + SNAP_RAD
-FAR_APART_M, MOST_APART_M = 5.0, 100.0
+FAR_APART_M, MAX_APART_M = 5.0, 100.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,7 +219,7 @@ def read_chain(path: Path, base: str | None, tip: str | None, snap: bool) -> Urd
                 remedy = f"Name where the arm begins by --base: {_some([each.child for each in joints])}"
             problem = f"type '{joint.type}' is no joint of a serial arm"
             raise InputError(path, f"joint {joint.name}", problem, remedy)
-        if (apart := np.abs(joint.T_parent_joint[:3, 3]).max()) > MOST_APART_M:
+        if (apart := np.abs(joint.T_parent_joint[:3, 3]).max()) > MAX_APART_M:
             problem = f"stands {apart:g} m from the one before it"
             remedy = "A URDF's lengths are in metres: divide millimetres by 1000"
             raise InputError(path, f"joint {joint.name}, xyz", problem, remedy)
@@ -285,7 +285,7 @@ def urdf_root(path: Path) -> ElementTree.Element:
     InputError
         for a file that is no URDF, such as xacro that is not expanded
     """
-    text = read_text(path, MOST_BYTES, "Leave out of it what is no link or joint of the arm")
+    text = read_text(path, MAX_BYTES, "Leave out of it what is no link or joint of the arm")
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise InputError(path, None, "holds a document type or entities", "Remove them; a URDF needs none")
     try:
@@ -843,7 +843,7 @@ def plain_urdf(path: Path, arguments: Sequence[str] = ()) -> Iterator[Path]:
         for arguments of another form or to a file that is no xacro, without xacrodoc, or for what it can't expand; it
         names ``path`` for what the expanded file is refused for, too
     """
-    if "<xacro:" not in COMMENT.sub("", read_text(path, MOST_BYTES)):
+    if "<xacro:" not in COMMENT.sub("", read_text(path, MAX_BYTES)):
         if arguments:
             raise InputError(path, "--xacro", "the file holds no xacro macros", "Leave the arguments out")
         yield path

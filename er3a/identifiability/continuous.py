@@ -27,8 +27,8 @@ from er3a.identifiability.alternatives import amounts_between
 from er3a.identifiability.entries import Gauge, TableNumber, shifted
 from er3a.identifiability.entry_evidence import Tolerance
 from er3a.identifiability.feasible import (
+    MAX_DAMPING,
     MET,
-    MOST_DAMPING,
     PROFILE,
     STAYING,
     WIDEST_DEG,
@@ -50,7 +50,7 @@ WIDEST_M, WIDEST_RAD = 0.4, np.pi
 REACTS = 1e-9
 FAR = 3.0  # of an entry's scale
 A_LENGTH_M, REVERSED_RAD, UNWATCHED, ROUNDED = 0.3, 0.3, 0.01, 6
-MOST_ROWS = 1 << 15
+MAX_ROWS = 1 << 15
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,10 +124,10 @@ def nearest_rows(own: Tables, region: Region, watched: Collection[int]) -> Table
 
 def same_robots(table: Tables) -> Tables:
     """The rows (a batch) that are the same robot as a table's (a batch of one), itself first; of arms with more than
-    eight joints the first ``MOST_ROWS`` of them."""
+    eight joints the first ``MAX_ROWS`` of them."""
     found = table
     for turn in _turns(table):
-        found = join([found, turn(found)]) if len(found) < MOST_ROWS else found
+        found = join([found, turn(found)]) if len(found) < MAX_ROWS else found
     return found
 
 
@@ -165,7 +165,7 @@ def _z_turned(tables: Tables, joint: int, row: int) -> Tables:
 SPREAD, CHALLENGE_WIDTHS = 192, (0.02, 0.1, 0.3, 1.0)
 REVERSED, TURNED = 0.2, 0.15  # shares of joints reversed and angles turned round, in every second spread start
 PUSHES = 1.1, 1.7, 3.0, 8.0  # of the smallest step that matters
-ROUNDS, PUSHED_FROM, MOST_KEPT = 3, 3, 40
+ROUNDS, PUSHED_FROM, MAX_KEPT = 3, 3, 40
 PASSES, STEP, DAMPING, STALLED, FLOOR, NOTHING = 40, 1e-3, 1e-2, 1e-3, 1e-8, 1e-12
 CHUNK, SEED = 48, 20261121
 
@@ -266,7 +266,7 @@ class _ManyStarts:
     def found(self) -> list[Elsewhere]:
         """Tables found, as points of the regions with their directions; those that extremes allow as well."""
         region, found = self.region, list[Elsewhere]()
-        for direction, amounts in (*self.farthest_tables()[:MOST_KEPT], *self.reversed.values()):
+        for direction, amounts in (*self.farthest_tables()[:MAX_KEPT], *self.reversed.values()):
             table = region.table.with_column("direction", slice(None), direction[None])
             other = Region(region.asked, table, region.entries, region.gauge)
             point = other.restarted(amounts, self.start.chi2)
@@ -296,7 +296,7 @@ class _ManyStarts:
             damping[rows] = np.where(better, np.maximum(damping[rows] / 10, 1e-9), damping[rows] * 10)
             stalled = better & (after > (1 - STALLED) * before)
             going[rows[stalled | (after == 0)]] = False
-            going &= damping < MOST_DAMPING
+            going &= damping < MAX_DAMPING
         chi2 = (off[:, likely] ** 2).sum(axis=1)
         met = self.region.asked.excess(off) <= MET
         met &= chi2 <= self.start.chi2 + PROFILE**2

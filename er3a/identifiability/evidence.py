@@ -546,7 +546,7 @@ PART_OF_GROUP: dict[str, PartName] = {
 }
 GRAVEST: tuple[PartStatus, ...] = ("contradicted", "open", "weak", "consistent", "settled_up_to_signs", "settled")
 SETTLED: tuple[Status, ...] = (*OUTRIGHT_OR_NOT, "gauge", "given")
-MOST_COMBINED = 256
+MAX_COMBINED = 256
 
 
 @dataclass(frozen=True)
@@ -593,7 +593,7 @@ def together(evidence: Evidence, names: list[str]) -> ToolOff:
     combined: list[tuple[Alternative, ...]] = [()]
     for each in readings:
         free = [own for own in combined if not {n for other in own for n in other.names} & set(each.names)]
-        combined += [(*own, each) for own in free][: MOST_COMBINED - len(combined)]
+        combined += [(*own, each) for own in free][: MAX_COMBINED - len(combined)]
     off = NOT_OFF
     for own in combined[1:]:
         off = off.worse(tool.off(with_readings(tool.table, evidence.robot, own)))

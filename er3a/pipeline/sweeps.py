@@ -14,9 +14,9 @@ from er3a.files.robot_file import Name, Placement, RobotFile, Text, check_placem
 from er3a.files.yaml_file import StrictModel, parse
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.stages.registry import STAGES
-from er3a.robots.robot import MOST_JOINTS
+from er3a.robots.robot import MAX_JOINTS
 
-MOST_VALUES = 1000
+MAX_VALUES = 1000
 DECIMALS = 9
 Value = Annotated[float, Field(ge=-1e6, le=1e6)]
 
@@ -53,14 +53,14 @@ _OF_THE_TOOL = {
 }
 ENTRIES = {
     f"joints.{joint}.{column}": Entry(joint, group, column, label, unit)
-    for joint in range(1, MOST_JOINTS + 1)
+    for joint in range(1, MAX_JOINTS + 1)
     for column, (group, label, unit) in _OF_A_JOINT.items()
 } | {f"tool.{key}": Entry(None, *where) for key, where in _OF_THE_TOOL.items()}
 
 
 def _known_entry(path: str) -> str:
     if path not in ENTRIES:
-        remedy = f"Write joints.1 to joints.{MOST_JOINTS} with one of {', '.join(_OF_A_JOINT)}; or tool with one of "
+        remedy = f"Write joints.1 to joints.{MAX_JOINTS} with one of {', '.join(_OF_A_JOINT)}; or tool with one of "
         raise ValueError(f"'{path}' is no entry that can be varied | {remedy}{', '.join(_OF_THE_TOOL)}")
     return path
 
@@ -167,8 +167,8 @@ class Sweep(StrictModel):
     vary: Annotated[Text, AfterValidator(_known_entry)]
     first: Annotated[Value | None, Field(alias="from")] = None
     to: Value | None = None
-    steps: Annotated[int, Field(ge=2, le=MOST_VALUES)] | None = None
-    values: Annotated[list[Value], Field(min_length=1, max_length=MOST_VALUES), AfterValidator(_distinct)] | None = None
+    steps: Annotated[int, Field(ge=2, le=MAX_VALUES)] | None = None
+    values: Annotated[list[Value], Field(min_length=1, max_length=MAX_VALUES), AfterValidator(_distinct)] | None = None
     stages: Annotated[list[StageName], Field(min_length=1), AfterValidator(_distinct)] = ["validation", "workspace"]
 
     @model_validator(mode="after")

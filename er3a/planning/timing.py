@@ -34,7 +34,7 @@ LONGEST_STEP = 0.02  # share of the whole path between two nodes
 SHARPEST_BEND = 0.15  # rad, between two steps in joint space measured in full speeds
 SHORTEST_STEP = 2e-4  # s at full speed; bends sharper than this count as corners
 SAME_NODE = 1e-5  # s at full speed
-MOST_ROUNDS = 30
+MAX_ROUNDS = 30
 STRAIGHT_NODES = 81
 SPLINE_DEGREE = 6  # in time, of a cubic at an even acceleration
 
@@ -174,7 +174,7 @@ def nodes_along(joints: Callable[[Reals], Reals], t: Reals, q: Reals, limits: Jo
     joints : angles (n, 6) in rad at times (n,)
     t, q : (N,) s and (N, 6) rad, to begin with
     """
-    for _ in range(MOST_ROUNDS):
+    for _ in range(MAX_ROUNDS):
         steps = np.diff(q, axis=0) / limits.speed
         size = np.abs(steps).max(axis=1)
         long = size > LONGEST_STEP * size.sum()

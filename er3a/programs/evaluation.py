@@ -21,7 +21,7 @@ from er3a.programs import syntax
 from er3a.programs.instructions import ArmMotion, Instruction, JointTarget, NamedFrame, PoseTarget, arc_end
 
 NO_FRAME = NamedFrame()
-MOST_ROBOT_AXES = 6
+MAX_ROBOT_AXES = 6
 
 Flange = Callable[[Reals], Reals]
 """T_robot_flange (4, 4) of joint angles (n,) in rad."""
@@ -43,7 +43,7 @@ class Cell(ByValue):
 
     flange: Flange | None = None
     start: Reals | None = None
-    joints: int = MOST_ROBOT_AXES
+    joints: int = MAX_ROBOT_AXES
     frames: Mapping[str, Reals] = field(default_factory=dict)
     tool: Reals | None = None
     base: Reals | None = None

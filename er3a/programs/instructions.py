@@ -322,7 +322,7 @@ def motions_of(instructions: Iterable[Instruction]) -> Iterable[ArmMotion]:
 
 
 ON_A_LINE = 1e-9
-MOST_LINES = 10_000
+MAX_LINES = 10_000
 
 
 def arc_poses(start: Reals, via: Reals, end: Reals, shares: Reals) -> Reals | None:
@@ -396,7 +396,7 @@ def chords(start: Reals, via: Reals, end: Reals, deviation: float) -> Reals | No
     centre, _, angle = circle
     radius = float(np.linalg.norm(start[:3, 3] - centre))
     widest = 2 * math.acos(max(1 - deviation / radius, 0.0)) if radius > 0 else angle
-    count = min(max(math.ceil(angle / max(widest, 1e-6)), 1), MOST_LINES)
+    count = min(max(math.ceil(angle / max(widest, 1e-6)), 1), MAX_LINES)
     found = arc_poses(start, via, end, np.arange(1, count + 1) / count)
     if found is not None:
         found[-1] = end

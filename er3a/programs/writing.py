@@ -24,9 +24,9 @@ from er3a.robots.masses import MassBody
 from er3a.robots.robot import Robot
 
 STEP_M, STEP_RAD = 0.02, 0.1
-MOST_STEPS = 10_000  # on a way that no arm can take
-MOST_AT_ONCE = 2_000  # motions whose joints are solved together
-MOST_ROUNDS = 10  # over them
+MAX_STEPS = 10_000  # on a way that no arm can take
+MAX_AT_ONCE = 2_000  # motions whose joints are solved together
+MAX_ROUNDS = 10  # over them
 
 Frames = tuple[instructions.NamedFrame, instructions.NamedFrame]
 NO_SIDE = 1e-9  # m or rad, of a signed distance that is on no side
@@ -136,7 +136,7 @@ class Resolver:
         reference = np.zeros(self.arm.joints) if near is None else near
         references = np.tile(reference, (len(flanges), 1))
         chain: list[Reals] = []
-        for _ in range(MOST_ROUNDS):  # until each pose is solved with the joints before it as reference
+        for _ in range(MAX_ROUNDS):  # until each pose is solved with the joints before it as reference
             try:
                 found = inverse_batch(self.arm, flanges, references)
                 chain = _chain(found, reference, self.arm, branch)
@@ -163,7 +163,7 @@ class Resolver:
     def _solve_ways(self, first: int, near: Reals) -> None:
         frames = _frames(self.motions[first][0])
         ways: list[Reals] = []
-        for motion, pose_before in self.motions[first : first + MOST_AT_ONCE]:
+        for motion, pose_before in self.motions[first : first + MAX_AT_ONCE]:
             if not _is_followed(motion) or pose_before is None or not _same(frames, _frames(motion)):
                 break
             ways.append(_between(motion, pose_before))
@@ -290,7 +290,7 @@ def _between(motion: instructions.ArmMotion, start: Reals) -> Reals:
     end = motion.target.pose
     turn = scipy.spatial.transform.Rotation.from_matrix(end[:3, :3] @ start[:3, :3].T).as_rotvec()
     way = float(np.linalg.norm(end[:3, 3] - start[:3, 3]))
-    count = int(min(max(way / STEP_M, float(np.linalg.norm(turn)) / STEP_RAD, 1), MOST_STEPS)) + 1
+    count = int(min(max(way / STEP_M, float(np.linalg.norm(turn)) / STEP_RAD, 1), MAX_STEPS)) + 1
     shares = np.arange(1, count + 1) / count
     poses = None
     if motion.kind == "arc" and isinstance(motion.via, instructions.PoseTarget):

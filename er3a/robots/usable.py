@@ -26,7 +26,7 @@ FINITE = (
     ("upper", "rad"),
 )
 SEVERAL_TURNS = 4 * np.pi
-MOST_TURNS = 2 * SEVERAL_TURNS  # rad, beyond which an arm's joint that turns by so much is given in degrees
+MAX_TURNS = 2 * SEVERAL_TURNS  # rad, beyond which an arm's joint that turns by so much is given in degrees
 _FEW = 1000
 
 
@@ -126,7 +126,7 @@ def warn_of_degrees(values: Reals, argument: str, stacklevel: int = 2) -> None:
     """Warn of joint values (n,) that can only be degrees where no robot says its limits: more than four turns in rad,
     and no more than two in degrees."""
     far = float(np.abs(values).max(initial=0.0))
-    if MOST_TURNS < far <= np.degrees(SEVERAL_TURNS):
+    if MAX_TURNS < far <= np.degrees(SEVERAL_TURNS):
         warnings.warn(
             f"{argument} holds {far:g}, which is {far / (2 * np.pi):.0f} turns in rad; er3a takes rad: "
             f"np.radians({argument})",

@@ -47,7 +47,7 @@ from er3a.vision.likelihood import UNKNOWNS, PoseObservations, Refined, refine, 
 from er3a.vision.setup_changes import moved_between
 
 DEVIATIONS = 6.0  # of the angle between two samples; beyond, a pair is in conflict
-MOST_DEVIATION = np.radians(2.0)  # of a camera that is of any use
+MAX_DEVIATION = np.radians(2.0)  # of a camera that is of any use
 ROUNDING = 1e-6  # rad
 SAME_POSITION_M, SAME_ROTATION_RAD = 5e-5, 2e-4
 MOSTLY_APART = 0.8  # of samples that stand apart, so that their residuals are judged as independent
@@ -113,7 +113,7 @@ def check_angles(samples: calibration_set.CalibrationSet) -> AngleCheck:
 
 def _tolerance(samples: calibration_set.CalibrationSet, mismatch: Reals) -> float:
     """Half of the mismatches of sound pairs lie below 0.674 standard deviations."""
-    deviation = min(float(np.median(mismatch)) / 0.674, MOST_DEVIATION)
+    deviation = min(float(np.median(mismatch)) / 0.674, MAX_DEVIATION)
     if samples.camera_covariance is not None:
         stated = np.linalg.eigvalsh(samples.camera_covariance[:, 3:, 3:])[:, -1].mean()
         if samples.flange_covariance is not None:
@@ -260,7 +260,7 @@ def other_reading(samples: calibration_set.CalibrationSet, residual: Reals) -> v
     best: tuple[float, vision_findings.RotationReading] | None = None
     for again, finding in _readings(samples, turned):
         mismatch = np.abs(angles_between(again.flange[:, :3, :3]) - angles_between(transposed(again.target)[:, :3, :3]))
-        if np.median(mismatch) > MOST_DEVIATION:
+        if np.median(mismatch) > MAX_DEVIATION:
             continue
         try:
             raw = residuals(again.hand, again.target, *solved_by("park", again.hand, again.target))[0]
@@ -278,7 +278,7 @@ SIGNED_AXES: dict[str, Reals] = {
     for signs in product((1.0, -1.0), repeat=3)
 }
 """What axes may be taken for x, y, z, first as they are: matrices (3, 3) by name."""
-LEAST_MISREAD = 3e-3  # m; residuals below are no wrong axes
+MIN_MISREAD = 3e-3  # m; residuals below are no wrong axes
 
 
 def position_axes(samples: calibration_set.CalibrationSet) -> vision_findings.PositionAxes | None:
@@ -312,7 +312,7 @@ def position_axes(samples: calibration_set.CalibrationSet) -> vision_findings.Po
     }
     best: vision_findings.Streams = min(streams, key=lambda stream: round(float(streams[stream].min()), 9))
     given, k = float(streams[best][0]), int(streams[best].argmin())
-    if given < LEAST_MISREAD or streams[best][k] > given / MUCH_BETTER:
+    if given < MIN_MISREAD or streams[best][k] > given / MUCH_BETTER:
         return None
     return vision_findings.PositionAxes(best, [*SIGNED_AXES][k], 1000 * given, 1000 * float(streams[best][k]))
 
@@ -364,18 +364,18 @@ def _product(T: Reals, axes: str, columns: list[int]) -> Reals:
     return R
 
 
-LEAST_SAMPLES = 3
+MIN_SAMPLES = 3
 FEW_SAMPLES = 6  # of which none is judged by the others
 EQUAL = 1e-9
-LEAST_TURN = np.radians(0.5)
-LEAST_SPREAD = np.radians(1.0)
+MIN_TURN = np.radians(0.5)
+MIN_SPREAD = np.radians(1.0)
 LITTLE_TURN, LITTLE_SPREAD = np.radians(15), np.radians(10)
 EXCLUDED = 1e-3
 SURE = 0.95
-MOST_FACTS = 10
+MAX_FACTS = 10
 ONE_MORE_ROUNDS = 20
 SURE_SCALE = 3.0  # half widths of its interval, from 0; a vaguer factor comes of samples that don't fit at all
-LEAST_SCALE_ERROR = 2e-3
+MIN_SCALE_ERROR = 2e-3
 DIRECTIONS = ((False, False), (True, True), (True, False), (False, True))
 
 
@@ -466,7 +466,7 @@ class HandEye(ByValue, Displayed):
         ]
         columns = ("pose", "axis", "mm", "half_width_mm", "rpy_deg", "half_width_deg")
         found = [*self.suspects, *self.warnings]
-        facts = tuple(shortly(each) for each in found[:MOST_FACTS])
+        facts = tuple(shortly(each) for each in found[:MAX_FACTS])
         heading = f"Hand-eye calibration, {int(self.used.sum())} of {len(self.samples)} samples used"
         return Sheet.of_table(heading, columns, rows, len(rows), facts)
 
@@ -580,21 +580,21 @@ def _shared_covariance(samples: calibration_set.CalibrationSet, refined: Refined
 
 def _check_determined(samples: calibration_set.CalibrationSet) -> tuple[float, float]:
     """The largest turn between two samples and how far the rotation axes leave one direction, rad."""
-    if len(samples) < LEAST_SAMPLES:
-        raise vision_findings.HandEyeError(vision_findings.TooFewSamples(len(samples), LEAST_SAMPLES))
+    if len(samples) < MIN_SAMPLES:
+        raise vision_findings.HandEyeError(vision_findings.TooFewSamples(len(samples), MIN_SAMPLES))
     for stream in ("flange", "target"):
         poses = getattr(samples, stream)
         if np.abs(step_between(poses[:1], poses)).max() < EQUAL:
             raise vision_findings.HandEyeError(vision_findings.AllSamplesEqual(stream))  # type: ignore[arg-type]
     R = samples.hand[:, :3, :3]
     greatest = float(angles_between(R).max())
-    if greatest < LEAST_TURN:
+    if greatest < MIN_TURN:
         raise vision_findings.HandEyeError(vision_findings.NoRotation(float(np.degrees(greatest))))
     i, j = np.triu_indices(len(samples), 1)
     turns = log_rotation(transposed(R[j]) @ R[i])
     _, size, axes = np.linalg.svd(turns, full_matrices=False)
     apart = float(np.arctan2(size[1], size[0]))
-    if apart < LEAST_SPREAD:
+    if apart < MIN_SPREAD:
         raise vision_findings.HandEyeError(
             vision_findings.ParallelTurns(tuple(axes[0].tolist()), float(np.degrees(apart)))
         )
@@ -625,7 +625,7 @@ def _warnings(
         best = next(each for each in directions if each.status == "best")
         return [*found, vision_findings.OtherDirection(best.flange_inverted, best.target_inverted)]
     factor, half_width = board_scale(samples, refined)
-    if abs(factor - 1) > max(2 * half_width, LEAST_SCALE_ERROR) and factor > SURE_SCALE * half_width:
+    if abs(factor - 1) > max(2 * half_width, MIN_SCALE_ERROR) and factor > SURE_SCALE * half_width:
         found.append(vision_findings.BoardScale(factor, half_width))
     size, turn = _misfit(refined.residual)
     if size > 1 and not vision_findings.grave_warnings(found):

@@ -45,7 +45,7 @@ STEPS = 40
 STEP_ENDS = 1e-10
 HALVINGS = 10
 TABLE_JOINTS = 6
-LEAST_FREEDOM = 6
+MIN_FREEDOM = 6
 
 
 class NoCorrections(Finding):
@@ -137,14 +137,14 @@ def correct_table(found: HandEye, robot: Robot, level: LevelName = "all_entries"
     sigma = np.broadcast_to(np.repeat(found.deviations, 3), (len(samples), 6))
     _, _, J = problem.linear(tables_of(robot), every, found.X, found.Y)
     kept, held = _identified(likelihood.whitening(seen, sigma, found.X, found.Y) @ J, every, samples.setup, robot)
-    if 6 * len(samples) - likelihood.UNKNOWNS - len(kept) < LEAST_FREEDOM:
+    if 6 * len(samples) - likelihood.UNKNOWNS - len(kept) < MIN_FREEDOM:
         return NoCorrections("few")
     fit = _fit(problem, kept, found)
     return NoCorrections("steps") if fit is None else _result(problem, (level, kept, held), found, fit)
 
 
 ZERO_CHANCE = 1e-4  # of sound sets in which a zero is called wrong
-LEAST_ZERO = np.radians(0.5)
+MIN_ZERO = np.radians(0.5)
 ZERO_STEP = 1e-5
 
 
@@ -174,7 +174,7 @@ def zeros_tried(found: HandEye, robot: Robot) -> tuple[HandEye, tuple[str, ...],
             unseen.append(name)
             continue
         value, half_width, raw = with_one_more(turn.at, (found.X, found.Y), found.deviations)
-        least = max(least, round(float(np.degrees(max(LEAST_ZERO, widths * half_width))), 2))
+        least = max(least, round(float(np.degrees(max(MIN_ZERO, widths * half_width))), 2))
         left = float(((raw / np.repeat(found.deviations, 3)) ** 2).sum())
         chance = float(scipy.special.fdtrc(1, free, max(squares - left, 0.0) / (left / free))) * len(names)
         rms = float(1000 * np.sqrt((raw[:, :3] ** 2).mean()))
@@ -182,7 +182,7 @@ def zeros_tried(found: HandEye, robot: Robot) -> tuple[HandEye, tuple[str, ...],
     chance, k, value, half_width, rms = best
     tried = found if len(unseen) == len(names) else replace(found, warnings=tuple(map(_zeros_too, found.warnings)))
     explained = {each.code for each in grave_warnings(found.warnings)} <= EXPLAINED_BY_A_ZERO
-    if chance > ZERO_CHANCE or abs(value) < LEAST_ZERO or not explained:
+    if chance > ZERO_CHANCE or abs(value) < MIN_ZERO or not explained:
         return tried, tuple(unseen), least
     mended = _Turned(robot, found.samples, k).flange(value)
     try:

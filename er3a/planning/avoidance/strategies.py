@@ -56,7 +56,7 @@ STEP = 1e-6  # of the characteristic length, or rad
 BENT_POINTS = 120
 GROWTH = 1.4
 HALVINGS = 12
-MOST_SIDES = 8
+MAX_SIDES = 8
 FARTHEST: dict[Kind, float] = {"shift": 0.5, "tilt": 1.0}  # of the characteristic length; rad
 SAME_TIME = 0.01  # s
 SPARE = 1.0005  # keep this much more than the distance
@@ -141,7 +141,7 @@ def _via(segment: avoidance.SingularSegment, kind: Kind) -> avoidance.Avoidance 
     if not all(bends):
         return _none_far_enough(segment, kind)
     fallback = None
-    for chosen in sorted(product(*bends), key=lambda some: sum(bend.amount for bend in some))[:MOST_SIDES]:
+    for chosen in sorted(product(*bends), key=lambda some: sum(bend.amount for bend in some))[:MAX_SIDES]:
         path = BentPath(segment.followed.line, chosen)
         for other in _followed(segment, path):
             if other.regions:

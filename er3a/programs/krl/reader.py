@@ -601,7 +601,7 @@ def split_comment(line: str, place: Place) -> tuple[str, str]:
 
 
 CALL = re.compile(r"\b([A-Za-z]\w*)\s*\(")
-MOST_MODULES = 200
+MAX_MODULES = 200
 BASICS, BASICS_FILES = "BAS", ("bas.src", "BAS.SRC", "Bas.src", "BAS.src")
 DEEPEST = 6  # folders of an archive
 
@@ -628,7 +628,7 @@ def modules_of(path: Path) -> tuple[Path, ...]:
     beside.pop(path.stem.upper(), None)
     found: list[Path] = []
     waiting = [path]
-    while beside and waiting and len(found) < MOST_MODULES:
+    while beside and waiting and len(found) < MAX_MODULES:
         called = dict.fromkeys(name.upper() for name in CALL.findall(read_program_text(waiting.pop(0)).text))
         new = [beside.pop(name) for name in called if name in beside]
         found += new

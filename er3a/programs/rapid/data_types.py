@@ -233,7 +233,7 @@ def moved_target(target: Record, T: Reals) -> Record:
 
 
 QUARTER = math.pi / 2
-LEAST_LOAD = 0.001
+MIN_LOAD = 0.001
 """kg, of a tool whose mass is not known: tool0 and most templates have it (3 loaddata)."""
 AT_A_QUARTER = 1e-3  # rad; nearer to a quarter's end an axis belongs to both: programs round their positions
 CONFIGURED = (0, 3, 5)

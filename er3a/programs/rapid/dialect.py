@@ -357,7 +357,7 @@ def _tool(memory: ProgramMemory, expression: object, value: syntax.Value) -> tup
         pose = _mapped(memory, name)
     load = data_types.load_of(data_types.part(data_types.typed(value, data_types.TOOLDATA), "TLOAD"))
     return instructions.NamedFrame(
-        name, pose, load if load is not None and load.mass > data_types.LEAST_LOAD else None
+        name, pose, load if load is not None and load.mass > data_types.MIN_LOAD else None
     ), stationary
 
 
@@ -369,7 +369,7 @@ def _load(memory: ProgramMemory, tool: instructions.NamedFrame, total: syntax.Va
     whole = data_types.load_of(data_types.typed(total, data_types.LOADDATA)) if total is not None else None
     if total is not None and whole is None:
         return f"\\TLoad {total.text if isinstance(total, syntax.Unclear) else ''}".strip()
-    if whole is not None and whole.mass > data_types.LEAST_LOAD:
+    if whole is not None and whole.mass > data_types.MIN_LOAD:
         return whole
     value = memory.read("%GRIPLOAD")
     if value is None:
@@ -377,7 +377,7 @@ def _load(memory: ProgramMemory, tool: instructions.NamedFrame, total: syntax.Va
     gripped = data_types.load_of(data_types.typed(value, data_types.LOADDATA))
     if gripped is None:
         return f"GripLoad {value.text if isinstance(value, syntax.Unclear) else ''}".strip()
-    if gripped.mass <= data_types.LEAST_LOAD:
+    if gripped.mass <= data_types.MIN_LOAD:
         return tool.load
     if tool.pose is None:
         return f"GripLoad ({tool.name})"

@@ -87,8 +87,8 @@ ARRIVING = frozenset(("INPOS", "ZEROSPEED"))
 LEAVING = ("STOPMOVE", "STARTMOVE", "STARTMOVERETRY", "RESTOPATH", "CLEARPATH")
 """Instructions that stop a motion on its way, or begin one again that the program does not wait for."""
 ABSENT = "%absent"
-MOST_LATE = 200
-MOST_ELEMENTS = 1000
+MAX_LATE = 200
+MAX_ELEMENTS = 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -464,7 +464,7 @@ class _ModuleReader:
             for size in reversed(sizes):
                 shape = ("[]", shape)
                 count = syntax.number(size.value) if isinstance(size, syntax.Constant) else None
-                known = count is not None and 0 < count <= MOST_ELEMENTS
+                known = count is not None and 0 < count <= MAX_ELEMENTS
                 initial = (initial,) * int(count or 0) if known and initial is not None else None
             scope.shapes[name] = shape
             if local:
@@ -673,7 +673,7 @@ class _BodyReader:
             for name, count in self.module.procedures.items()
             if name.startswith(prefix) and count == len(given[0]) and name != "MAIN"
         ]
-        if not fitting or len(fitting) > MOST_LATE:
+        if not fitting or len(fitting) > MAX_LATE:
             self.builder.unknown(place, text)
             return
         for i, name in enumerate(fitting):
@@ -999,7 +999,7 @@ LATE_CALL = re.compile(r"(?m)(?:^|;)\s*%(?!%)(?!\s*\"\w*\"\s*%)|\bCallByVar\b", 
 """A call of a procedure whose name the text does not give."""
 FOLDERS = {"PROGMOD": "SYSMOD", "SYSMOD": "PROGMOD"}
 """Folders of a task in a controller's backup."""
-MOST_MODULES = 200
+MAX_MODULES = 200
 
 
 def modules_of(path: Path) -> tuple[Path, ...]:
@@ -1013,7 +1013,7 @@ def modules_of(path: Path) -> tuple[Path, ...]:
     waiting = {each: _names(each) for each in _beside(path) if not _is_encoded(each)}
     waiting = {each: names for each, names in waiting.items() if "MAIN" not in names[1]}
     found: list[Path] = []
-    while len(found) < MOST_MODULES:
+    while len(found) < MAX_MODULES:
         missing = used - given
         new = [each for each, names in waiting.items() if late or names[1] & missing]
         if not new:

@@ -129,7 +129,7 @@ def _no_xml(path: Path, error: expat.ExpatError) -> InputError:
 
 TOP = "Xpl-source"
 HEAD = ("Info", "Title", "Description", "Version", "Author")
-MOST_LOOPS = 50
+MAX_LOOPS = 50
 OTHER_SIDES = ("elsif", "elseif", "else")
 MOTION_PARTS = ("target", "speed", "zone", "tool", "refsys")
 
@@ -272,7 +272,7 @@ class _Pou:
         body = self._named(name, within)
         if body is None:
             raise fault(place, f"there is no <Pou> '{name}' for the loop's body", "Add it, or correct <pouref>")
-        if body in within or len(within) > MOST_LOOPS:
+        if body in within or len(within) > MAX_LOOPS:
             raise fault(place, f"the loop's body '{name}' holds the loop itself", "Give each loop its own <Pou>")
         source = text_of(element)
         if element.tag == "while":
@@ -292,7 +292,7 @@ class _Pou:
         self.inferred.append(FormInferred("if", place))
         for number, (condition, name) in enumerate(sides):
             body = self._named(name, within)
-            if body is None or body in within or len(within) > MOST_LOOPS:
+            if body is None or body in within or len(within) > MAX_LOOPS:
                 raise fault(place, f"there is no <Pou> '{name}' for a side of the if", "Add it, or correct <pouref>")
             source = f"IF {condition} THEN"
             if number == 0:
@@ -309,7 +309,7 @@ class _Pou:
         self.whole.append(element)
         for name in (each.text for each in element.all("pouref")):
             body = self._named(name, within)
-            if body is None or body in within or len(within) > MOST_LOOPS:
+            if body is None or body in within or len(within) > MAX_LOOPS:
                 raise fault(place, f"there is no <Pou> '{name}' for a body here", "Add it, or correct <pouref>")
             builder.open_if(place, syntax.Opaque(source), source)
             self._body(builder, body, f"{place.element}/{name}", within)

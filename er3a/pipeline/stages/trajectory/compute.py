@@ -49,7 +49,7 @@ from er3a.planning.way_around import PlanningTask, WayAround, way_between
 from er3a.robots.joint_limits import shown, within
 from er3a.robots.robot import Robot
 
-LEAST_RATIO = 1e-3  # of the limits, below which a path counts as standing still
+MIN_RATIO = 1e-3  # of the limits, below which a path counts as standing still
 FAULTS: tuple[PathVerdict, ...] = ("unreachable", "none found", "leaves limits", "collides", "too fast")
 ROUNDED = 0.0005  # m, by which a pose may be off that is written with one decimal of mm and two of deg
 ROWS = 250  # of each motion in the table
@@ -132,7 +132,7 @@ class AvoidanceTask:
             return self.limits
         limits = self.limits.speed, self.limits.acceleration
         ratios = (float((most / limit).max()) for most, limit in zip(found.greatest, limits))
-        speed, acceleration = (limit * min(1.0, max(ratio, LEAST_RATIO)) for limit, ratio in zip(limits, ratios))
+        speed, acceleration = (limit * min(1.0, max(ratio, MIN_RATIO)) for limit, ratio in zip(limits, ratios))
         return replace(self.limits, speed=speed, acceleration=acceleration)
 
     def _planned(self, motion: Motion) -> list[StrategyResult]:
