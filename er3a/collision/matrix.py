@@ -518,10 +518,10 @@ def _centres(robot: Robot, pair: tuple[Body, Body], q: Reals, hub: Reals | None)
 
 
 def _row(first: str, second: str, found: Sequence[JudgedPair], reason: str) -> MatrixRow:
-    """One row over all pairs of bodies of two links; the gravest of what watched ones are."""
+    """One row over all pairs of bodies of two links; the most serious state of the watched ones."""
     watched = [each for each in found if each.bodies or each.state == "overlaps"]
-    grave = ("overlaps", "meets", "undecided", "joined", "watched", "allowed", "never")
-    state = min((each.state for each in watched or found), key=grave.index)
+    by_severity = ("overlaps", "meets", "undecided", "joined", "watched", "allowed", "never")
+    state = min((each.state for each in watched or found), key=by_severity.index)
     witness = next((each.witness for each in found if each.witness is not None), None)
     bounds = [each.least for each in found if each.state == "never"]
     return MatrixRow(

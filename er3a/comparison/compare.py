@@ -90,7 +90,7 @@ class GeometryLayer:
 @dataclass(frozen=True)
 class ZeroLayer:
     """By row what B's offset is more than A's (deg; mm of joints that slide); 0 of the first and the last row, whose
-    zeros can't be distinguished from base and flange. ``causes`` : the one slip in A that explains them all."""
+    zeros can't be distinguished from base and flange. ``causes`` : the one mistake in A that explains them all."""
 
     same: bool
     offsets_deg: tuple[float, ...]
@@ -99,7 +99,7 @@ class ZeroLayer:
 
 @dataclass(frozen=True)
 class DirectionLayer:
-    """Numbers of the rows that B moves the other way. ``causes`` : the one slip in A's table that does so, where no
+    """Numbers of the rows that B moves the other way. ``causes`` : the one mistake in A's table that does so, where no
     zero differs."""
 
     same: bool
@@ -231,11 +231,11 @@ def _compared(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances, 
     moved = tolerances.exceeded(found.zeros, a.sliding)
     scale = np.where(a.sliding, 1000.0, np.degrees(1.0))
     turned = same and explain and bool(moved.any() or found.reverses.any())
-    slips = tuple(_causes_of_zeros(robot_a, b, found, tolerances)) if turned else ()
-    zero = ZeroLayer(not moved.any(), tuple((scale * found.zeros).tolist()), slips if moved.any() else ())
+    mistakes = tuple(_causes_of_zeros(robot_a, b, found, tolerances)) if turned else ()
+    zero = ZeroLayer(not moved.any(), tuple((scale * found.zeros).tolist()), mistakes if moved.any() else ())
     reverses, coupled = _joints_paired(robot_a, robot_b, found)
     reversed_rows = tuple((np.flatnonzero(found.reverses) + 1).tolist())
-    directions = DirectionLayer(not reversed_rows, reversed_rows, () if moved.any() else slips)
+    directions = DirectionLayer(not reversed_rows, reversed_rows, () if moved.any() else mistakes)
     base, flange = (_placement(T, tolerances) for T in (found.base, found.flange))
     joint_zeros = _joint_zeros(robot_a, found)
     limits = _limits(robot_a, robot_b, reverses, joint_zeros, tolerances)
@@ -449,7 +449,7 @@ def _causes(
 
 
 def _repaired(robot: Robot, other: Robot) -> Iterator[tuple[CauseCode, float | None, str, Columns]]:
-    """The columns of a table with one slip undone throughout; how many rows or times, and of which columns or unit."""
+    """The columns of a table with one mistake undone throughout; how many rows or times, of which columns or unit."""
     a, d, alpha = robot.a, robot.d, robot.alpha
     yield "a_and_d_swapped", None, "", {"a": d, "d": a}
     yield "other_convention", None, "", {"convention": "modified" if robot.convention == "standard" else "standard"}
@@ -486,14 +486,14 @@ def _ratios(one: mechanism.Mechanism, other: mechanism.Mechanism) -> list[float]
 def _causes_of_zeros(
     robot: Robot, b: mechanism.Mechanism, found: mechanism.Match, tolerances: mechanism.Tolerances
 ) -> Iterator[Cause]:
-    """The one slip in the first table that explains why zeros or directions differ, where geometry agrees."""
+    """The one mistake in the first table that explains why zeros or directions differ, where geometry agrees."""
     offset, zeros = robot.offset, np.where(robot.sliding, 0.0, found.zeros)
     inner = [k for k in range(1, robot.rows - 1) if not robot.sliding[k]]
     if not found.reverses.any() and (np.abs(zeros) > tolerances.angle).sum() > 1:
-        slips: list[tuple[CauseCode, float | None, str, Reals]] = [("offsets_negated", None, "", -offset)]
-        slips += [("angle_unit", scale, f"offset, {unit}", offset * scale) for unit, scale in ANGLE_UNITS.items()]
-        slips += [("rows_shifted", float(rows), "offset", np.roll(offset, rows)) for rows in (1, -1)]
-        for code, amount, unit, meant in slips:
+        mistakes: list[tuple[CauseCode, float | None, str, Reals]] = [("offsets_negated", None, "", -offset)]
+        mistakes += [("angle_unit", scale, f"offset, {unit}", offset * scale) for unit, scale in ANGLE_UNITS.items()]
+        mistakes += [("rows_shifted", float(rows), "offset", np.roll(offset, rows)) for rows in (1, -1)]
+        for code, amount, unit, meant in mistakes:
             left = np.abs(wrap_to_pi(meant - offset - zeros)[inner])
             if left.max() < tolerances.angle and np.abs(wrap_to_pi(meant)[inner]).max() > tolerances.angle:
                 yield Cause(code, "a", (), amount, unit)

@@ -107,7 +107,7 @@ def load_measurements(path: str | Path, robot: Robot | None = None) -> tuple[Mea
 
 
 def _check_lengths(path: Path, rows: list[Measurement]) -> None:
-    """A pair has two rows and one length, a bar a length in all of its rows or in none."""
+    """Check that a pair has two rows and one length, and a bar a length in all of its rows or in none."""
     groups: dict[tuple[str, str], list[Measurement]] = {}
     for row in rows:
         if row.touched and row.touched[0] in ("pair", "bar"):
@@ -116,9 +116,14 @@ def _check_lengths(path: Path, rows: list[Measurement]) -> None:
         lengths = {row.length_mm for row in own}
         where = f"row {own[-1].row}, column {kind}"
         if kind == "pair" and len(own) != 2:
-            raise InputError(path, where, f"{len(own)} rows are of the pair '{name}'", "Give two rows to each pair")
+            raise InputError(path, where, f"the pair '{name}' has {len(own)} rows", "Give each pair two rows")
         if kind == "pair" and (len(lengths) > 1 or None in lengths):
-            raise InputError(path, where, f"the pair '{name}' lacks one length", "Write it in both rows, in length_mm")
+            raise InputError(
+                path,
+                where,
+                f"the rows of pair '{name}' need one and the same length",
+                "Write it in both rows, in length_mm",
+            )
         if kind == "bar" and None in lengths and len(lengths) > 1:
             problem = f"the bar '{name}' has a length in some rows only"
             raise InputError(path, where, problem, "Write it in all rows, or in none if it is unknown")

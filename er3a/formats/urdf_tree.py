@@ -493,7 +493,7 @@ def write_masses(robot: Robot, names: Sequence[str], root: ElementTree.Element) 
 
 
 def peak_torque(robot: Robot, joint: int) -> float:
-    """What a joint's (from 0) drive gives for a moment, N m or N; 0 where it is unknown."""
+    """Peak torque or force of the drive of a joint (from 0), N m or N; 0 where it is unknown."""
     drives = robot.masses.drives
     return 0.0 if drives is None or np.isnan(drives.peak[joint]) else float(drives.peak[joint])
 

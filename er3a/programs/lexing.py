@@ -210,7 +210,7 @@ def dotted(expression: Expression) -> str:
             return f"{dotted(of)}[]"
         case Invocation(function=function):
             return f"{function}()"
-    raise MisreadError("not a name")
+    raise MisreadError("expected an identifier")
 
 
 MAX_PROGRAM_BYTES = 32_000_000

@@ -327,7 +327,7 @@ class SlideSpeed(Speed):
 
 
 @dataclass(frozen=True)
-class PoseOutside(QuantityAtPose):
+class LimitExcess(QuantityAtPose):
     """How far a pose lies outside the joint limits: largest excess of a joint (mm of one that slides), 0 inside."""
 
     depends_on_table: ClassVar[bool] = False

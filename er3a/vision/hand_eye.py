@@ -138,7 +138,7 @@ def _mending_turn(target: Reals, turned: Reals, i: int, used: Flags, tolerance: 
     best = tolerance
     mending: vision_findings.SuspectKind = "rotation"
     for kind in MEND_KINDS:
-        for R in _mended(target[i], kind):
+        for R in _rotation_candidates(target[i], kind):
             angle = rotation_angle(transposed(R)[None], transposed(target[used, :3, :3]))
             off = float(np.median(np.abs(angle - turned[i, used])))
             if off < best:
@@ -146,7 +146,7 @@ def _mending_turn(target: Reals, turned: Reals, i: int, used: Flags, tolerance: 
     return mending
 
 
-def _mended(T: Reals, kind: vision_findings.SuspectKind) -> list[Reals]:
+def _rotation_candidates(T: Reals, kind: vision_findings.SuspectKind) -> list[Reals]:
     """The rotations (3, 3) that a detection may have been mistaken for."""
     R = T[:3, :3]
     if kind == "mirrored_tilt":
@@ -371,9 +371,9 @@ MIN_TURN = np.radians(0.5)
 MIN_SPREAD = np.radians(1.0)
 LITTLE_TURN, LITTLE_SPREAD = np.radians(15), np.radians(10)
 EXCLUDED = 1e-3
-SURE = 0.95
+CONFIDENCE = 0.95
 MAX_FACTS = 10
-ONE_MORE_ROUNDS = 20
+EXTRA_ROUNDS = 20
 SURE_SCALE = 3.0  # half widths of its interval, from 0; a vaguer factor comes of samples that don't fit at all
 MIN_SCALE_ERROR = 2e-3
 DIRECTIONS = ((False, False), (True, True), (True, False), (False, True))
@@ -508,7 +508,7 @@ def calibrate_hand_eye(samples: calibration_set.CalibrationSet) -> HandEye:
     if not others and share > MOSTLY_APART and (step := moved_between(samples.take(once), used[once], refined)):
         warnings.append(step)
     covariance = refined.covariance / share + _shared_covariance(kept, refined)
-    half_width = scipy.special.stdtrit(refined.freedom * share, (1 + SURE) / 2) * np.sqrt(np.diag(covariance))
+    half_width = scipy.special.stdtrit(refined.freedom * share, (1 + CONFIDENCE) / 2) * np.sqrt(np.diag(covariance))
     found = HandEye(
         samples=samples,
         used=used,
@@ -532,7 +532,7 @@ def calibrate_hand_eye(samples: calibration_set.CalibrationSet) -> HandEye:
     return found if samples.touched is None else replace(found, touch=_touch(found, samples.touched))
 
 
-def start(F: Reals, B: Reals, deviations: Reals) -> tuple[Reals, Reals]:
+def best_closed_form(F: Reals, B: Reals, deviations: Reals) -> tuple[Reals, Reals]:
     """The closed-form answer X, Y (4, 4) with the smallest residuals, in standard deviations (2,) in m and rad.
 
     Raises
@@ -557,7 +557,7 @@ def start(F: Reals, B: Reals, deviations: Reals) -> tuple[Reals, Reals]:
 def _fitted(samples: calibration_set.CalibrationSet) -> Refined:
     seen = PoseObservations.of(samples)
     try:
-        found = refine(seen, *start(samples.hand, samples.target, np.array([1e-3, 5e-3])))
+        found = refine(seen, *best_closed_form(samples.hand, samples.target, np.array([1e-3, 5e-3])))
     except np.linalg.LinAlgError:
         raise vision_findings.HandEyeError(vision_findings.NothingFits()) from None
     if not np.isfinite(found.covariance).all() or (np.diag(found.covariance) <= 0).any():
@@ -643,11 +643,11 @@ def board_scale(samples: calibration_set.CalibrationSet, refined: Refined) -> tu
         B[:, :3, 3] *= 1 + s
         return *residuals(samples.hand, B, X, Y), seen
 
-    more, half_width, _ = with_one_more(grown, (refined.X, refined.Y), refined.deviations)
+    more, half_width, _ = fit_extra_parameter(grown, (refined.X, refined.Y), refined.deviations)
     return 1 + more, half_width
 
 
-def with_one_more(
+def fit_extra_parameter(
     at: Callable[[Reals, Reals, float], tuple[Reals, Reals, Reals]], poses: tuple[Reals, Reals], deviations: Reals
 ) -> tuple[float, float, Reals]:
     """One more unknown beside the twelve: its value, half its 95 % interval, and the residuals (N, 6) with it.
@@ -656,7 +656,7 @@ def with_one_more(
     """
     (X, Y), value = poses, 0.0
     weight = 1 / np.repeat(deviations, 3)
-    for _ in range(ONE_MORE_ROUNDS):
+    for _ in range(EXTRA_ROUNDS):
         raw, J, own = at(X, Y, value)
         J = (np.concatenate([J, own[..., None]], axis=2) * weight[:, None]).reshape(-1, UNKNOWNS + 1)
         r = (raw * weight).ravel()
@@ -666,7 +666,7 @@ def with_one_more(
         if np.abs(step).max() < 1e-10:
             break
     free = max(len(r) - UNKNOWNS - 1, 1)
-    half_width = scipy.special.stdtrit(free, (1 + SURE) / 2) * np.sqrt(r @ r / free * inverse[12, 12])
+    half_width = scipy.special.stdtrit(free, (1 + CONFIDENCE) / 2) * np.sqrt(r @ r / free * inverse[12, 12])
     return value, float(half_width), raw
 
 
@@ -736,7 +736,7 @@ _PARTS = (slice(3), slice(3, 6))
 def _residuals_of(F: Reals, B: Reals, sigma: Reals) -> Reals | None:
     covariance = np.broadcast_to(np.diag(np.repeat(sigma, 3) ** 2), (len(F), 6, 6))
     try:
-        found = refine(PoseObservations("eye_in_hand", F, B, covariance), *start(F, B, sigma))
+        found = refine(PoseObservations("eye_in_hand", F, B, covariance), *best_closed_form(F, B, sigma))
     except (np.linalg.LinAlgError, vision_findings.HandEyeError):
         return None
     return found.residual

@@ -31,7 +31,7 @@ from er3a.robots.joint_limits import joint_names
 from er3a.robots.robot import Robot
 from er3a.vision import likelihood
 from er3a.vision.calibration_set import CalibrationSet
-from er3a.vision.hand_eye import SURE, HandEye, calibrate_hand_eye, with_one_more
+from er3a.vision.hand_eye import CONFIDENCE, HandEye, calibrate_hand_eye, fit_extra_parameter
 from er3a.vision.vision_findings import (
     CalibrationWarning,
     HandEyeError,
@@ -166,14 +166,14 @@ def zeros_tried(found: HandEye, robot: Robot) -> tuple[HandEye, tuple[str, ...],
     squares = float(((found.residual[found.used] / np.repeat(found.deviations, 3)) ** 2).sum())
     free = 6 * len(samples) - likelihood.UNKNOWNS - 1
     best, unseen = (1.0, 0, 0.0, 0.0, np.inf), []
-    least, sure = 0.0, (1 + SURE) / 2
+    least, sure = 0.0, (1 + CONFIDENCE) / 2
     widths = float(scipy.special.stdtrit(free, 1 - ZERO_CHANCE / len(names) / 2) / scipy.special.stdtrit(free, sure))
     for k, name in enumerate(names):
         turn = _Turned(robot, samples, k)
         if robot.slides[k] or not turn.seen(found.X, found.Y):
             unseen.append(name)
             continue
-        value, half_width, raw = with_one_more(turn.at, (found.X, found.Y), found.deviations)
+        value, half_width, raw = fit_extra_parameter(turn.at, (found.X, found.Y), found.deviations)
         least = max(least, round(float(np.degrees(max(MIN_ZERO, widths * half_width))), 2))
         left = float(((raw / np.repeat(found.deviations, 3)) ** 2).sum())
         chance = float(scipy.special.fdtrc(1, free, max(squares - left, 0.0) / (left / free))) * len(names)
@@ -219,7 +219,7 @@ class _Turned:
         return forward(self.robot.without_tool(), self.samples.q + value * np.eye(self.robot.joints)[self.k])
 
     def at(self, X: Reals, Y: Reals, value: float) -> tuple[Reals, Reals, Reals]:
-        """As :func:`er3a.vision.hand_eye.with_one_more` asks for it."""
+        """As :func:`er3a.vision.hand_eye.fit_extra_parameter` asks for it."""
         flange, setup = self.flange(value), self.samples.setup
         F = flange if setup == "eye_in_hand" else inverted(flange)
         raw, J = likelihood.residuals(F, self.samples.target, X, Y)
@@ -343,7 +343,7 @@ def _result(
 ) -> TableCorrections:
     (level, kept, held), robot, samples = asked, problem.robot, problem.samples
     error = np.sqrt(np.diag(fit.covariance))
-    half = scipy.special.stdtrit(fit.freedom, (1 + SURE) / 2) * error
+    half = scipy.special.stdtrit(fit.freedom, (1 + CONFIDENCE) / 2) * error
     correlation = (fit.covariance / np.outer(error, error))[likelihood.UNKNOWNS :, likelihood.UNKNOWNS :]
     rows, columns = np.nonzero(np.triu(np.abs(correlation) > CLOSE, 1))
     before = likelihood.refine(

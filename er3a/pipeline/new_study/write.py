@@ -219,12 +219,12 @@ class TaskSearch:
         self.near, self.bodies = self.required.near, Bodies(robot, scene)
         self.tried, self.rejected = 0, dict[str, Counter[str]]()
         q = reach.q[:DRAWN]
-        roomy, regular, free = self._roomy(q), self._regular(q), self.bodies.free(q)
-        self.fit = q[roomy & regular & free]
+        inside, nonsingular, free = self._away_from_limits(q), self._away_from_singularities(q), self.bodies.free(q)
+        self.fit = q[inside & nonsingular & free]
         touching = Counter({pair.label: 0 for pair in self.bodies.pairs})
         for pair, count in zip(self.bodies.pairs, self.bodies.overlaps(q).sum(axis=0).tolist()):
             touching[pair.label] = max(touching[pair.label], count)
-        near_limit, near_singular, colliding = (int(np.count_nonzero(~each)) for each in (roomy, regular, free))
+        near_limit, near_singular, colliding = (int(np.count_nonzero(~each)) for each in (inside, nonsingular, free))
         often = tuple((label, count) for label, count in touching.most_common(NAMED_PAIRS) if count)
         self.counts = DrawnCounts(len(q), len(self.fit), near_limit, near_singular, colliding, often)
 
@@ -323,11 +323,11 @@ class TaskSearch:
 
     def _fits(self, q: Reals) -> Flags:
         """Whether joints (N, n) are away from limits and singular poses, and clear of everything."""
-        fits = self._roomy(q) & self._regular(q)
+        fits = self._away_from_limits(q) & self._away_from_singularities(q)
         fits[fits] = self.bodies.free(q[fits])
         return fits
 
-    def _roomy(self, q: Reals) -> Flags:
+    def _away_from_limits(self, q: Reals) -> Flags:
         """Whether joints (N, n) are away from their limits, by 8 deg or a twentieth of the range."""
         robot = self.robot
         least = np.minimum(np.where(robot.slides, np.inf, LIMIT_MARGIN_RAD), (robot.upper - robot.lower) / 20)
@@ -340,7 +340,7 @@ class TaskSearch:
         values: list[float] = (np.round(np.round(shown(self.robot, q) / step) * step, 2) + 0.0).tolist()
         return values
 
-    def _regular(self, q: Reals) -> Flags:
+    def _away_from_singularities(self, q: Reals) -> Flags:
         """Whether joints (N, n) are away from singular poses, by twice what the study calls near."""
         return np.asarray(self.near.margin(self.robot, q) > SINGULAR_MARGIN)
 

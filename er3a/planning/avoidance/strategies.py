@@ -583,7 +583,7 @@ class StrategyResult:
     reasons: tuple[NotUsable, ...] = ()
 
 
-def compare(segment: avoidance.SingularSegment, chosen: StrategyName | None = None) -> list[StrategyResult]:
+def compare_strategies(segment: avoidance.SingularSegment, chosen: StrategyName | None = None) -> list[StrategyResult]:
     """Try all strategies, or the chosen one."""
     return [_tried(segment, name) for name in STRATEGIES if chosen in (None, name)]
 

@@ -330,7 +330,7 @@ def _do(reading: _Statement) -> None:
     """A routine behind DO, which runs whenever a condition holds; or an assignment of a TRIGGER."""
     asked = re.search(r"(?i)\bDO\b(.*?)(\bPRIO\s*=.*)?$", reading.text)
     if asked is None:
-        raise MisreadError("no DO")
+        raise MisreadError("expected DO")
     words = KrlWords(asked[1])
     what = words.expression()
     if isinstance(what, syntax.Invocation):

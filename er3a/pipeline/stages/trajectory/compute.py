@@ -41,7 +41,7 @@ from er3a.pipeline.stages.trajectory.motion import (
 from er3a.pipeline.stages.trajectory.written_programs import near_assumed_shapes, program_files
 from er3a.pipeline.study import Study
 from er3a.planning.avoidance.avoidance import SingularSegment, singular_segment
-from er3a.planning.avoidance.strategies import StrategyCost, StrategyResult, best, compare, deviation
+from er3a.planning.avoidance.strategies import StrategyCost, StrategyResult, best, compare_strategies, deviation
 from er3a.planning.motion_faults import Interval, SingularEvent
 from er3a.planning.names import PathVerdict, StrategyName
 from er3a.planning.timing import JointLimits, Timed, TimingError, fastest, nodes_along
@@ -104,7 +104,9 @@ class AvoidanceTask:
             segment = singular_segment(motion.followed, self.near, self.limits, found.events, fixed_start)
             quickest = _quickest(segment)
             if found.verdict != "safe":
-                results = compare(replace(segment, limits=self._no_more_than(found), allowed=self.limits), self.only)
+                results = compare_strategies(
+                    replace(segment, limits=self._no_more_than(found), allowed=self.limits), self.only
+                )
         collides = bool(along.contacts)
         if (collides or found.beyond or found.limits) and motion.no_way is None and self.only in (None, "planned"):
             results += self._planned(motion)
