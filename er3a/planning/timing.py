@@ -138,13 +138,13 @@ class Timed:
 
     def ratios(self, limits: JointLimits) -> tuple[float, float]:
         """Largest ratio of a joint's speed to its limit, and of its acceleration to its limit, on the whole curve."""
-        speed, acceleration = self.greatest
+        speed, acceleration = self.max_rates
         return float((speed / limits.speed).max()), float((acceleration / limits.acceleration).max())
 
     @cached_property
-    def greatest(self) -> tuple[Reals, Reals]:
+    def max_rates(self) -> tuple[Reals, Reals]:
         """Maximum speed (n,) in rad/s and acceleration (n,) in rad/s^2 of each joint."""
-        return self.curve.greatest(self.curve.velocity), self.curve.greatest(self.curve.acceleration)
+        return self.curve.max_abs(self.curve.velocity), self.curve.max_abs(self.curve.acceleration)
 
 
 def joint_limits(

@@ -339,7 +339,7 @@ def _with_jerk(route: JointSequence, limits: JointLimits) -> Timed:
     curve = route.polynomials()
     assert limits.jerk is not None
     speed, acceleration, jerk = (
-        float((curve.greatest(series) / most).max())
+        float((curve.max_abs(series) / most).max())
         for series, most in (
             (curve.velocity, limits.speed),
             (curve.acceleration, limits.acceleration),

@@ -130,10 +130,10 @@ class AvoidanceTask:
 
     def _no_more_than(self, found: judgement.Judgement) -> JointLimits:
         """The limits, or what of them the path needs if that is less."""
-        if found.fast or found.greatest is None:
+        if found.fast or found.max_rates is None:
             return self.limits
         limits = self.limits.speed, self.limits.acceleration
-        ratios = (float((most / limit).max()) for most, limit in zip(found.greatest, limits))
+        ratios = (float((most / limit).max()) for most, limit in zip(found.max_rates, limits))
         speed, acceleration = (limit * min(1.0, max(ratio, MIN_RATIO)) for limit, ratio in zip(limits, ratios))
         return replace(self.limits, speed=speed, acceleration=acceleration)
 
@@ -221,7 +221,7 @@ class AvoidanceTask:
     def _fastest_time(self, timed: Timed) -> float:
         """When a joint comes nearest to its maximum speed."""
         curve = timed.curve
-        j = int(np.argmax(timed.greatest[0] / self.limits.speed))
+        j = int(np.argmax(timed.max_rates[0] / self.limits.speed))
         return max(curve.of_joint(curve.velocity, j, sign).peak() for sign in (1.0, -1.0))[1]
 
 
@@ -287,7 +287,7 @@ def path_summary(
     labels = branch_labels(robot) if has_branches(robot) else ()
     slots = [] if followed is None else [int(slot) for slot in dict.fromkeys(followed.slot) if slot >= 0]
     contacts = judgement.collisions(along)
-    speed, acceleration = found.greatest or (None, None)
+    speed, acceleration = found.max_rates or (None, None)
     return model.PathSummary(
         name=entry.name,
         title=entry.title,
@@ -328,8 +328,8 @@ def path_summary(
     )
 
 
-def _ratio(greatest: Reals | None, most: Reals) -> float | None:
-    return None if greatest is None else float((greatest / most).max())
+def _ratio(largest: Reals | None, most: Reals) -> float | None:
+    return None if largest is None else float((largest / most).max())
 
 
 def _half_turns(motion: Motion) -> tuple[model.HalfTurn, ...]:
