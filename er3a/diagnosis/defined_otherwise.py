@@ -40,6 +40,7 @@ from er3a.diagnosis.faults import (
     WrongOffset,
     limit_stated,
 )
+from er3a.diagnosis.fitting import MEETS
 from er3a.geometry.transforms import rot_x, rot_y, rot_z, translation
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.forward import forward, frames
@@ -92,37 +93,36 @@ class Conventions:
     left: float
 
 
-def conventions_of(robot: Robot, references: Sequence[Reference], meets: float) -> Conventions | None:
+def conventions_of(robot: Robot, references: Sequence[Reference]) -> Conventions | None:
     """How references define zeros, directions, base and flange of a table otherwise; None if that is not the reason
     why they are missed, or if they state neither all joint axes nor many poses.
 
     Parameters
     ----------
     references : that all state a value; limits don't count here, but are set right besides
-    meets : half-widths by which a reference that is met may be off
     """
     if robot.coupling is not None or robot.rows != robot.joints or robot.sliding.any():
         return None
     stated = [r for r in references if r.quantity.depends_on_table]
     lines = _lines(stated, robot.joints)
     if lines is not None:
-        found = (_conventions(robot, stated, lines, meets, finer) for finer in FINER)
+        found = (_conventions(robot, stated, lines, finer) for finer in FINER)
         best = next((each for each in found if each is not None), None)
     else:
-        best = _from_poses(robot, stated, meets)
+        best = _from_poses(robot, stated)
     chosen = best and _with_limits(robot, best, references)
     return chosen if chosen and chosen.faults else None
 
 
 def counted_from_ground(
-    robot: Robot, references: Sequence[Reference], meets: float, limits_besides: bool = False
+    robot: Robot, references: Sequence[Reference], limits_besides: bool = False
 ) -> list[Conventions]:
     """Which joint references count from the ground (J3 - J2), so that all of them are met, in each way that does it.
     Its limits may be stated either way: of the table's joint, or of the one counted so.
 
     Parameters
     ----------
-    references, meets : as of :func:`conventions_of`
+    references : as of :func:`conventions_of`
     limits_besides : where positions tell, limits that are other ones, as those of a linkage often are, are set right
     """
     if robot.coupling is not None or robot.sliding.any():
@@ -136,10 +136,10 @@ def counted_from_ground(
         for along in dict.fromkeys((*((k,) for k in reversed(parallel)), tuple(parallel))):
             for sign, ends in itertools.product(SIGNS if along else (), (False, True)):
                 fault = CountedFromGround(joint + 1, tuple(k + 1 for k in along), sign)
-                own = Conventions((fault,), _from_ground(robot, joint, along, sign, ends), meets)
+                own = Conventions((fault,), _from_ground(robot, joint, along, sign, ends), MEETS)
                 own = _with_limits(robot, own, references) if limits_besides and not ends else own
                 off = (predict_tables(tables_of(own.corrected), own.corrected, quantities)[0] - expected) / uncertainty
-                if np.abs(off).max() <= meets:
+                if np.abs(off).max() <= MEETS:
                     found.setdefault(fault, replace(own, left=float(np.abs(off).max())))
     return list(found.values())
 
@@ -155,9 +155,7 @@ def _from_ground(robot: Robot, joint: int, along: tuple[int, ...], sign: Literal
     return robot.replace(coupling=coupling, lower=lower, upper=upper)
 
 
-def _conventions(
-    robot: Robot, stated: Sequence[Reference], lines: Lines, meets: float, finer: float
-) -> Conventions | None:
+def _conventions(robot: Robot, stated: Sequence[Reference], lines: Lines, finer: float) -> Conventions | None:
     """What :func:`conventions_of` finds where entries differ that are off by more than the lines' tolerances, or by a
     finer part of them."""
     directions, points, signed, widest = lines
@@ -175,7 +173,7 @@ def _conventions(
         start = _with_entry(start, column, row, each.other)
     flips = itertools.product(*([1.0] if sure else [1.0, -1.0] for sure in signed))
     starts = [start.replace(direction=start.direction * np.array(flip)) for flip in flips]
-    return _fitted_to(robot, starts, wrong, stated, tolerances, meets)
+    return _fitted_to(robot, starts, wrong, stated, tolerances)
 
 
 def _fitted_to(
@@ -184,7 +182,6 @@ def _fitted_to(
     wrong: Sequence[tuple[str, int]],
     stated: Sequence[Reference],
     tolerances: Tolerances,
-    meets: float,
 ) -> Conventions | None:
     """The start that comes nearest to what is stated, of nearly equal ones that with the fewest directions reversed,
     fitted; None if something is missed then."""
@@ -201,10 +198,10 @@ def _fitted_to(
         tried.append((round(float(np.abs(off(arm)).max()), 3), reversed_count, arm))
     least = min(worst for worst, _, _ in tried)
     best = min((each for each in tried if each[0] <= least + 0.5), key=lambda each: each[1])[2]
-    best = _fitted(best, wrong, off, meets)
-    best = _plain(robot, best, off, meets, tolerances)
+    best = _fitted(best, wrong, off)
+    best = _plain(robot, best, off, tolerances)
     left = float(np.abs(off(best)).max())
-    if left > meets:
+    if left > MEETS:
         return None
     faults = (
         *(_wrong_entry(robot, best, column, row) for column, row in wrong),
@@ -213,7 +210,7 @@ def _fitted_to(
     return Conventions(faults, best, left)
 
 
-def _from_poses(robot: Robot, stated: Sequence[Reference], meets: float) -> Conventions | None:
+def _from_poses(robot: Robot, stated: Sequence[Reference]) -> Conventions | None:
     """What :func:`_conventions` finds, without joint axes, of a table whose geometry is right: distances between
     flanges, and turns between them where orientations are stated, depend on neither base nor (turns) flange. Directions
     and zeros that give them are scanned in steps of ``SCAN``, and the best fitted."""
@@ -283,7 +280,7 @@ def _from_poses(robot: Robot, stated: Sequence[Reference], meets: float) -> Conv
     for row in np.lexsort((changed, np.array(left) > 2 * length))[:KEPT_OF_SCAN].tolist():
         arm = robot_of(tables, row, robot)
         start = arm.replace(base=bases[row] @ arm.base, flange=arm.flange @ translation(*shift[row]))
-        found.append(_fitted_to(robot, [start], (), stated, tolerances, meets))
+        found.append(_fitted_to(robot, [start], (), stated, tolerances))
     return min((each for each in found if each is not None), key=lambda each: len(each.faults), default=None)
 
 
@@ -416,12 +413,12 @@ def _changed(robot: Robot, wrong: Sequence[tuple[str, int]], x: Reals) -> Robot:
     return robot.replace(base=base, flange=flange, offset=offset)
 
 
-def _fitted(robot: Robot, wrong: Sequence[tuple[str, int]], off: Misfit, meets: float) -> Robot:
+def _fitted(robot: Robot, wrong: Sequence[tuple[str, int]], off: Misfit) -> Robot:
     """Gauss and Newton's steps from an arm that nearly meets the references."""
     count = 12 + max(robot.joints - 2, 0) + len(wrong)
     for _ in range(ROUNDS):
         here = off(robot)
-        if np.abs(here).max() < 0.1 * meets:
+        if np.abs(here).max() < 0.1 * MEETS:
             break
         slopes = np.stack([(off(_changed(robot, wrong, STEP * row)) - here) / STEP for row in np.eye(count)], axis=1)
         step = -np.asarray(np.linalg.lstsq(slopes, here, rcond=1e-9)[0], dtype=np.float64)
@@ -432,11 +429,11 @@ def _fitted(robot: Robot, wrong: Sequence[tuple[str, int]], off: Misfit, meets: 
     return robot
 
 
-def _plain(given: Robot, fitted: Robot, off: Misfit, meets: float, tolerances: Tolerances) -> Robot:
+def _plain(given: Robot, fitted: Robot, off: Misfit, tolerances: Tolerances) -> Robot:
     """The fitted arm with as much as can be left as the table has it, and zeros that are whole degrees written so."""
 
     def kept(arm: Robot, simpler: Robot) -> Robot:
-        return simpler if np.abs(off(simpler)).max() <= max(meets, 1.05 * np.abs(off(arm)).max()) else arm
+        return simpler if np.abs(off(simpler)).max() <= max(MEETS, 1.05 * np.abs(off(arm)).max()) else arm
 
     moved = np.degrees(wrap_to_pi(fitted.offset - given.offset))
     snapped = np.where(np.abs(moved - np.round(moved)) < 2 * np.degrees(tolerances.angle), np.round(moved), moved)

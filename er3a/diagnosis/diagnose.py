@@ -330,12 +330,12 @@ def diagnosis_of(robot: Robot, references: ReferenceSet | Sequence[Reference]) -
     hypotheses = tuple(_described(ranking, group, robot) for group in ranking.groups)
     tried = len(ranking.pool.faults)
     explained = bool(hypotheses) and hypotheses[0].explains
-    from_ground = counted_from_ground(robot, stated, MEETS) or (
-        [] if explained else counted_from_ground(robot, stated, MEETS, limits_besides=True)
+    from_ground = counted_from_ground(robot, stated) or (
+        [] if explained else counted_from_ground(robot, stated, limits_besides=True)
     )
     chosen = from_ground[0] if from_ground else None
     if chosen is None and _may_be_chosen(robot, hypotheses):
-        chosen = conventions_of(robot, stated, MEETS)
+        chosen = conventions_of(robot, stated)
     if chosen is not None:
         difference = predict_tables(tables_of(chosen.corrected), chosen.corrected, quantities_of(stated))[0]
         left = difference - expected_of(stated)[0]

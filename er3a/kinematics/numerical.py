@@ -502,6 +502,7 @@ def _rotation_vector(D: Reals) -> tuple[Reals, Reals]:
 
 
 RESTARTS = 500
+MISS_RESTARTS = 20
 DIAGNOSIS_RESTARTS = 100
 TOLERANCE = 1e-10  # m or rad
 NEARLY = 1e-6  # m (in parts of the arm's length) or rad: so near, only a singularity keeps the iteration from its end
@@ -560,11 +561,11 @@ def solve(
     return search.solutions(T, q0, respect_limits, restarts, threads, explained=True)
 
 
-def nearest_arm(robot: Robot, T: Reals, q0: Reals, mask: Reals, respect_limits: bool, restarts: int) -> Solutions:
+def nearest_arm(robot: Robot, T: Reals, q0: Reals, mask: Reals, respect_limits: bool) -> Solutions:
     """What :func:`solve` gives for one pose (4, 4), without the reason where it finds none: that takes ten times as
     long as the search."""
     search = _Search(robot, mask, np.full(2, TOLERANCE), seed=0)
-    return search.solutions(np.ascontiguousarray(T), q0, respect_limits, restarts, threads=1, explained=False)
+    return search.solutions(np.ascontiguousarray(T), q0, respect_limits, MISS_RESTARTS, threads=1, explained=False)
 
 
 def all_found(robot: Robot, T: Reals, starts: int) -> Reals:

@@ -88,7 +88,7 @@ def limits_crossed(robot: Robot) -> str:
     return f"limits of joint {crossed[0] + 1} are crossed: lower {low:g} {unit}, upper {high:g} {unit}; swap them"
 
 
-def check_joint_values(robot: Robot, values: Any, argument: str, stacklevel: int = 2) -> None:
+def check_joint_values(robot: Robot, values: Any, argument: str) -> None:
     """Refuse NaN and infinity among joint values (..., n), and warn of those that can only be degrees.
 
     A row can only be degrees if one of its joints that turn and have limits is several turns beyond them in rad, and
@@ -118,7 +118,7 @@ def check_joint_values(robot: Robot, values: Any, argument: str, stacklevel: int
             f"{argument} is several turns beyond the limits of {robot.name} in rad, and within them in degrees; er3a "
             f"takes rad: np.radians({argument})",
             InputWarning,
-            stacklevel=stacklevel + 1,
+            stacklevel=3,
         )
 
 

@@ -88,7 +88,7 @@ class RowsFound:
     certainty: Integers
 
 
-def prepared(links: Reals, sliding: Flags | None = None, seed: int = 7) -> SixRevolute:
+def prepared(links: Reals, sliding: Flags | None = None) -> SixRevolute:
     """The solver for a chain with constant links (7, 4, 4); readings are tried out on poses of random joints.
 
     ``sliding`` (6,) marks prismatic joints; one is within what the method can do, of two no reading was left so far.
@@ -99,7 +99,7 @@ def prepared(links: Reals, sliding: Flags | None = None, seed: int = 7) -> SixRe
     scaled[:, :3, 3] /= size
     bare = scaled.copy()
     bare[0] = np.eye(4)
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(7)
     q = random.uniform(-1, 1, (TRIALS, 6)) * np.where(sliding, 1.0, np.pi)
     T = poses_of(bare, q, sliding)
     memory = new_memory(sliding)

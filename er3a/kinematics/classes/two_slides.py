@@ -79,13 +79,13 @@ class TwoSlides:
     readings: tuple[SlideReading, ...]
 
 
-def two_slides(links: Reals, sliding: Flags, seed: int = 7) -> TwoSlides | None:
+def two_slides(links: Reals, sliding: Flags) -> TwoSlides | None:
     """The solver for links (7, 4, 4) two of whose joints are prismatic; None if no reading of the loop determines its
     solutions."""
     size = size_of(links)
     scaled = np.array(links, float)
     scaled[:, :3, 3] /= size
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(7)
     q = random.uniform(-1, 1, (TRIALS, 6)) * np.where(sliding, 1.0, np.pi)
     loops = scaled[6] @ inverse_rigid(poses_of(scaled, q, sliding)) @ scaled[0]
     ranked = []
