@@ -50,7 +50,7 @@ WORDS_OF = {None: ("", "~", "null", "Null", "NULL"), True: ("true", "yes", "on")
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a damaged file; ``fault`` is None if that is as it should be."""
+    """The outcome for a damaged file; ``fault`` is None if it is correct."""
 
     accepted: bool
     seconds: float

@@ -11,7 +11,7 @@ References
 Holding torques and distances from axes at the corners of hulls around boxes of joint values.
 
 Both are affine in the cosine and sine of each row's angle (in its shift, where it slides), because no row comes in
-twice: what hangs behind a joint is carried to its axis row by row, gravity from the base likewise. Cosine and sine of
+twice: what is beyond a joint is carried to its axis row by row, gravity from the base too. Cosine and sine of
 an arc lie in the triangle of its ends and the point where the tangents there meet; those of an arc of more than 120
 degrees in the triangle around the whole circle. What is affine in each of several points has its largest absolute
 value over a product of triangles at a corner of it, so nowhere in a box is there more than at the corners.

@@ -62,7 +62,7 @@ def fastest_under_torques(model: ArmModel, q: Reals, speed: Reals, peak: Reals) 
     Raises
     ------
     TimingError
-        if there is no such time law
+        if no such time law exists
     """
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(q, axis=0) / speed, axis=1))])
     if (path := timing.path_through(q, s)) is None:

@@ -184,7 +184,7 @@ def diagnose(robot: Robot, references: ReferenceSet | Sequence[Reference] | str 
     Raises
     ------
     InputError
-        if there is no such reference set, or it can't be read
+        if the reference set doesn't exist or can't be read
     """
     return diagnosis.diagnose(
         robot, load_references(references, robot) if isinstance(references, str | Path) else references
@@ -207,7 +207,7 @@ def evidence(robot: Robot, references: References | None = None, tolerance: Tole
     Raises
     ------
     InputError
-        if there is no such reference set, it can't be read, or a document that the robot's values name is not declared
+        if the reference set doesn't exist, it can't be read, or a document that the robot's values name is not declared
         in its sets
     """
     wanted = robot.references if references is None else references

@@ -114,7 +114,7 @@ def read_lines(path: Path) -> Lines:
 
 
 def check_widths(path: Path, lines: Lines) -> None:
-    """Refuse a row that has not as many fields as the header."""
+    """Reject a row with another number of fields than the header."""
     for number, line in lines[1:]:
         if len(line) != len(lines[0][1]):
             problem = f"{len(line)} fields where the header has {len(lines[0][1])}"

@@ -349,7 +349,7 @@ class _Heading:
 
 
 def heading_of(text: str) -> _Heading | None:
-    """What a heading of those columns that books print stands for; None for any other."""
+    """What a column heading, as books print it, means; None for any other."""
     if own := _OURS.fullmatch(text):
         return _Heading(own[1] or own[2], own[3] or "", False)
     plain = re.sub(r"[\s{}\\]", "", text.lower().translate(_PLAIN))
@@ -374,7 +374,7 @@ def as_columns(path: Path, lines: Lines) -> PrintedTable:
     Raises
     ------
     InputError
-        for a row that has not as many fields as the header, and for a cell with two variables
+        for a row with another number of fields than the header, and for a cell with two variables
     """
     header = [name.strip() for name in lines[0][1]] if lines else []
     found = {k: own for k, name in enumerate(header) if (own := heading_of(name))}
@@ -445,7 +445,7 @@ class _Table:
         ]
 
     def _plain(self, k: int, own: _Heading, sliding: list[bool], columns: dict[str, list[str]]) -> None:
-        """A column of a, alpha or d; a sliding joint's d keeps what stands beside its variable."""
+        """A column of a, alpha or d; a sliding joint's d keeps the constant beside its variable."""
         texts = []
         for (number, cells), slides in zip(self.rows, sliding):
             text = cells[k]
@@ -455,7 +455,7 @@ class _Table:
         self._add(k, own.quantity, texts, columns)
 
     def _theta(self, k: int, sliding: list[bool], columns: dict[str, list[str]]) -> list[str]:
-        """Directions and offsets of joints that turn, and where theta of those that slide stands."""
+        """Directions and offsets of joints that turn, and theta of those that slide."""
         parts = [
             (0, cells[k]) if slides else self._beside(number, k, cells[k])
             for (number, cells), slides in zip(self.rows, sliding)
@@ -504,7 +504,7 @@ def _compact(cell: str) -> str:
 
 
 def _variable(cell: str) -> re.Match[str] | None:
-    """The variable in a cell that is no plain number."""
+    """The variable in a cell that is not a plain number."""
     return _VARIABLE.search(_compact(cell))
 
 

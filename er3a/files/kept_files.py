@@ -37,7 +37,7 @@ def given_file(path: Path) -> Path:
 
 
 def names(folder: str, pattern: str) -> list[str]:
-    """The stems of what stands in a folder of the study or of the project, sorted."""
+    """The file stems in a folder of the study or of the project, sorted."""
     places = (Path(folder), ROOT / folder)
     return sorted({path.stem for place in places for path in place.glob(pattern)})
 

@@ -185,7 +185,7 @@ def _is_number(value: object) -> TypeGuard[float]:
 
 
 def _joint_columns(path: Path, header: set[str]) -> tuple[str, ...]:
-    """The columns of the joints, in order; :class:`InputError` if one is missing or stands there twice."""
+    """The columns of the joints, in order; :class:`InputError` if one is missing or repeated."""
     found = {name: int(match[1]) for name in header if (match := JOINT_COLUMN.fullmatch(name))}
     numbers = sorted(found.values())
     if numbers != list(range(1, len(numbers) + 1)):

@@ -71,5 +71,5 @@ def load_pieces(path: str | Path) -> PiecesFile:
 
 
 def checksum_of(pieces: list[list[list[float]]]) -> str:
-    """Of pieces as they stand in the file."""
+    """Of the pieces in the file."""
     return hashlib.sha256(json.dumps(pieces).encode()).hexdigest()

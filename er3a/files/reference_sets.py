@@ -139,7 +139,7 @@ def _orientation(fields: Fields) -> Rotation3 | None:
 
 
 def rotation_of(columns: tuple[str, ...], values: Reals) -> Reals:
-    """The rotation matrix (3, 3) nearest to an orientation as it is written in such columns."""
+    """The rotation matrix (3, 3) nearest to an orientation that such columns give."""
     turn = scipy.spatial.transform.Rotation
     if columns == _RPY:
         found = turn.from_euler("xyz", values, degrees=True)

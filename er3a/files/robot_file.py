@@ -518,7 +518,7 @@ class LinkVisual(StrictModel):
         return self
 
     def visual(self) -> Visual:
-        """In metres; ``ValueError`` for what is no triangles."""
+        """In metres; ``ValueError`` for anything but triangles."""
         try:
             points, faces = (
                 np.frombuffer(base64.b64decode(text, validate=True), kind).reshape(-1, 3)

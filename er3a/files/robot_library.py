@@ -70,7 +70,7 @@ def read_robot(path: Path) -> robot_file.RobotFile:
 
 
 def robot_path(name_or_path: str | Path) -> Path:
-    """The file that a robot's name, or a path ending in .yaml, stands for."""
+    """The file that a robot's name, or a path ending in .yaml, refers to."""
     text = str(name_or_path)
     if text.endswith((".yaml", ".yml")):
         return Path(text)

@@ -75,7 +75,7 @@ class MeshObstacle(Obstacle):
     pieces: PiecesPath
 
     def solid(self) -> library.Mesh:
-        """In the units of the library; :class:`InputError` for a file that is no such pieces."""
+        """In the units of the library; :class:`InputError` for a file without such pieces."""
         content = load_pieces(own_or_shipped(self.pieces))
         return library.Mesh(self.name, self.place(), content.pieces(), content.uncovered_mm / 1000)
 

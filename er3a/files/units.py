@@ -62,7 +62,7 @@ def check_degrees(values: Sequence[float], otherwise: str, slides: bool = False)
 
 
 def suspect(text: str) -> None:
-    """Warn of something that can be meant as it is written, and looks like a slip."""
+    """Warn of a value that may be right, and looks like a mistake."""
     warnings.warn(text, InputWarning, stacklevel=3)
 
 

@@ -36,7 +36,7 @@ def read_mesh(path: str | Path, unit: Unit) -> ClosedMesh:
     Raises
     ------
     InputError
-        for a file that is no such mesh, is too large, is not closed, or can only be in the other unit
+        for a file that is not such a mesh, is too large, is not closed, or can only be in the other unit
     """
     path = Path(path)
     mesh = _closed(path, _loaded(path), 1.0 if unit == "m" else 1e-3)
@@ -64,7 +64,7 @@ def read_link_vertices(path: Path, scale: Reals) -> Reals:
     Raises
     ------
     InputError
-        for a file that is no mesh, is too large, or has a size that no link has
+        for a file that is not a mesh, is too large, or has a size that no link has
     """
     loaded = _loaded(path)
     return np.asarray(loaded.vertices, float) * _link_scale(path, loaded, scale)

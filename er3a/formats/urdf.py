@@ -52,7 +52,7 @@ TIE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class AxisTable:
-    """A standard table with ``theta = direction * q + offset`` and what stands before and behind it.
+    """A standard table with ``theta = direction * q + offset`` and the transforms before and after it.
 
     For a prismatic joint the same table holds with theta at ``offset`` and ``d + direction * q``.
 

@@ -69,7 +69,7 @@ class Mimic:
 
 @dataclass(frozen=True, eq=False)
 class UrdfJoint:
-    """One joint: where it stands in its parent link's frame, and how it moves.
+    """One joint: its place in its parent link's frame, and how it moves.
 
     ``lower``, ``upper``, ``speed`` are in rad or m, NaN where the file says nothing.
     """
@@ -196,7 +196,7 @@ def read_chain(path: Path, base: str | None, tip: str | None, snap: bool) -> Urd
     Raises
     ------
     InputError
-        if the file is no URDF, or names several arms (the candidates are named)
+        if the file is not a URDF, or names several arms (the candidates are named)
     """
     notes: list[str] = []
     tree = tree_of(path, snap)
@@ -283,7 +283,7 @@ def urdf_root(path: Path) -> ElementTree.Element:
     Raises
     ------
     InputError
-        for a file that is no URDF, such as xacro that is not expanded
+        for a file that is not a URDF, such as xacro that is not expanded
     """
     text = read_text(path, MAX_BYTES, "Leave out of it what is no link or joint of the arm")
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
@@ -423,7 +423,7 @@ def _perhaps_rounded(rpy: Reals, where: str) -> list[str]:
 
 
 class LinkPlaces(Protocol):
-    """Where links stand, as :func:`er3a.formats.urdf.link_places` tells."""
+    """Places of links, from :func:`er3a.formats.urdf.link_places`."""
 
     def __call__(self, name: str, carried: bool = False, /) -> tuple[Reals, int] | None: ...
 
@@ -520,7 +520,7 @@ def _body(inertial: ElementTree.Element) -> tuple[MassBody, Reals]:
 
 
 def _unusable(inertial: ElementTree.Element) -> str:
-    """What of an ``<inertial>`` is no finite number, or that its mass is below 0."""
+    """What of an ``<inertial>`` is not a finite number, or that its mass is below 0."""
     for element in inertial:
         for key, text in element.items():
             values = np.array([_float(word) for word in text.split()])
@@ -806,7 +806,7 @@ def _mesh(
 
 
 def _quality(mesh: str, found: ConvexPieces) -> str:
-    """How well convex pieces stand for a mesh."""
+    """How well convex pieces represent a mesh."""
     if len(found.pieces) == 1:
         return f"{mesh} fills its hull but for a tenth at most; the hull is taken"
     away = 1000 * found.uncovered
@@ -835,12 +835,12 @@ def plain_urdf(path: Path, arguments: Sequence[str] = ()) -> Iterator[Path]:
 
     Parameters
     ----------
-    arguments : ``NAME:=VALUE``, as ``<xacro:arg name="NAME"/>`` asks for them
+    arguments : ``NAME:=VALUE``, as ``<xacro:arg name="NAME"/>`` declares them
 
     Raises
     ------
     InputError
-        for arguments of another form or to a file that is no xacro, without xacrodoc, or for what it can't expand; it
+        for arguments of another form or to a file that is not xacro, without xacrodoc, or for what it can't expand; it
         names ``path`` for what the expanded file is refused for, too
     """
     if "<xacro:" not in COMMENT.sub("", read_text(path, MAX_BYTES)):

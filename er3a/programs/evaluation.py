@@ -52,7 +52,7 @@ class Cell(ByValue):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Position:
-    """Where the arm stands.
+    """Where the arm is.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class Position:
     base: NamedFrame = NO_FRAME
 
     def after(self, motion: ArmMotion, flange: Flange | None) -> Position:
-        """Where the arm stands behind a motion."""
+        """Where the arm is after a motion."""
         target = motion.target
         if motion.angle is not None:
             return self._after_arc(motion, motion.angle, flange)
@@ -174,7 +174,7 @@ class Dialect(ABC):
     modal : variables that motions depend on without naming them
     local_by_default : whether a routine's assignment to a name that nothing else knows makes a local variable
     setters : functions that are not in the program, move nothing, and set what motions depend on
-    whole_division : whether two whole numbers have a whole quotient; None where no source tells
+    whole_division : whether two whole numbers have a whole quotient; None where no source says
     first_index : of a list's first element
     """
 
@@ -208,7 +208,7 @@ class Dialect(ABC):
         return False
 
     def constant(self, memory: ProgramMemory, name: str) -> syntax.Value | None:
-        """The value of a name that the language itself gives, if it does: a frame, where the arm stands."""
+        """The value of a name that the language itself gives, if it does: a frame, or where the arm is."""
         return None
 
     def listed(self, kind: str, values: tuple[syntax.Value, ...]) -> syntax.Value:
@@ -225,7 +225,7 @@ class Dialect(ABC):
 
     @abstractmethod
     def motion(self, memory: ProgramMemory, move: syntax.Move) -> ArmMotion:
-        """The motion, from where the arm stands."""
+        """The motion, from where the arm is."""
 
     @abstractmethod
     def carry_out(self, memory: ProgramMemory, doing: syntax.Doing) -> Instruction | None:
@@ -245,7 +245,7 @@ class ProgramMemory:
     types : declared types by name
     kept : what a language keeps until the next value is given
     beside : names that a thread changes, so that their values are unclear
-    here : where the arm stands
+    here : where the arm is
     cell : what is known of the cell
     """
 

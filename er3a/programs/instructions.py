@@ -82,7 +82,7 @@ class Rate:
 
 @dataclass(frozen=True, slots=True)
 class Zone:
-    """How near the arm has to come to a target before it goes on.
+    """How near to a target the arm must be before it goes on.
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ FINE = Zone()
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NamedFrame(ByValue):
-    """A tool (T_flange_tool) or base (T_robot_base) that targets are meant by.
+    """A tool (T_flange_tool) or base (T_robot_base) that targets refer to.
 
     Attributes
     ----------
@@ -192,7 +192,7 @@ class ArmMotion(ByValue):
     via : point on the arc
     angle : rad, by which the arc goes on (KRL's CA); None if it ends at the target
     spline_block : number of the spline block that it belongs to
-    speed, acceleration : None where the program leaves them as they are on the controller
+    speed, acceleration : None where the program keeps the controller's values
     turn_speed : rad/s, at most, of the tool's turn on a line or arc; None if the program gives none: then turns count
         as lengths do
     load : what hangs on the flange, in its frame; a text where the program names a load without all its numbers; None

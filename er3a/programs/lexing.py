@@ -191,7 +191,7 @@ class Words:
 
 
 def as_number(text: str) -> int | float:
-    """A number as it is written: whole if it has no point and no exponent."""
+    """A number: whole if it is written without point and exponent."""
     if text.isascii() and text.isdigit():
         return int(text) if len(text) < 19 else float(text)
     if text[:1] == "0" and text[1:2].lower() in ("x", "o", "b"):

@@ -210,7 +210,7 @@ def _moves(operation: syntax.Operation, moving: set[str], dialect: Dialect) -> b
 
 
 def _may_move(operation: syntax.Operation, dialect: Dialect) -> bool:
-    """Whether an operation that is no motion may move the arm for all that is known."""
+    """Whether an operation that is not a motion may move the arm, as far as is known."""
     match operation:
         case syntax.Fixed(instruction=instructions.Unknown(may_move=may_move)):
             return may_move
@@ -301,11 +301,11 @@ def _quiet_in(
 
 
 class _Graph:
-    """What follows what in a routine; the number after the last operation stands for its end.
+    """What follows what in a routine; the number after the last operation means its end.
 
     Attributes
     ----------
-    meeting : by operation, the first that every way from it comes to; -1 where there is none
+    meeting : by operation, the first that every path from it reaches; -1 where there is none
     """
 
     def __init__(self, routine: syntax.Routine):
@@ -341,7 +341,7 @@ class _Graph:
         return before
 
     def _order(self, before: list[list[int]]) -> list[int]:
-        """All operations from which the end is reached, each behind those that come to it first."""
+        """All operations from which the end is reached, each after those that lead to it first."""
         order: list[int] = []
         seen = {self.end}
         stack: list[tuple[int, Iterator[int]]] = [(self.end, iter(before[self.end]))]
@@ -491,7 +491,7 @@ class Machine:
         return Execution(self.program, tuple(self.steps), tuple(self.endings), self._unmet())
 
     def _unmet(self) -> tuple[instructions.Place, ...]:
-        """Instructions that are no motions, may move the arm for all that is known, and were not carried out."""
+        """Instructions that are not motions, may move the arm as far as is known, and were not carried out."""
         return tuple(
             operation.place
             for routine in self.program.routines.values()

@@ -123,7 +123,7 @@ LanguageName = Literal["krl", "urscript", "rpl", "xpl", "rapid", "csv"]
 
 @dataclass(frozen=True, slots=True)
 class Constant:
-    """A value that stands in the text."""
+    """A literal value."""
 
     value: Value
 

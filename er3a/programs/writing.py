@@ -70,7 +70,7 @@ class ReadyMotion:
 
 
 class Resolver:
-    """Follows a sequence and knows where the arm is; joints are solved when they are asked for, many at a time.
+    """Follows a sequence and knows where the arm is; joints are solved when they are needed, many at a time.
 
     Parameters
     ----------
@@ -231,7 +231,7 @@ def solutions_meant(branch: instructions.MeantSolution, robot: Robot, rows: Real
     """Which of joint vectors (k, n) in rad are meant: (k,).
 
     The wrist centre's sides are compared with those in the arm's zero pose; what has no side there, or has no such
-    sides at all, as an arm without a spherical wrist, is not asked for.
+    sides at all, as an arm without a spherical wrist, is not checked.
     """
     met: Flags = np.asarray(((rows >= branch.ranges[:, 0]) & (rows <= branch.ranges[:, 1])).all(axis=1), np.bool_)
     if branch.behind_axis_1 is None and branch.behind_lower_arm is None:
@@ -330,7 +330,7 @@ class WrittenProgram(ByValue):
     Attributes
     ----------
     files : texts by suffix (``.src``, ``.dat``)
-    findings : where the text differs from what was asked for; the file's head says the same
+    findings : where the text differs from the request; the file's head says the same
     """
 
     name: str

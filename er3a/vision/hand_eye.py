@@ -13,7 +13,7 @@ References
 
 Orientations read by another convention than they were written by, found because the samples fit only by the other.
 
-Quaternions whose real part stands at the other end keep all turning angles, for that moves them as a rotation and a
+Quaternions whose real part is at the other end keep all turning angles, for that moves them as a rotation and a
 mirror of four dimensions does; so do some orders of Euler angles. Only a fit can tell them.
 """
 
@@ -65,7 +65,7 @@ MEND_KINDS: tuple[vision_findings.SuspectKind, ...] = (*BOARD_TURNS, "mirrored_t
 
 @dataclass(frozen=True, eq=False)
 class AngleCheck(ByValue):
-    """What the turning angles tell.
+    """What the rotation angles show.
 
     Attributes
     ----------

@@ -65,7 +65,7 @@ class TableCorrections(ByValue):
     Attributes
     ----------
     robot : with the corrected table
-    level : which entries were asked for
+    level : which entries were requested
     estimates : of those that can be determined, in mm and deg, with half-widths of their 95 % intervals (k,)
     held : why the others keep their values
     X, Y, half_width : as of :class:`er3a.vision.hand_eye.HandEye`, (12,)
@@ -149,9 +149,9 @@ ZERO_STEP = 1e-5
 
 
 def zeros_tried(found: HandEye, robot: Robot) -> tuple[HandEye, tuple[str, ...], float]:
-    """A calibration whose warnings name the joint with a wrong zero, if one explains all that speaks against it.
+    """A calibration whose warnings name the joint with a wrong zero, if one explains all that contradicts it.
 
-    A zero is named if its value is more than chance, and nothing grave speaks against the samples with it.
+    A zero is named if its value is more than chance, and nothing serious contradicts the samples with it.
 
     Returns
     -------
@@ -208,7 +208,7 @@ def _zeros_too(warning: CalibrationWarning) -> CalibrationWarning:
 
 @dataclass(frozen=True, eq=False)
 class _Turned:
-    """Samples whose joint k, from 0, stands beside its recorded values."""
+    """Samples whose joint k, from 0, is off its recorded values."""
 
     robot: Robot
     samples: CalibrationSet
@@ -219,7 +219,7 @@ class _Turned:
         return forward(self.robot.without_tool(), self.samples.q + value * np.eye(self.robot.joints)[self.k])
 
     def at(self, X: Reals, Y: Reals, value: float) -> tuple[Reals, Reals, Reals]:
-        """As :func:`er3a.vision.hand_eye.fit_extra_parameter` asks for it."""
+        """The argument ``at`` of :func:`er3a.vision.hand_eye.fit_extra_parameter`."""
         flange, setup = self.flange(value), self.samples.setup
         F = flange if setup == "eye_in_hand" else inverted(flange)
         raw, J = likelihood.residuals(F, self.samples.target, X, Y)

@@ -226,7 +226,7 @@ class _Statement:
         self.builder.add(syntax.Doing(self.place, left, self.text))
 
     def _known(self, expression: syntax.Expression) -> syntax.Expression:
-        """The signal that a name stands for."""
+        """The signal that a name denotes."""
         if isinstance(expression, syntax.Variable):
             return self.signals.get(expression.name, expression)
         return expression

@@ -322,7 +322,7 @@ class Cursor:
         self.source, self.tokens, self.at = source, _tokens(source), 0
 
     def next(self, comments: bool = False) -> Token | None:
-        """The next word; comments are passed unless asked for."""
+        """The next word; comments are skipped unless requested."""
         while not comments and self.at < len(self.tokens) and self.tokens[self.at].kind == "comment":
             self.at += 1
         return self.tokens[self.at] if self.at < len(self.tokens) else None
@@ -339,7 +339,7 @@ class Cursor:
         return word
 
     def place(self) -> Place:
-        """Where the next word stands."""
+        """The place of the next word."""
         token = self.next() or (self.tokens[-1] if self.tokens else None)
         return Place(self.source.path, token.line if token else 1)
 
@@ -662,7 +662,7 @@ class _BodyReader:
                 )
 
     def late(self, place: Place, called: syntax.Expression, given: Given, text: str) -> None:
-        """A call of the procedure that a text names when the program runs: one after the other is asked for."""
+        """A call of the procedure that a text names when the program runs; the candidates are tried one by one."""
         prefix, whole = _prefix(called)
         prefix = prefix.upper()
         if whole:
@@ -924,7 +924,7 @@ def _goto(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None
 
 
 def _stop(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None:
-    """Stop, behind which the arm stands at its target, and Break, which does not wait for that."""
+    """Stop, after which the arm rests at its target, and Break, which does not wait for that."""
     body.builder.add(syntax.Waiting(place, "operator", None, text))
     body.builder.add(syntax.Assign(place, syntax.Variable(PASSING), syntax.Constant(text[:5].upper() == "BREAK"), ""))
 
@@ -1007,7 +1007,7 @@ def modules_of(path: Path) -> tuple[Path, ...]:
 
     Where the name of a procedure is known only when the program runs, all modules are taken. They lie beside it or, in
     a controller's backup, in the other folder of its task. A module with a routine ``main`` of its own is another
-    program; one that is no text is left out.
+    program; one that is not text is left out.
     """
     used, given, late = _names(path)
     waiting = {each: _names(each) for each in _beside(path) if not _is_encoded(each)}
@@ -1042,7 +1042,7 @@ def _beside(path: Path) -> list[Path]:
 
 
 def _is_encoded(path: Path) -> bool:
-    """Whether a module is no text, as those are that a maker has encoded."""
+    """Whether a module is not text, such as those that a manufacturer has encoded."""
     try:
         read_program_text(path)
     except InputError:

@@ -86,7 +86,7 @@ def read_xml(source: ProgramText) -> XmlNode:
     Raises
     ------
     InputError
-        for what is no XML, holds a document type or entities, or is nested too deeply
+        for text that is not XML, holds a document type or entities, or is nested too deeply
     """
     top = XmlNode("", 0, {})
     stack = [top]
@@ -140,7 +140,7 @@ def read_xpl(source: ProgramText) -> syntax.Program:
     Raises
     ------
     InputError
-        for text that is no XML, entities, loops whose body is missing or is the loop itself
+        for text that is not XML, entities, loops whose body is missing or is the loop itself
     """
     if not source.text.lstrip().startswith("<"):
         problem = "is text, not XML: the controller refuses it (alarm 4902)"
@@ -359,7 +359,7 @@ def _sides(element: XmlNode, more: list[XmlNode]) -> list[tuple[str, str]]:
 
 
 def _element(builder: CodeBuilder, element: XmlNode, place: Place) -> bool:
-    """An element that is no loop; False if it is not understood."""
+    """An element other than a loop; False if it is not understood."""
     source = text_of(element)
     if element.tag in ("mjoint", "mlin"):
         parts = [element.child(tag) for tag in MOTION_PARTS]

@@ -135,7 +135,7 @@ class _UrReader:
         self.within_unread = 0  # blocks open within it that begin no further in than it does
 
     def read(self) -> list[syntax.Routine]:
-        """All routines; the one without a name holds what stands outside of others."""
+        """All routines; the one without a name holds what is outside of the others."""
         place = Place(self.source.path, 1)
         for place, text, comment in self._statements():
             if text:
