@@ -465,12 +465,12 @@ class _Table:
         if "offset" not in self.column:
             self._add(k, "offset", turning, columns)
         elif offsets:
-            raise InputError(self.path, f"column {self.header[k]}", "offsets stand in another column too", "Keep one")
+            raise InputError(self.path, f"column {self.header[k]}", "another column holds offsets too", "Keep one")
         if any(sliding):
             self._add(k, "theta", [text if slides else "" for slides, (_, text) in zip(sliding, parts)], columns)
         if any(sign < 0 for sign, _ in parts):
             if "direction" in self.header:
-                problem = "directions stand in another column too"
+                problem = "another column holds directions too"
                 raise InputError(self.path, f"column {self.header[k]}", problem, "Keep one")
             columns["direction"] = ["-1" if sign < 0 else "1" for sign, _ in parts]
         return offsets

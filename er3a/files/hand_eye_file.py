@@ -105,7 +105,7 @@ def _rotations(path: Path, rows: list[dict[str, Any]], stream: str, R: Reals) ->
         where = f"row {row['row']}, columns {stream}_r11 to {stream}_r33"
         worst = float(np.abs(M @ M.T - np.eye(3)).max())
         if worst > ORTHONORMAL_TOLERANCE:
-            problem = f"the matrix is no rotation: R R^T differs from 1 by {worst:.3g}"
+            problem = f"the matrix is not a rotation: R R^T differs from 1 by {worst:.3g}"
             raise InputError(path, where, problem, "Correct the sample, or write more digits")
         if np.linalg.det(M) < 0:
             problem = "the matrix is left-handed (its determinant is -1)"
@@ -452,5 +452,5 @@ def grey_image(file: Path) -> NDArray[np.uint8]:
         with Image.open(file) as image:
             return np.asarray(image.convert("L"))
     except (OSError, ValueError) as error:
-        reason = "there is no such file" if isinstance(error, FileNotFoundError) else "is no image that can be read"
+        reason = "there is no such file" if isinstance(error, FileNotFoundError) else "is not a readable image"
         raise InputError(file, None, reason, "Correct the name, or save it as PNG or JPEG") from None

@@ -163,7 +163,7 @@ def _joint_order(path: Path, names: list[str]) -> list[int]:
     numbers = [int(each[0]) for each in found if each]
     first = min(numbers, default=0)
     if sorted(numbers) != list(range(first, first + len(names))):
-        problem = f"which joint is which can't be told from {', '.join(names)}"
+        problem = f"joints can't be identified by {', '.join(names)}"
         raise InputError(path, "joint_names", problem, "Name them joint_1, joint_2 ... from the base on")
     return sorted(range(len(names)), key=numbers.__getitem__)
 

@@ -171,7 +171,7 @@ def _position_faults(fields: Fields) -> Iterator[Fault]:
                 M = values.reshape(3, 3).T
                 if np.abs(M.T @ M - np.eye(3)).max() > NOT_RIGID or np.linalg.det(M) < 0:
                     remedy = "nx, ny, nz is the flange's x axis in the base frame, ox ... its y axis, ax ... its z axis"
-                    yield columns[0], "these columns are no rotation matrix", remedy
+                    yield columns[0], "these columns are not a rotation matrix", remedy
 
 
 def _pose(fields: Fields) -> Pose:

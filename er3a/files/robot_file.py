@@ -36,7 +36,7 @@ METRES_BELOW_MM = 0.5
 MAX_PACKED = 400_000  # letters of a link's corners or triangles
 
 IMPOSSIBLE = {
-    "not_finite": "is no finite number",
+    "not_finite": "is not a finite number",
     "negative_mass": "the mass is below 0",
     "negative_moment": "a principal moment is below 0, which no body has",
     "triangle": "a principal moment exceeds the sum of the other two, which no body can have",

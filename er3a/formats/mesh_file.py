@@ -98,7 +98,7 @@ def _link_scale(path: Path, loaded: Any, scale: Reals) -> Reals:
 def _loaded(path: Path) -> Any:
     """A mesh as trimesh reads it."""
     if path.suffix.lower() not in FORMATS:
-        raise InputError(path, None, f"'{path.suffix}' is no format of meshes", f"Save it as {', '.join(FORMATS)}")
+        raise InputError(path, None, f"'{path.suffix}' is not a mesh format", f"Save it as {', '.join(FORMATS)}")
     if not path.is_file():
         raise InputError(path, None, "there is no such file", "Check the path")
     _refuse_large(path)
@@ -116,7 +116,7 @@ def _loaded(path: Path) -> Any:
     if len(loaded.faces) > MAX_TRIANGLES:
         raise _too_many(path, len(loaded.faces))
     if not np.isfinite(loaded.vertices).all():
-        raise InputError(path, None, "has corners that are no numbers", "Save the mesh again")
+        raise InputError(path, None, "has corners that are not numbers", "Save the mesh again")
     return loaded
 
 

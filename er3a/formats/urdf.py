@@ -549,7 +549,7 @@ def _coupling(
         while joint.mimic is not None:
             follows = found.all.get(joint.mimic.source)
             if follows is None or follows.name in seen or not follows.moves:
-                problem = f"follows '{joint.mimic.source}', which is no joint that moves by itself"
+                problem = f"follows '{joint.mimic.source}', which is not an independent joint"
                 raise InputError(path, f"joint {joint.name}", problem, "Correct its <mimic>")
             factor, offset = factor * joint.mimic.multiplier, offset + factor * joint.mimic.offset
             joint = follows

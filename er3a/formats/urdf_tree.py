@@ -217,7 +217,7 @@ def read_chain(path: Path, base: str | None, tip: str | None, snap: bool) -> Urd
             remedy = f"Write {', '.join(MOVING)} or fixed"
             if joint.type in FREE:
                 remedy = f"Name where the arm begins by --base: {_some([each.child for each in joints])}"
-            problem = f"type '{joint.type}' is no joint of a serial arm"
+            problem = f"type '{joint.type}' is not a joint of a serial arm"
             raise InputError(path, f"joint {joint.name}", problem, remedy)
         if (apart := np.abs(joint.T_parent_joint[:3, 3]).max()) > MAX_APART_M:
             problem = f"stands {apart:g} m from the one before it"
@@ -247,7 +247,7 @@ def _downwards(tree: Tree, link: str, notes: list[str]) -> list[UrdfJoint]:
         moving, active = tree.onward(link)
         count = sum(joint.independent for joint in chain)
         if tree.hand_begins(moving, count):
-            notes.append(f"a gripper stands behind link {link} ({_some(_names(moving))}); it was left out")
+            notes.append(f"a gripper follows link {link} ({_some(_names(moving))}); it was left out")
             break
         if len(active) > 1:
             ends = [end for joint in active for end in tree.ends(joint.child, count + joint.independent)]
@@ -259,7 +259,7 @@ def _downwards(tree: Tree, link: str, notes: list[str]) -> list[UrdfJoint]:
             passive = [joint for joint in moving if joint not in active]
             notes.append(f"joints beside the chain that only follow others were left out: {_some(_names(passive))}")
         if not moving and len(onward) > 1:
-            notes.append(f"several fixed frames stand behind {link}; it was taken as the flange")
+            notes.append(f"several fixed frames follow {link}; it was taken as the flange")
             break
         chain.append((active or moving or onward)[0])
         link = chain[-1].child
@@ -285,7 +285,7 @@ def urdf_root(path: Path) -> ElementTree.Element:
     InputError
         for a file that is not a URDF, such as xacro that is not expanded
     """
-    text = read_text(path, MAX_BYTES, "Leave out of it what is no link or joint of the arm")
+    text = read_text(path, MAX_BYTES, "Remove all but the links and joints of the arm")
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise InputError(path, None, "holds a document type or entities", "Remove them; a URDF needs none")
     try:
@@ -638,7 +638,7 @@ def collision_shapes(
                 return []
             pieces = found
         case tag:
-            notes.append(f"{where}: <{tag}> is no shape that er3a reads; it is left out")
+            notes.append(f"{where}: <{tag}> is not a shape that er3a reads; it is left out")
             return []
     placed = (piece @ T[:3, :3].T + T[:3, 3] for piece in pieces.pieces)
     stated = float(_numbers(path, where, collision, "margin", None)[0]) if "margin" in collision.attrib else 0.0
@@ -864,7 +864,7 @@ def plain_urdf(path: Path, arguments: Sequence[str] = ()) -> Iterator[Path]:
 def _argument(path: Path, text: str) -> tuple[str, str]:
     name, given, value = text.partition(":=")
     if not name or not given:
-        raise InputError(path, "--xacro", f"'{text}' is no argument of xacro", "Write NAME:=VALUE")
+        raise InputError(path, "--xacro", f"'{text}' is not an xacro argument", "Write NAME:=VALUE")
     return name, value
 
 
@@ -881,7 +881,7 @@ def _expanded(path: Path, values: dict[str, str]) -> str:
         root = ElementTree.fromstring(text)
     except Exception as error:  # whatever a macro makes its expander stumble over
         reason = " ".join(str(error).split())[:200] or type(error).__name__
-        remedy = "Give what it asks for: --xacro NAME:=VALUE; keep its packages in folders beside it"
+        remedy = "Give its arguments: --xacro NAME:=VALUE; keep its packages in folders beside it"
         raise InputError(path, None, f"can't be expanded ({reason})", remedy) from None
     for mesh in root.iter("mesh"):
         if (file := mesh_of(path, mesh.get("filename", ""))) is not None:

@@ -91,7 +91,7 @@ def _check_hand_eye(path: Path) -> None:
         for row in sample_rows(samples)[0]:
             if not (samples.parent / str(row.get("image"))).is_file():
                 where = f"row {row['row']}, column image"
-                raise InputError(samples, where, f"'{row.get('image')}' is no file", "Name the sample's image")
+                raise InputError(samples, where, f"'{row.get('image')}' is not a file", "Name the sample's image")
 
 
 def _check_vision(path: Path) -> None:

@@ -61,7 +61,7 @@ ENTRIES = {
 def _known_entry(path: str) -> str:
     if path not in ENTRIES:
         remedy = f"Write joints.1 to joints.{MAX_JOINTS} with one of {', '.join(_OF_A_JOINT)}; or tool with one of "
-        raise ValueError(f"'{path}' is no entry that can be varied | {remedy}{', '.join(_OF_THE_TOOL)}")
+        raise ValueError(f"'{path}' can't be varied | {remedy}{', '.join(_OF_THE_TOOL)}")
     return path
 
 
@@ -152,7 +152,7 @@ StageName = Annotated[Text, AfterValidator(_known_stage)]
 def _distinct(values: list[Any]) -> list[Any]:
     for value in values:
         if values.count(value) > 1:
-            raise ValueError(f"{value} stands there twice | Remove one of the two")
+            raise ValueError(f"{value} is listed twice | Remove one of the two")
     return values
 
 

@@ -118,7 +118,7 @@ def _numbers(source: ProgramText, line: int, row: list[str], columns: list[int],
         except ValueError:
             value = math.nan
         if not math.isfinite(value):
-            problem = f"'{text[:40]}' is no finite number" if text else "a value is missing"
+            problem = f"'{text[:40]}' is not a finite number" if text else "a value is missing"
             raise InputError(source.path, f"line {line}, column {head[column]}", problem, "Write a number")
         found.append(value)
     return found

@@ -264,7 +264,7 @@ def read_program_text(path: Path) -> ProgramText:
     if control is not None:
         line = text.count("\n", 0, control.start()) + 1
         raise InputError(
-            path, f"line {line}", "holds control characters, so it is no text", "Export the program as text"
+            path, f"line {line}", "holds control characters, so it is not text", "Export the program as text"
         )
     return ProgramText(path, text.rstrip("\x1a"), encoding)
 

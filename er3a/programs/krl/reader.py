@@ -60,7 +60,7 @@ class KrlWords(Words):
             try:
                 return syntax.Constant(int(word[2:-1], 16 if word[1] in "Hh" else 2))
             except ValueError:
-                raise MisreadError(f"{word} is no number") from None
+                raise MisreadError(f"{word} is not a number") from None
         if self.accept("{"):
             return self._aggregate()
         return syntax.Opaque(self.take()) if self.next in ("?", "!") else None
@@ -532,7 +532,7 @@ class _KrlReader:
                 end = "ENDFCT" if head[1].upper() == "DEFFCT" else "END"
             elif builder is None:
                 if text and not text.startswith("&"):
-                    raise fault(place, f"'{text[:40]}' stands outside of any routine", "Begin with DEF NAME ( )")
+                    raise fault(place, f"'{text[:40]}' is outside of any routine", "Begin with DEF NAME ( )")
             elif text.upper() == end:
                 routines.append(builder.routine(place))
                 builder = None

@@ -281,7 +281,7 @@ class _Pou:
             first, last = (expression(element.text_of(tag)) for tag in ("from", "to"))
             step = expression(element.text_of("by")) if element.child("by") is not None else None
             if not WORD.match(counter := element.text_of("var")):
-                raise fault(place, f"'{counter}' is no variable that a loop could count", "Name a variable in <var>")
+                raise fault(place, f"'{counter}' is not a variable that a loop can count", "Name a variable in <var>")
             builder.open_for(place, counter, first, last, step, source)
         self._body(builder, body, f"{place.element}/{name}", within)
         builder.close(element.tag, place)
