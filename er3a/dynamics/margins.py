@@ -325,7 +325,7 @@ def load_diagram(
     """The load diagram; None for wrists whose axes don't meet in a point, or that nothing is known of.
 
     A joint before the last one counts with the distance from the wrist's centre, which a load gets from its
-    axis if the joints behind turn far enough.
+    axis if the joints beyond turn far enough.
     """
     behind = wrist_to_flange(robot)
     if behind is None or not (wrist.moment or wrist.inertia):

@@ -44,7 +44,7 @@ APEX = 2
 
 @dataclass(frozen=True, eq=False)
 class Hanging:
-    """What hangs behind a joint, in the frame that moves with it.
+    """What hangs beyond a joint, in the frame that moves with it.
 
     Attributes
     ----------
@@ -112,11 +112,11 @@ def _alone(vector: Reals) -> Reals:
 
 
 def carried(robot: Robot, own: list[Hanging], at: list[Reals], row: int) -> Hanging:
-    """All that hangs behind a row's joint, in the frame that moves with it, over the corners of the rows behind.
+    """All that hangs beyond a row's joint, in the frame that moves with it, over the corners of the rows beyond.
 
     Parameters
     ----------
-    at : m arrays (B, c, 2), corners of each row; those of rows behind come in order, the last row's fastest
+    at : m arrays (B, c, 2), corners of each row; those of rows beyond come in order, the last row's fastest
     """
     links, found = constant_links(robot), own[-1]
     for behind in range(robot.rows - 1, row, -1):
@@ -176,7 +176,7 @@ def row_torques(robot: Robot, row: int, behind: Hanging, pull: Reals) -> Reals:
 
 
 def torque_caps(robot: Robot, row: int, behind: Hanging, gravity: float) -> Reals:
-    """What a row's torque or force (B, K) can't exceed wherever gravity points, over the corners of the rows behind."""
+    """What a row's torque or force (B, K) can't exceed wherever gravity points, over the corners of the rows beyond."""
     if robot.sliding[row]:
         caps: Reals = behind.mass * gravity + np.abs(behind.force[..., 2])
     else:
@@ -211,7 +211,7 @@ class Bounded:
 def bounded_torque(model: ArmModel, joint: int, size: Size, start: Bounded) -> Bounded:
     """The largest holding torque of a joint (from 0) by its absolute value, at least that of ``start``.
 
-    Wherever gravity could point in a joint's frame is a bound that only the joints behind are in, and often reached.
+    Wherever gravity could point in a joint's frame is a bound that only the joints beyond are in, and often reached.
     """
     robot, own = model.robot, hanging_of(model)
     gravity = float(-model.model.gravity.linear[2])

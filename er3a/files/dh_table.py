@@ -234,7 +234,7 @@ def _unit(row: dict[str, Any]) -> str:
 
 
 def _check_kind(path: Path, row: dict[str, Any], given: set[str]) -> None:
-    """Refuse cells that are empty, or filled in for the other kind of joint."""
+    """Reject cells that are empty, or filled in for the other kind of joint."""
     unit = _unit(row)
     own = {f"lower_{unit}", f"upper_{unit}", f"speed_{unit}_s", "theta_deg" if unit == "mm" else "offset_deg"}
     for column in sorted(given & {key for key, kind in OPTIONAL.items() if kind.optional}):

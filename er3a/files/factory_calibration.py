@@ -101,7 +101,7 @@ def _of_deltas(path: Path, nominal: Robot) -> Robot:
 
 
 def _list(path: Path, text: str, key: str) -> Reals:
-    """Six numbers behind a key."""
+    """Six numbers after a key."""
     found = re.search(rf"^\s*{key}\s*=\s*\[([^\]]*)\]", text, re.MULTILINE)
     if found is None:
         raise InputError(path, key, "missing", REMEDY)

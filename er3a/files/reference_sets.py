@@ -356,7 +356,7 @@ FORMATS: dict[str, Format] = {
 
 
 def row_of(kind: str, fields: Mapping[str, Any]) -> Row:
-    """The row behind the fields of a CSV line."""
+    """The row that the fields of a CSV line describe."""
     values = FORMATS[kind].gather(dict(fields))
     values["line"] = values.pop("row")
     values["gaussian"] = values.pop(STATED_AS) == STANDARD_DEVIATION
@@ -407,7 +407,7 @@ def load_documents(path: str | Path) -> Documents:
 
 
 def check_origins(path: Path, rows: Iterable[Row], documents: Documents) -> None:
-    """Refuse rows whose origin is none of the documents: :class:`InputError` naming the row."""
+    """Reject rows whose origin is none of the documents: :class:`InputError` naming the row."""
     for row in rows:
         if row.origin not in documents.by_name:
             problem = f"the document '{row.origin}' is not known"
@@ -415,7 +415,7 @@ def check_origins(path: Path, rows: Iterable[Row], documents: Documents) -> None
 
 
 def check_robot_origins(robot: Robot, documents: Collection[str]) -> None:
-    """Refuse a robot whose values name documents that its sets don't declare; without sets it may name any."""
+    """Reject a robot whose values name documents that its sets don't declare; without sets it may name any."""
     named = {f"{group}.origin": source.origin for group, source in robot.sources.items() if source.origin}
     named |= {f"the origin of {entry}": name for entry, name in robot.origins.items()}
     for field, name in named.items():
@@ -594,7 +594,7 @@ def _check_row(path: Path, format: Format, fields: Fields) -> None:
 
 
 def _check_units(path: Path, format: Format, table: list[Fields]) -> None:
-    """Refuse values in metres or radians, but where a person has checked the units of every row."""
+    """Reject values in metres or radians, but where a person has checked the units of every row."""
     if all(fields[UNITS_CHECKED] for fields in table):
         return
     _check_span(path, table, LENGTHS, MIN_SPAN_MM, METRES)
@@ -608,7 +608,7 @@ def _check_units(path: Path, format: Format, table: list[Fields]) -> None:
 
 
 def _check_span(path: Path, table: list[Fields], columns: tuple[str, ...], least: float, mistaken: Mistaken) -> None:
-    """Refuse a table whose values are all too small."""
+    """Reject a table whose values are all too small."""
     present = [column for column in columns if column in table[0]]
     largest = max(_sizes(table, present))
     if "length" not in table[0] and 0 < largest < least:
@@ -619,7 +619,7 @@ def _check_span(path: Path, table: list[Fields], columns: tuple[str, ...], least
 def _check_mixed(
     path: Path, table: list[Fields], columns: tuple[str, ...], least: float, most: float, mistaken: Mistaken
 ) -> None:
-    """Refuse a row of small values beside rows of large ones."""
+    """Reject a row of small values beside rows of large ones."""
     present = [column for column in columns if column in table[0]]
     sizes = _sizes(table, present)
     for fields, size in zip(table, sizes):
@@ -635,7 +635,7 @@ def _sizes(table: list[Fields], columns: list[str]) -> list[float]:
 
 
 def _check_angles(path: Path, table: list[Fields]) -> None:
-    """Refuse poses that are all in radians; of single angles among degrees, which can be meant so, only warn."""
+    """Reject poses that are all in radians; of single angles among degrees, which can be meant so, only warn."""
     all_small = max(_sizes(table, [*_POSE, *_FURTHER])) < WIDEST_IN_RADIANS
     if all_small and _COORDINATES[0] in table[0]:
         _check_arcs(path, table)
@@ -651,7 +651,7 @@ def _check_angles(path: Path, table: list[Fields]) -> None:
 
 
 def _check_arcs(path: Path, table: list[Fields]) -> None:
-    """Refuse points that move by more than joints that turn so little can move them."""
+    """Reject points that move by more than joints that turn so little can move them."""
     first: dict[tuple[str, str], Fields] = {}
     whole = [row for row in table if all(row[column] is not None for column in _COORDINATES)]
     for row in whole:

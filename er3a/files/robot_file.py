@@ -267,7 +267,7 @@ def link_masses(robot: Robot, inertia: Inertia) -> tuple[LinkMass, ...]:
 
 
 def _at_zero(robot: Robot, links: np.ndarray) -> np.ndarray:
-    """The frame (4, 4) that moves with the last of some joints, with all of them at 0, behind as many links."""
+    """The frame (4, 4) that moves with the last of some joints, with all of them at 0, after as many links."""
     T = np.eye(4)
     for link, turn in zip(links, np.where(robot.sliding, 0.0, joint_starts(robot))):
         T = T @ link @ rot_z(turn)
@@ -559,7 +559,7 @@ class CollisionPairs(StrictModel):
         )
 
     def check(self, known: Collection[str]) -> None:
-        """Refuse unknown names, and a pair that is decided twice: ``ValueError``."""
+        """Reject unknown names, and a pair that is decided twice: ``ValueError``."""
         seen: set[frozenset[str]] = set()
         for key in ("allow", "watch"):
             for i, entry in enumerate(getattr(self, key)):
@@ -719,7 +719,7 @@ class RobotFile(StrictModel):
         return self
 
     def _check_far_normals(self) -> None:
-        """Refuse d of hundreds of metres that do not cancel, and bodies in frames as far away."""
+        """Reject d of hundreds of metres that do not cancel, and bodies in frames as far away."""
         if any(abs(row.d_mm) > LONGEST_LENGTH_MM for row in self.dh.rows) and not self.dh.has_far_normals:
             problem = "dh.rows: d of more than 20 m that does not cancel between nearly parallel axes"
             raise ValueError(f"{problem} | Write the lengths in mm")
@@ -758,7 +758,7 @@ def _kind(sliding: bool) -> str:
 
 
 def _check_limit(field: str, row: JointLimitRow | CombinedLimitRow, sliding: bool) -> None:
-    """Refuse limits in the unit of the other type of joint, half of them, crossed ones, and unlikely ones."""
+    """Reject limits in the unit of the other type of joint, half of them, crossed ones, and unlikely ones."""
     named = f"joint {row.joint}" if isinstance(row, JointLimitRow) else "the sum"
     degrees, millimetres = (row.lower_deg, row.upper_deg), (row.lower_mm, row.upper_mm)
     own, other, unit = (millimetres, degrees, "mm") if sliding else (degrees, millimetres, "deg")
@@ -790,7 +790,7 @@ def coupling_matrix(group: Coupling, rows: int, joints: int) -> Reals:
 
 
 def check_placement(field: str, placement: Placement | None, calibrated: bool = False) -> None:
-    """Refuse a placement that is too far away, as ``ValueError`` with ``field: problem | remedy``; warn of units, but
+    """Reject a placement that is too far away, as ``ValueError`` with ``field: problem | remedy``; warn of units, but
     not of lengths below 2 mm that were calibrated."""
     if placement is None:
         return

@@ -31,7 +31,7 @@ WHOLE_DEGREES = "nothing is to be done"
 
 
 def check_millimetres(values: Sequence[float]) -> None:
-    """Refuse lengths that can only be metres (all below 5, and not all zero), and any over 100 m."""
+    """Reject lengths that can only be metres (all below 5, and not all zero), and any over 100 m."""
     largest = max(abs(value) for value in values)
     shown = ", ".join(f"{value:g}" for value in values)
     if 0 < largest < METRES_BELOW_MM:
@@ -41,7 +41,7 @@ def check_millimetres(values: Sequence[float]) -> None:
 
 
 def check_degrees(values: Sequence[float], otherwise: str, slides: bool = False) -> None:
-    """Refuse angles of more than ten turns; warn of those that look like radians.
+    """Reject angles of more than ten turns; warn of those that look like radians.
 
     All within +-6.3, they look so if two are not whole numbers.
 

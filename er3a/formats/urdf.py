@@ -115,7 +115,7 @@ def table_from_axes(directions: Reals, points: Reals, T_base_flange: Reals) -> A
 
 
 def _feet(directions: Reals, points: Reals, flange: Reals) -> tuple[Reals, Reals]:
-    """Feet of the common normals on each axis: from the axis before (n, 3), and to the axis behind (n, 3)."""
+    """Feet of the common normals on each axis: from the axis before (n, 3), and to the axis after (n, 3)."""
     joints = len(directions)
     incoming, outgoing = np.empty((joints, 3)), np.empty((joints, 3))
     incoming[0] = _foot(np.zeros(3), directions[0], points[0])

@@ -133,7 +133,7 @@ class Tree:
             self.depth[joint.name] = joint.independent + max((self.depth[name] for name in behind), default=0)
 
     def _outwards(self) -> list[UrdfJoint]:
-        """All joints, each before those behind it; :class:`InputError` for joints that no root leads to."""
+        """All joints, each before those after it; :class:`InputError` for joints that no root leads to."""
         found: list[UrdfJoint] = []
         todo = [joint for link in self.by_parent if link not in self.by_child for joint in self.by_parent[link]]
         while todo:
@@ -154,12 +154,12 @@ class Tree:
         return found[::-1]
 
     def onward(self, link: str) -> tuple[list[UrdfJoint], list[UrdfJoint]]:
-        """The joints at a link behind which anything moves, and those behind which anything moves by itself."""
+        """The joints at a link after which anything moves, and those after which anything moves by itself."""
         moving = [joint for joint in self.by_parent.get(link, []) if self.moves[joint.name]]
         return moving, [joint for joint in moving if self.depth[joint.name]]
 
     def hand_begins(self, moving: list[UrdfJoint], count: int) -> bool:
-        """Whether what moves behind a link, after so many joints, is a gripper or a hand."""
+        """Whether what moves after a link, after so many joints, is a gripper or a hand."""
         if count < ARM_JOINTS or any(self.depth[joint.name] > FINGER_JOINTS for joint in moving):
             return False
         alone = [
@@ -168,7 +168,7 @@ class Tree:
         return len(moving) > 1 or len(alone) == 1
 
     def ends(self, link: str, count: int = 0) -> list[str]:
-        """Links behind a link, which has so many moving joints before it, at which an arm may end."""
+        """Links after a link, which has so many moving joints before it, at which an arm may end."""
         found, todo = list[str](), [(link, count)]
         while todo:
             link, count = todo.pop()
@@ -182,7 +182,7 @@ class Tree:
         return found
 
     def _tail(self, link: str) -> str:
-        """The end of the fixed joints behind a link, or the link itself where they branch."""
+        """The end of the fixed joints after a link, or the link itself where they branch."""
         while len(onward := self.by_parent.get(link, [])) == 1 and not onward[0].moves:
             link = onward[0].child
         return link

@@ -144,7 +144,7 @@ def stage_forms(robot: Robot) -> dict[str, str]:
 def check_file(path: Path) -> str:
     """Check a file and return in words what it is; :class:`er3a.errors.InputError` if something is wrong with it.
 
-    A folder stands for the study in it.
+    A folder means the study in it.
 
     Each file that it names is looked at too, from the folder that a study is run in: that which ``config`` or ``data``,
     where it stands, stands in, or else the working folder.

@@ -22,7 +22,7 @@ Value = Annotated[float, Field(ge=-1e6, le=1e6)]
 
 
 class Entry(NamedTuple):
-    """An entry that can be varied: of a joint, or of the tool (``joint`` None); where it stands, its name and unit.
+    """An entry that can be varied: of a joint, or of the tool (``joint`` None); its place, name and unit.
 
     ``group`` and ``column`` are those of a joint's row in a robot's file, or the key and index of a tool's placement.
     """
@@ -92,7 +92,7 @@ class Variant:
         return f"{entry_label(self.entry)} = {self.value:.9g} {self.entry.unit}"
 
     def table(self, content: RobotFile) -> RobotFile:
-        """A robot's file with the variant's title and the varied joint entry (a varied tool is no part of it).
+        """A robot's file with the variant's title and the varied joint entry (a varied tool is not part of it).
 
         Capsules that the file gives for its own link lengths don't fit others: a varied D-H entry leaves the default.
         """
@@ -115,7 +115,7 @@ class Variant:
             raise self._refusal(f"{error.field}: {error.problem}", error.remedy) from None
 
     def tool(self, tool: Placement | None) -> Placement | None:
-        """The tool with the varied entry; a varied joint leaves it as it is."""
+        """The tool with the varied entry; a varied joint does not change it."""
         entry = self.entry
         if entry.joint is not None:
             return tool

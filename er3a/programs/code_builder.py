@@ -268,7 +268,7 @@ Each = Callable[[syntax.Expression], syntax.Expression]
 
 
 def linked(routines: Iterable[syntax.Routine]) -> tuple[dict[str, syntax.Routine], tuple[ProgramFinding, ...]]:
-    """The routines by name, with calls of each other taken out of expressions; and what is to be said of the text.
+    """The routines by name, with calls of each other taken out of expressions; and the findings about the text.
 
     Of two routines with one name the later one counts; the other is kept under a name that nothing calls.
     """

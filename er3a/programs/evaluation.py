@@ -84,7 +84,7 @@ class Position:
         return Position()
 
     def _after_arc(self, motion: ArmMotion, angle: float, flange: Flange | None) -> Position:
-        """Behind an arc with an angle of its own."""
+        """After an arc with an angle of its own."""
         start = self.seen(motion.tool, motion.base, flange)
         poses = isinstance(motion.target, PoseTarget) and isinstance(motion.via, PoseTarget)
         if start is None or not poses or not math.isfinite(angle):
@@ -200,7 +200,7 @@ class Dialect(ABC):
         return True
 
     def assigned(self, old: syntax.Value, new: syntax.Value) -> syntax.Value:
-        """What a variable has behind an assignment to it."""
+        """What a variable has after an assignment to it."""
         return new
 
     def named(self, name: str) -> bool:

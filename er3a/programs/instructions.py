@@ -389,7 +389,7 @@ def arc_end(start: Reals, via: Reals, target: Reals, angle: float) -> Reals | No
 
 
 def chords(start: Reals, via: Reals, end: Reals, deviation: float) -> Reals | None:
-    """Poses (n, 4, 4) behind the start, lines between which stay within ``deviation`` (m) of the arc."""
+    """Poses (n, 4, 4) after the start, lines between which stay within ``deviation`` (m) of the arc."""
     circle = centre_and_angle(start[:3, 3], via[:3, 3], end[:3, 3])
     if circle is None:
         return None

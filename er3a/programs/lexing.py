@@ -142,13 +142,13 @@ class Words:
         return None
 
     def reference(self) -> Expression:
-        """A name with the fields, indices and arguments behind it."""
+        """A name with the fields, indices and arguments after it."""
         name = self.take()
         value = self.lexicon.constants.get(name.upper())
         return self.parts_of(Variable(name)) if value is None else Constant(value)
 
     def parts_of(self, found: Expression) -> Expression:
-        """An expression with the fields, indices and arguments behind it."""
+        """An expression with the fields, indices and arguments after it."""
         while self.kind == "mark":
             if self.accept("."):
                 found = Member(found, self.name())

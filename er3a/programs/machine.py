@@ -696,8 +696,8 @@ class Machine:
     def _start(self, way: ExecutionPath, start: syntax.Beside) -> None:
         """Follow a routine that moves the arm beside the program, on a way that begins here.
 
-        The program's own way goes on. Behind the start of a thread it does not know where the arm stands; an interrupt,
-        which may come at any time, begins where it is not known, and the motion that it broke into goes on behind it.
+        The program's own way goes on. After the start of a thread it does not know where the arm stands; an interrupt,
+        which may come at any time, begins where it is not known, and the motion that it broke into goes on after it.
         """
         name = start.what.function
         routine = self.program.routines.get(name)
@@ -766,7 +766,7 @@ class Machine:
         return rounds > self.limits.rounds
 
     def _met(self, way: ExecutionPath) -> tuple[EndKind, int] | None:
-        """Whether this way (it repeats) or another (it joins) was in this state before, and behind which step."""
+        """Whether this way (it repeats) or another (it joins) was in this state before, and after which step."""
         memory, last = way.memory, len(way.frames) - 1
         frames = tuple(
             (frame.routine.name, frame.at, self._kept(memory.local if i == last else frame.local))
@@ -819,7 +819,7 @@ def _labels(routine: syntax.Routine) -> frozenset[int]:
 
 
 def _loops(routine: syntax.Routine) -> frozenset[int]:
-    """Branches whose condition keeps a loop going: behind them, the code jumps back to before them."""
+    """Branches whose condition keeps a loop going: after them, the code jumps back to before them."""
     jumps = [(i, each.to) for i, each in enumerate(routine.code) if isinstance(each, syntax.GoTo) and each.to <= i]
     branches = [(i, each.otherwise) for i, each in enumerate(routine.code) if isinstance(each, syntax.Branch)]
     return frozenset(at for at, end in branches if any(to <= at < i < end for i, to in jumps))

@@ -106,7 +106,7 @@ class Resolver:
         return ready
 
     def joints_after(self, number: int) -> Reals | None:
-        """Joints (n,) in rad behind a motion; -1 for the start."""
+        """Joints (n,) in rad after a motion; -1 for the start."""
         if number < 0:
             return self.start
         motion, _ = self.motions[number]
@@ -128,7 +128,7 @@ class Resolver:
 
         Of solutions on a ``branch`` only, where there are some.
 
-        The list ends behind the first pose that has none, with None.
+        The list ends after the first pose that has none, with None.
         """
         flanges = self._flanges_of(poses, frames)
         if self.arm is None or flanges is None:
@@ -149,7 +149,7 @@ class Resolver:
         return [*chain, None] if len(chain) < len(flanges) else list(chain)
 
     def _solve_next(self) -> None:
-        """Solve the next motion, and with it those behind it that are lines and arcs to poses."""
+        """Solve the next motion, and with it those after it that are lines and arcs to poses."""
         first = len(self._solved)
         motion, pose_before = self.motions[first]
         near = self.joints_after(first - 1)
@@ -629,12 +629,12 @@ def ascii_text(text: str) -> str:
 
 
 def fixed(value: float, digits: int) -> str:
-    """A number with so many digits behind the point, never -0."""
+    """A number with so many digits after the point, never -0."""
     return f"{round(value, digits) + 0.0:.{digits}f}"
 
 
 def short(value: float, digits: int = 6) -> str:
-    """A number with up to so many digits behind the point, at least one."""
+    """A number with up to so many digits after the point, at least one."""
     text = fixed(value, digits).rstrip("0")
     return text + "0" if text.endswith(".") else text
 

@@ -319,7 +319,7 @@ def _judged(task: GraspTask, candidates: list[_Candidate], poses: int) -> tuple[
 
 
 def _ratio(value: Reals, needed: float) -> Reals:
-    """How many times a margin is what is asked; infinite where nothing is."""
+    """A margin divided by the required one; infinite where none is required."""
     return np.asarray(value) / needed if needed > 0 else np.full(np.shape(value), np.inf)
 
 

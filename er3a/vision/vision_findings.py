@@ -124,7 +124,7 @@ class LittleMotion(Finding):
 
 
 class FewSamples(Finding):
-    """So few samples that none is judged by the others, and that their scatter is hardly known."""
+    """Too few samples to judge one by the others, or to know their scatter well."""
 
     samples: int
 

@@ -396,7 +396,7 @@ def _base_turned(robot: Robot) -> Reals:
 
 
 def _one_row_down(robot: Robot) -> Robot:
-    """The table as Craig would write it: a and alpha of row i behind joint i stand in row i + 1."""
+    """The table as Craig would write it: a and alpha of row i, after joint i, are in row i + 1."""
     a, alpha = (np.concatenate([[0.0], values[:-1]]) for values in (robot.a, robot.alpha))
     return robot.replace(convention="modified", a=a, alpha=alpha)
 

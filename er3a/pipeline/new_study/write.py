@@ -592,7 +592,7 @@ def write_study(arm: Arm, folder: Path) -> WrittenStudy:
     Raises
     ------
     Er3aError
-        a file stands where one would be written; then nothing is written
+        a file exists where one would be written; then nothing is written
     """
     name = arm.robot.name
     own = (f"data/{kind}/{name}.yaml" for kind in ("robots", "targets", "paths"))

@@ -467,7 +467,7 @@ class Settings(NamedTuple):
 
 
 def _set_alone(code: tuple[syntax.Operation, ...], number: str, frame: str) -> bool:
-    """Whether somewhere a variable is set and another is not, right before or behind it."""
+    """Whether somewhere a variable is set and another is not, right before or after it."""
     names = [variable_of(each.target) if isinstance(each, syntax.Assign) else "" for each in code]
     return any(
         name == number and frame not in names[max(i - BESIDE, 0) : i + BESIDE + 1] for i, name in enumerate(names)

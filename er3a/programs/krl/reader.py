@@ -327,7 +327,7 @@ def _interrupt(reading: _Statement) -> None:
 
 
 def _do(reading: _Statement) -> None:
-    """A routine behind DO, which runs whenever a condition holds; or an assignment of a TRIGGER."""
+    """A routine after DO, which runs whenever a condition holds; or an assignment of a TRIGGER."""
     asked = re.search(r"(?i)\bDO\b(.*?)(\bPRIO\s*=.*)?$", reading.text)
     if asked is None:
         raise MisreadError("expected DO")

@@ -146,7 +146,7 @@ class RapidWords(Words):
     def arguments(
         self, close: str = ")"
     ) -> tuple[tuple[syntax.Expression | None, ...], tuple[tuple[str, syntax.Expression], ...]]:
-        """Arguments by place and, behind a backslash, by name; a name alone is a switch."""
+        """Arguments by place and, after a backslash, by name; a name alone is a switch."""
         placed: list[syntax.Expression | None] = []
         named: list[tuple[str, syntax.Expression]] = []
         first = self.at
@@ -650,7 +650,7 @@ class _BodyReader:
         )
 
     def forget_changed(self, place: Place, expression: syntax.Expression, text: str) -> None:
-        """What a function in an expression changes has no known value behind it."""
+        """What a function in an expression changes has no known value after it."""
         for each in syntax.inner(expression):
             self.forget_changed(place, each, text)
         if isinstance(expression, syntax.Invocation) and expression.function in CHANGING_FUNCTIONS:

@@ -325,7 +325,7 @@ class _Pou:
 
 
 def _with_sides(elements: list[XmlNode]) -> Iterator[tuple[XmlNode, list[tuple[str, str]]]]:
-    """Elements of a body; an ``if`` with its sides, which the ``elsif`` and ``else`` behind it are among."""
+    """Elements of a body; an ``if`` with its sides, which the ``elsif`` and ``else`` after it are among."""
     at = 0
     while at < len(elements):
         first, behind = elements[at], at + 1

@@ -430,7 +430,7 @@ def _joints(value: syntax.Value) -> Reals | None:
 def _of_position(memory: ProgramMemory, name: str, given: dict[str, syntax.Value]) -> syntax.Value | None:
     """Functions of where the arm is, and of its table.
 
-    Behind a motion with a blend radius the program goes on where the arm enters it [1]_, so that what it reads of the
+    After a motion with a blend radius the program goes on where the arm enters it [1]_, so that what it reads of the
     arm is not known; the waypoint is.
 
     References
@@ -462,7 +462,7 @@ def _of_position(memory: ProgramMemory, name: str, given: dict[str, syntax.Value
 
 
 def _changed(values: list[syntax.Value | None], unclear: syntax.Unclear) -> syntax.Value:
-    """A list behind one of its methods, whose name is the second argument."""
+    """A list after one of its methods, whose name is the second argument."""
     found, name, *more = (syntax.Unclear("") if each is None else each for each in values)
     if isinstance(found, tuple) and len(found) < LONGEST_LIST:
         if name == "append" and len(more) == 1:

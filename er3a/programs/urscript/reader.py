@@ -189,7 +189,7 @@ class _UrReader:
                     yield NotUnderstood(each.text, each.place)
 
     def _statements(self) -> Iterator[tuple[Place, str, str]]:
-        """Statements with their first line: lines are joined while a bracket is open, or behind an operator."""
+        """Statements with their first line: lines are joined while a bracket is open, or after an operator."""
         parts: list[str] = []
         depth, first = 0, 0
         for number, line in enumerate(self.source.lines, 1):
