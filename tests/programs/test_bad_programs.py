@@ -51,7 +51,7 @@ LIMITS = RunLimits(operations=20_000, ways=50, rounds=20)
         ("a.src", "", "is empty"),
         ("a.src", "DEF a( )\nFOR i=1 TO\nENDFOR\nEND\n", "line 2: this FOR can't be read"),
         ("a.src", "DEF a( )\nSWITCH i\nCASE {\nENDSWITCH\nEND\n", "line 3: this CASE can't be read"),
-        ("a.txt", "hello\n", "no program that is known"),
+        ("a.txt", "hello\n", "not a known robot program"),
         ("a.dat", "DEFDAT A\nENDDAT\n", "Give its .src file"),
     ],
 )

@@ -57,7 +57,7 @@ BENT_POINTS = 120
 GROWTH = 1.4
 HALVINGS = 12
 MAX_SIDES = 8
-FARTHEST: dict[Kind, float] = {"shift": 0.5, "tilt": 1.0}  # of the characteristic length; rad
+MAX_BEND: dict[Kind, float] = {"shift": 0.5, "tilt": 1.0}  # of the characteristic length; rad
 SAME_TIME = 0.01  # s
 SPARE = 1.0005  # keep this much more than the distance
 
@@ -249,11 +249,11 @@ def _least(
     span: tuple[float, float, float],
     direction: Reals,
 ) -> Bend | None:
-    """The smallest bend in a direction (6,) that keeps the distance; None if none up to FARTHEST does."""
+    """The smallest bend in a direction (6,) that keeps the distance; None if none up to MAX_BEND does."""
     path = segment.followed.line
     grid = np.unique(np.concatenate([np.linspace(span[0], span[2], BENT_POINTS), [span[1]]]))
     kind: Kind = "shift" if direction[:3].any() else "tilt"
-    most = FARTHEST[kind] * (characteristic_length(segment.robot) if kind == "shift" else 1.0)
+    most = MAX_BEND[kind] * (characteristic_length(segment.robot) if kind == "shift" else 1.0)
 
     def bend(size: float) -> Bend:
         return Bend(*span, size * direction[:3], size * direction[3:])
@@ -277,8 +277,8 @@ def _least(
 
 def _none_far_enough(segment: avoidance.SingularSegment, kind: Kind) -> avoidance.NotPossible:
     if kind == "shift":
-        return avoidance.NoShiftKeepsDistance(FARTHEST["shift"] * characteristic_length(segment.robot) * 1000)
-    return avoidance.NoTiltKeepsDistance(float(np.degrees(FARTHEST["tilt"])))
+        return avoidance.NoShiftKeepsDistance(MAX_BEND["shift"] * characteristic_length(segment.robot) * 1000)
+    return avoidance.NoTiltKeepsDistance(float(np.degrees(MAX_BEND["tilt"])))
 
 
 STEPS = 1000
