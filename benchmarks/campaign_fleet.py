@@ -32,7 +32,7 @@ from testing.fleet_study import MET, at_most, round_trip, singular_joints, small
 POSES, INVERSE_POSES = 100, 5
 EXACT = 1e-9  # m, rad, m/rad
 SAME_JOINTS, SAME_AT_SINGULAR = 1e-6, 1e-5
-MOST_SECONDS = 240  # for one arm
+MAX_SECONDS = 240  # for one arm
 
 
 EVERY = 1000 // sized(1000)  # arm is tried; all of them at full size
@@ -76,7 +76,7 @@ def table() -> str:
         f"than {MET:g}; URDF export and import give the same arm; of the first arm of each class and number",
         "of joints the study that `er3a new` writes is computed in all stages and shown on pages",
         f"({studied} studies, small budgets). A stage that says why it does not apply passes, one that breaks not.",
-        f"{MOST_SECONDS} s are the most that an arm may take. {len(refused)} could not be read.",
+        f"{MAX_SECONDS} s are the most that an arm may take. {len(refused)} could not be read.",
         "",
         "| arm | joints | class | forward off | Jacobian off | joints found again | stages | failed |",
         "|---|---|---|---|---|---|---|---|",
@@ -185,7 +185,7 @@ def _common(robot: Robot, outcome: Outcome, folder: Path) -> None:
 
 
 def _through(robot: Robot, outcome: Outcome, folder: Path) -> None:
-    with at_most(MOST_SECONDS):
+    with at_most(MAX_SECONDS):
         path = folder / f"{robot.name}.yaml"
         write_robot(robot, path)
         check_file(path)

@@ -7,13 +7,13 @@ import time
 from pathlib import Path
 
 from testing.evidence import sized
-from testing.file_judge import MOST_SECONDS, run
+from testing.file_judge import MAX_SECONDS, run
 from testing.input_files import seeds
 
 SEED, MUTANTS = 20261120, sized(3000)
 KINDS = {
     "traceback": "a traceback, or a warning of a library",
-    "hang": f"more than {MOST_SECONDS:g} s of processor time",
+    "hang": f"more than {MAX_SECONDS:g} s of processor time",
     "message": "a message of more than one line, too long, or without the file's name",
     "read otherwise": "accepted, and read as other numbers or words than are written",
 }

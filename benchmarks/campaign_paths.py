@@ -16,7 +16,7 @@ from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import characteristic_length, conditioning, determinant_factors
 from er3a.planning.avoidance.avoidance import singular_segment
-from er3a.planning.avoidance.strategies import STRATEGIES, best, compare
+from er3a.planning.avoidance.strategies import STRATEGIES, best, compare_strategies
 from er3a.planning.follow import follow
 from er3a.planning.motion_faults import singular_events
 from er3a.planning.moves import line
@@ -65,7 +65,7 @@ def avoidance_rows(robot, random) -> list[str]:
         if not events:
             continue
         count += 1
-        results = compare(singular_segment(followed, NEAR, limits, events, fixed_start=True))
+        results = compare_strategies(singular_segment(followed, NEAR, limits, events, fixed_start=True))
         for result in results:
             if (cost := result.cost) and (not result.reasons or result.name == "stop"):
                 cells = cost.distance.max() * 1000, np.degrees(cost.angle.max()), cost.motion.duration

@@ -21,7 +21,7 @@ REPEATABILITY = {"ur5": 0.1, "wam": 2.0}
 SPLITS, SEED = sized(400), 20261123
 TRIED_PARTS = {False: sized(PARTS), True: sized(PARTS // 2)}
 DRAWS, DRAWN = 2000, (20, 40)
-MOST_WORST_MM, MOST_MEAN_MM = 0.16, 0.1
+MAX_WORST_MM, MAX_MEAN_MM = 0.16, 0.1
 NEAREST = 4
 
 
@@ -63,10 +63,10 @@ def table() -> str:
         "terms are, without the others. The table alone, and with these: mean distance at all poses, which it is",
         "fitted to, and left out (tenths at random and neighbourhoods; the choice of terms has seen all of them).",
         "Chosen anew: the poses left out at random above, by calibrations that have not seen them at all; their mean,",
-        f"and of {DRAWS} times {many} of them, drawn from all, the share whose own mean is at most {MOST_MEAN_MM} mm.",
+        f"and of {DRAWS} times {many} of them, drawn from all, the share whose own mean is at most {MAX_MEAN_MM} mm.",
         "",
         "| arm | coupling (1/1000) | table alone: fitted | left out | far away "
-        f"| with coupling: fitted | left out | far away | chosen anew | means of {many} <= {MOST_MEAN_MM} |",
+        f"| with coupling: fitted | left out | far away | chosen anew | means of {many} <= {MAX_MEAN_MM} |",
         "|---|---|---|---|---|---|---|---|---|---|",
         *(_file_row(name, found[name], runs[name, False], many) for name in ARMS),
         "",
@@ -74,11 +74,11 @@ def table() -> str:
         "",
         "If what remains were noise of one size in three coordinates, distances would be as Maxwell's distribution has",
         "them. Worst of all poses as found and as its median is for noise of that size; the median of the worst of",
-        f"{few} and of {many} poses drawn from these, and how often it is at most {MOST_WORST_MM} mm in {DRAWS} draws;",
+        f"{few} and of {many} poses drawn from these, and how often it is at most {MAX_WORST_MM} mm in {DRAWS} draws;",
         "of the 10 worst poses how many are among the 10 worst by the other models (robot file, plain fit).",
         "",
-        f"| arm | model | poses | worst | worst by noise | of {few} | <= {MOST_WORST_MM} | of {many} "
-        f"| <= {MOST_WORST_MM} | 10 worst: robot file | plain fit |",
+        f"| arm | model | poses | worst | worst by noise | of {few} | <= {MAX_WORST_MM} | of {many} "
+        f"| <= {MAX_WORST_MM} | 10 worst: robot file | plain fit |",
         "|---|---|---|---|---|---|---|---|---|---|---|",
         *(line for name in ARMS for line in _worst_rows(name, runs[name, False], (few, many))),
         "",
@@ -174,7 +174,7 @@ def _worst_rows(name: str, run: Unseen, sizes: tuple[int, ...]) -> list[str]:
         size = float(np.sqrt((distances**2).mean() / 3))
         by_noise = size * scipy.stats.maxwell.ppf(0.5 ** (1 / len(distances)))
         drawn = [[random.choice(distances, count, replace=False).max() for _ in range(DRAWS)] for count in sizes]
-        of_few = " | ".join(f"{np.median(w):.3f} | {np.mean(np.array(w) <= MOST_WORST_MM):.1%}" for w in drawn)
+        of_few = " | ".join(f"{np.median(w):.3f} | {np.mean(np.array(w) <= MAX_WORST_MM):.1%}" for w in drawn)
         shared = " | ".join(str(len(worst[model] & worst[other])) for other in ("robot file", "plain fit"))
         rows.append(
             f"| {TITLES[name]} | {model} | {len(distances)} | {distances.max():.3f} "
@@ -196,7 +196,7 @@ def _file_row(name: str, found: Calibration, run: Unseen, count: int) -> str:
         else "– | – | –"
         for each in (alone, found)
     ]
-    share = np.mean(np.array(means) <= MOST_MEAN_MM)
+    share = np.mean(np.array(means) <= MAX_MEAN_MM)
     return f"| {TITLES[name]} | {ratios} | {' | '.join(errors)} | {run.table.mean():.4f} | {share:.1%} |"
 
 

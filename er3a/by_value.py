@@ -147,8 +147,8 @@ def _restored(kind: type[Any], held: dict[str, Any], read_only: list[str]) -> An
     return found
 
 
-MOST_ROWS = 16
-MOST_LETTERS = 120
+MAX_ROWS = 16
+MAX_LETTERS = 120
 ABSENT = "-"
 
 
@@ -198,7 +198,7 @@ class Displayed(ABC):
 
 def first_rows(rows: Iterable[Sequence[Any]], count: int) -> tuple[tuple[tuple[str, ...], ...], int]:
     """The first rows of a table of so many as texts, and the number of those left out."""
-    shown = tuple(tuple(shortly(value) for value in row) for row in islice(rows, MOST_ROWS))
+    shown = tuple(tuple(shortly(value) for value in row) for row in islice(rows, MAX_ROWS))
     return shown, max(count - len(shown), 0)
 
 
@@ -216,7 +216,7 @@ def shortly(value: Any) -> str:
         values = [f"{each.name}={shortly(getattr(value, each.name))}" for each in fields(value) if each.name != "code"]
         return _cut(value.code + (f" ({', '.join(values)})" if values else ""))
     if isinstance(value, tuple | list):
-        return _cut(", ".join(shortly(each) for each in islice(value, MOST_ROWS)) or ABSENT)
+        return _cut(", ".join(shortly(each) for each in islice(value, MAX_ROWS)) or ABSENT)
     return _cut(str(value))
 
 
@@ -255,7 +255,7 @@ def _left_out(sheet: Sheet) -> tuple[str, ...]:
 
 def _cut(text: str) -> str:
     text = "".join(letter if letter.isprintable() else " " for letter in text)
-    return text if len(text) <= MOST_LETTERS else text[: MOST_LETTERS - 3] + "..."
+    return text if len(text) <= MAX_LETTERS else text[: MAX_LETTERS - 3] + "..."
 
 
 @dataclass_transform(frozen_default=True)

@@ -16,7 +16,7 @@ KINDS = ("generic", "industrial", "offset_wrist", "parallel", "coincident", "nea
 LENGTHS_M, ANGLES_DEG = (6e-4, 2e-3, 0.01, 0.08, 0.3), (0.2, 0.5, 2.0, 15.0, 37.0, 90.0)
 POSES = 24
 STEP = 1e-6
-LEAST_SEEN = 0.2, 0.06  # of what an entry, a length or an angle, changes of the flange by itself
+MIN_SEEN = 0.2, 0.06  # of what an entry, a length or an angle, changes of the flange by itself
 ALIKE = 1 - 1e-5
 
 
@@ -197,7 +197,7 @@ def _known(entries: Sequence[tuple[str, int]], effect: np.ndarray, chosen: Seque
     for i in chosen:
         rest = effect[:, [j for j in chosen if j != i]]
         left = effect[:, i] - rest @ np.linalg.lstsq(rest, effect[:, i], rcond=None)[0]
-        least = LEAST_SEEN[0 if entries[i][0] in ("a", "d") else 1] * np.sqrt(POSES)
+        least = MIN_SEEN[0 if entries[i][0] in ("a", "d") else 1] * np.sqrt(POSES)
         if np.linalg.norm(left) < max(least, 0.1 * np.linalg.norm(effect[:, i])):
             return False
     return True

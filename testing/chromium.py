@@ -24,7 +24,7 @@ SWITCHES = (
 
 
 def lacking() -> str | None:
-    """Why there is no browser to test in; None if there is one."""
+    """Why no browser is available for tests; None if one is."""
     return None if _binary() and shutil.which("chromedriver") else "no Chromium with chromedriver on this machine"
 
 

@@ -3,7 +3,7 @@
 A page tells of the code that it was made from, and says which that is: version, commit, date. It is not made again
 with every edit; ``make campaigns`` makes those pages again since whose commit code, data or studies have changed.
 
-make release-check            an error if the papers of a release disagree; lists pages that tell of other code
+make release-check            an error if the papers of a release disagree; lists pages about other code
 """
 
 from __future__ import annotations
@@ -127,7 +127,7 @@ def papers_out_of_order(root: Path = ROOT) -> tuple[str, ...]:
 
 
 def main() -> int:
-    """Of a release: list the pages that tell of other code; 1 if its papers disagree."""
+    """Of a release: list the pages about other code; 1 if its papers disagree."""
     for each in evidence():
         if not is_of_this_code(each):
             print(f"{each.page.relative_to(ROOT)} ({each.campaign}) tells of {each.commit or 'code that it names not'}")

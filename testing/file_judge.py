@@ -42,7 +42,7 @@ from er3a.pipeline.check import check_file
 from er3a.pipeline.study import load_study
 from testing.input_files import mutants
 
-MOST_SECONDS = 5.0  # of processor time, for one file
+MAX_SECONDS = 5.0  # of processor time, for one file
 LONGEST_MESSAGE = 1000
 NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?")
 WORDS_OF = {None: ("", "~", "null", "Null", "NULL"), True: ("true", "yes", "on"), False: ("false", "no", "off")}
@@ -50,7 +50,7 @@ WORDS_OF = {None: ("", "~", "null", "Null", "NULL"), True: ("true", "yes", "on")
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a damaged file; ``fault`` is None if that is as it should be."""
+    """The outcome for a damaged file; ``fault`` is None if it is correct."""
 
     accepted: bool
     seconds: float
@@ -61,7 +61,7 @@ def judge(path: Path) -> Outcome:
     """Check a file and look for what must not happen: a traceback, a hang, an unclear message, other numbers."""
     start = time.process_time()
     before = signal.signal(signal.SIGVTALRM, _stop)
-    signal.setitimer(signal.ITIMER_VIRTUAL, MOST_SECONDS)
+    signal.setitimer(signal.ITIMER_VIRTUAL, MAX_SECONDS)
     accepted, fault = False, None
     try:
         with warnings.catch_warnings(action="error"):
@@ -70,7 +70,7 @@ def judge(path: Path) -> Outcome:
     except InputError as error:
         fault = unclear(str(error), path)
     except TimeoutError:
-        fault = f"hang: more than {MOST_SECONDS:g} s"
+        fault = f"hang: more than {MAX_SECONDS:g} s"
     except Exception:  # whatever else comes out is what the campaign looks for
         fault = "traceback: " + " / ".join(traceback.format_exc().strip().splitlines()[-3:])
     finally:

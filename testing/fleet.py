@@ -95,7 +95,7 @@ def urdf_files(folder: Path, wanted: Callable[[str], bool] = lambda name: True) 
 
     Parameters
     ----------
-    wanted : whether a file is, by its name
+    wanted : whether to take a file, by its name
     """
     shared = Path(str(find_spec("pinocchio").origin)).parents[4] / "share" / "example-robot-data" / "robots"
     for path in sorted(shared.rglob("*.urdf")):

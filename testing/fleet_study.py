@@ -112,7 +112,7 @@ def small_study(robot_file: Path, folder: Path) -> tuple[dict[str, str], list[st
         (name,) = study.robots
         verdicts, broken = {}, []
         for stage in STAGES.values():
-            if not stage.wanted(study, name):
+            if not stage.is_configured(study, name):
                 continue
             results, page = Path("results") / name / stage.name, Path("reports") / name / f"{stage.name}.html"
             with contextlib.redirect_stderr(io.StringIO()):

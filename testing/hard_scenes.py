@@ -10,7 +10,7 @@ from er3a.kinematics.chain import arm_length
 
 
 def hard_scenes(robot) -> dict[str, Scene]:
-    """The scenes, for an arm that stands on the floor at the origin."""
+    """The scenes, for an arm on the floor at the origin."""
     size = 2 * arm_length(robot)
     floor = Plane("floor", np.array([0.0, 0.0, 1.0]), -0.05 * size)
     return {

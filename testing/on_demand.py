@@ -1,4 +1,4 @@
-"""Results that are computed when a test first asks for them."""
+"""Results that are computed when a test first needs them."""
 
 from __future__ import annotations
 

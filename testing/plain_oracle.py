@@ -165,7 +165,7 @@ def _on_grid(
 
 def components(rows: Rows, said: Statement, at: np.ndarray | None = None) -> list[np.ndarray]:
     """Parts (H, k) by which tables are off a statement, in its half-widths, the length of each being what counts; none
-    for what says nothing of an arm's shape. ``at``: where extremes are read instead of being looked for."""
+    for what does not depend on an arm's shape. ``at``: where extremes are read instead of being looked for."""
     if said.kind in ("envelope", "reach"):
         return [_extent(rows, said, at)[0]]
     width = said.number("uncertainty_mm")
@@ -227,7 +227,7 @@ def _extent(rows: Rows, said: Statement, at: np.ndarray | None) -> tuple[np.ndar
 
 def off(rows: Rows, said: Statement) -> np.ndarray | None:
     """How far tables are off a statement (H,), in its half-widths, coordinate by coordinate the worst; None for what
-    says nothing of an arm's shape."""
+    does not depend on an arm's shape."""
     lengths = [np.linalg.norm(part, axis=1) for part in components(rows, said)]
     return np.max(lengths, axis=0) if lengths else None
 

@@ -1,4 +1,4 @@
-"""Simulated measurements of an arm that differs from its table, to see whether the intervals tell the truth."""
+"""Simulated measurements of an arm that differs from its table, to check the coverage of the intervals."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 LONGEST_FUNCTION = 80
-MOST_POSITIONAL = 6
+MAX_POSITIONAL = 6
 IN_EVERY_STAGE = {"entry", "model", "compute", "played", "record", "report"}
 IN_EVERY_LANGUAGE = {"language", "reader", "dialect", "writer"}
 LANGUAGES = "er3a/programs"  # a folder of it is a language of robot programs
@@ -69,7 +69,7 @@ def test_no_function_is_long():
 
 def test_no_function_takes_many_positional_arguments():
     taken = {place: [each.arg for each in (*node.args.posonlyargs, *node.args.args)] for place, node in functions()}
-    many = {place for place, names in taken.items() if len({*names} - {"self", "cls"}) > MOST_POSITIONAL}
+    many = {place for place, names in taken.items() if len({*names} - {"self", "cls"}) > MAX_POSITIONAL}
     assert many == set()
 
 

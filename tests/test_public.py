@@ -32,7 +32,7 @@ from er3a.robots.usable import check_robot
 
 PACKAGE = Path(er3a.__file__).parent
 Q = np.radians([20, 10, 15, 30, 40, 50])
-MOST_LETTERS = 4000
+MAX_LETTERS = 4000
 
 
 @pytest.fixture(scope="module")
@@ -336,14 +336,14 @@ def test_objects_show_themselves_in_a_few_lines_and_as_tables(shown):
         if not isinstance(each, Displayed | Measurement):
             continue
         text = repr(each)
-        assert len(text) < MOST_LETTERS, name
+        assert len(text) < MAX_LETTERS, name
         assert text.count("\n") < 40, name
         assert str(each) == text
         if isinstance(each, Displayed):
             cells = Cells()
             cells.feed(each._repr_html_())
             assert len(set(cells.rows)) <= 1, name
-            assert len(each._repr_html_()) < 2 * MOST_LETTERS, name
+            assert len(each._repr_html_()) < 2 * MAX_LETTERS, name
 
 
 COPIES: dict[str, Callable[[Any], Any]] = {

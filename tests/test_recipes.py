@@ -232,7 +232,7 @@ from er3a.pipeline.messages.trajectory import strategy_word
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.study import load_study
 from er3a.planning.avoidance.avoidance import singular_segment
-from er3a.planning.avoidance.strategies import compare
+from er3a.planning.avoidance.strategies import compare_strategies
 from er3a.planning.follow import follow
 from er3a.planning.moves import line
 from er3a.planning.timing import joint_limits
@@ -247,7 +247,7 @@ way = line(transform([0.4, -0.15, 0.65], forward), transform([0.4, 0.15, 0.65], 
 followed = follow(robot, way, np.linspace(0, 4, 400))
 near = NearSingular(float(np.radians(5)), float(np.radians(5)), 0.03)
 segment = singular_segment(followed, near, joint_limits(robot, np.radians([180] * 6), 0.25))
-(result,) = compare(segment, "wait")
+(result,) = compare_strategies(segment, "wait")
 assert result.cost.done == 0.1
 assert [reason.code for reason in result.reasons] == ["path_not_finished"]
 assert strategy_word("wait") == "wait"
@@ -446,13 +446,13 @@ class Turntable(WithoutParameters):
 
 
 @dataclass(frozen=True, eq=False)
-class PlanarFour('''
+class ScaraSolver('''
     edits = {
         "er3a/kinematics/classes/turntable.py": module,
         "er3a/kinematics/classes/class_solvers.py": (
             ('    "unsolved",\n]', '    "unsolved",\n    "turntable",\n]'),
             ('    "dependent": Arm', '    "turntable": ArmClassTraits(closed_form=True),\n    "dependent": Arm'),
-            ("@dataclass(frozen=True, eq=False)\nclass PlanarFour(", solver),
+            ("@dataclass(frozen=True, eq=False)\nclass ScaraSolver(", solver),
             (
                 "from er3a.kinematics.closed_form",
                 "from er3a.kinematics.classes.turntable import solve_turntable\nfrom er3a.kinematics.closed_form",

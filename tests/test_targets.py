@@ -222,7 +222,7 @@ def test_table_with_quaternion_off_unit_length_names_its_row(table):
 
 
 def test_table_with_more_rows_than_a_file_may_have_is_refused(table, monkeypatch):
-    monkeypatch.setattr("er3a.files.target_file.MOST_TARGETS", 2)
+    monkeypatch.setattr("er3a.files.target_file.MAX_TARGETS", 2)
     assert len(read_targets(table(TABLE))) == 2
     with pytest.raises(InputError, match=r"rows: 3 targets are too many"):
         read_targets(table(TABLE + "c,400,50,300,0,90,0,\n"))

@@ -486,7 +486,7 @@ def observed(
     """
     if isinstance(measurements, ReferenceSet):
         stated = [r for r in measurements.checkable if isinstance(r.quantity, PointCoordinate | SectionCoordinate)]
-        stated = [r for r in stated if r.authoritative] or stated
+        stated = [r for r in stated if r.is_authoritative] or stated
         expected, uncertainty = expected_of(stated)
         return QuantityObservations(quantities_of(stated), expected, HALF_WIDTH_TO_DEVIATION * uncertainty)
     check_poses(measurements, robot)

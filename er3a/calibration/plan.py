@@ -93,7 +93,7 @@ class Plan:
     proposals : poses, the one that adds most first
     beyond : where these go beyond the measured poses
     widths : of all numbers that are settled with the proposals, for the deviation stated or else 0.1 mm
-    undetermined_bars : bars of unknown length of which nothing can be said: by the table their points are no ball's
+    undetermined_bars : bars of unknown length that nothing determines: by the table their points don't lie on a sphere
     """
 
     settled: tuple[str, ...]

@@ -175,10 +175,10 @@ class Bodies:
         points: Reals = np.array([near[0] + sizes[0] * unit, near[1] - sizes[1] * unit])
         return points
 
-    def always_overlaps(self, pair: int, boxes: int = BOXES) -> bool:
+    def always_overlaps(self, pair: int) -> bool:
         """Whether a pair overlaps in all arms within the limits, proven."""
         box = np.stack([self.robot.lower, self.robot.upper])
-        return search_boxes(self.layout, pair, box, (True, 0.0), boxes, np.empty(box.shape[1]))[0] == FREE
+        return search_boxes(self.layout, pair, box, (True, 0.0), BOXES, np.empty(box.shape[1]))[0] == FREE
 
     def _depth(self, world: Reals, pair: int) -> float:
         cores = []

@@ -706,7 +706,7 @@ def search_boxes(
 RIM = 96  # points that represent a cylinder's rim, on a circle that lies around it
 STARTS = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)])
 EXACT_SHARE = 1e-12  # parts of the cores' size
-MOST_POINTS = 1000
+MAX_POINTS = 1000
 
 
 def overlap_depth(first: Reals, second: Reals) -> float:
@@ -718,7 +718,7 @@ def overlap_depth(first: Reals, second: Reals) -> float:
     corners = _farthest(first, second, STARTS)
     try:
         hull = scipy.spatial.ConvexHull(corners, incremental=True)
-        for _ in range(MOST_POINTS):
+        for _ in range(MAX_POINTS):
             nearest = hull.equations[hull.equations[:, 3].argmax()]
             beyond = _farthest(first, second, nearest[None, :3])
             reach = float(beyond[0] @ nearest[:3])

@@ -31,7 +31,7 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 
 Z_95 = 1.959963984540054
 POSES_A_ROUND = 8  # tried in a place in one round
-LEAST_EXTENT_M = 1e-4  # of what a tool point that stays in place is reported to reach
+MIN_EXTENT_M = 1e-4  # of what a tool point that stays in place is reported to reach
 DEPTH = 1e-3  # m; a move in which the arm may overlap by less than this, unproven, joins nothing
 LOOKS = 300  # arms looked at to prove one move
 
@@ -132,7 +132,7 @@ def find_places(
     T = forward(robot, space.q)
     points = T[:, :3, 3]
     corner = points.min(axis=0)
-    cell = max(float(np.ptp(points, axis=0).max()), LEAST_EXTENT_M) / across * (1 + 1e-9)
+    cell = max(float(np.ptp(points, axis=0).max()), MIN_EXTENT_M) / across * (1 + 1e-9)
     index, where, tries = np.unique(
         ((points - corner) / cell).astype(np.int64), axis=0, return_inverse=True, return_counts=True
     )

@@ -242,9 +242,7 @@ def _without_poor_guesses(robot: Robot, matrix: CollisionMatrix) -> CollisionMat
     return CollisionMatrix(tuple(rows), tuple(pair for pair, _ in kept), tuple(joined for _, joined in kept))
 
 
-def matrix_of(
-    robot: Robot, pairs: Sequence[tuple[Body, Body]], rules: Sequence[PairRule], boxes: int = BOXES
-) -> CollisionMatrix:
+def matrix_of(robot: Robot, pairs: Sequence[tuple[Body, Body]], rules: Sequence[PairRule]) -> CollisionMatrix:
     """Judge pairs of bodies of different links."""
     by_names: dict[tuple[str, str], list[tuple[Body, Body]]] = {}
     for first, second in pairs:
@@ -258,7 +256,7 @@ def matrix_of(
         if rule:
             found = [_allowed(robot, bodies)] if rule.rule == "allow" else [JudgedPair("watched", tuple(bodies))]
         else:
-            found = _together(robot, judged_pairs(robot, bodies, boxes), boxes)
+            found = _together(robot, judged_pairs(robot, bodies, BOXES), BOXES)
         rows.append(_row(*names, found, rule.reason if rule else ""))
         watched += [(pair, each.state == "joined") for each in found for pair in each.bodies]
     return CollisionMatrix(tuple(rows), tuple(pair for pair, _ in watched), tuple(joined for _, joined in watched))
@@ -272,7 +270,7 @@ def _allowed(robot: Robot, pairs: Sequence[tuple[Body, Body]]) -> JudgedPair:
     return JudgedPair("allowed", witness=q[meet.argmax()] if hidden else None)
 
 
-def judged_pairs(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: int = BOXES) -> list[JudgedPair]:
+def judged_pairs(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: int) -> list[JudgedPair]:
     """Judge pairs of bodies, the second on the link that is farther out."""
     flat = [body for pair in pairs for body in pair]
     layout = layout_of(robot, flat, [(2 * k, 2 * k + 1) for k in range(len(pairs))])
@@ -518,10 +516,10 @@ def _centres(robot: Robot, pair: tuple[Body, Body], q: Reals, hub: Reals | None)
 
 
 def _row(first: str, second: str, found: Sequence[JudgedPair], reason: str) -> MatrixRow:
-    """One row over all pairs of bodies of two links; the gravest of what watched ones are."""
+    """One row over all pairs of bodies of two links; the most serious state of the watched ones."""
     watched = [each for each in found if each.bodies or each.state == "overlaps"]
-    grave = ("overlaps", "meets", "undecided", "joined", "watched", "allowed", "never")
-    state = min((each.state for each in watched or found), key=grave.index)
+    by_severity = ("overlaps", "meets", "undecided", "joined", "watched", "allowed", "never")
+    state = min((each.state for each in watched or found), key=by_severity.index)
     witness = next((each.witness for each in found if each.witness is not None), None)
     bounds = [each.least for each in found if each.state == "never"]
     return MatrixRow(

@@ -36,7 +36,7 @@ LINK_SEARCH: dict[str, Any] = {
     "preprocess_resolution": 40,
 }
 """coacd's settings for a link: seconds of work, and few pieces, because all pairs of them are judged."""
-MOST_CORNERS = 64  # of a piece
+MAX_CORNERS = 64  # of a piece
 AGREE = 2e-5  # m, tolerance of the bound of what extends beyond
 CUTS = 12
 FINEST = 4_000_000  # triangles looked at in all
@@ -136,19 +136,19 @@ def _split(vertices: Reals, faces: Integers, seed: int, **settings: Any) -> tupl
     coacd.set_log_level("error")
     middle, size = vertices.mean(axis=0), float(np.ptp(vertices, axis=0).max())
     mesh = coacd.Mesh((vertices - middle) / size, faces)
-    parts = coacd.run_coacd(mesh, seed=seed, decimate=True, max_ch_vertex=MOST_CORNERS, **settings)
+    parts = coacd.run_coacd(mesh, seed=seed, decimate=True, max_ch_vertex=MAX_CORNERS, **settings)
     return tuple(_corners(np.asarray(points) * size + middle) for points, _ in parts)
 
 
 def hull_of(points: Reals) -> ConvexPieces:
-    """The hull of points (n, 3), m, with at most ``MOST_CORNERS`` of its corners: the outermost ones.
+    """The hull of points (n, 3), m, with at most ``MAX_CORNERS`` of its corners: the outermost ones.
 
     What the corners left out stand out by is the margin; the excess is not that of a mesh, but 0: corners are points.
     """
     corners = _corners(points)
-    if len(corners) <= MOST_CORNERS:
+    if len(corners) <= MAX_CORNERS:
         return ConvexPieces((corners,), 0.0, 0.0)
-    kept = _corners(corners[np.unique((fibonacci_sphere(MOST_CORNERS) @ corners.T).argmax(axis=1))])
+    kept = _corners(corners[np.unique((fibonacci_sphere(MAX_CORNERS) @ corners.T).argmax(axis=1))])
     away = np.empty(len(corners))
     distances_from_hull(corners, kept, away)
     return ConvexPieces((kept,), float(away.max()) + ROUNDING, 0.0)

@@ -126,7 +126,7 @@ def _outside(robot: Robot, shapes: ArmShapes, points: Reals, link: int, beside: 
 
 
 def shapes_assumed(robot: Robot, margin: float, clearances: Mapping[str, float | None]) -> ShapesAssumed | None:
-    """What is to be said of collisions where the arm's shapes are assumed; None where a document that
+    """The remark on collisions where the arm's shapes are assumed; None where a document that
     verdicts rest on gives them.
 
     Parameters

@@ -18,6 +18,7 @@ import scipy
 
 from er3a.by_value import ByValue
 from er3a.comparison import mechanism
+from er3a.comparison.mechanism import TOLERANCE_DEG, TOLERANCE_MM
 from er3a.errors import RobotError
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.chain import row_values
@@ -90,7 +91,7 @@ class GeometryLayer:
 @dataclass(frozen=True)
 class ZeroLayer:
     """By row what B's offset is more than A's (deg; mm of joints that slide); 0 of the first and the last row, whose
-    zeros can't be distinguished from base and flange. ``causes`` : the one slip in A that explains them all."""
+    zeros can't be distinguished from base and flange. ``causes`` : the one mistake in A that explains them all."""
 
     same: bool
     offsets_deg: tuple[float, ...]
@@ -99,7 +100,7 @@ class ZeroLayer:
 
 @dataclass(frozen=True)
 class DirectionLayer:
-    """Numbers of the rows that B moves the other way. ``causes`` : the one slip in A's table that does so, where no
+    """Numbers of the rows that B moves the other way. ``causes`` : the one mistake in A's table that does so, where no
     zero differs."""
 
     same: bool
@@ -188,7 +189,9 @@ class Comparison(ByValue):
         return len(self.geometry.differences) if self.geometry else 1000
 
 
-def compare(robot_a: Robot, robot_b: Robot, *, tolerance_mm: float = 0.5, tolerance_deg: float = 0.1) -> Comparison:
+def compare(
+    robot_a: Robot, robot_b: Robot, *, tolerance_mm: float = TOLERANCE_MM, tolerance_deg: float = TOLERANCE_DEG
+) -> Comparison:
     """Compare two arms: geometry, zero, directions, base, flange, couplings, then limits and speeds.
 
     Parameters
@@ -229,14 +232,14 @@ def _compared(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances, 
         found.invariants,
         1000 * found.unexplained,
     )
-    moved = np.abs(found.zeros) > np.where(a.sliding, tolerances.length, tolerances.angle)
+    moved = tolerances.exceeded(found.zeros, a.sliding)
     scale = np.where(a.sliding, 1000.0, np.degrees(1.0))
     turned = same and explain and bool(moved.any() or found.reverses.any())
-    slips = tuple(_causes_of_zeros(robot_a, b, found, tolerances)) if turned else ()
-    zero = ZeroLayer(not moved.any(), tuple((scale * found.zeros).tolist()), slips if moved.any() else ())
+    mistakes = tuple(_causes_of_zeros(robot_a, b, found, tolerances)) if turned else ()
+    zero = ZeroLayer(not moved.any(), tuple((scale * found.zeros).tolist()), mistakes if moved.any() else ())
     reverses, coupled = _joints_paired(robot_a, robot_b, found)
     reversed_rows = tuple((np.flatnonzero(found.reverses) + 1).tolist())
-    directions = DirectionLayer(not reversed_rows, reversed_rows, () if moved.any() else slips)
+    directions = DirectionLayer(not reversed_rows, reversed_rows, () if moved.any() else mistakes)
     base, flange = (_placement(T, tolerances) for T in (found.base, found.flange))
     joint_zeros = _joint_zeros(robot_a, found)
     limits = _limits(robot_a, robot_b, reverses, joint_zeros, tolerances)
@@ -251,7 +254,11 @@ def _compared(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances, 
 
 
 def best_of(
-    robot: Robot, others: Mapping[str, Robot], *, tolerance_mm: float = 0.5, tolerance_deg: float = 0.1
+    robot: Robot,
+    others: Mapping[str, Robot],
+    *,
+    tolerance_mm: float = TOLERANCE_MM,
+    tolerance_deg: float = TOLERANCE_DEG,
 ) -> list[tuple[str, Comparison]]:
     """A robot compared with several, the one that fits best first: fewest entries, then the smallest differences.
 
@@ -281,10 +288,13 @@ def _other_kinds(robot: Robot, kinds: Reals) -> GeometryLayer:
     return GeometryLayer(False, 0.0, 0.0, found)
 
 
+ANGLES = "alpha", "beta", "theta"
+
+
 def _named(robot: Robot, found: mechanism.EntryDifference) -> Difference:
     """A difference by its name, values and unit in A's own table."""
     column, link = found.column, found.link
-    angle = column in ("alpha", "beta", "theta")
+    angle = column in ANGLES
     scale = np.degrees(1.0) if angle else 1000.0
     one, other = (float(np.round(scale * value, 6)) + 0.0 for value in (found.one, found.other))
     alike = tuple(_name(robot, *each) for each in found.alike)
@@ -455,7 +465,7 @@ def _causes(
 
 
 def _repaired(robot: Robot, other: Robot) -> Iterator[tuple[CauseCode, float | None, str, Columns]]:
-    """The columns of a table with one slip undone throughout; how many rows or times, and of which columns or unit."""
+    """The columns of a table with one mistake undone throughout; how many rows or times, of which columns or unit."""
     a, d, alpha = robot.a, robot.d, robot.alpha
     yield "a_and_d_swapped", None, "", {"a": d, "d": a}
     yield "other_convention", None, "", {"convention": "modified" if robot.convention == "standard" else "standard"}
@@ -492,14 +502,14 @@ def _ratios(one: mechanism.Mechanism, other: mechanism.Mechanism) -> list[float]
 def _causes_of_zeros(
     robot: Robot, b: mechanism.Mechanism, found: mechanism.Match, tolerances: mechanism.Tolerances
 ) -> Iterator[Cause]:
-    """The one slip in the first table that explains why zeros or directions differ, where geometry agrees."""
+    """The one mistake in the first table that explains why zeros or directions differ, where geometry agrees."""
     offset, zeros = robot.offset, np.where(robot.sliding, 0.0, found.zeros)
     inner = [k for k in range(1, robot.rows - 1) if not robot.sliding[k]]
     if not found.reverses.any() and (np.abs(zeros) > tolerances.angle).sum() > 1:
-        slips: list[tuple[CauseCode, float | None, str, Reals]] = [("offsets_negated", None, "", -offset)]
-        slips += [("angle_unit", scale, f"offset, {unit}", offset * scale) for unit, scale in ANGLE_UNITS.items()]
-        slips += [("rows_shifted", float(rows), "offset", np.roll(offset, rows)) for rows in (1, -1)]
-        for code, amount, unit, meant in slips:
+        mistakes: list[tuple[CauseCode, float | None, str, Reals]] = [("offsets_negated", None, "", -offset)]
+        mistakes += [("angle_unit", scale, f"offset, {unit}", offset * scale) for unit, scale in ANGLE_UNITS.items()]
+        mistakes += [("rows_shifted", float(rows), "offset", np.roll(offset, rows)) for rows in (1, -1)]
+        for code, amount, unit, meant in mistakes:
             left = np.abs(wrap_to_pi(meant - offset - zeros)[inner])
             if left.max() < tolerances.angle and np.abs(wrap_to_pi(meant)[inner]).max() > tolerances.angle:
                 yield Cause(code, "a", (), amount, unit)
@@ -546,10 +556,10 @@ def _corrected(
     named = "a", "alpha", "beta", "d", "offset", "direction"
     columns: dict[str, Any] = {key: np.array(getattr(robot_a, key)) for key in named}
     for each in found.differences:
-        angle = each.column in ("alpha", "beta", "theta")
+        angle = each.column in ANGLES
         column = "offset" if each.column == "theta" else each.column
         columns[column][_row_of(robot_a, column, each.link)] = _rounded(each.other, angle)
-    moved = np.abs(found.zeros) > np.where(robot_a.sliding, tolerances.length, tolerances.angle)
+    moved = tolerances.exceeded(found.zeros, robot_a.sliding)
     columns["direction"] = np.where(found.reverses, -1.0, 1.0) * robot_a.direction
     for k in np.flatnonzero(moved).tolist():
         column = "d" if robot_a.sliding[k] else "offset"

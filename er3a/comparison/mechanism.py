@@ -46,19 +46,26 @@ Parts = tuple[Reals, Reals, Reals]
 EXACTLY_PARALLEL = 1e-5  # rad; below it a common normal has no digits left
 NEARLY_PARALLEL = math.radians(3.0)
 ON_AXIS = 1e-9  # m
-MOST_SENSES = 6
-MOST_ENTRIES = 4
+MAX_SENSES = 6
+MAX_ENTRIES = 4
 TURNED_END = 2  # joints reversed, that a base or flange turned counts for
 HALF_TURN = rot_x(math.pi)
-HALF_TURN_AT_MOST = math.radians(185.0)
+MAX_HALF_TURN = math.radians(185.0)
+
+
+TOLERANCE_MM, TOLERANCE_DEG = 0.5, 0.1
 
 
 @dataclass(frozen=True)
 class Tolerances:
     """By how much entries may differ and still agree: m and rad."""
 
-    length: float = 0.5e-3
-    angle: float = math.radians(0.1)
+    length: float = TOLERANCE_MM / 1000
+    angle: float = math.radians(TOLERANCE_DEG)
+
+    def exceeded(self, zeros: Reals, sliding: Flags) -> Flags:
+        """Which zeros (m,), rad or m, of rows that turn or slide, differ by more."""
+        return np.asarray(np.abs(zeros) > np.where(sliding, self.length, self.angle))
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,7 +264,7 @@ def _likely_senses(
         extra = extra + _ends_turned(one, other, senses, turned, tolerances)
     order = np.argsort(np.floor(total) + 0.01 * extra + 1e-3 * (total % 1), kind="stable")
     most = np.floor(total).min() + 1 if may_differ or inexact.any() else 0
-    best = order[np.floor(total[order]) <= most][: MOST_SENSES * (4 if one.sliding.any() else 1)]
+    best = order[np.floor(total[order]) <= most][: MAX_SENSES * (4 if one.sliding.any() else 1)]
     found = []
     for k in best:
         found.append((senses[k], normals[k]))
@@ -326,7 +333,7 @@ def _other_angle(column: str, link: int, one: float, gap: float) -> EntryDiffere
     """An angle that differs by ``gap``, written as a table would: within half a turn, but for tolerances around it."""
     other = one + gap
     return EntryDifference(
-        column, link, one, float(wrap_to_pi(np.array(other))) if abs(other) > HALF_TURN_AT_MOST else other
+        column, link, one, float(wrap_to_pi(np.array(other))) if abs(other) > MAX_HALF_TURN else other
     )
 
 
@@ -517,7 +524,7 @@ def _settled_at(
     flange = translation(*(-right_end)) @ rot_z(last_turn) @ other.flange
     placed = one.base @ np.linalg.inv(base), np.linalg.inv(one.flange) @ flange
     reverses = one.direction * other.direction < 0
-    moved = np.abs(zeros) > np.where(one.sliding, tolerances.length, tolerances.angle)
+    moved = tolerances.exceeded(zeros, one.sliding)
     ends = sum(
         int(np.linalg.norm(T[:3, 3]) > tolerances.length) + TURNED_END * (turn_of(T) > tolerances.angle) for T in placed
     )
@@ -671,7 +678,7 @@ def _fewest(columns: Reals, wanted: Reals, printed: Reals, tolerances: Tolerance
     if rank == count or np.linalg.norm(amounts) < 0.2 * tolerances.length:
         return amounts, float(np.abs(wanted - columns @ amounts).max(initial=0.0)), rank
     fit = float(np.abs(wanted - columns @ amounts).max()) + 0.1 * tolerances.length
-    for size in range(1, min(rank, MOST_ENTRIES) + 1):
+    for size in range(1, min(rank, MAX_ENTRIES) + 1):
         chosen = np.array(list(itertools.combinations(range(count), size)))
         some = columns.T[chosen].transpose(0, 2, 1)  # (sets, rows, size)
         values = np.linalg.pinv(some, rcond=1e-7) @ wanted

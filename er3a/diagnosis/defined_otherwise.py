@@ -3,7 +3,7 @@
 If references state the line of every joint axis, these lines describe an arm, and the table is matched with it
 (:mod:`er3a.comparison.mechanism`): geometry first. Zeros, directions, base and flange, any number of them at once, are
 taken from the match and fitted to all references about the arm's shape and place. If all of these are met, the table
-describes the same arm. If up to ``MOST_WRONG`` entries of the geometry are wrong as well, it is a faulty table of that
+describes the same arm. If up to ``MAX_WRONG`` entries of the geometry are wrong as well, it is a faulty table of that
 arm.
 """
 
@@ -40,6 +40,7 @@ from er3a.diagnosis.faults import (
     WrongOffset,
     limit_stated,
 )
+from er3a.diagnosis.fitting import MEETS
 from er3a.geometry.transforms import rot_x, rot_y, rot_z, translation
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.forward import forward, frames
@@ -53,10 +54,8 @@ from er3a.references.quantities import (
     AxisAngle,
     AxisCoordinate,
     FlangeTurn,
-    Limit,
     PointCoordinate,
     Pose,
-    PoseOutside,
 )
 from er3a.references.reference import Reference, expected_of, quantities_of
 from er3a.robots.robot import Robot
@@ -65,10 +64,10 @@ Misfit = Callable[[Robot], Reals]
 Lines = tuple[Reals, Reals, list[bool], Tolerances]
 """Directions and points (n, 3), m, of all axes, which of these directions are of positive rotation, and how exactly."""
 
-MOST_WRONG = 3
+MAX_WRONG = 3
 SLIGHT_LENGTH, SLIGHT_ANGLE = 1e-3, math.radians(0.2)
 FINER = (1.0, 0.3, 0.1)
-LEAST_LENGTH, LEAST_ANGLE = 1e-5, math.radians(1e-3)
+MIN_LENGTH, MIN_ANGLE = 1e-5, math.radians(1e-3)
 LEVER = 0.3  # m, over which an axis' direction says where it is
 SPREAD = 3.0  # times its uncertainty, that what is derived from two lines may be off
 ROUNDS = 8
@@ -80,7 +79,7 @@ SCANNED_AT = 8  # poses at most: 28 distances, for up to 5 zeros and the flange'
 KEPT_OF_SCAN, FITTED = 24, 576
 """Starts that are kept of each way of the joints' directions, and fitted of all. With 4 kept, 2 of 15 random cases were
 lost, with 1 five; with 64 fitted one."""
-MOST_SCANNED = 7  # joints
+MAX_SCANNED = 7  # joints
 SIGNS: tuple[Literal[1, -1], ...] = (-1, 1)
 
 
@@ -94,42 +93,41 @@ class Conventions:
     left: float
 
 
-def conventions_of(robot: Robot, references: Sequence[Reference], meets: float) -> Conventions | None:
+def conventions_of(robot: Robot, references: Sequence[Reference]) -> Conventions | None:
     """How references define zeros, directions, base and flange of a table otherwise; None if that is not the reason
     why they are missed, or if they state neither all joint axes nor many poses.
 
     Parameters
     ----------
     references : that all state a value; limits don't count here, but are set right besides
-    meets : half-widths by which a reference that is met may be off
     """
     if robot.coupling is not None or robot.rows != robot.joints or robot.sliding.any():
         return None
-    stated = [r for r in references if not isinstance(r.quantity, Limit | PoseOutside)]
+    stated = [r for r in references if r.quantity.depends_on_table]
     lines = _lines(stated, robot.joints)
     if lines is not None:
-        found = (_conventions(robot, stated, lines, meets, finer) for finer in FINER)
+        found = (_conventions(robot, stated, lines, finer) for finer in FINER)
         best = next((each for each in found if each is not None), None)
     else:
-        best = _from_poses(robot, stated, meets)
+        best = _from_poses(robot, stated)
     chosen = best and _with_limits(robot, best, references)
     return chosen if chosen and chosen.faults else None
 
 
 def counted_from_ground(
-    robot: Robot, references: Sequence[Reference], meets: float, limits_besides: bool = False
+    robot: Robot, references: Sequence[Reference], limits_besides: bool = False
 ) -> list[Conventions]:
     """Which joint references count from the ground (J3 - J2), so that all of them are met, in each way that does it.
     Its limits may be stated either way: of the table's joint, or of the one counted so.
 
     Parameters
     ----------
-    references, meets : as of :func:`conventions_of`
+    references : as of :func:`conventions_of`
     limits_besides : where positions tell, limits that are other ones, as those of a linkage often are, are set right
     """
     if robot.coupling is not None or robot.sliding.any():
         return []
-    if limits_besides and all(isinstance(r.quantity, Limit | PoseOutside) for r in references):
+    if limits_besides and not any(r.quantity.depends_on_table for r in references):
         return []
     axes, found = frames(robot, np.zeros(robot.joints))[:-1, :3, 2], dict[Fault, Conventions]()
     quantities, (expected, uncertainty) = quantities_of(references), expected_of(references)
@@ -138,10 +136,10 @@ def counted_from_ground(
         for along in dict.fromkeys((*((k,) for k in reversed(parallel)), tuple(parallel))):
             for sign, ends in itertools.product(SIGNS if along else (), (False, True)):
                 fault = CountedFromGround(joint + 1, tuple(k + 1 for k in along), sign)
-                own = Conventions((fault,), _from_ground(robot, joint, along, sign, ends), meets)
+                own = Conventions((fault,), _from_ground(robot, joint, along, sign, ends), MEETS)
                 own = _with_limits(robot, own, references) if limits_besides and not ends else own
                 off = (predict_tables(tables_of(own.corrected), own.corrected, quantities)[0] - expected) / uncertainty
-                if np.abs(off).max() <= meets:
+                if np.abs(off).max() <= MEETS:
                     found.setdefault(fault, replace(own, left=float(np.abs(off).max())))
     return list(found.values())
 
@@ -157,9 +155,7 @@ def _from_ground(robot: Robot, joint: int, along: tuple[int, ...], sign: Literal
     return robot.replace(coupling=coupling, lower=lower, upper=upper)
 
 
-def _conventions(
-    robot: Robot, stated: Sequence[Reference], lines: Lines, meets: float, finer: float
-) -> Conventions | None:
+def _conventions(robot: Robot, stated: Sequence[Reference], lines: Lines, finer: float) -> Conventions | None:
     """What :func:`conventions_of` finds where entries differ that are off by more than the lines' tolerances, or by a
     finer part of them."""
     directions, points, signed, widest = lines
@@ -168,7 +164,7 @@ def _conventions(
     found = match(mechanism_of(robot.without_tool()), other, tolerances)
     if any(each.column not in ("a", "d", "alpha") for each in found.differences):
         return None
-    if found.unexplained or sum(_gross(each) for each in found.differences) > MOST_WRONG:
+    if found.unexplained or sum(_gross(each) for each in found.differences) > MAX_WRONG:
         return None
     later = int(robot.convention == "modified")  # rows of a and alpha are those of the next joint
     wrong = [(each.column, each.link + later * (each.column != "d")) for each in found.differences]
@@ -177,7 +173,7 @@ def _conventions(
         start = _with_entry(start, column, row, each.other)
     flips = itertools.product(*([1.0] if sure else [1.0, -1.0] for sure in signed))
     starts = [start.replace(direction=start.direction * np.array(flip)) for flip in flips]
-    return _fitted_to(robot, starts, wrong, stated, tolerances, meets)
+    return _fitted_to(robot, starts, wrong, stated, tolerances)
 
 
 def _fitted_to(
@@ -186,7 +182,6 @@ def _fitted_to(
     wrong: Sequence[tuple[str, int]],
     stated: Sequence[Reference],
     tolerances: Tolerances,
-    meets: float,
 ) -> Conventions | None:
     """The start that comes nearest to what is stated, of nearly equal ones that with the fewest directions reversed,
     fitted; None if something is missed then."""
@@ -203,10 +198,10 @@ def _fitted_to(
         tried.append((round(float(np.abs(off(arm)).max()), 3), reversed_count, arm))
     least = min(worst for worst, _, _ in tried)
     best = min((each for each in tried if each[0] <= least + 0.5), key=lambda each: each[1])[2]
-    best = _fitted(best, wrong, off, meets)
-    best = _plain(robot, best, off, meets, tolerances)
+    best = _fitted(best, wrong, off)
+    best = _plain(robot, best, off, tolerances)
     left = float(np.abs(off(best)).max())
-    if left > meets:
+    if left > MEETS:
         return None
     faults = (
         *(_wrong_entry(robot, best, column, row) for column, row in wrong),
@@ -215,21 +210,21 @@ def _fitted_to(
     return Conventions(faults, best, left)
 
 
-def _from_poses(robot: Robot, stated: Sequence[Reference], meets: float) -> Conventions | None:
+def _from_poses(robot: Robot, stated: Sequence[Reference]) -> Conventions | None:
     """What :func:`_conventions` finds, without joint axes, of a table whose geometry is right: distances between
     flanges, and turns between them where orientations are stated, depend on neither base nor (turns) flange. Directions
     and zeros that give them are scanned in steps of ``SCAN``, and the best fitted."""
     points, turns = _stated_flanges(stated)
     poses, inner = list(points), list(range(1, robot.joints - 1))
     known = 3 * (len(points) + sum(pose in turns for pose in poses)) - 12 - len(inner)
-    if robot.joints > MOST_SCANNED or known < 2 * robot.joints:
+    if robot.joints > MAX_SCANNED or known < 2 * robot.joints:
         return None
     xyz, R = (
         np.array([points[pose] for pose in poses]),
         np.array([turns.get(pose, np.full((3, 3), np.nan)) for pose in poses]),
     )
     q, table = joints_of(robot, poses), tables_of(robot)
-    steps = np.arange(0, 2 * np.pi, SCAN if robot.joints < MOST_SCANNED else 2 * SCAN)
+    steps = np.arange(0, 2 * np.pi, SCAN if robot.joints < MAX_SCANNED else 2 * SCAN)
     turned = np.array(list(itertools.product(steps, repeat=len(inner))))
     many = table[np.zeros(len(turned), dtype=int)].with_column("offset", inner, table.offset[:, inner] + turned)
 
@@ -285,7 +280,7 @@ def _from_poses(robot: Robot, stated: Sequence[Reference], meets: float) -> Conv
     for row in np.lexsort((changed, np.array(left) > 2 * length))[:KEPT_OF_SCAN].tolist():
         arm = robot_of(tables, row, robot)
         start = arm.replace(base=bases[row] @ arm.base, flange=arm.flange @ translation(*shift[row]))
-        found.append(_fitted_to(robot, [start], (), stated, tolerances, meets))
+        found.append(_fitted_to(robot, [start], (), stated, tolerances))
     return min((each for each in found if each is not None), key=lambda each: len(each.faults), default=None)
 
 
@@ -339,7 +334,7 @@ def _lines(stated: Sequence[Reference], joints: int) -> Lines | None:
     """Directions, points (n, 3), m, of all joint axes, which directions are of positive rotation, and how exactly."""
     toward = dict[int, AxisAngle]()
     points = dict[int, tuple[float, float, float]]()
-    length, angle = LEAST_LENGTH, LEAST_ANGLE
+    length, angle = MIN_LENGTH, MIN_ANGLE
     for reference in stated:
         quantity, uncertainty = reference.quantity, float(expected_of([reference])[1][0])
         if isinstance(quantity, AxisAngle) and (quantity.joint not in toward or quantity.signed):
@@ -418,12 +413,12 @@ def _changed(robot: Robot, wrong: Sequence[tuple[str, int]], x: Reals) -> Robot:
     return robot.replace(base=base, flange=flange, offset=offset)
 
 
-def _fitted(robot: Robot, wrong: Sequence[tuple[str, int]], off: Misfit, meets: float) -> Robot:
+def _fitted(robot: Robot, wrong: Sequence[tuple[str, int]], off: Misfit) -> Robot:
     """Gauss and Newton's steps from an arm that nearly meets the references."""
     count = 12 + max(robot.joints - 2, 0) + len(wrong)
     for _ in range(ROUNDS):
         here = off(robot)
-        if np.abs(here).max() < 0.1 * meets:
+        if np.abs(here).max() < 0.1 * MEETS:
             break
         slopes = np.stack([(off(_changed(robot, wrong, STEP * row)) - here) / STEP for row in np.eye(count)], axis=1)
         step = -np.asarray(np.linalg.lstsq(slopes, here, rcond=1e-9)[0], dtype=np.float64)
@@ -434,11 +429,11 @@ def _fitted(robot: Robot, wrong: Sequence[tuple[str, int]], off: Misfit, meets: 
     return robot
 
 
-def _plain(given: Robot, fitted: Robot, off: Misfit, meets: float, tolerances: Tolerances) -> Robot:
+def _plain(given: Robot, fitted: Robot, off: Misfit, tolerances: Tolerances) -> Robot:
     """The fitted arm with as much as can be left as the table has it, and zeros that are whole degrees written so."""
 
     def kept(arm: Robot, simpler: Robot) -> Robot:
-        return simpler if np.abs(off(simpler)).max() <= max(meets, 1.05 * np.abs(off(arm)).max()) else arm
+        return simpler if np.abs(off(simpler)).max() <= max(MEETS, 1.05 * np.abs(off(arm)).max()) else arm
 
     moved = np.degrees(wrap_to_pi(fitted.offset - given.offset))
     snapped = np.where(np.abs(moved - np.round(moved)) < 2 * np.degrees(tolerances.angle), np.round(moved), moved)

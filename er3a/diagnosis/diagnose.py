@@ -30,7 +30,7 @@ from er3a.references.reference import (
 from er3a.robots.robot import Robot
 
 STEP_DEG = 45.0
-MOST_COMPARED = 60
+MAX_COMPARED = 60
 APART_MM = 1.0
 APART_RAD = 1e-3
 REACH_STARTS = 40
@@ -52,7 +52,7 @@ def deciding_measurement(tables: Tables, robot: Robot) -> conclusions.NextMeasur
     """
     if len(tables) < 2:
         return None
-    tables = tables[:MOST_COMPARED]
+    tables = tables[:MAX_COMPARED]
     poses = _candidates(robot)
     flanges = frames_of(tables, robot, np.radians(poses))[:, :, -1]
     points = flanges[..., :3, 3] * MM
@@ -158,7 +158,7 @@ def distinguishability(case: Case, ranking: Ranking) -> float | None:
     group = ranking.groups[0]
     difference = ranking.pool.difference / case.uncertainty
     factors = []
-    for row in group[1:MOST_COMPARED]:
+    for row in group[1:MAX_COMPARED]:
         apart = difference[row] - difference[group[0]]
         slopes = _slopes(case, ranking, row)
         if slopes.shape[1]:
@@ -306,7 +306,7 @@ def extremes_missed(robot: Robot, references: ReferenceSet | Sequence[Reference]
         return ()
     every = references.checkable if isinstance(references, ReferenceSet) else references
     stated = [r for r in every if r.expected is not None and isinstance(r.quantity, Extreme)]
-    stated = [r for r in stated if r.authoritative] or stated
+    stated = [r for r in stated if r.is_authoritative] or stated
     contradicted = {i for pair in conflicts(stated) for i in pair}
     found = []
     for i, reference in enumerate(stated):
@@ -330,12 +330,12 @@ def diagnosis_of(robot: Robot, references: ReferenceSet | Sequence[Reference]) -
     hypotheses = tuple(_described(ranking, group, robot) for group in ranking.groups)
     tried = len(ranking.pool.faults)
     explained = bool(hypotheses) and hypotheses[0].explains
-    from_ground = counted_from_ground(robot, stated, MEETS) or (
-        [] if explained else counted_from_ground(robot, stated, MEETS, limits_besides=True)
+    from_ground = counted_from_ground(robot, stated) or (
+        [] if explained else counted_from_ground(robot, stated, limits_besides=True)
     )
     chosen = from_ground[0] if from_ground else None
     if chosen is None and _may_be_chosen(robot, hypotheses):
-        chosen = conventions_of(robot, stated, MEETS)
+        chosen = conventions_of(robot, stated)
     if chosen is not None:
         difference = predict_tables(tables_of(chosen.corrected), chosen.corrected, quantities_of(stated))[0]
         left = difference - expected_of(stated)[0]

@@ -14,7 +14,7 @@ import numpy as np
 from er3a.by_value import Finding
 from er3a.kinematics.table_batch import COLUMNS, Tables
 from er3a.numerics.arrays import Reals
-from er3a.references.quantities import Limit, PoseOutside, Side, value_at
+from er3a.references.quantities import Limit, LimitExcess, Side, value_at
 from er3a.references.reference import Reference, expected_of
 
 Misread = Literal["metres_as_millimetres", "millimetres_as_metres", "radians_as_degrees", "degrees_as_radians"]
@@ -281,7 +281,7 @@ def limit_stated(joint: int, side: Side, now: float, references: Sequence[Refere
         met = (np.abs(expected - now) <= uncertainty).all()
         middle = (np.max(expected - uncertainty) + np.min(expected + uncertainty)) / 2
         return None if met else round(float(middle), DECIMALS)
-    shown = [value_at(r.quantity.pose, joint + 1) for r in references if isinstance(r.quantity, PoseOutside)]
+    shown = [value_at(r.quantity.pose, joint + 1) for r in references if isinstance(r.quantity, LimitExcess)]
     if not shown:
         return None
     farthest = min(shown) if side == "lower" else max(shown)

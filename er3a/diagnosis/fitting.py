@@ -107,7 +107,7 @@ def _degrees(angle: float) -> float:
 PROBE = 1e-6
 MEETS = 1.0 + 1e-6
 CURVED = 1.5
-DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-6, 1e-9, 1e9
+DAMPING, MIN_DAMPING, MAX_DAMPING = 1e-6, 1e-9, 1e9
 EASED, STIFFENED = 0.1, 10.0
 TINY = 1e-12
 LAWSON_PASSES = 80
@@ -194,7 +194,7 @@ def descend(search: Search, fits: Fits, passes: int) -> Fits:
         better = np.flatnonzero(trial.squares < fits.squares)
         fits = fits.with_rows(better, trial[better])
         gained = np.isin(np.arange(len(fits)), better)
-        damping = np.clip(damping * np.where(gained, EASED, STIFFENED), LEAST_DAMPING, MOST_DAMPING)
+        damping = np.clip(damping * np.where(gained, EASED, STIFFENED), MIN_DAMPING, MAX_DAMPING)
     return fits
 
 
@@ -223,7 +223,7 @@ def minimise_max(slopes: Reals, left: Reals, enough: float = 1.0) -> Reals:
     """
     weights = np.full(left.shape, 1 / left.shape[1])
     best, least = np.zeros((len(left), slopes.shape[2])), np.abs(left).max(axis=1)
-    none = np.full(len(left), LEAST_DAMPING)
+    none = np.full(len(left), MIN_DAMPING)
     for _ in range(LAWSON_PASSES):
         step = -_solved(slopes, left, weights, none)
         after = np.abs(left + np.einsum("bnk,bk->bn", slopes, step))

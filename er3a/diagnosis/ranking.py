@@ -35,17 +35,17 @@ from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.table_batch import Tables, join, tables_of
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.references.predict import predict_tables
-from er3a.references.quantities import Extreme, Limit, PoseOutside, Speed, Unit
+from er3a.references.quantities import Extreme, Speed, Unit
 from er3a.references.reference import Reference, ReferenceSet, conflicts, expected_of, quantities_of
 from er3a.robots.robot import Robot
 
 FREE_NUMBER = 1.5
 UNCHANGED = 1e-9
-LEAST_SCALE = 1e-3
+MIN_SCALE = 1e-3
 DECIMALS = 12
 SAME_ANGLE, SAME_LENGTH = 0.1, 0.02  # rad; of the arm's length
 FEW_PASSES, MANY_PASSES, ALL_PASSES = 3, 10, 40
-MOST_PROMISING = 400
+MAX_PROMISING = 400
 
 Difference = Callable[[Tables], Reals]
 
@@ -114,7 +114,7 @@ class Case:
 
     @cached_property
     def _about_shape(self) -> Flags:
-        return np.array([not isinstance(each.quantity, Limit | PoseOutside) for each in self.references])
+        return np.array([each.quantity.depends_on_table for each in self.references])
 
     def search(self, starts: Tables) -> fitting.Search:
         """A search from start tables; what is said about limits depends on no free number and is left out."""
@@ -208,7 +208,7 @@ def _refined(search: fitting.Search, fits: fitting.Fits, thorough: bool) -> fitt
     if thorough:
         return fitting.meet(search, fitting.descend(search, fits, ALL_PASSES))
     fits = fitting.descend(search, fits, FEW_PASSES)
-    best = np.sort(np.argsort(fits.squares, kind="stable")[:MOST_PROMISING])
+    best = np.sort(np.argsort(fits.squares, kind="stable")[:MAX_PROMISING])
     return fitting.meet(search, fits.with_rows(best, fitting.descend(search, fits[best], MANY_PASSES)))
 
 
@@ -252,7 +252,7 @@ def _distinct(case: Case, starts: Tables, fits: fitting.Fits) -> fitting.Fits:
     amounts = np.where(is_angle, wrap_to_pi(values + fits.amounts) - values, fits.amounts)
     changes: Flags = np.all(np.abs(np.where(is_angle, wrap_to_pi(amounts), amounts)) > UNCHANGED, axis=1)
     is_scale = np.array([number.column is None for number in case.numbers])[fits.which]
-    changes &= ~(is_scale & (1 + amounts < LEAST_SCALE)).any(axis=1)
+    changes &= ~(is_scale & (1 + amounts < MIN_SCALE)).any(axis=1)
     fits = fitting.Fits(fits.start, fits.which, amounts, fits.left)
     order = np.lexsort((fits.greatest, *fits.which.T[::-1], fits.start))
     fits, is_angle, kept = fits[order], is_angle[order], changes[order]
@@ -346,7 +346,7 @@ def usable(references: ReferenceSet | Sequence[Reference]) -> tuple[Reference, .
     """
     every = references.checkable if isinstance(references, ReferenceSet) else references
     stated = [r for r in every if r.expected is not None and not isinstance(r.quantity, Extreme | Speed)]
-    authoritative = [r for r in stated if r.authoritative]
+    authoritative = [r for r in stated if r.is_authoritative]
     resting = tuple(authoritative or stated)
     contradicted = {i for pair in conflicts(resting) for i in pair}
     return tuple(reference for i, reference in enumerate(resting) if i not in contradicted)

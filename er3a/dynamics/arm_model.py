@@ -51,7 +51,7 @@ PARAMETERS = 10
 """Numbers of a body in the regressor: m, m c (3), and inertia about the frame's origin xx, xy, yy, xz, yz, zz."""
 
 PROBLEMS = {
-    "not_finite": "holds something that is no finite number",
+    "not_finite": "holds a value that is not finite",
     "negative_mass": "has a mass below 0",
     "negative_moment": "has a principal moment of inertia below 0",
     "triangle": "has a principal moment of inertia above the sum of the other two, which no body has",

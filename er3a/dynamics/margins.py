@@ -233,7 +233,7 @@ WristQuantity = Literal["payload", "moment", "inertia"]
 
 @dataclass(frozen=True)
 class WristUse:
-    """What a load asks for, against what is allowed: kg, N m or kg m^2; ``joint`` from 1, None for the payload.
+    """What a load requires, against what is allowed: kg, N m or kg m^2; ``joint`` from 1, None for the payload.
 
     ``asked`` is in the worst pose found, ``most`` a bound that no pose exceeds, with the load's tolerances.
     """
@@ -269,7 +269,7 @@ def worst_levers(robot: Robot, point: Reals, rows: Sequence[int]) -> tuple[Reals
 def wrist_use(
     robot: Robot, wrist: WristLoad, load: Load, gravity: float = GRAVITY, off: tuple[float, float] = (0.0, 0.0)
 ) -> tuple[WristUse, ...]:
-    """What a load asks of the wrist at rest, in the order of the table; only quantities that the wrist's data limit.
+    """What a load requires of the wrist at rest, in the table's order; only quantities that the wrist's data limit.
 
     ``off``: by how much the load's mass (kg) and centre (m) may be off, which ``most`` of the uses takes in.
     """
@@ -324,8 +324,8 @@ def load_diagram(
 ) -> LoadDiagram | None:
     """The load diagram; None for wrists whose axes don't meet in a point, or that nothing is known of.
 
-    A joint before the last one counts with the distance from the wrist's centre, which a load comes to have from its
-    axis if the joints behind turn far enough.
+    A joint before the last one counts with the distance from the wrist's centre, which a load gets from its
+    axis if the joints beyond turn far enough.
     """
     behind = wrist_to_flange(robot)
     if behind is None or not (wrist.moment or wrist.inertia):

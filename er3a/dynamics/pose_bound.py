@@ -11,7 +11,7 @@ References
 Holding torques and distances from axes at the corners of hulls around boxes of joint values.
 
 Both are affine in the cosine and sine of each row's angle (in its shift, where it slides), because no row comes in
-twice: what hangs behind a joint is carried to its axis row by row, gravity from the base likewise. Cosine and sine of
+twice: what is beyond a joint is carried to its axis row by row, gravity from the base too. Cosine and sine of
 an arc lie in the triangle of its ends and the point where the tangents there meet; those of an arc of more than 120
 degrees in the triangle around the whole circle. What is affine in each of several points has its largest absolute
 value over a product of triangles at a corner of it, so nowhere in a box is there more than at the corners.
@@ -44,7 +44,7 @@ APEX = 2
 
 @dataclass(frozen=True, eq=False)
 class Hanging:
-    """What hangs behind a joint, in the frame that moves with it.
+    """What hangs beyond a joint, in the frame that moves with it.
 
     Attributes
     ----------
@@ -112,11 +112,11 @@ def _alone(vector: Reals) -> Reals:
 
 
 def carried(robot: Robot, own: list[Hanging], at: list[Reals], row: int) -> Hanging:
-    """All that hangs behind a row's joint, in the frame that moves with it, over the corners of the rows behind.
+    """All that hangs beyond a row's joint, in the frame that moves with it, over the corners of the rows beyond.
 
     Parameters
     ----------
-    at : m arrays (B, c, 2), corners of each row; those of rows behind come in order, the last row's fastest
+    at : m arrays (B, c, 2), corners of each row; those of rows beyond come in order, the last row's fastest
     """
     links, found = constant_links(robot), own[-1]
     for behind in range(robot.rows - 1, row, -1):
@@ -176,7 +176,7 @@ def row_torques(robot: Robot, row: int, behind: Hanging, pull: Reals) -> Reals:
 
 
 def torque_caps(robot: Robot, row: int, behind: Hanging, gravity: float) -> Reals:
-    """What a row's torque or force (B, K) can't exceed wherever gravity points, over the corners of the rows behind."""
+    """What a row's torque or force (B, K) can't exceed wherever gravity points, over the corners of the rows beyond."""
     if robot.sliding[row]:
         caps: Reals = behind.mass * gravity + np.abs(behind.force[..., 2])
     else:
@@ -187,8 +187,8 @@ def torque_caps(robot: Robot, row: int, behind: Hanging, gravity: float) -> Real
 CLOSE = 1e-3
 """Bounds nearer than that to what is found, in parts of it, are near enough; levers, of few joints, get nearer."""
 CLOSE_LEVER = 1e-5
-MOST_CORNERS = 12_000_000
-MOST_BOXES = 60_000
+MAX_CORNERS = 12_000_000
+MAX_BOXES = 60_000
 BATCH_CORNERS = 300_000
 ROUNDING = 1e-9
 IDLE = 1e-12
@@ -211,7 +211,7 @@ class Bounded:
 def bounded_torque(model: ArmModel, joint: int, size: Size, start: Bounded) -> Bounded:
     """The largest holding torque of a joint (from 0) by its absolute value, at least that of ``start``.
 
-    Wherever gravity could point in a joint's frame is a bound that only the joints behind are in, and often reached.
+    Wherever gravity could point in a joint's frame is a bound that only the joints beyond are in, and often reached.
     """
     robot, own = model.robot, hanging_of(model)
     gravity = float(-model.model.gravity.linear[2])
@@ -285,12 +285,12 @@ def _branch_and_bound(
     bound, joint = _bounds(robot, at_corners, used, low, high)
     best, q = start.found, start.q
     each = 3 ** int(used.sum())
-    batch, left, dropped = max(1, BATCH_CORNERS // each), MOST_CORNERS // each, 0.0
+    batch, left, dropped = max(1, BATCH_CORNERS // each), MAX_CORNERS // each, 0.0
     while True:
         open_ = bound > best * (1 + close)
         dropped = max(dropped, float(bound[~open_].max(initial=0.0)))
         low, high, bound, joint = low[open_], high[open_], bound[open_], joint[open_]
-        if not len(bound) or left <= 0 or len(bound) > MOST_BOXES or best > useless:
+        if not len(bound) or left <= 0 or len(bound) > MAX_BOXES or best > useless:
             break
         order = np.argsort(-bound, kind="stable")
         taken, kept = order[:batch], order[batch:]
@@ -369,7 +369,7 @@ POSES = 1000
 CLIMBS = 4
 GRID = 21
 REFINEMENTS = 3
-MOST_ROUNDS = 12
+MAX_ROUNDS = 12
 NO_BETTER = 1e-9
 
 
@@ -397,7 +397,7 @@ def max_over_poses(robot: Robot, objective: Callable[[Reals], Reals]) -> Maxima:
     best = np.argsort(-values, axis=0, kind="stable")[:CLIMBS]
     targets = np.broadcast_to(np.arange(k), best.shape).ravel()
     poses, reached = q[best.ravel()], values[best.ravel(), targets]
-    for _ in range(MOST_ROUNDS):
+    for _ in range(MAX_ROUNDS):
         before = reached
         for joint in range(robot.joints):
             poses, reached = _along(robot, objective, poses, targets, joint)

@@ -31,7 +31,7 @@ from er3a.numerics.arrays import Reals
 from er3a.planning import timing
 from er3a.planning.piecewise import polynomial_motion
 
-MOST_ROUNDS = 30
+MAX_ROUNDS = 30
 GAIN = 1e-4
 SLOWEST = 1e-3
 SLACK = 1e-3  # by which a speed that no motion exceeds is kept above the one found, because TOPP-RA's is rounded
@@ -62,18 +62,18 @@ def fastest_under_torques(model: ArmModel, q: Reals, speed: Reals, peak: Reals) 
     Raises
     ------
     TimingError
-        if there is no such time law
+        if no such time law exists
     """
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(q, axis=0) / speed, axis=1))])
-    if (path := timing.path_through(q, way)) is None:
+    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(q, axis=0) / speed, axis=1))])
+    if (path := timing.path_through(q, s)) is None:
         timed = timing.standing(q[-1], 0.0)
         return TimedTorques(timed, holding_torques(model, timed.q), 0.0)
-    _, way, spline = path
-    along = TorquesAlong.along(model, way, spline, speed, peak)
+    _, s, spline = path
+    along = TorquesAlong.along(model, s, spline, speed, peak)
     least, ceiling = along.least_time()
-    pace, t = along.fastest(ceiling)
-    timed = timing.Timed(polynomial_motion(timing.run_along(way, spline, pace, t), t, timing.SPLINE_DEGREE))
-    dry = known(drives_of(model.robot).coulomb) * (direction_of(spline(way, 1)) - direction_of(timed.velocity))
+    path_speed, t = along.fastest(ceiling)
+    timed = timing.Timed(polynomial_motion(timing.run_along(s, spline, path_speed, t), t, timing.SPLINE_DEGREE))
+    dry = known(drives_of(model.robot).coulomb) * (direction_of(spline(s, 1)) - direction_of(timed.velocity))
     torques = torque_parts(model, timed.q, timed.velocity, timed.acceleration).total + dry
     return TimedTorques(timed, torques, min(least, timed.duration))
 
@@ -87,12 +87,12 @@ class TorquesAlong:
 
     Attributes
     ----------
-    way : (N,), s at the nodes; spline : the joints (n,) along it; speed : (n,), largest
-    largest : (N,), s' under the joints' speeds
-    slow : (N,), s' whose viscous friction takes half of what gravity and dry friction leave, at most ``largest``
+    s : (N,), at the nodes; spline : the joints (n,) along it; speed : (n,), largest
+    speed_bound : (N,), largest s' under the joints' speed limits
+    slow : (N,), s' whose viscous friction takes half of what gravity and dry friction leave, at most ``speed_bound``
     """
 
-    way: Reals
+    s: Reals
     spline: scipy.interpolate.CubicSpline
     speed: Reals
     a: Reals
@@ -100,32 +100,32 @@ class TorquesAlong:
     c: Reals
     viscous: Reals
     peak: Reals
-    greatest: Reals
+    speed_bound: Reals
     slow: Reals
 
     @classmethod
     def along(
-        cls, model: ArmModel, way: Reals, spline: scipy.interpolate.CubicSpline, speed: Reals, peak: Reals
+        cls, model: ArmModel, s: Reals, spline: scipy.interpolate.CubicSpline, speed: Reals, peak: Reals
     ) -> TorquesAlong:
         """The torques along a path."""
         bound, drives = np.isfinite(peak), drives_of(model.robot)
-        a, b, c = _torque_rows(model, way, spline, peak)
-        slope = spline(way, 1)
+        a, b, c = _torque_rows(model, s, spline, peak)
+        slope = spline(s, 1)
         viscous = known(drives.viscous) * slope
         with np.errstate(divide="ignore", invalid="ignore"):
-            greatest = (speed / np.abs(slope)).min(axis=1)
+            speed_bound = (speed / np.abs(slope)).min(axis=1)
             room = np.maximum(peak - np.abs(c), SLOWEST * peak) / (2 * np.abs(viscous))
-        slow = np.minimum(greatest, np.where(np.isfinite(room), room, np.inf).min(axis=1))
+        slow = np.minimum(speed_bound, np.where(np.isfinite(room), room, np.inf).min(axis=1))
         rows = a[:, bound], b[:, bound], c[:, bound], viscous[:, bound]
-        return cls(way, spline, speed, *rows, peak[bound], greatest, slow)
+        return cls(s, spline, speed, *rows, peak[bound], speed_bound, slow)
 
     def least_time(self) -> tuple[float, Reals]:
         """A time (s) that no motion undercuts, and s' at the nodes (N,) that none exceeds."""
-        ceiling, least = self.greatest, 0.0
-        for _ in range(MOST_ROUNDS):
-            pace, t = self._solved(self._relaxed(ceiling), ceiling)
+        ceiling, least = self.speed_bound, 0.0
+        for _ in range(MAX_ROUNDS):
+            path_speed, t = self._solved(self._relaxed(ceiling), ceiling)
             gained, least = t[-1] > least * (1 + GAIN), max(least, float(t[-1]))
-            ceiling = np.clip(pace * (1 + SLACK), SLOWEST * self.greatest, ceiling)
+            ceiling = np.clip(path_speed * (1 + SLACK), SLOWEST * self.speed_bound, ceiling)
             if not (gained and self.viscous.any()):
                 break
         return least, ceiling
@@ -133,13 +133,13 @@ class TorquesAlong:
     def fastest(self, ceiling: Reals) -> tuple[Reals, Reals]:
         """Speeds s' and times (s) at the nodes (N,) of a motion that keeps the limits; ``ceiling`` of all motions."""
         around, best = self.slow, np.inf
-        for _ in range(MOST_ROUNDS):
-            pace, t = self._solved(self._kept(around, ceiling), ceiling)
+        for _ in range(MAX_ROUNDS):
+            path_speed, t = self._solved(self._kept(around, ceiling), ceiling)
             gained, best = t[-1] < best * (1 - GAIN), float(t[-1])
-            around = np.maximum(pace, SLOWEST * self.slow)
+            around = np.maximum(path_speed, SLOWEST * self.slow)
             if not (gained and self.viscous.any()):
                 break
-        return pace, t
+        return path_speed, t
 
     def _relaxed(self, ceiling: Reals) -> Rows:
         """Rows that every motion keeps which is nowhere faster than ``ceiling`` (N,)."""
@@ -149,22 +149,31 @@ class TorquesAlong:
         """Rows that keep the limits up to ``ceiling`` (N,); exact at ``around`` (N,) where friction costs torque."""
         return self._rows(around / 2, 1 / (2 * around), 0.0, 1 / ceiling)
 
-    def _rows(self, cost: Reals | float, per_cost: Reals, help_: Reals | float, per_help: Reals) -> Rows:
+    def _rows(
+        self,
+        friction_opposing: Reals | float,
+        per_opposing: Reals,
+        friction_assisting: Reals | float,
+        per_assisting: Reals,
+    ) -> Rows:
         """``F (a s'' + b s'^2 + c) <= g`` with a, b, c, g (N, 2k), F the unit matrix: upper ends first, then lower.
 
-        s' counts as ``cost + per_cost s'^2`` where friction costs torque, as ``help_ + per_help s'^2`` where it helps.
+        s' counts as ``friction_opposing + per_opposing s'^2`` where friction costs torque, as
+        ``friction_assisting + per_assisting s'^2`` where it helps.
         """
         viscous = np.concatenate([self.viscous, -self.viscous], axis=1)
-        costs, helps = np.maximum(viscous, 0.0), np.minimum(viscous, 0.0)
+        opposing, assisting = np.maximum(viscous, 0.0), np.minimum(viscous, 0.0)
         a, b, c = (np.concatenate([part, -part], axis=1) for part in (self.a, self.b, self.c))
-        b = b + costs * per_cost[:, None] + helps * per_help[:, None]
-        constant = costs * np.reshape(cost, (-1, 1)) + helps * np.reshape(help_, (-1, 1))
+        b = b + opposing * per_opposing[:, None] + assisting * per_assisting[:, None]
+        constant = opposing * np.reshape(friction_opposing, (-1, 1)) + assisting * np.reshape(
+            friction_assisting, (-1, 1)
+        )
         F = np.broadcast_to(np.eye(a.shape[1]), (len(a), a.shape[1], a.shape[1])).copy()
         return a, b, c, F, np.tile(self.peak, 2) - constant
 
     def _solved(self, rows: Rows, ceiling: Reals) -> tuple[Reals, Reals]:
         """Speeds s', at most ``ceiling``, and times (s) at the nodes (N,); rows hold at both ends of each step."""
-        constraint, way = timing.toppra_library().constraint, self.way
+        constraint, s = timing.toppra_library().constraint, self.s
 
         class Torques(constraint.LinearConstraint):  # type: ignore[misc, name-defined]
             def get_dof(self) -> int:
@@ -172,16 +181,16 @@ class TorquesAlong:
 
             def compute_constraint_params(self, path: Any, gridpoints: Any) -> Any:
                 collocated = constraint.linear_constraint.canlinear_colloc_to_interpolate
-                squares = np.stack([np.zeros(len(way)), ceiling**2], axis=1)
+                squares = np.stack([np.zeros(len(s)), ceiling**2], axis=1)
                 return collocated(*rows, None, squares, gridpoints, identical=False)
 
         count = len(self.speed)
         speeds = constraint.JointVelocityConstraint(np.stack([-self.speed, self.speed], axis=1))
-        return timing.solved(timing.toppra_path(way, self.spline, AT_REST), way, [speeds, Torques()])
+        return timing.solved(timing.toppra_path(s, self.spline, AT_REST), s, [speeds, Torques()])
 
 
 def _torque_rows(
-    model: ArmModel, way: Reals, spline: scipy.interpolate.CubicSpline, peak: Reals
+    model: ArmModel, s: Reals, spline: scipy.interpolate.CubicSpline, peak: Reals
 ) -> tuple[Reals, Reals, Reals]:
     """Torques ``a s'' + b s'^2 + c`` at the nodes, (N, n) each, by toppra's constraint of joint torques."""
     drives = drives_of(model.robot)
@@ -195,5 +204,5 @@ def _torque_rows(
     constraint = timing.toppra_library().constraint.JointTorqueConstraint(
         torques, np.stack([-peak, peak], axis=1), known(drives.coulomb)
     )
-    a, b, c = constraint.compute_constraint_params(timing.toppra_path(way, spline, AT_REST), way)[:3]
+    a, b, c = constraint.compute_constraint_params(timing.toppra_path(s, spline, AT_REST), s)[:3]
     return a, b, c

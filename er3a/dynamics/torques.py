@@ -172,7 +172,7 @@ class Demand:
 
 
 def demand(t: Reals, qd: Reals, tau: Reals) -> Demand:
-    """What a motion asks for, of torques and velocities (N, n) at times (N,) in s."""
+    """What a motion requires: torques and velocities (N, n) at times (N,) in s."""
     power, duration = tau * qd, float(t[-1] - t[0])
 
     def whole(values: Reals) -> Reals:

@@ -99,7 +99,7 @@ def read_arms(folder: Path, **options: str | None) -> tuple[dict[str, ReadArm], 
 
 
 DIGITS_MM, DIGITS_DEG, DIGITS_AXIS = 6, 7, 12
-LEAST_MM, LEAST_DEG = 0.1, 0.02  # tables are printed to 0.1 mm
+MIN_MM, MIN_DEG = 0.1, 0.02  # tables are printed to 0.1 mm
 Table = list[Sequence[object]]
 
 
@@ -130,8 +130,8 @@ def write_urdf_references(
         raise InputError(folder, None, f"holds references already ({', '.join(held)})", "Name an empty or a new folder")
     found = urdf_statements(path, base=base, tip=tip)
     document = robot_name(path)
-    mm = max(LEAST_MM, float(np.ceil(found.half_width_m * MM * 1e3)) / 1e3)
-    deg = max(LEAST_DEG, float(np.ceil(np.degrees(found.half_width_rad) * 1e3)) / 1e3)
+    mm = max(MIN_MM, float(np.ceil(found.half_width_m * MM * 1e3)) / 1e3)
+    deg = max(MIN_DEG, float(np.ceil(np.degrees(found.half_width_rad) * 1e3)) / 1e3)
     limited = np.isfinite(found.lower) & np.isfinite(found.upper) & (found.lower < found.upper)
     ends = np.column_stack([found.lower, found.upper])
     moving = np.isfinite(found.speed) & (found.speed > 0)

@@ -25,14 +25,14 @@ from er3a.diagnosis.diagnose import Hypotheses
 from er3a.errors import ArgumentError, InputError
 from er3a.files.csv_file import CsvColumn, read_csv, read_header
 from er3a.files.reference_sets import check_robot_origins, load_references
-from er3a.files.units import LEAST_SPAN_MM, WIDEST_IN_RADIANS
+from er3a.files.units import MIN_SPAN_MM, WIDEST_IN_RADIANS
 from er3a.identifiability.entry_evidence import Evidence, Tolerance
 from er3a.identifiability.evidence import evidence_of
 from er3a.numerics.arrays import Reals
 from er3a.references.quantities import Pose
 from er3a.references.reference import Document, Documents, Reference, ReferenceSet
 from er3a.robots.joint_limits import meant
-from er3a.robots.robot import MOST_JOINTS, Robot, Source
+from er3a.robots.robot import MAX_JOINTS, Robot, Source
 
 _NUMBER = CsvColumn(float)
 SAME = 1e-9  # m, rad, kg
@@ -127,7 +127,7 @@ def load_joint_values(path: str | Path, robot: Robot) -> Reals:
 
 
 def _check_lengths(path: Path, rows: list[Measurement]) -> None:
-    """A pair has two rows and one length, a bar a length in all of its rows or in none."""
+    """Check that a pair has two rows and one length, and a bar a length in all of its rows or in none."""
     groups: dict[tuple[str, str], list[Measurement]] = {}
     for row in rows:
         if row.touched and row.touched[0] in ("pair", "bar"):
@@ -136,9 +136,14 @@ def _check_lengths(path: Path, rows: list[Measurement]) -> None:
         lengths = {row.length_mm for row in own}
         where = f"row {own[-1].row}, column {kind}"
         if kind == "pair" and len(own) != 2:
-            raise InputError(path, where, f"{len(own)} rows are of the pair '{name}'", "Give two rows to each pair")
+            raise InputError(path, where, f"the pair '{name}' has {len(own)} rows", "Give each pair two rows")
         if kind == "pair" and (len(lengths) > 1 or None in lengths):
-            raise InputError(path, where, f"the pair '{name}' lacks one length", "Write it in both rows, in length_mm")
+            raise InputError(
+                path,
+                where,
+                f"the rows of pair '{name}' need one and the same length",
+                "Write it in both rows, in length_mm",
+            )
         if kind == "bar" and None in lengths and len(lengths) > 1:
             problem = f"the bar '{name}' has a length in some rows only"
             raise InputError(path, where, problem, "Write it in all rows, or in none if it is unknown")
@@ -147,16 +152,16 @@ def _check_lengths(path: Path, rows: list[Measurement]) -> None:
 def _units_in(path: Path) -> list[str]:
     """Units of the joints that a header names; six angles if it names none."""
     named = {int(found[1]): found[2] for name in read_header(path) if (found := JOINT_COLUMN.fullmatch(name))}
-    if max(named, default=0) > MOST_JOINTS:
+    if max(named, default=0) > MAX_JOINTS:
         column = f"q{max(named)}_{named[max(named)]}"
-        raise InputError(path, f"column {column}", f"er3a supports at most {MOST_JOINTS} joints", "Remove it")
+        raise InputError(path, f"column {column}", f"er3a supports at most {MAX_JOINTS} joints", "Remove it")
     return [named.get(joint, "deg") for joint in range(1, max(named, default=6) + 1)]
 
 
 def _check_units(path: Path, rows: list[Measurement], units: Sequence[str]) -> None:
     for row in rows:
         span = max((abs(value) for value in row.xyz_mm if value is not None), default=0.0)
-        if None not in row.xyz_mm and span < LEAST_SPAN_MM:
+        if None not in row.xyz_mm and span < MIN_SPAN_MM:
             problem = f"the point is {span:g} mm from the base's origin at most, which can only be metres"
             raise InputError(path, f"row {row.row}, columns x_mm, y_mm, z_mm", problem, "Multiply by 1000")
     angles = [abs(value) for row in rows for value, unit in zip(row.pose, units) if unit == "deg"]
@@ -199,7 +204,7 @@ def diagnose(robot: Robot, references: ReferenceSet | Sequence[Reference] | str 
     Raises
     ------
     InputError
-        if there is no such reference set, or it can't be read
+        if the reference set doesn't exist or can't be read
     """
     return diagnosis.diagnose(
         robot, load_references(references, robot) if isinstance(references, str | Path) else references
@@ -222,7 +227,7 @@ def evidence(robot: Robot, references: References | None = None, tolerance: Tole
     Raises
     ------
     InputError
-        if there is no such reference set, it can't be read, or a document that the robot's values name is not declared
+        if the reference set doesn't exist, it can't be read, or a document that the robot's values name is not declared
         in its sets
     """
     wanted = robot.references if references is None else references

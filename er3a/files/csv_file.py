@@ -18,7 +18,7 @@ from er3a.formats.mesh_file import read_text
 
 LARGEST_DIGITS = 9
 
-MOST_BYTES = 50_000_000
+MAX_BYTES = 50_000_000
 
 Lines = list[tuple[int, list[str]]]
 """Fields of a file's lines, with the lines' numbers."""
@@ -100,7 +100,7 @@ def read_lines(path: Path) -> Lines:
 
     Spreadsheets of some countries separate by semicolons and write decimal commas, which are read as points.
     """
-    text = read_text(path, MOST_BYTES)
+    text = read_text(path, MAX_BYTES)
     header = text.lstrip().partition("\n")[0]
     mark = next((each for each in ";\t" if each in header and "," not in header), ",")
     reader = csv.reader(io.StringIO(text), strict=True, delimiter=mark)
@@ -114,7 +114,7 @@ def read_lines(path: Path) -> Lines:
 
 
 def check_widths(path: Path, lines: Lines) -> None:
-    """Refuse a row that has not as many fields as the header."""
+    """Reject a row with another number of fields than the header."""
     for number, line in lines[1:]:
         if len(line) != len(lines[0][1]):
             problem = f"{len(line)} fields where the header has {len(lines[0][1])}"

@@ -24,9 +24,9 @@ from typing import Any, Literal
 from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn, Lines, check_widths, read_csv, read_lines
 from er3a.files.robot_file import SHORTEST_PLAIN_LENGTH_MM, RobotFile, far_normals
-from er3a.files.units import MOST_DEG, RADIANS_BELOW_DEG, look_like_radians
+from er3a.files.units import MAX_DEG, RADIANS_BELOW_DEG, look_like_radians
 from er3a.files.yaml_file import parse
-from er3a.robots.robot import CONVENTIONS, MOST_JOINTS, Convention, Grade
+from er3a.robots.robot import CONVENTIONS, MAX_JOINTS, Convention, Grade
 
 _NUMBER, _OF_KIND = CsvColumn(float), CsvColumn(float, optional=True)
 NEEDED = {"joint": CsvColumn(int), "a_mm": _NUMBER, "alpha_deg": _NUMBER, "d_mm": _NUMBER}
@@ -115,9 +115,9 @@ def read_dh_table(
         if len(pair := given & {f"lower_{unit}", f"upper_{unit}"}) == 1:
             missing = ({f"lower_{unit}", f"upper_{unit}"} - pair).pop()
             raise InputError(path, f"column {missing}", "missing beside the other limit", "Give both limits, or none")
-    if [row["joint"] for row in rows] != list(range(1, len(rows) + 1)) or not 1 <= len(rows) <= MOST_JOINTS:
+    if [row["joint"] for row in rows] != list(range(1, len(rows) + 1)) or not 1 <= len(rows) <= MAX_JOINTS:
         problem = f"the joints are {', '.join(str(row['joint']) for row in rows) or 'none'}"
-        remedy = f"er3a models 1 to {MOST_JOINTS} joints: write one row for each, from 1 on in order"
+        remedy = f"er3a models 1 to {MAX_JOINTS} joints: write one row for each, from 1 on in order"
         raise InputError(path, "column joint", problem, remedy)
     for row in rows:
         _check_kind(path, row, given)
@@ -185,7 +185,7 @@ def _in_own_units(
     elif angle_unit == "deg":
         turned = set()
     in_degrees = "alpha_deg" not in own | turned
-    twice = [row for row in rows if in_degrees and abs(row["alpha_deg"]) > MOST_DEG]
+    twice = [row for row in rows if in_degrees and abs(row["alpha_deg"]) > MAX_DEG]
     for row in rows:
         for column, value in row.items():
             if column not in own and isinstance(value, float):
@@ -234,7 +234,7 @@ def _unit(row: dict[str, Any]) -> str:
 
 
 def _check_kind(path: Path, row: dict[str, Any], given: set[str]) -> None:
-    """Refuse cells that are empty, or filled in for the other kind of joint."""
+    """Reject cells that are empty, or filled in for the other kind of joint."""
     unit = _unit(row)
     own = {f"lower_{unit}", f"upper_{unit}", f"speed_{unit}_s", "theta_deg" if unit == "mm" else "offset_deg"}
     for column in sorted(given & {key for key, kind in OPTIONAL.items() if kind.optional}):
@@ -349,7 +349,7 @@ class _Heading:
 
 
 def heading_of(text: str) -> _Heading | None:
-    """What a heading of those columns that books print stands for; None for any other."""
+    """What a column heading, as books print it, means; None for any other."""
     if own := _OURS.fullmatch(text):
         return _Heading(own[1] or own[2], own[3] or "", False)
     plain = re.sub(r"[\s{}\\]", "", text.lower().translate(_PLAIN))
@@ -374,7 +374,7 @@ def as_columns(path: Path, lines: Lines) -> PrintedTable:
     Raises
     ------
     InputError
-        for a row that has not as many fields as the header, and for a cell with two variables
+        for a row with another number of fields than the header, and for a cell with two variables
     """
     header = [name.strip() for name in lines[0][1]] if lines else []
     found = {k: own for k, name in enumerate(header) if (own := heading_of(name))}
@@ -445,7 +445,7 @@ class _Table:
         ]
 
     def _plain(self, k: int, own: _Heading, sliding: list[bool], columns: dict[str, list[str]]) -> None:
-        """A column of a, alpha or d; a sliding joint's d keeps what stands beside its variable."""
+        """A column of a, alpha or d; a sliding joint's d keeps the constant beside its variable."""
         texts = []
         for (number, cells), slides in zip(self.rows, sliding):
             text = cells[k]
@@ -455,7 +455,7 @@ class _Table:
         self._add(k, own.quantity, texts, columns)
 
     def _theta(self, k: int, sliding: list[bool], columns: dict[str, list[str]]) -> list[str]:
-        """Directions and offsets of joints that turn, and where theta of those that slide stands."""
+        """Directions and offsets of joints that turn, and theta of those that slide."""
         parts = [
             (0, cells[k]) if slides else self._beside(number, k, cells[k])
             for (number, cells), slides in zip(self.rows, sliding)
@@ -465,12 +465,12 @@ class _Table:
         if "offset" not in self.column:
             self._add(k, "offset", turning, columns)
         elif offsets:
-            raise InputError(self.path, f"column {self.header[k]}", "offsets stand in another column too", "Keep one")
+            raise InputError(self.path, f"column {self.header[k]}", "another column holds offsets too", "Keep one")
         if any(sliding):
             self._add(k, "theta", [text if slides else "" for slides, (_, text) in zip(sliding, parts)], columns)
         if any(sign < 0 for sign, _ in parts):
             if "direction" in self.header:
-                problem = "directions stand in another column too"
+                problem = "another column holds directions too"
                 raise InputError(self.path, f"column {self.header[k]}", problem, "Keep one")
             columns["direction"] = ["-1" if sign < 0 else "1" for sign, _ in parts]
         return offsets
@@ -504,7 +504,7 @@ def _compact(cell: str) -> str:
 
 
 def _variable(cell: str) -> re.Match[str] | None:
-    """The variable in a cell that is no plain number."""
+    """The variable in a cell that is not a plain number."""
     return _VARIABLE.search(_compact(cell))
 
 

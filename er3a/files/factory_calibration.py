@@ -26,7 +26,7 @@ from er3a.numerics.arrays import Reals
 from er3a.robots.masses import Masses
 from er3a.robots.robot import Robot, Source
 
-MOST_BYTES = 1_000_000
+MAX_BYTES = 1_000_000
 DELTAS = {"offset": "delta_theta", "a": "delta_a", "d": "delta_d", "alpha": "delta_alpha"}
 LINKS = ("shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3")
 LONGEST_M = 20.0
@@ -93,7 +93,7 @@ def load_factory_calibration(path: str | Path, nominal: Robot) -> Robot:
 
 
 def _of_deltas(path: Path, nominal: Robot) -> Robot:
-    text = read_text(path, MOST_BYTES)
+    text = read_text(path, MAX_BYTES)
     if nominal.convention != "standard":
         raise InputError(path, None, f"{nominal.name}'s table is not standard D-H", "Name the table as published")
     columns = {column: getattr(nominal, column) + _list(path, text, key) for column, key in DELTAS.items()}
@@ -101,7 +101,7 @@ def _of_deltas(path: Path, nominal: Robot) -> Robot:
 
 
 def _list(path: Path, text: str, key: str) -> Reals:
-    """Six numbers behind a key."""
+    """Six numbers after a key."""
     found = re.search(rf"^\s*{key}\s*=\s*\[([^\]]*)\]", text, re.MULTILINE)
     if found is None:
         raise InputError(path, key, "missing", REMEDY)

@@ -105,7 +105,7 @@ def _rotations(path: Path, rows: list[dict[str, Any]], stream: str, R: Reals) ->
         where = f"row {row['row']}, columns {stream}_r11 to {stream}_r33"
         worst = float(np.abs(M @ M.T - np.eye(3)).max())
         if worst > ORTHONORMAL_TOLERANCE:
-            problem = f"the matrix is no rotation: R R^T differs from 1 by {worst:.3g}"
+            problem = f"the matrix is not a rotation: R R^T differs from 1 by {worst:.3g}"
             raise InputError(path, where, problem, "Correct the sample, or write more digits")
         if np.linalg.det(M) < 0:
             problem = "the matrix is left-handed (its determinant is -1)"
@@ -133,7 +133,7 @@ def _check_millimetres(path: Path, rows: list[dict[str, Any]], stream: str, posi
 STREAM_SAMPLES = 60
 SHOWN_HEADER = 60
 EXAMPLE = "flange_x_mm, .., flange_qw, .., flange_qz, target_x_mm, .., target_qz (lengths in mm)"
-LEAST_SQUARE_MM = 0.5
+MIN_SQUARE_MM = 0.5
 EPOCH_DIGITS = 10  # of the seconds since 1970, which recorders write
 POINTS = {f"{part}_{c}_mm": CsvColumn() for part in ("seen", "touched") for c in "xyz"}
 
@@ -163,7 +163,7 @@ class BoardEntry(StrictModel):
 
     @model_validator(mode="after")
     def _in_mm(self) -> Self:
-        if self.square_mm < LEAST_SQUARE_MM:
+        if self.square_mm < MIN_SQUARE_MM:
             raise ValueError(f"square_mm: {self.square_mm:g} mm can only be metres | Multiply by 1000")
         return self
 
@@ -452,5 +452,5 @@ def grey_image(file: Path) -> NDArray[np.uint8]:
         with Image.open(file) as image:
             return np.asarray(image.convert("L"))
     except (OSError, ValueError) as error:
-        reason = "there is no such file" if isinstance(error, FileNotFoundError) else "is no image that can be read"
+        reason = "there is no such file" if isinstance(error, FileNotFoundError) else "is not a readable image"
         raise InputError(file, None, reason, "Correct the name, or save it as PNG or JPEG") from None

@@ -37,7 +37,7 @@ def given_file(path: Path) -> Path:
 
 
 def names(folder: str, pattern: str) -> list[str]:
-    """The stems of what stands in a folder of the study or of the project, sorted."""
+    """The file stems in a folder of the study or of the project, sorted."""
     places = (Path(folder), ROOT / folder)
     return sorted({path.stem for place in places for path in place.glob(pattern)})
 
@@ -59,7 +59,7 @@ def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
     Raises
     ------
     WriteError
-        naming ``path``, if the system refuses; an existing file stays unchanged
+        naming ``path``, if the system does not allow it; an existing file stays unchanged
     """
     temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
     try:
@@ -76,7 +76,7 @@ def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
 
 
 def write_checked(path: Path, content: bytes) -> None:
-    """Write bytes behind their checksum."""
+    """Write bytes after their checksum."""
     write_atomically(path, lambda file: file.write_bytes(hashlib.sha256(content).digest() + content))
 
 

@@ -39,14 +39,14 @@ from er3a.planning import commands
 from er3a.planning.names import PathVerdict
 from er3a.planning.profiles import Times
 from er3a.robots.joint_limits import joint_columns
-from er3a.robots.robot import MOST_JOINTS, Robot
+from er3a.robots.robot import MAX_JOINTS, Robot
 
 JOINT_COLUMN = re.compile(r"q([1-9]\d?)_(deg|mm)")
 UNIT_LENGTH_TOLERANCE = 1e-6
 LONGEST_S = 3600.0
-MOST_ROWS = 200_000
+MAX_ROWS = 200_000
 SAME_POINT = 1e-9  # m or rad
-MOST_RAD = 10 * 2 * math.pi
+MAX_RAD = 10 * 2 * math.pi
 UNREAD = ("velocities", "accelerations", "effort")
 
 
@@ -108,8 +108,8 @@ def read_path_table(path: str | Path) -> PathTable:
     rows = read_csv(path, timed | {name: CsvColumn() for name in columns})
     if len(rows) < 2:
         raise InputError(path, None, f"the path has {_points(len(rows))}", "Give at least two rows")
-    if len(rows) > MOST_ROWS:
-        raise InputError(path, None, f"{len(rows)} rows are more than {MOST_ROWS}", "Split the path")
+    if len(rows) > MAX_ROWS:
+        raise InputError(path, None, f"{len(rows)} rows are more than {MAX_ROWS}", "Split the path")
     lines = np.array([row["row"] for row in rows])
     times = _times(path, lines, rows) if timed else None
     if of_joints:
@@ -140,8 +140,8 @@ def _ros_trajectory(path: Path) -> tuple[Reals, Reals, tuple[str, ...]]:
     if not isinstance(names, list) or not isinstance(points, list) or not names:
         remedy = "Give trajectory_msgs/JointTrajectory: joint_names, and points with positions and time_from_start"
         raise InputError(path, None, "holds no joint trajectory", remedy)
-    if not 2 <= len(points) <= MOST_ROWS:
-        raise InputError(path, "points", f"the path has {_points(len(points))}", f"Give 2 to {MOST_ROWS} points")
+    if not 2 <= len(points) <= MAX_ROWS:
+        raise InputError(path, "points", f"the path has {_points(len(points))}", f"Give 2 to {MAX_ROWS} points")
     order = _joint_order(path, [str(name) for name in names])
     times, joints = np.empty(len(points)), np.empty((len(points), len(names)))
     for k, point in enumerate(points):
@@ -150,7 +150,7 @@ def _ros_trajectory(path: Path) -> tuple[Reals, Reals, tuple[str, ...]]:
             raise InputError(path, f"points[{k}].positions", f"not {len(names)} numbers", "Give one for each joint")
         joints[k], times[k] = values, _seconds(path, k, point.get("time_from_start"))
     _check_times(path, [f"points[{k}].time_from_start" for k in range(len(points))], times)
-    if np.abs(joints).max() > MOST_RAD:
+    if np.abs(joints).max() > MAX_RAD:
         k = int(np.abs(joints).max(axis=1).argmax())
         problem = f"{np.abs(joints[k]).max():g} rad are more than ten turns"
         raise InputError(path, f"points[{k}].positions", problem, "Write radians, or metres for a prismatic joint")
@@ -163,7 +163,7 @@ def _joint_order(path: Path, names: list[str]) -> list[int]:
     numbers = [int(each[0]) for each in found if each]
     first = min(numbers, default=0)
     if sorted(numbers) != list(range(first, first + len(names))):
-        problem = f"which joint is which can't be told from {', '.join(names)}"
+        problem = f"joints can't be identified by {', '.join(names)}"
         raise InputError(path, "joint_names", problem, "Name them joint_1, joint_2 ... from the base on")
     return sorted(range(len(names)), key=numbers.__getitem__)
 
@@ -185,7 +185,7 @@ def _is_number(value: object) -> TypeGuard[float]:
 
 
 def _joint_columns(path: Path, header: set[str]) -> tuple[str, ...]:
-    """The columns of the joints, in order; :class:`InputError` if one is missing or stands there twice."""
+    """The columns of the joints, in order; :class:`InputError` if one is missing or repeated."""
     found = {name: int(match[1]) for name in header if (match := JOINT_COLUMN.fullmatch(name))}
     numbers = sorted(found.values())
     if numbers != list(range(1, len(numbers) + 1)):
@@ -283,7 +283,7 @@ TRAPEZOID_RAMP = 1 / 3  # of a motion's time, on the way up and on the way down
 
 Duration = Annotated[float, Field(gt=0, le=3600)]
 Samples = Annotated[int, Field(ge=2, le=100_000)]
-Rates = Annotated[list[Annotated[float, Field(ge=-1e6, le=1e6)]], Field(min_length=1, max_length=MOST_JOINTS)]
+Rates = Annotated[list[Annotated[float, Field(ge=-1e6, le=1e6)]], Field(min_length=1, max_length=MAX_JOINTS)]
 Blend = Annotated[float, Field(ge=0, le=10_000)]
 
 

@@ -17,7 +17,7 @@ from er3a.files.yaml_file import StrictModel, parse
 from er3a.formats.mesh_file import read_text
 from er3a.numerics.arrays import Reals
 
-MOST_BYTES = 20_000_000
+MAX_BYTES = 20_000_000
 
 
 class PiecesFile(StrictModel):
@@ -57,7 +57,7 @@ def load_pieces(path: str | Path) -> PiecesFile:
         remedy = f"Make one of the mesh: er3a mesh {path.name} --unit mm --output {path.stem}.json"
         raise InputError(path, None, "is not a file of convex pieces", remedy)
     try:
-        data = json.loads(read_text(path, MOST_BYTES))
+        data = json.loads(read_text(path, MAX_BYTES))
     except (json.JSONDecodeError, RecursionError):
         raise InputError(path, None, "not valid JSON", "Import the mesh again: er3a mesh") from None
     if not isinstance(data, dict):
@@ -71,5 +71,5 @@ def load_pieces(path: str | Path) -> PiecesFile:
 
 
 def checksum_of(pieces: list[list[list[float]]]) -> str:
-    """Of pieces as they stand in the file."""
+    """Of the pieces in the file."""
     return hashlib.sha256(json.dumps(pieces).encode()).hexdigest()

@@ -16,13 +16,13 @@ from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn, Written, read_csv
 from er3a.files.kept_files import names, own_or_shipped
 from er3a.files.robot_file import NAME_PATTERN
-from er3a.files.units import LEAST_SPAN_MM, WIDEST_IN_RADIANS, suspect
+from er3a.files.units import MIN_SPAN_MM, WIDEST_IN_RADIANS, suspect
 from er3a.numerics.arrays import Reals
 from er3a.references.quantities import ZERO_POSE, NotOfArm, Pose, Quantity, Rotation3, not_of_arm
 from er3a.references.reference import NO_DOCUMENT, Document, Documents, Reference, ReferenceSet, Row, conflicts
 from er3a.references.rows import ENVELOPE_CORNERS, ENVELOPE_EXTENTS, KINDS, check_complete, reference_set
 from er3a.references.seen import COARSE_DEG, SEEN
-from er3a.robots.robot import GRADES, MOST_JOINTS, Robot
+from er3a.robots.robot import GRADES, MAX_JOINTS, Robot
 
 Fields = dict[str, Any]
 Fault = tuple[str, str, str]
@@ -58,7 +58,7 @@ ORIENTATIONS: dict[str, tuple[str, ...]] = {
 ORIENTATION_COLUMNS = tuple(column for columns in ORIENTATIONS.values() for column in columns)
 NOT_RIGID = 2e-3
 _POSE = tuple(f"q{joint}_deg" for joint in range(1, len(ZERO_POSE) + 1))
-_FURTHER = tuple(f"q{joint}_deg" for joint in range(len(ZERO_POSE) + 1, MOST_JOINTS + 1))
+_FURTHER = tuple(f"q{joint}_deg" for joint in range(len(ZERO_POSE) + 1, MAX_JOINTS + 1))
 _POSE_COLUMNS = dict.fromkeys(_POSE, _NUMBER) | dict.fromkeys(_FURTHER, CsvColumn(Written, always=False))
 
 
@@ -139,7 +139,7 @@ def _orientation(fields: Fields) -> Rotation3 | None:
 
 
 def rotation_of(columns: tuple[str, ...], values: Reals) -> Reals:
-    """The rotation matrix (3, 3) nearest to an orientation as it is written in such columns."""
+    """The rotation matrix (3, 3) nearest to an orientation that such columns give."""
     turn = scipy.spatial.transform.Rotation
     if columns == _RPY:
         found = turn.from_euler("xyz", values, degrees=True)
@@ -171,7 +171,7 @@ def _position_faults(fields: Fields) -> Iterator[Fault]:
                 M = values.reshape(3, 3).T
                 if np.abs(M.T @ M - np.eye(3)).max() > NOT_RIGID or np.linalg.det(M) < 0:
                     remedy = "nx, ny, nz is the flange's x axis in the base frame, ox ... its y axis, ax ... its z axis"
-                    yield columns[0], "these columns are no rotation matrix", remedy
+                    yield columns[0], "these columns are not a rotation matrix", remedy
 
 
 def _pose(fields: Fields) -> Pose:
@@ -356,7 +356,7 @@ FORMATS: dict[str, Format] = {
 
 
 def row_of(kind: str, fields: Mapping[str, Any]) -> Row:
-    """The row behind the fields of a CSV line."""
+    """The row that the fields of a CSV line describe."""
     values = FORMATS[kind].gather(dict(fields))
     values["line"] = values.pop("row")
     values["gaussian"] = values.pop(STATED_AS) == STANDARD_DEVIATION
@@ -407,7 +407,7 @@ def load_documents(path: str | Path) -> Documents:
 
 
 def check_origins(path: Path, rows: Iterable[Row], documents: Documents) -> None:
-    """Refuse rows whose origin is none of the documents: :class:`InputError` naming the row."""
+    """Reject rows whose origin is none of the documents: :class:`InputError` naming the row."""
     for row in rows:
         if row.origin not in documents.by_name:
             problem = f"the document '{row.origin}' is not known"
@@ -415,7 +415,7 @@ def check_origins(path: Path, rows: Iterable[Row], documents: Documents) -> None
 
 
 def check_robot_origins(robot: Robot, documents: Collection[str]) -> None:
-    """Refuse a robot whose values name documents that its sets don't declare; without sets it may name any."""
+    """Reject a robot whose values name documents that its sets don't declare; without sets it may name any."""
     named = {f"{group}.origin": source.origin for group, source in robot.sources.items() if source.origin}
     named |= {f"the origin of {entry}": name for entry, name in robot.origins.items()}
     for field, name in named.items():
@@ -587,17 +587,17 @@ def _check_row(path: Path, format: Format, fields: Fields) -> None:
         if value <= 0:
             remedy = "Half the last digit that the source prints, if it gives none"
             faults.append((column, f"{value:g} is not positive", remedy))
-    if fields.get("joint", 1) not in range(1, MOST_JOINTS + 1):
-        faults.append(("joint", f"there is no joint {fields['joint']}", f"Write a number from 1 to {MOST_JOINTS}"))
+    if fields.get("joint", 1) not in range(1, MAX_JOINTS + 1):
+        faults.append(("joint", f"there is no joint {fields['joint']}", f"Write a number from 1 to {MAX_JOINTS}"))
     for column, problem, remedy in (*faults, *format.faults(fields)):
         raise InputError(path, f"row {fields['row']}, column {column}", problem, remedy)
 
 
 def _check_units(path: Path, format: Format, table: list[Fields]) -> None:
-    """Refuse values in metres or radians, but where a person has checked the units of every row."""
+    """Reject values in metres or radians, but where a person has checked the units of every row."""
     if all(fields[UNITS_CHECKED] for fields in table):
         return
-    _check_span(path, table, LENGTHS, LEAST_SPAN_MM, METRES)
+    _check_span(path, table, LENGTHS, MIN_SPAN_MM, METRES)
     if format.mixed_lengths:
         _check_mixed(path, table, LENGTHS, SHORTEST_BESIDE_LONG_MM, LONG_MM, METRES)
     if format.mixed_limits:
@@ -608,7 +608,7 @@ def _check_units(path: Path, format: Format, table: list[Fields]) -> None:
 
 
 def _check_span(path: Path, table: list[Fields], columns: tuple[str, ...], least: float, mistaken: Mistaken) -> None:
-    """Refuse a table whose values are all too small."""
+    """Reject a table whose values are all too small."""
     present = [column for column in columns if column in table[0]]
     largest = max(_sizes(table, present))
     if "length" not in table[0] and 0 < largest < least:
@@ -619,7 +619,7 @@ def _check_span(path: Path, table: list[Fields], columns: tuple[str, ...], least
 def _check_mixed(
     path: Path, table: list[Fields], columns: tuple[str, ...], least: float, most: float, mistaken: Mistaken
 ) -> None:
-    """Refuse a row of small values beside rows of large ones."""
+    """Reject a row of small values beside rows of large ones."""
     present = [column for column in columns if column in table[0]]
     sizes = _sizes(table, present)
     for fields, size in zip(table, sizes):
@@ -635,7 +635,7 @@ def _sizes(table: list[Fields], columns: list[str]) -> list[float]:
 
 
 def _check_angles(path: Path, table: list[Fields]) -> None:
-    """Refuse poses that are all in radians; of single angles among degrees, which can be meant so, only warn."""
+    """Reject poses that are all in radians; of single angles among degrees, which can be meant so, only warn."""
     all_small = max(_sizes(table, [*_POSE, *_FURTHER])) < WIDEST_IN_RADIANS
     if all_small and _COORDINATES[0] in table[0]:
         _check_arcs(path, table)
@@ -651,7 +651,7 @@ def _check_angles(path: Path, table: list[Fields]) -> None:
 
 
 def _check_arcs(path: Path, table: list[Fields]) -> None:
-    """Refuse points that move by more than joints that turn so little can move them."""
+    """Reject points that move by more than joints that turn so little can move them."""
     first: dict[tuple[str, str], Fields] = {}
     whole = [row for row in table if all(row[column] is not None for column in _COORDINATES)]
     for row in whole:

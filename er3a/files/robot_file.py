@@ -11,24 +11,32 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
-from er3a.files.units import FARTHEST_MM, MOST_DEG, RADIANS_BELOW_DEG, Triple, check_degrees, look_like_radians, suspect
+from er3a.files.units import (
+    MAX_DEG,
+    MAX_DISTANCE_MM,
+    RADIANS_BELOW_DEG,
+    Triple,
+    check_degrees,
+    look_like_radians,
+    suspect,
+)
 from er3a.files.yaml_file import StrictModel
 from er3a.geometry.transforms import rot_z, transform
 from er3a.kinematics.chain import constant_links, joint_starts
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import in_si
 from er3a.robots.masses import Drives, LinkMass, MassBody, Masses, WristLoad, moved, no_body
-from er3a.robots.robot import MOST_JOINTS, Grade, PairRule, Robot, Visual
+from er3a.robots.robot import MAX_JOINTS, Grade, PairRule, Robot, Visual
 
 NAME_PATTERN = r"^[a-z0-9][a-z0-9_-]{0,63}$"
 HEAVIEST_LINK_KG = 20_000.0
 HEAVIEST_PAYLOAD_KG = 2_500.0
 """The strongest arms carry 2.3 t."""
 METRES_BELOW_MM = 0.5
-MOST_PACKED = 400_000  # letters of a link's corners or triangles
+MAX_PACKED = 400_000  # letters of a link's corners or triangles
 
 IMPOSSIBLE = {
-    "not_finite": "is no finite number",
+    "not_finite": "is not a finite number",
     "negative_mass": "the mass is below 0",
     "negative_moment": "a principal moment is below 0, which no body has",
     "triangle": "a principal moment exceeds the sum of the other two, which no body can have",
@@ -51,7 +59,7 @@ def _mass(value: float) -> float:
 
 Text = Annotated[str, Field(min_length=1, max_length=2000)]
 Name = Annotated[str, Field(pattern=NAME_PATTERN)]
-JointNumber = Annotated[int, Field(ge=1, le=MOST_JOINTS)]
+JointNumber = Annotated[int, Field(ge=1, le=MAX_JOINTS)]
 Mass = Annotated[float, AfterValidator(_mass)]
 Positive = Annotated[float, AfterValidator(_positive)]
 NotNegative = Annotated[float, Field(ge=0)]
@@ -92,7 +100,7 @@ class BodyFields(StrictModel):
             radius_mm = 1000 * float(np.sqrt(max(self.inertia_kg_m2[:3]) / self.mass_kg))
             if radius_mm > 100 * max(map(abs, self.centre_mm)) and max(map(abs, self.centre_mm)) > 0.02:
                 suspect(f"centre_mm: {self.centre_mm} mm may be metres")
-        if max(map(abs, self.centre_mm)) > FARTHEST_MM:
+        if max(map(abs, self.centre_mm)) > MAX_DISTANCE_MM:
             raise ValueError(f"centre_mm: {self.centre_mm} is more than 100 m | Write mm")
         if problem := no_body(self.body):
             remedy = "Give kg m^2 about the centre of mass: ixx, iyy, izz, ixy, ixz, iyz"
@@ -108,7 +116,7 @@ class BodyFields(StrictModel):
 class LinkRow(BodyFields):
     """The body of a link. Link 0 is the base; link k moves with row k of the table."""
 
-    link: Annotated[int, Field(ge=0, le=MOST_JOINTS)]
+    link: Annotated[int, Field(ge=0, le=MAX_JOINTS)]
 
 
 class JointOrigin(Placement):
@@ -131,7 +139,7 @@ class Inertia(Sourced):
 
     frame: Literal["joint", "dh", "urdf"]
     origins: list[JointOrigin] = []
-    links: Annotated[list[LinkRow], Field(min_length=1, max_length=MOST_JOINTS + 1)]
+    links: Annotated[list[LinkRow], Field(min_length=1, max_length=MAX_JOINTS + 1)]
 
     @model_validator(mode="after")
     def _frames_known(self):
@@ -171,7 +179,7 @@ class DriveRow(StrictModel):
 class DriveGroup(Sourced):
     """Drives, one row for each joint with known values."""
 
-    rows: Annotated[list[DriveRow], Field(min_length=1, max_length=MOST_JOINTS)]
+    rows: Annotated[list[DriveRow], Field(min_length=1, max_length=MAX_JOINTS)]
 
 
 class WristRow(StrictModel):
@@ -186,7 +194,7 @@ class WristLoadGroup(Sourced):
     """Rated payload, and allowed moments and inertias at the wrist's axes."""
 
     payload_kg: Positive | None = None
-    rows: Annotated[list[WristRow], Field(max_length=MOST_JOINTS)] = []
+    rows: Annotated[list[WristRow], Field(max_length=MAX_JOINTS)] = []
 
 
 class Weight(Sourced):
@@ -259,7 +267,7 @@ def link_masses(robot: Robot, inertia: Inertia) -> tuple[LinkMass, ...]:
 
 
 def _at_zero(robot: Robot, links: np.ndarray) -> np.ndarray:
-    """The frame (4, 4) that moves with the last of some joints, with all of them at 0, behind as many links."""
+    """The frame (4, 4) that moves with the last of some joints, with all of them at 0, after as many links."""
     T = np.eye(4)
     for link, turn in zip(links, np.where(robot.sliding, 0.0, joint_starts(robot))):
         T = T @ link @ rot_z(turn)
@@ -288,13 +296,13 @@ def _wrist(group: WristLoadGroup) -> WristLoad:
 SHORTEST_PLAIN_LENGTH_MM = 2.0
 LONGEST_LENGTH_MM = 20_000.0
 FAR_NORMAL_MM = 5_000.0
-FARTHEST_NORMAL_MM = 1e8  # of axes that are parallel to 0.001 mrad
+MAX_NORMAL_MM = 1e8  # of axes that are parallel to 0.001 mrad
 RESIDUE_MM = 1e-3
-LEAST_LONGEST_MM = 10.0
+MIN_LONGEST_MM = 10.0
 """A length as short as that is what a derivation leaves over, in mm or in metres."""
 FASTEST_DEG_S = 36_000.0
 FASTEST_MM_S = 100_000.0
-MOST_FACTOR = 100.0
+MAX_FACTOR = 100.0
 
 JointType = Literal["revolute", "prismatic"]
 
@@ -380,8 +388,8 @@ class JointSpeedRow(OfOneJoint):
 class WeightedJoints(StrictModel):
     """A sum of joints: each of ``joints`` times its number in ``factors``."""
 
-    joints: Annotated[list[JointNumber], Field(min_length=1, max_length=MOST_JOINTS)]
-    factors: Annotated[list[Annotated[float, Field(ge=-MOST_FACTOR, le=MOST_FACTOR)]], Field(min_length=1)]
+    joints: Annotated[list[JointNumber], Field(min_length=1, max_length=MAX_JOINTS)]
+    factors: Annotated[list[Annotated[float, Field(ge=-MAX_FACTOR, le=MAX_FACTOR)]], Field(min_length=1)]
 
     @model_validator(mode="after")
     def _a_factor_each(self):
@@ -427,7 +435,7 @@ class Zero(Sourced):
 
 class Limits(Sourced):
     rows: list[JointLimitRow]
-    combined: Annotated[list[CombinedLimitRow], Field(max_length=MOST_JOINTS)] = []
+    combined: Annotated[list[CombinedLimitRow], Field(max_length=MAX_JOINTS)] = []
 
 
 class Speeds(Sourced):
@@ -438,7 +446,7 @@ class Coupling(Sourced):
     """Rows of the table that are moved by sums of joints. A row that is not listed is moved by the joint of its
     number."""
 
-    rows: Annotated[list[CouplingRow], Field(min_length=1, max_length=MOST_JOINTS)]
+    rows: Annotated[list[CouplingRow], Field(min_length=1, max_length=MAX_JOINTS)]
 
 
 class SourcedPlacement(Placement, Sourced):
@@ -448,7 +456,7 @@ class SourcedPlacement(Placement, Sourced):
 class Capsule(StrictModel):
     """All points within ``radius_mm`` of the line between two points, in the frame that turns with joint ``link``."""
 
-    link: Annotated[int, Field(ge=0, le=MOST_JOINTS)]
+    link: Annotated[int, Field(ge=0, le=MAX_JOINTS)]
     from_mm: Triple
     to_mm: Triple
     radius_mm: Annotated[float, Field(ge=SHORTEST_PLAIN_LENGTH_MM, le=LONGEST_LENGTH_MM)]
@@ -501,8 +509,8 @@ class LinkVisual(StrictModel):
     """
 
     link: Annotated[int, Field(ge=0)]
-    points_mm: Annotated[str, Field(max_length=MOST_PACKED)]
-    faces: Annotated[str, Field(max_length=MOST_PACKED)]
+    points_mm: Annotated[str, Field(max_length=MAX_PACKED)]
+    faces: Annotated[str, Field(max_length=MAX_PACKED)]
 
     @model_validator(mode="after")
     def _triangles(self):
@@ -510,7 +518,7 @@ class LinkVisual(StrictModel):
         return self
 
     def visual(self) -> Visual:
-        """In metres; ``ValueError`` for what is no triangles."""
+        """In metres; ``ValueError`` for anything but triangles."""
         try:
             points, faces = (
                 np.frombuffer(base64.b64decode(text, validate=True), kind).reshape(-1, 3)
@@ -551,7 +559,7 @@ class CollisionPairs(StrictModel):
         )
 
     def check(self, known: Collection[str]) -> None:
-        """Refuse unknown names, and a pair that is decided twice: ``ValueError``."""
+        """Reject unknown names, and a pair that is decided twice: ``ValueError``."""
         seen: set[frozenset[str]] = set()
         for key in ("allow", "watch"):
             for i, entry in enumerate(getattr(self, key)):
@@ -583,7 +591,7 @@ class RobotFile(StrictModel):
     flange: SourcedPlacement | None = None
     tool: SourcedPlacement | None = None
     envelopes: Envelopes | None = None
-    visuals: Annotated[list[LinkVisual], Field(max_length=MOST_JOINTS + 1)] = []
+    visuals: Annotated[list[LinkVisual], Field(max_length=MAX_JOINTS + 1)] = []
     collision: CollisionPairs | None = None
     inertia: Inertia | None = None
     drives: DriveGroup | None = None
@@ -593,8 +601,8 @@ class RobotFile(StrictModel):
     @model_validator(mode="after")
     def _rows_in_order(self):
         rows, joints = len(self.dh.rows), len(self.limits.rows)
-        if not 1 <= rows <= MOST_JOINTS:
-            raise ValueError(f"dh.rows: a table of {rows} joints | er3a reads serial arms of 1 to {MOST_JOINTS} joints")
+        if not 1 <= rows <= MAX_JOINTS:
+            raise ValueError(f"dh.rows: a table of {rows} joints | er3a reads serial arms of 1 to {MAX_JOINTS} joints")
         if self.coupling and not 1 <= joints <= rows:
             raise ValueError(
                 f"limits.rows: {joints} joints for {rows} rows of the table | Every joint moves at least one row"
@@ -700,7 +708,7 @@ class RobotFile(StrictModel):
             suspect(f"dh.rows, zero.rows: {small} deg may be radians")
         for key in ("base", "flange", "tool"):
             check_placement(key, getattr(self, key), self.dh.calibrated and key == "base")
-        longest, least = max(max(abs(row.a_mm), abs(row.d_mm)) for row in self.dh.rows), LEAST_LONGEST_MM
+        longest, least = max(max(abs(row.a_mm), abs(row.d_mm)) for row in self.dh.rows), MIN_LONGEST_MM
         if self.dh.calibrated:  # lengths that were derived may all be short
             placed = [abs(value) for each in (self.base, self.flange, self.tool) if each for value in each.xyz_mm]
             longest, least = max(longest, *placed, 0.0), SHORTEST_PLAIN_LENGTH_MM
@@ -711,7 +719,7 @@ class RobotFile(StrictModel):
         return self
 
     def _check_far_normals(self) -> None:
-        """Refuse d of hundreds of metres that do not cancel, and bodies in frames as far away."""
+        """Reject d of hundreds of metres that do not cancel, and bodies in frames as far away."""
         if any(abs(row.d_mm) > LONGEST_LENGTH_MM for row in self.dh.rows) and not self.dh.has_far_normals:
             problem = "dh.rows: d of more than 20 m that does not cancel between nearly parallel axes"
             raise ValueError(f"{problem} | Write the lengths in mm")
@@ -750,7 +758,7 @@ def _kind(sliding: bool) -> str:
 
 
 def _check_limit(field: str, row: JointLimitRow | CombinedLimitRow, sliding: bool) -> None:
-    """Refuse limits in the unit of the other type of joint, half of them, crossed ones, and unlikely ones."""
+    """Reject limits in the unit of the other type of joint, half of them, crossed ones, and unlikely ones."""
     named = f"joint {row.joint}" if isinstance(row, JointLimitRow) else "the sum"
     degrees, millimetres = (row.lower_deg, row.upper_deg), (row.lower_mm, row.upper_mm)
     own, other, unit = (millimetres, degrees, "mm") if sliding else (degrees, millimetres, "deg")
@@ -764,9 +772,9 @@ def _check_limit(field: str, row: JointLimitRow | CombinedLimitRow, sliding: boo
         raise ValueError(f"{field}: {named} is {_kind(sliding)} | Write lower_{unit} and upper_{unit}")
     if lower > upper:
         raise ValueError(f"{field}: {named} has lower_{unit} {lower:g} above upper_{unit} {upper:g} | Swap them")
-    if not sliding and max(abs(lower), abs(upper)) > MOST_DEG:
+    if not sliding and max(abs(lower), abs(upper)) > MAX_DEG:
         raise ValueError(f"{field}: {named} turns more than ten times | Check the value")
-    if sliding and max(abs(lower), abs(upper)) > FARTHEST_MM:
+    if sliding and max(abs(lower), abs(upper)) > MAX_DISTANCE_MM:
         raise ValueError(f"{field}: {named} slides more than 100 m | Write mm, not micrometres")
     if sliding and 0 < max(abs(lower), abs(upper)) < SHORTEST_PLAIN_LENGTH_MM:
         suspect(f"{field}: {lower:g} to {upper:g} mm may be metres")
@@ -782,7 +790,7 @@ def coupling_matrix(group: Coupling, rows: int, joints: int) -> Reals:
 
 
 def check_placement(field: str, placement: Placement | None, calibrated: bool = False) -> None:
-    """Refuse a placement that is too far away, as ``ValueError`` with ``field: problem | remedy``; warn of units, but
+    """Reject a placement that is too far away, as ``ValueError`` with ``field: problem | remedy``; warn of units, but
     not of lengths below 2 mm that were calibrated."""
     if placement is None:
         return
@@ -790,7 +798,7 @@ def check_placement(field: str, placement: Placement | None, calibrated: bool = 
         suspect(f"{field}.xyz_mm: {placement.xyz_mm} mm may be metres")
     if look_like_radians(placement.rpy_deg):
         suspect(f"{field}.rpy_deg: {placement.rpy_deg} deg may be radians")
-    if max(abs(value) for value in placement.xyz_mm) > FARTHEST_MM:
+    if max(abs(value) for value in placement.xyz_mm) > MAX_DISTANCE_MM:
         raise ValueError(f"{field}.xyz_mm: {placement.xyz_mm} is more than 100 m | Write mm, not micrometres")
     for i, value in enumerate(placement.rpy_deg):
         _check_angle(f"{field}.rpy_deg[{i}]", value)
@@ -798,7 +806,7 @@ def check_placement(field: str, placement: Placement | None, calibrated: bool = 
 
 def _check_length(field: str, value: float, calibrated: bool) -> None:
     far = abs(value) > LONGEST_LENGTH_MM
-    if far and not (calibrated and field.endswith("d_mm") and abs(value) <= FARTHEST_NORMAL_MM):
+    if far and not (calibrated and field.endswith("d_mm") and abs(value) <= MAX_NORMAL_MM):
         remedy = "Write the length in mm"
         if field.endswith("d_mm"):
             remedy += "; if rows cancel each other (a factory's calibration), set dh.calibrated: true"
@@ -822,5 +830,5 @@ def far_normals(rows: Sequence[tuple[float, float]]) -> bool:
 
 
 def _check_angle(field: str, value: float) -> None:
-    if abs(value) > MOST_DEG:
-        raise ValueError(f"{field}: {value:g} deg is more than ten turns | Write degrees within +-{MOST_DEG:g}")
+    if abs(value) > MAX_DEG:
+        raise ValueError(f"{field}: {value:g} deg is more than ten turns | Write degrees within +-{MAX_DEG:g}")

@@ -70,7 +70,7 @@ def read_robot(path: Path) -> robot_file.RobotFile:
 
 
 def robot_path(name_or_path: str | Path) -> Path:
-    """The file that a robot's name, or a path ending in .yaml, stands for."""
+    """The file that a robot's name, or a path ending in .yaml, refers to."""
     text = str(name_or_path)
     if text.endswith((".yaml", ".yml")):
         return Path(text)
@@ -83,7 +83,7 @@ def robot_path(name_or_path: str | Path) -> Path:
 
 
 def robot_of(content: robot_file.RobotFile) -> Robot:
-    """The model behind a checked file: metres and radians."""
+    """The model that a checked file describes: metres and radians."""
     groups = ("dh", "zero", "limits", "speeds", "coupling", "base", "flange", "tool", "envelopes", *MASS_GROUPS)
     present = {group: getattr(content, group) for group in groups if getattr(content, group) is not None}
     rows, joints = content.dh.rows, len(content.limits.rows)

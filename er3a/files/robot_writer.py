@@ -13,7 +13,7 @@ import yaml
 from er3a.errors import InputWarning
 from er3a.files.kept_files import write_atomically
 from er3a.files.robot_file import (
-    LEAST_LONGEST_MM,
+    MIN_LONGEST_MM,
     RESIDUE_MM,
     SHORTEST_PLAIN_LENGTH_MM,
     SLIDING,
@@ -151,7 +151,7 @@ def robot_file(robot: Robot, path: Path | None = None) -> RobotFile:
 def _short(lengths_mm: np.ndarray) -> bool:
     """Whether a table has lengths so short that a person's would be taken for metres."""
     short = (lengths_mm > 0) & (lengths_mm < SHORTEST_PLAIN_LENGTH_MM)
-    return bool(short.any() or 0 < lengths_mm.max() < LEAST_LONGEST_MM)
+    return bool(short.any() or 0 < lengths_mm.max() < MIN_LONGEST_MM)
 
 
 def _shifted(base: np.ndarray) -> bool:

@@ -14,15 +14,15 @@ from er3a.collision import scene as library
 from er3a.files.kept_files import own_or_shipped
 from er3a.files.pieces_file import load_pieces
 from er3a.files.robot_file import CollisionPairs, DecidedPair, Name, PiecesPath, Text
-from er3a.files.units import FARTHEST_MM, PositionMm, RpyDeg, Triple
+from er3a.files.units import MAX_DISTANCE_MM, PositionMm, RpyDeg, Triple
 from er3a.files.yaml_file import StrictModel, load
 from er3a.geometry.transforms import transform
 
 SMALLEST_OBSTACLE_MM = 2.0
-MOST_LINKS = 30
+MAX_LINKS = 30
 SHAPES = ("boxes", "cylinders", "spheres", "planes", "meshes")
 
-Length = Annotated[float, Field(gt=0, le=FARTHEST_MM)]
+Length = Annotated[float, Field(gt=0, le=MAX_DISTANCE_MM)]
 
 
 class Obstacle(StrictModel):
@@ -75,7 +75,7 @@ class MeshObstacle(Obstacle):
     pieces: PiecesPath
 
     def solid(self) -> library.Mesh:
-        """In the units of the library; :class:`InputError` for a file that is no such pieces."""
+        """In the units of the library; :class:`InputError` for a file without such pieces."""
         content = load_pieces(own_or_shipped(self.pieces))
         return library.Mesh(self.name, self.place(), content.pieces(), content.uncovered_mm / 1000)
 
@@ -101,7 +101,7 @@ class PlaneObstacle(StrictModel):
 
     name: Name
     normal: Triple
-    offset_mm: Annotated[float, Field(ge=-FARTHEST_MM, le=FARTHEST_MM)]
+    offset_mm: Annotated[float, Field(ge=-MAX_DISTANCE_MM, le=MAX_DISTANCE_MM)]
 
     @field_validator("normal")
     @classmethod
@@ -168,7 +168,7 @@ class SceneFile(StrictModel):
                     seen[obstacle.name] = where
         if not seen:
             raise ValueError(f"the scene is empty | Add an obstacle under {', '.join(SHAPES)}")
-        links = ["base", *(f"link_{k}" for k in range(1, MOST_LINKS + 1))]
+        links = ["base", *(f"link_{k}" for k in range(1, MAX_LINKS + 1))]
         try:
             self.collision.check({*seen, *links})
         except ValueError as error:

@@ -26,7 +26,7 @@ from er3a.files.yaml_file import StrictModel, check_own_names, load, parse
 from er3a.geometry.transforms import ORTHONORMAL_TOLERANCE, posed, rot_y, rot_z, transform
 from er3a.kinematics.forward import forward
 from er3a.kinematics.solutions import Target, TargetOutcome
-from er3a.robots.robot import MOST_JOINTS, Robot
+from er3a.robots.robot import MAX_JOINTS, Robot
 
 POSITION = ("x_mm", "y_mm", "z_mm")
 FORMS: dict[str, tuple[str, ...]] = {
@@ -37,7 +37,7 @@ FORMS: dict[str, tuple[str, ...]] = {
 }
 KNOWN_FORMS = "; or ".join(", ".join(names[:4]) + (" ..." if len(names) > 4 else "") for names in FORMS.values())
 TEXTS = ("note", "expect")
-REFERENCE = tuple(f"q{joint}_ref_deg" for joint in range(1, MOST_JOINTS + 1))
+REFERENCE = tuple(f"q{joint}_ref_deg" for joint in range(1, MAX_JOINTS + 1))
 
 
 def read_target_table(path: str | Path) -> list[dict[str, Any]]:
@@ -81,7 +81,7 @@ def _target(row: dict[str, Any], form: str, reference: tuple[str, ...]) -> dict[
     return target
 
 
-MOST_TARGETS = 20_000
+MAX_TARGETS = 20_000
 UNIT_LENGTH_TOLERANCE = 1e-6
 EULER_KEY = re.compile(r"euler\w*|[xyz]{3}(_(deg|rad))?", re.IGNORECASE)
 
@@ -227,8 +227,8 @@ class TargetFile(StrictModel):
     def _some_but_not_many(cls, targets):
         if not targets:
             raise ValueError("the list is empty | Add a target, or take the robot out of the study")
-        if len(targets) > MOST_TARGETS:
-            raise ValueError(f"{len(targets)} targets are too many | Split the file; {MOST_TARGETS} at most")
+        if len(targets) > MAX_TARGETS:
+            raise ValueError(f"{len(targets)} targets are too many | Split the file; {MAX_TARGETS} at most")
         return targets
 
     @model_validator(mode="after")

@@ -17,13 +17,13 @@ from pydantic import AfterValidator, Field
 from er3a.errors import InputError, InputWarning
 from er3a.numerics.arrays import Reals
 from er3a.robots.joint_limits import meant
-from er3a.robots.robot import MOST_JOINTS, Robot
+from er3a.robots.robot import MAX_JOINTS, Robot
 
 METRES_BELOW_MM = 5.0
-FARTHEST_MM = 100_000.0
+MAX_DISTANCE_MM = 100_000.0
 RADIANS_BELOW_DEG = 6.3
-MOST_DEG = 3600.0
-LEAST_SPAN_MM = 10.0
+MAX_DEG = 3600.0
+MIN_SPAN_MM = 10.0
 """A table whose lengths are all below is in metres."""
 WIDEST_IN_RADIANS = 2.01 * math.pi
 """A table whose angles (deg) are all below is in radians."""
@@ -31,17 +31,17 @@ WHOLE_DEGREES = "nothing is to be done"
 
 
 def check_millimetres(values: Sequence[float]) -> None:
-    """Refuse lengths that can only be metres (all below 5, and not all zero), and any over 100 m."""
+    """Reject lengths that can only be metres (all below 5, and not all zero), and any over 100 m."""
     largest = max(abs(value) for value in values)
     shown = ", ".join(f"{value:g}" for value in values)
     if 0 < largest < METRES_BELOW_MM:
         raise ValueError(f"{shown} mm can only be metres | Multiply by 1000")
-    if largest > FARTHEST_MM:
+    if largest > MAX_DISTANCE_MM:
         raise ValueError(f"{shown} mm is more than 100 m | Write mm, not micrometres")
 
 
 def check_degrees(values: Sequence[float], otherwise: str, slides: bool = False) -> None:
-    """Refuse angles of more than ten turns; warn of those that look like radians.
+    """Reject angles of more than ten turns; warn of those that look like radians.
 
     All within +-6.3, they look so if two are not whole numbers.
 
@@ -52,9 +52,9 @@ def check_degrees(values: Sequence[float], otherwise: str, slides: bool = False)
     """
     largest = max(abs(value) for value in values)
     shown = ", ".join(f"{value:g}" for value in values)
-    if largest > (FARTHEST_MM if slides else MOST_DEG):
+    if largest > (MAX_DISTANCE_MM if slides else MAX_DEG):
         much = "more than ten turns, or than 100 m" if slides else "more than ten turns"
-        raise ValueError(f"{shown} deg is {much} | Write degrees within +-{MOST_DEG:g}")
+        raise ValueError(f"{shown} deg is {much} | Write degrees within +-{MAX_DEG:g}")
     broken = sum(value != round(value) for value in values)
     if largest < RADIANS_BELOW_DEG and broken >= 2:
         converted = ", ".join(f"{math.degrees(value):.4g}" for value in values)
@@ -62,7 +62,7 @@ def check_degrees(values: Sequence[float], otherwise: str, slides: bool = False)
 
 
 def suspect(text: str) -> None:
-    """Warn of something that can be meant as it is written, and looks like a slip."""
+    """Warn of a value that may be right, and looks like a mistake."""
     warnings.warn(text, InputWarning, stacklevel=3)
 
 
@@ -87,10 +87,10 @@ def joint_values(robot: Robot, values: Sequence[float], field: str) -> Reals:
     a joint would turn more than ten times."""
     given = joint_rates(robot, values, field)
     turned = np.where(robot.slides, 0.0, np.abs(given))
-    if turned.max(initial=0.0) > np.radians(MOST_DEG):
+    if turned.max(initial=0.0) > np.radians(MAX_DEG):
         joint = int(turned.argmax()) + 1
         problem = f"{values[joint - 1]:g} deg of joint {joint} is more than ten turns"
-        raise InputError(None, field, problem, f"Write degrees within +-{MOST_DEG:g}")
+        raise InputError(None, field, problem, f"Write degrees within +-{MAX_DEG:g}")
     return given
 
 
@@ -110,7 +110,7 @@ def as_millimetres(values: list[float]) -> list[float]:
 
 
 Triple = Annotated[list[float], Field(min_length=3, max_length=3)]
-Joints = Annotated[list[float], Field(min_length=1, max_length=MOST_JOINTS)]
+Joints = Annotated[list[float], Field(min_length=1, max_length=MAX_JOINTS)]
 """One value for each joint: degrees, or mm of those that slide."""
 PositionMm = Annotated[Triple, AfterValidator(as_millimetres)]
 RpyDeg = Annotated[Triple, as_degrees(WHOLE_DEGREES)]

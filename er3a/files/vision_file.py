@@ -23,7 +23,7 @@ from er3a.vision.next_view import FieldOfView
 from er3a.vision.point_error import ArmAccuracy
 from er3a.vision.vision_findings import GraspOutcome
 
-MOST_OBJECTS = 30
+MAX_OBJECTS = 30
 Angle = Annotated[float, Field(gt=0, lt=180)]
 Tolerances = Annotated[list[Positive], Field(min_length=3, max_length=3)]
 
@@ -153,7 +153,7 @@ class VisionFile(StrictModel):
     gripper: GripperEntry
     home_deg: Annotated[list[float], Field(min_length=1, max_length=16)]
     picture_deg: Annotated[list[float], Field(min_length=1, max_length=16)] | None = None
-    objects: Annotated[list[ObjectEntry], Field(min_length=1, max_length=MOST_OBJECTS)]
+    objects: Annotated[list[ObjectEntry], Field(min_length=1, max_length=MAX_OBJECTS)]
 
     @model_validator(mode="after")
     def _own_names(self) -> Self:

@@ -49,7 +49,7 @@ class StrictModel(BaseModel):
 
 
 class _PlainLoader(Composer, yaml.CSafeLoader):
-    """Safe YAML loader with numbers as in YAML 1.2, which refuses a key written twice, aliases and tags.
+    """Safe YAML loader with numbers as in YAML 1.2, which rejects a key written twice, aliases and tags.
 
     YAML 1.1 would read ``0650`` as octal 424, ``1:30`` as 90, and ``1e3`` as a text; a tag (``!!int 0650``) would
     bring that back. The text is parsed by libyaml; Python's composer shows each node's event before it is built.
@@ -170,7 +170,7 @@ def load(model: type[Model], path: str | Path) -> Model:
 
 
 def check_own_names(field: str, names: list[str]) -> None:
-    """Refuse a name that an earlier entry of a list has too, as ``ValueError`` that names the entry."""
+    """Reject a name that an earlier entry of a list has too, as ``ValueError`` that names the entry."""
     places: dict[str, int] = {}
     for i, name in enumerate(names):
         if (first := places.setdefault(name, i)) < i:

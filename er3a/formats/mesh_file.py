@@ -16,8 +16,8 @@ from er3a.numerics.arrays import Integers, Reals
 
 Unit = Literal["m", "mm"]
 FORMATS = (".stl", ".obj", ".dae", ".glb")
-MOST_TRIANGLES = 1_000_000
-MOST_BYTES = 200_000_000
+MAX_TRIANGLES = 1_000_000
+MAX_MESH_BYTES = 200_000_000
 SMALLEST, LARGEST = 2e-3, 100.0  # m, of a mesh in all
 LARGEST_OF_LINK = 20.0  # m
 
@@ -36,7 +36,7 @@ def read_mesh(path: str | Path, unit: Unit) -> ClosedMesh:
     Raises
     ------
     InputError
-        for a file that is no such mesh, is too large, is not closed, or can only be in the other unit
+        for a file that is not such a mesh, is too large, is not closed, or can only be in the other unit
     """
     path = Path(path)
     mesh = _closed(path, _loaded(path), 1.0 if unit == "m" else 1e-3)
@@ -64,7 +64,7 @@ def read_link_vertices(path: Path, scale: Reals) -> Reals:
     Raises
     ------
     InputError
-        for a file that is no mesh, is too large, or has a size that no link has
+        for a file that is not a mesh, is too large, or has a size that no link has
     """
     loaded = _loaded(path)
     return np.asarray(loaded.vertices, float) * _link_scale(path, loaded, scale)
@@ -98,7 +98,7 @@ def _link_scale(path: Path, loaded: Any, scale: Reals) -> Reals:
 def _loaded(path: Path) -> Any:
     """A mesh as trimesh reads it."""
     if path.suffix.lower() not in FORMATS:
-        raise InputError(path, None, f"'{path.suffix}' is no format of meshes", f"Save it as {', '.join(FORMATS)}")
+        raise InputError(path, None, f"'{path.suffix}' is not a mesh format", f"Save it as {', '.join(FORMATS)}")
     if not path.is_file():
         raise InputError(path, None, "there is no such file", "Check the path")
     _refuse_large(path)
@@ -113,10 +113,10 @@ def _loaded(path: Path) -> Any:
         raise InputError(path, None, f"can't be read as a mesh ({reason})", "Save the mesh again") from None
     if not isinstance(loaded, trimesh.Trimesh) or not len(loaded.faces):
         raise InputError(path, None, "holds no triangles", "Save the surface as triangles")
-    if len(loaded.faces) > MOST_TRIANGLES:
+    if len(loaded.faces) > MAX_TRIANGLES:
         raise _too_many(path, len(loaded.faces))
     if not np.isfinite(loaded.vertices).all():
-        raise InputError(path, None, "has corners that are no numbers", "Save the mesh again")
+        raise InputError(path, None, "has corners that are not numbers", "Save the mesh again")
     return loaded
 
 
@@ -126,15 +126,15 @@ def _refuse_large(path: Path) -> None:
     if path.suffix.lower() == ".stl" and size >= 84:
         with path.open("rb") as file:
             count = struct.unpack("<I", file.read(84)[80:])[0]
-        if size == 84 + 50 * count and count > MOST_TRIANGLES:
+        if size == 84 + 50 * count and count > MAX_TRIANGLES:
             raise _too_many(path, count)
-    if size > MOST_BYTES:
-        raise InputError(path, None, f"larger than {MOST_BYTES // 1_000_000} MB", "Simplify the mesh")
+    if size > MAX_MESH_BYTES:
+        raise InputError(path, None, f"larger than {MAX_MESH_BYTES // 1_000_000} MB", "Simplify the mesh")
 
 
 def _too_many(path: Path, count: int) -> InputError:
     remedy = "Simplify it: links are known to millimetres"
-    return InputError(path, None, f"has {count} triangles; at most {MOST_TRIANGLES} are read", remedy)
+    return InputError(path, None, f"has {count} triangles; at most {MAX_TRIANGLES} are read", remedy)
 
 
 def _check_size(path: Path, size: float, unit: Unit) -> None:

@@ -41,7 +41,7 @@ from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import forward, frames
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.quasi_random import quasi_random_points
-from er3a.robots.robot import MOST_JOINTS, ConvexPiece, Envelope, Robot, Source, Visual, robot_name
+from er3a.robots.robot import MAX_JOINTS, ConvexPiece, Envelope, Robot, Source, Visual, robot_name
 
 PARALLEL = 1e-12
 NEARLY_PARALLEL = math.radians(1.0)  # as far as arms are made wrong; on links of 0.1 m a normal is 6 m away, or more
@@ -52,7 +52,7 @@ TIE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class AxisTable:
-    """A standard table with ``theta = direction * q + offset`` and what stands before and behind it.
+    """A standard table with ``theta = direction * q + offset`` and the transforms before and after it.
 
     For a prismatic joint the same table holds with theta at ``offset`` and ``d + direction * q``.
 
@@ -115,7 +115,7 @@ def table_from_axes(directions: Reals, points: Reals, T_base_flange: Reals) -> A
 
 
 def _feet(directions: Reals, points: Reals, flange: Reals) -> tuple[Reals, Reals]:
-    """Feet of the common normals on each axis: from the axis before (n, 3), and to the axis behind (n, 3)."""
+    """Feet of the common normals on each axis: from the axis before (n, 3), and to the axis after (n, 3)."""
     joints = len(directions)
     incoming, outgoing = np.empty((joints, 3)), np.empty((joints, 3))
     incoming[0] = _foot(np.zeros(3), directions[0], points[0])
@@ -194,11 +194,11 @@ def _frame(x: Reals, z: Reals, origin: Reals) -> Reals:
 
 MISFIT_POSES = 1000
 NO_RANGE = math.pi
-NO_SLIDE_M, MOST_SLID_M = 1.0, 100.0
+NO_SLIDE_M, MAX_SLID_M = 1.0, 100.0
 LOOKED_AT, TURNED_ALONE = 12, 75.0  # poses, deg
 STEP_RAD = math.pi / 12
-LEAST_DECIMALS = 4  # of lengths in m: a file that prints fewer left zeros out
-MANY_TURNS, MOST_TURNED = 4 * math.pi + 0.01, 20 * math.pi
+MIN_DECIMALS = 4  # of lengths in m: a file that prints fewer left zeros out
+MANY_TURNS, MAX_TURNED = 4 * math.pi + 0.01, 20 * math.pi
 FOLLOWS = 1e-6  # rad or m
 DRAWN_TRIANGLES = 4000  # of an arm: what a page paints at each step of a motion
 FASTEST = 100.0  # rad/s or m/s; what URDFs give above stands for a speed that no one knows
@@ -385,15 +385,15 @@ def _rounding(root: ElementTree.Element, chain: urdf_tree.UrdfChain) -> tuple[fl
         origin for joint in root.findall("joint") if joint.get("name") in names for origin in joint.iter("origin")
     ]
     lengths, angles = ([word for origin in origins for word in origin.get(key, "").split()] for key in ("xyz", "rpy"))
-    digits = max((_decimals(word) for word in lengths if float(word)), default=LEAST_DECIMALS)
-    most = max((_decimals(word) for word in angles if float(word)), default=LEAST_DECIMALS)
+    digits = max((_decimals(word) for word in lengths if float(word)), default=MIN_DECIMALS)
+    most = max((_decimals(word) for word in angles if float(word)), default=MIN_DECIMALS)
     total = 0.0
     for word in angles:
         value, own = abs(float(word)), 0.5 * 10.0 ** -_decimals(word)
         lacks = abs(value - round(value / STEP_RAD) * STEP_RAD)
         total += 0.0 if not value else lacks if lacks <= own else 0.5 * 10.0**-most
     counted = sum(any(float(word) for word in origin.get("xyz", "").split()) for origin in origins)
-    return counted * 0.5 * 10.0 ** -max(digits, LEAST_DECIMALS), total
+    return counted * 0.5 * 10.0 ** -max(digits, MIN_DECIMALS), total
 
 
 def _decimals(word: str) -> int:
@@ -406,10 +406,10 @@ def _robot_of_chain(
 ) -> tuple[Robot, list[urdf_tree.UrdfJoint], Reals, Reals, list[str]]:
     """The robot without shapes and masses, its joints, what they move (m, n) and its constant (m,), notes on limits."""
     moving = [joint for joint in found.joints if joint.moves]
-    if not 1 <= len(moving) <= MOST_JOINTS:
+    if not 1 <= len(moving) <= MAX_JOINTS:
         ends = f"from {found.joints[0].parent} to {found.joints[-1].child}" if found.joints else "of no joints"
         problem = f"the chain {ends} has {len(moving)} moving joints"
-        raise InputError(path, "joint", problem, f"er3a reads 1 to {MOST_JOINTS} in series; name --base and --tip")
+        raise InputError(path, "joint", problem, f"er3a reads 1 to {MAX_JOINTS} in series; name --base and --tip")
     sources, coupling, shift = _coupling(path, found, moving)
     directions, points, T = _axes_at_zero(found.joints, shift)
     sliding = np.array([joint.type == "prismatic" for joint in moving])
@@ -549,7 +549,7 @@ def _coupling(
         while joint.mimic is not None:
             follows = found.all.get(joint.mimic.source)
             if follows is None or follows.name in seen or not follows.moves:
-                problem = f"follows '{joint.mimic.source}', which is no joint that moves by itself"
+                problem = f"follows '{joint.mimic.source}', which is not an independent joint"
                 raise InputError(path, f"joint {joint.name}", problem, "Correct its <mimic>")
             factor, offset = factor * joint.mimic.multiplier, offset + factor * joint.mimic.offset
             joint = follows
@@ -599,15 +599,15 @@ def _limits(path: Path, sources: list[urdf_tree.UrdfJoint]) -> tuple[Reals, list
             half, shown = (NO_RANGE, "180 deg") if turns else (NO_SLIDE_M, f"{NO_SLIDE_M * 1000:g} mm")
             notes.append(f"joint {joint.name} has {has}: +-{shown} were assumed")
             lower, upper = -half, half
-        elif joint.type == "revolute" and max(abs(lower), abs(upper)) > MOST_TURNED:
+        elif joint.type == "revolute" and max(abs(lower), abs(upper)) > MAX_TURNED:
             notes.append(f"joint {joint.name} has limits beyond ten turns (in radians): +-180 deg were assumed")
             lower, upper = -NO_RANGE, NO_RANGE
         elif joint.type == "revolute" and max(abs(lower), abs(upper)) > MANY_TURNS:
             shown = f"{lower:g} to {upper:g} rad"
             notes.append(f"joint {joint.name} has limits of more than two turns ({shown}); a URDF's are in radians")
-        elif joint.type == "prismatic" and max(abs(lower), abs(upper)) > MOST_SLID_M:
-            notes.append(f"joint {joint.name} has limits beyond {MOST_SLID_M:g} m: it was held to that")
-            lower, upper = max(lower, -MOST_SLID_M), min(upper, MOST_SLID_M)
+        elif joint.type == "prismatic" and max(abs(lower), abs(upper)) > MAX_SLID_M:
+            notes.append(f"joint {joint.name} has limits beyond {MAX_SLID_M:g} m: it was held to that")
+            lower, upper = max(lower, -MAX_SLID_M), min(upper, MAX_SLID_M)
         rows.append((lower, upper))
     return np.array(rows), notes
 

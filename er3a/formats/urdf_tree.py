@@ -46,7 +46,7 @@ MOVING = ("revolute", "continuous", "prismatic")
 FREE = ("floating", "planar")
 SNAP_RAD = 1e-4
 ROUNDED_RAD = 2e-3  # an angle so near to a right one may be that, rounded: 1.57, 1.571, 3.14
-MOST_BYTES = 20_000_000
+MAX_BYTES = 20_000_000
 ARM_JOINTS = 4  # so many joints before a branching make what follows a hand rather than an arm
 FINGER_JOINTS = 4
 GRIPPER = re.compile("gripper|finger|jaw", re.IGNORECASE)
@@ -55,7 +55,7 @@ EXPAND = "Expand it first: xacro FILE > arm.urdf"
 DEFINITIONS = ("property", "arg")  # of xacro
 PREFIXED = re.compile(r"(</?[\w.-]+):([\w.-]+)")
 WHOLE_TURN = 2 * math.pi + SNAP_RAD
-FAR_APART_M, MOST_APART_M = 5.0, 100.0
+FAR_APART_M, MAX_APART_M = 5.0, 100.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +69,7 @@ class Mimic:
 
 @dataclass(frozen=True, eq=False)
 class UrdfJoint:
-    """One joint: where it stands in its parent link's frame, and how it moves.
+    """One joint: its place in its parent link's frame, and how it moves.
 
     ``lower``, ``upper``, ``speed`` are in rad or m, NaN where the file says nothing.
     """
@@ -133,7 +133,7 @@ class Tree:
             self.depth[joint.name] = joint.independent + max((self.depth[name] for name in behind), default=0)
 
     def _outwards(self) -> list[UrdfJoint]:
-        """All joints, each before those behind it; :class:`InputError` for joints that no root leads to."""
+        """All joints, each before those after it; :class:`InputError` for joints that no root leads to."""
         found: list[UrdfJoint] = []
         todo = [joint for link in self.by_parent if link not in self.by_child for joint in self.by_parent[link]]
         while todo:
@@ -154,12 +154,12 @@ class Tree:
         return found[::-1]
 
     def onward(self, link: str) -> tuple[list[UrdfJoint], list[UrdfJoint]]:
-        """The joints at a link behind which anything moves, and those behind which anything moves by itself."""
+        """The joints at a link after which anything moves, and those after which anything moves by itself."""
         moving = [joint for joint in self.by_parent.get(link, []) if self.moves[joint.name]]
         return moving, [joint for joint in moving if self.depth[joint.name]]
 
     def hand_begins(self, moving: list[UrdfJoint], count: int) -> bool:
-        """Whether what moves behind a link, after so many joints, is a gripper or a hand."""
+        """Whether what moves after a link, after so many joints, is a gripper or a hand."""
         if count < ARM_JOINTS or any(self.depth[joint.name] > FINGER_JOINTS for joint in moving):
             return False
         alone = [
@@ -168,7 +168,7 @@ class Tree:
         return len(moving) > 1 or len(alone) == 1
 
     def ends(self, link: str, count: int = 0) -> list[str]:
-        """Links behind a link, which has so many moving joints before it, at which an arm may end."""
+        """Links after a link, which has so many moving joints before it, at which an arm may end."""
         found, todo = list[str](), [(link, count)]
         while todo:
             link, count = todo.pop()
@@ -182,7 +182,7 @@ class Tree:
         return found
 
     def _tail(self, link: str) -> str:
-        """The end of the fixed joints behind a link, or the link itself where they branch."""
+        """The end of the fixed joints after a link, or the link itself where they branch."""
         while len(onward := self.by_parent.get(link, [])) == 1 and not onward[0].moves:
             link = onward[0].child
         return link
@@ -196,7 +196,7 @@ def read_chain(path: Path, base: str | None, tip: str | None, snap: bool) -> Urd
     Raises
     ------
     InputError
-        if the file is no URDF, or names several arms (the candidates are named)
+        if the file is not a URDF, or names several arms (the candidates are named)
     """
     notes: list[str] = []
     tree = tree_of(path, snap)
@@ -217,9 +217,9 @@ def read_chain(path: Path, base: str | None, tip: str | None, snap: bool) -> Urd
             remedy = f"Write {', '.join(MOVING)} or fixed"
             if joint.type in FREE:
                 remedy = f"Name where the arm begins by --base: {_some([each.child for each in joints])}"
-            problem = f"type '{joint.type}' is no joint of a serial arm"
+            problem = f"type '{joint.type}' is not a joint of a serial arm"
             raise InputError(path, f"joint {joint.name}", problem, remedy)
-        if (apart := np.abs(joint.T_parent_joint[:3, 3]).max()) > MOST_APART_M:
+        if (apart := np.abs(joint.T_parent_joint[:3, 3]).max()) > MAX_APART_M:
             problem = f"stands {apart:g} m from the one before it"
             remedy = "A URDF's lengths are in metres: divide millimetres by 1000"
             raise InputError(path, f"joint {joint.name}, xyz", problem, remedy)
@@ -247,7 +247,7 @@ def _downwards(tree: Tree, link: str, notes: list[str]) -> list[UrdfJoint]:
         moving, active = tree.onward(link)
         count = sum(joint.independent for joint in chain)
         if tree.hand_begins(moving, count):
-            notes.append(f"a gripper stands behind link {link} ({_some(_names(moving))}); it was left out")
+            notes.append(f"a gripper follows link {link} ({_some(_names(moving))}); it was left out")
             break
         if len(active) > 1:
             ends = [end for joint in active for end in tree.ends(joint.child, count + joint.independent)]
@@ -259,7 +259,7 @@ def _downwards(tree: Tree, link: str, notes: list[str]) -> list[UrdfJoint]:
             passive = [joint for joint in moving if joint not in active]
             notes.append(f"joints beside the chain that only follow others were left out: {_some(_names(passive))}")
         if not moving and len(onward) > 1:
-            notes.append(f"several fixed frames stand behind {link}; it was taken as the flange")
+            notes.append(f"several fixed frames follow {link}; it was taken as the flange")
             break
         chain.append((active or moving or onward)[0])
         link = chain[-1].child
@@ -283,9 +283,9 @@ def urdf_root(path: Path) -> ElementTree.Element:
     Raises
     ------
     InputError
-        for a file that is no URDF, such as xacro that is not expanded
+        for a file that is not a URDF, such as xacro that is not expanded
     """
-    text = read_text(path, MOST_BYTES, "Leave out of it what is no link or joint of the arm")
+    text = read_text(path, MAX_BYTES, "Remove all but the links and joints of the arm")
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise InputError(path, None, "holds a document type or entities", "Remove them; a URDF needs none")
     try:
@@ -423,7 +423,7 @@ def _perhaps_rounded(rpy: Reals, where: str) -> list[str]:
 
 
 class LinkPlaces(Protocol):
-    """Where links stand, as :func:`er3a.formats.urdf.link_places` tells."""
+    """Places of links, from :func:`er3a.formats.urdf.link_places`."""
 
     def __call__(self, name: str, carried: bool = False, /) -> tuple[Reals, int] | None: ...
 
@@ -493,7 +493,7 @@ def write_masses(robot: Robot, names: Sequence[str], root: ElementTree.Element) 
 
 
 def peak_torque(robot: Robot, joint: int) -> float:
-    """What a joint's (from 0) drive gives for a moment, N m or N; 0 where it is unknown."""
+    """Peak torque or force of the drive of a joint (from 0), N m or N; 0 where it is unknown."""
     drives = robot.masses.drives
     return 0.0 if drives is None or np.isnan(drives.peak[joint]) else float(drives.peak[joint])
 
@@ -520,7 +520,7 @@ def _body(inertial: ElementTree.Element) -> tuple[MassBody, Reals]:
 
 
 def _unusable(inertial: ElementTree.Element) -> str:
-    """What of an ``<inertial>`` is no finite number, or that its mass is below 0."""
+    """What of an ``<inertial>`` is not a finite number, or that its mass is below 0."""
     for element in inertial:
         for key, text in element.items():
             values = np.array([_float(word) for word in text.split()])
@@ -638,7 +638,7 @@ def collision_shapes(
                 return []
             pieces = found
         case tag:
-            notes.append(f"{where}: <{tag}> is no shape that er3a reads; it is left out")
+            notes.append(f"{where}: <{tag}> is not a shape that er3a reads; it is left out")
             return []
     placed = (piece @ T[:3, :3].T + T[:3, 3] for piece in pieces.pieces)
     stated = float(_numbers(path, where, collision, "margin", None)[0]) if "margin" in collision.attrib else 0.0
@@ -806,7 +806,7 @@ def _mesh(
 
 
 def _quality(mesh: str, found: ConvexPieces) -> str:
-    """How well convex pieces stand for a mesh."""
+    """How well convex pieces represent a mesh."""
     if len(found.pieces) == 1:
         return f"{mesh} fills its hull but for a tenth at most; the hull is taken"
     away = 1000 * found.uncovered
@@ -835,15 +835,15 @@ def plain_urdf(path: Path, arguments: Sequence[str] = ()) -> Iterator[Path]:
 
     Parameters
     ----------
-    arguments : ``NAME:=VALUE``, as ``<xacro:arg name="NAME"/>`` asks for them
+    arguments : ``NAME:=VALUE``, as ``<xacro:arg name="NAME"/>`` declares them
 
     Raises
     ------
     InputError
-        for arguments of another form or to a file that is no xacro, without xacrodoc, or for what it can't expand; it
+        for arguments of another form or to a file that is not xacro, without xacrodoc, or for what it can't expand; it
         names ``path`` for what the expanded file is refused for, too
     """
-    if "<xacro:" not in COMMENT.sub("", read_text(path, MOST_BYTES)):
+    if "<xacro:" not in COMMENT.sub("", read_text(path, MAX_BYTES)):
         if arguments:
             raise InputError(path, "--xacro", "the file holds no xacro macros", "Leave the arguments out")
         yield path
@@ -864,7 +864,7 @@ def plain_urdf(path: Path, arguments: Sequence[str] = ()) -> Iterator[Path]:
 def _argument(path: Path, text: str) -> tuple[str, str]:
     name, given, value = text.partition(":=")
     if not name or not given:
-        raise InputError(path, "--xacro", f"'{text}' is no argument of xacro", "Write NAME:=VALUE")
+        raise InputError(path, "--xacro", f"'{text}' is not an xacro argument", "Write NAME:=VALUE")
     return name, value
 
 
@@ -881,7 +881,7 @@ def _expanded(path: Path, values: dict[str, str]) -> str:
         root = ElementTree.fromstring(text)
     except Exception as error:  # whatever a macro makes its expander stumble over
         reason = " ".join(str(error).split())[:200] or type(error).__name__
-        remedy = "Give what it asks for: --xacro NAME:=VALUE; keep its packages in folders beside it"
+        remedy = "Give its arguments: --xacro NAME:=VALUE; keep its packages in folders beside it"
         raise InputError(path, None, f"can't be expanded ({reason})", remedy) from None
     for mesh in root.iter("mesh"):
         if (file := mesh_of(path, mesh.get("filename", ""))) is not None:

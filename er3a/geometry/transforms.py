@@ -18,7 +18,7 @@ from er3a.numerics.jit import kernel
 
 ORTHONORMAL_TOLERANCE = 1e-6
 BOTTOM_ROW_TOLERANCE = 1e-12
-FARTHEST_M = 100.0  # from the origin: farther off, a position was meant in mm
+MAX_DISTANCE_M = 100.0  # from the origin: farther off, a position was meant in mm
 
 
 def cos_sin(angle: float | Reals) -> tuple[Reals, Reals]:
@@ -217,7 +217,7 @@ def _fault_of(T: Reals) -> str:
         return f"has a rotation part that is not orthonormal to {ORTHONORMAL_TOLERANCE:g}: {rows}"
     if np.linalg.det(R) < 0:
         return "has a mirrored (left-handed) rotation part: turn the sign of one column"
-    if np.abs(T[:3, 3]).max() > FARTHEST_M:
+    if np.abs(T[:3, 3]).max() > MAX_DISTANCE_M:
         x, y, z = T[:3, 3]
         return f"has a position of ({x:g}, {y:g}, {z:g}) m in column 3, which can only be mm: divide it by 1000"
     return ""
@@ -230,7 +230,7 @@ def _all_rigid(T: Reals) -> bool:
         last = abs(T[n, 3, 0]) + abs(T[n, 3, 1]) + abs(T[n, 3, 2]) + abs(T[n, 3, 3] - 1.0)
         worst, near = last * ORTHONORMAL_TOLERANCE / BOTTOM_ROW_TOLERANCE, True
         for r in range(3):
-            near = near and abs(T[n, r, 3]) <= FARTHEST_M
+            near = near and abs(T[n, r, 3]) <= MAX_DISTANCE_M
             for s in range(r + 1):
                 product = T[n, r, 0] * T[n, s, 0] + T[n, r, 1] * T[n, s, 1] + T[n, r, 2] * T[n, s, 2]
                 worst = max(worst, abs(product - (1.0 if r == s else 0.0)))

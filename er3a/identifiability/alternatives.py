@@ -33,9 +33,9 @@ from er3a.references.quantities import Quantity, value_at
 from er3a.references.seen import TableEntry
 from er3a.robots.robot import Robot
 
-MOST_TOGETHER = 4
+MAX_TOGETHER = 4
 PATTERNS_UP_TO = 6
-MOST_FLIPS = 3  # in a combination that is the same robot
+MAX_FLIPS = 3  # in a combination that is the same robot
 SOME_DEG = 1e-6
 
 
@@ -107,11 +107,11 @@ def sets_of(flips: Sequence[Flip]) -> Iterator[list[tuple[int, ...]]]:
     arms of up to six joints, all of them."""
     basic = [i for i, flip in enumerate(flips) if not flip.about_deg and flip.entry is not None]
     turning = [i for i in basic if flips[i].entry.column in ("direction", "offset")]  # type: ignore[union-attr]
-    most = len(turning) if len(turning) <= 2 * PATTERNS_UP_TO else MOST_TOGETHER
-    for count in range(1, max(most, MOST_TOGETHER) + 1):
+    most = len(turning) if len(turning) <= 2 * PATTERNS_UP_TO else MAX_TOGETHER
+    for count in range(1, max(most, MAX_TOGETHER) + 1):
         if count <= 2:
             chosen = list(combinations(range(len(flips)), count))
-        elif count <= MOST_TOGETHER:
+        elif count <= MAX_TOGETHER:
             chosen = list(combinations(basic, count))
         else:
             chosen = list(combinations(turning, count))
@@ -147,7 +147,7 @@ CHUNK = 1024
 NO_WORSE = 1e-6
 SEARCHED_EXTREMES = 400
 SAME_TOOL = 4.0  # mm, and thousandths: what moves a tool by less is none of another robot
-MOST_COMPOSED = 2048
+MAX_COMPOSED = 2048
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,7 +178,7 @@ def gauge_flips(tool: ToolRange, flips: Sequence[Flip]) -> list[tuple[str, ...]]
     own = tool.signature(tool.table)[0]
     found: list[tuple[int, ...]] = []
     basic = [i for i, flip in enumerate(flips) if not flip.about_deg]
-    for chosen in islice(sets_of(flips), MOST_FLIPS):
+    for chosen in islice(sets_of(flips), MAX_FLIPS):
         sets = [each for each in chosen if set(each) <= set(basic) and not _holds(each, found)]
         if sets:
             same = np.abs(_signatures(tool, tool.table, flips, sets) - own).max(axis=1) < SAME_TOOL
@@ -270,7 +270,7 @@ class _AlternativeSearch:
         self._compose(chosen)
 
     def _compose(self, chosen: tuple[int, ...]) -> None:
-        if len(self.composed) > MOST_COMPOSED:
+        if len(self.composed) > MAX_COMPOSED:
             return
         new = [
             (*each, *chosen)
@@ -344,7 +344,7 @@ def _nearest_open(found: Tables, table: Tables, asked: Asked) -> Tables:
     """Of an open table and those that discrete changes make of it and that are open too, the nearest to a table."""
     flips = [flip for flip in flips_of(robot_of(found, 0, asked.robot), []) if flip.entry is not None]
     every = [found]
-    for _, chosen in zip(range(MOST_TOGETHER), sets_of(flips)):
+    for _, chosen in zip(range(MAX_TOGETHER), sets_of(flips)):
         for start in range(0, len(chosen), CHUNK):
             tables = changed(found, flips, chosen[start : start + CHUNK])
             met = (

@@ -27,8 +27,8 @@ from er3a.identifiability.alternatives import amounts_between
 from er3a.identifiability.entries import Gauge, TableNumber, shifted
 from er3a.identifiability.entry_evidence import Tolerance
 from er3a.identifiability.feasible import (
+    MAX_DAMPING,
     MET,
-    MOST_DAMPING,
     PROFILE,
     STAYING,
     WIDEST_DEG,
@@ -50,7 +50,7 @@ WIDEST_M, WIDEST_RAD = 0.4, np.pi
 REACTS = 1e-9
 FAR = 3.0  # of an entry's scale
 A_LENGTH_M, REVERSED_RAD, UNWATCHED, ROUNDED = 0.3, 0.3, 0.01, 6
-MOST_ROWS = 1 << 15
+MAX_ROWS = 1 << 15
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,10 +124,10 @@ def nearest_rows(own: Tables, region: Region, watched: Collection[int]) -> Table
 
 def same_robots(table: Tables) -> Tables:
     """The rows (a batch) that are the same robot as a table's (a batch of one), itself first; of arms with more than
-    eight joints the first ``MOST_ROWS`` of them."""
+    eight joints the first ``MAX_ROWS`` of them."""
     found = table
     for turn in _turns(table):
-        found = join([found, turn(found)]) if len(found) < MOST_ROWS else found
+        found = join([found, turn(found)]) if len(found) < MAX_ROWS else found
     return found
 
 
@@ -165,7 +165,7 @@ def _z_turned(tables: Tables, joint: int, row: int) -> Tables:
 SPREAD, CHALLENGE_WIDTHS = 192, (0.02, 0.1, 0.3, 1.0)
 REVERSED, TURNED = 0.2, 0.15  # shares of joints reversed and angles turned round, in every second spread start
 PUSHES = 1.1, 1.7, 3.0, 8.0  # of the smallest step that matters
-ROUNDS, PUSHED_FROM, MOST_KEPT = 3, 3, 40
+ROUNDS, PUSHED_FROM, MAX_KEPT = 3, 3, 40
 PASSES, STEP, DAMPING, STALLED, FLOOR, NOTHING = 40, 1e-3, 1e-2, 1e-3, 1e-8, 1e-12
 CHUNK, SEED = 48, 20261121
 
@@ -266,7 +266,7 @@ class _ManyStarts:
     def found(self) -> list[Elsewhere]:
         """Tables found, as points of the regions with their directions; those that extremes allow as well."""
         region, found = self.region, list[Elsewhere]()
-        for direction, amounts in (*self.farthest_tables()[:MOST_KEPT], *self.reversed.values()):
+        for direction, amounts in (*self.farthest_tables()[:MAX_KEPT], *self.reversed.values()):
             table = region.table.with_column("direction", slice(None), direction[None])
             other = Region(region.asked, table, region.entries, region.gauge)
             point = other.restarted(amounts, self.start.chi2)
@@ -296,7 +296,7 @@ class _ManyStarts:
             damping[rows] = np.where(better, np.maximum(damping[rows] / 10, 1e-9), damping[rows] * 10)
             stalled = better & (after > (1 - STALLED) * before)
             going[rows[stalled | (after == 0)]] = False
-            going &= damping < MOST_DAMPING
+            going &= damping < MAX_DAMPING
         chi2 = (off[:, likely] ** 2).sum(axis=1)
         met = self.region.asked.excess(off) <= MET
         met &= chi2 <= self.start.chi2 + PROFILE**2
@@ -361,7 +361,7 @@ class Extents:
     Parameters
     ----------
     table : from which the search starts (a batch of one)
-    entries : all that can take any value; speaking : places of those to which a requirement reacts
+    entries : all that can take any value; relevant : places of those to which a requirement reacts
     tolerance : how far the tool may be off for what counts as settled
     found : a table that meets the requirements, if the search from ``table`` is known to find none
     """
@@ -371,7 +371,7 @@ class Extents:
         asked: Asked,
         table: Tables,
         entries: Sequence[TableNumber],
-        speaking: Sequence[int],
+        relevant: Sequence[int],
         gauge: Gauge,
         tool: ToolRange,
         *,
@@ -380,11 +380,11 @@ class Extents:
     ):
         self.tolerance = tolerance or Tolerance()
         self.asked, self.table, self.entries, self.tool = asked, table, tuple(entries), tool
-        self.speaking = list(speaking)
-        self.held = self._held(gauge, self.speaking)
-        self.region = Region(asked, table, [entries[k] for k in self.speaking], self.held)
-        begun = np.zeros(len(self.speaking)) if found is None else amounts_between(table, found, self.region.entries)
-        self.start: OpenTable | None = self.region.start(begun) if self.speaking else None
+        self.relevant = list(relevant)
+        self.held = self._held(gauge, self.relevant)
+        self.region = Region(asked, table, [entries[k] for k in self.relevant], self.held)
+        begun = np.zeros(len(self.relevant)) if found is None else amounts_between(table, found, self.region.entries)
+        self.start: OpenTable | None = self.region.start(begun) if self.relevant else None
         self.table_meets = table is tool.table and (self.start is None or not self.start.amounts.any())
         self.met = self.start is None or self.start.open
         self._extended: dict[bytes, Reached] = {}
@@ -392,10 +392,10 @@ class Extents:
         self._half_turns: dict[int, bool] = {}
         self.elsewhere: list[Elsewhere] = []
         if self.start is not None and self.met:
-            self.seen = sorted({*self.speaking, *seen_entries(asked, table, self.entries)})
+            self.seen = sorted({*self.relevant, *seen_entries(asked, table, self.entries)})
             self._everywhere = Region(asked, table, [entries[k] for k in self.seen], self._held(gauge, self.seen))
             amounts = np.zeros(len(entries))
-            amounts[self.speaking] = self.start.amounts
+            amounts[self.relevant] = self.start.amounts
             self.begun = amounts[self.seen]
             self._begun = replace(self.start, amounts=self.begun)
             self.elsewhere = open_elsewhere(self._everywhere, self._begun, self._watched)
@@ -427,7 +427,7 @@ class Extents:
         scales = np.array([each.scale * each.in_unit for each in self.entries])
         units = factors * factor / scales
         value = float(sum(u * v for u, v in zip(units, self._values()) if u))
-        if self.start is None or not factors[self.speaking].any():
+        if self.start is None or not factors[self.relevant].any():
             return self._anything(entry, value, self._off(factors, self._widest(entry) / factor))
         if not self.met:
             return Extent(np.nan, np.nan, NOT_OFF, bool(self._blamed(factors)))
@@ -456,7 +456,7 @@ class Extents:
     @property
     def _watched(self) -> list[int]:
         """Places of the entries to which a requirement reacts, among those that are seen."""
-        return [self.seen.index(k) for k in self.speaking]
+        return [self.seen.index(k) for k in self.relevant]
 
     def _challenge(self) -> bool:
         """Look once for tables that contradict what was found; whether there are any."""
@@ -530,7 +530,7 @@ class Extents:
 
     def _near(self, factors: Reals) -> Reached:
         """How far the start's own surroundings extend."""
-        toward = factors[self.speaking]
+        toward = factors[self.relevant]
         key = toward.tobytes()
         if key not in self._extended and self.start is not None:
             self._extended[key] = self.region.extent(self.start, toward)
@@ -550,7 +550,7 @@ class Extents:
             return max(own, reached.value), reached.finished
         ways = [best.region.followed(best.point, toward, FEW_STEPS)]
         if self.start is not None:
-            ways.append(self.region.extent(self.start, factors[self.speaking], quick=True))
+            ways.append(self.region.extent(self.start, factors[self.relevant], quick=True))
         value = max(own, *(way.value for way in ways))
         return value, value > float(np.abs(toward) @ best.region.widest) - ALREADY
 
@@ -570,9 +570,9 @@ class Extents:
         """Whether some table with the combination as it is meets all requirements."""
         if self.start is None:
             return True
-        places = [(self.region, np.zeros(len(self.speaking))), (self.region, self.start.amounts)]
+        places = [(self.region, np.zeros(len(self.relevant))), (self.region, self.start.amounts)]
         for own, amounts in (*places, *((each.region, each.point.amounts) for each in self.elsewhere)):
-            toward = factors[self.speaking if own is self.region else self.seen]
+            toward = factors[self.relevant if own is self.region else self.seen]
             held = np.concatenate([own.gauge, toward[None] / np.linalg.norm(toward)])
             region = Region(self.asked, own.table, own.entries, held)
             begun = amounts - toward * (toward @ amounts) / (toward @ toward)
@@ -582,4 +582,4 @@ class Extents:
 
     def _blamed(self, factors: Reals) -> bool:
         """Whether the table that comes nearest to requirements which none meets differs in a combination."""
-        return self.start is not None and abs(float(factors[self.speaking] @ self.start.amounts)) > 1.0
+        return self.start is not None and abs(float(factors[self.relevant] @ self.start.amounts)) > 1.0

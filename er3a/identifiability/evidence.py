@@ -37,7 +37,7 @@ from er3a.identifiability.requirements import Asked, Requirement, requirements_o
 from er3a.identifiability.statements import NOT_OFF, ToolOff, ToolRange
 from er3a.kinematics.table_batch import Tables, robot_of, tables_of
 from er3a.numerics.arrays import Flags
-from er3a.references.quantities import Limit, PoseOutside, Speed, value_at
+from er3a.references.quantities import Limit, LimitExcess, Speed, value_at
 from er3a.references.reference import Documents, Reference, conflicts
 from er3a.robots.robot import Robot
 
@@ -80,7 +80,7 @@ def judge_limit(
 def _past_poses(entry: TableNumber, independent: Sequence[Reference], low: float, high: float) -> tuple[float, float]:
     """A limit lies beyond every pose at which a document shows the arm."""
     for reference in independent:
-        if isinstance(reference.quantity, PoseOutside):
+        if isinstance(reference.quantity, LimitExcess):
             angle = value_at(reference.quantity.pose, entry.joint)
             if entry.column == "upper":
                 low = max(low, angle - reference.uncertainty)
@@ -159,7 +159,7 @@ class _Judge:
         self.reacts = reactions(robot, self.references, self.entries)
         self.tool = ToolRange(robot, self.table)
         self.gauge: Gauge = gauge_of(robot, self.free)
-        trusted = [i for i, reference in enumerate(self.references) if reference.authoritative]
+        trusted = [i for i, reference in enumerate(self.references) if reference.is_authoritative]
         self.trusted = tuple(trusted or range(len(self.references)))
         self._asked: dict[tuple[int, ...], Asked] = {}
         self._alternatives: dict[tuple[int, ...], list[Alternative]] = {}
@@ -246,7 +246,7 @@ class _Judge:
     def _alone(self, i: int) -> list[Requirement]:
         return [replace(asked, references=(i,)) for asked in requirements_of([self.references[i]])]
 
-    def _speaking(self, entry: TableNumber, among: Sequence[int]) -> tuple[int, ...]:
+    def _relevant_references(self, entry: TableNumber, among: Sequence[int]) -> tuple[int, ...]:
         row: Flags = self.reacts[:, self.entries.index(entry)]
         return tuple(i for i in among if row[i])
 
@@ -256,7 +256,7 @@ class _Judge:
     def _number(self, entry: TableNumber) -> EntryEvidence:
         document = document_of(self.robot, entry)
         own = self._independent(document)
-        speaking = self._speaking(entry, own)
+        relevant = self._relevant_references(entry, own)
         extents = self._extents_of(own)
         gauge = self.free.index(entry) in self._in_gauge
         extent = extents.free_choice(entry) if gauge else extents.of(entry)
@@ -267,19 +267,19 @@ class _Judge:
             status = "gauge"
         elif extent.excluded or entry.name in self._repaired(own):
             status = "contradicted"
-        elif not speaking:
-            consistent = self._speaking(entry, range(len(self.references)))
+        elif not relevant:
+            consistent = self._relevant_references(entry, range(len(self.references)))
             status = "consistent" if consistent and entry.name not in by_all else "open"
             status = "contradicted" if consistent and self._excluded_by_all(entry) else status
         elif entry.name in by_all:
             status = "open"
         elif not concerned and extents.met and self._small(extent):
             status = self._settled(own, [entry.name])
-        return self._described(entry, status, extent, concerned, speaking)
+        return self._described(entry, status, extent, concerned, relevant)
 
     def _direction(self, entry: TableNumber) -> EntryEvidence:
         own = self._independent(document_of(self.robot, entry))
-        speaking = self._speaking(entry, own)
+        relevant = self._relevant_references(entry, own)
         concerned = [each for each in self._alternatives_of(own) if entry.name in each.names]
         value = self.values[entry.name]
         interval = (-1.0, 1.0) if concerned else (value, value)
@@ -292,19 +292,19 @@ class _Judge:
             if entry.name in self._names_open(self.trusted):
                 status = "open"
             else:
-                status = "weak" if speaking else "contradicted" if self._excluded_by_all(entry) else "consistent"
+                status = "weak" if relevant else "contradicted" if self._excluded_by_all(entry) else "consistent"
         else:
             doubtful = bool(own) and extents.met and extents.may_reverse(entry.joint)
             interval = (-1.0, 1.0) if doubtful else interval
-            status = "weak" if speaking or doubtful else "open"
+            status = "weak" if relevant or doubtful else "open"
             if own and extents.met and not doubtful:
                 status = self._settled(own, [entry.name])
         off = _worst([each.off for each in concerned])
-        if status in OUTRIGHT_OR_NOT and not speaking:
-            speaking = self._speaking_at(extents.met_by, entry, own)
-        return self._described(entry, status, Extent(*interval, off, False), concerned, speaking)
+        if status in OUTRIGHT_OR_NOT and not relevant:
+            relevant = self._relevant_at(extents.met_by, entry, own)
+        return self._described(entry, status, Extent(*interval, off, False), concerned, relevant)
 
-    def _speaking_at(self, table: Tables, entry: TableNumber, among: Sequence[int]) -> tuple[int, ...]:
+    def _relevant_at(self, table: Tables, entry: TableNumber, among: Sequence[int]) -> tuple[int, ...]:
         """References that react to an entry of another table (a batch of one), as they may not do at the robot's."""
         references = [self.references[i] for i in among]
         reacts = reactions(robot_of(table, 0, self.robot), references, [entry])[:, 0]
@@ -319,10 +319,10 @@ class _Judge:
 
     def _bound(self, entry: TableNumber) -> EntryEvidence:
         own = self._independent(document_of(self.robot, entry))
-        speaking = self._speaking(entry, own)
-        all_speaking = self._speaking(entry, range(len(self.references)))
-        status, interval = judge_limit(self.robot, entry, [self.references[i] for i in speaking], bool(all_speaking))
-        trusted = [self.references[i] for i in all_speaking if i in self.trusted]
+        relevant = self._relevant_references(entry, own)
+        all_relevant = self._relevant_references(entry, range(len(self.references)))
+        status, interval = judge_limit(self.robot, entry, [self.references[i] for i in relevant], bool(all_relevant))
+        trusted = [self.references[i] for i in all_relevant if i in self.trusted]
         if status == "consistent" and trusted and judge_limit(self.robot, entry, trusted, True)[0] == "contradicted":
             status = "contradicted"
         return EntryEvidence(
@@ -331,13 +331,13 @@ class _Judge:
             unit=entry.unit,
             status=status,
             interval=interval,
-            by=self._documents(speaking or all_speaking),
+            by=self._documents(relevant or all_relevant),
             alternatives=(),
             document=document_of(self.robot, entry),
         )
 
     def _described(
-        self, entry: TableNumber, status: Status, extent: Extent, concerned: list[Alternative], speaking: Sequence[int]
+        self, entry: TableNumber, status: Status, extent: Extent, concerned: list[Alternative], relevant: Sequence[int]
     ) -> EntryEvidence:
         readings = [self._reading(each) for each in concerned]
         readings += [
@@ -346,7 +346,7 @@ class _Judge:
             if entry.name in names
         ]
         readings += [self._shift(k) for k in range(len(self.gauge.directions)) if self._shifts(k, entry)]
-        known = speaking or self._speaking(entry, range(len(self.references)))
+        known = relevant or self._relevant_references(entry, range(len(self.references)))
         off = _worst([extent.off, *(each.off for each in concerned)])
         return EntryEvidence(
             entry=entry.name,
@@ -390,12 +390,14 @@ class _Judge:
         own = self._independent(document)
         extents = self._extents_of(own)
         extent = extents.along(self.gauge.determined[row])
-        speaking = sorted({i for entry, _ in factors for i in self._speaking(entry, own)})
-        everyone = sorted({i for entry, _ in factors for i in self._speaking(entry, range(len(self.references)))})
+        relevant = sorted({i for entry, _ in factors for i in self._relevant_references(entry, own)})
+        everyone = sorted(
+            {i for entry, _ in factors for i in self._relevant_references(entry, range(len(self.references)))}
+        )
         status: Status = "weak"
         if extent.excluded:
             status = "contradicted"
-        elif not speaking:
+        elif not relevant:
             status = "consistent" if everyone else "open"
         elif extents.met and self._small(extent):
             status = self._settled(own, [entry.name for entry, _ in factors])
@@ -405,7 +407,7 @@ class _Judge:
             unit=first.unit,
             status=status,
             interval=_interval(extent),
-            by=self._documents(speaking or everyone),
+            by=self._documents(relevant or everyone),
             alternatives=(),
             document=document,
             off=NOT_OFF if status in OUTRIGHT_OR_NOT else extent.off,
@@ -495,9 +497,9 @@ class _Judge:
         if own not in self._extents:
             fewest = min(self._repairs_of(own), key=lambda each: len(each.entries), default=None)
             table = fewest.table if fewest else self.table
-            speaking = [k for k, entry in enumerate(self.free) if self._speaking(entry, own)]
+            relevant = [k for k, entry in enumerate(self.free) if self._relevant_references(entry, own)]
             asked = self._asked_of(own)
-            near = Extents(asked, table, self.free, speaking, self.gauge, self.tool, tolerance=self.tolerance)
+            near = Extents(asked, table, self.free, relevant, self.gauge, self.tool, tolerance=self.tolerance)
             self._extents[own] = near if near.met else self._far(asked, near)
         return self._extents[own]
 
@@ -511,7 +513,7 @@ class _Judge:
         joints = list(range(found.direction.shape[1]))
         table = self.table.with_column("direction", joints, found.direction)
         return Extents(
-            asked, table, self.free, near.speaking, self.gauge, self.tool, found=found, tolerance=self.tolerance
+            asked, table, self.free, near.relevant, self.gauge, self.tool, found=found, tolerance=self.tolerance
         )
 
 
@@ -546,7 +548,7 @@ PART_OF_GROUP: dict[str, PartName] = {
 }
 GRAVEST: tuple[PartStatus, ...] = ("contradicted", "open", "weak", "consistent", "settled_up_to_signs", "settled")
 SETTLED: tuple[Status, ...] = (*OUTRIGHT_OR_NOT, "gauge", "given")
-MOST_COMBINED = 256
+MAX_COMBINED = 256
 
 
 @dataclass(frozen=True)
@@ -593,7 +595,7 @@ def together(evidence: Evidence, names: list[str]) -> ToolOff:
     combined: list[tuple[Alternative, ...]] = [()]
     for each in readings:
         free = [own for own in combined if not {n for other in own for n in other.names} & set(each.names)]
-        combined += [(*own, each) for own in free][: MOST_COMBINED - len(combined)]
+        combined += [(*own, each) for own in free][: MAX_COMBINED - len(combined)]
     off = NOT_OFF
     for own in combined[1:]:
         off = off.worse(tool.off(with_readings(tool.table, evidence.robot, own)))

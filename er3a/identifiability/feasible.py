@@ -31,15 +31,15 @@ from er3a.numerics.arrays import Flags, Reals
 PROFILE = 1.959963984540054
 TANGENTS = 8
 MET = 1e-3  # of a half-width
-LEAST_MM, WIDEST_DEG = 1000.0, 180.0
-FIRST_TRUST, LEAST_TRUST, GROWTH, SHRINKING = 4.0, 1e-3, 3.0, 0.4
+MIN_MM, WIDEST_DEG = 1000.0, 180.0
+FIRST_TRUST, MIN_TRUST, GROWTH, SHRINKING = 4.0, 1e-3, 3.0, 0.4
 STEPS, RETURNS = 40, 8
 FOLLOWED = 0.05  # of a half-width, by which an extreme that was followed may be missed
 IDLE_COST, EXCESS_COST = 1e-4, 1e3
 SETTLED_GAIN, IDLE_STEPS = 4e-3, 5
 SEARCH_STEPS = 40
 UNSEEN = 1e-6  # of the largest singular value, below which measurements see nothing
-MOST_DAMPING, NOTHING_GAINED = 1e3, 1e-3
+MAX_DAMPING, NOTHING_GAINED = 1e3, 1e-3
 DAMPINGS = 1e-2, 1e-5
 STAYING = 0.9  # of a half-width, up to which steps leave alone what is met
 FEW = 3
@@ -81,7 +81,7 @@ class Reached:
 
 def largest_length(table: Tables) -> float:
     """Search range in mm around the table's length: all its lengths together, at least a metre."""
-    return max(float(np.abs(table.a).sum() + np.abs(table.d).sum()) * 1000.0, LEAST_MM)
+    return max(float(np.abs(table.a).sum() + np.abs(table.d).sum()) * 1000.0, MIN_MM)
 
 
 class Region:
@@ -177,7 +177,7 @@ class Region:
         self.off(amounts)
         for _ in range(SEARCH_STEPS):
             slope, places = self.slope(amounts, used), self.asked.places
-            while damping < MOST_DAMPING:
+            while damping < MAX_DAMPING:
                 step = basis @ self._toward(rest, slope @ basis[used], damping)
                 trial = np.clip(amounts + step, -self.widest, self.widest)
                 new_off = self.off(trial)
@@ -229,7 +229,7 @@ class Region:
                 trust = trust * GROWTH if long else trust
             else:
                 trust = min(trust, float(np.abs(step).max())) * SHRINKING
-                finished = trust < LEAST_TRUST
+                finished = trust < MIN_TRUST
                 if finished:
                     break
                 self.asked.follow(places)

@@ -13,7 +13,7 @@ from er3a.identifiability.requirements import FollowedExtreme
 from er3a.kinematics.table_batch import Tables, join, tables_of
 from er3a.numerics.arrays import Flags, Reals
 from er3a.references.predict import predict_tables
-from er3a.references.quantities import Extreme, PoseOutside, Quantity, Speed, value_at
+from er3a.references.quantities import Extreme, LimitExcess, Quantity, Speed, value_at
 from er3a.references.reference import Documents, Reference, quantities_of
 from er3a.robots.robot import Robot
 
@@ -86,14 +86,14 @@ def bases_of(robot: Robot, references: Sequence[Reference], documents: Documents
         touched = [entry for entry, own in zip(entries, row) if own]
         free = [e for e in touched if documents.independent(reference.document, document_of(robot, e))]
         related = [e for e in free if documents.same_publisher(reference.document, document_of(robot, e))]
-        kind: CheckKind = "claim" if not reference.authoritative else "independent" if free else "consistency"
+        kind: CheckKind = "claim" if not reference.is_authoritative else "independent" if free else "consistency"
         found.append(CheckBasis(kind, _names(touched), _names(free), _names(related)))
     return found
 
 
 def undeclared_bases(references: Sequence[Reference]) -> list[CheckBasis]:
     """Likewise for arms whose entries are not varied: nothing is called independent."""
-    return [CheckBasis("consistency" if each.authoritative else "claim", (), (), ()) for each in references]
+    return [CheckBasis("consistency" if each.is_authoritative else "claim", (), (), ()) for each in references]
 
 
 def reactions(robot: Robot, references: Sequence[Reference], entries: Sequence[TableNumber]) -> Flags:
@@ -104,7 +104,7 @@ def reactions(robot: Robot, references: Sequence[Reference], entries: Sequence[T
     reacts = np.zeros((len(quantities), len(entries)), dtype=bool)
     table = tables_of(robot)
     probes, owner = _probes(table, entries)
-    plain = [i for i, quantity in enumerate(quantities) if not isinstance(quantity, Extreme | Speed | PoseOutside)]
+    plain = [i for i, quantity in enumerate(quantities) if not isinstance(quantity, Extreme | Speed | LimitExcess)]
     if plain:
         values = predict_tables(join([table, *probes]), robot, [quantities[i] for i in plain])
         changed = ~(np.abs(values[1:] - values[0]) <= REACTS)
@@ -123,7 +123,7 @@ def _bounds(quantity: Quantity, entry: TableNumber) -> bool:
     """Whether a quantity is the speed of an entry, or a pose that one of its limits must let pass."""
     if isinstance(quantity, Speed):
         return entry.column == "speed" and entry.joint == quantity.joint
-    if isinstance(quantity, PoseOutside):
+    if isinstance(quantity, LimitExcess):
         angle = value_at(quantity.pose, entry.joint)
         return (entry.column == "upper" and angle > 0) or (entry.column == "lower" and angle < 0)
     return False

@@ -493,8 +493,7 @@ def requirements_of(references: Sequence[Reference]) -> list[Requirement]:
     asked = {
         i: reference
         for i, reference in enumerate(references)
-        if reference.expected is not None
-        and not isinstance(reference.quantity, quantities.Limit | quantities.Speed | quantities.PoseOutside)
+        if reference.expected is not None and reference.quantity.depends_on_table
     }
     rivals: dict[int, set[int]] = {}
     for i, j in conflicts(references):

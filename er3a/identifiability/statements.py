@@ -24,7 +24,7 @@ from er3a.references.reference import Documents, Reference, ReferenceSet, confli
 from er3a.robots.robot import Robot
 
 QUARTERS = (-1, 1, 2)
-MOST_FAULTS = 2
+MAX_FAULTS = 2
 
 
 class NotTheRobotDescribed(Finding):
@@ -80,7 +80,7 @@ def not_the_robot_described(robot: Robot, references: ReferenceSet) -> NotTheRob
     foreign = [
         reference
         for reference in references.checkable
-        if reference.authoritative and not made_from_table(robot, reference.document, references.documents)
+        if reference.is_authoritative and not made_from_table(robot, reference.document, references.documents)
     ]
     ranking = rank(robot, foreign) if foreign else None
     if ranking is None:
@@ -89,7 +89,7 @@ def not_the_robot_described(robot: Robot, references: ReferenceSet) -> NotTheRob
     stated = [reference for reference, own in zip(ranking.references, lengths) if own]
     vectors = vectors_of(stated)
     before = lengths_of(ranking.before[lengths], vectors).max(initial=0.0)
-    few = ranking.pool.count <= MOST_FAULTS
+    few = ranking.pool.count <= MAX_FAULTS
     left = lengths_of(ranking.pool.difference[few][:, lengths], vectors).max(axis=1, initial=0.0)
     allowed = max((reference.uncertainty for reference in stated), default=0.0)
     if left.min() <= allowed * np.sqrt(3):
@@ -105,7 +105,7 @@ def inconsistent_with_own_text(robot: Robot, references: ReferenceSet) -> Incons
     own = [
         reference
         for i, reference in enumerate(stated)
-        if i not in contested and not reference.authoritative and _own_text(robot, reference, references.documents)
+        if i not in contested and not reference.is_authoritative and _own_text(robot, reference, references.documents)
     ]
     asked = Asked(robot, requirements_of(own))
     if not len(asked):

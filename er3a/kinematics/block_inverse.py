@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from er3a.geometry.transforms import FARTHEST_M, ORTHONORMAL_TOLERANCE
+from er3a.geometry.transforms import MAX_DISTANCE_M, ORTHONORMAL_TOLERANCE
 from er3a.geometry.vectors import TURN, Vector
 from er3a.kinematics.classes.arm_angle import about_x, about_z
 from er3a.numerics.arrays import Flags, Reals
@@ -223,7 +223,7 @@ def _check(w: Reals) -> None:
         straight = (abs(first) <= ORTHONORMAL_TOLERANCE) & (abs(second) <= ORTHONORMAL_TOLERANCE)
         straight = straight & (abs(third) <= ORTHONORMAL_TOLERANCE) & (abs(off_1) <= ORTHONORMAL_TOLERANCE)
         straight = straight & (abs(off_2) <= ORTHONORMAL_TOLERANCE) & (abs(off_3) <= ORTHONORMAL_TOLERANCE)
-        near = (abs(x) <= FARTHEST_M) & (abs(y) <= FARTHEST_M) & (abs(z) <= FARTHEST_M)
+        near = (abs(x) <= MAX_DISTANCE_M) & (abs(y) <= MAX_DISTANCE_M) & (abs(z) <= MAX_DISTANCE_M)
         w[_RIGID * BLOCK + i] = 1.0 if straight & near & (w[_RIGID * BLOCK + i] <= 1e-12) & (volume > 0.0) else 0.0
 
 

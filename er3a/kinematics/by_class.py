@@ -44,7 +44,7 @@ SOLVES = 1e-9
 OWN_SOLVES, MISSED = 1e-12, 1e-4  # m and parts of 1; rad or m from all rows
 MAYBE_SAME = 1e-2  # rad
 SPREAD = 1e-13
-MOST_CURVES, MOST_ON_SURFACE = 24, 2
+MAX_CURVES, MAX_ON_SURFACE = 24, 2
 MOVES_BELOW = 3e-8  # smallest singular value above which rows of three parallel axes, known to rounding, can't move
 STARTS, FEW_STARTS = 240, 32
 TRACED: dict[ArmClassCode, int] = {"free_roll": OPEN_ROLL, "position": POSITION}
@@ -177,7 +177,7 @@ def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, values: Reals, cer
         if any(chain.holds(curve, x) for curve in curves) or _is_same_root(robot, x, alone, chain):
             continue
         surface = sum(curve.dimension > 1 for curve in curves)
-        if len(curves) >= MOST_CURVES or surface >= MOST_ON_SURFACE:
+        if len(curves) >= MAX_CURVES or surface >= MAX_ON_SURFACE:
             if not chain.moves(x) and chain.error(x) < SOLVES:
                 alone.append(x)
             continue

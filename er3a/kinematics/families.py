@@ -38,7 +38,7 @@ SOLVES_M = SOLVES_RAD = 0.9e-9  # a family is given where it solves the pose to 
 ALMOST_IN_LINE = 1e-3
 NO_DIRECTION = 1e-13
 MOVING = [0, 1, 2, 5]
-MOST_STEPS, ROUNDING, SETTLED, INDEPENDENT = 8, 1e-14, 0.01, 1e-9
+MAX_STEPS, ROUNDING, SETTLED, INDEPENDENT = 8, 1e-14, 0.01, 1e-9
 
 
 def aligned_arms(robot: Robot, T: Reals, q: Reals) -> Iterator[tuple[tuple[int, int], Reals]]:
@@ -129,7 +129,7 @@ def _in_line(robot: Robot, T: Reals, q: Reals) -> Reals | None:
     q = q.copy()
     q[4] = robot.direction[4] * (folded - signed_angle(w[3], w[5], w[4]) - robot.offset[4])
     best, least, before = None, SOLVES_M, np.inf
-    for _ in range(MOST_STEPS):
+    for _ in range(MAX_STEPS):
         reached = forward(robot, q)
         R = T[:3, :3] @ reached[:3, :3].T  # a small turn, so its sine will do
         turn = [R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]

@@ -36,7 +36,6 @@ SAME_MEMBER = 1e-6
 MISSED = 1e-4  # rad or m from all rows
 SOLVES = 1e-12  # m and parts of 1
 STARTS, STARTS_OF_DEPENDENT = 400, 24  # where joints depend on each other a start that leads anywhere leads elsewhere
-MISS_RESTARTS = 20
 
 
 def inverse(
@@ -185,10 +184,10 @@ def missed_row(robot: Robot, T: Reals, q_ref: Reals) -> solutions.Solutions:
     """What a search from the reference (n,) finds at a pose that the arm's class has no row for, within the limits if
     it can."""
     open_pose = bool(by_class.parameters_of(robot))
-    near = nearest_arm(robot, T, q_ref, by_class.task_mask(robot), open_pose, MISS_RESTARTS)
+    near = nearest_arm(robot, T, q_ref, by_class.task_mask(robot), open_pose)
     if open_pose or not near.solved or within(robot, near.q):
         return near
-    inside = nearest_arm(robot, T, q_ref, by_class.task_mask(robot), True, MISS_RESTARTS)
+    inside = nearest_arm(robot, T, q_ref, by_class.task_mask(robot), True)
     return inside if inside.solved else near
 
 

@@ -53,35 +53,35 @@ from er3a.robots.robot import Robot
 from er3a.robots.whole_turns import shortest_move
 
 LANES = 32
-LEAST_PIVOT = 1e-15
+MIN_PIVOT = 1e-15
 
 
 @inner_kernel
 def solve_by_cholesky(A: Reals, step: Reals) -> None:
     """Replace ``step`` (6 rows of lanes) by the solutions x of A x = step; of A (36 rows) the lower half is read."""
     for i in range(LANES):
-        r_0 = 1.0 / np.sqrt(max(A[i], LEAST_PIVOT))
+        r_0 = 1.0 / np.sqrt(max(A[i], MIN_PIVOT))
         l_10 = A[6 * LANES + i] * r_0
         l_20 = A[12 * LANES + i] * r_0
         l_30 = A[18 * LANES + i] * r_0
         l_40 = A[24 * LANES + i] * r_0
         l_50 = A[30 * LANES + i] * r_0
-        r_1 = 1.0 / np.sqrt(max(A[7 * LANES + i] - l_10 * l_10, LEAST_PIVOT))
+        r_1 = 1.0 / np.sqrt(max(A[7 * LANES + i] - l_10 * l_10, MIN_PIVOT))
         l_21 = (A[13 * LANES + i] - l_20 * l_10) * r_1
         l_31 = (A[19 * LANES + i] - l_30 * l_10) * r_1
         l_41 = (A[25 * LANES + i] - l_40 * l_10) * r_1
         l_51 = (A[31 * LANES + i] - l_50 * l_10) * r_1
-        r_2 = 1.0 / np.sqrt(max(A[14 * LANES + i] - l_20 * l_20 - l_21 * l_21, LEAST_PIVOT))
+        r_2 = 1.0 / np.sqrt(max(A[14 * LANES + i] - l_20 * l_20 - l_21 * l_21, MIN_PIVOT))
         l_32 = (A[20 * LANES + i] - l_30 * l_20 - l_31 * l_21) * r_2
         l_42 = (A[26 * LANES + i] - l_40 * l_20 - l_41 * l_21) * r_2
         l_52 = (A[32 * LANES + i] - l_50 * l_20 - l_51 * l_21) * r_2
-        r_3 = 1.0 / np.sqrt(max(A[21 * LANES + i] - l_30 * l_30 - l_31 * l_31 - l_32 * l_32, LEAST_PIVOT))
+        r_3 = 1.0 / np.sqrt(max(A[21 * LANES + i] - l_30 * l_30 - l_31 * l_31 - l_32 * l_32, MIN_PIVOT))
         l_43 = (A[27 * LANES + i] - l_40 * l_30 - l_41 * l_31 - l_42 * l_32) * r_3
         l_53 = (A[33 * LANES + i] - l_50 * l_30 - l_51 * l_31 - l_52 * l_32) * r_3
-        r_4 = 1.0 / np.sqrt(max(A[28 * LANES + i] - l_40 * l_40 - l_41 * l_41 - l_42 * l_42 - l_43 * l_43, LEAST_PIVOT))
+        r_4 = 1.0 / np.sqrt(max(A[28 * LANES + i] - l_40 * l_40 - l_41 * l_41 - l_42 * l_42 - l_43 * l_43, MIN_PIVOT))
         l_54 = (A[34 * LANES + i] - l_50 * l_40 - l_51 * l_41 - l_52 * l_42 - l_53 * l_43) * r_4
         r_5 = 1.0 / np.sqrt(
-            max(A[35 * LANES + i] - l_50 * l_50 - l_51 * l_51 - l_52 * l_52 - l_53 * l_53 - l_54 * l_54, LEAST_PIVOT)
+            max(A[35 * LANES + i] - l_50 * l_50 - l_51 * l_51 - l_52 * l_52 - l_53 * l_53 - l_54 * l_54, MIN_PIVOT)
         )
         y_0 = step[i] * r_0
         y_1 = (step[1 * LANES + i] - l_10 * y_0) * r_1
@@ -100,11 +100,11 @@ def solve_by_cholesky(A: Reals, step: Reals) -> None:
 
 
 DAMPING = 0.1
-MOST_ITERATIONS = 40
+MAX_ITERATIONS = 40
 LONGEST_STEP = 1.0  # rad
 STALLED = 0.9  # the squared error must fall by this factor ...
 PATIENCE = 3  # ... within so many iterations
-LEAST_DAMPING = 1e-15
+MIN_DAMPING = 1e-15
 
 # Rows of scratch memory, one number of each lane in a row: the arm's frame (3 x 4), the target (3 x 4), then vectors.
 _FRAME, _TARGET, _Q, _E, _W, _SQUARED, _POSITION, _ROTATION = 0, 12, 24, 30, 36, 39, 40, 41
@@ -153,7 +153,7 @@ def solve_numerically(
             else:
                 since[i] += 1
             count[i] += 1
-            if not (solved or since[i] > PATIENCE or count[i] > MOST_ITERATIONS):
+            if not (solved or since[i] > PATIENCE or count[i] > MAX_ITERATIONS):
                 continue
             if solved or square < best[i] or start[i] == 0:
                 best[i], error[n, 0], error[n, 1], starts[n] = square, position, rotation, 0
@@ -319,7 +319,7 @@ def _step(lower: Reals, upper: Reals, respect: bool, w: Reals, J: Reals, A: Real
         total = 0.0
         for r in range(6):
             total += e[r * LANES + i] * e[r * LANES + i]
-        damping[i] = DAMPING * total + LEAST_DAMPING
+        damping[i] = DAMPING * total + MIN_DAMPING
     for k in range(6):
         column = J[6 * k * LANES : (6 * k + 6) * LANES]
         gradient = w[(_STEP + k) * LANES : (_STEP + k + 1) * LANES]
@@ -404,7 +404,7 @@ def _descend(arm: AnyArm, limits: Limits, T: Reals, goal: Goal, x: Reals, e: Rea
     free = np.ones(n, np.bool_)
     units = arm[5]
     position, rotation = _evaluate_any(arm, T, mask, length, x, e, J)
-    for _ in range(MOST_ITERATIONS):
+    for _ in range(MAX_ITERATIONS):
         square = (position / length) ** 2 + rotation**2
         if position <= tolerances[0] and rotation <= tolerances[1]:
             break
@@ -419,7 +419,7 @@ def _descend(arm: AnyArm, limits: Limits, T: Reals, goal: Goal, x: Reals, e: Rea
             at_low, at_high = x[j] <= lower[j], x[j] >= upper[j]
             free[j] = not (respect and ((at_low and gradient[j] < 0.0) or (at_high and gradient[j] > 0.0)))
         M = J.T @ J
-        least = LEAST_DAMPING + ABOVE_ROUNDING * np.trace(M)
+        least = MIN_DAMPING + ABOVE_ROUNDING * np.trace(M)
         for i in range(n):
             for j in range(n):
                 if not (free[i] and free[j]):
@@ -502,6 +502,7 @@ def _rotation_vector(D: Reals) -> tuple[Reals, Reals]:
 
 
 RESTARTS = 500
+MISS_RESTARTS = 20
 DIAGNOSIS_RESTARTS = 100
 TOLERANCE = 1e-10  # m or rad
 NEARLY = 1e-6  # m (in parts of the arm's length) or rad: so near, only a singularity keeps the iteration from its end
@@ -560,11 +561,11 @@ def solve(
     return search.solutions(T, q0, respect_limits, restarts, threads, explained=True)
 
 
-def nearest_arm(robot: Robot, T: Reals, q0: Reals, mask: Reals, respect_limits: bool, restarts: int) -> Solutions:
+def nearest_arm(robot: Robot, T: Reals, q0: Reals, mask: Reals, respect_limits: bool) -> Solutions:
     """What :func:`solve` gives for one pose (4, 4), without the reason where it finds none: that takes ten times as
     long as the search."""
     search = _Search(robot, mask, np.full(2, TOLERANCE), seed=0)
-    return search.solutions(np.ascontiguousarray(T), q0, respect_limits, restarts, threads=1, explained=False)
+    return search.solutions(np.ascontiguousarray(T), q0, respect_limits, MISS_RESTARTS, threads=1, explained=False)
 
 
 def all_found(robot: Robot, T: Reals, starts: int) -> Reals:

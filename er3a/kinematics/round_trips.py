@@ -26,7 +26,7 @@ NEAR_WRIST_DEG = NEAR_ELBOW_DEG = 0.5
 NEAR_SHOULDER_MM = 1.0
 NEAR = NearSingular(np.radians(NEAR_WRIST_DEG), np.radians(NEAR_ELBOW_DEG), NEAR_SHOULDER_MM / 1000)
 BLOCK = 20_000
-MOST_BY_CLASS = 500  # poses solved in validation for arms without a spherical wrist
+MAX_BY_CLASS = 500  # poses solved in validation for arms without a spherical wrist
 
 
 @dataclass(frozen=True, eq=False)

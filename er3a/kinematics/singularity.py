@@ -196,7 +196,7 @@ def _angle_short_of_line(a: Vector, b: Vector, axis: Vector) -> float:
 
 DEPENDENT = 1e-6  # smallest singular value of columns that count as dependent, relative to that of the event
 SHORTEST, EDGE = 1e-9, 1e-4  # shares of the motion
-MOST_SAMPLES = 200_000
+MAX_SAMPLES = 200_000
 TRAVEL = 1.5  # joints' travel inside an interval, over what its ends show, where no speeds are given
 
 
@@ -297,7 +297,7 @@ def _refined(
     dips of less than 1e-4 of the motion that do not reach 0."""
     per_joint = change_per_joint(robot) / np.where(robot.slides, arm_length(robot), 1.0)
     smallest, sign = _smallest_and_sign(robot, q)
-    while len(t) < MOST_SAMPLES:
+    while len(t) < MAX_SAMPLES:
         span = np.diff(t)
         travel = np.abs(np.diff(q, axis=0)) * TRAVEL if speed is None else span[:, None] * speed
         # from the nearer end at most half the interval away
@@ -367,7 +367,7 @@ def dependent_axes(robot: Robot, q: Reals) -> tuple[int, ...]:
     return best[1]
 
 
-LEAST_SINGULAR_VALUE = 0.02
+MIN_SINGULAR_VALUE = 0.02
 
 
 @dataclass(frozen=True)
@@ -380,7 +380,7 @@ class NearSingular:
     wrist_rad: float
     elbow_rad: float
     shoulder_m: float
-    smallest: float = LEAST_SINGULAR_VALUE
+    smallest: float = MIN_SINGULAR_VALUE
 
     def of(self, kind: SingularityType) -> float:
         """The threshold of one type, rad or m."""

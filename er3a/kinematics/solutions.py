@@ -18,7 +18,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from er3a.by_value import MOST_ROWS, ByValue, Displayed, Finding, Sheet, shortly
+from er3a.by_value import MAX_ROWS, ByValue, Displayed, Finding, Sheet, shortly
 from er3a.geometry.transforms import rpy_of
 from er3a.geometry.vectors import TURN, wrap_to_pi
 from er3a.kinematics.by_class import arm_solver
@@ -329,7 +329,7 @@ class Solutions(ByValue, Displayed):
 
     def _sheet_of_search(self) -> Sheet:
         q, solved = self.q.reshape(-1, self.robot.joints), self.solved.reshape(-1)
-        first = shown(self.robot, q[:MOST_ROWS])
+        first = shown(self.robot, q[:MAX_ROWS])
         errors = [np.asarray(error).reshape(-1) for error in (self.position_error, self.rotation_error)]
         rows = (
             (pose, bool(done), *angles, 1000 * position, turn)
@@ -342,7 +342,7 @@ class Solutions(ByValue, Displayed):
             ("pose", "solved", *joint_columns(self.robot), "off_mm", "off_deg"),
             rows,
             len(q),
-            facts=tuple(f"unsolved: {shortly(why)}" for why in self.unsolved[:MOST_ROWS]),
+            facts=tuple(f"unsolved: {shortly(why)}" for why in self.unsolved[:MAX_ROWS]),
         )
 
 

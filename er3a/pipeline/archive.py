@@ -91,7 +91,7 @@ def _crate(robots) -> ROCrate:
 
 
 def _place(file: Path) -> Path:
-    """Where an input stands in the archive: as the study or the project has it, else below ``inputs``."""
+    """The place of an input in the archive: as the study or the project has it, else below ``inputs``."""
     if file.is_relative_to(ROOT):
         return file.relative_to(ROOT)
     return Path("inputs") / file.name if file.is_absolute() or ".." in file.parts else file

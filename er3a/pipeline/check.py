@@ -134,7 +134,7 @@ def _check_hand_eye(path: Path) -> None:
         for row in sample_rows(samples)[0]:
             if not (samples.parent / str(row.get("image"))).is_file():
                 where = f"row {row['row']}, column image"
-                raise InputError(samples, where, f"'{row.get('image')}' is no file", "Name the sample's image")
+                raise InputError(samples, where, f"'{row.get('image')}' is not a file", "Name the sample's image")
 
 
 def _check_vision(path: Path) -> None:
@@ -187,7 +187,7 @@ def stage_forms(robot: Robot) -> dict[str, str]:
 def check_file(path: Path) -> str:
     """Check a file and return in words what it is; :class:`er3a.errors.InputError` if something is wrong with it.
 
-    A folder stands for the study in it.
+    A folder means the study in it.
 
     Each file that it names is looked at too, from the folder that a study is run in: that which ``config`` or ``data``,
     where it stands, stands in, or else the working folder.

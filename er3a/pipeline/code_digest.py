@@ -24,7 +24,7 @@ VIEWS = ("report.py", "page.py", "panel.py", "index.py")
 @cache
 def code_digest(*modules: str) -> str:
     """SHA-256 over the sources of modules, of all modules of er3a that they import (transitively), and of templates
-    (``*.j2``, ``*.css``, ``*.js``) that stand beside those that are part of a view."""
+    (``*.j2``, ``*.css``, ``*.js``) beside those that are part of a view."""
     for module in modules:
         if _file(module) is None:
             raise ModuleNotFoundError(f"er3a has no module '{module}'")

@@ -46,7 +46,7 @@ def summary_schema(stage: Stage) -> dict[str, Any]:
 
 
 def _verdict_schema(stored: dict[str, Any], definitions: dict[str, Any]) -> dict[str, Any]:
-    """A verdict as it stands in the file: status, code and params."""
+    """A verdict in the file: status, code and params."""
     finding = stored["properties"]["finding"]
     references = [part["$ref"] for part in finding.get("anyOf", [finding])]
     cases = []

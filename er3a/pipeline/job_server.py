@@ -42,7 +42,7 @@ def hand_over(words: Sequence[str]) -> int | None:
 
     Returns
     -------
-    code : the job's exit code; None where there is no server for it
+    code : the job's exit code; None without a server for it
     """
     address = os.environ.get(ADDRESS)
     if not address or not words or words[0] not in VERBS or any(os.environ.get(k) != v for k, v in SETTINGS.items()):
@@ -89,7 +89,7 @@ def running(keep_open: int) -> Iterator[None]:
 
 
 def serve(listener: socket.socket) -> None:
-    """Fork a child for each job that is asked for, until standard input is closed."""
+    """Fork a child for each requested job, until standard input is closed."""
     import gc
     import selectors
 
@@ -173,7 +173,7 @@ def _run() -> int:
 
 
 def _end_with(line: socket.socket) -> None:
-    """End this process and what it started when the command that asked for the job has ended."""
+    """End this process and what it started when the command that requested the job has ended."""
     with suppress(OSError):
         line.recv(1)
     os.killpg(0, signal.SIGKILL)

@@ -142,7 +142,7 @@ def _where(place: Place) -> str:
 
 
 def shown(file: Path | None) -> str:
-    """A path as it is printed: from the folder that the command runs in, where it lies below it."""
+    """A path as printed: from the folder that the command runs in, where it lies below it."""
     if file is None:
         return "program"
     near = os.path.relpath(file)

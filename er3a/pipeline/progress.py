@@ -83,7 +83,7 @@ def shown_work(what: str) -> Iterator[Callable[[str], None]]:
 
 
 def work_clock() -> float:
-    """Seconds of a clock that stands still while kernels are compiled, as they are once on a machine."""
+    """Seconds of a clock that stops while kernels are compiled, as they are once on a machine."""
     from er3a.numerics.jit import compile_seconds  # numba only where work is timed: all commands load this file
 
     return time.monotonic() - compile_seconds()

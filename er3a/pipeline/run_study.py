@@ -93,7 +93,7 @@ def logger_words(study: Path, expected: Expected) -> list[str]:
 
 @dataclass
 class RunLogSettings(LogHandlerSettingsBase):
-    """Snakemake asks for one; there is nothing to set."""
+    """Snakemake requires one; it has no settings."""
 
 
 class RunLog(LogHandlerBase):
@@ -283,7 +283,7 @@ def _one_at_first() -> list[str]:
 
 
 def _parsed(words: Sequence[str]) -> Namespace:
-    """What Snakemake is asked for in words such as ``-np`` or ``--dry-run``."""
+    """What words request of Snakemake, such as ``-np`` or ``--dry-run``."""
     from snakemake.cli import get_argument_parser
     from snakemake.exceptions import CliException
 

@@ -11,7 +11,7 @@ from er3a.files.robot_file import Text
 from er3a.files.yaml_file import StrictModel
 from er3a.planning.names import ACCELERATION_TIME, StrategyName
 from er3a.programs.syntax import LanguageName
-from er3a.robots.robot import MOST_JOINTS
+from er3a.robots.robot import MAX_JOINTS
 
 
 class TrajectorySettings(StrictModel):
@@ -33,7 +33,7 @@ class TrajectorySettings(StrictModel):
     near_shoulder_mm: Annotated[float, Field(gt=0, le=10_000)]
     avoidance: Literal["compare"] | StrategyName = "compare"
     assumed_speed_deg_s: Annotated[
-        list[Annotated[float, Field(gt=0, le=10_000)]], Field(min_length=1, max_length=MOST_JOINTS)
+        list[Annotated[float, Field(gt=0, le=10_000)]], Field(min_length=1, max_length=MAX_JOINTS)
     ] = [180, 180, 180, 360, 360, 360]
     assumed_speed_mm_s: Annotated[float, Field(gt=0, le=100_000)] = 500
     acceleration_time_s: Annotated[float, Field(gt=0, le=10)] = ACCELERATION_TIME

@@ -152,7 +152,7 @@ class StudyBase(StrictModel):
         variant = self.variants.get(name)
         named = self.robots[name].stages if variant is None else self.sweeps[variant.sweep].stages
         asked = STAGES if named is None else tuple(named)
-        return tuple(stage for stage in asked if REGISTRY[stage].wanted(self, name))
+        return tuple(stage for stage in asked if REGISTRY[stage].is_configured(self, name))
 
     def pages(self, name: str) -> tuple[str, ...]:
         """The pages of a robot: its stages', and the teach panel of one that is no variant."""
@@ -239,7 +239,7 @@ class StudyBase(StrictModel):
             scene = self.scene_file(name, key)
             settings["scene"] = str(scene) if scene else None
         if key in REGISTRY:
-            settings |= REGISTRY[key].given(self, name)
+            settings |= REGISTRY[key].extra_inputs(self, name)
         return {"seed": self.seed, "robot": entry, key: settings}
 
     def article_pages(self) -> dict[str, str]:

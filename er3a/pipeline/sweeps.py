@@ -14,15 +14,15 @@ from er3a.files.robot_file import Name, Placement, RobotFile, Text, check_placem
 from er3a.files.yaml_file import StrictModel, parse
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.stages.registry import STAGES
-from er3a.robots.robot import MOST_JOINTS
+from er3a.robots.robot import MAX_JOINTS
 
-MOST_VALUES = 1000
+MAX_VALUES = 1000
 DECIMALS = 9
 Value = Annotated[float, Field(ge=-1e6, le=1e6)]
 
 
 class Entry(NamedTuple):
-    """An entry that can be varied: of a joint, or of the tool (``joint`` None); where it stands, its name and unit.
+    """An entry that can be varied: of a joint, or of the tool (``joint`` None); its place, name and unit.
 
     ``group`` and ``column`` are those of a joint's row in a robot's file, or the key and index of a tool's placement.
     """
@@ -53,15 +53,15 @@ _OF_THE_TOOL = {
 }
 ENTRIES = {
     f"joints.{joint}.{column}": Entry(joint, group, column, label, unit)
-    for joint in range(1, MOST_JOINTS + 1)
+    for joint in range(1, MAX_JOINTS + 1)
     for column, (group, label, unit) in _OF_A_JOINT.items()
 } | {f"tool.{key}": Entry(None, *where) for key, where in _OF_THE_TOOL.items()}
 
 
 def _known_entry(path: str) -> str:
     if path not in ENTRIES:
-        remedy = f"Write joints.1 to joints.{MOST_JOINTS} with one of {', '.join(_OF_A_JOINT)}; or tool with one of "
-        raise ValueError(f"'{path}' is no entry that can be varied | {remedy}{', '.join(_OF_THE_TOOL)}")
+        remedy = f"Write joints.1 to joints.{MAX_JOINTS} with one of {', '.join(_OF_A_JOINT)}; or tool with one of "
+        raise ValueError(f"'{path}' can't be varied | {remedy}{', '.join(_OF_THE_TOOL)}")
     return path
 
 
@@ -92,7 +92,7 @@ class Variant:
         return f"{entry_label(self.entry)} = {self.value:.9g} {self.entry.unit}"
 
     def table(self, content: RobotFile) -> RobotFile:
-        """A robot's file with the variant's title and the varied joint entry (a varied tool is no part of it).
+        """A robot's file with the variant's title and the varied joint entry (a varied tool is not part of it).
 
         Capsules that the file gives for its own link lengths don't fit others: a varied D-H entry leaves the default.
         """
@@ -115,7 +115,7 @@ class Variant:
             raise self._refusal(f"{error.field}: {error.problem}", error.remedy) from None
 
     def tool(self, tool: Placement | None) -> Placement | None:
-        """The tool with the varied entry; a varied joint leaves it as it is."""
+        """The tool with the varied entry; a varied joint does not change it."""
         entry = self.entry
         if entry.joint is not None:
             return tool
@@ -152,7 +152,7 @@ StageName = Annotated[Text, AfterValidator(_known_stage)]
 def _distinct(values: list[Any]) -> list[Any]:
     for value in values:
         if values.count(value) > 1:
-            raise ValueError(f"{value} stands there twice | Remove one of the two")
+            raise ValueError(f"{value} is listed twice | Remove one of the two")
     return values
 
 
@@ -167,8 +167,8 @@ class Sweep(StrictModel):
     vary: Annotated[Text, AfterValidator(_known_entry)]
     first: Annotated[Value | None, Field(alias="from")] = None
     to: Value | None = None
-    steps: Annotated[int, Field(ge=2, le=MOST_VALUES)] | None = None
-    values: Annotated[list[Value], Field(min_length=1, max_length=MOST_VALUES), AfterValidator(_distinct)] | None = None
+    steps: Annotated[int, Field(ge=2, le=MAX_VALUES)] | None = None
+    values: Annotated[list[Value], Field(min_length=1, max_length=MAX_VALUES), AfterValidator(_distinct)] | None = None
     stages: Annotated[list[StageName], Field(min_length=1), AfterValidator(_distinct)] = ["validation", "workspace"]
 
     @model_validator(mode="after")

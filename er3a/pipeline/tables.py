@@ -49,7 +49,7 @@ class Column:
 
     Attributes
     ----------
-    pattern : name in the file; with ``{}`` for a group: what stands there is in ``parts``, or counts from 1
+    pattern : name in the file; with ``{}`` for a group: what replaces it is in ``parts``, or counts from 1
     kind : of a column of findings, which ones they can be
     lists : whether each row holds a list of real numbers
     heading : what it is called at an axis or over a table, in few words; empty where the meaning serves
@@ -294,7 +294,7 @@ class Table(ByValue):
 
 
 def _array(values: Any, spec: Column) -> NDArray[Any]:
-    """A column from an array, a sequence, or what stands in every row."""
+    """A column from an array, a sequence, or one value for every row."""
     if spec.dtype != object or spec.is_group or not isinstance(values, list | tuple):
         return np.asarray(values, spec.dtype)
     array = np.empty(len(values), object)
@@ -312,7 +312,7 @@ def _values(stored: pa.ChunkedArray, spec: Column) -> NDArray[Any]:
 
 
 def _coded(findings: NDArray[Any]) -> NDArray[Any]:
-    """Findings (rows,) as text: code first, then parameters; one that stands in many rows is written out once."""
+    """Findings (rows,) as text: code first, then parameters; one that is in many rows is written out once."""
     texts: dict[int, str | None] = {id(None): None}
     for finding in findings:
         if id(finding) not in texts:

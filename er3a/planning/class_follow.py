@@ -269,7 +269,7 @@ def _improved(search: _LawSearch, s: int, law: ArmAngleLaw) -> ArmAngleLaw:
 
 
 DEGREE = 9
-FIRST_PIECES, MOST_PIECES = 4, 1024  # between two corners of the path or of its law of time
+FIRST_PIECES, MAX_PIECES = 4, 1024  # between two corners of the path or of its law of time
 CLOSE = 1e-10  # rad, m
 SAME_TIME = 1e-9  # share of the duration
 WIDE = np.radians(20.0)  # rad, m; of a joint between two points
@@ -431,7 +431,7 @@ def _followed(robot: Robot, path: ToolPath, start: Reals, rows_at: Callable[[Rea
         t, back = np.unique(np.concatenate([nodes.ravel(), between.ravel()]), return_inverse=True)
         q = np.empty((len(t), robot.joints))
         ended, reached = _tracked(np.ascontiguousarray(rows_at(t)), (turns.steps, turns.counts), start, q)
-        more = pieces < MOST_PIECES
+        more = pieces < MAX_PIECES
         if ended < len(t) and not (reached and more):
             raise PathEndsError(robot.name, "singular" if reached else "out_of_reach", float(t[ended]))
         if ended == len(t):

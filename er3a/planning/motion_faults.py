@@ -639,7 +639,7 @@ class MaxRates:
         for order, series in enumerate((part.velocity, part.acceleration)):
             for j, side in np.ndindex(self._peaks.shape[1:]):
                 pieces = part.of_joint(series, j, (1.0, -1.0)[side])
-                self._peaks[order, j, side] = pieces.greatest(float(self._peaks[order, j, side]))
+                self._peaks[order, j, side] = pieces.maximum(float(self._peaks[order, j, side]))
 
     @property
     def rates(self) -> tuple[Reals, Reals]:

@@ -17,7 +17,7 @@ PathVerdict = Literal[
     "safe",
 ]
 PATH_VERDICTS: tuple[PathVerdict, ...] = get_args(PathVerdict)
-"""The gravest first."""
+"""Most serious first."""
 NOT_TO_BE_RUN = PATH_VERDICTS[: PATH_VERDICTS.index("undecided")]
 """Of paths that no arm should run as they are; others pass near singular poses, or leave something open."""
 

@@ -109,7 +109,7 @@ class Pieces:
                 most, at = float(values.max()), float(t[values.argmax()])
         return most, at
 
-    def greatest(self, before: float = -np.inf) -> float:
+    def maximum(self, before: float = -np.inf) -> float:
         """The largest value, or ``before`` if that is greater."""
         most = max(before, *(float(chebyshev.chebval(x, self.series.T).max()) for x in (-1.0, 1.0)))
         bounds = self.range[1]
@@ -194,10 +194,10 @@ class PiecewiseMotion(ByValue):
         """One joint's function of time."""
         return Pieces(self.times, sign * series[:, :, j])
 
-    def greatest(self, series: Reals) -> Reals:
+    def max_abs(self, series: Reals) -> Reals:
         """Largest size (n,) of angle, velocity, acceleration or jerk of each joint."""
         joints = range(series.shape[2])
-        return np.array([max(self.of_joint(series, j, sign).greatest() for sign in (1.0, -1.0)) for j in joints])
+        return np.array([max(self.of_joint(series, j, sign).maximum() for sign in (1.0, -1.0)) for j in joints])
 
     def parts(self) -> Iterator[PiecewiseMotion]:
         """The motion in one part."""

@@ -228,7 +228,7 @@ def _coefficients(x: Reals) -> tuple[Reals, Reals, Reals, Reals]:
 
 
 TURN_LENGTH = 0.1  # m per rad, of a turn on the spot, when time is shared out
-NO_WAY = 1e-12  # m; shorter segments are left out
+ZERO_LENGTH = 1e-12  # m; shorter segments are left out
 SIX_POINTS = 2.0  # Lebesgue constant of the six points of extreme value, 1.99: polynomials up to degree 5 exceed
 # their largest size at these points by no more
 RUNS_ON = 1e-9  # relative difference of twists below which a corner is none
@@ -476,7 +476,7 @@ def joint_sequence(points: Reals, blends: Reals, timing: float | Times, ramp: fl
 
 def _check(sizes: Reals, blends: Reals, unit: float, name: str) -> None:
     for k, size in enumerate(sizes):
-        if not size > NO_WAY:
+        if not size > ZERO_LENGTH:
             raise PathError(k + 1, "has no way: it ends where it starts")
     for k, blend in enumerate(blends):
         most = min(sizes[k], sizes[k + 1]) / 2

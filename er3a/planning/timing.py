@@ -34,7 +34,7 @@ LONGEST_STEP = 0.02  # share of the whole path between two nodes
 SHARPEST_BEND = 0.15  # rad, between two steps in joint space measured in full speeds
 SHORTEST_STEP = 2e-4  # s at full speed; bends sharper than this count as corners
 SAME_NODE = 1e-5  # s at full speed
-MOST_ROUNDS = 30
+MAX_ROUNDS = 30
 STRAIGHT_NODES = 81
 SPLINE_DEGREE = 6  # in time, of a cubic at an even acceleration
 
@@ -138,13 +138,13 @@ class Timed:
 
     def ratios(self, limits: JointLimits) -> tuple[float, float]:
         """Largest ratio of a joint's speed to its limit, and of its acceleration to its limit, on the whole curve."""
-        speed, acceleration = self.greatest
+        speed, acceleration = self.max_rates
         return float((speed / limits.speed).max()), float((acceleration / limits.acceleration).max())
 
     @cached_property
-    def greatest(self) -> tuple[Reals, Reals]:
+    def max_rates(self) -> tuple[Reals, Reals]:
         """Maximum speed (n,) in rad/s and acceleration (n,) in rad/s^2 of each joint."""
-        return self.curve.greatest(self.curve.velocity), self.curve.greatest(self.curve.acceleration)
+        return self.curve.max_abs(self.curve.velocity), self.curve.max_abs(self.curve.acceleration)
 
 
 def joint_limits(
@@ -174,7 +174,7 @@ def nodes_along(joints: Callable[[Reals], Reals], t: Reals, q: Reals, limits: Jo
     joints : angles (n, 6) in rad at times (n,)
     t, q : (N,) s and (N, 6) rad, to begin with
     """
-    for _ in range(MOST_ROUNDS):
+    for _ in range(MAX_ROUNDS):
         steps = np.diff(q, axis=0) / limits.speed
         size = np.abs(steps).max(axis=1)
         long = size > LONGEST_STEP * size.sum()

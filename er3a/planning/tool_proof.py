@@ -54,12 +54,12 @@ SHORTEST_JERK = 2e-7  # share of the duration; below, jerks are differences of e
 SETTLED_ELSEWHERE = 1e-5  # share of the duration: shortest interval for what another interval breaks already
 BESIDE_EVENT = 2e-3, 1e-4  # shares of the duration: so near to a known singular pose no interval is made shorter
 # than that, nor where start, middle and end are singular
-MOST_INTERVALS = 240_000
+MAX_INTERVALS = 240_000
 MANY_INTERVALS = 4_000  # beyond which means of jerks, which take two more poses each, pay
 FIRST_INTERVALS = 64
 GROWN = 0.5  # b sqrt(n) C h V up to which a motion is continued
 ATTEMPTS = 3
-MOST_ROUNDS = 3
+MAX_ROUNDS = 3
 BLURRED = 1e-9  # relative, rounding of second derivatives by differences of the Jacobian
 STEP_ASIDE = 1e-10  # share of the duration
 
@@ -169,7 +169,7 @@ def follow_and_prove(
 
     Where a pose proves out of reach between others that are not, the path is followed again with that pose among them.
     """
-    for _ in range(MOST_ROUNDS):
+    for _ in range(MAX_ROUNDS):
         followed = follow(robot, line, t, q_start, start_slot)
         events = singular_events(robot, followed.t, followed.q, followed.joints, required.near)
         beyond = np.flatnonzero(np.diff(np.isnan(followed.q[:, 0])))
@@ -219,7 +219,7 @@ def prove(followed: Followed, required: ProofRequirements, singular: Reals) -> T
             followed, found
         )
         shortest = np.where(hopeless[:, None], np.maximum(least, BESIDE_EVENT[1] * duration), least)
-        again = (found.open & ((end - start)[:, None] > 2 * shortest)).any(axis=1) & (count <= MOST_INTERVALS)
+        again = (found.open & ((end - start)[:, None] > 2 * shortest)).any(axis=1) & (count <= MAX_INTERVALS)
         done.append(found.part(~again))
         middle = (start + end)[again] / 2
         start = np.concatenate([start[again], middle])

@@ -52,7 +52,7 @@ SHOWN = 101
 STILL = 1e-9  # rad
 SPARE = 0.25  # of the clearance at the ends, to within which that of the motion is found
 STREAM = 17
-MOST_PAIRS = 4
+MAX_PAIRS = 4
 LIKELY = (0.5, 0.25, 0.75)  # shares of a move at which it is tried first
 
 
@@ -192,7 +192,7 @@ def way_between(task: PlanningTask, starts: Reals, ends: Reals) -> WayAround | N
     if not len(starts) or not len(ends):
         return EndUnreached("end" if len(starts) else "start")
     found: WayAround | NoWayAround = NoneFound(0)
-    for _, i, j in pairs[:MOST_PAIRS]:
+    for _, i, j in pairs[:MAX_PAIRS]:
         found = way_around(task, starts[i], ends[j])
         if isinstance(found, WayAround):
             break
@@ -339,7 +339,7 @@ def _with_jerk(route: JointSequence, limits: JointLimits) -> Timed:
     curve = route.polynomials()
     assert limits.jerk is not None
     speed, acceleration, jerk = (
-        float((curve.greatest(series) / most).max())
+        float((curve.max_abs(series) / most).max())
         for series, most in (
             (curve.velocity, limits.speed),
             (curve.acceleration, limits.acceleration),

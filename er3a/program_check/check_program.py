@@ -511,7 +511,7 @@ def parts_of(check: ProgramCheck, robot: Robot, source: CommandSource) -> tuple[
         if motion.end is None:
             break
     if not groups:
-        raise InputError(source.file, f"{source.field}.program", "no motion has a known way", "Give start_deg")
+        raise InputError(source.file, f"{source.field}.program", "no motion has a known start", "Give start_deg")
     return [_part(group) for group in groups], tuple(sorted({*rest.values()} - {0}))
 
 

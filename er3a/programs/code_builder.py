@@ -17,7 +17,7 @@ from er3a.programs import syntax
 from er3a.programs.instructions import Aside, Place, Remark, Unknown
 from er3a.programs.program_findings import NameTwice, NotUnderstood, ProgramFinding
 
-MOST_NESTED = 200
+MAX_NESTED = 200
 ASSIGNED = re.compile(r"(?:(?:global|local)\s+)?([A-Za-z_$][\w$]*)[^=\"'(]*=(?!=)")
 
 
@@ -130,7 +130,7 @@ class CodeBuilder:
         text: str,
     ) -> None:
         """``FOR name = first TO last STEP step``; the last and the step are fixed when the loop is entered."""
-        if len(self.blocks) >= MOST_NESTED:
+        if len(self.blocks) >= MAX_NESTED:
             self._open("for", place)
         self._hidden += 1
         limit, by = (syntax.Variable(f"%{part}{self._hidden}") for part in ("last", "step"))
@@ -221,8 +221,8 @@ class CodeBuilder:
         return syntax.Routine(self.name, self.parameters, (*self.code, syntax.Return(end)), self.place, self.thread)
 
     def _open(self, kind: str, place: Place, word: str = "") -> None:
-        if len(self.blocks) >= MOST_NESTED:
-            raise fault(place, f"more than {MOST_NESTED} blocks within each other", "Nest fewer")
+        if len(self.blocks) >= MAX_NESTED:
+            raise fault(place, f"more than {MAX_NESTED} blocks within each other", "Nest fewer")
         self.blocks.append(Block(kind, place, len(self.code), word=word or kind))
 
     def _innermost(self, word: str, place: Place) -> Block:
@@ -269,7 +269,7 @@ Each = Callable[[syntax.Expression], syntax.Expression]
 
 
 def linked(routines: Iterable[syntax.Routine]) -> tuple[dict[str, syntax.Routine], tuple[ProgramFinding, ...]]:
-    """The routines by name, with calls of each other taken out of expressions; and what is to be said of the text.
+    """The routines by name, with calls of each other taken out of expressions; and the findings about the text.
 
     Of two routines with one name the later one counts; the other is kept under a name that nothing calls.
     """

@@ -66,7 +66,7 @@ def read_csv_program(source: ProgramText) -> Program:
     Raises
     ------
     InputError
-        for a column that is missing, a value that is no finite number, times that do not rise
+        for a column that is missing, a value that is not a finite number, times that do not rise
     """
     kept = [(i, line) for i, line in enumerate(source.lines, 1) if line.strip() and not line.startswith("#")]
     rows = [next(csv.reader((line,))) for _, line in kept]  # each by itself: no quote goes on over lines
@@ -118,7 +118,7 @@ def _numbers(source: ProgramText, line: int, row: list[str], columns: list[int],
         except ValueError:
             value = math.nan
         if not math.isfinite(value):
-            problem = f"'{text[:40]}' is no finite number" if text else "a value is missing"
+            problem = f"'{text[:40]}' is not a finite number" if text else "a value is missing"
             raise InputError(source.path, f"line {line}, column {head[column]}", problem, "Write a number")
         found.append(value)
     return found

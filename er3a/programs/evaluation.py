@@ -21,7 +21,7 @@ from er3a.programs import syntax
 from er3a.programs.instructions import ArmMotion, Instruction, JointTarget, NamedFrame, PoseTarget, arc_end
 
 NO_FRAME = NamedFrame()
-MOST_ROBOT_AXES = 6
+MAX_ROBOT_AXES = 6
 
 Flange = Callable[[Reals], Reals]
 """T_robot_flange (4, 4) of joint angles (n,) in rad."""
@@ -43,7 +43,7 @@ class Cell(ByValue):
 
     flange: Flange | None = None
     start: Reals | None = None
-    joints: int = MOST_ROBOT_AXES
+    joints: int = MAX_ROBOT_AXES
     frames: Mapping[str, Reals] = field(default_factory=dict)
     tool: Reals | None = None
     base: Reals | None = None
@@ -52,7 +52,7 @@ class Cell(ByValue):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Position:
-    """Where the arm stands.
+    """Where the arm is.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class Position:
     base: NamedFrame = NO_FRAME
 
     def after(self, motion: ArmMotion, flange: Flange | None) -> Position:
-        """Where the arm stands behind a motion."""
+        """Where the arm is after a motion."""
         target = motion.target
         if motion.angle is not None:
             return self._after_arc(motion, motion.angle, flange)
@@ -84,7 +84,7 @@ class Position:
         return Position()
 
     def _after_arc(self, motion: ArmMotion, angle: float, flange: Flange | None) -> Position:
-        """Behind an arc with an angle of its own."""
+        """After an arc with an angle of its own."""
         start = self.seen(motion.tool, motion.base, flange)
         poses = isinstance(motion.target, PoseTarget) and isinstance(motion.via, PoseTarget)
         if start is None or not poses or not math.isfinite(angle):
@@ -174,7 +174,7 @@ class Dialect(ABC):
     modal : variables that motions depend on without naming them
     local_by_default : whether a routine's assignment to a name that nothing else knows makes a local variable
     setters : functions that are not in the program, move nothing, and set what motions depend on
-    whole_division : whether two whole numbers have a whole quotient; None where no source tells
+    whole_division : whether two whole numbers have a whole quotient; None where no source says
     first_index : of a list's first element
     """
 
@@ -200,7 +200,7 @@ class Dialect(ABC):
         return True
 
     def assigned(self, old: syntax.Value, new: syntax.Value) -> syntax.Value:
-        """What a variable has behind an assignment to it."""
+        """What a variable has after an assignment to it."""
         return new
 
     def named(self, name: str) -> bool:
@@ -208,7 +208,7 @@ class Dialect(ABC):
         return False
 
     def constant(self, memory: ProgramMemory, name: str) -> syntax.Value | None:
-        """The value of a name that the language itself gives, if it does: a frame, where the arm stands."""
+        """The value of a name that the language itself gives, if it does: a frame, or where the arm is."""
         return None
 
     def listed(self, kind: str, values: tuple[syntax.Value, ...]) -> syntax.Value:
@@ -225,7 +225,7 @@ class Dialect(ABC):
 
     @abstractmethod
     def motion(self, memory: ProgramMemory, move: syntax.Move) -> ArmMotion:
-        """The motion, from where the arm stands."""
+        """The motion, from where the arm is."""
 
     @abstractmethod
     def carry_out(self, memory: ProgramMemory, doing: syntax.Doing) -> Instruction | None:
@@ -245,7 +245,7 @@ class ProgramMemory:
     types : declared types by name
     kept : what a language keeps until the next value is given
     beside : names that a thread changes, so that their values are unclear
-    here : where the arm stands
+    here : where the arm is
     cell : what is known of the cell
     """
 

@@ -42,8 +42,8 @@ class Step:
 
     Attributes
     ----------
-    place : where it stands
-    calls : where the routines were called that it stands in, the outermost first
+    place : its place in the text
+    calls : where the routines around it were called, the outermost first
     before : number of the step before it; -1 for the first
     """
 
@@ -103,7 +103,7 @@ class Execution(ByValue):
         return tuple(i for i, step in enumerate(self.steps) if isinstance(step.instruction, ArmMotion))
 
     def own_line(self, step: Step) -> int:
-        """The line of the program's own file at which a step is met: the call's if it stands in another module."""
+        """The line of the program's own file at which a step is met: the call's if it is in another module."""
         chain = (*step.calls, step.place)
         return next((place.line for place in reversed(chain) if place.file == self.program.file), step.place.line)
 

@@ -52,7 +52,7 @@ def listing_of(
     Parameters
     ----------
     start : (n,), rad, joints at the path's start
-    ends : (k, n), rad, joints at the end of each segment or row behind the start, where they are known: they fix the
+    ends : (k, n), rad, joints at the end of each segment or row after the start, where they are known: they fix the
         branch for languages that write joints
     load : what hangs on the flange, as of :class:`er3a.programs.instructions.ArmMotion`
     """

@@ -82,7 +82,7 @@ class Rate:
 
 @dataclass(frozen=True, slots=True)
 class Zone:
-    """How near the arm has to come to a target before it goes on.
+    """How near to a target the arm must be before it goes on.
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ FINE = Zone()
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NamedFrame(ByValue):
-    """A tool (T_flange_tool) or base (T_robot_base) that targets are meant by.
+    """A tool (T_flange_tool) or base (T_robot_base) that targets refer to.
 
     Attributes
     ----------
@@ -192,7 +192,7 @@ class ArmMotion(ByValue):
     via : point on the arc
     angle : rad, by which the arc goes on (KRL's CA); None if it ends at the target
     spline_block : number of the spline block that it belongs to
-    speed, acceleration : None where the program leaves them as they are on the controller
+    speed, acceleration : None where the program keeps the controller's values
     turn_speed : rad/s, at most, of the tool's turn on a line or arc; None if the program gives none: then turns count
         as lengths do
     load : what hangs on the flange, in its frame; a text where the program names a load without all its numbers; None
@@ -322,7 +322,7 @@ def motions_of(instructions: Iterable[Instruction]) -> Iterable[ArmMotion]:
 
 
 ON_A_LINE = 1e-9
-MOST_LINES = 10_000
+MAX_LINES = 10_000
 
 
 def arc_poses(start: Reals, via: Reals, end: Reals, shares: Reals) -> Reals | None:
@@ -389,14 +389,14 @@ def arc_end(start: Reals, via: Reals, target: Reals, angle: float) -> Reals | No
 
 
 def chords(start: Reals, via: Reals, end: Reals, deviation: float) -> Reals | None:
-    """Poses (n, 4, 4) behind the start, lines between which stay within ``deviation`` (m) of the arc."""
+    """Poses (n, 4, 4) after the start, lines between which stay within ``deviation`` (m) of the arc."""
     circle = centre_and_angle(start[:3, 3], via[:3, 3], end[:3, 3])
     if circle is None:
         return None
     centre, _, angle = circle
     radius = float(np.linalg.norm(start[:3, 3] - centre))
     widest = 2 * math.acos(max(1 - deviation / radius, 0.0)) if radius > 0 else angle
-    count = min(max(math.ceil(angle / max(widest, 1e-6)), 1), MOST_LINES)
+    count = min(max(math.ceil(angle / max(widest, 1e-6)), 1), MAX_LINES)
     found = arc_poses(start, via, end, np.arange(1, count + 1) / count)
     if found is not None:
         found[-1] = end

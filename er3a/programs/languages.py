@@ -64,7 +64,7 @@ def language_of(source: ProgramText) -> LanguageName:
     Raises
     ------
     InputError
-        if neither tells
+        if neither decides
     """
     if not source.text.strip():
         raise InputError(source.path, None, "is empty", f"Give a program in {KNOWN}")
@@ -76,7 +76,7 @@ def language_of(source: ProgramText) -> LanguageName:
     if named is not None and (named in shown or not shown or LANGUAGES[named].sign is None):
         return named
     if not shown:
-        raise InputError(source.path, None, "is no program that is known", f"Give one in {KNOWN}")
+        raise InputError(source.path, None, "is not a known robot program", f"Give one in {KNOWN}")
     return shown[0]
 
 

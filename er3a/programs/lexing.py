@@ -142,13 +142,13 @@ class Words:
         return None
 
     def reference(self) -> Expression:
-        """A name with the fields, indices and arguments behind it."""
+        """A name with the fields, indices and arguments after it."""
         name = self.take()
         value = self.lexicon.constants.get(name.upper())
         return self.parts_of(Variable(name)) if value is None else Constant(value)
 
     def parts_of(self, found: Expression) -> Expression:
-        """An expression with the fields, indices and arguments behind it."""
+        """An expression with the fields, indices and arguments after it."""
         while self.kind == "mark":
             if self.accept("."):
                 found = Member(found, self.name())
@@ -191,7 +191,7 @@ class Words:
 
 
 def as_number(text: str) -> int | float:
-    """A number as it is written: whole if it has no point and no exponent."""
+    """A number: whole if it is written without point and exponent."""
     if text.isascii() and text.isdigit():
         return int(text) if len(text) < 19 else float(text)
     if text[:1] == "0" and text[1:2].lower() in ("x", "o", "b"):
@@ -210,7 +210,7 @@ def dotted(expression: Expression) -> str:
             return f"{dotted(of)}[]"
         case Invocation(function=function):
             return f"{function}()"
-    raise MisreadError("not a name")
+    raise MisreadError("expected an identifier")
 
 
 MAX_PROGRAM_BYTES = 32_000_000
@@ -264,7 +264,7 @@ def read_program_text(path: Path) -> ProgramText:
     if control is not None:
         line = text.count("\n", 0, control.start()) + 1
         raise InputError(
-            path, f"line {line}", "holds control characters, so it is no text", "Export the program as text"
+            path, f"line {line}", "holds control characters, so it is not text", "Export the program as text"
         )
     return ProgramText(path, text.rstrip("\x1a"), encoding)
 

@@ -210,7 +210,7 @@ def _moves(operation: syntax.Operation, moving: set[str], dialect: Dialect) -> b
 
 
 def _may_move(operation: syntax.Operation, dialect: Dialect) -> bool:
-    """Whether an operation that is no motion may move the arm for all that is known."""
+    """Whether an operation that is not a motion may move the arm, as far as is known."""
     match operation:
         case syntax.Fixed(instruction=instructions.Unknown(may_move=may_move)):
             return may_move
@@ -301,11 +301,11 @@ def _quiet_in(
 
 
 class _Graph:
-    """What follows what in a routine; the number after the last operation stands for its end.
+    """What follows what in a routine; the number after the last operation means its end.
 
     Attributes
     ----------
-    meeting : by operation, the first that every way from it comes to; -1 where there is none
+    meeting : by operation, the first that every path from it reaches; -1 where there is none
     """
 
     def __init__(self, routine: syntax.Routine):
@@ -341,7 +341,7 @@ class _Graph:
         return before
 
     def _order(self, before: list[list[int]]) -> list[int]:
-        """All operations from which the end is reached, each behind those that come to it first."""
+        """All operations from which the end is reached, each after those that lead to it first."""
         order: list[int] = []
         seen = {self.end}
         stack: list[tuple[int, Iterator[int]]] = [(self.end, iter(before[self.end]))]
@@ -491,7 +491,7 @@ class Machine:
         return Execution(self.program, tuple(self.steps), tuple(self.endings), self._unmet())
 
     def _unmet(self) -> tuple[instructions.Place, ...]:
-        """Instructions that are no motions, may move the arm for all that is known, and were not carried out."""
+        """Instructions that are not motions, may move the arm as far as is known, and were not carried out."""
         return tuple(
             operation.place
             for routine in self.program.routines.values()
@@ -696,8 +696,8 @@ class Machine:
     def _start(self, way: ExecutionPath, start: syntax.Beside) -> None:
         """Follow a routine that moves the arm beside the program, on a way that begins here.
 
-        The program's own way goes on. Behind the start of a thread it does not know where the arm stands; an interrupt,
-        which may come at any time, begins where it is not known, and the motion that it broke into goes on behind it.
+        The program's own way goes on. After the start of a thread it does not know where the arm stands; an interrupt,
+        which may come at any time, begins where it is not known, and the motion that it broke into goes on after it.
         """
         name = start.what.function
         routine = self.program.routines.get(name)
@@ -766,7 +766,7 @@ class Machine:
         return rounds > self.limits.rounds
 
     def _met(self, way: ExecutionPath) -> tuple[EndKind, int] | None:
-        """Whether this way (it repeats) or another (it joins) was in this state before, and behind which step."""
+        """Whether this way (it repeats) or another (it joins) was in this state before, and after which step."""
         memory, last = way.memory, len(way.frames) - 1
         frames = tuple(
             (frame.routine.name, frame.at, self._kept(memory.local if i == last else frame.local))
@@ -819,7 +819,7 @@ def _labels(routine: syntax.Routine) -> frozenset[int]:
 
 
 def _loops(routine: syntax.Routine) -> frozenset[int]:
-    """Branches whose condition keeps a loop going: behind them, the code jumps back to before them."""
+    """Branches whose condition keeps a loop going: after them, the code jumps back to before them."""
     jumps = [(i, each.to) for i, each in enumerate(routine.code) if isinstance(each, syntax.GoTo) and each.to <= i]
     branches = [(i, each.otherwise) for i, each in enumerate(routine.code) if isinstance(each, syntax.Branch)]
     return frozenset(at for at, end in branches if any(to <= at < i < end for i, to in jumps))

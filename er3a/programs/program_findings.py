@@ -126,7 +126,7 @@ class NotTranslated(Finding, code="written_not_translated"):
 
 
 class WrittenUnsafe(Finding):
-    """The path is not safe as it is, and was written all the same because that was asked for."""
+    """The path is not safe, and was written because the user requested it."""
 
     path: str
     verdict: PathVerdict

@@ -24,9 +24,9 @@ class Language:
     ----------
     title : what it is called
     suffixes : of its files, the usual one first, in small letters
-    sign : what texts of the language have; None where the opening alone tells
+    sign : what texts of the language have; None where the opening alone decides
     opening : with what all its texts begin, and those of no other language
-    dialect : how its expressions, motions and functions are meant when a program runs
+    dialect : the meaning of its expressions, motions and functions when a program runs
     writer : None of a table over time (:func:`er3a.programs.csv_program.write_csv`)
     joints : how many joint angles a target can have; None for any number, of prismatic joints too
     points : suffix of the file with a program's points, where they stand in one of their own

@@ -123,7 +123,7 @@ LanguageName = Literal["krl", "urscript", "rpl", "xpl", "rapid", "csv"]
 
 @dataclass(frozen=True, slots=True)
 class Constant:
-    """A value that stands in the text."""
+    """A literal value."""
 
     value: Value
 
@@ -278,7 +278,7 @@ class Move:
     Attributes
     ----------
     form : the language's word
-    words : flags behind it, such as ``C_DIS`` or ``#TOOL``
+    words : flags after it, such as ``C_DIS`` or ``#TOOL``
     settings : what holds for this motion alone (KRL's WITH; URScript's keywords)
     """
 
@@ -331,7 +331,7 @@ class RoutineParameter:
 
 @dataclass(frozen=True, slots=True)
 class Routine:
-    """Code with a name; a run ends behind its last operation.
+    """Code with a name; a run ends after its last operation.
 
     Attributes
     ----------
@@ -353,7 +353,7 @@ class Program(ByValue):
     ----------
     entry : the routine with which it begins
     data : declarations (of a .dat or .var file, or of global variables), carried out first
-    findings : what is to be said about the text
+    findings : about the text
     slides : whether each joint of a table slides, its targets in m; empty of other programs
     """
 

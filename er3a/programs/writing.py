@@ -24,9 +24,9 @@ from er3a.robots.masses import MassBody
 from er3a.robots.robot import Robot
 
 STEP_M, STEP_RAD = 0.02, 0.1
-MOST_STEPS = 10_000  # on a way that no arm can take
-MOST_AT_ONCE = 2_000  # motions whose joints are solved together
-MOST_ROUNDS = 10  # over them
+MAX_STEPS = 10_000  # on a way that no arm can take
+MAX_AT_ONCE = 2_000  # motions whose joints are solved together
+MAX_ROUNDS = 10  # over them
 
 Frames = tuple[instructions.NamedFrame, instructions.NamedFrame]
 NO_SIDE = 1e-9  # m or rad, of a signed distance that is on no side
@@ -70,7 +70,7 @@ class ReadyMotion:
 
 
 class Resolver:
-    """Follows a sequence and knows where the arm is; joints are solved when they are asked for, many at a time.
+    """Follows a sequence and knows where the arm is; joints are solved when they are needed, many at a time.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ class Resolver:
         return ready
 
     def joints_after(self, number: int) -> Reals | None:
-        """Joints (n,) in rad behind a motion; -1 for the start."""
+        """Joints (n,) in rad after a motion; -1 for the start."""
         if number < 0:
             return self.start
         motion, _ = self.motions[number]
@@ -128,7 +128,7 @@ class Resolver:
 
         Of solutions on a ``branch`` only, where there are some.
 
-        The list ends behind the first pose that has none, with None.
+        The list ends after the first pose that has none, with None.
         """
         flanges = self._flanges_of(poses, frames)
         if self.arm is None or flanges is None:
@@ -136,7 +136,7 @@ class Resolver:
         reference = np.zeros(self.arm.joints) if near is None else near
         references = np.tile(reference, (len(flanges), 1))
         chain: list[Reals] = []
-        for _ in range(MOST_ROUNDS):  # until each pose is solved with the joints before it as reference
+        for _ in range(MAX_ROUNDS):  # until each pose is solved with the joints before it as reference
             try:
                 found = inverse_batch(self.arm, flanges, references)
                 chain = _chain(found, reference, self.arm, branch)
@@ -149,7 +149,7 @@ class Resolver:
         return [*chain, None] if len(chain) < len(flanges) else list(chain)
 
     def _solve_next(self) -> None:
-        """Solve the next motion, and with it those behind it that are lines and arcs to poses."""
+        """Solve the next motion, and with it those after it that are lines and arcs to poses."""
         first = len(self._solved)
         motion, pose_before = self.motions[first]
         near = self.joints_after(first - 1)
@@ -163,7 +163,7 @@ class Resolver:
     def _solve_ways(self, first: int, near: Reals) -> None:
         frames = _frames(self.motions[first][0])
         ways: list[Reals] = []
-        for motion, pose_before in self.motions[first : first + MOST_AT_ONCE]:
+        for motion, pose_before in self.motions[first : first + MAX_AT_ONCE]:
             if not _is_followed(motion) or pose_before is None or not _same(frames, _frames(motion)):
                 break
             ways.append(_between(motion, pose_before))
@@ -231,7 +231,7 @@ def solutions_meant(branch: instructions.MeantSolution, robot: Robot, rows: Real
     """Which of joint vectors (k, n) in rad are meant: (k,).
 
     The wrist centre's sides are compared with those in the arm's zero pose; what has no side there, or has no such
-    sides at all, as an arm without a spherical wrist, is not asked for.
+    sides at all, as an arm without a spherical wrist, is not checked.
     """
     met: Flags = np.asarray(((rows >= branch.ranges[:, 0]) & (rows <= branch.ranges[:, 1])).all(axis=1), np.bool_)
     if branch.behind_axis_1 is None and branch.behind_lower_arm is None:
@@ -290,7 +290,7 @@ def _between(motion: instructions.ArmMotion, start: Reals) -> Reals:
     end = motion.target.pose
     turn = scipy.spatial.transform.Rotation.from_matrix(end[:3, :3] @ start[:3, :3].T).as_rotvec()
     way = float(np.linalg.norm(end[:3, 3] - start[:3, 3]))
-    count = int(min(max(way / STEP_M, float(np.linalg.norm(turn)) / STEP_RAD, 1), MOST_STEPS)) + 1
+    count = int(min(max(way / STEP_M, float(np.linalg.norm(turn)) / STEP_RAD, 1), MAX_STEPS)) + 1
     shares = np.arange(1, count + 1) / count
     poses = None
     if motion.kind == "arc" and isinstance(motion.via, instructions.PoseTarget):
@@ -330,7 +330,7 @@ class WrittenProgram(ByValue):
     Attributes
     ----------
     files : texts by suffix (``.src``, ``.dat``)
-    findings : where the text differs from what was asked for; the file's head says the same
+    findings : where the text differs from the request; the file's head says the same
     """
 
     name: str
@@ -629,12 +629,12 @@ def ascii_text(text: str) -> str:
 
 
 def fixed(value: float, digits: int) -> str:
-    """A number with so many digits behind the point, never -0."""
+    """A number with so many digits after the point, never -0."""
     return f"{round(value, digits) + 0.0:.{digits}f}"
 
 
 def short(value: float, digits: int = 6) -> str:
-    """A number with up to so many digits behind the point, at least one."""
+    """A number with up to so many digits after the point, at least one."""
     text = fixed(value, digits).rstrip("0")
     return text + "0" if text.endswith(".") else text
 

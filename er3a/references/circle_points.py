@@ -23,8 +23,8 @@ from er3a.robots.robot import Robot
 OFF_EVERY_AXIS_MM = 100.0
 TRIED_OFFSETS_MM = (200.0, 400.0, 800.0, 1600.0)
 STATIONS = 25
-LEAST_TURN, MOST_TURN = np.pi / 2, 2 * np.pi
-LEAST_SLIDE = 0.1  # m
+MIN_TURN, MAX_TURN = np.pi / 2, 2 * np.pi
+MIN_SLIDE = 0.1  # m
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,9 +110,9 @@ def fit_line(track: Reals) -> tuple[Reals, Reals, float, float]:
 def _track(robot: Robot, joint: int, offset_mm: Reals) -> Reals:
     """The carried point's positions (N, 3) in mm while one joint turns from its lower to its upper limit."""
     lower, upper = sorted((robot.lower[joint], robot.upper[joint]))
-    middle, turn = (lower + upper) / 2, np.clip(upper - lower, LEAST_TURN, MOST_TURN)
+    middle, turn = (lower + upper) / 2, np.clip(upper - lower, MIN_TURN, MAX_TURN)
     if robot.slides[joint]:
-        turn = max(upper - lower, LEAST_SLIDE)
+        turn = max(upper - lower, MIN_SLIDE)
     q = np.zeros((STATIONS, robot.joints))
     q[:, joint] = middle + np.linspace(-turn / 2, turn / 2, STATIONS)
     T = forward(robot.without_tool(), q)

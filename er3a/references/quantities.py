@@ -92,9 +92,10 @@ class AxisLines:
 
 @dataclass(frozen=True)
 class Quantity(ABC):
-    """One number about an arm."""
+    """One number about an arm; ``depends_on_table``: not on the joints' limits and speeds alone."""
 
     unit: ClassVar[Unit] = "mm"
+    depends_on_table: ClassVar[bool] = True
 
     @property
     def seen_at(self) -> Pose:
@@ -285,6 +286,7 @@ class Limit(Quantity):
 
     joint: int
     side: Side
+    depends_on_table: ClassVar[bool] = False
     unit: ClassVar[Unit] = "deg"
 
     def value(self, state: ModelState) -> Reals:
@@ -307,6 +309,7 @@ class Speed(Quantity):
     """A joint's maximum speed; NaN where the robot's file gives none."""
 
     joint: int
+    depends_on_table: ClassVar[bool] = False
     unit: ClassVar[Unit] = "deg/s"
 
     def value(self, state: ModelState) -> Reals:
@@ -324,9 +327,10 @@ class SlideSpeed(Speed):
 
 
 @dataclass(frozen=True)
-class PoseOutside(QuantityAtPose):
+class LimitExcess(QuantityAtPose):
     """How far a pose lies outside the joint limits: largest excess of a joint (mm of one that slides), 0 inside."""
 
+    depends_on_table: ClassVar[bool] = False
     unit: ClassVar[Unit] = "deg"
 
     def value(self, state: ModelState) -> Reals:

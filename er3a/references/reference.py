@@ -147,7 +147,7 @@ class Reference:
         return self.quantity.unit
 
     @property
-    def authoritative(self) -> bool:
+    def is_authoritative(self) -> bool:
         """Whether a verdict may rest on it."""
         return self.grade in AUTHORITATIVE_GRADES
 

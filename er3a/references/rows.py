@@ -86,7 +86,7 @@ class PositionRow(Row):
 
     def within_limits(self) -> Scalar:
         """That the pose lies within the joint limits."""
-        return subjects.PoseExcess(self.name), self.group, quantities.PoseOutside(self.pose), 0.0, POSE_SLACK_DEG
+        return subjects.PoseExcess(self.name), self.group, quantities.LimitExcess(self.pose), 0.0, POSE_SLACK_DEG
 
 
 @dataclass(frozen=True)
@@ -268,9 +268,9 @@ KINDS: dict[str, type[Row]] = {
 
 
 def check_complete(what: str, wanted: Iterable[str], present: Iterable[str]) -> None:
-    """Refuse at once a registry that lacks something, or has something that no other knows."""
+    """Reject a registry that lacks a name, or has one that is registered nowhere else."""
     if differing := set(wanted) ^ set(present):
-        raise LookupError(f"{what}: {', '.join(sorted(differing))} stands in one place and not in the other")
+        raise LookupError(f"{what}: {', '.join(sorted(differing))} listed in one place and missing in the other")
 
 
 def reference_set(name: str, rows: Mapping[str, tuple[Row, ...]], documents: Documents | None = None) -> ReferenceSet:
@@ -281,7 +281,7 @@ def reference_set(name: str, rows: Mapping[str, tuple[Row, ...]], documents: Doc
     reached: dict[object, Reference] = {}
     for row in rows.get(PositionRow.kind, ()):
         if isinstance(row, PositionRow) and row.pose != quantities.ZERO_POSE:
-            key = (row.source, quantities.PoseOutside(row.pose))
+            key = (row.source, quantities.LimitExcess(row.pose))
             if key not in said:
                 reached.setdefault(key, row.reference(row.within_limits()))
     return ReferenceSet(name, (*stated, *reached.values()), rows, documents or Documents())

@@ -14,7 +14,7 @@ from er3a.robots.robot import Robot
 from er3a.robots.whole_turns import LIMIT_TOLERANCE, nearest_rows, rows_within, shortest_move, turns_in, whole_turns
 
 SAME_DIGITS = 9  # of rad, m: joint values that are alike to these are one
-MOST_ROWS = 10_000
+MAX_ROWS = 10_000
 
 
 class LimitExceeded(Finding):
@@ -141,11 +141,11 @@ def equivalents_within(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
     Raises
     ------
     Er3aError
-        if the limits allow more than ``MOST_ROWS``
+        if the limits allow more than ``MAX_ROWS``
     """
-    rows = rows_within(robot, q, q_ref, MOST_ROWS)
-    if len(rows) > MOST_ROWS:
-        raise Er3aError(f"{robot.name}: the limits allow more than {MOST_ROWS} turns of one pose; narrow them")
+    rows = rows_within(robot, q, q_ref, MAX_ROWS)
+    if len(rows) > MAX_ROWS:
+        raise Er3aError(f"{robot.name}: the limits allow more than {MAX_ROWS} turns of one pose; narrow them")
     return rows if len(rows) else nearest_equivalent(robot, q, q_ref)[None]
 
 

@@ -79,7 +79,7 @@ class Drives(ByValue):
     armature : rotor inertia times the gear ratio squared, kg m^2
     gear_ratio : turns of the motor for one of the joint
     coulomb, viscous : friction, N m and N m s/rad
-    rated, peak : torque that a drive gives on and on, and for a moment, N m
+    rated, peak : continuous (rated) and peak torque of a drive, N m
     """
 
     armature: Reals

@@ -24,7 +24,7 @@ from er3a.geometry.transforms import rot_x, rot_y, rpy_of, translation
 from er3a.numerics.arrays import Flags, Integers, Reals, as_floats
 from er3a.robots.masses import Masses
 
-MOST_JOINTS = 10
+MAX_JOINTS = 10
 Convention = Literal["standard", "modified"]
 CONVENTIONS: tuple[Convention, ...] = get_args(Convention)
 Grade = Literal["official", "measured", "cad", "export", "claim", "inferred"]
@@ -216,8 +216,8 @@ class Robot(ByValue, Displayed):
             self._keep(key, np.array(given, dtype=bool) if np.size(given) else np.zeros(count, dtype=bool), (count,))
         if self.coupling is not None:
             self._keep("coupling", np.array(as_floats(self.coupling, "coupling")), (rows, joints))
-        if not (1 <= joints <= MOST_JOINTS and joints <= rows <= MOST_JOINTS):
-            raise ShapeError("lower", (joints,), f"(1,) to ({MOST_JOINTS},)")
+        if not (1 <= joints <= MAX_JOINTS and joints <= rows <= MAX_JOINTS):
+            raise ShapeError("lower", (joints,), f"(1,) to ({MAX_JOINTS},)")
         if rows != joints and self.coupling is None:
             raise ShapeError("lower", (joints,), f"({rows},), or a coupling ({rows}, {joints})")
         if self.convention not in CONVENTIONS:
@@ -371,7 +371,7 @@ _OF_JOINTS = "lower", "upper", "speed"
 _PLACED = "base", "flange", "tool"
 
 
-LONGEST_M, MOST_TURNED = 20.0, 20 * np.pi  # beyond which a number is another unit's
+LONGEST_M, MAX_TURNED = 20.0, 20 * np.pi  # beyond which a number is another unit's
 
 
 def _warn_of_units(robot: Robot) -> None:
@@ -379,7 +379,7 @@ def _warn_of_units(robot: Robot) -> None:
     turned = np.concatenate([robot.alpha, robot.offset, (robot.upper - robot.lower)[~robot.slides]])
     if max(np.abs(robot.a).max(), np.abs(robot.d).max()) > LONGEST_M:
         _warn(robot, f"a link is longer than {LONGEST_M:g} m", "er3a takes m: divide mm by 1000")
-    if np.abs(turned).max() > MOST_TURNED:
+    if np.abs(turned).max() > MAX_TURNED:
         _warn(robot, "an angle is more than ten turns in rad", "er3a takes rad: np.radians(...)")
 
 

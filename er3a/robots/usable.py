@@ -26,7 +26,7 @@ FINITE = (
     ("upper", "rad"),
 )
 SEVERAL_TURNS = 4 * np.pi
-MOST_TURNS = 2 * SEVERAL_TURNS  # rad, beyond which an arm's joint that turns by so much is given in degrees
+MAX_TURNS = 2 * SEVERAL_TURNS  # rad, beyond which an arm's joint that turns by so much is given in degrees
 _FEW = 1000
 
 
@@ -88,7 +88,7 @@ def limits_crossed(robot: Robot) -> str:
     return f"limits of joint {crossed[0] + 1} are crossed: lower {low:g} {unit}, upper {high:g} {unit}; swap them"
 
 
-def check_joint_values(robot: Robot, values: Any, argument: str, stacklevel: int = 2) -> None:
+def check_joint_values(robot: Robot, values: Any, argument: str) -> None:
     """Refuse NaN and infinity among joint values (..., n), and warn of those that can only be degrees.
 
     A row can only be degrees if one of its joints that turn and have limits is several turns beyond them in rad, and
@@ -118,7 +118,7 @@ def check_joint_values(robot: Robot, values: Any, argument: str, stacklevel: int
             f"{argument} is several turns beyond the limits of {robot.name} in rad, and within them in degrees; er3a "
             f"takes rad: np.radians({argument})",
             InputWarning,
-            stacklevel=stacklevel + 1,
+            stacklevel=3,
         )
 
 
@@ -126,7 +126,7 @@ def warn_of_degrees(values: Reals, argument: str, stacklevel: int = 2) -> None:
     """Warn of joint values (n,) that can only be degrees where no robot says its limits: more than four turns in rad,
     and no more than two in degrees."""
     far = float(np.abs(values).max(initial=0.0))
-    if MOST_TURNS < far <= np.degrees(SEVERAL_TURNS):
+    if MAX_TURNS < far <= np.degrees(SEVERAL_TURNS):
         warnings.warn(
             f"{argument} holds {far:g}, which is {far / (2 * np.pi):.0f} turns in rad; er3a takes rad: "
             f"np.radians({argument})",

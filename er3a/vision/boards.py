@@ -47,9 +47,9 @@ def opencv() -> Any:
 
 
 Pattern = Literal["chessboard", "charuco", "apriltag"]
-LEAST_CORNERS = 6
-LEAST_IMAGES = 5
-LEAST_RATIO = 2.0  # of the reprojection errors of a flat board's two poses, below which either may be the true one
+MIN_CORNERS = 6
+MIN_IMAGES = 5
+MIN_RATIO = 2.0  # of the reprojection errors of a flat board's two poses, below which either may be the true one
 
 Image = NDArray[np.uint8]
 
@@ -127,7 +127,7 @@ class BoardNotFoundError(Er3aError):
     def __init__(self, image: int, corners: int):
         self.image, self.corners = image, corners
         super().__init__(
-            f"no image shows the board; most corners are in image {image + 1}, {corners}; {LEAST_CORNERS} are needed"
+            f"no image shows the board; most corners are in image {image + 1}, {corners}; {MIN_CORNERS} are needed"
         )
 
 
@@ -150,11 +150,11 @@ def board_views(
     find = _detector(board)
     found = [find(image) for image in images]
     counts = [len(in_image) for _, in_image in found]
-    numbers = tuple(number for number, count in enumerate(counts) if count >= LEAST_CORNERS)
+    numbers = tuple(number for number, count in enumerate(counts) if count >= MIN_CORNERS)
     if not numbers:
         most = int(np.argmax(counts))
         raise BoardNotFoundError(most, counts[most])
-    without = tuple((number, count) for number, count in enumerate(counts) if count < LEAST_CORNERS)
+    without = tuple((number, count) for number, count in enumerate(counts) if count < MIN_CORNERS)
     size = images[0].shape[1], images[0].shape[0]
     points, corners = zip(*(found[number] for number in numbers))
     views = views_of_corners(points, corners, size, camera, pixel_deviation)
@@ -206,15 +206,13 @@ def intrinsics_covariance(found: Sequence[_Pose], corners: Sequence[Reals]) -> R
 def ambiguous_tilts(views: BoardViews, names: Sequence[str]) -> tuple[AmbiguousTilt, ...]:
     """The images that leave open which way the board is tilted; ``names`` of the samples, N."""
     found = zip(names, views.ambiguous.tolist())
-    return tuple(AmbiguousTilt(name, ratio) for name, ratio in found if ratio < LEAST_RATIO)
+    return tuple(AmbiguousTilt(name, ratio) for name, ratio in found if ratio < MIN_RATIO)
 
 
 def estimated_camera(points: Sequence[Reals], corners: Sequence[Reals], size: tuple[int, int]) -> Camera:
     """Intrinsics, after Zhang, from corners of at least five images of (width, height)."""
-    if len(points) < LEAST_IMAGES:
-        raise Er3aError(
-            f"{len(points)} images can't give the camera's intrinsics too; take {LEAST_IMAGES}, or give them"
-        )
+    if len(points) < MIN_IMAGES:
+        raise Er3aError(f"{len(points)} images can't give the camera's intrinsics too; take {MIN_IMAGES}, or give them")
     cv2 = opencv()
     on_board, in_image = ([part.astype(np.float32) for part in parts] for parts in (points, corners))
     found = cv2.calibrateCamera(on_board, in_image, size, None, None)

@@ -102,7 +102,7 @@ class CalibrationSet(ByValue, Displayed):
 GRID_S = 0.02
 SPAN_S = 0.4  # over which turns are compared
 INLIER = 3.0
-MOST_PAIRS = 2000
+MAX_PAIRS = 2000
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +132,7 @@ def time_offset(hand: Stream, eye: Stream, widest: float) -> TimeOffset:
     later = np.searchsorted(eye.t, eye.t + SPAN_S)
     first = np.flatnonzero(later < len(eye.t))
     first = first[eye.t[later[first]] - eye.t[first] < 2 * SPAN_S]
-    first = first[:: max(1, len(first) // MOST_PAIRS)]
+    first = first[:: max(1, len(first) // MAX_PAIRS)]
     last = later[first]
     R = scipy.spatial.transform.Rotation.from_matrix(eye.T[:, :3, :3])
     turned = (R[last] * R[first].inv()).magnitude()

@@ -34,8 +34,8 @@ from er3a.numerics.arrays import Reals
 MethodName = Literal["park", "horaud", "tsai", "andreff", "daniilidis", "shah", "li"]
 METHOD_NAMES: tuple[MethodName, ...] = get_args(MethodName)
 
-TSAI_LEAST = 0.3  # of twice the sine of half the turn: 17 deg
-LEAST_COSINE = 0.1  # of the cosine of half the turn: 169 deg, beyond which errors decide the sign of a quaternion
+TSAI_MIN = 0.3  # of twice the sine of half the turn: 17 deg
+MIN_COSINE = 0.1  # of the cosine of half the turn: 169 deg, beyond which errors decide the sign of a quaternion
 Unknowns = tuple[Reals, Reals]
 
 
@@ -89,7 +89,7 @@ def _nearest_rotation(M: Reals) -> Reals:
 
 def _below_half_turns(A: Reals, C: Reals) -> tuple[Reals, Reals]:
     """The motions whose quaternions have a sure sign, alike for hand and eye; all if those are few."""
-    sure = np.minimum(*(quaternion_of(T)[:, 0] for T in (A, C))) > LEAST_COSINE
+    sure = np.minimum(*(quaternion_of(T)[:, 0] for T in (A, C))) > MIN_COSINE
     return (A[sure], C[sure]) if sure.sum() >= 2 else (A, C)
 
 
@@ -123,7 +123,7 @@ def _tsai(A: Reals, C: Reals) -> Reals:
     A, C = _below_half_turns(A, C)
     a, c = (2 * quaternion_of(T)[:, 1:] for T in (A, C))
     size = np.minimum(np.linalg.norm(a, axis=1), np.linalg.norm(c, axis=1))
-    far = size >= min(TSAI_LEAST, float(np.median(size)))
+    far = size >= min(TSAI_MIN, float(np.median(size)))
     A, C, a, c = A[far], C[far], a[far], c[far]
     p = np.linalg.lstsq(skew(a + c).reshape(-1, 3), (c - a).ravel())[0]
     p = 2 * p / np.sqrt(1 + p @ p)

@@ -36,7 +36,7 @@ PARTS: tuple[Part, ...] = ("move", "approach", "retreat")
 DEPTH = 2e-4  # m, to within which the smallest clearance is found
 PEAKS = (15 / 8, 10 / np.sqrt(3), 60.0)  # of a quintic from rest to rest: speed, acceleration and jerk, by duration
 SPARE = 1.02  # of the duration, so that bounds settle what samples allow
-LEAST_DURATION = 0.05  # s
+MIN_DURATION = 0.05  # s
 CHECKS = 41
 NO_NEAR = NearSingular(0.0, 0.0, 0.0, 0.0)
 
@@ -74,7 +74,7 @@ def _joint_leg(part: Part, start: Reals, end: Reals, limits: JointLimits) -> Gra
     least = [(PEAKS[0] * turn / limits.speed).max(), np.sqrt(PEAKS[1] * turn / limits.acceleration).max()]
     if limits.jerk is not None:
         least.append(np.cbrt(PEAKS[2] * turn / limits.jerk).max())
-    move = JointMove(start, end, max(LEAST_DURATION, *map(float, least)))
+    move = JointMove(start, end, max(MIN_DURATION, *map(float, least)))
     motion = move.polynomials()
     return GraspLeg(part, move.duration, lambda t: move.joints(t)[0], motion.rate_bounds, end)
 
@@ -113,7 +113,7 @@ def tool_leg(
     if parallel_axes_arm(robot) is None and wrist_partition_missing(robot) is not None:
         return joint_legs(part, waypoints, limits)
     length = float(np.linalg.norm(ends[1][:3, 3] - ends[0][:3, 3]))
-    duration = max(LEAST_DURATION, PEAKS[0] * length / speed)
+    duration = max(MIN_DURATION, PEAKS[0] * length / speed)
     path, times = line(*ends, duration), np.linspace(0, duration, CHECKS)
     _, velocity, acceleration = follow(robot, path, times, waypoints[0]).rates(times)
     needed = [np.abs(velocity / limits.speed), np.sqrt(np.abs(acceleration / limits.acceleration))]

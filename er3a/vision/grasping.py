@@ -6,7 +6,7 @@ clearance. The best of them are then followed along both lines, and on the way t
 (:mod:`er3a.vision.grasp_motion`). Of those that pass, the one is taken whose smallest margin, each divided by what is
 asked of it, is largest.
 
-The object and what is held are no bodies of the scene; the arm, its tool's capsule if it has one, and the scene are.
+The object and what is held are not bodies of the scene; the arm, its tool's capsule if it has one, and the scene are.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ class DetectedObject:
 
 @dataclass(frozen=True)
 class GraspNeeds:
-    """What is asked of a grasp.
+    """The requirements of a grasp.
 
     Attributes
     ----------
@@ -319,7 +319,7 @@ def _judged(task: GraspTask, candidates: list[_Candidate], poses: int) -> tuple[
 
 
 def _ratio(value: Reals, needed: float) -> Reals:
-    """How many times a margin is what is asked; infinite where nothing is."""
+    """A margin divided by the required one; infinite where none is required."""
     return np.asarray(value) / needed if needed > 0 else np.full(np.shape(value), np.inf)
 
 
@@ -405,7 +405,7 @@ def success_probability(
 ) -> float:
     """That the tool meets the object within the gripper's tolerance, in each of its six directions.
 
-    A turn about the z axis of an object that looks alike in all of them is no error.
+    A turn about the z axis of a rotationally symmetric object is not an error.
     """
     T = chosen.T_base_tool
     lever = T[:3, 3] - T_base_object[:3, 3]

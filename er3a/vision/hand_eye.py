@@ -13,7 +13,7 @@ References
 
 Orientations read by another convention than they were written by, found because the samples fit only by the other.
 
-Quaternions whose real part stands at the other end keep all turning angles, for that moves them as a rotation and a
+Quaternions whose real part is at the other end keep all turning angles, for that moves them as a rotation and a
 mirror of four dimensions does; so do some orders of Euler angles. Only a fit can tell them.
 """
 
@@ -47,7 +47,7 @@ from er3a.vision.likelihood import UNKNOWNS, PoseObservations, Refined, refine, 
 from er3a.vision.setup_changes import moved_between
 
 DEVIATIONS = 6.0  # of the angle between two samples; beyond, a pair is in conflict
-MOST_DEVIATION = np.radians(2.0)  # of a camera that is of any use
+MAX_DEVIATION = np.radians(2.0)  # of a camera that is of any use
 ROUNDING = 1e-6  # rad
 SAME_POSITION_M, SAME_ROTATION_RAD = 5e-5, 2e-4
 MOSTLY_APART = 0.8  # of samples that stand apart, so that their residuals are judged as independent
@@ -65,7 +65,7 @@ MEND_KINDS: tuple[vision_findings.SuspectKind, ...] = (*BOARD_TURNS, "mirrored_t
 
 @dataclass(frozen=True, eq=False)
 class AngleCheck(ByValue):
-    """What the turning angles tell.
+    """What the rotation angles show.
 
     Attributes
     ----------
@@ -113,7 +113,7 @@ def check_angles(samples: calibration_set.CalibrationSet) -> AngleCheck:
 
 def _tolerance(samples: calibration_set.CalibrationSet, mismatch: Reals) -> float:
     """Half of the mismatches of sound pairs lie below 0.674 standard deviations."""
-    deviation = min(float(np.median(mismatch)) / 0.674, MOST_DEVIATION)
+    deviation = min(float(np.median(mismatch)) / 0.674, MAX_DEVIATION)
     if samples.camera_covariance is not None:
         stated = np.linalg.eigvalsh(samples.camera_covariance[:, 3:, 3:])[:, -1].mean()
         if samples.flange_covariance is not None:
@@ -138,7 +138,7 @@ def _mending_turn(target: Reals, turned: Reals, i: int, used: Flags, tolerance: 
     best = tolerance
     mending: vision_findings.SuspectKind = "rotation"
     for kind in MEND_KINDS:
-        for R in _mended(target[i], kind):
+        for R in _rotation_candidates(target[i], kind):
             angle = rotation_angle(transposed(R)[None], transposed(target[used, :3, :3]))
             off = float(np.median(np.abs(angle - turned[i, used])))
             if off < best:
@@ -146,7 +146,7 @@ def _mending_turn(target: Reals, turned: Reals, i: int, used: Flags, tolerance: 
     return mending
 
 
-def _mended(T: Reals, kind: vision_findings.SuspectKind) -> list[Reals]:
+def _rotation_candidates(T: Reals, kind: vision_findings.SuspectKind) -> list[Reals]:
     """The rotations (3, 3) that a detection may have been mistaken for."""
     R = T[:3, :3]
     if kind == "mirrored_tilt":
@@ -260,7 +260,7 @@ def other_reading(samples: calibration_set.CalibrationSet, residual: Reals) -> v
     best: tuple[float, vision_findings.RotationReading] | None = None
     for again, finding in _readings(samples, turned):
         mismatch = np.abs(angles_between(again.flange[:, :3, :3]) - angles_between(transposed(again.target)[:, :3, :3]))
-        if np.median(mismatch) > MOST_DEVIATION:
+        if np.median(mismatch) > MAX_DEVIATION:
             continue
         try:
             raw = residuals(again.hand, again.target, *solved_by("park", again.hand, again.target))[0]
@@ -278,7 +278,7 @@ SIGNED_AXES: dict[str, Reals] = {
     for signs in product((1.0, -1.0), repeat=3)
 }
 """What axes may be taken for x, y, z, first as they are: matrices (3, 3) by name."""
-LEAST_MISREAD = 3e-3  # m; residuals below are no wrong axes
+MIN_MISREAD = 3e-3  # m; residuals below are no wrong axes
 
 
 def position_axes(samples: calibration_set.CalibrationSet) -> vision_findings.PositionAxes | None:
@@ -312,7 +312,7 @@ def position_axes(samples: calibration_set.CalibrationSet) -> vision_findings.Po
     }
     best: vision_findings.Streams = min(streams, key=lambda stream: round(float(streams[stream].min()), 9))
     given, k = float(streams[best][0]), int(streams[best].argmin())
-    if given < LEAST_MISREAD or streams[best][k] > given / MUCH_BETTER:
+    if given < MIN_MISREAD or streams[best][k] > given / MUCH_BETTER:
         return None
     return vision_findings.PositionAxes(best, [*SIGNED_AXES][k], 1000 * given, 1000 * float(streams[best][k]))
 
@@ -364,18 +364,18 @@ def _product(T: Reals, axes: str, columns: list[int]) -> Reals:
     return R
 
 
-LEAST_SAMPLES = 3
+MIN_SAMPLES = 3
 FEW_SAMPLES = 6  # of which none is judged by the others
 EQUAL = 1e-9
-LEAST_TURN = np.radians(0.5)
-LEAST_SPREAD = np.radians(1.0)
+MIN_TURN = np.radians(0.5)
+MIN_SPREAD = np.radians(1.0)
 LITTLE_TURN, LITTLE_SPREAD = np.radians(15), np.radians(10)
 EXCLUDED = 1e-3
-SURE = 0.95
-MOST_FACTS = 10
-ONE_MORE_ROUNDS = 20
+CONFIDENCE = 0.95
+MAX_FACTS = 10
+EXTRA_ROUNDS = 20
 SURE_SCALE = 3.0  # half widths of its interval, from 0; a vaguer factor comes of samples that don't fit at all
-LEAST_SCALE_ERROR = 2e-3
+MIN_SCALE_ERROR = 2e-3
 DIRECTIONS = ((False, False), (True, True), (True, False), (False, True))
 
 
@@ -466,7 +466,7 @@ class HandEye(ByValue, Displayed):
         ]
         columns = ("pose", "axis", "mm", "half_width_mm", "rpy_deg", "half_width_deg")
         found = [*self.suspects, *self.warnings]
-        facts = tuple(shortly(each) for each in found[:MOST_FACTS])
+        facts = tuple(shortly(each) for each in found[:MAX_FACTS])
         heading = f"Hand-eye calibration, {int(self.used.sum())} of {len(self.samples)} samples used"
         return Sheet.of_table(heading, columns, rows, len(rows), facts)
 
@@ -508,7 +508,7 @@ def calibrate_hand_eye(samples: calibration_set.CalibrationSet) -> HandEye:
     if not others and share > MOSTLY_APART and (step := moved_between(samples.take(once), used[once], refined)):
         warnings.append(step)
     covariance = refined.covariance / share + _shared_covariance(kept, refined)
-    half_width = scipy.special.stdtrit(refined.freedom * share, (1 + SURE) / 2) * np.sqrt(np.diag(covariance))
+    half_width = scipy.special.stdtrit(refined.freedom * share, (1 + CONFIDENCE) / 2) * np.sqrt(np.diag(covariance))
     found = HandEye(
         samples=samples,
         used=used,
@@ -532,7 +532,7 @@ def calibrate_hand_eye(samples: calibration_set.CalibrationSet) -> HandEye:
     return found if samples.touched is None else replace(found, touch=_touch(found, samples.touched))
 
 
-def start(F: Reals, B: Reals, deviations: Reals) -> tuple[Reals, Reals]:
+def best_closed_form(F: Reals, B: Reals, deviations: Reals) -> tuple[Reals, Reals]:
     """The closed-form answer X, Y (4, 4) with the smallest residuals, in standard deviations (2,) in m and rad.
 
     Raises
@@ -557,7 +557,7 @@ def start(F: Reals, B: Reals, deviations: Reals) -> tuple[Reals, Reals]:
 def _fitted(samples: calibration_set.CalibrationSet) -> Refined:
     seen = PoseObservations.of(samples)
     try:
-        found = refine(seen, *start(samples.hand, samples.target, np.array([1e-3, 5e-3])))
+        found = refine(seen, *best_closed_form(samples.hand, samples.target, np.array([1e-3, 5e-3])))
     except np.linalg.LinAlgError:
         raise vision_findings.HandEyeError(vision_findings.NothingFits()) from None
     if not np.isfinite(found.covariance).all() or (np.diag(found.covariance) <= 0).any():
@@ -580,21 +580,21 @@ def _shared_covariance(samples: calibration_set.CalibrationSet, refined: Refined
 
 def _check_determined(samples: calibration_set.CalibrationSet) -> tuple[float, float]:
     """The largest turn between two samples and how far the rotation axes leave one direction, rad."""
-    if len(samples) < LEAST_SAMPLES:
-        raise vision_findings.HandEyeError(vision_findings.TooFewSamples(len(samples), LEAST_SAMPLES))
+    if len(samples) < MIN_SAMPLES:
+        raise vision_findings.HandEyeError(vision_findings.TooFewSamples(len(samples), MIN_SAMPLES))
     for stream in ("flange", "target"):
         poses = getattr(samples, stream)
         if np.abs(step_between(poses[:1], poses)).max() < EQUAL:
             raise vision_findings.HandEyeError(vision_findings.AllSamplesEqual(stream))  # type: ignore[arg-type]
     R = samples.hand[:, :3, :3]
     greatest = float(angles_between(R).max())
-    if greatest < LEAST_TURN:
+    if greatest < MIN_TURN:
         raise vision_findings.HandEyeError(vision_findings.NoRotation(float(np.degrees(greatest))))
     i, j = np.triu_indices(len(samples), 1)
     turns = log_rotation(transposed(R[j]) @ R[i])
     _, size, axes = np.linalg.svd(turns, full_matrices=False)
     apart = float(np.arctan2(size[1], size[0]))
-    if apart < LEAST_SPREAD:
+    if apart < MIN_SPREAD:
         raise vision_findings.HandEyeError(
             vision_findings.ParallelTurns(tuple(axes[0].tolist()), float(np.degrees(apart)))
         )
@@ -625,7 +625,7 @@ def _warnings(
         best = next(each for each in directions if each.status == "best")
         return [*found, vision_findings.OtherDirection(best.flange_inverted, best.target_inverted)]
     factor, half_width = board_scale(samples, refined)
-    if abs(factor - 1) > max(2 * half_width, LEAST_SCALE_ERROR) and factor > SURE_SCALE * half_width:
+    if abs(factor - 1) > max(2 * half_width, MIN_SCALE_ERROR) and factor > SURE_SCALE * half_width:
         found.append(vision_findings.BoardScale(factor, half_width))
     size, turn = _misfit(refined.residual)
     if size > 1 and not vision_findings.grave_warnings(found):
@@ -643,11 +643,11 @@ def board_scale(samples: calibration_set.CalibrationSet, refined: Refined) -> tu
         B[:, :3, 3] *= 1 + s
         return *residuals(samples.hand, B, X, Y), seen
 
-    more, half_width, _ = with_one_more(grown, (refined.X, refined.Y), refined.deviations)
+    more, half_width, _ = fit_extra_parameter(grown, (refined.X, refined.Y), refined.deviations)
     return 1 + more, half_width
 
 
-def with_one_more(
+def fit_extra_parameter(
     at: Callable[[Reals, Reals, float], tuple[Reals, Reals, Reals]], poses: tuple[Reals, Reals], deviations: Reals
 ) -> tuple[float, float, Reals]:
     """One more unknown beside the twelve: its value, half its 95 % interval, and the residuals (N, 6) with it.
@@ -656,7 +656,7 @@ def with_one_more(
     """
     (X, Y), value = poses, 0.0
     weight = 1 / np.repeat(deviations, 3)
-    for _ in range(ONE_MORE_ROUNDS):
+    for _ in range(EXTRA_ROUNDS):
         raw, J, own = at(X, Y, value)
         J = (np.concatenate([J, own[..., None]], axis=2) * weight[:, None]).reshape(-1, UNKNOWNS + 1)
         r = (raw * weight).ravel()
@@ -666,7 +666,7 @@ def with_one_more(
         if np.abs(step).max() < 1e-10:
             break
     free = max(len(r) - UNKNOWNS - 1, 1)
-    half_width = scipy.special.stdtrit(free, (1 + SURE) / 2) * np.sqrt(r @ r / free * inverse[12, 12])
+    half_width = scipy.special.stdtrit(free, (1 + CONFIDENCE) / 2) * np.sqrt(r @ r / free * inverse[12, 12])
     return value, float(half_width), raw
 
 
@@ -736,7 +736,7 @@ _PARTS = (slice(3), slice(3, 6))
 def _residuals_of(F: Reals, B: Reals, sigma: Reals) -> Reals | None:
     covariance = np.broadcast_to(np.diag(np.repeat(sigma, 3) ** 2), (len(F), 6, 6))
     try:
-        found = refine(PoseObservations("eye_in_hand", F, B, covariance), *start(F, B, sigma))
+        found = refine(PoseObservations("eye_in_hand", F, B, covariance), *best_closed_form(F, B, sigma))
     except (np.linalg.LinAlgError, vision_findings.HandEyeError):
         return None
     return found.residual

@@ -27,13 +27,13 @@ from er3a.numerics.arrays import Reals
 from er3a.vision.calibration_set import CalibrationSet, Setup
 
 UNKNOWNS = 12
-MOST_STEPS = 60
+MAX_STEPS = 60
 STEP_ENDS = 1e-11  # m and rad
 VARIANCE_ROUNDS = 12
 WEIGHT_ROUNDS = 3
 SETTLED = 1e-2  # share by which deviations may still change in the last round
 START_DEVIATIONS = (1e-3, 5e-3)  # m, rad
-LEAST_DEVIATION = 1e-12
+MIN_DEVIATION = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +155,7 @@ def refine(seen: PoseObservations, X: Reals, Y: Reals) -> Refined:
         if known is None:
             squares = np.stack([(white[..., part] ** 2).sum(axis=(-2, -1)) for part in (slice(3), slice(3, 6))], -1)
             ratio = np.sqrt(squares / redundancy)
-            before, deviations = deviations, np.maximum(deviations * ratio, LEAST_DEVIATION)
+            before, deviations = deviations, np.maximum(deviations * ratio, MIN_DEVIATION)
             change = np.abs(deviations / before - 1)
             if change.max() < 1e-6:
                 break
@@ -184,7 +184,7 @@ def _steps(seen: PoseObservations, W: Reals, X: Reals, Y: Reals) -> tuple[Reals,
     damping = np.full(X.shape[:-2], 1e-6)
     done = np.zeros(X.shape[:-2], dtype=bool)
     cost, H, g = _normal(seen, W, X, Y)
-    for _ in range(MOST_STEPS):
+    for _ in range(MAX_STEPS):
         size = np.diagonal(H, axis1=-2, axis2=-1)
         damped = H + (damping[..., None] * size)[..., None] * np.eye(UNKNOWNS)
         step: Reals = np.asarray(np.linalg.solve(damped, -g[..., None])[..., 0], float)

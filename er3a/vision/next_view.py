@@ -18,7 +18,7 @@ from er3a.vision.point_error import error_sizes
 
 CANDIDATES = 4000
 MEASURED_FOR_CLEARANCE = 25
-MOST_TILT = np.radians(55)  # of the board against the line of sight: detectors lose it beyond
+MAX_TILT = np.radians(55)  # of the board against the line of sight: detectors lose it beyond
 LIMIT_SHARE = 0.02  # of each joint's range, kept from both its ends
 
 
@@ -82,7 +82,7 @@ def board_visible(view: FieldOfView, T_camera_board: Reals, facing: float = 1.0)
     sight = seen.mean(axis=-2)
     sight = sight / np.linalg.norm(sight, axis=-1, keepdims=True)
     tilted = facing * (sight * T_camera_board[..., :3, 2]).sum(axis=-1)
-    visible: Flags = in_sight(view, seen).all(axis=-1) & (tilted > np.cos(MOST_TILT))
+    visible: Flags = in_sight(view, seen).all(axis=-1) & (tilted > np.cos(MAX_TILT))
     return visible
 
 

@@ -19,10 +19,10 @@ from er3a.vision.likelihood import UNKNOWNS, PoseObservations, Refined, residual
 from er3a.vision.vision_findings import MovedBetween
 
 CHANCE = 1e-4  # of sound sets in which a step is found
-LEAST_BLOCK = 2  # samples on either side of a step
+MIN_BLOCK = 2  # samples on either side of a step
 EXPLAINED = 3.0  # standard deviations
 SOLVABLE = 1e8  # condition of a step's equations, beyond which the samples on one side of it don't determine it
-LEAST_STEP = 1e-9  # m, rad; less is rounding, of poses that a simulation gives without errors
+MIN_STEP = 1e-9  # m, rad; less is rounding, of poses that a simulation gives without errors
 PARTS = {"camera": slice(0, 6), "board": slice(6, 12)}
 
 
@@ -34,7 +34,7 @@ def moved_between(samples: CalibrationSet, used: Flags, refined: Refined) -> Mov
 def _of_used(samples: CalibrationSet, refined: Refined) -> MovedBetween | None:
     count = len(samples)
     free = 6 * count - UNKNOWNS - 6
-    if count < 2 * LEAST_BLOCK or free < 6:
+    if count < 2 * MIN_BLOCK or free < 6:
         return None
     sigma = np.broadcast_to(np.repeat(refined.deviations, 3), (count, 6))
     W = whitening(PoseObservations.of(samples), sigma, refined.X, refined.Y)
@@ -45,7 +45,7 @@ def _of_used(samples: CalibrationSet, refined: Refined) -> MovedBetween | None:
     for what, part in PARTS.items():
         own = J[..., part]
         from_here = [  # sums over all samples from each on
-            np.cumsum(each[::-1], axis=0)[::-1][LEAST_BLOCK : count - LEAST_BLOCK + 1]
+            np.cumsum(each[::-1], axis=0)[::-1][MIN_BLOCK : count - MIN_BLOCK + 1]
             for each in (np.einsum("nki,nk->ni", own, r), own.mT @ own, own.mT @ J)
         ]
         right, square, crossed = from_here
@@ -57,8 +57,8 @@ def _of_used(samples: CalibrationSet, refined: Refined) -> MovedBetween | None:
         scale = np.maximum((squares - drop) / free, 0.0 if samples.camera_covariance is None else 1.0)
         chance = scipy.special.fdtrc(6, free, drop / 6 / np.maximum(scale, 1e-300)) * 2 * len(drop)
         at = int(chance.argmin())
-        best = min(best, (float(chance[at]), at + LEAST_BLOCK, what, step[at]), key=lambda each: each[0])
-    if best[0] >= CHANCE or np.linalg.norm(best[3]) < LEAST_STEP:
+        best = min(best, (float(chance[at]), at + MIN_BLOCK, what, step[at]), key=lambda each: each[0])
+    if best[0] >= CHANCE or np.linalg.norm(best[3]) < MIN_STEP:
         return None
     return _finding(samples.names[best[1]], best[2], best[3], best[0])
 
@@ -66,7 +66,7 @@ def _of_used(samples: CalibrationSet, refined: Refined) -> MovedBetween | None:
 def _of_left_out(samples: CalibrationSet, used: Flags, refined: Refined) -> MovedBetween | None:
     out, count = np.flatnonzero(~used), len(used)
     last = len(out) and out[0] == count - len(out)
-    if len(out) < LEAST_BLOCK or not (last or out[-1] == len(out) - 1):
+    if len(out) < MIN_BLOCK or not (last or out[-1] == len(out) - 1):
         return None
     left = samples.take(out)
     sigma = np.repeat(refined.deviations, 3)

@@ -31,7 +31,7 @@ from er3a.robots.joint_limits import joint_names
 from er3a.robots.robot import Robot
 from er3a.vision import likelihood
 from er3a.vision.calibration_set import CalibrationSet
-from er3a.vision.hand_eye import SURE, HandEye, calibrate_hand_eye, with_one_more
+from er3a.vision.hand_eye import CONFIDENCE, HandEye, calibrate_hand_eye, fit_extra_parameter
 from er3a.vision.vision_findings import (
     CalibrationWarning,
     HandEyeError,
@@ -45,7 +45,7 @@ STEPS = 40
 STEP_ENDS = 1e-10
 HALVINGS = 10
 TABLE_JOINTS = 6
-LEAST_FREEDOM = 6
+MIN_FREEDOM = 6
 
 
 class NoCorrections(Finding):
@@ -65,7 +65,7 @@ class TableCorrections(ByValue):
     Attributes
     ----------
     robot : with the corrected table
-    level : which entries were asked for
+    level : which entries were requested
     estimates : of those that can be determined, in mm and deg, with half-widths of their 95 % intervals (k,)
     held : why the others keep their values
     X, Y, half_width : as of :class:`er3a.vision.hand_eye.HandEye`, (12,)
@@ -137,21 +137,21 @@ def correct_table(found: HandEye, robot: Robot, level: LevelName = "all_entries"
     sigma = np.broadcast_to(np.repeat(found.deviations, 3), (len(samples), 6))
     _, _, J = problem.linear(tables_of(robot), every, found.X, found.Y)
     kept, held = _identified(likelihood.whitening(seen, sigma, found.X, found.Y) @ J, every, samples.setup, robot)
-    if 6 * len(samples) - likelihood.UNKNOWNS - len(kept) < LEAST_FREEDOM:
+    if 6 * len(samples) - likelihood.UNKNOWNS - len(kept) < MIN_FREEDOM:
         return NoCorrections("few")
     fit = _fit(problem, kept, found)
     return NoCorrections("steps") if fit is None else _result(problem, (level, kept, held), found, fit)
 
 
 ZERO_CHANCE = 1e-4  # of sound sets in which a zero is called wrong
-LEAST_ZERO = np.radians(0.5)
+MIN_ZERO = np.radians(0.5)
 ZERO_STEP = 1e-5
 
 
 def zeros_tried(found: HandEye, robot: Robot) -> tuple[HandEye, tuple[str, ...], float]:
-    """A calibration whose warnings name the joint with a wrong zero, if one explains all that speaks against it.
+    """A calibration whose warnings name the joint with a wrong zero, if one explains all that contradicts it.
 
-    A zero is named if its value is more than chance, and nothing grave speaks against the samples with it.
+    A zero is named if its value is more than chance, and nothing serious contradicts the samples with it.
 
     Returns
     -------
@@ -166,15 +166,15 @@ def zeros_tried(found: HandEye, robot: Robot) -> tuple[HandEye, tuple[str, ...],
     squares = float(((found.residual[found.used] / np.repeat(found.deviations, 3)) ** 2).sum())
     free = 6 * len(samples) - likelihood.UNKNOWNS - 1
     best, unseen = (1.0, 0, 0.0, 0.0, np.inf), []
-    least, sure = 0.0, (1 + SURE) / 2
+    least, sure = 0.0, (1 + CONFIDENCE) / 2
     widths = float(scipy.special.stdtrit(free, 1 - ZERO_CHANCE / len(names) / 2) / scipy.special.stdtrit(free, sure))
     for k, name in enumerate(names):
         turn = _Turned(robot, samples, k)
         if robot.slides[k] or not turn.seen(found.X, found.Y):
             unseen.append(name)
             continue
-        value, half_width, raw = with_one_more(turn.at, (found.X, found.Y), found.deviations)
-        least = max(least, round(float(np.degrees(max(LEAST_ZERO, widths * half_width))), 2))
+        value, half_width, raw = fit_extra_parameter(turn.at, (found.X, found.Y), found.deviations)
+        least = max(least, round(float(np.degrees(max(MIN_ZERO, widths * half_width))), 2))
         left = float(((raw / np.repeat(found.deviations, 3)) ** 2).sum())
         chance = float(scipy.special.fdtrc(1, free, max(squares - left, 0.0) / (left / free))) * len(names)
         rms = float(1000 * np.sqrt((raw[:, :3] ** 2).mean()))
@@ -182,7 +182,7 @@ def zeros_tried(found: HandEye, robot: Robot) -> tuple[HandEye, tuple[str, ...],
     chance, k, value, half_width, rms = best
     tried = found if len(unseen) == len(names) else replace(found, warnings=tuple(map(_zeros_too, found.warnings)))
     explained = {each.code for each in grave_warnings(found.warnings)} <= EXPLAINED_BY_A_ZERO
-    if chance > ZERO_CHANCE or abs(value) < LEAST_ZERO or not explained:
+    if chance > ZERO_CHANCE or abs(value) < MIN_ZERO or not explained:
         return tried, tuple(unseen), least
     mended = _Turned(robot, found.samples, k).flange(value)
     try:
@@ -208,7 +208,7 @@ def _zeros_too(warning: CalibrationWarning) -> CalibrationWarning:
 
 @dataclass(frozen=True, eq=False)
 class _Turned:
-    """Samples whose joint k, from 0, stands beside its recorded values."""
+    """Samples whose joint k, from 0, is off its recorded values."""
 
     robot: Robot
     samples: CalibrationSet
@@ -219,7 +219,7 @@ class _Turned:
         return forward(self.robot.without_tool(), self.samples.q + value * np.eye(self.robot.joints)[self.k])
 
     def at(self, X: Reals, Y: Reals, value: float) -> tuple[Reals, Reals, Reals]:
-        """As :func:`er3a.vision.hand_eye.with_one_more` asks for it."""
+        """The argument ``at`` of :func:`er3a.vision.hand_eye.fit_extra_parameter`."""
         flange, setup = self.flange(value), self.samples.setup
         F = flange if setup == "eye_in_hand" else inverted(flange)
         raw, J = likelihood.residuals(F, self.samples.target, X, Y)
@@ -343,7 +343,7 @@ def _result(
 ) -> TableCorrections:
     (level, kept, held), robot, samples = asked, problem.robot, problem.samples
     error = np.sqrt(np.diag(fit.covariance))
-    half = scipy.special.stdtrit(fit.freedom, (1 + SURE) / 2) * error
+    half = scipy.special.stdtrit(fit.freedom, (1 + CONFIDENCE) / 2) * error
     correlation = (fit.covariance / np.outer(error, error))[likelihood.UNKNOWNS :, likelihood.UNKNOWNS :]
     rows, columns = np.nonzero(np.triu(np.abs(correlation) > CLOSE, 1))
     before = likelihood.refine(

@@ -1,4 +1,4 @@
-"""What hand-eye calibration finds: samples that don't fit, directions, motion that tells too little."""
+"""What hand-eye calibration finds: samples that don't fit, directions, motion that determines too little."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class FarFromFit(Finding):
 
 
 class RepeatedPose(Finding):
-    """The flange stands where it stood in another sample; ``apart``: what the two saw of the board differs by."""
+    """The flange is where it was in another sample; ``apart``: what the two saw of the board differs by."""
 
     sample: str
     first: str
@@ -110,7 +110,7 @@ class OtherDirection(Finding):
 
 
 class BoardScale(Finding):
-    """The distances seen ask for a board larger by this factor, beyond its 95 % interval."""
+    """The distances seen require a board larger by this factor, beyond its 95 % interval."""
 
     factor: float
     half_width: float
@@ -124,7 +124,7 @@ class LittleMotion(Finding):
 
 
 class FewSamples(Finding):
-    """So few samples that none is judged by the others, and that their scatter is hardly known."""
+    """Too few samples to judge one by the others, or to know their scatter well."""
 
     samples: int
 
@@ -137,7 +137,7 @@ class MoreScatter(Finding):
 
 
 class MovedBetween(Finding):
-    """From ``sample`` on the camera, or the board, stands elsewhere: the set is of two setups.
+    """From ``sample`` on the camera, or the board, is elsewhere: the set is of two setups.
 
     ``probability``: that chance makes such a step; 0 where one end of the set was left out and a step explains it.
     """
@@ -249,7 +249,7 @@ class DirectionTried(Finding):
     Attributes
     ----------
     status : ``best`` of those tried; ``same_problem`` as the best, with the two unknowns swapped; ``excluded`` by the
-        residuals (probability below 0.001); ``open``: they can't tell
+        residuals (probability below 0.001); ``open``: they can't decide
     rms_mm, rms_deg : of the residuals, by coordinate; None where nothing fits
     probability : that residuals of a right direction are this much larger than the best's
     """

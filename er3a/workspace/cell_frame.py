@@ -13,7 +13,7 @@ import numpy as np
 from er3a.geometry.vectors import TURN
 from er3a.kinematics.by_class import arm_solver
 from er3a.kinematics.classes.chain_solvers import LockedJoint
-from er3a.kinematics.classes.class_solvers import ARM_CLASSES, ChainSolver, Completed
+from er3a.kinematics.classes.class_solvers import ARM_CLASSES, ChainSolver, PaddedChain
 from er3a.kinematics.wrist_partitioned import wrist_partition_missing
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.robot import Robot, derived
@@ -104,7 +104,7 @@ def cell_frame(robot: Robot) -> CellFrame:
 def is_quick(robot: Robot) -> bool:
     """Whether a pose is solved within some microseconds, or else within some tenths of a millisecond."""
     chain: ChainSolver | None = arm_solver(robot).chain
-    while isinstance(chain, LockedJoint | Completed):
+    while isinstance(chain, LockedJoint | PaddedChain):
         chain = chain.rest
     return chain is not None and ARM_CLASSES[chain.code].closed_form
 

@@ -24,7 +24,7 @@ from er3a.workspace.interval_inverse import GOOD, NEVER, States, branches, theta
 from er3a.workspace.section_arm import section_frame
 from er3a.workspace.section_proof import ring_volumes
 
-_MOST_LEVEL = 6
+_MAX_LEVEL = 6
 _STACK = 256
 _LARGEST, _SMALLEST = 0.7, 2e-3  # rad, radii of patches worth a try
 _STRIDE = 0.381966
@@ -79,7 +79,7 @@ def dexterous_core(robot: Robot, cells: Reals, directions: int, roll: Roll, most
     numbers = (roll.half_step, roll.beside, roll.reach, float(arm.upper_arm + arm.forearm))
     open_sectors = np.full(len(cells), _ONE if sectors == 1 else _ALL)
     lower, looked, used = 0.0, 0, 0
-    for level in range(_MOST_LEVEL + 1):
+    for level in range(_MAX_LEVEL + 1):
         good, likely = np.zeros((2, len(cells)), dtype=np.uint64)
         left = most_poses - used
         masks = open_sectors, good, likely
@@ -88,7 +88,7 @@ def dexterous_core(robot: Robot, cells: Reals, directions: int, roll: Roll, most
         shares = ring_volumes(cells) / sectors
         lower += float(shares @ np.bitwise_count(good))
         children = 4 * int((open_sectors != 0).sum())
-        if level == _MOST_LEVEL or not children or 2 * directions * children > most_poses - used:
+        if level == _MAX_LEVEL or not children or 2 * directions * children > most_poses - used:
             break
         cells, open_sectors = _split(cells[open_sectors != 0]), np.tile(open_sectors[open_sectors != 0], 4)
     upper = lower + float(shares @ np.bitwise_count(open_sectors))

@@ -56,7 +56,7 @@ from er3a.numerics.jit import inner_kernel, kernel
 from er3a.robots.joint_limits import within
 from er3a.robots.robot import Robot
 from er3a.workspace.general_arm import GeneralArm, curvature, general_arm, own_range, place, point_of
-from er3a.workspace.section_arm import FULL_TURN, MOST_ARCS, ROUND_OFF, Cell, measure, meets, remove
+from er3a.workspace.section_arm import FULL_TURN, MAX_ARCS, ROUND_OFF, Cell, measure, meets, remove
 from er3a.workspace.section_proof import Proof, refined
 
 _ROOM, _STEPS, _PER_EDGE, _CORNERS = 0.2, 8, 5, 4
@@ -423,7 +423,7 @@ def fill_cells(
     Parameters
     ----------
     cells : (N, 4), m
-    unfilled, counts : (N, MOST_ARCS, 2), rad, and (N,); changed
+    unfilled, counts : (N, MAX_ARCS, 2), rad, and (N,); changed
     witness : (N, m), joint values that reach the middle of the cell (joint 1 at theta 0), NaN before
     known : joint values to begin from; those that fill a ring are added
     tries : how many of them are tried for each ring
@@ -772,7 +772,7 @@ def exclude_cells(arm: GeneralArm, behind: Rings, cells: Reals, empty: Reals, co
     Parameters
     ----------
     cells : (N, 4), m
-    empty : (N, MOST_ARCS, 2), rad, and counts (N,): arcs of the whole turn at first; set
+    empty : (N, MAX_ARCS, 2), rad, and counts (N,): arcs of the whole turn at first; set
     """
     flags = np.zeros((2, _PIECES << _LEVELS), dtype=np.bool_)
     for n in range(cells.shape[0]):
@@ -782,8 +782,8 @@ def exclude_cells(arm: GeneralArm, behind: Rings, cells: Reals, empty: Reals, co
 
 
 SAMPLES, TRIES = 400_000, 24
-FINEST, LEAST = 1000, 1e-4
-_BUCKETS, _MOST_POSTURES = 96, 300_000
+FINEST, MIN_CELL = 1000, 1e-4
+_BUCKETS, _MAX_POSTURES = 96, 300_000
 _PORTION = 1 << 16
 _ACROSS = 2.5  # rings along each set after joint 1, for each cell across
 
@@ -803,14 +803,14 @@ def prove_general(arm: GeneralArm, target: float, most_cells: int, seed: int) ->
         known
     """
     behind = outer_rings(arm, min(FINEST, int(_ACROSS * np.sqrt(most_cells))))
-    known, room = postures(arm, _BUCKETS, _MOST_POSTURES), memory(arm)
+    known, room = postures(arm, _BUCKETS, _MAX_POSTURES), memory(arm)
     random = np.random.Generator(np.random.Philox(key=seed))
     for start in range(0, SAMPLES, _PORTION):
         sample(arm, random.random((min(_PORTION, SAMPLES - start), len(arm.v_lower))), known, room)
 
     def judge(cells: Reals, level: int, parents: Proof | None) -> Proof:
         n = len(cells)
-        unfilled, empty = np.full((2, n, MOST_ARCS, 2), np.nan)
+        unfilled, empty = np.full((2, n, MAX_ARCS, 2), np.nan)
         unfilled[:, 0] = empty[:, 0] = 0.0, TURN
         witness = np.full((n, len(arm.v_lower)), np.nan)
         counts, empties = np.ones((2, n), dtype=np.int64)
@@ -824,11 +824,11 @@ def prove_general(arm: GeneralArm, target: float, most_cells: int, seed: int) ->
         fill_cells(arm, cells[some], *parts, known, room, TRIES)
         unfilled[some], counts[some], witness[some] = parts
         for arcs, count in ((unfilled, counts), (empty, empties)):
-            arcs[np.arange(MOST_ARCS) >= count[:, None]] = np.nan
+            arcs[np.arange(MAX_ARCS) >= count[:, None]] = np.nan
         return Proof(cells, unfilled, empty, np.full(n, level), witness, n, arm.bar)
 
     (low, high), reach = arm.heights[0].tolist(), float(arm.radii[0])
-    floor = max(LEAST, max(reach, high - low) / 8)  # or there would be many cells across what is flat
+    floor = max(MIN_CELL, max(reach, high - low) / 8)  # or there would be many cells across what is flat
     middle, half = (low + high) / 2, max(high - low, floor) / 2
     proof = refined(judge, max(reach, floor), (middle - half, middle + half), target, most_cells)
     return proof, proof.witness

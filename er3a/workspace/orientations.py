@@ -24,7 +24,7 @@ from er3a.workspace.directions import Roll, cone_directions, roll_of, tool_rotat
 
 AskedKind = Literal["directions", "tilts", "turns", "points"]
 _PARALLEL = 1e-9
-_LEAST_PLANAR = 3
+_MIN_PLANAR = 3
 _TASK_TURNS = 36
 
 
@@ -171,7 +171,7 @@ def _tilt_plane(robot: Robot, joints: int) -> TiltPlane | None:
     """The plane in which an arm's first ``joints`` joints tilt its tool; None if they do not tilt it in a plane."""
     axes, _, T = axes_at_zero_theta(robot)
     behind, sliding = axes[1:joints], robot.sliding[1:joints]
-    if robot.sliding[0] or len(behind) < _LEAST_PLANAR or sliding.all():
+    if robot.sliding[0] or len(behind) < _MIN_PLANAR or sliding.all():
         return None
     normal = behind[~sliding][0]
     apart = np.linalg.norm(np.cross(behind[~sliding], normal), axis=1).max()

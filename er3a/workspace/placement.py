@@ -475,7 +475,7 @@ Constants = tuple[BlockConstants, Reals, Reals, float, Reals, float, float]
 SAME_DIRECTION = 1e-9
 """Directions are the same if their product lacks less of 1."""
 _STACK = 512
-_MOST_TRIES = 200
+_MAX_TRIES = 200
 _POSES_PER_BRICK = 512
 _SMALLEST = (0.2, 0.05, 0.0125, 0.003, 0.0)  # half-widths, rad or length per lever, of pieces to split
 
@@ -590,7 +590,7 @@ def choose_places(
             return "undecided", 0
         return prove_place(robot, task, places.centre[row], bool(places.turned[row]), slot, roll, most_poses=most)
 
-    while len(rows) < count and refuted < _MOST_TRIES and free.any():
+    while len(rows) < count and refuted < _MAX_TRIES and free.any():
         row = int(np.argmax(free))
         budget = (most_poses - used) // (count - len(rows))
         slot = int(places.slot[row])

@@ -40,8 +40,8 @@ from er3a.robots.robot import Robot
 from er3a.sampling.grid import tool_bound
 from er3a.workspace.general_arm import coupled, general_arm
 from er3a.workspace.general_proof import prove_general
-from er3a.workspace.section_arm import MOST_ARCS, SectionArm, section_arm, section_frame
-from er3a.workspace.section_proof import MOST_LEVEL, Proof, in_section, in_space, judge, prove, ring_volumes, sharpen
+from er3a.workspace.section_arm import MAX_ARCS, SectionArm, section_arm, section_frame
+from er3a.workspace.section_proof import MAX_LEVEL, Proof, in_section, in_space, judge, prove, ring_volumes, sharpen
 
 OUTSIDE = -1
 FILLED, EMPTY, UNDECIDED = 0, 1, 2
@@ -104,7 +104,7 @@ class SectionMap:
 
 
 def holds_azimuth(arcs: Reals, azimuth: Reals) -> Flags:
-    """Whether azimuths (n,) in rad lie in sets of arcs (n, MOST_ARCS, 2)."""
+    """Whether azimuths (n,) in rad lie in sets of arcs (n, MAX_ARCS, 2)."""
     return np.asarray(((arcs[..., 0] <= azimuth[:, None]) & (azimuth[:, None] <= arcs[..., 1])).any(axis=1))
 
 
@@ -349,7 +349,7 @@ def cavities(section: SectionMap) -> tuple[list[Cavity], Cavity]:
 def rim(section: SectionMap, enclosed: list[Cavity]) -> Flags:
     """Which cells (n,) of the proof are undecided and belong to enclosed cavities."""
     chosen = np.zeros(len(section.proof.cells), dtype=bool)
-    splittable = section.proof.level < MOST_LEVEL
+    splittable = section.proof.level < MAX_LEVEL
     for cavity in enclosed:
         middle = cavity.cells.reshape(-1, 2, 2).mean(axis=2)
         open_arcs = cavity.empty < 1 - 1e-9
@@ -386,7 +386,7 @@ CellState = Literal["filled", "touched", "empty", "undecided", "partly_filled"]
 
 TARGET = 0.002
 BEYOND_ROUNDING = 1 + 1e-9
-LEAST_BOUND_M = 1e-4  # for a tool point that no joint moves
+MIN_BOUND_M = 1e-4  # for a tool point that no joint moves
 VOID_RATIO = 0.25
 NEAR_WRIST = 0.07
 WIDE, WIDEST = 6.3, 0.5
@@ -503,9 +503,9 @@ def lacking_for_proof(robot: Robot) -> ClosedFormMissing | None:
 def _bounded_by_lengths(robot: Robot, points: int, seed: int, method: GeneralMethod) -> Proven:
     """One ring that the tool point can't leave, of arms whose joint 1 slides or goes with others."""
     bound = tool_bound(robot)
-    reach, radius = (BEYOND_ROUNDING * max(length, LEAST_BOUND_M) for length in (bound.reach, bound.radius))
+    reach, radius = (BEYOND_ROUNDING * max(length, MIN_BOUND_M) for length in (bound.reach, bound.radius))
     low, high = bound.height - radius, bound.height + radius
-    unfilled, empty = np.full((2, 1, MOST_ARCS, 2), np.nan)
+    unfilled, empty = np.full((2, 1, MAX_ARCS, 2), np.nan)
     unfilled[0, 0] = 0.0, TURN
     cells, none = np.array([[0.0, reach, low, high]]), np.zeros((1, 4))
     proof = Proof(cells, unfilled, empty, np.zeros(1, dtype=np.int64), none, 0)

@@ -254,7 +254,7 @@ def along_change(
     return bound
 
 
-MOST_ARCS = 12
+MAX_ARCS = 12
 
 
 @kernel
@@ -269,10 +269,10 @@ def _cut(arcs: Reals, count: int, low: float, high: float, more: bool) -> int:
             count -= 1
             arcs[n, 0], arcs[n, 1] = arcs[count, 0], arcs[count, 1]
         elif low > a and high < b:
-            if count == MOST_ARCS and not more:
+            if count == MAX_ARCS and not more:
                 return count
             arcs[n, 1] = low
-            if count == MOST_ARCS:
+            if count == MAX_ARCS:
                 return count
             arcs[count, 0], arcs[count, 1] = high, b
             count += 1

@@ -64,7 +64,7 @@ from er3a.geometry.vectors import TURN, Vector, cross, dot, subtract
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import inner_kernel, kernel
 from er3a.workspace.section_arm import (
-    MOST_ARCS,
+    MAX_ARCS,
     ROUND_OFF,
     Cell,
     Range,
@@ -525,7 +525,7 @@ def judge_cells(
     grid : configurations (m, 9), see :func:`fill_configurations`, and their spacing in theta_2
         and tau, rad
     most_boxes : of one emptiness proof; 0: nothing is proven empty, only filled
-    unfilled, empty : (n, MOST_ARCS, 2), azimuths (rad) that are not proven filled, and those of them that are proven
+    unfilled, empty : (n, MAX_ARCS, 2), azimuths (rad) that are not proven filled, and those of them that are proven
         empty, with their counts (n,): at first of the cell that this one was split off, on return of the cell itself
     witness : (n, 4), set to theta_2, tau, phi of a configuration that reaches the cell's centre, and 1 (else 0)
 
@@ -533,7 +533,7 @@ def judge_cells(
     -------
     boxes : how many the emptiness proofs examined
     """
-    stack, splits, known = np.empty((STACK, 6)), np.empty((_SPLITS, 2)), np.empty((MOST_ARCS, 2))
+    stack, splits, known = np.empty((STACK, 6)), np.empty((_SPLITS, 2)), np.empty((MAX_ARCS, 2))
     best = np.empty(2 * _SECTORS), np.empty(2 * _SECTORS, dtype=np.int64)
     (unfilled_arcs, unfilled_count), (empty_arcs, empty_count) = unfilled, empty
     boxes = 0
@@ -713,9 +713,9 @@ def _exclude(
 
 
 _STANCES = 96
-_MOST_BOXES = 20_000
+_MAX_BOXES = 20_000
 _OPEN = 1e-9
-MOST_LEVEL = 7
+MAX_LEVEL = 7
 """Cells are not split further than this: a set without volume would never be decided."""
 _SHARE = 64
 _ARRAYS = "cells", "unfilled", "empty", "level", "witness"
@@ -728,7 +728,7 @@ class Proof:
     Attributes
     ----------
     cells : (n, 4), m: rho_0, rho_1, z_0, z_1 about the section's origin
-    unfilled, empty : (n, MOST_ARCS, 2), rad in [0, 2 pi]: arcs of azimuth that are not proven filled, and those of them
+    unfilled, empty : (n, MAX_ARCS, 2), rad in [0, 2 pi]: arcs of azimuth that are not proven filled, and those of them
         that are proven empty; unused rows are NaN
     level : (n,), how often the cell was split off
     witness : (n, 4): theta_2, tau, phi of a configuration that reaches the cell's centre, and 1; or zeros
@@ -839,7 +839,7 @@ def refined(
         undecided = volumes * (reached[1] - reached[0])
         split = undecided > _OPEN * volumes
         lower, upper = settled + reached @ volumes
-        if upper - lower <= target * upper or level == MOST_LEVEL:
+        if upper - lower <= target * upper or level == MAX_LEVEL:
             split[:] = False
         room = max(0, most_cells - looked) // 4
         if split.sum() > room:
@@ -873,7 +873,7 @@ def judge(arm: SectionArm, cells: Reals) -> Proof:
 
 
 def unfilled_arcs(arm: SectionArm, cells: Reals) -> Reals:
-    """Arcs (n, MOST_ARCS, 2) of given cells (n, 4) that one look does not prove filled, as in :class:`Proof`."""
+    """Arcs (n, MAX_ARCS, 2) of given cells (n, 4) that one look does not prove filled, as in :class:`Proof`."""
     cells = np.ascontiguousarray(cells, dtype=float)
     return _judge(arm, cells, _configuration_grid(arm), 0, most_boxes=0).unfilled
 
@@ -915,11 +915,11 @@ def _judge(
     parents: Proof | None = None,
     threads: int = 1,
     *,
-    most_boxes: int = _MOST_BOXES,
+    most_boxes: int = _MAX_BOXES,
 ) -> Proof:
     """Judge cells, beginning from what is known of those they were split off."""
     n = len(cells)
-    unfilled, empty = np.full((2, n, MOST_ARCS, 2), np.nan)
+    unfilled, empty = np.full((2, n, MAX_ARCS, 2), np.nan)
     unfilled[:, 0] = 0.0, TURN
     counts, witness = np.array([np.ones(n), np.zeros(n)]).astype(np.int64), np.zeros((n, 4))
     if parents is not None:
@@ -935,5 +935,5 @@ def _judge(
     with ThreadPoolExecutor(threads) as pool:
         boxes = sum(pool.map(work, parts)) if threads > 1 else sum(map(work, parts))
     for arcs, count in ((unfilled, counts[0]), (empty, counts[1])):
-        arcs[np.arange(MOST_ARCS) >= count[:, None]] = np.nan
+        arcs[np.arange(MAX_ARCS) >= count[:, None]] = np.nan
     return Proof(cells, unfilled, empty, np.full(n, level), witness, boxes)

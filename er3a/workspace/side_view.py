@@ -42,7 +42,7 @@ Swept = Literal["theta_2", "tau", "gamma"]
 SAMPLES = 121
 _SWEPT: tuple[Swept, ...] = ("theta_2", "tau", "gamma")
 _BESIDE = 4e-3
-_MOST_BOXES = 12_000
+_MAX_BOXES = 12_000
 _ANGLE = 1e-9
 
 
@@ -159,7 +159,7 @@ def _unreachable(arm: SectionArm, rings: Reals, angles: Reals, out: Flags) -> No
     stack = np.empty((STACK, 6))
     for n in range(rings.shape[0]):
         rho, z = rings[n, 0], rings[n, 1]
-        out[n], _ = is_empty(arm, (rho, rho, z, z), angles[n, 0], angles[n, 1], _MOST_BOXES, stack)
+        out[n], _ = is_empty(arm, (rho, rho, z, z), angles[n, 0], angles[n, 1], _MAX_BOXES, stack)
 
 
 def _runs(kept: Flags) -> list[slice]:

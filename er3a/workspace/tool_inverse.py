@@ -22,7 +22,7 @@ from er3a.kinematics.by_class import (
     task_mask,
 )
 from er3a.kinematics.classes.chain_solvers import LockedJoint, Unsolved
-from er3a.kinematics.classes.class_solvers import ARM_CLASSES, ChainSolver, Completed
+from er3a.kinematics.classes.class_solvers import ARM_CLASSES, ChainSolver, PaddedChain
 from er3a.kinematics.classes.six_revolute import CERTAIN
 from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.wrist_partitioned import wrist_partition_missing
@@ -80,9 +80,9 @@ def pose_cost(robot: Robot) -> float:
     """About how long (s, the same on every machine) the solutions of a pose take, at one value of what it leaves
     open: by the arm's class, and how many random poses of its own leave doubt."""
     chain: ChainSolver | None = arm_solver(robot).chain
-    cost = COMPLETED_S if isinstance(chain, Completed) else 0.0
+    cost = COMPLETED_S if isinstance(chain, PaddedChain) else 0.0
     cost += 0.0 if whole_turns(robot).each else GEARED_S * slot_count(robot)
-    while isinstance(chain, LockedJoint | Completed):
+    while isinstance(chain, LockedJoint | PaddedChain):
         chain = chain.rest
     if chain is None:
         return cost + CERTAIN_S + INNER_S

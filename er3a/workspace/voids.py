@@ -38,7 +38,7 @@ from er3a.workspace.proven import Cavity, Proven, cavities
 from er3a.workspace.section_proof import in_space, ring_volumes
 
 _CUBE = np.ones((3, 3, 3), dtype=bool)
-LEAST_BLOCKS = 8
+MIN_BLOCKS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +126,7 @@ def pockets(blocks: Blocks, inside: Flags) -> list[Flags]:
         labels[labels == max(i, j)] = min(i, j)
     volumes = blocks.volumes * blocks.empty
     masks = [labels == n for n in np.unique(labels[labels > 0])]
-    return sorted((mask for mask in masks if mask.sum() >= LEAST_BLOCKS), key=lambda mask: -volumes[mask].sum())
+    return sorted((mask for mask in masks if mask.sum() >= MIN_BLOCKS), key=lambda mask: -volumes[mask].sum())
 
 
 def _wraps(labels: Integers) -> list[tuple[int, int]]:
@@ -216,7 +216,7 @@ def closed_volume(vertices: Reals, triangles: Integers) -> float | None:
 
 VoidKind = Literal["enclosed", "open"]
 
-LEAST_CELLS = 8
+MIN_CELLS = 8
 EXPECTED_SAMPLES = 10.0
 UNSEEN_RATIO = 0.10
 UNLISTED = -1
@@ -293,7 +293,7 @@ def _judged(kind: VoidKind, labels: Integers, counts: Integers) -> Iterator[Samp
             continue
         cells = np.argwhere(labels[box] == number) + [side.start for side in box]
         expected, unseen = _evidence(cells, counts)
-        if len(cells) >= LEAST_CELLS and unseen < len(cells):
+        if len(cells) >= MIN_CELLS and unseen < len(cells):
             sampled = expected >= EXPECTED_SAMPLES and unseen <= UNSEEN_RATIO * len(cells)
             yield SampledVoid(kind, "sampled" if sampled else "undersampled", cells)
 

@@ -22,7 +22,7 @@ def test_tab_key_reaches_everything_in_the_page_s_order(browser, small_study, pa
         WebDriverWait(browser, PAUSE).until(lambda shown: shown.find_elements(By.CSS_SELECTOR, ".sort"))
     expected = browser.execute_script(CONTROLS)
     reached = []
-    for _ in range(min(len(expected), MOST_TABS)):
+    for _ in range(min(len(expected), MAX_TABS)):
         for kind in ("keyDown", "keyUp"):
             browser.execute_cdp_cmd("Input.dispatchKeyEvent", {"type": kind, "key": "Tab", "windowsVirtualKeyCode": 9})
         number, outlined = browser.execute_script(FOCUSED)
@@ -32,14 +32,14 @@ def test_tab_key_reaches_everything_in_the_page_s_order(browser, small_study, pa
         assert outlined, f"focus can't be seen on control {number}"
     assert reached == list(range(len(reached)))
     kinds = browser.execute_script(
-        "return controls.slice(0, arguments[0]).map((c) => c.classList[0] || c.tagName)", MOST_TABS
+        "return controls.slice(0, arguments[0]).map((c) => c.classList[0] || c.tagName)", MAX_TABS
     )
     assert kinds[0] == "A" or page == "index.html"
     if sortable:
         assert {"sort", "tool", "scroll"} <= set(kinds)
 
 
-MOST_TABS = 80
+MAX_TABS = 80
 PAUSE = 5.0  # s to wait for what the page does at once on an idle machine
 HAS_TABLES = "return [...document.querySelectorAll('tbody')].some((body) => body.rows.length > 1)"
 CONTROLS = """

@@ -555,8 +555,11 @@ def test_a_bar_s_unknown_length_is_fitted_with_its_socket_where_its_points_settl
 @pytest.mark.parametrize(
     ("rows", "problem"),
     [
-        ("10,tool,,,,p,,300", "row 2, column pair: 1 rows are of the pair 'p'"),
-        ("10,tool,,,,p,,300\n20,tool,,,,p,,301", "row 3, column pair: the pair 'p' lacks one length"),
+        ("10,tool,,,,p,,300", "row 2, column pair: the pair 'p' has 1 rows"),
+        (
+            "10,tool,,,,p,,300\n20,tool,,,,p,,301",
+            "row 3, column pair: the rows of pair 'p' need one and the same length",
+        ),
         ("10,tool,,,,,b,300\n20,tool,,,,,b,", "row 3, column bar: the bar 'b' has a length in some rows only"),
         ("10,tool,1,2,300,,,300", "row 2, column length_mm: a length of neither a pair nor a bar"),
         ("10,tool,,,,,b,-300", "row 2, column length_mm: -300 is not positive"),

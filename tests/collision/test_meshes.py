@@ -145,7 +145,7 @@ BAD = {
     "not closed": ("is not closed: 3 edges", "Close its holes"),
     "in metres": ("can only be metres", "--unit m"),
     "ten million triangles": ("has 10000000 triangles", "Simplify"),
-    "no format": ("is no format of meshes", "Save it as"),
+    "no format": ("is not a mesh format", "Save it as"),
     "empty": ("holds no triangles", "as triangles"),
     "nowhere": ("there is no such file", "Check"),
 }

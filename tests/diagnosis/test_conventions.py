@@ -16,7 +16,7 @@ from er3a.diagnosis.faults import (
     entry_of,
 )
 from er3a.geometry.transforms import rot_z, translation
-from er3a.references.quantities import MM, Limit, PointCoordinate, PoseOutside
+from er3a.references.quantities import MM, Limit, LimitExcess, PointCoordinate
 from er3a.references.reference import Reference
 from er3a.references.subjects import JointLimit, PointAtPose, PoseExcess
 
@@ -89,7 +89,7 @@ def test_poses_that_are_shown_outside_of_limits_are_a_matter_of_limits():
     right = er3a.load_robot("er3_600")
     upper = right.upper.copy()
     upper[2] -= 1.0
-    shown = (PoseOutside(tuple(np.degrees(right.upper).round(3).tolist())), 0.0, 0.001, "manual", "official", "manual")
+    shown = (LimitExcess(tuple(np.degrees(right.upper).round(3).tolist())), 0.0, 0.001, "manual", "official", "manual")
     pose = Reference(PoseExcess("p"), "key_poses", *shown)
     wrong = other_conventions(right, 0).replace(upper=upper)
     best = er3a.diagnose(wrong, [*er3a.load_references("er3_600").references, pose])[0]

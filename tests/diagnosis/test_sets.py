@@ -27,7 +27,7 @@ from er3a.diagnosis.ranking import usable
 from er3a.files.reference_sets import load_references
 from er3a.files.robot_library import load_robot
 from er3a.numerics.arrays import Reals
-from er3a.references.quantities import COORDINATES, PointCoordinate, PoseOutside
+from er3a.references.quantities import COORDINATES, LimitExcess, PointCoordinate
 from er3a.references.reference import Reference
 from er3a.references.subjects import PointAtPose, PoseExcess
 
@@ -223,7 +223,7 @@ def test_a_disagreement_too_small_to_tell_says_from_what_size_on_it_can_be(arm):
 
 def test_a_limit_that_only_a_pose_contradicts(arm):
     pose = (0.0, 60.0, 0.0, 0.0, 0.0, 0.0)
-    shown = Reference(PoseExcess("parked"), "key_poses", PoseOutside(pose), 0.0, 1e-3, "a photograph", "official")
+    shown = Reference(PoseExcess("parked"), "key_poses", LimitExcess(pose), 0.0, 1e-3, "a photograph", "official")
     narrow = arm.replace(upper=np.where(np.arange(6) == 1, np.radians(30), arm.upper))
     first = er3a.diagnose(narrow, (*stated_of(arm), shown))[0]
     named = [rounded(faults[0]) for faults in (first.faults, *first.indistinguishable_from)]

@@ -233,7 +233,7 @@ def test_of_an_arm_that_hardly_moves_the_bound_is_what_it_holds(arm):
 
 def test_a_bound_that_the_budget_cuts_short_still_holds(arm, monkeypatch):
     whole = worst_holding(arm_model(arm)).bound
-    monkeypatch.setattr(pose_bound, "MOST_CORNERS", 1)
+    monkeypatch.setattr(pose_bound, "MAX_CORNERS", 1)
     cut = worst_holding(arm_model(arm.replace(name="cut")))
     assert (cut.bound >= np.abs(cut.values)).all()
     assert (cut.bound[1:] > whole[1:]).any()

@@ -343,7 +343,7 @@ def test_shapes_and_conventions():
         (lambda arm: er3a.gravity(arm, ["a"] * 6), PoseError, "no real number"),
         (lambda arm: er3a.gravity(arm, np.zeros(6), 3000), Er3aError, "load is of type int"),
         (lambda arm: er3a.gravity(arm, np.zeros(6), Load(-1.0)), RobotError, "the load has a mass below 0"),
-        (lambda arm: er3a.gravity(arm, np.zeros(6), Load(np.nan)), RobotError, "no finite number"),
+        (lambda arm: er3a.gravity(arm, np.zeros(6), Load(np.nan)), RobotError, "not finite"),
         (
             lambda arm: er3a.gravity(arm, np.zeros(6), Load(1.0, inertia=(1.0, 0.1, 0.1, 0, 0, 0))),
             RobotError,

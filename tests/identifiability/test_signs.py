@@ -78,7 +78,7 @@ def smallest_readings(rows: oracle.Rows, stated: list[oracle.Statement]) -> list
 def test_no_other_reading_is_left_of_what_is_settled_outright(name, kinds):
     robot, references = load_robot(name), load_references(name)
     own = [each for kind in kinds for row in references.rows.get(kind, ()) for each in row.references()]
-    own = [replace(each, origin="outside") for each in own if each.authoritative]
+    own = [replace(each, origin="outside") for each in own if each.is_authoritative]
     found = evidence_of(robot, own, Documents())
     stated = [said for said in oracle.statements_of(name) if said.kind in kinds and said.trusted]
     left = smallest_readings(oracle.table_of(name), stated)

@@ -29,7 +29,7 @@ def test_checks_by_what_they_rest_on(name, independent, consistency, claims):
         claims,
     ]
     for basis, reference in zip(bases, references.checkable):
-        assert (basis.kind == "independent") == (bool(basis.independent_of) and reference.authoritative)
+        assert (basis.kind == "independent") == (bool(basis.independent_of) and reference.is_authoritative)
         assert set(basis.independent_of) <= set(basis.reacts_to)
         assert set(basis.same_publisher) <= set(basis.independent_of)
 

@@ -392,8 +392,8 @@ def test_import_urdf_takes_xacro_too(xacro, tmp_path):
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (("mesh=box.stl",), "'mesh=box.stl' is no argument of xacro. Write NAME:=VALUE"),
-        ((":=box.stl",), "':=box.stl' is no argument of xacro"),
+        (("mesh=box.stl",), "'mesh=box.stl' is not an xacro argument. Write NAME:=VALUE"),
+        ((":=box.stl",), "':=box.stl' is not an xacro argument"),
         (None, "--xacro: the file holds no xacro macros"),
     ],
 )

@@ -17,7 +17,7 @@ from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.pipeline.messages import planning as messages
 from er3a.planning.avoidance import avoidance, strategies
 from er3a.planning.avoidance.avoidance import singular_segment
-from er3a.planning.avoidance.strategies import STRATEGIES, best, compare, deviation
+from er3a.planning.avoidance.strategies import STRATEGIES, best, compare_strategies, deviation
 from er3a.planning.follow import follow
 from er3a.planning.motion_faults import singular_events
 from er3a.planning.moves import line
@@ -47,7 +47,7 @@ def segment_of(name: str, robot=None, duration: float = 4.0):
 
 @pytest.fixture(scope="module")
 def results():
-    return {name: {result.name: result for result in compare(segment_of(name))} for name in LINES}
+    return {name: {result.name: result for result in compare_strategies(segment_of(name))} for name in LINES}
 
 
 @pytest.mark.parametrize("name", LINES)
@@ -187,7 +187,7 @@ def test_damping_may_ask_more_of_the_joints_than_the_path_does():
     own = float((np.abs(followed.rates(followed.t)[1]) / limits.speed).max())
     assert own < 0.5
     case = singular_segment(followed, NEAR, replace(limits, speed=own * limits.speed), fixed_start=True, allowed=limits)
-    result = compare(case, "damped")[0]
+    result = compare_strategies(case, "damped")[0]
     assert not result.reasons
     assert result.cost.max_joint_speed_ratio < 1.01 * own
     assert result.cost.distance.max() < 1e-4
@@ -247,7 +247,9 @@ def test_start_inside_the_region_is_left_by_a_joint_move():
     end[:3, 3] += [0.0, 0.15, -0.15]
     followed = follow(robot, line(T, end, 3.0), np.linspace(0, 3, 300), q)
     limits = joint_limits(robot, np.radians([180] * 6), 0.25)
-    found = {result.name: result for result in compare(singular_segment(followed, NEAR, limits, fixed_start=True))}
+    found = {
+        result.name: result for result in compare_strategies(singular_segment(followed, NEAR, limits, fixed_start=True))
+    }
     np.testing.assert_allclose(found["detour"].cost.motion.q[0], q, atol=1e-9)
     assert found["via_shift"].reasons == found["stop"].reasons == (avoidance.BeginsInRegion(),)
 

@@ -81,8 +81,8 @@ def point(**more):
     ("content", "told"),
     [
         ({"kind": "paths"}, "holds no joint trajectory"),
-        (changed(joint_names=["shoulder", "elbow", "wrist"]), "joint_names: which joint is which"),
-        (changed(joint_names=["j1", "j1", "j2"]), "joint_names: which joint is which"),
+        (changed(joint_names=["shoulder", "elbow", "wrist"]), "joint_names: joints can't be identified"),
+        (changed(joint_names=["j1", "j1", "j2"]), "joint_names: joints can't be identified"),
         (changed(points=ROS["points"][:1]), "points: the path has"),
         (point(positions=[1, 2]), r"points\[1\].positions: not 3 numbers"),
         (point(positions=[1, 2, True]), r"points\[1\].positions: not 3 numbers"),

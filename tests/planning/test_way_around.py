@@ -97,7 +97,7 @@ def test_jerk_is_kept_where_it_is_bounded(random):
     way = way_around(one, *blocked(one.bodies, random))
     assert isinstance(way, WayAround)
     curve = way.motion.curve
-    assert (curve.greatest(curve.jerk) <= jerk * (1 + 1e-9)).all()
+    assert (curve.max_abs(curve.jerk) <= jerk * (1 + 1e-9)).all()
     assert curve.steps.max() < 1e-6
 
 

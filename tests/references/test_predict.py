@@ -19,8 +19,8 @@ from er3a.references.quantities import (
     AxisDistance,
     Extreme,
     Limit,
+    LimitExcess,
     ModelState,
-    PoseOutside,
     SectionExtent,
     SegmentAngle,
     Speed,
@@ -120,8 +120,8 @@ def test_segments_of_the_article_arm_lie_as_the_table_has_them():
 def test_limits_speeds_and_poses_outside():
     robot = load_robot("er3_600")
     pose = (0.0, 90.0, 0.0, 0.0, 0.0, 0.0)
-    state = state_of(robot, (PoseOutside(pose),))
-    assert PoseOutside(pose).value(state) == pytest.approx(5)
+    state = state_of(robot, (LimitExcess(pose),))
+    assert LimitExcess(pose).value(state) == pytest.approx(5)
     assert Limit(3, "upper").value(state) == pytest.approx(185)
     assert Speed(6).value(state) == pytest.approx(840)
 

@@ -160,7 +160,10 @@ def test_a_limit_that_is_not_given_is_0_as_the_specification_says(tmp_path):
         (urdf([("planar", *REAL_ARM[0][1:]), *REAL_ARM[1:]]), "type 'planar'"),
         (urdf().replace('name="j2"', 'name="j1"'), "2 joints have this name"),
         (urdf([("revolute", "0, 0, 1", "0 0 0", "0 0 1"), *REAL_ARM[1:]]), "'0, 0, 1' is not 3 finite numbers"),
-        (urdf(limit='<mimic joint="j1"/><limit lower="-2" upper="2"/>'), "follows 'j1', which is no joint"),
+        (
+            urdf(limit='<mimic joint="j1"/><limit lower="-2" upper="2"/>'),
+            "follows 'j1', which is not an independent joint",
+        ),
         (urdf([("revolute", "0 0 nan", "0 0 0", "0 0 1"), *REAL_ARM[1:]]), "'0 0 nan'"),
         (urdf([("revolute", "0 0 1", "0 0 0", "0 0 0"), *REAL_ARM[1:]]), "no length"),
         (urdf().replace("<robot", "<sdf").replace("</robot", "</sdf"), "<sdf>"),

@@ -26,7 +26,7 @@ from er3a.pipeline.results import read_results
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.inverse.compute import compute
 from er3a.pipeline.stages.inverse.model import (
-    MOST_SHOWN,
+    MAX_SHOWN,
     RESULTS,
     SINGULAR_PARTS,
     InverseResults,
@@ -401,8 +401,8 @@ def test_of_many_targets_one_turn_of_each_branch_is_kept_and_the_page_says_so(tm
     study = make_study(er3a_c60={"targets": str(tmp_path / "many.csv"), "paths": "unused.yaml"})
     every = compute(study, "er3a_c60")
     monkeypatch.setattr("er3a.pipeline.stages.inverse.compute.MANY_TARGETS", 14)
-    monkeypatch.setattr("er3a.pipeline.stages.inverse.model.MOST_SHOWN", 5)
-    monkeypatch.setattr("er3a.pipeline.stages.inverse.compute.MOST_ADVISED", 2)
+    monkeypatch.setattr("er3a.pipeline.stages.inverse.model.MAX_SHOWN", 5)
+    monkeypatch.setattr("er3a.pipeline.stages.inverse.compute.MAX_ADVISED", 2)
     run.compute("inverse", study, "er3a_c60", tmp_path / "few")
     few = read_results(tmp_path / "few", RESULTS).results
     assert len(few.solutions) < len(every.solutions)
@@ -427,8 +427,8 @@ def test_of_many_targets_one_turn_of_each_branch_is_kept_and_the_page_says_so(tm
 def test_a_page_shows_targets_of_each_outcome():
     targets = [SimpleNamespace(name=str(k), outcome="collides" if k == 900 else "reached") for k in range(1000)]
     shown = [int(target.name) for target in shown_targets(targets)]
-    assert len(shown) == MOST_SHOWN
+    assert len(shown) == MAX_SHOWN
     assert shown == sorted(set(shown))
     assert {0, 900, 999} <= set(shown)
     assert max(np.diff(shown)) < 40  # evenly over the list
-    assert shown_targets(targets[:MOST_SHOWN]) == targets[:MOST_SHOWN]
+    assert shown_targets(targets[:MAX_SHOWN]) == targets[:MAX_SHOWN]

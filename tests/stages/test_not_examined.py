@@ -19,7 +19,7 @@ from er3a.collision.shapes import arm_shapes, has_bare_tool, link_frames
 from er3a.files.robot_library import load_robot
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
-from er3a.kinematics.singularity import LEAST_SINGULAR_VALUE
+from er3a.kinematics.singularity import MIN_SINGULAR_VALUE
 from er3a.pipeline.messages.left_out import left_out_names, left_out_text
 from er3a.pipeline.messages.say import say, say_all
 from er3a.pipeline.new_study.write import arm_of, write_study
@@ -523,7 +523,7 @@ def test_workspace_names_what_samples_and_budgets_leave_open(study):
 
 
 def test_grasps_are_refused_where_arms_without_branches_are_near_singular(study):
-    assert study.vision.least_singular_value == LEAST_SINGULAR_VALUE
+    assert study.vision.least_singular_value == MIN_SINGULAR_VALUE
 
 
 def test_names_are_words():

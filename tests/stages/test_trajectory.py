@@ -456,7 +456,7 @@ def test_choices_that_do_not_fit_are_refused(study, tmp_path, change, message):
 
 @pytest.mark.long
 def test_extreme_paths_give_results(study, tmp_path, monkeypatch):
-    monkeypatch.setattr(tool_proof, "MOST_INTERVALS", 4000)  # the proof from a singular start uses up what it may
+    monkeypatch.setattr(tool_proof, "MAX_INTERVALS", 4000)  # the proof from a singular start uses up what it may
     far = {"xyz_mm": [5000, 0, 300], "rpy_deg": [180, 0, 0]}
     paths = [
         LINE | {"name": "still", "end": LINE["start"]},

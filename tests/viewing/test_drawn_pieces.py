@@ -6,7 +6,7 @@ from collections import Counter
 
 import numpy as np
 
-from er3a.pipeline.player.player import MOST_FACES, drawn_shapes, drawn_size
+from er3a.pipeline.player.player import MAX_FACES, drawn_shapes, drawn_size
 from er3a.robots.robot import ConvexPiece
 from testing.arms import gantry, make_arm
 
@@ -31,7 +31,7 @@ def test_pieces_are_closed_and_face_outwards():
 
 def test_many_pieces_are_drawn_with_fewer_faces():
     drawn = drawn_shapes(make_arm(hulls=pieces(70, 64)))["pieces"]
-    assert sum(len(piece["faces"]) for piece in drawn) <= 1.05 * MOST_FACES
+    assert sum(len(piece["faces"]) for piece in drawn) <= 1.05 * MAX_FACES
 
 
 def test_flat_pieces_are_left_out_and_an_arm_without_lengths_has_a_size():

@@ -102,7 +102,7 @@ def spoiled(what: str, flange: np.ndarray, target: np.ndarray) -> dict[str, np.n
         ("mixed", "row 5", "another unit"),
         ("length", "row 6", "length is"),
         ("mirrored", "row 7", "left-handed"),
-        ("skewed", "row 8", "no rotation"),
+        ("skewed", "row 8", "not a rotation"),
         ("nan", "row 4", "not a finite number"),
     ],
 )

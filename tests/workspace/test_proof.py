@@ -24,7 +24,7 @@ from er3a.workspace.proven import (
     wilson,
     witness_joints,
 )
-from er3a.workspace.section_arm import MOST_ARCS, measure, meets, remove, section_arm, section_frame, wrist_and_forearm
+from er3a.workspace.section_arm import MAX_ARCS, measure, meets, remove, section_arm, section_frame, wrist_and_forearm
 from er3a.workspace.section_proof import Proof, judge, prove
 from er3a.workspace.side_view import border
 
@@ -136,7 +136,7 @@ def test_intervals_of_the_estimate_hold_a_volume_known_exactly():
 def test_points_of_the_estimate_are_even_over_arcs_that_are_open(random):
     """Those of a cylinder's points that two cells, which differ in arcs and volume, leave open."""
     cells = np.array([[0.2, 0.5, -0.1, 0.2], [0.5, 0.8, -0.1, 0.2]])
-    unfilled, empty = np.full((2, 2, MOST_ARCS, 2), np.nan)
+    unfilled, empty = np.full((2, 2, MAX_ARCS, 2), np.nan)
     unfilled[0, :2], empty[0, 0] = [(0.0, 1.0), (3.0, 6.0)], (4.0, 5.0)
     unfilled[1, 0], empty[1, 0] = (2.0, 2.5), (2.0, 2.1)
     proof = Proof(cells, unfilled, empty, np.zeros(2, np.int64), np.zeros((2, 4)), 0)
@@ -315,7 +315,7 @@ def test_the_zone_holds_all_samples_and_is_reached(random):
 @settings(max_examples=200)
 @given(st.lists(st.tuples(st.floats(-20, 20), st.floats(0, 7)), max_size=8), st.booleans())
 def test_arcs_agree_with_a_fine_grid(cuts, more):
-    arcs = np.full((MOST_ARCS, 2), np.nan)
+    arcs = np.full((MAX_ARCS, 2), np.nan)
     arcs[0] = 0, 2 * np.pi
     count, kept = 1, np.ones(3600, dtype=bool)
     grid = (np.arange(3600) + 0.5) * 2 * np.pi / 3600

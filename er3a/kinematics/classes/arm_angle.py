@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 from er3a.geometry.transforms import frame_along
-from er3a.geometry.vectors import TURN, Vector
+from er3a.geometry.vectors import TURN, Vector, dot
 from er3a.kinematics.chain import axes_of, meeting_point, poses_of
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.fast_math import arctan2, cos_sin
@@ -296,11 +296,6 @@ def solve_arm_angle_blocks(k: ArmAngleConstants, T: Reals, psi: Reals, q: Reals,
                         q[start + i, slot, j] = np.nan
 
 
-@kernel
-def _dot(r: Vector, x: float, y: float, z: float) -> float:
-    return r[0] * x + r[1] * y + r[2] * z
-
-
 @inner_kernel
 def _turned_about_line(k: ArmAngleConstants, T: Reals, psi: Reals, start: int, size: int, w: Reals) -> None:
     """Rows 0-8 of ``w``: n, e and n x e in the frame before axis 1; 9-14 axis 7 and the vector beside it along those;
@@ -325,9 +320,9 @@ def _turned_about_line(k: ArmAngleConstants, T: Reals, psi: Reals, start: int, s
         ex, ey, ez = c * bx + s * ax, c * by + s * ay, c * bz + s * az
         fx, fy, fz = ny * ez - nz * ey, nz * ex - nx * ez, nx * ey - ny * ex
         for row in range(3):
-            w[row * BLOCK + i] = _dot(k.base[row], nx, ny, nz)
-            w[(3 + row) * BLOCK + i] = _dot(k.base[row], ex, ey, ez)
-            w[(6 + row) * BLOCK + i] = _dot(k.base[row], fx, fy, fz)
+            w[row * BLOCK + i] = dot(k.base[row], (nx, ny, nz))
+            w[(3 + row) * BLOCK + i] = dot(k.base[row], (ex, ey, ez))
+            w[(6 + row) * BLOCK + i] = dot(k.base[row], (fx, fy, fz))
         a, b = k.axis_7_in_tool, k.beside_7_in_tool
         zx = T[m, 0, 0] * a[0] + T[m, 0, 1] * a[1] + T[m, 0, 2] * a[2]
         zy = T[m, 1, 0] * a[0] + T[m, 1, 1] * a[1] + T[m, 1, 2] * a[2]
@@ -386,7 +381,7 @@ def _elbow(k: ArmAngleConstants, w: Reals, sign: float) -> None:
             ct, st = cos_sin(theta)
             p0, p1 = p0 * ct + p1 * st, p1 * ct - p0 * st
             for row in range(3):
-                w[(30 + 3 * vector + row) * BLOCK + i] = _dot(k.forearm[row], p0, p1, p2)
+                w[(30 + 3 * vector + row) * BLOCK + i] = dot(k.forearm[row], (p0, p1, p2))
 
 
 @inner_kernel

@@ -124,7 +124,7 @@ def _with_three_slides(links: Reals, sliding: Flags) -> class_solvers.ChainSolve
     if len(sliding) != 6 or sliding.sum() != 3 or not full_rank(links, sliding):
         return None
     three = gantry(links, sliding)
-    return None if three is None else class_solvers.ThreeSliding(three)
+    return None if three is None else class_solvers.GantrySolver(three)
 
 
 def _with_arm_angle(links: Reals, sliding: Flags) -> class_solvers.ChainSolver | None:
@@ -136,7 +136,7 @@ def _with_arm_angle(links: Reals, sliding: Flags) -> class_solvers.ChainSolver |
 
 def _as_scara(links: Reals, sliding: Flags) -> class_solvers.ChainSolver | None:
     planar = scara(links, sliding) if len(sliding) == 4 else None
-    return None if planar is None else class_solvers.PlanarFour(planar)
+    return None if planar is None else class_solvers.ScaraSolver(planar)
 
 
 CLOSED_FORMS: tuple[Callable[[Reals, Flags], class_solvers.ChainSolver | None], ...] = (
@@ -156,15 +156,19 @@ def _by_elimination(links: Reals, sliding: Flags) -> class_solvers.ChainSolver:
     if sliding.sum() == 2:
         two = two_slides(links, sliding)
         return (
-            Unsolved(6) if two is None else class_solvers.General(partial(solve_two_slides, two), "six_two_prismatic")
+            Unsolved(6)
+            if two is None
+            else class_solvers.EliminationSolver(partial(solve_two_slides, two), "six_two_prismatic")
         )
     arm = prepared(links, sliding)
     if not arm.readings:
         return Unsolved(6)
     by_elimination = partial(solve_six_revolute, arm)
     if not arm.clear and (with_wrist := slide_and_wrist(links, sliding)) is not None:
-        return class_solvers.General(partial(solve_slide_and_wrist, with_wrist, by_elimination), "six_one_prismatic")
-    return class_solvers.General(by_elimination, "six_one_prismatic" if sliding.any() else "general_six")
+        return class_solvers.EliminationSolver(
+            partial(solve_slide_and_wrist, with_wrist, by_elimination), "six_one_prismatic"
+        )
+    return class_solvers.EliminationSolver(by_elimination, "six_one_prismatic" if sliding.any() else "general_six")
 
 
 def full_rank(links: Reals, sliding: Flags, at_rest: tuple[int, ...] = ()) -> bool:
@@ -248,7 +252,7 @@ def _completed(links: Reals, sliding: Flags) -> class_solvers.ChainSolver:
         if best is not None and code == "planar_wrist" and places == tuple(range(n, 6)):
             break  # made for any chain, and needed by those alone that nothing else completes
         if best is None or (code == best[1].code and place < best[0]):
-            best = (place, class_solvers.Completed(rest, places, code))
+            best = (place, class_solvers.PaddedChain(rest, places, code))
     return Unsolved(n) if best is None else best[1]
 
 

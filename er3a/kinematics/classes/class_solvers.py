@@ -240,7 +240,7 @@ class ParallelAxes(WithoutParameters):
 
 
 @dataclass(frozen=True, eq=False)
-class General(WithoutParameters):
+class EliminationSolver(WithoutParameters):
     """Any six joints of which at most two slide."""
 
     solve: Callable[[Reals], RowsFound]
@@ -285,7 +285,7 @@ class ArmAngle:
 
 
 @dataclass(frozen=True, eq=False)
-class ThreeSliding(WithoutParameters):
+class GantrySolver(WithoutParameters):
     """Six joints, three of them prismatic."""
 
     arm: Gantry
@@ -301,7 +301,7 @@ class ThreeSliding(WithoutParameters):
 
 
 @dataclass(frozen=True, eq=False)
-class PlanarFour(WithoutParameters):
+class ScaraSolver(WithoutParameters):
     """Four joints of one direction, one of them prismatic."""
 
     arm: Scara
@@ -318,7 +318,7 @@ class PlanarFour(WithoutParameters):
 
 
 @dataclass(frozen=True, eq=False)
-class Completed(WithoutParameters):
+class PaddedChain(WithoutParameters):
     """Fewer than six joints, solved with joints that the chain lacks at these places (from 0, rising)."""
 
     rest: ChainSolver

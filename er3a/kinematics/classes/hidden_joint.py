@@ -105,7 +105,7 @@ TERMS = 2 * DEGREE + 1
 SAMPLES = 20
 ARCS = 8
 ORDER = 2 * DEGREE
-MOST_PARTS = 150
+MAX_PARTS = 150
 CLOSE = 1e-13
 LOCAL_ORDER = 12
 LOCAL_NOISE = 1e-11
@@ -240,7 +240,7 @@ def isolate(stack: Reals, order: int, noise: float, found: Reals, count: int) ->
             found[count, 0], found[count, 1], found[count, 2] = low, high, kind
             count += 1
             continue
-        if used > MOST_PARTS or depth + 2 > stack.shape[0]:
+        if used > MAX_PARTS or depth + 2 > stack.shape[0]:
             return -1
         # Halved by de Casteljau: b becomes the right half and waits below the left.
         left = stack[depth + 1]

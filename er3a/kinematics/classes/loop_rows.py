@@ -30,8 +30,8 @@ from er3a.kinematics.classes.hidden_joint import (
 from er3a.numerics.arrays import Flags, Integers, Reals, for_kernel
 from er3a.numerics.jit import inner_kernel, kernel
 
-MOST_ZEROS = 48
-MOST_DARK = 64
+MAX_ZEROS = 48
+MAX_DARK = 64
 WIDEST = 0.2  # rad, that a dark interval is sampled in one piece
 NARROWEST = 1e-6
 DEEPEST = 4.0
@@ -63,8 +63,8 @@ def new_memory(sliding: Flags) -> LoopMemory:
     """Memory for one thread; ``sliding`` (6,) marks prismatic joints."""
     return LoopMemory(
         elimination=new_scratch(),
-        found=np.zeros((MOST_ZEROS, 3)),
-        zeros=np.zeros((MOST_ZEROS, 3)),
+        found=np.zeros((MAX_ZEROS, 3)),
+        zeros=np.zeros((MAX_ZEROS, 3)),
         values=np.zeros(LOCAL_ORDER + 1),
         stack=np.zeros((100, TERMS + 2)),
         F=np.zeros((6, 9)),
@@ -90,7 +90,7 @@ def hidden_angles(e: Scratch, level: float, m: LoopMemory) -> int:
     found = zeros_on_circle(e.terms, level, m.found, m.stack)
     if found < 0:
         return -1
-    count, dark = 0, np.empty((MOST_DARK, 3))
+    count, dark = 0, np.empty((MAX_DARK, 3))
     waiting = 0
     for row in range(found):
         low, high = m.found[row, 0], m.found[row, 1]
@@ -100,7 +100,7 @@ def hidden_angles(e: Scratch, level: float, m: LoopMemory) -> int:
             continue
         parts = int(np.ceil((high - low) / WIDEST))
         for part in range(parts):
-            if waiting == MOST_DARK:
+            if waiting == MAX_DARK:
                 return -1
             step, margin = (high - low) / parts, 0.1 * (high - low) / parts + 1e-7
             dark[waiting, 0], dark[waiting, 1] = low + part * step - margin, low + (part + 1) * step + margin
@@ -112,7 +112,7 @@ def hidden_angles(e: Scratch, level: float, m: LoopMemory) -> int:
         waiting -= 1
         low, high, depth = dark[waiting, 0], dark[waiting, 1], dark[waiting, 2]
         looked += 1
-        if looked > MOST_DARK:
+        if looked > MAX_DARK:
             return -1
         middle, half, noise = 0.5 * (low + high), 0.5 * (high - low), 0.0
         for i in range(LOCAL_ORDER + 1):
@@ -124,13 +124,13 @@ def hidden_angles(e: Scratch, level: float, m: LoopMemory) -> int:
         for row in range(found):
             below, above = m.found[row, 0], m.found[row, 1]
             if m.found[row, 2] == 0.0 and above - below > NARROWEST and depth < DEEPEST:
-                if waiting == MOST_DARK:
+                if waiting == MAX_DARK:
                     return -1
                 margin = 0.1 * (above - below)
                 dark[waiting, 0], dark[waiting, 1], dark[waiting, 2] = below - margin, above + margin, depth + 1.0
                 waiting += 1
                 continue
-            if count == MOST_ZEROS:
+            if count == MAX_ZEROS:
                 return -1
             m.zeros[count, 0], m.zeros[count, 1], m.zeros[count, 2] = 0.5 * (below + above), above, m.found[row, 2]
             count += 1

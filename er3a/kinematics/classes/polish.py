@@ -14,7 +14,7 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import inner_kernel, kernel
 
 SOLVES = 1e-12  # residual, rad and parts of the chain's size
-LEAST_PIVOT = 1e-9
+MIN_PIVOT = 1e-9
 LARGEST_STEP = 0.7
 NEAR_FOLD = 2e-2
 PROBE = 1e-2
@@ -123,7 +123,7 @@ def _step(J: Reals, columns: Integers, dq: Reals) -> None:
         total = J[k, 6]
         for c in range(k + 1, 6):
             total -= J[k, c] * dq[columns[c]]
-        dq[columns[k]] = total / J[k, k] if abs(J[k, k]) > LEAST_PIVOT * first else 0.0
+        dq[columns[k]] = total / J[k, k] if abs(J[k, k]) > MIN_PIVOT * first else 0.0
 
 
 @inner_kernel

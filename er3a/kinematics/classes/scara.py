@@ -25,7 +25,7 @@ from er3a.numerics.jit import kernel
 
 SLOTS = 2
 PARALLEL = 1e-9
-LEAST_LINK_M = 1e-9
+MIN_LINK_M = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ def scara(links: Reals, sliding: Flags) -> Scara | None:
     T = poses_of(links, np.zeros(4), np.asarray(sliding))
     a, b, c = (points[turning] - points[turning[0]]) @ frame.T
     end = frame @ (T[:3, 3] - points[turning[0]])
-    if min(np.linalg.norm((b - a)[:2]), np.linalg.norm((c - b)[:2])) < LEAST_LINK_M:
+    if min(np.linalg.norm((b - a)[:2]), np.linalg.norm((c - b)[:2])) < MIN_LINK_M:
         return None
     slide = int(np.flatnonzero(sliding)[0])
     sense = np.sign(axes @ w)

@@ -23,7 +23,7 @@ from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.jit import inner_kernel, kernel
 
 STEP = np.radians(2.0)  # largest joint move between two points of a curve
-MOST_POINTS = 1200
+MAX_POINTS = 1200
 REGULAR = 1e-6  # pivots of J J^T above this part of the largest diagonal entry
 TRUNCATED = 1e-5  # singular values below this part of the largest are no directions
 SOLVES = 1e-11
@@ -424,7 +424,7 @@ class PoseChain:
         dimension = free_direction(self.posed, start, v)
         if dimension == 0:
             return None
-        points = np.empty((MOST_POINTS, len(x)))
+        points = np.empty((MAX_POINTS, len(x)))
         count, end = trace(self.posed, start, v, points)
         path, lost = points[:count].copy(), end == LOST
         if end != CLOSED:

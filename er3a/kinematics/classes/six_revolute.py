@@ -34,7 +34,7 @@ MAYBE_SAME = 1e-2  # rad: rows nearer than this are one if what lies midway solv
 DARK = 200.0  # noise is taken as so many times what it was measured to be
 LOUD = 1e-7
 FAMILY_PEAK = 1e-25
-MOST_READINGS = 4
+MAX_READINGS = 4
 TRIALS = 24
 BESIDE, NOTHING_NEW = 24, 6  # poses beside one in doubt, and after how many that bring nothing new it is left
 ASIDE = (1e-3, 1e-2, 3e-2)  # how far beside, in turn: rad and parts of the size
@@ -88,7 +88,7 @@ class RowsFound:
     certainty: Integers
 
 
-def prepared(links: Reals, sliding: Flags | None = None, seed: int = 7) -> SixRevolute:
+def prepared(links: Reals, sliding: Flags | None = None) -> SixRevolute:
     """The solver for a chain with constant links (7, 4, 4); readings are tried out on poses of random joints.
 
     ``sliding`` (6,) marks prismatic joints; one is within what the method can do, of two no reading was left so far.
@@ -99,7 +99,7 @@ def prepared(links: Reals, sliding: Flags | None = None, seed: int = 7) -> SixRe
     scaled[:, :3, 3] /= size
     bare = scaled.copy()
     bare[0] = np.eye(4)
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(7)
     q = random.uniform(-1, 1, (TRIALS, 6)) * np.where(sliding, 1.0, np.pi)
     T = poses_of(bare, q, sliding)
     memory = new_memory(sliding)
@@ -129,7 +129,7 @@ def _trial(reading: Reading, links: Reals, T: Reals, memory: LoopMemory) -> floa
 def solve_six_revolute(arm: SixRevolute, T: Reals) -> RowsFound:
     """All solutions for poses T (N, 4, 4), m; each reading takes the poses that those before it left in doubt.
 
-    After ``MOST_READINGS`` that were conclusive a pose stays in doubt; those whose determinant vanishes don't count, as
+    After ``MAX_READINGS`` that were conclusive a pose stays in doubt; those whose determinant vanishes don't count, as
     they may do so beside special geometry where others don't.
     """
     return all_rows(arm, _by_readings, T)
@@ -149,7 +149,7 @@ def _by_readings(
         rows_by_reading(reading, arm.links, arm.size, T, left, memory, q, count, verdicts, moving)
         certainty[left] = np.minimum(certainty[left], verdicts)
         readings_used[left] += verdicts != CONTINUUM
-        left = left[(verdicts != CERTAIN) & (readings_used[left] < MOST_READINGS)]
+        left = left[(verdicts != CERTAIN) & (readings_used[left] < MAX_READINGS)]
     certainty[moving] = CONTINUUM
 
 

@@ -40,10 +40,10 @@ from er3a.numerics.arrays import Complexes, Flags, Integers, Reals
 from er3a.numerics.jit import inner_kernel, kernel
 
 TRIALS = 24
-MOST_READINGS = 3  # that are conclusive, for a pose in doubt
+MAX_READINGS = 3  # that are conclusive, for a pose in doubt
 NOISE = 1e-9  # of the largest sample: more, and a reading is inconclusive
-LEAST = 1e-20  # largest sample below which a reading vanishes for all poses
-MOST_DEGREE = 8
+MIN_SAMPLE = 1e-20  # largest sample below which a reading vanishes for all poses
+MAX_DEGREE = 8
 FAINT = 1e-13  # of the largest coefficient: so small ones are rounding
 ACROSS = 1e-6  # sine between the axes of the two joints that follow
 ON_CIRCLE, NEAR_CIRCLE = 1e-6, 3e-2  # a zero's distance from the unit circle: real; perhaps one of several that meet
@@ -79,27 +79,27 @@ class TwoSlides:
     readings: tuple[SlideReading, ...]
 
 
-def two_slides(links: Reals, sliding: Flags, seed: int = 7) -> TwoSlides | None:
+def two_slides(links: Reals, sliding: Flags) -> TwoSlides | None:
     """The solver for links (7, 4, 4) two of whose joints are prismatic; None if no reading of the loop determines its
     solutions."""
     size = size_of(links)
     scaled = np.array(links, float)
     scaled[:, :3, 3] /= size
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(7)
     q = random.uniform(-1, 1, (TRIALS, 6)) * np.where(sliding, 1.0, np.pi)
     loops = scaled[6] @ inverse_rigid(poses_of(scaled, q, sliding)) @ scaled[0]
     ranked = []
     for number, (joint, sense, arranged, place, slides) in enumerate(_arrangements(scaled, sliding)):
         for power in (1, 2):
-            reading = SlideReading(joint, sense, arranged, place, slides, power, MOST_DEGREE, 1.0)
+            reading = SlideReading(joint, sense, arranged, place, slides, power, MAX_DEGREE, 1.0)
             terms, peak = _polynomials(reading, loops)
-            clear = _clear(terms, peak) & (peak > LEAST)
+            clear = _clear(terms, peak) & (peak > MIN_SAMPLE)
             if clear.sum() * 2 <= TRIALS:
                 continue
             reading = reading._replace(usual=float(np.median((peak / _reach(loops) ** 2)[clear])))
             size_of_terms = np.abs(terms[clear]) / np.abs(terms[clear]).max(axis=1, keepdims=True)
             degree = (int(np.flatnonzero((size_of_terms > FAINT).any(axis=0))[-1]) + 1) // 2
-            degree = min(max(degree, 1), MOST_DEGREE)
+            degree = min(max(degree, 1), MAX_DEGREE)
             ranked.append((int(TRIALS - clear.sum()), degree, power, number, reading._replace(degree=degree)))
             break
     if not ranked:
@@ -153,7 +153,7 @@ def _by_readings(arm: TwoSlides, T: Reals, memory: LoopMemory, q: Reals, count: 
         readings_used[known] += 1
         done = np.zeros(len(T), dtype=bool)
         done[known] = verdicts == CERTAIN
-        left = left[~done[left] & (readings_used[left] < MOST_READINGS)]
+        left = left[~done[left] & (readings_used[left] < MAX_READINGS)]
     certainty[moving] = CONTINUUM
 
 
@@ -165,7 +165,7 @@ def _reach(loops: Reals) -> Reals:
 def _clear(terms: Reals, peak: Reals) -> Flags:
     """Whether the terms (N, 20) that would vanish without rounding are small; False where the reading is
     inconclusive."""
-    return np.asarray(np.abs(terms[:, 2 * MOST_DEGREE + 1 :]).max(axis=1) < NOISE * peak)
+    return np.asarray(np.abs(terms[:, 2 * MAX_DEGREE + 1 :]).max(axis=1) < NOISE * peak)
 
 
 def _polynomials(reading: SlideReading, loops: Reals) -> tuple[Reals, Reals]:

@@ -222,10 +222,10 @@ def article_numbers(study: Study, results: Path) -> ArticleNumbers:
     compared = compare(robot, study.robot(tables.real))
     hypothesis = next(found for found in validation.diagnoses if found.reference_set == STATEMENTS).hypotheses[0]
     fault = hypothesis.faults[0]
-    literal = _points(robot.replace(convention="modified"), _over_range(robot, 0))
+    literal = _points(robot.replace(convention="modified"), _base_turned(robot))
     random = random_joints(robot, study.seed, CLOUD)
     shifted = np.abs(_points(_one_row_down(robot), random) - _points(robot, random))
-    circle = _points(robot, _over_range(robot, 0))
+    circle = _points(robot, _base_turned(robot))
     radius = np.hypot(circle[:, 0], circle[:, 1])
     target = _target()
     free, kept = solve(robot, target, np.zeros(6), respect_limits=False), solve(robot, target, np.zeros(6))
@@ -388,15 +388,15 @@ def _from_vertical_deg(vector: Reals) -> float:
     return float(np.degrees(np.arccos(np.clip(vector[2] / np.linalg.norm(vector), -1, 1))))
 
 
-def _over_range(robot: Robot, joint: int) -> Reals:
-    """Joint values (100, 6), one joint over its range and the others at 0."""
+def _base_turned(robot: Robot) -> Reals:
+    """Joint values (100, 6), joint 1 over its range and the others at 0."""
     q = np.zeros((100, 6))
-    q[:, joint] = np.linspace(robot.lower[joint], robot.upper[joint], len(q))
+    q[:, 0] = np.linspace(robot.lower[0], robot.upper[0], len(q))
     return q
 
 
 def _one_row_down(robot: Robot) -> Robot:
-    """The table as Craig would write it: a and alpha of row i behind joint i stand in row i + 1."""
+    """The table as Craig would write it: a and alpha of row i, after joint i, are in row i + 1."""
     a, alpha = (np.concatenate([[0.0], values[:-1]]) for values in (robot.a, robot.alpha))
     return robot.replace(convention="modified", a=a, alpha=alpha)
 

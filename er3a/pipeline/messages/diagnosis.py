@@ -76,8 +76,8 @@ LIMIT_FAULTS = {
     "lower_sign": N_("lower limit has the wrong sign"),
     "upper_sign": N_("upper limit has the wrong sign"),
 }
-LEAST_SHOWN, LEAST_FITTED = 0.005, 5e-5
-MOST_LISTED = 24
+MIN_SHOWN, MIN_FITTED = 0.005, 5e-5
+MAX_LISTED = 24
 LEVELS = {
     "lengths": N_("lengths"),
     "lengths_and_offsets": N_("lengths and joint offsets"),
@@ -223,7 +223,7 @@ def both(faults: Faults) -> str:
 
 def shown(value: float) -> str:
     """A residual: two decimals below 1, one below 100, none above; one that rounds to nothing is 0.0."""
-    if LEAST_SHOWN <= value < 1:
+    if MIN_SHOWN <= value < 1:
         return f"{value:.2f}"
     return f"{value:.1f}" if value < 100 else f"{value:.0f}"
 
@@ -233,7 +233,7 @@ def fitted(found: WrongAlpha | WrongOffset | WrongLimit | WrongLength) -> str:
     given, fits = (
         (found.given_mm, found.fits_mm) if isinstance(found, WrongLength) else (found.given_deg, found.fits_deg)
     )
-    if abs(fits) < LEAST_FITTED:
+    if abs(fits) < MIN_FITTED:
         return "0"
     text = next((text for d in (4, 5, 6) if (text := as_text(fits, f".{d}g")) != as_text(given, f".{d}g")), "")
     return text or as_text(fits, ".7g")
@@ -300,7 +300,7 @@ def _(found: WrongScale) -> str:
 @say.register
 def _(found: BaseElsewhere | FlangeElsewhere) -> str:
     x, y, z = found.shift_mm
-    return say_as(found, "turned" if found.turn_deg >= LEAST_SHOWN else "shifted", x=x, y=y, z=z)
+    return say_as(found, "turned" if found.turn_deg >= MIN_SHOWN else "shifted", x=x, y=y, z=z)
 
 
 @say.register
@@ -379,7 +379,7 @@ def _residual_falls(found: MostLikelyFault | MainFault) -> str:
 
 def _candidates(members: Sequence[Faults]) -> str:
     """All members of a set; of a set that no one would read, the first."""
-    texts = [both(faults) for faults in members[:MOST_LISTED]]
+    texts = [both(faults) for faults in members[:MAX_LISTED]]
     if more := len(members) - len(texts):
         texts.append(sentence("candidates", count=more))
     return joined(texts)

@@ -149,7 +149,7 @@ TEXTS = texts(
 )
 
 
-MOST_NAMED = 6  # in a sentence; the table names all
+MAX_NAMED = 6  # in a sentence; the table names all
 _words: dict[LeftOutSubject, tuple[str, Mapping[str, str]]] = {}
 RESERVED: Mapping[str, tuple[LeftOutSubject, ...]] = {
     "grasp_counts": ("carried", "bare_tool"),
@@ -184,5 +184,5 @@ def left_out_text(found: LeftOut) -> str:
 
 @say.register
 def _(found: NoPass) -> str:
-    missed = [bracketed(left_out_text(each), left_out_names(each, MOST_NAMED)) for each in found.missed]
+    missed = [bracketed(left_out_text(each), left_out_names(each, MAX_NAMED)) for each in found.missed]
     return say_as(found, missed=joined(missed))

@@ -27,7 +27,7 @@ STRATEGIES: dict[StrategyName, str] = {
     "planned": N_("Use another motion instead, planned in joint space"),
 }
 
-MOST_SHOWN = 1e6  # of an acceleration; towards a singular pose or the edge of the reach it has no bound
+MAX_SHOWN = 1e6  # of an acceleration; towards a singular pose or the edge of the reach it has no bound
 
 
 TEXTS = texts(
@@ -91,7 +91,7 @@ def _(found: TooFast | TooFastIfAssumed) -> str:
 
 @say.register
 def _(found: AccelerationTooGreat | AccelerationTooGreatIfAssumed) -> str:
-    needed = as_text(found.needed_deg_s2, ".0f") if found.needed_deg_s2 < MOST_SHOWN else tr("more than 1 000 000")
+    needed = as_text(found.needed_deg_s2, ".0f") if found.needed_deg_s2 < MAX_SHOWN else tr("more than 1 000 000")
     return say_as(found, unit=unit_of(found.slides), needed=needed)
 
 

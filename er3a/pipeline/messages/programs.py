@@ -125,7 +125,7 @@ STOPPED: dict[EndKind, str] = {
 }
 STAYS_MM = 1.0  # that a tool moves when it stays where it is
 PACED = (TooFast, FasterThanAssumed, AcceleratesMoreThanAssumed)
-MOST_PAIRS = 3  # that are named of a collision
+MAX_PAIRS = 3  # that are named of a collision
 FIGURES = {
     "programs_passed": N_("Programs that pass, of those meant to"),
     "instructions_passed": N_("Motion instructions that pass, of programs meant to pass"),
@@ -441,8 +441,8 @@ def _(found: found_in.ConfigurationChanges) -> str:
 
 @say.register
 def _(found: found_in.MotionCollides) -> str:
-    parts = {"touches": joined(listed(found.touches[:MOST_PAIRS]))}
-    if len(found.touches) > MOST_PAIRS:
+    parts = {"touches": joined(listed(found.touches[:MAX_PAIRS]))}
+    if len(found.touches) > MAX_PAIRS:
         return sentence("motion_collides.more", **parts)
     return say_as(found, **parts)
 

@@ -49,7 +49,7 @@ STRATEGIES: dict[StrategyName, str] = {
     "planned": N_("planned motion of the joints"),
 }
 BY_JOINTS: tuple[StrategyName, ...] = ("branch", "detour", "planned")  # ways that no path of the tool shows
-MOST_PAIRS = 3
+MAX_PAIRS = 3
 NO_DEVIATION = 0.005  # mm or deg
 NO_TIME = 0.005  # s
 AT_EDGE = 1e-3  # s, before the edge of the reach, where the arm is stretched
@@ -325,8 +325,8 @@ def _when(stretch: model.Stretch) -> str:  # type: ignore[type-arg]
 
 @say.register
 def _(found: model.BodiesOverlap) -> str:
-    touches = joined(listed(found.touches[:MOST_PAIRS]))
-    if len(found.touches) > MOST_PAIRS:
+    touches = joined(listed(found.touches[:MAX_PAIRS]))
+    if len(found.touches) > MAX_PAIRS:
         return sentence("bodies_overlap.more", touches=touches)
     return touches
 

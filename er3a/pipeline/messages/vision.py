@@ -347,9 +347,12 @@ def _(found: NoCorrections) -> str:
     return word("vision.no_corrections", NO_CORRECTIONS, found.why)
 
 
-def correction_verdict(probability: float, before: float, after: float, limit: float = 0.01) -> str:
+CONTRADICTED = 0.01
+
+
+def correction_verdict(probability: float, before: float, after: float) -> str:
     """Whether the samples speak against the table as it is."""
-    if probability < limit:
+    if probability < CONTRADICTED:
         return sentence("vision.corrections#contradicted", before=before, after=after, p=probability)
     return sentence("vision.corrections#consistent", before=before, after=after, p=probability)
 

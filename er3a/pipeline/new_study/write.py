@@ -62,7 +62,7 @@ FLOOR_BELOW_MM = 5
 ROOM_BELOW_M, ROOM_BELOW = 0.1, 0.1  # at least, and of the reach
 TABLE_TOP, TABLE_FROM, TABLE_LENGTH, TABLE_WIDTH = 0.12, 0.4, 0.5, 0.9  # of the reach
 TABLE_THICKNESS_MM = 40
-LEAST_RADIUS_M = 0.05
+MIN_RADIUS_M = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +96,7 @@ def reach_of(robot: Robot) -> SampledReach:
     azimuth = np.degrees(np.arctan2(away[:, 1], away[:, 0]))
     near = [np.count_nonzero(np.abs((azimuth - side + 180) % 360 - 180) < 45) for side in SIDES_DEG]
     side = SIDES_DEG[0] if near[0] > 0.4 * max(near) else SIDES_DEG[int(np.argmax(near))]
-    radius = max(float(np.linalg.norm(away, axis=1).max()), LEAST_RADIUS_M)
+    radius = max(float(np.linalg.norm(away, axis=1).max()), MIN_RADIUS_M)
     return SampledReach(q, poses, radius, side, bool(np.mean(away[:, 2] > 0) >= 0.5))
 
 
@@ -139,7 +139,7 @@ def _scene(title: str, height_mm: float) -> dict[str, Any]:
     return {"kind": "scene", "title": title, "planes": [plane]}
 
 
-MOST_TARGETS, LEAST_TARGETS = 5, 2
+MAX_TARGETS, MIN_TARGETS = 5, 2
 NAMED_PAIRS = 3
 APART = 0.1  # of the reach
 TRIES, CHOICE = 150, 30  # of poses above the ground and of drawn ones each; solved ones to choose from
@@ -219,17 +219,17 @@ class TaskSearch:
         self.near, self.bodies = self.required.near, Bodies(robot, scene)
         self.tried, self.rejected = 0, dict[str, Counter[str]]()
         q = reach.q[:DRAWN]
-        roomy, regular, free = self._roomy(q), self._regular(q), self.bodies.free(q)
-        self.fit = q[roomy & regular & free]
+        inside, nonsingular, free = self._away_from_limits(q), self._away_from_singularities(q), self.bodies.free(q)
+        self.fit = q[inside & nonsingular & free]
         touching = Counter({pair.label: 0 for pair in self.bodies.pairs})
         for pair, count in zip(self.bodies.pairs, self.bodies.overlaps(q).sum(axis=0).tolist()):
             touching[pair.label] = max(touching[pair.label], count)
-        near_limit, near_singular, colliding = (int(np.count_nonzero(~each)) for each in (roomy, regular, free))
+        near_limit, near_singular, colliding = (int(np.count_nonzero(~each)) for each in (inside, nonsingular, free))
         often = tuple((label, count) for label, count in touching.most_common(NAMED_PAIRS) if count)
         self.counts = DrawnCounts(len(q), len(self.fit), near_limit, near_singular, colliding, often)
 
     def spots(self) -> list[Spot]:
-        """Poses far from one another: at most ``MOST_TARGETS``, fewer where the arm reaches no more of those tried."""
+        """Poses far from one another: at most ``MAX_TARGETS``, fewer where the arm reaches no more of those tried."""
         if not len(self.fit):
             return []
         slow = self.robot.joints > FULL_POSE or isinstance(arm_solver(self.robot).chain, Unsolved)
@@ -237,7 +237,7 @@ class TaskSearch:
         written = chain(islice(self._above_ground(), tries), islice(self._drawn(), tries))
         choice = list(islice(filter(None, map(self._spot, written)), most))
         found = choice[:1]
-        while choice and len(found) < MOST_TARGETS:
+        while choice and len(found) < MAX_TARGETS:
             away = [min(np.linalg.norm(np.subtract(spot.xyz_mm, other.xyz_mm)) for other in found) for spot in choice]
             if max(away) < APART * self.reach.radius * 1000:
                 break
@@ -247,9 +247,9 @@ class TaskSearch:
     def any_spots(self) -> list[Spot]:
         """Poses of drawn joint values, whatever is in the way."""
         reach = self.reach
-        values = [self._written(q) for q in reach.q[:MOST_TARGETS]]
+        values = [self._written(q) for q in reach.q[:MAX_TARGETS]]
         written = [{"q_deg": each, "q_ref_deg": [*each]} for each in values]
-        points = (reach.poses[:MOST_TARGETS, :3, 3] * 1000).tolist()
+        points = (reach.poses[:MAX_TARGETS, :3, 3] * 1000).tolist()
         return [Spot(pose, (x, y, z), q, "") for pose, (x, y, z), q in zip(written, points, reach.q)]
 
     def any_path(self, spots: list[Spot]) -> list[dict[str, Any]]:
@@ -323,11 +323,11 @@ class TaskSearch:
 
     def _fits(self, q: Reals) -> Flags:
         """Whether joints (N, n) are away from limits and singular poses, and clear of everything."""
-        fits = self._roomy(q) & self._regular(q)
+        fits = self._away_from_limits(q) & self._away_from_singularities(q)
         fits[fits] = self.bodies.free(q[fits])
         return fits
 
-    def _roomy(self, q: Reals) -> Flags:
+    def _away_from_limits(self, q: Reals) -> Flags:
         """Whether joints (N, n) are away from their limits, by 8 deg or a twentieth of the range."""
         robot = self.robot
         least = np.minimum(np.where(robot.slides, np.inf, LIMIT_MARGIN_RAD), (robot.upper - robot.lower) / 20)
@@ -340,7 +340,7 @@ class TaskSearch:
         values: list[float] = (np.round(np.round(shown(self.robot, q) / step) * step, 2) + 0.0).tolist()
         return values
 
-    def _regular(self, q: Reals) -> Flags:
+    def _away_from_singularities(self, q: Reals) -> Flags:
         """Whether joints (N, n) are away from singular poses, by twice what the study calls near."""
         return np.asarray(self.near.margin(self.robot, q) > SINGULAR_MARGIN)
 
@@ -592,7 +592,7 @@ def write_study(arm: Arm, folder: Path) -> WrittenStudy:
     Raises
     ------
     Er3aError
-        a file stands where one would be written; then nothing is written
+        a file exists where one would be written; then nothing is written
     """
     name = arm.robot.name
     own = (f"data/{kind}/{name}.yaml" for kind in ("robots", "targets", "paths"))
@@ -626,7 +626,7 @@ def _found(arm: Arm) -> FoundTasks:
     for scene in scenes(arm.robot, reach):
         search = TaskSearch(arm.robot, reach, parse(SceneFile, scene, None).scene(), settings)
         spots = search.spots()
-        if len(spots) >= LEAST_TARGETS and (paths := search.paths(spots)):
+        if len(spots) >= MIN_TARGETS and (paths := search.paths(spots)):
             found = {path["kind"] for path in paths}
             missing = (f"No {_without_path(kind, search)}" for kind in search.rejected if kind not in found)
             return FoundTasks(scene, spots, paths, True, True, tuple(_unexamined(arm, search)), tuple(missing))
@@ -634,7 +634,7 @@ def _found(arm: Arm) -> FoundTasks:
             best = scene, search, spots
     assert best is not None
     scene, search, spots = best
-    clear = len(spots) >= LEAST_TARGETS
+    clear = len(spots) >= MIN_TARGETS
     if clear:
         why = " ".join(f"No {_without_path(kind, search)}." for kind in search.rejected)
         shortcoming = f"The path is a move of the joints between two targets that the arm can't be said to do. {why}"
@@ -689,7 +689,7 @@ def _without_targets(arm: Arm, search: TaskSearch, found: int) -> str:
     if counts.overlaps:
         text += f" ({', '.join(f'{pair} in {count}' for pair, count in counts.overlaps)})"
     if counts.fit:
-        text += f"; of {search.tried} poses tried {found or 'none'} could be solved so, and {LEAST_TARGETS} are needed"
+        text += f"; of {search.tried} poses tried {found or 'none'} could be solved so, and {MIN_TARGETS} are needed"
     always = [pair for pair, count in counts.overlaps if count == counts.drawn]
     if always:
         text += f". {', '.join(always)} overlap in all of them, which no arm can do"

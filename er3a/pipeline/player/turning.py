@@ -116,11 +116,11 @@ def _edges(points: Reals) -> list[Reals]:
     ]
 
 
+AZIMUTH_DEG = -65.0  # about z, from where a figure is seen at first
+
+
 def turning_figure(
-    groups: Mapping[str, Sequence[Layer]],
-    scale: ColourScale | None = None,
-    first: str | None = None,
-    azimuth_deg: float = -65.0,
+    groups: Mapping[str, Sequence[Layer]], scale: ColourScale | None = None, first: str | None = None
 ) -> Markup:
     """The figure as HTML, one a page, whose head holds ``drawing_head``.
 
@@ -128,7 +128,6 @@ def turning_figure(
     ----------
     groups : layers that are seen together, by name; a reader chooses one
     first : the group that is seen at first, the first of all if None
-    azimuth_deg : from where it is seen at first, about z
     """
     points = np.concatenate([layer.points_mm for layers in groups.values() for layer in layers])
     low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
@@ -138,7 +137,7 @@ def turning_figure(
     shades = colormaps[scale.colours.removesuffix("_r")](np.linspace(DARKEST, 1, SHADES))[::back] if scale else ()
     data = {
         "box": [low.tolist(), high.tolist()],
-        "azimuth": float(np.radians(azimuth_deg)),
+        "azimuth": float(np.radians(AZIMUTH_DEG)),
         "palette": [to_hex(colour) for colour in shades],
         "first": first,
         "groups": [

@@ -51,8 +51,8 @@ class Stage:
     title, question : marked with ``N_``: the page's title, and what it answers
     settings : per key of the study file the model of what stands there; the first is the stage's own
     inputs : the files that a robot's results rest on besides its own file
-    given : what else of the study they rest on besides settings, as plain data by name
-    wanted : whether a robot of a study goes through the stage at all: whether the study gives it what the stage reads
+    extra_inputs : what else of the study they rest on besides settings, as plain data by name
+    is_configured : whether the study gives a robot what the stage reads; without that it does not run
     applies : why the stage can't be computed for a robot, a finding of one of ``absences``; None if it can
     views : ``record`` (a recording, with its preview) and ``report`` (a page), as far as the stage has them
     rests_on : names of the stages whose verdict its pages say first
@@ -64,8 +64,8 @@ class Stage:
     question: str
     settings: Mapping[str, type[StrictModel]]
     inputs: Callable[[StudyFiles, str], list[Path]] = lambda study, robot: []
-    given: Callable[[StudyFiles, str], dict[str, Any]] = lambda study, robot: {}
-    wanted: Callable[[StudyFiles, str], bool] = lambda study, robot: True
+    extra_inputs: Callable[[StudyFiles, str], dict[str, Any]] = lambda study, robot: {}
+    is_configured: Callable[[StudyFiles, str], bool] = lambda study, robot: True
     applies: Callable[[Robot], Finding | None] = lambda robot: None
     absences: tuple[type[Finding], ...] = ()
     views: tuple[str, ...] = ("record", "report")

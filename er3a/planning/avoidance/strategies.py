@@ -56,8 +56,8 @@ STEP = 1e-6  # of the characteristic length, or rad
 BENT_POINTS = 120
 GROWTH = 1.4
 HALVINGS = 12
-MOST_SIDES = 8
-FARTHEST: dict[Kind, float] = {"shift": 0.5, "tilt": 1.0}  # of the characteristic length; rad
+MAX_SIDES = 8
+MAX_BEND: dict[Kind, float] = {"shift": 0.5, "tilt": 1.0}  # of the characteristic length; rad
 SAME_TIME = 0.01  # s
 SPARE = 1.0005  # keep this much more than the distance
 
@@ -141,7 +141,7 @@ def _via(segment: avoidance.SingularSegment, kind: Kind) -> avoidance.Avoidance 
     if not all(bends):
         return _none_far_enough(segment, kind)
     fallback = None
-    for chosen in sorted(product(*bends), key=lambda some: sum(bend.amount for bend in some))[:MOST_SIDES]:
+    for chosen in sorted(product(*bends), key=lambda some: sum(bend.amount for bend in some))[:MAX_SIDES]:
         path = BentPath(segment.followed.line, chosen)
         for other in _followed(segment, path):
             if other.regions:
@@ -249,11 +249,11 @@ def _least(
     span: tuple[float, float, float],
     direction: Reals,
 ) -> Bend | None:
-    """The smallest bend in a direction (6,) that keeps the distance; None if none up to FARTHEST does."""
+    """The smallest bend in a direction (6,) that keeps the distance; None if none up to MAX_BEND does."""
     path = segment.followed.line
     grid = np.unique(np.concatenate([np.linspace(span[0], span[2], BENT_POINTS), [span[1]]]))
     kind: Kind = "shift" if direction[:3].any() else "tilt"
-    most = FARTHEST[kind] * (characteristic_length(segment.robot) if kind == "shift" else 1.0)
+    most = MAX_BEND[kind] * (characteristic_length(segment.robot) if kind == "shift" else 1.0)
 
     def bend(size: float) -> Bend:
         return Bend(*span, size * direction[:3], size * direction[3:])
@@ -277,8 +277,8 @@ def _least(
 
 def _none_far_enough(segment: avoidance.SingularSegment, kind: Kind) -> avoidance.NotPossible:
     if kind == "shift":
-        return avoidance.NoShiftKeepsDistance(FARTHEST["shift"] * characteristic_length(segment.robot) * 1000)
-    return avoidance.NoTiltKeepsDistance(float(np.degrees(FARTHEST["tilt"])))
+        return avoidance.NoShiftKeepsDistance(MAX_BEND["shift"] * characteristic_length(segment.robot) * 1000)
+    return avoidance.NoTiltKeepsDistance(float(np.degrees(MAX_BEND["tilt"])))
 
 
 STEPS = 1000
@@ -583,7 +583,7 @@ class StrategyResult:
     reasons: tuple[NotUsable, ...] = ()
 
 
-def compare(segment: avoidance.SingularSegment, chosen: StrategyName | None = None) -> list[StrategyResult]:
+def compare_strategies(segment: avoidance.SingularSegment, chosen: StrategyName | None = None) -> list[StrategyResult]:
     """Try all strategies, or the chosen one."""
     return [_tried(segment, name) for name in STRATEGIES if chosen in (None, name)]
 

@@ -65,7 +65,7 @@ def target(memory: ProgramMemory, value: syntax.Value, frames: Frames, said: tup
 
 
 def relative(memory: ProgramMemory, value: syntax.Value, frames: Frames, said: tuple[str, bool]) -> instructions.Target:
-    """A target given by its difference from where the arm stands."""
+    """A target given by its difference from where the arm is."""
     text, in_tool = said
     if not isinstance(value, syntax.Record):
         if isinstance(value, syntax.Unclear) and value is not UNREAD:
@@ -346,7 +346,7 @@ def _tool_number(memory: ProgramMemory, given: syntax.Value) -> None:
 
 
 def load_of(value: syntax.Value | None) -> MassBody | str | None:
-    """What a LOAD says hangs on the flange; None of a mass below 0, which stands for one that is not known.
+    """What a LOAD says hangs on the flange; None for a mass below 0, which means unknown.
 
     ``{M kg, CM {X mm, Y, Z, A deg, B, C}, J {X kg m^2, Y, Z}}``: J about the axes of CM, through the centre of mass.
     """
@@ -535,7 +535,7 @@ class KrlDialect(Dialect):
         return syntax.Record(new.kind, (*new.items, *missing))
 
     def constant(self, memory: ProgramMemory, name: str) -> syntax.Value | None:
-        """Frames of the controller and of the cell, and where the arm stands."""
+        """Frames of the controller and of the cell, and where the arm is."""
         if name in ("$NULLFRAME", "$WORLD", "$ROBROOT"):
             return frame_record(instructions.pose_of((0.0,) * 6, "kuka"))
         if name == "$NUM_AX":
@@ -645,7 +645,7 @@ class KrlDialect(Dialect):
         return replace(goal, pose=pose)
 
     def _argument(self, memory: ProgramMemory, argument: syntax.Expression | None) -> syntax.Value:
-        """A motion's argument; to go to where the arm stands, wherever that is, no joint moves."""
+        """A motion's argument; to go to where the arm is, wherever that is, no joint moves."""
         if argument is None:
             return syntax.Unclear("")
         here = isinstance(argument, syntax.Variable) and argument.name in HERE + HERE_JOINTS

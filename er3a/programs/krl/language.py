@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from er3a.programs.evaluation import MOST_ROBOT_AXES
+from er3a.programs.evaluation import MAX_ROBOT_AXES
 from er3a.programs.krl.dialect import KrlDialect
 from er3a.programs.krl.reader import companions, read_krl
 from er3a.programs.krl.writer import KrlWriter
@@ -18,7 +18,7 @@ KRL = Language(
     reader=read_krl,
     dialect=KrlDialect,
     writer=KrlWriter,
-    joints=range(1, MOST_ROBOT_AXES + 1),  # A1 to A6; E1 to E6 are axes beside the arm
+    joints=range(1, MAX_ROBOT_AXES + 1),  # A1 to A6; E1 to E6 are axes beside the arm
     points=".dat",
     companions=companions,
 )

@@ -69,7 +69,7 @@ class KrlWords(Words):
             try:
                 return syntax.Constant(int(word[2:-1], 16 if word[1] in "Hh" else 2))
             except ValueError:
-                raise MisreadError(f"{word} is no number") from None
+                raise MisreadError(f"{word} is not a number") from None
         if self.accept("{"):
             return self._aggregate()
         return syntax.Opaque(self.take()) if self.next in ("?", "!") else None
@@ -235,7 +235,7 @@ class _Statement:
         self.builder.add(syntax.Doing(self.place, left, self.text))
 
     def known(self, expression: syntax.Expression) -> syntax.Expression:
-        """The signal that a name stands for."""
+        """The signal that a name denotes."""
         if isinstance(expression, syntax.Variable):
             return self.signals.get(expression.name, expression)
         return expression
@@ -336,13 +336,13 @@ def _interrupt(reading: _Statement) -> None:
 
 
 def _do(reading: _Statement, at_any_time: bool = False) -> None:
-    """A routine behind DO, which runs whenever a condition holds; or an assignment, from which on the value is unclear.
+    """A routine after DO, which runs whenever a condition holds; or an assignment, from which on the value is unclear.
 
     An interrupt (``at_any_time``) may assign again and again: it is named.
     """
     asked = re.search(r"(?i)\bDO\b(.*?)(\bPRIO\s*=.*)?$", reading.text)
     if asked is None:
-        raise MisreadError("no DO")
+        raise MisreadError("expected DO")
     words = KrlWords(asked[1])
     what = words.expression()
     if isinstance(what, syntax.Invocation):
@@ -548,7 +548,7 @@ class _KrlReader:
                 end = "ENDFCT" if head[1].upper() == "DEFFCT" else "END"
             elif builder is None:
                 if text and not text.startswith("&"):
-                    raise fault(place, f"'{text[:40]}' stands outside of any routine", "Begin with DEF NAME ( )")
+                    raise fault(place, f"'{text[:40]}' is outside of any routine", "Begin with DEF NAME ( )")
             elif text.upper() == end:
                 routines.append(builder.routine(place))
                 builder = None
@@ -617,7 +617,7 @@ def split_comment(line: str, place: Place) -> tuple[str, str]:
 
 
 CALL = re.compile(r"\b([A-Za-z]\w*)\s*\(")
-MOST_MODULES = 200
+MAX_MODULES = 200
 BASICS, BASICS_FILES = "BAS", ("bas.src", "BAS.SRC", "Bas.src", "BAS.src")
 DEEPEST = 6  # folders of an archive
 
@@ -644,7 +644,7 @@ def modules_of(path: Path) -> tuple[Path, ...]:
     beside.pop(path.stem.upper(), None)
     found: list[Path] = []
     waiting = [path]
-    while beside and waiting and len(found) < MOST_MODULES:
+    while beside and waiting and len(found) < MAX_MODULES:
         called = dict.fromkeys(name.upper() for name in CALL.findall(read_program_text(waiting.pop(0)).text))
         new = [beside.pop(name) for name in called if name in beside]
         found += new

@@ -5,7 +5,7 @@ Entries are named as in ABB's *Technical reference manual: RAPID Instructions, F
 That manual's text could not be had; what was read is ABB's older *RAPID Reference Manual* (published as *Basic
 Characteristics RAPID*), by its pages: kinds of sums and products (5-26, section 7.1), priority between operators
 (section 7.7), configuration (6-34, 7-confdata-1), robtarget and the axes that are not there (7-robtarget-1, -2),
-wobjdata's frames, stop points, at which a program waits until the arm stands, and zones, at most half a motion
+wobjdata's frames, stop points, at which a program waits until the arm is at rest, and zones, at most half a motion
 (7-zonedata-1), EulerZYX's range (9-EulerZYX-1). There cfx is not used yet: its bits are as two public post-processors
 write them. Sizes of predefined zones are as public code cites them from 3HAC16581-1 revision J, section 3.78; those of
 speeds as in the tests of another library. For all else, such as the order of the turns of RelTool and OrientZYX, or
@@ -233,7 +233,7 @@ def moved_target(target: Record, T: Reals) -> Record:
 
 
 QUARTER = math.pi / 2
-LEAST_LOAD = 0.001
+MIN_LOAD = 0.001
 """kg, of a tool whose mass is not known: tool0 and most templates have it (3 loaddata)."""
 AT_A_QUARTER = 1e-3  # rad; nearer to a quarter's end an axis belongs to both: programs round their positions
 CONFIGURED = (0, 3, 5)

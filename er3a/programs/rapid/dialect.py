@@ -119,7 +119,7 @@ class RapidDialect(Dialect):
         return data_types.predefined(name)
 
     def function(self, memory: ProgramMemory, name: str, given: syntax.Invocation) -> syntax.Value:
-        """Mathematics, positions, where the arm stands; what is not known, or called otherwise, is unclear."""
+        """Mathematics, positions, where the arm is; what is unknown, or called otherwise, is unclear."""
         values = tuple(UNCLEAR if each is None else memory.value(each) for each in given.arguments)
         named = {key: memory.value(each) for key, each in given.keywords}
         unclear = syntax.Unclear(f"{given.function.lower()}({', '.join(map(syntax.shown, values))})")
@@ -319,7 +319,7 @@ def _joints_of(
 
 
 def frame_of_tool(value: syntax.Value | None) -> tuple[Reals | None, bool]:
-    """T_flange_tool (4, 4) in m of tooldata, and whether the tool stands beside the arm (3 tooldata: robhold)."""
+    """T_flange_tool (4, 4) in m of tooldata, and whether the tool is stationary (3 tooldata: robhold)."""
     data = data_types.typed(value, data_types.TOOLDATA) if value is not None else None
     return data_types.pose_matrix(data_types.part(data, "TFRAME")), data_types.part(data, "ROBHOLD") is False
 
@@ -327,7 +327,7 @@ def frame_of_tool(value: syntax.Value | None) -> tuple[Reals | None, bool]:
 def frame_of_object(value: syntax.Value | None) -> tuple[Reals | None, bool]:
     """T_robot_object (4, 4) in m of wobjdata, and whether the arm holds the object (3 wobjdata: robhold).
 
-    The object's frame stands in the user's frame, and that in the world, which is the robot's base unless a controller
+    The object's frame is in the user's frame, and that in the world, which is the robot's base unless a controller
     is set up otherwise. None where an external unit moves the user's frame (ufprog FALSE, ufmec).
     """
     data = data_types.typed(value, data_types.WOBJDATA) if value is not None else None
@@ -357,7 +357,7 @@ def _tool(memory: ProgramMemory, expression: object, value: syntax.Value) -> tup
         pose = _mapped(memory, name)
     load = data_types.load_of(data_types.part(data_types.typed(value, data_types.TOOLDATA), "TLOAD"))
     return instructions.NamedFrame(
-        name, pose, load if load is not None and load.mass > data_types.LEAST_LOAD else None
+        name, pose, load if load is not None and load.mass > data_types.MIN_LOAD else None
     ), stationary
 
 
@@ -369,7 +369,7 @@ def _load(memory: ProgramMemory, tool: instructions.NamedFrame, total: syntax.Va
     whole = data_types.load_of(data_types.typed(total, data_types.LOADDATA)) if total is not None else None
     if total is not None and whole is None:
         return f"\\TLoad {total.text if isinstance(total, syntax.Unclear) else ''}".strip()
-    if whole is not None and whole.mass > data_types.LEAST_LOAD:
+    if whole is not None and whole.mass > data_types.MIN_LOAD:
         return whole
     value = memory.read("%GRIPLOAD")
     if value is None:
@@ -377,7 +377,7 @@ def _load(memory: ProgramMemory, tool: instructions.NamedFrame, total: syntax.Va
     gripped = data_types.load_of(data_types.typed(value, data_types.LOADDATA))
     if gripped is None:
         return f"GripLoad {value.text if isinstance(value, syntax.Unclear) else ''}".strip()
-    if gripped.mass <= data_types.LEAST_LOAD:
+    if gripped.mass <= data_types.MIN_LOAD:
         return tool.load
     if tool.pose is None:
         return f"GripLoad ({tool.name})"
@@ -498,7 +498,7 @@ def _set(memory: ProgramMemory, call: syntax.Invocation) -> bool:
 def _displace(
     memory: ProgramMemory, call: syntax.Invocation, values: list[syntax.Value], options: Mapping[str, syntax.Value]
 ) -> bool:
-    """1 PDispOn: by how much where the arm stands, or ExeP, is off the programmed point; turned too with ``\\Rot``."""
+    """1 PDispOn: by how much the arm, or ExeP, is off the programmed point; turned too with ``\\Rot``."""
     memory.write("%PDISP", syntax.Unclear("PDispOn"))
     if len(values) != 2:
         return False
@@ -562,7 +562,7 @@ def _number_of(name: str, values: tuple[syntax.Value, ...]) -> syntax.Value | No
 
 
 def _here(memory: ProgramMemory) -> Position:
-    """Where the arm stands; not known behind a motion that the program does not wait for (7-zonedata-1)."""
+    """Where the arm is; unknown after a motion that the program does not wait for (7-zonedata-1)."""
     return memory.here if memory.read(reader.PASSING) in (None, False) else Position()
 
 
@@ -573,7 +573,7 @@ def _of_position(
     named: Mapping[str, syntax.Value],
     given: syntax.Invocation,
 ) -> syntax.Value | None:
-    """Where the arm stands, and what its table gives.
+    """Where the arm is, and what its table gives.
 
     2 CRobT, 2 CPos: in the work object, for the tool; where none is given, those of the last motion.
     """

@@ -87,8 +87,8 @@ ARRIVING = frozenset(("INPOS", "ZEROSPEED"))
 LEAVING = ("STOPMOVE", "STARTMOVE", "STARTMOVERETRY", "RESTOPATH", "CLEARPATH")
 """Instructions that stop a motion on its way, or begin one again that the program does not wait for."""
 ABSENT = "%absent"
-MOST_LATE = 200
-MOST_ELEMENTS = 1000
+MAX_LATE = 200
+MAX_ELEMENTS = 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,7 +146,7 @@ class RapidWords(Words):
     def arguments(
         self, close: str = ")"
     ) -> tuple[tuple[syntax.Expression | None, ...], tuple[tuple[str, syntax.Expression], ...]]:
-        """Arguments by place and, behind a backslash, by name; a name alone is a switch."""
+        """Arguments by place and, after a backslash, by name; a name alone is a switch."""
         placed: list[syntax.Expression | None] = []
         named: list[tuple[str, syntax.Expression]] = []
         first = self.at
@@ -322,7 +322,7 @@ class Cursor:
         self.source, self.tokens, self.at = source, _tokens(source), 0
 
     def next(self, comments: bool = False) -> Token | None:
-        """The next word; comments are passed unless asked for."""
+        """The next word; comments are skipped unless requested."""
         while not comments and self.at < len(self.tokens) and self.tokens[self.at].kind == "comment":
             self.at += 1
         return self.tokens[self.at] if self.at < len(self.tokens) else None
@@ -339,7 +339,7 @@ class Cursor:
         return word
 
     def place(self) -> Place:
-        """Where the next word stands."""
+        """The place of the next word."""
         token = self.next() or (self.tokens[-1] if self.tokens else None)
         return Place(self.source.path, token.line if token else 1)
 
@@ -464,7 +464,7 @@ class _ModuleReader:
             for size in reversed(sizes):
                 shape = ("[]", shape)
                 count = syntax.number(size.value) if isinstance(size, syntax.Constant) else None
-                known = count is not None and 0 < count <= MOST_ELEMENTS
+                known = count is not None and 0 < count <= MAX_ELEMENTS
                 initial = (initial,) * int(count or 0) if known and initial is not None else None
             scope.shapes[name] = shape
             if local:
@@ -650,7 +650,7 @@ class _BodyReader:
         )
 
     def forget_changed(self, place: Place, expression: syntax.Expression, text: str) -> None:
-        """What a function in an expression changes has no known value behind it."""
+        """What a function in an expression changes has no known value after it."""
         for each in syntax.inner(expression):
             self.forget_changed(place, each, text)
         if isinstance(expression, syntax.Invocation) and expression.function in CHANGING_FUNCTIONS:
@@ -662,7 +662,7 @@ class _BodyReader:
                 )
 
     def late(self, place: Place, called: syntax.Expression, given: Given, text: str) -> None:
-        """A call of the procedure that a text names when the program runs: one after the other is asked for."""
+        """A call of the procedure that a text names when the program runs; the candidates are tried one by one."""
         prefix, whole = _prefix(called)
         prefix = prefix.upper()
         if whole:
@@ -673,7 +673,7 @@ class _BodyReader:
             for name, count in self.module.procedures.items()
             if name.startswith(prefix) and count == len(given[0]) and name != "MAIN"
         ]
-        if not fitting or len(fitting) > MOST_LATE:
+        if not fitting or len(fitting) > MAX_LATE:
             self.builder.unknown(place, text)
             return
         for i, name in enumerate(fitting):
@@ -949,7 +949,7 @@ def _goto(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None
 
 
 def _stop(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None:
-    """Stop, behind which the arm stands at its target, and Break, which does not wait for that."""
+    """Stop, after which the arm rests at its target, and Break, which does not wait for that."""
     body.builder.add(syntax.Waiting(place, "operator", None, text))
     body.builder.add(syntax.Assign(place, syntax.Variable(PASSING), syntax.Constant(text[:5].upper() == "BREAK"), ""))
 
@@ -1024,7 +1024,7 @@ LATE_CALL = re.compile(r"(?m)(?:^|;)\s*%(?!%)(?!\s*\"\w*\"\s*%)|\bCallByVar\b", 
 """A call of a procedure whose name the text does not give."""
 FOLDERS = {"PROGMOD": "SYSMOD", "SYSMOD": "PROGMOD"}
 """Folders of a task in a controller's backup."""
-MOST_MODULES = 200
+MAX_MODULES = 200
 
 
 def modules_of(path: Path) -> tuple[Path, ...]:
@@ -1032,13 +1032,13 @@ def modules_of(path: Path) -> tuple[Path, ...]:
 
     Where the name of a procedure is known only when the program runs, all modules are taken. They lie beside it or, in
     a controller's backup, in the other folder of its task. A module with a routine ``main`` of its own is another
-    program; one that is no text is left out.
+    program; one that is not text is left out.
     """
     used, given, late = _names(path)
     waiting = {each: _names(each) for each in _beside(path) if not _is_encoded(each)}
     waiting = {each: names for each, names in waiting.items() if "MAIN" not in names[1]}
     found: list[Path] = []
-    while len(found) < MOST_MODULES:
+    while len(found) < MAX_MODULES:
         missing = used - given
         new = [each for each, names in waiting.items() if late or names[1] & missing]
         if not new:
@@ -1067,7 +1067,7 @@ def _beside(path: Path) -> list[Path]:
 
 
 def _is_encoded(path: Path) -> bool:
-    """Whether a module is no text, as those are that a maker has encoded."""
+    """Whether a module is not text, such as those that a manufacturer has encoded."""
     try:
         read_program_text(path)
     except InputError:

@@ -189,7 +189,7 @@ def _joints_text(joints: Reals) -> str:
 def _load_text(load: MassBody | None) -> str:
     """loaddata, with the principal axes of the inertia; the least that a controller takes if it is not known."""
     if load is None:
-        return f"[{data_types.LEAST_LOAD},[0,0,{data_types.LEAST_LOAD}],[1,0,0,0],0,0,0]"
+        return f"[{data_types.MIN_LOAD},[0,0,{data_types.MIN_LOAD}],[1,0,0,0],0,0,0]"
     pose, moments = writing.principal_axes(load)
     quaternion = ",".join(writing.fixed(each, QUATERNION_DIGITS) for each in instructions.numbers_of(pose, "abb")[3:])
     centre = ",".join(writing.short(each * 1000) for each in load.centre)

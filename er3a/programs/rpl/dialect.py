@@ -35,7 +35,7 @@ class RplDialect(Dialect):
         return name.startswith(("io.DOut", "io.AOut"))
 
     def function(self, memory: ProgramMemory, name: str, given: syntax.Invocation) -> syntax.Value:
-        """Points, OFFSET, roots; no source tells in which unit angles of the others are."""
+        """Points, OFFSET, roots; no source says in which unit the angles of the others are."""
         values = [None if each is None else memory.value(each) for each in given.arguments]
         if name in FIELDS:
             return _point(name, values)

@@ -69,7 +69,7 @@ LIBRARY_NAMES = frozenset(("io", "fidbus", "sys", "str", "log", "tcpip"))
 
 
 def expression(text: str) -> syntax.Expression:
-    """An expression that stands alone; one that is not understood is kept."""
+    """An expression by itself; one that is not understood is kept."""
     if WORD.match(text) and text.upper() not in RPL.constants and text not in RPL.right:
         return syntax.Variable(text)
     if (point := plain_point(text)) is not None:

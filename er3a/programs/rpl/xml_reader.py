@@ -86,7 +86,7 @@ def read_xml(source: ProgramText) -> XmlNode:
     Raises
     ------
     InputError
-        for what is no XML, holds a document type or entities, or is nested too deeply
+        for text that is not XML, holds a document type or entities, or is nested too deeply
     """
     top = XmlNode("", 0, {})
     stack = [top]
@@ -129,7 +129,7 @@ def _no_xml(path: Path, error: expat.ExpatError) -> InputError:
 
 TOP = "Xpl-source"
 HEAD = ("Info", "Title", "Description", "Version", "Author")
-MOST_LOOPS = 50
+MAX_LOOPS = 50
 OTHER_SIDES = ("elsif", "elseif", "else")
 MOTION_PARTS = ("target", "speed", "zone", "tool", "refsys")
 
@@ -140,7 +140,7 @@ def read_xpl(source: ProgramText) -> syntax.Program:
     Raises
     ------
     InputError
-        for text that is no XML, entities, loops whose body is missing or is the loop itself
+        for text that is not XML, entities, loops whose body is missing or is the loop itself
     """
     if not source.text.lstrip().startswith("<"):
         problem = "is text, not XML: the controller refuses it (alarm 4902)"
@@ -272,7 +272,7 @@ class _Pou:
         body = self._named(name, within)
         if body is None:
             raise fault(place, f"there is no <Pou> '{name}' for the loop's body", "Add it, or correct <pouref>")
-        if body in within or len(within) > MOST_LOOPS:
+        if body in within or len(within) > MAX_LOOPS:
             raise fault(place, f"the loop's body '{name}' holds the loop itself", "Give each loop its own <Pou>")
         source = text_of(element)
         if element.tag == "while":
@@ -281,7 +281,7 @@ class _Pou:
             first, last = (expression(element.text_of(tag)) for tag in ("from", "to"))
             step = expression(element.text_of("by")) if element.child("by") is not None else None
             if not WORD.match(counter := element.text_of("var")):
-                raise fault(place, f"'{counter}' is no variable that a loop could count", "Name a variable in <var>")
+                raise fault(place, f"'{counter}' is not a variable that a loop can count", "Name a variable in <var>")
             builder.open_for(place, counter, first, last, step, source)
         self._body(builder, body, f"{place.element}/{name}", within)
         builder.close(element.tag, place)
@@ -292,7 +292,7 @@ class _Pou:
         self.inferred.append(FormInferred("if", place))
         for number, (condition, name) in enumerate(sides):
             body = self._named(name, within)
-            if body is None or body in within or len(within) > MOST_LOOPS:
+            if body is None or body in within or len(within) > MAX_LOOPS:
                 raise fault(place, f"there is no <Pou> '{name}' for a side of the if", "Add it, or correct <pouref>")
             source = f"IF {condition} THEN"
             if number == 0:
@@ -309,7 +309,7 @@ class _Pou:
         self.whole.append(element)
         for name in (each.text for each in element.all("pouref")):
             body = self._named(name, within)
-            if body is None or body in within or len(within) > MOST_LOOPS:
+            if body is None or body in within or len(within) > MAX_LOOPS:
                 raise fault(place, f"there is no <Pou> '{name}' for a body here", "Add it, or correct <pouref>")
             builder.open_if(place, syntax.Opaque(source), source)
             self._body(builder, body, f"{place.element}/{name}", within)
@@ -325,7 +325,7 @@ class _Pou:
 
 
 def _with_sides(elements: list[XmlNode]) -> Iterator[tuple[XmlNode, list[tuple[str, str]]]]:
-    """Elements of a body; an ``if`` with its sides, which the ``elsif`` and ``else`` behind it are among."""
+    """Elements of a body; an ``if`` with its sides, which the ``elsif`` and ``else`` after it are among."""
     at = 0
     while at < len(elements):
         first, behind = elements[at], at + 1
@@ -359,7 +359,7 @@ def _sides(element: XmlNode, more: list[XmlNode]) -> list[tuple[str, str]]:
 
 
 def _element(builder: CodeBuilder, element: XmlNode, place: Place) -> bool:
-    """An element that is no loop; False if it is not understood."""
+    """An element other than a loop; False if it is not understood."""
     source = text_of(element)
     if element.tag in ("mjoint", "mlin"):
         parts = [element.child(tag) for tag in MOTION_PARTS]

@@ -165,7 +165,7 @@ class UrScriptDialect(Dialect):
         return syntax.Record("p", tuple(zip(syntax.POSE_KEYS, values)))
 
     def function(self, memory: ProgramMemory, name: str, given: syntax.Invocation) -> syntax.Value:
-        """Mathematics, poses, where the arm stands; what is not known, or called otherwise than known, is unclear."""
+        """Mathematics, poses, where the arm is; what is unknown, or called otherwise than known, is unclear."""
         values = [None if each is None else memory.value(each) for each in given.arguments]
         keywords = {key: memory.value(each) for key, each in given.keywords}
         if name == "struct":
@@ -285,7 +285,7 @@ def _placed(
 
 
 def _mounted(memory: ProgramMemory, up: syntax.Value | None, text: str) -> instructions.Instruction:
-    """Gravity tells how the arm is mounted: where up is in the frame of its base; otherwise than in the robot file, the
+    """Gravity shows how the arm is mounted: where up is in the frame of its base; otherwise than in the robot file, the
     cell's shapes are elsewhere."""
     given = syntax.numbers(up) if isinstance(up, tuple) else None
     if given is None or len(given) != 3 or not syntax.finite(given) or not any(given):
@@ -428,9 +428,9 @@ def _joints(value: syntax.Value) -> Reals | None:
 
 
 def _of_position(memory: ProgramMemory, name: str, given: dict[str, syntax.Value]) -> syntax.Value | None:
-    """Functions of where the arm stands, and of its table.
+    """Functions of where the arm is, and of its table.
 
-    Behind a motion with a blend radius the program goes on where the arm enters it [1]_, so that what it reads of the
+    After a motion with a blend radius the program goes on where the arm enters it [1]_, so that what it reads of the
     arm is not known; the waypoint is.
 
     References
@@ -462,7 +462,7 @@ def _of_position(memory: ProgramMemory, name: str, given: dict[str, syntax.Value
 
 
 def _changed(values: list[syntax.Value | None], unclear: syntax.Unclear) -> syntax.Value:
-    """A list behind one of its methods, whose name is the second argument."""
+    """A list after one of its methods, whose name is the second argument."""
     found, name, *more = (syntax.Unclear("") if each is None else each for each in values)
     if isinstance(found, tuple) and len(found) < LONGEST_LIST:
         if name == "append" and len(more) == 1:

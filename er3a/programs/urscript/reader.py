@@ -135,7 +135,7 @@ class _UrReader:
         self.within_unread = 0  # blocks open within it that begin no further in than it does
 
     def read(self) -> list[syntax.Routine]:
-        """All routines; the one without a name holds what stands outside of others."""
+        """All routines; the one without a name holds what is outside of the others."""
         place = Place(self.source.path, 1)
         for place, text, comment in self._statements():
             if text:
@@ -191,7 +191,7 @@ class _UrReader:
                     yield NotUnderstood(each.text, each.place)
 
     def _statements(self) -> Iterator[tuple[Place, str, str]]:
-        """Statements with their first line: lines are joined while a bracket is open, or behind an operator."""
+        """Statements with their first line: lines are joined while a bracket is open, or after an operator."""
         parts: list[str] = []
         depth, first = 0, 0
         for number, line in enumerate(self.source.lines, 1):

@@ -28,7 +28,7 @@ class UrScriptWriter(writing.Writer):
         return {".script": "\n".join(lines)}
 
     def begin_loop(self) -> None:
-        """``while (True):``, and what stands within further in."""
+        """``while (True):``, with its body indented."""
         super().begin_loop()
         self.indent = "    "
 

@@ -388,7 +388,7 @@ def _bound(margin: margins.Margin | None, t: Reals) -> model.BindingLimit | None
 
 
 DIAGRAM_POINTS = 501
-FARTHEST_M = 1.0
+MAX_DISTANCE_M = 1.0
 PARTS_OF_PAYLOAD = (1 / 3, 2 / 3, 1.0)
 UNITS = {"payload": "kg", "moment": "N m", "inertia": "kg m²"}
 
@@ -428,7 +428,7 @@ def diagram_rows(robot: Robot, load: Load | None, gravity: float) -> model.Diagr
     masses |= {load.mass} if load and load.mass > 0 else set()
     if not masses:
         return model.DiagramRows.empty()
-    along = np.linspace(0.0, FARTHEST_M, DIAGRAM_POINTS)
+    along = np.linspace(0.0, MAX_DISTANCE_M, DIAGRAM_POINTS)
     diagram = margins.load_diagram(robot, wrist, np.array(sorted(masses)), along, gravity)
     if diagram is None:
         return model.DiagramRows.empty()

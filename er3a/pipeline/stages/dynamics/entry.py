@@ -41,7 +41,7 @@ STAGE = Stage(
     question=N_("How much torque do the motors need, and can they supply it?"),
     settings={"dynamics": DynamicsSettings, "trajectory": TrajectorySettings},
     inputs=_inputs,
-    given=lambda study, robot: {"loads": [load.model_dump() for load in study.loads(robot)]},
+    extra_inputs=lambda study, robot: {"loads": [load.model_dump() for load in study.loads(robot)]},
     rests_on=("validation",),
 )
 """Settings of the trajectory stage say how fast joints of unknown speed are taken to be."""

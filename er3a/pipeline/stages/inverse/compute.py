@@ -25,7 +25,7 @@ from er3a.kinematics.families import Family
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.neighbours import Usable, neighbours
-from er3a.kinematics.round_trips import MOST_BY_CLASS, SAME_JOINTS_RAD, BatchRoundTrips, batch_round_trips
+from er3a.kinematics.round_trips import MAX_BY_CLASS, SAME_JOINTS_RAD, BatchRoundTrips, batch_round_trips
 from er3a.kinematics.self_motions import SelfMotionCurve
 from er3a.kinematics.singularity import TYPES, characteristic_length, conditioning, determinant_factors
 from er3a.kinematics.solutions import MANY_TARGETS, ByClass, Iteration, Method, Solutions, Target, TargetOutcome
@@ -365,7 +365,7 @@ def solution_map(robot: Robot, cells: int, scene: Scene | None) -> model.MapRows
 STAGE_NAME = "inverse"
 REPRODUCED_M = 1e-9
 REPRODUCED_RAD = 1e-9
-MOST_ADVISED = 100  # of many targets those for which it is looked for what would help
+MAX_ADVISED = 100  # of many targets those for which it is looked for what would help
 ADVICE_STREAM, ROUND_TRIP_STREAM = 0, 1
 
 
@@ -381,7 +381,7 @@ def compute(study: Study, name: str) -> model.InverseResults:
     with shown_progress(len(targets), f"{name}: targets solved") as advance:
         for number, target in enumerate(targets):
             random = np.random.default_rng([study.seed, ADVICE_STREAM, number])
-            advise = not many or advised < MOST_ADVISED
+            advise = not many or advised < MAX_ADVISED
             solved.append(solve_target(robot, target, random, scene, many=many, advise=advise, clearance=clearance))
             advised += solved[-1].result.neighbours is not None
             advance(1)
@@ -395,7 +395,7 @@ def compute(study: Study, name: str) -> model.InverseResults:
     rests_on = shapes_assumed(robot, motion.assumed_margin_mm / 1000, {each.name: d for each, d in zip(asked, least)})
     complete = not isinstance(arm_solver(robot).chain, Unsolved)
     random = np.random.default_rng([study.seed, ROUND_TRIP_STREAM])
-    wanted = settings.round_trips if has_branches(robot) else min(settings.round_trips, MOST_BY_CLASS)
+    wanted = settings.round_trips if has_branches(robot) else min(settings.round_trips, MAX_BY_CLASS)
     trips = batch_round_trips(robot, random, wanted) if complete else None
     worst = _worst_residuals(solutions, trips)
     summary = model.InverseSummary(

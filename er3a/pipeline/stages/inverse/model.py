@@ -342,18 +342,18 @@ class InverseResults(Results[InverseSummary]):
 RESULTS = InverseResults
 
 
-MOST_SHOWN = 32
+MAX_SHOWN = 32
 
 
 def shown_targets(targets: Sequence[TargetResult]) -> list[TargetResult]:
     """All targets, in their order; of more than 32 as many of each outcome, taken evenly over the list."""
-    if len(targets) <= MOST_SHOWN:
+    if len(targets) <= MAX_SHOWN:
         return list(targets)
     by_outcome: dict[str, list[int]] = {}
     for number, target in enumerate(targets):
         by_outcome.setdefault(target.outcome, []).append(number)
     taken: list[int] = []
-    left, kinds = MOST_SHOWN, len(by_outcome)
+    left, kinds = MAX_SHOWN, len(by_outcome)
     for done, numbers in enumerate(sorted(by_outcome.values(), key=len)):
         count = min(len(numbers), left // (kinds - done))
         taken += [numbers[int(k)] for k in np.linspace(0, len(numbers) - 1, count).round()]

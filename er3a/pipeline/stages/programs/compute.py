@@ -39,8 +39,8 @@ from er3a.programs.syntax import ProgramOutcome
 from er3a.robots.robot import Robot
 
 OUTCOMES: dict[Level, ProgramOutcome] = {"pass": "pass", "note": "pass", "caution": "caution", "fail": "fail"}
-MOST_MOTIONS = 20_000
-MOST_POINTS = 20_000  # of a program's motion that are kept
+MAX_MOTIONS = 20_000
+MAX_POINTS = 20_000  # of a program's motion that are kept
 
 
 def compute(study: Study, name: str) -> model.ProgramsResults:
@@ -136,7 +136,7 @@ def _options(study: Study, listed: ProgramsFile, robot: Robot) -> CheckOptions:
         assumed=AssumedRates(
             own.tool_speed_mm_s / 1000, own.tool_acceleration_mm_s2 / 1000, own.joint_speed_percent / 100
         ),
-        most_motions=MOST_MOTIONS,
+        most_motions=MAX_MOTIONS,
         limits=RunLimits(own.most_steps, own.most_branches, own.loop_rounds),
     )
 
@@ -237,7 +237,7 @@ def _motion(name: str, check: ProgramCheck, joints: int) -> tuple[model.ProgramM
         else:
             known = np.isfinite(motion.way.q[:, 0])
             t, q, arm = motion.way.t[known], motion.way.q[known], motion.way.arm
-        if not len(t) or len(lines) + len(t) > MOST_POINTS:
+        if not len(t) or len(lines) + len(t) > MAX_POINTS:
             break
         starts[number] = now
         times.append(now + t)

@@ -42,6 +42,6 @@ STAGE = Stage(
     question=N_("Can the robot carry out its programs?"),
     settings={"programs": ProgramsSettings, "trajectory": TrajectorySettings},
     inputs=_inputs,
-    wanted=lambda study, robot: study.entry(robot).programs is not None,
+    is_configured=lambda study, robot: study.entry(robot).programs is not None,
     rests_on=("validation",),
 )

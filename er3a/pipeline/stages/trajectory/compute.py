@@ -41,7 +41,7 @@ from er3a.pipeline.stages.trajectory.motion import (
 from er3a.pipeline.stages.trajectory.written_programs import near_assumed_shapes, program_files
 from er3a.pipeline.study import Study
 from er3a.planning.avoidance.avoidance import SingularSegment, singular_segment
-from er3a.planning.avoidance.strategies import StrategyCost, StrategyResult, best, compare, deviation
+from er3a.planning.avoidance.strategies import StrategyCost, StrategyResult, best, compare_strategies, deviation
 from er3a.planning.motion_faults import Interval, SingularEvent
 from er3a.planning.names import PathVerdict, StrategyName
 from er3a.planning.timing import JointLimits, Timed, TimingError, fastest, nodes_along
@@ -49,7 +49,7 @@ from er3a.planning.way_around import PlanningTask, WayAround, way_between
 from er3a.robots.joint_limits import shown, within
 from er3a.robots.robot import Robot
 
-LEAST_RATIO = 1e-3  # of the limits, below which a path counts as standing still
+MIN_RATIO = 1e-3  # of the limits, below which a path counts as standing still
 FAULTS: tuple[PathVerdict, ...] = ("unreachable", "none found", "leaves limits", "collides", "too fast")
 ROUNDED = 0.0005  # m, by which a pose may be off that is written with one decimal of mm and two of deg
 ROWS = 250  # of each motion in the table
@@ -104,7 +104,9 @@ class AvoidanceTask:
             segment = singular_segment(motion.followed, self.near, self.limits, found.events, fixed_start)
             quickest = _quickest(segment)
             if found.verdict != "safe":
-                results = compare(replace(segment, limits=self._no_more_than(found), allowed=self.limits), self.only)
+                results = compare_strategies(
+                    replace(segment, limits=self._no_more_than(found), allowed=self.limits), self.only
+                )
         collides = bool(along.contacts)
         if (collides or found.beyond or found.limits) and motion.no_way is None and self.only in (None, "planned"):
             results += self._planned(motion)
@@ -128,11 +130,11 @@ class AvoidanceTask:
 
     def _no_more_than(self, found: judgement.Judgement) -> JointLimits:
         """The limits, or what of them the path needs if that is less."""
-        if found.fast or found.greatest is None:
+        if found.fast or found.max_rates is None:
             return self.limits
         limits = self.limits.speed, self.limits.acceleration
-        ratios = (float((most / limit).max()) for most, limit in zip(found.greatest, limits))
-        speed, acceleration = (limit * min(1.0, max(ratio, LEAST_RATIO)) for limit, ratio in zip(limits, ratios))
+        ratios = (float((most / limit).max()) for most, limit in zip(found.max_rates, limits))
+        speed, acceleration = (limit * min(1.0, max(ratio, MIN_RATIO)) for limit, ratio in zip(limits, ratios))
         return replace(self.limits, speed=speed, acceleration=acceleration)
 
     def _planned(self, motion: Motion) -> list[StrategyResult]:
@@ -219,7 +221,7 @@ class AvoidanceTask:
     def _fastest_time(self, timed: Timed) -> float:
         """When a joint comes nearest to its maximum speed."""
         curve = timed.curve
-        j = int(np.argmax(timed.greatest[0] / self.limits.speed))
+        j = int(np.argmax(timed.max_rates[0] / self.limits.speed))
         return max(curve.of_joint(curve.velocity, j, sign).peak() for sign in (1.0, -1.0))[1]
 
 
@@ -285,7 +287,7 @@ def path_summary(
     labels = branch_labels(robot) if has_branches(robot) else ()
     slots = [] if followed is None else [int(slot) for slot in dict.fromkeys(followed.slot) if slot >= 0]
     contacts = judgement.collisions(along)
-    speed, acceleration = found.greatest or (None, None)
+    speed, acceleration = found.max_rates or (None, None)
     return model.PathSummary(
         name=entry.name,
         title=entry.title,
@@ -326,8 +328,8 @@ def path_summary(
     )
 
 
-def _ratio(greatest: Reals | None, most: Reals) -> float | None:
-    return None if greatest is None else float((greatest / most).max())
+def _ratio(largest: Reals | None, most: Reals) -> float | None:
+    return None if largest is None else float((largest / most).max())
 
 
 def _half_turns(motion: Motion) -> tuple[model.HalfTurn, ...]:

@@ -39,14 +39,14 @@ class Faults:
     ----------
     fast : where a joint exceeds a limit of speed, acceleration or jerk
     undecided : where the bounds leave something open
-    greatest : maximum speeds (n,), rad/s, and accelerations (n,), rad/s^2, if any are known
+    max_rates : maximum speeds (n,), rad/s, and accelerations (n,), rad/s^2, if any are known
     """
 
     events: list[motion_faults.SingularEvent]
     limits: list[motion_faults.Interval[motion_faults.LimitCause]]
     fast: list[motion_faults.Interval[motion_faults.RateCause]]
     undecided: list[motion_faults.Interval[Undecided]]
-    greatest: tuple[Reals, Reals] | None
+    max_rates: tuple[Reals, Reals] | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +89,7 @@ def judge(robot: Robot, motion: Motion, near: NearSingular, limits: JointLimits)
     edge = any(interval.start > 0 or interval.end < times[-1] for interval in beyond)
     bounded = not edge and not jumps and not (np.isfinite(q[:, 0]) & np.isnan(velocity[:, 0])).any()
     return Judgement(
-        **vars(found) | ({} if bounded else {"greatest": None}),
+        **vars(found) | ({} if bounded else {"max_rates": None}),
         verdict="none found"
         if motion.no_way
         else _verdict(found, bool(beyond), bool(jumps), motion.followed is not None),
@@ -120,11 +120,11 @@ def _verdict(found: Faults, beyond: bool, jumps: bool, of_tool: bool) -> PathVer
 def _joint_faults(robot: Robot, motion: Polynomials, checks: Reals, near: NearSingular, limits: JointLimits) -> Faults:
     """Faults found in one run through the motion, whose parts are made while they are wanted."""
     singular = motion_faults.SingularCheck(robot, near) if wrist_partition_missing(robot) is None else None
-    within, greatest = motion_faults.LimitCheck(robot), motion_faults.MaxRates(robot.joints)
+    within, max_rates = motion_faults.LimitCheck(robot), motion_faults.MaxRates(robot.joints)
     rates = [motion_faults.RateCheck(limit) for limit in limits.rates]
     for part in motion.parts():
         within.add(part)
-        greatest.add(part)
+        max_rates.add(part)
         for rate in rates:
             rate.add(part)
         if singular is not None:
@@ -139,7 +139,7 @@ def _joint_faults(robot: Robot, motion: Polynomials, checks: Reals, near: NearSi
         limits=within.intervals(),
         fast=[part for check in rates for part in check.intervals()],
         undecided=[],
-        greatest=greatest.rates,
+        max_rates=max_rates.rates,
     )
 
 
@@ -163,7 +163,7 @@ def _tool_faults(robot: Robot, motion: Motion, near: NearSingular, limits: Joint
             continue
         fast += motion_faults.rates_exceeded(at, rates[:, limit.order - 1], limit, partial(_rate, motion, limit.order))
     known = rates[np.isfinite(rates).all(axis=(1, 2))]
-    greatest = np.abs(known).max(axis=0) if len(known) else None
+    max_rates = np.abs(known).max(axis=0) if len(known) else None
     followed = motion.followed
     assert followed is not None
     ends = followed.jumps or np.isnan(followed.q).any() or any(event.crossing for event in events)
@@ -172,7 +172,7 @@ def _tool_faults(robot: Robot, motion: Motion, near: NearSingular, limits: Joint
         limits=motion_faults.out_of_limits(robot, t, q, motion.joints),
         fast=fast,
         undecided=[*proof.undecided, *(() if ends else proof.beside)],
-        greatest=None if greatest is None else (greatest[0], greatest[1]),
+        max_rates=None if max_rates is None else (max_rates[0], max_rates[1]),
     )
 
 

@@ -38,7 +38,7 @@ from er3a.robots.robot import Robot
 CONDITION_SCALE = LogNorm(3, 300)
 PATH_COLOURS = "viridis_r"
 AZIMUTH, ELEVATION = np.radians(-55.0), np.radians(24.0)
-MOST_SINGULAR_ARMS = 3  # at singular poses
+MAX_SINGULAR_ARMS = 3  # at singular poses
 
 
 def draw_path(
@@ -50,7 +50,7 @@ def draw_path(
     points = rows.xyz_mm
     reached = np.flatnonzero(rows.reachable)
     nearest = [int(np.argmin(np.abs(rows.t_s - event.t_s))) for event in path.singularities]
-    at_events = [i for i in nearest if i in reached][:MOST_SINGULAR_ARMS]
+    at_events = [i for i in nearest if i in reached][:MAX_SINGULAR_ARMS]
     arms = [(i, palette.LINK, "-") for i in reached[:1]] + [(i, palette.LINK, "--") for i in reached[-1:]]
     for i, colour, style in arms + [(i, palette.HIGHLIGHT, "-") for i in at_events]:
         links = project(skeleton(robot, meant(robot, rows.q_deg[i])) * 1000)
@@ -381,7 +381,7 @@ def _curves(paths: list[Measured], rows: model.Clearances) -> Figure:
 
 POINTS = 250
 LOG_RANGE = np.log10(3), np.log10(300)  # of the condition number
-MOST_ARMS = 3
+MAX_ARMS = 3
 
 
 def in_space(
@@ -425,7 +425,7 @@ def _layers(
     for k, name, colour in ((index[:1], tr("arm at the start"), ""), (index[-1:], last, palette.LINK)):
         for i in k:
             yield Layer(name, "line", 1000 * skeleton(robot, q[i]), colour, 5.0)
-    for event, i in list(zip(path.singularities, events))[:MOST_ARMS]:
+    for event, i in list(zip(path.singularities, events))[:MAX_ARMS]:
         if reached[i]:
             singular = tr("{type}, t = {t:.3f} s", type=event_word(event), t=event.t_s)
             name = singular if event.crossing else tr("near {singular}", singular=singular)

@@ -145,8 +145,8 @@ class _Stated:
         if self.met[i]:
             return "pass"
         rivals = [b if a == i else a for a, b in self.pairs if i in (a, b)]
-        weak = not self.references[i].authoritative
-        excused = any(self.met[k] and (weak or self.references[k].authoritative) for k in rivals)
+        weak = not self.references[i].is_authoritative
+        excused = any(self.met[k] and (weak or self.references[k].is_authoritative) for k in rivals)
         return "conflict" if excused else "fail"
 
 
@@ -244,7 +244,7 @@ def round_trip_checks(robot: Robot, poses: int, seed: int) -> tuple[list[model.C
     """Round trips as checks, and their errors; None if the arm has no closed form."""
     missing = wrist_partition_missing(robot)
     if missing or robot.coupling is not None:
-        return _class_checks(robot, min(poses, round_trips.MOST_BY_CLASS), seed), None
+        return _class_checks(robot, min(poses, round_trips.MAX_BY_CLASS), seed), None
     found = round_trips.slot_round_trips(robot, poses, seed)
     note = model.NearSingularLeftOut(
         poses - found.near_singular, poses, round_trips.NEAR_WRIST_DEG, round_trips.NEAR_SHOULDER_MM

@@ -19,7 +19,7 @@ from er3a.identifiability.proposals import proposals_of
 from er3a.identifiability.reactions import bases_of, undeclared_bases
 from er3a.identifiability.statements import made_from_table, title_of
 from er3a.kinematics.forward import frames
-from er3a.kinematics.round_trips import MOST_BY_CLASS
+from er3a.kinematics.round_trips import MAX_BY_CLASS
 from er3a.kinematics.table_batch import robot_of
 from er3a.kinematics.wrist_partitioned import wrist_partition_missing
 from er3a.numerics.arrays import Reals
@@ -370,7 +370,7 @@ def _left_out(
     if unsolved:
         yield LeftOut("all_solutions")
     else:
-        yield LeftOut("round_trips", amount=settings.round_trips if trips else min(settings.round_trips, MOST_BY_CLASS))
+        yield LeftOut("round_trips", amount=settings.round_trips if trips else min(settings.round_trips, MAX_BY_CLASS))
     if trips and trips.near_singular:
         yield LeftOut("near_singular_poses", amount=trips.near_singular)
     yield LeftOut("reach_starts", amount=settings.reach_starts)

@@ -21,7 +21,7 @@ from er3a.robots.joint_limits import meant, size_of
 from er3a.robots.robot import AUTHORITATIVE_GRADES, Robot
 
 HOLD_S, MOVE_S, STEPS = 2.0, 1.0, 30
-LEAST_ARROW_MM = 0.1
+MIN_ARROW_MM = 0.1
 NOTE = """# Key poses of {title}
 
 {text}
@@ -110,7 +110,7 @@ def _points(rows: KeyPoses, radius: float) -> list[tuple[float, str, Logged]]:
     stated = rows.take(np.flatnonzero(np.isfinite(rows.point_mm).all(axis=1)))
     points, model = stated.point_mm / 1000, stated.model_point_mm / 1000
     colours = np.array(_colours(stated.grade))
-    seen = stated.deviation_mm >= LEAST_ARROW_MM
+    seen = stated.deviation_mm >= MIN_ARROW_MM
     shapes = {
         "reference/points": rr.Points3D(points, radii=radius, colors=colours),
         "model": rr.Points3D(model, radii=radius * 1.15, colors=rgb(MODEL)),

@@ -256,7 +256,7 @@ def typographic(text: str) -> str:
 
 SHOWN_HYPOTHESES = 5
 SHOWN_RESIDUALS = 12
-LEAST_DRAWN = 1e-3
+MIN_DRAWN = 1e-3
 
 
 def diagnosis_stories(summary: model.ValidationSummary, residuals: model.Residuals) -> list[dict[str, Any]]:
@@ -341,7 +341,7 @@ def residual_figure(rows: model.Residuals) -> Figure:
     """Residuals before and after the best hypothesis, with each reference's uncertainty; worst on top."""
     figure, axes = new_figure(width=9, height=1.5 + 0.32 * len(rows))
     at = np.arange(len(rows))[::-1]
-    before, after = np.maximum(rows.before, LEAST_DRAWN), np.maximum(rows.after, LEAST_DRAWN)
+    before, after = np.maximum(rows.before, MIN_DRAWN), np.maximum(rows.after, MIN_DRAWN)
     axes.hlines(at, np.minimum(before, after), np.maximum(before, after), color=MUTED, linewidth=1.2)
     axes.plot(before, at, "o", color=REFERENCE, label=tr("table as it is"))
     axes.plot(after, at, "D", color=MODEL, markersize=5, label=tr("with the best hypothesis corrected"))
@@ -349,9 +349,9 @@ def residual_figure(rows: model.Residuals) -> Figure:
     axes.set_xscale("log")
     axes.set_yticks(at, [bracketed(say(subject), tr(unit)) for subject, unit in zip(rows.subject, rows.unit)])
     axes.set_ylim(-0.7, len(rows) - 0.3)
-    axes.set_xlim(LEAST_DRAWN / 1.5, 2 * max(before.max(), after.max()))
+    axes.set_xlim(MIN_DRAWN / 1.5, 2 * max(before.max(), after.max()))
     axes.grid(axis="y", visible=False)
-    axes.set_xlabel(tr("residual (mm or deg, as named; smaller ones are drawn at {least:g})", least=LEAST_DRAWN))
+    axes.set_xlabel(tr("residual (mm or deg, as named; smaller ones are drawn at {least:g})", least=MIN_DRAWN))
     figure.legend(loc="outside upper left", ncols=3)
     return figure
 

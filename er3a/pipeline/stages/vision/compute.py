@@ -51,7 +51,7 @@ from er3a.vision.table_corrections import NoCorrections, TableCorrections, corre
 from er3a.vision.vision_findings import HandEyeError, grave_warnings
 
 MARGIN = 0.25  # of the objects' extent
-LEAST_HALF = 0.2  # m, to each side of the objects' middle
+MIN_HALF = 0.2  # m, to each side of the objects' middle
 NO_BOARD = [1.0, 1.0]
 
 
@@ -81,7 +81,7 @@ class MapTask:
 def error_map(found: HandEye, task: MapTask) -> model.ErrorMapRows:
     """Errors on a square around the objects, of the first object's grasp held at each cell."""
     middle = task.places[:, :3, 3].mean(axis=0)
-    half = max(LEAST_HALF, (1 + MARGIN) * float(np.abs(task.places[:, :2, 3] - middle[:2]).max()))
+    half = max(MIN_HALF, (1 + MARGIN) * float(np.abs(task.places[:, :2, 3] - middle[:2]).max()))
     steps = np.linspace(-half, half, task.cells)
     x, y = (part.ravel() for part in np.meshgrid(middle[0] + steps, middle[1] + steps))
     points = np.tile(task.places[0], (len(x), 1, 1))

@@ -67,6 +67,6 @@ STAGE = Stage(
     question=N_("Is the camera calibrated well enough, and which objects can be grasped?"),
     settings={"vision": VisionSettings, "trajectory": TrajectorySettings},
     inputs=_inputs,
-    wanted=lambda study, robot: study.entry(robot).vision is not None,
+    is_configured=lambda study, robot: study.entry(robot).vision is not None,
     rests_on=("validation",),
 )

@@ -10,7 +10,7 @@ from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from er3a.files.reference_sets import reference_folder
 from er3a.files.robot_file import Text
-from er3a.files.units import FARTHEST_MM, Triple, as_millimetres
+from er3a.files.units import MAX_DISTANCE_MM, Triple, as_millimetres
 from er3a.files.yaml_file import StrictModel
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.settings import TrajectorySettings
@@ -66,8 +66,8 @@ class BoxTask(StrictModel):
     tool_direction: Triple = [0, 0, -1]
     cone_deg: Annotated[float, Field(ge=0, le=180)] = 30
     limit_margin_deg: Annotated[float, Field(ge=0, le=45)] = 2
-    lowest_mm: Annotated[float, Field(ge=-FARTHEST_MM, le=FARTHEST_MM)] = 0
-    clear_of_axis_mm: Annotated[float, Field(ge=0, le=FARTHEST_MM)] = 150
+    lowest_mm: Annotated[float, Field(ge=-MAX_DISTANCE_MM, le=MAX_DISTANCE_MM)] = 0
+    clear_of_axis_mm: Annotated[float, Field(ge=0, le=MAX_DISTANCE_MM)] = 150
 
     @field_validator("tool_direction")
     @classmethod

@@ -61,10 +61,10 @@ from er3a.workspace.tool_inverse import (
     tried_values,
 )
 
-MOST_ACROSS, MOST_ACROSS_REDUNDANT = 64, 28
-CELL_TRIES, LEAST_TRIES = 192, 3  # poses tried in a cell, and in each sector of it
+MAX_ACROSS, MAX_ACROSS_REDUNDANT = 64, 28
+CELL_TRIES, MIN_TRIES = 192, 3  # poses tried in a cell, and in each sector of it
 CELLS_S, CLEAR_S, PLACES_S = 8.0, 2.0, 8.0
-_LEAST_CELLS, _LEAST_DIRECTIONS, _MOST_ROLLS = 400, 24, 4
+_MIN_CELLS, _MIN_DIRECTIONS, _MAX_ROLLS = 400, 24, 4
 _FREE_S = 1.5e-5  # poses that take less are asked as the study says
 _WIDE_STEPS = np.radians([20.0, 30.0])
 _COARSER = 1.1
@@ -95,7 +95,7 @@ class CapabilityPlan:
 
     def tries_of(self, reached: int, sectors: int) -> int:
         """How many poses to try in each of so many reached cells and sectors."""
-        tries = max(LEAST_TRIES, CELL_TRIES // sectors)
+        tries = max(MIN_TRIES, CELL_TRIES // sectors)
         return tries if self.poses is None else max(1, min(tries, self.poses // max(1, reached)))
 
 
@@ -115,7 +115,7 @@ def plan_of(
     task : that of the box; proven : what is known of the reach
     """
     frame, values = cell_frame(robot), tried_values(robot)
-    across = MOST_ACROSS if values == 1 else MOST_ACROSS_REDUNDANT
+    across = MAX_ACROSS if values == 1 else MAX_ACROSS_REDUNDANT
     cell = max(cell, max(frame.reach * (1 if frame.bar else 2), frame.heights[1] - frame.heights[0]) / across)
     count, cells = settings.directions, _cells(robot, cell, proven)
     if asked.kind == "points":
@@ -124,11 +124,11 @@ def plan_of(
     if is_quick(robot) and per_pose < _FREE_S:
         return CapabilityPlan(asked, count, cell, cells, RING, cell, None, False)
     most, fine = int(CELLS_S / per_pose), len(cells)
-    if len(asked.roll.angles) > _MOST_ROLLS and fine * count * len(asked.roll.angles) > most:
-        asked = asked_of(robot, _MOST_ROLLS) or asked
+    if len(asked.roll.angles) > _MAX_ROLLS and fine * count * len(asked.roll.angles) > most:
+        asked = asked_of(robot, _MAX_ROLLS) or asked
     tries = len(asked.roll.angles) * (2 if asked.plane is not None else 1)
     if fine * count * tries > most:
-        count = min(count, max(_LEAST_DIRECTIONS, most // (_LEAST_CELLS * tries)))
+        count = min(count, max(_MIN_DIRECTIONS, most // (_MIN_CELLS * tries)))
     while len(cells) * count * tries > most and len(cells) > 1:
         cell *= _COARSER
         cells = _cells(robot, cell, proven)
