@@ -105,6 +105,12 @@ def test_a_relative_line_turns_about_the_axes_of_base_or_of_tool(tmp_path):
         np.testing.assert_allclose(found.target.pose[:3, 3], T[:3, 3] + way, atol=1e-12)
 
 
+def test_more_than_full_speed_is_full_speed(tmp_path):
+    for percent, share in ((150, 1.0), (40, 0.4)):
+        (found,) = moves(run(tmp_path, f"BAS(#VEL_PTP,{percent})\nPTP {{A1 10,A2 0,A3 0,A4 0,A5 0,A6 0}}"))
+        assert (found.speed.value, found.speed.unit) == (share, "share")
+
+
 def test_positions_are_computed_with(tmp_path):
     body = """DECL E6POS P
 DECL INT i
