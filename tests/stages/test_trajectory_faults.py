@@ -141,7 +141,7 @@ def test_a_path_that_comes_into_reach_needs_speeds_without_bound_there(tmp_path)
     end, start = ({"xyz_mm": [x, 0, 400], "rpy_deg": [0, 135, 0]} for x in (350, 700))
     (found,) = paths_of(tmp_path, "line_out", start=start, end=end)
     assert found.verdict == "unreachable"
-    assert found.unreachable[0].start == 0
+    assert found.unreachable[0].t0_s == 0
     assert not found.joint_speed_bounded
 
 
