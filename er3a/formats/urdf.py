@@ -511,7 +511,7 @@ def link_visuals(
     """The visual geometry of a URDF, one surface for each link, simplified to ``DRAWN_TRIANGLES`` in all, and notes."""
     zero = np.concatenate([robot.base[None], frames(robot, np.zeros(robot.joints))])
     parts: dict[int, list[tuple[Reals, Integers]]] = {}
-    missing = list[str]()
+    missing = dict[str, Er3aError]()
     for link in root.findall("link"):
         visuals, place = link.findall("visual"), placed(link.get("name", "?"))
         if place is None:
@@ -521,8 +521,8 @@ def link_visuals(
         for visual in visuals:
             try:
                 points, faces = urdf_tree.visual_surface(path, link.get("name", "?"), visual)
-            except Er3aError:
-                missing.append(link.get("name", "?"))
+            except Er3aError as error:
+                missing.setdefault(link.get("name", "?"), error)
                 continue
             parts.setdefault(number, []).append((points @ T[:3, :3].T + T[:3, 3], faces))
     found = []
@@ -533,9 +533,8 @@ def link_visuals(
         points, faces = simplified(points, faces, DRAWN_TRIANGLES // len(parts))
         used, corners = np.unique(faces, return_inverse=True)
         found.append(Visual(number, points[used], corners.reshape(-1, 3)))
-    names = ", ".join(dict.fromkeys(missing))
-    note = f"pictures show no visual geometry of {names}: it was not found, or can't be read"
-    return tuple(found), (note,) if missing else ()
+    notes = (f"pictures show no visual geometry of {', '.join(missing)}: {why}" for why in missing.values())
+    return tuple(found), tuple(notes)[:1]
 
 
 def _coupling(

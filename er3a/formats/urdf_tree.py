@@ -674,7 +674,7 @@ def visual_surface(path: Path, name: str, visual: ElementTree.Element) -> tuple[
             points, faces, _ = read_link_mesh(file, _numbers(path, where, shape, "scale", (1.0, 1.0, 1.0)))
             made = trimesh.Trimesh(points, faces, process=False)
         case _:
-            raise InputError(path, where, "no shape was found", "Give a box, cylinder, sphere or mesh")
+            raise InputError(path, where, "no shape, or no file of its mesh", "Give a box, cylinder, sphere or mesh")
     made.apply_transform(transform(xyz, rpy))
     return np.asarray(made.vertices, float), np.asarray(made.faces, np.int64)
 

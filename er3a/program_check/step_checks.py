@@ -115,7 +115,7 @@ class Arms:
         elif motion.tool.name:
             missing.append(found_in.FrameNotGiven(motion.tool.name, "tool", needed=False))
         if base is None and motion.base.name:
-            missing.append(found_in.FrameNotGiven(motion.base.name, "base", needed=motion.kind != "joint"))
+            missing.append(found_in.FrameNotGiven(motion.base.name, "base", needed=False))
         known = None if base is None and motion.base.name else self.robot.base @ (np.eye(4) if base is None else base)
         return PlacedMotion(motion, arm, known, tuple(missing), taken)
 

@@ -63,6 +63,12 @@ def swing(count: int = 401) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return 0.4 * np.sin(2 * t + phase), 0.8 * np.cos(2 * t + phase), -1.6 * np.sin(2 * t + phase)
 
 
+def test_an_arm_that_its_drives_can_not_hold_carries_nothing_even_if_a_load_would_relieve_them():
+    without, per_kg = np.array([[12.0, 0.0]]), np.array([[-1.0, 1.0]])
+    found = max_payload(np.zeros(1), without, per_kg, limits(np.array([10.0, 50.0]), UNKNOWN[:2], UNKNOWN[:2]))
+    assert (found.value, found.by, found.joint) == (0.0, "peak", 0)
+
+
 def test_the_greatest_payload_brings_one_drive_to_its_peak(arm):
     q, qd, qdd = swing()
     centre, moments = (0.02, 0.0, 0.08), (0.002, 0.002, 0.001, 0.0, 0.0, 0.0)

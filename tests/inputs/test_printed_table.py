@@ -109,3 +109,13 @@ def test_offsets_in_two_columns_are_refused(tmp_path):
     (tmp_path / "arm.csv").write_text("i,a,alpha,d,theta,offset\n1,70,90,352,q1-90,90\n", encoding="utf-8")
     with pytest.raises(InputError, match="another column"):
         read_dh_table(tmp_path / "arm.csv", "arm")
+
+
+@pytest.mark.parametrize(("longest", "unit"), [(350, "mm"), (0.35, "m")])
+def test_one_short_length_makes_no_table_of_metres(tmp_path, longest, unit):
+    """The longest length says what unit all are in."""
+    rows = "".join(f"{joint},{a:g},90,0\n" for joint, a in enumerate((longest, longest / 50, longest / 2), 1))
+    (tmp_path / "arm.csv").write_text(f"joint,a_mm,alpha_deg,d_mm\n{rows}", encoding="utf-8")
+    content, notes = read_dh_table(tmp_path / "arm.csv", "arm", as_printed=True)
+    assert robot_of(content).a == pytest.approx([0.35, 0.007, 0.175])
+    assert any("metres" in note for note in notes) == (unit == "m")

@@ -94,6 +94,23 @@ def test_a_partial_position_behind_axes_needs_the_arm(tmp_path):
     np.testing.assert_allclose(up.target.pose[:3, 3], known.target.pose[:3, 3] + 0.01 * T[:3, 2], atol=1e-12)
 
 
+def test_a_relative_line_turns_about_the_axes_of_base_or_of_tool(tmp_path):
+    robot, q = load_robot("er3a_c60"), np.radians([10.0, -20.0, 15.0, 5.0, -60.0, 20.0])
+    body = "$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\nPTP {A1 10,A2 -20,A3 15,A4 5,A5 -60,A6 20}\nLIN_REL {A 90,X 10}"
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    T = forward(robot, q)
+    for frame, R, way in (("#BASE", turn @ T[:3, :3], [0.01, 0, 0]), ("#TOOL", T[:3, :3] @ turn, 0.01 * T[:3, 0])):
+        _, found = moves(run(tmp_path, f"{body} {frame}", robot=robot))
+        np.testing.assert_allclose(found.target.pose[:3, :3], R, atol=1e-12)
+        np.testing.assert_allclose(found.target.pose[:3, 3], T[:3, 3] + way, atol=1e-12)
+
+
+def test_more_than_full_speed_is_full_speed(tmp_path):
+    for percent, share in ((150, 1.0), (40, 0.4)):
+        (found,) = moves(run(tmp_path, f"BAS(#VEL_PTP,{percent})\nPTP {{A1 10,A2 0,A3 0,A4 0,A5 0,A6 0}}"))
+        assert (found.speed.value, found.speed.unit) == (share, "share")
+
+
 def test_positions_are_computed_with(tmp_path):
     body = """DECL E6POS P
 DECL INT i

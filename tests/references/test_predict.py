@@ -122,6 +122,9 @@ def test_limits_speeds_and_poses_outside():
     pose = (0.0, 90.0, 0.0, 0.0, 0.0, 0.0)
     state = state_of(robot, (LimitExcess(pose),))
     assert LimitExcess(pose).value(state) == pytest.approx(5)
+    below = (0.0, float(np.degrees(robot.lower[1])) - 7.0, *pose[2:])
+    assert LimitExcess(below).value(state) == pytest.approx(7)
+    assert LimitExcess((0.0,) * 6).value(state) == 0
     assert Limit(3, "upper").value(state) == pytest.approx(185)
     assert Speed(6).value(state) == pytest.approx(840)
 
