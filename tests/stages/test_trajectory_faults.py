@@ -159,14 +159,6 @@ def test_a_path_that_ends_before_the_edge_of_the_reach_as_advised_is_safe(tmp_pa
     assert ((slowed >= lower + 1) & (slowed <= upper - 1)).all()
 
 
-def test_a_path_that_comes_into_reach_needs_speeds_without_bound_there(tmp_path):
-    end, start = ({"xyz_mm": [x, 0, 400], "rpy_deg": [0, 135, 0]} for x in (350, 700))
-    (found,) = paths_of(tmp_path, "line_out", start=start, end=end)
-    assert found.verdict == "unreachable"
-    assert found.unreachable[0].t0_s == 0
-    assert not found.joint_speed_bounded
-
-
 def test_a_path_that_keeps_the_margin_nowhere_gets_no_point_to_end_at(tmp_path):
     results = compute(study_of(tmp_path, "line_collides", settings={"assumed_margin_mm": 400.0}), ROBOT)
     (path,), (fault,) = results.summary.paths, faults(results)
