@@ -112,7 +112,9 @@ def scaling() -> float:
     def timed(groups: list[int]) -> float:
         start = time.perf_counter()
         for count in groups:
-            for process in [subprocess.Popen([*command, str(10 * _SPEED_SAMPLES)]) for _ in range(count)]:
+            for process in [
+                subprocess.Popen([*command, str(10 * _SPEED_SAMPLES)], stdout=subprocess.DEVNULL) for _ in range(count)
+            ]:
                 process.wait()
         return time.perf_counter() - start
 

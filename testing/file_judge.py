@@ -7,6 +7,7 @@ exact fractions), and a robot's pose is worked out again from that text.
 from __future__ import annotations
 
 import re
+import shutil
 import signal
 import time
 import traceback
@@ -24,7 +25,7 @@ from pydantic import BaseModel
 from scipy.spatial.transform import Rotation
 
 from er3a.collision.scene import Plane, Scene, Solid
-from er3a.errors import InputError
+from er3a.errors import InputError, InputWarning
 from er3a.files.by_name import load_measurements
 from er3a.files.csv_file import read_csv
 from er3a.files.hand_eye_file import POINTS, HandEyeFile, sample_rows
@@ -40,7 +41,7 @@ from er3a.files.yaml_file import load
 from er3a.kinematics.forward import forward
 from er3a.pipeline.check import check_file
 from er3a.pipeline.study import load_study
-from testing.input_files import mutants
+from testing.input_files import ROOT, mutants, seeds
 
 MAX_SECONDS = 5.0  # of processor time, for one file
 LONGEST_MESSAGE = 1000
@@ -65,6 +66,7 @@ def judge(path: Path) -> Outcome:
     accepted, fault = False, None
     try:
         with warnings.catch_warnings(action="error"):
+            warnings.simplefilter("ignore", InputWarning)  # what a person reads about the file, not of a library
             check_file(path)
         accepted = True
     except InputError as error:
@@ -91,8 +93,9 @@ def _stop(*_):
 
 
 def unclear(message: str, path: Path) -> str | None:
-    """What is wrong with an error message, if anything."""
-    if path.name not in message:
+    """What is wrong with an error message, if anything. It names the file, or one that is missing and written in it."""
+    missing = message.partition(": there is no such file")[0]
+    if path.name not in message and missing not in path.read_text(encoding="utf-8", errors="replace"):
         return f"message without the file's name: {message[:200]!r}"
     if not message.isprintable():
         return f"message with line ends or control characters: {message[:200]!r}"
@@ -235,7 +238,11 @@ def _differing_solids(scene: Scene, written: dict[str, yaml.Node]) -> list[str]:
 def differing_table(path: Path) -> list[str]:
     """Where what er3a read from a CSV file is not what pandas says is written there."""
     text = path.read_bytes().decode("utf-8-sig")
-    table = pd.read_csv(StringIO(text, newline=""), dtype=str, keep_default_na=False, skip_blank_lines=True)
+    header = text.lstrip("\r\n").splitlines()[0]
+    separator = max(",;\t", key=header.count)
+    table = pd.read_csv(
+        StringIO(text, newline=""), sep=separator, dtype=str, keep_default_na=False, skip_blank_lines=True
+    )
     table = table.map(str.strip).rename(columns=str.strip)
     table = table[(table != "").any(axis=1)]
     if path.parent.name == "paths":
@@ -311,11 +318,15 @@ def _leaves(value: object) -> list:
 
 
 def run(count: int, seed: int, folder: Path) -> list[tuple[str, str, bytes, Outcome]]:
-    """Judge ``count`` damaged files: path, damage, content and outcome of each."""
-    found = []
+    """Judge ``count`` damaged files, each among the sound ones: path, damage, content and outcome of each."""
+    found, sound = [], dict(seeds())
+    shutil.copytree(ROOT / "data", folder / "data", dirs_exist_ok=True)
+    for name, content in sound.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(content)
     for name, content, damage in mutants(count, seed):
         path = folder / name
-        path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content)
         found.append((name, damage, content, judge(path)))
+        path.write_bytes(sound[name])
     return found

@@ -105,6 +105,9 @@ for _tag, _pattern in _NUMBERS.items():
     _PlainLoader.add_implicit_resolver(_tag, re.compile(_pattern), list("-+.0123456789"))
 
 
+_LINE_END = re.compile("\r\n|[\n\r\x85\u2028\u2029]")  # what PyYAML counts as one; a fault can lie after the last line
+
+
 def vanished(text: str, value: float) -> bool:
     """Whether a number that is not written as zero is too small to be held as another."""
     return value == 0 and re.search("[1-9]", text.lower().partition("e")[0]) is not None
@@ -125,7 +128,7 @@ def read_yaml(path: str | Path) -> dict[str, Any]:
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
         where = f"line {mark.line + 1}, column {mark.column + 1}" if mark else None
-        if mark and text.split("\n")[mark.line].lstrip(" ").startswith("\t"):
+        if mark and any(line.lstrip(" ").startswith("\t") for line in _LINE_END.split(text)[mark.line : mark.line + 1]):
             raise InputError(path, where, "a tab character at the start of the line", "Indent by spaces") from None
         raise InputError(path, where, error.problem or "not valid YAML", "Correct this line") from None
     except RecursionError:

@@ -68,6 +68,8 @@ BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\nb: &b [*a, *a, *a, *a, *a, *a, *a, *a
         ("kind: whole\nparts:\n- {length_mm: 1, length_mm: 2}\n", "line 3, column 18", "the key 'length_mm' is given"),
         ("kind: [whole\n", "line 2, column 1", "expected ',' or ']'"),
         ("kind: whole\n\tcount: 1\n", "line 2, column 1", "a tab character"),
+        ("kind: whole\x85\tcount: 1\n", "line 2, column 1", "a tab character"),
+        ("kind: whole\x85parts: [\n", "line 3, column 1", "expected"),  # was a traceback
         ("kind: whole\nparts:\n\t- length_mm: 1\n", "line 3, column 1", "a tab character at the start"),
         ("kind: whole\nparts:\n- {length_mm: 50,0}\n", "line 3, column 18", "write decimals with a point, not a comma"),
         (BOMB, "line 2, column 8", "aliases (*name) are not supported"),
