@@ -820,8 +820,8 @@ class StepChecker:
         if not along.contacts:
             return self._clear(replace(motion, clearance=least), along)
         touches: dict[Pair, found_in.BodiesTouch] = {}
-        last = way.q[np.isfinite(way.q).all(axis=1)][-1:]
-        at_target = {bodies.pairs[k] for k in np.flatnonzero(bodies.overlaps(last)[0])}
+        reached = way.q[-1:][np.isfinite(way.q[-1:]).all(axis=1)]  # no row, if the motion ends out of reach
+        at_target = {bodies.pairs[k] for k in np.flatnonzero(bodies.overlaps(reached).any(axis=0))}
         for touch in (each for contact in along.contacts for each in contact.touches):  # in the order of time
             at = None if motion.kind == "joint" else way.along_mm(touch.start)
             first = touches.get(
