@@ -71,6 +71,7 @@ from er3a.robots.robot import Robot
 SHOWN_POSES = 3
 CLOSE = 0.9
 MOST_SCATTER = 3.0
+ROUNDING = 1e-6  # mm: a fit that leaves less has met its points exactly
 FAR_OUT = 6.0
 """Standard deviations beyond which a point is set aside: noise goes there once in 500 million."""
 FARTHEST = 0.5
@@ -627,7 +628,8 @@ def _out_of(observations: PointObservations, off_mm: Reals, usual_mm: Reals) -> 
     """By how many times (P,) points are farther off than noise goes; its deviation by the median of ``usual_mm``, which
     knows of no outliers, or as stated if that is more."""
     deviation = MEDIAN_TO_DEVIATION * float(np.median(np.abs(usual_mm)))
-    noise = np.maximum(deviation, observations.deviation_mm) if observations.deviation_known else deviation
+    stated = observations.deviation_mm if observations.deviation_known else 0.0
+    noise = np.maximum(max(deviation, ROUNDING), stated)
     out = np.zeros(len(observations.row_values))
     np.maximum.at(out, observations.pose_of, np.abs(off_mm) / (FAR_OUT * noise))
     return out
