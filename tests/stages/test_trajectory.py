@@ -227,7 +227,7 @@ def test_strategies_are_listed_with_their_costs(results, name):
     if planned.strategy == "planned":
         assert advice(planned).startswith("The path itself can't be driven. Use another motion instead")
         shorter = planned.chosen.motion.duration_s < planned.duration_s
-        assert (f"and slower, in the {planned.duration_s:.2f} s programmed" in advice(planned)) == shorter
+        assert (f"quicker than the {planned.duration_s:.2f} s programmed" in advice(planned)) == shorter
     mended = paths["line_wrist"]
     assert mended.chosen.motion.max_joint_speed_ratio <= mended.max_joint_speed_ratio * (1 + 1e-6)
     assert mended.chosen.motion.max_joint_acceleration_ratio <= mended.max_joint_acceleration_ratio * (1 + 1e-6)

@@ -420,7 +420,7 @@ def test_the_article_is_another_robot_and_contradicts_itself_in_two_statements(s
     first, second = text.index("This is not the robot that these describe"), text.index("contradicts its own text")
     assert "361.1 mm" in text[first:second]
     assert "−90 deg" not in text[first:second]
-    assert "This is no evidence about a real robot" in text[second:]
+    assert "The text is no evidence about a real robot" in text[second:]
     assert "Most likely fault" not in text
     page = page_of(study, stored["er3a_c60_article"], tmp_path)
     for diagnosis in summaries["er3a_c60_article"].diagnoses:
