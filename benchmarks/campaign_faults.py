@@ -110,10 +110,10 @@ RECORD = ("record", "trajectory", ROBOT)
 GATHER = ("compute", "workspace", ROBOT, BLOCKS)
 VIEW = f"reports/{ROBOT}/trajectory"
 FAULTS = (
-    Fault("disk full: results", disk(STAGE, "size=16k"), COMPUTE, f"{STAGE}/checks.parquet", root=True),
+    Fault("disk full: results", disk(STAGE, "size=16k"), COMPUTE, f"{STAGE}/samples.parquet", root=True),
     Fault("disk full: recording", disk(f"reports/{ROBOT}", "size=16k"), RECORD, f"{VIEW}.rrd", root=True),
     Fault("disk full: page", disk(f"reports/{ROBOT}", "size=16k"), REPORT, f"{VIEW}.html", root=True),
-    Fault("results can't be written", disk(STAGE, "ro"), COMPUTE, f"{STAGE}/checks.parquet", root=True),
+    Fault("results can't be written", disk(STAGE, "ro"), COMPUTE, f"{STAGE}/samples.parquet", root=True),
     Fault("reports can't be written", disk(f"reports/{ROBOT}", "ro"), REPORT, f"{VIEW}.html", root=True),
     Fault("a file where a folder must be", in_the_way, (*COMPUTE, "--results", "elsewhere"), "elsewhere"),
     Fault("memory limit (ulimit -v)", lambda *_: None, ("sample", ROBOT, "--part", "1-of-1", "--output", "b.npz",
