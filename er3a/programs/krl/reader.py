@@ -388,7 +388,7 @@ HANDLERS: dict[str, Handler] = {
     "HALT": lambda reading: reading.builder.add(syntax.Waiting(reading.place, "operator", None, "HALT")),
     "WAIT": _wait,
     "INTERRUPT": _interrupt,
-    "TRIGGER": lambda reading: _do(reading),
+    "TRIGGER": _do,
     "RESUME": lambda reading: reading.builder.unknown(reading.place, reading.text),  # the arm stops where it is
     "SPLINE": lambda reading: _spline(reading),
     "PTP_SPLINE": lambda reading: _spline(reading),

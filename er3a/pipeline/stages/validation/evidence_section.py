@@ -130,8 +130,10 @@ def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, 
 
 
 def _read_pose(robot: Robot, evidence: TableEvidence) -> str:
-    """By what a pendant shows at a pose the table can be told from another that fits every document; empty where there
-    is none, or its orientation is the same or has no unique angles there."""
+    """What a pendant shows at a pose, which distinguishes the table from another that fits all documents.
+
+    Empty where there is none, or its orientation is the same or has no unique angles there.
+    """
     other = other_robot(robot, evidence)
     if other is None or evidence.other is None or evidence.other.code != "allowed" or robot.joints < BENT:
         return ""
