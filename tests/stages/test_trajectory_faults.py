@@ -14,6 +14,7 @@ from lxml import etree
 from er3a.collision.pairs import ShapesAssumed
 from er3a.files.path_file import load_paths
 from er3a.files.robot_library import load_robot
+from er3a.kinematics.forward import forward
 from er3a.pipeline.messages.trajectory import SoundEnd, advice, end_text, first_faults
 from er3a.pipeline.program_reports import programs_of
 from er3a.pipeline.stages import run
@@ -190,6 +191,31 @@ def test_what_is_wrong_before_a_contact_ends_the_sound_part_of_a_path(tmp_path):
     assert "From t = 0.5 s: wrist singularity; from t = 0.9 s (100.0 mm of the path) it is out of reach" in advice(
         beyond, last_sound(beyond, rows, limits)
     )
+
+
+def test_where_limits_are_left_before_a_contact_the_path_may_end_before_them_and_nowhere_if_it_starts_beyond(tmp_path):
+    """Joint 1 turns from 100 to 240 deg past its limit; the tool meets a ball at 210 deg."""
+    robot, ends = load_robot(ROBOT), [[turn, 20, 10, 0, 40, 0] for turn in (100, 240)]
+    at = 1000 * forward(robot, np.radians([210.0, *ends[0][1:]]))[:3, 3]
+    ball = {"name": "ball", "radius_mm": 20, "xyz_mm": at.tolist()}
+    move = {"kind": "joint", "title": "Turn", "duration_s": 3, "samples": 5}
+    paths = [
+        move | {"name": name, "start_deg": [*start], "end_deg": [*end]}
+        for name, start, end in (("out", *ends), ("in", *ends[::-1]))
+    ]
+    for name, content in (("scene", {"title": "A ball", "spheres": [ball]}), ("paths", {"paths": paths})):
+        (tmp_path / f"{name}.yaml").write_text(yaml.safe_dump({"kind": name} | content), encoding="utf-8")
+    study = load_study("config/small.yaml")
+    files = {name: str(tmp_path / f"{name}.yaml") for name in ("scene", "paths")}
+    settings = study.trajectory.model_copy(update={"avoidance": "slow"})
+    entry = study.robots[ROBOT].model_copy(update=files)
+    study = study.model_copy(update={"robots": {ROBOT: entry}, "trajectory": settings})
+    out, back = compute(study, ROBOT).summary.paths
+    assert out.out_of_limits[0].t0_s < out.collisions[0].t0_s
+    limit = float(np.degrees(robot.upper[0]))
+    assert limit - 5 < out.clear_until.q_deg[0] < limit
+    assert back.out_of_limits[0].t0_s == 0 < back.collisions[0].t0_s
+    assert back.clear_until is None
 
 
 @pytest.mark.parametrize(
