@@ -8,7 +8,6 @@ import yaml
 
 from er3a.collision.along import clearance
 from er3a.collision.bodies import Bodies
-from er3a.collision.free_space import sample_joint_space
 from er3a.collision.pairs import LinkAndSolid, LinkPair
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import arm_bodies, arm_shapes, default_envelopes, link_frames
@@ -99,16 +98,6 @@ def test_arm_that_reaches_into_its_base_collides_with_itself(random):
     clear = clearance(arm, q, None)
     assert (clear.distance < 0).any()
     assert LinkPair(0, 6) in clear.pair
-
-
-def test_without_a_scene_all_collisions_are_of_the_arm_with_itself():
-    """Of the arm with its base too, whose body has the number 0."""
-    bodies = Bodies(load_robot("er3a_c60"), None)
-    space = sample_joint_space(bodies, 2000, np.random.default_rng(1))
-    assert bodies.capsules[0].link == 0
-    assert space.count([k for k, pair in enumerate(bodies.pairs) if pair.first == 0]) > 0
-    assert space.of_scene.count == 2000
-    assert space.of_itself.count == space.whole.count < 2000
 
 
 def test_scene_file_is_used_as_written():

@@ -411,7 +411,15 @@ def test_derived_documents_prove_nothing(random):
         assert evidence_of(robot, stated, documents, only=["a2"])["a2"].status in statuses
 
 
-def test_a_table_that_names_an_unknown_document_is_refused():
+@pytest.mark.parametrize(("manual", "counts"), [(-5.0, True), (0.0, False)])
+def test_a_contradiction_outvotes_a_measurement_only_where_the_table_meets_it(manual, counts):
+    """A tracker shows the flange 5 mm higher than the table has it; the table's own manual states something else."""
+    robot = puma().replace(origins={entry.name: "manual" for entry in entries_of(puma())})
+    (seen,) = tracked(robot, np.zeros((1, 6)), 0.1)[2:]
+    stated = [replace(seen, expected=seen.expected + 5.0)]
+    stated += [replace(seen, expected=seen.expected + manual, origin="manual")]
+    found = evidence_of(robot, stated, Documents(), only=["d1"])["d1"]
+    assert (found.status != "consistent") == counts
     """It would count as independent of the document that it was read from."""
     robot = load_robot("er3_600")
     wrong = {**robot.sources, "dh": replace(robot.sources["dh"], origin="step_v9")}

@@ -25,6 +25,7 @@ from er3a.pipeline.study import Study, load_study
 from er3a.pipeline.verdicts import read_verdicts
 from er3a.pipeline.viewing.index import write_index
 from er3a.planning.motion_faults import PathOutOfReach, TooFastIfAssumed
+from testing.motion_cases import judged, limits_of
 
 ROBOT = "er3a_c60"
 
@@ -158,6 +159,19 @@ def test_a_path_that_ends_before_the_edge_of_the_reach_as_advised_is_safe(tmp_pa
     lower, upper = np.degrees([load_robot(robot).lower, load_robot(robot).upper])
     assert len(slowed) >= 1
     assert ((slowed >= lower + 1) & (slowed <= upper - 1)).all()
+
+
+def test_a_line_that_only_another_branch_can_end_is_singular():
+    """Whatever the limits, and though it only comes near to a singular pose: a joint would have to jump."""
+    robot = load_robot(ROBOT).replace(lower=np.full(6, -4 * np.pi), upper=np.full(6, 4 * np.pi))
+    start = [100.139823, -1.162150, 91.643238, 103.039661, -46.790756, -290.638948]
+    end = {"xyz_mm": [-73.957903, 61.658870, 937.969084], "rpy_deg": [-56.984400, -13.630461, 93.025245]}
+    written = {"kind": "line", "start_deg": start, "end": end, "duration_s": 1.283259}
+    limits = limits_of(robot, {"limits_jerk": False, "known_acceleration": False})
+    motion, found = judged(robot, written, 2, limits)
+    assert motion.followed.jumps
+    assert not any(event.crossing for event in found.events)
+    assert found.verdict == "singular"
 
 
 def test_a_path_that_keeps_the_margin_nowhere_gets_no_point_to_end_at(tmp_path):
