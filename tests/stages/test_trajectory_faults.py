@@ -174,6 +174,18 @@ def test_a_line_that_only_another_branch_can_end_is_singular():
     assert found.verdict == "singular"
 
 
+def test_where_a_line_leaves_the_reach_joint_speeds_have_no_bound():
+    """Though all speeds that are solved, up to where the elbow is stretched, are finite."""
+    robot = load_robot("er3_600")
+    end = {"xyz_mm": [-414.2, -333.5, 469.2], "rpy_deg": [-4.0, 52.2, 53.8]}
+    written = {"kind": "line", "start_deg": [-123.1, -101.6, 166.3, -178.4, 77.5, 177.8], "end": end, "duration_s": 0.5}
+    _, found = judged(robot, written, 2, limits_of(robot, {"limits_jerk": False, "known_acceleration": False}))
+    (beyond,) = found.beyond
+    assert 0 < beyond.start < beyond.end == 0.5
+    assert not found.speed_bounded
+    assert found.max_rates is None
+
+
 def test_a_path_that_keeps_the_margin_nowhere_gets_no_point_to_end_at(tmp_path):
     results = compute(study_of(tmp_path, "line_collides", settings={"assumed_margin_mm": 400.0}), ROBOT)
     (path,), (fault,) = results.summary.paths, faults(results)
