@@ -79,6 +79,23 @@ def test_an_arm_that_is_back_where_it_was_may_have_been_elsewhere():
     assert len(found.contacts) == 1
 
 
+def test_a_whole_turn_at_constant_speed_may_have_met_something():
+    """Joint 1 turns once between the only two points, at both of which the arm is the same; nothing accelerates it."""
+    robot = load_robot("er3a_c60")
+    held, axis = np.radians([0, -90, 75, 0, 15, 0]), np.eye(6)[0]
+
+    def joints(t):
+        return held + 2 * np.pi * t[:, None] * axis
+
+    def rates(start, end):
+        return np.tile(2 * np.pi * axis, (len(start), 1)), np.zeros((len(start), 6))
+
+    at = forward(robot, held + np.pi * axis)[:3, 3] * 1000
+    scene = scene_of(spheres=[{"name": "ball", "radius_mm": 100, "xyz_mm": at.tolist()}])
+    assert (clearance(robot, joints(ENDS), scene).distance > 0.01).all()
+    assert len(clearance_along(Bodies(robot, scene), joints, rates, ENDS, ENDS, 0.09).contacts) == 1
+
+
 def test_obstacle_that_is_passed_by_is_not_met(robot):
     move, at = swing(robot)
     wire = {"name": "wire", "radius_mm": 0.2, "length_mm": 2}

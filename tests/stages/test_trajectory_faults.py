@@ -14,6 +14,7 @@ from lxml import etree
 from er3a.collision.pairs import ShapesAssumed
 from er3a.files.path_file import load_paths
 from er3a.files.robot_library import load_robot
+from er3a.kinematics.forward import forward
 from er3a.pipeline.messages.trajectory import SoundEnd, advice, end_text, first_faults
 from er3a.pipeline.program_reports import programs_of
 from er3a.pipeline.stages import run
@@ -24,6 +25,7 @@ from er3a.pipeline.study import Study, load_study
 from er3a.pipeline.verdicts import read_verdicts
 from er3a.pipeline.viewing.index import write_index
 from er3a.planning.motion_faults import PathOutOfReach, TooFastIfAssumed
+from testing.motion_cases import judged, limits_of
 
 ROBOT = "er3a_c60"
 
@@ -159,6 +161,31 @@ def test_a_path_that_ends_before_the_edge_of_the_reach_as_advised_is_safe(tmp_pa
     assert ((slowed >= lower + 1) & (slowed <= upper - 1)).all()
 
 
+def test_a_line_that_only_another_branch_can_end_is_singular():
+    """Whatever the limits, and though it only comes near to a singular pose: a joint would have to jump."""
+    robot = load_robot(ROBOT).replace(lower=np.full(6, -4 * np.pi), upper=np.full(6, 4 * np.pi))
+    start = [100.139823, -1.162150, 91.643238, 103.039661, -46.790756, -290.638948]
+    end = {"xyz_mm": [-73.957903, 61.658870, 937.969084], "rpy_deg": [-56.984400, -13.630461, 93.025245]}
+    written = {"kind": "line", "start_deg": start, "end": end, "duration_s": 1.283259}
+    limits = limits_of(robot, {"limits_jerk": False, "known_acceleration": False})
+    motion, found = judged(robot, written, 2, limits)
+    assert motion.followed.jumps
+    assert not any(event.crossing for event in found.events)
+    assert found.verdict == "singular"
+
+
+def test_where_a_line_leaves_the_reach_joint_speeds_have_no_bound():
+    """Though all speeds that are solved, up to where the elbow is stretched, are finite."""
+    robot = load_robot("er3_600")
+    end = {"xyz_mm": [-414.2, -333.5, 469.2], "rpy_deg": [-4.0, 52.2, 53.8]}
+    written = {"kind": "line", "start_deg": [-123.1, -101.6, 166.3, -178.4, 77.5, 177.8], "end": end, "duration_s": 0.5}
+    _, found = judged(robot, written, 2, limits_of(robot, {"limits_jerk": False, "known_acceleration": False}))
+    (beyond,) = found.beyond
+    assert 0 < beyond.start < beyond.end == 0.5
+    assert not found.speed_bounded
+    assert found.max_rates is None
+
+
 def test_a_path_that_keeps_the_margin_nowhere_gets_no_point_to_end_at(tmp_path):
     results = compute(study_of(tmp_path, "line_collides", settings={"assumed_margin_mm": 400.0}), ROBOT)
     (path,), (fault,) = results.summary.paths, faults(results)
@@ -190,6 +217,31 @@ def test_what_is_wrong_before_a_contact_ends_the_sound_part_of_a_path(tmp_path):
     assert "From t = 0.5 s: wrist singularity; from t = 0.9 s (100.0 mm of the path) it is out of reach" in advice(
         beyond, last_sound(beyond, rows, limits)
     )
+
+
+def test_where_limits_are_left_before_a_contact_the_path_may_end_before_them_and_nowhere_if_it_starts_beyond(tmp_path):
+    """Joint 1 turns from 100 to 240 deg past its limit; the tool meets a ball at 210 deg."""
+    robot, ends = load_robot(ROBOT), [[turn, 20, 10, 0, 40, 0] for turn in (100, 240)]
+    at = 1000 * forward(robot, np.radians([210.0, *ends[0][1:]]))[:3, 3]
+    ball = {"name": "ball", "radius_mm": 20, "xyz_mm": at.tolist()}
+    move = {"kind": "joint", "title": "Turn", "duration_s": 3, "samples": 5}
+    paths = [
+        move | {"name": name, "start_deg": [*start], "end_deg": [*end]}
+        for name, start, end in (("out", *ends), ("in", *ends[::-1]))
+    ]
+    for name, content in (("scene", {"title": "A ball", "spheres": [ball]}), ("paths", {"paths": paths})):
+        (tmp_path / f"{name}.yaml").write_text(yaml.safe_dump({"kind": name} | content), encoding="utf-8")
+    study = load_study("config/small.yaml")
+    files = {name: str(tmp_path / f"{name}.yaml") for name in ("scene", "paths")}
+    settings = study.trajectory.model_copy(update={"avoidance": "slow"})
+    entry = study.robots[ROBOT].model_copy(update=files)
+    study = study.model_copy(update={"robots": {ROBOT: entry}, "trajectory": settings})
+    out, back = compute(study, ROBOT).summary.paths
+    assert out.out_of_limits[0].t0_s < out.collisions[0].t0_s
+    limit = float(np.degrees(robot.upper[0]))
+    assert limit - 5 < out.clear_until.q_deg[0] < limit
+    assert back.out_of_limits[0].t0_s == 0 < back.collisions[0].t0_s
+    assert back.clear_until is None
 
 
 @pytest.mark.parametrize(

@@ -265,7 +265,7 @@ def clear_until(
     for _ in range(ATTEMPTS):
         grid = np.linspace(0.0, end, STEPS_TO_CONTACT + 1)
         least = beyond(grid)
-        if not least[0] > 0:
+        if not (end > 0 and least[0] > 0):
             return None
         k = int(np.argmax(least <= 0))
         if k > 0:
