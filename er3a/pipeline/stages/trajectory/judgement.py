@@ -232,10 +232,10 @@ def verdict_of(found: Judgement, along: ClearanceAlong) -> PathVerdict:
 
 def min_clearance(along: ClearanceAlong) -> model.MinClearance | None:
     """Where the arm comes nearest to anything; None where nothing could be measured."""
-    least = along.least
-    if least < 0 or (pair := along.pair[least]) is None:
+    at = along.closest
+    if at < 0 or (pair := along.pair[at]) is None:
         return None
-    return model.MinClearance(float(along.distance[least] * 1000), float(along.t[least]), pair, along.measured)
+    return model.MinClearance(float(along.distance[at] * 1000), float(along.t[at]), pair, along.measured)
 
 
 def clear_until(
@@ -268,10 +268,10 @@ def clear_until(
     end = min([first, *(BEFORE_STOP * stop for stop in stops)])
     for _ in range(ATTEMPTS):
         grid = np.linspace(0.0, end, STEPS_TO_CONTACT + 1)
-        least = beyond(grid)
-        if not least[0] > 0:
+        spare = beyond(grid)
+        if not spare[0] > 0:
             return None
-        k = int(np.argmax(least <= 0))
+        k = int(np.argmax(spare <= 0))
         if k > 0:
             end = scipy.optimize.brentq(lambda t: beyond(np.array([t]))[0], grid[k - 1], grid[k], xtol=1e-9 * first)
         known = np.append(motion.t[motion.t < end], end)
