@@ -272,7 +272,8 @@ def _pose(placed: PlacedMotion) -> Reals:
 
 
 MAX_TURN = 1.0  # rad, to which the twist of a rotation vector that changes has been bounded
-MAX_GROWTH = 0.7
+MAX_GROWTH = 0.7  # spectral radius of what bounds a joint's motion by itself: beyond, the bound does not converge
+FIRST_GUESS, LARGER = 1.2, 1.1  # times the motion to first order, tried as its bound; times the bound that fails
 STEP, BLUR = 1e-5, 1e-8  # rad, of differences of the Jacobian; their error
 ATTEMPTS = 6
 SAME = 1e-7  # rad
@@ -337,7 +338,7 @@ class ZonePatch:
         # a twist turns with the tool, by no more than the tool does; slack adds to what has to be gone
         aside = [near.size @ np.repeat([self.slack / near.length, turned * angle], 3) for angle in angles]
         first = np.abs(twists @ near.inverse.T) + np.stack(aside)
-        moved = 1.2 * np.maximum(first.max(axis=0), first.max() / 5)
+        moved = FIRST_GUESS * np.maximum(first.max(axis=0), first.max() / 5)
         for _ in range(ATTEMPTS):
             grown = near.grown(moved)
             if grown is None:
@@ -345,7 +346,7 @@ class ZonePatch:
             rates = first @ grown.T
             if (rates <= moved).all():
                 break
-            moved = np.maximum(moved, 1.1 * rates.max(axis=0))
+            moved = np.maximum(moved, LARGER * rates.max(axis=0))
         else:
             return open_
         if (np.abs(q[1:] - q[0]) > rates * (1 + 1e-6) + SAME).any():  # another branch
