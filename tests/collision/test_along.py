@@ -105,7 +105,7 @@ def test_obstacle_that_is_passed_by_is_not_met(robot):
         least = clearance(robot, move.joints(times)[0], scene).distance.min()
         found = along(robot, scene, move)
         assert bool(found.contacts) == (least < 0)
-        assert least - DEPTH < found.distance[found.least] < least + DEPTH
+        assert least - DEPTH < found.distance[found.closest] < least + DEPTH
 
 
 def test_random_motions_among_random_balls_agree_with_dense_sampling(robot, random):
@@ -128,7 +128,7 @@ def test_random_motions_among_random_balls_agree_with_dense_sampling(robot, rand
         assert inside[dense < -DEPTH].all()
         assert not inside[dense > DEPTH].any()
         if not found.contacts:
-            assert found.distance[found.least] < dense.min() + DEPTH
+            assert found.distance[found.closest] < dense.min() + DEPTH
         shown = clearance(robot, move.joints(found.t)[0], scene).distance
         np.testing.assert_allclose(found.distance, shown, atol=1e-6)
         met += bool(found.contacts)

@@ -216,7 +216,9 @@ def test_strategies_are_listed_with_their_costs(results, name):
         assert not stop.usable
         assert 0 < stop.motion.done_ratio < 1
     assert paths["line_out"].strategy is None
-    assert advice(paths["line_out"]).endswith("it is out of reach besides")
+    out = paths["line_out"]
+    assert "it is out of reach besides" in advice(out)
+    assert ("End it at t = " in advice(out)) == (out.sound_end is not None)
     last, met = paths["line_collides"].clear_until, paths["line_collides"].collisions[0]
     assert 0 < last.t_s < met.t0_s
     assert f"up to t = {last.t_s:.4g} s ({last.s_m * 1000:.1f} mm): end the path there" in advice(

@@ -15,12 +15,13 @@ from er3a.collision.pairs import ShapesAssumed
 from er3a.files.path_file import load_paths
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
-from er3a.pipeline.messages.trajectory import SoundEnd, advice, end_text, first_faults
+from er3a.pipeline.messages.trajectory import advice, end_text, first_faults
 from er3a.pipeline.program_reports import programs_of
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.trajectory.compute import compute
-from er3a.pipeline.stages.trajectory.model import Singularity
-from er3a.pipeline.stages.trajectory.played import advised, faults, last_sound
+from er3a.pipeline.stages.trajectory.judgement import sound_end
+from er3a.pipeline.stages.trajectory.model import Singularity, SoundEnd
+from er3a.pipeline.stages.trajectory.played import advised, faults
 from er3a.pipeline.study import Study, load_study
 from er3a.pipeline.verdicts import read_verdicts
 from er3a.pipeline.viewing.index import write_index
@@ -131,8 +132,8 @@ def test_a_path_that_ends_before_the_edge_of_the_reach_as_advised_is_safe(tmp_pa
     """At the end that index and page name: in the same time and after a stop from it the joints keep all limits."""
     results = compute(study_of(tmp_path, name, robot=robot), robot)
     (path,), (fault,), limits = results.summary.paths, faults(results), results.summary.joint_limits
-    last = last_sound(path, results.checks, limits)
-    said = advice(path, last)
+    last = path.sound_end
+    said = advice(path)
     (entry,) = (each for each in load_paths(f"data/paths/{robot}.yaml").paths if each.name == name)
     start, end = np.array(entry.start.xyz_mm), np.array(entry.end.xyz_mm)
     found = re.search(
@@ -197,17 +198,20 @@ def test_a_path_that_keeps_the_margin_nowhere_gets_no_point_to_end_at(tmp_path):
 def test_what_is_wrong_before_a_contact_ends_the_sound_part_of_a_path(tmp_path):
     results = compute(study_of(tmp_path, "line_collides"), ROBOT)
     (path,), rows, limits = results.summary.paths, results.checks, results.summary.joint_limits
-    assert last_sound(path, rows, limits)[0] == path.clear_until.t_s > 0.5
+    assert sound_end(path, rows, limits) == path.sound_end
+    assert path.sound_end.t_s == path.clear_until.t_s > 0.5
     passed, crossed = (Singularity(0.5, 0.5, "wrist", crossing, 0.0, None) for crossing in (False, True))
-    assert last_sound(replace(path, singularities=(passed,)), rows, limits)[0] == path.clear_until.t_s
+    assert sound_end(replace(path, singularities=(passed,)), rows, limits).t_s == path.clear_until.t_s
     early = replace(path, singularities=(crossed,))
-    assert 0.4 < last_sound(early, rows, limits)[0] < 0.5
-    assert "keeps" not in advice(early, last_sound(early, rows, limits))
-    assert 0.2 < last_sound(path, replace(rows, near_singular=rows.t_s > 0.3), limits)[0] <= 0.3
+    early = replace(early, sound_end=sound_end(early, rows, limits))
+    assert 0.4 < early.sound_end.t_s < 0.5
+    assert "keeps" not in advice(early)
+    assert 0.2 < sound_end(path, replace(rows, near_singular=rows.t_s > 0.3), limits).t_s <= 0.3
     near = replace(rows, near_singular=rows.t_s >= 0)
-    assert last_sound(path, near, limits) is None
-    assert "end the path there" not in advised(path, near, limits)
-    assert "near-singular at the start" in advised(path, near, limits)
+    assert sound_end(path, near, limits) is None
+    nowhere = replace(path, sound_end=None)
+    assert "end the path there" not in advised(nowhere, near, limits)
+    assert "near-singular at the start" in advised(nowhere, near, limits)
     fast = replace(path.collisions[0], t0_s=0.7, cause=TooFastIfAssumed(2, 900.0, 180.0))
     several = replace(early, too_fast=(fast,), avoidance=path.avoidance * 2)
     assert [t for t, _ in first_faults(several)] == [0.5, path.collisions[0].t0_s]
@@ -215,7 +219,7 @@ def test_what_is_wrong_before_a_contact_ends_the_sound_part_of_a_path(tmp_path):
     assert (fault.when, fault.what[:18]) == ("0.500 s", "wrist singularity;")
     beyond = replace(several, unreachable=(replace(fast, t0_s=0.9, s0_m=0.1, cause=PathOutOfReach(())),))
     assert "From t = 0.5 s: wrist singularity; from t = 0.9 s (100.0 mm of the path) it is out of reach" in advice(
-        beyond, last_sound(beyond, rows, limits)
+        replace(beyond, sound_end=sound_end(beyond, rows, limits))
     )
 
 

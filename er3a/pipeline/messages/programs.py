@@ -85,7 +85,7 @@ REMEDIES: dict[str, str] = {
     "line_not_checked": BY_HAND,
     "may_move": BY_HAND,
     "program_not_understood": BY_HAND,
-    "program_not_simulated": N_("Check on the controller what this instruction does to the motions behind it."),
+    "program_not_simulated": N_("Check on the controller what this instruction does to the motions after it."),
     "program_form_inferred": N_("Compare this element with what the controller does."),
     "external_axes_left_out": N_("Check by hand that the external axes stand as assumed."),
     "target_not_given": N_("Give the target in the program or in its data file."),

@@ -478,7 +478,7 @@ OF_ALL_RUNS = (  # what may turn any of them unsafe
     *("obstacles", "uncovered_links", "bare_tool", "base_inside", "allowed_contacts", "program_rest", "given_rates"),
     *("controller_language", "tool", "carried", "torques"),
 )
-MOST_FAULTS = 20  # of a robot's paths, and of its programs, that are listed
+MAX_FAULTS = 20  # of a robot's paths, and of its programs, that are listed
 PLACE_LETTERS = 160
 VOID_TAGS = ("br", "img", "input", "wbr", "hr")
 _NOT_READ = re.compile(r'<(script|style)\b.*?</\1>|\ssrc="data:[^"]*"|\sdata-[\w-]+="[^"]*"', re.DOTALL)
@@ -505,7 +505,7 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         questions={stage.name: stage.question for stage in STAGES.values()},
         shown_figures=SHOWN_FIGURES,
         run_words=RUNS,
-        most_faults=MOST_FAULTS,
+        most_faults=MAX_FAULTS,
         sweeps=sweep_sections(study, results),
         command=page.run_command(study, "index.html"),
         provenance=Provenance(

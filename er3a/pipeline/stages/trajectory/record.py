@@ -85,7 +85,7 @@ def _runs(robot: Robot, results: TrajectoryResults, path: PathSummary) -> Iterat
         shapes=[*still, *_trail(shown, HIGHLIGHT)],
     )
     if path.chosen and path.chosen.motion:
-        to_do = advice(path, limits=results.summary.joint_limits) or ""
+        to_do = advice(path, results.summary.joint_limits) or ""
         repair: MotionRows = motions.take((motions.path == path.name) & (motions.strategy == path.strategy))
         repaired = repair.take(_frames(repair))
         yield Run(

@@ -193,9 +193,9 @@ def _programs_table(robot: Robot, chosen: ChosenGrasp, head: tuple[str, ...]) ->
     return write_csv(np.concatenate(times), shown(robot, joints), poses, comments, joint_columns(robot))
 
 
-def _closes(before: GraspLeg, behind: GraspLeg) -> bool:
+def _closes(before: GraspLeg, after: GraspLeg) -> bool:
     """Whether the gripper closes between two legs."""
-    return before.part == "approach" and behind.part == "retreat"
+    return before.part == "approach" and after.part == "retreat"
 
 
 def calibration_result(
