@@ -42,9 +42,11 @@ from er3a.pipeline.messages.validation import (
     unconfirmed,
 )
 from er3a.pipeline.messages.workspace import box_text, judged_void, void_text
+from er3a.pipeline.player.motions import Fault
 from er3a.pipeline.results import (
     AbsentResults,
     Input,
+    NoPass,
     Provenance,
     Stored,
     input_records,
@@ -53,6 +55,7 @@ from er3a.pipeline.results import (
     read_status,
     result_records,
 )
+from er3a.pipeline.stages.expectations import unmet_expectations
 from er3a.pipeline.stages.programs.model import ProgramsResults, ProgramSummary
 from er3a.pipeline.stages.programs.played import faults as program_faults
 from er3a.pipeline.stages.registry import STAGES, all_messages
@@ -804,6 +807,7 @@ def _run(stage: str, results: TrajectoryResults | ProgramsResults) -> dict[str, 
         followed, lost, faults = results.summary.programs, 0, program_faults(results)
     else:
         followed, lost, faults = results.summary.paths, len(results.summary.not_followed), path_faults(results)
+    faults += _otherwise(stage, followed, {fault.name for fault in faults})
     faulty = {fault.name for fault in faults}
     sound = [each.name for each in followed if each.name not in faulty]
     left_out = [left_out_text(each) for each in results.summary.not_examined if each.subject in OF_ALL_RUNS]
@@ -814,8 +818,30 @@ def _run(stage: str, results: TrajectoryResults | ProgramsResults) -> dict[str, 
         "sound": sound,
         "faults": faults,
         "open": left_out,
+        "no_pass": say(NoPass(missed)) if (missed := results.summary.verdict.missed) else "",
         "more": len(results.summary.not_examined) - len(left_out),
     }
+
+
+def _otherwise(stage: str, followed: Sequence[ProgramSummary | PathSummary], faulty: set[str]) -> list[Fault]:
+    """Those that pass although their file expects something else: file or check is not what it is taken for."""
+    unmet = unmet_expectations(followed)
+    return [
+        Fault(
+            each.name,
+            "",
+            "fail",
+            tr("not as expected"),
+            False,
+            "",
+            say(each),
+            "",
+            f"{stage}.html#{each.name}",
+            first=say(each),
+        )
+        for each in (unmet.unmet if unmet else ())
+        if each.name not in faulty
+    ]
 
 
 def _note(stage: str, head: Head, results: Any) -> str:
