@@ -449,6 +449,8 @@ def _cycle(
                 continue
             stopping += motion.way.law.duration
             saved += motion.way.law.saved_by_blend * motion.blended_ends
+        elif isinstance(instruction, ArmMotion):
+            complete = False  # most_motions, or the time, ended before it
     return CycleTime(stopping - saved + pauses, stopping + pauses, pauses, waits, again is not None, complete)
 
 

@@ -107,6 +107,28 @@ def test_a_fault_ends_with_a_code_and_a_demonstration_is_counted_apart(tmp_path,
     assert (f"{shown} meant to be faulty and found so" in cell) == bool(shown)
 
 
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("expect", "scene", "passing", "words"),
+    [
+        ({}, "data/scenes/table_and_post.yaml", 1, ""),
+        ({"line_clean": "collides"}, "data/scenes/table_and_post.yaml", 0, "not as expected"),
+        ({}, None, 1, "Not examined, and therefore no pass: obstacles"),
+    ],
+)
+def test_the_index_says_where_it_counts_what_passes_why_that_is_no_pass(tmp_path, expect, scene, passing, words):
+    """A path that is safe although its file expects a collision, and one that was checked without obstacles."""
+    study = study_of(tmp_path, "line_clean", expect=expect, settings={"avoidance": "slow", "scene": scene})
+    run.compute("trajectory", study, ROBOT, tmp_path / "results" / ROBOT / "trajectory")
+    write_index(study, tmp_path / "results", tmp_path)
+    text = (tmp_path / "index.html").read_text(encoding="utf-8")
+    decision, rest = text.split(f"{passing} of 1 paths pass", 1)[1].split("</tr>", 1)
+    shown = decision if scene is None else rest.split("The verdict of each stage")[0]
+    assert words in shown
+    for other in {"not as expected", "and therefore no pass: obstacles"}:
+        assert (other in text) == bool(words and other in words)
+
+
 @pytest.mark.parametrize("name", ["line_collides", "line_limits"])
 def test_a_path_that_ends_where_its_advice_says_keeps_the_margin(tmp_path, name):
     """The advised point as it is printed, in the path's own file, judged by the stage itself."""

@@ -605,5 +605,5 @@ def cycle_text(program: ProgramSummary) -> str:
     time = tr("{time} s", time=low) if low == high else tr("{low} to {high} s", low=low, high=high)
     what = tr("one round: {time}", time=time) if cycle.repeats else time
     waits = sentence("programs.waits", count=cycle.waits) if cycle.waits else ""
-    unknown = "" if cycle.complete else tr("without the motions whose path is unknown")
+    unknown = "" if cycle.complete else tr("without motions whose path is unknown or was not checked")
     return joined([what, waits, unknown], ", ")

@@ -145,8 +145,6 @@ def shown_verdict(path: model.PathSummary, near: ClearOfAssumed | None) -> tuple
     """A path's verdict in colour and words; ``near`` as of :func:`near_assumed`."""
     if path.verdict == "safe" and near:
         return "caution", tr("clear of assumed shapes only")
-    if path.verdict == "safe":
-        return "plain", tr("safe in the model")
     collides = outcome_word("collides") if path.collisions and path.verdict != "collides" else ""
     return WEIGHTS[path.verdict], joined([outcome_word(path.verdict), collides], ", ")
 
