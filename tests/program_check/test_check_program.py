@@ -21,6 +21,7 @@ from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.program_check.motion_checks import _slot
 from er3a.programs.instructions import numbers_of
 from er3a.programs.languages import read_program
+from testing.program_texts import axes
 
 ROOT = Path(__file__).resolve().parents[2]
 FAULTS = ROOT / "data/programs/faults"
@@ -54,11 +55,6 @@ def checked(text: str, tmp_path: Path, name: str = "a.src", **options):
 def codes(check) -> set[str]:
     """Codes of all findings."""
     return {each.finding.code for each in check.findings}
-
-
-def axes(q) -> str:
-    """Joint angles in rad as a KRL axis position."""
-    return "{" + ", ".join(f"A{i + 1} {np.degrees(angle):.6f}" for i, angle in enumerate(q)) + "}"
 
 
 def frame(T) -> str:
