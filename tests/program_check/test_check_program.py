@@ -18,10 +18,10 @@ from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.solutions import branch_labels
 from er3a.program_check.check_program import CheckOptions, check_program
-from er3a.program_check.motion_checks import _slot
 from er3a.programs.instructions import numbers_of
 from er3a.programs.languages import read_program
 from testing.program_texts import axes
+from testing.singular_poses import branch_of
 
 ROOT = Path(__file__).resolve().parents[2]
 FAULTS = ROOT / "data/programs/faults"
@@ -176,7 +176,7 @@ def test_the_branch_of_joint_angles_is_that_of_the_inverse():
     for q in rng.uniform(ROBOT.lower, ROBOT.upper, (50, 6)):
         found = inverse(ROBOT, forward(ROBOT, q), q)
         nearest = int(np.abs(found.q - q).max(axis=1).argmin())
-        assert _slot(ROBOT, q) == found.branch[nearest]
+        assert branch_of(ROBOT, q) == found.branch[nearest]
     assert len(set(branch_labels(ROBOT))) == 8
 
 
