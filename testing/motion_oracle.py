@@ -31,12 +31,12 @@ NOISE = (0, 8, 32, 128)  # roundings of an angle in a difference of each order
 
 
 def quintic_law(u):
-    """Share of the way from rest to rest at shares (n,) of the time."""
+    """Path parameter of a quintic law from rest to rest, at normalised times (n,)."""
     return u**3 * (10 - 15 * u + 6 * u**2)
 
 
 def trapezoid_law(u, ramp):
-    """The same with even ramps."""
+    """Path parameter of a trapezoidal law with equal ramps, at normalised times (n,)."""
     top = 1 / (1 - ramp)
     up, down = top * u**2 / (2 * ramp), 1 - top * (1 - u) ** 2 / (2 * ramp)
     return np.where(u < ramp, up, np.where(u > 1 - ramp, down, top * (u - ramp / 2)))
@@ -57,7 +57,7 @@ def halting_law(corners, halts, duration, ramp):
 
 
 def timed_law(corners, halts, times):
-    """Through corners at their times: monotone cubics, at rest where they halt."""
+    """Law through corners at given times: monotone cubics, at rest where they halt."""
     slopes = PchipInterpolator(times, corners).derivative()(times)
     slopes[halts] = 0.0
 
@@ -174,7 +174,7 @@ def joint_path(spec) -> tuple[Callable, np.ndarray]:
 
 @dataclass(frozen=True)
 class Arm:
-    """What plane trigonometry needs of an arm, read off its chain at rest."""
+    """Lengths and offsets that plane trigonometry needs, read off the chain with all joints at 0."""
 
     links: np.ndarray
     direction: np.ndarray
@@ -256,7 +256,7 @@ def arm_of(table) -> Arm:
 
 
 def _meeting(frames):
-    """The point next to the z axes of frames."""
+    """The point nearest to the z axes of frames, by least squares."""
     A, b = np.zeros((3, 3)), np.zeros(3)
     for T in frames:
         across = np.eye(3) - np.outer(T[:3, 2], T[:3, 2])
@@ -453,7 +453,7 @@ class Truth:
 
 
 def truth(spec, arm: Arm, limits, q_start=None, points=POINTS) -> Truth:
-    """Look at a path; limits: (speed, acceleration) or (speed, acceleration, jerk), each (6,)."""
+    """Sample a path densely; limits: (speed, acceleration) or (speed, acceleration, jerk), each (6,), rad and s."""
     if q_start is None:
         joints, ends = joint_path(spec)
         duration = ends[-1]

@@ -9,7 +9,7 @@ V = TypeVar("V")
 
 
 class OnDemand(dict[str, V]):
-    """By name, each made once."""
+    """Results by name, each computed once."""
 
     def __init__(self, make: Callable[[str], V]):
         super().__init__()

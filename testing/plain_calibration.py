@@ -30,7 +30,7 @@ class MeasuredArm:
 
 
 def measured_arm(robot: Path, positions: Path) -> MeasuredArm:
-    """Read with nothing of er3a; standard D-H, no offsets, directions all +1."""
+    """Read without er3a: standard D-H, no offsets, all directions +1."""
     content = yaml.safe_load(robot.read_text(encoding="utf-8"))
     rows = content["dh"]["rows"]
     with positions.open(encoding="utf-8") as file:
@@ -69,5 +69,5 @@ def plain_fit(arm: MeasuredArm, used: NDArray[np.bool_]) -> Reals:
 
 
 def distances(arm: MeasuredArm, numbers: Reals, which: NDArray[np.bool_]) -> Reals:
-    """How far the points of some positions are from the measured ones, mm."""
+    """Distances (P,), mm, between computed and measured points."""
     return np.linalg.norm(positions(arm, numbers, arm.q[which]) - arm.xyz[which], axis=1)

@@ -29,7 +29,7 @@ Rows = dict[str, np.ndarray]
 
 
 def table_of(robot: str) -> Rows:
-    """A robot's standard table as its file prints it."""
+    """A robot's standard D-H table as written in its file, mm and deg."""
     content = yaml.safe_load((DATA / "robots" / f"{robot}.yaml").read_text(encoding="utf-8"))
     dh, zero, limits = (content[group]["rows"] for group in ("dh", "zero", "limits"))
     columns = {
@@ -233,7 +233,7 @@ def off(rows: Rows, said: Statement) -> np.ndarray | None:
 
 
 def worst(rows: Rows, stated: list[Statement]) -> np.ndarray:
-    """The greatest miss (H,) of statements, in half-widths; 1 and less is met."""
+    """The largest deviation (H,) from statements, in half-widths; up to 1 is within the uncertainty."""
     found = [each for each in (off(rows, said) for said in stated) if each is not None]
     return np.max(found, axis=0) if found else np.zeros(len(rows["a"]))
 

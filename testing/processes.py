@@ -1,4 +1,4 @@
-"""Processes that end with what started them, all that they started themselves included."""
+"""Processes that end together with their children when the caller ends."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ def started(command: Sequence[Any], **options: Any) -> Iterator[subprocess.Popen
 
 
 def end(process: subprocess.Popen[str]) -> None:
-    """Kill a process that was started in a session of its own, and the others of its session."""
+    """Kill a process that was started in its own session, and all others of that session."""
     with suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL)
     process.wait()
 
 
 def run(command: Sequence[Any], **options: Any) -> subprocess.CompletedProcess[str]:
-    """What ``subprocess.run`` does with captured output, but a process that is cut off leaves none behind."""
+    """As ``subprocess.run`` with captured output, but a process that times out leaves no children."""
     with started(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, **options) as process:
         output, errors = process.communicate()
     return subprocess.CompletedProcess(list(command), process.returncode, output, errors)

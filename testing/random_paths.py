@@ -1,4 +1,4 @@
-"""Random joint moves and straight lines, and what a finer sampling finds on them."""
+"""Random joint moves and straight lines, and the events that a finer sampling finds on them."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def random_joint_move(robot, random) -> Path:
 
 
 def random_line(robot, random) -> Path:
-    """Between the poses of two arms, the second one not far from the first; it may leave the reach."""
+    """A line between the tool poses of two random joint vectors near each other; it may leave the reach."""
     q = random.uniform(robot.lower, robot.upper)
     return _followed(robot, q, q + random.uniform(-0.6, 0.6, 6))
 

@@ -1,4 +1,4 @@
-"""Copies of the project in which tests and campaigns run the small study, and do what they like to it."""
+"""Copies of the project in which tests and campaigns run, and may damage, the small study."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ PARTS = ("Snakefile", "Makefile", "workflow", "er3a", "config", "data", "profile
 
 
 def fresh(folder: Path, project: Path = ROOT) -> Path:
-    """A copy of the project without results; modules that are compiled already stay so."""
+    """A copy of the project without results; compiled modules are kept."""
     folder.mkdir(parents=True)
     for part in PARTS:
         source = project / part
@@ -39,7 +39,7 @@ def run_command(*words: str) -> list[str]:
 
 
 def run(folder: Path) -> subprocess.CompletedProcess[str]:
-    """Run the small study in a copy, to its end."""
+    """Run the small study in a copy to its end."""
     command = run_command()
     return subprocess.run(command, cwd=folder, env=environment(folder), capture_output=True, text=True, check=False)
 

@@ -167,7 +167,7 @@ def _what_more(
 
 
 def _what_touches(settled: int, best: int, observations: PointObservations) -> MoreTouches:
-    """How many poses at each place, for ``best`` of the numbers to be settled, with one to spare."""
+    """Number of poses needed at each place to determine ``best`` numbers, with one to spare."""
     things = observations.things()
     numbers = sum(each.numbers for each in things)
     missing, each = max(best - settled, best + 1 - numbers), []
@@ -186,7 +186,7 @@ def _rich(robot: Robot, observations: Observations) -> Observations:
 
 
 def _examples(robot: Robot, kept: list[Parameter], observations: Observations) -> tuple[Pose, ...]:
-    """Poses that add most to what is known: greedily the largest gain in ln det of the information matrix."""
+    """Poses that add most information, chosen greedily by the gain in ln det of the information matrix."""
     poses = spread(robot)
     candidates = observations.flange_at(robot, poses)
     blocks = SCALE * jacobian(robot, kept, candidates).reshape(len(poses), 3, len(kept))
@@ -397,7 +397,7 @@ class Calibration(ByValue, Displayed):
 
 @dataclass(frozen=True)
 class JointShare:
-    """What corrections of a joint, of base or tool do to the measured points.
+    """Effect of the corrections of a joint, of base or of tool on the measured points.
 
     Attributes
     ----------

@@ -151,12 +151,12 @@ class Touched:
 
     @property
     def numbers(self) -> int:
-        """How many independent numbers its poses give."""
+        """Number of independent values that its poses give."""
         return self.coordinates * max(self.poses - self.unknown, 0)
 
     @property
     def coordinates(self) -> int:
-        """How many numbers one more pose gives."""
+        """Number of coordinates that one more pose gives."""
         return 3 if self.kind == "place" else 1
 
 
@@ -350,7 +350,7 @@ class PointObservations:
         return values
 
     def positions(self, robot: Robot) -> Reals:
-        """Where a robot puts the measured points (P, 3), m."""
+        """Measured points (P, 3), m, by a robot's table, in its base frame."""
         T = frames_of(tables_of(robot), robot, self.row_values)[0][:, -1]
         found: Reals = np.einsum("pij,pj->pi", T[:, :3, :3], self.points(robot)) + T[:, :3, 3]
         return found

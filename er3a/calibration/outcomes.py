@@ -1,4 +1,4 @@
-"""What a calibration could not estimate, and what it would take."""
+"""What a calibration could not estimate, and which measurements are missing."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ class MovesNothing(Finding):
 
 
 class NotToldApart(Finding):
-    """Entries act alike on the measured points; ``parallel_joints``: because these joints are parallel, if so."""
+    """Entries have the same effect on the measured points; ``parallel_joints``: joints whose parallel axes cause it."""
 
     entries: tuple[str, ...]
     parallel_joints: tuple[int, int] | None
 
 
 class SetsScale(Finding):
-    """No length was measured, so that the longest keeps its value, and all others are given beside it."""
+    """No length was measured, so the longest keeps its value and the others are relative to it."""
 
     entry: str
 
@@ -49,7 +49,7 @@ class NoPositions(Finding):
 
 
 class MorePositions(Finding):
-    """A level asks for more positions.
+    """A level needs more positions.
 
     Attributes
     ----------
@@ -91,7 +91,7 @@ class MoreTouches(Finding):
 
 
 class NoCorrectionFits(Finding):
-    """The steps do not end: the table has a gross fault or is another arm's."""
+    """The iteration does not converge: the table has a gross fault or is another arm's."""
 
     steps: int
     rest_mm: float
@@ -109,7 +109,7 @@ class CalibrationError(Er3aError):
 
 
 class Misfit(Finding):
-    """No corrections make the table meet the positions to three times their uncertainty."""
+    """No corrections bring the table within three times the uncertainty of the positions."""
 
     level: LevelName
     rms_before_mm: float
@@ -117,7 +117,7 @@ class Misfit(Finding):
 
 
 class CorrectionsFound(Finding):
-    """Entries whose 95 % interval does not hold 0."""
+    """Entries whose 95 % interval does not contain 0."""
 
     entries: tuple[str, ...]
 

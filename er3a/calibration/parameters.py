@@ -43,7 +43,7 @@ class Parameter:
 
     @property
     def name(self) -> str:
-        """Such as ``d4``, ``base_x``."""
+        """The parameter's name, such as ``d4`` or ``base_x``."""
         return f"{self.column}{self.joint}" if self.joint else self.column
 
     @property
@@ -83,13 +83,13 @@ def parameters_of(robot: Robot, level: LevelName) -> tuple[Parameter, ...]:
 
 
 def placements_of(names: Sequence[PlacementName]) -> tuple[Parameter, ...]:
-    """The numbers that place base and tool, which are preferred to a table's entries that act as they do."""
+    """The parameters of base and tool; they are preferred to table entries with the same effect."""
     columns = (BASE_COLUMNS if "base" in names else ()) + (TOOL_COLUMNS if "tool" in names else ())
     return tuple(Parameter(column, 0) for column in columns)
 
 
 def all_parameters(robot: Robot) -> tuple[Parameter, ...]:
-    """Every number that a calibration can correct of the robot."""
+    """Every parameter of the robot that a calibration can correct."""
     joints = range(1, robot.rows + 1)
     table = (Parameter(column, j) for column in ("a", "alpha", "beta", "d", "offset") for j in joints)
     return (*table, *placements_of(("base", "tool")))
@@ -129,7 +129,7 @@ WIDEST = 0.05
 
 
 def settles(robot: Robot, unit: Literal["mm", "deg"], half_width: float) -> bool:
-    """Whether half of a 95 % interval, mm or deg, is less than what the table of an arm could be wrong by."""
+    """Whether the half-width of a 95 % interval, mm or deg, is less than the largest plausible error of a table."""
     strokes = (robot.upper - robot.lower)[robot.slides]
     size_mm = 1000 * float(np.abs(robot.a).sum() + np.abs(robot.d).sum() + strokes.sum())
     return half_width <= WIDEST * (size_mm if unit == "mm" else float(np.degrees(1)))

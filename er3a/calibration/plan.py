@@ -299,14 +299,14 @@ def _touching(
 
 
 def _points(robot: Robot, q: Reals, seen: PointObservations) -> Reals:
-    """Where the table puts the measured point (N, 3), m."""
+    """Measured points by the table (N, 3), m, in the base frame."""
     T = forward(robot if seen.on_tool.any() else robot.without_tool(), q)
     found: Reals = T[:, :3, 3]
     return found
 
 
 def _by_joints(robot: Robot, q: Reals, seen: PointObservations) -> Reals:
-    """How the measured point moves with joints, (N, 3, n), m per rad or m."""
+    """Jacobian of the measured point by the joints, (N, 3, n), m/rad or m/m."""
     point = robot.tool[:3, 3] if seen.on_tool.any() else np.zeros(3)
     by_row = effects(robot, row_values(robot, q), np.broadcast_to(point, (len(q), 3)))
     coupling = np.eye(robot.rows, robot.joints) if robot.coupling is None else robot.coupling

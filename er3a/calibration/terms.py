@@ -52,7 +52,7 @@ class JointTerm:
 
     @property
     def count(self) -> int:
-        """How many coefficients it has."""
+        """Number of coefficients."""
         return 2 if self.kind in ("once", "twice", "ripple") else 1
 
     def shapes(self, x: Reals, climb: Reals, own_climb: Reals) -> Reals:
@@ -75,7 +75,7 @@ class JointTerm:
 
 
 def candidates(robot: Robot, kinds: Sequence[TermKind] = KINDS) -> tuple[JointTerm, ...]:
-    """The terms that are tried beside ripples; prismatic joints have no turns."""
+    """The terms that are tried besides ripples; prismatic joints have no harmonics."""
     joints = range(1, robot.rows + 1)
     return tuple(
         JointTerm(kind, row, by=by)
@@ -90,7 +90,7 @@ def candidates(robot: Robot, kinds: Sequence[TermKind] = KINDS) -> tuple[JointTe
 
 
 def terms_of(robot: Robot) -> tuple[JointTerm, ...]:
-    """All that can be told of the robot's joints."""
+    """All terms that apply to the robot's joints."""
     turning = np.flatnonzero(~robot.sliding) + 1
     return (*candidates(robot), *(JointTerm("ripple", int(row), turns) for row in turning for turns in RIPPLES))
 
@@ -155,7 +155,7 @@ class JointErrors(ByValue):
         return [(term.joint - 1, values[:, k]) for term, values in shapes for k in range(term.count)]
 
     def amounts(self, x: Reals, points: Reals) -> Reals:
-        """By how much rows that are meant to move by x (P, m) move too far, (P, m), rad or m."""
+        """Errors (P, m), rad or m, of rows commanded to move by x (P, m)."""
         found = np.zeros_like(x)
         for coefficient, (row, values) in zip(self.coefficients, self.columns(x, points)):
             found[:, row] += coefficient * values
@@ -236,5 +236,5 @@ def places_of(terms: Sequence[JointTerm], first: int = 0) -> list[list[int]]:
 
 
 def wrong_way(term: JointTerm, coefficients: Reals) -> bool:
-    """Whether a load would have to lift the arm."""
+    """Whether the estimated sag has the wrong sign: a load would lift the arm."""
     return term.kind in ("sag", "weight") and float(coefficients[0]) < 0

@@ -90,7 +90,7 @@ class NotExamined:
 
 @dataclass(frozen=True)
 class LocatedFinding:
-    """A finding and where it belongs.
+    """A finding and its place.
 
     Attributes
     ----------
@@ -113,7 +113,7 @@ class LocatedFinding:
 
 @dataclass(frozen=True)
 class MotionVerdict:
-    """A motion instruction of the text.
+    """The result for a motion instruction of the program's text.
 
     Attributes
     ----------
@@ -156,7 +156,7 @@ class CycleTime:
 
 @dataclass(frozen=True, eq=False)
 class ProgramCheck(ByValue):
-    """What was found.
+    """The result of a program check.
 
     Attributes
     ----------
@@ -187,7 +187,7 @@ class ProgramCheck(ByValue):
 
 
 def assumed_limits(robot: Robot, options: CheckOptions) -> JointLimits:
-    """Limits of the joints, with what is assumed where no document gives them."""
+    """Joint limits, assumed where no document gives them."""
     speed = options.assumed_speed
     assumed = np.where(robot.slides, ASSUMED_SLIDE, ASSUMED_SPEED) if speed is None else speed
     return joint_limits(robot, assumed, options.acceleration_time)
@@ -225,7 +225,7 @@ def check_program(program: Program, robot: Robot, options: CheckOptions | None =
 
 
 def _checked_until(checker: StepChecker, options: CheckOptions) -> int:
-    """Check step by step; the number of the first step that is not checked."""
+    """Check step by step; returns the number of the first step not checked."""
     steps, most, keep_on = checker.execution.steps, options.most_motions, options.keep_on
     for number, step in enumerate(steps):
         if isinstance(step.instruction, ArmMotion):
@@ -311,7 +311,7 @@ def _located(execution: Execution, robot: Robot, checker: StepChecker, end: int)
 
 
 def _loads(execution: Execution, robot: Robot) -> Iterator[LocatedFinding]:
-    """Each load that the program says hangs on the flange, at the first motion with it."""
+    """Each load that the program states, at the first motion with it."""
     wrist, seen = robot.masses.wrist, set()
     for step in execution.steps:
         load = step.instruction.load if isinstance(step.instruction, ArmMotion) else None
@@ -342,7 +342,7 @@ MAX_ADVISED = 20  # motions for which such moves are looked for
 def _with_joint_moves(
     located: tuple[LocatedFinding, ...], checker: StepChecker, keep_on: KeepOn | None
 ) -> tuple[LocatedFinding, ...]:
-    """Findings with joint moves that pass in place of the motion, where some were found."""
+    """Findings, with joint moves that pass instead of the motion where some were found."""
     moves: dict[int, tuple[tuple[float, ...], ...]] = {}
     for each in located:
         if each.step is None or each.step in moves or each.finding.code not in BY_JOINT_MOVES:
@@ -360,13 +360,13 @@ def _with_joint_moves(
 
 
 def _which(finding: found_in.CheckFinding) -> str:
-    """What distinguishes findings of one code at one instruction."""
+    """Key that distinguishes findings of one code at one instruction."""
     names = ("joint", "type", "name", "text", "condition", "kind", "mass_kg")
     return " ".join(f"{getattr(finding, name)}" for name in names if hasattr(finding, name))
 
 
 def _place_of(finding: found_in.CheckFinding, top: Place) -> Place:
-    """Where a finding about the text stands."""
+    """The place of a finding about the text."""
     place = getattr(finding, "place", None)
     return place if isinstance(place, Place) else top
 
@@ -533,7 +533,7 @@ def _moving(check: ProgramCheck) -> dict[Hashable, int]:
 
 
 def _same_for(check: ProgramCheck, number: int) -> Hashable:
-    """Equal for motions of one instruction from and to the same joints."""
+    """A key that is equal for motions of one instruction between the same joints."""
     motion = check.motions[number]
     ends = (None if q is None else q.tobytes() for q in (motion.start, motion.end))
     return check.execution.steps[number].place, *ends

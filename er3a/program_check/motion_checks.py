@@ -41,7 +41,7 @@ RAMP_OF_A_DURATION = 1 / 3  # of the time that a program gives for a motion, on 
 
 @dataclass(frozen=True)
 class MotionLaw:
-    """A trapezoid of speed.
+    """A trapezoidal speed profile.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class MotionLaw:
 
     @property
     def saved_by_blend(self) -> float:
-        """Time (s) that is saved where the arm does not stop at one end."""
+        """Time (s) saved by not stopping at one end."""
         return self.duration * self.ramp / 2
 
 
@@ -78,7 +78,7 @@ class AssumedRates:
 
 
 def law_of(way: float, speed: float, acceleration: float) -> MotionLaw:
-    """The trapezoid that covers a way at a speed and an acceleration, in any one unit of length."""
+    """The trapezoidal profile over a length, at a speed and an acceleration in the same unit of length."""
     if way * acceleration >= speed * speed:
         duration = way / speed + speed / acceleration
         return MotionLaw(duration, speed / acceleration / duration)
@@ -126,13 +126,13 @@ def joint_law(
 
 
 def is_given(motion: ArmMotion) -> bool:
-    """Whether a motion's speed is one that its law uses."""
+    """Whether the program gives a speed that the motion's law uses."""
     units = ("s", "rad/s", "share", "m/s") if motion.kind == "joint" else ("s", "m/s")
     return motion.speed is not None and motion.speed.unit in units and motion.speed.value > 0
 
 
 def progress(law: MotionLaw, t: Reals) -> tuple[Reals, Reals, Reals]:
-    """Share of the way done at times (n,) in s, with its first and second derivative."""
+    """Path parameter (0 to 1) at times (n,), s, with its first and second time derivative."""
     return trapezoid(np.clip(t, 0.0, law.duration), law.duration, law.ramp)
 
 
@@ -144,7 +144,7 @@ PARTS, HALVINGS = 200, 50
 
 
 def time_of_share(law: MotionLaw, share: float) -> float:
-    """When (s) a law has done a share (0 to 1) of the way."""
+    """Time (s) at which the path parameter (0 to 1) is reached."""
     low, high = 0.0, law.duration
     for _ in range(HALVINGS):
         middle = (low + high) / 2
@@ -161,12 +161,12 @@ def limit_moment(law: MotionLaw, side: motion_faults.LimitSide, start: Reals, en
 
 
 def speed_moment(law: MotionLaw, share_of_max: float) -> float:
-    """When (s) the speed comes to a share (0 to 1) of its largest, on the ramp up."""
+    """Time (s) on the ramp up at which the speed is a ratio (0 to 1) of its maximum."""
     return law.ramp * law.duration * share_of_max
 
 
 def change_moment(law: MotionLaw, kind: Callable[[float], int | None]) -> float:
-    """When (s) the kind of pose, by shares of the way, first is another than at the start."""
+    """Time (s) at which ``kind``, a function of the path parameter, first differs from its value at the start."""
     shares = np.linspace(0.0, 1.0, PARTS + 1)
     first = kind(0.0)
     other = next((i for i, share in enumerate(shares) if kind(float(share)) not in (first, None)), PARTS)
@@ -187,7 +187,7 @@ SAME_ARRIVAL = 1e-4  # rad
 
 @dataclass(frozen=True, eq=False)
 class CheckRules(ByValue):
-    """What ways are checked against.
+    """What motions are checked against.
 
     Attributes
     ----------
@@ -239,13 +239,13 @@ class MotionPath(ByValue):
         return float(self.tool_path.radius * (1 - np.cos(half)))
 
     def along_mm(self, t: float) -> float:
-        """How far (mm) the tool point of a line has come at a time."""
+        """Length (mm) of the tool point's path up to a time."""
         return round(1000 * self.length * float(progress(self.law, np.array(t))[0]), 3)
 
 
 @dataclass(frozen=True, eq=False)
 class _JointMove(ByValue):
-    """All joints from ``start`` by ``step`` (n,), in proportion."""
+    """A synchronous joint move from ``start`` by ``step``, both (n,), rad or m."""
 
     law: MotionLaw
     start: Reals
@@ -305,7 +305,7 @@ def _sides_left(arm: Robot, q: Reals) -> list[motion_faults.LimitSide]:
 
 
 def _limit_moments(arm: Robot, law: MotionLaw, start: Reals, end: Reals) -> dict[found_in.CheckFinding, float]:
-    """Limits that the end (n,) of a joint move is beyond, and when (s) the move passes them."""
+    """Limits that the end (n,) of a joint move exceeds, with the times (s) at which the move crosses them."""
     return {side.cause(float(side.of(end))): limit_moment(law, side, start, end) for side in _sides_left(arm, end)}
 
 
@@ -361,7 +361,7 @@ def _arc(T_start: Reals, via: Reals, end: Reals, time: tuple[float, float | None
 def _followed_moments(
     followed: Followed, proof: ToolProof, way: MotionPath, rules: CheckRules
 ) -> dict[found_in.CheckFinding, float]:
-    """Reach, configuration, limits, singular poses and speeds, each with the time (s) from which on it is wrong."""
+    """Findings on reach, configuration, limits, singular poses and speeds, each with the time (s) of its start."""
     arm = way.arm
     found: dict[found_in.CheckFinding, float] = {
         found_in.StretchOutOfReach(way.along_mm(stretch.start), stretch.cause.reasons): stretch.start
@@ -407,7 +407,7 @@ def _followed_moments(
 
 
 def _of(stretch: motion_faults.Interval[motion_faults.RateCause]) -> tuple[type, int]:
-    """What limit of which joint is exceeded."""
+    """The joint and the limit that an interval exceeds."""
     return type(stretch.cause), stretch.cause.joint
 
 
@@ -421,7 +421,7 @@ def _as_checked(cause: motion_faults.RateCause) -> found_in.CheckFinding:
 
 
 def _arrival_moments(followed: Followed, given: Reals | None, way: MotionPath) -> dict[found_in.CheckFinding, float]:
-    """Turns at rest at the start, and whether the end has the joints that the program gives; with their times, s."""
+    """Joint turns at the singular start, and an end in other joints than the program gives; with times (s)."""
     found: dict[found_in.CheckFinding, float] = {}
     turn, last = followed.start_turn, followed.q[-1]
     joint = int(np.argmax(np.abs(turn)))
@@ -442,7 +442,7 @@ def _points(length: float, turned: float) -> int:
 def _rate_moments(
     arm: Robot, law: MotionLaw, greatest: tuple[Reals, Reals], limits: JointLimits
 ) -> dict[found_in.CheckFinding, float]:
-    """Of a joint move with maximum speeds and accelerations (n,), each with when (s) it gets too great."""
+    """Rate findings of a joint move with maximum speeds and accelerations (n,), with the times (s) they begin."""
     found: dict[found_in.CheckFinding, float] = {}
     speed = greatest[0]
     for j in np.flatnonzero(speed > limits.speed * (1 + SPEED_TOLERANCE)).tolist():
@@ -453,7 +453,7 @@ def _rate_moments(
 
 
 def _acceleration_findings(arm: Robot, acceleration: Reals, limits: JointLimits) -> list[found_in.CheckFinding]:
-    """The joint that asks most of its acceleration, if that is too much."""
+    """The joint with the largest ratio to its acceleration limit, if it exceeds it."""
     ratio = acceleration / limits.acceleration
     worst = int(np.argmax(ratio))
     if ratio[worst] <= 1 + SPEED_TOLERANCE:
@@ -467,7 +467,7 @@ def _acceleration_findings(arm: Robot, acceleration: Reals, limits: JointLimits)
 def _configuration_moment(
     arm: Robot, law: MotionLaw, joints_at: Callable[[Reals], Reals]
 ) -> dict[found_in.CheckFinding, float]:
-    """Whether a joint move ends in another configuration, and when (s) it leaves that of its start."""
+    """The configuration change of a joint move, if any, and the time (s) at which it leaves the first one."""
     if wrist_partition_missing(arm) is not None:
         return {}
 
@@ -495,7 +495,7 @@ def _joint_jumps(arm: Robot, start: Reals, end: Reals, moved: float, turned: flo
 
 
 def _slot(arm: Robot, q: Reals) -> int | None:
-    """The closed-form branch of joint angles; None on a singular pose, which belongs to two."""
+    """Closed-form branch of joint angles (n,), rad; None at a singular pose, where two branches meet."""
     found = determinant_factors(arm, q)
     factors = np.array([found.shoulder, found.elbow, found.wrist])
     if np.abs(factors).min() < NO_WAY:

@@ -22,7 +22,7 @@ RANKS: dict[Level, int] = {"pass": 0, "note": 1, "caution": 2, "fail": 3}
 
 
 class TargetNotGiven(Finding):
-    """The program's text does not fix the target."""
+    """The program's text does not determine the target."""
 
     target: str
     reason: Unresolved
@@ -37,30 +37,30 @@ class FrameNotGiven(Finding):
 
 
 class FrameTakenAsFlange(Finding):
-    """A tool that is called tool0 and given nowhere was taken for the flange."""
+    """A tool named tool0 that is defined nowhere was taken to be the flange."""
 
     name: str
 
 
 class PathNotKnown(Finding, code="way_not_known"):
-    """Where the arm comes from is not known, so that only the target was checked."""
+    """The start of the motion is unknown, so only its target was checked."""
 
 
 class TargetOutOfReach(Finding):
-    """No solution of the arm brings the tool to the target; ``reasons`` are empty where they were not looked for."""
+    """No IK solution reaches the target; ``reasons`` are empty where they were not determined."""
 
     reasons: tuple[Unsolved, ...]
 
 
 class StretchOutOfReach(Finding, code="way_out_of_reach"):
-    """The tool leaves the reach on its way to the target."""
+    """The tool leaves the arm's reach on the way to the target."""
 
     at_mm: float
     reasons: tuple[Unsolved, ...]
 
 
 class ConfigurationEnds(Finding):
-    """On the way the arm would have to go over to another configuration at once: a joint would have to jump."""
+    """The configuration ends on the way: to go on in another one, a joint would have to jump."""
 
     at_mm: float
     joint: int
@@ -69,7 +69,7 @@ class ConfigurationEnds(Finding):
 
 
 class MeetsSingularity(Finding):
-    """The tool's way meets a singular pose; ``bounded`` if the joint speeds stay finite there."""
+    """The tool's path meets a singular pose; ``bounded`` if joint speeds stay finite there."""
 
     type: SingularityType
     at_mm: float
@@ -77,7 +77,7 @@ class MeetsSingularity(Finding):
 
 
 class PassesSingularity(Finding):
-    """The tool's way passes by a singular pose at a distance (of wrist and elbow in deg, of the shoulder in mm)."""
+    """The tool's path passes a singular pose at a distance (wrist and elbow in deg, shoulder in mm)."""
 
     type: SingularityType
     at_mm: float
@@ -85,7 +85,7 @@ class PassesSingularity(Finding):
 
 
 class FasterThanAssumed(Finding):
-    """A joint (from 1) of no documented speed would have to move faster than is assumed; mm if it ``slides``."""
+    """A joint (from 1) without a documented speed limit exceeds the assumed one; in mm/s if it ``slides``."""
 
     joint: int
     needed_deg_s: float
@@ -94,7 +94,7 @@ class FasterThanAssumed(Finding):
 
 
 class AcceleratesMoreThanAssumed(Finding):
-    """A joint (from 1) would have to accelerate more than is assumed of it; values are in mm if it ``slides``."""
+    """A joint (from 1) exceeds its assumed acceleration; in mm/s^2 if it ``slides``."""
 
     joint: int
     needed_deg_s2: float
@@ -109,14 +109,14 @@ class MoreThanFullSpeed(Finding):
 
 
 class ConfigurationChanges(Finding):
-    """A joint move goes over to another configuration of the arm."""
+    """A joint move ends in another configuration than it starts in."""
 
     before: BranchLabel
     after: BranchLabel
 
 
 class JointJumps(Finding):
-    """A joint turns far in a joint move that takes the tool hardly anywhere."""
+    """A joint turns far in a joint move that hardly moves the tool."""
 
     joint: int
     angle_deg: float
@@ -124,7 +124,7 @@ class JointJumps(Finding):
 
 
 class WholeTurn(Finding):
-    """A joint turns by more than half a turn, where its nearest equivalent within the limits is nearer."""
+    """A joint turns by more than half a turn, although an equivalent value within the limits is nearer."""
 
     joint: int
     angle_deg: float
@@ -132,7 +132,7 @@ class WholeTurn(Finding):
 
 
 class ArrivesOtherwise(Finding):
-    """A line or arc to joint angles ends at their tool pose, but in other joint angles; mm if the joint ``slides``."""
+    """A line or arc ends at the tool pose of the given joints, but with other angles; mm if the joint ``slides``."""
 
     joint: int
     difference_deg: float
@@ -140,33 +140,33 @@ class ArrivesOtherwise(Finding):
 
 
 class TurnsAtStart(Finding):
-    """At the singular start of a line a joint has to turn with the tool at rest."""
+    """At the singular start of a line, a joint has to turn while the tool is at rest."""
 
     joint: int
     angle_deg: float
 
 
 class TurnNotMet(Finding):
-    """No solution within the limits has the signs of the joint angles that the target's Turn (T) asks for."""
+    """No solution within the limits has the signs of joint angles that the target's Turn (T) requires."""
 
     turn: int
 
 
 class ConfigurationNotMet(Finding):
-    """No solution within the limits has the target's configuration, or a ``line`` does not arrive in it."""
+    """No solution within the limits has the target's configuration, or a ``line`` does not end in it."""
 
     text: str
     where: Literal["target", "line"]
 
 
 class ConfigurationNotRead(Finding):
-    """What the target says of its configuration is not known; the solution nearest to the joints before was taken."""
+    """The target's configuration is unknown; the solution nearest to the previous joint values was taken."""
 
     text: str
 
 
 class ConfigurationGuessed(Finding):
-    """Where the arm comes from is not known, nor which of its solutions is meant: the one nearest to 0 was taken."""
+    """Neither the start nor the intended solution is known; the solution nearest to 0 was taken."""
 
     solutions: int
 
@@ -185,7 +185,7 @@ class BodiesTouch(Finding):
 
 
 class MotionCollides(Finding):
-    """Bodies overlap on the way, the first to touch first."""
+    """Bodies overlap during the motion, in the order of first contact."""
 
     touches: tuple[BodiesTouch, ...]
 
@@ -196,7 +196,7 @@ class MotionCollides(Finding):
 
 
 class ClearOfAssumed(Finding):
-    """The arm is clear of assumed shapes by less than what such shapes may be wrong by."""
+    """The clearance to assumed shapes is less than their assumed uncertainty."""
 
     pair: Pair
     clearance_mm: float
@@ -204,33 +204,33 @@ class ClearOfAssumed(Finding):
 
 
 class ZoneCollides(Finding):
-    """The arm is free on the programmed way, but not on each way round the corner that the zone allows."""
+    """The programmed path is free of collisions, but not every path that the corner's zone allows."""
 
     pair: Pair
     depth_mm: float
 
 
 class ZoneNotSettled(Finding):
-    """So near to something that the ways round the corner could not all be measured."""
+    """Not every path round the corner could be proven free: a body is too near."""
 
     least_mm: float
 
 
 class ZoneTooLarge(Finding):
-    """A zone is larger than half of a motion that it lies on."""
+    """A zone is larger than half of a motion that it belongs to."""
 
     zone_mm: float
     motion_mm: float
 
 
 class ZoneWithoutSize(Finding):
-    """A zone whose size the program does not give; half of each motion was taken."""
+    """The program does not give the zone's size; half of each motion was assumed."""
 
     zone: str
 
 
 class ArcHasNoCircle(Finding):
-    """The arc's points fix no circle, or one of them is not known."""
+    """The arc's points determine no circle, or one of them is unknown."""
 
 
 class ArcGoesOn(Finding):
@@ -251,13 +251,13 @@ class SplineAsLine(Finding):
 
 
 class ExternalAxesLeftOut(Finding):
-    """Axes beyond the arm's were taken to stand still."""
+    """External axes were assumed not to move."""
 
     axes: tuple[str, ...]
 
 
 class LineNotChecked(Finding):
-    """The arm has no closed-form inverse, so that lines and arcs were not followed; only their targets were checked."""
+    """The arm has no closed-form inverse: of lines and arcs only the targets were checked."""
 
 
 class SpeedNotGiven(Finding):
@@ -269,13 +269,13 @@ class SpeedNotGiven(Finding):
 
 
 class MayMove(Finding):
-    """An instruction that is not understood and may move the arm."""
+    """An instruction that was not understood may move the arm."""
 
     text: str
 
 
 class MovesBesideProgram(Finding, code="moves_beside"):
-    """A routine moves the arm beside the program; its motions and the program's were not checked as one."""
+    """A concurrent routine moves the arm; its motions were not checked together with the program's."""
 
     routine: str
     kind: Literal["thread", "interrupt"]
@@ -289,31 +289,31 @@ class NeverReached(Finding):
 
 
 class MotionNotReached(Finding, code="not_come_to"):
-    """A motion that the program had not come to when it was followed no further."""
+    """A motion that was not reached before execution stopped."""
 
 
 class RestNotChecked(Finding):
-    """The program has more motions than are checked; of those from here on only ``targets`` targets are."""
+    """The program has more motions than are checked; from here on only ``targets`` targets were checked."""
 
     checked: int
     targets: int
 
 
 class BothSidesChecked(Finding):
-    """A condition that only the cell knows; both sides were followed."""
+    """A condition that depends on the cell; both branches were followed."""
 
     condition: str
 
 
 class NotFollowedToEnd(Finding):
-    """A way through the program was not followed to its end; ``limit`` as of an ending."""
+    """An execution path was not followed to its end; ``limit`` as in ``Ending``."""
 
     kind: EndKind
     limit: int = 0
 
 
 class LoopComesBackOtherwise(Finding):
-    """When the loop begins again, a joint is elsewhere than in the round that was checked; mm if it ``slides``."""
+    """When the loop repeats, a joint starts elsewhere than in the round that was checked; mm if it ``slides``."""
 
     joint: int
     difference_deg: float
@@ -334,7 +334,7 @@ class LoadNotExamined(Finding):
 
 
 class LoadAbovePayload(Finding):
-    """What the program says hangs on the flange is more than the arm's document allows."""
+    """The load that the program states exceeds the arm's documented payload."""
 
     mass_kg: float
     payload_kg: float
@@ -418,7 +418,7 @@ NOTES = frozenset(
 
 
 def level_of(finding: CheckFinding) -> Level:
-    """How much a finding weighs: ``fail`` where the program can't be carried out as it is written."""
+    """Severity of a finding; ``fail`` where the program can't be executed as written."""
     if isinstance(finding, MeetsSingularity):
         return "caution" if finding.bounded else "fail"
     if isinstance(finding, NotFollowedToEnd) and finding.kind == "recursion":
@@ -433,5 +433,5 @@ def level_of(finding: CheckFinding) -> Level:
 
 
 def worst_of(levels: Iterable[Level]) -> Level:
-    """The level that weighs most; ``pass`` of none."""
+    """The most severe level; ``pass`` if there are no findings."""
     return max(levels, key=RANKS.__getitem__, default="pass")

@@ -75,7 +75,7 @@ SAME_DIGITS = 6  # of angles in rad
 
 @dataclass(frozen=True, eq=False)
 class PlacedMotion(ByValue):
-    """A motion with the arm that carries its tool.
+    """A motion, and the arm with the motion's tool.
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ class Arms:
         self._by_tool: dict[bytes, Robot] = {robot.tool.tobytes(): robot}
 
     def placed(self, motion: instructions.ArmMotion) -> PlacedMotion:
-        """A motion with its arm; frames that are not given are named."""
+        """A motion placed in the world, with the frames that are unknown."""
         missing: list[found_in.FrameNotGiven] = []
         taken: tuple[found_in.FrameTakenAsFlange, ...] = ()
         arm, base = self.robot, motion.base.pose
@@ -144,7 +144,7 @@ class Goal:
 
 
 def goal_of(placed: PlacedMotion, target: instructions.Target | None, before: Reals | None) -> Goal:
-    """What a target means, from joints (n,) in rad; of several solutions the nearest within the limits."""
+    """The goal of a target, from joints (n,), rad; of several solutions, the nearest within the limits."""
     if isinstance(target, instructions.UnresolvedTarget) and target.reason == "position_unknown" and placed.missing:
         return Goal(None, None, False, placed.needed)
     if target is None or isinstance(target, instructions.UnresolvedTarget):
@@ -196,12 +196,12 @@ def _solved(placed: PlacedMotion, target: instructions.PoseTarget, pose: Reals, 
 
 
 def _different(rows: Reals) -> int:
-    """How many solutions (k, n) there are that are not the same."""
+    """Number of distinct solutions among (k, n), rad."""
     return len(np.unique(np.round(rows, SAME_DIGITS), axis=0))
 
 
 def _branch_not_met(target: instructions.PoseTarget, joint: bool) -> found_in.CheckFinding:
-    """That no solution has the configuration of a target, or that a line does not arrive in it."""
+    """The finding that no solution has a target's configuration, or that a line does not end in it."""
     given = dict(target.configuration)
     if isinstance(turn := given.get("T"), (int, float)):
         return found_in.TurnNotMet(int(turn))
@@ -215,7 +215,7 @@ MAX_REASONS = 1000  # targets out of reach whose reasons are looked for
 def target_findings(
     arms: Arms, motions: Mapping[int, instructions.ArmMotion], keys: Mapping[int, Hashable]
 ) -> tuple[int, dict[int, tuple[found_in.CheckFinding, ...]]]:
-    """How many targets were examined, and what is wrong with them, by the number of the step.
+    """Number of targets examined, and their findings by step number.
 
     Parameters
     ----------
@@ -243,7 +243,7 @@ def target_findings(
 
 
 def _of_poses(group: list[tuple[int, PlacedMotion]]) -> dict[int, tuple[found_in.CheckFinding, ...]]:
-    """Findings of targets that are poses, of one arm."""
+    """Findings on pose targets of one arm."""
     arm = group[0][1].arm
     findings: dict[int, tuple[found_in.CheckFinding, ...]] = {number: () for number, _ in group}
     try:
@@ -459,7 +459,7 @@ def zone_clearance(
     patch: ZonePatch | None = None,
     margin: float = 0.0,
 ) -> found_in.ZoneCollides | found_in.ZoneNotSettled | None:
-    """Look for a way round a corner that collides; None if all are free.
+    """Look for a path round a corner that collides; None if all are proven free.
 
     Parameters
     ----------
@@ -541,7 +541,7 @@ BEND_PARTS = 16
 
 @dataclass(frozen=True, eq=False)
 class Obstacles:
-    """What the arm may not touch.
+    """The bodies that the arm must not touch.
 
     Attributes
     ----------
@@ -569,7 +569,7 @@ def obstacles_of(robot: Robot, scene: Scene | None, tolerance: float, assumed_ma
 
 @dataclass(frozen=True, eq=False)
 class CheckedMotion(ByValue):
-    """A motion as it was carried out.
+    """A motion as executed.
 
     Attributes
     ----------
@@ -611,7 +611,7 @@ class StepChecker:
         self._corners: dict[Hashable, tuple[found_in.CheckFinding, ...]] = {}
 
     def check(self, number: int) -> None:
-        """Check a step; those before it have been checked."""
+        """Check a step; all earlier steps must have been checked."""
         step = self.execution.steps[number]
         joints = self._joints[step.before] if step.before >= 0 else self.start
         before = self._before[step.before] if step.before >= 0 else -1
@@ -632,7 +632,7 @@ class StepChecker:
 
     @property
     def different(self) -> int:
-        """How many motions that differ were checked."""
+        """Number of distinct motions checked."""
         return len(self._known)
 
     def rest(self, first: int) -> tuple[int, dict[int, tuple[found_in.CheckFinding, ...]]]:
@@ -688,7 +688,7 @@ class StepChecker:
         return ()
 
     def _goal_pose(self, checked: CheckedMotion) -> Reals | None:
-        """T_world_tool (4, 4) of a motion's target."""
+        """T_world_tool (4, 4), m, of a motion's target."""
         placed, target = checked.placed, checked.placed.motion.target
         if placed.missing or placed.motion.angle is not None:
             return None
@@ -699,14 +699,14 @@ class StepChecker:
         return None
 
     def _free(self, placed: PlacedMotion, q: Reals) -> Reals:
-        """Those of joint vectors (k, n) at which the arm is as far from everything as it has to be."""
+        """Which of joint vectors (k, n), rad, keep the required clearance."""
         if self.obstacles is None or not len(q):
             return q
         free: Reals = q[self.obstacles.of(placed.arm).free(q, self.obstacles.assumed_margin)]
         return free
 
     def _passes(self, placed: PlacedMotion, start: Reals, end: Reals) -> bool:
-        """Whether a joint move with a motion's tool has no finding of more than a note."""
+        """Whether a joint move with a motion's tool has no finding more severe than a note."""
         speed = instructions.Rate(self.rules.assumed.joint_share, "share")
         move = instructions.ArmMotion(
             "joint", instructions.JointTarget(end), speed=speed, tool=placed.motion.tool, base=placed.motion.base
@@ -810,7 +810,7 @@ class StepChecker:
         return None
 
     def _measured(self, motion: CheckedMotion) -> CheckedMotion:
-        """With its clearance and what it collides with."""
+        """The motion with its clearance and collisions."""
         way = motion.way
         if self.obstacles is None or way is None or not np.isfinite(way.q).any():
             return motion
@@ -834,7 +834,7 @@ class StepChecker:
         return replace(motion, findings=(*motion.findings, hit), clearance=clearance, moments=moments)
 
     def _clear(self, motion: CheckedMotion, along: ClearanceAlong) -> CheckedMotion:
-        """A motion that meets nothing, with what is to be said where it comes near to assumed shapes."""
+        """A collision-free motion, with a finding where it comes near assumed shapes."""
         assert self.obstacles is not None
         margin = self.obstacles.assumed_margin
         pair = along.pair[along.closest] if along.closest >= 0 else None
@@ -845,7 +845,7 @@ class StepChecker:
         return replace(motion, findings=(*motion.findings, near), moments=moments)
 
     def _corner(self, first: int, second: int) -> None:
-        """Check the corner between two motions, if a zone lets the arm round it."""
+        """Check the corner between two motions if a zone rounds it."""
         if first < 0:
             return
         motion = self.motions[first]
@@ -867,7 +867,7 @@ class StepChecker:
     def _round_corner(
         self, way: MotionPath, after: MotionPath, corners: Reals, shares: tuple[float, float], margin: float = 0.0
     ) -> found_in.ZoneCollides | found_in.ZoneNotSettled | None:
-        """What stands in a way from joints (3, n) before a corner to those after it, over shares of the two motions."""
+        """Collisions round a corner with joints (3, n), rad: where the zone begins, at the corner, where it ends."""
         assert self.obstacles is not None
         bodies, tolerance = self.obstacles.of(way.arm), self.obstacles.tolerance
         if way.tool_path is None or after.tool_path is None or way.arm is not after.arm:
@@ -951,7 +951,7 @@ def _as_written(q: Reals) -> Reals:
 
 
 def _said(motion: instructions.ArmMotion) -> list[found_in.CheckFinding]:
-    """What is to be said of a motion whatever the arm does."""
+    """Findings on a motion that do not depend on the arm."""
     found: list[found_in.CheckFinding] = []
     outer = getattr(motion.target, "external", ())
     if outer:
@@ -965,7 +965,7 @@ def _said(motion: instructions.ArmMotion) -> list[found_in.CheckFinding]:
 
 
 def _key(motion: instructions.ArmMotion) -> Hashable:
-    """Equal for motions that are the same in all numbers."""
+    """A key that is equal for motions with the same numbers."""
     targets = tuple(_target_key(each) for each in (motion.target, motion.via))
     frames = tuple(
         (each.name, None if each.pose is None else each.pose.tobytes()) for each in (motion.tool, motion.base)

@@ -1,7 +1,7 @@
 """Variables of a running program, and the values of expressions.
 
 Names with fields and indices are looked up as a whole (``$VEL.CP``, ``XP[3]``) where no record or list is kept under
-the shorter name. What is not there is :class:`~er3a.programs.syntax.Unclear`, and so is all that is made of it.
+the shorter name. What is unknown is :class:`~er3a.programs.syntax.Unclear`, and so is everything computed from it.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ Flange = Callable[[Reals], Reals]
 
 @dataclass(frozen=True, eq=False)
 class Cell(ByValue):
-    """What is known of the cell that a program runs in.
+    """The robot cell in which a program runs.
 
     Attributes
     ----------
     flange : forward kinematics of the arm; None if no arm is given
-    start : (n,), rad, joints where the program starts
-    joints : n, how many the arm has
-    frames : poses (4, 4) of tools and bases by the program's names for them
+    start : (n,), rad or m, joint values at the start of the program; None if unknown
+    joints : n, number of the arm's joints
+    frames : poses (4, 4), m, of tools and bases, by their names in the program
     tool, base : (4, 4), for motions whose program sets none; None if no arm is given
-    up : (3,), where up is in the frame of the robot's base, by how the robot file mounts it
+    up : (3,), unit vector upwards in the frame of the robot's base, by the robot file's mounting
     """
 
     flange: Flange | None = None
@@ -113,7 +113,7 @@ class Position:
         return found
 
     def key(self) -> tuple[bytes, ...]:
-        """Equal for equal positions."""
+        """A key that is equal for equal positions."""
         frames = (self.tool, self.base) if self.pose is not None else ()
         parts = (self.joints, self.pose, *(frame.pose for frame in frames))
         words = tuple(frame.name.encode() for frame in frames)
@@ -121,14 +121,14 @@ class Position:
 
 
 def same(a: NamedFrame, b: NamedFrame) -> bool:
-    """Whether two frames are one."""
+    """Whether two frames have the same pose, or the same name if neither pose is known."""
     if a.pose is not None and b.pose is not None:
         return bool(np.array_equal(a.pose, b.pose))
     return a.name == b.name and a.pose is None and b.pose is None
 
 
 WITH_FIELDS = ("$VEL", "$ACC", "$APO")
-"""Variables of KRL whose fields are read by their whole names, however they were set."""
+"""KRL variables whose fields are looked up by their full names, however they were set."""
 
 LONGEST_TEXT = 10_000
 LARGEST_WHOLE = 2**62
@@ -163,19 +163,19 @@ BITWISE: Mapping[str, Callable[[int, int], int]] = {
     "B_OR": operator.or_,
     "B_EXOR": operator.xor,
 }
-"""Of whole numbers, bit by bit; of anything else they are not defined."""
+"""Bitwise operators; defined for whole numbers only."""
 
 
 class Dialect(ABC):
-    """A language, as a run needs it: what most languages have stands here, each says what differs.
+    """The semantics of a language during execution; the base class holds what most languages share.
 
     Attributes
     ----------
-    modal : variables that motions depend on without naming them
+    modal : variables that motions use implicitly
     local_by_default : whether a routine's assignment to a name that nothing else knows makes a local variable
-    setters : functions that are not in the program, move nothing, and set what motions depend on
-    whole_division : whether two whole numbers have a whole quotient; None where no source says
-    first_index : of a list's first element
+    setters : functions outside the program that do not move the arm but set what motions use
+    whole_division : whether whole numbers are divided to a whole number; None where this is not documented
+    first_index : index of a list's first element
     """
 
     modal: frozenset[str] = frozenset()
@@ -185,22 +185,22 @@ class Dialect(ABC):
     first_index: int = 1
 
     def __init__(self, program: syntax.Program) -> None:  # noqa: B027 - most languages need nothing of it
-        """For the program that is run, whose declarations a language may need."""
+        """Some languages read the program's declarations."""
 
     def is_signal(self, name: str) -> bool:
         """Whether an assignment to this name sets an output."""
         return False
 
     def reads_back(self, name: str) -> bool:
-        """Whether an output has what the program gave it last."""
+        """Whether reading an output gives the value that the program set last."""
         return True
 
     def is_followed(self, name: str, value: syntax.Value) -> bool:
-        """Whether motions are followed as a variable asks that is set to a value."""
+        """Whether the effect of setting a variable to a value on motions is simulated."""
         return True
 
     def assigned(self, old: syntax.Value, new: syntax.Value) -> syntax.Value:
-        """What a variable has after an assignment to it."""
+        """The value of a variable after an assignment."""
         return new
 
     def named(self, name: str) -> bool:
@@ -208,7 +208,7 @@ class Dialect(ABC):
         return False
 
     def constant(self, memory: ProgramMemory, name: str) -> syntax.Value | None:
-        """The value of a name that the language itself gives, if it does: a frame, or where the arm is."""
+        """The value of a predefined name, such as a frame or the arm's position; None if there is none."""
         return None
 
     def listed(self, kind: str, values: tuple[syntax.Value, ...]) -> syntax.Value:
@@ -221,30 +221,30 @@ class Dialect(ABC):
 
     @abstractmethod
     def function(self, memory: ProgramMemory, name: str, given: syntax.Invocation) -> syntax.Value:
-        """The value of a function that is not in the program."""
+        """The value of a function that the program does not define."""
 
     @abstractmethod
     def motion(self, memory: ProgramMemory, move: syntax.Move) -> ArmMotion:
-        """The motion, from where the arm is."""
+        """The motion from the arm's position."""
 
     @abstractmethod
     def carry_out(self, memory: ProgramMemory, doing: syntax.Doing) -> Instruction | None:
-        """A call of a function that is not in the program; None if it only sets variables."""
+        """Execute a call of a function that the program does not define; None if it only sets variables."""
 
     @abstractmethod
     def harmless(self, call: syntax.Invocation) -> bool:
-        """Whether a function that is not in the program neither moves the arm nor sets what motions depend on."""
+        """Whether an undefined function neither moves the arm nor sets what motions use."""
 
 
 class ProgramMemory:
-    """Variables: those of the program, and those of the routine that runs.
+    """Variables of the program and of the running routine.
 
     Attributes
     ----------
     shared, local : values by name
     types : declared types by name
-    kept : what a language keeps until the next value is given
-    beside : names that a thread changes, so that their values are unclear
+    kept : what a language caches until the next assignment
+    beside : variables that a concurrent thread changes, so that their values are unclear
     here : where the arm is
     cell : what is known of the cell
     """
@@ -259,7 +259,7 @@ class ProgramMemory:
         self.beside: frozenset[str] = frozenset()
 
     def copy(self) -> ProgramMemory:
-        """Another that goes its own way from here."""
+        """An independent copy."""
         other = ProgramMemory(self.functions, self.cell)
         other.here = self.here
         other.shared, other.local, other.types = dict(self.shared), dict(self.local), self.types
@@ -267,7 +267,7 @@ class ProgramMemory:
         return other
 
     def read(self, name: str) -> syntax.Value | None:
-        """The value of a whole name, or None."""
+        """The value of a full name, or None."""
         if name in self.local:
             return self.local[name]
         if self.beside and root(name) in self.beside:
@@ -276,7 +276,7 @@ class ProgramMemory:
         return self.functions.constant(self, name) if value is None else value
 
     def write(self, name: str, value: syntax.Value, local: bool = False) -> None:
-        """Give a whole name a value."""
+        """Set the value of a full name."""
         self.kept.clear()
         if name in WITH_FIELDS and isinstance(value, syntax.Record):
             self.shared.update({f"{name}.{field}": part for field, part in value.items})
@@ -286,7 +286,7 @@ class ProgramMemory:
             self.shared[name] = value
 
     def assign(self, target: syntax.Expression, value: syntax.Value, local: bool = False) -> None:
-        """Give a variable, a field or an element a value."""
+        """Assign a value to a variable, field or element."""
         if isinstance(target, syntax.Member) and self._set_field(target, value):
             return
         if isinstance(target, syntax.Element):
@@ -304,7 +304,7 @@ class ProgramMemory:
                 self.forget(target.name)
 
     def forget(self, variable: str) -> None:
-        """Nothing of a variable is known from here."""
+        """Make a variable unclear, with all its fields and elements."""
         self.kept.clear()
         for values, more in ((self.local, ()), (self.shared, self.cell.frames)):
             for name in [each for each in (*values, *more) if root(each) == variable]:
@@ -313,13 +313,13 @@ class ProgramMemory:
             self.shared[variable] = syntax.Unclear(f"{variable}, changed")
 
     def _set_field(self, target: syntax.Member, value: syntax.Value) -> bool:
-        """Give a field of a kept value a value; False if the field is kept under its whole name."""
+        """Assign a field of a stored record; False if the field is stored under its full name."""
         of, name = self.value(target.of), self.key(target.of)
         if isinstance(of, syntax.Record):
             self.assign(target.of, of.having(target.name, value))
             return True
         if isinstance(target.of, syntax.Member) and isinstance(self.value(target.of.of), syntax.Record):
-            self.assign(target.of, syntax.Unclear(f"{target.of.name}, changed in part"))  # the record has no such part
+            self.assign(target.of, syntax.Unclear(f"{target.of.name}, partly changed"))  # the record has no such part
             return True
         kept = None if name is None else self.read(name)
         if kept is None or not isinstance(of, syntax.Unclear):
@@ -329,7 +329,7 @@ class ProgramMemory:
         return True
 
     def key(self, target: syntax.Expression) -> str | None:
-        """The whole name of a variable, field or element; None if an index is unclear or it is none of these."""
+        """The full name of a variable, field or element; None for others, or if an index is unclear."""
         match target:
             case syntax.Variable(name=name):
                 return name
@@ -411,7 +411,7 @@ class ProgramMemory:
                 return float(value)
             if kind in ("INT", "DINT", "SINT", "LINT") and isinstance(value, float) and abs(value) < LARGEST_WHOLE:
                 if self.functions.whole_division is None and value % 1:
-                    return syntax.Unclear(f"{value:g}, of which no source tells how it becomes a whole number")
+                    return syntax.Unclear(f"{value:g}, whose conversion to a whole number is not documented")
                 return int(math.copysign(math.floor(abs(value) + 0.5), value))  # KRL: from x.5 on it is x + 1
         return value
 
@@ -450,7 +450,7 @@ class ProgramMemory:
         if not whole or self.functions.whole_division is False:
             return a / b
         if self.functions.whole_division is None and a % b:
-            return syntax.Unclear(f"{a:.0f}/{b:.0f}, of which no source tells whether it is a whole number")
+            return syntax.Unclear(f"{a:.0f}/{b:.0f}: whether such a quotient is a whole number is not documented")
         return int(a / b)
 
     def _computed(self, sign: str, left: syntax.Value, right: syntax.Value) -> syntax.Value:
@@ -467,11 +467,11 @@ class ProgramMemory:
                 return self._quotient(a, b, whole)
             if sign in ("^", "**"):
                 power = a**b
-                return syntax.Unclear("a root") if isinstance(power, complex) else power
+                return syntax.Unclear("a root of a negative number") if isinstance(power, complex) else power
             if sign not in ARITHMETIC:
                 return syntax.Unclear(f"... {sign} ...")
             if sign in ("%", "MOD") and min(a, b) < 0 and a % b:
-                return syntax.Unclear(f"{a:g} {sign} {b:g}, of which no source tells the sign")
+                return syntax.Unclear(f"{a:g} {sign} {b:g}, whose sign is not documented")
             found = ARITHMETIC[sign](a, b)
         except (ZeroDivisionError, OverflowError, ValueError):
             return syntax.Unclear("a division by zero or an overflow")
@@ -479,12 +479,12 @@ class ProgramMemory:
 
 
 def known(found: syntax.Value | None, name: str) -> syntax.Value:
-    """What a name has; unclear where that is nothing."""
+    """The value of a name; unclear if it has none."""
     return syntax.Unclear(name) if found is None or isinstance(found, syntax.Unset) else found
 
 
 def root(name: str) -> str:
-    """The variable that a whole name belongs to: ``XP`` of ``XP[3]`` and ``XP.X``."""
+    """The variable of a full name: ``XP`` of ``XP[3]`` and ``XP.X``."""
     dot, bracket = name.find("."), name.find("[")
     ends = [at for at in (dot, bracket) if at > 0]
     return name[: min(ends)] if ends else name

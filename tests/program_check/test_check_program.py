@@ -18,9 +18,10 @@ from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.solutions import branch_labels
 from er3a.program_check.check_program import CheckOptions, check_program
-from er3a.program_check.motion_checks import _slot
 from er3a.programs.instructions import numbers_of
 from er3a.programs.languages import read_program
+from testing.program_texts import axes
+from testing.singular_poses import branch_of
 
 ROOT = Path(__file__).resolve().parents[2]
 FAULTS = ROOT / "data/programs/faults"
@@ -54,11 +55,6 @@ def checked(text: str, tmp_path: Path, name: str = "a.src", **options):
 def codes(check) -> set[str]:
     """Codes of all findings."""
     return {each.finding.code for each in check.findings}
-
-
-def axes(q) -> str:
-    """Joint angles in rad as a KRL axis position."""
-    return "{" + ", ".join(f"A{i + 1} {np.degrees(angle):.6f}" for i, angle in enumerate(q)) + "}"
 
 
 def frame(T) -> str:
@@ -192,7 +188,7 @@ def test_the_branch_of_joint_angles_is_that_of_the_inverse():
     for q in rng.uniform(ROBOT.lower, ROBOT.upper, (50, 6)):
         found = inverse(ROBOT, forward(ROBOT, q), q)
         nearest = int(np.abs(found.q - q).max(axis=1).argmin())
-        assert _slot(ROBOT, q) == found.branch[nearest]
+        assert branch_of(ROBOT, q) == found.branch[nearest]
     assert len(set(branch_labels(ROBOT))) == 8
 
 

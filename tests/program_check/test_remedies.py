@@ -30,6 +30,7 @@ from er3a.programs.execution import RunLimits
 from er3a.programs.languages import read_program
 from er3a.robots.robot import CombinedLimit, Envelope
 from testing.arms import scara
+from testing.program_texts import axes
 
 ROBOT = load_robot("er3a_c60")
 
@@ -130,11 +131,6 @@ def rapid(*lines: str) -> str:
 def krl(*lines: str, more: str = "") -> str:
     """A program with these lines, at a speed that is given."""
     return HEAD + "".join(f"{line}\n" for line in lines) + f"END\n{more}"
-
-
-def axes(q) -> str:
-    """Joint angles (rad) as a KRL axis position."""
-    return "{" + ",".join(f"A{i} {np.degrees(angle):.6f}" for i, angle in enumerate(q, 1)) + "}"
 
 
 def last(check):
