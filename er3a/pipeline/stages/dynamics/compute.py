@@ -489,6 +489,7 @@ def compute(study: Study, name: str) -> model.DynamicsResults:
             *rest,
             *_left_out(robot, summaries, skipped, unknown, settings.samples),
             *_weight(study, name, settings),
+            *(() if study.scene(name, "trajectory") or not paths else (LeftOut("obstacles"),)),
         )
         if holding or uses
         else (),
