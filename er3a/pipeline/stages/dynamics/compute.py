@@ -490,9 +490,7 @@ def compute(study: Study, name: str) -> model.DynamicsResults:
             *_left_out(robot, summaries, skipped, unknown, settings.samples),
             *_weight(study, name, settings),
             *(() if study.scene(name, "trajectory") or not paths else (LeftOut("obstacles"),)),
-        )
-        if holding or uses
-        else (),
+        ),
     )
     followed = [path.rows for path in paths if path.demand]
     rows = model.TorqueRows.stacked(followed).of_joints(robot.slides)
