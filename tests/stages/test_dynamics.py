@@ -118,6 +118,9 @@ def test_a_robot_without_masses_has_no_data(tmp_path):
     assert found.status == "no_reference"
     verdict = found.results.summary.verdict.finding
     assert isinstance(verdict, NoData)
+    left = {each.subject: each.names for each in found.results.summary.not_examined}
+    assert left["link_masses"] == tuple("123456")
+    assert {"peak_torques", "load", "torque_peaks", "drive_behaviour"} <= left.keys()
     assert say(verdict).startswith("No data")
     assert "payload" not in {each.what for each in found.results.summary.unknown}  # the manual has it
     assert len(found.results.torques) == 0

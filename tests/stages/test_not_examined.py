@@ -106,6 +106,16 @@ def test_paths_name_what_their_settings_leave_out(study, tmp_path):
 
 
 @pytest.mark.long
+@pytest.mark.parametrize("stage", ["trajectory", "dynamics"])
+def test_stages_that_follow_paths_without_obstacles_say_so(study, tmp_path, stage):
+    """Motors are sized by the paths that may be run, which a scene decides."""
+    compute, entry = STAGES[stage].module("compute").compute, {"paths": one_path(tmp_path)}
+    for scene in (None, "data/scenes/table_and_post.yaml"):
+        results = compute(changed(study, entry, trajectory={"scene": scene, "avoidance": "slow"}), ROBOT)
+        assert ("obstacles" in subjects(results)) == (scene is None)
+
+
+@pytest.mark.long
 def test_a_path_that_collides_passes_by_no_allowed_contact_missing_shape_or_missing_scene(study, tmp_path):
     """The line runs into the table, which is not looked at in each of three ways."""
     content = yaml.safe_load(Path(f"data/paths/{ROBOT}.yaml").read_text(encoding="utf-8"))

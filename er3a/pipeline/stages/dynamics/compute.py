@@ -489,9 +489,8 @@ def compute(study: Study, name: str) -> model.DynamicsResults:
             *rest,
             *_left_out(robot, summaries, skipped, unknown, settings.samples),
             *_weight(study, name, settings),
-        )
-        if holding or uses
-        else (),
+            *(() if study.scene(name, "trajectory") or not paths else (LeftOut("obstacles"),)),
+        ),
     )
     followed = [path.rows for path in paths if path.demand]
     rows = model.TorqueRows.stacked(followed).of_joints(robot.slides)

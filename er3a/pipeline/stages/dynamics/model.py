@@ -15,7 +15,7 @@ from er3a.dynamics.margins import Binding, WristQuantity
 from er3a.dynamics.plausibility import MassFinding
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.language import N_
-from er3a.pipeline.results import Results, Summary, Verdict
+from er3a.pipeline.results import NEVER_A_PASS, Results, Summary, Verdict
 from er3a.pipeline.tables import Table, Texts, column, per_joint
 from er3a.planning.names import PathVerdict
 from er3a.planning.timing import NoTimeLaw
@@ -330,6 +330,8 @@ class MotorNeed:
 class DynamicsSummary(Summary):
     """Head, masses, paths, drives and wrist.
 
+    Without obstacles paths count that may not be run, which asks no less of the motors: so that can still be a pass.
+
     Attributes
     ----------
     masses : None where there are none
@@ -337,6 +339,8 @@ class DynamicsSummary(Summary):
     uses : all that was compared with a limit, the tightest first
     power_imbalance : largest difference of power and change of energy, of the largest power; None without paths
     """
+
+    decisive = NEVER_A_PASS - {"obstacles"}
 
     verdict: Verdict[NoData | NoLimits | AllWithin | Marginal | Overload]
     gravity_m_s2: float
