@@ -49,6 +49,7 @@ STEPS, MOST_STEPS = 30, 100
 SMALL_STEP = 1e-12  # m and rad
 SMALL_CHANGE, SLOW_CHANGE = 1e-6, 1e-3  # of the weighted differences, of measured points; after STEPS
 HALVINGS = 12
+ROUNDING = 1e-6  # mm: a fit that leaves less has met its points exactly
 LEAST_OWN = 1e-9
 CLEAR = 10.0
 """Times what the table leaves of touched points that has to set a length, root mean square: the ways of joints that
@@ -245,15 +246,13 @@ def covariance_by_poses(found: Fit, pose_of: Integers) -> tuple[Reals, Reals]:
     C = found.covariance
     order = np.argsort(pose_of, kind="stable")
     starts, counts = np.unique(pose_of[order], return_index=True, return_counts=True)[1:]
-    middle = np.zeros_like(C)
-    sizes, pulls = [], []
+    sizes, pulls, pushes = [], [], []
     for count in np.unique(counts):
         rows = order[starts[counts == count][:, None] + np.arange(count)]
         J = found.J[rows]  # (poses, count, k + c)
         size, axes = np.linalg.eigh(np.eye(count) - J @ C @ J.swapaxes(1, 2))
         weight = (axes / np.sqrt(np.maximum(size, LEAST_OWN))[:, None]) @ axes.swapaxes(1, 2)
-        push = (J.swapaxes(1, 2) @ weight @ found.rest[rows][..., None])[..., 0]
-        middle += push.T @ push
+        pushes.append((J.swapaxes(1, 2) @ weight @ found.rest[rows][..., None])[..., 0])
         shares = weight @ J @ C
         sizes.append((shares**2).sum(axis=1))
         pulls.append(J.swapaxes(1, 2) @ shares)
@@ -263,7 +262,8 @@ def covariance_by_poses(found: Fit, pose_of: Integers) -> tuple[Reals, Reals]:
     both = C @ (by_number @ by_number.transpose(0, 2, 1))
     squares = (own**2).sum(axis=0) - 2 * (own * drawn).sum(axis=0) + np.einsum("kij,kji->k", both, both)
     freedom = (own - drawn).sum(axis=0) ** 2 / np.maximum(squares, LEAST_OWN * (own**2).sum(axis=0))
-    return np.asarray(C @ middle @ C, np.float64), np.asarray(np.maximum(freedom, 1.0), np.float64)
+    errors = np.concatenate(pushes) @ C  # squares: no rounding makes a variance negative
+    return np.asarray(errors.T @ errors, np.float64), np.asarray(np.maximum(freedom, 1.0), np.float64)
 
 
 @dataclass(frozen=True)

@@ -172,8 +172,11 @@ def _figures(found: Calibration, errors: MeasuredErrors) -> list[ShownFigure]:
     if left_out:
         figures.append((tr("at poses left out, mean"), left_out.mean_mm))
         figures.append((tr("at poses left out, worst"), left_out.worst_mm))
-    if found.deviation_mm is not None:
-        figures.append((tr("standard deviation of a coordinate, estimated for the table alone"), found.deviation_mm))
+    by_model = {"model": found.beyond.deviation_mm if found.beyond else None, "table": found.deviation_mm}
+    for model, deviation in by_model.items():
+        if deviation is not None:
+            label = tr("standard deviation of a coordinate, estimated: {model}", model=tr(MODELS[model]))
+            figures.append((label, deviation))
     return [ShownFigure(label, label, value, "mm", None, False) for label, value in figures]
 
 
