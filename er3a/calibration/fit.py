@@ -137,7 +137,8 @@ def left_of_touched(robot: Robot, observations: Observations) -> float:
 
 def scale_of(robot: Robot, observations: PointObservations) -> Parameter | None:
     """The longest length of the table that moves the points as nothing else does, which is taken as it is; None where
-    coordinates or lengths were measured, or joints have slid while a place or plane was touched."""
+    coordinates or lengths were measured, or joints have slid while a place or plane was touched, or lengths of a flat
+    arm's bar differ."""
     if observations.has_scale:
         return None
     lengths = parameters_of(robot, "lengths")
@@ -148,9 +149,10 @@ def scale_of(robot: Robot, observations: PointObservations) -> Parameter | None:
     longest = max(alone, key=lambda entry: abs(entry.nominal(robot)), default=None)
     if longest is None:
         return None
-    slid, off = observations.slid(robot), observations.predict(robot, (), np.zeros((1, 0)))[0]
+    off = observations.predict(robot, (), np.zeros((1, 0)))[0] - observations.values_mm
+    known = max(np.linalg.norm(observations.slid(robot)), np.linalg.norm(observations.varied()))
     least = max(CLEAR * float(np.linalg.norm(off)), DEPENDENT * abs(longest.nominal(robot)) * len(off) ** 0.5)
-    return longest if np.linalg.norm(slid) < least else None
+    return longest if known < least else None
 
 
 def _replaceable(robot: Robot, lengths: Sequence[Parameter], observations: PointObservations) -> list[Parameter]:

@@ -177,9 +177,9 @@ class PointObservations:
         plane, socket and unknown length drop out
     kinds, names : of each number
     axes : (3, 3), rows are the directions in which coordinates are observed
-    flat : whether the table moves all points in the plane of the first two, while nothing but places and planes is
-        touched. What is across it is not observed then, because such a table lets points meet there however the arm's
-        axes are tilted; planes are seen as lines
+    flat : whether the table moves all points in the plane of the first two, while no coordinates are measured. What is
+        across it is not observed then, because such a table lets points meet there however the arm's axes are tilted,
+        and a socket may be on either side; planes are seen as lines
     """
 
     row_values: Reals
@@ -242,10 +242,21 @@ class PointObservations:
 
     @property
     def has_scale(self) -> bool:
-        """Whether coordinates or lengths were measured, which set the scale of the arm."""
+        """Whether coordinates or lengths were measured, which set the scale of the arm. Beside the plane of a flat arm a
+        bar's points may be on any circle about its socket."""
         return bool((self.touched < 0).any()) or any(
-            kind in ("pair", "bar") and self.lengths_mm(rows).any() for kind, rows in self.groups()
+            (kind == "pair" or (kind == "bar" and not self.flat)) and self.lengths_mm(rows).any()
+            for kind, rows in self.groups()
         )
+
+    def varied(self) -> Reals:
+        """By how much measured lengths of bars differ from their mean (n,), mm."""
+        found = np.zeros(self.seen.shape)
+        for kind, rows in self.groups():
+            if kind == "bar":
+                found[rows, 0] = self.lengths_mm(rows) - self.lengths_mm(rows).mean()
+        own: Reals = found[self.seen]
+        return own
 
     def lengths_mm(self, rows: Integers) -> Reals:
         """Measured lengths of a pair or bar; 0 if they are unknown."""
@@ -254,9 +265,16 @@ class PointObservations:
         found: Reals = lengths[rows, 0]
         return found
 
+    def _along_axes(self, xyz: Reals) -> Reals:
+        """Coordinates (P, 3) along ``axes``, 0 across the plane if the arm is flat."""
+        found: Reals = xyz @ self.axes.T
+        if self.flat:
+            found[:, 2] = 0.0
+        return found
+
     def relative(self, xyz: Reals) -> Reals:
         """What is observed of points (P, 3), m: see ``touched``."""
-        found: Reals = xyz @ self.axes.T
+        found = self._along_axes(xyz)
         if not self.kinds:
             return found
         for kind, rows in self.groups():
@@ -276,7 +294,7 @@ class PointObservations:
 
     def relative_shift(self, shift: Reals, around: Reals) -> Reals:
         """By how much small shifts (P, 3) of points ``around`` change what is observed, m."""
-        found: Reals = shift @ self.axes.T
+        found = self._along_axes(shift)
         for kind, rows in self.groups():
             along, basis = self._dropping(kind, rows, around)
             own = found[rows] - found[rows[::-1]] if kind == "pair" else found[rows]
@@ -295,7 +313,7 @@ class PointObservations:
     def _dropping(self, kind: TouchKind, rows: Integers, around: Reals) -> tuple[Reals, Reals]:
         """For points ``around``: the directions (k, 3) in which those of a plane, pair or bar are observed, and what
         drops out, (k, r), the same for each coordinate of a place."""
-        here, every = around[rows] @ self.axes.T, np.ones((len(rows), 1))
+        here, every = self._along_axes(around[rows]), np.ones((len(rows), 1))
         if kind == "place":
             return here, every
         if kind == "plane":
@@ -452,12 +470,18 @@ def directions(apart: Reals) -> tuple[Reals, Reals]:
 
 def socket(xyz: Reals, lengths: Reals) -> Reals:
     """The point (3,), m, from which points (P, 3) are nearest to lengths (P,), or to one length if they are all 0: a
-    sphere by linear least squares, then Gauss-Newton steps."""
+    sphere by linear least squares, then Gauss-Newton steps. Beside points in one plane it is on the side to which the
+    largest component of the normal points."""
     middle = xyz.mean(axis=0)
     here = xyz - middle
     unknown = not lengths.any()
     squares = (here**2).sum(axis=1) - lengths**2
-    centre: Reals = np.linalg.lstsq(np.column_stack([2 * here, np.ones(len(here))]), squares, DEPENDENT)[0][:3]
+    sphere = np.linalg.lstsq(np.column_stack([2 * here, np.ones(len(here))]), squares, DEPENDENT)[0]
+    centre: Reals = sphere[:3]
+    sizes, axes = np.linalg.svd(here, full_matrices=False)[1:]
+    if len(sizes) == 3 and sizes[2] < DEPENDENT * sizes[0] and not unknown:
+        height = np.sqrt(max(-sphere[3] - centre @ centre, 0.0))
+        centre = centre + height * axes[2] * np.sign(axes[2][np.abs(axes[2]).argmax()])
     for _ in range(SOCKET_STEPS):
         along, size = directions(here - centre)
         off = size - lengths
@@ -531,7 +555,7 @@ def observed(
         kinds=tuple(kind for kind, _ in numbers),
         names=tuple(name for _, name in numbers),
     )
-    axes = _flat_axes(robot, found) if set(found.kinds) <= {"place", "plane"} and found.all_touched else None
+    axes = _flat_axes(robot, found) if found.all_touched else None
     if axes is None:
         return found
     seen[:, 2] = False

@@ -462,16 +462,20 @@ def test_what_is_touched_at_unknown_places_corrects_a_table(kind, arm, random, t
             assert each.nominal + each.correction == pytest.approx(true, abs=3 * each.half_width)
 
 
-@pytest.mark.parametrize("kind", ["place", "plane"])
+@pytest.mark.parametrize("kind", ["place", "plane", "bar"])
 def test_touches_of_a_flat_arm_settle_what_moves_points_in_its_plane_alone(kind, random):
     """Whatever its axes' tilts are, without them all points are in one plane, and meet there."""
     bench, rows = Bench("planar", random), []
     bench.truth = bench.truth.replace(alpha=bench.robot.alpha, base=np.eye(4))
     for number in range(8):
         target = er3a.forward(bench.truth, bench.joints(1)[0])[:3, 3]
-        normal = None if kind == "place" else np.array([np.cos(number), np.sin(number), 0])
-        q = reached(bench, target, normal, 20) + random.normal(0, 2e-5, (20, 3))
-        rows += [Measurement(0, tuple(p), "tool", (None,) * 3, **{kind: str(number)}) for p in np.degrees(q).tolist()]
+        normal, radius = np.array([np.cos(number), np.sin(number), 0]), 0.2 if kind == "bar" else 0.0
+        q = reached(bench, target, normal if kind == "plane" else None, 20, radius) + random.normal(0, 2e-5, (20, 3))
+        length = 250.0 if kind == "bar" and number % 2 else None  # of sockets 0.15 m above or below; others are unknown
+        rows += [
+            Measurement(0, tuple(pose), "tool", (None,) * 3, **{kind: str(number)}, length_mm=length)
+            for pose in np.degrees(q).tolist()
+        ]
     found, proposed = er3a.calibrate(bench.robot, rows), plan(bench.robot, rows, 3)
     assert {each.name for each in found.estimates} == {"tool_x", "tool_y", "a2", "offset2"}
     assert {"alpha2", "beta1"} <= {name for each in found.held for name in getattr(each, "entries", ())}
