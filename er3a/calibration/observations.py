@@ -242,8 +242,8 @@ class PointObservations:
 
     @property
     def has_scale(self) -> bool:
-        """Whether coordinates or lengths were measured, which set the scale of the arm. Beside the plane of a flat arm a
-        bar's points may be on any circle about its socket."""
+        """Whether coordinates or lengths were measured, which set the scale of the arm. A bar's points in the plane of
+        a flat arm may be on any circle about its socket."""
         return bool((self.touched < 0).any()) or any(
             (kind == "pair" or (kind == "bar" and not self.flat)) and self.lengths_mm(rows).any()
             for kind, rows in self.groups()

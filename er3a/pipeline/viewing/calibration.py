@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 from matplotlib import colormaps
+from matplotlib.ticker import MaxNLocator
 
 from er3a.calibration.calibrate import Calibration, JointShare, TermEstimate, joint_shares
 from er3a.calibration.cross_validation import HeldOutErrors, TriedTerm
@@ -259,7 +260,8 @@ def _maps(errors: MeasuredErrors) -> Picture:
             )
             equal_scale(ax, x_label, y_label)
         axes[0, column].set_title(tr(MODELS[model]))
-        figure.colorbar(drawn, ax=axes[:, column], location="bottom", label=bracketed(tr("distance"), "mm"))
+        label = bracketed(tr("distance"), "mm")
+        figure.colorbar(drawn, ax=axes[:, column], location="bottom", label=label, ticks=MaxNLocator(4))
     caption = tr("Error over the workspace: above from above, below in the section through the base's axis; each "
                  "column has its own scale.")  # fmt: skip
     return Picture(figure, tr("Points of the workspace, coloured by their error before and after"), caption)
