@@ -301,7 +301,7 @@ class Calibration(ByValue, Displayed):
     coordinates, poses : how many measured coordinates at how many poses
     rms_before_mm, rms_after_mm : of the differences to the measurements
     scatter : root mean square of what remains, in standard deviations, per degree of freedom: near 1 if table and
-        stated deviations are right; near 1, too, if the deviation was estimated
+        stated deviations are right; 1 if the deviation was estimated
     more : what it takes to estimate more entries; None if all are estimated
     idle : what was touched at too few poses to say anything
     deviation_mm : standard deviation of a coordinate, estimated from what the robot file's model leaves; None if it
@@ -538,9 +538,10 @@ def _estimates(robot: Robot, found: Fit, error: Reals, quantiles: Reals) -> tupl
 @dataclass(frozen=True, eq=False)
 class _Model:
     """Points that are used, the table with what a robot file can hold, and with all terms that are chosen (the same if
-    there are none)."""
+    there are none), which has observations of its own deviation."""
 
     observations: PointObservations
+    for_whole: PointObservations
     level: Level
     table: Fit
     choice: ChosenTerms
@@ -550,7 +551,7 @@ class _Model:
     @property
     def off_mm(self) -> Reals:
         """What the whole model leaves, mm (n,)."""
-        off: Reals = self.whole.after * self.observations.deviation_mm
+        off: Reals = self.whole.after * self.for_whole.deviation_mm
         return off
 
 
@@ -573,7 +574,17 @@ def _model(robot: Robot, observations: PointObservations, free_ratios: bool) -> 
         and _error_left_out(observations, whole) >= _error_left_out(observations, table)
     ):
         choice, whole = ChosenTerms((), ()), table  # they stand for a coupling, which was not tried beside them
-    return _Model(observations, level, table, choice, for_file, whole)
+    finer = observations
+    if not observations.deviation_known:  # that of the table alone would let the prior pull coefficients towards 0
+        if for_file.terms:
+            observations = observations.with_deviation(observations.deviation_mm[0] * table.scatter)
+            table = fit(robot, level.kept, observations, for_file.terms)
+        if choice.terms:
+            finer = finer.with_deviation(finer.deviation_mm[0] * whole.scatter)
+            whole = fit(robot, level.kept, finer, choice.terms)
+    if not choice.terms:
+        finer, whole = observations, table
+    return _Model(observations, finer, level, table, choice, for_file, whole)
 
 
 def _error_left_out(observations: PointObservations, found: Fit) -> float:
@@ -599,7 +610,7 @@ def _from_points(robot: Robot, every: PointObservations, free_ratios: bool) -> C
         residuals=_structure(robot, observations, model.table),
         tried=model.choice.tried or model.for_file.tried,
         tried_for_file=model.for_file.tried if model.choice.tried else (),
-        beyond=_beyond(robot, observations, model.whole) if model.choice.terms else None,
+        beyond=_beyond(robot, model.for_whole, model.whole) if model.choice.terms else None,
     )
 
 

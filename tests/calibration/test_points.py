@@ -203,6 +203,15 @@ def test_sag_under_the_arm_s_own_weight_is_told_from_a_load_at_the_tool(random):
     assert term.coefficients[0] == pytest.approx(3, abs=4 * term.standard_errors[0])
 
 
+def test_a_large_sag_is_no_smaller_than_its_interval_says(random):
+    """A coefficient of several times its usual size, in an arm that is measured finely."""
+    bench = Bench("slide", random, {JointTerm("sag", 2): [6e-3]})
+    found = er3a.calibrate(bench.robot, bench.measured(200, 0.015))
+    (term,) = found.beyond.terms
+    assert term.coefficients[0] == pytest.approx(6, abs=3 * term.standard_errors[0])
+    assert found.beyond.deviation_mm == pytest.approx(0.015, rel=0.1)
+
+
 def test_a_load_that_lifts_the_arm_is_no_sag(random):
     bench = Bench("six", random, {JointTerm("sag", 2): [-3e-3]})
     found = er3a.calibrate(bench.robot, bench.measured(200, 0.05))
