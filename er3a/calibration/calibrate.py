@@ -27,6 +27,7 @@ from er3a.calibration.cross_validation import (
     left_out,
 )
 from er3a.calibration.fit import (
+    ROUNDING,
     SCALE,
     BarLength,
     Fit,
@@ -71,7 +72,7 @@ from er3a.robots.robot import Robot
 SHOWN_POSES = 3
 CLOSE = 0.9
 MAX_SCATTER = 3.0
-ROUNDING = 1e-6  # mm: a fit that leaves less has met its points exactly
+SMALLEST = np.finfo(float).tiny  # instead of 0, to divide by
 FAR_OUT = 6.0
 """Standard deviations beyond which a point is set aside: noise goes there once in 500 million."""
 TOGETHER = 0.5
@@ -272,6 +273,7 @@ class Beyond(CorrectedModel):
     terms : their coefficients
     estimates : the table's corrections
     rms_mm : of what remains
+    deviation_mm : standard deviation of a coordinate, estimated from what this model leaves; None if it was stated
     left_out : at poses left out; None of too few poses
     residuals : what remains: noise, or structure
     """
@@ -279,6 +281,7 @@ class Beyond(CorrectedModel):
     terms: tuple[TermEstimate, ...]
     estimates: tuple[Estimate, ...]
     rms_mm: float
+    deviation_mm: float | None
     left_out: HeldOutErrors | None
     residuals: ResidualStructure | None
 
@@ -301,7 +304,8 @@ class Calibration(ByValue, Displayed):
         stated deviations are right; 1 if the deviation was estimated
     more : what it takes to estimate more entries; None if all are estimated
     idle : what was touched at too few poses to say anything
-    deviation_mm : standard deviation of a coordinate, estimated from what remains; None if it was stated
+    deviation_mm : standard deviation of a coordinate, estimated from what the robot file's model leaves; None if it
+        was stated
     outliers : measurements that were set aside
     bars : ball bars of unknown length, by the table alone
     left_out : at poses left out, by what the robot's file holds; None of reference sets and of too few poses
@@ -479,7 +483,7 @@ def _result(robot: Robot, level: Level, observations: Observations, found: Fit) 
     """What the table, with ratios, has of a calibration."""
     covariance, quantiles = _covariance(observations, found)
     error, count = np.sqrt(np.diag(covariance)), len(found.kept)
-    correlation = (covariance / np.outer(error, error))[:count, :count]
+    correlation = (covariance / np.maximum(np.outer(error, error), SMALLEST))[:count, :count]
     rows, columns = np.nonzero(np.triu(np.abs(correlation) > CLOSE, 1))
     kept, deviation, here = found.kept, observations.deviation_mm, corrected(robot, found.kept, found.amounts)
     bars: tuple[BarLength, ...] = ()
@@ -534,9 +538,10 @@ def _estimates(robot: Robot, found: Fit, error: Reals, quantiles: Reals) -> tupl
 @dataclass(frozen=True, eq=False)
 class _Model:
     """Points that are used, the table with what a robot file can hold, and with all terms that are chosen (the same if
-    there are none)."""
+    there are none), which has observations of its own deviation."""
 
     observations: PointObservations
+    for_whole: PointObservations
     level: Level
     table: Fit
     choice: ChosenTerms
@@ -546,7 +551,7 @@ class _Model:
     @property
     def off_mm(self) -> Reals:
         """What the whole model leaves, mm (n,)."""
-        off: Reals = self.whole.after * self.observations.deviation_mm
+        off: Reals = self.whole.after * self.for_whole.deviation_mm
         return off
 
 
@@ -569,7 +574,17 @@ def _model(robot: Robot, observations: PointObservations, free_ratios: bool) -> 
         and _error_left_out(observations, whole) >= _error_left_out(observations, table)
     ):
         choice, whole = ChosenTerms((), ()), table  # they stand for a coupling, which was not tried beside them
-    return _Model(observations, level, table, choice, for_file, whole)
+    finer = observations
+    if not observations.deviation_known:  # that of the table alone would let the prior pull coefficients towards 0
+        if for_file.terms:
+            observations = observations.with_deviation(observations.deviation_mm[0] * table.scatter)
+            table = fit(robot, level.kept, observations, for_file.terms)
+        if choice.terms:
+            finer = finer.with_deviation(finer.deviation_mm[0] * whole.scatter)
+            whole = fit(robot, level.kept, finer, choice.terms)
+    if not choice.terms:
+        finer, whole = observations, table
+    return _Model(observations, finer, level, table, choice, for_file, whole)
 
 
 def _error_left_out(observations: PointObservations, found: Fit) -> float:
@@ -589,13 +604,13 @@ def _from_points(robot: Robot, every: PointObservations, free_ratios: bool) -> C
     observations, table = model.observations, _result(robot, model.level, model.observations, model.table)
     return replace(
         table,
-        deviation_mm=None if observations.deviation_known else float(observations.deviation_mm[0]),
+        deviation_mm=_deviation(observations, model.table),
         outliers=tuple(Outlier(int(every.lines[k]), float(distances[k])) for k in np.flatnonzero(~used)),
         left_out=_left_out(observations, model.table),
         residuals=_structure(robot, observations, model.table),
         tried=model.choice.tried or model.for_file.tried,
         tried_for_file=model.for_file.tried if model.choice.tried else (),
-        beyond=_beyond(robot, observations, model.whole) if model.choice.terms else None,
+        beyond=_beyond(robot, model.for_whole, model.whole) if model.choice.terms else None,
     )
 
 
@@ -656,6 +671,11 @@ def _off_mm(robot: Robot, every: PointObservations, model: _Model, used: Flags) 
     return off
 
 
+def _deviation(observations: PointObservations, found: Fit) -> float | None:
+    """Of a coordinate, mm, by what a fit leaves; None if it was stated."""
+    return None if observations.deviation_known else float(observations.deviation_mm[0]) * found.scatter
+
+
 def _left_out(observations: PointObservations, found: Fit) -> HeldOutErrors | None:
     return left_out(observations, found) if can_leave_out(observations.pose_of[found.last], found.J.shape[1]) else None
 
@@ -697,6 +717,7 @@ def _beyond(robot: Robot, observations: PointObservations, found: Fit) -> Beyond
         terms=_term_estimates(found, error),
         estimates=_estimates(robot, found, error, quantiles),
         rms_mm=float(np.sqrt(np.mean((found.after * observations.deviation_mm) ** 2))),
+        deviation_mm=_deviation(observations, found),
         left_out=_left_out(observations, found),
         residuals=_structure(robot, observations, found),
     )

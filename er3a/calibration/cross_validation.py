@@ -20,7 +20,7 @@ import scipy
 import scipy.sparse
 from scipy.cluster.vq import kmeans2
 
-from er3a.calibration.fit import Fit, jacobian
+from er3a.calibration.fit import ROUNDING, Fit, jacobian
 from er3a.calibration.observations import PointObservations
 from er3a.calibration.outcomes import TermVerdict
 from er3a.calibration.parameters import DEPENDENT, Parameter
@@ -176,7 +176,8 @@ def choose_terms(
     Parameters
     ----------
     robot : the table to start from; here : corrected without terms
-    ways : kinds that are tried, by the first for which there are coordinates enough; none if there is no such
+    ways : kinds that are tried, by the first for which there are coordinates enough; none if there is no such, or if
+        the table leaves nothing but rounding
     """
     rows, last = observations.independent(here)
     pose_of, rows = observations.pose_of[last], rows / observations.deviation_mm
@@ -188,8 +189,10 @@ def choose_terms(
             break
     else:
         return ChosenTerms((), ())
-    J = rows @ jacobian(here, kept, observations)
-    rest = rows @ (observations.values_mm - observations.predict(here, kept, np.zeros((1, count)))[0])
+    off = observations.values_mm - observations.predict(here, kept, np.zeros((1, count)))[0]
+    if np.sqrt(np.mean(off**2)) < ROUNDING:
+        return ChosenTerms((), ())
+    J, rest = rows @ jacobian(here, kept, observations), rows @ off
     rest = rest / np.sqrt(rest @ rest / (len(rest) - count))
     parts = [part for seed in SEEDS for part in parts_of(observations.row_values, seed)]
     search = _RippleSearch(here, observations) if ripples else None

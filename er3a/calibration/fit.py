@@ -49,6 +49,7 @@ STEPS, MAX_STEPS = 30, 100
 SMALL_STEP = 1e-12  # m and rad
 SMALL_CHANGE, SLOW_CHANGE = 1e-6, 1e-3  # of the weighted differences, of measured points; after STEPS
 HALVINGS = 12
+ROUNDING = 1e-6  # mm: a fit that leaves less has met its points exactly
 MIN_OWN = 1e-9
 CLEAR = 10.0
 """Times what the table leaves of touched points that has to set a length, root mean square: the ways of joints that
@@ -136,7 +137,8 @@ def left_of_touched(robot: Robot, observations: Observations) -> float:
 
 def scale_of(robot: Robot, observations: PointObservations) -> Parameter | None:
     """The longest length of the table that moves the points as nothing else does, which is taken as it is; None where
-    coordinates or lengths were measured, or joints have slid while a place or plane was touched."""
+    coordinates or lengths were measured, or joints have slid while a place or plane was touched, or lengths of a flat
+    arm's bar differ."""
     if observations.has_scale:
         return None
     lengths = parameters_of(robot, "lengths")
@@ -147,9 +149,10 @@ def scale_of(robot: Robot, observations: PointObservations) -> Parameter | None:
     longest = max(alone, key=lambda entry: abs(entry.nominal(robot)), default=None)
     if longest is None:
         return None
-    slid, off = observations.slid(robot), observations.predict(robot, (), np.zeros((1, 0)))[0]
-    min_slide = max(CLEAR * float(np.linalg.norm(off)), DEPENDENT * abs(longest.nominal(robot)) * len(off) ** 0.5)
-    return longest if np.linalg.norm(slid) < min_slide else None
+    off = observations.predict(robot, (), np.zeros((1, 0)))[0] - observations.values_mm
+    known = max(np.linalg.norm(observations.slid(robot)), np.linalg.norm(observations.varied()))
+    min_known = max(CLEAR * float(np.linalg.norm(off)), DEPENDENT * abs(longest.nominal(robot)) * len(off) ** 0.5)
+    return longest if known < min_known else None
 
 
 def _replaceable(robot: Robot, lengths: Sequence[Parameter], observations: PointObservations) -> list[Parameter]:
@@ -245,15 +248,13 @@ def covariance_by_poses(found: Fit, pose_of: Integers) -> tuple[Reals, Reals]:
     C = found.covariance
     order = np.argsort(pose_of, kind="stable")
     starts, counts = np.unique(pose_of[order], return_index=True, return_counts=True)[1:]
-    middle = np.zeros_like(C)
-    sizes, pulls = [], []
+    sizes, pulls, pushes = [], [], []
     for count in np.unique(counts):
         rows = order[starts[counts == count][:, None] + np.arange(count)]
         J = found.J[rows]  # (poses, count, k + c)
         size, axes = np.linalg.eigh(np.eye(count) - J @ C @ J.swapaxes(1, 2))
         weight = (axes / np.sqrt(np.maximum(size, MIN_OWN))[:, None]) @ axes.swapaxes(1, 2)
-        push = (J.swapaxes(1, 2) @ weight @ found.rest[rows][..., None])[..., 0]
-        middle += push.T @ push
+        pushes.append((J.swapaxes(1, 2) @ weight @ found.rest[rows][..., None])[..., 0])
         shares = weight @ J @ C
         sizes.append((shares**2).sum(axis=1))
         pulls.append(J.swapaxes(1, 2) @ shares)
@@ -263,7 +264,8 @@ def covariance_by_poses(found: Fit, pose_of: Integers) -> tuple[Reals, Reals]:
     both = C @ (by_number @ by_number.transpose(0, 2, 1))
     squares = (own**2).sum(axis=0) - 2 * (own * drawn).sum(axis=0) + np.einsum("kij,kji->k", both, both)
     freedom = (own - drawn).sum(axis=0) ** 2 / np.maximum(squares, MIN_OWN * (own**2).sum(axis=0))
-    return np.asarray(C @ middle @ C, np.float64), np.asarray(np.maximum(freedom, 1.0), np.float64)
+    errors = np.concatenate(pushes) @ C  # squares: no rounding makes a variance negative
+    return np.asarray(errors.T @ errors, np.float64), np.asarray(np.maximum(freedom, 1.0), np.float64)
 
 
 @dataclass(frozen=True)

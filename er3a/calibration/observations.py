@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -11,7 +11,7 @@ import numpy as np
 import scipy.sparse
 
 from er3a.calibration.outcomes import FixedName, PlacementName
-from er3a.calibration.parameters import DEPENDENT, MM, Parameter, moved, placed
+from er3a.calibration.parameters import DEPENDENT, MM, PARALLEL_RAD, Parameter, moved, placed
 from er3a.errors import InputError
 from er3a.kinematics.chain import row_values
 from er3a.kinematics.table_batch import frames_of, join, tables_of
@@ -142,22 +142,19 @@ class Touched:
     ----------
     poses : at which it is touched; a pair's two are one
     unknown : how many of these say nothing, because nobody knows where it is
+    coordinates : how many numbers one more pose gives
     """
 
     kind: TouchKind
     name: str
     poses: int
     unknown: int
+    coordinates: int
 
     @property
     def numbers(self) -> int:
         """Number of independent values that its poses give."""
         return self.coordinates * max(self.poses - self.unknown, 0)
-
-    @property
-    def coordinates(self) -> int:
-        """Number of coordinates that one more pose gives."""
-        return 3 if self.kind == "place" else 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,6 +176,10 @@ class PointObservations:
         points their distance from the socket that fits them best, beside its mean if the length is unknown. Place,
         plane, socket and unknown length drop out
     kinds, names : of each number
+    axes : (3, 3), rows are the directions in which coordinates are observed
+    flat : whether the table moves all points in the plane of the first two, while no coordinates are measured. What is
+        across it is not observed then, because such a table lets points meet there however the arm's axes are tilted,
+        and a socket may be on either side; planes are seen as lines
     """
 
     row_values: Reals
@@ -192,6 +193,8 @@ class PointObservations:
     touched: Integers
     kinds: tuple[TouchKind, ...] = ()
     names: tuple[str, ...] = ()
+    axes: Reals = field(default_factory=lambda: np.eye(3))
+    flat: bool = False
 
     def __len__(self) -> int:
         return len(self.values_mm)
@@ -227,6 +230,7 @@ class PointObservations:
                 self.names[self.touched[rows[0]]],
                 len(self.seen[rows, 0].nonzero()[0]),
                 self._unknowns(kind, rows),
+                int(self.seen[rows].sum(axis=1).max()),
             )
             for kind, rows in self.groups()
         ]
@@ -234,14 +238,25 @@ class PointObservations:
     def _unknowns(self, kind: TouchKind, rows: Integers) -> int:
         """How many numbers of each coordinate drop out: how many poses say nothing."""
         bar = 3 + (not self.lengths_mm(rows).any())
-        return {"place": 1, "plane": 3, "pair": 0, "bar": bar}[kind]
+        return {"place": 1, "plane": 3 - self.flat, "pair": 0, "bar": bar}[kind]
 
     @property
     def has_scale(self) -> bool:
-        """Whether coordinates or lengths were measured, which set the scale of the arm."""
+        """Whether coordinates or lengths were measured, which set the scale of the arm. A bar's points in the plane of
+        a flat arm may be on any circle about its socket."""
         return bool((self.touched < 0).any()) or any(
-            kind in ("pair", "bar") and self.lengths_mm(rows).any() for kind, rows in self.groups()
+            (kind == "pair" or (kind == "bar" and not self.flat)) and self.lengths_mm(rows).any()
+            for kind, rows in self.groups()
         )
+
+    def varied(self) -> Reals:
+        """By how much measured lengths of bars differ from their mean (n,), mm."""
+        found = np.zeros(self.seen.shape)
+        for kind, rows in self.groups():
+            if kind == "bar":
+                found[rows, 0] = self.lengths_mm(rows) - self.lengths_mm(rows).mean()
+        own: Reals = found[self.seen]
+        return own
 
     def lengths_mm(self, rows: Integers) -> Reals:
         """Measured lengths of a pair or bar; 0 if they are unknown."""
@@ -250,17 +265,24 @@ class PointObservations:
         found: Reals = lengths[rows, 0]
         return found
 
+    def _along_axes(self, xyz: Reals) -> Reals:
+        """Coordinates (P, 3) along ``axes``, 0 across the plane if the arm is flat."""
+        found: Reals = xyz @ self.axes.T
+        if self.flat:
+            found[:, 2] = 0.0
+        return found
+
     def relative(self, xyz: Reals) -> Reals:
         """What is observed of points (P, 3), m: see ``touched``."""
-        found = xyz.copy()
+        found = self._along_axes(xyz)
         if not self.kinds:
             return found
         for kind, rows in self.groups():
-            own = xyz[rows]
+            own = found[rows]
             if kind == "place":
                 found[rows] = own - own.mean(axis=0)
             elif kind == "plane":
-                found[rows, 0] = (own - own.mean(axis=0)) @ _plane(own)[0]
+                found[rows, 0] = (own - own.mean(axis=0)) @ self.plane(own)[0]
             elif kind == "pair":
                 found[rows, 0] = np.linalg.norm(own[0] - own[-1])
             else:
@@ -272,22 +294,30 @@ class PointObservations:
 
     def relative_shift(self, shift: Reals, around: Reals) -> Reals:
         """By how much small shifts (P, 3) of points ``around`` change what is observed, m."""
-        found = shift.copy()
+        found = self._along_axes(shift)
         for kind, rows in self.groups():
             along, basis = self._dropping(kind, rows, around)
-            own = shift[rows] - shift[rows[::-1]] if kind == "pair" else shift[rows]
+            own = found[rows] - found[rows[::-1]] if kind == "pair" else found[rows]
             own = own if kind == "place" else np.einsum("pi,pi->p", along, own)[:, None]
             found[rows, : own.shape[1]] = own - basis @ np.linalg.lstsq(basis, own, rcond=None)[0]
         return found
 
+    def plane(self, xyz: Reals) -> tuple[Reals, Reals]:
+        """Normal (3,) of the plane that fits points (P, 3) along ``axes`` best, and where they are in it, (P, 2); of
+        the line, (P, 1), that fits the first two coordinates best, if the arm is flat."""
+        wide = 2 - self.flat
+        here = (xyz - xyz.mean(axis=0)) * (np.arange(3) <= wide)
+        axes = np.linalg.svd(np.linalg.qr(here, mode="r"))[2]
+        return axes[wide] * np.sign(axes[wide][np.abs(axes[wide]).argmax()]), here @ axes[:wide].T
+
     def _dropping(self, kind: TouchKind, rows: Integers, around: Reals) -> tuple[Reals, Reals]:
         """For points ``around``: the directions (k, 3) in which those of a plane, pair or bar are observed, and what
         drops out, (k, r), the same for each coordinate of a place."""
-        here, every = around[rows], np.ones((len(rows), 1))
+        here, every = self._along_axes(around[rows]), np.ones((len(rows), 1))
         if kind == "place":
             return here, every
         if kind == "plane":
-            normal, inside = _plane(here)
+            normal, inside = self.plane(here)
             return every * normal, np.hstack([every, inside])
         if kind == "pair":
             return directions(here - here[::-1])[0], every[:, :0]
@@ -419,14 +449,9 @@ class PointObservations:
             deviation_mm=np.full(3 * count, np.median(self.deviation_mm)),
             lines=np.zeros(count, dtype=np.int64),
             touched=np.full(count, -1),
+            axes=np.eye(3),
+            flat=False,
         )
-
-
-def _plane(xyz: Reals) -> tuple[Reals, Reals]:
-    """Normal (3,) of the plane that fits points (P, 3) best, and where they are in it, (P, 2)."""
-    here = xyz - xyz.mean(axis=0)
-    axes = np.linalg.svd(np.linalg.qr(here, mode="r"))[2]
-    return axes[2] * np.sign(axes[2][np.abs(axes[2]).argmax()]), here @ axes[:2].T
 
 
 def _innovations(basis: Reals) -> Reals:
@@ -445,12 +470,18 @@ def directions(apart: Reals) -> tuple[Reals, Reals]:
 
 def socket(xyz: Reals, lengths: Reals) -> Reals:
     """The point (3,), m, from which points (P, 3) are nearest to lengths (P,), or to one length if they are all 0: a
-    sphere by linear least squares, then Gauss-Newton steps."""
+    sphere by linear least squares, then Gauss-Newton steps. Beside points in one plane it is on the side to which the
+    largest component of the normal points."""
     middle = xyz.mean(axis=0)
     here = xyz - middle
     unknown = not lengths.any()
     squares = (here**2).sum(axis=1) - lengths**2
-    centre: Reals = np.linalg.lstsq(np.column_stack([2 * here, np.ones(len(here))]), squares, DEPENDENT)[0][:3]
+    sphere = np.linalg.lstsq(np.column_stack([2 * here, np.ones(len(here))]), squares, DEPENDENT)[0]
+    centre: Reals = sphere[:3]
+    sizes, axes = np.linalg.svd(here, full_matrices=False)[1:]
+    if len(sizes) == 3 and sizes[2] < DEPENDENT * sizes[0] and not unknown:
+        height = np.sqrt(max(-sphere[3] - centre @ centre, 0.0))
+        centre = centre + height * axes[2] * np.sign(axes[2][np.abs(axes[2]).argmax()])
     for _ in range(SOCKET_STEPS):
         along, size = directions(here - centre)
         off = size - lengths
@@ -509,7 +540,7 @@ def observed(
     known = all(each.deviation_mm is not None for each in measurements)
     deviation = np.array([each.deviation_mm if known else 1.0 for each in measurements], dtype=float)
     poses = np.array([each.pose for each in measurements], dtype=float).reshape(-1, robot.joints)
-    return PointObservations(
+    found = PointObservations(
         row_values=row_values(robot, meant(robot, poses)),
         on_tool=on_tool,
         seen=seen,
@@ -524,6 +555,23 @@ def observed(
         kinds=tuple(kind for kind, _ in numbers),
         names=tuple(name for _, name in numbers),
     )
+    axes = _flat_axes(robot, found) if found.all_touched else None
+    if axes is None:
+        return found
+    seen[:, 2] = False
+    by_point = np.broadcast_to(deviation[:, None], seen.shape)[seen]
+    return replace(found, seen=seen, values_mm=xyz[seen], deviation_mm=by_point, axes=axes, flat=True)
+
+
+def _flat_axes(robot: Robot, points: PointObservations) -> Reals | None:
+    """Two directions of the plane in which the joints that move take all points by a robot's table, and its normal;
+    None if there is no such plane."""
+    mixed = np.column_stack([np.roll(column, k) for k, column in enumerate(points.row_values.T)])
+    x = replace(points, row_values=mixed).positions(robot)
+    if len(x) < len(COORDINATES):
+        return None
+    sizes, axes = np.linalg.svd(x - x.mean(axis=0), full_matrices=False)[1:]
+    return axes if sizes[2] < PARALLEL_RAD * sizes[1] else None
 
 
 def check_poses(measurements: Sequence[Measurement], robot: Robot, path: str | Path | None = None) -> None:

@@ -188,8 +188,9 @@ def _with(
     new = [_as_measured(each, point, each.kind == "pair" or (each.kind, each.name) in known) for each in proposals]
     found = observed([*measurements, *new], robot, [name for name in PLACEMENTS if name not in seen.free])
     assert isinstance(found, PointObservations)
-    usual = np.full(len(found) - len(seen), np.median(seen.deviation_mm))
-    return replace(found, deviation_mm=np.r_[seen.deviation_mm, usual])
+    by_point = np.full(len(found.seen), np.median(seen.deviation_mm))
+    by_point[seen.pose_of] = seen.deviation_mm
+    return replace(found, deviation_mm=by_point[found.pose_of])
 
 
 def _as_measured(proposal: Proposal, point: Literal["flange", "tool"], with_length: bool) -> Measurement:
@@ -274,7 +275,7 @@ def _touching(
     from ``others`` (N, 3); lengths (N,), m, and whether each does, free of collision and within limits."""
     size = np.resize(lengths, len(q))
     centre = x.mean(axis=0)
-    normal = np.linalg.svd(x - centre)[2][2]
+    normal = seen.plane(x @ seen.axes.T)[0] @ seen.axes
     if kind == "bar":
         centre = socket(x, lengths)
         if not lengths.any():

@@ -179,6 +179,7 @@ def test_a_term_that_is_there_is_found_and_no_other(name, term, random):
     ):
         assert value == pytest.approx(1000 * true, abs=5 * error)
     assert bench.error(found) < 0.04
+    assert found.beyond.deviation_mm == pytest.approx(0.05, rel=0.15)
     if own.kind not in ("ratio", "ripple"):  # ratios are in the file; neighbouring poses are several waves apart
         assert not found.residuals.is_noise
     assert found.beyond.residuals.is_noise
@@ -200,6 +201,15 @@ def test_sag_under_the_arm_s_own_weight_is_told_from_a_load_at_the_tool(random):
     (term,) = found.beyond.terms
     assert (term.kind, term.joint) == ("weight", 2)
     assert term.coefficients[0] == pytest.approx(3, abs=4 * term.standard_errors[0])
+
+
+def test_a_large_sag_is_no_smaller_than_its_interval_says(random):
+    """A coefficient of several times its usual size, in an arm that is measured finely."""
+    bench = Bench("slide", random, {JointTerm("sag", 2): [6e-3]})
+    found = er3a.calibrate(bench.robot, bench.measured(200, 0.015))
+    (term,) = found.beyond.terms
+    assert term.coefficients[0] == pytest.approx(6, abs=3 * term.standard_errors[0])
+    assert found.beyond.deviation_mm == pytest.approx(0.015, rel=0.1)
 
 
 def test_a_load_that_lifts_the_arm_is_no_sag(random):
@@ -296,6 +306,9 @@ def test_the_command_tells_positions_held_back(tmp_path):
     assert f"held back: 20 positions, {found['held_back']['mean_mm']:.4g} mm off on average" in text
     assert f"at worst (row {found['held_back']['worst_row']})" in text
     assert "tried: J3 coupled to J1" in text
+    whole, file = found["beyond"]["standard_deviation_mm"], found["standard_deviation_mm"]
+    assert f"estimated: {whole:.3g} mm by the whole model, {file:.3g} mm by the robot file" in text
+    assert whole < file
     assert text.startswith(f"the whole model errs at poses left out by {found['beyond']['left_out']['mean_mm']:.4g} mm")
     alone = found["held_back"]["table_mean_mm"]
     assert alone > found["held_back"]["mean_mm"]
@@ -456,6 +469,60 @@ def test_what_is_touched_at_unknown_places_corrects_a_table(kind, arm, random, t
         if each.name in ("a2", "a3"):
             true = truth["a"][each.parameter.joint - 1] * ratio * 1000
             assert each.nominal + each.correction == pytest.approx(true, abs=3 * each.half_width)
+
+
+@pytest.mark.parametrize("kind", ["place", "plane", "bar"])
+def test_touches_of_a_flat_arm_settle_what_moves_points_in_its_plane_alone(kind, random):
+    """Whatever its axes' tilts are, without them all points are in one plane, and meet there."""
+    bench, rows = Bench("planar", random), []
+    bench.truth = bench.truth.replace(alpha=bench.robot.alpha, base=np.eye(4))
+    for number in range(8):
+        target = er3a.forward(bench.truth, bench.joints(1)[0])[:3, 3]
+        normal, radius = np.array([np.cos(number), np.sin(number), 0]), 0.2 if kind == "bar" else 0.0
+        q = reached(bench, target, normal if kind == "plane" else None, 20, radius) + random.normal(0, 2e-5, (20, 3))
+        length = 250.0 if kind == "bar" and number % 2 else None  # of sockets 0.15 m above or below; others are unknown
+        rows += [
+            Measurement(0, tuple(pose), "tool", (None,) * 3, **{kind: str(number)}, length_mm=length)
+            for pose in np.degrees(q).tolist()
+        ]
+    found, proposed = er3a.calibrate(bench.robot, rows), plan(bench.robot, rows, 3)
+    assert {each.name for each in found.estimates} == {"tool_x", "tool_y", "a2", "offset2"}
+    assert {"alpha2", "beta1"} <= {name for each in found.held for name in getattr(each, "entries", ())}
+    assert set(proposed.settled) == {each.name for each in found.estimates}
+    assert found.deviation_mm > 0.001
+    (length,) = (each for each in found.estimates if each.name == "a2")
+    true = 1000 * bench.truth.a[1] * bench.robot.a[0] / bench.truth.a[0]
+    assert length.nominal + length.correction == pytest.approx(true, abs=2 * length.half_width)
+    assert length.half_width < 0.1
+
+
+def test_joints_that_turn_points_in_one_plane_leave_the_others_to_more_touches(random):
+    """J2, J3 and J5 of six joints, one way up and the other, touch places in the plane of the upper arm."""
+    bench, rows, middle = Bench("six", random), [], [1, 2, 4]
+    for number in range(30):
+        q = np.array([0.3, -0.4, 0.5, 0, 0.6, 0]) + random.uniform(-0.4, 0.4, 6) * np.isin(np.arange(6), middle)
+        target = er3a.forward(bench.robot, q)[:3, 3]
+        for turn in (0, 0.15, 0.3):
+            own = q + turn * np.eye(6)[4]
+            for _ in range(20):
+                J = er3a.jacobian(bench.robot, own)[:3, 1:3]
+                own[1:3] += np.linalg.lstsq(J, target - er3a.forward(bench.robot, own)[:3, 3], rcond=None)[0]
+            rows.append(Measurement(0, tuple(np.degrees(own).tolist()), "tool", (None,) * 3, place=str(number)))
+    found = plan(bench.robot, rows, 0)
+    assert not {"alpha2", "beta2", "alpha1", "d2"} & set(found.settled)
+    assert {"alpha2", "beta2"} <= set(found.lacking)
+
+
+@pytest.mark.parametrize("name", ["six", "planar"])
+def test_points_without_noise_are_met_without_outliers_terms_or_warnings(name, random):
+    bench = Bench(name, random)
+    for truth in (bench.robot, bench.robot.replace(a=bench.robot.a + 1e-4)):
+        bench.truth = truth
+        found = er3a.calibrate(bench.robot, bench.measured(60, 0.0))
+        assert found.outliers == found.ratios == ()
+        assert found.beyond is None
+        assert found.deviation_mm < 1e-9
+        assert np.isfinite(found.correlation).all()
 
 
 @pytest.mark.parametrize("kind", ["place", "plane", "bar"])
@@ -690,6 +757,8 @@ def test_a_coupling_of_joints_is_found_and_held_by_a_robot_file(poses, random, t
     assert len(tried) == 6 + 6 * 5
     assert [(each.joint, each.by) for each in tried if each.verdict == "taken"] == [(4, 2)]
     assert (found.beyond is None) == (poses < 100)
+    for model in (found, found.beyond or found):
+        assert model.deviation_mm == pytest.approx(0.02, rel=0.2)
     robot = bench.robot.replace(coupling=np.eye(6) - np.eye(6, k=-1) * [0, 1, 0, 0, 0, 0])  # J3 - J2
     file, q = coupled(robot, {(4, 2): 1e-3}).replace(name="coupled"), bench.joints(20)
     write_robot(file, tmp_path / "coupled.yaml")

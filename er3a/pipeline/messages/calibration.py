@@ -42,7 +42,7 @@ def lines_of(found: Calibration) -> str:
     scatter = (
         f"scatter {found.scatter:.2f} standard deviations"
         if found.deviation_mm is None
-        else f"standard deviation estimated: {found.deviation_mm:.3g} mm a coordinate"
+        else f"standard deviation of a coordinate, estimated: {_deviations(found)}"
     )
     lines = [
         *_summary(found),
@@ -87,6 +87,12 @@ def lines_of(found: Calibration) -> str:
     if found.more:
         lines.append(f"to estimate more: {say(found.more)}")
     return "\n".join(lines)
+
+
+def _deviations(found: Calibration) -> str:
+    """Those that the models leave."""
+    model, file = found.beyond.deviation_mm if found.beyond else None, found.deviation_mm
+    return f"{file:.3g} mm" if model is None else f"{model:.3g} mm by the whole model, {file:.3g} mm by the robot file"
 
 
 def _summary(found: Calibration) -> list[str]:
@@ -388,6 +394,7 @@ def _beyond(found: Beyond) -> dict[str, object]:
         "terms": [vars(each) for each in found.terms],
         "entries": _entries(found.estimates),
         "rms_mm": found.rms_mm,
+        "standard_deviation_mm": found.deviation_mm,
         "left_out": vars(found.left_out) if found.left_out else None,
         "residuals": _residuals(found.residuals),
     }

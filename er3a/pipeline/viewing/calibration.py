@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 from matplotlib import colormaps
+from matplotlib.ticker import MaxNLocator
 
 from er3a.calibration.calibrate import Calibration, JointShare, TermEstimate, joint_shares
 from er3a.calibration.cross_validation import HeldOutErrors, TriedTerm
@@ -172,8 +173,11 @@ def _figures(found: Calibration, errors: MeasuredErrors) -> list[ShownFigure]:
     if left_out:
         figures.append((tr("at poses left out, mean"), left_out.mean_mm))
         figures.append((tr("at poses left out, worst"), left_out.worst_mm))
-    if found.deviation_mm is not None:
-        figures.append((tr("standard deviation of a coordinate, estimated for the table alone"), found.deviation_mm))
+    by_model = {"model": found.beyond.deviation_mm if found.beyond else None, "table": found.deviation_mm}
+    for model, deviation in by_model.items():
+        if deviation is not None:
+            label = tr("standard deviation of a coordinate, estimated: {model}", model=tr(MODELS[model]))
+            figures.append((label, deviation))
     return [ShownFigure(label, label, value, "mm", None, False) for label, value in figures]
 
 
@@ -256,7 +260,8 @@ def _maps(errors: MeasuredErrors) -> Picture:
             )
             equal_scale(ax, x_label, y_label)
         axes[0, column].set_title(tr(MODELS[model]))
-        figure.colorbar(drawn, ax=axes[:, column], location="bottom", label=bracketed(tr("distance"), "mm"))
+        label = bracketed(tr("distance"), "mm")
+        figure.colorbar(drawn, ax=axes[:, column], location="bottom", label=label, ticks=MaxNLocator(4))
     caption = tr("Error over the workspace: above from above, below in the section through the base's axis; each "
                  "column has its own scale.")  # fmt: skip
     return Picture(figure, tr("Points of the workspace, coloured by their error before and after"), caption)
