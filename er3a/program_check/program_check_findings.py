@@ -411,7 +411,7 @@ FAILS = frozenset(
 )
 NOTES = frozenset(
     (
-        *("way_not_known", "frame_taken_as_flange", "speed_not_given", "load_not_examined"),
+        *("frame_taken_as_flange", "speed_not_given", "load_not_examined"),
         *("both_sides_checked", "program_form_inferred", "program_other_encoding"),
     )
 )

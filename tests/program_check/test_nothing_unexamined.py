@@ -129,7 +129,7 @@ def test_a_block_whose_head_is_not_understood_is_named_line_by_line_and_reading_
     assert codes(found)["way_not_known"] == [last]
     assert [(each.place.line, each.level) for each in found.verdicts] == [
         (3, "pass"),
-        (last, "note"),
+        (last, "caution"),
         (last + 2, "fail"),
     ]
 
@@ -205,7 +205,7 @@ def test_an_interrupt_that_moves_is_followed_and_named(tmp_path, head):
     assert codes(found)["moves_beside"] == [2]
     assert [(verdict.place.line, verdict.level) for verdict in found.verdicts] == [
         (4, "note"),
-        (7, "note"),
+        (7, "caution"),
         (8, "fail"),
     ]
 
