@@ -75,7 +75,7 @@ TEXTS = texts(
         ),
         "workspace.void_at_shoulder": (
             "An enclosed void of at least {litres:.3g} L surrounds the shoulder at ({x}, {y}, {z}) mm: the arm can't "
-            "fold far enough to reach it. No enclosed void elsewhere suggests a wrong joint range."
+            "fold far enough to reach it. There is no other enclosed void, so no joint range looks wrong."
         ),
         "workspace.no_void#sampled": "The samples leave no enclosed void inside the hull; no proof.",
         "workspace.no_void#undecided": (

@@ -194,7 +194,7 @@ def _slices_caption(summary: model.WorkspaceSummary) -> str:
     pockets = len(summary.voids) - enclosed
     return tr(
         "The hull contains {voids} and {pockets}. Every point of the blue area is reached by some joint vector "
-        "within the limits; place nothing in the white.",
+        "within the limits; place nothing outside it.",
         voids=sentence("workspace.voids", count=enclosed) if enclosed else tr("no enclosed void"),
         pockets=sentence("workspace.pockets", count=pockets),
     )
