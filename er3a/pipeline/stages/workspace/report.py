@@ -143,12 +143,12 @@ def _change_rows(summary: model.WorkspaceSummary) -> list[list[str]]:
 def _section_caption(summary: model.WorkspaceSummary, drawn: bool) -> str:
     texts = [
         tr(
-            "Cells are bars along the slide. What is white on the right is proven unreachable all along it; blank "
+            "Cells are bars along the slide. What is empty on the right is proven unreachable all along it; blank "
             "cells on the left were merely not sampled."
         )
         if summary.proof.bars
         else tr(
-            "What is white on the right is proven unreachable from every side; blank cells on the left were merely not "
+            "What is empty on the right is proven unreachable from every side; blank cells on the left were merely not "
             "sampled."
         )
     ]
