@@ -14,6 +14,7 @@ from lxml import etree
 from er3a.collision.pairs import ShapesAssumed
 from er3a.files.path_file import load_paths
 from er3a.files.robot_library import load_robot
+from er3a.pipeline.messages.say import say
 from er3a.pipeline.messages.trajectory import SoundEnd, advice, end_text, first_faults
 from er3a.pipeline.program_reports import programs_of
 from er3a.pipeline.stages import run
@@ -159,6 +160,18 @@ def test_a_path_that_ends_before_the_edge_of_the_reach_as_advised_is_safe(tmp_pa
     assert ((slowed >= lower + 1) & (slowed <= upper - 1)).all()
 
 
+def test_all_that_a_path_came_to_is_named_everywhere_in_the_order_of_time(tmp_path):
+    results = compute(study_of(tmp_path, "line_limits", expect={"line_limits": "leaves limits"}), ROBOT)
+    (path,), (fault,) = results.summary.paths, faults(results)
+    assert path.collisions[0].t0_s < path.out_of_limits[0].t0_s
+    assert path.outcomes == ("collides", "leaves limits")
+    assert fault.verdict == "collides, leaves limits"
+    assert "found so: line_limits (collides, leaves limits)" in say(results.summary.verdict.finding)
+    late = replace(path, collisions=(replace(path.collisions[0], t0_s=path.out_of_limits[0].t0_s + 0.1),))
+    assert late.outcomes == ("leaves limits", "collides")
+    assert replace(path, collisions=()).outcomes == ("leaves limits",)
+
+
 def test_a_path_that_keeps_the_margin_nowhere_gets_no_point_to_end_at(tmp_path):
     results = compute(study_of(tmp_path, "line_collides", settings={"assumed_margin_mm": 400.0}), ROBOT)
     (path,), (fault,) = results.summary.paths, faults(results)
@@ -181,6 +194,8 @@ def test_what_is_wrong_before_a_contact_ends_the_sound_part_of_a_path(tmp_path):
     assert last_sound(path, near, limits) is None
     assert "end the path there" not in advised(path, near, limits)
     assert "near-singular at the start" in advised(path, near, limits)
+    met = replace(path, singularities=(Singularity(0.0, 0.0, "wrist", True, 0.0, None),))
+    assert "the arm is singular at the start" in advised(met, near, limits)
     fast = replace(path.collisions[0], t0_s=0.7, cause=TooFastIfAssumed(2, 900.0, 180.0))
     several = replace(early, too_fast=(fast,), avoidance=path.avoidance * 2)
     assert [t for t, _ in first_faults(several)] == [0.5, path.collisions[0].t0_s]
