@@ -83,9 +83,13 @@ TEXTS = texts(
         ),
         "workspace.no_void#none": "The workspace holds no enclosed void.",
         "void_advice#cause": (
-            "It has this cause: {cause}: check the limits, the zero and the direction of joints 2 and 3."
+            "It has this cause: {cause}: check the limits, the zero and the direction of joints 2 and 3; never widen a "
+            "limit of the arm for it."
         ),
-        "void_advice#predicate": "It {cause}: check the limits, the zero and the direction of joints 2 and 3.",
+        "void_advice#predicate": (
+            "It {cause}: check the limits, the zero and the direction of joints 2 and 3; never widen a limit of the "
+            "arm for it."
+        ),
         "void_changes": (
             "{count} of {tried} single changes of the table leave less than a tenth of it: {named}. References must "
             "tell which is right."
