@@ -18,8 +18,9 @@ for module in pkgutil.iter_modules(messages.__path__):
     importlib.import_module(f"{messages.__name__}.{module.name}")
 
 ADVISES = re.compile(
-    r"(?:^|[:;,.)] |\bor |\band )(?:add|allow|ask|check|convert|correct|end|give|go|import|invert|jog|lead|leave|lower|"
-    r"make|map|measure|move|put|raise|read|remove|rotate|run|set|shift|spread|take|teach|tilt|time|turn|use|write)\b "
+    r"(?:^|[:;,.)] |\bor |\band )(?:add|allow|ask|begin|check|convert|correct|end|give|go|import|invert|jog|lead|leave|"
+    r"lower|make|map|measure|mount|move|put|raise|read|remove|rotate|run|set|shift|spread|start|take|teach|tilt|time|"
+    r"turn|use|write)\b "
     r"(?!\()",
     re.IGNORECASE,
 )
@@ -27,6 +28,7 @@ OF_PROGRAMS = "test_a_program_that_is_mended_as_advised_passes"
 BY_JOINT_MOVES = "test_joint_moves_that_are_advised_pass"
 OF_SETS = "test_a_set_that_is_mended_as_advised_gives_the_camera_and_no_warning"
 AT_PLACES = "test_the_clearance_of_a_place_is_that_of_the_nearest_arm_on_its_lattice"
+AT_OVERRIDE = "test_at_the_override_that_is_advised_a_controller_ten_times_as_fast_keeps_the_assumed_speeds"
 MEASURED = "test_the_proposed_measurement_settles_or_contradicts"
 CARRIED_OUT = {
     **dict.fromkeys(REMEDIES, OF_PROGRAMS),
@@ -53,6 +55,7 @@ CARRIED_OUT = {
     "strategy.stop": "test_stop_rests_on_the_path_before_the_region",
     "strategy.planned": "test_planned_motions_touch_nothing_and_keep_their_limits",
     "advice.slower": "test_the_slower_pace_that_is_advised_keeps_the_limits",
+    **dict.fromkeys(("advice.full_speed", "advice.limits#both", "advice.limits#speed"), AT_OVERRIDE),
     "advice.clear_until": "test_a_path_that_ends_where_its_advice_says_keeps_the_margin",
     "advice.clear_until#links": "test_a_path_that_ends_where_its_advice_says_keeps_the_margin",
     "advice.end": "test_a_path_that_ends_before_the_edge_of_the_reach_as_advised_is_safe",
@@ -87,7 +90,7 @@ NOT_CARRIED_OUT = {  # a person looks at the controller, the cell or the file, o
     *("contradiction#one", "contradiction#more"),
     *("all_samples_equal#target", "void_advice#cause", "void_advice#predicate"),
     *("read_limit#lower", "read_limit#upper", "time_joint"),
-    "payload.unknown",
+    *("payload.unknown", "payload.not_examined"),
     *("validation.left_open#turned", "validation.left_open#turned_at_least"),
 }
 NO_ADVICE = {f"not_of_this_arm#{why}" for why in ("no_such_joint", "no_wrist_centre", "joint_slides", "joint_turns")}

@@ -70,13 +70,13 @@ from er3a.robots.robot import Robot
 
 SHOWN_POSES = 3
 CLOSE = 0.9
-MOST_SCATTER = 3.0
+MAX_SCATTER = 3.0
 ROUNDING = 1e-6  # mm: a fit that leaves less has met its points exactly
 FAR_OUT = 6.0
 """Standard deviations beyond which a point is set aside: noise goes there once in 500 million."""
-FARTHEST = 0.5
-"""Share of the farthest from which on points are set aside in one go."""
-MOST_OUT = 0.1
+TOGETHER = 0.5
+"""Ratio to the farthest point's distance: points at least this far out are set aside in one go."""
+MAX_OUTLIER_SHARE = 0.1
 OUTLIER_ROUNDS = 3
 MEDIAN_TO_DEVIATION = 1.4826
 
@@ -139,7 +139,7 @@ def choose_level(robot: Robot, observations: Observations) -> Level:
                 what = next((each for each in more if isinstance(each, MoreTouches)), more[-1] if more else None)
                 return Level(name, parameters, here, what, scale)
     lack = "numbers" if isinstance(more[-1], MoreTouches) else "positions"
-    problem = f"{len(observations)} coordinates determine too little; {lack} to be added: {more[-1].least} at least"
+    problem = f"{len(observations)} coordinates determine too little; {lack} to be added: {more[-1].missing} at least"
     raise CalibrationError(more[-1], problem)
 
 
@@ -160,7 +160,7 @@ def _what_more(
         determined=len(here.kept),
         determinable=len(best.kept),
         level=level,
-        least=-(-max(lacking, len(best.kept) + 1 - len(observations)) // 3),
+        missing=-(-max(lacking, len(best.kept) + 1 - len(observations)) // 3),
         entries=tuple(parameters[k].name for k in best.kept if k not in here.kept),
         examples_deg=_examples(robot, [parameters[k] for k in best.kept], observations),
     )
@@ -170,12 +170,12 @@ def _what_touches(settled: int, best: int, observations: PointObservations) -> M
     """How many poses at each place, for ``best`` of the numbers to be settled, with one to spare."""
     things = observations.things()
     numbers = sum(each.numbers for each in things)
-    least, each = max(best - settled, best + 1 - numbers), []
+    missing, each = max(best - settled, best + 1 - numbers), []
     for kind in dict.fromkeys(thing.kind for thing in things):
         own = [thing for thing in things if thing.kind == kind]
-        whole = least + sum(thing.numbers for thing in own)
+        whole = missing + sum(thing.numbers for thing in own)
         each.append((kind, len(own), max(thing.unknown for thing in own) - (-whole // (own[0].coordinates * len(own)))))
-    return MoreTouches(observations.poses, numbers, settled, best, least, tuple(each))
+    return MoreTouches(observations.poses, numbers, settled, best, missing, tuple(each))
 
 
 def _rich(robot: Robot, observations: Observations) -> Observations:
@@ -340,7 +340,7 @@ class Calibration(ByValue, Displayed):
     @property
     def fits(self) -> bool:
         """Whether the corrected table meets the measurements to three times their uncertainty."""
-        return self.scatter <= MOST_SCATTER
+        return self.scatter <= MAX_SCATTER
 
     @property
     def open(self) -> tuple[str, ...]:
@@ -582,7 +582,7 @@ def _from_points(robot: Robot, every: PointObservations, free_ratios: bool) -> C
     model = _model(robot, every.take(used), free_ratios)
     for _ in range(OUTLIER_ROUNDS):
         again = _out_of(every, _off_mm(robot, every, model, used), model.off_mm) <= 1.0
-        if (again == used).all() or (~again).mean() > MOST_OUT:
+        if (again == used).all() or (~again).mean() > MAX_OUTLIER_SHARE:
             break
         used, model = again, _model(robot, every.take(again), free_ratios)
     distances = np.sqrt(np.bincount(every.pose_of, weights=_off_mm(robot, every, model, used) ** 2))
@@ -615,11 +615,11 @@ def _without_outliers(robot: Robot, every: PointObservations) -> Flags:
             return all_used
         off = found.after * observations.deviation_mm
         out = _out_of(observations, off, off)
-        far = out > max(1.0, FARTHEST * out.max())
+        far = out > max(1.0, TOGETHER * out.max())
         if not far.any():
             return used
         used[np.flatnonzero(used)[far]] = False
-        if (~used).mean() > MOST_OUT:
+        if (~used).mean() > MAX_OUTLIER_SHARE:
             return all_used
         observations = observations.take(~far)
 

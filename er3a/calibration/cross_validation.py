@@ -43,10 +43,10 @@ PARTS = 10
 SEEDS = 1, 2, 3, 4
 SURE = 1e-5
 """How improbable a term's share has to be if there is only noise; some 80 terms are tried, again with each taken."""
-LEAST_GAIN = 0.01
+MIN_GAIN = 0.01
 """Share of the mean squared error at poses left out that a term has to take away, either way of leaving out."""
-LEAST_POSES = 40
-LEAST_SPARE = 3
+MIN_POSES = 40
+MIN_SPARE = 3
 """Coordinates for each number of the model with all terms that are tried, for them to be tried."""
 RIDGE = 1e-12
 
@@ -147,7 +147,7 @@ class ChosenTerms:
 
 def can_leave_out(pose_of: Integers, numbers: int) -> bool:
     """Whether there are poses enough to leave some out; ``pose_of`` (m,) those of independent coordinates."""
-    return len(np.unique(pose_of)) >= LEAST_POSES and len(pose_of) >= 2 * numbers
+    return len(np.unique(pose_of)) >= MIN_POSES and len(pose_of) >= 2 * numbers
 
 
 def left_out(observations: PointObservations, found: Fit, seed: int = 0) -> HeldOutErrors:
@@ -184,7 +184,7 @@ def choose_terms(
     for kinds in ways if can_leave_out(pose_of, 0) else ():
         fixed_terms, ripples = candidates(robot, kinds), "ripple" in kinds and measured
         numbers = count + sum(term.count for term in fixed_terms) + ripples * 2 * turning
-        if len(last) >= LEAST_SPARE * numbers:
+        if len(last) >= MIN_SPARE * numbers:
             break
     else:
         return ChosenTerms((), ())
@@ -248,7 +248,7 @@ class _Trial:
         verdict: TermVerdict = "taken"
         if self.probability > SURE:
             verdict = "noise"
-        elif change.max() > -LEAST_GAIN:
+        elif change.max() > -MIN_GAIN:
             verdict = "not_lower"
         elif wrong_way(term, self._amounts):
             verdict = "wrong_way"

@@ -45,15 +45,15 @@ from er3a.robots.robot import Robot
 STEP = 1e-5
 SCALE = 1e-3  # m and rad alike: 1 mm, and 1 mrad, which moves a flange about as far
 NO_EFFECT = 1e-6
-STEPS, MOST_STEPS = 30, 100
+STEPS, MAX_STEPS = 30, 100
 SMALL_STEP = 1e-12  # m and rad
 SMALL_CHANGE, SLOW_CHANGE = 1e-6, 1e-3  # of the weighted differences, of measured points; after STEPS
 HALVINGS = 12
-LEAST_OWN = 1e-9
+MIN_OWN = 1e-9
 CLEAR = 10.0
 """Times what the table leaves of touched points that has to set a length, root mean square: the ways of joints that
 slide, how far a bar's points are off a common cone. Taken for part of it, what is left errs by the square, 1 %."""
-LEAST_ALIGNED, FAR = 3, 10.0
+MIN_ALIGNED, FAR = 3, 10.0
 SMALL_SHARE = 0.01  # of a variance: what adds less does not widen its interval
 LEVER = 0.3  # m, at which a length turns points as an angle does
 TURNS_ALL = Parameter("offset", 1)
@@ -104,19 +104,19 @@ def subspace(
     norms = np.linalg.norm(J, axis=0)
     left = left_of_touched(robot, observations) if left is None else left
     turned = SCALE * left * len(J) ** 0.5
-    least = max(NO_EFFECT * np.linalg.norm(1 / observations.deviation_mm), NO_EFFECT * norms.max(), turned / LEVER)
+    min_norm = max(NO_EFFECT * np.linalg.norm(1 / observations.deviation_mm), NO_EFFECT * norms.max(), turned / LEVER)
     kept: list[int] = []
     held: list[Held] = []
     basis: Reals = np.empty((len(J), 0))
     for k, norm in enumerate(norms):
         rest = J[:, k] - basis @ (basis.T @ J[:, k])
         rest -= basis @ (basis.T @ rest)
-        if norm > least and np.linalg.norm(rest) > max(DEPENDENT * norm, turned):
+        if norm > min_norm and np.linalg.norm(rest) > max(DEPENDENT * norm, turned):
             kept.append(k)
             basis = np.column_stack([basis, rest / np.linalg.norm(rest)])
             continue
         nothing = MovesNothing(parameters[k].name)
-        held.append(nothing if norm <= least else _confounded_with(robot, parameters, k, kept, J))
+        held.append(nothing if norm <= min_norm else _confounded_with(robot, parameters, k, kept, J))
     singular_values = np.asarray(np.linalg.svd(J, compute_uv=False), np.float64)
     return Subspace(tuple(kept), tuple(held), singular_values)
 
@@ -148,8 +148,8 @@ def scale_of(robot: Robot, observations: PointObservations) -> Parameter | None:
     if longest is None:
         return None
     slid, off = observations.slid(robot), observations.predict(robot, (), np.zeros((1, 0)))[0]
-    least = max(CLEAR * float(np.linalg.norm(off)), DEPENDENT * abs(longest.nominal(robot)) * len(off) ** 0.5)
-    return longest if np.linalg.norm(slid) < least else None
+    min_slide = max(CLEAR * float(np.linalg.norm(off)), DEPENDENT * abs(longest.nominal(robot)) * len(off) ** 0.5)
+    return longest if np.linalg.norm(slid) < min_slide else None
 
 
 def _replaceable(robot: Robot, lengths: Sequence[Parameter], observations: PointObservations) -> list[Parameter]:
@@ -251,7 +251,7 @@ def covariance_by_poses(found: Fit, pose_of: Integers) -> tuple[Reals, Reals]:
         rows = order[starts[counts == count][:, None] + np.arange(count)]
         J = found.J[rows]  # (poses, count, k + c)
         size, axes = np.linalg.eigh(np.eye(count) - J @ C @ J.swapaxes(1, 2))
-        weight = (axes / np.sqrt(np.maximum(size, LEAST_OWN))[:, None]) @ axes.swapaxes(1, 2)
+        weight = (axes / np.sqrt(np.maximum(size, MIN_OWN))[:, None]) @ axes.swapaxes(1, 2)
         push = (J.swapaxes(1, 2) @ weight @ found.rest[rows][..., None])[..., 0]
         middle += push.T @ push
         shares = weight @ J @ C
@@ -262,7 +262,7 @@ def covariance_by_poses(found: Fit, pose_of: Integers) -> tuple[Reals, Reals]:
     by_number = pull.transpose(2, 1, 0)
     both = C @ (by_number @ by_number.transpose(0, 2, 1))
     squares = (own**2).sum(axis=0) - 2 * (own * drawn).sum(axis=0) + np.einsum("kij,kji->k", both, both)
-    freedom = (own - drawn).sum(axis=0) ** 2 / np.maximum(squares, LEAST_OWN * (own**2).sum(axis=0))
+    freedom = (own - drawn).sum(axis=0) ** 2 / np.maximum(squares, MIN_OWN * (own**2).sum(axis=0))
     return np.asarray(C @ middle @ C, np.float64), np.asarray(np.maximum(freedom, 1.0), np.float64)
 
 
@@ -299,8 +299,8 @@ def bar_lengths(
         xyz = moved.positions(here)
         along, size = directions(xyz - socket(xyz, np.zeros(len(xyz))))
         basis = np.column_stack([along, np.ones(len(xyz))])
-        least = max(DEPENDENT, CLEAR * float(size.std() / size.mean()))
-        if np.linalg.matrix_rank(basis, tol=least * len(xyz) ** 0.5) < basis.shape[1]:
+        threshold = max(DEPENDENT, CLEAR * float(size.std() / size.mean()))
+        if np.linalg.matrix_rank(basis, tol=threshold * len(xyz) ** 0.5) < basis.shape[1]:
             found.append(BarLength(name, None, None))
             continue
         weights = np.linalg.pinv(basis)[-1]  # what the length takes of each distance, beside the socket
@@ -324,7 +324,7 @@ def _base_at(robot: Robot, kept: Sequence[Parameter], observations: Observations
     whole = observations.take(observations.seen.all(axis=1) & (observations.touched < 0))
     base, (points, measured) = np.linalg.inv(robot.base), (whole.positions(robot), whole.values_mm.reshape(-1, 3) / MM)
     points, measured = (xyz @ base[:3, :3].T + base[:3, 3] for xyz in (points, measured))
-    if len(points) < LEAST_ALIGNED:
+    if len(points) < MIN_ALIGNED:
         return amounts
     S, at, centre = np.eye(4), points.mean(axis=0), measured.mean(axis=0)
     U, _, V = np.linalg.svd((measured - centre).T @ (points - at))
@@ -372,7 +372,7 @@ def fit(robot: Robot, kept: Sequence[Parameter], observations: Observations, ter
     before = weighted(robot, unknowns[k:])[:n]
     here = corrected(robot, kept, unknowns[:k])
     rest = weighted(here, unknowns[k:])
-    for number in range(MOST_STEPS):
+    for number in range(MAX_STEPS):
         J = slopes(here, unknowns[:k], unknowns[k:])
         step = np.linalg.lstsq(J, -rest, rcond=None)[0]
         gain = np.linalg.norm(J @ step)
@@ -394,7 +394,7 @@ def fit(robot: Robot, kept: Sequence[Parameter], observations: Observations, ter
             )
     rest_mm = float(np.sqrt(np.mean((rest[:n] * deviation) ** 2)))
     raise CalibrationError(
-        NoCorrectionFits(MOST_STEPS, rest_mm),
-        f"no corrections make the table fit: after {MOST_STEPS} steps the positions are still {rest_mm:.3g} mm off. "
+        NoCorrectionFits(MAX_STEPS, rest_mm),
+        f"no corrections make the table fit: after {MAX_STEPS} steps the positions are still {rest_mm:.3g} mm off. "
         "The table has a gross fault or is another arm's; er3a.diagnose names single faults",
     )

@@ -36,7 +36,7 @@ PLACEMENTS: tuple[PlacementName, ...] = ("base", "tool")
 HALF_WIDTH_TO_DEVIATION = 1 / np.sqrt(3)
 RICH_POSES = 64
 TouchKind = Literal["place", "plane", "pair", "bar"]
-LEAST_LENGTH = 1e-9
+MIN_LENGTH = 1e-9
 SOCKET_STEPS = 50
 SOCKET_STEP = 1e-13  # m
 AT_ONCE = 8_000  # poses of tables whose frames are held at once
@@ -439,7 +439,7 @@ def _innovations(basis: Reals) -> Reals:
 
 def directions(apart: Reals) -> tuple[Reals, Reals]:
     """Unit vectors (P, 3) of vectors, and their lengths (P,)."""
-    size = np.maximum(np.linalg.norm(apart, axis=1), LEAST_LENGTH)
+    size = np.maximum(np.linalg.norm(apart, axis=1), MIN_LENGTH)
     return apart / size[:, None], size
 
 

@@ -56,7 +56,7 @@ class MorePositions(Finding):
     coordinates, poses : how many were measured
     determined, determinable : entries of the level that they determine, and that positions of these points ever can
     level : the level that is out of reach
-    least : how many more positions it takes
+    missing : how many more positions it takes
     entries : those that aren't determined
     examples_deg : poses that add most
     """
@@ -66,7 +66,7 @@ class MorePositions(Finding):
     determined: int
     determinable: int
     level: LevelName
-    least: int
+    missing: int
     entries: tuple[str, ...]
     examples_deg: tuple[Pose, ...]
 
@@ -78,7 +78,7 @@ class MoreTouches(Finding):
     ----------
     poses, numbers : how many poses there are, and independent numbers that they give
     determined, determinable : entries that they settle, and that such poses can settle
-    least : how many more numbers it takes
+    missing : how many more numbers it takes
     each : of each kind how many there are, and how many poses of each it takes if each has as many
     """
 
@@ -86,7 +86,7 @@ class MoreTouches(Finding):
     numbers: int
     determined: int
     determinable: int
-    least: int
+    missing: int
     each: tuple[tuple[str, int, int], ...]
 
 

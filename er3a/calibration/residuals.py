@@ -26,7 +26,7 @@ ORDERS = 499
 NEIGHBOURS = 4
 DEGREE = 4
 SURE = 0.01
-LEAST_POSES = 40
+MIN_POSES = 40
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ def structure_of(
     worst : line of the file with the largest residual, and how large it is, mm
     """
     count = len(residuals_mm)
-    if count < LEAST_POSES:
+    if count < MIN_POSES:
         return None
     spread = row_values.std(axis=0)
     moving = row_values[:, spread > 0] / spread[spread > 0]

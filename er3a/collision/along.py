@@ -106,7 +106,7 @@ class ClearanceAlong:
     measured: int
 
     @property
-    def least(self) -> int:
+    def closest(self) -> int:
         """Index of the smallest clearance; -1 if none is known."""
         return -1 if np.isnan(self.distance).all() else int(np.nanargmin(self.distance))
 
@@ -264,9 +264,9 @@ def _refine(motion: _Motion, times: Reals, q: Reals, travel: Reals, step: float)
             np.clip(np.searchsorted(travel[a : b + 1].sum(axis=1), travel[[a, b]].sum() / 2) + a, a + 1, b - 1)
         )
         found = motion.measure(times[middle], q[middle], pairs)
-        least = float(np.nanmin(bodies.counted(found)))
-        if least < best:
-            best = least
+        nearest = float(np.nanmin(bodies.counted(found)))
+        if nearest < best:
+            best = nearest
             motion.measure(times[middle], q[middle], every)
         waiting += [(a, middle, pairs), (middle, b, pairs)]
 

@@ -41,6 +41,9 @@ CauseCode = Literal[
 Columns = dict[str, Reals | str]
 SAMPLES = 192
 SWEEPS = 2
+SAME_RATIO = 0.005  # relative difference of speeds, and of lengths in two units, that counts as none
+HALF_TURN = np.pi - 1e-4  # rad, from which on a rotation's skew part has no digits left for its axis
+NO_OFFSET = 1e-6  # m, of a row from an axis; sine of its tilt; entry of a coupling; largest distance worth a search
 ROUNDED = 4  # decimals of mm and deg in a corrected table
 UNITS = {25.4: "inch", 1 / 25.4: "inch", 1000.0: "metre", 0.001: "metre", 10.0: "centimetre", 0.1: "centimetre"}
 
@@ -313,7 +316,7 @@ def _row_of(robot: Robot, column: str, link: int) -> int:
 def _placement(T: Reals, tolerances: mechanism.Tolerances) -> PlacementLayer:
     x, y, z = (1000 * T[:3, 3]).tolist()
     angle, R = mechanism.turn_of(T), T[:3, :3]
-    if angle > np.pi - 1e-4:  # the skew part has no digits left
+    if angle > HALF_TURN:
         outer = 0.5 * (R + np.eye(3))
         axis = outer[:, int(np.argmax(np.diag(outer)))]
     else:
@@ -337,7 +340,7 @@ def _joints_paired(robot_a: Robot, robot_b: Robot, found: mechanism.Match) -> tu
     turned = rows[:, None] * other  # what A's rows would move by for B's joints
     with_same, with_other = np.abs(turned - own).sum(axis=0), np.abs(turned + own).sum(axis=0)
     signs = np.where(with_other < with_same, -1.0, 1.0)
-    wrong = np.flatnonzero((np.abs(turned * signs - own) > 1e-6).any(axis=1))
+    wrong = np.flatnonzero((np.abs(turned * signs - own) > NO_OFFSET).any(axis=1))
     return signs, CouplingLayer(not wrong.size, tuple((wrong + 1).tolist()))
 
 
@@ -387,7 +390,7 @@ def _speeds(robot_a: Robot, robot_b: Robot) -> RangeLayer:
         slides = bool(robot_a.slides[j])
         scale, unit = (1000.0, "mm/s") if slides else (math.degrees(1.0), "deg/s")
         own, other = scale * float(robot_a.speed[j]), scale * float(robot_b.speed[j])
-        if abs(own - other) > 0.005 * max(abs(own), abs(other)):
+        if abs(own - other) > SAME_RATIO * max(abs(own), abs(other)):
             found.append(RangeDifference(j + 1, "speed", own, other, unit))
     return RangeLayer(not found, tuple(found))
 
@@ -431,7 +434,7 @@ def _largest(
     values = off(*flanges(q))
     best = q[int(values.argmax())]
     steps = np.linspace(0.0, 1.0, 17)
-    for _ in range(SWEEPS if values.max() > 1e-6 else 0):
+    for _ in range(SWEEPS if values.max() > NO_OFFSET else 0):
         for j in range(robot.joints):
             tried = np.tile(best, (len(steps) + 1, 1))
             tried[1:, j] = robot.lower[j] + steps * (robot.upper[j] - robot.lower[j])
@@ -496,7 +499,7 @@ def _ratios(one: mechanism.Mechanism, other: mechanism.Mechanism) -> list[float]
     if min(longest) <= 0:
         return []
     ratio = float(longest[1] / longest[0])
-    return [ratio] if abs(math.log(ratio)) > 0.005 else []
+    return [ratio] if abs(math.log(ratio)) > SAME_RATIO else []
 
 
 def _causes_of_zeros(
@@ -626,7 +629,7 @@ def _rounded_pose(T: Reals) -> Reals:
 
 def _about_z(T: Reals) -> bool:
     """Whether a transform only turns about z and shifts along it."""
-    return bool(np.hypot(*T[:2, 3]) < 1e-6 and np.hypot(*T[:2, 2]) < 1e-6 and T[2, 2] > 0)
+    return bool(np.hypot(*T[:2, 3]) < NO_OFFSET and np.hypot(*T[:2, 2]) < NO_OFFSET and T[2, 2] > 0)
 
 
 def _put_on_axis(columns: dict[str, Reals], row: int, T: Reals) -> None:

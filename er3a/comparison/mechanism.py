@@ -53,7 +53,7 @@ HALF_TURN = rot_x(math.pi)
 MAX_HALF_TURN = math.radians(185.0)
 
 
-TOLERANCE_MM, TOLERANCE_DEG = 0.5, 0.1
+TOLERANCE_MM, TOLERANCE_DEG = 0.5, 0.1  # lengths and angles that differ by at most this are equal, unless asked for
 
 
 @dataclass(frozen=True)

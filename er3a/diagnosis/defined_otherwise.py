@@ -72,6 +72,9 @@ LEVER = 0.3  # m, over which an axis' direction says where it is
 SPREAD = 3.0  # times its uncertainty, that what is derived from two lines may be off
 ROUNDS = 8
 STEP = 1e-6
+MET = 0.1  # of MEETS, from which on a fit needs no more steps
+GAINS = 0.999  # of the misfit, which a step has to fall below
+AS_GOOD = 1.05  # times the misfit: a simpler arm that misses by no more is taken
 ROUND_DEG, ROUND_MM = 1e-6, 1e-6
 PARALLEL = 1 - 1e-6
 SCAN = math.pi / 4
@@ -418,12 +421,12 @@ def _fitted(robot: Robot, wrong: Sequence[tuple[str, int]], off: Misfit) -> Robo
     count = 12 + max(robot.joints - 2, 0) + len(wrong)
     for _ in range(ROUNDS):
         here = off(robot)
-        if np.abs(here).max() < 0.1 * MEETS:
+        if np.abs(here).max() < MET * MEETS:
             break
         slopes = np.stack([(off(_changed(robot, wrong, STEP * row)) - here) / STEP for row in np.eye(count)], axis=1)
         step = -np.asarray(np.linalg.lstsq(slopes, here, rcond=1e-9)[0], dtype=np.float64)
         ahead = _changed(robot, wrong, step)
-        if np.linalg.norm(off(ahead)) > 0.999 * np.linalg.norm(here):
+        if np.linalg.norm(off(ahead)) > GAINS * np.linalg.norm(here):
             break
         robot = ahead
     return robot
@@ -433,7 +436,7 @@ def _plain(given: Robot, fitted: Robot, off: Misfit, tolerances: Tolerances) -> 
     """The fitted arm with as much as can be left as the table has it, and zeros that are whole degrees written so."""
 
     def kept(arm: Robot, simpler: Robot) -> Robot:
-        return simpler if np.abs(off(simpler)).max() <= max(MEETS, 1.05 * np.abs(off(arm)).max()) else arm
+        return simpler if np.abs(off(simpler)).max() <= max(MEETS, AS_GOOD * np.abs(off(arm)).max()) else arm
 
     moved = np.degrees(wrap_to_pi(fitted.offset - given.offset))
     snapped = np.where(np.abs(moved - np.round(moved)) < 2 * np.degrees(tolerances.angle), np.round(moved), moved)

@@ -32,7 +32,9 @@ NAME_PATTERN = r"^[a-z0-9][a-z0-9_-]{0,63}$"
 HEAVIEST_LINK_KG = 20_000.0
 HEAVIEST_PAYLOAD_KG = 2_500.0
 """The strongest arms carry 2.3 t."""
-METRES_BELOW_MM = 0.5
+METRES_BELOW_MM, MIN_CENTRE_MM = 0.5, 0.02  # between them a link's centre of mass may be written in metres ...
+METRES_ABOVE_KG, FAR_WIDER = 0.5, 100.0  # ... of a link heavier than this, with a gyration radius so many times larger
+RADIANS_BELOW = 2.01 * math.pi  # the widest limit of an arm, if it is written in radians
 MAX_PACKED = 400_000  # letters of a link's corners or triangles
 
 IMPOSSIBLE = {
@@ -96,9 +98,13 @@ class BodyFields(StrictModel):
 
     @model_validator(mode="after")
     def _a_body(self):
-        if 0 < max(map(abs, self.centre_mm)) < METRES_BELOW_MM and self.mass_kg > 0.5 and any(self.inertia_kg_m2):
+        if (
+            0 < max(map(abs, self.centre_mm)) < METRES_BELOW_MM
+            and self.mass_kg > METRES_ABOVE_KG
+            and any(self.inertia_kg_m2)
+        ):
             radius_mm = 1000 * float(np.sqrt(max(self.inertia_kg_m2[:3]) / self.mass_kg))
-            if radius_mm > 100 * max(map(abs, self.centre_mm)) and max(map(abs, self.centre_mm)) > 0.02:
+            if max(map(abs, self.centre_mm)) > MIN_CENTRE_MM and radius_mm > FAR_WIDER * max(map(abs, self.centre_mm)):
                 suspect(f"centre_mm: {self.centre_mm} mm may be metres")
         if max(map(abs, self.centre_mm)) > MAX_DISTANCE_MM:
             raise ValueError(f"centre_mm: {self.centre_mm} is more than 100 m | Write mm")
@@ -735,7 +741,7 @@ class RobotFile(StrictModel):
             for row in self.limits.rows
             if row.lower_deg is not None
         ]
-        if len(spans) > 1 and 0 < max(spans) <= 2.01 * math.pi:
+        if len(spans) > 1 and 0 < max(spans) <= RADIANS_BELOW:
             suspect(f"limits.rows: the widest limit is {max(spans):g} deg; they may be radians")
         return self
 

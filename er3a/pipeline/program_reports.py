@@ -169,7 +169,7 @@ def cycle_line(checked: CheckedFile) -> str:
     time = f"{low} s" if low == high else f"{low} to {high} s"
     what = "one round of its loop" if cycle.repeats else "the program"
     more = f", and {cycle.waits} wait{'s' if cycle.waits > 1 else ''} for signals" if cycle.waits else ""
-    less = "" if cycle.complete else ", without the motions whose path is unknown"
+    less = "" if cycle.complete else ", without motions whose path is unknown or was not checked"
     return f"{shown(checked.file)}: {what} takes about {time}{more}{less}"
 
 
@@ -312,20 +312,17 @@ def sarif_of(checked: Sequence[CheckedFile]) -> dict[str, Any]:
 
 
 def _notifications(checked: Sequence[CheckedFile]) -> list[dict[str, Any]]:
-    """What was not examined, as the log's notifications."""
+    """What was not examined, and on what shapes collisions rest, as the log's notifications."""
     found = []
     for each in checked:
-        found += [(missed_line((one,)), Place(each.file)) for one in each.missed]
+        found += [("not_examined", missed_line((one,)), Place(each.file)) for one in each.missed]
         for one in each.check.not_examined if each.check else ():
-            found.append((f"not examined, or not each time: {one.what}", one.place))
+            found.append(("not_examined", f"not examined, or not each time: {one.what}", one.place))
+        if each.check and each.check.shapes:
+            found.append((each.check.shapes.code, say(each.check.shapes), Place(each.file)))
     return [
-        {
-            "level": "warning",
-            "descriptor": {"id": "not_examined"},
-            "message": {"text": text},
-            "locations": [_location(place)],
-        }
-        for text, place in found
+        {"level": "warning", "descriptor": {"id": code}, "message": {"text": text}, "locations": [_location(place)]}
+        for code, text, place in found
     ]
 
 

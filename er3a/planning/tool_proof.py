@@ -109,8 +109,8 @@ class ToolProof(ByValue):
         """As :meth:`er3a.planning.piecewise.PiecewiseMotion.rate_bounds`."""
         last = len(self.proven) - 1
         first = np.clip(np.searchsorted(self.times, start, side="right") - 1, 0, last)
-        behind = np.clip(np.searchsorted(self.times, end, side="left") - 1, first, last)
-        return max_between(self.velocity, first, behind), max_between(self.acceleration, first, behind)
+        final = np.clip(np.searchsorted(self.times, end, side="left") - 1, first, last)
+        return max_between(self.velocity, first, final), max_between(self.acceleration, first, final)
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,10 +243,10 @@ def _acceleration_steps(followed: Followed) -> tuple[Reals, Reals]:
     law, duration = followed.line.law, followed.line.duration
     times = np.unique(np.concatenate([law.breaks, times_at(law, followed.line.edges)]))
     aside = STEP_ASIDE * duration
-    behind = followed.rates(np.minimum(times + aside, duration))[2]
+    after = followed.rates(np.minimum(times + aside, duration))[2]
     before = followed.rates(np.maximum(times - aside, 0.0))[2]
-    behind[times >= duration - aside], before[times <= aside] = 0.0, 0.0  # at rest
-    return times, behind - before
+    after[times >= duration - aside], before[times <= aside] = 0.0, 0.0  # at rest
+    return times, after - before
 
 
 def law_motion(law: TimeLaw) -> PiecewiseMotion:

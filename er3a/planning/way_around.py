@@ -357,5 +357,5 @@ def _proven(task: PlanningTask, corners: Reals, motion: Timed, depth: float) -> 
         return None
     grid = np.linspace(0.0, curve.duration, SHOWN)
     along = clearance_along(task.bodies, curve.joints, curve.rate_bounds, grid, grid, depth)
-    nearest = np.inf if along.least < 0 else float(along.distance[along.least])
+    nearest = np.inf if along.closest < 0 else float(along.distance[along.closest])
     return WayAround(corners, motion, along) if nearest > depth else None

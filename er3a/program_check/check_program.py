@@ -40,8 +40,8 @@ from er3a.robots.masses import MassBody
 from er3a.robots.robot import Robot
 
 ASSUMED_SPEED, ASSUMED_SLIDE = np.radians(180.0), 0.5  # rad/s and m/s
-MOST_MOTIONS = 1_000
-MOST_ROUNDS = 20  # times as many motions as may differ are carried out
+MAX_MOTIONS = 1_000
+MAX_ROUNDS = 20  # times as many motions as may differ are carried out
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +73,7 @@ class CheckOptions(ByValue):
     penetration_tolerance: float = PENETRATION_TOLERANCE
     assumed_margin: float = ASSUMED_MARGIN
     measures: bool = True
-    most_motions: int = MOST_MOTIONS
+    most_motions: int = MAX_MOTIONS
     assumed: AssumedRates = field(default_factory=AssumedRates)
     limits: RunLimits = field(default_factory=RunLimits)
     keep_on: KeepOn | None = None
@@ -229,7 +229,7 @@ def _checked_until(checker: StepChecker, options: CheckOptions) -> int:
     steps, most, keep_on = checker.execution.steps, options.most_motions, options.keep_on
     for number, step in enumerate(steps):
         if isinstance(step.instruction, ArmMotion):
-            full = checker.different >= most or len(checker.motions) >= MOST_ROUNDS * most
+            full = checker.different >= most or len(checker.motions) >= MAX_ROUNDS * most
             if full or (keep_on is not None and not keep_on("checking", number, len(steps))):
                 return number
         checker.check(number)
@@ -336,7 +336,7 @@ BY_JOINT_MOVES = frozenset(
     )
 )
 """Findings of motions that joint moves to another solution, or round by a point, may be free of."""
-MOST_ADVISED = 20  # motions for which such moves are looked for
+MAX_ADVISED = 20  # motions for which such moves are looked for
 
 
 def _with_joint_moves(
@@ -347,7 +347,7 @@ def _with_joint_moves(
     for each in located:
         if each.step is None or each.step in moves or each.finding.code not in BY_JOINT_MOVES:
             continue
-        if len(moves) == MOST_ADVISED or (keep_on is not None and not keep_on("checking", each.step, 0)):
+        if len(moves) == MAX_ADVISED or (keep_on is not None and not keep_on("checking", each.step, 0)):
             break
         found = checker.joint_moves_instead(each.step)
         moves[each.step] = tuple(tuple((np.round(np.degrees(row), 3) + 0.0).tolist()) for row in found)
@@ -449,10 +449,12 @@ def _cycle(
                 continue
             stopping += motion.way.law.duration
             saved += motion.way.law.saved_by_blend * motion.blended_ends
+        elif isinstance(instruction, ArmMotion):
+            complete = False  # most_motions, or the time, ended before it
     return CycleTime(stopping - saved + pauses, stopping + pauses, pauses, waits, again is not None, complete)
 
 
-MOST_OF_A_MOTION = 0.49  # that a rounded corner takes
+MAX_MOTION_SHARE = 0.49  # that a rounded corner takes
 
 
 @dataclass(frozen=True, eq=False)
@@ -558,7 +560,7 @@ def _blend(motion: CheckedMotion, way: MotionPath, after: MotionPath) -> float:
     zone = motion.placed.motion.zone
     if zone.kind != "distance":
         return 0.0
-    return min(zone.value, MOST_OF_A_MOTION * way.length, MOST_OF_A_MOTION * after.length)
+    return min(zone.value, MAX_MOTION_SHARE * way.length, MAX_MOTION_SHARE * after.length)
 
 
 def _segment(checked: CheckedMotion, blend: float) -> SegmentCommand:

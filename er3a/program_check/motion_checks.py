@@ -156,8 +156,8 @@ def time_of_share(law: MotionLaw, share: float) -> float:
 def limit_moment(law: MotionLaw, side: motion_faults.LimitSide, start: Reals, end: Reals) -> float:
     """When (s) a joint move between joints (n,) goes beyond a side of a limit that its end is beyond; 0 if it begins
     there."""
-    before, behind, bound = float(side.of(start)), float(side.of(end)), side.sign * side.limit
-    return 0.0 if before >= bound else time_of_share(law, (bound - before) / (behind - before))
+    at_start, at_end, bound = float(side.of(start)), float(side.of(end)), side.sign * side.limit
+    return 0.0 if at_start >= bound else time_of_share(law, (bound - at_start) / (at_end - at_start))
 
 
 def speed_moment(law: MotionLaw, share_of_max: float) -> float:
@@ -178,7 +178,7 @@ def change_moment(law: MotionLaw, kind: Callable[[float], int | None]) -> float:
 
 
 POINTS_APART_M, POINTS_APART_RAD = 0.01, np.radians(2.0)
-FEWEST_POINTS, MOST_POINTS = 21, 501
+MIN_POINTS, MAX_POINTS = 21, 501
 NO_WAY = 1e-9  # m or rad
 SPEED_TOLERANCE = 1e-6  # relative
 FAR_TURN, NEAR_MOVE = np.radians(90.0), 0.05  # of a joint that jumps: it turns so far where the tool moves less
@@ -435,8 +435,8 @@ def _arrival_moments(followed: Followed, given: Reals | None, way: MotionPath) -
 
 
 def _points(length: float, turned: float) -> int:
-    wanted = max(length / POINTS_APART_M, turned / POINTS_APART_RAD)
-    return int(np.clip(np.ceil(wanted) + 1, FEWEST_POINTS, MOST_POINTS))
+    intervals = max(length / POINTS_APART_M, turned / POINTS_APART_RAD)
+    return int(np.clip(np.ceil(intervals) + 1, MIN_POINTS, MAX_POINTS))
 
 
 def _rate_moments(

@@ -209,7 +209,7 @@ def _branch_not_met(target: instructions.PoseTarget, joint: bool) -> found_in.Ch
     return found_in.ConfigurationNotMet(shown, "target" if joint else "line")
 
 
-MOST_REASONS = 1000  # targets out of reach whose reasons are looked for
+MAX_REASONS = 1000  # targets out of reach whose reasons are looked for
 
 
 def target_findings(
@@ -257,7 +257,7 @@ def _of_poses(group: list[tuple[int, PlacedMotion]]) -> dict[int, tuple[found_in
         number, placed = group[i]
         if found.solved[i].any():
             findings[number] = limit_findings(arm, found.q[i, int(away[i].argmin())])
-        elif (reasons := reasons + 1) <= MOST_REASONS:
+        elif (reasons := reasons + 1) <= MAX_REASONS:
             findings[number] = goal_of(placed, placed.motion.target, None).findings
         else:
             findings[number] = (found_in.TargetOutOfReach(()),)
@@ -271,12 +271,13 @@ def _pose(placed: PlacedMotion) -> Reals:
     return found
 
 
-MOST_TURN = 1.0  # rad, to which the twist of a rotation vector that changes has been bounded
-MOST_GROWN = 0.7
+MAX_TURN = 1.0  # rad, to which the twist of a rotation vector that changes has been bounded
+MAX_GROWTH = 0.7  # spectral radius of what bounds a joint's motion by itself: beyond, the bound does not converge
+FIRST_GUESS, LARGER = 1.2, 1.1  # times the motion to first order, tried as its bound; times the bound that fails
 STEP, BLUR = 1e-5, 1e-8  # rad, of differences of the Jacobian; their error
 ATTEMPTS = 6
 SAME = 1e-7  # rad
-MOST_INVERSE = 1e6  # of the scaled Jacobian; beyond, nothing is proven
+MAX_INVERSE = 1e6  # of the scaled Jacobian; beyond, nothing is proven
 
 
 @dataclass(frozen=True, eq=False)
@@ -327,7 +328,7 @@ class ZonePatch:
         n = q.shape[1]
         open_ = np.full(n, np.inf), np.zeros(n)
         turned = float(np.linalg.norm(self.turns, axis=1).sum())
-        near = NearJoints.of(self.arm, q[0]) if np.isfinite(q).all() and turned <= MOST_TURN else None
+        near = NearJoints.of(self.arm, q[0]) if np.isfinite(q).all() and turned <= MAX_TURN else None
         if near is None:
             return open_
         edges = at[1:] - at[0]
@@ -337,7 +338,7 @@ class ZonePatch:
         # a twist turns with the tool, by no more than the tool does; slack adds to what has to be gone
         aside = [near.size @ np.repeat([self.slack / near.length, turned * angle], 3) for angle in angles]
         first = np.abs(twists @ near.inverse.T) + np.stack(aside)
-        moved = 1.2 * np.maximum(first.max(axis=0), first.max() / 5)
+        moved = FIRST_GUESS * np.maximum(first.max(axis=0), first.max() / 5)
         for _ in range(ATTEMPTS):
             grown = near.grown(moved)
             if grown is None:
@@ -345,7 +346,7 @@ class ZonePatch:
             rates = first @ grown.T
             if (rates <= moved).all():
                 break
-            moved = np.maximum(moved, 1.1 * rates.max(axis=0))
+            moved = np.maximum(moved, LARGER * rates.max(axis=0))
         else:
             return open_
         if (np.abs(q[1:] - q[0]) > rates * (1 + 1e-6) + SAME).any():  # another branch
@@ -383,7 +384,7 @@ class NearJoints:
         """At joints (n,) in rad; None where J0 has no inverse to speak of."""
         n, length = len(q), characteristic_length(arm)
         (b,), (reach,) = inverse_and_reach(arm, q[None], length)
-        if not b < MOST_INVERSE:
+        if not b < MAX_INVERSE:
             return None
         steps = STEP * np.eye(n)
         J = jacobian(arm, np.concatenate([q[None], q + steps, q - steps]))
@@ -408,7 +409,7 @@ class NearJoints:
         """(I - E)^-1 (n, n) while joints move by no more than (n,), rad; None if E is too great."""
         columns, rows = self.column(moved)
         E = np.tensordot(moved, self.changes, 1) + self.norms[:, None] * columns * rows**2 / 2
-        if rows >= 1.0 or np.abs(np.linalg.eigvals(E)).max() >= MOST_GROWN:
+        if rows >= 1.0 or np.abs(np.linalg.eigvals(E)).max() >= MAX_GROWTH:
             return None
         return np.asarray(np.linalg.inv(np.eye(len(E)) - E), np.float64)
 
@@ -445,7 +446,7 @@ def bend_of_line(arm: Robot, q: Reals, slack: float) -> Reals:
     return found
 
 
-MOST_POSES, MOST_SOLVED = 4000, 500
+MAX_POSES, MAX_SOLVED = 4000, 500
 WHOLE = np.array([[1.0, 0.0], [0.0, 0.0], [0.0, 1.0]])  # shares of where the zone begins and ends
 PARTS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])  # of corners and of the middles between them
 
@@ -476,8 +477,8 @@ def zone_clearance(
     per_joint = levers if coupling is None else levers @ np.abs(coupling)
     bend = np.zeros(corners.shape[1]) if bend is None else bend
     waiting: list[tuple[float, int, Reals, Reals]] = [(0.0, 0, WHOLE, corners)]
-    most = MOST_POSES if patch is None else MOST_SOLVED
-    measured, least, settled = 0, np.inf, True
+    most = MAX_POSES if patch is None else MAX_SOLVED
+    measured, nearest, settled = 0, np.inf, True
     while waiting:
         _, _, at, triangle = heapq.heappop(waiting)  # the nearest to anything first
         middle = triangle.mean(axis=0)
@@ -490,7 +491,7 @@ def zone_clearance(
         distances = bodies.counted(bodies.distances(bodies.ends(middle), every))
         measured += 1
         worst = int(np.argmin(distances))
-        least = min(least, float(distances[worst]))
+        nearest = min(nearest, float(distances[worst]))
         if distances[worst] < margin - tolerance - (0.0 if patch is None else off[worst]):
             return found_in.ZoneCollides(bodies.pairs[worst], -1000 * float(distances[worst]))
         nearer = (levers @ np.abs(row_values(bodies.robot, triangle - middle)).T).max(axis=1)
@@ -508,7 +509,7 @@ def zone_clearance(
         places, joints = np.concatenate([at, between]), np.concatenate([triangle, solved])
         for i, part in enumerate(PARTS):
             heapq.heappush(waiting, (float(distances[worst]), 4 * measured + i, places[part], joints[part]))
-    return None if settled else found_in.ZoneNotSettled(1000 * least)
+    return None if settled else found_in.ZoneNotSettled(1000 * nearest)
 
 
 def pair_levers(bodies: Bodies, corners: Reals) -> Reals:
@@ -532,7 +533,7 @@ def pair_levers(bodies: Bodies, corners: Reals) -> Reals:
     return found
 
 
-MOST_OF_A_MOTION = 0.5  # that a zone may take
+MAX_MOTION_SHARE = 0.5  # that a zone may take
 TOLERANCE = 1e-9
 SAME_JOINTS = 1e-4  # rad
 BEND_PARTS = 16
@@ -592,7 +593,7 @@ class CheckedMotion(ByValue):
     moments: Mapping[found_in.CheckFinding, float] = field(default_factory=dict)
 
 
-MOST_SOLUTIONS = 8  # of a target, to which joint moves are tried
+MAX_SOLUTIONS = 8  # of a target, to which joint moves are tried
 VIA_TURNS = (20.0, 40.0)  # deg, by which joints are turned away on the way round
 
 
@@ -674,7 +675,7 @@ class StepChecker:
         except PoseError:
             return ()
         rows = self._free(checked.placed, _as_written(found.q[found.within_limits]))
-        rows = rows[np.argsort(np.abs(rows - checked.start).max(axis=1), kind="stable")][:MOST_SOLUTIONS]
+        rows = rows[np.argsort(np.abs(rows - checked.start).max(axis=1), kind="stable")][:MAX_SOLUTIONS]
         if len(rows) and np.abs(rows[0] - checked.start).max() < SAME_JOINTS:
             return ()  # the tool is there already: no move is needed
         straight = [(row,) for row in rows]
@@ -816,9 +817,9 @@ class StepChecker:
         bodies = self.obstacles.of(way.arm)
         ends = way.t[[0, -1]]
         along = clearance_along(bodies, way.joints, way.rates, way.t, ends, self.obstacles.tolerance)
-        least = float(along.distance[along.least]) if along.least >= 0 else None
+        clearance = float(along.distance[along.closest]) if along.closest >= 0 else None
         if not along.contacts:
-            return self._clear(replace(motion, clearance=least), along)
+            return self._clear(replace(motion, clearance=clearance), along)
         touches: dict[Pair, found_in.BodiesTouch] = {}
         reached = way.q[-1:][np.isfinite(way.q[-1:]).all(axis=1)]  # no row, if the motion ends out of reach
         at_target = {bodies.pairs[k] for k in np.flatnonzero(bodies.overlaps(reached).any(axis=0))}
@@ -830,17 +831,17 @@ class StepChecker:
             touches[touch.pair] = replace(first, depth_mm=max(first.depth_mm, touch.depth * 1000))
         hit = found_in.MotionCollides(tuple(touches.values()))
         moments = {**motion.moments, hit: along.contacts[0].start}
-        return replace(motion, findings=(*motion.findings, hit), clearance=least, moments=moments)
+        return replace(motion, findings=(*motion.findings, hit), clearance=clearance, moments=moments)
 
     def _clear(self, motion: CheckedMotion, along: ClearanceAlong) -> CheckedMotion:
         """A motion that meets nothing, with what is to be said where it comes near to assumed shapes."""
         assert self.obstacles is not None
         margin = self.obstacles.assumed_margin
-        pair = along.pair[along.least] if along.least >= 0 else None
+        pair = along.pair[along.closest] if along.closest >= 0 else None
         if pair is None or motion.clearance is None or motion.clearance >= margin:
             return motion
         near = found_in.ClearOfAssumed(pair, 1000 * motion.clearance, 1000 * margin)
-        moments = {**motion.moments, near: float(along.t[along.least])}
+        moments = {**motion.moments, near: float(along.t[along.closest])}
         return replace(motion, findings=(*motion.findings, near), moments=moments)
 
     def _corner(self, first: int, second: int) -> None:
@@ -866,7 +867,7 @@ class StepChecker:
     def _round_corner(
         self, way: MotionPath, after: MotionPath, corners: Reals, shares: tuple[float, float], margin: float = 0.0
     ) -> found_in.ZoneCollides | found_in.ZoneNotSettled | None:
-        """What stands in a way from joints (3, n) before a corner to behind it, over shares of the two motions."""
+        """What stands in a way from joints (3, n) before a corner to those after it, over shares of the two motions."""
         assert self.obstacles is not None
         bodies, tolerance = self.obstacles.of(way.arm), self.obstacles.tolerance
         if way.tool_path is None or after.tool_path is None or way.arm is not after.arm:
@@ -887,21 +888,25 @@ class StepChecker:
         shares = [_zone_share(motion.placed.motion, part) for part in (way, after)]
         found: list[found_in.CheckFinding] = []
         zone = motion.placed.motion.zone
-        if zone.kind == "distance" and max(shares) > MOST_OF_A_MOTION + TOLERANCE:
+        if zone.kind == "distance" and max(shares) > MAX_MOTION_SHARE + TOLERANCE:
             found.append(found_in.ZoneTooLarge(zone.value * 1000, min(way.length, after.length) * 1000))
         if self.obstacles is None or motion.clearance is None or motion.clearance < 0:
             return tuple(found)
-        before, behind = (min(share, MOST_OF_A_MOTION) for share in shares)
+        share_before, share_after = (min(share, MAX_MOTION_SHARE) for share in shares)
         corners = np.stack(
-            [way.joints_at(np.array(1 - before)), way.joints_at(np.array(1.0)), after.joints_at(np.array(behind))]
+            [
+                way.joints_at(np.array(1 - share_before)),
+                way.joints_at(np.array(1.0)),
+                after.joints_at(np.array(share_after)),
+            ]
         )
         if np.isfinite(corners).all():
-            hit = self._round_corner(way, after, corners, (before, behind))
+            hit = self._round_corner(way, after, corners, (share_before, share_after))
             margin = self.obstacles.assumed_margin
             if hit is not None:
                 found.append(hit)
             elif 0 < margin <= motion.clearance:
-                near = self._round_corner(way, after, corners, (before, behind), margin)
+                near = self._round_corner(way, after, corners, (share_before, share_after), margin)
                 if isinstance(near, found_in.ZoneCollides):
                     found.append(found_in.ClearOfAssumed(near.pair, -near.depth_mm, 1000 * margin))
                 elif near is not None:
@@ -922,16 +927,16 @@ def _zone_share(motion: instructions.ArmMotion, way: MotionPath) -> float:
     zone = motion.zone
     match zone.kind:
         case "distance":
-            return zone.value / way.length if way.length > TOLERANCE else MOST_OF_A_MOTION
+            return zone.value / way.length if way.length > TOLERANCE else MAX_MOTION_SHARE
         case "angle":
-            return min(zone.value / way.turned, MOST_OF_A_MOTION) if way.turned > TOLERANCE else MOST_OF_A_MOTION
+            return min(zone.value / way.turned, MAX_MOTION_SHARE) if way.turned > TOLERANCE else MAX_MOTION_SHARE
         case "share":
-            return min(zone.value, 1.0) * MOST_OF_A_MOTION
-    return MOST_OF_A_MOTION
+            return min(zone.value, 1.0) * MAX_MOTION_SHARE
+    return MAX_MOTION_SHARE
 
 
 def _vias(arm: Robot, start: Reals, end: Reals) -> Reals:
-    """Joints (k, n) in rad between a start and an end, with one or two of those behind the first turned away."""
+    """Joints (k, n) in rad between a start and an end, with one or two of those after the first turned away."""
     middle = (start + end) / 2
     turns = [(1, 0), (-1, 0), (0, 1), (0, -1), (-1, -1), (1, 1), (-1, 1), (1, -1)]
     away = np.zeros((len(VIA_TURNS) * len(turns), len(middle)))

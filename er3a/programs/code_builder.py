@@ -28,7 +28,7 @@ class Block:
     kind: str
     place: Place
     start: int
-    exits: list[int] = field(default_factory=list)  # jumps behind the block
+    exits: list[int] = field(default_factory=list)  # jumps past the block
     skips: list[int] = field(default_factory=list)  # branches or jumps to the next arm, or to the next round
     subject: syntax.Expression | None = None
     step: syntax.Expression | None = None

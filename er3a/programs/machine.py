@@ -173,12 +173,12 @@ def quiet_branches(program: syntax.Program, dialect: Dialect) -> dict[tuple[str,
     waiting = [*needed, *(name for key, used in conditions.items() if key not in found for name in used)]
     while waiting:
         needed.update(waiting)
-        behind = {source for name in waiting for source in sources.get(name, ())}
+        origins = {source for name in waiting for source in sources.get(name, ())}
         louder = [key for key, quiet in found.items() if quiet.changed & needed]
         for key in louder:
             del found[key]
-            behind |= conditions[key]
-        waiting = list(behind - needed)
+            origins |= conditions[key]
+        waiting = list(origins - needed)
     return found
 
 
@@ -589,10 +589,10 @@ class Machine:
         return self.stopped
 
     def _end(
-        self, way: ExecutionPath, kind: EndKind, place: instructions.Place, behind: int | None = None, limit: int = 0
+        self, way: ExecutionPath, kind: EndKind, place: instructions.Place, after: int | None = None, limit: int = 0
     ) -> None:
-        """``behind``: the step in front of the one that follows."""
-        follows = None if behind is None else self.first_after.get(behind)
+        """``after``: the step before the one that follows."""
+        follows = None if after is None else self.first_after.get(after)
         self.endings.append(Ending(kind, way.step, place, follows, limit, way.beside))
 
     def _assign(self, memory: ProgramMemory, each: syntax.Assign) -> instructions.Output | instructions.Unknown | None:

@@ -59,17 +59,20 @@ class Rule:
         return measured if self.best == "least" else -measured
 
 
+MIN_WEIGHT = 0.1  # of a joint that moves nothing, against 1 of the one that moves the tool farthest
+
+
 def joint_weights(robot: Robot) -> Reals:
     """Weights (n,) of joint moves: the largest lever (m) at which each joint swings the tool, the longest being 1.
 
-    A joint near the base moves more of the arm; a joint with no lever still counts a tenth. A prismatic joint moves
-    the tool by as much as itself.
+    A joint near the base moves more of the arm; a joint with no lever still counts ``MIN_WEIGHT``. A prismatic joint
+    moves the tool by as much as itself.
     """
     lengths = np.abs(robot.a) + np.abs(robot.d)
     outward = np.array([lengths[k:].sum() for k in range(robot.joints)]) + np.linalg.norm(robot.last_to_tool[:3, 3])
     if robot.sliding.any():
         outward = np.where(robot.slides, 1.0, outward)
-    weights: Reals = np.maximum(outward / outward.max(), 0.1)
+    weights: Reals = np.maximum(outward / outward.max(), MIN_WEIGHT)
     return weights
 
 

@@ -143,8 +143,8 @@ def least_clearance(bodies: Bodies, legs: tuple[GraspLeg, ...]) -> tuple[float, 
     for leg in legs:
         times = np.linspace(0.0, leg.duration, CHECKS)
         along = clearance_along(bodies, leg.joints, leg.rates, times, times, DEPTH)
-        pair = along.pair[along.least] if along.least >= 0 else None
+        pair = along.pair[along.closest] if along.closest >= 0 else None
         if pair is not None:
-            distance = float(along.distance[along.least]) - DEPTH
+            distance = float(along.distance[along.closest]) - DEPTH
             least = min(least or (np.inf, pair), (distance, pair), key=lambda each: each[0])
     return least

@@ -179,7 +179,7 @@ def test_few_poses_give_fewer_entries_and_say_what_more_is_needed(random):
         er3a.calibrate(robot, measured(robot, poses_in(robot, random, 1), 0.05, random))
     needed = caught.value.finding
     assert isinstance(needed, MorePositions)
-    assert (needed.poses, needed.determined, needed.determinable, needed.least) == (1, 3, 5, 1)
+    assert (needed.poses, needed.determined, needed.determinable, needed.missing) == (1, 3, 5, 1)
 
 
 def test_positions_of_another_arm_are_not_explained_away(random):

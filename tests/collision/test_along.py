@@ -79,6 +79,23 @@ def test_an_arm_that_is_back_where_it_was_may_have_been_elsewhere():
     assert len(found.contacts) == 1
 
 
+def test_a_whole_turn_at_constant_speed_may_have_met_something():
+    """Joint 1 turns once between the only two points, at both of which the arm is the same; nothing accelerates it."""
+    robot = load_robot("er3a_c60")
+    held, axis = np.radians([0, -90, 75, 0, 15, 0]), np.eye(6)[0]
+
+    def joints(t):
+        return held + 2 * np.pi * t[:, None] * axis
+
+    def rates(start, end):
+        return np.tile(2 * np.pi * axis, (len(start), 1)), np.zeros((len(start), 6))
+
+    at = forward(robot, held + np.pi * axis)[:3, 3] * 1000
+    scene = scene_of(spheres=[{"name": "ball", "radius_mm": 100, "xyz_mm": at.tolist()}])
+    assert (clearance(robot, joints(ENDS), scene).distance > 0.01).all()
+    assert len(clearance_along(Bodies(robot, scene), joints, rates, ENDS, ENDS, 0.09).contacts) == 1
+
+
 def test_obstacle_that_is_passed_by_is_not_met(robot):
     move, at = swing(robot)
     wire = {"name": "wire", "radius_mm": 0.2, "length_mm": 2}
@@ -88,7 +105,7 @@ def test_obstacle_that_is_passed_by_is_not_met(robot):
         least = clearance(robot, move.joints(times)[0], scene).distance.min()
         found = along(robot, scene, move)
         assert bool(found.contacts) == (least < 0)
-        assert least - DEPTH < found.distance[found.least] < least + DEPTH
+        assert least - DEPTH < found.distance[found.closest] < least + DEPTH
 
 
 def test_random_motions_among_random_balls_agree_with_dense_sampling(robot, random):
@@ -111,7 +128,7 @@ def test_random_motions_among_random_balls_agree_with_dense_sampling(robot, rand
         assert inside[dense < -DEPTH].all()
         assert not inside[dense > DEPTH].any()
         if not found.contacts:
-            assert found.distance[found.least] < dense.min() + DEPTH
+            assert found.distance[found.closest] < dense.min() + DEPTH
         shown = clearance(robot, move.joints(found.t)[0], scene).distance
         np.testing.assert_allclose(found.distance, shown, atol=1e-6)
         met += bool(found.contacts)

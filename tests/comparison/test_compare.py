@@ -216,7 +216,10 @@ def test_limits_are_compared_as_the_other_arms_zeros_and_directions_have_them():
     ends = turned * (right.lower - right.direction * moved), turned * (right.upper - right.direction * moved)
     same = {"offset": right.offset + moved, "direction": turned * right.direction}
     other = right.replace(**same, lower=np.minimum(*ends), upper=np.maximum(*ends))
-    assert er3a.compare(right, other).limits.same
+    compared = er3a.compare(right, other)
+    assert compared.limits.same
+    np.testing.assert_allclose(compared.corrected.lower, other.lower, atol=1e-9)
+    np.testing.assert_allclose(compared.corrected.upper, other.upper, atol=1e-9)
     found = er3a.compare(right, other.replace(upper=other.upper + np.radians([0, 0, 0, 0, 2, 0]))).limits
     assert [(each.joint, each.entry) for each in found.differences] == [(5, "upper")]
     assert found.differences[0].b - found.differences[0].a == pytest.approx(2)

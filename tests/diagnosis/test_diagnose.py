@@ -132,8 +132,12 @@ def test_what_references_cannot_tell_apart_is_named_with_what_would_decide():
     assert first.to_decide == NothingDecides()
 
 
-def test_members_of_a_set_differ_by_less_than_the_uncertainty_everywhere():
-    ranking = rank(changed("er3_600", alpha=(4, -np.pi / 2)), load_references("er3_600"))
+@pytest.mark.parametrize(("times", "off"), [(1, 0), (10, 6)])
+def test_members_of_a_set_differ_by_less_than_the_uncertainty_everywhere(times, off):
+    """Where uncertainties are so large that some are like the best, but not like each other, too."""
+    stated = [replace(each, uncertainty=times * each.uncertainty) for each in usable(load_references("er3_600"))]
+    stated[12] = replace(stated[12], expected=stated[12].expected + off * stated[12].uncertainty)
+    ranking = rank(changed("er3_600", alpha=(4, -np.pi / 2)), stated)
     _, uncertainty = expected_of(ranking.references)
     assert len(ranking.groups[0]) > 1
     for group in ranking.groups:

@@ -257,6 +257,12 @@ def test_the_worked_example_of_a_manual():
         asked, allowed = {"moment": (6.468, 15.2), "inertia": (0.1452, 0.42)}[use.quantity]
         assert use.asked == pytest.approx(asked, rel=1e-6)
         assert use.ratio == pytest.approx(asked / allowed, rel=1e-6)
+    # With 0.1 kg and 5 mm more: 3.1 kg at 225 mm.
+    payload, *uses = wrist_use(arm, wrist, Load(3.0, (0.0, 0.0, 0.1)), gravity=9.8, off=(0.1, 0.005))
+    assert (payload.asked, payload.most) == (3.0, 3.1)
+    for use in uses:
+        most = {"moment": 3.1 * 9.8 * 0.225, "inertia": 3.1 * 0.225**2}[use.quantity]
+        assert most * (1 - 1e-9) <= use.most < most * 1.01
 
 
 def test_levers_are_distances_of_the_load_from_the_axes(arm):

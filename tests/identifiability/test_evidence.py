@@ -17,6 +17,7 @@ from er3a.identifiability.alternatives import Flip
 from er3a.identifiability.entries import TableNumber, continuous_of, entries_of
 from er3a.identifiability.entry_evidence import Evidence, Tolerance
 from er3a.identifiability.evidence import NOT_OFF, Extent, _interval, evidence_of, parts_of
+from er3a.identifiability.feasible import Region
 from er3a.identifiability.proposals import (
     LookAtMotion,
     MeasureAngle,
@@ -409,6 +410,26 @@ def test_derived_documents_prove_nothing(random):
             ]
         )
         assert evidence_of(robot, stated, documents, only=["a2"])["a2"].status in statuses
+
+
+@pytest.mark.parametrize(("manual", "counts"), [pytest.param(-5.0, True, marks=pytest.mark.long), (0.0, False)])
+def test_a_contradiction_outvotes_a_measurement_only_where_the_table_meets_it(manual, counts):
+    """A tracker shows the flange 5 mm higher than the table has it; the table's own manual states something else."""
+    robot = puma().replace(origins={entry.name: "manual" for entry in entries_of(puma())})
+    (seen,) = tracked(robot, np.zeros((1, 6)), 0.1)[2:]
+    stated = [replace(seen, expected=seen.expected + 5.0)]
+    stated += [replace(seen, expected=seen.expected + manual, origin="manual")]
+    found = evidence_of(robot, stated, Documents(), only=["d1"])["d1"]
+    assert (found.status != "consistent") == counts
+
+
+def test_a_search_that_is_cut_off_settles_nothing(random, monkeypatch):
+    robot, followed = puma(), Region.followed
+    stated = tracked(robot, poses(random, 12), 0.1)
+    monkeypatch.setattr(Region, "followed", lambda self, start, toward, steps=1: followed(self, start, toward, 1))
+    found = evidence_of(robot, stated, Documents(), only=["a2"])["a2"]
+    assert (found.status, found.at_least) == ("weak", True)
+    assert found.off.within(Tolerance().mm, Tolerance().deg)
 
 
 def test_a_table_that_names_an_unknown_document_is_refused():

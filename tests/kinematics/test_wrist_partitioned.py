@@ -16,6 +16,7 @@ from er3a.kinematics.forward import forward, frames
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.solutions import branch_labels
 from er3a.kinematics.wrist_partitioned import (
+    CoupledWrist,
     ElbowAxesNotParallel,
     NeighboursParallel,
     NoArmLength,
@@ -181,6 +182,8 @@ def test_a_wrist_that_can_t_tilt_far_enough_is_named():
         ({"alpha": np.array([-90, 0, -90, 0, -90, 0]) * DEG}, NeighboursParallel(4, 5)),
         ({"alpha": np.array([-90, 0, -90, 90, 180, 0]) * DEG}, NeighboursParallel(5, 6)),
         ({"d": [0.3, 0, 0, 0.35, 0.02, 0.08]}, NoWristCentre(pytest.approx(10))),
+        ({"d": [0.3, 0, 0, 0.35, 2e-6, 0.08]}, NoWristCentre(pytest.approx(1e-3))),
+        ({"coupling": np.diag([1.0, 1.0, 2.0, 1.0, 1.0, 1.0])}, CoupledWrist()),
         ({"a": [0.1, 0.4, 0.05, 0.001, 0, 0]}, NoWristCentre(pytest.approx(2 / 3))),
         ({"a": [0.1, 0.0, 0.05, 0, 0, 0]}, NoArmLength()),
         ({"a": [0.1, 0.4, 0, 0, 0, 0], "d": [0.3, 0, 0, 0, 0, 0.08]}, NoArmLength()),

@@ -14,7 +14,9 @@ from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.planning.follow import follow
 from er3a.planning.motion_faults import (
     AboveLimit,
+    RateLimit,
     TooFast,
+    jerk_exceeded,
     limit_intervals,
     out_of_limits,
     rates_exceeded,
@@ -51,19 +53,30 @@ def test_limit_that_is_left_between_two_check_points_only():
     assert interval.cause == AboveLimit(1, pytest.approx(170.01, abs=0.01), pytest.approx(170))
 
 
-def test_speed_that_is_passed_between_two_check_points_only():
+@pytest.mark.parametrize("sense", [1, -1])
+def test_speed_that_is_passed_between_two_check_points_only(sense):
     robot = load_robot("er3_600")
-    move = JointMove(np.zeros(6), np.radians([0, 0, 0, 0, 0, 840.2 / 15 * 8]), 1.0)
+    move = JointMove(np.zeros(6), sense * np.radians([0, 0, 0, 0, 0, 840.2 / 15 * 8]), 1.0)
     even = np.linspace(0, 1, 20)  # the quintic is fastest half way
     velocity = move.joints(even)[1]
     assert (np.abs(velocity) < robot.speed).all()
     limit = speed_limit(robot)
     (interval,) = rates_exceeded(even, velocity, limit, lambda t: move.joints(t)[1])
-    np.testing.assert_allclose(move.joints(np.array([interval.start, interval.end]))[1][:, 5], limit.allowed[5])
+    np.testing.assert_allclose(move.joints(np.array([interval.start, interval.end]))[1][:, 5], sense * limit.allowed[5])
     (exact,) = rate_intervals(move.polynomials(), limit)
     assert (exact.start, exact.end) == pytest.approx((interval.start, interval.end), abs=1e-9)
     assert exact.cause.needed_deg_s == pytest.approx(interval.cause.needed_deg_s, rel=1e-9)
     assert interval.cause == TooFast(6, pytest.approx(840.2, abs=0.1), pytest.approx(840))
+
+
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_a_step_of_the_acceleration_exceeds_any_jerk_in_both_senses(sense):
+    limit = RateLimit(3, np.array([10.0, np.nan]), np.zeros(2, bool), np.full(2, 0.1))
+    steps = np.array([0.5, 1.5, 2.0]), sense * np.array([[0.2, 0.2], [0.05, 0.2], [0.0, 0.0]])
+    jerk = sense * np.array([[9.0, 99.0], [11.0, 0.0]])
+    found = jerk_exceeded(np.array([0.0, 1.0, 2.0]), jerk, steps, limit)
+    assert [(each.start, each.end, each.cause.joint) for each in found] == [(0.5, 0.5, 1), (1.0, 2.0, 1)]
+    assert [each.cause.needed_deg_s3 for each in found] == [None, pytest.approx(np.degrees(11.0))]
 
 
 def test_motion_that_stays_below_has_no_interval():

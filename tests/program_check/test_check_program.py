@@ -119,6 +119,18 @@ def test_a_line_is_timed_by_speed_and_acceleration(tmp_path):
     assert check.cycle.complete
 
 
+@pytest.mark.parametrize(("speed", "by_joint"), [(100, False), (5000, True)])
+def test_a_joint_move_takes_as_long_as_its_tool_or_its_slowest_joint(speed, by_joint, tmp_path):
+    turned = HOME + np.radians([60, 0, 0, 0, 0, 0])
+    target = f"[[{','.join(f'{each:.9f}' for each in np.degrees(turned))}],[9E9,9E9,9E9,9E9,9E9,9E9]]"
+    text = f"MODULE m\n  PROC main()\n    MoveAbsJ {target},v{speed},fine,tool0;\n  ENDPROC\nENDMODULE\n"
+    (tmp_path / "m.mod").write_text(text)
+    check = check_program(read_program(tmp_path / "m.mod"), ROBOT, CheckOptions(start=HOME))
+    radius = np.linalg.norm(forward(ROBOT, HOME)[:2, 3])  # a sixth of a turn has a chord as long
+    joint = 60 / 180 + 0.25  # s, at the speed and acceleration assumed of a joint without a document
+    assert check.cycle.stopping_s == pytest.approx(joint if by_joint else 1000 * radius / speed, rel=1e-6)
+
+
 def moment(check, code: str) -> float:
     """When, within its motion, the one finding of a code begins, s."""
     return next(each.moment for each in check.findings if each.finding.code == code)
@@ -293,6 +305,15 @@ def test_targets_beyond_the_most_motions_are_checked_for_reach_and_limits(tmp_pa
     assert lines == {line for line, code in behind if code in wrong}
 
 
+def test_a_pose_beyond_the_most_motions_whose_solutions_all_leave_limits_is_a_fault(tmp_path):
+    narrow = ROBOT.replace(lower=HOME - 0.3, upper=HOME + 0.3)
+    poses = [frame(forward(ROBOT, HOME + np.array([turn, 0, 0, 0, 0, 0]))) for turn in (0.1, 0.5)]
+    checked("\n".join(f"PTP {target}" for target in (axes(HOME), *poses)), tmp_path)
+    check = check_program(read_program(tmp_path / "a.src"), narrow, CheckOptions(start=HOME, most_motions=1))
+    found = {(each.place.line, each.finding.code) for each in check.findings if "limit" in each.finding.code}
+    assert found == {(9, "above_limit")}
+
+
 def test_motions_that_are_repeated_count_once(tmp_path):
     body = f"FOR i=1 TO 30\nPTP {axes(HOME)}\nPTP {{A1 10}}\nENDFOR"
     check = checked(body, tmp_path, most_motions=4)
@@ -345,6 +366,9 @@ END
     phi = np.radians(180 - angle * shares)  # from the start over the point: clockwise seen from above
     wanted = np.stack([0.43 + 0.03 * np.cos(phi), 0.03 * np.sin(phi), np.full(50, 0.35)], axis=1)
     np.testing.assert_allclose(forward(ROBOT, way.joints_at(shares))[:, :3, 3], wanted, atol=1e-9)
+    radians = np.radians(180 - angle * np.array([0.0, 0.25, 0.5]))  # half the arc bulges over its chord by
+    start, middle, end = 0.03 * np.stack([np.cos(radians), np.sin(radians)], axis=1)
+    assert way.sagitta(0.5) == pytest.approx(np.linalg.norm(middle - (start + end) / 2))
     after = list(check.motions.values())[-1]
     np.testing.assert_allclose(forward(ROBOT, after.end)[:3, 3], wanted[-1] + [0, 0, 0.01], atol=1e-7)
 

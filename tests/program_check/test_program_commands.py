@@ -98,9 +98,25 @@ def test_what_is_not_examined_is_named_in_text_json_and_sarif(tmp_path):
     assert lines == moves[3:]
     assert [each["level"] for each in found["motions"][3:]] == ["caution"] * len(lines)
     (log,) = json.loads(sarif.read_text())["runs"]
-    notes = log["invocations"][0]["toolExecutionNotifications"]
-    assert [each["locations"][0]["physicalLocation"]["region"]["startLine"] for each in notes] == lines
+    notes, of = log["invocations"][0]["toolExecutionNotifications"], dict[str, list[dict]]()
+    for each in notes:
+        of.setdefault(each["descriptor"]["id"], []).append(each)
+    assert [each["locations"][0]["physicalLocation"]["region"]["startLine"] for each in of["not_examined"]] == lines
+    assert [each["message"]["text"][:24] for each in of["shapes_assumed"]] == ["Link shapes are assumed "]
     assert "not examined, or not each time: motions of lines" in check(*cut).stderr
+
+
+def test_a_check_that_ends_early_is_no_pass_and_names_no_time_of_the_whole():
+    """Whatever ended it; the exit code is that of a caution."""
+    words = ("check-program", "data/programs/palletise.src", "--robot", "er3a_c60", "--start", HOME, "--scene", SCENE)
+    whole = json.loads(run(*words, "--json").stdout)[0]["cycle"]
+    assert whole["complete"]
+    cut = run(*words, "--most-motions", "2", "--json")
+    (found,) = json.loads(cut.stdout)
+    assert found["cycle"]["stopping_s"] < 0.5 * whole["stopping_s"]
+    assert not found["cycle"]["complete"]
+    assert "without motions whose path is unknown or was not checked" in run(*words, "--most-motions", "2").stderr
+    assert (cut.exit_code, run(*words, "--most-motions", "2", "--fail-on", "caution").exit_code) == (0, 1)
 
 
 def test_no_motion_passes_without_obstacles_shapes_or_contacts(tmp_path):
@@ -124,7 +140,8 @@ def test_no_motion_passes_without_obstacles_shapes_or_contacts(tmp_path):
         levels = {found["level"], *(each["level"] for each in found["motions"])}
         assert levels == {"caution" if expected else "pass"}, expected
         (log,) = json.loads(sarif.read_text())["runs"]
-        assert len(log["invocations"][0]["toolExecutionNotifications"]) == len(expected)
+        notes = log["invocations"][0]["toolExecutionNotifications"]
+        assert sum(each["descriptor"]["id"] == "not_examined" for each in notes) == len(expected)
         assert run(*words, "--fail-on", "caution").exit_code == bool(expected)
         assert ("therefore no pass" in run(*words).stderr) == bool(expected)
 

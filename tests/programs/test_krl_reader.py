@@ -109,6 +109,8 @@ def test_more_than_full_speed_is_full_speed(tmp_path):
     for percent, share in ((150, 1.0), (40, 0.4)):
         (found,) = moves(run(tmp_path, f"BAS(#VEL_PTP,{percent})\nPTP {{A1 10,A2 0,A3 0,A4 0,A5 0,A6 0}}"))
         assert (found.speed.value, found.speed.unit) == (share, "share")
+        (line,) = moves(run(tmp_path, f"BAS(#ACC_CP,{percent})\nLIN {{X 400,Y 0,Z 450,A 0,B 0,C 180}}"))
+        assert (line.acceleration.value, line.acceleration.unit) == (share, "share")
 
 
 def test_positions_are_computed_with(tmp_path):

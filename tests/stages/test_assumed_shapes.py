@@ -17,6 +17,7 @@ from er3a.pipeline.stages.collision.compute import compute as collision
 from er3a.pipeline.stages.collision.model import FreeSpace
 from er3a.pipeline.stages.trajectory.model import RESULTS, MinClearance, is_safe
 from er3a.pipeline.stages.trajectory.played import faults
+from er3a.pipeline.stages.trajectory.record import _runs
 from er3a.pipeline.stages.trajectory.written_programs import near_assumed_shapes
 from er3a.pipeline.study import load_study
 from er3a.program_check.check_program import CheckOptions, check_program
@@ -73,6 +74,22 @@ def test_the_stages_say_so(small_results):
     assert (is_safe(sound, shapes), is_safe(sound, nearer)) == (True, False)
     closer = replace(summary, verdict=replace(summary.verdict, shapes=nearer))
     assert len(faults(replace(stored.results, summary=closer))) == len(faults(stored.results)) + 1
+
+
+def test_recordings_call_no_path_safe_without_saying_of_what(small_results):
+    study = load_study("config/small.yaml")
+    results = read_results(small_results("trajectory", "er3a_c60", study), RESULTS).results
+    summary = results.summary
+    sound = [each for each in summary.paths if is_safe(each, summary.verdict.shapes)]
+    nearer = replace(summary.verdict, shapes=replace(summary.verdict.shapes, near=(sound[0].name,)))
+    close = replace(results, summary=replace(summary, verdict=nearer))
+    for found, status, words in (
+        (results, "plain", "safe in the model"),
+        (close, "caution", "clear of assumed shapes only"),
+    ):
+        run = next(_runs(load_robot("er3a_c60"), found, sound[0]))
+        assert (run.status, run.outcome) == (status, words)
+        assert f"**{words}**" in run.text
 
 
 def test_a_program_of_a_path_near_assumed_shapes_says_so_in_its_head():

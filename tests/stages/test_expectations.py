@@ -39,7 +39,8 @@ def test_what_comes_otherwise_is_named_with_both_outcomes():
     assert found is not None
     assert [each.name for each in found.unmet] == ["out", "line"]
     assert say(found) == (
-        "2 of 2 expectations are not met: out (safe; expected: unreachable); line (too fast; expected: safe)."
+        "2 of 2 expectations are not met: out (safe in the model; expected: unreachable); "
+        "line (too fast; expected: safe in the model)."
     )
     assert demonstrations([Came("out", "safe", "unreachable")], "safe") == ()
 

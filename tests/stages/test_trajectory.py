@@ -18,7 +18,7 @@ from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import characteristic_length, conditioning
-from er3a.pipeline.messages.trajectory import FIGURES, advice, cause_text, path_text
+from er3a.pipeline.messages.trajectory import FIGURES, advice, cause_text, path_text, repair_text
 from er3a.pipeline.results import (
     AbsentResults,
     NotComputed,
@@ -216,7 +216,9 @@ def test_strategies_are_listed_with_their_costs(results, name):
         assert not stop.usable
         assert 0 < stop.motion.done_ratio < 1
     assert paths["line_out"].strategy is None
-    assert advice(paths["line_out"]).endswith("it is out of reach besides")
+    out = paths["line_out"]
+    assert "it is out of reach besides" in advice(out)
+    assert ("End it at t = " in advice(out)) == (out.sound_end is not None)
     last, met = paths["line_collides"].clear_until, paths["line_collides"].collisions[0]
     assert 0 < last.t_s < met.t0_s
     assert f"up to t = {last.t_s:.4g} s ({last.s_m * 1000:.1f} mm): end the path there" in advice(
@@ -579,6 +581,26 @@ def test_the_slower_pace_that_is_advised_keeps_the_limits(study, results, tmp_pa
     assert path.too_fast
     assert not slower.too_fast
     assert hardly.too_fast
+
+
+def test_at_the_override_that_is_advised_a_controller_ten_times_as_fast_keeps_the_assumed_speeds(results):
+    """The stored joint angles in ten times the time; the share of the limits that is named is that of differences."""
+    found, advised = results["er3a_c60"], 0
+    limits = found.summary.joint_limits
+    for path in (each for each in found.summary.paths if each.chosen and each.chosen.motion):
+        said = re.search(r"uses up to (\d+) % .*: begin at (\d+) % override", repair_text(path, limits))
+        named, override = int(said[1]) / 100, int(said[2]) / 100
+        own = found.avoidance
+        rows = own.take((own.path == path.name) & (own.strategy == path.chosen.name))
+        rates = np.abs(np.diff(rows.q_deg, axis=0)) / (np.diff(rows.t_s)[:, None] / override)
+        ratio = (rates / limits.speed_deg_s).max()
+        assert ratio / override == pytest.approx(named, abs=0.03)
+        assert 10 * ratio <= named + 0.005 <= 1.005
+        known = replace(limits, speed_assumed=(False,) * 6)
+        assert ("start slowly" in repair_text(path, known)) == (named > 0.99)
+        assert "override" not in repair_text(path, known)
+        advised += named > 0.99
+    assert advised
 
 
 def test_the_shortest_time_of_a_path_that_is_too_fast_is_told_with_what_it_means(results):

@@ -14,17 +14,20 @@ from lxml import etree
 from er3a.collision.pairs import ShapesAssumed
 from er3a.files.path_file import load_paths
 from er3a.files.robot_library import load_robot
+from er3a.kinematics.forward import forward
 from er3a.pipeline.messages.say import say
-from er3a.pipeline.messages.trajectory import SoundEnd, advice, end_text, first_faults
+from er3a.pipeline.messages.trajectory import advice, end_text, first_faults
 from er3a.pipeline.program_reports import programs_of
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.trajectory.compute import compute
-from er3a.pipeline.stages.trajectory.model import Singularity
-from er3a.pipeline.stages.trajectory.played import advised, faults, last_sound
+from er3a.pipeline.stages.trajectory.judgement import sound_end
+from er3a.pipeline.stages.trajectory.model import Singularity, SoundEnd
+from er3a.pipeline.stages.trajectory.played import advised, faults
 from er3a.pipeline.study import Study, load_study
 from er3a.pipeline.verdicts import read_verdicts
 from er3a.pipeline.viewing.index import write_index
 from er3a.planning.motion_faults import PathOutOfReach, TooFastIfAssumed
+from testing.motion_cases import judged, limits_of
 
 ROBOT = "er3a_c60"
 
@@ -105,6 +108,28 @@ def test_a_fault_ends_with_a_code_and_a_demonstration_is_counted_apart(tmp_path,
     assert (f"{shown} meant to be faulty and found so" in cell) == bool(shown)
 
 
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("expect", "scene", "passing", "words"),
+    [
+        ({}, "data/scenes/table_and_post.yaml", 1, ""),
+        ({"line_clean": "collides"}, "data/scenes/table_and_post.yaml", 0, "not as expected"),
+        ({}, None, 1, "Not examined, and therefore no pass: obstacles"),
+    ],
+)
+def test_the_index_says_where_it_counts_what_passes_why_that_is_no_pass(tmp_path, expect, scene, passing, words):
+    """A path that is safe although its file expects a collision, and one that was checked without obstacles."""
+    study = study_of(tmp_path, "line_clean", expect=expect, settings={"avoidance": "slow", "scene": scene})
+    run.compute("trajectory", study, ROBOT, tmp_path / "results" / ROBOT / "trajectory")
+    write_index(study, tmp_path / "results", tmp_path)
+    text = (tmp_path / "index.html").read_text(encoding="utf-8")
+    decision, rest = text.split(f"{passing} of 1 paths pass", 1)[1].split("</tr>", 1)
+    shown = decision if scene is None else rest.split("The verdict of each stage")[0]
+    assert words in shown
+    for other in {"not as expected", "and therefore no pass: obstacles"}:
+        assert (other in text) == bool(words and other in words)
+
+
 @pytest.mark.parametrize("name", ["line_collides", "line_limits"])
 def test_a_path_that_ends_where_its_advice_says_keeps_the_margin(tmp_path, name):
     """The advised point as it is printed, in the path's own file, judged by the stage itself."""
@@ -130,8 +155,8 @@ def test_a_path_that_ends_before_the_edge_of_the_reach_as_advised_is_safe(tmp_pa
     """At the end that index and page name: in the same time and after a stop from it the joints keep all limits."""
     results = compute(study_of(tmp_path, name, robot=robot), robot)
     (path,), (fault,), limits = results.summary.paths, faults(results), results.summary.joint_limits
-    last = last_sound(path, results.checks, limits)
-    said = advice(path, last)
+    last = path.sound_end
+    said = advice(path)
     (entry,) = (each for each in load_paths(f"data/paths/{robot}.yaml").paths if each.name == name)
     start, end = np.array(entry.start.xyz_mm), np.array(entry.end.xyz_mm)
     found = re.search(
@@ -172,6 +197,31 @@ def test_all_that_a_path_came_to_is_named_everywhere_in_the_order_of_time(tmp_pa
     assert replace(path, collisions=()).outcomes == ("leaves limits",)
 
 
+def test_a_line_that_only_another_branch_can_end_is_singular():
+    """Whatever the limits, and though it only comes near to a singular pose: a joint would have to jump."""
+    robot = load_robot(ROBOT).replace(lower=np.full(6, -4 * np.pi), upper=np.full(6, 4 * np.pi))
+    start = [100.139823, -1.162150, 91.643238, 103.039661, -46.790756, -290.638948]
+    end = {"xyz_mm": [-73.957903, 61.658870, 937.969084], "rpy_deg": [-56.984400, -13.630461, 93.025245]}
+    written = {"kind": "line", "start_deg": start, "end": end, "duration_s": 1.283259}
+    limits = limits_of(robot, {"limits_jerk": False, "known_acceleration": False})
+    motion, found = judged(robot, written, 2, limits)
+    assert motion.followed.jumps
+    assert not any(event.crossing for event in found.events)
+    assert found.verdict == "singular"
+
+
+def test_where_a_line_leaves_the_reach_joint_speeds_have_no_bound():
+    """Though all speeds that are solved, up to where the elbow is stretched, are finite."""
+    robot = load_robot("er3_600")
+    end = {"xyz_mm": [-414.2, -333.5, 469.2], "rpy_deg": [-4.0, 52.2, 53.8]}
+    written = {"kind": "line", "start_deg": [-123.1, -101.6, 166.3, -178.4, 77.5, 177.8], "end": end, "duration_s": 0.5}
+    _, found = judged(robot, written, 2, limits_of(robot, {"limits_jerk": False, "known_acceleration": False}))
+    (beyond,) = found.beyond
+    assert 0 < beyond.start < beyond.end == 0.5
+    assert not found.speed_bounded
+    assert found.max_rates is None
+
+
 def test_a_path_that_keeps_the_margin_nowhere_gets_no_point_to_end_at(tmp_path):
     results = compute(study_of(tmp_path, "line_collides", settings={"assumed_margin_mm": 400.0}), ROBOT)
     (path,), (fault,) = results.summary.paths, faults(results)
@@ -183,18 +233,21 @@ def test_a_path_that_keeps_the_margin_nowhere_gets_no_point_to_end_at(tmp_path):
 def test_what_is_wrong_before_a_contact_ends_the_sound_part_of_a_path(tmp_path):
     results = compute(study_of(tmp_path, "line_collides"), ROBOT)
     (path,), rows, limits = results.summary.paths, results.checks, results.summary.joint_limits
-    assert last_sound(path, rows, limits)[0] == path.clear_until.t_s > 0.5
+    assert sound_end(path, rows, limits) == path.sound_end
+    assert path.sound_end.t_s == path.clear_until.t_s > 0.5
     passed, crossed = (Singularity(0.5, 0.5, "wrist", crossing, 0.0, None) for crossing in (False, True))
-    assert last_sound(replace(path, singularities=(passed,)), rows, limits)[0] == path.clear_until.t_s
+    assert sound_end(replace(path, singularities=(passed,)), rows, limits).t_s == path.clear_until.t_s
     early = replace(path, singularities=(crossed,))
-    assert 0.4 < last_sound(early, rows, limits)[0] < 0.5
-    assert "keeps" not in advice(early, last_sound(early, rows, limits))
-    assert 0.2 < last_sound(path, replace(rows, near_singular=rows.t_s > 0.3), limits)[0] <= 0.3
+    early = replace(early, sound_end=sound_end(early, rows, limits))
+    assert 0.4 < early.sound_end.t_s < 0.5
+    assert "keeps" not in advice(early)
+    assert 0.2 < sound_end(path, replace(rows, near_singular=rows.t_s > 0.3), limits).t_s <= 0.3
     near = replace(rows, near_singular=rows.t_s >= 0)
-    assert last_sound(path, near, limits) is None
-    assert "end the path there" not in advised(path, near, limits)
-    assert "near-singular at the start" in advised(path, near, limits)
-    met = replace(path, singularities=(Singularity(0.0, 0.0, "wrist", True, 0.0, None),))
+    assert sound_end(path, near, limits) is None
+    nowhere = replace(path, sound_end=None)
+    assert "end the path there" not in advised(nowhere, near, limits)
+    assert "near-singular at the start" in advised(nowhere, near, limits)
+    met = replace(nowhere, singularities=(Singularity(0.0, 0.0, "wrist", True, 0.0, None),))
     assert "the arm is singular at the start" in advised(met, near, limits)
     fast = replace(path.collisions[0], t0_s=0.7, cause=TooFastIfAssumed(2, 900.0, 180.0))
     several = replace(early, too_fast=(fast,), avoidance=path.avoidance * 2)
@@ -203,8 +256,33 @@ def test_what_is_wrong_before_a_contact_ends_the_sound_part_of_a_path(tmp_path):
     assert (fault.when, fault.what[:18]) == ("0.500 s", "wrist singularity;")
     beyond = replace(several, unreachable=(replace(fast, t0_s=0.9, s0_m=0.1, cause=PathOutOfReach(())),))
     assert "From t = 0.5 s: wrist singularity; from t = 0.9 s (100.0 mm of the path) it is out of reach" in advice(
-        beyond, last_sound(beyond, rows, limits)
+        replace(beyond, sound_end=sound_end(beyond, rows, limits))
     )
+
+
+def test_where_limits_are_left_before_a_contact_the_path_may_end_before_them_and_nowhere_if_it_starts_beyond(tmp_path):
+    """Joint 1 turns from 100 to 240 deg past its limit; the tool meets a ball at 210 deg."""
+    robot, ends = load_robot(ROBOT), [[turn, 20, 10, 0, 40, 0] for turn in (100, 240)]
+    at = 1000 * forward(robot, np.radians([210.0, *ends[0][1:]]))[:3, 3]
+    ball = {"name": "ball", "radius_mm": 20, "xyz_mm": at.tolist()}
+    move = {"kind": "joint", "title": "Turn", "duration_s": 3, "samples": 5}
+    paths = [
+        move | {"name": name, "start_deg": [*start], "end_deg": [*end]}
+        for name, start, end in (("out", *ends), ("in", *ends[::-1]))
+    ]
+    for name, content in (("scene", {"title": "A ball", "spheres": [ball]}), ("paths", {"paths": paths})):
+        (tmp_path / f"{name}.yaml").write_text(yaml.safe_dump({"kind": name} | content), encoding="utf-8")
+    study = load_study("config/small.yaml")
+    files = {name: str(tmp_path / f"{name}.yaml") for name in ("scene", "paths")}
+    settings = study.trajectory.model_copy(update={"avoidance": "slow"})
+    entry = study.robots[ROBOT].model_copy(update=files)
+    study = study.model_copy(update={"robots": {ROBOT: entry}, "trajectory": settings})
+    out, back = compute(study, ROBOT).summary.paths
+    assert out.out_of_limits[0].t0_s < out.collisions[0].t0_s
+    limit = float(np.degrees(robot.upper[0]))
+    assert limit - 5 < out.clear_until.q_deg[0] < limit
+    assert back.out_of_limits[0].t0_s == 0 < back.collisions[0].t0_s
+    assert back.clear_until is None
 
 
 @pytest.mark.parametrize(

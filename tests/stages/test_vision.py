@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -70,6 +71,19 @@ def test_objects_within_the_margin_of_assumed_shapes_count_apart(folders):
         assert (f"{len(near)} more only if" in say(verdict.finding)) == bool(near)
         figures = {each.name: each.value for each in _figures(summary.calibration, summary.objects, near)}
         assert figures["objects_grasped"] == clear
+
+
+@pytest.mark.long
+def test_the_verdict_names_the_least_success_whatever_level_the_study_asks_for(folders):
+    """A study that asks for no level counts a grasp that fails 199 times in 200, and says so."""
+    summary = read_results(folders["er3a_c60"], VisionResults).results.summary
+    likely, *others = (each for each in summary.objects if each.grasp)
+    for probability, words in ((0.00499, "at least 0.4 %"), (0.9999, "at least 99.9 %")):
+        objects = (replace(likely, grasp=replace(likely.grasp, probability=probability)),)
+        assert f"the probability of success is {words}" in say(_verdict(summary.calibration, objects, ()).finding)
+        both = _verdict(summary.calibration, (*objects, *others), ()).finding
+        assert both.probability == min(probability, *(each.grasp.probability for each in others))
+    assert "probability" not in say(_verdict(summary.calibration, (), ()).finding)
 
 
 @pytest.mark.long

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from er3a.identifiability.entry_evidence import Tolerance
 from er3a.identifiability.proposals import LookAtMotion
@@ -17,9 +19,14 @@ from er3a.pipeline.results import LeftOut
 from er3a.pipeline.stages.dynamics.model import NoLimits
 from er3a.pipeline.stages.inverse.model import RankingRows
 from er3a.pipeline.stages.inverse.report import _rule_rows
+from er3a.pipeline.stages.programs.model import ProgramMotion, ProgramsResults
+from er3a.pipeline.stages.trajectory.model import PathChecks, TrajectoryResults
 from er3a.pipeline.stages.validation.model import LeftOpen, PartFound
 from er3a.pipeline.stages.vision.model import GraspCounts
-from er3a.pipeline.viewing.index import _condition, _proposed
+from er3a.pipeline.stages.workspace.entry import BoxTask
+from er3a.pipeline.stages.workspace.model import PlacementSummary, PlaceSummary, StandSummary
+from er3a.pipeline.stages.workspace.tool_capability import _task_summary
+from er3a.pipeline.viewing.index import _condition, _passes, _proposed, first_inside
 
 TALLY = CheckTally(24)
 TURNED = ToolOff(0.0, 180.0)
@@ -99,3 +106,91 @@ def test_a_verdict_says_what_it_is_not_to_be_taken_for():
 def test_an_arm_that_nothing_can_meet_has_infinite_clearance():
     one = (["t"], [0], ["found_arm"], ["clearance"], [np.inf], [1])
     assert _rule_rows(RankingRows(*map(np.array, one)), ["clearance"])[0][1].startswith("∞")
+
+
+def test_a_point_enters_a_box_when_a_dense_walk_along_its_polyline_does(random):
+    """Also if no vertex lies in the box; a vertex that is not known hides only the pieces that it ends."""
+    low, high = np.array([-0.3, -0.2, -0.1]), np.array([0.2, 0.3, 0.25])
+    entered = 0
+    for _ in range(300):
+        t = np.cumsum(random.uniform(0.1, 2, 8))
+        points = random.uniform(-1, 1, (8, 3))
+        points[3, :2] = points[2, :2]  # straight up
+        found = first_inside(t, points, low, high)
+        times = np.linspace(t[0], t[-1], 20_001)
+        walked = np.column_stack([np.interp(times, t, column) for column in points.T])
+        inside = times[((walked >= low) & (walked <= high)).all(axis=1)]
+        if len(inside):
+            assert found == pytest.approx(inside[0], abs=2 * (times[1] - times[0]))
+            entered += 1
+        elif found is not None:  # a corner cut between two points of the walk
+            place = np.array([np.interp(found, t, column) for column in points.T])
+            np.testing.assert_allclose(place, np.clip(place, low, high), atol=1e-9)
+    assert 50 < entered < 250
+    across = np.array([[-1.0, 0, 0], [1, 0, 0]])
+    assert first_inside(np.array([0.0, 2]), across, low, high) == pytest.approx(0.7)
+    assert first_inside(np.array([0.0, 2]), across + np.array([0, 0, 0.25]), low, high) == pytest.approx(
+        0.7
+    )  # along a face
+    assert first_inside(np.array([0.0, 2]), across + np.array([0, 0, 0.26]), low, high) is None
+    lost = np.array([[-1.0, 0, 0], [np.nan] * 3, [1, 0, 0], [0, 0, 0]])
+    assert first_inside(np.arange(4.0), lost, low, high) == pytest.approx(2.8)
+    assert first_inside(np.zeros(0), np.zeros((0, 3)), low, high) is None
+
+
+def placed(**stands) -> SimpleNamespace:
+    """The workspace stage's results, which put a box of 200 x 150 x 50 mm at (350, 0, 400) mm."""
+    spot = PlaceSummary(
+        (0.35, 0.0, 0.4), (0.15, 0.2, 0.05), True, "proven", None, "sampled", 1, 1, None, (0,) * 3, (0,) * 3
+    )
+    stand = [StandSummary("table", 0.1, None, None, "in_the_way", spot)] if stands.get("over") else []
+    task = _task_summary(BoxTask())
+    found = PlacementSummary(None, 20, task, (0.02,) * 3, 45, 1, 1, 1, 1, 0, 1, (spot,), tuple(stand))
+    return SimpleNamespace(results=SimpleNamespace(summary=SimpleNamespace(placement=found)))
+
+
+def moving(kind, table, key, summary, motions) -> SimpleNamespace:
+    """Results of a stage with motions, all from x = 0 to x = 1000 mm in 10 s, at y and z of each, by name."""
+    rows = [(name, 10.0 * x, (1000.0 * x, y, z)) for name, (y, z) in motions.items() for x in (0, 0.5, 1)]
+    columns = {name: np.zeros((len(rows), 6) if each.is_group else len(rows)) for name, each in table.columns().items()}
+    columns["t_s"] = np.array([row[1] for row in rows])
+    columns |= {key: np.array([row[0] for row in rows]), "xyz_mm": np.array([row[2] for row in rows]).reshape(-1, 3)}
+    return SimpleNamespace(results=kind(summary, *([table(**columns)] * (5 if kind is TrajectoryResults else 3))))
+
+
+def named(*names) -> list[SimpleNamespace]:
+    return [SimpleNamespace(name=name) for name in names]
+
+
+@pytest.mark.parametrize("over", [False, True])
+def test_the_index_names_what_passes_through_the_box_or_its_stand(over):
+    """First times by hand: the box begins at x = 275 mm, which is passed after 2.75 s."""
+    paths = SimpleNamespace(paths=named("into", "below", "beside"), not_followed=tuple(named("lost")))
+    programs = SimpleNamespace(programs=named("through", "still"))
+    motions = {"into": (99.0, 424.0), "below": (0.0, 150.0), "beside": (101.0, 400.0)}
+    stored = {
+        "workspace": placed(over=over),
+        "trajectory": moving(TrajectoryResults, PathChecks, "path", paths, motions),
+        "programs": moving(ProgramsResults, ProgramMotion, "program", programs, {"through": (0.0, 376.0)}),
+    }
+    found = _passes(stored)
+    below = {"below": pytest.approx(2.75)} if over else {}
+    assert found.through == {
+        "trajectory": {"into": pytest.approx(2.75)} | below,
+        "programs": {"through": pytest.approx(2.75)},
+    }
+    assert "into (from 2.75 s)" in found.text
+    assert "through (from 2.75 s)" in found.text
+    assert "beside" not in found.text
+    assert found.text.endswith("Not compared, or not all of it: lost, still.")
+    assert found.short.endswith(f"or its stand in {2 if over else 1} of the paths, 1 of the programs.")
+
+
+def test_without_motions_or_without_a_place_nothing_is_said_to_be_free():
+    assert _passes({}) is None
+    alone = _passes({"workspace": placed()})
+    assert (alone.short, alone.text) == ("No path or program was compared with its place.", "")
+    clear = moving(
+        ProgramsResults, ProgramMotion, "program", SimpleNamespace(programs=named("far")), {"far": (500.0, 0.0)}
+    )
+    assert "links and the tool's body were not" in _passes({"workspace": placed(), "programs": clear}).text

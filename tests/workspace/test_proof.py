@@ -160,6 +160,34 @@ def test_points_of_the_estimate_are_even_over_arcs_that_are_open(random):
     np.testing.assert_allclose(*shares, atol=0.004)
 
 
+@pytest.mark.parametrize(("gap", "is_open"), [((1, 0), True), ((1, 2), True), ((2, 1), True), ((0, 1), False)])
+def test_a_void_is_open_to_all_sides_but_the_axis_and_nothing_is_reached_beyond_the_cells(gap, is_open):
+    """Nine rings, filled but for the middle one and one beside it."""
+    places = [(i, j) for i in range(3) for j in range(3)]
+    unfilled = np.full((9, MAX_ARCS, 2), np.nan)
+    unfilled[[places.index(each) for each in ((1, 1), gap)], 0] = 0.0, 2 * np.pi
+    cells = np.array([[i, i + 1, j, j + 1] for i, j in places], float)
+    section = SectionMap(Proof(cells, unfilled, unfilled.copy(), np.zeros(9, np.int64), np.zeros((9, 4)), 0))
+    enclosed, outside = cavities(section)
+    inner = ((gap[0] + 1) ** 2 - gap[0] ** 2 + 3) * np.pi  # m^3 of the two rings
+    assert [cavity.upper for cavity in enclosed] == ([] if is_open else [pytest.approx(inner)])
+    assert outside.upper == pytest.approx(inner if is_open else 0.0)
+    beyond = section.status(np.array([3.5, 2.5]), np.zeros(2), np.array([2.5, 2.5]))
+    assert beyond.tolist() == [EMPTY, FILLED]
+
+
+@pytest.mark.parametrize(("reached", "share"), [(0.0, 0.5), (1.0, 1.0), (0.25, 0.625)])
+def test_points_that_could_not_be_decided_count_half(reached, share):
+    unfilled, empty = np.full((2, 1, MAX_ARCS, 2), np.nan)
+    unfilled[0, 0] = 0.0, 2 * np.pi
+    proof = Proof(np.array([[0.0, 1.0, 0.0, 1.0]]), unfilled, empty, np.zeros(1, np.int64), np.zeros((1, 4)), 0)
+
+    def search(points):
+        return np.arange(len(points)) < reached * len(points)
+
+    assert estimate_volume(search, proof, 1000, 3).value == pytest.approx(share * np.pi)
+
+
 def test_witnesses_reach_the_middle_of_their_cell(proven):
     robot, section = proven
     arm, proof = section_arm(robot), section.proof

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from er3a.comparison.mechanism import TOLERANCE_DEG, TOLERANCE_MM
 from er3a.errors import Er3aError
 from er3a.files.dh_table import AngleUnit, LengthUnit
 from er3a.pipeline.commands.options import ROBOT_FILES, AsJson, Xacro, app, print_json, print_note
@@ -16,6 +17,8 @@ from er3a.robots.robot import Convention
 if TYPE_CHECKING:
     from er3a.comparison.compare import Comparison
 
+MAX_TOLERANCE = 1000.0  # mm, and deg
+MATCHES_SHOWN = 5  # of a folder
 _ARM = "a D-H table (.csv), a robot's name or file, a URDF or xacro"
 
 
@@ -36,8 +39,8 @@ def compare(
     base: Annotated[str | None, typer.Option(help="the link of the URDF at which the arm begins")] = None,
     tip: Annotated[str | None, typer.Option(help="the link of the URDF at which the arm ends")] = None,
     xacro: Xacro = None,
-    tolerance_mm: Annotated[float, typer.Option(help="lengths that differ by at most this are equal")] = 0.5,
-    tolerance_deg: Annotated[float, typer.Option(help="angles that differ by at most this are equal")] = 0.1,
+    tolerance_mm: Annotated[float, typer.Option(help="lengths that differ by at most this are equal")] = TOLERANCE_MM,
+    tolerance_deg: Annotated[float, typer.Option(help="angles that differ by at most this are equal")] = TOLERANCE_DEG,
     output: Annotated[Path | None, typer.Option(help="write A, corrected to equal B, to this file (.yaml)")] = None,
     html: Annotated[Path | None, typer.Option(help="also write a page")] = None,
     as_json: AsJson = False,
@@ -48,8 +51,8 @@ def compare(
     from er3a.robots.robot import to_modified, to_standard
 
     for option, value in (("--tolerance-mm", tolerance_mm), ("--tolerance-deg", tolerance_deg)):
-        if not 0 < value < 1000:
-            raise Er3aError(f"{option} is {value:g}; give a number above 0")
+        if not 0 < value < MAX_TOLERANCE:
+            raise Er3aError(f"{option} is {value:g}; give a number above 0 and below {MAX_TOLERANCE:g}")
     if output is not None and output.suffix not in (".yaml", ".yml"):
         raise Er3aError(f"--output is '{output}'; robot files end in .yaml")
     options: dict[str, Any] = {"convention": convention, "length_unit": length_unit, "angle_unit": angle_unit}
@@ -96,11 +99,11 @@ def compare(
 
 
 def _print(ranked: list[tuple[str, Comparison]], folder: bool) -> None:
-    """Print the best comparison, layer by layer; for a folder, first the five best matches."""
+    """Print the best comparison, layer by layer; for a folder, first the best matches."""
     from er3a.pipeline.messages.comparison import headline, layer_rows
 
     if folder:
-        for other, each in ranked[:5]:
+        for other, each in ranked[:MATCHES_SHOWN]:
             print(f"{other}: {headline(each)}")
         print()
     print(headline(ranked[0][1]))

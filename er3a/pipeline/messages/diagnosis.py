@@ -191,7 +191,7 @@ TEXTS = texts(
             "({level}) that positions of these points can determine",
         ),
         "more_positions#needed": Plural(
-            "least", "at least {count} more position is needed", "at least {count} more positions are needed"
+            "missing", "at least {count} more position is needed", "at least {count} more positions are needed"
         ),
         "more_positions#request": "{known}; {needed}. Spread them over all joints, for example {examples}.",
         "more_positions#for_entries": "{needed} for {entries:, }",

@@ -16,7 +16,7 @@ OUTCOMES: dict[Outcome, str] = {
     "too fast for the assumed limits": N_("too fast for the assumed limits"),
     "undecided": N_("undecided"),
     "near-singular": N_("near-singular"),
-    "safe": N_("safe"),
+    "safe": N_("safe in the model"),
     "reached": N_("reached"),
     "pass": N_("pass"),
     "caution": N_("caution"),

@@ -125,7 +125,10 @@ TEXTS = texts(
         "bad_guess": by(
             "solved_by",
             other_starts="bad guess: from the start given {miss}; other starts solve it, so allow restarts",
-            without_limits="bad guess: {miss}; ignoring the limits, a solution within them was found: start there",
+            without_limits=(
+                "bad guess: {miss}; a search from there without limits (respect_limits=False) finds a solution within "
+                "them"
+            ),
         ),
         "found_arm": "solution {number}",
         "not_six_turning_joints#revolute": "it has {joints} joints",

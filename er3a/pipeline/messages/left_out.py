@@ -147,7 +147,10 @@ TEXTS = texts(
         "left_out.box_directions": (
             "directions of the box's cone: the arm's joints don't set them all, and those that they don't are not asked"
         ),
-        "left_out.placed_box": "collisions with the box where it is placed",
+        "left_out.placed_box": (
+            "collisions with the box where it is placed, or with its stand: no path, program or target was checked "
+            "with them"
+        ),
     }
 )
 

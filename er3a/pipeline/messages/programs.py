@@ -85,7 +85,7 @@ REMEDIES: dict[str, str] = {
     "line_not_checked": BY_HAND,
     "may_move": BY_HAND,
     "program_not_understood": BY_HAND,
-    "program_not_simulated": N_("Check on the controller what this instruction does to the motions behind it."),
+    "program_not_simulated": N_("Check on the controller what this instruction does to the motions after it."),
     "program_form_inferred": N_("Compare this element with what the controller does."),
     "external_axes_left_out": N_("Check by hand that the external axes stand as assumed."),
     "target_not_given": N_("Give the target in the program or in its data file."),
@@ -606,5 +606,5 @@ def cycle_text(program: ProgramSummary) -> str:
     time = tr("{time} s", time=low) if low == high else tr("{low} to {high} s", low=low, high=high)
     what = tr("one round: {time}", time=time) if cycle.repeats else time
     waits = sentence("programs.waits", count=cycle.waits) if cycle.waits else ""
-    unknown = "" if cycle.complete else tr("without the motions whose path is unknown")
+    unknown = "" if cycle.complete else tr("without motions whose path is unknown or was not checked")
     return joined([what, waits, unknown], ", ")

@@ -148,7 +148,7 @@ def say_all(findings: Iterable[Finding]) -> str:
 
 
 def bracketed(text: str, more: str) -> str:
-    """A text and what stands behind it in brackets, such as a unit; the text alone where that is empty."""
+    """A text, followed by something in brackets, such as a unit; the text alone where that is empty."""
     return sentence("bracketed", text=text, more=more) if more else text
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.pairs import LinkAndSolid, ShapesAssumed
@@ -60,18 +60,6 @@ IF_ASSUMED = "_if_assumed"  # ends the codes of faults against assumed limits
 PACE_MARGIN = 1.01  # by which a slower pace stays below the limits
 
 
-class SoundEnd(NamedTuple):
-    """Where a path may end: time (s), place (mm), how long before a fault (s), and how long a stop there takes (s).
-
-    The last two are None where something comes too near first, from which it is clear by a margin.
-    """
-
-    t_s: float
-    xyz_mm: tuple[float, ...]
-    left_s: float | None = None
-    stop_s: float | None = None
-
-
 TEXTS = texts(
     {
         "trajectory.paths": Plural(
@@ -109,7 +97,7 @@ TEXTS = texts(
         "advice.out_of_reach": "it is out of reach {when}",
         "advice.only": "{way}, as the study requires, does not repair it: {reason}",
         "advice.none": "No avoidance strategy completes this path: {why}",
-        "advice.no_way": "No avoidance strategy works: {reason}",
+        "advice.no_strategy": "No avoidance strategy works: {reason}",
         "advice.slower": (
             "If its speed can't vary along the path, run all of it at {percent:.3g} % of that: duration_s "
             "{needed:.4g} in the path file"
@@ -248,9 +236,9 @@ def path_text(path: model.PathSummary) -> str:
 
 
 def _apart_from_collisions(path: model.PathSummary) -> str:
-    if path.no_way:
+    if path.not_planned:
         shown = sentence("path.shown")
-        return joined([say(path.no_way), shown])
+        return joined([say(path.not_planned), shown])
     if path.unreachable:
         return joined(map(say, path.unreachable))
     if faults := path.out_of_limits or _first_and_worst(path.too_fast):
@@ -366,13 +354,9 @@ def _until_when(part: model.Stretch[RateCause]) -> str:
     return sentence("path.too_fast_until", cause=say(part.cause), end=part.t1_s) if lasts else say(part.cause)
 
 
-def advice(
-    path: model.PathSummary,
-    sound: SoundEnd | None = None,
-    limits: model.LimitsUsed | None = None,
-) -> str | None:
-    """What to do about a path; None where nothing is to be done. ``sound``: where it may end before
-    anything is wrong; ``limits``: of the joints, whose assumed ones are named."""
+def advice(path: model.PathSummary, limits: model.LimitsUsed | None = None) -> str | None:
+    """What to do about a path; None where nothing is to be done. ``limits``: of the joints, whose assumed ones are
+    named."""
     if not path.avoidance:
         return None
     if path.chosen:
@@ -387,24 +371,25 @@ def advice(
     if len(path.avoidance) == 1:
         (only,) = path.avoidance
         if only.name == "planned":
-            no_way = sentence("advice.no_way", reason=reasons(only))
-            return joined([no_way, _until(path, sound)], ". ")
+            none = sentence("advice.no_strategy", reason=reasons(only))
+            return joined([none, _until(path)], ". ")
         parts = {"way": word("advice", ADVICE, only.name), "reason": reasons(only)}
         return sentence("advice.only", **parts)
     none = _within_reach(path) or sentence("advice.none", why=why)
-    return joined([none, _until(path, sound)], ". ")
+    return joined([none, _until(path)], ". ")
 
 
-def _until(path: model.PathSummary, sound: SoundEnd | None) -> str:
+def _until(path: model.PathSummary) -> str:
     """Up to where a path may be run: to the last point with the margin, unless something else is wrong before."""
-    if sound and not (path.clear_until and sound.t_s >= path.clear_until.t_s):
-        return sentence(
-            "advice.sound", t=sound.t_s, xyz=_numbers(sound.xyz_mm, 1), left=sound.left_s, stop=sound.stop_s
-        )
-    return _clear(path)
+    end = path.sound_end
+    if end is None:
+        return ""
+    if path.clear_until and end.t_s >= path.clear_until.t_s:
+        return _clear(path)
+    return sentence("advice.sound", t=end.t_s, **_end(end))
 
 
-def end_text(path: model.PathSummary, end: SoundEnd, assumed: ShapesAssumed | None) -> str:
+def end_text(path: model.PathSummary, end: model.SoundEnd, assumed: ShapesAssumed | None) -> str:
     """That a path may be run to a point of it, and by how much it is clear up to there, if that was measured; of
     ``assumed`` shapes by how much these may be wrong."""
     if path.clear_until:
@@ -416,7 +401,7 @@ def end_text(path: model.PathSummary, end: SoundEnd, assumed: ShapesAssumed | No
     return sentence("advice.end", **_end(end))
 
 
-def _end(end: SoundEnd) -> dict[str, Any]:
+def _end(end: model.SoundEnd) -> dict[str, Any]:
     return {"xyz": _numbers(end.xyz_mm, 1), "left": end.left_s, "stop": end.stop_s}
 
 

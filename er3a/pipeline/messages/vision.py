@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -141,6 +142,7 @@ TEXTS = texts(
             "{count} more only if shapes that no document gives are right ({assumed:, })",
         ),
         "grasp_counts#error": "at the worst grasp 95 % of errors stay below {point_mm:.2g} mm",
+        "grasp_counts#success": "the probability of success is at least {percent:g} %",
         "grasp_counts#simulated": "The camera's samples are simulated.",
         "grasp_counts#left_out": "calibrated without {left_out:, }",
         "grasp_unlikely": (
@@ -275,12 +277,15 @@ def _(found: DirectionContradicted) -> str:
 @say.register
 def _(found: GraspCounts) -> str:
     grasped = say_as(found, "grasped", count=found.objects)
+    percent = None if found.probability is None else math.floor(1000 * found.probability) / 10
+    success = "" if percent is None else say_as(found, "success", percent=percent)
     error = say_as(found, "error") if found.point_mm is not None else ""
     assumed = say_as(found, "assumed", count=len(found.assumed)) if found.assumed else ""
     left = say_as(found, "left_out") if found.left_out else ""
     sentences = [
         grasped if found.objects else "",
         assumed,
+        success,
         error,
         *listed(found.missed),
         left,

@@ -26,8 +26,8 @@ from er3a.robots.robot import Robot
 
 _HERE = Path(__file__).parent
 TEACH = _HERE.with_name("teach")
-MAX_FRAMES, FRAMES_IN_ALL, FEWEST_FRAMES = 240, 6000, 40  # of a motion, of all, and of one among many
-MAX_FACES, FEWEST_CORNERS = 2000, 12  # of an arm, and of a convex piece
+MAX_FRAMES, FRAMES_IN_ALL, MIN_FRAMES = 240, 6000, 40  # of a motion, of all, and of one among many
+MAX_FACES, MIN_CORNERS = 2000, 12  # of an arm, and of a convex piece
 BALL = 24  # corners of each end of a capsule
 SCENE_COLOUR = "#b9a78f"
 COLOURS = {status: VERDICTS[status] for status in ("caution", "fail")}
@@ -127,7 +127,7 @@ def _data(
 ) -> dict[str, Any]:
     size = drawn_size(robot)
     bases = [arm.base[:3, 3] for arm in (robot, *beside)]
-    most = min(MAX_FRAMES, max(FEWEST_FRAMES, FRAMES_IN_ALL // len(motions)))
+    most = min(MAX_FRAMES, max(MIN_FRAMES, FRAMES_IN_ALL // len(motions)))
     return {
         "table": table_data(robot),
         "size": size,
@@ -184,7 +184,7 @@ def drawn_shapes(robot: Robot) -> dict[str, list[dict[str, Any]]]:
     for each in arm_shapes(robot).capsules if visuals else ():
         ball = each.radius * fibonacci_sphere(BALL)
         shapes.append((each.link, np.concatenate([ball + each.start, ball + each.end])))
-    corners = max(FEWEST_CORNERS, MAX_FACES // (2 * len(shapes) or 1))
+    corners = max(MIN_CORNERS, MAX_FACES // (2 * len(shapes) or 1))
     pieces = []
     for link, points in shapes:
         if len(points) > corners:

@@ -22,7 +22,7 @@ const FLAT = 1e-18; // m^3
 const PARALLEL = 1e-14;
 const ENOUGH = 1e-7; // m, to which a depth is found
 const ROUNDING = 1e-13; // m
-const MOST_FACES = 256; // steps
+const MAX_FACES = 256; // steps
 
 /**
  * Distance (m) of two bodies with points `p` and `r` in space, negative by the depth where they overlap: `{distance,
@@ -144,7 +144,7 @@ function overlap(a, p, b, r, simplex) {
     const nearest = faces.reduce((best, face) => (face.away < best.away ? face : best));
     const next = along(nearest.n);
     const ended = dot(next.w, nearest.n) - nearest.away < ENOUGH;
-    if (ended || round === MOST_FACES) {
+    if (ended || round === MAX_FACES) {
       const weights = ofTriangle(...nearest.corners.map((corner) => corner.w));
       const mixed = (key) => nearest.corners.reduce((sum, corner, at) => add(sum, scaled(corner[key], weights[at])), [0, 0, 0]);
       return { distance: -Math.max(0, nearest.away), near: [mixed("onA"), mixed("onB")], deep: !ended };

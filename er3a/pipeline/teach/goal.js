@@ -4,12 +4,12 @@ import { column, cross, dot, norm, scaled, singularValues, subtract, turnedBack 
 import { excesses, inverse } from "er3a/inverse";
 import { frames, POSE, scaledJacobian } from "er3a/kinematics";
 
-const MOST_ITERATIONS = 60;
+const MAX_ITERATIONS = 60;
 const CLOSE = 1e-10; // m in parts of the arm's length, and rad
 const MET = 1e-6; // m
 const PLACE_FIRST = 1e3; // weight of the position where the arm can't follow a whole pose
 const DAMPING = 0.1; // of the squared error
-const LEAST_DAMPING = 1e-13; // of the normal matrix, which is singular where the arm is
+const MIN_DAMPING = 1e-13; // of the normal matrix, which is singular where the arm is
 const LONGEST_STEP = 0.5; // rad
 const [STALLED, PATIENCE] = [0.9, 6]; // the squared error must fall by this factor within so many iterations
 const TYPED_STARTS = 60;
@@ -90,7 +90,7 @@ function descend(goal, T, start) {
   const clamped = (value, k) => (table.continuous[k] ? value : Math.min(table.upper[k], Math.max(table.lower[k], value)));
   let q = start.map(clamped);
   let [mark, since, best] = [Infinity, 0, { size: Infinity }];
-  for (let round = 0; round < MOST_ITERATIONS; round++) {
+  for (let round = 0; round < MAX_ITERATIONS; round++) {
     const now = frames(table, links, q);
     const error = errorOf(T, now.at(-1)).map((value, r) => (weights[r] * value) / (r < 3 ? length : 1));
     const square = inner(error, error);
@@ -104,7 +104,7 @@ function descend(goal, T, start) {
     const gradient = J.map((entries) => inner(entries, error));
     const held = q.map((value, k) => !table.continuous[k] && ((value <= table.lower[k] && gradient[k] < 0) || (value >= table.upper[k] && gradient[k] > 0)));
     const trace = J.reduce((sum, entries) => sum + inner(entries, entries), 0);
-    const damping = DAMPING * Math.min(square, 1) + LEAST_DAMPING * trace;
+    const damping = DAMPING * Math.min(square, 1) + MIN_DAMPING * trace;
     const matrix = J.map((a, i) => J.map((b, j) => (i === j ? inner(a, a) + damping + (held[i] ? 1 : 0) : held[i] || held[j] ? 0 : inner(a, b))));
     const move = solved(matrix, gradient.map((value, k) => (held[k] ? 0 : value)));
     const most = Math.max(LONGEST_STEP, ...move.map(Math.abs)) / LONGEST_STEP;

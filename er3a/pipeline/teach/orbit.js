@@ -7,8 +7,8 @@ const VIEWS = {
   top: { azimuth: -Math.PI / 2, elevation: Math.PI / 2 },
 };
 const DISTANCE = 3.7; // of the eye, in lengths of the arm from axis 2
-const NEAREST = 1.2;
-const FARTHEST = 12;
+const MIN_DISTANCE = 1.2;
+const MAX_DISTANCE = 12;
 const KEY_TURN = Math.PI / 36;
 const KEY_ZOOM = 1.15;
 
@@ -35,7 +35,7 @@ export class Orbit {
   }
 
   zoom(factor) {
-    this.distance = Math.min(FARTHEST * this.length, Math.max(NEAREST * this.length, this.distance * factor));
+    this.distance = Math.min(MAX_DISTANCE * this.length, Math.max(MIN_DISTANCE * this.length, this.distance * factor));
     this.draw();
   }
 

@@ -8,7 +8,7 @@ import { add, column, cross, dot, moved, scaled, subtract, translation, unit } f
 const WORLD = translation(0, 0, 0);
 const LAMP = unit([0.35, -0.55, 0.9]);
 const AMBIENT = 0.55;
-const MOST_PIXELS = 1.6e6; // more can't be painted often enough without a graphics processor
+const MAX_PIXELS = 1.6e6; // more can't be painted often enough without a graphics processor
 const GRID_STEPS = 6; // lines of the floor on each side of the base
 const GHOST = 0.3;
 // Where a word may stand, in its widths and heights from its point: there, beside, at a corner, farther off.
@@ -37,7 +37,7 @@ export class Picture {
   fit() {
     const { clientWidth, clientHeight } = this.canvas;
     this.letters = Number.parseFloat(getComputedStyle(this.canvas).fontSize);
-    const most = Math.sqrt(MOST_PIXELS / Math.max(1, clientWidth * clientHeight));
+    const most = Math.sqrt(MAX_PIXELS / Math.max(1, clientWidth * clientHeight));
     this.ratio = Math.min(window.devicePixelRatio || 1, Math.max(most, 0.5));
     const [width, height] = [clientWidth, clientHeight].map((length) => Math.max(1, Math.round(length * this.ratio)));
     if (this.canvas.width !== width || this.canvas.height !== height) Object.assign(this.canvas, { width, height });

@@ -29,7 +29,7 @@ TIMELINE = "t"
 ARM = "/arm/**"
 LABEL = (200, 90, 0)  # of labels: about as legible on the viewer's dark ground as on its light one
 LABEL_AT = 0.6  # of the axis arrow: off the drum, and short of the next joint
-FARTHEST = 2.5  # of the arm's size from the base: what a view shows at most when it opens
+MAX_DISTANCE = 2.5  # of the arm's size from the base: what a view shows at most when it opens
 AXES = ((255, 80, 80), (80, 200, 80), (110, 130, 255))
 """Colours of a frame's x, y and z."""
 _TAPER = (1.0, 0.92, 0.8, 0.66, 0.55, 0.45)
@@ -56,7 +56,7 @@ def arm_view(
     """
     size, base = size_of(robot), robot.base[:3, 3]
     placed = np.concatenate([*points, skeleton(robot, np.clip(0.0, robot.lower, robot.upper))])
-    placed = np.clip(placed[np.isfinite(placed).all(axis=1)] - base, -FARTHEST * size, FARTHEST * size) + base
+    placed = np.clip(placed[np.isfinite(placed).all(axis=1)] - base, -MAX_DISTANCE * size, MAX_DISTANCE * size) + base
     centre = (placed.min(axis=0) + placed.max(axis=0)) / 2
     distance = 1.2 * max(float(np.ptp(placed, axis=0).max()), 1.1 * size)
     eye = rrb.EyeControls3D(

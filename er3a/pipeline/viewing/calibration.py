@@ -37,7 +37,7 @@ from er3a.robots.joint_limits import meant, size_of
 from er3a.robots.robot import Robot
 
 BINS = 12
-LEAST_IN_BIN = 3
+MIN_IN_BIN = 3
 AXES = ("x", "y", "z")
 MODELS = {"before": N_("before"), "table": N_("robot file"), "model": N_("with terms")}
 
@@ -284,12 +284,12 @@ def _by_joint(robot: Robot, errors: MeasuredErrors) -> Picture:
 
 
 def _binned(ax, values: Reals, left: Reals) -> None:
-    ends = np.unique(np.quantile(values, np.linspace(0, 1, max(1, min(BINS, len(values) // LEAST_IN_BIN)) + 1)))
+    ends = np.unique(np.quantile(values, np.linspace(0, 1, max(1, min(BINS, len(values) // MIN_IN_BIN)) + 1)))
     band = np.clip(np.searchsorted(ends, values, side="right") - 1, 0, max(len(ends) - 2, 0))
     ax.axhline(0, color=MUTED, linewidth=0.8)
     for c, name in enumerate(AXES):
         own = [(values[band == k], left[band == k, c]) for k in range(max(len(ends) - 1, 1))]
-        kept = [(at.mean(), d[np.isfinite(d)]) for at, d in own if np.isfinite(d).sum() >= LEAST_IN_BIN]
+        kept = [(at.mean(), d[np.isfinite(d)]) for at, d in own if np.isfinite(d).sum() >= MIN_IN_BIN]
         if kept:
             at = np.array([middle for middle, _ in kept])
             mean = np.array([d.mean() for _, d in kept])
@@ -300,7 +300,7 @@ def _binned(ax, values: Reals, left: Reals) -> None:
 
 STAGE_NAME = "calibration"
 SECONDS_A_POSE = 0.25
-MOST_SHOWN = 400
+MAX_SHOWN_POSES = 400
 ARROW = 0.1  # of the arm's size: the longest error's arrow
 COLOURS = {"before": REFERENCE, "table": MODEL, "model": HIGHLIGHT}
 NAMES = {"before": "before", "table": "robot file", "model": "with terms"}
@@ -310,7 +310,7 @@ def record_calibration(found: Calibration, errors: MeasuredErrors, output: Path)
     """Write the recording of a calibration: one pose after the other as in the file (400 of them at most), all points
     coloured by their errors, and the errors as curves."""
     robot, models = found.robot, list(errors.differences_mm)
-    rows = np.unique(np.linspace(0, len(errors.q) - 1, min(len(errors.q), MOST_SHOWN)).round().astype(int))
+    rows = np.unique(np.linspace(0, len(errors.q) - 1, min(len(errors.q), MAX_SHOWN_POSES)).round().astype(int))
     times, texts = SECONDS_A_POSE * np.arange(len(rows), dtype=float), [_now(errors, int(k)) for k in rows]
     distances = np.stack([errors.distances_mm(model)[rows] for model in models], axis=1)
     run = Run(

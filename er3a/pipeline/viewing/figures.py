@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from matplotlib.typing import RcKeyType
 
 PANELS = 4  # side by side, of curves of many paths
-MOST_STEPS = 16  # a colour map of few colours stands for whole numbers or classes
+MAX_STEPS = 16  # a colour map of few colours stands for whole numbers or classes
 NUMBER = re.compile(r"[-−]?[\d.]*(e\d+)?")
 
 
@@ -79,7 +79,7 @@ def _axes(i: int, ax: Axes, others: list[Axes]) -> dict[str, Any]:
             "box": _box(bar.ax),
             "upright": upright,
             "scale": _scale(bar.ax.yaxis if upright else bar.ax.xaxis, []),
-            "steps": bar.cmap.N if bar.cmap.N <= MOST_STEPS else 0,
+            "steps": bar.cmap.N if bar.cmap.N <= MAX_STEPS else 0,
         }
     return found
 

@@ -42,9 +42,11 @@ from er3a.pipeline.messages.validation import (
     unconfirmed,
 )
 from er3a.pipeline.messages.workspace import box_text, judged_void, void_text
+from er3a.pipeline.player.motions import Fault
 from er3a.pipeline.results import (
     AbsentResults,
     Input,
+    NoPass,
     Provenance,
     Stored,
     input_records,
@@ -53,13 +55,14 @@ from er3a.pipeline.results import (
     read_status,
     result_records,
 )
+from er3a.pipeline.stages.expectations import unmet_expectations
 from er3a.pipeline.stages.programs.model import ProgramsResults, ProgramSummary
 from er3a.pipeline.stages.programs.played import faults as program_faults
 from er3a.pipeline.stages.registry import STAGES, all_messages
 from er3a.pipeline.stages.trajectory.model import PathSummary, TrajectoryResults
 from er3a.pipeline.stages.trajectory.played import faults as path_faults
 from er3a.pipeline.stages.validation.model import AnotherArm, Contradicted, DefinedOtherwise, LeftOpen, PartFound
-from er3a.pipeline.stages.workspace.model import VoidSummary, WorkspaceResults, WorkspaceSummary
+from er3a.pipeline.stages.workspace.model import PlacementSummary, VoidSummary, WorkspaceResults, WorkspaceSummary
 from er3a.pipeline.study import Study
 from er3a.pipeline.sweeps import ENTRIES, entry_label
 from er3a.pipeline.verdicts import NOT_EXAMINED, StageVerdict, read_verdicts
@@ -478,7 +481,7 @@ OF_ALL_RUNS = (  # what may turn any of them unsafe
     *("obstacles", "uncovered_links", "bare_tool", "base_inside", "allowed_contacts", "program_rest", "given_rates"),
     *("controller_language", "tool", "carried", "torques"),
 )
-MOST_FAULTS = 20  # of a robot's paths, and of its programs, that are listed
+MAX_FAULTS = 20  # of a robot's paths, and of its programs, that are listed
 PLACE_LETTERS = 160
 VOID_TAGS = ("br", "img", "input", "wbr", "hr")
 _NOT_READ = re.compile(r'<(script|style)\b.*?</\1>|\ssrc="data:[^"]*"|\sdata-[\w-]+="[^"]*"', re.DOTALL)
@@ -505,7 +508,7 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         questions={stage.name: stage.question for stage in STAGES.values()},
         shown_figures=SHOWN_FIGURES,
         run_words=RUNS,
-        most_faults=MOST_FAULTS,
+        most_faults=MAX_FAULTS,
         sweeps=sweep_sections(study, results),
         command=page.run_command(study, "index.html"),
         provenance=Provenance(
@@ -588,6 +591,7 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
     finding = heads["validation"].finding if "validation" in heads else None
     same_arm, instead = isinstance(finding, DefinedOtherwise), alternative_table(study, name, results.parent)
     unproven, settled = _settled(finding)
+    passes = _passes({stage: each for stage, each in stored.items() if heads[stage].status != "not_computed"})
     return {
         "robot": robot,
         "table": table,
@@ -596,7 +600,7 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         "decision": decision(table, [*failed.values()], instead, unproven=unproven, same_arm=same_arm),
         "settled": settled,
         "instead": {instead: f"#{instead}"} if instead else {},
-        "answers": [*_answers(heads, robot)],
+        "answers": [*_answers(heads, robot, passes)],
         "notes": {stage: _note(stage, head, stored[stage].results) for stage, head in heads.items()},
         "bare": any(
             _misses(heads[stage], "carried") or _misses(heads[stage], "tool") for stage in RUNS if stage in heads
@@ -608,12 +612,7 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
             if stage in stored and heads[stage].status != "not_computed"
         ],
         "condition": _condition(_parts(heads), getattr(finding, "unbounded", ())),
-        "box": tr(
-            "These pass without the tray or box and its stand: put both into the study's scene file and run again "
-            "before you run any of them there."
-        )
-        if _puts_box(heads)
-        else "",
+        "box": joined([_without_box(), passes.text], " ") if passes else "",
         "shapes": next(
             (say(replace(shapes, near=())) for shapes in (head.shapes for head in heads.values()) if shapes), ""
         ),
@@ -659,14 +658,14 @@ def _settled(finding: object) -> tuple[bool, str]:
     return part is not None and not (part.settled or part.up_to_signs), said
 
 
-def _answers(heads: Mapping[str, Head], robot: Robot) -> Iterator[tuple[str, str, str]]:
+def _answers(heads: Mapping[str, Head], robot: Robot, passes: _Passes | None) -> Iterator[tuple[str, str, str]]:
     """What is asked of an arm first: the question, its answer and where it is shown."""
     workspace = heads["workspace"].summary if "workspace" in heads else None
     if workspace:
         box = box_text(workspace)
         if box and _misses(heads["workspace"], "tool"):
             box = joined([box, tr("No tool is given: the tool point is the flange's centre.")], " ")
-        yield tr("Tray or box"), box, "workspace.html#placement"
+        yield tr("Tray or box"), joined([box, passes.short if passes else ""], " "), "workspace.html#placement"
     summary = heads["dynamics"].summary if "dynamics" in heads else None
     yield tr("Payload"), payload_text(summary, robot), "dynamics.html#payload" if summary else ""
     if workspace:
@@ -692,10 +691,105 @@ def _misses(head: Head, subject: str) -> bool:
     return any(each.subject == subject for each in head.summary.not_examined)
 
 
-def _puts_box(heads: Mapping[str, Head]) -> bool:
-    """Whether a place for the study's box is named, of which paths and programs know nothing."""
-    placement = getattr(heads["workspace"].summary, "placement", None) if "workspace" in heads else None
-    return bool(getattr(placement, "named_places", ()))
+@dataclass(frozen=True)
+class _Passes:
+    """The tool points that pass through the box where it is proposed, or through what it stands on.
+
+    Attributes
+    ----------
+    through : per stage the first time (s) by name
+    unseen : names of paths and programs whose tool points are not known, or not all
+    """
+
+    through: Mapping[str, Mapping[str, float]]
+    unseen: tuple[str, ...]
+
+    @property
+    def short(self) -> str:
+        """How many there are."""
+        if not self.through:
+            return tr("No path or program was compared with its place.")
+        counts = [
+            tr("{count} of the {what}", count=len(found), what=tr(RUNS[stage]))
+            for stage, found in self.through.items()
+            if found
+        ]
+        if not counts:
+            return ""
+        return tr("The tool point passes through it or its stand in {runs}.", runs=joined(counts, ", "))
+
+    @property
+    def text(self) -> str:
+        """Which, and from when on."""
+        if not self.through:
+            return ""
+        named = [
+            tr("{name} (from {t} s)", name=name, t=f"{t:.2f}")
+            for each in self.through.values()
+            for name, t in each.items()
+        ]
+        said = [
+            tr("Their tool points pass through the box or its stand: {names}.", names=joined(named, ", "))
+            if named
+            else tr("No tool point of these was found in the box or its stand."),
+            tr(
+                "Only tool points were compared, straight between the stored times; links and the tool's body were not."
+            ),
+        ]
+        if self.unseen:
+            said.append(tr("Not compared, or not all of it: {names}.", names=joined(self.unseen, ", ")))
+        return joined(said, " ")
+
+
+def _passes(stored: Mapping[str, Stored[Any]]) -> _Passes | None:
+    """What passes through the box of the study where the workspace stage puts it; None if it puts none."""
+    placement = getattr(stored["workspace"].results.summary, "placement", None) if "workspace" in stored else None
+    if not isinstance(placement, PlacementSummary) or not placement.named_places:
+        return None
+    centre, half = (1000 * np.array(each) for each in (placement.best.centre_m, placement.best.size_m))
+    low, high = centre - half / 2, centre + half / 2
+    if placement.stand is None and placement.over:
+        low[2] = min(low[2], 1000 * placement.over.height_m)
+    through, unseen = dict[str, dict[str, float]](), list[str]()
+    for stage in (name for name in RUNS if name in stored):
+        results = stored[stage].results
+        programs = isinstance(results, ProgramsResults)
+        names, motion = (results.motion.program, results.motion) if programs else (results.checks.path, results.checks)
+        followed = results.summary.programs if programs else results.summary.paths
+        through[stage] = {}
+        for name in (each.name for each in followed):
+            rows = motion.take(names == name)
+            first = first_inside(rows.t_s, rows.xyz_mm, low, high)
+            if first is not None:
+                through[stage][name] = first
+            if len(rows) < 2 or not np.isfinite(rows.xyz_mm).all():
+                unseen.append(name)
+        unseen += [each.name for each in getattr(results.summary, "not_followed", ())]
+    return _Passes(through, tuple(unseen))
+
+
+def first_inside(t: Reals, points: Reals, low: Reals, high: Reals) -> float | None:
+    """When a point that moves straight from each of ``points`` (n, 3) at ``t`` (n,) to the next enters a box first.
+
+    ``low``, ``high``: (3,), the box's corners. None if it never does.
+    """
+    way = np.diff(points, axis=0, append=points[-1:])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ends = np.stack([low - points, high - points]) / way
+    ends = np.sort(np.where(np.isnan(ends), [[[-np.inf]], [[np.inf]]], ends), axis=0)  # 0/0: along a face
+    enters, leaves = np.maximum(ends[0].max(axis=1), 0), np.minimum(ends[1].min(axis=1), 1)
+    (hits,) = np.nonzero((enters <= leaves) & np.isfinite(points + way).all(axis=1))
+    if not len(hits):
+        return None
+    row = hits[0]
+    return float(t[row] + enters[row] * (t[min(row + 1, len(t) - 1)] - t[row]))
+
+
+def _without_box() -> str:
+    return tr(
+        "These pass without the tray or box and its stand: put both into the study's scene file and run again before "
+        "you run any of them there."
+    )
 
 
 def _condition(parts: Sequence[PartFound], unbounded: Sequence[str]) -> str:
@@ -713,6 +807,7 @@ def _run(stage: str, results: TrajectoryResults | ProgramsResults) -> dict[str, 
         followed, lost, faults = results.summary.programs, 0, program_faults(results)
     else:
         followed, lost, faults = results.summary.paths, len(results.summary.not_followed), path_faults(results)
+    faults += _otherwise(stage, followed, {fault.name for fault in faults})
     faulty = {fault.name for fault in faults}
     sound = [each.name for each in followed if each.name not in faulty]
     left_out = [left_out_text(each) for each in results.summary.not_examined if each.subject in OF_ALL_RUNS]
@@ -723,8 +818,30 @@ def _run(stage: str, results: TrajectoryResults | ProgramsResults) -> dict[str, 
         "sound": sound,
         "faults": faults,
         "open": left_out,
+        "no_pass": say(NoPass(missed)) if (missed := results.summary.verdict.missed) else "",
         "more": len(results.summary.not_examined) - len(left_out),
     }
+
+
+def _otherwise(stage: str, followed: Sequence[ProgramSummary | PathSummary], faulty: set[str]) -> list[Fault]:
+    """Those that pass although their file expects something else: file or check is not what it is taken for."""
+    unmet = unmet_expectations(followed)
+    return [
+        Fault(
+            each.name,
+            "",
+            "fail",
+            tr("not as expected"),
+            False,
+            "",
+            say(each),
+            "",
+            f"{stage}.html#{each.name}",
+            first=say(each),
+        )
+        for each in (unmet.unmet if unmet else ())
+        if each.name not in faulty
+    ]
 
 
 def _note(stage: str, head: Head, results: Any) -> str:

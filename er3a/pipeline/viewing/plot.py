@@ -19,7 +19,7 @@ from er3a.robots.joint_limits import size_of
 from er3a.robots.robot import Robot
 
 TOOL_AXES = ("#b42318", "#18794e", "#0b5c94")
-MOST_FRAMES = 200
+MAX_FRAMES = 200
 AXES_LENGTH = 0.12  # of the tool's axes, in parts of the arm's size
 
 
@@ -50,7 +50,7 @@ def plot(robot: Robot, q: Reals, seconds: float = 5.0, window: Sequence[float] |
     if values.ndim not in (1, 2) or values.shape[-1] != robot.joints or not len(values):
         raise ShapeError("q", values.shape, f"({robot.joints},) or (N, {robot.joints})")
     motion = values if values.ndim == 2 else values[None]
-    motion = motion[np.unique(np.linspace(0, len(motion) - 1, MOST_FRAMES).round().astype(int))]
+    motion = motion[np.unique(np.linspace(0, len(motion) - 1, MAX_FRAMES).round().astype(int))]
     figure = pyplot.figure()
     axes: Any = figure.add_subplot(projection="3d")
     trail = forward(robot, motion)[:, :3, 3]

@@ -178,7 +178,9 @@ def _bends(segment: avoidance.SingularSegment, first: int, last: int, kind: Kind
     span = max(0.0, top - half), top, min(1.0, top + half)
     slot = int(segment.followed.slot[np.searchsorted(segment.followed.t, t[first - 1])])
     singular = _nearest_type(segment, first, worst)
-    bends = [_least(segment, slot, singular, span, way) for way in _directions(segment, slot, singular, top, kind)]
+    bends = [
+        _smallest_bend(segment, slot, singular, span, way) for way in _directions(segment, slot, singular, top, kind)
+    ]
     return [bend for bend in bends if bend is not None]
 
 
@@ -242,7 +244,7 @@ def _beside(segment: avoidance.SingularSegment, T: Reals, slot: int, singular: S
     return apart
 
 
-def _least(
+def _smallest_bend(
     segment: avoidance.SingularSegment,
     slot: int,
     singular: SingularityType,

@@ -136,7 +136,7 @@ def statement(
     try:
         reading.read()
     except MisreadError as error:
-        if reading.words.texts[0] in ("FOR", "CASE"):  # without which the lines behind would mean something else
+        if reading.words.texts[0] in ("FOR", "CASE"):  # without which the next lines would mean something else
             problem = f"this {reading.words.texts[0]} can't be read ({error})"
             raise fault(place, problem, "Write FOR i=1 TO 9, or CASE 1, 2") from None
         builder.unread(place, text, not inside_data, folds=True)

@@ -25,7 +25,7 @@ ARC_FORMS = ("MOVEC", "TRIGGC", "SEARCHC")
 SLOWEST_RAMP = 20.0  # percent; 1 AccSet: smaller values count as 20
 FULL_SPEED = 5000.0  # mm/s, of VelSet where a program sets none
 SETTINGS = ("CONFJ", "CONFL", "ACCSET", "VELSET", "PDISPSET", "PDISPON", "PDISPOFF", "PATHACCLIM", "WORLDACCLIM")
-"""Instructions that motions behind them depend on, and that are followed."""
+"""Instructions that later motions depend on, and that are followed."""
 MODAL = ("%CONFJ", "%CONFL", "%ACC", "%SPEED", "%PDISP", "%PATHACCLIM", "%WORLDACCLIM", "%GRIPLOAD")
 OUTPUTS = frozenset(
     (
@@ -160,8 +160,8 @@ class RapidDialect(Dialect):
         if len(placed) < targets + 3:
             unknown = instructions.UnresolvedTarget(move.text, "not_understood")
             return instructions.ArmMotion(kind, unknown, form, unknown if arc else None)
-        behind = form.startswith("TRIGG")
-        zone_at, tool_at = (-2, -1) if behind else (targets + 1, targets + 2)
+        at_end = form.startswith("TRIGG")
+        zone_at, tool_at = (-2, -1) if at_end else (targets + 1, targets + 2)
         values = [UNCLEAR if each is None else memory.value(each) for each in placed]
         tool, stationary = _tool(memory, placed[tool_at], values[tool_at])
         wobj = dict(move.settings).get("WOBJ")

@@ -81,7 +81,7 @@ NOT_SIMULATED = frozenset(NOT_SIMULATED_TEXT.split())
 """What is known to shape a motion or to move something else, and is not followed: it is named."""
 UPPER, ARITHMETIC, TYPED, STEP, LATE = "%UPPER", "%ARITHMETIC", "%TYPED", "%STEP", "%LATE"
 PASSING = "%PASSING"
-"""Whether the arm may not be at the last target yet, as behind a motion with a zone: the program goes on before."""
+"""Whether the arm may not be at the last target yet, as after a motion with a zone: the program goes on before."""
 ARRIVING = frozenset(("INPOS", "ZEROSPEED"))
 """Options of waits that end where the arm stands still."""
 LEAVING = ("STOPMOVE", "STARTMOVE", "STARTMOVERETRY", "RESTOPATH", "CLEARPATH")

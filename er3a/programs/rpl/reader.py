@@ -323,7 +323,7 @@ def _block(builder: CodeBuilder, place: Place, text: str, first: str) -> bool:
 
 def _until(text: str, end: str, place: Place) -> str:
     if not text.upper().endswith(end):
-        raise fault(place, f"'{text[:60]}' lacks {end}", f"Write {end} behind it")
+        raise fault(place, f"'{text[:60]}' lacks {end}", f"Write {end} after it")
     return text[: -len(end)].strip()
 
 

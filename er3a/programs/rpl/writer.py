@@ -23,6 +23,7 @@ DIGITS = 6
 PERCENTS = (1, 2, 5, 10, 15, 20, 25, 30, 40, 50, 60, 70, 75, 80, 90, 100)
 SPEEDS_MM_S = (5, 10, 20, 30, 40, 50, 60, 80, 100, 150, 200, 300, 400, 500, 600, 800, 1000, 1500, 2000)
 ZONES_MM = (1, 5, 10, 15, 20, 30, 40, 50, 60, 80, 100, 150, 200)
+MIN_CHORD_ZONE, MAX_CHORD_ZONE = 0.001, 0.2  # m, of the zones between the chords of an arc
 USUAL_JOINT, USUAL_LINE = "v50perc", "v100"
 
 
@@ -142,7 +143,7 @@ class RplWriter(Writer):
         self.count["chords"] += len(targets)
         speed = self._speed(ready)
         longest = (ready.length or 0.0) / len(targets) / 2
-        passing = Zone("distance", min(max(longest, 0.001), 0.2))
+        passing = Zone("distance", min(max(longest, MIN_CHORD_ZONE), MAX_CHORD_ZONE))
         for i, target in enumerate(targets):
             zone = motion.zone if i == len(targets) - 1 else passing
             self._move("mlin", target, motion, speed, zone)

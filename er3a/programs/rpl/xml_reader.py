@@ -328,11 +328,11 @@ def _with_sides(elements: list[XmlNode]) -> Iterator[tuple[XmlNode, list[tuple[s
     """Elements of a body; an ``if`` with its sides, which the ``elsif`` and ``else`` after it are among."""
     at = 0
     while at < len(elements):
-        first, behind = elements[at], at + 1
-        while behind < len(elements) and elements[behind].tag in OTHER_SIDES:
-            behind += 1
-        sides = _sides(first, elements[at + 1 : behind]) if first.tag == "if" else []
-        at = behind if sides else at + 1
+        first, end = elements[at], at + 1
+        while end < len(elements) and elements[end].tag in OTHER_SIDES:
+            end += 1
+        sides = _sides(first, elements[at + 1 : end]) if first.tag == "if" else []
+        at = end if sides else at + 1
         yield first, sides
 
 

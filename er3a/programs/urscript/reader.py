@@ -39,7 +39,7 @@ LONGEST_STATEMENT = 500  # lines
 THREAD = "%thread"
 """What a variable holds that a thread was started with, as a function."""
 CHANGED = "%changed"
-"""What a list is behind a method that changes it, as a function of itself, the method's name and its arguments."""
+"""What a list is after a method changed it, as a function of itself, the method's name and its arguments."""
 LIST_METHODS = frozenset(("append", "clear", "extend", "insert", "pop", "remove", "sort"))
 
 

@@ -90,10 +90,10 @@ def path_clearances(
                 to_mm=near[:, 1] * 1000,
             )
         )
-        least = along.least
-        if least >= 0 and pair[least] >= 0:
-            about = (entry.name, "path", float(along.t[least]))
-            closest.append(_closest(bodies, about, q[least], along.distance[least], pair[least]))
+        at = along.closest
+        if at >= 0 and pair[at] >= 0:
+            about = (entry.name, "path", float(along.t[at]))
+            closest.append(_closest(bodies, about, q[at], along.distance[at], pair[at]))
     return model.PathClearances.stacked(tables).of_joints(bodies.robot.slides), closest
 
 

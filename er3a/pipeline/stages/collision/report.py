@@ -29,13 +29,13 @@ from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, LINK, MODEL, MUTED, RE
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
-MOST_PAIRS = 12
+MAX_PAIRS = 12
 LOST, CLEAR, JOINED = 0, 1, 2
 
 
 def by_pair(pairs: model.PairShares) -> Picture | None:
     """How much of joint space each pair takes; None where none takes any."""
-    shown = pairs.take(np.flatnonzero(pairs.ratio > 0)[:MOST_PAIRS])
+    shown = pairs.take(np.flatnonzero(pairs.ratio > 0)[:MAX_PAIRS])
     if not len(shown):
         return None
     figure, ax = new_figure(width=9.0, height=0.8 + 0.28 * len(shown))
@@ -172,7 +172,7 @@ def closest_pair(robot: Robot, found: model.Closest) -> Picture:
 
 
 NO_BREAK_SPACE = "\u00a0"
-MOST_ROWS = 100  # of a table of targets and paths
+MAX_ROWS = 100  # of a table of targets and paths
 
 
 def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -> None:
@@ -195,8 +195,8 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
         clearance=clearance_over_time(results),
         player=player(robot, motions(robot, results), scene),
         drawing_head=drawing_head(),
-        closest=[_closest(found) for found in closest[:MOST_ROWS]],
-        rows_left_out=max(len(closest), len(set(results.targets.target))) - MOST_ROWS,
+        closest=[_closest(found) for found in closest[:MAX_ROWS]],
+        rows_left_out=max(len(closest), len(set(results.targets.target))) - MAX_ROWS,
         nearest=closest_pair(robot, nearest) if nearest else None,
         mounting=[_mounted(contact.solid, contact.depth_mm, contact.inside) for contact in summary.mounting],
     )
@@ -245,7 +245,7 @@ def _targets(rows: model.TargetClearances) -> list[list[str]]:
     names, first, group = np.unique(rows.target.astype(str), return_index=True, return_inverse=True)
     most = np.full(len(names), -np.inf)
     np.maximum.at(most, group, rows.clearance_mm)
-    kept = np.argsort(most, kind="stable")[:MOST_ROWS]
+    kept = np.argsort(most, kind="stable")[:MAX_ROWS]
     found = []
     for name in names[kept[np.argsort(first[kept])]]:
         own = rows.take(rows.target == name)

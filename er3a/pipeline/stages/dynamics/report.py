@@ -128,7 +128,7 @@ def diagram_figure(summary: model.DynamicsSummary, rows: model.DiagramRows) -> P
     return Picture(figure, tr("The load diagram: one curve for each mass."), caption)
 
 
-MOST_USES = 12
+MAX_USES = 12
 NONE = "–"
 
 
@@ -151,8 +151,8 @@ def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) ->
         findings=listed(summary.findings),
         unknown=listed(summary.unknown),
         links=_links(summary),
-        uses=[_use(use) for use in summary.uses[:MOST_USES]],
-        more_uses=max(0, len(summary.uses) - MOST_USES),
+        uses=[_use(use) for use in summary.uses[:MAX_USES]],
+        more_uses=max(0, len(summary.uses) - MAX_USES),
         motors=[_motor(motor) for motor in summary.motors],
         paths=[_path(path) for path in summary.paths if path.counts],
         not_run=[_not_run(path) for path in summary.paths if not path.counts],

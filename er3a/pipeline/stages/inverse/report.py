@@ -341,7 +341,7 @@ def _shape_word(label: str, branch: int) -> str:
 NO_BREAK_SPACE = "\u00a0"
 
 
-MOST_SELF_MOTIONS = 6
+MAX_SELF_MOTIONS = 6
 
 
 def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> None:
@@ -474,9 +474,9 @@ def _rule_rows(ranked: model.RankingRows, rules: list[str]) -> list[list[str]]:
 
 def _self_motions(robot: Robot, families: tuple[model.SelfMotion, ...]) -> list[str]:
     """The nearest self-motions, and how many more there are."""
-    texts = [_self_motion(robot, family) for family in families[:MOST_SELF_MOTIONS]]
-    if len(families) > MOST_SELF_MOTIONS:
-        texts.append(tr("{count} more in summary.json", count=len(families) - MOST_SELF_MOTIONS))
+    texts = [_self_motion(robot, family) for family in families[:MAX_SELF_MOTIONS]]
+    if len(families) > MAX_SELF_MOTIONS:
+        texts.append(tr("{count} more in summary.json", count=len(families) - MAX_SELF_MOTIONS))
     return texts
 
 

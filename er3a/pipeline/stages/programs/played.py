@@ -108,7 +108,7 @@ def line_id(program: str, line: int) -> str:
 
 
 def when(each: FindingAt) -> float:
-    """When a finding begins, s; behind all others where that is not known."""
+    """When a finding begins, s; after all others where that is not known."""
     return next((time for time in (each.program_s, each.motion_s) if time is not None), np.inf)
 
 

@@ -22,7 +22,7 @@ from er3a.pipeline.viewing.recording import Curves, Logged, Run, escaped, record
 from er3a.program_check.program_check_findings import Level
 from er3a.programs.languages import LANGUAGES
 
-AROUND = 4  # lines of the listing before and behind the one that is carried out
+AROUND = 4  # lines of the listing before and after the one that is carried out
 COLOURS: dict[str, str] = {**VERDICTS, "note": VERDICTS["pass"]}
 NOTE = """# {title}: programs
 {findings}

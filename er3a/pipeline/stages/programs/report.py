@@ -32,7 +32,7 @@ from er3a.pipeline.viewing.page import render_stage
 from er3a.program_check.program_check_findings import Level, worst_of
 from er3a.programs.languages import LANGUAGES
 
-MOST_LINES = 400  # of a listing that the page shows
+MAX_LINES = 400  # of a listing that the page shows
 AROUND = 3  # lines around those with motions or findings, in a longer listing
 
 
@@ -108,10 +108,10 @@ def _listing(
     if len(text) and not text.text[-1]:  # the end of the last line
         text = text.take(np.arange(len(text) - 1))
     kept = set(range(1, len(text) + 1))
-    if len(text) > MOST_LINES:
+    if len(text) > MAX_LINES:
         heaviest = {line: min(map(weight, here)) for line, here in found.items()}
         urgent = sorted({*moves, *found}, key=lambda line: heaviest.get(line, (1, line)))
-        marked = urgent[: MOST_LINES // (2 * AROUND + 1)]
+        marked = urgent[: MAX_LINES // (2 * AROUND + 1)]
         kept = {line + k for line in marked for k in range(-AROUND, AROUND + 1)} & kept
     lines: list[dict[str, Any]] = []
     skipped = False

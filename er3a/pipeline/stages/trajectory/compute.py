@@ -108,7 +108,7 @@ class AvoidanceTask:
                     replace(segment, limits=self._no_more_than(found), allowed=self.limits), self.only
                 )
         collides = bool(along.contacts)
-        if (collides or found.beyond or found.limits) and motion.no_way is None and self.only in (None, "planned"):
+        if (collides or found.beyond or found.limits) and motion.not_planned is None and self.only in (None, "planned"):
             results += self._planned(motion)
         margin, name = self._margin_of(along), motion.entry.name
         met = {result.name: self._meets(result.cost, margin) for result in results if result.cost}
@@ -321,7 +321,7 @@ def path_summary(
         velocity_check_deg_s=float(np.degrees(found.velocity_check)),
         collisions=_stretches(motion, contacts),
         clearance=judgement.min_clearance(along),
-        no_way=motion.no_way,
+        not_planned=motion.not_planned,
         fastest_s=avoided.fastest_s,
         avoidance=avoided.tried,
         strategy=avoided.chosen,
@@ -365,8 +365,8 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
     """Compute the trajectory stage of a robot."""
     robot, settings = study.robot(name), study.section(TrajectorySettings)
     file = Path(study.entry(name).paths)
-    thresholds = model.NearThresholds(settings.near_wrist_deg, settings.near_elbow_deg, settings.near_shoulder_mm)
     required, limits = proof_requirements(robot, settings), limits_of(robot, settings)
+    used = _limits_used(robot, limits, settings)
     near, scene = required.near, study.scene(name, "trajectory")
     surroundings = judgement.Surroundings(Bodies(robot, scene), settings.penetration_tolerance_mm / 1000)
     only = None if settings.avoidance == "compare" else settings.avoidance
@@ -386,9 +386,8 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
         motion = each.motion
         rest += each.left_out if each.expect in (None, "safe") else ()
         if motion is None:
-            stops = each.ends.t if each.ends else None
-            lacking, outcome = wrist_partition_missing(robot), each.outcome_unfollowed
-            skipped.append(model.PathNotFollowed(each.name, each.title, lacking, outcome, each.expect, stops))
+            known = each.outcome_unfollowed, each.expect, each.ends.t if each.ends else None
+            skipped.append(model.PathNotFollowed(each.name, each.title, wrist_partition_missing(robot), *known))
             continue
         turned += _asked_of_tool(each.name, motion) if each.expect in (None, "safe") else ()
         found = judgement.judge(robot, motion, near, limits)
@@ -398,26 +397,27 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
         clearances.append(judgement.clearance_rows(each.name, along))
         strategies.append(avoided.rows)
         last = judgement.clear_until(surroundings, motion, found, along, margin)
-        paths.append(replace(path_summary(robot, motion, found, along, avoided, limits), clear_until=last))
+        path = replace(path_summary(robot, motion, found, along, avoided, limits), clear_until=last)
+        paths.append(replace(path, sound_end=judgement.sound_end(path, tables[-1], used)))
         repair = avoided.rows.take(avoided.rows.strategy == (avoided.chosen or ""))
-        close = near_assumed_shapes(robot, each.name, paths[-1].clearance, settings.assumed_margin_mm)
+        close = near_assumed_shapes(robot, each.name, path.clearance, settings.assumed_margin_mm)
         asked = settings.programs, settings.write_unsafe
-        verdict, speed = paths[-1].verdict, limits.speed
-        programs.append(program_files(robot, motion, verdict, *asked, near=close, repaired=repair, speed=speed))
+        made = program_files(robot, motion, path.verdict, *asked, near=close, repaired=repair, speed=limits.speed)
+        programs.append(made)
     checks = model.PathChecks.stacked(tables).of_joints(robot.slides)
     own = checks.take(checks.sample)
-    length, used = characteristic_length(robot), _limits_used(robot, limits, settings)
-    least = {
+    length = characteristic_length(robot)
+    clearance = {
         path.name: path.clearance.least_mm / 1000 for path in paths if path.clearance and path.expect in (None, "safe")
     }
-    assumed_shapes = shapes_assumed(robot, assumed_margin, least)
+    assumed_shapes = shapes_assumed(robot, assumed_margin, clearance)
     summary = model.TrajectorySummary(
         verdict=_verdict(paths, skipped, assumed_shapes)
         .without(surroundings.bodies.unexamined)
         .resting_on(assumed_shapes),
         figures=_figures(paths, length, used, assumed_shapes),
         characteristic_length_m=length,
-        near=thresholds,
+        near=model.NearThresholds(settings.near_wrist_deg, settings.near_elbow_deg, settings.near_shoulder_mm),
         joint_limits=used,
         scene=scene.title if scene else None,
         penetration_tolerance_mm=settings.penetration_tolerance_mm,

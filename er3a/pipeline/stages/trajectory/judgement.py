@@ -29,6 +29,10 @@ ASSUMED = (motion_faults.TooFastIfAssumed, motion_faults.AccelerationTooGreatIfA
 STEPS_TO_CONTACT, ATTEMPTS = 1000, 5
 BEFORE_STOP = 0.99  # of the time until limits or reach are left
 SPEED_STEP = 1e-5  # share of the duration
+LIMIT_MARGIN = 2.0  # deg (mm of a prismatic joint), between an advised end and a joint limit that the path leaves later
+REACH_MARGIN = 0.02  # m of the path before it leaves the reach
+SPEED_MARGIN = 0.9  # of a joint's speed limit
+STOPS = 2.0  # times the time that the joints take to stop, left before the first fault
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +95,7 @@ def judge(robot: Robot, motion: Motion, near: NearSingular, limits: JointLimits)
     return Judgement(
         **vars(found) | ({} if bounded else {"max_rates": None}),
         verdict="none found"
-        if motion.no_way
+        if motion.not_planned
         else _verdict(found, bool(beyond), bool(jumps), motion.followed is not None),
         beyond=beyond,
         times=times,
@@ -235,10 +239,10 @@ def outcomes_of(found: Judgement, along: ClearanceAlong) -> tuple[PathVerdict, .
 
 def min_clearance(along: ClearanceAlong) -> model.MinClearance | None:
     """Where the arm comes nearest to anything; None where nothing could be measured."""
-    least = along.least
-    if least < 0 or (pair := along.pair[least]) is None:
+    at = along.closest
+    if at < 0 or (pair := along.pair[at]) is None:
         return None
-    return model.MinClearance(float(along.distance[least] * 1000), float(along.t[least]), pair, along.measured)
+    return model.MinClearance(float(along.distance[at] * 1000), float(along.t[at]), pair, along.measured)
 
 
 def clear_until(
@@ -271,10 +275,10 @@ def clear_until(
     end = min([first, *(BEFORE_STOP * stop for stop in stops)])
     for _ in range(ATTEMPTS):
         grid = np.linspace(0.0, end, STEPS_TO_CONTACT + 1)
-        least = beyond(grid)
-        if not least[0] > 0:
+        spare = beyond(grid)
+        if not (end > 0 and spare[0] > 0):
             return None
-        k = int(np.argmax(least <= 0))
+        k = int(np.argmax(spare <= 0))
         if k > 0:
             end = scipy.optimize.brentq(lambda t: beyond(np.array([t]))[0], grid[k - 1], grid[k], xtol=1e-9 * first)
         known = np.append(motion.t[motion.t < end], end)
@@ -297,6 +301,38 @@ def clear_until(
         tuple(np.degrees(rpy_of(pose)).tolist()),
         tuple(shown(robot, q[0]).tolist()),
         tuple((1000 * touching).tolist()),
+    )
+
+
+def sound_end(path: model.PathSummary, rows: model.PathChecks, limits: model.LimitsUsed) -> model.SoundEnd | None:
+    """The last point of a path's ``rows``, or the last with the margin of a collision, at which it may end.
+
+    ``STOPS``, ``LIMIT_MARGIN``, ``REACH_MARGIN`` and ``SPEED_MARGIN`` are kept before the first fault; a path of the
+    tool also ends before it is near-singular. None where no point of the path allows that, nothing is wrong, a
+    collision's margin is kept nowhere, or no motion was planned.
+    """
+    until = path.clear_until
+    if path.not_planned or (path.collisions and until is None):
+        return None
+    faults = path.unreachable, path.out_of_limits, path.too_fast, path.undecided
+    starts = [part.t0_s for stretches in faults for part in stretches] + path.singular_times_s
+    starts += [] if path.in_joint_space else rows.t_s[rows.near_singular][:1].tolist()
+    first = min(starts, default=np.inf)
+    stop = (np.abs(rows.q_deg_s) / limits.acceleration_deg_s2).max(axis=1)
+    kept = rows.reachable & (rows.t_s + STOPS * stop <= first) & (np.nan_to_num(rows.speed_ratio) <= SPEED_MARGIN)
+    for part in path.out_of_limits:
+        joints, at = [j - 1 for j in motion_faults.joints_of(part.cause)], int(np.argmin(np.abs(rows.t_s - part.t0_s)))
+        kept &= np.abs(rows.q_deg[:, joints] - rows.q_deg[at, joints]).max(axis=1) >= LIMIT_MARGIN
+    for lost in path.unreachable:
+        kept &= rows.s_m <= lost.s0_m - REACH_MARGIN
+    if until and (np.isinf(first) or kept[rows.t_s <= until.t_s][-1:].any()):
+        return model.SoundEnd(until.t_s, until.xyz_mm)
+    ends = np.flatnonzero(kept & (rows.t_s < first) & (rows.t_s <= (until.t_s if until else np.inf)))
+    if not starts or not len(ends):
+        return None
+    k = ends[-1]
+    return model.SoundEnd(
+        float(rows.t_s[k]), tuple(rows.xyz_mm[k].tolist()), float(first - rows.t_s[k]), float(stop[k])
     )
 
 

@@ -201,6 +201,23 @@ class ClearUntil:
 
 
 @dataclass(frozen=True)
+class SoundEnd:
+    """The last point at which a path may end: before anything is wrong, and with time to stop there.
+
+    Attributes
+    ----------
+    xyz_mm : of the tool in the base frame
+    left_s, stop_s : time from there to the first fault, and that which the joints take to stop there; None where a
+        contact comes first, from which the point is clear by the margin of ``ClearUntil``
+    """
+
+    t_s: float
+    xyz_mm: tuple[float, ...]
+    left_s: float | None = None
+    stop_s: float | None = None
+
+
+@dataclass(frozen=True)
 class StrategyMotion:
     """A strategy's motion, against the path as programmed.
 
@@ -256,8 +273,9 @@ class PathSummary:
         of prismatic joints (``sliding``, from 1) in mm/s
     velocity_check_deg_s : largest difference of joint velocities by the Jacobian and by differences of angles
     clearance : None where none could be measured
-    no_way : why no motion was planned, of one that is to be
+    not_planned : why no motion was planned, of one that is to be
     clear_until : how far it could be used; None where it does not collide, or keeps the margin nowhere
+    sound_end : where it may end instead, with margins; None where it is not to end earlier, or nowhere may
     fastest_s : of the exact path under the joint limits; None where no motion follows it
     avoidance : the strategies tried; none where the path is safe
     strategy : the one to take
@@ -291,12 +309,13 @@ class PathSummary:
     velocity_check_deg_s: float
     collisions: tuple[Stretch[BodiesOverlap], ...]
     clearance: MinClearance | None
-    no_way: NoWayAround | None
+    not_planned: NoWayAround | None
     fastest_s: float | None
     avoidance: tuple[TriedStrategy, ...]
     strategy: StrategyName | None
     sliding: tuple[int, ...] = ()
     clear_until: ClearUntil | None = None
+    sound_end: SoundEnd | None = None
 
     @property
     def fastest_joint(self) -> int | None:
@@ -304,6 +323,12 @@ class PathSummary:
         speeds = {j: v for j, v in enumerate(self.max_joint_speed_deg_s or ()) if j + 1 not in self.sliding}
         nearly = max(speeds.values(), default=0.0) * (1 - SAME_SPEED)
         return next((joint for joint, speed in speeds.items() if speed >= nearly), None)
+
+    @property
+    def singular_times_s(self) -> list[float]:
+        """When a path of the tool crosses singular poses, or the arm jumps."""
+        crossed = [] if self.in_joint_space else [event.t_s for event in self.singularities if event.crossing]
+        return [*crossed, *(jump.t_s for jump in self.jumps)]
 
     @property
     def outcome(self) -> PathVerdict:

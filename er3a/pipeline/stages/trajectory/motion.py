@@ -102,7 +102,7 @@ class Motion:
     followed : how a path of the tool is followed; None for one in joint space
     polynomials : a move of the joints, exactly; None for a path of the tool
     proof : what is known of a path of the tool between the poses that are solved
-    no_way : why nothing was planned where a motion was to be; the motion is then the straight joint move
+    not_planned : why nothing was planned where a motion was to be; the motion is then the straight joint move
     """
 
     entry: PlannedEntry
@@ -118,7 +118,7 @@ class Motion:
     followed: Followed | None
     polynomials: Polynomials | None
     proof: ToolProof | None
-    no_way: NoWayAround | None = None
+    not_planned: NoWayAround | None = None
 
     @property
     def rate_bounds(self) -> RateBounds:
@@ -210,7 +210,7 @@ def _planned(task: PlanningTask, entry: PlannedEntry, command: PlanCommand, chec
         curve, reason = standing(np.clip(np.zeros(len(robot.lower)), robot.lower, robot.upper), 1.0).curve, found
     built = Built(joints=PlannedMove(curve))
     motion = _joint_motion(robot, entry, built, PlannedMove(curve), *_times(entry, built.duration, checks_per_sample))
-    return replace(motion, no_way=reason)
+    return replace(motion, not_planned=reason)
 
 
 def joints_at(robot: Robot, end: Reals) -> Reals:

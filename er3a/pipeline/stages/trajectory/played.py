@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
-
-import numpy as np
 
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.language import own_title, tr
@@ -14,7 +11,6 @@ from er3a.pipeline.messages.programs import remedy, say
 from er3a.pipeline.messages.say import joined, sentence
 from er3a.pipeline.messages.trajectory import (
     IF_ASSUMED,
-    SoundEnd,
     advice,
     cause_text,
     end_text,
@@ -26,15 +22,11 @@ from er3a.pipeline.messages.trajectory import (
 from er3a.pipeline.player.motions import Fault, Mark, PlayedEvent, PlayedMotion, Weight, address_of
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.viewing.numbers import fixed
-from er3a.planning.motion_faults import joints_of
 from er3a.planning.names import PathVerdict
 from er3a.program_check.program_check_findings import ClearOfAssumed
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
-LIMIT_MARGIN = 2.0  # deg, or mm where a joint slides, between an end that is advised and a limit that the path leaves
-REACH_MARGIN = 0.02  # m of the path before it leaves the reach
-SPEED_MARGIN = 0.9  # of a joint's speed limit
 WEIGHTS: dict[PathVerdict, Weight] = {
     "safe": "plain",
     "near-singular": "caution",
@@ -59,7 +51,7 @@ def motions(robot: Robot, results: model.TrajectoryResults) -> list[PlayedMotion
         )
         if path.chosen:
             repair = avoidance.take((avoidance.path == path.name) & (avoidance.strategy == path.strategy))
-            text = advice(path, limits=results.summary.joint_limits) or ""
+            text = advice(path, results.summary.joint_limits) or ""
             motions.append(PlayedMotion(repaired(path), text, repair.t_s, meant(robot, repair.q_deg)))
     return motions
 
@@ -101,18 +93,12 @@ def faults(results: model.TrajectoryResults) -> list[Fault]:
 
 def _first_fault(path: model.PathSummary) -> tuple[str, float | None, str]:
     """What is wrong first with a path that is not safe, and when (s), if it has a time; then what is wrong later."""
-    found = [] if path.no_way else first_faults(path)
+    found = [] if path.not_planned else first_faults(path)
     if (path.verdict in ("singular", "near-singular") and len(found) <= 1) or not found:
-        times = [] if path.no_way else _singular_times(path) or [event.t_s for event in path.singularities]
+        times = [] if path.not_planned else path.singular_times_s or [event.t_s for event in path.singularities]
         return path_text(path), min(times, default=None), ""
     later = [tr("at t = {time} s: {text}", time=fixed(t, 3), text=text) for t, text in found[1:]]
     return found[0][1], found[0][0], joined(later)
-
-
-def _singular_times(path: model.PathSummary) -> list[float]:
-    """When (s) a path of the tool crosses singular poses, or the arm jumps."""
-    crossed = [] if path.in_joint_space else [event.t_s for event in path.singularities if event.crossing]
-    return [*crossed, *(jump.t_s for jump in path.jumps)]
 
 
 def _assumed(part: model.Stretch[Any]) -> bool:
@@ -130,25 +116,24 @@ def _to_do(
         return repair, (name, address_of("trajectory", name, 0.0, path.name))
     if path.verdict == "safe" and (near := near_assumed(path, summary)):
         return remedy(near), None
-    last = last_sound(path, rows, summary.joint_limits)
+    last = path.sound_end
     if last is None:
         todo = advised(path, rows, summary.joint_limits)
         return sentence("finding", finding=todo) if todo else "", None
-    name = tr("{path}, up to {time} s", path=path.name, time=fixed(last[0], 3))
+    name = tr("{path}, up to {time} s", path=path.name, time=fixed(last.t_s, 3))
     end = end_text(path, last, summary.verdict.shapes)
-    return end, (name, address_of("trajectory", path.name, last[0], path.name, last[0]))
+    return end, (name, address_of("trajectory", path.name, last.t_s, path.name, last.t_s))
 
 
 def advised(path: model.PathSummary, rows: model.PathChecks, limits: model.LimitsUsed) -> str | None:
     """What to do about a path; None where nothing is to be done. ``rows``, ``limits``: of the path, of the joints."""
-    sound = last_sound(path, rows, limits)
-    text = advice(path if sound else replace(path, clear_until=None), sound, limits)
+    text = advice(path, limits)
     if text is None or path.chosen:
         return text
     if not path.in_joint_space and len(rows) and rows.near_singular[0]:
         met = any(event.crossing and event.t_s <= rows.t_s[0] for event in path.singularities)
         return joined([sentence("advice.near#met" if met else "advice.near"), text], ". ")
-    no_part = sound is None and WEIGHTS[path.verdict] == "fail"
+    no_part = path.sound_end is None and WEIGHTS[path.verdict] == "fail"
     return joined([text, sentence("advice.no_part")], ". ") if no_part else text
 
 
@@ -157,42 +142,10 @@ def repaired(path: model.PathSummary) -> str:
     return tr("{path}, repaired", path=path.name)
 
 
-def last_sound(path: model.PathSummary, rows: model.PathChecks, limits: model.LimitsUsed) -> SoundEnd | None:
-    """The last point (of ``rows``, or where a collision's margin is kept) at which a path may end.
-
-    Before anything is wrong, or a path of the tool is near-singular, twice the time is left that the joints take to
-    stop there at their ``limits``, and ``LIMIT_MARGIN``, ``REACH_MARGIN`` and ``SPEED_MARGIN`` are kept. None where no
-    point of a path has that, it keeps no margin of collisions anywhere, or none was planned.
-    """
-    until = path.clear_until
-    if path.no_way or (path.collisions and until is None):
-        return None
-    others = path.unreachable, path.out_of_limits, path.too_fast, path.undecided
-    starts = [part.t0_s for stretches in others for part in stretches] + _singular_times(path)
-    starts += [] if path.in_joint_space else rows.t_s[rows.near_singular][:1].tolist()
-    first = min(starts, default=np.inf)
-    stop = (np.abs(rows.q_deg_s) / limits.acceleration_deg_s2).max(axis=1)
-    kept = rows.reachable & (rows.t_s + 2 * stop <= first) & (np.nan_to_num(rows.speed_ratio) <= SPEED_MARGIN)
-    for part in path.out_of_limits:
-        joints, at = [j - 1 for j in joints_of(part.cause)], int(np.argmin(np.abs(rows.t_s - part.t0_s)))
-        kept &= np.abs(rows.q_deg[:, joints] - rows.q_deg[at, joints]).max(axis=1) >= LIMIT_MARGIN
-    for lost in path.unreachable:
-        kept &= rows.s_m <= lost.s0_m - REACH_MARGIN
-    if until and (np.isinf(first) or kept[rows.t_s <= until.t_s][-1:].any()):
-        return SoundEnd(until.t_s, until.xyz_mm)
-    ends = np.flatnonzero(kept & (rows.t_s < first) & (rows.t_s <= (until.t_s if until else np.inf)))
-    if not starts or not len(ends):
-        return None
-    k = ends[-1]
-    return SoundEnd(float(rows.t_s[k]), tuple(rows.xyz_mm[k].tolist()), float(first - rows.t_s[k]), float(stop[k]))
-
-
 def shown_verdict(path: model.PathSummary, near: ClearOfAssumed | None) -> tuple[Weight, str]:
     """A path's verdict in colour and words; ``near`` as of :func:`near_assumed`."""
     if path.verdict == "safe" and near:
         return "caution", tr("clear of assumed shapes only")
-    if path.verdict == "safe":
-        return "plain", tr("safe in the model")
     return WEIGHTS[path.verdict], joined(map(outcome_word, path.outcomes), ", ")
 
 

@@ -13,11 +13,10 @@ from matplotlib.colors import LogNorm
 
 from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Flags, Reals
-from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.trajectory import advice, event_word, path_text
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.trajectory.model import MotionRows, PathChecks, PathSummary, TrajectoryResults
-from er3a.pipeline.stages.trajectory.played import WEIGHTS, contact, events
+from er3a.pipeline.stages.trajectory.played import contact, events, near_assumed, shown_verdict
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.arm import LABEL
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, MUTED, REFERENCE, rgb
@@ -71,7 +70,8 @@ def record(study: Study, stored: Stored[TrajectoryResults], output: Path) -> Non
 def _runs(robot: Robot, results: TrajectoryResults, path: PathSummary) -> Iterator[Run]:
     """The path as programmed and, if there is such a motion, repaired."""
     rows: PathChecks = results.checks.take(results.checks.path == path.name)
-    verdict, shown, motions = outcome_word(path.verdict), rows.take(_frames(rows)), results.avoidance
+    status, verdict = shown_verdict(path, near_assumed(path, results.summary))
+    shown, motions = rows.take(_frames(rows)), results.avoidance
     line: Logged = _line(shown.xyz_mm / 1000, shown.condition_number)
     still = [(0.0, entity, shape) for entity, shape in ({"path": line} | _ghosts(robot, path, rows)).items()]
     yield Run(
@@ -81,11 +81,11 @@ def _runs(robot: Robot, results: TrajectoryResults, path: PathSummary) -> Iterat
         events=events(path),
         marks=contact(path),
         outcome=verdict,
-        status=WEIGHTS[path.verdict],
+        status=status,
         shapes=[*still, *_trail(shown, HIGHLIGHT)],
     )
     if path.chosen and path.chosen.motion:
-        to_do = advice(path, limits=results.summary.joint_limits) or ""
+        to_do = advice(path, results.summary.joint_limits) or ""
         repair: MotionRows = motions.take((motions.path == path.name) & (motions.strategy == path.strategy))
         repaired = repair.take(_frames(repair))
         yield Run(

@@ -45,7 +45,7 @@ from er3a.programs.languages import titles_unwritten
 from er3a.robots.robot import Robot
 
 DRAWN = 250  # points of a curve
-MOST_DRAWN, DRAWN_OF_MORE = 16, 8  # paths with a figure and programs to save: all of up to so many, or the worst
+MAX_DRAWN, DRAWN_OF_MORE = 16, 8  # paths with a figure and programs to save: all of up to so many, or the worst
 
 
 def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) -> None:
@@ -54,7 +54,7 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
     summary, checks, avoidance = results.summary, results.checks, results.avoidance
     scene = study.scene(stored.robot, stored.stage)
     figure, sections = PathFigure(), []
-    count = len(summary.paths) if len(summary.paths) <= MOST_DRAWN else DRAWN_OF_MORE
+    count = len(summary.paths) if len(summary.paths) <= MAX_DRAWN else DRAWN_OF_MORE
     paths, contradicted = worst_first(summary.paths), stored.rests_on.get("validation") == "fail"
     for i, path in enumerate(paths):
         rows, own = checks.take(checks.path == path.name), avoidance.take(avoidance.path == path.name)

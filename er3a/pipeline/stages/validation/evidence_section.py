@@ -73,7 +73,7 @@ OTHER_COLUMNS = ("a", "alpha", "d", "beta", "offset", "direction")
 LIMITS = ("lower", "upper")
 DIFFERS = 2e-3
 BENT, BENT_BY = 5, pi / 6  # a joint (from 1) that is not at 0 where two tables are told apart, and its angle
-MOST_DIFFERENT = 3  # entries in which two tables may differ to be told apart at one pose
+MAX_DIFFERENT = 3  # entries in which two tables may differ to be told apart at one pose
 STEEP = 85.0  # deg, from which pitch on roll and yaw are not unique enough to compare
 IN_UNIT = {"a": MM, "d": MM, "direction": 1.0} | dict.fromkeys(("alpha", "beta", "offset", *LIMITS), 180 / pi)
 OTHER_TITLES = {
@@ -179,7 +179,7 @@ def _read_pose(robot: Robot, evidence: TableEvidence) -> PoseReadings | None:
         for kind in ("alpha", "offset")
         for k in np.flatnonzero(np.abs(getattr(other, kind) - getattr(robot, kind)) > DIFFERS).tolist()
     ]
-    if len(differs) > MOST_DIFFERENT:
+    if len(differs) > MAX_DIFFERENT:
         return None
     read: dict[tuple[float, ...], list[str]] = {}
     for turned, *changed in product((False, True), *([(False, True)] * len(differs))):

@@ -122,7 +122,7 @@ def blank_row(check: model.Unjudged) -> list[str]:
 FRAME_COLUMNS = "noap"  # of a transform: the frame's x, y and z axis, and its origin
 MM = 1000.0
 DIGITS = 6
-MOST_PRODUCTS = 200  # of one entry: behind that nobody reads it
+MAX_PRODUCTS = 200  # of one entry; nobody reads more
 
 
 @dataclass(frozen=True)
@@ -148,7 +148,7 @@ def formulas(robot: Robot) -> Formulas:
     zero, arm = np.where(robot.sliding, robot.d, robot.offset), arm_transform(robot)
     values = arm.at(zero)
     longest = max(len(entry) for row in arm.entries for entry in row)
-    entries = [(r, c) for c in range(4) for r in range(3)] if longest <= MOST_PRODUCTS else []
+    entries = [(r, c) for c in range(4) for r in range(3)] if longest <= MAX_PRODUCTS else []
     return Formulas(
         moved=[_moved(robot, k) for k in range(robot.rows)],
         links=[_link(k, link, zero) for k, link in enumerate(link_transforms(robot))],

@@ -193,9 +193,9 @@ def _programs_table(robot: Robot, chosen: ChosenGrasp, head: tuple[str, ...]) ->
     return write_csv(np.concatenate(times), shown(robot, joints), poses, comments, joint_columns(robot))
 
 
-def _closes(before: GraspLeg, behind: GraspLeg) -> bool:
+def _closes(before: GraspLeg, after: GraspLeg) -> bool:
     """Whether the gripper closes between two legs."""
-    return before.part == "approach" and behind.part == "retreat"
+    return before.part == "approach" and after.part == "retreat"
 
 
 def calibration_result(
@@ -574,17 +574,23 @@ def _verdict(
     shown = demonstrations(objects, "grasped")
     assumed = tuple(each.name for each in asked if each.name in near)
     sound = len(asked) - len(missed) - len(assumed)
-    counts = model.GraspCounts(len(asked), sound, missed, left_out, worst, shown, calibration.simulated, assumed)
+    counts = model.GraspCounts(
+        len(asked), sound, missed, left_out, worst, shown, calibration.simulated, assumed, _least_success(asked)
+    )
     if asked and len(missed) == len(asked):
         return Verdict("fail", counts)
     return Verdict("caution" if missed or calibration.warnings else "pass", counts)
+
+
+def _least_success(objects: Sequence[model.ObjectResult]) -> float | None:
+    return min((each.grasp.probability for each in objects if each.grasp), default=None)
 
 
 def _figures(
     calibration: model.CalibrationResult, objects: tuple[model.ObjectResult, ...], near: tuple[str, ...]
 ) -> tuple[Figure, ...]:
     asked = [each for each in objects if each.expect in (None, "grasped")]
-    least = min((each.grasp.probability for each in asked if each.grasp), default=None)
+    least = _least_success(asked)
     worst = max((each.error_mm.together for each in asked if each.error_mm), default=None)
     grasped = sum(each.grasp is not None and each.name not in near for each in asked)
     return (

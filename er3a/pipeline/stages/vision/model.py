@@ -74,6 +74,7 @@ class GraspCounts(Finding):
     left_out : samples that the calibration does not rest on
     point_mm : 95 % of errors at the worst grasp stay below; None where nothing is grasped
     simulated : whether no camera took the samples
+    probability : of success, the least of what can be grasped; None where nothing can
     """
 
     objects: int
@@ -84,6 +85,7 @@ class GraspCounts(Finding):
     demonstrations: tuple[Demonstration, ...]
     simulated: bool
     assumed: tuple[str, ...] = ()
+    probability: float | None = None
 
 
 Three = tuple[float, float, float]

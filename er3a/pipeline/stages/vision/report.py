@@ -35,8 +35,8 @@ from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MODEL
 from er3a.programs.languages import titles_unwritten
 from er3a.vision.table_corrections import NoCorrections
 
-LEAST_RANGE = 0.02  # of the largest value, by which a map's colours go beyond its values
-MOST_IMAGES = 9
+MIN_RANGE = 0.02  # of the largest value, by which a map's colours go beyond its values
+MAX_IMAGES = 9
 WIDEST_PX = 480
 ARROW_PX = 30.0
 
@@ -72,7 +72,7 @@ def image_picture(rows: model.CornerRows, folder: Path) -> Picture:
     size = {
         name: float(np.sqrt((off[rows.image == name] ** 2).sum(axis=1).mean())) for name in dict.fromkeys(rows.image)
     }
-    shown = sorted(size, key=lambda name: -size[name])[:MOST_IMAGES]
+    shown = sorted(size, key=lambda name: -size[name])[:MAX_IMAGES]
     columns = min(3, len(shown))
     lines = -(-len(shown) // columns)
     figure, axes = new_figure(lines, columns, height=2.6 * lines, squeeze=False)
@@ -130,7 +130,7 @@ def map_picture(rows: model.ErrorMapRows, objects: tuple[model.ObjectResult, ...
     for ax, (title, column, label) in zip(axes.ravel(), panels):
         value = np.where(seen, column, np.nan).reshape(len(y), len(x))
         known = value[np.isfinite(value)]
-        ends = (known.min() - LEAST_RANGE * known.max(), (1 + LEAST_RANGE) * known.max()) if known.size else (0.0, 1.0)
+        ends = (known.min() - MIN_RANGE * known.max(), (1 + MIN_RANGE) * known.max()) if known.size else (0.0, 1.0)
         mesh = ax.pcolormesh(
             x, y, value, cmap="viridis", shading="nearest", rasterized=True, vmin=ends[0], vmax=ends[1]
         )

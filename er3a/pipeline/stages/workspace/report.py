@@ -29,7 +29,8 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
     robot, results = study.robot(stored.robot), stored.results
     summary, scene = results.summary, study.scene(stored.robot, "capability")
     context = _context(robot, results, scene)
-    if stored.rests_on.get("validation") == "fail":
+    contradicted = stored.rests_on.get("validation") == "fail"
+    if contradicted:
         context |= dict.fromkeys(("nowhere", "best_text"), sentence("box.contradicted"))
     render_stage(
         study,
@@ -42,6 +43,7 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
         pocket_mm=3000 * summary.pocket_block_m,
         turning=workspace_figures.in_space(robot, results, scene),
         drawing_head=drawing_head(),
+        puts_box=bool(getattr(summary.placement, "named_places", ())) and not contradicted,
         void_rows=[_void_row(n, void) for n, void in enumerate(summary.voids[:LISTED], start=1)],
         voids_more=max(0, len(summary.voids) - LISTED),
         change_rows=_change_rows(summary),

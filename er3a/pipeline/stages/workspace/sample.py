@@ -44,7 +44,7 @@ def identity(study: Study, robot: Robot) -> dict[str, Any]:
 
 
 def write_part(path: Path, identity: dict[str, Any], tally: Tally) -> None:
-    """Write a tally behind its checksum; equal tallies give equal bytes."""
+    """Write a checksum, then its tally; equal tallies give equal bytes."""
     touched = np.flatnonzero(tally.counts)
     stream = io.BytesIO()
     np.savez_compressed(
