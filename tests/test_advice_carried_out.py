@@ -104,6 +104,7 @@ MOVES_ARM_OR_PART = re.compile(
 ON_PAGES = {  # texts without a key that are none of the remedies above: the first words
     *("Never use this table", "Evidence contradicts this table", "In the model: run none"),  # that forbid something
     *("Part of this D-H table", "This D-H table was", "Run it on the arm only when", "Run none of these"),  # likewise
+    "Stop: neither table is the arm",  # likewise
     *("To have all pages", "Its table has not been examined", "These pass without the tray"),  # runs of er3a
     "Compare the limits with the manual",  # of what a target says itself, see turn_tool and shift_tool
     "Validation's diagnosis of the table",  # that puts a check before it

@@ -103,7 +103,12 @@ def test_the_pages_say_where_what_stands_around_the_arm_is():
     rows = solid_rows(load_study("config/small.yaml").scene("er3a_c60", "trajectory"))
     assert ["table", "box 500 × 800 × 40", "(500, 0, 80)"] in rows
     assert ["post", "cylinder ⌀ 80 × 900", "(200, 420, 450)"] in rows
-    assert ["floor", "plane", "(0, 0, 1) · p ≤ −5"] in rows
+    assert ["floor", "all below a plane", "all points with z up to −5"] in rows
+    slanted = Plane("ramp", np.array([0.6, 0, 0.8]), 0.1), Plane("roof", np.array([0.0, 0, -1]), -2.0)
+    assert [row[2] for row in solid_rows(Scene("two", slanted))] == [
+        "up to 100 from the origin along (0.6, 0, 0.8)",
+        "up to −2000 from the origin along (0, 0, −1)",
+    ]
 
 
 @pytest.mark.long

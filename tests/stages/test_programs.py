@@ -118,6 +118,12 @@ def test_page_and_recording_are_written(study, stored, tmp_path):
     assert {each.name for each in listed if each.meant} == {
         each.name for each in stored["er3a_c60"].results.summary.verdict.finding.demonstrations
     }
+    (fault,) = (each for each in listed if each.name == "collision_with_table")
+    own = next(each for each in stored["er3a_c60"].results.summary.programs if each.name == fault.name)
+    first = next(each for each in own.findings if each.finding.code == "motion_collides")
+    assert fault.when == f"line 10, {first.motion_s:.2f} s into it (player: {first.program_s:.2f} s)"
+    down = f"{met.xyz_mm[0, 2] - first.finding.at_mm:.0f}"  # the line is vertical
+    assert f"; tool at x, y, z = 380, 180, {down} mm" in fault.what
     for each in listed:  # what the index links to
         name, t, place = re.fullmatch(r"programs\.html\?play=(\w+)&t=([\d.]+)#([\w.-]+)", each.address).groups()
         assert name == each.name

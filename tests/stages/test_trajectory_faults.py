@@ -15,6 +15,7 @@ from er3a.collision.pairs import ShapesAssumed
 from er3a.files.path_file import load_paths
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
+from er3a.pipeline.messages.say import say
 from er3a.pipeline.messages.trajectory import advice, end_text, first_faults
 from er3a.pipeline.program_reports import programs_of
 from er3a.pipeline.stages import run
@@ -184,6 +185,18 @@ def test_a_path_that_ends_before_the_edge_of_the_reach_as_advised_is_safe(tmp_pa
     assert ((slowed >= lower + 1) & (slowed <= upper - 1)).all()
 
 
+def test_all_that_a_path_came_to_is_named_everywhere_in_the_order_of_time(tmp_path):
+    results = compute(study_of(tmp_path, "line_limits", expect={"line_limits": "leaves limits"}), ROBOT)
+    (path,), (fault,) = results.summary.paths, faults(results)
+    assert path.collisions[0].t0_s < path.out_of_limits[0].t0_s
+    assert path.outcomes == ("collides", "leaves limits")
+    assert fault.verdict == "collides, leaves limits"
+    assert "found so: line_limits (collides, leaves limits)" in say(results.summary.verdict.finding)
+    late = replace(path, collisions=(replace(path.collisions[0], t0_s=path.out_of_limits[0].t0_s + 0.1),))
+    assert late.outcomes == ("leaves limits", "collides")
+    assert replace(path, collisions=()).outcomes == ("leaves limits",)
+
+
 def test_a_line_that_only_another_branch_can_end_is_singular():
     """Whatever the limits, and though it only comes near to a singular pose: a joint would have to jump."""
     robot = load_robot(ROBOT).replace(lower=np.full(6, -4 * np.pi), upper=np.full(6, 4 * np.pi))
@@ -234,6 +247,8 @@ def test_what_is_wrong_before_a_contact_ends_the_sound_part_of_a_path(tmp_path):
     nowhere = replace(path, sound_end=None)
     assert "end the path there" not in advised(nowhere, near, limits)
     assert "near-singular at the start" in advised(nowhere, near, limits)
+    met = replace(nowhere, singularities=(Singularity(0.0, 0.0, "wrist", True, 0.0, None),))
+    assert "the arm is singular at the start" in advised(met, near, limits)
     fast = replace(path.collisions[0], t0_s=0.7, cause=TooFastIfAssumed(2, 900.0, 180.0))
     several = replace(early, too_fast=(fast,), avoidance=path.avoidance * 2)
     assert [t for t, _ in first_faults(several)] == [0.5, path.collisions[0].t0_s]

@@ -40,6 +40,7 @@ from er3a.pipeline.stages import run
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.validation import compute as compute_module
 from er3a.pipeline.stages.validation.checks import checks_of_set, table_checks, verdict_of
+from er3a.pipeline.stages.validation.evidence_section import evidence_section
 from er3a.pipeline.stages.validation.model import (
     RESULTS,
     AnotherArm,
@@ -72,6 +73,7 @@ from er3a.references.subjects import (
     Reach,
     SegmentInclination,
 )
+from testing import plain_oracle as oracle
 from testing.on_demand import OnDemand
 from testing.readme import answer
 from tests.robots.test_conventions import random_arm
@@ -391,7 +393,7 @@ def test_round_trips_find_the_joints_again(robot):
 def test_the_page_tells_the_articles_reader(study, stored, tmp_path):
     text = page_of(study, stored["er3a_c60_article"], tmp_path)
     for words in (
-        "Its own claims: er3a_c60_article",
+        "Statements of its own source: er3a_c60_article",
         "the upper arm stands 90° from the vertical where 0° is stated",
         "Most likely fault: joint 2: offset −90 deg missing; residual falls from 1433 mm to 0.0 mm.",
         "of one fault or two, explains the data",
@@ -480,6 +482,40 @@ def test_the_table_stands_beside_the_one_that_documents_describe_or_do_not_tell_
     assert allowed.code == "allowed"
     assert allowed.table.direction == (-1.0, -1.0, -1.0, -1.0, -1.0, -1.0)
     assert allowed.table.a == tuple(load_robot("er3_600").a)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["er3a_c60", "er3_600"])
+def test_each_reading_of_the_pendant_is_that_of_the_table_it_names(stored, name):
+    """By plain matrices, and other functions for the angles."""
+    found = evidence_section(load_robot(name), stored[name].results.summary.evidence)["readings"]
+    q = np.radians([[0, 0, 0, 0, 30, 0]])
+    assert (found.pose, found.first) == ("J5 at 30 deg, all others at 0", "1, 2, 3, 4, 5, 6")
+    assert len(found.rows) == len({reading for reading, _ in found.rows}) == 8
+    for reading, named in found.rows:
+        entries = {
+            entry: float(value) for entry, value in re.findall(r"(\w+\d) = (\S+?)(?:,|$)", named.replace("−", "-"))
+        }
+        assert bool(entries) != (named == "the table of this page")
+        R = oracle.frames(oracle.changed(oracle.table_of(name), **entries), q)[0, 0, -1, :3, :3]
+        shown = [float(angle) for angle in reading.replace("−", "-").split(", ")]
+        np.testing.assert_allclose(Rotation.from_euler("xyz", shown, degrees=True).as_matrix(), R, atol=1e-3)
+
+
+@pytest.mark.long
+def test_an_entry_that_only_the_source_of_the_table_to_use_gives_has_one_mark(summaries):
+    article, real = (summaries[name].evidence for name in ("er3a_c60_article", "er3a_c60"))
+
+    def marks(section) -> dict[str, str]:
+        return {cell["entry"]: cell["mark"] for _, cells in section["rows"] for cell in cells if cell}
+
+    alone, beside = (evidence_section(load_robot("er3a_c60_article"), article, *to_use) for to_use in ((), (real,)))
+    changed = {entry for entry, mark in marks(alone).items() if mark != marks(beside)[entry]}
+    assert changed == {f"direction{joint}" for joint in (1, 4, 6)}
+    own = marks(evidence_section(load_robot("er3a_c60"), real))
+    assert {marks(beside)[entry] for entry in changed} == {own[entry] for entry in changed} == {"="}
+    assert (alone["of_one"], beside["of_one"]) == ("", "direction 1, 4, 6")
+    assert [row[0] for row in beside["open_rows"] if row[0] in changed] == sorted(changed)
 
 
 def test_the_page_says_how_far_each_contradicted_entry_is_off(study, stored, summaries, tmp_path):

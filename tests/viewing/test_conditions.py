@@ -98,7 +98,7 @@ def test_a_verdict_says_what_it_is_not_to_be_taken_for():
     grasped = GraspCounts(2, 2, (), (), None, (), simulated=False)
     torque = NoLimits(5, 2, 14.0, 4.1, "N m", "arc", (), 0, None)
     assert say_reserved(grasped, [LeftOut("carried")]).endswith("This is of the bare arm: no gripper was checked.")
-    assert say_reserved(torque, [LeftOut("friction")]).endswith("lower bounds, so don't choose motors by them.")
+    assert say_reserved(torque, [LeftOut("friction")]).endswith("known masses alone: don't choose motors by them.")
     for found in (grasped, torque):
         assert say_reserved(found, [LeftOut("jerk")]) == say(found)
 

@@ -164,9 +164,7 @@ def solid_rows(scene: Scene | None) -> list[list[str]]:
     for each in scene.solids if scene else ():
         match each:
             case Plane():
-                rows.append(
-                    [each.name, tr("plane"), f"({_millimetres(each.normal, 1)}) · p ≤ {_millimetres([each.offset])}"]
-                )
+                rows.append([each.name, tr("all below a plane"), _below(each)])
                 continue
             case Box():
                 size = tr("box {size}", size=_millimetres(each.size).replace(", ", " × "))
@@ -179,6 +177,14 @@ def solid_rows(scene: Scene | None) -> list[list[str]]:
                 size = tr("mesh {size}", size=_millimetres(extent).replace(", ", " × "))
         rows.append([each.name, size, f"({_millimetres(each.T[:3, 3])})"])
     return rows
+
+
+def _below(plane: Plane) -> str:
+    """Where a plane's solid ends: in words where the plane is square to an axis."""
+    end = _millimetres([plane.offset])
+    if np.count_nonzero(plane.normal) == 1 and plane.normal.max() > 0:
+        return tr("all points with {axis} up to {end}", axis="xyz"[int(np.argmax(plane.normal))], end=end)
+    return tr("up to {end} from the origin along ({normal})", end=end, normal=_millimetres(plane.normal, 1))
 
 
 def _millimetres(values: Reals | list[float], scale: float = 1000) -> str:

@@ -43,9 +43,9 @@ names_in_words("load", "dynamics.need", NEEDS)
 FIGURES = {
     "paths": N_("Paths that count"),
     "mass": N_("Mass of the links"),
-    "peak_torque": N_("Greatest torque on a path that may be run"),
+    "peak_torque": N_("Greatest torque on a path that the model does not rule out"),
     "holding_torque": N_("Greatest holding torque found"),
-    "energy": N_("Greatest energy of a path that may be run"),
+    "energy": N_("Greatest energy of a path that the model does not rule out"),
     "utilisation": N_("Highest utilisation of a limit"),
     "power_balance": N_("Power balance, greatest error"),
 }
@@ -72,8 +72,8 @@ TEXTS = texts(
         "dynamics.use#joint": "{what} at J{joint}: {asked:.3g} {unit} of {allowed:.3g} {unit} ({percent:.0f} %)",
         "dynamics.no_data": "No data: torques need masses. Needed: {needs}.",
         "dynamics.no_limits#path": (
-            "No drive's limits are known, so the motors can't be judged. On the paths that may be run the greatest "
-            "torque is {torque:.3g} ± {tolerance:.2g} {unit}, at J{joint} on path {path}."
+            "No drive's limits are known, so the motors can't be judged. On the paths that the model does not rule "
+            "out the greatest torque is {torque:.3g} ± {tolerance:.2g} {unit}, at J{joint} on path {path}."
         ),
         "dynamics.no_limits#holding": (
             "No drive's limits are known, so the motors can't be judged. The greatest holding torque is {torque:.3g} "
@@ -141,7 +141,9 @@ TEXTS = texts(
             "{given_kg_m2:.3g} kg m² given, {about_centre_kg_m2:.3g} if so, {shape_kg_m2:.3g} by the link's shape"
         ),
         "sum_off_weight": "the links' masses add to {sum_kg:.4g} kg, and the manufacturer states {weight_kg:.4g} kg",
-        "payload.bounded": "At most {kg:.3g} kg on the paths that may be run, limited by torques on {path}.",
+        "payload.bounded": (
+            "At most {kg:.3g} kg on the paths that the model does not rule out, limited by torques on {path}."
+        ),
         "payload.partly": "Left out, because not known: {what}.",
         "payload.unknown": (
             "Not known: mount nothing until the manufacturer gives the rated payload. Ask for: {what}."

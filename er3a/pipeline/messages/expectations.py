@@ -54,7 +54,7 @@ def demonstrated(shown: tuple[Demonstration, ...]) -> str:
 
 @say.register
 def _(found: Demonstration) -> str:
-    return say_as(found, outcome=outcome_word(found.found))
+    return say_as(found, outcome=joined(map(outcome_word, found.found), ", "))
 
 
 @say.register

@@ -15,7 +15,10 @@ TEXTS = texts(
             "obstacles: none are given, so the arm was checked only against itself and what it carries"
         ),
         "reserved.grasp_counts": "This is of the bare arm: no gripper was checked.",
-        "reserved.dynamics.no_limits": "These are lower bounds, so don't choose motors by them.",
+        "reserved.dynamics.no_limits": (
+            "What is not known comes on top of these torques, whose ± is that of the known masses alone: don't choose "
+            "motors by them."
+        ),
         "no_pass": "Not examined, and therefore no pass: {missed}.",
         "left_out.bare_links": "collisions of links without a shape that lie within the shapes of others",
         "left_out.uncovered_links": (

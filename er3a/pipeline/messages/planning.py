@@ -64,13 +64,18 @@ TEXTS = texts(
         "ends_off_path": "it ends {distance_mm:.3g} mm and {angle_deg:.3g} deg from the path's end",
         "speed_exceeded": "a joint needs {ratio:.2f} times its greatest speed",
         "acceleration_exceeded": "a joint needs {ratio:.2f} times its greatest acceleration",
-        "too_fast": "J{joint} would need {needed_deg_s:.0f} {unit}/s; its limit is {limit_deg_s:g} {unit}/s",
-        "too_fast_if_assumed": (
-            "J{joint} would need {needed_deg_s:.0f} {unit}/s; assumed limit {limit_deg_s:g} {unit}/s"
+        "too_fast": (
+            "J{joint} exceeds its limit of {limit_deg_s:g} {unit}/s, at worst needing {needed_deg_s:.0f} {unit}/s"
         ),
-        "acceleration_too_great": "J{joint} would need {needed} {unit}/s²; its limit is {limit_deg_s2:g} {unit}/s²",
+        "too_fast_if_assumed": (
+            "J{joint} exceeds the assumed limit of {limit_deg_s:g} {unit}/s, at worst needing {needed_deg_s:.0f} "
+            "{unit}/s"
+        ),
+        "acceleration_too_great": (
+            "J{joint} exceeds its limit of {limit_deg_s2:g} {unit}/s², at worst needing {needed} {unit}/s²"
+        ),
         "acceleration_too_great_if_assumed": (
-            "J{joint} would need {needed} {unit}/s²; assumed limit {limit_deg_s2:g} {unit}/s²"
+            "J{joint} exceeds the assumed limit of {limit_deg_s2:g} {unit}/s², at worst needing {needed} {unit}/s²"
         ),
         "jerk_too_great#needed": "J{joint} would need {needed:.0f} {unit}/s³; its jerk limit is {able:g} {unit}/s³",
         "jerk_too_great#step": "J{joint}'s acceleration has a step; its jerk limit is {able:g} {unit}/s³",

@@ -230,11 +230,12 @@ TEXTS = texts(
         "passes_singularity": "passes the {type} singularity at {distance:.2f} deg, after {at:.1f} mm",
         "passes_singularity.mm": "passes the {type} singularity at {distance:.1f} mm, after {at:.1f} mm",
         "faster_than_assumed": (
-            "J{joint} would need {needed_deg_s:.0f} {unit}/s; assumed limit {assumed_deg_s:g} {unit}/s, as no document "
-            "gives its speed"
+            "J{joint} exceeds the assumed limit of {assumed_deg_s:g} {unit}/s (no document gives its speed), at worst "
+            "needing {needed_deg_s:.0f} {unit}/s"
         ),
         "accelerates_more_than_assumed": (
-            "J{joint} would need {needed_deg_s2:.0f} {unit}/s²; assumed limit {assumed_deg_s2:g} {unit}/s²"
+            "J{joint} exceeds the assumed limit of {assumed_deg_s2:g} {unit}/s², at worst needing "
+            "{needed_deg_s2:.0f} {unit}/s²"
         ),
         "configuration_changes": "the configuration changes from {before} to {after}",
         "arrives_otherwise": (

@@ -110,8 +110,8 @@ TEXTS = texts(
         "coordinate_of": "{vector} {coordinate}",
         "read_limit": by(
             "side",
-            upper="read joint {joint}'s upper software limit in the controller; drive there only in T1, way free",
-            lower="read joint {joint}'s lower software limit in the controller; drive there only in T1, way free",
+            upper="read joint {joint}'s upper software limit in the controller's settings; don't drive there",
+            lower="read joint {joint}'s lower software limit in the controller's settings; don't drive there",
         ),
         "time_joint": (
             "in a cleared cell, time a long turn of joint {joint} at full speed, to ±{half_width_deg_s:g} deg/s"

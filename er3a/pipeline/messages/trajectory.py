@@ -20,7 +20,7 @@ from er3a.planning.names import PathVerdict, StrategyName
 
 FIGURES = {
     "safe": N_("Safe paths, of those meant to be safe"),
-    "singular_poses": N_("Singular poses met, on paths meant to be safe"),
+    "singular_poses": N_("Singular poses met, on paths meant to be safe (joint moves pass them unharmed)"),
     "near_passes": N_("Near-singular passes, on paths meant to be safe"),
     "colliding": N_("Paths with a collision, of those meant to be safe"),
     "max_joint_speed": N_("Joint speed nearest its limit, on paths meant to be safe"),
@@ -93,7 +93,7 @@ TEXTS = texts(
         "bodies_overlap.more": "{touches}; and more later",
         "path.either_way": "{open}; the path is not safe in either case",
         "path.singular": "{type} singularity",
-        "path.too_fast_until": "too fast until t = {end:.4g} s; at worst, {cause}",
+        "path.too_fast_until": "until t = {end:.4g} s {cause}",
         "advice.out_of_reach": "it is out of reach {when}",
         "advice.only": "{way}, as the study requires, does not repair it: {reason}",
         "advice.none": "No avoidance strategy completes this path: {why}",
@@ -138,8 +138,12 @@ TEXTS = texts(
         "advice.instead": "The path itself can't be driven",
         "advice.slowly": "This is its shortest time, quicker than the {programmed:.2f} s programmed: another motion",
         "advice.near": "No part of it is safe: the arm is near-singular at the start",
+        "advice.near#met": "No part of it is safe: the arm is singular at the start",
         "advice.region": "It still passes near the singular pose",
         "advice.full_speed": "A joint moves at full speed: start slowly",
+        "limits_assumed#both": "Joint speeds and accelerations are assumed: what passes may be too fast for the arm.",
+        "limits_assumed#speed": "Joint speeds are assumed: what passes may be too fast for the arm.",
+        "limits_assumed#acceleration": "Joint accelerations are assumed: what passes may be too fast for the arm.",
         "advice.limits#both": (
             "It uses up to {speed:.0f} % of the assumed joint speeds and {acceleration:.0f} % of the assumed "
             "accelerations; the controller's own 100 % may be faster: begin at 10 % override"
@@ -481,13 +485,24 @@ def _of_limits(motion: model.StrategyMotion, limits: model.LimitsUsed) -> str:
     speeds, speed, acceleration = any(limits.speed_assumed), limits.speed_deg_s, limits.acceleration_assumed
     if not speeds and not acceleration:
         return ""
-    form = "both" if speeds and acceleration else "speed" if speeds else "acceleration"
+    form = _assumed_form(speeds, acceleration)
     pairs = zip(motion.max_joint_speed_deg_s, speed, limits.speed_assumed)
     return sentence(
         f"advice.limits#{form}",
         speed=100 * max((most / limit for most, limit, assumed in pairs if assumed), default=0.0),
         acceleration=100 * motion.max_joint_acceleration_ratio,
     )
+
+
+def _assumed_form(speed: bool, acceleration: bool) -> str:
+    return "both" if speed and acceleration else "speed" if speed else "acceleration"
+
+
+def limits_assumed(speed: Sequence[bool], acceleration: bool) -> str:
+    """That passing rests on assumed limits of the joints; empty where none is assumed."""
+    if not any(speed) and not acceleration:
+        return ""
+    return sentence(f"limits_assumed#{_assumed_form(any(speed), acceleration)}")
 
 
 def _leaves(far_mm: float, turned_deg: float) -> str:

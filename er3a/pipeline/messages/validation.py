@@ -85,11 +85,11 @@ TEXTS = texts(
             "count", "{count} label is missed, by up to {worst} mm.", "{count} labels are missed, by up to {worst} mm."
         ),
         "graded": "{own_source} ({grade})",
-        "claims#all": "All {claims} claims in {reference_set} hold.",
+        "claims#all": "All {claims} statements in {reference_set} that no document backs (“claims”) hold.",
         "claims#some": Plural(
             "failed",
-            "Of the {claims} claims in {reference_set}, {count} doesn't hold.",
-            "Of the {claims} claims in {reference_set}, {count} don't hold.",
+            "Of the {claims} statements in {reference_set} that no document backs (“claims”), {count} doesn't hold.",
+            "Of the {claims} statements in {reference_set} that no document backs (“claims”), {count} don't hold.",
         ),
         "counted_checks#independent": "{passed} of {total} independent checks pass",
         "counted_checks#consistency": "{same_passed} of {same_total} consistency checks pass, and none is independent",
@@ -115,7 +115,8 @@ TEXTS = texts(
         "validation.left_open#entry": "an open or weak entry",
         "validation.left_open#uncovered": "No independent document covers this table ({checks}).",
         "validation.left_open#uncontradicted": (
-            "No independent document contradicts this table ({checks}), but not all of it is settled."
+            "No independent document contradicts this table ({checks}), but not all of it is settled: a check that "
+            "other values would pass as well settles none."
         ),
         "validation.missed#contradicted": (
             "The model contradicts the {grades} data in {own_set}: the {quantity} is {measured}, not {expected}; "

@@ -75,7 +75,7 @@ TEXTS = texts(
         ),
         "workspace.void_at_shoulder": (
             "An enclosed void of at least {litres:.3g} L surrounds the shoulder at ({x}, {y}, {z}) mm: the arm can't "
-            "fold far enough to reach it. No enclosed void elsewhere suggests a wrong joint range."
+            "fold far enough to reach it. There is no other enclosed void, so no joint range looks wrong."
         ),
         "workspace.no_void#sampled": "The samples leave no enclosed void inside the hull; no proof.",
         "workspace.no_void#undecided": (
@@ -83,9 +83,13 @@ TEXTS = texts(
         ),
         "workspace.no_void#none": "The workspace holds no enclosed void.",
         "void_advice#cause": (
-            "It has this cause: {cause}: check the limits, the zero and the direction of joints 2 and 3."
+            "It has this cause: {cause}: check the limits, the zero and the direction of joints 2 and 3; never widen a "
+            "limit of the arm for it."
         ),
-        "void_advice#predicate": "It {cause}: check the limits, the zero and the direction of joints 2 and 3.",
+        "void_advice#predicate": (
+            "It {cause}: check the limits, the zero and the direction of joints 2 and 3; never widen a limit of the "
+            "arm for it."
+        ),
         "void_changes": (
             "{count} of {tried} single changes of the table leave less than a tenth of it: {named}. References must "
             "tell which is right."

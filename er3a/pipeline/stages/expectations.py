@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Protocol
+from collections.abc import Callable, Iterable
+from typing import Protocol, TypeVar
 
 from er3a.by_value import Finding
 from er3a.kinematics.solutions import TargetOutcome
@@ -23,10 +23,10 @@ class UnmetExpectation(Finding):
 
 
 class Demonstration(Finding):
-    """A target, a path or an object that fails as it is meant to."""
+    """A target, a path or an object that fails as it is meant to: all that it came to, the first first."""
 
     name: str
-    found: Outcome
+    found: tuple[Outcome, ...]
 
 
 class ExpectationsUnmet(Finding):
@@ -58,6 +58,13 @@ def unmet_expectations(judged: Iterable[Judged]) -> ExpectationsUnmet | None:
     return ExpectationsUnmet(len(expected), unmet) if unmet else None
 
 
-def demonstrations(judged: Iterable[Judged], sound: Outcome) -> tuple[Demonstration, ...]:
-    """What fails as it is meant to; ``sound``: what counts as no failure."""
-    return tuple(Demonstration(each.name, each.outcome) for each in judged if each.expect == each.outcome != sound)
+JudgedT = TypeVar("JudgedT", bound=Judged)
+
+
+def demonstrations(
+    judged: Iterable[JudgedT],
+    sound: Outcome,
+    outcomes: Callable[[JudgedT], tuple[Outcome, ...]] = lambda each: (each.outcome,),
+) -> tuple[Demonstration, ...]:
+    """What fails as it is meant to; ``sound``: what counts as no failure; ``outcomes``: all that one came to."""
+    return tuple(Demonstration(each.name, outcomes(each)) for each in judged if each.expect == each.outcome != sound)

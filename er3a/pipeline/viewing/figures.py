@@ -165,6 +165,7 @@ CHINESE_FONTS = (
     "SimHei",
 )
 STYLE: dict[RcKeyType, Any] = {
+    "axes.axisbelow": True,
     "axes.edgecolor": MUTED,
     "axes.grid": True,
     "axes.labelcolor": INK,

@@ -23,8 +23,7 @@ from er3a.pipeline.results import Figure, LeftOut, LeftOutSubject, Status, Verdi
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.dynamics import model
 from er3a.pipeline.stages.dynamics.entry import DynamicsSettings
-from er3a.pipeline.stages.trajectory.judgement import Surroundings, judge, measured
-from er3a.pipeline.stages.trajectory.judgement import verdict_of as verdict_of_motion
+from er3a.pipeline.stages.trajectory.judgement import Surroundings, judge, measured, outcomes_of
 from er3a.pipeline.stages.trajectory.motion import (
     Motion,
     PartOfProgram,
@@ -238,30 +237,30 @@ class PathJudge:
     near: NearSingular
     limits: JointLimits
 
-    def judged(self, motion: Motion) -> tuple[PathVerdict, bool]:
-        """The verdict on a motion, and whether it may be run."""
+    def judged(self, motion: Motion) -> tuple[tuple[PathVerdict, ...], bool]:
+        """What a motion came to, and whether it may be run."""
         found = judge(self.robot, motion, self.near, self.limits)
-        verdict = verdict_of_motion(found, measured(self.surroundings, motion))
-        return verdict, verdict not in NOT_TO_BE_RUN and found.speed_bounded
+        outcomes = outcomes_of(found, measured(self.surroundings, motion))
+        return outcomes, set(outcomes).isdisjoint(NOT_TO_BE_RUN) and found.speed_bounded
 
 
 def path_torques(
-    arm: LoadedArm, motion: Motion, judged: tuple[PathVerdict, bool], samples: int, wrist: tuple[int, ...]
+    arm: LoadedArm, motion: Motion, judged: tuple[tuple[PathVerdict, ...], bool], samples: int, wrist: tuple[int, ...]
 ) -> PathTorques:
     """Torques of a path: its table at evenly spread times, peaks and means also where the path was solved and checked.
 
     Parameters
     ----------
-    judged : its verdict, and whether it may be run
+    judged : what it came to, and whether it may be run
     wrist : joints whose moments by the load are wanted
     """
-    entry, n, (verdict, runs) = motion.entry, arm.robot.joints, judged
+    entry, n, (outcomes, runs) = motion.entry, arm.robot.joints, judged
     asked = entry.expect in (None, "safe")
     t = np.linspace(0.0, motion.built.duration, samples)
     q, qd, qdd = motion.rates(t)
     if not np.isfinite([q, qd, qdd]).all():
         nothing = (float(t[-1]), (), (), None, None, (), None, None)
-        absent = model.PathLoad(entry.name, entry.title, verdict, False, False, *nothing)
+        absent = model.PathLoad(entry.name, entry.title, outcomes, False, False, *nothing)
         return PathTorques(absent, asked, model.TorqueRows.empty(), None, np.full((n, 2), np.nan), None)
     timed, kinematic, no_law = _timings(arm, motion.joints, t, q)
     evenly, t = t, np.union1d(t, motion.t)
@@ -276,7 +275,7 @@ def path_torques(
     summary = model.PathLoad(
         name=entry.name,
         title=entry.title,
-        verdict=verdict,
+        outcomes=outcomes,
         counts=runs,
         complete=True,
         duration_s=float(t[-1]),

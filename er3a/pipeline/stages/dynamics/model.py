@@ -267,7 +267,7 @@ class PathLoad:
 
     Attributes
     ----------
-    verdict : of the trajectory stage's checks
+    outcomes : of the trajectory stage's checks: the verdict and, if it is another, that it collides, in order of time
     counts : whether it may be run; motors, limits and key figures rest on such paths alone
     complete : whether the arm can follow it all along; nothing else is known of one that it can't
     payload, speed_scale : None where no torque limit is known
@@ -279,7 +279,7 @@ class PathLoad:
 
     name: str
     title: str
-    verdict: PathVerdict
+    outcomes: tuple[PathVerdict, ...]
     counts: bool
     complete: bool
     duration_s: float

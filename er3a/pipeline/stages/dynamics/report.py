@@ -228,11 +228,12 @@ def _motor(motor: model.MotorNeed) -> list[str]:
 
 
 def _not_run(path: model.PathLoad) -> list[str]:
+    why = joined(map(outcome_word, path.outcomes), ", ")
     if not path.complete:
-        return [path.name, outcome_word(path.verdict), tr("not followed to its end")]
+        return [path.name, why, tr("not followed to its end")]
     worst = path.hardest
     peak = f"{number(worst.peak, 3)} ± {number(worst.tolerance, 2)} {worst.unit} (J{worst.joint})"
-    return [Markup('<a href="#{0}">{0}</a>').format(path.name), outcome_word(path.verdict), peak]
+    return [Markup('<a href="#{0}">{0}</a>').format(path.name), why, peak]
 
 
 def _nodes(summary: model.DynamicsSummary) -> list[list[str]]:

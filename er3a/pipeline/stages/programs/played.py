@@ -67,7 +67,7 @@ def faults(results: ProgramsResults) -> list[Fault]:
                 outcome_word(program.outcome),
                 program.expect == program.outcome,
                 _where(program, first),
-                joined([say_first(first.finding), *later]),
+                joined([say_first(first.finding), _tool_at(results.motion, program.name, first), *later]),
                 " ".join(dict.fromkeys(text for each in told for text in remedies_of(program, each)[:1])),
                 address_of("programs", program.name, first.program_s or 0.0, line_id(program.name, first.line * own)),
                 first=say_first(first.finding),
@@ -81,13 +81,25 @@ def _placed(where: str, text: str) -> str:
 
 
 def _where(program: ProgramSummary, found: FindingAt) -> str:
-    """The line of a finding, with its file if it is not the program's own, and the player's time."""
+    """The line of a finding, with its file if it is not the program's own, the time into it, and the player's."""
     if not found.line:
         return ""
     line = tr("line {line}", line=found.line)
     if found not in of_line(program, found.line):
         return joined([found.file, line], ", ")
-    return line if found.program_s is None else joined([line, tr("{time} s", time=fixed(found.program_s, 2))], ", ")
+    if found.program_s is None or found.motion_s is None:
+        return line
+    own, clock = fixed(found.motion_s, 2), fixed(found.program_s, 2)
+    return tr("{line}, {own} s into it (player: {clock} s)", line=line, own=own, clock=clock)
+
+
+def _tool_at(motion: ProgramMotion, program: str, found: FindingAt) -> str:
+    """Where the tool is when a finding begins; empty off the way that is kept."""
+    rows = motion.take(motion.program == program)
+    if found.program_s is None or not len(rows):
+        return ""
+    xyz = [fixed(np.interp(found.program_s, rows.t_s, rows.xyz_mm[:, k]), 0) for k in range(3)]
+    return tr("tool at x, y, z = {xyz} mm", xyz=", ".join(xyz))
 
 
 def line_id(program: str, line: int) -> str:

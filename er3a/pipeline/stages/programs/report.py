@@ -13,6 +13,7 @@ from er3a.pipeline.messages.collision import solid_rows
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.programs import cycle_text, level_word, remedies, remedy_at
 from er3a.pipeline.messages.say import bracketed, say
+from er3a.pipeline.messages.trajectory import limits_assumed
 from er3a.pipeline.player.player import drawing_head, moment, player, stretch
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.programs import model
@@ -46,6 +47,7 @@ def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) ->
         output,
         head_links={each.name: f"#{each.name}" for each in summary.programs},
         sections=sections,
+        limits_assumed=limits_assumed(summary.assumed_speed, acceleration=True),
         faults={fault.name: fault for fault in faults(results)},
         player=player(robot, motions(results), scene),
         bodies=[each.name for each in scene.solids] if scene else [],

@@ -523,6 +523,7 @@ def _verdict(
     finding = model.AllSafe if safe == count else model.SomeUnsafe if safe else model.NoneSafe
     failed = any(_fails(path) for path in asked) or any(path.stops_at_s is not None for path in unfollowed)
     status: Status = "pass" if safe == count else "fail" if failed or not named("safe") else "caution"
+    judged: list[model.PathSummary | model.PathNotFollowed] = [*paths, *skipped]
     counts = finding(
         paths=count,
         safe=safe,
@@ -535,7 +536,7 @@ def _verdict(
         too_fast_if_assumed=named("too fast for the assumed limits"),
         undecided=named("undecided"),
         near_singular=named("near-singular"),
-        demonstrations=demonstrations([*paths, *skipped], "safe"),
+        demonstrations=demonstrations(judged, "safe", lambda each: each.outcomes),
         not_followed=tuple(path.name for path in unfollowed),
     )
     return Verdict(status, counts)

@@ -230,6 +230,13 @@ def verdict_of(found: Judgement, along: ClearanceAlong) -> PathVerdict:
     return min(verdicts, key=PATH_VERDICTS.index)
 
 
+def outcomes_of(found: Judgement, along: ClearanceAlong) -> tuple[PathVerdict, ...]:
+    """The gravest verdict on a motion and, if it is another, that it collides: the first fault first."""
+    verdict = verdict_of(found, along)
+    starts = [part.start for part in (found.beyond if verdict == "unreachable" else found.limits)]
+    return model.in_order(verdict, starts, [contact.start for contact in along.contacts])
+
+
 def min_clearance(along: ClearanceAlong) -> model.MinClearance | None:
     """Where the arm comes nearest to anything; None where nothing could be measured."""
     at = along.closest

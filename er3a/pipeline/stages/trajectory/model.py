@@ -5,6 +5,7 @@ Times count from a path's start, ways along the tool point's path. Angles are th
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Generic, Literal, TypeVar
 
@@ -335,9 +336,26 @@ class PathSummary:
         return self.verdict
 
     @property
+    def outcomes(self) -> tuple[PathVerdict, ...]:
+        """The verdict and, if it is another, that it collides: the first fault first."""
+        parts = self.unreachable if self.verdict == "unreachable" else self.out_of_limits
+        starts = [part.t0_s for part in parts]
+        return in_order(self.verdict, starts, [part.t0_s for part in self.collisions])
+
+    @property
     def chosen(self) -> TriedStrategy | None:
         """The strategy to take."""
         return next((tried for tried in self.avoidance if tried.name == self.strategy), None)
+
+
+def in_order(verdict: PathVerdict, starts: Sequence[float], collisions: Sequence[float]) -> tuple[PathVerdict, ...]:
+    """A path's verdict and, if it is another, that it collides: the first fault first.
+
+    ``starts``, ``collisions``: when (s) it leaves limits or reach, and when bodies begin to overlap.
+    """
+    if not collisions or verdict == "collides":
+        return (verdict,)
+    return ("collides", verdict) if min(collisions) < min(starts, default=0.0) else (verdict, "collides")
 
 
 @dataclass(frozen=True)
@@ -359,6 +377,11 @@ class PathNotFollowed:
     outcome: PathVerdict
     expect: PathVerdict | None
     stops_at_s: float | None = None
+
+    @property
+    def outcomes(self) -> tuple[PathVerdict, ...]:
+        """What it came to."""
+        return (self.outcome,)
 
 
 def is_safe(path: PathSummary, shapes: ShapesAssumed | None) -> bool:

@@ -272,7 +272,9 @@ def _effort(ax: Axes, path: model.PathSummary, rows: model.PathChecks, motions: 
 
 
 def _key(ax: Axes, corner: Literal["upper left", "lower left"]) -> None:
-    ax.legend(loc=corner, ncols=3, fontsize=8, handlelength=1.2, columnspacing=1.0, borderpad=0.1)
+    legend = ax.legend(loc=corner, ncols=3, fontsize=8, handlelength=1.2, columnspacing=1.0, borderpad=0.1)
+    legend.set_frame_on(True)  # a ground of its own, where a curve passes behind it
+    legend.get_frame().set(facecolor="white", edgecolor="none", alpha=0.85)
 
 
 def _limits(ax: Axes, robot: Robot, q_deg: Reals) -> None:
@@ -298,7 +300,9 @@ def _cut(ax: Axes, values: Reals) -> None:
     if size.size:
         reach = 1.6 * np.percentile(size, 97)
         ax.set_ylim(-reach, reach)
-        ax.text(0.99, 0.04, tr("cut: grows without bound"), transform=ax.transAxes, ha="right", fontsize=8)
+        ground = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.5}
+        text = tr("cut: grows without bound")
+        ax.text(0.99, 0.04, text, transform=ax.transAxes, ha="right", fontsize=8, bbox=ground, zorder=6)
 
 
 def _shades(path: model.PathSummary) -> list[tuple[tuple[model.Stretch[Any], ...], str, float, str]]:

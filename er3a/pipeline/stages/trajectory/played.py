@@ -131,7 +131,8 @@ def advised(path: model.PathSummary, rows: model.PathChecks, limits: model.Limit
     if text is None or path.chosen:
         return text
     if not path.in_joint_space and len(rows) and rows.near_singular[0]:
-        return joined([sentence("advice.near"), text], ". ")
+        met = any(event.crossing and event.t_s <= rows.t_s[0] for event in path.singularities)
+        return joined([sentence("advice.near#met" if met else "advice.near"), text], ". ")
     no_part = path.sound_end is None and WEIGHTS[path.verdict] == "fail"
     return joined([text, sentence("advice.no_part")], ". ") if no_part else text
 
@@ -145,8 +146,7 @@ def shown_verdict(path: model.PathSummary, near: ClearOfAssumed | None) -> tuple
     """A path's verdict in colour and words; ``near`` as of :func:`near_assumed`."""
     if path.verdict == "safe" and near:
         return "caution", tr("clear of assumed shapes only")
-    collides = outcome_word("collides") if path.collisions and path.verdict != "collides" else ""
-    return WEIGHTS[path.verdict], joined([outcome_word(path.verdict), collides], ", ")
+    return WEIGHTS[path.verdict], joined(map(outcome_word, path.outcomes), ", ")
 
 
 def near_assumed(path: model.PathSummary, summary: model.TrajectorySummary) -> ClearOfAssumed | None:

@@ -17,6 +17,7 @@ from er3a.pipeline.messages.trajectory import (
     event_distance,
     event_word,
     kind_word,
+    limits_assumed,
     path_text,
     reasons,
     strategy_word,
@@ -45,7 +46,6 @@ from er3a.robots.robot import Robot
 
 DRAWN = 250  # points of a curve
 MAX_DRAWN, DRAWN_OF_MORE = 16, 8  # paths with a figure and programs to save: all of up to so many, or the worst
-AT_ANY_PACE = ("leaves limits", "collides", "unreachable", "none found")  # verdicts of paths that fail however slow
 
 
 def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) -> None:
@@ -75,6 +75,7 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         clearance=clearance_section(results, count),
         solids=solid_rows(scene),
         assumed=assumed,
+        limits_assumed=limits_assumed(summary.joint_limits.speed_assumed, summary.joint_limits.acceleration_assumed),
         contradicted=contradicted,
         drawn_paths=count,
         turning=in_space(robot, results, paths[:count], scene),
@@ -117,7 +118,7 @@ def _section(
         strategies=_strategies(path),
         programs=[each for each in programs if not _repairs(path, each)],
         repaired=[each for each in programs if _repairs(path, each)],
-        shortest="–" if (shortest := _shortest(path)) is None else fixed(shortest, 2),
+        shortest="–" if path.verdict != "safe" or path.fastest_s is None else fixed(path.fastest_s, 2),
         figure=figure,
     )
 
@@ -128,11 +129,6 @@ def _clear_of(path: model.PathSummary) -> str:
         return ""
     far = number(path.clearance.least_mm, 3)
     return tr("{far} mm clear: {pair}.", far=far, pair=say(path.clearance.between))
-
-
-def _shortest(path: model.PathSummary) -> float | None:
-    """The shortest time (s) of a path; None where none follows it, or it fails at any pace."""
-    return None if path.verdict in AT_ANY_PACE else path.fastest_s
 
 
 def _repairs(path: model.PathSummary, program: dict[str, Any]) -> bool:
@@ -199,9 +195,10 @@ def _strategies(path: model.PathSummary) -> list[list[str]]:
             rows.append([name, *["–"] * 6, tr("not possible: {reason}", reason=reasons(tried))])
         else:
             rows.append([name, *_costs(tried.motion), _remark(tried, tried.motion)])
-    if shortest := _shortest(path):
-        costs = ["0", "0", "1.00", "1.00", clearance, fixed(shortest, 2)]
-        rows.append([tr("the path at its fastest"), *costs, tr("for comparison")])
+    if path.fastest_s and not (path.out_of_limits or path.collisions or path.unreachable):
+        costs = ["0", "0", "1.00", "1.00", clearance, fixed(path.fastest_s, 2)]
+        remark = tr("for comparison: only with a speed that varies along the path as the limits allow")
+        rows.append([tr("the path at its fastest"), *costs, remark])
     return rows
 
 

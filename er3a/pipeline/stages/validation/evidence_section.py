@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, dataclass, replace
+from itertools import product
 from math import pi
 from typing import Any
 
@@ -18,6 +19,7 @@ from er3a.kinematics.forward import forward
 from er3a.pipeline.messages.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.references import STATUS_MEANINGS, STATUS_WORDS
 from er3a.pipeline.messages.say import joined, say, sentence, word
+from er3a.pipeline.messages.validation import shortened
 from er3a.pipeline.stages.validation.model import TableEvidence
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.references.quantities import MM
@@ -25,7 +27,7 @@ from er3a.robots.robot import Robot
 
 MARKS: Mapping[Status, str] = {
     "settled": "✓",
-    "settled_up_to_signs": "±",
+    "settled_up_to_signs": "(✓)",
     "weak": "~",
     "contradicted": "✗",
     "consistent": "=",
@@ -33,6 +35,7 @@ MARKS: Mapping[Status, str] = {
     "gauge": "↔",
     "given": "·",
 }
+CONFIRMED = ("settled", "settled_up_to_signs")
 SETTLED = ("settled", "settled_up_to_signs", "gauge")
 COLUMNS = {
     "a": "a (mm)",
@@ -70,6 +73,7 @@ OTHER_COLUMNS = ("a", "alpha", "d", "beta", "offset", "direction")
 LIMITS = ("lower", "upper")
 DIFFERS = 2e-3
 BENT, BENT_BY = 5, pi / 6  # a joint (from 1) that is not at 0 where two tables are told apart, and its angle
+MAX_DIFFERENT = 3  # entries in which two tables may differ to be told apart at one pose
 STEEP = 85.0  # deg, from which pitch on roll and yaw are not unique enough to compare
 IN_UNIT = {"a": MM, "d": MM, "direction": 1.0} | dict.fromkeys(("alpha", "beta", "offset", *LIMITS), 180 / pi)
 OTHER_TITLES = {
@@ -87,11 +91,25 @@ OTHER_TEXTS = {
 }
 
 
-def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, Any] | None:
+def evidence_section(
+    robot: Robot, evidence: TableEvidence | None, to_use: TableEvidence | None = None
+) -> dict[str, Any] | None:
     """What the page shows of a table's evidence: the table by rows (a cell is None where it has no such entry), its
-    legend, and the entries in words; rows of entries begin with the name, which is the address on the page."""
+    legend, and the entries in words; rows of entries begin with the name, which is the address on the page.
+
+    ``to_use``: the evidence of the table to use instead. What only its own source gives is marked so in both: that
+    document alone settles an entry of another table, but would be called no confirmation beside it.
+    """
     if evidence is None:
         return None
+    unconfirmed = {each.entry for each in to_use.entries if each.status == "consistent"} if to_use else set()
+    of_one = [each.entry for each in evidence.entries if each.status in CONFIRMED and each.entry in unconfirmed]
+    evidence = replace(
+        evidence,
+        entries=tuple(
+            replace(each, status="consistent") if each.entry in of_one else each for each in evidence.entries
+        ),
+    )
     by_name = {each.entry: each for each in evidence.entries}
     joints = sorted({int(name[len(kind) :]) for name in by_name if (kind := name.rstrip("0123456789")) in COLUMNS})
     kinds = [kind for kind in COLUMNS if any(f"{kind}{joint}" in by_name for joint in joints)]
@@ -99,7 +117,9 @@ def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, 
     numbers = [each for each in everything if each.value is not None]
     left = [each for each in numbers if each.status not in SETTLED]
     read = _read_pose(robot, evidence)
-    by_pose = tr("{measurement}; or read the pose on the pendant, as below the other table")
+    by_pose = tr(
+        "{measurement}; or, when the directions are checked, read the pose on the pendant, as below the other table"
+    )
     proposals = {
         proposal.entry: by_pose.format(measurement=say(proposal))
         if read and isinstance(proposal, MeasureAngle)
@@ -122,39 +142,76 @@ def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, 
         open_rows=[[*_row(each), proposals.get(each.entry, "–")] for each in left],
         settled_rows=[_row(each) for each in numbers if each.status in SETTLED],
         unmet=not evidence.table_meets and evidence.other is None,
-        other=_other(evidence, read) if evidence.other else None,
+        other=_other(evidence) if evidence.other else None,
+        readings=read,
+        of_one=shortened(of_one),
         tolerance=tr(
             "{mm} mm and {deg} deg", mm=number(evidence.tolerance.mm, 2), deg=number(evidence.tolerance.deg, 2)
         ),
     )
 
 
-def _read_pose(robot: Robot, evidence: TableEvidence) -> str:
-    """What a pendant shows at a pose, which distinguishes the table from another that fits all documents.
+@dataclass(frozen=True)
+class PoseReadings:
+    """What a pendant shows at a pose, by what a table of an arm can be: reading and the entries that differ there.
 
-    Empty where there is none, or its orientation is the same or has no unique angles there.
+    ``first``: directions of joints, as words, that are to be checked before.
+    """
+
+    pose: str
+    first: str
+    rows: tuple[tuple[str, str], ...]
+
+
+def _read_pose(robot: Robot, evidence: TableEvidence) -> PoseReadings | None:
+    """What a pendant shows at a pose, which distinguishes the table from another that fits all documents, and from what
+    lies between the two: each of the entries in which they differ by itself, and the bent joint's direction.
+
+    None where there is no other, or its orientation is the same or has no unique angles there.
     """
     other = other_robot(robot, evidence)
     if other is None or evidence.other is None or evidence.other.code != "allowed" or robot.joints < BENT:
-        return ""
-    q = np.zeros(robot.joints)
-    q[BENT - 1] = BENT_BY if robot.upper[BENT - 1] >= BENT_BY else -BENT_BY
-    shown = [np.degrees(rpy_of(forward(each, q))).round(1) + 0.0 for each in (robot, other)]
-    if max(abs(angles[1]) for angles in shown) > STEEP or np.abs(shown[0] - shown[1]).max() < 1:
-        return ""
-    here, there = (", ".join(fixed(angle, 1) for angle in angles) for angles in shown)
-    return tr(
-        "To tell them apart, set no tool and no base, move J{joint} to {angle} deg and all other joints to 0: on the "
-        "pendant roll, pitch, yaw (about fixed x, y, z; A, B, C is yaw, pitch, roll) are {here} deg by the table of "
-        "this page and {there} deg by this one.",
-        joint=BENT,
-        angle=fixed(np.degrees(q[BENT - 1]), 0),
-        here=here,
-        there=there,
+        return None
+    q, bent = np.zeros(robot.joints), BENT - 1
+    q[bent] = BENT_BY if robot.upper[bent] >= BENT_BY else -BENT_BY
+    differs = [
+        (kind, k)
+        for kind in ("alpha", "offset")
+        for k in np.flatnonzero(np.abs(getattr(other, kind) - getattr(robot, kind)) > DIFFERS).tolist()
+    ]
+    if len(differs) > MAX_DIFFERENT:
+        return None
+    read: dict[tuple[float, ...], list[str]] = {}
+    for turned, *changed in product((False, True), *([(False, True)] * len(differs))):
+        values = {kind: getattr(robot, kind).copy() for kind in ("alpha", "offset", "direction")}
+        values["direction"][bent] *= -1 if turned else 1
+        named = []
+        for (kind, k), change in zip(differs, changed):
+            if change:
+                values[kind][k] = getattr(other, kind)[k]
+                named.append(f"{kind}{k + 1} = {_plain(np.degrees(values[kind][k]))}")
+        if turned:
+            named.append(f"direction{BENT} = {_plain(values['direction'][bent])}")
+        angles = np.degrees(rpy_of(forward(robot.replace(**values), q)))
+        if abs(angles[1]) > STEEP:
+            return None
+        seen = tuple((np.where(angles.round(1) == -180, 180.0, angles.round(1)) + 0.0).tolist())
+        read.setdefault(seen, []).append(joined(named, ", ") or tr("the table of this page"))
+    if len(read) == 1:
+        return None
+    joints = [
+        each.entry[len("direction") :]
+        for each in evidence.entries
+        if column_of(each.entry) == "direction" and each.status not in SETTLED
+    ]
+    return PoseReadings(
+        pose=tr("J{joint} at {angle} deg, all others at 0", joint=BENT, angle=fixed(np.degrees(q[bent]), 0)),
+        first=", ".join(joints),
+        rows=tuple((", ".join(fixed(angle, 1) for angle in seen), joined(named)) for seen, named in read.items()),
     )
 
 
-def _other(evidence: TableEvidence, read: str) -> dict[str, Any] | None:
+def _other(evidence: TableEvidence) -> dict[str, Any] | None:
     found = evidence.other
     if found is None:
         return None
@@ -176,9 +233,7 @@ def _other(evidence: TableEvidence, read: str) -> dict[str, Any] | None:
             cells.append((_plain(value), abs(value - given) > DIFFERS, ""))
         rows.append((joint, cells))
     title, text = (word(found.code, words, found.code) for words in (OTHER_TITLES, OTHER_TEXTS))
-    return dict(
-        title=title, text=joined([text, read], " "), page="", columns=[tr(COLUMNS[kind]) for kind in kinds], rows=rows
-    )
+    return dict(title=title, text=text, page="", columns=[tr(COLUMNS[kind]) for kind in kinds], rows=rows)
 
 
 def _limit(each: EntryEvidence) -> float:

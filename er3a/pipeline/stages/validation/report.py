@@ -255,6 +255,7 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
     file = robot_file(corrected) if corrected and not summary.is_beyond_correction else None
     text = robot_text(file) if file else ""
     instead = alternative_table(study, name, stored.folder.parents[1]) if contradicted and stored.folder else None
+    unsettled, known = _known(stored, instead) if instead else ("", None)
     render_stage(
         study,
         stored,
@@ -262,8 +263,8 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
         head=_head(stored, instead),
         robot=robot,
         fold=contradicted,
-        to_use=table_to_use(robot, study.robot(instead), *_known(stored, instead)) if instead else None,
-        table_evidence=evidence_section(robot, summary.evidence),
+        to_use=table_to_use(robot, study.robot(instead), unsettled, known) if instead else None,
+        table_evidence=evidence_section(robot, summary.evidence, known),
         frames=_frames_picture(robot, summary),
         formulas=formulas(robot),
         sets=[_set_story(found, judged, results.key_poses) for found in summary.sets],
@@ -327,7 +328,7 @@ def _set_story(found: model.SetSummary, checks: Iterable[Judged], poses: model.K
         found=found,
         counted=counted_checks(found.counts)
         if found.is_authoritative
-        else tr("{passed} of {total} claims hold", passed=claims.passed, total=claims.total),
+        else tr("{passed} of {total} statements hold", passed=claims.passed, total=claims.total),
         is_authoritative=found.is_authoritative,
         conflicting=sum(each.conflicting for each in weighing),
         statements=[validation_figures.typographic(say(each)) for each in (found.described, found.own_text) if each],

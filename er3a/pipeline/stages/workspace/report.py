@@ -145,12 +145,12 @@ def _change_rows(summary: model.WorkspaceSummary) -> list[list[str]]:
 def _section_caption(summary: model.WorkspaceSummary, drawn: bool) -> str:
     texts = [
         tr(
-            "Cells are bars along the slide. What is white on the right is proven unreachable all along it; blank "
+            "Cells are bars along the slide. What is empty on the right is proven unreachable all along it; blank "
             "cells on the left were merely not sampled."
         )
         if summary.proof.bars
         else tr(
-            "What is white on the right is proven unreachable from every side; blank cells on the left were merely not "
+            "What is empty on the right is proven unreachable from every side; blank cells on the left were merely not "
             "sampled."
         )
     ]
@@ -196,7 +196,7 @@ def _slices_caption(summary: model.WorkspaceSummary) -> str:
     pockets = len(summary.voids) - enclosed
     return tr(
         "The hull contains {voids} and {pockets}. Every point of the blue area is reached by some joint vector "
-        "within the limits; place nothing in the white.",
+        "within the limits; place nothing outside it.",
         voids=sentence("workspace.voids", count=enclosed) if enclosed else tr("no enclosed void"),
         pockets=sentence("workspace.pockets", count=pockets),
     )

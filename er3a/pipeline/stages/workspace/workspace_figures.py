@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from typing import Any
 
@@ -416,7 +417,7 @@ def _draw_samples(axes: Axes, views: model.SideViewCells, point: str) -> QuadMes
 
 
 CLOUD_POINTS = 12_000
-_COLOURS = {"enclosed": HIGHLIGHT, "open": REFERENCE}
+_COLOURS = {"enclosed": (HIGHLIGHT, JOINTS[6]), "open": (REFERENCE, JOINTS[8])}  # in turns, so that two stand apart
 _NAMES = {"enclosed": N_("void {number} (enclosed)"), "open": N_("void {number} (open)")}
 
 
@@ -427,11 +428,14 @@ def in_space(robot: Robot, results: model.WorkspaceResults, scene: Scene | None)
     value = cloud.manipulability_m3[far]
     most = float(np.quantile(value, 0.99)) or 1.0
     layers = [Layer(tr("cloud, far half"), "points", 1000 * cloud.point_m[far], width=1.6, shade=value / most)]
+    drawn: Counter[str] = Counter()
     for i, void in enumerate(results.summary.voids, start=1):
         faces = triangles.corners[triangles.void == i]
         if len(faces):
             name, corners = tr(_NAMES[void.kind], number=i), 1000 * vertices.point_m[vertices.void == i]
-            layers.append(Layer(name, "surface", corners, _COLOURS[void.kind], faces=faces))
+            colour = _COLOURS[void.kind][drawn[void.kind] % 2]
+            layers.append(Layer(name, "surface", corners, colour, faces=faces))
+            drawn[void.kind] += 1
     layers.append(Layer(tr("arm at 0"), "line", 1000 * skeleton(robot, np.zeros(robot.joints)), width=5.0))
     layers += scene_layers(scene)
     scale = ColourScale("viridis", tr("manipulability (m³)"), [(0.0, "0"), (1.0, number(most, 2))])
