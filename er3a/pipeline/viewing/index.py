@@ -58,6 +58,7 @@ from er3a.pipeline.stages.programs.played import faults as program_faults
 from er3a.pipeline.stages.registry import STAGES, all_messages
 from er3a.pipeline.stages.trajectory.model import PathSummary, TrajectoryResults
 from er3a.pipeline.stages.trajectory.played import faults as path_faults
+from er3a.pipeline.stages.validation.evidence_section import evidence_section
 from er3a.pipeline.stages.validation.model import AnotherArm, Contradicted, DefinedOtherwise, LeftOpen, PartFound
 from er3a.pipeline.stages.workspace.model import VoidSummary, WorkspaceResults, WorkspaceSummary
 from er3a.pipeline.study import Study
@@ -595,6 +596,9 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         "may_run": table != "fail",
         "decision": decision(table, [*failed.values()], instead, unproven=unproven, same_arm=same_arm),
         "settled": settled,
+        "entries": evidence_section(robot, getattr(heads["validation"].summary, "evidence", None))
+        if "validation" in heads
+        else None,
         "instead": {instead: f"#{instead}"} if instead else {},
         "answers": [*_answers(heads, robot)],
         "notes": {stage: _note(stage, head, stored[stage].results) for stage, head in heads.items()},
@@ -665,7 +669,8 @@ def _answers(heads: Mapping[str, Head], robot: Robot) -> Iterator[tuple[str, str
     if workspace:
         box = box_text(workspace)
         if box and _misses(heads["workspace"], "tool"):
-            box = joined([box, tr("No tool is given: the tool point is the flange's centre.")], " ")
+            bare = tr("No tool is given: the flange's own centre enters the box. Repeat it with your tool's length.")
+            box = joined([box, bare], " ")
         yield tr("Tray or box"), box, "workspace.html#placement"
     summary = heads["dynamics"].summary if "dynamics" in heads else None
     yield tr("Payload"), payload_text(summary, robot), "dynamics.html#payload" if summary else ""
@@ -701,9 +706,9 @@ def _puts_box(heads: Mapping[str, Head]) -> bool:
 def _condition(parts: Sequence[PartFound], unbounded: Sequence[str]) -> str:
     """What has to be confirmed before anything that passes is run on the arm; empty where all of its table is."""
     if not parts:
-        return tr("In the model: run none on the arm before its table is confirmed.")
+        return tr("Run nothing on the arm until its table is confirmed.")
     names = unconfirmed(parts, unbounded)
-    return names and tr("In the model: run none on the arm before these are confirmed: {entries}.", entries=names)
+    return names and tr("Run nothing on the arm until these are confirmed: {entries}.", entries=names)
 
 
 def _run(stage: str, results: TrajectoryResults | ProgramsResults) -> dict[str, Any]:

@@ -23,7 +23,7 @@ from er3a.pipeline.messages.trajectory import (
     path_text,
     repair_text,
 )
-from er3a.pipeline.player.motions import Fault, Mark, PlayedEvent, PlayedMotion, Weight, address_of
+from er3a.pipeline.player.motions import Fault, FaultMoment, Mark, PlayedEvent, PlayedMotion, Weight, address_of
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.planning.motion_faults import joints_of
@@ -78,9 +78,10 @@ def faults(results: model.TrajectoryResults) -> list[Fault]:
         if model.is_safe(path, results.summary.verdict.shapes):
             continue
         clearance = path.clearance if path.verdict == "safe" else None
-        first, t, later = (say(near), clearance.t_s, "") if clearance else _first_fault(path)
+        wrong = [(clearance.t_s, say(near))] if clearance else _faults(path)
         status, verdict = shown_verdict(path, near)
-        to_do, instead = _to_do(path, results.checks.take(results.checks.path == path.name), results.summary)
+        rows = results.checks.take(results.checks.path == path.name)
+        to_do, instead = _to_do(path, rows, results.summary)
         found.append(
             Fault(
                 path.name,
@@ -88,25 +89,36 @@ def faults(results: model.TrajectoryResults) -> list[Fault]:
                 status,
                 verdict,
                 path.expect == path.verdict != "safe",
-                "" if t is None else tr("{time} s", time=fixed(t, 3)),
-                joined([first, later]),
+                tuple(_moment(text, t, rows) for t, text in wrong),
                 to_do,
-                address_of("trajectory", path.name, t or 0.0, path.name),
+                address_of("trajectory", path.name, wrong[0][0] or 0.0, path.name),
                 instead,
-                first,
             )
         )
     return found
 
 
-def _first_fault(path: model.PathSummary) -> tuple[str, float | None, str]:
-    """What is wrong first with a path that is not safe, and when (s), if it has a time; then what is wrong later."""
+def _faults(path: model.PathSummary) -> Sequence[tuple[float | None, str]]:
+    """What is wrong with a path that is not safe, and when (s), if it has a time: first, and what weighs more later."""
     found = [] if path.no_way else first_faults(path)
     if (path.verdict in ("singular", "near-singular") and len(found) <= 1) or not found:
         times = [] if path.no_way else _singular_times(path) or [event.t_s for event in path.singularities]
-        return path_text(path), min(times, default=None), ""
-    later = [tr("at t = {time} s: {text}", time=fixed(t, 3), text=text) for t, text in found[1:]]
-    return found[0][1], found[0][0], joined(later)
+        return [(min(times, default=None), path_text(path))]
+    return found
+
+
+def _moment(what: str, t: float | None, rows: model.PathChecks) -> FaultMoment:
+    """A fault at a time (s) of a path, with the place of it between the path's rows."""
+    if t is None:
+        return FaultMoment(what)
+    when = tr("{time} s", time=fixed(t, 3))
+    if not len(rows):
+        return FaultMoment(what, when)
+    far, *xyz = (float(np.interp(t, rows.t_s, values)) for values in (1000 * rows.s_m, *rows.xyz_mm.T))
+    place = tr(
+        "{far} mm along it, x, y, z = {xyz} mm", far=fixed(far, 1), xyz=joined([fixed(value, 1) for value in xyz], ", ")
+    )
+    return FaultMoment(what, when, place if np.isfinite([far, *xyz]).all() else "")
 
 
 def _singular_times(path: model.PathSummary) -> list[float]:

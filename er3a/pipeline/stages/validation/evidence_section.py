@@ -12,7 +12,7 @@ from markupsafe import Markup
 
 from er3a.geometry.transforms import rpy_of
 from er3a.identifiability.entries import column_of
-from er3a.identifiability.entry_evidence import EntryEvidence, OtherReading, Status
+from er3a.identifiability.entry_evidence import EntryEvidence, OtherReading, OtherTable, Status
 from er3a.identifiability.proposals import MeasureAngle
 from er3a.kinematics.forward import forward
 from er3a.pipeline.messages.language import N_, own_title, tr, with_unit
@@ -34,6 +34,19 @@ MARKS: Mapping[Status, str] = {
     "given": "·",
 }
 SETTLED = ("settled", "settled_up_to_signs", "gauge")
+VERDICTS: Mapping[str, Mapping[Status, str]] = {  # in the three words that a reader of the index needs
+    N_("confirmed"): {
+        "settled": "",
+        "settled_up_to_signs": N_("its sign follows from open entries"),
+        "gauge": N_("only the sum counts"),
+    },
+    N_("not confirmed"): {
+        "weak": N_("too loosely"),
+        "consistent": N_("only its own source gives it"),
+        "open": N_("no document tells it from another value"),
+    },
+    N_("contradicted"): {"contradicted": N_("→ what the evidence gives")},
+}
 COLUMNS = {
     "a": "a (mm)",
     "alpha": "α (°)",
@@ -109,7 +122,13 @@ def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, 
     present = dict.fromkeys(each.status for each in numbers)
     return dict(
         columns=[tr(COLUMNS[kind]) for kind in kinds],
-        rows=[(joint, [_cell(by_name.get(f"{kind}{joint}")) for kind in kinds]) for joint in joints],
+        rows=[(joint, [_cell(by_name.get(f"{kind}{joint}"), evidence) for kind in kinds]) for joint in joints],
+        verdicts=[
+            (tr(verdict), [(status, MARKS[status], tr(text)) for status, text in each.items() if status in present])
+            for verdict, each in VERDICTS.items()
+            if not present.keys().isdisjoint(each)
+        ],
+        allowed=_allowed(evidence),
         legend=[
             (status, mark, _status(status), word("status_meaning", STATUS_MEANINGS, status))
             for status, mark in MARKS.items()
@@ -170,15 +189,41 @@ def _other(evidence: TableEvidence, read: str) -> dict[str, Any] | None:
             if each is None:  # a limit of a joint that turns on and on
                 cells.append(("–", False, ""))
                 continue
-            given = each.value or 0.0
-            value = _limit(each) if kind in LIMITS else getattr(found.table, kind)[joint - 1] * IN_UNIT[kind]
-            value = _roundest(value, each)
-            cells.append((_plain(value), abs(value - given) > DIFFERS, ""))
+            value = _other_value(found, each)
+            cells.append((_plain(value), abs(value - (each.value or 0.0)) > DIFFERS, ""))
         rows.append((joint, cells))
     title, text = (word(found.code, words, found.code) for words in (OTHER_TITLES, OTHER_TEXTS))
     return dict(
         title=title, text=joined([text, read], " "), page="", columns=[tr(COLUMNS[kind]) for kind in kinds], rows=rows
     )
+
+
+def _other_value(found: OtherTable, each: EntryEvidence) -> float:
+    """An entry's value in the other table, as rounded as its evidence allows."""
+    kind = column_of(each.entry)
+    if kind not in OTHER_COLUMNS:
+        return _roundest(_limit(each), each)
+    joint = int(each.entry.removeprefix(kind))
+    return _roundest(getattr(found.table, kind)[joint - 1] * IN_UNIT[kind], each)
+
+
+def _gives(each: EntryEvidence, evidence: TableEvidence) -> str:
+    """What evidence gives instead of a contradicted entry, or as well as an open one; empty where that is no other."""
+    found, kind = evidence.other, column_of(each.entry)
+    if found is None or (found.code == "described") != (each.status == "contradicted"):
+        return ""
+    if kind not in (*OTHER_COLUMNS, *LIMITS) or (found.code == "allowed" and kind in LIMITS):
+        return ""
+    value = _other_value(found, each)
+    return _plain(value) if abs(value - (each.value or 0.0)) > DIFFERS else ""
+
+
+def _allowed(evidence: TableEvidence) -> str:
+    """The entries of another table that fits every document, as it has them; empty where there is none."""
+    if evidence.other is None or evidence.other.code != "allowed":
+        return ""
+    given = [(each, _gives(each, evidence)) for each in evidence.entries]
+    return joined([f"{each.entry} = {value} ({_value(each)})" for each, value in given if value], ", ")
 
 
 def _limit(each: EntryEvidence) -> float:
@@ -243,11 +288,12 @@ def other_robot(robot: Robot, evidence: TableEvidence | None) -> Robot | None:
     return robot.replace(**asdict(evidence.other.table)) if evidence and evidence.other else None
 
 
-def _cell(each: EntryEvidence | None) -> dict[str, Any] | None:
+def _cell(each: EntryEvidence | None, evidence: TableEvidence) -> dict[str, Any] | None:
     if each is None or each.value is None:
         return None
     title = tr("{entry}: {status}", entry=each.entry, status=_status(each.status))
-    return dict(entry=each.entry, value=_value(each), status=each.status, mark=MARKS[each.status], title=title)
+    shown = dict(entry=each.entry, value=_value(each), status=each.status, mark=MARKS[each.status], title=title)
+    return shown | dict(gives=_gives(each, evidence))
 
 
 def _status(status: Status) -> str:
