@@ -101,7 +101,7 @@ def test_a_fault_ends_with_a_code_and_a_demonstration_is_counted_apart(tmp_path,
     cells = (tmp_path / "index.html").read_text(encoding="utf-8").split('class="cells"')[1].split("<li>")
     (cell,) = (each for each in cells if f"{ROBOT}/trajectory.html" in each)
     assert f'badge {status}"' in cell
-    assert (f"{shown} meant to be faulty and found so" in cell) == bool(shown)
+    assert (f"{shown} expected to fail, and did" in cell) == bool(shown)
 
 
 @pytest.mark.parametrize("name", ["line_collides", "line_limits"])

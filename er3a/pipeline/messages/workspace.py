@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.pipeline.messages.kinematics import sum_of_joints
 from er3a.pipeline.messages.language import N_, as_text, tr, with_unit
@@ -191,8 +193,8 @@ TEXTS = texts(
             "and run again."
         ),
         "box.range": (
-            "Stands {least} to {most} mm high pass the same checks, but nearer to a singular pose: manipulability falls "
-            "to {percent:.2g} % of that at {gap} mm."
+            "Stands {least} to {most} mm high pass the same checks, but nearer to a singular pose: manipulability "
+            "falls to {percent:.2g} % or less of that at {gap} mm."
         ),
         "box.proven#all": "the tool point, {tilt}, reaches all of it (proven); {unchecked}",
         "box.proven#upper": (
@@ -233,6 +235,7 @@ def _(found: model.VoidUnexpected) -> str:
 
 
 SERVED_ALL_M = 1e-6
+SAME_PLACE_M = 1e-6
 CHANGED_FIRST = ("offset", "direction", "lower", "upper", "a", "d")
 NAMED_CHANGES = 4
 
@@ -393,6 +396,22 @@ def _reached(placement: model.PlacementSummary, status: str, form: str, served_f
     unchecked = sentence("box.unchecked")
     served = millimetres([served_from_m])
     return sentence(f"box.{status}#{form}", tilt=tilt, unchecked=unchecked, served_from=served)
+
+
+def range_text(placement: model.PlacementSummary, places: model.BoxPlaces) -> str:
+    """How high the stand of the box may be, and how near to a singular pose the arm comes over that range; empty where
+    no stand is needed or only one height serves."""
+    gaps = placement.over.gaps_m if placement.over and not placement.stand else None
+    if gaps is None or gaps[1] == gaps[2]:
+        return ""
+    gap, least, most = gaps
+    *xy, z = placement.best.centre_m
+    above = np.abs(places.centre_m[:, :2] - xy).max(axis=1) < SAME_PLACE_M
+    heights = places.centre_m[:, 2] - z + gap
+    above &= (least - SAME_PLACE_M < heights) & (heights < most + SAME_PLACE_M)
+    worst = min(places.manipulability_m3[above], default=0.0) / placement.best.manipulability_m3
+    shown = {"gap": millimetres([gap]), "least": millimetres([least]), "most": millimetres([most])}
+    return sentence("box.range", percent=100 * float(worst), **shown)
 
 
 def void_text(summary: Summary, *, confirmed: bool = True) -> str:

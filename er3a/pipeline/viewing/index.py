@@ -41,7 +41,7 @@ from er3a.pipeline.messages.validation import (
     shortened,
     unconfirmed,
 )
-from er3a.pipeline.messages.workspace import box_text, judged_void, void_text
+from er3a.pipeline.messages.workspace import box_text, judged_void, range_text, void_text
 from er3a.pipeline.results import (
     AbsentResults,
     Input,
@@ -58,9 +58,9 @@ from er3a.pipeline.stages.programs.played import faults as program_faults
 from er3a.pipeline.stages.registry import STAGES, all_messages
 from er3a.pipeline.stages.trajectory.model import PathSummary, TrajectoryResults
 from er3a.pipeline.stages.trajectory.played import faults as path_faults
-from er3a.pipeline.stages.validation.evidence_section import evidence_section
+from er3a.pipeline.stages.validation.evidence_section import evidence_section, verdict_legend
 from er3a.pipeline.stages.validation.model import AnotherArm, Contradicted, DefinedOtherwise, LeftOpen, PartFound
-from er3a.pipeline.stages.workspace.model import VoidSummary, WorkspaceResults, WorkspaceSummary
+from er3a.pipeline.stages.workspace.model import PlacementSummary, VoidSummary, WorkspaceResults, WorkspaceSummary
 from er3a.pipeline.study import Study
 from er3a.pipeline.sweeps import ENTRIES, entry_label
 from er3a.pipeline.verdicts import NOT_EXAMINED, StageVerdict, read_verdicts
@@ -502,6 +502,7 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         folder / "index.html",
         places=list(_places(study, folder)),
         robots=robots,
+        legend=verdict_legend(status for each in robots if each["entries"] for status in each["entries"]["statuses"]),
         article=study.article is not None,
         questions={stage.name: stage.question for stage in STAGES.values()},
         shown_figures=SHOWN_FIGURES,
@@ -600,7 +601,8 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         if "validation" in heads
         else None,
         "instead": {instead: f"#{instead}"} if instead else {},
-        "answers": [*_answers(heads, robot)],
+        "dh_instead": {instead: f"#dh-{instead}"} if instead else {},
+        "answers": [*_answers(heads, robot, _box_range(stored["workspace"].results) if "workspace" in stored else "")],
         "notes": {stage: _note(stage, head, stored[stage].results) for stage, head in heads.items()},
         "bare": any(
             _misses(heads[stage], "carried") or _misses(heads[stage], "tool") for stage in RUNS if stage in heads
@@ -663,14 +665,16 @@ def _settled(finding: object) -> tuple[bool, str]:
     return part is not None and not (part.settled or part.up_to_signs), said
 
 
-def _answers(heads: Mapping[str, Head], robot: Robot) -> Iterator[tuple[str, str, str]]:
-    """What is asked of an arm first: the question, its answer and where it is shown."""
+def _answers(heads: Mapping[str, Head], robot: Robot, box_range: str) -> Iterator[tuple[str, str, str]]:
+    """What is asked of an arm first: the question, its answer and where it is shown; ``box_range``: how high the box's
+    stand may be."""
     workspace = heads["workspace"].summary if "workspace" in heads else None
     if workspace:
         box = box_text(workspace)
         if box and _misses(heads["workspace"], "tool"):
             bare = tr("No tool is given: the flange's own centre enters the box. Repeat it with your tool's length.")
             box = joined([box, bare], " ")
+        box = joined([box, box_range], " ") if box else ""
         yield tr("Tray or box"), box, "workspace.html#placement"
     summary = heads["dynamics"].summary if "dynamics" in heads else None
     yield tr("Payload"), payload_text(summary, robot), "dynamics.html#payload" if summary else ""
@@ -679,6 +683,14 @@ def _answers(heads: Mapping[str, Head], robot: Robot) -> Iterator[tuple[str, str
         if isinstance(workspace, WorkspaceSummary) and workspace.enclosed_voids:
             place = f"#void-{workspace.voids.index(judged_void(workspace)) + 1}"
         yield tr("Void"), void_text(workspace, confirmed=_limits_confirmed(heads)), f"workspace.html{place}"
+
+
+def _box_range(results: Any) -> str:
+    """How high the stand of a box may be; empty where none is proposed."""
+    placement = getattr(results.summary, "placement", None)
+    if not isinstance(placement, PlacementSummary) or not placement.named_places:
+        return ""
+    return range_text(placement, results.places)
 
 
 def _limits_confirmed(heads: Mapping[str, Head]) -> bool:

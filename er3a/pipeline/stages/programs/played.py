@@ -83,10 +83,10 @@ def _place(found: FindingAt, rows: ProgramMotion) -> str:
     track = np.stack([np.interp(moments, rows.t_s, values) for values in rows.xyz_mm.T], axis=1)
     far = np.linalg.norm(np.diff(track, axis=0), axis=1).sum()
     return tr(
-        "{time} s and {far} mm into the line, x, y, z = {xyz} mm",
+        "{time} s and {far} mm into it, ({xyz})",
         time=fixed(found.motion_s, 2),
-        far=fixed(far, 1),
-        xyz=joined([fixed(value, 1) for value in track[-1]], ", "),
+        far=fixed(far, 0),
+        xyz=joined([fixed(value, 0) for value in track[-1]], ", "),
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 from math import pi
 from typing import Any
@@ -12,13 +12,13 @@ from markupsafe import Markup
 
 from er3a.geometry.transforms import rpy_of
 from er3a.identifiability.entries import column_of
-from er3a.identifiability.entry_evidence import EntryEvidence, OtherReading, OtherTable, Status
+from er3a.identifiability.entry_evidence import EntryEvidence, OtherReading, Status
 from er3a.identifiability.proposals import MeasureAngle
 from er3a.kinematics.forward import forward
 from er3a.pipeline.messages.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.references import STATUS_MEANINGS, STATUS_WORDS
 from er3a.pipeline.messages.say import joined, say, sentence, word
-from er3a.pipeline.stages.validation.model import TableEvidence
+from er3a.pipeline.stages.validation.model import OtherTableFound, TableEvidence
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.references.quantities import MM
 from er3a.robots.robot import Robot
@@ -123,11 +123,7 @@ def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, 
     return dict(
         columns=[tr(COLUMNS[kind]) for kind in kinds],
         rows=[(joint, [_cell(by_name.get(f"{kind}{joint}"), evidence) for kind in kinds]) for joint in joints],
-        verdicts=[
-            (tr(verdict), [(status, MARKS[status], tr(text)) for status, text in each.items() if status in present])
-            for verdict, each in VERDICTS.items()
-            if not present.keys().isdisjoint(each)
-        ],
+        statuses=list(present),
         allowed=_allowed(evidence),
         legend=[
             (status, mark, _status(status), word("status_meaning", STATUS_MEANINGS, status))
@@ -146,6 +142,19 @@ def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, 
             "{mm} mm and {deg} deg", mm=number(evidence.tolerance.mm, 2), deg=number(evidence.tolerance.deg, 2)
         ),
     )
+
+
+def verdict_legend(statuses: Iterable[Status]) -> list[tuple[str, list[tuple[Status, str, str]]]]:
+    """What the marks of these statuses mean: each verdict with its statuses, their marks and what they add to it."""
+    present = set(statuses)
+    return [
+        (
+            tr(verdict),
+            [(status, MARKS[status], text and tr(text)) for status, text in each.items() if status in present],
+        )
+        for verdict, each in VERDICTS.items()
+        if not present.isdisjoint(each)
+    ]
 
 
 def _read_pose(robot: Robot, evidence: TableEvidence) -> str:
@@ -198,7 +207,7 @@ def _other(evidence: TableEvidence, read: str) -> dict[str, Any] | None:
     )
 
 
-def _other_value(found: OtherTable, each: EntryEvidence) -> float:
+def _other_value(found: OtherTableFound, each: EntryEvidence) -> float:
     """An entry's value in the other table, as rounded as its evidence allows."""
     kind = column_of(each.entry)
     if kind not in OTHER_COLUMNS:
@@ -223,7 +232,10 @@ def _allowed(evidence: TableEvidence) -> str:
     if evidence.other is None or evidence.other.code != "allowed":
         return ""
     given = [(each, _gives(each, evidence)) for each in evidence.entries]
-    return joined([f"{each.entry} = {value} ({_value(each)})" for each, value in given if value], ", ")
+    texts = [
+        tr("{entry} = {value} (here {own})", entry=each.entry, value=v, own=_value(each)) for each, v in given if v
+    ]
+    return joined(texts, ", ")
 
 
 def _limit(each: EntryEvidence) -> float:
