@@ -162,8 +162,8 @@ TEXTS = texts(
         "void.rests": "The bounds hold for {limits}, which nothing confirms.",
         "void.cause#noun": "Its cause: {cause}.",
         "void.expected": (
-            "This is normal for the arm: no target there can be reached. Collisions of the arm are not counted, so what "
-            "can't be reached is larger."
+            "This is normal for the arm: no target there can be reached. Collisions of the arm are not counted, so "
+            "what can't be reached is larger."
         ),
         "void.no_tool": "With a tool the void is elsewhere.",
         "void.pocket": (
@@ -188,9 +188,9 @@ TEXTS = texts(
             "with them: before you run any there, put both into the study's scene file and run again."
         ),
         "box.put#free": (
-            "Planning only: the box with its centre at ({centre}) mm; no surface is known there. Box: {box}; {reached}. "
-            "No path or program was checked with it: before you run any there, put the box into the study's scene file "
-            "and run again."
+            "Planning only: the box with its centre at ({centre}) mm; no surface is known there. Box: {box}; "
+            "{reached}. No path or program was checked with it: before you run any there, put the box into the study's "
+            "scene file and run again."
         ),
         "box.range": (
             "Stands {least} to {most} mm high pass the same checks, but nearer to a singular pose: manipulability "

@@ -41,8 +41,8 @@ class Mark:
 
 @dataclass(frozen=True)
 class FaultMoment:
-    """One thing that is wrong: ``when``, or in which line, and ``place``, how far along and where the tool point is then;
-    both empty where not known."""
+    """One thing that is wrong: ``when``, or in which line, and ``place``, how far along and where the tool point is
+    then; both empty where not known."""
 
     what: str
     when: str = ""
