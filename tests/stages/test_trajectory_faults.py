@@ -14,6 +14,7 @@ from lxml import etree
 from er3a.collision.pairs import ShapesAssumed
 from er3a.files.path_file import load_paths
 from er3a.files.robot_library import load_robot
+from er3a.kinematics.forward import forward
 from er3a.pipeline.messages.trajectory import SoundEnd, advice, end_text, first_faults
 from er3a.pipeline.program_reports import programs_of
 from er3a.pipeline.stages import run
@@ -190,6 +191,25 @@ def test_what_is_wrong_before_a_contact_ends_the_sound_part_of_a_path(tmp_path):
     assert "From t = 0.5 s: wrist singularity; from t = 0.9 s (100.0 mm of the path) it is out of reach" in advice(
         beyond, last_sound(beyond, rows, limits)
     )
+
+
+@pytest.mark.parametrize("name", ["line_collides", "line_limits"])
+def test_a_fault_has_its_place_along_the_path(tmp_path, name):
+    """By the path's own file, whose lines are driven from standstill to standstill along one straight line."""
+    study = study_of(tmp_path, name)
+    results = compute(study, ROBOT)
+    (path,), (fault,), robot = results.summary.paths, faults(results), study.robot(ROBOT)
+    found = sorted(part.t0_s for part in (*path.collisions, *path.out_of_limits))[: len(fault.moments)]
+    assert [float(each.when.removesuffix(" s")) for each in fault.moments] == [round(t, 3) for t in found]
+    rows = results.checks
+    start = forward(robot, np.radians(rows.q_deg[0]))[:3, 3]
+    for t, moment in zip(found, fault.moments):
+        place = moment.place.replace("−", "-")
+        far, *xyz = map(float, re.fullmatch(r"(.*) mm, \((.*), (.*), (.*)\)", place).groups())
+        q = [np.interp(t, rows.t_s[rows.reachable], own) for own in np.radians(rows.q_deg[rows.reachable]).T]
+        tool = forward(robot, np.array(q))[:3, 3]
+        np.testing.assert_allclose(xyz, 1000 * tool, atol=1)
+        np.testing.assert_allclose(far, 1000 * np.linalg.norm(tool - start), atol=1)
 
 
 @pytest.mark.parametrize(
