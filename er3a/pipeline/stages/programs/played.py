@@ -86,7 +86,7 @@ def _place(found: FindingAt, rows: ProgramMotion) -> str:
         "{time} s and {far} mm into it, ({xyz})",
         time=fixed(found.motion_s, 2),
         far=fixed(far, 0),
-        xyz=joined([fixed(value, 0) for value in track[-1]], ", "),
+        xyz=", ".join(fixed(value, 0) for value in track[-1]),
     )
 
 

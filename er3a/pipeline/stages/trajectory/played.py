@@ -115,7 +115,7 @@ def _moment(what: str, t: float | None, rows: model.PathChecks) -> FaultMoment:
     if not len(rows):
         return FaultMoment(what, when)
     far, *xyz = (float(np.interp(t, rows.t_s, values)) for values in (1000 * rows.s_m, *rows.xyz_mm.T))
-    place = tr("{far} mm, ({xyz})", far=fixed(far, 0), xyz=joined([fixed(value, 0) for value in xyz], ", "))
+    place = tr("{far} mm, ({xyz})", far=fixed(far, 0), xyz=", ".join(fixed(value, 0) for value in xyz))
     return FaultMoment(what, when, place if np.isfinite([far, *xyz]).all() else "")
 
 
