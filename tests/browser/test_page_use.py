@@ -171,6 +171,24 @@ def test_a_link_into_a_fold_opens_it(browser, small_study):
     assert fold.find_element(By.CSS_SELECTOR, "a[href$='#line_clean']").is_displayed()
 
 
+def test_back_leads_to_where_one_was(browser, small_study):
+    browser.get((small_study.folder / "reports/index.html").as_uri())
+    browser.find_element(By.CSS_SELECTOR, 'a[href="#runs-er3a_c60"]').click()
+    fold = browser.find_element(By.ID, "runs-er3a_c60")
+    WebDriverWait(browser, PAUSE).until(lambda _: fold.get_property("open"))
+    card = browser.find_element(By.CSS_SELECTOR, '#decisions a[href="#er3a_c60"]')
+    browser.execute_script("arguments[0].click()", card)
+    link = fold.find_element(By.CSS_SELECTOR, "a[href$='#line_clean']")
+    browser.execute_script("arguments[0].scrollIntoView({ block: 'center' })", link)
+    before = browser.execute_script("return arguments[0].getBoundingClientRect().top", link)
+    link.click()
+    WebDriverWait(browser, PAUSE).until(lambda _: "trajectory.html" in browser.current_url)
+    browser.back()
+    WebDriverWait(browser, PAUSE).until(lambda _: browser.find_element(By.ID, "runs-er3a_c60").get_property("open"))
+    link = browser.find_element(By.CSS_SELECTOR, "#runs-er3a_c60 a[href$='#line_clean']")
+    assert abs(browser.execute_script("return arguments[0].getBoundingClientRect().top", link) - before) < 2
+
+
 def test_words_are_found_over_all_pages_and_on_each(browser, small_study):
     browser.get((small_study.folder / "reports/index.html").as_uri())
     field = browser.find_element(By.CSS_SELECTOR, ".find input")

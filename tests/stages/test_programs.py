@@ -123,7 +123,8 @@ def test_page_and_recording_are_written(study, stored, tmp_path):
     first = next(each for each in own.findings if each.finding.code == "motion_collides")
     assert fault.when == f"line 10, {first.motion_s:.2f} s into it (player: {first.program_s:.2f} s)"
     down = f"{met.xyz_mm[0, 2] - first.finding.at_mm:.0f}"  # the line is vertical
-    assert f"; tool at x, y, z = 380, 180, {down} mm" in fault.what
+    assert fault.moments[0].place.endswith(f" mm into it, (380, 180, {down})")
+    placed = set()
     for each in listed:  # what the index links to
         name, t, place = re.fullmatch(r"programs\.html\?play=(\w+)&t=([\d.]+)#([\w.-]+)", each.address).groups()
         assert name == each.name
@@ -133,6 +134,13 @@ def test_page_and_recording_are_written(study, stored, tmp_path):
         program = next(own for own in stored["er3a_c60"].results.summary.programs if own.name == name)
         moments = [own.program_s for own in program.findings if own.level in ("caution", "fail") and own.program_s]
         assert float(t) == round(min(moments, default=0.0), 9)  # the earliest
+        for own in program.findings:  # the checker's own distance, of what it measures
+            where = f" s into it (player: {own.program_s:.2f} s)" if own.program_s is not None else None
+            (moment,) = [m for m in each.moments if where and m.when.endswith(where)][:1] or [None]
+            if moment and hasattr(own.finding, "at_mm"):
+                assert moment.place.startswith(f"{own.finding.at_mm:.0f} mm into it, (")
+                placed.add(name)
+    assert {"out_of_reach", "drifting_loop"} <= placed
     summary = stored["er3a_c60"].results.summary
     program, grave = next((own, each) for own in summary.programs for each in own.findings if each.level == "fail")
     told = (replace(grave, level="caution", program_s=0.0), replace(grave, line=0, program_s=1.0))

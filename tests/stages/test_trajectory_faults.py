@@ -105,7 +105,7 @@ def test_a_fault_ends_with_a_code_and_a_demonstration_is_counted_apart(tmp_path,
     cells = (tmp_path / "index.html").read_text(encoding="utf-8").split('class="cells"')[1].split("<li>")
     (cell,) = (each for each in cells if f"{ROBOT}/trajectory.html" in each)
     assert f'badge {status}"' in cell
-    assert (f"{shown} meant to be faulty and found so" in cell) == bool(shown)
+    assert (f"{shown} expected to fail, and did" in cell) == bool(shown)
 
 
 @pytest.mark.long
@@ -283,6 +283,25 @@ def test_where_limits_are_left_before_a_contact_the_path_may_end_before_them_and
     assert limit - 5 < out.clear_until.q_deg[0] < limit
     assert back.out_of_limits[0].t0_s == 0 < back.collisions[0].t0_s
     assert back.clear_until is None
+
+
+@pytest.mark.parametrize("name", ["line_collides", "line_limits"])
+def test_a_fault_has_its_place_along_the_path(tmp_path, name):
+    """By the path's own file, whose lines are driven from standstill to standstill along one straight line."""
+    study = study_of(tmp_path, name)
+    results = compute(study, ROBOT)
+    (path,), (fault,), robot = results.summary.paths, faults(results), study.robot(ROBOT)
+    found = sorted(part.t0_s for part in (*path.collisions, *path.out_of_limits))[: len(fault.moments)]
+    assert [float(each.when.removesuffix(" s")) for each in fault.moments] == [round(t, 3) for t in found]
+    rows = results.checks
+    start = forward(robot, np.radians(rows.q_deg[0]))[:3, 3]
+    for t, moment in zip(found, fault.moments):
+        place = moment.place.replace("−", "-")
+        far, *xyz = map(float, re.fullmatch(r"(.*) mm, \((.*), (.*), (.*)\)", place).groups())
+        q = [np.interp(t, rows.t_s[rows.reachable], own) for own in np.radians(rows.q_deg[rows.reachable]).T]
+        tool = forward(robot, np.array(q))[:3, 3]
+        np.testing.assert_allclose(xyz, 1000 * tool, atol=1)
+        np.testing.assert_allclose(far, 1000 * np.linalg.norm(tool - start), atol=1)
 
 
 @pytest.mark.parametrize(

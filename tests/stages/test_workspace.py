@@ -125,13 +125,16 @@ def test_a_void_at_the_shoulder_names_the_limit_that_nothing_confirms_and_a_cont
     study, name = load_study("config/small.yaml"), "er3a_c60"
     stored = read_stage(small_results("workspace", name, study), STAGES["workspace"])
     lower = np.degrees(study.robot(name).lower[2])
-    said = f"The bounds hold for J3 ≥ {lower:.4g} deg, which nothing confirms. With a tool".replace("-", "−")
-    assert said in void_text(stored.results.summary, confirmed=False)
+    said = f"What makes it: J3 ≥ {lower:.4g} deg, which nothing confirms. Never widen".replace("-", "−")
+    text = void_text(stored.results.summary, confirmed=False)
+    assert said in text
+    assert "extended" not in text  # no recipe for a larger limit
+    assert "Collisions of the arm are not counted" in text
     assert "which nothing confirms" not in void_text(stored.results.summary)
     for status in ("caution", "fail"):
         report(study, replace(stored, rests_on={"validation": status}), tmp_path / "page.html")
         page = (tmp_path / "page.html").read_text(encoding="utf-8")
-        assert ("Put the box on" in page, "No place for the box is recommended" in page) == (
+        assert ("Planning only: the box on" in page, "No place for the box is recommended" in page) == (
             status != "fail",
             status == "fail",
         )

@@ -10,7 +10,11 @@ import pytest
 
 import er3a
 from er3a.identifiability.entry_evidence import EntryEvidence
+from er3a.pipeline.results import read_stage
+from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.validation.evidence_section import _roundest, table_to_use
+from er3a.pipeline.study import load_study
+from er3a.pipeline.viewing.index import write_index
 from er3a.pipeline.viewing.page import Numbering, linked
 from tests.conftest import ROOT
 
@@ -64,3 +68,34 @@ def test_the_table_to_use_is_whole_and_as_its_file_gives_it():
 def test_a_value_is_rounded_as_far_as_documents_leave_open(value, interval, shown):
     entry = EntryEvidence("a2", 650.0, "mm", "contradicted", interval, (), (), "article")
     assert _roundest(value, entry) == shown
+
+
+def test_the_index_marks_each_entry_of_a_table_as_validation_found_it(small_results, tmp_path):
+    """By the summary alone: class, value and what the evidence gives beside it, and no entry is left out."""
+    study = load_study("config/small.yaml")
+    for name in study.robots:
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "validation").symlink_to(small_results("validation", name, study).resolve())
+    write_index(study, tmp_path, tmp_path)
+    page = (tmp_path / "index.html").read_text(encoding="utf-8")
+    legend = page.split('class="key entries"')[1].split("</p>")[0]
+    for name in study.robots:
+        evidence = read_stage(tmp_path / name / "validation", STAGES["validation"]).results.summary.evidence
+        for entry in (each for each in evidence.entries if each.value is not None):
+            link = re.escape(f'<a href="{name}/validation.html#entry-{entry.entry}">')
+            (status, value, rest) = re.search(
+                rf'<td class="n (\w+)" title="[^"]*">{link}(.*?)</a>(.*?)</td>', page
+            ).groups()
+            assert (status, float(value.replace("−", "-"))) == (entry.status, round(entry.value, 3)), entry
+            assert f'<span class="{status}">' in legend
+            if status == "contradicted":
+                given = float(re.search("→ <strong>(.*?)</strong>", rest)[1].replace("−", "-"))
+                assert entry.interval[0] <= given <= entry.interval[1], entry
+            else:
+                assert "→" not in rest
+    for twin in ("alpha6", "offset6"):
+        assert re.search(rf'er3a_c60/validation.html#entry-{twin}">0</a> or 180 ', page)
+    assert "alpha6 = 180 (here 0), offset6 = 180 (here 0)" in page
+    assert '<a href="#dh-er3a_c60">er3a_c60</a>' in page
+    confirmed = legend.split("not confirmed")[0]
+    assert set(re.findall('class="(\\w+)"', confirmed)) == {"settled", "settled_up_to_signs", "gauge"}

@@ -167,8 +167,7 @@ def payload_text(summary: Summary | None, robot: Robot) -> str:
     bounds = [
         (path.payload.value, path) for path in paths if path.counts and path.payload and path.payload.value is not None
     ]
-    wanted = ("payload", "masses", "peak", "rated")
-    missing = [say(each) for each in getattr(summary, "unknown", ()) if each.what in wanted]
+    missing = [say(each) for each in getattr(summary, "unknown", ())]
     if bounds:
         value, path = min(bounds, key=lambda bound: bound[0])
         known = sentence("payload.bounded", kg=value, path=path.name)

@@ -33,7 +33,7 @@ TEXTS = texts(
             "{count} of {expectations} expectations is not met: {unmet:; }.",
             "{count} of {expectations} expectations are not met: {unmet:; }.",
         ),
-        "demonstrations": "{count} meant to be faulty and found so: {named}",
+        "demonstrations": "{count} expected to fail, and did: {named}",
         "demonstration": "{name} ({outcome})",
         "unmet_expectation": "{name} ({found}; expected: {expected})",
     }

@@ -96,7 +96,11 @@ def _(found: TooFast | TooFastIfAssumed) -> str:
 
 @say.register
 def _(found: AccelerationTooGreat | AccelerationTooGreatIfAssumed) -> str:
-    needed = as_text(found.needed_deg_s2, ".0f") if found.needed_deg_s2 < MAX_SHOWN else tr("more than 1 000 000")
+    needed = (
+        as_text(found.needed_deg_s2, ".0f")
+        if found.needed_deg_s2 < MAX_SHOWN
+        else tr("more than {most}", most=as_text(MAX_SHOWN, ".0f"))
+    )
     return say_as(found, unit=unit_of(found.slides), needed=needed)
 
 

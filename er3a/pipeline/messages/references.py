@@ -134,11 +134,11 @@ TEXTS = texts(
         "part": "{part}: {status}",
         "look_at_motion_from": (
             "in a cleared cell, at reduced speed (T1), jog +J{joint} a few degrees from ({own_pose}) deg and see "
-            "whether {motion} (forward is +x)"
+            "whether {motion}, for somebody who stands behind the arm and looks along +x (left is +y)"
         ),
         "look_at_motion": (
             "in a cleared cell, at reduced speed (T1), jog +J{joint} a few degrees from the zero pose and see whether "
-            "{motion} (forward is +x)"
+            "{motion}, for somebody who stands behind the arm and looks along +x (left is +y)"
         ),
         "inconsistent_with_own_text": (
             "The table contradicts its own text ({against:; }): to agree with it, {entry} would have to be {needed:g} "

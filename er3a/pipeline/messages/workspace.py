@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.pipeline.messages.kinematics import sum_of_joints
 from er3a.pipeline.messages.language import N_, as_text, tr, with_unit
@@ -159,10 +161,14 @@ TEXTS = texts(
             "The tool point can't reach {lower:.3g} to {upper:.3g} L away from the shoulder: {extent} mm, centre "
             "({centre}) mm."
         ),
-        "void.cause#it": "A joint limit makes it: it {cause}; never widen a limit for it.",
-        "void.cause#noun": "Its cause: {cause}.",
-        "void.expected": "This is normal for the arm: no target there can be reached.",
+        "void.cause#limit": "What makes it: {limits}{unconfirmed}. Never widen a joint limit to reach there.",
+        "void.unconfirmed": ", which nothing confirms",
         "void.rests": "The bounds hold for {limits}, which nothing confirms.",
+        "void.cause#noun": "Its cause: {cause}.",
+        "void.expected": (
+            "This is normal for the arm: no target there can be reached. Collisions of the arm are not counted, so "
+            "what can't be reached is larger."
+        ),
         "void.no_tool": "With a tool the void is elsewhere.",
         "void.pocket": (
             "Out of reach too, but open to the outside: a larger pocket of {lower:.3g} to {upper:.3g} L, centre "
@@ -177,18 +183,22 @@ TEXTS = texts(
         "box.unknown": "Box of {box} mm: {why}",
         "box.nowhere": "Box of {box} mm: no place was found where the tool reaches all of it.",
         "box.put#on": (
-            "Put the box on {name}, its centre at ({centre}) mm. Box: {box}; {reached}. No path or program was checked "
-            "with it: before you run any there, put the box into the study's scene file and run again."
+            "Planning only: the box on {name}, its centre at ({centre}) mm. Box: {box}; {reached}. No path or program "
+            "was checked with it: before you run any there, put the box into the study's scene file and run again."
         ),
         "box.put#over": (
-            "Put the box on a stand {gap} mm high ({least} to {most} mm work too) on {name} (top at z = {height} mm), "
-            "its centre at ({centre}) mm. Box: {box}; {reached}. No place directly on {none} works. No path or program "
-            "was checked with them: before you run any there, put both into the study's scene file and run again."
+            "Planning only: the box on a stand {gap} mm high on {name} (top at z = {height} mm), its centre at "
+            "({centre}) mm. Box: {box}; {reached}. No place directly on {none} works. No path or program was checked "
+            "with them: before you run any there, put both into the study's scene file and run again."
         ),
         "box.put#free": (
-            "Put the box with its centre at ({centre}) mm; no surface is known there. Box: {box}; {reached}. No path "
-            "or program was checked with it: before you run any there, put the box into the study's scene file and run "
-            "again."
+            "Planning only: the box with its centre at ({centre}) mm; no surface is known there. Box: {box}; "
+            "{reached}. No path or program was checked with it: before you run any there, put the box into the study's "
+            "scene file and run again."
+        ),
+        "box.range": (
+            "Stands {least} to {most} mm high pass the same checks, but nearer to a singular pose: manipulability "
+            "falls to {percent:.2g} % or less of that at {gap} mm."
         ),
         "box.proven#all": "the tool point, {tilt}, reaches all of it (proven); {unchecked}",
         "box.proven#upper": (
@@ -229,6 +239,7 @@ def _(found: model.VoidUnexpected) -> str:
 
 
 SERVED_ALL_M = 1e-6
+SAME_PLACE_M = 1e-6
 CHANGED_FIRST = ("offset", "direction", "lower", "upper", "a", "d")
 NAMED_CHANGES = 4
 
@@ -375,8 +386,7 @@ def box_text(summary: Summary) -> str:
     if stand:
         return sentence("box.put#on", name=stand.name, **parts)
     if over and over.gaps_m:
-        gap, least, most = (millimetres([value]) for value in over.gaps_m)
-        parts |= {"gap": gap, "least": least, "most": most, "height": millimetres([over.height_m])}
+        parts |= {"gap": millimetres(over.gaps_m[:1]), "height": millimetres([over.height_m])}
         parts |= {"none": ", ".join(each.name for each in placement.stands)}
         return sentence("box.put#over", name=over.name, **parts)
     return sentence("box.put#free", **parts)
@@ -392,6 +402,22 @@ def _reached(placement: model.PlacementSummary, status: str, form: str, served_f
     return sentence(f"box.{status}#{form}", tilt=tilt, unchecked=unchecked, served_from=served)
 
 
+def range_text(placement: model.PlacementSummary, places: model.BoxPlaces) -> str:
+    """How high the stand of the box may be, and how near to a singular pose the arm comes over that range; empty where
+    no stand is needed or only one height serves."""
+    gaps = placement.over.gaps_m if placement.over and not placement.stand else None
+    if gaps is None or gaps[1] == gaps[2]:
+        return ""
+    gap, least, most = gaps
+    *xy, z = placement.best.centre_m
+    above = np.abs(places.centre_m[:, :2] - xy).max(axis=1) < SAME_PLACE_M
+    heights = places.centre_m[:, 2] - z + gap
+    above &= (least - SAME_PLACE_M < heights) & (heights < most + SAME_PLACE_M)
+    worst = min(places.manipulability_m3[above], default=0.0) / placement.best.manipulability_m3
+    shown = {"gap": millimetres([gap]), "least": millimetres([least]), "most": millimetres([most])}
+    return sentence("box.range", percent=100 * float(worst), **shown)
+
+
 def void_text(summary: Summary, *, confirmed: bool = True) -> str:
     """The void that the verdict tells of, with its bounds, place and cause, and a larger open pocket; empty where voids
     were not judged. ``confirmed``: whether independent documents settle the joints' limits."""
@@ -404,12 +430,17 @@ def void_text(summary: Summary, *, confirmed: bool = True) -> str:
         return ""
     voids, judged = summary.enclosed_voids, judged_void(summary)
     where = sentence("void.shoulder" if judged.holds_shoulder else "void.away", **_void_parts(judged))
-    cause = sentence("void.cause#it" if is_predicate(judged.cause) else "void.cause#noun", cause=say(judged.cause))
+    limits = _limits(judged.cause)
+    if is_predicate(judged.cause):
+        unconfirmed = "" if confirmed else sentence("void.unconfirmed")
+        cause = sentence("void.cause#limit", limits=limits, unconfirmed=unconfirmed)
+    else:
+        rests = sentence("void.rests", limits=limits) if limits and not confirmed else ""
+        cause = joined([sentence("void.cause#noun", cause=say(judged.cause)), rests], " ")
     expected = ""
     if isinstance(finding, model.VoidAtShoulder):
         bare = any(each.subject == "tool" for each in summary.not_examined)
-        rests = "" if confirmed else _resting_on(judged.cause)
-        expected = joined([sentence("void.expected"), rests, sentence("void.no_tool") if bare else ""], " ")
+        expected = joined([sentence("void.expected"), sentence("void.no_tool") if bare else ""], " ")
     more = sentence("void.more", count=len(voids) - 1) if len(voids) > 1 else ""
     pocket = max(summary.voids, key=lambda void: void.volume_m3.upper)
     open_one = sentence("void.pocket", **_void_parts(pocket)) if pocket.kind == "open" else ""
@@ -423,8 +454,8 @@ def judged_void(summary: model.WorkspaceSummary) -> model.VoidSummary:
     return next(unexpected, voids[0])
 
 
-def _resting_on(cause: VoidCause) -> str:
-    """The limits that make a void, as nothing confirms them; empty where none does."""
+def _limits(cause: VoidCause) -> str:
+    """The limits that make a void, or have a part in it; empty where none has."""
     if isinstance(cause, Disappears):
         limits = cause.limits
     elif isinstance(cause, OnlySampled) or cause.most is None:
@@ -436,7 +467,7 @@ def _resting_on(cause: VoidCause) -> str:
         + with_unit(as_text(limit.limit, ".4g"), limit.unit)
         for limit in limits
     ]
-    return sentence("void.rests", limits=joined(said, ", "))
+    return joined(said, ", ")
 
 
 def _void_parts(void: model.VoidSummary) -> dict[str, float | str]:

@@ -8,6 +8,8 @@ from typing import Literal
 from urllib.parse import urlencode
 
 from er3a.numerics.arrays import Reals
+from er3a.pipeline.messages.language import tr
+from er3a.pipeline.messages.say import joined
 
 Weight = Literal["plain", "caution", "fail"]
 
@@ -38,10 +40,20 @@ class Mark:
 
 
 @dataclass(frozen=True)
-class Fault:
-    """Why a path or a program may not be run as it is: what fails first, when or in which line, and what to do instead.
+class FaultMoment:
+    """One thing that is wrong: ``when``, or in which line, and ``place``, how far along and where the tool point is
+    then; both empty where not known."""
 
-    ``first``: what fails first alone, without what fails later.
+    what: str
+    when: str = ""
+    place: str = ""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Why a path or a program may not be run as it is, and what to do instead.
+
+    ``moments``: what fails first, then what fails later and weighs more.
     ``status`` and ``verdict``: of all of it; ``meant``: whether its file expects that; ``address``: of the place on the
     robot's pages, which the player shows there. ``instead``: a motion that may be run, and where the player shows it.
     """
@@ -51,12 +63,22 @@ class Fault:
     status: Weight
     verdict: str
     meant: bool
-    when: str
-    what: str
+    moments: tuple[FaultMoment, ...]
     to_do: str
     address: str
     instead: tuple[str, str] | None = None
-    first: str = ""
+
+    @property
+    def when(self) -> str:
+        """When it fails first."""
+        return self.moments[0].when
+
+    @property
+    def what(self) -> str:
+        """All that fails, each after the first with its moment."""
+        first, *later = self.moments
+        placed = [tr("{where}: {text}", where=m.when, text=m.what) if m.when else m.what for m in later]
+        return joined([first.what, *placed])
 
 
 def address_of(page: str, motion: str, t: float, place: str, until: float | None = None) -> str:

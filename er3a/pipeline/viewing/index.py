@@ -41,7 +41,7 @@ from er3a.pipeline.messages.validation import (
     shortened,
     unconfirmed,
 )
-from er3a.pipeline.messages.workspace import box_text, judged_void, void_text
+from er3a.pipeline.messages.workspace import box_text, judged_void, range_text, void_text
 from er3a.pipeline.player.motions import Fault
 from er3a.pipeline.results import (
     AbsentResults,
@@ -61,7 +61,16 @@ from er3a.pipeline.stages.programs.played import faults as program_faults
 from er3a.pipeline.stages.registry import STAGES, all_messages
 from er3a.pipeline.stages.trajectory.model import PathSummary, TrajectoryResults
 from er3a.pipeline.stages.trajectory.played import faults as path_faults
-from er3a.pipeline.stages.validation.model import AnotherArm, Contradicted, DefinedOtherwise, LeftOpen, PartFound
+from er3a.pipeline.stages.validation.evidence_section import evidence_section, verdict_legend
+from er3a.pipeline.stages.validation.model import (
+    AnotherArm,
+    Contradicted,
+    DefinedOtherwise,
+    LeftOpen,
+    PartFound,
+    TableEvidence,
+    ValidationResults,
+)
 from er3a.pipeline.stages.workspace.model import PlacementSummary, VoidSummary, WorkspaceResults, WorkspaceSummary
 from er3a.pipeline.study import Study
 from er3a.pipeline.sweeps import ENTRIES, entry_label
@@ -504,6 +513,7 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         folder / "index.html",
         places=list(_places(study, folder)),
         robots=robots,
+        legend=verdict_legend(status for each in robots if each["entries"] for status in each["entries"]["statuses"]),
         article=study.article is not None,
         questions={stage.name: stage.question for stage in STAGES.values()},
         shown_figures=SHOWN_FIGURES,
@@ -576,6 +586,13 @@ def _workspace(folder: Path) -> WorkspaceResults | AbsentResults | None:
     return read_stage(folder, STAGES["workspace"]).results if is_computed(folder) else None
 
 
+def _evidence(results: Path) -> TableEvidence | None:
+    """What evidence says of a robot's table; None before the validation stage has been computed."""
+    folder = results / "validation"
+    stored = read_stage(folder, STAGES["validation"]).results if is_computed(folder) else None
+    return stored.summary.evidence if isinstance(stored, ValidationResults) else None
+
+
 def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
     """What the index shows of a robot."""
     robot, expected = study.robot(name), study.entry(name).expect
@@ -591,6 +608,7 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
     finding = heads["validation"].finding if "validation" in heads else None
     same_arm, instead = isinstance(finding, DefinedOtherwise), alternative_table(study, name, results.parent)
     unproven, settled = _settled(finding)
+    box_range = _box_range(stored["workspace"].results) if "workspace" in stored else ""
     passes = _passes({stage: each for stage, each in stored.items() if heads[stage].status != "not_computed"})
     return {
         "robot": robot,
@@ -599,8 +617,12 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         "may_run": table != "fail",
         "decision": decision(table, [*failed.values()], instead, unproven=unproven, same_arm=same_arm),
         "settled": settled,
+        "entries": evidence_section(
+            robot, _evidence(results), _evidence(results.parent / instead) if instead else None
+        ),
         "instead": {instead: f"#{instead}"} if instead else {},
-        "answers": [*_answers(heads, robot, passes)],
+        "dh_instead": {instead: f"#dh-{instead}"} if instead else {},
+        "answers": [*_answers(heads, robot, passes, box_range)],
         "notes": {stage: _note(stage, head, stored[stage].results) for stage, head in heads.items()},
         "bare": any(
             _misses(heads[stage], "carried") or _misses(heads[stage], "tool") for stage in RUNS if stage in heads
@@ -658,14 +680,19 @@ def _settled(finding: object) -> tuple[bool, str]:
     return part is not None and not (part.settled or part.up_to_signs), said
 
 
-def _answers(heads: Mapping[str, Head], robot: Robot, passes: _Passes | None) -> Iterator[tuple[str, str, str]]:
-    """What is asked of an arm first: the question, its answer and where it is shown."""
+def _answers(
+    heads: Mapping[str, Head], robot: Robot, passes: _Passes | None, box_range: str
+) -> Iterator[tuple[str, str, str]]:
+    """What is asked of an arm first: the question, its answer and where it is shown; ``box_range``: how high the box's
+    stand may be."""
     workspace = heads["workspace"].summary if "workspace" in heads else None
     if workspace:
         box = box_text(workspace)
         if box and _misses(heads["workspace"], "tool"):
-            box = joined([box, tr("No tool is given: the tool point is the flange's centre.")], " ")
-        yield tr("Tray or box"), joined([box, passes.short if passes else ""], " "), "workspace.html#placement"
+            bare = tr("No tool is given: the flange's own centre enters the box. Repeat it with your tool's length.")
+            box = joined([box, bare], " ")
+        box = joined([box, box_range, passes.short if passes else ""], " ") if box else ""
+        yield tr("Tray or box"), box, "workspace.html#placement"
     summary = heads["dynamics"].summary if "dynamics" in heads else None
     yield tr("Payload"), payload_text(summary, robot), "dynamics.html#payload" if summary else ""
     if workspace:
@@ -673,6 +700,14 @@ def _answers(heads: Mapping[str, Head], robot: Robot, passes: _Passes | None) ->
         if isinstance(workspace, WorkspaceSummary) and workspace.enclosed_voids:
             place = f"#void-{workspace.voids.index(judged_void(workspace)) + 1}"
         yield tr("Void"), void_text(workspace, confirmed=_limits_confirmed(heads)), f"workspace.html{place}"
+
+
+def _box_range(results: Any) -> str:
+    """How high the stand of a box may be; empty where none is proposed."""
+    placement = getattr(results.summary, "placement", None)
+    if not isinstance(placement, PlacementSummary) or not placement.named_places:
+        return ""
+    return range_text(placement, results.places)
 
 
 def _limits_confirmed(heads: Mapping[str, Head]) -> bool:
@@ -795,9 +830,9 @@ def _without_box() -> str:
 def _condition(parts: Sequence[PartFound], unbounded: Sequence[str]) -> str:
     """What has to be confirmed before anything that passes is run on the arm; empty where all of its table is."""
     if not parts:
-        return tr("In the model: run none on the arm before its table is confirmed.")
+        return tr("Run nothing on the arm until its table is confirmed.")
     names = unconfirmed(parts, unbounded)
-    return names and tr("In the model: run none on the arm before these are confirmed: {entries}.", entries=names)
+    return names and tr("Run nothing on the arm until these are confirmed: {entries}.", entries=names)
 
 
 def _run(stage: str, results: TrajectoryResults | ProgramsResults) -> dict[str, Any]:

@@ -603,6 +603,19 @@ function unfoldTarget() {
   aim.scrollIntoView();
 }
 
+// Back leads to where one was: what was unfolded, and how far down.
+const folds = () => [...document.querySelectorAll("main details")];
+
+function keepPlace(event) {
+  if (event.target.closest("a[href]")) history.replaceState({ ...history.state, open: folds().map((fold) => fold.open), y: scrollY }, "");
+}
+
+function returnToPlace() {
+  if (!history.state?.open) return;
+  folds().forEach((fold, index) => (fold.open = history.state.open[index] ?? fold.open));
+  scrollTo(0, history.state.y);
+}
+
 // The first time that a page uses a term of the glossary, its meaning can be asked for, by pointer, key or touch.
 function explainTerms(terms) {
   const letters = (text) => text.replace(/[.*+?^${}()|[\]\\]/g, "\\$&").replaceAll(" ", "\\s+");
@@ -718,3 +731,5 @@ for (const link of document.querySelectorAll("[data-packed]")) {
 }
 
 addFinder();
+addEventListener("click", keepPlace, true);
+returnToPlace();

@@ -11,7 +11,7 @@ from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.language import own_title, tr
 from er3a.pipeline.messages.programs import remedies, say
 from er3a.pipeline.messages.say import joined, say_first
-from er3a.pipeline.player.motions import Fault, PlayedEvent, PlayedMotion, Weight, address_of
+from er3a.pipeline.player.motions import Fault, FaultMoment, PlayedEvent, PlayedMotion, Weight, address_of
 from er3a.pipeline.stages.programs.model import FindingAt, ProgramMotion, ProgramsResults, ProgramSummary
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.program_check.program_check_findings import RANKS, Level, MotionCollides
@@ -58,7 +58,7 @@ def faults(results: ProgramsResults) -> list[Fault]:
         first, worst = wrong[0], min(wrong, key=lambda each: -RANKS[each.level])
         told = [first] if worst.level == first.level else [first, worst]
         own = first in of_line(program, first.line)
-        later = [_placed(_where(program, each), say_first(each.finding)) for each in told[1:]]
+        rows = results.motion.take(results.motion.program == program.name)
         found.append(
             Fault(
                 program.name,
@@ -66,18 +66,23 @@ def faults(results: ProgramsResults) -> list[Fault]:
                 WEIGHTS[program.outcome],
                 outcome_word(program.outcome),
                 program.expect == program.outcome,
-                _where(program, first),
-                joined([say_first(first.finding), _tool_at(results.motion, program.name, first), *later]),
+                tuple(FaultMoment(say_first(m.finding), _where(program, m), _place(m, rows)) for m in told),
                 " ".join(dict.fromkeys(text for each in told for text in remedies_of(program, each)[:1])),
                 address_of("programs", program.name, first.program_s or 0.0, line_id(program.name, first.line * own)),
-                first=say_first(first.finding),
             )
         )
     return found
 
 
-def _placed(where: str, text: str) -> str:
-    return tr("{where}: {text}", where=where, text=text) if where else text
+def _place(found: FindingAt, rows: ProgramMotion) -> str:
+    """How far into the motion of its line a finding is, and where the tool point is then; empty where not known."""
+    if found.program_s is None or found.motion_s is None or not len(rows):
+        return ""
+    t0, t1 = found.program_s - found.motion_s, found.program_s
+    moments = np.hstack([t0, rows.t_s[(t0 < rows.t_s) & (rows.t_s < t1)], t1])
+    track = np.stack([np.interp(moments, rows.t_s, values) for values in rows.xyz_mm.T], axis=1)
+    far = np.linalg.norm(np.diff(track, axis=0), axis=1).sum()
+    return tr("{far} mm into it, ({xyz})", far=fixed(far, 0), xyz=", ".join(fixed(value, 0) for value in track[-1]))
 
 
 def _where(program: ProgramSummary, found: FindingAt) -> str:
@@ -91,15 +96,6 @@ def _where(program: ProgramSummary, found: FindingAt) -> str:
         return line
     own, clock = fixed(found.motion_s, 2), fixed(found.program_s, 2)
     return tr("{line}, {own} s into it (player: {clock} s)", line=line, own=own, clock=clock)
-
-
-def _tool_at(motion: ProgramMotion, program: str, found: FindingAt) -> str:
-    """Where the tool is when a finding begins; empty off the way that is kept."""
-    rows = motion.take(motion.program == program)
-    if found.program_s is None or not len(rows):
-        return ""
-    xyz = [fixed(np.interp(found.program_s, rows.t_s, rows.xyz_mm[:, k]), 0) for k in range(3)]
-    return tr("tool at x, y, z = {xyz} mm", xyz=", ".join(xyz))
 
 
 def line_id(program: str, line: int) -> str:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.language import own_title, tr
 from er3a.pipeline.messages.programs import remedy, say
@@ -19,7 +21,7 @@ from er3a.pipeline.messages.trajectory import (
     path_text,
     repair_text,
 )
-from er3a.pipeline.player.motions import Fault, Mark, PlayedEvent, PlayedMotion, Weight, address_of
+from er3a.pipeline.player.motions import Fault, FaultMoment, Mark, PlayedEvent, PlayedMotion, Weight, address_of
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.planning.names import PathVerdict
@@ -70,9 +72,10 @@ def faults(results: model.TrajectoryResults) -> list[Fault]:
         if model.is_safe(path, results.summary.verdict.shapes):
             continue
         clearance = path.clearance if path.verdict == "safe" else None
-        first, t, later = (say(near), clearance.t_s, "") if clearance else _first_fault(path)
+        wrong = [(clearance.t_s, say(near))] if clearance else _faults(path)
         status, verdict = shown_verdict(path, near)
-        to_do, instead = _to_do(path, results.checks.take(results.checks.path == path.name), results.summary)
+        rows = results.checks.take(results.checks.path == path.name)
+        to_do, instead = _to_do(path, rows, results.summary)
         found.append(
             Fault(
                 path.name,
@@ -80,25 +83,34 @@ def faults(results: model.TrajectoryResults) -> list[Fault]:
                 status,
                 verdict,
                 path.expect == path.verdict != "safe",
-                "" if t is None else tr("{time} s", time=fixed(t, 3)),
-                joined([first, later]),
+                tuple(_moment(text, t, rows) for t, text in wrong),
                 to_do,
-                address_of("trajectory", path.name, t or 0.0, path.name),
+                address_of("trajectory", path.name, wrong[0][0] or 0.0, path.name),
                 instead,
-                first,
             )
         )
     return found
 
 
-def _first_fault(path: model.PathSummary) -> tuple[str, float | None, str]:
-    """What is wrong first with a path that is not safe, and when (s), if it has a time; then what is wrong later."""
+def _faults(path: model.PathSummary) -> Sequence[tuple[float | None, str]]:
+    """What is wrong with a path that is not safe, and when (s), if it has a time: first, and what weighs more later."""
     found = [] if path.not_planned else first_faults(path)
     if (path.verdict in ("singular", "near-singular") and len(found) <= 1) or not found:
         times = [] if path.not_planned else path.singular_times_s or [event.t_s for event in path.singularities]
-        return path_text(path), min(times, default=None), ""
-    later = [tr("at t = {time} s: {text}", time=fixed(t, 3), text=text) for t, text in found[1:]]
-    return found[0][1], found[0][0], joined(later)
+        return [(min(times, default=None), path_text(path))]
+    return found
+
+
+def _moment(what: str, t: float | None, rows: model.PathChecks) -> FaultMoment:
+    """A fault at a time (s) of a path, with the place of it between the path's rows."""
+    if t is None:
+        return FaultMoment(what)
+    when = tr("{time} s", time=fixed(t, 3))
+    if not len(rows):
+        return FaultMoment(what, when)
+    far, *xyz = (float(np.interp(t, rows.t_s, values)) for values in (1000 * rows.s_m, *rows.xyz_mm.T))
+    place = tr("{far} mm, ({xyz})", far=fixed(far, 0), xyz=", ".join(fixed(value, 0) for value in xyz))
+    return FaultMoment(what, when, place if np.isfinite([far, *xyz]).all() else "")
 
 
 def _assumed(part: model.Stretch[Any]) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
 from itertools import product
 from math import pi
@@ -20,7 +20,7 @@ from er3a.pipeline.messages.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.references import STATUS_MEANINGS, STATUS_WORDS
 from er3a.pipeline.messages.say import joined, say, sentence, word
 from er3a.pipeline.messages.validation import shortened
-from er3a.pipeline.stages.validation.model import TableEvidence
+from er3a.pipeline.stages.validation.model import OtherTableFound, TableEvidence
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.references.quantities import MM
 from er3a.robots.robot import Robot
@@ -37,6 +37,19 @@ MARKS: Mapping[Status, str] = {
 }
 CONFIRMED = ("settled", "settled_up_to_signs")
 SETTLED = ("settled", "settled_up_to_signs", "gauge")
+VERDICTS: Mapping[str, Mapping[Status, str]] = {  # in the three words that a reader of the index needs
+    N_("confirmed"): {
+        "settled": "",
+        "settled_up_to_signs": N_("its sign follows from open entries"),
+        "gauge": N_("only the sum counts"),
+    },
+    N_("not confirmed"): {
+        "weak": N_("too loosely"),
+        "consistent": N_("only its own source gives it"),
+        "open": N_("no document tells it from another value"),
+    },
+    N_("contradicted"): {"contradicted": N_("→ what the evidence gives")},
+}
 COLUMNS = {
     "a": "a (mm)",
     "alpha": "α (°)",
@@ -129,7 +142,9 @@ def evidence_section(
     present = dict.fromkeys(each.status for each in numbers)
     return dict(
         columns=[tr(COLUMNS[kind]) for kind in kinds],
-        rows=[(joint, [_cell(by_name.get(f"{kind}{joint}")) for kind in kinds]) for joint in joints],
+        rows=[(joint, [_cell(by_name.get(f"{kind}{joint}"), evidence) for kind in kinds]) for joint in joints],
+        statuses=list(present),
+        allowed=_allowed(evidence),
         legend=[
             (status, mark, _status(status), word("status_meaning", STATUS_MEANINGS, status))
             for status, mark in MARKS.items()
@@ -149,6 +164,19 @@ def evidence_section(
             "{mm} mm and {deg} deg", mm=number(evidence.tolerance.mm, 2), deg=number(evidence.tolerance.deg, 2)
         ),
     )
+
+
+def verdict_legend(statuses: Iterable[Status]) -> list[tuple[str, list[tuple[Status, str, str]]]]:
+    """What the marks of these statuses mean: each verdict with its statuses, their marks and what they add to it."""
+    present = set(statuses)
+    return [
+        (
+            tr(verdict),
+            [(status, MARKS[status], text and tr(text)) for status, text in each.items() if status in present],
+        )
+        for verdict, each in VERDICTS.items()
+        if not present.isdisjoint(each)
+    ]
 
 
 @dataclass(frozen=True)
@@ -227,13 +255,42 @@ def _other(evidence: TableEvidence) -> dict[str, Any] | None:
             if each is None:  # a limit of a joint that turns on and on
                 cells.append(("–", False, ""))
                 continue
-            given = each.value or 0.0
-            value = _limit(each) if kind in LIMITS else getattr(found.table, kind)[joint - 1] * IN_UNIT[kind]
-            value = _roundest(value, each)
-            cells.append((_plain(value), abs(value - given) > DIFFERS, ""))
+            value = _other_value(found, each)
+            cells.append((_plain(value), abs(value - (each.value or 0.0)) > DIFFERS, ""))
         rows.append((joint, cells))
     title, text = (word(found.code, words, found.code) for words in (OTHER_TITLES, OTHER_TEXTS))
     return dict(title=title, text=text, page="", columns=[tr(COLUMNS[kind]) for kind in kinds], rows=rows)
+
+
+def _other_value(found: OtherTableFound, each: EntryEvidence) -> float:
+    """An entry's value in the other table, as rounded as its evidence allows."""
+    kind = column_of(each.entry)
+    if kind not in OTHER_COLUMNS:
+        return _roundest(_limit(each), each)
+    joint = int(each.entry.removeprefix(kind))
+    return _roundest(getattr(found.table, kind)[joint - 1] * IN_UNIT[kind], each)
+
+
+def _gives(each: EntryEvidence, evidence: TableEvidence) -> str:
+    """What evidence gives instead of a contradicted entry, or as well as an open one; empty where that is no other."""
+    found, kind = evidence.other, column_of(each.entry)
+    if found is None or (found.code == "described") != (each.status == "contradicted"):
+        return ""
+    if kind not in (*OTHER_COLUMNS, *LIMITS) or (found.code == "allowed" and kind in LIMITS):
+        return ""
+    value = _other_value(found, each)
+    return _plain(value) if abs(value - (each.value or 0.0)) > DIFFERS else ""
+
+
+def _allowed(evidence: TableEvidence) -> str:
+    """The entries of another table that fits every document, as it has them; empty where there is none."""
+    if evidence.other is None or evidence.other.code != "allowed":
+        return ""
+    given = [(each, _gives(each, evidence)) for each in evidence.entries]
+    texts = [
+        tr("{entry} = {value} (here {own})", entry=each.entry, value=v, own=_value(each)) for each, v in given if v
+    ]
+    return joined(texts, ", ")
 
 
 def _limit(each: EntryEvidence) -> float:
@@ -298,11 +355,12 @@ def other_robot(robot: Robot, evidence: TableEvidence | None) -> Robot | None:
     return robot.replace(**asdict(evidence.other.table)) if evidence and evidence.other else None
 
 
-def _cell(each: EntryEvidence | None) -> dict[str, Any] | None:
+def _cell(each: EntryEvidence | None, evidence: TableEvidence) -> dict[str, Any] | None:
     if each is None or each.value is None:
         return None
     title = tr("{entry}: {status}", entry=each.entry, status=_status(each.status))
-    return dict(entry=each.entry, value=_value(each), status=each.status, mark=MARKS[each.status], title=title)
+    shown = dict(entry=each.entry, value=_value(each), status=each.status, mark=MARKS[each.status], title=title)
+    return shown | dict(gives=_gives(each, evidence))
 
 
 def _status(status: Status) -> str:
