@@ -42,7 +42,7 @@ from er3a.pipeline.messages.validation import (
     unconfirmed,
 )
 from er3a.pipeline.messages.workspace import box_text, judged_void, range_text, void_text
-from er3a.pipeline.player.motions import Fault
+from er3a.pipeline.player.motions import Fault, FaultMoment
 from er3a.pipeline.results import (
     AbsentResults,
     Input,
@@ -868,11 +868,9 @@ def _otherwise(stage: str, followed: Sequence[ProgramSummary | PathSummary], fau
             "fail",
             tr("not as expected"),
             False,
-            "",
-            say(each),
+            (FaultMoment(say(each)),),
             "",
             f"{stage}.html#{each.name}",
-            first=say(each),
         )
         for each in (unmet.unmet if unmet else ())
         if each.name not in faulty
