@@ -152,6 +152,39 @@ assert "flange" in say(reference.subject)
 
 
 @pytest.mark.long
+def test_an_error_term_of_calibrate(carry_out):
+    branch = """        if self.kind == "bent":
+            return own[:, None] ** 2
+        if self.kind == "sag":"""
+    edits = {
+        "er3a/calibration/terms.py": (
+            ('"ripple", "coupling"]', '"ripple", "coupling", "bent"]'),
+            ('        if self.kind == "sag":', branch),
+        ),
+        "er3a/pipeline/messages/calibration.py": (
+            ('    "ratio": N_("ratio"),', '    "ratio": N_("ratio"),\n    "bent": N_("bent"),'),
+        ),
+    }
+    script = """
+import numpy as np
+from er3a.calibration.terms import FOR_ALL_JOINTS, JointErrors, JointTerm, candidates, terms_of
+from er3a.files.robot_library import load_robot
+from er3a.pipeline.messages.calibration import term_name
+
+robot = load_robot("er3_600")
+term = JointTerm("bent", 2)
+assert term in candidates(robot) and term in terms_of(robot)
+for kinds, missing in zip(FOR_ALL_JOINTS, ((), ("coupling",), ("coupling", "ripple"))):
+    assert "bent" in kinds and not {*missing} & {*kinds}
+x = np.full((3, 6), 0.5)
+amounts = JointErrors(robot, (term,), np.array([2e-3])).amounts(x, np.zeros((3, 3)))
+np.testing.assert_allclose(amounts, np.full((3, 1), 5e-4) * (np.arange(6) == 1))
+assert term_name(term) == "J2 bent"
+"""
+    carry_out("An error term of `er3a calibrate`.", edits, script)
+
+
+@pytest.mark.long
 def test_a_rule_that_ranks_solutions(carry_out):
     measure = """def _base_move(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Reals:
     return np.degrees(np.abs(q - q_ref)[..., 0])

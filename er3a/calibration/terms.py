@@ -31,10 +31,13 @@ from er3a.robots.robot import Robot
 
 TermKind = Literal["ratio", "once", "twice", "sag", "weight", "ripple", "coupling"]
 KINDS: tuple[TermKind, ...] = get_args(TermKind)
-FOR_ALL_JOINTS = KINDS, KINDS[:-1], KINDS[:-2]
+WITHOUT_COUPLINGS = tuple(kind for kind in KINDS if kind != "coupling")
+WITHOUT_RIPPLES = tuple(kind for kind in WITHOUT_COUPLINGS if kind != "ripple")
+FOR_ALL_JOINTS = KINDS, WITHOUT_COUPLINGS, WITHOUT_RIPPLES
 """What is tried of as many measurements as it takes, or of fewer: couplings and ripples ask for most."""
-IN_ROBOT_FILE: tuple[TermKind, ...] = ("ratio", "coupling")
-FOR_ROBOT_FILE = IN_ROBOT_FILE, IN_ROBOT_FILE[:1]
+RATIOS: tuple[TermKind, ...] = ("ratio",)
+IN_ROBOT_FILE: tuple[TermKind, ...] = (*RATIOS, "coupling")
+FOR_ROBOT_FILE = IN_ROBOT_FILE, RATIOS
 RIPPLES = range(3, 257)
 """How many times a turn an error is looked for; strain wave gears have some 200 a turn."""
 TYPICAL = 2e-3  # rad, m; each per rad, m of what it is multiplied by: how large coefficients are taken to be, one sigma
