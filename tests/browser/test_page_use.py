@@ -197,7 +197,8 @@ def test_words_are_found_over_all_pages_and_on_each(browser, small_study):
     field.send_keys("line_collides er3a-c60")
     links = browser.find_elements(By.CSS_SELECTOR, ".elsewhere a")
     assert {link.get_attribute("href").rsplit("/", 1)[1].split("?")[0] for link in links} >= {"trajectory.html"}
-    assert not browser.find_elements(By.CSS_SELECTOR, ".robot:not(.unfound)")
+    found = browser.find_elements(By.CSS_SELECTOR, ".robot:not(.unfound)")
+    assert [each.find_element(By.TAG_NAME, "h2").text for each in found] == ["EFORT ER3A-C60"]
     link = next(link for link in links if "er3a_c60/trajectory.html" in link.get_attribute("href"))
     browser.get(link.get_attribute("href"))
     field = browser.find_element(By.CSS_SELECTOR, ".find input")

@@ -191,7 +191,7 @@ def test_all_that_a_path_came_to_is_named_everywhere_in_the_order_of_time(tmp_pa
     assert path.collisions[0].t0_s < path.out_of_limits[0].t0_s
     assert path.outcomes == ("collides", "leaves limits")
     assert fault.verdict == "collides, leaves limits"
-    assert "found so: line_limits (collides, leaves limits)" in say(results.summary.verdict.finding)
+    assert "expected to fail, and did: line_limits (collides, leaves limits)" in say(results.summary.verdict.finding)
     late = replace(path, collisions=(replace(path.collisions[0], t0_s=path.out_of_limits[0].t0_s + 0.1),))
     assert late.outcomes == ("leaves limits", "collides")
     assert replace(path, collisions=()).outcomes == ("leaves limits",)

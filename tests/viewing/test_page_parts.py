@@ -79,6 +79,8 @@ def test_the_index_marks_each_entry_of_a_table_as_validation_found_it(small_resu
     write_index(study, tmp_path, tmp_path)
     page = (tmp_path / "index.html").read_text(encoding="utf-8")
     legend = page.split('class="key entries"')[1].split("</p>")[0]
+    better = read_stage(tmp_path / "er3a_c60/validation", STAGES["validation"]).results.summary.evidence
+    to_use = {each.entry: each.status for each in better.entries}
     for name in study.robots:
         evidence = read_stage(tmp_path / name / "validation", STAGES["validation"]).results.summary.evidence
         for entry in (each for each in evidence.entries if each.value is not None):
@@ -86,7 +88,9 @@ def test_the_index_marks_each_entry_of_a_table_as_validation_found_it(small_resu
             (status, value, rest) = re.search(
                 rf'<td class="n (\w+)" title="[^"]*">{link}(.*?)</a>(.*?)</td>', page
             ).groups()
-            assert (status, float(value.replace("−", "-"))) == (entry.status, round(entry.value, 3)), entry
+            alone = name == "er3a_c60_article" and "settled" in entry.status and to_use[entry.entry] == "consistent"
+            expected = "consistent" if alone else entry.status  # as in the table to use: one document alone gives it
+            assert (status, float(value.replace("−", "-"))) == (expected, round(entry.value, 3)), entry
             assert f'<span class="{status}">' in legend
             if status == "contradicted":
                 given = float(re.search("→ <strong>(.*?)</strong>", rest)[1].replace("−", "-"))
