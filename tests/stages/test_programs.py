@@ -147,7 +147,7 @@ def test_page_and_recording_are_written(study, stored, tmp_path):
     nowhere = replace(summary, programs=(replace(program, findings=told),))
     (fault,) = faults(replace(stored["er3a_c60"].results, summary=nowhere))
     assert not re.search(r"[;.:。；] *[:：]", fault.what), fault.what
-    assert "go by a joint move to (" in html
+    assert "go by a joint move to the joint angles (" in html
     assert (tmp_path / "programs.rrd").stat().st_size > 100_000
 
 

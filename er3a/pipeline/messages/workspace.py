@@ -152,7 +152,7 @@ TEXTS = texts(
             "Not on {name} itself: an arm that reaches all of the box comes within {margin} mm of the scene or of "
             "itself."
         ),
-        "stand.between": "On a stand {gap} mm high ({least} to {most} mm work too) on {name}: centre at ({centre}) mm.",
+        "stand.between": "On a stand {gap} mm high ({least} to {most} mm pass the same checks, nearer to a singular pose) on {name}: centre at ({centre}) mm.",
         "void.shoulder": (
             "The tool point can't reach {lower:.3g} to {upper:.3g} L around the shoulder: {extent} mm, centre "
             "({centre}) mm."
@@ -197,8 +197,8 @@ TEXTS = texts(
             "scene file and run again."
         ),
         "box.range": (
-            "Stands {least} to {most} mm high pass the same checks, but nearer to a singular pose: manipulability "
-            "falls to {percent:.2g} % or less of that at {gap} mm."
+            "Stands {least} to {most} mm high pass the same checks, but nearer to a singular pose: at one of them "
+            "manipulability falls to {percent:.2g} % of that at {gap} mm, or less."
         ),
         "box.proven#all": "the tool point, {tilt}, reaches all of it (proven); {unchecked}",
         "box.proven#upper": (

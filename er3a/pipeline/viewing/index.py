@@ -658,7 +658,7 @@ def _proposed(finding: object) -> dict[str, str]:
     if not isinstance(finding, LeftOpen) or finding.next_measurement is None:
         return {}
     proposal, entry = finding.next_measurement, finding.next_measurement.entry
-    seen = N_("If so, {entry} is right; if not, turn its sign in the robot's file, and run again.")
+    seen = N_("If so, {entry} is correct; if not, turn its sign in the robot's file, and run again.")
     settles = seen if proposal.code == "look_at_motion" else N_("It settles {entry}.")
     step = [page.whole_sentence(say(proposal)), tr(settles, entry=entry if " " in entry else shortened([entry]))]
     open_ = sum(part.entries - part.settled - part.up_to_signs for part in finding.parts)
@@ -764,7 +764,7 @@ class _Passes:
             for name, t in each.items()
         ]
         said = [
-            tr("Their tool points pass through the box or its stand: {names}.", names=joined(named, ", "))
+            tr("The tool point passes through the box or its stand in: {names}.", names=joined(named, ", "))
             if named
             else tr("No tool point of these was found in the box or its stand."),
             tr(
@@ -830,9 +830,9 @@ def _without_box() -> str:
 def _condition(parts: Sequence[PartFound], unbounded: Sequence[str]) -> str:
     """What has to be confirmed before anything that passes is run on the arm; empty where all of its table is."""
     if not parts:
-        return tr("Run nothing on the arm until its table is confirmed.")
+        return tr("Run no path or program on the arm until its table is confirmed.")
     names = unconfirmed(parts, unbounded)
-    return names and tr("Run nothing on the arm until these are confirmed: {entries}.", entries=names)
+    return names and tr("Run no path or program on the arm until these are confirmed: {entries}.", entries=names)
 
 
 def _run(stage: str, results: TrajectoryResults | ProgramsResults) -> dict[str, Any]:
