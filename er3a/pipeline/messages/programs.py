@@ -333,12 +333,12 @@ TEXTS = texts(
             "Keep {margin:g} mm between {pair}, or give shapes from a drawing or model in the robot's file."
         ),
         "remedy.joint_move": (
-            "From where this line starts, go by a joint move to the joint angles ({end}) deg: in the model it is within limits, speeds "
-            "and clear, at the joint speed assumed here."
+            "From where this line starts, go by a joint move to the joint angles ({end}) deg: in the model it is "
+            "within limits, speeds and clear, at the joint speed assumed here."
         ),
         "remedy.joint_moves": (
-            "From where this line starts, go by joint moves to the joint angles ({via}) deg, then ({end}) deg: in the model they are "
-            "within limits, speeds and clear, at the joint speed assumed here."
+            "From where this line starts, go by joint moves to the joint angles ({via}) deg, then ({end}) deg: in the model "
+            "they are within limits, speeds and clear, at the joint speed assumed here."
         ),
         "remedy.zone_too_large": "Make the zone {half:.1f} mm at most.",
         "remedy.limit#above": (

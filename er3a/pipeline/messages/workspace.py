@@ -152,7 +152,10 @@ TEXTS = texts(
             "Not on {name} itself: an arm that reaches all of the box comes within {margin} mm of the scene or of "
             "itself."
         ),
-        "stand.between": "On a stand {gap} mm high ({least} to {most} mm pass the same checks, nearer to a singular pose) on {name}: centre at ({centre}) mm.",
+        "stand.between": (
+            "On a stand {gap} mm high ({least} to {most} mm pass the same checks, nearer to a singular pose) on {name}: "
+            "centre at ({centre}) mm."
+        ),
         "void.shoulder": (
             "The tool point can't reach {lower:.3g} to {upper:.3g} L around the shoulder: {extent} mm, centre "
             "({centre}) mm."
