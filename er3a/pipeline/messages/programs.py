@@ -337,8 +337,8 @@ TEXTS = texts(
             "within limits, speeds and clear, at the joint speed assumed here."
         ),
         "remedy.joint_moves": (
-            "From where this line starts, go by joint moves to the joint angles ({via}) deg, then ({end}) deg: in the model "
-            "they are within limits, speeds and clear, at the joint speed assumed here."
+            "From where this line starts, go by joint moves to the joint angles ({via}) deg, then ({end}) deg: in the "
+            "model they are within limits, speeds and clear, at the joint speed assumed here."
         ),
         "remedy.zone_too_large": "Make the zone {half:.1f} mm at most.",
         "remedy.limit#above": (

@@ -153,8 +153,8 @@ TEXTS = texts(
             "itself."
         ),
         "stand.between": (
-            "On a stand {gap} mm high ({least} to {most} mm pass the same checks, nearer to a singular pose) on {name}: "
-            "centre at ({centre}) mm."
+            "On a stand {gap} mm high ({least} to {most} mm pass the same checks, nearer to a singular pose) on {name}"
+            ": centre at ({centre}) mm."
         ),
         "void.shoulder": (
             "The tool point can't reach {lower:.3g} to {upper:.3g} L around the shoulder: {extent} mm, centre "

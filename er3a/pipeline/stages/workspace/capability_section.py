@@ -42,7 +42,12 @@ def best_text(summary: model.WorkspaceSummary, placement: model.PlacementSummary
     texts = [
         box_text(summary),
         tr("Other collisions were checked at samples only.") if place.status == "proven" else "",
-        tr("It can be moved by {room} mm, one direction at a time.", room=_room(place)) if _movable(place) else "",
+        tr(
+            "Reach and limits allow to move it by {room} mm, one direction at a time; what it stands on may be smaller.",
+            room=_room(place),
+        )
+        if _movable(place)
+        else "",
         _nearest_limit(place),
         _nearest_bodies(place),
     ]
