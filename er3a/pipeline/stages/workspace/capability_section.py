@@ -43,7 +43,7 @@ def best_text(summary: model.WorkspaceSummary, placement: model.PlacementSummary
         box_text(summary),
         tr("Other collisions were checked at samples only.") if place.status == "proven" else "",
         tr(
-            "Reach and limits allow to move it by {room} mm, one direction at a time; what it stands on may be smaller.",
+            "Reach and limits allow to move it by {room} mm, one direction at a time; its support may be smaller.",
             room=_room(place),
         )
         if _movable(place)
