@@ -93,7 +93,9 @@ def test_the_index_marks_each_entry_of_a_table_as_validation_found_it(small_resu
             assert (status, float(value.replace("−", "-"))) == (expected, round(entry.value, 3)), entry
             assert f'<span class="{status}">' in legend
             if status == "contradicted":
-                given = float(re.search("→ <strong>(.*?)</strong>", rest)[1].replace("−", "-"))
+                given, alone = re.search("→ <strong>(.*?)( =)?</strong>", rest).groups()
+                given = float(given.replace("−", "-"))
+                assert bool(alone) == (to_use[entry.entry] == "consistent"), entry
                 assert entry.interval[0] <= given <= entry.interval[1], entry
             else:
                 assert "→" not in rest

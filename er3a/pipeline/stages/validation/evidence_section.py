@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Set
 from dataclasses import asdict, dataclass, replace
 from itertools import product
 from math import pi
@@ -142,7 +142,9 @@ def evidence_section(
     present = dict.fromkeys(each.status for each in numbers)
     return dict(
         columns=[tr(COLUMNS[kind]) for kind in kinds],
-        rows=[(joint, [_cell(by_name.get(f"{kind}{joint}"), evidence) for kind in kinds]) for joint in joints],
+        rows=[
+            (joint, [_cell(by_name.get(f"{kind}{joint}"), evidence, unconfirmed) for kind in kinds]) for joint in joints
+        ],
         statuses=list(present),
         allowed=_allowed(evidence),
         legend=[
@@ -355,12 +357,14 @@ def other_robot(robot: Robot, evidence: TableEvidence | None) -> Robot | None:
     return robot.replace(**asdict(evidence.other.table)) if evidence and evidence.other else None
 
 
-def _cell(each: EntryEvidence | None, evidence: TableEvidence) -> dict[str, Any] | None:
+def _cell(each: EntryEvidence | None, evidence: TableEvidence, unconfirmed: Set[str]) -> dict[str, Any] | None:
     if each is None or each.value is None:
         return None
     title = tr("{entry}: {status}", entry=each.entry, status=_status(each.status))
     shown = dict(entry=each.entry, value=_value(each), status=each.status, mark=MARKS[each.status], title=title)
-    return shown | dict(gives=_gives(each, evidence))
+    gives = _gives(each, evidence)
+    alone = gives and each.status == "contradicted" and each.entry in unconfirmed
+    return shown | dict(gives=f"{gives} {MARKS['consistent']}" if alone else gives)
 
 
 def _status(status: Status) -> str:
