@@ -102,7 +102,11 @@ MOVES_ARM_OR_PART = re.compile(
     re.IGNORECASE,
 )
 ON_PAGES = {  # texts without a key that are none of the remedies above: the first words
-    *("Never use this table", "Evidence contradicts this table", "In the model: run none"),  # that forbid something
+    *(
+        "Never use this table",
+        "Evidence contradicts this table",
+        "Run no path or program on the arm",
+    ),  # that forbid something
     *("Part of this D-H table", "This D-H table was", "Run it on the arm only when", "Run none of these"),  # likewise
     "Stop: neither table is the arm",  # likewise
     *("To have all pages", "Its table has not been examined", "These pass without the tray"),  # runs of er3a

@@ -124,12 +124,8 @@ def test_part_of_a_study_has_verdicts_an_index_and_a_report(study, tmp_path, mon
     write_index(study, results, reports)
     page = (reports / "index.html").read_text(encoding="utf-8")
     assert "Not examined yet: workspace, collision, inverse, trajectory, dynamics." in page
-    assert re.findall(r'href="er3_600/(\w+)\.html', page) == [
-        "validation",
-        "validation",
-        "teach",
-        "validation",
-        "validation",
+    assert re.findall(r'href="er3_600/(\w+)\.html(?!#entry-)', page) == [
+        *("validation", "validation", "teach", "validation", "validation")
     ]  # next, badge, panel, table, cell
     skipped = etree.parse(reports / "junit.xml").findall(".//skipped")
     assert len(skipped) == len(others)

@@ -274,5 +274,5 @@ end
 """
     arm = load_robot("ur5e")
     check = check_program(program_of(tmp_path, "line.script", text), arm, CheckOptions(measures=False))
-    assert {each.place.line: each.level for each in check.verdicts} == {2: "note", 4: "pass", 5: "fail"}
+    assert {each.place.line: each.level for each in check.verdicts} == {2: "caution", 4: "pass", 5: "fail"}
     assert "way_out_of_reach" in {each.finding.code for each in check.findings}

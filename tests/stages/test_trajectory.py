@@ -389,7 +389,7 @@ def test_the_index_says_first_what_validation_came_to(study, folders, stored, tm
     assert 'play=line_wrist%2C+repaired&amp;t=0.0#line_wrist">line_<wbr>wrist, repaired</a>' in listed
     assert "trajectory.html?play=line_clean&amp;t=0#line_clean" in index  # a sound one is named too
     assert '<details class="faults tight" id="runs-er3_600">' in index
-    assert "run none on the arm before its table is confirmed" in index
+    assert "Run no path or program on the arm until its table is confirmed" in index
     for each in meant:
         t, place = re.search(rf'trajectory.html\?play={each.name}&amp;t=([\d.]+)#(\w+)"', listed).groups()
         path = next(path for path in stored["er3_600"].results.summary.paths if path.name == each.name)
