@@ -19,7 +19,7 @@ from er3a.pipeline.viewing.index import write_index, write_junit
 ROOT = Path(__file__).resolve().parents[1]
 
 SCHEMA = Path(__file__).with_name("junit.xsd")
-GOOD = StageVerdict("arm", "validation", "pass", "v.good", "All checks agree.")
+GOOD = StageVerdict("arm", "validation", "pass", "v.good", "All checks agree.", not_examined=("steel: \x1b[1m arm",))
 CAUTION = StageVerdict("arm", "workspace", "caution", "w.void", "Usable; 2 voids.")
 BAD = StageVerdict("arm", "trajectory", "fail", "t.none_safe", "No path is safe: <line> & arc.")
 UNKNOWN = StageVerdict("other", "validation", "no_reference", "v.none", "There is nothing to check against.")
@@ -45,7 +45,7 @@ def test_each_verdict_is_the_outcome_that_it_means(report):
         for case in report.iter("testcase")
     }
     assert outcomes == {
-        ("arm", "validation"): [],
+        ("arm", "validation"): ["system-out"],
         ("arm", "workspace"): ["system-out"],
         ("arm", "trajectory"): ["failure"],
         ("other", "validation"): ["skipped"],
@@ -58,7 +58,8 @@ def test_each_verdict_is_the_outcome_that_it_means(report):
 def test_texts_and_counts(report):
     assert report.find(".//failure").get("message") == BAD.text
     assert report.find(".//failure").get("type") == BAD.code
-    assert report.findtext(".//system-out") == "caution: Usable; 2 voids."
+    said = [each.text for each in report.iter("system-out")]
+    assert said == ["pass: All checks agree.\nnot examined: steel: ?[1m arm", "caution: Usable; 2 voids."]
     assert report.find(".//error").get("message") == "ValueError: ?[31m odd"
     assert dict(report.getroot().attrib) == {"name": "er3a", "tests": "7", "failures": "1", "errors": "1"}
     assert report.find("testsuite[@name='other']").get("skipped") == "3"
@@ -82,10 +83,10 @@ def test_demonstrations_are_counted_apart_and_expectations_that_are_not_met_fail
     assert report.getroot().get("failures") == "1"
     said = {case.get("name"): case.findtext("system-out") for case in report.iter("testcase")}
     assert said == {
-        "validation": None,
+        "validation": "pass: All checks agree.\nnot examined: steel: ?[1m arm",
         "dynamics": "demonstration, fail as expected: Masses can't be right.",
-        "inverse": "demonstrations, which fail as expected: 2",
-        "collision": "expected: fail",
+        "inverse": "pass: All reached; 2 fail as expected.\ndemonstrations, which fail as expected: 2",
+        "collision": "pass: Free.\nexpected: fail",
     }
     not_for_it = replace(NOT_FOR_IT, expected="fail")  # has come to no other verdict
     for level in ("caution", "fail"):
@@ -143,7 +144,7 @@ def test_an_index_without_validation_says_so(study, tmp_path, monkeypatch):
 
 MOVE = "movej([0, -0.2, -0.2, 0, -1.2, 0], a=1, v=0.5)\n"
 EVERY = {  # robot: program, what is expected of the stage; its status; exit codes at caution and fail; case; badge
-    "passes": (MOVE, None, "pass", (0, 0), None),
+    "passes": (MOVE, None, "pass", (0, 0), "system-out"),
     "doubtful": (MOVE + "go_home()\n", None, "caution", (1, 0), "system-out"),
     "fails": ("movej([9, 0, 0, 0, 0, 0])\n", None, "fail", (1, 1), "failure"),
     "fails_as_expected": ("movej([9, 0, 0, 0, 0, 0])\n", "fail", "fail", (0, 0), "system-out"),
@@ -196,7 +197,12 @@ def test_every_status_in_one_study_is_the_same_in_index_report_and_exit_codes(tm
     for name, (_, _, status, codes, case) in EVERY.items():
         assert found[name].status == status, name
         (own_case,) = report.iterfind(f"testsuite[@name='{name}']/testcase[@name='programs']")
-        assert [each.tag for each in own_case][:1] == [case] * bool(case), name
+        assert [each.tag for each in own_case][:1] == [case], name
+        shown = [line for line in own_case.findtext("system-out", "").splitlines() if line.startswith("not examined: ")]
+        left_out = found[name].not_examined
+        assert shown == [f"not examined: {each}" for each in left_out], name
+        read = status not in ("not_computed", "not_examined")
+        assert any("collisions of a tool" in each for each in left_out) == read, name
         (tmp_path / "study.yaml").write_text(yaml.safe_dump(content | {"robots": {name: robots[name]}}))
         for level, code in zip(("caution", "fail"), codes):
             if name != "not_run":

@@ -432,13 +432,13 @@ def _status(folder: Path, record: dict[str, Any]) -> Status:
     return status
 
 
-def read_verdict(folder: Path, stage: Stage) -> Verdict[Any]:
-    """A stage's verdict; :class:`ResultError` as :func:`read_stage`."""
+def read_verdict(folder: Path, stage: Stage) -> tuple[Verdict[Any], tuple[LeftOut, ...]]:
+    """A stage's verdict, and what it leaves out; :class:`ResultError` as :func:`read_stage`."""
     record = _record(folder)
     if _status(folder, record) == "not_computed":
-        return Verdict("not_computed", _reason_of_absence(record["verdict"], stage))
-    verdict: Verdict[Any] = _parsed(folder / SUMMARY, record, stage.module("model").RESULTS)[0].verdict
-    return verdict
+        return Verdict("not_computed", _reason_of_absence(record["verdict"], stage)), ()
+    summary = _parsed(folder / SUMMARY, record, stage.module("model").RESULTS)[0]
+    return summary.verdict, summary.not_examined
 
 
 def check_results(folder: Path) -> None:

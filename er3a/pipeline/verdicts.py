@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Literal
 
 from er3a.pipeline.messages import language
-from er3a.pipeline.messages.say import say_all, sentence
+from er3a.pipeline.messages.left_out import left_out_names, left_out_text
+from er3a.pipeline.messages.say import bracketed, say_all, sentence
 from er3a.pipeline.results import NotComputed, Status, is_computed, read_status, read_verdict
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
@@ -28,6 +29,7 @@ class StageVerdict:
     code : of the finding; text : in English
     demonstrations : how many targets, paths, programs or objects in it fail as they are meant to
     expected : what the study says that the status is to be, if it does
+    not_examined : what the verdict leaves out, in English
     """
 
     robot: str
@@ -37,6 +39,7 @@ class StageVerdict:
     text: str
     demonstrations: int = 0
     expected: str | None = None
+    not_examined: tuple[str, ...] = ()
 
     @property
     def is_demonstration(self) -> bool:
@@ -96,6 +99,8 @@ def _stage_verdict(results: Path, robot: str, name: str, expected: str | None) -
         unknown = sentence("stage.not_examined")
         return StageVerdict(robot, name, NOT_EXAMINED, "stage.not_examined", unknown, expected=expected)
     import_module(stage.messages)
-    verdict = read_verdict(folder, stage)
+    verdict, left_out = read_verdict(folder, stage)
     shown = len(getattr(verdict.finding, "demonstrations", ()))
-    return StageVerdict(robot, name, verdict.status, verdict.finding.code, say_all(verdict.findings), shown, expected)
+    missed = tuple(bracketed(left_out_text(each), left_out_names(each)) for each in left_out)
+    text = say_all(verdict.findings)
+    return StageVerdict(robot, name, verdict.status, verdict.finding.code, text, shown, expected, missed)

@@ -158,7 +158,7 @@ def test_shapes_in_error_end_no_other_stage_and_are_never_a_pass(stage, tmp_path
     """Each stage that looks for collisions says which pairs it did not look at."""
     study = with_a_base_too_large(tmp_path)
     run.compute(stage, study, "arm", tmp_path / stage)
-    verdict = read_verdict(tmp_path / stage, STAGES[stage])
+    verdict, _ = read_verdict(tmp_path / stage, STAGES[stage])
     assert verdict.status == "caution"
     assert [pair.second for pair in verdict.unexamined] == [3, 4, 6]
     assert say(verdict.findings[1]) == (

@@ -431,8 +431,9 @@ def write_junit(verdicts: Sequence[StageVerdict], output: Path) -> None:
     """Write the report.
 
     A verdict of ``fail`` is a failure, a stage that broke an error; ``no_reference``, and a stage that does not apply
-    to the robot or has not been computed yet, are skipped; a caution passes and tells what it found. What fails as it
-    is meant to is no failure, and counts as a demonstration; what the study expects otherwise is a failure.
+    to the robot or has not been computed yet, are skipped; a caution passes. What fails as it is meant to is no
+    failure, and counts as a demonstration; what the study expects otherwise is a failure. What passes says its verdict,
+    and each case lists what was not examined.
     """
     root = ElementTree.Element("testsuites", {"name": "er3a"} | _counts(verdicts))
     for robot in dict.fromkeys(verdict.robot for verdict in verdicts):
@@ -454,12 +455,13 @@ def _add_case(suite: ElementTree.Element, verdict: StageVerdict) -> None:
     lines = []
     if verdict.is_demonstration:
         lines.append(f"demonstration, {verdict.status} as expected: {text}")
-    elif verdict.status == "caution":
-        lines.append(f"caution: {text}")
+    elif verdict.status in ("pass", "caution"):
+        lines.append(f"{verdict.status}: {text}")
     if verdict.demonstrations:
         lines.append(f"demonstrations, which fail as expected: {verdict.demonstrations}")
     if verdict.is_otherwise:
         lines.append(f"expected: {verdict.expected}")
+    lines += [f"not examined: {_NO_XML.sub('?', each)}" for each in verdict.not_examined]
     if lines:
         ElementTree.SubElement(case, "system-out").text = "\n".join(lines)
 
