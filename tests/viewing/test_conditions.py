@@ -173,8 +173,22 @@ def test_the_index_names_what_passes_through_the_box_or_its_stand(over):
         "workspace": placed(over=over),
         "trajectory": moving(TrajectoryResults, PathChecks, "path", paths, motions),
         "programs": moving(ProgramsResults, ProgramMotion, "program", programs, {"through": (0.0, 376.0)}),
+        "inverse": SimpleNamespace(
+            results=SimpleNamespace(
+                summary=SimpleNamespace(
+                    targets=[
+                        SimpleNamespace(name="on_edge", xyz_mm=(275.0, 100.0, 425.0), chosen_deg=(0.0,)),
+                        SimpleNamespace(name="under", xyz_mm=(350.0, 0.0, 200.0), chosen_deg=(0.0,)),
+                        SimpleNamespace(name="unsolved", xyz_mm=(350.0, 0.0, 400.0), chosen_deg=None),
+                        SimpleNamespace(name="outside", xyz_mm=(274.0, 0.0, 400.0), chosen_deg=(0.0,)),
+                    ]
+                )
+            )
+        ),
     }
     found = _passes(stored)
+    assert found.targets == (("on_edge", "under") if over else ("on_edge",))
+    assert f"Targets in it or its stand: {', '.join(found.targets)}." in found.text
     below = {"below": pytest.approx(2.75)} if over else {}
     assert found.through == {
         "trajectory": {"into": pytest.approx(2.75)} | below,

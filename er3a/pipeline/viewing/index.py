@@ -735,10 +735,12 @@ class _Passes:
     Attributes
     ----------
     through : per stage the first time (s) by name
+    targets : those with a solution, whose tool points lie in it
     unseen : names of paths and programs whose tool points are not known, or not all
     """
 
     through: Mapping[str, Mapping[str, float]]
+    targets: tuple[str, ...]
     unseen: tuple[str, ...]
 
     @property
@@ -765,10 +767,12 @@ class _Passes:
             for each in self.through.values()
             for name, t in each.items()
         ]
+        inside = tr("Targets in it or its stand: {names}.", names=joined(self.targets, ", ")) if self.targets else ""
         said = [
             tr("The tool point passes through the box or its stand in: {names}.", names=joined(named, ", "))
             if named
             else tr("No tool point of these was found in the box or its stand."),
+            inside,
             tr(
                 "Only tool points were compared, straight between the stored times; links and the tool's body were not."
             ),
@@ -802,7 +806,9 @@ def _passes(stored: Mapping[str, Stored[Any]]) -> _Passes | None:
             if len(rows) < 2 or not np.isfinite(rows.xyz_mm).all():
                 unseen.append(name)
         unseen += [each.name for each in getattr(results.summary, "not_followed", ())]
-    return _Passes(through, tuple(unseen))
+    targets = stored["inverse"].results.summary.targets if "inverse" in stored else ()
+    inside = (each.name for each in targets if each.chosen_deg and np.all((low <= each.xyz_mm) & (each.xyz_mm <= high)))
+    return _Passes(through, tuple(inside), tuple(unseen))
 
 
 def first_inside(t: Reals, points: Reals, low: Reals, high: Reals) -> float | None:
