@@ -94,9 +94,9 @@ def test_recordings_call_no_path_safe_without_saying_of_what(small_results):
 
 def test_a_program_of_a_path_near_assumed_shapes_says_so_in_its_head():
     robot, least = load_robot("er3a_c60"), MinClearance(11.2, 0.4, LinkPair(1, 3), 5)
-    (near,) = near_assumed_shapes(robot, "a", least, 20)
+    (near,) = near_assumed_shapes(robot, "a", least, 0.02)
     assert head_line(near).startswith("NOT SETTLED: the path a is clear by 11.2 mm of assumed shapes only")
-    assert near_assumed_shapes(robot, "a", least, 10) == near_assumed_shapes(documented(), "a", least, 20) == ()
+    assert near_assumed_shapes(robot, "a", least, 0.01) == near_assumed_shapes(documented(), "a", least, 0.02) == ()
 
 
 def test_the_pages_say_where_what_stands_around_the_arm_is():
