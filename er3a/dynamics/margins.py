@@ -143,13 +143,13 @@ def _first_root(a: Reals, b: Reals, c: Reals) -> Reals:
 
 def _least(values: dict[Binding, Reals]) -> Margin:
     """The least of values (N, n), or (1, n) of the whole motion; NaN where nothing limits."""
-    least = Margin(np.inf)
+    smallest = Margin(np.inf)
     for by, each in values.items():
         each = np.where(np.isnan(each), np.inf, each)
         sample, joint = np.unravel_index(int(each.argmin()), each.shape)
-        if each[sample, joint] < least.value:
-            least = Margin(float(each[sample, joint]), by, int(joint), None if by == "rms" else int(sample))
-    return least
+        if each[sample, joint] < smallest.value:
+            smallest = Margin(float(each[sample, joint]), by, int(joint), None if by == "rms" else int(sample))
+    return smallest
 
 
 AXES = np.eye(3)

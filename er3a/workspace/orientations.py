@@ -71,8 +71,8 @@ class TiltPlane:
         aside = float(self.tool[:, 2] @ self.normal)
         x, y = up @ axis, np.cross(normal, up) @ axis
         size = np.hypot(x, y) * np.sqrt(max(0.0, 1 - aside**2))
-        least = np.cos(half_angle) - aside * (normal @ axis)
-        ratio = np.divide(least, size, out=np.where(least > 0, 2.0, -1.0), where=size > 1e-12)
+        smallest = np.cos(half_angle) - aside * (normal @ axis)
+        ratio = np.divide(smallest, size, out=np.where(smallest > 0, 2.0, -1.0), where=size > 1e-12)
         width = np.arccos(np.where(ratio <= 1 + 1e-9, np.clip(ratio, -1, 1), np.nan)).reshape(turns.shape)
         middle = np.arctan2(y, x).reshape(turns.shape)
         share = np.linspace(-1, 1, 2 * int(np.ceil(half_angle / step - 1e-9)) + 1)[:, None] * [1.0, -1.0]

@@ -359,7 +359,7 @@ def _timings(
         kinematic = fastest(nodes, arm.limits).duration
         for _ in range(HALVINGS + 1):
             shortest = fastest_under_torques(arm.model, joints(t), arm.limits.speed, peak)
-            found.append(model.ShortestTime(len(t), shortest.timed.duration, shortest.least))
+            found.append(model.ShortestTime(len(t), shortest.timed.duration, shortest.lower_bound))
             t = np.sort(np.concatenate([t, (t[1:] + t[:-1]) / 2]))
         return tuple(found), kinematic, None
     except TimingError as error:
