@@ -327,8 +327,8 @@ def load_diagram(
     A joint before the last one counts with the distance from the wrist's centre, which a load gets from its
     axis if the joints beyond turn far enough.
     """
-    behind = wrist_to_flange(robot)
-    if behind is None or not (wrist.moment or wrist.inertia):
+    wrist_offset = wrist_to_flange(robot)
+    if wrist_offset is None or not (wrist.moment or wrist.inertia):
         return None
     last, before = [np.full((len(mass), 1), np.inf) for _ in range(2)]
     with np.errstate(divide="ignore"):  # a load without weight bends no wrist, however long its lever
@@ -337,7 +337,7 @@ def load_diagram(
     for joint, lever in levers_of:
         last, before = (np.minimum(last, lever), before) if joint == robot.rows else (last, np.minimum(before, lever))
     with np.errstate(invalid="ignore"):
-        across = np.minimum(np.sqrt(before**2 - (behind + along) ** 2), last)
+        across = np.minimum(np.sqrt(before**2 - (wrist_offset + along) ** 2), last)
     across = np.where(np.isfinite(across), across, np.nan)
     if np.isfinite(wrist.payload):
         across[mass > wrist.payload * (1 + 1e-9)] = np.nan

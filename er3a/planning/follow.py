@@ -570,13 +570,13 @@ def _costs_to_go(q: Reals, price: Reals, meeting: Integers) -> tuple[Integers, F
         if np.isfinite(q[count - 1, a, 0]):
             cost[a] = price[count - 1, a]
     for i in range(count - 2, -1, -1):
-        behind = cost.copy()
+        cost_after = cost.copy()
         cost[:] = np.inf
         for a in range(SLOTS):
             if not np.isfinite(q[i, a, 0]):
                 continue
             for b in range(SLOTS):
-                if not np.isfinite(behind[b]):
+                if not np.isfinite(cost_after[b]):
                     continue
                 travel, max_step = 0.0, 0.0
                 for j in range(6):
@@ -586,7 +586,7 @@ def _costs_to_go(q: Reals, price: Reals, meeting: Integers) -> tuple[Integers, F
                     max_step = max(max_step, abs(step))
                 together = (a ^ b) & ~(meeting[i, a] | meeting[i + 1, b]) == 0
                 jump = max_step > (WIDE_STEP if together else SWITCH_STEP)
-                total = price[i, a] + np.sqrt(travel) + behind[b] + (JUMP_COST if jump else 0.0)
+                total = price[i, a] + np.sqrt(travel) + cost_after[b] + (JUMP_COST if jump else 0.0)
                 if total < cost[a]:
                     cost[a] = total
                     onward[i, a] = b

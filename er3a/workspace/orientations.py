@@ -170,12 +170,12 @@ def asked_of(robot: Robot, rolls: int) -> AskedOrientations | None:
 def _tilt_plane(robot: Robot, joints: int) -> TiltPlane | None:
     """The plane in which an arm's first ``joints`` joints tilt its tool; None if they do not tilt it in a plane."""
     axes, _, T = axes_at_zero_theta(robot)
-    behind, sliding = axes[1:joints], robot.sliding[1:joints]
-    if robot.sliding[0] or len(behind) < _MIN_PLANAR or sliding.all():
+    later_axes, sliding = axes[1:joints], robot.sliding[1:joints]
+    if robot.sliding[0] or len(later_axes) < _MIN_PLANAR or sliding.all():
         return None
-    normal = behind[~sliding][0]
-    apart = np.linalg.norm(np.cross(behind[~sliding], normal), axis=1).max()
-    along = np.abs(behind[sliding] @ normal).max(initial=0.0)
+    normal = later_axes[~sliding][0]
+    apart = np.linalg.norm(np.cross(later_axes[~sliding], normal), axis=1).max()
+    along = np.abs(later_axes[sliding] @ normal).max(initial=0.0)
     up = axes[0] - (axes[0] @ normal) * normal
     if max(apart, along) > _PARALLEL or np.linalg.norm(up) < _PARALLEL:
         return None
