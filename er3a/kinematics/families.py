@@ -211,7 +211,7 @@ class Family(ByValue, Displayed):
             return self.q0 + t[..., None] * self.direction
         joint = FREE_JOINT[self.kind]
         q = _on_curve(self.robot, self.T, joint, self.q0[joint] + t.reshape(-1), self.q0, self.branches[0])
-        q = nearest_equivalent(self.robot, _nearest_wrists(self.robot, q, self.q0), self.q0)
+        q = nearest_equivalent(self.robot, nearest_wrists(self.robot, q, self.q0), self.q0)
         q[:, joint] = self.q0[joint] + t.reshape(-1)
         return q.reshape(*t.shape, 6)
 
@@ -319,7 +319,7 @@ def _curve_families(
     grid = np.unique(np.append(np.minimum(grid, high), np.clip(q_ref[joint], low, high)))
 
     def members(values: Reals) -> Reals:
-        q = _nearest_wrists(robot, _on_curve(robot, T, joint, values, q_ref, slot), q_ref)
+        q = nearest_wrists(robot, _on_curve(robot, T, joint, values, q_ref, slot), q_ref)
         q = nearest_equivalent(robot, q, q_ref)
         q[:, joint] = values
         return q
@@ -348,7 +348,7 @@ def _curve_families(
     return sorted(found, key=lambda family: float(np.linalg.norm(family.q0 - q_ref)))
 
 
-def _nearest_wrists(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
+def nearest_wrists(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
     """Rows (n, 6) with an aligned wrist moved along their line to the member nearest to the reference."""
     for row in np.flatnonzero(np.abs(bend_of_wrist(robot, q)) < SOLVES_RAD):
         on_line, direction = wrist_line(robot, q[row])

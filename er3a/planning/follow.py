@@ -483,11 +483,13 @@ def _best(robot: Robot, grid: Branches, part: slice, starts: Integers, before: R
     for start in starts:
         slot = _walk(onward, start)
         jumps = leaps[np.arange(len(t) - 1), slot[:-1]]
-        sequences.append(_with_turns(robot, q[np.arange(len(t)), slot], slot, jumps, share, before))
+        sequences.append(with_whole_turns(robot, q[np.arange(len(t)), slot], slot, jumps, share, before))
     return min(sequences, key=lambda sequence: sequence.cost)
 
 
-def _with_turns(robot: Robot, q: Reals, slot: Integers, jumps: Flags, share: Reals, before: Reals | None) -> _Sequence:
+def with_whole_turns(
+    robot: Robot, q: Reals, slot: Integers, jumps: Flags, share: Reals, before: Reals | None
+) -> _Sequence:
     """Make angles continuous and choose each joint's whole turns: those with the shortest time outside the limits of
     joints and of sums of joints, then the nearest."""
     steps = turned_difference(q[:-1], q[1:])

@@ -17,7 +17,7 @@ from er3a.pipeline.stages.collision.compute import compute as collision
 from er3a.pipeline.stages.collision.model import FreeSpace
 from er3a.pipeline.stages.trajectory.model import RESULTS, MinClearance, is_safe
 from er3a.pipeline.stages.trajectory.played import faults
-from er3a.pipeline.stages.trajectory.record import _runs
+from er3a.pipeline.stages.trajectory.record import runs_of_path
 from er3a.pipeline.stages.trajectory.written_programs import near_assumed_shapes
 from er3a.pipeline.study import load_study
 from er3a.program_check.check_program import CheckOptions, check_program
@@ -87,7 +87,7 @@ def test_recordings_call_no_path_safe_without_saying_of_what(small_results):
         (results, "plain", "safe in the model"),
         (close, "caution", "clear of assumed shapes only"),
     ):
-        run = next(_runs(load_robot("er3a_c60"), found, sound[0]))
+        run = next(runs_of_path(load_robot("er3a_c60"), found, sound[0]))
         assert (run.status, run.outcome) == (status, words)
         assert f"**{words}**" in run.text
 

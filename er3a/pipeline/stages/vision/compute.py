@@ -365,11 +365,11 @@ def compute(study: Study, name: str) -> model.VisionResults:
     objects = tuple(_object(entry, places[entry.name], plan, error) for entry, plan, error in planned)
     shapes = _shapes(robot, objects, study.assumed_margin(name))
     near = shapes.near if shapes else ()
-    judged = Verdict[Found]("fail", doubt) if doubt else _verdict(calibration, objects, near)
+    judged = Verdict[Found]("fail", doubt) if doubt else verdict_of(calibration, objects, near)
     bodies = bodies_of(robot, scene)
     summary = model.VisionSummary(
         verdict=judged.without(bodies.unexamined).resting_on(shapes),
-        figures=_figures(calibration, objects, near),
+        figures=figures_of(calibration, objects, near),
         title=task_file.title,
         scene=title,
         least_success=settings.least_success,
@@ -561,7 +561,7 @@ def _grasp(chosen: ChosenGrasp) -> model.GraspResult:
     )
 
 
-def _verdict(
+def verdict_of(
     calibration: model.CalibrationResult, objects: tuple[model.ObjectResult, ...], near: tuple[str, ...]
 ) -> Verdict[Found]:
     """``near``: objects whose grasps come within the margin of assumed shapes, which are not counted as grasped."""
@@ -586,7 +586,7 @@ def _least_success(objects: Sequence[model.ObjectResult]) -> float | None:
     return min((each.grasp.probability for each in objects if each.grasp), default=None)
 
 
-def _figures(
+def figures_of(
     calibration: model.CalibrationResult, objects: tuple[model.ObjectResult, ...], near: tuple[str, ...]
 ) -> tuple[Figure, ...]:
     asked = [each for each in objects if each.expect in (None, "grasped")]
