@@ -59,7 +59,7 @@ class ArmShapes:
 
     @property
     def assumed(self) -> bool:
-        """Whether no document gives them that a verdict may rest on."""
+        """Whether no document that a verdict may rest on gives them."""
         return self.grade in ("inferred", "claim")
 
 
