@@ -8,7 +8,7 @@ from __future__ import annotations
 import coal
 import numpy as np
 
-from testing.motion_oracle import _turn, arm_of
+from testing.motion_oracle import about_z, arm_of
 
 
 class Contacts:
@@ -69,7 +69,7 @@ class Contacts:
     def _placed(self, q) -> list:
         T, frames = self.links[0], [self.base]
         for k in range(6):
-            T = T @ _turn(self.direction[k] * q[k] + self.offset[k])
+            T = T @ about_z(self.direction[k] * q[k] + self.offset[k])
             frames.append(T)
             T = T @ self.links[k + 1]
         placed = [frames[link] @ own for link, own in self.numbers]

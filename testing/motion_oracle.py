@@ -188,7 +188,7 @@ class Arm:
     sense: np.ndarray  # (3,), by which q1..q3 turn them
 
 
-def _turn(angle):
+def about_z(angle):
     T = np.zeros((*np.shape(angle), 4, 4))
     T[..., 0, 0] = T[..., 1, 1] = np.cos(angle)
     T[..., 1, 0], T[..., 0, 1] = np.sin(angle), -np.sin(angle)
@@ -222,7 +222,7 @@ def arm_of(table) -> Arm:
         T, found = links[0], []
         for k in range(6):
             found.append(T)
-            T = T @ _turn(direction[k] * q[k] + offset[k]) @ links[k + 1]
+            T = T @ about_z(direction[k] * q[k] + offset[k]) @ links[k + 1]
         return [*found, T]
 
     def planar(q):

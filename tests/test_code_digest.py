@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import er3a
-from er3a.pipeline.code_digest import _imports, code_digest
+from er3a.pipeline.code_digest import code_digest, imported_names
 
 PACKAGE = Path(er3a.__file__).parent
 
@@ -215,4 +215,4 @@ def test_imports_are_read_as_a_parser_reads_them():
                 parsed |= {alias.name for alias in node.names}
             elif isinstance(node, ast.ImportFrom) and node.module != "er3a":
                 parsed |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
-        assert parsed <= set(_imports(path)), path
+        assert parsed <= set(imported_names(path)), path

@@ -130,14 +130,14 @@ class Bodies:
     def min_distance(self, q: Reals) -> tuple[Reals, Integers]:
         """Smallest distance (N,) in m of arms (N, n), negative by the depth, and the number of its pair (-1: none)."""
         q = np.ascontiguousarray(q, float)
-        least, pair, deep = np.empty(len(q)), np.empty(len(q), np.int64), np.zeros(len(q), bool)
-        measure(self.layout, q, np.empty((0, 0)), least, pair, deep)
+        smallest, pair, deep = np.empty(len(q)), np.empty(len(q), np.int64), np.zeros(len(q), bool)
+        measure(self.layout, q, np.empty((0, 0)), smallest, pair, deep)
         every = np.arange(len(self.pairs))
         for row in np.flatnonzero(deep):
             distances = self.counted(self.distances(self.ends(q[row]), every))
             pair[row] = int(distances.argmin())
-            least[row] = distances[pair[row]]
-        return least, pair
+            smallest[row] = distances[pair[row]]
+        return smallest, pair
 
     def min_distance_of_turns(self, q: Reals) -> tuple[Reals, Integers]:
         """As :meth:`min_distance`, for arms (N, n) many of which are others but for whole turns: those are measured
@@ -145,8 +145,8 @@ class Bodies:
         if self.robot.coupling is not None:
             return self.min_distance(q)
         _, first, inverse = np.unique(but_for_turns(self.robot, q), axis=0, return_index=True, return_inverse=True)
-        least, pair = self.min_distance(q[first])
-        return least[inverse.reshape(-1)], pair[inverse.reshape(-1)]
+        smallest, pair = self.min_distance(q[first])
+        return smallest[inverse.reshape(-1)], pair[inverse.reshape(-1)]
 
     def overlaps(self, q: Reals) -> Flags:
         """Which pairs overlap, (N, P), in arms (N, n)."""

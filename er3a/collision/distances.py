@@ -252,11 +252,11 @@ def _cores(
 def _above_plane(w: Reals, first: int, last: int, disc: float, plane: int, near: Reals) -> float:
     """How far a core stays above a half-space, whose rows begin with ``plane``; negative by the depth."""
     x, y, z = w[plane, 0], w[plane, 1], w[plane, 2]
-    least, at = np.inf, first
+    smallest, at = np.inf, first
     for p in range(first, last):
         height = w[p, 0] * x + w[p, 1] * y + w[p, 2] * z
-        if height < least:
-            least, at = height, p
+        if height < smallest:
+            smallest, at = height, p
     near[0, 0], near[0, 1], near[0, 2] = w[at, 0], w[at, 1], w[at, 2]
     if disc > 0:
         i, j, k = w[first + 1, 0] - w[first, 0], w[first + 1, 1] - w[first, 1], w[first + 1, 2] - w[first, 2]
@@ -267,10 +267,10 @@ def _above_plane(w: Reals, first: int, last: int, disc: float, plane: int, near:
             near[0, 0] -= disc / size * i
             near[0, 1] -= disc / size * j
             near[0, 2] -= disc / size * k
-            least -= disc * size
-    least -= w[plane + 1, 0]
-    near[1, 0], near[1, 1], near[1, 2] = near[0, 0] - least * x, near[0, 1] - least * y, near[0, 2] - least * z
-    return float(least)
+            smallest -= disc * size
+    smallest -= w[plane + 1, 0]
+    near[1, 0], near[1, 1], near[1, 2] = near[0, 0] - smallest * x, near[0, 1] - smallest * y, near[0, 2] - smallest * z
+    return float(smallest)
 
 
 @kernel
@@ -452,10 +452,10 @@ def some_distances(layout: Layout, w: Reals, pairs: Integers, found: Reals, deep
 
 
 @kernel
-def measure(layout: Layout, q: Reals, found: Reals, least: Reals, pair: Integers, deep: Flags) -> None:
+def measure(layout: Layout, q: Reals, found: Reals, smallest: Reals, pair: Integers, deep: Flags) -> None:
     """Distances of all pairs in arms (N, n); of overlapping cores the smallest known depth.
 
-    ``found`` (N, K) gets them all; if it has no columns, only ``least`` (N,) and its number ``pair`` (N,) are worked
+    ``found`` (N, K) gets them all; if it has no columns, only ``smallest`` (N,) and its number ``pair`` (N,) are worked
     out, without pairs that can't be the nearest. Joined pairs count as nearest only where they overlap. ``deep``
     (N,) says whether cores overlapped.
     """
@@ -475,7 +475,7 @@ def measure(layout: Layout, q: Reals, found: Reals, least: Reals, pair: Integers
                 found[n, k] = distance
             if distance < best and not (joined[k] and distance >= 0 and not overlap):
                 best, at = distance, k
-        least[n], pair[n], deep[n] = best, at, inside
+        smallest[n], pair[n], deep[n] = best, at, inside
 
 
 @kernel
@@ -647,7 +647,7 @@ def search_boxes(
     -------
     FREE if so, proven; MEETS with the joint vector ``at`` (n,) in which it is otherwise; or UNDECIDED
     looked : how many boxes were examined
-    least : m, of FREE a lower bound of how far apart (or deep) the two stay
+    smallest : m, of FREE a lower bound of how far apart (or deep) the two stay
     """
     room, near = np.empty((ROOM, 3)), np.empty((2, 3))
     n = box.shape[1]
@@ -658,7 +658,7 @@ def search_boxes(
     cuts = (layout.inner[k], last) if layout.coupling.shape[0] == 0 else (0, n)
     stack, value = np.empty((DEEPEST, 2, n)), np.empty(2)
     _set_box(stack[0], box[0], box[1])
-    height, looked, least, outcome = 1, 0, np.inf, FREE
+    height, looked, smallest, outcome = 1, 0, np.inf, FREE
     half, alone = np.empty(n), np.zeros(n)
     while height:
         if looked >= most or height + 1 > DEEPEST:
@@ -677,7 +677,7 @@ def search_boxes(
             return MEETS, looked, distance
         moved = _pair_motion(layout, T, w, k, half)
         if distance - moved > goal:
-            least = min(least, distance - moved)
+            smallest = min(smallest, distance - moved)
             continue
         widest, cut = -1.0, 0
         for j in range(cuts[0], cuts[1]):
@@ -700,7 +700,7 @@ def search_boxes(
             _set_box(stack[row], low, high)
             stack[row, 1 - side, cut] = (low[cut] + high[cut]) / 2
         height += 2
-    return outcome, looked, least
+    return outcome, looked, smallest
 
 
 RIM = 96  # points that represent a cylinder's rim, on a circle that lies around it

@@ -59,7 +59,7 @@ class ArmShapes:
 
     @property
     def assumed(self) -> bool:
-        """Whether no document gives them that a verdict may rest on."""
+        """Whether no document that a verdict may rest on gives them."""
         return self.grade in ("inferred", "claim")
 
 
@@ -137,7 +137,7 @@ def shapes_assumed(robot: Robot, margin: float, clearances: Mapping[str, float |
     shapes = arm_shapes(robot)
     if not shapes.assumed:
         return None
-    near = tuple(name for name, least in clearances.items() if least is not None and 0 <= least < margin)
+    near = tuple(name for name, smallest in clearances.items() if smallest is not None and 0 <= smallest < margin)
     return ShapesAssumed(shapes.given, 1000 * margin, near)
 
 

@@ -143,13 +143,13 @@ def _first_root(a: Reals, b: Reals, c: Reals) -> Reals:
 
 def _least(values: dict[Binding, Reals]) -> Margin:
     """The least of values (N, n), or (1, n) of the whole motion; NaN where nothing limits."""
-    least = Margin(np.inf)
+    smallest = Margin(np.inf)
     for by, each in values.items():
         each = np.where(np.isnan(each), np.inf, each)
         sample, joint = np.unravel_index(int(each.argmin()), each.shape)
-        if each[sample, joint] < least.value:
-            least = Margin(float(each[sample, joint]), by, int(joint), None if by == "rms" else int(sample))
-    return least
+        if each[sample, joint] < smallest.value:
+            smallest = Margin(float(each[sample, joint]), by, int(joint), None if by == "rms" else int(sample))
+    return smallest
 
 
 AXES = np.eye(3)
@@ -327,8 +327,8 @@ def load_diagram(
     A joint before the last one counts with the distance from the wrist's centre, which a load gets from its
     axis if the joints beyond turn far enough.
     """
-    behind = wrist_to_flange(robot)
-    if behind is None or not (wrist.moment or wrist.inertia):
+    wrist_offset = wrist_to_flange(robot)
+    if wrist_offset is None or not (wrist.moment or wrist.inertia):
         return None
     last, before = [np.full((len(mass), 1), np.inf) for _ in range(2)]
     with np.errstate(divide="ignore"):  # a load without weight bends no wrist, however long its lever
@@ -337,7 +337,7 @@ def load_diagram(
     for joint, lever in levers_of:
         last, before = (np.minimum(last, lever), before) if joint == robot.rows else (last, np.minimum(before, lever))
     with np.errstate(invalid="ignore"):
-        across = np.minimum(np.sqrt(before**2 - (behind + along) ** 2), last)
+        across = np.minimum(np.sqrt(before**2 - (wrist_offset + along) ** 2), last)
     across = np.where(np.isfinite(across), across, np.nan)
     if np.isfinite(wrist.payload):
         across[mass > wrist.payload * (1 + 1e-9)] = np.nan

@@ -119,10 +119,10 @@ def carried(robot: Robot, own: list[Hanging], at: list[Reals], row: int) -> Hang
     at : m arrays (B, c, 2), corners of each row; those of rows beyond come in order, the last row's fastest
     """
     links, found = constant_links(robot), own[-1]
-    for behind in range(robot.rows - 1, row, -1):
-        corner, link = at[behind], links[behind]
+    for outer_row in range(robot.rows - 1, row, -1):
+        corner, link = at[outer_row], links[outer_row]
         first, moment, force = (each[:, None] for each in (found.first, found.moment, found.force))
-        if robot.sliding[behind]:
+        if robot.sliding[outer_row]:
             shift = corner[:, :, None, :1] * np.array([0.0, 0.0, 1.0])
             first, moment = first + found.mass * shift, moment + np.cross(shift, force)
             force = force + 0 * shift
@@ -130,7 +130,7 @@ def carried(robot: Robot, own: list[Hanging], at: list[Reals], row: int) -> Hang
             first, moment, force = (_rotated(each, corner[:, :, None, :]) for each in (first, moment, force))
         R, p = link[:3, :3], link[:3, 3]
         first, moment, force = first @ R.T, moment @ R.T, force @ R.T
-        here = own[behind - 1]
+        here = own[outer_row - 1]
         found = Hanging(
             found.mass + here.mass,
             _joined(first + found.mass * p) + here.first,
@@ -164,23 +164,23 @@ def _joined(vectors: Reals) -> Reals:
     return found
 
 
-def row_torques(robot: Robot, row: int, behind: Hanging, pull: Reals) -> Reals:
+def row_torques(robot: Robot, row: int, outer: Hanging, pull: Reals) -> Reals:
     """Holding torques or forces (B, K) of a row: over the corners of all rows, the last row's fastest."""
     x, y, z = (pull[:, :, None, axis] for axis in range(3))
     if robot.sliding[row]:
-        found = -behind.mass * z - behind.force[:, None, :, 2]
+        found = -outer.mass * z - outer.force[:, None, :, 2]
     else:
-        found = behind.first[:, None, :, 1] * x - behind.first[:, None, :, 0] * y - behind.moment[:, None, :, 2]
+        found = outer.first[:, None, :, 1] * x - outer.first[:, None, :, 0] * y - outer.moment[:, None, :, 2]
     torques: Reals = found.reshape(len(found), found.shape[1] * found.shape[2])
     return torques
 
 
-def torque_caps(robot: Robot, row: int, behind: Hanging, gravity: float) -> Reals:
+def torque_caps(robot: Robot, row: int, outer: Hanging, gravity: float) -> Reals:
     """What a row's torque or force (B, K) can't exceed wherever gravity points, over the corners of the rows beyond."""
     if robot.sliding[row]:
-        caps: Reals = behind.mass * gravity + np.abs(behind.force[..., 2])
+        caps: Reals = outer.mass * gravity + np.abs(outer.force[..., 2])
     else:
-        caps = gravity * np.hypot(behind.first[..., 0], behind.first[..., 1]) + np.abs(behind.moment[..., 2])
+        caps = gravity * np.hypot(outer.first[..., 0], outer.first[..., 1]) + np.abs(outer.moment[..., 2])
     return caps
 
 
@@ -228,8 +228,8 @@ def bounded_torque(model: ArmModel, joint: int, size: Size, start: Bounded) -> B
     def at_corners(at: list[Reals]) -> tuple[Reals, Reals]:
         values = np.zeros((1, 1))
         for row in rows:
-            behind = carried(robot, own, at, row)
-            values = values + shares[row] * row_torques(robot, row, behind, gravity_before(robot, gravity, at, row))
+            outer = carried(robot, own, at, row)
+            values = values + shares[row] * row_torques(robot, row, outer, gravity_before(robot, gravity, at, row))
         return values, caps(at).max(axis=1)
 
     used, bound = _used_rows(robot, at_corners, robot.lower[None], robot.upper[None])

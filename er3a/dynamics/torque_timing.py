@@ -43,12 +43,12 @@ class TimedTorques:
 
     Attributes
     ----------
-    least : s, that no motion under the same limits at the same nodes takes less than
+    lower_bound : s; no motion under the same limits at the same nodes is faster
     """
 
     timed: timing.Timed
     torques: Reals
-    least: float
+    lower_bound: float
 
 
 def fastest_under_torques(model: ArmModel, q: Reals, speed: Reals, peak: Reals) -> TimedTorques:
@@ -70,12 +70,12 @@ def fastest_under_torques(model: ArmModel, q: Reals, speed: Reals, peak: Reals) 
         return TimedTorques(timed, holding_torques(model, timed.q), 0.0)
     _, s, spline = path
     along = TorquesAlong.along(model, s, spline, speed, peak)
-    least, ceiling = along.least_time()
+    lower_bound, ceiling = along.shortest_time()
     path_speed, t = along.fastest(ceiling)
     timed = timing.Timed(polynomial_motion(timing.run_along(s, spline, path_speed, t), t, timing.SPLINE_DEGREE))
     dry = known(drives_of(model.robot).coulomb) * (direction_of(spline(s, 1)) - direction_of(timed.velocity))
     torques = torque_parts(model, timed.q, timed.velocity, timed.acceleration).total + dry
-    return TimedTorques(timed, torques, min(least, timed.duration))
+    return TimedTorques(timed, torques, min(lower_bound, timed.duration))
 
 
 Rows = tuple[Reals, Reals, Reals, Reals, Reals]
@@ -119,16 +119,16 @@ class TorquesAlong:
         rows = a[:, bound], b[:, bound], c[:, bound], viscous[:, bound]
         return cls(s, spline, speed, *rows, peak[bound], speed_bound, slow)
 
-    def least_time(self) -> tuple[float, Reals]:
+    def shortest_time(self) -> tuple[float, Reals]:
         """A time (s) that no motion undercuts, and s' at the nodes (N,) that none exceeds."""
-        ceiling, least = self.speed_bound, 0.0
+        ceiling, lower_bound = self.speed_bound, 0.0
         for _ in range(MAX_ROUNDS):
             path_speed, t = self._solved(self._relaxed(ceiling), ceiling)
-            gained, least = t[-1] > least * (1 + GAIN), max(least, float(t[-1]))
+            gained, lower_bound = t[-1] > lower_bound * (1 + GAIN), max(lower_bound, float(t[-1]))
             ceiling = np.clip(path_speed * (1 + SLACK), SLOWEST * self.speed_bound, ceiling)
             if not (gained and self.viscous.any()):
                 break
-        return least, ceiling
+        return lower_bound, ceiling
 
     def fastest(self, ceiling: Reals) -> tuple[Reals, Reals]:
         """Speeds s' and times (s) at the nodes (N,) of a motion that keeps the limits; ``ceiling`` of all motions."""

@@ -20,6 +20,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from math import isnan
 
 import numpy as np
 
@@ -353,6 +354,11 @@ class Extent:
     off: ToolOff
     excluded: bool
     at_least: bool = False
+
+    @property
+    def interval(self) -> tuple[float, float] | None:
+        """Bounds to nine decimals; None where nothing meets the evidence."""
+        return None if isnan(self.low) else (round(self.low, 9), round(self.high, 9))
 
 
 class Extents:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import isnan
 from typing import Literal
 
 import numpy as np
@@ -353,7 +352,7 @@ class _Judge:
             value=self.values[entry.name],
             unit=entry.unit,
             status=status,
-            interval=_interval(extent),
+            interval=extent.interval,
             by=self._documents(known),
             alternatives=tuple(readings),
             document=document_of(self.robot, entry),
@@ -406,7 +405,7 @@ class _Judge:
             value=sum(f * self.values[entry.name] for entry, f in factors),
             unit=first.unit,
             status=status,
-            interval=_interval(extent),
+            interval=extent.interval,
             by=self._documents(relevant or everyone),
             alternatives=(),
             document=document,
@@ -524,11 +523,6 @@ def _sum_of(factors: Sequence[tuple[TableNumber, float]]) -> str:
         size = "" if abs(abs(factor) - 1) < 1e-9 else f"{abs(factor):.3g} "
         text += f"{sign}{size}{entry.name}"
     return text
-
-
-def _interval(extent: Extent) -> tuple[float, float] | None:
-    """Bounds to nine decimals; None where nothing meets the evidence."""
-    return None if isnan(extent.low) else (round(extent.low, 9), round(extent.high, 9))
 
 
 def _worst(found: Sequence[ToolOff]) -> ToolOff:

@@ -237,18 +237,18 @@ def _manufacturers_angles(joints: Joints, reference: Reals, pair: Reals) -> None
     for k in range(2):
         for j in range(6):
             row = (6 * k + j) * BLOCK
-            sign, zero, least, most = direction[j], offset[j], lower[j], upper[j]
+            sign, zero, smallest, most = direction[j], offset[j], lower[j], upper[j]
             inside = (_WITHIN + k) * BLOCK
             for i in range(BLOCK):
                 angle = sign * (pair[row + i] - zero)
                 near = angle - TURN * np.floor((angle - reference[j * BLOCK + i]) * PER_TURN + 0.5)
-                low = np.ceil((least - LIMIT_TOLERANCE - near) * PER_TURN)
+                low = np.ceil((smallest - LIMIT_TOLERANCE - near) * PER_TURN)
                 high = np.floor((most + LIMIT_TOLERANCE - near) * PER_TURN)
                 fits = low <= high
                 turns = low if low > 0.0 else high if high < 0.0 else 0.0
                 below = near + TURN * (low - 1.0)
                 above = near + TURN * low
-                outside = below if least - below < above - most else above
+                outside = below if smallest - below < above - most else above
                 chosen = near + TURN * turns if fits else outside
                 pair[inside + i] = pair[inside + i] if fits else 0.0
                 pair[row + i] = chosen if pair[_VALID * BLOCK + i] > 0.0 else np.nan

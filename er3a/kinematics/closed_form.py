@@ -67,9 +67,9 @@ REACHED, TOO_FAR, TOO_NEAR, OFF_AXIS, ORIENTATION = 0, 1, 2, 3, 4
 class ArmConstants(NamedTuple):
     """An arm's constants for the kernel: its axis lines as plain numbers, with all theta at 0.
 
-    ``beside_6`` is a vector across axis 6; ``_in_tool`` marks components in the tool frame. ``reach`` and ``least`` are
-    the stretched and the folded arm's length, ``elbow_angle`` turns the upper arm to the forearm, ``wrist_angle`` axis
-    4 to axis 6 about axis 5, ``angle_45`` and ``angle_56`` lie between neighbouring axes. ``*_offset`` is how
+    ``beside_6`` is a vector across axis 6; ``_in_tool`` marks components in the tool frame. ``reach`` and ``min_reach``
+    are the stretched and the folded arm's length, ``elbow_angle`` turns the upper arm to the forearm, ``wrist_angle``
+    axis 4 to axis 6 about axis 5, ``angle_45`` and ``angle_56`` lie between neighbouring axes. ``*_offset`` is how
     far roots that meet at that fold are kept from it, 0 where it is no fold.
     """
 
@@ -87,7 +87,7 @@ class ArmConstants(NamedTuple):
     axis_6_in_tool: Vector
     beside_6_in_tool: Vector
     reach: float
-    least: float
+    min_reach: float
     cos_12: float
     sin_12: float
     shoulder_offset: float
@@ -97,8 +97,8 @@ class ArmConstants(NamedTuple):
     angle_45: float
     angle_56: float
     folded_offset: float
-    least_tilt_offset: float
-    most_tilt_offset: float
+    min_tilt_offset: float
+    max_tilt_offset: float
 
 
 @inner_kernel
@@ -150,14 +150,14 @@ def solve(
             axis_6_1, beside_6_1 = rotated(axis_6, arm.axis_1, c, s), rotated(beside_6, arm.axis_1, c, s)
 
             D = np.sqrt(dot(x, x))
-            far, near = D - arm.reach, arm.least - D
+            far, near = D - arm.reach, arm.min_reach - D
             if far > BOUNDARY_M or near > BOUNDARY_M:
                 for slot in range(4 * shoulder, 4 * shoulder + 4):
                     fault[n, slot] = TOO_FAR if far > 0 else TOO_NEAR
                     gap[n, slot] = max(far, near)
                 continue
             bend = 2.0 * np.arctan2(
-                np.sqrt(max(-far, 0.0) * (arm.reach + D)), np.sqrt(max(-near, 0.0) * (D + arm.least))
+                np.sqrt(max(-far, 0.0) * (arm.reach + D)), np.sqrt(max(-near, 0.0) * (D + arm.min_reach))
             )
             if keep_folds:
                 bend = _off_folds(bend, -far, -near, FOLD_OFFSET, arm.folded_offset)
@@ -204,7 +204,7 @@ def _solve_wrist(
     bend = 2.0 * np.arctan2(np.sqrt(max(upper_part, 0.0)), np.sqrt(max(lower_part, 0.0)))
     if keep_folds:
         low, high = gamma - np.abs(b - c), min(b + c, 2 * np.pi - b - c) - gamma
-        bend = _off_folds(bend, low, high, arm.least_tilt_offset, arm.most_tilt_offset)
+        bend = _off_folds(bend, low, high, arm.min_tilt_offset, arm.max_tilt_offset)
     aligned = gamma < FREE or np.pi - gamma < FREE
     for k in range(2):
         theta_5 = (bend if k == 0 else -bend) - arm.wrist_angle

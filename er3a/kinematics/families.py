@@ -128,15 +128,15 @@ def _in_line(robot: Robot, T: Reals, q: Reals) -> Reals | None:
     folded = 0.0 if axis_4 @ axis_6 > 0 else np.pi
     q = q.copy()
     q[4] = robot.direction[4] * (folded - signed_angle(w[3], w[5], w[4]) - robot.offset[4])
-    best, least, before = None, SOLVES_M, np.inf
+    best, smallest, before = None, SOLVES_M, np.inf
     for _ in range(MAX_STEPS):
         reached = forward(robot, q)
         R = T[:3, :3] @ reached[:3, :3].T  # a small turn, so its sine will do
         turn = [R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]
         miss = np.append(T[:3, 3] - reached[:3, 3], np.multiply(turn, 0.5))
         far = float(max(np.linalg.norm(miss[:3]), np.linalg.norm(miss[3:])))
-        if far < least:
-            best, least = q.copy(), far
+        if far < smallest:
+            best, smallest = q.copy(), far
         if far < ROUNDING or abs(far - before) < SETTLED * far:
             break
         before = far
@@ -211,7 +211,7 @@ class Family(ByValue, Displayed):
             return self.q0 + t[..., None] * self.direction
         joint = FREE_JOINT[self.kind]
         q = _on_curve(self.robot, self.T, joint, self.q0[joint] + t.reshape(-1), self.q0, self.branches[0])
-        q = nearest_equivalent(self.robot, _nearest_wrists(self.robot, q, self.q0), self.q0)
+        q = nearest_equivalent(self.robot, nearest_wrists(self.robot, q, self.q0), self.q0)
         q[:, joint] = self.q0[joint] + t.reshape(-1)
         return q.reshape(*t.shape, 6)
 
@@ -274,10 +274,10 @@ def _wrist_families(robot: Robot, T: Reals, q: Reals, q_ref: Reals, branches: tu
     most = int(np.ceil((robot.upper - robot.lower)[[3, 5]].sum() / TURN)) + 2
     for k in range(-most, most + 1):
         start = rest + TURN * k * np.eye(6)[5]
-        least, greatest = limits.lower - limits.lines @ start, limits.upper - limits.lines @ start
-        if (least > LIMIT_TOLERANCE)[~moved].any() or (greatest < -LIMIT_TOLERANCE)[~moved].any():
+        smallest, greatest = limits.lower - limits.lines @ start, limits.upper - limits.lines @ start
+        if (smallest > LIMIT_TOLERANCE)[~moved].any() or (greatest < -LIMIT_TOLERANCE)[~moved].any():
             continue
-        ends = np.sort(np.stack([least[moved], greatest[moved]]) / rates[moved], axis=0)
+        ends = np.sort(np.stack([smallest[moved], greatest[moved]]) / rates[moved], axis=0)
         nearest = _nearest_on_line(start, direction, q_ref)
         low, high = float(ends[0].max()), float(ends[1].min())
         if np.isinf(high - low):  # nothing ends it: one lap
@@ -319,7 +319,7 @@ def _curve_families(
     grid = np.unique(np.append(np.minimum(grid, high), np.clip(q_ref[joint], low, high)))
 
     def members(values: Reals) -> Reals:
-        q = _nearest_wrists(robot, _on_curve(robot, T, joint, values, q_ref, slot), q_ref)
+        q = nearest_wrists(robot, _on_curve(robot, T, joint, values, q_ref, slot), q_ref)
         q = nearest_equivalent(robot, q, q_ref)
         q[:, joint] = values
         return q
@@ -348,7 +348,7 @@ def _curve_families(
     return sorted(found, key=lambda family: float(np.linalg.norm(family.q0 - q_ref)))
 
 
-def _nearest_wrists(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
+def nearest_wrists(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
     """Rows (n, 6) with an aligned wrist moved along their line to the member nearest to the reference."""
     for row in np.flatnonzero(np.abs(bend_of_wrist(robot, q)) < SOLVES_RAD):
         on_line, direction = wrist_line(robot, q[row])

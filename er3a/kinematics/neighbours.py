@@ -145,8 +145,8 @@ def _least_turn(robot: Robot, T: Reals, usable: Usable | None) -> Reals | None:
         middle = (low + high) / 2
         ok = solvable(robot, _rotated(T, about * middle[:, None]), usable)
         low, high = np.where(ok, low, middle), np.where(ok, middle, high)
-    least = int(high.argmin())
-    return np.asarray(_rotated(T, (about[least] * high[least])[None])[0])
+    smallest = int(high.argmin())
+    return np.asarray(_rotated(T, (about[smallest] * high[smallest])[None])[0])
 
 
 def _nearest_position(robot: Robot, T: Reals, usable: Usable | None) -> Reals | None:

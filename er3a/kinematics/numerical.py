@@ -376,7 +376,7 @@ def solve_any(
     n = lower.shape[0]
     x, best, e, J = np.empty(n), np.empty(n), np.empty(6), np.empty((6, n))
     for pose in range(T.shape[0]):
-        least = np.inf
+        smallest = np.inf
         starts[pose] = 0
         for start in range(restarts + 1):
             for j in range(n):
@@ -387,8 +387,8 @@ def solve_any(
             position, rotation = _descend(arm, limits, T[pose], goal, x, e, J)
             square = (position / length) ** 2 + rotation**2
             solved = position <= tolerances[0] and rotation <= tolerances[1]
-            if solved or square < least:
-                least, error[pose, 0], error[pose, 1] = square, position, rotation
+            if solved or square < smallest:
+                smallest, error[pose, 0], error[pose, 1] = square, position, rotation
                 best[:] = x
             if solved:
                 starts[pose] = start + 1
@@ -419,12 +419,12 @@ def _descend(arm: AnyArm, limits: Limits, T: Reals, goal: Goal, x: Reals, e: Rea
             at_low, at_high = x[j] <= lower[j], x[j] >= upper[j]
             free[j] = not (respect and ((at_low and gradient[j] < 0.0) or (at_high and gradient[j] > 0.0)))
         M = J.T @ J
-        least = MIN_DAMPING + ABOVE_ROUNDING * np.trace(M)
+        smallest = MIN_DAMPING + ABOVE_ROUNDING * np.trace(M)
         for i in range(n):
             for j in range(n):
                 if not (free[i] and free[j]):
                     M[i, j] = 0.0
-            M[i, i] += DAMPING * square + least + (0.0 if free[i] else 1.0)
+            M[i, i] += DAMPING * square + smallest + (0.0 if free[i] else 1.0)
             if not free[i]:
                 gradient[i] = 0.0
         step = np.linalg.solve(M, gradient)

@@ -186,7 +186,7 @@ def constants_of(arm: WristPartitionedArm) -> closed_form.ArmConstants:
     w = [_vector(axis) for axis in arm.axes]
     beside_6 = frame_along(arm.axes[5])[0]
     upper_arm, forearm = _vector(arm.upper_arm), _vector(arm.forearm)
-    least = abs(arm.upper_arm_length - arm.forearm_length)
+    min_reach = abs(arm.upper_arm_length - arm.forearm_length)
     angle_45, angle_56 = float(unsigned_angle(w[3], w[4])), float(unsigned_angle(w[4], w[5]))
     oblique = (
         abs(angle_45 - angle_56) > closed_form.BOUNDARY_RAD,
@@ -207,7 +207,7 @@ def constants_of(arm: WristPartitionedArm) -> closed_form.ArmConstants:
         axis_6_in_tool=_vector(arm.tool_rotation.T @ arm.axes[5]),
         beside_6_in_tool=_vector(arm.tool_rotation.T @ beside_6),
         reach=arm.wrist_reach,
-        least=least,
+        min_reach=min_reach,
         cos_12=float(arm.axes[0] @ arm.axes[1]),
         sin_12=float(np.linalg.norm(np.cross(arm.axes[0], arm.axes[1]))),
         shoulder_offset=arm.shoulder_offset,
@@ -216,11 +216,11 @@ def constants_of(arm: WristPartitionedArm) -> closed_form.ArmConstants:
         wrist_angle=float(signed_angle(w[3], w[5], w[4])),
         angle_45=angle_45,
         angle_56=angle_56,
-        folded_offset=closed_form.FOLD_OFFSET * min(1.0, least / arm.forearm_length)
-        if least > closed_form.BOUNDARY_M
+        folded_offset=closed_form.FOLD_OFFSET * min(1.0, min_reach / arm.forearm_length)
+        if min_reach > closed_form.BOUNDARY_M
         else 0.0,
-        least_tilt_offset=closed_form.FOLD_OFFSET if oblique[0] else 0.0,
-        most_tilt_offset=closed_form.FOLD_OFFSET if oblique[1] else 0.0,
+        min_tilt_offset=closed_form.FOLD_OFFSET if oblique[0] else 0.0,
+        max_tilt_offset=closed_form.FOLD_OFFSET if oblique[1] else 0.0,
     )
 
 

@@ -52,10 +52,10 @@ def _sources(modules: Iterable[str]) -> set[Path]:
 @cache
 def _imported(path: Path) -> tuple[Path, ...]:
     """The files that a file imports."""
-    return tuple(file for name in _imports(path) if (file := _file(name)))
+    return tuple(file for name in imported_names(path) if (file := _file(name)))
 
 
-def _imports(path: Path) -> tuple[str, ...]:
+def imported_names(path: Path) -> tuple[str, ...]:
     """All names that a file imports, public names of er3a by the modules that they come from."""
     names: list[str] = []
     for found in _IMPORT.finditer(path.read_text(encoding="utf-8")):

@@ -93,7 +93,7 @@ def serve(listener: socket.socket) -> None:
     import gc
     import selectors
 
-    _load_libraries()
+    load_libraries()
     gc.freeze()  # so that collecting garbage in a child copies no pages
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # no child is waited for
     selector = selectors.DefaultSelector()
@@ -111,7 +111,7 @@ def serve(listener: socket.socket) -> None:
                 _do(line)
 
 
-def _load_libraries() -> None:
+def load_libraries() -> None:
     """Import what jobs import, but for Rerun, which starts threads as it is loaded: they do not survive a fork."""
     from importlib import import_module
 

@@ -430,7 +430,7 @@ def programs_of(
         if (verdict != "safe" and not unsafe) or not np.isfinite(each.motion.q[0]).all():
             yield PathProgram(each.name, verdict, None)
             continue
-        near = near_assumed_shapes(robot, each.name, min_clearance(along), 1000 * ASSUMED_MARGIN)
+        near = near_assumed_shapes(robot, each.name, min_clearance(along), ASSUMED_MARGIN)
         files, findings = written(robot, each.motion, verdict, language, near, task.limits.speed)
         name = program_name(each.name, LONGEST_NAME)
         yield PathProgram(

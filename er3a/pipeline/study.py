@@ -17,6 +17,7 @@ from er3a.files.robot_library import LoadFields, placement_transform, read_robot
 from er3a.files.scene_file import load_scene
 from er3a.files.yaml_file import StrictModel, load, read_yaml
 from er3a.pipeline.messages.language import LANGUAGES, LanguageCode
+from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.registry import STAGES as REGISTRY
 from er3a.pipeline.sweeps import StageName, Sweep, Variant
 from er3a.robots.robot import Robot
@@ -196,6 +197,12 @@ class StudyBase(StrictModel):
         """What hangs on the flange: the tool, then the payload, as far as the study says."""
         entry = self.entry(name)
         return [load for load in (entry.tool_load, entry.payload) if load]
+
+    def assumed_margin(self, name: str) -> float:
+        """The distance (m) from a robot's shapes within which nothing is settled if they are assumed; the study's, for
+        all of its robots alike."""
+        self.entry(name)
+        return self.section(TrajectorySettings).assumed_margin_mm / 1000
 
     def references(self, name: str) -> list[str]:
         """The reference sets that a robot's file names."""

@@ -122,9 +122,9 @@ def bent_laws(
             values = np.asarray(chebyshev.chebfit(2 * share - 1, angles, degree, w=weights), dtype=float)
             values[0] += angles[0] - chebyshev.chebval(-1.0, values)
             law = ArmAngleLaw(values, slot, 0.0, bent=True)
-            least = search.margin(law.at(share)[:, 0], s)
-            if least > 0:
-                found.append(replace(law, margin=least))
+            smallest = search.margin(law.at(share)[:, 0], s)
+            if smallest > 0:
+                found.append(replace(law, margin=smallest))
     return sorted(found, key=lambda law: -law.margin)
 
 

@@ -483,11 +483,13 @@ def _best(robot: Robot, grid: Branches, part: slice, starts: Integers, before: R
     for start in starts:
         slot = _walk(onward, start)
         jumps = leaps[np.arange(len(t) - 1), slot[:-1]]
-        sequences.append(_with_turns(robot, q[np.arange(len(t)), slot], slot, jumps, share, before))
+        sequences.append(with_whole_turns(robot, q[np.arange(len(t)), slot], slot, jumps, share, before))
     return min(sequences, key=lambda sequence: sequence.cost)
 
 
-def _with_turns(robot: Robot, q: Reals, slot: Integers, jumps: Flags, share: Reals, before: Reals | None) -> _Sequence:
+def with_whole_turns(
+    robot: Robot, q: Reals, slot: Integers, jumps: Flags, share: Reals, before: Reals | None
+) -> _Sequence:
     """Make angles continuous and choose each joint's whole turns: those with the shortest time outside the limits of
     joints and of sums of joints, then the nearest."""
     steps = turned_difference(q[:-1], q[1:])
@@ -570,13 +572,13 @@ def _costs_to_go(q: Reals, price: Reals, meeting: Integers) -> tuple[Integers, F
         if np.isfinite(q[count - 1, a, 0]):
             cost[a] = price[count - 1, a]
     for i in range(count - 2, -1, -1):
-        behind = cost.copy()
+        cost_after = cost.copy()
         cost[:] = np.inf
         for a in range(SLOTS):
             if not np.isfinite(q[i, a, 0]):
                 continue
             for b in range(SLOTS):
-                if not np.isfinite(behind[b]):
+                if not np.isfinite(cost_after[b]):
                     continue
                 travel, max_step = 0.0, 0.0
                 for j in range(6):
@@ -586,7 +588,7 @@ def _costs_to_go(q: Reals, price: Reals, meeting: Integers) -> tuple[Integers, F
                     max_step = max(max_step, abs(step))
                 together = (a ^ b) & ~(meeting[i, a] | meeting[i + 1, b]) == 0
                 jump = max_step > (WIDE_STEP if together else SWITCH_STEP)
-                total = price[i, a] + np.sqrt(travel) + behind[b] + (JUMP_COST if jump else 0.0)
+                total = price[i, a] + np.sqrt(travel) + cost_after[b] + (JUMP_COST if jump else 0.0)
                 if total < cost[a]:
                     cost[a] = total
                     onward[i, a] = b

@@ -240,11 +240,11 @@ def path_through(q: Reals, s: Reals) -> tuple[Integers, Reals, scipy.interpolate
     return kept, s, scipy.interpolate.CubicSpline(s, q)
 
 
-def within_limits(curve: PiecewiseMotion, limits: JointLimits, least: float = 0.0) -> Timed:
+def within_limits(curve: PiecewiseMotion, limits: JointLimits, smallest: float = 0.0) -> Timed:
     """A motion, evenly slowed down if it exceeds a limit of speed or acceleration anywhere, or takes less than s."""
     motion = Timed(curve)
     speed, acceleration = motion.ratios(limits)
-    factor = max(speed, np.sqrt(acceleration), least / motion.duration)
+    factor = max(speed, np.sqrt(acceleration), smallest / motion.duration)
     return motion if factor <= 1 else Timed(curve.scaled(factor))
 
 

@@ -212,13 +212,13 @@ def prove(followed: Followed, required: ProofRequirements, singular: Reals) -> T
         found = _settle(followed, required, (progress, by_means), start, end)
         count += len(start)
         broken |= found.broken.any(axis=0)
-        least = np.where(broken, SETTLED_ELSEWHERE, SHORTEST) * duration
-        least[4] = max(SHORTEST_JERK * duration, least[4])
-        least[0] = (SETTLED_ELSEWHERE if broken.any() else SHORTEST) * duration
+        smallest = np.where(broken, SETTLED_ELSEWHERE, SHORTEST) * duration
+        smallest[4] = max(SHORTEST_JERK * duration, smallest[4])
+        smallest[0] = (SETTLED_ELSEWHERE if broken.any() else SHORTEST) * duration
         hopeless = (_distance(singular, start, end) < BESIDE_EVENT[0] * duration) | _singular_throughout(
             followed, found
         )
-        shortest = np.where(hopeless[:, None], np.maximum(least, BESIDE_EVENT[1] * duration), least)
+        shortest = np.where(hopeless[:, None], np.maximum(smallest, BESIDE_EVENT[1] * duration), smallest)
         again = (found.open & ((end - start)[:, None] > 2 * shortest)).any(axis=1) & (count <= MAX_INTERVALS)
         done.append(found.part(~again))
         middle = (start + end)[again] / 2
@@ -424,11 +424,11 @@ def inverse_and_reach(robot: Robot, q: Reals, length: float) -> tuple[Reals, Rea
     """Norm (k,) of the inverse of the scaled Jacobian, and largest lever of the tool point over the length."""
     J = jacobian(robot, q)
     J[..., :3, :] /= length
-    least = np.linalg.svd(J, compute_uv=False)[..., -1]
+    smallest = np.linalg.svd(J, compute_uv=False)[..., -1]
     lever = np.linalg.norm(J[..., :3, :], axis=-2).max(axis=-1)
     T = frames(robot, q)
     far = np.linalg.norm(T[:, -1:, :3, 3] - T[:, :-1, :3, 3], axis=-1).max(axis=-1) / length
-    return 1 / least, np.maximum(lever, far)
+    return 1 / smallest, np.maximum(lever, far)
 
 
 def _rate_bounds(

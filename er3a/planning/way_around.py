@@ -217,7 +217,7 @@ class _Moves:
     def free(self, a: Reals, b: Reals) -> bool:
         """Whether the move from a to b (n,) keeps the margin."""
         turn = np.abs(b - a)
-        swing, least = float(self.levers @ turn), SHORTEST_STEP / max(float(turn.max()), SHORTEST_STEP)
+        swing, smallest = float(self.levers @ turn), SHORTEST_STEP / max(float(turn.max()), SHORTEST_STEP)
         if any(self.clear(a + share * (b - a)) < self.margin for share in LIKELY):
             return False
         share = 0.0
@@ -225,7 +225,7 @@ class _Moves:
             spare = self.clear(a + share * (b - a)) - self.margin
             if spare < 0:
                 return False
-            share += max(spare / swing, least) if swing > 0 else 1.0
+            share += max(spare / swing, smallest) if swing > 0 else 1.0
         return self.clear(b) >= self.margin
 
 

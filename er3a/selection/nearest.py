@@ -165,8 +165,8 @@ def nearest(
 
 def _first(rows: list[int], distance: Reals, branch: Integers) -> int:
     """Of rows whose largest moves are alike."""
-    least = min(distance[row] for row in rows)
-    return min((row for row in rows if distance[row] <= least + SAME_MOVE), key=lambda row: (branch[row], row))
+    smallest = min(distance[row] for row in rows)
+    return min((row for row in rows if distance[row] <= smallest + SAME_MOVE), key=lambda row: (branch[row], row))
 
 
 def _why_first(solutions: Solutions, order: list[int], moves: Reals, distance: Reals) -> WhyFirst:
@@ -204,7 +204,7 @@ def why_none(robot: Robot, solutions: Solutions, refused: Sequence[Refusal | Non
     if overlaps:
         widest = max(overlaps, key=lambda row: margin[row])
         return AllCollide(len(overlaps), overlaps[widest])
-    least = int(margin.argmax())
+    nearest = int(margin.argmax())
     return AllOutsideLimits(
-        len(solutions.q), int(solutions.branch[least]), solutions.label[least], solutions.reason[least]
+        len(solutions.q), int(solutions.branch[nearest]), solutions.label[nearest], solutions.reason[nearest]
     )

@@ -123,10 +123,10 @@ def mixed_cost(weights: Mapping[RuleName, float], costs: Mapping[RuleName, Reals
     """The weighted sum (n,) of costs (n,) per rule, each stretched to 0..1 over the allowed rows."""
     total = np.zeros(len(allowed))
     for name, weight in weights.items():
-        least, most = (costs[name][allowed].min(), costs[name][allowed].max()) if allowed.any() else (0.0, 1.0)
-        if not np.isfinite(least):  # nothing can meet: the rule tells no rows apart
+        smallest, most = (costs[name][allowed].min(), costs[name][allowed].max()) if allowed.any() else (0.0, 1.0)
+        if not np.isfinite(smallest):  # nothing can meet: the rule tells no rows apart
             continue
-        total += weight * (costs[name] - least) / (most - least if most > least else 1.0)
+        total += weight * (costs[name] - smallest) / (most - smallest if most > smallest else 1.0)
     return total
 
 

@@ -71,10 +71,10 @@ def joint_legs(part: Part, corners: Reals, limits: JointLimits) -> tuple[GraspLe
 
 def _joint_leg(part: Part, start: Reals, end: Reals, limits: JointLimits) -> GraspLeg:
     turn = np.abs(end - start)
-    least = [(PEAKS[0] * turn / limits.speed).max(), np.sqrt(PEAKS[1] * turn / limits.acceleration).max()]
+    smallest = [(PEAKS[0] * turn / limits.speed).max(), np.sqrt(PEAKS[1] * turn / limits.acceleration).max()]
     if limits.jerk is not None:
-        least.append(np.cbrt(PEAKS[2] * turn / limits.jerk).max())
-    move = JointMove(start, end, max(MIN_DURATION, *map(float, least)))
+        smallest.append(np.cbrt(PEAKS[2] * turn / limits.jerk).max())
+    move = JointMove(start, end, max(MIN_DURATION, *map(float, smallest)))
     motion = move.polynomials()
     return GraspLeg(part, move.duration, lambda t: move.joints(t)[0], motion.rate_bounds, end)
 
@@ -96,8 +96,8 @@ def transfer(task: PlanningTask, start: Reals, end: Reals) -> tuple[GraspLeg, ..
 
 
 def _touches_nothing(bodies: Bodies, legs: tuple[GraspLeg, ...]) -> bool:
-    least = least_clearance(bodies, legs)
-    return least is None or least[0] > 0
+    smallest = min_clearance(bodies, legs)
+    return smallest is None or smallest[0] > 0
 
 
 def tool_leg(
@@ -134,17 +134,17 @@ def tool_leg(
     return (GraspLeg(part, duration, followed.joints, proof.rate_bounds, q_end, ends[1]),)
 
 
-def least_clearance(bodies: Bodies, legs: tuple[GraspLeg, ...]) -> tuple[float, Pair] | None:
+def min_clearance(bodies: Bodies, legs: tuple[GraspLeg, ...]) -> tuple[float, Pair] | None:
     """What the arm is proven to keep clear by along legs, m (below 0 where it overlaps), and what is nearest there.
 
     None where nothing can meet.
     """
-    least: tuple[float, Pair] | None = None
+    smallest: tuple[float, Pair] | None = None
     for leg in legs:
         times = np.linspace(0.0, leg.duration, CHECKS)
         along = clearance_along(bodies, leg.joints, leg.rates, times, times, DEPTH)
         pair = along.pair[along.closest] if along.closest >= 0 else None
         if pair is not None:
             distance = float(along.distance[along.closest]) - DEPTH
-            least = min(least or (np.inf, pair), (distance, pair), key=lambda each: each[0])
-    return least
+            smallest = min(smallest or (np.inf, pair), (distance, pair), key=lambda each: each[0])
+    return smallest

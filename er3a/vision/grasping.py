@@ -32,7 +32,7 @@ from er3a.planning.timing import JointLimits
 from er3a.planning.way_around import NoWayAround, PlanningTask
 from er3a.robots.joint_limits import limit_margin
 from er3a.robots.robot import Robot
-from er3a.vision.grasp_motion import GraspLeg, Part, least_clearance, tool_leg, transfer
+from er3a.vision.grasp_motion import GraspLeg, Part, min_clearance, tool_leg, transfer
 from er3a.vision.point_error import draws
 
 ANY_TURN = 12  # turns tried of an object that looks alike from all sides
@@ -352,11 +352,11 @@ def _followed(task: GraspTask, candidate: _Candidate, target: DetectedObject) ->
     every = np.concatenate([leg.sampled(LEG_POINTS)[1] for leg in lines])
     limit = float(limit_margin(robot, every).min())
     value = float(conditioning(robot, every).smallest_singular_value.min())
-    least = least_clearance(task.bodies, (*moves, *lines)) if task.bodies is not None else None
+    smallest = min_clearance(task.bodies, (*moves, *lines)) if task.bodies is not None else None
     asked = (
         (limit, needs.limit_margin),
         (value, needs.singular_value),
-        (least[0] if least else np.inf, needs.clearance),
+        (smallest[0] if smallest else np.inf, needs.clearance),
     )
     return ChosenGrasp(
         grasp=candidate.grasp,
@@ -366,8 +366,8 @@ def _followed(task: GraspTask, candidate: _Candidate, target: DetectedObject) ->
         q=candidate.q,
         q_after=lines[-1].q_end,
         legs=(*moves, *lines),
-        clearance=least[0] if least else None,
-        nearest=least[1] if least else None,
+        clearance=smallest[0] if smallest else None,
+        nearest=smallest[1] if smallest else None,
         limit_margin=limit,
         singular_value=value,
         margin=min(float(_ratio(np.array(own), needed)) for own, needed in asked),
@@ -377,10 +377,10 @@ def _followed(task: GraspTask, candidate: _Candidate, target: DetectedObject) ->
 
 
 def _too_near(task: GraspTask, part: Part, legs: tuple[GraspLeg, ...]) -> PathCollides | None:
-    least = least_clearance(task.bodies, legs) if task.bodies is not None else None
-    if least is None or least[0] >= task.needs.clearance:
+    smallest = min_clearance(task.bodies, legs) if task.bodies is not None else None
+    if smallest is None or smallest[0] >= task.needs.clearance:
         return None
-    return PathCollides(part, least[1], 1000 * least[0], 1000 * task.needs.clearance)
+    return PathCollides(part, smallest[1], 1000 * smallest[0], 1000 * task.needs.clearance)
 
 
 def _along(task: GraspTask, T_from: Reals, T_to: Reals, q: Reals) -> Reals:

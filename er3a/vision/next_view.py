@@ -48,7 +48,7 @@ class NextView:
     q : (n,), rad; target : (4, 4), T_camera_board to be expected there
     error_before, error_after : m, that 95 % of the calibration's errors at the point of work stay below
     clearance : m; None where it can't be measured
-    tried, in_view : poses drawn within the limits, and those of them that see the whole board
+    tried, in_view : poses drawn within the limits, and those among them that see the whole board
     """
 
     q: Reals

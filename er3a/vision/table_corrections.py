@@ -157,7 +157,7 @@ def zeros_tried(found: HandEye, robot: Robot) -> tuple[HandEye, tuple[str, ...],
     -------
     found, unseen : names of joints whose zero the samples don't tell from the two poses: all where no joint values are
         recorded, those that slide, and mostly the first and the last
-    least : deg, at least, of a wrong zero of the others that would be named; 0 if there are no others
+    smallest : deg; a wrong zero of another joint is named if it is at least this large; 0 if there are no others
     """
     names, q = joint_names(robot), found.samples.q
     if q is None:
@@ -166,7 +166,7 @@ def zeros_tried(found: HandEye, robot: Robot) -> tuple[HandEye, tuple[str, ...],
     squares = float(((found.residual[found.used] / np.repeat(found.deviations, 3)) ** 2).sum())
     free = 6 * len(samples) - likelihood.UNKNOWNS - 1
     best, unseen = (1.0, 0, 0.0, 0.0, np.inf), []
-    least, sure = 0.0, (1 + CONFIDENCE) / 2
+    smallest, sure = 0.0, (1 + CONFIDENCE) / 2
     widths = float(scipy.special.stdtrit(free, 1 - ZERO_CHANCE / len(names) / 2) / scipy.special.stdtrit(free, sure))
     for k, name in enumerate(names):
         turn = _Turned(robot, samples, k)
@@ -174,7 +174,7 @@ def zeros_tried(found: HandEye, robot: Robot) -> tuple[HandEye, tuple[str, ...],
             unseen.append(name)
             continue
         value, half_width, raw = fit_extra_parameter(turn.at, (found.X, found.Y), found.deviations)
-        least = max(least, round(float(np.degrees(max(MIN_ZERO, widths * half_width))), 2))
+        smallest = max(smallest, round(float(np.degrees(max(MIN_ZERO, widths * half_width))), 2))
         left = float(((raw / np.repeat(found.deviations, 3)) ** 2).sum())
         chance = float(scipy.special.fdtrc(1, free, max(squares - left, 0.0) / (left / free))) * len(names)
         rms = float(1000 * np.sqrt((raw[:, :3] ** 2).mean()))
@@ -183,18 +183,18 @@ def zeros_tried(found: HandEye, robot: Robot) -> tuple[HandEye, tuple[str, ...],
     tried = found if len(unseen) == len(names) else replace(found, warnings=tuple(map(_zeros_too, found.warnings)))
     explained = {each.code for each in grave_warnings(found.warnings)} <= EXPLAINED_BY_A_ZERO
     if chance > ZERO_CHANCE or abs(value) < MIN_ZERO or not explained:
-        return tried, tuple(unseen), least
+        return tried, tuple(unseen), smallest
     mended = _Turned(robot, found.samples, k).flange(value)
     try:
         again = calibrate_hand_eye(replace(found.samples, flange=mended))
     except HandEyeError:
-        return tried, tuple(unseen), least
+        return tried, tuple(unseen), smallest
     if grave_warnings(again.warnings):
-        return tried, tuple(unseen), least
+        return tried, tuple(unseen), smallest
     given = float(1000 * np.sqrt((found.residual[found.used, :3] ** 2).mean()))
     zero = JointZero(k + 1, float(np.degrees(value)), float(np.degrees(half_width)), given, rms)
     others = tuple(each for each in found.warnings if each.code not in EXPLAINED_BY_A_ZERO)
-    return replace(found, warnings=(zero, *others)), tuple(unseen), least
+    return replace(found, warnings=(zero, *others)), tuple(unseen), smallest
 
 
 EXPLAINED_BY_A_ZERO = {"board_scale", "unexplained_residuals", "moved_between", "more_scatter"}

@@ -102,7 +102,7 @@ def _split(cells: Reals) -> Reals:
 
 
 @kernel
-def _arc(first: int, many: int) -> np.uint64:
+def sectors_in_a_row(first: int, many: int) -> np.uint64:
     """Bits of ``many`` sectors in a row, from number ``first`` (any turn)."""
     if many <= 0:
         return _NONE
@@ -130,10 +130,10 @@ def _sectors(ranges: Reals, branch: _Found) -> tuple[np.uint64, np.uint64]:
             continue
         low, high = theta_1[slot, 0], theta_1[slot, 1]
         first, last = int(np.ceil((least - high) / width - 0.5)), int(np.floor((most - low) / width + 0.5))
-        maybe |= _arc(first, last - first + 1)
+        maybe |= sectors_in_a_row(first, last - first + 1)
         if state[slot] == GOOD:
             first, last = int(np.ceil((least - low) / width + 0.5)), int(np.floor((most - high) / width - 0.5))
-            good |= _arc(first, last - first + 1)
+            good |= sectors_in_a_row(first, last - first + 1)
     return good, (_ONE if most == np.inf else _ALL) & ~maybe
 
 

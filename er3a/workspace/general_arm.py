@@ -379,17 +379,17 @@ def curvature(arm: GeneralArm, moves: Reals, radii: Reals) -> float:
     ----------
     .. [1] ``w_i x (w_j x (p - o_j))``: J.-P. Merlet, *Parallel Robots*, 2nd ed., 2006, chapter 7.
     """
-    total, behind, n = 0.0, 0.0, moves.shape[0]
+    total, beyond, n = 0.0, 0.0, moves.shape[0]
     inner = 0.0
     for k in range(n):
         inner += 0.0 if arm.sliding[k] else moves[k]
     for k in range(n - 1, -1, -1):
         if arm.sliding[k]:
             total += 2.0 * moves[k] * inner
-            behind += moves[k]
+            beyond += moves[k]
             continue
-        lever = min(arm.levers[k], radii[k] + behind)
+        lever = min(arm.levers[k], radii[k] + beyond)
         inner -= moves[k]
         total += lever * moves[k] * (moves[k] + 2.0 * inner)
-        behind += lever * moves[k]
+        beyond += lever * moves[k]
     return total

@@ -525,9 +525,9 @@ def _summed(rings: Rings) -> Rings:
     return rings._replace(reached=reached)
 
 
-def _carried(arm: GeneralArm, k: int, rings: Rings, behind: Rings) -> Rings:
+def _carried(arm: GeneralArm, k: int, rings: Rings, outer: Rings) -> Rings:
     low, high = (0.0, 0.0) if arm.sliding[k] else (arm.lower[k], arm.upper[k])
-    _carry(np.ascontiguousarray(arm.links[k + 1]), low, high, behind, rings)
+    _carry(np.ascontiguousarray(arm.links[k + 1]), low, high, outer, rings)
     return rings
 
 
@@ -613,28 +613,28 @@ def _spread(L: Reals, cell: Cell, angle: float, width: float, bar: float) -> Spr
 
 
 @kernel
-def _meets(L: Reals, cell: Cell, angle: float, width: float, behind: Rings, bar: float) -> bool:
+def _meets(L: Reals, cell: Cell, angle: float, width: float, outer: Rings, bar: float) -> bool:
     """Whether a cell at a range of angles about axis k may meet what is not empty about axis k + 1."""
     spread = _spread(L, cell, angle, width, bar)
-    i_0, i_1, j_0, j_1 = _range_of(spread, behind)
+    i_0, i_1, j_0, j_1 = _range_of(spread, outer)
     if i_0 > i_1 or j_0 > j_1:
         return False
-    sums = behind.reached
+    sums = outer.reached
     total = sums[i_1 + 1, j_1 + 1] - sums[i_0, j_1 + 1] - sums[i_1 + 1, j_0] + sums[i_0, j_0]
     if total == 0:
         return False
-    if behind.full or spread[5] >= np.pi:
+    if outer.full or spread[5] >= np.pi:
         return True
     low, high = spread[4] - spread[5], spread[4] + spread[5]
     for i in range(i_0, i_1 + 1):
         for j in range(j_0, j_1 + 1):
-            if not _within(behind.empty[i, j], behind.counts[i, j], low, high):
+            if not _within(outer.empty[i, j], outer.counts[i, j], low, high):
                 return True
     return False
 
 
 @inner_kernel
-def _meets_anywhere(L: Reals, cell: Cell, behind: Rings, levels: int) -> bool:
+def _meets_anywhere(L: Reals, cell: Cell, outer: Rings, levels: int) -> bool:
     """Whether a cell may meet what is not empty at any angle."""
     stack = np.empty((levels + 2, 2))
     for piece in range(_PIECES):
@@ -643,7 +643,7 @@ def _meets_anywhere(L: Reals, cell: Cell, behind: Rings, levels: int) -> bool:
         while waiting > 0:
             waiting -= 1
             angle, width = stack[waiting, 0], stack[waiting, 1]
-            if not _meets(L, cell, angle, width, behind, 0.0):
+            if not _meets(L, cell, angle, width, outer, 0.0):
                 continue
             if width <= finest:
                 return True
@@ -656,7 +656,7 @@ def _meets_anywhere(L: Reals, cell: Cell, behind: Rings, levels: int) -> bool:
 
 @inner_kernel
 def exclude(
-    L: Reals, cell: Cell, ends: tuple[float, float, float], behind: Rings, arcs: Reals, count: int, flags: Flags
+    L: Reals, cell: Cell, ends: tuple[float, float, float], outer: Rings, arcs: Reals, count: int, flags: Flags
 ) -> int:
     """Take the azimuths that a joint's range brings a ring or bar to out of its arcs; what is left is empty.
 
@@ -664,7 +664,7 @@ def exclude(
     ----------
     L : (4, 4), the link after the joint
     ends : the joint's range, rad, and the length of bars, m (0 for rings)
-    behind : the largest reach of the joints after it
+    outer : the largest reach of the joints after it
     arcs, count : the arcs that are empty so far; changed
     flags : (2, longest) bool, working memory
 
@@ -673,16 +673,16 @@ def exclude(
     count : of the arcs
     """
     low, high, bar = ends
-    edge = max(min(cell[1] - cell[0], cell[3] - cell[2]), 0.5 * min(behind.size[0], behind.size[1]))
+    edge = max(min(cell[1] - cell[0], cell[3] - cell[2]), 0.5 * min(outer.size[0], outer.size[1]))
     levels, pieces, around = 0, _PIECES, bar if bar > 0.0 else cell[1] * TURN
     while levels < _LEVELS and around / pieces > edge:
         levels, pieces = levels + 1, 2 * pieces
     if high - low >= FULL_TURN:
-        return 0 if _meets_anywhere(L, cell, behind, levels) else count
+        return 0 if _meets_anywhere(L, cell, outer, levels) else count
     now, finer = flags[0], flags[1]
     pieces, found = _PIECES, False
     for i in range(pieces):
-        now[i] = _meets(L, cell, TURN * (i + 0.5) / pieces, 0.5 * TURN / pieces + 1e-12, behind, bar)
+        now[i] = _meets(L, cell, TURN * (i + 0.5) / pieces, 0.5 * TURN / pieces + 1e-12, outer, bar)
         found = found or now[i]
     if not found:
         return count
@@ -699,7 +699,7 @@ def exclude(
                     continue
                 m = (i + sense) % pieces
                 half = 0.5 * TURN / pieces + 1e-12
-                while finer[m] and not _meets(L, cell, TURN * (m + 0.5) / pieces, half, behind, bar):
+                while finer[m] and not _meets(L, cell, TURN * (m + 0.5) / pieces, half, outer, bar):
                     finer[m] = False
                     m = (m + sense) % pieces
         now, finer = finer, now
@@ -717,7 +717,7 @@ def exclude(
 
 
 @kernel
-def _carry(L: Reals, low: float, high: float, behind: Rings, rings: Rings) -> None:
+def _carry(L: Reals, low: float, high: float, outer: Rings, rings: Rings) -> None:
     """Fill in what one more joint in front may reach."""
     n_rho, n_z = rings.counts.shape
     flags = np.zeros((2, _PIECES << _LEVELS), dtype=np.bool_)
@@ -729,7 +729,7 @@ def _carry(L: Reals, low: float, high: float, behind: Rings, rings: Rings) -> No
                 rings.low + j * rings.size[1],
                 rings.low + (j + 1) * rings.size[1],
             )
-            rings.counts[i, j] = exclude(L, cell, (low, high, 0.0), behind, rings.empty[i, j], 1, flags)
+            rings.counts[i, j] = exclude(L, cell, (low, high, 0.0), outer, rings.empty[i, j], 1, flags)
 
 
 @kernel
@@ -766,7 +766,7 @@ def _remove_rest(empty: Reals, empty_count: int, arcs: Reals, count: int) -> int
 
 
 @kernel
-def exclude_cells(arm: GeneralArm, behind: Rings, cells: Reals, empty: Reals, counts: Integers) -> None:
+def exclude_cells(arm: GeneralArm, outer: Rings, cells: Reals, empty: Reals, counts: Integers) -> None:
     """Azimuths of rings about axis 1, or places along bars, that are proven empty.
 
     Parameters
@@ -778,7 +778,7 @@ def exclude_cells(arm: GeneralArm, behind: Rings, cells: Reals, empty: Reals, co
     for n in range(cells.shape[0]):
         cell = cells[n, 0], cells[n, 1], cells[n, 2], cells[n, 3]
         ends = arm.lower[0], arm.upper[0], arm.bar
-        counts[n] = exclude(arm.links[1], cell, ends, behind, empty[n], counts[n], flags)
+        counts[n] = exclude(arm.links[1], cell, ends, outer, empty[n], counts[n], flags)
 
 
 SAMPLES, TRIES = 400_000, 24
@@ -802,7 +802,7 @@ def prove_general(arm: GeneralArm, target: float, most_cells: int, seed: int) ->
     witness : (cells, m), joint values that reach the middle of each cell with theta of joint 1 at 0, NaN where none is
         known
     """
-    behind = outer_rings(arm, min(FINEST, int(_ACROSS * np.sqrt(most_cells))))
+    outer = outer_rings(arm, min(FINEST, int(_ACROSS * np.sqrt(most_cells))))
     known, room = postures(arm, _BUCKETS, _MAX_POSTURES), memory(arm)
     random = np.random.Generator(np.random.Philox(key=seed))
     for start in range(0, SAMPLES, _PORTION):
@@ -817,7 +817,7 @@ def prove_general(arm: GeneralArm, target: float, most_cells: int, seed: int) ->
         if parents is not None:
             unfilled[:] = parents.unfilled
             counts = np.isfinite(unfilled[..., 0]).sum(axis=1)
-        exclude_cells(arm, behind, cells, empty, empties)
+        exclude_cells(arm, outer, cells, empty, empties)
         nowhere = (empties == 1) & (empty[:, 0, 1] - empty[:, 0, 0] >= TURN)
         some = np.flatnonzero(~nowhere)
         parts = unfilled[some], counts[some], witness[some]
@@ -886,8 +886,8 @@ def surface_of(robot: Robot, most_cells: int, seed: int) -> Surface | None:
 def _normal(robot: Robot, q: Reals) -> tuple[Reals | None, float]:
     """Normal (3,) in the last moving joint's frame, and the sphere's radius (m), 0 for a plane; None for others."""
     last, _ = moving_tip(constant_links(robot), robot.sliding)
-    behind = constant_links(robot, last + 1)[last + 1, :3, :3]
-    frames = forward(robot, q, frame=last + 1)[:, :3, :3] @ behind.T
+    end_rotation = constant_links(robot, last + 1)[last + 1, :3, :3]
+    frames = forward(robot, q, frame=last + 1)[:, :3, :3] @ end_rotation.T
     points = forward(robot, q)[:, :3, 3]
     centred = points - points.mean(axis=0)
     _, spread, directions = np.linalg.svd(centred, full_matrices=False)

@@ -41,23 +41,23 @@ def theta_ranges(robot: Robot) -> Reals:
 @kernel
 def holds(ranges: Reals, joint: int, low: float, high: float) -> bool:
     """Whether all angles from ``low`` to ``high`` are within the joint's range, by one same turn."""
-    least: float = ranges[joint, 0]
+    smallest: float = ranges[joint, 0]
     most: float = ranges[joint, 1]
     if most == np.inf:
         return True
-    shift: float = np.ceil((least - low) / TURN) * TURN
-    return low + shift >= least and high + shift <= most
+    shift: float = np.ceil((smallest - low) / TURN) * TURN
+    return low + shift >= smallest and high + shift <= most
 
 
 @inner_kernel
 def misses(ranges: Reals, joint: int, low: float, high: float) -> bool:
     """Whether no angle from ``low`` to ``high`` is within the joint's range, by any turn."""
-    least: float = ranges[joint, 0]
+    smallest: float = ranges[joint, 0]
     most: float = ranges[joint, 1]
     if most == np.inf or high - low >= TURN:
         return False
-    shift: float = np.ceil((least - low) / TURN) * TURN
-    return low + shift > most and high + shift - TURN < least
+    shift: float = np.ceil((smallest - low) / TURN) * TURN
+    return low + shift > most and high + shift - TURN < smallest
 
 
 @inner_kernel
@@ -78,11 +78,11 @@ def _opposite(a: float, b: float, opposite: float) -> float:
 def _angle_range(link: float, other: float, low: float, high: float) -> tuple[float, float]:
     """Range of the angle between ``link`` and the line from axis 2 to the wrist centre, whose length is in a range."""
     first, last = _opposite(low, link, other), _opposite(high, link, other)
-    least, most = min(first, last), max(first, last)
+    smallest, most = min(first, last), max(first, last)
     turning = link * link - other * other
     if turning > 0.0 and low * low < turning < high * high:
         most = max(most, np.arcsin(other / link))
-    return least, most
+    return smallest, most
 
 
 @inner_kernel
@@ -129,13 +129,13 @@ def branches(
     k_move = abs(arm.cos_12) / arm.sin_12 * move
     k_low, k_high = k - k_move, k + k_move
     k_most = max(abs(k_low), abs(k_high))
-    k_least = 0.0 if k_low < 0.0 < k_high else min(abs(k_low), abs(k_high))
-    if r_high < k_least:
+    k_min = 0.0 if k_low < 0.0 < k_high else min(abs(k_low), abs(k_high))
+    if r_high < k_min:
         return
     beside = r_low >= k_most
     ahead = np.sqrt(max(r * r - k * k, 0.0))
     ahead_low = np.sqrt(max(r_low * r_low - k_most * k_most, 0.0))
-    ahead_high = np.sqrt(max(r_high * r_high - k_least * k_least, 0.0))
+    ahead_high = np.sqrt(max(r_high * r_high - k_min * k_min, 0.0))
     beta, beta_low, beta_high = np.arctan2(k, ahead), -0.5 * np.pi, 0.5 * np.pi
     if k_most == 0.0:
         beta_low, beta_high = 0.0, 0.0
@@ -156,7 +156,7 @@ def branches(
     longest, shortest = arm.upper_arm + arm.forearm, abs(arm.upper_arm - arm.forearm)
     orthogonal = arm.cos_45 == 0.0 and arm.cos_56 == 0.0
     angle_45, angle_56 = np.arctan2(arm.sin_45, arm.cos_45), np.arctan2(arm.sin_56, arm.cos_56)
-    tilt_least, tilt_most = abs(angle_45 - angle_56), min(angle_45 + angle_56, TURN - angle_45 - angle_56)
+    tilt_min, tilt_max = abs(angle_45 - angle_56), min(angle_45 + angle_56, TURN - angle_45 - angle_56)
 
     for side in range(2):
         front = 1.0 - 2.0 * side
@@ -167,12 +167,12 @@ def branches(
 
         # The triangle of upper arm and forearm.
         x = front * ahead - arm.point_2[0]
-        x_least = (ahead_low if side == 0 else -ahead_high) - arm.point_2[0]
-        x_most = (ahead_high if side == 0 else -ahead_low) - arm.point_2[0]
-        x_near = 0.0 if x_least < 0.0 < x_most else min(abs(x_least), abs(x_most))
+        x_min = (ahead_low if side == 0 else -ahead_high) - arm.point_2[0]
+        x_max = (ahead_high if side == 0 else -ahead_low) - arm.point_2[0]
+        x_near = 0.0 if x_min < 0.0 < x_max else min(abs(x_min), abs(x_max))
         far = np.hypot(x, y)
         far_low = max(np.hypot(x_near, max(abs(y) - y_move, 0.0)), far - plane_move) - PAD
-        far_high = min(np.hypot(max(abs(x_least), abs(x_most)), abs(y) + y_move), far + plane_move) + PAD
+        far_high = min(np.hypot(max(abs(x_min), abs(x_max)), abs(y) + y_move), far + plane_move) + PAD
         if far_low > longest or far_high < shortest:
             continue
         elbow = beside and far_low >= shortest and far_high <= longest
@@ -212,12 +212,12 @@ def branches(
             tilt = np.arctan2(flat, fz)
             tilt_low = max(0.0, tilt - turned, abs(polar_4 - polar_6) - about - 1e-7)
             tilt_high = min(np.pi, tilt + turned, min(polar_4 + polar_6, TURN - polar_4 - polar_6) + about + 1e-7)
-            if tilt_low > tilt_most + PAD or tilt_high < tilt_least - PAD:
+            if tilt_low > tilt_max + PAD or tilt_high < tilt_min - PAD:
                 continue
             if not orthogonal:
-                sound = sound and tilt_low >= tilt_least + PAD and tilt_high <= tilt_most - PAD
-            phi_low = _tilt_to_phi_5(arm, max(tilt_low, tilt_least)) - PAD
-            phi_high = _tilt_to_phi_5(arm, min(tilt_high, tilt_most)) + PAD
+                sound = sound and tilt_low >= tilt_min + PAD and tilt_high <= tilt_max - PAD
+            phi_low = _tilt_to_phi_5(arm, max(tilt_low, tilt_min)) - PAD
+            phi_high = _tilt_to_phi_5(arm, min(tilt_high, tilt_max)) + PAD
             swing_46 = _swing(np.sin(turned), np.sin(tilt)) + PAD if turned < min(tilt, np.pi - tilt) else np.pi
             gx, gy = _beside(arm, beside_6, (zx, zy, zz), cos_1, sin_1, c, s)
 

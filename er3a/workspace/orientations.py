@@ -71,8 +71,8 @@ class TiltPlane:
         aside = float(self.tool[:, 2] @ self.normal)
         x, y = up @ axis, np.cross(normal, up) @ axis
         size = np.hypot(x, y) * np.sqrt(max(0.0, 1 - aside**2))
-        least = np.cos(half_angle) - aside * (normal @ axis)
-        ratio = np.divide(least, size, out=np.where(least > 0, 2.0, -1.0), where=size > 1e-12)
+        smallest = np.cos(half_angle) - aside * (normal @ axis)
+        ratio = np.divide(smallest, size, out=np.where(smallest > 0, 2.0, -1.0), where=size > 1e-12)
         width = np.arccos(np.where(ratio <= 1 + 1e-9, np.clip(ratio, -1, 1), np.nan)).reshape(turns.shape)
         middle = np.arctan2(y, x).reshape(turns.shape)
         share = np.linspace(-1, 1, 2 * int(np.ceil(half_angle / step - 1e-9)) + 1)[:, None] * [1.0, -1.0]
@@ -170,12 +170,12 @@ def asked_of(robot: Robot, rolls: int) -> AskedOrientations | None:
 def _tilt_plane(robot: Robot, joints: int) -> TiltPlane | None:
     """The plane in which an arm's first ``joints`` joints tilt its tool; None if they do not tilt it in a plane."""
     axes, _, T = axes_at_zero_theta(robot)
-    behind, sliding = axes[1:joints], robot.sliding[1:joints]
-    if robot.sliding[0] or len(behind) < _MIN_PLANAR or sliding.all():
+    later_axes, sliding = axes[1:joints], robot.sliding[1:joints]
+    if robot.sliding[0] or len(later_axes) < _MIN_PLANAR or sliding.all():
         return None
-    normal = behind[~sliding][0]
-    apart = np.linalg.norm(np.cross(behind[~sliding], normal), axis=1).max()
-    along = np.abs(behind[sliding] @ normal).max(initial=0.0)
+    normal = later_axes[~sliding][0]
+    apart = np.linalg.norm(np.cross(later_axes[~sliding], normal), axis=1).max()
+    along = np.abs(later_axes[sliding] @ normal).max(initial=0.0)
     up = axes[0] - (axes[0] @ normal) * normal
     if max(apart, along) > _PARALLEL or np.linalg.norm(up) < _PARALLEL:
         return None

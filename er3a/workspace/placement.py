@@ -430,15 +430,15 @@ def _weighed(places: Places) -> Reals:
 
 def _places(field: Field, bricks: Flags, box: Reals, turned: bool) -> Places:
     points = _lattice_points(field, box)
-    any_branch = _sliding_least(field.least_any, points)
+    any_branch = _sliding_min(field.least_any, points)
     where = np.nonzero(any_branch > NO)
     used = np.flatnonzero((field.least > NO).any(axis=(0, 1, 2)))
     slots = field.least.shape[-1]
     by_slot = np.full((len(where[0]), slots), NO)
     limit_margin = np.zeros((len(where[0]), slots))
     for slot in used:
-        by_slot[:, slot] = _sliding_least(field.least[..., slot], points)[where]
-        limit_margin[:, slot] = _sliding_least(field.limit_margin[..., slot], points)[where]
+        by_slot[:, slot] = _sliding_min(field.least[..., slot], points)[where]
+        limit_margin[:, slot] = _sliding_min(field.limit_margin[..., slot], points)[where]
     slot = np.round(by_slot, 9).argmax(axis=1)
     rows = np.arange(len(slot))
     one = by_slot[rows, slot] > NO
@@ -448,7 +448,7 @@ def _places(field: Field, bricks: Flags, box: Reals, turned: bool) -> Places:
         slot=np.where(one, slot, MIXED),
         least=np.where(one, by_slot[rows, slot], any_branch[where]),
         limit_margin=np.where(one, limit_margin[rows, slot], np.nan),
-        proven=_sliding_least(bricks.astype(float), points - 1)[where] > 0,
+        proven=_sliding_min(bricks.astype(float), points - 1)[where] > 0,
     )
 
 
@@ -458,7 +458,7 @@ def _lattice_points(field: Field, box: Reals) -> Integers:
     return count
 
 
-def _sliding_least(values: Reals, points: Integers) -> Reals:
+def _sliding_min(values: Reals, points: Integers) -> Reals:
     """Smallest value over ``points`` (3,) lattice points from each one on; NO where the box leaves the lattice."""
     for axis, size in enumerate(points):
         values = scipy.ndimage.minimum_filter1d(

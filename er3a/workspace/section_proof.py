@@ -367,16 +367,16 @@ def slack(
     dz = z - W_z
     inner = arm.d - np.sqrt((rho - rho_W) ** 2 + dz * dz)
     outer = np.sqrt((rho + rho_W) ** 2 + dz * dz) - arm.d
-    least = min(inner, outer)
+    smallest = min(inner, outer)
     if rho_W < 1e-9:
         return -np.inf, 0.0
     X = ((rho * rho - arm.d * arm.d + rho_W * rho_W) + dz * dz) / (2.0 * rho_W)
     X = min(max(X, -rho), rho)
     Y = np.sqrt(max(0.0, rho * rho - X * X))
     along = f_cos * X - side * f_sin * Y + f_z * z - W_f
-    least = min(least, along - arm.d * arm.inner_low) if arm.inner_low > -1.0 else least
-    least = min(least, arm.d * arm.inner_high - along) if arm.inner_high < 1.0 else least
-    return least, X
+    smallest = min(smallest, along - arm.d * arm.inner_low) if arm.inner_low > -1.0 else smallest
+    smallest = min(smallest, arm.d * arm.inner_high - along) if arm.inner_high < 1.0 else smallest
+    return smallest, X
 
 
 @inner_kernel
@@ -396,14 +396,14 @@ def reached_angles(
         return False, 0.0, 0.0
     d, size = arm.d, rho_1 + rho_W + arm.d + abs(W_z) + abs(z_0) + abs(z_1)
     safe = _SAFE * (1.0 + size)
-    dz_most = max(abs(z_0 - W_z), abs(z_1 - W_z))
-    dz_least = 0.0 if z_0 <= W_z <= z_1 else min(abs(z_0 - W_z), abs(z_1 - W_z))
+    dz_max = max(abs(z_0 - W_z), abs(z_1 - W_z))
+    dz_min = 0.0 if z_0 <= W_z <= z_1 else min(abs(z_0 - W_z), abs(z_1 - W_z))
     furthest = max(abs(rho_0 - rho_W), abs(rho_1 - rho_W))
-    if np.sqrt(furthest**2 + dz_most**2) + safe > d or np.sqrt((rho_0 + rho_W) ** 2 + dz_least**2) - safe < d:
+    if np.sqrt(furthest**2 + dz_max**2) + safe > d or np.sqrt((rho_0 + rho_W) ** 2 + dz_min**2) - safe < d:
         return False, 0.0, 0.0
     fixed = rho_W * rho_W - d * d
-    X_0 = (rho_0 * rho_0 + fixed + dz_least * dz_least) / (2.0 * rho_W)
-    X_1 = (rho_1 * rho_1 + fixed + dz_most * dz_most) / (2.0 * rho_W)
+    X_0 = (rho_0 * rho_0 + fixed + dz_min * dz_min) / (2.0 * rho_W)
+    X_1 = (rho_1 * rho_1 + fixed + dz_max * dz_max) / (2.0 * rho_W)
 
     # f_cos X + f_z z: quadratic in z, monotone in rho.
     k = f_cos / (2.0 * rho_W)
@@ -420,9 +420,9 @@ def reached_angles(
                 high = _tilted(k, end, fixed, turning, W_z, f_z)
     if abs(f_sin) > 1e-15:
         squared_most = max(X_0 * X_0, X_1 * X_1)
-        squared_least = 0.0 if X_0 < 0 < X_1 else min(X_0 * X_0, X_1 * X_1)
+        squared_min = 0.0 if X_0 < 0 < X_1 else min(X_0 * X_0, X_1 * X_1)
         Y_0 = np.sqrt(max(0.0, rho_0 * rho_0 - squared_most))
-        Y_1 = np.sqrt(max(0.0, rho_1 * rho_1 - squared_least))
+        Y_1 = np.sqrt(max(0.0, rho_1 * rho_1 - squared_min))
         a, b = -side * f_sin * Y_0, -side * f_sin * Y_1
         low, high = low + min(a, b), high + max(a, b)
     safe_along = safe * (1.0 + size / rho_W)
@@ -432,12 +432,12 @@ def reached_angles(
         return False, 0.0, 0.0
 
     # cos(phi - phi_W) = X / rho = (rho + B / rho) / (2 rho_W): B is monotone in |z - W_z|, the rest convex in rho.
-    B_0, B_1 = fixed + dz_least * dz_least, fixed + dz_most * dz_most
+    B_0, B_1 = fixed + dz_min * dz_min, fixed + dz_max * dz_max
     most = max(rho_0 + B_1 / rho_0, rho_1 + B_1 / rho_1) / (2.0 * rho_W)
     bottom = min(max(np.sqrt(max(0.0, B_0)), rho_0), rho_1)
-    least = min(bottom + B_0 / bottom, min(rho_0 + B_0 / rho_0, rho_1 + B_0 / rho_1)) / (2.0 * rho_W)
-    least, most = max(-1.0, least - safe_along / rho_0), min(1.0, most + safe_along / rho_0)
-    a, b = np.arccos(most) - ROUND_OFF, np.arccos(least) + ROUND_OFF
+    smallest = min(bottom + B_0 / bottom, min(rho_0 + B_0 / rho_0, rho_1 + B_0 / rho_1)) / (2.0 * rho_W)
+    smallest, most = max(-1.0, smallest - safe_along / rho_0), min(1.0, most + safe_along / rho_0)
+    a, b = np.arccos(most) - ROUND_OFF, np.arccos(smallest) + ROUND_OFF
     if side > 0:
         return True, phi_W + a, phi_W + b
     return True, phi_W - b, phi_W - a

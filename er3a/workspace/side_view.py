@@ -135,8 +135,8 @@ def _tilts(arm: SectionArm) -> list[tuple[float, float]]:
     """Ranges of gamma in the arm's plane."""
     if arm.d == 0:
         return [(0.0, 0.0)]
-    least, most = float(np.arccos(arm.inner_high)), float(np.arccos(arm.inner_low))
-    return [(-most, most)] if least < _ANGLE else [(-most, -least), (least, most)]
+    smallest, most = float(np.arccos(arm.inner_high)), float(np.arccos(arm.inner_low))
+    return [(-most, most)] if smallest < _ANGLE else [(-most, -smallest), (smallest, most)]
 
 
 def _on_border(arm: SectionArm, points: Complexes, side_view: bool) -> Flags:

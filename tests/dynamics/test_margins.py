@@ -346,7 +346,7 @@ def test_times_under_torques_are_those_of_toppras_own_constraint(arm):
     own = arm.replace(masses=replace(arm.masses, drives=replace(arm.masses.drives, viscous=np.zeros(6))))
     found = fastest_under_torques(arm_model(own), path(), np.full(6, 4.0), PEAK)
     assert found.timed.duration == pytest.approx(toppras_own(arm, path()), rel=2e-3)
-    assert found.least == found.timed.duration
+    assert found.lower_bound == found.timed.duration
 
 
 @pytest.mark.parametrize("viscous", [0.0, 1.0])
@@ -361,7 +361,7 @@ def test_the_shortest_time_falls_to_the_optimum_as_nodes_are_added(arm, viscous)
         for count in (101, 201, 401, 801)
     ]
     times = np.array([each.timed.duration for each in runs])
-    least = np.array([each.least for each in runs])
+    least = np.array([each.lower_bound for each in runs])
     assert (np.diff(times) < 0).all()
     assert (-np.diff(times)[1:] < -np.diff(times)[:-1] / 2).all()
     assert (least <= times).all()
@@ -407,7 +407,7 @@ def test_times_under_torques_are_those_of_full_thrust_and_full_braking(viscous):
     shortest = halves(scipy.optimize.brentq(lambda top: halves(top)[0] - angle, 1e-6, highest))[1]
     assert np.abs(found.torques).max() <= peak * (1 + 1e-3)
     assert shortest * (1 - 1e-6) <= found.timed.duration <= shortest * 1.01
-    assert found.least <= found.timed.duration <= found.least * 1.005
+    assert found.lower_bound <= found.timed.duration <= found.lower_bound * 1.005
 
 
 @pytest.mark.long

@@ -14,9 +14,10 @@ from er3a.errors import InputError
 from er3a.files.reference_sets import load_references
 from er3a.files.robot_library import load_robot
 from er3a.identifiability.alternatives import Flip
+from er3a.identifiability.continuous import Extent
 from er3a.identifiability.entries import TableNumber, continuous_of, entries_of
 from er3a.identifiability.entry_evidence import Evidence, Tolerance
-from er3a.identifiability.evidence import NOT_OFF, Extent, _interval, evidence_of, parts_of
+from er3a.identifiability.evidence import NOT_OFF, evidence_of, parts_of
 from er3a.identifiability.feasible import Region
 from er3a.identifiability.proposals import (
     LookAtMotion,
@@ -136,8 +137,8 @@ def test_the_table_read_from_the_step_model_is_consistent_with_it():
 
 
 def test_an_entry_for_which_no_table_meets_the_documents_has_no_interval():
-    assert _interval(Extent(np.nan, np.nan, NOT_OFF, True)) is None
-    assert _interval(Extent(1 - 1e-12, 2.0, NOT_OFF, True)) == (1, 2)
+    assert Extent(np.nan, np.nan, NOT_OFF, True).interval is None
+    assert Extent(1 - 1e-12, 2.0, NOT_OFF, True).interval == (1, 2)
 
 
 @pytest.mark.long

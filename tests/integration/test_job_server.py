@@ -80,7 +80,7 @@ def test_other_commands_are_not_handed_over(server, monkeypatch):
 def test_what_a_server_loads_before_it_forks_starts_no_threads():
     """Rerun's runtime begins as it is imported, and a fork leaves its threads behind: a job would wait for ever."""
     words = (
-        "import sys; from er3a.pipeline import job_server; job_server._load_libraries(); print('rerun' in sys.modules)"
+        "import sys; from er3a.pipeline import job_server; job_server.load_libraries(); print('rerun' in sys.modules)"
     )
     done = subprocess.run([sys.executable, "-c", words], cwd=ROOT, capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["False"]

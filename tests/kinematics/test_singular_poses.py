@@ -8,7 +8,7 @@ import scipy
 
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.batch import inverse_batch
-from er3a.kinematics.families import Family, _nearest_wrists, bend_of_wrist
+from er3a.kinematics.families import Family, bend_of_wrist, nearest_wrists
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import determinant_factors
@@ -51,7 +51,7 @@ def test_oblique_wrist_is_not_taken_for_aligned():
     arm = make_arm(alpha=np.array([-90, 0, -90, 70, -80, 0]) * DEG)
     q = np.array([[0.1, 0.2, 0.3, 0.4, 0.0, 0.6]])
     q[0, 4] -= bend_of_wrist(arm, q)[0]
-    np.testing.assert_array_equal(_nearest_wrists(arm, q.copy(), np.zeros(6)), q)
+    np.testing.assert_array_equal(nearest_wrists(arm, q.copy(), np.zeros(6)), q)
 
 
 def assert_own_branch_found(robot, q, random):

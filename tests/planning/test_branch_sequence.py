@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
-from er3a.planning.follow import WIDE_STEP, _with_turns, branches_along, follow, turned_difference
+from er3a.planning.follow import WIDE_STEP, branches_along, follow, turned_difference, with_whole_turns
 from er3a.planning.moves import line
 
 GRID = np.linspace(0, 1, 121)
@@ -63,14 +63,14 @@ def test_no_other_sequence_stays_within_limits_for_longer(name):
         share = np.gradient(grid.t)
         none = np.zeros(len(grid.t) - 1, bool)
         costs = {
-            tuple(slot): _with_turns(robot, grid.q[np.arange(len(slot)), slot], slot, none, share, None).cost[1]
+            tuple(slot): with_whole_turns(robot, grid.q[np.arange(len(slot)), slot], slot, none, share, None).cost[1]
             for slot in every_sequence(grid)
         }
         followed = follow(robot, path, GRID)
         assert not followed.jumps
-        ours = _with_turns(robot, grid.q[np.arange(len(grid.t)), followed.slot], followed.slot, none, share, None).cost[
-            1
-        ]
+        ours = with_whole_turns(
+            robot, grid.q[np.arange(len(grid.t)), followed.slot], followed.slot, none, share, None
+        ).cost[1]
         assert ours <= min(costs.values()) + 2e-6
         compared += 1
         switched += len(set(followed.slot)) > 1

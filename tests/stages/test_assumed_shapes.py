@@ -17,7 +17,7 @@ from er3a.pipeline.stages.collision.compute import compute as collision
 from er3a.pipeline.stages.collision.model import FreeSpace
 from er3a.pipeline.stages.trajectory.model import RESULTS, MinClearance, is_safe
 from er3a.pipeline.stages.trajectory.played import faults
-from er3a.pipeline.stages.trajectory.record import _runs
+from er3a.pipeline.stages.trajectory.record import runs_of_path
 from er3a.pipeline.stages.trajectory.written_programs import near_assumed_shapes
 from er3a.pipeline.study import load_study
 from er3a.program_check.check_program import CheckOptions, check_program
@@ -87,16 +87,16 @@ def test_recordings_call_no_path_safe_without_saying_of_what(small_results):
         (results, "plain", "safe in the model"),
         (close, "caution", "clear of assumed shapes only"),
     ):
-        run = next(_runs(load_robot("er3a_c60"), found, sound[0]))
+        run = next(runs_of_path(load_robot("er3a_c60"), found, sound[0]))
         assert (run.status, run.outcome) == (status, words)
         assert f"**{words}**" in run.text
 
 
 def test_a_program_of_a_path_near_assumed_shapes_says_so_in_its_head():
     robot, least = load_robot("er3a_c60"), MinClearance(11.2, 0.4, LinkPair(1, 3), 5)
-    (near,) = near_assumed_shapes(robot, "a", least, 20)
+    (near,) = near_assumed_shapes(robot, "a", least, 0.02)
     assert head_line(near).startswith("NOT SETTLED: the path a is clear by 11.2 mm of assumed shapes only")
-    assert near_assumed_shapes(robot, "a", least, 10) == near_assumed_shapes(documented(), "a", least, 20) == ()
+    assert near_assumed_shapes(robot, "a", least, 0.01) == near_assumed_shapes(documented(), "a", least, 0.02) == ()
 
 
 def test_the_pages_say_where_what_stands_around_the_arm_is():

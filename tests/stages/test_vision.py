@@ -15,7 +15,7 @@ from er3a.pipeline.messages.vision import say
 from er3a.pipeline.results import read_results
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.registry import STAGES
-from er3a.pipeline.stages.vision.compute import _figures, _verdict
+from er3a.pipeline.stages.vision.compute import figures_of, verdict_of
 from er3a.pipeline.stages.vision.model import VisionResults
 from er3a.pipeline.study import load_study
 from testing.hand_eye_sets import pose
@@ -65,11 +65,11 @@ def test_objects_are_grasped_as_expected_and_the_turned_board_is_named(folders):
 def test_objects_within_the_margin_of_assumed_shapes_count_apart(folders):
     summary = read_results(folders["er3a_c60"], VisionResults).results.summary
     for near, clear in (((), 2), (("can",), 1), (("can", "box"), 0)):
-        verdict = _verdict(summary.calibration, summary.objects, near)
+        verdict = verdict_of(summary.calibration, summary.objects, near)
         assert (verdict.finding.objects, verdict.finding.grasped, verdict.finding.assumed) == (2, clear, near)
         assert f"{clear} of 2 objects can be grasped" in say(verdict.finding)
         assert (f"{len(near)} more only if" in say(verdict.finding)) == bool(near)
-        figures = {each.name: each.value for each in _figures(summary.calibration, summary.objects, near)}
+        figures = {each.name: each.value for each in figures_of(summary.calibration, summary.objects, near)}
         assert figures["objects_grasped"] == clear
 
 
@@ -80,10 +80,10 @@ def test_the_verdict_names_the_least_success_whatever_level_the_study_asks_for(f
     likely, *others = (each for each in summary.objects if each.grasp)
     for probability, words in ((0.00499, "at least 0.4 %"), (0.9999, "at least 99.9 %")):
         objects = (replace(likely, grasp=replace(likely.grasp, probability=probability)),)
-        assert f"the probability of success is {words}" in say(_verdict(summary.calibration, objects, ()).finding)
-        both = _verdict(summary.calibration, (*objects, *others), ()).finding
+        assert f"the probability of success is {words}" in say(verdict_of(summary.calibration, objects, ()).finding)
+        both = verdict_of(summary.calibration, (*objects, *others), ()).finding
         assert both.probability == min(probability, *(each.grasp.probability for each in others))
-    assert "probability" not in say(_verdict(summary.calibration, (), ()).finding)
+    assert "probability" not in say(verdict_of(summary.calibration, (), ()).finding)
 
 
 @pytest.mark.long

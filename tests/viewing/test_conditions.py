@@ -18,14 +18,14 @@ from er3a.pipeline.messages.vision import say
 from er3a.pipeline.results import LeftOut
 from er3a.pipeline.stages.dynamics.model import NoLimits
 from er3a.pipeline.stages.inverse.model import RankingRows
-from er3a.pipeline.stages.inverse.report import _rule_rows
+from er3a.pipeline.stages.inverse.report import rule_rows
 from er3a.pipeline.stages.programs.model import ProgramMotion, ProgramsResults
 from er3a.pipeline.stages.trajectory.model import PathChecks, TrajectoryResults
 from er3a.pipeline.stages.validation.model import LeftOpen, PartFound
 from er3a.pipeline.stages.vision.model import GraspCounts
 from er3a.pipeline.stages.workspace.entry import BoxTask
 from er3a.pipeline.stages.workspace.model import PlacementSummary, PlaceSummary, StandSummary
-from er3a.pipeline.stages.workspace.tool_capability import _task_summary
+from er3a.pipeline.stages.workspace.tool_capability import task_summary
 from er3a.pipeline.viewing.index import _condition, _passes, _proposed, first_inside
 
 TALLY = CheckTally(24)
@@ -106,7 +106,7 @@ def test_a_verdict_says_what_it_is_not_to_be_taken_for():
 
 def test_an_arm_that_nothing_can_meet_has_infinite_clearance():
     one = (["t"], [0], ["found_arm"], ["clearance"], [np.inf], [1])
-    assert _rule_rows(RankingRows(*map(np.array, one)), ["clearance"])[0][1].startswith("∞")
+    assert rule_rows(RankingRows(*map(np.array, one)), ["clearance"])[0][1].startswith("∞")
 
 
 def test_a_point_enters_a_box_when_a_dense_walk_along_its_polyline_does(random):
@@ -145,7 +145,7 @@ def placed(**stands) -> SimpleNamespace:
         (0.35, 0.0, 0.4), (0.15, 0.2, 0.05), True, "proven", None, "sampled", 1, 1, None, (0,) * 3, (0,) * 3
     )
     stand = [StandSummary("table", 0.1, None, None, "in_the_way", spot)] if stands.get("over") else []
-    task = _task_summary(BoxTask())
+    task = task_summary(BoxTask())
     found = PlacementSummary(None, 20, task, (0.02,) * 3, 45, 1, 1, 1, 1, 0, 1, (spot,), tuple(stand))
     return SimpleNamespace(results=SimpleNamespace(summary=SimpleNamespace(placement=found)))
 

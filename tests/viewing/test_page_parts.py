@@ -12,7 +12,7 @@ import er3a
 from er3a.identifiability.entry_evidence import EntryEvidence
 from er3a.pipeline.results import read_stage
 from er3a.pipeline.stages.registry import STAGES
-from er3a.pipeline.stages.validation.evidence_section import _roundest, table_to_use
+from er3a.pipeline.stages.validation.evidence_section import rounded_within, table_to_use
 from er3a.pipeline.study import load_study
 from er3a.pipeline.viewing.index import write_index
 from er3a.pipeline.viewing.page import Numbering, linked
@@ -67,7 +67,7 @@ def test_the_table_to_use_is_whole_and_as_its_file_gives_it():
 )
 def test_a_value_is_rounded_as_far_as_documents_leave_open(value, interval, shown):
     entry = EntryEvidence("a2", 650.0, "mm", "contradicted", interval, (), (), "article")
-    assert _roundest(value, entry) == shown
+    assert rounded_within(value, entry) == shown
 
 
 def test_the_index_marks_each_entry_of_a_table_as_validation_found_it(small_results, tmp_path):

@@ -16,7 +16,7 @@ from er3a.kinematics.inverse import inverse
 from er3a.kinematics.wrist_partitioned import constants_for_blocks
 from er3a.robots.robot import Robot
 from er3a.workspace.capability import manipulability, map_capability
-from er3a.workspace.dexterous import _arc, dexterous_core
+from er3a.workspace.dexterous import dexterous_core, sectors_in_a_row
 from er3a.workspace.directions import cone_directions, poses, roll_of, tool_rotations
 from er3a.workspace.interval_inverse import GOOD, NEVER, branches, theta_ranges
 from er3a.workspace.orientations import asked_of
@@ -60,7 +60,9 @@ def test_what_holds_for_a_neighbourhood_holds_for_every_pose_in_it(data):
 @pytest.mark.parametrize("first", [-70, 0, 5, 63, 64])
 def test_sectors_in_a_row_are_counted_round_the_turn(first):
     for many in (-1, 0, 1, 37, 63, 64, 65):
-        assert int(_arc(first, many)) == sum(1 << place for place in {(first + k) % 64 for k in range(many)})
+        assert int(sectors_in_a_row(first, many)) == sum(
+            1 << place for place in {(first + k) % 64 for k in range(many)}
+        )
 
 
 def test_a_pose_alone_is_decided(robot, random):

@@ -114,7 +114,7 @@ def three_angles(
     per = 1.0 / (cos_half * cos_half + sin_half * sin_half)
     upper = (cos_half * less_s + sin_half * less_c) * (sin_half * less_c - cos_half * less_s) * per
     lower = (cos_half * sum_s + sin_half * sum_c) * (cos_half * sum_s - sin_half * sum_c) * per
-    least = min(min(upper, lower), tilt)
+    smallest = min(min(upper, lower), tilt)
     upper, lower = max(upper, 0.0), max(lower, 0.0)
     a, d = np.sqrt(upper), np.sqrt(lower)
     per = 1.0 / (upper + lower)
@@ -130,7 +130,7 @@ def three_angles(
     uy, uz = uy * k.cos_12 + xz * k.sin_12, xz * k.cos_12 - uy * k.sin_12
     ux, uy = ux * cos_2 + uy * sin_2, uy * cos_2 - ux * sin_2
     last = arctan2(uy * k.cos_23 - uz * k.sin_23, ux)
-    return arctan2(s, c) - k.zero_1, middle - k.zero_2, last, 1.0 if least > -1e-12 else 0.0, least
+    return arctan2(s, c) - k.zero_1, middle - k.zero_2, last, 1.0 if smallest > -1e-12 else 0.0, smallest
 
 
 SLOTS = 8
@@ -241,9 +241,9 @@ def is_out_of_reach(arm: ArmAngleArm, T: Reals) -> bool:
     k = arm.constants
     W = T[:3, :3] @ np.array(k.wrist_in_tool) + T[:3, 3]
     squared = float(np.sum((W - np.array(k.shoulder)) ** 2)) - k.height**2
-    reach, least = k.upper_arm + k.lower_arm, k.upper_arm - k.lower_arm
+    reach, smallest = k.upper_arm + k.lower_arm, k.upper_arm - k.lower_arm
     slack = OUT_OF_REACH * reach**2
-    return squared > reach**2 + slack or squared < least**2 - slack
+    return squared > reach**2 + slack or squared < smallest**2 - slack
 
 
 def arm_angles_of(arm: ArmAngleArm, q: Reals) -> Reals:
@@ -341,11 +341,11 @@ def _turned_about_line(k: ArmAngleConstants, T: Reals, psi: Reals, start: int, s
 def _elbow(k: ArmAngleConstants, w: Reals, sign: float) -> None:
     """Joint 4 by one root (row 36, NaN if S and W are too far or near), then axis 3 before axis 1 (rows 24-29, with the
     vector beside it) and axis 7 before axis 5 (rows 30-35)."""
-    reach, least = k.upper_arm + k.lower_arm, k.upper_arm - k.lower_arm
+    reach, smallest = k.upper_arm + k.lower_arm, k.upper_arm - k.lower_arm
     for i in range(BLOCK):
         distance = w[37 * BLOCK + i]
         squared = distance * distance - k.height * k.height
-        far, near = reach * reach - squared, squared - least * least
+        far, near = reach * reach - squared, squared - smallest * smallest
         slack = 2.0 * MEETS_M * reach  # what S and W are known to
         valid = (far > -slack) & (near > -slack)
         straight = (abs(far) < slack) | (abs(near) < slack)
@@ -388,10 +388,10 @@ def _elbow(k: ArmAngleConstants, w: Reals, sign: float) -> None:
 def _three(k: SphericalConstants, w: Reals, row: int, sign: float, out: Reals) -> None:
     for i in range(BLOCK):
         z, x = row * BLOCK + i, (row + 3) * BLOCK + i
-        a, b, c, valid, least = three_angles(
+        a, b, c, valid, smallest = three_angles(
             k, w[z], w[z + BLOCK], w[z + 2 * BLOCK], w[x], w[x + BLOCK], w[x + 2 * BLOCK], sign
         )
-        w[38 * BLOCK + i] = 1.0 if abs(least) < NEAR else w[38 * BLOCK + i]
+        w[38 * BLOCK + i] = 1.0 if abs(smallest) < NEAR else w[38 * BLOCK + i]
         one = 1.0 if valid > 0.0 else np.nan
         out[i] = (a - TURN * np.ceil(a * (1.0 / TURN) - 0.5)) * one
         out[BLOCK + i] = (b - TURN * np.ceil(b * (1.0 / TURN) - 0.5)) * one

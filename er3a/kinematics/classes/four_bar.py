@@ -150,9 +150,9 @@ def _gaps(arm: ThreeParallel, T: Reals, q: Reals) -> Reals:
         for shoulder, v in ((0, -root), (1, root)):
             W = np.array([k.cos_lean * wanted - k.sin_lean * p[2], v])
             away, slack = float(np.linalg.norm(W - k.axis_2)), float(np.hypot(*k.rest))
-            reach, least = k.upper_arm + k.forearm, abs(k.upper_arm - k.forearm)
+            reach, smallest = k.upper_arm + k.forearm, abs(k.upper_arm - k.forearm)
             # axis 4 is somewhere on a circle about W
-            most = max(abs(wanted) - across, away - reach - slack, least - slack - away, 1e-12)
+            most = max(abs(wanted) - across, away - reach - slack, smallest - slack - away, 1e-12)
             part = slice(4 * shoulder, 4 * shoulder + 4)
             gap[n, part] = np.where(np.isnan(q[n, part, 0]), most, 0.0)
     return gap
@@ -217,12 +217,12 @@ def _intervals(k: ParallelConstants, W: Reals) -> Reals:
     """Ranges of phi in which axis 4, on its circle about W, is within the reach of joints 2 and 3."""
     away, rest = W - np.array(k.axis_2), np.array(k.rest)
     D, r = float(np.linalg.norm(away)), float(np.linalg.norm(rest))
-    least, most = (k.upper_arm - k.forearm) ** 2, (k.upper_arm + k.forearm) ** 2
+    smallest, most = (k.upper_arm - k.forearm) ** 2, (k.upper_arm + k.forearm) ** 2
     if D * r < 1e-15:
-        inside = least <= D * D + r * r <= most
+        inside = smallest <= D * D + r * r <= most
         return np.array([[-np.pi, np.pi]]) if inside else np.empty((0, 2))
     middle = float(np.arctan2(away[1], away[0]) - np.arctan2(rest[1], rest[0]))
-    low, high = (D * D + r * r - most) / (2 * D * r), (D * D + r * r - least) / (2 * D * r)  # bounds of the cosine
+    low, high = (D * D + r * r - most) / (2 * D * r), (D * D + r * r - smallest) / (2 * D * r)  # bounds of the cosine
     if low > 1 or high < -1:
         return np.empty((0, 2))
     near, far = float(np.arccos(min(high, 1.0))), float(np.arccos(max(low, -1.0)))

@@ -277,8 +277,8 @@ def _wrist_and_elbow(k: ParallelConstants, pose: Reals, side: Reals, sign: float
         x = side[2 * BLOCK + i] - (c * k.rest[0] - s * k.rest[1]) - k.axis_2[0]
         y = side[3 * BLOCK + i] - (s * k.rest[0] + c * k.rest[1]) - k.axis_2[1]
         squared = x * x + y * y
-        reach, least = k.upper_arm + k.forearm, k.upper_arm - k.forearm
-        far, near = (reach * reach - squared), (squared - least * least)
+        reach, smallest = k.upper_arm + k.forearm, k.upper_arm - k.forearm
+        far, near = (reach * reach - squared), (squared - smallest * smallest)
         edge = k.near_m * reach * NEAR
         mark = mark | (abs(far) < edge) | (abs(near) < edge) | (squared < k.near_m * k.near_m)
         marked = mark & (side[BLOCK + i] > 0.0)

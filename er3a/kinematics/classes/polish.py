@@ -131,16 +131,16 @@ def newton(
     links: Reals, sliding: Flags, T: Reals, q: Reals, most: int, w: Reals, J: Reals, dq: Reals, columns: Integers
 ) -> tuple[float, float]:
     """Move q to a root; returns the residual there and the last pivot's ratio at the last step (1 if none was made)."""
-    pivot, least = 1.0, np.inf
+    pivot, smallest = 1.0, np.inf
     best = dq[6:12]
     for _ in range(most):
         error = residual_and_jacobian(links, sliding, T, q, w, J)
-        if error >= least and least < 1e-8:  # rounding is reached
+        if error >= smallest and smallest < 1e-8:  # rounding is reached
             for k in range(6):
                 q[k] = best[k]
-            return least, pivot
-        if error < least:
-            least = error
+            return smallest, pivot
+        if error < smallest:
+            smallest = error
             for k in range(6):
                 best[k] = q[k]
         if error < 2e-16:
@@ -158,10 +158,10 @@ def newton(
         if size < 1e-9 and error < 1e-8 and pivot > 1e-5:  # the next error is its square
             return size * size + 2e-16, pivot
     error = residual_and_jacobian(links, sliding, T, q, w, J)
-    if error > least:
+    if error > smallest:
         for k in range(6):
             q[k] = best[k]
-        return least, pivot
+        return smallest, pivot
     return error, pivot
 
 

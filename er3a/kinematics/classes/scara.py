@@ -136,8 +136,8 @@ def solve_gantry(arm: Gantry, T: Reals) -> tuple[Reals, Flags]:
     Where slides don't span space, only the solution with the smallest shifts is returned.
     """
     turn = np.ascontiguousarray(arm.frame @ T[:, :3, :3] @ arm.behind)
-    angles, least = np.empty((len(T), SLOTS, 3)), np.empty(len(T))
-    wrist_angles(arm.angles, turn, angles, least)
+    angles, smallest = np.empty((len(T), SLOTS, 3)), np.empty(len(T))
+    wrist_angles(arm.angles, turn, angles, smallest)
     q = np.zeros((len(T), SLOTS, 6))
     q[:, :, ~arm.sliding] = wrap_to_pi(angles)
     start = poses_of(arm.links, q, arm.sliding)[..., :3, 3]
@@ -154,11 +154,11 @@ def solve_gantry(arm: Gantry, T: Reals) -> tuple[Reals, Flags]:
             shifts[n, slot] = np.nan
     q[:, :, slides] = shifts
     q[np.isnan(q).any(axis=2)] = np.nan
-    return q, (np.abs(least) < NEAR) | ~spans.all(axis=1)
+    return q, (np.abs(smallest) < NEAR) | ~spans.all(axis=1)
 
 
 @kernel
-def wrist_angles(k: SphericalConstants, turn: Reals, angles: Reals, least: Reals) -> None:
+def wrist_angles(k: SphericalConstants, turn: Reals, angles: Reals, smallest: Reals) -> None:
     for n in range(turn.shape[0]):
         R = turn[n]
         for slot in range(SLOTS):
@@ -166,4 +166,4 @@ def wrist_angles(k: SphericalConstants, turn: Reals, angles: Reals, least: Reals
             a, b, c, valid, near = three_angles(k, R[0, 2], R[1, 2], R[2, 2], R[0, 0], R[1, 0], R[2, 0], sign)
             one = 1.0 if valid > 0.0 else np.nan
             angles[n, slot, 0], angles[n, slot, 1], angles[n, slot, 2] = a * one, b * one, c * one
-            least[n] = near
+            smallest[n] = near

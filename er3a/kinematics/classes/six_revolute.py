@@ -219,8 +219,8 @@ def rows_by_reading(
         invert_rigid(pose, rest)
         multiply_rigid(rest, links[0], pose_link)
         multiply_rigid(links[6], pose_link, rest)
-        verdicts[i], count[n], least = _by_reading(reading, links, pose, rest, m, q[n], count[n])
-        moving[n] |= least < STUCK
+        verdicts[i], count[n], smallest = _by_reading(reading, links, pose, rest, m, q[n], count[n])
+        moving[n] |= smallest < STUCK
 
 
 @kernel
@@ -254,13 +254,13 @@ def followed_back(
 def in_order(q: Reals, count: Integers) -> None:
     for n in range(q.shape[0]):
         for r in range(count[n]):
-            least = r
+            smallest = r
             for other in range(r + 1, count[n]):
-                if q[n, other, 0] < q[n, least, 0]:
-                    least = other
-            if least != r:
+                if q[n, other, 0] < q[n, smallest, 0]:
+                    smallest = other
+            if smallest != r:
                 for k in range(6):
-                    q[n, r, k], q[n, least, k] = q[n, least, k], q[n, r, k]
+                    q[n, r, k], q[n, smallest, k] = q[n, smallest, k], q[n, r, k]
 
 
 @inner_kernel
@@ -279,7 +279,7 @@ def _by_reading(
     zeros = hidden_angles(e, level, m)
     if zeros < 0:
         return UNCERTAIN, rows, np.inf
-    earlier, distinct, least = rows, 0, np.inf
+    earlier, distinct, smallest = rows, 0, np.inf
     for z in range(zeros):
         solved, candidates = False, 0
         again = False
@@ -295,7 +295,7 @@ def _by_reading(
                     m.candidate[reading.joint[i]] = reading.sense * m.x[k, i]
                 residual, pivot = newton(links, m.sliding, pose, m.candidate, 8, m.frames, m.J, m.dq, m.columns)
                 if residual < SOLVES:
-                    least = min(least, pivot)
+                    smallest = min(smallest, pivot)
                     away = m.candidate[reading.joint[2]] * reading.sense - m.zeros[z, 0]
                     away -= 2 * np.pi * np.round(away / (2 * np.pi))
                     solved = solved or abs(away) < 1e-2
@@ -311,7 +311,7 @@ def _by_reading(
     # Complex zeros come in pairs, and each real zero has a solution of its own.
     if rows % 2 == 1 or (earlier == 0 and rows < distinct):
         verdict = UNCERTAIN
-    return verdict, rows, least
+    return verdict, rows, smallest
 
 
 @kernel

@@ -122,13 +122,13 @@ def solve_slide_and_wrist(arm: SlideAndWrist, otherwise: Callable[[Reals], RowsF
     x[:, :, :3] = front[n, place, None]
     turned = poses_of(arm.links[:4], x[:, 0, :3], arm.sliding[:3])[:, :3, :3]
     zero = poses_of(arm.links[:4], np.zeros(3))[:3, :3]
-    least = np.empty(len(n))
+    smallest = np.empty(len(n))
     turn = arm.frame @ zero @ turned.transpose(0, 2, 1) @ scaled[n, :3, :3] @ arm.behind
-    wrist_angles(arm.wrist, np.ascontiguousarray(turn), x[:, :, 3:], least)
+    wrist_angles(arm.wrist, np.ascontiguousarray(turn), x[:, :, 3:], smallest)
     x[..., ~arm.sliding] = wrap_to_pi(x[..., ~arm.sliding])
     solved = np.isfinite(x[..., 3])
     off = np.abs(poses_of(arm.links, x, arm.sliding) - scaled[n, None]).max(axis=(2, 3))
-    doubt[n[(np.abs(least) < WRIST) | (off > POSE).any(axis=1)]] = True
+    doubt[n[(np.abs(smallest) < WRIST) | (off > POSE).any(axis=1)]] = True
     for row, root in np.argwhere(solved):
         q[n[row], count[n[row]]] = x[row, root]
         count[n[row]] += 1

@@ -16,7 +16,7 @@ Message = tuple[int, str, Any, list[str]]
 def extract(fileobj: Any, keywords: Any, comment_tags: Any, options: Any) -> Iterator[Message]:
     """Babel's extraction method for this package: ``tr`` and ``N_``, titles, and tables of ``texts`` by key.
 
-    The English of a text with a key becomes a comment beside its entry, for who translates.
+    The English of a text with a key becomes a comment beside its entry, for translators.
     """
     yield from extract_python(fileobj, {"tr": None, "N_": None}, comment_tags, options)  # type: ignore[misc]
     fileobj.seek(0)

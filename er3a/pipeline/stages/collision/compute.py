@@ -17,7 +17,6 @@ from er3a.kinematics.solutions import MANY_TARGETS
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import stated
 from er3a.pipeline.results import Figure, LeftOut, Verdict
-from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.collision import model
 from er3a.pipeline.stages.collision.entry import CollisionSettings
 from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_without_tool
@@ -133,8 +132,9 @@ def compute(study: Study, name: str) -> model.CollisionResults:
     undecided = int((matrix.state == "undecided").sum())
     home_found = None if at_home is None else model.HomeCollides(at_home, float(-least[0] * 1000), space.whole.value)
     closest = (*at_targets, *on_paths)
-    margin = study.section(TrajectorySettings).assumed_margin_mm / 1000
-    assumed = shapes_assumed(robot, margin, {each.name: each.clearance_mm / 1000 for each in closest})
+    assumed = shapes_assumed(
+        robot, study.assumed_margin(name), {each.name: each.clearance_mm / 1000 for each in closest}
+    )
     joined = places_found.joined
     free = model.FreeSpace(
         space.whole.value, places_found.reached, places_found.clear, joined, undecided, assumed is not None

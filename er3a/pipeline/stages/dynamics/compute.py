@@ -359,7 +359,7 @@ def _timings(
         kinematic = fastest(nodes, arm.limits).duration
         for _ in range(HALVINGS + 1):
             shortest = fastest_under_torques(arm.model, joints(t), arm.limits.speed, peak)
-            found.append(model.ShortestTime(len(t), shortest.timed.duration, shortest.least))
+            found.append(model.ShortestTime(len(t), shortest.timed.duration, shortest.lower_bound))
             t = np.sort(np.concatenate([t, (t[1:] + t[:-1]) / 2]))
         return tuple(found), kinematic, None
     except TimingError as error:
@@ -448,7 +448,7 @@ NO_FIGURE = Figure("holding_torque", None, "")
 def compute(study: Study, name: str) -> model.DynamicsResults:
     """Compute the dynamics stage of a robot."""
     settings = study.section(DynamicsSettings)
-    given, margin = study.robot(name), study.section(TrajectorySettings).assumed_margin_mm / 1000
+    given, margin = study.robot(name), study.assumed_margin(name)
     robot = with_estimates(given, settings.capsule_density_kg_m3)
     loads = study.loads(name)
     load, load_grade = load_of(loads), _worst_grade([each.grade for each in loads])

@@ -375,8 +375,9 @@ def compute(study: Study, name: str) -> model.InverseResults:
     targets = load_targets(study.entry(name).targets, robot)
     settings, motion = study.section(InverseSettings), study.section(TrajectorySettings)
     scene = study.scene(name, STAGE_NAME)
-    assumed = shapes_assumed(robot, motion.assumed_margin_mm / 1000, {})
-    clearance = (motion.assumed_margin_mm if assumed else motion.penetration_tolerance_mm) / 1000
+    margin = study.assumed_margin(name)
+    assumed = shapes_assumed(robot, margin, {})
+    clearance = margin if assumed else motion.penetration_tolerance_mm / 1000
     many, advised, solved = len(targets) > MANY_TARGETS, 0, list[SolvedTarget]()
     with shown_progress(len(targets), f"{name}: targets solved") as advance:
         for number, target in enumerate(targets):
@@ -392,7 +393,7 @@ def compute(study: Study, name: str) -> model.InverseResults:
     chosen = meant(robot, np.reshape([each.chosen_deg for each in asked], (-1, robot.joints)))
     T_of = {target.name: target.T for target in targets}
     least = bodies_of(robot, scene).min_distance(chosen)[0].tolist()
-    rests_on = shapes_assumed(robot, motion.assumed_margin_mm / 1000, {each.name: d for each, d in zip(asked, least)})
+    rests_on = shapes_assumed(robot, margin, {each.name: d for each, d in zip(asked, least)})
     complete = not isinstance(arm_solver(robot).chain, Unsolved)
     random = np.random.default_rng([study.seed, ROUND_TRIP_STREAM])
     wanted = settings.round_trips if has_branches(robot) else min(settings.round_trips, MAX_BY_CLASS)

@@ -438,7 +438,7 @@ def _section(
         families=_self_motions(robot, target.families),
         unsolved=joined(listed(target.unsolved)),
         rows=_branch_rows(rows, branches),
-        rules=_rule_rows(results.rankings.take(results.rankings.target == target.name), rules),
+        rules=rule_rows(results.rankings.take(results.rankings.target == target.name), rules),
         residual_mm=rows.position_residual_mm.max() if len(rows) else None,
         residual_deg=rows.orientation_residual_deg.max() if len(rows) else None,
     )
@@ -459,7 +459,7 @@ def _rule_heading(rule: str) -> str:
     return bracketed(_rule(rule), "" if unit == "1" else tr(unit)) + ">"
 
 
-def _rule_rows(ranked: model.RankingRows, rules: list[str]) -> list[list[str]]:
+def rule_rows(ranked: model.RankingRows, rules: list[str]) -> list[list[str]]:
     """One row for each branch: the measure of each rule, with its place; a dash for a rule that this target lacks."""
     rows, collides = [], tr("collides")
     for branch in np.unique(ranked.branch):

@@ -49,7 +49,7 @@ def compute(study: Study, name: str) -> model.ProgramsResults:
     file = study.entry(name).programs
     listed = load_programs(file) if file else ProgramsFile(kind="programs")
     scene = study.scene(name, "trajectory")
-    options = replace(_options(study, listed, robot), scene=scene)
+    options = replace(_options(study, name, listed, robot), scene=scene)
     summaries: list[model.ProgramSummary] = []
     lines: list[model.Lines] = []
     instructions: list[model.Instructions] = []
@@ -124,7 +124,7 @@ def _loads(program: model.ProgramSummary) -> Iterator[str]:
             )
 
 
-def _options(study: Study, listed: ProgramsFile, robot: Robot) -> CheckOptions:
+def _options(study: Study, name: str, listed: ProgramsFile, robot: Robot) -> CheckOptions:
     paths, own = study.section(TrajectorySettings), study.section(ProgramsSettings)
     return CheckOptions(
         frames=listed.transforms(),
@@ -132,7 +132,7 @@ def _options(study: Study, listed: ProgramsFile, robot: Robot) -> CheckOptions:
         assumed_speed=assumed_speeds(robot, paths),
         acceleration_time=paths.acceleration_time_s,
         penetration_tolerance=paths.penetration_tolerance_mm / 1000,
-        assumed_margin=paths.assumed_margin_mm / 1000,
+        assumed_margin=study.assumed_margin(name),
         assumed=AssumedRates(
             own.tool_speed_mm_s / 1000, own.tool_acceleration_mm_s2 / 1000, own.joint_speed_percent / 100
         ),

@@ -371,7 +371,7 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
     surroundings = judgement.Surroundings(Bodies(robot, scene), settings.penetration_tolerance_mm / 1000)
     only = None if settings.avoidance == "compare" else settings.avoidance
     planning = planning_of(robot, settings, surroundings.bodies, study.seed)
-    assumed_margin = settings.assumed_margin_mm / 1000
+    assumed_margin = study.assumed_margin(name)
     margin = (assumed_margin if arm_shapes(robot).assumed else surroundings.tolerance) + ROUNDED
     avoidance = AvoidanceTask(robot, near, limits, only, surroundings, planning, margin)
     tables: list[model.PathChecks] = []
@@ -400,7 +400,7 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
         path = replace(path_summary(robot, motion, found, along, avoided, limits), clear_until=last)
         paths.append(replace(path, sound_end=judgement.sound_end(path, tables[-1], used)))
         repair = avoided.rows.take(avoided.rows.strategy == (avoided.chosen or ""))
-        close = near_assumed_shapes(robot, each.name, path.clearance, settings.assumed_margin_mm)
+        close = near_assumed_shapes(robot, each.name, path.clearance, assumed_margin)
         asked = settings.programs, settings.write_unsafe
         made = program_files(robot, motion, path.verdict, *asked, near=close, repaired=repair, speed=limits.speed)
         programs.append(made)

@@ -58,7 +58,7 @@ def record(study: Study, stored: Stored[TrajectoryResults], output: Path) -> Non
         stored,
         output,
         NOTE,
-        runs=[run for path in results.summary.paths for run in _runs(robot, results, path)],
+        runs=[run for path in results.summary.paths for run in runs_of_path(robot, results, path)],
         curves=CURVES,
         scene=study.scene(stored.robot, stored.stage),
         views={"Arm and path": ["**"]},
@@ -67,7 +67,7 @@ def record(study: Study, stored: Stored[TrajectoryResults], output: Path) -> Non
     )
 
 
-def _runs(robot: Robot, results: TrajectoryResults, path: PathSummary) -> Iterator[Run]:
+def runs_of_path(robot: Robot, results: TrajectoryResults, path: PathSummary) -> Iterator[Run]:
     """The path as programmed and, if there is such a motion, repaired."""
     rows: PathChecks = results.checks.take(results.checks.path == path.name)
     status, verdict = shown_verdict(path, near_assumed(path, results.summary))

@@ -76,12 +76,12 @@ def written(
 
 
 def near_assumed_shapes(
-    robot: Robot, name: str, clearance: MinClearance | None, margin_mm: float
+    robot: Robot, name: str, clearance: MinClearance | None, margin: float
 ) -> tuple[WriteFinding, ...]:
-    """That a path is clear of assumed shapes by less than these may be wrong by; empty where that is not so."""
-    if clearance is None or not (shapes := shapes_assumed(robot, margin_mm / 1000, {name: clearance.least_mm / 1000})):
+    """The finding that a path passes assumed shapes within ``margin`` (m) of them; empty if it does not."""
+    if clearance is None or not (shapes := shapes_assumed(robot, margin, {name: clearance.least_mm / 1000})):
         return ()
-    return (WrittenNearAssumed(name, clearance.least_mm, margin_mm),) if shapes.near else ()
+    return (WrittenNearAssumed(name, clearance.least_mm, 1000 * margin),) if shapes.near else ()
 
 
 def repair_name(path: str) -> str:

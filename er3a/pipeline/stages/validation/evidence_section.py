@@ -268,9 +268,9 @@ def _other_value(found: OtherTableFound, each: EntryEvidence) -> float:
     """An entry's value in the other table, as rounded as its evidence allows."""
     kind = column_of(each.entry)
     if kind not in OTHER_COLUMNS:
-        return _roundest(_limit(each), each)
+        return rounded_within(_limit(each), each)
     joint = int(each.entry.removeprefix(kind))
-    return _roundest(getattr(found.table, kind)[joint - 1] * IN_UNIT[kind], each)
+    return rounded_within(getattr(found.table, kind)[joint - 1] * IN_UNIT[kind], each)
 
 
 def _gives(each: EntryEvidence, evidence: TableEvidence) -> str:
@@ -302,7 +302,7 @@ def _limit(each: EntryEvidence) -> float:
     return each.value or 0.0
 
 
-def _roundest(value: float, each: EntryEvidence) -> float:
+def rounded_within(value: float, each: EntryEvidence) -> float:
     """A value with as few decimals as the entry's evidence allows; with three where it leaves nothing open."""
     low, high = each.interval or (value, value)
     if each.status != "contradicted" and abs(value - (each.value or 0.0)) < DIFFERS:

@@ -363,13 +363,13 @@ def compute(study: Study, name: str) -> model.VisionResults:
         limits = (limits_of(robot, motions), study.seed)
         planned = _planned(robot, task_file, found, scene, (settings, picture), limits)
     objects = tuple(_object(entry, places[entry.name], plan, error) for entry, plan, error in planned)
-    shapes = _shapes(robot, objects, motions)
+    shapes = _shapes(robot, objects, study.assumed_margin(name))
     near = shapes.near if shapes else ()
-    judged = Verdict[Found]("fail", doubt) if doubt else _verdict(calibration, objects, near)
+    judged = Verdict[Found]("fail", doubt) if doubt else verdict_of(calibration, objects, near)
     bodies = bodies_of(robot, scene)
     summary = model.VisionSummary(
         verdict=judged.without(bodies.unexamined).resting_on(shapes),
-        figures=_figures(calibration, objects, near),
+        figures=figures_of(calibration, objects, near),
         title=task_file.title,
         scene=title,
         least_success=settings.least_success,
@@ -449,11 +449,11 @@ def _left_out(
     yield LeftOut("gripped_parts")
 
 
-def _shapes(robot: Robot, objects: tuple[model.ObjectResult, ...], motions: TrajectorySettings) -> ShapesAssumed | None:
-    """What assumed shapes of the arm leave open of the grasps; None where none was tried."""
+def _shapes(robot: Robot, objects: tuple[model.ObjectResult, ...], margin: float) -> ShapesAssumed | None:
+    """What assumed shapes, ``margin`` (m) around them, leave open of the grasps; None where no grasp was tried."""
     clear = {each.name: each.grasp.clearance_mm for each in objects if each.grasp}
     near = {name: None if least is None else least / 1000 for name, least in clear.items()}
-    return shapes_assumed(robot, motions.assumed_margin_mm / 1000, near) if objects else None
+    return shapes_assumed(robot, margin, near) if objects else None
 
 
 def _camera_at(robot: Robot, found: HandEye, picture: Reals | None) -> Reals:
@@ -561,7 +561,7 @@ def _grasp(chosen: ChosenGrasp) -> model.GraspResult:
     )
 
 
-def _verdict(
+def verdict_of(
     calibration: model.CalibrationResult, objects: tuple[model.ObjectResult, ...], near: tuple[str, ...]
 ) -> Verdict[Found]:
     """``near``: objects whose grasps come within the margin of assumed shapes, which are not counted as grasped."""
@@ -586,7 +586,7 @@ def _least_success(objects: Sequence[model.ObjectResult]) -> float | None:
     return min((each.grasp.probability for each in objects if each.grasp), default=None)
 
 
-def _figures(
+def figures_of(
     calibration: model.CalibrationResult, objects: tuple[model.ObjectResult, ...], near: tuple[str, ...]
 ) -> tuple[Figure, ...]:
     asked = [each for each in objects if each.expect in (None, "grasped")]

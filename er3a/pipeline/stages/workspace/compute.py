@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from er3a.collision.along import bodies_of
+from er3a.collision.pairs import ShapesAssumed
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import shapes_assumed
 from er3a.files.reference_sets import check_reference_file, reference_folder
@@ -169,14 +170,14 @@ def compute(study: Study, name: str, parts: Sequence[Path] | None = None) -> mod
     if not proven.settles:
         voids += sampled_only(in_cloud, grid, shoulder, voids)
     scene = study.scene(name, "capability")
-    assumed = shapes_assumed(robot, motion.assumed_margin_mm / 1000, {})
-    margin = motion.assumed_margin_mm if assumed else motion.penetration_tolerance_mm
+    assumed = shapes_assumed(robot, study.assumed_margin(name), {})
+    margin = study.assumed_margin(name) if assumed else motion.penetration_tolerance_mm / 1000
     asked = study.section(CapabilitySettings)
-    tool = tool_capability(robot, asked, grid.cell, scene, study.seed, margin=margin / 1000, proven=proven)
+    tool = tool_capability(robot, asked, grid.cell, scene, study.seed, margin=margin, proven=proven)
     vertices, triangles = model.void_surfaces(voids)
     corners = model.HullVertices(hull.vertices, shown(robot, samples.q_extreme[hull.of]))
     return model.WorkspaceResults(
-        summary=_summary(study, robot, samples, proven, voids, tool, scene=scene),
+        summary=_summary(study, robot, samples, proven, voids, tool, scene=scene, assumed=assumed),
         cells=model.cells(tally, void_numbers(in_cloud, tally.counts, samples.inside)),
         section=model.SectionCells.of(section_cells(tally, grid)),
         side_view=model.SideViewCells.stacked(map(model.SideViewCells.of, side_views(robot, tally, grid, draw))),
@@ -218,6 +219,7 @@ def _summary(
     tool: ToolCapability,
     *,
     scene: Scene | None,
+    assumed: ShapesAssumed | None,
 ) -> model.WorkspaceSummary:
     settings, grid, tally, hull = study.section(WorkspaceSettings), samples.grid, samples.tally, samples.hull
     touched, unseen = tally.counts > 0, unseen_cells(tally.counts)
@@ -233,13 +235,12 @@ def _summary(
         judged = replace(judged, finding=replace(judged.finding, single_changes=tried))
     if surface:
         judged = Verdict("caution", model.OnSurface(surface))
-    margin = study.section(TrajectorySettings).assumed_margin_mm / 1000
-    assumed = None if isinstance(tool.capability, model.CapabilityMissing) else shapes_assumed(robot, margin, {})
+    examined = not isinstance(tool.capability, model.CapabilityMissing)
     guess = proven.estimate
     volume = model.Volume(lower, upper, guess.value, (guess.low, guess.high))
     reach = search_reach(robot, grid, samples.q_kept)
     return model.WorkspaceSummary(
-        verdict=judged.without(tool.unexamined).resting_on(assumed),
+        verdict=judged.without(tool.unexamined).resting_on(assumed if examined else None),
         figures=_figures(reach, voids, volume, hull, settings.samples, surface),
         samples=settings.samples,
         sampling=settings.sampling,

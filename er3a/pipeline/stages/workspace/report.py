@@ -183,7 +183,7 @@ def _section_caption(summary: model.WorkspaceSummary, drawn: bool) -> str:
 def _top_caption(robot: Robot) -> str:
     if robot.slides[0]:
         return tr("Joint 1 slides: the view from above shows how far the samples reach along it and beside it.")
-    if robot.upper[0] - robot.lower[0] >= 2 * np.pi - 1e-9:
+    if workspace_figures.turns_fully(robot):
         return tr("Density depends only on the distance from axis 1, because joint 1 makes a full turn.")
     return tr(
         "In the dead zone behind the robot, between the limits of joint 1, the tool point gets only by leaning "

@@ -258,10 +258,10 @@ def _placed(
     asked = plan.asked
     if not asked.in_cone(np.zeros((1, 3)), task.axis, task.half_angle, task.step).shape[1]:
         return model.ToolPointsElsewhere(
-            _task_summary(settings.placement), model.triple(asked.tool[:, 2])
+            task_summary(settings.placement), model.triple(asked.tool[:, 2])
         ), model.BoxPlaces.empty()
     if plan.lattice is None:
-        return model.PlacementTooLong(_task_summary(settings.placement)), model.BoxPlaces.empty()
+        return model.PlacementTooLong(task_summary(settings.placement)), model.BoxPlaces.empty()
     within = narrowed(robot, task.margin)
     bodies, free = Bodies(robot, scene), partial(Bodies(within, scene).free, margin=margin)
     placement = find_places(
@@ -396,7 +396,7 @@ def _task(asked: BoxTask) -> Task:
     )
 
 
-def _task_summary(asked: BoxTask) -> model.TaskSummary:
+def task_summary(asked: BoxTask) -> model.TaskSummary:
     box, direction = model.triple(asked.box_mm), model.triple(asked.tool_direction)
     return stated(model.TaskSummary, asked, box_mm=box, tool_direction=direction)
 
@@ -409,7 +409,7 @@ def _placement_summary(
     return model.PlacementSummary(
         scene=scene.title if scene else None,
         margin_mm=1000 * margin,
-        task=_task_summary(asked),
+        task=task_summary(asked),
         spacing_m=model.triple(placement.field.spacing),
         directions=len(cone_directions(task.axis, task.half_angle, task.step)),
         points_serving=int((placement.field.least_any > NO).sum()),

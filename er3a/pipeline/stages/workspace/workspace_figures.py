@@ -32,7 +32,12 @@ from er3a.robots.robot import Robot
 
 DENSITY = "YlGnBu"
 LIMIT = REFERENCE
-_FULL_TURN = 2 * np.pi - 1e-9
+FULL_TURN = 2 * np.pi - 1e-9
+
+
+def turns_fully(robot: Robot) -> bool:
+    """Whether joint 1 makes a full turn, so that the view from above has no dead zone; False if it slides."""
+    return not robot.slides[0] and bool(robot.continuous[0] or robot.upper[0] - robot.lower[0] >= FULL_TURN)
 
 
 class CellMap:
@@ -69,7 +74,7 @@ def top_view(robot: Robot, results: model.WorkspaceResults) -> Figure:
     if robot.slides[0]:
         lower, upper = (fixed(limit, 0) for limit in 1000 * np.array([robot.lower[0], robot.upper[0]]))
         title = tr("From above: joint 1 slides from {lower} to {upper} mm", lower=lower, upper=upper)
-    elif robot.upper[0] - robot.lower[0] < _FULL_TURN and not robot.continuous[0]:
+    elif not turns_fully(robot):
         lower, upper = (fixed(limit, 0) for limit in np.degrees([robot.lower[0], robot.upper[0]]))
         title = tr("From above: joint 1 turns from {lower} to {upper} deg", lower=lower, upper=upper)
         size = max(np.ptp(cells.edges(0)), np.ptp(cells.edges(1))) / 2
