@@ -269,7 +269,7 @@ def _jacobian(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links
         axes = _fill_start(rows, links[0])
         for k in range(joints):
             # Until the tool point is known, the linear rows hold a point on the axis.
-            _keep_axis(rows, axes[1], axes[3] * direction[k], columns[k])
+            _keep_axis(rows, axes, direction[k], columns[k])
             far = False
             if sliding[k]:
                 _slide_rows(q, direction[k], start, k, rows, axes)
@@ -296,13 +296,13 @@ def _fill_start(rows: Reals, link: Reals) -> Axes:
 
 
 @inner_kernel
-def _keep_axis(rows: Reals, to_z: int, sign: float, column: Reals) -> None:
+def _keep_axis(rows: Reals, axes: Axes, sign: float, column: Reals) -> None:
     """A point on the joint's axis, and the axis in the sense of the manufacturer's angle."""
     for r in range(3):
-        zs = rows[(4 * r + to_z) * BLOCK : (4 * r + to_z + 1) * BLOCK]
+        zs = rows[(4 * r + axes[1]) * BLOCK : (4 * r + axes[1] + 1) * BLOCK]
         for i in range(BLOCK):
             column[r * BLOCK + i] = rows[(4 * r + 3) * BLOCK + i]
-            column[(3 + r) * BLOCK + i] = zs[i] * sign
+            column[(3 + r) * BLOCK + i] = (axes[3] * zs[i] + 0.0) * sign
 
 
 @kernel
