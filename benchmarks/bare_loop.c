@@ -1,4 +1,5 @@
-/* Forward kinematics of many poses, one after another: the arithmetic of er3a/kinematics/forward.py and fast_math.py. */
+/* Forward kinematics of many poses, one after another: the arithmetic of er3a/kinematics/forward.py and fast_math.py,
+   right angles between axes multiplied in full. */
 #include <stddef.h>
 #include <math.h>
 static inline void cs(double angle, double *co, double *si){

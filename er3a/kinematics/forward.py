@@ -17,6 +17,7 @@ from er3a.numerics.jit import inner_kernel, kernel
 from er3a.robots.robot import Robot
 
 Row = tuple[float, float, float, float]
+Axes = tuple[int, int, float, float]  # the columns in scratch memory that hold y and z, and their signs there
 
 BLOCK = 64
 _COS, _SIN = 12, 13  # rows of scratch memory after the 3 x 4 entries of a block of poses
@@ -154,68 +155,93 @@ def write_rows(x: Row, y: Row, z: Row, out: Reals) -> None:
 
 
 @inner_kernel
-def _cos_sin_rows(q: Reals, direction: Reals, offset: Reals, start: int, k: int, rows: Reals) -> None:
-    """Cosines and sines of joint ``k`` for a block, as rows 12 and 13; poses past the end repeat the last."""
-    sign, zero, far = direction[k], offset[k], False
-    for i in range(BLOCK):
-        rows[_COS * BLOCK + i] = q[min(start + i, q.shape[0] - 1), k]
+def _cos_sin_rows(q: Reals, sign: float, zero: float, start: int, k: int, of_y: float, rows: Reals) -> bool:
+    """Rows 12 and 13: cosines of joint ``k`` for a block, and sines times y's sign; whether one is NaN or far off."""
+    count, far = min(BLOCK, q.shape[0] - start), False
+    for i in range(count):
+        rows[_COS * BLOCK + i] = q[start + i, k]
     for i in range(BLOCK):
         angle = sign * rows[_COS * BLOCK + i] + zero
         c, s = cos_sin(angle)
-        rows[_COS * BLOCK + i], rows[_SIN * BLOCK + i] = c, s
-        far = far | (abs(angle) > LARGEST_ANGLE)
+        rows[_COS * BLOCK + i], rows[_SIN * BLOCK + i] = c, of_y * s
+        far = far | (not abs(angle) <= LARGEST_ANGLE)
     if far:
-        for i in range(BLOCK):
-            angle = sign * q[min(start + i, q.shape[0] - 1), k] + zero
-            rows[_COS * BLOCK + i], rows[_SIN * BLOCK + i] = np.cos(angle), np.sin(angle)
+        for i in range(count):
+            angle = sign * q[start + i, k] + zero
+            if not abs(angle) <= LARGEST_ANGLE:
+                rows[_COS * BLOCK + i], rows[_SIN * BLOCK + i] = np.cos(angle), of_y * np.sin(angle)
+    return far
 
 
 @inner_kernel
-def _slide_rows(q: Reals, sign: float, start: int, k: int, rows: Reals) -> None:
+def _slide_rows(q: Reals, sign: float, start: int, k: int, rows: Reals, axes: Axes) -> None:
     """Shift a block of transforms along their z axes by joint ``k``, and leave no turn in rows 12 and 13."""
-    for i in range(BLOCK):
-        along = sign * q[min(start + i, q.shape[0] - 1), k]
+    for i in range(min(BLOCK, q.shape[0] - start)):
+        along = sign * q[start + i, k] * axes[3]
         for r in range(3):
-            rows[(4 * r + 3) * BLOCK + i] += along * rows[(4 * r + 2) * BLOCK + i]
+            rows[(4 * r + 3) * BLOCK + i] += along * rows[(4 * r + axes[1]) * BLOCK + i]
+    for i in range(BLOCK):
         rows[_COS * BLOCK + i], rows[_SIN * BLOCK + i] = 1.0, 0.0
 
 
 @kernel
 def _forward(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links: Reals, out: Reals) -> None:
-    rows = np.empty((_SIN + 1) * BLOCK)
+    rows = np.zeros((_SIN + 1) * BLOCK)
     for start in range(0, q.shape[0], BLOCK):
-        _fill_start(rows, links[0])
+        axes = _fill_start(rows, links[0])
         for k in range(links.shape[0] - 1):
+            far = False
             if sliding[k]:  # here, not in a kernel of its own, through which each pose took 12 % longer
-                _slide_rows(q, direction[k], start, k, rows)
+                _slide_rows(q, direction[k], start, k, rows, axes)
             else:
-                _cos_sin_rows(q, direction, start_at, start, k, rows)
-            _turn_and_step(rows, links[k + 1])
+                far = _cos_sin_rows(q, direction[k], start_at[k], start, k, axes[2], rows)
+            axes = _turn_and_step(rows, links[k + 1], axes, far)
+        ys, zs = rows[axes[0] * BLOCK :], rows[axes[1] * BLOCK :]
         for i in range(min(BLOCK, q.shape[0] - start)):
             for r in range(3):
-                for c in range(4):
-                    out[start + i, r, c] = rows[(4 * r + c) * BLOCK + i]
+                # Plus 0.0: a zero is positive, as it would be among the sums that were left out.
+                out[start + i, r, 0] = rows[4 * r * BLOCK + i] + 0.0
+                out[start + i, r, 1] = axes[2] * ys[4 * r * BLOCK + i] + 0.0
+                out[start + i, r, 2] = axes[3] * zs[4 * r * BLOCK + i] + 0.0
+                out[start + i, r, 3] = rows[(4 * r + 3) * BLOCK + i]
             out[start + i, 3, 0], out[start + i, 3, 1], out[start + i, 3, 2] = 0.0, 0.0, 0.0
             out[start + i, 3, 3] = 1.0
 
 
 @inner_kernel
-def _turn_and_step(rows: Reals, link: Reals) -> None:
-    """Multiply a block of transforms by Rz of the block's cosines and sines and by a constant transform."""
+def _turn_and_step(rows: Reals, link: Reals, axes: Axes, dense: bool) -> Axes:
+    """Multiply a block of transforms by Rz of the block's cosines and sines and by a constant transform.
+
+    Right angles about x, which nearly all tables have, multiply nothing: they rename columns. If a joint value is NaN,
+    the product is ``dense``, so that NaN reaches every entry of its pose.
+    """
+    to_y, to_z, of_y, of_z = axes
     a, b, c, x = link[0, 0], link[0, 1], link[0, 2], link[0, 3]
-    d, e, f, y = link[1, 0], link[1, 1], link[1, 2], link[1, 3]
-    g, h, k, z = link[2, 0], link[2, 1], link[2, 2], link[2, 3]
+    d, e, f, y = link[1, 0] * of_y, link[1, 1] * of_y, link[1, 2] * of_y, link[1, 3] * of_y
+    g, h, k, z = link[2, 0] * of_z, link[2, 1] * of_z, link[2, 2] * of_z, link[2, 3] * of_z
+    about_x = (a == 1.0) & (b == 0.0) & (c == 0.0) & (d == 0.0) & (g == 0.0) & (y == 0.0)
+    right = (e * f == 0.0) & (h * k == 0.0) & (e * e + f * f == 1.0) & (h * h + k * k == 1.0)
+    sparse = about_x & right & (not dense)
     for r in range(3):
-        row = rows[4 * r * BLOCK : (4 * r + 4) * BLOCK]
-        angle = rows[_COS * BLOCK :]
-        for i in range(BLOCK):
-            cosine, sine = angle[i], angle[BLOCK + i]
-            p, s, t = row[i], row[BLOCK + i], row[2 * BLOCK + i]
-            p, s = p * cosine + s * sine, s * cosine - p * sine
-            row[i] = p * a + s * d + t * g
-            row[BLOCK + i] = p * b + s * e + t * h
-            row[2 * BLOCK + i] = p * c + s * f + t * k
-            row[3 * BLOCK + i] += p * x + s * y + t * z
+        row, angle = rows[4 * r * BLOCK : 4 * (r + 1) * BLOCK], rows[_COS * BLOCK :]
+        ys, zs = row[to_y * BLOCK : (to_y + 1) * BLOCK], row[to_z * BLOCK : (to_z + 1) * BLOCK]
+        if sparse:
+            for i in range(BLOCK):
+                cosine, sine, p, s = angle[i], angle[BLOCK + i], row[i], ys[i]
+                p, s = p * cosine + s * sine, s * cosine - p * sine
+                row[i], ys[i] = p, s
+                row[3 * BLOCK + i] += p * x + zs[i] * z
+        else:
+            for i in range(BLOCK):
+                cosine, sine, p, s, t = angle[i], angle[BLOCK + i], row[i], ys[i], zs[i]
+                p, s = p * cosine + s * sine, s * cosine - p * sine
+                row[i] = p * a + s * d + t * g
+                ys[i] = p * b + s * e + t * h
+                zs[i] = p * c + s * f + t * k
+                row[3 * BLOCK + i] += p * x + s * y + t * z
+    if not sparse:
+        return to_y, to_z, 1.0, 1.0
+    return (to_y, to_z, e, k) if f == 0.0 else (to_z, to_y, h, f)
 
 
 @kernel
@@ -238,17 +264,18 @@ def _frames(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links: 
 @kernel
 def _jacobian(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links: Reals, out: Reals) -> None:
     joints = q.shape[1]
-    rows, columns = np.empty((_SIN + 1) * BLOCK), np.empty((joints, 6 * BLOCK))
+    rows, columns = np.zeros((_SIN + 1) * BLOCK), np.empty((joints, 6 * BLOCK))
     for start in range(0, q.shape[0], BLOCK):
-        _fill_start(rows, links[0])
+        axes = _fill_start(rows, links[0])
         for k in range(joints):
             # Until the tool point is known, the linear rows hold a point on the axis.
-            _keep_axis(rows, direction[k], columns[k])
+            _keep_axis(rows, axes, direction[k], columns[k])
+            far = False
             if sliding[k]:
-                _slide_rows(q, direction[k], start, k, rows)
+                _slide_rows(q, direction[k], start, k, rows, axes)
             else:
-                _cos_sin_rows(q, direction, start_at, start, k, rows)
-            _turn_and_step(rows, links[k + 1])
+                far = _cos_sin_rows(q, direction[k], start_at[k], start, k, axes[2], rows)
+            axes = _turn_and_step(rows, links[k + 1], axes, far)
         for k in range(joints):
             if sliding[k]:
                 _along(columns[k])
@@ -261,19 +288,21 @@ def _jacobian(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links
 
 
 @inner_kernel
-def _fill_start(rows: Reals, link: Reals) -> None:
+def _fill_start(rows: Reals, link: Reals) -> Axes:
     for r in range(3):
         for c in range(4):
             rows[(4 * r + c) * BLOCK : (4 * r + c + 1) * BLOCK] = link[r, c]
+    return 1, 2, 1.0, 1.0
 
 
 @inner_kernel
-def _keep_axis(rows: Reals, sign: float, column: Reals) -> None:
+def _keep_axis(rows: Reals, axes: Axes, sign: float, column: Reals) -> None:
     """A point on the joint's axis, and the axis in the sense of the manufacturer's angle."""
     for r in range(3):
+        zs = rows[(4 * r + axes[1]) * BLOCK : (4 * r + axes[1] + 1) * BLOCK]
         for i in range(BLOCK):
             column[r * BLOCK + i] = rows[(4 * r + 3) * BLOCK + i]
-            column[(3 + r) * BLOCK + i] = rows[(4 * r + 2) * BLOCK + i] * sign
+            column[(3 + r) * BLOCK + i] = (axes[3] * zs[i] + 0.0) * sign
 
 
 @kernel

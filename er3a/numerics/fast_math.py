@@ -19,6 +19,7 @@ LARGEST_ANGLE = 1e5  # rad; the two-part reduction below keeps full accuracy up 
 
 _HALF_PI_HIGH, _HALF_PI_LOW = 1.57079632673412561417e00, 6.07710050650619224932e-11
 _PER_HALF_PI = 2 / np.pi
+_LAST_BITS = 1.5 * 2.0**52  # a whole number plus this ends in the number's own bits
 _TAN_PI_8 = 0.41421356237309503
 
 
@@ -37,11 +38,12 @@ def cos_sin(angle: float) -> tuple[float, float]:
     half = 0.5 * z
     near_one = 1.0 - half
     c = near_one + ((1.0 - near_one) - half + z * c)
-    quarter = k - 4.0 * np.floor(0.25 * k)
-    odd = (quarter == 1.0) | (quarter == 3.0)
+    turns = np.float64(k + _LAST_BITS).view(np.int64)
+    odd = (turns & 1) != 0
     cosine, sine = s if odd else c, c if odd else s
-    cosine = -cosine if (quarter == 1.0) | (quarter == 2.0) else cosine
-    sine = -sine if quarter >= 2.0 else sine
+    # Bit 1 moved up to the sign: the cosine is negative in quarters 1 and 2, the sine in 2 and 3.
+    cosine = np.int64(np.float64(cosine).view(np.int64) ^ ((turns + 1 & 2) << 62)).view(np.float64)
+    sine = np.int64(np.float64(sine).view(np.int64) ^ ((turns & 2) << 62)).view(np.float64)
     return cosine, sine
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -50,6 +52,30 @@ def test_random_arms_agree_with_pinocchio(data, robot):
     distance, angle = pose_errors(forward(robot, q), peer.forward(q))
     assert max(distance[0], angle[0]) < 1e-12
     np.testing.assert_allclose(jacobian(robot, q), peer.jacobian(q), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, 1e9])
+def test_a_joint_value_without_meaning_or_far_away_touches_its_own_pose_alone(robot, random, value):
+    q = joints_at_random(robot, random, 100)
+    T, J = forward(robot, q), jacobian(robot, q)
+    for k in range(6):
+        odd = q.copy()
+        odd[70, k] = value
+        got, others = forward(robot, odd), np.arange(100) != 70
+        np.testing.assert_array_equal(got[others], T[others])
+        np.testing.assert_array_equal(jacobian(robot, odd)[others], J[others])
+        assert np.isnan(got[70, :3]).all() == (not np.isfinite(value))
+        np.testing.assert_array_equal(got[70], forward(robot, odd[70]))
+
+
+@pytest.mark.parametrize("twists", list(product([-1, 0, 1, 2], repeat=3)))
+def test_right_angles_between_axes_agree_with_the_product_of_matrices(twists, random):
+    alpha = np.array([*twists, 0.3, *twists[:2]]) * np.where(np.arange(6) == 3, 1, np.pi / 2)
+    arm = make_arm("standard", alpha=alpha, a=random.uniform(-1, 1, 6), d=random.uniform(-1, 1, 6))
+    for q in random.uniform(-3, 3, (5, 6)):
+        np.testing.assert_allclose(forward(arm, q, frame=6), frame_by_hand(arm, q, 6), rtol=0, atol=1e-14)
+    q = random.uniform(-3, 3, (5, 6))
+    np.testing.assert_allclose(jacobian(arm, q), PinocchioArm(arm).jacobian(q), rtol=0, atol=1e-13)
 
 
 def test_jacobian_agrees_with_central_differences(robot, random):
