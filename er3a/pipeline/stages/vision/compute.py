@@ -378,7 +378,9 @@ def compute(study: Study, name: str) -> model.VisionResults:
         not_examined=(
             *_left_out(calibration, task_file, unseen_zeros, least_zero),
             *left_out_of_collisions(robot, bodies, scene, 1000 * DEPTH),
-            *left_out_of_rates(np.isfinite(robot.speed), motions.jerk_deg_s3 is not None),
+            *left_out_of_rates(
+                np.isfinite(robot.speed), motions.acceleration_deg_s2 is not None, motions.jerk_deg_s3 is not None
+            ),
             LeftOut("torques"),
         ),
     )
