@@ -12,12 +12,14 @@ from er3a.collision.scene import Plane, Scene, Sphere
 from er3a.collision.shapes import arm_shapes, shapes_assumed
 from er3a.files.robot_library import load_robot
 from er3a.pipeline.messages.collision import say, solid_rows
+from er3a.pipeline.messages.trajectory import repair_text
 from er3a.pipeline.results import Verdict, read_results
 from er3a.pipeline.stages.collision.compute import compute as collision
 from er3a.pipeline.stages.collision.model import FreeSpace
 from er3a.pipeline.stages.trajectory.model import RESULTS, MinClearance, is_safe
 from er3a.pipeline.stages.trajectory.played import faults
 from er3a.pipeline.stages.trajectory.record import runs_of_path
+from er3a.pipeline.stages.trajectory.report import report
 from er3a.pipeline.stages.trajectory.written_programs import near_assumed_shapes
 from er3a.pipeline.study import load_study
 from er3a.program_check.check_program import CheckOptions, check_program
@@ -90,6 +92,25 @@ def test_recordings_call_no_path_safe_without_saying_of_what(small_results):
         run = next(runs_of_path(load_robot("er3a_c60"), found, sound[0]))
         assert (run.status, run.outcome) == (status, words)
         assert f"**{words}**" in run.text
+
+
+def test_every_clearance_on_the_page_of_paths_is_called_that_of_assumed_shapes(small_results, tmp_path):
+    """Of shapes that a document gives, none is."""
+    study = load_study("config/small.yaml")
+    stored = read_results(small_results("trajectory", "er3a_c60", study), RESULTS)
+    summary = stored.results.summary
+    drawn = replace(summary, verdict=replace(summary.verdict, shapes=None))
+    sound = [path for path in summary.paths if path.verdict == "safe"]
+    repaired = [path for path in summary.paths if path.chosen and path.chosen.motion.clearance_mm is not None]
+    assert sound
+    assert repaired
+    for found, of_assumed in ((summary, True), (drawn, False)):
+        report(study, replace(stored, results=replace(stored.results, summary=found)), tmp_path / "page.html")
+        page = (tmp_path / "page.html").read_text(encoding="utf-8")
+        assert page.count("mm clear of assumed shapes") == page.count("mm clear") * of_assumed
+        assert ("Clearance is that of assumed shapes" in page) == of_assumed
+        for path in repaired:
+            assert ("Clearance is that" in repair_text(path, assumed=of_assumed)) == of_assumed
 
 
 def test_a_program_of_a_path_near_assumed_shapes_says_so_in_its_head():

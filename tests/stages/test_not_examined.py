@@ -16,6 +16,7 @@ from er3a.collision.matrix import base_contacts, collision_matrix
 from er3a.collision.pairs import ASSUMED_MARGIN
 from er3a.collision.scene import Box, Plane, Scene, Sphere
 from er3a.collision.shapes import arm_shapes, has_bare_tool, link_frames
+from er3a.files.robot_file import Placement
 from er3a.files.robot_library import load_robot
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
@@ -99,6 +100,9 @@ def test_paths_name_what_their_settings_leave_out(study, tmp_path):
     jerky = changed(study, entry, trajectory={"jerk_deg_s3": [1e6] * robot.joints})
     more = subjects(trajectory(jerky, ROBOT))
     assert "jerk" not in more
+    assert {"own_accelerations"} <= found.keys() & more.keys()
+    known = changed(study, entry, trajectory={"acceleration_deg_s2": [700.0] * robot.joints, "avoidance": "slow"})
+    assert "own_accelerations" not in subjects(trajectory(known, ROBOT))
     assert "strategies" not in more
     assert "scene_shapes" not in found
     absent = "scene_shapes" if study.scene(ROBOT, "trajectory") is None else "obstacles"
@@ -170,7 +174,7 @@ def test_programs_name_their_lines_and_starts(study, tmp_path):
     found = subjects(results)
     assert found["program_lines"].names == ("job: 5",)
     assert found["program_starts"].names == ("job",)
-    assert {"controller_ramps", "torques", "shallow_overlaps"} <= found.keys()
+    assert {"controller_ramps", "torques", "shallow_overlaps", "own_accelerations"} <= found.keys()
     assert results.summary.verdict.status == "caution"
 
 
@@ -300,7 +304,12 @@ def test_validation_names_what_no_reference_states(study, tmp_path):
     assert found["near_singular_poses"].amount == results.summary.round_trips.near_singular > 0
     assert found["reach_starts"].amount == 2
     assert {"more_faults", "the_arm_itself"} <= found.keys()
-    assert "diagnosis" not in found
+    assert {"diagnosis", "tool_and_base", "conflicting_references"}.isdisjoint(found)
+    tilted = {"xyz_mm": [0.0, 0.0, 500.0], "rpy_deg": [0.0, 20.0, 0.0]}
+    for key in ("tool", "base"):
+        entry = {"file": str(tmp_path / f"{ROBOT}.yaml"), key: Placement(**tilted)}
+        found = subjects(validation(changed(study, entry, validation={"round_trips": 5, "reach_starts": 2}), ROBOT))
+        assert found["tool_and_base"].names == (key,)
 
 
 @pytest.mark.long
@@ -570,6 +579,8 @@ LEFT_OUT_BY_SETTINGS = {
         "checks_per_sample": "path_stretches",
         "assumed_speed_deg_s": "own_speeds",
         "assumed_speed_mm_s": "own_speeds",
+        "acceleration_time_s": "own_accelerations",
+        "acceleration_deg_s2": "own_accelerations",
         "jerk_deg_s3": "jerk",
         "scene": "obstacles",
         "penetration_tolerance_mm": "shallow_overlaps",
@@ -586,7 +597,7 @@ LEAVE_NOTHING_OUT = {
     "workspace": ("sampling", "blocks", "cells_across", "hull_directions", "cloud_points", "volume_points"),
     "inverse": ("map_cells",),
     "trajectory": (
-        *("near_wrist_deg", "near_elbow_deg", "near_shoulder_mm", "acceleration_time_s", "acceleration_deg_s2"),
+        *("near_wrist_deg", "near_elbow_deg", "near_shoulder_mm"),
         *("assumed_margin_mm", "programs", "write_unsafe"),
     ),
     "dynamics": ("payload_centre_mm", "payload_gyration_mm"),

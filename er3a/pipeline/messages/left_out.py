@@ -41,6 +41,9 @@ TEXTS = texts(
         "left_out.scene_shapes": "whether what stands in the cell is shaped and placed as the scene's file says",
         "left_out.shallow_overlaps": "overlaps of less than {amount:g} mm between the points measured",
         "left_out.own_speeds": "the joints' real speeds: no document gives them, so speeds are assumed",
+        "left_out.own_accelerations": (
+            "the joints' real accelerations: no document gives them, so accelerations are assumed"
+        ),
         "left_out.jerk": "jerk: no limit is given",
         "left_out.torques": "torques, payload and deflection of the arm (torques and payload: see the stage dynamics)",
         "left_out.paths": "paths that were not followed to their end",
@@ -106,6 +109,12 @@ TEXTS = texts(
         "left_out.references": "quantities that no reference states, or for which the robot's file gives no value",
         "left_out.loose_references": (
             "references whose source leaves so much open that a value taken at random would pass as often as not"
+        ),
+        "left_out.conflicting_references": (
+            "references that the table misses, and that other references which it meets contradict: they decide nothing"
+        ),
+        "left_out.tool_and_base": (
+            "the tool, and where the study places the base: references speak of the flange and the robot's own base"
         ),
         "left_out.table_entries": "entries of the table that independent references don't settle, signs included",
         "left_out.diagnosis": "which entry is wrong: diagnosis is for arms whose joints all turn",

@@ -135,6 +135,7 @@ TEXTS = texts(
         ),
         "advice.chosen": "{way}: {tool}; {time}",
         "advice.chosen#clear": "{way}: {tool}; {time}; the arm keeps {clearance:.1f} mm of clearance",
+        "advice.of_assumed": "Clearance is that of assumed shapes: the true ones may come nearer",
         "advice.instead": "The path itself can't be driven",
         "advice.slowly": "This is its shortest time, quicker than the {programmed:.2f} s programmed: another motion",
         "advice.near": "No part of it is safe: the arm is near-singular at the start",
@@ -354,14 +355,14 @@ def _until_when(part: model.Stretch[RateCause]) -> str:
     return sentence("path.too_fast_until", cause=say(part.cause), end=part.t1_s) if lasts else say(part.cause)
 
 
-def advice(path: model.PathSummary, limits: model.LimitsUsed | None = None) -> str | None:
+def advice(path: model.PathSummary, limits: model.LimitsUsed | None = None, *, assumed: bool = False) -> str | None:
     """What to do about a path; None where nothing is to be done. ``limits``: of the joints, whose assumed ones are
-    named."""
+    named; ``assumed``: whether clearance is that of assumed shapes."""
     if not path.avoidance:
         return None
     if path.chosen:
         slower = _slower_throughout(path) if path.strategy == "slow" else ""
-        return joined([repair_text(path, limits), slower], ". ")
+        return joined([repair_text(path, limits, assumed=assumed), slower], ". ")
     if path.unreachable:
         when = joined(map(_when, path.unreachable), ", ")
         why = sentence("advice.out_of_reach", when=when)
@@ -372,11 +373,18 @@ def advice(path: model.PathSummary, limits: model.LimitsUsed | None = None) -> s
         (only,) = path.avoidance
         if only.name == "planned":
             none = sentence("advice.no_strategy", reason=reasons(only))
-            return joined([none, _until(path)], ". ")
+            return joined([none, _until(path), _of_assumed(path, assumed)], ". ")
         parts = {"way": word("advice", ADVICE, only.name), "reason": reasons(only)}
         return sentence("advice.only", **parts)
     none = _within_reach(path) or sentence("advice.none", why=why)
-    return joined([none, _until(path)], ". ")
+    return joined([none, _until(path), _of_assumed(path, assumed)], ". ")
+
+
+def _of_assumed(path: model.PathSummary, assumed: bool) -> str:
+    """That the clearance up to where a path may be run is that of assumed shapes; empty where none is named."""
+    end, last = path.sound_end, path.clear_until
+    named = end is not None and last is not None and end.t_s >= last.t_s and not path.unreachable
+    return sentence("advice.of_assumed") if assumed and named else ""
 
 
 def _until(path: model.PathSummary) -> str:
@@ -450,8 +458,9 @@ def reasons(tried: model.TriedStrategy) -> str:
     return joined(listed(tried.reasons))
 
 
-def repair_text(path: model.PathSummary, limits: model.LimitsUsed | None = None) -> str:
-    """What the strategy that was chosen does, what it costs, and what of ``limits`` that are assumed it takes."""
+def repair_text(path: model.PathSummary, limits: model.LimitsUsed | None = None, *, assumed: bool = False) -> str:
+    """What the strategy that was chosen does, what it costs, and what it takes of ``limits`` that are assumed;
+    ``assumed``: whether clearance is that of assumed shapes."""
     tried = path.chosen
     if tried is None or tried.motion is None:
         raise ValueError(f"{path.name} has no motion that repairs it")
@@ -477,7 +486,8 @@ def repair_text(path: model.PathSummary, limits: model.LimitsUsed | None = None)
     unsaid = limits is None or not any(limits.speed_assumed)
     full = sentence("advice.full_speed") if unsaid and (motion.max_joint_speed_ratio or 0.0) >= FULL_SPEED else ""
     first = sentence("advice.instead") if other else ""
-    return joined([first, chosen, slowly, near, _of_limits(motion, limits) if limits else "", full], ". ")
+    shapes = sentence("advice.of_assumed") if assumed and clearance is not None else ""
+    return joined([first, chosen, shapes, slowly, near, _of_limits(motion, limits) if limits else "", full], ". ")
 
 
 def _of_limits(motion: model.StrategyMotion, limits: model.LimitsUsed) -> str:

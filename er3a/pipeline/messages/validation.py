@@ -68,6 +68,7 @@ GRADES = {
     "inferred": N_("inferred, not stated"),
 }
 CONVENTIONS = {"standard": N_("standard"), "modified": N_("modified")}
+PLACED = {"tool": N_("tool"), "base": N_("base")}
 PART_ENTRIES = {
     "geometry": N_("lengths and twists"),
     "zero_and_directions": N_("zeros and directions"),
@@ -76,6 +77,8 @@ PART_ENTRIES = {
 }
 names_in_words("references", "reference.group", GROUP_WORDS)
 names_in_words("loose_references", "reference.group", GROUP_WORDS)
+names_in_words("conflicting_references", "reference.group", GROUP_WORDS)
+names_in_words("tool_and_base", "placed", PLACED)
 GROUPS = GROUP_WORDS | {"table_sanity": N_("table sanity"), "round_trips": N_("round trips")}
 
 

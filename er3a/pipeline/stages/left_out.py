@@ -86,7 +86,9 @@ def left_out_of_orientations(robot: Robot, asked: Iterable[tuple[str, Reals, Rea
     return (LeftOut("orientations", tuple(off), amount=max(off.values())),) if off else ()
 
 
-def left_out_of_rates(speed_known: Flags, jerk: bool) -> tuple[LeftOut, ...]:
-    """What is not known of joints: speeds that no document gives (n,), and jerk without bound."""
+def left_out_of_rates(speed_known: Flags, acceleration: bool, jerk: bool) -> tuple[LeftOut, ...]:
+    """What is not known of joints: speeds that no document gives (n,), accelerations, and jerk without bound."""
     assumed = tuple(f"J{joint}" for joint in (np.flatnonzero(~speed_known) + 1).tolist())
-    return (*((LeftOut("own_speeds", assumed),) if assumed else ()), *((LeftOut("jerk"),) if not jerk else ()))
+    speeds = (LeftOut("own_speeds", assumed),) if assumed else ()
+    accelerations = () if acceleration else (LeftOut("own_accelerations"),)
+    return (*speeds, *accelerations, *(() if jerk else (LeftOut("jerk"),)))

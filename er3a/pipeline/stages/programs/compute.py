@@ -83,7 +83,7 @@ def compute(study: Study, name: str) -> model.ProgramsResults:
                 *left_out_of_collisions(
                     robot, bodies_of(robot, scene), scene, 1000 * options.penetration_tolerance, arms
                 ),
-                *left_out_of_rates(np.isfinite(robot.speed), jerk=False),
+                *left_out_of_rates(np.isfinite(robot.speed), acceleration=False, jerk=False),
                 *_left_out(summaries, unknown_starts),
             ),
         ),

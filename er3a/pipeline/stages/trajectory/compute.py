@@ -425,7 +425,7 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
         not_followed=tuple(skipped),
         not_examined=(
             *left_out_of_collisions(robot, surroundings.bodies, scene, settings.penetration_tolerance_mm),
-            *left_out_of_rates(np.isfinite(robot.speed), limits.jerk is not None),
+            *left_out_of_rates(np.isfinite(robot.speed), not used.acceleration_assumed, limits.jerk is not None),
             *_left_out(paths, skipped, only),
             *by_subject(rest),
             *left_out_of_orientations(robot, turned),

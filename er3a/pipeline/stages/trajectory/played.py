@@ -122,24 +122,30 @@ def _to_do(
     path: model.PathSummary, rows: model.PathChecks, summary: model.TrajectorySummary
 ) -> tuple[str, tuple[str, str] | None]:
     """What to do instead of running a path as it is, and the motion that may be run with its address."""
+    assumed = summary.verdict.shapes is not None
     if path.chosen:
         name = repaired(path)
-        repair = sentence("finding", finding=repair_text(path, summary.joint_limits))
+        repair = sentence("finding", finding=repair_text(path, summary.joint_limits, assumed=assumed))
         return repair, (name, address_of("trajectory", name, 0.0, path.name))
     if path.verdict == "safe" and (near := near_assumed(path, summary)):
         return remedy(near), None
     last = path.sound_end
     if last is None:
-        todo = advised(path, rows, summary.joint_limits)
+        todo = advised(path, rows, summary.joint_limits, assumed=assumed)
         return sentence("finding", finding=todo) if todo else "", None
     name = tr("{path}, up to {time} s", path=path.name, time=fixed(last.t_s, 3))
     end = end_text(path, last, summary.verdict.shapes)
     return end, (name, address_of("trajectory", path.name, last.t_s, path.name, last.t_s))
 
 
-def advised(path: model.PathSummary, rows: model.PathChecks, limits: model.LimitsUsed) -> str | None:
-    """What to do about a path; None where nothing is to be done. ``rows``, ``limits``: of the path, of the joints."""
-    text = advice(path, limits)
+def advised(
+    path: model.PathSummary, rows: model.PathChecks, limits: model.LimitsUsed, *, assumed: bool = False
+) -> str | None:
+    """What to do about a path; None where nothing is to be done.
+
+    ``rows``, ``limits``: of the path, of the joints; ``assumed``: whether clearance is that of assumed shapes.
+    """
+    text = advice(path, limits, assumed=assumed)
     if text is None or path.chosen:
         return text
     if not path.in_joint_space and len(rows) and rows.near_singular[0]:

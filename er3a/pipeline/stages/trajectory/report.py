@@ -9,7 +9,7 @@ import numpy as np
 
 from er3a.pipeline.messages.collision import solid_rows
 from er3a.pipeline.messages.kinematics import branch_word
-from er3a.pipeline.messages.language import tr, with_unit
+from er3a.pipeline.messages.language import N_, tr, with_unit
 from er3a.pipeline.messages.programs import remedy
 from er3a.pipeline.messages.say import joined, say
 from er3a.pipeline.messages.trajectory import (
@@ -100,7 +100,7 @@ def _section(
     programs: list[dict[str, Any]],
     summary: model.TrajectorySummary,
 ) -> dict[str, Any]:
-    near = near_assumed(path, summary)
+    near, assumed = near_assumed(path, summary), summary.verdict.shapes is not None
     status, verdict = shown_verdict(path, near)
     return dict(
         path=path,
@@ -108,8 +108,8 @@ def _section(
         verdict=verdict,
         kind=kind_word(path.kind),
         text=joined([path_text(path), say(near) if near else ""]),
-        distance=_clear_of(path),
-        advice=advised(path, rows, summary.joint_limits),
+        distance=_clear_of(path, assumed),
+        advice=advised(path, rows, summary.joint_limits, assumed=assumed),
         near=joined([say(near), remedy(near).rstrip(".。")], ". ") if near else "",
         branches=[branch_word(label) for label in path.branches],
         speed=_speed(path, summary.joint_limits),
@@ -123,12 +123,13 @@ def _section(
     )
 
 
-def _clear_of(path: model.PathSummary) -> str:
-    """How near a path that passes comes to anything; empty where that is not known."""
+def _clear_of(path: model.PathSummary, assumed: bool) -> str:
+    """How near a path that passes comes to anything, by ``assumed`` shapes; empty where that is not known."""
     if path.clearance is None or path.verdict != "safe":
         return ""
     far = number(path.clearance.least_mm, 3)
-    return tr("{far} mm clear: {pair}.", far=far, pair=say(path.clearance.between))
+    text = N_("{far} mm clear of assumed shapes: {pair}.") if assumed else N_("{far} mm clear: {pair}.")
+    return tr(text, far=far, pair=say(path.clearance.between))
 
 
 def _repairs(path: model.PathSummary, program: dict[str, Any]) -> bool:

@@ -319,7 +319,10 @@ def compute(study: Study, name: str) -> model.ValidationResults:
         section_origin_mm=_section_origin_mm(robot),
         counts=counts,
         evidence=evidence,
-        not_examined=tuple(_left_out(settings, checks, diagnoses if turning else None, calibrations, trips, evidence)),
+        not_examined=(
+            *_left_out(settings, checks, diagnoses if turning else None, calibrations, trips, evidence),
+            *_left_out_of_places(study.robot(name), robot),
+        ),
     )
     return model.ValidationResults(
         summary=summary,
@@ -354,6 +357,11 @@ def _left_out(
         yield LeftOut("references", unstated)
     if loose := tuple(dict.fromkeys(check.group for check in checks if isinstance(check.note, model.TooUncertain))):
         yield LeftOut("loose_references", loose)
+    conflicting = [
+        check.group for check in checks if isinstance(check, model.ReferenceCheck) if check.status == "conflict"
+    ]
+    if conflicting:
+        yield LeftOut("conflicting_references", tuple(dict.fromkeys(conflicting)))
     entries = evidence.entries if evidence else ()
     doubtful = tuple(each.entry for each in entries if each.status not in ("settled", "gauge", "given"))
     if doubtful or evidence is None:
@@ -375,6 +383,13 @@ def _left_out(
         yield LeftOut("near_singular_poses", amount=trips.near_singular)
     yield LeftOut("reach_starts", amount=settings.reach_starts)
     yield LeftOut("the_arm_itself")
+
+
+def _left_out_of_places(placed: Robot, robot: Robot) -> Iterator[LeftOut]:
+    """Tool and base of the robot as the study places it, as far as the model that was checked has them otherwise."""
+    names = tuple(name for name in ("tool", "base") if not np.array_equal(getattr(placed, name), getattr(robot, name)))
+    if names:
+        yield LeftOut("tool_and_base", names)
 
 
 def evidence_of_table(robot: Robot, sets: Sequence[ReferenceSet]) -> model.TableEvidence | None:

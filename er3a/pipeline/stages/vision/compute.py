@@ -378,7 +378,7 @@ def compute(study: Study, name: str) -> model.VisionResults:
         not_examined=(
             *_left_out(calibration, task_file, unseen_zeros, least_zero),
             *left_out_of_collisions(robot, bodies, scene, 1000 * DEPTH),
-            *left_out_of_rates(np.isfinite(robot.speed), motions.jerk_deg_s3 is not None),
+            *left_out_of_rates(np.isfinite(robot.speed), *_rates_given(motions)),
             LeftOut("torques"),
         ),
     )
@@ -407,6 +407,11 @@ def compute(study: Study, name: str) -> model.VisionResults:
         ),
         corner_rows(found, images),
     )
+
+
+def _rates_given(motions: TrajectorySettings) -> tuple[bool, bool]:
+    """Whether the study gives the joints' accelerations, and their jerk."""
+    return motions.acceleration_deg_s2 is not None, motions.jerk_deg_s3 is not None
 
 
 def _without_calibration(summary: model.VisionSummary) -> model.VisionResults:
