@@ -242,7 +242,7 @@ class PointObservations:
     def _unknowns(self, kind: TouchKind, rows: Integers) -> int:
         """How many numbers of each coordinate drop out: how many poses say nothing."""
         bar = 3 + (not self.lengths_mm(rows).any())
-        return {"place": 1, "plane": 3 - self.flat + self._lifted(rows).shape[1], "pair": 0, "bar": bar}[kind]
+        return {"place": 1, "plane": 3 - self.flat + len(self._lifted(rows).T), "pair": 0, "bar": bar}[kind]
 
     @property
     def has_scale(self) -> bool:
