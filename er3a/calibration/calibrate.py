@@ -134,11 +134,13 @@ def choose_level(robot: Robot, observations: Observations) -> Level:
             here = subspace(robot, parameters, observations, left)
             best = subspace(robot, parameters, rich, left) if len(rich) else here
             settled = len(best.kept) <= len(here.kept)
-            if not settled or spare <= len(here.kept):
+            if not (settled and here.kept) or spare <= len(here.kept):
                 more.append(_what_more(robot, name, parameters, (here, best), observations))
-            if (settled or isinstance(more[-1], MoreTouches)) and spare > len(here.kept):
+            if (settled or isinstance(more[-1], MoreTouches)) and spare > len(here.kept) > 0:
                 what = next((each for each in more if isinstance(each, MoreTouches)), more[-1] if more else None)
                 return Level(name, parameters, here, what, scale)
+    if not more[-1].determinable:
+        raise CalibrationError(more[-1], "no entry of the table moves what was measured; touch or measure elsewhere")
     lack = "numbers" if isinstance(more[-1], MoreTouches) else "positions"
     problem = f"{len(observations)} coordinates determine too little; {lack} to be added: {more[-1].missing} at least"
     raise CalibrationError(more[-1], problem)

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 import scipy.sparse
-from scipy.cluster.vq import kmeans2
+from scipy.cluster.vq import kmeans, vq
 
 from er3a.calibration.fit import ROUNDING, Fit, jacobian
 from er3a.calibration.observations import PointObservations
@@ -133,8 +133,8 @@ def parts_of(row_values: Reals, seed: int) -> tuple[Integers, Integers]:
     random = np.random.default_rng(seed).permutation(count) % PARTS
     spread = row_values.std(axis=0)
     scaled = row_values / np.where(spread > 0, spread, 1.0)
-    near = kmeans2(scaled, min(PARTS, count), seed=np.random.default_rng(seed), minit="++")[1]
-    return random, near.astype(np.int64)
+    centres = kmeans(scaled, min(PARTS, count), seed=np.random.default_rng(seed))[0]  # fewer if some would be empty
+    return random, vq(scaled, centres)[0].astype(np.int64)
 
 
 @dataclass(frozen=True, eq=False)

@@ -39,6 +39,7 @@ TouchKind = Literal["place", "plane", "pair", "bar"]
 MIN_LENGTH = 1e-9
 SOCKET_STEPS = 50
 SOCKET_STEP = 1e-13  # m
+TILT = 1e-5  # rad
 AT_ONCE = 8_000  # poses of tables whose frames are held at once
 
 
@@ -180,6 +181,8 @@ class PointObservations:
     flat : whether the table moves all points in the plane of the first two, while no coordinates are measured. What is
         across it is not observed then, because such a table lets points meet there however the arm's axes are tilted,
         and a socket may be on either side; planes are seen as lines
+    lifted : (P, h), how tilts of a flat arm's axes lift its points; a plane that is oblique to the arm's takes an
+        unknown share of that, which drops out, too
     """
 
     row_values: Reals
@@ -195,6 +198,7 @@ class PointObservations:
     names: tuple[str, ...] = ()
     axes: Reals = field(default_factory=lambda: np.eye(3))
     flat: bool = False
+    lifted: Reals | None = None
 
     def __len__(self) -> int:
         return len(self.values_mm)
@@ -238,7 +242,7 @@ class PointObservations:
     def _unknowns(self, kind: TouchKind, rows: Integers) -> int:
         """How many numbers of each coordinate drop out: how many poses say nothing."""
         bar = 3 + (not self.lengths_mm(rows).any())
-        return {"place": 1, "plane": 3 - self.flat, "pair": 0, "bar": bar}[kind]
+        return {"place": 1, "plane": 3 - self.flat + len(self._lifted(rows).T), "pair": 0, "bar": bar}[kind]
 
     @property
     def has_scale(self) -> bool:
@@ -265,6 +269,9 @@ class PointObservations:
         found: Reals = lengths[rows, 0]
         return found
 
+    def _lifted(self, rows: Integers) -> Reals:
+        return np.empty((len(rows), 0)) if self.lifted is None else self.lifted[rows]
+
     def _along_axes(self, xyz: Reals) -> Reals:
         """Coordinates (P, 3) along ``axes``, 0 across the plane if the arm is flat."""
         found: Reals = xyz @ self.axes.T
@@ -282,7 +289,10 @@ class PointObservations:
             if kind == "place":
                 found[rows] = own - own.mean(axis=0)
             elif kind == "plane":
-                found[rows, 0] = (own - own.mean(axis=0)) @ self.plane(own)[0]
+                normal, inside = self.plane(own)
+                off = (own - own.mean(axis=0)) @ normal
+                basis = np.hstack([np.ones((len(rows), 1)), inside, self._lifted(rows)])
+                found[rows, 0] = off - basis @ np.linalg.lstsq(basis, off, rcond=None)[0]
             elif kind == "pair":
                 found[rows, 0] = np.linalg.norm(own[0] - own[-1])
             else:
@@ -318,7 +328,7 @@ class PointObservations:
             return here, every
         if kind == "plane":
             normal, inside = self.plane(here)
-            return every * normal, np.hstack([every, inside])
+            return every * normal, np.hstack([every, inside, self._lifted(rows)])
         if kind == "pair":
             return directions(here - here[::-1])[0], every[:, :0]
         along = directions(here - socket(here, self.lengths_mm(rows) / MM))[0]
@@ -410,6 +420,7 @@ class PointObservations:
             deviation_mm=self.deviation_mm[own],
             lines=self.lines[used],
             touched=self.touched[used],
+            lifted=None if self.lifted is None else self.lifted[used],
         )
 
     def shifted(self, amounts: Reals) -> PointObservations:
@@ -451,6 +462,7 @@ class PointObservations:
             touched=np.full(count, -1),
             axes=np.eye(3),
             flat=False,
+            lifted=None,
         )
 
 
@@ -560,7 +572,8 @@ def observed(
         return found
     seen[:, 2] = False
     by_point = np.broadcast_to(deviation[:, None], seen.shape)[seen]
-    return replace(found, seen=seen, values_mm=xyz[seen], deviation_mm=by_point, axes=axes, flat=True)
+    lifted = _lifted(robot, found, axes)
+    return replace(found, seen=seen, values_mm=xyz[seen], deviation_mm=by_point, axes=axes, flat=True, lifted=lifted)
 
 
 def _flat_axes(robot: Robot, points: PointObservations) -> Reals | None:
@@ -572,6 +585,17 @@ def _flat_axes(robot: Robot, points: PointObservations) -> Reals | None:
         return None
     sizes, axes = np.linalg.svd(x - x.mean(axis=0), full_matrices=False)[1:]
     return axes if sizes[2] < PARALLEL_RAD * sizes[1] else None
+
+
+def _lifted(robot: Robot, points: PointObservations, axes: Reals) -> Reals:
+    """Orthonormal columns (P, h): how tilts of joint axes lift points off the plane of a flat arm, apart from what
+    tilts the whole arm."""
+    x, turns = points.positions(robot), TILT * np.eye(robot.rows)
+    tilted = [robot.replace(**{name: getattr(robot, name) + turn}) for name in ("alpha", "beta") for turn in turns]
+    ways = np.column_stack([(points.positions(each) - x) @ axes[2] for each in tilted]) / TILT
+    whole = np.linalg.qr(np.column_stack([np.ones(len(x)), x @ axes[:2].T]))[0]
+    found, sizes, _ = np.linalg.svd(ways - whole @ (whole.T @ ways), full_matrices=False)
+    return found[:, sizes > DEPENDENT * np.linalg.norm(x - x.mean(axis=0))]
 
 
 def check_poses(measurements: Sequence[Measurement], robot: Robot, path: str | Path | None = None) -> None:

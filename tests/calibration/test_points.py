@@ -496,6 +496,45 @@ def test_touches_of_a_flat_arm_settle_what_moves_points_in_its_plane_alone(kind,
     assert length.half_width < 0.1
 
 
+@pytest.mark.parametrize("seed", [1, 3])
+def test_oblique_planes_take_what_tilted_axes_of_a_flat_arm_lift(seed):
+    """By sums of angles; without noise the tilts alone would be fitted as corrections or terms."""
+    random = np.random.default_rng(seed)
+    a, wrong, tilts = np.array([0.4, 0.3, 0.2]), np.array([0, 2e-3, 0]), random.normal(0, 1e-3, (2, 2))
+    rows = []
+    for number in range(6):
+        angle, steep, far = random.uniform(0, 2 * np.pi), random.uniform(-1.5, 1.5), random.uniform(0.1, 0.3)
+        while len(rows) < 60 * (number + 1):
+            q = random.uniform(-2.6, 2.6, 3)
+            for _ in range(30):  # J1 turns until the point is in the plane
+                at = np.exp(1j * np.cumsum(q))
+                steps = (a + wrong) * at
+                outer = (steps[1] + steps[2]) / at[0], steps[2] / at[1]
+                height = sum(own @ [way.real, way.imag] for own, way in zip(tilts, outer))
+                here = steps.sum() * np.exp(-1j * angle)
+                q[0] += np.clip((here.real + steep * height - far) / (here.imag or 1.0), -0.3, 0.3)
+            if abs(here.real + steep * height - far) < 1e-9 and abs(here.imag) > 0.05 and abs(q[0]) < 3:
+                pose = np.degrees(q + random.normal(0, 1e-6, 3))
+                rows.append(Measurement(0, tuple(pose.tolist()), "flange", (None,) * 3, plane=str(number)))
+    found = er3a.calibrate(er3a.Robot.from_dh(a, [0, 0, 0], [0, 0, 0]), rows)
+    assert found.beyond is None
+    assert found.ratios == ()
+    true = {"a2": 2.0}
+    assert {each.name for each in found.estimates} == {"a2", "a3", "offset2", "offset3"}
+    for each in found.estimates:
+        assert each.correction == pytest.approx(true.get(each.name, 0.0), abs=2 * each.half_width + 0.005)
+
+
+def test_touches_that_no_entry_moves_are_refused():
+    """A flange on the axes of all joints: nothing moves it, and there is nothing to fit."""
+    random = np.random.default_rng(0)
+    robot = er3a.Robot.from_dh([0, 0, 0], [0, 0, 0], [0.4, 0.3, 0.2])
+    poses = np.degrees(random.uniform(-2, 2, (80, 3))).tolist()
+    rows = [Measurement(0, tuple(q), "flange", (None,) * 3, plane=str(k % 2)) for k, q in enumerate(poses)]
+    with pytest.raises(CalibrationError, match="no entry of the table moves"):
+        er3a.calibrate(robot, rows)
+
+
 def test_joints_that_turn_points_in_one_plane_leave_the_others_to_more_touches(random):
     """J2, J3 and J5 of six joints, one way up and the other, touch places in the plane of the upper arm."""
     bench, rows, middle = Bench("six", random), [], [1, 2, 4]
