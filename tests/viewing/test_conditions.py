@@ -184,13 +184,34 @@ def test_the_index_names_what_passes_through_the_box_or_its_stand(over):
     assert "through (from 2.75 s)" in found.text
     assert "beside" not in found.text
     assert found.text.endswith("Not compared, or not all of it: lost, still.")
-    assert found.short.endswith(f"or its stand in {2 if over else 1} of the paths, 1 of the programs.")
+    runs = f"or its stand in {2 if over else 1} of the paths, 1 of the programs."
+    assert found.short.endswith(f"{runs} No target was compared with its place.")
+
+
+@pytest.mark.parametrize("over", [False, True])
+def test_the_index_names_the_targets_in_the_box_or_its_stand(over):
+    """By hand: the box is from (275, -100, 375) to (425, 100, 425) mm; its stand over a table begins at z = 100."""
+    places = {
+        "corner": (275.0, -100.0, 425.0),
+        "middle": (350.0, 0.0, 400.0),
+        "stand": (350.0, 0.0, 150.0),
+        "beside": (274.9, 0.0, 400.0),
+        "above": (350.0, 0.0, 425.1),
+    }
+    targets = [SimpleNamespace(name=name, xyz_mm=xyz) for name, xyz in places.items()]
+    inverse = SimpleNamespace(results=SimpleNamespace(summary=SimpleNamespace(targets=targets)))
+    short = _passes({"workspace": placed(over=over), "inverse": inverse}).short
+    inside = "corner, middle, stand" if over else "corner, middle"
+    assert short.endswith(f" Targets in the box or its stand: {inside}.")
+    targets[:] = targets[-2:]
+    assert "arget" not in _passes({"workspace": placed(over=over), "inverse": inverse}).short
 
 
 def test_without_motions_or_without_a_place_nothing_is_said_to_be_free():
     assert _passes({}) is None
     alone = _passes({"workspace": placed()})
-    assert (alone.short, alone.text) == ("No path or program was compared with its place.", "")
+    assert alone.short == "No path or program was compared with its place. No target was compared with its place."
+    assert alone.text == ""
     clear = moving(
         ProgramsResults, ProgramMotion, "program", SimpleNamespace(programs=named("far")), {"far": (500.0, 0.0)}
     )

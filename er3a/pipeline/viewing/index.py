@@ -736,14 +736,20 @@ class _Passes:
     ----------
     through : per stage the first time (s) by name
     unseen : names of paths and programs whose tool points are not known, or not all
+    targets : names of the targets that lie in them; None if no target was compared
     """
 
     through: Mapping[str, Mapping[str, float]]
     unseen: tuple[str, ...]
+    targets: tuple[str, ...] | None = None
 
     @property
     def short(self) -> str:
-        """How many there are."""
+        """How many there are, and which targets."""
+        return joined([self._of_runs, self._of_targets], " ")
+
+    @property
+    def _of_runs(self) -> str:
         if not self.through:
             return tr("No path or program was compared with its place.")
         counts = [
@@ -777,6 +783,14 @@ class _Passes:
             said.append(tr("Not compared, or not all of it: {names}.", names=joined(self.unseen, ", ")))
         return joined(said, " ")
 
+    @property
+    def _of_targets(self) -> str:
+        if self.targets is None:
+            return tr("No target was compared with its place.")
+        if not self.targets:
+            return ""
+        return tr("Targets in the box or its stand: {names}.", names=joined(self.targets, ", "))
+
 
 def _passes(stored: Mapping[str, Stored[Any]]) -> _Passes | None:
     """What passes through the box of the study where the workspace stage puts it; None if it puts none."""
@@ -802,7 +816,11 @@ def _passes(stored: Mapping[str, Stored[Any]]) -> _Passes | None:
             if len(rows) < 2 or not np.isfinite(rows.xyz_mm).all():
                 unseen.append(name)
         unseen += [each.name for each in getattr(results.summary, "not_followed", ())]
-    return _Passes(through, tuple(unseen))
+    targets = getattr(stored["inverse"].results.summary, "targets", None) if "inverse" in stored else None
+    if targets is not None:
+        points = [(each.name, np.array(each.xyz_mm)) for each in targets]
+        targets = tuple(name for name, point in points if ((low <= point) & (point <= high)).all())
+    return _Passes(through, tuple(unseen), targets)
 
 
 def first_inside(t: Reals, points: Reals, low: Reals, high: Reals) -> float | None:

@@ -309,7 +309,8 @@ def _left_out(
         yield LeftOut("between_places", amount=1000 * max(placement.spacing_m))
         if found.asked != "directions":
             yield LeftOut("box_directions")
-        yield LeftOut("placed_box")
+        if placement.named_places:
+            yield LeftOut("placed_box")
 
 
 def _bars(proven: Proven) -> model.Bars | None:
