@@ -378,7 +378,7 @@ class ProgramMemory:
             values = of.values() if isinstance(of, syntax.Record) else of
             at = syntax.number(self.value(expression.indices[0]))
             place = None if at is None else at - self.functions.first_index
-            found = values[int(place)] if place is not None and 0 <= place < len(values) else None
+            found = values[int(place)] if place is not None and not place % 1 and 0 <= place < len(values) else None
         else:
             key = self.key(expression)
             found = None if key is None else self.read(key)
@@ -394,12 +394,12 @@ class ProgramMemory:
         at = syntax.number(self.value(target.indices[0])) if len(target.indices) == 1 else None
         if not isinstance(of, (tuple, syntax.Record)):
             return None
-        if at is None:
+        if at is None or at % 1:
             return syntax.Unclear("a list with a changed element")
         place = int(at) - self.functions.first_index
         values = of.values() if isinstance(of, syntax.Record) else of
-        if not 0 <= place < len(values):
-            return None
+        if not 0 <= place < len(values):  # where a controller stops
+            return syntax.Unclear(f"a list of {len(values)} whose element {at:g} was set")
         if isinstance(of, syntax.Record):
             return of.having(of.items[place][0], value)
         return (*of[:place], value, *of[place + 1 :])

@@ -549,3 +549,33 @@ def test_a_variable_of_a_nested_function_is_not_global_however_the_program_begin
     assert codes(check(tmp_path, text))["program_not_understood"] == [5]
     shared = f"def main():\ny = 0\n{inner}inner()\nend\n"
     assert "program_not_understood" not in codes(check(tmp_path, shared))
+
+
+def changed(lines):
+    """A URScript that goes on with these after a joint move in line 2."""
+    return "\n  ".join(["def a():", "movej([0, 0, 0, 0, -1, 0])", *lines]) + "\nend\n"
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        ["p = get_actual_tcp_pose()", "p[2] = p[2] + 0.03", "movel(p)"],  # p[2] reads as a pose of one number
+        ["q = get_actual_joint_positions()", "q[6] = 0.3", "movej(q)"],
+        ["q = get_actual_joint_positions()", "q[-1] = 0.3", "movej(q)"],
+        ["q = get_actual_joint_positions()", "q[0.6] = 0.3", "movej(q)"],
+        ["x = [0.1, 0.7]", "movej([x[0.9], 0, 0, 0, -1, 0])"],
+    ],
+)
+def test_a_list_whose_changed_element_is_not_settled_is_no_target(tmp_path, lines):
+    checked = check(tmp_path, changed(lines), "a.script")
+    assert [(each.line, each.level) for each in checked.verdicts if each.line == 2 + len(lines)] == [
+        (2 + len(lines), "fail")
+    ]
+    assert "target_not_given" in {each.finding.code for each in checked.findings}
+
+
+@pytest.mark.parametrize("line", ["get_target() = 0.3", "[0.1, 0.2] = 0.3", "p[0.3, 0.1, 0.4, 0, 3, 0] = 0.3"])
+def test_an_assignment_to_no_variable_is_named(tmp_path, line):
+    checked = check(tmp_path, changed([line, "movej([0.1, 0, 0, 0, -1, 0])"]), "a.script")
+    assert checked.level == "caution"
+    assert 3 in {each.place.line for each in checked.findings if each.level == "caution"}

@@ -20,6 +20,7 @@ from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.forward import forward
 from er3a.kinematics.solutions import branch_labels
 from er3a.pipeline.stages.workspace.capability_section import capability_context
+from er3a.pipeline.stages.workspace.compute import _left_out
 from er3a.pipeline.stages.workspace.entry import CapabilitySettings
 from er3a.pipeline.stages.workspace.model import CellLookup, ToolPointsElsewhere
 from er3a.pipeline.stages.workspace.tool_capability import ToolCapability, tool_capability
@@ -197,6 +198,10 @@ def test_no_place_is_no_error():
     context = context_of(load_robot("er3_600"), done)
     assert context["place_rows"] == []
     assert context["place_picture"] is None
+    proven = SimpleNamespace(proof=SimpleNamespace(bounds=(1.0, 1.0), width=0.1))
+    left_out = {each.subject for each in _left_out(SimpleNamespace(samples=1000), proven, None, (), done)}
+    assert "between_places" in left_out
+    assert "placed_box" not in left_out  # none was placed
 
 
 def test_a_box_lower_than_the_layers_of_places_stands_whole_or_is_told_why_not():

@@ -376,6 +376,10 @@ def _plain(builder: CodeBuilder, words: UrWords, place: Place, text: str) -> Non
             _run(builder, words, place, text)
         value = syntax.Invocation(THREAD, ()) if started else words.expression()
         words.finish()
+        if isinstance(left, syntax.Listed) and left.kind == "p":  # a variable of this name, or a pose that is no target
+            left, value = syntax.Variable("p"), syntax.Opaque(text)
+        elif not isinstance(left, (syntax.Variable, syntax.Member, syntax.Element)):
+            raise MisreadError("nothing can be assigned to this")
         builder.add(syntax.Assign(place, left, value, text, "global" if scope == "global" else "", scope == "local"))
         if isinstance(value, syntax.Invocation):
             _method(builder, value, place, text)
