@@ -54,8 +54,8 @@ class CheckOptions(ByValue):
     frames : T_flange_tool of tools and T_robot_base of bases (4, 4) in m, by the program's names for them
     scene : the obstacles; None for none
     near : thresholds below which a pose of a line is near-singular
-    assumed_speed : (n,), rad/s or m/s, for joints of unknown speed
-    acceleration_time : s, assumed time in which each joint reaches its full speed
+    joint_limits : speeds and accelerations of the joints; None for the robot's own speeds, and assumed ones where it
+        has none
     penetration_tolerance : m; no overlap deeper than this goes unnoticed
     assumed_margin : m; if the arm's shapes are assumed, a motion nearer to them than this is a caution
     measures : whether to check collisions
@@ -68,8 +68,7 @@ class CheckOptions(ByValue):
     frames: Mapping[str, Reals] = field(default_factory=dict)
     scene: Scene | None = None
     near: NearSingular = USUAL_NEAR
-    assumed_speed: Reals | None = None
-    acceleration_time: float = ACCELERATION_TIME
+    joint_limits: JointLimits | None = None
     penetration_tolerance: float = PENETRATION_TOLERANCE
     assumed_margin: float = ASSUMED_MARGIN
     measures: bool = True
@@ -188,9 +187,8 @@ class ProgramCheck(ByValue):
 
 def assumed_limits(robot: Robot, options: CheckOptions) -> JointLimits:
     """Joint limits, assumed where no document gives them."""
-    speed = options.assumed_speed
-    assumed = np.where(robot.slides, ASSUMED_SLIDE, ASSUMED_SPEED) if speed is None else speed
-    return joint_limits(robot, assumed, options.acceleration_time)
+    assumed = np.where(robot.slides, ASSUMED_SLIDE, ASSUMED_SPEED)
+    return options.joint_limits or joint_limits(robot, assumed, ACCELERATION_TIME)
 
 
 def check_program(program: Program, robot: Robot, options: CheckOptions | None = None) -> ProgramCheck:

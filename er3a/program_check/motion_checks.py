@@ -414,9 +414,9 @@ def _of(stretch: motion_faults.Interval[motion_faults.RateCause]) -> tuple[type,
 def _as_checked(cause: motion_faults.RateCause) -> found_in.CheckFinding:
     if isinstance(cause, motion_faults.TooFastIfAssumed):
         return found_in.FasterThanAssumed(cause.joint, cause.needed_deg_s, cause.limit_deg_s, cause.slides)
-    if isinstance(cause, motion_faults.TooFast):
+    if isinstance(cause, motion_faults.TooFast | motion_faults.AccelerationTooGreat):
         return cause
-    assert isinstance(cause, motion_faults.AccelerationTooGreatIfAssumed | motion_faults.AccelerationTooGreat)
+    assert isinstance(cause, motion_faults.AccelerationTooGreatIfAssumed)
     return found_in.AcceleratesMoreThanAssumed(cause.joint, cause.needed_deg_s2, cause.limit_deg_s2, cause.slides)
 
 
@@ -461,7 +461,8 @@ def _acceleration_findings(arm: Robot, acceleration: Reals, limits: JointLimits)
     (needed, slides), (able, _) = (
         joint_shown(arm, worst, float(rates[worst])) for rates in (acceleration, limits.acceleration)
     )
-    return [found_in.AcceleratesMoreThanAssumed(worst + 1, needed, able, slides)]
+    assumed, known = found_in.AcceleratesMoreThanAssumed, motion_faults.AccelerationTooGreat
+    return [(assumed if limits.acceleration_assumed else known)(worst + 1, needed, able, slides)]
 
 
 def _configuration_moment(

@@ -10,7 +10,7 @@ from er3a.collision.pairs import Pair, PairsUnexamined
 from er3a.kinematics.classes.class_solvers import BranchLabel
 from er3a.kinematics.singularity import SingularityType
 from er3a.kinematics.solutions import Unsolved
-from er3a.planning.motion_faults import AboveLimit, BelowLimit, TooFast
+from er3a.planning.motion_faults import AboveLimit, AccelerationTooGreat, BelowLimit, TooFast
 from er3a.planning.tool_proof import Undecided
 from er3a.programs.execution import EndKind
 from er3a.programs.instructions import Unresolved
@@ -347,6 +347,7 @@ CheckFinding = (
     | SlideExceeded
     | CombinationExceeded
     | TooFast
+    | AccelerationTooGreat
     | TargetNotGiven
     | FrameNotGiven
     | FrameTakenAsFlange
@@ -403,6 +404,7 @@ FAILS = frozenset(
             "slide_exceeded",
             "combination_exceeded",
             "too_fast",
+            "acceleration_too_great",
             "motion_collides",
             "arc_has_no_circle",
             "load_above_payload",

@@ -14,6 +14,7 @@ import pytest
 from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
+from er3a.pipeline.messages.programs import remedy
 from er3a.pipeline.results import Stored, read_results
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages import run
@@ -25,6 +26,7 @@ from er3a.pipeline.stages.programs.report import report
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.trajectory.compute import compute as compute_paths
 from er3a.pipeline.study import Study, load_study
+from er3a.planning.motion_faults import AccelerationTooGreat
 from er3a.programs.csv_program import write_csv
 
 ROBOTS = ("er3a_c60", "er3_600")
@@ -171,6 +173,32 @@ def test_a_long_listing_keeps_the_line_that_is_wrong_and_no_line_has_another_pro
     places = {each.address.partition("#")[2] for each in faults(found.results)}
     assert places == {"far.462", "far-2.3"}
     assert places < set(ids)
+
+
+def test_accelerations_that_the_study_gives_bind_programs_too(study, tmp_path):
+    """J1 speeds up at 4 rad/s² = 229.2 deg/s²: within a limit of 300 deg/s², too much for one of 100 deg/s²."""
+    (tmp_path / "quick.script").write_text(
+        "movej([0, -0.2, -0.2, 0, -1.2, 0])\nmovej([0.9, -0.2, -0.2, 0, -1.2, 0], a=4)\n"
+    )
+    listed = {
+        "name": "quick",
+        "title": "Quick",
+        "file": str(tmp_path / "quick.script"),
+        "start_deg": [0] * 4 + [-70, 0],
+    }
+    (tmp_path / "programs.yaml").write_text(json.dumps({"kind": "programs", "programs": [listed]}))
+    found = {}
+    for limit in (300.0, 100.0):
+        given = study.section(TrajectorySettings).model_copy(update={"acceleration_deg_s2": [limit] * 6})
+        own = with_entry(study, programs=str(tmp_path / "programs.yaml")).model_copy(update={"trajectory": given})
+        summary = compute_programs(own, "er3a_c60").summary
+        assert "own_accelerations" not in {each.subject for each in summary.not_examined}
+        found[limit] = [each.finding for each in summary.programs[0].findings if each.level == "fail"]
+    assert found[300.0] == []
+    assert found[100.0] == [AccelerationTooGreat(1, pytest.approx(np.degrees(4.0)), pytest.approx(100.0))]
+    percent, acceleration = re.findall(r"([\d.]+) %", remedy(found[100.0][0]))
+    assert float(acceleration) / 100 * np.degrees(4.0) == pytest.approx(100.0, rel=0.01)
+    assert (float(percent) / 100) ** 2 * np.degrees(4.0) <= 100.0
 
 
 def test_a_file_without_programs_is_no_reference_and_has_a_page(study, tmp_path):

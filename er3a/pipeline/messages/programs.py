@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from functools import singledispatch
-from typing import Any
+from typing import Any, get_args
 
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.pairs import LinkAndSolid
@@ -16,7 +16,7 @@ from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.planning import unit_of
 from er3a.pipeline.messages.say import Plural, by, joined, listed, say, say_as, sentence, texts, word
 from er3a.pipeline.stages.programs.model import FindingAt, ProgramCounts, ProgramSummary
-from er3a.planning.motion_faults import AboveLimit, BelowLimit, TooFast
+from er3a.planning.motion_faults import AboveLimit, AccelerationTooGreat, BelowLimit, TooFast
 from er3a.program_check import program_check_findings as found_in
 from er3a.program_check.program_check_findings import (
     RANKS,
@@ -124,7 +124,8 @@ STOPPED: dict[EndKind, str] = {
     "recursion": N_("Give the routine a condition to return."),
 }
 STAYS_MM = 1.0  # that a tool moves when it stays where it is
-PACED = (TooFast, FasterThanAssumed, AcceleratesMoreThanAssumed)
+Pace = TooFast | FasterThanAssumed | AccelerationTooGreat | AcceleratesMoreThanAssumed
+PACED = get_args(Pace)
 MAX_PAIRS = 3  # that are named of a collision
 FIGURES = {
     "programs_passed": N_("Programs that pass, of those meant to"),
@@ -533,7 +534,7 @@ def _(found: MotionCollides) -> str:
 
 
 @remedy.register
-def _(found: TooFast | FasterThanAssumed | AcceleratesMoreThanAssumed) -> str:
+def _(found: Pace) -> str:
     return _slower(_pace(found))
 
 
@@ -557,13 +558,15 @@ def remedy_at(finding: CheckFinding, joint_moves: Sequence[Sequence[float]]) -> 
     return sentence("remedy.joint_move", end=end)
 
 
-def _pace(found: TooFast | FasterThanAssumed | AcceleratesMoreThanAssumed) -> float:
+def _pace(found: Pace) -> float:
     """The share of its pace at which the joint keeps its limit: speeds go with it, accelerations with its square."""
     match found:
         case TooFast():
             return found.limit_deg_s / found.needed_deg_s
         case FasterThanAssumed():
             return found.assumed_deg_s / found.needed_deg_s
+        case AccelerationTooGreat():
+            return math.sqrt(found.limit_deg_s2 / found.needed_deg_s2)
         case AcceleratesMoreThanAssumed():
             return math.sqrt(found.assumed_deg_s2 / found.needed_deg_s2)
 

@@ -19,7 +19,7 @@ from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations,
 from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_of_rates
 from er3a.pipeline.stages.programs import model
 from er3a.pipeline.stages.programs.entry import ProgramsSettings
-from er3a.pipeline.stages.trajectory.motion import assumed_speeds, near_singular
+from er3a.pipeline.stages.trajectory.motion import limits_of, near_singular
 from er3a.pipeline.study import Study
 from er3a.program_check.check_program import CheckOptions, LocatedFinding, ProgramCheck, check_program
 from er3a.program_check.motion_checks import AssumedRates
@@ -49,7 +49,8 @@ def compute(study: Study, name: str) -> model.ProgramsResults:
     file = study.entry(name).programs
     listed = load_programs(file) if file else ProgramsFile(kind="programs")
     scene = study.scene(name, "trajectory")
-    options = replace(_options(study, name, listed, robot), scene=scene)
+    limits = limits_of(robot, study.section(TrajectorySettings))
+    options = replace(_options(study, name, listed), scene=scene, joint_limits=limits)
     summaries: list[model.ProgramSummary] = []
     lines: list[model.Lines] = []
     instructions: list[model.Instructions] = []
@@ -83,7 +84,7 @@ def compute(study: Study, name: str) -> model.ProgramsResults:
                 *left_out_of_collisions(
                     robot, bodies_of(robot, scene), scene, 1000 * options.penetration_tolerance, arms
                 ),
-                *left_out_of_rates(np.isfinite(robot.speed), acceleration=False, jerk=False),
+                *left_out_of_rates(np.isfinite(robot.speed), not limits.acceleration_assumed, jerk=False),
                 *_left_out(summaries, unknown_starts),
             ),
         ),
@@ -124,13 +125,11 @@ def _loads(program: model.ProgramSummary) -> Iterator[str]:
             )
 
 
-def _options(study: Study, name: str, listed: ProgramsFile, robot: Robot) -> CheckOptions:
+def _options(study: Study, name: str, listed: ProgramsFile) -> CheckOptions:
     paths, own = study.section(TrajectorySettings), study.section(ProgramsSettings)
     return CheckOptions(
         frames=listed.transforms(),
         near=near_singular(paths),
-        assumed_speed=assumed_speeds(robot, paths),
-        acceleration_time=paths.acceleration_time_s,
         penetration_tolerance=paths.penetration_tolerance_mm / 1000,
         assumed_margin=study.assumed_margin(name),
         assumed=AssumedRates(

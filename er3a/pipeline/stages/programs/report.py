@@ -47,7 +47,9 @@ def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) ->
         output,
         head_links={each.name: f"#{each.name}" for each in summary.programs},
         sections=sections,
-        limits_assumed=limits_assumed(summary.assumed_speed, acceleration=True),
+        limits_assumed=limits_assumed(
+            summary.assumed_speed, any(each.subject == "own_accelerations" for each in summary.not_examined)
+        ),
         faults={fault.name: fault for fault in faults(results)},
         player=player(robot, motions(results), scene),
         bodies=[each.name for each in scene.solids] if scene else [],
