@@ -313,9 +313,9 @@ class Cavity:
         return centroid
 
     def box(self) -> tuple[Reals, Reals]:
-        """Lowest and highest corner (3,), m, of what holds something proven empty, in the frame about axis 1."""
-        kept = self.empty > 0
-        cells, arcs = self.cells[kept], self.arcs[kept]
+        """Lowest and highest corner (3,), m, of a box that holds all of it, what is undecided too, in the frame about
+        axis 1."""
+        cells, arcs = self.cells, self.arcs
         share = np.linspace(0, 1, 49)
         azimuth = arcs[:, :1] + (arcs[:, 1:] - arcs[:, :1]) * share
         x, y, _ = np.moveaxis(in_space(cells[:, 1:2], azimuth, cells[:, 3:], self.bar), -1, 0)

@@ -242,10 +242,9 @@ class SampledVoid:
         centroid: Reals = grid.centres(self.cells).mean(axis=0)
         return centroid
 
-    def extent(self, grid: Grid) -> Reals:
-        """Extent along x, y, z, (3,), m."""
-        extent: Reals = (np.ptp(self.cells, axis=0) + 1) * grid.cell
-        return extent
+    def box(self, grid: Grid) -> tuple[Reals, Reals]:
+        """Lowest and highest corner (3,) of the box about its cells, m."""
+        return grid.origin + self.cells.min(axis=0) * grid.cell, grid.origin + (self.cells.max(axis=0) + 1) * grid.cell
 
 
 def find_voids(counts: Integers, inside: Flags) -> list[SampledVoid]:
@@ -427,7 +426,8 @@ class Void:
     ----------
     status : whether the lower volume is proven empty, or only samples suggest the void
     lower, upper : bounds of its volume, m^3
-    centroid, extent : (3,), m
+    centroid : (3,), m
+    low, high : (3,), m, corners of the box along x, y, z that nothing of it lies outside
     relaxed : what of it is reached with each limit widened; none if only samples suggest it
     holds_shoulder : whether it holds the point of axis 1 at the height of joint 2
     vertices, triangles : (V, 3), m, and (F, 3), its surface on blocks; none if only samples suggest it
@@ -439,7 +439,8 @@ class Void:
     lower: float
     upper: float
     centroid: Reals
-    extent: Reals
+    low: Reals
+    high: Reals
     cause: VoidCause
     relaxed: tuple[Relaxed | Unlimited, ...]
     holds_shoulder: bool
@@ -470,8 +471,9 @@ def sampled_only(voids: list[SampledVoid], grid: Grid, shoulder: Reals, proven: 
     found = []
     for void in voids:
         centroid = void.centroid(grid)
-        if any((np.abs(centroid - other.centroid) <= other.extent / 2).all() for other in proven):
+        if any(((other.low <= centroid) & (centroid <= other.high)).all() for other in proven):
             continue
+        low, high = void.box(grid)
         near = np.all(np.abs(void.cells - cell_of_shoulder) <= 1, axis=1)
         found.append(
             Void(
@@ -480,7 +482,8 @@ def sampled_only(voids: list[SampledVoid], grid: Grid, shoulder: Reals, proven: 
                 lower=0.0,
                 upper=len(void.cells) * grid.cell_volume,
                 centroid=centroid,
-                extent=void.extent(grid),
+                low=low,
+                high=high,
                 cause=OnlySampled(),
                 relaxed=(),
                 holds_shoulder=bool(np.any(near)),
@@ -500,7 +503,7 @@ def _void(
     )
     low, high = cavity.box()
     corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
-    extent = np.ptp(proven.in_base(corners), axis=0)
+    corners = proven.in_base(corners)
     size, (rho, _, z) = proven.section.size, (float(part[0]) for part in proven.in_section(shoulder[None]))
     near = (cavity.cells[:, [0, 2]] <= [rho + size, z + size]).all(axis=1)
     near &= (cavity.cells[:, [1, 3]] >= [rho - size, z - size]).all(axis=1)
@@ -513,7 +516,8 @@ def _void(
         lower=cavity.lower,
         upper=cavity.upper,
         centroid=proven.in_base(cavity.centroid()) + 0.0,
-        extent=extent,
+        low=corners.min(axis=0),
+        high=corners.max(axis=0),
         cause=cause_of(single, unlimited),
         relaxed=(*single, unlimited),
         holds_shoulder=bool(near.any()),

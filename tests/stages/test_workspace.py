@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from er3a.errors import InputError, ResultError
@@ -165,6 +166,21 @@ def test_void_centres_have_no_inverse_solution(small_results, random):
 
     assert not solvable(void.centroid_m)
     assert solvable([0.9, 0.1, 0.5])
+    low, high = void.low_m[2], void.high_m[2]
+
+    def meets(z):
+        """Whether an optimizer finds joints that take the tool to that height of axis 1."""
+        starts, bounds = random.uniform(robot.lower, robot.upper, (15, 6)), (robot.lower, robot.upper)
+        return any(
+            least_squares(lambda q: forward(robot, q)[:3, 3] - [0, 0, z], start, bounds=bounds).cost < 1e-12
+            for start in starts
+        )
+
+    lost = [z for z in np.linspace(low - 0.05, high + 0.05, 12) if not meets(z)]
+    assert low <= min(lost) < low + 0.3 * (high - low)
+    assert high - 0.3 * (high - low) < max(lost) <= high
+    box = f"z {round(1000 * low)} to {round(1000 * high)} mm of the base".replace("-", "−")
+    assert box in void_text(summary)
 
 
 def test_full_turn_of_joint_1_gives_a_symmetric_cloud():

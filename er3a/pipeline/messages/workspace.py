@@ -157,13 +157,13 @@ TEXTS = texts(
             ": centre at ({centre}) mm."
         ),
         "void.shoulder": (
-            "The tool point can't reach {lower:.3g} to {upper:.3g} L around the shoulder: {extent} mm, centre "
-            "({centre}) mm."
+            "The tool point can't reach {lower:.3g} to {upper:.3g} L around the shoulder, within {box} mm of the base."
         ),
         "void.away": (
-            "The tool point can't reach {lower:.3g} to {upper:.3g} L away from the shoulder: {extent} mm, centre "
-            "({centre}) mm."
+            "The tool point can't reach {lower:.3g} to {upper:.3g} L away from the shoulder, within {box} mm of the "
+            "base."
         ),
+        "void.side": "{axis} {low} to {high}",
         "void.cause#limit": "What makes it: {limits}{unconfirmed}. Never widen a joint limit to reach there.",
         "void.unconfirmed": ", which nothing confirms",
         "void.rests": "The bounds hold for {limits}, which nothing confirms.",
@@ -174,8 +174,8 @@ TEXTS = texts(
         ),
         "void.no_tool": "With a tool the void is elsewhere.",
         "void.pocket": (
-            "Out of reach too, but open to the outside: a larger pocket of {lower:.3g} to {upper:.3g} L, centre "
-            "({centre}) mm."
+            "Out of reach too, but open to the outside: a larger pocket of {lower:.3g} to {upper:.3g} L, within {box} "
+            "mm."
         ),
         "void.more": Plural(
             "count", "There is {count} other enclosed void.", "There are {count} other enclosed voids."
@@ -475,9 +475,11 @@ def _limits(cause: VoidCause) -> str:
 
 def _void_parts(void: model.VoidSummary) -> dict[str, float | str]:
     bounds = void.volume_m3
-    extent = millimetres(void.extent_m).replace(", ", " × ")
-    litres = {"lower": 1000 * bounds.lower, "upper": 1000 * bounds.upper}
-    return {**litres, "extent": extent, "centre": millimetres(void.centroid_m)}
+    box = [
+        sentence("void.side", axis=axis, low=millimetres((low,)), high=millimetres((high,)))
+        for axis, low, high in zip("xyz", void.low_m, void.high_m)
+    ]
+    return {"lower": 1000 * bounds.lower, "upper": 1000 * bounds.upper, "box": joined(box, ", ")}
 
 
 def millimetres(values: Sequence[float]) -> str:

@@ -347,7 +347,8 @@ class VoidSummary:
     status: Literal["proven_empty", "undersampled"]
     volume_m3: Bounds
     centroid_m: Triple
-    extent_m: Triple
+    low_m: Triple
+    high_m: Triple
     cause: VoidCause
     relaxed: tuple[Relaxed | Unlimited, ...]
     holds_shoulder: bool

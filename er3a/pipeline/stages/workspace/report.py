@@ -120,8 +120,7 @@ def _void_row(row: int, void: model.VoidSummary) -> list[str]:
         word("workspace.void_kind", VOID_KINDS, void.kind),
         word("workspace.void_status", VOID_STATUS, void.status),
         tr("{low} to {high}", low=number(low, 3), high=number(high, 3)),
-        ", ".join(fixed(1000 * value, 0) for value in void.centroid_m),
-        " × ".join(fixed(1000 * value, 0) for value in void.extent_m),
+        *(", ".join(fixed(1000 * value, 0) for value in corner) for corner in (void.low_m, void.high_m)),
         say(void.cause),
         tr("yes") if void.holds_shoulder else tr("no"),
     ]
