@@ -338,8 +338,8 @@ def table_to_use(robot: Robot, other: Robot, unconfirmed: str, evidence: TableEv
         parts.append(sentence("validation.left_open#open", names=unconfirmed))
         parts.append(
             tr(
-                "“One source”: only the source of {robot} gives it, which may contradict another table but confirms none of "
-                "its own values; ? and ~ no document settles it. Check all of these on the arm.",
+                "“One source”: only the source of {robot} gives it, which may contradict another table but confirms "
+                "none of its own values; ? and ~ no document settles it. Check all of these on the arm.",
                 robot=other.name,
             )
         )
