@@ -298,7 +298,7 @@ def how_far_off(found: LeftOpen) -> list[str]:
         parts = {"mm": found.off.mm, "deg": found.off.deg, "factor": factor, "entry": entry}
         sentences.append(sentence(f"validation.left_open#{form}", **parts))
     if found.unbounded:
-        sentences.append(sentence("validation.left_open#unbounded", names=shortened(found.unbounded)))
+        sentences.insert(0, sentence("validation.left_open#unbounded", names=shortened(found.unbounded)))
     return sentences
 
 
