@@ -444,7 +444,7 @@ def test_every_count_of_checks_is_of_one_scheme(study, stored, summaries, tmp_pa
     counts = {"independent": summary.counts.independent, "consistency": summary.counts.consistency}
     for kind, tally in counts.items():
         assert tiles[f"{kind}_checks"] == (tally.passed, tally.total)
-    words = "{0.passed} of {0.total} independent and {1.passed} of {1.total} consistency checks pass"
+    words = "{0.passed} of {0.total} independent checks and {1.passed} of {1.total} consistency checks (with the"
     assert words.format(*counts.values()) in say(summary.verdict.finding)
     page = page_of(study, stored[name], tmp_path)
     shown = re.findall(r"(\d+) of (\d+) (?:independent|consistency|checks|claims)", page)

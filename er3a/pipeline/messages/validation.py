@@ -94,7 +94,8 @@ TEXTS = texts(
         "counted_checks#independent": "{passed} of {total} independent checks pass",
         "counted_checks#consistency": "{same_passed} of {same_total} consistency checks pass, and none is independent",
         "counted_checks#both": (
-            "{passed} of {total} independent and {same_passed} of {same_total} consistency checks pass"
+            "{passed} of {total} independent checks and {same_passed} of {same_total} consistency checks (with the "
+            "table's own sources) pass"
         ),
         "validation.left_open#up_to": (
             "If an open or weak entry is wrong, the tool is off by up to {mm:.0f} mm and {deg:.0f} deg."
