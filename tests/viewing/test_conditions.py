@@ -54,9 +54,9 @@ def test_what_nothing_confirms_is_named_entry_by_entry_or_as_a_whole():
     names = "alpha 6, offset 6, direction 1, 2, 3, 4, 5, 6, all limits"
     assert unconfirmed(FOUND.parts, FOUND.unbounded) == names
     assert settled_parts(FOUND) == (
-        "Confirmed by independent documents: 16 of 17 lengths and twists (for 10 of these only the size; the sign "
-        "follows from open entries), 5 of 12 zeros and directions (for 5 of these only the size; the sign follows from "
-        f"open entries). Not confirmed: {names}."
+        "Confirmed by independent documents: 16 of 17 lengths and twists (10 of these only as long as the open "
+        "entries are right), 5 of 12 zeros and directions (5 of these only as long as the open entries are right). "
+        f"Not confirmed: {names}."
     )
     assert names in _condition(FOUND.parts, FOUND.unbounded)
     nothing = tuple(replace(part, settled=0, up_to_signs=0) for part in FOUND.parts)

@@ -136,7 +136,7 @@ TEXTS = texts(
         ),
         "advice.chosen": "{way}: {tool}; {time}",
         "advice.chosen#clear": "{way}: {tool}; {time}; the arm keeps {clearance:.1f} mm of clearance",
-        "advice.instead": "The path itself can't be driven",
+        "advice.instead": "Another motion, because the path itself can't be driven",
         "advice.slowly": "This is its shortest time, quicker than the {programmed:.2f} s programmed: another motion",
         "advice.near": "No part of it is safe: the arm is near-singular at the start",
         "advice.near#met": "No part of it is safe: the arm is singular at the start",

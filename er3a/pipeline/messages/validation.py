@@ -157,7 +157,7 @@ TEXTS = texts(
         "part_found#all": "all {part}",
         "part_found#some": "{settled} of {entries} {part}",
         "part_found#more": "{more} more of the {part}",
-        "part_found#up_to_signs": "for {count} of these only the size; the sign follows from open entries",
+        "part_found#up_to_signs": "{count} of these only as long as the open entries are right",
         "part_found#excluded": "{names} (contradicted)",
         "validation.no_reference": "There is no official, CAD or exported data to compare this model with.",
         "validation.model_unsound": "The model fails its internal checks: {check} {value}.",

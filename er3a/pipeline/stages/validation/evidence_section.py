@@ -40,7 +40,7 @@ SETTLED = ("settled", "settled_up_to_signs", "gauge")
 VERDICTS: Mapping[str, Mapping[Status, str]] = {  # in the three words that a reader of the index needs
     N_("confirmed"): {
         "settled": "",
-        "settled_up_to_signs": N_("its sign follows from open entries"),
+        "settled_up_to_signs": N_("as long as the open entries are right"),
         "gauge": N_("only the sum counts"),
     },
     N_("not confirmed"): {
