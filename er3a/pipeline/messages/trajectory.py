@@ -136,7 +136,6 @@ TEXTS = texts(
         ),
         "advice.chosen": "{way}: {tool}; {time}",
         "advice.chosen#clear": "{way}: {tool}; {time}; the arm keeps {clearance:.1f} mm of clearance",
-        "advice.instead": "Another motion, because the path itself can't be driven",
         "advice.slowly": "This is its shortest time, quicker than the {programmed:.2f} s programmed: another motion",
         "advice.near": "No part of it is safe: the arm is near-singular at the start",
         "advice.near#met": "No part of it is safe: the arm is singular at the start",
@@ -491,8 +490,7 @@ def repair_text(path: model.PathSummary, limits: model.LimitsUsed | None = None)
         slowly = sentence("advice.slowly", programmed=path.duration_s)
     unsaid = limits is None or not any(limits.speed_assumed)
     full = sentence("advice.full_speed") if unsaid and (motion.max_joint_speed_ratio or 0.0) >= FULL_SPEED else ""
-    first = sentence("advice.instead") if other else ""
-    return joined([first, chosen, slowly, near, _of_limits(motion, limits) if limits else "", full], ". ")
+    return joined([chosen, slowly, near, _of_limits(motion, limits) if limits else "", full], ". ")
 
 
 def _of_limits(motion: model.StrategyMotion, limits: model.LimitsUsed) -> str:

@@ -77,7 +77,8 @@ TEXTS = texts(
         ),
         "workspace.void_at_shoulder": (
             "An enclosed void of at least {litres:.3g} L surrounds the shoulder at ({x}, {y}, {z}) mm: the arm can't "
-            "fold far enough to reach it. There is no other enclosed void, so no joint range looks wrong."
+            "fold far enough to reach it. There is no other enclosed void that would hint at a wrong "
+            "limit; this confirms none."
         ),
         "workspace.no_void#sampled": "The samples leave no enclosed void inside the hull; no proof.",
         "workspace.no_void#undecided": (
@@ -157,12 +158,12 @@ TEXTS = texts(
             ": centre at ({centre}) mm."
         ),
         "void.shoulder": (
-            "The tool point can't reach {lower:.3g} to {upper:.3g} L around the shoulder: {extent} mm, centre "
-            "({centre}) mm."
+            "The tool point can't reach {lower:.3g} to {upper:.3g} L around the shoulder: {extent} mm at its "
+            "widest, centroid ({centre}) mm, which is not the middle of these."
         ),
         "void.away": (
-            "The tool point can't reach {lower:.3g} to {upper:.3g} L away from the shoulder: {extent} mm, centre "
-            "({centre}) mm."
+            "The tool point can't reach {lower:.3g} to {upper:.3g} L away from the shoulder: {extent} mm at its "
+            "widest, centroid ({centre}) mm, which is not the middle of these."
         ),
         "void.cause#limit": "What makes it: {limits}{unconfirmed}. Never widen a joint limit to reach there.",
         "void.unconfirmed": ", which nothing confirms (another limit, another void)",
@@ -174,7 +175,7 @@ TEXTS = texts(
         ),
         "void.no_tool": "With a tool the void is elsewhere.",
         "void.pocket": (
-            "Out of reach too, but open to the outside: a larger pocket of {lower:.3g} to {upper:.3g} L, centre "
+            "Out of reach too, but open to the outside: a larger pocket of {lower:.3g} to {upper:.3g} L, centroid "
             "({centre}) mm."
         ),
         "void.more": Plural(

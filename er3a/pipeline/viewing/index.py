@@ -520,6 +520,7 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         questions={stage.name: stage.question for stage in STAGES.values()},
         shown_figures=SHOWN_FIGURES,
         run_words=RUNS,
+        conventions=CONVENTIONS,
         most_faults=MAX_FAULTS,
         sweeps=sweep_sections(study, results),
         command=page.run_command(study, "index.html"),
