@@ -14,7 +14,7 @@ from er3a.pipeline.viewing.page import LED, led
         ("fail", ["trajectory"], "Never use this table"),
         ("pass", ["trajectory"], "Do not use it as it is: see trajectory"),
         ("caution", ["trajectory", "vision"], "Do not use it as it is: see trajectory, vision"),
-        ("caution", [], "Use it with care"),
+        ("caution", [], "Use it for planning only"),
         ("pass", [], "Use it: "),
         ("no_reference", [], "There is no evidence on its table"),
         ("not_computed", [], "There is no evidence on its table"),
@@ -26,7 +26,7 @@ def test_the_table_decides_first_then_what_fails(table, failed, start):
 
 def test_a_table_of_which_nothing_is_settled_is_told_from_one_that_is_nearly():
     assert decision("caution", [], unproven=True).startswith("Don't rely on it yet")
-    assert decision("caution", []).startswith("Use it with care")
+    assert decision("caution", []).startswith("Use it for planning only")
     assert decision("pass", [], unproven=True).startswith("Use it: ")
 
 

@@ -294,11 +294,12 @@ CauseT = TypeVar("CauseT", bound=Finding)
 
 @dataclass(frozen=True)
 class Interval(Generic[CauseT]):
-    """A stretch of time (s), and what is wrong in it."""
+    """A stretch of time (s), what is wrong in it, and, where that has a value, when it is worst."""
 
     start: float
     end: float
     cause: CauseT
+    worst: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -326,8 +327,10 @@ class RateLimit:
         return self.most * (1 + OVER)
 
 
-def rate_interval(limit: RateLimit, joint: int, start: float, end: float, most: float) -> Interval[RateCause]:
-    """A stretch on which a joint (from 0) exceeds a limit, by its largest value there."""
+def rate_interval(
+    limit: RateLimit, joint: int, start: float, end: float, most: float, worst: float
+) -> Interval[RateCause]:
+    """A stretch on which a joint (from 0) exceeds a limit, by its largest value there, at time ``worst``."""
     slides = limit.sliding is not None and bool(limit.sliding[joint])
     needed, allowed = (np.array([most, limit.most[joint]]) * (1000.0 if slides else np.degrees(1.0))).tolist()
     cause: RateCause
@@ -338,7 +341,7 @@ def rate_interval(limit: RateLimit, joint: int, start: float, end: float, most: 
         cause = made(joint + 1, needed, allowed, slides)
     else:
         cause = (TooFastIfAssumed if limit.assumed[joint] else TooFast)(joint + 1, needed, allowed, slides)
-    return Interval(start, end, cause)
+    return Interval(start, end, cause, worst)
 
 
 LimitCause = AboveLimit | BelowLimit | SlideExceeded | CombinationExceeded
@@ -410,8 +413,8 @@ def out_of_limits(robot: Robot, t: Reals, q: Reals, joints: Joints) -> list[Inte
         def beyond(at: float, side: LimitSide = side, bound: float = bound) -> float:
             return float(side.of(joints(np.asarray(at))) - bound - LIMIT_TOLERANCE)
 
-        for start, end, most in _where_positive(t, side.of(q) - bound - LIMIT_TOLERANCE, beyond):
-            found.append(Interval(start, end, side.cause(bound + most)))
+        for start, end, most, worst in _where_positive(t, side.of(q) - bound - LIMIT_TOLERANCE, beyond):
+            found.append(Interval(start, end, side.cause(bound + most), worst))
     return sorted(found, key=lambda interval: (interval.start, joints_of(interval.cause)))
 
 
@@ -430,8 +433,8 @@ def rates_exceeded(
         def excess(at: float, j: int = j) -> float:
             return float(np.abs(rate(np.array([at]))[0, j]) - limit.allowed[j])
 
-        for start, end, most in _where_positive(t, np.abs(values[:, j]) - limit.allowed[j], excess):
-            found.append(rate_interval(limit, j, start, end, limit.allowed[j] + most))
+        for start, end, most, worst in _where_positive(t, np.abs(values[:, j]) - limit.allowed[j], excess):
+            found.append(rate_interval(limit, j, start, end, limit.allowed[j] + most, worst))
     return sorted(found, key=lambda interval: (interval.start, interval.cause.joint))
 
 
@@ -448,9 +451,11 @@ def jerk_exceeded(times: Reals, jerk: Reals, steps: tuple[Reals, Reals], limit: 
         size = np.abs(jerk[:, j])
         for first, last in runs(size > limit.allowed[j]):
             stretch = float(times[first]), float(times[last])
-            found.append(rate_interval(limit, j, *stretch, float(size[first:last].max())))
+            top = first + int(np.argmax(size[first:last]))
+            found.append(rate_interval(limit, j, *stretch, float(size[top]), float(times[top])))
         for k in np.flatnonzero(np.abs(steps[1][:, j]) > limit.step_allowed[j]).tolist():
-            found.append(rate_interval(limit, j, float(steps[0][k]), float(steps[0][k]), np.inf))
+            at = float(steps[0][k])
+            found.append(rate_interval(limit, j, at, at, np.inf, at))
     return sorted(found, key=lambda interval: (interval.start, interval.cause.joint))
 
 
@@ -466,17 +471,19 @@ def unreachable(robot: Robot, followed: Followed) -> list[Interval[PathOutOfReac
     return found
 
 
-def _where_positive(t: Reals, values: Reals, function: Callable[[float], float]) -> list[tuple[float, float, float]]:
-    """Stretches of positive values, those between two grid points too: start, end (roots), and the largest value."""
+def _where_positive(t: Reals, values: Reals, function: Callable[[float], float]) -> list[Stretch]:
+    """Stretches of positive values, those between two grid points too: start, end (roots), the largest value, and
+    when."""
     found = []
     for first, last in runs(values > 0):
         start = _root(function, t, values, first - 1, first) if first > 0 else t[0]
         end = _root(function, t, values, last - 1, last) if last < len(t) else t[-1]
-        found.append((float(start), float(end), float(values[first:last].max())))
+        top = first + int(np.argmax(values[first:last]))
+        found.append((float(start), float(end), float(values[top]), float(t[top])))
     return found + _peaks_between(t, values, function)
 
 
-def _peaks_between(t: Reals, values: Reals, function: Callable[[float], float]) -> list[tuple[float, float, float]]:
+def _peaks_between(t: Reals, values: Reals, function: Callable[[float], float]) -> list[Stretch]:
     """Stretches of positive values about a peak between grid points that are not positive themselves.
 
     A peak is searched for where the parabola through a highest point and its neighbours rises at least halfway to
@@ -496,7 +503,7 @@ def _peaks_between(t: Reals, values: Reals, function: Callable[[float], float]) 
             scipy.optimize.brentq(function, *sorted((side, best.x)), xtol=1e-12 * (t[-1] - t[0]))
             for side in t[[i - 1, i + 1]]
         ]
-        found.append((float(ends[0]), float(ends[1]), float(-best.fun)))
+        found.append((float(ends[0]), float(ends[1]), float(-best.fun), float(best.x)))
     return found
 
 
@@ -584,7 +591,11 @@ class LimitCheck:
 
     def intervals(self) -> list[Interval[LimitCause]]:
         """One for each limit, side and stretch."""
-        found = [Interval(start, end, side.cause(most)) for side, part in self._sides for start, end, most in part]
+        found = [
+            Interval(start, end, side.cause(most), worst)
+            for side, part in self._sides
+            for start, end, most, worst in part
+        ]
         return sorted(found, key=lambda interval: (interval.start, joints_of(interval.cause)))
 
 
@@ -617,7 +628,7 @@ class RateCheck:
 
     def _steps(self, j: int, times: Reals, steps: Reals) -> list[Stretch]:
         """Steps (m, n) of the acceleration at times (m,) that exceed the limit of joint ``j``."""
-        return [(t, t, np.inf) for t in times[steps[:, j] > self._limit.step_allowed[j]].tolist()]
+        return [(t, t, np.inf, t) for t in times[steps[:, j] > self._limit.step_allowed[j]].tolist()]
 
     def intervals(self) -> list[Interval[RateCause]]:
         """One for each joint and stretch."""

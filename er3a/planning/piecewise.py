@@ -31,7 +31,7 @@ SAME_TIME = 1e-13  # share of the duration
 LOCATED = 1e-14  # share of the duration
 PIECES_AT_ONCE = 4096
 TIMES_AT_ONCE = 20_000
-Stretch = tuple[float, float, float]
+Stretch = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +77,7 @@ class Pieces:
         )
 
     def above(self, level: float, found: list[Stretch] | None = None) -> list[Stretch]:
-        """Stretches on which the function is greater than a level: start, end, and its largest value there.
+        """Stretches on which the function is greater than a level: start, end, its largest value there, and when.
 
         Parameters
         ----------
@@ -91,11 +91,13 @@ class Pieces:
                     continue
                 start = float(t[k]) if values[k] > level else self.root(i, t[k], t[k + 1], level)
                 end = float(t[k + 1]) if values[k + 1] > level else self.root(i, t[k], t[k + 1], level)
-                most = float(max(values[k], values[k + 1]))
+                top = k + int(values[k + 1] > values[k])
+                most, at = float(values[top]), float(t[top])
                 if found and found[-1][1] >= start:
-                    start, _, before = found.pop()
-                    most = max(most, before)
-                found.append((start, end, most))
+                    start, _, *before = found.pop()
+                    if before[0] >= most:
+                        most, at = before
+                found.append((start, end, most, at))
         return found
 
     def peak(self) -> tuple[float, float]:

@@ -50,6 +50,7 @@ def test_limit_that_is_left_between_two_check_points_only():
     (interval,) = out_of_limits(robot, GRID, joints(GRID), joints)
     half = np.sqrt(np.radians(0.01) / 4)
     assert (interval.start, interval.end) == pytest.approx((0.525 - half, 0.525 + half), abs=1e-7)
+    assert interval.worst == pytest.approx(0.525, abs=1e-6)
     assert interval.cause == AboveLimit(1, pytest.approx(170.01, abs=0.01), pytest.approx(170))
 
 
@@ -65,6 +66,7 @@ def test_speed_that_is_passed_between_two_check_points_only(sense):
     np.testing.assert_allclose(move.joints(np.array([interval.start, interval.end]))[1][:, 5], sense * limit.allowed[5])
     (exact,) = rate_intervals(move.polynomials(), limit)
     assert (exact.start, exact.end) == pytest.approx((interval.start, interval.end), abs=1e-9)
+    assert (exact.worst, interval.worst) == pytest.approx((0.5, 0.5), abs=1e-5)
     assert exact.cause.needed_deg_s == pytest.approx(interval.cause.needed_deg_s, rel=1e-9)
     assert interval.cause == TooFast(6, pytest.approx(840.2, abs=0.1), pytest.approx(840))
 
@@ -76,6 +78,7 @@ def test_a_step_of_the_acceleration_exceeds_any_jerk_in_both_senses(sense):
     jerk = sense * np.array([[9.0, 99.0], [11.0, 0.0]])
     found = jerk_exceeded(np.array([0.0, 1.0, 2.0]), jerk, steps, limit)
     assert [(each.start, each.end, each.cause.joint) for each in found] == [(0.5, 0.5, 1), (1.0, 2.0, 1)]
+    assert [each.worst for each in found] == [0.5, 1.0]
     assert [each.cause.needed_deg_s3 for each in found] == [None, pytest.approx(np.degrees(11.0))]
 
 

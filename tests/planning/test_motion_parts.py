@@ -55,6 +55,7 @@ def test_limit_left_over_many_parts_is_one_stretch(in_parts):
     half = np.sqrt(0.2)
     assert (found.start, found.end) == pytest.approx((1 - half, 1 + half), abs=1e-8)
     assert found.cause.reached_deg == pytest.approx(np.degrees(top + 0.2), abs=1e-9)
+    assert found.worst == pytest.approx(1.0, abs=1e-6)
 
 
 def test_rates_over_many_parts(in_parts):
@@ -62,6 +63,7 @@ def test_rates_over_many_parts(in_parts):
     (fast,) = rate_intervals(motion, rate_limit(1, 3.0))
     assert (fast.start, fast.end) == pytest.approx((1.0, 2.0), abs=1e-6)  # one part in a million is allowed
     assert fast.cause.needed_deg_s == pytest.approx(np.degrees(12.0), rel=1e-9)
+    assert fast.worst == pytest.approx(2.0, abs=1e-9)
     (steep,) = rate_intervals(motion, rate_limit(2, 6.0))
     assert (steep.start, steep.end) == pytest.approx((1.0, 2.0), abs=1e-6)  # one part in a million is allowed
     (last,) = rate_intervals(motion, rate_limit(3, 6.1))  # no step at the borders, one to rest at the end

@@ -447,7 +447,7 @@ def test_every_count_of_checks_is_of_one_scheme(study, stored, summaries, tmp_pa
     counts = {"independent": summary.counts.independent, "consistency": summary.counts.consistency}
     for kind, tally in counts.items():
         assert tiles[f"{kind}_checks"] == (tally.passed, tally.total)
-    words = "{0.passed} of {0.total} independent and {1.passed} of {1.total} consistency checks pass"
+    words = "{0.passed} of {0.total} independent checks and {1.passed} of {1.total} consistency checks (with the"
     assert words.format(*counts.values()) in say(summary.verdict.finding)
     page = page_of(study, stored[name], tmp_path)
     shown = re.findall(r"(\d+) of (\d+) (?:independent|consistency|checks|claims)", page)
@@ -516,7 +516,7 @@ def test_an_entry_that_only_the_source_of_the_table_to_use_gives_has_one_mark(su
     changed = {entry for entry, mark in marks(alone).items() if mark != marks(beside)[entry]}
     assert changed == {f"direction{joint}" for joint in (1, 4, 6)}
     own = marks(evidence_section(load_robot("er3a_c60"), real))
-    assert {marks(beside)[entry] for entry in changed} == {own[entry] for entry in changed} == {"="}
+    assert {marks(beside)[entry] for entry in changed} == {own[entry] for entry in changed} == {"one source"}
     assert (alone["of_one"], beside["of_one"]) == ("", "direction 1, 4, 6")
     assert [row[0] for row in beside["open_rows"] if row[0] in changed] == sorted(changed)
 

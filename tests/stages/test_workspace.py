@@ -126,7 +126,7 @@ def test_a_void_at_the_shoulder_names_the_limit_that_nothing_confirms_and_a_cont
     study, name = load_study("config/small.yaml"), "er3a_c60"
     stored = read_stage(small_results("workspace", name, study), STAGES["workspace"])
     lower = np.degrees(study.robot(name).lower[2])
-    said = f"What makes it: J3 ≥ {lower:.4g} deg, which nothing confirms. Never widen".replace("-", "−")
+    said = f"J3 ≥ {lower:.4g} deg, which nothing confirms (another limit, another void). Never widen".replace("-", "−")
     text = void_text(stored.results.summary, confirmed=False)
     assert said in text
     assert "extended" not in text  # no recipe for a larger limit

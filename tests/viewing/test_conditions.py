@@ -54,9 +54,9 @@ def test_what_nothing_confirms_is_named_entry_by_entry_or_as_a_whole():
     names = "alpha 6, offset 6, direction 1, 2, 3, 4, 5, 6, all limits"
     assert unconfirmed(FOUND.parts, FOUND.unbounded) == names
     assert settled_parts(FOUND) == (
-        "Confirmed by independent documents: 16 of 17 lengths and twists (for 10 of these only the size; the sign "
-        "follows from open entries), 5 of 12 zeros and directions (for 5 of these only the size; the sign follows from "
-        f"open entries). Not confirmed: {names}."
+        "Confirmed by independent documents: 16 of 17 lengths and twists (10 of these only as long as the open "
+        "entries are right), 5 of 12 zeros and directions (5 of these only as long as the open entries are right). "
+        f"Not confirmed: {names}."
     )
     assert names in _condition(FOUND.parts, FOUND.unbounded)
     nothing = tuple(replace(part, settled=0, up_to_signs=0) for part in FOUND.parts)
@@ -74,16 +74,17 @@ def test_weak_entries_which_have_no_name_here_are_counted():
 
 
 def test_a_turned_flange_moves_the_tip_of_a_tool():
-    (first, _) = how_far_off(FOUND)
+    unbounded, first = how_far_off(FOUND)  # the larger error stands first
+    assert unbounded.endswith("the tool could be off by any amount.")
     assert first.startswith(
         "If an open or weak entry (alpha 6, offset 6) is wrong, the tool point (without a tool: the"
     )
     assert "off by up to 2 times its distance from there. Run no Cartesian target with a tool" in first
-    (quarter, _) = how_far_off(replace(FOUND, off=ToolOff(0.0, 90.0)))
+    (_, quarter) = how_far_off(replace(FOUND, off=ToolOff(0.0, 90.0)))
     chord = np.linalg.norm(np.array([1.0, 0.0]) - [0.0, 1.0])  # of a quarter turn
     assert f"{chord:.2g} times its distance" in quarter
     weak = replace(FOUND, parts=(replace(FOUND.parts[0], settled=5), *FOUND.parts[1:]))
-    assert "If an open or weak entry is wrong" in how_far_off(weak)[0]  # one more is not settled, and has no name here
+    assert "If an open or weak entry is wrong" in how_far_off(weak)[1]  # one more is not settled, and has no name here
 
 
 def test_other_entries_are_to_be_checked_only_where_there_are_others():
@@ -194,17 +195,17 @@ def test_the_index_names_what_passes_through_the_box_or_its_stand(over):
         "trajectory": {"into": pytest.approx(2.75)} | below,
         "programs": {"through": pytest.approx(2.75)},
     }
-    assert "into (from 2.75 s)" in found.text
-    assert "through (from 2.75 s)" in found.text
-    assert "beside" not in found.text
+    assert found.text.startswith("“Box at”: ")
     assert found.text.endswith("Not compared, or not all of it: lost, still.")
-    assert found.short.endswith(f"or its stand in {2 if over else 1} of the paths, 1 of the programs.")
+    sound = {"trajectory": ["below", "beside"], "programs": ["through", "still"]}
+    counts = f"{'1 of the 2 paths, ' if over else ''}1 of the 2 programs"
+    assert found.short(sound).endswith(f"or its stand in {counts} that pass without them.")
 
 
 def test_without_motions_or_without_a_place_nothing_is_said_to_be_free():
     assert _passes({}) is None
     alone = _passes({"workspace": placed()})
-    assert (alone.short, alone.text) == ("No path or program was compared with its place.", "")
+    assert (alone.short({}), alone.text) == ("No path or program was compared with its place.", "")
     clear = moving(
         ProgramsResults, ProgramMotion, "program", SimpleNamespace(programs=named("far")), {"far": (500.0, 0.0)}
     )

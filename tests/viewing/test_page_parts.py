@@ -51,7 +51,7 @@ def test_the_table_to_use_is_whole_and_as_its_file_gives_it():
     ]
     section = table_to_use(article, real, "alpha 6, all limits", SimpleNamespace(entries=open_ones))
     rows = [[value for value, *_ in cells] for _, cells in section["rows"]]
-    assert "Not confirmed: alpha 6, all limits. Marks: = only the source of er3a_c60 gives it" in section["text"]
+    assert "Not confirmed: alpha 6, all limits. “One source”: only the source of er3a_c60 gives it" in section["text"]
     assert [mark for _, cells in section["rows"] for *_, mark in cells if mark] == ["?"]
     assert section["rows"][5][1][1][2] == "?"
     assert section["page"] == "../er3a_c60/validation.html"
@@ -93,7 +93,7 @@ def test_the_index_marks_each_entry_of_a_table_as_validation_found_it(small_resu
             assert (status, float(value.replace("−", "-"))) == (expected, round(entry.value, 3)), entry
             assert f'<span class="{status}">' in legend
             if status == "contradicted":
-                given, alone = re.search("→ <strong>(.*?)( =)?</strong>", rest).groups()
+                given, alone = re.search("→ <strong>(.*?)( one source)?</strong>", rest).groups()
                 given = float(given.replace("−", "-"))
                 assert bool(alone) == (to_use[entry.entry] == "consistent"), entry
                 assert entry.interval[0] <= given <= entry.interval[1], entry

@@ -152,7 +152,9 @@ TEXTS = texts(
             "Not known: mount nothing until the manufacturer gives the rated payload. Whether the motors carry a load "
             "was not examined."
         ),
-        "payload.rated": "The robot's file gives a rated payload of {kg:.3g} kg; nothing here confirms it.",
+        "payload.rated": (
+            "The robot's file gives a rated payload of {kg:.3g} kg, which nothing confirms: don't rely on it."
+        ),
         "impossible_inertia": "link {link}: no body can have this inertia ({why})",
     }
 )

@@ -191,7 +191,7 @@ def decision(
             "geometry."
         )
     if table == "caution":
-        return tr("Use it with care: nothing contradicts its table, but part of it is not settled.")
+        return tr("Use it for planning only: nothing contradicts its table, but part of it is not settled.")
     return tr("There is no evidence on its table: check it before you use it.")
 
 

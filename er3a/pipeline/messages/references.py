@@ -34,7 +34,7 @@ STATUS_WORDS = {
     "settled_up_to_signs": N_("settled but for signs"),
     "weak": N_("weak"),
     "contradicted": N_("contradicted"),
-    "consistent": N_("consistent"),
+    "consistent": N_("one source"),
     "open": N_("open"),
     "gauge": N_("free choice"),
     "given": N_("given"),

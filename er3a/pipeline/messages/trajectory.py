@@ -88,6 +88,7 @@ TEXTS = texts(
         "dependent.met": "{type} at t = {when} s",
         "path.jump": "the branch in use ends at t = {t:.4g} s, J{joint} would jump",
         "path.stretch": "{when}: {cause}",
+        "path.worst": "{cause} at t = {t:.4g} s",
         "path.when": "from t = {start:.4g} to {end:.4g} s",
         "pair_touches": "{pair} overlap from t = {t0_s:.4g} s, up to {depth_mm:.1f} mm at t = {t_s:.4g} s",
         "bodies_overlap.more": "{touches}; and more later",
@@ -136,7 +137,6 @@ TEXTS = texts(
         "advice.chosen": "{way}: {tool}; {time}",
         "advice.chosen#clear": "{way}: {tool}; {time}; the arm keeps {clearance:.1f} mm of clearance",
         "advice.of_assumed": "Clearance is that of assumed shapes: the true ones may come nearer",
-        "advice.instead": "The path itself can't be driven",
         "advice.slowly": "This is its shortest time, quicker than the {programmed:.2f} s programmed: another motion",
         "advice.near": "No part of it is safe: the arm is near-singular at the start",
         "advice.near#met": "No part of it is safe: the arm is singular at the start",
@@ -309,7 +309,7 @@ def _(jump: model.Jump) -> str:
 
 @say.register
 def _(stretch: model.Stretch) -> str:  # type: ignore[type-arg]  # singledispatch takes no parametrised class
-    return sentence("path.stretch", when=_when(stretch), cause=say(stretch.cause))
+    return sentence("path.stretch", when=_when(stretch), cause=_with_worst(stretch, say(stretch.cause)))
 
 
 def _when(stretch: model.Stretch) -> str:  # type: ignore[type-arg]
@@ -326,7 +326,7 @@ def _(found: model.BodiesOverlap) -> str:
 
 def cause_text(path: model.PathSummary, part: model.Stretch) -> str:  # type: ignore[type-arg]
     """Why a stretch of a path is listed; what is undecided is no open question where something else decides."""
-    cause = say(part.cause)
+    cause = _with_worst(part, say(part.cause))
     if part in path.undecided and path.verdict != "undecided":
         return sentence("path.either_way", open=cause)
     return cause
@@ -338,7 +338,10 @@ def first_faults(path: model.PathSummary) -> list[tuple[float, str]]:
     fast = [[part for part in path.too_fast if part.cause.code.endswith(IF_ASSUMED) is each] for each in (False, True)]
     grave: list[Sequence[model.Stretch[Any]]] = [path.unreachable, path.out_of_limits, path.collisions]
     firsts = [min(each, key=lambda part: part.t0_s) for each in (*grave, *fast) if each]
-    found = [(part.t0_s, _until_when(part) if part in path.too_fast else say_first(part.cause)) for part in firsts]
+    found = [
+        (part.t0_s, _until_when(part) if part in path.too_fast else _with_worst(part, say_first(part.cause)))
+        for part in firsts
+    ]
     edge = min((part.t0_s for part in path.unreachable), default=math.inf) - AT_EDGE
     events = [] if path.in_joint_space else [each for each in path.singularities if each.crossing and each.t_s < edge]
     found += [(event.t_s, sentence("path.singular", type=event_word(event))) for event in events[:1]]
@@ -351,8 +354,19 @@ def first_faults(path: model.PathSummary) -> list[tuple[float, str]]:
 
 def _until_when(part: model.Stretch[RateCause]) -> str:
     """What is too fast, and until when where that is not but a moment: its figure is the greatest of the stretch."""
-    lasts = part.t1_s - part.t0_s >= MOMENT
-    return sentence("path.too_fast_until", cause=say(part.cause), end=part.t1_s) if lasts else say(part.cause)
+    cause = _with_worst(part, say(part.cause))
+    return sentence("path.too_fast_until", cause=cause, end=part.t1_s) if _lasts(part) else cause
+
+
+def _with_worst(part: model.Stretch[Any], cause: str) -> str:
+    """A cause, and when it is worst on a stretch that is not but a moment."""
+    if part.worst_s is None or not _lasts(part):
+        return cause
+    return sentence("path.worst", cause=cause, t=part.worst_s)
+
+
+def _lasts(part: model.Stretch[Any]) -> bool:
+    return part.t1_s - part.t0_s >= MOMENT
 
 
 def advice(path: model.PathSummary, limits: model.LimitsUsed | None = None, *, assumed: bool = False) -> str | None:
@@ -485,9 +499,8 @@ def repair_text(path: model.PathSummary, limits: model.LimitsUsed | None = None,
         slowly = sentence("advice.slowly", programmed=path.duration_s)
     unsaid = limits is None or not any(limits.speed_assumed)
     full = sentence("advice.full_speed") if unsaid and (motion.max_joint_speed_ratio or 0.0) >= FULL_SPEED else ""
-    first = sentence("advice.instead") if other else ""
     shapes = sentence("advice.of_assumed") if assumed and clearance is not None else ""
-    return joined([first, chosen, shapes, slowly, near, _of_limits(motion, limits) if limits else "", full], ". ")
+    return joined([chosen, shapes, slowly, near, _of_limits(motion, limits) if limits else "", full], ". ")
 
 
 def _of_limits(motion: model.StrategyMotion, limits: model.LimitsUsed) -> str:

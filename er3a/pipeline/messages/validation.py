@@ -97,7 +97,8 @@ TEXTS = texts(
         "counted_checks#independent": "{passed} of {total} independent checks pass",
         "counted_checks#consistency": "{same_passed} of {same_total} consistency checks pass, and none is independent",
         "counted_checks#both": (
-            "{passed} of {total} independent and {same_passed} of {same_total} consistency checks pass"
+            "{passed} of {total} independent checks and {same_passed} of {same_total} consistency checks (with the "
+            "table's own sources) pass"
         ),
         "validation.left_open#up_to": (
             "If an open or weak entry is wrong, the tool is off by up to {mm:.0f} mm and {deg:.0f} deg."
@@ -159,7 +160,7 @@ TEXTS = texts(
         "part_found#all": "all {part}",
         "part_found#some": "{settled} of {entries} {part}",
         "part_found#more": "{more} more of the {part}",
-        "part_found#up_to_signs": "for {count} of these only the size; the sign follows from open entries",
+        "part_found#up_to_signs": "{count} of these only as long as the open entries are right",
         "part_found#excluded": "{names} (contradicted)",
         "validation.no_reference": "There is no official, CAD or exported data to compare this model with.",
         "validation.model_unsound": "The model fails its internal checks: {check} {value}.",
@@ -301,7 +302,7 @@ def how_far_off(found: LeftOpen) -> list[str]:
         parts = {"mm": found.off.mm, "deg": found.off.deg, "factor": factor, "entry": entry}
         sentences.append(sentence(f"validation.left_open#{form}", **parts))
     if found.unbounded:
-        sentences.append(sentence("validation.left_open#unbounded", names=shortened(found.unbounded)))
+        sentences.insert(0, sentence("validation.left_open#unbounded", names=shortened(found.unbounded)))
     return sentences
 
 

@@ -77,7 +77,8 @@ TEXTS = texts(
         ),
         "workspace.void_at_shoulder": (
             "An enclosed void of at least {litres:.3g} L surrounds the shoulder at ({x}, {y}, {z}) mm: the arm can't "
-            "fold far enough to reach it. There is no other enclosed void, so no joint range looks wrong."
+            "fold far enough to reach it. There is no other enclosed void that would hint at a wrong "
+            "limit; this confirms none."
         ),
         "workspace.no_void#sampled": "The samples leave no enclosed void inside the hull; no proof.",
         "workspace.no_void#undecided": (
@@ -165,7 +166,7 @@ TEXTS = texts(
         ),
         "void.side": "{axis} {low} to {high}",
         "void.cause#limit": "What makes it: {limits}{unconfirmed}. Never widen a joint limit to reach there.",
-        "void.unconfirmed": ", which nothing confirms",
+        "void.unconfirmed": ", which nothing confirms (another limit, another void)",
         "void.rests": "The bounds hold for {limits}, which nothing confirms.",
         "void.cause#noun": "Its cause: {cause}.",
         "void.expected": (
@@ -200,8 +201,8 @@ TEXTS = texts(
             "scene file and run again."
         ),
         "box.range": (
-            "Stands {least} to {most} mm high pass the same checks, but nearer to a singular pose: at one of them "
-            "manipulability falls to {percent:.2g} % of that at {gap} mm, or less."
+            "Keep this height: other stands of {least} to {most} mm pass the same checks, but bring the arm nearer to "
+            "a singular pose (at one of them manipulability is {percent:.2g} % of that at {gap} mm, or less)."
         ),
         "box.proven#all": "the tool point, {tilt}, reaches all of it (proven); {unchecked}",
         "box.proven#upper": (
@@ -213,7 +214,9 @@ TEXTS = texts(
         ),
         "box.tilt#down": "tilted up to {cone:g} deg from straight down",
         "box.tilt#along": "tilted up to {cone:g} deg from ({axis})",
-        "box.unchecked": "clearance was sampled, collisions with the box and what it stands on were not checked",
+        "box.unchecked": (
+            "clearance to the scene was only sampled, collisions with the box and its stand were not checked"
+        ),
         "workspace.tool_points_elsewhere": (
             "Nowhere: the arm can't tilt its tool, which points along ({x:.2f}, {y:.2f}, {z:.2f}) and not within the "
             "cone."

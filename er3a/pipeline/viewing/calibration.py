@@ -256,7 +256,7 @@ def _maps(errors: MeasuredErrors) -> Picture:
         for row, (across, up, x_label, y_label) in enumerate(views):
             ax = axes[row, column]
             drawn = ax.scatter(
-                across[order], up[order], c=distance[order], s=14, cmap="viridis", vmin=0, vmax=top, rasterized=True
+                across[order], up[order], c=distance[order], s=14, cmap="viridis_r", vmin=0, vmax=top, rasterized=True
             )
             equal_scale(ax, x_label, y_label)
         axes[0, column].set_title(tr(MODELS[model]))

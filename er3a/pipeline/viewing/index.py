@@ -520,6 +520,7 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         questions={stage.name: stage.question for stage in STAGES.values()},
         shown_figures=SHOWN_FIGURES,
         run_words=RUNS,
+        conventions=CONVENTIONS,
         most_faults=MAX_FAULTS,
         sweeps=sweep_sections(study, results),
         command=page.run_command(study, "index.html"),
@@ -612,6 +613,12 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
     unproven, settled = _settled(finding)
     box_range = _box_range(stored["workspace"].results) if "workspace" in stored else ""
     passes = _passes({stage: each for stage, each in stored.items() if heads[stage].status != "not_computed"})
+    runs = [
+        _run(stage, stored[stage].results)
+        for stage in RUNS
+        if stage in stored and heads[stage].status != "not_computed"
+    ]
+    sound = {run["stage"]: run["sound"] for run in runs}
     return {
         "robot": robot,
         "table": table,
@@ -624,19 +631,16 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         ),
         "instead": {instead: f"#{instead}"} if instead else {},
         "dh_instead": {instead: f"#dh-{instead}"} if instead else {},
-        "answers": [*_answers(heads, robot, passes, box_range)],
+        "answers": [*_answers(heads, robot, passes.short(sound) if passes else "", box_range)],
         "notes": {stage: _note(stage, head, stored[stage].results) for stage, head in heads.items()},
         "bare": any(
             _misses(heads[stage], "carried") or _misses(heads[stage], "tool") for stage in RUNS if stage in heads
         ),
         "bodies": [each.name for each in scene.solids] if (scene := study.scene(name, "trajectory")) else [],
-        "runs": [
-            _run(stage, stored[stage].results)
-            for stage in RUNS
-            if stage in stored and heads[stage].status != "not_computed"
-        ],
+        "runs": runs,
         "condition": _condition(_parts(heads), getattr(finding, "unbounded", ())),
         "box": joined([_without_box(), passes.text], " ") if passes else "",
+        "in_box": passes.through if passes else {},
         "shapes": next(
             (say(replace(shapes, near=())) for shapes in (head.shapes for head in heads.values()) if shapes), ""
         ),
@@ -665,7 +669,7 @@ def _proposed(finding: object) -> dict[str, str]:
     step = [page.whole_sentence(say(proposal)), tr(settles, entry=entry if " " in entry else shortened([entry]))]
     open_ = sum(part.entries - part.settled - part.up_to_signs for part in finding.parts)
     if open_ > 1 or any(name != entry for name in finding.unbounded):
-        step.append(tr("Then check the other entries that are not settled."))
+        step.append(tr("Then check the other entries that are not settled, as that page says."))
     return {"measurement": joined(step, " "), "entry": entry.replace(" ", "")}
 
 
@@ -682,9 +686,7 @@ def _settled(finding: object) -> tuple[bool, str]:
     return part is not None and not (part.settled or part.up_to_signs), said
 
 
-def _answers(
-    heads: Mapping[str, Head], robot: Robot, passes: _Passes | None, box_range: str
-) -> Iterator[tuple[str, str, str]]:
+def _answers(heads: Mapping[str, Head], robot: Robot, passes: str, box_range: str) -> Iterator[tuple[str, str, str]]:
     """What is asked of an arm first: the question, its answer and where it is shown; ``box_range``: how high the box's
     stand may be."""
     workspace = heads["workspace"].summary if "workspace" in heads else None
@@ -693,7 +695,7 @@ def _answers(
         if box and _misses(heads["workspace"], "tool"):
             bare = tr("No tool is given: the flange's own centre enters the box. Repeat it with your tool's length.")
             box = joined([box, bare], " ")
-        box = joined([box, box_range, passes.short if passes else ""], " ") if box else ""
+        box = joined([box, box_range, passes], " ") if box else ""
         yield tr("Tray or box"), box, "workspace.html#placement"
     summary = heads["dynamics"].summary if "dynamics" in heads else None
     yield tr("Payload"), payload_text(summary, robot), "dynamics.html#payload" if summary else ""
@@ -744,33 +746,14 @@ class _Passes:
     unseen: tuple[str, ...]
 
     @property
-    def short(self) -> str:
-        """How many there are."""
-        if not self.through:
-            return tr("No path or program was compared with its place.")
-        counts = [
-            tr("{count} of the {what}", count=len(found), what=tr(RUNS[stage]))
-            for stage, found in self.through.items()
-            if found
-        ]
-        if not counts:
-            return ""
-        return tr("The tool point passes through it or its stand in {runs}.", runs=joined(counts, ", "))
-
-    @property
     def text(self) -> str:
-        """Which, and from when on."""
+        """What was compared, and what of it was found."""
         if not self.through:
             return ""
-        named = [
-            tr("{name} (from {t} s)", name=name, t=f"{t:.2f}")
-            for each in self.through.values()
-            for name, t in each.items()
-        ]
         inside = tr("Targets in it or its stand: {names}.", names=joined(self.targets, ", ")) if self.targets else ""
         said = [
-            tr("The tool point passes through the box or its stand in: {names}.", names=joined(named, ", "))
-            if named
+            tr("“Box at”: the moment from which the tool point is in the box or its stand.")
+            if any(self.through.values())
             else tr("No tool point of these was found in the box or its stand."),
             inside,
             tr(
@@ -780,6 +763,21 @@ class _Passes:
         if self.unseen:
             said.append(tr("Not compared, or not all of it: {names}.", names=joined(self.unseen, ", ")))
         return joined(said, " ")
+
+    def short(self, sound: Mapping[str, Sequence[str]]) -> str:
+        """How many there are among the names of what passes, per stage."""
+        if not self.through:
+            return tr("No path or program was compared with its place.")
+        counts = [
+            tr("{count} of the {passing} {what}", count=len(inside), passing=len(sound[stage]), what=tr(RUNS[stage]))
+            for stage, found in self.through.items()
+            if (inside := found.keys() & sound[stage])
+        ]
+        if not counts:
+            return ""
+        return tr(
+            "The tool point passes through it or its stand in {runs} that pass without them.", runs=joined(counts, ", ")
+        )
 
 
 def _passes(stored: Mapping[str, Stored[Any]]) -> _Passes | None:

@@ -131,9 +131,9 @@ class Picture:
         return readings(self.figure)
 
     @property
-    def shades(self) -> bool:
-        """Whether brightness means something in it, so that a dark page must not turn it round."""
-        return any(drawn.get_array() is not None for ax in self.figure.axes for drawn in (*ax.collections, *ax.images))
+    def photograph(self) -> bool:
+        """Whether it shows what a camera saw, which a dark page must not invert."""
+        return any(ax.images for ax in self.figure.axes)
 
     @property
     def inches(self) -> float:

@@ -353,7 +353,7 @@ def _stretches(motion: Motion, intervals: Iterable[Interval[model.CauseT]]) -> t
     found = []
     for interval in intervals:
         s0, s1 = (float(value) for value in motion.way(np.array([interval.start, interval.end])))
-        found.append(model.Stretch(interval.start, interval.end, s0, s1, interval.cause))
+        found.append(model.Stretch(interval.start, interval.end, s0, s1, interval.cause, interval.worst))
     return tuple(found)
 
 

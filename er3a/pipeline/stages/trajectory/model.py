@@ -162,13 +162,15 @@ class BodiesOverlap(Finding):
 
 @dataclass(frozen=True)
 class Stretch(Generic[CauseT]):
-    """A stretch of a path, in time and along its way, on which something is wrong."""
+    """A stretch of a path, in time and along its way, on which something is wrong; and when it is worst, where that has
+    a value."""
 
     t0_s: float
     t1_s: float
     s0_m: float
     s1_m: float
     cause: CauseT
+    worst_s: float | None = None
 
 
 @dataclass(frozen=True)

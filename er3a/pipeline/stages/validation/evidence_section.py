@@ -30,7 +30,7 @@ MARKS: Mapping[Status, str] = {
     "settled_up_to_signs": "(✓)",
     "weak": "~",
     "contradicted": "✗",
-    "consistent": "=",
+    "consistent": STATUS_WORDS["consistent"],  # a sign would be read as a confirmation
     "open": "?",
     "gauge": "↔",
     "given": "·",
@@ -40,7 +40,7 @@ SETTLED = ("settled", "settled_up_to_signs", "gauge")
 VERDICTS: Mapping[str, Mapping[Status, str]] = {  # in the three words that a reader of the index needs
     N_("confirmed"): {
         "settled": "",
-        "settled_up_to_signs": N_("its sign follows from open entries"),
+        "settled_up_to_signs": N_("as long as the open entries are right"),
         "gauge": N_("only the sum counts"),
     },
     N_("not confirmed"): {
@@ -148,8 +148,8 @@ def evidence_section(
         statuses=list(present),
         allowed=_allowed(evidence),
         legend=[
-            (status, mark, _status(status), word("status_meaning", STATUS_MEANINGS, status))
-            for status, mark in MARKS.items()
+            (status, _marked(status), word("status_meaning", STATUS_MEANINGS, status))
+            for status in MARKS
             if status in present
         ],
         off_columns=[tr(column) for column in OFF_COLUMNS],
@@ -174,7 +174,7 @@ def verdict_legend(statuses: Iterable[Status]) -> list[tuple[str, list[tuple[Sta
     return [
         (
             tr(verdict),
-            [(status, MARKS[status], text and tr(text)) for status, text in each.items() if status in present],
+            [(status, _mark(status), text and tr(text)) for status, text in each.items() if status in present],
         )
         for verdict, each in VERDICTS.items()
         if not present.isdisjoint(each)
@@ -328,7 +328,7 @@ def table_to_use(robot: Robot, other: Robot, unconfirmed: str, evidence: TableEv
             value = round(float(getattr(other, kind)[k]) * unit, 3)
             differs = comparable and abs(value - float(getattr(robot, kind)[k]) * unit) > DIFFERS
             status = known.get(f"{kind}{k + 1}", "settled")
-            cells.append((_plain(value), differs, "" if status in SETTLED else MARKS[status]))
+            cells.append((_plain(value), differs, "" if status in SETTLED else _mark(status)))
         rows.append((k + 1, cells))
     source = other.sources.get("dh")
     parts = [tr("Source: {source}.", source=own_title(source.source))] if source else []
@@ -338,8 +338,8 @@ def table_to_use(robot: Robot, other: Robot, unconfirmed: str, evidence: TableEv
         parts.append(sentence("validation.left_open#open", names=unconfirmed))
         parts.append(
             tr(
-                "Marks: = only the source of {robot} gives it, which may contradict another table but confirms none of "
-                "its own values; ? and ~ no document settles it. Check all of these on the arm.",
+                "“One source”: only the source of {robot} gives it, which may contradict another table but confirms "
+                "none of its own values; ? and ~ no document settles it. Check all of these on the arm.",
                 robot=other.name,
             )
         )
@@ -361,10 +361,19 @@ def _cell(each: EntryEvidence | None, evidence: TableEvidence, unconfirmed: Set[
     if each is None or each.value is None:
         return None
     title = tr("{entry}: {status}", entry=each.entry, status=_status(each.status))
-    shown = dict(entry=each.entry, value=_value(each), status=each.status, mark=MARKS[each.status], title=title)
+    shown = dict(entry=each.entry, value=_value(each), status=each.status, mark=_mark(each.status), title=title)
     gives = _gives(each, evidence)
     alone = gives and each.status == "contradicted" and each.entry in unconfirmed
-    return shown | dict(gives=f"{gives} {MARKS['consistent']}" if alone else gives)
+    return shown | dict(gives=f"{gives} {_mark('consistent')}" if alone else gives)
+
+
+def _mark(status: Status) -> str:
+    return tr(MARKS[status]) if MARKS[status] == STATUS_WORDS[status] else MARKS[status]
+
+
+def _marked(status: Status) -> str:
+    """A status with its mark, unless that is the same word."""
+    return _status(status) if MARKS[status] == STATUS_WORDS[status] else f"{MARKS[status]} {_status(status)}"
 
 
 def _status(status: Status) -> str:
@@ -383,7 +392,7 @@ def _row(each: EntryEvidence) -> list[str]:
     return [
         each.entry,
         with_unit(_value(each), each.unit),
-        f"{MARKS[each.status]} {_status(each.status)}",
+        _marked(each.status),
         _interval(each) if each.interval and each.status != "gauge" else "–",
         _tool_off(each),
         joined(each.by, ", ") or "–",

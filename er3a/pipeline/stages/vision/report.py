@@ -132,7 +132,7 @@ def map_picture(rows: model.ErrorMapRows, objects: tuple[model.ObjectResult, ...
         known = value[np.isfinite(value)]
         ends = (known.min() - MIN_RANGE * known.max(), (1 + MIN_RANGE) * known.max()) if known.size else (0.0, 1.0)
         mesh = ax.pcolormesh(
-            x, y, value, cmap="viridis", shading="nearest", rasterized=True, vmin=ends[0], vmax=ends[1]
+            x, y, value, cmap="viridis_r", shading="nearest", rasterized=True, vmin=ends[0], vmax=ends[1]
         )
         figure.colorbar(mesh, ax=ax, label=label, shrink=0.85)
         for each in objects:

@@ -145,7 +145,7 @@ def outlines(solid: Box | Cylinder | Sphere | Mesh, shown: list[int]) -> list[Re
     return [piece[scipy.spatial.ConvexHull(piece).vertices] for piece in (own[:, shown] for own in solid_pieces(solid))]
 
 
-SHADES = "viridis"
+SHADES = "viridis_r"
 PIXELS = 301
 _HEIGHTS = (0.25, 0.5, 0.75)
 _LABEL = 0.035  # height of a label, of the longer side of a drawing
@@ -496,7 +496,7 @@ def _slices_caption(capability: model.CapabilitySummary) -> str:
             first,
             tr("These solutions are averaged over the directions reached; of random joint values, as the page of the "
                "stage inverse draws them, more solutions are found, because poses with many are met more often."),
-            tr("Plan work where all three are bright; dark rims are reached only with the arm stretched, folded or "
+            tr("Plan work where all three are high; rims are reached only with the arm stretched, folded or "
                "twisted."),
         ],
         " ",
