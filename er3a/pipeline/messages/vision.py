@@ -289,7 +289,7 @@ def _(found: GraspCounts) -> str:
         error,
         *listed(found.missed),
         left,
-        demonstrated(found.demonstrations),
+        demonstrated(found.demonstrations, found.objects),
     ]
     simulated = say_as(found, "simulated") if found.simulated else ""
     return joined([sentence("finding", finding=joined(sentences)), simulated], " ")
