@@ -223,6 +223,15 @@ def test_free_space_names_its_samples(study, tmp_path):
     assert found["joined_pairs"].names
 
 
+def test_free_space_that_no_motion_from_home_enters_is_no_pass(study, tmp_path):
+    """One random joint vector of no collision: no place is shown to be reached from home."""
+    few = {"samples": 1, "cells_across": 4, "rounds": 0, "neighbours": 1}
+    summary = collision(changed(study, {"paths": one_path(tmp_path)}, collision=few), ROBOT).summary
+    assert summary.places.clear == 1
+    assert summary.places.joined == 0
+    assert summary.verdict.status == "caution"
+
+
 def test_free_space_names_targets_and_paths_without_clearance(study, tmp_path):
     quick = {"samples": 1000, "cells_across": 4, "rounds": 0, "neighbours": 1}
     targets = {"kind": "targets", "targets": [{"name": "far", "xyz_mm": [9000, 0, 0], "rpy_deg": [0, 0, 0]}]}
