@@ -27,9 +27,10 @@ def test_what_is_expected_and_comes_is_a_demonstration():
     judged = [Came("out", "unreachable", "unreachable"), Came("fine", "safe", "safe"), Came("bad", "collides")]
     assert unmet_expectations(judged) is None
     assert [shown.name for shown in demonstrations(judged, "safe")] == ["out"]
-    assert demonstrated(demonstrations(judged, "safe")) == "1 expected to fail, and did: out (unreachable)"
+    assert demonstrated(demonstrations(judged, "safe"), 1) == "1 expected to fail, and did: out (unreachable)"
     shown = demonstrations(judged, "safe", lambda each: ("collides", each.outcome))
-    assert demonstrated(shown) == "1 expected to fail, and did: out (collides, unreachable)"
+    assert demonstrated(shown, 1) == "1 expected to fail, and did: out (collides, unreachable)"
+    assert demonstrated(shown, 0).endswith("; nothing else is given to be judged")
 
 
 def test_what_comes_otherwise_is_named_with_both_outcomes():

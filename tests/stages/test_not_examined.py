@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -165,6 +166,39 @@ def test_rates_that_a_trajectory_of_ros_gives_are_no_pass(study, tmp_path):
         assert verdict.status == ("caution" if named else "pass")
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("stage", ["inverse", "trajectory", "programs", "vision"])
+def test_what_is_expected_to_fail_alone_is_no_pass(study, tmp_path, stage):
+    """Each as expected: nothing that is meant to be sound was judged."""
+    key, sound = {
+        "inverse": ("targets", "reached"),
+        "trajectory": ("paths", "safe"),
+        "programs": ("programs", "pass"),
+        "vision": ("vision", "grasped"),
+    }[stage]
+    content = yaml.safe_load(Path(f"data/{key}/{ROBOT}.yaml").read_text(encoding="utf-8"))
+    listed = "objects" if stage == "vision" else key
+    content[listed] = [each for each in content[listed] if each.get("expect") not in (None, sound)][:2]
+    for each in content[listed] if stage == "programs" else ():
+        each["file"] = str(Path(each["file"]).resolve())
+    for file in Path("data/vision").glob("fixed_camera*"):
+        shutil.copy(file, tmp_path)
+    (tmp_path / "input.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
+    quick = {
+        "inverse": {"round_trips": 3, "map_cells": 4},
+        "trajectory": {"avoidance": "slow", "programs": []},
+        "vision": {"map_cells": 4},
+    }
+    results = (
+        STAGES[stage].module("compute").compute(changed(study, {key: str(tmp_path / "input.yaml")}, **quick), ROBOT)
+    )
+    verdict = results.summary.verdict
+    import_module(STAGES[stage].messages)
+    assert verdict.status == "no_reference"
+    assert len(verdict.finding.demonstrations) == len(content[listed])
+    assert "nothing else is given to be judged" in say_all(verdict.findings)
+
+
 def test_programs_name_their_lines_and_starts(study, tmp_path):
     text = "def a():\n  movej([0, -0.2, -0.2, 0, -1.2, 0])\nend\ndef b():\n  movej([0, -0.3, -0.2, 0, -1.2, 0])\nend\n"
     (tmp_path / "a.script").write_text(text)
@@ -187,6 +221,15 @@ def test_free_space_names_its_samples(study, tmp_path):
     assert found["joint_vectors"].amount == 1000
     assert found["lost_cells"].amount >= 0
     assert found["joined_pairs"].names
+
+
+def test_free_space_that_no_motion_from_home_enters_is_no_pass(study, tmp_path):
+    """One random joint vector of no collision: no place is shown to be reached from home."""
+    few = {"samples": 1, "cells_across": 4, "rounds": 0, "neighbours": 1}
+    summary = collision(changed(study, {"paths": one_path(tmp_path)}, collision=few), ROBOT).summary
+    assert summary.places.clear == 1
+    assert summary.places.joined == 0
+    assert summary.verdict.status == "caution"
 
 
 def test_free_space_names_targets_and_paths_without_clearance(study, tmp_path):

@@ -34,6 +34,7 @@ TEXTS = texts(
             "{count} of {expectations} expectations are not met: {unmet:; }.",
         ),
         "demonstrations": "{count} expected to fail, and did: {named}",
+        "demonstrations#alone": "{count} expected to fail, and did: {named}; nothing else is given to be judged",
         "demonstration": "{name} ({outcome})",
         "unmet_expectation": "{name} ({found}; expected: {expected})",
     }
@@ -45,11 +46,12 @@ def outcome_word(outcome: Outcome) -> str:
     return word("trajectory.path", OUTCOMES, outcome)
 
 
-def demonstrated(shown: tuple[Demonstration, ...]) -> str:
-    """What fails as it is meant to; empty if nothing does."""
+def demonstrated(shown: tuple[Demonstration, ...], asked: int) -> str:
+    """What fails as it is meant to, beside so many that are ``asked`` not to; empty if nothing does."""
     if not shown:
         return ""
-    return sentence("demonstrations", count=len(shown), named=joined(listed(shown), ", "))
+    form = "demonstrations" if asked else "demonstrations#alone"
+    return sentence(form, count=len(shown), named=joined(listed(shown), ", "))
 
 
 @say.register

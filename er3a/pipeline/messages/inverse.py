@@ -8,13 +8,13 @@ from er3a.pipeline.messages.kinematics import RULE_NAMES, sum_of_joints
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.left_out import names_in_words
 from er3a.pipeline.messages.say import Plural, by, joined, listed, say, say_as, sentence, texts
-from er3a.pipeline.stages.expectations import Demonstration
 from er3a.pipeline.stages.inverse.model import (
     AllSolved,
     NoneSolved,
     ReachMissing,
     ShiftTool,
     SomeUnsolved,
+    TargetCounts,
     TurnTool,
     UnsolvedTarget,
 )
@@ -127,18 +127,18 @@ TEXTS = texts(
 @say.register
 def _(found: AllSolved) -> str:
     if not found.targets:
-        return _and_demonstrations("", found.demonstrations)
+        return _and_demonstrations("", found)
     where = _where(found.collisions)
     if not found.demonstrations:
         return say_as(found, "every", where=where)
     some = say_as(found, "some", total=found.targets, where=where)
-    return _and_demonstrations(some, found.demonstrations)
+    return _and_demonstrations(some, found)
 
 
 @say.register
 def _(found: NoneSolved) -> str:
     none = say_as(found, where=_where(found.collisions), none_for=_none_for(found.unsolved))
-    return _and_demonstrations(none, found.demonstrations)
+    return _and_demonstrations(none, found)
 
 
 @say.register
@@ -149,11 +149,11 @@ def _(found: SomeUnsolved) -> str:
         where=_where(found.collisions),
         none_for=_none_for(found.unsolved),
     )
-    return _and_demonstrations(some, found.demonstrations)
+    return _and_demonstrations(some, found)
 
 
-def _and_demonstrations(text: str, shown: tuple[Demonstration, ...]) -> str:
-    expected = demonstrated(shown)
+def _and_demonstrations(text: str, found: TargetCounts) -> str:
+    expected = demonstrated(found.demonstrations, found.targets)
     return joined([text, sentence("finding", finding=expected) if expected else ""], " ")
 
 

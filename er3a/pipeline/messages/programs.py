@@ -379,7 +379,12 @@ def _(found: ProgramCounts) -> str:
         others.append(sentence("programs.fault", **parts) if names else "")
     missed = joined(found.not_examined, ", ")
     open_parts = sentence("programs.not_examined", names=missed) if missed else ""
-    sentences = [passed if found.programs else "", joined(others, ", "), open_parts, demonstrated(found.demonstrations)]
+    sentences = [
+        passed if found.programs else "",
+        joined(others, ", "),
+        open_parts,
+        demonstrated(found.demonstrations, found.programs),
+    ]
     return sentence("finding", finding=joined(sentences))
 
 

@@ -188,7 +188,7 @@ def _(found: model.PathCounts) -> str:
     if found.not_followed:
         parts = {"count": len(found.not_followed), "names": joined(found.not_followed, ", ")}
         faults.append(sentence("trajectory.not_followed", **parts))
-    sentences = [safe if found.paths else "", joined(faults, ", "), demonstrated(found.demonstrations)]
+    sentences = [safe if found.paths else "", joined(faults, ", "), demonstrated(found.demonstrations, found.paths)]
     return sentence("finding", finding=joined(sentences))
 
 

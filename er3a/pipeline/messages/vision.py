@@ -241,7 +241,8 @@ TEXTS = texts(
         ),
         "unexplained_residuals": (
             "the residuals are {rms_mm:.3g} mm and {rms_deg:.2g} deg, and nothing tried explains them ({causes}): "
-            "check the order of the samples, the board's size, and which tool and which base the poses belong to"
+            "check the order of the samples, the board's size, which tool and which base the poses belong to, and of "
+            "two recordings by how much their clocks differ (widest_s)"
         ),
         "other_direction": (
             "the samples exclude this direction: they fit with one stream inverted. Either the setup is the other "
@@ -289,7 +290,7 @@ def _(found: GraspCounts) -> str:
         error,
         *listed(found.missed),
         left,
-        demonstrated(found.demonstrations),
+        demonstrated(found.demonstrations, found.objects),
     ]
     simulated = say_as(found, "simulated") if found.simulated else ""
     return joined([sentence("finding", finding=joined(sentences)), simulated], " ")

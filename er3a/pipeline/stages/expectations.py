@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from typing import Protocol, TypeVar
 
 from er3a.by_value import Finding
 from er3a.kinematics.solutions import TargetOutcome
+from er3a.pipeline.results import Status
 from er3a.planning.names import PathVerdict
 from er3a.programs.syntax import ProgramOutcome
 from er3a.vision.vision_findings import GraspOutcome
@@ -56,6 +57,11 @@ def unmet_expectations(judged: Iterable[Judged]) -> ExpectationsUnmet | None:
         UnmetExpectation(each.name, expect, each.outcome) for each, expect in expected if expect != each.outcome
     )
     return ExpectationsUnmet(len(expected), unmet) if unmet else None
+
+
+def pass_of(asked: Collection[Judged]) -> Status:
+    """What a stage comes to whose ``asked`` are all sound: no pass where there are demonstrations alone."""
+    return "pass" if asked else "no_reference"
 
 
 JudgedT = TypeVar("JudgedT", bound=Judged)

@@ -257,7 +257,7 @@ def _verdict(
         return Verdict("fail", model.BaseInSolid(inside))
     if known:
         return Verdict("fail" if isinstance(known, model.ShapesOverlap) else "caution", known)
-    return Verdict("caution" if found.undecided or not found.clear else "pass", found)
+    return Verdict("caution" if found.undecided or not found.joined else "pass", found)
 
 
 def _figures(space: free_space.JointSpace, places: model.PlacesSummary, matrix: model.MatrixRows) -> tuple[Figure, ...]:

@@ -35,7 +35,7 @@ from er3a.numerics.si_units import stated
 from er3a.pipeline.progress import shown_progress
 from er3a.pipeline.results import Figure, LeftOut, Verdict
 from er3a.pipeline.settings import TrajectorySettings
-from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
+from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, pass_of, unmet_expectations
 from er3a.pipeline.stages.inverse import model
 from er3a.pipeline.stages.inverse.entry import InverseSettings
 from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_of_orientations, left_out_without_tool
@@ -466,7 +466,7 @@ def _verdict(
     unsolved = tuple(model.UnsolvedTarget(target.name, target.obstacle) for target in asked if target.obstacle)
     count, solved = len(asked), len(asked) - len(unsolved)
     if not unsolved:
-        return Verdict("pass", model.AllSolved(count, solved, unsolved, collisions, shown))
+        return Verdict(pass_of(asked), model.AllSolved(count, solved, unsolved, collisions, shown))
     if not solved:
         return Verdict("fail", model.NoneSolved(count, solved, unsolved, collisions, shown))
     return Verdict("caution", model.SomeUnsolved(count, solved, unsolved, collisions, shown))

@@ -15,7 +15,7 @@ from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.results import Figure, LeftOut, Status, Verdict
 from er3a.pipeline.settings import TrajectorySettings
-from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
+from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, pass_of, unmet_expectations
 from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_of_rates
 from er3a.pipeline.stages.programs import model
 from er3a.pipeline.stages.programs.entry import ProgramsSettings
@@ -268,7 +268,7 @@ def _verdict(
     asked = [each for each in programs if each.expect in (None, "pass")]
     caution, failed = (tuple(each.name for each in asked if each.outcome == outcome) for outcome in ("caution", "fail"))
     finding = model.SomeProgramsFail if failed else model.SomeProgramsCaution if caution else model.AllProgramsPass
-    status: Status = "fail" if failed else "caution" if caution else "pass"
+    status: Status = "fail" if failed else "caution" if caution else pass_of(asked)
     passed = len(asked) - len(caution) - len(failed)
     missed = tuple(each.name for each in asked if each.not_examined)
     return Verdict(status, finding(len(asked), passed, caution, failed, demonstrations(programs, "pass"), missed))

@@ -22,7 +22,7 @@ from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import from_si, stated
 from er3a.pipeline.results import Figure, LeftOut, Status, Verdict
 from er3a.pipeline.settings import TrajectorySettings
-from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
+from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, pass_of, unmet_expectations
 from er3a.pipeline.stages.left_out import (
     left_out_of_collisions,
     left_out_of_orientations,
@@ -522,7 +522,9 @@ def _verdict(
     safe, count = sum(model.is_safe(path, shapes) for path in asked), len(asked) + len(unfollowed)
     finding = model.AllSafe if safe == count else model.SomeUnsafe if safe else model.NoneSafe
     failed = any(_fails(path) for path in asked) or any(path.stops_at_s is not None for path in unfollowed)
-    status: Status = "pass" if safe == count else "fail" if failed or not named("safe") else "caution"
+    status: Status = (
+        pass_of([*asked, *unfollowed]) if safe == count else "fail" if failed or not named("safe") else "caution"
+    )
     judged: list[model.PathSummary | model.PathNotFollowed] = [*paths, *skipped]
     counts = finding(
         paths=count,

@@ -25,7 +25,7 @@ from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.si_units import from_si, stated
 from er3a.pipeline.results import Figure, LeftOut, Verdict
 from er3a.pipeline.settings import TrajectorySettings
-from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
+from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, pass_of, unmet_expectations
 from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_of_rates
 from er3a.pipeline.stages.trajectory.motion import limits_of
 from er3a.pipeline.stages.vision import model
@@ -584,7 +584,7 @@ def verdict_of(
     )
     if asked and len(missed) == len(asked):
         return Verdict("fail", counts)
-    return Verdict("caution" if missed or calibration.warnings else "pass", counts)
+    return Verdict("caution" if missed or calibration.warnings else pass_of(asked), counts)
 
 
 def _least_success(objects: Sequence[model.ObjectResult]) -> float | None:
