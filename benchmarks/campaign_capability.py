@@ -78,7 +78,7 @@ def services(name: str, random: np.random.Generator) -> str:
     low = field.origin + random.choice(np.argwhere(bricks), SERVICES) * field.spacing
     missed = _missed(robot, low + random.random((SERVICES, 3)) * field.spacing, roll, random)
     listed = f"{sum(chosen.proven)} of {len(chosen.proven)}"
-    served = int((field.least_any > NO).sum())
+    served = int((field.manipulability_any > NO).sum())
     share = f"{100 * places.proven.mean():.1f} %"
     return f"| {name} | {served:,} | {len(places.slot):,} | {share} | {listed} | {SERVICES:,} | {missed} |"
 

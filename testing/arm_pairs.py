@@ -22,7 +22,7 @@ ALIKE = 1 - 1e-5
 
 @dataclass(frozen=True)
 class Arm:
-    """A standard D-H table: rows of m and rad, ``theta = direction q + offset`` or, of joints that slide, d so."""
+    """A standard D-H table in m and rad: ``theta = direction q + offset``; for prismatic joints ``d`` is so."""
 
     a: np.ndarray
     alpha: np.ndarray
@@ -161,14 +161,14 @@ def effects(arm: Arm, entries: Sequence[tuple[str, int]]) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Wrong:
-    """Entries that were made wrong, and with each all others that no data can tell from it."""
+    """Entries that were made wrong, each with all others that no data can distinguish from it."""
 
     entries: tuple[tuple[str, int], ...]
     alike: tuple[frozenset[str], ...]
 
 
 def name(entry: tuple[str, int]) -> str:
-    """As a table's reader counts: ``d4``."""
+    """Column and joint, counted from 1: ``d4``."""
     return f"{entry[0]}{entry[1] + 1}"
 
 

@@ -1,4 +1,4 @@
-"""Arms drawn at random or made to measure, and computations of theirs that share no code with er3a."""
+"""Random and hand-made arms, and their kinematics computed without er3a's code."""
 
 from __future__ import annotations
 
@@ -136,7 +136,7 @@ def six(low: float, high: float):
 
 @st.composite
 def arms(draw, orthogonal_wrist: bool = False) -> Robot:
-    """Wrist-partitioned arms with parallel axes 2 and 3, in both conventions, with all that a table may hold."""
+    """Wrist-partitioned arms with parallel axes 2 and 3, in both conventions, with every optional entry of a table."""
     convention = draw(st.sampled_from(["standard", "modified"]))
     right = st.sampled_from([-90.0, 90.0])
     wrist = right if orthogonal_wrist else st.one_of(right, number(35, 145), number(-145, -35))
@@ -218,7 +218,7 @@ def joints_at_random(robot: Robot, random: np.random.Generator, count: int) -> n
 
 
 def margin(robot: Robot, q: np.ndarray) -> np.ndarray:
-    """Least of |sin wrist|, |sin elbow| and |shoulder| / 1 m: how far from a singularity."""
+    """Distance from singularities: the smallest of |sin wrist|, |sin elbow| and |shoulder| / 1 m."""
     factors: DeterminantFactors = determinant_factors(robot, q)
     parts = [np.sin(factors.wrist), np.sin(factors.elbow), factors.shoulder]
     return np.abs(parts).min(axis=0)

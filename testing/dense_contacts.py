@@ -47,7 +47,7 @@ class Contacts:
         return made(*map(float, measures)), coal.Transform3s(T[:3, :3], T[:3, 3])
 
     def least(self, q) -> np.ndarray:
-        """Least distance (n,) in m of arms (n, 6) in rad; about 0 or less where something touches."""
+        """Smallest distance (n,) in m at joint angles (n, 6) in rad; about 0 or less where something touches."""
         q = np.atleast_2d(q)
         own = [(self.shapes[i], self.shapes[j], i, j) for i, j in self.own]
         found = [

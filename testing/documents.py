@@ -1,4 +1,4 @@
-"""README and guides, as their readers take them: code, prose and command lines."""
+"""README and guides, split into code, prose and command lines."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Pages of evidence: which there are, how large their campaigns are, and which commit a page was made from.
 
-A page tells of the code that it was made from, and says which that is: version, commit, date. It is not made again
-with every edit; ``make campaigns`` makes those pages again since whose commit code, data or studies have changed.
+A page is about the code that it was made from, and names its version, commit and date. It is not made again after every
+edit: ``make campaigns`` makes the pages again whose code, data or studies have changed since their commit.
 
 make release-check            an error if the papers of a release disagree; lists pages about other code
 """
@@ -109,7 +109,7 @@ def _version(root: Path) -> str:
 
 
 def papers_out_of_order(root: Path = ROOT) -> tuple[str, ...]:
-    """What a release's papers say against each other."""
+    """Why the files of a release are not ready: a version that they don't name, changes still under Unreleased."""
     version = _version(root)
     stated = {
         "CITATION.cff": rf"^version: {re.escape(version)}$",

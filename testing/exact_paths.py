@@ -1,4 +1,4 @@
-"""Distances from the singular sets along a path, worked out apart from er3a and in extended precision.
+"""Distances from the singular sets along a path, computed without er3a, in extended precision.
 
 For arms of the project's layout: axis 1 vertical, axes 2 and 3 across it, a spherical wrist. Everything follows from
 the table's lengths by plane trigonometry, in numpy's long double; it needs no inverse kinematics and no Jacobian.
@@ -60,7 +60,7 @@ def turned(v, axis, angle):
 
 
 def nearest(distance, guess, width=1e-5):
-    """Where the square of a distance, a function of progress (n,), is least next to a guess: the root of its slope."""
+    """Progress (n,) at which a squared distance is smallest near a guess: the root of its slope."""
     step = REAL(1e-6)
 
     def slope(at):

@@ -1,6 +1,6 @@
-"""Robots that no one of the project wrote: the D-H models of Robotics Toolbox, and the URDFs that come with packages.
+"""Robots from outside the project: the D-H models of Robotics Toolbox, and the URDFs of installed packages.
 
-``rtb-data`` and ``example-robot-data`` are installed for tests; nothing of theirs is copied into the project.
+``rtb-data`` and ``example-robot-data`` are installed for tests; none of their files is copied into the project.
 """
 
 from __future__ import annotations
@@ -90,20 +90,20 @@ def _toolbox_poses(made, q: np.ndarray) -> np.ndarray:
     return np.array([made.fkine(row).A for row in q])
 
 
-def urdf_files(folder: Path, wanted: Callable[[str], bool] = lambda name: True) -> Iterator[UrdfFile | tuple[str, str]]:
+def urdf_files(folder: Path, chosen: Callable[[str], bool] = lambda name: True) -> Iterator[UrdfFile | tuple[str, str]]:
     """URDFs of both packages; xacro is expanded into ``folder``. Name and reason for those that can't be.
 
     Parameters
     ----------
-    wanted : whether to take a file, by its name
+    chosen : whether to take a file, by its name
     """
     shared = Path(str(find_spec("pinocchio").origin)).parents[4] / "share" / "example-robot-data" / "robots"
     for path in sorted(shared.rglob("*.urdf")):
-        if wanted(name := str(path.relative_to(shared))):
+        if chosen(name := str(path.relative_to(shared))):
             yield UrdfFile(name, path)
     data = Path(str(find_spec("rtbdata").origin)).parent
     for path in sorted([*data.rglob("*.urdf"), *data.rglob("*.xacro")]):
-        if not wanted(name := str(path.relative_to(data))):
+        if not chosen(name := str(path.relative_to(data))):
             continue
         if path.suffix == ".xacro":
             if not re.search(r"<robot[^>]*\bname=", path.read_text(encoding="utf-8")):

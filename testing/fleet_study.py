@@ -1,4 +1,4 @@
-"""What every arm of the fleet goes through besides: poses on singular sets, and a study of all stages."""
+"""Further tests of every arm of the fleet: inverse kinematics on singular sets, and a study of all stages."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class TooLong(Exception):
 
 @contextlib.contextmanager
 def at_most(seconds: int) -> Iterator[None]:
-    """Raise :class:`TooLong` in what takes longer."""
+    """Raise :class:`TooLong` in the body after this many seconds."""
 
     def end(*_: object) -> None:
         raise TooLong(f"more than {seconds} s")
@@ -102,7 +102,7 @@ def small_study(robot_file: Path, folder: Path) -> tuple[dict[str, str], list[st
     Returns
     -------
     verdicts : of each stage its status
-    broken : what did not come out: stages that apply and were not computed, pages that were not written
+    broken : what is missing: stages that apply and were not computed, pages that were not written
     """
     with contextlib.redirect_stderr(io.StringIO()):
         write_study(arm_of(None, None, str(robot_file)), folder)

@@ -1,4 +1,4 @@
-"""How often the 95 % intervals of a hand-eye calibration hold the truth, alone and with corrections to the table."""
+"""How often the 95 % intervals of a hand-eye calibration contain the truth, alone and with corrections to the table."""
 
 from __future__ import annotations
 

@@ -83,7 +83,7 @@ def mutations_of(robot: Robot) -> Iterator[Mutation]:
 
 
 def noisy(references: Sequence[Reference], noise_mm: float, random: np.random.Generator) -> tuple[Reference, ...]:
-    """Lengths with uniform noise up to ``noise_mm``, and with an uncertainty that owns up to it."""
+    """Lengths with uniform noise up to ``noise_mm``, and an uncertainty that includes it."""
     return tuple(
         replace(r, expected=r.expected + random.uniform(-noise_mm, noise_mm), uncertainty=r.uncertainty + noise_mm)
         if r.unit == "mm" and r.expected is not None
@@ -191,13 +191,13 @@ class ScannedEntry:
     ----------
     number : None for a limit or a direction
     side : of a limit; joint : of a limit or a direction, counted from 0
-    least : least error (m or rad) at which references notice it; 0 for a direction
+    smallest : error (m or rad) from which on references notice it; 0 for a direction
     """
 
     number: FreeNumber | None
     side: Side | None
     joint: int
-    least: float
+    smallest: float
 
     @property
     def gross(self) -> float:
@@ -223,28 +223,28 @@ def entries_of(case: Case) -> list[ScannedEntry]:
     """The entries of a right table whose errors its references notice; all directions."""
     found = []
     for number in case.numbers:
-        least = least_noticed(case, number) if number.column else None
-        if least is not None:
-            found.append(ScannedEntry(number, None, number.joint, least))
+        smallest = least_noticed(case, number) if number.column else None
+        if smallest is not None:
+            found.append(ScannedEntry(number, None, number.joint, smallest))
     joints, right = range(case.given.direction.shape[-1]), case.difference(case.given)[0]
     for side in SIDES:
         for joint in joints:
             places = [i for i, r in enumerate(case.references) if r.quantity == Limit(joint + 1, side)]
             if places:
-                least = np.min(case.uncertainty[places] + np.abs(right[places]))
-                found.append(ScannedEntry(None, side, joint, float(np.radians(least))))
+                smallest = np.min(case.uncertainty[places] + np.abs(right[places]))
+                found.append(ScannedEntry(None, side, joint, float(np.radians(smallest))))
     return [*found, *(ScannedEntry(None, None, joint, 0.0) for joint in joints)]
 
 
 def single_scan(case: Case, sizes: int, from_m: float = 0.0, beyond: float = 1.05) -> Iterator[Mutation]:
-    """Every entry, wrong by ``sizes`` errors from ``beyond`` the least that is noticed (lengths: ``from_m`` more) to a
-    gross one, either way."""
+    """Every entry, wrong by ``sizes`` errors either way: from ``beyond`` times the smallest that is noticed (lengths:
+    ``from_m`` more) to a gross one."""
     for entry in entries_of(case):
-        if not entry.least:
+        if not entry.smallest:
             yield _mutation(*entry.wrong(case.given, 0.0))
             continue
-        least = beyond * entry.least + (0.0 if entry.gross == GROSS_RAD else from_m)
-        for size in np.geomspace(least, entry.gross, sizes):
+        smallest = beyond * entry.smallest + (0.0 if entry.gross == GROSS_RAD else from_m)
+        for size in np.geomspace(smallest, entry.gross, sizes):
             for by in (size, -size):
                 yield _mutation(*entry.wrong(case.given, float(by)))
 
@@ -258,7 +258,7 @@ class Pair:
 
 
 def random_pairs(case: Case, beyond: float, random: np.random.Generator) -> Iterator[Pair]:
-    """Without end: two entries drawn at random, each wrong by an error between ``beyond`` times the least that is
+    """Without end: two entries drawn at random, each wrong by an error between ``beyond`` times the smallest that is
     noticed and a gross one, drawn evenly on a logarithmic scale."""
     entries = entries_of(case)
     while True:
@@ -292,9 +292,9 @@ def is_identifiable(robot: Robot, pair: Pair, case: Case) -> bool:
 
 
 def _drawn(entry: ScannedEntry, beyond: float, random: np.random.Generator) -> float:
-    if not entry.least:
+    if not entry.smallest:
         return 0.0
-    size = np.exp(random.uniform(np.log(beyond * entry.least), np.log(entry.gross)))
+    size = np.exp(random.uniform(np.log(beyond * entry.smallest), np.log(entry.gross)))
     return float(size * random.choice([-1.0, 1.0]))
 
 

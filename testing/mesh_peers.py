@@ -136,8 +136,10 @@ def held_against_meshes(path: Path, imported: UrdfImport, poses: int, seed: int)
         found.states[row.state] += 1
         if (excess := float((np.maximum(least, 0) - np.maximum(own, 0)).max())) > APART:
             found.wrong.append(f"{name}: meshes {1000 * excess:.2f} mm nearer than shapes")
-        if row.state == "never" and own.min() < row.least - APART:
-            found.wrong.append(f"{name}: said to be {1000 * row.least:.2f} mm apart, meshes {1000 * own.min():.2f} mm")
+        if row.state == "never" and own.min() < row.lower_bound - APART:
+            found.wrong.append(
+                f"{name}: said to be {1000 * row.lower_bound:.2f} mm apart, meshes {1000 * own.min():.2f} mm"
+            )
         if row.state in ("joined", "overlaps") and least.max() > (0.002 if row.state == "joined" else 0):
             found.wrong.append(f"{name}: said to overlap always, shapes {1000 * least.max():.2f} mm apart")
         if row.state == "joined" and own.max() > 0:

@@ -1,4 +1,4 @@
-"""Random paths of every kind, what the trajectory stage says of them, and what of that the oracle contradicts."""
+"""Random paths of every kind, the trajectory stage's verdicts on them, and which of these the oracle contradicts."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""What random paths do, worked out apart from er3a: dense points, and roots polished on the same formulas.
+"""What happens along random paths, computed without er3a: dense points, and roots refined on the same formulas.
 
 Paths come as plain numbers in degrees, millimetres and seconds, arms as their tables. Laws of time, rounded corners and
-rotations are written down once more; joints of paths of the tool follow from plane trigonometry, for arms with a
+rotations are implemented a second time; joints of paths of the tool follow from plane trigonometry, for arms with a
 vertical first axis, parallel axes 2 and 3 in the plane of axis 1, and a spherical wrist. Speeds, accelerations
 and jerks are differences of their angles; an acceleration that steps shows as a jerk beyond any limit.
 """
@@ -440,7 +440,7 @@ class Truth:
     """What dense points show: times, crossings (type number, time), and stretches (order, joint, start, end).
 
     ``jerk`` (N, 6) are means over ``jerk_span`` seconds from each time on, where a limit of jerk is given. ``blur``: by
-    order (0 to 3), how far beyond a limit a rate has to be to be told from the rounding of differences.
+    order (0 to 3), how far beyond a limit a rate must be to differ from the rounding of differences.
     """
 
     t: np.ndarray

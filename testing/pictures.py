@@ -44,7 +44,7 @@ def main() -> None:
 
 
 def _there(page: Path, study: str) -> Path:
-    """A page of a finished study, or the end of this with what to do."""
+    """A page of a finished study; exits with the command that makes it if it is missing."""
     if not page.is_file():
         raise SystemExit(f"error: {page}: there is no such page; first: .venv/bin/er3a run --study {study}")
     return page.resolve()

@@ -1,4 +1,4 @@
-"""A calibration without er3a, by scipy alone: the judge of er3a's own on measured arms."""
+"""A calibration without er3a, by scipy alone: a reference for er3a's own on measured arms."""
 
 from __future__ import annotations
 

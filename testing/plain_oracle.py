@@ -1,4 +1,4 @@
-"""A second opinion on tables and their documents that imports none of er3a.
+"""An independent judge of tables and their documents; imports nothing of er3a.
 
 Robot files and reference rows are read from the disk by themselves, standard D-H rows are multiplied out with plain
 NumPy, and extremes over the joint limits are looked for on grids. Nothing here is fast, and nothing linearises.

@@ -12,7 +12,7 @@ from typing import Any
 
 @contextmanager
 def started(command: Sequence[Any], **options: Any) -> Iterator[subprocess.Popen[str]]:
-    """A process in a session of its own; at the end, however it comes, nothing of the session goes on.
+    """A process in a session of its own, all of whose processes are killed on exit, also after an error.
 
     Parameters
     ----------

@@ -36,7 +36,7 @@ def measured(proposal: Proposal, arm: Robot, origin: str = MEASURED) -> Referenc
 
 
 def opposite(seen: Seen) -> Seen:
-    """What is seen if the joint turns the other way."""
+    """The outcome if the joint turns the other way."""
     turned = {"up": "down", "left": "right", "forward": "back"}
     turned |= {other: one for one, other in turned.items()}
     stem, _, last = seen.rpartition("_")

@@ -1,4 +1,4 @@
-"""Published D-H tables beside URDFs of the same arms, and a judge of what is said about them that imports no er3a.
+"""Published D-H tables beside URDFs of the same arms, and an independent judge of er3a's statements about them.
 
 Tables of Robotics Toolbox for Python are read from the installed package. Those of robotkinematicscatalogue 1.1.2 are
 quoted here as numbers. URDFs are those of rtb-data and example-robot-data.

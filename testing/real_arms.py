@@ -1,4 +1,4 @@
-"""Calibrations of measured arms at poses that they have not seen, and against each other in halves."""
+"""Calibrations of measured arms, tested at held-out poses, and compared between halves of the data."""
 
 from __future__ import annotations
 

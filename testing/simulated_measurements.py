@@ -38,7 +38,7 @@ def covered(
     -------
     names : of the k identifiable entries
     inside : (runs, k) bool, whether the 95 % interval holds the true correction
-    terms : how many runs took errors of joints beyond the table, which there are not
+    terms : how many runs chose error terms of joints, although the simulated arm has none
     """
     kept = _identifiable(robot, poses, random)
     size = np.array([LENGTH_ERROR_M if parameter.unit == "mm" else ANGLE_ERROR_RAD for parameter in kept])

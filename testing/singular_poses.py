@@ -47,7 +47,7 @@ def joints_near(robot: Robot, kind: str, random: np.random.Generator, count: int
     """Joint angles (n, 6), n at most ``count``, at and next to the singularities that ``kind`` names.
 
     The joints concerned are at 0 (one in eight), at a power of ten from 1e-12 to 1e-3, or anywhere between, either way
-    (rad). Rows that can't stand so are left out: all of them where the arm can't.
+    (rad). Rows in which the shoulder factor has no zero are left out; none is left if the arm has no such pose.
     """
     q = random.uniform(robot.lower, robot.upper, (count, 6))
     power = random.uniform(-12.0, -3.0, (count, 3))

@@ -172,7 +172,7 @@ class JudgedPair:
     ----------
     bodies : pairs to be watched
     witness : (n,), rad or m, a joint vector in which watched bodies overlap; None where none was found
-    least : m, a lower bound of the distance of bodies that never meet; NaN for others
+    lower_bound : m, a lower bound of the distance of bodies that never meet; NaN for others
     left_out : m, radius of the region around the joint that is left out, 0 where there is none
     boxes : how many boxes of joint vectors were examined
     hub : (3,), m, in the outer link's frame, where a joint is proven to hold the two; None where none is
@@ -181,7 +181,7 @@ class JudgedPair:
     state: PairState
     bodies: tuple[tuple[Body, Body], ...] = ()
     witness: Reals | None = None
-    least: float = np.nan
+    lower_bound: float = np.nan
     left_out: float = 0.0
     boxes: int = 0
     hub: Reals | None = None
@@ -204,7 +204,7 @@ class MatrixRow:
     second: str
     state: PairState
     witness: Reals | None
-    least: float
+    lower_bound: float
     left_out: float
     boxes: int
     reason: str = ""
@@ -282,9 +282,9 @@ def judged_pairs(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: int) -
         boxes = min(boxes, BOXES_MORE)
     found = []
     for k, pair in enumerate(pairs):
-        at, least = np.empty(robot.joints), distance[:, k]
+        at, sampled = np.empty(robot.joints), distance[:, k]
         if always[k]:
-            found.append(_overlapping(robot, pair, q, least, boxes))
+            found.append(_overlapping(robot, pair, q, sampled, boxes))
             continue
         if meets[k] and (guide := _guide(robot, pair)):
             rest = [(part, pair[1]) for part in beside_axis(pair[0], *guide)]
@@ -296,21 +296,21 @@ def judged_pairs(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: int) -
             continue
         if meets[k]:
             grown = (pair[0], replace(pair[1], radius=pair[1].radius + TOUCH))
-            held = _held(robot, grown, boxes) if _neighbours(robot, pair) and least.max() < TOUCH else None
+            held = _held(robot, grown, boxes) if _neighbours(robot, pair) and sampled.max() < TOUCH else None
             if held:
-                found.append(_joined(robot, pair, q[least.argmax()], held, boxes))
+                found.append(_joined(robot, pair, q[sampled.argmax()], held, boxes))
             else:
-                witness = q[np.where(overlap[:, k], least, np.inf).argmin()]
+                witness = q[np.where(overlap[:, k], sampled, np.inf).argmin()]
                 found.append(JudgedPair("meets", (pair,), witness))
             continue
-        outcome, looked, bound = search_boxes(layout, k, box, (False, GOAL * float(least.min())), boxes // 2, at)
+        outcome, looked, bound = search_boxes(layout, k, box, (False, GOAL * float(sampled.min())), boxes // 2, at)
         if outcome not in (FREE, MEETS):
             outcome, more, bound = search_boxes(layout, k, box, (False, 0.0), boxes, at)
             looked += more
         if outcome == MEETS:
             found.append(JudgedPair("meets", (pair,), at, boxes=looked))
         elif outcome == FREE:
-            found.append(JudgedPair("never", least=bound, boxes=looked))
+            found.append(JudgedPair("never", lower_bound=bound, boxes=looked))
         else:
             found.append(JudgedPair("undecided", (pair,), boxes=looked))
     return _beside(robot, pairs, found, q[distance.argmax(axis=0)], boxes)
@@ -521,7 +521,7 @@ def _row(first: str, second: str, found: Sequence[JudgedPair], reason: str) -> M
     by_severity = ("overlaps", "meets", "undecided", "joined", "watched", "allowed", "never")
     state = min((each.state for each in watched or found), key=by_severity.index)
     witness = next((each.witness for each in found if each.witness is not None), None)
-    bounds = [each.least for each in found if each.state == "never"]
+    bounds = [each.lower_bound for each in found if each.state == "never"]
     return MatrixRow(
         first,
         second,

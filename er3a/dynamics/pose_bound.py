@@ -1,26 +1,24 @@
 """Upper bounds of a maximum over all poses within the limits, by branch and bound [1]_.
 
-A box of joint values has a bound by the corners of its hulls (:mod:`er3a.dynamics.pose_bound`). Boxes that can't
-hold more than what is found already are dropped, the others halved, the highest bound first. What is left in the end,
-or when the budget is spent, bounds the largest there is: up to rounding the bound holds whenever it stops.
+**Search** (:func:`max_over_poses`): the largest value that is found, for several objectives at once. It starts from
+evenly spread poses and improves the best few: it sets one joint after another to the best value of a grid over its
+whole range, then refines the grid about it.
+
+**Bound** (:func:`bounded_torque`, :func:`bounded_lever`): a box of joint values has a bound from the corners of its
+hulls. Boxes that can't exceed the largest value found are dropped. The others are halved, the highest bound first.
+When boxes or budget run out, no pose exceeds the largest of the value found and the remaining bounds, up to
+rounding.
+
+**Hulls**: holding torques and distances from axes are affine in the cosine and sine of each row's angle (in the shift
+of a prismatic row), because each row enters once: what hangs beyond a joint is carried to its axis row by row, and
+gravity from the base. Cosine and sine of an arc lie in the triangle of its two ends and the point where the tangents
+there meet. For an arc of more than 120 degrees, they lie in the triangle around the whole circle. A function that is
+affine in each of several points has its largest absolute value over a product of triangles at a corner, so no pose in
+the box exceeds the corners.
 
 References
 ----------
 .. [1] R. Horst, H. Tuy, *Global Optimization: Deterministic Approaches*, 3rd ed., chapter IV.
-
-Holding torques and distances from axes at the corners of hulls around boxes of joint values.
-
-Both are affine in the cosine and sine of each row's angle (in its shift, where it slides), because no row comes in
-twice: what is beyond a joint is carried to its axis row by row, gravity from the base too. Cosine and sine of
-an arc lie in the triangle of its ends and the point where the tangents there meet; those of an arc of more than 120
-degrees in the triangle around the whole circle. What is affine in each of several points has its largest absolute
-value over a product of triangles at a corner of it, so nowhere in a box is there more than at the corners.
-
-The pose of an arm within its limits at which something is largest, for several objectives at once.
-
-From evenly spread poses the best few are climbed: one joint after another is set to the best of a grid over its whole
-range, which is then refined about it. The outcome is the largest found: :mod:`er3a.dynamics.pose_bound` says how much
-more there can be.
 """
 
 from __future__ import annotations

@@ -379,11 +379,11 @@ def to_pendant(pendant: Pendant, x: Reals, q_ref: Reals, q: Reals, inside: Flags
     direction, start, sliding, lower, upper = pendant
     slots, n, per_turn = x.shape[1], x.shape[2], 1.0 / TURN
     # all slots in one row and no branches, so that the processor takes several joints at once
-    sign, zero, turn, least, most, ref = np.empty((6, slots * n))
+    sign, zero, turn, lowest, highest, ref = np.empty((6, slots * n))
     for m in range(slots * n):
         j = m % n
         sign[m], zero[m], turn[m] = direction[j], start[j], 0.0 if sliding[j] else TURN
-        least[m], most[m], ref[m] = lower[j] - LIMIT_TOLERANCE, upper[j] + LIMIT_TOLERANCE, q_ref[0, j]
+        lowest[m], highest[m], ref[m] = lower[j] - LIMIT_TOLERANCE, upper[j] + LIMIT_TOLERANCE, q_ref[0, j]
     rows, found = x.reshape(x.shape[0], slots * n), q.reshape(x.shape[0], slots * n)
     for i in range(x.shape[0]):
         if q_ref.shape[0] > 1:
@@ -392,15 +392,15 @@ def to_pendant(pendant: Pendant, x: Reals, q_ref: Reals, q: Reals, inside: Flags
         for m in range(slots * n):
             value = sign[m] * (rows[i, m] - zero[m])
             value += turn[m] * np.rint((ref[m] - value) * per_turn)
-            low, high = np.ceil((least[m] - value) * per_turn), np.floor((most[m] - value) * per_turn)
+            low, high = np.ceil((lowest[m] - value) * per_turn), np.floor((highest[m] - value) * per_turn)
             below, above = value + turn[m] * (low - 1.0), value + turn[m] * low
-            outside = below if least[m] - below < above - most[m] else above
+            outside = below if lowest[m] - below < above - highest[m] else above
             found[i, m] = value + turn[m] * min(max(0.0, low), high) if low <= high else outside
         for slot in range(slots):
             fits = True
             for j in range(n):
                 value = found[i, slot * n + j]
-                fits &= (value <= most[j]) & (value >= least[j])
+                fits &= (value <= highest[j]) & (value >= lowest[j])
             inside[i, slot] = fits
 
 

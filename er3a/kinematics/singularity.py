@@ -353,7 +353,7 @@ def dependent_axes(robot: Robot, q: Reals) -> tuple[int, ...]:
     """
     J = scaled_jacobian(robot, q)
     J = J / np.maximum(np.linalg.norm(J, axis=0), 1e-300)
-    least = float(np.linalg.svd(J[:, : min(6, J.shape[1])] if J.shape[1] <= 6 else J, compute_uv=False)[-1])
+    of_all = float(np.linalg.svd(J[:, : min(6, J.shape[1])] if J.shape[1] <= 6 else J, compute_uv=False)[-1])
     best: tuple[float, tuple[int, ...]] = (np.inf, ())
     for count in range(2, min(6, robot.joints) + 1):
         sets = list(combinations(range(robot.joints), count))
@@ -362,7 +362,7 @@ def dependent_axes(robot: Robot, q: Reals) -> tuple[int, ...]:
         k = int(smallest.argmin())
         if smallest[k] < 0.2 * best[0]:
             best = float(smallest[k]), tuple(j + 1 for j in sets[k])
-        if best[0] < max(5.0 * least, DEPENDENT):
+        if best[0] < max(5.0 * of_all, DEPENDENT):
             break
     return best[1]
 

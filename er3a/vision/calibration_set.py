@@ -1,9 +1,9 @@
 """What was recorded for a hand-eye calibration, as arrays.
 
-Two streams of poses with clocks of their own: by how much one clock is ahead, and which poses belong together.
-
-Hand and eye turn by equal angles over equal times. The offset is the one at which the angles that the board turned by
-over short times agree best with the arm's over the same times; it is searched on a grid and then refined.
+Two streams of poses may have clocks of their own. :func:`time_offset` estimates the offset between them, and
+:func:`paired` interpolates poses at equal times. Hand and eye turn by equal angles over equal times, so the offset is
+the one at which the board's rotation angles over short times agree best with the arm's. It is searched on a grid and
+refined.
 """
 
 from __future__ import annotations
@@ -126,7 +126,7 @@ class TimeOffset:
 def time_offset(hand: Stream, eye: Stream, widest: float) -> TimeOffset:
     """Estimate the offset within +-``widest`` s.
 
-    Robust: a half of the compared turns may be wrong.
+    Robust: up to half of the compared rotations may be wrong.
     """
     arm = scipy.spatial.transform.Slerp(hand.t, scipy.spatial.transform.Rotation.from_matrix(hand.T[:, :3, :3]))
     later = np.searchsorted(eye.t, eye.t + SPAN_S)
@@ -160,10 +160,10 @@ def time_offset(hand: Stream, eye: Stream, widest: float) -> TimeOffset:
 
 
 def paired(hand: Stream, eye: Stream, offset: float, count: int) -> tuple[Reals, Reals, Reals]:
-    """So many poses (count, 4, 4) of hand and eye at equal times (count,), spread over rotations, the arm's between.
+    """``count`` poses (count, 4, 4) of hand and eye at equal times (count,), s, spread over rotations.
 
-    Chosen one after another, each the farthest in angle from those chosen before; of the half of all times at which
-    the arm moves least, so that what is left of the offset matters least.
+    The arm's poses are interpolated. Poses are chosen one after another, each the farthest in angle from those before,
+    from the half of all times at which the arm is slowest, where an error of the offset matters least.
     """
     inside = np.flatnonzero((eye.t + offset > hand.t[0]) & (eye.t + offset < hand.t[-1]))
     t = eye.t[inside] + offset

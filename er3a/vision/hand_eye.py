@@ -1,20 +1,19 @@
 """Hand-eye calibration: the likeliest poses of camera and board, how sure they are, and what contradicts them.
 
-Outliers, samples that can't be right: found without any calibration, by angles (:func:`check_angles`), and with one,
-by residuals (:func:`worst_sample`).
+**Outliers** are found without a calibration, by rotation angles (:func:`check_angles`), and with one, by residuals
+(:func:`worst_sample`). Between two samples hand and board turn by equal angles, whatever the hand-eye pose, and
+whichever way round the transforms are written [1]_. Samples are taken out, the one in most conflicts first, until all
+remaining pairs agree. For each one taken out, the rotations that detectors confuse are tried. The remaining samples
+are judged by their residuals.
 
-Between two samples hand and board turn by equal angles, whatever the hand-eye pose, and whichever way round the
-transforms are written [1]_. Samples are taken out, the one in most conflicts first, until all pairs left agree. For
-each one taken out the turns that detectors mistake are tried. What is left over is judged by its residuals.
+**Conventions**: orientations that were read by another convention than they were written by are recognised because the
+samples fit only by the other. A quaternion whose real part is at the other end keeps all rotation angles: the exchange
+acts on it as a rotation and a mirror image in four dimensions. Some orders of Euler angles keep them too. Only a fit
+shows these.
 
 References
 ----------
 .. [1] H. H. Chen, "A screw motion approach to uniqueness analysis of head-eye geometry", CVPR 1991.
-
-Orientations read by another convention than they were written by, found because the samples fit only by the other.
-
-Quaternions whose real part is at the other end keep all turning angles, for that moves them as a rotation and a
-mirror of four dimensions does; so do some orders of Euler angles. Only a fit can tell them.
 """
 
 from __future__ import annotations

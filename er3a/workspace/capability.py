@@ -8,16 +8,15 @@ Joint 1 only turns everything about its axis, or shifts it. So each cell of the 
 with joint 1 free; the result at another azimuth follows exactly by turning joint 1. With a limited joint 1, azimuths
 are divided into sectors, judged at their middles; so are positions along a prismatic joint 1.
 
+:func:`try_poses` estimates, from random poses, the ratio of the reached poses in a cell that can be held without
+contact; it proves nothing about other poses. A pose counts as reached if a solution within the limits is found, and as
+clear if one of its solutions touches neither the surroundings nor the arm itself.
+
 References
 ----------
 .. [1] F. Zacharias, C. Borst, G. Hirzinger, "Capturing robot workspace structure: representing robot capabilities",
    IEEE/RSJ Int. Conf. on Intelligent Robots and Systems (IROS), 2007.
 .. [2] T. Yoshikawa, "Manipulability of robotic mechanisms", Int. J. Robotics Research 4(2), 1985.
-
-The share of reached poses in a cell that can be held without contact: estimated from random poses, not proven.
-
-A pose counts as reached if a solution within the limits is found, and as clear if one of its solutions touches neither
-the surroundings nor the arm itself. Such a solution proves its pose; the share is an estimate.
 """
 
 from __future__ import annotations

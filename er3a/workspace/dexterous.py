@@ -119,22 +119,22 @@ def sectors_in_a_row(first: int, many: int) -> np.uint64:
 def _sectors(ranges: Reals, branch: _Found) -> tuple[np.uint64, np.uint64]:
     """Masks of the sectors where some branch is good, and where none is."""
     good, maybe, (state, theta_1) = _NONE, _NONE, branch
-    least, most, width = ranges[0, 0], ranges[0, 1], TURN / SECTORS
+    lower, upper, width = ranges[0, 0], ranges[0, 1], TURN / SECTORS
     for slot in range(SLOTS):
         if state[slot] == NEVER:
             continue
-        if most == np.inf:
+        if upper == np.inf:
             maybe = _ONE
             if state[slot] == GOOD:
                 good = _ONE
             continue
         low, high = theta_1[slot, 0], theta_1[slot, 1]
-        first, last = int(np.ceil((least - high) / width - 0.5)), int(np.floor((most - low) / width + 0.5))
+        first, last = int(np.ceil((lower - high) / width - 0.5)), int(np.floor((upper - low) / width + 0.5))
         maybe |= sectors_in_a_row(first, last - first + 1)
         if state[slot] == GOOD:
-            first, last = int(np.ceil((least - low) / width + 0.5)), int(np.floor((most - high) / width - 0.5))
+            first, last = int(np.ceil((lower - low) / width + 0.5)), int(np.floor((upper - high) / width - 0.5))
             good |= sectors_in_a_row(first, last - first + 1)
-    return good, (_ONE if most == np.inf else _ALL) & ~maybe
+    return good, (_ONE if upper == np.inf else _ALL) & ~maybe
 
 
 @kernel

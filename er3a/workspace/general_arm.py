@@ -41,7 +41,8 @@ class GeneralArm(NamedTuple):
     levers, radii : (n,), m, the point is never further from each axis; a prismatic joint has the lever 1
     heights : (n, 2), lowest and highest z of the point along each axis once its joint moved, m
     drive, start : (n, m) and (n,)
-    v_lower, v_upper : (m,), limits of v; combined (c, m), least, most (c,): ``least <= combined @ v <= most``.
+    v_lower, v_upper : (m,), limits of v
+    combined (c, m), combined_lower, combined_upper (c,) : ``combined_lower <= combined @ v <= combined_upper``
         Where v[0] counts in one of these, the others decide how far joint 1 goes; see :func:`own_range`
     to_joints : (m, m + 1), the manufacturer's joint values are ``to_joints @ [*v, 1]``, v[0] being x[0]
     full_turn : whether joint 1 covers a full turn
@@ -63,8 +64,8 @@ class GeneralArm(NamedTuple):
     v_lower: Reals
     v_upper: Reals
     combined: Reals
-    least: Reals
-    most: Reals
+    combined_lower: Reals
+    combined_upper: Reals
     to_joints: Reals
     full_turn: bool
     bar: float
@@ -78,9 +79,9 @@ class GeneralArm(NamedTuple):
         """The manufacturer's joint values (N, m) for values (N, m), joint 1 at the middle of what these allow it."""
         v = v.copy()
         low, high = np.full(len(v), self.lower[0]), np.full(len(v), self.upper[0])
-        for row, least, most in zip(self.combined, self.least, self.most):
+        for row, lowest, highest in zip(self.combined, self.combined_lower, self.combined_upper):
             if row[0]:
-                ends = (np.array([[least], [most]]) - v[:, 1:] @ row[1:]) / row[0]
+                ends = (np.array([[lowest], [highest]]) - v[:, 1:] @ row[1:]) / row[0]
                 low, high = np.maximum(low, ends.min(axis=0)), np.minimum(high, ends.max(axis=0))
         v[:, 0] = (low + high) / 2
         return np.asarray(v @ self.to_joints[:, :-1].T + self.to_joints[:, -1])
@@ -113,7 +114,7 @@ def general_arm(robot: Robot, thickness: tuple[Reals, float] | None = None) -> t
     ends[wide, 1] = ends[wide, 0] + 2 * np.pi
     lower, upper = ends.T.copy()
     drive, start, v_lower, v_upper = np.eye(n), np.zeros(n), lower, upper
-    combined, least, most = np.empty((0, n)), np.empty(0), np.empty(0)
+    combined, combined_lower, combined_upper = np.empty((0, n)), np.empty(0), np.empty(0)
     own = slice(last + 1 - n, last + 1)
     to_joints = np.column_stack([np.diag(robot.direction[own]), -(robot.direction * joint_starts(robot))[own]])
     if coupled(robot):
@@ -122,7 +123,9 @@ def general_arm(robot: Robot, thickness: tuple[Reals, float] | None = None) -> t
         drive = np.ascontiguousarray((robot.direction[:, None] * coupling)[:n])
         start, v_lower, v_upper = joint_starts(robot)[:n].copy(), robot.lower.copy(), robot.upper.copy()
         combined = np.array([limit.factors for limit in robot.combined]).reshape(-1, robot.joints)
-        least, most = np.array([[limit.lower, limit.upper] for limit in robot.combined]).reshape(-1, 2).T.copy()
+        combined_lower, combined_upper = (
+            np.array([[limit.lower, limit.upper] for limit in robot.combined]).reshape(-1, 2).T.copy()
+        )
     links, full_turn = links[:n], bool(wide[0])
     if thickness is not None:
         direction, length = thickness
@@ -151,8 +154,8 @@ def general_arm(robot: Robot, thickness: tuple[Reals, float] | None = None) -> t
         v_lower=v_lower,
         v_upper=v_upper,
         combined=combined,
-        least=least,
-        most=most,
+        combined_lower=combined_lower,
+        combined_upper=combined_upper,
         to_joints=to_joints,
         full_turn=full_turn,
         bar=0.0,
@@ -195,7 +198,9 @@ def _freed(arm: GeneralArm, ends: Reals) -> GeneralArm:
     M[:, 0] = line
     shift = -arm.start[0] * line
     limits = np.concatenate([np.eye(m), arm.combined])
-    low, high = np.concatenate([[arm.v_lower, arm.v_upper], [arm.least, arm.most]], axis=1) - limits @ shift
+    low, high = (
+        np.concatenate([[arm.v_lower, arm.v_upper], [arm.combined_lower, arm.combined_upper]], axis=1) - limits @ shift
+    )
     rows = limits @ M
     rows[np.abs(rows) < _ALONE] = 0.0
     kept = (rows[:, 0] != 0) | (np.count_nonzero(rows, axis=1) > 1)
@@ -213,8 +218,8 @@ def _freed(arm: GeneralArm, ends: Reals) -> GeneralArm:
         v_lower=v_lower,
         v_upper=v_upper,
         combined=np.ascontiguousarray(rows[kept]),
-        least=np.ascontiguousarray(low[kept]),
-        most=np.ascontiguousarray(high[kept]),
+        combined_lower=np.ascontiguousarray(low[kept]),
+        combined_upper=np.ascontiguousarray(high[kept]),
         to_joints=np.column_stack([M, shift]),
         full_turn=False,
     )
@@ -231,7 +236,7 @@ def own_range(arm: GeneralArm, v: Reals) -> tuple[float, float]:
         total = 0.0
         for j in range(1, v.shape[0]):
             total += arm.combined[r, j] * v[j]
-        a, b = (arm.least[r] - total) / factor, (arm.most[r] - total) / factor
+        a, b = (arm.combined_lower[r] - total) / factor, (arm.combined_upper[r] - total) / factor
         low, high = max(low, min(a, b)), min(high, max(a, b))
     return low, high
 
@@ -265,7 +270,12 @@ def _along_slide(arm: GeneralArm, first: Reals) -> tuple[GeneralArm, Reals, Real
     to_joints[:, 0] *= bar / (2 * np.pi)
     radii[0], heights[0] = size[0] + 2 * spare[0], (low[2], high[2])
     arm = arm._replace(links=links, lower=lower, upper=upper, radii=radii, heights=heights, bar=bar)
-    arm = arm._replace(combined=combined, least=arm.least - shift, most=arm.most - shift, to_joints=to_joints)
+    arm = arm._replace(
+        combined=combined,
+        combined_lower=arm.combined_lower - shift,
+        combined_upper=arm.combined_upper - shift,
+        to_joints=to_joints,
+    )
     return arm, frame, first[:3, 3] + (corner + np.array([0.0, start, 0.0])) @ frame
 
 

@@ -173,7 +173,7 @@ def _allowed(arm: GeneralArm, v: Reals) -> bool:
         total = 0.0
         for j in range(v.shape[0]):
             total += arm.combined[r, j] * v[j]
-        if total < arm.least[r] or total > arm.most[r]:
+        if total < arm.combined_lower[r] or total > arm.combined_upper[r]:
             return False
     return True
 
@@ -354,7 +354,7 @@ def _azimuths(arm: GeneralArm, cell: Cell, memory: Memory) -> tuple[bool, float,
     if arm.bar == 0.0 and (rho <= 0.0 or cell[0] <= 0.0):
         return False, 0.0, 0.0
     ux, uy = (x / rho, y / rho) if arm.bar == 0.0 else (1.0, 0.0)
-    low = high = least = 0.0
+    low = high = inward = 0.0
     memory.moves[:] = 0.0
     for c in range(memory.points.shape[0]):
         aside = along = 0.0
@@ -363,12 +363,12 @@ def _azimuths(arm: GeneralArm, cell: Cell, memory: Memory) -> tuple[bool, float,
             memory.moves[k] = max(memory.moves[k], abs(move))
             aside += move * (ux * memory.columns[k, 1] - uy * memory.columns[k, 0])
             along += move * (ux * memory.columns[k, 0] + uy * memory.columns[k, 1])
-        low, high, least = min(low, aside), max(high, aside), min(least, along)
+        low, high, inward = min(low, aside), max(high, aside), min(inward, along)
     second = 0.5 * curvature(arm, memory.moves, memory.radii) + 64.0 * ROUND_OFF * (1.0 + rho + arm.bar)
     if arm.bar > 0.0:
         return True, _azimuth(arm, x, y + low - second), _azimuth(arm, x, y + high + second)
     low, high = (low - second) / cell[0], (high + second) / cell[0]
-    if low < -1.0 or high > 1.0 or rho + least - second <= 0.0:
+    if low < -1.0 or high > 1.0 or rho + inward - second <= 0.0:
         return False, 0.0, 0.0
     middle = np.arctan2(y, x)
     return True, middle + np.arcsin(low) - ROUND_OFF, middle + np.arcsin(high) + ROUND_OFF
@@ -606,10 +606,10 @@ def _spread(L: Reals, cell: Cell, angle: float, width: float, bar: float) -> Spr
     up = abs(rz) * inwards + abs(tz) * d_turn + abs(vz) * d_z
     safe = 64.0 * ROUND_OFF * (1.0 + cell[1] + bar + abs(z) + abs(L[0, 3]) + abs(L[1, 3]) + abs(L[2, 3]))
     along, aside, up = along + safe, aside + safe, up + safe
-    least = max(0.0, rho_there - along)
+    nearest = max(0.0, rho_there - along)
     d_phi = np.arctan2(aside, rho_there - along) + 1e-9 if rho_there > along else np.pi
-    most = np.sqrt((rho_there + along) ** 2 + aside * aside)
-    return least, most, pz - up, pz + up, np.arctan2(py, px), d_phi
+    farthest = np.sqrt((rho_there + along) ** 2 + aside * aside)
+    return nearest, farthest, pz - up, pz + up, np.arctan2(py, px), d_phi
 
 
 @kernel

@@ -3,10 +3,10 @@
 At each point of a lattice, all directions of a cone are tested, branch by branch. A box fits where all lattice points
 in it are good, which sliding minima find for all places at once. The lattice only proposes places.
 
-Criterion: places where one branch serves the whole box come first, of these proven ones. Then the least manipulability
-over the box and the cone, which keeps away from singularities, and the smallest distance from the joint limits are
-weighed: each as a share of the best of all places, and the smaller share counts. A minimum of that distance is also
-required: the task narrows the limits.
+Criterion: places where one branch serves the whole box come first, and of these the proven ones. Two measures rank the
+rest: the smallest manipulability over the box and the cone, which keeps away from singularities, and the smallest
+distance from the joint limits. Each is taken as a ratio to the best of all places, and the smaller ratio counts. A
+minimum of that distance is also required: the task narrows the limits.
 
 A supported box has its underside on a :class:`Support`, over which all of it lies.
 
@@ -183,17 +183,17 @@ class Field:
     Attributes
     ----------
     origin : (3,), m; spacing : (3,), m; shape of the arrays : (nx, ny, nz)
-    least : (nx, ny, nz, slots), m^3, smallest manipulability over the directions by branch, NO where it misses one, and
-        where slots are no branches
-    least_any : (nx, ny, nz), the same by the best branch for each direction
+    manipulability : (nx, ny, nz, slots), m^3, the smallest over the directions by branch; NO where the branch misses a
+        direction, and where slots are no branches
+    manipulability_any : (nx, ny, nz), the same by the best branch for each direction
     limit_margin : (nx, ny, nz, slots), rad, smallest distance from the limits of joints with less than a full turn
         and of sums of revolute joints, by branch
     """
 
     origin: Reals
     spacing: Reals
-    least: Reals
-    least_any: Reals
+    manipulability: Reals
+    manipulability_any: Reals
     limit_margin: Reals
 
 
@@ -205,14 +205,14 @@ class Places:
     ----------
     centre : (n, 3), m; turned : (n,), whether the box is turned by 90 deg about z
     slot : (n,), the branch that serves it all, or MIXED
-    least : (n,), m^3, the criterion; limit_margin : (n,), rad (NaN with MIXED)
+    manipulability : (n,), m^3, the criterion; limit_margin : (n,), rad (NaN with MIXED)
     proven : (n,), whether all bricks of the lattice in it are proven, by any mix of branches
     """
 
     centre: Reals
     turned: Flags
     slot: Integers
-    least: Reals
+    manipulability: Reals
     limit_margin: Reals
     proven: Flags
 
@@ -247,18 +247,24 @@ def survey(
     """
     slots = slot_count(robot)
     start, spacing, shape, points, asked = _lattice(robot, task, coarsest)
-    least, least_any = np.full((len(points), slots), NO), np.full(len(points), NO)
+    manipulability, manipulability_any = np.full((len(points), slots), NO), np.full(len(points), NO)
     limit_margin = np.zeros((len(points), slots))
     if in_cone is None:
         rotations = directions.tool_rotations(directions.cone_directions(task.axis, task.half_angle, task.step), roll)
     else:
         rotations = in_cone(points[asked], task.axis, task.half_angle, task.step)
     if rotations.shape[-4]:
-        least[asked], least_any[asked], limit_margin[asked] = serve(robot, points[asked], rotations, roll, free)
+        manipulability[asked], manipulability_any[asked], limit_margin[asked] = serve(
+            robot, points[asked], rotations, roll, free
+        )
     if not slot_labels(robot):  # slots of a point's neighbours are other arms
-        least[:], limit_margin[:] = NO, 0.0
+        manipulability[:], limit_margin[:] = NO, 0.0
     return Field(
-        start, spacing, least.reshape(*shape, slots), least_any.reshape(shape), limit_margin.reshape(*shape, slots)
+        start,
+        spacing,
+        manipulability.reshape(*shape, slots),
+        manipulability_any.reshape(shape),
+        limit_margin.reshape(*shape, slots),
     )
 
 
@@ -309,10 +315,10 @@ def serve(
 
     Returns
     -------
-    least, least_any, limit_margin : (n, slots), (n,), (n, slots), as in :class:`Field`
+    manipulability, manipulability_any, limit_margin : (n, slots), (n,), (n, slots), as in :class:`Field`
     """
     asked, slots = directions.left_to_roll(robot, roll), slot_count(robot)
-    least, least_any = np.full((len(points), slots), np.inf), np.full(len(points), np.inf)
+    manipulability, manipulability_any = np.full((len(points), slots), np.inf), np.full(len(points), np.inf)
     limit_margin = np.full((len(points), slots), np.inf)
     alive = np.arange(len(points))
     for direction in _by_direction(rotations):
@@ -323,16 +329,16 @@ def serve(
             q_all, within = all_solutions(asked, directions.poses(points[part][:, None], tried).reshape(-1, 4, 4))
             value = np.where(within, manipulability_of(robot, q_all, within), NO).reshape(len(part), -1, slots)
             inside = _limit_margin(asked, q_all)
-            rolled = _best_roll(value, q_all.reshape(*value.shape, -1), free, (least[part] <= NO, least_any[part]))[
-                :, None
-            ]
+            rolled = _best_roll(
+                value, q_all.reshape(*value.shape, -1), free, (manipulability[part] <= NO, manipulability_any[part])
+            )[:, None]
             value = np.take_along_axis(value, rolled, axis=1)[:, 0]
             inside = np.take_along_axis(inside.reshape(len(part), -1, slots), rolled, axis=1)[:, 0]
-            least[part] = np.minimum(least[part], value)
-            least_any[part] = np.minimum(least_any[part], value.max(axis=1))
+            manipulability[part] = np.minimum(manipulability[part], value)
+            manipulability_any[part] = np.minimum(manipulability_any[part], value.max(axis=1))
             limit_margin[part] = np.fmin(limit_margin[part], inside)
-        alive = np.flatnonzero(least_any > NO)
-    return least, least_any, np.where(least > NO, limit_margin, 0.0)
+        alive = np.flatnonzero(manipulability_any > NO)
+    return manipulability, manipulability_any, np.where(manipulability > NO, limit_margin, 0.0)
 
 
 def _by_direction(rotations: Reals) -> Reals:
@@ -421,23 +427,23 @@ def fitting_places(field: Field, bricks: Flags, box: Reals) -> Places:
 
 def _weighed(places: Places) -> Reals:
     """The smaller of a place's shares (n,) in the best manipulability and the best distance from limits of all."""
-    least = places.least / max(places.least.max(initial=0.0), NOTHING)
+    ratio = places.manipulability / max(places.manipulability.max(initial=0.0), NOTHING)
     margin = np.where(np.isinf(places.limit_margin), np.inf, np.nan_to_num(places.limit_margin))
     best = max(margin[np.isfinite(margin)].max(initial=0.0), NOTHING)
-    weighed: Reals = np.minimum(least, np.where(places.slot == MIXED, 1.0, margin / best))
+    weighed: Reals = np.minimum(ratio, np.where(places.slot == MIXED, 1.0, margin / best))
     return weighed
 
 
 def _places(field: Field, bricks: Flags, box: Reals, turned: bool) -> Places:
     points = _lattice_points(field, box)
-    any_branch = _sliding_min(field.least_any, points)
+    any_branch = _sliding_min(field.manipulability_any, points)
     where = np.nonzero(any_branch > NO)
-    used = np.flatnonzero((field.least > NO).any(axis=(0, 1, 2)))
-    slots = field.least.shape[-1]
+    used = np.flatnonzero((field.manipulability > NO).any(axis=(0, 1, 2)))
+    slots = field.manipulability.shape[-1]
     by_slot = np.full((len(where[0]), slots), NO)
     limit_margin = np.zeros((len(where[0]), slots))
     for slot in used:
-        by_slot[:, slot] = _sliding_min(field.least[..., slot], points)[where]
+        by_slot[:, slot] = _sliding_min(field.manipulability[..., slot], points)[where]
         limit_margin[:, slot] = _sliding_min(field.limit_margin[..., slot], points)[where]
     slot = np.round(by_slot, 9).argmax(axis=1)
     rows = np.arange(len(slot))
@@ -446,7 +452,7 @@ def _places(field: Field, bricks: Flags, box: Reals, turned: bool) -> Places:
         centre=field.origin + (np.stack(where, axis=1) + (points - 1) / 2) * field.spacing,
         turned=np.full(len(slot), turned),
         slot=np.where(one, slot, MIXED),
-        least=np.where(one, by_slot[rows, slot], any_branch[where]),
+        manipulability=np.where(one, by_slot[rows, slot], any_branch[where]),
         limit_margin=np.where(one, limit_margin[rows, slot], np.nan),
         proven=_sliding_min(bricks.astype(float), points - 1)[where] > 0,
     )
@@ -661,7 +667,7 @@ def proven_bricks(robot: Robot, task: Task, field: Field, roll: directions.Roll)
 
     None of an arm without a spherical wrist.
     """
-    serving = field.least_any > NO
+    serving = field.manipulability_any > NO
     for axis in range(3):
         serving = np.minimum(np.delete(serving, -1, axis), np.delete(serving, 0, axis))
     bricks = np.argwhere(serving)

@@ -157,18 +157,18 @@ def _solutions(robot: Robot, T: Reals, redundancy: Reals | None) -> tuple[Reals,
     return slots.q, slots.inside
 
 
-def generic_manipulability(robot: Robot, q: Reals, wanted: Flags) -> Reals:
+def generic_manipulability(robot: Robot, q: Reals, chosen: Flags) -> Reals:
     """Product of the singular values of the Jacobian of what the tool has to meet, at joint values (..., n); 0 at those
-    not ``wanted``.
+    not ``chosen``.
 
     In m^3, less one m for each prismatic joint among those that place the tool point.
     """
-    J, found = jacobian(robot, q[wanted]), np.zeros(wanted.shape)
+    J, found = jacobian(robot, q[chosen]), np.zeros(chosen.shape)
     mask = task_mask(robot) > 0
     if not mask.all() and arm_solver(robot).chain.code != "scara":  # of a SCARA the other rows are 0
-        R = forward(robot, q[wanted])[:, :3, :3]
+        R = forward(robot, q[chosen])[:, :3, :3]
         J = np.concatenate([J[:, :3], R.swapaxes(-1, -2) @ J[:, 3:]], axis=1)[:, mask]
     gram = J @ J.swapaxes(-1, -2) if J.shape[-2] <= J.shape[-1] else J.swapaxes(-1, -2) @ J
     size = np.abs(np.linalg.det(J)) if J.shape[-2] == J.shape[-1] else np.sqrt(np.maximum(0.0, np.linalg.det(gram)))
-    found[wanted] = size
+    found[chosen] = size
     return found

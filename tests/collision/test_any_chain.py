@@ -158,7 +158,7 @@ def test_what_never_meets_does_not(robot, seed):
     for row in collision_matrix(robot).rows:
         if row.state == "never":
             away = lines(row.first)[:, :, None] - lines(row.second)[:, None]
-            assert np.linalg.norm(away, axis=-1).min() - 0.04 >= row.least - 1e-9
+            assert np.linalg.norm(away, axis=-1).min() - 0.04 >= row.lower_bound - 1e-9
         if row.witness is not None:
             assert ((row.witness >= robot.lower - 1e-12) & (row.witness <= robot.upper + 1e-12)).all()
 

@@ -86,7 +86,7 @@ def test_every_pair_of_links_stands_in_it_with_what_dense_sampling_finds(robot, 
     for (first, second), row in rows.items():
         distances = np.array([coal_distance(robot, each, first, second) for each in q])
         if row.state == "never":
-            assert 0 < row.least <= distances.min() + 1e-9
+            assert 0 < row.lower_bound <= distances.min() + 1e-9
         elif row.state == "joined":
             assert distances.max() < 0
         elif row.state == "meets":

@@ -68,14 +68,14 @@ def test_places_agree_with_brute_force_one_pose_at_a_time():
     field = survey(robot, task, roll_of(robot, 1), 0.1)
     assert field.spacing == pytest.approx([0.1, 0.1, 0.1])
     (rotation,) = tool_rotations(cone_directions(DOWN, 0.0), roll_of(robot, 1))[:, 0]
-    good = np.zeros(field.least_any.shape, dtype=bool)
+    good = np.zeros(field.manipulability_any.shape, dtype=bool)
     for index in np.ndindex(good.shape):
         point = field.origin + index * field.spacing
         if point[2] < 0.2 - 1e-9 or np.hypot(*point[:2]) < 0.15 or np.hypot(*point[:2]) > 0.5 or point[2] > 0.8:
-            good[index] = field.least_any[index] > NO
+            good[index] = field.manipulability_any[index] > NO
             continue
         good[index] = inverse(robot, poses(point, rotation)).within_limits.any()
-    assert np.array_equal(good, field.least_any > NO)
+    assert np.array_equal(good, field.manipulability_any > NO)
     expected = set()
     for turned, (a, b, c) in ((False, (3, 2, 2)), (True, (2, 3, 2))):
         for i, j, k in np.ndindex(good.shape):
@@ -160,7 +160,9 @@ def test_the_criterion_is_the_least_over_box_and_cone(random):
     places, roll = places_of(load_robot("er3_600"), TRAY), roll_of(robot, 1)
     assert places.slot[0] != MIXED
     one = places.rows(places.slot != MIXED)
-    shares = np.minimum(one.least / places.least.max(), one.limit_margin / np.nanmax(places.limit_margin))
+    shares = np.minimum(
+        one.manipulability / places.manipulability.max(), one.limit_margin / np.nanmax(places.limit_margin)
+    )
     assert (np.diff(one.proven.astype(int)) <= 0).all()
     assert 0 < one.proven.sum() < len(one.proven)
     for proven in (True, False):
@@ -172,7 +174,7 @@ def test_the_criterion_is_the_least_over_box_and_cone(random):
     found = inverse_batch(robot, T)
     q = found.q[:, places.slot[0]]
     assert found.within_limits[:, places.slot[0]].all()
-    assert np.abs(np.linalg.det(jacobian(robot, q))).min() == pytest.approx(places.least[0], rel=1e-9)
+    assert np.abs(np.linalg.det(jacobian(robot, q))).min() == pytest.approx(places.manipulability[0], rel=1e-9)
     limit_margin = np.minimum(q - robot.lower, robot.upper - q)[:, [0, 1, 2, 4]].min()
     assert limit_margin == pytest.approx(places.limit_margin[0], abs=1e-9)
 
@@ -182,7 +184,7 @@ def test_harder_tasks_are_never_easier():
     easy = places_of(robot, TRAY)
 
     def lattice(places: Places) -> dict:
-        return {(bool(t), *np.round(c, 6)): v for t, c, v in zip(places.turned, places.centre, places.least)}
+        return {(bool(t), *np.round(c, 6)): v for t, c, v in zip(places.turned, places.centre, places.manipulability)}
 
     most = lattice(easy)
     for harder in (replace(TRAY, half_angle=np.radians(35)), replace(TRAY, margin=np.radians(8))):
@@ -193,10 +195,10 @@ def test_harder_tasks_are_never_easier():
     larger = replace(TRAY, box=np.array([0.3, 0.15, 0.1]))
     fields = [survey(robot, task, roll_of(robot, 1), 0.05) for task in (TRAY, larger)]
     assert fields[0].spacing == pytest.approx(fields[1].spacing)
-    bricks = np.zeros(np.array(fields[0].least_any.shape) - 1, dtype=bool)
+    bricks = np.zeros(np.array(fields[0].manipulability_any.shape) - 1, dtype=bool)
     small, large = (fitting_places(fields[0], bricks, task.box) for task in (TRAY, larger))
     assert 0 < len(large.slot) < len(small.slot)
-    assert large.least.max() <= small.least.max()
+    assert large.manipulability.max() <= small.manipulability.max()
 
 
 def test_no_place_that_is_chosen_is_another_turned_about_axis_1():
@@ -240,7 +242,7 @@ def test_a_turned_base_turns_the_places():
     turned = robot.replace(base=placement([0, 0, 0], [0, 0, np.pi / 2]))
     one, other = places_of(robot, task), places_of(turned, task)
     assert len(one.slot) == len(other.slot)
-    assert np.sort(one.least) == pytest.approx(np.sort(other.least), rel=1e-6)
+    assert np.sort(one.manipulability) == pytest.approx(np.sort(other.manipulability), rel=1e-6)
     key = {(bool(t), *(np.round(c, 4) + 0.0)) for t, c in zip(other.turned, other.centre)}
     expected = {(not t, *(np.round([-c[1], c[0], c[2]], 4) + 0.0)) for t, c in zip(one.turned, one.centre)}
     assert key == expected

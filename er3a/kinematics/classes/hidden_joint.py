@@ -614,7 +614,7 @@ def nine_rows(F: Reals, M: Reals) -> tuple[float, float]:
     for r in range(6):
         for j in range(9):
             M[r, j] = F[r, j]
-    factor, least = 1.0, np.inf
+    factor, smallest = 1.0, np.inf
     for k in range(3):
         pivot = k
         for r in range(k + 1, 6):
@@ -625,7 +625,7 @@ def nine_rows(F: Reals, M: Reals) -> tuple[float, float]:
             for j in range(k, 9):
                 F[k, j], F[pivot, j] = F[pivot, j], F[k, j]
         factor *= F[k, k]
-        least = min(least, abs(F[k, k]))
+        smallest = min(smallest, abs(F[k, k]))
         if F[k, k] == 0.0:
             continue
         per = 1.0 / F[k, k]
@@ -638,13 +638,13 @@ def nine_rows(F: Reals, M: Reals) -> tuple[float, float]:
             M[6 + r, j] = F[3 + r, 3 + j]
         for j in range(6, 9):
             M[6 + r, j] = 0.0
-    return factor, least
+    return factor, smallest
 
 
 @kernel
 def determinant(M: Reals) -> tuple[float, float]:
     """Determinant of M (9, 9), which it changes, and its smallest pivot."""
-    value, least = 1.0, np.inf
+    value, smallest = 1.0, np.inf
     for k in range(9):
         pivot = k
         for r in range(k + 1, 9):
@@ -657,24 +657,24 @@ def determinant(M: Reals) -> tuple[float, float]:
             for j in range(k, 9):
                 M[k, j], M[pivot, j] = M[pivot, j], M[k, j]
         value *= M[k, k]
-        least = min(least, abs(M[k, k]))
+        smallest = min(smallest, abs(M[k, k]))
         per = 1.0 / M[k, k]
         for r in range(k + 1, 9):
             x = M[r, k] * per
             for j in range(k + 1, 9):
                 M[r, j] -= x * M[k, j]
-    return value, least
+    return value, smallest
 
 
 @inner_kernel
 def determinant_at(equations: Reals, angle: float, F: Reals, M: Reals) -> tuple[float, float]:
     """The determinant of the twelve equations at an angle, and about how much of it is rounding."""
     at_angle(equations, angle, F)
-    factor, least = nine_rows(F, M)
-    value, smallest = determinant(M)
-    least = min(least, smallest)
+    factor, smallest = nine_rows(F, M)
+    value, smallest_of_nine = determinant(M)
+    smallest = min(smallest, smallest_of_nine)
     value *= factor
-    return value, ROUNDING * abs(value) / least if least > 0.0 else 0.0
+    return value, ROUNDING * abs(value) / smallest if smallest > 0.0 else 0.0
 
 
 @kernel

@@ -104,7 +104,7 @@ def _without_what_is_open(T: Reals, task: int, frame: Reals, e: Reals, J: Reals)
 
 
 @inner_kernel
-def least_step(J: Reals, e: Reals, out: Reals) -> bool:
+def shortest_step(J: Reals, e: Reals, out: Reals) -> bool:
     """``out`` (n,) = the shortest x with ``J x = e`` by factors of ``J J^T``; False if J is nearly dependent."""
     n = J.shape[1]
     M, y = np.empty((6, 6)), np.empty(6)
@@ -151,7 +151,7 @@ def null_share(J: Reals, v: Reals, out: Reals) -> int:
         for r in range(6):
             for k in range(n):
                 moved[r] += J[r, k] * v[k]
-        if least_step(J, moved, out):
+        if shortest_step(J, moved, out):
             for k in range(n):
                 out[k] = v[k] - out[k]
             return n - 6
@@ -172,15 +172,15 @@ def null_share(J: Reals, v: Reals, out: Reals) -> int:
 @inner_kernel
 def onto_curve(posed: Posed, x: Reals, e: Reals, J: Reals) -> float:
     """Minimum-norm Newton steps; returns the error that is left."""
-    least, step = np.inf, np.empty(x.shape[0])
+    smallest, step = np.inf, np.empty(x.shape[0])
     for _ in range(25):
         error = error_and_jacobian(posed, x, e, J)
-        if error < 1e-15 or (error < SOLVES and error >= 0.5 * least):
+        if error < 1e-15 or (error < SOLVES and error >= 0.5 * smallest):
             return error
         if error > 0.5:
             return error
-        least = min(least, error)
-        if x.shape[0] > 6 and least_step(J, e, step):
+        smallest = min(smallest, error)
+        if x.shape[0] > 6 and shortest_step(J, e, step):
             for k in range(x.shape[0]):
                 x[k] += step[k]
             continue
@@ -301,9 +301,9 @@ def between(posed: Posed, points: Reals, at: Reals, out: Reals) -> None:
 def _to_rounding(posed: Posed, x: Reals, e: Reals, J: Reals) -> float:
     """Onto a curve, or to a root where the Jacobian is nearly singular: there each step halves what is missing."""
     error = onto_curve(posed, x, e, J)
-    best, least = x.copy(), error
+    best, smallest = x.copy(), error
     for _ in range(40):
-        if least < SOLVES_AS_ROOT * 1e-2:
+        if smallest < SOLVES_AS_ROOT * 1e-2:
             break
         U, s, Vt = np.linalg.svd(J, False)
         for r in range(s.shape[0]):
@@ -315,11 +315,11 @@ def _to_rounding(posed: Posed, x: Reals, e: Reals, J: Reals) -> float:
                 for k in range(x.shape[0]):
                     x[k] += along * Vt[r, k]
         error = error_and_jacobian(posed, x, e, J)
-        if error < least:
+        if error < smallest:
             best[:] = x
-            least = error
+            smallest = error
     x[:] = best
-    return least
+    return smallest
 
 
 @kernel

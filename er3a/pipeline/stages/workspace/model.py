@@ -728,7 +728,7 @@ def capability(middles: Reals, found: Capability, tried: ClearPoses, bars: bool)
 def places(found: Places) -> BoxPlaces:
     """Positions of the box."""
     margin = np.where(np.isinf(found.limit_margin), np.nan, found.limit_margin)
-    return BoxPlaces.of(found, manipulability_m3=found.least, limit_margin=margin)
+    return BoxPlaces.of(found, manipulability_m3=found.manipulability, limit_margin=margin)
 
 
 def _arcs(rows: Reals) -> list[list[float]]:

@@ -333,7 +333,7 @@ def _in_reach(within: Robot, part: Task, plan: CapabilityPlan) -> bool:
     """Whether the box fits somewhere where only reach counts."""
     assert plan.lattice is not None
     field = survey(within, part, plan.asked.roll, plan.lattice, in_cone=plan.asked.in_cone)
-    return bool(len(fitting_places(field, np.zeros(np.array(field.least_any.shape) - 1, bool), part.box).slot))
+    return bool(len(fitting_places(field, np.zeros(np.array(field.manipulability_any.shape) - 1, bool), part.box).slot))
 
 
 def _best_over(
@@ -412,7 +412,7 @@ def _placement_summary(
         task=task_summary(asked),
         spacing_m=model.triple(placement.field.spacing),
         directions=len(cone_directions(task.axis, task.half_angle, task.step)),
-        points_serving=int((placement.field.least_any > NO).sum()),
+        points_serving=int((placement.field.manipulability_any > NO).sum()),
         fitting=len(places.slot),
         fitting_with_one_branch=int((places.slot != MIXED).sum()),
         fitting_proven=int(places.proven.sum()),
@@ -435,8 +435,8 @@ def _listed(robot: Robot, task: Task, placement: BoxPlacement, best: float) -> l
             status=_status(proven),
             branch=None if slot == MIXED else labels[slot],
             branch_status=_status(branch_proven),
-            manipulability_m3=float(places.least[row]),
-            manipulability_ratio=float(places.least[row]) / best if best > 0 else 0.0,
+            manipulability_m3=float(places.manipulability[row]),
+            manipulability_ratio=float(places.manipulability[row]) / best if best > 0 else 0.0,
             limit_margin_deg=float(np.degrees(places.limit_margin[row] + task.margin))
             if slot != MIXED and np.isfinite(places.limit_margin[row])
             else None,
