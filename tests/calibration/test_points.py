@@ -530,7 +530,7 @@ def test_bars_in_the_plane_of_a_flat_arm_take_a_table_of_any_size(wrong, random)
     """By sums of angles. A socket in that plane allows no circle wider than its bar, but the length that is held may
     make the whole arm too large: terms were taken for that."""
     a, rows = np.array([0.4, 0.3, 0.2]), []
-    true = a + [wrong, 0, 0]
+    true = a + np.array([wrong, 0, 0])
     for number in range(4):
         middle, length = random.uniform(0.35, 0.6), random.uniform(0.2, 0.3)
         while len(rows) < 40 * (number + 1):
