@@ -269,6 +269,13 @@ class PointObservations:
         found: Reals = lengths[rows, 0]
         return found
 
+    def _from_socket(self, rows: Integers) -> Reals:
+        """A bar's measured lengths, m, 0 if they are unknown or say nothing: the points of a flat arm whose distance
+        is one length are on a circle of any radius, as the socket may be beside their plane. A table that is too large
+        would have them on a circle wider than the length, which no socket allows."""
+        lengths: Reals = self.lengths_mm(rows) / MM
+        return np.zeros(len(lengths)) if self.flat and np.ptp(lengths) < MIN_LENGTH else lengths
+
     def _lifted(self, rows: Integers) -> Reals:
         return np.empty((len(rows), 0)) if self.lifted is None else self.lifted[rows]
 
@@ -296,10 +303,10 @@ class PointObservations:
             elif kind == "pair":
                 found[rows, 0] = np.linalg.norm(own[0] - own[-1])
             else:
-                lengths = self.lengths_mm(rows) / MM
+                stated, lengths = self.lengths_mm(rows) / MM, self._from_socket(rows)
                 found[rows, 0] = np.linalg.norm(own - socket(own, lengths), axis=1)
                 if not lengths.any():
-                    found[rows, 0] -= found[rows, 0].mean()
+                    found[rows, 0] += stated.mean() - found[rows, 0].mean()
         return found
 
     def relative_shift(self, shift: Reals, around: Reals) -> Reals:
@@ -331,8 +338,9 @@ class PointObservations:
             return every * normal, np.hstack([every, inside, self._lifted(rows)])
         if kind == "pair":
             return directions(here - here[::-1])[0], every[:, :0]
-        along = directions(here - socket(here, self.lengths_mm(rows) / MM))[0]
-        return along, along if self._unknowns(kind, rows) == 3 else np.hstack([along, every])
+        lengths = self._from_socket(rows)
+        along = directions(here - socket(here, lengths))[0]
+        return along, along if lengths.any() else np.hstack([along, every])
 
     def independent(self, robot: Robot) -> tuple[scipy.sparse.csr_array, Integers]:
         """What is observed without what drops out, in standard deviations, near to a robot's table.
@@ -619,7 +627,7 @@ def check_poses(measurements: Sequence[Measurement], robot: Robot, path: str | P
 
 
 def spread(robot: Robot) -> list[Pose]:
-    """Poses all over the joint range, in whole multiples of 5 deg or mm."""
+    """Poses all over the joint range, in whole multiples of 5 deg or mm, or at a limit."""
     low, high = shown(robot, robot.lower), shown(robot, robot.upper)
-    rows = np.round(quasi_random_points(low, high, RICH_POSES) / 5) * 5 + 0.0
+    rows = np.clip(np.round(quasi_random_points(low, high, RICH_POSES) / 5) * 5, low, high) + 0.0
     return [tuple(row) for row in rows.tolist()]

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 import er3a
 from er3a.calibration.fit import Fit, covariance_by_poses
-from er3a.calibration.observations import Measurement, PointObservations
+from er3a.calibration.observations import Measurement, PointObservations, spread
 from er3a.calibration.outcomes import CalibrationError, MovesNothing, NotToldApart
 from er3a.calibration.parameters import coupled, settles
 from er3a.calibration.plan import plan
@@ -523,6 +523,42 @@ def test_oblique_planes_take_what_tilted_axes_of_a_flat_arm_lift(seed):
     assert {each.name for each in found.estimates} == {"a2", "a3", "offset2", "offset3"}
     for each in found.estimates:
         assert each.correction == pytest.approx(true.get(each.name, 0.0), abs=2 * each.half_width + 0.005)
+
+
+@pytest.mark.parametrize("wrong", [-3e-3, 3e-3])
+def test_bars_in_the_plane_of_a_flat_arm_take_a_table_of_any_size(wrong, random):
+    """By sums of angles. A socket in that plane allows no circle wider than its bar, but the length that is held may
+    make the whole arm too large: terms were taken for that."""
+    a, rows = np.array([0.4, 0.3, 0.2]), []
+    true = a + np.array([wrong, 0, 0])
+    for number in range(4):
+        middle, length = random.uniform(0.35, 0.6), random.uniform(0.2, 0.3)
+        while len(rows) < 40 * (number + 1):
+            q = np.concatenate([[0], random.uniform(-2.4, 2.4, 2)])
+            far = length + random.normal(0, 1e-5)
+            tip = (true * np.exp(1j * np.cumsum(q))).sum()
+            cosine = (abs(tip) ** 2 + middle**2 - far**2) / (2 * abs(tip) * middle)
+            if abs(cosine) < 1:
+                q[0] = random.choice([-1, 1]) * np.arccos(cosine) - np.angle(tip)
+                pose = tuple(np.degrees(np.angle(np.exp(1j * q))).tolist())
+                rows.append(Measurement(0, pose, "flange", (None,) * 3, bar=str(number), length_mm=1000 * length))
+    found = er3a.calibrate(er3a.Robot.from_dh(a, [0, 0, 0], [0, 0, 0]), rows)
+    assert found.beyond is None
+    assert found.ratios == ()
+    assert [each.entry for each in found.held if each.code == "sets_scale"] == ["a1"]
+    lengths = {each.name: each for each in found.estimates if each.unit == "mm"}
+    assert set(lengths) == {"a2", "a3"}
+    for each in lengths.values():
+        size = 1000 * true[each.parameter.joint - 1] * a[0] / true[0]
+        assert each.nominal + each.correction == pytest.approx(size, abs=2 * each.half_width)
+        assert each.half_width < 0.1
+
+
+def test_a_calibration_s_own_poses_are_within_the_limits():
+    """Poses in whole 5 deg were refused beside limits between these."""
+    robot = load_robot("er3_600")
+    robot = robot.replace(lower=np.radians(np.full(6, -154.7)), upper=np.radians(np.full(6, 154.7)))
+    assert np.abs(spread(robot)).max() == pytest.approx(154.7)
 
 
 def test_touches_that_no_entry_moves_are_refused():
