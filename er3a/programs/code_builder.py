@@ -273,8 +273,8 @@ def linked(
 ) -> tuple[dict[str, syntax.Routine], tuple[ProgramFinding, ...]]:
     """The routines by name, with calls of each other taken out of expressions; and the findings about the text.
 
-    Of two routines with one name the later one counts; the other is kept under a name that nothing calls. What a function
-    outside the program sets of its arguments (``sets_arguments``) is unclear from its call on.
+    Of two routines with one name the later one counts; the other is kept under a name that nothing calls. What a
+    function outside the program sets of its arguments (``sets_arguments``) is unclear from its call on.
     """
     found: list[ProgramFinding] = []
     by_name: dict[str, syntax.Routine] = {}
