@@ -8,7 +8,7 @@ Calls of a program's own routines, wherever they stand in expressions, become op
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Container, Iterable, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -268,10 +268,13 @@ def fault(place: Place, problem: str, remedy: str) -> InputError:
 Each = Callable[[syntax.Expression], syntax.Expression]
 
 
-def linked(routines: Iterable[syntax.Routine]) -> tuple[dict[str, syntax.Routine], tuple[ProgramFinding, ...]]:
+def linked(
+    routines: Iterable[syntax.Routine], sets_arguments: Callable[[str], bool] = lambda function: False
+) -> tuple[dict[str, syntax.Routine], tuple[ProgramFinding, ...]]:
     """The routines by name, with calls of each other taken out of expressions; and the findings about the text.
 
-    Of two routines with one name the later one counts; the other is kept under a name that nothing calls.
+    Of two routines with one name the later one counts; the other is kept under a name that nothing calls. What a
+    function outside the program sets of its arguments (``sets_arguments``) is unclear from its call on.
     """
     found: list[ProgramFinding] = []
     by_name: dict[str, syntax.Routine] = {}
@@ -283,7 +286,7 @@ def linked(routines: Iterable[syntax.Routine]) -> tuple[dict[str, syntax.Routine
             by_name[hidden] = replace(former, name=hidden)
         by_name[routine.name] = routine
     found += [finding for routine in by_name.values() for finding in not_understood(routine.code)]
-    return {name: _linked(routine, by_name) for name, routine in by_name.items()}, tuple(found)
+    return {name: _linked(routine, by_name, sets_arguments) for name, routine in by_name.items()}, tuple(found)
 
 
 def lacks_data(routines: Iterable[syntax.Routine], data: Iterable[syntax.Assign], known: Container[str]) -> bool:
@@ -350,9 +353,11 @@ def _opaque(expression: syntax.Expression) -> Iterable[str]:
         yield from _opaque(each)
 
 
-def _linked(routine: syntax.Routine, known: Mapping[str, syntax.Routine]) -> syntax.Routine:
+def _linked(
+    routine: syntax.Routine, known: Mapping[str, syntax.Routine], sets_arguments: Callable[[str], bool]
+) -> syntax.Routine:
     parts = (each for operation in routine.code if not _plain(operation) for each in syntax.expressions_of(operation))
-    if not any(_calls(each, known) for each in parts):
+    if not any(each.function in known or sets_arguments(each.function) for part in parts for each in _invoked(part)):
         return routine
     code: list[syntax.Operation] = []
     starts: list[int] = []
@@ -370,7 +375,15 @@ def _linked(routine: syntax.Routine, known: Mapping[str, syntax.Routine]) -> syn
             last: syntax.Operation = syntax.Call(operation.place, call.function, arguments, keywords, operation.text)
         else:
             last = mapped(operation, calls.out)
-        code += [*calls.found, last]
+        outside = [each for part in syntax.expressions_of(last) if not _plain(last) for each in _invoked(part)]
+        unclear = [
+            syntax.Assign(operation.place, given, syntax.Opaque(f"{each.function}(...)"), f"{each.function}(...)")
+            for each in outside
+            if sets_arguments(each.function)
+            for given in each.arguments
+            if isinstance(given, (syntax.Variable, syntax.Member, syntax.Element)) and not _of_system(given)
+        ]
+        code += [*calls.found, *unclear, last]
     starts.append(len(code))
     return replace(routine, code=tuple(_moved(operation, starts) for operation in code))
 
@@ -381,6 +394,21 @@ def _moved(operation: syntax.Operation, starts: list[int]) -> syntax.Operation:
     if isinstance(operation, syntax.Branch):
         return replace(operation, otherwise=starts[operation.otherwise])
     return operation
+
+
+def _invoked(expression: syntax.Expression) -> Iterator[syntax.Invocation]:
+    """The functions in an expression."""
+    if isinstance(expression, syntax.Invocation):
+        yield expression
+    for each in syntax.inner(expression):
+        yield from _invoked(each)
+
+
+def _of_system(target: syntax.Expression) -> bool:
+    """Whether a variable is the controller's own, such as ``$POS_ACT``."""
+    while isinstance(target, (syntax.Member, syntax.Element)):
+        target = target.of
+    return isinstance(target, syntax.Variable) and target.name.startswith("$")
 
 
 def _calls(expression: syntax.Expression, known: Mapping[str, syntax.Routine]) -> bool:

@@ -296,12 +296,22 @@ class ProgramMemory:
                 return
         key = self.key(target)
         if key is not None:
+            if "[" in key:
+                self._forget_overlapping(key)
             self.write(key, self._typed(key, value), local)
         else:  # an element changes, but which one is not known: none of its list is known from here
             while isinstance(target, (syntax.Member, syntax.Element)):
                 target = target.of
             if isinstance(target, syntax.Variable):
                 self.forget(target.name)
+
+    def _forget_overlapping(self, key: str) -> None:
+        """What a whole list and its elements say of each other, before the list ``A[]`` or an element is set."""
+        whole = f"{root(key)}[]"
+        if key.startswith(whole) or key.strip("[],") == root(key):
+            self.forget(root(key))
+        elif whole in self.local or whole in self.shared:
+            self.write(whole, syntax.Unclear(f"{whole}, whose element was set"))
 
     def forget(self, variable: str) -> None:
         """Make a variable unclear, with all its fields and elements."""

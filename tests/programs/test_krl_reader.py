@@ -334,3 +334,45 @@ def test_relative_motions_by_a_tool_beside_the_arm_are_not_understood(tmp_path):
     line, joint = moves(run(tmp_path, f"{body}LIN_REL {{X 5}}\nPTP_REL {{A1 5}}", robot=load_robot("er3a_c60")))[1:]
     assert line.target.reason == "external_tool"
     assert not isinstance(joint.target, PoseTarget)
+
+
+AXES = "PTP {{A1 {}, A2 0, A3 0, A4 0, A5 -60, A6 0}}"
+
+
+@pytest.mark.parametrize(
+    ("body", "more"),
+    [
+        ("S(A[])", "DEF S(X[]:OUT)\nINT X[]\nX[1]=50\nEND"),
+        ("S(A[])", "DEF S(X[]:OUT)\nINT X[]\nT(X[])\nEND\nDEF T(Y[]:OUT)\nINT Y[]\nY[1]=50\nEND"),
+        ("I=F(A[])", "DEFFCT INT F(X[]:OUT)\nINT X[]\nX[1]=50\nRETURN 1\nENDFCT"),
+        ("B[2]=50\nA[]=B[]", ""),
+        ('SREAD("50",STATE,OFFSET,"%d",A[1])', ""),
+        ('I=EKI_GETINT("Cell","Angle",A[1])', ""),
+        ('IF EKI_GETINT("Cell","Angle",A[1]) THEN\nWAIT SEC 1\nENDIF', ""),
+        ("CAST_FROM(BUFFER[],OFFSET,A[])", ""),
+        ("LOST(A[])", ""),
+    ],
+)
+def test_what_is_passed_by_reference_does_not_keep_its_old_value(body, more, tmp_path):
+    found = run(tmp_path, f"DECL INT A[2],B[2],I\nA[1]=3\nA[2]=4\n{body}\n{AXES.format('A[1]')}", more=more)
+    assert [each.target for each in moves(found) if isinstance(each.target, JointTarget)] == []
+    assert moves(found)
+
+
+def test_functions_that_only_read_their_arguments_keep_them(tmp_path):
+    body = f'DECL INT I\nI=3\nEKI_SETINT("Cell","Angle",I)\nCWRITE(H,STATE,MODE,"%d",I)\n{AXES.format("I")}'
+    (move,) = moves(run(tmp_path, body))
+    assert move.target.joints[0] == pytest.approx(np.radians(3))
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        'S[]="abc"\nS[1]="z"\nIF S[]=="abc" THEN',
+        'S[1]="z"\nS[]="abc"\nIF S[1]=="z" THEN',
+        'S[]="abc"\nSTRCLEAR(S[])\nIF S[]=="abc" THEN',
+    ],
+)
+def test_a_text_and_its_letters_change_together(body, tmp_path):
+    found = run(tmp_path, f"DECL CHAR S[9]\n{body}\n{AXES.format(5)}\nELSE\n{AXES.format(7)}\nENDIF")
+    assert len(moves(found)) == 2  # both sides

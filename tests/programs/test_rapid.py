@@ -98,7 +98,6 @@ POSES = {  # instructions, mm, quaternion (w first)
     "robtarget": ("MoveL p,@;", (100, 200, 300), (1, 0, 0, 0)),
     "quaternion": ("MoveL turned,@;", (100, 200, 300), (HALF, 0, 0, HALF)),
     "aggregate": (f"MoveJ [[1,-2,3.5],[0,1,0,0],[0,0,0,0],{NONE}],@;", (1, -2, 3.5), (0, 1, 0, 0)),
-    "not_of_length_1": (f"MoveL [[1,2,3],[2,0,0,0],[0,0,0,0],{NONE}],@;", (1, 2, 3), (1, 0, 0, 0)),
     "offs": ("MoveL Offs(p,10,20,30),@;", (110, 220, 330), (1, 0, 0, 0)),
     "offs_of_the_object": ("MoveL Offs(turned,10,0,0),@;", (110, 200, 300), (HALF, 0, 0, HALF)),
     "reltool": ("MoveL RelTool(turned,10,0,0),@;", (100, 210, 300), (HALF, 0, 0, HALF)),
@@ -600,3 +599,14 @@ def test_an_encoded_module_beside_is_named_and_refuses_nothing(tmp_path):
     found = check_program(read_program(tmp_path / "a.mod"), ROBOT, CheckOptions(measures=False)).findings
     told = {each.finding.code: (each.place.line, each.finding.text) for each in found if hasattr(each.finding, "text")}
     assert told == {"program_not_understood": (0, "sealed.sys"), "may_move": (4, "sealed_move")}
+
+
+@pytest.mark.parametrize("rotation", ["[2,0,0,0]", "[0.5,0,0,0]", "[1,1,0,0]"])
+def test_a_quaternion_whose_length_is_not_1_is_no_orientation(rotation, tmp_path):
+    path = tmp_path / "m.mod"
+    target = f"[[300,0,300],{rotation},[0,0,0,0],{NONE}]"
+    path.write_text(f"MODULE m\nPROC main()\nMoveJ {target},v100,fine,tool0;\nENDPROC\nENDMODULE\n", encoding="utf-8")
+    (move,) = [
+        step.instruction for step in execute(read_program(path)).steps if isinstance(step.instruction, ArmMotion)
+    ]
+    assert isinstance(move.target, UnresolvedTarget)

@@ -422,6 +422,13 @@ STRTOFRAME STRTOINT STRTOPOS STRTOREAL STRTOSTRING SWRITE USER_GRP VARSTATE VAR_
 HARMLESS = frozenset(HARMLESS_TEXT.split())
 """Functions of the controller that move nothing and set no frame."""
 EVALUATED = frozenset((*IN_DEGREES, "ATAN2", "INV_POS"))
+READING_TEXT = """
+BAS CHECKHOME CLEAR_KRLMSG CWRITE EKI_CHECKBUFFER EKI_CLEAR EKI_CLEARBUFFER EKI_CLOSE EKI_INIT EKI_LOCK EKI_OPEN
+EKI_SEND EKI_SETBOOL EKI_SETFRAME EKI_SETINT EKI_SETREAL EKI_SETSTRING EKI_UNLOCK EXISTS_KRLMSG MSGINFO MSGLOG MSGNOTIFY
+MSGQUIT MSGSTATE P00 PULSE STRCOMP STRDECLLEN STRFIND STRLEN VARSTATE VAR_STATE
+"""
+READING = frozenset(READING_TEXT.split())
+"""Functions of a controller that only read their arguments; others, as ``SREAD`` and ``EKI_GETREAL``, may set them."""
 OF_SETTINGS_TEXT = """
 SVEL_CP SVEL_JOINT SACC_CP SACC_JOINT SAPO SAPO_PTP STOOL STOOL2 SBASE SIPO_MODE SJERK SLOAD SGEAR_JERK SORI_TYP
 SORI_TYPE SCIRC_TYPE
@@ -677,6 +684,11 @@ class KrlDialect(Dialect):
     def harmless(self, call: syntax.Invocation) -> bool:
         """Messages, files, signals."""
         return call.function in HARMLESS or call.function in EVALUATED or call.function in OF_SETTINGS
+
+
+def sets_arguments(function: str) -> bool:
+    """Whether a function outside the program may set the variables that it is given: KRL passes them by reference."""
+    return not function.startswith("%") and function not in EVALUATED | OF_SETTINGS | READING
 
 
 _SET = frozenset(

@@ -24,6 +24,7 @@ from er3a.programs.code_builder import (
     within,
 )
 from er3a.programs.instructions import Place
+from er3a.programs.krl.dialect import sets_arguments
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, data_file_of, read_program_text
 from er3a.programs.program_findings import DataFileMissing, NameTwice, ProgramFinding
 
@@ -488,7 +489,7 @@ def read_krl(source: ProgramText) -> syntax.Program:
             findings += more
     if data_file is None and lacks_data(routines, reader.data, CONFIG_NAMES):
         findings.append(DataFileMissing(source.path.with_suffix(".dat").name))
-    by_name, unlinked = linked([*called, *routines])
+    by_name, unlinked = linked([*called, *routines], sets_arguments)
     return syntax.Program(
         "krl",
         source.path.stem,

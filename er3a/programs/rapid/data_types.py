@@ -171,21 +171,25 @@ def plain(value: Value | None, count: int) -> tuple[float, ...] | None:
     return found if found is not None and finite(found) else None
 
 
+LENGTH_TOLERANCE = 0.01
+"""How far a quaternion's length may be from 1: two digits round it by less. ABB's manual wants it normalised."""
+
+
 def pose_matrix(value: Value | None) -> Reals | None:
-    """The transform (4, 4) in m of a pose; None unless its seven numbers are given and its quaternion has a length."""
+    """The transform (4, 4) in m of a pose; None unless its seven numbers are given and its quaternion's length is 1."""
     trans, rot = (part(value, "TRANS"), part(value, "ROT")) if isinstance(value, Record) else (None, None)
     if isinstance(value, tuple) and len(value) == 2:
         trans, rot = value
     xyz, quaternion = plain(trans, 3), plain(rot, 4)
-    if xyz is None or quaternion is None or math.hypot(*quaternion) < 1e-6:
+    if xyz is None or quaternion is None or abs(math.hypot(*quaternion) - 1) > LENGTH_TOLERANCE:
         return None
     return pose_of((*xyz, *quaternion), "abb")
 
 
 def rotation_of(value: Value | None) -> Reals | None:
-    """The rotation (3, 3) of an orient."""
+    """The rotation (3, 3) of an orient; None unless its length is 1."""
     quaternion = plain(value, 4)
-    if quaternion is None or math.hypot(*quaternion) < 1e-6:
+    if quaternion is None or abs(math.hypot(*quaternion) - 1) > LENGTH_TOLERANCE:
         return None
     found: Reals = Rotation.from_quat([*quaternion[1:], quaternion[0]]).as_matrix()
     return found
