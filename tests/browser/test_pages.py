@@ -75,7 +75,7 @@ def test_index_cells_are_links_as_a_whole_and_what_is_open_stands_first(browser,
 # In a corner of each cell, far from its words, the page's topmost element is the cell's link.
 CELLS_THAT_ARE_NO_LINK = """
 return [...document.querySelectorAll(".cells > li")].filter((cell) => {
-  cell.scrollIntoView({ block: "center" });
+  cell.scrollIntoView({ block: "end" });
   const box = cell.getBoundingClientRect();
   const hit = document.elementFromPoint(box.right - 4, box.bottom - 4);
   return hit?.tagName !== "A" || !cell.contains(hit);
