@@ -572,3 +572,35 @@ for code, label in (("en", "weight at rest (N)"), ("zh", "weight at rest（N）"
 assert axes.get_xlabel().endswith("（mm）")
 """
     carry_out("A column, and its plot.", edits, script)
+
+
+@pytest.mark.long
+def test_a_command(carry_out):
+    command = '''@options.app.command(rich_help_panel=options.FIRST)
+def robots(study: options.StudyFile = options.DEFAULT_STUDY):
+    """Print the robots of a study."""
+    from er3a.pipeline.study import load_study
+
+    options.print_table(("robot", "joints"), [("er3_600", str(load_study(study).robot("er3_600").joints))])
+
+
+@options.app.command(rich_help_panel=options.FIRST)
+def verdicts(
+'''
+    anchor = "@options.app.command(rich_help_panel=options.FIRST)\ndef verdicts(\n"
+    script = """
+import subprocess
+import sys
+
+def er3a(*words):
+    return subprocess.run([sys.executable, "-m", "er3a", *words], capture_output=True, text=True)
+
+done = er3a("robots", "--study", "config/small.yaml")
+words = [word for word in done.stdout.split() if word.isascii()]
+assert (done.returncode, words) == (0, ["robot", "joints", "er3_600", "6"]), done.stdout + done.stderr
+assert "Print the robots of a study." in er3a("--help").stdout
+missing = er3a("robots", "--study", "no.yaml")
+assert (missing.returncode, missing.stdout) == (2, "")
+assert "no.yaml" in missing.stderr
+"""
+    carry_out("A command.", {"er3a/pipeline/commands/studies.py": ((anchor, command),)}, script)
