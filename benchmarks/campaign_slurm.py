@@ -17,7 +17,7 @@ from testing.evidence import sized
 from testing.small_study import ROOT, STUDY, environment, fresh, run_command
 
 ROBOT, CORES, BLOCKS = "er3a_c60", 2, 4
-BLOCK = sized(1_000_000_000)
+BLOCK = sized(10_000_000_000)
 """Samples in a block of the size that docs/cluster.md recommends."""
 PID_FILES = [
     Path("/run", name) for name in ("slurmd.node1.pid", "slurmd.node2.pid", "slurmctld.pid", "munge/munged.pid")
