@@ -66,7 +66,8 @@ TEXTS = texts(
             "count", "{safe} of {count} path passes in the model", "{safe} of {count} paths pass in the model"
         ),
         "trajectory.not_followed": "{count} not followed to the end ({names})",
-        "trajectory.fault": "{count} {word} ({names})",
+        "trajectory.fault": "{word}: {count} ({names})",
+        "trajectory.near_assumed": "within the margin of assumed shapes: {count}",
         "dependent_axes": "axes {axes} dependent",
         "smallest_singular_value": "smallest singular value {value:.3g}",
         "path.safe": "far from singular poses, within limits and reach",
@@ -188,6 +189,8 @@ def _(found: model.PathCounts) -> str:
     if found.not_followed:
         parts = {"count": len(found.not_followed), "names": joined(found.not_followed, ", ")}
         faults.append(sentence("trajectory.not_followed", **parts))
+    if near := found.paths - found.safe - len(found.not_followed) - sum(map(len, unsafe.values())):
+        faults.append(sentence("trajectory.near_assumed", count=near))
     sentences = [safe if found.paths else "", joined(faults, ", "), demonstrated(found.demonstrations, found.paths)]
     return sentence("finding", finding=joined(sentences))
 
