@@ -25,6 +25,7 @@ from er3a.calibration.cross_validation import (
     can_leave_out,
     choose_terms,
     left_out,
+    tilts_explain,
 )
 from er3a.calibration.fit import (
     ROUNDING,
@@ -51,6 +52,7 @@ from er3a.calibration.outcomes import (
     MoreTouches,
     NoPositions,
     PlacementName,
+    SocketsBeside,
 )
 from er3a.calibration.parameters import (
     LEVELS,
@@ -565,6 +567,8 @@ def _model(robot: Robot, observations: PointObservations, free_ratios: bool) -> 
         table = fit(robot, level.kept, observations)
     here = corrected(robot, table.kept, table.amounts)
     choice, for_file = choose_terms(robot, here, table.kept, observations), ChosenTerms((), ())
+    if not choice.terms and tilts_explain(here, table.kept, observations):
+        raise _sockets_beside(observations, table)
     all_tried = any(each.kind == "coupling" for each in choice.tried)
     if free_ratios and (choice.terms or not all_tried):  # else none helps
         for_file = choose_terms(robot, here, table.kept, observations, FOR_ROBOT_FILE)
@@ -587,6 +591,16 @@ def _model(robot: Robot, observations: PointObservations, free_ratios: bool) -> 
     if not choice.terms:
         finer, whole = observations, table
     return _Model(observations, finer, level, table, choice, for_file, whole)
+
+
+def _sockets_beside(observations: PointObservations, table: Fit) -> CalibrationError:
+    bars = tuple(each.name for each in observations.things() if each.kind == "bar")
+    rest = float(np.sqrt(np.mean((table.after * observations.deviation_mm) ** 2)))
+    problem = (
+        f"what the table leaves ({rest:.3g} mm) looks like tilted axes with sockets beside the plane in which the arm "
+        f"moves; put the sockets of {', '.join(bars)} into it, or measure coordinates"
+    )
+    return CalibrationError(SocketsBeside(bars, rest), problem)
 
 
 def _error_left_out(observations: PointObservations, found: Fit) -> float:

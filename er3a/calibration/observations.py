@@ -276,6 +276,17 @@ class PointObservations:
         lengths: Reals = self.lengths_mm(rows) / MM
         return np.zeros(len(lengths)) if self.flat and np.ptp(lengths) < MIN_LENGTH else lengths
 
+    def lifted_bars(self) -> Reals:
+        """(n, k), each times an unknown amount: how tilts of a flat arm's axes change the distances of bars whose
+        sockets lie beside its plane."""
+        found: list[Reals] = []
+        for kind, rows in self.groups():
+            for lifted in self._lifted(rows).T if kind == "bar" else ():
+                own = np.zeros(self.seen.shape)
+                own[rows, 0] = lifted
+                found.append(own[self.seen])
+        return np.stack(found, axis=1) if found else np.empty((len(self), 0))
+
     def _lifted(self, rows: Integers) -> Reals:
         return np.empty((len(rows), 0)) if self.lifted is None else self.lifted[rows]
 

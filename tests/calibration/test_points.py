@@ -554,6 +554,41 @@ def test_bars_in_the_plane_of_a_flat_arm_take_a_table_of_any_size(wrong, random)
         assert each.half_width < 0.1
 
 
+@pytest.mark.parametrize("tilted", [True, False])
+def test_sockets_beside_the_plane_of_a_flat_arm_whose_axes_are_tilted_settle_nothing(tilted):
+    """By matrices. Terms that are not there were taken for the tilts, and entries missed by 6 half-widths."""
+    random = np.random.default_rng(2)
+    a, up, rows = np.array([0.4, 0.3, 0.2]), 0.15, []
+    true, tilts = a + np.array([0, 2e-3, 0]), [1e-3, -1e-3, 0] if tilted else [0, 0, 0]
+
+    def link(angle, length, tilt):
+        c, s = np.cos(angle), np.sin(angle)
+        cos, sin = np.cos(tilt), np.sin(tilt)
+        return np.array([[c, -s * cos, s * sin, length * c], [s, c * cos, -c * sin, length * s], [0, sin, cos, 0]])
+
+    for number in range(4):
+        middle, length = random.uniform(0.35, 0.6), random.uniform(0.3, 0.4)
+        while len(rows) < 40 * (number + 1):
+            q, far, tip = random.uniform(-2.4, 2.4, 3), length + random.normal(0, 1e-5), np.array([0, 0, 0, 1.0])
+            for angle, own, tilt in zip((*q[:0:-1], 0.0), true[::-1], tilts[::-1]):
+                tip = np.append(link(angle, own, tilt) @ tip, 1)
+            out = np.hypot(tip[0], tip[1])
+            cosine = (out**2 + middle**2 + (tip[2] - up) ** 2 - far**2) / (2 * out * middle)
+            if abs(cosine) < 1:
+                q[0] = random.choice([-1, 1]) * np.arccos(cosine) - np.arctan2(tip[1], tip[0])
+                pose = tuple(np.degrees(np.angle(np.exp(1j * q))).tolist())
+                rows.append(Measurement(0, pose, "flange", (None,) * 3, bar=str(number), length_mm=1000 * length))
+    robot = er3a.Robot.from_dh(a, [0, 0, 0], [0, 0, 0])
+    if tilted:
+        with pytest.raises(CalibrationError, match="sockets beside the plane") as refused:
+            er3a.calibrate(robot, rows)
+        assert refused.value.finding.bars == ("0", "1", "2", "3")
+        return
+    found = er3a.calibrate(robot, rows)
+    assert found.beyond is None
+    assert {each.name for each in found.estimates if abs(each.correction) > 2 * each.half_width} == {"a2"}
+
+
 def test_a_calibration_s_own_poses_are_within_the_limits():
     """Poses in whole 5 deg were refused beside limits between these."""
     robot = load_robot("er3_600")

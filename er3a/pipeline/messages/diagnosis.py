@@ -172,6 +172,11 @@ TEXTS = texts(
             "no corrections make the table fit: after {steps} steps the positions are still {rest_mm:.3g} mm off. The "
             "table has a gross fault or belongs to another arm; er3a.diagnose finds single faults"
         ),
+        "sockets_beside": (
+            "the corrected table leaves {rest_mm:.3g} mm, which look like tilted axes with sockets beside the plane in "
+            "which the arm moves: no entry is settled. Put the sockets of {bars:, } into that plane, or measure "
+            "coordinates"
+        ),
         "corrections_found": "The positions indicate corrections of {entries:, }: their 95 % intervals exclude 0.",
         "no_correction_found": Plural(
             "intervals",
