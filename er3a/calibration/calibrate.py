@@ -65,7 +65,15 @@ from er3a.calibration.parameters import (
 )
 from er3a.calibration.plan import d_optimal, touches
 from er3a.calibration.residuals import ResidualStructure, structure_of
-from er3a.calibration.terms import FOR_ROBOT_FILE, CorrectedModel, JointErrors, TermKind, effects, places_of
+from er3a.calibration.terms import (
+    FOR_ALL_JOINTS,
+    FOR_ROBOT_FILE,
+    CorrectedModel,
+    JointErrors,
+    TermKind,
+    effects,
+    places_of,
+)
 from er3a.numerics.arrays import Flags, Reals
 from er3a.references.quantities import Pose
 from er3a.references.reference import INTERVAL_95, ReferenceSet
@@ -207,7 +215,7 @@ class Estimate:
     ----------
     nominal : the table's value; correction : to be added to it; standard_error : of the correction
     quantile : half-width of its 95 % interval in standard errors
-    settled : whether that is less than what the table could be wrong by
+    settled : whether that is less than what the table could be wrong by, and no quite different arm fits better
     """
 
     parameter: Parameter
@@ -361,9 +369,9 @@ class Calibration(ByValue, Displayed):
         if not self.fits:
             return outcomes.Misfit(self.level, self.rms_before_mm, self.rms_after_mm)
         beyond = tuple(each.name for each in self.estimates if abs(each.correction) > each.half_width)
-        return (
-            outcomes.CorrectionsFound(beyond) if beyond else outcomes.NoCorrectionFound(len(self.estimates), self.open)
-        )
+        if beyond and len(self.open) < len(self.estimates):
+            return outcomes.CorrectionsFound(beyond)
+        return outcomes.NoCorrectionFound(len(self.estimates), self.open)
 
     @property
     def model(self) -> CorrectedModel:
@@ -533,7 +541,7 @@ def _estimates(robot: Robot, found: Fit, error: Reals, quantiles: Reals) -> tupl
             float(amount * parameter.in_unit),
             float(own * parameter.in_unit),
             float(quantile),
-            settles(robot, parameter.unit, float(quantile * own * parameter.in_unit)),
+            not found.ran_off and settles(robot, parameter.unit, float(quantile * own * parameter.in_unit)),
         )
         for parameter, amount, own, quantile in zip(found.kept, found.amounts, error, quantiles)
     )
@@ -566,11 +574,12 @@ def _model(robot: Robot, observations: PointObservations, free_ratios: bool) -> 
         observations = observations.with_deviation(observations.deviation_mm[0] * table.scatter)
         table = fit(robot, level.kept, observations)
     here = corrected(robot, table.kept, table.amounts)
-    choice, for_file = choose_terms(robot, here, table.kept, observations), ChosenTerms((), ())
+    ways = () if observations.all_touched and not _settled(robot, observations, table) else FOR_ALL_JOINTS
+    choice, for_file = choose_terms(robot, here, table.kept, observations, ways), ChosenTerms((), ())
     if not choice.terms and tilts_explain(here, table.kept, observations):
         raise _sockets_beside(observations, table)
     all_tried = any(each.kind == "coupling" for each in choice.tried)
-    if free_ratios and (choice.terms or not all_tried):  # else none helps
+    if free_ratios and ways and (choice.terms or not all_tried):  # else none helps
         for_file = choose_terms(robot, here, table.kept, observations, FOR_ROBOT_FILE)
         table = fit(robot, level.kept, observations, for_file.terms) if for_file.terms else table
     whole = fit(robot, level.kept, observations, choice.terms) if choice.terms else table
@@ -591,6 +600,13 @@ def _model(robot: Robot, observations: PointObservations, free_ratios: bool) -> 
     if not choice.terms:
         finer, whole = observations, table
     return _Model(observations, finer, level, table, choice, for_file, whole)
+
+
+def _settled(robot: Robot, observations: PointObservations, table: Fit) -> bool:
+    """Whether all entries are settled: else a table is so far from straight in what touches leave open that terms would
+    be taken for that."""
+    covariance, quantiles = _covariance(observations, table)
+    return all(each.settled for each in _estimates(robot, table, np.sqrt(np.diag(covariance)), quantiles))
 
 
 def _sockets_beside(observations: PointObservations, table: Fit) -> CalibrationError:

@@ -13,7 +13,8 @@ References
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -46,6 +47,8 @@ STEP = 1e-5
 SCALE = 1e-3  # m and rad alike: 1 mm, and 1 mrad, which moves a flange about as far
 NO_EFFECT = 1e-6
 STEPS, MAX_STEPS = 30, 100
+PLAUSIBLE = 0.05  # m and rad: a standard deviation of corrections
+FAR_OFF = 4.0  # of these
 SMALL_STEP = 1e-12  # m and rad
 SMALL_CHANGE, SLOW_CHANGE = 1e-6, 1e-3  # of the weighted differences, of measured points; after STEPS
 HALVINGS = 12
@@ -205,6 +208,7 @@ class Fit:
     J, rest : (m, k + c) and (m,), derivatives and differences of what is independent of places, planes and sockets
         that nobody knows, in standard deviations of it, ``deviation_mm`` (m,)
     last : (m,), the last of the n observed values that it is made of
+    ran_off : whether another arm meets the observations better, so that corrections were taken to be small
     """
 
     kept: tuple[Parameter, ...]
@@ -217,6 +221,7 @@ class Fit:
     rest: Reals
     deviation_mm: Reals
     last: Integers
+    ran_off: bool = False
 
     @property
     def freedom(self) -> int:
@@ -340,11 +345,27 @@ def _base_at(robot: Robot, kept: Sequence[Parameter], observations: Observations
 def fit(robot: Robot, kept: Sequence[Parameter], observations: Observations, terms: Sequence[JointTerm] = ()) -> Fit:
     """Corrections, and coefficients of terms (of measured points only), that meet the observations best.
 
+    Points that touch something may be met best by quite another arm, if they settle little or some are outliers. If the
+    steps don't end, or end there, corrections are taken to be small (``PLAUSIBLE``), and none of them is settled.
+
     Raises
     ------
     CalibrationError
         if the steps don't end
     """
+    if not (isinstance(observations, PointObservations) and observations.all_touched):
+        return _fit(robot, kept, observations, terms, 0.0)
+    with suppress(CalibrationError):
+        found = _fit(robot, kept, observations, terms, 0.0)
+        if np.abs(found.amounts).max() < FAR_OFF * PLAUSIBLE:
+            return found
+    return replace(_fit(robot, kept, observations, terms, 1 / PLAUSIBLE), ran_off=True)
+
+
+def _fit(
+    robot: Robot, kept: Sequence[Parameter], observations: Observations, terms: Sequence[JointTerm], holding: float
+) -> Fit:
+    """``holding``: by how much corrections are held at 0, per rad or m."""
     kept, terms, deviation = tuple(kept), tuple(terms), observations.deviation_mm
     nothing, start = np.zeros((1, len(kept))), _base_at(robot, kept, observations)
     far = bool(start.any())  # a large turn is no small one behind another
@@ -360,6 +381,9 @@ def fit(robot: Robot, kept: Sequence[Parameter], observations: Observations, ter
         values = with_errors(coefficients).predict(here, kept, nothing)[0]
         return np.concatenate([(values - observations.values_mm) / deviation, prior * coefficients])
 
+    def held(rest: Reals, amounts: Reals) -> Reals:
+        return np.concatenate([rest, holding * amounts]) if holding else rest
+
     def slopes(here: Robot, amounts: Reals, coefficients: Reals) -> Reals:
         seen = with_errors(coefficients)
         slope = jacobian(robot, kept, seen, amounts) if far else jacobian(here, kept, seen)
@@ -373,15 +397,16 @@ def fit(robot: Robot, kept: Sequence[Parameter], observations: Observations, ter
     unknowns = np.r_[start, np.zeros(len(prior))]
     before = weighted(robot, unknowns[k:])[:n]
     here = corrected(robot, kept, unknowns[:k])
-    rest = weighted(here, unknowns[k:])
+    rest = held(weighted(here, unknowns[k:]), unknowns[:k])
     for number in range(MAX_STEPS):
         J = slopes(here, unknowns[:k], unknowns[k:])
+        J = np.vstack([J, holding * np.eye(k, len(unknowns))]) if holding else J
         step = np.linalg.lstsq(J, -rest, rcond=None)[0]
         gain = np.linalg.norm(J @ step)
         for _ in range(HALVINGS):
             trial = unknowns + step
             here = corrected(robot, kept, trial[:k])
-            new = weighted(here, trial[k:])
+            new = held(weighted(here, trial[k:]), trial[:k])
             if new @ new <= rest @ rest * (1 + 1e-9):
                 break
             step = step / 2

@@ -589,6 +589,32 @@ def test_sockets_beside_the_plane_of_a_flat_arm_whose_axes_are_tilted_settle_not
     assert {each.name for each in found.estimates if abs(each.correction) > 2 * each.half_width} == {"a2"}
 
 
+def test_touches_that_quite_another_arm_meets_better_settle_nothing():
+    """A slide and two joints, four touches of each ball, seen with 1 mm: least squares ran off to a tool metres long, and
+    the table was refused as another arm's; elsewhere it took terms, or entries with intervals of 0."""
+    random, tool, rows = np.random.default_rng(0), translation(0.03, 0.05, 0.12), []
+    low, high = [0.05, -2.4, -2.4], [0.5, 2.4, 2.4]
+    robot = er3a.Robot.from_dh(
+        [0.1, 0.45, 0.3], [np.pi / 2, 0.3, 0], [0.2, 0.1, 0.08], lower=low, upper=high, sliding=[True, False, False]
+    ).replace(tool=tool)
+    true = robot.replace(alpha=robot.alpha + np.array([4e-3, 0, 0]))
+    for number in range(34):
+        at = er3a.forward(true, random.uniform(low, high))[:3, 3]
+        for aim in at + random.normal(0, 1e-3, (4, 3)):
+            off = lambda q, aim=aim: er3a.forward(true, q)[:3, 3] - aim  # noqa: E731
+            found = least_squares(
+                off, random.uniform(low, high), bounds=(low, high), max_nfev=60, xtol=1e-12, ftol=1e-14
+            )
+            if np.abs(found.fun).max() < 1e-8:
+                pose = (1000 * found.x[0], *np.degrees(found.x[1:]).tolist())
+                rows.append(Measurement(0, pose, "tool", (None,) * 3, place=str(number)))
+    found = er3a.calibrate(robot, rows)
+    assert found.beyond is None
+    assert found.ratios == ()
+    assert found.conclusion.code == "no_correction_found"
+    assert set(found.open) == {each.name for each in found.estimates}
+
+
 def test_a_calibration_s_own_poses_are_within_the_limits():
     """Poses in whole 5 deg were refused beside limits between these."""
     robot = load_robot("er3_600")

@@ -50,7 +50,10 @@ def lines_of(found: Calibration) -> str:
         f"these measurements settle {len(found.estimates) - len(found.open)} of "
         f"{len(found.estimates) + len(found.held)} numbers",
         *(
-            [f"not settled, by intervals wider than an arm's table may be off: {', '.join(found.open)}"]
+            [
+                "not settled, by intervals wider than an arm's table may be off, or because quite another arm meets "
+                f"the positions as well: {', '.join(found.open)}"
+            ]
             * bool(found.open)
         ),
         f"root mean square difference {found.rms_before_mm:.4g} mm before, {found.rms_after_mm:.4g} mm after; "

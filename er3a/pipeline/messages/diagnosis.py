@@ -184,7 +184,8 @@ TEXTS = texts(
             "The positions indicate no correction: all {count} 95 % intervals contain 0.",
         ),
         "no_correction_found#open": (
-            "The positions settle nothing of {open:, }: their 95 % intervals are wider than an arm's table may be off."
+            "The positions settle nothing of {open:, }: their 95 % intervals are wider than an arm's table may be off, "
+            "or quite another arm meets the positions as well."
         ),
         "not_told_apart#parallel": "{entries} can't be identified separately: axes {first} and {second} are parallel",
         "not_told_apart": "{entries} can't be identified separately",
