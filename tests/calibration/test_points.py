@@ -590,7 +590,7 @@ def test_sockets_beside_the_plane_of_a_flat_arm_whose_axes_are_tilted_settle_not
 
 
 def test_touches_that_quite_another_arm_meets_better_settle_nothing():
-    """A slide and two joints, four touches of each ball, seen with 1 mm: least squares ran off to a tool metres long, and
+    """A slide and two joints, four touches of each ball, seen with 1 mm: least squares ran off to a tool of metres, and
     the table was refused as another arm's; elsewhere it took terms, or entries with intervals of 0."""
     random, tool, rows = np.random.default_rng(0), translation(0.03, 0.05, 0.12), []
     low, high = [0.05, -2.4, -2.4], [0.5, 2.4, 2.4]
