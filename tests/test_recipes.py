@@ -575,6 +575,54 @@ assert axes.get_xlabel().endswith("（mm）")
 
 
 @pytest.mark.long
+def test_a_setting(carry_out):
+    """Of two stages: a class under a key of its own, which both list; all others keep what they are computed from."""
+    settings = "from er3a.pipeline.settings import TrajectorySettings\n"
+    both = settings.replace("import T", "import FixtureSettings, T")
+    fixture = """
+
+
+class FixtureSettings(StrictModel):
+    \"\"\"``height_mm``: of the fixture that the arm stands on.\"\"\"
+
+    height_mm: Annotated[float, Field(ge=0, le=10_000)] = 0
+"""
+    last = "    write_unsafe: bool = False\n"
+    edits = {"er3a/pipeline/settings.py": ((last, last + fixture),)}
+    for stage, own in (("inverse", "InverseSettings"), ("dynamics", "DynamicsSettings")):
+        listed = f'settings={{"{stage}": {own}, '
+        edits[f"er3a/pipeline/stages/{stage}/entry.py"] = (
+            (settings, both),
+            (listed, listed + '"fixture": FixtureSettings, '),
+        )
+    script = """
+import yaml
+from er3a.pipeline.settings import FixtureSettings
+from er3a.pipeline.study import STAGES, load_study
+
+from pathlib import Path
+
+def computed(height):
+    content = yaml.safe_load(Path("config/small.yaml").read_text())
+    content["fixture"] = {"height_mm": height} if height is not None else {}
+    Path("fixture.yaml").write_text(yaml.safe_dump(content))
+    study = load_study("fixture.yaml")
+    assert study.section(FixtureSettings).height_mm == (height or 0)
+    return {stage: study.computed_from("er3a_c60", stage) for stage in STAGES}
+
+before, after = computed(None), computed(25.0)
+assert {stage for stage in STAGES if before[stage] != after[stage]} == {"inverse", "dynamics"}
+try:
+    computed(-1.0)
+except Exception as error:
+    assert "fixture.height_mm" in str(error), error
+else:
+    raise AssertionError
+"""
+    carry_out("A setting.", edits, script)
+
+
+@pytest.mark.long
 def test_a_command(carry_out):
     command = '''@options.app.command(rich_help_panel=options.FIRST)
 def robots(study: options.StudyFile = options.DEFAULT_STUDY):
