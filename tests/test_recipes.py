@@ -623,6 +623,46 @@ else:
 
 
 @pytest.mark.long
+def test_a_finding(carry_out):
+    """Another suspect sample of a hand-eye calibration, in both languages."""
+    finding = '''class LateSample(Finding):
+    """The board was seen some time after the arm had its pose."""
+
+    sample: str
+    late_s: float
+
+
+Suspect = LateSample | RotationMismatch'''
+    text = '        "late_sample": "{sample}: seen {late_s:.2f} s after the arm was there",\n'
+    translated = 'msgctxt "key"\nmsgid "late_sample"\nmsgstr "{sample}：晚了 {late_s} s"\n\n'
+    first, anchor = (
+        '        "far_from_fit": (\n',
+        "#. {sample}: {off_mm:.3g} mm and {off_deg:.2g} deg from what the other samples\n",
+    )
+    edits = {
+        "er3a/vision/vision_findings.py": (("Suspect = RotationMismatch", finding),),
+        "er3a/pipeline/messages/vision.py": ((first, text + first),),
+        "er3a/pipeline/messages/locale/zh/LC_MESSAGES/er3a.po": ((anchor, translated + anchor),),
+    }
+    script = """
+from typing import get_args
+
+from er3a.pipeline.messages import vision
+from er3a.pipeline.messages.language import using
+from er3a.pipeline.messages.say import say
+from er3a.vision.vision_findings import LateSample, Suspect
+
+assert LateSample in get_args(Suspect)
+found = LateSample("shot_7", 0.5)
+assert found.code == "late_sample"
+assert say(found) == "shot_7: seen 0.50 s after the arm was there"
+with using("zh"):
+    assert say(found) == "shot_7：晚了 0.50 s", say(found)
+"""
+    carry_out("A finding.", edits, script)
+
+
+@pytest.mark.long
 def test_a_command(carry_out):
     command = '''@options.app.command(rich_help_panel=options.FIRST)
 def robots(study: options.StudyFile = options.DEFAULT_STUDY):
