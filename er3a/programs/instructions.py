@@ -198,7 +198,7 @@ class ArmMotion(ByValue):
     load : what hangs on the flange, in its frame; a text where the program names a load without all its numbers; None
         where it says nothing
     doubt : an instruction before that is not understood, and may have set another tool, base or path; empty if there is
-        none, and for joint targets
+        none, and for targets that are no poses
     """
 
     kind: MotionKind

@@ -557,7 +557,7 @@ class Machine:
         memory = way.memory
         if isinstance(operation, syntax.Move):
             motion = self.dialect.motion(memory, operation)
-            if memory.doubts and not isinstance(motion.target, instructions.JointTarget):
+            if memory.doubts and isinstance(motion.target, instructions.PoseTarget):
                 motion = replace(motion, doubt=next(iter(memory.doubts.values())))
             self._note(way, operation.place, motion)
             memory.here = memory.here.after(motion, memory.cell.flange)

@@ -584,6 +584,7 @@ def test_an_assignment_to_no_variable_is_named(tmp_path, line):
 # What an instruction that is not understood may have set
 
 
+RAPID_MOVE = "MoveAbsJ [[10,-15,-5,5,-60,10],[9E9,9E9,9E9,9E9,9E9,9E9]],v50,fine,tool0;"
 LINE = "LIN {X 560,Y 0,Z 500,A 0,B 90,C 0}"
 ZERO = "{X 0,Y 0,Z 0,A 0,B 0,C 0}"
 
@@ -618,3 +619,18 @@ def test_a_tool_of_urscript_is_in_doubt_after_an_unknown_function_until_it_is_se
     tool = "set_tcp(p[0,0,0.1,0,0,0])\n"
     assert codes(check(tmp_path, f"{tool}elsewhere()\n{moves}"))["frames_in_doubt"] == [4]
     assert "frames_in_doubt" not in codes(check(tmp_path, f"elsewhere()\n{tool}{moves}"))
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("a.src", krl(f"{FRAMES}elsewhere()\nPTP {axes(NEAR)}")),
+        ("a.src", krl(f"{FRAMES}$ACT_TOOL=2\nPTP {axes(NEAR)}")),
+        ("a.script", f"\n\n\nelsewhere()\nmovej({NEAR_TEXT})\n"),
+        ("a.mod", f"MODULE a\nPROC main()\n\nSingArea \\Wrist;\n{RAPID_MOVE}\nENDPROC\nENDMODULE\n"),
+    ],
+)
+def test_what_an_instruction_does_that_is_not_understood_or_simulated_is_listed(tmp_path, name, text):
+    found = check(tmp_path, text, name)
+    assert (4, "instruction") in [(each.place.line, each.what) for each in found.not_examined]
+    assert len(found.verdicts) == 1
