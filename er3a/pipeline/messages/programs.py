@@ -93,7 +93,7 @@ REMEDIES: dict[str, str] = {
     "frame_taken_as_flange": N_(
         "Map the name to a frame under frames in the file that lists the programs, if a tool is mounted."
     ),
-    "frames_in_doubt": N_("Put what defines it beside the program, or set tool and base after it."),
+    "frames_in_doubt": N_("Set tool and base after it, or remove it."),
     "way_not_known": N_("Give start_deg of the program, or mend the motion before."),
     "not_come_to": FURTHER,
     "rest_not_checked": N_("Give the check more time or motions, or split the program and check its parts."),
