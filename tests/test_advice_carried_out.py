@@ -50,6 +50,7 @@ CARRIED_OUT = {
     "load_not_examined": "test_the_load_that_a_program_names_counts_for_its_stretches",
     "load_above_payload": "test_a_load_is_named_once_and_one_above_the_payload_fails",
     "frame_not_given#base": OF_PROGRAMS,
+    "frames_in_doubt": OF_PROGRAMS,
     "frame_not_given#tool": OF_PROGRAMS,
     **{f"strategy.{name}": "test_what_is_usable_ends_at_the_end_within_all_limits" for name in STRATEGIES},
     "strategy.stop": "test_stop_rests_on_the_path_before_the_region",

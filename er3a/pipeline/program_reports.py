@@ -188,7 +188,12 @@ def not_examined_line(checked: CheckedFile) -> str:
     """Which lines were not examined, or not each time that they are carried out; empty if all were."""
     if checked.check is None or not checked.check.not_examined:
         return ""
-    words = {"motion": "motions of lines", "way": "the ways to the targets of lines", "course": "the course from lines"}
+    words = {
+        "motion": "motions of lines",
+        "way": "the ways to the targets of lines",
+        "course": "the course from lines",
+        "instruction": "what is done in lines",
+    }
     lines: dict[tuple[Path | None, str], list[int]] = {}
     for each in checked.check.not_examined:
         lines.setdefault((each.place.file, words[each.what]), []).append(each.place.line)

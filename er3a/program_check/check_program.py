@@ -34,7 +34,7 @@ from er3a.program_check.step_checks import CheckedMotion, StepChecker, obstacles
 from er3a.programs.execution import Ending, Execution, KeepOn, RunLimits
 from er3a.programs.instructions import ArmMotion, Decision, MovesBeside, Pause, Place, PoseTarget, Unknown
 from er3a.programs.machine import execute
-from er3a.programs.program_findings import NotUnderstood
+from er3a.programs.program_findings import NotSimulated, NotUnderstood
 from er3a.programs.syntax import Fixed, Move, Program
 from er3a.robots.masses import MassBody
 from er3a.robots.robot import Robot
@@ -81,10 +81,11 @@ class CheckOptions(ByValue):
 @dataclass(frozen=True)
 class NotExamined:
     """What was not examined: a motion instruction, or not each time that it is carried out; the way of a motion whose
-    start is not known; or where the program's course was not followed on."""
+    start is not known; where the program's course was not followed on; or what an ``instruction`` does that is not
+    understood or not simulated."""
 
     place: Place
-    what: Literal["motion", "way", "course"]
+    what: Literal["motion", "way", "course", "instruction"]
 
 
 @dataclass(frozen=True)
@@ -244,6 +245,8 @@ def _not_examined(execution: Execution, located: tuple[LocatedFinding, ...], end
     found += [
         NotExamined(each.place, "course") for each in located if isinstance(each.finding, found_in.NotFollowedToEnd)
     ]
+    strange = (found_in.MayMove, NotUnderstood, NotSimulated)
+    found += [NotExamined(each.place, "instruction") for each in located if isinstance(each.finding, strange)]
     files = {each.place.file: i for i, each in enumerate(located)}
     order = dict.fromkeys(found)
     return tuple(sorted(order, key=lambda each: (files.get(each.place.file, len(files)), each.place.line)))
@@ -402,7 +405,7 @@ def _verdicts(
     worst: dict[Place, found_in.Level] = {}
     for each in located:
         worst[each.place] = found_in.worst_of((worst.get(each.place, "pass"), each.level))
-    for missing in (each for each in missed if each.what != "way"):
+    for missing in (each for each in missed if each.what in ("motion", "course")):
         worst[missing.place] = found_in.worst_of((worst.get(missing.place, "pass"), "caution"))
     met = {step.place for step in execution.steps}
     found = []
@@ -527,7 +530,8 @@ def _moving(check: ProgramCheck) -> dict[Hashable, int]:
         if isinstance(step.instruction, Unknown) and step.instruction.may_move:
             found[step.place] = execution.own_line(step)
     lines = {step.place: execution.own_line(step) for step in execution.steps}
-    return found | {each: lines.get(each.place, each.place.line) for each in check.not_examined if each.what != "way"}
+    missed = (each for each in check.not_examined if each.what in ("motion", "course"))
+    return found | {each: lines.get(each.place, each.place.line) for each in missed}
 
 
 def _same_for(check: ProgramCheck, number: int) -> Hashable:

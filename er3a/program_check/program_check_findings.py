@@ -42,6 +42,12 @@ class FrameTakenAsFlange(Finding):
     name: str
 
 
+class FramesInDoubt(Finding):
+    """An instruction before, which is not understood, may have set another tool, base or path for this motion."""
+
+    text: str
+
+
 class PathNotKnown(Finding, code="way_not_known"):
     """The start of the motion is unknown, so only its target was checked."""
 
@@ -351,6 +357,7 @@ CheckFinding = (
     | TargetNotGiven
     | FrameNotGiven
     | FrameTakenAsFlange
+    | FramesInDoubt
     | PathNotKnown
     | TargetOutOfReach
     | StretchOutOfReach

@@ -179,11 +179,13 @@ def _solved(placed: PlacedMotion, target: instructions.PoseTarget, pose: Reals, 
     rows = found.q[found.within_limits] if found.within_limits.any() else found.q
     findings: list[found_in.CheckFinding] = list(placed.taken)
     joint = placed.motion.kind == "joint"
+    met = np.ones(len(rows), np.bool_)
     if target.branch is not None and joint:
         met = solutions_meant(target.branch, placed.arm, rows)
         rows = rows[met] if met.any() else rows
-        findings += () if met.any() else (_branch_not_met(target, joint),)
-    elif target.configuration and target.branch is None and joint and _different(rows) > 1:
+    if not met.any():
+        findings.append(_branch_not_met(target, joint))
+    elif target.configuration and joint and _different(rows) > 1:
         words = (
             f"{key} {value}" if isinstance(value, str) else f"{key} {value:g}" for key, value in target.configuration
         )
@@ -961,6 +963,8 @@ def _said(motion: instructions.ArmMotion) -> list[found_in.CheckFinding]:
         found.append(found_in.MoreThanFullSpeed(100 * max(rates)))
     if motion.kind == "spline":
         found.append(found_in.SplineAsLine())
+    if motion.doubt:
+        found.append(found_in.FramesInDoubt(motion.doubt))
     return found
 
 
@@ -971,7 +975,7 @@ def _key(motion: instructions.ArmMotion) -> Hashable:
         (each.name, None if each.pose is None else each.pose.tobytes()) for each in (motion.tool, motion.base)
     )
     rates = (motion.speed, motion.turn_speed, motion.acceleration)
-    return (motion.kind, targets, motion.angle, rates, motion.zone, frames, motion.load)
+    return (motion.kind, targets, motion.angle, rates, motion.zone, frames, motion.load, motion.doubt)
 
 
 def _target_key(target: instructions.Target | None) -> Hashable:

@@ -172,6 +172,7 @@ class Dialect(ABC):
     Attributes
     ----------
     modal : variables that motions use implicitly
+    frames : of these, tool and base, which a routine that is not understood may set
     local_by_default : whether a routine's assignment to a name that nothing else knows makes a local variable
     setters : functions outside the program that do not move the arm but set what motions use
     whole_division : whether whole numbers are divided to a whole number; None where this is not documented
@@ -179,6 +180,7 @@ class Dialect(ABC):
     """
 
     modal: frozenset[str] = frozenset()
+    frames: tuple[str, ...] = ()
     local_by_default: bool = False
     setters: frozenset[str] = frozenset()
     whole_division: bool | None = False
@@ -198,6 +200,10 @@ class Dialect(ABC):
     def is_followed(self, name: str, value: syntax.Value) -> bool:
         """Whether the effect of setting a variable to a value on motions is simulated."""
         return True
+
+    def doubted(self, name: str) -> str:
+        """The variable after whose next assignment motions no longer depend on one that is not simulated."""
+        return name
 
     def assigned(self, old: syntax.Value, new: syntax.Value) -> syntax.Value:
         """The value of a variable after an assignment."""
@@ -246,12 +252,14 @@ class ProgramMemory:
     kept : what a language caches until the next assignment
     beside : variables that a concurrent thread changes, so that their values are unclear
     here : where the arm is
+    doubts : instructions that are not understood, by the variables of motions that they may have set
     cell : what is known of the cell
     """
 
     def __init__(self, functions: Dialect, cell: Cell):
         self.functions, self.cell = functions, cell
         self.here = Position(cell.start)
+        self.doubts: dict[str, str] = {}
         self.shared: dict[str, syntax.Value] = {}
         self.local: dict[str, syntax.Value] = {}
         self.types: dict[str, str] = {}
@@ -263,8 +271,13 @@ class ProgramMemory:
         other = ProgramMemory(self.functions, self.cell)
         other.here = self.here
         other.shared, other.local, other.types = dict(self.shared), dict(self.local), self.types
-        other.beside = self.beside
+        other.beside, other.doubts = self.beside, dict(self.doubts)
         return other
+
+    def lost(self, text: str) -> None:
+        """Something that is not understood may have moved the arm and set its tool and base."""
+        self.here = Position()
+        self.doubts.update(dict.fromkeys(self.functions.frames, text))
 
     def read(self, name: str) -> syntax.Value | None:
         """The value of a full name, or None."""
@@ -278,6 +291,8 @@ class ProgramMemory:
     def write(self, name: str, value: syntax.Value, local: bool = False) -> None:
         """Set the value of a full name."""
         self.kept.clear()
+        if self.doubts:
+            self.doubts.pop(name, None)
         if name in WITH_FIELDS and isinstance(value, syntax.Record):
             self.shared.update({f"{name}.{field}": part for field, part in value.items})
         if local or (self.local and root(name) in self.local):

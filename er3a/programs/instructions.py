@@ -197,6 +197,8 @@ class ArmMotion(ByValue):
         as lengths do
     load : what hangs on the flange, in its frame; a text where the program names a load without all its numbers; None
         where it says nothing
+    doubt : an instruction before that is not understood, and may have set another tool, base or path; empty if there is
+        none, and for targets that are no poses
     """
 
     kind: MotionKind
@@ -212,6 +214,7 @@ class ArmMotion(ByValue):
     spline_block: int | None = None
     turn_speed: float | None = None
     load: MassBody | str | None = None
+    doubt: str = ""
 
 
 @dataclass(frozen=True, slots=True)

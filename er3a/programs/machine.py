@@ -525,7 +525,7 @@ class Machine:
             self.passed.add((frame.routine.name, at))
             if (strange := self.strange.get((frame.routine.name, at))) is not None:
                 self._note(way, operation.place, instructions.Unknown(strange))
-                way.memory.here = Position()
+                way.memory.lost(strange)
             if isinstance(operation, syntax.GoTo):
                 frame.at, back = operation.to, operation.to <= at
                 if operation.endless and back and self._drifts(way, frame.routine.name, at):
@@ -557,6 +557,8 @@ class Machine:
         memory = way.memory
         if isinstance(operation, syntax.Move):
             motion = self.dialect.motion(memory, operation)
+            if memory.doubts and isinstance(motion.target, instructions.PoseTarget):
+                motion = replace(motion, doubt=next(iter(memory.doubts.values())))
             self._note(way, operation.place, motion)
             memory.here = memory.here.after(motion, memory.cell.flange)
         elif isinstance(operation, syntax.Fixed):
@@ -564,7 +566,7 @@ class Machine:
             if isinstance(operation.instruction, instructions.ArmMotion):
                 memory.here = memory.here.after(operation.instruction, memory.cell.flange)
             elif isinstance(operation.instruction, instructions.Unknown) and operation.instruction.may_move:
-                memory.here = Position()
+                memory.lost(operation.instruction.text)
         elif isinstance(operation, syntax.Assign):
             signal = self._assign(memory, operation)
             if signal is not None:
@@ -576,7 +578,7 @@ class Machine:
             if done is not None:
                 self._note(way, operation.place, done)
                 if isinstance(done, instructions.Unknown) and done.may_move:
-                    memory.here = Position()
+                    memory.lost(done.text)
 
     def _note(self, way: ExecutionPath, place: instructions.Place, instruction: instructions.Instruction) -> None:
         self.first_after.setdefault(way.step, len(self.steps))
@@ -613,10 +615,16 @@ class Machine:
         local = each.local or (not declared and self._is_new(memory, name))
         if not each.type_name and isinstance(value, syntax.Record):
             value = self.dialect.assigned(memory.value(each.target), value)
+        doubt = memory.doubts.get(root(name)) if root(name) in names(each.value) or name != root(name) else None
         memory.assign(each.target, value, local)
+        if doubt is not None:  # a part of it, or computed from what is in doubt
+            memory.doubts[root(name)] = doubt
         if self.dialect.named(name):
             memory.write(name + "%name", each.text.partition("=")[2].strip())
-        return None if self.dialect.is_followed(name, value) else instructions.Unknown(each.text, may_move=False)
+        if self.dialect.is_followed(name, value):
+            return None
+        memory.doubts[self.dialect.doubted(name)] = each.text
+        return instructions.Unknown(each.text, may_move=False)
 
     def _is_new(self, memory: ProgramMemory, name: str) -> bool:
         start = root(name)
@@ -772,7 +780,7 @@ class Machine:
             (frame.routine.name, frame.at, self._kept(memory.local if i == last else frame.local))
             for i, frame in enumerate(way.frames)
         )
-        key = (frames, self._kept(memory.shared), memory.here.key())
+        key = (frames, self._kept(memory.shared), memory.here.key(), frozenset(memory.doubts.items()))
         found = self.seen.get(key)
         if found is None:
             self.seen[key] = (way.number, len(self.seen), way.step)

@@ -381,3 +381,19 @@ def test_what_no_source_tells_of_rpl_is_no_pass(tmp_path, line):
     assert not worse & set(codes(plain))
     assert worse & set(codes(found))
     assert found.level in ("caution", "fail")
+
+
+@pytest.mark.parametrize(
+    ("angles", "alike"), [((-4.7, 65.7, 93.1, -51.2, 15.7, -128.3), 2), ((10, -15, -5, 5, -60, 10), 1)]
+)
+def test_a_turn_that_two_solutions_have_is_not_known_to_mean_the_nearest(tmp_path, angles, alike):
+    """Elbow up and elbow down may have the same signs, and S is not used."""
+    own = np.radians(angles)
+    found = inverse(ROBOT, forward(ROBOT, own))
+    rows = found.q[found.within_limits]
+    assert ((rows < 0) == (own < 0)).all(axis=1).sum() == alike
+    numbers = zip("XYZABC", numbers_of(forward(ROBOT, own), "kuka"))
+    target = ",".join(f"{key} {value:.9f}" for key, value in numbers)
+    turn = int(((own < 0) << np.arange(6)).sum())
+    checked = check(tmp_path, krl(f"{FRAMES}PTP {{{target},S 2,T {turn}}}"), "a.src")
+    assert codes(checked).get("configuration_not_read") == (None if alike == 1 else [4])

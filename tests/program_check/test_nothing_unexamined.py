@@ -579,3 +579,58 @@ def test_an_assignment_to_no_variable_is_named(tmp_path, line):
     checked = check(tmp_path, changed([line, "movej([0.1, 0, 0, 0, -1, 0])"]), "a.script")
     assert checked.level == "caution"
     assert 3 in {each.place.line for each in checked.findings if each.level == "caution"}
+
+
+# What an instruction that is not understood may have set
+
+
+RAPID_MOVE = "MoveAbsJ [[10,-15,-5,5,-60,10],[9E9,9E9,9E9,9E9,9E9,9E9]],v50,fine,tool0;"
+LINE = "LIN {X 560,Y 0,Z 500,A 0,B 90,C 0}"
+ZERO = "{X 0,Y 0,Z 0,A 0,B 0,C 0}"
+
+
+@pytest.mark.parametrize(
+    ("between", "lines"),
+    [
+        ("MSGNOTIFY(1)", []),
+        ("elsewhere()", [6]),
+        ("IF elsewhere() THEN\nENDIF", [7]),
+        (f"elsewhere()\n$TOOL={ZERO}", [7]),
+        (f"elsewhere()\n$TOOL={ZERO}\n$BASE={ZERO}", []),
+        ("elsewhere()\nBAS(#TOOL,0)\nBAS(#BASE,0)", []),
+        (f"elsewhere()\n$TOOL={ZERO}\n$BASE.Z=0", [8]),
+        (f"elsewhere()\n$TOOL={ZERO}\n$BASE=$BASE:{ZERO}", [8]),
+        ("$ACT_TOOL=2", [6]),
+        (f"$ACT_TOOL=2\n$TOOL={ZERO}", []),
+        (f"$CORR_T={ZERO}", [6]),
+        ("$TCP_IPO=FALSE", [6]),
+        ("$TCP_IPO=FALSE\n$TCP_IPO=TRUE", []),
+        (f"{LINE}\nFOR I=1 TO 2\n{LINE}\nelsewhere()\nENDFOR\nBAS(#TOOL,0)\nBAS(#BASE,0)", [6]),
+    ],
+)
+def test_poses_after_what_may_have_set_tool_or_base_are_no_pass(tmp_path, between, lines):
+    """The routine is elsewhere; a motion to joint angles rests on no frame."""
+    found = check(tmp_path, krl(f"{FRAMES}{between}\nPTP {axes(NEAR)}\n{LINE}"), "a.src")
+    assert sorted(set(codes(found).get("frames_in_doubt", []))) == lines
+
+
+def test_a_tool_of_urscript_is_in_doubt_after_an_unknown_function_until_it_is_set(tmp_path):
+    moves = f"movej({NEAR_TEXT})\nmovel(p[0.5,0,0.4,0,3.14,0])\n"
+    tool = "set_tcp(p[0,0,0.1,0,0,0])\n"
+    assert codes(check(tmp_path, f"{tool}elsewhere()\n{moves}"))["frames_in_doubt"] == [4]
+    assert "frames_in_doubt" not in codes(check(tmp_path, f"elsewhere()\n{tool}{moves}"))
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("a.src", krl(f"{FRAMES}elsewhere()\nPTP {axes(NEAR)}")),
+        ("a.src", krl(f"{FRAMES}$ACT_TOOL=2\nPTP {axes(NEAR)}")),
+        ("a.script", f"\n\n\nelsewhere()\nmovej({NEAR_TEXT})\n"),
+        ("a.mod", f"MODULE a\nPROC main()\n\nSingArea \\Wrist;\n{RAPID_MOVE}\nENDPROC\nENDMODULE\n"),
+    ],
+)
+def test_what_an_instruction_does_that_is_not_understood_or_simulated_is_listed(tmp_path, name, text):
+    found = check(tmp_path, text, name)
+    assert (4, "instruction") in [(each.place.line, each.what) for each in found.not_examined]
+    assert len(found.verdicts) == 1

@@ -198,6 +198,11 @@ MENDED = {
     ),
     "way_not_known": ((krl("PTP {A1 10}", AT_HOME), {"start": None}), krl("PTP {A1 10}", AT_HOME)),
     "may_move": (krl("GO_HOME( )", AT_HOME), krl(AT_HOME)),
+    "frames_in_doubt": (
+        krl("GO_HOME( )", AT_HOME, f"LIN {{X 400,Y 0,Z 400,{DOWN}}}"),
+        krl("GO_HOME( )", "$TOOL=$NULLFRAME", "$BASE=$NULLFRAME", AT_HOME, f"LIN {{X 400,Y 0,Z 400,{DOWN}}}"),
+        krl(AT_HOME, f"LIN {{X 400,Y 0,Z 400,{DOWN}}}"),
+    ),
     "program_not_understood": (krl("$CORR_T={X 5,Y 0,Z 0,A 0,B 0,C 0}", AT_HOME), krl(AT_HOME)),
     "moves_beside": (
         THREAD.format(head="thread", run="run "),

@@ -13,6 +13,7 @@ from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.programs.instructions import ArmMotion
 from er3a.programs.languages import files_of, read_program
 from er3a.programs.machine import execute
+from testing.program_texts import motions
 
 FILES = {
     "cell.src": "DEF CELL( )\nDECL INT I\nPTP XP1\nFOR I=1 TO 2\nPICK(5.0)\nENDFOR\nHELP( )\nSUB( )\nEND\n"
@@ -71,3 +72,13 @@ def test_its_own_routines_come_first(cell):
     program = read_program(cell)
     assert {routine.place.file for name, routine in program.routines.items() if name == "PICK"} == {cell}
     assert "program_name_twice" not in {finding.code for finding in program.findings}
+
+
+@pytest.mark.parametrize("folder", ["R1", "R1/Program", "R1/Program/weld", "R1/System"])
+def test_points_of_the_controller_are_found_from_each_folder_of_an_archive(tmp_path, folder):
+    config = "DEFDAT $CONFIG\nE6AXIS XHOME={A1 1,A2 -10,A3 10,A4 0,A5 -60,A6 0}\nENDDAT\n"
+    for name in (folder, "R1/System"):
+        (tmp_path / name).mkdir(parents=True, exist_ok=True)
+    (tmp_path / "R1/System/$config.dat").write_text(config)
+    (move,) = motions(tmp_path / folder, "DEF a( )\nPTP XHOME\nEND\n", "a.src")
+    np.testing.assert_allclose(np.degrees(move.target.joints), [1, -10, 10, 0, -60, 0])

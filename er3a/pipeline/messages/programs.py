@@ -93,6 +93,7 @@ REMEDIES: dict[str, str] = {
     "frame_taken_as_flange": N_(
         "Map the name to a frame under frames in the file that lists the programs, if a tool is mounted."
     ),
+    "frames_in_doubt": N_("Set tool and base after it, or remove it."),
     "way_not_known": N_("Give start_deg of the program, or mend the motion before."),
     "not_come_to": FURTHER,
     "rest_not_checked": N_("Give the check more time or motions, or split the program and check its parts."),
@@ -150,6 +151,9 @@ TEXTS = texts(
             tool="the tool {name} is not given; map it to a frame",
         ),
         "frame_taken_as_flange": "{name} is not given; the flange was taken for it",
+        "frames_in_doubt": (
+            "checked with the tool and base that are known, but {text}, which is not understood, may have changed them"
+        ),
         "way_not_known": "the start of the motion is not known; only the target was checked",
         "more_than_full_speed": "asks for {percent:g} % of the joints' speed or acceleration",
         "joint_jumps": "J{joint} turns by {angle_deg:.1f} deg while the tool moves by {moved_mm:.1f} mm",
@@ -165,7 +169,8 @@ TEXTS = texts(
             line="the line does not arrive in the configuration {text}; a controller that supervises it stops",
         ),
         "configuration_not_read": (
-            "the meaning of the configuration {text} is not known; the solution nearest to the joints before was taken"
+            "the configuration {text} is not known to select one solution; the solution nearest to the joints before "
+            "was taken"
         ),
         "configuration_guessed": (
             "where the arm comes from is not known: of {solutions} solutions the one nearest to 0 was taken, and what "

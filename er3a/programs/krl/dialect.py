@@ -498,6 +498,7 @@ class KrlDialect(Dialect):
     """KRL, as a run needs it."""
 
     modal = frozenset((*MODAL, *MODAL_DATA))
+    frames = ("$TOOL", "$BASE")
     setters = frozenset(("BAS", "PULSE", "%SPLINE", "%ENDSPLINE"))
     whole_division = True
 
@@ -523,6 +524,10 @@ class KrlDialect(Dialect):
         if name in ("$ACT_TOOL", "$ACT_BASE"):
             return name not in self.numbers_only
         return not name.startswith("$") or root(name) in HARMLESS_VARIABLES
+
+    def doubted(self, name: str) -> str:
+        """A number of a frame: until that frame is set."""
+        return {"$ACT_TOOL": "$TOOL", "$ACT_BASE": "$BASE"}.get(name, name)
 
     def named(self, name: str) -> bool:
         """Tool and base keep the name of what they are set to."""

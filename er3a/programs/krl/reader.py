@@ -659,8 +659,8 @@ def shared_data_of(path: Path) -> Path | None:
 
 
 def _in_archive(path: Path, names: Iterable[str]) -> Path | None:
-    """A file of the controller beside a program, or in the folder System beside one of the folders above it."""
-    for folder in (path.parent, *(above / "System" for above in list(path.resolve().parents)[1:DEEPEST])):
+    """A file of the controller beside a program, or in the folder System of its own folder or of one above it."""
+    for folder in (path.parent, *(above / "System" for above in list(path.resolve().parents)[:DEEPEST])):
         for name in names:
             if (folder / name).is_file():
                 return folder / name

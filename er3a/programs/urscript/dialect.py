@@ -149,6 +149,7 @@ class UrScriptDialect(Dialect):
         self.modal = frozenset(("%tcp", "%load", *((PASSING,) if reads else ())))
 
     local_by_default = True
+    frames = ("%tcp",)
     setters = frozenset(("set_tcp", *LOADS))
     first_index = 0
 

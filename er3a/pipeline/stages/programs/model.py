@@ -79,7 +79,8 @@ class ProgramSummary:
     complete : whether every way through it was followed to its end, or until it repeats
     ways : through the program, by the sides of its branches
     motions : instructions of the text; passed, caution, failed : of these
-    not_examined : lines of motions that were not checked each time, or from which the course was not followed on
+    not_examined : lines of motions that were not checked each time, from which the course was not followed on, or of
+        instructions that are not understood or not simulated
     """
 
     name: str
