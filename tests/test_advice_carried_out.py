@@ -34,6 +34,7 @@ CARRIED_OUT = {
     **dict.fromkeys(REMEDIES, OF_PROGRAMS),
     **{f"singular.{kind}": OF_PROGRAMS for kind in ("wrist", "elbow", "shoulder")},
     **{f"stopped.{kind}": OF_PROGRAMS for kind in STOPPED},
+    "sockets_beside": "test_sockets_beside_the_plane_of_a_flat_arm_whose_axes_are_tilted_settle_nothing",
     "whole_turn": BY_JOINT_MOVES,
     "configuration_changes": BY_JOINT_MOVES,
     "remedy.joint_move": BY_JOINT_MOVES,
