@@ -130,12 +130,12 @@ class _Motion:
         robot = self.bodies.robot
         T = link_frames(robot, np.zeros(robot.joints))
         links = np.linalg.norm(np.diff(T[:, :3, 3], axis=0), axis=1).sum()
-        slides = self._of_rows(np.maximum(np.abs(robot.lower), np.abs(robot.upper)))[robot.sliding].sum()
+        slides = self.of_rows(np.maximum(np.abs(robot.lower), np.abs(robot.upper)))[robot.sliding].sum()
         origins = T[[capsule.link for capsule in self.bodies.capsules], None, :3, 3]
         own = np.linalg.norm(self.bodies.ends(np.zeros(robot.joints)) - origins, axis=-1).max()
         return float(links + slides + own)
 
-    def _of_rows(self, sizes: Reals) -> Reals:
+    def of_rows(self, sizes: Reals) -> Reals:
         """What rows (..., m) move by at most where joints move by up to ``sizes`` (..., n)."""
         coupling = self.bodies.robot.coupling
         return sizes if coupling is None else np.asarray(sizes @ np.abs(coupling).T)
@@ -145,7 +145,7 @@ class _Motion:
         sliding = self.bodies.robot.sliding
         speed, acceleration = self.rates(start, end)
         known = np.asarray(np.isfinite(speed + acceleration).all(axis=1, keepdims=True))
-        speed, acceleration = (self._of_rows(np.where(known, part, 0.0)) for part in (speed, acceleration))
+        speed, acceleration = (self.of_rows(np.where(known, part, 0.0)) for part in (speed, acceleration))
         turning, shifting = speed[:, ~sliding].sum(axis=1), speed[:, sliding].sum(axis=1)
         bent = acceleration[:, ~sliding].sum(axis=1) + turning**2
         found = self.lever * bent + acceleration[:, sliding].sum(axis=1) + 2 * turning * shifting

@@ -163,4 +163,4 @@ def test_stretch_out_of_reach_has_no_clearance():
 def test_rows_of_coupled_joints_move_by_the_sum_of_what_their_joints_can():
     robot = load_robot("er3_600").replace(coupling=np.eye(6) - 0.5 * np.eye(6, k=-1))
     motion = _Motion(Bodies(robot, None), None, None)
-    np.testing.assert_allclose(motion._of_rows(np.arange(1.0, 7.0)), [1, 2.5, 4, 5.5, 7, 8.5])
+    np.testing.assert_allclose(motion.of_rows(np.arange(1.0, 7.0)), [1, 2.5, 4, 5.5, 7, 8.5])

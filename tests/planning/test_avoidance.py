@@ -124,7 +124,7 @@ def test_no_random_bend_of_the_same_shape_is_smaller(name, random):
     (region,) = case.regions
     slot = int(case.followed.slot[region[0]])
     for kind in ("shift", "tilt"):
-        least = min(strategies._bends(case, *region, kind), key=lambda bend: bend.amount)
+        least = min(strategies.bends_of(case, *region, kind), key=lambda bend: bend.amount)
         grid = np.linspace(least.start, least.end, 200)
         for _ in range(60):
             direction = random.normal(size=3)
@@ -153,7 +153,7 @@ def test_damped_least_squares_are_those_of_the_formula(results):
     t = np.linspace(0, 4, strategies.STEPS + 1)
     way, length = case.followed.line, characteristic_length(case.robot)
     T = way.poses(way.progress(t)[0])
-    motion = strategies._run(case, t, T, 0.1)
+    motion = strategies.damped(case, t, T, 0.1)
     q, dt = case.q[0].copy(), t[1] - t[0]
     scale = np.array([1 / length] * 3 + [1] * 3)
     for n in range(500):

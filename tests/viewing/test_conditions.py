@@ -26,7 +26,7 @@ from er3a.pipeline.stages.vision.model import GraspCounts
 from er3a.pipeline.stages.workspace.entry import BoxTask
 from er3a.pipeline.stages.workspace.model import PlacementSummary, PlaceSummary, StandSummary
 from er3a.pipeline.stages.workspace.tool_capability import task_summary
-from er3a.pipeline.viewing.index import _condition, _passes, _proposed, first_inside
+from er3a.pipeline.viewing.index import condition, first_inside, passing, proposed
 
 TALLY = CheckTally(24)
 TURNED = ToolOff(0.0, 180.0)
@@ -58,14 +58,14 @@ def test_what_nothing_confirms_is_named_entry_by_entry_or_as_a_whole():
         "entries are right), 5 of 12 zeros and directions (5 of these only as long as the open entries are right). "
         f"Not confirmed: {names}."
     )
-    assert names in _condition(FOUND.parts, FOUND.unbounded)
+    assert names in condition(FOUND.parts, FOUND.unbounded)
     nothing = tuple(replace(part, settled=0, up_to_signs=0) for part in FOUND.parts)
     assert unconfirmed(nothing, FOUND.unbounded) == ("all lengths and twists, all zeros and directions, all limits")
 
 
 def test_a_table_without_evidence_is_a_condition_and_a_confirmed_one_is_none():
-    assert _condition((), ()).startswith("Run no path or program on the arm until its table is confirmed")
-    assert _condition([replace(part, settled=part.entries, up_to_signs=0, open=()) for part in FOUND.parts], ()) == ""
+    assert condition((), ()).startswith("Run no path or program on the arm until its table is confirmed")
+    assert condition([replace(part, settled=part.entries, up_to_signs=0, open=()) for part in FOUND.parts], ()) == ""
 
 
 def test_weak_entries_which_have_no_name_here_are_counted():
@@ -90,10 +90,10 @@ def test_a_turned_flange_moves_the_tip_of_a_tool():
 def test_other_entries_are_to_be_checked_only_where_there_are_others():
     only = replace(FOUND, parts=(PartFound("zero_and_directions", "open", 12, 11, 0, (), (), TURNED),))
     only = replace(only, unbounded=("direction1",))
-    assert "Then check the other" not in _proposed(only)["measurement"]
-    assert "Then check the other" in _proposed(replace(only, unbounded=("direction1", "direction2")))["measurement"]
-    assert "Then check the other" in _proposed(FOUND)["measurement"]
-    assert "at reduced speed (T1), jog +J1 a few degrees" in _proposed(FOUND)["measurement"]
+    assert "Then check the other" not in proposed(only)["measurement"]
+    assert "Then check the other" in proposed(replace(only, unbounded=("direction1", "direction2")))["measurement"]
+    assert "Then check the other" in proposed(FOUND)["measurement"]
+    assert "at reduced speed (T1), jog +J1 a few degrees" in proposed(FOUND)["measurement"]
 
 
 def test_a_verdict_says_what_it_is_not_to_be_taken_for():
@@ -187,7 +187,7 @@ def test_the_index_names_what_passes_through_the_box_or_its_stand(over):
             )
         ),
     }
-    found = _passes(stored)
+    found = passing(stored)
     assert found.targets == (("on_edge", "under") if over else ("on_edge",))
     assert f"Targets in it or its stand: {', '.join(found.targets)}." in found.text
     below = {"below": pytest.approx(2.75)} if over else {}
@@ -203,10 +203,10 @@ def test_the_index_names_what_passes_through_the_box_or_its_stand(over):
 
 
 def test_without_motions_or_without_a_place_nothing_is_said_to_be_free():
-    assert _passes({}) is None
-    alone = _passes({"workspace": placed()})
+    assert passing({}) is None
+    alone = passing({"workspace": placed()})
     assert (alone.short({}), alone.text) == ("No path or program was compared with its place.", "")
     clear = moving(
         ProgramsResults, ProgramMotion, "program", SimpleNamespace(programs=named("far")), {"far": (500.0, 0.0)}
     )
-    assert "links and the tool's body were not" in _passes({"workspace": placed(), "programs": clear}).text
+    assert "links and the tool's body were not" in passing({"workspace": placed(), "programs": clear}).text

@@ -612,7 +612,7 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
     same_arm, instead = isinstance(finding, DefinedOtherwise), alternative_table(study, name, results.parent)
     unproven, settled = _settled(finding)
     box_range = _box_range(stored["workspace"].results) if "workspace" in stored else ""
-    passes = _passes({stage: each for stage, each in stored.items() if heads[stage].status != "not_computed"})
+    passes = passing({stage: each for stage, each in stored.items() if heads[stage].status != "not_computed"})
     runs = [
         _run(stage, stored[stage].results)
         for stage in RUNS
@@ -638,7 +638,7 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         ),
         "bodies": [each.name for each in scene.solids] if (scene := study.scene(name, "trajectory")) else [],
         "runs": runs,
-        "condition": _condition(_parts(heads), getattr(finding, "unbounded", ())),
+        "condition": condition(_parts(heads), getattr(finding, "unbounded", ())),
         "box": joined([_without_box(), passes.text], " ") if passes else "",
         "in_box": passes.through if passes else {},
         "shapes": next(
@@ -650,7 +650,7 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
             failed,
             instead=instead,
             same_arm=same_arm,
-            **_proposed(finding),
+            **proposed(finding),
         ),
         "cells": [_cell(head) for head in sorted(heads.values(), key=lambda head: FIRST.index(head.status))],
         "expected": expected,
@@ -659,7 +659,7 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
     }
 
 
-def _proposed(finding: object) -> dict[str, str]:
+def proposed(finding: object) -> dict[str, str]:
     """The measurement that validation proposes, as :func:`next_step` takes it; empty where it proposes none."""
     if not isinstance(finding, LeftOpen) or finding.next_measurement is None:
         return {}
@@ -731,7 +731,7 @@ def _misses(head: Head, subject: str) -> bool:
 
 
 @dataclass(frozen=True)
-class _Passes:
+class Passing:
     """The tool points that pass through the box where it is proposed, or through what it stands on.
 
     Attributes
@@ -780,7 +780,7 @@ class _Passes:
         )
 
 
-def _passes(stored: Mapping[str, Stored[Any]]) -> _Passes | None:
+def passing(stored: Mapping[str, Stored[Any]]) -> Passing | None:
     """What passes through the box of the study where the workspace stage puts it; None if it puts none."""
     placement = getattr(stored["workspace"].results.summary, "placement", None) if "workspace" in stored else None
     if not isinstance(placement, PlacementSummary) or not placement.named_places:
@@ -806,7 +806,7 @@ def _passes(stored: Mapping[str, Stored[Any]]) -> _Passes | None:
         unseen += [each.name for each in getattr(results.summary, "not_followed", ())]
     targets = stored["inverse"].results.summary.targets if "inverse" in stored else ()
     inside = (each.name for each in targets if each.chosen_deg and np.all((low <= each.xyz_mm) & (each.xyz_mm <= high)))
-    return _Passes(through, tuple(inside), tuple(unseen))
+    return Passing(through, tuple(inside), tuple(unseen))
 
 
 def first_inside(t: Reals, points: Reals, low: Reals, high: Reals) -> float | None:
@@ -833,7 +833,7 @@ def _without_box() -> str:
     )
 
 
-def _condition(parts: Sequence[PartFound], unbounded: Sequence[str]) -> str:
+def condition(parts: Sequence[PartFound], unbounded: Sequence[str]) -> str:
     """What has to be confirmed before anything that passes is run on the arm; empty where all of its table is."""
     if not parts:
         return tr("Run no path or program on the arm until its table is confirmed.")

@@ -137,7 +137,7 @@ def _via(segment: avoidance.SingularSegment, kind: Kind) -> avoidance.Avoidance 
         return avoidance.BeginsInRegion()
     if segment.regions[-1][1] == len(segment.t):
         return avoidance.EndsInRegion()
-    bends = [_bends(segment, first, last, kind) for first, last in segment.regions]
+    bends = [bends_of(segment, first, last, kind) for first, last in segment.regions]
     if not all(bends):
         return _none_far_enough(segment, kind)
     fallback = None
@@ -169,7 +169,7 @@ def _carried_out(segment: avoidance.SingularSegment, other: avoidance.SingularSe
     return joined([*turn, other.along(0, len(other.t) - 1)])
 
 
-def _bends(segment: avoidance.SingularSegment, first: int, last: int, kind: Kind) -> list[Bend]:
+def bends_of(segment: avoidance.SingularSegment, first: int, last: int, kind: Kind) -> list[Bend]:
     """The smallest bend to either side that clears a region."""
     path, t = segment.followed.line, segment.t
     worst = first + int(np.argmin(segment.near.margin(segment.robot, segment.q[first:last])))
@@ -301,7 +301,7 @@ def damped(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidanc
     line = segment.followed.line
     t = np.linspace(0.0, line.duration, STEPS + 1)
     T = line.poses(line.progress(t)[0])
-    runs = [_run(segment, t, T, damping) for damping in DAMPINGS]
+    runs = [damped(segment, t, T, damping) for damping in DAMPINGS]
     ratios = np.array([motion.ratios(segment.allowed or segment.limits) for motion in runs])
     held = np.flatnonzero((ratios <= 1.0).all(axis=1))
     if not held.size:
@@ -312,7 +312,8 @@ def damped(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidanc
     return avoidance.Avoidance(joined([*segment.begin(), best]))
 
 
-def _run(segment: avoidance.SingularSegment, t: Reals, T: Reals, damping: float) -> Timed:
+def damped(segment: avoidance.SingularSegment, t: Reals, T: Reals, damping: float) -> Timed:
+    """Joints that follow poses T (N, 4, 4) at times t (N,), s, from the segment's start, by damped least squares."""
     robot = segment.robot
     q = np.empty((len(t), 6))
     q[0] = segment.q[0]
