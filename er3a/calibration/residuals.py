@@ -37,7 +37,7 @@ class ResidualStructure:
     ----------
     neighbours, neighbours_probability : correlation of residuals at neighbouring poses, and the probability of
         so much of it if they are noise
-    order, order_probability : the same of poses one after the other in the file: drift, or the way on which they were reached
+    order, order_probability : the same of poses one after the other in the file: drift, or how they were reached
     joint : whose value explains most of the residuals; share : of their squares beyond chance
     joint_probability : of so much by chance, for all joints
     shares, probabilities : the same of each joint

@@ -153,7 +153,7 @@ def test_damped_least_squares_are_those_of_the_formula(results):
     t = np.linspace(0, 4, strategies.STEPS + 1)
     way, length = case.followed.line, characteristic_length(case.robot)
     T = way.poses(way.progress(t)[0])
-    motion = strategies.damped(case, t, T, 0.1)
+    motion = strategies.followed_damped(case, t, T, 0.1)
     q, dt = case.q[0].copy(), t[1] - t[0]
     scale = np.array([1 / length] * 3 + [1] * 3)
     for n in range(500):

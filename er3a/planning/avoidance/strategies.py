@@ -301,7 +301,7 @@ def damped(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidanc
     line = segment.followed.line
     t = np.linspace(0.0, line.duration, STEPS + 1)
     T = line.poses(line.progress(t)[0])
-    runs = [damped(segment, t, T, damping) for damping in DAMPINGS]
+    runs = [followed_damped(segment, t, T, damping) for damping in DAMPINGS]
     ratios = np.array([motion.ratios(segment.allowed or segment.limits) for motion in runs])
     held = np.flatnonzero((ratios <= 1.0).all(axis=1))
     if not held.size:
@@ -312,7 +312,7 @@ def damped(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidanc
     return avoidance.Avoidance(joined([*segment.begin(), best]))
 
 
-def damped(segment: avoidance.SingularSegment, t: Reals, T: Reals, damping: float) -> Timed:
+def followed_damped(segment: avoidance.SingularSegment, t: Reals, T: Reals, damping: float) -> Timed:
     """Joints that follow poses T (N, 4, 4) at times t (N,), s, from the segment's start, by damped least squares."""
     robot = segment.robot
     q = np.empty((len(t), 6))
