@@ -79,6 +79,8 @@ def test_a_machine_at_its_limits_is_one_line_and_exit_code_2(monkeypatch, capsys
         ("run -- --cores two", "number of cores"),
         ("run -- --bogus", "unrecognized arguments: --bogus"),
         ("run -- --cores", "expected one argument"),
+        ("run --cores 0", "--cores is 0; a run needs 1 or more"),
+        ("run -j -1", "--jobs is -1"),
     ],
 )
 def test_a_wrong_option_is_one_line_and_exit_code_2(monkeypatch, capsys, tmp_path, words, problem):

@@ -55,3 +55,13 @@ def test_pages_and_snakemakes_own_words_stay_out_errors_do_not(log, capsys):
         "a rule is missing",
         "✗ arm: report workspace: ended with an error; see logs/arm/workspace.report.log",
     ]
+
+
+def test_what_snakemake_does_not_know_is_one_line(log, capsys):
+    text = "MissingRuleException:\nNo rule to produce my.yaml (if you use input functions make sure ...)."
+    log(LogEvent.ERROR, text, level=logging.ERROR)
+    log(LogEvent.ERROR, "WorkflowError:\nno such profile", level=logging.ERROR)
+    unknown, other = capsys.readouterr().err.splitlines()
+    assert unknown.startswith("error: my.yaml: no stage (validation, ")
+    assert unknown.endswith("a study is given by --study")
+    assert other == "error: WorkflowError: no such profile"

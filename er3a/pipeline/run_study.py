@@ -14,6 +14,7 @@ import atexit
 import fcntl
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -131,6 +132,8 @@ class RunLog(LogHandlerBase):
             job = record.__dict__
             logs = ", ".join(str(log) for log in job.get("log") or ())
             self._print(f"✗ {job.get('rule_msg') or job.get('rule_name')}: ended with an error; see {logs}")
+        elif event == LogEvent.ERROR:
+            self._print(_error_line(record.getMessage()))
         elif event is None and _concerns_a_person(record):
             self._print(record.getMessage())
 
@@ -197,6 +200,14 @@ def _concerns_a_person(record: LogRecord) -> bool:
     if "output files of rule index were not present" in text:  # it was written meanwhile, by this log
         return False
     return record.levelno >= WARNING or text.startswith("Nothing to be done")
+
+
+def _error_line(text: str) -> str:
+    """What Snakemake can't do, in one line; words that it was given and doesn't know are most often a study's file."""
+    if unknown := re.search(r"^MissingRuleException:\s+No rule to produce (\S+)", text):
+        known = ", ".join(STAGES)
+        return f"error: {unknown[1]}: no stage ({known}) and no file that this study makes; a study is given by --study"
+    return f"error: {' '.join(text.split())}"
 
 
 def _bar() -> Any:
@@ -290,7 +301,7 @@ def _parsed(words: Sequence[str]) -> Namespace:
     said = StringIO()
     try:
         with redirect_stderr(said):
-            return get_argument_parser().parse_args(list(words))
+            asked = get_argument_parser().parse_args(list(words))
     except CliException as error:
         raise RunError(" ".join(str(error).split())) from None
     except SystemExit as end:
@@ -298,6 +309,10 @@ def _parsed(words: Sequence[str]) -> Namespace:
             raise
         problem = said.getvalue().strip().rpartition("error: ")[2]
         raise RunError(f"{' '.join(problem.split())}. See: snakemake --help") from None
+    for option, count in (("--cores", asked.cores), ("--jobs", asked.jobs)):
+        if isinstance(count, int) and count < 1 and not asked.dryrun:  # Snakemake would wait for ever
+            raise RunError(f"{option} is {count}; a run needs 1 or more")
+    return asked
 
 
 def _dry_run(study_file: Path, results: Path, reports: Path, words: Sequence[str]) -> bool:
