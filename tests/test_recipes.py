@@ -692,3 +692,121 @@ assert (missing.returncode, missing.stdout) == (2, "")
 assert "no.yaml" in missing.stderr
 """
     carry_out("A command.", {"er3a/pipeline/commands/studies.py": ((anchor, command),)}, script)
+
+
+@pytest.mark.long
+def test_a_shape_of_a_scene(carry_out):
+    solid = '''@dataclass(frozen=True, eq=False)
+class Capsule(ByValue):
+    """A rod with round ends about its own middle, along its z axis.
+
+    Attributes
+    ----------
+    T : (4, 4), T_world_capsule; radius, length : m, the length without the ends
+    """
+
+    name: str
+    T: Reals
+    radius: float
+    length: float
+
+    @property
+    def measures(self) -> str:
+        """Where it is, radius and length, in mm."""
+        return f"{_place(self.T)}; radius {1000 * self.radius:.6g}, length {1000 * self.length:.6g}"
+
+
+Solid = Box | Capsule | Cylinder | Sphere | Plane | Mesh'''
+    body = """        case Capsule():
+            half = solid.length / 2
+            points, radius, kind, disc = np.array([[0, 0, -half], [0, 0, half]]), solid.radius, HULL, 0.0
+        case Sphere():
+"""
+    model = '''class CapsuleObstacle(CylinderObstacle):
+    """A rod with round ends along its own z axis."""
+
+    def solid(self) -> library.Capsule:
+        """In the units of the library."""
+        return library.Capsule(self.name, self.place(), self.radius_mm / 1000, self.length_mm / 1000)
+
+
+class MeshObstacle(Obstacle):
+'''
+    words = """            case Capsule():
+                size = tr("capsule ⌀ {wide:g} × {long:g}", wide=2000 * each.radius, long=1000 * each.length)
+            case Sphere():
+"""
+    imports = ("scene import Box, Cylinder", "scene import Box, Capsule, Cylinder")
+    key = "    cylinders: list[CylinderObstacle] = []\n    spheres: list[SphereObstacle] = []\n"
+    added = key + "    capsules: list[CapsuleObstacle] = []\n"
+    edits = {
+        "er3a/collision/scene.py": (("Solid = Box | Cylinder | Sphere | Plane | Mesh", solid),),
+        "er3a/collision/shapes.py": (imports, ("        case Sphere():\n", body)),
+        "er3a/files/scene_file.py": (
+            ('SHAPES = ("boxes", "cylinders",', 'SHAPES = ("boxes", "capsules", "cylinders",'),
+            ("class MeshObstacle(Obstacle):\n", model),
+            (f"{key}    meshes", f"{added}    meshes"),
+            (f"{key}    planes", f"{added}    planes"),
+        ),
+        "er3a/pipeline/messages/collision.py": (imports, ("            case Sphere():\n", words)),
+    }
+    script = """
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+
+import er3a
+from er3a.collision.distances import distances_from_hull
+from er3a.collision.scene import Scene
+from er3a.collision.shapes import hull_faces, solid_bodies, solid_pieces
+from er3a.files.robot_library import load_robot
+from er3a.files.scene_file import load_scene
+from er3a.pipeline.messages.collision import solid_rows
+from er3a.pipeline.player.player import scene_data
+from er3a.pipeline.player.turning import scene_layers
+from er3a.pipeline.stages.workspace.capability_section import outlines
+from er3a.pipeline.viewing.arm import solid_shapes
+
+Path("cell.yaml").write_text(
+    "kind: scene\\ntitle: a cell\\ncapsules:\\n"
+    "- {name: pipe, xyz_mm: [500, 0, 400], rpy_deg: [90, 0, 0], radius_mm: 50, length_mm: 400}\\n"
+    "carried: {capsules: [{name: rod, xyz_mm: [0, 0, 50], radius_mm: 10, length_mm: 80}]}\\n"
+)
+scene, robot = load_scene("cell.yaml"), load_robot("er3_600")
+(pipe,) = scene.solids
+low, high = np.array([0.45, -0.25, 0.35]), np.array([0.55, 0.25, 0.45])
+np.testing.assert_allclose(np.abs(np.array(pipe.T)[:3, 2]), [0, 1, 0], atol=1e-12)
+
+# A ball 300 mm beside the pipe is as far from it as lines and radii say.
+(core,) = solid_bodies(pipe)
+distance = np.empty(1)
+distances_from_hull(np.array([[0.2, 0.1, 0.4]]), core.points, distance)
+assert abs(distance[0] - core.radius - 0.25) < 1e-9
+q = np.random.default_rng(7).uniform(robot.lower, robot.upper, (300, 6))
+thinner = Scene("the same, thinner", (dataclasses.replace(pipe, radius=0.04),), scene.carried)
+thick, thin = (er3a.clearance(robot, q, each) for each in (scene, thinner))
+of_pipe = np.array([thick.pair[i] is not None and "pipe" in thick.pair[i].names for i in range(300)])
+chosen = of_pipe & (thick.distance > 0) & (thin.distance - thick.distance > 0.009)
+assert chosen.sum() > 20
+np.testing.assert_allclose((thin.distance - thick.distance)[chosen].max(), 0.01, atol=1e-9)
+
+assert solid_rows(scene) == [["pipe", "capsule ⌀ 100 × 400", "(500, 0, 400)"]]
+(piece,) = solid_pieces(pipe)
+near = {"atol": 2e-3}  # its ends are drawn by corners
+np.testing.assert_allclose([piece.min(axis=0), piece.max(axis=0)], [low, high], **near)
+(outline,) = outlines(pipe, [0, 2])
+np.testing.assert_allclose([outline.min(axis=0), outline.max(axis=0)], [low[[0, 2]], high[[0, 2]]], **near)
+(layer,) = scene_layers(scene)
+seen = layer.points_mm[np.isfinite(layer.points_mm).all(axis=1)] / 1000
+np.testing.assert_allclose([seen.min(axis=0), seen.max(axis=0)], [low, high], **near)
+(drawn,) = scene_data(scene.solids)
+corners, faces = np.array(drawn["points"]), np.array(drawn["faces"])
+a, b, c = corners[faces].transpose(1, 0, 2)
+volume = np.einsum("ij,ij->", a - pipe.T[:3, 3], np.cross(b - a, c - a)) / 6
+exact = np.pi * 0.05**2 * (0.4 + 4 / 3 * 0.05)
+assert 0.96 < volume / exact < 1, volume / exact
+((name, _, _),) = solid_shapes(scene.solids, robot, (1, 2, 3, 255))
+assert name == "pipe"
+"""
+    carry_out("A shape of a scene.", edits, script)

@@ -20,13 +20,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from er3a.collision.distances import CYLINDER, HALF_SPACE, HULL, WORLD, Layout, cylinder_points, distances_from_hull
 from er3a.collision.pairs import BASE, ShapesAssumed, link_label
 from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Solid, Sphere
+from er3a.geometry.vectors import fibonacci_sphere
 from er3a.kinematics.chain import ALONG_Z, TO_NEXT_AXIS, constant_links, joint_starts, link_parts
 from er3a.kinematics.forward import frames
-from er3a.numerics.arrays import Reals
+from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.robot import ConvexPiece, Envelope, Grade, Robot, derived
 
 RADIUS_RATIOS = (0.055, 0.055, 0.05, 0.045, 0.04, 0.035, 0.03)
@@ -175,6 +177,8 @@ def _pieces(robot: Robot, link: int, size: float, lines: list[tuple[Reals, Reals
 
 
 ON_AXIS = 1e-9  # m
+ROUND = 72  # corners by which a circle is drawn
+BALL = 200  # and a ball
 SIDES = 24
 CORNERS = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 
@@ -240,6 +244,38 @@ def solid_bodies(solid: Solid) -> tuple[Body, ...]:
         case Sphere():
             points, radius, kind, disc = np.zeros((1, 3)), solid.radius, HULL, 0.0
     return (Body(solid.name, WORLD, points @ solid.T[:3, :3].T + solid.T[:3, 3], radius, kind, disc),)
+
+
+def solid_pieces(solid: Solid) -> tuple[Reals, ...]:
+    """Corners (k, 3), m, in the world, of the convex pieces that a solid is drawn by; planes have none.
+
+    Corners of round ones are on their surface. Pieces of a mesh are without the margin that is added to them.
+    """
+    if isinstance(solid, Plane):
+        return ()
+    return tuple(_corners(body, 0.0 if isinstance(solid, Mesh) else body.radius) for body in solid_bodies(solid))
+
+
+def _corners(body: Body, radius: float) -> Reals:
+    points = body.points
+    if body.kind == CYLINDER:
+        points = cylinder_points(points, body.disc * np.cos(np.pi / ROUND), ROUND)
+    return (points[:, None] + radius * fibonacci_sphere(BALL)).reshape(-1, 3) if radius else points
+
+
+def hull_faces(points: Reals) -> Integers:
+    """The triangles (n, 3) of the convex hull of points (k, 3), their corners counter-clockwise from outside.
+
+    Raises
+    ------
+    scipy.spatial.QhullError
+        the points are in one plane
+    """
+    hull = ConvexHull(points)
+    a, b, c = np.moveaxis(points[hull.simplices], 1, 0)
+    inwards = (np.cross(b - a, c - a) * hull.equations[:, :3]).sum(axis=1) < 0
+    faces: Integers = np.where(inwards[:, None], hull.simplices[:, ::-1], hull.simplices)
+    return faces
 
 
 def layout_of(

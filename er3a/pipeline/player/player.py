@@ -14,8 +14,8 @@ import numpy as np
 import scipy
 from markupsafe import Markup
 
-from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Solid, Sphere
-from er3a.collision.shapes import arm_shapes
+from er3a.collision.scene import Box, Cylinder, Plane, Scene, Solid, Sphere
+from er3a.collision.shapes import arm_shapes, hull_faces, solid_pieces
 from er3a.geometry.vectors import fibonacci_sphere
 from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.messages.language import N_, tr
@@ -190,12 +190,9 @@ def drawn_shapes(robot: Robot) -> dict[str, list[dict[str, Any]]]:
         if len(points) > corners:
             points = points[np.unique((fibonacci_sphere(corners) @ points.T).argmax(axis=1))]
         try:
-            hull = scipy.spatial.ConvexHull(points)
+            pieces.append(_drawn(link, points, hull_faces(points)))
         except scipy.spatial.QhullError:  # flat: nothing to be seen of it but from above
             continue
-        a, b, c = np.moveaxis(points[hull.simplices], 1, 0)
-        inwards = (np.cross(b - a, c - a) * hull.equations[:, :3]).sum(axis=1) < 0
-        pieces.append(_drawn(link, points, np.where(inwards[:, None], hull.simplices[:, ::-1], hull.simplices)))
     return {"pieces": pieces, "visuals": visuals}
 
 
@@ -215,22 +212,23 @@ def scene_data(solids: Sequence[Solid]) -> list[dict[str, Any]]:
     return [_solid(solid) for solid in solids if not isinstance(solid, Plane)]
 
 
-def _solid(solid: Box | Cylinder | Sphere | Mesh) -> dict[str, Any]:
-    """An obstacle as the drawing code takes it."""
-    common = {"name": solid.name, "T": np.asarray(solid.T).tolist(), "colour": SCENE_COLOUR}
-    if isinstance(solid, Box):
-        return {"kind": "box", "size": np.asarray(solid.size).tolist(), **common}
-    if isinstance(solid, Cylinder):
-        return {"kind": "cylinder", "radius": solid.radius, "length": solid.length, **common}
-    if isinstance(solid, Mesh):
-        import trimesh  # slow to import, and few scenes need it
-
-        hulls = [trimesh.convex.convex_hull(piece) for piece in solid.pieces]
-        points = np.concatenate([hull.vertices for hull in hulls]) if hulls else np.empty((0, 3))
-        starts = np.cumsum([0, *(len(hull.vertices) for hull in hulls)])
-        faces = [face for hull, start in zip(hulls, starts) for face in (hull.faces + start).tolist()]
-        return {"kind": "mesh", "points": points.tolist(), "faces": faces, **common}
-    return {"kind": "sphere", "radius": solid.radius, **common}
+def _solid(solid: Solid) -> dict[str, Any]:
+    """An obstacle as the drawing code takes it; one that it has no shape for as the hulls of its pieces."""
+    common: dict[str, Any] = {"name": solid.name, "colour": SCENE_COLOUR}
+    if isinstance(solid, Box | Cylinder | Sphere):
+        common["T"] = np.asarray(solid.T).tolist()
+    match solid:
+        case Box():
+            return {**common, "kind": "box", "size": np.asarray(solid.size).tolist()}
+        case Cylinder():
+            return {**common, "kind": "cylinder", "radius": solid.radius, "length": solid.length}
+        case Sphere():
+            return {**common, "kind": "sphere", "radius": solid.radius}
+    pieces = solid_pieces(solid)
+    starts = np.cumsum([0, *(len(piece) for piece in pieces)])
+    faces = np.concatenate([start + hull_faces(piece) for start, piece in zip(starts, pieces)])
+    points = np.concatenate(pieces)
+    return {**common, "kind": "mesh", "T": np.eye(4).tolist(), "points": points.tolist(), "faces": faces.tolist()}
 
 
 def _motion(motion: PlayedMotion, most: int) -> dict[str, Any]:

@@ -18,7 +18,8 @@ from matplotlib import colormaps
 from matplotlib.colors import to_hex
 from scipy.spatial import ConvexHull
 
-from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Sphere
+from er3a.collision.scene import Cylinder, Scene, Sphere
+from er3a.collision.shapes import ROUND, solid_pieces
 from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.messages.language import N_, own_title, tr
 from er3a.pipeline.viewing.palette import MUTED
@@ -67,22 +68,9 @@ class ColourScale:
     ticks: Sequence[tuple[float, str]]
 
 
-_CORNERS = np.array(np.meshgrid(*[[-0.5, 0.5]] * 3)).reshape(3, -1).T
 _TURN = np.linspace(0.0, 2.0 * np.pi, 73)
 CIRCLE = np.stack([np.cos(_TURN), np.sin(_TURN)], axis=1)
 _SHARP = np.cos(np.radians(20.0))  # of the angle between two faces whose edge is drawn
-
-
-def solid_pieces(solid: Box | Cylinder | Mesh) -> list[Reals]:
-    """Points (k, 3), m, whose convex hulls are a solid's pieces."""
-    if isinstance(solid, Box):
-        pieces = [_CORNERS * solid.size]
-    elif isinstance(solid, Mesh):
-        pieces = list(solid.pieces)
-    else:
-        circle, half = solid.radius * CIRCLE, solid.length / 2
-        pieces = [np.concatenate([np.column_stack([circle, np.full(len(circle), z)]) for z in (-half, half)])]
-    return [piece @ solid.T[:3, :3].T + solid.T[:3, 3] for piece in pieces]
 
 
 def scene_layers(scene: Scene | None) -> list[Layer]:
@@ -92,11 +80,11 @@ def scene_layers(scene: Scene | None) -> list[Layer]:
         if isinstance(solid, Sphere):
             flat = np.column_stack([solid.radius * CIRCLE, np.zeros(len(CIRCLE))])
             lines += [np.roll(flat, k, axis=1) + solid.T[:3, 3] for k in range(3)]
-        elif not isinstance(solid, Plane):
-            pieces = solid_pieces(solid)
-            lines += [edge for piece in pieces for edge in _edges(piece)]
-            if isinstance(solid, Cylinder):  # four lines along a wall that turns evenly
-                lines += list(pieces[0].reshape(2, -1, 3)[:, :-1:18].swapaxes(0, 1))
+            continue
+        pieces = solid_pieces(solid)
+        lines += [line for piece in pieces for line in _edges(piece) or _contours(piece)]
+        if isinstance(solid, Cylinder):  # four lines along a wall that turns evenly
+            lines += list(pieces[0].reshape(2, -1, 3)[:, :: ROUND // 4].swapaxes(0, 1))
     if not lines or scene is None:
         return []
     gap = np.full((1, 3), np.nan)
@@ -114,6 +102,12 @@ def _edges(points: Reals) -> list[Reals]:
         for corner, other in enumerate(neighbours)
         if face < other and normals[face] @ normals[other] < _SHARP
     ]
+
+
+def _contours(points: Reals) -> list[Reals]:
+    """Where a convex hull without edges ends as seen along each axis of the world: closed lines (k, 3)."""
+    seen = [ConvexHull(np.delete(points, axis, axis=1)).vertices for axis in range(3)]
+    return [points[[*corners, corners[0]]] for corners in seen]
 
 
 AZIMUTH_DEG = -65.0  # about z, from where a figure is seen at first

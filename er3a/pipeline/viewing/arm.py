@@ -12,11 +12,10 @@ from typing import Any
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
-import scipy
 
 from er3a.collision.pairs import link_label
-from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Solid, Sphere
-from er3a.collision.shapes import Body, arm_bodies
+from er3a.collision.scene import Box, Cylinder, Plane, Solid, Sphere
+from er3a.collision.shapes import Body, arm_bodies, hull_faces, solid_pieces
 from er3a.kinematics.chain import ALONG_Z, TO_NEXT_AXIS, link_parts
 from er3a.kinematics.forward import frames, skeleton
 from er3a.numerics.arrays import Integers, Reals
@@ -216,18 +215,17 @@ def solid_shapes(
                 shape = rr.Cylinders3D(lengths=[each.length], radii=[each.radius], **style)
             case Sphere():
                 shape = rr.Ellipsoids3D(radii=[each.radius], **style)
-            case Mesh():
-                shape = pieces_mesh(each.pieces, colour)
             case Plane():
                 shape = rr.Boxes3D(sizes=[[size, size, _PLANE_THICKNESS]], **style)
+            case _:
+                T, shape = np.eye(4), pieces_mesh(solid_pieces(each), colour)
         yield each.name, rr.Transform3D(translation=T[:3, 3], mat3x3=T[:3, :3]), shape
 
 
 def pieces_mesh(pieces: Sequence[Reals], colour: tuple[int, ...]) -> rr.Mesh3D:
     """Convex pieces (k, 3) each, m, as one mesh."""
-    hulls = [scipy.spatial.ConvexHull(piece) for piece in pieces]
     starts = np.cumsum([0, *(len(piece) for piece in pieces)])
-    triangles = [start + _outward(hull) for start, hull in zip(starts, hulls)]
+    triangles = [start + hull_faces(piece) for start, piece in zip(starts, pieces)]
     return _mesh(np.concatenate(pieces), np.concatenate(triangles), colour)
 
 
@@ -239,14 +237,6 @@ def _mesh(points: Reals, faces: Integers, colour: tuple[int, ...]) -> rr.Mesh3D:
     return rr.Mesh3D(
         vertex_positions=corners.reshape(-1, 3), vertex_normals=np.repeat(normals, 3, axis=0), albedo_factor=colour
     )
-
-
-def _outward(hull: scipy.spatial.ConvexHull) -> Integers:
-    """A hull's triangles with their corners in order around the outward normal."""
-    corners = hull.points[hull.simplices]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    inward = np.einsum("ij,ij->i", normal, hull.equations[:, :3]) < 0
-    return np.where(inward[:, None], hull.simplices[:, ::-1], hull.simplices)
 
 
 def _below(plane: Plane, base: Reals) -> Reals:

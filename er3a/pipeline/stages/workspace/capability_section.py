@@ -14,7 +14,8 @@ from matplotlib.lines import AxLine, Line2D
 from matplotlib.patches import Patch, Polygon, Rectangle
 
 import er3a.pipeline.messages.collision  # noqa: F401
-from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Sphere
+from er3a.collision.scene import Plane, Scene, Solid, Sphere
+from er3a.collision.shapes import solid_pieces
 from er3a.geometry.transforms import rpy_along
 from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -22,7 +23,7 @@ from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import own_title, tr
 from er3a.pipeline.messages.say import bracketed, joined, say, word
 from er3a.pipeline.messages.workspace import STATUS, box_text, millimetres, stand_text
-from er3a.pipeline.player.turning import CIRCLE, solid_pieces
+from er3a.pipeline.player.turning import CIRCLE
 from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.workspace_figures import name_level, slide_names
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
@@ -138,7 +139,7 @@ def draw_scene(axes: Axes, scene: Scene | None, shown: list[int]) -> None:
             axes.add_artist(Polygon(1000 * outline, **_STYLE))
 
 
-def outlines(solid: Box | Cylinder | Sphere | Mesh, shown: list[int]) -> list[Reals]:
+def outlines(solid: Solid, shown: list[int]) -> list[Reals]:
     """The outline of each convex piece of a solid, corners (k, 2) in m, seen along the axis that is not shown."""
     if isinstance(solid, Sphere):
         return [np.asarray(solid.T)[:3, 3][shown] + solid.radius * CIRCLE]
