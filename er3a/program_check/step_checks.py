@@ -578,7 +578,7 @@ class CheckedMotion(ByValue):
     start : (n,), rad; None if not known
     way : None where there is none: the arm stays (``stays``), or the way is not known
     end : (n,), rad, where the motions that follow go on from; None if not known
-    clearance : m, least on the way, negative by an overlap; None where not measured
+    clearance : m, smallest on the way, negative by an overlap; None where not measured
     blended_ends : of its two ends, how many have a zone that is not fine
     moments : s from the motion's start, when what is found begins; not of findings about the motion as a whole
     """

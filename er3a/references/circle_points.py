@@ -62,8 +62,8 @@ def carried_point(robot: Robot) -> Reals:
     offsets = np.concatenate([toward * length for length in TRIED_OFFSETS_MM])
     points = T[-1, :3, 3] + (offsets / MM) @ T[-1, :3, :3].T
     across = np.cross(T[:-1, None, :3, 2], points - T[:-1, None, :3, 3])
-    least = np.linalg.norm(across, axis=-1).min(axis=0) * MM
-    by_length = least.reshape(len(TRIED_OFFSETS_MM), -1)
+    smallest = np.linalg.norm(across, axis=-1).min(axis=0) * MM
+    by_length = smallest.reshape(len(TRIED_OFFSETS_MM), -1)
     length = int(np.argmax(by_length.max(axis=1) >= OFF_EVERY_AXIS_MM))
     chosen: Reals = offsets[length * len(toward) + int(np.argmax(by_length[length]))]
     return chosen

@@ -292,8 +292,8 @@ def _changes_of_the_void(robot: Robot, workspace: WorkspaceSummary, printed: Tab
     """Single changes of the printed table that take its void away, and those of them that keep the pose at zero."""
     finding = workspace.verdict.finding
     changes = finding.single_changes if isinstance(finding, VoidUnexpected) else ()
-    least = 0.1 * printed.void_litres[0] if printed.void_litres else 0.0
-    gone = tuple(change for change in changes if change.left_litres and change.left_litres[1] < least)
+    smallest = 0.1 * printed.void_litres[0] if printed.void_litres else 0.0
+    gone = tuple(change for change in changes if change.left_litres and change.left_litres[1] < smallest)
     meeting = [each for each in gone if _meets_zero_pose(with_entry(robot, each.column, each.joint, each.tried))]
     undecided = sum(change.left_litres is None for change in changes)
     return {

@@ -330,8 +330,8 @@ class TaskSearch:
     def _away_from_limits(self, q: Reals) -> Flags:
         """Whether joints (N, n) are away from their limits, by 8 deg or a twentieth of the range."""
         robot = self.robot
-        least = np.minimum(np.where(robot.slides, np.inf, LIMIT_MARGIN_RAD), (robot.upper - robot.lower) / 20)
-        room = (np.minimum(q - robot.lower, robot.upper - q) > least) | robot.continuous
+        smallest = np.minimum(np.where(robot.slides, np.inf, LIMIT_MARGIN_RAD), (robot.upper - robot.lower) / 20)
+        room = (np.minimum(q - robot.lower, robot.upper - q) > smallest) | robot.continuous
         return np.asarray(room.all(axis=-1))
 
     def _written(self, q: Reals) -> list[float]:

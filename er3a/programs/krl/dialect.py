@@ -741,8 +741,8 @@ def _acceleration(memory: ProgramMemory, kind: instructions.MotionKind) -> instr
 
 def _axis_share(memory: ProgramMemory, name: str) -> instructions.Rate | None:
     given = [syntax.number(memory.read(f"{name}[{axis}]")) for axis in range(1, 7)]
-    least = min((each for each in given if each is not None), default=None)
-    return None if least is None else instructions.Rate(least / 100, "share")
+    smallest = min((each for each in given if each is not None), default=None)
+    return None if smallest is None else instructions.Rate(smallest / 100, "share")
 
 
 def _zone(memory: ProgramMemory, kind: instructions.MotionKind, words: tuple[str, ...]) -> instructions.Zone:

@@ -116,8 +116,8 @@ def compute(study: Study, name: str) -> model.CollisionResults:
     random = np.random.default_rng([study.seed, PLACES_STREAM])
     places = free_space.find_places(bodies, space, settings.cells_across, settings.rounds, random)
     home = np.clip(np.zeros(robot.joints), robot.lower, robot.upper)
-    least, nearest = bodies.min_distance(home[None])
-    at_home = bodies.pairs[nearest[0]] if nearest[0] >= 0 and least[0] < 0 else None
+    smallest, nearest = bodies.min_distance(home[None])
+    at_home = bodies.pairs[nearest[0]] if nearest[0] >= 0 and smallest[0] < 0 else None
     if at_home is None:
         places.joined[:] = free_space.joined_to_home(bodies, places, home, settings.neighbours)
     targets, at_targets = target_clearances(robot, bodies, study.entry(name).targets)
@@ -130,7 +130,7 @@ def compute(study: Study, name: str) -> model.CollisionResults:
     places_found = _places_summary(places)
     wrong = model.ShapesOverlap(bodies.in_error, space.whole.value) if bodies.in_error else None
     undecided = int((matrix.state == "undecided").sum())
-    home_found = None if at_home is None else model.HomeCollides(at_home, float(-least[0] * 1000), space.whole.value)
+    home_found = None if at_home is None else model.HomeCollides(at_home, float(-smallest[0] * 1000), space.whole.value)
     closest = (*at_targets, *on_paths)
     assumed = shapes_assumed(
         robot, study.assumed_margin(name), {each.name: each.clearance_mm / 1000 for each in closest}

@@ -175,7 +175,7 @@ class TargetClearances(Table):
     branch: Integers = column("number of the branch")
     label: Texts = column("code of the branch")
     q_deg: Reals = per_joint("joint angle")
-    clearance_mm: Reals = column("least distance; negative by the depth of overlap")
+    clearance_mm: Reals = column("smallest distance; negative by the depth of overlap")
     between: Texts = column("what is nearest to what")
 
 
@@ -185,7 +185,7 @@ class PathClearances(Table):
     path: Texts = column("name of the path")
     t_s: Reals = column("time since the path's start", heading=N_("time"))
     q_deg: Reals = per_joint("joint angle; NaN where the path can't be reached")
-    clearance_mm: Reals = column("least distance; negative by the depth of overlap", heading=N_("clearance"))
+    clearance_mm: Reals = column("smallest distance; negative by the depth of overlap", heading=N_("clearance"))
     between: Texts = column("what is nearest to what")
     from_mm: Reals = vector("from_{}_mm", "the nearest point of the first body")
     to_mm: Reals = vector("to_{}_mm", "the nearest point of the second body")

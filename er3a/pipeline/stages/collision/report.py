@@ -240,7 +240,7 @@ def _pairs(rows: model.PairShares) -> list[list[str]]:
 def _targets(rows: model.TargetClearances) -> list[list[str]]:
     """One row for each target: solutions within limits, clear ones, the best clearance and its branch.
 
-    Of many targets those whose best clearance is least.
+    Of many targets those whose best clearance is smallest.
     """
     names, first, group = np.unique(rows.target.astype(str), return_index=True, return_inverse=True)
     most = np.full(len(names), -np.inf)

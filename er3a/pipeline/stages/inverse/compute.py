@@ -210,10 +210,10 @@ def _obstacle(robot: Robot, target: Target, branches: int) -> model.Obstacle:
     if not has_branches(robot):
         return model.NothingFound()
     _, fault, gap = (batch[0] for batch in solve_slots(robot, target.T[None], target.q_ref[None]))
-    least = int(gap.argmin())
-    if fault[least] == ORIENTATION:
-        return model.TiltMissing(float(np.degrees(gap[least])))
-    return model.ReachMissing(float(gap[least] * 1000))
+    smallest = int(gap.argmin())
+    if fault[smallest] == ORIENTATION:
+        return model.TiltMissing(float(np.degrees(gap[smallest])))
+    return model.ReachMissing(float(gap[smallest] * 1000))
 
 
 def _outcome(obstacle: model.Obstacle | None) -> TargetOutcome:
@@ -392,8 +392,8 @@ def compute(study: Study, name: str) -> model.InverseResults:
     asked = [each for each in results if each.chosen_deg is not None and each.expect in (None, "reached")]
     chosen = meant(robot, np.reshape([each.chosen_deg for each in asked], (-1, robot.joints)))
     T_of = {target.name: target.T for target in targets}
-    least = bodies_of(robot, scene).min_distance(chosen)[0].tolist()
-    rests_on = shapes_assumed(robot, margin, {each.name: d for each, d in zip(asked, least)})
+    smallest = bodies_of(robot, scene).min_distance(chosen)[0].tolist()
+    rests_on = shapes_assumed(robot, margin, {each.name: d for each, d in zip(asked, smallest)})
     complete = not isinstance(arm_solver(robot).chain, Unsolved)
     random = np.random.default_rng([study.seed, ROUND_TRIP_STREAM])
     wanted = settings.round_trips if has_branches(robot) else min(settings.round_trips, MAX_BY_CLASS)

@@ -302,7 +302,7 @@ class SolutionRows(Table):
         "whether the arm is on this singularity, to 1e-6 rad or m (rank: of an arm without closed form)",
         parts=SINGULAR_PARTS,
     )
-    limit_margin_deg: Reals = column("least distance of a joint from its limits; negative outside")
+    limit_margin_deg: Reals = column("smallest distance of a joint from its limits; negative outside")
     greatest_move_deg: Reals = column("the farthest that a joint turns from the reference")
     distance_deg: Reals = column("root of the summed squares of the joint moves")
 

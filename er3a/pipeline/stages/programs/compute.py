@@ -67,12 +67,12 @@ def compute(study: Study, name: str) -> model.ProgramsResults:
         lines.append(_lines(entry.name, check))
         instructions.append(_instructions(entry.name, check, len(robot.lower)))
         motions.append(motion)
-    least = {
+    smallest = {
         each.name: None if each.least_clearance_mm is None else each.least_clearance_mm / 1000
         for each in summaries
         if each.expect in (None, "pass")
     }
-    assumed = shapes_assumed(robot, options.assumed_margin, least)
+    assumed = shapes_assumed(robot, options.assumed_margin, smallest)
     return model.ProgramsResults(
         summary=model.ProgramsSummary(
             verdict=_verdict(summaries).without(bodies_of(robot, scene).unexamined).resting_on(assumed),

@@ -128,7 +128,7 @@ class Instructions(Table):
     level: Texts = column("verdict: pass, note, caution or fail")
     times: Integers = column("how often it was carried out")
     duration_s: Reals = column("longest estimated duration; NaN where unknown")
-    clearance_mm: Reals = column("least clearance, negative by an overlap; NaN where not measured")
+    clearance_mm: Reals = column("smallest clearance, negative by an overlap; NaN where not measured")
     end_deg: Reals = per_joint("joint angle at its first end; NaN where unknown", name="q_deg")
 
 

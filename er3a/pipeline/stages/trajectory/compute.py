@@ -181,13 +181,13 @@ class AvoidanceTask:
         along = clearance_along(
             self.surroundings.bodies, curve.joints, curve.rate_bounds, grid, grid, self.surroundings.tolerance
         )
-        least = judgement.min_clearance(along)
-        if least is None:
+        smallest = judgement.min_clearance(along)
+        if smallest is None:
             return None, None
         if along.contacts:
-            return PairOverlaps(least.between, -least.least_mm), least.least_mm
-        near = least.least_mm < 1000 * margin
-        return PairTooNear(least.between, least.least_mm, 1000 * margin) if near else None, least.least_mm
+            return PairOverlaps(smallest.between, -smallest.least_mm), smallest.least_mm
+        near = smallest.least_mm < 1000 * margin
+        return PairTooNear(smallest.between, smallest.least_mm, 1000 * margin) if near else None, smallest.least_mm
 
     def _margin_of(self, along: ClearanceAlong) -> float:
         """The margin (m) that a motion is to keep which has the ends of a path: no more than these ends have."""

@@ -228,7 +228,7 @@ class StrategyMotion:
     done_ratio : how much of the path is done, 0..1
     keeps_clear : whether the arm keeps its distance from singular poses wherever the tool is on or beside the path
     joint_swing_deg : between the extremes of each joint; mm where it slides
-    clearance_mm : least; None where none was measured
+    clearance_mm : smallest; None where none was measured
     """
 
     done_ratio: float
@@ -449,7 +449,7 @@ class Clearances(Table):
 
     path: Texts = column("name of the path")
     t_s: Reals = column("time since the path's start", heading=N_("time"))
-    clearance_mm: Reals = column("least distance, negative by the depth of an overlap", heading=N_("clearance"))
+    clearance_mm: Reals = column("smallest distance, negative by the depth of an overlap", heading=N_("clearance"))
     between: Texts = column("the two bodies nearest to each other")
 
 

@@ -364,17 +364,23 @@ def clearance_section(results: model.TrajectoryResults, most: int) -> dict[str, 
         caption = joined([caption, tr("Drawn: the {count} paths with the least clearance.", count=most)], " ")
     alt = tr("Least clearance over time, one panel per path. {conclusion}", conclusion=caption)
     rows = [
-        [path.name, fixed(least.least_mm, 1), fixed(least.t_s, 3), say(least.between), str(least.poses_measured)]
-        for path, least in paths
+        [
+            path.name,
+            fixed(smallest.least_mm, 1),
+            fixed(smallest.t_s, 3),
+            say(smallest.between),
+            str(smallest.poses_measured),
+        ]
+        for path, smallest in paths
     ]
     return {"picture": Picture(_curves(drawn, results.clearance), alt, caption), "rows": rows}
 
 
 def _curves(paths: list[Measured], rows: model.Clearances) -> Figure:
     figure, panels = clearance_panels(rows, [path.name for path, _ in paths])
-    for (ax, _), (path, least) in zip(panels, paths):
-        colour = palette.VERDICTS["fail"] if least.least_mm <= 0 else palette.INK
-        ax.plot(least.t_s, least.least_mm, "o", color=colour, markersize=4)
+    for (ax, _), (path, smallest) in zip(panels, paths):
+        colour = palette.VERDICTS["fail"] if smallest.least_mm <= 0 else palette.INK
+        ax.plot(smallest.t_s, smallest.least_mm, "o", color=colour, markersize=4)
         for gap in path.unreachable:
             ax.axvspan(gap.t0_s, gap.t1_s, color=palette.MUTED, alpha=0.25, linewidth=0)
         ax.set_xlim(0, path.duration_s)

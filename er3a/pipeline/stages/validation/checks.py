@@ -403,8 +403,8 @@ def most_telling(failed: list[model.ReferenceCheck]) -> model.ReferenceCheck:
     """The failed check to quote: of those not far behind the largest difference in mm, the first of the group that
     tells most."""
     lengths = [check for check in failed if check.unit == "mm"]
-    least = TELLING_SHARE * max((abs(check.difference) for check in lengths), default=0.0)
-    large = [check for check in lengths if abs(check.difference) >= least]
+    smallest = TELLING_SHARE * max((abs(check.difference) for check in lengths), default=0.0)
+    large = [check for check in lengths if abs(check.difference) >= smallest]
     return min(large or failed, key=lambda check: GROUPS[check.group])
 
 

@@ -457,7 +457,7 @@ def _left_out(
 def _shapes(robot: Robot, objects: tuple[model.ObjectResult, ...], margin: float) -> ShapesAssumed | None:
     """What assumed shapes, ``margin`` (m) around them, leave open of the grasps; None where no grasp was tried."""
     clear = {each.name: each.grasp.clearance_mm for each in objects if each.grasp}
-    near = {name: None if least is None else least / 1000 for name, least in clear.items()}
+    near = {name: None if mm is None else mm / 1000 for name, mm in clear.items()}
     return shapes_assumed(robot, margin, near) if objects else None
 
 
@@ -595,7 +595,7 @@ def figures_of(
     calibration: model.CalibrationResult, objects: tuple[model.ObjectResult, ...], near: tuple[str, ...]
 ) -> tuple[Figure, ...]:
     asked = [each for each in objects if each.expect in (None, "grasped")]
-    least = _least_success(asked)
+    lowest = _least_success(asked)
     worst = max((each.error_mm.together for each in asked if each.error_mm), default=None)
     grasped = sum(each.grasp is not None and each.name not in near for each in asked)
     return (
@@ -604,7 +604,7 @@ def figures_of(
         Figure("rotation_half_width", max(calibration.hand_eye.half_width_deg), "deg"),
         *((Figure("objects_grasped", grasped, "", of=len(asked)),) if asked else ()),
         *((Figure("worst_error", worst, "mm"),) if worst is not None else ()),
-        *((Figure("least_success", 100 * least, "%"),) if least is not None else ()),
+        *((Figure("least_success", 100 * lowest, "%"),) if lowest is not None else ()),
     )
 
 

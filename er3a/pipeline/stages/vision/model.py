@@ -74,7 +74,7 @@ class GraspCounts(Finding):
     left_out : samples that the calibration does not rest on
     point_mm : 95 % of errors at the worst grasp stay below; None where nothing is grasped
     simulated : whether no camera took the samples
-    probability : of success, the least of what can be grasped; None where nothing can
+    probability : of success, the lowest of what can be grasped; None where nothing can
     """
 
     objects: int
@@ -269,7 +269,7 @@ class GraspResult:
     ----------
     turn_deg : about the object's z axis
     clearance_mm, nearest : proven along move, approach and retreat, and what is nearest there
-    limit_margin_deg, singular_value : least along approach and retreat
+    limit_margin_deg, singular_value : smallest along approach and retreat
     probability, deviation : that the gripper's tolerance is kept, and that figure's standard deviation from its draws
     corners : of the planner's way to the approach; 0 for the straight joint move
     duration_s : of the whole motion, without the gripper

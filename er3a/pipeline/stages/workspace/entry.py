@@ -54,7 +54,7 @@ class WorkspaceSettings(StrictModel):
 class BoxTask(StrictModel):
     """A box that the tool must serve, in the frame that the robot's base is placed in.
 
-    ``box_mm`` are its edges along x, y and z (it may stand turned by 90 deg about z), ``lowest_mm`` the least height of
+    ``box_mm`` are its edges along x, y, z (it may stand turned by 90 deg about z), ``lowest_mm`` the lowest height of
     its underside, ``clear_of_axis_mm`` the smallest distance of its points from axis 1. At every point the tool must
     reach all directions within ``cone_deg`` of ``tool_direction`` (z of the tool frame), ``limit_margin_deg`` within
     the limits of joints with less than a full turn and of sums of revolute joints.

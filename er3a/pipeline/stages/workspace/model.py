@@ -224,8 +224,8 @@ class BoxPlaces(Table):
     centre_m: Reals = vector("{}_m", "middle of the box in the base frame")
     turned: Flags = column("whether the box stands turned by 90 deg about z")
     slot: NDArray[np.int8] = column("number of the branch that serves it all, -1 if none does")
-    manipulability_m3: Singles = column("least |det J| over the box and its directions")
-    limit_margin_deg: Singles = column("least distance of joints from the task's limits")
+    manipulability_m3: Singles = column("smallest |det J| over the box and its directions")
+    limit_margin_deg: Singles = column("smallest distance of joints from the task's limits")
     proven: Flags = column("whether every point and direction is proven")
 
 
@@ -453,7 +453,7 @@ class PlaceSummary:
     Attributes
     ----------
     branch : configuration that serves it all, None if it changes within the box or has no name
-    manipulability_m3 : least over the box and its directions; manipulability_ratio : of the arm's best
+    manipulability_m3 : smallest over the box and its directions; manipulability_ratio : of the arm's best
     limit_margin_deg : smallest distance of joints, and of sums of joints, from their limits, None without one branch,
         or without joints of less than a full turn
     clearance_mm : smallest distance of the arm from scene and itself over the samples, None if nothing can meet

@@ -468,11 +468,11 @@ def _arms_at(within: Robot, free: Free, task: Task, asked: AskedOrientations, pl
 def _with_nearest(place: model.PlaceSummary, bodies: Bodies, q: Reals) -> model.PlaceSummary:
     """A place with the smallest clearance of its arms (m, joints), rad, the pair that has it, and the joint nearest to
     a limit."""
-    least, pair = bodies.min_distance(q)
-    nearest = int(least.argmin()) if len(least) else -1
-    if nearest >= 0 and np.isfinite(least[nearest]):
+    smallest, pair = bodies.min_distance(q)
+    nearest = int(smallest.argmin()) if len(smallest) else -1
+    if nearest >= 0 and np.isfinite(smallest[nearest]):
         place = replace(
-            place, clearance_mm=1000 * float(least[nearest]), clearance_pair=bodies.pairs[int(pair[nearest])]
+            place, clearance_mm=1000 * float(smallest[nearest]), clearance_pair=bodies.pairs[int(pair[nearest])]
         )
     if place.limit_margin_deg is None or not len(q):
         return place
