@@ -32,6 +32,7 @@ CauseCode = Literal[
     "other_convention",
     "all_alphas_negated",
     "one_alpha_negated",
+    "one_length_negated",
     "offsets_negated",
     "unit",
     "angle_unit",
@@ -508,10 +509,13 @@ def _causes_of_zeros(
     """The one mistake in the first table that explains why zeros or directions differ, where geometry agrees."""
     offset, zeros = robot.offset, np.where(robot.sliding, 0.0, found.zeros)
     inner = [k for k in range(1, robot.rows - 1) if not robot.sliding[k]]
-    if not found.reverses.any() and (np.abs(zeros) > tolerances.angle).sum() > 1:
-        mistakes: list[tuple[CauseCode, float | None, str, Reals]] = [("offsets_negated", None, "", -offset)]
+    moved = int((np.abs(zeros) > tolerances.angle).sum())
+    if moved and not found.reverses.any():
+        mistakes: list[tuple[CauseCode, float | None, str, Reals]] = []
         mistakes += [("angle_unit", scale, f"offset, {unit}", offset * scale) for unit, scale in ANGLE_UNITS.items()]
-        mistakes += [("rows_shifted", float(rows), "offset", np.roll(offset, rows)) for rows in (1, -1)]
+        if moved > 1:  # one zero that is half a turn or a quarter off can be chosen so
+            mistakes += [("offsets_negated", None, "", -offset)]
+            mistakes += [("rows_shifted", float(rows), "offset", np.roll(offset, rows)) for rows in (1, -1)]
         for code, amount, unit, meant in mistakes:
             left = np.abs(wrap_to_pi(meant - offset - zeros)[inner])
             if left.max() < tolerances.angle and np.abs(wrap_to_pi(meant)[inner]).max() > tolerances.angle:
@@ -519,7 +523,7 @@ def _causes_of_zeros(
                 return
     if np.abs(np.sin(zeros)).max() > tolerances.angle:
         return  # a turned normal turns zeros by half turns
-    ends = found.layers - int(found.reverses.sum() + (np.abs(zeros) > tolerances.angle).sum())
+    ends = found.layers - int(found.reverses.sum()) - moved
     rows = [k for k in range(robot.rows) if abs(math.sin(robot.alpha[k])) > tolerances.angle]
     for negated in (*([k] for k in rows), rows):
         alpha = np.where(np.isin(np.arange(robot.rows), negated), -robot.alpha, robot.alpha)
@@ -527,6 +531,27 @@ def _causes_of_zeros(
             names = tuple(f"alpha{k + 1}" for k in negated)
             yield Cause("one_alpha_negated", "a", names) if len(names) == 1 else Cause("all_alphas_negated", "a")
             return
+    yield from _negated_lengths(robot, b, tolerances, ends)
+
+
+def _negated_lengths(
+    robot: Robot, b: mechanism.Mechanism, tolerances: mechanism.Tolerances, ends: int
+) -> Iterator[Cause]:
+    """The lengths of which any one has the wrong sign if base, directions and zeros are to agree.
+
+    Geometry can't tell: with a base that is turned over, the same links turn the other way.
+    """
+    entries = [
+        (column, k)
+        for column in ("a", "d")
+        for k in range(robot.rows)
+        if abs(getattr(robot, column)[k]) > tolerances.length and not (column == "d" and robot.sliding[k])
+    ]
+    for column, k in entries:
+        values = np.array(getattr(robot, column))
+        values[k] = -values[k]
+        if mechanism.joints_agree(mechanism.mechanism_of(robot, **{column: values}), b, tolerances, ends):
+            yield Cause("one_length_negated", "a", (f"{column}{k + 1}",))
 
 
 def _swapped_in_a_row(robot: Robot, other: Robot, tolerances: mechanism.Tolerances) -> tuple[str, ...]:

@@ -605,9 +605,9 @@ class Machine:
                 memory.write(each.target.name, syntax.Unset(each.target.name), each.local)
             return None
         value = memory.value(each.value)
-        if isinstance(each.value, syntax.Constant) and isinstance(value, syntax.Unclear):  # which part is not known
-            memory.forget(root(memory.key(each.target) or ""))
         name = memory.key(each.target) or each.text
+        if isinstance(each.value, syntax.Constant) and isinstance(value, syntax.Unclear):  # which part is not known
+            memory.forget(root(name))
         if self.dialect.is_signal(name):
             memory.write(name, value if self.dialect.reads_back(name) else syntax.Unclear(name))
             return instructions.Output(name, syntax.shown(value))

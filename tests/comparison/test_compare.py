@@ -191,11 +191,39 @@ def test_a_twist_of_the_wrong_sign_beside_an_offset_is_one_entry():
     assert (found.zero.same, found.directions.same) == (True, True)
 
 
+@pytest.mark.parametrize(
+    ("name", "entry"),
+    [("er3a_c60", "a1"), ("er3a_c60", "a3"), ("er3a_c60", "d4"), ("er3_600", "a3"), ("ur5e", "d5")],
+)
+@pytest.mark.parametrize("elsewhere", [False, True])
+def test_a_length_of_the_wrong_sign_is_named(name, entry, elsewhere):
+    """It is the same arm with a base or a flange turned over, whose joints turn the other way."""
+    right = er3a.to_standard(er3a.load_robot(name))
+    values = getattr(right, entry[0]) * np.where(np.arange(6) == int(entry[1]) - 1, -1, 1)
+    if elsewhere:
+        right = right.replace(base=rot_z(0.4) @ right.base, flange=right.flange @ rot_z(1.0))
+    found = er3a.compare(right.replace(base=er3a.load_robot(name).base, **{entry[0]: values}), right)
+    assert found.verdict == "same_arm"
+    causes = (*found.zero.causes, *found.directions.causes)
+    assert [(each.code, each.entries) for each in causes] == [("one_length_negated", (entry,))]
+
+
+def test_arms_that_only_stand_or_count_otherwise_have_no_length_of_the_wrong_sign():
+    right = er3a.to_standard(er3a.load_robot("er3a_c60"))
+    over = np.diag([1.0, -1.0, -1.0, 1.0])
+    for other in (right.replace(base=over @ right.base), right.replace(direction=-right.direction)):
+        found = er3a.compare(right, other)
+        assert (found.verdict, found.zero.causes, found.directions.causes) == ("same_arm", (), ())
+
+
 def test_offsets_in_radians_are_named():
     offset = np.radians([0, -90, 37, 180, 12, 0])
     right = er3a.load_robot("er3_600").replace(offset=offset)
     found = er3a.compare(right.replace(offset=np.radians(offset)), right)
     assert found.geometry.same
+    assert [(each.code, each.unit) for each in found.zero.causes] == [("angle_unit", "offset, radian")]
+    only = right.replace(offset=offset * (np.arange(6) == 1))  # as of most arms, whose zeros differ by one quarter turn
+    found = er3a.compare(only.replace(offset=np.radians(only.offset)), only)
     assert [(each.code, each.unit) for each in found.zero.causes] == [("angle_unit", "offset, radian")]
 
 

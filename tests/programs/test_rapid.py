@@ -610,3 +610,15 @@ def test_a_quaternion_whose_length_is_not_1_is_no_orientation(rotation, tmp_path
         step.instruction for step in execute(read_program(path)).steps if isinstance(step.instruction, ArmMotion)
     ]
     assert isinstance(move.target, UnresolvedTarget)
+
+
+def test_an_instruction_that_may_change_an_element_whose_number_is_unknown_makes_the_list_unclear(tmp_path):
+    body = f"""
+    n:=GInput(gi1);
+    GetDataVal "x",list{{n}};
+    GetDataVal "x",twin.count{{n}};
+    WHILE di1=1 DO
+      MoveAbsJ [[list{{1}},0,0,0,30,0],{NONE}],v100,fine,tool0;
+    ENDWHILE"""
+    (target,) = {each.target for each in motions(run(tmp_path, body))}
+    assert isinstance(target, UnresolvedTarget)

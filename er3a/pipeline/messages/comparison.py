@@ -37,6 +37,7 @@ CAUSES = {
     ),
     "all_alphas_negated": N_("the sign of every alpha is turned round"),
     "one_alpha_negated": N_("the sign is turned round"),
+    "one_length_negated": N_("the sign is turned round"),
     "offsets_negated": N_("the sign of every offset is turned round"),
     "unit": N_("the lengths are in another unit"),
     "angle_unit": N_("the angles are in another unit"),
