@@ -317,6 +317,12 @@ class Stored(ByValue, Generic[ResultsT]):
         """The verdict's status."""
         return self.results.summary.verdict.status
 
+    @property
+    def validated(self) -> Path | None:
+        """Where validation's results of the robot are, if there are any."""
+        folder = self.folder.parent / "validation" if self.folder else None
+        return folder if folder and is_computed(folder) else None
+
 
 class NotComputed(Finding, code="stage.not_computed"):
     """A stage could not be computed for a robot."""

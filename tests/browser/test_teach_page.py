@@ -297,6 +297,7 @@ def test_way_points_become_a_path_file_and_a_program_that_er3a_reads(panel, tmp_
     for what in ("pathFile", "program"):
         ask = "const [what, done] = arguments; import('er3a/panel').then((panel) => done(panel.points[what]()))"
         texts[what] = panel.browser.execute_async_script(ask, what)
+    assert all("er3a: Run no path or program on the arm until" in text for text in texts.values())
     robot = load_robot("er3a_c60")
     (tmp_path / "taught.yaml").write_text(texts["pathFile"], encoding="utf-8")
     (path,) = load_paths(tmp_path / "taught.yaml").paths

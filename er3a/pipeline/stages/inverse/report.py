@@ -32,7 +32,7 @@ from er3a.pipeline.messages.inverse import (
 from er3a.pipeline.messages.kinematics import RULE_NAMES, RULE_TITLES, branch_word, singularity_word
 from er3a.pipeline.messages.language import N_, tr, with_unit
 from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
-from er3a.pipeline.results import Stored, is_computed, read_stage
+from er3a.pipeline.results import Stored, read_stage
 from er3a.pipeline.stages.inverse import model
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
@@ -385,12 +385,11 @@ class Correction:
 def _correction(robot: Robot, stored: Stored[model.InverseResults]) -> Correction | None:
     """What validation's diagnosis says of the table; None if it was not computed, names no single fault, or documents
     describe another arm."""
-    folder = stored.folder.parent / "validation" if stored.folder else None
-    if folder is None or not is_computed(folder):
+    if stored.validated is None:
         return None
     stage = STAGES["validation"]
     import_module(stage.messages)
-    summary = read_stage(folder, stage).results.summary
+    summary = read_stage(stored.validated, stage).results.summary
     beyond = getattr(summary, "is_beyond_correction", False)
     for found in () if beyond else getattr(summary, "diagnoses", ()):
         if found.corrected and len(faults := found.hypotheses[0].faults) == 1:
