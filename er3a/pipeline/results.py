@@ -110,6 +110,7 @@ LeftOutSubject = Literal[
     "unexamined_pairs",
     "allowed_pairs",
     "joined_pairs",
+    "unmeasured_pairs",
     "scene_shapes",
     "shallow_overlaps",
     "own_speeds",

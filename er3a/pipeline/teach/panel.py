@@ -17,7 +17,7 @@ from er3a.kinematics.singularity import TYPES, USUAL_NEAR, NearSingular, charact
 from er3a.kinematics.solutions import branch_labels
 from er3a.kinematics.wrist_partitioned import CoupledJoints, has_branches, wrist_partition_missing
 from er3a.pipeline.code_digest import code_digest
-from er3a.pipeline.messages.collision import body_word
+from er3a.pipeline.messages.collision import body_word, unmeasured_text
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.pages import Caveat, caveat
@@ -381,6 +381,7 @@ def clearance_data(robot: Robot, scene: Scene | None) -> dict[str, Any]:
         "near": NEAR_TOUCH,
         "unexamined": say(PairsUnexamined(found.unexamined)) if found.unexamined else None,
         "assumed": say(shapes) if shapes else "",
+        "unmeasured": unmeasured_text(found.unmeasured),
         "allowed": [
             f"{body_word(row.first)} / {body_word(row.second)}" for row in found.matrix if row.state == "allowed"
         ],

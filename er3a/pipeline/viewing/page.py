@@ -27,6 +27,7 @@ from er3a.collision.pairs import ShapesAssumed
 from er3a.errors import ResultError
 from er3a.files.kept_files import INSTALLED, ROOT, view_command, write_atomically
 from er3a.pipeline.messages import language
+from er3a.pipeline.messages.collision import unmeasured_text
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.left_out import left_out_names, left_out_text, say_reserved
 from er3a.pipeline.messages.pages import GRADE_NAMES, GROUP_NAMES, Caveat, caveat, glossary
@@ -213,6 +214,12 @@ class Head:
     def banner(self) -> str:
         """On what assumed shapes all rests, as the text ends; empty where no shapes are assumed."""
         return say(self.shapes) if self.shapes else ""
+
+    @property
+    def unmeasured(self) -> str:
+        """Which pairs no clearance counts until they overlap; empty where there are none."""
+        named = (each.names for each in self.summary.not_examined if each.subject == "unmeasured_pairs")
+        return unmeasured_text(next(named, ()))
 
     @property
     def own_text(self) -> str:

@@ -349,18 +349,23 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
     name, results, summary = stored.robot, stored.results, stored.results.summary
     robot, trips, chosen = study.robot(name), summary.round_trips, model.shown_targets(summary.targets)
     rules = list(dict.fromkeys(results.rankings.rule))
+    names = results.solutions.target
+
+    def of_target(target: model.TargetResult) -> model.SolutionRows:
+        return results.solutions.take(names == target.name)
+
     correction, contradicted = _correction(robot, stored), stored.rests_on.get("validation") == "fail"
     render_stage(
         study,
         stored,
         output,
         nearest_rule=tr(NEAREST_RULE),
-        overview=[_overview_row(target) for target in chosen],
+        overview=[overview_row(target, of_target(target)) for target in chosen],
         sections=[_section(robot, target, results, rules, correction, contradicted) for target in chosen],
         outcomes=_outcomes(summary.targets),
         not_advised=_not_advised(summary.targets),
         units=_units(robot),
-        chosen_heading=tr("Chosen J1 to J{count} ({units})", count=robot.joints, units=_units(robot)),
+        chosen_heading=tr("Chosen branch, and its J1 to J{count} ({units})", count=robot.joints, units=_units(robot)),
         optimised_heading=tr("J1 to J{count}, optimised ({units})", count=robot.joints, units=_units(robot)),
         rule_columns=[tr("Branch"), *map(_rule_heading, rules)],
         trips=trips,
@@ -549,15 +554,46 @@ def _stops(sequence: model.VisitOrder | None, named: set[str]) -> list[list[str]
     ]
 
 
-def _overview_row(target: model.TargetResult) -> list[str]:
+def overview_row(target: model.TargetResult, rows: model.SolutionRows) -> list[str]:
+    """The cells of a target with its ``rows``: name, place, branches, what is chosen, its clearance, and why."""
     unreached = target.obstacle if not target.solutions else None
+    near = target.clearance
     return [
         Markup('<a href="#{0}">{0}</a>').format(target.name),
         _listed(target.xyz_mm),
         tr("{within} of {all}", within=target.within_limits, all=target.solutions),
-        tr("none") if target.chosen_deg is None else _joints(target.chosen_deg),
+        tr("none") if target.chosen_deg is None else _chosen(target.chosen_deg, rows),
+        tr("{far} mm: {pair}", far=fixed(near.least_mm, 1), pair=say(near.between)) if near else "–",
         say(unreached or target.reason),
     ]
+
+
+def _chosen(q_deg: tuple[float, ...], rows: model.SolutionRows) -> str:
+    """The solution taken of a target's rows: its branch and joints; at a singularity that it is, and the best solution
+    that is at none."""
+    chosen = rows.take(rows.rank == 1)
+    name = branch_word(chosen.label[0], int(chosen.branch[0]))
+    cell = Markup("{0}<br>{1}").format(name, Markup(_joints(q_deg)))
+    if not (kinds := _singular(chosen, 0)):
+        return cell
+    other = rows.take((rows.rank > 0) & rows.first_of_branch & ~rows.singular.any(axis=1))
+    said = tr("▲ {kinds} singularity: joint moves only", kinds=kinds)
+    if len(other):
+        k = int(np.argmin(other.rank))
+        said = tr(
+            "{singular}; not singular: {branch} ({move} deg move, {margin} deg from a limit)",
+            singular=said,
+            branch=branch_word(other.label[k], int(other.branch[k])),
+            move=fixed(other.greatest_move_deg[k], 0),
+            margin=fixed(other.limit_margin_deg[k], 1),
+        )
+    return cell + Markup("<br><strong>{0}</strong>").format(said)
+
+
+def _singular(rows: model.SolutionRows, k: int) -> str:
+    """At which singularities a solution is; empty for none."""
+    kinds = [kind for kind, on in zip(model.SINGULAR_PARTS, rows.singular[k]) if on]
+    return tr(", ").join(map(singularity_word, kinds))
 
 
 def _branch_rows(rows: model.SolutionRows, branches: model.SolutionRows) -> list[list[str]]:
