@@ -47,6 +47,7 @@ from er3a.pipeline.stages.trajectory.played import faults
 from er3a.pipeline.stages.trajectory.record import record
 from er3a.pipeline.stages.trajectory.report import report
 from er3a.pipeline.study import Study, load_study
+from er3a.pipeline.teach import panel
 from er3a.pipeline.teach.panel import write_teach_page
 from er3a.pipeline.viewing.index import write_index
 from er3a.planning import tool_proof
@@ -409,12 +410,15 @@ def test_the_index_says_first_what_validation_came_to(study, folders, stored, tm
 @pytest.mark.parametrize(
     ("status", "told"), [("fail", "Never use this table"), ("pass", None), (None, "was not validated")]
 )
-def test_the_teach_panel_says_first_what_validation_came_to(study, tmp_path, status, told):
+def test_the_teach_panel_says_first_what_validation_came_to(study, tmp_path, monkeypatch, status, told):
+    folder = tmp_path / "results/er3_600/validation"
+    monkeypatch.setattr(panel, "program_head", lambda validated: [f"by {validated}"])  # what is made up has no evidence
     if status:
         found = AbsentResults(Summary(Verdict(status, NotComputed("made up")), ()))
-        write_results(tmp_path / "results/er3_600/validation", study, "er3_600", STAGES["validation"], found)
+        write_results(folder, study, "er3_600", STAGES["validation"], found)
     write_teach_page(study, "er3_600", tmp_path / "results", tmp_path / "teach.html")
     page = (tmp_path / "teach.html").read_text(encoding="utf-8")
+    assert f"by {folder if status else None}" in page
     body = page[page.index("<body") :]
     assert ('class="caveat ' in body) == bool(told)
     assert ('class="caveat fail"' in body) == (status == "fail")
