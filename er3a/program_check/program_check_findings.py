@@ -274,6 +274,12 @@ class SpeedNotGiven(Finding):
     word: str = ""
 
 
+class AccelerationNotKnown(Finding):
+    """The program gives the acceleration by ``word``, whose value is not known; one was assumed."""
+
+    word: str
+
+
 class MayMove(Finding):
     """An instruction that was not understood may move the arm."""
 
@@ -390,6 +396,7 @@ CheckFinding = (
     | ExternalAxesLeftOut
     | LineNotChecked
     | SpeedNotGiven
+    | AccelerationNotKnown
     | MayMove
     | MovesBesideProgram
     | NeverReached
@@ -437,6 +444,8 @@ def level_of(finding: CheckFinding) -> Level:
     if isinstance(finding, FrameNotGiven):
         return "fail" if finding.needed else "caution"
     if isinstance(finding, SpeedNotGiven) and finding.word:
+        return "caution"
+    if isinstance(finding, LoadNotExamined) and finding.mass_kg is None:
         return "caution"
     return "fail" if finding.code in FAILS else "note" if finding.code in NOTES else "caution"
 

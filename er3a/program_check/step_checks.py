@@ -743,6 +743,9 @@ class StepChecker:
                 if motion.kind == "joint"
                 else found_in.SpeedNotGiven(assumed.tool_speed, "m/s", word)
             )
+        timed = motion.speed is not None and motion.speed.unit == "s"
+        if motion.acceleration is not None and motion.acceleration.value == 0 and not timed:
+            findings.append(found_in.AccelerationNotKnown(motion.acceleration.text))
         if before is None:
             findings.append(found_in.PathNotKnown())
             findings += () if goal.joints is None else limit_findings(placed.arm, goal.joints)

@@ -634,3 +634,37 @@ def test_what_an_instruction_does_that_is_not_understood_or_simulated_is_listed(
     found = check(tmp_path, text, name)
     assert (4, "instruction") in [(each.place.line, each.what) for each in found.not_examined]
     assert len(found.verdicts) == 1
+
+
+@pytest.mark.parametrize(
+    ("file", "given", "code"),
+    [
+        ("a.script", "movej([0.1,0,0,0,0,0], v=read_input_float_register(1))", "speed_not_given"),
+        ("a.script", "movej([0.1,0,0,0,0,0], t=read_input_float_register(1))", "speed_not_given"),
+        ("a.script", "movej([0.1,0,0,0,0,0], v=0)", "speed_not_given"),
+        ("a.script", "movej([0.1,0,0,0,0,0], a=read_input_float_register(1))", "acceleration_not_known"),
+        ("a.src", "BAS(#VEL_PTP,$ANIN[1])", "speed_not_given"),
+        ("a.src", "$VEL_AXIS[3]=$ANIN[1]", "speed_not_given"),
+        ("a.src", "$VEL_AXIS[3]=150", "more_than_full_speed"),
+        ("a.src", "$ACC_AXIS[3]=$ANIN[1]", "acceleration_not_known"),
+        ("a.mod", "v200\\V:=GInput(gi1)", "speed_not_given"),
+        ("a.mod", "v200\\T:=GInput(gi1)", "speed_not_given"),
+        ("a.mod", "vUnheardOf", "speed_not_given"),
+    ],
+)
+def test_a_speed_or_an_acceleration_that_is_given_and_not_known_is_a_caution(tmp_path, file, given, code):
+    none = "[9E9,9E9,9E9,9E9,9E9,9E9]"
+    text = {
+        "a.script": f"def p():\n  {given}\nend\n",
+        "a.src": krl(f"{given}\nPTP {axes(NEAR)}"),
+        "a.mod": f"MODULE a\nPROC main()\nMoveAbsJ [[5,0,0,0,20,0],{none}],{given},fine,tool0;\nENDPROC\nENDMODULE\n",
+    }[file]
+    found = check(tmp_path, text, file)
+    assert [each.level for each in found.findings if each.finding.code == code] == ["caution"]
+
+
+def test_a_column_of_a_table_that_nobody_reads_is_named(tmp_path):
+    found = check(tmp_path, "t_s,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,gripper\n0,0,0,0,0,20,0,1\n", "a.csv")
+    assert [
+        (each.level, each.finding.text) for each in found.findings if each.finding.code == "program_not_understood"
+    ] == [("caution", "the column gripper")]

@@ -102,6 +102,7 @@ REMEDIES: dict[str, str] = {
     "program_name_twice": N_("Remove one of the two definitions."),
     "program_nothing_moves": N_("Check that this is the program to run."),
     "speed_not_given": N_("Give a speed before the motion."),
+    "acceleration_not_known": N_("Give the acceleration as a number."),
     "zone_without_size": N_("Give the zone's size in mm."),
     "spline_as_line": N_("Write straight lines of the spline (SLIN)."),
     "configuration_not_read": N_("Check on the controller that it takes this solution."),
@@ -259,7 +260,13 @@ TEXTS = texts(
         ),
         "speed_not_given": "the program gives no speed; {assumed:g} m/s were assumed for the duration",
         "speed_not_given.share": "the program gives no speed; {percent:g} % were assumed for the duration",
-        "speed_not_given.word": "the speed '{word}' is not known; {assumed} was assumed for duration and joint speeds",
+        "speed_not_given.word": (
+            "the speed '{word}' is not known, or not above 0; {assumed} was assumed for duration and joint speeds"
+        ),
+        "acceleration_not_known": (
+            "the acceleration '{word}' is not known, or not above 0; one was assumed for duration and joint "
+            "accelerations"
+        ),
         "rest_not_checked.targets": (
             "only the first {checked} motions that are carried out were checked; of those from here on {targets} "
             "targets, for reach and limits, but not the motions between them"
@@ -277,7 +284,7 @@ TEXTS = texts(
         "program_other_encoding": "the file is not UTF-8; it was read as {encoding}",
         "program_nothing_moves": "no instruction moves the arm",
         "load_not_examined": "{mass_kg:g} kg on the flange from here on; torques with this load are not examined",
-        "load_not_examined.text": "the load {text} has no known numbers; torques with it are not examined",
+        "load_not_examined.text": "not all numbers of the load {text} are known; torques with it are not examined",
         "load_above_payload": "{mass_kg:g} kg on the flange, and the arm may carry {payload_kg:g} kg",
         "written_zones_dropped": Plural(
             "zones",
@@ -487,7 +494,7 @@ def _(found: found_in.SpeedNotGiven) -> str:
 
 @say.register
 def _(found: found_in.LoadNotExamined) -> str:
-    return say_as(found) if found.mass_kg is not None else sentence("load_not_examined.text", text=found.text)
+    return sentence("load_not_examined.text", text=found.text) if found.text else say_as(found)
 
 
 @say.register
