@@ -619,7 +619,7 @@ class StepChecker:
         before = self._before[step.before] if step.before >= 0 else -1
         what = step.instruction
         if isinstance(what, instructions.ArmMotion):
-            self.motions[number] = motion = self._motion(what, joints)
+            self.motions[number] = motion = self._from_start(self._motion(what, joints), joints)
             joints = motion.end
             self._corner(before, number)
             before = number
@@ -631,6 +631,14 @@ class StepChecker:
             joints, before = None, -1
         self._joints.append(joints)
         self._before.append(before)
+
+    def _from_start(self, motion: CheckedMotion, joints: Reals | None) -> CheckedMotion:
+        """The first motion, with limits that the arm stands beyond before it: no target before says so."""
+        if joints is None or joints is not self.start:
+            return motion
+        beyond = [each for each in limit_findings(motion.placed.arm, joints) if each not in motion.findings]
+        moments: dict[found_in.CheckFinding, float] = {**motion.moments, **{each: 0.0 for each in beyond}}
+        return replace(motion, findings=(*motion.findings, *beyond), moments=moments)
 
     @property
     def different(self) -> int:
@@ -762,7 +770,9 @@ class StepChecker:
             return CheckedMotion("joint", placed, before, None, None, tuple(findings))
         way = joint_motion_path(placed.arm, placed.motion, before, goal.joints, self.rules)
         if way is None:
-            return CheckedMotion("joint", placed, before, None, goal.joints, tuple(findings), stays=True)
+            return self._standing(
+                CheckedMotion("joint", placed, before, None, goal.joints, tuple(findings), stays=True)
+            )
         found = (*findings, *way.findings)
         beyond = np.maximum(goal.joints - placed.arm.upper, placed.arm.lower - goal.joints).max()
         if beyond > TURN:  # no arm gets there, and nothing goes on from there
@@ -792,7 +802,7 @@ class StepChecker:
             given = None
         way = tool_motion_path(placed.arm, placed.motion, before, (end, given, via), self.rules)
         if way is None:
-            return CheckedMotion(kind, placed, before, None, before, tuple(findings), stays=True)
+            return self._standing(CheckedMotion(kind, placed, before, None, before, tuple(findings), stays=True))
         if not isinstance(way, MotionPath):
             return CheckedMotion(kind, placed, before, None, goal.joints, (*findings, way))
         if any(isinstance(each, found_in.StretchOutOfReach) for each in way.findings):
@@ -837,6 +847,26 @@ class StepChecker:
         hit = found_in.MotionCollides(tuple(touches.values()))
         moments = {**motion.moments, hit: along.contacts[0].start}
         return replace(motion, findings=(*motion.findings, hit), clearance=clearance, moments=moments)
+
+    def _standing(self, motion: CheckedMotion) -> CheckedMotion:
+        """A motion that leaves the arm where it is, with the limits it is beyond and what it touches there."""
+        q, arm = motion.start, motion.placed.arm
+        assert q is not None
+        found: list[found_in.CheckFinding] = [each for each in limit_findings(arm, q) if each not in motion.findings]
+        clearance = None
+        if self.obstacles is not None:
+            bodies, margin = self.obstacles.of(arm), self.obstacles.assumed_margin
+            distances = bodies.counted(bodies.distances(bodies.ends(q), np.arange(len(bodies.pairs))))
+            nearest = int(distances.argmin()) if len(distances) else -1
+            clearance = float(distances[nearest]) if nearest >= 0 and np.isfinite(distances[nearest]) else None
+            touching = np.flatnonzero(distances < 0)
+            touches = [found_in.BodiesTouch(bodies.pairs[k], 0.0, None, -1000 * distances[k], True) for k in touching]
+            if touches:
+                found.append(found_in.MotionCollides(tuple(touches)))
+            elif clearance is not None and clearance < margin:
+                found.append(found_in.ClearOfAssumed(bodies.pairs[nearest], 1000 * clearance, 1000 * margin))
+        moments = {**motion.moments, **dict.fromkeys(found, 0.0)}
+        return replace(motion, findings=(*motion.findings, *found), clearance=clearance, moments=moments)
 
     def _clear(self, motion: CheckedMotion, along: ClearanceAlong) -> CheckedMotion:
         """A collision-free motion, with a finding where it comes near assumed shapes."""

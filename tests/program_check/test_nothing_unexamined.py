@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from er3a.collision.bodies import Bodies
 from er3a.collision.scene import Plane, Scene
 from er3a.errors import InputError
+from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward
 from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.programs.instructions import JointTarget, UnresolvedTarget, numbers_of
@@ -668,3 +669,32 @@ def test_a_column_of_a_table_that_nobody_reads_is_named(tmp_path):
     assert [
         (each.level, each.finding.text) for each in found.findings if each.finding.code == "program_not_understood"
     ] == [("caution", "the column gripper")]
+
+
+@pytest.mark.parametrize("scene", [None, "table_and_post"])
+def test_an_arm_that_only_stands_is_examined_where_it_stands(tmp_path, scene):
+    """A program of one move to where the arm is already, inside the post."""
+    inside = np.radians([70, -24.84, -21.5, 0, -43.65, 25])
+    options = {"start": inside, "measures": True} | (
+        {"scene": load_scene(f"data/scenes/{scene}.yaml")} if scene else {}
+    )
+    found = check(tmp_path, krl(f"PTP {axes(inside)}"), "a.src", **options)
+    hits = [each.finding for each in found.findings if each.finding.code == "motion_collides"]
+    assert bool(hits) == bool(scene)
+    for hit in hits:
+        assert {each.pair.names: each.at_target for each in hit.touches} == {
+            ("link_4", "post"): True,
+            ("link_6", "post"): True,
+        }
+        moved = check(tmp_path, krl(f"PTP {axes(inside)}"), "a.src", **options | {"start": inside * [0, 1, 1, 1, 1, 1]})
+        (coming,) = [each.finding for each in moved.findings if each.finding.code == "motion_collides"]
+        deepest = [max(each.depth_mm for each in found.touches) for found in (hit, coming)]
+        assert 20 < deepest[0] <= deepest[1] + 0.1
+
+
+@pytest.mark.parametrize("target", [[0, 0, 0, 0, -112, 0], [0, 0, 0, 0, -30, 0]])
+def test_a_start_beyond_the_limits_is_named(tmp_path, target):
+    start = np.radians([0, 0, 0, 0, -112, 0])
+    found = check(tmp_path, krl(f"PTP {axes(np.radians(target))}"), "a.src", start=start)
+    assert codes(found)["below_limit"] == [2]
+    assert found.level == "fail"

@@ -101,7 +101,7 @@ REMEDIES: dict[str, str] = {
     "program_data_file_missing": N_("Put the data file beside the program."),
     "program_name_twice": N_("Remove one of the two definitions."),
     "program_nothing_moves": N_("Check that this is the program to run."),
-    "speed_not_given": N_("Give a speed before the motion."),
+    "speed_not_given": N_("Give a speed, as a number above 0, before the motion."),
     "acceleration_not_known": N_("Give the acceleration as a number."),
     "zone_without_size": N_("Give the zone's size in mm."),
     "spline_as_line": N_("Write straight lines of the spline (SLIN)."),
