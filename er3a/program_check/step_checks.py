@@ -30,7 +30,7 @@ from __future__ import annotations
 import heapq
 import math
 from collections import defaultdict
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -42,7 +42,7 @@ from er3a.collision.along import ClearanceAlong, clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import Pair
 from er3a.collision.scene import Scene
-from er3a.collision.shapes import arm_shapes, link_frames
+from er3a.collision.shapes import arm_shapes, enlarged_by, link_frames
 from er3a.errors import PoseError
 from er3a.geometry.vectors import TURN
 from er3a.kinematics.batch import inverse_batch
@@ -562,6 +562,12 @@ class Obstacles:
             self.bodies[id(arm)] = Bodies(arm, self.scene)
         return self.bodies[id(arm)]
 
+    def hit(self, arm: Robot, touches: Iterable[found_in.BodiesTouch]) -> found_in.MotionCollides:
+        """A collision, with what is known of the shapes that overlap."""
+        return found_in.MotionCollides(
+            tuple(replace(each, enlarged_mm=1000 * enlarged_by(arm, self.scene, each.pair.names)) for each in touches)
+        )
+
 
 def obstacles_of(robot: Robot, scene: Scene | None, tolerance: float, assumed_margin: float) -> Obstacles:
     """What a robot must not meet, itself among it; ``assumed_margin`` holds if its shapes are assumed."""
@@ -844,7 +850,7 @@ class StepChecker:
                 touch.pair, found_in.BodiesTouch(touch.pair, touch.start, at, 0.0, touch.pair in at_target)
             )
             touches[touch.pair] = replace(first, depth_mm=max(first.depth_mm, touch.depth * 1000))
-        hit = found_in.MotionCollides(tuple(touches.values()))
+        hit = self.obstacles.hit(way.arm, touches.values())
         moments = {**motion.moments, hit: along.contacts[0].start}
         return replace(motion, findings=(*motion.findings, hit), clearance=clearance, moments=moments)
 
@@ -862,7 +868,7 @@ class StepChecker:
             touching = np.flatnonzero(distances < 0)
             touches = [found_in.BodiesTouch(bodies.pairs[k], 0.0, None, -1000 * distances[k], True) for k in touching]
             if touches:
-                found.append(found_in.MotionCollides(tuple(touches)))
+                found.append(self.obstacles.hit(arm, touches))
             elif clearance is not None and clearance < margin:
                 found.append(found_in.ClearOfAssumed(bodies.pairs[nearest], 1000 * clearance, 1000 * margin))
         moments = {**motion.moments, **dict.fromkeys(found, 0.0)}

@@ -7,13 +7,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
+from er3a.collision.along import clearance
 from er3a.collision.bodies import Bodies
-from er3a.collision.scene import Plane, Scene
+from er3a.collision.scene import Mesh, Plane, Scene
 from er3a.errors import InputError
 from er3a.files.scene_file import load_scene
+from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
+from er3a.pipeline.messages.programs import say
 from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.programs.instructions import JointTarget, UnresolvedTarget, numbers_of
 from testing.arms import palletiser
@@ -698,3 +702,22 @@ def test_a_start_beyond_the_limits_is_named(tmp_path, target):
     found = check(tmp_path, krl(f"PTP {axes(np.radians(target))}"), "a.src", start=start)
     assert codes(found)["below_limit"] == [2]
     assert found.level == "fail"
+
+
+@pytest.mark.parametrize(("margin", "level"), [(0.0, "fail"), (0.004, "fail"), (0.03, "caution")])
+def test_an_overlap_by_less_than_a_shape_is_larger_than_its_mesh_is_no_contact_for_sure(tmp_path, margin, level):
+    """A block whose mesh comes within 20 mm of the arm, or, with other margins, 5 mm into it."""
+    q = np.zeros((1, 6))
+    corners = np.array([(x, y, z) for x in (0, 0.2) for y in (-0.1, 0.1) for z in (-0.1, 0.1)])
+
+    def block(x: float, margin: float) -> Scene:
+        return Scene("block", (Mesh("block", transform(np.array([x, 0, 0.6]), np.zeros(3)), (corners,), margin),))
+
+    near = brentq(lambda x: clearance(ROBOT, q, block(x, 0.0)).distance[0] - 1e-3, 0.0, 3.0)
+    scene = block(near + (0.019 if level == "caution" else -0.006), margin)
+    found = check(tmp_path, krl("PTP {A1 0,A2 0,A3 0,A4 0,A5 0,A6 0}"), "a.src", start=q[0], scene=scene, measures=True)
+    ((said, hit),) = [(each.level, each.finding) for each in found.findings if each.finding.code == "motion_collides"]
+    assert said == level
+    touches = [each for each in hit.touches if "block" in each.pair.names]
+    assert {each.enlarged_mm for each in touches} == {1000 * margin}
+    assert ("larger than the meshes" in say(hit)) == bool(margin)

@@ -251,6 +251,7 @@ TEXTS = texts(
         "motion_collides": "collision: {touches}",
         "motion_collides.more": "collision: {touches}; and more later",
         "bodies_touch": "{pair} after {at_mm:.1f} mm, up to {depth_mm:.1f} mm deep",
+        "bodies_touch.enlarged": "{touch} (these shapes are up to {enlarged_mm:.1f} mm larger than the meshes in them)",
         "bodies_touch.joint": "{pair} after {t_s:.2f} s, up to {depth_mm:.1f} mm deep",
         "arc_goes_on": "the arc ends after {angle_deg:g} deg, not at its target",
         "arc_goes_on.unknown": "the angle at which the arc ends is not known; the arc was not checked",
@@ -468,9 +469,14 @@ def _(found: found_in.MotionCollides) -> str:
 
 @say.register
 def _(found: found_in.BodiesTouch) -> str:
+    at = {"pair": say(found.pair), "depth_mm": found.depth_mm}
     if found.at_mm is None:
-        return sentence("bodies_touch.joint", pair=say(found.pair), depth_mm=found.depth_mm, t_s=found.t_s)
-    return say_as(found)
+        touch = sentence("bodies_touch.joint", t_s=found.t_s, **at)
+    else:
+        touch = sentence("bodies_touch", at_mm=found.at_mm, **at)
+    if not found.enlarged_mm:
+        return touch
+    return sentence("bodies_touch.enlarged", touch=touch, enlarged_mm=found.enlarged_mm)
 
 
 @say.register
