@@ -103,7 +103,7 @@ REMEDIES: dict[str, str] = {
     "program_nothing_moves": N_("Check that this is the program to run."),
     "speed_not_given": N_("Give a speed, as a number above 0, before the motion."),
     "acceleration_not_known": N_("Give the acceleration as a number."),
-    "zone_without_size": N_("Give the zone's size in mm."),
+    "zone_without_size": N_("Give the zone's size: in mm, or for C_PTP in percent ($APO.CPTP)."),
     "spline_as_line": N_("Write straight lines of the spline (SLIN)."),
     "configuration_not_read": N_("Check on the controller that it takes this solution."),
     "load_not_examined": N_(

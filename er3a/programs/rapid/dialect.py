@@ -403,6 +403,8 @@ def _displaced(memory: ProgramMemory, base: instructions.NamedFrame) -> instruct
     if moved is None or base.pose is None:
         return base
     pose = data_types.pose_matrix(moved)
+    if pose is None:
+        pose = _mapped(memory, "pdispon")
     if pose is None or not np.array_equal(pose, np.eye(4)):
         base = instructions.NamedFrame("PDispOn" if pose is None else "", None if pose is None else base.pose @ pose)
     return base
