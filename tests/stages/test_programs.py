@@ -301,7 +301,9 @@ def test_an_arm_that_slides_has_millimetres_in_tables_player_and_recording(tmp_p
         np.testing.assert_allclose(ends[-1], targets[-1], atol=1e-9)
     np.testing.assert_allclose(results.instructions.end_deg[0], targets[0], atol=1e-9)
     runs = motions(robot, results)
-    monkeypatch.setattr("er3a.pipeline.stages.programs.record.record_stage", lambda *_, **given: runs.extend(given["runs"]))
+    monkeypatch.setattr(
+        "er3a.pipeline.stages.programs.record.record_stage", lambda *_, **given: runs.extend(given["runs"])
+    )
     record(study, SimpleNamespace(results=results, robot="arm"), tmp_path / "programs.rrd")
     assert len(runs) == 2
     for each in runs:

@@ -121,6 +121,13 @@ TEXTS = texts(
             "the best of {count} solutions is {margin_deg:.1f} deg from the joint limits; {needed_deg:g} deg are "
             "required",
         ),
+        "grasp_near_ends": Plural(
+            "solutions",
+            "the only solution is {margin_deg:.1f} deg (mm of a prismatic joint) from the joint limits; {needed_deg:g} "
+            "are required",
+            "the best of {count} solutions is {margin_deg:.1f} deg (mm of a prismatic joint) from the joint limits; "
+            "{needed_deg:g} are required",
+        ),
         "grasp_singular": (
             "all solutions within the limits are singular: the least singular value is {singular_value:.2g} at best, "
             "and {needed:g} is required"

@@ -48,7 +48,7 @@ from er3a.selection.rule_names import RuleName
 from er3a.selection.select import RULES, MoveRule, available_rules, best_of_sets, mixed_cost, refusals
 
 SINGULAR = 1e-6
-LITTLE_MARGIN_DEG = 2.0
+LITTLE_MARGIN_DEG = 2.0  # mm of a prismatic joint
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +87,7 @@ def solve_target(
     obstacle: model.Obstacle | None = None
     advice: tuple[model.Advice, ...] = ()
     if chosen is not None:
-        advice = _what_to_know(rows, chosen)
+        advice = _what_to_know(robot, rows, chosen)
     else:
         if isinstance(choice.reason, AllCollide):
             obstacle = model.BranchesCollide(len(within))
@@ -251,10 +251,11 @@ def _what_would_help(near: model.NeighbourPoses, clearance: float) -> tuple[mode
     return turn, shift
 
 
-def _what_to_know(rows: model.SolutionRows, chosen: int) -> tuple[model.Advice, ...]:
+def _what_to_know(robot: Robot, rows: model.SolutionRows, chosen: int) -> tuple[model.Advice, ...]:
     found: list[model.Advice] = [model.AtSingularity(kind) for kind, on in zip(TYPES, rows.singular[chosen]) if on]
     margin = float(rows.limit_margin_deg[chosen])
-    return (*found, model.NearLimit(margin)) if margin < LITTLE_MARGIN_DEG else tuple(found)
+    near = model.NearEnd if robot.sliding.any() else model.NearLimit
+    return (*found, near(margin)) if margin < LITTLE_MARGIN_DEG else tuple(found)
 
 
 MIX = "mix"

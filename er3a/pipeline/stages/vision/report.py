@@ -211,6 +211,7 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
         images=image_picture(results.corners, _image_folder(study, name)) if len(results.corners) else None,
         map=map_picture(results.error_map, summary.objects) if len(results.error_map) else None,
         overview=[_overview(each) for each in summary.objects],
+        slides=bool(robot.slides.any()),
         grasps=[_grasp(each) for each in summary.objects if each.grasp],
         programs=_programs(results.programs) if stored.rests_on.get("validation") != "fail" else [],
         program_warnings=[*([tr(SIMULATED)] if found and found.simulated else []), tr(NO_LOAD)],
