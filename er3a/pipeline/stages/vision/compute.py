@@ -45,7 +45,7 @@ from er3a.vision.calibration_set import TimeOffset
 from er3a.vision.grasp_motion import DEPTH, PARTS, GraspLeg
 from er3a.vision.grasping import ChosenGrasp, DetectedObject, GraspNeeds, GraspPlan, GraspTask, plan_grasp
 from er3a.vision.hand_eye import HandEye, MethodAnswer, calibrate_hand_eye, spread_of
-from er3a.vision.next_view import FieldOfView, NextView, in_sight, next_view
+from er3a.vision.next_view import FieldOfView, in_sight, next_view
 from er3a.vision.point_error import ArmAccuracy, SeenPoseError, error_sizes, seen_pose, seen_pose_error
 from er3a.vision.table_corrections import NoCorrections, TableCorrections, correct_table, zeros_tried
 from er3a.vision.vision_findings import HandEyeError, grave_warnings
@@ -198,11 +198,21 @@ def _closes(before: GraspLeg, after: GraspLeg) -> bool:
     return before.part == "approach" and after.part == "retreat"
 
 
+def _view_to_add(
+    robot: Robot, found: HandEye, file: VisionFile, board_mm: list[float] | None, *, scene: Scene | None, seed: int
+) -> model.ViewToAdd | None:
+    """The pose to record next; None where the board's size is not known or no pose is found."""
+    if not board_mm:
+        return None
+    middle = np.mean([each.pose()[:3, 3] for each in file.objects], axis=0)
+    view = next_view(robot, found, file.view.view(board_mm), middle, scene, seed)
+    return stated(model.ViewToAdd, view, q_deg=shown(robot, view.q)) if view else None
+
+
 def calibration_result(
-    robot: Robot,
     head: HandEyeFile,
     found: HandEye,
-    view: NextView | None,
+    view: model.ViewToAdd | None,
     offset: TimeOffset | None,
     table: TableCorrections | NoCorrections | None,
     images: SeenImages | None,
@@ -231,7 +241,7 @@ def calibration_result(
         moved_deg=from_si("deg", tilted),
         methods=tuple(map(_method, found.methods)),
         touch=_touch(found),
-        next_view=stated(model.ViewToAdd, view, q_deg=shown(robot, view.q)) if view else None,
+        next_view=view,
         time_offset=stated(model.OffsetResult, offset) if offset else None,
         table=_table_result(table) if isinstance(table, TableCorrections) else table,
         open_tilts=ambiguous_tilts(images.views, found.samples.names) if images else (),
@@ -315,7 +325,7 @@ def corner_rows(found: HandEye, images: SeenImages | None) -> model.CornerRows:
 
 STAGE_NAME = "vision"
 VIEW_STREAM = 0
-CONTRADICTED = 1e-3
+CONTRADICTED = 1e-3  # probability of touched points as far off, below which they contradict the calibration
 LEG_ROWS = 13
 
 Found = (
@@ -351,13 +361,10 @@ def compute(study: Study, name: str) -> model.VisionResults:
     picture = None if head.setup == "eye_to_hand" else meant(robot, np.array(task_file.picture_deg))
     camera = _camera_at(robot, found, picture)
     places = {each.name: camera @ each.pose() for each in task_file.objects}
-    view = task_file.view.view(head.board_mm) if head.board_mm else None
-    to_add = None
-    if view is not None:
-        middle = np.mean([each.pose()[:3, 3] for each in task_file.objects], axis=0)
-        to_add = next_view(robot, found, view, middle, scene, study.seed + VIEW_STREAM)
+    seed = study.seed + VIEW_STREAM
+    to_add = _view_to_add(robot, found, task_file, head.board_mm, scene=scene, seed=seed)
     table = correct_table(found, robot, head.table_corrections) if head.table_corrections else None
-    calibration = calibration_result(robot, head, found, to_add, offset, table, images)
+    calibration = calibration_result(head, found, to_add, offset, table, images)
     doubt = _doubt(calibration)
     planned = []
     if not doubt:

@@ -172,7 +172,7 @@ def _range(values: Reals, low: str, high: str) -> dict[str, str]:
     return {low: fixed(float(values.min()), 2), high: fixed(float(values.max()), 2)}
 
 
-NEARLY_HALF_TURN = 170.0
+NEARLY_HALF_TURN = 170.0  # deg; see MIN_COSINE (169 deg) in er3a/vision/classic_methods.py
 POINTER_M = 0.15
 WAYS = {"move": N_("move to the approach"), "approach": N_("approach"), "retreat": N_("retreat")}
 AXES = ("x", "y", "z")
