@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import assert_never
 
 import numpy as np
 from scipy.spatial import ConvexHull
@@ -254,6 +255,8 @@ def solid_bodies(solid: Solid) -> tuple[Body, ...]:
             points, radius, kind, disc = np.array([[0, 0, -half], [0, 0, half]]), 0.0, CYLINDER, solid.radius
         case Sphere():
             points, radius, kind, disc = np.zeros((1, 3)), solid.radius, HULL, 0.0
+        case _:
+            assert_never(solid)
     return (Body(solid.name, WORLD, points @ solid.T[:3, :3].T + solid.T[:3, 3], radius, kind, disc),)
 
 
