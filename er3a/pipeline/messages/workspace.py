@@ -201,8 +201,8 @@ TEXTS = texts(
             "scene file and run again."
         ),
         "box.range": (
-            "Keep this height: other stands of {least} to {most} mm pass the same checks, but bring the arm nearer to "
-            "a singular pose (at one of them manipulability is {percent:.2g} % of that at {gap} mm, or less)."
+            "Keep the stand at {gap} mm: heights of {least} to {most} mm pass the same checks, but bring the arm "
+            "nearer to a singular pose (at one of them manipulability is {percent:.2g} % of that at {gap} mm, or less)."
         ),
         "box.proven#all": "the tool point, {tilt}, reaches all of it (proven); {unchecked}",
         "box.proven#upper": (

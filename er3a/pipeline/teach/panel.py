@@ -23,7 +23,7 @@ from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.pages import Caveat, caveat
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.player.player import LOOKS, drawn_shapes, drawn_size, floor_of, import_map, scene_data, table_data
-from er3a.pipeline.results import SUMMARY, Provenance, input_records, read_status
+from er3a.pipeline.results import SUMMARY, Provenance, input_records, read_foundation
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.trajectory.motion import near_singular
 from er3a.pipeline.study import Study
@@ -271,7 +271,7 @@ KINDS = {HULL: "hull", CYLINDER: "cylinder", HALF_SPACE: "half_space"}
 def write_teach_page(study: Study, name: str, results: Path, output: Path) -> None:
     """Write the teach panel of a robot of the study to ``output``; the verdict on its table is in ``results``."""
     validated = results / name / "validation"
-    first_caveat = caveat(read_status(validated) if (validated / SUMMARY).exists() else "not_computed")
+    first_caveat = caveat(read_foundation(validated) if (validated / SUMMARY).exists() else "not_computed")
     near = near_singular(study.section(TrajectorySettings))
     inputs = input_records(study.inputs(name, "teach"))
     write_panel(
