@@ -115,6 +115,7 @@ WORDS: dict[str, Any] = {
         "iteration found no joint values within the limits; the nearest are {length} and {angle} away. This "
         "does not prove that none exist"
     ),
+    "in_metres": N_("Positions are in mm: did you mean ({place})?"),
     "left_over": N_(
         "The tool is {length} and {angle} away from what was asked, in what the {joints} joints of this arm cannot set."
     ),

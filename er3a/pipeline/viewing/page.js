@@ -91,7 +91,15 @@ function makeSortable(table) {
 
 function csvOf(table) {
   const quoted = (text) => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
-  return [...table.rows].map((row) => [...row.cells].map((cell) => quoted(plain(textOf(cell)))).join(",")).join("\n") + "\n";
+  return [...table.rows].map((row) => [...row.cells].flatMap(partsOf).map((text) => quoted(plain(text))).join(",")).join("\n") + "\n";
+}
+
+// A cell's texts: of a D-H table's entry its value, and apart from it what is known of it.
+function partsOf(cell) {
+  if (!cell.matches(".entries .n")) return [textOf(cell)];
+  if (cell.tagName === "TH") return [textOf(cell), `${textOf(cell)}${WORDS.colon}${WORDS.known}`];
+  const [value, ...known] = [...cell.childNodes].map((part) => part.textContent.trim()).filter(Boolean);
+  return [value ?? "", known.join(" ")];
 }
 
 function nameFor(element) {

@@ -37,7 +37,7 @@ from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.stages.workspace.entry import CapabilitySettings
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import readings, svg_data_uri
-from er3a.pipeline.viewing.numbers import fixed, number
+from er3a.pipeline.viewing.numbers import fixed, measured, number
 from er3a.version import __version__
 
 _HERE = Path(__file__).parent
@@ -57,6 +57,7 @@ WHOLE, LED = 300, 260  # characters of a verdict that is shown in one, and those
 SCRIPT_WORDS = {
     "sort": N_("sort by this column"),
     "csv": N_("download as CSV"),
+    "known": N_("what is known of it"),
     "svg": N_("download"),
     "enlarge": N_("enlarge"),
     "close": N_("close"),
@@ -281,6 +282,7 @@ def render(
     environment.globals |= {"view_command": view_command, "numbered": Numbering(), "bracketed": bracketed}
     environment.filters |= {
         "number": number,
+        "measured": measured,
         "fixed": fixed,
         "tr": tr,
         "own": language.own_title,
