@@ -223,7 +223,7 @@ def test_words_are_found_over_all_pages_and_on_each(browser, small_study):
         ("er3a_c60/trajectory.html", "line_clean", ".caveat, .assumed-shapes, .verdict, #line_clean ~ p strong"),
         ("er3a_c60/vision.html", "grasp_can", ".caveat, .verdict, section:has([download^=grasp_can]) p strong"),
         ("compare.html", "limit", ".caveat"),
-        ("index.html", "paths pass", ".robot h2, .robot .decision"),
+        ("index.html", "paths pass", ".robot h2, .robot .decision, #decisions .decision.fail"),
         ("index.html", "paths pass", "#er3a_c60_article, .robot:has(#er3a_c60_article) > details > p strong"),
     ],
 )

@@ -346,7 +346,7 @@ const HEADINGS = ["H2", "H3", "SUMMARY", "CAPTION"];
 const CONTAINERS = "h2, h3, p, ul, ol, dl, tr, figure, section, details";
 const WHOLE = "tr, li, dl, figure, .verdict, #turning, .player"; // found or not as one
 const BESIDE = "script, style, thead, .contents, .tools, .pickers"; // goes with what it belongs to
-const WARNING = ".caveat, .assumed-shapes, .verdict, .robot h2, .robot .decision, p:has(strong)";
+const WARNING = "#decisions .decision.fail, .caveat, .assumed-shapes, .verdict, .robot h2, .robot .decision, p:has(strong)";
 
 // What a reader sees of an element, folded or not, in small letters.
 function allText(element) {
