@@ -55,10 +55,10 @@ function typePose(reach, arm, words) {
     const turn = multiply(rotZ(yaw), multiply(rotY(pitch), rotX(roll)));
     const place = values.slice(0, 3);
     reach(multiply(translation(...place.map((value) => value / 1000)), turn), message);
-    if (message.textContent && Math.hypot(...place) < AS_METRES) {
-      const typed = place.map((value) => plain(1000 * value)).join(", ");
-      write(message, `${message.textContent} ${fill(words.in_metres, { place: typed })}`);
-    }
+    const far = Math.hypot(...place);
+    if (far === 0 || far >= AS_METRES) return;
+    const typed = place.map((value) => Number((1000 * value).toFixed(3))).join(", ");
+    write(message, `${message.textContent} ${fill(words.in_metres, { place: typed })}`.trim());
   });
   take();
 }

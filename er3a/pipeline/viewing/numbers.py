@@ -9,6 +9,9 @@ from er3a.pipeline.messages.language import as_number
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
+SMALLEST = 1e-4  # uncertainty that is written without a power of ten
+
+
 def no_noise(value: float) -> float:
     """0 for what is nothing but rounding, or no number; an infinite value stays."""
     return 0.0 if abs(value) < 1e-9 or isnan(value) else float(value)
@@ -35,7 +38,7 @@ def number(value: float | int | None, digits: int = 4) -> str:
 
 def measured(value: float | int | None, uncertainty: float | None) -> str:
     """A number with as many decimals as two significant digits of its uncertainty have, if it has one."""
-    if not isinstance(value, float) or not uncertainty or not abs(value) >= uncertainty:
+    if not isinstance(value, float) or not value or not uncertainty or uncertainty < SMALLEST:
         return number(value)
     return fixed(value, max(0, 1 - floor(log10(uncertainty))))
 
