@@ -161,6 +161,17 @@ def default_envelopes(robot: Robot) -> tuple[Envelope, ...]:
     return tuple(found)
 
 
+def enlarged_by(robot: Robot, scene: Scene | None, names: Sequence[str]) -> float:
+    """By how much (m) shapes of links, and of solids, are at most larger than the meshes that they hold, together.
+
+    An overlap by less is no contact for sure.
+    """
+    margins = [(link_label(piece.link), piece.margin) for piece in arm_shapes(robot).pieces]
+    solids = (*scene.solids, *scene.carried) if scene else ()
+    margins += [(solid.name, solid.margin) for solid in solids if isinstance(solid, Mesh)]
+    return sum(max((margin for owner, margin in margins if owner == name), default=0.0) for name in names)
+
+
 def link_frames(robot: Robot, q: Reals) -> Reals:
     """Frames (..., m + 1, 4, 4) of the base and the links at joint values (..., n)."""
     T = frames(robot, q)
