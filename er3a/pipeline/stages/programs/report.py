@@ -55,7 +55,6 @@ def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) ->
         bodies=[each.name for each in scene.solids] if scene else [],
         solids=solid_rows(scene),
         drawing_head=drawing_head(),
-        box_asked="workspace" in study.stages(stored.robot) and stored.rests_on.get("validation") != "fail",
     )
 
 

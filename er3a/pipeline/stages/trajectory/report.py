@@ -81,7 +81,6 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         turning=in_space(robot, results, paths[:count], scene),
         player=player(robot, motions(robot, results), scene),
         drawing_head=drawing_head(),
-        box_asked="workspace" in study.stages(stored.robot) and stored.rests_on.get("validation") != "fail",
     )
 
 
