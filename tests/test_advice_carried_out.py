@@ -114,7 +114,6 @@ ON_PAGES = {  # texts without a key that are none of the remedies above: the fir
         "No entry of this D-H table",
         "This D-H table was",
         "Run it on the arm only when",
-        "Run none of these",
     ),  # likewise
     "Stop: neither table is the arm",  # likewise
     *("To have all pages", "Its table has not been examined", "These pass without the tray"),  # runs of er3a

@@ -99,6 +99,11 @@ class Bodies:
         places = [np.arange(len(body.points)) + most * i for i, body in enumerate(self.capsules)]
         self._kept = np.concatenate(places) if places else np.empty(0, int)
 
+    @property
+    def unmeasured(self) -> tuple[str, ...]:
+        """The joined pairs by name, of which no distance is counted until they overlap."""
+        return tuple(dict.fromkeys(pair.label for pair, joined in zip(self.pairs, self.joined) if joined))
+
     def ends(self, q: Reals) -> Reals:
         """Points (..., bodies, k, 3) in m whose hulls are the cores of bodies, at joint angles (..., n) in rad.
 

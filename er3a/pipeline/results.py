@@ -111,6 +111,7 @@ LeftOutSubject = Literal[
     "unexamined_pairs",
     "allowed_pairs",
     "joined_pairs",
+    "unmeasured_pairs",
     "scene_shapes",
     "shallow_overlaps",
     "own_speeds",
@@ -317,6 +318,12 @@ class Stored(ByValue, Generic[ResultsT]):
     def status(self) -> Status:
         """The verdict's status."""
         return self.results.summary.verdict.status
+
+    @property
+    def validated(self) -> Path | None:
+        """Where validation's results of the robot are, if there are any."""
+        folder = self.folder.parent / "validation" if self.folder else None
+        return folder if folder and is_computed(folder) else None
 
 
 class NotComputed(Finding, code="stage.not_computed"):

@@ -6,7 +6,7 @@ import math
 import re
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -618,6 +618,19 @@ def head_line(finding: program_findings.WriteFinding) -> str:
             return f"NOT SETTLED: the path {ascii_text(path)} is {near}"
         case program_findings.NotTranslated(instructions=count):
             return f"{count} instruction(s) of the other language as comments"
+
+
+HEAD_LINE = re.compile(rf"(?m)^(<rem>\n<text>|[ ]*(?:;|#|!|\(\*) ){HEAD}.*?(</text>\n</rem>| \*\)|)$")
+
+
+def with_head_lines(text: str, lines: Iterable[str]) -> str:
+    """The text of a written file with further lines at the beginning of its head; one without a head as it is."""
+    first = HEAD_LINE.search(text)
+    if first is None:
+        return text
+    before, behind = first.groups()
+    more = "".join(f"{before}{HEAD}{ascii_text(line)}{behind}\n" for line in lines)
+    return text[: first.start()] + more + text[first.start() :]
 
 
 def program_name(name: str, longest: int) -> str:

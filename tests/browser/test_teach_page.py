@@ -300,6 +300,7 @@ def test_way_points_become_a_path_file_and_a_program_that_er3a_reads(panel, tmp_
     for what in ("pathFile", "program"):
         ask = "const [what, done] = arguments; import('er3a/panel').then((panel) => done(panel.points[what]()))"
         texts[what] = panel.browser.execute_async_script(ask, what)
+    assert all("er3a: Run no path or program on the arm until" in text for text in texts.values())
     robot = load_robot("er3a_c60")
     (tmp_path / "taught.yaml").write_text(texts["pathFile"], encoding="utf-8")
     (path,) = load_paths(tmp_path / "taught.yaml").paths
@@ -519,6 +520,8 @@ def test_the_panel_names_the_nearest_pair_and_turns_red_where_links_touch(panel)
         told = "Collision" if distance <= 0 else f"Clearance {distance:.1f}\u202fmm"
         assert panel.text("#clearance").startswith(told)
         assert say(pair) in panel.text("#clearance")
+        unmeasured = "Clearance does not count these until they overlap: link 2 and link 4."
+        assert (unmeasured in panel.text("#clearance")) == (distance > 0)
     red = "const c = document.getElementById('arm'); const d = c.getContext('2d').getImageData(0, 0, c.width, c.height)"
     each = "n += d[i] > 100 && d[i + 1] < 60 && d[i + 2] < 70"
     count = f".data; let n = 0; for (let i = 0; i < d.length; i += 4) {each}; return n"

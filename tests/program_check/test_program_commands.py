@@ -193,6 +193,7 @@ def test_paths_are_written_and_unsafe_ones_refused(tmp_path):
     assert run(*words, "--output", str(tmp_path), "--only", "line_limits", "--unsafe").exit_code == 0
     text = (tmp_path / "line_limits.src").read_text()
     assert "; er3a: NOT SAFE: the path line_limits leaves limits" in text
+    assert "; er3a: Run no path or program on the arm until its table is confirmed." in text
     assert read_program(tmp_path / "line_clean.src").findings == ()
 
 

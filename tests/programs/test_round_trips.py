@@ -19,6 +19,7 @@ from er3a.planning.commands import (
     ToolTableCommand,
 )
 from er3a.planning.profiles import Times
+from er3a.programs.csv_program import write_csv
 from er3a.programs.from_commands import listing_of
 from er3a.programs.instructions import ArmMotion, JointTarget, Listing, Output, Pause, PoseTarget, Rate, Remark, Zone
 from er3a.programs.krl.writer import KrlWriter
@@ -36,7 +37,8 @@ from er3a.programs.program_findings import (
     ValuesRounded,
     ZonesDropped,
 )
-from er3a.programs.writing import WriteOptions
+from er3a.programs.writing import HEAD, WriteOptions, with_head_lines
+from er3a.robots.joint_limits import joint_columns
 
 LANGUAGES = ("krl", "urscript", "rpl", "xpl", "rapid")
 ROBOT = load_robot("er3a_c60")
@@ -110,6 +112,29 @@ def test_lines_and_arcs_are_written_read_and_written_again(language, tmp_path):
     kinds = [each.kind for each in execution.listing().motions]
     assert kinds[:2] == ["joint", "line"]
     assert ("arc" in kinds) == (language in ("krl", "urscript", "rapid"))
+
+
+@pytest.mark.parametrize("language", [*LANGUAGES, "csv"])
+def test_lines_at_the_beginning_of_a_head_come_first_and_change_no_motion(language, tmp_path):
+    q = np.radians([[0.0, -10, 15, 5, -60, 20], [3.0, -9, 15, 5, -60, 20]])
+    lines = ["not confirmed: alpha 6", "no tool"]
+    listing = listing_of(JointSequenceCommand(q, 0.0, 4.0), ROBOT, q[0], "p").listing
+    if language == "csv":
+        comments, poses = (f"{HEAD}path",), forward(ROBOT, q)
+        texts = {".csv": write_csv(np.arange(2.0), np.degrees(q), poses, comments, joint_columns(ROBOT))}
+    else:
+        texts = write_program(listing, language, WriteOptions(ROBOT, head=("path",))).files
+    warned = {suffix: with_head_lines(text, lines) for suffix, text in texts.items()}
+    told = next(iter(warned.values()))
+    places = [told.index(f"{HEAD}{line}") for line in [*lines, "path"]]
+    assert places == sorted(places)
+    for name, files in (("plain", texts), ("warned", warned)):
+        (tmp_path / name).mkdir()
+        for suffix, text in files.items():
+            (tmp_path / name / f"p{suffix}").write_text(text, encoding="utf-8")
+    both = [read_program(tmp_path / name / f"p{next(iter(texts))}") for name in ("plain", "warned")]
+    first, second = ([each for each in execute(it, ROBOT).listing().motions] for it in both)
+    assert first == second != []
 
 
 @pytest.mark.parametrize("language", ["krl", "urscript", "rapid"])

@@ -14,11 +14,13 @@ from er3a.collision.along import clearance
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward
+from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import read_results, read_verdict
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.collision.compute import compute
 from er3a.pipeline.stages.collision.model import RESULTS
+from er3a.pipeline.stages.collision.report import target_rows
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study, load_study
 from er3a.pipeline.teach.panel import write_teach_page
@@ -85,6 +87,35 @@ def test_page_and_recording_say_what_was_found(folder, tmp_path):
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     for words in ("Which pairs are checked", "taken to be its mounting", "link\u00a02", "They collide at joint values"):
         assert words in page
+
+
+def test_the_verdict_names_the_nearest_target_and_the_paths_that_collide(results):
+    found, closest = results.summary.verdict.finding, results.summary.closest
+    of_targets = [each for each in closest if each.kind == "target"]
+    least = min(of_targets, key=lambda each: each.clearance_mm)
+    assert (found.targets, found.nearest.name) == (len(of_targets), least.name)
+    assert say(found).startswith(
+        f"The chosen solutions of {found.targets} targets are clear by {least.clearance_mm:.1f} mm ({least.name}, "
+        f"{say(least.between)}) or more."
+    )
+    met = [f"{each.name} ({say(each.between)})" for each in closest if each.kind == "path" and each.clearance_mm < 0]
+    assert met
+    assert f" {', '.join(met)}. " in say(found)
+
+
+def test_of_branches_that_are_alike_the_chosen_one_is_named(results):
+    """Branches are counted, not their turns, as the inverse page counts them."""
+    chosen = {each.name: each.q_deg for each in results.summary.closest if each.kind == "target"}
+    rows = {row[0]: row for row in target_rows(results.targets, chosen)}
+    for name, q_deg in chosen.items():
+        own = results.targets.take(results.targets.target == name)
+        taken = int(np.abs(own.q_deg - q_deg).max(axis=1).argmin())
+        best = own.clearance_mm.max()
+        alike = len(set(own.branch[own.clearance_mm >= best - 0.05].tolist()))
+        assert rows[name][1] == str(len(set(own.branch.tolist())))
+        assert (f"({alike} branches are alike)" in rows[name][4]) == (alike > 1)
+        if own.clearance_mm[taken] >= best - 0.05:
+            assert rows[name][4].startswith(branch_word(own.label[taken], int(own.branch[taken])))
 
 
 def scene_file(folder: Path, **shapes) -> Path:

@@ -244,6 +244,8 @@ def test_paths_that_may_not_be_run_count_for_nothing(full, tmp_path):
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     own = page[page.index("why it may not be run") :]
     assert own.index("line_shoulder") < own.index("line_out") < own.index("Path playback")
+    known = {each.subject for each in summary.not_examined}.isdisjoint(("link_masses", "load", "friction"))
+    assert ("; for sizing motors and gears" in page, "not for sizing motors and gears" in page) == (known, not known)
 
 
 def test_what_the_files_leave_open_is_named_and_no_pass(tmp_path, bare, full):

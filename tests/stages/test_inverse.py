@@ -21,6 +21,7 @@ from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
+from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import read_results
 from er3a.pipeline.stages import run
@@ -33,6 +34,7 @@ from er3a.pipeline.stages.inverse.model import (
     TargetResult,
     shown_targets,
 )
+from er3a.pipeline.stages.inverse.report import overview_row
 from er3a.pipeline.study import Study
 from er3a.selection.select import RULES
 
@@ -205,6 +207,34 @@ def test_wrist_singularity_is_named(computed):
     np.testing.assert_allclose(best.q_deg[0, [3, 5]], 7.5)  # nearest to 0, 0 with a sum of 15
     advice = target_named(results, "wrist_aligned").advice[0]
     assert (advice.code, advice.kind) == ("at_singularity", "wrist")
+    finding = results.summary.verdict.finding
+    singular = tuple(each.name for each in results.summary.targets if any(it.code == advice.code for it in each.advice))
+    if finding.code != "inverse.none_solved":
+        assert "wrist_aligned" in finding.singular == singular
+        assert ", where only joint moves lead: " + ", ".join(singular) in say(finding)
+
+
+def test_the_chosen_branch_and_what_is_not_singular_stand_in_the_first_table(computed):
+    _, results = computed
+    for target in results.summary.targets:
+        rows = results.solutions.take(results.solutions.target == target.name)
+        cells = overview_row(target, rows)
+        if target.chosen_deg is None:
+            assert cells[3:5] == ["none", "–"]
+            continue
+        best = rows.take(rows.rank == 1)
+        told = cells[3].split("<br>")
+        assert told[0] == branch_word(best.label[0])
+        assert f"{target.clearance.least_mm:.1f} mm: {say(target.clearance.between)}".replace("-", "−") == cells[4]
+        assert (len(told) == 3) == best.singular.any()
+        if best.singular.any():
+            other = rows.take((rows.rank > 0) & ~rows.singular.any(axis=1))
+            assert "wrist singularity: joint moves only" in told[2]
+            assert (branch_word(other.label[other.rank.argmin()]) in told[2]) == bool(len(other))
+        if target.reason.code == "moves_less":
+            others = rows.greatest_move_deg[rows.rank == 2]
+            assert target.reason.less_deg == pytest.approx(others[0] - best.greatest_move_deg[0], abs=1e-6)
+            assert f"needs {target.reason.less_deg:.3g} deg more" in cells[5]
 
 
 def test_round_trips_lose_nothing(computed):

@@ -13,6 +13,7 @@ import pytest
 import yaml
 
 from er3a.collision.along import bodies_of
+from er3a.collision.bodies import Bodies
 from er3a.collision.matrix import base_contacts, collision_matrix
 from er3a.collision.pairs import ASSUMED_MARGIN
 from er3a.collision.scene import Box, Plane, Scene, Sphere
@@ -22,6 +23,7 @@ from er3a.files.robot_library import load_robot
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import MIN_SINGULAR_VALUE
+from er3a.pipeline.messages.collision import unmeasured_text
 from er3a.pipeline.messages.left_out import left_out_names, left_out_text
 from er3a.pipeline.messages.say import say, say_all
 from er3a.pipeline.new_study.write import arm_of, write_study
@@ -469,6 +471,26 @@ def test_bodies_that_a_joint_holds_are_named_where_others_of_their_links_meet():
     assert (row.state, row.left_out > 0) == ("meets", True)
     found = {each.subject: each.names for each in left_out_of_collisions(arm, bodies_of(arm, None), None)}
     assert found["joined_pairs"] == ("base/link_1",)
+
+
+def test_links_that_no_clearance_counts_until_they_overlap_are_named():
+    """By arms that are near to an overlap of them: what is counted as nearest is farther away than they are."""
+    robot = load_robot("er3_600")
+    bodies = Bodies(robot, None)
+    assert bodies.unmeasured == ("base/link_2", "link_2/link_4", "link_4/link_6")
+    left = {each.subject: each.names for each in left_out_of_collisions(robot, bodies, None)}
+    assert left["unmeasured_pairs"] == bodies.unmeasured
+    assert unmeasured_text(bodies.unmeasured) == (
+        "Clearance does not count these until they overlap: base and link 2, link 2 and link 4, link 4 and link 6."
+    )
+    q = np.radians(np.linspace([0, 0, -40, 0, -20, 0], [0, 0, -64, 0, -20, 0], 200))
+    apart = np.array([bodies.distances(bodies.ends(each), np.arange(len(bodies.pairs))) for each in q])
+    of_them = apart[:, [pair.label in bodies.unmeasured for pair in bodies.pairs]].min(axis=1)
+    just_clear = of_them > 0
+    assert just_clear.any()
+    assert not just_clear.all()
+    assert (bodies.min_distance(q[just_clear])[0] > of_them[just_clear]).all()
+    assert unmeasured_text(()) == ""
 
 
 def test_orientations_that_an_arm_of_few_joints_leaves_off_are_named():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import gzip
 import json
 import re
 import shutil
@@ -365,6 +367,11 @@ def test_the_page_says_first_what_validation_came_to_and_hands_out_no_program_of
     body = page[page.index("<body") :]
     assert ('class="caveat ' in body[: body.index('class="verdict')]) == bool(told)
     assert ("data-packed=" in body, "No program is offered" in body) == (status == "pass", status == "fail")
+    for file, packed in re.findall(r'download="([^"]+)" data-packed="([^"]+)"', body):
+        text = gzip.decompress(base64.b64decode(packed)).decode()
+        first = text[text.find("er3a: ") :].startswith("er3a: Run no path or program on the arm until its table is")
+        assert first or file.endswith((".dat", ".var"))
+        assert first == ("er3a: not checked: the tool: none is given" in text)
     if told:
         assert body.index(told) < body.index('class="verdict') < body.index("safe")
 

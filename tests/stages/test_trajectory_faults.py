@@ -11,7 +11,7 @@ import pytest
 import yaml
 from lxml import etree
 
-from er3a.collision.pairs import ShapesAssumed
+from er3a.collision.bodies import Bodies
 from er3a.files.path_file import load_paths
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
@@ -21,7 +21,7 @@ from er3a.pipeline.program_reports import programs_of
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.trajectory.compute import compute
 from er3a.pipeline.stages.trajectory.judgement import sound_end
-from er3a.pipeline.stages.trajectory.model import Singularity, SoundEnd
+from er3a.pipeline.stages.trajectory.model import Singularity
 from er3a.pipeline.stages.trajectory.played import advised, faults
 from er3a.pipeline.study import Study, load_study
 from er3a.pipeline.verdicts import read_verdicts
@@ -133,12 +133,23 @@ def test_the_index_says_where_it_counts_what_passes_why_that_is_no_pass(tmp_path
 @pytest.mark.parametrize("name", ["line_collides", "line_limits"])
 def test_a_path_that_ends_where_its_advice_says_keeps_the_margin(tmp_path, name):
     """The advised point as it is printed, in the path's own file, judged by the stage itself."""
-    (path,) = paths_of(tmp_path, name)
+    study = study_of(tmp_path, name)
+    results = compute(study, ROBOT)
+    (path,), rows = results.summary.paths, results.checks
+    t, stop = path.clear_until.t_s, path.clear_until.stop_s
+    rates = np.array([np.interp(t, rows.t_s, column) for column in rows.q_deg_s.T])
+    brakes = np.array(results.summary.joint_limits.acceleration_deg_s2)
+    assert stop == pytest.approx((np.abs(rates) / brakes).max(), rel=0.02)
+    bodies = Bodies(study.robot(ROBOT), study.scene(ROBOT, "trajectory"))
+    pairs = np.arange(len(bodies.pairs))
+    for tau in np.linspace(0.0, stop, 20):  # each joint brakes by itself
+        during = np.minimum(tau, np.abs(rates) / brakes)
+        q = path.clear_until.q_deg + rates * during - np.sign(rates) * brakes * during**2 / 2
+        assert 1000 * bodies.distances(bodies.ends(np.radians(q)), pairs).min() >= path.clear_until.margin_mm - 0.1
     xyz, rpy = re.search(r"x, y, z = (.*?) mm and roll, pitch, yaw = (.*?) deg", advice(path)).groups()
     end = {"xyz_mm": [float(x) for x in xyz.split(", ")], "rpy_deg": [float(x) for x in rpy.split(", ")]}
-    shown = end_text(path, SoundEnd(0.0, path.clear_until.xyz_mm), ShapesAssumed(given=True, margin_mm=20.0, near=()))
-    left = path.clear_until.margin_mm - 20
-    assert f"{left:.1f} mm if the true shapes are 20 mm larger; the way that braking takes comes off that" in shown
+    shown = end_text(path, path.sound_end, assumed=True)
+    assert f"also after a stop from there ({path.clear_until.stop_s:.2f} s); it touches if the true shapes" in shown
     (shorter,) = paths_of(tmp_path, name, end=end, duration_s=path.duration_s * path.clear_until.s_m / path.length_m)
     assert not shorter.collisions
     assert not shorter.out_of_limits

@@ -123,6 +123,7 @@ def test_page_and_recording_are_written(study, folders, tmp_path, name):
     heads = [base64.b64decode(text).decode() for text in packed]
     assert len(heads) >= 5 * (name == "er3a_c60")
     assert all("the camera is simulated" in head and "may carry the object was not examined" in head for head in heads)
+    assert all("er3a: Run no path or program on the arm until" in head for head in heads)
     assert (tmp_path / "record").stat().st_size > 10_000
 
 

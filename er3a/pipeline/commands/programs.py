@@ -134,10 +134,14 @@ def write(
     from er3a.pipeline.messages.programs import say
     from er3a.pipeline.program_reports import missed_collisions, missed_line, programs_of, shapes_line
     from er3a.pipeline.progress import shown_work
+    from er3a.pipeline.stages.left_out import left_out_without_tool
+    from er3a.pipeline.viewing.page import program_head
     from er3a.programs.program_findings import TargetsLeftOut
+    from er3a.programs.writing import with_head_lines
 
     arm, around = load_robot(robot), load_scene(scene) if scene else None
-    refused = 0
+    refused, alone = 0, missed_collisions(arm, around)
+    head = program_head(None, (*alone, *left_out_without_tool(arm)))
     with shown_work(f"{paths}: checking each path"):
         programs = list(programs_of(paths, arm, language, around, only, unsafe))
     for made in programs:
@@ -147,13 +151,13 @@ def write(
             continue
         for name, text in made.files.items():
             file = output / name
-            _write(file, text)
+            _write(file, with_head_lines(text, head))
             print(f"{file}: written")
         for finding in made.findings:
             print_note(f"{made.name}: {say(finding)}")
         refused += bool(made.left_out) or any(isinstance(finding, TargetsLeftOut) for finding in made.findings)
     missed = dict.fromkeys(each for made in programs for each in made.left_out)
-    for line in filter(None, (shapes_line(arm), missed_line((*missed_collisions(arm, around), *missed)))):
+    for line in filter(None, (shapes_line(arm), missed_line((*alone, *missed)))):
         print_note(line)
     if refused:
         raise typer.Exit(1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import assert_never
 
 import numpy as np
@@ -13,7 +13,7 @@ from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Sphere
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages import left_out  # noqa: F401
 from er3a.pipeline.messages.language import N_, own_title, tr
-from er3a.pipeline.messages.say import joined, listed, say, say_as, sentence, texts, word
+from er3a.pipeline.messages.say import Plural, joined, listed, say, say_as, sentence, texts, word
 from er3a.pipeline.stages.collision.model import BaseInSolid, FreeSpace, HomeCollides, NeverFree, ShapesOverlap
 
 NAMED = 3
@@ -89,7 +89,18 @@ TEXTS = texts(
         "collision.free_space#doubt": (
             "Pairs of links that may or may not collide, and are therefore checked: {undecided}."
         ),
+        "collision.free_space#targets": Plural(
+            "targets",
+            "The chosen solution of {count} target is clear by {nearest}.",
+            "The chosen solutions of {count} targets are clear by {nearest} or more.",
+        ),
+        "nearest_target": "{clearance_mm:.1f} mm ({name}, {pair})",
+        "colliding_path": "{name} ({pair})",
+        "collision.free_space#paths": Plural(
+            "colliding", "{count} path collides: {colliding:, }.", "{count} paths collide: {colliding:, }."
+        ),
         "collision.free_space#none": "No collision-free configuration was found.",
+        "clearance.unmeasured": "Clearance does not count these until they overlap: {pairs}.",
     }
 )
 
@@ -153,10 +164,10 @@ def _(found: FreeSpace) -> str:
         percent=100 * found.free_ratio,
         lost=100 * (1 - found.clear / found.places),
     )
-    if not found.undecided:
-        return free
-    doubt = say_as(found, "doubt")
-    return joined([free, doubt], " ")
+    targets = say_as(found, "targets") if found.nearest else ""
+    paths = say_as(found, "paths") if found.colliding else ""
+    doubt = say_as(found, "doubt") if found.undecided else ""
+    return joined([targets, paths, free, doubt], " ")
 
 
 def solid_rows(scene: Scene | None) -> list[list[str]]:
@@ -205,6 +216,17 @@ def body_word(name: str) -> str:
         return sentence("link#base")
     number = name.removeprefix("link_")
     return sentence("link#number", number=number) if number != name else own_title(name)
+
+
+def pair_words(label: str) -> str:
+    """Two bodies by their label in columns of text."""
+    return tr(" and ").join(map(body_word, label.split("/")))
+
+
+def unmeasured_text(pairs: Iterable[str]) -> str:
+    """Which pairs, by their labels, no clearance counts until they overlap; empty where there are none."""
+    named = joined(map(pair_words, pairs), ", ")
+    return sentence("clearance.unmeasured", pairs=named) if named else ""
 
 
 def why(

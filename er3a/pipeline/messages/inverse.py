@@ -81,6 +81,11 @@ TEXTS = texts(
             "{count} of {total} targets has a solution {where}; none for {none_for}.",
             "{count} of {total} targets have a solution {where}; none for {none_for}.",
         ),
+        "inverse.singular": Plural(
+            "names",
+            "{count} of them is at a singularity, where only joint moves lead: {names:, }.",
+            "{count} of them are at singularities, where only joint moves lead: {names:, }.",
+        ),
         "where#itself": "within the limits and free of self-collision",
         "where#scene": "within the limits and free of collisions",
         "reach_missing#near": "{gap_mm:.2g} mm out of reach",
@@ -131,7 +136,7 @@ def _(found: AllSolved) -> str:
         return _and_demonstrations("", found)
     where = _where(found.collisions)
     if not found.demonstrations:
-        return say_as(found, "every", where=where)
+        return _and_demonstrations(say_as(found, "every", where=where), found)
     some = say_as(found, "some", total=found.targets, where=where)
     return _and_demonstrations(some, found)
 
@@ -155,7 +160,8 @@ def _(found: SomeUnsolved) -> str:
 
 def _and_demonstrations(text: str, found: TargetCounts) -> str:
     expected = demonstrated(found.demonstrations, found.targets)
-    return joined([text, sentence("finding", finding=expected) if expected else ""], " ")
+    singular = sentence("inverse.singular", names=found.singular) if found.singular else ""
+    return joined([text, singular, sentence("finding", finding=expected) if expected else ""], " ")
 
 
 def _where(collisions: bool) -> str:

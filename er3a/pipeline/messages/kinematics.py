@@ -152,13 +152,13 @@ TEXTS = texts(
         "other_turns": "the same branch, {joints:, }",
         "other_free_joint": "the same branch, its free joint at another angle",
         "all_collide": "all {count} solutions within the limits collide: {overlap}",
-        "moves_less": "{move}, {less_deg:.3g} deg less than {other}",
-        "slides_less": "{move}, {less_deg:.3g} less than {other} (in deg, or mm of a prismatic joint)",
+        "moves_less": "{move}; {other} needs {less_deg:.3g} deg more",
+        "slides_less": "{move}; {other} needs {less_deg:.3g} more (in deg, or mm of a prismatic joint)",
         "slides_less_together": (
-            "{move}, as with {other}; all joints taken together move {less_deg:.3g} less (in deg, or mm of a prismatic "
-            "joint)"
+            "{move}; {other} needs the same, but {less_deg:.3g} more of all joints together (in deg, or mm of a "
+            "prismatic joint)"
         ),
-        "moves_less_together": "{move}, as with {other}; all joints taken together move {less_deg:.3g} deg less",
+        "moves_less_together": "{move}; {other} needs the same, but {less_deg:.3g} deg more of all joints together",
         "lower_branch_number": "{move}; {other} is just as near, and the lower branch number decides",
         "next_best": "the next best ({branch})",
         "no_solution": "out of reach: {fault}",

@@ -37,6 +37,7 @@ TEXTS = texts(
         "left_out.joined_pairs": (
             "overlaps of these links where they meet at a joint, and how near they come; the rest of them is examined"
         ),
+        "left_out.unmeasured_pairs": "how near these links, which meet at a joint, come elsewhere before they overlap",
         "left_out.scene_shapes": "whether what stands in the cell is shaped and placed as the scene's file says",
         "left_out.shallow_overlaps": "overlaps of less than {amount:g} mm between the points measured",
         "left_out.own_speeds": "the joints' real speeds: no document gives them, so speeds are assumed",

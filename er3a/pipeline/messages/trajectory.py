@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import er3a.pipeline.messages.collision  # noqa: F401
-from er3a.collision.pairs import LinkAndSolid, ShapesAssumed
+from er3a.collision.pairs import LinkAndSolid
 from er3a.pipeline.messages.expectations import demonstrated, outcome_word
 from er3a.pipeline.messages.kinematics import singularity_word
 from er3a.pipeline.messages.language import N_, with_unit
@@ -105,14 +105,14 @@ TEXTS = texts(
             "{needed:.4g} in the path file"
         ),
         "advice.clear_until": (
-            "It keeps {margin:.1f} mm of clearance up to t = {t:.4g} s ({far:.1f} mm): end the path there, with the "
-            "tool at x, y, z = {xyz} mm and roll, pitch, yaw = {rpy} deg (joints {q}), or move its end or the body "
-            "that it hits: {pair} touch at {contact} mm"
+            "It keeps {margin:.1f} mm of clearance up to t = {t:.4g} s ({far:.1f} mm) and in a stop from there "
+            "({stop:.2f} s): end the path there, with the tool at x, y, z = {xyz} mm and roll, pitch, yaw = {rpy} deg "
+            "(joints {q}), or move its end or the body that it hits: {pair} touch at {contact} mm"
         ),
         "advice.clear_until#links": (
-            "It keeps {margin:.1f} mm of clearance up to t = {t:.4g} s ({far:.1f} mm): end the path there, with the "
-            "tool at x, y, z = {xyz} mm and roll, pitch, yaw = {rpy} deg (joints {q}), or move the path: {pair} touch "
-            "at {contact} mm"
+            "It keeps {margin:.1f} mm of clearance up to t = {t:.4g} s ({far:.1f} mm) and in a stop from there "
+            "({stop:.2f} s): end the path there, with the tool at x, y, z = {xyz} mm and roll, pitch, yaw = {rpy} deg "
+            "(joints {q}), or move the path: {pair} touch at {contact} mm"
         ),
         "advice.within_reach": (
             "It is within reach up to t = {t:.4g} s ({far:.1f} mm of the path): move its end or the workpiece nearer "
@@ -130,10 +130,13 @@ TEXTS = texts(
             "End it there, with the tool at x, y, z = {xyz} mm: {left:.2f} s before the first fault (a stop takes "
             "{stop:.2f} s)."
         ),
-        "advice.end#clear": "End it there, with the tool at x, y, z = {xyz} mm: {margin:.1f} mm clear.",
+        "advice.end#clear": (
+            "End it there, with the tool at x, y, z = {xyz} mm: {margin:.1f} mm clear, also after a stop from there "
+            "({stop:.2f} s)."
+        ),
         "advice.end#assumed": (
-            "End it there, with the tool at x, y, z = {xyz} mm: {margin:.1f} mm clear of assumed shapes, and "
-            "{left:.1f} mm if the true shapes are {wrong:g} mm larger; the way that braking takes comes off that."
+            "End it there, with the tool at x, y, z = {xyz} mm: {margin:.1f} mm clear of assumed shapes, also after a "
+            "stop from there ({stop:.2f} s); it touches if the true shapes are larger by more than that."
         ),
         "advice.chosen": "{way}: {tool}; {time}",
         "advice.chosen#clear": "{way}: {tool}; {time}; the arm keeps {clearance:.1f} mm of clearance",
@@ -414,15 +417,12 @@ def _until(path: model.PathSummary) -> str:
     return sentence("advice.sound", t=end.t_s, **_end(end))
 
 
-def end_text(path: model.PathSummary, end: model.SoundEnd, assumed: ShapesAssumed | None) -> str:
-    """That a path may be run to a point of it, and by how much it is clear up to there, if that was measured; of
-    ``assumed`` shapes by how much these may be wrong."""
-    if path.clear_until:
-        parts = {"xyz": _numbers(end.xyz_mm, 1), "margin": path.clear_until.margin_mm}
-        if assumed:
-            left = max(0.0, path.clear_until.margin_mm - assumed.margin_mm)
-            return sentence("advice.end#assumed", wrong=assumed.margin_mm, left=left, **parts)
-        return sentence("advice.end#clear", **parts)
+def end_text(path: model.PathSummary, end: model.SoundEnd, *, assumed: bool) -> str:
+    """That a path may be run to a point of it, and by how much it is clear up to there, if that was measured, of
+    ``assumed`` shapes or of given ones."""
+    if last := path.clear_until:
+        parts = {"xyz": _numbers(end.xyz_mm, 1), "margin": last.margin_mm, "stop": last.stop_s}
+        return sentence("advice.end#assumed" if assumed else "advice.end#clear", **parts)
     return sentence("advice.end", **_end(end))
 
 
@@ -463,7 +463,7 @@ def _clear(path: model.PathSummary) -> str:
     pair = path.collisions[0].cause.touches[0].pair
     form = "advice.clear_until" if isinstance(pair, LinkAndSolid) else "advice.clear_until#links"
     parts["pair"] = say(pair)
-    return sentence(form, margin=last.margin_mm, t=last.t_s, far=last.s_m * 1000, **parts)
+    return sentence(form, margin=last.margin_mm, t=last.t_s, far=last.s_m * 1000, stop=last.stop_s, **parts)
 
 
 def _numbers(values: tuple[float, ...], digits: int) -> str:

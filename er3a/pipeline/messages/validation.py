@@ -12,7 +12,7 @@ from er3a.diagnosis.faults import CountedFromGround, ReversedDirection, WrongOff
 from er3a.identifiability.entries import GROUP_OF
 from er3a.identifiability.evidence import PART_OF_GROUP, PartName
 from er3a.identifiability.reactions import CheckCounts
-from er3a.pipeline.messages.language import N_, as_text, own_title, with_unit
+from er3a.pipeline.messages.language import N_, as_text, own_title, tr, with_unit
 from er3a.pipeline.messages.left_out import names_in_words
 from er3a.pipeline.messages.references import GROUP_WORDS, MISSING_WORDS, quoted
 from er3a.pipeline.messages.say import Plural, bracketed, by, joined, say, say_as, sentence, texts, word
@@ -280,6 +280,14 @@ def unconfirmed(parts: Sequence[PartFound], unbounded: Sequence[str] = ()) -> st
             excluded = say_as(part, "excluded", names=shortened(part.contradicted)) if part.contradicted else ""
             named += [shortened(own), excluded, say_as(part, "more", more=more, part=kind) if more > 0 else ""]
     return joined([*named, shortened(left)], ", ")
+
+
+def condition(parts: Sequence[PartFound], unbounded: Sequence[str]) -> str:
+    """What has to be confirmed before anything that passes is run on the arm; empty where all of its table is."""
+    if not parts:
+        return tr("Run no path or program on the arm until its table is confirmed.")
+    names = unconfirmed(parts, unbounded)
+    return names and tr("Run no path or program on the arm until these are confirmed: {entries}.", entries=names)
 
 
 def _open_alone(found: LeftOpen) -> list[str]:

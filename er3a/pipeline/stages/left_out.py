@@ -60,6 +60,7 @@ def left_out_of_collisions(
         ("unexamined_pairs", tuple(pair.label for pair in bodies.unexamined)),
         ("allowed_pairs", tuple(name for name in allowed if name not in hidden)),
         ("joined_pairs", pairs("joined")),
+        ("unmeasured_pairs", bodies.unmeasured),
     ]
     listed = [LeftOut(subject, names) for subject, names in found if names]
     obstacles = [LeftOut("scene_shapes" if solids else "obstacles")]

@@ -58,7 +58,8 @@ export class Clearance {
   #described({ distance, deep, pair }) {
     const words = this.clearance.assumed ? this.words.assumed : this.words;
     const text = distance <= 0 ? (deep ? words.overlap_deep : words.overlap) : words.clearance_is;
-    return fill(text, { distance: inMillimetres(Math.abs(distance)), pair: pair.text });
+    const said = fill(text, { distance: inMillimetres(Math.abs(distance)), pair: pair.text });
+    return distance > 0 && this.clearance.unmeasured ? `${said} ${this.clearance.unmeasured}` : said;
   }
 
   /** Writes the least distance at frames `T` into the page; returns what is to be drawn of it, null for nothing. */

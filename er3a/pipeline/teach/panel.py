@@ -17,18 +17,19 @@ from er3a.kinematics.singularity import TYPES, USUAL_NEAR, NearSingular, charact
 from er3a.kinematics.solutions import branch_labels
 from er3a.kinematics.wrist_partitioned import CoupledJoints, has_branches, wrist_partition_missing
 from er3a.pipeline.code_digest import code_digest
-from er3a.pipeline.messages.collision import body_word
+from er3a.pipeline.messages.collision import body_word, unmeasured_text
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.pages import Caveat, caveat
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.player.player import LOOKS, drawn_shapes, drawn_size, floor_of, import_map, scene_data, table_data
-from er3a.pipeline.results import SUMMARY, Provenance, input_records, read_foundation
+from er3a.pipeline.results import Provenance, input_records, is_computed, read_foundation
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.trajectory.motion import near_singular
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.page import render, run_command
+from er3a.pipeline.viewing.page import program_head, render, run_command
 from er3a.pipeline.viewing.palette import BODY, INK, JOINTS, LINK
+from er3a.programs.writing import ascii_text
 from er3a.robots.joint_limits import joint_names
 from er3a.robots.robot import Robot
 
@@ -272,7 +273,8 @@ KINDS = {HULL: "hull", CYLINDER: "cylinder", HALF_SPACE: "half_space"}
 def write_teach_page(study: Study, name: str, results: Path, output: Path) -> None:
     """Write the teach panel of a robot of the study to ``output``; the verdict on its table is in ``results``."""
     validated = results / name / "validation"
-    first_caveat = caveat(read_foundation(validated) if (validated / SUMMARY).exists() else "not_computed")
+    known = is_computed(validated)
+    first_caveat = caveat(read_foundation(validated) if known else "not_computed")
     near = near_singular(study.section(TrajectorySettings))
     inputs = input_records(study.inputs(name, "teach"))
     write_panel(
@@ -282,6 +284,7 @@ def write_teach_page(study: Study, name: str, results: Path, output: Path) -> No
         scene=study.scene(name, "trajectory"),
         robot_pages=study.pages(name),
         first_caveat=first_caveat,
+        head=program_head(validated if known else None),
         command=run_command(study, f"{name}/teach.html"),
         provenance=Provenance(inputs, code_digest(__name__), config=study.settings(name, "trajectory")),
     )
@@ -297,6 +300,7 @@ def write_panel(
     scene: Scene | None = None,
     robot_pages: Sequence[str] = (),
     first_caveat: Caveat | None = None,
+    head: Sequence[str] | None = None,
 ) -> None:
     """Write the teach panel of a robot.
 
@@ -305,6 +309,7 @@ def write_panel(
     near : where the panel warns of a singularity
     robot_pages : those that stand beside it; none outside of a study
     first_caveat : what to know of its table, if anything
+    head : what files that the panel exports say first; None where nothing is known of the table
     """
     own = panel_data(robot, near)
     panel = own | {
@@ -313,6 +318,7 @@ def write_panel(
         "carried": scene_data(scene.carried if scene else ()),
         "floor": floor_of(scene),
         "clearance": clearance_data(robot, scene),
+        "head": [ascii_text(line) for line in (program_head(None) if head is None else head)],
     }
     render(
         _HERE / "teach.html.j2",
@@ -376,6 +382,7 @@ def clearance_data(robot: Robot, scene: Scene | None) -> dict[str, Any]:
         "near": NEAR_TOUCH,
         "unexamined": say(PairsUnexamined(found.unexamined)) if found.unexamined else None,
         "assumed": say(shapes) if shapes else "",
+        "unmeasured": unmeasured_text(found.unmeasured),
         "allowed": [
             f"{body_word(row.first)} / {body_word(row.second)}" for row in found.matrix if row.state == "allowed"
         ],

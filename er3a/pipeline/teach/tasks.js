@@ -153,10 +153,10 @@ function wayPoints(data, arm) {
     points.length = 0;
     changed();
   });
-  byId("export-path").addEventListener("click", () => save(`${name}_taught.yaml`, pathFile(table, points)));
-  byId("export-program")?.addEventListener("click", () => save(`${name}_taught.pgm`, rplProgram(name, points)));
+  byId("export-path").addEventListener("click", () => save(`${name}_taught.yaml`, pathFile(data, points)));
+  byId("export-program")?.addEventListener("click", () => save(`${name}_taught.pgm`, rplProgram(data, points)));
   changed();
-  return { pathFile: () => pathFile(table, points), program: () => rplProgram(name, points) };
+  return { pathFile: () => pathFile(data, points), program: () => rplProgram(data, points) };
 }
 
 function save(file, text) {
@@ -168,16 +168,17 @@ function save(file, text) {
 }
 
 /** A path file of er3a: joint moves through the points, which stop at each. */
-function pathFile(table, points) {
+function pathFile({ head, table }, points) {
   const rows = points.map((q) => `      - [${plain(table, q)}]\n`);
   const time = (k, value) => Math.abs(shown(table, k, value)) / (table.slides[k] ? SLIDE_SPEED : SPEED);
   const moves = points.slice(1).map((q, i) => Math.max(1, ...q.map((value, k) => time(k, value - points[i][k]))));
   const duration = Math.ceil(moves.reduce((sum, time) => sum + time, 0));
-  return `kind: paths\npaths:\n  - name: taught\n    title: Points taught in the teach panel\n    kind: joint_sequence\n    points_deg:\n${rows.join("")}    duration_s: ${duration}\n    samples: ${25 * duration}\n`;
+  return `${head.map((line) => `# er3a: ${line}\n`).join("")}kind: paths\npaths:\n  - name: taught\n    title: Points taught in the teach panel\n    kind: joint_sequence\n    points_deg:\n${rows.join("")}    duration_s: ${duration}\n    samples: ${25 * duration}\n`;
 }
 
 /** A program in RPL: a joint move to each point, at a tenth of full speed. */
-function rplProgram(name, points) {
+function rplProgram({ head, name }, points) {
   const moves = points.map((q) => `MJOINT(POINTJ(${q.map((angle) => toDegrees(angle).toFixed(6)).join(",")}), v10perc, fine, tool0);\n`);
-  return `(* er3a: taught on ${name}; not checked *)\n${moves.join("")}`;
+  const said = [`taught on ${name}; not checked`, ...head].map((line) => `(* er3a: ${line} *)\n`);
+  return said.join("") + moves.join("");
 }

@@ -35,6 +35,7 @@ from er3a.pipeline.messages.pages import caveat, decision, next_step
 from er3a.pipeline.messages.say import bracketed, joined, say
 from er3a.pipeline.messages.validation import (
     CONVENTIONS,
+    condition,
     how_far_off,
     missed_text,
     settled_parts,
@@ -867,14 +868,6 @@ def _without_box() -> str:
         "These pass without the tray or box and its stand: put both into the study's scene file and run again before "
         "you run any of them there."
     )
-
-
-def condition(parts: Sequence[PartFound], unbounded: Sequence[str]) -> str:
-    """What has to be confirmed before anything that passes is run on the arm; empty where all of its table is."""
-    if not parts:
-        return tr("Run no path or program on the arm until its table is confirmed.")
-    names = unconfirmed(parts, unbounded)
-    return names and tr("Run no path or program on the arm until these are confirmed: {entries}.", entries=names)
 
 
 def _run(stage: str, results: TrajectoryResults | ProgramsResults) -> dict[str, Any]:

@@ -137,7 +137,10 @@ def compute(study: Study, name: str) -> model.CollisionResults:
     )
     joined = places_found.joined
     free = model.FreeSpace(
-        space.whole.value, places_found.reached, places_found.clear, joined, undecided, assumed is not None
+        *(space.whole.value, places_found.reached, places_found.clear, joined, undecided, assumed is not None),
+        targets=len(at_targets),
+        nearest=_nearest_target(at_targets),
+        colliding=tuple(model.CollidingPath(each.name, each.between) for each in on_paths if each.clearance_mm < 0),
     )
     return model.CollisionResults(
         summary=model.CollisionSummary(
@@ -178,6 +181,13 @@ def compute(study: Study, name: str) -> model.CollisionResults:
         targets=targets,
         paths=paths,
     )
+
+
+def _nearest_target(closest: list[model.Closest]) -> model.NearestTarget | None:
+    if not closest:
+        return None
+    least = min(closest, key=lambda each: each.clearance_mm)
+    return model.NearestTarget(least.name, least.clearance_mm, least.between)
 
 
 def _left_out(study: Study, name: str, found: model.TargetClearances, motions: list[ListedMotion]) -> Iterator[LeftOut]:

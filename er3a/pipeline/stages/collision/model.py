@@ -45,6 +45,21 @@ class HomeCollides(Finding, code="collision.home_collides"):
     free_ratio: float
 
 
+class NearestTarget(Finding):
+    """The target whose chosen solution is the nearest to anything."""
+
+    name: str
+    clearance_mm: float
+    pair: Pair
+
+
+class CollidingPath(Finding):
+    """A path on which two bodies overlap, the deepest of them."""
+
+    name: str
+    pair: Pair
+
+
 class FreeSpace(Finding, code="collision.free_space"):
     """How much of joint space and of the reached places is free.
 
@@ -53,6 +68,7 @@ class FreeSpace(Finding, code="collision.free_space"):
     places, clear, joined : cells reached, with an arm free of overlap, and joined to home by a proven motion
     undecided : pairs of links of which it is not known whether they can meet
     assumed : whether the shapes of the arm's links are, so that nothing is proven of the arm itself
+    targets, nearest : how many have a chosen solution, and the nearest of these; colliding : paths that do
     """
 
     free_ratio: float
@@ -61,6 +77,9 @@ class FreeSpace(Finding, code="collision.free_space"):
     joined: int
     undecided: int
     assumed: bool = False
+    targets: int = 0
+    nearest: NearestTarget | None = None
+    colliding: tuple[CollidingPath, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from matplotlib.figure import Figure
 from er3a.collision.pairs import TRIED
 from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.messages.collision import body_word, state_word, why
+from er3a.pipeline.messages.collision import body_word, pair_words, state_word, why
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import joined, say
@@ -173,6 +174,7 @@ def closest_pair(robot: Robot, found: model.Closest) -> Picture:
 
 NO_BREAK_SPACE = "\u00a0"
 MAX_ROWS = 100  # of a table of targets and paths
+ALIKE_MM = 0.05  # clearances that differ by no more are shown as the same
 
 
 def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -> None:
@@ -191,7 +193,7 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
         by_pair=by_pair(results.pairs),
         pairs=_pairs(results.pairs),
         workspace=workspace(results),
-        targets=_targets(results.targets),
+        targets=target_rows(results.targets, {each.name: each.q_deg for each in closest if each.kind == "target"}),
         clearance=clearance_over_time(results),
         player=player(robot, motions(robot, results), scene),
         drawing_head=drawing_head(),
@@ -237,10 +239,11 @@ def _pairs(rows: model.PairShares) -> list[list[str]]:
     ]
 
 
-def _targets(rows: model.TargetClearances) -> list[list[str]]:
-    """One row for each target: solutions within limits, clear ones, the best clearance and its branch.
+def target_rows(rows: model.TargetClearances, chosen: Mapping[str, tuple[float, ...]]) -> list[list[str]]:
+    """One row for each target: branches within limits, clear ones, the best clearance and its branch.
 
-    Of many targets those whose best clearance is smallest.
+    Of many targets those whose best clearance is smallest. Of branches that are alike the ``chosen`` one is named, by
+    joint values.
     """
     names, first, group = np.unique(rows.target.astype(str), return_index=True, return_inverse=True)
     most = np.full(len(names), -np.inf)
@@ -249,14 +252,18 @@ def _targets(rows: model.TargetClearances) -> list[list[str]]:
     found = []
     for name in names[kept[np.argsort(first[kept])]]:
         own = rows.take(rows.target == name)
-        best = int(own.clearance_mm.argmax())
+        alike = np.flatnonzero(own.clearance_mm >= own.clearance_mm.max() - ALIKE_MM)
+        away = np.abs(own.q_deg[alike] - chosen[name]).max(axis=1) if name in chosen else np.zeros(len(alike))
+        best = int(alike[away.argmin()])
+        branches, equal = len(set(own.branch.tolist())), len(set(own.branch[alike].tolist()))
+        branch = branch_word(own.label[best], int(own.branch[best]))
         found.append(
             [
                 str(name),
-                str(len(own)),
-                str(int((own.clearance_mm >= 0).sum())),
+                str(branches),
+                str(len(set(own.branch[own.clearance_mm >= 0].tolist()))),
                 fixed(own.clearance_mm[best], 1),
-                branch_word(own.label[best], int(own.branch[best])),
+                branch if equal == 1 else tr("{branch} ({count} branches are alike)", branch=branch, count=equal),
                 _between(own.between[best]),
             ]
         )
@@ -264,7 +271,7 @@ def _targets(rows: model.TargetClearances) -> list[list[str]]:
 
 
 def _between(label: str) -> str:
-    return tr(" and ").join(body_word(part) for part in label.split("/")) if label else tr("nothing")
+    return pair_words(label) if label else tr("nothing")
 
 
 def _closest(found: model.Closest) -> list[str]:

@@ -389,12 +389,12 @@ def compute(study: Study, name: str) -> model.InverseResults:
             advance(1)
     ranked = [rankings(robot, target, one, scene, settings.mix) for target, one in zip(targets, solved)]
     solutions = model.SolutionRows.stacked(one.rows for one in solved).of_joints(robot.slides)
-    results = tuple(one.result for one in solved)
+    results = _with_clearance(robot, scene, [one.result for one in solved])
     asked = [each for each in results if each.chosen_deg is not None and each.expect in (None, "reached")]
     chosen = meant(robot, np.reshape([each.chosen_deg for each in asked], (-1, robot.joints)))
     T_of = {target.name: target.T for target in targets}
-    smallest = bodies_of(robot, scene).min_distance(chosen)[0].tolist()
-    rests_on = shapes_assumed(robot, margin, {each.name: d for each, d in zip(asked, smallest)})
+    smallest = {each.name: each.clearance.least_mm / 1000 for each in asked if each.clearance}
+    rests_on = shapes_assumed(robot, margin, smallest)
     complete = not isinstance(arm_solver(robot).chain, Unsolved)
     random = np.random.default_rng([study.seed, ROUND_TRIP_STREAM])
     wanted = settings.round_trips if has_branches(robot) else min(settings.round_trips, MAX_BY_CLASS)
@@ -422,6 +422,19 @@ def compute(study: Study, name: str) -> model.InverseResults:
         solution_map(robot, settings.map_cells, scene) if has_branches(robot) else model.MapRows.empty()
     )
     return model.InverseResults(summary, solutions, model.RankingRows.stacked(ranked), number_of_solutions)
+
+
+def _with_clearance(
+    robot: Robot, scene: Scene | None, targets: list[model.TargetResult]
+) -> tuple[model.TargetResult, ...]:
+    """The targets with the clearance of their chosen solutions."""
+    bodies, chosen = bodies_of(robot, scene), [k for k, each in enumerate(targets) if each.chosen_deg is not None]
+    q = meant(robot, np.reshape([targets[k].chosen_deg for k in chosen], (-1, robot.joints)))
+    for k, distance, pair in zip(chosen, *bodies.min_distance(q)):
+        if pair >= 0:
+            nearest = model.TargetClearance(float(1000 * distance), bodies.pairs[pair])
+            targets[k] = replace(targets[k], clearance=nearest)
+    return tuple(targets)
 
 
 def _left_out(
@@ -465,12 +478,13 @@ def _verdict(
     shown = demonstrations(targets, "reached")
     asked = [target for target in targets if target.expect in (None, "reached")]
     unsolved = tuple(model.UnsolvedTarget(target.name, target.obstacle) for target in asked if target.obstacle)
+    singular = tuple(each.name for each in asked if any(isinstance(it, model.AtSingularity) for it in each.advice))
     count, solved = len(asked), len(asked) - len(unsolved)
     if not unsolved:
-        return Verdict(pass_of(asked), model.AllSolved(count, solved, unsolved, collisions, shown))
+        return Verdict(pass_of(asked), model.AllSolved(count, solved, unsolved, collisions, shown, singular))
     if not solved:
         return Verdict("fail", model.NoneSolved(count, solved, unsolved, collisions, shown))
-    return Verdict("caution", model.SomeUnsolved(count, solved, unsolved, collisions, shown))
+    return Verdict("caution", model.SomeUnsolved(count, solved, unsolved, collisions, shown, singular))
 
 
 def _figures(

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from er3a.by_value import Finding
+from er3a.collision.pairs import Pair
 from er3a.kinematics.solutions import Label, Method, TargetOutcome, Unsolved
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
@@ -127,7 +128,8 @@ class TargetCounts:
     """How many targets have an admissible solution, and which have none.
 
     ``collisions``: a scene was given, so that the solutions touch nothing of it. The arm never touches itself.
-    ``demonstrations``, which are meant to have none, are not counted.
+    ``demonstrations``, which are meant to have none, are not counted. ``singular``: targets whose chosen solution is at
+    a singularity.
     """
 
     targets: int
@@ -135,6 +137,7 @@ class TargetCounts:
     unsolved: tuple[UnsolvedTarget, ...]
     collisions: bool
     demonstrations: tuple[Demonstration, ...]
+    singular: tuple[str, ...] = ()
 
 
 class AllSolved(TargetCounts, Finding, code="inverse.all_solved"):
@@ -183,6 +186,14 @@ class SelfMotion:
 
 
 @dataclass(frozen=True)
+class TargetClearance:
+    """How near a chosen solution comes to anything, negative by the depth of an overlap, and what comes so near."""
+
+    least_mm: float
+    between: Pair
+
+
+@dataclass(frozen=True)
 class TargetResult:
     """One target.
 
@@ -195,6 +206,7 @@ class TargetResult:
     outcome, expect : what it came to, and what its file says that it should
     unsolved : why branches, or the pose, have no solution
     neighbours : only for targets without a solution within the limits
+    clearance : of the chosen solution; None where nothing can meet
     """
 
     name: str
@@ -218,6 +230,7 @@ class TargetResult:
     families: tuple[SelfMotion, ...]
     neighbours: NeighbourPoses | None
     advice: tuple[Advice, ...]
+    clearance: TargetClearance | None = None
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ from er3a.pipeline.messages.inverse import (
 from er3a.pipeline.messages.kinematics import RULE_NAMES, RULE_TITLES, branch_word, singularity_word
 from er3a.pipeline.messages.language import N_, tr, with_unit
 from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
-from er3a.pipeline.results import Stored, is_computed, read_stage
+from er3a.pipeline.results import Stored, read_stage
 from er3a.pipeline.stages.inverse import model
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
@@ -349,19 +349,24 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
     name, results, summary = stored.robot, stored.results, stored.results.summary
     robot, trips, chosen = study.robot(name), summary.round_trips, model.shown_targets(summary.targets)
     rules = list(dict.fromkeys(results.rankings.rule))
+    names = results.solutions.target
+
+    def of_target(target: model.TargetResult) -> model.SolutionRows:
+        return results.solutions.take(names == target.name)
+
     correction, contradicted = _correction(robot, stored), stored.rests_on.get("validation") == "fail"
     render_stage(
         study,
         stored,
         output,
         nearest_rule=tr(NEAREST_RULE),
-        overview=[_overview_row(target) for target in chosen],
+        overview=[overview_row(target, of_target(target)) for target in chosen],
         sections=[_section(robot, target, results, rules, correction, contradicted) for target in chosen],
         outcomes=_outcomes(summary.targets),
         not_advised=_not_advised(summary.targets),
         units=_units(robot),
         slides=bool(robot.slides.any()),
-        chosen_heading=tr("Chosen J1 to J{count} ({units})", count=robot.joints, units=_units(robot)),
+        chosen_heading=tr("Chosen branch, and its J1 to J{count} ({units})", count=robot.joints, units=_units(robot)),
         optimised_heading=tr("J1 to J{count}, optimised ({units})", count=robot.joints, units=_units(robot)),
         rule_columns=[tr("Branch"), *(_rule_heading(robot, rule) for rule in rules)],
         trips=trips,
@@ -386,12 +391,11 @@ class Correction:
 def _correction(robot: Robot, stored: Stored[model.InverseResults]) -> Correction | None:
     """What validation's diagnosis says of the table; None if it was not computed, names no single fault, or documents
     describe another arm."""
-    folder = stored.folder.parent / "validation" if stored.folder else None
-    if folder is None or not is_computed(folder):
+    if stored.validated is None:
         return None
     stage = STAGES["validation"]
     import_module(stage.messages)
-    summary = read_stage(folder, stage).results.summary
+    summary = read_stage(stored.validated, stage).results.summary
     beyond = getattr(summary, "is_beyond_correction", False)
     for found in () if beyond else getattr(summary, "diagnoses", ()):
         if found.corrected and len(faults := found.hypotheses[0].faults) == 1:
@@ -553,15 +557,46 @@ def _stops(sequence: model.VisitOrder | None, named: set[str]) -> list[list[str]
     ]
 
 
-def _overview_row(target: model.TargetResult) -> list[str]:
+def overview_row(target: model.TargetResult, rows: model.SolutionRows) -> list[str]:
+    """The cells of a target with its ``rows``: name, place, branches, what is chosen, its clearance, and why."""
     unreached = target.obstacle if not target.solutions else None
+    near = target.clearance
     return [
         Markup('<a href="#{0}">{0}</a>').format(target.name),
         _listed(target.xyz_mm),
         tr("{within} of {all}", within=target.within_limits, all=target.solutions),
-        tr("none") if target.chosen_deg is None else _joints(target.chosen_deg),
+        tr("none") if target.chosen_deg is None else _chosen(target.chosen_deg, rows),
+        tr("{far} mm: {pair}", far=fixed(near.least_mm, 1), pair=say(near.between)) if near else "–",
         say(unreached or target.reason),
     ]
+
+
+def _chosen(q_deg: tuple[float, ...], rows: model.SolutionRows) -> str:
+    """The solution taken of a target's rows: its branch and joints; at a singularity that it is, and the best solution
+    that is at none."""
+    chosen = rows.take(rows.rank == 1)
+    name = branch_word(chosen.label[0], int(chosen.branch[0]))
+    cell = Markup("{0}<br>{1}").format(name, Markup(_joints(q_deg)))
+    if not (kinds := _singular(chosen, 0)):
+        return cell
+    other = rows.take((rows.rank > 0) & rows.first_of_branch & ~rows.singular.any(axis=1))
+    said = tr("▲ {kinds} singularity: joint moves only", kinds=kinds)
+    if len(other):
+        k = int(np.argmin(other.rank))
+        said = tr(
+            "{singular}; not singular: {branch} ({move} deg move, {margin} deg from a limit)",
+            singular=said,
+            branch=branch_word(other.label[k], int(other.branch[k])),
+            move=fixed(other.greatest_move_deg[k], 0),
+            margin=fixed(other.limit_margin_deg[k], 1),
+        )
+    return cell + Markup("<br><strong>{0}</strong>").format(said)
+
+
+def _singular(rows: model.SolutionRows, k: int) -> str:
+    """At which singularities a solution is; empty for none."""
+    kinds = [kind for kind, on in zip(model.SINGULAR_PARTS, rows.singular[k]) if on]
+    return tr(", ").join(map(singularity_word, kinds))
 
 
 def _branch_rows(rows: model.SolutionRows, branches: model.SolutionRows) -> list[list[str]]:

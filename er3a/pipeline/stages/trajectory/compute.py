@@ -396,7 +396,7 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
         tables.append(_checks(robot, motion, found, near, limits))
         clearances.append(judgement.clearance_rows(each.name, along))
         strategies.append(avoided.rows)
-        last = judgement.clear_until(surroundings, motion, found, along, margin)
+        last = judgement.clear_until(surroundings, motion, found, along, margin, limits.acceleration)
         path = replace(path_summary(robot, motion, found, along, avoided, limits), clear_until=last)
         paths.append(replace(path, sound_end=judgement.sound_end(path, tables[-1], used)))
         repair = avoided.rows.take(avoided.rows.strategy == (avoided.chosen or ""))

@@ -246,13 +246,20 @@ def min_clearance(along: ClearanceAlong) -> model.MinClearance | None:
 
 
 def clear_until(
-    surroundings: Surroundings, motion: Motion, found: Judgement, along: ClearanceAlong, margin: float
+    surroundings: Surroundings,
+    motion: Motion,
+    found: Judgement,
+    along: ClearanceAlong,
+    margin: float,
+    acceleration: Reals,
 ) -> model.ClearUntil | None:
-    """The last point of a motion up to which it keeps a margin (m); None if it meets nothing, or keeps it nowhere.
+    """The last point from which a motion still stops with a margin (m) kept; None if it meets nothing, or keeps it
+    nowhere. ``acceleration``: of the joints (n,), rad/s^2.
 
-    The point is searched for on a grid up to the first contact, or to where the motion leaves limits or reach, and
-    proven: where the clearance along the motion up to it is less, it is moved back. Of links that touch by design at
-    their joint, which have no margin to keep there, those that overlap elsewhere keep half of their first distance.
+    The end of the margin is searched for on a grid up to the first contact, or to where the motion leaves limits or
+    reach, and proven: where the clearance along the motion up to it is less, it is moved back. Of links that touch by
+    design at their joint, which have no margin to keep there, those that overlap elsewhere keep half of their first
+    distance.
     """
     if not along.contacts:
         return None
@@ -272,7 +279,7 @@ def clear_until(
         return np.minimum(spare, (apart(t) - kept).min(axis=1)) if joined.size else spare
 
     stops = [part.start for part in found.limits] + [part.start for part in found.beyond]
-    end = min([first, *(BEFORE_STOP * stop for stop in stops)])
+    end = last = min([first, *(BEFORE_STOP * stop for stop in stops)])
     for _ in range(ATTEMPTS):
         grid = np.linspace(0.0, end, STEPS_TO_CONTACT + 1)
         spare = beyond(grid)
@@ -291,17 +298,39 @@ def clear_until(
         end = float(until.t[int(np.argmax(short))])
     else:
         return None
+    stop = float(_stop_time(motion, np.array([end]), acceleration)[0])
+    if end < last:
+        begun = _stop_before(motion, end, acceleration)
+        if begun is None:
+            return None
+        end, stop = begun
     pose, q = motion.tool(np.array([end]))[0], motion.joints(np.array([end, first]))
     touching = bodies.surface_points(q[1], int(bodies.min_distance(q[1:])[1][0])).mean(axis=0)
     return model.ClearUntil(
-        1000 * margin,
+        1000 * float(min([margin, *kept])),
         end,
+        stop,
         float(motion.way(np.array([end]))[0]),
         tuple((1000 * pose[:3, 3]).tolist()),
         tuple(np.degrees(rpy_of(pose)).tolist()),
         tuple(shown(robot, q[0]).tolist()),
         tuple((1000 * touching).tolist()),
     )
+
+
+def _stop_before(motion: Motion, end: float, acceleration: Reals) -> tuple[float, float] | None:
+    """The last time (s) at which a stop along a motion can begin that ends by a time, and how long it takes; None if
+    none can. What keeps the accelerations comes, in the time that a stop takes, at least as far as the stop does."""
+    times = np.linspace(0.0, end, STEPS_TO_CONTACT + 1)
+    stops = _stop_time(motion, times, acceleration)
+    kept = np.flatnonzero(times + stops <= end)
+    return (float(times[kept[-1]]), float(stops[kept[-1]])) if len(kept) else None
+
+
+def _stop_time(motion: Motion, t: Reals, acceleration: Reals) -> Reals:
+    """How long (s) the joints take to stop at times (k,)."""
+    found: Reals = (np.abs(motion.rates(t)[1]) / acceleration).max(axis=1)
+    return found
 
 
 def sound_end(path: model.PathSummary, rows: model.PathChecks, limits: model.LimitsUsed) -> model.SoundEnd | None:

@@ -185,16 +185,18 @@ class MinClearance:
 
 @dataclass(frozen=True)
 class ClearUntil:
-    """The last point of a path that collides, from whose start to there it keeps a margin.
+    """The last point of a path that collides, from whose start to there, and in a stop from there, it keeps a margin.
 
     Attributes
     ----------
+    stop_s : that the joints take to stop there
     xyz_mm, rpy_deg : of the tool in the base frame; q_deg : in mm for a prismatic joint
     contact_mm : where the first bodies touch, further on
     """
 
     margin_mm: float
     t_s: float
+    stop_s: float
     s_m: float
     xyz_mm: tuple[float, ...]
     rpy_deg: tuple[float, ...]

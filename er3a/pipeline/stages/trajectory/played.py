@@ -134,7 +134,7 @@ def _to_do(
         todo = advised(path, rows, summary.joint_limits, assumed=assumed)
         return sentence("finding", finding=todo) if todo else "", None
     name = tr("{path}, up to {time} s", path=path.name, time=fixed(last.t_s, 3))
-    end = end_text(path, last, summary.verdict.shapes)
+    end = end_text(path, last, assumed=assumed)
     return end, (name, address_of("trajectory", path.name, last.t_s, path.name, last.t_s))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ from er3a.pipeline.messages.trajectory import (
     strategy_word,
 )
 from er3a.pipeline.player.player import drawing_head, moment, player
-from er3a.pipeline.results import Stored
+from er3a.pipeline.results import LeftOut, Stored
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.stages.trajectory.path_figures import PathFigure, clearance_section, in_space
@@ -40,8 +41,9 @@ from er3a.pipeline.stages.trajectory.written_programs import repair_name
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import readings
 from er3a.pipeline.viewing.numbers import fixed, number
-from er3a.pipeline.viewing.page import packed_text, render_stage
+from er3a.pipeline.viewing.page import condition_of, packed_text, program_head, render_stage
 from er3a.programs.languages import titles_unwritten
+from er3a.programs.writing import with_head_lines
 from er3a.robots.robot import Robot
 
 DRAWN = 250  # points of a curve
@@ -56,10 +58,13 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
     figure, sections = PathFigure(), []
     count = len(summary.paths) if len(summary.paths) <= MAX_DRAWN else DRAWN_OF_MORE
     paths, contradicted = worst_first(summary.paths), stored.rests_on.get("validation") == "fail"
+    box_asked = "workspace" in study.stages(stored.robot) and not contradicted
+    boxes = [LeftOut("placed_box")] if box_asked else []
+    lines = program_head(stored.validated, [*summary.not_examined, *boxes])
     for i, path in enumerate(paths):
         rows, own = checks.take(checks.path == path.name), avoidance.take(avoidance.path == path.name)
         links = _programs(
-            results.programs.take((results.programs.path == path.name) & (i < count and not contradicted))
+            results.programs.take((results.programs.path == path.name) & (i < count and not contradicted)), lines
         )
         drawn = _figure(figure, robot, path, rows, own, summary.near) if i < count else None
         sections.append(_section(path, rows, drawn, links, summary))
@@ -81,15 +86,17 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         turning=in_space(robot, results, paths[:count], scene),
         player=player(robot, motions(robot, results), scene),
         drawing_head=drawing_head(),
+        condition=condition_of(stored.validated),
     )
 
 
-def _programs(rows: model.ProgramFiles) -> list[dict[str, Any]]:
+def _programs(rows: model.ProgramFiles, head: Sequence[str]) -> list[dict[str, Any]]:
+    """The files to save, each with further lines at the beginning of its head."""
     speeds = [
         ", ".join(with_unit(*speed.split(" ", 1)) for speed in text.split(", ") if speed)
         for text in rows.assumed_speed.tolist()
     ]
-    texts = zip(rows.file.tolist(), rows.text.tolist(), speeds)
+    texts = zip(rows.file.tolist(), [with_head_lines(text, head) for text in rows.text.tolist()], speeds)
     return [dict(file=file, packed=packed_text(text), empty=not text, assumed=speed) for file, text, speed in texts]
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -24,15 +24,23 @@ from er3a.pipeline.messages.vision import (
 )
 from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion
 from er3a.pipeline.player.player import drawing_head, player
-from er3a.pipeline.results import Stored
+from er3a.pipeline.results import LeftOut, Stored
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.vision import model
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.numbers import fixed, number
-from er3a.pipeline.viewing.page import Picture, panel_link, render_stage, text_address
+from er3a.pipeline.viewing.page import (
+    Picture,
+    condition_of,
+    panel_link,
+    program_head,
+    render_stage,
+    text_address,
+)
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MODEL
 from er3a.programs.languages import titles_unwritten
+from er3a.programs.writing import with_head_lines
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 from er3a.vision.table_corrections import NoCorrections
@@ -193,7 +201,9 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
     """Write the page from the stage's results."""
     name, results, summary = stored.robot, stored.results, stored.results.summary
     found, scene = summary.calibration, study.scene(name, stored.stage)
-    robot = study.robot(name)
+    robot, contradicted = study.robot(name), stored.rests_on.get("validation") == "fail"
+    boxes = [LeftOut("placed_box")] if "workspace" in study.stages(name) else []
+    head = program_head(stored.validated, [*summary.not_examined, *boxes])
     render_stage(
         study,
         stored,
@@ -215,8 +225,12 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
         overview=[_overview(each) for each in summary.objects],
         slides=bool(robot.slides.any()),
         grasps=[_grasp(each) for each in summary.objects if each.grasp],
-        programs=_programs(results.programs) if stored.rests_on.get("validation") != "fail" else [],
-        program_warnings=[*([tr(SIMULATED)] if found and found.simulated else []), tr(NO_LOAD)],
+        programs=[] if contradicted else _programs(results.programs, head),
+        program_warnings=[
+            *filter(None, [condition_of(stored.validated)]),
+            *([tr(SIMULATED)] if found and found.simulated else []),
+            tr(NO_LOAD),
+        ],
         unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
         errors=[_errors(each) for each in summary.objects if each.error_mm],
         error_columns=[tr("Object"), *(f"{word('vision.part_of_error', PARTS, part)}>" for part in PARTS)],
@@ -235,11 +249,11 @@ def _image_folder(study: Study, name: str) -> Path:
     return (head.parent / str(load(HandEyeFile, head).samples)).parent
 
 
-def _programs(rows: model.GraspPrograms) -> list[tuple[str, list[tuple[str, str]]]]:
-    """Of each object its programs: the file's name, and the data address of its text."""
+def _programs(rows: model.GraspPrograms, head: Sequence[str]) -> list[tuple[str, list[tuple[str, str]]]]:
+    """Of each object its programs: the file's name, and the data address of its text, which begins with ``head``."""
     found: dict[str, list[tuple[str, str]]] = {}
     for target, file, text in zip(rows.target.tolist(), rows.file.tolist(), rows.text.tolist()):
-        found.setdefault(target, []).append((file, text_address(text)))
+        found.setdefault(target, []).append((file, text_address(with_head_lines(text, head))))
     return list(found.items())
 
 
