@@ -274,6 +274,8 @@ def contacts_of(robot, scene) -> Contacts:
                 solids.append(("sphere", (solid.radius,), solid.T))
             case Plane():
                 solids.append(("plane", (solid.normal, solid.offset), None))
+            case _:
+                raise TypeError(f"{solid.name}: the dense check has no distance to a {type(solid).__name__}")
     met = {(row.first, row.second) for row in collision_matrix(robot).rows if row.state == "meets"}
     named = ["base" if capsule.link == 0 else f"link_{capsule.link}" for capsule in arm_shapes(robot).capsules]
     pairs = [(i, j) for i, first in enumerate(named) for j, second in enumerate(named) if (first, second) in met]

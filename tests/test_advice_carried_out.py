@@ -109,7 +109,12 @@ ON_PAGES = {  # texts without a key that are none of the remedies above: the fir
         "Evidence contradicts this table",
         "Run no path or program on the arm",
     ),  # that forbid something
-    *("Part of this D-H table", "This D-H table was", "Run it on the arm only when"),  # likewise
+    *(
+        "Part of this D-H table",
+        "No entry of this D-H table",
+        "This D-H table was",
+        "Run it on the arm only when",
+    ),  # likewise
     "Stop: neither table is the arm",  # likewise
     *("To have all pages", "Its table has not been examined", "These pass without the tray"),  # runs of er3a
     "Compare the limits with the manual",  # of what a target says itself, see turn_tool and shift_tool

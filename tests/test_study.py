@@ -12,7 +12,10 @@ import yaml
 from er3a.errors import InputError
 from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.kinematics.forward import forward
+from er3a.pipeline.settings import TrajectorySettings
+from er3a.pipeline.stages.trajectory.motion import near_singular
 from er3a.pipeline.study import STAGES, RobotEntry, Study, load_study
+from er3a.program_check.check_program import CheckOptions
 from testing.arms import placement
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -192,3 +195,16 @@ def test_the_numbers_of_a_stage_depend_on_its_own_settings(study, study_with, se
             stage for stage in of_robot if study.computed_from(robot, stage) != other.computed_from(robot, stage)
         }
         assert differing == stages & set(of_robot)
+
+
+def test_checks_without_a_study_have_the_thresholds_of_the_studies():
+    """Near-singular and the margin of assumed shapes: of the library, of all studies here, and of the notebook."""
+    usual = CheckOptions()
+    assert (np.degrees(usual.near.wrist_rad), np.degrees(usual.near.elbow_rad)) == pytest.approx((5, 5))
+    assert (usual.near.shoulder_m, usual.assumed_margin) == (0.03, 0.02)
+    for file in (ROOT / "config").glob("*.yaml"):
+        settings = load_study(file).section(TrajectorySettings)
+        assert near_singular(settings) == usual.near, file
+        assert settings.assumed_margin_mm == 1000 * usual.assumed_margin, file
+    stated = "NearSingular(wrist_rad=np.radians(5), elbow_rad=np.radians(5), shoulder_m=0.03)"
+    assert stated in (ROOT / "docs" / "notebooks" / "is_the_path_safe.md").read_text(encoding="utf-8")

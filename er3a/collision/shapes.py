@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import assert_never
 
 import numpy as np
 from scipy.spatial import ConvexHull
@@ -161,6 +162,17 @@ def default_envelopes(robot: Robot) -> tuple[Envelope, ...]:
     return tuple(found)
 
 
+def enlarged_by(robot: Robot, scene: Scene | None, names: Sequence[str]) -> float:
+    """By how much (m) shapes of links, and of solids, are at most larger than the meshes that they hold, together.
+
+    An overlap by less is no contact for sure.
+    """
+    margins = [(link_label(piece.link), piece.margin) for piece in arm_shapes(robot).pieces]
+    solids = (*scene.solids, *scene.carried) if scene else ()
+    margins += [(solid.name, solid.margin) for solid in solids if isinstance(solid, Mesh)]
+    return sum(max((margin for owner, margin in margins if owner == name), default=0.0) for name in names)
+
+
 def link_frames(robot: Robot, q: Reals) -> Reals:
     """Frames (..., m + 1, 4, 4) of the base and the links at joint values (..., n)."""
     T = frames(robot, q)
@@ -243,6 +255,8 @@ def solid_bodies(solid: Solid) -> tuple[Body, ...]:
             points, radius, kind, disc = np.array([[0, 0, -half], [0, 0, half]]), 0.0, CYLINDER, solid.radius
         case Sphere():
             points, radius, kind, disc = np.zeros((1, 3)), solid.radius, HULL, 0.0
+        case _:
+            assert_never(solid)
     return (Body(solid.name, WORLD, points @ solid.T[:3, :3].T + solid.T[:3, 3], radius, kind, disc),)
 
 

@@ -548,9 +548,10 @@ def _negated_lengths(
         if abs(getattr(robot, column)[k]) > tolerances.length and not (column == "d" and robot.sliding[k])
     ]
     for column, k in entries:
-        values = np.array(getattr(robot, column))
-        values[k] = -values[k]
-        if mechanism.joints_agree(mechanism.mechanism_of(robot, **{column: values}), b, tolerances, ends):
+        a, d = np.array(robot.a), np.array(robot.d)
+        changed = a if column == "a" else d
+        changed[k] = -changed[k]
+        if mechanism.joints_agree(mechanism.mechanism_of(robot, a=a, d=d), b, tolerances, ends):
             yield Cause("one_length_negated", "a", (f"{column}{k + 1}",))
 
 

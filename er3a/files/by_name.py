@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -25,7 +24,7 @@ from er3a.diagnosis.diagnose import Hypotheses
 from er3a.errors import ArgumentError, InputError
 from er3a.files.csv_file import CsvColumn, read_csv, read_header
 from er3a.files.reference_sets import check_robot_origins, load_references
-from er3a.files.units import MIN_SPAN_MM, WIDEST_IN_RADIANS
+from er3a.files.units import JOINT_COLUMN, MIN_SPAN_MM, WIDEST_IN_RADIANS
 from er3a.identifiability.entry_evidence import Evidence, Tolerance
 from er3a.identifiability.evidence import evidence_of
 from er3a.numerics.arrays import Reals
@@ -37,7 +36,6 @@ from er3a.robots.robot import MAX_JOINTS, Robot, Source
 _NUMBER = CsvColumn(float)
 SAME = 1e-9  # m, rad, kg
 WRITE_CALIBRATION = "Write one: er3a calibrate ROBOT MEASUREMENTS.csv --json > FILE.json"
-JOINT_COLUMN = re.compile(r"q([1-9]\d?)_(deg|mm)")
 
 
 def measurement_columns(units: Sequence[str]) -> dict[str, CsvColumn]:

@@ -13,6 +13,7 @@ Rotation vectors (axis times angle, in rad) are used by OpenCV and by the pendan
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import takewhile
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -27,12 +28,13 @@ from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn, read_csv, read_header
 from er3a.files.robot_file import Text
 from er3a.files.target_file import FORMS as TARGET_FORMS
-from er3a.files.units import METRES_BELOW_MM, WIDEST_IN_RADIANS
+from er3a.files.units import JOINT_COLUMN, METRES_BELOW_MM, WIDEST_IN_RADIANS
 from er3a.files.yaml_file import StrictModel, load
 from er3a.geometry.transforms import exp_rotation, posed, transform
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import in_si
+from er3a.robots.joint_limits import joint_columns, meant
 from er3a.robots.robot import Robot
 from er3a.vision.boards import Board, BoardlessImage, BoardNotFoundError, BoardViews, Camera, board_views
 from er3a.vision.calibration_set import CalibrationSet, Stream, TimeOffset, paired, time_offset
@@ -344,8 +346,7 @@ def sample_rows(table: Path) -> tuple[list[dict[str, Any]], list[str]]:
             columns[name] = CsvColumn(str, optional=name == "name")
     if "t_s" in header:
         columns["t_s"] = CsvColumn(digits=EPOCH_DIGITS, quantity="time in s")
-    joints = sum(1 for name in header if name.startswith("q") and name.endswith("_deg") and name[1:-4].isdigit())
-    columns |= {f"q{joint + 1}_deg": CsvColumn() for joint in range(joints)}
+    columns |= {name: CsvColumn() for name in _joint_columns(header)}
     for stream in ("flange", "target"):
         if form := pose_form(table, header, stream):
             columns |= {f"{stream}_{name}": CsvColumn() for name in (*POSITION, *FORMS[form])}
@@ -359,6 +360,12 @@ def sample_rows(table: Path) -> tuple[list[dict[str, Any]], list[str]]:
     return rows, header
 
 
+def _joint_columns(header: list[str]) -> list[str]:
+    """The columns of joint values, of as many joints as a header numbers without a gap, those that slide in mm."""
+    named = {int(found[1]): name for name in header if (found := JOINT_COLUMN.fullmatch(name))}
+    return list(takewhile(bool, (named.get(joint + 1, "") for joint in range(len(named)))))
+
+
 def _form(table: Path, header: list[str], stream: str) -> str:
     form = pose_form(table, header, stream)
     if form is None:
@@ -370,23 +377,29 @@ def _form(table: Path, header: list[str], stream: str) -> str:
 def _flange(
     table: Path, rows: list[dict[str, Any]], header: list[str], robot: Robot | None
 ) -> tuple[Reals, Reals | None]:
-    """T_base_flange (N, 4, 4), from joint angles by the robot's table where they are given."""
-    if "q1_deg" not in header:
+    """T_base_flange (N, 4, 4), from joint values by the robot's table where they are given."""
+    given = _joint_columns(header)
+    if not given:
         return poses_of(table, rows, "flange", _form(table, header, "flange")), None
     if pose_form(table, header, "flange"):
         raise InputError(table, "header", "joint angles and flange poses both say where the arm was", "Keep one")
     if robot is None:
         raise InputError(table, "columns q1_deg ...", "joint angles need a robot's table", "Name the robot")
-    joints = sum(1 for name in header if name[:1] == "q" and name[1:-4].isdigit())
-    if joints != len(robot.lower):
-        problem = f"{joints} joint angles, and the robot {robot.name} has {len(robot.lower)} joints"
+    if len(given) != robot.joints:
+        problem = f"{len(given)} joint angles, and the robot {robot.name} has {robot.joints} joints"
         raise InputError(table, "columns q1_deg ...", problem, "Give one column for each joint")
-    q = np.array([[row[f"q{joint + 1}_deg"] for joint in range(joints)] for row in rows], dtype=float)
-    widest = float(np.abs(q).max())
+    wanted = joint_columns(robot)
+    if wrong := [name for name, right in zip(given, wanted, strict=True) if name != right]:
+        kind = "slides" if wrong[0].endswith("_deg") else "turns"
+        problem = f"joint {wrong[0][1:].partition('_')[0]} of {robot.name} {kind}"
+        raise InputError(table, f"column {wrong[0]}", problem, f"Give {', '.join(wanted)}")
+    values = np.array([[row[name] for name in given] for row in rows], dtype=float)
+    widest = float(np.abs(values[:, ~robot.slides]).max(initial=0.0))
     if len(rows) >= ROWS_TO_JUDGE_UNITS and 0 < widest <= WIDEST_IN_RADIANS:
         problem = f"the widest angle is {widest:g} deg, which can only be radians"
-        raise InputError(table, f"columns q1_deg to q{joints}_deg", problem, "Convert to degrees")
-    return forward(robot.without_tool(), np.radians(q)), np.radians(q)
+        raise InputError(table, f"columns {given[0]} to {given[-1]}", problem, "Convert to degrees")
+    q = meant(robot, values)
+    return forward(robot.without_tool(), q), q
 
 
 def _stream(table: Path, name: str, robot: Robot | None) -> Stream:

@@ -30,7 +30,16 @@ from er3a.files.csv_file import CsvColumn, read_csv, read_header
 from er3a.files.kept_files import given_file
 from er3a.files.robot_file import Name, Text
 from er3a.files.target_file import FORMS, KNOWN_FORMS, POSITION, Orientation
-from er3a.files.units import JointsDeg, PositionMm, Triple, check_degrees, check_millimetres, joint_rates, joint_values
+from er3a.files.units import (
+    JOINT_COLUMN,
+    JointsDeg,
+    PositionMm,
+    Triple,
+    check_degrees,
+    check_millimetres,
+    joint_rates,
+    joint_values,
+)
 from er3a.files.yaml_file import StrictModel, check_own_names, load, read_yaml
 from er3a.geometry.transforms import ORTHONORMAL_TOLERANCE, transform
 from er3a.kinematics.classes.class_solvers import BranchLabel
@@ -41,7 +50,6 @@ from er3a.planning.profiles import Times
 from er3a.robots.joint_limits import joint_columns
 from er3a.robots.robot import MAX_JOINTS, Robot
 
-JOINT_COLUMN = re.compile(r"q([1-9]\d?)_(deg|mm)")
 UNIT_LENGTH_TOLERANCE = 1e-6
 LONGEST_S = 3600.0
 MAX_ROWS = 200_000

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import math
 from collections.abc import Collection, Sequence
+from dataclasses import fields
 from pathlib import PurePosixPath
 from typing import Annotated, Literal
 
@@ -213,6 +214,11 @@ TURNING = ("armature_kg_m2", "coulomb_n_m", "viscous_n_m_s_rad", "rated_n_m", "p
 SLIDING = ("armature_kg", "coulomb_n", "viscous_n_s_m", "rated_n", "peak_n")
 
 
+def drive_field(key: str) -> str:
+    """The field of :class:`er3a.robots.masses.Drives` that a key of a drive's row gives: the key without its unit."""
+    return next(field.name for field in fields(Drives) if key.startswith(field.name))
+
+
 def check_masses(
     inertia: Inertia | None, drives: DriveGroup | None, wrist: WristLoadGroup | None, slides: Sequence[bool]
 ) -> None:
@@ -281,14 +287,12 @@ def _at_zero(robot: Robot, links: np.ndarray) -> np.ndarray:
 
 
 def _drives(robot: Robot, group: DriveGroup) -> Drives:
-    columns = {key: np.full(robot.joints, np.nan) for key in ("armature", "coulomb", "viscous", "rated", "peak")}
-    ratio = np.full(robot.joints, np.nan)
+    columns = {field.name: np.full(robot.joints, np.nan) for field in fields(Drives)}
     for row in group.rows:
-        for column, turning, sliding in zip(columns.values(), TURNING, SLIDING):
-            own = getattr(row, sliding if robot.slides[row.joint - 1] else turning)
-            column[row.joint - 1] = np.nan if own is None else own
-        ratio[row.joint - 1] = np.nan if row.gear_ratio is None else row.gear_ratio
-    return Drives(gear_ratio=ratio, **columns)
+        for key in (*(SLIDING if robot.slides[row.joint - 1] else TURNING), "gear_ratio"):
+            own = getattr(row, key)
+            columns[drive_field(key)][row.joint - 1] = np.nan if own is None else own
+    return Drives(**columns)
 
 
 def _wrist(group: WristLoadGroup) -> WristLoad:

@@ -20,6 +20,7 @@ from er3a.files.robot_file import (
     TURNING,
     BodyFields,
     RobotFile,
+    drive_field,
     link_visual,
 )
 from er3a.files.robot_library import VALUES_OF_ROW
@@ -61,8 +62,8 @@ def _link(link: int, body: MassBody) -> dict[str, Any]:
 def _drive(robot: Robot, k: int) -> dict[str, float]:
     drives = robot.masses.drives
     assert drives is not None
-    columns = (drives.armature, drives.coulomb, drives.viscous, drives.rated, drives.peak)
-    named = dict(zip(SLIDING if robot.slides[k] else TURNING, columns)) | {"gear_ratio": drives.gear_ratio}
+    keys = SLIDING if robot.slides[k] else TURNING
+    named = {key: getattr(drives, drive_field(key)) for key in (*keys, "gear_ratio")}
     return {key: float(column[k]) for key, column in named.items() if np.isfinite(column[k])}
 
 

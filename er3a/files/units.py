@@ -7,6 +7,7 @@ below 2 pi are always legal as degrees; several that look like radians give only
 from __future__ import annotations
 
 import math
+import re
 import warnings
 from collections.abc import Sequence
 from typing import Annotated
@@ -19,6 +20,7 @@ from er3a.numerics.arrays import Reals
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import MAX_JOINTS, Robot
 
+JOINT_COLUMN = re.compile(r"q([1-9]\d?)_(deg|mm)")
 METRES_BELOW_MM = 5.0
 MAX_DISTANCE_MM = 100_000.0
 RADIANS_BELOW_DEG = 6.3

@@ -141,7 +141,7 @@ class VisionFile(StrictModel):
     """data/vision/NAME.yaml. ``calibration``: a calibration set beside it.
 
     ``home_deg``: joint position before the grasp; ``picture_deg``: joint position in which a camera on the flange saw
-    the objects.
+    the objects (mm of prismatic joints).
     """
 
     kind: Literal["vision"]

@@ -24,7 +24,7 @@ import xml.etree.ElementTree as ElementTree
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
@@ -51,6 +51,7 @@ ARM_JOINTS = 4  # so many joints before a branching make what follows a hand rat
 FINGER_JOINTS = 4
 GRIPPER = re.compile("gripper|finger|jaw", re.IGNORECASE)
 SHOWN = 12
+CONTROLLER_BASE = "base"
 EXPAND = "Expand it first: xacro FILE > arm.urdf"
 DEFINITIONS = ("property", "arg")  # of xacro
 PREFIXED = re.compile(r"(</?[\w.-]+):([\w.-]+)")
@@ -181,6 +182,19 @@ class Tree:
                 found.append(self._tail(link))
         return found
 
+    def back_from(self, link: str) -> list[UrdfJoint]:
+        """Fixed joints, reversed, from a frame beside an arm to the link from which the arm goes on.
+
+        Empty for links that the arm is at or after.
+        """
+        found: list[UrdfJoint] = []
+        while not self.onward(link)[1] and link in self.by_child and not self.by_child[link].moves:
+            joint = self.by_child[link]
+            back = np.asarray(np.linalg.inv(joint.T_parent_joint), np.float64)
+            found.append(replace(joint, parent=joint.child, child=joint.parent, T_parent_joint=back))
+            link = joint.parent
+        return found if self.onward(link)[1] else []
+
     def _tail(self, link: str) -> str:
         """The end of the fixed joints after a link, or the link itself where they branch."""
         while len(onward := self.by_parent.get(link, [])) == 1 and not onward[0].moves:
@@ -203,6 +217,11 @@ def read_chain(path: Path, base: str | None, tip: str | None, snap: bool) -> Urd
     for named, link in (("--base", base), ("--tip", tip)):
         if link is not None and link not in tree.links:
             raise InputError(path, named, f"there is no link '{link}'", f"Links: {_some(sorted(tree.links))}")
+    back = tree.back_from(base) if base is not None else []
+    if back and (tip is None or base not in [joint.child for joint in tree.up_from(tip)]):
+        base = back[-1].child
+    else:
+        back = []
     if tip is not None:
         joints = tree.up_from(tip)
         above = [joints[0].parent, *(joint.child for joint in joints)] if joints else [tip]
@@ -212,6 +231,9 @@ def read_chain(path: Path, base: str | None, tip: str | None, snap: bool) -> Urd
         joints = joints[first:]
     else:
         joints = _downwards(tree, base or _root(tree), notes)
+    joints = [*back, *joints]
+    if joints and not back:
+        notes += _controller_base(tree, joints[0].parent)
     for joint in joints:
         if joint.moves and joint.type not in MOVING:
             remedy = f"Write {', '.join(MOVING)} or fixed"
@@ -225,6 +247,23 @@ def read_chain(path: Path, base: str | None, tip: str | None, snap: bool) -> Urd
             raise InputError(path, f"joint {joint.name}, xyz", problem, remedy)
     taken = [note for joint in joints for note in joint.notes]
     return UrdfChain(tuple(joints), tree.by_name, (*taken, *notes))
+
+
+def _controller_base(tree: Tree, base: str) -> Iterator[str]:
+    """A note on the link in which the controller gives poses, if it stands otherwise than the link that was taken.
+
+    ROS-Industrial calls it ``base``; Universal Robots' is turned by half a turn against ``base_link``.
+    """
+    joint = tree.by_child.get(CONTROLLER_BASE)
+    if joint is None or joint.moves or joint.parent != base or np.allclose(joint.T_parent_joint, np.eye(4)):
+        return
+    x, y, z = (1000 * joint.T_parent_joint[:3, 3]).tolist()
+    roll, pitch, yaw = np.degrees(rpy_of(joint.T_parent_joint)).tolist()
+    yield (
+        f"the robot's base is the link {base}; poses of the controller may refer to the link {CONTROLLER_BASE}, which "
+        f"stands at ({x:g}, {y:g}, {z:g}) mm, roll {roll:g}, pitch {pitch:g}, yaw {yaw:g} deg in it: for the "
+        f"controller's programs give --base {CONTROLLER_BASE}"
+    )
 
 
 def tree_of(path: Path, snap: bool) -> Tree:

@@ -92,7 +92,8 @@ TURN = 2 * np.pi
 def max_joint_move(q: Reals, q_ref: Reals) -> Reals:
     """The largest turn (...,), rad, of a joint from joint angles ``q_ref`` to ``q`` (..., 6).
 
-    By this the arm's next joint angles are *near* wherever solutions are ranked or ordered.
+    By this joint angles are one solution, and turns of a branch stand in order. Solutions are ranked by
+    :func:`er3a.robots.joint_limits.comparable`.
     """
     move: Reals = np.abs(q - q_ref).max(axis=-1, initial=0.0)
     return move

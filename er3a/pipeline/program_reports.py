@@ -20,7 +20,7 @@ import numpy as np
 
 from er3a.collision.along import bodies_of
 from er3a.collision.bodies import Bodies
-from er3a.collision.pairs import ASSUMED_MARGIN, PENETRATION_TOLERANCE
+from er3a.collision.pairs import PENETRATION_TOLERANCE
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import shapes_assumed
 from er3a.errors import InputError
@@ -175,7 +175,7 @@ def cycle_line(checked: CheckedFile) -> str:
 
 def shapes_line(robot: Robot) -> str:
     """On what shapes of the arm collisions rest; empty where a document gives them."""
-    found = shapes_assumed(robot, ASSUMED_MARGIN, {})
+    found = shapes_assumed(robot, CheckOptions.assumed_margin, {})
     return "" if found is None else say(found)
 
 
@@ -435,7 +435,7 @@ def programs_of(
         if (verdict != "safe" and not unsafe) or not np.isfinite(each.motion.q[0]).all():
             yield PathProgram(each.name, verdict, None)
             continue
-        near = near_assumed_shapes(robot, each.name, min_clearance(along), ASSUMED_MARGIN)
+        near = near_assumed_shapes(robot, each.name, min_clearance(along), CheckOptions.assumed_margin)
         files, findings = written(robot, each.motion, verdict, language, near, task.limits.speed)
         name = program_name(each.name, LONGEST_NAME)
         yield PathProgram(

@@ -46,6 +46,7 @@ SUMMARY = "summary.json"
 CHECKSUMS = "SHA256SUMS"
 
 Status = Literal["pass", "caution", "fail", "no_reference", "not_computed"]
+Foundation = Literal[Status, "unsettled"]  # a caution about a table of which independent documents settle no entry
 FindingT = TypeVar("FindingT", bound=Finding)
 
 
@@ -302,7 +303,7 @@ class Stored(ByValue, Generic[ResultsT]):
 
     Attributes
     ----------
-    rests_on : statuses of the stages without which they mean little, as far as those were computed
+    rests_on : what the stages without which they mean little found, as far as those were computed
     folder : that they were read from
     """
 
@@ -310,7 +311,7 @@ class Stored(ByValue, Generic[ResultsT]):
     stage: str
     provenance: Provenance
     results: ResultsT
-    rests_on: Mapping[str, Status] = field(default_factory=dict)
+    rests_on: Mapping[str, Foundation] = field(default_factory=dict)
     folder: Path | None = None
 
     @property
@@ -367,8 +368,8 @@ def read_stage(folder: Path, stage: Stage) -> Stored[Any]:
         naming the file that is missing, damaged or of another format version
     """
     record = _record(folder)
-    rests_on: dict[str, Status] = {
-        name: read_status(folder.parent / name) for name in stage.rests_on if is_computed(folder.parent / name)
+    rests_on: dict[str, Foundation] = {
+        name: read_foundation(folder.parent / name) for name in stage.rests_on if is_computed(folder.parent / name)
     }
     if record["verdict"]["status"] == "not_computed":
         absent = AbsentResults(Summary(Verdict("not_computed", _reason_of_absence(record["verdict"], stage)), ()))
@@ -432,6 +433,16 @@ def _record(folder: Path) -> dict[str, Any]:
 def read_status(folder: Path) -> Status:
     """The status of a stage's verdict; :class:`ResultError` as :func:`read_stage`."""
     return _status(folder, _record(folder))
+
+
+def read_foundation(folder: Path) -> Foundation:
+    """What the validation stage's verdict is for the stages that rest on it; :class:`ResultError` as
+    :func:`read_stage`."""
+    record = _record(folder)
+    parts = record["verdict"].get("params", {}).get("parts", ())
+    unsettled = parts and not any(part["settled"] or part["up_to_signs"] for part in parts)
+    status = _status(folder, record)
+    return "unsettled" if status == "caution" and unsettled else status
 
 
 def _status(folder: Path, record: dict[str, Any]) -> Status:

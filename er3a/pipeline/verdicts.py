@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Literal
 
 from er3a.pipeline.messages import language
-from er3a.pipeline.messages.left_out import left_out_names, left_out_text
-from er3a.pipeline.messages.say import bracketed, say_all, sentence
+from er3a.pipeline.messages.left_out import left_out_names, left_out_text, say_reserved
+from er3a.pipeline.messages.say import bracketed, joined, say_all, sentence
 from er3a.pipeline.results import NotComputed, Status, is_computed, read_status, read_verdict
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
@@ -102,5 +102,6 @@ def _stage_verdict(results: Path, robot: str, name: str, expected: str | None) -
     verdict, left_out = read_verdict(folder, stage)
     shown = len(getattr(verdict.finding, "demonstrations", ()))
     missed = tuple(bracketed(left_out_text(each), left_out_names(each)) for each in left_out)
-    text = say_all(verdict.findings)
+    first, *others = verdict.findings
+    text = joined([say_reserved(first, left_out), say_all(others)], " ")
     return StageVerdict(robot, name, verdict.status, verdict.finding.code, text, shown, expected, missed)

@@ -32,11 +32,20 @@ from er3a.program_check import program_check_findings as found_in
 from er3a.program_check.motion_checks import RAMP_OF_A_DURATION, AssumedRates, CheckRules, MotionPath
 from er3a.program_check.step_checks import CheckedMotion, StepChecker, obstacles_of
 from er3a.programs.execution import Ending, Execution, KeepOn, RunLimits
-from er3a.programs.instructions import ArmMotion, Decision, MovesBeside, Pause, Place, PoseTarget, Unknown
+from er3a.programs.instructions import (
+    ArmMotion,
+    Decision,
+    Load,
+    MovesBeside,
+    Pause,
+    Place,
+    PoseTarget,
+    UnclearLoad,
+    Unknown,
+)
 from er3a.programs.machine import execute
 from er3a.programs.program_findings import NotSimulated, NotUnderstood
 from er3a.programs.syntax import Fixed, Move, Program
-from er3a.robots.masses import MassBody
 from er3a.robots.robot import Robot
 
 ASSUMED_SPEED, ASSUMED_SLIDE = np.radians(180.0), 0.5  # rad/s and m/s
@@ -320,10 +329,10 @@ def _loads(execution: Execution, robot: Robot) -> Iterator[LocatedFinding]:
             continue
         seen.add(load)
         found: found_in.CheckFinding
-        if isinstance(load, str):
-            found = found_in.LoadNotExamined(None, load)
-        elif wrist is not None and load.mass > wrist.payload:
+        if wrist is not None and load.mass is not None and load.mass > wrist.payload:
             found = found_in.LoadAbovePayload(load.mass, wrist.payload)
+        elif isinstance(load, UnclearLoad):
+            found = found_in.LoadNotExamined(load.mass, load.text)
         else:
             found = found_in.LoadNotExamined(load.mass)
         yield LocatedFinding(found_in.level_of(found), found, step.place, step.calls)
@@ -471,7 +480,7 @@ class ProgramPart:
     kind: Literal["joint_sequence", "sequence"]
     lines: tuple[int, int]
     made: Command
-    load: MassBody | str | None = None
+    load: Load | None = None
 
     def command(self, source: CommandSource) -> Command:
         """The path, with what errors call it."""

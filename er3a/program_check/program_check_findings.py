@@ -180,7 +180,8 @@ class ConfigurationGuessed(Finding):
 class BodiesTouch(Finding):
     """Two bodies that overlap on the way, from a time (s) of the motion on, and a place of a line; how deep at most.
 
-    ``at_target``: whether they overlap at the motion's end.
+    ``at_target``: whether they overlap at the motion's end. ``enlarged_mm``: by how much their shapes are larger than
+    the meshes in them; an overlap by less is no contact for sure.
     """
 
     pair: Pair
@@ -188,6 +189,12 @@ class BodiesTouch(Finding):
     at_mm: float | None
     depth_mm: float
     at_target: bool = False
+    enlarged_mm: float = 0.0
+
+    @property
+    def is_certain(self) -> bool:
+        """Whether the bodies overlap by more than their shapes are too large."""
+        return self.depth_mm > self.enlarged_mm
 
 
 class MotionCollides(Finding):
@@ -272,6 +279,12 @@ class SpeedNotGiven(Finding):
     assumed: float
     unit: Literal["m/s", "share"]
     word: str = ""
+
+
+class AccelerationNotKnown(Finding):
+    """The program gives the acceleration by ``word``, whose value is not known; one was assumed."""
+
+    word: str
 
 
 class MayMove(Finding):
@@ -390,6 +403,7 @@ CheckFinding = (
     | ExternalAxesLeftOut
     | LineNotChecked
     | SpeedNotGiven
+    | AccelerationNotKnown
     | MayMove
     | MovesBesideProgram
     | NeverReached
@@ -436,7 +450,11 @@ def level_of(finding: CheckFinding) -> Level:
         return "caution" if finding.turns or finding.angle_deg is None else "note"
     if isinstance(finding, FrameNotGiven):
         return "fail" if finding.needed else "caution"
+    if isinstance(finding, MotionCollides):
+        return "fail" if any(touch.is_certain for touch in finding.touches) else "caution"
     if isinstance(finding, SpeedNotGiven) and finding.word:
+        return "caution"
+    if isinstance(finding, LoadNotExamined) and finding.mass_kg is None:
         return "caution"
     return "fail" if finding.code in FAILS else "note" if finding.code in NOTES else "caution"
 

@@ -30,7 +30,7 @@ from __future__ import annotations
 import heapq
 import math
 from collections import defaultdict
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -42,7 +42,7 @@ from er3a.collision.along import ClearanceAlong, clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import Pair
 from er3a.collision.scene import Scene
-from er3a.collision.shapes import arm_shapes, link_frames
+from er3a.collision.shapes import arm_shapes, enlarged_by, link_frames
 from er3a.errors import PoseError
 from er3a.geometry.vectors import TURN
 from er3a.kinematics.batch import inverse_batch
@@ -562,6 +562,12 @@ class Obstacles:
             self.bodies[id(arm)] = Bodies(arm, self.scene)
         return self.bodies[id(arm)]
 
+    def hit(self, arm: Robot, touches: Iterable[found_in.BodiesTouch]) -> found_in.MotionCollides:
+        """A collision, with what is known of the shapes that overlap."""
+        return found_in.MotionCollides(
+            tuple(replace(each, enlarged_mm=1000 * enlarged_by(arm, self.scene, each.pair.names)) for each in touches)
+        )
+
 
 def obstacles_of(robot: Robot, scene: Scene | None, tolerance: float, assumed_margin: float) -> Obstacles:
     """What a robot must not meet, itself among it; ``assumed_margin`` holds if its shapes are assumed."""
@@ -619,7 +625,7 @@ class StepChecker:
         before = self._before[step.before] if step.before >= 0 else -1
         what = step.instruction
         if isinstance(what, instructions.ArmMotion):
-            self.motions[number] = motion = self._motion(what, joints)
+            self.motions[number] = motion = self._from_start(self._motion(what, joints), joints)
             joints = motion.end
             self._corner(before, number)
             before = number
@@ -631,6 +637,14 @@ class StepChecker:
             joints, before = None, -1
         self._joints.append(joints)
         self._before.append(before)
+
+    def _from_start(self, motion: CheckedMotion, joints: Reals | None) -> CheckedMotion:
+        """The first motion, with limits that the arm stands beyond before it: no target before says so."""
+        if joints is None or joints is not self.start:
+            return motion
+        beyond = [each for each in limit_findings(motion.placed.arm, joints) if each not in motion.findings]
+        moments: dict[found_in.CheckFinding, float] = {**motion.moments, **{each: 0.0 for each in beyond}}
+        return replace(motion, findings=(*motion.findings, *beyond), moments=moments)
 
     @property
     def different(self) -> int:
@@ -743,6 +757,9 @@ class StepChecker:
                 if motion.kind == "joint"
                 else found_in.SpeedNotGiven(assumed.tool_speed, "m/s", word)
             )
+        timed = motion.speed is not None and motion.speed.unit == "s"
+        if motion.acceleration is not None and motion.acceleration.value == 0 and not timed:
+            findings.append(found_in.AccelerationNotKnown(motion.acceleration.text))
         if before is None:
             findings.append(found_in.PathNotKnown())
             findings += () if goal.joints is None else limit_findings(placed.arm, goal.joints)
@@ -759,7 +776,9 @@ class StepChecker:
             return CheckedMotion("joint", placed, before, None, None, tuple(findings))
         way = joint_motion_path(placed.arm, placed.motion, before, goal.joints, self.rules)
         if way is None:
-            return CheckedMotion("joint", placed, before, None, goal.joints, tuple(findings), stays=True)
+            return self._standing(
+                CheckedMotion("joint", placed, before, None, goal.joints, tuple(findings), stays=True)
+            )
         found = (*findings, *way.findings)
         beyond = np.maximum(goal.joints - placed.arm.upper, placed.arm.lower - goal.joints).max()
         if beyond > TURN:  # no arm gets there, and nothing goes on from there
@@ -789,7 +808,7 @@ class StepChecker:
             given = None
         way = tool_motion_path(placed.arm, placed.motion, before, (end, given, via), self.rules)
         if way is None:
-            return CheckedMotion(kind, placed, before, None, before, tuple(findings), stays=True)
+            return self._standing(CheckedMotion(kind, placed, before, None, before, tuple(findings), stays=True))
         if not isinstance(way, MotionPath):
             return CheckedMotion(kind, placed, before, None, goal.joints, (*findings, way))
         if any(isinstance(each, found_in.StretchOutOfReach) for each in way.findings):
@@ -831,9 +850,29 @@ class StepChecker:
                 touch.pair, found_in.BodiesTouch(touch.pair, touch.start, at, 0.0, touch.pair in at_target)
             )
             touches[touch.pair] = replace(first, depth_mm=max(first.depth_mm, touch.depth * 1000))
-        hit = found_in.MotionCollides(tuple(touches.values()))
+        hit = self.obstacles.hit(way.arm, touches.values())
         moments = {**motion.moments, hit: along.contacts[0].start}
         return replace(motion, findings=(*motion.findings, hit), clearance=clearance, moments=moments)
+
+    def _standing(self, motion: CheckedMotion) -> CheckedMotion:
+        """A motion that leaves the arm where it is, with the limits it is beyond and what it touches there."""
+        q, arm = motion.start, motion.placed.arm
+        assert q is not None
+        found: list[found_in.CheckFinding] = [each for each in limit_findings(arm, q) if each not in motion.findings]
+        clearance = None
+        if self.obstacles is not None:
+            bodies, margin = self.obstacles.of(arm), self.obstacles.assumed_margin
+            distances = bodies.counted(bodies.distances(bodies.ends(q), np.arange(len(bodies.pairs))))
+            nearest = int(distances.argmin()) if len(distances) else -1
+            clearance = float(distances[nearest]) if nearest >= 0 and np.isfinite(distances[nearest]) else None
+            touching = np.flatnonzero(distances < 0)
+            touches = [found_in.BodiesTouch(bodies.pairs[k], 0.0, None, -1000 * distances[k], True) for k in touching]
+            if touches:
+                found.append(self.obstacles.hit(arm, touches))
+            elif clearance is not None and clearance < margin:
+                found.append(found_in.ClearOfAssumed(bodies.pairs[nearest], 1000 * clearance, 1000 * margin))
+        moments = {**motion.moments, **dict.fromkeys(found, 0.0)}
+        return replace(motion, findings=(*motion.findings, *found), clearance=clearance, moments=moments)
 
     def _clear(self, motion: CheckedMotion, along: ClearanceAlong) -> CheckedMotion:
         """A collision-free motion, with a finding where it comes near assumed shapes."""

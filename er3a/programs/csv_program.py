@@ -3,8 +3,8 @@
 Columns, in this order: ``t_s`` (from 0, rising); ``q1_deg``, ``q2_deg`` ..., the joints
 (``q3_mm`` of one that slides); ``x_mm, y_mm, z_mm`` and
 ``roll_deg, pitch_deg, yaw_deg``, the tool in the base frame with R = Rz(yaw) Ry(pitch) Rx(roll). The poses follow from
-the joints and are for the reader; ``t_s`` may be left out, and other columns are passed over. Lines that begin with
-``#`` are comments.
+the joints and are for the reader; ``t_s`` may be left out, and other columns are named as not understood. Lines
+that begin with ``#`` are comments.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from er3a.numerics.arrays import Reals
 from er3a.programs.code_builder import CodeBuilder
 from er3a.programs.instructions import ArmMotion, JointTarget, Place, Rate
 from er3a.programs.lexing import ProgramText
-from er3a.programs.program_findings import NothingMoves, ProgramFinding
+from er3a.programs.program_findings import NothingMoves, NotUnderstood, ProgramFinding
 from er3a.programs.program_language import Language
 from er3a.programs.rpl.dialect import RplDialect
 from er3a.programs.syntax import Fixed, Program
@@ -99,7 +99,9 @@ def read_csv_program(source: ProgramText) -> Program:
         given = np.array(values[: len(names)])
         target = JointTarget(np.where(slides, given / 1000, np.radians(given)))
         builder.add(Fixed(place, ArmMotion("joint", target, "row", speed=speed)))
-    findings: tuple[ProgramFinding, ...] = (*source.findings, *(() if table else (NothingMoves(),)))
+    other = [name for name in head if name not in (*names, TIME, *POSE_COLUMNS)]
+    unread = [NotUnderstood(f"the column {name[:40]}", Place(source.path, kept[0][0])) for name in other]
+    findings: tuple[ProgramFinding, ...] = (*source.findings, *unread, *(() if table else (NothingMoves(),)))
     routine = builder.routine(Place(source.path, len(source.lines)))
     return Program(
         *("csv", source.path.stem, source.path, {"MAIN": routine}, "MAIN"),

@@ -16,7 +16,6 @@ from er3a.planning.profiles import Times
 from er3a.planning.sequences import TURN_LENGTH
 from er3a.programs import instructions
 from er3a.programs.program_findings import HalfTurnsSplit, WriteFinding
-from er3a.robots.masses import MassBody
 from er3a.robots.robot import Robot
 
 TO_START = instructions.Rate(0.1, "share")
@@ -45,7 +44,7 @@ def listing_of(
     title: str = "",
     *,
     ends: Reals | None = None,
-    load: MassBody | str | None = None,
+    load: instructions.Load | None = None,
 ) -> PathListing:
     """A path's command as a sequence that begins with a joint motion to its start.
 
@@ -96,7 +95,7 @@ def listing_of(
 class _Making:
     """Puts the instructions of a path together."""
 
-    def __init__(self, robot: Robot, start: Reals, load: MassBody | str | None):
+    def __init__(self, robot: Robot, start: Reals, load: instructions.Load | None):
         self.tool, self.base, self.load = (
             instructions.NamedFrame("", robot.tool),
             instructions.NamedFrame("", np.eye(4)),

@@ -71,13 +71,25 @@ class Rate:
 
     Attributes
     ----------
-    value : in ``unit``; ``share`` is of the largest the arm can do (0..1), ``s`` is the motion's whole time
-    text : the word that was read, for speeds that are names
+    value : in ``unit``; ``share`` is of the largest the arm can do (0..1), ``s`` is the motion's whole time; 0 where
+        the program gives one whose value is not known
+    text : the word that was read, for speeds that are names and for values that are not known
     """
 
     value: float
     unit: RateUnit
     text: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class UnclearLoad:
+    """A load that a program names, by the text of it, without all its numbers; ``mass`` (kg) where that is known."""
+
+    text: str
+    mass: float | None = None
+
+
+Load = MassBody | UnclearLoad
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,8 +207,7 @@ class ArmMotion(ByValue):
     speed, acceleration : None where the program keeps the controller's values
     turn_speed : rad/s, at most, of the tool's turn on a line or arc; None if the program gives none: then turns count
         as lengths do
-    load : what hangs on the flange, in its frame; a text where the program names a load without all its numbers; None
-        where it says nothing
+    load : what hangs on the flange, in its frame; None where the program says nothing
     doubt : an instruction before that is not understood, and may have set another tool, base or path; empty if there is
         none, and for targets that are no poses
     """
@@ -213,7 +224,7 @@ class ArmMotion(ByValue):
     base: NamedFrame = field(default_factory=NamedFrame)
     spline_block: int | None = None
     turn_speed: float | None = None
-    load: MassBody | str | None = None
+    load: Load | None = None
     doubt: str = ""
 
 

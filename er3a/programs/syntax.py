@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Literal
 
 from er3a.by_value import ByValue
-from er3a.programs.instructions import Instruction, Place
+from er3a.programs.instructions import Instruction, Place, Rate, RateUnit
 from er3a.programs.program_findings import ProgramFinding
 
 POSE_KEYS = ("x", "y", "z", "rx", "ry", "rz")
@@ -113,6 +113,14 @@ def shown(value: Value) -> str:
             return f"{value:.6g}"
         case _:
             return str(value)
+
+
+def rate_of(value: Value | None, unit: RateUnit, per_unit: float = 1.0) -> Rate | None:
+    """The rate that a program gives by a value, of which ``per_unit`` make one unit; None without a value."""
+    plain = number(value)
+    if value is None or (plain is not None and plain > 0 and math.isfinite(plain)):
+        return None if plain is None else Rate(plain / per_unit, unit)
+    return Rate(0.0, unit, shown(value))
 
 
 START = "%start"

@@ -305,7 +305,7 @@ def _between(motion: instructions.ArmMotion, start: Reals) -> Reals:
 
 
 HEAD = "er3a: "
-AGAIN = "again"
+AGAIN = instructions.UnclearLoad("again")
 """Load at the start of what is done for ever: the one at its end, or the one before."""
 RESERVED = frozenset(
     word
@@ -386,7 +386,7 @@ class Writer(ABC):
         self.lines: list[str] = []
         self.settings: dict[str, str] = {}
         self.said: list[str] = []
-        self.load: MassBody | str | None = None
+        self.load: instructions.Load | None = None
         self.own = listing.language in self.languages
 
     def write(self) -> WrittenProgram:
@@ -475,8 +475,10 @@ class Writer(ABC):
 
     def _share_asked(self, ready: ReadyMotion) -> float | None:
         speed = ready.motion.speed
-        if speed is None or speed.unit == "share":
-            return None if speed is None else speed.value
+        if speed is None or speed.value <= 0:
+            return None
+        if speed.unit == "share":
+            return speed.value
         moved = _moved(ready)
         if speed.unit == "rad/s":
             return speed.value / self._greatest_speed(0 if moved is None else int(np.argmax(moved)))
@@ -489,7 +491,7 @@ class Writer(ABC):
     def leading_joint_speed(self, ready: ReadyMotion) -> float | None:
         """The speed of a joint motion as that of the joint that moves most, rad/s."""
         speed = ready.motion.speed
-        if speed is None or speed.unit not in ("share", "rad/s"):
+        if speed is None or speed.value <= 0 or speed.unit not in ("share", "rad/s"):
             return None
         if speed.unit == "rad/s":
             return speed.value
@@ -522,10 +524,12 @@ class Writer(ABC):
     def _add(self, instruction: instructions.Instruction | ReadyMotion) -> None:
         match instruction:
             case ReadyMotion(motion=motion):
+                if motion.acceleration is not None and motion.acceleration.value <= 0:  # not known
+                    instruction = replace(instruction, motion=replace(motion, acceleration=None))
                 if motion.load != self.load:
                     self.load = motion.load
-                    if isinstance(motion.load, str):
-                        self.name_tool(f"the load {motion.load}")
+                    if isinstance(motion.load, instructions.UnclearLoad):
+                        self.name_tool(f"the load {motion.load.text}")
                     else:
                         self.set_load(motion.load)
                 self.motion(instruction)
@@ -680,12 +684,12 @@ def duration(ready: ReadyMotion) -> float | None:
 def _by_length(ready: ReadyMotion, unit: str) -> float | None:
     """A program's speed (m/s) or time (s) in one of both units, the other one by the length of the way."""
     speed = ready.motion.speed
-    if speed is None or speed.unit not in ("m/s", "s"):
+    if speed is None or speed.value <= 0 or speed.unit not in ("m/s", "s"):
         return None
     if speed.unit == unit:
         return speed.value
     length = ready.length
-    return length / speed.value if length and speed.value > 0 else None
+    return length / speed.value if length else None
 
 
 def _moved(ready: ReadyMotion) -> Reals | None:

@@ -89,18 +89,34 @@ def theta_limits(robot: Robot) -> Reals:
     return ends
 
 
+def comparable(robot: Robot, moves: Reals) -> Reals:
+    """Moves of joints, or their distances from limits (..., n), rad or m, as rad: a millimetre of a prismatic joint
+    counts as a degree.
+
+    By this joints of both types are compared wherever solutions are ranked or margins are asked for; in degrees it has
+    the unit :func:`unit_compared`.
+    """
+    return np.where(robot.slides, np.radians(1000.0) * moves, moves) if robot.sliding.any() else moves
+
+
+def unit_compared(robot: Robot) -> str:
+    """The unit of what :func:`comparable` returns, in degrees."""
+    return "deg (mm of a prismatic joint)" if robot.sliding.any() else "deg"
+
+
 def limit_margin(robot: Robot, q: Reals) -> Reals:
-    """Smallest distance (...,) of joints (..., n) from their limits, rad (m of prismatic joints); negative outside.
+    """Smallest distance (...,) of joints (..., n) from their limits, rad as by :func:`comparable`; negative outside.
 
     Infinite where all joints are continuous. Limits of sums of joints count too.
     """
-    each = np.minimum(q - robot.lower, robot.upper - q)
+    each = comparable(robot, np.minimum(q - robot.lower, robot.upper - q))
     if robot.continuous.any():
         each = np.where(robot.continuous, np.inf, each)
     margin: Reals = each.min(axis=-1)
     for limit in robot.combined:
-        total = q @ np.array(limit.factors)
-        margin = np.minimum(margin, np.minimum(total - limit.lower, limit.upper - total))
+        total, slides = q @ np.array(limit.factors), bool(robot.slides[np.flatnonzero(limit.factors)].all())
+        room = np.minimum(total - limit.lower, limit.upper - total)
+        margin = np.minimum(margin, np.radians(1000.0) * room if slides else room)
     return margin
 
 

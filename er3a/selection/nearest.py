@@ -1,7 +1,7 @@
 """Choice of the joint solution nearest to a reference, with the reason, or the reason why none is chosen.
 
 The admissible solution with the smallest maximum joint move from the reference is chosen
-(:func:`er3a.geometry.vectors.max_joint_move`, the meaning of *nearest* in all rankings). If all joints start and stop
+(:func:`er3a.robots.joint_limits.comparable`, the meaning of *nearest* in all rankings). If all joints start and stop
 together, that joint decides the duration of the move. Between equals (to 1e-9 rad) the least root of the summed squares
 of all joint moves decides, then the lower branch number.
 """
@@ -15,10 +15,9 @@ import numpy as np
 
 from er3a.by_value import Finding
 from er3a.collision.pairs import PairOverlaps
-from er3a.geometry.vectors import max_joint_move
 from er3a.kinematics.solutions import Label, Solutions, Unsolved
 from er3a.numerics.arrays import Integers, Reals
-from er3a.robots.joint_limits import LimitsExceeded, limit_margin
+from er3a.robots.joint_limits import LimitsExceeded, comparable, joint_shown, limit_margin
 from er3a.robots.robot import Robot
 
 SAME_MOVE = 1e-9
@@ -60,32 +59,50 @@ class MaxJointMove(Finding, code="greatest_move"):
     angle_deg: float
 
 
+class MaxSlideMove(Finding, code="greatest_slide"):
+    """The joint with the largest move, which is prismatic, and that move."""
+
+    joint: int
+    move_mm: float
+
+
+MaxMove = MaxJointMove | MaxSlideMove
+
+
 class OnlyAdmissible(Finding):
     """No other solution is within the limits (and free of collisions, where they count)."""
 
-    move: MaxJointMove
+    move: MaxMove
 
 
 class MovesLess(Finding):
     """Its largest joint move is less than the next best solution's, by ``less_deg``."""
 
-    move: MaxJointMove
+    move: MaxMove
     less_deg: float
     next_best: NextBest
+
+
+class SlidesLess(MovesLess):
+    """The same of an arm with prismatic joints, of which a millimetre counts as a degree."""
 
 
 class MovesLessTogether(Finding):
     """The largest joint moves are equal; the root of all moves' squares is less by ``less_deg``."""
 
-    move: MaxJointMove
+    move: MaxMove
     less_deg: float
     next_best: NextBest
+
+
+class SlidesLessTogether(MovesLessTogether):
+    """The same of an arm with prismatic joints, of which a millimetre counts as a degree."""
 
 
 class LowerBranchNumber(Finding):
     """The next best solution is just as near."""
 
-    move: MaxJointMove
+    move: MaxMove
     next_best: NextBest
 
 
@@ -111,7 +128,7 @@ class AllCollide(Finding):
     overlap: PairOverlaps
 
 
-WhyFirst = OnlyAdmissible | MovesLess | MovesLessTogether | LowerBranchNumber
+WhyFirst = OnlyAdmissible | MovesLess | SlidesLess | MovesLessTogether | SlidesLessTogether | LowerBranchNumber
 WhyNone = NoSolution | AllOutsideLimits | AllCollide
 
 
@@ -122,7 +139,8 @@ class Choice:
     Attributes
     ----------
     order : (k,) int, rows of the solutions to choose from, best first
-    max_joint_move : (n,), rad, largest joint move from the reference to each solution
+    max_joint_move : (n,), rad, largest joint move from the reference to each solution; a millimetre of a prismatic
+        joint counts as a degree here and in ``distance``
     distance : (n,), rad, root of the summed squares of the joint moves
     reason : why the first was taken, or why none
     """
@@ -145,10 +163,11 @@ def nearest(
 
     Parameters
     ----------
-    q_ref : (6,), rad, the joint angles that the arm comes from
+    q_ref : (n,), rad or m, the joint values that the arm comes from
     refused : why each row is not admissible, None for those that are; left out, the limits alone refuse
     """
-    moves, greatest = np.abs(solutions.q - q_ref), max_joint_move(solutions.q, q_ref)
+    moves = comparable(robot, np.abs(solutions.q - q_ref))
+    greatest: Reals = moves.max(axis=-1, initial=0.0)
     distance: Reals = np.linalg.norm(moves, axis=1)
     allowed = solutions.within_limits if refused is None else [why is None for why in refused]
     rows = np.flatnonzero(allowed)
@@ -159,7 +178,11 @@ def nearest(
             alike += 1
         best = left.index(_first(left[:alike], distance, solutions.branch))
         ordered.append(left.pop(best))
-    why = _why_first(solutions, ordered, moves, distance) if ordered else why_none(robot, solutions, refused or ())
+    why: WhyFirst | WhyNone
+    if ordered:
+        why = _why_first(robot, solutions, q_ref, ordered, moves, distance)
+    else:
+        why = why_none(robot, solutions, refused or ())
     return Choice(np.array(ordered, dtype=int), greatest, distance, why)
 
 
@@ -169,21 +192,25 @@ def _first(rows: list[int], distance: Reals, branch: Integers) -> int:
     return min((row for row in rows if distance[row] <= smallest + SAME_MOVE), key=lambda row: (branch[row], row))
 
 
-def _why_first(solutions: Solutions, order: list[int], moves: Reals, distance: Reals) -> WhyFirst:
+def _why_first(
+    robot: Robot, solutions: Solutions, q_ref: Reals, order: list[int], moves: Reals, distance: Reals
+) -> WhyFirst:
     chosen = order[0]
     joint = int(moves[chosen].argmax())
     most = moves[chosen, joint]
-    move = MaxJointMove(joint + 1, float(np.degrees(most)))
+    value, slides = joint_shown(robot, joint, float(np.abs(solutions.q[chosen, joint] - q_ref[joint])))
+    move: MaxMove = MaxSlideMove(joint + 1, value) if slides else MaxJointMove(joint + 1, value)
     if len(order) == 1:
         return OnlyAdmissible(move)
     second = order[1]
     other = _difference(solutions, chosen, second)
     margin = moves[second].max() - most
     if margin > SAME_MOVE:
-        return MovesLess(move, float(np.degrees(margin)), other)
+        return (SlidesLess if robot.sliding.any() else MovesLess)(move, float(np.degrees(margin)), other)
     nearer = distance[second] - distance[chosen]
     if nearer > SAME_MOVE:
-        return MovesLessTogether(move, float(np.degrees(nearer)), other)
+        together = SlidesLessTogether if robot.sliding.any() else MovesLessTogether
+        return together(move, float(np.degrees(nearer)), other)
     return LowerBranchNumber(move, other)
 
 

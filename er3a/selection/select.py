@@ -28,12 +28,11 @@ from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import PairOverlaps
 from er3a.collision.scene import Scene
 from er3a.errors import Er3aError, ShapeError
-from er3a.geometry.vectors import max_joint_move
 from er3a.kinematics.inverse import checked_reference
 from er3a.kinematics.singularity import characteristic_length, conditioning
 from er3a.kinematics.solutions import Solutions
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.robots.joint_limits import limit_margin
+from er3a.robots.joint_limits import comparable, joint_columns, limit_margin, shown, unit_compared
 from er3a.robots.robot import Robot
 from er3a.selection.nearest import Refusal, WhyNone, nearest, why_none
 from er3a.selection.rule_names import RuleName
@@ -45,14 +44,18 @@ class Rule:
 
     Attributes
     ----------
-    unit : of the measure
+    unit : of the measure; None: of one joint, by which joints are compared
     best : "least" or "greatest" measure
     measure : (robot, q (..., 6), q_ref (..., 6), scene) -> (...,)
     """
 
-    unit: str
+    unit: str | None
     best: Literal["least", "greatest"]
     measure: Callable[[Robot, Reals, Reals, Scene | None], Reals]
+
+    def unit_of(self, robot: Robot) -> str:
+        """The unit of the measure of an arm's solutions."""
+        return unit_compared(robot) if self.unit is None else self.unit
 
     def cost(self, measured: Reals) -> Reals:
         """The measure, or its negative, so that less is better."""
@@ -66,7 +69,7 @@ def joint_weights(robot: Robot) -> Reals:
     """Weights (n,) of joint moves: the largest lever (m) at which each joint swings the tool, the longest being 1.
 
     A joint near the base moves more of the arm; a joint with no lever still counts ``MIN_WEIGHT``. A prismatic joint
-    moves the tool by as much as itself.
+    moves the tool by as much as itself, as one with a lever of 1 m does along its arc.
     """
     lengths = np.abs(robot.a) + np.abs(robot.d)
     outward = np.array([lengths[k:].sum() for k in range(robot.joints)]) + np.linalg.norm(robot.last_to_tool[:3, 3])
@@ -77,7 +80,8 @@ def joint_weights(robot: Robot) -> Reals:
 
 
 def _max_joint_move(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Reals:
-    return np.degrees(max_joint_move(q, q_ref))
+    greatest: Reals = comparable(robot, np.abs(q - q_ref)).max(axis=-1, initial=0.0)
+    return np.degrees(greatest)
 
 
 def _weighted_move(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Reals:
@@ -105,11 +109,11 @@ def _clearance(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Rea
 
 
 RULES: dict[RuleName, Rule] = {
-    "nearest": Rule("deg", "least", _max_joint_move),
+    "nearest": Rule(None, "least", _max_joint_move),
     "weighted": Rule("deg", "least", _weighted_move),
     "time": Rule("s", "least", _time),
     "manipulability": Rule("1", "greatest", _manipulability),
-    "limits": Rule("deg", "greatest", _limit_distance),
+    "limits": Rule(None, "greatest", _limit_distance),
     "clearance": Rule("mm", "greatest", _clearance),
 }
 
@@ -120,13 +124,18 @@ def available_rules(robot: Robot) -> tuple[RuleName, ...]:
 
 
 def mixed_cost(weights: Mapping[RuleName, float], costs: Mapping[RuleName, Reals], allowed: Flags) -> Reals:
-    """The weighted sum (n,) of costs (n,) per rule, each stretched to 0..1 over the allowed rows."""
+    """The weighted sum (n,) of costs (n,) per rule, each stretched to 0..1 over the allowed rows with a finite one.
+
+    An infinite cost is stretched to 1, a negative infinite one to 0.
+    """
     total = np.zeros(len(allowed))
     for name, weight in weights.items():
-        smallest, most = (costs[name][allowed].min(), costs[name][allowed].max()) if allowed.any() else (0.0, 1.0)
-        if not np.isfinite(smallest):  # nothing can meet: the rule tells no rows apart
+        cost, finite = costs[name], np.isfinite(costs[name])
+        ends = cost[allowed & finite] if allowed.any() else np.array([0.0, 1.0])
+        if not ends.size:  # such as where nothing can meet: the rule tells no rows apart
             continue
-        total += weight * (costs[name] - smallest) / (most - smallest if most > smallest else 1.0)
+        above = np.where(finite, cost, ends.min()) - ends.min()
+        total += np.where(finite, weight * above / (np.ptp(ends) or 1.0), weight * (cost > 0))
     return total
 
 
@@ -164,6 +173,7 @@ class Measure(Finding):
 
     rule: RuleName
     value: float
+    unit: str
 
 
 class Placed(Finding):
@@ -187,7 +197,8 @@ class SolutionRanking(ByValue, Displayed):
     Attributes
     ----------
     order : (k,) int, rows that are within the limits and free of collisions, best first
-    measured : rule -> (n,), each solution's measure in the rule's unit (``RULES``)
+    measured : rule -> (n,), each solution's measure
+    units : rule -> unit of its measure
     cost : (n,), what the order follows; less is better
     reason : n: why a row was refused, or its place and measures
     chosen_reason : why the first was taken, or why none
@@ -195,6 +206,7 @@ class SolutionRanking(ByValue, Displayed):
 
     order: Integers
     measured: Mapping[RuleName, Reals]
+    units: Mapping[RuleName, str]
     cost: Reals
     reason: tuple[Placed | Refusal, ...]
     chosen_reason: BestByRules | WhyNone
@@ -214,7 +226,7 @@ class SolutionRanking(ByValue, Displayed):
                 *((None, row, self.reason[row]) for row in refused),
             )
         )
-        units = [f"{name} ({RULES[name].unit})" for name in self.measured]
+        units = [f"{name} ({self.units[name]})" for name in self.measured]
         heading = f"Ranking of {len(self.reason)} solutions, {len(self.order)} admissible"
         taken = f"row {self.chosen} is taken" if len(self.order) else f"none is taken: {shortly(self.chosen_reason)}"
         columns = ("place", "row", "cost", *units, "refused")
@@ -242,20 +254,24 @@ def select(
     if solutions.q.ndim != 2:
         raise ShapeError("solutions.q", solutions.q.shape, "(n, 6)")
     measured = {name: RULES[name].measure(robot, solutions.q, q_ref, scene) for name in weights}
+    units = {name: RULES[name].unit_of(robot) for name in weights}
     refused = refusals(robot, solutions, scene)
     allowed = np.array([why is None for why in refused], dtype=bool)
     costs = {name: RULES[name].cost(values) for name, values in measured.items()}
     cost = next(iter(costs.values())) if len(weights) == 1 else mixed_cost(weights, costs, allowed)
     order = _ordered(robot, solutions, list(weights), cost, allowed, q_ref)
     place = {int(row): rank + 1 for rank, row in enumerate(order)}
-    measures = [tuple(Measure(name, float(measured[name][row])) for name in weights) for row in range(len(solutions.q))]
+    measures = [
+        tuple(Measure(name, float(measured[name][row]), units[name]) for name in weights)
+        for row in range(len(solutions.q))
+    ]
     reason = tuple(why or Placed(place[row], measures[row]) for row, why in enumerate(refused))
     chosen_reason: BestByRules | WhyNone
     if len(order):
         chosen_reason = BestByRules(measures[order[0]], measures[order[1]] if len(order) > 1 else ())
     else:
         chosen_reason = why_none(robot, solutions, refused)
-    return SolutionRanking(order, measured, cost, reason, chosen_reason)
+    return SolutionRanking(order, measured, units, cost, reason, chosen_reason)
 
 
 def refusals(robot: Robot, solutions: Solutions, scene: Scene | None) -> tuple[Refusal | None, ...]:
@@ -296,11 +312,13 @@ class SequenceChoice(ByValue, Displayed):
 
     Attributes
     ----------
-    rows : (N,) int, the row taken of each pose's solutions; q : (N, 6), rad
-    cost : sum of the moves' costs from the reference on (deg, or s for *time*)
+    robot : the arm
+    rows : (N,) int, the row taken of each pose's solutions; q : (N, n), rad or m
+    cost : sum of the moves' costs from the reference on, in the rule's unit
     greedy_rows : (N,) int, what taking the cheapest next move each time would take; greedy_cost : what that costs
     """
 
+    robot: Robot
     rows: Integers
     q: Reals
     cost: float
@@ -309,9 +327,10 @@ class SequenceChoice(ByValue, Displayed):
 
     def sheet(self) -> Sheet:
         """The row taken of each pose, with its joint angles."""
-        rows = ((pose, row, *angles) for pose, row, angles in zip(range(len(self.q)), self.rows, np.degrees(self.q)))
+        values = zip(range(len(self.q)), self.rows, shown(self.robot, self.q), strict=True)
+        rows = ((pose, row, *joints) for pose, row, joints in values)
         heading = f"Sequence of {len(self.q)} poses: cost {self.cost:.6g}; nearest each time: {self.greedy_cost:.6g}"
-        columns = ("pose", "row", *(f"q{k + 1}_deg" for k in range(self.q.shape[1])))
+        columns = ("pose", "row", *joint_columns(self.robot))
         return Sheet.of_table(heading, columns, rows, len(self.q))
 
 
@@ -373,6 +392,7 @@ def best_of_sets(
         greedy_cost += float(costs.min())
         at = q[greedy[-1]]
     return SequenceChoice(
+        robot=robot,
         rows=np.array(best),
         q=np.array([q[k] for q, k in zip(sets, best)]),
         cost=float(total.min()),

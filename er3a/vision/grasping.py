@@ -77,7 +77,8 @@ class GraspNeeds:
 
     Attributes
     ----------
-    clearance : m; limit_margin : rad; singular_value : smallest singular value of the scaled Jacobian
+    clearance : m; limit_margin : rad, a millimetre of a prismatic joint as a degree
+    singular_value : smallest singular value of the scaled Jacobian
     tolerance : errors that the gripper forgives, m along and rad about the tool's x, y and z
     probability : with which the tolerance is kept
     """
@@ -101,6 +102,10 @@ class GraspNearLimits(Finding):
     solutions: int
     margin_deg: float
     needed_deg: float
+
+
+class GraspNearEnds(GraspNearLimits):
+    """The same of an arm with prismatic joints, of which a millimetre counts as a degree."""
 
 
 class GraspSingular(Finding):
@@ -158,6 +163,7 @@ class GraspUnlikely(Finding):
 GraspRefusal = (
     GraspOutOfReach
     | GraspNearLimits
+    | GraspNearEnds
     | GraspSingular
     | GraspCollides
     | LineLeaves
@@ -179,7 +185,7 @@ class ChosenGrasp:
     T_base_tool : (4, 4); q_before, q, q_after : (n,), rad, at the beginning of the approach, the grasp, and away
     legs : the motion, in order
     clearance : m, proven along all of it; None where it can't be measured
-    limit_margin : rad; singular_value : least along both lines
+    limit_margin : rad, as that of the needs; singular_value : least along both lines
     margin : smallest of the three, each divided by what is asked
     probability : that the error stays within the gripper's tolerance; deviation : of that figure, from its draws
     """
@@ -296,7 +302,8 @@ def _judged(task: GraspTask, candidates: list[_Candidate], poses: int) -> tuple[
     inside = np.flatnonzero(limit >= needs.limit_margin)
     if not inside.size:
         most = float(np.degrees(limit.max()))
-        return [], GraspNearLimits(len(q), most, float(np.degrees(needs.limit_margin)))
+        near = GraspNearEnds if robot.sliding.any() else GraspNearLimits
+        return [], near(len(q), most, float(np.degrees(needs.limit_margin)))
     value = conditioning(robot, q[inside]).smallest_singular_value
     regular = inside[value >= needs.singular_value]
     if not regular.size:

@@ -46,6 +46,7 @@ STEP_ENDS = 1e-10
 HALVINGS = 10
 TABLE_JOINTS = 6
 MIN_FREEDOM = 6
+TABLE_CONTRADICTED = 0.01  # probability of such samples by the table as it is, below which they contradict it
 
 
 class NoCorrections(Finding):

@@ -216,11 +216,11 @@ def closed_volume(vertices: Reals, triangles: Integers) -> float | None:
 
 VoidKind = Literal["enclosed", "open"]
 
-MIN_CELLS = 8
-EXPECTED_SAMPLES = 10.0
-UNSEEN_RATIO = 0.10
+MIN_CELLS = 8  # of a void that is listed: a cube of two cells
+EXPECTED_SAMPLES = 10.0  # in a void's cells if they were reached as its rim is: then none at all is no chance (e^-10)
+UNSEEN_RATIO = 0.10  # of the touched cells, or of a void's: more that samples missed leave it open what a void is
 UNLISTED = -1
-_LOW_QUANTILE = 0.05
+_LOW_QUANTILE = 0.05  # of samples in the cells of a rim: a low estimate of how densely a void would be sampled
 
 
 @dataclass(frozen=True, eq=False)

@@ -70,6 +70,24 @@ def test_csv_holds_the_table_with_plain_numbers(page):
     assert rows[1:] == [["b, long", "-1234.5"], ["a", "20"], ['"c"', "–"], ["d", "3"], ["e", "5.0e-3"]]
 
 
+def test_csv_of_a_table_of_entries_has_numbers_apart_from_their_marks(page):
+    table = """<table class="entries"><tr><th>joint</th><th class="n">a (mm)</th></tr>
+    <tr><th>1</th><td class="n"><a href="#a1">−1 050</a> <b>one source</b></td></tr>
+    <tr><th>2</th><td class="n"><a href="#a2">90</a> → <strong>−90</strong> <b>✗</b></td></tr>
+    <tr><th>3</th><td class="n">–</td></tr></table>"""
+    text = page.execute_script(
+        "document.querySelector('main').insertAdjacentHTML('beforeend', arguments[0]);"
+        "return csvOf(document.querySelector('table.entries'))",
+        table,
+    )
+    assert list(csv.reader(io.StringIO(text))) == [
+        ["joint", "a (mm)", "a (mm): what is known of it"],
+        ["1", "-1050", "one source"],
+        ["2", "90", "→ −90 ✗"],
+        ["3", "–", ""],
+    ]
+
+
 def test_figure_is_enlarged_and_closed_by_keyboard(page):
     page.find_element(By.CSS_SELECTOR, "figure button").send_keys(Keys.ENTER)
     dialog = page.find_element(By.CSS_SELECTOR, "dialog")

@@ -216,6 +216,25 @@ def test_words_are_found_over_all_pages_and_on_each(browser, small_study):
     assert all(row.is_displayed() for row in rows)
 
 
+@pytest.mark.parametrize(
+    ("page", "words", "warning"),
+    [
+        ("er3a_c60_article/trajectory.html", "line_clean", ".caveat, .assumed-shapes, .verdict"),
+        ("er3a_c60/trajectory.html", "line_clean", ".caveat, .assumed-shapes, .verdict, #line_clean ~ p strong"),
+        ("er3a_c60/vision.html", "grasp_can", ".caveat, .verdict, section:has([download^=grasp_can]) p strong"),
+        ("compare.html", "limit", ".caveat"),
+        ("index.html", "paths pass", ".robot h2, .robot .decision, #decisions .decision.fail"),
+        ("index.html", "paths pass", "#er3a_c60_article, .robot:has(#er3a_c60_article) > details > p strong"),
+    ],
+)
+def test_no_warning_is_hidden_by_a_search(browser, small_study, page, words, warning):
+    browser.get(f"{(small_study.folder / 'reports' / page).as_uri()}?find={words.replace(' ', '+')}")
+    assert browser.find_elements(By.CSS_SELECTOR, "main.finding .unfound")
+    warnings = browser.find_elements(By.CSS_SELECTOR, f"main :is({warning})")
+    assert warnings
+    assert [each.get_attribute("outerHTML")[:80] for each in warnings if not each.is_displayed()] == []
+
+
 def test_joint_vectors_lead_to_the_teach_panel(browser, small_study):
     reports = small_study.folder / "reports/er3a_c60"
     counts = {}

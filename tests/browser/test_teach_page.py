@@ -258,6 +258,9 @@ def test_a_typed_pose_is_reached_or_refused_in_words(panel):
     assert re.search(
         r"The arm does not move: the wrist centre would be .* too far from axis 2", panel.text("#pose-message")
     )
+    assert "did you mean" not in panel.text("#pose-message")
+    type_pose(panel, 0.5, 0.2, 0.7, 180, 0, 0)
+    assert panel.text("#pose-message").endswith("did you mean (500, 200, 700)?")
     panel.one("#pose-form input").send_keys(SELECT_ALL, Keys.DELETE)
     panel.one("#pose-form button[type=submit]").click()
     assert "needs a number" in panel.text("#pose-message")

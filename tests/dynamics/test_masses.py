@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -28,11 +28,13 @@ from er3a.dynamics.plausibility import (
     mass_findings,
 )
 from er3a.errors import InputError
+from er3a.files.robot_file import SLIDING, TURNING, DriveRow, drive_field
 from er3a.files.robot_library import LoadFields, load_of
 from er3a.files.robot_writer import write_robot
 from er3a.formats.urdf import export_urdf, import_urdf
 from er3a.robots.masses import Drives, LinkMass, MassBody, Masses, WristLoad, about, moved, no_body, together
 from er3a.robots.robot import ConvexPiece, Envelope, Robot
+from testing.arms import scara
 from testing.fleet import UrdfFile, urdf_files
 
 
@@ -231,11 +233,26 @@ def test_a_written_file_reads_back(arm, tmp_path):
     write_robot(full, tmp_path / "er3a_c60.yaml")
     back = er3a.load_robot(tmp_path / "er3a_c60.yaml").masses
     assert (back.wrist, back.weight) == (full.masses.wrist, 27.0)
-    for name in ("armature", "gear_ratio", "coulomb", "viscous", "rated", "peak"):
-        np.testing.assert_array_equal(getattr(back.drives, name), getattr(full.masses.drives, name))
+    assert back.drives == full.masses.drives
     for one, other in zip(back.links, full.masses.links):
         np.testing.assert_allclose(one.body.inertia, other.body.inertia, atol=1e-15)
         np.testing.assert_allclose(one.body.centre, other.body.centre, atol=1e-13)
+
+
+def test_each_field_of_each_drive_reads_back_from_its_key(tmp_path):
+    """Of joints that turn and of one that slides, by numbers that no two fields share."""
+    robot = scara()
+    names = [field.name for field in fields(Drives)]
+    values = np.arange(1.0, 1 + 4 * len(names)).reshape(len(names), 4)
+    drives = Drives(**dict(zip(names, values, strict=True)))
+    write_robot(robot.replace(name="scara", masses=Masses(drives=drives)), tmp_path / "scara.yaml")
+    back = er3a.load_robot(tmp_path / "scara.yaml").masses.drives
+    for name, expected in zip(names, values, strict=True):
+        np.testing.assert_array_equal(getattr(back, name), expected, err_msg=name)
+    keys = {key for key in DriveRow.model_fields if key != "joint"}
+    assert keys == {*TURNING, *SLIDING, "gear_ratio"}
+    for kind in (TURNING, SLIDING):
+        assert sorted(map(drive_field, (*kind, "gear_ratio"))) == sorted(names)
 
 
 # URDF

@@ -7,12 +7,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
+from er3a.collision.along import clearance
 from er3a.collision.bodies import Bodies
-from er3a.collision.scene import Plane, Scene
+from er3a.collision.scene import Mesh, Plane, Scene
 from er3a.errors import InputError
+from er3a.files.scene_file import load_scene
+from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
+from er3a.pipeline.messages.programs import say
 from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.programs.instructions import JointTarget, UnresolvedTarget, numbers_of
 from testing.arms import palletiser
@@ -634,3 +639,85 @@ def test_what_an_instruction_does_that_is_not_understood_or_simulated_is_listed(
     found = check(tmp_path, text, name)
     assert (4, "instruction") in [(each.place.line, each.what) for each in found.not_examined]
     assert len(found.verdicts) == 1
+
+
+@pytest.mark.parametrize(
+    ("file", "given", "code"),
+    [
+        ("a.script", "movej([0.1,0,0,0,0,0], v=read_input_float_register(1))", "speed_not_given"),
+        ("a.script", "movej([0.1,0,0,0,0,0], t=read_input_float_register(1))", "speed_not_given"),
+        ("a.script", "movej([0.1,0,0,0,0,0], v=0)", "speed_not_given"),
+        ("a.script", "movej([0.1,0,0,0,0,0], a=read_input_float_register(1))", "acceleration_not_known"),
+        ("a.src", "BAS(#VEL_PTP,$ANIN[1])", "speed_not_given"),
+        ("a.src", "$VEL_AXIS[3]=$ANIN[1]", "speed_not_given"),
+        ("a.src", "$VEL_AXIS[3]=150", "more_than_full_speed"),
+        ("a.src", "$ACC_AXIS[3]=$ANIN[1]", "acceleration_not_known"),
+        ("a.mod", "v200\\V:=GInput(gi1)", "speed_not_given"),
+        ("a.mod", "v200\\T:=GInput(gi1)", "speed_not_given"),
+        ("a.mod", "vUnheardOf", "speed_not_given"),
+    ],
+)
+def test_a_speed_or_an_acceleration_that_is_given_and_not_known_is_a_caution(tmp_path, file, given, code):
+    none = "[9E9,9E9,9E9,9E9,9E9,9E9]"
+    text = {
+        "a.script": f"def p():\n  {given}\nend\n",
+        "a.src": krl(f"{given}\nPTP {axes(NEAR)}"),
+        "a.mod": f"MODULE a\nPROC main()\nMoveAbsJ [[5,0,0,0,20,0],{none}],{given},fine,tool0;\nENDPROC\nENDMODULE\n",
+    }[file]
+    found = check(tmp_path, text, file)
+    assert [each.level for each in found.findings if each.finding.code == code] == ["caution"]
+
+
+def test_a_column_of_a_table_that_nobody_reads_is_named(tmp_path):
+    found = check(tmp_path, "t_s,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,gripper\n0,0,0,0,0,20,0,1\n", "a.csv")
+    assert [
+        (each.level, each.finding.text) for each in found.findings if each.finding.code == "program_not_understood"
+    ] == [("caution", "the column gripper")]
+
+
+@pytest.mark.parametrize("scene", [None, "table_and_post"])
+def test_an_arm_that_only_stands_is_examined_where_it_stands(tmp_path, scene):
+    """A program of one move to where the arm is already, inside the post."""
+    inside = np.radians([70, -24.84, -21.5, 0, -43.65, 25])
+    options = {"start": inside, "measures": True} | (
+        {"scene": load_scene(f"data/scenes/{scene}.yaml")} if scene else {}
+    )
+    found = check(tmp_path, krl(f"PTP {axes(inside)}"), "a.src", **options)
+    hits = [each.finding for each in found.findings if each.finding.code == "motion_collides"]
+    assert bool(hits) == bool(scene)
+    for hit in hits:
+        assert {each.pair.names: each.at_target for each in hit.touches} == {
+            ("link_4", "post"): True,
+            ("link_6", "post"): True,
+        }
+        moved = check(tmp_path, krl(f"PTP {axes(inside)}"), "a.src", **options | {"start": inside * [0, 1, 1, 1, 1, 1]})
+        (coming,) = [each.finding for each in moved.findings if each.finding.code == "motion_collides"]
+        deepest = [max(each.depth_mm for each in found.touches) for found in (hit, coming)]
+        assert 20 < deepest[0] <= deepest[1] + 0.1
+
+
+@pytest.mark.parametrize("target", [[0, 0, 0, 0, -112, 0], [0, 0, 0, 0, -30, 0]])
+def test_a_start_beyond_the_limits_is_named(tmp_path, target):
+    start = np.radians([0, 0, 0, 0, -112, 0])
+    found = check(tmp_path, krl(f"PTP {axes(np.radians(target))}"), "a.src", start=start)
+    assert codes(found)["below_limit"] == [2]
+    assert found.level == "fail"
+
+
+@pytest.mark.parametrize(("margin", "level"), [(0.0, "fail"), (0.004, "fail"), (0.03, "caution")])
+def test_an_overlap_by_less_than_a_shape_is_larger_than_its_mesh_is_no_contact_for_sure(tmp_path, margin, level):
+    """A block whose mesh comes within 20 mm of the arm, or, with other margins, 5 mm into it."""
+    q = np.zeros((1, 6))
+    corners = np.array([(x, y, z) for x in (0, 0.2) for y in (-0.1, 0.1) for z in (-0.1, 0.1)])
+
+    def block(x: float, margin: float) -> Scene:
+        return Scene("block", (Mesh("block", transform(np.array([x, 0, 0.6]), np.zeros(3)), (corners,), margin),))
+
+    near = brentq(lambda x: clearance(ROBOT, q, block(x, 0.0)).distance[0] - 1e-3, 0.0, 3.0)
+    scene = block(near + (0.019 if level == "caution" else -0.006), margin)
+    found = check(tmp_path, krl("PTP {A1 0,A2 0,A3 0,A4 0,A5 0,A6 0}"), "a.src", start=q[0], scene=scene, measures=True)
+    ((said, hit),) = [(each.level, each.finding) for each in found.findings if each.finding.code == "motion_collides"]
+    assert said == level
+    touches = [each for each in hit.touches if "block" in each.pair.names]
+    assert {each.enlarged_mm for each in touches} == {1000 * margin}
+    assert ("larger than the meshes" in say(hit)) == bool(margin)

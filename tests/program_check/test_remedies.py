@@ -275,6 +275,7 @@ MENDED = {
         krl("b( )", more="DEF b( )\nPTP {A1 9}\nEND\n"),
     ),
     "speed_not_given": ("DEF a( )\nPTP {A1 5}\nEND\n", krl("PTP {A1 5}")),
+    "acceleration_not_known": (krl("BAS(#ACC_PTP,$ANIN[1])", "PTP {A1 5}"), krl("BAS(#ACC_PTP,50)", "PTP {A1 5}")),
     "above_limit": (krl("PTP {A1 170}"), krl(f"PTP {{A1 {np.degrees(ROBOT.upper[0]):g}}}")),
     "below_limit": (krl("PTP {A1 -170}"), krl(f"PTP {{A1 {np.degrees(ROBOT.lower[0]):g}}}")),
     "motion_collides.solid": (  # round the post, by the via point that was found

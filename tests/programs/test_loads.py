@@ -8,7 +8,7 @@ import pytest
 from er3a.files.robot_library import load_robot
 from er3a.program_check.check_program import CheckOptions, ProgramCheck, check_program
 from er3a.program_check.program_check_findings import LoadAbovePayload, LoadNotExamined
-from er3a.programs.instructions import ArmMotion, JointTarget, Listing, NamedFrame
+from er3a.programs.instructions import ArmMotion, JointTarget, Listing, Load, NamedFrame, UnclearLoad
 from er3a.programs.languages import read_program, write_program
 from er3a.programs.machine import execute
 from er3a.programs.program_findings import ToolNotGiven
@@ -30,7 +30,7 @@ RAPID = (
 WRAPPED = {"krl": "DEF P( )\n{body}END\n", "urscript": "def p():\n{body}end\n", "rapid": RAPID}
 
 
-def loads(language: str, tmp_path, *settings: str) -> list[MassBody | str | None]:
+def loads(language: str, tmp_path, *settings: str) -> list[Load | None]:
     """The load of a motion behind each setting."""
     file = tmp_path / f"p{SUFFIX[language]}"
     body = "".join(f"{each}\n{MOVES[language]}" for each in settings)
@@ -39,7 +39,7 @@ def loads(language: str, tmp_path, *settings: str) -> list[MassBody | str | None
     return [motion.load for motion in run.listing().motions]
 
 
-def same(load: MassBody | str | None, mass: float, centre: tuple, inertia: tuple, within: float = 1e-12) -> None:
+def same(load: Load | None, mass: float, centre: tuple, inertia: tuple, within: float = 1e-12) -> None:
     assert isinstance(load, MassBody)
     assert load.mass == pytest.approx(mass)
     np.testing.assert_allclose(load.centre, centre, atol=within)
@@ -61,7 +61,30 @@ def test_krl_gives_loads_by_variable_number_and_tool(tmp_path):
     same(heavier, 3, (0.01, 0, 0.05), (0.2, 0.1, 0.3, 0, 0, 0))
     same(numbered, 4, (0, 0, 0.07), (0,) * 6)
     assert unknown is None
-    assert open_ == "LOAD_DATA[9]"
+    assert open_ == UnclearLoad("LOAD_DATA[9]")
+
+
+def test_parts_of_a_krl_load_whose_whole_is_not_known_are_not_dropped(tmp_path):
+    """Controllers hold a load from before; a program that changes its mass names that alone."""
+    (tmp_path / "$config.dat").write_text("DEFDAT $CONFIG PUBLIC\nDECL LOAD LOAD_DATA[16]\nENDDAT\n")
+    settings = ("$LOAD.M=50", "$LOAD.CM.Z=500", "BAS(#TOOL,0)", "$LOAD.M=$ANIN[1]")
+    alone, moved, none, unknown = loads("krl", tmp_path, *settings)
+    assert alone == UnclearLoad("$LOAD.M", 50.0)
+    assert moved == UnclearLoad("$LOAD.M, $LOAD.CM.Z", 50.0)
+    assert none is None
+    assert unknown == UnclearLoad("$LOAD.M", None)
+
+
+def test_a_mass_alone_is_compared_with_the_payload(tmp_path):
+    move = "  movej([0,-0.17,-0.17,0,-1.22,0])\n"
+    found = checked(
+        tmp_path, f"def p():\n  set_payload(50)\n{move}  set_payload(read_input_float_register(0))\n{move}end\n"
+    )
+    said = [each for each in found.findings if isinstance(each.finding, (LoadNotExamined, LoadAbovePayload))]
+    assert [(each.level, each.finding.code) for each in said] == [
+        ("fail", "load_above_payload"),
+        ("caution", "load_not_examined"),
+    ]
 
 
 def test_urscript_keeps_what_a_call_leaves_out(tmp_path):
@@ -71,14 +94,16 @@ def test_urscript_keeps_what_a_call_leaves_out(tmp_path):
         *("  set_payload(cog=[0, 0, 0.1], m=1)", "  set_payload(0, [0, 0, 0])", "  set_payload(1, [0, 0, 0], 7)"),
     )
     found = loads("urscript", tmp_path, *settings)
-    assert found[0] == "set_payload(1.5)"  # the centre is the controller's, which the program does not give
+    assert found[0] == UnclearLoad(
+        "set_payload(1.5)", 1.5
+    )  # the centre is the controller's, which the program does not give
     same(found[1], 1.5, (0, 0.01, 0.05), (0,) * 6)
     same(found[2], 2, (0, 0.01, 0.05), (0,) * 6)
     same(found[3], 2, (0, 0, 0.1), (0,) * 6)
     same(found[4], 3, (0, 0, 0.2), (0.1, 0.2, 0.3, 0, 0.01, 0))
     same(found[5], 1, (0, 0, 0.1), (0,) * 6)
     assert found[6] is None
-    assert isinstance(found[7], str)
+    assert isinstance(found[7], UnclearLoad)
 
 
 def test_rapid_adds_the_part_to_the_tool(tmp_path):
@@ -100,7 +125,7 @@ PART = MassBody(2.5, (0.01, -0.02, 0.05), (0.02, 0.03, 0.04, 0.001, -0.002, 0.00
 PLAIN = MassBody(1.2, (0.0, 0.0, 0.07))
 
 
-def written(language: str, loads: list[MassBody | str | None], repeats_from: int | None = None) -> WrittenProgram:
+def written(language: str, loads: list[Load | None], repeats_from: int | None = None) -> WrittenProgram:
     """Joint motions with these loads, written."""
     tool = NamedFrame("", np.array([[0, -1, 0, 0.0], [1, 0, 0, 0], [0, 0, 1, 0.1], [0, 0, 0, 1]]))
     points = (np.radians([i, -10, -10, 0, -70, 0]) for i in range(len(loads)))
@@ -109,7 +134,7 @@ def written(language: str, loads: list[MassBody | str | None], repeats_from: int
     return write_program(Listing("p", tuple(motions), repeats_from=repeats_from), language, WriteOptions(robot))
 
 
-def read_back(program: WrittenProgram, tmp_path) -> list[MassBody | str | None]:
+def read_back(program: WrittenProgram, tmp_path) -> list[Load | None]:
     for suffix, text in program.files.items():
         (tmp_path / f"p{suffix}").write_text(text)
     run = execute(read_program(tmp_path / f"p{next(iter(program.files))}"), load_robot("er3a_c60"))
@@ -138,7 +163,7 @@ def test_a_load_that_can_not_be_written_is_named():
     for language, load, name in (
         ("rpl", PART, "a load of 2.5 kg"),
         ("xpl", PART, "a load of 2.5 kg"),
-        ("krl", "set_payload(2)", "the load set_payload(2)"),
+        ("krl", UnclearLoad("set_payload(2)", 2.0), "the load set_payload(2)"),
     ):
         findings = written(language, [load]).findings
         assert name in [each.name for each in findings if isinstance(each, ToolNotGiven)]

@@ -622,3 +622,14 @@ def test_an_instruction_that_may_change_an_element_whose_number_is_unknown_makes
     ENDWHILE"""
     (target,) = {each.target for each in motions(run(tmp_path, body))}
     assert isinstance(target, UnresolvedTarget)
+
+
+def test_a_displacement_that_is_not_known_is_the_frame_that_the_cell_gives(tmp_path):
+    file = saved(tmp_path, "n:=GInput(gi1); PDispSet [[n,0,0],[1,0,0,0]]; MoveL p,v100,fine,tool0;", DATA)
+    shift = np.eye(4)
+    shift[:3, 3] = 0.5, 0.0, 0.0
+    found = {}
+    for name, frames in (("unknown", {}), ("given", {"PDispOn": shift})):
+        check = check_program(read_program(file), ROBOT, CheckOptions(np.zeros(6), frames=frames, measures=False))
+        found[name] = [each.finding.name for each in check.findings if each.finding.code == "frame_not_given"]
+    assert found == {"unknown": ["PDispOn"], "given": []}

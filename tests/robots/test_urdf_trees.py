@@ -248,3 +248,18 @@ def test_what_urdfs_leave_out_or_overdo_is_assumed_with_a_note(written):
         assert word in told
     write_robot(imported.robot, path.with_suffix(".yaml"))
     load_robot(path.with_suffix(".yaml"))
+
+
+def test_a_frame_beside_the_arm_can_be_its_base(tmp_path):
+    """As of Universal Robots in ROS, whose controllers give poses in ``base``, half a turn from ``base_link``."""
+    path = tmp_path / "arm.urdf"
+    beside = joint("fixed", "fixed", "base_link", "base", xyz="0.1 0 0.3", rpy="0 0 3.141592653589793", more="")
+    path.write_text(f'<robot name="r"><link name="base_link"/>{row(6, start="base_link")}{beside}</robot>')
+    own, by_controller = (import_urdf(path, base=name) for name in ("base_link", "base"))
+    assert "(100, 0, 300) mm, roll 0, pitch 0, yaw 180 deg" in "".join(own.notes)
+    assert "--base base" in "".join(own.notes)
+    assert not any("--base" in note for note in by_controller.notes)
+    q = np.random.default_rng(3).uniform(own.robot.lower, own.robot.upper, (20, 6))
+    there = np.diag([-1.0, -1.0, 1.0, 1.0])
+    there[:3, 3] = 0.1, 0.0, 0.3  # T_base_link_base
+    np.testing.assert_allclose(there @ forward(by_controller.robot, q), forward(own.robot, q), atol=1e-9)

@@ -11,7 +11,10 @@ from er3a.kinematics.inverse import inverse
 from er3a.kinematics.solutions import Solutions
 from er3a.pipeline.messages.kinematics import say
 from er3a.robots.joint_limits import limit_margin
-from er3a.selection.nearest import MaxJointMove, OnlyAdmissible, nearest
+from er3a.robots.robot import CombinedLimit
+from er3a.selection.nearest import MaxJointMove, MaxSlideMove, OnlyAdmissible, nearest
+from er3a.selection.select import select, select_sequence
+from testing.arms import scara
 
 
 def solutions_of(q, within, branch) -> Solutions:
@@ -56,3 +59,26 @@ def test_limit_margin_is_negative_outside():
     robot = load_robot("er3_600")
     np.testing.assert_allclose(np.degrees(limit_margin(robot, np.zeros((2, 6)))), [65, 65])
     assert np.degrees(limit_margin(robot, np.radians([0, 95, 0, 0, 0, 0]))) == pytest.approx(-10)
+
+
+def test_a_millimetre_of_a_slide_counts_as_a_degree_and_is_told_as_one():
+    """A SCARA: both arms of a pose move the slide by as much, and have the same distance to its end."""
+    robot = scara().replace(upper=np.array([2.2, 2.5, 0.18, 3.0]), lower=np.array([-2.2, -2.5, 0.0, -3.0]))
+    q = np.array([0.3, 0.5, 0.150, 0.1])
+    assert np.degrees(limit_margin(robot, q)) == pytest.approx(30)  # of 0 to 180 mm
+    near = np.append(q[:2], [0.179, 0.1])
+    assert np.degrees(limit_margin(robot, near)) == pytest.approx(1)
+    summed = robot.replace(combined=(CombinedLimit((0, 0, 2, 0), 0.0, 0.32),))
+    assert np.degrees(limit_margin(summed, q)) == pytest.approx(20)
+    q_ref = q - [0.0, 0.0, 0.120, 0.0]
+    solutions = inverse(robot, forward(robot, q), q_ref)
+    choice = nearest(robot, solutions, q_ref)
+    assert np.degrees(choice.max_joint_move) == pytest.approx(120)
+    assert choice.reason.move == MaxSlideMove(3, pytest.approx(120))
+    assert say(choice.reason).startswith("greatest joint move 120.0 mm (J3), as with the next best")
+    assert "less (in deg, or mm of a prismatic joint)" in say(choice.reason)
+    ranking = select(robot, solutions, {"nearest": 1, "limits": 1}, q_ref)
+    np.testing.assert_allclose(ranking.measured["nearest"], 120)
+    np.testing.assert_allclose(ranking.measured["limits"], 30)
+    assert "limits 30 deg (mm of a prismatic joint)" in say(ranking.chosen_reason)
+    assert "q3_mm" in repr(select_sequence(robot, [solutions], q_ref))

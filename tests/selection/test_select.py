@@ -15,7 +15,7 @@ from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import SceneFile
 from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.inverse import inverse
-from er3a.selection.select import RULES, available_rules, joint_weights, select, select_sequence
+from er3a.selection.select import RULES, available_rules, joint_weights, mixed_cost, select, select_sequence
 from testing.arms import DEG, joints_at_random
 
 POSE = np.array([10, 20, 10, 30, 40, -50]) * DEG
@@ -157,3 +157,17 @@ def test_bad_rules_are_refused(arm, solutions):
 def test_public_names():
     assert er3a.select.__wrapped__ is select
     assert er3a.select_sequence.__wrapped__ is select_sequence
+
+
+def test_an_infinite_cost_is_the_worst_of_its_rule_and_no_nan():
+    every = np.ones(3, dtype=bool)
+    mixed = mixed_cost({"nearest": 1, "limits": 1}, _costs(3, 4, np.inf), every)
+    np.testing.assert_array_equal(mixed, [0, 1.5, 2])
+    mixed = mixed_cost({"nearest": 0, "limits": 1}, _costs(-np.inf, 4, np.inf), every)
+    np.testing.assert_array_equal(mixed, [0, 0.5, 1])
+    mixed = mixed_cost({"nearest": 2, "limits": 1}, _costs(-np.inf, 4, 6), every)
+    np.testing.assert_array_equal(mixed, [0, 0.5, 3])
+
+
+def _costs(*nearest):
+    return {"nearest": np.array(nearest, float), "limits": np.array([1.0, 2, 3])}

@@ -495,5 +495,6 @@ def test_the_load_that_a_program_names_counts_for_its_stretches(tmp_path):
         assert held.torque == pytest.approx(torque, abs=1e-6)
     left = {each.subject: each.names for each in summary.not_examined}
     assert left["program_loads"] == ("moves_3: set_payload(get_flag(1))",)
+    assert "program_loads" in [each.subject for each in summary.verdict.missed]
     report(study, found, tmp_path / "page.html")
     assert "With 2 kg on the flange, which the program names" in (tmp_path / "page.html").read_text(encoding="utf-8")

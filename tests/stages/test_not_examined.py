@@ -403,6 +403,10 @@ def test_a_grasp_passes_by_no_object_out_of_view_and_no_arm_without_errors(study
     content = yaml.safe_load(Path(f"data/vision/{ROBOT}.yaml").read_text(encoding="utf-8"))
     content["objects"] = content["objects"][:1]
     few = {"map_cells": 4}
+    scene = Path("data/scenes/table_and_post.yaml").read_text(encoding="utf-8")
+    gripper = "carried: {boxes: [{name: gripper, size_mm: [40, 40, 90], xyz_mm: [0, 0, 50]}]}\n"
+    (tmp_path / "scene.yaml").write_text(scene + gripper, encoding="utf-8")
+    own = {"vision": str(tmp_path / "vision.yaml"), "scene": str(tmp_path / "scene.yaml")}
     for subject, names, more in (
         (None, (), {}),
         ("objects_out_of_view", ("can",), {"view": content["view"] | {"horizontal_deg": 5}}),
@@ -410,13 +414,14 @@ def test_a_grasp_passes_by_no_object_out_of_view_and_no_arm_without_errors(study
         ("arm_errors", (), {"arm": {"source": "none", "repeatability_mm": 0.02}}),
     ):
         (tmp_path / "vision.yaml").write_text(yaml.safe_dump(content | more), encoding="utf-8")
-        verdict = vision(changed(study, {"vision": str(tmp_path / "vision.yaml")}, vision=few), ROBOT).summary.verdict
+        verdict = vision(changed(study, own, vision=few), ROBOT).summary.verdict
         assert verdict.status == ("caution" if subject else "pass"), more
         assert [(each.subject, each.names) for each in verdict.missed] == ([(subject, names)] if subject else [])
     rows = (tmp_path / "fixed_camera.csv").read_text(encoding="utf-8").splitlines()
     again = "again" + rows[-1][rows[-1].index(",") :]
     (tmp_path / "fixed_camera.csv").write_text("\n".join([*rows, again, ""]), encoding="utf-8")
     summary = vision(changed(study, {"vision": str(tmp_path / "vision.yaml")}, vision=few), ROBOT).summary
+    assert "carried" in [each.subject for each in summary.verdict.missed]
     left = {each.subject: each.names for each in summary.not_examined}
     assert left["left_out_samples"] == ("pose_12",)
     assert left["copied_samples"] == ("again",)
@@ -425,12 +430,20 @@ def test_a_grasp_passes_by_no_object_out_of_view_and_no_arm_without_errors(study
 
 
 def test_what_no_verdict_passes_without_turns_it_and_is_said():
-    """Whatever a stage computes, its summary makes no pass of it; obstacles turn no reach and no torque."""
+    """Whatever a stage computes, its summary makes no pass of it; obstacles turn no reach and no torque.
+
+    A grasp needs the gripper's shape, and torques the load of the program that they are of.
+    """
     import er3a.pipeline.messages.collision  # noqa: F401
 
+    own = {
+        "workspace": NEVER_A_PASS - {"obstacles"},
+        "dynamics": NEVER_A_PASS - {"obstacles"} | {"program_loads"},
+        "vision": NEVER_A_PASS | {"carried"},
+    }
     for stage in STAGES.values():
         decisive = summary_type(stage.module("model").RESULTS).decisive
-        assert decisive == (NEVER_A_PASS - {"obstacles"} if stage.name in ("workspace", "dynamics") else NEVER_A_PASS)
+        assert decisive == own.get(stage.name, NEVER_A_PASS)
     for subject in LeftOutSubject.__args__:
         for status in ("pass", "caution", "fail", "no_reference"):
             verdict = Summary(

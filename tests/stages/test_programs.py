@@ -7,12 +7,14 @@ import re
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
+from er3a.files.robot_writer import write_robot
 from er3a.kinematics.forward import forward
 from er3a.pipeline.messages.programs import remedy
 from er3a.pipeline.results import Stored, read_results
@@ -20,7 +22,7 @@ from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.programs.compute import compute as compute_programs
 from er3a.pipeline.stages.programs.model import RESULTS, ProgramsResults, SomeProgramsFail
-from er3a.pipeline.stages.programs.played import faults
+from er3a.pipeline.stages.programs.played import faults, motions
 from er3a.pipeline.stages.programs.record import record
 from er3a.pipeline.stages.programs.report import report
 from er3a.pipeline.stages.registry import STAGES
@@ -28,6 +30,8 @@ from er3a.pipeline.stages.trajectory.compute import compute as compute_paths
 from er3a.pipeline.study import Study, load_study
 from er3a.planning.motion_faults import AccelerationTooGreat
 from er3a.programs.csv_program import write_csv
+from er3a.robots.joint_limits import joint_columns
+from testing.arms import scara
 
 ROBOTS = ("er3a_c60", "er3_600")
 
@@ -276,3 +280,31 @@ def test_an_arm_of_seven_joints_has_its_table_checked(tmp_path):
     study = study.model_copy(update={"robots": {"lbr_iiwa_14": own}})
     program = compute_programs(study, "lbr_iiwa_14").summary.programs[0]
     assert (program.outcome, program.motions) == ("pass", 2)
+
+
+def test_an_arm_that_slides_has_millimetres_in_tables_player_and_recording(tmp_path, monkeypatch):
+    """The joints of a table are those of the results, whose player and recording show the arm in them."""
+    robot = scara().replace(name="arm")
+    write_robot(robot, tmp_path / "arm.yaml")
+    targets = np.array([[0.0, 10, 100, 0], [10, 20, 150, 0]])
+    lines = "".join(f"joint,{','.join(f'{value:g}' for value in row)}\n" for row in targets)
+    (tmp_path / "a.csv").write_text("motion,q1_deg,q2_deg,q3_mm,q4_deg\n" + lines)
+    entry = f"- {{name: a, title: a, file: {tmp_path / 'a.csv'}, start_deg: [0, 10, 50, 0]}}"
+    (tmp_path / "programs.yaml").write_text(f"kind: programs\nprograms:\n{entry}\n")
+    study = load_study("config/gallery.yaml")
+    files = {"file": str(tmp_path / "arm.yaml"), "programs": str(tmp_path / "programs.yaml")}
+    own = study.entry("lbr_iiwa_14").model_copy(update=files | {"scene": None})
+    study = study.model_copy(update={"robots": {"arm": own}})
+    results = compute_programs(study, "arm")
+    for rows, ends in ((results.instructions, results.instructions.end_deg), (results.motion, results.motion.q_deg)):
+        assert set(joint_columns(robot)) <= set(rows.frame().columns)
+        np.testing.assert_allclose(ends[-1], targets[-1], atol=1e-9)
+    np.testing.assert_allclose(results.instructions.end_deg[0], targets[0], atol=1e-9)
+    runs = motions(robot, results)
+    monkeypatch.setattr(
+        "er3a.pipeline.stages.programs.record.record_stage", lambda *_, **given: runs.extend(given["runs"])
+    )
+    record(study, SimpleNamespace(results=results, robot="arm"), tmp_path / "programs.rrd")
+    assert len(runs) == 2
+    for each in runs:
+        np.testing.assert_allclose(1000 * forward(robot, each.q)[:, :3, 3], results.motion.xyz_mm, atol=1e-9)

@@ -43,7 +43,8 @@ def folders(study, small_results):
 @pytest.mark.long
 def test_objects_are_grasped_as_expected_and_the_turned_board_is_named(folders):
     summary = read_results(folders["er3a_c60"], VisionResults).results.summary
-    assert summary.verdict.status == "pass"
+    assert summary.verdict.status == "caution"  # no gripper has a shape
+    assert [each.subject for each in summary.verdict.missed] == ["carried"]
     assert summary.verdict.finding.left_out == ("pose_12",)
     assert summary.verdict.finding.simulated
     assert "samples are simulated" in say(summary.verdict.finding)

@@ -2,27 +2,32 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from er3a.files.robot_library import load_robot
 from er3a.identifiability.entry_evidence import Tolerance
 from er3a.identifiability.proposals import LookAtMotion
 from er3a.identifiability.reactions import CheckCounts, CheckTally
 from er3a.identifiability.statements import ToolOff
+from er3a.kinematics.inverse import inverse
 from er3a.pipeline.messages.left_out import say_reserved
+from er3a.pipeline.messages.pages import caveat
 from er3a.pipeline.messages.validation import how_far_off, settled_parts, unconfirmed
 from er3a.pipeline.messages.vision import say
-from er3a.pipeline.results import LeftOut
+from er3a.pipeline.results import FORMAT_VERSION, LeftOut, plain, read_foundation, write_checksums
 from er3a.pipeline.stages.dynamics.model import NoLimits
 from er3a.pipeline.stages.inverse.model import RankingRows
 from er3a.pipeline.stages.inverse.report import rule_rows
 from er3a.pipeline.stages.programs.model import ProgramMotion, ProgramsResults
 from er3a.pipeline.stages.trajectory.model import PathChecks, TrajectoryResults
 from er3a.pipeline.stages.validation.model import LeftOpen, PartFound
-from er3a.pipeline.stages.vision.model import GraspCounts
+from er3a.pipeline.stages.vision.model import GraspCounts, PathRows, VisionResults
 from er3a.pipeline.stages.workspace.entry import BoxTask
 from er3a.pipeline.stages.workspace.model import PlacementSummary, PlaceSummary, StandSummary
 from er3a.pipeline.stages.workspace.tool_capability import task_summary
@@ -110,6 +115,23 @@ def test_an_arm_that_nothing_can_meet_has_infinite_clearance():
     assert rule_rows(RankingRows(*map(np.array, one)), ["clearance"])[0][1].startswith("∞")
 
 
+def test_of_a_table_that_nothing_settles_each_page_says_so_first(tmp_path):
+    none = replace(FOUND, parts=tuple(replace(part, settled=0, up_to_signs=0) for part in FOUND.parts))
+    assert say(none).startswith("Don't rely on this table: ")
+    assert "none settles any entry of it" in say(none)
+    assert "but not all of it is settled" in say(FOUND)
+    assert (_foundation(none, tmp_path), _foundation(FOUND, tmp_path)) == ("unsettled", "caution")
+    assert caveat("unsettled").text.startswith("No entry of this D-H table is settled by an independent document")
+
+
+def _foundation(found: LeftOpen, folder: Path) -> str:
+    verdict = {"status": "caution", "params": plain(found)}
+    head = {"format_version": FORMAT_VERSION, "robot": "r", "stage": "validation", "figures": []}
+    (folder / "summary.json").write_text(json.dumps(head | {"verdict": verdict, "provenance": {}}), encoding="utf-8")
+    write_checksums(folder)
+    return read_foundation(folder)
+
+
 def test_a_point_enters_a_box_when_a_dense_walk_along_its_polyline_does(random):
     """Also if no vertex lies in the box; a vertex that is not known hides only the pieces that it ends."""
     low, high = np.array([-0.3, -0.2, -0.1]), np.array([0.2, 0.3, 0.25])
@@ -187,7 +209,7 @@ def test_the_index_names_what_passes_through_the_box_or_its_stand(over):
             )
         ),
     }
-    found = passing(stored)
+    found = passing(stored, None)
     assert found.targets == (("on_edge", "under") if over else ("on_edge",))
     assert f"Targets in it or its stand: {', '.join(found.targets)}." in found.text
     below = {"below": pytest.approx(2.75)} if over else {}
@@ -199,14 +221,38 @@ def test_the_index_names_what_passes_through_the_box_or_its_stand(over):
     assert found.text.endswith("Not compared, or not all of it: lost, still.")
     sound = {"trajectory": ["below", "beside"], "programs": ["through", "still"]}
     counts = f"{'1 of the 2 paths, ' if over else ''}1 of the 2 programs"
-    assert found.short(sound).endswith(f"or its stand in {counts} that pass without them.")
+    assert f"is in the way of {counts} that pass without them" in found.short(sound)
+
+
+def test_grasps_that_pass_through_the_box_are_counted():
+    """By hand: J1 carries the flange from -60 deg to 0 in 2 s, along the chord to (350, 0, 400) mm, and enters at
+    y = -100 mm."""
+    robot = load_robot("er3a_c60")
+    down = np.array([[1.0, 0, 0, 0.35], [0, -1, 0, 0], [0, 0, -1, 0.4], [0, 0, 0, 1]])
+    there = np.degrees(inverse(robot, down, np.zeros(6)).q[0])
+    q = np.stack([there - np.array([60.0, 0, 0, 0, 0, 0]), there, there + np.array([0, 0, 0, 0, 0, 30.0])])
+    names = np.array(["can"] * 3 + ["missed"] * 3)
+    ways = PathRows(names, names, np.arange(6), np.tile([0.0, 2, 3], 2), np.vstack([q, q]))
+    objects = [SimpleNamespace(name=name, outcome=outcome) for name, outcome in GRASPED.items()]
+    empty = VisionResults(SimpleNamespace(objects=objects), *(None,) * 5)
+    vision = SimpleNamespace(results=replace(empty, ways=ways))
+    found = passing({"workspace": placed(), "vision": vision}, robot)
+    enters = 2 * (1 - 100 / (350 * np.sin(np.radians(60))))
+    assert found.through == {"vision": {"can": pytest.approx(enters)}}
+    assert "is in the way of 1 of the 1 grasps that pass" in found.short({"vision": ["can"]})
+
+
+GRASPED = {"can": "grasped", "missed": "not graspable"}
 
 
 def test_without_motions_or_without_a_place_nothing_is_said_to_be_free():
-    assert passing({}) is None
-    alone = passing({"workspace": placed()})
-    assert (alone.short({}), alone.text) == ("No path or program was compared with its place.", "")
+    assert passing({}, None) is None
+    alone = passing({"workspace": placed()}, None)
+    assert (alone.short({}), alone.text) == (
+        "No path, program or grasp was compared with the place of the tray or box.",
+        "",
+    )
     clear = moving(
         ProgramsResults, ProgramMotion, "program", SimpleNamespace(programs=named("far")), {"far": (500.0, 0.0)}
     )
-    assert "links and the tool's body were not" in passing({"workspace": placed(), "programs": clear}).text
+    assert "links and the tool's body were not" in passing({"workspace": placed(), "programs": clear}, None).text

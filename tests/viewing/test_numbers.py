@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from er3a.pipeline.viewing.numbers import fixed, number
+from er3a.pipeline.viewing.numbers import fixed, measured, number
 
 
 @pytest.mark.parametrize(
@@ -23,6 +23,23 @@ from er3a.pipeline.viewing.numbers import fixed, number
 )
 def test_number_has_significant_digits(value, shown):
     assert number(value).replace("\u202f", " ") == shown
+
+
+@pytest.mark.parametrize(
+    ("value", "uncertainty", "shown"),
+    [
+        (13.98, 4.1, "14.0"),
+        (1.34512, 0.0011, "1.3451"),
+        (2345.6, 120.0, "2346"),
+        (0.000571, 0.028, "0.001"),
+        (12.3456, 1e-9, "12.35"),
+        (0.0, 0.5, "0"),
+        (12.3456, None, "12.35"),
+        (7, 0.5, "7"),
+    ],
+)
+def test_a_number_has_the_digits_that_its_uncertainty_has(value, uncertainty, shown):
+    assert measured(value, uncertainty) == shown
 
 
 def test_fixed_has_no_negative_zero():

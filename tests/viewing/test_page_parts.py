@@ -14,7 +14,7 @@ from er3a.pipeline.results import read_stage
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.validation.evidence_section import rounded_within, table_to_use
 from er3a.pipeline.study import load_study
-from er3a.pipeline.viewing.index import write_index
+from er3a.pipeline.viewing.index import _PlacesOfPage, write_index
 from er3a.pipeline.viewing.page import Numbering, linked
 from tests.conftest import ROOT
 
@@ -105,3 +105,12 @@ def test_the_index_marks_each_entry_of_a_table_as_validation_found_it(small_resu
     assert '<a href="#dh-er3a_c60">er3a_c60</a>' in page
     confirmed = legend.split("not confirmed")[0]
     assert set(re.findall('class="(\\w+)"', confirmed)) == {"settled", "settled_up_to_signs", "gauge"}
+
+
+def test_a_place_of_what_was_not_examined_says_so_in_the_search():
+    page = """<h2>Paths</h2><table><tr><td>line</td><td>safe</td></tr></table>
+    <div id="table-not-examined"><table><tr><td>collisions of a gripper</td><td>-</td></tr></table></div>
+    <table><tr><td>line 2</td></tr></table>"""
+    parser = _PlacesOfPage()
+    parser.feed(page)
+    assert list(parser.texts) == ["Paths", "line", "not examined: collisions of a gripper", "line 2"]

@@ -18,6 +18,7 @@ from er3a.files.scene_file import load_scene
 from er3a.files.vision_file import load_vision
 from er3a.geometry.transforms import moved, step_between, transform
 from er3a.kinematics.forward import forward
+from er3a.pipeline.messages.vision import say
 from er3a.pipeline.stages.vision.compute import grasp_programs
 from er3a.planning.timing import joint_limits
 from er3a.planning.way_around import EndOutsideLimits, PlannerMissing
@@ -25,10 +26,20 @@ from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.programs.languages import read_program
 from er3a.robots.joint_limits import within
 from er3a.vision.grasp_motion import PARTS
-from er3a.vision.grasping import DetectedObject, Grasp, GraspNeeds, GraspTask, GraspUnlikely, NoTransfer, plan_grasp
+from er3a.vision.grasping import (
+    DetectedObject,
+    Grasp,
+    GraspNearEnds,
+    GraspNeeds,
+    GraspTask,
+    GraspUnlikely,
+    NoTransfer,
+    plan_grasp,
+)
 from er3a.vision.hand_eye import calibrate_hand_eye
 from er3a.vision.next_view import board_visible, next_view
 from er3a.vision.point_error import ArmAccuracy, error_sizes, seen_pose, seen_pose_error, table_covariance
+from testing.arms import scara
 from testing.camera_cells import CARRIED, FIXED, FOLDER, SCENE, seen_from
 from testing.hand_eye_sets import pose
 
@@ -333,3 +344,20 @@ def test_other_arms_grasp_along_straight_lines(name, home):
         assert within(robot, q).all()
     if name == "ur5e":
         assert [leg.part for leg in chosen.legs] == ["move", "approach", "retreat"]
+
+
+def test_a_margin_asked_for_in_degrees_is_millimetres_of_a_slide():
+    """2 deg are not the 35 mm that metres taken for radians make of them."""
+    robot = scara()
+    needs = GraspNeeds(0.0, np.radians(2), 0.0, (1.0,) * 6)
+    limits = joint_limits(robot, np.array([3.0, 3, 0.5, 6]), 0.25)
+    task = GraspTask(robot, None, None, np.array([0.2, 0.4, 0.1, 0]), needs, limits, SPEED, 1)
+    for slide, margin in ((0.150, 30), (0.179, 1)):
+        T = forward(robot, np.array([0.3, 0.5, slide, 0.1]))
+        target = DetectedObject("t", T, 1e-12 * np.eye(6), 1, (Grasp("g", np.eye(4)),), 0.02, 0.02)
+        plan = plan_grasp(task, target, T, lambda _: 1e-12 * np.eye(6))
+        if margin < 2:
+            assert plan.refusal == GraspNearEnds(4, pytest.approx(1), 2.0)
+            assert "1.0 deg (mm of a prismatic joint) from the joint limits; 2 are required" in say(plan.refusal)
+        else:
+            assert np.degrees(plan.chosen.limit_margin) == pytest.approx(margin, abs=0.1)

@@ -19,7 +19,9 @@ from er3a.files.vision_file import load_vision
 from er3a.kinematics.forward import forward
 from er3a.pipeline.cli import app
 from er3a.pipeline.stages.vision.entry import vision_files
+from er3a.robots.joint_limits import joint_columns
 from testing import camera_cells
+from testing.arms import scara
 from testing.hand_eye_sets import X_TRUE, Y_TRUE, flange_poses, noisy, off, seen
 
 POSITION = ("x_mm", "y_mm", "z_mm")
@@ -174,6 +176,19 @@ def test_two_clocks_are_brought_together(tmp_path):
     found = calibrate_hand_eye(samples)
     assert np.abs(off(found.X, X_TRUE)).max() < 2e-3
     assert np.abs(off(found.Y, Y_TRUE)).max() < 2e-3
+
+
+def test_joints_that_slide_are_given_in_millimetres(tmp_path, poses):
+    robot = scara()
+    values = np.array([[10.0 + k, 20 - 3 * k, 100 + 5 * k, 5 * k] for k in range(8)])
+    target = columns(poses[1], "target", "quaternion")
+    file = write(tmp_path, dict(zip(joint_columns(robot), values.T, strict=True)) | target)
+    found = load_hand_eye(file, robot)
+    np.testing.assert_allclose(found.q[0], [np.radians(10), np.radians(20), 0.1, 0])
+    np.testing.assert_allclose(found.flange, forward(robot, found.q))
+    write(tmp_path, {f"q{k + 1}_deg": values[:, k] for k in range(4)} | target)
+    with pytest.raises(InputError, match=r"column q3_deg: joint 3 of made slides\. Give q1_deg, q2_deg, q3_mm, q4_deg"):
+        load_hand_eye(file, robot)
 
 
 def test_the_studys_sets_are_what_the_script_makes(tmp_path):

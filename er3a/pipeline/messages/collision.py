@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import assert_never
 
 import numpy as np
 
@@ -186,6 +187,8 @@ def solid_rows(scene: Scene | None) -> list[list[str]]:
             case Mesh():
                 extent = np.ptp(np.concatenate(each.pieces), axis=0)
                 size = tr("mesh {size}", size=_millimetres(extent).replace(", ", " × "))
+            case _:
+                assert_never(each)
         rows.append([each.name, size, f"({_millimetres(each.T[:3, 3])})"])
     return rows
 

@@ -99,6 +99,7 @@ TEXTS = texts(
         ),
         "move_obstacle": "Move the part, the obstacle or the base: the arm alone can take this pose with margin.",
         "near_limit": "Little margin: one joint is {margin_deg:.2g} deg from its limit.",
+        "near_end": "Little margin: one joint is {margin_deg:.2g} deg (mm of a prismatic joint) from its limit.",
         "sum_in_short#above": "{sum} {excess:.1f} above",
         "sum_in_short#below": "{sum} {excess:.1f} below",
         "slide_in_short#above": "J{joint} {excess:.1f} mm above",

@@ -29,7 +29,7 @@ from er3a.selection.nearest import (
     NoSolution,
     OtherBranch,
 )
-from er3a.selection.select import RULES, BestByRules, Measure, Placed
+from er3a.selection.select import BestByRules, Measure, Placed
 
 BRANCHES = {
     "front_elbow_up_no_flip": N_("front, elbow up, no flip"),
@@ -146,12 +146,18 @@ TEXTS = texts(
         ),
         "side_unsolved": "to the {side}: {why}",
         "greatest_move": "greatest joint move {angle_deg:.1f} deg (J{joint})",
+        "greatest_slide": "greatest joint move {move_mm:.1f} mm (J{joint})",
         "only_admissible": "{move}; the only admissible solution",
         "joint_turned": "J{joint} turned by {turn_deg:+d} deg",
         "other_turns": "the same branch, {joints:, }",
         "other_free_joint": "the same branch, its free joint at another angle",
         "all_collide": "all {count} solutions within the limits collide: {overlap}",
         "moves_less": "{move}; {other} needs {less_deg:.3g} deg more",
+        "slides_less": "{move}; {other} needs {less_deg:.3g} more (in deg, or mm of a prismatic joint)",
+        "slides_less_together": (
+            "{move}; {other} needs the same, but {less_deg:.3g} more of all joints together (in deg, or mm of a "
+            "prismatic joint)"
+        ),
         "moves_less_together": "{move}; {other} needs the same, but {less_deg:.3g} deg more of all joints together",
         "lower_branch_number": "{move}; {other} is just as near, and the lower branch number decides",
         "next_best": "the next best ({branch})",
@@ -296,7 +302,7 @@ def _(found: AllOutsideLimits) -> str:
 @say.register
 def _(found: Measure) -> str:
     rule = word("rule", RULE_NAMES, found.rule)
-    return f"{rule} {as_text(found.value, '.3g')} {RULES[found.rule].unit}".removesuffix(" 1")
+    return f"{rule} {as_text(found.value, '.3g')} {found.unit}".removesuffix(" 1")
 
 
 @say.register

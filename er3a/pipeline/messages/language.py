@@ -44,7 +44,8 @@ def written_title(text: str) -> str:
     return text
 
 
-UNITS = (N_("deg"), N_("deg/s"), N_("µdeg/s"))  # those that are not the same in every language
+# Those that are not the same in every language.
+UNITS = (N_("deg"), N_("deg (mm of a prismatic joint)"), N_("deg/s"), N_("µdeg/s"))
 
 
 def use(language: str, own: Mapping[str, str] | None = None) -> None:

@@ -14,7 +14,6 @@ TEXTS = texts(
         "left_out.obstacles": (
             "obstacles: none are given, so the arm was checked only against itself and what it carries"
         ),
-        "reserved.grasp_counts": "This is of the bare arm: no gripper was checked.",
         "reserved.dynamics.no_limits": (
             "What is not known comes on top of these torques, whose ± is that of the known masses alone: don't choose "
             "motors by them."
@@ -103,7 +102,7 @@ TEXTS = texts(
         "left_out.within_cells": "places within a cell of {amount:.0f} mm beside the one that an arm was found for",
         "left_out.targets": "targets without a solution within the limits",
         "left_out.turns": "other turns of the joints in solutions of targets, as there are many targets",
-        "left_out.carried": "collisions of a tool or workpiece: no shape of one is given",
+        "left_out.carried": "collisions of a tool, gripper or workpiece: the scene gives none a shape (`carried`)",
         "left_out.carried_shapes": "whether what the flange carries is shaped and held as the scene's file says",
         "left_out.tool": "the tool: none is given, so the flange's centre is taken as its tip",
         "left_out.plans": "motions for which the planner found none within its tries; there may be one",
@@ -168,7 +167,6 @@ TEXTS = texts(
 MAX_NAMED = 6  # in a sentence; the table names all
 _words: dict[LeftOutSubject, tuple[str, Mapping[str, str]]] = {}
 RESERVED: Mapping[str, tuple[LeftOutSubject, ...]] = {
-    "grasp_counts": ("carried", "bare_tool"),
     "dynamics.no_limits": ("link_masses", "load", "friction"),
 }
 NameT = TypeVar("NameT", bound=str)

@@ -21,6 +21,10 @@ FOUNDATIONS: Mapping[str, str] = {
         "Part of this D-H table is not settled: what passes here passes in the model. Run none of it on the arm before "
         "the table is confirmed."
     ),
+    "unsettled": N_(
+        "No entry of this D-H table is settled by an independent document: don't rely on it. What passes here passes "
+        "in the model; run none of it on the arm before the table is confirmed."
+    ),
     "no_reference": N_(
         "This D-H table was compared with no data: what passes here passes in the model. Run none of it on the arm "
         "before the table is confirmed."
@@ -237,15 +241,15 @@ def next_step(
 
 @dataclass(frozen=True)
 class Caveat:
-    """What to know first, and the status of validation that it comes from."""
+    """What to know first, and what validation found that it comes from."""
 
     status: str
     text: str
 
 
-def caveat(status: str) -> Caveat | None:
-    """What a status of validation says to know first; None for ``pass``."""
-    return Caveat(status, word("foundation", FOUNDATIONS, status)) if status in FOUNDATIONS else None
+def caveat(found: str) -> Caveat | None:
+    """What validation's foundation says to know first; None for ``pass``."""
+    return Caveat(found, word("foundation", FOUNDATIONS, found)) if found in FOUNDATIONS else None
 
 
 def glossary() -> dict[str, str]:

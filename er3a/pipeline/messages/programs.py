@@ -101,8 +101,9 @@ REMEDIES: dict[str, str] = {
     "program_data_file_missing": N_("Put the data file beside the program."),
     "program_name_twice": N_("Remove one of the two definitions."),
     "program_nothing_moves": N_("Check that this is the program to run."),
-    "speed_not_given": N_("Give a speed before the motion."),
-    "zone_without_size": N_("Give the zone's size in mm."),
+    "speed_not_given": N_("Give a speed, as a number above 0, before the motion."),
+    "acceleration_not_known": N_("Give the acceleration as a number."),
+    "zone_without_size": N_("Give the zone's size: in mm, or for C_PTP in percent ($APO.CPTP)."),
     "spline_as_line": N_("Write straight lines of the spline (SLIN)."),
     "configuration_not_read": N_("Check on the controller that it takes this solution."),
     "load_not_examined": N_(
@@ -250,6 +251,7 @@ TEXTS = texts(
         "motion_collides": "collision: {touches}",
         "motion_collides.more": "collision: {touches}; and more later",
         "bodies_touch": "{pair} after {at_mm:.1f} mm, up to {depth_mm:.1f} mm deep",
+        "bodies_touch.enlarged": "{touch} (these shapes are up to {enlarged_mm:.1f} mm larger than the meshes in them)",
         "bodies_touch.joint": "{pair} after {t_s:.2f} s, up to {depth_mm:.1f} mm deep",
         "arc_goes_on": "the arc ends after {angle_deg:g} deg, not at its target",
         "arc_goes_on.unknown": "the angle at which the arc ends is not known; the arc was not checked",
@@ -259,7 +261,13 @@ TEXTS = texts(
         ),
         "speed_not_given": "the program gives no speed; {assumed:g} m/s were assumed for the duration",
         "speed_not_given.share": "the program gives no speed; {percent:g} % were assumed for the duration",
-        "speed_not_given.word": "the speed '{word}' is not known; {assumed} was assumed for duration and joint speeds",
+        "speed_not_given.word": (
+            "the speed '{word}' is not known, or not above 0; {assumed} was assumed for duration and joint speeds"
+        ),
+        "acceleration_not_known": (
+            "the acceleration '{word}' is not known, or not above 0; one was assumed for duration and joint "
+            "accelerations"
+        ),
         "rest_not_checked.targets": (
             "only the first {checked} motions that are carried out were checked; of those from here on {targets} "
             "targets, for reach and limits, but not the motions between them"
@@ -277,7 +285,7 @@ TEXTS = texts(
         "program_other_encoding": "the file is not UTF-8; it was read as {encoding}",
         "program_nothing_moves": "no instruction moves the arm",
         "load_not_examined": "{mass_kg:g} kg on the flange from here on; torques with this load are not examined",
-        "load_not_examined.text": "the load {text} has no known numbers; torques with it are not examined",
+        "load_not_examined.text": "not all numbers of the load {text} are known; torques with it are not examined",
         "load_above_payload": "{mass_kg:g} kg on the flange, and the arm may carry {payload_kg:g} kg",
         "written_zones_dropped": Plural(
             "zones",
@@ -461,9 +469,14 @@ def _(found: found_in.MotionCollides) -> str:
 
 @say.register
 def _(found: found_in.BodiesTouch) -> str:
+    at = {"pair": say(found.pair), "depth_mm": found.depth_mm}
     if found.at_mm is None:
-        return sentence("bodies_touch.joint", pair=say(found.pair), depth_mm=found.depth_mm, t_s=found.t_s)
-    return say_as(found)
+        touch = sentence("bodies_touch.joint", t_s=found.t_s, **at)
+    else:
+        touch = sentence("bodies_touch", at_mm=found.at_mm, **at)
+    if not found.enlarged_mm:
+        return touch
+    return sentence("bodies_touch.enlarged", touch=touch, enlarged_mm=found.enlarged_mm)
 
 
 @say.register
@@ -487,7 +500,7 @@ def _(found: found_in.SpeedNotGiven) -> str:
 
 @say.register
 def _(found: found_in.LoadNotExamined) -> str:
-    return say_as(found) if found.mass_kg is not None else sentence("load_not_examined.text", text=found.text)
+    return sentence("load_not_examined.text", text=found.text) if found.text else say_as(found)
 
 
 @say.register

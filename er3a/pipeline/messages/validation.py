@@ -118,6 +118,10 @@ TEXTS = texts(
         ),
         "validation.left_open#entry": "an open or weak entry",
         "validation.left_open#uncovered": "No independent document covers this table ({checks}).",
+        "validation.left_open#unsettled": (
+            "Don't rely on this table: no independent document contradicts it, but none settles any entry of it. "
+            "{checks}; a check that other values would pass as well settles none."
+        ),
         "validation.left_open#uncontradicted": (
             "No independent document contradicts this table ({checks}), but not all of it is settled: a check that "
             "other values would pass as well settles none."
@@ -238,8 +242,9 @@ def _of_claims(found: JudgedTable) -> list[str]:
 
 @say.register
 def _(found: LeftOpen) -> str:
-    sentences = [_what_speaks(found.counts), settled_parts(found)]
-    if found.tolerance and any(part.settled or part.up_to_signs for part in found.parts):
+    some = any(part.settled or part.up_to_signs for part in found.parts)
+    sentences = [_what_speaks(found.counts, settled=some or not found.parts), settled_parts(found)]
+    if found.tolerance and some:
         sentences.append(
             say_as(found, "tolerance", mm=as_text(found.tolerance.mm, "g"), deg=as_text(found.tolerance.deg, "g"))
         )
@@ -314,12 +319,12 @@ def how_far_off(found: LeftOpen) -> list[str]:
     return sentences
 
 
-def _what_speaks(counts: CheckCounts) -> str:
+def _what_speaks(counts: CheckCounts, *, settled: bool) -> str:
     checks = counted_checks(counts)
     if counts.independent.conflicting:
         undecided = sentence("validation.left_open#conflicting", count=counts.independent.conflicting)
         checks = joined([checks, undecided], ", ")
-    form = "uncontradicted" if counts.independent.total else "uncovered"
+    form = ("uncontradicted" if settled else "unsettled") if counts.independent.total else "uncovered"
     return sentence(f"validation.left_open#{form}", checks=checks)
 
 

@@ -28,7 +28,7 @@ from er3a.vision.grasping import (
     PathCollides,
 )
 from er3a.vision.hand_eye import HandEye, spread_of
-from er3a.vision.table_corrections import NoCorrections, TableCorrections
+from er3a.vision.table_corrections import TABLE_CONTRADICTED, NoCorrections, TableCorrections
 from er3a.vision.vision_findings import (
     AngleOrder,
     DirectionTried,
@@ -120,6 +120,13 @@ TEXTS = texts(
             "the only solution is {margin_deg:.1f} deg from the joint limits; {needed_deg:g} deg are required",
             "the best of {count} solutions is {margin_deg:.1f} deg from the joint limits; {needed_deg:g} deg are "
             "required",
+        ),
+        "grasp_near_ends": Plural(
+            "solutions",
+            "the only solution is {margin_deg:.1f} deg (mm of a prismatic joint) from the joint limits; {needed_deg:g} "
+            "are required",
+            "the best of {count} solutions is {margin_deg:.1f} deg (mm of a prismatic joint) from the joint limits; "
+            "{needed_deg:g} are required",
         ),
         "grasp_singular": (
             "all solutions within the limits are singular: the least singular value is {singular_value:.2g} at best, "
@@ -353,12 +360,9 @@ def _(found: NoCorrections) -> str:
     return word("vision.no_corrections", NO_CORRECTIONS, found.why)
 
 
-CONTRADICTED = 0.01
-
-
 def correction_verdict(probability: float, before: float, after: float) -> str:
     """Whether the samples speak against the table as it is."""
-    if probability < CONTRADICTED:
+    if probability < TABLE_CONTRADICTED:
         return sentence("vision.corrections#contradicted", before=before, after=after, p=probability)
     return sentence("vision.corrections#consistent", before=before, after=after, p=probability)
 

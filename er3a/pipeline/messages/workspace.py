@@ -158,11 +158,12 @@ TEXTS = texts(
             ": centre at ({centre}) mm."
         ),
         "void.shoulder": (
-            "The tool point can't reach {lower:.3g} to {upper:.3g} L around the shoulder, within {box} mm of the base."
+            "The tool point can't reach {lower:.3g} to {upper:.3g} litres around the shoulder, within {box} mm of the "
+            "base."
         ),
         "void.away": (
-            "The tool point can't reach {lower:.3g} to {upper:.3g} L away from the shoulder, within {box} mm of the "
-            "base."
+            "The tool point can't reach {lower:.3g} to {upper:.3g} litres away from the shoulder, within {box} mm of "
+            "the base."
         ),
         "void.side": "{axis} {low} to {high}",
         "void.cause#limit": "What makes it: {limits}{unconfirmed}. Never widen a joint limit to reach there.",
@@ -175,8 +176,8 @@ TEXTS = texts(
         ),
         "void.no_tool": "With a tool the void is elsewhere.",
         "void.pocket": (
-            "Out of reach too, but open to the outside: a larger pocket of {lower:.3g} to {upper:.3g} L, within {box} "
-            "mm."
+            "Out of reach too, but open to the outside: a larger pocket of {lower:.3g} to {upper:.3g} litres, within "
+            "{box} mm."
         ),
         "void.more": Plural(
             "count", "There is {count} other enclosed void.", "There are {count} other enclosed voids."
@@ -201,8 +202,8 @@ TEXTS = texts(
             "scene file and run again."
         ),
         "box.range": (
-            "Keep this height: other stands of {least} to {most} mm pass the same checks, but bring the arm nearer to "
-            "a singular pose (at one of them manipulability is {percent:.2g} % of that at {gap} mm, or less)."
+            "Keep the stand at {gap} mm: heights of {least} to {most} mm pass the same checks, but bring the arm "
+            "nearer to a singular pose (at one of them manipulability is {percent:.2g} % of that at {gap} mm, or less)."
         ),
         "box.proven#all": "the tool point, {tilt}, reaches all of it (proven); {unchecked}",
         "box.proven#upper": (

@@ -74,7 +74,7 @@ def left_out_without_tool(robot: Robot) -> tuple[LeftOut, ...]:
     return () if "tool" in robot.sources or not np.array_equal(robot.tool, np.eye(4)) else (LeftOut("tool"),)
 
 
-ORIENTATION_OFF_DEG = 0.1  # of what an arm of few joints can't set, which a target may be off by
+ORIENTATION_OFF_DEG = 0.1  # of what an arm of few joints can't set; poses with two decimals of deg are off by less
 
 
 def left_out_of_orientations(robot: Robot, asked: Iterable[tuple[str, Reals, Reals]]) -> tuple[LeftOut, ...]:

@@ -23,7 +23,7 @@ from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.pages import Caveat, caveat
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.player.player import LOOKS, drawn_shapes, drawn_size, floor_of, import_map, scene_data, table_data
-from er3a.pipeline.results import Provenance, input_records, is_computed, read_status
+from er3a.pipeline.results import Provenance, input_records, is_computed, read_foundation
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.trajectory.motion import near_singular
 from er3a.pipeline.study import Study
@@ -116,6 +116,7 @@ WORDS: dict[str, Any] = {
         "iteration found no joint values within the limits; the nearest are {length} and {angle} away. This "
         "does not prove that none exist"
     ),
+    "in_metres": N_("Positions are in mm: did you mean ({place})?"),
     "left_over": N_(
         "The tool is {length} and {angle} away from what was asked, in what the {joints} joints of this arm cannot set."
     ),
@@ -273,7 +274,7 @@ def write_teach_page(study: Study, name: str, results: Path, output: Path) -> No
     """Write the teach panel of a robot of the study to ``output``; the verdict on its table is in ``results``."""
     validated = results / name / "validation"
     known = is_computed(validated)
-    first_caveat = caveat(read_status(validated) if known else "not_computed")
+    first_caveat = caveat(read_foundation(validated) if known else "not_computed")
     near = near_singular(study.section(TrajectorySettings))
     inputs = input_records(study.inputs(name, "teach"))
     write_panel(

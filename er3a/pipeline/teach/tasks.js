@@ -8,6 +8,7 @@ import { fill, fixed, inDegrees, inMillimetres, meant, plain, shown, toDegrees, 
 const SPEED = 30; // deg/s on the mean of a move, of the joint that takes longest
 const SLIDE_SPEED = 150; // mm/s
 const STILL = 1e-9; // rad or m
+const AS_METRES = 5; // mm from the base's origin: who types less means metres
 const FOLLOWED = 1e-6; // m and rad
 
 const byId = (id) => document.getElementById(id);
@@ -52,7 +53,12 @@ function typePose(reach, arm, words) {
     if (bad) return write(message, fill(words.pose_number, { field: bad.ariaLabel }));
     const [roll, pitch, yaw] = values.slice(3).map(toRadians);
     const turn = multiply(rotZ(yaw), multiply(rotY(pitch), rotX(roll)));
-    reach(multiply(translation(...values.slice(0, 3).map((value) => value / 1000)), turn), message);
+    const place = values.slice(0, 3);
+    reach(multiply(translation(...place.map((value) => value / 1000)), turn), message);
+    const far = Math.hypot(...place);
+    if (far === 0 || far >= AS_METRES) return;
+    const typed = place.map((value) => Number((1000 * value).toFixed(3))).join(", ");
+    write(message, `${message.textContent} ${fill(words.in_metres, { place: typed })}`.trim());
   });
   take();
 }

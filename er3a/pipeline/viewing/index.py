@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from html.parser import HTMLParser
 from pathlib import Path
@@ -24,7 +24,7 @@ from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull
 
 from er3a.files.kept_files import write_atomically
-from er3a.kinematics.forward import skeleton
+from er3a.kinematics.forward import forward, skeleton
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages.collision import near_shapes
@@ -52,15 +52,15 @@ from er3a.pipeline.results import (
     Stored,
     input_records,
     is_computed,
+    read_foundation,
     read_stage,
-    read_status,
     result_records,
 )
 from er3a.pipeline.stages.expectations import unmet_expectations
-from er3a.pipeline.stages.programs.model import ProgramsResults, ProgramSummary
+from er3a.pipeline.stages.programs.model import ProgramMotion, ProgramsResults, ProgramSummary
 from er3a.pipeline.stages.programs.played import faults as program_faults
 from er3a.pipeline.stages.registry import STAGES, all_messages
-from er3a.pipeline.stages.trajectory.model import PathSummary, TrajectoryResults
+from er3a.pipeline.stages.trajectory.model import PathChecks, PathSummary, TrajectoryResults
 from er3a.pipeline.stages.trajectory.played import faults as path_faults
 from er3a.pipeline.stages.validation.evidence_section import evidence_section, verdict_legend
 from er3a.pipeline.stages.validation.model import (
@@ -72,6 +72,7 @@ from er3a.pipeline.stages.validation.model import (
     TableEvidence,
     ValidationResults,
 )
+from er3a.pipeline.stages.vision.model import VisionResults
 from er3a.pipeline.stages.workspace.model import PlacementSummary, VoidSummary, WorkspaceResults, WorkspaceSummary
 from er3a.pipeline.study import Study
 from er3a.pipeline.sweeps import ENTRIES, entry_label
@@ -116,7 +117,7 @@ def write_compare(study: Study, results: Path, workspaces: Workspaces, output: P
         rows=rows,
         data=data,
         caveats={
-            name: caveat(read_status(folder) if is_computed(folder) else "not_computed")
+            name: caveat(read_foundation(folder) if is_computed(folder) else "not_computed")
             for name, folder in validated.items()
         },
         low=corners.min(axis=0).tolist(),
@@ -489,6 +490,7 @@ def _counts(verdicts: Sequence[StageVerdict]) -> dict[str, str]:
 
 SHOWN_FIGURES = 3
 RUNS = {"trajectory": N_("paths"), "programs": N_("programs")}  # stages whose motions may be run or not
+MOVED = RUNS | {"vision": N_("grasps")}  # stages with motions that the box is compared with
 OF_ALL_RUNS = (  # what may turn any of them unsafe
     *("obstacles", "uncovered_links", "bare_tool", "base_inside", "allowed_contacts", "program_rest", "given_rates"),
     *("controller_language", "tool", "carried", "torques"),
@@ -514,7 +516,7 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
     page.render(
         Path(__file__).with_name("index.html.j2"),
         folder / "index.html",
-        places=list(_places(study, folder)),
+        places=list(_places(study, folder, {each["robot"].name for each in robots if each["table"] == "fail"})),
         robots=robots,
         legend=verdict_legend(status for each in robots if each["entries"] for status in each["entries"]["statuses"]),
         article=study.article is not None,
@@ -543,9 +545,10 @@ class _PlacesOfPage(HTMLParser):
     def __init__(self) -> None:
         super().__init__()
         self.texts: dict[str, None] = {}
-        self._depth, self._cells, self._parts = 0, 0, list[str]()
+        self._depth, self._cells, self._parts, self._unexamined = 0, 0, list[str](), False
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self._unexamined |= dict(attrs).get("id") == "table-not-examined"
         if tag == "tr":
             self._cells = 0
         elif tag in ("td", "th"):
@@ -553,8 +556,11 @@ class _PlacesOfPage(HTMLParser):
         verdict = tag == "section" and "verdict" in (dict(attrs).get("class") or "")
         if self._depth or verdict or tag in self.NAMED or (tag == "td" and self._cells == 1):
             self._depth += tag not in VOID_TAGS
+            if tag == "td" and self._unexamined:
+                self._parts = [tr("not examined"), tr(": ")]
 
     def handle_endtag(self, tag: str) -> None:
+        self._unexamined &= tag != "table"
         if not self._depth or tag in VOID_TAGS:
             return
         self._depth -= 1
@@ -570,11 +576,15 @@ class _PlacesOfPage(HTMLParser):
             self._parts.append(data)
 
 
-def _places(study: Study, folder: Path) -> Iterator[tuple[str, str, list[str]]]:
-    """Of each page that is there its address, its title, and where a reader's words may stand on it."""
+def _places(study: Study, folder: Path, contradicted: Set[str]) -> Iterator[tuple[str, str, list[str]]]:
+    """Of each page that is there its address, its title, and where a reader's words may stand on it; a title says which
+    robots' tables evidence contradicts."""
     pages = [(name, stage) for name in study.names for stage in study.pages(name) if stage != "teach"]
+    warned = {name: tr("never use this table") if name in contradicted else "" for name in study.names}
+    titles = {name: bracketed(own_title(study.robot(name).title), warned[name]) for name in study.names}
     named = {
-        f"{name}/{stage}.html": f"{own_title(study.robot(name).title)}: {tr(PAGES[stage])}" for name, stage in pages
+        f"{name}/{stage}.html": tr("{robot}: {page}", robot=titles[name], page=tr(PAGES[stage]))
+        for name, stage in pages
     }
     if study.article:
         named["article.html"] = tr("The article, item by item")
@@ -613,13 +623,11 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
     same_arm, instead = isinstance(finding, DefinedOtherwise), alternative_table(study, name, results.parent)
     unproven, settled = _settled(finding)
     box_range = _box_range(stored["workspace"].results) if "workspace" in stored else ""
-    passes = passing({stage: each for stage, each in stored.items() if heads[stage].status != "not_computed"})
-    runs = [
-        _run(stage, stored[stage].results)
-        for stage in RUNS
-        if stage in stored and heads[stage].status != "not_computed"
-    ]
-    sound = {run["stage"]: run["sound"] for run in runs}
+    computed = {stage: each for stage, each in stored.items() if heads[stage].status != "not_computed"}
+    passes = passing(computed, robot)
+    runs = [_run(stage, computed[stage].results) for stage in RUNS if stage in computed]
+    grasped = _grasped(computed["vision"].results) if "vision" in computed else []
+    sound = {run["stage"]: run["sound"] for run in runs} | {"vision": grasped}
     return {
         "robot": robot,
         "table": table,
@@ -639,6 +647,7 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         ),
         "bodies": [each.name for each in scene.solids] if (scene := study.scene(name, "trajectory")) else [],
         "runs": runs,
+        "grasped": grasped,
         "condition": condition(_parts(heads), getattr(finding, "unbounded", ())),
         "box": joined([_without_box(), passes.text], " ") if passes else "",
         "in_box": passes.through if passes else {},
@@ -696,7 +705,7 @@ def _answers(heads: Mapping[str, Head], robot: Robot, passes: str, box_range: st
         if box and _misses(heads["workspace"], "tool"):
             bare = tr("No tool is given: the flange's own centre enters the box. Repeat it with your tool's length.")
             box = joined([box, bare], " ")
-        box = joined([box, box_range, passes], " ") if box else ""
+        box = joined([passes, box, box_range], " ") if box else ""
         yield tr("Tray or box"), box, "workspace.html#placement"
     summary = heads["dynamics"].summary if "dynamics" in heads else None
     yield tr("Payload"), payload_text(summary, robot), "dynamics.html#payload" if summary else ""
@@ -739,7 +748,7 @@ class Passing:
     ----------
     through : per stage the first time (s) by name
     targets : those with a solution, whose tool points lie in it
-    unseen : names of paths and programs whose tool points are not known, or not all
+    unseen : names of motions whose tool points are not known, or not all
     """
 
     through: Mapping[str, Mapping[str, float]]
@@ -768,20 +777,22 @@ class Passing:
     def short(self, sound: Mapping[str, Sequence[str]]) -> str:
         """How many there are among the names of what passes, per stage."""
         if not self.through:
-            return tr("No path or program was compared with its place.")
+            return tr("No path, program or grasp was compared with the place of the tray or box.")
         counts = [
-            tr("{count} of the {passing} {what}", count=len(inside), passing=len(sound[stage]), what=tr(RUNS[stage]))
+            tr("{count} of the {passing} {what}", count=len(inside), passing=len(sound[stage]), what=tr(MOVED[stage]))
             for stage, found in self.through.items()
             if (inside := found.keys() & sound[stage])
         ]
         if not counts:
             return ""
         return tr(
-            "The tool point passes through it or its stand in {runs} that pass without them.", runs=joined(counts, ", ")
+            "The tray or box, or its stand, is in the way of {runs} that pass without them: the tool point goes "
+            "through.",
+            runs=joined(counts, ", "),
         )
 
 
-def passing(stored: Mapping[str, Stored[Any]]) -> Passing | None:
+def passing(stored: Mapping[str, Stored[Any]], robot: Robot) -> Passing | None:
     """What passes through the box of the study where the workspace stage puts it; None if it puts none."""
     placement = getattr(stored["workspace"].results.summary, "placement", None) if "workspace" in stored else None
     if not isinstance(placement, PlacementSummary) or not placement.named_places:
@@ -791,23 +802,48 @@ def passing(stored: Mapping[str, Stored[Any]]) -> Passing | None:
     if placement.stand is None and placement.over:
         low[2] = min(low[2], 1000 * placement.over.height_m)
     through, unseen = dict[str, dict[str, float]](), list[str]()
-    for stage in (name for name in RUNS if name in stored):
+    for stage in (name for name in MOVED if name in stored):
         results = stored[stage].results
-        programs = isinstance(results, ProgramsResults)
-        names, motion = (results.motion.program, results.motion) if programs else (results.checks.path, results.checks)
-        followed = results.summary.programs if programs else results.summary.paths
         through[stage] = {}
-        for name in (each.name for each in followed):
-            rows = motion.take(names == name)
-            first = first_inside(rows.t_s, rows.xyz_mm, low, high)
+        for name, t, points in _tool_points(results, robot):
+            first = first_inside(t, points, low, high)
             if first is not None:
                 through[stage][name] = first
-            if len(rows) < 2 or not np.isfinite(rows.xyz_mm).all():
+            if len(t) < 2 or not np.isfinite(points).all():
                 unseen.append(name)
         unseen += [each.name for each in getattr(results.summary, "not_followed", ())]
     targets = stored["inverse"].results.summary.targets if "inverse" in stored else ()
     inside = (each.name for each in targets if each.chosen_deg and np.all((low <= each.xyz_mm) & (each.xyz_mm <= high)))
     return Passing(through, tuple(inside), tuple(unseen))
+
+
+def _grasped(results: VisionResults) -> list[str]:
+    """Names of the objects that can be grasped."""
+    return [each.name for each in results.summary.objects if each.outcome == "grasped"]
+
+
+def _tool_points(
+    results: TrajectoryResults | ProgramsResults | VisionResults, robot: Robot
+) -> Iterator[tuple[str, Reals, Reals]]:
+    """The motions of a stage: name, times (n,) in s, and tool points (n, 3) in mm."""
+    if isinstance(results, VisionResults):
+        ways = results.ways
+        for name in _grasped(results):
+            rows = ways.take(ways.target == name)
+            yield name, rows.t_s, 1000 * forward(robot, np.radians(rows.q_deg))[:, :3, 3]
+        return
+    for name, own in _followed(results):
+        yield name, own.t_s, own.xyz_mm
+
+
+def _followed(results: TrajectoryResults | ProgramsResults) -> Iterator[tuple[str, PathChecks | ProgramMotion]]:
+    """Each path or program that was followed, and its rows."""
+    if isinstance(results, ProgramsResults):
+        for program in results.summary.programs:
+            yield program.name, results.motion.take(results.motion.program == program.name)
+        return
+    for path in results.summary.paths:
+        yield path.name, results.checks.take(results.checks.path == path.name)
 
 
 def first_inside(t: Reals, points: Reals, low: Reals, high: Reals) -> float | None:

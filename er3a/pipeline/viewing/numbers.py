@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from math import isnan
+from math import floor, isnan, log10
 
 from er3a.pipeline.messages.language import as_number
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+SMALLEST = 1e-4  # uncertainty that is written without a power of ten
 
 
 def no_noise(value: float) -> float:
@@ -31,6 +34,13 @@ def number(value: float | int | None, digits: int = 4) -> str:
     if "e" in text:
         text = f"{float(text):.0f}"
     return as_number(f"{float(text):.{len(text.partition('.')[2])}f}")
+
+
+def measured(value: float | int | None, uncertainty: float | None) -> str:
+    """A number with as many decimals as two significant digits of its uncertainty have, if it has one."""
+    if not isinstance(value, float) or not value or not uncertainty or uncertainty < SMALLEST:
+        return number(value)
+    return fixed(value, max(0, 1 - floor(log10(uncertainty))))
 
 
 def fixed(value: float | None, decimals: int = 1) -> str:

@@ -91,7 +91,15 @@ function makeSortable(table) {
 
 function csvOf(table) {
   const quoted = (text) => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
-  return [...table.rows].map((row) => [...row.cells].map((cell) => quoted(plain(textOf(cell)))).join(",")).join("\n") + "\n";
+  return [...table.rows].map((row) => [...row.cells].flatMap(partsOf).map((text) => quoted(plain(text))).join(",")).join("\n") + "\n";
+}
+
+// A cell's texts: of a D-H table's entry its value, and apart from it what is known of it.
+function partsOf(cell) {
+  if (!cell.matches(".entries .n")) return [textOf(cell)];
+  if (cell.tagName === "TH") return [textOf(cell), `${textOf(cell)}${WORDS.colon}${WORDS.known}`];
+  const [value, ...known] = [...cell.childNodes].map((part) => part.textContent.trim()).filter(Boolean);
+  return [value ?? "", known.join(" ")];
 }
 
 function nameFor(element) {
@@ -338,6 +346,7 @@ const HEADINGS = ["H2", "H3", "SUMMARY", "CAPTION"];
 const CONTAINERS = "h2, h3, p, ul, ol, dl, tr, figure, section, details";
 const WHOLE = "tr, li, dl, figure, .verdict, #turning, .player"; // found or not as one
 const BESIDE = "script, style, thead, .contents, .tools, .pickers"; // goes with what it belongs to
+const WARNING = "#decisions .decision.fail, .caveat, .assumed-shapes, .verdict, .robot h2, .robot .decision, p:has(strong)";
 
 // What a reader sees of an element, folded or not, in small letters.
 function allText(element) {
@@ -376,6 +385,15 @@ function keepFound(element, words, above) {
   return count;
 }
 
+// What warns of a part of which something is found stays with it.
+function keepWarnings(main) {
+  for (const warning of main.querySelectorAll(WARNING)) {
+    const about = warning.parentElement.closest("section, details, main");
+    if (about.closest(".unfound")) continue;
+    for (let part = warning; part !== about; part = part.parentElement) part.classList.remove("unfound");
+  }
+}
+
 // One field over the whole page; the address keeps its words, as "?find=words". The index looks on all pages with it.
 function addFinder() {
   const main = document.querySelector("main");
@@ -403,6 +421,7 @@ function addFinder() {
     const here = words.length ? keepFound(main, words, "") : 0;
     const count = others.reduce((sum, { texts }) => sum + texts.length, here);
     status.textContent = !words.length ? "" : count ? WORDS.found.replace("{count}", count) : document.getElementById("places") ? WORDS.noneAnywhere : WORDS.none;
+    if (count) keepWarnings(main);
     if (!words.length || !count) { // all of the page
       for (const part of [main, ...main.querySelectorAll(".unfound")]) part.classList.remove("unfound", "finding");
       open.forEach((was, part) => (part.open = was));

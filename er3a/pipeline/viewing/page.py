@@ -45,9 +45,10 @@ from er3a.pipeline.results import (
 )
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.stage import Stage
+from er3a.pipeline.stages.workspace.entry import CapabilitySettings
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import readings, svg_data_uri
-from er3a.pipeline.viewing.numbers import fixed, number
+from er3a.pipeline.viewing.numbers import fixed, measured, number
 from er3a.version import __version__
 
 _HERE = Path(__file__).parent
@@ -67,6 +68,7 @@ WHOLE, LED = 300, 260  # characters of a verdict that is shown in one, and those
 SCRIPT_WORDS = {
     "sort": N_("sort by this column"),
     "csv": N_("download as CSV"),
+    "known": N_("what is known of it"),
     "svg": N_("download"),
     "enlarge": N_("enlarge"),
     "close": N_("close"),
@@ -297,6 +299,7 @@ def render(
     environment.globals |= {"view_command": view_command, "numbered": Numbering(), "bracketed": bracketed}
     environment.filters |= {
         "number": number,
+        "measured": measured,
         "fixed": fixed,
         "tr": tr,
         "own": language.own_title,
@@ -355,9 +358,18 @@ def render_stage(
         "command": run_command(study, f"{name}/{stage}.html"),
         "robot": study.robot(name),
         "robot_pages": study.pages(name),
+        "box": "" if stage in ("validation", "workspace", "dynamics") else _box(study, stored),
     }
     template = _HERE.parent / "stages" / stage / "report.html.j2"
     render(template, output, stored.results.summary, **shared | context)
+
+
+def _box(study: Study, stored: Stored[Any]) -> str:
+    """The edges (mm) of the tray or box that the workspace page may place, which no other stage takes for an obstacle;
+    empty where no place is asked for or recommended."""
+    if "workspace" not in study.stages(stored.robot) or stored.rests_on.get("validation") == "fail":
+        return ""
+    return " × ".join(f"{edge:g}" for edge in study.section(CapabilitySettings).placement.box_mm)
 
 
 BRACKETS = re.compile(r"(?<=>)(?<!<code>)([^<>()]{1,40}) \(([^<>()]{1,20})\)(?=</t[hd]>)")
@@ -532,4 +544,5 @@ def report_absent(study: Study, stored: Stored[AbsentResults], output: Path) -> 
         command=run_command(study, f"{stored.robot}/{stored.stage}.html"),
         robot=study.robot(stored.robot),
         robot_pages=study.pages(stored.robot),
+        box="",
     )

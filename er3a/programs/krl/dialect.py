@@ -342,16 +342,31 @@ def _number(memory: ProgramMemory, variable: str, array: str, given: syntax.Valu
 def _tool_number(memory: ProgramMemory, given: syntax.Value) -> None:
     """Tool and load by their number, as controllers' own bas.src sets both."""
     _number(memory, "$TOOL", "TOOL_DATA", given)
+    for name in _load_parts(memory):
+        del memory.shared[name]
     memory.write("$LOAD", memory.read(f"LOAD_DATA[{syntax.number(given) or 0:g}]") or 0)
 
 
-def load_of(value: syntax.Value | None) -> MassBody | str | None:
+def _load_parts(memory: ProgramMemory) -> list[str]:
+    """Parts of $LOAD that are set one by one, as by ``$LOAD.M=5``, where the whole is not known."""
+    return [name for name in memory.shared if name.startswith("$LOAD.")]
+
+
+def _load(memory: ProgramMemory) -> instructions.Load | None:
+    """What the program says hangs on the flange."""
+    whole, parts = memory.read("$LOAD"), _load_parts(memory)
+    if parts and not isinstance(whole, syntax.Record):
+        return instructions.UnclearLoad(", ".join(parts), syntax.number(memory.read("$LOAD.M")))
+    return load_of(whole)
+
+
+def load_of(value: syntax.Value | None) -> instructions.Load | None:
     """What a LOAD says hangs on the flange; None for a mass below 0, which means unknown.
 
     ``{M kg, CM {X mm, Y, Z, A deg, B, C}, J {X kg m^2, Y, Z}}``: J about the axes of CM, through the centre of mass.
     """
     if not isinstance(value, syntax.Record):
-        return value.text if isinstance(value, syntax.Unclear) else None
+        return instructions.UnclearLoad(value.text) if isinstance(value, syntax.Unclear) else None
     mass, moments = syntax.number(value.get("M")), value.get("J")
     if mass is not None and mass <= 0:
         return None
@@ -359,7 +374,7 @@ def load_of(value: syntax.Value | None) -> MassBody | str | None:
     parts = [syntax.number(moments.get(key)) for key in "XYZ"] if isinstance(moments, syntax.Record) else [0.0] * 3
     given = [each for each in parts if each is not None]
     if mass is None or not math.isfinite(mass) or centre is None or len(given) < 3:
-        return "LOAD"
+        return instructions.UnclearLoad("LOAD", mass)
     x, y, z = given
     return moved(MassBody(mass, inertia=(x, y, z, 0.0, 0.0, 0.0)), centre)
 
@@ -470,7 +485,7 @@ class Settings(NamedTuple):
     speed: instructions.Rate | None
     acceleration: instructions.Rate | None
     zone: instructions.Zone
-    load: MassBody | str | None
+    load: instructions.Load | None
 
 
 def _set_alone(code: tuple[syntax.Operation, ...], number: str, frame: str) -> bool:
@@ -715,7 +730,7 @@ def _settings(memory: ProgramMemory, kind: instructions.MotionKind, move: syntax
             _speed(memory, kind),
             _acceleration(memory, kind),
             _zone(memory, kind, move.words),
-            load_of(memory.read("$LOAD")),
+            _load(memory),
         )
         memory.kept[key] = found
     return found
@@ -724,8 +739,7 @@ def _settings(memory: ProgramMemory, kind: instructions.MotionKind, move: syntax
 def _speed(memory: ProgramMemory, kind: instructions.MotionKind) -> instructions.Rate | None:
     if kind == "joint":
         return _axis_share(memory, "$VEL_AXIS")
-    speed = syntax.number(memory.read("$VEL.CP"))
-    return None if speed is None else instructions.Rate(speed, "m/s")
+    return syntax.rate_of(memory.read("$VEL.CP"), "m/s")
 
 
 def _acceleration(memory: ProgramMemory, kind: instructions.MotionKind) -> instructions.Rate | None:
@@ -733,16 +747,18 @@ def _acceleration(memory: ProgramMemory, kind: instructions.MotionKind) -> instr
         return _axis_share(memory, "$ACC_AXIS")
     value = memory.read("$ACC.CP")
     if isinstance(value, syntax.Record):
-        share = syntax.number(value.get("share"))
-        return None if share is None else instructions.Rate(share, "share")
-    found = syntax.number(value)
-    return None if found is None else instructions.Rate(found, "m/s2")
+        return syntax.rate_of(value.get("share"), "share")
+    return syntax.rate_of(value, "m/s2")
 
 
 def _axis_share(memory: ProgramMemory, name: str) -> instructions.Rate | None:
-    given = [syntax.number(memory.read(f"{name}[{axis}]")) for axis in range(1, 7)]
-    smallest = min((each for each in given if each is not None), default=None)
-    return None if smallest is None else instructions.Rate(smallest / 100, "share")
+    """What is set for the axes in percent: one that is not known, else one beyond 100, else the slowest."""
+    values = [memory.read(f"{name}[{axis}]") for axis in range(1, 7)]
+    given = [rate for value in values if (rate := syntax.rate_of(value, "share", 100.0)) is not None]
+    if any(rate.text for rate in given):
+        return next(rate for rate in given if rate.text)
+    beyond = [rate for rate in given if rate.value > 1]
+    return min(beyond or given, key=lambda rate: rate.value, default=None)
 
 
 def _zone(memory: ProgramMemory, kind: instructions.MotionKind, words: tuple[str, ...]) -> instructions.Zone:

@@ -17,7 +17,7 @@ from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, syntax
 from er3a.programs.evaluation import Dialect, Position, ProgramMemory
 from er3a.programs.rapid import data_types, reader
-from er3a.robots.masses import MassBody, moved, together
+from er3a.robots.masses import moved, together
 
 ROBOT_BASE = instructions.NamedFrame("wobj0", np.eye(4))
 JOINT_FORMS = ("MOVEJ", "TRIGGJ")
@@ -361,14 +361,14 @@ def _tool(memory: ProgramMemory, expression: object, value: syntax.Value) -> tup
     ), stationary
 
 
-def _load(memory: ProgramMemory, tool: instructions.NamedFrame, total: syntax.Value | None) -> MassBody | str | None:
+def _load(memory: ProgramMemory, tool: instructions.NamedFrame, total: syntax.Value | None) -> instructions.Load | None:
     """What the program says hangs on the flange: the tool, and what GripLoad says is in it (in the tool's frame).
 
     ``\\TLoad`` says all of it; load0 there is as if it were not given (1 MoveL).
     """
     whole = data_types.load_of(data_types.typed(total, data_types.LOADDATA)) if total is not None else None
     if total is not None and whole is None:
-        return f"\\TLoad {total.text if isinstance(total, syntax.Unclear) else ''}".strip()
+        return instructions.UnclearLoad(f"\\TLoad {total.text if isinstance(total, syntax.Unclear) else ''}".strip())
     if whole is not None and whole.mass > data_types.MIN_LOAD:
         return whole
     value = memory.read("%GRIPLOAD")
@@ -376,11 +376,11 @@ def _load(memory: ProgramMemory, tool: instructions.NamedFrame, total: syntax.Va
         return tool.load
     gripped = data_types.load_of(data_types.typed(value, data_types.LOADDATA))
     if gripped is None:
-        return f"GripLoad {value.text if isinstance(value, syntax.Unclear) else ''}".strip()
+        return instructions.UnclearLoad(f"GripLoad {value.text if isinstance(value, syntax.Unclear) else ''}".strip())
     if gripped.mass <= data_types.MIN_LOAD:
         return tool.load
     if tool.pose is None:
-        return f"GripLoad ({tool.name})"
+        return instructions.UnclearLoad(f"GripLoad ({tool.name})", gripped.mass)
     return together([*([tool.load] if tool.load else []), moved(gripped, tool.pose)])
 
 
@@ -403,6 +403,8 @@ def _displaced(memory: ProgramMemory, base: instructions.NamedFrame) -> instruct
     if moved is None or base.pose is None:
         return base
     pose = data_types.pose_matrix(moved)
+    if pose is None:
+        pose = _mapped(memory, "pdispon")
     if pose is None or not np.array_equal(pose, np.eye(4)):
         base = instructions.NamedFrame("PDispOn" if pose is None else "", None if pose is None else base.pose @ pose)
     return base
@@ -412,21 +414,19 @@ def _speed(
     memory: ProgramMemory, value: syntax.Value, options: Mapping[str, syntax.Value], kind: instructions.MotionKind
 ) -> tuple[instructions.Rate | None, float | None]:
     """Speed of the tool and of its turn (rad/s); 1 VelSet scales and bounds it."""
-    seconds = syntax.number(options.get("T"))
-    if seconds is not None and seconds > 0:
-        return instructions.Rate(seconds, "s"), None
+    if "T" in options:
+        return syntax.rate_of(options["T"], "s"), None
     share, most = _velocity(memory)
     if isinstance(value, syntax.Record) and value.get("FASTEST") is True:
         if kind == "joint":
             return instructions.Rate(share, "share", "vmax"), None
         return instructions.Rate(most / 1000 * share, "m/s", "vmax"), math.radians(data_types.TURN_SPEED) * share
     data = data_types.typed(value, data_types.SPEEDDATA)
-    along, turn = syntax.number(data_types.part(data, "V_TCP")), syntax.number(data_types.part(data, "V_ORI"))
-    own = syntax.number(options.get("V"))
-    along = along if own is None else own
-    if along is None or along <= 0:
-        return None, None
-    limited = min(along * share, most)
+    turn = syntax.number(data_types.part(data, "V_ORI"))
+    along = syntax.rate_of(options.get("V", data_types.part(data, "V_TCP")), "m/s")
+    if along is None or along.text:
+        return along or instructions.Rate(0.0, "m/s", syntax.shown(value)), None
+    limited = min(along.value * share, most)
     return instructions.Rate(limited / 1000, "m/s"), math.radians(turn) * share if turn and kind != "joint" else None
 
 

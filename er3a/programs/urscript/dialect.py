@@ -209,9 +209,11 @@ class UrScriptDialect(Dialect):
             made = _in_mode(memory, values["mode"], via, made, move.text)
         a, v = DEFAULTS[move.form]
         joint = kind == "joint"
-        seconds = syntax.number(values.get("t")) or 0.0
+        timed = syntax.number(values.get("t")) != 0.0 and "t" in values  # 0: by speed and acceleration
         speed = (
-            instructions.Rate(seconds, "s") if seconds > 0 else _rate(values.get("v", v), "rad/s" if joint else "m/s")
+            syntax.rate_of(values["t"], "s")
+            if timed
+            else syntax.rate_of(values.get("v", v), "rad/s" if joint else "m/s")
         )
         radius = values.get("r", 0.0)
         blend = syntax.number(radius)
@@ -231,7 +233,7 @@ class UrScriptDialect(Dialect):
             via,
             None,
             speed,
-            _rate(values.get("a", a), "rad/s2" if joint else "m/s2"),
+            syntax.rate_of(values.get("a", a), "rad/s2" if joint else "m/s2"),
             zone,
             _tool(memory),
             ROBOT_BASE,
@@ -259,7 +261,11 @@ class UrScriptDialect(Dialect):
             memory.write(
                 "%load", syntax.Unclear(doing.text) if loaded is None else _load_set(memory.read("%load"), loaded)
             )
-            return instructions.Aside(doing.text) if isinstance(_load(memory.read("%load")), str) else None
+            return (
+                instructions.Aside(doing.text)
+                if isinstance(_load(memory.read("%load")), instructions.UnclearLoad)
+                else None
+            )
         output = _placed(("n", "b"), values, keywords) if call.function in OUTPUTS else None
         if output is not None and len(output) == 2:
             return instructions.Output(
@@ -320,24 +326,18 @@ def _load_set(before: syntax.Value | None, given: dict[str, syntax.Value]) -> sy
     return syntax.Record("load", tuple((kept | given | {"inertia": given.get("inertia", (0.0,) * 6)}).items()))
 
 
-def _load(value: syntax.Value | None) -> MassBody | str | None:
+def _load(value: syntax.Value | None) -> instructions.Load | None:
     """What the program says hangs on the flange."""
     if not isinstance(value, syntax.Record):
-        return value.text if isinstance(value, syntax.Unclear) else None
+        return instructions.UnclearLoad(value.text) if isinstance(value, syntax.Unclear) else None
     mass, centre, inertia = (value.get(key) for key in ("m", "cog", "inertia"))
     parts = (mass, *(centre if isinstance(centre, tuple) else ()), *(inertia if isinstance(inertia, tuple) else ()))
     plain = syntax.numbers(parts)
     if plain is None or len(plain) != 10 or not syntax.finite(plain) or plain[0] < 0:
-        return "set_payload" if mass is None else f"set_payload({syntax.shown(mass)})"
+        text = "set_payload" if mass is None else f"set_payload({syntax.shown(mass)})"
+        return instructions.UnclearLoad(text, syntax.number(mass))
     kg, x, y, z, xx, yy, zz, xy, xz, yz = plain
     return MassBody(kg, (x, y, z), (xx, yy, zz, xy, xz, yz)) if kg else None
-
-
-def _rate(value: syntax.Value, unit: str) -> instructions.Rate | None:
-    plain = syntax.number(value)
-    units = {"rad/s": instructions.Rate(plain or 0.0, "rad/s"), "m/s": instructions.Rate(plain or 0.0, "m/s")}
-    units |= {"rad/s2": instructions.Rate(plain or 0.0, "rad/s2"), "m/s2": instructions.Rate(plain or 0.0, "m/s2")}
-    return None if plain is None else units[unit]
 
 
 def _pose(value: syntax.Value | None) -> Reals | None:

@@ -35,6 +35,7 @@ from er3a.pipeline.stages.trajectory.motion import (
 from er3a.pipeline.study import Study
 from er3a.planning.names import NOT_TO_BE_RUN, PathVerdict
 from er3a.planning.timing import JointLimits, NoTimeLaw, TimingError, fastest, nodes_along
+from er3a.programs.instructions import UnclearLoad
 from er3a.robots.joint_limits import shown
 from er3a.robots.masses import LinkMass, Load, MassBody, Masses, no_body, together
 from er3a.robots.robot import Grade, Robot
@@ -611,8 +612,9 @@ def _paths(
 def program_load(motion: Motion) -> MassBody | str | None:
     """What the program that a path is from says hangs on the flange; None for other paths."""
     load = motion.entry.part.load if isinstance(motion.entry, PartOfProgram) else None
-    impossible = isinstance(load, MassBody) and no_body(load) is not None
-    return f"{load.mass:g} kg" if isinstance(load, MassBody) and impossible else load
+    if isinstance(load, UnclearLoad):
+        return load.text
+    return f"{load.mass:g} kg" if load is not None and no_body(load) is not None else load
 
 
 def with_load(arm: LoadedArm, load: MassBody | str | None) -> LoadedArm:

@@ -340,7 +340,7 @@ class DynamicsSummary(Summary):
     power_imbalance : largest difference of power and change of energy, of the largest power; None without paths
     """
 
-    decisive = NEVER_A_PASS - {"obstacles"}
+    decisive = NEVER_A_PASS - {"obstacles"} | {"program_loads"}
 
     verdict: Verdict[NoData | NoLimits | AllWithin | Marginal | Overload]
     gravity_m_s2: float

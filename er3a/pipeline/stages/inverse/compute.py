@@ -47,8 +47,8 @@ from er3a.selection.nearest import AllCollide, Choice, Refusal, nearest
 from er3a.selection.rule_names import RuleName
 from er3a.selection.select import RULES, MoveRule, available_rules, best_of_sets, mixed_cost, refusals
 
-SINGULAR = 1e-6
-LITTLE_MARGIN_DEG = 2.0
+SINGULAR = 1e-6  # sine of an angle, m from axis 1, or singular value (no unit): far above rounding
+LITTLE_MARGIN_DEG = 2.0  # mm of a prismatic joint; as much as grasps and boxes are asked for by default
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +87,7 @@ def solve_target(
     obstacle: model.Obstacle | None = None
     advice: tuple[model.Advice, ...] = ()
     if chosen is not None:
-        advice = _what_to_know(rows, chosen)
+        advice = _what_to_know(robot, rows, chosen)
     else:
         if isinstance(choice.reason, AllCollide):
             obstacle = model.BranchesCollide(len(within))
@@ -251,10 +251,11 @@ def _what_would_help(near: model.NeighbourPoses, clearance: float) -> tuple[mode
     return turn, shift
 
 
-def _what_to_know(rows: model.SolutionRows, chosen: int) -> tuple[model.Advice, ...]:
+def _what_to_know(robot: Robot, rows: model.SolutionRows, chosen: int) -> tuple[model.Advice, ...]:
     found: list[model.Advice] = [model.AtSingularity(kind) for kind, on in zip(TYPES, rows.singular[chosen]) if on]
     margin = float(rows.limit_margin_deg[chosen])
-    return (*found, model.NearLimit(margin)) if margin < LITTLE_MARGIN_DEG else tuple(found)
+    near = model.NearEnd if robot.sliding.any() else model.NearLimit
+    return (*found, near(margin)) if margin < LITTLE_MARGIN_DEG else tuple(found)
 
 
 MIX = "mix"
@@ -363,7 +364,7 @@ def solution_map(robot: Robot, cells: int, scene: Scene | None) -> model.MapRows
 
 
 STAGE_NAME = "inverse"
-REPRODUCED_M = 1e-9
+REPRODUCED_M = 1e-9  # by which a solution may miss its target: far above the rounding of a solution in closed form
 REPRODUCED_RAD = 1e-9
 MAX_ADVISED = 100  # of many targets those for which it is looked for what would help
 ADVICE_STREAM, ROUND_TRIP_STREAM = 0, 1

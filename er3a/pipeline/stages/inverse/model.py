@@ -99,7 +99,13 @@ class NearLimit(Finding):
     margin_deg: float
 
 
-Advice = TurnTool | TurningDoesNotHelp | ShiftTool | ShiftingDoesNotHelp | MoveObstacle | AtSingularity | NearLimit
+class NearEnd(NearLimit):
+    """The same of an arm with prismatic joints, of which a millimetre counts as a degree."""
+
+
+Advice = (
+    TurnTool | TurningDoesNotHelp | ShiftTool | ShiftingDoesNotHelp | MoveObstacle | AtSingularity | NearLimit | NearEnd
+)
 
 
 class UnsolvedTarget(Finding):
@@ -296,7 +302,8 @@ class InverseSummary(Summary):
 
 
 class SolutionRows(Table):
-    """One row for each solution of each target, turns included."""
+    """One row for each solution of each target, turns included. A mm of a prismatic joint counts as a deg in margin,
+    move and distance."""
 
     target: Texts = column("name of the target")
     branch: Integers = column("4 * shoulder + 2 * elbow + wrist; else the number of the arm found")

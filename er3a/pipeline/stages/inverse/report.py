@@ -47,7 +47,7 @@ from er3a.selection.select import RULES
 NAMED = 12  # targets that a cell names
 
 
-def symptoms(summary: model.InverseSummary) -> list[list[str]]:
+def symptoms(robot: Robot, summary: model.InverseSummary) -> list[list[str]]:
     """Rows of symptom, usual cause, what was tried here and what helps, from the summary's targets alone."""
     targets = summary.targets
     unreachable = [target.name for target in targets if not target.solutions]
@@ -93,7 +93,7 @@ def symptoms(summary: model.InverseSummary) -> list[list[str]]:
         [
             tr("Sudden wrist flip between two targets"),
             tr("The solver takes the nearest branch target by target"),
-            _greed(summary.sequence),
+            _greed(robot, summary.sequence),
             tr("Choose the branches of a sequence as a whole"),
         ],
     ]
@@ -107,14 +107,14 @@ def _names(names: list[str]) -> str:
     return joined(names, ", ") if names else tr("no target")
 
 
-def _greed(sequence: model.VisitOrder | None) -> str:
+def _greed(robot: Robot, sequence: model.VisitOrder | None) -> str:
     if sequence is None:
         return tr("Fewer than two targets can be reached, so there is no sequence")
     return tr(
         "All targets in order: {cost:.3g} {unit} as a whole, greedily {more:.3g} {unit} more",
         cost=sequence.cost,
         more=sequence.greedy_cost - sequence.cost,
-        unit=tr(RULES[sequence.rule].unit),
+        unit=tr(RULES[sequence.rule].unit_of(robot)),
     )
 
 
@@ -365,17 +365,18 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
         outcomes=_outcomes(summary.targets),
         not_advised=_not_advised(summary.targets),
         units=_units(robot),
+        slides=bool(robot.slides.any()),
         chosen_heading=tr("Chosen branch, and its J1 to J{count} ({units})", count=robot.joints, units=_units(robot)),
         optimised_heading=tr("J1 to J{count}, optimised ({units})", count=robot.joints, units=_units(robot)),
-        rule_columns=[tr("Branch"), *map(_rule_heading, rules)],
+        rule_columns=[tr("Branch"), *(_rule_heading(robot, rule) for rule in rules)],
         trips=trips,
         histogram=histogram(trips) if trips else None,
         map=solutions_per_position(results.map) if len(results.map) else None,
-        symptoms=symptoms(summary),
+        symptoms=symptoms(robot, summary),
         rules=[(_rule(rule), word("rule.title", RULE_TITLES, rule)) for rule in RULES],
         mix=tr(", ").join(f"{_rule(rule)} {weight:g}" for rule, weight in summary.mix.items()),
         stops=_stops(summary.sequence, {target.name for target in chosen}),
-        move=_move_rule(summary.sequence),
+        move=_move_rule(robot, summary.sequence),
     )
 
 
@@ -458,8 +459,8 @@ def _rule(rule: str) -> str:
     return word("rule", RULE_NAMES, rule)
 
 
-def _rule_heading(rule: str) -> str:
-    unit = next((own.unit for name, own in RULES.items() if name == rule), "1")
+def _rule_heading(robot: Robot, rule: str) -> str:
+    unit = next((own.unit_of(robot) for name, own in RULES.items() if name == rule), "1")
     return bracketed(_rule(rule), "" if unit == "1" else tr(unit)) + ">"
 
 
@@ -524,9 +525,11 @@ def _curve(robot: Robot, family: model.SelfMotion) -> str:
     )
 
 
-def _move_rule(sequence: model.VisitOrder | None) -> tuple[str, str]:
+def _move_rule(robot: Robot, sequence: model.VisitOrder | None) -> tuple[str, str]:
     """Unit and title of the rule that moves in the sequence are ranked by."""
-    return (tr(RULES[sequence.rule].unit), word("rule.title", RULE_TITLES, sequence.rule)) if sequence else ("", "")
+    if sequence is None:
+        return "", ""
+    return tr(RULES[sequence.rule].unit_of(robot)), word("rule.title", RULE_TITLES, sequence.rule)
 
 
 def _outcomes(targets: Iterable[model.TargetResult]) -> str:

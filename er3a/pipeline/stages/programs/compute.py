@@ -36,6 +36,7 @@ from er3a.programs.instructions import Pause, Place
 from er3a.programs.languages import read_program
 from er3a.programs.program_findings import NameTwice, NotUnderstood
 from er3a.programs.syntax import ProgramOutcome
+from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 
 OUTCOMES: dict[Level, ProgramOutcome] = {"pass": "pass", "note": "pass", "caution": "caution", "fail": "fail"}
@@ -59,13 +60,13 @@ def compute(study: Study, name: str) -> model.ProgramsResults:
     motions: list[model.ProgramMotion] = []
     for entry in listed.programs:
         check = check_program(read_program(entry.file), robot, replace(options, start=entry.start(robot)))
-        motion, starts = _motion(entry.name, check, len(robot.lower))
+        motion, starts = _motion(entry.name, check, robot)
         summaries.append(_summary(entry, check, starts))
         if any(each.what == "way" for each in check.not_examined):
             unknown_starts.append(entry.name)
         arms += check.arms if entry.expect in (None, "pass") else ()
         lines.append(_lines(entry.name, check))
-        instructions.append(_instructions(entry.name, check, len(robot.lower)))
+        instructions.append(_instructions(entry.name, check, robot))
         motions.append(motion)
     smallest = {
         each.name: None if each.least_clearance_mm is None else each.least_clearance_mm / 1000
@@ -89,8 +90,8 @@ def compute(study: Study, name: str) -> model.ProgramsResults:
             ),
         ),
         lines=model.Lines.stacked(lines),
-        instructions=model.Instructions.stacked(instructions),
-        motion=model.ProgramMotion.stacked(motions),
+        instructions=model.Instructions.stacked(instructions).of_joints(robot.slides),
+        motion=model.ProgramMotion.stacked(motions).of_joints(robot.slides),
     )
 
 
@@ -193,12 +194,13 @@ def _lines(name: str, check: ProgramCheck) -> model.Lines:
     return model.Lines.of(program=name, line=np.arange(1, len(text) + 1), text=text)
 
 
-def _instructions(name: str, check: ProgramCheck, joints: int) -> model.Instructions:
+def _instructions(name: str, check: ProgramCheck, robot: Robot) -> model.Instructions:
     ends: dict[Place, Reals] = {}
     for number, motion in check.motions.items():
         if motion.end is not None:
             ends.setdefault(check.execution.steps[number].place, motion.end)
-    unknown = np.full(joints, np.nan)
+    unknown = np.full(robot.joints, np.nan)
+    first_ends = np.array([ends.get(each.place, unknown) for each in check.verdicts]).reshape(-1, robot.joints)
     return model.Instructions.of(
         program=name,
         line=[each.line for each in check.verdicts],
@@ -208,17 +210,17 @@ def _instructions(name: str, check: ProgramCheck, joints: int) -> model.Instruct
         times=[each.times for each in check.verdicts],
         duration_s=[each.duration_s for each in check.verdicts],
         clearance_mm=[each.least_clearance_mm for each in check.verdicts],
-        end_deg=np.degrees([ends.get(each.place, unknown) for each in check.verdicts]).reshape(-1, joints),
+        end_deg=shown(robot, first_ends),
     )
 
 
-def _motion(name: str, check: ProgramCheck, joints: int) -> tuple[model.ProgramMotion, dict[int, float]]:
+def _motion(name: str, check: ProgramCheck, robot: Robot) -> tuple[model.ProgramMotion, dict[int, float]]:
     """The main way over time, with a stop at each target, and when (s) each of its steps begins; what is not known is
     left out."""
     starts: dict[int, float] = {}
     levels = {each.place: each.level for each in check.verdicts}
     times: list[Reals] = [np.empty(0)]
-    angles: list[Reals] = [np.empty((0, joints))]
+    angles: list[Reals] = [np.empty((0, robot.joints))]
     points: list[Reals] = [np.empty((0, 3))]
     lines: list[int] = []
     step_levels: list[str] = []
@@ -250,7 +252,7 @@ def _motion(name: str, check: ProgramCheck, joints: int) -> tuple[model.ProgramM
         t_s=np.concatenate(times),
         line=lines,
         level=step_levels,
-        q_deg=np.degrees(np.concatenate(angles)),
+        q_deg=shown(robot, np.concatenate(angles)),
         xyz_mm=np.concatenate(points) * 1000,
     )
     return kept, starts

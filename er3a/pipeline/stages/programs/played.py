@@ -15,11 +15,13 @@ from er3a.pipeline.player.motions import Fault, FaultMoment, PlayedEvent, Played
 from er3a.pipeline.stages.programs.model import FindingAt, ProgramMotion, ProgramsResults, ProgramSummary
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.program_check.program_check_findings import RANKS, Level, MotionCollides
+from er3a.robots.joint_limits import meant
+from er3a.robots.robot import Robot
 
 WEIGHTS: dict[Level, Weight] = {"pass": "plain", "note": "plain", "caution": "caution", "fail": "fail"}
 
 
-def motions(results: ProgramsResults) -> list[PlayedMotion]:
+def motions(robot: Robot, results: ProgramsResults) -> list[PlayedMotion]:
     """The programs as far as they were followed, the worst first, as the player shows them.
 
     The motion of each line is an event with its text, its verdict and what touches; each finding is one at its moment.
@@ -37,7 +39,7 @@ def motions(results: ProgramsResults) -> list[PlayedMotion]:
         for each in program.findings:
             if each.program_s is not None:
                 events.append(PlayedEvent(each.program_s, each.program_s, say(each.finding), WEIGHTS[each.level]))
-        q = np.radians(rows.q_deg)
+        q = meant(robot, rows.q_deg)
         motions.append(PlayedMotion(program.name, "", rows.t_s, q, events, label=own_title(program.title)))
     return motions
 

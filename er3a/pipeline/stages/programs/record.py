@@ -21,6 +21,8 @@ from er3a.pipeline.viewing.palette import VERDICTS, rgb
 from er3a.pipeline.viewing.recording import Curves, Logged, Run, escaped, record_stage
 from er3a.program_check.program_check_findings import Level
 from er3a.programs.languages import LANGUAGES
+from er3a.robots.joint_limits import meant
+from er3a.robots.robot import Robot
 
 AROUND = 4  # lines of the listing before and after the one that is carried out
 COLOURS: dict[str, str] = {**VERDICTS, "note": VERDICTS["pass"]}
@@ -38,13 +40,13 @@ the text beside it shows the line that it is at.
 
 def record(study: Study, stored: Stored[ProgramsResults], output: Path) -> None:
     """Write the recording of a robot's programs."""
-    results = stored.results
+    results, robot = stored.results, study.robot(stored.robot)
     record_stage(
         study,
         stored,
         output,
         NOTE,
-        runs=[_run(results, program) for program in results.summary.programs],
+        runs=[_run(robot, results, program) for program in results.summary.programs],
         curves=[Curves("angle", "Joint angle (deg)")],
         scene=study.scene(stored.robot, "trajectory"),  # the stage whose scene counts here too
         views={"Arm and tool": ["**"]},
@@ -53,7 +55,7 @@ def record(study: Study, stored: Stored[ProgramsResults], output: Path) -> None:
     )
 
 
-def _run(results: ProgramsResults, program: ProgramSummary) -> Run:
+def _run(robot: Robot, results: ProgramsResults, program: ProgramSummary) -> Run:
     rows = results.motion.take(results.motion.program == program.name)
     listing = results.lines.text[results.lines.program == program.name].tolist()
     outcome = outcome_word(program.outcome)
@@ -70,7 +72,7 @@ def _run(results: ProgramsResults, program: ProgramSummary) -> Run:
         name=program.name,
         text=f"## {program.name}\n**{outcome}**: {escaped(program.title)}\n\n{cycle_text(program)}",
         t=rows.t_s,
-        q=np.radians(rows.q_deg),
+        q=meant(robot, rows.q_deg),
         events=events,
         outcome=f"{outcome} ({LANGUAGES[program.language].title})",
         status=WEIGHTS[program.outcome],

@@ -51,11 +51,10 @@ def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) ->
             summary.assumed_speed, any(each.subject == "own_accelerations" for each in summary.not_examined)
         ),
         faults={fault.name: fault for fault in faults(results)},
-        player=player(robot, motions(results), scene),
+        player=player(robot, motions(robot, results), scene),
         bodies=[each.name for each in scene.solids] if scene else [],
         solids=solid_rows(scene),
         drawing_head=drawing_head(),
-        box_asked="workspace" in study.stages(stored.robot) and stored.rests_on.get("validation") != "fail",
     )
 
 

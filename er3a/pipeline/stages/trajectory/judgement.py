@@ -27,11 +27,11 @@ from er3a.robots.robot import Robot
 
 ASSUMED = (motion_faults.TooFastIfAssumed, motion_faults.AccelerationTooGreatIfAssumed)
 STEPS_TO_CONTACT, ATTEMPTS = 1000, 5
-BEFORE_STOP = 0.99  # of the time until limits or reach are left
+BEFORE_STOP = 0.99  # of the time until limits or reach are left, where the motion is not solved any more
 SPEED_STEP = 1e-5  # share of the duration
 LIMIT_MARGIN = 2.0  # deg (mm of a prismatic joint), between an advised end and a joint limit that the path leaves later
 REACH_MARGIN = 0.02  # m of the path before it leaves the reach
-SPEED_MARGIN = 0.9  # of a joint's speed limit
+SPEED_MARGIN = 0.9  # of a joint's speed limit; these four are chosen, no standard states them
 STOPS = 2.0  # times the time that the joints take to stop, left before the first fault
 
 

@@ -86,7 +86,6 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         turning=in_space(robot, results, paths[:count], scene),
         player=player(robot, motions(robot, results), scene),
         drawing_head=drawing_head(),
-        box_asked=box_asked,
         condition=condition_of(stored.validated),
     )
 

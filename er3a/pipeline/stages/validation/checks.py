@@ -12,6 +12,8 @@ import numpy as np
 
 from er3a.diagnosis.conclusions import TooSmallToTell
 from er3a.diagnosis.faults import CONVENTIONS, WrongLimit
+from er3a.files.robot_file import LONGEST_LENGTH_MM, MIN_LONGEST_MM
+from er3a.files.units import WIDEST_IN_RADIANS
 from er3a.identifiability.entries import GROUP_OF
 from er3a.identifiability.entry_evidence import EntryEvidence, Evidence, Status
 from er3a.identifiability.evidence import PART_OF_GROUP, PartName, PartStatus, parts_of, together
@@ -36,7 +38,8 @@ from er3a.references.rows import GROUPS, AxisRow
 from er3a.references.subjects import AxisPosition, JointLimit, JointSpeed, ReferenceSubject
 from er3a.robots.robot import AUTHORITATIVE_GRADES, Grade, Robot
 
-ROUNDING = 1e-9
+ROUNDING = 1e-9  # in the unit of a reference (mm, deg, mm/s, deg/s): what reading and predicting it lose at most
+NONE_ALLOWED = 0.5  # tolerance of a count
 SIX_TURN = (False,) * 6
 
 
@@ -197,11 +200,10 @@ def _gaps(references: ReferenceSet, slides: Sequence[bool] | Flags) -> list[mode
     return gaps
 
 
-JOINT_TOLERANCE_DEG = 1e-6
+JOINT_TOLERANCE_DEG = 1e-6  # of a round trip: far above its rounding, far below any tolerance of a document
 POSITION_TOLERANCE_MM = 1e-6
 ORIENTATION_TOLERANCE_DEG = 1e-6
-SHORTEST, LONGEST = 0.01, 20.0  # m
-WIDEST_IN_RADIANS = 2.01 * np.pi
+SHORTEST, LONGEST = MIN_LONGEST_MM / 1000, LONGEST_LENGTH_MM / 1000  # m, as a robot file may have them
 GROUP: Literal["round_trips"] = "round_trips"
 
 
@@ -218,11 +220,11 @@ def table_checks(robot: Robot) -> list[model.Check]:
         "length_unit": int(not SHORTEST <= np.nanmax(lengths) <= LONGEST),
         "limit_unit": int(turning.shape[1] > 1 and 0 < np.degrees(np.nanmax(turning)) < WIDEST_IN_RADIANS),
     }
-    checks = [against_itself(name, "table_sanity", float(count), 0.5) for name, count in faults.items()]
+    checks = [against_itself(name, "table_sanity", float(count), NONE_ALLOWED) for name, count in faults.items()]
     missing = model.NumbersMissing() if checks[0].status == "fail" else wrist_partition_missing(robot)
     if missing:
         return [*checks, model.Unjudged(model.SelfCheck("closed_form"), "table_sanity", "", missing)]
-    return [*checks, against_itself("closed_form", "table_sanity", 0.0, 0.5)]
+    return [*checks, against_itself("closed_form", "table_sanity", 0.0, NONE_ALLOWED)]
 
 
 def _class_checks(robot: Robot, poses: int, seed: int) -> list[model.Check]:
@@ -232,7 +234,7 @@ def _class_checks(robot: Robot, poses: int, seed: int) -> list[model.Check]:
         return [model.Unjudged(model.SelfCheck("joints_to_pose_to_joints"), GROUP, "deg", model.NoClosedForm(missing))]
     found = round_trips.batch_round_trips(robot, np.random.default_rng(seed), poses)
     return [
-        against_itself("unsolved_poses", GROUP, float(found.poses - found.own_found), 0.5),
+        against_itself("unsolved_poses", GROUP, float(found.poses - found.own_found), NONE_ALLOWED),
         against_itself("position_error", GROUP, found.worst_position * 1000, POSITION_TOLERANCE_MM, "mm"),
         against_itself(
             "orientation_error", GROUP, float(np.degrees(found.worst_orientation)), ORIENTATION_TOLERANCE_DEG, "deg"
@@ -250,7 +252,7 @@ def round_trip_checks(robot: Robot, poses: int, seed: int) -> tuple[list[model.C
         poses - found.near_singular, poses, round_trips.NEAR_WRIST_DEG, round_trips.NEAR_SHOULDER_MM
     )
     checks: list[model.Check] = [
-        against_itself("unsolved_poses", GROUP, float(found.unsolved), 0.5),
+        against_itself("unsolved_poses", GROUP, float(found.unsolved), NONE_ALLOWED),
         against_itself("joint_error", GROUP, found.joint_error_deg, JOINT_TOLERANCE_DEG, "deg", note),
         against_itself("position_error", GROUP, found.position_error_mm, POSITION_TOLERANCE_MM, "mm"),
         against_itself("orientation_error", GROUP, found.orientation_error_deg, ORIENTATION_TOLERANCE_DEG, "deg"),
@@ -294,7 +296,7 @@ def _part(evidence: Evidence, part: PartName, status: PartStatus, own: Sequence[
     )
 
 
-TELLING_SHARE = 0.25
+TELLING_SHARE = 0.25  # of the largest difference in mm: a check that is off by less is not the one quoted
 SHOWN_DECIMALS = 9
 
 

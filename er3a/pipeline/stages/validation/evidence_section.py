@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Set
 from dataclasses import asdict, dataclass, replace
-from itertools import product
+from itertools import combinations, product
 from math import pi
 from typing import Any
 
@@ -12,6 +12,7 @@ import numpy as np
 from markupsafe import Markup
 
 from er3a.geometry.transforms import rpy_of
+from er3a.geometry.vectors import wrap_to_pi
 from er3a.identifiability.entries import column_of
 from er3a.identifiability.entry_evidence import EntryEvidence, OtherReading, Status
 from er3a.identifiability.proposals import MeasureAngle
@@ -87,6 +88,7 @@ LIMITS = ("lower", "upper")
 DIFFERS = 2e-3
 BENT, BENT_BY = 5, pi / 6  # a joint (from 1) that is not at 0 where two tables are told apart, and its angle
 MAX_DIFFERENT = 3  # entries in which two tables may differ to be told apart at one pose
+READ_WITHIN = 0.5  # deg, of an angle that a pendant shows
 STEEP = 85.0  # deg, from which pitch on roll and yaw are not unique enough to compare
 IN_UNIT = {"a": MM, "d": MM, "direction": 1.0} | dict.fromkeys(("alpha", "beta", "offset", *LIMITS), 180 / pi)
 OTHER_TITLES = {
@@ -185,12 +187,14 @@ def verdict_legend(statuses: Iterable[Status]) -> list[tuple[str, list[tuple[Sta
 class PoseReadings:
     """What a pendant shows at a pose, by what a table of an arm can be: reading and the entries that differ there.
 
-    ``first``: directions of joints, as words, that are to be checked before.
+    ``first``: directions of joints, as words, that are to be checked before; ``within``: how far off a reading
+    may be, deg.
     """
 
     pose: str
     first: str
     rows: tuple[tuple[str, str], ...]
+    within: float = READ_WITHIN
 
 
 def _read_pose(robot: Robot, evidence: TableEvidence) -> PoseReadings | None:
@@ -227,7 +231,8 @@ def _read_pose(robot: Robot, evidence: TableEvidence) -> PoseReadings | None:
             return None
         seen = tuple((np.where(angles.round(1) == -180, 180.0, angles.round(1)) + 0.0).tolist())
         read.setdefault(seen, []).append(joined(named, ", ") or tr("the table of this page"))
-    if len(read) == 1:
+    apart = [np.abs(wrap_to_pi(np.radians(np.subtract(a, b)))).max() for a, b in combinations(read, 2)]
+    if not apart or np.degrees(min(apart)) < 2 * READ_WITHIN:
         return None
     joints = [
         each.entry[len("direction") :]
@@ -426,7 +431,7 @@ def _tool_off(each: EntryEvidence) -> str:
     if each.status == "consistent":
         return tr("no bound")
     if not each.off.moves:
-        return "–"
+        return tr("no bound") if each.status == "contradicted" and column_of(each.entry) == "direction" else "–"
     off = _off(each.off.mm, each.off.deg)
     return tr("at least {off}", off=off) if each.at_least else off
 

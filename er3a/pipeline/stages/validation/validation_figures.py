@@ -254,6 +254,10 @@ def typographic(text: str) -> str:
     return re.sub(r"(?<![0-9A-Za-z])-(?=[0-9])", "−", text)
 
 
+OWN_CLAIMS = N_(
+    "Correcting that makes the table agree with its own source's statements alone, which are no evidence about a real "
+    "robot: don't use the corrected table for one."
+)
 SHOWN_HYPOTHESES = 5
 SHOWN_RESIDUALS = 12
 MIN_DRAWN = 1e-3
@@ -275,8 +279,7 @@ def _diagnosis_story(diagnosis: model.SetDiagnosis, residuals: model.Residuals, 
     best = diagnosis.hypotheses[0] if named else None
     return dict(
         reference_set=diagnosis.reference_set,
-        own_claims=own_claims,
-        text=typographic(say(diagnosis.conclusion)),
+        text=joined([typographic(say(diagnosis.conclusion)), tr(OWN_CLAIMS) if own_claims and best else ""], " "),
         against=_measured_against(diagnosis),
         to_decide=typographic(say(best.to_decide)) if best and best.to_decide else "",
         others_title=tr("Next best hypotheses")

@@ -38,14 +38,14 @@ from er3a.programs.from_commands import TO_START
 from er3a.programs.languages import not_written, write_program
 from er3a.programs.syntax import LanguageName
 from er3a.programs.writing import HEAD, WriteOptions, ascii_text, program_name
-from er3a.robots.joint_limits import joint_columns, shown
+from er3a.robots.joint_limits import joint_columns, meant, shown
 from er3a.robots.robot import Robot
 from er3a.vision.boards import ambiguous_tilts, projected
 from er3a.vision.calibration_set import TimeOffset
 from er3a.vision.grasp_motion import DEPTH, PARTS, GraspLeg
 from er3a.vision.grasping import ChosenGrasp, DetectedObject, GraspNeeds, GraspPlan, GraspTask, plan_grasp
 from er3a.vision.hand_eye import HandEye, MethodAnswer, calibrate_hand_eye, spread_of
-from er3a.vision.next_view import FieldOfView, NextView, in_sight, next_view
+from er3a.vision.next_view import FieldOfView, in_sight, next_view
 from er3a.vision.point_error import ArmAccuracy, SeenPoseError, error_sizes, seen_pose, seen_pose_error
 from er3a.vision.table_corrections import NoCorrections, TableCorrections, correct_table, zeros_tried
 from er3a.vision.vision_findings import HandEyeError, grave_warnings
@@ -198,10 +198,21 @@ def _closes(before: GraspLeg, after: GraspLeg) -> bool:
     return before.part == "approach" and after.part == "retreat"
 
 
+def _view_to_add(
+    robot: Robot, found: HandEye, file: VisionFile, board_mm: list[float] | None, *, scene: Scene | None, seed: int
+) -> model.ViewToAdd | None:
+    """The pose to record next; None where the board's size is not known or no pose is found."""
+    if not board_mm:
+        return None
+    middle = np.mean([each.pose()[:3, 3] for each in file.objects], axis=0)
+    view = next_view(robot, found, file.view.view(board_mm), middle, scene, seed)
+    return stated(model.ViewToAdd, view, q_deg=shown(robot, view.q)) if view else None
+
+
 def calibration_result(
     head: HandEyeFile,
     found: HandEye,
-    view: NextView | None,
+    view: model.ViewToAdd | None,
     offset: TimeOffset | None,
     table: TableCorrections | NoCorrections | None,
     images: SeenImages | None,
@@ -230,7 +241,7 @@ def calibration_result(
         moved_deg=from_si("deg", tilted),
         methods=tuple(map(_method, found.methods)),
         touch=_touch(found),
-        next_view=stated(model.ViewToAdd, view) if view else None,
+        next_view=view,
         time_offset=stated(model.OffsetResult, offset) if offset else None,
         table=_table_result(table) if isinstance(table, TableCorrections) else table,
         open_tilts=ambiguous_tilts(images.views, found.samples.names) if images else (),
@@ -277,7 +288,7 @@ def _touch(found: HandEye) -> model.TouchResult | None:
     return model.TouchResult(points, found.touch.probability)
 
 
-def sample_rows(found: HandEye, joints: int) -> model.SampleRows:
+def sample_rows(found: HandEye, robot: Robot) -> model.SampleRows:
     """One row for each sample."""
     samples, count = found.samples, len(found.samples)
     in_hand = samples.setup == "eye_in_hand"
@@ -293,8 +304,8 @@ def sample_rows(found: HandEye, joints: int) -> model.SampleRows:
         flange_mm=1000 * samples.flange[:, :3, 3],
         seen_mm=1000 * seen[:, :3, 3],
         predicted_mm=1000 * predicted[:, :3, 3],
-        q_deg=np.full((count, joints), np.nan) if samples.q is None else np.degrees(samples.q),
-    )
+        q_deg=np.full((count, robot.joints), np.nan) if samples.q is None else shown(robot, samples.q),
+    ).of_joints(robot.slides)
 
 
 def corner_rows(found: HandEye, images: SeenImages | None) -> model.CornerRows:
@@ -314,7 +325,7 @@ def corner_rows(found: HandEye, images: SeenImages | None) -> model.CornerRows:
 
 STAGE_NAME = "vision"
 VIEW_STREAM = 0
-CONTRADICTED = 1e-3
+CONTRADICTED = 1e-3  # probability of touched points as far off, below which they contradict the calibration
 LEG_ROWS = 13
 
 Found = (
@@ -347,14 +358,11 @@ def compute(study: Study, name: str) -> model.VisionResults:
         return _without_calibration(
             model.VisionSummary(verdict, (), task_file.title, title, settings.least_success, None, ())
         )
-    picture = None if head.setup == "eye_to_hand" else np.radians(task_file.picture_deg or [])
+    picture = None if head.setup == "eye_to_hand" else meant(robot, np.array(task_file.picture_deg))
     camera = _camera_at(robot, found, picture)
     places = {each.name: camera @ each.pose() for each in task_file.objects}
-    view = task_file.view.view(head.board_mm) if head.board_mm else None
-    to_add = None
-    if view is not None:
-        middle = np.mean([each.pose()[:3, 3] for each in task_file.objects], axis=0)
-        to_add = next_view(robot, found, view, middle, scene, study.seed + VIEW_STREAM)
+    seed = study.seed + VIEW_STREAM
+    to_add = _view_to_add(robot, found, task_file, head.board_mm, scene=scene, seed=seed)
     table = correct_table(found, robot, head.table_corrections) if head.table_corrections else None
     calibration = calibration_result(head, found, to_add, offset, table, images)
     doubt = _doubt(calibration)
@@ -362,7 +370,7 @@ def compute(study: Study, name: str) -> model.VisionResults:
     if not doubt:
         limits = (limits_of(robot, motions), study.seed)
         planned = _planned(robot, task_file, found, scene, (settings, picture), limits)
-    objects = tuple(_object(entry, places[entry.name], plan, error) for entry, plan, error in planned)
+    objects = tuple(_object(robot, entry, places[entry.name], plan, error) for entry, plan, error in planned)
     shapes = _shapes(robot, objects, study.assumed_margin(name))
     near = shapes.near if shapes else ()
     judged = Verdict[Found]("fail", doubt) if doubt else verdict_of(calibration, objects, near)
@@ -384,7 +392,7 @@ def compute(study: Study, name: str) -> model.VisionResults:
     )
     map_task = MapTask(
         robot=robot,
-        home=np.radians(task_file.home_deg),
+        home=meant(robot, np.array(task_file.home_deg)),
         accuracy=task_file.arm.accuracy(),
         T_base_camera=camera,
         picture=picture,
@@ -399,9 +407,11 @@ def compute(study: Study, name: str) -> model.VisionResults:
     )
     return model.VisionResults(
         summary,
-        sample_rows(found, len(robot.lower)),
+        sample_rows(found, robot),
         error_map(found, map_task),
-        model.PathRows.stacked(_ways(entry.name, plan.chosen) for entry, plan, _ in planned if plan.chosen),
+        model.PathRows.stacked(
+            _ways(robot, entry.name, plan.chosen) for entry, plan, _ in planned if plan.chosen
+        ).of_joints(robot.slides),
         model.GraspPrograms.stacked(
             written(robot, entry.name, map_task.home, plan.chosen) for entry, plan, _ in planned if plan.chosen
         ),
@@ -507,7 +517,7 @@ def _planned(
     )
     bodies = Bodies(robot, scene)
     speed = settings.line_speed_mm_s / 1000
-    task = GraspTask(robot, scene, bodies, np.radians(task_file.home_deg), needs, limits, speed, seed)
+    task = GraspTask(robot, scene, bodies, meant(robot, np.array(task_file.home_deg)), needs, limits, speed, seed)
     accuracy = task_file.arm.accuracy()
     camera = _camera_at(robot, found, picture)
     rows: Planned = []
@@ -529,7 +539,9 @@ def _error_at(
     return seen_pose_error(found, target.T_camera_object, target.covariance, accuracy, (arm[0], q, arm[1]))
 
 
-def _object(entry: ObjectEntry, T: Reals, plan: GraspPlan, error: SeenPoseError | None) -> model.ObjectResult:
+def _object(
+    robot: Robot, entry: ObjectEntry, T: Reals, plan: GraspPlan, error: SeenPoseError | None
+) -> model.ObjectResult:
     parts = (
         None
         if error is None
@@ -550,17 +562,20 @@ def _object(entry: ObjectEntry, T: Reals, plan: GraspPlan, error: SeenPoseError 
         expect=entry.expect,
         error_mm=None if parts is None else model.ErrorParts(*(1000 * parts[:, 0]).tolist()),
         error_deg=None if parts is None else model.ErrorParts(*np.degrees(parts[:, 1]).tolist()),
-        grasp=_grasp(plan.chosen) if plan.chosen else None,
+        grasp=_grasp(robot, plan.chosen) if plan.chosen else None,
     )
 
 
-def _grasp(chosen: ChosenGrasp) -> model.GraspResult:
+def _grasp(robot: Robot, chosen: ChosenGrasp) -> model.GraspResult:
     pose = _pose(chosen.T_base_tool)
     return stated(
         model.GraspResult,
         chosen,
         tool_xyz=pose["xyz"],
         tool_rpy=pose["rpy"],
+        q_before_deg=tuple(shown(robot, chosen.q_before).tolist()),
+        q_deg=tuple(shown(robot, chosen.q).tolist()),
+        q_after_deg=tuple(shown(robot, chosen.q_after).tolist()),
         corners=sum(leg.part == "move" for leg in chosen.legs) - 1,
         duration_s=sum(leg.duration for leg in chosen.legs),
     )
@@ -608,7 +623,7 @@ def figures_of(
     )
 
 
-def _ways(name: str, chosen: ChosenGrasp) -> model.PathRows:
+def _ways(robot: Robot, name: str, chosen: ChosenGrasp) -> model.PathRows:
     """The whole motion, each point once."""
     parts: list[str] = []
     times, rows, now = [], [], 0.0
@@ -625,5 +640,5 @@ def _ways(name: str, chosen: ChosenGrasp) -> model.PathRows:
         part=part,
         step=np.concatenate([np.arange((part == each).sum()) for each in PARTS]),
         t_s=np.concatenate(times),
-        q_deg=np.degrees(np.concatenate(rows)),
+        q_deg=shown(robot, np.concatenate(rows)),
     )

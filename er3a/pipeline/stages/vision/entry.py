@@ -41,6 +41,7 @@ def calibration_files(path: str | Path) -> list[Path]:
 class VisionSettings(StrictModel):
     """What is asked of grasps. ``scene``: the obstacles that the arm may not come nearer to than the clearance.
 
+    ``least_limit_margin_deg`` : of joints from their limits, mm of a prismatic joint.
     ``least_singular_value`` : of the Jacobian with lengths divided by the wrist's reach. ``least_success`` : the
     probability of success below which an object is not graspable. ``map_cells`` : cells across the map of errors.
     ``line_speed_mm_s`` : the tool's maximum speed on approach and retreat. Limits of the joints' rates, and the

@@ -10,7 +10,7 @@ from er3a.calibration.calibrate import Close
 from er3a.calibration.outcomes import Held, LevelName
 from er3a.collision.pairs import Pair
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.pipeline.results import Results, Summary, Verdict
+from er3a.pipeline.results import NEVER_A_PASS, Results, Summary, Verdict
 from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.vision.boards import AmbiguousTilt, BoardlessImage
@@ -321,8 +321,11 @@ class ObjectResult:
 class VisionSummary(Summary):
     """What the stage found; ``calibration`` is None where the samples determine none.
 
-    ``least_success``: the probability of success below which an object is not graspable.
+    ``least_success``: the probability of success below which an object is not graspable. Without a shape of the gripper
+    grasps are no pass.
     """
+
+    decisive = NEVER_A_PASS | {"carried"}
 
     verdict: Verdict[
         CalibrationImpossible

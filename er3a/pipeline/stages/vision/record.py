@@ -20,7 +20,7 @@ from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.arm import AXES
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, MUTED, REFERENCE, rgb
 from er3a.pipeline.viewing.recording import Logged, Run, escaped, record_stage
-from er3a.robots.joint_limits import size_of
+from er3a.robots.joint_limits import meant, size_of
 from er3a.robots.robot import Robot
 
 MAGNIFIED = 50.0
@@ -47,7 +47,7 @@ def record(study: Study, stored: Stored[VisionResults], output: Path) -> None:
     results, summary, robot = stored.results, stored.results.summary, study.robot(stored.robot)
     size = size_of(robot)
     task = load_vision(str(study.entry(stored.robot).vision))
-    found, home = summary.calibration, np.radians(task.home_deg)
+    found, home = summary.calibration, meant(robot, np.array(task.home_deg))
     shapes: dict[str, Logged] = _samples(results.samples, size)
     if found is not None:
         shapes |= _camera(robot, task, summary)
@@ -59,7 +59,10 @@ def record(study: Study, stored: Stored[VisionResults], output: Path) -> None:
         stored,
         output,
         NOTE,
-        runs=[_sampled(results.samples, home), *(_grasped(results, each, home) for each in summary.objects)],
+        runs=[
+            _sampled(robot, results.samples, home),
+            *(_grasped(robot, results, each, home) for each in summary.objects),
+        ],
         scene=study.scene(stored.robot, stored.stage),
         views={"Camera and grasps": ["**"]},
         shapes=shapes,
@@ -78,7 +81,7 @@ def _camera(robot: Robot, task: VisionFile, summary: VisionSummary) -> dict[str,
     camera = _placed(found.hand_eye)
     fixed = found.setup == "eye_to_hand"
     if not fixed:
-        camera = forward(robot.without_tool(), np.radians(task.picture_deg or task.home_deg)) @ camera
+        camera = forward(robot.without_tool(), meant(robot, np.array(task.picture_deg or task.home_deg))) @ camera
     half = np.tan(np.radians([task.view.horizontal_deg, task.view.vertical_deg]) / 2)
     far = SIGHT * task.view.farthest_mm / 1000
     corners = [[sx * half[0] * far, sy * half[1] * far, far] for sx, sy in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
@@ -117,7 +120,7 @@ def _object(each: ObjectResult, size: float) -> dict[str, Logged]:
     return shapes
 
 
-def _sampled(rows: SampleRows, home: Reals) -> Run:
+def _sampled(robot: Robot, rows: SampleRows, home: Reals) -> Run:
     """Samples half a second each."""
     poses = np.flatnonzero(np.isfinite(rows.q_deg).all(axis=1)) if len(rows) else np.empty(0, dtype=int)
     times = SAMPLE_S * np.arange(len(poses) + 1, dtype=float)
@@ -126,15 +129,15 @@ def _sampled(rows: SampleRows, home: Reals) -> Run:
     for t, k in zip(times[1:].tolist(), poses):
         used, residual = "used" if rows.used[k] else "**left out**", np.linalg.norm(rows.residual_mm[k])
         texts.append((t, f"Sample {escaped(rows.sample[k])}, {used}: residual {residual:.3g} mm"))
-    q = np.concatenate([home[None], np.radians(rows.q_deg[poses])]) if len(poses) else home[None]
+    q = np.concatenate([home[None], meant(robot, rows.q_deg[poses])]) if len(poses) else home[None]
     return Run("samples", "The arm waits.", times, q, texts=texts, pause_s=SAMPLE_S)
 
 
-def _grasped(results: VisionResults, each: ObjectResult, home: Reals) -> Run:
+def _grasped(robot: Robot, results: VisionResults, each: ObjectResult, home: Reals) -> Run:
     """The way to an object and back."""
     ways = results.ways.take(results.ways.target == each.name)
     outcome = f"{each.grasp.grasp}, success {100 * each.grasp.probability:.1f} %" if each.grasp else say(each.refusal)
-    q = np.concatenate([home[None], np.radians(ways.q_deg)]) if len(ways) else np.full((1, len(home)), np.nan)
+    q = np.concatenate([home[None], meant(robot, ways.q_deg)]) if len(ways) else np.full((1, len(home)), np.nan)
     return Run(
         name=each.name,
         text=f"# {escaped(each.name)}\n\n{outcome}",

@@ -41,6 +41,8 @@ from er3a.pipeline.viewing.page import (
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MODEL
 from er3a.programs.languages import titles_unwritten
 from er3a.programs.writing import with_head_lines
+from er3a.robots.joint_limits import meant
+from er3a.robots.robot import Robot
 from er3a.vision.table_corrections import NoCorrections
 
 MIN_RANGE = 0.02  # of the largest value, by which a map's colours go beyond its values
@@ -178,7 +180,7 @@ def _range(values: Reals, low: str, high: str) -> dict[str, str]:
     return {low: fixed(float(values.min()), 2), high: fixed(float(values.max()), 2)}
 
 
-NEARLY_HALF_TURN = 170.0
+NEARLY_HALF_TURN = 170.0  # deg; see MIN_COSINE (169 deg) in er3a/vision/classic_methods.py
 POINTER_M = 0.15
 WAYS = {"move": N_("move to the approach"), "approach": N_("approach"), "retreat": N_("retreat")}
 AXES = ("x", "y", "z")
@@ -221,6 +223,7 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
         images=image_picture(results.corners, _image_folder(study, name)) if len(results.corners) else None,
         map=map_picture(results.error_map, summary.objects) if len(results.error_map) else None,
         overview=[_overview(each) for each in summary.objects],
+        slides=bool(robot.slides.any()),
         grasps=[_grasp(each) for each in summary.objects if each.grasp],
         programs=[] if contradicted else _programs(results.programs, head),
         program_warnings=[
@@ -231,7 +234,7 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
         unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
         errors=[_errors(each) for each in summary.objects if each.error_mm],
         error_columns=[tr("Object"), *(f"{word('vision.part_of_error', PARTS, part)}>" for part in PARTS)],
-        player=player(robot, _motions(results), scene),
+        player=player(robot, _motions(robot, results), scene),
         drawing_head=drawing_head(),
         next_pose=panel_link(found.next_view.q_deg, _listed(found.next_view.q_deg))
         if found and found.next_view
@@ -254,7 +257,7 @@ def _programs(rows: model.GraspPrograms, head: Sequence[str]) -> list[tuple[str,
     return list(found.items())
 
 
-def _motions(results: model.VisionResults) -> list[PlayedMotion]:
+def _motions(robot: Robot, results: model.VisionResults) -> list[PlayedMotion]:
     """The way to each object grasped and away from it, with a line that points at the object."""
     motions = []
     for each in results.summary.objects:
@@ -266,7 +269,7 @@ def _motions(results: model.VisionResults) -> list[PlayedMotion]:
         x, y, z = (value / 1000 for value in each.xyz_mm)
         mark = Mark(0.0, float(rows.t_s[-1]), (x, y, z), (x, y, z + POINTER_M), each.name)
         text = tr("{grasp}, turned by {turn} deg", grasp=each.grasp.grasp, turn=fixed(each.grasp.turn_deg, 0))
-        motions.append(PlayedMotion(each.name, text, rows.t_s, np.radians(rows.q_deg), events, [mark]))
+        motions.append(PlayedMotion(each.name, text, rows.t_s, meant(robot, rows.q_deg), events, [mark]))
     return motions
 
 

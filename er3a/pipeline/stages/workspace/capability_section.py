@@ -22,7 +22,7 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import own_title, tr
 from er3a.pipeline.messages.say import bracketed, joined, say, word
-from er3a.pipeline.messages.workspace import STATUS, box_text, millimetres, stand_text
+from er3a.pipeline.messages.workspace import STATUS, box_text, millimetres, range_text, stand_text
 from er3a.pipeline.player.turning import CIRCLE
 from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.workspace_figures import name_level, slide_names
@@ -35,19 +35,22 @@ from er3a.robots.robot import Robot
 ROUNDING = 1e-6  # mm
 
 
-def best_text(summary: model.WorkspaceSummary, placement: model.PlacementSummary) -> str:
-    """Where to put the box, and what room that place has."""
+def best_text(results: model.WorkspaceResults, placement: model.PlacementSummary) -> str:
+    """Where to put the box, and what room that place has; its height is kept where others bring the arm nearer to a
+    singular pose."""
     if not placement.named_places:
-        return box_text(summary)
-    place = placement.best
+        return box_text(results.summary)
+    place, height = placement.best, range_text(placement, results.places)
+    room = _room(place, "xy" if height else "xyz")
     texts = [
-        box_text(summary),
+        box_text(results.summary),
+        height,
         tr("Other collisions were checked at samples only.") if place.status == "proven" else "",
         tr(
             "Reach and limits allow to move it by {room} mm, one direction at a time; its support may be smaller.",
-            room=_room(place),
+            room=room,
         )
-        if _movable(place)
+        if room
         else "",
         _nearest_limit(place),
         _nearest_bodies(place),
@@ -71,17 +74,14 @@ def _nearest_bodies(place: model.PlaceSummary) -> str:
     return tr("The smallest clearance is {far} mm, between {pair}.", pair=pair, far=far)
 
 
-def _movable(place: model.PlaceSummary) -> bool:
-    return any((*place.room_down_m, *place.room_up_m))
-
-
-def _room(place: model.PlaceSummary) -> str:
-    """How far the box can be moved, such as ``x ±25, y -50 to 0``, in whole mm that the room holds."""
-    if not _movable(place):
-        return fixed(0, 0)
+def _room(place: model.PlaceSummary, axes: str = "xyz") -> str:
+    """How far the box can be moved along axes, such as ``x ±25, y -50 to 0``, in whole mm that the room holds; empty
+    where it can't."""
+    if not any((*place.room_down_m[: len(axes)], *place.room_up_m[: len(axes)])):
+        return ""
     parts = []
     whole = (np.floor(1000 * np.array(room) + ROUNDING) for room in (place.room_down_m, place.room_up_m))
-    for axis, down, up in zip("xyz", *whole):
+    for axis, down, up in zip(axes, *whole):
         if down == up:
             parts.append(f"{axis} {'±' if up else ''}{fixed(up, 0)}")
         elif down or up:
@@ -108,7 +108,7 @@ def place_row(name: str, place: model.PlaceSummary, capability: model.Capability
         fixed(100 * place.manipulability_ratio, 1),
         bracketed(fixed(place.limit_margin_deg, 1), f"J{place.limit_joint}" if place.limit_joint is not None else ""),
         bracketed(fixed(place.clearance_mm, 0), say(place.clearance_pair) if place.clearance_pair is not None else ""),
-        _room(place),
+        _room(place) or fixed(0, 0),
     ]
 
 
@@ -374,7 +374,7 @@ def _placement_context(
         "placing_scene": placement.scene,
         "placing_margin": fixed(placement.margin_mm, 0),
         "try_text": _try_text(robot, placement.task) if capability.asked == "directions" else "",
-        "best_text": best_text(results.summary, placement),
+        "best_text": best_text(results, placement),
         "stands": [stand_text(stand, placement) for stand in placement.stands],
         "points_serving": placement.points_serving,
         "place_rows": rows,
@@ -656,12 +656,13 @@ def _try_text(robot: Robot, task: model.TaskSummary) -> str:
     if np.allclose(robot.tool, np.eye(4)):
         return tr(
             "To see the arm at a position, type its centre, roll {roll}, pitch {pitch} and yaw 0 deg into the "
-            "teach panel. The robot has no tool here: the centre of its flange goes there.",
+            "teach panel. The robot has no tool here: the centre of its flange goes there. The box is not in the "
+            "panel's scene: its clearance leaves the box out.",
             **parts,
         )
     return tr(
         "To see the arm at a position, type its centre, roll {roll}, pitch {pitch} and yaw 0 deg into the teach"
-        " panel: the tool point goes there.",
+        " panel: the tool point goes there. The box is not in the panel's scene: its clearance leaves the box out.",
         **parts,
     )
 

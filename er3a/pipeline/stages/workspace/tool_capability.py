@@ -61,9 +61,10 @@ from er3a.workspace.tool_inverse import (
     tried_values,
 )
 
+SAME_HEIGHT = 1e-9  # m
 MAX_ACROSS, MAX_ACROSS_REDUNDANT = 64, 28
 CELL_TRIES, MIN_TRIES = 192, 3  # poses tried in a cell, and in each sector of it
-CELLS_S, CLEAR_S, PLACES_S = 8.0, 2.0, 8.0
+CELLS_S, CLEAR_S, PLACES_S = 8.0, 2.0, 8.0  # s by the model of `pose_cost`, never of a clock: equal on all machines
 _MIN_CELLS, _MIN_DIRECTIONS, _MAX_ROLLS = 400, 24, 4
 _FREE_S = 1.5e-5  # poses that take less are asked as the study says
 _WIDE_STEPS = np.radians([20.0, 30.0])
@@ -298,7 +299,7 @@ def _placed(
 
 def _why_not(support: Support, task: Task) -> model.WhyNoStand | None:
     """What of a support alone keeps the box from standing on it."""
-    if support.height < task.lowest - 1e-9:
+    if support.height < task.lowest - SAME_HEIGHT:
         return "too_low"
     return None if fits_on(support, task.box) else "too_small"
 
