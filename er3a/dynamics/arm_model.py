@@ -44,7 +44,9 @@ def pinocchio() -> Any:
     try:
         return import_module("pinocchio")
     except ModuleNotFoundError:
-        raise Er3aError("dynamics needs the Pinocchio library, which has no wheels for this platform") from None
+        raise Er3aError(
+            "dynamics needs Pinocchio (package pin), which is not installed; not every platform has wheels of it"
+        ) from None
 
 
 PARAMETERS = 10

@@ -2,7 +2,7 @@
 
 Torques are linear in the mass of a payload whose centre and radii of gyration stay, and quadratic in a scale of speed:
 gravity and Coulomb friction stay, viscous friction goes with it, inertia and velocity terms with its square [1]_. So
-the square of the effective torque is a polynomial of degree two in the one and of degree four in the other.
+the square of the RMS torque is a polynomial of degree two in the one and of degree four in the other.
 
 The error of torques from errors of masses and centres is linear, by the regressor: ``tau = Y(q, qd, qdd) p`` is linear
 in each body's ten parameters p [2]_. A body's mass is off with its centre and radii of gyration kept, so p moves along
@@ -44,7 +44,7 @@ REAL = 1e-7
 
 @dataclass(frozen=True, eq=False)
 class DriveLimits:
-    """Peak torques, effective ones over a cycle, and joint speeds: (n,) each, NaN where unknown."""
+    """Peak torques, RMS ones over a cycle, and joint speeds: (n,) each, NaN where unknown."""
 
     peak: Reals
     rated: Reals
@@ -62,7 +62,7 @@ class Margin:
 
     Attributes
     ----------
-    joint : from 0; sample : its number, None for the effective torque, which is one of the whole motion
+    joint : from 0; sample : its number, None for the RMS torque, which is one of the whole motion
     """
 
     value: float
@@ -72,7 +72,7 @@ class Margin:
 
 
 def max_payload(t: Reals, without: Reals, per_kg: Reals, limits: DriveLimits) -> Margin | None:
-    """The maximum payload in kg that keeps peak and effective torques within limits; None where no limit is known.
+    """The maximum payload in kg that keeps peak and RMS torques within limits; None where no limit is known.
 
     Parameters
     ----------

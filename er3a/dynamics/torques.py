@@ -154,7 +154,7 @@ class Demand:
     Attributes
     ----------
     peak, peak_at : maximum torque by its absolute value, and the number of its sample
-    rms : effective torque, which heats the motor
+    rms : root mean square of the torque, which heats the motor
     power : largest power given, 0 where the drive only brakes
     braking : largest power taken back, as a positive number
     work, recovered : energy given and taken back

@@ -46,7 +46,7 @@ class Rule:
     ----------
     unit : of the measure; None: of one joint, by which joints are compared
     best : "least" or "greatest" measure
-    measure : (robot, q (..., 6), q_ref (..., 6), scene) -> (...,)
+    measure : (robot, q (..., n), q_ref (..., n), scene) -> (...,)
     """
 
     unit: str | None
@@ -252,7 +252,7 @@ def select(
     weights = checked_weights(rule)
     q_ref = checked_reference(robot, q_ref)
     if solutions.q.ndim != 2:
-        raise ShapeError("solutions.q", solutions.q.shape, "(n, 6)")
+        raise ShapeError("solutions.q", solutions.q.shape, f"(n, {robot.joints})")
     measured = {name: RULES[name].measure(robot, solutions.q, q_ref, scene) for name in weights}
     units = {name: RULES[name].unit_of(robot) for name in weights}
     refused = refusals(robot, solutions, scene)
@@ -419,7 +419,7 @@ def _usable(robot: Robot, solutions: Solutions, scene: Scene | None, number: int
 
 
 def _move_costs(robot: Robot, before: Reals, after: Reals, rule: MoveRule, acceleration: Reals | None) -> Reals:
-    """Cost (n, m) of each move from joint angles (n, 6) to (m, 6)."""
+    """Cost (n, m) of each move from joint values (n, joints) to (m, joints)."""
     if rule == "time" and acceleration is not None:
         times = rest_to_rest(np.abs(after[None] - before[:, None]), robot.speed, acceleration)
         slowest: Reals = times.max(axis=-1, initial=0.0)

@@ -231,7 +231,7 @@ class GraspTask:
 
     Attributes
     ----------
-    home : (n,), rad, where the arm waits
+    home : (n,), rad or m, where the arm waits
     limits : of the joints' rates; line_speed : m/s, the tool's largest on approach and retreat; seed : of the planner
     """
 

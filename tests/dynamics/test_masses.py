@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import sys
 from dataclasses import fields, replace
 from pathlib import Path
 
@@ -14,6 +15,7 @@ import yaml
 from scipy.spatial.transform import Rotation
 
 import er3a
+from er3a.dynamics import arm_model
 from er3a.dynamics.arm_model import capsule_body, estimated_links, filled
 from er3a.dynamics.plausibility import (
     AboutOrigin,
@@ -253,6 +255,12 @@ def test_each_field_of_each_drive_reads_back_from_its_key(tmp_path):
     assert keys == {*TURNING, *SLIDING, "gear_ratio"}
     for kind in (TURNING, SLIDING):
         assert sorted(map(drive_field, (*kind, "gear_ratio"))) == sorted(names)
+
+
+def test_without_pinocchio_the_error_names_the_package(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pinocchio", None)  # what import then raises is a ModuleNotFoundError
+    with pytest.raises(er3a.Er3aError, match=r"Pinocchio \(package pin\), which is not installed"):
+        arm_model.pinocchio()
 
 
 # URDF

@@ -27,7 +27,8 @@ from er3a.pipeline.stages.inverse.report import rule_rows
 from er3a.pipeline.stages.programs.model import ProgramMotion, ProgramsResults
 from er3a.pipeline.stages.trajectory.model import PathChecks, TrajectoryResults
 from er3a.pipeline.stages.validation.model import LeftOpen, PartFound
-from er3a.pipeline.stages.vision.model import GraspCounts, PathRows, VisionResults
+from er3a.pipeline.stages.vision.model import PathRows, VisionResults
+from er3a.pipeline.stages.workspace import capability_section
 from er3a.pipeline.stages.workspace.entry import BoxTask
 from er3a.pipeline.stages.workspace.model import PlacementSummary, PlaceSummary, StandSummary
 from er3a.pipeline.stages.workspace.tool_capability import task_summary
@@ -102,12 +103,9 @@ def test_other_entries_are_to_be_checked_only_where_there_are_others():
 
 
 def test_a_verdict_says_what_it_is_not_to_be_taken_for():
-    grasped = GraspCounts(2, 2, (), (), None, (), simulated=False)
     torque = NoLimits(5, 2, 14.0, 4.1, "N m", "arc", (), 0, None)
-    assert say_reserved(grasped, [LeftOut("carried")]).endswith("This is of the bare arm: no gripper was checked.")
     assert say_reserved(torque, [LeftOut("friction")]).endswith("known masses alone: don't choose motors by them.")
-    for found in (grasped, torque):
-        assert say_reserved(found, [LeftOut("jerk")]) == say(found)
+    assert say_reserved(torque, [LeftOut("jerk")]) == say(torque)
 
 
 def test_an_arm_that_nothing_can_meet_has_infinite_clearance():
@@ -243,6 +241,19 @@ def test_grasps_that_pass_through_the_box_are_counted():
 
 
 GRASPED = {"can": "grasped", "missed": "not graspable"}
+
+
+@pytest.mark.parametrize(
+    ("height", "room"), [("", "x ±75, y −200 to 175, z −200 to 50"), ("Keep.", "x ±75, y −200 to 175")]
+)
+def test_the_workspace_page_moves_a_box_up_or_down_only_where_no_height_is_to_be_kept(monkeypatch, height, room):
+    monkeypatch.setattr(capability_section, "range_text", lambda *_: height)
+    monkeypatch.setattr(capability_section, "box_text", lambda *_: "Put it there.")
+    placement = placed().results.summary.placement
+    spot = replace(placement.best, room_down_m=(0.075, 0.2, 0.2), room_up_m=(0.075, 0.175, 0.05))
+    text = capability_section.best_text(SimpleNamespace(summary=None, places=None), replace(placement, places=(spot,)))
+    assert text.startswith(f"Put it there. {height}".strip())
+    assert f"allow to move it by {room} mm," in text
 
 
 def test_without_motions_or_without_a_place_nothing_is_said_to_be_free():

@@ -63,7 +63,8 @@ GLOSSARY = {
     N_("arm angle"): N_("where the elbow of an arm with spherical shoulder and wrist is on its circle"),
     N_("cuspidal"): N_("of an arm that can change between solutions of a pose without passing a singularity"),
     N_("manipulability"): N_(
-        "the product of the Jacobian's singular values, lengths divided by the wrist's reach; 0 at a singularity"
+        "the product of the Jacobian's singular values, lengths divided by the wrist's reach (in the workspace "
+        "undivided, in m³); 0 at a singularity"
     ),
     N_("condition number"): N_(
         "the Jacobian's largest singular value divided by its smallest; without bound at a singularity"

@@ -46,7 +46,7 @@ DynamicsVerdict = Verdict[model.NoData | model.NoLimits | model.AllWithin | mode
 def drive_uses(
     robot: Robot, paths: tuple[model.PathLoad, ...], holding: tuple[model.HoldingTorque, ...]
 ) -> tuple[model.Use, ...]:
-    """Peak and effective torques of the paths that count against the drives', holding torques against rated ones."""
+    """Peak and RMS torques of the paths that count against the drives', holding torques against rated ones."""
     drives, found = drives_of(robot), []
     for path in paths:
         for load in path.joints if path.counts else ():

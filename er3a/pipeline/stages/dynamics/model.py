@@ -203,7 +203,7 @@ class JointLoad:
 
     Attributes
     ----------
-    tolerance : of the peak; rms_tolerance : of the effective torque
+    tolerance : of the peak; rms_tolerance : of the RMS torque
     gravity, inertia, velocity, friction, tool : largest of each part
     power_w, braking_w : largest given and taken back
     """
@@ -230,7 +230,7 @@ class JointLoad:
 class BindingLimit:
     """The largest value under the limits, and what binds; None where nothing does.
 
-    ``t_s`` is None for the effective torque, which is one of the whole path.
+    ``t_s`` is None for the RMS torque, which is one of the whole path.
     """
 
     value: float | None
