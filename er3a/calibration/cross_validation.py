@@ -131,14 +131,15 @@ class _Linear:
         return amounts / self.scale[columns], float(rest @ rest)
 
 
-def parts_of(row_values: Reals, seed: int) -> tuple[Integers, Integers]:
-    """Which of ten parts each pose (P, m) is in: at random, and by neighbourhood."""
+def parts_of(observations: PointObservations, seed: int) -> tuple[Integers, Integers]:
+    """Which of ten parts each point (P,) is in, all of one pose in one: at random, and by neighbourhood."""
+    row_values, pose = observations.row_values, observations.same_pose
     count = len(row_values)
-    random = np.random.default_rng(seed).permutation(count) % PARTS
+    random = (np.random.default_rng(seed).permutation(count) % PARTS)[pose]
     spread = row_values.std(axis=0)
     scaled = row_values / np.where(spread > 0, spread, 1.0)
     centres = kmeans(scaled, min(PARTS, count), seed=np.random.default_rng(seed))[0]  # fewer if some would be empty
-    return random, vq(scaled, centres)[0].astype(np.int64)
+    return random, vq(scaled, centres)[0].astype(np.int64)[pose]
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +157,7 @@ def can_leave_out(pose_of: Integers, numbers: int) -> bool:
 
 def left_out(observations: PointObservations, found: Fit, seed: int = 0) -> HeldOutErrors:
     """What the model of a fit errs by at poses left out; other parts than those that terms are chosen by."""
-    parts = parts_of(observations.row_values, seed)
+    parts = parts_of(observations, seed)
     unknowns = np.r_[found.amounts, found.coefficients]
     poses, pose_of = np.unique(observations.pose_of[found.last], return_inverse=True)
     linear = _Linear(found.J, found.J @ unknowns - found.rest, len(found.amounts), poses[pose_of], parts)
@@ -188,7 +189,7 @@ def choose_terms(
     pose_of, rows = observations.pose_of[last], rows / observations.deviation_mm
     measured, turning, count = not (observations.touched >= 0).any(), int((~robot.sliding).sum()), len(kept)
     for kinds in ways if can_leave_out(pose_of, 0) else ():
-        fixed_terms, ripples = candidates(robot, kinds), "ripple" in kinds and measured
+        fixed_terms, ripples = candidates(robot, kinds), "ripple" in kinds and measured and turning > 0
         numbers = count + sum(term.count for term in fixed_terms) + ripples * 2 * turning
         if len(last) >= MIN_SPARE * numbers:
             break
@@ -201,7 +202,7 @@ def choose_terms(
     J = np.hstack([J, _lifted(rows, J, off, here, observations)])
     count = J.shape[1]
     rest = rest / np.sqrt(rest @ rest / (len(rest) - count))
-    parts = [part for seed in SEEDS for part in parts_of(observations.row_values, seed)]
+    parts = [part for seed in SEEDS for part in parts_of(observations, seed)]
     search = _RippleSearch(here, observations) if ripples else None
     taken: dict[JointTerm, TriedTerm] = {}
     dropped: dict[JointTerm, TriedTerm] = {}
