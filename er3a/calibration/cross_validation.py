@@ -27,6 +27,7 @@ from er3a.calibration.parameters import DEPENDENT, MM, Parameter
 from er3a.calibration.terms import (
     FOR_ALL_JOINTS,
     RIPPLES,
+    TAKEN,
     TYPICAL,
     JointTerm,
     TermKind,
@@ -95,13 +96,17 @@ class TriedTerm:
 
 
 class _Linear:
-    """The model near the best fit: columns of ``count`` numbers and of terms, and the tenths that are left out."""
+    """The model near the best fit: columns of numbers, of terms that were taken and of others, ``counts`` of the first
+    two, and the tenths that are left out."""
 
-    def __init__(self, J: Reals, rest: Reals, count: int, pose_of: Integers, parts: Sequence[Integers]):
+    def __init__(
+        self, J: Reals, rest: Reals, counts: tuple[int, int], pose_of: Integers, parts: Sequence[Integers]
+    ):
         scale = np.linalg.norm(J, axis=0)
         scale[scale == 0] = 1.0
         self.J, self.rest, self.scale = J / scale, rest, scale
-        prior = np.r_[np.zeros(count), np.full(J.shape[1] - count, 1 / TYPICAL)]
+        count, taken = counts
+        prior = np.r_[np.zeros(count), np.full(taken, 1 / TAKEN), np.full(J.shape[1] - count - taken, 1 / TYPICAL)]
         self._prior = (prior / scale) ** 2 + RIDGE
         self.whole = self.J.T @ self.J, self.J.T @ rest
         self._parts = [[np.flatnonzero(part[pose_of] == k) for k in range(PARTS)] for part in parts]
@@ -160,7 +165,8 @@ def left_out(observations: PointObservations, found: Fit, seed: int = 0) -> Held
     parts = parts_of(observations, seed)
     unknowns = np.r_[found.amounts, found.coefficients]
     poses, pose_of = np.unique(observations.pose_of[found.last], return_inverse=True)
-    linear = _Linear(found.J, found.J @ unknowns - found.rest, len(found.amounts), poses[pose_of], parts)
+    counts = len(found.amounts), len(found.coefficients)
+    linear = _Linear(found.J, found.J @ unknowns - found.rest, counts, poses[pose_of], parts)
     near, far = (
         np.sqrt(np.bincount(pose_of, weights=(errors * found.deviation_mm) ** 2))
         for errors in linear.errors(list(range(len(unknowns))))
@@ -211,7 +217,7 @@ def choose_terms(
         open_terms = [*fixed_terms, *(search.best(np.hstack([J, own]), rest) if search else [])]
         open_terms = [term for term in open_terms if term not in taken and term not in dropped]
         more = rows @ term_jacobian(here, robot, open_terms, observations)
-        linear = _Linear(np.hstack([J, own, more]), rest, count, pose_of, parts)
+        linear = _Linear(np.hstack([J, own, more]), rest, (count, own.shape[1]), pose_of, parts)
         used, places = list(range(count + own.shape[1])), places_of(open_terms, count + own.shape[1])
         trials = [_Trial(linear, used, *pair) for pair in zip(open_terms, places)]
         before = linear.squares(used)

@@ -37,7 +37,7 @@ from er3a.calibration.parameters import (
     parameters_of,
     placements_of,
 )
-from er3a.calibration.terms import TYPICAL, JointErrors, JointTerm, term_jacobian
+from er3a.calibration.terms import TAKEN, JointErrors, JointTerm, term_jacobian
 from er3a.geometry.transforms import rpy_of
 from er3a.numerics.arrays import Integers, Reals
 from er3a.references.reference import INTERVAL_95
@@ -230,8 +230,8 @@ class Fit:
 
     @property
     def covariance(self) -> Reals:
-        """(k + c, k + c), of the estimates; coefficients of terms are taken to be about as large as ``TYPICAL``."""
-        prior = np.r_[np.zeros(len(self.amounts)), np.full(len(self.coefficients), TYPICAL**-2)]
+        """(k + c, k + c), of the estimates; coefficients of terms are taken to be at most about as large as ``TAKEN``."""
+        prior = np.r_[np.zeros(len(self.amounts)), np.full(len(self.coefficients), TAKEN**-2)]
         scale = np.linalg.norm(self.J, axis=0)
         information = (self.J / scale).T @ (self.J / scale) + np.diag(prior / scale**2)
         return np.asarray(np.linalg.inv(information) / np.outer(scale, scale), np.float64)
@@ -369,7 +369,7 @@ def _fit(
     kept, terms, deviation = tuple(kept), tuple(terms), observations.deviation_mm
     nothing, start = np.zeros((1, len(kept))), _base_at(robot, kept, observations)
     far = bool(start.any())  # a large turn is no small one behind another
-    prior = np.full(sum(term.count for term in terms), 1 / TYPICAL)
+    prior = np.full(sum(term.count for term in terms), 1 / TAKEN)
 
     def with_errors(coefficients: Reals) -> Observations:
         if not (terms and isinstance(observations, PointObservations)):
