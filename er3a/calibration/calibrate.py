@@ -9,8 +9,10 @@ ratios of joints, and what couples them, as its coupling; the table that goes th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import Literal
 
 import numpy as np
@@ -64,6 +66,7 @@ from er3a.calibration.parameters import (
     parameters_of,
     placements_of,
     settles,
+    whole_length_mm,
 )
 from er3a.calibration.plan import d_optimal, touches
 from er3a.calibration.residuals import ResidualStructure, structure_of
@@ -93,6 +96,11 @@ TOGETHER = 0.5
 MAX_OUTLIER_SHARE = 0.1
 OUTLIER_ROUNDS = 3
 MEDIAN_TO_DEVIATION = 1.4826
+FAR_WIDEST = 2.0
+"""Times ``WIDEST``: a correction beyond is none of this arm."""
+FAR_REST = 0.004
+"""Of an arm's whole length: a root mean square that no tracker leaves of an arm whose table is right."""
+AS_GOOD = 1.1  # times what the table leaves
 FEW_SPARE = 10
 """Degrees of freedom below which what remains says how large noise is, but not where."""
 
@@ -321,6 +329,7 @@ class Calibration(ByValue, Displayed):
     held : why the other entries of the level keep their values
     singular_values : of the scaled Jacobian (standard deviations per mm or mrad), descending
     coordinates, poses : how many measured coordinates at how many poses; of those that were read again the means
+    wrong : why measurements and table can't belong together; None if they can
     freedom : how many more independent coordinates than numbers there are; of one nothing is settled, unless the
         deviation was stated
     repeated : how many lines read a point again at a pose of another line; their mean counts once
@@ -357,6 +366,7 @@ class Calibration(ByValue, Displayed):
     more: MorePositions | MoreTouches | None
     repeated: int = 0
     freedom: int = FEW_SPARE
+    wrong: outcomes.FarFromTable | None = None
     deviation_mm: float | None = None
     outliers: tuple[Outlier, ...] = ()
     ratios: tuple[TermEstimate, ...] = ()
@@ -370,8 +380,8 @@ class Calibration(ByValue, Displayed):
 
     @property
     def fits(self) -> bool:
-        """Whether the corrected table meets the measurements to three times their uncertainty."""
-        return self.scatter <= MAX_SCATTER
+        """Whether the corrected table meets the measurements to three times their uncertainty and is the same arm's."""
+        return self.scatter <= MAX_SCATTER and self.wrong is None
 
     @property
     def open(self) -> tuple[str, ...]:
@@ -381,6 +391,8 @@ class Calibration(ByValue, Displayed):
     @property
     def conclusion(self) -> outcomes.CalibrationConclusion:
         """What the measurements say about the table."""
+        if self.wrong:
+            return self.wrong
         if not self.fits:
             return outcomes.Misfit(self.level, self.rms_before_mm, self.rms_after_mm)
         beyond = tuple(each.name for each in self.estimates if abs(each.correction) > each.half_width)
@@ -693,6 +705,7 @@ def _from_points(robot: Robot, every: PointObservations, free_ratios: bool) -> C
     observations, table = model.observations, _result(robot, model.level, model.observations, model.table)
     return replace(
         table,
+        wrong=None if model.level.left else _wrong(robot, observations, table),
         repeated=int(used.sum()) - len(observations.row_values),
         deviation_mm=_deviation(observations, model.table),
         outliers=tuple(Outlier(int(every.lines[k]), float(distances[k])) for k in np.flatnonzero(~used)),
@@ -702,6 +715,57 @@ def _from_points(robot: Robot, every: PointObservations, free_ratios: bool) -> C
         tried_for_file=model.for_file.tried if model.choice.tried else (),
         beyond=_beyond(robot, model.for_whole, model.whole) if model.choice.terms else None,
     )
+
+
+def _far_off(robot: Robot, estimates: Sequence[Estimate]) -> tuple[str, ...]:
+    """Entries of the table whose corrections no way of building an arm explains."""
+    return tuple(
+        each.name
+        for each in estimates
+        if each.parameter.joint
+        and each.settled
+        and not settles(robot, each.unit, (abs(each.correction) - each.half_width) / FAR_WIDEST)
+    )
+
+
+def _wrong(robot: Robot, observations: PointObservations, found: Calibration) -> outcomes.FarFromTable | None:
+    """Why measurements and table can't belong together: what fits with two joints' columns swapped, or one joint's sign
+    turned, is named; corrections or residuals far beyond those of arms and trackers are an error of some other kind."""
+    far = _far_off(robot, found.estimates)
+    too_much = not observations.deviation_known and found.rms_after_mm > FAR_REST * whole_length_mm(robot)
+    if not (far or too_much or found.scatter > MAX_SCATTER):
+        return None
+    mistakes: list[tuple[float, tuple[int, int] | None, int | None]] = []
+    kept = [each.parameter for each in found.estimates]
+    for swapped, opposite, columns in _mistakes(robot):
+        with suppress(CalibrationError):
+            other = fit(robot, kept, replace(observations, row_values=observations.row_values @ columns.T))
+            rms = float(np.sqrt(np.mean((other.after * observations.deviation_mm) ** 2)))
+            plain = np.full(len(kept), 0.0)
+            if rms <= AS_GOOD * found.rms_after_mm and not _far_off(
+                robot, _estimates(robot, observations, other, plain, plain)
+            ):
+                mistakes.append((rms, swapped, opposite))
+    best = min(mistakes, key=lambda each: each[0], default=None)
+    if best or far or too_much:
+        return outcomes.FarFromTable(far, found.rms_after_mm, *(best[1:] if best else ()))
+    return None
+
+
+def _mistakes(robot: Robot) -> Iterator[tuple[tuple[int, int] | None, int | None, Reals]]:
+    """Two joints that may be swapped, or one whose sign may be wrong, and what that makes of rows' values (m, m)."""
+    count, slides = robot.joints, robot.slides
+    if robot.rows != count:
+        return
+    coupling = np.eye(count) if robot.coupling is None else robot.coupling
+    for first, second in combinations(range(count), 2):
+        if slides[first] == slides[second]:
+            order = np.arange(count)
+            order[[first, second]] = second, first
+            yield (first + 1, second + 1), None, coupling @ np.eye(count)[order] @ np.linalg.inv(coupling)
+    for joint in range(count):
+        signs = np.where(np.arange(count) == joint, -1.0, 1.0)
+        yield None, joint + 1, coupling @ np.diag(signs) @ np.linalg.inv(coupling)
 
 
 def _without_outliers(robot: Robot, every: PointObservations) -> Flags:

@@ -99,9 +99,7 @@ class _Linear:
     """The model near the best fit: columns of numbers, of terms that were taken and of others, ``counts`` of the first
     two, and the tenths that are left out."""
 
-    def __init__(
-        self, J: Reals, rest: Reals, counts: tuple[int, int], pose_of: Integers, parts: Sequence[Integers]
-    ):
+    def __init__(self, J: Reals, rest: Reals, counts: tuple[int, int], pose_of: Integers, parts: Sequence[Integers]):
         scale = np.linalg.norm(J, axis=0)
         scale[scale == 0] = 1.0
         self.J, self.rest, self.scale = J / scale, rest, scale

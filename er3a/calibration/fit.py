@@ -230,7 +230,7 @@ class Fit:
 
     @property
     def covariance(self) -> Reals:
-        """(k + c, k + c), of the estimates; coefficients of terms are taken to be at most about as large as ``TAKEN``."""
+        """(k + c, k + c), of the estimates; coefficients of terms are about ``TAKEN`` at most."""
         prior = np.r_[np.zeros(len(self.amounts)), np.full(len(self.coefficients), TAKEN**-2)]
         scale = np.linalg.norm(self.J, axis=0)
         information = (self.J / scale).T @ (self.J / scale) + np.diag(prior / scale**2)
