@@ -102,7 +102,7 @@ FAR_REST = 0.004
 """Of an arm's whole length: a root mean square that no tracker leaves of an arm whose table is right."""
 AS_GOOD = 1.1  # times what the table leaves
 FEW_SPARE = 10
-"""Degrees of freedom below which what remains says how large noise is, but not where."""
+"""Degrees of freedom below which what remains says how large noise is, but not where; at least as many as numbers."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,8 +165,8 @@ def choose_level(robot: Robot, observations: Observations) -> Level:
                 more.append(_what_more(robot, name, parameters, (here, best), observations))
             if (settled or isinstance(more[-1], MoreTouches)) and spare > len(here.kept) > 0:
                 what = next((each for each in more if isinstance(each, MoreTouches)), more[-1] if more else None)
-                kept = {parameters[k] for k in here.kept}
-                return Level(name, parameters, here, what, scale, tuple(each for each in every if each not in kept))
+                left_out_of_it = tuple(each for each in every if each not in parameters)
+                return Level(name, parameters, here, what, scale, left_out_of_it)
     if not more[-1].determinable:
         raise CalibrationError(more[-1], "no entry of the table moves what was measured; touch or measure elsewhere")
     lack = "numbers" if isinstance(more[-1], MoreTouches) else "positions"
@@ -585,7 +585,7 @@ def _covariance(observations: Observations, found: Fit, beside: Reals) -> tuple[
 def _covariance_by_noise(observations: Observations, found: Fit) -> tuple[Reals, Reals]:
     if not isinstance(observations, PointObservations) or observations.deviation_known:
         return found.covariance, np.full(found.J.shape[1], INTERVAL_95)
-    if found.freedom < FEW_SPARE:
+    if found.freedom < max(FEW_SPARE, found.J.shape[1]):
         quantile = float(scipy.special.stdtrit(found.freedom, 0.975))
         return found.scatter**2 * found.covariance, np.full(found.J.shape[1], quantile)
     covariance, freedom = covariance_by_poses(found, observations.same_pose[observations.pose_of[found.last]])
@@ -641,7 +641,8 @@ def _model(robot: Robot, observations: PointObservations, free_ratios: bool) -> 
         observations = observations.with_deviation(observations.deviation_mm[0] * table.scatter)
         table = fit(robot, level.kept, observations)
     here = corrected(robot, table.kept, table.amounts)
-    ways = () if observations.all_touched and not _settled(robot, observations, table) else FOR_ALL_JOINTS
+    unclear = level.left or (observations.all_touched and not _settled(robot, observations, table))
+    ways = () if unclear else FOR_ALL_JOINTS  # terms would stand for what entries that are left out do
     choice, for_file = choose_terms(robot, here, table.kept, observations, ways), ChosenTerms((), ())
     if not choice.terms and tilts_explain(here, table.kept, observations):
         raise _sockets_beside(observations, table)

@@ -285,7 +285,8 @@ def test_readings_of_one_pose_count_once(deviation, random):
     rows = with_pose_errors(robot, random, 40, 5, deviation)
     found, once = er3a.calibrate(robot, rows), er3a.calibrate(robot, rows[:40])
     assert (found.poses, found.repeated, found.coordinates) == (40, 160, 120)
-    assert not found.beyond and not found.ratios
+    assert not found.beyond
+    assert not found.ratios
     widths = [[each.half_width for each in own.estimates] for own in (found, once)]
     assert widths[0] == pytest.approx(widths[1], rel=0.15)
     assert found.left_out.mean_mm == pytest.approx(once.left_out.mean_mm, rel=0.1)
@@ -364,6 +365,8 @@ def test_swapped_columns_and_a_joints_sign_are_named(convert, known, random):
     assert (found.wrong.swapped, found.wrong.opposite) == ((5, 6), None) if swapped else (None, 5)
     assert lines_of(found).startswith("Measurements and table belong together if J5 ")
     assert not found.fits
+    advised = [replace(row, pose=tuple(own)) for row, own in zip(rows, np.degrees(convert(wrong)).tolist())]
+    assert er3a.calibrate(robot, advised).fits
 
 
 def test_a_joints_zero_that_is_far_off_is_named(random):

@@ -222,8 +222,9 @@ TEXTS = texts(
             "arm leaves. Check the order, signs and zeros of the joints, and whether the table is that of this arm."
         ),
         "far_from_table#rest": (
-            "Measurements and table don't belong together: {rest_mm:.3g} mm (root mean square) remain, far more than of "
-            "a measured arm. Check the order, signs and zeros of the joints, and whether the table is that of this arm."
+            "Measurements and table don't belong together: {rest_mm:.3g} mm (root mean square) remain, far more than "
+            "of a measured arm. Check the order, signs and zeros of the joints, and whether the table is that of this "
+            "arm."
         ),
         "far_from_table#swapped": (
             "Measurements and table belong together if J{first} and J{second} are swapped. Swap their columns."
