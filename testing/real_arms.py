@@ -66,7 +66,7 @@ def unseen(name: str, far: bool, seed: int, parts: int = PARTS) -> Unseen:
     """
     robot, rows = load(name)
     arm = measured_arm(MEASUREMENTS / f"{name}.yaml", MEASUREMENTS / f"{name}.csv")
-    part = parts_of(points(name)[1].row_values, seed)[int(far)]
+    part = parts_of(points(name)[1], seed)[int(far)]
     table, model, plain = (np.full(len(rows), np.nan) for _ in range(3))
     found = []
     for k in range(parts):

@@ -30,6 +30,7 @@ OF_SETS = "test_a_set_that_is_mended_as_advised_gives_the_camera_and_no_warning"
 AT_PLACES = "test_the_clearance_of_a_place_is_that_of_the_nearest_arm_on_its_lattice"
 AT_OVERRIDE = "test_at_the_override_that_is_advised_a_controller_ten_times_as_fast_keeps_the_assumed_speeds"
 MEASURED = "test_the_proposed_measurement_settles_or_contradicts"
+SWAPPED = "test_swapped_columns_and_a_joints_sign_are_named"
 CARRIED_OUT = {
     **dict.fromkeys(REMEDIES, OF_PROGRAMS),
     **{f"singular.{kind}": OF_PROGRAMS for kind in ("wrist", "elbow", "shoulder")},
@@ -84,6 +85,7 @@ CARRIED_OUT = {
     "ambiguous_tilt": "test_a_board_seen_head_on_leaves_its_tilt_open_until_it_is_nearer_or_tilted",
     "other_direction": OF_SETS,
     "wrong_limit#lower": "test_single_faults_are_named",
+    **{f"far_from_table#{mistake}": SWAPPED for mistake in ("swapped", "opposite")},
 }
 NOT_CARRIED_OUT = {  # a person looks at the controller, the cell or the file, or takes another picture
     *("configuration_not_read", "program_not_simulated", "program_form_inferred", "external_axes_left_out"),
@@ -94,6 +96,7 @@ NOT_CARRIED_OUT = {  # a person looks at the controller, the cell or the file, o
     *("read_limit#lower", "read_limit#upper", "time_joint"),
     *("payload.unknown", "payload.not_examined"),
     *("validation.left_open#turned", "validation.left_open#turned_at_least"),
+    *("far_from_table", "far_from_table#rest"),
 }
 NO_ADVICE = {f"not_of_this_arm#{why}" for why in ("no_such_joint", "no_wrist_centre", "joint_slides", "joint_turns")}
 

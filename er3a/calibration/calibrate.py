@@ -9,8 +9,10 @@ ratios of joints, and what couples them, as its coupling; the table that goes th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import Literal
 
 import numpy as np
@@ -28,6 +30,7 @@ from er3a.calibration.cross_validation import (
     tilts_explain,
 )
 from er3a.calibration.fit import (
+    PLAUSIBLE,
     ROUNDING,
     SCALE,
     BarLength,
@@ -50,6 +53,7 @@ from er3a.calibration.outcomes import (
     LevelName,
     MorePositions,
     MoreTouches,
+    NoCorrectionFits,
     NoPositions,
     PlacementName,
     SocketsBeside,
@@ -62,12 +66,14 @@ from er3a.calibration.parameters import (
     parameters_of,
     placements_of,
     settles,
+    whole_length_mm,
 )
 from er3a.calibration.plan import d_optimal, touches
 from er3a.calibration.residuals import ResidualStructure, structure_of
 from er3a.calibration.terms import (
     FOR_ALL_JOINTS,
     FOR_ROBOT_FILE,
+    TYPICAL,
     CorrectedModel,
     JointErrors,
     TermKind,
@@ -90,6 +96,13 @@ TOGETHER = 0.5
 MAX_OUTLIER_SHARE = 0.1
 OUTLIER_ROUNDS = 3
 MEDIAN_TO_DEVIATION = 1.4826
+FAR_WIDEST = 2.0
+"""Times ``WIDEST``: a correction beyond is none of this arm."""
+FAR_REST = 0.004
+"""Of an arm's whole length: a root mean square that no tracker leaves of an arm whose table is right."""
+AS_GOOD = 1.1  # times what the table leaves
+FEW_SPARE = 10
+"""Degrees of freedom below which what remains says how large noise is, but not where; at least as many as numbers."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +115,7 @@ class Level:
     parameters : its entries, behind those of base and tool; subspace : which of them the observations determine
     more : what a fuller level would take; None if all entries are estimated
     scale : the length that is taken as it is because nothing else sets the scale; None where coordinates were measured
+    left : entries, base and tool that are not estimated although more observations could settle them
     """
 
     name: LevelName
@@ -109,6 +123,7 @@ class Level:
     subspace: Subspace
     more: MorePositions | MoreTouches | None
     scale: Parameter | None = None
+    left: tuple[Parameter, ...] = ()
 
     @property
     def held(self) -> tuple[outcomes.Held, ...]:
@@ -138,17 +153,20 @@ def choose_level(robot: Robot, observations: Observations) -> Level:
     spare = len(observations) - getattr(observations, "dropped", 0)
     rich = _rich(robot, observations)
     more: list[MorePositions | MoreTouches] = []
-    for name in LEVELS[::-1]:
-        for first in (placed, ()) if placed else ((),):
+    every: list[Parameter] = []
+    for first in (placed, ()) if placed else ((),):
+        for name in LEVELS[::-1]:
             parameters = (*first, *without_scale(parameters_of(robot, name), scale))
             here = subspace(robot, parameters, observations, left)
             best = subspace(robot, parameters, rich, left) if len(rich) else here
+            every = every or [parameters[k] for k in best.kept]
             settled = len(best.kept) <= len(here.kept)
             if not (settled and here.kept) or spare <= len(here.kept):
                 more.append(_what_more(robot, name, parameters, (here, best), observations))
             if (settled or isinstance(more[-1], MoreTouches)) and spare > len(here.kept) > 0:
                 what = next((each for each in more if isinstance(each, MoreTouches)), more[-1] if more else None)
-                return Level(name, parameters, here, what, scale)
+                left_out_of_it = tuple(each for each in every if each not in parameters)
+                return Level(name, parameters, here, what, scale, left_out_of_it)
     if not more[-1].determinable:
         raise CalibrationError(more[-1], "no entry of the table moves what was measured; touch or measure elsewhere")
     lack = "numbers" if isinstance(more[-1], MoreTouches) else "positions"
@@ -310,7 +328,11 @@ class Calibration(ByValue, Displayed):
     ratios : of joints, and couplings, where poses left out are met better with them
     held : why the other entries of the level keep their values
     singular_values : of the scaled Jacobian (standard deviations per mm or mrad), descending
-    coordinates, poses : how many measured coordinates at how many poses
+    coordinates, poses : how many measured coordinates at how many poses; of those that were read again the means
+    wrong : why measurements and table can't belong together; None if they can
+    freedom : how many more independent coordinates than numbers there are; of one nothing is settled, unless the
+        deviation was stated
+    repeated : how many lines read a point again at a pose of another line; their mean counts once
     rms_before_mm, rms_after_mm : of the differences to the measurements
     scatter : root mean square of what remains, in standard deviations, per degree of freedom: near 1 if table and
         stated deviations are right; 1 if the deviation was estimated
@@ -342,6 +364,9 @@ class Calibration(ByValue, Displayed):
     rms_after_mm: float
     scatter: float
     more: MorePositions | MoreTouches | None
+    repeated: int = 0
+    freedom: int = FEW_SPARE
+    wrong: outcomes.FarFromTable | None = None
     deviation_mm: float | None = None
     outliers: tuple[Outlier, ...] = ()
     ratios: tuple[TermEstimate, ...] = ()
@@ -355,8 +380,8 @@ class Calibration(ByValue, Displayed):
 
     @property
     def fits(self) -> bool:
-        """Whether the corrected table meets the measurements to three times their uncertainty."""
-        return self.scatter <= MAX_SCATTER
+        """Whether the corrected table meets the measurements to three times their uncertainty and is the same arm's."""
+        return self.scatter <= MAX_SCATTER and self.wrong is None
 
     @property
     def open(self) -> tuple[str, ...]:
@@ -366,6 +391,8 @@ class Calibration(ByValue, Displayed):
     @property
     def conclusion(self) -> outcomes.CalibrationConclusion:
         """What the measurements say about the table."""
+        if self.wrong:
+            return self.wrong
         if not self.fits:
             return outcomes.Misfit(self.level, self.rms_before_mm, self.rms_after_mm)
         beyond = tuple(each.name for each in self.estimates if abs(each.correction) > each.half_width)
@@ -493,7 +520,8 @@ def calibrate(
 
 def _result(robot: Robot, level: Level, observations: Observations, found: Fit) -> Calibration:
     """What the table, with ratios, has of a calibration."""
-    covariance, quantiles = _covariance(observations, found)
+    beside = _beside(robot, level, observations, found)
+    covariance, quantiles = _covariance(observations, found, beside)
     error, count = np.sqrt(np.diag(covariance)), len(found.kept)
     correlation = (covariance / np.maximum(np.outer(error, error), SMALLEST))[:count, :count]
     rows, columns = np.nonzero(np.triu(np.abs(correlation) > CLOSE, 1))
@@ -507,7 +535,7 @@ def _result(robot: Robot, level: Level, observations: Observations, found: Fit) 
     return Calibration(
         robot=coupled(here, {(t.joint, t.by or t.joint): float(c) for t, c in zip(found.terms, found.coefficients)}),
         level=level.name,
-        estimates=_estimates(robot, found, error, quantiles),
+        estimates=_estimates(robot, observations, found, error, quantiles),
         correlation=correlation,
         ratios=_term_estimates(found, error),
         held=level.held,
@@ -517,23 +545,57 @@ def _result(robot: Robot, level: Level, observations: Observations, found: Fit) 
         poses=observations.poses,
         rms_before_mm=float(np.sqrt(np.mean((found.before * deviation) ** 2))),
         rms_after_mm=float(np.sqrt(np.mean((found.after * deviation) ** 2))),
-        scatter=found.scatter,
+        scatter=_scatter(found, beside),
+        freedom=found.freedom,
         more=level.more,
         bars=bars,
         idle=idle,
     )
 
 
-def _covariance(observations: Observations, found: Fit) -> tuple[Reals, Reals]:
-    """By the stated deviations; where none was stated, by what remains at each pose; and half-widths (k + c,) of 95 %
-    intervals in standard errors."""
-    if isinstance(observations, PointObservations) and not observations.deviation_known:
-        covariance, freedom = covariance_by_poses(found, observations.pose_of[found.last])
-        return covariance, np.asarray(scipy.special.stdtrit(freedom, 0.975))
-    return found.covariance, np.full(found.J.shape[1], INTERVAL_95)
+def _beside(robot: Robot, level: Level, observations: Observations, found: Fit) -> Reals:
+    """(m, l), standard deviations: what entries that are left out do if they are off by ``TYPICAL``, a base or tool by
+    ``PLAUSIBLE``. A reference set is of the table itself, which nothing has built otherwise."""
+    if not (level.left and isinstance(observations, PointObservations)):
+        return np.empty((len(found.rest), 0))
+    here, off = corrected(robot, found.kept, found.amounts), [TYPICAL if p.joint else PLAUSIBLE for p in level.left]
+    J = jacobian(here, level.left, observations) / observations.deviation_mm[:, None]
+    rows: Reals = observations.independent(here)[0] @ (J * off)
+    return rows
 
 
-def _estimates(robot: Robot, found: Fit, error: Reals, quantiles: Reals) -> tuple[Estimate, ...]:
+def _scatter(found: Fit, beside: Reals) -> float:
+    """Of what remains, beside what entries that are left out may do."""
+    if not beside.size:
+        return found.scatter
+    root = np.linalg.cholesky(np.eye(len(found.rest)) + beside @ beside.T)
+    J, rest = np.linalg.solve(root, found.J), np.linalg.solve(root, found.rest)
+    left = rest - J @ np.linalg.lstsq(J, rest, rcond=None)[0]
+    return float(np.sqrt((left @ left) / found.freedom))
+
+
+def _covariance(observations: Observations, found: Fit, beside: Reals) -> tuple[Reals, Reals]:
+    """By the stated deviations; where none was stated, by what remains at each pose, or of all poses alike if these are
+    few; and half-widths (k + c,) of 95 % intervals in standard errors. ``beside``: of entries that are left out."""
+    covariance, quantiles = _covariance_by_noise(observations, found)
+    bias = found.covariance @ found.J.T @ beside
+    return covariance + bias @ bias.T, quantiles
+
+
+def _covariance_by_noise(observations: Observations, found: Fit) -> tuple[Reals, Reals]:
+    if not isinstance(observations, PointObservations) or observations.deviation_known:
+        return found.covariance, np.full(found.J.shape[1], INTERVAL_95)
+    if found.freedom < max(FEW_SPARE, found.J.shape[1]):
+        quantile = float(scipy.special.stdtrit(found.freedom, 0.975))
+        return found.scatter**2 * found.covariance, np.full(found.J.shape[1], quantile)
+    covariance, freedom = covariance_by_poses(found, observations.same_pose[observations.pose_of[found.last]])
+    return covariance, np.asarray(scipy.special.stdtrit(freedom, 0.975))
+
+
+def _estimates(
+    robot: Robot, observations: Observations, found: Fit, error: Reals, quantiles: Reals
+) -> tuple[Estimate, ...]:
+    known = observations.deviation_known or found.freedom > 1
     return tuple(
         Estimate(
             parameter,
@@ -541,10 +603,21 @@ def _estimates(robot: Robot, found: Fit, error: Reals, quantiles: Reals) -> tupl
             float(amount * parameter.in_unit),
             float(own * parameter.in_unit),
             float(quantile),
-            not found.ran_off and settles(robot, parameter.unit, float(quantile * own * parameter.in_unit)),
+            not found.ran_off and known and settles(robot, parameter.unit, float(quantile * own * parameter.in_unit)),
         )
         for parameter, amount, own, quantile in zip(found.kept, found.amounts, error, quantiles)
     )
+
+
+def _fitted(robot: Robot, level: Level, observations: PointObservations) -> Fit:
+    """The table; if nothing fits while entries are left out, positions are too few to say that the table is wrong."""
+    try:
+        return fit(robot, level.kept, observations)
+    except CalibrationError as error:
+        if not (level.left and level.more and isinstance(error.finding, NoCorrectionFits)):
+            raise
+        problem = f"{observations.poses} poses settle too little of the table to fit it"
+        raise CalibrationError(level.more, problem) from None
 
 
 @dataclass(frozen=True, eq=False)
@@ -560,21 +633,16 @@ class _Model:
     for_file: ChosenTerms
     whole: Fit
 
-    @property
-    def off_mm(self) -> Reals:
-        """What the whole model leaves, mm (n,)."""
-        off: Reals = self.whole.after * self.for_whole.deviation_mm
-        return off
-
 
 def _model(robot: Robot, observations: PointObservations, free_ratios: bool) -> _Model:
     level = choose_level(robot, observations)
-    table = fit(robot, level.kept, observations)
+    table = _fitted(robot, level, observations)
     if not observations.deviation_known:
         observations = observations.with_deviation(observations.deviation_mm[0] * table.scatter)
         table = fit(robot, level.kept, observations)
     here = corrected(robot, table.kept, table.amounts)
-    ways = () if observations.all_touched and not _settled(robot, observations, table) else FOR_ALL_JOINTS
+    unclear = level.left or (observations.all_touched and not _settled(robot, observations, table))
+    ways = () if unclear else FOR_ALL_JOINTS  # terms would stand for what entries that are left out do
     choice, for_file = choose_terms(robot, here, table.kept, observations, ways), ChosenTerms((), ())
     if not choice.terms and tilts_explain(here, table.kept, observations):
         raise _sockets_beside(observations, table)
@@ -605,8 +673,9 @@ def _model(robot: Robot, observations: PointObservations, free_ratios: bool) -> 
 def _settled(robot: Robot, observations: PointObservations, table: Fit) -> bool:
     """Whether all entries are settled: else a table is so far from straight in what touches leave open that terms would
     be taken for that."""
-    covariance, quantiles = _covariance(observations, table)
-    return all(each.settled for each in _estimates(robot, table, np.sqrt(np.diag(covariance)), quantiles))
+    covariance, quantiles = _covariance_by_noise(observations, table)
+    error = np.sqrt(np.diag(covariance))
+    return all(each.settled for each in _estimates(robot, observations, table, error, quantiles))
 
 
 def _sockets_beside(observations: PointObservations, table: Fit) -> CalibrationError:
@@ -626,16 +695,19 @@ def _error_left_out(observations: PointObservations, found: Fit) -> float:
 
 def _from_points(robot: Robot, every: PointObservations, free_ratios: bool) -> Calibration:
     used = _without_outliers(robot, every)
-    model = _model(robot, every.take(used), free_ratios)
+    model = _model(robot, every.take(used).merged(), free_ratios)
     for _ in range(OUTLIER_ROUNDS):
-        again = _out_of(every, _off_mm(robot, every, model, used), model.off_mm) <= 1.0
+        off = _off_mm(robot, every, model, used)
+        again = _out_of(every, off, off[used[every.pose_of]]) <= 1.0
         if (again == used).all() or (~again).mean() > MAX_OUTLIER_SHARE:
             break
-        used, model = again, _model(robot, every.take(again), free_ratios)
+        used, model = again, _model(robot, every.take(again).merged(), free_ratios)
     distances = np.sqrt(np.bincount(every.pose_of, weights=_off_mm(robot, every, model, used) ** 2))
     observations, table = model.observations, _result(robot, model.level, model.observations, model.table)
     return replace(
         table,
+        wrong=None if model.level.left else _wrong(robot, observations, table),
+        repeated=int(used.sum()) - len(observations.row_values),
         deviation_mm=_deviation(observations, model.table),
         outliers=tuple(Outlier(int(every.lines[k]), float(distances[k])) for k in np.flatnonzero(~used)),
         left_out=_left_out(observations, model.table),
@@ -646,6 +718,57 @@ def _from_points(robot: Robot, every: PointObservations, free_ratios: bool) -> C
     )
 
 
+def _far_off(robot: Robot, estimates: Sequence[Estimate]) -> tuple[str, ...]:
+    """Entries of the table whose corrections no way of building an arm explains."""
+    return tuple(
+        each.name
+        for each in estimates
+        if each.parameter.joint
+        and each.settled
+        and not settles(robot, each.unit, (abs(each.correction) - each.half_width) / FAR_WIDEST)
+    )
+
+
+def _wrong(robot: Robot, observations: PointObservations, found: Calibration) -> outcomes.FarFromTable | None:
+    """Why measurements and table can't belong together: what fits with two joints' columns swapped, or one joint's sign
+    turned, is named; corrections or residuals far beyond those of arms and trackers are an error of some other kind."""
+    far = _far_off(robot, found.estimates)
+    too_much = not observations.deviation_known and found.rms_after_mm > FAR_REST * whole_length_mm(robot)
+    if not (far or too_much or found.scatter > MAX_SCATTER):
+        return None
+    mistakes: list[tuple[float, tuple[int, int] | None, int | None]] = []
+    kept = [each.parameter for each in found.estimates]
+    for swapped, opposite, columns in _mistakes(robot):
+        with suppress(CalibrationError):
+            other = fit(robot, kept, replace(observations, row_values=observations.row_values @ columns.T))
+            rms = float(np.sqrt(np.mean((other.after * observations.deviation_mm) ** 2)))
+            plain = np.full(len(kept), 0.0)
+            if rms <= AS_GOOD * found.rms_after_mm and not _far_off(
+                robot, _estimates(robot, observations, other, plain, plain)
+            ):
+                mistakes.append((rms, swapped, opposite))
+    best = min(mistakes, key=lambda each: each[0], default=None)
+    if best or far or too_much:
+        return outcomes.FarFromTable(far, found.rms_after_mm, *(best[1:] if best else ()))
+    return None
+
+
+def _mistakes(robot: Robot) -> Iterator[tuple[tuple[int, int] | None, int | None, Reals]]:
+    """Two joints that may be swapped, or one whose sign may be wrong, and what that makes of rows' values (m, m)."""
+    count, slides = robot.joints, robot.slides
+    if robot.rows != count:
+        return
+    coupling = np.eye(count) if robot.coupling is None else robot.coupling
+    for first, second in combinations(range(count), 2):
+        if slides[first] == slides[second]:
+            order = np.arange(count)
+            order[[first, second]] = second, first
+            yield (first + 1, second + 1), None, coupling @ np.eye(count)[order] @ np.linalg.inv(coupling)
+    for joint in range(count):
+        signs = np.where(np.arange(count) == joint, -1.0, 1.0)
+        yield None, joint + 1, coupling @ np.diag(signs) @ np.linalg.inv(coupling)
+
+
 def _without_outliers(robot: Robot, every: PointObservations) -> Flags:
     """Points (P,) that are used for a first model: those far out are set aside, the farthest first, because they bend
     the table; all are used if they are many."""
@@ -653,7 +776,7 @@ def _without_outliers(robot: Robot, every: PointObservations) -> Flags:
     used, observations = all_used.copy(), every
     while True:
         try:
-            found = fit(robot, choose_level(robot, observations).kept, observations)
+            found = _fitted(robot, choose_level(robot, observations.merged()), observations)
         except CalibrationError:
             if observations is every:
                 raise
@@ -741,13 +864,13 @@ def _term_estimates(found: Fit, error: Reals) -> tuple[TermEstimate, ...]:
 
 
 def _beyond(robot: Robot, observations: PointObservations, found: Fit) -> Beyond:
-    covariance, quantiles = _covariance(observations, found)
+    covariance, quantiles = _covariance_by_noise(observations, found)
     error = np.sqrt(np.diag(covariance))
     return Beyond(
         robot=corrected(robot, found.kept, found.amounts),
         errors=JointErrors(robot, found.terms, found.coefficients),
         terms=_term_estimates(found, error),
-        estimates=_estimates(robot, found, error, quantiles),
+        estimates=_estimates(robot, observations, found, error, quantiles),
         rms_mm=float(np.sqrt(np.mean((found.after * observations.deviation_mm) ** 2))),
         deviation_mm=_deviation(observations, found),
         left_out=_left_out(observations, found),

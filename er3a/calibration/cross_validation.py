@@ -27,6 +27,7 @@ from er3a.calibration.parameters import DEPENDENT, MM, Parameter
 from er3a.calibration.terms import (
     FOR_ALL_JOINTS,
     RIPPLES,
+    TAKEN,
     TYPICAL,
     JointTerm,
     TermKind,
@@ -95,13 +96,15 @@ class TriedTerm:
 
 
 class _Linear:
-    """The model near the best fit: columns of ``count`` numbers and of terms, and the tenths that are left out."""
+    """The model near the best fit: columns of numbers, of terms that were taken and of others, ``counts`` of the first
+    two, and the tenths that are left out."""
 
-    def __init__(self, J: Reals, rest: Reals, count: int, pose_of: Integers, parts: Sequence[Integers]):
+    def __init__(self, J: Reals, rest: Reals, counts: tuple[int, int], pose_of: Integers, parts: Sequence[Integers]):
         scale = np.linalg.norm(J, axis=0)
         scale[scale == 0] = 1.0
         self.J, self.rest, self.scale = J / scale, rest, scale
-        prior = np.r_[np.zeros(count), np.full(J.shape[1] - count, 1 / TYPICAL)]
+        count, taken = counts
+        prior = np.r_[np.zeros(count), np.full(taken, 1 / TAKEN), np.full(J.shape[1] - count - taken, 1 / TYPICAL)]
         self._prior = (prior / scale) ** 2 + RIDGE
         self.whole = self.J.T @ self.J, self.J.T @ rest
         self._parts = [[np.flatnonzero(part[pose_of] == k) for k in range(PARTS)] for part in parts]
@@ -131,14 +134,15 @@ class _Linear:
         return amounts / self.scale[columns], float(rest @ rest)
 
 
-def parts_of(row_values: Reals, seed: int) -> tuple[Integers, Integers]:
-    """Which of ten parts each pose (P, m) is in: at random, and by neighbourhood."""
+def parts_of(observations: PointObservations, seed: int) -> tuple[Integers, Integers]:
+    """Which of ten parts each point (P,) is in, all of one pose in one: at random, and by neighbourhood."""
+    row_values, pose = observations.row_values, observations.same_pose
     count = len(row_values)
-    random = np.random.default_rng(seed).permutation(count) % PARTS
+    random = (np.random.default_rng(seed).permutation(count) % PARTS)[pose]
     spread = row_values.std(axis=0)
     scaled = row_values / np.where(spread > 0, spread, 1.0)
     centres = kmeans(scaled, min(PARTS, count), seed=np.random.default_rng(seed))[0]  # fewer if some would be empty
-    return random, vq(scaled, centres)[0].astype(np.int64)
+    return random, vq(scaled, centres)[0].astype(np.int64)[pose]
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,10 +160,11 @@ def can_leave_out(pose_of: Integers, numbers: int) -> bool:
 
 def left_out(observations: PointObservations, found: Fit, seed: int = 0) -> HeldOutErrors:
     """What the model of a fit errs by at poses left out; other parts than those that terms are chosen by."""
-    parts = parts_of(observations.row_values, seed)
+    parts = parts_of(observations, seed)
     unknowns = np.r_[found.amounts, found.coefficients]
     poses, pose_of = np.unique(observations.pose_of[found.last], return_inverse=True)
-    linear = _Linear(found.J, found.J @ unknowns - found.rest, len(found.amounts), poses[pose_of], parts)
+    counts = len(found.amounts), len(found.coefficients)
+    linear = _Linear(found.J, found.J @ unknowns - found.rest, counts, poses[pose_of], parts)
     near, far = (
         np.sqrt(np.bincount(pose_of, weights=(errors * found.deviation_mm) ** 2))
         for errors in linear.errors(list(range(len(unknowns))))
@@ -188,7 +193,7 @@ def choose_terms(
     pose_of, rows = observations.pose_of[last], rows / observations.deviation_mm
     measured, turning, count = not (observations.touched >= 0).any(), int((~robot.sliding).sum()), len(kept)
     for kinds in ways if can_leave_out(pose_of, 0) else ():
-        fixed_terms, ripples = candidates(robot, kinds), "ripple" in kinds and measured
+        fixed_terms, ripples = candidates(robot, kinds), "ripple" in kinds and measured and turning > 0
         numbers = count + sum(term.count for term in fixed_terms) + ripples * 2 * turning
         if len(last) >= MIN_SPARE * numbers:
             break
@@ -201,7 +206,7 @@ def choose_terms(
     J = np.hstack([J, _lifted(rows, J, off, here, observations)])
     count = J.shape[1]
     rest = rest / np.sqrt(rest @ rest / (len(rest) - count))
-    parts = [part for seed in SEEDS for part in parts_of(observations.row_values, seed)]
+    parts = [part for seed in SEEDS for part in parts_of(observations, seed)]
     search = _RippleSearch(here, observations) if ripples else None
     taken: dict[JointTerm, TriedTerm] = {}
     dropped: dict[JointTerm, TriedTerm] = {}
@@ -210,7 +215,7 @@ def choose_terms(
         open_terms = [*fixed_terms, *(search.best(np.hstack([J, own]), rest) if search else [])]
         open_terms = [term for term in open_terms if term not in taken and term not in dropped]
         more = rows @ term_jacobian(here, robot, open_terms, observations)
-        linear = _Linear(np.hstack([J, own, more]), rest, count, pose_of, parts)
+        linear = _Linear(np.hstack([J, own, more]), rest, (count, own.shape[1]), pose_of, parts)
         used, places = list(range(count + own.shape[1])), places_of(open_terms, count + own.shape[1])
         trials = [_Trial(linear, used, *pair) for pair in zip(open_terms, places)]
         before = linear.squares(used)

@@ -37,7 +37,7 @@ from er3a.calibration.parameters import (
     parameters_of,
     placements_of,
 )
-from er3a.calibration.terms import TYPICAL, JointErrors, JointTerm, term_jacobian
+from er3a.calibration.terms import TAKEN, JointErrors, JointTerm, term_jacobian
 from er3a.geometry.transforms import rpy_of
 from er3a.numerics.arrays import Integers, Reals
 from er3a.references.reference import INTERVAL_95
@@ -230,8 +230,8 @@ class Fit:
 
     @property
     def covariance(self) -> Reals:
-        """(k + c, k + c), of the estimates; coefficients of terms are taken to be about as large as ``TYPICAL``."""
-        prior = np.r_[np.zeros(len(self.amounts)), np.full(len(self.coefficients), TYPICAL**-2)]
+        """(k + c, k + c), of the estimates; coefficients of terms are about ``TAKEN`` at most."""
+        prior = np.r_[np.zeros(len(self.amounts)), np.full(len(self.coefficients), TAKEN**-2)]
         scale = np.linalg.norm(self.J, axis=0)
         information = (self.J / scale).T @ (self.J / scale) + np.diag(prior / scale**2)
         return np.asarray(np.linalg.inv(information) / np.outer(scale, scale), np.float64)
@@ -321,9 +321,24 @@ def bar_lengths(
     return tuple(found)
 
 
+def aligned(points: Reals, measured: Reals) -> tuple[Reals, float, float]:
+    """Place and turn (4, 4) that bring points (P, 3) nearest to measured ones [Kabsch, Acta Cryst. A 32 (1976)]; how
+    many times as far apart the measured ones are (NaN if all are at one place), and the share of their squares that is
+    left beside such a scale."""
+    S, at, centre = np.eye(4), points.mean(axis=0), measured.mean(axis=0)
+    U, sizes, V = np.linalg.svd((measured - centre).T @ (points - at))
+    signs = np.array([1.0, 1.0, np.linalg.det(U @ V)])
+    S[:3, :3] = U @ np.diag(signs) @ V
+    S[:3, 3] = centre - S[:3, :3] @ at
+    both, own, theirs = sizes @ signs, ((points - at) ** 2).sum(), ((measured - centre) ** 2).sum()
+    if not own * theirs:
+        return S, float("nan"), 1.0
+    return S, float(both / own), float(1 - both**2 / (own * theirs))
+
+
 def _base_at(robot: Robot, kept: Sequence[Parameter], observations: Observations) -> Reals:
     """Amounts (k,) to start from: of points measured in a frame far from the base, its place and turn that bring the
-    table's points nearest to them [Kabsch, Acta Cryst. A 32 (1976)]."""
+    table's points nearest to them."""
     amounts = np.zeros(len(kept))
     where = [kept.index(each) for each in placements_of(("base",)) if each in kept]
     if len(where) < len(BASE_COLUMNS) or not isinstance(observations, PointObservations):
@@ -333,10 +348,7 @@ def _base_at(robot: Robot, kept: Sequence[Parameter], observations: Observations
     points, measured = (xyz @ base[:3, :3].T + base[:3, 3] for xyz in (points, measured))
     if len(points) < MIN_ALIGNED:
         return amounts
-    S, at, centre = np.eye(4), points.mean(axis=0), measured.mean(axis=0)
-    U, _, V = np.linalg.svd((measured - centre).T @ (points - at))
-    S[:3, :3] = U @ np.diag([1.0, 1.0, np.linalg.det(U @ V)]) @ V
-    S[:3, 3] = centre - S[:3, :3] @ at
+    S = aligned(points, measured)[0]
     if FAR * np.linalg.norm(points @ S[:3, :3].T + S[:3, 3] - measured) < np.linalg.norm(points - measured):
         amounts[where] = [*S[:3, 3], *rpy_of(S)]
     return amounts
@@ -369,7 +381,7 @@ def _fit(
     kept, terms, deviation = tuple(kept), tuple(terms), observations.deviation_mm
     nothing, start = np.zeros((1, len(kept))), _base_at(robot, kept, observations)
     far = bool(start.any())  # a large turn is no small one behind another
-    prior = np.full(sum(term.count for term in terms), 1 / TYPICAL)
+    prior = np.full(sum(term.count for term in terms), 1 / TAKEN)
 
     def with_errors(coefficients: Reals) -> Observations:
         if not (terms and isinstance(observations, PointObservations)):

@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 import scipy.sparse
+from scipy.spatial import cKDTree
 
 from er3a.calibration.outcomes import FixedName, PlacementName
 from er3a.calibration.parameters import DEPENDENT, MM, PARALLEL_RAD, Parameter, moved, placed
@@ -32,6 +33,7 @@ from er3a.robots.joint_limits import meant, shown
 from er3a.robots.robot import Robot
 
 LIMIT_SLACK = 0.01  # deg, mm
+SAME_POSE = 1e-4  # rad, m: by which joints may read otherwise at one pose
 PLACEMENTS: tuple[PlacementName, ...] = ("base", "tool")
 HALF_WIDTH_TO_DEVIATION = 1 / np.sqrt(3)
 RICH_POSES = 64
@@ -383,7 +385,7 @@ class PointObservations:
     @property
     def poses(self) -> int:
         """Number of poses."""
-        return len(np.unique(self.row_values, axis=0))
+        return len(np.unique(self.same_pose))
 
     @property
     def pose_of(self) -> Integers:
@@ -440,6 +442,50 @@ class PointObservations:
             lines=self.lines[used],
             touched=self.touched[used],
             lifted=None if self.lifted is None else self.lifted[used],
+        )
+
+    @property
+    def same_pose(self) -> Integers:
+        """(P,), the first of the points whose pose is the same: all joints within ``SAME_POSE``."""
+        if not len(self.row_values):
+            return np.zeros(0, dtype=np.int64)
+        tree, first = cKDTree(self.row_values), np.full(len(self.row_values), -1)
+        for k, near in enumerate(tree.query_ball_point(self.row_values, SAME_POSE, p=np.inf)):
+            if first[k] < 0:
+                own = np.array(near)
+                first[own[first[own] < 0]] = k
+        return first
+
+    def merged(self) -> PointObservations:
+        """Readings of one point, or of one place, plane, bar or pair, at one pose as one, their mean: what a model
+        misses there is the same each time, so that repeated readings don't tell it from what it has to find."""
+        pose, partner = self.same_pose, np.full(len(self.touched), -1)
+        thing = self.touched.copy()
+        for kind, rows in self.groups():
+            if kind == "pair":
+                partner[rows], thing[rows] = pose[rows[::-1]], [-2, -3]
+        keys = np.column_stack([pose, partner, thing, self.on_tool])
+        first, number = np.unique(keys, axis=0, return_index=True, return_inverse=True)[1:]
+        order = np.argsort(first)
+        number = np.argsort(order)[number.ravel()]
+        if len(first) == len(keys):
+            return self
+        values, variance = np.zeros((2, *self.seen.shape))
+        values[self.seen], variance[self.seen] = self.values_mm, self.deviation_mm**2
+        readings = scipy.sparse.csr_array((np.ones(len(number)), (number, np.arange(len(number)))))
+        counts = readings @ self.seen.astype(float)
+        seen, counts = counts > 0, np.maximum(counts, 1)
+        own = np.sort(first)
+        return replace(
+            self,
+            row_values=readings @ self.row_values / readings.sum(axis=1)[:, None],
+            on_tool=self.on_tool[own],
+            seen=seen,
+            values_mm=(readings @ values / counts)[seen],
+            deviation_mm=np.sqrt(readings @ variance / counts)[seen],
+            lines=self.lines[own],
+            touched=self.touched[own],
+            lifted=None if self.lifted is None else self.lifted[own],
         )
 
     def shifted(self, amounts: Reals) -> PointObservations:

@@ -142,4 +142,21 @@ class NoCorrectionFound(Finding):
     open: tuple[str, ...] = ()
 
 
-CalibrationConclusion = Misfit | CorrectionsFound | NoCorrectionFound
+class FarFromTable(Finding):
+    """Corrections, or what they leave, are far beyond what building and measuring an arm leave.
+
+    Attributes
+    ----------
+    entries : of the table, whose corrections are far too large
+    rest_mm : root mean square of what remains
+    swapped : joints whose columns are swapped, if that explains it
+    opposite : the joint that turns or slides the other way, if that explains it
+    """
+
+    entries: tuple[str, ...]
+    rest_mm: float
+    swapped: tuple[int, int] | None = None
+    opposite: int | None = None
+
+
+CalibrationConclusion = FarFromTable | Misfit | CorrectionsFound | NoCorrectionFound

@@ -130,9 +130,13 @@ WIDEST = 0.05
 
 def settles(robot: Robot, unit: Literal["mm", "deg"], half_width: float) -> bool:
     """Whether the half-width of a 95 % interval, mm or deg, is less than the largest plausible error of a table."""
+    return half_width <= WIDEST * (whole_length_mm(robot) if unit == "mm" else float(np.degrees(1)))
+
+
+def whole_length_mm(robot: Robot) -> float:
+    """Of all lengths and strokes."""
     strokes = (robot.upper - robot.lower)[robot.slides]
-    size_mm = 1000 * float(np.abs(robot.a).sum() + np.abs(robot.d).sum() + strokes.sum())
-    return half_width <= WIDEST * (size_mm if unit == "mm" else float(np.degrees(1)))
+    return MM * float(np.abs(robot.a).sum() + np.abs(robot.d).sum() + strokes.sum())
 
 
 def coupled(robot: Robot, errors: Mapping[tuple[int, int], float]) -> Robot:

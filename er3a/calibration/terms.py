@@ -41,6 +41,8 @@ FOR_ROBOT_FILE = IN_ROBOT_FILE, RATIOS
 RIPPLES = range(3, 257)
 """How many times a turn an error is looked for; strain wave gears have some 200 a turn."""
 TYPICAL = 2e-3  # rad, m; each per rad, m of what it is multiplied by: how large coefficients are taken to be, one sigma
+TAKEN = 0.1
+"""The same of terms that were taken: it holds what measurements leave open, and doesn't pull at what they settle."""
 
 
 @dataclass(frozen=True)

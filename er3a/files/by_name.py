@@ -15,6 +15,7 @@ import pyarrow.parquet as pq
 
 from er3a.calibration import calibrate as calibration
 from er3a.calibration.calibrate import Calibration
+from er3a.calibration.fit import aligned
 from er3a.calibration.observations import PLACEMENTS, Measurement, TouchKind, check_poses
 from er3a.calibration.outcomes import FixedName
 from er3a.calibration.parameters import all_parameters, corrected
@@ -27,6 +28,7 @@ from er3a.files.reference_sets import check_robot_origins, load_references
 from er3a.files.units import JOINT_COLUMN, MIN_SPAN_MM, WIDEST_IN_RADIANS
 from er3a.identifiability.entry_evidence import Evidence, Tolerance
 from er3a.identifiability.evidence import evidence_of
+from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.references.quantities import Pose
 from er3a.references.reference import Document, Documents, Reference, ReferenceSet
@@ -55,6 +57,10 @@ def measurement_columns(units: Sequence[str]) -> dict[str, CsvColumn]:
 
 COLUMNS = measurement_columns(["deg"] * 6)
 POSES_TO_JUDGE_UNITS = 3
+POSES_TO_JUDGE_SCALE = 4
+OTHER_UNITS_MM = {"metres": 1000.0, "feet": 304.8, "inches": 25.4, "cm": 10.0, "micrometres": 1e-3}
+MUCH, LEFT_BY_SCALE = 1.25, 0.05
+"""Times a unit that points may be apart beside it, and the share of their squares that it may leave."""
 APART_DEVIATIONS = 8.0
 
 
@@ -100,6 +106,8 @@ def load_measurements(path: str | Path, robot: Robot | None = None) -> tuple[Mea
         pose = tuple(fields[f"q{joint}_{unit}"] for joint, unit in enumerate(units, 1))
         rows.append(Measurement(fields["row"], pose, fields["point"], xyz, deviation, **names, length_mm=length))
     _check_units(path, rows, units)
+    if robot is not None:
+        _check_scale(path, rows, robot)
     _check_contradictions(path, rows)
     _check_lengths(path, rows)
     return tuple(rows)
@@ -157,16 +165,33 @@ def _units_in(path: Path) -> list[str]:
 
 
 def _check_units(path: Path, rows: list[Measurement], units: Sequence[str]) -> None:
-    for row in rows:
-        span = max((abs(value) for value in row.xyz_mm if value is not None), default=0.0)
-        if None not in row.xyz_mm and span < MIN_SPAN_MM:
-            problem = f"the point is {span:g} mm from the base's origin at most, which can only be metres"
-            raise InputError(path, f"row {row.row}, columns x_mm, y_mm, z_mm", problem, "Multiply by 1000")
+    whole = [row for row in rows if None not in row.xyz_mm]
+    span = max((abs(value) for row in whole for value in row.xyz_mm if value is not None), default=0.0)
+    if whole and span < MIN_SPAN_MM:
+        problem = f"all points are within {span:g} mm of the frame's origin, which can only be metres"
+        raise InputError(path, f"row {whole[0].row}, columns x_mm, y_mm, z_mm", problem, "Multiply by 1000")
     angles = [abs(value) for row in rows for value, unit in zip(row.pose, units) if unit == "deg"]
     widest = max(angles, default=0.0)
     if len({row.pose for row in rows}) >= POSES_TO_JUDGE_UNITS and 0 < widest <= WIDEST_IN_RADIANS:
         problem = f"the widest angle is {widest:g} deg, which can only be radians"
         raise InputError(path, f"columns q1_deg to q{len(units)}_deg", problem, "Convert to degrees")
+
+
+def _check_scale(path: Path, rows: list[Measurement], robot: Robot) -> None:
+    """Refuse coordinates that are as the robot's table has them but for a factor that a unit explains."""
+    whole = [row for row in rows if None not in row.xyz_mm]
+    q = meant(robot, np.array([row.pose for row in whole], dtype=float).reshape(-1, robot.joints))
+    if len(np.unique(q, axis=0)) < POSES_TO_JUDGE_SCALE:
+        return
+    on_tool = np.array([row.point == "tool" for row in whole])
+    points = np.where(on_tool[:, None], *(forward(each, q)[:, :3, 3] for each in (robot, robot.without_tool())))
+    measured = np.array([row.xyz_mm for row in whole], dtype=float)
+    _, scale, left = aligned(1000 * points, measured)
+    unit = next((unit for unit, size in OTHER_UNITS_MM.items() if 1 / MUCH < scale * size < MUCH), None)
+    if unit and left < LEFT_BY_SCALE:
+        problem = f"the points are {scale:.3g} times as far apart as {robot.name}'s table puts them: these are {unit}"
+        remedy = f"Multiply by {OTHER_UNITS_MM[unit]:g}"
+        raise InputError(path, "columns x_mm, y_mm, z_mm", problem, remedy)
 
 
 def _check_contradictions(path: Path, rows: list[Measurement]) -> None:

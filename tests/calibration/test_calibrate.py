@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,10 +13,12 @@ from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
 import er3a
+from er3a.calibration import calibrate as calibration
 from er3a.calibration.fit import jacobian
-from er3a.calibration.observations import observed
+from er3a.calibration.observations import Measurement, observed
 from er3a.calibration.outcomes import (
     CalibrationError,
+    FarFromTable,
     MorePositions,
     MovesNothing,
     NoCorrectionFits,
@@ -190,9 +193,14 @@ def test_positions_of_another_arm_are_not_explained_away(random):
     assert isinstance(caught.value.finding, NoCorrectionFits)
 
 
-def written(folder: Path, robot: er3a.Robot, random: np.random.Generator) -> Path:
-    rows = measured(robot, poses_in(robot, random, 30), 0.02, random)
-    lines = [",".join(map(repr, row.pose)) + ",flange," + ",".join(map(repr, row.xyz_mm)) + ",0.02" for row in rows]
+def written(
+    folder: Path,
+    robot: er3a.Robot,
+    random: np.random.Generator,
+    frame: Callable[[np.ndarray], np.ndarray] = np.asarray,
+) -> Path:
+    rows = [(row, frame(row.xyz_mm)) for row in measured(robot, poses_in(robot, random, 30), 0.02, random)]
+    lines = [",".join(map(repr, row.pose)) + ",flange," + ",".join(map(str, xyz)) + ",0.02" for row, xyz in rows]
     path = folder / "measured.csv"
     path.write_text(HEADER + "\n".join(lines) + "\n", encoding="utf-8")
     return path
@@ -256,3 +264,131 @@ def test_a_table_of_another_unit_or_seven_joints_is_named(tmp_path):
     path.write_text(HEADER.replace("q6_deg", "q6_deg,q7_deg") + "0,0,0,0,0,0,0,flange,3,0,7,0.1\n", encoding="utf-8")
     with pytest.raises(InputError, match="q7_deg"):
         er3a.calibrate(load_robot("er3_600"), path)
+
+
+def with_pose_errors(
+    robot: er3a.Robot, random: np.random.Generator, poses: int, readings: int, deviation: float | None
+) -> list[Measurement]:
+    """Readings of the bent arm that err by 0.05 mm at each pose, the same each time, and by 0.005 mm besides."""
+    rows = measured(bent(robot, random), poses_in(robot, random, poses), 0.05, random)
+    every = [(row, row.xyz_mm + random.normal(0, 0.005, 3)) for _ in range(readings) for row in rows]
+    return [
+        replace(row, row=k, xyz_mm=tuple(xyz.tolist()), deviation_mm=deviation) for k, (row, xyz) in enumerate(every)
+    ]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("deviation", [None, 0.05])
+def test_readings_of_one_pose_count_once(deviation, random):
+    """Intervals and the errors left out are those of the poses; no term is taken for what a pose errs by."""
+    robot = load_robot("er3a_c60")
+    rows = with_pose_errors(robot, random, 40, 5, deviation)
+    found, once = er3a.calibrate(robot, rows), er3a.calibrate(robot, rows[:40])
+    assert (found.poses, found.repeated, found.coordinates) == (40, 160, 120)
+    assert not found.beyond
+    assert not found.ratios
+    widths = [[each.half_width for each in own.estimates] for own in (found, once)]
+    assert widths[0] == pytest.approx(widths[1], rel=0.15)
+    assert found.left_out.mean_mm == pytest.approx(once.left_out.mean_mm, rel=0.1)
+    assert "There are 40 distinct poses; 160 more lines" in lines_of(found)
+
+
+def test_joints_that_read_a_little_otherwise_are_one_pose(random):
+    robot = load_robot("er3_600")
+    rows = with_pose_errors(robot, random, 5, 3, None)
+    rows = [replace(row, pose=tuple(np.add(row.pose, random.uniform(-1, 1, 6) * 1e-3))) for row in rows]
+    seen = observed(rows, robot)
+    merged = seen.merged()
+    assert (seen.poses, len(seen.row_values), merged.poses, len(merged.row_values)) == (5, 15, 5, 5)
+    assert merged.values_mm == pytest.approx(seen.values_mm.reshape(3, 15).mean(axis=0))
+    assert merged.row_values == pytest.approx(seen.row_values.reshape(3, 5, 6).mean(axis=0))
+
+
+@pytest.mark.parametrize(("poses", "deviation"), [(8, 0.05), (8, None), (5, 0.05)])
+def test_entries_left_out_widen_the_intervals_of_the_others(poses, deviation, random):
+    """As entries that aren't estimated may be off, too; that is no misfit."""
+    robot = load_robot("er3a_c60")
+    inside = []
+    for _ in range(8):
+        rows = measured(bent(robot, random), poses_in(robot, random, poses), 0.05, random)
+        found = er3a.calibrate(robot, [replace(row, deviation_mm=deviation) for row in rows])
+        assert found.level != "all_entries" or "base_x" not in [each.name for each in found.estimates]
+        assert found.fits
+        inside += [abs(each.correction) <= each.half_width for each in found.estimates if "base" in each.name]
+    assert np.mean(inside) > 0.9
+
+
+def test_one_coordinate_to_spare_settles_nothing(random):
+    robot = load_robot("er3a_c60")
+    rows = [
+        replace(row, deviation_mm=None)
+        for row in measured(bent(robot, random), poses_in(robot, random, 30), 0.05, random)
+    ]
+    numbers = len(er3a.calibrate(robot, rows).estimates)
+    short = -(-(numbers + 1) // 3)
+    row = replace(rows[short - 1], xyz_mm=(*rows[short - 1].xyz_mm[: 3 - (3 * short - numbers - 1)], None, None)[:3])
+    found = er3a.calibrate(robot, [*rows[: short - 1], row])
+    assert (found.freedom, len(found.estimates)) == (1, numbers)
+    assert found.open == tuple(each.name for each in found.estimates)
+    assert "Nothing is settled: there is only one coordinate more" in lines_of(found)
+
+
+def test_too_few_positions_are_no_gross_fault(random, monkeypatch):
+    robot = load_robot("er3a_c60")
+    rows = measured(robot, poses_in(robot, random, 6), 0.05, random)
+
+    def never(*_):
+        raise CalibrationError(NoCorrectionFits(100, 9.0), "")
+
+    monkeypatch.setattr(calibration, "fit", never)
+    with pytest.raises(CalibrationError) as caught:
+        er3a.calibrate(robot, rows)
+    assert isinstance(caught.value.finding, MorePositions)
+
+
+@pytest.mark.parametrize("convert", [lambda q: q[:, [0, 1, 2, 3, 5, 4]], lambda q: q * [1, 1, 1, 1, -1, 1]])
+@pytest.mark.parametrize("known", [True, False])
+def test_swapped_columns_and_a_joints_sign_are_named(convert, known, random):
+    tool = np.eye(4)
+    tool[:3, 3] = 0.05, 0.02, 0.1
+    robot = load_robot("er3a_c60").replace(tool=tool)
+    truth, q = bent(robot, random), random.uniform(-1.2, 1.2, (60, 6))
+    wrong = convert(q)
+    rows = [
+        Measurement(k, tuple(np.degrees(own)), "tool", tuple(1000 * T[:3, 3] + random.normal(0, 0.05, 3)), 0.05)
+        for k, (own, T) in enumerate(zip(wrong, er3a.forward(truth, q)))
+    ]
+    rows = rows if known else [replace(row, deviation_mm=None) for row in rows]
+    found = er3a.calibrate(robot, rows)
+    swapped = not np.array_equal(np.abs(wrong), np.abs(q))
+    assert isinstance(found.conclusion, FarFromTable)
+    assert (found.wrong.swapped, found.wrong.opposite) == ((5, 6), None) if swapped else (None, 5)
+    assert lines_of(found).startswith("Measurements and table belong together if J5 ")
+    assert not found.fits
+    advised = [replace(row, pose=tuple(own)) for row, own in zip(rows, np.degrees(convert(wrong)).tolist())]
+    assert er3a.calibrate(robot, advised).fits
+
+
+def test_a_joints_zero_that_is_far_off_is_named(random):
+    robot = load_robot("er3a_c60")
+    rows = measured(robot, random.uniform(-1, 1, (40, 6)), 0.05, random)
+    rows = [replace(row, pose=tuple(np.add(row.pose, [0, 0, 0, 30, 0, 0])), deviation_mm=None) for row in rows]
+    found = er3a.calibrate(robot, rows)
+    assert found.wrong.entries == ("offset4",)
+    assert "corrections of offset4 are far beyond" in lines_of(found)
+
+
+@pytest.mark.parametrize(("size", "words"), [(0.1, "cm. Multiply by 10"), (1 / 25.4, "inches. Multiply by 25.4")])
+def test_coordinates_of_another_unit_are_refused(size, words, random, tmp_path):
+    robot = load_robot("er3a_c60")
+    path = written(tmp_path, robot, random, lambda xyz: np.multiply(xyz, size) + 20.0)
+    with pytest.raises(InputError, match=f"times as far apart .* these are {words}"):
+        load_measurements(path, robot)
+
+
+def test_a_frame_may_stand_at_a_measured_point(random, tmp_path):
+    robot, seed = load_robot("er3a_c60"), random.integers(1000)
+    first = load_measurements(written(tmp_path, robot, np.random.default_rng(seed)))[0].xyz_mm
+    path = written(tmp_path, robot, np.random.default_rng(seed), lambda xyz: np.subtract(xyz, first))
+    assert load_measurements(path, robot)[0].xyz_mm == (0, 0, 0)
+    assert len(er3a.calibrate(robot, path).estimates) > 20

@@ -901,3 +901,37 @@ def test_a_coupling_of_joints_is_found_and_held_by_a_robot_file(poses, random, t
     write_robot(file, tmp_path / "coupled.yaml")
     assert row_values(file, q)[:, 3] == pytest.approx(row_values(robot, q) @ [0, 1e-3, 0, 1, 0, 0])
     assert er3a.forward(load_robot(tmp_path / "coupled.yaml"), q) == pytest.approx(er3a.forward(file, q), abs=1e-12)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("name", "term", "amount", "noise", "poses"),
+    [("six", JointTerm("ratio", 5), 0.02, 0.2, 70), ("slide", JointTerm("coupling", 4, by=3), 0.05, 0.05, 70)],
+)
+def test_a_large_term_is_not_pulled_towards_nothing(name, term, amount, noise, poses, random):
+    """Of noisy points, too, and of a joint that slides a little way: its interval holds it."""
+    bench, off = Bench(name, random, {term: [amount]}), []
+    for _ in range(5):
+        found = er3a.calibrate(bench.robot, bench.measured(poses, noise))
+        terms = found.beyond.terms if found.beyond else found.ratios
+        own = next(each for each in terms if (each.kind, each.joint, each.by) == (term.kind, term.joint, term.by))
+        off.append((own.coefficients[0] - 1000 * amount) / own.standard_errors[0])
+    assert abs(np.mean(off)) < 1.5
+    assert np.abs(off).max() < 3.5
+
+
+def test_a_gantry_of_slides_alone_has_no_errors_that_return_in_a_turn(random):
+    robot = gantry()
+    slides = er3a.Robot.from_dh(
+        robot.a[:3], robot.alpha[:3], robot.d[:3], offset=robot.offset[:3], lower=[-1] * 3, upper=[1] * 3,
+        sliding=[True] * 3,
+    )  # fmt: skip
+    q = random.uniform(-1, 1, (60, 3))
+    xyz = 1000 * er3a.forward(slides, q)[:, :3, 3] + random.normal(0, 0.05, (60, 3))
+    rows = [
+        Measurement(k, tuple(1000 * pose), "flange", tuple(point))
+        for k, (pose, point) in enumerate(zip(q, xyz.tolist()))
+    ]
+    found = er3a.calibrate(slides, rows)
+    assert found.deviation_mm == pytest.approx(0.05, rel=0.2)
+    assert {each.kind for each in found.tried} == {"ratio", "sag", "coupling"}

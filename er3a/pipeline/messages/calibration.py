@@ -45,7 +45,9 @@ def lines_of(found: Calibration) -> str:
         else f"standard deviation of a coordinate, estimated: {_deviations(found)}"
     )
     lines = [
+        *([say(found.wrong)] if found.wrong else []),
         *_summary(found),
+        *warning_texts(found),
         f"{found.coordinates} coordinates at {found.poses} poses; estimated: {level(found.level)}",
         f"these measurements settle {len(found.estimates) - len(found.open)} of "
         f"{len(found.estimates) + len(found.held)} numbers",
@@ -90,6 +92,28 @@ def lines_of(found: Calibration) -> str:
     if found.more:
         lines.append(f"to estimate more: {say(found.more)}")
     return "\n".join(lines)
+
+
+def warning_texts(found: Calibration) -> list[str]:
+    """How many poses there are, if some were read again, and what too few of them don't settle."""
+    texts = []
+    if found.repeated:
+        texts.append(
+            tr(
+                "There are {poses} distinct poses; {repeated} more lines read one of them again. A pose counts once, "
+                "with the mean of its lines.",
+                poses=found.poses,
+                repeated=found.repeated,
+            )
+        )
+    if found.deviation_mm is not None and found.freedom == 1:
+        texts.append(
+            tr(
+                "Nothing is settled: there is only one coordinate more than numbers, which doesn't tell how large "
+                "errors are. Measure more poses, or state the standard deviation."
+            )
+        )
+    return texts
 
 
 def _deviations(found: Calibration) -> str:
@@ -339,6 +363,9 @@ def calibration_record(found: Calibration, robot: Robot, others: Sequence[Measur
         "level": found.level,
         "coordinates": found.coordinates,
         "poses": found.poses,
+        "repeated": found.repeated,
+        "freedom": found.freedom,
+        "wrong": say(found.wrong) if found.wrong else None,
         "rms_before_mm": found.rms_before_mm,
         "rms_after_mm": found.rms_after_mm,
         "scatter": found.scatter,

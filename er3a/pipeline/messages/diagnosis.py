@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from er3a.calibration.outcomes import (
+    FarFromTable,
     Misfit,
     MorePositions,
     MoreTouches,
@@ -215,6 +216,22 @@ TEXTS = texts(
         "misfit": (
             "Correcting {level} does not make this table fit the positions: {rms_after_mm:.3g} mm of "
             "{rms_before_mm:.3g} mm (root mean square) remain. Calibration can't repair it."
+        ),
+        "far_from_table": (
+            "Measurements and table don't belong together: corrections of {entries:, } are far beyond what building an "
+            "arm leaves. Check the order, signs and zeros of the joints, and whether the table is that of this arm."
+        ),
+        "far_from_table#rest": (
+            "Measurements and table don't belong together: {rest_mm:.3g} mm (root mean square) remain, far more than "
+            "of a measured arm. Check the order, signs and zeros of the joints, and whether the table is that of this "
+            "arm."
+        ),
+        "far_from_table#swapped": (
+            "Measurements and table belong together if J{first} and J{second} are swapped. Swap their columns."
+        ),
+        "far_from_table#opposite": (
+            "Measurements and table belong together if J{joint} moves the other way. Change the sign of its column, or "
+            "its direction in the robot's file."
         ),
         "list": "{others} and {last}",
     }
@@ -432,6 +449,15 @@ def _(found: MoreTouches) -> str:
 @say.register
 def _(found: Misfit) -> str:
     return say_as(found, level=level(found.level))
+
+
+@say.register
+def _(found: FarFromTable) -> str:
+    if found.swapped:
+        return say_as(found, "swapped", first=found.swapped[0], second=found.swapped[1])
+    if found.opposite:
+        return say_as(found, "opposite", joint=found.opposite)
+    return say_as(found) if found.entries else say_as(found, "rest")
 
 
 def _with_and(words: Sequence[str]) -> str:

@@ -23,7 +23,15 @@ from er3a.files.robot_writer import robot_file, robot_text
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages import language
-from er3a.pipeline.messages.calibration import VERDICTS, bar_texts, file_text, idle_texts, residual_texts, term_kind
+from er3a.pipeline.messages.calibration import (
+    VERDICTS,
+    bar_texts,
+    file_text,
+    idle_texts,
+    residual_texts,
+    term_kind,
+    warning_texts,
+)
 from er3a.pipeline.messages.comparison import headline, layer_rows
 from er3a.pipeline.messages.language import N_, as_text, tr
 from er3a.pipeline.messages.say import bracketed, say
@@ -156,6 +164,7 @@ def _texts(found: Calibration) -> list[str]:
             coordinates=found.coordinates,
             poses=found.poses,
         ),
+        *warning_texts(found),
         *idle_texts(found),
         *bar_texts(found),
     ]
