@@ -107,7 +107,8 @@ REMEDIES: dict[str, str] = {
     "spline_as_line": N_("Write straight lines of the spline (SLIN)."),
     "configuration_not_read": N_("Check on the controller that it takes this solution."),
     "load_not_examined": N_(
-        "List the program as a path of a study: its stage dynamics then computes torques with this load."
+        "List the program as a path of a study: its stage dynamics computes torques with a load whose numbers are all "
+        "given."
     ),
     "load_above_payload": N_("Carry less, or correct the load if it is wrong."),
 }
