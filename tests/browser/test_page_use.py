@@ -219,12 +219,12 @@ def test_words_are_found_over_all_pages_and_on_each(browser, small_study):
 @pytest.mark.parametrize(
     ("page", "words", "warning"),
     [
-        ("er3a_c60_article/trajectory.html", "line_clean", ".caveat, .assumed-shapes, .verdict"),
+        ("er3a_c60_article/workspace.html", "volume", ".caveat, .verdict"),
         ("er3a_c60/trajectory.html", "line_clean", ".caveat, .assumed-shapes, .verdict, #line_clean ~ p strong"),
         ("er3a_c60/vision.html", "grasp_can", ".caveat, .verdict, section:has([download^=grasp_can]) p strong"),
         ("compare.html", "limit", ".caveat"),
-        ("index.html", "paths pass", ".robot h2, .robot .decision, #decisions .decision.fail"),
-        ("index.html", "paths pass", "#er3a_c60_article, .robot:has(#er3a_c60_article) > details > p strong"),
+        ("index.html", "void", ".robot h2, .robot .decision, #decisions .decision.fail"),
+        ("index.html", "void", "#er3a_c60_article, .robot:has(#er3a_c60_article) > details > p strong"),
     ],
 )
 def test_no_warning_is_hidden_by_a_search(browser, small_study, page, words, warning):

@@ -23,8 +23,7 @@ from er3a.files.robot_library import load_robot
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import MIN_SINGULAR_VALUE
-from er3a.pipeline.messages.collision import unmeasured_text
-from er3a.pipeline.messages.left_out import left_out_names, left_out_text
+from er3a.pipeline.messages.left_out import left_out_names, left_out_text, unmeasured_text
 from er3a.pipeline.messages.say import say, say_all
 from er3a.pipeline.new_study.write import arm_of, write_study
 from er3a.pipeline.results import (

@@ -224,7 +224,7 @@ def test_strategies_are_listed_with_their_costs(results, name):
     assert ("End it at t = " in advice(out)) == (out.sound_end is not None)
     last, met = paths["line_collides"].clear_until, paths["line_collides"].collisions[0]
     assert 0 < last.t_s < met.t0_s
-    assert f"up to t = {last.t_s:.4g} s ({last.s_m * 1000:.1f} mm): end the path there" in advice(
+    assert f"up to t = {last.t_s:.4g} s ({last.s_m * 1000:.1f} mm) and in a stop from there" in advice(
         paths["line_collides"]
     )
     planned = paths["line_limits"]

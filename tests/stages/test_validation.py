@@ -399,7 +399,7 @@ def test_the_page_tells_the_articles_reader(study, stored, tmp_path):
         "Statements of its own source: er3a_c60_article",
         "the upper arm stands 90° from the vertical where 0° is stated",
         "Most likely fault: joint 2: offset −90 deg missing; residual falls from 1433 mm to 0.0 mm.",
-        "with its own source's statements alone, which are no evidence about a real robot: don't use the corrected",
+        "source&#39;s statements alone, which are no evidence about a real robot: don&#39;t use the corrected",
         "turns the other way</td><td>no bound",
         "of one fault or two, explains the data",
         "This is another arm, or more than two numbers are wrong, or one is wrong in a way that was not tried",

@@ -135,7 +135,7 @@ def write(
     from er3a.pipeline.program_reports import missed_collisions, missed_line, programs_of, shapes_line
     from er3a.pipeline.progress import shown_work
     from er3a.pipeline.stages.left_out import left_out_without_tool
-    from er3a.pipeline.viewing.page import program_head
+    from er3a.pipeline.viewing.conditions import program_head
     from er3a.programs.program_findings import TargetsLeftOut
     from er3a.programs.writing import with_head_lines
 

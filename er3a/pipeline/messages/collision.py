@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import assert_never
 
 import numpy as np
 
 from er3a.collision.matrix import PairState
-from er3a.collision.pairs import BASE, TRIED, Pair, PairsUnexamined, ShapesAssumed, link_label
+from er3a.collision.pairs import BASE, TRIED, Pair, PairsUnexamined, ShapesAssumed
 from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Sphere
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages import left_out  # noqa: F401
@@ -54,8 +54,6 @@ TEXTS = texts(
             "differ."
         ),
         "shapes_assumed.near": "Within {margin_mm:g} mm of assumed shapes, and so not settled: {names}.",
-        "link#base": "base",
-        "link#number": "link {number}",
         "collision.never_free#given": (
             "No joint vector within the limits is collision-free (proven): {pairs} always overlap."
         ),
@@ -100,7 +98,6 @@ TEXTS = texts(
             "colliding", "{count} path collides: {colliding:, }.", "{count} paths collide: {colliding:, }."
         ),
         "collision.free_space#none": "No collision-free configuration was found.",
-        "clearance.unmeasured": "Clearance does not count these until they overlap: {pairs}.",
     }
 )
 
@@ -208,25 +205,6 @@ def _millimetres(values: Reals | list[float], scale: float = 1000) -> str:
 def state_word(state: PairState) -> str:
     """What holds of a pair, in short."""
     return word("collision.state", STATES, state)
-
-
-def body_word(name: str) -> str:
-    """A body of the arm, or what is carried, by its name."""
-    if name == link_label(BASE):
-        return sentence("link#base")
-    number = name.removeprefix("link_")
-    return sentence("link#number", number=number) if number != name else own_title(name)
-
-
-def pair_words(label: str) -> str:
-    """Two bodies by their label in columns of text."""
-    return tr(" and ").join(map(body_word, label.split("/")))
-
-
-def unmeasured_text(pairs: Iterable[str]) -> str:
-    """Which pairs, by their labels, no clearance counts until they overlap; empty where there are none."""
-    named = joined(map(pair_words, pairs), ", ")
-    return sentence("clearance.unmeasured", pairs=named) if named else ""
 
 
 def why(

@@ -6,11 +6,16 @@ from collections.abc import Iterable, Mapping
 from typing import TypeVar
 
 from er3a.by_value import Finding
+from er3a.collision.pairs import BASE, link_label
+from er3a.pipeline.messages.language import own_title, tr
 from er3a.pipeline.messages.say import bracketed, joined, say, say_as, sentence, texts, word
 from er3a.pipeline.results import LeftOut, LeftOutSubject, NoPass
 
 TEXTS = texts(
     {
+        "link#base": "base",
+        "link#number": "link {number}",
+        "clearance.unmeasured": "Clearance does not count these until they overlap: {pairs}.",
         "left_out.obstacles": (
             "obstacles: none are given, so the arm was checked only against itself and what it carries"
         ),
@@ -200,3 +205,22 @@ def left_out_text(found: LeftOut) -> str:
 def _(found: NoPass) -> str:
     missed = [bracketed(left_out_text(each), left_out_names(each, MAX_NAMED)) for each in found.missed]
     return say_as(found, missed=joined(missed))
+
+
+def body_word(name: str) -> str:
+    """A body of the arm, or what is carried, by its name."""
+    if name == link_label(BASE):
+        return sentence("link#base")
+    number = name.removeprefix("link_")
+    return sentence("link#number", number=number) if number != name else own_title(name)
+
+
+def pair_words(label: str) -> str:
+    """Two bodies by their label in columns of text."""
+    return tr(" and ").join(map(body_word, label.split("/")))
+
+
+def unmeasured_text(pairs: Iterable[str]) -> str:
+    """Which pairs, by their labels, no clearance counts until they overlap; empty where there are none."""
+    named = joined(map(pair_words, pairs), ", ")
+    return sentence("clearance.unmeasured", pairs=named) if named else ""

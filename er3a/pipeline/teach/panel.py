@@ -17,9 +17,9 @@ from er3a.kinematics.singularity import TYPES, USUAL_NEAR, NearSingular, charact
 from er3a.kinematics.solutions import branch_labels
 from er3a.kinematics.wrist_partitioned import CoupledJoints, has_branches, wrist_partition_missing
 from er3a.pipeline.code_digest import code_digest
-from er3a.pipeline.messages.collision import body_word, unmeasured_text
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.messages.left_out import body_word, unmeasured_text
 from er3a.pipeline.messages.pages import Caveat, caveat
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.player.player import LOOKS, drawn_shapes, drawn_size, floor_of, import_map, scene_data, table_data
@@ -27,7 +27,8 @@ from er3a.pipeline.results import Provenance, input_records, is_computed, read_f
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.trajectory.motion import near_singular
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.page import program_head, render, run_command
+from er3a.pipeline.viewing.conditions import program_head
+from er3a.pipeline.viewing.page import render, run_command
 from er3a.pipeline.viewing.palette import BODY, INK, JOINTS, LINK
 from er3a.programs.writing import ascii_text
 from er3a.robots.joint_limits import joint_names

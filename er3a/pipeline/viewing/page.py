@@ -27,16 +27,12 @@ from er3a.collision.pairs import ShapesAssumed
 from er3a.errors import ResultError
 from er3a.files.kept_files import INSTALLED, ROOT, view_command, write_atomically
 from er3a.pipeline.messages import language
-from er3a.pipeline.messages.collision import unmeasured_text
 from er3a.pipeline.messages.language import N_, tr
-from er3a.pipeline.messages.left_out import left_out_names, left_out_text, say_reserved
+from er3a.pipeline.messages.left_out import left_out_names, left_out_text, say_reserved, unmeasured_text
 from er3a.pipeline.messages.pages import GRADE_NAMES, GROUP_NAMES, Caveat, caveat, glossary
 from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
-from er3a.pipeline.messages.validation import condition
 from er3a.pipeline.results import (
     AbsentResults,
-    LeftOut,
-    LeftOutSubject,
     Provenance,
     Status,
     Stored,
@@ -450,27 +446,6 @@ def text_address(text: str) -> str:
 def packed_text(text: str) -> str:
     """A text for a link's ``data-packed``, which the page's script unpacks to be saved: gzip, in base64."""
     return base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode()
-
-
-WARNED_OF: tuple[LeftOutSubject, ...] = (
-    *("obstacles", "tool", "bare_tool", "carried", "gripped_parts", "placed_box", "torques", "ways_between"),
-)
-
-
-def condition_of(validated: Path | None) -> str:
-    """What of a table has to be confirmed before anything is run on the arm, by validation's results in a folder, if
-    there are any; empty where all of it is."""
-    summary = read_stage(validated, STAGES["validation"]).results.summary if validated else None
-    evidence, finding = getattr(summary, "evidence", None), summary and summary.verdict.finding
-    return condition(evidence.parts if evidence else (), getattr(finding, "unbounded", ()))
-
-
-def program_head(validated: Path | None, not_examined: Iterable[LeftOut] = ()) -> list[str]:
-    """What a robot program begins with, in English: what has to be confirmed, as :func:`condition_of` says it, and what
-    was not checked."""
-    with language.using("en"):
-        missed = [f"not checked: {left_out_text(each)}" for each in not_examined if each.subject in WARNED_OF]
-        return [line for line in (condition_of(validated), *missed) if line]
 
 
 def _preview(picture: Path) -> str | None:

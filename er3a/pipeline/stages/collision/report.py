@@ -14,9 +14,10 @@ from matplotlib.figure import Figure
 from er3a.collision.pairs import TRIED
 from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.messages.collision import body_word, pair_words, state_word, why
+from er3a.pipeline.messages.collision import state_word, why
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import tr
+from er3a.pipeline.messages.left_out import body_word, pair_words
 from er3a.pipeline.messages.say import joined, say
 from er3a.pipeline.player.player import drawing_head, moment, player
 from er3a.pipeline.results import Stored

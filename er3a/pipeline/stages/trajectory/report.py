@@ -39,9 +39,10 @@ from er3a.pipeline.stages.trajectory.played import (
 )
 from er3a.pipeline.stages.trajectory.written_programs import repair_name
 from er3a.pipeline.study import Study
+from er3a.pipeline.viewing.conditions import condition_of, program_head
 from er3a.pipeline.viewing.figures import readings
 from er3a.pipeline.viewing.numbers import fixed, number
-from er3a.pipeline.viewing.page import condition_of, packed_text, program_head, render_stage
+from er3a.pipeline.viewing.page import packed_text, render_stage
 from er3a.programs.languages import titles_unwritten
 from er3a.programs.writing import with_head_lines
 from er3a.robots.robot import Robot

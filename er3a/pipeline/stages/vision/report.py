@@ -28,13 +28,12 @@ from er3a.pipeline.results import LeftOut, Stored
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.vision import model
 from er3a.pipeline.study import Study
+from er3a.pipeline.viewing.conditions import condition_of, program_head
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import (
     Picture,
-    condition_of,
     panel_link,
-    program_head,
     render_stage,
     text_address,
 )
