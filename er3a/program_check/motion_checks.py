@@ -346,7 +346,8 @@ def tool_motion_path(
         *(arm, law, followed.t, followed.q, followed.joints, followed.joints_at, proof.rate_bounds),
         *(path.length, path.turned, end_joints, (), path),
     )
-    moments = _followed_moments(followed, proof, way, rules) | _arrival_moments(followed, given, way)
+    carried = bool(getattr(motion.target, "external", ()))
+    moments = _followed_moments(followed, proof, way, rules, carried) | _arrival_moments(followed, given, way)
     return replace(way, findings=tuple(moments), moments=moments)
 
 
@@ -359,12 +360,12 @@ def _arc(T_start: Reals, via: Reals, end: Reals, time: tuple[float, float | None
 
 
 def _followed_moments(
-    followed: Followed, proof: ToolProof, way: MotionPath, rules: CheckRules
+    followed: Followed, proof: ToolProof, way: MotionPath, rules: CheckRules, carried: bool
 ) -> dict[found_in.CheckFinding, float]:
     """Findings on reach, configuration, limits, singular poses and speeds, each with the time (s) of its start."""
     arm = way.arm
     found: dict[found_in.CheckFinding, float] = {
-        found_in.StretchOutOfReach(way.along_mm(stretch.start), stretch.cause.reasons): stretch.start
+        found_in.StretchOutOfReach(way.along_mm(stretch.start), stretch.cause.reasons, carried): stretch.start
         for stretch in motion_faults.unreachable(arm, followed)
     }
     for jump in followed.jumps:

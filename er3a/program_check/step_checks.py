@@ -81,14 +81,15 @@ class PlacedMotion(ByValue):
     ----------
     arm : the robot with the motion's tool; without one where the tool is not known
     base : T_world_base of the targets (4, 4); None where the base is not known
-    missing, taken : frames that are not given
+    missing : frames that are not given
+    taken : frames that were taken for ones that are not given, or not wholly
     """
 
     motion: instructions.ArmMotion
     arm: Robot
     base: Reals | None
     missing: tuple[found_in.FrameNotGiven, ...]
-    taken: tuple[found_in.FrameTakenAsFlange, ...]
+    taken: tuple[found_in.FrameTakenAsFlange | found_in.FrameOfSeveral, ...]
 
     @property
     def needed(self) -> tuple[found_in.FrameNotGiven, ...]:
@@ -106,18 +107,22 @@ class Arms:
     def placed(self, motion: instructions.ArmMotion) -> PlacedMotion:
         """A motion placed in the world, with the frames that are unknown."""
         missing: list[found_in.FrameNotGiven] = []
-        taken: tuple[found_in.FrameTakenAsFlange, ...] = ()
+        taken: list[found_in.FrameTakenAsFlange | found_in.FrameOfSeveral] = []
         arm, base = self.robot, motion.base.pose
         if motion.tool.pose is not None:
             arm = self._with(motion.tool.pose)
+            taken += [found_in.FrameOfSeveral(motion.tool.name, "tool")] if motion.tool.one_of_several else []
         elif motion.tool.name == FLANGE:
-            arm, taken = self._with(np.eye(4)), (found_in.FrameTakenAsFlange(FLANGE),)
+            arm = self._with(np.eye(4))
+            taken.append(found_in.FrameTakenAsFlange(FLANGE))
         elif motion.tool.name:
             missing.append(found_in.FrameNotGiven(motion.tool.name, "tool", needed=False))
         if base is None and motion.base.name:
             missing.append(found_in.FrameNotGiven(motion.base.name, "base", needed=False))
+        if base is not None and motion.base.one_of_several:
+            taken.append(found_in.FrameOfSeveral(motion.base.name, "base"))
         known = None if base is None and motion.base.name else self.robot.base @ (np.eye(4) if base is None else base)
-        return PlacedMotion(motion, arm, known, tuple(missing), taken)
+        return PlacedMotion(motion, arm, known, tuple(missing), tuple(taken))
 
     def _with(self, tool: Reals) -> Robot:
         key = tool.tobytes()
@@ -175,9 +180,9 @@ def _solved(placed: PlacedMotion, target: instructions.PoseTarget, pose: Reals, 
     except PoseError:
         return Goal(None, None, False, (found_in.TargetNotGiven("", "not_finite"),))
     if not len(found.q):
-        return Goal(None, pose, True, (*placed.taken, found_in.TargetOutOfReach(found.unsolved)))
+        return Goal(None, pose, True, (*placed.taken, found_in.TargetOutOfReach(found.unsolved, bool(target.external))))
     rows = found.q[found.within_limits] if found.within_limits.any() else found.q
-    findings: list[found_in.CheckFinding] = list(placed.taken)
+    findings: list[found_in.CheckFinding] = []
     joint = placed.motion.kind == "joint"
     met = np.ones(len(rows), np.bool_)
     if target.branch is not None and joint:
@@ -194,7 +199,7 @@ def _solved(placed: PlacedMotion, target: instructions.PoseTarget, pose: Reals, 
         findings.append(found_in.ConfigurationGuessed(different))
     start = np.zeros(rows.shape[1]) if reference is None else reference
     away = np.abs(rows - start).max(axis=1)
-    return Goal(rows[int(away.argmin())], pose, True, tuple(findings))
+    return Goal(rows[int(away.argmin())], pose, True, (*placed.taken, *findings))
 
 
 def _different(rows: Reals) -> int:
@@ -262,7 +267,8 @@ def _of_poses(group: list[tuple[int, PlacedMotion]]) -> dict[int, tuple[found_in
         elif (reasons := reasons + 1) <= MAX_REASONS:
             findings[number] = goal_of(placed, placed.motion.target, None).findings
         else:
-            findings[number] = (found_in.TargetOutOfReach(()),)
+            outer = getattr(placed.motion.target, "external", ())
+            findings[number] = (found_in.TargetOutOfReach((), bool(outer)),)
     return findings
 
 
@@ -743,6 +749,8 @@ class StepChecker:
         placed = self.arms.placed(motion)
         goal = goal_of(placed, motion.target, before)
         findings: list[found_in.CheckFinding] = [*goal.findings, *_said(motion)]
+        if motion.kind != "joint":  # the tool's path depends on it even between joint targets
+            findings += [each for each in placed.taken if each not in findings]
         if motion.angle is not None and not np.isfinite(motion.angle):
             return CheckedMotion(
                 motion.kind, placed, before, None, None, (*findings, found_in.ArcGoesOn(None, turns=False))
