@@ -182,6 +182,7 @@ MIN_POINTS, MAX_POINTS = 21, 501
 NO_WAY = 1e-9  # m or rad
 SPEED_TOLERANCE = 1e-6  # relative
 FAR_TURN, NEAR_MOVE = np.radians(90.0), 0.05  # of a joint that jumps: it turns so far where the tool moves less
+SPARED = np.radians(10.0)  # the other way round is named where it is shorter by so much
 SAME_ARRIVAL = 1e-4  # rad
 
 
@@ -489,9 +490,9 @@ def _joint_jumps(arm: Robot, start: Reals, end: Reals, moved: float, turned: flo
     lead = int(np.argmax(turned_by))
     if turned_by[lead] > FAR_TURN and moved < NEAR_MOVE and turned < turned_by[lead] / 2:
         found.append(found_in.JointJumps(lead + 1, float(np.degrees(step[lead])), moved * 1000))
-    for j in np.flatnonzero(turned_by > np.pi + NO_WAY).tolist():
+    for j in np.flatnonzero(turned_by > np.pi).tolist():
         nearer = float(wrap_to_pi(step[j]))
-        if arm.lower[j] <= start[j] + nearer <= arm.upper[j]:
+        if turned_by[j] - abs(nearer) > SPARED and arm.lower[j] <= start[j] + nearer <= arm.upper[j]:
             found.append(found_in.WholeTurn(j + 1, *np.degrees([step[j], nearer]).tolist()))
     return found
 

@@ -44,6 +44,7 @@ from er3a.collision.pairs import Pair
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import arm_shapes, enlarged_by, link_frames
 from er3a.errors import PoseError
+from er3a.geometry.transforms import rotation_angle
 from er3a.geometry.vectors import TURN
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.chain import row_values
@@ -66,7 +67,7 @@ from er3a.program_check.motion_checks import (
 from er3a.programs import instructions
 from er3a.programs.execution import Ending, Execution
 from er3a.programs.writing import solutions_meant
-from er3a.robots.joint_limits import joint_shown, within
+from er3a.robots.joint_limits import equivalents_within, joint_shown, within
 from er3a.robots.robot import Robot
 
 FLANGE = "tool0"
@@ -685,8 +686,9 @@ class StepChecker:
         """Joint moves (n,), one or two, that take the tool where a motion does and pass its checks; empty if none was
         found, and of arms with prismatic joints.
 
-        The first that passes is taken: straight to the solution nearest to the start, or else round by the middle of
-        both with some joints turned away. They are checked at the share of full speed that is assumed.
+        The first that passes is taken: straight to the solution on the way to which the tool turns least, of like ones
+        the nearest to the start, or else round by the middle of both with some joints turned away. They are checked at
+        the share of full speed that is assumed.
         """
         checked = self.motions[number]
         goal = self._goal_pose(checked)
@@ -696,8 +698,11 @@ class StepChecker:
             found = inverse(checked.placed.arm, goal, checked.start, self_motion_rows=True)
         except PoseError:
             return ()
-        rows = self._free(checked.placed, _as_written(found.q[found.within_limits]))
-        rows = rows[np.argsort(np.abs(rows - checked.start).max(axis=1), kind="stable")][:MAX_SOLUTIONS]
+        arm, inside = checked.placed.arm, found.q[found.within_limits]
+        rows = np.concatenate([inside[:0], *(equivalents_within(arm, q, checked.start) for q in inside)])
+        rows = self._free(checked.placed, _as_written(rows))
+        away, turns = np.abs(rows - checked.start).max(axis=1), _turns(arm, checked.start, rows)
+        rows = rows[np.lexsort((away, np.round(turns / LIKE_TURNS)))][:MAX_SOLUTIONS]
         if len(rows) and np.abs(rows[0] - checked.start).max() < SAME_JOINTS:
             return ()  # the tool is there already: no move is needed
         straight = [(row,) for row in rows]
@@ -996,6 +1001,17 @@ def _vias(arm: Robot, start: Reals, end: Reals) -> Reals:
 def _as_written(q: Reals) -> Reals:
     """Joint angles (..., n) in rad, rounded to 0.001 deg, as reports state them."""
     found: Reals = np.radians(np.round(np.degrees(q), 3))
+    return found
+
+
+LIKE_TURNS = np.radians(30.0)
+
+
+def _turns(arm: Robot, start: Reals, ends: Reals) -> Reals:
+    """The largest turn (k,), rad, of the tool from where it is, on joint moves to ``ends`` (k, n)."""
+    share = np.linspace(0, 1, 33)[:, None, None]
+    R = forward(arm, start + share * (ends - start))[..., :3, :3]
+    found: Reals = rotation_angle(R[0], R).max(axis=0)
     return found
 
 

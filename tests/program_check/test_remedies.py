@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from pathlib import Path
 from typing import get_args
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from er3a.collision.pairs import LinkPair
 from er3a.collision.scene import Scene, Sphere
@@ -113,6 +115,19 @@ def test_joint_moves_that_are_advised_pass(tmp_path, code, start, line):
     if code != "above_limit":  # of which no arm has the end
         ends = [list(check.motions.values())[-1].end for check in (before, after)]
         np.testing.assert_allclose(*(forward(ROBOT, end)[:3, 3] for end in ends if end is not None), atol=1e-4)
+
+
+def test_of_the_solutions_one_is_advised_on_the_way_to_which_the_tool_hardly_turns():
+    """The example's line keeps the tool's orientation through the wrist's singularity; by another solution, hardly
+    farther away, a joint move would turn the tool once around."""
+    program = read_program(Path("data/programs/faults/singular_line.src"))
+    check = check_program(program, ROBOT, CheckOptions(start=np.radians([0, -10, -10, 0, -70, 0]), measures=False))
+    advised = next(each for each in check.findings if each.joint_moves)
+    motion = check.motions[advised.step]
+    (end,) = np.radians(advised.joint_moves)
+    R = forward(motion.placed.arm, motion.start + np.linspace(0, 1, 101)[:, None] * (end - motion.start))[:, :3, :3]
+    turned = Rotation.from_matrix(R[0].T @ R).magnitude()
+    assert np.degrees(turned.max()) < 15
 
 
 def test_what_no_joint_move_mends_says_so_by_not_advising_one(tmp_path):
