@@ -79,7 +79,7 @@ from er3a.pipeline.sweeps import ENTRIES, entry_label
 from er3a.pipeline.verdicts import NOT_EXAMINED, StageVerdict, read_verdicts
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.figures import new_figure
-from er3a.pipeline.viewing.numbers import number
+from er3a.pipeline.viewing.numbers import decimals_of, number
 from er3a.pipeline.viewing.page import PAGES, Head, Picture, alternative_table, head_of, stage_head, status_word
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, MUTED, REFERENCE, VERDICTS
 from er3a.robots.joint_limits import shown
@@ -170,10 +170,17 @@ def key_figures(folder: Path, stages: Sequence[str]) -> dict[tuple[str, str, str
         for figure in head.figures:
             value, unit = figure.value, figure.unit
             if figure.part and value is not None:  # the whole differs from robot to robot
-                found[title, figure.label, ""] = f"{number(value)} {unit}"
+                found[title, figure.label, ""] = f"{figure.text} {unit}"
             else:
-                found[title, figure.label, unit] = float(f"{value:.6g}") if isinstance(value, float) else value
+                found[title, figure.label, unit] = _rounded(figure)
     return found
+
+
+def _rounded(figure: page.ShownFigure) -> float | int | None:
+    """The value with the digits that its page shows."""
+    if not isinstance(figure.value, float) or not np.isfinite(figure.value) or not figure.value:
+        return figure.value
+    return round(figure.value, decimals_of(figure.value, figure.uncertainty, figure.measure))
 
 
 def border_mm(workspace: WorkspaceResults | AbsentResults | None) -> list[list[list[float]]]:

@@ -152,7 +152,10 @@ class Picture:
 
 @dataclass(frozen=True)
 class ShownFigure:
-    """A key figure in the page's language; the unit of ``part`` of a whole is the whole, in words."""
+    """A key figure in the page's language; the unit of ``part`` of a whole is the whole, in words.
+
+    ``measure`` : the unit as results name it
+    """
 
     name: str
     label: str
@@ -160,6 +163,12 @@ class ShownFigure:
     unit: str
     uncertainty: float | None
     part: bool
+    measure: str
+
+    @property
+    def text(self) -> str:
+        """The value with the digits that matter."""
+        return measured(self.value, self.uncertainty, self.measure)
 
 
 NUMERICS = {  # key figures that answer no question of a verdict
@@ -237,6 +246,7 @@ def head_of(stored: Stored[Any], links: Mapping[str, str] | None = None) -> Head
             tr("of {total}", total=figure.of) if figure.of is not None else tr(figure.unit),
             figure.uncertainty,
             figure.of is not None,
+            figure.unit,
         )
         for figure in stored.results.summary.figures
     )
