@@ -32,7 +32,8 @@ from er3a.pipeline.stages.workspace import capability_section
 from er3a.pipeline.stages.workspace.entry import BoxTask
 from er3a.pipeline.stages.workspace.model import PlacementSummary, PlaceSummary, StandSummary
 from er3a.pipeline.stages.workspace.tool_capability import task_summary
-from er3a.pipeline.viewing.index import condition, first_inside, passing, proposed
+from er3a.pipeline.viewing.index import condition, passing, proposed
+from er3a.pipeline.viewing.tray import first_inside
 
 TALLY = CheckTally(24)
 TURNED = ToolOff(0.0, 180.0)
@@ -215,7 +216,7 @@ def test_the_index_names_what_passes_through_the_box_or_its_stand(over):
         "trajectory": {"into": pytest.approx(2.75)} | below,
         "programs": {"through": pytest.approx(2.75)},
     }
-    assert found.text.startswith("“Box at”: ")
+    assert found.text.startswith("“In the tray at”: ")
     assert found.text.endswith("Not compared, or not all of it: lost, still.")
     sound = {"trajectory": ["below", "beside"], "programs": ["through", "still"]}
     counts = f"{'1 of the 2 paths, ' if over else ''}1 of the 2 programs"
@@ -260,7 +261,7 @@ def test_without_motions_or_without_a_place_nothing_is_said_to_be_free():
     assert passing({}, None) is None
     alone = passing({"workspace": placed()}, None)
     assert (alone.short({}), alone.text) == (
-        "No path, program or grasp was compared with the place of the tray or box.",
+        "No path, program or grasp was compared with the place of the tray.",
         "",
     )
     clear = moving(

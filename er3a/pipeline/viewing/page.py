@@ -371,7 +371,7 @@ def render_stage(
 
 
 def _box(study: Study, stored: Stored[Any]) -> str:
-    """The edges (mm) of the tray or box that the workspace page may place, which no other stage takes for an obstacle;
+    """The edges (mm) of the tray that the workspace page may place, which no other stage takes for an obstacle;
     empty where no place is asked for or recommended."""
     if "workspace" not in study.stages(stored.robot) or stored.rests_on.get("validation") == "fail":
         return ""
