@@ -35,7 +35,7 @@ ROBOT = "er3a_c60"
 def study_of(
     folder: Path,
     *names: str,
-    expect: dict[str, str] | None = None,
+    expect: dict[str, str | list[str]] | None = None,
     settings: dict | None = None,
     robot: str = ROBOT,
     **changes,
@@ -197,12 +197,17 @@ def test_a_path_that_ends_before_the_edge_of_the_reach_as_advised_is_safe(tmp_pa
 
 
 def test_all_that_a_path_came_to_is_named_everywhere_in_the_order_of_time(tmp_path):
-    results = compute(study_of(tmp_path, "line_limits", expect={"line_limits": "leaves limits"}), ROBOT)
+    both = {"line_limits": ["leaves limits", "collides"]}
+    results = compute(study_of(tmp_path, "line_limits", expect=both), ROBOT)
     (path,), (fault,) = results.summary.paths, faults(results)
     assert path.collisions[0].t0_s < path.out_of_limits[0].t0_s
     assert path.outcomes == ("collides", "leaves limits")
     assert fault.verdict == "collides, leaves limits"
     assert "expected to fail, and did: line_limits (collides, leaves limits)" in say(results.summary.verdict.finding)
+    assert (fault.meant, fault.expected) == (True, "as expected")
+    alone = replace(path, expect=("leaves limits",))  # of a file that does not expect the collision
+    (fault,) = faults(replace(results, summary=replace(results.summary, paths=(alone,))))
+    assert (fault.meant, fault.expected) == (False, "leaves limits: as expected; collides: not expected")
     late = replace(path, collisions=(replace(path.collisions[0], t0_s=path.out_of_limits[0].t0_s + 0.1),))
     assert late.outcomes == ("leaves limits", "collides")
     assert replace(path, collisions=()).outcomes == ("leaves limits",)

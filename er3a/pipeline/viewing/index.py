@@ -903,6 +903,7 @@ def _otherwise(stage: str, followed: Sequence[ProgramSummary | PathSummary], fau
             "fail",
             tr("not as expected"),
             False,
+            "",
             (FaultMoment(say(each)),),
             "",
             f"{stage}.html#{each.name}",

@@ -201,7 +201,7 @@ def _left_out(study: Study, name: str, found: model.TargetClearances, motions: l
         yield LeftOut("paths", skipped)
     if unknown := tuple(each.name for each in motions if each.motion and np.isnan(each.motion.q).any()):
         yield LeftOut("path_stretches", unknown)
-    yield from by_subject(rest for each in motions if each.expect in (None, "safe") for rest in each.left_out)
+    yield from by_subject(rest for each in motions if each.meant_safe for rest in each.left_out)
 
 
 def _matrix(bodies: Bodies) -> model.MatrixRows:

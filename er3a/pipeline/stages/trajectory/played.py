@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from er3a.pipeline.messages.expectations import outcome_word
+from er3a.pipeline.messages.expectations import as_expected, outcome_words
 from er3a.pipeline.messages.language import own_title, tr
 from er3a.pipeline.messages.programs import remedy, say
 from er3a.pipeline.messages.say import joined, sentence
@@ -22,6 +22,7 @@ from er3a.pipeline.messages.trajectory import (
     repair_text,
 )
 from er3a.pipeline.player.motions import Fault, FaultMoment, Mark, PlayedEvent, PlayedMotion, Weight, address_of
+from er3a.pipeline.stages.expectations import is_met
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.planning.names import PathVerdict
@@ -61,7 +62,7 @@ def motions(robot: Robot, results: model.TrajectoryResults) -> list[PlayedMotion
 def worst_first(paths: Sequence[model.PathSummary]) -> list[model.PathSummary]:
     """Those that fail first, of them those that were not expected to."""
     ranks = ("fail", "caution", "plain")
-    return sorted(paths, key=lambda path: (ranks.index(WEIGHTS[path.verdict]), path.expect == path.verdict))
+    return sorted(paths, key=lambda path: (ranks.index(WEIGHTS[path.verdict]), is_met(path)))
 
 
 def faults(results: model.TrajectoryResults) -> list[Fault]:
@@ -82,7 +83,8 @@ def faults(results: model.TrajectoryResults) -> list[Fault]:
                 own_title(path.title),
                 status,
                 verdict,
-                path.expect == path.verdict != "safe",
+                path.verdict != "safe" and is_met(path),
+                as_expected(path),
                 tuple(_moment(text, t, rows) for t, text in wrong),
                 to_do,
                 address_of("trajectory", path.name, wrong[0][0] or 0.0, path.name),
@@ -164,7 +166,7 @@ def shown_verdict(path: model.PathSummary, near: ClearOfAssumed | None) -> tuple
     """A path's verdict in colour and words; ``near`` as of :func:`near_assumed`."""
     if path.verdict == "safe" and near:
         return "caution", tr("clear of assumed shapes only")
-    return WEIGHTS[path.verdict], joined(map(outcome_word, path.outcomes), ", ")
+    return WEIGHTS[path.verdict], outcome_words(path.outcomes)
 
 
 def near_assumed(path: model.PathSummary, summary: model.TrajectorySummary) -> ClearOfAssumed | None:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from er3a.pipeline.messages.collision import solid_rows
+from er3a.pipeline.messages.expectations import as_expected
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import N_, tr, with_unit
 from er3a.pipeline.messages.programs import remedy
@@ -115,6 +116,7 @@ def _section(
         status=status.replace("plain", "pass"),
         verdict=verdict,
         kind=kind_word(path.kind),
+        expected=as_expected(path),
         text=joined([path_text(path), say(near) if near else ""]),
         distance=_clear_of(path, assumed),
         advice=advised(path, rows, summary.joint_limits, assumed=assumed),
