@@ -76,8 +76,8 @@ TEXTS = texts(
             "proof, and the samples can't tell."
         ),
         "workspace.void_at_shoulder": (
-            "An enclosed void of at least {litres:.3g} L surrounds the shoulder at ({x}, {y}, {z}) mm: the arm can't "
-            "fold far enough to reach it. There is no other enclosed void that would hint at a wrong "
+            "An enclosed void of at least {litres:.3g} L, centred at ({x}, {y}, {z}) mm, surrounds the shoulder: the "
+            "arm can't fold far enough to reach it. There is no other enclosed void that would hint at a wrong "
             "limit; this confirms none."
         ),
         "workspace.no_void#sampled": "The samples leave no enclosed void inside the hull; no proof.",

@@ -198,6 +198,19 @@ class Head:
     links: Mapping[str, str] = field(default_factory=dict)
 
     @property
+    def no_verdict(self) -> bool:
+        """Whether evidence contradicts the table that all rests on, so that nothing is said of the robot."""
+        first = self.caveats.get("validation")
+        return first is not None and first.status == "fail" and self.status != "not_computed"
+
+    @property
+    def sign(self) -> str:
+        """The classes of its mark, the same on every page: a pass beside what is expected to fail has its own."""
+        if self.no_verdict:
+            return "no_verdict"
+        return "pass as_meant" if self.status == "pass" and self.demonstrations else self.status
+
+    @property
     def finding(self) -> Any:
         """What the verdict says."""
         return self.summary.verdict.finding

@@ -128,6 +128,7 @@ def compute(study: Study, name: str) -> model.CollisionResults:
     mounting = tuple(stated(model.Mounting, contact) for contact in base_contacts(robot, scene))
     matrix = _matrix(bodies)
     places_found = _places_summary(places)
+    meant = {each.name for each in motions if "collides" in each.expected}
     wrong = model.ShapesOverlap(bodies.in_error, space.whole.value) if bodies.in_error else None
     undecided = int((matrix.state == "undecided").sum())
     home_found = None if at_home is None else model.HomeCollides(at_home, float(-smallest[0] * 1000), space.whole.value)
@@ -140,7 +141,11 @@ def compute(study: Study, name: str) -> model.CollisionResults:
         *(space.whole.value, places_found.reached, places_found.clear, joined, undecided, assumed is not None),
         targets=len(at_targets),
         nearest=_nearest_target(at_targets),
-        colliding=tuple(model.CollidingPath(each.name, each.between) for each in on_paths if each.clearance_mm < 0),
+        colliding=tuple(
+            model.CollidingPath(each.name, each.between, each.name in meant)
+            for each in on_paths
+            if each.clearance_mm < 0
+        ),
     )
     return model.CollisionResults(
         summary=model.CollisionSummary(
