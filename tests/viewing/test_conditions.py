@@ -20,6 +20,7 @@ from er3a.pipeline.messages.left_out import say_reserved
 from er3a.pipeline.messages.pages import caveat
 from er3a.pipeline.messages.validation import how_far_off, settled_parts, unconfirmed
 from er3a.pipeline.messages.vision import say
+from er3a.pipeline.messages.workspace import range_text
 from er3a.pipeline.results import FORMAT_VERSION, LeftOut, plain, read_foundation, write_checksums
 from er3a.pipeline.stages.dynamics.model import NoLimits
 from er3a.pipeline.stages.inverse.model import RankingRows
@@ -254,6 +255,21 @@ def test_the_workspace_page_moves_a_box_up_or_down_only_where_no_height_is_to_be
     text = capability_section.best_text(SimpleNamespace(summary=None, places=None), replace(placement, places=(spot,)))
     assert text.startswith(f"Put it there. {height}".strip())
     assert f"allow to move it by {room} mm," in text
+
+
+def test_other_heights_of_a_stand_are_told_with_what_they_have_less_of():
+    """Of three heights the lower has half the manipulability, the higher 4 deg less to a joint's limit; the task asks
+    for 2 deg."""
+    placement = placed(over=True).results.summary.placement
+    spot = replace(placement.best, limit_margin_deg=10.0, room_down_m=(0.0, 0, 0.1), room_up_m=(0.0, 0, 0.1))
+    placement = replace(placement, stands=(replace(placement.stands[0], above=spot),))
+    heights = np.array([[0.35, 0, 0.3], [0.35, 0, 0.4], [0.35, 0, 0.5], [0.0, 0, 0.4]])
+    shares, margins = np.array([0.5, 1, 1.5, 0.1]), np.array([10.0, 8, 4, 0])
+    places = SimpleNamespace(centre_m=heights, manipulability_m3=shares, limit_margin_deg=margins)
+    text = range_text(placement, places)
+    assert "manipulability 50 % of that at 275 mm, 6.0 deg from a joint limit instead of 10.0 deg" in text
+    alone = SimpleNamespace(centre_m=heights[1:2], manipulability_m3=shares[1:2], limit_margin_deg=margins[1:2])
+    assert range_text(placement, alone) == ""
 
 
 def test_without_motions_or_without_a_place_nothing_is_said_to_be_free():

@@ -154,7 +154,7 @@ TEXTS = texts(
             "itself."
         ),
         "stand.between": (
-            "On a stand {gap} mm high ({least} to {most} mm pass the same checks, nearer to a singular pose) on {name}"
+            "On a stand {gap} mm high ({least} to {most} mm pass the same checks with less to spare) on {name}"
             ": centre at ({centre}) mm."
         ),
         "void.shoulder": (
@@ -202,9 +202,11 @@ TEXTS = texts(
             "scene file and run again."
         ),
         "box.range": (
-            "Keep the stand at {gap} mm: heights of {least} to {most} mm pass the same checks, but bring the arm "
-            "nearer to a singular pose (at one of them manipulability is {percent:.2g} % of that at {gap} mm, or less)."
+            "Keep the stand at {gap} mm: heights of {least} to {most} mm pass the same checks, some of them with the "
+            "tray turned the other way, but the worst of them has less to spare: {spare}."
         ),
+        "box.spare.manipulability": "manipulability {percent:.2g} % of that at {gap} mm",
+        "box.spare.limits": "{least:.1f} deg from a joint limit instead of {here:.1f} deg",
         "box.proven#all": "the tool point, {tilt}, reaches all of it (proven); {unchecked}",
         "box.proven#upper": (
             "the tool point, {tilt}, reaches all of it except the lowest {served_from} mm (proven); {unchecked}"
@@ -247,6 +249,7 @@ def _(found: model.VoidUnexpected) -> str:
 
 SERVED_ALL_M = 1e-6
 SAME_PLACE_M = 1e-6
+SAME_SHARE = 0.99  # of what there is to spare at a place: less than that is told
 CHANGED_FIRST = ("offset", "direction", "lower", "upper", "a", "d")
 NAMED_CHANGES = 4
 
@@ -410,8 +413,8 @@ def _reached(placement: model.PlacementSummary, status: str, form: str, served_f
 
 
 def range_text(placement: model.PlacementSummary, places: model.BoxPlaces) -> str:
-    """How high the stand of the box may be, and how near to a singular pose the arm comes over that range; empty where
-    no stand is needed or only one height serves."""
+    """How high the stand of the box may be, and how near to a singular pose and to joint limits the arm comes over that
+    range; empty where no stand is needed or only one height serves."""
     gaps = placement.over.gaps_m if placement.over and not placement.stand else None
     if gaps is None or gaps[1] == gaps[2]:
         return ""
@@ -420,9 +423,17 @@ def range_text(placement: model.PlacementSummary, places: model.BoxPlaces) -> st
     above = np.abs(places.centre_m[:, :2] - xy).max(axis=1) < SAME_PLACE_M
     heights = places.centre_m[:, 2] - z + gap
     above &= (least - SAME_PLACE_M < heights) & (heights < most + SAME_PLACE_M)
-    worst = min(places.manipulability_m3[above], default=0.0) / placement.best.manipulability_m3
-    shown = {"gap": millimetres([gap]), "least": millimetres([least]), "most": millimetres([most])}
-    return sentence("box.range", percent=100 * float(worst), **shown)
+    best, shown = placement.best, {"gap": millimetres([gap])}
+    worst = float(min(places.manipulability_m3[above], default=0.0)) / best.manipulability_m3
+    spare = [sentence("box.spare.manipulability", percent=100 * worst, **shown)] if worst < SAME_SHARE else []
+    near = float(min(places.limit_margin_deg[above], default=np.inf)) + placement.task.limit_margin_deg
+    if best.limit_margin_deg is not None and near < SAME_SHARE * best.limit_margin_deg:
+        spare.append(sentence("box.spare.limits", least=near, here=best.limit_margin_deg))
+    if not spare:
+        return ""
+    return sentence(
+        "box.range", least=millimetres([least]), most=millimetres([most]), spare=joined(spare, ", "), **shown
+    )
 
 
 def void_text(summary: Summary, *, confirmed: bool = True) -> str:
