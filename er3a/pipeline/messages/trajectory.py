@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.pairs import LinkAndSolid
 from er3a.pipeline.messages.expectations import demonstrated, outcome_word
 from er3a.pipeline.messages.kinematics import singularity_word
-from er3a.pipeline.messages.language import N_, with_unit
+from er3a.pipeline.messages.language import N_, as_text, with_unit
 from er3a.pipeline.messages.left_out import names_in_words
 from er3a.pipeline.messages.planning import STRATEGIES as ADVICE
 from er3a.pipeline.messages.planning import rate_needed
@@ -55,6 +56,7 @@ NO_DEVIATION = 0.005  # mm or deg
 NO_TIME = 0.005  # s
 AT_EDGE = 1e-3  # s, before the edge of the reach, where the arm is stretched
 MOMENT = 0.001  # s
+LEAST_CHANGE = 0.5  # deg or mm
 ADJOINING = 0.05  # s, between stretches that are told as one
 FULL_SPEED = 0.995  # of a joint's limit, which rounds to 100 %
 WHOLE = 10.0  # from which on numbers are rounded to whole ones
@@ -111,8 +113,8 @@ TEXTS = texts(
         "advice.none": "No avoidance strategy completes this path: {why}",
         "advice.no_strategy": "No avoidance strategy works: {reason}",
         "advice.slower": (
-            "If its speed can't vary along the path, run all of it at {percent:.3g} % of that: duration_s "
-            "{needed:.4g} in the path file"
+            "If its speed can't vary along the path, run all of it at {percent:.3g} % of the programmed speed: "
+            "duration_s {needed:.4g} in the path file"
         ),
         "advice.clear_until": (
             "It keeps {margin:.1f} mm of clearance up to t = {t:.4g} s ({far:.1f} mm) and in a stop from there "
@@ -173,6 +175,11 @@ TEXTS = texts(
         "advice.tool#far": "the tool leaves the path by {far} mm",
         "advice.tool#turned": "the tool leaves the path by {turned} deg",
         "advice.swing": "{tool}; J{joint} turns most, by {swing:.0f} deg",
+        "advice.switch#before": (
+            "It begins at other joint angles than programmed ({changes}): the way there is not part of it and was not "
+            "checked"
+        ),
+        "advice.switch#within": "The move to the other solution is part of it and was checked",
         "advice.time#less": "{takes:.2f} s instead of {programmed:.2f} s",
         "advice.time#same": "same time as programmed",
         "advice.time#slower_there": "same time as programmed, slower there and faster elsewhere",
@@ -261,7 +268,7 @@ def _apart_from_collisions(path: model.PathSummary) -> str:
     if faults := path.out_of_limits or _first_and_worst(path.too_fast):
         return joined([*map(say, faults), *map(say, path.singularities), _at_another_pace(path)])
     if path.undecided:
-        return joined([*map(say, path.undecided), *map(say, path.singularities)])
+        return joined([*map(say, adjoined(path.undecided)), *map(say, path.singularities)])
     met = [say(event) for event in path.singularities if event.crossing]
     if path.in_joint_space:
         if not met:
@@ -364,6 +371,18 @@ def first_faults(path: model.PathSummary) -> list[tuple[float, str]]:
     if open_ and open_.t0_s < min(found, default=(math.inf,))[0]:
         found.append((open_.t0_s, cause_text(path, open_)))
     return sorted({*found[: max(1, sum(map(bool, grave)))], *sorted(found)[:1]})
+
+
+def adjoined(stretches: Sequence[model.Stretch[Any]]) -> list[model.Stretch[Any]]:
+    """Stretches in order of time, those of one cause that adjoin as one."""
+    found: list[model.Stretch[Any]] = []
+    for part in sorted(stretches, key=lambda part: part.t0_s):
+        k = next((k for k, each in enumerate(found) if each.cause == part.cause), None)
+        if k is not None and part.t0_s <= found[k].t1_s + ADJOINING:
+            found[k] = replace(found[k], t1_s=max(found[k].t1_s, part.t1_s), s1_m=max(found[k].s1_m, part.s1_m))
+        else:
+            found.insert(0, part)
+    return sorted(found, key=lambda part: part.t0_s)
 
 
 def _rates(stretches: Sequence[model.Stretch[RateCause]]) -> str:
@@ -505,7 +524,7 @@ def _clear(path: model.PathSummary) -> str:
 
 
 def _numbers(values: tuple[float, ...], digits: int) -> str:
-    return ", ".join(f"{value + 0.0:.{digits}f}" for value in values)
+    return ", ".join(as_text(value + 0.0, f".{digits}f") for value in values)
 
 
 def reasons(tried: model.TriedStrategy) -> str:
@@ -582,6 +601,18 @@ def _leaves(far_mm: float, turned_deg: float) -> str:
 
 def _shortly(value: float) -> str:
     return f"{value:.2g}" if value < WHOLE else f"{value:.0f}"
+
+
+def switch_text(change: Sequence[float], sliding: Sequence[int]) -> str:
+    """Whether the move to another IK solution is part of the motion that takes it, and how far it is if not.
+
+    ``change``: of each joint between the programmed start and the motion's, deg, mm where it is one of ``sliding``.
+    """
+    moved = [(joint, value) for joint, value in enumerate(change, 1) if abs(value) >= LEAST_CHANGE]
+    if not moved:
+        return sentence("advice.switch#within")
+    parts = (with_unit(f"J{j} {as_text(value, '+.0f')}", "mm" if j in sliding else "deg") for j, value in moved)
+    return sentence("advice.switch#before", changes=joined(parts, ", "))
 
 
 def _takes(takes_s: float, programmed_s: float, strategy: StrategyName) -> str:

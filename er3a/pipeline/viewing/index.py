@@ -79,7 +79,7 @@ from er3a.pipeline.sweeps import ENTRIES, entry_label
 from er3a.pipeline.verdicts import NOT_EXAMINED, StageVerdict, read_verdicts
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.figures import new_figure
-from er3a.pipeline.viewing.numbers import number
+from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import PAGES, Head, Picture, alternative_table, head_of, stage_head, status_word
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, MUTED, REFERENCE, VERDICTS
 from er3a.robots.joint_limits import shown
@@ -621,7 +621,7 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
     table = heads["validation"].status if "validation" in heads else NOT_EXAMINED
     finding = heads["validation"].finding if "validation" in heads else None
     same_arm, instead = isinstance(finding, DefinedOtherwise), alternative_table(study, name, results.parent)
-    unproven, settled = _settled(finding)
+    unproven, settled = _settled(finding, _evidence(results))
     entries = evidence_section(robot, _evidence(results), _evidence(results.parent / instead) if instead else None)
     box_range = _box_range(stored["workspace"].results) if "workspace" in stored else ""
     computed = {stage: each for stage, each in stored.items() if heads[stage].status != "not_computed"}
@@ -683,7 +683,7 @@ def proposed(finding: object) -> dict[str, str]:
     return {"measurement": joined(step, " "), "entry": entry.replace(" ", "")}
 
 
-def _settled(finding: object) -> tuple[bool, str]:
+def _settled(finding: object, evidence: TableEvidence | None) -> tuple[bool, str]:
     """Whether nothing of a table's geometry is settled; and of one that is contradicted by what, of one that is settled
     in part how much, and how far off the tool could be."""
     if isinstance(finding, Contradicted | AnotherArm):
@@ -692,7 +692,9 @@ def _settled(finding: object) -> tuple[bool, str]:
         return False, ""
     part = next((part for part in finding.parts if part.part == "geometry"), None)
     conflict = say(finding.contradiction) if finding.contradiction else ""
-    said = joined([settled_parts(finding), *how_far_off(finding), conflict], " ")
+    sums = joined([each.entry for each in evidence.combinations] if evidence else [], ", ")
+    counted = tr("Counted as one entry, because only the sum matters: {names}.", names=sums) if sums else ""
+    said = joined([settled_parts(finding), counted, *how_far_off(finding), conflict], " ")
     return part is not None and not (part.settled or part.up_to_signs), said
 
 
@@ -722,7 +724,7 @@ def _reach_text(summary: WorkspaceSummary, *, bare: bool) -> str:
     """How far from axis 1 and how high the tool point comes; ``bare``: whether the robot has no tool."""
     reach = summary.reach_m
     least, most, low, high = (
-        number(1000 * value, 4)
+        fixed(1000 * value, 1)
         for value in (reach.nearest_to_axis, reach.furthest_from_axis, reach.lowest, reach.highest)
     )
     point = tr("without a tool: the centre of the flange") if bare else tr("the tool point")
