@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from er3a.pipeline.messages.language import alike
 from er3a.pipeline.viewing.numbers import decimals_of_column, decimals_of_spreads, fixed, measured, number
 
 
@@ -77,3 +78,9 @@ def test_fixed_has_no_negative_zero():
     assert fixed(-0.00001) == "0.0"
     assert fixed(-12.34, 1) == "−12.3"
     assert fixed(float("nan")) == "–"
+
+
+def test_numbers_of_one_list_have_equally_many_decimals():
+    assert alike([20, -30, 7.5, 0]) == ["20.0", "−30.0", "7.5", "0.0"]
+    assert alike([20, -30.0001, -0.0]) == ["20", "−30", "0"]
+    assert alike([10.103, -269.88]) == ["10.103", "−269.880"]

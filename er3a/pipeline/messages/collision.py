@@ -13,7 +13,7 @@ from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Sphere
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages import left_out  # noqa: F401
 from er3a.pipeline.messages.language import N_, own_title, tr
-from er3a.pipeline.messages.say import Plural, joined, listed, say, say_as, sentence, texts, word
+from er3a.pipeline.messages.say import Plural, by, joined, listed, say, say_as, sentence, texts, word
 from er3a.pipeline.stages.collision.model import BaseInSolid, FreeSpace, HomeCollides, NeverFree, ShapesOverlap
 
 NAMED = 3
@@ -93,7 +93,7 @@ TEXTS = texts(
             "The chosen solutions of {count} targets are clear by {nearest} or more.",
         ),
         "nearest_target": "{clearance_mm:.1f} mm ({name}, {pair})",
-        "colliding_path": "{name} ({pair})",
+        "colliding_path": by("expected", true="{name} ({pair}; as expected)", false="{name} ({pair}; not expected)"),
         "collision.free_space#paths": Plural(
             "colliding", "{count} path collides: {colliding:, }.", "{count} paths collide: {colliding:, }."
         ),

@@ -50,7 +50,7 @@ TEXTS = texts(
             "the joints' real accelerations: no document gives them, so accelerations are assumed"
         ),
         "left_out.jerk": "jerk: no limit is given",
-        "left_out.torques": "torques, payload and deflection of the arm (torques and payload: see the stage dynamics)",
+        "left_out.torques": "torques, payload and deflection of the arm",
         "left_out.paths": "paths that were not followed to their end",
         "left_out.path_stretches": "stretches that the computed bounds can't decide",
         "left_out.strategies": "avoidance strategies that the study does not ask for",

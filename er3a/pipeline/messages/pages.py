@@ -59,6 +59,10 @@ GROUP_NAMES = {  # of a robot file
 }
 GLOSSARY = {
     N_("branch"): N_("one choice of shoulder, elbow and wrist among the joint angles that bring the tool to a pose"),
+    N_("branch and bound"): N_(
+        "a search that divides what is possible and drops the parts that bounds exclude, until the rest is small; not "
+        "the arm's branches"
+    ),
     N_("self-motion"): N_("a continuum of solutions: joints that move while the tool stays on its target"),
     N_("arm angle"): N_("where the elbow of an arm with spherical shoulder and wrist is on its circle"),
     N_("cuspidal"): N_("of an arm that can change between solutions of a pose without passing a singularity"),

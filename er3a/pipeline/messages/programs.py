@@ -12,7 +12,7 @@ from er3a.collision.pairs import LinkAndSolid
 from er3a.kinematics.singularity import SingularityType
 from er3a.pipeline.messages.expectations import demonstrated, outcome_word
 from er3a.pipeline.messages.kinematics import branch_word, singularity_word
-from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.messages.language import N_, alike, tr
 from er3a.pipeline.messages.planning import unit_of
 from er3a.pipeline.messages.say import Plural, by, joined, listed, say, say_as, sentence, texts, word
 from er3a.pipeline.stages.programs.model import FindingAt, ProgramCounts, ProgramSummary
@@ -597,7 +597,7 @@ def remedy_at(finding: CheckFinding, joint_moves: Sequence[Sequence[float]]) -> 
     """What to do about a finding: ``joint_moves`` (deg) that pass, or else what mends it and was not tried here."""
     if not joint_moves:
         return remedy(finding)
-    *via, end = [", ".join(f"{value:g}" for value in row) for row in joint_moves]
+    *via, end = [", ".join(alike(row)) for row in joint_moves]
     if via:
         return sentence("remedy.joint_moves", via=via[0], end=end)
     return sentence("remedy.joint_move", end=end)

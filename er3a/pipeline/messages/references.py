@@ -51,7 +51,10 @@ STATUS_MEANINGS = {
         "tolerance"
     ),
     "contradicted": N_("don't use it: the evidence excludes the value"),
-    "consistent": N_("check it on the arm: only the table's own source gives it"),
+    "consistent": N_(
+        "check it on the arm: only the table's own source gives it, which may contradict another table, but confirms "
+        "none of its own values"
+    ),
     "open": N_("measure it: no document distinguishes it from another value that moves the tool"),
     "gauge": N_(
         "keep it: another value, with other entries changed to match, describes the same robot; only their sum counts"

@@ -76,8 +76,8 @@ TEXTS = texts(
             "proof, and the samples can't tell."
         ),
         "workspace.void_at_shoulder": (
-            "An enclosed void of at least {litres:.3g} L surrounds the shoulder at ({x}, {y}, {z}) mm: the arm can't "
-            "fold far enough to reach it. There is no other enclosed void that would hint at a wrong "
+            "An enclosed void of at least {litres:.3g} L, centred at ({x}, {y}, {z}) mm, surrounds the shoulder: the "
+            "arm can't fold far enough to reach it. There is no other enclosed void that would hint at a wrong "
             "limit; this confirms none."
         ),
         "workspace.no_void#sampled": "The samples leave no enclosed void inside the hull; no proof.",
@@ -414,8 +414,8 @@ def _reached(placement: model.PlacementSummary, status: str, form: str, served_f
 
 
 def range_text(placement: model.PlacementSummary, places: model.BoxPlaces) -> str:
-    """How high the stand of the tray may be, and how near to a singular pose and to joint limits the arm comes over that
-    range; empty where no stand is needed or only one height serves."""
+    """How high the stand of the tray may be, and how near to a singular pose and to joint limits the arm comes over
+    that range; empty where no stand is needed or only one height serves."""
     gaps = placement.over.gaps_m if placement.over and not placement.stand else None
     if gaps is None or gaps[1] == gaps[2]:
         return ""

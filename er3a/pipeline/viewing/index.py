@@ -79,7 +79,7 @@ from er3a.pipeline.sweeps import ENTRIES, entry_label
 from er3a.pipeline.verdicts import NOT_EXAMINED, StageVerdict, read_verdicts
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.figures import new_figure
-from er3a.pipeline.viewing.numbers import decimals_of, number
+from er3a.pipeline.viewing.numbers import decimals_of, fixed, number
 from er3a.pipeline.viewing.page import PAGES, Head, Picture, alternative_table, head_of, stage_head, status_word
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, MUTED, REFERENCE, VERDICTS
 from er3a.pipeline.viewing.tray import first_inside, placed_tray
@@ -503,6 +503,7 @@ OF_ALL_RUNS = (  # what may turn any of them unsafe
     *("obstacles", "uncovered_links", "bare_tool", "base_inside", "allowed_contacts", "program_rest", "given_rates"),
     *("controller_language", "tool", "carried", "torques"),
 )
+MAX_TALLIED = 3  # that do not pass, though nothing expects it, and are named beside their number
 MAX_FAULTS = 20  # of a robot's paths, and of its programs, that are listed
 PLACE_LETTERS = 160
 VOID_TAGS = ("br", "img", "input", "wbr", "hr")
@@ -526,7 +527,6 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         folder / "index.html",
         places=list(_places(study, folder, {each["robot"].name for each in robots if each["table"] == "fail"})),
         robots=robots,
-        legend=verdict_legend(status for each in robots if each["entries"] for status in each["entries"]["statuses"]),
         article=study.article is not None,
         questions={stage.name: stage.question for stage in STAGES.values()},
         shown_figures=SHOWN_FIGURES,
@@ -629,11 +629,12 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
     table = heads["validation"].status if "validation" in heads else NOT_EXAMINED
     finding = heads["validation"].finding if "validation" in heads else None
     same_arm, instead = isinstance(finding, DefinedOtherwise), alternative_table(study, name, results.parent)
-    unproven, settled = _settled(finding)
+    unproven, settled = _settled(finding, _evidence(results))
+    entries = evidence_section(robot, _evidence(results), _evidence(results.parent / instead) if instead else None)
     box_range = _box_range(stored["workspace"].results) if "workspace" in stored else ""
     computed = {stage: each for stage, each in stored.items() if heads[stage].status != "not_computed"}
     passes = passing(computed, robot)
-    runs = [_run(stage, computed[stage].results) for stage in RUNS if stage in computed]
+    runs = [_run(stage, name, computed[stage].results) for stage in RUNS if stage in computed]
     grasped = _grasped(computed["vision"].results) if "vision" in computed else []
     sound = {run["stage"]: run["sound"] for run in runs} | {"vision": grasped}
     return {
@@ -643,13 +644,12 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         "may_run": table != "fail",
         "decision": decision(table, [*failed.values()], instead, unproven=unproven, same_arm=same_arm),
         "settled": settled,
-        "entries": evidence_section(
-            robot, _evidence(results), _evidence(results.parent / instead) if instead else None
-        ),
+        "entries": entries,
+        "legend": verdict_legend(entries["statuses"]) if entries else [],
         "instead": {instead: f"#{instead}"} if instead else {},
         "dh_instead": {instead: f"#dh-{instead}"} if instead else {},
         "answers": [*_answers(heads, robot, passes.short(sound) if passes else "", box_range)],
-        "notes": {stage: _note(stage, head, stored[stage].results) for stage, head in heads.items()},
+        "notes": {stage: _note(head, [run for run in runs if run["stage"] == stage]) for stage, head in heads.items()},
         "bare": any(
             _misses(heads[stage], "carried") or _misses(heads[stage], "tool") for stage in RUNS if stage in heads
         ),
@@ -691,7 +691,7 @@ def proposed(finding: object) -> dict[str, str]:
     return {"measurement": joined(step, " "), "entry": entry.replace(" ", "")}
 
 
-def _settled(finding: object) -> tuple[bool, str]:
+def _settled(finding: object, evidence: TableEvidence | None) -> tuple[bool, str]:
     """Whether nothing of a table's geometry is settled; and of one that is contradicted by what, of one that is settled
     in part how much, and how far off the tool could be."""
     if isinstance(finding, Contradicted | AnotherArm):
@@ -700,7 +700,9 @@ def _settled(finding: object) -> tuple[bool, str]:
         return False, ""
     part = next((part for part in finding.parts if part.part == "geometry"), None)
     conflict = say(finding.contradiction) if finding.contradiction else ""
-    said = joined([settled_parts(finding), *how_far_off(finding), conflict], " ")
+    sums = joined([each.entry for each in evidence.combinations] if evidence else [], ", ")
+    counted = tr("Counted as one entry, because only the sum matters: {names}.", names=sums) if sums else ""
+    said = joined([settled_parts(finding), counted, *how_far_off(finding), conflict], " ")
     return part is not None and not (part.settled or part.up_to_signs), said
 
 
@@ -708,13 +710,8 @@ def _answers(heads: Mapping[str, Head], robot: Robot, passes: str, box_range: st
     """What is asked of an arm first: the question, its answer and where it is shown; ``box_range``: how high the tray's
     stand may be."""
     workspace = heads["workspace"].summary if "workspace" in heads else None
-    if workspace:
-        box = box_text(workspace)
-        if box and _misses(heads["workspace"], "tool"):
-            bare = tr("No tool is given: the flange's own centre enters the tray. Repeat it with your tool's length.")
-            box = joined([box, bare], " ")
-        box = joined([passes, box, box_range], " ") if box else ""
-        yield tr("Tray"), box, "workspace.html#placement"
+    if isinstance(workspace, WorkspaceSummary):
+        yield tr("Reach"), _reach_text(workspace, bare=_misses(heads["workspace"], "tool")), "workspace.html"
     summary = heads["dynamics"].summary if "dynamics" in heads else None
     yield tr("Payload"), payload_text(summary, robot), "dynamics.html#payload" if summary else ""
     if workspace:
@@ -722,6 +719,31 @@ def _answers(heads: Mapping[str, Head], robot: Robot, passes: str, box_range: st
         if isinstance(workspace, WorkspaceSummary) and workspace.enclosed_voids:
             place = f"#void-{workspace.voids.index(judged_void(workspace)) + 1}"
         yield tr("Void"), void_text(workspace, confirmed=_limits_confirmed(heads)), f"workspace.html{place}"
+    if workspace:
+        box = box_text(workspace)
+        if box and _misses(heads["workspace"], "tool"):
+            bare = tr("No tool is given: the flange's own centre enters the tray. Repeat it with your tool's length.")
+            box = joined([box, bare], " ")
+        box = joined([passes, box, box_range], " ") if box else ""
+        yield tr("Tray"), box, "workspace.html#placement"
+
+
+def _reach_text(summary: WorkspaceSummary, *, bare: bool) -> str:
+    """How far from axis 1 and how high the tool point comes; ``bare``: whether the robot has no tool."""
+    reach = summary.reach_m
+    least, most, low, high = (
+        fixed(1000 * value, 1)
+        for value in (reach.nearest_to_axis, reach.furthest_from_axis, reach.lowest, reach.highest)
+    )
+    point = tr("without a tool: the centre of the flange") if bare else tr("the tool point")
+    return tr(
+        "{least} to {most} mm from axis 1 ({point}), {low} to {high} mm along it; {smallest} to {largest} m³ in all "
+        "(proven).",
+        point=point,
+        **{"most": most, "least": least, "low": low, "high": high},
+        smallest=number(summary.volume_m3.lower),
+        largest=number(summary.volume_m3.upper),
+    )
 
 
 def _box_range(results: Any) -> str:
@@ -857,7 +879,7 @@ def _without_box() -> str:
     )
 
 
-def _run(stage: str, results: TrajectoryResults | ProgramsResults) -> dict[str, Any]:
+def _run(stage: str, robot: str, results: TrajectoryResults | ProgramsResults) -> dict[str, Any]:
     """How many paths or programs there are, which may be run as they are, and why the others may not."""
     followed: Sequence[ProgramSummary | PathSummary]
     if isinstance(results, ProgramsResults):
@@ -871,8 +893,9 @@ def _run(stage: str, results: TrajectoryResults | ProgramsResults) -> dict[str, 
     return {
         "stage": stage,
         "count": len(followed) + lost,
-        "lost": lost,
         "sound": sound,
+        "tally": _tally(stage, len(sound), faults, lost),
+        "links": {fault.name: f"{robot}/{fault.address}" for fault in faults},
         "faults": faults,
         "open": left_out,
         "no_pass": say(NoPass(missed)) if (missed := results.summary.verdict.missed) else "",
@@ -890,6 +913,7 @@ def _otherwise(stage: str, followed: Sequence[ProgramSummary | PathSummary], fau
             "fail",
             tr("not as expected"),
             False,
+            "",
             (FaultMoment(say(each)),),
             "",
             f"{stage}.html#{each.name}",
@@ -899,13 +923,31 @@ def _otherwise(stage: str, followed: Sequence[ProgramSummary | PathSummary], fau
     ]
 
 
-def _note(stage: str, head: Head, results: Any) -> str:
-    """What stands beside a stage's name: how many of its paths or programs pass, where some do not, or that its camera
-    is simulated."""
-    if stage in RUNS and head.status != "not_computed":
-        run = _run(stage, results)
-        return tr("{sound} of {count}", sound=len(run["sound"]), count=run["count"]) if run["faults"] else ""
-    return tr("simulated") if _misses(head, "real_camera") else ""
+def _tally(stage: str, sound: int, faults: Sequence[Fault], lost: int) -> str:
+    """How many paths or programs pass, how many of the others are expected not to, and which others do not."""
+    others, count = [fault for fault in faults if not fault.meant], sound + len(faults) + lost
+    meant = len(faults) - len(others)
+    passing = tr("{sound} of {count} {what} pass in the model", sound=sound, count=count, what=tr(RUNS[stage]))
+    rest = N_("the other one is expected to fail") if meant == 1 else N_("the other {count} are expected to fail")
+    whole = N_("{count} expected to fail") if others or lost else rest
+    named = [tr("{name}: {verdict}", name=fault.name, verdict=fault.verdict) for fault in others[:MAX_TALLIED]]
+    more = tr("{count} more do not pass", count=len(others) - MAX_TALLIED) if len(others) > MAX_TALLIED else ""
+    left = tr("{count} not followed to the end", count=lost) if lost else ""
+    return joined([passing, tr(whole, count=meant) if meant else "", *named, more, left])
+
+
+def _note(head: Head, runs: Sequence[Mapping[str, Any]]) -> str:
+    """What stands beside a stage's name: how many of its paths or programs pass, where some do not, how many targets,
+    paths, programs or objects are expected to fail, or that its camera is simulated."""
+    if head.no_verdict:
+        return ""
+    parts = [
+        tr("{sound} of {count}", sound=len(run["sound"]), count=run["count"])
+        for run in runs
+        if len(run["sound"]) < run["count"]
+    ]
+    parts += [tr("{count} expected to fail", count=head.demonstrations)] if head.demonstrations else []
+    return joined([*parts, tr("simulated") if _misses(head, "real_camera") else ""])
 
 
 def _cell(head: Head) -> dict[str, Any]:

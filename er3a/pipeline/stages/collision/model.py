@@ -54,10 +54,11 @@ class NearestTarget(Finding):
 
 
 class CollidingPath(Finding):
-    """A path on which two bodies overlap, the deepest of them."""
+    """A path on which two bodies overlap, the deepest of them; ``expected``: whether its file expects that."""
 
     name: str
     pair: Pair
+    expected: bool = False
 
 
 class FreeSpace(Finding, code="collision.free_space"):

@@ -661,6 +661,7 @@ def _joints(q_deg: Iterable[float]) -> str:
 
 
 def _listed(values: Iterable[float]) -> str:
-    """Numbers with one decimal where they need it, kept on one line."""
-    texts = (fixed(value, 1).removesuffix(".0") for value in values)
-    return f",{NO_BREAK_SPACE}".join(texts)
+    """Numbers, with one decimal where one of them needs it, kept on one line."""
+    texts = [fixed(value, 1) for value in values]
+    whole = all(text.endswith(".0") for text in texts)
+    return f",{NO_BREAK_SPACE}".join(text.removesuffix(".0") if whole else text for text in texts)

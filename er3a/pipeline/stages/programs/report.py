@@ -12,6 +12,7 @@ from markupsafe import Markup, escape
 
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.collision import solid_rows
+from er3a.pipeline.messages.expectations import as_expected
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.programs import cycle_text, level_word, remedies, remedy_at
 from er3a.pipeline.messages.say import bracketed, say
@@ -86,6 +87,7 @@ def _section(results: model.ProgramsResults, program: model.ProgramSummary) -> d
     return dict(
         program=program,
         status=program.outcome,
+        expected=as_expected(program),
         language=LANGUAGES[program.language].title,
         cycle=cycle_text(program),
         lines=_listing(program, text, rows, motion, found),

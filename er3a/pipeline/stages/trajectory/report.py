@@ -10,11 +10,13 @@ import numpy as np
 
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.collision import solid_rows
+from er3a.pipeline.messages.expectations import as_expected
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import N_, tr, with_unit
 from er3a.pipeline.messages.programs import remedy
-from er3a.pipeline.messages.say import joined, say
+from er3a.pipeline.messages.say import bracketed, joined, say
 from er3a.pipeline.messages.trajectory import (
+    adjoined,
     cause_text,
     event_distance,
     event_word,
@@ -70,7 +72,7 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
             results.programs.take((results.programs.path == path.name) & (i < count and not contradicted)), lines
         )
         drawn = _figure(figure, robot, path, rows, own, summary.near) if i < count else None
-        sections.append(_section(path, rows, drawn, links, summary))
+        sections.append(_section(path, rows, own, drawn, links, summary))
     assumed = [f"J{j + 1}" for j, is_assumed in enumerate(summary.joint_limits.speed_assumed) if is_assumed]
     render_stage(
         study,
@@ -84,6 +86,7 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         clearance=clearance_section(results, count),
         solids=solid_rows(scene),
         assumed=assumed,
+        assumed_speeds=_assumed_speeds(summary.joint_limits, robot),
         limits_assumed=limits_assumed(summary.joint_limits.speed_assumed, summary.joint_limits.acceleration_assumed),
         contradicted=contradicted,
         drawn_paths=count,
@@ -101,6 +104,16 @@ def _tool_points(results: model.TrajectoryResults) -> Iterator[tuple[str, Reals,
         yield path.name, rows.t_s, rows.xyz_mm
 
 
+def _assumed_speeds(limits: model.LimitsUsed, robot: Robot) -> str:
+    """The joint speeds that are assumed, each with its joints."""
+    joints: dict[str, list[str]] = {}
+    for j, (speed, assumed) in enumerate(zip(limits.speed_deg_s, limits.speed_assumed)):
+        if assumed:
+            shown = with_unit(number(speed, 4), "mm/s" if robot.slides[j] else "deg/s")
+            joints.setdefault(shown, []).append(f"J{j + 1}")
+    return joined([bracketed(speed, ", ".join(named)) for speed, named in joints.items()], ", ")
+
+
 def _programs(rows: model.ProgramFiles, head: Sequence[str]) -> list[dict[str, Any]]:
     """The files to save, each with further lines at the beginning of its head."""
     speeds = [
@@ -114,6 +127,7 @@ def _programs(rows: model.ProgramFiles, head: Sequence[str]) -> list[dict[str, A
 def _section(
     path: model.PathSummary,
     rows: model.PathChecks,
+    motions: model.AvoidanceRows,
     figure: dict[str, Any] | None,
     programs: list[dict[str, Any]],
     summary: model.TrajectorySummary,
@@ -125,9 +139,10 @@ def _section(
         status=status.replace("plain", "pass"),
         verdict=verdict,
         kind=kind_word(path.kind),
+        expected=as_expected(path),
         text=joined([path_text(path), say(near) if near else ""]),
         distance=_clear_of(path, assumed),
-        advice=advised(path, rows, summary.joint_limits, assumed=assumed),
+        advice=advised(path, rows, motions, summary.joint_limits, assumed=assumed),
         near=joined([say(near), remedy(near).rstrip(".。")], ". ") if near else "",
         branches=[branch_word(label) for label in path.branches],
         speed=_speed(path, summary.joint_limits),
@@ -195,7 +210,8 @@ def _faults(path: model.PathSummary) -> list[list[str]]:
             cause_text(path, part),
         ]
         for word, part in sorted(
-            ((word, part) for word, stretches in kinds(path) for part in stretches), key=lambda each: each[1].t0_s
+            ((word, part) for word, stretches in kinds(path) for part in adjoined(stretches)),
+            key=lambda each: each[1].t0_s,
         )
     ]
 
