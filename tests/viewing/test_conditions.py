@@ -243,7 +243,7 @@ def test_a_place_that_fewer_motions_meet_is_named():
     assert "With its centre at (350, 500, 400) mm over floor it is in the way of 0 of these." in text
 
 
-def test_the_rows_of_what_meets_the_tray_lead_to_that_moment(monkeypatch):
+def test_the_rows_of_what_meets_the_tray_lead_to_that_moment(monkeypatch, tmp_path):
     """First times by hand, as above; the repair of a path that is clear is compared on its own. Without a place there
     are no marks, which is not the same as no motion in it."""
     paths = SimpleNamespace(paths=named("into", "beside"), not_followed=())
@@ -253,12 +253,12 @@ def test_the_rows_of_what_meets_the_tray_lead_to_that_moment(monkeypatch):
     rows = moving(TrajectoryResults, AvoidanceRows, "path", paths, {"beside": (0.0, 400.0)}).results.avoidance
     rows = replace(rows, strategy=np.full(3, "slow"))
     study = SimpleNamespace(robot=lambda name: load_robot(name), scene=lambda name, stage: None)
-    folder = Path("results/er3a_c60/trajectory")
+    folder = tmp_path / "trajectory"
     stored = SimpleNamespace(
         folder=folder, robot="er3a_c60", stage="trajectory", results=replace(results, avoidance=rows)
     )
     assert tray.in_tray(study, stored) is None
-    monkeypatch.setattr(tray, "is_computed", lambda folder: folder == Path("results/er3a_c60/workspace"))
+    monkeypatch.setattr(tray, "is_computed", lambda folder: folder == tmp_path / "workspace")
     monkeypatch.setattr(tray, "read_stage", lambda folder, stage: placed())
     marked = tray.in_tray(study, stored)
     assert marked.keys() == {"into", "beside, repaired"}
