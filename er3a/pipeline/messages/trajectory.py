@@ -18,7 +18,7 @@ from er3a.pipeline.stages.trajectory import model
 from er3a.planning.motion_faults import JerkTooGreat, RateCause
 from er3a.planning.names import PathVerdict, StrategyName
 
-FIGURES = {
+KEY_FIGURES = {
     "safe": N_("Safe paths, of those meant to be safe"),
     "singular_poses": N_("Singular poses met, on paths meant to be safe (joint moves pass them unharmed)"),
     "near_passes": N_("Near-singular passes, on paths meant to be safe"),

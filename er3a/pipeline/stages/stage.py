@@ -57,6 +57,9 @@ class Stage:
     views : ``record`` (a recording, with its preview) and ``report`` (a page), as far as the stage has them
     rests_on : names of the stages whose verdict its pages say first
     sampled : whether ``compute`` gathers parts that jobs of their own have sampled
+    obstacles : whether it looks for collisions; its page then says that the workspace's box is no obstacle
+    motions : in plural and marked with ``N_``, what its motions are; the index compares them with the box
+    may_run : whether the index says which of its motions may be run
     """
 
     name: str
@@ -71,6 +74,9 @@ class Stage:
     views: tuple[str, ...] = ("record", "report")
     rests_on: tuple[str, ...] = ()
     sampled: bool = False
+    obstacles: bool = False
+    motions: str = ""
+    may_run: bool = False
 
     def module(self, name: str) -> Any:
         """A module of the stage's folder, imported when it is needed."""

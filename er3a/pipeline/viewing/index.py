@@ -489,8 +489,8 @@ def _counts(verdicts: Sequence[StageVerdict]) -> dict[str, str]:
 
 
 SHOWN_FIGURES = 3
-RUNS = {"trajectory": N_("paths"), "programs": N_("programs")}  # stages whose motions may be run or not
-MOVED = RUNS | {"vision": N_("grasps")}  # stages with motions that the box is compared with
+MOTIONS = {name: stage.motions for name, stage in STAGES.items() if stage.motions}
+MAY_RUN = {name: motions for name, motions in MOTIONS.items() if STAGES[name].may_run}
 OF_ALL_RUNS = (  # what may turn any of them unsafe
     *("obstacles", "uncovered_links", "bare_tool", "base_inside", "allowed_contacts", "program_rest", "given_rates"),
     *("controller_language", "tool", "carried", "torques"),
@@ -522,7 +522,7 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         article=study.article is not None,
         questions={stage.name: stage.question for stage in STAGES.values()},
         shown_figures=SHOWN_FIGURES,
-        run_words=RUNS,
+        run_words=MAY_RUN,
         conventions=CONVENTIONS,
         most_faults=MAX_FAULTS,
         sweeps=sweep_sections(study, results),
@@ -625,7 +625,7 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
     box_range = _box_range(stored["workspace"].results) if "workspace" in stored else ""
     computed = {stage: each for stage, each in stored.items() if heads[stage].status != "not_computed"}
     passes = passing(computed, robot)
-    runs = [_run(stage, computed[stage].results) for stage in RUNS if stage in computed]
+    runs = [_run(stage, computed[stage].results) for stage in MAY_RUN if stage in computed]
     grasped = _grasped(computed["vision"].results) if "vision" in computed else []
     sound = {run["stage"]: run["sound"] for run in runs} | {"vision": grasped}
     return {
@@ -643,7 +643,7 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         "answers": [*_answers(heads, robot, passes.short(sound) if passes else "", box_range)],
         "notes": {stage: _note(stage, head, stored[stage].results) for stage, head in heads.items()},
         "bare": any(
-            _misses(heads[stage], "carried") or _misses(heads[stage], "tool") for stage in RUNS if stage in heads
+            _misses(heads[stage], "carried") or _misses(heads[stage], "tool") for stage in MAY_RUN if stage in heads
         ),
         "bodies": [each.name for each in scene.solids] if (scene := study.scene(name, "trajectory")) else [],
         "runs": runs,
@@ -779,7 +779,7 @@ class Passing:
         if not self.through:
             return tr("No path, program or grasp was compared with the place of the tray or box.")
         counts = [
-            tr("{count} of the {passing} {what}", count=len(inside), passing=len(sound[stage]), what=tr(MOVED[stage]))
+            tr("{count} of the {passing} {what}", count=len(inside), passing=len(sound[stage]), what=tr(MOTIONS[stage]))
             for stage, found in self.through.items()
             if (inside := found.keys() & sound[stage])
         ]
@@ -802,7 +802,7 @@ def passing(stored: Mapping[str, Stored[Any]], robot: Robot) -> Passing | None:
     if placement.stand is None and placement.over:
         low[2] = min(low[2], 1000 * placement.over.height_m)
     through, unseen = dict[str, dict[str, float]](), list[str]()
-    for stage in (name for name in MOVED if name in stored):
+    for stage in (name for name in MOTIONS if name in stored):
         results = stored[stage].results
         through[stage] = {}
         for name, t, points in _tool_points(results, robot):
@@ -915,7 +915,7 @@ def _otherwise(stage: str, followed: Sequence[ProgramSummary | PathSummary], fau
 def _note(stage: str, head: Head, results: Any) -> str:
     """What stands beside a stage's name: how many of its paths or programs pass, where some do not, or that its camera
     is simulated."""
-    if stage in RUNS and head.status != "not_computed":
+    if stage in MAY_RUN and head.status != "not_computed":
         run = _run(stage, results)
         return tr("{sound} of {count}", sound=len(run["sound"]), count=run["count"]) if run["faults"] else ""
     return tr("simulated") if _misses(head, "real_camera") else ""
