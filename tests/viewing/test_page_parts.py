@@ -15,7 +15,7 @@ from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.validation.evidence_section import rounded_within, table_to_use
 from er3a.pipeline.study import load_study
 from er3a.pipeline.viewing.index import _PlacesOfPage, write_index
-from er3a.pipeline.viewing.page import Numbering, _box, linked
+from er3a.pipeline.viewing.page import Numbering, _box_edges, linked
 from tests.conftest import ROOT
 
 CALL = re.compile(r"ui\.(picture|table)\((.*)\) \}\}")
@@ -110,9 +110,9 @@ def test_the_index_marks_each_entry_of_a_table_as_validation_found_it(small_resu
 def test_a_box_that_may_be_placed_is_named_where_nothing_recommends_against_it():
     study = load_study(ROOT / "config/config.yaml")
     stored = SimpleNamespace(robot="er3a_c60", rests_on={"validation": "caution"})
-    assert _box(study, stored) == "200 × 150 × 50"
+    assert _box_edges(study, stored) == "200 × 150 × 50"
     stored.rests_on["validation"] = "fail"
-    assert _box(study, stored) == ""
+    assert _box_edges(study, stored) == ""
 
 
 def test_a_place_of_what_was_not_examined_says_so_in_the_search():
