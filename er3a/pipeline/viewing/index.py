@@ -498,8 +498,8 @@ def _counts(verdicts: Sequence[StageVerdict]) -> dict[str, str]:
 
 
 SHOWN_FIGURES = 3
-RUNS = {"trajectory": N_("paths"), "programs": N_("programs")}  # stages whose motions may be run or not
-MOVED = RUNS | {"vision": N_("grasps")}  # stages with motions that the tray is compared with
+MOTIONS = {name: stage.motions for name, stage in STAGES.items() if stage.motions}
+MAY_RUN = {name: motions for name, motions in MOTIONS.items() if STAGES[name].may_run}
 OF_ALL_RUNS = (  # what may turn any of them unsafe
     *("obstacles", "uncovered_links", "bare_tool", "base_inside", "allowed_contacts", "program_rest", "given_rates"),
     *("controller_language", "tool", "carried", "torques"),
@@ -531,7 +531,7 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         article=study.article is not None,
         questions={stage.name: stage.question for stage in STAGES.values()},
         shown_figures=SHOWN_FIGURES,
-        run_words=RUNS,
+        run_words=MAY_RUN,
         conventions=CONVENTIONS,
         most_faults=MAX_FAULTS,
         sweeps=sweep_sections(study, results),
@@ -634,10 +634,10 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
     entries = evidence_section(robot, _evidence(results), _evidence(results.parent / instead) if instead else None)
     box_range = _box_range(stored["workspace"].results) if "workspace" in stored else ""
     computed = {stage: each for stage, each in stored.items() if heads[stage].status != "not_computed"}
-    runs = [_run(stage, name, computed[stage].results) for stage in RUNS if stage in computed]
+    runs = [_run(stage, name, computed[stage].results) for stage in MAY_RUN if stage in computed]
     grasped = _grasped(computed["vision"].results) if "vision" in computed else []
     sound = {run["stage"]: run["sound"] for run in runs} | {"vision": grasped}
-    passes = passing(computed, robot, {stage: study.scene(name, stage) for stage in MOVED}, sound)
+    passes = passing(computed, robot, {stage: study.scene(name, stage) for stage in MOTIONS}, sound)
     return {
         "robot": robot,
         "table": table,
@@ -652,7 +652,7 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         "answers": [*_answers(heads, robot, passes.short(sound) if passes else "", box_range)],
         "notes": {stage: _note(head, [run for run in runs if run["stage"] == stage]) for stage, head in heads.items()},
         "bare": any(
-            _misses(heads[stage], "carried") or _misses(heads[stage], "tool") for stage in RUNS if stage in heads
+            _misses(heads[stage], "carried") or _misses(heads[stage], "tool") for stage in MAY_RUN if stage in heads
         ),
         "bodies": [each.name for each in scene.solids] if (scene := study.scene(name, "trajectory")) else [],
         "runs": runs,
@@ -806,7 +806,7 @@ class Passing:
             return tr("No path, program or grasp was compared with the place of the tray.")
         met = {stage: found.keys() & sound[stage] for stage, found in self.through.items()}
         counts = [
-            tr("{count} of the {passing} {what}", count=len(inside), passing=len(sound[stage]), what=tr(MOVED[stage]))
+            tr("{count} of the {passing} {what}", count=len(inside), passing=len(sound[stage]), what=tr(MOTIONS[stage]))
             for stage, inside in met.items()
             if inside
         ]
@@ -839,7 +839,7 @@ def passing(
     places = trays(stored["workspace"].results) if "workspace" in stored else []
     if not places:
         return None
-    motions = {stage: [*stretches(stored[stage].results, robot)] for stage in MOVED if stage in stored}
+    motions = {stage: [*stretches(stored[stage].results, robot)] for stage in MOTIONS if stage in stored}
     through = {stage: met(robot, places[0], scenes.get(stage), each) for stage, each in motions.items()}
     unseen = [each.name for moved in motions.values() for each in moved if not each.whole]
     for stage in motions:
@@ -916,7 +916,7 @@ def _tally(stage: str, sound: int, faults: Sequence[Fault], lost: int) -> str:
     """How many paths or programs pass, how many of the others are expected not to, and which others do not."""
     others, count = [fault for fault in faults if not fault.meant], sound + len(faults) + lost
     meant = len(faults) - len(others)
-    passing = tr("{sound} of {count} {what} pass in the model", sound=sound, count=count, what=tr(RUNS[stage]))
+    passing = tr("{sound} of {count} {what} pass in the model", sound=sound, count=count, what=tr(MAY_RUN[stage]))
     rest = N_("the other one is expected to fail") if meant == 1 else N_("the other {count} are expected to fail")
     whole = N_("{count} expected to fail") if others or lost else rest
     named = [tr("{name}: {verdict}", name=fault.name, verdict=fault.verdict) for fault in others[:MAX_TALLIED]]

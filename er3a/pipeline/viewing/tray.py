@@ -104,8 +104,8 @@ def _tray(place: PlaceSummary, stand: StandSummary | None) -> Tray:
     return Tray(centre - half, centre + half, stand.height_m if stand and below else None, stand.name if stand else "")
 
 
-def stretches(results: TrajectoryResults | ProgramsResults | VisionResults, robot: Robot) -> Iterator[Stretch]:
-    """The motions of a stage: paths and what repairs them, programs, grasps."""
+def stretches(results: object, robot: Robot) -> Iterator[Stretch]:
+    """The motions of a stage's results: paths and what repairs them, programs, grasps; of others none."""
     if isinstance(results, VisionResults):
         for each in results.summary.objects:
             if each.outcome == "grasped":
@@ -116,7 +116,7 @@ def stretches(results: TrajectoryResults | ProgramsResults | VisionResults, robo
         for program in results.summary.programs:
             motion = results.motion.take(results.motion.program == program.name)
             yield Stretch(program.name, motion.t_s, meant(robot, motion.q_deg), motion.xyz_mm / 1000)
-    else:
+    elif isinstance(results, TrajectoryResults):
         for path in results.summary.paths:
             rows = results.checks.take(results.checks.path == path.name)
             yield Stretch(path.name, rows.t_s, meant(robot, rows.q_deg), rows.xyz_mm / 1000)
