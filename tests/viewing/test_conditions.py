@@ -33,7 +33,9 @@ from er3a.pipeline.stages.workspace import capability_section
 from er3a.pipeline.stages.workspace.entry import BoxTask
 from er3a.pipeline.stages.workspace.model import PlacementSummary, PlaceSummary, StandSummary
 from er3a.pipeline.stages.workspace.tool_capability import task_summary
-from er3a.pipeline.viewing.index import condition, first_inside, passing, proposed
+from er3a.pipeline.viewing import tray
+from er3a.pipeline.viewing.index import condition, passing, proposed
+from er3a.pipeline.viewing.tray import first_inside
 
 TALLY = CheckTally(24)
 TURNED = ToolOff(0.0, 180.0)
@@ -216,11 +218,32 @@ def test_the_index_names_what_passes_through_the_box_or_its_stand(over):
         "trajectory": {"into": pytest.approx(2.75)} | below,
         "programs": {"through": pytest.approx(2.75)},
     }
-    assert found.text.startswith("“Box at”: ")
+    assert found.text.startswith("“In the tray at”: ")
     assert found.text.endswith("Not compared, or not all of it: lost, still.")
     sound = {"trajectory": ["below", "beside"], "programs": ["through", "still"]}
     counts = f"{'1 of the 2 paths, ' if over else ''}1 of the 2 programs"
     assert f"is in the way of {counts} that pass without them" in found.short(sound)
+
+
+def test_the_rows_of_what_passes_through_the_tray_lead_to_that_moment(monkeypatch):
+    """First times by hand, as above; without a place there are no marks, which is not the same as no motion in it."""
+    motions = {"into": (99.0, 424.0), "beside": (101.0, 400.0)}
+    paths = SimpleNamespace(paths=named("into", "beside"), not_followed=())
+    rows = moving(TrajectoryResults, PathChecks, "path", paths, motions).results.checks
+    each = [(name, rows.t_s[rows.path == name], rows.xyz_mm[rows.path == name]) for name in motions]
+    stored = SimpleNamespace(folder=Path("results/er3a_c60/trajectory"))
+    assert tray.in_tray(stored, each) is None
+    monkeypatch.setattr(tray, "is_computed", lambda folder: folder == Path("results/er3a_c60/workspace"))
+    monkeypatch.setattr(tray, "read_stage", lambda folder, stage: placed())
+    marked = tray.in_tray(stored, each)
+    assert marked.keys() == {"into"}
+    assert 'data-play="into"' in marked["into"]
+    assert "in the tray at 2.75 s" in marked["into"]
+    assert tray.in_tray(stored, each[1:]) == {}
+    monkeypatch.setattr(
+        tray, "read_stage", lambda folder, stage: moving(TrajectoryResults, PathChecks, "path", paths, {})
+    )
+    assert tray.in_tray(stored, each) is None
 
 
 def test_grasps_that_pass_through_the_box_are_counted():
@@ -276,7 +299,7 @@ def test_without_motions_or_without_a_place_nothing_is_said_to_be_free():
     assert passing({}, None) is None
     alone = passing({"workspace": placed()}, None)
     assert (alone.short({}), alone.text) == (
-        "No path, program or grasp was compared with the place of the tray or box.",
+        "No path, program or grasp was compared with the place of the tray.",
         "",
     )
     clear = moving(

@@ -220,18 +220,22 @@ def why(
     match state:
         case "never" if assumed:
             return tr(
-                "The assumed shapes are at least {least:.1f} mm apart in every pose ({boxes} boxes).",
+                "The assumed shapes are at least {least:.1f} mm apart in every pose ({boxes} ranges of joint values).",
                 least=least_mm,
                 boxes=boxes,
             )
         case "never":
             return tr(
-                "At least {least:.1f} mm apart in every pose; proven with {boxes} boxes.", least=least_mm, boxes=boxes
+                "At least {least:.1f} mm apart in every pose; proven over {boxes} ranges of joint values.",
+                least=least_mm,
+                boxes=boxes,
             )
         case "allowed" | "watched":
             return tr("Decided in the robot or scene file: {reason}", reason=own_title(reason))
         case "undecided":
-            return tr("Neither proven apart nor found to collide, in {boxes} boxes; checked.", boxes=boxes)
+            return tr(
+                "Neither proven apart nor found to collide, in {boxes} ranges of joint values; checked.", boxes=boxes
+            )
         case "overlaps":
             return tr(
                 "Their shapes overlap in every joint vector tried ({count}), and no joint explains it: correct the "

@@ -96,6 +96,10 @@ GLOSSARY = {
     N_("claim"): N_("what an article says; shown, but no verdict rests on it"),
     N_("margin"): N_("how far something is from a limit, in its unit"),
     N_("capability"): N_("what the tool can do at a place: share of directions, solutions, dexterity"),
+    N_("tray"): N_(
+        "the space, as of a bin or of a pallet's load, for which the workspace page looks for a place: the tool has to "
+        "reach every point of it"
+    ),
     N_("void"): N_("a region that the tool point can't reach: enclosed, or an open pocket"),
     N_("undecided"): N_("what the computed bounds can't decide; never called safe"),
     N_("allowed collision matrix"): N_(

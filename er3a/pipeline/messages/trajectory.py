@@ -21,7 +21,7 @@ from er3a.planning.motion_faults import JerkTooGreat, RateCause
 from er3a.planning.names import PathVerdict, StrategyName
 
 FIGURES = {
-    "safe": N_("Safe paths, of those meant to be safe"),
+    "safe": N_("Paths that pass in the model, of those meant to"),
     "singular_poses": N_("Singular poses met, on paths meant to be safe (joint moves pass them unharmed)"),
     "near_passes": N_("Near-singular passes, on paths meant to be safe"),
     "colliding": N_("Paths with a collision, of those meant to be safe"),

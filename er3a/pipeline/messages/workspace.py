@@ -143,14 +143,14 @@ TEXTS = texts(
         ),
         "workspace.placement_too_long": (
             "Not computed: a pose takes milliseconds with this arm, and within seconds only points wider apart than "
-            "the box could be asked. A larger box or a narrower cone may do."
+            "the tray could be asked. A larger tray or a narrower cone may do."
         ),
         "stand.fits": "On {name}: centre at ({centre}) mm; {reached}.",
         "stand.too_low": "Not on {name}: at {height} mm it is lower than the {lowest} mm that the task allows.",
         "stand.too_small": "Not on {name}: there is no room for it.",
-        "stand.out_of_reach": "Not on {name}: nowhere on it does the tool reach all of the box.",
+        "stand.out_of_reach": "Not on {name}: nowhere on it does the tool reach all of the tray.",
         "stand.in_the_way": (
-            "Not on {name} itself: an arm that reaches all of the box comes within {margin} mm of the scene or of "
+            "Not on {name} itself: an arm that reaches all of the tray comes within {margin} mm of the scene or of "
             "itself."
         ),
         "stand.between": (
@@ -184,22 +184,23 @@ TEXTS = texts(
         ),
         "box.size#turned": "{box} mm, turned by 90 deg (x, y, z: {xyz} mm)",
         "box.size#as_given": "{box} mm (x, y, z)",
-        "box.contradicted": "No place for the box is recommended: evidence contradicts this table.",
-        "box.unknown": "Box of {box} mm: {why}",
-        "box.nowhere": "Box of {box} mm: no place was found where the tool reaches all of it.",
+        "box.contradicted": "No place for the tray is recommended: evidence contradicts this table.",
+        "box.unknown": "Tray of {box} mm: {why}",
+        "box.nowhere": "Tray of {box} mm: no place was found where the tool reaches all of it.",
         "box.put#on": (
-            "Planning only: the box on {name}, its centre at ({centre}) mm. Box: {box}; {reached}. No path or program "
-            "was checked with it: before you run any there, put the box into the study's scene file and run again."
+            "Planning only: the tray on {name}, its centre at ({centre}) mm. Tray: {box}; {reached}. No path or "
+            "program was checked with it: before you run any there, put it into the study's scene file as a box and "
+            "run again."
         ),
         "box.put#over": (
-            "Planning only: the box on a stand {gap} mm high on {name} (top at z = {height} mm), its centre at "
-            "({centre}) mm. Box: {box}; {reached}. No place directly on {none} works. No path or program was checked "
-            "with them: before you run any there, put both into the study's scene file and run again."
+            "Planning only: the tray on a stand {gap} mm high on {name} (top at z = {height} mm), its centre at "
+            "({centre}) mm. Tray: {box}; {reached}. No place directly on {none} works. No path or program was checked "
+            "with them: before you run any there, put both into the study's scene file as boxes and run again."
         ),
         "box.put#free": (
-            "Planning only: the box with its centre at ({centre}) mm; no surface is known there. Box: {box}; "
-            "{reached}. No path or program was checked with it: before you run any there, put the box into the study's "
-            "scene file and run again."
+            "Planning only: the tray with its centre at ({centre}) mm; no surface is known there. Tray: {box}; "
+            "{reached}. No path or program was checked with it: before you run any there, put it into the study's "
+            "scene file as a box and run again."
         ),
         "box.range": (
             "Keep the stand at {gap} mm: heights of {least} to {most} mm pass the same checks, some of them with the "
@@ -218,7 +219,7 @@ TEXTS = texts(
         "box.tilt#down": "tilted up to {cone:g} deg from straight down",
         "box.tilt#along": "tilted up to {cone:g} deg from ({axis})",
         "box.unchecked": (
-            "clearance to the scene was only sampled, collisions with the box and its stand were not checked"
+            "clearance to the scene was only sampled, collisions with the tray and its stand were not checked"
         ),
         "workspace.tool_points_elsewhere": (
             "Nowhere: the arm can't tilt its tool, which points along ({x:.2f}, {y:.2f}, {z:.2f}) and not within the "
@@ -374,7 +375,7 @@ def _(found: model.ToolPointsElsewhere) -> str:
 
 
 def box_text(summary: Summary) -> str:
-    """Where to put the box of the study; empty where places were not looked for."""
+    """Where to put the tray of the study; empty where places were not looked for."""
     placement = getattr(summary, "placement", None)
     if placement is None:
         return ""
@@ -403,7 +404,7 @@ def box_text(summary: Summary) -> str:
 
 
 def _reached(placement: model.PlacementSummary, status: str, form: str, served_from_m: float) -> str:
-    """How much of a box the tool reaches, how it is tilted there, and what was not checked."""
+    """How much of a tray the tool reaches, how it is tilted there, and what was not checked."""
     axis, cone = placement.task.tool_direction, placement.task.cone_deg
     down = tuple(round(each, 6) for each in axis) == (0, 0, -1)
     tilt = sentence("box.tilt#down" if down else "box.tilt#along", cone=cone, axis=", ".join(f"{x:g}" for x in axis))
@@ -413,8 +414,8 @@ def _reached(placement: model.PlacementSummary, status: str, form: str, served_f
 
 
 def range_text(placement: model.PlacementSummary, places: model.BoxPlaces) -> str:
-    """How high the stand of the box may be, and how near to a singular pose and to joint limits the arm comes over that
-    range; empty where no stand is needed or only one height serves."""
+    """How high the stand of the tray may be, and how near to a singular pose and to joint limits the arm comes over
+    that range; empty where no stand is needed or only one height serves."""
     gaps = placement.over.gaps_m if placement.over and not placement.stand else None
     if gaps is None or gaps[1] == gaps[2]:
         return ""
@@ -503,7 +504,7 @@ def millimetres(values: Sequence[float]) -> str:
 
 
 def stand_text(stand: model.StandSummary, placement: model.PlacementSummary) -> str:
-    """Whether the box can stand on a surface; if not why, and how high what would have to stand between them is."""
+    """Whether the tray can stand on a surface; if not why, and how high what would have to stand between them is."""
     named = {"name": stand.name, "height": millimetres([stand.height_m])}
     if stand.place and stand.served_from_m is not None:
         form = "upper" if stand.served_from_m > SERVED_ALL_M else "all"

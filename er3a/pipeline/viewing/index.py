@@ -79,9 +79,10 @@ from er3a.pipeline.sweeps import ENTRIES, entry_label
 from er3a.pipeline.verdicts import NOT_EXAMINED, StageVerdict, read_verdicts
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.figures import new_figure
-from er3a.pipeline.viewing.numbers import fixed, number
+from er3a.pipeline.viewing.numbers import decimals_of, fixed, number
 from er3a.pipeline.viewing.page import PAGES, Head, Picture, alternative_table, head_of, stage_head, status_word
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, MUTED, REFERENCE, VERDICTS
+from er3a.pipeline.viewing.tray import first_inside, placed_tray
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 
@@ -170,10 +171,17 @@ def key_figures(folder: Path, stages: Sequence[str]) -> dict[tuple[str, str, str
         for figure in head.figures:
             value, unit = figure.value, figure.unit
             if figure.part and value is not None:  # the whole differs from robot to robot
-                found[title, figure.label, ""] = f"{number(value)} {unit}"
+                found[title, figure.label, ""] = f"{figure.text} {unit}"
             else:
-                found[title, figure.label, unit] = float(f"{value:.6g}") if isinstance(value, float) else value
+                found[title, figure.label, unit] = _rounded(figure)
     return found
+
+
+def _rounded(figure: page.ShownFigure) -> float | int | None:
+    """The value with the digits that its page shows."""
+    if not isinstance(figure.value, float) or not np.isfinite(figure.value) or not figure.value:
+        return figure.value
+    return round(figure.value, decimals_of(figure.value, figure.uncertainty, figure.measure))
 
 
 def border_mm(workspace: WorkspaceResults | AbsentResults | None) -> list[list[list[float]]]:
@@ -490,7 +498,7 @@ def _counts(verdicts: Sequence[StageVerdict]) -> dict[str, str]:
 
 SHOWN_FIGURES = 3
 RUNS = {"trajectory": N_("paths"), "programs": N_("programs")}  # stages whose motions may be run or not
-MOVED = RUNS | {"vision": N_("grasps")}  # stages with motions that the box is compared with
+MOVED = RUNS | {"vision": N_("grasps")}  # stages with motions that the tray is compared with
 OF_ALL_RUNS = (  # what may turn any of them unsafe
     *("obstacles", "uncovered_links", "bare_tool", "base_inside", "allowed_contacts", "program_rest", "given_rates"),
     *("controller_language", "tool", "carried", "torques"),
@@ -699,7 +707,7 @@ def _settled(finding: object, evidence: TableEvidence | None) -> tuple[bool, str
 
 
 def _answers(heads: Mapping[str, Head], robot: Robot, passes: str, box_range: str) -> Iterator[tuple[str, str, str]]:
-    """What is asked of an arm first: the question, its answer and where it is shown; ``box_range``: how high the box's
+    """What is asked of an arm first: the question, its answer and where it is shown; ``box_range``: how high the tray's
     stand may be."""
     workspace = heads["workspace"].summary if "workspace" in heads else None
     if isinstance(workspace, WorkspaceSummary):
@@ -714,10 +722,10 @@ def _answers(heads: Mapping[str, Head], robot: Robot, passes: str, box_range: st
     if workspace:
         box = box_text(workspace)
         if box and _misses(heads["workspace"], "tool"):
-            bare = tr("No tool is given: the flange's own centre enters the box. Repeat it with your tool's length.")
+            bare = tr("No tool is given: the flange's own centre enters the tray. Repeat it with your tool's length.")
             box = joined([box, bare], " ")
         box = joined([passes, box, box_range], " ") if box else ""
-        yield tr("Tray or box"), box, "workspace.html#placement"
+        yield tr("Tray"), box, "workspace.html#placement"
 
 
 def _reach_text(summary: WorkspaceSummary, *, bare: bool) -> str:
@@ -739,7 +747,7 @@ def _reach_text(summary: WorkspaceSummary, *, bare: bool) -> str:
 
 
 def _box_range(results: Any) -> str:
-    """How high the stand of a box may be; empty where none is proposed."""
+    """How high the stand of a tray may be; empty where none is proposed."""
     placement = getattr(results.summary, "placement", None)
     if not isinstance(placement, PlacementSummary) or not placement.named_places:
         return ""
@@ -764,7 +772,7 @@ def _misses(head: Head, subject: str) -> bool:
 
 @dataclass(frozen=True)
 class Passing:
-    """The tool points that pass through the box where it is proposed, or through what it stands on.
+    """The tool points that pass through the tray where it is proposed, or through what it stands on.
 
     Attributes
     ----------
@@ -784,9 +792,9 @@ class Passing:
             return ""
         inside = tr("Targets in it or its stand: {names}.", names=joined(self.targets, ", ")) if self.targets else ""
         said = [
-            tr("“Box at”: the moment from which the tool point is in the box or its stand.")
+            tr("“In the tray at”: the moment from which the tool point is in the tray or its stand.")
             if any(self.through.values())
-            else tr("No tool point of these was found in the box or its stand."),
+            else tr("No tool point of these was found in the tray or its stand."),
             inside,
             tr(
                 "Only tool points were compared, straight between the stored times; links and the tool's body were not."
@@ -799,7 +807,7 @@ class Passing:
     def short(self, sound: Mapping[str, Sequence[str]]) -> str:
         """How many there are among the names of what passes, per stage."""
         if not self.through:
-            return tr("No path, program or grasp was compared with the place of the tray or box.")
+            return tr("No path, program or grasp was compared with the place of the tray.")
         counts = [
             tr("{count} of the {passing} {what}", count=len(inside), passing=len(sound[stage]), what=tr(MOVED[stage]))
             for stage, found in self.through.items()
@@ -808,21 +816,17 @@ class Passing:
         if not counts:
             return ""
         return tr(
-            "The tray or box, or its stand, is in the way of {runs} that pass without them: the tool point goes "
-            "through.",
+            "The tray or its stand is in the way of {runs} that pass without them: the tool point goes through.",
             runs=joined(counts, ", "),
         )
 
 
 def passing(stored: Mapping[str, Stored[Any]], robot: Robot) -> Passing | None:
-    """What passes through the box of the study where the workspace stage puts it; None if it puts none."""
-    placement = getattr(stored["workspace"].results.summary, "placement", None) if "workspace" in stored else None
-    if not isinstance(placement, PlacementSummary) or not placement.named_places:
+    """What passes through the tray of the study where the workspace stage puts it; None if it puts none."""
+    tray = placed_tray(stored["workspace"].results) if "workspace" in stored else None
+    if tray is None:
         return None
-    centre, half = (1000 * np.array(each) for each in (placement.best.centre_m, placement.best.size_m))
-    low, high = centre - half / 2, centre + half / 2
-    if placement.stand is None and placement.over:
-        low[2] = min(low[2], 1000 * placement.over.height_m)
+    low, high = tray
     through, unseen = dict[str, dict[str, float]](), list[str]()
     for stage in (name for name in MOVED if name in stored):
         results = stored[stage].results
@@ -868,26 +872,9 @@ def _followed(results: TrajectoryResults | ProgramsResults) -> Iterator[tuple[st
         yield path.name, results.checks.take(results.checks.path == path.name)
 
 
-def first_inside(t: Reals, points: Reals, low: Reals, high: Reals) -> float | None:
-    """When a point that moves straight from each of ``points`` (n, 3) at ``t`` (n,) to the next enters a box first.
-
-    ``low``, ``high``: (3,), the box's corners. None if it never does.
-    """
-    way = np.diff(points, axis=0, append=points[-1:])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ends = np.stack([low - points, high - points]) / way
-    ends = np.sort(np.where(np.isnan(ends), [[[-np.inf]], [[np.inf]]], ends), axis=0)  # 0/0: along a face
-    enters, leaves = np.maximum(ends[0].max(axis=1), 0), np.minimum(ends[1].min(axis=1), 1)
-    (hits,) = np.nonzero((enters <= leaves) & np.isfinite(points + way).all(axis=1))
-    if not len(hits):
-        return None
-    row = hits[0]
-    return float(t[row] + enters[row] * (t[min(row + 1, len(t) - 1)] - t[row]))
-
-
 def _without_box() -> str:
     return tr(
-        "These pass without the tray or box and its stand: put both into the study's scene file and run again before "
+        "These pass without the tray and its stand: put both into the study's scene file and run again before "
         "you run any of them there."
     )
 

@@ -153,7 +153,10 @@ class Picture:
 
 @dataclass(frozen=True)
 class ShownFigure:
-    """A key figure in the page's language; the unit of ``part`` of a whole is the whole, in words."""
+    """A key figure in the page's language; the unit of ``part`` of a whole is the whole, in words.
+
+    ``measure`` : the unit as results name it
+    """
 
     name: str
     label: str
@@ -161,6 +164,12 @@ class ShownFigure:
     unit: str
     uncertainty: float | None
     part: bool
+    measure: str
+
+    @property
+    def text(self) -> str:
+        """The value with the digits that matter."""
+        return measured(self.value, self.uncertainty, self.measure)
 
 
 NUMERICS = {  # key figures that answer no question of a verdict
@@ -263,6 +272,7 @@ def head_of(stored: Stored[Any], links: Mapping[str, str] | None = None, pages: 
             tr("of {total}", total=figure.of) if figure.of is not None else tr(figure.unit),
             figure.uncertainty,
             figure.of is not None,
+            figure.unit,
         )
         for figure in stored.results.summary.figures
     )
@@ -396,7 +406,7 @@ def render_stage(
 
 
 def _box(study: Study, stored: Stored[Any]) -> str:
-    """The edges (mm) of the tray or box that the workspace page may place, which no other stage takes for an obstacle;
+    """The edges (mm) of the tray that the workspace page may place, which no other stage takes for an obstacle;
     empty where no place is asked for or recommended."""
     if "workspace" not in study.stages(stored.robot) or stored.rests_on.get("validation") == "fail":
         return ""

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.collision import solid_rows
 from er3a.pipeline.messages.expectations import as_expected
 from er3a.pipeline.messages.kinematics import branch_word
@@ -45,6 +46,7 @@ from er3a.pipeline.viewing.conditions import condition_of, program_head
 from er3a.pipeline.viewing.figures import readings
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import packed_text, render_stage
+from er3a.pipeline.viewing.tray import in_tray
 from er3a.programs.languages import titles_unwritten
 from er3a.programs.writing import with_head_lines
 from er3a.robots.robot import Robot
@@ -78,6 +80,7 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         output,
         head_links={path.name: f"#{path.name}" for path in summary.paths},
         sections=sections,
+        entered=None if contradicted else in_tray(stored, _tool_points(results)),
         faults={fault.name: fault for fault in faults(results)},
         unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
         clearance=clearance_section(results, count),
@@ -92,6 +95,13 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         drawing_head=drawing_head(),
         condition=condition_of(stored.validated),
     )
+
+
+def _tool_points(results: model.TrajectoryResults) -> Iterator[tuple[str, Reals, Reals]]:
+    """Of each path its name, times (n,) in s and tool points (n, 3) in mm."""
+    for path in results.summary.paths:
+        rows = results.checks.take(results.checks.path == path.name)
+        yield path.name, rows.t_s, rows.xyz_mm
 
 
 def _assumed_speeds(limits: model.LimitsUsed, robot: Robot) -> str:
@@ -150,7 +160,7 @@ def _clear_of(path: model.PathSummary, assumed: bool) -> str:
     """How near a path that passes comes to anything, by ``assumed`` shapes; empty where that is not known."""
     if path.clearance is None or path.verdict != "safe":
         return ""
-    far = number(path.clearance.least_mm, 3)
+    far = fixed(path.clearance.least_mm, 1)
     text = N_("{far} mm clear of assumed shapes: {pair}.") if assumed else N_("{far} mm clear: {pair}.")
     return tr(text, far=far, pair=say(path.clearance.between))
 
@@ -212,7 +222,7 @@ def _strategies(path: model.PathSummary) -> list[list[str]]:
         return []
     clearance = _clearance(path.clearance.least_mm if path.clearance else None)
     ratios = _ratio(path.max_joint_speed_ratio), _ratio(path.max_joint_acceleration_ratio)
-    programmed = ["0", "0", *ratios, clearance, fixed(path.duration_s, 2), tr("the path to be repaired")]
+    programmed = ["0.00", "0.00", *ratios, clearance, fixed(path.duration_s, 2), tr("the path to be repaired")]
     rows = [[tr("as programmed"), *programmed]]
     for tried in path.avoidance:
         name = strategy_word(tried.name) + (" ←" if tried.name == path.strategy else "")
@@ -221,7 +231,7 @@ def _strategies(path: model.PathSummary) -> list[list[str]]:
         else:
             rows.append([name, *_costs(tried.motion), _remark(tried, tried.motion)])
     if path.fastest_s and not (path.out_of_limits or path.collisions or path.unreachable):
-        costs = ["0", "0", "1.00", "1.00", clearance, fixed(path.fastest_s, 2)]
+        costs = ["0.00", "0.00", "1.00", "1.00", clearance, fixed(path.fastest_s, 2)]
         remark = tr("for comparison: only with a speed that varies along the path as the limits allow")
         rows.append([tr("the path at its fastest"), *costs, remark])
     return rows
@@ -229,8 +239,8 @@ def _strategies(path: model.PathSummary) -> list[list[str]]:
 
 def _costs(motion: model.StrategyMotion) -> list[str]:
     return [
-        _small(motion.max_deviation_mm),
-        _small(motion.max_deviation_deg),
+        fixed(motion.max_deviation_mm, 2),
+        fixed(motion.max_deviation_deg, 2),
         _ratio(motion.max_joint_speed_ratio),
         _ratio(motion.max_joint_acceleration_ratio),
         _clearance(motion.clearance_mm),
@@ -252,10 +262,6 @@ def _remark(tried: model.TriedStrategy, motion: model.StrategyMotion) -> str:
 
 def _ratio(value: float | None) -> str:
     return tr("no bound") if value is None else fixed(value, 2)
-
-
-def _small(value: float) -> str:
-    return "0" if value < 5e-4 else number(value, 3)
 
 
 def _conclusion(path: model.PathSummary, rows: model.PathChecks) -> str:
@@ -284,12 +290,12 @@ def _speed(path: model.PathSummary, limits: model.LimitsUsed) -> str:
         return "–" if not path.joint_speed_bounded and path.verdict == "unreachable" else tr("unbounded")
     joint = max(range(len(speeds)), key=lambda j: speeds[j] / limits.speed_deg_s[j])
     unit = " mm/s" if joint + 1 in path.sliding else ""
-    return f"{number(speeds[joint], 3)}{unit} (J{joint + 1})"
+    return f"{fixed(speeds[joint], 1)}{unit} (J{joint + 1})"
 
 
 def _event_row(path: str, event: model.Singularity) -> list[str]:
-    until = f" – {fixed(event.until_s, 6)}" if event.until_s > event.t_s else ""
-    when = moment(path, event.t_s, fixed(event.t_s, 6) + until)
+    until = f" – {fixed(event.until_s, 3)}" if event.until_s > event.t_s else ""
+    when = moment(path, event.t_s, fixed(event.t_s, 3) + until)
     if event.crossing:
         return [event_word(event), when, tr("meets it"), "0"]
     return [event_word(event), when, tr("passes by"), event_distance(event)]
