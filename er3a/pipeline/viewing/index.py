@@ -83,7 +83,7 @@ from er3a.pipeline.viewing.figures import new_figure
 from er3a.pipeline.viewing.numbers import decimals_of, fixed, number
 from er3a.pipeline.viewing.page import PAGES, Head, Picture, alternative_table, head_of, stage_head, status_word
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, MUTED, REFERENCE, VERDICTS
-from er3a.pipeline.viewing.tray import Meeting, Tray, compared_with_tray, met, stretches, trays
+from er3a.pipeline.viewing.tray import Meeting, Tray, compared_with_tray, met, scene_of, stretches, trays
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 
@@ -637,7 +637,7 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
     runs = [_run(stage, name, computed[stage].results) for stage in MAY_RUN if stage in computed]
     grasped = _grasped(computed["vision"].results) if "vision" in computed else []
     sound = {run["stage"]: run["sound"] for run in runs} | {"vision": grasped}
-    passes = passing(computed, robot, {stage: study.scene(name, stage) for stage in MOTIONS}, sound)
+    passes = passing(computed, robot, {stage: scene_of(study, name, stage) for stage in MOTIONS}, sound)
     return {
         "robot": robot,
         "table": table,

@@ -140,6 +140,11 @@ def met(robot: Robot, tray: Tray, carried: Scene | None, motions: Iterable[Stret
     return found
 
 
+def scene_of(study: Study, robot: str, stage: str) -> Scene | None:
+    """The scene in which a stage's motions are checked; that of paths counts for programs too."""
+    return study.scene(robot, stage if stage == "vision" else "trajectory")
+
+
 def in_tray(study: Study, stored: Stored[Any]) -> Mapping[str, Markup] | None:
     """Of each motion of a stage that meets the tray when it first does, as a link to that moment; None where the
     robot's workspace stage puts no tray."""
@@ -148,7 +153,7 @@ def in_tray(study: Study, stored: Stored[Any]) -> Mapping[str, Markup] | None:
     if not placed:
         return None
     robot = study.robot(stored.robot)
-    scene = study.scene(stored.robot, stored.stage)
+    scene = scene_of(study, stored.robot, stored.stage)
     firsts = met(robot, placed[0], scene, stretches(stored.results, robot))
     return {
         name: moment(name, each.t, tr("meets the tray at {t:.2f} s: {body}", t=each.t, body=each.body))
