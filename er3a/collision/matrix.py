@@ -24,8 +24,8 @@ proven harmless:
 - *meets*: a joint vector in which they overlap was found, and one in which they don't: checked;
 - *undecided*: none of this within the number of boxes: checked.
 
-Decisions in the robot file (``Robot.pair_rules``) come first. *Allowed* pairs are not checked; but whether they ever
-overlap is determined, and if they do, no verdict passes. *Watched* pairs are checked as a whole.
+Decisions in the robot file (``Robot.pair_rules``) overrule this. *Allowed* pairs are not checked. But they are judged
+as if they weren't allowed, and if that finds an overlap, no verdict passes. *Watched* pairs are checked as a whole.
 """
 
 from __future__ import annotations
@@ -225,8 +225,9 @@ class CollisionMatrix:
 @derived
 def collision_matrix(robot: Robot) -> CollisionMatrix:
     """The matrix of an arm without anything carried."""
-    matrix = matrix_of(robot, list(combinations(arm_bodies(robot), 2)), robot.pair_rules)
-    return matrix if arm_shapes(robot).given else _without_poor_guesses(robot, matrix)
+    matrix = _judged_matrix(robot, list(combinations(arm_bodies(robot), 2)), robot.pair_rules)
+    matrix = matrix if arm_shapes(robot).given else _without_poor_guesses(robot, matrix)
+    return _allowing(matrix, robot.pair_rules)
 
 
 def _without_poor_guesses(robot: Robot, matrix: CollisionMatrix) -> CollisionMatrix:
@@ -244,17 +245,22 @@ def _without_poor_guesses(robot: Robot, matrix: CollisionMatrix) -> CollisionMat
 
 def matrix_of(robot: Robot, pairs: Sequence[tuple[Body, Body]], rules: Sequence[PairRule]) -> CollisionMatrix:
     """Judge pairs of bodies of different links."""
+    return _allowing(_judged_matrix(robot, pairs, rules), rules)
+
+
+def _judged_matrix(robot: Robot, pairs: Sequence[tuple[Body, Body]], rules: Sequence[PairRule]) -> CollisionMatrix:
+    """The same; pairs that are allowed are judged as if they weren't."""
     by_names: dict[tuple[str, str], list[tuple[Body, Body]]] = {}
     for first, second in pairs:
         if first.link != second.link:
             inner, outer = (first, second) if first.link < second.link else (second, first)
             by_names.setdefault((inner.name, outer.name), []).append((inner, outer))
-    decided = {frozenset((rule.first, rule.second)): rule for rule in rules}
+    decided = {frozenset((rule.first, rule.second)): rule for rule in rules if rule.rule == "watch"}
     rows, watched = [], list[tuple[tuple[Body, Body], bool]]()
     for names, bodies in by_names.items():
         rule = decided.get(frozenset(names))
         if rule:
-            found = [_allowed(robot, bodies)] if rule.rule == "allow" else [JudgedPair("watched", tuple(bodies))]
+            found = [JudgedPair("watched", tuple(bodies))]
         else:
             found = _together(robot, judged_pairs(robot, bodies, BOXES), BOXES)
         rows.append(_row(*names, found, rule.reason if rule else ""))
@@ -262,12 +268,27 @@ def matrix_of(robot: Robot, pairs: Sequence[tuple[Body, Body]], rules: Sequence[
     return CollisionMatrix(tuple(rows), tuple(pair for pair, _ in watched), tuple(joined for _, joined in watched))
 
 
-def _allowed(robot: Robot, pairs: Sequence[tuple[Body, Body]]) -> JudgedPair:
-    """An allowed pair, with a joint vector in which its bodies overlap, if in another they don't."""
-    meet = _overlap(robot, pairs).any(axis=1)
-    hidden = meet.any() and not meet.all()
-    q = quasi_random_points(robot.lower, robot.upper, TRIED)
-    return JudgedPair("allowed", witness=q[meet.argmax()] if hidden else None)
+def _allowing(matrix: CollisionMatrix, rules: Sequence[PairRule]) -> CollisionMatrix:
+    """A matrix without the pairs that rules allow; of shapes that can be right, with a joint vector that this hides.
+
+    Two links that a joint joins overlap always, but what is left of them without its region may meet.
+    """
+    allowed = {frozenset((rule.first, rule.second)): rule.reason for rule in rules if rule.rule == "allow"}
+
+    def let(row: MatrixRow, reason: str) -> MatrixRow:
+        witness = None if row.state in ("overlaps", "guessed") else row.witness
+        return replace(row, state="allowed", witness=witness, lower_bound=np.nan, left_out=0.0, reason=reason)
+
+    rows = ((row, allowed.get(frozenset((row.first, row.second)))) for row in matrix.rows)
+    named = [
+        (frozenset(body.name for body in pair), pair, joined) for pair, joined in zip(matrix.watched, matrix.joined)
+    ]
+    kept = [(pair, joined) for names, pair, joined in named if names not in allowed]
+    return CollisionMatrix(
+        tuple(row if reason is None else let(row, reason) for row, reason in rows),
+        tuple(pair for pair, _ in kept),
+        tuple(joined for _, joined in kept),
+    )
 
 
 def judged_pairs(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: int) -> list[JudgedPair]:

@@ -29,8 +29,8 @@ TEXTS = texts(
             "collisions of links that reach out of all shapes: they have none, or look larger than the shapes checked"
         ),
         "left_out.bare_tool": (
-            "collisions of the tool (or bare flange): its point lies outside the last link's shapes, and the scene "
-            "gives it no shape"
+            "collisions of the tool (or bare flange): it reaches out of the last link's shapes, and the scene gives no "
+            "shape to all of it (`carried`)"
         ),
         "left_out.allowed_contacts": "collisions that the scene's or the robot's file allows",
         "left_out.arm_errors": "what the arm's own errors add to a grasp's: the file states none",
