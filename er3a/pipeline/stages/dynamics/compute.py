@@ -370,10 +370,11 @@ def _timings(
 def _wrist_moments(
     arm: LoadedArm, t: Reals, q: Reals, qd: Reals, qdd: Reals, wrist: tuple[int, ...]
 ) -> tuple[model.WristMoment, ...]:
-    """What the load's own mass asks of the wrist's joints."""
+    """What the load's own mass, and the surroundings' forces on the tool, ask of the wrist's joints."""
     if arm.load is None:
         return ()
-    by_load = np.abs(arm.model.rigid_torques(q, qd, qdd) - arm.bare.rigid_torques(q, qd, qdd))
+    by_mass = arm.model.rigid_torques(q, qd, qdd) - arm.bare.rigid_torques(q, qd, qdd)
+    by_load = np.abs(by_mass + arm.model.tool_torques(q))
     off = margins.load_tolerance(arm.model, q, qd, qdd, arm.load_grade)
     most = [(j, int(by_load[:, j - 1].argmax())) for j in wrist]
     return tuple(model.WristMoment(j, float(by_load[at, j - 1]), float(off[at, j - 1]), float(t[at])) for j, at in most)
