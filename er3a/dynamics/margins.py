@@ -208,8 +208,15 @@ def load_tolerance(model: ArmModel, q: Reals, qd: Reals, qdd: Reals, load: Grade
     return _halves(model, (q, qd, qdd), load, load)[-1] if model.load else np.zeros_like(q)
 
 
+AT_ONCE = 10_000  # poses whose regressors are in the memory
+
+
 def _halves(model: ArmModel, motion: tuple[Reals, Reals, Reals], links: Grade, load: Grade) -> list[Reals]:
     """What each body's tolerances add, the load's last."""
+    if len(motion[0]) > AT_ONCE:
+        starts = range(0, len(motion[0]), AT_ONCE)
+        parts = [tuple(each[k : k + AT_ONCE] for each in motion) for k in starts]
+        return [np.concatenate(half) for half in zip(*(_halves(model, (q, v, a), links, load) for q, v, a in parts))]
     Y, halves = model.regressor(*motion), []
     for link, body in model.bodies:
         mass, centre = tolerances_of(body, load if link is None else links)
@@ -274,8 +281,9 @@ def load_moments(robot: Robot, load: Load, gravity: float, q: Reals) -> Reals:
     R, arm = T[:, -1, :3, :3], T[:, -1, None, :3, 3] - T[:, :-1, :3, 3]
     force, moment = R @ np.array(load.force), R @ np.array(load.moment)
     about_axes = np.cross(arm, force[:, None]) + moment[:, None]
-    found: Reals = load.mass * gravity * levers(robot, q, np.array(load.centre))
-    return found + np.abs((T[:, :-1, :3, 2] * about_axes).sum(axis=2))
+    by_tool = np.abs((T[:, :-1, :3, 2] * about_axes).sum(axis=2))
+    found: Reals = load.mass * gravity * levers(robot, q, np.array(load.centre)) + by_tool
+    return found
 
 
 def worst_moments(robot: Robot, load: Load, gravity: float, rows: Sequence[int]) -> tuple[Reals, Reals]:
