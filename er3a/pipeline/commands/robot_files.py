@@ -288,6 +288,8 @@ def hand_eye(
 
     Exit code 1 if the calibration can't be used.
     """
+    import numpy as np
+
     from er3a.files.hand_eye_file import HandEyeFile, read_calibration
     from er3a.files.robot_library import load_robot
     from er3a.files.yaml_file import load
@@ -300,7 +302,9 @@ def hand_eye(
     from er3a.vision.table_corrections import correct_table, zeros_tried
     from er3a.vision.vision_findings import HandEyeError, grave_warnings
 
-    arm, asked = load_robot(robot) if robot else None, load(HandEyeFile, file).table_corrections
+    # What is printed is for the controller, and so in the robot's own base, wherever its file places that.
+    arm = load_robot(robot).replace(base=np.eye(4)) if robot else None
+    asked = load(HandEyeFile, file).table_corrections
     with shown_work(f"{file}: reading the samples") as at:
         samples, offset, images = read_calibration(file, arm)
         open_tilts = ambiguous_tilts(images.views, samples.names) if images else ()
