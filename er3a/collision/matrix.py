@@ -25,14 +25,14 @@ proven harmless:
 - *undecided*: none of this within the number of boxes: checked.
 
 Decisions in the robot file (``Robot.pair_rules``) overrule this. *Allowed* pairs are not checked. But they are judged
-as if they weren't allowed, and if that finds an overlap, no verdict passes. *Watched* pairs are checked as a whole.
+as if they weren't allowed, and if they would be checked then, no verdict passes. *Watched* pairs are checked whole.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from itertools import combinations, product
+from itertools import combinations, compress, product
 from typing import Literal
 
 import numpy as np
@@ -198,7 +198,10 @@ class Held:
 
 @dataclass(frozen=True, eq=False)
 class MatrixRow:
-    """What holds of two links, or of a link and what is carried; as :class:`JudgedPair`, over all of their bodies."""
+    """What holds of two links, or of a link and what is carried; as :class:`JudgedPair`, over all of their bodies.
+
+    ``hides``: that an allowed pair would be watched otherwise.
+    """
 
     first: str
     second: str
@@ -208,6 +211,7 @@ class MatrixRow:
     left_out: float
     boxes: int
     reason: str = ""
+    hides: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,25 +273,24 @@ def _judged_matrix(robot: Robot, pairs: Sequence[tuple[Body, Body]], rules: Sequ
 
 
 def _allowing(matrix: CollisionMatrix, rules: Sequence[PairRule]) -> CollisionMatrix:
-    """A matrix without the pairs that rules allow; of shapes that can be right, with a joint vector that this hides.
+    """A matrix without the pairs that rules allow, of which it says whether that hides anything.
 
     Two links that a joint joins overlap always, but what is left of them without its region may meet.
     """
     allowed = {frozenset((rule.first, rule.second)): rule.reason for rule in rules if rule.rule == "allow"}
+    named = [frozenset(body.name for body in pair) for pair in matrix.watched]
 
-    def let(row: MatrixRow, reason: str) -> MatrixRow:
-        witness = None if row.state in ("overlaps", "guessed") else row.witness
-        return replace(row, state="allowed", witness=witness, lower_bound=np.nan, left_out=0.0, reason=reason)
+    def let(row: MatrixRow, pair: frozenset[str]) -> MatrixRow:
+        witness = row.witness if pair in named else None
+        found = replace(row, state="allowed", witness=witness, lower_bound=np.nan, left_out=0.0)
+        return replace(found, reason=allowed[pair], hides=pair in named)
 
-    rows = ((row, allowed.get(frozenset((row.first, row.second)))) for row in matrix.rows)
-    named = [
-        (frozenset(body.name for body in pair), pair, joined) for pair, joined in zip(matrix.watched, matrix.joined)
-    ]
-    kept = [(pair, joined) for names, pair, joined in named if names not in allowed]
+    rows = ((row, frozenset((row.first, row.second))) for row in matrix.rows)
+    kept = [names not in allowed for names in named]
     return CollisionMatrix(
-        tuple(row if reason is None else let(row, reason) for row, reason in rows),
-        tuple(pair for pair, _ in kept),
-        tuple(joined for _, joined in kept),
+        tuple(let(row, pair) if pair in allowed else row for row, pair in rows),
+        tuple(compress(matrix.watched, kept)),
+        tuple(compress(matrix.joined, kept)),
     )
 
 

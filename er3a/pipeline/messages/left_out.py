@@ -36,9 +36,7 @@ TEXTS = texts(
         "left_out.arm_errors": "what the arm's own errors add to a grasp's: the file states none",
         "left_out.objects_out_of_view": "whether the camera can have seen objects that lie out of its stated view",
         "left_out.unexamined_pairs": "collisions of pairs whose shapes can't be right",
-        "left_out.allowed_pairs": (
-            "collisions of pairs that the robot's file allows: none was seen, or they overlap always"
-        ),
+        "left_out.allowed_pairs": ("collisions of pairs that the robot's file allows: they never meet, or always do"),
         "left_out.joined_pairs": (
             "overlaps of these links where they meet at a joint, and how near they come; the rest of them is examined"
         ),
