@@ -614,7 +614,7 @@ class StepChecker:
         self.motions: dict[int, CheckedMotion] = {}
         self.returns: list[tuple[Ending, found_in.LoopComesBackOtherwise]] = []
         self._joints: list[Reals | None] = []
-        self._before: list[int] = []  # the motion that an arm blends from into the next; -1 for none
+        self._before: list[tuple[int, bool]] = []  # as of _after, by step
         self._known: dict[Hashable, CheckedMotion] = {}
         self._corners: dict[Hashable, tuple[found_in.CheckFinding, ...]] = {}
 
@@ -622,21 +622,30 @@ class StepChecker:
         """Check a step; all earlier steps must have been checked."""
         step = self.execution.steps[number]
         joints = self._joints[step.before] if step.before >= 0 else self.start
-        before = self._before[step.before] if step.before >= 0 else -1
+        before = self._before[step.before] if step.before >= 0 else (-1, False)
         what = step.instruction
         if isinstance(what, instructions.ArmMotion):
             self.motions[number] = motion = self._from_start(self._motion(what, joints), joints)
             joints = motion.end
             self._corner(before, number)
-            before = number
-        elif isinstance(what, instructions.Pause):
-            before = -1
-        elif (isinstance(what, instructions.Unknown) and what.may_move) or (
-            isinstance(what, instructions.MovesBeside) and what.kind != "interrupt"
-        ):
-            joints, before = None, -1
+        elif _is_lost(what):
+            joints = None
         self._joints.append(joints)
-        self._before.append(before)
+        self._before.append(self._after(before, number))
+
+    def _after(self, before: tuple[int, bool], number: int) -> tuple[int, bool]:
+        """The motion that the arm may blend from after a step, -1 for none; and whether it may stop at its target too.
+
+        A wait for which the arm need not stop may be over before the corner, so that it is rounded. So may be that
+        before a motion to where the arm is.
+        """
+        what, motion = self.execution.steps[number].instruction, before[0]
+        if isinstance(what, instructions.ArmMotion):
+            passes = motion >= 0 and self.motions[number].stays and what.zone.kind != "fine"
+            return (motion, True) if passes else (number, False)
+        if isinstance(what, instructions.Pause):
+            return (-1, False) if what.stops else (motion, True)
+        return (-1, False) if _is_lost(what) else before
 
     def _from_start(self, motion: CheckedMotion, joints: Reals | None) -> CheckedMotion:
         """The first motion, with limits that the arm stands beyond before it: no target before says so."""
@@ -885,8 +894,9 @@ class StepChecker:
         moments = {**motion.moments, near: float(along.t[along.closest])}
         return replace(motion, findings=(*motion.findings, near), moments=moments)
 
-    def _corner(self, first: int, second: int) -> None:
-        """Check the corner between two motions if a zone rounds it."""
+    def _corner(self, before: tuple[int, bool], second: int) -> None:
+        """Check the corner between two motions if a zone rounds it; ``before`` as of :meth:`_after`."""
+        first, may_stop = before
         if first < 0:
             return
         motion = self.motions[first]
@@ -900,10 +910,10 @@ class StepChecker:
         if motion.way is not None and after.way is not None:
             findings += self._rounded(motion.way, after.way, motion)
         new = tuple(each for each in findings if each not in motion.findings)
-        self.motions[first] = replace(
-            motion, findings=(*motion.findings, *new), blended_ends=min(motion.blended_ends + 1, 2)
-        )
-        self.motions[second] = replace(self.motions[second], blended_ends=min(self.motions[second].blended_ends + 1, 2))
+        self.motions[first] = replace(motion, findings=(*motion.findings, *new))
+        for number in () if may_stop else (first, second):
+            blended = self.motions[number]
+            self.motions[number] = replace(blended, blended_ends=min(blended.blended_ends + 1, 2))
 
     def _round_corner(
         self, way: MotionPath, after: MotionPath, corners: Reals, shares: tuple[float, float], margin: float = 0.0
@@ -953,6 +963,13 @@ class StepChecker:
                 elif near is not None:
                     found.append(near)
         return tuple(found)
+
+
+def _is_lost(what: instructions.Instruction) -> bool:
+    """Whether it is not known where the arm is after an instruction."""
+    return (isinstance(what, instructions.Unknown) and what.may_move) or (
+        isinstance(what, instructions.MovesBeside) and what.kind != "interrupt"
+    )
 
 
 def _bend(way: MotionPath, first: float, last: float) -> Reals:

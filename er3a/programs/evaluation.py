@@ -10,7 +10,7 @@ import math
 import operator
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TypeGuard
 
 import numpy as np
@@ -197,6 +197,10 @@ class Dialect(ABC):
         """Whether reading an output gives the value that the program set last."""
         return True
 
+    def runs_on(self, name: str) -> bool:
+        """Whether a variable changes by itself after it is set, as a timer does."""
+        return False
+
     def is_followed(self, name: str, value: syntax.Value) -> bool:
         """Whether the effect of setting a variable to a value on motions is simulated."""
         return True
@@ -251,6 +255,7 @@ class ProgramMemory:
     types : declared types by name
     kept : what a language caches until the next assignment
     beside : variables that a concurrent thread changes, so that their values are unclear
+    aliased : variables that now have another name too, by which they may be changed, so that their values are unclear
     here : where the arm is
     doubts : instructions that are not understood, by the variables of motions that they may have set
     cell : what is known of the cell
@@ -265,13 +270,14 @@ class ProgramMemory:
         self.types: dict[str, str] = {}
         self.kept: dict[object, object] = {}
         self.beside: frozenset[str] = frozenset()
+        self.aliased: frozenset[str] = frozenset()
 
     def copy(self) -> ProgramMemory:
         """An independent copy."""
         other = ProgramMemory(self.functions, self.cell)
         other.here = self.here
         other.shared, other.local, other.types = dict(self.shared), dict(self.local), self.types
-        other.beside, other.doubts = self.beside, dict(self.doubts)
+        other.beside, other.aliased, other.doubts = self.beside, self.aliased, dict(self.doubts)
         return other
 
     def lost(self, text: str) -> None:
@@ -281,6 +287,8 @@ class ProgramMemory:
 
     def read(self, name: str) -> syntax.Value | None:
         """The value of a full name, or None."""
+        if self.aliased and root(name) in self.aliased:
+            return syntax.Unclear(f"{name}, which may be changed by another name")
         if name in self.local:
             return self.local[name]
         if self.beside and root(name) in self.beside:
@@ -368,6 +376,15 @@ class ProgramMemory:
                     return None
                 return f"{start}[{','.join(f'{each:g}' for each in found)}]"
         return None
+
+    def settled(self, target: syntax.Expression) -> syntax.Expression:
+        """A variable, field or element with its indices as they are now."""
+        if isinstance(target, syntax.Member):
+            return replace(target, of=self.settled(target.of))
+        if isinstance(target, syntax.Element):
+            indices = tuple(syntax.Constant(self.value(each)) for each in target.indices)
+            return replace(target, of=self.settled(target.of), indices=indices)
+        return target
 
     def value(self, expression: syntax.Expression) -> syntax.Value:
         """The value of an expression."""

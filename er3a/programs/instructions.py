@@ -230,10 +230,16 @@ class ArmMotion(ByValue):
 
 @dataclass(frozen=True, slots=True)
 class Pause:
-    """The arm waits: for so many seconds, for a condition, or for the operator (both None)."""
+    """The program waits: for so many seconds, for a condition, or for the operator (both None).
+
+    Attributes
+    ----------
+    stops : whether the arm is known to stand at its target then, even after a motion with a zone
+    """
 
     seconds: float | None = None
     condition: str | None = None
+    stops: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -126,6 +126,9 @@ def rate_of(value: Value | None, unit: RateUnit, per_unit: float = 1.0) -> Rate 
 START = "%start"
 """Result of the call with which a program begins whose variables are those of its first routine."""
 
+CYCLIC = "%CYCLIC"
+"""What a :class:`Beside` asks for that sets its first argument again and again."""
+
 LanguageName = Literal["krl", "urscript", "rpl", "xpl", "rapid", "csv"]
 
 
@@ -300,12 +303,13 @@ class Move:
 
 @dataclass(frozen=True, slots=True)
 class Waiting:
-    """A wait of so many ``seconds``, or for a condition, or for the operator."""
+    """A wait of so many ``seconds``, or for a condition, or for the operator; ``stops`` as of ``Pause``."""
 
     place: Place
     kind: Literal["seconds", "condition", "operator"]
     of: Expression | None
     text: str
+    stops: bool = False
 
 
 @dataclass(frozen=True, slots=True)

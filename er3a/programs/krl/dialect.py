@@ -11,7 +11,7 @@ import numpy as np
 from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, syntax
 from er3a.programs.code_builder import variable_of
-from er3a.programs.evaluation import IN_DEGREES, Dialect, ProgramMemory, root
+from er3a.programs.evaluation import IN_DEGREES, Dialect, ProgramMemory, known, root
 from er3a.robots.masses import MassBody, moved
 
 FRAME_KEYS = ("X", "Y", "Z", "A", "B", "C")
@@ -316,10 +316,19 @@ def keep_setting(memory: ProgramMemory, name: str, expression: syntax.Expression
             _number(memory, "$BASE", "BASE_DATA", given)
         case "SIPO_MODE":
             memory.write("$IPO_MODE", given)
+        case "SORI_TYP" | "SORI_TYPE":
+            memory.write(name, _typed(given, "ORI_TYP", "#VAR"))
+        case "SCIRC_TYPE" | "SCIRC_TYP":
+            memory.write(name, _typed(given, "CIRC_TYP", "#BASE"))
         case _:
             if name in ("$TOOL", "$BASE"):
                 memory.write(name, syntax.Unclear(f"{expression.function}(...)"))
                 memory.shared.pop(name + "%name", None)
+
+
+def _typed(data: syntax.Value, name: str, usual: str) -> syntax.Value:
+    """How motion data say that the tool turns; as usual where they don't."""
+    return data.get(name) or usual if isinstance(data, syntax.Record) else data
 
 
 def _all_axes(memory: ProgramMemory, name: str, value: syntax.Value) -> None:
@@ -422,8 +431,10 @@ def _zone_data(memory: ProgramMemory, data: syntax.Value, usual: str) -> None:
 
 
 KINDS: dict[str, instructions.MotionKind] = {"PTP": "joint", "LIN": "line", "CIRC": "arc", "SPL": "spline"}
-MODAL = ("$TOOL", "$BASE", "$LOAD", "$VEL", "$ACC", "$APO", "$VEL_AXIS", "$ACC_AXIS", "$IPO_MODE")
+MODAL = ("$TOOL", "$BASE", "$LOAD", "$VEL", "$ACC", "$APO", "$VEL_AXIS", "$ACC_AXIS", "$IPO_MODE", "$ORI_TYPE")
 MODAL_DATA = ("PDAT_ACT", "LDAT_ACT", "FDAT_ACT", "%spline")
+READ_BY_NUMBER = ("TOOL_DATA", "BASE_DATA", "LOAD_DATA", "DEF_VEL_CP", "DEF_ACC_CP")
+"""What ``BAS`` and settings after WITH read without naming it."""
 HARMLESS_TEXT = """
 CAST_FROM CAST_TO CCLOSE CHECKHOME CIOCTL CLEAR_KRLMSG COPEN CREAD CWRITE DELETE_BACKWARD_BUFFER EB EB_ABS EK
 EKI_CHECK EKI_CHECKBUFFER EKI_CLEAR EKI_CLEARBUFFER EKI_CLOSE EKI_GETBOOL EKI_GETBOOLARRAY EKI_GETFRAME
@@ -446,7 +457,7 @@ READING = frozenset(READING_TEXT.split())
 """Functions of a controller that only read their arguments; others, as ``SREAD`` and ``EKI_GETREAL``, may set them."""
 OF_SETTINGS_TEXT = """
 SVEL_CP SVEL_JOINT SACC_CP SACC_JOINT SAPO SAPO_PTP STOOL STOOL2 SBASE SIPO_MODE SJERK SLOAD SGEAR_JERK SORI_TYP
-SORI_TYPE SCIRC_TYPE
+SORI_TYPE SCIRC_TYP SCIRC_TYPE
 """
 OF_SETTINGS = frozenset(OF_SETTINGS_TEXT.split())
 """Functions after WITH, which :func:`keep_setting` reads."""
@@ -459,6 +470,8 @@ $TIMER_FLAG $TIMER_STOP $TORQMON $TORQMON_COM $TORQMON_DEF $TRACE $WBOXDISABLE $
 HARMLESS_VARIABLES = frozenset((*MODAL, *HARMLESS_VARIABLES_TEXT.split()))
 """System variables that are followed, or set nothing but speeds, stops, watches, signals and marks; another may make
 axes soft, shift paths (``$CORR_T``, ``$TECH``) or choose other postures (``$SINGUL_POS``)."""
+RUNNING = ("$CYCFLAG", "$DATE", "$OV_PRO", "$TIMER", "$TIMER_FLAG")
+"""System variables that change after they are set: watches, expressions that are evaluated again and again."""
 ORIENTATION_TYPES = {"$ORI_TYPE": ("#VAR", "#CONSTANT"), "$CIRC_TYPE": ("#BASE",)}
 """How the tool may turn on lines and arcs so that they are followed as they are meant."""
 CONTROLLER: dict[str, syntax.Value] = {
@@ -470,8 +483,10 @@ CONTROLLER: dict[str, syntax.Value] = {
     "$COLLISAVOID": False,
 }
 """What a controller of an arm without other axes has in variables that its own modules ask, if no error has come up."""
-HERE = ("$POS_ACT", "$POS_FOR", "$POS_INT", "$POS_ACT_MES")
-HERE_JOINTS = ("$AXIS_ACT", "$AXIS_FOR", "$AXIS_INT", "$AXIS_ACT_MEAS")
+HERE = ("$POS_ACT", "$POS_FOR", "$POS_ACT_MES")
+HERE_JOINTS = ("$AXIS_ACT", "$AXIS_FOR", "$AXIS_ACT_MEAS")
+WHERE_INTERRUPTED = ("$POS_INT", "$AXIS_INT")
+"""Where the arm was when an interrupt came, which is known nowhere."""
 
 
 BESIDE = 3  # operations
@@ -512,13 +527,14 @@ def _of_number(frame: syntax.Expression | None, number: syntax.Expression | None
 class KrlDialect(Dialect):
     """KRL, as a run needs it."""
 
-    modal = frozenset((*MODAL, *MODAL_DATA))
     frames = ("$TOOL", "$BASE")
     setters = frozenset(("BAS", "PULSE", "%SPLINE", "%ENDSPLINE"))
     whole_division = True
 
     def __init__(self, program: syntax.Program) -> None:
         """Numbers of tool and base count as followed where the frame is set beside each."""
+        changed = {variable_of(each.target) for each in program.operations() if isinstance(each, syntax.Assign)}
+        self.modal = frozenset((*MODAL, *MODAL_DATA, *changed.intersection(READ_BY_NUMBER)))
         self.numbers_only = {
             f"$ACT_{name}"
             for name in ("TOOL", "BASE")
@@ -529,6 +545,10 @@ class KrlDialect(Dialect):
     def is_signal(self, name: str) -> bool:
         """Outputs."""
         return name.startswith(("$OUT[", "$ANOUT["))
+
+    def runs_on(self, name: str) -> bool:
+        """Timers, cyclic flags, the override."""
+        return root(name) in RUNNING
 
     def is_followed(self, name: str, value: syntax.Value) -> bool:
         """Whether motions are followed as a variable asks that is set to a value."""
@@ -613,20 +633,26 @@ class KrlDialect(Dialect):
 
     def motion(self, memory: ProgramMemory, move: syntax.Move) -> instructions.ArmMotion:
         """PTP, LIN, CIRC and their relatives and splines."""
-        kept = {name: memory.shared.get(name) for name in memory.shared if name in _SET} if move.settings else {}
-        angle = None
+        if not move.settings:
+            return self._motion(memory, move, None)
+        own = _SET.union(name for name, _ in move.settings)
+        kept, doubts = {name: value for name, value in memory.shared.items() if name in own}, dict(memory.doubts)
+        angle, doubt = None, ""
         for name, expression in move.settings:
             if name == "CA":
                 degrees = syntax.number(memory.value(expression))
                 angle = math.radians(degrees) if degrees is not None else math.nan
-            else:
-                keep_setting(memory, name, expression)
-        found = self._motion(memory, move, angle)
-        if move.settings:
-            for name in _SET & memory.shared.keys():
-                del memory.shared[name]
-            memory.shared.update({name: value for name, value in kept.items() if value is not None})
-            memory.kept.clear()
+                continue
+            keep_setting(memory, name, expression)
+            value = known(memory.read(name), name)
+            if not self.is_followed(name, value):
+                doubt = f"{name}={syntax.shown(value)}"
+        found = replace(self._motion(memory, move, angle), doubt=doubt)
+        for name in own & memory.shared.keys():
+            del memory.shared[name]
+        memory.shared.update(kept)
+        memory.doubts = doubts
+        memory.kept.clear()
         return found
 
     def _motion(self, memory: ProgramMemory, move: syntax.Move, angle: float | None) -> instructions.ArmMotion:
@@ -675,8 +701,9 @@ class KrlDialect(Dialect):
         """A motion's argument; to go to where the arm is, wherever that is, no joint moves."""
         if argument is None:
             return syntax.Unclear("")
-        here = isinstance(argument, syntax.Variable) and argument.name in HERE + HERE_JOINTS
-        if here and isinstance(memory.value(argument), syntax.Unclear):
+        name = argument.name if isinstance(argument, syntax.Variable) else ""
+        lost = name in WHERE_INTERRUPTED and memory.here.joints is None and memory.here.pose is None
+        if (lost or name in HERE + HERE_JOINTS) and isinstance(memory.value(argument), syntax.Unclear):
             return syntax.Record("E6AXIS", ())
         return memory.value(argument)
 
@@ -703,7 +730,7 @@ class KrlDialect(Dialect):
 
     def harmless(self, call: syntax.Invocation) -> bool:
         """Messages, files, signals."""
-        return call.function in HARMLESS or call.function in EVALUATED or call.function in OF_SETTINGS
+        return call.function in HARMLESS | EVALUATED | OF_SETTINGS or call.function == syntax.CYCLIC
 
 
 def sets_arguments(function: str) -> bool:

@@ -23,7 +23,7 @@ from er3a.programs.code_builder import (
     variable_of,
     within,
 )
-from er3a.programs.instructions import Place
+from er3a.programs.instructions import Aside, Place, Remark
 from er3a.programs.krl.dialect import sets_arguments
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, data_file_of, read_program_text
 from er3a.programs.program_findings import DataFileMissing, NameTwice, ProgramFinding
@@ -115,7 +115,7 @@ PTP LIN CIRC PTP_REL LIN_REL CIRC_REL SPTP SLIN SCIRC SPL SPTP_REL SLIN_REL SCIR
 """
 MOTIONS = frozenset(WORDS_OF_MOTIONS.split())
 WORDS_ASIDE = """
-EXT EXTFCT IMPORT ENUM STRUC CONTINUE ANIN ANOUT BRAKE TIME_BLOCK CONST_VEL ON_ERROR_PROCEED STOP
+EXT EXTFCT IMPORT ENUM STRUC CONTINUE ANOUT BRAKE CONST_VEL ON_ERROR_PROCEED STOP
 """
 ASIDES = frozenset(WORDS_ASIDE.split())
 OUTER_AXES = frozenset(["ASYPTP", "ASYCONT", "ASYSTOP", "ASYCANCEL"])  # which run beside the arm's own
@@ -311,15 +311,42 @@ def _case(reading: _Statement) -> None:
 
 
 def _wait(reading: _Statement) -> None:
-    words = reading.words
+    """The arm stops before a wait, unless a ``CONTINUE`` before it lets the program run ahead of the arm."""
+    words, stops = reading.words, not _runs_ahead(reading.builder)
     if words.accept("SEC"):
         seconds = words.expression()
         words.finish()
-        reading.builder.add(syntax.Waiting(reading.place, "seconds", seconds, reading.text))
+        reading.builder.add(syntax.Waiting(reading.place, "seconds", seconds, reading.text, stops))
         return
     words.expect("FOR")
     text = re.sub(r"(?i)^WAIT\s+FOR\s*", "", reading.text)
-    reading.builder.add(syntax.Waiting(reading.place, "condition", reading.condition(), text))
+    reading.builder.add(syntax.Waiting(reading.place, "condition", reading.condition(), text, stops))
+
+
+def _runs_ahead(builder: CodeBuilder) -> bool:
+    """Whether the last statement, but for comments, is ``CONTINUE``."""
+    said = (each.instruction if isinstance(each, syntax.Fixed) else None for each in reversed(builder.code))
+    last = next((each for each in said if not isinstance(each, Remark)), None)
+    return isinstance(last, Aside) and last.text.upper() == "CONTINUE"
+
+
+def _anin(reading: _Statement) -> None:
+    """``ANIN ON X=20*S1+0`` sets the variable again and again: its value is nowhere known."""
+    if not reading.words.accept("ON"):
+        reading.builder.aside(reading.place, reading.text)
+        return
+    target = reading.words.reference()
+    reading.words.expect("=")
+    reading.builder.beside(reading.place, syntax.Invocation(syntax.CYCLIC, (target,)), reading.text, "interrupt")
+    reading.builder.unclear(reading.place, variable_of(target))
+
+
+def _time_block(reading: _Statement) -> None:
+    """``TIME_BLOCK END=0.05``: the time of a spline's part, in place of the programmed speeds."""
+    if reading.words.accept("END"):
+        reading.builder.unknown(reading.place, reading.text, may_move=False)
+    else:
+        reading.builder.aside(reading.place, reading.text)
 
 
 def _return(reading: _Statement) -> None:
@@ -386,8 +413,10 @@ HANDLERS: dict[str, Handler] = {
     "EXIT": _simple(lambda builder, place: builder.leave_loop(place)),
     "GOTO": _goto,
     "RETURN": _return,
-    "HALT": lambda reading: reading.builder.add(syntax.Waiting(reading.place, "operator", None, "HALT")),
+    "HALT": lambda reading: reading.builder.add(syntax.Waiting(reading.place, "operator", None, "HALT", stops=True)),
     "WAIT": _wait,
+    "ANIN": _anin,
+    "TIME_BLOCK": _time_block,
     "INTERRUPT": _interrupt,
     "TRIGGER": _do,
     "RESUME": lambda reading: reading.builder.unknown(reading.place, reading.text),  # the arm stops where it is

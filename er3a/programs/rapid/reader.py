@@ -743,17 +743,18 @@ class _BodyReader:
             if name in CALLING and placed and placed[-1] is not None:
                 self.late(place, placed[-1], ((), ()), text)
             return
-        if name in LEAVING or (name.startswith("WAIT") and options & ARRIVING):
+        arrives = name.startswith("WAIT") and bool(options & ARRIVING)
+        if name in LEAVING or arrives:
             builder.add(syntax.Assign(place, syntax.Variable(PASSING), syntax.Constant(name in LEAVING), ""))
         if name == "WAITTIME" and placed:
-            builder.add(syntax.Waiting(place, "seconds", placed[0], text))
+            builder.add(syntax.Waiting(place, "seconds", placed[0], text, arrives))
             return
         if name == "CALLBYVAR" and len(placed) == 2 and placed[0] is not None and placed[1] is not None:
             suffix = syntax.Invocation("NUMTOSTR", (placed[1], syntax.Constant(0)))
             self.late(place, syntax.Invocation(ARITHMETIC, (syntax.Constant("+"), placed[0], suffix)), ((), ()), text)
             return
         if name in WAITS:
-            builder.add(syntax.Waiting(place, "condition", None, text))
+            builder.add(syntax.Waiting(place, "condition", None, text, arrives))
         else:
             builder.add(syntax.Doing(place, syntax.Invocation(name, placed, named), text))
         changed = [each for key, each in named if key in ("TIMEFLAG", "VALUE")]
@@ -950,8 +951,9 @@ def _goto(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None
 
 def _stop(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None:
     """Stop, after which the arm rests at its target, and Break, which does not wait for that."""
-    body.builder.add(syntax.Waiting(place, "operator", None, text))
-    body.builder.add(syntax.Assign(place, syntax.Variable(PASSING), syntax.Constant(text[:5].upper() == "BREAK"), ""))
+    breaks = text[:5].upper() == "BREAK"
+    body.builder.add(syntax.Waiting(place, "operator", None, text, stops=not breaks))
+    body.builder.add(syntax.Assign(place, syntax.Variable(PASSING), syntax.Constant(breaks), ""))
 
 
 def _halt(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None:
