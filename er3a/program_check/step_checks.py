@@ -602,6 +602,7 @@ class CheckedMotion(ByValue):
 
 
 MAX_SOLUTIONS = 8  # of a target, to which joint moves are tried
+MAX_MOTIONS_AGAIN = 1_000  # that are checked again after two ways with the same tool pose and other joints have joined
 VIA_TURNS = (20.0, 40.0)  # deg, by which joints are turned away on the way round
 
 
@@ -617,11 +618,14 @@ class StepChecker:
         self._before: list[tuple[int, bool]] = []  # as of _after, by step
         self._known: dict[Hashable, CheckedMotion] = {}
         self._corners: dict[Hashable, tuple[found_in.CheckFinding, ...]] = {}
+        self._following: dict[int, list[int]] = defaultdict(list)
+        for number, step in enumerate(execution.steps):
+            self._following[step.before].append(number)
 
     def check(self, number: int) -> None:
         """Check a step; all earlier steps must have been checked."""
         step = self.execution.steps[number]
-        joints = self._joints[step.before] if step.before >= 0 else self.start
+        joints = self._before_it(number)
         before = self._before[step.before] if step.before >= 0 else (-1, False)
         what = step.instruction
         if isinstance(what, instructions.ArmMotion):
@@ -671,18 +675,73 @@ class StepChecker:
         return target_findings(self.arms, motions, {i: _key(motion) for i, motion in motions.items()})
 
     def close_loop(self, ending: Ending) -> None:
-        """Where a loop begins again: whether the arm stands as it did then, and the corner between the rounds."""
-        if ending.kind != "repeats" or ending.repeats_from is None or ending.step < 0:
+        """Where a way comes to what was followed before: the corner there, and what follows from where the arm stands.
+
+        A loop that comes back otherwise is named. A way that joins another one by the tool's pose alone, as its joints
+        differ, is checked on until they are the same.
+        """
+        if ending.repeats_from is None or ending.step < 0:
             return
-        first = self.execution.steps[ending.repeats_from]
-        then = self._joints[first.before] if first.before >= 0 else self.start
-        now = self._joints[ending.step]
-        if then is not None and now is not None and np.abs(now - then).max() > SAME_JOINTS:
+        at = self.execution.steps[ending.repeats_from].before
+        then, now, before = self._before_it(ending.repeats_from), self._joints[ending.step], self._before[ending.step]
+        loops = ending.kind == "repeats"
+        if then is None or now is None or not _apart(then, now):
+            self._checked_on(at, then, before)
+        elif loops or not self._checked_on(at, now, before):
             joint = int(np.argmax(np.abs(now - then)))
             other = joint_shown(self.arms.robot, joint, float(now[joint] - then[joint]))
             self.returns.append((ending, found_in.LoopComesBackOtherwise(joint + 1, *other)))
-        if isinstance(first.instruction, instructions.ArmMotion):
-            self._corner(self._before[ending.step], ending.repeats_from)
+            if loops:
+                self._checked_on(at, then, before)
+
+    def _before_it(self, number: int) -> Reals | None:
+        """Joints (n,) before a step, rad; None if not known."""
+        before = self.execution.steps[number].before
+        return self._joints[before] if before >= 0 else self.start
+
+    def _checked_on(self, at: int, joints: Reals | None, before: tuple[int, bool]) -> bool:
+        """Check what follows a step from other joints, or after another motion, until both make no difference.
+
+        Returns
+        -------
+        done : False where that takes too many motions
+        """
+        steps = self.execution.steps
+        last = self.motions.get(before[0])
+        waiting = [(number, joints, before, last) for number in self._following[at]]
+        count = 0
+        while waiting:
+            number, joints, before, last = waiting.pop()
+            what, same = steps[number].instruction, not _apart(joints, self._before_it(number))
+            if isinstance(what, instructions.ArmMotion):
+                if (count := count + 1) > MAX_MOTIONS_AGAIN:
+                    return False
+                motion = self.motions[number] if same else self._motion(what, joints)
+                self._add(number, motion.findings, motion.moments)
+                if last is not None:
+                    self._add(before[0], self._corner_findings(last, motion))
+                if same:
+                    continue
+                joints, last = motion.end, motion
+            elif _is_lost(what) or (same and before[0] < 0):
+                continue
+            after = self._after(before, number)
+            last = last if after[0] >= 0 else None
+            waiting += [(each, joints, after, last) for each in self._following[number]]
+        return True
+
+    def _add(
+        self,
+        number: int,
+        findings: Iterable[found_in.CheckFinding],
+        moments: Mapping[found_in.CheckFinding, float] | None = None,
+    ) -> None:
+        """Add what is new of findings to those of a motion."""
+        motion = self.motions[number]
+        new = tuple(each for each in dict.fromkeys(findings) if each not in motion.findings)
+        if new:
+            moments = {**(moments or {}), **motion.moments}
+            self.motions[number] = replace(motion, findings=(*motion.findings, *new), moments=moments)
 
     def joint_moves_instead(self, number: int) -> tuple[Reals, ...]:
         """Joint moves (n,), one or two, that take the tool where a motion does and pass its checks; empty if none was
@@ -900,20 +959,22 @@ class StepChecker:
         if first < 0:
             return
         motion = self.motions[first]
-        zone = motion.placed.motion.zone
-        if zone.kind == "fine":
+        if motion.placed.motion.zone.kind == "fine":
             return
-        after = self.motions[second]
-        findings: list[found_in.CheckFinding] = []
-        if zone.kind in ("named", "velocity"):
-            findings.append(found_in.ZoneWithoutSize(zone.text))
-        if motion.way is not None and after.way is not None:
-            findings += self._rounded(motion.way, after.way, motion)
-        new = tuple(each for each in findings if each not in motion.findings)
-        self.motions[first] = replace(motion, findings=(*motion.findings, *new))
+        self._add(first, self._corner_findings(motion, self.motions[second]))
         for number in () if may_stop else (first, second):
             blended = self.motions[number]
             self.motions[number] = replace(blended, blended_ends=min(blended.blended_ends + 1, 2))
+
+    def _corner_findings(self, motion: CheckedMotion, after: CheckedMotion) -> list[found_in.CheckFinding]:
+        """Findings on the corner between two motions if a zone rounds it."""
+        zone = motion.placed.motion.zone
+        findings: list[found_in.CheckFinding] = []
+        if zone.kind in ("named", "velocity"):
+            findings.append(found_in.ZoneWithoutSize(zone.text))
+        if zone.kind != "fine" and motion.way is not None and after.way is not None:
+            findings += self._rounded(motion.way, after.way, motion)
+        return findings
 
     def _round_corner(
         self, way: MotionPath, after: MotionPath, corners: Reals, shares: tuple[float, float], margin: float = 0.0
@@ -963,6 +1024,11 @@ class StepChecker:
                 elif near is not None:
                     found.append(near)
         return tuple(found)
+
+
+def _apart(a: Reals | None, b: Reals | None) -> bool:
+    """Whether joints (n,), rad, that are known both, differ."""
+    return a is not None and b is not None and bool(np.abs(a - b).max() > SAME_JOINTS)
 
 
 def _is_lost(what: instructions.Instruction) -> bool:

@@ -209,6 +209,10 @@ class Dialect(ABC):
         """The variable after whose next assignment motions no longer depend on one that is not simulated."""
         return name
 
+    def typed(self, kind: str, value: syntax.Value) -> syntax.Value:
+        """What a variable of a declared kind, empty for none, holds after a value is assigned to it."""
+        return value
+
     def assigned(self, old: syntax.Value, new: syntax.Value) -> syntax.Value:
         """The value of a variable after an assignment."""
         return new
@@ -308,6 +312,15 @@ class ProgramMemory:
         else:
             self.shared[name] = value
 
+    def declare(self, name: str, kind: str, local: bool) -> None:
+        """The type of a variable; a parameter of a routine takes it where that declares it."""
+        if not local:
+            self.types[name] = kind
+            return
+        self.local[f"{name}%type"] = kind
+        if name in self.local:
+            self.local[name] = self.typed(name, self.local[name])
+
     def assign(self, target: syntax.Expression, value: syntax.Value, local: bool = False) -> None:
         """Assign a value to a variable, field or element."""
         if isinstance(target, syntax.Member) and self._set_field(target, value):
@@ -321,7 +334,7 @@ class ProgramMemory:
         if key is not None:
             if "[" in key:
                 self._forget_overlapping(key)
-            self.write(key, self._typed(key, value), local)
+            self.write(key, self.typed(key, value, local), local)
         else:  # an element changes, but which one is not known: none of its list is known from here
             while isinstance(target, (syntax.Member, syntax.Element)):
                 target = target.of
@@ -446,8 +459,12 @@ class ProgramMemory:
             return of.having(of.items[place][0], value)
         return (*of[:place], value, *of[place + 1 :])
 
-    def _typed(self, key: str, value: syntax.Value) -> syntax.Value:
-        kind = self.types.get(root(key), "")
+    def typed(self, key: str, value: syntax.Value, local: bool = False) -> syntax.Value:
+        """A value as the type of the variable is that it is assigned to."""
+        name = root(key)
+        own = local or name in self.local
+        kind = str(self.local.get(f"{name}%type", "")) if own else self.types.get(name, "")
+        value = self.functions.typed(kind, value)
         if not isinstance(value, bool) and isinstance(value, (int, float)):
             if kind in ("REAL", "LREAL") and not isinstance(value, float):
                 return float(value)

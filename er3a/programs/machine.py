@@ -273,10 +273,12 @@ def _gathered(program: syntax.Program, own: dict[str, set[str]]) -> dict[str, se
 
 
 def _changed(operation: syntax.Operation) -> Iterator[str]:
+    """Variables that an operation may change, but for a parameter that is declared, or given its type's parts."""
     if isinstance(operation, syntax.Assign):
         value = operation.value
-        if not (operation.local and isinstance(value, syntax.Invocation) and operation.target in value.arguments):
-            yield target_name(operation.target)  # but of a parameter that is given the names of its type's parts
+        itself = operation.local and isinstance(value, syntax.Invocation) and operation.target in value.arguments
+        if value is not None and not itself:
+            yield target_name(operation.target)
     elif isinstance(operation, syntax.Call):  # parameters may go both ways
         yield from (name for each in operation.arguments for name in names(each))
 
@@ -683,7 +685,7 @@ class Machine:
 
     def _assign(self, memory: ProgramMemory, each: syntax.Assign) -> instructions.Output | instructions.Unknown | None:
         if each.type_name and isinstance(each.target, syntax.Variable):
-            memory.types[each.target.name] = each.type_name
+            memory.declare(each.target.name, each.type_name, each.local)
         if each.value is None:
             if isinstance(each.target, syntax.Variable) and each.target.name not in memory.local:
                 memory.write(each.target.name, syntax.Unset(each.target.name), each.local)
@@ -849,7 +851,9 @@ class Machine:
 
     def _return(self, way: ExecutionPath, operation: syntax.Return) -> None:
         memory = way.memory
-        value: syntax.Value = syntax.Unclear("a value") if operation.value is None else memory.value(operation.value)
+        value: syntax.Value = syntax.Unclear("a value")
+        if operation.value is not None:
+            value = memory.typed(syntax.RETURNED, memory.value(operation.value))
         frame = way.frames.pop()
         aliased, memory.aliased = memory.aliased, frame.aliased
         memory.local = way.frames[-1].local

@@ -126,6 +126,9 @@ def rate_of(value: Value | None, unit: RateUnit, per_unit: float = 1.0) -> Rate 
 START = "%start"
 """Result of the call with which a program begins whose variables are those of its first routine."""
 
+RETURNED = "%returned"
+"""Variable of a routine whose declared type is that of its value."""
+
 CYCLIC = "%CYCLIC"
 """What a :class:`Beside` asks for that sets its first argument again and again."""
 

@@ -18,6 +18,8 @@ FRAME_KEYS = ("X", "Y", "Z", "A", "B", "C")
 AXIS_KEYS = ("A1", "A2", "A3", "A4", "A5", "A6")
 AXIS_KINDS = ("AXIS", "E6AXIS")
 EXTERNAL_KEYS = ("E1", "E2", "E3", "E4", "E5", "E6")
+COORDINATES = frozenset((*FRAME_KEYS, *AXIS_KEYS, *EXTERNAL_KEYS))
+POSITION_KINDS = ("FRAME", "POS", "E6POS", *AXIS_KINDS)
 SIGN_ZERO = 1e-7  # rad; nearer to 0 a joint's sign says nothing
 NOT_NUMBERS = ("NAN", "INF", "INFINITY")
 Frames = tuple[instructions.NamedFrame, instructions.NamedFrame]
@@ -457,15 +459,16 @@ READING = frozenset(READING_TEXT.split())
 """Functions of a controller that only read their arguments; others, as ``SREAD`` and ``EKI_GETREAL``, may set them."""
 OF_SETTINGS_TEXT = """
 SVEL_CP SVEL_JOINT SACC_CP SACC_JOINT SAPO SAPO_PTP STOOL STOOL2 SBASE SIPO_MODE SJERK SLOAD SGEAR_JERK SORI_TYP
-SORI_TYPE SCIRC_TYP SCIRC_TYPE
+SORI_TYPE SCIRC_TYP SCIRC_TYPE SCIRC_M USE_CM_PRO_VALUES USE_CM_PRO_VALUES_ONLY
 """
 OF_SETTINGS = frozenset(OF_SETTINGS_TEXT.split())
 """Functions after WITH, which :func:`keep_setting` reads."""
 HARMLESS_VARIABLES_TEXT = """
-$ACCU_STATE $ADVANCE $ANOUT $AXWORKSPACE $CMD $CP_STATMON $CP_VEL_TYPE $CYCFLAG $CYCLE $DATE
-$ECO_LEVEL $ERR $EXT $FLAG $GEAR_JERK $H_POS $I_O_ACT $JERK $LOOP_MSG $MSG_T $OUT $OUT_NODRIVE $OV_APPL $OV_PRO $OV_ROB
-$PERI_RDY $PRO_ACT $PRO_MODE $PRO_STATE $RED_VEL $SOFT_PLCBOOL $SOFT_PLCINT $SOFT_PLCREAL $STOPNOAPROX $TIMER
-$TIMER_FLAG $TIMER_STOP $TORQMON $TORQMON_COM $TORQMON_DEF $TRACE $WBOXDISABLE $WORKSPACE
+$ACCU_STATE $ACC_EXTAX $ADVANCE $ANOUT $AXWORKSPACE $BWDSTART $CMD $COLLMON_TOL_PRO $CP_STATMON $CP_VEL_TYPE
+$CYCFLAG $CYCLE $DATE $ECO_LEVEL $ERR $EXT $FLAG $GEAR_JERK $H_POS $I_O_ACT $JERK $LOAD_A1 $LOAD_A2 $LOAD_A3
+$LOOP_MSG $MSG_T $OUT $OUT_NODRIVE $OV_APPL $OV_PRO $OV_ROB $PERI_RDY $PRO_ACT $PRO_MODE $PRO_STATE $RED_VEL
+$SOFT_PLCBOOL $SOFT_PLCINT $SOFT_PLCREAL $STOPNOAPROX $TIMER $TIMER_FLAG $TIMER_STOP $TORQMON $TORQMON_COM
+$TORQMON_DEF $TRACE $VEL_EXTAX $WBOXDISABLE $WORKSPACE
 """
 HARMLESS_VARIABLES = frozenset((*MODAL, *HARMLESS_VARIABLES_TEXT.split()))
 """System variables that are followed, or set nothing but speeds, stops, watches, signals and marks; another may make
@@ -567,6 +570,16 @@ class KrlDialect(Dialect):
     def named(self, name: str) -> bool:
         """Tool and base keep the name of what they are set to."""
         return name in ("$TOOL", "$BASE")
+
+    def typed(self, kind: str, value: syntax.Value) -> syntax.Value:
+        """Coordinates are REAL, however they are written; a field of the program's own type is what it declares."""
+        if not isinstance(value, syntax.Record) or kind not in ("", *POSITION_KINDS):
+            return value
+        items = (
+            (key, float(each) if isinstance(each, int) and key in COORDINATES and not isinstance(each, bool) else each)
+            for key, each in value.items
+        )
+        return syntax.Record(value.kind, tuple(items))
 
     def assigned(self, old: syntax.Value, new: syntax.Value) -> syntax.Value:
         """A position that leaves out what the variable had: no source says whether the controller keeps that."""

@@ -431,6 +431,12 @@ def _spline(reading: _Statement) -> None:
     form = "ENDSPLINE" if reading.text.upper().startswith("ENDSPLINE") else "SPLINE"
     begins = form == "SPLINE" and reading.words.accept("WITH")
     reading.builder.settings = tuple(reading.with_settings()) if begins else ()
+    if form == "ENDSPLINE" and reading.words.accept("C_SPL"):  # the zone of the block's last motion
+        code = reading.builder.code
+        at = next((i for i in reversed(range(len(code))) if isinstance(code[i], syntax.Move)), -1)
+        if at >= 0 and isinstance(last := code[at], syntax.Move):
+            code[at] = replace(last, words=(*last.words, "C_SPL"))
+    reading.words.finish()
     call = syntax.Invocation(f"%{form}", ())
     reading.builder.add(syntax.Doing(reading.place, call, reading.text))
 
@@ -606,10 +612,10 @@ class _KrlReader:
             builder.remark(place, comment)
 
     def _begin(self, kind: str, text: str, place: Place) -> CodeBuilder:
-        words = KrlWords(text)
+        words, returned = KrlWords(text), ""
         try:
             if kind == "DEFFCT":
-                words.name()
+                returned = words.name()
                 if words.accept("["):
                     words.arguments("]")
             name = words.name()
@@ -626,7 +632,10 @@ class _KrlReader:
                     break
         except MisreadError as error:
             raise fault(place, f"this head of a routine can't be read ({error})", "Write DEF NAME ( )") from None
-        return CodeBuilder(name, tuple(parameters), place)
+        builder = CodeBuilder(name, tuple(parameters), place)
+        if returned:
+            builder.add(syntax.Assign(place, syntax.Variable(syntax.RETURNED), None, "", returned, local=True))
+        return builder
 
 
 def split_comment(line: str, place: Place) -> tuple[str, str]:
