@@ -539,6 +539,7 @@ MAX_MOTION_SHARE = 0.5  # that a zone may take
 TOLERANCE = 1e-9
 SAME_JOINTS = 1e-4  # rad
 BEND_PARTS = 16
+NEAR_PARTS = 129
 
 
 @dataclass(frozen=True, eq=False)
@@ -618,6 +619,7 @@ class StepChecker:
         self._before: list[tuple[int, bool]] = []  # as of _after, by step
         self._known: dict[Hashable, CheckedMotion] = {}
         self._corners: dict[Hashable, tuple[found_in.CheckFinding, ...]] = {}
+        self._again = 0  # motions that were checked from other joints
         self._following: dict[int, list[int]] = defaultdict(list)
         for number, step in enumerate(execution.steps):
             self._following[step.before].append(number)
@@ -709,12 +711,12 @@ class StepChecker:
         steps = self.execution.steps
         last = self.motions.get(before[0])
         waiting = [(number, joints, before, last) for number in self._following[at]]
-        count = 0
         while waiting:
             number, joints, before, last = waiting.pop()
             what, same = steps[number].instruction, not _apart(joints, self._before_it(number))
             if isinstance(what, instructions.ArmMotion):
-                if (count := count + 1) > MAX_MOTIONS_AGAIN:
+                self._again += not same
+                if self._again > MAX_MOTIONS_AGAIN:
                     return False
                 motion = self.motions[number] if same else self._motion(what, joints)
                 self._add(number, motion.findings, motion.moments)
@@ -722,11 +724,12 @@ class StepChecker:
                     self._add(before[0], self._corner_findings(last, motion))
                 if same:
                     continue
-                joints, last = motion.end, motion
+                joints = motion.end
             elif _is_lost(what) or (same and before[0] < 0):
                 continue
             after = self._after(before, number)
-            last = last if after[0] >= 0 else None
+            if after[0] != before[0]:
+                last = motion if after[0] == number else None
             waiting += [(each, joints, after, last) for each in self._following[number]]
         return True
 
@@ -1004,7 +1007,10 @@ class StepChecker:
             found.append(found_in.ZoneTooLarge(zone.value * 1000, min(way.length, after.length) * 1000))
         if self.obstacles is None or motion.clearance is None or motion.clearance < 0:
             return tuple(found)
-        share_before, share_after = (min(share, MAX_MOTION_SHARE) for share in shares)
+        share_before, share_after = (
+            max(min(share, MAX_MOTION_SHARE), _share_near(zone, part, at_end))
+            for share, part, at_end in zip(shares, (way, after), (True, False))
+        )
         corners = np.stack(
             [
                 way.joints_at(np.array(1 - share_before)),
@@ -1057,6 +1063,16 @@ def _zone_share(motion: instructions.ArmMotion, way: MotionPath) -> float:
         case "share":
             return min(zone.value, 1.0) * MAX_MOTION_SHARE
     return MAX_MOTION_SHARE
+
+
+def _share_near(zone: instructions.Zone, way: MotionPath, at_end: bool) -> float:
+    """The share of a joint move, at most half, on which the tool is within its zone's distance of the corner."""
+    if zone.kind != "distance" or way.tool_path is not None:
+        return 0.0
+    shares = np.linspace(0.0, MAX_MOTION_SHARE, NEAR_PARTS)
+    points = forward(way.arm, way.joints_at(1 - shares if at_end else shares))[:, :3, 3]
+    beyond = np.flatnonzero(np.linalg.norm(points - points[0], axis=1) > zone.value)
+    return float(shares[beyond[0]]) if beyond.size else MAX_MOTION_SHARE
 
 
 def _vias(arm: Robot, start: Reals, end: Reals) -> Reals:

@@ -259,7 +259,7 @@ class ProgramMemory:
     types : declared types by name
     kept : what a language caches until the next assignment
     beside : variables that a concurrent thread changes, so that their values are unclear
-    aliased : variables that now have another name too, by which they may be changed, so that their values are unclear
+    aliased : variables that may be changed now under another name, or by a handler, so that their values are unclear
     here : where the arm is
     doubts : instructions that are not understood, by the variables of motions that they may have set
     cell : what is known of the cell
@@ -292,7 +292,7 @@ class ProgramMemory:
     def read(self, name: str) -> syntax.Value | None:
         """The value of a full name, or None."""
         if self.aliased and root(name) in self.aliased:
-            return syntax.Unclear(f"{name}, which may be changed by another name")
+            return syntax.Unclear(f"{name}, which may be changed elsewhere")
         if name in self.local:
             return self.local[name]
         if self.beside and root(name) in self.beside:

@@ -567,7 +567,7 @@ class Machine:
         entry = self.program.routines.get(self.program.entry)
         if entry is not None:
             frame = Frame(entry)
-            memory.local = frame.local
+            memory.local, memory.aliased = frame.local, entry.unsettled
             self.waiting.append(ExecutionPath([frame], memory))
         while self.waiting:
             self._follow(self.waiting.pop())
@@ -788,9 +788,10 @@ class Machine:
         calls = (*way.frames[-1].calls, call.place)
         way.frames.append(Frame(routine, 0, local, calls, call.result, outs, memory.aliased))
         memory.local = local
+        memory.aliased |= routine.unsettled
         if self.aliased:
             memory.aliased |= self.aliased.get(call, frozenset())
-            memory.kept.clear()
+        memory.kept.clear()
 
     def _start(self, way: ExecutionPath, start: syntax.Beside) -> None:
         """Follow a routine that moves the arm beside the program, on a way that begins here.

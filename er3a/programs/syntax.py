@@ -351,6 +351,7 @@ class Routine:
     Attributes
     ----------
     thread : whether it runs beside the program, so that a run of the program does not carry it out
+    unsettled : variables that a handler of its errors may change at any time
     """
 
     name: str
@@ -358,6 +359,7 @@ class Routine:
     code: tuple[Operation, ...]
     place: Place
     thread: bool = False
+    unsettled: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -993,6 +993,20 @@ def test_a_corner_is_looked_at_unless_the_arm_surely_stops_there(tmp_path, name,
     assert "motion_collides" not in codes(found)
 
 
+@pytest.mark.long
+def test_all_of_a_joint_move_within_a_zones_distance_is_looked_at(tmp_path):
+    """The elbow comes out straight: the tool hardly moves at the end, so the zone is a quarter of the move."""
+    at = np.eye(4)
+    at[:3, 3] = [0.3595, 0.0468, 0.5475]
+    scene = Scene("ball", (Sphere("ball", at, 0.002),))
+    joints = ["{A1 0,A2 0,A3 -43,A4 0,A5 0,A6 0}", "{A1 0,A2 -70,A3 77,A4 0,A5 0,A6 0} C_DIS"]
+    joints.append("{A1 80,A2 -70,A3 77,A4 0,A5 0,A6 0}")
+    body = f"{FRAMES}{SLOW}$APO.CDIS=50\n" + "\n".join(f"PTP {each}" for each in joints)
+    start = np.radians([0, 0, -43, 0, 0, 0])
+    found = check(tmp_path, krl(body), "a.src", scene=scene, measures=True, start=start)
+    assert codes(found)["zone_collides"] == [9]
+
+
 def test_a_wait_after_a_stop_is_no_corner(tmp_path):
     text = (CORNER["a.pgm"] % "DWELL(0.1);").replace("z95", "fine")
     found = check(tmp_path, text, "a.pgm")
@@ -1072,3 +1086,83 @@ def test_the_worst_of_what_rounds_find_at_an_instruction_leads(tmp_path):
 def test_numbers_are_of_the_type_that_is_declared(tmp_path, body, more, wanted):
     found = motions(tmp_path, krl(f"PTP {axes(HOME)}\n{body}", more), "a.src")[-1]
     assert np.degrees(found.target.joints[0]) == pytest.approx(wanted)
+
+
+# What RAPID's handlers, traps and functions change
+
+
+AT_P = "[[400,0,300],[0,1,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
+
+
+def rapid(body: str, more: str = "", data: str = "") -> str:
+    """A module whose main begins at home."""
+    head = f"MODULE a\nCONST robtarget p:={AT_P};\nVAR num n:=1;\nVAR bool b;\n{data}PROC main()\n"
+    home = "MoveAbsJ [[0,-10,-10,0,-70,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v50,fine,tool0;\nConfL\\Off;\n"
+    return f"{head}{home}{body}\nENDPROC\n{more}ENDMODULE\n"
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "WaitAI ai1\\GT,5\\MaxTime:=4\\ValueAtTimeout:=n;",
+        'sub1 StrToVal("40",n);',
+        'WHILE StrToVal("40",n) DO\nn:=1;\nENDWHILE',
+        'TEST StrToVal("40",n)\nCASE TRUE:\nSetDO do1,1;\nENDTEST',
+        'IF StrToVal("40",n) SetDO do1,1;',
+        'b:=StrToVal("40",n);',
+        "BitSet n,5;",
+        "BitClear n,5;",
+    ],
+)
+def test_what_an_instruction_or_function_may_change_has_no_value(tmp_path, line):
+    more = "PROC sub1(bool c)\nENDPROC\n"
+    found = motions(tmp_path, rapid(f"{line}\nMoveL Offs(p,0,n,0),v100,fine,tool0;", more), "a.mod")
+    assert isinstance(found[-1].target, UnresolvedTarget)
+
+
+@pytest.mark.parametrize("local", [True, False])
+def test_what_a_handler_sets_has_no_value(tmp_path, local):
+    handler = "ERROR\nIF ERRNO=ERR_WAIT_MAXTIME THEN\noff:=-400;\nRETRY;\nENDIF"
+    data = "VAR num off:=0;\n"
+    lines = "WaitDI di1,1\\MaxTime:=2;\nMoveL Offs(p,0,0,off),v100,fine,tool0;\nMoveL Offs(p,0,n,0),v100,fine,tool0;\n"
+    text = rapid(lines + handler, data="" if local else data)
+    text = text.replace("PROC main()\n", f"PROC main()\n{data}") if local else text
+    _, off, kept = motions(tmp_path, text, "a.mod")
+    assert isinstance(off.target, UnresolvedTarget)
+    assert not isinstance(kept.target, UnresolvedTarget)
+
+
+@pytest.mark.parametrize(
+    ("own", "caller", "leaves"),
+    [
+        ("ERROR\nIF ERRNO=ERR_WAIT_MAXTIME RETURN;\n", "", True),
+        ('ERROR\nTPWrite "late";\n', "", True),
+        ("ERROR\nTRYNEXT;\n", "", False),
+        ("ERROR\nRETRY;\n", "", False),
+        ("", "ERROR\nTRYNEXT;", True),
+        ("", "", False),
+    ],
+)
+def test_a_routine_that_an_error_ends_is_followed(tmp_path, own, caller, leaves):
+    sub = "PROC sub1()\nMoveL p,v100,fine,tool0;\nWaitDI di1,1\\MaxTime:=2;\nMoveL Offs(p,0,0,100),v100,fine,tool0;\n"
+    text = rapid(f"sub1;\nMoveL Offs(p,0,50,0),v100,fine,tool0;\n{caller}", f"{sub}{own}ENDPROC\n")
+    found = check(tmp_path, text, "a.mod")
+    assert (len(found.execution.endings) > 1) == leaves
+    lines = [each for each in found.motions.values() if each.kind == "line"]
+    assert len({tuple(np.round(np.append(each.start, each.end), 6)) for each in lines}) == 3 + leaves
+
+
+@pytest.mark.parametrize("word", ["ExitCycle", "RAISE my_err"])
+def test_a_trap_that_ends_the_cycle_or_the_routine_is_named(tmp_path, word):
+    more = f"TRAP t1\n{word};\nENDTRAP\n"
+    body = "CONNECT i1 WITH t1;\nISignalDI di1,1,i1;\nMoveL p,v100,fine,tool0;"
+    found = check(tmp_path, rapid(body, more, "VAR intnum i1;\n"), "a.mod")
+    assert codes(found)["moves_beside"] == [9]
+    assert codes(found)["may_move"] == [14]
+
+
+def test_a_position_that_is_read_after_continue_is_not_known(tmp_path):
+    line = f"{AT_START}$APO.CDIS=20\nLIN {{X 400,Y 0,Z 300,{DOWN}}} C_DIS\n%sF=$POS_ACT\nLIN F"
+    ahead, stopped = (motions(tmp_path, krl(f"FRAME F\n{line % each}"), "a.src")[-1] for each in ("CONTINUE\n", ""))
+    assert isinstance(ahead.target, UnresolvedTarget)
+    assert not isinstance(stopped.target, UnresolvedTarget)

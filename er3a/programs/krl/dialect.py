@@ -746,9 +746,10 @@ class KrlDialect(Dialect):
         return call.function in HARMLESS | EVALUATED | OF_SETTINGS or call.function == syntax.CYCLIC
 
 
-def sets_arguments(function: str) -> bool:
-    """Whether a function outside the program may set the variables that it is given: KRL passes them by reference."""
-    return not function.startswith("%") and function not in EVALUATED | OF_SETTINGS | READING
+def changed_arguments(call: syntax.Invocation) -> tuple[syntax.Expression | None, ...]:
+    """What a function outside the program may change: all that it is given, as KRL passes by reference."""
+    name = call.function
+    return () if name.startswith("%") or name in EVALUATED | OF_SETTINGS | READING else call.arguments
 
 
 _SET = frozenset(

@@ -24,7 +24,7 @@ from er3a.programs.code_builder import (
     within,
 )
 from er3a.programs.instructions import Aside, Place, Remark
-from er3a.programs.krl.dialect import sets_arguments
+from er3a.programs.krl.dialect import HERE, HERE_JOINTS, changed_arguments
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, data_file_of, read_program_text
 from er3a.programs.program_findings import DataFileMissing, NameTwice, ProgramFinding
 
@@ -228,6 +228,8 @@ class _Statement:
         if words.accept("="):
             value = words.expression()
             words.finish()
+            if _runs_ahead(self.builder) and any(_names(value, each) for each in (*HERE, *HERE_JOINTS)):
+                value = syntax.Constant(syntax.Unclear(f"{self.text} after CONTINUE"))
             self.builder.add(syntax.Assign(self.place, left, value, self.text))
             return
         words.finish()
@@ -321,6 +323,12 @@ def _wait(reading: _Statement) -> None:
     words.expect("FOR")
     text = re.sub(r"(?i)^WAIT\s+FOR\s*", "", reading.text)
     reading.builder.add(syntax.Waiting(reading.place, "condition", reading.condition(), text, stops))
+
+
+def _names(expression: syntax.Expression, name: str) -> bool:
+    """Whether a variable is in an expression."""
+    own = isinstance(expression, syntax.Variable) and expression.name == name
+    return own or any(_names(each, name) for each in syntax.inner(expression))
 
 
 def _runs_ahead(builder: CodeBuilder) -> bool:
@@ -524,7 +532,7 @@ def read_krl(source: ProgramText) -> syntax.Program:
             findings += more
     if data_file is None and lacks_data(routines, reader.data, CONFIG_NAMES):
         findings.append(DataFileMissing(source.path.with_suffix(".dat").name))
-    by_name, unlinked = linked([*called, *routines], sets_arguments)
+    by_name, unlinked = linked([*called, *routines], changed_arguments)
     return syntax.Program(
         "krl",
         source.path.stem,
