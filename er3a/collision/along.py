@@ -319,6 +319,36 @@ def _touch(
     return Touch(motion.bodies.pairs[k], start, -float(distances[deepest]), at)
 
 
+STEP = 0.02
+"""Of joints, rad or m, between moments at which a stored motion is compared with solids."""
+
+
+def first_overlap(bodies: Bodies, t: Reals, q: Reals) -> tuple[float, Pair] | None:
+    """When a motion that goes straight from row to row first overlaps a solid of the scene, and with what; None if it
+    never does at the rows and every STEP between them.
+
+    Parameters
+    ----------
+    t : (n,), s
+    q : (n, joints), rad or m; rows that are not finite are left out, with what is beside them
+    """
+    around = np.flatnonzero(bodies.second < 0)
+    steps = np.abs(np.diff(q, axis=0, append=q[-1:])).max(axis=1)
+    counts = np.where(np.isfinite(steps), np.maximum(np.ceil(steps / STEP), 1), 1).astype(int)
+    row = np.repeat(np.arange(len(t)), counts)
+    share = (np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)) / counts[row]
+    after = np.minimum(row + 1, len(t) - 1)
+    tried = np.where(share[:, None] > 0, q[row] + share[:, None] * (q[after] - q[row]), q[row])
+    known = np.flatnonzero(np.isfinite(tried).all(axis=1))
+    found = bodies.overlaps(tried[known])[:, around]
+    (hits,) = np.nonzero(found.any(axis=1))
+    if not len(hits):
+        return None
+    at = known[hits[0]]
+    moment = t[row[at]] + share[at] * (t[after[at]] - t[row[at]])
+    return float(moment), bodies.pairs[around[found[hits[0]].argmax()]]
+
+
 @dataclass(frozen=True, eq=False)
 class Clearance:
     """Smallest distances of arms.

@@ -44,6 +44,7 @@ from er3a.collision.pairs import Pair
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import arm_shapes, enlarged_by, link_frames
 from er3a.errors import PoseError
+from er3a.geometry.transforms import rotation_angle
 from er3a.geometry.vectors import TURN
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.chain import row_values
@@ -66,7 +67,7 @@ from er3a.program_check.motion_checks import (
 from er3a.programs import instructions
 from er3a.programs.execution import Ending, Execution
 from er3a.programs.writing import solutions_meant
-from er3a.robots.joint_limits import joint_shown, within
+from er3a.robots.joint_limits import equivalents_within, joint_shown, within
 from er3a.robots.robot import Robot
 
 FLANGE = "tool0"
@@ -81,14 +82,15 @@ class PlacedMotion(ByValue):
     ----------
     arm : the robot with the motion's tool; without one where the tool is not known
     base : T_world_base of the targets (4, 4); None where the base is not known
-    missing, taken : frames that are not given
+    missing : frames that are not given
+    taken : frames that were taken for ones that are not given, or not wholly
     """
 
     motion: instructions.ArmMotion
     arm: Robot
     base: Reals | None
     missing: tuple[found_in.FrameNotGiven, ...]
-    taken: tuple[found_in.FrameTakenAsFlange, ...]
+    taken: tuple[found_in.FrameTakenAsFlange | found_in.FrameOfSeveral, ...]
 
     @property
     def needed(self) -> tuple[found_in.FrameNotGiven, ...]:
@@ -106,18 +108,22 @@ class Arms:
     def placed(self, motion: instructions.ArmMotion) -> PlacedMotion:
         """A motion placed in the world, with the frames that are unknown."""
         missing: list[found_in.FrameNotGiven] = []
-        taken: tuple[found_in.FrameTakenAsFlange, ...] = ()
+        taken: list[found_in.FrameTakenAsFlange | found_in.FrameOfSeveral] = []
         arm, base = self.robot, motion.base.pose
         if motion.tool.pose is not None:
             arm = self._with(motion.tool.pose)
+            taken += [found_in.FrameOfSeveral(motion.tool.name, "tool")] if motion.tool.one_of_several else []
         elif motion.tool.name == FLANGE:
-            arm, taken = self._with(np.eye(4)), (found_in.FrameTakenAsFlange(FLANGE),)
+            arm = self._with(np.eye(4))
+            taken.append(found_in.FrameTakenAsFlange(FLANGE))
         elif motion.tool.name:
             missing.append(found_in.FrameNotGiven(motion.tool.name, "tool", needed=False))
         if base is None and motion.base.name:
             missing.append(found_in.FrameNotGiven(motion.base.name, "base", needed=False))
+        if base is not None and motion.base.one_of_several:
+            taken.append(found_in.FrameOfSeveral(motion.base.name, "base"))
         known = None if base is None and motion.base.name else self.robot.base @ (np.eye(4) if base is None else base)
-        return PlacedMotion(motion, arm, known, tuple(missing), taken)
+        return PlacedMotion(motion, arm, known, tuple(missing), tuple(taken))
 
     def _with(self, tool: Reals) -> Robot:
         key = tool.tobytes()
@@ -175,9 +181,9 @@ def _solved(placed: PlacedMotion, target: instructions.PoseTarget, pose: Reals, 
     except PoseError:
         return Goal(None, None, False, (found_in.TargetNotGiven("", "not_finite"),))
     if not len(found.q):
-        return Goal(None, pose, True, (*placed.taken, found_in.TargetOutOfReach(found.unsolved)))
+        return Goal(None, pose, True, (*placed.taken, found_in.TargetOutOfReach(found.unsolved, bool(target.external))))
     rows = found.q[found.within_limits] if found.within_limits.any() else found.q
-    findings: list[found_in.CheckFinding] = list(placed.taken)
+    findings: list[found_in.CheckFinding] = []
     joint = placed.motion.kind == "joint"
     met = np.ones(len(rows), np.bool_)
     if target.branch is not None and joint:
@@ -194,7 +200,7 @@ def _solved(placed: PlacedMotion, target: instructions.PoseTarget, pose: Reals, 
         findings.append(found_in.ConfigurationGuessed(different))
     start = np.zeros(rows.shape[1]) if reference is None else reference
     away = np.abs(rows - start).max(axis=1)
-    return Goal(rows[int(away.argmin())], pose, True, tuple(findings))
+    return Goal(rows[int(away.argmin())], pose, True, (*placed.taken, *findings))
 
 
 def _different(rows: Reals) -> int:
@@ -262,7 +268,8 @@ def _of_poses(group: list[tuple[int, PlacedMotion]]) -> dict[int, tuple[found_in
         elif (reasons := reasons + 1) <= MAX_REASONS:
             findings[number] = goal_of(placed, placed.motion.target, None).findings
         else:
-            findings[number] = (found_in.TargetOutOfReach(()),)
+            outer = getattr(placed.motion.target, "external", ())
+            findings[number] = (found_in.TargetOutOfReach((), bool(outer)),)
     return findings
 
 
@@ -750,8 +757,9 @@ class StepChecker:
         """Joint moves (n,), one or two, that take the tool where a motion does and pass its checks; empty if none was
         found, and of arms with prismatic joints.
 
-        The first that passes is taken: straight to the solution nearest to the start, or else round by the middle of
-        both with some joints turned away. They are checked at the share of full speed that is assumed.
+        The first that passes is taken: straight to the solution on the way to which the tool turns least, of like ones
+        the nearest to the start, or else round by the middle of both with some joints turned away. They are checked at
+        the share of full speed that is assumed.
         """
         checked = self.motions[number]
         goal = self._goal_pose(checked)
@@ -761,8 +769,11 @@ class StepChecker:
             found = inverse(checked.placed.arm, goal, checked.start, self_motion_rows=True)
         except PoseError:
             return ()
-        rows = self._free(checked.placed, _as_written(found.q[found.within_limits]))
-        rows = rows[np.argsort(np.abs(rows - checked.start).max(axis=1), kind="stable")][:MAX_SOLUTIONS]
+        arm, inside = checked.placed.arm, found.q[found.within_limits]
+        rows = np.concatenate([inside[:0], *(equivalents_within(arm, q, checked.start) for q in inside)])
+        rows = self._free(checked.placed, _as_written(rows))
+        away, turns = np.abs(rows - checked.start).max(axis=1), _turns(arm, checked.start, rows)
+        rows = rows[np.lexsort((away, np.round(turns / LIKE_TURNS)))][:MAX_SOLUTIONS]
         if len(rows) and np.abs(rows[0] - checked.start).max() < SAME_JOINTS:
             return ()  # the tool is there already: no move is needed
         straight = [(row,) for row in rows]
@@ -814,6 +825,8 @@ class StepChecker:
         placed = self.arms.placed(motion)
         goal = goal_of(placed, motion.target, before)
         findings: list[found_in.CheckFinding] = [*goal.findings, *_said(motion)]
+        if motion.kind != "joint":  # the tool's path depends on it even between joint targets
+            findings += [each for each in placed.taken if each not in findings]
         if motion.angle is not None and not np.isfinite(motion.angle):
             return CheckedMotion(
                 motion.kind, placed, before, None, None, (*findings, found_in.ArcGoesOn(None, turns=False))
@@ -1087,6 +1100,17 @@ def _vias(arm: Robot, start: Reals, end: Reals) -> Reals:
 def _as_written(q: Reals) -> Reals:
     """Joint angles (..., n) in rad, rounded to 0.001 deg, as reports state them."""
     found: Reals = np.radians(np.round(np.degrees(q), 3))
+    return found
+
+
+LIKE_TURNS = np.radians(30.0)
+
+
+def _turns(arm: Robot, start: Reals, ends: Reals) -> Reals:
+    """The largest turn (k,), rad, of the tool from where it is, on joint moves to ``ends`` (k, n)."""
+    share = np.linspace(0, 1, 33)[:, None, None]
+    R = forward(arm, start + share * (ends - start))[..., :3, :3]
+    found: Reals = rotation_angle(R[0], R).max(axis=0)
     return found
 
 

@@ -439,7 +439,20 @@ class ProgramMemory:
             found = None if key is None else self.read(key)
             if found is None and isinstance(of, syntax.Unclear):
                 return syntax.Unclear(key or of.text)
-        return syntax.Unclear(self.key(expression) or "an element") if found is None else found
+        return syntax.Unclear(self._shown(expression)) if found is None else found
+
+    def _shown(self, target: syntax.Expression) -> str:
+        """A variable, field or element as text, with indices that are not known by their variables."""
+        match target:
+            case syntax.Variable(name=name):
+                return name
+            case syntax.Member(of=of, name=name):
+                return f"{self._shown(of)}.{name}"
+            case syntax.Element(of=of, indices=indices):
+                numbers = [syntax.number(self.value(each)) for each in indices]
+                shown = (self._shown(i) if n is None else f"{n:g}" for i, n in zip(indices, numbers))
+                return f"{self._shown(of)}[{','.join(shown)}]"
+        return "?"
 
     def _with_element(self, target: syntax.Element, value: syntax.Value) -> syntax.Value | None:
         """The list or record that an element belongs to, with that element changed; None if it belongs to none."""

@@ -19,7 +19,8 @@ from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.pipeline.messages.programs import say
 from er3a.program_check.check_program import CheckOptions, check_program
-from er3a.programs.instructions import JointTarget, UnresolvedTarget, numbers_of
+from er3a.programs.csv_program import write_csv
+from er3a.programs.instructions import JointTarget, NamedFrame, UnresolvedTarget, numbers_of
 from testing.arms import palletiser
 from testing.program_texts import (
     FAR,
@@ -1166,3 +1167,63 @@ def test_a_position_that_is_read_after_continue_is_not_known(tmp_path):
     ahead, stopped = (motions(tmp_path, krl(f"FRAME F\n{line % each}"), "a.src")[-1] for each in ("CONTINUE\n", ""))
     assert isinstance(ahead.target, UnresolvedTarget)
     assert not isinstance(stopped.target, UnresolvedTarget)
+
+
+ONE_TOOL = "[TRUE,[[0,0,100],[1,0,0,0]],[1,[0,0,0],[1,0,0,0],0,0,0]]"
+TOOLS = f"VAR num n;\nPERS tooldata tools{{2}}:=[{ONE_TOOL},{ONE_TOOL}];\n"
+STEP = "MoveL [[300,50,200],[0,1,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v50,fine,tools{n};"
+
+
+@pytest.mark.parametrize(
+    ("file", "text", "name"),
+    [
+        ("a.src", krl("INT n\n$BASE=$NULLFRAME\nn=$IN[3]\n$TOOL=TOOL_DATA[n]\nLIN_REL {Z 1}"), "TOOL_DATA[N]"),
+        ("a.mod", f"MODULE a\n{TOOLS}PROC main()\nn:=GInput(gi1);\n{STEP}\nENDPROC\nENDMODULE\n", "tools[n]"),
+    ],
+)
+def test_one_frame_given_for_every_index_is_a_caution(tmp_path, file, text, name):
+    found = check(tmp_path, text, file, frames={name: np.eye(4)})
+    said = [each for each in found.findings if each.finding.code == "frame_of_several"]
+    assert [(each.level, each.finding.name, each.finding.frame) for each in said] == [("caution", name, "tool")]
+
+
+@pytest.mark.parametrize(("name", "several"), [("TOOL_DATA[12]", False), ("wobj{1, 2}", False), ("tool (old)", False)])
+def test_frames_with_numbers_are_one_each(name, several):
+    assert NamedFrame(name).one_of_several is several
+
+
+FAR_AWAY = "MoveL [[{x},0,400],[0,1,0,0],[0,0,0,0],[{track},9E9,9E9,9E9,9E9,9E9]],v50,fine,tool0;"
+
+
+@pytest.mark.parametrize(("track", "level"), [("1500", "caution"), ("9E9", "fail")])
+@pytest.mark.parametrize("reached", [True, False])
+def test_reach_is_not_decided_where_external_axes_were_left_out(tmp_path, track, level, reached):
+    line = FAR_AWAY.format(x=3000, track=track)
+    near = "" if reached else f"{FAR_AWAY.format(x=400, track='9E9')}\n"
+    text = f"MODULE a\nPROC main()\n{near}{line}\nENDPROC\nENDMODULE\n"
+    found = check(tmp_path, text, "a.mod", **({} if reached else {"most_motions": 1}))
+    said = {each.finding.code: each.level for each in found.findings}
+    assert said.get("way_out_of_reach", said.get("target_out_of_reach")) == level
+
+
+@pytest.mark.parametrize(
+    ("moved_mm", "turned_deg", "said"), [(0.0, 0.0, None), (0.0, 2.0, (0.0, 2.0)), (30.0, 0.0, (30.0, 0.0))]
+)
+def test_a_table_whose_poses_are_another_arms_is_a_caution(tmp_path, moved_mm, turned_deg, said):
+    joints = np.linspace(HOME, NEAR, 4)
+    poses = np.linalg.inv(ROBOT.base) @ forward(ROBOT, joints)
+    poses[2, 0, 3] += moved_mm / 1000
+    poses[2, :3, :3] = Rotation.from_euler("z", turned_deg, degrees=True).as_matrix() @ poses[2, :3, :3]
+    found = check(tmp_path, write_csv(np.arange(4.0), np.degrees(joints), poses), "a.csv")
+    named = [each for each in found.findings if each.finding.code == "tool_stated_elsewhere"]
+    if said is None:
+        assert not named
+    else:
+        (one,) = named
+        assert (one.level, one.place.line) == ("caution", 4)
+        np.testing.assert_allclose((one.finding.moved_mm, one.finding.turned_deg), said, atol=1e-5)
+
+
+def test_a_tables_pose_columns_that_are_not_all_there_are_named(tmp_path):
+    table = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,x_mm,yaw_deg\n0,-10,-10,0,-70,0,400,0\n"
+    assert codes(check(tmp_path, table, "a.csv"))["program_not_understood"] == [1, 1]

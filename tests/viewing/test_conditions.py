@@ -20,6 +20,7 @@ from er3a.pipeline.messages.left_out import say_reserved
 from er3a.pipeline.messages.pages import caveat
 from er3a.pipeline.messages.validation import how_far_off, settled_parts, unconfirmed
 from er3a.pipeline.messages.vision import say
+from er3a.pipeline.messages.workspace import range_text
 from er3a.pipeline.results import FORMAT_VERSION, LeftOut, plain, read_foundation, write_checksums
 from er3a.pipeline.stages.dynamics.model import NoLimits
 from er3a.pipeline.stages.inverse.model import RankingRows
@@ -32,7 +33,9 @@ from er3a.pipeline.stages.workspace import capability_section
 from er3a.pipeline.stages.workspace.entry import BoxTask
 from er3a.pipeline.stages.workspace.model import PlacementSummary, PlaceSummary, StandSummary
 from er3a.pipeline.stages.workspace.tool_capability import task_summary
-from er3a.pipeline.viewing.index import condition, first_inside, passing, proposed
+from er3a.pipeline.viewing import tray
+from er3a.pipeline.viewing.index import condition, passing, proposed
+from er3a.pipeline.viewing.tray import first_inside
 
 TALLY = CheckTally(24)
 TURNED = ToolOff(0.0, 180.0)
@@ -215,11 +218,32 @@ def test_the_index_names_what_passes_through_the_box_or_its_stand(over):
         "trajectory": {"into": pytest.approx(2.75)} | below,
         "programs": {"through": pytest.approx(2.75)},
     }
-    assert found.text.startswith("“Box at”: ")
+    assert found.text.startswith("“In the tray at”: ")
     assert found.text.endswith("Not compared, or not all of it: lost, still.")
     sound = {"trajectory": ["below", "beside"], "programs": ["through", "still"]}
     counts = f"{'1 of the 2 paths, ' if over else ''}1 of the 2 programs"
     assert f"is in the way of {counts} that pass without them" in found.short(sound)
+
+
+def test_the_rows_of_what_passes_through_the_tray_lead_to_that_moment(monkeypatch):
+    """First times by hand, as above; without a place there are no marks, which is not the same as no motion in it."""
+    motions = {"into": (99.0, 424.0), "beside": (101.0, 400.0)}
+    paths = SimpleNamespace(paths=named("into", "beside"), not_followed=())
+    rows = moving(TrajectoryResults, PathChecks, "path", paths, motions).results.checks
+    each = [(name, rows.t_s[rows.path == name], rows.xyz_mm[rows.path == name]) for name in motions]
+    stored = SimpleNamespace(folder=Path("results/er3a_c60/trajectory"))
+    assert tray.in_tray(stored, each) is None
+    monkeypatch.setattr(tray, "is_computed", lambda folder: folder == Path("results/er3a_c60/workspace"))
+    monkeypatch.setattr(tray, "read_stage", lambda folder, stage: placed())
+    marked = tray.in_tray(stored, each)
+    assert marked.keys() == {"into"}
+    assert 'data-play="into"' in marked["into"]
+    assert "in the tray at 2.75 s" in marked["into"]
+    assert tray.in_tray(stored, each[1:]) == {}
+    monkeypatch.setattr(
+        tray, "read_stage", lambda folder, stage: moving(TrajectoryResults, PathChecks, "path", paths, {})
+    )
+    assert tray.in_tray(stored, each) is None
 
 
 def test_grasps_that_pass_through_the_box_are_counted():
@@ -256,11 +280,26 @@ def test_the_workspace_page_moves_a_box_up_or_down_only_where_no_height_is_to_be
     assert f"allow to move it by {room} mm," in text
 
 
+def test_other_heights_of_a_stand_are_told_with_what_they_have_less_of():
+    """Of three heights the lower has half the manipulability, the higher 4 deg less to a joint's limit; the task asks
+    for 2 deg."""
+    placement = placed(over=True).results.summary.placement
+    spot = replace(placement.best, limit_margin_deg=10.0, room_down_m=(0.0, 0, 0.1), room_up_m=(0.0, 0, 0.1))
+    placement = replace(placement, stands=(replace(placement.stands[0], above=spot),))
+    heights = np.array([[0.35, 0, 0.3], [0.35, 0, 0.4], [0.35, 0, 0.5], [0.0, 0, 0.4]])
+    shares, margins = np.array([0.5, 1, 1.5, 0.1]), np.array([10.0, 8, 4, 0])
+    places = SimpleNamespace(centre_m=heights, manipulability_m3=shares, limit_margin_deg=margins)
+    text = range_text(placement, places)
+    assert "manipulability 50 % of that at 275 mm, 6.0 deg from a joint limit instead of 10.0 deg" in text
+    alone = SimpleNamespace(centre_m=heights[1:2], manipulability_m3=shares[1:2], limit_margin_deg=margins[1:2])
+    assert range_text(placement, alone) == ""
+
+
 def test_without_motions_or_without_a_place_nothing_is_said_to_be_free():
     assert passing({}, None) is None
     alone = passing({"workspace": placed()}, None)
     assert (alone.short({}), alone.text) == (
-        "No path, program or grasp was compared with the place of the tray or box.",
+        "No path, program or grasp was compared with the place of the tray.",
         "",
     )
     clear = moving(

@@ -56,6 +56,7 @@ class Stage:
     applies : why the stage can't be computed for a robot, a finding of one of ``absences``; None if it can
     views : ``record`` (a recording, with its preview) and ``report`` (a page), as far as the stage has them
     rests_on : names of the stages whose verdict its pages say first
+    shows : names of the stages whose results its page shows besides its own, as far as they are there
     sampled : whether ``compute`` gathers parts that jobs of their own have sampled
     """
 
@@ -70,6 +71,7 @@ class Stage:
     absences: tuple[type[Finding], ...] = ()
     views: tuple[str, ...] = ("record", "report")
     rests_on: tuple[str, ...] = ()
+    shows: tuple[str, ...] = ()
     sampled: bool = False
 
     def module(self, name: str) -> Any:

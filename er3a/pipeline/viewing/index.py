@@ -79,9 +79,10 @@ from er3a.pipeline.sweeps import ENTRIES, entry_label
 from er3a.pipeline.verdicts import NOT_EXAMINED, StageVerdict, read_verdicts
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.figures import new_figure
-from er3a.pipeline.viewing.numbers import number
+from er3a.pipeline.viewing.numbers import decimals_of, fixed, number
 from er3a.pipeline.viewing.page import PAGES, Head, Picture, alternative_table, head_of, stage_head, status_word
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, MUTED, REFERENCE, VERDICTS
+from er3a.pipeline.viewing.tray import first_inside, placed_tray
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 
@@ -170,10 +171,17 @@ def key_figures(folder: Path, stages: Sequence[str]) -> dict[tuple[str, str, str
         for figure in head.figures:
             value, unit = figure.value, figure.unit
             if figure.part and value is not None:  # the whole differs from robot to robot
-                found[title, figure.label, ""] = f"{number(value)} {unit}"
+                found[title, figure.label, ""] = f"{figure.text} {unit}"
             else:
-                found[title, figure.label, unit] = float(f"{value:.6g}") if isinstance(value, float) else value
+                found[title, figure.label, unit] = _rounded(figure)
     return found
+
+
+def _rounded(figure: page.ShownFigure) -> float | int | None:
+    """The value with the digits that its page shows."""
+    if not isinstance(figure.value, float) or not np.isfinite(figure.value) or not figure.value:
+        return figure.value
+    return round(figure.value, decimals_of(figure.value, figure.uncertainty, figure.measure))
 
 
 def border_mm(workspace: WorkspaceResults | AbsentResults | None) -> list[list[list[float]]]:
@@ -490,11 +498,12 @@ def _counts(verdicts: Sequence[StageVerdict]) -> dict[str, str]:
 
 SHOWN_FIGURES = 3
 RUNS = {"trajectory": N_("paths"), "programs": N_("programs")}  # stages whose motions may be run or not
-MOVED = RUNS | {"vision": N_("grasps")}  # stages with motions that the box is compared with
+MOVED = RUNS | {"vision": N_("grasps")}  # stages with motions that the tray is compared with
 OF_ALL_RUNS = (  # what may turn any of them unsafe
     *("obstacles", "uncovered_links", "bare_tool", "base_inside", "allowed_contacts", "program_rest", "given_rates"),
     *("controller_language", "tool", "carried", "torques"),
 )
+MAX_TALLIED = 3  # that do not pass, though nothing expects it, and are named beside their number
 MAX_FAULTS = 20  # of a robot's paths, and of its programs, that are listed
 PLACE_LETTERS = 160
 VOID_TAGS = ("br", "img", "input", "wbr", "hr")
@@ -518,7 +527,6 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         folder / "index.html",
         places=list(_places(study, folder, {each["robot"].name for each in robots if each["table"] == "fail"})),
         robots=robots,
-        legend=verdict_legend(status for each in robots if each["entries"] for status in each["entries"]["statuses"]),
         article=study.article is not None,
         questions={stage.name: stage.question for stage in STAGES.values()},
         shown_figures=SHOWN_FIGURES,
@@ -621,11 +629,12 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
     table = heads["validation"].status if "validation" in heads else NOT_EXAMINED
     finding = heads["validation"].finding if "validation" in heads else None
     same_arm, instead = isinstance(finding, DefinedOtherwise), alternative_table(study, name, results.parent)
-    unproven, settled = _settled(finding)
+    unproven, settled = _settled(finding, _evidence(results))
+    entries = evidence_section(robot, _evidence(results), _evidence(results.parent / instead) if instead else None)
     box_range = _box_range(stored["workspace"].results) if "workspace" in stored else ""
     computed = {stage: each for stage, each in stored.items() if heads[stage].status != "not_computed"}
     passes = passing(computed, robot)
-    runs = [_run(stage, computed[stage].results) for stage in RUNS if stage in computed]
+    runs = [_run(stage, name, computed[stage].results) for stage in RUNS if stage in computed]
     grasped = _grasped(computed["vision"].results) if "vision" in computed else []
     sound = {run["stage"]: run["sound"] for run in runs} | {"vision": grasped}
     return {
@@ -635,13 +644,12 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         "may_run": table != "fail",
         "decision": decision(table, [*failed.values()], instead, unproven=unproven, same_arm=same_arm),
         "settled": settled,
-        "entries": evidence_section(
-            robot, _evidence(results), _evidence(results.parent / instead) if instead else None
-        ),
+        "entries": entries,
+        "legend": verdict_legend(entries["statuses"]) if entries else [],
         "instead": {instead: f"#{instead}"} if instead else {},
         "dh_instead": {instead: f"#dh-{instead}"} if instead else {},
         "answers": [*_answers(heads, robot, passes.short(sound) if passes else "", box_range)],
-        "notes": {stage: _note(stage, head, stored[stage].results) for stage, head in heads.items()},
+        "notes": {stage: _note(head, [run for run in runs if run["stage"] == stage]) for stage, head in heads.items()},
         "bare": any(
             _misses(heads[stage], "carried") or _misses(heads[stage], "tool") for stage in RUNS if stage in heads
         ),
@@ -683,7 +691,7 @@ def proposed(finding: object) -> dict[str, str]:
     return {"measurement": joined(step, " "), "entry": entry.replace(" ", "")}
 
 
-def _settled(finding: object) -> tuple[bool, str]:
+def _settled(finding: object, evidence: TableEvidence | None) -> tuple[bool, str]:
     """Whether nothing of a table's geometry is settled; and of one that is contradicted by what, of one that is settled
     in part how much, and how far off the tool could be."""
     if isinstance(finding, Contradicted | AnotherArm):
@@ -692,21 +700,18 @@ def _settled(finding: object) -> tuple[bool, str]:
         return False, ""
     part = next((part for part in finding.parts if part.part == "geometry"), None)
     conflict = say(finding.contradiction) if finding.contradiction else ""
-    said = joined([settled_parts(finding), *how_far_off(finding), conflict], " ")
+    sums = joined([each.entry for each in evidence.combinations] if evidence else [], ", ")
+    counted = tr("Counted as one entry, because only the sum matters: {names}.", names=sums) if sums else ""
+    said = joined([settled_parts(finding), counted, *how_far_off(finding), conflict], " ")
     return part is not None and not (part.settled or part.up_to_signs), said
 
 
 def _answers(heads: Mapping[str, Head], robot: Robot, passes: str, box_range: str) -> Iterator[tuple[str, str, str]]:
-    """What is asked of an arm first: the question, its answer and where it is shown; ``box_range``: how high the box's
+    """What is asked of an arm first: the question, its answer and where it is shown; ``box_range``: how high the tray's
     stand may be."""
     workspace = heads["workspace"].summary if "workspace" in heads else None
-    if workspace:
-        box = box_text(workspace)
-        if box and _misses(heads["workspace"], "tool"):
-            bare = tr("No tool is given: the flange's own centre enters the box. Repeat it with your tool's length.")
-            box = joined([box, bare], " ")
-        box = joined([passes, box, box_range], " ") if box else ""
-        yield tr("Tray or box"), box, "workspace.html#placement"
+    if isinstance(workspace, WorkspaceSummary):
+        yield tr("Reach"), _reach_text(workspace, bare=_misses(heads["workspace"], "tool")), "workspace.html"
     summary = heads["dynamics"].summary if "dynamics" in heads else None
     yield tr("Payload"), payload_text(summary, robot), "dynamics.html#payload" if summary else ""
     if workspace:
@@ -714,10 +719,35 @@ def _answers(heads: Mapping[str, Head], robot: Robot, passes: str, box_range: st
         if isinstance(workspace, WorkspaceSummary) and workspace.enclosed_voids:
             place = f"#void-{workspace.voids.index(judged_void(workspace)) + 1}"
         yield tr("Void"), void_text(workspace, confirmed=_limits_confirmed(heads)), f"workspace.html{place}"
+    if workspace:
+        box = box_text(workspace)
+        if box and _misses(heads["workspace"], "tool"):
+            bare = tr("No tool is given: the flange's own centre enters the tray. Repeat it with your tool's length.")
+            box = joined([box, bare], " ")
+        box = joined([passes, box, box_range], " ") if box else ""
+        yield tr("Tray"), box, "workspace.html#placement"
+
+
+def _reach_text(summary: WorkspaceSummary, *, bare: bool) -> str:
+    """How far from axis 1 and how high the tool point comes; ``bare``: whether the robot has no tool."""
+    reach = summary.reach_m
+    least, most, low, high = (
+        fixed(1000 * value, 1)
+        for value in (reach.nearest_to_axis, reach.furthest_from_axis, reach.lowest, reach.highest)
+    )
+    point = tr("without a tool: the centre of the flange") if bare else tr("the tool point")
+    return tr(
+        "{least} to {most} mm from axis 1 ({point}), {low} to {high} mm along it; {smallest} to {largest} m³ in all "
+        "(proven).",
+        point=point,
+        **{"most": most, "least": least, "low": low, "high": high},
+        smallest=number(summary.volume_m3.lower),
+        largest=number(summary.volume_m3.upper),
+    )
 
 
 def _box_range(results: Any) -> str:
-    """How high the stand of a box may be; empty where none is proposed."""
+    """How high the stand of a tray may be; empty where none is proposed."""
     placement = getattr(results.summary, "placement", None)
     if not isinstance(placement, PlacementSummary) or not placement.named_places:
         return ""
@@ -742,7 +772,7 @@ def _misses(head: Head, subject: str) -> bool:
 
 @dataclass(frozen=True)
 class Passing:
-    """The tool points that pass through the box where it is proposed, or through what it stands on.
+    """The tool points that pass through the tray where it is proposed, or through what it stands on.
 
     Attributes
     ----------
@@ -762,9 +792,9 @@ class Passing:
             return ""
         inside = tr("Targets in it or its stand: {names}.", names=joined(self.targets, ", ")) if self.targets else ""
         said = [
-            tr("“Box at”: the moment from which the tool point is in the box or its stand.")
+            tr("“In the tray at”: the moment from which the tool point is in the tray or its stand.")
             if any(self.through.values())
-            else tr("No tool point of these was found in the box or its stand."),
+            else tr("No tool point of these was found in the tray or its stand."),
             inside,
             tr(
                 "Only tool points were compared, straight between the stored times; links and the tool's body were not."
@@ -777,7 +807,7 @@ class Passing:
     def short(self, sound: Mapping[str, Sequence[str]]) -> str:
         """How many there are among the names of what passes, per stage."""
         if not self.through:
-            return tr("No path, program or grasp was compared with the place of the tray or box.")
+            return tr("No path, program or grasp was compared with the place of the tray.")
         counts = [
             tr("{count} of the {passing} {what}", count=len(inside), passing=len(sound[stage]), what=tr(MOVED[stage]))
             for stage, found in self.through.items()
@@ -786,21 +816,17 @@ class Passing:
         if not counts:
             return ""
         return tr(
-            "The tray or box, or its stand, is in the way of {runs} that pass without them: the tool point goes "
-            "through.",
+            "The tray or its stand is in the way of {runs} that pass without them: the tool point goes through.",
             runs=joined(counts, ", "),
         )
 
 
 def passing(stored: Mapping[str, Stored[Any]], robot: Robot) -> Passing | None:
-    """What passes through the box of the study where the workspace stage puts it; None if it puts none."""
-    placement = getattr(stored["workspace"].results.summary, "placement", None) if "workspace" in stored else None
-    if not isinstance(placement, PlacementSummary) or not placement.named_places:
+    """What passes through the tray of the study where the workspace stage puts it; None if it puts none."""
+    tray = placed_tray(stored["workspace"].results) if "workspace" in stored else None
+    if tray is None:
         return None
-    centre, half = (1000 * np.array(each) for each in (placement.best.centre_m, placement.best.size_m))
-    low, high = centre - half / 2, centre + half / 2
-    if placement.stand is None and placement.over:
-        low[2] = min(low[2], 1000 * placement.over.height_m)
+    low, high = tray
     through, unseen = dict[str, dict[str, float]](), list[str]()
     for stage in (name for name in MOVED if name in stored):
         results = stored[stage].results
@@ -846,31 +872,14 @@ def _followed(results: TrajectoryResults | ProgramsResults) -> Iterator[tuple[st
         yield path.name, results.checks.take(results.checks.path == path.name)
 
 
-def first_inside(t: Reals, points: Reals, low: Reals, high: Reals) -> float | None:
-    """When a point that moves straight from each of ``points`` (n, 3) at ``t`` (n,) to the next enters a box first.
-
-    ``low``, ``high``: (3,), the box's corners. None if it never does.
-    """
-    way = np.diff(points, axis=0, append=points[-1:])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ends = np.stack([low - points, high - points]) / way
-    ends = np.sort(np.where(np.isnan(ends), [[[-np.inf]], [[np.inf]]], ends), axis=0)  # 0/0: along a face
-    enters, leaves = np.maximum(ends[0].max(axis=1), 0), np.minimum(ends[1].min(axis=1), 1)
-    (hits,) = np.nonzero((enters <= leaves) & np.isfinite(points + way).all(axis=1))
-    if not len(hits):
-        return None
-    row = hits[0]
-    return float(t[row] + enters[row] * (t[min(row + 1, len(t) - 1)] - t[row]))
-
-
 def _without_box() -> str:
     return tr(
-        "These pass without the tray or box and its stand: put both into the study's scene file and run again before "
+        "These pass without the tray and its stand: put both into the study's scene file and run again before "
         "you run any of them there."
     )
 
 
-def _run(stage: str, results: TrajectoryResults | ProgramsResults) -> dict[str, Any]:
+def _run(stage: str, robot: str, results: TrajectoryResults | ProgramsResults) -> dict[str, Any]:
     """How many paths or programs there are, which may be run as they are, and why the others may not."""
     followed: Sequence[ProgramSummary | PathSummary]
     if isinstance(results, ProgramsResults):
@@ -884,8 +893,9 @@ def _run(stage: str, results: TrajectoryResults | ProgramsResults) -> dict[str, 
     return {
         "stage": stage,
         "count": len(followed) + lost,
-        "lost": lost,
         "sound": sound,
+        "tally": _tally(stage, len(sound), faults, lost),
+        "links": {fault.name: f"{robot}/{fault.address}" for fault in faults},
         "faults": faults,
         "open": left_out,
         "no_pass": say(NoPass(missed)) if (missed := results.summary.verdict.missed) else "",
@@ -903,6 +913,7 @@ def _otherwise(stage: str, followed: Sequence[ProgramSummary | PathSummary], fau
             "fail",
             tr("not as expected"),
             False,
+            "",
             (FaultMoment(say(each)),),
             "",
             f"{stage}.html#{each.name}",
@@ -912,13 +923,31 @@ def _otherwise(stage: str, followed: Sequence[ProgramSummary | PathSummary], fau
     ]
 
 
-def _note(stage: str, head: Head, results: Any) -> str:
-    """What stands beside a stage's name: how many of its paths or programs pass, where some do not, or that its camera
-    is simulated."""
-    if stage in RUNS and head.status != "not_computed":
-        run = _run(stage, results)
-        return tr("{sound} of {count}", sound=len(run["sound"]), count=run["count"]) if run["faults"] else ""
-    return tr("simulated") if _misses(head, "real_camera") else ""
+def _tally(stage: str, sound: int, faults: Sequence[Fault], lost: int) -> str:
+    """How many paths or programs pass, how many of the others are expected not to, and which others do not."""
+    others, count = [fault for fault in faults if not fault.meant], sound + len(faults) + lost
+    meant = len(faults) - len(others)
+    passing = tr("{sound} of {count} {what} pass in the model", sound=sound, count=count, what=tr(RUNS[stage]))
+    rest = N_("the other one is expected to fail") if meant == 1 else N_("the other {count} are expected to fail")
+    whole = N_("{count} expected to fail") if others or lost else rest
+    named = [tr("{name}: {verdict}", name=fault.name, verdict=fault.verdict) for fault in others[:MAX_TALLIED]]
+    more = tr("{count} more do not pass", count=len(others) - MAX_TALLIED) if len(others) > MAX_TALLIED else ""
+    left = tr("{count} not followed to the end", count=lost) if lost else ""
+    return joined([passing, tr(whole, count=meant) if meant else "", *named, more, left])
+
+
+def _note(head: Head, runs: Sequence[Mapping[str, Any]]) -> str:
+    """What stands beside a stage's name: how many of its paths or programs pass, where some do not, how many targets,
+    paths, programs or objects are expected to fail, or that its camera is simulated."""
+    if head.no_verdict:
+        return ""
+    parts = [
+        tr("{sound} of {count}", sound=len(run["sound"]), count=run["count"])
+        for run in runs
+        if len(run["sound"]) < run["count"]
+    ]
+    parts += [tr("{count} expected to fail", count=head.demonstrations)] if head.demonstrations else []
+    return joined([*parts, tr("simulated") if _misses(head, "real_camera") else ""])
 
 
 def _cell(head: Head) -> dict[str, Any]:

@@ -31,4 +31,5 @@ STAGE = Stage(
     settings={"trajectory": TrajectorySettings},
     inputs=_inputs,
     rests_on=("validation",),
+    shows=("workspace",),
 )
