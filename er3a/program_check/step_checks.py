@@ -1117,9 +1117,9 @@ def _turns(arm: Robot, start: Reals, ends: Reals) -> Reals:
 def _said(motion: instructions.ArmMotion) -> list[found_in.CheckFinding]:
     """Findings on a motion that do not depend on the arm."""
     found: list[found_in.CheckFinding] = []
-    outer = getattr(motion.target, "external", ())
+    outer = {name: None for each in (motion.target, motion.via) for name, _ in getattr(each, "external", ())}
     if outer:
-        found.append(found_in.ExternalAxesLeftOut(tuple(name for name, _ in outer)))
+        found.append(found_in.ExternalAxesLeftOut(tuple(outer)))
     rates = [rate.value for rate in (motion.speed, motion.acceleration) if rate is not None and rate.unit == "share"]
     if rates and max(rates) > 1 + TOLERANCE:
         found.append(found_in.MoreThanFullSpeed(100 * max(rates)))

@@ -138,7 +138,8 @@ class JointTarget(ByValue):
 
     Attributes
     ----------
-    external : names and values (rad or m as the controller has them, not converted) of axes beside the arm's
+    external : names and values (rad or m as the controller has them, not converted) of axes beside the arm's; NaN where
+        not known
     stated : T_base_tool (4, 4), m, that a table gives beside the joints, NaN where it gives none of it
     """
 

@@ -92,7 +92,8 @@ def changed_beside(program: syntax.Program, dialect: Dialect, itself: str = "") 
     asked = {what.function for what in beside}
     cyclic = {name for what in beside if what.function == syntax.CYCLIC for name in names(what.arguments[0])}
     started = {name for name in routines if (name in asked or routines[name].thread) and name != itself}
-    return (_changed_in(program, _with_called(program, started), dialect) | cyclic) - dialect.modal
+    given = {name for what in beside for name in _given_back(program, what.function, what.arguments)}
+    return (_changed_in(program, _with_called(program, started), dialect) | cyclic | given) - dialect.modal
 
 
 def _with_called(program: syntax.Program, names: Iterable[str]) -> set[str]:
@@ -116,11 +117,26 @@ def _next(operation: syntax.Operation) -> tuple[str, ...]:
 
 def _changed_in(program: syntax.Program, names: Iterable[str], dialect: Dialect) -> frozenset[str]:
     """Variables, not local ones, that routines change."""
-    return frozenset(each for name in names for op in program.routines[name].code for each in _shared(op, dialect))
+    code = [op for name in names for op in program.routines[name].code]
+    return frozenset(each for op in code for each in _shared(program, op, dialect))
 
 
-def _shared(operation: syntax.Operation, dialect: Dialect) -> Iterable[str]:
+def _given_back(program: syntax.Program, name: str, arguments: Iterable[syntax.Expression | None]) -> set[str]:
+    """Variables that a routine, or what it calls, changes as its parameters."""
+    parameters = program.routines[name].parameters if name in program.routines else ()
+    given = {
+        parameter.name: variable_of(each)
+        for parameter, each in zip(parameters, arguments)
+        if parameter.out and isinstance(each, (syntax.Variable, syntax.Member, syntax.Element))
+    }
+    code = (op for each in _with_called(program, (name,)) for op in program.routines[each].code) if given else ()
+    return {given[changed] for op in code for changed in _changed(op) if changed in given}
+
+
+def _shared(program: syntax.Program, operation: syntax.Operation, dialect: Dialect) -> Iterable[str]:
     """Variables, not local ones, that an operation changes."""
+    if isinstance(operation, syntax.Call):
+        return _given_back(program, operation.routine, operation.arguments)
     if isinstance(operation, syntax.Assign):
         return () if operation.local else (target_name(operation.target),)
     if isinstance(operation, syntax.Doing) and not (
@@ -845,7 +861,7 @@ class Machine:
                 operation = code[at]
                 waiting += [operation.to] if isinstance(operation, syntax.GoTo) else [at + 1]
                 waiting += [operation.otherwise] if isinstance(operation, syntax.Branch) else []
-                found.update(_shared(operation, self.dialect))
+                found.update(_shared(self.program, operation, self.dialect))
                 called.update(_next(operation))
         found |= _changed_in(self.program, _with_called(self.program, called), self.dialect)
         return frozenset(found) - self.dialect.modal

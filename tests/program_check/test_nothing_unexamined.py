@@ -1227,3 +1227,28 @@ def test_a_table_whose_poses_are_another_arms_is_a_caution(tmp_path, moved_mm, t
 def test_a_tables_pose_columns_that_are_not_all_there_are_named(tmp_path):
     table = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,x_mm,yaw_deg\n0,-10,-10,0,-70,0,400,0\n"
     assert codes(check(tmp_path, table, "a.csv"))["program_not_understood"] == [1, 1]
+
+
+@pytest.mark.parametrize("start", ["INTERRUPT DECL 5 WHEN $IN[1] DO", "TRIGGER WHEN DISTANCE=0 DELAY=0 DO"])
+@pytest.mark.parametrize(("what", "changed"), [("st(N)", True), ("far( )", True), ("look(N)", False)])
+def test_what_a_routine_beside_the_program_changes_by_reference_has_no_value(tmp_path, start, what, changed):
+    (tmp_path / "a.dat").write_text("DEFDAT a\nDECL INT N=0\nENDDAT\n")
+    more = "DEF st(X:OUT)\nINT X\nX=50\nEND\nDEF far( )\nst(N)\nEND\nDEF look(X:OUT)\nINT X\n$OUT[1]=X>3\nEND\n"
+    found = motions(tmp_path, krl(f"{start} {what}\nPTP {axes(HOME)}\nPTP {{A1 N}}", more), "a.src")
+    assert isinstance(found[-1].target, UnresolvedTarget) == changed
+
+
+@pytest.mark.parametrize(
+    ("motion", "named"),
+    [
+        ("PTP_REL {E1 100}", True),
+        ("PTP_REL {A1 5,E1 0}", False),
+        ("LIN_REL {X 10,E1 100}", True),
+        ("LIN_REL {X 10,E1 100} #TOOL", True),
+        ("PTP {A1 5,E1 $ANIN[1]}", True),
+        (f"CIRC {{X 410,Y 10,Z 300,{DOWN},E1 50}},{{X 400,Y 20,Z 300,{DOWN}}}", True),
+    ],
+)
+def test_external_axes_are_named_in_every_motion(tmp_path, motion, named):
+    found = check(tmp_path, krl(f"{AT_START}LIN {{X 400,Y 0,Z 300,{DOWN}}}\n{motion}"), "a.src")
+    assert ("external_axes_left_out" in codes(found)) == named

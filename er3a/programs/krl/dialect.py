@@ -17,6 +17,7 @@ from er3a.robots.masses import MassBody, moved
 FRAME_KEYS = ("X", "Y", "Z", "A", "B", "C")
 AXIS_KEYS = ("A1", "A2", "A3", "A4", "A5", "A6")
 AXIS_KINDS = ("AXIS", "E6AXIS")
+LEFT_OUT = "left out of"
 EXTERNAL_KEYS = ("E1", "E2", "E3", "E4", "E5", "E6")
 COORDINATES = frozenset((*FRAME_KEYS, *AXIS_KEYS, *EXTERNAL_KEYS))
 POSITION_KINDS = ("FRAME", "POS", "E6POS", *AXIS_KINDS)
@@ -77,7 +78,7 @@ def relative(memory: ProgramMemory, value: syntax.Value, frames: Frames, said: t
         change = _joints(memory, value, text, missing=0.0)
         if memory.here.joints is None or not isinstance(change, instructions.JointTarget):
             return instructions.UnresolvedTarget(text, "position_unknown")
-        return instructions.JointTarget(memory.here.joints + change.joints)
+        return instructions.JointTarget(memory.here.joints + change.joints, change.external)
     if memory.read("$IPO_MODE") == "#TCP":
         return instructions.UnresolvedTarget(text, "external_tool")
     steps = syntax.Record(value.kind, (*((key, 0.0) for key in FRAME_KEYS if value.get(key) is None), *value.items))
@@ -85,11 +86,11 @@ def relative(memory: ProgramMemory, value: syntax.Value, frames: Frames, said: t
     if offset is None or seen is None:
         return instructions.UnresolvedTarget(text, "position_unknown")
     if in_tool:
-        return instructions.PoseTarget(seen @ offset)
+        return instructions.PoseTarget(seen @ offset, external=_external(value))
     found = seen.copy()
     found[:3, 3] += offset[:3, 3]
     found[:3, :3] = offset[:3, :3] @ seen[:3, :3]
-    return instructions.PoseTarget(found)
+    return instructions.PoseTarget(found, external=_external(value))
 
 
 def _unresolved(value: syntax.Unclear) -> instructions.UnresolvedTarget:
@@ -117,9 +118,17 @@ def _components(
 
 
 def _external(value: syntax.Record) -> tuple[tuple[str, float], ...]:
+    """Axes beside the arm that are given and not 0; NaN where the value is not known."""
     parts = dict(value.items)
-    given = ((key, syntax.number(parts[key])) for key in EXTERNAL_KEYS if key in parts)
-    return tuple((key, part) for key, part in given if part)
+    given = ((key, number) for key in EXTERNAL_KEYS if key in parts and (number := _of_axis(parts[key])))
+    return tuple(given)
+
+
+def _of_axis(value: syntax.Value) -> float:
+    """The value of an external axis; 0 of one that an assignment left out."""
+    if isinstance(value, syntax.Unclear):
+        return 0.0 if value.text.startswith(LEFT_OUT) else math.nan
+    return syntax.number(value) or 0.0
 
 
 def _joints(
@@ -590,7 +599,7 @@ class KrlDialect(Dialect):
         ):
             return new
         missing = tuple(
-            (key, syntax.Unclear(f"left out of {syntax.shown(new)}")) for key, _ in old.items if new.get(key) is None
+            (key, syntax.Unclear(f"{LEFT_OUT} {syntax.shown(new)}")) for key, _ in old.items if new.get(key) is None
         )
         return syntax.Record(new.kind, (*new.items, *missing))
 
