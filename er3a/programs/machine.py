@@ -313,18 +313,16 @@ def aliased_calls(program: syntax.Program) -> dict[syntax.Call, frozenset[str]]:
     for caller in program.routines.values():
         own = _own_names(caller)
         for call in (each for each in caller.code if isinstance(each, syntax.Call)):
-            given = [
-                (parameter.name, variable_of(each))
-                for parameter, each in zip(program.routines[call.routine].parameters, call.arguments)
-                if parameter.out and isinstance(each, (syntax.Variable, syntax.Member, syntax.Element))
-            ]
-            twice = Counter(variable for _, variable in given)
+            named: dict[str, set[str]] = defaultdict(set)
+            for parameter, each in zip(program.routines[call.routine].parameters, call.arguments):
+                if parameter.out and isinstance(each, (syntax.Variable, syntax.Member, syntax.Element)):
+                    named[variable_of(each)] |= {parameter.name, variable_of(each)}
             shared = [
-                {name, variable}
-                for name, variable in given
-                if twice[variable] > 1 or (variable not in own and variable in uses[call.routine])
+                each
+                for variable, each in named.items()
+                if len(each) > 2 or (variable not in own and variable in uses[call.routine])
             ]
-            changed = frozenset(name for pair in shared if pair & changes[call.routine] for name in pair)
+            changed = frozenset(name for each in shared if each & changes[call.routine] for name in each)
             if changed:
                 found[call] = changed
     return found

@@ -276,7 +276,7 @@ def read_rapid(source: ProgramText) -> syntax.Program:
 def changed_arguments(call: syntax.Invocation) -> list[syntax.Expression | None]:
     """What a function of the controller changes of its arguments."""
     at = CHANGING_FUNCTIONS.get(call.function)
-    by_name = [each for key, each in call.keywords if key in CHANGING_OPTIONS]
+    by_name: list[syntax.Expression | None] = [each for key, each in call.keywords if key in CHANGING_OPTIONS]
     return by_name if at is None else [*call.arguments[at : at + 1], *by_name]
 
 
