@@ -20,7 +20,7 @@ from er3a.pipeline.stages.trajectory import model
 from er3a.planning.motion_faults import JerkTooGreat, RateCause
 from er3a.planning.names import PathVerdict, StrategyName
 
-FIGURES = {
+KEY_FIGURES = {
     "safe": N_("Paths that pass in the model, of those meant to"),
     "singular_poses": N_("Singular poses met, on paths meant to be safe (joint moves pass them unharmed)"),
     "near_passes": N_("Near-singular passes, on paths meant to be safe"),
