@@ -170,13 +170,14 @@ def test_a_stored_motion_is_compared_with_solids_between_its_rows():
     """J1 turns by 3 rad in one row's time, past a post that it meets at neither row; the moment by fine sampling."""
     robot = load_robot("er3a_c60")
     post = Cylinder("post", transform(np.array([0.4, 0.0, 0.6]), np.zeros(3)), 0.03, 1.2)
-    bodies = Bodies(robot, Scene("post", (post,)))
+    scene = Scene("post", (post,))
+    bodies = Bodies(robot, scene)
     t, q = np.array([0.0, 1, 2]), np.zeros((3, 6))
     q[:, 0] = -1.5, 1.5, np.nan
     share = np.linspace(0, 1, 30_001)
     hit = bodies.overlaps(q[0] + share[:, None] * (q[1] - q[0]))[:, bodies.second < 0].any(axis=1)
-    found = first_overlap(bodies, t, q)
+    found = first_overlap(robot, scene, t, q)
     assert found is not None
     assert 0 <= found[0] - share[hit.argmax()] <= STEP / 3
     assert found[1].label.endswith("post")
-    assert first_overlap(bodies, t, np.where(np.arange(6) == 0, np.pi, q)) is None
+    assert first_overlap(robot, scene, t, np.where(np.arange(6) == 0, np.pi, q)) is None

@@ -262,10 +262,10 @@ def test_what_is_wrong_before_a_contact_ends_the_sound_part_of_a_path(tmp_path):
     near = replace(rows, near_singular=rows.t_s >= 0)
     assert sound_end(path, near, limits) is None
     nowhere = replace(path, sound_end=None)
-    assert "end the path there" not in advised(nowhere, near, limits)
-    assert "near-singular at the start" in advised(nowhere, near, limits)
+    assert "end the path there" not in advised(nowhere, near, results.avoidance, limits)
+    assert "near-singular at the start" in advised(nowhere, near, results.avoidance, limits)
     met = replace(nowhere, singularities=(Singularity(0.0, 0.0, "wrist", True, 0.0, None),))
-    assert "the arm is singular at the start" in advised(met, near, limits)
+    assert "the arm is singular at the start" in advised(met, near, results.avoidance, limits)
     fast = replace(path.collisions[0], t0_s=0.7, cause=TooFastIfAssumed(2, 900.0, 180.0))
     several = replace(early, too_fast=(fast,), avoidance=path.avoidance * 2)
     assert [t for t, _ in first_faults(several)] == [0.5, path.collisions[0].t0_s]

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from er3a.pipeline.messages.language import alike
 from er3a.pipeline.viewing.numbers import decimals_of_column, decimals_of_spreads, fixed, measured, number
+from tests.browser.pages import PAGES_OF_EACH_KIND
 
 
 @pytest.mark.parametrize(
@@ -72,6 +75,17 @@ def test_a_column_has_one_number_of_decimals():
     assert decimals_of_spreads([0.1157, 0.0532, 0.0]) == 3
     assert decimals_of_spreads([1e-7]) == 4
     assert decimals_of_spreads([12.0]) == 0
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("page", PAGES_OF_EACH_KIND)
+def test_no_page_shows_digits_that_mean_nothing(small_study, page):
+    """Cells of numbers and key figures: no powers of ten but that of the least tolerance, and four decimals at most."""
+    html = (small_study.folder / "reports" / page).read_text(encoding="utf-8")
+    shown = re.findall(r'<td class="n">([^<]+)<|<dd>([^<]+)<small>', html)
+    for text in (cell or figure for cell, figure in shown):
+        assert "·10" not in text.replace("1·10⁻⁶", ""), text
+        assert not re.search(r"\.\d{5}", text), text
 
 
 def test_fixed_has_no_negative_zero():

@@ -18,7 +18,7 @@ from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.validation.evidence_section import rounded_within, table_to_use
 from er3a.pipeline.study import load_study
 from er3a.pipeline.viewing.index import _PlacesOfPage, _tally, write_index
-from er3a.pipeline.viewing.page import VERDICT_WORDS, Head, Numbering, _box, _missed, linked, page_environment
+from er3a.pipeline.viewing.page import VERDICT_WORDS, Head, Numbering, _missed, _tray_edges, linked, page_environment
 from tests.conftest import ROOT
 
 CALL = re.compile(r"ui\.(picture|table)\((.*)\) \}\}")
@@ -117,9 +117,9 @@ def test_the_index_marks_each_entry_of_a_table_as_validation_found_it(small_resu
 def test_a_box_that_may_be_placed_is_named_where_nothing_recommends_against_it():
     study = load_study(ROOT / "config/config.yaml")
     stored = SimpleNamespace(robot="er3a_c60", rests_on={"validation": "caution"})
-    assert _box(study, stored) == "200 × 150 × 50"
+    assert _tray_edges(study, stored) == "200 × 150 × 50"
     stored.rests_on["validation"] = "fail"
-    assert _box(study, stored) == ""
+    assert _tray_edges(study, stored) == ""
 
 
 def test_what_fails_though_nothing_expects_it_is_named_beside_the_count():

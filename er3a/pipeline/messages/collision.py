@@ -17,7 +17,7 @@ from er3a.pipeline.messages.say import Plural, by, joined, listed, say, say_as, 
 from er3a.pipeline.stages.collision.model import BaseInSolid, FreeSpace, HomeCollides, NeverFree, ShapesOverlap
 
 NAMED = 3
-FIGURES = {
+KEY_FIGURES = {
     "free_of_collisions": N_("Collision-free joint space"),
     "free_of_itself": N_("Free of self-collision"),
     "free_of_scene": N_("Free of collisions with the scene"),

@@ -134,7 +134,7 @@ STAYS_MM = 1.0  # that a tool moves when it stays where it is
 Pace = TooFast | FasterThanAssumed | AccelerationTooGreat | AcceleratesMoreThanAssumed
 PACED = get_args(Pace)
 MAX_PAIRS = 3  # that are named of a collision
-FIGURES = {
+KEY_FIGURES = {
     "programs_passed": N_("Programs that pass, of those meant to"),
     "instructions_passed": N_("Motion instructions that pass, of programs meant to pass"),
     "instructions_caution": N_("Motion instructions with caution, of programs meant to pass"),

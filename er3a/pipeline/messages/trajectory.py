@@ -20,7 +20,7 @@ from er3a.pipeline.stages.trajectory import model
 from er3a.planning.motion_faults import JerkTooGreat, RateCause
 from er3a.planning.names import PathVerdict, StrategyName
 
-FIGURES = {
+KEY_FIGURES = {
     "safe": N_("Paths that pass in the model, of those meant to"),
     "singular_poses": N_("Singular poses met, on paths meant to be safe (joint moves pass them unharmed)"),
     "near_passes": N_("Near-singular passes, on paths meant to be safe"),
@@ -104,7 +104,7 @@ TEXTS = texts(
             "{named} exceeds {limits} until t = {end:.4g} s: {worst:; }",
             "{named} exceed {limits} until t = {end:.4g} s: {worst:; }",
         ),
-        "path.rates#known": "its limits",
+        "path.rates#known": "the known limits",
         "path.rates#assumed": "the assumed limits",
         "path.rate": "at worst {needed} at t = {t:.4g} s",
         "path.rates#again": "{rates}; and again from t = {again:.4g} s",

@@ -22,7 +22,7 @@ from er3a.workspace.causes import (
     VoidCause,
 )
 
-FIGURES = {
+KEY_FIGURES = {
     "greatest_reach": N_("greatest reach from axis 1"),
     "enclosed_voids_lower": N_("enclosed voids, at least"),
     "volume": N_("reached volume"),

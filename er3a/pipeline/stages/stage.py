@@ -58,6 +58,9 @@ class Stage:
     rests_on : names of the stages whose verdict its pages say first
     shows : names of the stages whose results its page shows besides its own, as far as they are there
     sampled : whether ``compute`` gathers parts that jobs of their own have sampled
+    obstacles : whether it looks for collisions; its page then says that the workspace's tray is no obstacle
+    motions : in plural and marked with ``N_``, what its motions are; the index compares them with the tray
+    may_run : whether the index says which of its motions may be run
     """
 
     name: str
@@ -73,6 +76,9 @@ class Stage:
     rests_on: tuple[str, ...] = ()
     shows: tuple[str, ...] = ()
     sampled: bool = False
+    obstacles: bool = False
+    motions: str = ""
+    may_run: bool = False
 
     def module(self, name: str) -> Any:
         """A module of the stage's folder, imported when it is needed."""

@@ -23,8 +23,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull
 
+from er3a.collision.scene import Scene
 from er3a.files.kept_files import write_atomically
-from er3a.kinematics.forward import forward, skeleton
+from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages.collision import near_shapes
@@ -57,10 +58,10 @@ from er3a.pipeline.results import (
     result_records,
 )
 from er3a.pipeline.stages.expectations import unmet_expectations
-from er3a.pipeline.stages.programs.model import ProgramMotion, ProgramsResults, ProgramSummary
+from er3a.pipeline.stages.programs.model import ProgramsResults, ProgramSummary
 from er3a.pipeline.stages.programs.played import faults as program_faults
 from er3a.pipeline.stages.registry import STAGES, all_messages
-from er3a.pipeline.stages.trajectory.model import PathChecks, PathSummary, TrajectoryResults
+from er3a.pipeline.stages.trajectory.model import PathSummary, TrajectoryResults
 from er3a.pipeline.stages.trajectory.played import faults as path_faults
 from er3a.pipeline.stages.validation.evidence_section import evidence_section, verdict_legend
 from er3a.pipeline.stages.validation.model import (
@@ -82,7 +83,7 @@ from er3a.pipeline.viewing.figures import new_figure
 from er3a.pipeline.viewing.numbers import decimals_of, fixed, number
 from er3a.pipeline.viewing.page import PAGES, Head, Picture, alternative_table, head_of, stage_head, status_word
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, MUTED, REFERENCE, VERDICTS
-from er3a.pipeline.viewing.tray import first_inside, placed_tray
+from er3a.pipeline.viewing.tray import Meeting, Tray, compared_with_tray, met, scene_of, stretches, trays
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 
@@ -497,8 +498,8 @@ def _counts(verdicts: Sequence[StageVerdict]) -> dict[str, str]:
 
 
 SHOWN_FIGURES = 3
-RUNS = {"trajectory": N_("paths"), "programs": N_("programs")}  # stages whose motions may be run or not
-MOVED = RUNS | {"vision": N_("grasps")}  # stages with motions that the tray is compared with
+MOTIONS = {name: stage.motions for name, stage in STAGES.items() if stage.motions}
+MAY_RUN = {name: motions for name, motions in MOTIONS.items() if STAGES[name].may_run}
 OF_ALL_RUNS = (  # what may turn any of them unsafe
     *("obstacles", "uncovered_links", "bare_tool", "base_inside", "allowed_contacts", "program_rest", "given_rates"),
     *("controller_language", "tool", "carried", "torques"),
@@ -530,7 +531,7 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         article=study.article is not None,
         questions={stage.name: stage.question for stage in STAGES.values()},
         shown_figures=SHOWN_FIGURES,
-        run_words=RUNS,
+        run_words=MAY_RUN,
         conventions=CONVENTIONS,
         most_faults=MAX_FAULTS,
         sweeps=sweep_sections(study, results),
@@ -633,10 +634,10 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
     entries = evidence_section(robot, _evidence(results), _evidence(results.parent / instead) if instead else None)
     box_range = _box_range(stored["workspace"].results) if "workspace" in stored else ""
     computed = {stage: each for stage, each in stored.items() if heads[stage].status != "not_computed"}
-    passes = passing(computed, robot)
-    runs = [_run(stage, name, computed[stage].results) for stage in RUNS if stage in computed]
+    runs = [_run(stage, name, computed[stage].results) for stage in MAY_RUN if stage in computed]
     grasped = _grasped(computed["vision"].results) if "vision" in computed else []
     sound = {run["stage"]: run["sound"] for run in runs} | {"vision": grasped}
+    passes = passing(computed, robot, {stage: scene_of(study, name, stage) for stage in MOTIONS}, sound)
     return {
         "robot": robot,
         "table": table,
@@ -651,7 +652,7 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         "answers": [*_answers(heads, robot, passes.short(sound) if passes else "", box_range)],
         "notes": {stage: _note(head, [run for run in runs if run["stage"] == stage]) for stage, head in heads.items()},
         "bare": any(
-            _misses(heads[stage], "carried") or _misses(heads[stage], "tool") for stage in RUNS if stage in heads
+            _misses(heads[stage], "carried") or _misses(heads[stage], "tool") for stage in MAY_RUN if stage in heads
         ),
         "bodies": [each.name for each in scene.solids] if (scene := study.scene(name, "trajectory")) else [],
         "runs": runs,
@@ -772,104 +773,92 @@ def _misses(head: Head, subject: str) -> bool:
 
 @dataclass(frozen=True)
 class Passing:
-    """The tool points that pass through the tray where it is proposed, or through what it stands on.
+    """What meets the tray where it is proposed, or what it stands on.
 
     Attributes
     ----------
-    through : per stage the first time (s) by name
+    through : per stage when each motion meets it first, by name
     targets : those with a solution, whose tool points lie in it
-    unseen : names of motions whose tool points are not known, or not all
+    unseen : names of motions that are not known, or not all
+    elsewhere : how many of the motions that pass meet it at another place, the best of each surface
     """
 
-    through: Mapping[str, Mapping[str, float]]
+    through: Mapping[str, Mapping[str, Meeting]]
     targets: tuple[str, ...]
     unseen: tuple[str, ...]
+    elsewhere: tuple[tuple[Tray, int], ...] = ()
 
     @property
     def text(self) -> str:
         """What was compared, and what of it was found."""
         if not self.through:
             return ""
-        inside = tr("Targets in it or its stand: {names}.", names=joined(self.targets, ", ")) if self.targets else ""
-        said = [
-            tr("“In the tray at”: the moment from which the tool point is in the tray or its stand.")
-            if any(self.through.values())
-            else tr("No tool point of these was found in the tray or its stand."),
-            inside,
-            tr(
-                "Only tool points were compared, straight between the stored times; links and the tool's body were not."
-            ),
-        ]
+        said = [compared_with_tray({name: each for found in self.through.values() for name, each in found.items()})]
+        if self.targets:
+            said.append(tr("Targets in it or its stand: {names}.", names=joined(self.targets, ", ")))
         if self.unseen:
             said.append(tr("Not compared, or not all of it: {names}.", names=joined(self.unseen, ", ")))
         return joined(said, " ")
 
     def short(self, sound: Mapping[str, Sequence[str]]) -> str:
-        """How many there are among the names of what passes, per stage."""
+        """How many there are among the names of what passes, per stage, and where there are fewer."""
         if not self.through:
             return tr("No path, program or grasp was compared with the place of the tray.")
+        met = {stage: found.keys() & sound[stage] for stage, found in self.through.items()}
         counts = [
-            tr("{count} of the {passing} {what}", count=len(inside), passing=len(sound[stage]), what=tr(MOVED[stage]))
-            for stage, found in self.through.items()
-            if (inside := found.keys() & sound[stage])
+            tr("{count} of the {passing} {what}", count=len(inside), passing=len(sound[stage]), what=tr(MOTIONS[stage]))
+            for stage, inside in met.items()
+            if inside
         ]
         if not counts:
             return ""
-        return tr(
-            "The tray or its stand is in the way of {runs} that pass without them: the tool point goes through.",
-            runs=joined(counts, ", "),
+        said = tr("The tray or its stand is in the way of {runs} that pass without them.", runs=joined(counts, ", "))
+        tray, count = min(self.elsewhere, key=lambda each: each[1], default=(None, 0))
+        if tray is None or count >= sum(map(len, met.values())):
+            return said
+        centre = ", ".join(number(round(1000 * value)) for value in tray.centre)
+        other = tr(
+            "With its centre at ({centre}) mm over {name} it is in the way of {count} of these.",
+            centre=centre,
+            name=own_title(tray.on),
+            count=count,
         )
+        return joined([said, other], " ")
 
 
-def passing(stored: Mapping[str, Stored[Any]], robot: Robot) -> Passing | None:
-    """What passes through the tray of the study where the workspace stage puts it; None if it puts none."""
-    tray = placed_tray(stored["workspace"].results) if "workspace" in stored else None
-    if tray is None:
+def passing(
+    stored: Mapping[str, Stored[Any]],
+    robot: Robot,
+    scenes: Mapping[str, Scene | None],
+    sound: Mapping[str, Sequence[str]],
+) -> Passing | None:
+    """What meets the tray of the study where the workspace stage puts it; None if it puts none.
+
+    ``scenes``: of each stage, for what the arm carries. ``sound``: what passes in each, compared with other places too.
+    """
+    places = trays(stored["workspace"].results) if "workspace" in stored else []
+    if not places:
         return None
-    low, high = tray
-    through, unseen = dict[str, dict[str, float]](), list[str]()
-    for stage in (name for name in MOVED if name in stored):
-        results = stored[stage].results
-        through[stage] = {}
-        for name, t, points in _tool_points(results, robot):
-            first = first_inside(t, points, low, high)
-            if first is not None:
-                through[stage][name] = first
-            if len(t) < 2 or not np.isfinite(points).all():
-                unseen.append(name)
-        unseen += [each.name for each in getattr(results.summary, "not_followed", ())]
+    motions = {stage: [*stretches(stored[stage].results, robot)] for stage in MOTIONS if stage in stored}
+    through = {stage: met(robot, places[0], scenes.get(stage), each) for stage, each in motions.items()}
+    unseen = [each.name for moved in motions.values() for each in moved if not each.whole]
+    for stage in motions:
+        unseen += [each.name for each in getattr(stored[stage].results.summary, "not_followed", ())]
+    passed = {stage: [each for each in moved if each.name in sound[stage]] for stage, moved in motions.items()}
+    elsewhere = [
+        (tray, sum(len(met(robot, tray, scenes.get(stage), each)) for stage, each in passed.items()))
+        for tray in places[1:]
+        if any(through[stage].keys() & {each.name for each in passed[stage]} for stage in passed)
+    ]
+    low, high = (1000 * corner for corner in places[0].corners)
     targets = stored["inverse"].results.summary.targets if "inverse" in stored else ()
     inside = (each.name for each in targets if each.chosen_deg and np.all((low <= each.xyz_mm) & (each.xyz_mm <= high)))
-    return Passing(through, tuple(inside), tuple(unseen))
+    return Passing(through, tuple(inside), tuple(unseen), tuple(elsewhere))
 
 
 def _grasped(results: VisionResults) -> list[str]:
     """Names of the objects that can be grasped."""
     return [each.name for each in results.summary.objects if each.outcome == "grasped"]
-
-
-def _tool_points(
-    results: TrajectoryResults | ProgramsResults | VisionResults, robot: Robot
-) -> Iterator[tuple[str, Reals, Reals]]:
-    """The motions of a stage: name, times (n,) in s, and tool points (n, 3) in mm."""
-    if isinstance(results, VisionResults):
-        ways = results.ways
-        for name in _grasped(results):
-            rows = ways.take(ways.target == name)
-            yield name, rows.t_s, 1000 * forward(robot, np.radians(rows.q_deg))[:, :3, 3]
-        return
-    for name, own in _followed(results):
-        yield name, own.t_s, own.xyz_mm
-
-
-def _followed(results: TrajectoryResults | ProgramsResults) -> Iterator[tuple[str, PathChecks | ProgramMotion]]:
-    """Each path or program that was followed, and its rows."""
-    if isinstance(results, ProgramsResults):
-        for program in results.summary.programs:
-            yield program.name, results.motion.take(results.motion.program == program.name)
-        return
-    for path in results.summary.paths:
-        yield path.name, results.checks.take(results.checks.path == path.name)
 
 
 def _without_box() -> str:
@@ -927,7 +916,7 @@ def _tally(stage: str, sound: int, faults: Sequence[Fault], lost: int) -> str:
     """How many paths or programs pass, how many of the others are expected not to, and which others do not."""
     others, count = [fault for fault in faults if not fault.meant], sound + len(faults) + lost
     meant = len(faults) - len(others)
-    passing = tr("{sound} of {count} {what} pass in the model", sound=sound, count=count, what=tr(RUNS[stage]))
+    passing = tr("{sound} of {count} {what} pass in the model", sound=sound, count=count, what=tr(MAY_RUN[stage]))
     rest = N_("the other one is expected to fail") if meant == 1 else N_("the other {count} are expected to fail")
     whole = N_("{count} expected to fail") if others or lost else rest
     named = [tr("{name}: {verdict}", name=fault.name, verdict=fault.verdict) for fault in others[:MAX_TALLIED]]

@@ -263,7 +263,7 @@ def _missed(found: LeftOut, pages: Sequence[str] | None) -> tuple[str, str]:
 def head_of(stored: Stored[Any], links: Mapping[str, str] | None = None, pages: Sequence[str] | None = None) -> Head:
     """The head of a stage's page; ``links`` as of :class:`Head`, ``pages``: of the robot."""
     verdict, stage = stored.results.summary.verdict, stored.stage
-    words = import_module(STAGES[stage].messages).FIGURES
+    words = import_module(STAGES[stage].messages).KEY_FIGURES
     shown = tuple(
         ShownFigure(
             figure.name,
@@ -399,13 +399,13 @@ def render_stage(
         "command": run_command(study, f"{name}/{stage}.html"),
         "robot": study.robot(name),
         "robot_pages": study.pages(name),
-        "box": "" if stage in ("validation", "workspace", "dynamics") else _box(study, stored),
+        "box": _tray_edges(study, stored) if STAGES[stage].obstacles else "",
     }
     template = _HERE.parent / "stages" / stage / "report.html.j2"
     render(template, output, stored.results.summary, **shared | context)
 
 
-def _box(study: Study, stored: Stored[Any]) -> str:
+def _tray_edges(study: Study, stored: Stored[Any]) -> str:
     """The edges (mm) of the tray that the workspace page may place, which no other stage takes for an obstacle;
     empty where no place is asked for or recommended."""
     if "workspace" not in study.stages(stored.robot) or stored.rests_on.get("validation") == "fail":

@@ -45,4 +45,7 @@ STAGE = Stage(
     is_configured=lambda study, robot: study.entry(robot).programs is not None,
     rests_on=("validation",),
     shows=("workspace",),
+    obstacles=True,
+    motions=N_("programs"),
+    may_run=True,
 )

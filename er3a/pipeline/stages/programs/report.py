@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from markupsafe import Markup, escape
 
-from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.collision import solid_rows
 from er3a.pipeline.messages.expectations import as_expected
 from er3a.pipeline.messages.language import tr
@@ -32,7 +30,7 @@ from er3a.pipeline.stages.programs.played import (
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.pipeline.viewing.page import render_stage
-from er3a.pipeline.viewing.tray import in_tray
+from er3a.pipeline.viewing.tray import compared_with_tray, in_tray
 from er3a.program_check.program_check_findings import Level, worst_of
 from er3a.programs.languages import LANGUAGES
 
@@ -51,7 +49,8 @@ def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) ->
         output,
         head_links={each.name: f"#{each.name}" for each in summary.programs},
         sections=sections,
-        entered=None if stored.rests_on.get("validation") == "fail" else in_tray(stored, _tool_points(results)),
+        entered=None if stored.rests_on.get("validation") == "fail" else in_tray(study, stored),
+        compared_with_tray=compared_with_tray,
         limits_assumed=limits_assumed(
             summary.assumed_speed, any(each.subject == "own_accelerations" for each in summary.not_examined)
         ),
@@ -61,13 +60,6 @@ def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) ->
         solids=solid_rows(scene),
         drawing_head=drawing_head(),
     )
-
-
-def _tool_points(results: model.ProgramsResults) -> Iterator[tuple[str, Reals, Reals]]:
-    """Of each program its name, times (n,) in s and tool points (n, 3) in mm."""
-    for program in results.summary.programs:
-        rows = results.motion.take(results.motion.program == program.name)
-        yield program.name, rows.t_s, rows.xyz_mm
 
 
 def _section(results: model.ProgramsResults, program: model.ProgramSummary) -> dict[str, Any]:

@@ -32,4 +32,7 @@ STAGE = Stage(
     inputs=_inputs,
     rests_on=("validation",),
     shows=("workspace",),
+    obstacles=True,
+    motions=N_("paths"),
+    may_run=True,
 )

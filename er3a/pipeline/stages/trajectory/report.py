@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.collision import solid_rows
 from er3a.pipeline.messages.expectations import as_expected
 from er3a.pipeline.messages.kinematics import branch_word
@@ -46,7 +45,7 @@ from er3a.pipeline.viewing.conditions import condition_of, program_head
 from er3a.pipeline.viewing.figures import readings
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import packed_text, render_stage
-from er3a.pipeline.viewing.tray import in_tray
+from er3a.pipeline.viewing.tray import compared_with_tray, in_tray
 from er3a.programs.languages import titles_unwritten
 from er3a.programs.writing import with_head_lines
 from er3a.robots.robot import Robot
@@ -80,7 +79,8 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         output,
         head_links={path.name: f"#{path.name}" for path in summary.paths},
         sections=sections,
-        entered=None if contradicted else in_tray(stored, _tool_points(results)),
+        entered=None if contradicted else in_tray(study, stored),
+        compared_with_tray=compared_with_tray,
         faults={fault.name: fault for fault in faults(results)},
         unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
         clearance=clearance_section(results, count),
@@ -95,13 +95,6 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         drawing_head=drawing_head(),
         condition=condition_of(stored.validated),
     )
-
-
-def _tool_points(results: model.TrajectoryResults) -> Iterator[tuple[str, Reals, Reals]]:
-    """Of each path its name, times (n,) in s and tool points (n, 3) in mm."""
-    for path in results.summary.paths:
-        rows = results.checks.take(results.checks.path == path.name)
-        yield path.name, rows.t_s, rows.xyz_mm
 
 
 def _assumed_speeds(limits: model.LimitsUsed, robot: Robot) -> str:
