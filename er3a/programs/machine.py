@@ -305,22 +305,20 @@ def aliased_calls(program: syntax.Program) -> dict[syntax.Call, frozenset[str]]:
     A parameter that goes both ways is the caller's variable itself: the routine, or what it calls, may use that under
     its own name too, or under that of another parameter.
     """
-    changes, uses = (
-        _changes(program),
-        _gathered(program, {name: _used(each) for name, each in program.routines.items()}),
-    )
+    changes = _changes(program)
+    uses = _gathered(program, {name: _used(each) for name, each in program.routines.items()})
     found: dict[syntax.Call, frozenset[str]] = {}
     for caller in program.routines.values():
         own = _own_names(caller)
         for call in (each for each in caller.code if isinstance(each, syntax.Call)):
-            named: dict[str, set[str]] = defaultdict(set)
+            given: dict[str, list[str]] = defaultdict(list)
             for parameter, each in zip(program.routines[call.routine].parameters, call.arguments):
                 if parameter.out and isinstance(each, (syntax.Variable, syntax.Member, syntax.Element)):
-                    named[variable_of(each)] |= {parameter.name, variable_of(each)}
+                    given[variable_of(each)].append(parameter.name)
             shared = [
-                each
-                for variable, each in named.items()
-                if len(each) > 2 or (variable not in own and variable in uses[call.routine])
+                {variable, *parameters}
+                for variable, parameters in given.items()
+                if len(parameters) > 1 or (variable not in own and variable in uses[call.routine])
             ]
             changed = frozenset(name for each in shared if each & changes[call.routine] for name in each)
             if changed:

@@ -893,6 +893,12 @@ def test_a_variable_that_is_changed_under_another_name_has_no_value(tmp_path, in
     assert isinstance(motions(tmp_path, krl(body, more), "a.src")[-1].target, UnresolvedTarget)
 
 
+def test_a_variable_that_is_given_twice_may_have_the_name_of_a_parameter(tmp_path):
+    more = "DEF sub(P:OUT,Q:OUT)\nREAL P,Q\nQ=40\nPTP {A1 P}\nEND\n"
+    found = motions(tmp_path, krl(f"REAL P\nP=0\nPTP {axes(HOME)}\nsub(P,P)\nPTP {{A1 P}}", more), "a.src")
+    assert all(isinstance(each.target, UnresolvedTarget) for each in found[1:])
+
+
 def test_a_variable_that_is_only_read_under_two_names_keeps_its_value(tmp_path):
     (tmp_path / "a.dat").write_text("DEFDAT a\nDECL REAL G=30\nENDDAT\n")
     more = "DEF sub(P)\nREAL P,Q\nQ=P+G\nPTP {A1 Q}\nEND\nDEF other(P)\nREAL P\nP=P+1\nEND\n"
