@@ -183,3 +183,19 @@ def test_what_the_package_offers_is_there():
     (offered,) = (node.value for node in trees()["er3a/__init__.py"].body if "_PUBLIC" in names_of(ast.Module([node])))
     for name, module in ast.literal_eval(offered).items():
         assert name in names_of(trees()[f"{module.replace('.', '/')}.py"]), (name, module)
+
+
+IDENTIFIER = re.compile(r"`(_?[A-Za-z][A-Za-z0-9_]*_[A-Za-z0-9_]*|[A-Z][a-z]+[A-Z]\w*)(?:\(\))?`")
+
+
+def test_names_in_recipes_and_decisions_stand_in_the_tree():
+    """Backticked identifiers of the two documents that maintainers go by; those of their own examples aside."""
+    folders = ("er3a", "tests", "testing", "benchmarks", "workflow", "config", "data/manual_refs", "docs")
+    kinds = {".py", ".js", ".j2", ".yaml", ".smk", ".md", ".css", ".csv", ".json"}
+    files = [path for folder in folders for path in (ROOT / folder).rglob("*") if path.suffix in kinds]
+    documents = {ROOT / "CONTRIBUTING.md", ROOT / "docs/architecture.md"}
+    text = "\n".join(path.read_text(encoding="utf-8") for path in files if path not in documents)
+    known = set(re.findall(r"\w+", text))
+    named = {name for path in documents for name in IDENTIFIER.findall(path.read_text(encoding="utf-8"))}
+    assert len(named) > 150
+    assert sorted(named - known) == []

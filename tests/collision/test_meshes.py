@@ -20,8 +20,7 @@ from er3a.collision.bodies import Bodies
 from er3a.collision.matrix import collision_matrix
 from er3a.collision.meshes import hull_of, uncovered
 from er3a.errors import InputError
-from er3a.files.mesh_import import import_mesh
-from er3a.files.pieces_file import load_pieces
+from er3a.files.pieces_file import import_mesh, load_pieces
 from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.files.scene_file import load_scene
 from er3a.formats.mesh_file import read_mesh

@@ -140,7 +140,7 @@ def mesh(
     as_json: options.AsJson = False,
 ):
     """Split a mesh into convex pieces, for robot and scene files."""
-    from er3a.files.mesh_import import import_mesh
+    from er3a.files.pieces_file import import_mesh
 
     if output.suffix != ".json":
         raise Er3aError(f"{output}: files of convex pieces end in .json; write --output {output.stem}.json")

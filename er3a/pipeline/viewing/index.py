@@ -83,7 +83,7 @@ from er3a.pipeline.viewing.figures import new_figure
 from er3a.pipeline.viewing.numbers import decimals_of, fixed, number
 from er3a.pipeline.viewing.page import PAGES, Head, Picture, alternative_table, head_of, stage_head, status_word
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, MUTED, REFERENCE, VERDICTS
-from er3a.pipeline.viewing.tray import Meeting, Tray, compared_with_tray, met, scene_of, stretches, trays
+from er3a.pipeline.viewing.tray import Meeting, Tray, compared_with_tray, met, scene_of, stored_motions, trays
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 
@@ -804,9 +804,14 @@ class Passing:
         """How many there are among the names of what passes, per stage, and where there are fewer."""
         if not self.through:
             return tr("No path, program or grasp was compared with the place of the tray.")
-        met = {stage: found.keys() & sound[stage] for stage, found in self.through.items()}
+        met = {stage: found.keys() & sound.get(stage, ()) for stage, found in self.through.items()}
         counts = [
-            tr("{count} of the {passing} {what}", count=len(inside), passing=len(sound[stage]), what=tr(MOTIONS[stage]))
+            tr(
+                "{count} of the {passing} {what}",
+                count=len(inside),
+                passing=len(sound.get(stage, ())),
+                what=tr(MOTIONS[stage]),
+            )
             for stage, inside in met.items()
             if inside
         ]
@@ -839,12 +844,12 @@ def passing(
     places = trays(stored["workspace"].results) if "workspace" in stored else []
     if not places:
         return None
-    motions = {stage: [*stretches(stored[stage].results, robot)] for stage in MOTIONS if stage in stored}
+    motions = {stage: [*stored_motions(stored[stage].results, robot)] for stage in MOTIONS if stage in stored}
     through = {stage: met(robot, places[0], scenes.get(stage), each) for stage, each in motions.items()}
     unseen = [each.name for moved in motions.values() for each in moved if not each.whole]
     for stage in motions:
         unseen += [each.name for each in getattr(stored[stage].results.summary, "not_followed", ())]
-    passed = {stage: [each for each in moved if each.name in sound[stage]] for stage, moved in motions.items()}
+    passed = {stage: [each for each in moved if each.name in sound.get(stage, ())] for stage, moved in motions.items()}
     elsewhere = [
         (tray, sum(len(met(robot, tray, scenes.get(stage), each)) for stage, each in passed.items()))
         for tray in places[1:]

@@ -66,7 +66,7 @@ class Tray:
 
 
 @dataclass(frozen=True, eq=False)
-class Stretch:
+class StoredMotion:
     """A motion as it is stored: times (n,) in s, joints (n, joints) in rad or m, tool points (n, 3) in m."""
 
     name: str
@@ -104,29 +104,29 @@ def _tray(place: PlaceSummary, stand: StandSummary | None) -> Tray:
     return Tray(centre - half, centre + half, stand.height_m if stand and below else None, stand.name if stand else "")
 
 
-def stretches(results: object, robot: Robot) -> Iterator[Stretch]:
+def stored_motions(results: object, robot: Robot) -> Iterator[StoredMotion]:
     """The motions of a stage's results: paths and what repairs them, programs, grasps; of others none."""
     if isinstance(results, VisionResults):
         for each in results.summary.objects:
             if each.outcome == "grasped":
                 way = results.ways.take(results.ways.target == each.name)
                 q = meant(robot, way.q_deg)
-                yield Stretch(each.name, way.t_s, q, forward(robot, q)[:, :3, 3])
+                yield StoredMotion(each.name, way.t_s, q, forward(robot, q)[:, :3, 3])
     elif isinstance(results, ProgramsResults):
         for program in results.summary.programs:
             motion = results.motion.take(results.motion.program == program.name)
-            yield Stretch(program.name, motion.t_s, meant(robot, motion.q_deg), motion.xyz_mm / 1000)
+            yield StoredMotion(program.name, motion.t_s, meant(robot, motion.q_deg), motion.xyz_mm / 1000)
     elif isinstance(results, TrajectoryResults):
         for path in results.summary.paths:
             rows = results.checks.take(results.checks.path == path.name)
-            yield Stretch(path.name, rows.t_s, meant(robot, rows.q_deg), rows.xyz_mm / 1000)
+            yield StoredMotion(path.name, rows.t_s, meant(robot, rows.q_deg), rows.xyz_mm / 1000)
             if path.chosen:
                 own = (results.avoidance.path == path.name) & (results.avoidance.strategy == path.strategy)
                 repair = results.avoidance.take(own)
-                yield Stretch(repaired(path), repair.t_s, meant(robot, repair.q_deg), repair.xyz_mm / 1000)
+                yield StoredMotion(repaired(path), repair.t_s, meant(robot, repair.q_deg), repair.xyz_mm / 1000)
 
 
-def met(robot: Robot, tray: Tray, carried: Scene | None, motions: Iterable[Stretch]) -> dict[str, Meeting]:
+def met(robot: Robot, tray: Tray, carried: Scene | None, motions: Iterable[StoredMotion]) -> dict[str, Meeting]:
     """Of each motion by name when its tool point or a body of the arm first meets a tray or its stand, if it does."""
     found, scene = dict[str, Meeting](), tray.scene(carried)
     for each in motions:
@@ -154,7 +154,7 @@ def in_tray(study: Study, stored: Stored[Any]) -> Mapping[str, Markup] | None:
         return None
     robot = study.robot(stored.robot)
     scene = scene_of(study, stored.robot, stored.stage)
-    firsts = met(robot, placed[0], scene, stretches(stored.results, robot))
+    firsts = met(robot, placed[0], scene, stored_motions(stored.results, robot))
     return {
         name: moment(name, each.t, tr("meets the tray at {t:.2f} s: {body}", t=each.t, body=each.body))
         for name, each in firsts.items()
