@@ -24,15 +24,15 @@ proven harmless:
 - *meets*: a joint vector in which they overlap was found, and one in which they don't: checked;
 - *undecided*: none of this within the number of boxes: checked.
 
-Decisions in the robot file (``Robot.pair_rules``) come first. *Allowed* pairs are not checked; but whether they ever
-overlap is determined, and if they do, no verdict passes. *Watched* pairs are checked as a whole.
+Decisions in the robot file (``Robot.pair_rules``) overrule this. *Allowed* pairs are not checked. But they are judged
+as if they weren't allowed, and if they would be checked then, no verdict passes. *Watched* pairs are checked whole.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from itertools import combinations, product
+from itertools import combinations, compress, product
 from typing import Literal
 
 import numpy as np
@@ -198,7 +198,10 @@ class Held:
 
 @dataclass(frozen=True, eq=False)
 class MatrixRow:
-    """What holds of two links, or of a link and what is carried; as :class:`JudgedPair`, over all of their bodies."""
+    """What holds of two links, or of a link and what is carried; as :class:`JudgedPair`, over all of their bodies.
+
+    ``hides``: that an allowed pair would be watched otherwise.
+    """
 
     first: str
     second: str
@@ -208,6 +211,7 @@ class MatrixRow:
     left_out: float
     boxes: int
     reason: str = ""
+    hides: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,8 +229,9 @@ class CollisionMatrix:
 @derived
 def collision_matrix(robot: Robot) -> CollisionMatrix:
     """The matrix of an arm without anything carried."""
-    matrix = matrix_of(robot, list(combinations(arm_bodies(robot), 2)), robot.pair_rules)
-    return matrix if arm_shapes(robot).given else _without_poor_guesses(robot, matrix)
+    matrix = _judged_matrix(robot, list(combinations(arm_bodies(robot), 2)), robot.pair_rules)
+    matrix = matrix if arm_shapes(robot).given else _without_poor_guesses(robot, matrix)
+    return _allowing(matrix, robot.pair_rules)
 
 
 def _without_poor_guesses(robot: Robot, matrix: CollisionMatrix) -> CollisionMatrix:
@@ -244,17 +249,22 @@ def _without_poor_guesses(robot: Robot, matrix: CollisionMatrix) -> CollisionMat
 
 def matrix_of(robot: Robot, pairs: Sequence[tuple[Body, Body]], rules: Sequence[PairRule]) -> CollisionMatrix:
     """Judge pairs of bodies of different links."""
+    return _allowing(_judged_matrix(robot, pairs, rules), rules)
+
+
+def _judged_matrix(robot: Robot, pairs: Sequence[tuple[Body, Body]], rules: Sequence[PairRule]) -> CollisionMatrix:
+    """The same; pairs that are allowed are judged as if they weren't."""
     by_names: dict[tuple[str, str], list[tuple[Body, Body]]] = {}
     for first, second in pairs:
         if first.link != second.link:
             inner, outer = (first, second) if first.link < second.link else (second, first)
             by_names.setdefault((inner.name, outer.name), []).append((inner, outer))
-    decided = {frozenset((rule.first, rule.second)): rule for rule in rules}
+    decided = {frozenset((rule.first, rule.second)): rule for rule in rules if rule.rule == "watch"}
     rows, watched = [], list[tuple[tuple[Body, Body], bool]]()
     for names, bodies in by_names.items():
         rule = decided.get(frozenset(names))
         if rule:
-            found = [_allowed(robot, bodies)] if rule.rule == "allow" else [JudgedPair("watched", tuple(bodies))]
+            found = [JudgedPair("watched", tuple(bodies))]
         else:
             found = _together(robot, judged_pairs(robot, bodies, BOXES), BOXES)
         rows.append(_row(*names, found, rule.reason if rule else ""))
@@ -262,12 +272,26 @@ def matrix_of(robot: Robot, pairs: Sequence[tuple[Body, Body]], rules: Sequence[
     return CollisionMatrix(tuple(rows), tuple(pair for pair, _ in watched), tuple(joined for _, joined in watched))
 
 
-def _allowed(robot: Robot, pairs: Sequence[tuple[Body, Body]]) -> JudgedPair:
-    """An allowed pair, with a joint vector in which its bodies overlap, if in another they don't."""
-    meet = _overlap(robot, pairs).any(axis=1)
-    hidden = meet.any() and not meet.all()
-    q = quasi_random_points(robot.lower, robot.upper, TRIED)
-    return JudgedPair("allowed", witness=q[meet.argmax()] if hidden else None)
+def _allowing(matrix: CollisionMatrix, rules: Sequence[PairRule]) -> CollisionMatrix:
+    """A matrix without the pairs that rules allow, of which it says whether that hides anything.
+
+    Two links that a joint joins overlap always, but what is left of them without its region may meet.
+    """
+    allowed = {frozenset((rule.first, rule.second)): rule.reason for rule in rules if rule.rule == "allow"}
+    named = [frozenset(body.name for body in pair) for pair in matrix.watched]
+
+    def let(row: MatrixRow, pair: frozenset[str]) -> MatrixRow:
+        witness = row.witness if pair in named else None
+        found = replace(row, state="allowed", witness=witness, lower_bound=np.nan, left_out=0.0)
+        return replace(found, reason=allowed[pair], hides=pair in named)
+
+    rows = ((row, frozenset((row.first, row.second))) for row in matrix.rows)
+    kept = [names not in allowed for names in named]
+    return CollisionMatrix(
+        tuple(let(row, pair) if pair in allowed else row for row, pair in rows),
+        tuple(compress(matrix.watched, kept)),
+        tuple(compress(matrix.joined, kept)),
+    )
 
 
 def judged_pairs(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: int) -> list[JudgedPair]:

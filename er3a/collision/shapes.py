@@ -36,6 +36,7 @@ RADIUS_RATIOS = (0.055, 0.055, 0.05, 0.045, 0.04, 0.035, 0.03)
 SHORTEST = 1e-6
 LINE_POINTS, TOUCH = 25, 1e-3  # points along a piece of a link, and m, by which they may protrude
 VISIBLE = 0.02  # m, by which a link's visible mesh may protrude: covers and cables do
+UNSHAPED = 0.02  # m, of the way from the flange to a tool's point: adapters are thin, and tools reach a little less far
 
 
 @dataclass(frozen=True)
@@ -90,18 +91,43 @@ def _uncovered(robot: Robot, shapes: ArmShapes, link: int) -> bool:
     return _outside(robot, shapes, along, link, beside) or _outside(robot, shapes, seen, link, beside, VISIBLE)
 
 
-def has_bare_tool(robot: Robot) -> bool:
-    """Whether a tool's point, or the flange, lies outside the shapes that the arm's file gives the last link: the tool
-    has none.
+def has_bare_tool(robot: Robot, scene: Scene | None = None) -> bool:
+    """Whether a tool, or the flange, reaches out of all shapes, which those of the arm's file and what it carries are.
 
-    What is inside another link's shape at some joint values is not inside it at others.
+    Without anything carried, its point lies outside the last link's shapes. What is inside another link's shape at some
+    joint values is not inside it at others. Or, seen along the line from the table's end to that point, these shapes
+    and what is carried reach along less than all but ``UNSHAPED`` of it: something must hold what is carried at a
+    tool's tip. Tools are bent, and fingers stand beside the line, so it need not lie inside them.
     """
     shapes = arm_shapes(robot)
     if not shapes.given or not (robot.tool[:3, 3].any() or robot.flange[:3, 3].any()):
         return False
-    T, last = frames(robot, np.zeros(robot.joints)), robot.rows
-    point = (np.linalg.inv(T[last - 1]) @ T[last])[None, :3, 3]
-    return _outside(robot, shapes, point, last, {last})
+    last, carried = robot.rows, carried_bodies(robot, scene)
+    start, point = _end(robot.replace(tool=np.eye(4), flange=np.eye(4))), _end(robot)
+    if not carried and _outside(robot, shapes, point[None], last, {last}):
+        return True
+    bodies = [*carried, *(body for body in arm_bodies(robot) if body.link == last)]
+    return _length_without(bodies, start, point) > UNSHAPED
+
+
+def _end(robot: Robot) -> Reals:
+    """Where the tool's point is, (3,), m, in the last link's frame."""
+    T = frames(robot, np.zeros(robot.joints))
+    point: Reals = (np.linalg.inv(T[-2]) @ T[-1])[:3, 3]
+    return point
+
+
+def _length_without(bodies: Sequence[Body], start: Reals, end: Reals) -> float:
+    """The length (m) of a line, with ends (3,), along which none of some bodies in the same frame reaches."""
+    length = float(np.linalg.norm(end - start))
+    if length <= SHORTEST:
+        return 0.0
+    along = [(body.points - start) @ (end - start) / length for body in bodies]
+    reach, bare = 0.0, 0.0
+    for low, high in sorted((float(a.min()) - b.radius, float(a.max()) + b.radius) for a, b in zip(along, bodies)):
+        bare += max(min(low, length) - reach, 0.0)
+        reach = max(reach, min(high, length))
+    return bare + length - reach
 
 
 def _outside(robot: Robot, shapes: ArmShapes, points: Reals, link: int, beside: set[int], by: float = TOUCH) -> bool:

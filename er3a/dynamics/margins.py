@@ -11,7 +11,8 @@ itself; its centre is off with mass and inertia about it kept. Worst cases add.
 The wrist's limits and load diagram are the manufacturer's. A load of mass m whose centre is at distance L from a
 joint's axis makes the moment ``m g L`` and the inertia ``m L^2`` plus its own about that axis [3]_. L is the largest
 over all positions of the joints after it. Its own inertia counts with its largest principal moment, except for the last
-axis, to which the load is fixed.
+axis, to which the load is fixed. What the surroundings do to the tool adds its moment about the axis, in the same
+position, as if gravity were directed likewise.
 
 References
 ----------
@@ -29,7 +30,7 @@ from typing import Literal
 import numpy as np
 
 from er3a.dynamics.arm_model import PARAMETERS, ArmModel
-from er3a.dynamics.pose_bound import bounded_lever, max_over_poses
+from er3a.dynamics.pose_bound import bounded_lever, bounded_moment, max_over_poses
 from er3a.dynamics.torques import time_mean
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import frames
@@ -207,8 +208,15 @@ def load_tolerance(model: ArmModel, q: Reals, qd: Reals, qdd: Reals, load: Grade
     return _halves(model, (q, qd, qdd), load, load)[-1] if model.load else np.zeros_like(q)
 
 
+AT_ONCE = 10_000  # poses whose regressors are in the memory
+
+
 def _halves(model: ArmModel, motion: tuple[Reals, Reals, Reals], links: Grade, load: Grade) -> list[Reals]:
     """What each body's tolerances add, the load's last."""
+    if len(motion[0]) > AT_ONCE:
+        starts = range(0, len(motion[0]), AT_ONCE)
+        parts = [tuple(each[k : k + AT_ONCE] for each in motion) for k in starts]
+        return [np.concatenate(half) for half in zip(*(_halves(model, (q, v, a), links, load) for q, v, a in parts))]
     Y, halves = model.regressor(*motion), []
     for link, body in model.bodies:
         mass, centre = tolerances_of(body, load if link is None else links)
@@ -266,10 +274,31 @@ def worst_levers(robot: Robot, point: Reals, rows: Sequence[int]) -> tuple[Reals
     return np.array([each.found for each in found]), np.array([each.bound for each in found])
 
 
+def load_moments(robot: Robot, load: Load, gravity: float, q: Reals) -> Reals:
+    """Moments (N, m), N m, of a load at rest about each axis, at joint values (N, n), however gravity is directed; with
+    what the surroundings do to the tool."""
+    T = frames(robot, q)
+    R, arm = T[:, -1, :3, :3], T[:, -1, None, :3, 3] - T[:, :-1, :3, 3]
+    force, moment = R @ np.array(load.force), R @ np.array(load.moment)
+    about_axes = np.cross(arm, force[:, None]) + moment[:, None]
+    by_tool = np.abs((T[:, :-1, :3, 2] * about_axes).sum(axis=2))
+    found: Reals = load.mass * gravity * levers(robot, q, np.array(load.centre)) + by_tool
+    return found
+
+
+def worst_moments(robot: Robot, load: Load, gravity: float, rows: Sequence[int]) -> tuple[Reals, Reals]:
+    """Largest moments (r,) of a load, as :func:`load_moments`, about some rows' axes (from 0): found, and bounds."""
+    climbed = max_over_poses(robot, lambda q: load_moments(robot, load, gravity, q)[:, list(rows)])
+    found = [bounded_moment(robot, load, gravity, row, q) for row, q in zip(rows, climbed.q)]
+    return np.array([each.found for each in found]), np.array([each.bound for each in found])
+
+
 def wrist_use(
     robot: Robot, wrist: WristLoad, load: Load, gravity: float = GRAVITY, off: tuple[float, float] = (0.0, 0.0)
 ) -> tuple[WristUse, ...]:
     """What a load requires of the wrist at rest, in the table's order; only quantities that the wrist's data limit.
+
+    Moments take in the forces of the surroundings on the tool.
 
     ``off``: by how much the load's mass (kg) and centre (m) may be off, which ``most`` of the uses takes in.
     """
@@ -278,9 +307,14 @@ def wrist_use(
     found, bounds = worst_levers(robot, np.array(load.centre), [joint - 1 for joint in joints])
     far = dict(zip(joints, zip(found.tolist(), (bounds + off[1]).tolist())))
     uses = [WristUse("payload", None, load.mass, heaviest, wrist.payload)] if np.isfinite(wrist.payload) else []
+    pushed = any(load.force) or any(load.moment)
     for joint, allowed in wrist.moment:
         lever, longest = far[joint]
-        uses.append(WristUse("moment", joint, load.mass * gravity * lever, heaviest * gravity * longest, allowed))
+        asked, most = load.mass * gravity * lever, heaviest * gravity * longest
+        if pushed:
+            (asked,), (bound,) = (each.tolist() for each in worst_moments(robot, load, gravity, [joint - 1]))
+            most += bound - load.mass * gravity * (longest - off[1])
+        uses.append(WristUse("moment", joint, asked, most, allowed))
     for joint, allowed in wrist.inertia:
         (lever, longest), own = far[joint], _own(robot, load, joint)
         most = heaviest * longest**2 + ratio * own

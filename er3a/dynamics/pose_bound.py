@@ -4,7 +4,7 @@
 evenly spread poses and improves the best few: it sets one joint after another to the best value of a grid over its
 whole range, then refines the grid about it.
 
-**Bound** (:func:`bounded_torque`, :func:`bounded_lever`): a box of joint values has a bound from the corners of its
+**Bound** (:func:`bounded_torque`, :func:`bounded_moment`): a box of joint values has a bound from the corners of its
 hulls. Boxes that can't exceed the largest value found are dropped. The others are halved, the highest bound first.
 When boxes or budget run out, no pose exceeds the largest of the value found and the remaining bounds, up to
 rounding.
@@ -33,6 +33,7 @@ from er3a.kinematics.chain import constant_links, joint_starts
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.quasi_random import quasi_random_points
 from er3a.robots.joint_limits import within
+from er3a.robots.masses import Load
 from er3a.robots.robot import Robot
 
 WIDEST_ARC = np.pi / 3  # rad to either side
@@ -77,11 +78,8 @@ def corners(robot: Robot, low: Reals, high: Reals) -> Reals:
 
 def hanging_of(model: ArmModel) -> list[Hanging]:
     """What each link (of rows 0 to m - 1) adds of its own; load and forces at the tool count to the last one."""
-    robot, load = model.robot, model.load
-    last = constant_links(robot)[-1]
-    force, moment = (
-        last[:3, :3] @ np.array(part) for part in ((load.force, load.moment) if load else ((0.0,) * 3,) * 2)
-    )
+    robot = model.robot
+    moment, force = _wrench(robot, model.load or Load(0.0))
     found = []
     for row in range(robot.rows):
         own = [body for link, body in model.bodies if (robot.rows if link is None else link) == row + 1]
@@ -90,18 +88,26 @@ def hanging_of(model: ArmModel) -> list[Hanging]:
             Hanging(
                 sum(body.mass for body in own),
                 _alone(sum((body.mass * np.array(body.centre) for body in own), np.zeros(3))),
-                _alone((moment + np.cross(last[:3, 3], force)) * at_end),
+                _alone(moment * at_end),
                 _alone(force * at_end),
             )
         )
     return found
 
 
-def point_of(robot: Robot, point: Reals) -> list[Hanging]:
-    """A point (3,) of the flange as a point mass of 1 kg on the last row."""
-    placed = flange_in_last_link(robot) @ np.append(point, 1.0)
+def load_alone(robot: Robot, load: Load) -> list[Hanging]:
+    """A load, and what the surroundings do to the tool, on the last row of an arm without masses."""
+    centre = (flange_in_last_link(robot) @ np.append(load.centre, 1.0))[:3]
     none = [_alone(np.zeros(3))] * 3
-    return [*[Hanging(0.0, *none)] * (robot.rows - 1), Hanging(1.0, _alone(placed[:3]), *none[1:])]
+    hanging = (_alone(each) for each in (load.mass * centre, *_wrench(robot, load)))
+    return [*[Hanging(0.0, *none)] * (robot.rows - 1), Hanging(load.mass, *hanging)]
+
+
+def _wrench(robot: Robot, load: Load) -> tuple[Reals, Reals]:
+    """Moment about the last row's origin and force, (3,) each, of the surroundings on the tool, in that row's frame."""
+    last = constant_links(robot)[-1]
+    force, moment = (last[:3, :3] @ np.array(part) for part in (load.force, load.moment))
+    return moment + np.cross(last[:3, 3], force), force
 
 
 def _alone(vector: Reals) -> Reals:
@@ -243,13 +249,21 @@ def bounded_torque(model: ArmModel, joint: int, size: Size, start: Bounded) -> B
 
 def bounded_lever(robot: Robot, point: Reals, row: int, start: Reals) -> Bounded:
     """The largest distance (m) of a point (3,) of the flange from a row's axis (from 0); ``start`` is a pose (n,)."""
-    own = point_of(robot, point)
+    x, y, z = point.tolist()
+    return bounded_moment(robot, Load(1.0, (x, y, z)), 1.0, row, start)
 
-    def levers(at: list[Reals]) -> Reals:
-        first = carried(robot, own, at, row).first
-        return np.tile(np.hypot(first[..., 0], first[..., 1]), (1, _ahead(at, row)))
 
-    return _bounded_norm(robot, levers, start, CLOSE_LEVER)
+def bounded_moment(robot: Robot, load: Load, gravity: float, row: int, start: Reals) -> Bounded:
+    """The largest moment (N m) of a load about a row's axis (from 0) at rest, however gravity (m/s^2) is directed, with
+    what the surroundings do to the tool; ``start`` is a pose (n,)."""
+    own = load_alone(robot, load)
+
+    def moments(at: list[Reals]) -> Reals:
+        outer = carried(robot, own, at, row)
+        found = gravity * np.hypot(outer.first[..., 0], outer.first[..., 1]) + np.abs(outer.moment[..., 2])
+        return np.tile(found, (1, _ahead(at, row)))
+
+    return _bounded_norm(robot, moments, start, CLOSE_LEVER)
 
 
 def _ahead(at: list[Reals], row: int) -> int:

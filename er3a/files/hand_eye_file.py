@@ -262,7 +262,8 @@ def load_hand_eye(path: str | Path, arm: Robot | None = None) -> CalibrationSet:
 
     Parameters
     ----------
-    arm : the robot that was used, to convert joint angles into flange poses; not needed for sets with flange poses
+    arm : the robot that was used, to convert joint angles into flange poses; not needed for sets with flange poses.
+        What is in the robot's base (flange poses and touched points by its controller) is placed by ``arm.base``
 
     Raises
     ------
@@ -312,7 +313,7 @@ def read_calibration(
         camera_covariance=per_sample,
         flange_covariance=head.flange_standard_deviation.covariance() if head.flange_standard_deviation else None,
         q=q,
-        touched=_touched(path.parent / head.touched) if head.touched else None,
+        touched=_touched(path.parent / head.touched, robot) if head.touched else None,
         touch_deviation=head.touch_standard_deviation_mm / 1000,
         shared=shared,
     )
@@ -377,10 +378,12 @@ def _form(table: Path, header: list[str], stream: str) -> str:
 def _flange(
     table: Path, rows: list[dict[str, Any]], header: list[str], robot: Robot | None
 ) -> tuple[Reals, Reals | None]:
-    """T_base_flange (N, 4, 4), from joint values by the robot's table where they are given."""
+    """T_world_flange (N, 4, 4), from joint values by the robot's table where they are given; else a controller gives it
+    from the robot's own base."""
     given = _joint_columns(header)
     if not given:
-        return poses_of(table, rows, "flange", _form(table, header, "flange")), None
+        poses = poses_of(table, rows, "flange", _form(table, header, "flange"))
+        return poses if robot is None else robot.base @ poses, None
     if pose_form(table, header, "flange"):
         raise InputError(table, "header", "joint angles and flange poses both say where the arm was", "Keep one")
     if robot is None:
@@ -418,11 +421,14 @@ def _stream(table: Path, name: str, robot: Robot | None) -> Stream:
     return Stream(t, T)
 
 
-def _touched(table: Path) -> Reals:
+def _touched(table: Path, robot: Robot | None = None) -> Reals:
+    """Points (k, 2, 3), m, as the camera located them and as the robot touched them; of a robot in the world."""
     rows = read_csv(table, POINTS)
     found = np.array([[row[name] for name in POINTS] for row in rows], dtype=float).reshape(-1, 2, 3) / 1000
     if not len(found):
         raise InputError(table, None, "the table has a header but no points", "Add a row for each point touched")
+    if robot is not None:
+        found[:, 1] = found[:, 1] @ robot.base[:3, :3].T + robot.base[:3, 3]
     return found
 
 

@@ -242,8 +242,8 @@ def import_urdf(
     that joint's own link if they branch. Loads, cameras and tools are mounted there.
 
     Wrong limits, speeds, shapes and inertias are corrected or left out, with a note that names joint or link and the
-    value. Joints in the chain that follow others (mimic) become a coupling. Grippers, and linkages that only follow,
-    are left out with a note.
+    value. Joints in the chain that follow others (mimic) become a coupling; their own limits and speeds hold the joints
+    that they follow. Grippers, and linkages that only follow, are left out with a note.
 
     Parameters
     ----------
@@ -262,7 +262,6 @@ def import_urdf(
     found = urdf_tree.read_chain(path, base, tip, snap)
     robot, sources, coupling, shift, notes = _robot_of_chain(path, found)
     moving = [joint for joint in found.joints if joint.moves]
-    limits = np.stack([robot.lower, robot.upper], axis=1)
     q = np.random.default_rng(0).uniform(-math.pi, math.pi, (MISFIT_POSES, len(sources)))
     given = _chain_forward(found.joints, q @ coupling.T + shift)
     misfit = np.linalg.norm((forward(robot, q) - given)[:, :3, 3], axis=1).max()
@@ -285,10 +284,7 @@ def import_urdf(
         envelopes=envelopes, hulls=hulls, visuals=visuals, masses=masses, sources={**robot.sources, **more}
     )
     first, last = found.joints[0].parent, found.joints[-1].child
-    beyond = _followers_beyond(moving, coupling, shift, limits)
-    return UrdfImport(
-        robot, (*found.notes, *notes, *beyond, *shaped, *unseen, *weighed), float(misfit), names, first, last
-    )
+    return UrdfImport(robot, (*found.notes, *notes, *shaped, *unseen, *weighed), float(misfit), names, first, last)
 
 
 def urdf_table(path: str | Path, *, base: str | None = None, tip: str | None = None) -> tuple[Robot, tuple[str, ...]]:
@@ -416,22 +412,25 @@ def _robot_of_chain(
     table = table_from_axes(directions, points, T)
     plain = np.array_equal(coupling, np.eye(*coupling.shape))
     limits, notes = _limits(path, sources)
+    speed = np.array([joint.speed if joint.speed < FASTEST else math.nan for joint in sources])
+    held, speed, more = _held_by_followers(moving, coupling, shift, limits, speed)
+    continuous = np.array([joint.type == "continuous" for joint in sources]) & (held == limits).all(axis=1)
     groups = ("dh", "zero", "limits", "speeds", "base", "flange", *(() if plain else ("coupling",)))
     robot = Robot(
         name=robot_name(path),
         title=path.stem[:200] or sources[0].name,
         convention="standard",
-        lower=limits[:, 0],
-        upper=limits[:, 1],
-        speed=np.array([joint.speed if joint.speed < FASTEST else math.nan for joint in sources]),
+        lower=held[:, 0],
+        upper=held[:, 1],
+        speed=speed,
         zero_pose="As the URDF has it with all joints at 0.",
         sources=dict.fromkeys(groups, Source(f"Derived from the joint axes of {path.name}", "export")),
         sliding=sliding,
         coupling=None if plain else coupling,
-        continuous=np.array([joint.type == "continuous" for joint in sources]),
+        continuous=continuous,
         **vars(table),
     )
-    return robot, sources, coupling, shift, notes
+    return robot, sources, coupling, shift, [*notes, *more]
 
 
 def _asked(split: bool | urdf_tree.Split) -> urdf_tree.Split | None:
@@ -611,16 +610,31 @@ def _limits(path: Path, sources: list[urdf_tree.UrdfJoint]) -> tuple[Reals, list
     return np.array(rows), notes
 
 
-def _followers_beyond(moving: Sequence[urdf_tree.UrdfJoint], coupling: Reals, shift: Reals, limits: Reals) -> list[str]:
-    """Which joints of the chain follow others out of limits of their own, which the robot's limits don't keep."""
-    ends = np.sort(coupling @ limits + shift[:, None], axis=1)
-    notes = []
-    for joint, (least, most) in zip(moving, ends.tolist()):
+def _held_by_followers(
+    moving: Sequence[urdf_tree.UrdfJoint], coupling: Reals, shift: Reals, limits: Reals, speed: Reals
+) -> tuple[Reals, Reals, list[str]]:
+    """Limits (n, 2) and speeds (n,) of joints with which those that follow them keep their own, too, and notes."""
+    limits, speed, notes = limits.copy(), speed.copy(), []
+    for joint, row, offset in zip(moving, coupling, shift.tolist()):
+        leader, factor = int(np.abs(row).argmax()), float(row[np.abs(row).argmax()])
+        if joint.mimic is None or factor == 0:
+            continue
+        name, (least, most) = joint.mimic.source, np.sort(factor * limits[leader] + offset).tolist()
         stated = joint.lower < joint.upper and joint.type != "continuous"
-        if joint.mimic is not None and stated and (least < joint.lower - FOLLOWS or most > joint.upper + FOLLOWS):
-            taken, own = f"from {least:g} to {most:g}", f"{joint.lower:g} to {joint.upper:g}"
-            notes.append(f"joint {joint.name} follows {joint.mimic.source} {taken}; its own limits {own} are not kept")
-    return notes
+        if stated and (least < joint.lower - FOLLOWS or most > joint.upper + FOLLOWS):
+            lower, upper = sorted(((joint.lower - offset) / factor, (joint.upper - offset) / factor))
+            lower, upper = max(lower, float(limits[leader, 0])), min(upper, float(limits[leader, 1]))
+            told = f"joint {joint.name} follows {name} from {least:g} to {most:g}; its own limits {joint.lower:g} to "
+            if lower < upper:
+                limits[leader] = lower, upper
+                notes.append(f"{told}{joint.upper:g} hold that to {lower:g} to {upper:g}")
+            else:
+                notes.append(f"{told}{joint.upper:g} are not kept")
+        if joint.speed < FASTEST and not speed[leader] * abs(factor) <= joint.speed * (1 + FOLLOWS):
+            speed[leader] = joint.speed / abs(factor)
+            told = f"joint {joint.name}, which follows {name}, has the velocity {joint.speed:g}"
+            notes.append(f"{told}, which holds that to {speed[leader]:g}")
+    return limits, speed, notes
 
 
 def export_urdf(robot: Robot, meshes: str | Path | None = None) -> str:
@@ -683,8 +697,9 @@ def _describe(robot: Robot, k: int, moved_by: list[tuple[int, float]], joint: El
     kind = "prismatic" if robot.sliding[k] else "continuous" if endless else "revolute"
     joint.set("type", kind)
     ElementTree.SubElement(joint, "axis", xyz=f"0 0 {robot.direction[k]:g}")
-    speed = 0.0 if math.isnan(robot.speed[j]) else robot.speed[j]
-    limits = {} if endless else {"lower": robot.lower[j], "upper": robot.upper[j]}
+    speed = 0.0 if math.isnan(robot.speed[j]) else abs(factor) * robot.speed[j]
+    lower, upper = sorted((factor * robot.lower[j], factor * robot.upper[j]))
+    limits = {} if endless else {"lower": lower, "upper": upper}
     driver = moved_by.index((j, 1.0))
     limits |= {"velocity": speed, "effort": urdf_tree.peak_torque(robot, j) if driver == k else 0.0}
     ElementTree.SubElement(joint, "limit", {key: repr(float(value)) for key, value in limits.items()})
@@ -717,7 +732,7 @@ def export_srdf(robot: Robot) -> str:
     Pairs of links that are disabled: those that are proven apart in all joint vectors within the limits (Never),
     that a joint joins (Adjacent), that the robot's file allows to touch (User), and whose shapes overlap in every
     joint vector (Default), which is an error of the shapes: a comment names them. What er3a still checks of links
-    that a joint joins, away from that joint, SRDF has no words for.
+    that a joint joins, away from that joint, SRDF has no words for: :func:`pairs_checked_in_part` names them.
     """
     root = ElementTree.Element("robot", name=robot.name)
     group = ElementTree.SubElement(root, "group", name="arm")
@@ -737,3 +752,11 @@ def pairs_not_checked(robot: Robot) -> tuple[str, ...]:
     return tuple(
         f"{row.first} and {row.second}" for row in collision_matrix(robot).rows if REASONS.get(row.state) == "Default"
     )
+
+
+def pairs_checked_in_part(robot: Robot) -> tuple[str, ...]:
+    """Pairs of links that the SRDF disables, as they touch at their joint, of which er3a checks the rest."""
+    matrix = collision_matrix(robot)
+    rests = {(first.name, second.name) for first, second in matrix.watched}
+    joined = (row for row in matrix.rows if row.state == "joined" and (row.first, row.second) in rests)
+    return tuple(f"{row.first} and {row.second}" for row in joined)

@@ -204,6 +204,7 @@ class _Moves:
 
     def __init__(self, robot: Robot, bodies: Bodies, margin: float) -> None:
         self.bodies, self.margin = bodies, margin
+        self.coupling = np.eye(robot.rows) if robot.coupling is None else robot.coupling
         T = link_frames(robot, np.zeros(len(robot.lower)))
         origins = T[[capsule.link for capsule in bodies.capsules], None, :3, 3]
         reach = np.linalg.norm(bodies.ends(np.zeros(len(robot.lower))) - origins, axis=-1).max()
@@ -216,8 +217,8 @@ class _Moves:
 
     def free(self, a: Reals, b: Reals) -> bool:
         """Whether the move from a to b (n,) keeps the margin."""
-        turn = np.abs(b - a)
-        swing, smallest = float(self.levers @ turn), SHORTEST_STEP / max(float(turn.max()), SHORTEST_STEP)
+        turn, of_rows = np.abs(b - a), np.abs(self.coupling @ (b - a))
+        swing, smallest = float(self.levers @ of_rows), SHORTEST_STEP / max(float(turn.max()), SHORTEST_STEP)
         if any(self.clear(a + share * (b - a)) < self.margin for share in LIKELY):
             return False
         share = 0.0

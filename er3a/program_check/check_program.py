@@ -315,7 +315,9 @@ def _located(execution: Execution, robot: Robot, checker: StepChecker, end: int)
     groups: dict[tuple[Place, str, str], list[LocatedFinding]] = defaultdict(list)
     for each in found:
         groups[each.place, each.finding.code, _which(each.finding)].append(each)
-    grouped = [replace(same[0], times=len(same)) for same in groups.values()]
+    grouped = [
+        replace(max(same, key=lambda each: found_in.RANKS[each.level]), times=len(same)) for same in groups.values()
+    ]
     order = {path: i for i, path in enumerate(dict.fromkeys(str(each.place.file) for each in grouped))}
     return tuple(
         sorted(grouped, key=lambda each: (order[str(each.place.file)], each.place.line, -found_in.RANKS[each.level]))

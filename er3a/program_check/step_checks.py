@@ -546,6 +546,7 @@ MAX_MOTION_SHARE = 0.5  # that a zone may take
 TOLERANCE = 1e-9
 SAME_JOINTS = 1e-4  # rad
 BEND_PARTS = 16
+NEAR_PARTS = 129
 
 
 @dataclass(frozen=True, eq=False)
@@ -609,6 +610,7 @@ class CheckedMotion(ByValue):
 
 
 MAX_SOLUTIONS = 8  # of a target, to which joint moves are tried
+MAX_MOTIONS_AGAIN = 1_000  # that are checked again after two ways with the same tool pose and other joints have joined
 VIA_TURNS = (20.0, 40.0)  # deg, by which joints are turned away on the way round
 
 
@@ -621,29 +623,42 @@ class StepChecker:
         self.motions: dict[int, CheckedMotion] = {}
         self.returns: list[tuple[Ending, found_in.LoopComesBackOtherwise]] = []
         self._joints: list[Reals | None] = []
-        self._before: list[int] = []  # the motion that an arm blends from into the next; -1 for none
+        self._before: list[tuple[int, bool]] = []  # as of _after, by step
         self._known: dict[Hashable, CheckedMotion] = {}
         self._corners: dict[Hashable, tuple[found_in.CheckFinding, ...]] = {}
+        self._again = 0  # motions that were checked from other joints
+        self._following: dict[int, list[int]] = defaultdict(list)
+        for number, step in enumerate(execution.steps):
+            self._following[step.before].append(number)
 
     def check(self, number: int) -> None:
         """Check a step; all earlier steps must have been checked."""
         step = self.execution.steps[number]
-        joints = self._joints[step.before] if step.before >= 0 else self.start
-        before = self._before[step.before] if step.before >= 0 else -1
+        joints = self._before_it(number)
+        before = self._before[step.before] if step.before >= 0 else (-1, False)
         what = step.instruction
         if isinstance(what, instructions.ArmMotion):
             self.motions[number] = motion = self._from_start(self._motion(what, joints), joints)
             joints = motion.end
             self._corner(before, number)
-            before = number
-        elif isinstance(what, instructions.Pause):
-            before = -1
-        elif (isinstance(what, instructions.Unknown) and what.may_move) or (
-            isinstance(what, instructions.MovesBeside) and what.kind != "interrupt"
-        ):
-            joints, before = None, -1
+        elif _is_lost(what):
+            joints = None
         self._joints.append(joints)
-        self._before.append(before)
+        self._before.append(self._after(before, number))
+
+    def _after(self, before: tuple[int, bool], number: int) -> tuple[int, bool]:
+        """The motion that the arm may blend from after a step, -1 for none; and whether it may stop at its target too.
+
+        A wait for which the arm need not stop may be over before the corner, so that it is rounded. So may be that
+        before a motion to where the arm is.
+        """
+        what, motion = self.execution.steps[number].instruction, before[0]
+        if isinstance(what, instructions.ArmMotion):
+            passes = motion >= 0 and self.motions[number].stays and what.zone.kind != "fine"
+            return (motion, True) if passes else (number, False)
+        if isinstance(what, instructions.Pause):
+            return (-1, False) if what.stops else (motion, True)
+        return (-1, False) if _is_lost(what) else before
 
     def _from_start(self, motion: CheckedMotion, joints: Reals | None) -> CheckedMotion:
         """The first motion, with limits that the arm stands beyond before it: no target before says so."""
@@ -669,18 +684,74 @@ class StepChecker:
         return target_findings(self.arms, motions, {i: _key(motion) for i, motion in motions.items()})
 
     def close_loop(self, ending: Ending) -> None:
-        """Where a loop begins again: whether the arm stands as it did then, and the corner between the rounds."""
-        if ending.kind != "repeats" or ending.repeats_from is None or ending.step < 0:
+        """Where a way comes to what was followed before: the corner there, and what follows from where the arm stands.
+
+        A loop that comes back otherwise is named. A way that joins another one by the tool's pose alone, as its joints
+        differ, is checked on until they are the same.
+        """
+        if ending.repeats_from is None or ending.step < 0:
             return
-        first = self.execution.steps[ending.repeats_from]
-        then = self._joints[first.before] if first.before >= 0 else self.start
-        now = self._joints[ending.step]
-        if then is not None and now is not None and np.abs(now - then).max() > SAME_JOINTS:
+        at = self.execution.steps[ending.repeats_from].before
+        then, now, before = self._before_it(ending.repeats_from), self._joints[ending.step], self._before[ending.step]
+        loops = ending.kind == "repeats"
+        if then is None or now is None or not _apart(then, now):
+            self._checked_on(at, then, before)
+        elif loops or not self._checked_on(at, now, before):
             joint = int(np.argmax(np.abs(now - then)))
             other = joint_shown(self.arms.robot, joint, float(now[joint] - then[joint]))
             self.returns.append((ending, found_in.LoopComesBackOtherwise(joint + 1, *other)))
-        if isinstance(first.instruction, instructions.ArmMotion):
-            self._corner(self._before[ending.step], ending.repeats_from)
+            if loops:
+                self._checked_on(at, then, before)
+
+    def _before_it(self, number: int) -> Reals | None:
+        """Joints (n,) before a step, rad; None if not known."""
+        before = self.execution.steps[number].before
+        return self._joints[before] if before >= 0 else self.start
+
+    def _checked_on(self, at: int, joints: Reals | None, before: tuple[int, bool]) -> bool:
+        """Check what follows a step from other joints, or after another motion, until both make no difference.
+
+        Returns
+        -------
+        done : False where that takes too many motions
+        """
+        steps = self.execution.steps
+        last = self.motions.get(before[0])
+        waiting = [(number, joints, before, last) for number in self._following[at]]
+        while waiting:
+            number, joints, before, last = waiting.pop()
+            what, same = steps[number].instruction, not _apart(joints, self._before_it(number))
+            if isinstance(what, instructions.ArmMotion):
+                self._again += not same
+                if self._again > MAX_MOTIONS_AGAIN:
+                    return False
+                motion = self.motions[number] if same else self._motion(what, joints)
+                self._add(number, motion.findings, motion.moments)
+                if last is not None:
+                    self._add(before[0], self._corner_findings(last, motion))
+                if same:
+                    continue
+                joints = motion.end
+            elif _is_lost(what) or (same and before[0] < 0):
+                continue
+            after = self._after(before, number)
+            if after[0] != before[0]:
+                last = motion if after[0] == number else None
+            waiting += [(each, joints, after, last) for each in self._following[number]]
+        return True
+
+    def _add(
+        self,
+        number: int,
+        findings: Iterable[found_in.CheckFinding],
+        moments: Mapping[found_in.CheckFinding, float] | None = None,
+    ) -> None:
+        """Add what is new of findings to those of a motion."""
+        motion = self.motions[number]
+        new = tuple(each for each in dict.fromkeys(findings) if each not in motion.findings)
+        if new:
+            moments = {**(moments or {}), **motion.moments}
+            self.motions[number] = replace(motion, findings=(*motion.findings, *new), moments=moments)
 
     def joint_moves_instead(self, number: int) -> tuple[Reals, ...]:
         """Joint moves (n,), one or two, that take the tool where a motion does and pass its checks; empty if none was
@@ -898,25 +969,28 @@ class StepChecker:
         moments = {**motion.moments, near: float(along.t[along.closest])}
         return replace(motion, findings=(*motion.findings, near), moments=moments)
 
-    def _corner(self, first: int, second: int) -> None:
-        """Check the corner between two motions if a zone rounds it."""
+    def _corner(self, before: tuple[int, bool], second: int) -> None:
+        """Check the corner between two motions if a zone rounds it; ``before`` as of :meth:`_after`."""
+        first, may_stop = before
         if first < 0:
             return
         motion = self.motions[first]
-        zone = motion.placed.motion.zone
-        if zone.kind == "fine":
+        if motion.placed.motion.zone.kind == "fine":
             return
-        after = self.motions[second]
+        self._add(first, self._corner_findings(motion, self.motions[second]))
+        for number in () if may_stop else (first, second):
+            blended = self.motions[number]
+            self.motions[number] = replace(blended, blended_ends=min(blended.blended_ends + 1, 2))
+
+    def _corner_findings(self, motion: CheckedMotion, after: CheckedMotion) -> list[found_in.CheckFinding]:
+        """Findings on the corner between two motions if a zone rounds it."""
+        zone = motion.placed.motion.zone
         findings: list[found_in.CheckFinding] = []
         if zone.kind in ("named", "velocity"):
             findings.append(found_in.ZoneWithoutSize(zone.text))
-        if motion.way is not None and after.way is not None:
+        if zone.kind != "fine" and motion.way is not None and after.way is not None:
             findings += self._rounded(motion.way, after.way, motion)
-        new = tuple(each for each in findings if each not in motion.findings)
-        self.motions[first] = replace(
-            motion, findings=(*motion.findings, *new), blended_ends=min(motion.blended_ends + 1, 2)
-        )
-        self.motions[second] = replace(self.motions[second], blended_ends=min(self.motions[second].blended_ends + 1, 2))
+        return findings
 
     def _round_corner(
         self, way: MotionPath, after: MotionPath, corners: Reals, shares: tuple[float, float], margin: float = 0.0
@@ -946,7 +1020,10 @@ class StepChecker:
             found.append(found_in.ZoneTooLarge(zone.value * 1000, min(way.length, after.length) * 1000))
         if self.obstacles is None or motion.clearance is None or motion.clearance < 0:
             return tuple(found)
-        share_before, share_after = (min(share, MAX_MOTION_SHARE) for share in shares)
+        share_before, share_after = (
+            max(min(share, MAX_MOTION_SHARE), _share_near(zone, part, at_end))
+            for share, part, at_end in zip(shares, (way, after), (True, False))
+        )
         corners = np.stack(
             [
                 way.joints_at(np.array(1 - share_before)),
@@ -968,6 +1045,18 @@ class StepChecker:
         return tuple(found)
 
 
+def _apart(a: Reals | None, b: Reals | None) -> bool:
+    """Whether joints (n,), rad, that are known both, differ."""
+    return a is not None and b is not None and bool(np.abs(a - b).max() > SAME_JOINTS)
+
+
+def _is_lost(what: instructions.Instruction) -> bool:
+    """Whether it is not known where the arm is after an instruction."""
+    return (isinstance(what, instructions.Unknown) and what.may_move) or (
+        isinstance(what, instructions.MovesBeside) and what.kind != "interrupt"
+    )
+
+
 def _bend(way: MotionPath, first: float, last: float) -> Reals:
     """By how much joints (n,) leave the straight way between two shares of a motion, rad; 0 in a joint move."""
     if way.tool_path is None:
@@ -987,6 +1076,16 @@ def _zone_share(motion: instructions.ArmMotion, way: MotionPath) -> float:
         case "share":
             return min(zone.value, 1.0) * MAX_MOTION_SHARE
     return MAX_MOTION_SHARE
+
+
+def _share_near(zone: instructions.Zone, way: MotionPath, at_end: bool) -> float:
+    """The share of a joint move, at most half, on which the tool is within its zone's distance of the corner."""
+    if zone.kind != "distance" or way.tool_path is not None:
+        return 0.0
+    shares = np.linspace(0.0, MAX_MOTION_SHARE, NEAR_PARTS)
+    points = forward(way.arm, way.joints_at(1 - shares if at_end else shares))[:, :3, 3]
+    beyond = np.flatnonzero(np.linalg.norm(points - points[0], axis=1) > zone.value)
+    return float(shares[beyond[0]]) if beyond.size else MAX_MOTION_SHARE
 
 
 def _vias(arm: Robot, start: Reals, end: Reals) -> Reals:
@@ -1018,9 +1117,9 @@ def _turns(arm: Robot, start: Reals, ends: Reals) -> Reals:
 def _said(motion: instructions.ArmMotion) -> list[found_in.CheckFinding]:
     """Findings on a motion that do not depend on the arm."""
     found: list[found_in.CheckFinding] = []
-    outer = getattr(motion.target, "external", ())
+    outer = {name: None for each in (motion.target, motion.via) for name, _ in getattr(each, "external", ())}
     if outer:
-        found.append(found_in.ExternalAxesLeftOut(tuple(name for name, _ in outer)))
+        found.append(found_in.ExternalAxesLeftOut(tuple(outer)))
     rates = [rate.value for rate in (motion.speed, motion.acceleration) if rate is not None and rate.unit == "share"]
     if rates and max(rates) > 1 + TOLERANCE:
         found.append(found_in.MoreThanFullSpeed(100 * max(rates)))

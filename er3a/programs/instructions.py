@@ -138,7 +138,8 @@ class JointTarget(ByValue):
 
     Attributes
     ----------
-    external : names and values (rad or m as the controller has them, not converted) of axes beside the arm's
+    external : names and values (rad or m as the controller has them, not converted) of axes beside the arm's; NaN where
+        not known
     stated : T_base_tool (4, 4), m, that a table gives beside the joints, NaN where it gives none of it
     """
 
@@ -238,10 +239,16 @@ class ArmMotion(ByValue):
 
 @dataclass(frozen=True, slots=True)
 class Pause:
-    """The arm waits: for so many seconds, for a condition, or for the operator (both None)."""
+    """The program waits: for so many seconds, for a condition, or for the operator (both None).
+
+    Attributes
+    ----------
+    stops : whether the arm is known to stand at its target then, even after a motion with a zone
+    """
 
     seconds: float | None = None
     condition: str | None = None
+    stops: bool = False
 
 
 @dataclass(frozen=True, slots=True)

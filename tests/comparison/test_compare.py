@@ -6,12 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import er3a
 from er3a.comparison.compare import best_of
 from er3a.files.arm_file import read_arm
+from er3a.files.robot_writer import write_robot
 from er3a.formats.urdf_tree import read_chain
 from er3a.geometry.transforms import rot_x, rot_z
+from er3a.pipeline.cli import app
 from er3a.pipeline.messages.comparison import headline
 from testing.arm_pairs import KINDS, Arm, defined_elsewhere, flange_at, name, random_arm, with_wrong_entries
 from testing.arms import made_of
@@ -266,6 +269,15 @@ def test_a_flange_that_is_only_turned_is_named_with_its_angle():
     assert (round(found.as_printed_mm, 6), round(found.as_printed_deg, 6)) == (0, 180)
     assert found.aligned_deg < 1e-6
     assert "0.0 mm and 180.0 deg off as printed" in headline(found)
+
+
+def test_tools_that_differ_are_said_not_to_be_compared(tmp_path):
+    longer = er3a.load_robot("er3a_c60").replace(name="longer", tool=er3a.pose([0, 0, 0.1], [0, 0, 0]))
+    write_robot(longer, tmp_path / "longer.yaml")
+    for other, told in ((str(tmp_path / "longer.yaml"), True), ("er3a_c60", False)):
+        done = CliRunner().invoke(app, ["compare", "er3a_c60", other])
+        assert done.exit_code == 0
+        assert ("tools are not compared; these differ (their points by 100 mm)" in done.stderr) == told
 
 
 def test_the_arm_that_fits_best_comes_first():

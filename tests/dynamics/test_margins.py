@@ -265,6 +265,26 @@ def test_the_worked_example_of_a_manual():
         assert most * (1 - 1e-9) <= use.most < most * 1.01
 
 
+def test_forces_on_the_tool_count_to_the_wrists_moments(arm):
+    """A tool of 120 mm, pushed across by 100 N: joint 5 holds that by a lever of 198.5 mm, besides 1 kg at 30 mm."""
+    tool = np.eye(4)
+    tool[2, 3] = 0.12
+    arm, load = arm.replace(tool=tool), Load(1.0, (0.0, 0.0, 0.03), force=(100.0, 0.0, 0.0), moment=(0.0, 0.0, 0.5))
+    wrist = WristLoad(np.nan, ((4, 7.0), (5, 7.0), (6, 4.0)), ())
+    uses = {use.joint: use for use in wrist_use(arm, wrist, load)}
+    assert uses[5].asked == pytest.approx(100 * 0.1985 + 9.81 * 0.1085, rel=1e-6)
+    assert uses[6].asked == pytest.approx(0.5, rel=1e-6)
+    q = np.random.default_rng(3).uniform(arm.lower, arm.upper, (500, 6))
+    for turn in np.random.default_rng(4).uniform(-np.pi, np.pi, (5, 3)):  # however the arm is mounted
+        mounted = arm.replace(base=er3a.pose(np.zeros(3), turn))
+        held = np.abs(er3a.gravity(mounted, q, load) - er3a.gravity(mounted, q)).max(axis=0)
+        assert all(held[joint - 1] <= use.asked * (1 + 1e-6) for joint, use in uses.items())
+    for use in uses.values():
+        assert use.asked <= use.most <= use.asked * (1 + 1.1e-5)
+    off = {use.joint: use.most for use in wrist_use(arm, wrist, load, off=(0.1, 0.005))}
+    assert off[5] == pytest.approx(100 * 0.1985 + 1.1 * 9.81 * 0.1135, rel=1e-4)
+
+
 def test_levers_are_distances_of_the_load_from_the_axes(arm):
     point, q = np.array([0.03, -0.02, 0.1]), np.random.default_rng(2).uniform(arm.lower, arm.upper, (3000, 6))
     far, bounds = worst_levers(arm, point, range(2, 6))

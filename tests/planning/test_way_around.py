@@ -22,9 +22,11 @@ from er3a.planning.way_around import (
     PlannerMissing,
     PlanningTask,
     WayAround,
+    _Moves,
     way_around,
     way_between,
 )
+from testing.arms import palletiser
 from testing.hard_scenes import hard_scenes
 from testing.motion_cases import contacts_of
 
@@ -69,6 +71,16 @@ def test_planned_motions_touch_nothing_and_keep_their_limits(title, random):
         assert (np.abs(acceleration) <= LIMITS.acceleration * (1 + 1e-9)).all()
         assert not np.abs(velocity[[0, -1]]).max() > 1e-9
     assert found
+
+
+def test_a_move_of_an_arm_with_more_rows_than_joints_is_tried_as_its_rows_turn():
+    """Joint 2 of a palletizer turns rows 2 and 3, the latter back, and joint 3 rows 3 and 4."""
+    robot = palletiser()
+    moves = _Moves(robot, Bodies(robot, None), 0.0)
+    assert moves.levers.shape == (5,)
+    start, end = np.radians([[0, -60, 60, 0], [40, -20, 90, 10]])
+    assert moves.free(start, end) == (Bodies(robot, None).min_distance(np.linspace(start, end, 300))[0] > 0).all()
+    np.testing.assert_allclose(moves.coupling @ (end - start), np.radians([40, 40, -10, -30, 10]))
 
 
 def test_the_straight_move_between_them_would_touch(random):

@@ -11,7 +11,9 @@ from typer.testing import CliRunner
 from er3a.collision.matrix import collision_matrix
 from er3a.collision.pairs import link_label
 from er3a.files.robot_library import load_robot
+from er3a.files.robot_writer import write_robot
 from er3a.pipeline.cli import app
+from er3a.robots.robot import CombinedLimit
 
 
 @pytest.mark.parametrize("name", ["er3a_c60", "er3_600"])
@@ -34,3 +36,15 @@ def test_pairs_left_to_check_are_those_that_are_watched(name, tmp_path):
     watched = [row for row in rows if row.state in ("meets", "undecided", "watched")]
     assert left == {(numbers[row.first], numbers[row.second]) for row in watched}
     assert left
+    disabled = {(row.first, row.second) for row in rows if row.state == "joined"}
+    folds = disabled & {(first.name, second.name) for first, second in collision_matrix(robot).watched}
+    assert ("link_2", "link_4") in folds  # the forearm folds onto the upper arm
+    for first, second in disabled:
+        assert (f"{first} and {second} are disabled" in done.stderr) == ((first, second) in folds)
+
+
+def test_limits_on_sums_of_joints_are_told_to_be_left_out(tmp_path):
+    for combined in ((), (CombinedLimit((0.0, 1.0, 1.0, 0.0, 0.0, 0.0), -1.0, 2.0),)):
+        write_robot(load_robot("er3a_c60").replace(name="arm", combined=combined), tmp_path / "arm.yaml")
+        asked = ["export-urdf", str(tmp_path / "arm.yaml"), "--output", str(tmp_path / "arm.urdf")]
+        assert ("limits on sums of joints are left out" in CliRunner().invoke(app, asked).stderr) == bool(combined)

@@ -233,12 +233,32 @@ def test_a_mesh_has_the_unit_of_its_file_and_a_link_s_size(tmp_path, unit, side)
         np.testing.assert_allclose(np.sort(sides), [0.04, 0.06, 0.12], atol=1e-9)
 
 
-def test_a_follower_that_leaves_its_own_limits_is_told(tmp_path):
-    follower = '<mimic joint="j1" multiplier="3" offset="0.5"/>'
-    kept, left = (f'<limit lower="-{x}" upper="{x}" velocity="3"/>' for x in (6.5, 6.4))
-    for own, told in ((kept, []), (left, ["joint j2 follows j1 from -5.5 to 6.5; its own limits -6.4 to 6.4 are not"])):
+def test_what_a_follower_states_of_itself_holds_the_joint_that_it_follows(tmp_path):
+    """Joint 2 turns three times as far as joint 1, and 0.5 rad more; limits 0 and 0 say nothing, 20 and 21 can't be."""
+    follower = '<mimic joint="j1" multiplier="{}" offset="0.5"/>'
+    kept, held = "joint j2 follows j1 from -5.5 to 6.5; its own limits ", "hold that to"
+    fast = "joint j2, which follows j1, has the velocity 3, which holds that to 1"
+    cases = (
+        ("3", (-6.5, 6.5, 9), (-2, 2, 3), []),
+        ("3", (-6.4, 6.4, 9), (-2, 5.9 / 3, 3), [f"{kept}-6.4 to 6.4 {held} -2 to 1.96667"]),
+        ("-3", (-4, 6.4, 9), (-5.9 / 3, 1.5, 3), [f"{kept}-4 to 6.4 {held} -1.96667 to 1.5"]),
+        ("3", (20, 21, 9), (-2, 2, 3), [f"{kept}20 to 21 are not kept"]),
+        ("3", (0, 0, 3), (-2, 2, 1), [fast]),
+        ("0.5", (-6.5, 6.5, 3), (-2, 2, 3), []),
+    )
+    for factor, (least, most, own), (lower, upper, speed), told in cases:
         text = urdf()
         at = text.index("</joint>", text.index('"j2"'))
         start = text.rindex("<limit", 0, at)
-        notes = import_urdf(written(tmp_path, text[:start] + own + follower + text[at:])).notes
-        assert [note.removesuffix(" kept") for note in notes if "follows" in note] == told
+        limit = f'<limit lower="{least}" upper="{most}" velocity="{own}"/>'
+        found = import_urdf(written(tmp_path, text[:start] + limit + follower.format(factor) + text[at:]))
+        assert [note for note in found.notes if "follows" in note] == told
+        robot = found.robot
+        assert (robot.lower[0], robot.upper[0], robot.speed[0]) == pytest.approx((lower, upper, speed), rel=1e-6)
+        ends = [robot.coupling[1, 0] * end + 0.5 for end in (robot.lower[0], robot.upper[0])]
+        assert "not kept" in str(told) or not least < most or least - 1e-6 <= min(ends) <= max(ends) <= most + 1e-6
+        again = import_urdf(written(tmp_path, export_urdf(robot)))
+        assert not [note for note in again.notes if "follows" in note]
+        assert (again.robot.lower[0], again.robot.upper[0], again.robot.speed[0]) == pytest.approx(
+            (lower, upper, speed)
+        )

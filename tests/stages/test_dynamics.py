@@ -304,6 +304,22 @@ def test_the_wrist_is_compared_at_rest_and_along_the_paths(full):
     np.testing.assert_allclose(np.hypot(own.across_mm, own.along_mm + 78.5)[-1], lever_mm, rtol=1e-9)
 
 
+@pytest.mark.long
+def test_forces_on_the_tool_count_to_the_wrist_at_rest_and_along_the_paths(tmp_path, full):
+    """60 N across the flange, 78.5 mm from joint 5's axis; the load's own mass is as before."""
+    forced = CLAIM | {"body": LOAD, "force_n": [60.0, 0.0, 0.0]}
+    summary = computed(tmp_path, a_study(tmp_path, limited(1.0), entry={"payload": forced}, kept=ONE)).results.summary
+    at_rest = {use.joint: use.asked for use in summary.uses if use.quantity == "moment" and use.path is None}
+    weight, push = 1.5 * 9.81 * np.hypot(0.02, 0.09 + 0.0785), 60 * 0.0785
+    assert at_rest[5] == pytest.approx(weight + push, rel=1e-6)
+    assert isinstance(summary.verdict.finding, Overload)
+    before = next(path for path in full[1].results.summary.paths if path.name == "joint_move")
+    (path,) = summary.paths
+    more = {a.joint: b.moment_n_m - a.moment_n_m for a, b in zip(before.wrist, path.wrist)}
+    assert push - 2 * weight <= more[5] <= push * (1 + 1e-6)
+    assert more[5] != 0
+
+
 def test_beyond_the_limits_it_is_an_overload(tmp_path, full):
     study = a_study(tmp_path, limited(0.3), entry={"payload": CLAIM | {"body": LOAD}}, kept=ONE)
     beyond = computed(tmp_path, study)

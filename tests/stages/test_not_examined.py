@@ -306,6 +306,29 @@ def test_what_a_scene_allows_and_shows_of_a_tool_is_named(study):
     assert "bare_tool" not in {each.subject for each in left_out_of_collisions(robot, bodies_of(robot, held), held)}
 
 
+@pytest.mark.parametrize(
+    ("solids", "bare"),
+    [
+        ((), True),
+        ((("part", 0.0),), True),  # held at the tip by a rod without a shape
+        ((("rod", -0.12), ("part", 0.0)), False),
+        ((("rod", -0.06), ("part", 0.0)), True),  # 50 mm are missing
+        ((("rod", -0.12),), False),  # the tip is 15 mm beyond it
+    ],
+)
+@pytest.mark.parametrize("beside", [0.0, 0.04])
+def test_what_is_carried_has_to_reach_from_the_last_link_to_the_tools_tip(solids, bare, beside):
+    """The last link's shape reaches 33 mm along a tool of 250 mm. Fingers stand beside the line, and tools are bent."""
+    tool = transform(np.array([0, 0, 0.25]), np.zeros(3))
+    robot = load_robot(ROBOT).replace(tool=tool)
+    sizes = {"rod": (0.02, 0.02, 0.21), "part": (0.02, 0.02, 0.02)}
+    carried = [Box(n, transform(np.array([beside, 0, z]), np.zeros(3)), sizes[n]) for n, z in solids]
+    scene = Scene("Carried", (), tuple(carried))
+    assert has_bare_tool(robot, scene) is bare
+    found = left_out_of_collisions(robot, bodies_of(robot, scene), scene)
+    assert (LeftOut("bare_tool", ("tool",)) in found) is bare
+
+
 def test_a_target_near_assumed_shapes_is_a_caution(study, tmp_path):
     """The arm stands 9.4 mm above the table; nothing settles whether it does."""
     (tmp_path / "targets.yaml").write_text("kind: targets\ntargets:\n- {name: a, q_deg: [0, -10, -10, 0, -70, 0]}\n")
@@ -528,15 +551,21 @@ def test_a_line_whose_tilt_the_arms_joints_leave_off_is_no_pass(tmp_path, monkey
 
 
 def test_what_the_robots_file_allows_and_where_the_base_stands_is_named():
-    """Link 6 hits the base in some poses; links 1 and 2 overlap always. A ball about the base's axis misplaces it."""
-    rules = tuple(PairRule(*pair, "allow", "A test") for pair in (("base", "link_6"), ("link_1", "link_2")))
+    """Link 6 hits the base in some poses; links 1 and 2 overlap always. So do links 2 and 4, which the elbow joins, but
+    the forearm also folds onto the upper arm. A ball about the base's axis misplaces it."""
+    pairs = (("base", "link_6"), ("link_1", "link_2"), ("link_2", "link_4"))
+    rules = tuple(PairRule(*pair, "allow", "A test") for pair in pairs)
     robot = load_robot(ROBOT).replace(pair_rules=rules)
     places = ((0, 0, 0.1), (0.09, 0, 0.1), (0.4, 0, 0.1))
     balls = [Sphere(name, transform(np.array(p), np.zeros(3)), 0.05) for name, p in zip("abc", places)]
     scene = Scene("Balls", tuple(balls))
     found = {each.subject: each.names for each in left_out_of_collisions(robot, bodies_of(robot, scene), scene)}
-    assert (found["allowed_contacts"], found["allowed_pairs"]) == (("base/link_6",), ("link_1/link_2",))
+    assert (found["allowed_contacts"], found["allowed_pairs"]) == (("base/link_6", "link_2/link_4"), ("link_1/link_2",))
     assert (found["base_inside"], found["base_contacts"]) == (("a",), ("b",))
+    guessed = load_robot("er3a_c60_article")  # it allows two pairs of guessed shapes that can't be right
+    subjects = {each.subject: each.names for each in left_out_of_collisions(guessed, bodies_of(guessed, None), None)}
+    assert subjects["allowed_pairs"] == ("base/link_2", "link_2/link_4")
+    assert "allowed_contacts" not in subjects
 
 
 @pytest.mark.parametrize("margin", [0.0, 1e-12])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import shutil
 from pathlib import Path
 
@@ -15,7 +16,9 @@ from er3a.errors import InputError
 from er3a.files.hand_eye_file import load_hand_eye, read_calibration
 from er3a.files.kept_files import ROOT
 from er3a.files.robot_library import load_robot
+from er3a.files.robot_writer import write_robot
 from er3a.files.vision_file import load_vision
+from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.pipeline.cli import app
 from er3a.pipeline.stages.vision.entry import vision_files
@@ -25,6 +28,7 @@ from testing.arms import scara
 from testing.hand_eye_sets import X_TRUE, Y_TRUE, flange_poses, noisy, off, seen
 
 POSITION = ("x_mm", "y_mm", "z_mm")
+POINT_NAMES = [f"{part}_{c}_mm" for part in ("seen", "touched") for c in "xyz"]
 HEAD = "kind: hand_eye\ntitle: made\nsource: a test\nsetup: {setup}\nsamples: samples.csv\n"
 
 
@@ -74,6 +78,40 @@ def test_joint_angles_become_poses_by_the_robots_own_table(tmp_path, poses):
     np.testing.assert_allclose(found.flange, forward(robot.without_tool(), np.radians(q)), atol=1e-12)
     with pytest.raises(InputError, match="need a robot's table"):
         load_hand_eye(tmp_path / "set.yaml")
+
+
+def test_what_a_controller_gives_is_placed_by_the_robots_base(tmp_path):
+    """Joint angles, and flange poses and touched points as the controller has them, are of one arm on a pedestal."""
+    robot = load_robot("er3a_c60")
+    placed = robot.replace(base=transform(np.array([0.0, 0.1, 0.06]), np.array([0.0, 0.0, 0.3])))
+    random = np.random.default_rng(2)
+    q = random.uniform(-40, 40, (8, 6))
+    at_zero = forward(robot.without_tool(), np.radians(q))
+    target = columns(noisy(seen("eye_to_hand", at_zero), random), "target", "quaternion")
+    points = random.uniform(-300, 300, (4, 6))
+    rows = [POINT_NAMES, *(map(str, row) for row in points.tolist())]
+    (tmp_path / "touched.csv").write_text("\n".join(map(",".join, rows)))
+    head = HEAD.format(setup="eye_to_hand") + "touched: touched.csv\n"
+    by_joints = {f"q{j + 1}_deg": q[:, j] for j in range(6)}
+    sets = [
+        load_hand_eye(write(tmp_path, table | target, head), placed)
+        for table in (by_joints, columns(at_zero, "flange", "quaternion"))
+    ]
+    np.testing.assert_allclose(sets[0].flange, placed.base @ at_zero, atol=1e-12)
+    np.testing.assert_allclose(sets[1].flange, sets[0].flange, atol=1e-9)
+    for each in sets:
+        np.testing.assert_allclose(each.touched[:, 0], points[:, :3] / 1000)
+        np.testing.assert_allclose(
+            each.touched[:, 1], points[:, 3:] / 1000 @ placed.base[:3, :3].T + placed.base[:3, 3], atol=1e-12
+        )
+    write_robot(placed.replace(name="arm"), tmp_path / "arm.yaml")
+    printed = []
+    for table in (by_joints, columns(at_zero, "flange", "quaternion")):
+        file = write(tmp_path, table | target, HEAD.format(setup="eye_to_hand"))
+        told = CliRunner().invoke(app, ["hand-eye", str(file), "--robot", str(tmp_path / "arm.yaml"), "--json"])
+        printed.append(json.loads(told.stdout)["hand_eye"]["xyz_mm"])
+    np.testing.assert_allclose(*printed, atol=1e-3)
+    np.testing.assert_allclose(printed[0], 1000 * X_TRUE[:3, 3], atol=1.0)
 
 
 def spoiled(what: str, flange: np.ndarray, target: np.ndarray) -> dict[str, np.ndarray]:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 MAX_TOLERANCE = 1000.0  # mm, and deg
 MATCHES_SHOWN = 5  # of a folder
+TOOLS_EQUAL = 1e-9  # m, and of axes
 _ARM = "a D-H table (.csv), a robot's name or file, a URDF or xacro"
 
 
@@ -46,6 +47,8 @@ def compare(
     as_json: AsJson = False,
 ):
     """Do A and B describe the same arm? Lists the entries that differ. Exit code 1 if any do."""
+    import numpy as np
+
     from er3a.comparison.compare import best_of
     from er3a.files.arm_file import read_arm, read_arms
     from er3a.robots.robot import to_modified, to_standard
@@ -78,6 +81,10 @@ def compare(
     for source, read in ((a, first), (name, others[name])):
         for note in read.notes:
             print_note(f"{source}: {note}")
+    tool = others[name].robot.tool
+    if not np.allclose(arm.tool, tool, rtol=0.0, atol=TOOLS_EQUAL):
+        apart = 1000 * float(np.linalg.norm(arm.tool[:3, 3] - tool[:3, 3]))
+        print_note(f"{a} and {name}: tools are not compared; these differ (their points by {apart:.3g} mm)")
     if output is not None and found.corrected is not None:
         from er3a.files.robot_writer import write_robot
 

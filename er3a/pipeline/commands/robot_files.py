@@ -91,7 +91,7 @@ def export_urdf(
     """Write a robot as URDF."""
     from er3a.files.kept_files import write_atomically
     from er3a.files.robot_library import load_robot
-    from er3a.formats.urdf import export_srdf, pairs_not_checked
+    from er3a.formats.urdf import export_srdf, pairs_checked_in_part, pairs_not_checked
     from er3a.formats.urdf import export_urdf as urdf_text
 
     arm = load_robot(robot)
@@ -100,6 +100,13 @@ def export_urdf(
         texts[srdf] = export_srdf(arm)
         for pair in pairs_not_checked(arm):
             options.print_note(f"{srdf}: {pair} overlap where no arm can; their shapes are in error, not checked")
+        for pair in pairs_checked_in_part(arm):
+            told = (
+                "are disabled, as they touch at their joint; er3a checks the rest of them, but who reads the SRDF won't"
+            )
+            options.print_note(f"{srdf}: {pair} {told}")
+    if arm.combined:
+        options.print_note(f"{output}: limits on sums of joints are left out, as a URDF has no place for them")
     for file, text in texts.items():
         write_atomically(file, partial(Path.write_text, data=text, encoding="utf-8"))
         print(f"{file}: written")
@@ -288,6 +295,8 @@ def hand_eye(
 
     Exit code 1 if the calibration can't be used.
     """
+    import numpy as np
+
     from er3a.files.hand_eye_file import HandEyeFile, read_calibration
     from er3a.files.robot_library import load_robot
     from er3a.files.yaml_file import load
@@ -300,7 +309,9 @@ def hand_eye(
     from er3a.vision.table_corrections import correct_table, zeros_tried
     from er3a.vision.vision_findings import HandEyeError, grave_warnings
 
-    arm, asked = load_robot(robot) if robot else None, load(HandEyeFile, file).table_corrections
+    # What is printed is for the controller, and so in the robot's own base, wherever its file places that.
+    arm = load_robot(robot).replace(base=np.eye(4)) if robot else None
+    asked = load(HandEyeFile, file).table_corrections
     with shown_work(f"{file}: reading the samples") as at:
         samples, offset, images = read_calibration(file, arm)
         open_tilts = ambiguous_tilts(images.views, samples.names) if images else ()

@@ -29,16 +29,14 @@ TEXTS = texts(
             "collisions of links that reach out of all shapes: they have none, or look larger than the shapes checked"
         ),
         "left_out.bare_tool": (
-            "collisions of the tool (or bare flange): its point lies outside the last link's shapes, and the scene "
-            "gives it no shape"
+            "collisions of the tool (or bare flange): it reaches out of the last link's shapes, and the scene gives no "
+            "shape to all of it (`carried`)"
         ),
         "left_out.allowed_contacts": "collisions that the scene's or the robot's file allows",
         "left_out.arm_errors": "what the arm's own errors add to a grasp's: the file states none",
         "left_out.objects_out_of_view": "whether the camera can have seen objects that lie out of its stated view",
         "left_out.unexamined_pairs": "collisions of pairs whose shapes can't be right",
-        "left_out.allowed_pairs": (
-            "collisions of pairs that the robot's file allows: none was seen, or they overlap always"
-        ),
+        "left_out.allowed_pairs": ("collisions of pairs that the robot's file allows: they never meet, or always do"),
         "left_out.joined_pairs": (
             "overlaps of these links where they meet at a joint, and how near they come; the rest of them is examined"
         ),

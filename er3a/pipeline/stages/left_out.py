@@ -46,9 +46,9 @@ def left_out_of_collisions(
     shapes, rules = arm_shapes(robot), scene.pair_rules if scene else ()
     solids = {solid.name for solid in scene.solids} if scene else set()
     by_scene = {frozenset((each.first, each.second)): f"{each.first}/{each.second}" for each in rules}
-    bare = dict.fromkeys(name or tip for name, arm in (("", robot), *arms) if not carries and has_bare_tool(arm))
+    bare = dict.fromkeys(name or tip for name, arm in (("", robot), *arms) if has_bare_tool(arm, scene))
     allowed = [name for name in pairs("allowed") if frozenset(name.split("/")) not in by_scene]
-    hidden = {f"{row.first}/{row.second}" for row in bodies.matrix if row.witness is not None}
+    hidden = {f"{row.first}/{row.second}" for row in bodies.matrix if row.hides}
     contacts = base_contacts(robot, scene)
     found: list[tuple[LeftOutSubject, tuple[str, ...]]] = [
         ("base_inside", tuple(each.solid for each in contacts if each.inside)),

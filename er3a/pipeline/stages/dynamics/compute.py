@@ -248,7 +248,8 @@ class PathJudge:
 def path_torques(
     arm: LoadedArm, motion: Motion, judged: tuple[tuple[PathVerdict, ...], bool], samples: int, wrist: tuple[int, ...]
 ) -> PathTorques:
-    """Torques of a path: its table at evenly spread times, peaks and means also where the path was solved and checked.
+    """Torques of a path: its table at evenly spread times; peaks and means also where the path was solved and checked,
+    and within pieces of it that are shorter than their steps.
 
     Parameters
     ----------
@@ -265,6 +266,7 @@ def path_torques(
         return PathTorques(absent, asked, model.TorqueRows.empty(), None, np.full((n, 2), np.nan), None)
     timed, kinematic, no_law = _timings(arm, motion.joints, t, q)
     evenly, t = t, np.union1d(t, motion.t)
+    t = np.union1d(t, within_short_pieces(motion, float(np.diff(t).max(initial=0.0))))
     rates = np.stack(motion.rates(t), axis=1)
     known = np.isfinite(rates).all(axis=(1, 2))
     t, (q, qd, qdd) = t[known], rates[known].swapaxes(0, 1)
@@ -303,6 +305,20 @@ def path_torques(
     imbalance = power_imbalance(arm.model, parts, q, qd, qdd)
     own_load = arm.load if summary.program_load_kg is not None else None
     return PathTorques(summary, asked, rows, needed, inertia, imbalance, own_load)
+
+
+PER_PIECE = 4  # times computed within a piece of a motion
+BEFORE_END = 1e-6  # of a piece, as accelerations step from piece to piece
+
+
+def within_short_pieces(motion: Motion, step: float) -> Reals:
+    """Times in s: begin, middle and end of those pieces of a motion of the joints that steps (s) would pass over."""
+    if motion.polynomials is None:
+        return np.empty(0)
+    starts, spans = motion.polynomials.times[:-1], np.diff(motion.polynomials.times)
+    short = spans < PER_PIECE * step
+    found: Reals = starts[short, None] + spans[short, None] * [0.0, 0.5, 1 - BEFORE_END]
+    return found.ravel()
 
 
 def _joint_loads(
@@ -370,10 +386,11 @@ def _timings(
 def _wrist_moments(
     arm: LoadedArm, t: Reals, q: Reals, qd: Reals, qdd: Reals, wrist: tuple[int, ...]
 ) -> tuple[model.WristMoment, ...]:
-    """What the load's own mass asks of the wrist's joints."""
+    """What the load's own mass, and the surroundings' forces on the tool, ask of the wrist's joints."""
     if arm.load is None:
         return ()
-    by_load = np.abs(arm.model.rigid_torques(q, qd, qdd) - arm.bare.rigid_torques(q, qd, qdd))
+    by_mass = arm.model.rigid_torques(q, qd, qdd) - arm.bare.rigid_torques(q, qd, qdd)
+    by_load = np.abs(by_mass + arm.model.tool_torques(q))
     off = margins.load_tolerance(arm.model, q, qd, qdd, arm.load_grade)
     most = [(j, int(by_load[:, j - 1].argmax())) for j in wrist]
     return tuple(model.WristMoment(j, float(by_load[at, j - 1]), float(off[at, j - 1]), float(t[at])) for j, at in most)

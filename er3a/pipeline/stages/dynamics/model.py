@@ -241,7 +241,8 @@ class BindingLimit:
 
 @dataclass(frozen=True)
 class WristMoment:
-    """The largest moment that the load makes about a wrist axis along a path, accelerations included."""
+    """The largest moment that the load makes about a wrist axis along a path, with accelerations and what the
+    surroundings do to the tool."""
 
     joint: int
     moment_n_m: float

@@ -127,7 +127,7 @@ def diagram_figure(summary: model.DynamicsSummary, rows: model.DiagramRows) -> P
     ax.legend(loc="upper right")
     caption = tr(
         "A load whose centre lies below the curve of its mass is within the allowed moments and inertias of the wrist. "
-        "The curves take the load as a point; its own inertia counts in the comparison above."
+        "The curves take the load as a point; its own inertia, and forces on the tool, count in the comparison above."
     )
     return Picture(figure, tr("The load diagram: one curve for each mass."), caption)
 
