@@ -597,7 +597,7 @@ def remedy_at(finding: CheckFinding, joint_moves: Sequence[Sequence[float]]) -> 
     """What to do about a finding: ``joint_moves`` (deg) that pass, or else what mends it and was not tried here."""
     if not joint_moves:
         return remedy(finding)
-    *via, end = [", ".join(alike(row)) for row in joint_moves]
+    *via, end = [", ".join(alike(row)).replace("−", "-") for row in joint_moves]  # to be copied into a program
     if via:
         return sentence("remedy.joint_moves", via=via[0], end=end)
     return sentence("remedy.joint_move", end=end)
