@@ -104,6 +104,13 @@ class Bodies:
         """The joined pairs by name, of which no distance is counted until they overlap."""
         return tuple(dict.fromkeys(pair.label for pair, joined in zip(self.pairs, self.joined) if joined))
 
+    def joined_apart(self, q: Reals) -> float | None:
+        """How near, m, joined pairs come in arms (N, n), some of which may be NaN, without overlapping there."""
+        q, layout = np.ascontiguousarray(q[np.isfinite(q).all(axis=1)], float), _of_pairs(self.layout, self.joined)
+        found, rest = np.empty((len(q), int(self.joined.sum()))), np.empty(len(q))
+        measure(layout, q, found, rest, np.empty(len(q), np.int64), np.empty(len(q), bool))
+        return float(found[found > 0].min()) if (found > 0).any() else None
+
     def ends(self, q: Reals) -> Reals:
         """Points (..., bodies, k, 3) in m whose hulls are the cores of bodies, at joint angles (..., n) in rad.
 

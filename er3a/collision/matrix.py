@@ -39,8 +39,8 @@ import numpy as np
 import scipy
 
 from er3a.collision.distances import FREE, MEETS, ROOM, Layout, measure, pair_distance, place, search_boxes
-from er3a.collision.pairs import BASE, TRIED
-from er3a.collision.scene import Scene
+from er3a.collision.pairs import BASE, PENETRATION_TOLERANCE, TRIED
+from er3a.collision.scene import Box, Scene
 from er3a.collision.shapes import Body, arm_bodies, arm_shapes, layout_of, link_frames, solid_bodies
 from er3a.kinematics.forward import frames
 from er3a.numerics.arrays import Flags, Reals
@@ -599,6 +599,17 @@ def base_contacts(robot: Robot, scene: Scene | None) -> tuple[BaseContact, ...]:
         ):
             found[contact.solid] = contact
     return tuple(found.values())
+
+
+def solids_met(robot: Robot, box: Box, scene: Scene) -> tuple[str, ...]:
+    """Solids of a scene, by name, that a box would overlap by more than ``PENETRATION_TOLERANCE`` on a side."""
+    inner = replace(box, size=np.maximum(np.asarray(box.size) - 2 * PENETRATION_TOLERANCE, PENETRATION_TOLERANCE))
+    bodies = [*solid_bodies(inner), *(body for solid in scene.solids for body in solid_bodies(solid))]
+    layout = layout_of(robot, bodies, [(0, k) for k in range(1, len(bodies))])
+    shape, room, near = (layout.start, layout.kind, layout.radius, layout.disc), np.empty((ROOM, 3)), np.empty((2, 3))
+    found = [pair_distance(layout.points, shape, 0, k, room, near) for k in range(1, len(bodies))]
+    met = (body.name for body, (distance, deep) in zip(bodies[1:], found) if deep or distance < 0)
+    return tuple(dict.fromkeys(met))
 
 
 def _middle(body: Body) -> Body:

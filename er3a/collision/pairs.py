@@ -104,11 +104,13 @@ class ShapesAssumed(Finding):
     given : whether the robot's file gives shapes, inferred or claimed; else they were guessed from its table
     margin_mm : within which of assumed shapes nothing is settled
     near : what comes so near to them without touching, by name
+    partial : whether a document gives them, but for some links only in part
     """
 
     given: bool
     margin_mm: float
     near: tuple[str, ...] = ()
+    partial: bool = False
 
 
 def link_label(number: int) -> str:

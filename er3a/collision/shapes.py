@@ -7,7 +7,9 @@ would overlap the shape around the next joint in every pose.
 
 ``ArmShapes.bare`` lists the links without a shape, because their contacts are not seen. No verdict passes if such a
 link reaches out of its neighbours' shapes (``ArmShapes.uncovered``), or if a link's visual mesh reaches out of its own
-and its neighbours' shapes by ``VISIBLE``.
+and its neighbours' shapes by ``VISIBLE``. Nor does one if the shapes of a link reach along too little of its
+lengths in the table (``ArmShapes.partial``). Only how far they reach in the direction of a length counts, as housings
+are often offset from the table's lines; and a d between parallel axes does not count, as it may stand in any row.
 
 The guess puts a capsule around each straight piece of a link, along its joint's axis and across to the next. Its radius
 is a share of the arm's size (the sum of all link lengths): 5.5 % at the shoulder, falling to 3 % at the wrist, an
@@ -21,7 +23,7 @@ from dataclasses import dataclass, replace
 from typing import assert_never
 
 import numpy as np
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, QhullError
 
 from er3a.collision.distances import CYLINDER, HALF_SPACE, HULL, WORLD, Layout, cylinder_points, distances_from_hull
 from er3a.collision.pairs import BASE, ShapesAssumed, link_label
@@ -36,6 +38,9 @@ RADIUS_RATIOS = (0.055, 0.055, 0.05, 0.045, 0.04, 0.035, 0.03)
 SHORTEST = 1e-6
 LINE_POINTS, TOUCH = 25, 1e-3  # points along a piece of a link, and m, by which they may protrude
 VISIBLE = 0.02  # m, by which a link's visible mesh may protrude: covers and cables do
+COVERED, GAP = 0.75, 0.04  # of a link's lengths in the table its shapes have to reach along so much, or all but GAP, m
+ASSUMED_GRADES: tuple[Grade, ...] = ("inferred", "claim")
+PARALLEL = 1e-6  # cosine short of 1
 UNSHAPED = 0.02  # m, of the way from the flange to a tool's point: adapters are thin, and tools reach a little less far
 
 
@@ -52,6 +57,8 @@ class ArmShapes:
         only links without length
     uncovered : of these, those that reach out of the shapes of the links beside them, along the table's lengths; and
         links whose visual meshes reach out of all shapes
+    partial : links with given shapes that reach along less than ``COVERED`` of the link's lengths in the table, and
+        leave more than ``GAP`` of them, each with that share
     """
 
     capsules: tuple[Envelope, ...]
@@ -60,11 +67,12 @@ class ArmShapes:
     grade: Grade
     bare: tuple[int, ...]
     uncovered: tuple[int, ...] = ()
+    partial: tuple[tuple[int, float], ...] = ()
 
     @property
     def assumed(self) -> bool:
-        """Whether no document that a verdict may rest on gives them."""
-        return self.grade in ("inferred", "claim")
+        """Whether no document that a verdict may rest on gives them, or not for all of a link."""
+        return self.grade in ASSUMED_GRADES or bool(self.partial)
 
 
 @derived
@@ -78,7 +86,48 @@ def arm_shapes(robot: Robot) -> ArmShapes:
     bare = tuple(link for link in range(robot.rows + 1) if given and link not in shaped)
     grade = source.grade if given and source else "inferred"
     shapes = ArmShapes(capsules, pieces, given, grade, bare)
-    return replace(shapes, uncovered=tuple(k for k in range(robot.rows + 1) if _uncovered(robot, shapes, k)))
+    lengths = ((link, *covered_lengths(robot, shapes, link)) for link in sorted(shaped) if given)
+    return replace(
+        shapes,
+        uncovered=tuple(k for k in range(robot.rows + 1) if _uncovered(robot, shapes, k)),
+        partial=tuple(
+            (link, covered / whole)
+            for link, covered, whole in lengths
+            if covered < COVERED * whole and whole - covered > GAP
+        ),
+    )
+
+
+def covered_lengths(robot: Robot, shapes: ArmShapes, link: int) -> tuple[float, float]:
+    """Of a link's lengths in the table that along which its shapes reach, or which lies in those of the links beside
+    it, and all of them, m."""
+    lines = _own_lengths(robot, link)
+    lengths = [float(np.linalg.norm(line[1] - line[0])) for line in lines]
+    shares = [_covered(robot, shapes, line, link) for line in lines]
+    return sum(share * length for share, length in zip(shares, lengths)), sum(lengths)
+
+
+def _own_lengths(robot: Robot, link: int) -> list[Reals]:
+    """The ends (2, 3), m, of the straight pieces of a link that its table settles: not those of flange and tool, which
+    are no link's, nor a shift along an axis that is parallel to the one before or after it."""
+    bare, row = robot.replace(tool=np.eye(4), flange=np.eye(4)), max(link - 1, 0)
+    turns = link_parts(robot)[:, TO_NEXT_AXIS, 2, 2]
+    beside = ([turns[row]] if row else []) + ([turns[row + 1]] if row + 1 < robot.rows else [])
+    shifts = any(abs(turn) > 1 - PARALLEL for turn in beside)
+    lines = [np.array([c.start, c.end]) for c in default_envelopes(bare) if c.link == link]
+    return [line for line in lines if not (shifts and abs(line[1, 2] - line[0, 2]) > SHORTEST)]
+
+
+def _covered(robot: Robot, shapes: ArmShapes, line: Reals, link: int) -> float:
+    """The share of one length that is covered, from point to point (2, 3), m, in the link's frame."""
+    length = float(np.linalg.norm(line[1] - line[0]))
+    share = (np.arange(LINE_POINTS) + 0.5) / LINE_POINTS
+    points, axis = line[0] + share[:, None] * (line[1] - line[0]), (line[1] - line[0]) / length
+    covered = _beyond(robot, shapes, points, link, {link - 1, link + 1}) <= TOUCH
+    for _, corners, radius in _hulls(shapes, {link}):
+        along = (corners - line[0]) @ axis
+        covered |= (share * length >= along.min() - radius) & (share * length <= along.max() + radius)
+    return float(covered.mean())
 
 
 def _uncovered(robot: Robot, shapes: ArmShapes, link: int) -> bool:
@@ -135,8 +184,11 @@ def _outside(robot: Robot, shapes: ArmShapes, points: Reals, link: int, beside: 
 
     They are looked at in one pose: a joint between two links turns about the line on which they meet.
     """
-    if not len(points):
-        return False
+    return bool((_beyond(robot, shapes, points, link, beside) > by).any())
+
+
+def _beyond(robot: Robot, shapes: ArmShapes, points: Reals, link: int, beside: set[int]) -> Reals:
+    """How far points (n, 3) of a link, m, are outside the shapes of some links, (n,), m; as :func:`_outside`."""
     T = link_frames(robot, np.clip(np.zeros(robot.joints), robot.lower, robot.upper))
 
     def placed(points: Reals, k: int) -> Reals:
@@ -145,18 +197,27 @@ def _outside(robot: Robot, shapes: ArmShapes, points: Reals, link: int, beside: 
 
     points = placed(points, link)
     outside = np.full(len(points), np.inf)
-    hulls = [(c.link, np.array([c.start, c.end]), c.radius) for c in shapes.capsules if c.link in beside]
-    hulls += [(h.link, np.array(h.points), h.margin) for h in shapes.pieces if h.link in beside]
-    for k, corners, radius in hulls:
+    for k, corners, radius in _hulls(shapes, beside):
         distance = np.empty(len(points))
         distances_from_hull(points, placed(corners, k), distance)
         outside = np.minimum(outside, distance - radius)
-    return bool((outside > by).any())
+    return outside
+
+
+def _hulls(shapes: ArmShapes, links: set[int]) -> list[tuple[int, Reals, float]]:
+    """Link, corners (k, 3), m, in its frame, and radius (m) of the shapes of some links."""
+    hulls = [(c.link, np.array([c.start, c.end]), c.radius) for c in shapes.capsules if c.link in links]
+    return hulls + [(h.link, np.array(h.points), h.margin) for h in shapes.pieces if h.link in links]
+
+
+def _size(robot: Robot) -> float:
+    """The sum of all lengths in the table, m."""
+    return float(np.abs(robot.a).sum() + np.abs(robot.d).sum())
 
 
 def shapes_assumed(robot: Robot, margin: float, clearances: Mapping[str, float | None]) -> ShapesAssumed | None:
     """The remark on collisions where the arm's shapes are assumed; None where a document that
-    verdicts rest on gives them.
+    verdicts rest on gives them, for all of its links.
 
     Parameters
     ----------
@@ -167,12 +228,13 @@ def shapes_assumed(robot: Robot, margin: float, clearances: Mapping[str, float |
     if not shapes.assumed:
         return None
     near = tuple(name for name, smallest in clearances.items() if smallest is not None and 0 <= smallest < margin)
-    return ShapesAssumed(shapes.given, 1000 * margin, near)
+    partial = shapes.grade not in ASSUMED_GRADES
+    return ShapesAssumed(shapes.given, 1000 * margin, near, partial)
 
 
 def default_envelopes(robot: Robot) -> tuple[Envelope, ...]:
     """Capsules along the table's link lengths (see the module's text)."""
-    size = float(np.abs(robot.a).sum() + np.abs(robot.d).sum())
+    size = _size(robot)
     parts, found = link_parts(robot), []
     last = robot.rows
     for k in range(last):
@@ -284,6 +346,31 @@ def solid_bodies(solid: Solid) -> tuple[Body, ...]:
         case _:
             assert_never(solid)
     return (Body(solid.name, WORLD, points @ solid.T[:3, :3].T + solid.T[:3, 3], radius, kind, disc),)
+
+
+def depths_in(solid: Solid, points: Reals) -> Reals:
+    """How deep points (n, 3), m, of the world are in a solid, (n,), m; not above 0 outside. The margin around the
+    pieces of a mesh does not count."""
+    depths: Reals = np.max([_depths_in(body, points) for body in solid_bodies(solid)], axis=0)
+    return depths
+
+
+def _depths_in(body: Body, points: Reals) -> Reals:
+    if body.kind == HALF_SPACE:
+        return np.asarray(body.points[1, 0] - points @ body.points[0])
+    if len(body.points) == 1:
+        return np.asarray(body.radius - np.linalg.norm(points - body.points[0], axis=1))
+    if body.kind == CYLINDER:
+        start, along = body.points[0], body.points[1] - body.points[0]
+        length = float(np.linalg.norm(along))
+        height = (points - start) @ along / length
+        away = np.linalg.norm(np.cross(points - start, along), axis=1) / length
+        return np.asarray(np.min([body.disc - away, height, length - height], axis=0))
+    try:
+        faces = ConvexHull(body.points).equations
+    except QhullError:  # flat
+        return np.full(len(points), -np.inf)
+    return np.asarray(-(points @ faces[:, :3].T + faces[:, 3]).max(axis=1))
 
 
 def solid_pieces(solid: Solid) -> tuple[Reals, ...]:

@@ -191,6 +191,7 @@ LeftOutSubject = Literal[
     "between_places",
     "placed_box",
     "uncovered_links",
+    "partial_links",
     "allowed_contacts",
     "bare_tool",
     "arm_errors",
@@ -200,6 +201,7 @@ LeftOutSubject = Literal[
     "box_directions",
     "base_contacts",
     "base_inside",
+    "places_in_solids",
 ]
 
 NEVER_A_PASS: frozenset[LeftOutSubject] = frozenset(
@@ -207,13 +209,14 @@ NEVER_A_PASS: frozenset[LeftOutSubject] = frozenset(
         *(
             "obstacles",
             "uncovered_links",
+            "partial_links",
             "bare_tool",
             "allowed_contacts",
             "program_rest",
             "given_rates",
             "other_gravity",
         ),
-        *("arm_errors", "objects_out_of_view", "hidden_voids", "orientations", "base_inside"),
+        *("arm_errors", "objects_out_of_view", "hidden_voids", "orientations", "base_inside", "places_in_solids"),
     )
 )
 """What no verdict passes without; the rest bounds what a verdict is about, and stands in the table alone."""

@@ -45,7 +45,7 @@ SHORT_CUTS = 50
 LONGEST_MOVE = 1.5  # rad of all joints together, by which a tree grows at a time
 SHORTEST_STEP = 2e-3  # rad of the joint that turns most, by which a move advances beside an obstacle
 MARGINS = (0.008, 0.003, 0.0)  # m beyond the tolerance, tried in this order
-FROM_LIMITS = np.radians(2.0)  # by which drawn joints keep from their limits
+FROM_LIMITS, FROM_ENDS = np.radians(2.0), 0.002  # rad, m of those that slide: drawn joints keep from their limits
 ROUNDINGS = (1.0, 0.5, 0.2, 0.0)  # of half of the shorter side
 NODES = 240
 SHOWN = 101
@@ -242,7 +242,7 @@ def _tree(task: PlanningTask, moves: _Moves, start: Reals, end: Reals, attempt: 
     space, bounds = base.RealVectorStateSpace(n), base.RealVectorBounds(n)
     for j in range(n):
         both = min(start[j], end[j]), max(start[j], end[j])
-        inner = min(FROM_LIMITS, (robot.upper[j] - robot.lower[j]) / 4)
+        inner = min(FROM_ENDS if robot.slides[j] else FROM_LIMITS, (robot.upper[j] - robot.lower[j]) / 4)
         bounds.setLow(j, float(min(both[0], robot.lower[j] + inner)))
         bounds.setHigh(j, float(max(both[1], robot.upper[j] - inner)))
     space.setBounds(bounds)

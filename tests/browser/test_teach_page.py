@@ -481,6 +481,22 @@ def test_any_arm_is_jogged_along_the_axes_that_its_joints_can_follow(other):
     assert (values(panel) - before)[-1] == pytest.approx(step)
 
 
+@pytest.mark.parametrize("other", ["scara"], indirect=True)
+def test_each_joint_warns_of_its_end_by_its_own_unit(other):
+    """Within 5 mm of the end of a slide, as within 5 deg of a limit."""
+    _, _, panel = other
+    for q, states in (
+        ((125.5, 40, 4.5, 20), ("near", "near")),
+        ((124.5, 40, 5.5, 20), ("clear", "clear")),
+        ((130, 40, 180, 20), ("at", "at")),
+    ):
+        panel.open("#q=" + ",".join(map(str, q)))
+        rows = panel.browser.execute_script(
+            "return [...document.querySelectorAll('.joint')].map((r) => r.dataset.state)"
+        )
+        assert (rows[0], rows[2]) == states
+
+
 @pytest.mark.parametrize("other", ["scara", "iiwa"], indirect=True)
 def test_any_arm_refuses_values_in_words_and_in_the_joint_s_unit(other):
     robot, _, panel = other

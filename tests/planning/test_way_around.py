@@ -23,10 +23,11 @@ from er3a.planning.way_around import (
     PlanningTask,
     WayAround,
     _Moves,
+    _tree,
     way_around,
     way_between,
 )
-from testing.arms import palletiser
+from testing.arms import palletiser, scara
 from testing.hard_scenes import hard_scenes
 from testing.motion_cases import contacts_of
 
@@ -143,6 +144,32 @@ def test_ends_that_can_not_be_are_named():
         assert isinstance(way_around(one, home, low), EndOverlaps)
     assert way_between(one, home[None], np.empty((0, 6))) == EndUnreached("end")
     assert way_around(PlanningTask(ROBOT, None, 1e-3, LIMITS, 3), home, home) == NothingMeasured()
+
+
+def test_drawn_joints_keep_from_their_limits_by_their_own_unit(monkeypatch):
+    """By 2 deg, a joint that slides by 2 mm, not by as many metres as 2 deg have radians; or by a quarter."""
+    base = pytest.importorskip("ompl").base
+    drawn: dict[int, list[float]] = {}
+
+    class Bounds(base.RealVectorBounds):
+        def setLow(self, joint, value):
+            drawn[joint] = [value]
+            super().setLow(joint, value)
+
+        def setHigh(self, joint, value):
+            drawn[joint].append(value)
+            super().setHigh(joint, value)
+
+    monkeypatch.setattr(base, "RealVectorBounds", Bounds)
+    for arm, edge in ((scara(), 0.002), (scara().replace(upper=scara().upper * [1, 1, 0.02, 1]), 0.0009)):
+        bodies = Bodies(arm, None)
+        asked = PlanningTask(arm, bodies, 1e-3, joint_limits(arm, np.ones(4), 0.25), seed=3, rounds=1)
+        middle = (arm.lower + arm.upper) / 2
+        _tree(asked, _Moves(arm, bodies, 1e-3), middle, middle, 0)
+        inner = np.array([*np.radians([2, 2]), edge, np.radians(2)])
+        np.testing.assert_allclose(
+            [drawn[joint] for joint in range(4)], np.stack([arm.lower + inner, arm.upper - inner], axis=1)
+        )
 
 
 def test_a_missing_planner_is_said(monkeypatch, random):

@@ -22,6 +22,7 @@ from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.pipeline.messages.kinematics import branch_word
+from er3a.pipeline.messages.left_out import pair_words
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import read_results
 from er3a.pipeline.stages import run
@@ -34,9 +35,11 @@ from er3a.pipeline.stages.inverse.model import (
     TargetResult,
     shown_targets,
 )
-from er3a.pipeline.stages.inverse.report import overview_row
+from er3a.pipeline.stages.inverse.report import of_a_joint, overview_row, rule_rows
 from er3a.pipeline.study import Study
+from er3a.robots.joint_limits import meant
 from er3a.selection.select import RULES
+from testing.arms import scara
 
 ROOT = Path(__file__).parents[2]
 NAMES = ("er3a_c60", "er3a_c60_article", "er3_600")
@@ -215,10 +218,10 @@ def test_wrist_singularity_is_named(computed):
 
 
 def test_the_chosen_branch_and_what_is_not_singular_stand_in_the_first_table(computed):
-    _, results = computed
+    name, results = computed
     for target in results.summary.targets:
         rows = results.solutions.take(results.solutions.target == target.name)
-        cells = overview_row(target, rows)
+        cells = overview_row(load_robot(name), target, rows)
         if target.chosen_deg is None:
             assert cells[3:5] == ["none", "–"]
             continue
@@ -235,6 +238,33 @@ def test_the_chosen_branch_and_what_is_not_singular_stand_in_the_first_table(com
             others = rows.greatest_move_deg[rows.rank == 2]
             assert target.reason.less_deg == pytest.approx(others[0] - best.greatest_move_deg[0], abs=1e-6)
             assert f"needs {target.reason.less_deg:.3g} deg more" in cells[5]
+
+
+def test_values_of_one_joint_have_its_unit():
+    """The greatest move and the least margin of a solution, which compare mm of a slide with deg; sums are in deg."""
+    robot = scara()
+    assert of_a_joint(robot, np.array([10.0, 20, 30, 5]), 30.0, 0) == "30 mm"
+    assert of_a_joint(robot, np.array([10.0, 20, 30, 5]), 5.0, 1) == "5.0 deg"
+    assert of_a_joint(robot, np.array([10.0, 20, 30, 5]), 29.0, 1) == "29.0 deg"
+
+
+def test_each_branch_tells_what_its_clearance_is_of(computed):
+    name, results = computed
+    ranked, robot = results.rankings.take(results.rankings.rule == "clearance"), load_robot(name)
+    assert len(ranked) or name == "er3a_c60_article"
+    for k in range(len(ranked)):
+        own = results.solutions.take(
+            (results.solutions.target == ranked.target[k]) & (results.solutions.branch == ranked.branch[k])
+        )
+        q = meant(robot, own.q_deg[own.first_of_branch & own.within_limits])
+        found = clearance(robot, q, None)
+        assert ranked.measure[k] == pytest.approx(1000 * found.distance[0])
+        assert ranked.between[k] == found.pair[0].label
+    assert set(results.rankings.between[results.rankings.rule != "clearance"]) == {""}
+    for target in set(ranked.target):
+        told = [row[-1] for row in rule_rows(results.rankings.take(results.rankings.target == target), ["clearance"])]
+        own = ranked.take(ranked.target == target)
+        assert told == [pair_words(label) for label in own.between[np.argsort(own.branch)]]
 
 
 def test_round_trips_lose_nothing(computed):

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from importlib import import_module
+from itertools import product
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -14,15 +16,17 @@ import yaml
 
 from er3a.collision.along import bodies_of
 from er3a.collision.bodies import Bodies
-from er3a.collision.matrix import base_contacts, collision_matrix
-from er3a.collision.pairs import ASSUMED_MARGIN
-from er3a.collision.scene import Box, Plane, Scene, Sphere
-from er3a.collision.shapes import arm_shapes, has_bare_tool, link_frames
+from er3a.collision.matrix import base_contacts, collision_matrix, solids_met
+from er3a.collision.pairs import ASSUMED_MARGIN, link_label
+from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Sphere
+from er3a.collision.shapes import arm_shapes, covered_lengths, has_bare_tool, link_frames, shapes_assumed
 from er3a.files.robot_file import Placement
 from er3a.files.robot_library import load_robot
+from er3a.files.scene_file import load_scene
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import MIN_SINGULAR_VALUE
+from er3a.numerics.quasi_random import quasi_random_points
 from er3a.pipeline.messages.left_out import left_out_names, left_out_text, unmeasured_text
 from er3a.pipeline.messages.say import say, say_all
 from er3a.pipeline.new_study.write import arm_of, write_study
@@ -39,7 +43,7 @@ from er3a.pipeline.results import (
 from er3a.pipeline.stages.collision.compute import compute as collision
 from er3a.pipeline.stages.collision.model import FreeSpace
 from er3a.pipeline.stages.inverse.compute import compute as inverse
-from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_of_orientations
+from er3a.pipeline.stages.left_out import left_out_in_solids, left_out_of_collisions, left_out_of_orientations
 from er3a.pipeline.stages.programs.compute import compute as programs
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.trajectory.compute import compute as trajectory
@@ -418,6 +422,98 @@ def test_a_proof_cut_short_takes_no_hole_for_the_shoulders(study):
     assert [each.subject for each in verdicts[100].missed] == ["hidden_voids"]
 
 
+SOLIDS = {
+    "spheres": [{"name": "solid", "radius_mm": 15, "xyz_mm": [0, 0, 0]}],
+    "boxes": [{"name": "solid", "size_mm": [300, 300, 30], "xyz_mm": [0, 0, 0]}],
+    "cylinders": [{"name": "solid", "radius_mm": 100, "length_mm": 30, "xyz_mm": [0, 0, 0]}],
+    "planes": [{"name": "solid", "normal": [0, 0, 1], "offset_mm": 15}],
+}
+
+
+@pytest.mark.parametrize("kind", SOLIDS)
+@pytest.mark.parametrize(("height", "sunk", "inside"), [(0, 0, True), (12, 5, False), (16, 0, False), (14.5, 0, False)])
+def test_a_place_in_a_solid_is_named_but_not_one_that_stands_on_it(tmp_path, kind, height, sunk, inside):
+    """All four end 15 mm above their middle; what is sunk by less than it may be, or by 1 mm, stands on it."""
+    (tmp_path / "scene.yaml").write_text(yaml.safe_dump({"kind": "scene", "title": "a", kind: SOLIDS[kind]}))
+    point = np.array([0.0, 0.0, height / 1000])
+    found = left_out_in_solids(load_scene(tmp_path / "scene.yaml"), [("here", point, sunk / 1000)])
+    assert found == ((LeftOut("places_in_solids", ("here: solid",)),) if inside else ())
+
+
+def test_a_place_in_a_piece_of_a_mesh_is_named():
+    corners = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * 0.1
+    scene = Scene("a", (Mesh("bin", np.eye(4), (corners + np.array([0.5, 0, 0]), corners), 0.05),))
+    places = [
+        ("in", np.zeros(3), 0.0),
+        ("beside", np.array([0.25, 0, 0]), 0.0),
+        ("margin", np.array([0, 0, 0.12]), 0.0),
+    ]
+    assert left_out_in_solids(scene, places) == (LeftOut("places_in_solids", ("in: bin",)),)
+    assert left_out_in_solids(None, places) == ()
+
+
+@pytest.mark.long
+def test_a_target_in_a_solid_is_no_pass(study, tmp_path):
+    """The scene gives the tool a shape that ends 15 mm before its point, as fingers do."""
+    import er3a.pipeline.messages.inverse  # noqa: F401
+
+    robot = yaml.safe_load(Path(f"data/robots/{ROBOT}.yaml").read_text(encoding="utf-8"))
+    robot["tool"] = {"source": "A test", "grade": "inferred", "xyz_mm": [0, 0, 200], "rpy_deg": [0, 0, 0]}
+    (tmp_path / f"{ROBOT}.yaml").write_text(yaml.safe_dump(robot), encoding="utf-8")
+    (tmp_path / "targets.yaml").write_text("kind: targets\ntargets:\n- {name: a, q_deg: [0, -10, -10, 0, -70, 0]}\n")
+    T = forward(load_robot(tmp_path / f"{ROBOT}.yaml"), np.radians([0, -10, -10, 0, -70, 0]))
+    entry = {"targets": str(tmp_path / "targets.yaml"), "file": str(tmp_path / f"{ROBOT}.yaml")}
+    few = {"round_trips": 3, "map_cells": 8, "scene": str(tmp_path / "scene.yaml")}
+    for moved, named in ((0, ("a: part",)), (60, ())):
+        ball = {"name": "part", "radius_mm": 8, "xyz_mm": (1000 * T[:3, 3] + [moved, 0, 0]).tolist()}
+        held = {"boxes": [{"name": "gripper", "size_mm": [30, 30, 185], "xyz_mm": [0, 0, -107.5]}]}
+        scene = {"kind": "scene", "title": "a", "spheres": [ball], "carried": held}
+        (tmp_path / "scene.yaml").write_text(yaml.safe_dump(scene))
+        verdict = inverse(changed(study, entry, inverse=few), ROBOT).summary.verdict
+        assert [(each.subject, each.names) for each in verdict.missed] == [("places_in_solids", named)] * bool(named)
+        assert verdict.status == ("caution" if named else "pass")
+        said = "they lie inside solids on which they don't stand (a: part)" in say_all(verdict.findings)
+        assert said == bool(named)
+        quick = {"samples": 200, "cells_across": 4, "scene": str(tmp_path / "scene.yaml")}
+        clear = collision(changed(study, entry | {"paths": one_path(tmp_path)}, collision=quick), ROBOT)
+        assert ("places_in_solids" in subjects(clear)) == bool(named)
+
+
+def test_a_box_that_would_be_in_a_solid_is_named_but_not_on_its_stand():
+    robot, place = load_robot(ROBOT), Box("box", transform(np.array([0.5, 0, 0.125]), np.zeros(3)), (0.2, 0.15, 0.05))
+    stand = Box("stand", transform(np.array([0.5, 0, 0.05]), np.zeros(3)), (0.5, 0.5, 0.1))
+    post = Cylinder("post", transform(np.array([0.55, 0.03, 0.2]), np.zeros(3)), 0.004, 1.0)
+    wall = Box("wall", transform(np.array([0.65, 0, 0.2]), np.zeros(3)), (0.1, 0.5, 0.5))
+    floor, high = Plane("floor", (0.0, 0.0, 1.0), 0.1), Plane("high", (0.0, 0.0, 1.0), 0.11)
+    assert solids_met(robot, place, Scene("a", (stand, post, wall, floor, high))) == ("post", "high")
+
+
+@pytest.mark.long
+def test_an_object_in_a_solid_is_no_grasp_that_passes(study, tmp_path):
+    """A ball about the can's place, which the gripper does not reach."""
+    for file in Path("data/vision").glob("fixed_camera*"):
+        shutil.copy(file, tmp_path)
+    content = yaml.safe_load(Path(f"data/vision/{ROBOT}.yaml").read_text(encoding="utf-8"))
+    (tmp_path / "vision.yaml").write_text(
+        yaml.safe_dump(content | {"objects": content["objects"][:1]}), encoding="utf-8"
+    )
+    scene = yaml.safe_load(Path("data/scenes/table_and_post.yaml").read_text(encoding="utf-8"))
+    scene["carried"] = {"boxes": [{"name": "gripper", "size_mm": [40, 40, 90], "xyz_mm": [0, 0, 50]}]}
+    own, place = {"vision": str(tmp_path / "vision.yaml"), "scene": str(tmp_path / "scene.yaml")}, None
+    for named in ((), ("can: ball",)):
+        balls = [{"name": "ball", "radius_mm": 10, "xyz_mm": list(place)}] if place else []
+        scene["spheres"] = [*scene["spheres"], *balls]
+        (tmp_path / "scene.yaml").write_text(yaml.safe_dump(scene), encoding="utf-8")
+        summary = vision(changed(study, own, vision={"map_cells": 4}), ROBOT).summary
+        (can,) = summary.objects
+        place = can.xyz_mm
+        assert can.outcome == "grasped"
+        assert summary.verdict.status == ("caution" if named else "pass")
+        assert [(each.subject, each.names) for each in summary.verdict.missed] == [("places_in_solids", named)] * bool(
+            named
+        )
+
+
 @pytest.mark.long
 def test_a_grasp_passes_by_no_object_out_of_view_and_no_arm_without_errors(study, tmp_path):
     for file in Path("data/vision").glob("fixed_camera*"):
@@ -483,6 +579,103 @@ def test_a_link_without_shape_is_covered_by_its_neighbours_or_named(link, reache
     fewer = robot.replace(envelopes=tuple(each for each in robot.envelopes if each.link != link))
     assert link in arm_shapes(fewer).bare
     assert (link in arm_shapes(fewer).uncovered) == reaches_out
+
+
+@pytest.mark.parametrize(
+    ("link", "end", "share"),
+    [
+        (2, (0.08, 0, 0), 0.68),
+        (2, (0.02, 0, 0), 0.48),
+        (4, (0, 0, 0.02), 0.2),
+        (0, (0, 0, 0.05), 0.56),
+        (6, (0, 0, 0.02), 0.68),
+    ],
+)
+def test_a_shape_that_covers_a_small_part_of_its_link_is_no_pass(link, end, share):
+    """Of 270, 299, 321.5 and 78.5 mm; what lies in the shapes of the links beside it is covered too.
+
+    Of the last only 25 mm are not.
+    """
+    robot = load_robot(ROBOT)
+    official = {"envelopes": replace(robot.sources["envelopes"], grade="official")}
+    capsules = [each for each in robot.envelopes if each.link != link]
+    (whole,) = (each for each in robot.envelopes if each.link == link)
+    for length, grade in product(("whole", "part"), ("official", "inferred")):
+        own = whole if length == "whole" else Envelope(link, (0.0, 0.0, 0.0), end, whole.radius)
+        arm = robot.replace(
+            envelopes=(*capsules, own), sources={**robot.sources, **(official if grade == "official" else {})}
+        )
+        shapes, few = arm_shapes(arm), length == "part" and link != 6
+        found = {each.subject: each for each in left_out_of_collisions(arm, bodies_of(arm, None), None)}
+        assumed = shapes_assumed(arm, ASSUMED_MARGIN, {})
+        covered, table = covered_lengths(arm, shapes, link)
+        assert covered / table == pytest.approx(1.0 if length == "whole" else share, abs=0.011)
+        assert shapes.assumed == (few or grade == "inferred") == bool(assumed)
+        assert ("partial_links" in found) == few
+        if few:
+            left = found["partial_links"]
+            assert left.names == (f"{link_label(link)}: {100 * covered / table:.0f} %",)
+            assert "along less than 75 % of their lengths" in left_out_text(left)
+            assert ("cover some links only in part" in say(assumed)) == (grade == "official")
+            summary = Summary(Verdict("pass", FreeSpace(0.5, 1, 1, 1, 0)), (), not_examined=(left,))
+            assert summary.verdict.status == "caution"
+
+
+def test_shapes_beside_the_tables_lines_cover_their_links():
+    """Housings beside their axes, as the upper arms of Universal Robots are, count as covering them."""
+    ur = load_robot("ur5e")
+    beside = [
+        (0, (0, 0, 0), (0, 0, 0.16)),
+        (2, (0, 0, 0.138), (-0.425, 0, 0.138)),
+        (3, (0, 0, 0.007), (-0.392, 0, 0.007)),
+    ]
+    wrists = [(4, (0, 0, 0.127), (0, 0, 0.13)), (5, (0, 0, 0.09), (0, 0, 0.1)), (6, (0, 0, 0.07), (0, 0, 0.1))]
+    arm = ur.replace(envelopes=tuple(Envelope(*each, 0.05) for each in (*beside, *wrists)), pair_rules=())
+    assert arm_shapes(arm).partial == ()
+    for name in ("er3a_c60", "er3_600", "er3a_c60_article", "ur5e", "lbr_iiwa_14"):
+        assert arm_shapes(load_robot(name)).partial == ()
+
+
+def test_an_allowed_pair_that_overlaps_in_few_poses_hides_something():
+    """In none of the joint vectors drawn, only where the arm is nearly folded: boxes find it."""
+    arm = Robot.from_dh(
+        [0.3, 0.3], [0.0, 0.0], [0.0, 0.0], lower=np.radians([-170, -150]), upper=np.radians([170, 150.1])
+    )
+    shapes = (Envelope(0, (0.0, 0.0, -0.1), (0.0, 0.0, 0.0), 0.02), Envelope(1, (0.05, 0, 0), (0.25, 0, 0), 0.02))
+    far = Envelope(2, (0.3, 0.0, 0.0), (0.3, 0.0, 0.0), 0.0)
+    T = link_frames(arm.replace(envelopes=(*shapes, far)), np.array([0.0, arm.upper[1]]))
+    tip = T[2, :3, :3] @ np.array(far.start) + T[2, :3, 3]
+    near = float(np.linalg.norm(tip - np.array([min(max(tip[0], 0.05), 0.25), 0, 0])))
+    far = Envelope(2, far.start, far.end, near - 0.02 + 5e-5)
+    arm = arm.replace(envelopes=(*shapes, far))
+    q = quasi_random_points(arm.lower, arm.upper, 1024)
+    plain = Bodies(arm, None)
+    (pair,) = [k for k, each in enumerate(plain.pairs) if each.label == "link_1/link_2"]
+    assert not plain.overlaps(q)[:, pair].any()
+    allowing = arm.replace(pair_rules=(PairRule("link_1", "link_2", "allow", "a test"),))
+    found = {each.subject: each.names for each in left_out_of_collisions(allowing, bodies_of(allowing, None), None)}
+    assert found["allowed_contacts"] == ("link_1/link_2",)
+
+
+def test_how_near_joined_pairs_come_in_the_poses_told_of_is_measured():
+    """The rest of links 2 and 4, which nothing counts, at four poses, in one of which they overlap."""
+    robot = load_robot("er3_600")
+    bodies = bodies_of(robot, None)
+    q = np.radians([[0, 0, 0, 0, -20, 0], [0, 0, -40, 0, -20, 0], [0, 0, -100, 0, -20, 0], [np.nan] * 6])
+    joined = np.flatnonzero(bodies.joined)
+    apart = np.array([bodies.distances(bodies.ends(each), joined) for each in q[:3]])
+    assert (apart.min(axis=1) < 0).tolist() == [False, False, True]
+    (left,) = (
+        each
+        for each in left_out_of_collisions(robot, bodies, None, q_deg=np.degrees(q))
+        if each.subject == "unmeasured_pairs"
+    )
+    assert left.amount == pytest.approx(1000 * apart[apart > 0].min())
+    said = unmeasured_text(left.names, left.amount, ("link_1/link_2",))
+    assert f"they come within {left.amount:.1f} mm" in said
+    assert said.endswith("Clearance does not count these, which the robot's file allows: link 1 and link 2.")
+    assert f"({left.amount:.1f} mm there)" in left_out_text(left)
+    assert bodies.joined_apart(q[3:]) is None
 
 
 def test_bodies_that_a_joint_holds_are_named_where_others_of_their_links_meet():

@@ -20,7 +20,8 @@ from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import characteristic_length, conditioning
-from er3a.pipeline.messages.trajectory import KEY_FIGURES, advice, cause_text, path_text, repair_text
+from er3a.pipeline.messages.say import say
+from er3a.pipeline.messages.trajectory import KEY_FIGURES, advice, cause_text, path_text, repair_text, strategy_word
 from er3a.pipeline.results import (
     AbsentResults,
     NotComputed,
@@ -45,7 +46,7 @@ from er3a.pipeline.stages.trajectory.model import (
 )
 from er3a.pipeline.stages.trajectory.played import faults
 from er3a.pipeline.stages.trajectory.record import record
-from er3a.pipeline.stages.trajectory.report import report
+from er3a.pipeline.stages.trajectory.report import report, strategies_shown
 from er3a.pipeline.study import Study, load_study
 from er3a.pipeline.teach import panel
 from er3a.pipeline.teach.panel import write_teach_page
@@ -214,6 +215,11 @@ def test_strategies_are_listed_with_their_costs(results, name):
         assert path.chosen.motion.max_joint_speed_ratio <= 1 + 1e-6
         assert path.chosen.motion.max_joint_acceleration_ratio <= 1 + 1e-6
         assert path.chosen.motion.clearance_mm >= 20
+        told = {row[0]: row[5] for row in strategies_shown(path)}
+        for each in (each for each in path.avoidance if each.motion):
+            shown = f"{each.motion.clearance_mm:.0f} ({say(each.motion.clearance_between)})".replace("-", "−")
+            assert told[strategy_word(each.name) + (" ←" if each.name == path.strategy else "")] == shown
+        assert told["as programmed"].endswith(f"({say(path.clearance.between)})")
         assert f"keeps {int(10 * path.chosen.motion.clearance_mm) / 10:.1f} mm of clearance" in advice(path)
         stop = tried(path, "stop")
         assert not stop.usable

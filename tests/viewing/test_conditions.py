@@ -113,7 +113,7 @@ def test_a_verdict_says_what_it_is_not_to_be_taken_for():
 
 
 def test_an_arm_that_nothing_can_meet_has_infinite_clearance():
-    one = (["t"], [0], ["found_arm"], ["clearance"], [np.inf], [1])
+    one = (["t"], [0], ["found_arm"], ["clearance"], [np.inf], [1], [""])
     assert rule_rows(RankingRows(*map(np.array, one)), ["clearance"])[0][1].startswith("∞")
 
 

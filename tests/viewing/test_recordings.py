@@ -16,13 +16,15 @@ import pytest
 from rerun.chunk import RrdReader
 
 from er3a.collision.scene import Scene, Sphere
+from er3a.files.robot_library import load_robot
 from er3a.pipeline.player.motions import Mark, PlayedEvent
 from er3a.pipeline.results import check_checksum
 from er3a.pipeline.study import STAGES
 from er3a.pipeline.viewing import viewer
 from er3a.pipeline.viewing.arm import LABEL, TIMELINE
 from er3a.pipeline.viewing.palette import JOINTS, legible, rgb
-from er3a.pipeline.viewing.recording import Recorded, Run, write_recording
+from er3a.pipeline.viewing.recording import Curves, Recorded, Run, write_recording
+from testing.arms import gantry, scara
 from testing.small_study import stages_of
 from tests.conftest import ROBOT, ROBOTS, ROOT
 from tests.viewing.pictures import joints_seen
@@ -55,6 +57,20 @@ def test_recording_is_sound(small_study, stage):
     assert "BlueprintActivationCommand" in subprocess.run(
         [RERUN, "rrd", "print", path], capture_output=True, text=True, check=True
     ).stdout  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("arm", "titles"),
+    [
+        (lambda: load_robot(ROBOT), ("Joint velocity (deg/s)", "Joint angle (deg)")),
+        (scara, ("Velocity (deg/s, J3: mm/s)", "Angle (deg, J3: mm)")),
+        (gantry, ("Joint velocity (mm/s)", "Joint position (mm)")),
+    ],
+)
+def test_curves_of_joints_name_the_unit_of_each(arm, titles):
+    robot = arm()
+    assert Curves.of_joints(robot, "velocity", "velocity", "/s").title == titles[0]
+    assert Curves.of_joints(robot, "angle", "angle").title == titles[1]
 
 
 @pytest.mark.parametrize("recording", RECORDINGS)

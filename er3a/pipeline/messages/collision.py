@@ -53,6 +53,10 @@ TEXTS = texts(
             "Link shapes are capsules guessed from the table, as the robot's file gives none: real collisions may "
             "differ."
         ),
+        "shapes_assumed#partial": (
+            "The given shapes cover some links only in part, so that no more is shown than of the shapes themselves: "
+            "real collisions may differ."
+        ),
         "shapes_assumed.near": "Within {margin_mm:g} mm of assumed shapes, and so not settled: {names}.",
         "collision.never_free#given": (
             "No joint vector within the limits is collision-free (proven): {pairs} always overlap."
@@ -118,7 +122,7 @@ def _(found: PairsUnexamined) -> str:
 
 @say.register
 def _(found: ShapesAssumed) -> str:
-    rests = say_as(found, "given" if found.given else "guessed")
+    rests = say_as(found, "partial" if found.partial else "given" if found.given else "guessed")
     return joined([rests, near_shapes(found.margin_mm, found.near)], " ")
 
 

@@ -16,6 +16,11 @@ TEXTS = texts(
         "link#base": "base",
         "link#number": "link {number}",
         "clearance.unmeasured": "Clearance does not count these until they overlap: {pairs}.",
+        "clearance.unmeasured#apart": (
+            "Clearance does not count these until they overlap: {pairs}. In the poses here they come within "
+            "{apart:.1f} mm beside the joint that they meet at."
+        ),
+        "clearance.allowed": "Clearance does not count these, which the robot's file allows: {pairs}.",
         "left_out.obstacles": (
             "obstacles: none are given, so the arm was checked only against itself and what it carries"
         ),
@@ -27,6 +32,10 @@ TEXTS = texts(
         "left_out.bare_links": "collisions of links without a shape that lie within the shapes of others",
         "left_out.uncovered_links": (
             "collisions of links that reach out of all shapes: they have none, or look larger than the shapes checked"
+        ),
+        "left_out.partial_links": (
+            "collisions of the rest of links whose shapes reach along less than {amount:.0f} % of their lengths in the "
+            "table"
         ),
         "left_out.bare_tool": (
             "collisions of the tool (or bare flange): it reaches out of the last link's shapes, and the scene gives no "
@@ -41,6 +50,10 @@ TEXTS = texts(
             "overlaps of these links where they meet at a joint, and how near they come; the rest of them is examined"
         ),
         "left_out.unmeasured_pairs": "how near these links, which meet at a joint, come elsewhere before they overlap",
+        "left_out.unmeasured_pairs#apart": (
+            "how near these links, which meet at a joint, come elsewhere before they overlap, but for the poses that "
+            "clearances are told of ({amount:.1f} mm there)"
+        ),
         "left_out.scene_shapes": "whether what stands in the cell is shaped and placed as the scene's file says",
         "left_out.shallow_overlaps": "overlaps of less than {amount:g} mm between the points measured",
         "left_out.own_speeds": "the joints' real speeds: no document gives them, so speeds are assumed",
@@ -156,6 +169,9 @@ TEXTS = texts(
         "left_out.between_places": "places for the tray between grid points {amount:.0f} mm apart",
         "left_out.base_contacts": "whether the base is mounted where it overlaps these solids, as is assumed",
         "left_out.base_inside": "collisions of the base, whose middle lies in these solids: scene or base is misplaced",
+        "left_out.places_in_solids": (
+            "whether these places, or the scene, are right: they lie inside solids on which they don't stand"
+        ),
         "left_out.box_directions": (
             "directions of the tray's cone: the arm's joints don't set them all, and those that they don't are not "
             "asked"
@@ -197,7 +213,8 @@ def left_out_names(found: LeftOut, most: int | None = None) -> str:
 
 def left_out_text(found: LeftOut) -> str:
     """What was not examined, in the language in use."""
-    return sentence(f"left_out.{found.subject}", amount=found.amount)
+    apart = "#apart" if found.subject == "unmeasured_pairs" and found.amount is not None else ""
+    return sentence(f"left_out.{found.subject}{apart}", amount=found.amount)
 
 
 @say.register
@@ -219,7 +236,10 @@ def pair_words(label: str) -> str:
     return tr(" and ").join(map(body_word, label.split("/")))
 
 
-def unmeasured_text(pairs: Iterable[str]) -> str:
-    """Which pairs, by their labels, no clearance counts until they overlap; empty where there are none."""
-    named = joined(map(pair_words, pairs), ", ")
-    return sentence("clearance.unmeasured", pairs=named) if named else ""
+def unmeasured_text(pairs: Iterable[str], apart_mm: float | None = None, allowed: Iterable[str] = ()) -> str:
+    """Which pairs, by their labels, no clearance counts until they overlap, and how near they come, if that is known;
+    and those that are ``allowed``. Empty where there are none."""
+    named, let = (joined(map(pair_words, each), ", ") for each in (pairs, allowed))
+    form = "clearance.unmeasured" if apart_mm is None else "clearance.unmeasured#apart"
+    found = sentence(form, pairs=named, apart=apart_mm) if named else ""
+    return joined([found, sentence("clearance.allowed", pairs=let) if let else ""], " ")

@@ -5,16 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from er3a.collision.bodies import Bodies
 from er3a.collision.matrix import PairState, base_contacts
-from er3a.collision.pairs import link_label
+from er3a.collision.pairs import PENETRATION_TOLERANCE, link_label
 from er3a.collision.scene import Scene
-from er3a.collision.shapes import arm_shapes, has_bare_tool
+from er3a.collision.shapes import COVERED, arm_shapes, depths_in, has_bare_tool
 from er3a.geometry.transforms import rotation_angle
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.results import LeftOut, LeftOutSubject
+from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
 
@@ -24,6 +26,7 @@ def left_out_of_collisions(
     scene: Scene | None,
     tolerance_mm: float | None = None,
     arms: Iterable[tuple[str, Robot]] = (),
+    q_deg: ArrayLike | None = None,
 ) -> tuple[LeftOut, ...]:
     """What a check for collisions does not see.
 
@@ -32,6 +35,7 @@ def left_out_of_collisions(
     robot : that of the bodies, which may be an equal one that looks otherwise
     tolerance_mm : of overlaps that may go unnoticed between points of a motion; None where only points are checked
     arms : the robot with each tool that programs set, by the tool's name
+    q_deg : (N, n), joints that clearances are told of, NaN where they are not known; mm of those that slide
     """
 
     def pairs(state: PairState) -> tuple[str, ...]:
@@ -60,13 +64,30 @@ def left_out_of_collisions(
         ("unexamined_pairs", tuple(pair.label for pair in bodies.unexamined)),
         ("allowed_pairs", tuple(name for name in allowed if name not in hidden)),
         ("joined_pairs", pairs("joined")),
-        ("unmeasured_pairs", bodies.unmeasured),
     ]
     listed = [LeftOut(subject, names) for subject, names in found if names]
+    if shapes.partial:
+        shares = tuple(f"{link_label(link)}: {100 * share:.0f} %" for link, share in shapes.partial)
+        listed.insert(0, LeftOut("partial_links", shares, 100 * COVERED))
+    if bodies.unmeasured:
+        q = None if q_deg is None else meant(robot, np.reshape(np.asarray(q_deg, float), (-1, robot.joints)))
+        apart = None if q is None else bodies.joined_apart(q)
+        listed.append(LeftOut("unmeasured_pairs", bodies.unmeasured, None if apart is None else 1000 * apart))
     obstacles = [LeftOut("scene_shapes" if solids else "obstacles")]
     carried = [LeftOut("carried_shapes" if carries else "carried")]
     shallow = [] if tolerance_mm is None else [LeftOut("shallow_overlaps", amount=tolerance_mm)]
     return (*obstacles, *carried, *listed, *shallow)
+
+
+def left_out_in_solids(scene: Scene | None, places: Iterable[tuple[str, Reals, float]]) -> tuple[LeftOut, ...]:
+    """Places, by name, whose point (3,), m, of the world is in a solid, and deeper than it may be sunk, m."""
+    found = [
+        f"{name}: {solid.name}"
+        for name, point, sunk in places
+        for solid in (scene.solids if scene else ())
+        if depths_in(solid, point[None])[0] > max(sunk, PENETRATION_TOLERANCE)
+    ]
+    return (LeftOut("places_in_solids", tuple(found)),) if found else ()
 
 
 def left_out_without_tool(robot: Robot) -> tuple[LeftOut, ...]:

@@ -269,8 +269,7 @@ WORDS: dict[str, Any] = {
 
 SIX = 6
 _HERE = Path(__file__).parent
-NEAR_LIMIT = np.radians(5.0)
-NEAR_END = 0.01  # m, of a prismatic joint
+NEAR_LIMIT, NEAR_END = np.radians(5.0), 0.005  # rad, m of a prismatic joint
 NEAR_TOUCH = 0.03  # m
 KINDS = {HULL: "hull", CYLINDER: "cylinder", HALF_SPACE: "half_space"}
 

@@ -238,9 +238,11 @@ class Head:
 
     @property
     def unmeasured(self) -> str:
-        """Which pairs no clearance counts until they overlap; empty where there are none."""
-        named = (each.names for each in self.summary.not_examined if each.subject == "unmeasured_pairs")
-        return unmeasured_text(next(named, ()))
+        """Which pairs no clearance counts, or not until they overlap; empty where there are none."""
+        left = {each.subject: each for each in self.summary.not_examined}
+        joined_pairs, allowed = left.get("unmeasured_pairs"), left.get("allowed_pairs")
+        names, apart = (joined_pairs.names, joined_pairs.amount) if joined_pairs else ((), None)
+        return unmeasured_text(names, apart, allowed.names if allowed else ())
 
     @property
     def own_text(self) -> str:

@@ -27,7 +27,7 @@ from er3a.pipeline.results import AbsentResults, Stored
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.arm import ARM, TIMELINE, arm_view, body_shape, log_arm, seconds, send_motion, solid_shapes
 from er3a.pipeline.viewing.palette import HIGHLIGHT, JOINT_NAMES, JOINTS, LINK, MUTED, VERDICTS, legible, rgb
-from er3a.robots.joint_limits import size_of
+from er3a.robots.joint_limits import joint_names, size_of
 from er3a.robots.robot import Robot
 
 PAUSE_S = 1.0  # between two runs
@@ -63,6 +63,16 @@ class Curves:
     names: Sequence[str] = JOINT_NAMES
     colours: Sequence[str] = JOINTS
     whole: bool = False
+
+    @classmethod
+    def of_joints(cls, robot: Robot, entity: str, name: str, per: str = "") -> Curves:
+        """A curve for each joint of an "angle" or "velocity": in deg, of those that slide in mm, ``per`` a time."""
+        if robot.slides.all():
+            return cls(entity, f"Joint {'position' if name == 'angle' else name} (mm{per})")
+        slides = ", ".join(joint for joint, is_slide in zip(joint_names(robot), robot.slides) if is_slide)
+        if slides:  # short enough for the head of a panel
+            return cls(entity, f"{name.capitalize()} (deg{per}, {slides}: mm{per})")
+        return cls(entity, f"Joint {name} (deg{per})")
 
 
 @dataclass(frozen=True, eq=False)

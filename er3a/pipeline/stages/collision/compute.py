@@ -10,6 +10,7 @@ from er3a.collision import free_space
 from er3a.collision.bodies import Bodies
 from er3a.collision.matrix import base_contacts
 from er3a.collision.pairs import Pair
+from er3a.collision.scene import Scene
 from er3a.collision.shapes import shapes_assumed
 from er3a.files.target_file import load_targets
 from er3a.kinematics.inverse import inverse
@@ -19,7 +20,7 @@ from er3a.numerics.si_units import stated
 from er3a.pipeline.results import Figure, LeftOut, Verdict
 from er3a.pipeline.stages.collision import model
 from er3a.pipeline.stages.collision.entry import CollisionSettings
-from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_without_tool
+from er3a.pipeline.stages.left_out import left_out_in_solids, left_out_of_collisions, left_out_without_tool
 from er3a.pipeline.stages.trajectory.judgement import Surroundings, measured
 from er3a.pipeline.stages.trajectory.motion import ListedMotion, by_subject, study_motions
 from er3a.pipeline.study import Study
@@ -165,11 +166,7 @@ def compute(study: Study, name: str) -> model.CollisionResults:
             mounting=mounting,
             closest=closest,
             not_examined=(
-                *(
-                    each
-                    for each in left_out_of_collisions(robot, bodies, scene, settings.penetration_tolerance_mm)
-                    if each.subject != "base_inside"  # it fails for that
-                ),
+                *_of_collisions(bodies, scene, settings, _judged(closest, paths, motions)),
                 LeftOut("joint_vectors", amount=settings.samples),
                 LeftOut("lost_cells", amount=places_found.reached - places_found.clear),
                 LeftOut("unjoined_cells", amount=places_found.clear - places_found.joined),
@@ -188,6 +185,22 @@ def compute(study: Study, name: str) -> model.CollisionResults:
     )
 
 
+def _of_collisions(
+    bodies: Bodies, scene: Scene | None, settings: CollisionSettings, q_deg: list[tuple[float, ...]]
+) -> Iterator[LeftOut]:
+    """What is not seen of collisions, but that the base lies in a solid: the stage fails for that."""
+    found = left_out_of_collisions(bodies.robot, bodies, scene, settings.penetration_tolerance_mm, q_deg=q_deg)
+    yield from (each for each in found if each.subject != "base_inside")
+
+
+def _judged(
+    closest: tuple[model.Closest, ...], paths: model.PathClearances, motions: list[ListedMotion]
+) -> list[tuple[float, ...]]:
+    """Joints of targets' chosen solutions, and of the paths that are meant to be safe, deg or mm."""
+    safe = np.isin(paths.path, [each.name for each in motions if each.meant_safe])
+    return [*(each.q_deg for each in closest if each.kind == "target"), *map(tuple, paths.q_deg[safe].tolist())]
+
+
 def _nearest_target(closest: list[model.Closest]) -> model.NearestTarget | None:
     if not closest:
         return None
@@ -196,8 +209,10 @@ def _nearest_target(closest: list[model.Closest]) -> model.NearestTarget | None:
 
 
 def _left_out(study: Study, name: str, found: model.TargetClearances, motions: list[ListedMotion]) -> Iterator[LeftOut]:
-    """Targets and paths that no clearance is known of, and turns that many targets leave out."""
+    """Targets and paths that no clearance is known of, and turns that many targets leave out; targets in solids."""
     targets = load_targets(study.entry(name).targets, study.robot(name))
+    asked = ((each.name, each.T[:3, 3], 0.0) for each in targets if each.expect in (None, "reached"))
+    yield from left_out_in_solids(study.scene(name, STAGE_NAME), asked)
     if unsolved := tuple(target.name for target in targets if not (found.target == target.name).any()):
         yield LeftOut("targets", unsolved)
     if len(targets) > MANY_TARGETS:

@@ -38,7 +38,12 @@ from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, pass_of, unmet_expectations
 from er3a.pipeline.stages.inverse import model
 from er3a.pipeline.stages.inverse.entry import InverseSettings
-from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_of_orientations, left_out_without_tool
+from er3a.pipeline.stages.left_out import (
+    left_out_in_solids,
+    left_out_of_collisions,
+    left_out_of_orientations,
+    left_out_without_tool,
+)
 from er3a.pipeline.stages.trajectory.motion import limits_of
 from er3a.pipeline.study import Study
 from er3a.robots.joint_limits import limit_margin, meant, shown
@@ -269,8 +274,17 @@ def rankings(
     rows = np.flatnonzero(solved.rows.first_of_branch & solved.rows.within_limits)
     few = solved.solutions.take(rows)
     free = ~collides(solved.rows)[rows]
+    bodies = bodies_of(robot, scene)
+    nearest = [bodies.pairs[k].label if k >= 0 else "" for k in bodies.min_distance(few.q)[1]]
     return model.RankingRows.stacked(
-        model.RankingRows.of(few, target=target.name, rule=rule, measure=measure, place=_places(cost, free))
+        model.RankingRows.of(
+            few,
+            target=target.name,
+            rule=rule,
+            measure=measure,
+            place=_places(cost, free),
+            between=nearest if rule == "clearance" else "",
+        )
         for rule, measure, cost in _measured(robot, few.q, target.q_ref, scene, mix, free)
     )
 
@@ -414,7 +428,8 @@ def compute(study: Study, name: str) -> model.InverseResults:
         not_examined=(
             *_left_out(robot, results, many, settings.mix, trips),
             *left_out_of_orientations(robot, ((each.name, T_of[each.name], q) for each, q in zip(asked, chosen))),
-            *left_out_of_collisions(robot, bodies_of(robot, scene), scene),
+            *left_out_of_collisions(robot, bodies_of(robot, scene), scene, q_deg=shown(robot, chosen)),
+            *left_out_in_solids(scene, ((each.name, T_of[each.name][:3, 3], 0.0) for each in asked)),
             *left_out_without_tool(robot),
         ),
     )

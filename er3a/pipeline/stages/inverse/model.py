@@ -336,6 +336,7 @@ class RankingRows(Table):
     rule: Texts = column("name of the rule, or mix")
     measure: Reals = column("in the rule's unit; for the mix its cost, 0 the best")
     place: Integers = column("1 is the best; 0 for solutions that collide")
+    between: Texts = column("of the rule clearance, what is nearest to what")
 
 
 class MapRows(Table):

@@ -31,6 +31,7 @@ from er3a.pipeline.messages.inverse import (
 )
 from er3a.pipeline.messages.kinematics import RULE_NAMES, RULE_TITLES, branch_word, singularity_word
 from er3a.pipeline.messages.language import N_, tr, with_unit
+from er3a.pipeline.messages.left_out import pair_words
 from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
 from er3a.pipeline.results import Stored, read_stage
 from er3a.pipeline.stages.inverse import model
@@ -339,6 +340,7 @@ def _shape_word(label: str, branch: int) -> str:
 
 
 NO_BREAK_SPACE = "\u00a0"
+SAME = 1e-6  # deg or mm
 
 
 MAX_SELF_MOTIONS = 6
@@ -360,7 +362,7 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
         stored,
         output,
         nearest_rule=tr(NEAREST_RULE),
-        overview=[overview_row(target, of_target(target)) for target in chosen],
+        overview=[overview_row(robot, target, of_target(target)) for target in chosen],
         sections=[_section(robot, target, results, rules, correction, contradicted) for target in chosen],
         outcomes=_outcomes(summary.targets),
         not_advised=_not_advised(summary.targets),
@@ -368,7 +370,7 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
         slides=bool(robot.slides.any()),
         chosen_heading=tr("Chosen branch, and its J1 to J{count} ({units})", count=robot.joints, units=_units(robot)),
         optimised_heading=tr("J1 to J{count}, optimised ({units})", count=robot.joints, units=_units(robot)),
-        rule_columns=[tr("Branch"), *(_rule_heading(robot, rule) for rule in rules)],
+        rule_columns=[tr("Branch"), *(_rule_heading(robot, rule) for rule in rules), tr("Clearance between")],
         trips=trips,
         histogram=histogram(trips) if trips else None,
         map=solutions_per_position(results.map) if len(results.map) else None,
@@ -472,7 +474,8 @@ def _measure(rule: str, value: float) -> str:
 
 
 def rule_rows(ranked: model.RankingRows, rules: list[str]) -> list[list[str]]:
-    """One row for each branch: the measure of each rule, with its place; a dash for a rule that this target lacks."""
+    """One row for each branch: the measure of each rule, with its place, and the pair that has the clearance; a dash
+    for a rule that this target lacks."""
     rows, collides = [], tr("collides")
     for branch in np.unique(ranked.branch):
         own = ranked.take(ranked.branch == branch)
@@ -480,7 +483,9 @@ def rule_rows(ranked: model.RankingRows, rules: list[str]) -> list[list[str]]:
             rule: f"{_measure(rule, measure)}{NO_BREAK_SPACE}({place or collides})"
             for rule, measure, place in zip(own.rule, own.measure, own.place)
         }
-        rows.append([_on_one_line(own.label[0], int(branch)), *(cells.get(rule, "–") for rule in rules)])
+        pair = next((label for label in own.between if label), "")
+        cells_shown = (cells.get(rule, "–") for rule in rules)
+        rows.append([_on_one_line(own.label[0], int(branch)), *cells_shown, pair_words(pair) if pair else "–"])
     return rows
 
 
@@ -564,7 +569,7 @@ def _stops(sequence: model.VisitOrder | None, named: set[str]) -> list[list[str]
     ]
 
 
-def overview_row(target: model.TargetResult, rows: model.SolutionRows) -> list[str]:
+def overview_row(robot: Robot, target: model.TargetResult, rows: model.SolutionRows) -> list[str]:
     """The cells of a target with its ``rows``: name, place, branches, what is chosen, its clearance, and why."""
     unreached = target.obstacle if not target.solutions else None
     near = target.clearance
@@ -572,32 +577,41 @@ def overview_row(target: model.TargetResult, rows: model.SolutionRows) -> list[s
         Markup('<a href="#{0}">{0}</a>').format(target.name),
         _listed(target.xyz_mm),
         tr("{within} of {all}", within=target.within_limits, all=target.solutions),
-        tr("none") if target.chosen_deg is None else _chosen(target.chosen_deg, rows),
+        tr("none") if target.chosen_deg is None else _chosen(robot, target, rows),
         tr("{far} mm: {pair}", far=fixed(near.least_mm, 1), pair=say(near.between)) if near else "–",
         say(unreached or target.reason),
     ]
 
 
-def _chosen(q_deg: tuple[float, ...], rows: model.SolutionRows) -> str:
+def _chosen(robot: Robot, target: model.TargetResult, rows: model.SolutionRows) -> str:
     """The solution taken of a target's rows: its branch and joints; at a singularity that it is, and the best solution
     that is at none."""
     chosen = rows.take(rows.rank == 1)
     name = branch_word(chosen.label[0], int(chosen.branch[0]))
-    cell = Markup("{0}<br>{1}").format(name, Markup(_joints(q_deg)))
+    cell = Markup("{0}<br>{1}").format(name, Markup(_joints(target.chosen_deg or ())))
     if not (kinds := _singular(chosen, 0)):
         return cell
     other = rows.take((rows.rank > 0) & rows.first_of_branch & ~rows.singular.any(axis=1))
     said = tr("▲ {kinds} singularity: joint moves only", kinds=kinds)
     if len(other):
         k = int(np.argmin(other.rank))
+        moved = np.abs(other.q_deg[k] - np.array(target.q_ref_deg))
+        room = np.minimum(other.q_deg[k] - shown(robot, robot.lower), shown(robot, robot.upper) - other.q_deg[k])
         said = tr(
-            "{singular}; not singular: {branch} ({move} deg move, {margin} deg from a limit)",
+            "{singular}; not singular: {branch} ({move} move, {margin} from a limit)",
             singular=said,
             branch=branch_word(other.label[k], int(other.branch[k])),
-            move=fixed(other.greatest_move_deg[k], 0),
-            margin=fixed(other.limit_margin_deg[k], 1),
+            move=of_a_joint(robot, moved, float(other.greatest_move_deg[k]), 0),
+            margin=of_a_joint(robot, room, float(other.limit_margin_deg[k]), 1),
         )
     return cell + Markup("<br><strong>{0}</strong>").format(said)
+
+
+def of_a_joint(robot: Robot, of_joints: np.ndarray, value: float, digits: int) -> str:
+    """The value of one joint, in its unit, among those ``of_joints`` (n,), deg or mm; deg, if it is that of a sum."""
+    apart = np.abs(of_joints - value)
+    slides = apart.min() < SAME and robot.slides[int(apart.argmin())]
+    return with_unit(fixed(value, digits), "mm" if slides else "deg")
 
 
 def _singular(rows: model.SolutionRows, k: int) -> str:

@@ -47,7 +47,7 @@ def record(study: Study, stored: Stored[ProgramsResults], output: Path) -> None:
         output,
         NOTE,
         runs=[_run(robot, results, program) for program in results.summary.programs],
-        curves=[Curves("angle", "Joint angle (deg)")],
+        curves=[Curves.of_joints(robot, "angle", "angle")],
         scene=study.scene(stored.robot, "trajectory"),  # the stage whose scene counts here too
         views={"Arm and tool": ["**"]},
         points=[results.motion.xyz_mm / 1000],

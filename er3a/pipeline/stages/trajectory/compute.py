@@ -12,6 +12,7 @@ import numpy as np
 from er3a.collision.along import ClearanceAlong, clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import PairOverlaps, PairTooNear, ShapesAssumed
+from er3a.collision.scene import Scene
 from er3a.collision.shapes import arm_shapes, shapes_assumed
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
@@ -173,9 +174,11 @@ class AvoidanceTask:
             StrategyResult("slow", StrategyCost(slower, 1.0, nothing, nothing, speed, acceleration, False))
         ]
 
-    def _meets(self, cost: StrategyCost, margin: float) -> tuple[PairOverlaps | PairTooNear | None, float | None]:
-        """The deepest overlap on a motion, or what comes nearer than a margin (m), and its smallest clearance in mm
-        (None if nothing can meet)."""
+    def _meets(
+        self, cost: StrategyCost, margin: float
+    ) -> tuple[PairOverlaps | PairTooNear | None, model.MinClearance | None]:
+        """The deepest overlap on a motion, or what comes nearer than a margin (m), and its smallest clearance (None if
+        nothing can meet)."""
         curve = cost.motion.curve
         grid = np.linspace(0.0, curve.duration, CLEARANCE_TIMES)
         along = clearance_along(
@@ -185,9 +188,9 @@ class AvoidanceTask:
         if smallest is None:
             return None, None
         if along.contacts:
-            return PairOverlaps(smallest.between, -smallest.least_mm), smallest.least_mm
+            return PairOverlaps(smallest.between, -smallest.least_mm), smallest
         near = smallest.least_mm < 1000 * margin
-        return PairTooNear(smallest.between, smallest.least_mm, 1000 * margin) if near else None, smallest.least_mm
+        return PairTooNear(smallest.between, smallest.least_mm, 1000 * margin) if near else None, smallest
 
     def _margin_of(self, along: ClearanceAlong) -> float:
         """The margin (m) that a motion is to keep which has the ends of a path: no more than these ends have."""
@@ -252,14 +255,17 @@ def _quickest(segment: SingularSegment) -> Timed | None:
 
 
 def _tried(
-    robot: Robot, result: StrategyResult, meets: PairOverlaps | PairTooNear | None, clearance_mm: float | None
+    robot: Robot,
+    result: StrategyResult,
+    meets: PairOverlaps | PairTooNear | None,
+    clearance: model.MinClearance | None,
 ) -> model.TriedStrategy:
     reasons = (*result.reasons, meets) if meets else result.reasons
-    motion = _motion(robot, result.cost, clearance_mm) if result.cost else None
+    motion = _motion(robot, result.cost, clearance) if result.cost else None
     return model.TriedStrategy(result.name, motion is not None and not reasons, reasons, motion)
 
 
-def _motion(robot: Robot, cost: StrategyCost, clearance_mm: float | None) -> model.StrategyMotion:
+def _motion(robot: Robot, cost: StrategyCost, clearance: model.MinClearance | None) -> model.StrategyMotion:
     return stated(
         model.StrategyMotion,
         cost,
@@ -270,7 +276,8 @@ def _motion(robot: Robot, cost: StrategyCost, clearance_mm: float | None) -> mod
         joint_swing_deg=tuple(shown(robot, np.ptp(cost.motion.q, axis=0)).tolist()),
         max_joint_speed=np.abs(cost.motion.velocity).max(axis=0),
         max_joint_acceleration=np.abs(cost.motion.acceleration).max(axis=0),
-        clearance_mm=clearance_mm,
+        clearance_mm=clearance.least_mm if clearance else None,
+        clearance_between=clearance.between if clearance else None,
     )
 
 
@@ -422,7 +429,7 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
         paths=tuple(paths),
         not_followed=tuple(skipped),
         not_examined=(
-            *left_out_of_collisions(robot, surroundings.bodies, scene, settings.penetration_tolerance_mm),
+            *_of_collisions(surroundings.bodies, scene, settings, paths, checks),
             *left_out_of_rates(np.isfinite(robot.speed), not used.acceleration_assumed, limits.jerk is not None),
             *_left_out(paths, skipped, only),
             *by_subject(rest),
@@ -439,6 +446,19 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
         avoidance=model.AvoidanceRows.stacked(strategies).of_joints(robot.slides),
         programs=model.ProgramFiles.stacked(programs),
     )
+
+
+def _of_collisions(
+    bodies: Bodies,
+    scene: Scene | None,
+    settings: TrajectorySettings,
+    paths: list[model.PathSummary],
+    checks: model.PathChecks,
+) -> tuple[LeftOut, ...]:
+    """What is not seen of collisions; clearances are told of the paths that are meant to be safe."""
+    safe = np.isin(checks.path, [each.name for each in paths if each.meant_safe])
+    deep = settings.penetration_tolerance_mm
+    return left_out_of_collisions(bodies.robot, bodies, scene, deep, q_deg=checks.q_deg[safe])
 
 
 def _asked_of_tool(name: str, motion: Motion) -> Iterator[tuple[str, Reals, Reals]]:

@@ -230,7 +230,7 @@ class StrategyMotion:
     done_ratio : how much of the path is done, 0..1
     keeps_clear : whether the arm keeps its distance from singular poses wherever the tool is on or beside the path
     joint_swing_deg : between the extremes of each joint; mm where it slides
-    clearance_mm : smallest; None where none was measured
+    clearance_mm, clearance_between : smallest, and of which bodies; None where none was measured
     """
 
     done_ratio: float
@@ -244,6 +244,7 @@ class StrategyMotion:
     max_joint_acceleration_deg_s2: tuple[float, ...]
     max_joint_acceleration_ratio: float
     clearance_mm: float | None
+    clearance_between: Pair | None
 
 
 @dataclass(frozen=True)

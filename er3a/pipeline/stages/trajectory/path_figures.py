@@ -111,7 +111,7 @@ def _coloured(ax: Axes, points: Reals, condition: Reals) -> None:
 
 
 WIDTHS = (3.2, 2.8, 2.4, 2.0, 1.6, 1.2, 1.0, 0.9, 0.8, 0.7)  # so that curves that coincide all show
-NEAR_LIMIT_DEG = 20.0
+NEAR_LIMIT_DEG = 20.0  # mm of a prismatic joint
 EVENT_STYLES: dict[bool, Literal["-", ":"]] = {True: "-", False: ":"}
 TYPE_COLOURS = {"wrist": palette.JOINTS[4], "elbow": palette.JOINTS[2], "shoulder": palette.JOINTS[3]}
 LEFT, BOTTOM, TOP = 0.055, 0.07, 0.925

@@ -31,9 +31,7 @@ GHOST_ALPHA = 110
 LABELS_APART = 0.15  # of the arm's size
 GHOST_WIDTH = 0.006  # of the arm's size
 CONDITION_SCALE = LogNorm(3, 300)
-CURVES = (
-    Curves("angle", "Joint angle (deg)"),
-    Curves("velocity", "Joint velocity (deg/s)"),
+OF_THE_ARM = (
     Curves("condition", "Log10 of the condition number", ["condition number"], [MODEL]),
     Curves("smallest", "Smallest singular value", ["smallest singular value"], [REFERENCE]),
 )
@@ -60,7 +58,11 @@ def record(study: Study, stored: Stored[TrajectoryResults], output: Path) -> Non
         output,
         NOTE,
         runs=[run for path in results.summary.paths for run in runs_of_path(robot, results, path)],
-        curves=CURVES,
+        curves=(
+            Curves.of_joints(robot, "angle", "angle"),
+            Curves.of_joints(robot, "velocity", "velocity", "/s"),
+            *OF_THE_ARM,
+        ),
         scene=study.scene(stored.robot, stored.stage),
         views={"Arm and path": ["**"]},
         points=[results.checks.xyz_mm / 1000],

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from er3a.collision.pairs import Pair
 from er3a.pipeline.messages.collision import solid_rows
 from er3a.pipeline.messages.expectations import as_expected
 from er3a.pipeline.messages.kinematics import branch_word
@@ -141,7 +142,7 @@ def _section(
         speed=_speed(path, summary.joint_limits),
         events=[_event_row(path.name, event) for event in path.singularities],
         faults=_faults(path),
-        strategies=_strategies(path),
+        strategies=strategies_shown(path),
         programs=[each for each in programs if not _repairs(path, each)],
         repaired=[each for each in programs if _repairs(path, each)],
         shortest="–" if path.verdict != "safe" or path.fastest_s is None else fixed(path.fastest_s, 2),
@@ -209,11 +210,11 @@ def _faults(path: model.PathSummary) -> list[list[str]]:
     ]
 
 
-def _strategies(path: model.PathSummary) -> list[list[str]]:
+def strategies_shown(path: model.PathSummary) -> list[list[str]]:
     """Rows of the comparison: the programme, each strategy, and the exact path at its fastest."""
     if not path.avoidance:
         return []
-    clearance = _clearance(path.clearance.least_mm if path.clearance else None)
+    clearance = _clearance(path.clearance.least_mm, path.clearance.between) if path.clearance else "–"
     ratios = _ratio(path.max_joint_speed_ratio), _ratio(path.max_joint_acceleration_ratio)
     programmed = ["0.00", "0.00", *ratios, clearance, fixed(path.duration_s, 2), tr("the path to be repaired")]
     rows = [[tr("as programmed"), *programmed]]
@@ -236,13 +237,13 @@ def _costs(motion: model.StrategyMotion) -> list[str]:
         fixed(motion.max_deviation_deg, 2),
         _ratio(motion.max_joint_speed_ratio),
         _ratio(motion.max_joint_acceleration_ratio),
-        _clearance(motion.clearance_mm),
+        _clearance(motion.clearance_mm, motion.clearance_between),
         fixed(motion.duration_s, 2),
     ]
 
 
-def _clearance(value: float | None) -> str:
-    return "–" if value is None else fixed(value, 0)
+def _clearance(value: float | None, pair: Pair | None) -> str:
+    return "–" if value is None or pair is None else bracketed(fixed(value, 0), say(pair))
 
 
 def _remark(tried: model.TriedStrategy, motion: model.StrategyMotion) -> str:

@@ -9,10 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from er3a.collision.along import bodies_of
+from er3a.collision.matrix import solids_met
 from er3a.collision.pairs import ShapesAssumed
-from er3a.collision.scene import Scene
+from er3a.collision.scene import Box, Scene
 from er3a.collision.shapes import shapes_assumed
 from er3a.files.reference_sets import check_reference_file, reference_folder
+from er3a.geometry.transforms import translation
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.si_units import stated
@@ -270,6 +272,7 @@ def _summary(
         placement=tool.placement,
         not_examined=(
             *_left_out(settings, proven, surface, voids, tool),
+            *_in_solids(robot, scene, tool.placement),
             *left_out_of_collisions(robot, bodies_of(robot, scene), scene),
             *left_out_without_tool(robot),
         ),
@@ -312,6 +315,19 @@ def _left_out(
             yield LeftOut("box_directions")
         if placement.named_places:
             yield LeftOut("placed_box")
+
+
+def _in_solids(robot: Robot, scene: Scene | None, found: model.Placement | None) -> Iterator[LeftOut]:
+    """Places of the box that would be in solids, but for those that it stands on."""
+    if scene is None or not isinstance(found, model.PlacementSummary):
+        return
+    named = [
+        f"{name}: {solid}"
+        for name, place in found.named_places
+        for solid in solids_met(robot, Box(name, translation(*place.centre_m), np.array(place.size_m)), scene)
+    ]
+    if named:
+        yield LeftOut("places_in_solids", tuple(named))
 
 
 def _bars(proven: Proven) -> model.Bars | None:
