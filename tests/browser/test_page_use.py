@@ -245,6 +245,19 @@ def test_a_row_that_an_address_leads_to_has_the_heads_of_its_columns(browser, sm
     assert [text.strip('"') for text in shown] == heads
 
 
+def test_the_first_column_of_a_wide_table_stays_on_a_phone(browser, small_study):
+    browser.set_window_size(500, 800)
+    browser.get((small_study.folder / "reports/er3a_c60/workspace.html").as_uri())
+    moved, left = browser.execute_script(
+        "const box = document.querySelector('#table-voids');"
+        "box.scrollLeft = 200;"
+        "return [box.scrollLeft,"
+        "  box.querySelector('tbody td').getBoundingClientRect().left - box.getBoundingClientRect().left]"
+    )
+    assert moved > 0
+    assert abs(left) < 1
+
+
 def test_a_table_of_joints_keeps_their_order(browser, small_study):
     browser.get((small_study.folder / "reports/er3a_c60/validation.html").as_uri())
     assert browser.find_elements(By.CSS_SELECTOR, "table.entries")
