@@ -160,8 +160,8 @@ ENDLOOP"""
         kinds.count(Decision) == len([step for step in execution.steps if isinstance(step.instruction, Decision)]) >= 2
     )
     said = [step.instruction for step in execution.steps]
-    assert Pause(0.5) in said
-    assert Pause(condition="$IN[3]") in said
+    assert Pause(0.5, stops=True) in said
+    assert Pause(condition="$IN[3]", stops=True) in said
     assert Output("$OUT[8]", "TRUE") in said
 
 

@@ -56,7 +56,7 @@ def test_inline_forms_take_tool_base_speed_and_zone_from_their_data():
     assert (arc.kind, arc.speed.value, arc.zone.value) == ("arc", 0.02, 0.05)
     assert [by_line[number].kind for number in (57, 60)] == ["line", "joint"]
     assert by_line[44] == Output("$OUT[5]", "TRUE")
-    assert by_line[63] == Pause(0.5)
+    assert by_line[63] == Pause(0.5, stops=True)
     assert isinstance(by_line[68], Aside)
     assert {each.name for each in files_of(STYLES / "WELD1.src")} == {"WELD1.src", "WELD1.dat", "$config.dat"}
 
