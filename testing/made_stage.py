@@ -78,7 +78,7 @@ ROWS = Rows(
     q_deg=np.arange(18.0).reshape(3, 6),
     point_mm=np.arange(9.0).reshape(3, 3),
 )
-FIGURES = {"hull_volume": "Volume of the hull", "reach": "Reach", "solved": "Targets that are solved"}
+KEY_FIGURES = {"hull_volume": "Volume of the hull", "reach": "Reach", "solved": "Targets that are solved"}
 SUMMARY = MadeSummary(
     Verdict("fail", Hollow(0.25)),
     (Figure("hull_volume", 1.25, "m³", 0.01), Figure("reach", None, "mm"), Figure("solved", 2, "", of=3)),

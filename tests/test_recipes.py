@@ -368,7 +368,7 @@ class PlainWriter(Writer):
 
     def motion(self, ready: ReadyMotion) -> None:
         if ready.joints is None:
-            self.left_out(ready.motion)
+            self.omit(ready.motion)
         else:
             self.lines.append(" ".join(("GO", *(fixed(each, 4) for each in np.degrees(ready.joints).tolist()))))
 

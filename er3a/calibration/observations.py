@@ -105,7 +105,7 @@ class QuantityObservations:
     @property
     def poses(self) -> int:
         """Number of poses."""
-        return len({quantity.seen_at for quantity in self.quantities})
+        return len({quantity.arm_pose for quantity in self.quantities})
 
     def predict(self, robot: Robot, parameters: Sequence[Parameter], amounts: Reals) -> Reals:
         """Values (H, n), mm, by the robot's table with each row of amounts (H, p), in m and rad, added."""

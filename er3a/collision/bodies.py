@@ -92,7 +92,7 @@ class Bodies:
         self.joined = self.layout.joined
         self.first = self.layout.first
         self.second = np.where(self.layout.second < count, self.layout.second, -1)
-        self.pairs: tuple[Pair, ...] = tuple(_named(a, b) for a, b in (*watched, *around))
+        self.pairs: tuple[Pair, ...] = tuple(named_pair(a, b) for a, b in (*watched, *around))
         most = max((len(body.points) for body in self.capsules), default=1)
         rows = [np.resize(np.arange(len(body.points)), most) for body in self.capsules]
         self._padded = np.array([body.points[row] for body, row in zip(self.capsules, rows)]).reshape(-1, most, 3)
@@ -193,7 +193,7 @@ class Bodies:
         return overlap_depth(*cores)
 
 
-def _named(first: Body, second: Body) -> Pair:
+def named_pair(first: Body, second: Body) -> Pair:
     """What the results call two bodies, the second the outer one or a solid."""
     is_link = [body.name == link_label(body.link) for body in (first, second)]
     if second.link < 0:

@@ -51,13 +51,13 @@ class TimedTorques:
     lower_bound: float
 
 
-def fastest_under_torques(model: ArmModel, q: Reals, speed: Reals, peak: Reals) -> TimedTorques:
+def fastest_under_torques(model: ArmModel, q: Reals, speed: Reals, torque_limit: Reals) -> TimedTorques:
     """Run along nodes (N, n) from rest to rest, as fast as torques and joint speeds allow.
 
     Parameters
     ----------
     speed : (n,), maximum joint speeds, rad/s or m/s
-    peak : (n,), maximum torques, N m or N; NaN where unknown, which bounds nothing
+    torque_limit : (n,), maximum torques, N m or N; NaN where unknown, which bounds nothing
 
     Raises
     ------
@@ -69,7 +69,7 @@ def fastest_under_torques(model: ArmModel, q: Reals, speed: Reals, peak: Reals) 
         timed = timing.standing(q[-1], 0.0)
         return TimedTorques(timed, holding_torques(model, timed.q), 0.0)
     _, s, spline = path
-    along = TorquesAlong.along(model, s, spline, speed, peak)
+    along = TorquesAlong.along(model, s, spline, speed, torque_limit)
     lower_bound, ceiling = along.shortest_time()
     path_speed, t = along.fastest(ceiling)
     timed = timing.Timed(polynomial_motion(timing.run_along(s, spline, path_speed, t), t, timing.SPLINE_DEGREE))
@@ -83,7 +83,7 @@ Rows = tuple[Reals, Reals, Reals, Reals, Reals]
 
 @dataclass(frozen=True, eq=False)
 class TorquesAlong:
-    """Torques ``a s'' + b s'^2 + c + viscous s'`` at the nodes (N, k) of the k joints whose peak (k,) is known.
+    """Torques ``a s'' + b s'^2 + c + viscous s'`` at the nodes (N, k) of the k joints whose limit (k,) is known.
 
     Attributes
     ----------
@@ -99,25 +99,25 @@ class TorquesAlong:
     b: Reals
     c: Reals
     viscous: Reals
-    peak: Reals
+    torque_limit: Reals
     speed_bound: Reals
     slow: Reals
 
     @classmethod
     def along(
-        cls, model: ArmModel, s: Reals, spline: scipy.interpolate.CubicSpline, speed: Reals, peak: Reals
+        cls, model: ArmModel, s: Reals, spline: scipy.interpolate.CubicSpline, speed: Reals, torque_limit: Reals
     ) -> TorquesAlong:
         """The torques along a path."""
-        bound, drives = np.isfinite(peak), drives_of(model.robot)
-        a, b, c = _torque_rows(model, s, spline, peak)
+        bound, drives = np.isfinite(torque_limit), drives_of(model.robot)
+        a, b, c = _torque_rows(model, s, spline, torque_limit)
         slope = spline(s, 1)
         viscous = known(drives.viscous) * slope
         with np.errstate(divide="ignore", invalid="ignore"):
             speed_bound = (speed / np.abs(slope)).min(axis=1)
-            room = np.maximum(peak - np.abs(c), SLOWEST * peak) / (2 * np.abs(viscous))
+            room = np.maximum(torque_limit - np.abs(c), SLOWEST * torque_limit) / (2 * np.abs(viscous))
         slow = np.minimum(speed_bound, np.where(np.isfinite(room), room, np.inf).min(axis=1))
         rows = a[:, bound], b[:, bound], c[:, bound], viscous[:, bound]
-        return cls(s, spline, speed, *rows, peak[bound], speed_bound, slow)
+        return cls(s, spline, speed, *rows, torque_limit[bound], speed_bound, slow)
 
     def shortest_time(self) -> tuple[float, Reals]:
         """A time (s) that no motion undercuts, and s' at the nodes (N,) that none exceeds."""
@@ -169,7 +169,7 @@ class TorquesAlong:
             friction_assisting, (-1, 1)
         )
         F = np.broadcast_to(np.eye(a.shape[1]), (len(a), a.shape[1], a.shape[1])).copy()
-        return a, b, c, F, np.tile(self.peak, 2) - constant
+        return a, b, c, F, np.tile(self.torque_limit, 2) - constant
 
     def _solved(self, rows: Rows, ceiling: Reals) -> tuple[Reals, Reals]:
         """Speeds s', at most ``ceiling``, and times (s) at the nodes (N,); rows hold at both ends of each step."""
@@ -190,7 +190,7 @@ class TorquesAlong:
 
 
 def _torque_rows(
-    model: ArmModel, s: Reals, spline: scipy.interpolate.CubicSpline, peak: Reals
+    model: ArmModel, s: Reals, spline: scipy.interpolate.CubicSpline, torque_limit: Reals
 ) -> tuple[Reals, Reals, Reals]:
     """Torques ``a s'' + b s'^2 + c`` at the nodes, (N, n) each, by toppra's constraint of joint torques."""
     drives = drives_of(model.robot)
@@ -202,7 +202,7 @@ def _torque_rows(
         return whole
 
     constraint = timing.toppra_library().constraint.JointTorqueConstraint(
-        torques, np.stack([-peak, peak], axis=1), known(drives.coulomb)
+        torques, np.stack([-torque_limit, torque_limit], axis=1), known(drives.coulomb)
     )
     a, b, c = constraint.compute_constraint_params(timing.toppra_path(s, spline, AT_REST), s)[:3]
     return a, b, c

@@ -23,7 +23,7 @@ from typing import Annotated, Any, Literal, Self, TypeGuard, get_args
 
 import numpy as np
 import scipy
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn, read_csv, read_header
@@ -291,6 +291,15 @@ TRAPEZOID_RAMP = 1 / 3  # of a motion's time, on the way up and on the way down
 
 Duration = Annotated[float, Field(gt=0, le=3600)]
 Samples = Annotated[int, Field(ge=2, le=100_000)]
+Expected = Annotated[
+    list[PathVerdict],
+    Field(min_length=1),
+    BeforeValidator(
+        lambda value: [value] if isinstance(value, str) else value,
+        json_schema_input_type=PathVerdict | Annotated[list[PathVerdict], Field(min_length=1)],
+    ),
+]
+"""One verdict, or several that a path comes to at once."""
 Rates = Annotated[list[Annotated[float, Field(ge=-1e6, le=1e6)]], Field(min_length=1, max_length=MAX_JOINTS)]
 Blend = Annotated[float, Field(ge=0, le=10_000)]
 
@@ -313,14 +322,20 @@ class PoseEntry(Orientation):
 class NamedPath(StrictModel):
     """The keys of every path.
 
-    ``expect`` is the expected verdict: another one is a fault, and the expected one is not.
+    ``expect`` is the expected verdict: another one is a fault, and the expected one is not. A path that also collides
+    is as expected only if both are given (``[leaves limits, collides]``).
     """
 
     name: Name
     title: Text
     title_zh: Text | None = None
     samples: Samples
-    expect: PathVerdict | None = None
+    expect: Expected | None = None
+
+    @property
+    def expected(self) -> tuple[PathVerdict, ...]:
+        """All that is expected of it; empty where nothing is said."""
+        return tuple(self.expect or ())
 
 
 class Profiled(NamedPath):

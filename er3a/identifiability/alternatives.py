@@ -88,7 +88,7 @@ def flips_of(robot: Robot, quantities: Sequence[Quantity]) -> list[Flip]:
     joints = range(1, len(robot.a) + 1)
     found = [Flip("reversed", TableNumber("direction", j)) for j in joints]
     for j in joints:
-        angles = {round(value_at(quantity.seen_at, j), 9) for quantity in quantities} - {0.0}
+        angles = {round(value_at(quantity.arm_pose, j), 9) for quantity in quantities} - {0.0}
         found += [Flip("reversed", TableNumber("direction", j), angle) for angle in sorted(angles)]
     last_first = joints[::-1]  # what only turns the flange comes before what the flange and others compose
     found += [Flip("half_turn", TableNumber("offset", j)) for j in last_first]

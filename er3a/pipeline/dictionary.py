@@ -73,7 +73,7 @@ def data_dictionary() -> str:
 
 
 def _figures(stage: Stage) -> str:
-    names: dict[str, str] = import_module(stage.messages).FIGURES
+    names: dict[str, str] = import_module(stage.messages).KEY_FIGURES
     return "".join(f"- `{code}`: {name}\n" for code, name in names.items())
 
 

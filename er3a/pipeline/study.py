@@ -236,8 +236,8 @@ class StudyBase(StrictModel):
 
     def settings(self, name: str, key: str) -> dict[str, Any]:
         """What of the study concerns one of its keys, for a robot; of a key without settings seed and robot alone."""
-        left_out = {"targets", "paths", "programs", "vision", "file", "scene", "expect", "tool_load", "payload"}
-        entry = self.entry(name).model_dump(exclude=left_out, exclude_none=True)
+        not_counted = {"targets", "paths", "programs", "vision", "file", "scene", "expect", "tool_load", "payload"}
+        entry = self.entry(name).model_dump(exclude=not_counted, exclude_none=True)
         if variant := self.variants.get(name):
             entry["varied"] = {variant.vary: variant.value}
         own = getattr(self, key, None)

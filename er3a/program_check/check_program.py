@@ -15,6 +15,7 @@ from er3a.collision.pairs import ASSUMED_MARGIN, PENETRATION_TOLERANCE, PairsUne
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import shapes_assumed
 from er3a.errors import InputError
+from er3a.geometry.transforms import rotation_angle
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import USUAL_NEAR, NearSingular
 from er3a.numerics.arrays import Reals
@@ -35,6 +36,7 @@ from er3a.programs.execution import Ending, Execution, KeepOn, RunLimits
 from er3a.programs.instructions import (
     ArmMotion,
     Decision,
+    JointTarget,
     Load,
     MovesBeside,
     Pause,
@@ -297,7 +299,7 @@ def _located(execution: Execution, robot: Robot, checker: StepChecker, end: int)
             found.append(LocatedFinding("caution", beside, step.place, step.calls))
         elif isinstance(what, Decision) and what.taken:
             found.append(LocatedFinding("note", found_in.BothSidesChecked(what.condition), step.place, step.calls))
-    found += _loads(execution, robot)
+    found += [*_loads(execution, robot), *_stated_elsewhere(execution, robot)]
     found += [LocatedFinding("caution", other, ending.place) for ending, other in checker.returns]
     for ending in execution.endings:
         if ending.kind not in ("end", "repeats", "joins"):
@@ -313,7 +315,9 @@ def _located(execution: Execution, robot: Robot, checker: StepChecker, end: int)
     groups: dict[tuple[Place, str, str], list[LocatedFinding]] = defaultdict(list)
     for each in found:
         groups[each.place, each.finding.code, _which(each.finding)].append(each)
-    grouped = [replace(same[0], times=len(same)) for same in groups.values()]
+    grouped = [
+        replace(max(same, key=lambda each: found_in.RANKS[each.level]), times=len(same)) for same in groups.values()
+    ]
     order = {path: i for i, path in enumerate(dict.fromkeys(str(each.place.file) for each in grouped))}
     return tuple(
         sorted(grouped, key=lambda each: (order[str(each.place.file)], each.place.line, -found_in.RANKS[each.level]))
@@ -336,6 +340,30 @@ def _loads(execution: Execution, robot: Robot) -> Iterator[LocatedFinding]:
         else:
             found = found_in.LoadNotExamined(load.mass)
         yield LocatedFinding(found_in.level_of(found), found, step.place, step.calls)
+
+
+STATED_MM, STATED_DEG = 1.0, 0.5
+"""By how much a table's pose may differ from its joints, which tables often round to 0.1 deg."""
+
+
+def _stated_elsewhere(execution: Execution, robot: Robot) -> Iterator[LocatedFinding]:
+    """The row of a table whose tool is farthest from where its joints put it."""
+    rows = [
+        (step, step.instruction.target)
+        for step in execution.steps
+        if isinstance(step.instruction, ArmMotion) and isinstance(step.instruction.target, JointTarget)
+    ]
+    rows = [(step, target) for step, target in rows if target.stated is not None]
+    if not rows:
+        return
+    stated = np.stack([target.stated for _, target in rows if target.stated is not None])
+    reached = np.linalg.inv(robot.base) @ forward(robot, np.stack([target.joints for _, target in rows]))
+    moved = np.linalg.norm(stated[:, :3, 3] - reached[:, :3, 3], axis=1) * 1000
+    turned = np.nan_to_num(np.degrees(rotation_angle(stated[:, :3, :3], reached[:, :3, :3])))
+    worst = int((moved / STATED_MM + turned / STATED_DEG).argmax())
+    if moved[worst] > STATED_MM or turned[worst] > STATED_DEG:
+        other = found_in.ToolStatedElsewhere(float(moved[worst]), float(turned[worst]))
+        yield LocatedFinding("caution", other, rows[worst][0].place)
 
 
 BY_JOINT_MOVES = frozenset(

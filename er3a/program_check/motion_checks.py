@@ -182,6 +182,7 @@ MIN_POINTS, MAX_POINTS = 21, 501
 NO_WAY = 1e-9  # m or rad
 SPEED_TOLERANCE = 1e-6  # relative
 FAR_TURN, NEAR_MOVE = np.radians(90.0), 0.05  # of a joint that jumps: it turns so far where the tool moves less
+SPARED = np.radians(10.0)  # the other way round is named where it is shorter by so much
 SAME_ARRIVAL = 1e-4  # rad
 
 
@@ -346,7 +347,8 @@ def tool_motion_path(
         *(arm, law, followed.t, followed.q, followed.joints, followed.joints_at, proof.rate_bounds),
         *(path.length, path.turned, end_joints, (), path),
     )
-    moments = _followed_moments(followed, proof, way, rules) | _arrival_moments(followed, given, way)
+    carried = bool(getattr(motion.target, "external", ()))
+    moments = _followed_moments(followed, proof, way, rules, carried) | _arrival_moments(followed, given, way)
     return replace(way, findings=tuple(moments), moments=moments)
 
 
@@ -359,12 +361,12 @@ def _arc(T_start: Reals, via: Reals, end: Reals, time: tuple[float, float | None
 
 
 def _followed_moments(
-    followed: Followed, proof: ToolProof, way: MotionPath, rules: CheckRules
+    followed: Followed, proof: ToolProof, way: MotionPath, rules: CheckRules, carried: bool
 ) -> dict[found_in.CheckFinding, float]:
     """Findings on reach, configuration, limits, singular poses and speeds, each with the time (s) of its start."""
     arm = way.arm
     found: dict[found_in.CheckFinding, float] = {
-        found_in.StretchOutOfReach(way.along_mm(stretch.start), stretch.cause.reasons): stretch.start
+        found_in.StretchOutOfReach(way.along_mm(stretch.start), stretch.cause.reasons, carried): stretch.start
         for stretch in motion_faults.unreachable(arm, followed)
     }
     for jump in followed.jumps:
@@ -488,9 +490,9 @@ def _joint_jumps(arm: Robot, start: Reals, end: Reals, moved: float, turned: flo
     lead = int(np.argmax(turned_by))
     if turned_by[lead] > FAR_TURN and moved < NEAR_MOVE and turned < turned_by[lead] / 2:
         found.append(found_in.JointJumps(lead + 1, float(np.degrees(step[lead])), moved * 1000))
-    for j in np.flatnonzero(turned_by > np.pi + NO_WAY).tolist():
+    for j in np.flatnonzero(turned_by > np.pi).tolist():
         nearer = float(wrap_to_pi(step[j]))
-        if arm.lower[j] <= start[j] + nearer <= arm.upper[j]:
+        if turned_by[j] - abs(nearer) > SPARED and arm.lower[j] <= start[j] + nearer <= arm.upper[j]:
             found.append(found_in.WholeTurn(j + 1, *np.degrees([step[j], nearer]).tolist()))
     return found
 

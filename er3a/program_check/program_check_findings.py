@@ -42,6 +42,20 @@ class FrameTakenAsFlange(Finding):
     name: str
 
 
+class FrameOfSeveral(Finding):
+    """The program takes a tool or base by an index that is not known; one was given for all of them."""
+
+    name: str
+    frame: Literal["tool", "base"]
+
+
+class ToolStatedElsewhere(Finding):
+    """A table's pose of the tool is not where its joints put it; in the row where it is farthest away."""
+
+    moved_mm: float
+    turned_deg: float
+
+
 class FramesInDoubt(Finding):
     """An instruction before, which is not understood, may have set another tool, base or path for this motion."""
 
@@ -53,16 +67,21 @@ class PathNotKnown(Finding, code="way_not_known"):
 
 
 class TargetOutOfReach(Finding):
-    """No IK solution reaches the target; ``reasons`` are empty where they were not determined."""
+    """No IK solution reaches the target; ``reasons`` are empty where they were not determined.
+
+    ``carried`` where the target sets external axes, which were left out: they may bring the arm or the target near.
+    """
 
     reasons: tuple[Unsolved, ...]
+    carried: bool = False
 
 
 class StretchOutOfReach(Finding, code="way_out_of_reach"):
-    """The tool leaves the arm's reach on the way to the target."""
+    """The tool leaves the arm's reach on the way to the target; ``carried`` as for :class:`TargetOutOfReach`."""
 
     at_mm: float
     reasons: tuple[Unsolved, ...]
+    carried: bool = False
 
 
 class ConfigurationEnds(Finding):
@@ -370,6 +389,8 @@ CheckFinding = (
     | TargetNotGiven
     | FrameNotGiven
     | FrameTakenAsFlange
+    | FrameOfSeveral
+    | ToolStatedElsewhere
     | FramesInDoubt
     | PathNotKnown
     | TargetOutOfReach
@@ -450,6 +471,8 @@ def level_of(finding: CheckFinding) -> Level:
         return "caution" if finding.turns or finding.angle_deg is None else "note"
     if isinstance(finding, FrameNotGiven):
         return "fail" if finding.needed else "caution"
+    if isinstance(finding, TargetOutOfReach | StretchOutOfReach) and finding.carried:
+        return "caution"
     if isinstance(finding, MotionCollides):
         return "fail" if any(touch.is_certain for touch in finding.touches) else "caution"
     if isinstance(finding, SpeedNotGiven) and finding.word:

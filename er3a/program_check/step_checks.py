@@ -44,6 +44,7 @@ from er3a.collision.pairs import Pair
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import arm_shapes, enlarged_by, link_frames
 from er3a.errors import PoseError
+from er3a.geometry.transforms import rotation_angle
 from er3a.geometry.vectors import TURN
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.chain import row_values
@@ -66,7 +67,7 @@ from er3a.program_check.motion_checks import (
 from er3a.programs import instructions
 from er3a.programs.execution import Ending, Execution
 from er3a.programs.writing import solutions_meant
-from er3a.robots.joint_limits import joint_shown, within
+from er3a.robots.joint_limits import equivalents_within, joint_shown, within
 from er3a.robots.robot import Robot
 
 FLANGE = "tool0"
@@ -81,14 +82,15 @@ class PlacedMotion(ByValue):
     ----------
     arm : the robot with the motion's tool; without one where the tool is not known
     base : T_world_base of the targets (4, 4); None where the base is not known
-    missing, taken : frames that are not given
+    missing : frames that are not given
+    taken : frames that were taken for ones that are not given, or not wholly
     """
 
     motion: instructions.ArmMotion
     arm: Robot
     base: Reals | None
     missing: tuple[found_in.FrameNotGiven, ...]
-    taken: tuple[found_in.FrameTakenAsFlange, ...]
+    taken: tuple[found_in.FrameTakenAsFlange | found_in.FrameOfSeveral, ...]
 
     @property
     def needed(self) -> tuple[found_in.FrameNotGiven, ...]:
@@ -106,18 +108,22 @@ class Arms:
     def placed(self, motion: instructions.ArmMotion) -> PlacedMotion:
         """A motion placed in the world, with the frames that are unknown."""
         missing: list[found_in.FrameNotGiven] = []
-        taken: tuple[found_in.FrameTakenAsFlange, ...] = ()
+        taken: list[found_in.FrameTakenAsFlange | found_in.FrameOfSeveral] = []
         arm, base = self.robot, motion.base.pose
         if motion.tool.pose is not None:
             arm = self._with(motion.tool.pose)
+            taken += [found_in.FrameOfSeveral(motion.tool.name, "tool")] if motion.tool.one_of_several else []
         elif motion.tool.name == FLANGE:
-            arm, taken = self._with(np.eye(4)), (found_in.FrameTakenAsFlange(FLANGE),)
+            arm = self._with(np.eye(4))
+            taken.append(found_in.FrameTakenAsFlange(FLANGE))
         elif motion.tool.name:
             missing.append(found_in.FrameNotGiven(motion.tool.name, "tool", needed=False))
         if base is None and motion.base.name:
             missing.append(found_in.FrameNotGiven(motion.base.name, "base", needed=False))
+        if base is not None and motion.base.one_of_several:
+            taken.append(found_in.FrameOfSeveral(motion.base.name, "base"))
         known = None if base is None and motion.base.name else self.robot.base @ (np.eye(4) if base is None else base)
-        return PlacedMotion(motion, arm, known, tuple(missing), taken)
+        return PlacedMotion(motion, arm, known, tuple(missing), tuple(taken))
 
     def _with(self, tool: Reals) -> Robot:
         key = tool.tobytes()
@@ -175,9 +181,9 @@ def _solved(placed: PlacedMotion, target: instructions.PoseTarget, pose: Reals, 
     except PoseError:
         return Goal(None, None, False, (found_in.TargetNotGiven("", "not_finite"),))
     if not len(found.q):
-        return Goal(None, pose, True, (*placed.taken, found_in.TargetOutOfReach(found.unsolved)))
+        return Goal(None, pose, True, (*placed.taken, found_in.TargetOutOfReach(found.unsolved, bool(target.external))))
     rows = found.q[found.within_limits] if found.within_limits.any() else found.q
-    findings: list[found_in.CheckFinding] = list(placed.taken)
+    findings: list[found_in.CheckFinding] = []
     joint = placed.motion.kind == "joint"
     met = np.ones(len(rows), np.bool_)
     if target.branch is not None and joint:
@@ -194,7 +200,7 @@ def _solved(placed: PlacedMotion, target: instructions.PoseTarget, pose: Reals, 
         findings.append(found_in.ConfigurationGuessed(different))
     start = np.zeros(rows.shape[1]) if reference is None else reference
     away = np.abs(rows - start).max(axis=1)
-    return Goal(rows[int(away.argmin())], pose, True, tuple(findings))
+    return Goal(rows[int(away.argmin())], pose, True, (*placed.taken, *findings))
 
 
 def _different(rows: Reals) -> int:
@@ -262,7 +268,8 @@ def _of_poses(group: list[tuple[int, PlacedMotion]]) -> dict[int, tuple[found_in
         elif (reasons := reasons + 1) <= MAX_REASONS:
             findings[number] = goal_of(placed, placed.motion.target, None).findings
         else:
-            findings[number] = (found_in.TargetOutOfReach(()),)
+            outer = getattr(placed.motion.target, "external", ())
+            findings[number] = (found_in.TargetOutOfReach((), bool(outer)),)
     return findings
 
 
@@ -539,6 +546,7 @@ MAX_MOTION_SHARE = 0.5  # that a zone may take
 TOLERANCE = 1e-9
 SAME_JOINTS = 1e-4  # rad
 BEND_PARTS = 16
+NEAR_PARTS = 129
 
 
 @dataclass(frozen=True, eq=False)
@@ -602,6 +610,7 @@ class CheckedMotion(ByValue):
 
 
 MAX_SOLUTIONS = 8  # of a target, to which joint moves are tried
+MAX_MOTIONS_AGAIN = 1_000  # that are checked again after two ways with the same tool pose and other joints have joined
 VIA_TURNS = (20.0, 40.0)  # deg, by which joints are turned away on the way round
 
 
@@ -614,29 +623,42 @@ class StepChecker:
         self.motions: dict[int, CheckedMotion] = {}
         self.returns: list[tuple[Ending, found_in.LoopComesBackOtherwise]] = []
         self._joints: list[Reals | None] = []
-        self._before: list[int] = []  # the motion that an arm blends from into the next; -1 for none
+        self._before: list[tuple[int, bool]] = []  # as of _after, by step
         self._known: dict[Hashable, CheckedMotion] = {}
         self._corners: dict[Hashable, tuple[found_in.CheckFinding, ...]] = {}
+        self._again = 0  # motions that were checked from other joints
+        self._following: dict[int, list[int]] = defaultdict(list)
+        for number, step in enumerate(execution.steps):
+            self._following[step.before].append(number)
 
     def check(self, number: int) -> None:
         """Check a step; all earlier steps must have been checked."""
         step = self.execution.steps[number]
-        joints = self._joints[step.before] if step.before >= 0 else self.start
-        before = self._before[step.before] if step.before >= 0 else -1
+        joints = self._before_it(number)
+        before = self._before[step.before] if step.before >= 0 else (-1, False)
         what = step.instruction
         if isinstance(what, instructions.ArmMotion):
             self.motions[number] = motion = self._from_start(self._motion(what, joints), joints)
             joints = motion.end
             self._corner(before, number)
-            before = number
-        elif isinstance(what, instructions.Pause):
-            before = -1
-        elif (isinstance(what, instructions.Unknown) and what.may_move) or (
-            isinstance(what, instructions.MovesBeside) and what.kind != "interrupt"
-        ):
-            joints, before = None, -1
+        elif _is_lost(what):
+            joints = None
         self._joints.append(joints)
-        self._before.append(before)
+        self._before.append(self._after(before, number))
+
+    def _after(self, before: tuple[int, bool], number: int) -> tuple[int, bool]:
+        """The motion that the arm may blend from after a step, -1 for none; and whether it may stop at its target too.
+
+        A wait for which the arm need not stop may be over before the corner, so that it is rounded. So may be that
+        before a motion to where the arm is.
+        """
+        what, motion = self.execution.steps[number].instruction, before[0]
+        if isinstance(what, instructions.ArmMotion):
+            passes = motion >= 0 and self.motions[number].stays and what.zone.kind != "fine"
+            return (motion, True) if passes else (number, False)
+        if isinstance(what, instructions.Pause):
+            return (-1, False) if what.stops else (motion, True)
+        return (-1, False) if _is_lost(what) else before
 
     def _from_start(self, motion: CheckedMotion, joints: Reals | None) -> CheckedMotion:
         """The first motion, with limits that the arm stands beyond before it: no target before says so."""
@@ -662,25 +684,82 @@ class StepChecker:
         return target_findings(self.arms, motions, {i: _key(motion) for i, motion in motions.items()})
 
     def close_loop(self, ending: Ending) -> None:
-        """Where a loop begins again: whether the arm stands as it did then, and the corner between the rounds."""
-        if ending.kind != "repeats" or ending.repeats_from is None or ending.step < 0:
+        """Where a way comes to what was followed before: the corner there, and what follows from where the arm stands.
+
+        A loop that comes back otherwise is named. A way that joins another one by the tool's pose alone, as its joints
+        differ, is checked on until they are the same.
+        """
+        if ending.repeats_from is None or ending.step < 0:
             return
-        first = self.execution.steps[ending.repeats_from]
-        then = self._joints[first.before] if first.before >= 0 else self.start
-        now = self._joints[ending.step]
-        if then is not None and now is not None and np.abs(now - then).max() > SAME_JOINTS:
+        at = self.execution.steps[ending.repeats_from].before
+        then, now, before = self._before_it(ending.repeats_from), self._joints[ending.step], self._before[ending.step]
+        loops = ending.kind == "repeats"
+        if then is None or now is None or not _apart(then, now):
+            self._checked_on(at, then, before)
+        elif loops or not self._checked_on(at, now, before):
             joint = int(np.argmax(np.abs(now - then)))
             other = joint_shown(self.arms.robot, joint, float(now[joint] - then[joint]))
             self.returns.append((ending, found_in.LoopComesBackOtherwise(joint + 1, *other)))
-        if isinstance(first.instruction, instructions.ArmMotion):
-            self._corner(self._before[ending.step], ending.repeats_from)
+            if loops:
+                self._checked_on(at, then, before)
+
+    def _before_it(self, number: int) -> Reals | None:
+        """Joints (n,) before a step, rad; None if not known."""
+        before = self.execution.steps[number].before
+        return self._joints[before] if before >= 0 else self.start
+
+    def _checked_on(self, at: int, joints: Reals | None, before: tuple[int, bool]) -> bool:
+        """Check what follows a step from other joints, or after another motion, until both make no difference.
+
+        Returns
+        -------
+        done : False where that takes too many motions
+        """
+        steps = self.execution.steps
+        last = self.motions.get(before[0])
+        waiting = [(number, joints, before, last) for number in self._following[at]]
+        while waiting:
+            number, joints, before, last = waiting.pop()
+            what, same = steps[number].instruction, not _apart(joints, self._before_it(number))
+            if isinstance(what, instructions.ArmMotion):
+                self._again += not same
+                if self._again > MAX_MOTIONS_AGAIN:
+                    return False
+                motion = self.motions[number] if same else self._motion(what, joints)
+                self._add(number, motion.findings, motion.moments)
+                if last is not None:
+                    self._add(before[0], self._corner_findings(last, motion))
+                if same:
+                    continue
+                joints = motion.end
+            elif _is_lost(what) or (same and before[0] < 0):
+                continue
+            after = self._after(before, number)
+            if after[0] != before[0]:
+                last = motion if after[0] == number else None
+            waiting += [(each, joints, after, last) for each in self._following[number]]
+        return True
+
+    def _add(
+        self,
+        number: int,
+        findings: Iterable[found_in.CheckFinding],
+        moments: Mapping[found_in.CheckFinding, float] | None = None,
+    ) -> None:
+        """Add what is new of findings to those of a motion."""
+        motion = self.motions[number]
+        new = tuple(each for each in dict.fromkeys(findings) if each not in motion.findings)
+        if new:
+            moments = {**(moments or {}), **motion.moments}
+            self.motions[number] = replace(motion, findings=(*motion.findings, *new), moments=moments)
 
     def joint_moves_instead(self, number: int) -> tuple[Reals, ...]:
         """Joint moves (n,), one or two, that take the tool where a motion does and pass its checks; empty if none was
         found, and of arms with prismatic joints.
 
-        The first that passes is taken: straight to the solution nearest to the start, or else round by the middle of
-        both with some joints turned away. They are checked at the share of full speed that is assumed.
+        The first that passes is taken: straight to the solution on the way to which the tool turns least, of like ones
+        the nearest to the start, or else round by the middle of both with some joints turned away. They are checked at
+        the share of full speed that is assumed.
         """
         checked = self.motions[number]
         goal = self._goal_pose(checked)
@@ -690,8 +769,11 @@ class StepChecker:
             found = inverse(checked.placed.arm, goal, checked.start, self_motion_rows=True)
         except PoseError:
             return ()
-        rows = self._free(checked.placed, _as_written(found.q[found.within_limits]))
-        rows = rows[np.argsort(np.abs(rows - checked.start).max(axis=1), kind="stable")][:MAX_SOLUTIONS]
+        arm, inside = checked.placed.arm, found.q[found.within_limits]
+        rows = np.concatenate([inside[:0], *(equivalents_within(arm, q, checked.start) for q in inside)])
+        rows = self._free(checked.placed, _as_written(rows))
+        away, turns = np.abs(rows - checked.start).max(axis=1), _turns(arm, checked.start, rows)
+        rows = rows[np.lexsort((away, np.round(turns / LIKE_TURNS)))][:MAX_SOLUTIONS]
         if len(rows) and np.abs(rows[0] - checked.start).max() < SAME_JOINTS:
             return ()  # the tool is there already: no move is needed
         straight = [(row,) for row in rows]
@@ -743,6 +825,8 @@ class StepChecker:
         placed = self.arms.placed(motion)
         goal = goal_of(placed, motion.target, before)
         findings: list[found_in.CheckFinding] = [*goal.findings, *_said(motion)]
+        if motion.kind != "joint":  # the tool's path depends on it even between joint targets
+            findings += [each for each in placed.taken if each not in findings]
         if motion.angle is not None and not np.isfinite(motion.angle):
             return CheckedMotion(
                 motion.kind, placed, before, None, None, (*findings, found_in.ArcGoesOn(None, turns=False))
@@ -885,25 +969,28 @@ class StepChecker:
         moments = {**motion.moments, near: float(along.t[along.closest])}
         return replace(motion, findings=(*motion.findings, near), moments=moments)
 
-    def _corner(self, first: int, second: int) -> None:
-        """Check the corner between two motions if a zone rounds it."""
+    def _corner(self, before: tuple[int, bool], second: int) -> None:
+        """Check the corner between two motions if a zone rounds it; ``before`` as of :meth:`_after`."""
+        first, may_stop = before
         if first < 0:
             return
         motion = self.motions[first]
-        zone = motion.placed.motion.zone
-        if zone.kind == "fine":
+        if motion.placed.motion.zone.kind == "fine":
             return
-        after = self.motions[second]
+        self._add(first, self._corner_findings(motion, self.motions[second]))
+        for number in () if may_stop else (first, second):
+            blended = self.motions[number]
+            self.motions[number] = replace(blended, blended_ends=min(blended.blended_ends + 1, 2))
+
+    def _corner_findings(self, motion: CheckedMotion, after: CheckedMotion) -> list[found_in.CheckFinding]:
+        """Findings on the corner between two motions if a zone rounds it."""
+        zone = motion.placed.motion.zone
         findings: list[found_in.CheckFinding] = []
         if zone.kind in ("named", "velocity"):
             findings.append(found_in.ZoneWithoutSize(zone.text))
-        if motion.way is not None and after.way is not None:
+        if zone.kind != "fine" and motion.way is not None and after.way is not None:
             findings += self._rounded(motion.way, after.way, motion)
-        new = tuple(each for each in findings if each not in motion.findings)
-        self.motions[first] = replace(
-            motion, findings=(*motion.findings, *new), blended_ends=min(motion.blended_ends + 1, 2)
-        )
-        self.motions[second] = replace(self.motions[second], blended_ends=min(self.motions[second].blended_ends + 1, 2))
+        return findings
 
     def _round_corner(
         self, way: MotionPath, after: MotionPath, corners: Reals, shares: tuple[float, float], margin: float = 0.0
@@ -933,7 +1020,10 @@ class StepChecker:
             found.append(found_in.ZoneTooLarge(zone.value * 1000, min(way.length, after.length) * 1000))
         if self.obstacles is None or motion.clearance is None or motion.clearance < 0:
             return tuple(found)
-        share_before, share_after = (min(share, MAX_MOTION_SHARE) for share in shares)
+        share_before, share_after = (
+            max(min(share, MAX_MOTION_SHARE), _share_near(zone, part, at_end))
+            for share, part, at_end in zip(shares, (way, after), (True, False))
+        )
         corners = np.stack(
             [
                 way.joints_at(np.array(1 - share_before)),
@@ -953,6 +1043,18 @@ class StepChecker:
                 elif near is not None:
                     found.append(near)
         return tuple(found)
+
+
+def _apart(a: Reals | None, b: Reals | None) -> bool:
+    """Whether joints (n,), rad, that are known both, differ."""
+    return a is not None and b is not None and bool(np.abs(a - b).max() > SAME_JOINTS)
+
+
+def _is_lost(what: instructions.Instruction) -> bool:
+    """Whether it is not known where the arm is after an instruction."""
+    return (isinstance(what, instructions.Unknown) and what.may_move) or (
+        isinstance(what, instructions.MovesBeside) and what.kind != "interrupt"
+    )
 
 
 def _bend(way: MotionPath, first: float, last: float) -> Reals:
@@ -976,6 +1078,16 @@ def _zone_share(motion: instructions.ArmMotion, way: MotionPath) -> float:
     return MAX_MOTION_SHARE
 
 
+def _share_near(zone: instructions.Zone, way: MotionPath, at_end: bool) -> float:
+    """The share of a joint move, at most half, on which the tool is within its zone's distance of the corner."""
+    if zone.kind != "distance" or way.tool_path is not None:
+        return 0.0
+    shares = np.linspace(0.0, MAX_MOTION_SHARE, NEAR_PARTS)
+    points = forward(way.arm, way.joints_at(1 - shares if at_end else shares))[:, :3, 3]
+    beyond = np.flatnonzero(np.linalg.norm(points - points[0], axis=1) > zone.value)
+    return float(shares[beyond[0]]) if beyond.size else MAX_MOTION_SHARE
+
+
 def _vias(arm: Robot, start: Reals, end: Reals) -> Reals:
     """Joints (k, n) in rad between a start and an end, with one or two of those after the first turned away."""
     middle = (start + end) / 2
@@ -991,12 +1103,23 @@ def _as_written(q: Reals) -> Reals:
     return found
 
 
+LIKE_TURNS = np.radians(30.0)
+
+
+def _turns(arm: Robot, start: Reals, ends: Reals) -> Reals:
+    """The largest turn (k,), rad, of the tool from where it is, on joint moves to ``ends`` (k, n)."""
+    share = np.linspace(0, 1, 33)[:, None, None]
+    R = forward(arm, start + share * (ends - start))[..., :3, :3]
+    found: Reals = rotation_angle(R[0], R).max(axis=0)
+    return found
+
+
 def _said(motion: instructions.ArmMotion) -> list[found_in.CheckFinding]:
     """Findings on a motion that do not depend on the arm."""
     found: list[found_in.CheckFinding] = []
-    outer = getattr(motion.target, "external", ())
+    outer = {name: None for each in (motion.target, motion.via) for name, _ in getattr(each, "external", ())}
     if outer:
-        found.append(found_in.ExternalAxesLeftOut(tuple(name for name, _ in outer)))
+        found.append(found_in.ExternalAxesLeftOut(tuple(outer)))
     rates = [rate.value for rate in (motion.speed, motion.acceleration) if rate is not None and rate.unit == "share"]
     if rates and max(rates) > 1 + TOLERANCE:
         found.append(found_in.MoreThanFullSpeed(100 * max(rates)))

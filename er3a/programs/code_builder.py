@@ -46,6 +46,7 @@ class CodeBuilder:
         self.code: list[syntax.Operation] = []
         self.blocks: list[Block] = []
         self.settings: tuple[tuple[str, syntax.Expression], ...] = ()  # of each motion of a block
+        self.unsettled: set[str] = set()  # as of the routine
         self._labels: dict[str, int] = {}
         self._gotos: list[tuple[int, str]] = []
         self._hidden = 0
@@ -218,7 +219,8 @@ class CodeBuilder:
             if name not in self._labels:
                 raise fault(place, f"there is no label '{name}'", "Name a label of this routine")
             self.code[at] = syntax.GoTo(place, self._labels[name], endless=self._labels[name] <= at)
-        return syntax.Routine(self.name, self.parameters, (*self.code, syntax.Return(end)), self.place, self.thread)
+        code = (*self.code, syntax.Return(end))
+        return syntax.Routine(self.name, self.parameters, code, self.place, self.thread, frozenset(self.unsettled))
 
     def _open(self, kind: str, place: Place, word: str = "") -> None:
         if len(self.blocks) >= MAX_NESTED:
@@ -266,15 +268,17 @@ def fault(place: Place, problem: str, remedy: str) -> InputError:
 
 
 Each = Callable[[syntax.Expression], syntax.Expression]
+Changed = Callable[[syntax.Invocation], Iterable[syntax.Expression | None]]
+"""What a function outside the program may change of its arguments."""
 
 
 def linked(
-    routines: Iterable[syntax.Routine], sets_arguments: Callable[[str], bool] = lambda function: False
+    routines: Iterable[syntax.Routine], changed: Changed = lambda call: ()
 ) -> tuple[dict[str, syntax.Routine], tuple[ProgramFinding, ...]]:
     """The routines by name, with calls of each other taken out of expressions; and the findings about the text.
 
     Of two routines with one name the later one counts; the other is kept under a name that nothing calls. What a
-    function outside the program sets of its arguments (``sets_arguments``) is unclear from its call on.
+    function outside the program may change of its arguments (``changed``) is unclear from its call on.
     """
     found: list[ProgramFinding] = []
     by_name: dict[str, syntax.Routine] = {}
@@ -286,7 +290,7 @@ def linked(
             by_name[hidden] = replace(former, name=hidden)
         by_name[routine.name] = routine
     found += [finding for routine in by_name.values() for finding in not_understood(routine.code)]
-    return {name: _linked(routine, by_name, sets_arguments) for name, routine in by_name.items()}, tuple(found)
+    return {name: _linked(routine, by_name, changed) for name, routine in by_name.items()}, tuple(found)
 
 
 def lacks_data(routines: Iterable[syntax.Routine], data: Iterable[syntax.Assign], known: Container[str]) -> bool:
@@ -353,11 +357,9 @@ def _opaque(expression: syntax.Expression) -> Iterable[str]:
         yield from _opaque(each)
 
 
-def _linked(
-    routine: syntax.Routine, known: Mapping[str, syntax.Routine], sets_arguments: Callable[[str], bool]
-) -> syntax.Routine:
+def _linked(routine: syntax.Routine, known: Mapping[str, syntax.Routine], changed: Changed) -> syntax.Routine:
     parts = (each for operation in routine.code if not _plain(operation) for each in syntax.expressions_of(operation))
-    if not any(each.function in known or sets_arguments(each.function) for part in parts for each in _invoked(part)):
+    if not any(each.function in known or any(changed(each)) for part in parts for each in _invoked(part)):
         return routine
     code: list[syntax.Operation] = []
     starts: list[int] = []
@@ -379,8 +381,7 @@ def _linked(
         unclear = [
             syntax.Assign(operation.place, given, syntax.Opaque(f"{each.function}(...)"), f"{each.function}(...)")
             for each in outside
-            if sets_arguments(each.function)
-            for given in each.arguments
+            for given in changed(each)
             if isinstance(given, (syntax.Variable, syntax.Member, syntax.Element)) and not _of_system(given)
         ]
         code += [*calls.found, *unclear, last]

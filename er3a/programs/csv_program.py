@@ -2,9 +2,9 @@
 
 Columns, in this order: ``t_s`` (from 0, rising); ``q1_deg``, ``q2_deg`` ..., the joints
 (``q3_mm`` of one that slides); ``x_mm, y_mm, z_mm`` and
-``roll_deg, pitch_deg, yaw_deg``, the tool in the base frame with R = Rz(yaw) Ry(pitch) Rx(roll). The poses follow from
-the joints and are for the reader; ``t_s`` may be left out, and other columns are named as not understood. Lines
-that begin with ``#`` are comments.
+``roll_deg, pitch_deg, yaw_deg``, the tool in the base frame with R = Rz(yaw) Ry(pitch) Rx(roll). The arm goes where the
+joints are; a check compares the poses with them. Poses (or their angles) and ``t_s`` may be left out, and other columns
+are named as not understood. Lines that begin with ``#`` are comments.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from itertools import pairwise
 import numpy as np
 
 from er3a.errors import InputError
-from er3a.geometry.transforms import rpy_of
+from er3a.geometry.transforms import rpy_of, transform
 from er3a.numerics.arrays import Reals
 from er3a.programs.code_builder import CodeBuilder
 from er3a.programs.instructions import ArmMotion, JointTarget, Place, Rate
@@ -81,7 +81,9 @@ def read_csv_program(source: ProgramText) -> Program:
     if twice or missing:
         problem = f"the column {twice or missing} is {'there twice' if twice else 'missing'}"
         raise InputError(source.path, f"line {kept[0][0]}", problem, f"Give {', '.join(names)} once each")
-    columns = [head.index(name) for name in names]
+    stated = [name for part in (POSE_COLUMNS[:3], POSE_COLUMNS[3:]) if {*part} <= {*head} for name in part]
+    stated = stated if stated[:1] == ["x_mm"] else []
+    columns = [head.index(name) for name in (*names, *stated)]
     timed = head.index(TIME) if TIME in head else None
     table = [
         _numbers(source, number, row, columns + ([] if timed is None else [timed]), head)
@@ -97,9 +99,10 @@ def read_csv_program(source: ProgramText) -> Program:
         place = Place(source.path, kept[i + 1][0])
         speed = Rate(values[-1] - table[i - 1][-1], "s") if timed is not None and i else None
         given = np.array(values[: len(names)])
-        target = JointTarget(np.where(slides, given / 1000, np.radians(given)))
+        pose = _stated(values[len(names) : len(names) + len(stated)])
+        target = JointTarget(np.where(slides, given / 1000, np.radians(given)), stated=pose)
         builder.add(Fixed(place, ArmMotion("joint", target, "row", speed=speed)))
-    other = [name for name in head if name not in (*names, TIME, *POSE_COLUMNS)]
+    other = [name for name in head if name not in (*names, TIME, *stated)]
     unread = [NotUnderstood(f"the column {name[:40]}", Place(source.path, kept[0][0])) for name in other]
     findings: tuple[ProgramFinding, ...] = (*source.findings, *unread, *(() if table else (NothingMoves(),)))
     routine = builder.routine(Place(source.path, len(source.lines)))
@@ -109,6 +112,14 @@ def read_csv_program(source: ProgramText) -> Program:
         slides=tuple(slides.tolist()),
         lines=source.lines,
     )
+
+
+def _stated(numbers: list[float]) -> Reals | None:
+    """T_base_tool (4, 4), m, of mm and perhaps degrees; None of no numbers."""
+    if not numbers:
+        return None
+    angles = np.radians(numbers[3:]) if len(numbers) > 3 else np.full(3, np.nan)
+    return transform(np.array(numbers[:3]) / 1000, angles)
 
 
 def _numbers(source: ProgramText, line: int, row: list[str], columns: list[int], head: list[str]) -> list[float]:

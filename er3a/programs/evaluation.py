@@ -10,7 +10,7 @@ import math
 import operator
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TypeGuard
 
 import numpy as np
@@ -197,6 +197,10 @@ class Dialect(ABC):
         """Whether reading an output gives the value that the program set last."""
         return True
 
+    def runs_on(self, name: str) -> bool:
+        """Whether a variable changes by itself after it is set, as a timer does."""
+        return False
+
     def is_followed(self, name: str, value: syntax.Value) -> bool:
         """Whether the effect of setting a variable to a value on motions is simulated."""
         return True
@@ -204,6 +208,10 @@ class Dialect(ABC):
     def doubted(self, name: str) -> str:
         """The variable after whose next assignment motions no longer depend on one that is not simulated."""
         return name
+
+    def typed(self, kind: str, value: syntax.Value) -> syntax.Value:
+        """What a variable of a declared kind, empty for none, holds after a value is assigned to it."""
+        return value
 
     def assigned(self, old: syntax.Value, new: syntax.Value) -> syntax.Value:
         """The value of a variable after an assignment."""
@@ -251,6 +259,7 @@ class ProgramMemory:
     types : declared types by name
     kept : what a language caches until the next assignment
     beside : variables that a concurrent thread changes, so that their values are unclear
+    aliased : variables that may be changed now under another name, or by a handler, so that their values are unclear
     here : where the arm is
     doubts : instructions that are not understood, by the variables of motions that they may have set
     cell : what is known of the cell
@@ -265,13 +274,14 @@ class ProgramMemory:
         self.types: dict[str, str] = {}
         self.kept: dict[object, object] = {}
         self.beside: frozenset[str] = frozenset()
+        self.aliased: frozenset[str] = frozenset()
 
     def copy(self) -> ProgramMemory:
         """An independent copy."""
         other = ProgramMemory(self.functions, self.cell)
         other.here = self.here
         other.shared, other.local, other.types = dict(self.shared), dict(self.local), self.types
-        other.beside, other.doubts = self.beside, dict(self.doubts)
+        other.beside, other.aliased, other.doubts = self.beside, self.aliased, dict(self.doubts)
         return other
 
     def lost(self, text: str) -> None:
@@ -281,6 +291,8 @@ class ProgramMemory:
 
     def read(self, name: str) -> syntax.Value | None:
         """The value of a full name, or None."""
+        if self.aliased and root(name) in self.aliased:
+            return syntax.Unclear(f"{name}, which may be changed elsewhere")
         if name in self.local:
             return self.local[name]
         if self.beside and root(name) in self.beside:
@@ -300,6 +312,15 @@ class ProgramMemory:
         else:
             self.shared[name] = value
 
+    def declare(self, name: str, kind: str, local: bool) -> None:
+        """The type of a variable; a parameter of a routine takes it where that declares it."""
+        if not local:
+            self.types[name] = kind
+            return
+        self.local[f"{name}%type"] = kind
+        if name in self.local:
+            self.local[name] = self.typed(name, self.local[name])
+
     def assign(self, target: syntax.Expression, value: syntax.Value, local: bool = False) -> None:
         """Assign a value to a variable, field or element."""
         if isinstance(target, syntax.Member) and self._set_field(target, value):
@@ -313,7 +334,7 @@ class ProgramMemory:
         if key is not None:
             if "[" in key:
                 self._forget_overlapping(key)
-            self.write(key, self._typed(key, value), local)
+            self.write(key, self.typed(key, value, local), local)
         else:  # an element changes, but which one is not known: none of its list is known from here
             while isinstance(target, (syntax.Member, syntax.Element)):
                 target = target.of
@@ -369,6 +390,15 @@ class ProgramMemory:
                 return f"{start}[{','.join(f'{each:g}' for each in found)}]"
         return None
 
+    def settled(self, target: syntax.Expression) -> syntax.Expression:
+        """A variable, field or element with its indices as they are now."""
+        if isinstance(target, syntax.Member):
+            return replace(target, of=self.settled(target.of))
+        if isinstance(target, syntax.Element):
+            indices = tuple(syntax.Constant(self.value(each)) for each in target.indices)
+            return replace(target, of=self.settled(target.of), indices=indices)
+        return target
+
     def value(self, expression: syntax.Expression) -> syntax.Value:
         """The value of an expression."""
         match expression:
@@ -409,7 +439,20 @@ class ProgramMemory:
             found = None if key is None else self.read(key)
             if found is None and isinstance(of, syntax.Unclear):
                 return syntax.Unclear(key or of.text)
-        return syntax.Unclear(self.key(expression) or "an element") if found is None else found
+        return syntax.Unclear(self._shown(expression)) if found is None else found
+
+    def _shown(self, target: syntax.Expression) -> str:
+        """A variable, field or element as text, with indices that are not known by their variables."""
+        match target:
+            case syntax.Variable(name=name):
+                return name
+            case syntax.Member(of=of, name=name):
+                return f"{self._shown(of)}.{name}"
+            case syntax.Element(of=of, indices=indices):
+                numbers = [syntax.number(self.value(each)) for each in indices]
+                shown = (self._shown(i) if n is None else f"{n:g}" for i, n in zip(indices, numbers))
+                return f"{self._shown(of)}[{','.join(shown)}]"
+        return "?"
 
     def _with_element(self, target: syntax.Element, value: syntax.Value) -> syntax.Value | None:
         """The list or record that an element belongs to, with that element changed; None if it belongs to none."""
@@ -429,8 +472,12 @@ class ProgramMemory:
             return of.having(of.items[place][0], value)
         return (*of[:place], value, *of[place + 1 :])
 
-    def _typed(self, key: str, value: syntax.Value) -> syntax.Value:
-        kind = self.types.get(root(key), "")
+    def typed(self, key: str, value: syntax.Value, local: bool = False) -> syntax.Value:
+        """A value as the type of the variable is that it is assigned to."""
+        name = root(key)
+        own = local or name in self.local
+        kind = str(self.local.get(f"{name}%type", "")) if own else self.types.get(name, "")
+        value = self.functions.typed(kind, value)
         if not isinstance(value, bool) and isinstance(value, (int, float)):
             if kind in ("REAL", "LREAL") and not isinstance(value, float):
                 return float(value)

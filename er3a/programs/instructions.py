@@ -23,6 +23,7 @@ Angles are in (-180, 180]. Where the middle angle is +-90 deg the last one (the 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from pathlib import Path
@@ -125,6 +126,11 @@ class NamedFrame(ByValue):
     pose: Reals | None = None
     load: MassBody | None = None
 
+    @property
+    def one_of_several(self) -> bool:
+        """Whether the name has an index that is not a number, so that it stands for several frames."""
+        return bool(re.search(r"\w\s*[\[{][^\]}]*[^\s\d,\]}]", self.name))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointTarget(ByValue):
@@ -132,11 +138,14 @@ class JointTarget(ByValue):
 
     Attributes
     ----------
-    external : names and values (rad or m as the controller has them, not converted) of axes beside the arm's
+    external : names and values (rad or m as the controller has them, not converted) of axes beside the arm's; NaN where
+        not known
+    stated : T_base_tool (4, 4), m, that a table gives beside the joints, NaN where it gives none of it
     """
 
     joints: Reals
     external: tuple[tuple[str, float], ...] = ()
+    stated: Reals | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -230,10 +239,16 @@ class ArmMotion(ByValue):
 
 @dataclass(frozen=True, slots=True)
 class Pause:
-    """The arm waits: for so many seconds, for a condition, or for the operator (both None)."""
+    """The program waits: for so many seconds, for a condition, or for the operator (both None).
+
+    Attributes
+    ----------
+    stops : whether the arm is known to stand at its target then, even after a motion with a zone
+    """
 
     seconds: float | None = None
     condition: str | None = None
+    stops: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,6 +29,7 @@ from er3a.geometry.transforms import check_poses
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, syntax
+from er3a.programs.code_builder import variable_of
 from er3a.programs.evaluation import Cell, Dialect, Position, ProgramMemory, known, root
 from er3a.programs.execution import Ending, EndKind, Execution, KeepOn, RunLimits, Step
 from er3a.programs.languages import LANGUAGES, not_written
@@ -87,9 +88,12 @@ def changed_beside(program: syntax.Program, dialect: Dialect, itself: str = "") 
     that moves the arm beside the program, and the two are followed apart.
     """
     routines = program.routines
-    asked = {each.what.function for each in program.operations() if isinstance(each, syntax.Beside)}
+    beside = [each.what for each in program.operations() if isinstance(each, syntax.Beside)]
+    asked = {what.function for what in beside}
+    cyclic = {name for what in beside if what.function == syntax.CYCLIC for name in names(what.arguments[0])}
     started = {name for name in routines if (name in asked or routines[name].thread) and name != itself}
-    return _changed_in(program, _with_called(program, started), dialect) - dialect.modal
+    given = {name for what in beside for name in _given_back(program, what.function, what.arguments)}
+    return (_changed_in(program, _with_called(program, started), dialect) | cyclic | given) - dialect.modal
 
 
 def _with_called(program: syntax.Program, names: Iterable[str]) -> set[str]:
@@ -113,11 +117,26 @@ def _next(operation: syntax.Operation) -> tuple[str, ...]:
 
 def _changed_in(program: syntax.Program, names: Iterable[str], dialect: Dialect) -> frozenset[str]:
     """Variables, not local ones, that routines change."""
-    return frozenset(each for name in names for op in program.routines[name].code for each in _shared(op, dialect))
+    code = [op for name in names for op in program.routines[name].code]
+    return frozenset(each for op in code for each in _shared(program, op, dialect))
 
 
-def _shared(operation: syntax.Operation, dialect: Dialect) -> Iterable[str]:
+def _given_back(program: syntax.Program, name: str, arguments: Iterable[syntax.Expression | None]) -> set[str]:
+    """Variables that a routine, or what it calls, changes as its parameters."""
+    parameters = program.routines[name].parameters if name in program.routines else ()
+    given = {
+        parameter.name: variable_of(each)
+        for parameter, each in zip(parameters, arguments)
+        if parameter.out and isinstance(each, (syntax.Variable, syntax.Member, syntax.Element))
+    }
+    code = (op for each in _with_called(program, (name,)) for op in program.routines[each].code) if given else ()
+    return {given[changed] for op in code for changed in _changed(op) if changed in given}
+
+
+def _shared(program: syntax.Program, operation: syntax.Operation, dialect: Dialect) -> Iterable[str]:
     """Variables, not local ones, that an operation changes."""
+    if isinstance(operation, syntax.Call):
+        return _given_back(program, operation.routine, operation.arguments)
     if isinstance(operation, syntax.Assign):
         return () if operation.local else (target_name(operation.target),)
     if isinstance(operation, syntax.Doing) and not (
@@ -165,10 +184,11 @@ def quiet_branches(program: syntax.Program, dialect: Dialect) -> dict[tuple[str,
         for at, used, operation in _uses(routine):
             if isinstance(operation, syntax.Branch):
                 conditions[routine.name, at] = used
-            elif isinstance(operation, (syntax.Move, syntax.Doing)) and _moves(operation, moving, dialect):
+            elif isinstance(operation, (syntax.Move, syntax.Doing)) and _moves(program, operation, moving, dialect):
                 needed |= used
         if any(isinstance(operation, syntax.Branch) for operation in routine.code):
-            found |= _quiet_in(routine, moving, changes, dialect)
+            loud = [_moves(program, each, moving, dialect) for each in routine.code]
+            found |= _quiet_in(routine, loud, changes)
     sources = _sources(program)
     waiting = [*needed, *(name for key, used in conditions.items() if key not in found for name in used)]
     while waiting:
@@ -189,14 +209,15 @@ def _moving(program: syntax.Program, dialect: Dialect) -> set[str]:
         more = {
             routine.name
             for routine in program.routines.values()
-            if routine.name not in moving and any(_moves(each, moving, dialect) for each in routine.code)
+            if routine.name not in moving and any(_moves(program, each, moving, dialect) for each in routine.code)
         }
         if not more:
             return moving
         moving |= more
 
 
-def _moves(operation: syntax.Operation, moving: set[str], dialect: Dialect) -> bool:
+def _moves(program: syntax.Program, operation: syntax.Operation, moving: set[str], dialect: Dialect) -> bool:
+    """Whether an operation moves the arm, or has to be named where it is carried out."""
     match operation:
         case syntax.Move() | syntax.Fixed(instruction=instructions.ArmMotion()):
             return True
@@ -204,9 +225,32 @@ def _moves(operation: syntax.Operation, moving: set[str], dialect: Dialect) -> b
             return True
         case syntax.Call(routine=routine) if routine in moving:
             return True
-        case syntax.Beside(what=what) if what.function in moving:
-            return True
+        case syntax.Beside():
+            return _is_strange(program, operation, dialect) or _moves_beside(program, operation, moving, dialect)
+        case syntax.Assign(value=value) if value is not None:
+            name = _full_name(operation.target)
+            given = value.value if isinstance(value, syntax.Constant) else syntax.Unclear("")
+            if not dialect.is_signal(name) and not dialect.is_followed(name, given):
+                return True
     return _may_move(operation, dialect)
+
+
+def _full_name(target: syntax.Expression) -> str:
+    """The name of a variable or field; of an element, that of its list."""
+    if isinstance(target, syntax.Member):
+        return f"{_full_name(target.of)}.{target.name}"
+    return _full_name(target.of) if isinstance(target, syntax.Element) else target_name(target)
+
+
+def _is_strange(program: syntax.Program, start: syntax.Beside, dialect: Dialect) -> bool:
+    """Whether what runs beside the program is not known, and so may do anything."""
+    return start.what.function not in program.routines and (start.kind == "thread" or not dialect.harmless(start.what))
+
+
+def _moves_beside(program: syntax.Program, start: syntax.Beside, moving: set[str], dialect: Dialect) -> bool:
+    """Whether a routine of the program that runs beside it moves the arm, or sets what its motions depend on."""
+    name = start.what.function
+    return name in moving or bool(_changed_in(program, _with_called(program, (name,)), dialect) & dialect.modal)
 
 
 def _may_move(operation: syntax.Operation, dialect: Dialect) -> bool:
@@ -225,7 +269,14 @@ def _may_move(operation: syntax.Operation, dialect: Dialect) -> bool:
 
 def _changes(program: syntax.Program) -> dict[str, set[str]]:
     """Variables that each routine may change, with those that it calls."""
-    own = {name: {each for op in routine.code for each in _changed(op)} for name, routine in program.routines.items()}
+    return _gathered(
+        program,
+        {name: {each for op in routine.code for each in _changed(op)} for name, routine in program.routines.items()},
+    )
+
+
+def _gathered(program: syntax.Program, own: dict[str, set[str]]) -> dict[str, set[str]]:
+    """Names by routine, with those of the routines that it calls."""
     called = {
         name: {op.routine for op in routine.code if isinstance(op, syntax.Call)}
         for name, routine in program.routines.items()
@@ -238,10 +289,53 @@ def _changes(program: syntax.Program) -> dict[str, set[str]]:
 
 
 def _changed(operation: syntax.Operation) -> Iterator[str]:
+    """Variables that an operation may change, but for a parameter that is declared, or given its type's parts."""
     if isinstance(operation, syntax.Assign):
-        yield target_name(operation.target)
+        value = operation.value
+        itself = operation.local and isinstance(value, syntax.Invocation) and operation.target in value.arguments
+        if value is not None and not itself:
+            yield target_name(operation.target)
     elif isinstance(operation, syntax.Call):  # parameters may go both ways
         yield from (name for each in operation.arguments for name in names(each))
+
+
+def aliased_calls(program: syntax.Program) -> dict[syntax.Call, frozenset[str]]:
+    """Calls in which a variable has two names, and is changed by one of them; with all the names of such variables.
+
+    A parameter that goes both ways is the caller's variable itself: the routine, or what it calls, may use that under
+    its own name too, or under that of another parameter.
+    """
+    changes = _changes(program)
+    uses = _gathered(program, {name: _used(each) for name, each in program.routines.items()})
+    found: dict[syntax.Call, frozenset[str]] = {}
+    for caller in program.routines.values():
+        own = _own_names(caller)
+        for call in (each for each in caller.code if isinstance(each, syntax.Call)):
+            given: dict[str, list[str]] = defaultdict(list)
+            for parameter, each in zip(program.routines[call.routine].parameters, call.arguments):
+                if parameter.out and isinstance(each, (syntax.Variable, syntax.Member, syntax.Element)):
+                    given[variable_of(each)].append(parameter.name)
+            shared = [
+                {variable, *parameters}
+                for variable, parameters in given.items()
+                if len(parameters) > 1 or (variable not in own and variable in uses[call.routine])
+            ]
+            changed = frozenset(name for each in shared if each & changes[call.routine] for name in each)
+            if changed:
+                found[call] = changed
+    return found
+
+
+def _own_names(routine: syntax.Routine) -> set[str]:
+    """Parameters and variables that a routine declares for itself."""
+    declared = (each.target for each in routine.code if isinstance(each, syntax.Assign) and each.local)
+    return {*(each.name for each in routine.parameters), *map(target_name, declared)}
+
+
+def _used(routine: syntax.Routine) -> set[str]:
+    """Variables, not its own, that a routine names."""
+    parts = (part for op in routine.code for part in syntax.expressions_of(op))
+    return {name for part in parts for name in names(part)} - _own_names(routine)
 
 
 def _value_of(routine: str) -> str:
@@ -277,11 +371,10 @@ def _sources(program: syntax.Program) -> dict[str, set[str]]:
 
 
 def _quiet_in(
-    routine: syntax.Routine, moving: set[str], changes: dict[str, set[str]], dialect: Dialect
+    routine: syntax.Routine, loud: list[bool], changes: dict[str, set[str]]
 ) -> dict[tuple[str, int], QuietBranch]:
     """Branches of a routine between which and the place where their sides meet nothing moves the arm."""
     graph = _Graph(routine)
-    loud = [_moves(each, moving, dialect) for each in routine.code]
     found = {}
     for at, operation in enumerate(routine.code):
         if not isinstance(operation, syntax.Branch) or (to := graph.meeting[at]) < 0:
@@ -413,10 +506,11 @@ class Frame:
     calls: tuple[instructions.Place, ...] = ()
     result: str = ""
     outs: tuple[tuple[str, syntax.Expression], ...] = ()
+    aliased: frozenset[str] = frozenset()  # of the memory, before it was called
 
     def copy(self) -> Frame:
         """Another that goes its own way from here."""
-        return Frame(self.routine, self.at, dict(self.local), self.calls, self.result, self.outs)
+        return replace(self, local=dict(self.local))
 
 
 @dataclass(slots=True)
@@ -457,6 +551,7 @@ class Machine:
         self.deciding_names: list[str] = []  # of those, whole
         self.quiet = quiet_branches(program, dialect)
         self.moving = _moving(program, dialect)
+        self.aliased = aliased_calls(program)
         self.passed: set[tuple[str, int]] = set()
         self.strange: dict[tuple[str, int], str] = {
             (name, at): text
@@ -484,7 +579,7 @@ class Machine:
         entry = self.program.routines.get(self.program.entry)
         if entry is not None:
             frame = Frame(entry)
-            memory.local = frame.local
+            memory.local, memory.aliased = frame.local, entry.unsettled
             self.waiting.append(ExecutionPath([frame], memory))
         while self.waiting:
             self._follow(self.waiting.pop())
@@ -557,8 +652,11 @@ class Machine:
         memory = way.memory
         if isinstance(operation, syntax.Move):
             motion = self.dialect.motion(memory, operation)
-            if memory.doubts and isinstance(motion.target, instructions.PoseTarget):
-                motion = replace(motion, doubt=next(iter(memory.doubts.values())))
+            if not motion.doubt and memory.doubts and isinstance(motion.target, instructions.PoseTarget):
+                own = {name for name, _ in operation.settings}
+                motion = replace(
+                    motion, doubt=next((text for name, text in memory.doubts.items() if name not in own), "")
+                )
             self._note(way, operation.place, motion)
             memory.here = memory.here.after(motion, memory.cell.flange)
         elif isinstance(operation, syntax.Fixed):
@@ -599,7 +697,7 @@ class Machine:
 
     def _assign(self, memory: ProgramMemory, each: syntax.Assign) -> instructions.Output | instructions.Unknown | None:
         if each.type_name and isinstance(each.target, syntax.Variable):
-            memory.types[each.target.name] = each.type_name
+            memory.declare(each.target.name, each.type_name, each.local)
         if each.value is None:
             if isinstance(each.target, syntax.Variable) and each.target.name not in memory.local:
                 memory.write(each.target.name, syntax.Unset(each.target.name), each.local)
@@ -608,6 +706,8 @@ class Machine:
         name = memory.key(each.target) or each.text
         if isinstance(each.value, syntax.Constant) and isinstance(value, syntax.Unclear):  # which part is not known
             memory.forget(root(name))
+        if self.dialect.runs_on(name):
+            value = syntax.Unclear(name)
         if self.dialect.is_signal(name):
             memory.write(name, value if self.dialect.reads_back(name) else syntax.Unclear(name))
             return instructions.Output(name, syntax.shown(value))
@@ -632,14 +732,14 @@ class Machine:
 
     def _pause(self, memory: ProgramMemory, waiting: syntax.Waiting) -> instructions.Pause:
         if waiting.kind == "operator":
-            return instructions.Pause()
+            return instructions.Pause(stops=waiting.stops)
         if waiting.kind == "condition" or waiting.of is None:
-            return instructions.Pause(condition=waiting.text)
+            return instructions.Pause(condition=waiting.text, stops=waiting.stops)
         seconds = syntax.number(memory.value(waiting.of))
         return (
-            instructions.Pause(seconds)
+            instructions.Pause(seconds, stops=waiting.stops)
             if seconds is not None and seconds >= 0
-            else instructions.Pause(condition=waiting.text)
+            else instructions.Pause(condition=waiting.text, stops=waiting.stops)
         )
 
     def _branch(self, way: ExecutionPath, frame: Frame, branch: syntax.Branch, at: int) -> bool:
@@ -693,13 +793,17 @@ class Machine:
         if not fits:
             self._note(way, call.place, instructions.Unknown(call.text, may_move=False))
         outs = tuple(
-            (parameter.name, given)
+            (parameter.name, memory.settled(given))
             for parameter, given in zip(routine.parameters, call.arguments)
             if parameter.out and isinstance(given, (syntax.Variable, syntax.Member, syntax.Element))
         )
         calls = (*way.frames[-1].calls, call.place)
-        way.frames.append(Frame(routine, 0, local, calls, call.result, outs))
+        way.frames.append(Frame(routine, 0, local, calls, call.result, outs, memory.aliased))
         memory.local = local
+        memory.aliased |= routine.unsettled
+        if self.aliased:
+            memory.aliased |= self.aliased.get(call, frozenset())
+        memory.kept.clear()
 
     def _start(self, way: ExecutionPath, start: syntax.Beside) -> None:
         """Follow a routine that moves the arm beside the program, on a way that begins here.
@@ -709,9 +813,9 @@ class Machine:
         """
         name = start.what.function
         routine = self.program.routines.get(name)
-        unknown = routine is None and (start.kind == "thread" or not self.dialect.harmless(start.what))
-        sets = _changed_in(self.program, _with_called(self.program, (name,)), self.dialect) & self.dialect.modal
-        if not unknown and name not in self.moving and not sets:
+        if not _is_strange(self.program, start, self.dialect) and not _moves_beside(
+            self.program, start, self.moving, self.dialect
+        ):
             self._note(way, start.place, instructions.Aside(start.text))
             return
         before = way.step
@@ -753,18 +857,24 @@ class Machine:
                 operation = code[at]
                 waiting += [operation.to] if isinstance(operation, syntax.GoTo) else [at + 1]
                 waiting += [operation.otherwise] if isinstance(operation, syntax.Branch) else []
-                found.update(_shared(operation, self.dialect))
+                found.update(_shared(self.program, operation, self.dialect))
                 called.update(_next(operation))
         found |= _changed_in(self.program, _with_called(self.program, called), self.dialect)
         return frozenset(found) - self.dialect.modal
 
     def _return(self, way: ExecutionPath, operation: syntax.Return) -> None:
         memory = way.memory
-        value: syntax.Value = syntax.Unclear("a value") if operation.value is None else memory.value(operation.value)
+        value: syntax.Value = syntax.Unclear("a value")
+        if operation.value is not None:
+            value = memory.typed(syntax.RETURNED, memory.value(operation.value))
         frame = way.frames.pop()
+        aliased, memory.aliased = memory.aliased, frame.aliased
         memory.local = way.frames[-1].local
         for name, target in frame.outs:
-            memory.assign(target, known(frame.local.get(name), name))
+            if name in aliased:
+                memory.forget(target_name(target))
+            else:
+                memory.assign(target, known(frame.local.get(name), name))
         if frame.result:
             memory.write(frame.result, value, local=True)
 
@@ -780,7 +890,8 @@ class Machine:
             (frame.routine.name, frame.at, self._kept(memory.local if i == last else frame.local))
             for i, frame in enumerate(way.frames)
         )
-        key = (frames, self._kept(memory.shared), memory.here.key(), frozenset(memory.doubts.items()))
+        doubts = frozenset(memory.doubts.items())
+        key = (frames, self._kept(memory.shared), memory.here.key(), doubts, memory.aliased)
         found = self.seen.get(key)
         if found is None:
             self.seen[key] = (way.number, len(self.seen), way.step)

@@ -126,6 +126,12 @@ def rate_of(value: Value | None, unit: RateUnit, per_unit: float = 1.0) -> Rate 
 START = "%start"
 """Result of the call with which a program begins whose variables are those of its first routine."""
 
+RETURNED = "%returned"
+"""Variable of a routine whose declared type is that of its value."""
+
+CYCLIC = "%CYCLIC"
+"""What a :class:`Beside` asks for that sets its first argument again and again."""
+
 LanguageName = Literal["krl", "urscript", "rpl", "xpl", "rapid", "csv"]
 
 
@@ -300,12 +306,13 @@ class Move:
 
 @dataclass(frozen=True, slots=True)
 class Waiting:
-    """A wait of so many ``seconds``, or for a condition, or for the operator."""
+    """A wait of so many ``seconds``, or for a condition, or for the operator; ``stops`` as of ``Pause``."""
 
     place: Place
     kind: Literal["seconds", "condition", "operator"]
     of: Expression | None
     text: str
+    stops: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -344,6 +351,7 @@ class Routine:
     Attributes
     ----------
     thread : whether it runs beside the program, so that a run of the program does not carry it out
+    unsettled : variables that a handler of its errors may change at any time
     """
 
     name: str
@@ -351,6 +359,7 @@ class Routine:
     code: tuple[Operation, ...]
     place: Place
     thread: bool = False
+    unsettled: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

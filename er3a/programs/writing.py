@@ -459,7 +459,7 @@ class Writer(ABC):
         if load is not None:
             self.name_tool(f"a load of {load.mass:g} kg")
 
-    def left_out(self, motion: instructions.ArmMotion) -> None:
+    def omit(self, motion: instructions.ArmMotion) -> None:
         """A motion whose target can't be written."""
         self.count["left out"] += 1
         text = getattr(motion.target, "text", "") or "a target that needs the arm's table"

@@ -242,7 +242,7 @@ def joints_of(robot: Robot, poses: Sequence[Pose]) -> Reals:
 
 def _poses_of(quantities: Sequence[Quantity]) -> tuple[Pose, ...]:
     """The poses at which quantities look at the arm, in deg; the zero pose first."""
-    return tuple(dict.fromkeys([ZERO_POSE, *(quantity.seen_at for quantity in quantities)]))
+    return tuple(dict.fromkeys([ZERO_POSE, *(quantity.arm_pose for quantity in quantities)]))
 
 
 def _places(poses: Sequence[Pose]) -> dict[Pose, int]:

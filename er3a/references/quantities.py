@@ -98,7 +98,7 @@ class Quantity(ABC):
     depends_on_table: ClassVar[bool] = True
 
     @property
-    def seen_at(self) -> Pose:
+    def arm_pose(self) -> Pose:
         """The pose (deg) at which it looks at the arm."""
         return ZERO_POSE
 
@@ -170,7 +170,7 @@ class QuantityAtPose(Quantity):
     pose: Pose
 
     @property
-    def seen_at(self) -> Pose:
+    def arm_pose(self) -> Pose:
         return self.pose
 
 
@@ -404,7 +404,7 @@ def not_of_arm(quantity: Quantity, robot: Robot) -> NotOfArm | None:
     """Why an arm has no such quantity; None if it has. Only arms with six rows have a wrist centre. ``joint_slides``: a
     limit or speed is stated as of one that turns."""
     joint = getattr(quantity, "joint", getattr(quantity, "axis", 1))
-    if joint > robot.joints or any(quantity.seen_at[robot.joints :]):
+    if joint > robot.joints or any(quantity.arm_pose[robot.joints :]):
         return "no_such_joint"
     at_wrist = isinstance(quantity, SectionCoordinate | SegmentAngle)
     if getattr(quantity, "point", "wrist_centre" if at_wrist else "flange") != "flange" and robot.rows != SIX:

@@ -1,7 +1,7 @@
 """Observations by eye: one joint is jogged a little, and the direction in which a point or the tool moves is noted.
 
-Directions are those of the base: forward is +x, left +y, up +z. A tilt is the motion of the direction in which the tool
-points. A turn is clockwise as seen when looking forward, up, and so on.
+Directions are those of the base: forward is +x, left +y, up +z. A tilt is the motion of the direction in which the
+flange faces, its z axis. A turn is clockwise as seen when looking forward, up, and so on.
 """
 
 from __future__ import annotations

@@ -40,6 +40,7 @@ class RepeatedPose(Finding):
 
 
 Suspect = RotationMismatch | FarFromFit | RepeatedPose
+"""Of single samples; all but a repeated pose reject the sample."""
 
 
 class NoMajority(Finding):

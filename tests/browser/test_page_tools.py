@@ -88,6 +88,22 @@ def test_csv_of_a_table_of_entries_has_numbers_apart_from_their_marks(page):
     ]
 
 
+def test_branch_and_bound_is_not_explained_as_a_branch(browser, tmp_path):
+    template = tmp_path / "page.html.j2"
+    template.write_text(
+        '{% extends "base.html.j2" %}{% block title %}T{% endblock %}{% block header %}<h1>T</h1>{% endblock %}'
+        "{% block content %}<p>A bound by branch and bound, and a branch.</p>{% endblock %}",
+        encoding="utf-8",
+    )
+    render(template, tmp_path / "page.html", command=None, provenance=Provenance(inputs=(), code="0" * 64))
+    browser.get((tmp_path / "page.html").as_uri())
+    terms = browser.find_elements(By.CSS_SELECTOR, ".term")
+    told = {each.text: browser.find_element(By.ID, each.get_attribute("aria-describedby")) for each in terms}
+    assert {name: tip.get_attribute("textContent") for name, tip in told.items()} == {
+        name: GLOSSARY[name] for name in ("branch and bound", "branch")
+    }
+
+
 def test_figure_is_enlarged_and_closed_by_keyboard(page):
     page.find_element(By.CSS_SELECTOR, "figure button").send_keys(Keys.ENTER)
     dialog = page.find_element(By.CSS_SELECTOR, "dialog")

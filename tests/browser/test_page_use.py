@@ -41,7 +41,7 @@ def test_tab_key_reaches_everything_in_the_page_s_order(browser, small_study, pa
 
 MAX_TABS = 80
 PAUSE = 5.0  # s to wait for what the page does at once on an idle machine
-HAS_TABLES = "return [...document.querySelectorAll('tbody')].some((body) => body.rows.length > 1)"
+HAS_TABLES = "return [...document.querySelectorAll('table:not(.entries) tbody')].some((body) => body.rows.length > 1)"
 CONTROLS = """
 window.controls = [...document.querySelectorAll("a[href], button, input, select, summary, [tabindex='0']")].filter(
   (control) => control.checkVisibility({ visibilityProperty: true }) && !control.disabled && control.tabIndex >= 0 &&
@@ -223,7 +223,7 @@ def test_words_are_found_over_all_pages_and_on_each(browser, small_study):
         ("er3a_c60/trajectory.html", "line_clean", ".caveat, .assumed-shapes, .verdict, #line_clean ~ p strong"),
         ("er3a_c60/vision.html", "grasp_can", ".caveat, .verdict, section:has([download^=grasp_can]) p strong"),
         ("compare.html", "limit", ".caveat"),
-        ("index.html", "void", ".robot h2, .robot .decision, #decisions .decision.fail"),
+        ("index.html", "void", ".robot h2, .robot .decision, #decisions tr"),
         ("index.html", "void", "#er3a_c60_article, .robot:has(#er3a_c60_article) > details > p strong"),
     ],
 )
@@ -233,6 +233,46 @@ def test_no_warning_is_hidden_by_a_search(browser, small_study, page, words, war
     warnings = browser.find_elements(By.CSS_SELECTOR, f"main :is({warning})")
     assert warnings
     assert [each.get_attribute("outerHTML")[:80] for each in warnings if not each.is_displayed()] == []
+
+
+def test_a_row_that_an_address_leads_to_has_the_heads_of_its_columns(browser, small_study):
+    browser.get((small_study.folder / "reports/er3a_c60/workspace.html").as_uri() + "#void-1")
+    row = browser.find_element(By.ID, "void-1")
+    heads = [head.text.replace("\n", " ") for head in browser.find_elements(By.CSS_SELECTOR, "#table-voids thead th")]
+    shown = browser.execute_script(
+        "return [...arguments[0].cells].map((cell) => getComputedStyle(cell, '::before').content)", row
+    )
+    assert [text.strip('"') for text in shown] == heads
+
+
+def test_the_first_column_of_a_wide_table_stays_on_a_phone(browser, small_study):
+    browser.set_window_size(500, 800)
+    browser.get((small_study.folder / "reports/er3a_c60/workspace.html").as_uri())
+    moved, left = browser.execute_script(
+        "const box = document.querySelector('#table-voids');"
+        "box.scrollLeft = 200;"
+        "return [box.scrollLeft,"
+        "  box.querySelector('tbody td').getBoundingClientRect().left - box.getBoundingClientRect().left]"
+    )
+    assert moved > 0
+    assert abs(left) < 1
+
+
+def test_a_table_of_joints_keeps_their_order(browser, small_study):
+    browser.get((small_study.folder / "reports/er3a_c60/validation.html").as_uri())
+    assert browser.find_elements(By.CSS_SELECTOR, "table.entries")
+    assert not browser.find_elements(By.CSS_SELECTOR, "table.entries .sort")
+
+
+def test_the_contents_close_when_one_goes_on_reading(browser, small_study):
+    """Beside a narrow page they would cover it."""
+    browser.set_window_size(900, 800)
+    browser.get((small_study.folder / "reports/er3a_c60/workspace.html").as_uri())
+    contents = browser.find_element(By.CSS_SELECTOR, ".contents details")
+    browser.find_element(By.CSS_SELECTOR, ".contents summary").click()
+    assert contents.get_property("open")
+    browser.find_element(By.CSS_SELECTOR, ".verdict").click()
+    assert not contents.get_property("open")
 
 
 def test_joint_vectors_lead_to_the_teach_panel(browser, small_study):

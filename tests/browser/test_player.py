@@ -9,14 +9,16 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.wait import WebDriverWait
 
+from er3a.collision.scene import Scene, Sphere
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
-from er3a.kinematics.forward import frames
-from er3a.pipeline.player.motions import PlayedEvent, PlayedMotion
+from er3a.kinematics.forward import forward, frames
+from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion
 from er3a.pipeline.player.player import drawing_head, moment, player, stretch
 from er3a.pipeline.results import Provenance
 from er3a.pipeline.viewing.page import render
 from er3a.robots.robot import Visual
+from testing import chromium
 from testing.small_study import ROOT
 
 pytestmark = pytest.mark.long
@@ -38,6 +40,19 @@ Promise.all([import("er3a/kinematics"), import("er3a/values")]).then(([kinematic
 });"""
 
 
+WRITTEN = """const [id, at, done] = arguments;
+const drawn = [], bare = CanvasRenderingContext2D.prototype.fillText;
+CanvasRenderingContext2D.prototype.fillText = function (text, x, y) {
+  drawn.push([text, x, y, this.measureText(text).width, Number.parseFloat(this.font.split(" ")[1]), this.fillStyle]);
+};
+document.querySelector(".motion").value = id;
+document.querySelector(".motion").dispatchEvent(new Event("change"));
+document.querySelector(".time").value = at;
+document.querySelector(".time").dispatchEvent(new Event("input"));
+requestAnimationFrame(() => requestAnimationFrame(() => {
+  CanvasRenderingContext2D.prototype.fillText = bare;
+  done(drawn);
+}));"""
 PAINTED = """const [done] = arguments;
 requestAnimationFrame(() => requestAnimationFrame(() => done(document.querySelector("canvas.arm").toDataURL())));"""
 
@@ -125,6 +140,49 @@ def test_it_plays_no_further_than_the_address_says(page):
     button.click()
     until(page, lambda: button.text == "Play")
     assert clock(page).startswith("t = 1.900 s")
+
+
+def crowded(browser, tmp_path, crowd: int) -> list[tuple[str, float, float, float, float, str]]:
+    """Words (text, x, y, width, height of letters, colour) of a path that touches the first of a crowd of balls."""
+    robot = load_robot("er3a_c60")
+    q = bow(robot).q
+    touched = forward(robot, q[25])[:3, 3]
+    ball = np.eye(4)
+    ball[:3, 3] = touched
+    solids = [Sphere(f"ball_{k}", ball, 0.02 + 0.001 * k) for k in range(crowd)]  # all in one place
+    contact = tuple(touched.tolist())
+    event = PlayedEvent(0.9, 1.1, "collision", "fail", ("ball_0", "link_6"))
+    path = PlayedMotion("path", "", T, q, [event], [Mark(0.9, 1.1, contact, contact, "first contact")])
+    written(tmp_path, player(robot, [path], Scene("crowd", tuple(solids))))
+    browser.get((tmp_path / "page.html").as_uri())
+    WebDriverWait(browser, 10).until(lambda _: clock(browser))
+    return browser.execute_async_script(WRITTEN, "path", "1.0")
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+def test_words_in_the_picture_don_t_overlap_and_what_matters_is_named(browser, tmp_path, width):
+    """Where a crowd of bodies has its names in one place, what matters is named, and the others give way."""
+    with chromium.emulating(browser, width=width):
+        words = crowded(browser, tmp_path, 30)
+        again = browser.execute_async_script(WRITTEN, "path", "0.5")
+    texts = [text for text, *_ in words]
+    assert {"first contact", "ball_0"} <= set(texts)
+    assert len(texts) < 32  # others gave way
+    colours = {text: colour for text, *_, colour in words}
+    assert colours["ball_0"] != colours["first contact"]  # what is touched is red
+    assert "first contact" not in [text for text, *_ in again]
+    for i, (one, x, y, width_of_one, height, _) in enumerate(words):
+        for other, u, v, width_of_other, other_height, _ in words[:i]:
+            assert abs(x - u) >= (width_of_one + width_of_other) / 2 or abs(y - v) >= (height + other_height) / 2, (
+                one,
+                other,
+            )
+
+
+def test_a_motion_s_start_and_end_are_named(page):
+    """One that ends where it starts has one name for both."""
+    assert {"start", "end"} <= {text for text, *_ in page.execute_async_script(WRITTEN, "bow", "1.0")}
+    assert "start and end" in [text for text, *_ in page.execute_async_script(WRITTEN, "still", "0.5")]
 
 
 JOINTS = """return [...document.querySelectorAll(".player .joints dl > div")].map((cell) => {

@@ -469,6 +469,10 @@ def test_any_arm_is_jogged_along_the_axes_that_its_joints_can_follow(other):
         for axis in range(3, 6):
             click_jog(panel, axis)
             told.append(panel.text("#jog-message"))
+            named = f"about {'XYZ'[axis - 3]} of the base"
+            assert panel.one(f"[data-jog='{axis}']").get_attribute("title").startswith(f"A{named[1:]}: ")
+            if told[-1].startswith("The arm does not move: its joints"):
+                assert told[-1].endswith(f"turn the tool {named}.")
         assert any(told)
     panel.browser.execute_script("document.querySelector('input[value=joints]').click()")
     before = values(panel)
@@ -558,3 +562,25 @@ def test_what_would_hide_the_arm_lets_it_through(panel):
       });"""
     arm, places = [[0, 0, 0], [0, 0, 1]], [[2, 0, 0.3], [2, 0.6, 0.3], [-2, 0, 0.5]]  # before it, beside it, behind it
     assert panel.browser.execute_async_script(ask, arm, places) == [[False, [1, 2]], [True, [0]]]
+
+
+def test_words_keep_off_the_arm_and_a_line_leads_from_afar(panel):
+    ask = """const [radius, needed, done] = arguments;
+      import("er3a/scene").then((scene) => {
+        const picture = new scene.Picture(document.createElement("canvas"));
+        Object.assign(picture.canvas, { width: 800, height: 600 });
+        Object.assign(picture, { letters: 16, ratio: 1 });
+        picture.begin(scene.eyeOf({ azimuth: 0, elevation: 0, distance: 5, target: [0, 0, 0] }));
+        if (radius) picture.keepClear([[0, 0, 0]], radius);
+        const drawn = [];
+        picture.context.fillText = (text, x, y) => drawn.push([x - 400, y - 300]);
+        picture.context.stroke = () => drawn.push("line");
+        picture.word("name", [0, 0, 0], "#000000", "#ffffff", needed);
+        done([drawn, picture.scale / 5]);
+      });"""
+    ((at,), _) = panel.browser.execute_async_script(ask, 0, True)
+    assert at == [0, 0]
+    (led, at), zoom = panel.browser.execute_async_script(ask, 0.2, True)
+    assert led == "line"
+    assert max(abs(at[0]), abs(at[1])) > 0.2 * zoom  # beyond what is kept clear
+    assert panel.browser.execute_async_script(ask, 0.4, False)[0] == []  # no place near enough

@@ -124,6 +124,12 @@ def test_edits_of_views_and_of_a_budget_rerun_those_views_and_that_stage_only(sm
         planned = small_study.planned()
     assert {f"{robot}: compute workspace" for robot in small_study.robots} <= planned
     reports = {f"{robot}: report inverse" for robot in with_inverse(small_study)}
+    reports |= {
+        f"{robot}: report {name}"
+        for name, stage in REGISTRY.items()
+        for robot in small_study.robots
+        if "workspace" in stage.shows and name in stages_of(robot)
+    }
     assert {job for job in planned if "workspace" not in job} == reports | panels(small_study) | {"write the index"}
 
 

@@ -58,7 +58,7 @@ class ToyResults(Results[ToySummary]):
 RESULTS = ToyResults
 ''',
     "pipeline/stages/toy/compute.py": '''"""Adds lengths."""
-from er3a.pipeline.results import Figure, Verdict
+from er3a.pipeline.results import Figure, LeftOut, Verdict
 from er3a.pipeline.stages.toy.entry import ToySettings
 from er3a.pipeline.stages.toy.model import Lengths, Long, ToyResults, ToySummary
 
@@ -67,23 +67,22 @@ def compute(study, name):
     whole = float(a.sum())
     if not whole:
         raise ZeroDivisionError("no such arm")
-    return ToyResults(ToySummary(Verdict("pass", Long(whole)), (Figure("sum", whole, "m"),)), Lengths(a))
+    missed = (LeftOut("torques"),)
+    summary = ToySummary(Verdict("pass", Long(whole)), (Figure("sum", whole, "m"),), not_examined=missed)
+    return ToyResults(summary, Lengths(a))
 ''',
     "pipeline/stages/toy/report.py": '''"""The page."""
-from pathlib import Path
-from er3a.pipeline.viewing.page import head_of, render, run_command
+from er3a.pipeline.viewing.page import render_stage
 
 def report(study, stored, output):
     """Write it."""
-    render(Path(__file__).with_name("report.html.j2"), output, head=head_of(stored),
-           command=run_command(study, f"{stored.robot}/toy.html"), robot=study.robot(stored.robot),
-           robot_pages=study.pages(stored.robot))
+    render_stage(study, stored, output)
 ''',
     "pipeline/stages/toy/report.html.j2": '{% extends "base.html.j2" %}\n',
     "pipeline/messages/toy.py": '''"""The verdict, and words."""
 from er3a.pipeline.messages.say import texts
 
-FIGURES = {"sum": "All lengths"}
+KEY_FIGURES = {"sum": "All lengths"}
 TEXTS = texts(
     {
         "toy.too_long": "A link of {length_m:.2f} m is too long.",
@@ -151,6 +150,8 @@ def test_its_results_are_written_and_read(with_toy):
     page = (with_toy.folder / "reports/er3_600/toy.html").read_text(encoding="utf-8")
     assert "All lengths" in page
     assert "The arm is 1.00 m long." in page
+    assert "What this verdict did not examine" in page
+    assert "collisions with the tray" not in page, "it looks for none"
 
 
 def test_a_robot_for_which_it_fails_has_a_reason_and_the_index_stands(with_toy):

@@ -12,14 +12,15 @@ from scipy.spatial.transform import Rotation
 
 from er3a.collision.along import clearance
 from er3a.collision.bodies import Bodies
-from er3a.collision.scene import Mesh, Plane, Scene
+from er3a.collision.scene import Mesh, Plane, Scene, Sphere
 from er3a.errors import InputError
 from er3a.files.scene_file import load_scene
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.pipeline.messages.programs import say
 from er3a.program_check.check_program import CheckOptions, check_program
-from er3a.programs.instructions import JointTarget, UnresolvedTarget, numbers_of
+from er3a.programs.csv_program import write_csv
+from er3a.programs.instructions import JointTarget, NamedFrame, UnresolvedTarget, numbers_of
 from testing.arms import palletiser
 from testing.program_texts import (
     FAR,
@@ -721,3 +722,539 @@ def test_an_overlap_by_less_than_a_shape_is_larger_than_its_mesh_is_no_contact_f
     touches = [each for each in hit.touches if "block" in each.pair.names]
     assert {each.enlarged_mm for each in touches} == {1000 * margin}
     assert ("larger than the meshes" in say(hit)) == bool(margin)
+
+
+# What a branch that moves nothing holds
+
+
+SLOW = "$VEL.CP=0.1\n$ACC.CP=0.2\n$VEL_AXIS[1]=10\n"
+DOWN = "A 0,B 180,C 0"
+AT_START = f"{FRAMES}{SLOW}PTP {axes(HOME)}\n"
+
+
+@pytest.mark.parametrize(
+    ("inside", "more", "code"),
+    [
+        ("$CORR_T={X 0,Y 0,Z 50,A 0,B 0,C 0}", "", "program_not_understood"),
+        ("$ROBROOT={X 0,Y 0,Z 50,A 0,B 0,C 0}", "", "program_not_understood"),
+        ("$ACT_TOOL=3", "", "program_not_understood"),
+        ("$ORI_TYPE=#JOINT", "", "program_not_understood"),
+        ("shift( )", "DEF shift( )\n$CORR_T={X 0,Y 0,Z 50,A 0,B 0,C 0}\nEND\n", "program_not_understood"),
+        ("INTERRUPT DECL 5 WHEN $IN[2] DO elsewhere( )", "", "moves_beside"),
+        ("TRIGGER WHEN DISTANCE=0 DELAY=0 DO elsewhere( ) PRIO=-1", "", "moves_beside"),
+        (
+            "INTERRUPT DECL 5 WHEN $IN[2] DO lift( )",
+            "DEF lift( )\n$BASE={X 0,Y 0,Z 100,A 0,B 0,C 0}\nEND\n",
+            "moves_beside",
+        ),
+        (
+            "INTERRUPT DECL 5 WHEN $IN[2] DO lift( )",
+            "DEF lift( )\n$CORR_T={X 0,Y 0,Z 100,A 0,B 0,C 0}\nEND\n",
+            "moves_beside",
+        ),
+    ],
+)
+@pytest.mark.parametrize("branch", [True, False])
+def test_what_is_named_by_itself_is_named_in_a_branch_that_moves_nothing(tmp_path, inside, more, code, branch):
+    placed = f"IF $IN[1] THEN\n{inside}\nENDIF" if branch else inside
+    found = check(tmp_path, krl(f"{AT_START}{placed}\nLIN {{X 400,Y 0,Z 300,{DOWN}}}", more), "a.src")
+    assert code in codes(found)
+    assert found.level == "caution"
+
+
+def test_a_thread_or_trap_that_nobody_knows_is_named_in_a_branch_that_moves_nothing(tmp_path):
+    text = (
+        f"def a():\n  movej({HOME_TEXT})\n  if get_digital_in(1):\n    run flee()\n  end\n  movej({NEAR_TEXT})\nend\n"
+    )
+    assert codes(check(tmp_path, text))["moves_beside"] == [4]
+    joints = "[[0,-10,-10,0,-70,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
+    text = f"MODULE a\nVAR intnum i;\nPROC main()\nMoveAbsJ {joints},v50,fine,tool0;\nIF di1=1 THEN\n"
+    text += f"CONNECT i WITH flee;\nENDIF\nMoveAbsJ {joints},v50,fine,tool0;\nENDPROC\nENDMODULE\n"
+    assert codes(check(tmp_path, text, "a.mod"))["moves_beside"] == [6]
+
+
+def test_an_output_and_a_wait_in_a_branch_are_still_passed_by(tmp_path):
+    inside = "$OUT[1]=TRUE\nWAIT SEC 1\n$OV_PRO=50\nINTERRUPT DECL 5 WHEN $IN[2] DO light( )"
+    body = f"{AT_START}IF $IN[1] THEN\n{inside}\nENDIF\nPTP {axes(NEAR)}"
+    found = check(tmp_path, krl(body, "DEF light( )\n$OUT[3]=TRUE\nEND\n"), "a.src")
+    assert found.level in ("pass", "note")
+    assert len(found.execution.endings) == 1
+
+
+def test_ways_that_differ_in_how_the_tool_turns_are_followed_apart(tmp_path):
+    line = f"LIN {{X 400,Y 0,Z 300,{DOWN}}}"
+    sides = f"IF $IN[1] THEN\n{line}\n$ORI_TYPE=#CONSTANT\nELSE\n{line}\n$ORI_TYPE=#VAR\nENDIF"
+    body = f"{AT_START}{sides}\nLIN {{X 400,Y 50,Z 300,A 30,B 180,C 0}}"
+    lines = [each.target.pose for each in motions(tmp_path, krl(body), "a.src") if each.kind == "line"]
+    turns = [round(numbers_of(pose, "kuka")[3]) % 180 for pose in lines if pose[1, 3] > 0.01]
+    assert sorted(turns) == [0, 30]
+
+
+def test_ways_that_differ_in_data_read_by_number_are_followed_apart(tmp_path):
+    sides = "IF $IN[1] THEN\nBASE_DATA[1]={X 0,Y 0,Z 100,A 0,B 0,C 0}\n$OUT[1]=TRUE\nENDIF"
+    body = f"BASE_DATA[1]=$NULLFRAME\n{AT_START}{sides}\nBAS(#BASE,1)\nLIN {{X 400,Y 0,Z 300,{DOWN}}}"
+    found = [each.base.pose[2, 3] for each in motions(tmp_path, krl(body), "a.src") if each.kind == "line"]
+    assert sorted(found) == [0.0, 0.1]
+
+
+# Values that change by themselves, and what holds for one motion
+
+
+@pytest.mark.parametrize(
+    ("before", "asked"),
+    [
+        ("$TIMER[1]=0\n$TIMER_STOP[1]=FALSE", "$TIMER[1]>100"),
+        ("$FLAG[1]=FALSE\n$CYCFLAG[1]=$FLAG[1]\n$FLAG[1]=TRUE", "$CYCFLAG[1]"),
+        ("$OV_PRO=50", "$OV_PRO>60"),
+    ],
+)
+def test_what_runs_on_has_no_value_after_it_is_set(tmp_path, before, asked):
+    body = f"REAL X\nX=5\n{before}\nPTP {axes(HOME)}\nIF {asked} THEN\nX=60\nENDIF\nPTP {{A1 X}}"
+    found = [np.degrees(each.target.joints[0]) for each in motions(tmp_path, krl(body), "a.src")]
+    np.testing.assert_allclose(sorted(found), [0, 5, 60])
+
+
+@pytest.mark.parametrize("again", ["", "X=0\n"])
+def test_a_variable_that_an_input_sets_again_and_again_has_no_value(tmp_path, again):
+    (tmp_path / "a.dat").write_text("DEFDAT a\nDECL REAL X=0\nENDDAT\n")
+    body = f"SIGNAL S1 $ANIN[1]\nANIN ON X=20*S1+0\n{again}PTP {axes(HOME)}\nPTP {{A1 X}}"
+    assert isinstance(motions(tmp_path, krl(body), "a.src")[-1].target, UnresolvedTarget)
+
+
+def test_the_time_of_a_part_of_a_spline_is_named(tmp_path):
+    parts = f"TIME_BLOCK START\nSLIN {{X 400,Y 100,Z 300,{DOWN}}}\nTIME_BLOCK PART=100\nTIME_BLOCK END=0.05"
+    body = f"{AT_START}LIN {{X 400,Y 0,Z 300,{DOWN}}}\nSPLINE\n{parts}\nENDSPLINE"
+    found = codes(check(tmp_path, krl(body), "a.src"))
+    assert found["program_not_understood"] == [13]
+
+
+def test_a_setting_of_one_motion_is_undone_after_it(tmp_path):
+    first, turned = f"{{X 400,Y 0,Z 300,{DOWN}}}", "{X 400,Y 50,Z 300,A 30,B 180,C 0}"
+    body = f"{AT_START}LIN {first}\nSLIN {turned} WITH $ORI_TYPE=#CONSTANT\nLIN {turned}"
+    *_, kept, then = motions(tmp_path, krl(body), "a.src")
+    np.testing.assert_allclose(then.target.pose[:3, :3], transform(np.zeros(3), np.radians([0, 180, 30]))[:3, :3])
+    assert np.abs(kept.target.pose - then.target.pose).max() > 0.1
+
+
+def test_a_doubt_that_one_motion_does_without_comes_back_after_it(tmp_path):
+    line = f"{{X 400,Y 0,Z 300,{DOWN}}}"
+    body = f"{AT_START}unknown( )\nSLIN {line} WITH $TOOL=$NULLFRAME, $BASE=$NULLFRAME\nLIN {line}"
+    *_, own, then = motions(tmp_path, krl(body), "a.src")
+    assert (own.doubt, bool(then.doubt)) == ("", True)
+
+
+@pytest.mark.parametrize("kind", ["#JOINT", "#IGNORE", "#CONSTANT", "#VAR"])
+@pytest.mark.parametrize("by_data", [True, False])
+def test_how_one_motion_turns_the_tool_is_followed_or_named(tmp_path, kind, by_data):
+    data = f"{{VEL 0.1,ACC 100,APO_DIST 0,APO_FAC 50,ORI_TYP {kind}}}"
+    setting = "$ORI_TYPE=SORI_TYP(L1)" if by_data else f"$ORI_TYPE={kind}"
+    (tmp_path / "a.dat").write_text(f"DEFDAT a\nDECL LDAT L1={data}\nENDDAT\n")
+    body = f"{AT_START}LIN {{X 400,Y 0,Z 300,{DOWN}}}\nSLIN {{X 400,Y 50,Z 300,A 30,B 180,C 0}} WITH {setting}"
+    found = check(tmp_path, krl(body), "a.src")
+    assert ("frames_in_doubt" in codes(found)) == (kind in ("#JOINT", "#IGNORE"))
+    (*_, last) = (step.instruction for step in found.execution.steps)
+    before = transform(np.zeros(3), np.radians([0, 180, 0]))[:3, :3]
+    assert (np.abs(last.target.pose[:3, :3] - before).max() < 1e-9) == (kind == "#CONSTANT")
+
+
+@pytest.mark.parametrize("setting", ["$CIRC_TYPE=#PATH", "$CIRC_TYPE=SCIRC_TYP(L1)"])
+def test_an_arc_that_turns_along_its_path_is_named(tmp_path, setting):
+    (tmp_path / "a.dat").write_text("DEFDAT a\nDECL LDAT L1={VEL 0.1,ACC 100,CIRC_TYP #PATH}\nENDDAT\n")
+    arc = f"SCIRC {{X 410,Y 10,Z 300,{DOWN}}},{{X 400,Y 20,Z 300,{DOWN}}} WITH {setting}"
+    body = f"{AT_START}LIN {{X 400,Y 0,Z 300,{DOWN}}}\n{arc}"
+    assert "frames_in_doubt" in codes(check(tmp_path, krl(body), "a.src"))
+
+
+@pytest.mark.parametrize("name", ["$POS_INT", "$AXIS_INT"])
+def test_where_an_interrupt_came_is_not_where_the_arm_is(tmp_path, name):
+    body = f"INTERRUPT DECL 5 WHEN $IN[1] DO hit( )\n{AT_START}PTP {axes(NEAR)}\nPTP {name}"
+    found = check(tmp_path, krl(body, "DEF hit( )\n$OUT[1]=TRUE\nEND\n"), "a.src")
+    assert "target_not_given" in codes(found)
+
+
+def test_the_way_back_to_where_an_interrupt_came_is_a_way_that_is_not_known(tmp_path):
+    more = f"DEF hit( )\nLIN $POS_INT\nPTP {axes(NEAR)}\nEND\n"
+    found = check(tmp_path, krl(f"INTERRUPT DECL 5 WHEN $IN[1] DO hit( )\n{AT_START}PTP {axes(NEAR)}", more), "a.src")
+    assert found.level == "caution"
+    assert "moves_beside" in codes(found)
+
+
+# One variable under two names
+
+
+@pytest.mark.parametrize(
+    ("inside", "after"),
+    [("P=40\nPTP {A1 G}", ""), ("G=40", "PTP {A1 G}"), ("deeper( )\nPTP {A1 P}", ""), ("Q=40\nPTP {A1 P}", "")],
+)
+def test_a_variable_that_is_changed_under_another_name_has_no_value(tmp_path, inside, after):
+    (tmp_path / "a.dat").write_text("DEFDAT a\nDECL REAL G=0\nENDDAT\n")
+    more = f"DEF sub(P:OUT,Q:OUT)\nREAL P,Q\n{inside}\nEND\nDEF deeper( )\nG=40\nEND\n"
+    body = f"PTP {axes(HOME)}\nsub(G,G)\n{after}" if "Q" in inside else f"REAL U\nPTP {axes(HOME)}\nsub(G,U)\n{after}"
+    assert isinstance(motions(tmp_path, krl(body, more), "a.src")[-1].target, UnresolvedTarget)
+
+
+def test_a_variable_that_is_given_twice_may_have_the_name_of_a_parameter(tmp_path):
+    more = "DEF sub(P:OUT,Q:OUT)\nREAL P,Q\nQ=40\nPTP {A1 P}\nEND\n"
+    found = motions(tmp_path, krl(f"REAL P\nP=0\nPTP {axes(HOME)}\nsub(P,P)\nPTP {{A1 P}}", more), "a.src")
+    assert all(isinstance(each.target, UnresolvedTarget) for each in found[1:])
+
+
+def test_a_variable_that_is_only_read_under_two_names_keeps_its_value(tmp_path):
+    (tmp_path / "a.dat").write_text("DEFDAT a\nDECL REAL G=30\nENDDAT\n")
+    more = "DEF sub(P)\nREAL P,Q\nQ=P+G\nPTP {A1 Q}\nEND\nDEF other(P)\nREAL P\nP=P+1\nEND\n"
+    body = f"REAL U\nU=0\nPTP {axes(HOME)}\nsub(G)\nother(U)\nother(G)\nPTP {{A1 G,A2 -10}}"
+    found = [np.degrees(each.target.joints[0]) for each in motions(tmp_path, krl(body, more), "a.src")]
+    np.testing.assert_allclose(found, [0, 60, 31])
+
+
+def test_an_element_given_by_reference_is_the_one_that_was_meant_at_the_call(tmp_path):
+    (tmp_path / "a.dat").write_text("DEFDAT a\nDECL INT I=1\nDECL REAL V[2]\nV[1]=-10\nV[2]=-10\nENDDAT\n")
+    more = "DEF sub(P:OUT)\nREAL P\nI=2\nP=40\nEND\n"
+    (found,) = motions(tmp_path, krl("sub(V[I])\nPTP {A1 V[1],A2 -10,A3 V[2],A4 0,A5 -70,A6 0}", more), "a.src")
+    np.testing.assert_allclose(np.degrees(found.target.joints), [40, -10, -10, 0, -70, 0])
+
+
+@pytest.mark.parametrize("kind", ["INOUT", "VAR", "PERS"])
+def test_a_variable_of_rapid_under_two_names_has_no_value(tmp_path, kind):
+    at = "[[g,-10,-10,0,-70,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
+    text = f"MODULE a\nPERS num g:=0;\nPROC main()\nsub g;\nENDPROC\nPROC sub({kind} num p)\np:=40;\n"
+    text += f"MoveAbsJ {at},v50,fine,tool0;\nENDPROC\nENDMODULE\n"
+    (found,) = motions(tmp_path, text, "a.mod")
+    assert isinstance(found.target, UnresolvedTarget)
+
+
+def test_data_that_a_procedure_gets_and_names_too_keep_their_value(tmp_path):
+    pose = "[[400,0,300],[0,1,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
+    data = "PERS tooldata t:=[TRUE,[[0,0,50],[1,0,0,0]],[1,[0,0,10],[1,0,0,0],0,0,0]];"
+    text = f"MODULE a\n{data}\nPROC main()\nsub t;\nENDPROC\nPROC sub(PERS tooldata p)\n"
+    text += f"MoveL {pose},v50,fine,p;\nMoveL {pose},v50,fine,t;\nENDPROC\nENDMODULE\n"
+    assert [each.tool.pose[2, 3] for each in motions(tmp_path, text, "a.mod")] == [0.05, 0.05]
+
+
+def test_a_stop_within_a_blend_leaves_the_position_unknown(tmp_path):
+    lines = "  movel(p[0.4,0,0.3,3.14159265,0,0], a=0.2, v=0.1{})\n  stopl(2)\n"
+    text = (
+        f"def a():\n  set_tcp(p[0,0,0,0,0,0])\n  movej({HOME_TEXT}, v=0.5)\n{lines}  movej({NEAR_TEXT}, v=0.5)\nend\n"
+    )
+    assert codes(check(tmp_path, text.format(", r=0.005")))["may_move"] == [5]
+    assert not {"may_move", "way_not_known"} & codes(check(tmp_path, text.format(""))).keys()
+
+
+# Corners
+
+
+CORNER = {
+    "a.src": (
+        krl(
+            f"{FRAMES}{SLOW}$APO.CDIS=95\nPTP {{A1 -22.9183118,A2 -10,A3 -10,A4 0,A5 -70,A6 0}}\n"
+            "LIN {X 400,Y -200,Z 350,A 0,B 0,C 180}\nLIN {X 400,Y 0,Z 350,A 0,B 0,C 180} C_DIS\n%s\n"
+            "LIN {X 400,Y 0,Z 150,A 0,B 0,C 180}"
+        )
+    ),
+    "a.script": (
+        "def a():\n  set_tcp(p[0,0,0,0,0,0])\n  movej([-0.4,-0.17453293,-0.17453293,0,-1.22173048,0], v=0.5)\n"
+        "  movel(p[0.4,-0.2,0.35,3.14159265,0,0], v=0.1)\n  movel(p[0.4,0,0.35,3.14159265,0,0], v=0.1, r=0.095)\n"
+        "  %s\n  movel(p[0.4,0,0.15,3.14159265,0,0], v=0.1)\nend\n"
+    ),
+    "a.mod": (
+        "MODULE a\nVAR zonedata zz:=[FALSE,95,95,95,10,95,10];\nPROC main()\nConfL\\Off;\n"
+        "MoveAbsJ [[-22.9183118,-10,-10,0,-70,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v50,fine,tool0;\n"
+        "MoveL [[400,-200,350],[0,1,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v50,fine,tool0;\n"
+        "MoveL [[400,0,350],[0,1,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v50,zz,tool0;\n%s\n"
+        "MoveL [[400,0,150],[0,1,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v50,fine,tool0;\nENDPROC\nENDMODULE\n"
+    ),
+    "a.pgm": (
+        "MJOINT(POINTJ(-22.9183118,-10,-10,0,-70,0),v10perc,fine,tool0);\n"
+        "MLIN(POINTC(400,-200,350,0,0,180),v50,fine,tool0);\nMLIN(POINTC(400,0,350,0,0,180),v50,z95,tool0);\n%s\n"
+        "MLIN(POINTC(400,0,150,0,0,180),v50,fine,tool0);\n"
+    ),
+}
+"""Round whose corner a small ball stands within the zone: a stop passes it."""
+
+
+def ball() -> Scene:
+    """In the corner's zone, off its lines."""
+    at = np.eye(4)
+    at[:3, 3] = [0.4, -0.07, 0.28]
+    return Scene("ball", (Sphere("ball", at, 0.005),))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("name", "between", "rounded"),
+    [
+        *(("a.src", each, True) for each in ("", "CONTINUE\nWAIT FOR $IN[1]", "LIN_REL {X 0} C_DIS")),
+        *(
+            ("a.src", each, False)
+            for each in ("WAIT SEC 0", "WAIT FOR $IN[1]", "HALT", "CONTINUE\n;on\n$OUT[1]=TRUE\nWAIT SEC 0")
+        ),
+        *(("a.script", each, True) for each in ("", "sleep(0.01)")),
+        *(("a.mod", each, True) for each in ("WaitTime 0.1;", "WaitDI di1,1;", "WaitUntil b;", "Break;")),
+        *(("a.mod", each, False) for each in ("WaitTime\\InPos,0.1;", "WaitRob\\ZeroSpeed;", "Stop;")),
+        *(("a.pgm", each, True) for each in ("", "DWELL(0.1);", "WAIT(io.DIn[1]);")),
+    ],
+)
+def test_a_corner_is_looked_at_unless_the_arm_surely_stops_there(tmp_path, name, between, rounded):
+    found = check(tmp_path, CORNER[name] % between, name, scene=ball(), measures=True)
+    assert ("zone_collides" in codes(found)) == rounded
+    assert "motion_collides" not in codes(found)
+
+
+@pytest.mark.long
+def test_all_of_a_joint_move_within_a_zones_distance_is_looked_at(tmp_path):
+    """The elbow comes out straight: the tool hardly moves at the end, so the zone is a quarter of the move."""
+    at = np.eye(4)
+    at[:3, 3] = [0.3595, 0.0468, 0.5475]
+    scene = Scene("ball", (Sphere("ball", at, 0.002),))
+    joints = ["{A1 0,A2 0,A3 -43,A4 0,A5 0,A6 0}", "{A1 0,A2 -70,A3 77,A4 0,A5 0,A6 0} C_DIS"]
+    joints.append("{A1 80,A2 -70,A3 77,A4 0,A5 0,A6 0}")
+    body = f"{FRAMES}{SLOW}$APO.CDIS=50\n" + "\n".join(f"PTP {each}" for each in joints)
+    start = np.radians([0, 0, -43, 0, 0, 0])
+    found = check(tmp_path, krl(body), "a.src", scene=scene, measures=True, start=start)
+    assert codes(found)["zone_collides"] == [9]
+
+
+def test_a_wait_after_a_stop_is_no_corner(tmp_path):
+    text = (CORNER["a.pgm"] % "DWELL(0.1);").replace("z95", "fine")
+    found = check(tmp_path, text, "a.pgm")
+    assert not {code for code in codes(found) if code.startswith("zone")}
+
+
+def test_the_zone_at_the_end_of_a_spline_is_its_last_motions(tmp_path):
+    line = f"SLIN {{X 400,Y 50,Z 300,{DOWN}}}"
+    body = f"{AT_START}$APO.CDIS=20\nSPLINE\n{line}\nENDSPLINE C_SPL\nLIN {{X 400,Y 50,Z 250,{DOWN}}}"
+    found = motions(tmp_path, krl(body), "a.src")
+    assert [(each.zone.kind, each.zone.value) for each in found] == [("fine", 0.0), ("distance", 0.02), ("fine", 0.0)]
+
+
+# Ways that join, and loops
+
+
+JOINED = f"LIN {{X 400,Y 0,Z 300,{DOWN}}}"
+SIDES = [f"PTP {axes(HOME)}\n{JOINED}", f"PTP {{A1 0,A2 -10,A3 -10,A4 -180,A5 70,A6 -180}}\n{JOINED}"]
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_way_that_joins_with_other_joints_is_checked_on(tmp_path, order):
+    first, second = SIDES[::order]
+    line = "LIN {X 300,Y 300,Z 300,A 90,B 180,C 0}"
+    alone = check(tmp_path, krl(f"{FRAMES}{SLOW}{SIDES[1]}\n{line}"), "a.src")
+    assert codes(alone)["below_limit"] == [9]
+    both = f"{FRAMES}{SLOW}IF $IN[1] THEN\n{first}\nELSE\n{second}\nENDIF\n{line}"
+    found = check(tmp_path, krl(both), "a.src")
+    assert found.level == "fail"
+    assert codes(found)["below_limit"] == [14]
+
+
+@pytest.mark.long
+def test_the_corner_where_ways_join_is_looked_at(tmp_path):
+    near, far = "LIN {X 400,Y -200,Z 350,A 0,B 0,C 180}", "LIN {X 400,Y 0,Z 450,A 0,B 0,C 180}"
+    text = CORNER["a.src"] % ""
+    corner = next(line for line in text.splitlines() if line.endswith("C_DIS"))
+    sides = f"IF $IN[1] THEN\n{far}\n{corner}\nELSE\n{near}\n{corner}\nENDIF"
+    text = text.replace(f"{near}\n{corner}\n", f"{sides}\n")
+    found = check(tmp_path, text, "a.src", scene=ball(), measures=True)
+    assert codes(found)["zone_collides"] == [14]
+
+
+@pytest.mark.long
+def test_the_corner_of_a_loop_that_begins_with_an_output_is_looked_at(tmp_path):
+    points = ["LIN {X 400,Y 0,Z 150,A 0,B 0,C 180}", "LIN {X 400,Y -200,Z 350,A 0,B 0,C 180}"]
+    corner = "LIN {X 400,Y 0,Z 350,A 0,B 0,C 180}"
+    body = f"{FRAMES}{SLOW}$APO.CDIS=95\nPTP {{A1 -22.9183118,A2 -10,A3 -10,A4 0,A5 -70,A6 0}}\n{points[1]}\n"
+    body += f"IF $IN[1] THEN\n{corner}\nENDIF\n{corner}\nLOOP\n$OUT[1]=TRUE\n{points[0]}\n{corner}\n{points[1]}\n"
+    found = check(tmp_path, krl(f"{body}{corner} C_DIS\nENDLOOP"), "a.src", scene=ball(), measures=True)
+    assert codes(found)["zone_collides"] == [19]
+
+
+def test_the_worst_of_what_rounds_find_at_an_instruction_leads(tmp_path):
+    body = f"FOR I=1 TO 2\nPTP {axes(HOME)}\nPTP {axes(NEAR)}\n$VEL_AXIS[1]=$ANIN[1]\nENDFOR"
+    found = check(tmp_path, krl(body), "a.src")
+    assert found.level == "caution"
+    assert {each.level for each in found.findings if each.finding.code == "speed_not_given"} == {"caution"}
+
+
+# Types
+
+
+@pytest.mark.parametrize(
+    ("body", "more", "wanted"),
+    [
+        ("FRAME F\nF={X 401,Y 0,Z 300,A 0,B 180,C 0}\nREAL X\nX=F.X/2\nPTP {A1 X}", "", 200.5),
+        ("AXIS Q\nQ={A1 5}\nQ.A1=Q.A1/2\nPTP Q", "", 2.5),
+        ("AXIS Q\nQ={A1 0}\nQ.A1=5\nQ.A1=Q.A1/2\nPTP Q", "", 2.5),
+        ("INT N\nN=2\nREAL X\nX=5/N\nPTP {A1 X}", "", 2.0),
+        ("REAL X\nother( )\nX=12.7\nPTP {A1 X}", "DEF other( )\nINT X\nX=1\nEND\n", 12.7),
+        ("turn(5)", "DEF turn(R:IN)\nREAL R\nR=R/2\nPTP {A1 R}\nEND\n", 2.5),
+        ("turn(12.7)", "DEF turn(N:IN)\nINT N\nPTP {A1 N}\nEND\n", 13.0),
+        ("REAL X\nX=half(5)/2\nPTP {A1 X}", "DEFFCT REAL half(N:IN)\nINT N\nRETURN N\nENDFCT\n", 2.5),
+    ],
+)
+def test_numbers_are_of_the_type_that_is_declared(tmp_path, body, more, wanted):
+    found = motions(tmp_path, krl(f"PTP {axes(HOME)}\n{body}", more), "a.src")[-1]
+    assert np.degrees(found.target.joints[0]) == pytest.approx(wanted)
+
+
+# What RAPID's handlers, traps and functions change
+
+
+AT_P = "[[400,0,300],[0,1,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
+
+
+def rapid(body: str, more: str = "", data: str = "") -> str:
+    """A module whose main begins at home."""
+    head = f"MODULE a\nCONST robtarget p:={AT_P};\nVAR num n:=1;\nVAR bool b;\n{data}PROC main()\n"
+    home = "MoveAbsJ [[0,-10,-10,0,-70,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v50,fine,tool0;\nConfL\\Off;\n"
+    return f"{head}{home}{body}\nENDPROC\n{more}ENDMODULE\n"
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "WaitAI ai1\\GT,5\\MaxTime:=4\\ValueAtTimeout:=n;",
+        'sub1 StrToVal("40",n);',
+        'WHILE StrToVal("40",n) DO\nn:=1;\nENDWHILE',
+        'TEST StrToVal("40",n)\nCASE TRUE:\nSetDO do1,1;\nENDTEST',
+        'IF StrToVal("40",n) SetDO do1,1;',
+        'b:=StrToVal("40",n);',
+        "BitSet n,5;",
+        "BitClear n,5;",
+    ],
+)
+def test_what_an_instruction_or_function_may_change_has_no_value(tmp_path, line):
+    more = "PROC sub1(bool c)\nENDPROC\n"
+    found = motions(tmp_path, rapid(f"{line}\nMoveL Offs(p,0,n,0),v100,fine,tool0;", more), "a.mod")
+    assert isinstance(found[-1].target, UnresolvedTarget)
+
+
+@pytest.mark.parametrize("local", [True, False])
+def test_what_a_handler_sets_has_no_value(tmp_path, local):
+    handler = "ERROR\nIF ERRNO=ERR_WAIT_MAXTIME THEN\noff:=-400;\nRETRY;\nENDIF"
+    data = "VAR num off:=0;\n"
+    lines = "WaitDI di1,1\\MaxTime:=2;\nMoveL Offs(p,0,0,off),v100,fine,tool0;\nMoveL Offs(p,0,n,0),v100,fine,tool0;\n"
+    text = rapid(lines + handler, data="" if local else data)
+    text = text.replace("PROC main()\n", f"PROC main()\n{data}") if local else text
+    _, off, kept = motions(tmp_path, text, "a.mod")
+    assert isinstance(off.target, UnresolvedTarget)
+    assert not isinstance(kept.target, UnresolvedTarget)
+
+
+@pytest.mark.parametrize(
+    ("own", "caller", "leaves"),
+    [
+        ("ERROR\nIF ERRNO=ERR_WAIT_MAXTIME RETURN;\n", "", True),
+        ('ERROR\nTPWrite "late";\n', "", True),
+        ("ERROR\nTRYNEXT;\n", "", False),
+        ("ERROR\nRETRY;\n", "", False),
+        ("", "ERROR\nTRYNEXT;", True),
+        ("", "", False),
+    ],
+)
+def test_a_routine_that_an_error_ends_is_followed(tmp_path, own, caller, leaves):
+    sub = "PROC sub1()\nMoveL p,v100,fine,tool0;\nWaitDI di1,1\\MaxTime:=2;\nMoveL Offs(p,0,0,100),v100,fine,tool0;\n"
+    text = rapid(f"sub1;\nMoveL Offs(p,0,50,0),v100,fine,tool0;\n{caller}", f"{sub}{own}ENDPROC\n")
+    found = check(tmp_path, text, "a.mod")
+    assert (len(found.execution.endings) > 1) == leaves
+    lines = [each for each in found.motions.values() if each.kind == "line"]
+    assert len({tuple(np.round(np.append(each.start, each.end), 6)) for each in lines}) == 3 + leaves
+
+
+@pytest.mark.parametrize("word", ["ExitCycle", "RAISE my_err"])
+def test_a_trap_that_ends_the_cycle_or_the_routine_is_named(tmp_path, word):
+    more = f"TRAP t1\n{word};\nENDTRAP\n"
+    body = "CONNECT i1 WITH t1;\nISignalDI di1,1,i1;\nMoveL p,v100,fine,tool0;"
+    found = check(tmp_path, rapid(body, more, "VAR intnum i1;\n"), "a.mod")
+    assert codes(found)["moves_beside"] == [9]
+    assert codes(found)["may_move"] == [14]
+
+
+def test_a_position_that_is_read_after_continue_is_not_known(tmp_path):
+    line = f"{AT_START}$APO.CDIS=20\nLIN {{X 400,Y 0,Z 300,{DOWN}}} C_DIS\n%sF=$POS_ACT\nLIN F"
+    ahead, stopped = (motions(tmp_path, krl(f"FRAME F\n{line % each}"), "a.src")[-1] for each in ("CONTINUE\n", ""))
+    assert isinstance(ahead.target, UnresolvedTarget)
+    assert not isinstance(stopped.target, UnresolvedTarget)
+
+
+ONE_TOOL = "[TRUE,[[0,0,100],[1,0,0,0]],[1,[0,0,0],[1,0,0,0],0,0,0]]"
+TOOLS = f"VAR num n;\nPERS tooldata tools{{2}}:=[{ONE_TOOL},{ONE_TOOL}];\n"
+STEP = "MoveL [[300,50,200],[0,1,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v50,fine,tools{n};"
+
+
+@pytest.mark.parametrize(
+    ("file", "text", "name"),
+    [
+        ("a.src", krl("INT n\n$BASE=$NULLFRAME\nn=$IN[3]\n$TOOL=TOOL_DATA[n]\nLIN_REL {Z 1}"), "TOOL_DATA[N]"),
+        ("a.mod", f"MODULE a\n{TOOLS}PROC main()\nn:=GInput(gi1);\n{STEP}\nENDPROC\nENDMODULE\n", "tools[n]"),
+    ],
+)
+def test_one_frame_given_for_every_index_is_a_caution(tmp_path, file, text, name):
+    found = check(tmp_path, text, file, frames={name: np.eye(4)})
+    said = [each for each in found.findings if each.finding.code == "frame_of_several"]
+    assert [(each.level, each.finding.name, each.finding.frame) for each in said] == [("caution", name, "tool")]
+
+
+@pytest.mark.parametrize(("name", "several"), [("TOOL_DATA[12]", False), ("wobj{1, 2}", False), ("tool (old)", False)])
+def test_frames_with_numbers_are_one_each(name, several):
+    assert NamedFrame(name).one_of_several is several
+
+
+FAR_AWAY = "MoveL [[{x},0,400],[0,1,0,0],[0,0,0,0],[{track},9E9,9E9,9E9,9E9,9E9]],v50,fine,tool0;"
+
+
+@pytest.mark.parametrize(("track", "level"), [("1500", "caution"), ("9E9", "fail")])
+@pytest.mark.parametrize("reached", [True, False])
+def test_reach_is_not_decided_where_external_axes_were_left_out(tmp_path, track, level, reached):
+    line = FAR_AWAY.format(x=3000, track=track)
+    near = "" if reached else f"{FAR_AWAY.format(x=400, track='9E9')}\n"
+    text = f"MODULE a\nPROC main()\n{near}{line}\nENDPROC\nENDMODULE\n"
+    found = check(tmp_path, text, "a.mod", **({} if reached else {"most_motions": 1}))
+    said = {each.finding.code: each.level for each in found.findings}
+    assert said.get("way_out_of_reach", said.get("target_out_of_reach")) == level
+
+
+@pytest.mark.parametrize(
+    ("moved_mm", "turned_deg", "said"), [(0.0, 0.0, None), (0.0, 2.0, (0.0, 2.0)), (30.0, 0.0, (30.0, 0.0))]
+)
+def test_a_table_whose_poses_are_another_arms_is_a_caution(tmp_path, moved_mm, turned_deg, said):
+    joints = np.linspace(HOME, NEAR, 4)
+    poses = np.linalg.inv(ROBOT.base) @ forward(ROBOT, joints)
+    poses[2, 0, 3] += moved_mm / 1000
+    poses[2, :3, :3] = Rotation.from_euler("z", turned_deg, degrees=True).as_matrix() @ poses[2, :3, :3]
+    found = check(tmp_path, write_csv(np.arange(4.0), np.degrees(joints), poses), "a.csv")
+    named = [each for each in found.findings if each.finding.code == "tool_stated_elsewhere"]
+    if said is None:
+        assert not named
+    else:
+        (one,) = named
+        assert (one.level, one.place.line) == ("caution", 4)
+        np.testing.assert_allclose((one.finding.moved_mm, one.finding.turned_deg), said, atol=1e-5)
+
+
+def test_a_tables_pose_columns_that_are_not_all_there_are_named(tmp_path):
+    table = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,x_mm,yaw_deg\n0,-10,-10,0,-70,0,400,0\n"
+    assert codes(check(tmp_path, table, "a.csv"))["program_not_understood"] == [1, 1]
+
+
+@pytest.mark.parametrize("start", ["INTERRUPT DECL 5 WHEN $IN[1] DO", "TRIGGER WHEN DISTANCE=0 DELAY=0 DO"])
+@pytest.mark.parametrize(("what", "changed"), [("st(N)", True), ("far( )", True), ("look(N)", False)])
+def test_what_a_routine_beside_the_program_changes_by_reference_has_no_value(tmp_path, start, what, changed):
+    (tmp_path / "a.dat").write_text("DEFDAT a\nDECL INT N=0\nENDDAT\n")
+    more = "DEF st(X:OUT)\nINT X\nX=50\nEND\nDEF far( )\nst(N)\nEND\nDEF look(X:OUT)\nINT X\n$OUT[1]=X>3\nEND\n"
+    found = motions(tmp_path, krl(f"{start} {what}\nPTP {axes(HOME)}\nPTP {{A1 N}}", more), "a.src")
+    assert isinstance(found[-1].target, UnresolvedTarget) == changed
+
+
+@pytest.mark.parametrize(
+    ("motion", "named"),
+    [
+        ("PTP_REL {E1 100}", True),
+        ("PTP_REL {A1 5,E1 0}", False),
+        ("LIN_REL {X 10,E1 100}", True),
+        ("LIN_REL {X 10,E1 100} #TOOL", True),
+        ("PTP {A1 5,E1 $ANIN[1]}", True),
+        (f"CIRC {{X 410,Y 10,Z 300,{DOWN},E1 50}},{{X 400,Y 20,Z 300,{DOWN}}}", True),
+    ],
+)
+def test_external_axes_are_named_in_every_motion(tmp_path, motion, named):
+    found = check(tmp_path, krl(f"{AT_START}LIN {{X 400,Y 0,Z 300,{DOWN}}}\n{motion}"), "a.src")
+    assert ("external_axes_left_out" in codes(found)) == named

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from pathlib import Path
 from typing import get_args
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from er3a.collision.pairs import LinkPair
 from er3a.collision.scene import Scene, Sphere
@@ -115,6 +117,19 @@ def test_joint_moves_that_are_advised_pass(tmp_path, code, start, line):
         np.testing.assert_allclose(*(forward(ROBOT, end)[:3, 3] for end in ends if end is not None), atol=1e-4)
 
 
+def test_of_the_solutions_one_is_advised_on_the_way_to_which_the_tool_hardly_turns():
+    """The example's line keeps the tool's orientation through the wrist's singularity; by another solution, hardly
+    farther away, a joint move would turn the tool once around."""
+    program = read_program(Path("data/programs/faults/singular_line.src"))
+    check = check_program(program, ROBOT, CheckOptions(start=np.radians([0, -10, -10, 0, -70, 0]), measures=False))
+    advised = next(each for each in check.findings if each.joint_moves)
+    motion = check.motions[advised.step]
+    (end,) = np.radians(advised.joint_moves)
+    R = forward(motion.placed.arm, motion.start + np.linspace(0, 1, 101)[:, None] * (end - motion.start))[:, :3, :3]
+    turned = Rotation.from_matrix(R[0].T @ R).magnitude()
+    assert np.degrees(turned.max()) < 15
+
+
 def test_what_no_joint_move_mends_says_so_by_not_advising_one(tmp_path):
     (tmp_path / "a.src").write_text(f"{HEAD}PTP {{A2 -80,A3 -10}}\nEND\n")  # into the table
     options = CheckOptions(start=np.radians([0, -10, -10, 0, -70, 0]), scene=SCENE)
@@ -151,6 +166,7 @@ RPL = (
 AT_TOOL0 = "MLIN(POINTC(400,0,400,0,0,180), v50, fine, tool0);\n"
 WORDS = {"speed": "v10perc", "zone": "fine", "tool": "tool0"}
 FRAMED = f"DEF a( )\n$TOOL=TOOL_DATA[3]\n$BASE=$NULLFRAME\n$VEL.CP=0.05\nLIN {{X 300,Y 50,Z 400,{DOWN}}}\nEND\n"
+TABLE, ROW = "t_s,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg", "0,10,-10,-10,0,-70,0"
 THIRDS = [f"LIN {{A {turn},B 0,C 180}}" for turn in (120, -120, 0)]
 LOOP = ("$ACC.CP=0.2", f"LIN {{X 400,Y 0,Z 400,{DOWN}}}", "LOOP", *THIRDS)
 MOVEJ = "  movej([0, -0.2, -0.2, 0, -1.2, 0], a=1, v=0.5)\n"
@@ -236,6 +252,11 @@ MENDED = {
         (krl("PTP XP1"), {"data": "E6AXIS XP1={A1 10,A2 -10,A3 -10,A4 0,A5 -70,A6 0}"}),
     ),
     "frame_not_given": (FRAMED, (FRAMED, {"frames": {"TOOL_DATA[3]": np.eye(4)}})),
+    "tool_stated_elsewhere": (f"{TABLE},x_mm,y_mm,z_mm\n{ROW},500,0,0\n", f"{TABLE}\n{ROW}\n"),
+    "frame_of_several": (
+        (krl("$TOOL=TOOL_DATA[n]", f"LIN {{X 400,Y 0,Z 400,{DOWN}}}"), {"frames": {"TOOL_DATA[N]": np.eye(4)}}),
+        (krl("$TOOL=TOOL_DATA[3]", f"LIN {{X 400,Y 0,Z 400,{DOWN}}}"), {"frames": {"TOOL_DATA[3]": np.eye(4)}}),
+    ),
     "frame_taken_as_flange": (AT_TOOL0, (AT_TOOL0, {"frames": {"tool0": np.eye(4)}})),
     "not_followed_to_end.operations": (
         (krl("FOR i=1 TO 40", "PTP {A1 5}", "PTP {A1 0}", "ENDFOR"), {"limits": RunLimits(operations=60)}),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -30,6 +31,7 @@ from er3a.programs.languages import files_of, read_program, write_program
 from er3a.programs.machine import execute
 from er3a.programs.program_findings import NotSimulated, NotUnderstood, ToolNotGiven
 from er3a.programs.rapid.data_types import branch_of
+from er3a.programs.rapid.reader import MOTIONS
 from er3a.programs.writing import WriteOptions, solutions_meant
 
 ROBOT = load_robot("er3a_c60")
@@ -527,6 +529,12 @@ def test_what_is_not_understood_is_kept_and_may_move(case, tmp_path):
     refused = any(isinstance(each, ArmMotion) and isinstance(each.target, UnresolvedTarget) for each in kept[1:-1])
     assert unknown or refused
     assert isinstance(motions(execution)[-1].target, UnresolvedTarget)
+
+
+def test_the_motions_that_are_read_are_listed():
+    text = (Path(__file__).parents[2] / "docs/programs.md").read_text(encoding="utf-8")
+    listed = re.search(r"\*\*Motions\*\* that are read: (.*?)\n\n", text, re.DOTALL)[1]
+    assert {name.upper() for name in re.findall(r"`(\w+)`", listed)} == MOTIONS
 
 
 UNFOLLOWED = (

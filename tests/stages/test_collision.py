@@ -98,7 +98,11 @@ def test_the_verdict_names_the_nearest_target_and_the_paths_that_collide(results
         f"The chosen solutions of {found.targets} targets are clear by {least.clearance_mm:.1f} mm ({least.name}, "
         f"{say(least.between)}) or more."
     )
-    met = [f"{each.name} ({say(each.between)})" for each in closest if each.kind == "path" and each.clearance_mm < 0]
+    met = [
+        f"{each.name} ({say(each.between)}; as expected)"
+        for each in closest
+        if each.kind == "path" and each.clearance_mm < 0
+    ]
     assert met
     assert f" {', '.join(met)}. " in say(found)
 

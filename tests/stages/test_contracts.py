@@ -42,7 +42,7 @@ def test_its_views_take_those_results(stage):
 
 
 def test_its_key_figures_have_names(stage):
-    """A figure without a name in ``FIGURES`` would fail on the page alone; tests of the stages compute them all."""
-    figures = import_module(stage.messages).FIGURES
+    """A figure without a name in ``KEY_FIGURES`` would fail on the page alone; tests of the stages compute them all."""
+    figures = import_module(stage.messages).KEY_FIGURES
     assert figures
     assert all(name.isidentifier() and words for name, words in figures.items())

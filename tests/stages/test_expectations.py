@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import pytest
 
 from er3a.errors import InputError
 from er3a.files.path_file import load_paths
 from er3a.files.target_file import read_targets
-from er3a.pipeline.messages.expectations import demonstrated, say
+from er3a.pipeline.messages.expectations import as_expected, demonstrated, say
 from er3a.pipeline.stages.expectations import Outcome, demonstrations, unmet_expectations
 
 
@@ -20,7 +19,7 @@ class Came:
 
     name: str
     outcome: Outcome
-    expect: Outcome | None = None
+    expect: Outcome | tuple[Outcome, ...] | None = None
 
 
 def test_what_is_expected_and_comes_is_a_demonstration():
@@ -28,9 +27,32 @@ def test_what_is_expected_and_comes_is_a_demonstration():
     assert unmet_expectations(judged) is None
     assert [shown.name for shown in demonstrations(judged, "safe")] == ["out"]
     assert demonstrated(demonstrations(judged, "safe"), 1) == "1 expected to fail, and did: out (unreachable)"
-    shown = demonstrations(judged, "safe", lambda each: ("collides", each.outcome))
-    assert demonstrated(shown, 1) == "1 expected to fail, and did: out (collides, unreachable)"
-    assert demonstrated(shown, 0).endswith("; nothing else is given to be judged")
+    assert demonstrated(demonstrations(judged, "safe"), 0).endswith("; nothing else is given to be judged")
+
+
+@dataclass(frozen=True)
+class Judged(Came):
+    """Something that can come to more than one outcome."""
+
+    outcomes: tuple[Outcome, ...] = ()
+
+
+def test_what_comes_besides_the_expected_is_not_expected():
+    """A path that also collides is as expected only if both are given."""
+    both: tuple[Outcome, ...] = ("collides", "leaves limits")
+    part = Judged("line", "leaves limits", "leaves limits", both)
+    unmet = unmet_expectations([part])
+    assert unmet is not None
+    assert say(unmet) == ("1 of 1 expectations is not met: line (collides, leaves limits; expected: leaves limits).")
+    assert demonstrations([part], "safe") == ()
+    assert as_expected(part) == "leaves limits: as expected; collides: not expected"
+    given = Judged("line", "leaves limits", both[::-1], both)
+    assert unmet_expectations([given]) is None
+    shown = demonstrations([given], "safe")
+    assert demonstrated(shown, 1) == "1 expected to fail, and did: line (collides, leaves limits)"
+    assert as_expected(given) == "as expected"
+    assert as_expected(Judged("line", "collides", "leaves limits", ("collides",))) == "not as expected"
+    assert as_expected(Came("a", "safe")) == ""
 
 
 def test_what_comes_otherwise_is_named_with_both_outcomes():
@@ -46,7 +68,7 @@ def test_what_comes_otherwise_is_named_with_both_outcomes():
     assert demonstrations([Came("out", "safe", "unreachable")], "safe") == ()
 
 
-def test_files_hold_expectations(tmp_path: Path):
+def test_files_hold_expectations(tmp_path):
     table = tmp_path / "targets.csv"
     table.write_text(
         "name,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg,expect\na,500,0,400,180,0,0,\nb,900,0,9,0,0,0,unreachable\n"
@@ -58,7 +80,12 @@ def test_files_hold_expectations(tmp_path: Path):
         "     start_deg: [0, 0, 0, 0, 0, 0], end_deg: [10, 0, 0, 0, 0, 0]}\n"
     )
     paths.write_text(text.replace("EXPECT", "leaves limits"))
-    assert load_paths(paths).paths[0].expect == "leaves limits"
+    assert load_paths(paths).paths[0].expected == ("leaves limits",)
+    paths.write_text(text.replace("EXPECT", "[leaves limits, collides]"))
+    assert load_paths(paths).paths[0].expected == ("leaves limits", "collides")
+    paths.write_text(text.replace("EXPECT", "[]"))
+    with pytest.raises(InputError, match=r"paths\[0\].expect"):
+        load_paths(paths)
     paths.write_text(text.replace("EXPECT", "fine"))
     with pytest.raises(InputError, match=r"paths\[0\].expect"):
         load_paths(paths)

@@ -20,7 +20,7 @@ from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import characteristic_length, conditioning
-from er3a.pipeline.messages.trajectory import FIGURES, advice, cause_text, path_text, repair_text
+from er3a.pipeline.messages.trajectory import KEY_FIGURES, advice, cause_text, path_text, repair_text
 from er3a.pipeline.results import (
     AbsentResults,
     NotComputed,
@@ -319,7 +319,7 @@ def test_tiles_beside_each_other_tell_of_one_path_and_of_different_counts(result
     assert tiles["max_joint_speed"] == speed
     assert ratio == pytest.approx(speed / limit)
     assert tiles["colliding"] == sum(bool(path.collisions) for path in asked)
-    assert FIGURES["colliding"] == "Paths with a collision, of those meant to be safe"
+    assert KEY_FIGURES["colliding"] == "Paths with a collision, of those meant to be safe"
 
 
 @pytest.mark.long

@@ -16,17 +16,18 @@ from er3a.files.path_file import load_paths
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
 from er3a.pipeline.messages.say import say
-from er3a.pipeline.messages.trajectory import advice, end_text, first_faults
+from er3a.pipeline.messages.trajectory import _rates, adjoined, advice, end_text, first_faults, switch_text
 from er3a.pipeline.program_reports import programs_of
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.trajectory.compute import compute
 from er3a.pipeline.stages.trajectory.judgement import sound_end
-from er3a.pipeline.stages.trajectory.model import Singularity
+from er3a.pipeline.stages.trajectory.model import Singularity, Stretch
 from er3a.pipeline.stages.trajectory.played import advised, faults
 from er3a.pipeline.study import Study, load_study
 from er3a.pipeline.verdicts import read_verdicts
 from er3a.pipeline.viewing.index import write_index
-from er3a.planning.motion_faults import PathOutOfReach, TooFastIfAssumed
+from er3a.planning.motion_faults import AccelerationTooGreatIfAssumed, PathOutOfReach, TooFastIfAssumed
+from er3a.planning.tool_proof import Undecided
 from testing.motion_cases import judged, limits_of
 
 ROBOT = "er3a_c60"
@@ -35,7 +36,7 @@ ROBOT = "er3a_c60"
 def study_of(
     folder: Path,
     *names: str,
-    expect: dict[str, str] | None = None,
+    expect: dict[str, str | list[str]] | None = None,
     settings: dict | None = None,
     robot: str = ROBOT,
     **changes,
@@ -197,12 +198,17 @@ def test_a_path_that_ends_before_the_edge_of_the_reach_as_advised_is_safe(tmp_pa
 
 
 def test_all_that_a_path_came_to_is_named_everywhere_in_the_order_of_time(tmp_path):
-    results = compute(study_of(tmp_path, "line_limits", expect={"line_limits": "leaves limits"}), ROBOT)
+    both = {"line_limits": ["leaves limits", "collides"]}
+    results = compute(study_of(tmp_path, "line_limits", expect=both), ROBOT)
     (path,), (fault,) = results.summary.paths, faults(results)
     assert path.collisions[0].t0_s < path.out_of_limits[0].t0_s
     assert path.outcomes == ("collides", "leaves limits")
     assert fault.verdict == "collides, leaves limits"
     assert "expected to fail, and did: line_limits (collides, leaves limits)" in say(results.summary.verdict.finding)
+    assert (fault.meant, fault.expected) == (True, "as expected")
+    alone = replace(path, expect=("leaves limits",))  # of a file that does not expect the collision
+    (fault,) = faults(replace(results, summary=replace(results.summary, paths=(alone,))))
+    assert (fault.meant, fault.expected) == (False, "leaves limits: as expected; collides: not expected")
     late = replace(path, collisions=(replace(path.collisions[0], t0_s=path.out_of_limits[0].t0_s + 0.1),))
     assert late.outcomes == ("leaves limits", "collides")
     assert replace(path, collisions=()).outcomes == ("leaves limits",)
@@ -256,10 +262,10 @@ def test_what_is_wrong_before_a_contact_ends_the_sound_part_of_a_path(tmp_path):
     near = replace(rows, near_singular=rows.t_s >= 0)
     assert sound_end(path, near, limits) is None
     nowhere = replace(path, sound_end=None)
-    assert "end the path there" not in advised(nowhere, near, limits)
-    assert "near-singular at the start" in advised(nowhere, near, limits)
+    assert "end the path there" not in advised(nowhere, near, results.avoidance, limits)
+    assert "near-singular at the start" in advised(nowhere, near, results.avoidance, limits)
     met = replace(nowhere, singularities=(Singularity(0.0, 0.0, "wrist", True, 0.0, None),))
-    assert "the arm is singular at the start" in advised(met, near, limits)
+    assert "the arm is singular at the start" in advised(met, near, results.avoidance, limits)
     fast = replace(path.collisions[0], t0_s=0.7, cause=TooFastIfAssumed(2, 900.0, 180.0))
     several = replace(early, too_fast=(fast,), avoidance=path.avoidance * 2)
     assert [t for t, _ in first_faults(several)] == [0.5, path.collisions[0].t0_s]
@@ -342,3 +348,44 @@ def test_a_path_that_no_arm_of_its_class_follows_to_its_end_fails_unless_it_is_m
         for made in programs_of(tmp_path / "paths.yaml", load_robot(arm), "csv", None, None, False)
     ]
     assert programs == [("joint_move", False), ("out", True)]
+
+
+def stretch(cause, t0_s: float, t1_s: float, worst_s: float | None = None) -> Stretch:
+    """A stretch of time; places on the path do not matter here."""
+    return Stretch(t0_s, t1_s, 0.0, 0.0, cause, worst_s)
+
+
+def test_a_fault_of_rates_tells_all_its_joints_until_the_last_of_what_adjoins_is_over():
+    """Accelerations before and after a peak of speed are one fault; what comes much later is named as such."""
+    parts = [
+        stretch(AccelerationTooGreatIfAssumed(6, 6624.0, 1440.0), 1.842, 1.995, 1.957),
+        stretch(TooFastIfAssumed(4, 762.0, 360.0), 1.921, 2.079, 2.0),
+        stretch(TooFastIfAssumed(6, 761.0, 360.0), 1.921, 2.079, 2.0),
+        stretch(AccelerationTooGreatIfAssumed(4, 6600.0, 1440.0), 2.005, 2.158, 2.043),
+    ]
+    assert _rates(parts) == (
+        "J4, J6 exceed the assumed limits until t = 2.158 s: at worst J4 needs 762 of 360 deg/s at t = 2 s; "
+        "at worst J6 needs 6624 of 1440 deg/s² at t = 1.957 s"
+    )
+    again = stretch(TooFastIfAssumed(1, 200.0, 180.0), 3.0, 3.1, 3.05)
+    assert _rates([again, *parts]).endswith("; and again from t = 3 s")
+    assert "J1" not in _rates([again, *parts])
+
+
+def test_stretches_of_one_cause_that_adjoin_are_told_once():
+    open_, other = Undecided("singular"), Undecided("speed")
+    parts = [stretch(open_, 1.97, 2.03), stretch(open_, 1.945, 1.967), stretch(other, 1.95, 1.96)]
+    found = adjoined([*parts, stretch(open_, 2.9, 3.0)])
+    assert [(each.cause, each.t0_s, each.t1_s) for each in found] == [
+        (open_, 1.945, 2.03),
+        (other, 1.95, 1.96),
+        (open_, 2.9, 3.0),
+    ]
+
+
+def test_a_motion_on_another_solution_says_how_far_its_start_is_and_that_the_way_was_not_checked():
+    assert switch_text([0.1, 0, 0, 179.6, -93.2, 100.0], (6,)) == (
+        "It begins at other joint angles than programmed (J4 +180 deg, J5 −93 deg, J6 +100 mm): the way there is not "
+        "part of it and was not checked"
+    )
+    assert switch_text([0.0] * 6, ()) == "The move to the other solution is part of it and was checked"

@@ -518,9 +518,13 @@ def test_an_entry_that_only_the_source_of_the_table_to_use_gives_has_one_mark(su
     changed = {entry for entry, mark in marks(alone).items() if mark != marks(beside)[entry]}
     assert changed == {f"direction{joint}" for joint in (1, 4, 6)}
     own = marks(evidence_section(load_robot("er3a_c60"), real))
-    assert {marks(beside)[entry] for entry in changed} == {own[entry] for entry in changed} == {"one source"}
+    assert {own[entry] for entry in changed} == {"one source"}
+    assert {marks(beside)[entry] for entry in changed} == {"✓ one source", "(✓) one source"}
     assert (alone["of_one"], beside["of_one"]) == ("", "direction 1, 4, 6")
-    assert [row[0] for row in beside["open_rows"] if row[0] in changed] == sorted(changed)
+    settled = {row[0]: row[2] for row in beside["settled_rows"]}  # as the results have them
+    for each in (each for each in article.entries if each.entry in changed):
+        words = {"settled": "✓ settled, one source", "settled_up_to_signs": "(✓) settled but for signs, one source"}
+        assert settled[each.entry] == words[each.status]
 
 
 def test_the_page_says_how_far_each_contradicted_entry_is_off(study, stored, summaries, tmp_path):

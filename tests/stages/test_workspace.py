@@ -135,7 +135,7 @@ def test_a_void_at_the_shoulder_names_the_limit_that_nothing_confirms_and_a_cont
     for status in ("caution", "fail"):
         report(study, replace(stored, rests_on={"validation": status}), tmp_path / "page.html")
         page = (tmp_path / "page.html").read_text(encoding="utf-8")
-        assert ("Planning only: the box on" in page, "No place for the box is recommended" in page) == (
+        assert ("Planning only: the tray on" in page, "No place for the tray is recommended" in page) == (
             status != "fail",
             status == "fail",
         )

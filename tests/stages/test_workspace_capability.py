@@ -245,7 +245,7 @@ def test_a_box_stands_on_a_surface_where_the_arm_leaves_it_room_or_is_told_why_n
     assert (free & found.within_limits).any(axis=1).all()
     assert stands["floor"].above is not None
     context = context_of(robot, done)
-    assert "the box on table, its centre at" in context["best_text"]
+    assert "the tray on table, its centre at" in context["best_text"]
     assert len(context["stands"]) == 4
 
 

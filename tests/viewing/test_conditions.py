@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from er3a.collision.bodies import Bodies
 from er3a.files.robot_library import load_robot
 from er3a.identifiability.entry_evidence import Tolerance
 from er3a.identifiability.proposals import LookAtMotion
@@ -20,19 +21,22 @@ from er3a.pipeline.messages.left_out import say_reserved
 from er3a.pipeline.messages.pages import caveat
 from er3a.pipeline.messages.validation import how_far_off, settled_parts, unconfirmed
 from er3a.pipeline.messages.vision import say
+from er3a.pipeline.messages.workspace import range_text
 from er3a.pipeline.results import FORMAT_VERSION, LeftOut, plain, read_foundation, write_checksums
 from er3a.pipeline.stages.dynamics.model import NoLimits
 from er3a.pipeline.stages.inverse.model import RankingRows
 from er3a.pipeline.stages.inverse.report import rule_rows
 from er3a.pipeline.stages.programs.model import ProgramMotion, ProgramsResults
-from er3a.pipeline.stages.trajectory.model import PathChecks, TrajectoryResults
+from er3a.pipeline.stages.trajectory.model import AvoidanceRows, PathChecks, TrajectoryResults
 from er3a.pipeline.stages.validation.model import LeftOpen, PartFound
 from er3a.pipeline.stages.vision.model import PathRows, VisionResults
 from er3a.pipeline.stages.workspace import capability_section
 from er3a.pipeline.stages.workspace.entry import BoxTask
 from er3a.pipeline.stages.workspace.model import PlacementSummary, PlaceSummary, StandSummary
 from er3a.pipeline.stages.workspace.tool_capability import task_summary
-from er3a.pipeline.viewing.index import condition, first_inside, passing, proposed
+from er3a.pipeline.viewing import tray
+from er3a.pipeline.viewing.index import condition, passing, proposed
+from er3a.pipeline.viewing.tray import Meeting, first_inside
 
 TALLY = CheckTally(24)
 TURNED = ToolOff(0.0, 180.0)
@@ -181,7 +185,7 @@ def moving(kind, table, key, summary, motions) -> SimpleNamespace:
 
 
 def named(*names) -> list[SimpleNamespace]:
-    return [SimpleNamespace(name=name) for name in names]
+    return [SimpleNamespace(name=name, chosen=None) for name in names]
 
 
 @pytest.mark.parametrize("over", [False, True])
@@ -207,24 +211,67 @@ def test_the_index_names_what_passes_through_the_box_or_its_stand(over):
             )
         ),
     }
-    found = passing(stored, None)
-    assert found.targets == (("on_edge", "under") if over else ("on_edge",))
-    assert f"Targets in it or its stand: {', '.join(found.targets)}." in found.text
-    below = {"below": pytest.approx(2.75)} if over else {}
-    assert found.through == {
-        "trajectory": {"into": pytest.approx(2.75)} | below,
-        "programs": {"through": pytest.approx(2.75)},
-    }
-    assert found.text.startswith("“Box at”: ")
-    assert found.text.endswith("Not compared, or not all of it: lost, still.")
     sound = {"trajectory": ["below", "beside"], "programs": ["through", "still"]}
+    found = passing(stored, load_robot("er3a_c60"), {}, sound)
+    assert found.targets == (("on_edge", "under") if over else ("on_edge",))
+    said = found.text
+    assert said.startswith("“Meets the tray”: ")
+    assert f"Targets in it or its stand: {', '.join(found.targets)}." in said
+    enters = Meeting(pytest.approx(2.75), "tool point")
+    below = {"below": enters} if over else {}
+    assert found.through == {"trajectory": {"into": enters} | below, "programs": {"through": enters}}
+    assert said.endswith("Not compared, or not all of it: still, lost.")
     counts = f"{'1 of the 2 paths, ' if over else ''}1 of the 2 programs"
     assert f"is in the way of {counts} that pass without them" in found.short(sound)
 
 
-def test_grasps_that_pass_through_the_box_are_counted():
-    """By hand: J1 carries the flange from -60 deg to 0 in 2 s, along the chord to (350, 0, 400) mm, and enters at
-    y = -100 mm."""
+def test_a_place_that_fewer_motions_meet_is_named():
+    """The floor's is 500 mm to the side, where the tool point does not come."""
+    robot = load_robot("er3a_c60")
+    programs = SimpleNamespace(programs=named("through"))
+    stored = {
+        "workspace": placed(over=True),
+        "programs": moving(ProgramsResults, ProgramMotion, "program", programs, {"through": (0.0, 376.0)}),
+    }
+    sound = {"programs": ["through"]}
+    assert "With its centre" not in passing(stored, robot, {}, sound).short(sound)
+    placement = stored["workspace"].results.summary.placement
+    aside = replace(placement.places[0], centre_m=(0.35, 0.5, 0.4))
+    floor = StandSummary("floor", 0.0, None, None, "in_the_way", aside)
+    stored["workspace"].results.summary.placement = replace(placement, stands=(*placement.stands, floor))
+    text = passing(stored, robot, {}, sound).short(sound)
+    assert "With its centre at (350, 500, 400) mm over floor it is in the way of 0 of these." in text
+
+
+def test_the_rows_of_what_meets_the_tray_lead_to_that_moment(monkeypatch, tmp_path):
+    """First times by hand, as above; the repair of a path that is clear is compared on its own. Without a place there
+    are no marks, which is not the same as no motion in it."""
+    paths = SimpleNamespace(paths=named("into", "beside"), not_followed=())
+    paths.paths[1] = SimpleNamespace(name="beside", chosen=True, strategy="slow")
+    motions = {"into": (99.0, 424.0), "beside": (101.0, 400.0)}
+    results = moving(TrajectoryResults, PathChecks, "path", paths, motions).results
+    rows = moving(TrajectoryResults, AvoidanceRows, "path", paths, {"beside": (0.0, 400.0)}).results.avoidance
+    rows = replace(rows, strategy=np.full(3, "slow"))
+    study = SimpleNamespace(robot=lambda name: load_robot(name), scene=lambda name, stage: None)
+    folder = tmp_path / "trajectory"
+    stored = SimpleNamespace(
+        folder=folder, robot="er3a_c60", stage="trajectory", results=replace(results, avoidance=rows)
+    )
+    assert tray.in_tray(study, stored) is None
+    monkeypatch.setattr(tray, "is_computed", lambda folder: folder == tmp_path / "workspace")
+    monkeypatch.setattr(tray, "read_stage", lambda folder, stage: placed())
+    marked = tray.in_tray(study, stored)
+    assert marked.keys() == {"into", "beside, repaired"}
+    assert 'data-play="into"' in marked["into"]
+    assert "meets the tray at 2.75 s: tool point" in marked["into"]
+    elsewhere = moving(TrajectoryResults, PathChecks, "path", paths, {})
+    monkeypatch.setattr(tray, "read_stage", lambda folder, stage: elsewhere)
+    assert tray.in_tray(study, stored) is None
+
+
+def test_links_of_grasps_that_meet_the_tray_are_found_before_the_tool_point():
+    """J1 carries the flange from -60 deg to 0 in 2 s: by hand its chord enters the tray at y = -100 mm; the wrist's
+    shapes are in it before, at the time that fine sampling of the same shapes gives."""
     robot = load_robot("er3a_c60")
     down = np.array([[1.0, 0, 0, 0.35], [0, -1, 0, 0], [0, 0, -1, 0.4], [0, 0, 0, 1]])
     there = np.degrees(inverse(robot, down, np.zeros(6)).q[0])
@@ -234,10 +281,18 @@ def test_grasps_that_pass_through_the_box_are_counted():
     objects = [SimpleNamespace(name=name, outcome=outcome) for name, outcome in GRASPED.items()]
     empty = VisionResults(SimpleNamespace(objects=objects), *(None,) * 5)
     vision = SimpleNamespace(results=replace(empty, ways=ways))
-    found = passing({"workspace": placed(), "vision": vision}, robot)
-    enters = 2 * (1 - 100 / (350 * np.sin(np.radians(60))))
-    assert found.through == {"vision": {"can": pytest.approx(enters)}}
-    assert "is in the way of 1 of the 1 grasps that pass" in found.short({"vision": ["can"]})
+    sound = {"vision": ["can"]}
+    found = passing({"workspace": placed(), "vision": vision}, robot, {}, sound)
+    (place,) = tray.trays(placed().results)
+    bodies = Bodies(robot, place.scene(None))
+    t = np.linspace(0, 2, 2001)
+    rows = np.radians(q[0] + t[:, None] / 2 * (q[1] - q[0]))
+    link = t[bodies.overlaps(rows)[:, bodies.second < 0].any(axis=1).argmax()]
+    meeting = found.through["vision"]["can"]
+    assert 0 <= meeting.t - link < 0.05
+    assert link < 2 * (1 - 100 / (350 * np.sin(np.radians(60))))
+    assert meeting.body.startswith("link ")
+    assert "is in the way of 1 of the 1 grasps that pass" in found.short(sound)
 
 
 GRASPED = {"can": "grasped", "missed": "not graspable"}
@@ -256,14 +311,31 @@ def test_the_workspace_page_moves_a_box_up_or_down_only_where_no_height_is_to_be
     assert f"allow to move it by {room} mm," in text
 
 
+def test_other_heights_of_a_stand_are_told_with_what_they_have_less_of():
+    """Of three heights the lower has half the manipulability, the higher 4 deg less to a joint's limit; the task asks
+    for 2 deg."""
+    placement = placed(over=True).results.summary.placement
+    spot = replace(placement.best, limit_margin_deg=10.0, room_down_m=(0.0, 0, 0.1), room_up_m=(0.0, 0, 0.1))
+    placement = replace(placement, stands=(replace(placement.stands[0], above=spot),))
+    heights = np.array([[0.35, 0, 0.3], [0.35, 0, 0.4], [0.35, 0, 0.5], [0.0, 0, 0.4]])
+    shares, margins = np.array([0.5, 1, 1.5, 0.1]), np.array([10.0, 8, 4, 0])
+    places = SimpleNamespace(centre_m=heights, manipulability_m3=shares, limit_margin_deg=margins)
+    text = range_text(placement, places)
+    assert "manipulability 50 % of that at 275 mm, 6.0 deg from a joint limit instead of 10.0 deg" in text
+    alone = SimpleNamespace(centre_m=heights[1:2], manipulability_m3=shares[1:2], limit_margin_deg=margins[1:2])
+    assert range_text(placement, alone) == ""
+
+
 def test_without_motions_or_without_a_place_nothing_is_said_to_be_free():
-    assert passing({}, None) is None
-    alone = passing({"workspace": placed()}, None)
+    assert passing({}, None, {}, {}) is None
+    alone = passing({"workspace": placed()}, None, {}, {})
     assert (alone.short({}), alone.text) == (
-        "No path, program or grasp was compared with the place of the tray or box.",
+        "No path, program or grasp was compared with the place of the tray.",
         "",
     )
     clear = moving(
         ProgramsResults, ProgramMotion, "program", SimpleNamespace(programs=named("far")), {"far": (500.0, 0.0)}
     )
-    assert "links and the tool's body were not" in passing({"workspace": placed(), "programs": clear}, None).text
+    found = passing({"workspace": placed(), "programs": clear}, load_robot("er3a_c60"), {}, {"programs": ["far"]})
+    assert (found.through, found.short({"programs": ["far"]})) == ({"programs": {}}, "")
+    assert found.text.startswith("Neither the tool point nor a link's shape nor what is carried was found in the tray")

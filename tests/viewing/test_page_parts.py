@@ -10,12 +10,15 @@ import pytest
 
 import er3a
 from er3a.identifiability.entry_evidence import EntryEvidence
-from er3a.pipeline.results import read_stage
+from er3a.pipeline.messages.pages import Caveat
+from er3a.pipeline.messages.references import STATUS_WORDS
+from er3a.pipeline.player.motions import Fault, FaultMoment
+from er3a.pipeline.results import LeftOut, read_stage
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.validation.evidence_section import rounded_within, table_to_use
 from er3a.pipeline.study import load_study
-from er3a.pipeline.viewing.index import _PlacesOfPage, write_index
-from er3a.pipeline.viewing.page import Numbering, _box, linked
+from er3a.pipeline.viewing.index import _PlacesOfPage, _tally, write_index
+from er3a.pipeline.viewing.page import VERDICT_WORDS, Head, Numbering, _missed, _tray_edges, linked, page_environment
 from tests.conftest import ROOT
 
 CALL = re.compile(r"ui\.(picture|table)\((.*)\) \}\}")
@@ -78,7 +81,9 @@ def test_the_index_marks_each_entry_of_a_table_as_validation_found_it(small_resu
         (tmp_path / name / "validation").symlink_to(small_results("validation", name, study).resolve())
     write_index(study, tmp_path, tmp_path)
     page = (tmp_path / "index.html").read_text(encoding="utf-8")
-    legend = page.split('class="key entries"')[1].split("</p>")[0]
+    legends = {
+        name: page.split(f'id="dh-{name}"')[1].split('class="key entries"')[1].split("</p>")[0] for name in study.robots
+    }
     better = read_stage(tmp_path / "er3a_c60/validation", STAGES["validation"]).results.summary.evidence
     to_use = {each.entry: each.status for each in better.entries}
     for name in study.robots:
@@ -89,9 +94,10 @@ def test_the_index_marks_each_entry_of_a_table_as_validation_found_it(small_resu
                 rf'<td class="n (\w+)" title="[^"]*">{link}(.*?)</a>(.*?)</td>', page
             ).groups()
             alone = name == "er3a_c60_article" and "settled" in entry.status and to_use[entry.entry] == "consistent"
-            expected = "consistent" if alone else entry.status  # as in the table to use: one document alone gives it
-            assert (status, float(value.replace("−", "-"))) == (expected, round(entry.value, 3)), entry
-            assert f'<span class="{status}">' in legend
+            assert (status, float(value.replace("−", "-"))) == (entry.status, round(entry.value, 3)), entry
+            assert ("✓ one source" in rest or "(✓) one source" in rest) == alone, entry  # beside the table to use
+            assert f'<span class="{status}">' in legends[name]
+            assert f"{STATUS_WORDS[status]}" in legends[name]  # in the words of the validation page
             if status == "contradicted":
                 given, alone = re.search("→ <strong>(.*?)( one source)?</strong>", rest).groups()
                 given = float(given.replace("−", "-"))
@@ -103,16 +109,63 @@ def test_the_index_marks_each_entry_of_a_table_as_validation_found_it(small_resu
         assert re.search(rf'er3a_c60/validation.html#entry-{twin}">0</a> or 180 ', page)
     assert "alpha6 = 180 (here 0), offset6 = 180 (here 0)" in page
     assert '<a href="#dh-er3a_c60">er3a_c60</a>' in page
-    confirmed = legend.split("not confirmed")[0]
+    confirmed = " ".join(legend.split("not confirmed")[0] for legend in legends.values())
     assert set(re.findall('class="(\\w+)"', confirmed)) == {"settled", "settled_up_to_signs", "gauge"}
+    assert "one source (may contradict another table, confirms none of its own values)" in page
 
 
 def test_a_box_that_may_be_placed_is_named_where_nothing_recommends_against_it():
     study = load_study(ROOT / "config/config.yaml")
     stored = SimpleNamespace(robot="er3a_c60", rests_on={"validation": "caution"})
-    assert _box(study, stored) == "200 × 150 × 50"
+    assert _tray_edges(study, stored) == "200 × 150 × 50"
     stored.rests_on["validation"] = "fail"
-    assert _box(study, stored) == ""
+    assert _tray_edges(study, stored) == ""
+
+
+def test_what_fails_though_nothing_expects_it_is_named_beside_the_count():
+    def fault(name: str, meant: bool) -> Fault:
+        return Fault(name, "", "fail", "collides", meant, "", (FaultMoment("x"),), "", "trajectory.html")
+
+    meant = [fault(f"m{k}", True) for k in range(2)]
+    assert _tally("trajectory", 5, meant, 0) == "5 of 7 paths pass in the model; the other 2 are expected to fail"
+    assert _tally("trajectory", 5, meant[:1], 0).endswith("; the other one is expected to fail")
+    assert _tally("programs", 3, [], 0) == "3 of 3 programs pass in the model"
+    others = [fault(f"o{k}", False) for k in range(5)]
+    assert _tally("trajectory", 1, [*meant, *others], 1) == (
+        "1 of 9 paths pass in the model; 2 expected to fail; o0: collides; o1: collides; o2: collides; "
+        "2 more do not pass; 1 not followed to the end"
+    )
+
+
+@pytest.mark.parametrize(
+    ("status", "demonstrations", "foundation", "sign"),
+    [
+        ("pass", 0, "pass", "pass"),
+        ("pass", 7, "caution", "pass as_meant"),
+        ("caution", 7, "pass", "caution"),
+        ("pass", 7, "fail", "no_verdict"),
+        ("not_computed", 0, "fail", "not_computed"),
+    ],
+)
+def test_a_stage_has_one_sign_on_all_pages(status, demonstrations, foundation, sign):
+    caveats = {"validation": Caveat(foundation, "read this")} if foundation != "pass" else {}
+    head = Head("arm", "trajectory", status, "", (), None, caveats, demonstrations, None)
+    assert head.sign == sign
+    badge = (
+        page_environment()
+        .from_string('{% import "macros.html.j2" as ui %}{{ ui.stage_badge(head, words) }}')
+        .render(head=head, words=VERDICT_WORDS)
+    )
+    assert f'class="badge {sign}"' in badge
+    assert ("no verdict" in badge) == (sign == "no_verdict")
+    assert ("7 expected to fail" in badge) == (demonstrations > 0 and sign != "no_verdict")
+
+
+def test_what_another_page_examines_is_named_only_where_that_page_is():
+    torques = LeftOut("torques")
+    assert _missed(torques, ("dynamics",))[1] == '<a href="dynamics.html">dynamics</a>'
+    assert _missed(torques, ("trajectory",))[1] == "not examined in this study"
+    assert _missed(torques, None)[1] == ""
 
 
 def test_a_place_of_what_was_not_examined_says_so_in_the_search():

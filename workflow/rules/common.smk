@@ -159,8 +159,12 @@ def viewed(wildcards):
 
 
 def rests_on(wildcards):
-    """Input function: the verdicts that a stage's page says first, and those on tables to use instead of the robot's."""
+    """Input function: the verdicts that a stage's page says first, and those on tables to use instead of the robot's.
+
+    Of stages that it shows besides, the results, if the run makes them.
+    """
     others = [stage for stage in STAGES[wildcards.stage].rests_on if stage in STUDY.stages(wildcards.robot)]
+    others += [stage for stage in STAGES[wildcards.stage].shows if is_asked(wildcards.robot, stage)]
     tables = STUDY.other_tables(wildcards.robot) if wildcards.stage == "validation" else []
     return [
         *(f"results/{wildcards.robot}/{stage}/summary.json" for stage in others),

@@ -13,11 +13,11 @@ from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Sphere
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages import left_out  # noqa: F401
 from er3a.pipeline.messages.language import N_, own_title, tr
-from er3a.pipeline.messages.say import Plural, joined, listed, say, say_as, sentence, texts, word
+from er3a.pipeline.messages.say import Plural, by, joined, listed, say, say_as, sentence, texts, word
 from er3a.pipeline.stages.collision.model import BaseInSolid, FreeSpace, HomeCollides, NeverFree, ShapesOverlap
 
 NAMED = 3
-FIGURES = {
+KEY_FIGURES = {
     "free_of_collisions": N_("Collision-free joint space"),
     "free_of_itself": N_("Free of self-collision"),
     "free_of_scene": N_("Free of collisions with the scene"),
@@ -93,7 +93,7 @@ TEXTS = texts(
             "The chosen solutions of {count} targets are clear by {nearest} or more.",
         ),
         "nearest_target": "{clearance_mm:.1f} mm ({name}, {pair})",
-        "colliding_path": "{name} ({pair})",
+        "colliding_path": by("expected", true="{name} ({pair}; as expected)", false="{name} ({pair}; not expected)"),
         "collision.free_space#paths": Plural(
             "colliding", "{count} path collides: {colliding:, }.", "{count} paths collide: {colliding:, }."
         ),
@@ -220,18 +220,22 @@ def why(
     match state:
         case "never" if assumed:
             return tr(
-                "The assumed shapes are at least {least:.1f} mm apart in every pose ({boxes} boxes).",
+                "The assumed shapes are at least {least:.1f} mm apart in every pose ({boxes} ranges of joint values).",
                 least=least_mm,
                 boxes=boxes,
             )
         case "never":
             return tr(
-                "At least {least:.1f} mm apart in every pose; proven with {boxes} boxes.", least=least_mm, boxes=boxes
+                "At least {least:.1f} mm apart in every pose; proven over {boxes} ranges of joint values.",
+                least=least_mm,
+                boxes=boxes,
             )
         case "allowed" | "watched":
             return tr("Decided in the robot or scene file: {reason}", reason=own_title(reason))
         case "undecided":
-            return tr("Neither proven apart nor found to collide, in {boxes} boxes; checked.", boxes=boxes)
+            return tr(
+                "Neither proven apart nor found to collide, in {boxes} ranges of joint values; checked.", boxes=boxes
+            )
         case "overlaps":
             return tr(
                 "Their shapes overlap in every joint vector tried ({count}), and no joint explains it: correct the "

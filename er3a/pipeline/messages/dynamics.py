@@ -40,7 +40,7 @@ NEEDS: dict[model.Need, str] = {
     "load_inertia": N_("inertia of tool or payload"),
 }
 names_in_words("load", "dynamics.need", NEEDS)
-FIGURES = {
+KEY_FIGURES = {
     "paths": N_("Paths that count"),
     "mass": N_("Mass of the links"),
     "peak_torque": N_("Greatest torque on a path that the model does not rule out"),

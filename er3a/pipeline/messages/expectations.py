@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.say import Plural, joined, listed, say, say_as, sentence, texts, word
-from er3a.pipeline.stages.expectations import Demonstration, Outcome, UnmetExpectation
+from er3a.pipeline.stages.expectations import (
+    Demonstration,
+    Judged,
+    Outcome,
+    UnmetExpectation,
+    came_to,
+    expected_of,
+    is_met,
+)
 
 OUTCOMES: dict[Outcome, str] = {
     "unreachable": N_("unreachable"),
@@ -36,6 +46,9 @@ TEXTS = texts(
         "demonstrations": "{count} expected to fail, and did: {named}",
         "demonstrations#alone": "{count} expected to fail, and did: {named}; nothing else is given to be judged",
         "demonstration": "{name} ({outcome})",
+        "as_expected": "as expected",
+        "as_expected#partly": "{expected}: as expected; {other}: not expected",
+        "as_expected#not": "not as expected",
         "unmet_expectation": "{name} ({found}; expected: {expected})",
     }
 )
@@ -44,6 +57,22 @@ TEXTS = texts(
 def outcome_word(outcome: Outcome) -> str:
     """What a target or a path came to, in words."""
     return word("trajectory.path", OUTCOMES, outcome)
+
+
+def outcome_words(outcomes: Iterable[Outcome]) -> str:
+    """All that one came to."""
+    return joined(map(outcome_word, outcomes), ", ")
+
+
+def as_expected(judged: Judged) -> str:
+    """Whether one came to what its file expects, or to what else; empty where it expects nothing."""
+    expected, found = expected_of(judged), came_to(judged)
+    if not expected or is_met(judged):
+        return sentence("as_expected") if expected else ""
+    if set(expected) < set(found):
+        other = [outcome for outcome in found if outcome not in expected]
+        return sentence("as_expected#partly", expected=outcome_words(expected), other=outcome_words(other))
+    return sentence("as_expected#not")
 
 
 def demonstrated(shown: tuple[Demonstration, ...], asked: int) -> str:
@@ -56,9 +85,9 @@ def demonstrated(shown: tuple[Demonstration, ...], asked: int) -> str:
 
 @say.register
 def _(found: Demonstration) -> str:
-    return say_as(found, outcome=joined(map(outcome_word, found.found), ", "))
+    return say_as(found, outcome=outcome_words(found.found))
 
 
 @say.register
 def _(found: UnmetExpectation) -> str:
-    return say_as(found, found=outcome_word(found.found), expected=outcome_word(found.expected))
+    return say_as(found, found=outcome_words(found.found), expected=outcome_words(found.expected))

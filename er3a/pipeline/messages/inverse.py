@@ -22,7 +22,7 @@ from er3a.robots.joint_limits import CombinationExceeded, Exceeded, LimitsExceed
 
 NAMED = 3
 names_in_words("rules", "rule", RULE_NAMES)
-FIGURES = {
+KEY_FIGURES = {
     "targets_solved": N_("targets solved"),
     "solutions_of_random_pose": N_("solutions of a random reachable pose, mean"),
     "random_poses_solved_back": N_("random poses solved back to their joints"),

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import gettext
 import io
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from numbers import Real
 from pathlib import Path
@@ -108,6 +108,13 @@ def as_number(text: str) -> str:
     if digits.isdecimal() and len(digits) > 4:
         whole = whole.removesuffix(digits) + f"{int(digits):,}".replace(",", "\u202f")
     return (whole + point + rest).replace("-", "−")
+
+
+def alike(values: Iterable[float], most: int = 3) -> list[str]:
+    """Numbers with equally many decimals: as few as show each of them to ``most``."""
+    exact = [f"{value:.{most}f}" for value in values]
+    decimals = max((len(text.rstrip("0").partition(".")[2]) for text in exact), default=0)
+    return [as_text(float(text) + 0.0, f".{decimals}f") for text in exact]
 
 
 def with_unit(value: str, unit: str, gap: str = " ") -> str:

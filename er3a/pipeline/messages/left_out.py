@@ -48,7 +48,7 @@ TEXTS = texts(
             "the joints' real accelerations: no document gives them, so accelerations are assumed"
         ),
         "left_out.jerk": "jerk: no limit is given",
-        "left_out.torques": "torques, payload and deflection of the arm (torques and payload: see the stage dynamics)",
+        "left_out.torques": "torques, payload and deflection of the arm",
         "left_out.paths": "paths that were not followed to their end",
         "left_out.path_stretches": "stretches that the computed bounds can't decide",
         "left_out.strategies": "avoidance strategies that the study does not ask for",
@@ -146,21 +146,22 @@ TEXTS = texts(
         "left_out.area": "the area that the tool point reaches, or one of its bounds",
         "left_out.sampled_voids": "whether {amount:.0f} voids that are known from samples only are empty",
         "left_out.tool_directions": "tool directions between the {amount:,.0f} that were asked in each cell",
-        "left_out.capability": "tool directions, and where a box can stand",
+        "left_out.capability": "tool directions, and where a tray can stand",
         "left_out.core": "where the tool reaches all directions",
         "left_out.undecided_core": "{amount:.3g} L of which it is undecided whether the tool reaches all directions",
-        "left_out.places": "where the box can stand: a pose takes too long with this arm",
+        "left_out.places": "where the tray can stand: a pose takes too long with this arm",
         "left_out.sampled_places": (
-            "points and directions between those asked, at {amount:,.0f} places for the box that pass by samples only"
+            "points and directions between those asked, at {amount:,.0f} places for the tray that pass by samples only"
         ),
-        "left_out.between_places": "places for the box between grid points {amount:.0f} mm apart",
+        "left_out.between_places": "places for the tray between grid points {amount:.0f} mm apart",
         "left_out.base_contacts": "whether the base is mounted where it overlaps these solids, as is assumed",
         "left_out.base_inside": "collisions of the base, whose middle lies in these solids: scene or base is misplaced",
         "left_out.box_directions": (
-            "directions of the box's cone: the arm's joints don't set them all, and those that they don't are not asked"
+            "directions of the tray's cone: the arm's joints don't set them all, and those that they don't are not "
+            "asked"
         ),
         "left_out.placed_box": (
-            "collisions with the box where it is placed, or with its stand: no path, program or target was checked "
+            "collisions with the tray where it is placed, or with its stand: no path, program or target was checked "
             "with them"
         ),
     }

@@ -59,6 +59,10 @@ GROUP_NAMES = {  # of a robot file
 }
 GLOSSARY = {
     N_("branch"): N_("one choice of shoulder, elbow and wrist among the joint angles that bring the tool to a pose"),
+    N_("branch and bound"): N_(
+        "a search that divides what is possible and drops the parts that bounds exclude, until the rest is small; not "
+        "the arm's branches"
+    ),
     N_("self-motion"): N_("a continuum of solutions: joints that move while the tool stays on its target"),
     N_("arm angle"): N_("where the elbow of an arm with spherical shoulder and wrist is on its circle"),
     N_("cuspidal"): N_("of an arm that can change between solutions of a pose without passing a singularity"),
@@ -92,6 +96,10 @@ GLOSSARY = {
     N_("claim"): N_("what an article says; shown, but no verdict rests on it"),
     N_("margin"): N_("how far something is from a limit, in its unit"),
     N_("capability"): N_("what the tool can do at a place: share of directions, solutions, dexterity"),
+    N_("tray"): N_(
+        "the space, as of a bin or of a pallet's load, for which the workspace page looks for a place: the tool has to "
+        "reach every point of it"
+    ),
     N_("void"): N_("a region that the tool point can't reach: enclosed, or an open pocket"),
     N_("undecided"): N_("what the computed bounds can't decide; never called safe"),
     N_("allowed collision matrix"): N_(

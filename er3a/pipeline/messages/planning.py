@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import er3a.pipeline.messages.kinematics  # noqa: F401
 from er3a.pipeline.messages.language import N_, as_text, tr
-from er3a.pipeline.messages.say import by, joined, listed, say, say_as, texts, word
+from er3a.pipeline.messages.say import by, joined, listed, say, say_as, sentence, texts, word
 from er3a.planning.motion_faults import (
     AccelerationTooGreat,
     AccelerationTooGreatIfAssumed,
     JerkTooGreat,
+    NeededAcceleration,
     PathOutOfReach,
+    RateCause,
     TooFast,
     TooFastIfAssumed,
 )
@@ -79,6 +81,7 @@ TEXTS = texts(
         ),
         "jerk_too_great#needed": "J{joint} would need {needed:.0f} {unit}/s³; its jerk limit is {able:g} {unit}/s³",
         "jerk_too_great#step": "J{joint}'s acceleration has a step; its jerk limit is {able:g} {unit}/s³",
+        "rate_needed": "J{joint} needs {needed} of {limit:g} {unit}",
         "undecided": "the bounds can't decide {what}",
     }
 )
@@ -96,12 +99,11 @@ def _(found: TooFast | TooFastIfAssumed) -> str:
 
 @say.register
 def _(found: AccelerationTooGreat | AccelerationTooGreatIfAssumed) -> str:
-    needed = (
-        as_text(found.needed_deg_s2, ".0f")
-        if found.needed_deg_s2 < MAX_SHOWN
-        else tr("more than {most}", most=as_text(MAX_SHOWN, ".0f"))
-    )
-    return say_as(found, unit=unit_of(found.slides), needed=needed)
+    return say_as(found, unit=unit_of(found.slides), needed=_shown(found.needed_deg_s2))
+
+
+def _shown(needed: float) -> str:
+    return as_text(needed, ".0f") if needed < MAX_SHOWN else tr("more than {most}", most=as_text(MAX_SHOWN, ".0f"))
 
 
 @say.register
@@ -111,6 +113,19 @@ def _(found: JerkTooGreat) -> str:
         return say_as(found, "step", **values)
     needed = found.needed_deg_s3
     return say_as(found, "needed", needed=needed, **values)
+
+
+def rate_needed(cause: RateCause) -> str:
+    """What a joint needs of what it has, in few words."""
+    match cause:
+        case JerkTooGreat():
+            return say(cause)
+        case NeededAcceleration():
+            needed, limit, per = cause.needed_deg_s2, cause.limit_deg_s2, "/s²"
+        case _:
+            needed, limit, per = cause.needed_deg_s, cause.limit_deg_s, "/s"
+    unit = unit_of(cause.slides) + per
+    return sentence("rate_needed", joint=cause.joint, needed=_shown(needed), limit=limit, unit=unit)
 
 
 OPEN: dict[Quantity, str] = {

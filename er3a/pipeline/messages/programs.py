@@ -12,7 +12,7 @@ from er3a.collision.pairs import LinkAndSolid
 from er3a.kinematics.singularity import SingularityType
 from er3a.pipeline.messages.expectations import demonstrated, outcome_word
 from er3a.pipeline.messages.kinematics import branch_word, singularity_word
-from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.messages.language import N_, alike, tr
 from er3a.pipeline.messages.planning import unit_of
 from er3a.pipeline.messages.say import Plural, by, joined, listed, say, say_as, sentence, texts, word
 from er3a.pipeline.stages.programs.model import FindingAt, ProgramCounts, ProgramSummary
@@ -93,6 +93,10 @@ REMEDIES: dict[str, str] = {
     "frame_taken_as_flange": N_(
         "Map the name to a frame under frames in the file that lists the programs, if a tool is mounted."
     ),
+    "frame_of_several": N_(
+        "Give the index in the program, or check it once with each frame that the index may choose."
+    ),
+    "tool_stated_elsewhere": N_("Make the table anew for this arm and its tool, or leave its pose columns out."),
     "frames_in_doubt": N_("Set tool and base after it, or remove it."),
     "way_not_known": N_("Give start_deg of the program, or mend the motion before."),
     "not_come_to": FURTHER,
@@ -130,7 +134,7 @@ STAYS_MM = 1.0  # that a tool moves when it stays where it is
 Pace = TooFast | FasterThanAssumed | AccelerationTooGreat | AcceleratesMoreThanAssumed
 PACED = get_args(Pace)
 MAX_PAIRS = 3  # that are named of a collision
-FIGURES = {
+KEY_FIGURES = {
     "programs_passed": N_("Programs that pass, of those meant to"),
     "instructions_passed": N_("Motion instructions that pass, of programs meant to pass"),
     "instructions_caution": N_("Motion instructions with caution, of programs meant to pass"),
@@ -151,6 +155,15 @@ TEXTS = texts(
             "frame",
             base="the base {name} is not given; map it to a frame",
             tool="the tool {name} is not given; map it to a frame",
+        ),
+        "frame_of_several": by(
+            "frame",
+            tool="the index in {name} is not known; one tool was given for every value of it",
+            base="the index in {name} is not known; one base was given for every value of it",
+        ),
+        "tool_stated_elsewhere": (
+            "the table says that the tool is {moved_mm:.1f} mm and {turned_deg:.2f} deg from where its joints put it; "
+            "the joints were taken"
         ),
         "frame_taken_as_flange": "{name} is not given; the flange was taken for it",
         "frames_in_doubt": (
@@ -229,7 +242,11 @@ TEXTS = texts(
         "target_not_given": "the target is not known: {reason}",
         "target_out_of_reach": "the target is out of reach: {reasons:; }",
         "target_out_of_reach.bare": "the target is out of reach",
+        "target_out_of_reach.carried": "the target is out of reach while the external axes rest",
         "way_out_of_reach": "out of reach after {at_mm:.1f} mm; at worst, {reasons}",
+        "way_out_of_reach.carried": (
+            "out of reach after {at_mm:.1f} mm while the external axes rest; at worst, {reasons}"
+        ),
         "configuration_ends": (
             "the configuration ends after {at_mm:.1f} mm: J{joint} would have to jump by {angle_deg:.1f} {unit}"
         ),
@@ -417,6 +434,8 @@ def _(found: found_in.TargetNotGiven) -> str:
 
 @say.register
 def _(found: found_in.TargetOutOfReach) -> str:
+    if found.carried:
+        return sentence("target_out_of_reach.carried")
     if not found.reasons:
         return sentence("target_out_of_reach.bare")
     return say_as(found)
@@ -425,6 +444,8 @@ def _(found: found_in.TargetOutOfReach) -> str:
 @say.register
 def _(found: found_in.StretchOutOfReach) -> str:
     reasons = joined(listed(found.reasons))
+    if found.carried:
+        return sentence("way_out_of_reach.carried", at_mm=found.at_mm, reasons=reasons)
     return say_as(found, reasons=reasons)
 
 
@@ -576,7 +597,7 @@ def remedy_at(finding: CheckFinding, joint_moves: Sequence[Sequence[float]]) -> 
     """What to do about a finding: ``joint_moves`` (deg) that pass, or else what mends it and was not tried here."""
     if not joint_moves:
         return remedy(finding)
-    *via, end = [", ".join(f"{value:g}" for value in row) for row in joint_moves]
+    *via, end = [", ".join(alike(row)) for row in joint_moves]
     if via:
         return sentence("remedy.joint_moves", via=via[0], end=end)
     return sentence("remedy.joint_move", end=end)

@@ -51,7 +51,10 @@ STATUS_MEANINGS = {
         "tolerance"
     ),
     "contradicted": N_("don't use it: the evidence excludes the value"),
-    "consistent": N_("check it on the arm: only the table's own source gives it"),
+    "consistent": N_(
+        "check it on the arm: only the table's own source gives it, which may contradict another table, but confirms "
+        "none of its own values"
+    ),
     "open": N_("measure it: no document distinguishes it from another value that moves the tool"),
     "gauge": N_(
         "keep it: another value, with other entries changed to match, describes the same robot; only their sum counts"
@@ -85,12 +88,12 @@ TEXTS = texts(
         "motion#right": "the {point} moves to the right",
         "motion#forward": "the {point} moves forward",
         "motion#back": "the {point} moves back",
-        "motion#tilts_up": "the tool tilts up",
-        "motion#tilts_down": "the tool tilts down",
-        "motion#tilts_left": "the tool tilts to the left",
-        "motion#tilts_right": "the tool tilts to the right",
-        "motion#tilts_forward": "the tool tilts forward",
-        "motion#tilts_back": "the tool tilts back",
+        "motion#tilts_up": "the way the flange faces (its z axis) tilts up",
+        "motion#tilts_down": "the way the flange faces (its z axis) tilts down",
+        "motion#tilts_left": "the way the flange faces (its z axis) tilts to the left",
+        "motion#tilts_right": "the way the flange faces (its z axis) tilts to the right",
+        "motion#tilts_forward": "the way the flange faces (its z axis) tilts forward",
+        "motion#tilts_back": "the way the flange faces (its z axis) tilts back",
         "motion#clockwise_looking_up": "the flange (mark it) turns clockwise as seen looking up",
         "motion#clockwise_looking_down": "the flange (mark it) turns clockwise as seen looking down",
         "motion#clockwise_looking_left": "the flange (mark it) turns clockwise as seen looking left",

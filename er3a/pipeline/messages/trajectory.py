@@ -4,22 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.pairs import LinkAndSolid
 from er3a.pipeline.messages.expectations import demonstrated, outcome_word
 from er3a.pipeline.messages.kinematics import singularity_word
-from er3a.pipeline.messages.language import N_, with_unit
+from er3a.pipeline.messages.language import N_, as_text, with_unit
 from er3a.pipeline.messages.left_out import names_in_words
 from er3a.pipeline.messages.planning import STRATEGIES as ADVICE
+from er3a.pipeline.messages.planning import rate_needed
 from er3a.pipeline.messages.say import Plural, joined, listed, say, say_first, sentence, texts, word
 from er3a.pipeline.stages.trajectory import model
 from er3a.planning.motion_faults import JerkTooGreat, RateCause
 from er3a.planning.names import PathVerdict, StrategyName
 
-FIGURES = {
-    "safe": N_("Safe paths, of those meant to be safe"),
+KEY_FIGURES = {
+    "safe": N_("Paths that pass in the model, of those meant to"),
     "singular_poses": N_("Singular poses met, on paths meant to be safe (joint moves pass them unharmed)"),
     "near_passes": N_("Near-singular passes, on paths meant to be safe"),
     "colliding": N_("Paths with a collision, of those meant to be safe"),
@@ -54,6 +56,8 @@ NO_DEVIATION = 0.005  # mm or deg
 NO_TIME = 0.005  # s
 AT_EDGE = 1e-3  # s, before the edge of the reach, where the arm is stretched
 MOMENT = 0.001  # s
+LEAST_CHANGE = 0.5  # deg or mm
+ADJOINING = 0.05  # s, between stretches that are told as one
 FULL_SPEED = 0.995  # of a joint's limit, which rounds to 100 %
 WHOLE = 10.0  # from which on numbers are rounded to whole ones
 IF_ASSUMED = "_if_assumed"  # ends the codes of faults against assumed limits
@@ -95,14 +99,22 @@ TEXTS = texts(
         "bodies_overlap.more": "{touches}; and more later",
         "path.either_way": "{open}; the path is not safe in either case",
         "path.singular": "{type} singularity",
-        "path.too_fast_until": "until t = {end:.4g} s {cause}",
+        "path.rates": Plural(
+            "joints",
+            "{named} exceeds {limits} until t = {end:.4g} s: {worst:; }",
+            "{named} exceed {limits} until t = {end:.4g} s: {worst:; }",
+        ),
+        "path.rates#known": "the known limits",
+        "path.rates#assumed": "the assumed limits",
+        "path.rate": "at worst {needed} at t = {t:.4g} s",
+        "path.rates#again": "{rates}; and again from t = {again:.4g} s",
         "advice.out_of_reach": "it is out of reach {when}",
         "advice.only": "{way}, as the study requires, does not repair it: {reason}",
         "advice.none": "No avoidance strategy completes this path: {why}",
         "advice.no_strategy": "No avoidance strategy works: {reason}",
         "advice.slower": (
-            "If its speed can't vary along the path, run all of it at {percent:.3g} % of that: duration_s "
-            "{needed:.4g} in the path file"
+            "If its speed can't vary along the path, run all of it at {percent:.3g} % of the programmed speed: "
+            "duration_s {needed:.4g} in the path file"
         ),
         "advice.clear_until": (
             "It keeps {margin:.1f} mm of clearance up to t = {t:.4g} s ({far:.1f} mm) and in a stop from there "
@@ -163,6 +175,11 @@ TEXTS = texts(
         "advice.tool#far": "the tool leaves the path by {far} mm",
         "advice.tool#turned": "the tool leaves the path by {turned} deg",
         "advice.swing": "{tool}; J{joint} turns most, by {swing:.0f} deg",
+        "advice.switch#before": (
+            "It begins at other joint angles than programmed ({changes}): the way there is not part of it and was not "
+            "checked"
+        ),
+        "advice.switch#within": "The move to the other solution is part of it and was checked",
         "advice.time#less": "{takes:.2f} s instead of {programmed:.2f} s",
         "advice.time#same": "same time as programmed",
         "advice.time#slower_there": "same time as programmed, slower there and faster elsewhere",
@@ -251,7 +268,7 @@ def _apart_from_collisions(path: model.PathSummary) -> str:
     if faults := path.out_of_limits or _first_and_worst(path.too_fast):
         return joined([*map(say, faults), *map(say, path.singularities), _at_another_pace(path)])
     if path.undecided:
-        return joined([*map(say, path.undecided), *map(say, path.singularities)])
+        return joined([*map(say, adjoined(path.undecided)), *map(say, path.singularities)])
     met = [say(event) for event in path.singularities if event.crossing]
     if path.in_joint_space:
         if not met:
@@ -343,11 +360,9 @@ def first_faults(path: model.PathSummary) -> list[tuple[float, str]]:
     fault. What is undecided counts only where it comes before all that is not."""
     fast = [[part for part in path.too_fast if part.cause.code.endswith(IF_ASSUMED) is each] for each in (False, True)]
     grave: list[Sequence[model.Stretch[Any]]] = [path.unreachable, path.out_of_limits, path.collisions]
-    firsts = [min(each, key=lambda part: part.t0_s) for each in (*grave, *fast) if each]
-    found = [
-        (part.t0_s, _until_when(part) if part in path.too_fast else _with_worst(part, say_first(part.cause)))
-        for part in firsts
-    ]
+    firsts = [min(each, key=lambda part: part.t0_s) for each in grave if each]
+    found = [(part.t0_s, _with_worst(part, say_first(part.cause))) for part in firsts]
+    found += [(min(part.t0_s for part in each), _rates(each)) for each in fast if each]
     edge = min((part.t0_s for part in path.unreachable), default=math.inf) - AT_EDGE
     events = [] if path.in_joint_space else [each for each in path.singularities if each.crossing and each.t_s < edge]
     found += [(event.t_s, sentence("path.singular", type=event_word(event))) for event in events[:1]]
@@ -358,10 +373,52 @@ def first_faults(path: model.PathSummary) -> list[tuple[float, str]]:
     return sorted({*found[: max(1, sum(map(bool, grave)))], *sorted(found)[:1]})
 
 
-def _until_when(part: model.Stretch[RateCause]) -> str:
-    """What is too fast, and until when where that is not but a moment: its figure is the greatest of the stretch."""
-    cause = _with_worst(part, say(part.cause))
-    return sentence("path.too_fast_until", cause=cause, end=part.t1_s) if _lasts(part) else cause
+def adjoined(stretches: Sequence[model.Stretch[Any]]) -> list[model.Stretch[Any]]:
+    """Stretches in order of time, those of one cause that adjoin as one."""
+    found: list[model.Stretch[Any]] = []
+    for part in sorted(stretches, key=lambda part: part.t0_s):
+        k = next((k for k, each in enumerate(found) if each.cause == part.cause), None)
+        if k is not None and part.t0_s <= found[k].t1_s + ADJOINING:
+            found[k] = replace(found[k], t1_s=max(found[k].t1_s, part.t1_s), s1_m=max(found[k].s1_m, part.s1_m))
+        else:
+            found.insert(0, part)
+    return sorted(found, key=lambda part: part.t0_s)
+
+
+def _rates(stretches: Sequence[model.Stretch[RateCause]]) -> str:
+    """What is too fast first, of all joints: stretches that adjoin are one, and each kind of limit has its worst."""
+    first, *later = sorted(stretches, key=lambda part: part.t0_s)
+    run = [first]
+    end, again = first.t1_s, None
+    for part in later:
+        if part.t0_s > end + ADJOINING:
+            again = part.t0_s
+            break
+        run.append(part)
+        end = max(end, part.t1_s)
+    if len(run) == 1 and not _lasts(first):
+        return say(first.cause)
+    kinds = dict.fromkeys((part.cause.code, part.cause.slides) for part in run)
+    worst = [
+        max((part for part in run if (part.cause.code, part.cause.slides) == kind), key=lambda part: part.cause.ratio)
+        for kind in sorted(kinds, key=lambda kind: not kind[0].startswith("too_fast"))
+    ]
+    joints = sorted({part.cause.joint for part in run})
+    limits = "path.rates#assumed" if first.cause.code.endswith(IF_ASSUMED) else "path.rates#known"
+    rates = sentence(
+        "path.rates",
+        joints=joints,
+        named=", ".join(f"J{joint}" for joint in joints),
+        limits=sentence(limits),
+        end=end,
+        worst=tuple(map(_worst_rate, worst)),
+    )
+    return rates if again is None else sentence("path.rates#again", rates=rates, again=again)
+
+
+def _worst_rate(part: model.Stretch[RateCause]) -> str:
+    needed = rate_needed(part.cause)
+    return needed if part.worst_s is None else sentence("path.rate", needed=needed, t=part.worst_s)
 
 
 def _with_worst(part: model.Stretch[Any], cause: str) -> str:
@@ -467,7 +524,7 @@ def _clear(path: model.PathSummary) -> str:
 
 
 def _numbers(values: tuple[float, ...], digits: int) -> str:
-    return ", ".join(f"{value + 0.0:.{digits}f}" for value in values)
+    return ", ".join(as_text(value + 0.0, f".{digits}f") for value in values)
 
 
 def reasons(tried: model.TriedStrategy) -> str:
@@ -544,6 +601,18 @@ def _leaves(far_mm: float, turned_deg: float) -> str:
 
 def _shortly(value: float) -> str:
     return f"{value:.2g}" if value < WHOLE else f"{value:.0f}"
+
+
+def switch_text(change: Sequence[float], sliding: Sequence[int]) -> str:
+    """Whether the move to another IK solution is part of the motion that takes it, and how far it is if not.
+
+    ``change``: of each joint between the programmed start and the motion's, deg, mm where it is one of ``sliding``.
+    """
+    moved = [(joint, value) for joint, value in enumerate(change, 1) if abs(value) >= LEAST_CHANGE]
+    if not moved:
+        return sentence("advice.switch#within")
+    parts = (with_unit(f"J{j} {as_text(value, '+.0f')}", "mm" if j in sliding else "deg") for j, value in moved)
+    return sentence("advice.switch#before", changes=joined(parts, ", "))
 
 
 def _takes(takes_s: float, programmed_s: float, strategy: StrategyName) -> str:

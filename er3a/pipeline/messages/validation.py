@@ -48,7 +48,7 @@ SELF_CHECKS = {
     "orientation_error": N_("worst orientation error"),
 }
 DATA_GRADES = {"official": N_("official"), "measured": N_("measured"), "cad": N_("CAD"), "export": N_("exported")}
-FIGURES = {
+KEY_FIGURES = {
     "independent_checks": N_("Independent checks passed"),
     "consistency_checks": N_("Consistency checks passed"),
     "zero_pose_flange_error": N_("Zero pose: flange off the documents by"),

@@ -90,7 +90,7 @@ NO_CORRECTIONS = {
     "few": N_("too few samples for corrections to the table"),
     "steps": N_("no corrections to the table fit: it has a gross fault or belongs to another arm"),
 }
-FIGURES = {
+KEY_FIGURES = {
     "samples_used": N_("samples used"),
     "position_half_width": N_("camera's position, largest half-width (95 %)"),
     "rotation_half_width": N_("camera's rotation, largest half-width (95 %)"),

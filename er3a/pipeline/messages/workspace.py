@@ -22,7 +22,7 @@ from er3a.workspace.causes import (
     VoidCause,
 )
 
-FIGURES = {
+KEY_FIGURES = {
     "greatest_reach": N_("greatest reach from axis 1"),
     "enclosed_voids_lower": N_("enclosed voids, at least"),
     "volume": N_("reached volume"),
@@ -76,8 +76,8 @@ TEXTS = texts(
             "proof, and the samples can't tell."
         ),
         "workspace.void_at_shoulder": (
-            "An enclosed void of at least {litres:.3g} L surrounds the shoulder at ({x}, {y}, {z}) mm: the arm can't "
-            "fold far enough to reach it. There is no other enclosed void that would hint at a wrong "
+            "An enclosed void of at least {litres:.3g} L, centred at ({x}, {y}, {z}) mm, surrounds the shoulder: the "
+            "arm can't fold far enough to reach it. There is no other enclosed void that would hint at a wrong "
             "limit; this confirms none."
         ),
         "workspace.no_void#sampled": "The samples leave no enclosed void inside the hull; no proof.",
@@ -143,18 +143,18 @@ TEXTS = texts(
         ),
         "workspace.placement_too_long": (
             "Not computed: a pose takes milliseconds with this arm, and within seconds only points wider apart than "
-            "the box could be asked. A larger box or a narrower cone may do."
+            "the tray could be asked. A larger tray or a narrower cone may do."
         ),
         "stand.fits": "On {name}: centre at ({centre}) mm; {reached}.",
         "stand.too_low": "Not on {name}: at {height} mm it is lower than the {lowest} mm that the task allows.",
         "stand.too_small": "Not on {name}: there is no room for it.",
-        "stand.out_of_reach": "Not on {name}: nowhere on it does the tool reach all of the box.",
+        "stand.out_of_reach": "Not on {name}: nowhere on it does the tool reach all of the tray.",
         "stand.in_the_way": (
-            "Not on {name} itself: an arm that reaches all of the box comes within {margin} mm of the scene or of "
+            "Not on {name} itself: an arm that reaches all of the tray comes within {margin} mm of the scene or of "
             "itself."
         ),
         "stand.between": (
-            "On a stand {gap} mm high ({least} to {most} mm pass the same checks, nearer to a singular pose) on {name}"
+            "On a stand {gap} mm high ({least} to {most} mm pass the same checks with less to spare) on {name}"
             ": centre at ({centre}) mm."
         ),
         "void.shoulder": (
@@ -184,27 +184,30 @@ TEXTS = texts(
         ),
         "box.size#turned": "{box} mm, turned by 90 deg (x, y, z: {xyz} mm)",
         "box.size#as_given": "{box} mm (x, y, z)",
-        "box.contradicted": "No place for the box is recommended: evidence contradicts this table.",
-        "box.unknown": "Box of {box} mm: {why}",
-        "box.nowhere": "Box of {box} mm: no place was found where the tool reaches all of it.",
+        "box.contradicted": "No place for the tray is recommended: evidence contradicts this table.",
+        "box.unknown": "Tray of {box} mm: {why}",
+        "box.nowhere": "Tray of {box} mm: no place was found where the tool reaches all of it.",
         "box.put#on": (
-            "Planning only: the box on {name}, its centre at ({centre}) mm. Box: {box}; {reached}. No path or program "
-            "was checked with it: before you run any there, put the box into the study's scene file and run again."
+            "Planning only: the tray on {name}, its centre at ({centre}) mm. Tray: {box}; {reached}. No path or "
+            "program was checked with it: before you run any there, put it into the study's scene file as a box and "
+            "run again."
         ),
         "box.put#over": (
-            "Planning only: the box on a stand {gap} mm high on {name} (top at z = {height} mm), its centre at "
-            "({centre}) mm. Box: {box}; {reached}. No place directly on {none} works. No path or program was checked "
-            "with them: before you run any there, put both into the study's scene file and run again."
+            "Planning only: the tray on a stand {gap} mm high on {name} (top at z = {height} mm), its centre at "
+            "({centre}) mm. Tray: {box}; {reached}. No place directly on {none} works. No path or program was checked "
+            "with them: before you run any there, put both into the study's scene file as boxes and run again."
         ),
         "box.put#free": (
-            "Planning only: the box with its centre at ({centre}) mm; no surface is known there. Box: {box}; "
-            "{reached}. No path or program was checked with it: before you run any there, put the box into the study's "
-            "scene file and run again."
+            "Planning only: the tray with its centre at ({centre}) mm; no surface is known there. Tray: {box}; "
+            "{reached}. No path or program was checked with it: before you run any there, put it into the study's "
+            "scene file as a box and run again."
         ),
         "box.range": (
-            "Keep the stand at {gap} mm: heights of {least} to {most} mm pass the same checks, but bring the arm "
-            "nearer to a singular pose (at one of them manipulability is {percent:.2g} % of that at {gap} mm, or less)."
+            "Keep the stand at {gap} mm: heights of {least} to {most} mm pass the same checks, some of them with the "
+            "tray turned the other way, but the worst of them has less to spare: {spare}."
         ),
+        "box.spare.manipulability": "manipulability {percent:.2g} % of that at {gap} mm",
+        "box.spare.limits": "{least:.1f} deg from a joint limit instead of {here:.1f} deg",
         "box.proven#all": "the tool point, {tilt}, reaches all of it (proven); {unchecked}",
         "box.proven#upper": (
             "the tool point, {tilt}, reaches all of it except the lowest {served_from} mm (proven); {unchecked}"
@@ -216,7 +219,7 @@ TEXTS = texts(
         "box.tilt#down": "tilted up to {cone:g} deg from straight down",
         "box.tilt#along": "tilted up to {cone:g} deg from ({axis})",
         "box.unchecked": (
-            "clearance to the scene was only sampled, collisions with the box and its stand were not checked"
+            "clearance to the scene was only sampled, collisions with the tray and its stand were not checked"
         ),
         "workspace.tool_points_elsewhere": (
             "Nowhere: the arm can't tilt its tool, which points along ({x:.2f}, {y:.2f}, {z:.2f}) and not within the "
@@ -247,6 +250,7 @@ def _(found: model.VoidUnexpected) -> str:
 
 SERVED_ALL_M = 1e-6
 SAME_PLACE_M = 1e-6
+SAME_SHARE = 0.99  # of what there is to spare at a place: less than that is told
 CHANGED_FIRST = ("offset", "direction", "lower", "upper", "a", "d")
 NAMED_CHANGES = 4
 
@@ -371,7 +375,7 @@ def _(found: model.ToolPointsElsewhere) -> str:
 
 
 def box_text(summary: Summary) -> str:
-    """Where to put the box of the study; empty where places were not looked for."""
+    """Where to put the tray of the study; empty where places were not looked for."""
     placement = getattr(summary, "placement", None)
     if placement is None:
         return ""
@@ -400,7 +404,7 @@ def box_text(summary: Summary) -> str:
 
 
 def _reached(placement: model.PlacementSummary, status: str, form: str, served_from_m: float) -> str:
-    """How much of a box the tool reaches, how it is tilted there, and what was not checked."""
+    """How much of a tray the tool reaches, how it is tilted there, and what was not checked."""
     axis, cone = placement.task.tool_direction, placement.task.cone_deg
     down = tuple(round(each, 6) for each in axis) == (0, 0, -1)
     tilt = sentence("box.tilt#down" if down else "box.tilt#along", cone=cone, axis=", ".join(f"{x:g}" for x in axis))
@@ -410,8 +414,8 @@ def _reached(placement: model.PlacementSummary, status: str, form: str, served_f
 
 
 def range_text(placement: model.PlacementSummary, places: model.BoxPlaces) -> str:
-    """How high the stand of the box may be, and how near to a singular pose the arm comes over that range; empty where
-    no stand is needed or only one height serves."""
+    """How high the stand of the tray may be, and how near to a singular pose and to joint limits the arm comes over
+    that range; empty where no stand is needed or only one height serves."""
     gaps = placement.over.gaps_m if placement.over and not placement.stand else None
     if gaps is None or gaps[1] == gaps[2]:
         return ""
@@ -420,9 +424,17 @@ def range_text(placement: model.PlacementSummary, places: model.BoxPlaces) -> st
     above = np.abs(places.centre_m[:, :2] - xy).max(axis=1) < SAME_PLACE_M
     heights = places.centre_m[:, 2] - z + gap
     above &= (least - SAME_PLACE_M < heights) & (heights < most + SAME_PLACE_M)
-    worst = min(places.manipulability_m3[above], default=0.0) / placement.best.manipulability_m3
-    shown = {"gap": millimetres([gap]), "least": millimetres([least]), "most": millimetres([most])}
-    return sentence("box.range", percent=100 * float(worst), **shown)
+    best, shown = placement.best, {"gap": millimetres([gap])}
+    worst = float(min(places.manipulability_m3[above], default=0.0)) / best.manipulability_m3
+    spare = [sentence("box.spare.manipulability", percent=100 * worst, **shown)] if worst < SAME_SHARE else []
+    near = float(min(places.limit_margin_deg[above], default=np.inf)) + placement.task.limit_margin_deg
+    if best.limit_margin_deg is not None and near < SAME_SHARE * best.limit_margin_deg:
+        spare.append(sentence("box.spare.limits", least=near, here=best.limit_margin_deg))
+    if not spare:
+        return ""
+    return sentence(
+        "box.range", least=millimetres([least]), most=millimetres([most]), spare=joined(spare, ", "), **shown
+    )
 
 
 def void_text(summary: Summary, *, confirmed: bool = True) -> str:
@@ -492,7 +504,7 @@ def millimetres(values: Sequence[float]) -> str:
 
 
 def stand_text(stand: model.StandSummary, placement: model.PlacementSummary) -> str:
-    """Whether the box can stand on a surface; if not why, and how high what would have to stand between them is."""
+    """Whether the tray can stand on a surface; if not why, and how high what would have to stand between them is."""
     named = {"name": stand.name, "height": millimetres([stand.height_m])}
     if stand.place and stand.served_from_m is not None:
         form = "upper" if stand.served_from_m > SERVED_ALL_M else "all"

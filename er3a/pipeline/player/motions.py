@@ -54,8 +54,9 @@ class Fault:
     """Why a path or a program may not be run as it is, and what to do instead.
 
     ``moments``: what fails first, then what fails later and weighs more.
-    ``status`` and ``verdict``: of all of it; ``meant``: whether its file expects that; ``address``: of the place on the
-    robot's pages, which the player shows there. ``instead``: a motion that may be run, and where the player shows it.
+    ``status`` and ``verdict``: of all of it; ``meant``: whether its file expects that, said in words by ``expected``
+    (empty where it expects nothing). ``address``: of the place on the robot's pages, which the player shows there;
+    ``instead``: a motion that may be run, and where the player shows it.
     """
 
     name: str
@@ -63,6 +64,7 @@ class Fault:
     status: Weight
     verdict: str
     meant: bool
+    expected: str
     moments: tuple[FaultMoment, ...]
     to_do: str
     address: str

@@ -6,12 +6,15 @@
  * parts of its picture; without a motion of its own a panel shows that of the figure's `data-play`.
  */
 
-import { add, column, scaled } from "er3a/algebra";
+import { add, column, scaled, subtract } from "er3a/algebra";
 import { constantLinks } from "er3a/kinematics";
 import { Orbit } from "er3a/orbit";
-import { eyeOf, Picture } from "er3a/scene";
+import { alongArm, ARM, eyeOf, Picture } from "er3a/scene";
 import { armLooks, recoloured, sceneSolids } from "er3a/solids";
 import { decodeValues, posesOf, valuesAt } from "er3a/values";
+
+const DOT = 0.012; // of the arm's size
+const CLOSED = 0.02; // of the arm's size: a motion ends where it starts
 
 const place = document.getElementById("player");
 const data = JSON.parse(document.getElementById("player-data").textContent);
@@ -115,15 +118,29 @@ function draw() {
     const way = motion.trails[0].filter((_, i) => motion.times[i] >= from - 1e-4 && motion.times[i] <= until + 1e-4);
     if (status !== "plain" && way.length > 1) picture.line(way, data.colours[status], 3);
   }
-  for (const { from, to, text, t0, t1 } of motion.marks ?? []) {
-    if (t < t0 || t > t1 || (t === t1 && t0 < t1 && t1 < end())) continue; // where two meet, the later one
+  const marks = (motion.marks ?? []).filter(({ t0, t1 }) => t >= t0 && t <= t1 && !(t === t1 && t0 < t1 && t1 < end())); // where two meet, the later one
+  for (const { from, to } of marks) {
     const point = String(from) === String(to);
     picture.line([from, point ? add(to, [0, 0, 1e-3 * data.size]) : to], data.colours.mark, point ? 9 : 3);
-    picture.word(text, point ? add(from, [0, 0, 0.08 * data.size]) : scaled(add(from, to), 0.5), page.ink, page.halo);
   }
-  picture.names(surroundings, page.ink, page.halo);
   for (const { poses } of shown) toolFrame(poses.at(-1));
+  picture.keepClear(shown.flatMap(({ poses }) => alongArm(poses)), ARM * data.size);
+  picture.keepClear([motion.trails[0][0], motion.trails[0].at(-1), ...marks.map(({ from }) => from)], DOT * data.size);
+  for (const { from, to, text } of marks) picture.word(text, scaled(add(from, to), 0.5), page.ink, page.halo);
+  if (arms.length === 1) nameEnds(motion.trails[0]);
   for (const { text, at } of data.signs) picture.word(text, at, page.ink, page.halo);
+  picture.names(surroundings, page.ink, page.halo, touching, page.touching);
+}
+
+/** Names where a motion starts and where it ends. */
+function nameEnds(trail) {
+  const { page } = orbit;
+  const [first, last] = [trail[0], trail.at(-1)];
+  const closed = Math.hypot(...subtract(last, first)) < CLOSED * data.size;
+  for (const [at, text] of closed ? [[first, words.start_and_end]] : [[first, words.start], [last, words.end]]) {
+    picture.line([at, add(at, [0, 0, 1e-3 * data.size])], page.ink, 6);
+    picture.word(text, at, page.ink, page.halo, false);
+  }
 }
 
 function toolFrame(T) {

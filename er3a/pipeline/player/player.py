@@ -60,6 +60,9 @@ WORDS = {
     "room": N_("{room} to limit"),
     "beyond": N_("{room} beyond"),
     "unlimited": N_("no limit"),
+    "start": N_("start"),
+    "end": N_("end"),
+    "start_and_end": N_("start and end"),
     "undock": N_("return the player to its place"),
     "picture": N_("The arm on its path. Drag or use the arrow keys to turn the picture, + and − to zoom."),
     "help": N_(

@@ -141,7 +141,7 @@ function box(eye) {
   const edges = [at(1, front[1], back), at(0, front[0], back), at(0, front[0], back)];
   edges.forEach((edge, k) => {
     const away = scaled(subtract(edge, at(k, edge[k], middle)), 0.06);
-    for (const value of ticks[k]) picture.word(String(value), add(at(k, value, edge), at(k, 0, away)), ink, halo);
+    for (const value of ticks[k]) picture.word(String(value), add(at(k, value, edge), at(k, 0, away)), ink, halo, false);
     picture.word(`${"xyz"[k]} (mm)`, add(at(k, middle[k], edge), at(k, 0, scaled(away, 3))), ink, halo);
   });
 }

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable
-from typing import Protocol, TypeVar
+from collections.abc import Collection, Iterable
+from typing import Protocol
 
 from er3a.by_value import Finding
 from er3a.kinematics.solutions import TargetOutcome
@@ -16,11 +16,11 @@ Outcome = TargetOutcome | PathVerdict | ProgramOutcome | GraspOutcome
 
 
 class UnmetExpectation(Finding):
-    """Something came to another end than the file expects."""
+    """Something came to another end than the file expects, or to more."""
 
     name: str
-    expected: Outcome
-    found: Outcome
+    expected: tuple[Outcome, ...]
+    found: tuple[Outcome, ...]
 
 
 class Demonstration(Finding):
@@ -38,23 +38,43 @@ class ExpectationsUnmet(Finding):
 
 
 class Judged(Protocol):
-    """A target, a path or an object with what it came to, and what it is said to come to."""
+    """A target, a path or an object with what it came to, and what it is said to come to.
+
+    A path can come to more than one outcome (``outcomes``, the first first), and all of them can be expected.
+    """
 
     @property
     def name(self) -> str: ...
 
     @property
-    def expect(self) -> Outcome | None: ...
+    def expect(self) -> Outcome | tuple[Outcome, ...] | None: ...
 
     @property
     def outcome(self) -> Outcome: ...
 
 
+def came_to(judged: Judged) -> tuple[Outcome, ...]:
+    """All that one came to, the first first."""
+    found: tuple[Outcome, ...] = getattr(judged, "outcomes", (judged.outcome,))
+    return found
+
+
+def expected_of(judged: Judged) -> tuple[Outcome, ...]:
+    """All that one is said to come to; empty where its file says nothing."""
+    expect = judged.expect
+    return expect if isinstance(expect, tuple) else () if expect is None else (expect,)
+
+
+def is_met(judged: Judged) -> bool:
+    """Whether one came to what its file expects, to nothing less and to nothing more."""
+    return set(expected_of(judged)) == set(came_to(judged))
+
+
 def unmet_expectations(judged: Iterable[Judged]) -> ExpectationsUnmet | None:
     """The expectations that are not met; None if all are."""
-    expected = [(each, each.expect) for each in judged if each.expect is not None]
+    expected = [each for each in judged if expected_of(each)]
     unmet = tuple(
-        UnmetExpectation(each.name, expect, each.outcome) for each, expect in expected if expect != each.outcome
+        UnmetExpectation(each.name, expected_of(each), came_to(each)) for each in expected if not is_met(each)
     )
     return ExpectationsUnmet(len(expected), unmet) if unmet else None
 
@@ -64,13 +84,6 @@ def pass_of(asked: Collection[Judged]) -> Status:
     return "pass" if asked else "no_reference"
 
 
-JudgedT = TypeVar("JudgedT", bound=Judged)
-
-
-def demonstrations(
-    judged: Iterable[JudgedT],
-    sound: Outcome,
-    outcomes: Callable[[JudgedT], tuple[Outcome, ...]] = lambda each: (each.outcome,),
-) -> tuple[Demonstration, ...]:
-    """What fails as it is meant to; ``sound``: what counts as no failure; ``outcomes``: all that one came to."""
-    return tuple(Demonstration(each.name, outcomes(each)) for each in judged if each.expect == each.outcome != sound)
+def demonstrations(judged: Iterable[Judged], sound: Outcome) -> tuple[Demonstration, ...]:
+    """What fails as it is meant to; ``sound``: what counts as no failure."""
+    return tuple(Demonstration(each.name, came_to(each)) for each in judged if is_met(each) and each.outcome != sound)

@@ -56,7 +56,11 @@ class Stage:
     applies : why the stage can't be computed for a robot, a finding of one of ``absences``; None if it can
     views : ``record`` (a recording, with its preview) and ``report`` (a page), as far as the stage has them
     rests_on : names of the stages whose verdict its pages say first
+    shows : names of the stages whose results its page shows besides its own, as far as they are there
     sampled : whether ``compute`` gathers parts that jobs of their own have sampled
+    obstacles : whether it looks for collisions; its page then says that the workspace's tray is no obstacle
+    motions : in plural and marked with ``N_``, what its motions are; the index compares them with the tray
+    may_run : whether the index says which of its motions may be run
     """
 
     name: str
@@ -70,7 +74,11 @@ class Stage:
     absences: tuple[type[Finding], ...] = ()
     views: tuple[str, ...] = ("record", "report")
     rests_on: tuple[str, ...] = ()
+    shows: tuple[str, ...] = ()
     sampled: bool = False
+    obstacles: bool = False
+    motions: str = ""
+    may_run: bool = False
 
     def module(self, name: str) -> Any:
         """A module of the stage's folder, imported when it is needed."""

@@ -11,11 +11,14 @@ const AMBIENT = 0.55;
 const MAX_PIXELS = 1.6e6; // more can't be painted often enough without a graphics processor
 const GRID_STEPS = 6; // lines of the floor on each side of the base
 const GHOST = 0.3;
-// Where a word may stand, in its widths and heights from its point: there, beside, at a corner, farther off.
-const PLACES = [
-  [0, 0], [0, -1], [1, 0], [-1, 0], [0, 1], [1, -1], [-1, -1], [1, 1], [-1, 1], [0, -2], [0, 2], [2, 0], [-2, 0],
-];
+const WIDE = 3; // a word, in its heights, about
+// Where a word may stand, in its widths and heights from its point, the nearest place first.
+const PLACES = [-1.5, -1, -0.5, 0, 0.5, 1, 1.5]
+  .flatMap((i) => [-6, -5, -4, -3, -2, -1, 0, 1, 2, 3, 4, 5, 6].map((j) => [i, j]))
+  .sort((a, b) => Math.hypot(WIDE * a[0], a[1]) - Math.hypot(WIDE * b[0], b[1]));
+const NEAR = 3.2; // heights: a word that is not needed stands no farther from its point
 const WORD = 0.82; // height of words, in letters of the page
+export const ARM = 0.045; // about half the width of an arm, in parts of its size: words keep off it
 const FIELD = 1.9; // distance of the eye, in heights of the picture at the target
 
 /** Looks at `target` from `distance` (m), turned by `azimuth` about z and raised by `elevation` (rad). */
@@ -141,26 +144,38 @@ export class Picture {
 
   /** A line through points in space. */
   line(points, colour, width = 2) {
-    this.context.strokeStyle = colour;
-    this.context.lineWidth = width * this.ratio;
-    this.context.beginPath();
-    this.#trace(points);
-    this.context.stroke();
+    this.#stroke(points.map((point) => this.seen(point)), colour, width);
   }
 
-  /** A word beside a point in space, where no earlier word stands in its way. */
-  word(text, point, colour, halo) {
-    const { context, ratio } = this;
+  /** Keeps words off what is within `radius` (m) of points in space. */
+  keepClear(points, radius) {
+    for (const [x, y, depth] of points.map((point) => this.seen(point))) {
+      const side = (2 * radius * this.scale) / Math.max(depth, 1e-6);
+      this.taken.push([x, y, side, side]);
+    }
+  }
+
+  /**
+   * A word beside a point in space, where no earlier word stands in its way, nor what is kept clear; a line leads to it
+   * from afar. Where no place is free, one that is not `needed` is left out.
+   */
+  word(text, point, colour, halo, needed = true) {
+    const { context, ratio, canvas } = this;
     const size = WORD * this.letters * ratio;
     context.font = `600 ${size}px system-ui, sans-serif`;
     context.textAlign = "center";
     context.textBaseline = "middle";
     const [x, y] = this.seen(point);
     const [width, height] = [context.measureText(text).width + 0.3 * size, 1.2 * size];
-    const places = PLACES.map(([i, j]) => [x + i * width, y + j * height]);
-    const free = ([u, v]) => this.taken.every(([a, b, w]) => Math.abs(u - a) > (width + w) / 2 || Math.abs(v - b) > height);
-    const [u, v] = places.find(free) ?? [x, y];
-    this.taken.push([u, v, width]);
+    const places = PLACES.filter(([i, j]) => needed || Math.hypot(WIDE * i, j) < NEAR).map(([i, j]) => [x + i * width, y + j * height]);
+    const seen = ([u, v]) => Math.min(u, canvas.width - u) > width / 2 && Math.min(v, canvas.height - v) > height / 2;
+    const apart = ([u, v]) => this.taken.every(([a, b, w, h]) => Math.abs(u - a) > (width + w) / 2 || Math.abs(v - b) > (height + h) / 2);
+    const free = places.find((place) => seen(place) && apart(place));
+    if (!free && !needed) return;
+    const [u, v] = free ?? [x, y];
+    this.taken.push([u, v, width, height]);
+    const edge = [Math.min(u + width / 2, Math.max(u - width / 2, x)), Math.min(v + height / 2, Math.max(v - height / 2, y))];
+    if (Math.hypot(edge[0] - x, edge[1] - y) > height) this.#stroke([[x, y], edge], colour, 1);
     context.lineWidth = 4 * ratio;
     context.strokeStyle = halo;
     context.strokeText(text, u, v);
@@ -168,12 +183,25 @@ export class Picture {
     context.fillText(text, u, v);
   }
 
-  /** The names of solids that stand around the arm, each at the middle of its points. */
-  names(solids, colour, halo) {
-    for (const { name, points } of solids) {
+  /**
+   * The names of solids that stand around the arm, each at the middle of its points: those of `needed`, in a colour of
+   * their own, then others as far as there is room.
+   */
+  names(solids, colour, halo, needed = new Set(), marked = colour) {
+    const named = solids.filter(({ points }) => points.length).sort((a, b) => needed.has(b.name) - needed.has(a.name));
+    for (const { name, points } of named) {
       const sum = points.reduce((all, point) => all.map((value, i) => value + point[i]), [0, 0, 0]);
-      if (points.length) this.word(name, sum.map((value) => value / points.length), colour, halo);
+      const asked = needed.has(name);
+      this.word(name, sum.map((value) => value / points.length), asked ? marked : colour, halo, asked);
     }
+  }
+
+  #stroke(flat, colour, width) {
+    this.context.strokeStyle = colour;
+    this.context.lineWidth = width * this.ratio;
+    this.context.beginPath();
+    this.#join(flat);
+    this.context.stroke();
   }
 
   #trace(points) {
@@ -183,6 +211,13 @@ export class Picture {
   #join(flat) {
     flat.forEach(([x, y], i) => (i ? this.context.lineTo(x, y) : this.context.moveTo(x, y)));
   }
+}
+
+/** Points from an arm's base to its tool. */
+export function alongArm(poses) {
+  const origins = poses.map((T) => column(T, 3));
+  const between = (a, b) => [0.25, 0.5, 0.75, 1].map((part) => add(scaled(a, 1 - part), scaled(b, part)));
+  return [origins[0], ...origins.slice(1).flatMap((origin, k) => between(origins[k], origin))];
 }
 
 /** Whether a point of the canvas is inside a convex outline, seen from either side. */

@@ -17,21 +17,21 @@ const byId = (id) => document.getElementById(id);
 export function addTasks(data, goal, closed, arm) {
   const { table, words } = data;
 
-  /** Moves the tool to `T`, or says in `message` why not, or what of it the arm can't follow. */
-  function reach(T, message, starts) {
+  /** Moves the tool to `T`, or says in `message` why not (`still` where joints can't move it so), or what the arm can't follow. */
+  function reach(T, message, starts, still = words.no_such_motion) {
     const found = jointsFor(goal, closed, T, arm.joints(), starts);
     if (!found.q) return write(message, fill(words.not_reached, { reason: arm.why(found) }));
     const { length, angle } = found.left;
     const whole = length < FOLLOWED && angle < FOLLOWED;
-    const still = arm.joints().every((value, k) => Math.abs(value - found.q[k]) < STILL);
-    if (still && !whole) return write(message, words.no_such_motion);
+    const rests = arm.joints().every((value, k) => Math.abs(value - found.q[k]) < STILL);
+    if (rests && !whole) return write(message, still);
     arm.moveTo(found.q);
     const left = { joints: table.lower.length, length: inMillimetres(length), angle: inDegrees(angle) };
     return write(message, whole ? "" : fill(words.left_over, left));
   }
 
   typePose(reach, arm, words);
-  jog((T, message) => reach(T, message, 1), arm, data);
+  jog((T, message, still) => reach(T, message, 1, still), arm, data);
   return wayPoints(data, arm);
 }
 
@@ -67,12 +67,18 @@ function jog(reach, arm, { words, table, joint_names: names }) {
   const message = byId("jog-message");
   const frame = () => document.querySelector("input[name=jog-frame]:checked").value;
   const buttons = [...document.querySelectorAll("[data-jog]")];
+  /** What is said of a jog of the tool: about or along which axis of which frame. */
+  const told = (axis, start) => {
+    const manner = axis < 3 ? "along" : "about";
+    return fill(words[`${start}_${manner}`], { axis: words.jog_axes[axis % 3], frame: words.jog_frames[frame()] });
+  };
   const label = () => {
     const labels = frame() === "joints" ? names : words.jog_axes;
     for (const button of buttons) {
       const label = labels[Number(button.dataset.jog)];
       button.hidden = label === undefined;
       write(button, `${label} ${button.dataset.sign}`);
+      button.title = frame() === "joints" || button.hidden ? "" : told(Number(button.dataset.jog), "jog");
     }
   };
   const step = (axis, sign) => {
@@ -88,9 +94,10 @@ function jog(reach, arm, { words, table, joint_names: names }) {
     const shift = [0, 1, 2].map((i) => (i === axis ? (sign * size) / 1000 : 0));
     const turn = [rotX, rotY, rotZ][axis - 3]?.(sign * toRadians(size)) ?? translation(0, 0, 0);
     const T = arm.tool();
-    if (frame() === "tool") return reach(multiply(T, multiply(translation(...shift), turn)), message);
+    const still = told(axis, "no_jog");
+    if (frame() === "tool") return reach(multiply(T, multiply(translation(...shift), turn)), message, still);
     const turned = multiply(turn, T); // about the base's axes, the tool point at rest
-    return reach(turned.map((row, i) => (i < 3 ? [...row.slice(0, 3), T[i][3] + shift[i]] : row)), message);
+    return reach(turned.map((row, i) => (i < 3 ? [...row.slice(0, 3), T[i][3] + shift[i]] : row)), message, still);
   };
   for (const button of buttons) {
     button.addEventListener("click", () => step(Number(button.dataset.jog), button.dataset.sign === "+" ? 1 : -1));

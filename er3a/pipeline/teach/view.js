@@ -3,7 +3,7 @@
 import { add, column, moved, norm, scaled, subtract, turned } from "er3a/algebra";
 import { frames, tableFrames } from "er3a/kinematics";
 import { Orbit } from "er3a/orbit";
-import { eyeOf, Picture } from "er3a/scene";
+import { alongArm, ARM, eyeOf, Picture } from "er3a/scene";
 import { armLooks, drums, recoloured, sceneSolids } from "er3a/solids";
 
 const TOUCHING = "#d1242f";
@@ -54,8 +54,9 @@ export class ArmView extends Orbit {
     if (numbers.length) this.#tableFrames(tableFrames(this.table, poses.slice(1)), numbers);
     else this.#axes(poses);
     this.#toolFrame(poses.at(-1));
-    picture.names(this.surroundings, page.ink, page.halo);
+    picture.keepClear(alongArm(poses), ARM * size);
     if (nearest?.text) this.#nearest(nearest);
+    picture.names(this.surroundings, page.ink, page.halo, touching, page.touching);
   }
 
   /** Poses of base, the frames that the joints turn, and tool. */
@@ -66,7 +67,7 @@ export class ArmView extends Orbit {
   #nearest({ from, to, text, touching }) {
     const { picture, page } = this;
     picture.line([from, to], touching.length ? TOUCHING : page.ink, 3);
-    picture.word(text, scaled(add(from, to), 0.5), touching.length ? TOUCHING : page.ink, page.halo);
+    picture.word(text, scaled(add(from, to), 0.5), touching.length ? page.touching : page.ink, page.halo);
   }
 
   #tableFrames(found, numbers) {

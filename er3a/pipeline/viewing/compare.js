@@ -36,6 +36,9 @@ function compareRobots() {
   const [a, b] = pickers.map((picker) => compared[picker.value]);
   document.getElementById("title-a").textContent = a.title;
   document.getElementById("title-b").textContent = b.title;
+  const [keyA, keyB] = document.querySelectorAll(".borders-key span");
+  for (const [key, robot] of [[keyA, a], [keyB, b]]) key.textContent = robot.border.length ? robot.title : `${robot.title} (${key.dataset.none})`;
+  keyB.hidden = a === b; // drawn once
   for (const { row, index } of comparedRows) {
     const cells = [shownValue(a.values[index]), shownValue(b.values[index]), shownDifference(a.values[index], b.values[index])];
     cells.forEach((text, column) => (row.cells[column + 3].textContent = text));

@@ -66,7 +66,7 @@ def readings(figure: Figure) -> list[dict[str, Any]]:
 
 def _axes(i: int, ax: Axes, others: list[Axes]) -> dict[str, Any]:
     found: dict[str, Any] = {
-        "box": _box(ax),
+        "box": _extents(ax),
         "x": _scale(ax.xaxis, others),
         "y": _scale(ax.yaxis, others),
         "drawn_to_scale": ax.get_aspect() == 1,
@@ -76,7 +76,7 @@ def _axes(i: int, ax: Axes, others: list[Axes]) -> dict[str, Any]:
     if bar := _colour_bar(ax, others):
         upright = bool(np.ptp(bar.ax.bbox.extents[1::2]) > np.ptp(bar.ax.bbox.extents[::2]))
         found["shades"] = {
-            "box": _box(bar.ax),
+            "box": _extents(bar.ax),
             "upright": upright,
             "scale": _scale(bar.ax.yaxis if upright else bar.ax.xaxis, []),
             "steps": bar.cmap.N if bar.cmap.N <= MAX_STEPS else 0,
@@ -104,7 +104,7 @@ def _curves(ax: Axes) -> list[Line2D]:
     return [line for line in ax.lines if all(line.get_transform().contains_branch_seperately(data))]
 
 
-def _box(ax: Axes) -> list[float]:
+def _extents(ax: Axes) -> list[float]:
     return [round(float(value), 5) for value in ax.get_position().extents]
 
 

@@ -23,8 +23,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull
 
+from er3a.collision.scene import Scene
 from er3a.files.kept_files import write_atomically
-from er3a.kinematics.forward import forward, skeleton
+from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages.collision import near_shapes
@@ -57,10 +58,10 @@ from er3a.pipeline.results import (
     result_records,
 )
 from er3a.pipeline.stages.expectations import unmet_expectations
-from er3a.pipeline.stages.programs.model import ProgramMotion, ProgramsResults, ProgramSummary
+from er3a.pipeline.stages.programs.model import ProgramsResults, ProgramSummary
 from er3a.pipeline.stages.programs.played import faults as program_faults
 from er3a.pipeline.stages.registry import STAGES, all_messages
-from er3a.pipeline.stages.trajectory.model import PathChecks, PathSummary, TrajectoryResults
+from er3a.pipeline.stages.trajectory.model import PathSummary, TrajectoryResults
 from er3a.pipeline.stages.trajectory.played import faults as path_faults
 from er3a.pipeline.stages.validation.evidence_section import evidence_section, verdict_legend
 from er3a.pipeline.stages.validation.model import (
@@ -79,9 +80,10 @@ from er3a.pipeline.sweeps import ENTRIES, entry_label
 from er3a.pipeline.verdicts import NOT_EXAMINED, StageVerdict, read_verdicts
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.figures import new_figure
-from er3a.pipeline.viewing.numbers import number
+from er3a.pipeline.viewing.numbers import decimals_of, fixed, number
 from er3a.pipeline.viewing.page import PAGES, Head, Picture, alternative_table, head_of, stage_head, status_word
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, MUTED, REFERENCE, VERDICTS
+from er3a.pipeline.viewing.tray import Meeting, Tray, compared_with_tray, met, scene_of, stretches, trays
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 
@@ -170,10 +172,17 @@ def key_figures(folder: Path, stages: Sequence[str]) -> dict[tuple[str, str, str
         for figure in head.figures:
             value, unit = figure.value, figure.unit
             if figure.part and value is not None:  # the whole differs from robot to robot
-                found[title, figure.label, ""] = f"{number(value)} {unit}"
+                found[title, figure.label, ""] = f"{figure.text} {unit}"
             else:
-                found[title, figure.label, unit] = float(f"{value:.6g}") if isinstance(value, float) else value
+                found[title, figure.label, unit] = _rounded(figure)
     return found
+
+
+def _rounded(figure: page.ShownFigure) -> float | int | None:
+    """The value with the digits that its page shows."""
+    if not isinstance(figure.value, float) or not np.isfinite(figure.value) or not figure.value:
+        return figure.value
+    return round(figure.value, decimals_of(figure.value, figure.uncertainty, figure.measure))
 
 
 def border_mm(workspace: WorkspaceResults | AbsentResults | None) -> list[list[list[float]]]:
@@ -489,12 +498,13 @@ def _counts(verdicts: Sequence[StageVerdict]) -> dict[str, str]:
 
 
 SHOWN_FIGURES = 3
-RUNS = {"trajectory": N_("paths"), "programs": N_("programs")}  # stages whose motions may be run or not
-MOVED = RUNS | {"vision": N_("grasps")}  # stages with motions that the box is compared with
+MOTIONS = {name: stage.motions for name, stage in STAGES.items() if stage.motions}
+MAY_RUN = {name: motions for name, motions in MOTIONS.items() if STAGES[name].may_run}
 OF_ALL_RUNS = (  # what may turn any of them unsafe
     *("obstacles", "uncovered_links", "bare_tool", "base_inside", "allowed_contacts", "program_rest", "given_rates"),
     *("controller_language", "tool", "carried", "torques"),
 )
+MAX_TALLIED = 3  # that do not pass, though nothing expects it, and are named beside their number
 MAX_FAULTS = 20  # of a robot's paths, and of its programs, that are listed
 PLACE_LETTERS = 160
 VOID_TAGS = ("br", "img", "input", "wbr", "hr")
@@ -518,11 +528,10 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         folder / "index.html",
         places=list(_places(study, folder, {each["robot"].name for each in robots if each["table"] == "fail"})),
         robots=robots,
-        legend=verdict_legend(status for each in robots if each["entries"] for status in each["entries"]["statuses"]),
         article=study.article is not None,
         questions={stage.name: stage.question for stage in STAGES.values()},
         shown_figures=SHOWN_FIGURES,
-        run_words=RUNS,
+        run_words=MAY_RUN,
         conventions=CONVENTIONS,
         most_faults=MAX_FAULTS,
         sweeps=sweep_sections(study, results),
@@ -621,13 +630,14 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
     table = heads["validation"].status if "validation" in heads else NOT_EXAMINED
     finding = heads["validation"].finding if "validation" in heads else None
     same_arm, instead = isinstance(finding, DefinedOtherwise), alternative_table(study, name, results.parent)
-    unproven, settled = _settled(finding)
+    unproven, settled = _settled(finding, _evidence(results))
+    entries = evidence_section(robot, _evidence(results), _evidence(results.parent / instead) if instead else None)
     box_range = _box_range(stored["workspace"].results) if "workspace" in stored else ""
     computed = {stage: each for stage, each in stored.items() if heads[stage].status != "not_computed"}
-    passes = passing(computed, robot)
-    runs = [_run(stage, computed[stage].results) for stage in RUNS if stage in computed]
+    runs = [_run(stage, name, computed[stage].results) for stage in MAY_RUN if stage in computed]
     grasped = _grasped(computed["vision"].results) if "vision" in computed else []
     sound = {run["stage"]: run["sound"] for run in runs} | {"vision": grasped}
+    passes = passing(computed, robot, {stage: scene_of(study, name, stage) for stage in MOTIONS}, sound)
     return {
         "robot": robot,
         "table": table,
@@ -635,15 +645,14 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         "may_run": table != "fail",
         "decision": decision(table, [*failed.values()], instead, unproven=unproven, same_arm=same_arm),
         "settled": settled,
-        "entries": evidence_section(
-            robot, _evidence(results), _evidence(results.parent / instead) if instead else None
-        ),
+        "entries": entries,
+        "legend": verdict_legend(entries["statuses"]) if entries else [],
         "instead": {instead: f"#{instead}"} if instead else {},
         "dh_instead": {instead: f"#dh-{instead}"} if instead else {},
         "answers": [*_answers(heads, robot, passes.short(sound) if passes else "", box_range)],
-        "notes": {stage: _note(stage, head, stored[stage].results) for stage, head in heads.items()},
+        "notes": {stage: _note(head, [run for run in runs if run["stage"] == stage]) for stage, head in heads.items()},
         "bare": any(
-            _misses(heads[stage], "carried") or _misses(heads[stage], "tool") for stage in RUNS if stage in heads
+            _misses(heads[stage], "carried") or _misses(heads[stage], "tool") for stage in MAY_RUN if stage in heads
         ),
         "bodies": [each.name for each in scene.solids] if (scene := study.scene(name, "trajectory")) else [],
         "runs": runs,
@@ -683,7 +692,7 @@ def proposed(finding: object) -> dict[str, str]:
     return {"measurement": joined(step, " "), "entry": entry.replace(" ", "")}
 
 
-def _settled(finding: object) -> tuple[bool, str]:
+def _settled(finding: object, evidence: TableEvidence | None) -> tuple[bool, str]:
     """Whether nothing of a table's geometry is settled; and of one that is contradicted by what, of one that is settled
     in part how much, and how far off the tool could be."""
     if isinstance(finding, Contradicted | AnotherArm):
@@ -692,21 +701,18 @@ def _settled(finding: object) -> tuple[bool, str]:
         return False, ""
     part = next((part for part in finding.parts if part.part == "geometry"), None)
     conflict = say(finding.contradiction) if finding.contradiction else ""
-    said = joined([settled_parts(finding), *how_far_off(finding), conflict], " ")
+    sums = joined([each.entry for each in evidence.combinations] if evidence else [], ", ")
+    counted = tr("Counted as one entry, because only the sum matters: {names}.", names=sums) if sums else ""
+    said = joined([settled_parts(finding), counted, *how_far_off(finding), conflict], " ")
     return part is not None and not (part.settled or part.up_to_signs), said
 
 
 def _answers(heads: Mapping[str, Head], robot: Robot, passes: str, box_range: str) -> Iterator[tuple[str, str, str]]:
-    """What is asked of an arm first: the question, its answer and where it is shown; ``box_range``: how high the box's
+    """What is asked of an arm first: the question, its answer and where it is shown; ``box_range``: how high the tray's
     stand may be."""
     workspace = heads["workspace"].summary if "workspace" in heads else None
-    if workspace:
-        box = box_text(workspace)
-        if box and _misses(heads["workspace"], "tool"):
-            bare = tr("No tool is given: the flange's own centre enters the box. Repeat it with your tool's length.")
-            box = joined([box, bare], " ")
-        box = joined([passes, box, box_range], " ") if box else ""
-        yield tr("Tray or box"), box, "workspace.html#placement"
+    if isinstance(workspace, WorkspaceSummary):
+        yield tr("Reach"), _reach_text(workspace, bare=_misses(heads["workspace"], "tool")), "workspace.html"
     summary = heads["dynamics"].summary if "dynamics" in heads else None
     yield tr("Payload"), payload_text(summary, robot), "dynamics.html#payload" if summary else ""
     if workspace:
@@ -714,10 +720,35 @@ def _answers(heads: Mapping[str, Head], robot: Robot, passes: str, box_range: st
         if isinstance(workspace, WorkspaceSummary) and workspace.enclosed_voids:
             place = f"#void-{workspace.voids.index(judged_void(workspace)) + 1}"
         yield tr("Void"), void_text(workspace, confirmed=_limits_confirmed(heads)), f"workspace.html{place}"
+    if workspace:
+        box = box_text(workspace)
+        if box and _misses(heads["workspace"], "tool"):
+            bare = tr("No tool is given: the flange's own centre enters the tray. Repeat it with your tool's length.")
+            box = joined([box, bare], " ")
+        box = joined([passes, box, box_range], " ") if box else ""
+        yield tr("Tray"), box, "workspace.html#placement"
+
+
+def _reach_text(summary: WorkspaceSummary, *, bare: bool) -> str:
+    """How far from axis 1 and how high the tool point comes; ``bare``: whether the robot has no tool."""
+    reach = summary.reach_m
+    least, most, low, high = (
+        fixed(1000 * value, 1)
+        for value in (reach.nearest_to_axis, reach.furthest_from_axis, reach.lowest, reach.highest)
+    )
+    point = tr("without a tool: the centre of the flange") if bare else tr("the tool point")
+    return tr(
+        "{least} to {most} mm from axis 1 ({point}), {low} to {high} mm along it; {smallest} to {largest} m³ in all "
+        "(proven).",
+        point=point,
+        **{"most": most, "least": least, "low": low, "high": high},
+        smallest=number(summary.volume_m3.lower),
+        largest=number(summary.volume_m3.upper),
+    )
 
 
 def _box_range(results: Any) -> str:
-    """How high the stand of a box may be; empty where none is proposed."""
+    """How high the stand of a tray may be; empty where none is proposed."""
     placement = getattr(results.summary, "placement", None)
     if not isinstance(placement, PlacementSummary) or not placement.named_places:
         return ""
@@ -742,79 +773,87 @@ def _misses(head: Head, subject: str) -> bool:
 
 @dataclass(frozen=True)
 class Passing:
-    """The tool points that pass through the box where it is proposed, or through what it stands on.
+    """What meets the tray where it is proposed, or what it stands on.
 
     Attributes
     ----------
-    through : per stage the first time (s) by name
+    through : per stage when each motion meets it first, by name
     targets : those with a solution, whose tool points lie in it
-    unseen : names of motions whose tool points are not known, or not all
+    unseen : names of motions that are not known, or not all
+    elsewhere : how many of the motions that pass meet it at another place, the best of each surface
     """
 
-    through: Mapping[str, Mapping[str, float]]
+    through: Mapping[str, Mapping[str, Meeting]]
     targets: tuple[str, ...]
     unseen: tuple[str, ...]
+    elsewhere: tuple[tuple[Tray, int], ...] = ()
 
     @property
     def text(self) -> str:
         """What was compared, and what of it was found."""
         if not self.through:
             return ""
-        inside = tr("Targets in it or its stand: {names}.", names=joined(self.targets, ", ")) if self.targets else ""
-        said = [
-            tr("“Box at”: the moment from which the tool point is in the box or its stand.")
-            if any(self.through.values())
-            else tr("No tool point of these was found in the box or its stand."),
-            inside,
-            tr(
-                "Only tool points were compared, straight between the stored times; links and the tool's body were not."
-            ),
-        ]
+        said = [compared_with_tray({name: each for found in self.through.values() for name, each in found.items()})]
+        if self.targets:
+            said.append(tr("Targets in it or its stand: {names}.", names=joined(self.targets, ", ")))
         if self.unseen:
             said.append(tr("Not compared, or not all of it: {names}.", names=joined(self.unseen, ", ")))
         return joined(said, " ")
 
     def short(self, sound: Mapping[str, Sequence[str]]) -> str:
-        """How many there are among the names of what passes, per stage."""
+        """How many there are among the names of what passes, per stage, and where there are fewer."""
         if not self.through:
-            return tr("No path, program or grasp was compared with the place of the tray or box.")
+            return tr("No path, program or grasp was compared with the place of the tray.")
+        met = {stage: found.keys() & sound[stage] for stage, found in self.through.items()}
         counts = [
-            tr("{count} of the {passing} {what}", count=len(inside), passing=len(sound[stage]), what=tr(MOVED[stage]))
-            for stage, found in self.through.items()
-            if (inside := found.keys() & sound[stage])
+            tr("{count} of the {passing} {what}", count=len(inside), passing=len(sound[stage]), what=tr(MOTIONS[stage]))
+            for stage, inside in met.items()
+            if inside
         ]
         if not counts:
             return ""
-        return tr(
-            "The tray or box, or its stand, is in the way of {runs} that pass without them: the tool point goes "
-            "through.",
-            runs=joined(counts, ", "),
+        said = tr("The tray or its stand is in the way of {runs} that pass without them.", runs=joined(counts, ", "))
+        tray, count = min(self.elsewhere, key=lambda each: each[1], default=(None, 0))
+        if tray is None or count >= sum(map(len, met.values())):
+            return said
+        centre = ", ".join(number(round(1000 * value)) for value in tray.centre)
+        other = tr(
+            "With its centre at ({centre}) mm over {name} it is in the way of {count} of these.",
+            centre=centre,
+            name=own_title(tray.on),
+            count=count,
         )
+        return joined([said, other], " ")
 
 
-def passing(stored: Mapping[str, Stored[Any]], robot: Robot) -> Passing | None:
-    """What passes through the box of the study where the workspace stage puts it; None if it puts none."""
-    placement = getattr(stored["workspace"].results.summary, "placement", None) if "workspace" in stored else None
-    if not isinstance(placement, PlacementSummary) or not placement.named_places:
+def passing(
+    stored: Mapping[str, Stored[Any]],
+    robot: Robot,
+    scenes: Mapping[str, Scene | None],
+    sound: Mapping[str, Sequence[str]],
+) -> Passing | None:
+    """What meets the tray of the study where the workspace stage puts it; None if it puts none.
+
+    ``scenes``: of each stage, for what the arm carries. ``sound``: what passes in each, compared with other places too.
+    """
+    places = trays(stored["workspace"].results) if "workspace" in stored else []
+    if not places:
         return None
-    centre, half = (1000 * np.array(each) for each in (placement.best.centre_m, placement.best.size_m))
-    low, high = centre - half / 2, centre + half / 2
-    if placement.stand is None and placement.over:
-        low[2] = min(low[2], 1000 * placement.over.height_m)
-    through, unseen = dict[str, dict[str, float]](), list[str]()
-    for stage in (name for name in MOVED if name in stored):
-        results = stored[stage].results
-        through[stage] = {}
-        for name, t, points in _tool_points(results, robot):
-            first = first_inside(t, points, low, high)
-            if first is not None:
-                through[stage][name] = first
-            if len(t) < 2 or not np.isfinite(points).all():
-                unseen.append(name)
-        unseen += [each.name for each in getattr(results.summary, "not_followed", ())]
+    motions = {stage: [*stretches(stored[stage].results, robot)] for stage in MOTIONS if stage in stored}
+    through = {stage: met(robot, places[0], scenes.get(stage), each) for stage, each in motions.items()}
+    unseen = [each.name for moved in motions.values() for each in moved if not each.whole]
+    for stage in motions:
+        unseen += [each.name for each in getattr(stored[stage].results.summary, "not_followed", ())]
+    passed = {stage: [each for each in moved if each.name in sound[stage]] for stage, moved in motions.items()}
+    elsewhere = [
+        (tray, sum(len(met(robot, tray, scenes.get(stage), each)) for stage, each in passed.items()))
+        for tray in places[1:]
+        if any(through[stage].keys() & {each.name for each in passed[stage]} for stage in passed)
+    ]
+    low, high = (1000 * corner for corner in places[0].corners)
     targets = stored["inverse"].results.summary.targets if "inverse" in stored else ()
     inside = (each.name for each in targets if each.chosen_deg and np.all((low <= each.xyz_mm) & (each.xyz_mm <= high)))
-    return Passing(through, tuple(inside), tuple(unseen))
+    return Passing(through, tuple(inside), tuple(unseen), tuple(elsewhere))
 
 
 def _grasped(results: VisionResults) -> list[str]:
@@ -822,55 +861,14 @@ def _grasped(results: VisionResults) -> list[str]:
     return [each.name for each in results.summary.objects if each.outcome == "grasped"]
 
 
-def _tool_points(
-    results: TrajectoryResults | ProgramsResults | VisionResults, robot: Robot
-) -> Iterator[tuple[str, Reals, Reals]]:
-    """The motions of a stage: name, times (n,) in s, and tool points (n, 3) in mm."""
-    if isinstance(results, VisionResults):
-        ways = results.ways
-        for name in _grasped(results):
-            rows = ways.take(ways.target == name)
-            yield name, rows.t_s, 1000 * forward(robot, np.radians(rows.q_deg))[:, :3, 3]
-        return
-    for name, own in _followed(results):
-        yield name, own.t_s, own.xyz_mm
-
-
-def _followed(results: TrajectoryResults | ProgramsResults) -> Iterator[tuple[str, PathChecks | ProgramMotion]]:
-    """Each path or program that was followed, and its rows."""
-    if isinstance(results, ProgramsResults):
-        for program in results.summary.programs:
-            yield program.name, results.motion.take(results.motion.program == program.name)
-        return
-    for path in results.summary.paths:
-        yield path.name, results.checks.take(results.checks.path == path.name)
-
-
-def first_inside(t: Reals, points: Reals, low: Reals, high: Reals) -> float | None:
-    """When a point that moves straight from each of ``points`` (n, 3) at ``t`` (n,) to the next enters a box first.
-
-    ``low``, ``high``: (3,), the box's corners. None if it never does.
-    """
-    way = np.diff(points, axis=0, append=points[-1:])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ends = np.stack([low - points, high - points]) / way
-    ends = np.sort(np.where(np.isnan(ends), [[[-np.inf]], [[np.inf]]], ends), axis=0)  # 0/0: along a face
-    enters, leaves = np.maximum(ends[0].max(axis=1), 0), np.minimum(ends[1].min(axis=1), 1)
-    (hits,) = np.nonzero((enters <= leaves) & np.isfinite(points + way).all(axis=1))
-    if not len(hits):
-        return None
-    row = hits[0]
-    return float(t[row] + enters[row] * (t[min(row + 1, len(t) - 1)] - t[row]))
-
-
 def _without_box() -> str:
     return tr(
-        "These pass without the tray or box and its stand: put both into the study's scene file and run again before "
+        "These pass without the tray and its stand: put both into the study's scene file and run again before "
         "you run any of them there."
     )
 
 
-def _run(stage: str, results: TrajectoryResults | ProgramsResults) -> dict[str, Any]:
+def _run(stage: str, robot: str, results: TrajectoryResults | ProgramsResults) -> dict[str, Any]:
     """How many paths or programs there are, which may be run as they are, and why the others may not."""
     followed: Sequence[ProgramSummary | PathSummary]
     if isinstance(results, ProgramsResults):
@@ -884,8 +882,9 @@ def _run(stage: str, results: TrajectoryResults | ProgramsResults) -> dict[str, 
     return {
         "stage": stage,
         "count": len(followed) + lost,
-        "lost": lost,
         "sound": sound,
+        "tally": _tally(stage, len(sound), faults, lost),
+        "links": {fault.name: f"{robot}/{fault.address}" for fault in faults},
         "faults": faults,
         "open": left_out,
         "no_pass": say(NoPass(missed)) if (missed := results.summary.verdict.missed) else "",
@@ -903,6 +902,7 @@ def _otherwise(stage: str, followed: Sequence[ProgramSummary | PathSummary], fau
             "fail",
             tr("not as expected"),
             False,
+            "",
             (FaultMoment(say(each)),),
             "",
             f"{stage}.html#{each.name}",
@@ -912,13 +912,31 @@ def _otherwise(stage: str, followed: Sequence[ProgramSummary | PathSummary], fau
     ]
 
 
-def _note(stage: str, head: Head, results: Any) -> str:
-    """What stands beside a stage's name: how many of its paths or programs pass, where some do not, or that its camera
-    is simulated."""
-    if stage in RUNS and head.status != "not_computed":
-        run = _run(stage, results)
-        return tr("{sound} of {count}", sound=len(run["sound"]), count=run["count"]) if run["faults"] else ""
-    return tr("simulated") if _misses(head, "real_camera") else ""
+def _tally(stage: str, sound: int, faults: Sequence[Fault], lost: int) -> str:
+    """How many paths or programs pass, how many of the others are expected not to, and which others do not."""
+    others, count = [fault for fault in faults if not fault.meant], sound + len(faults) + lost
+    meant = len(faults) - len(others)
+    passing = tr("{sound} of {count} {what} pass in the model", sound=sound, count=count, what=tr(MAY_RUN[stage]))
+    rest = N_("the other one is expected to fail") if meant == 1 else N_("the other {count} are expected to fail")
+    whole = N_("{count} expected to fail") if others or lost else rest
+    named = [tr("{name}: {verdict}", name=fault.name, verdict=fault.verdict) for fault in others[:MAX_TALLIED]]
+    more = tr("{count} more do not pass", count=len(others) - MAX_TALLIED) if len(others) > MAX_TALLIED else ""
+    left = tr("{count} not followed to the end", count=lost) if lost else ""
+    return joined([passing, tr(whole, count=meant) if meant else "", *named, more, left])
+
+
+def _note(head: Head, runs: Sequence[Mapping[str, Any]]) -> str:
+    """What stands beside a stage's name: how many of its paths or programs pass, where some do not, how many targets,
+    paths, programs or objects are expected to fail, or that its camera is simulated."""
+    if head.no_verdict:
+        return ""
+    parts = [
+        tr("{sound} of {count}", sound=len(run["sound"]), count=run["count"])
+        for run in runs
+        if len(run["sound"]) < run["count"]
+    ]
+    parts += [tr("{count} expected to fail", count=head.demonstrations)] if head.demonstrations else []
+    return joined([*parts, tr("simulated") if _misses(head, "real_camera") else ""])
 
 
 def _cell(head: Head) -> dict[str, Any]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from math import floor, isnan, log10
+from collections.abc import Iterable
+from math import floor, isfinite, isnan, log10
 
 from er3a.pipeline.messages.language import as_number
 
@@ -10,6 +11,9 @@ _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 SMALLEST = 1e-4  # uncertainty that is written without a power of ten
+NOTHING = 1e-6  # of a length or an angle: rounding, which nobody reads digits of
+DECIMALS = {"deg": 3, "m³": 3, "m²": 3, "%": 1, "deg/s": 1, "mm/s": 1, "µdeg/s": 0, "ppb": 0}
+"""The decimals that matter in a unit, 2 in any other."""
 
 
 def no_noise(value: float) -> float:
@@ -36,11 +40,41 @@ def number(value: float | int | None, digits: int = 4) -> str:
     return as_number(f"{float(text):.{len(text.partition('.')[2])}f}")
 
 
-def measured(value: float | int | None, uncertainty: float | None) -> str:
-    """A number with as many decimals as two significant digits of its uncertainty have, if it has one."""
-    if not isinstance(value, float) or not value or not uncertainty or uncertainty < SMALLEST:
+def measured(value: float | int | None, uncertainty: float | None, unit: str = "") -> str:
+    """A number with as many decimals as two significant digits of its uncertainty have, if it has one.
+
+    Without one: with three significant digits, four from 100 on and of volumes, and no more decimals than matter in its
+    unit (as results name it); what these don't show is below the last of them.
+    """
+    if not isinstance(value, float) or not isfinite(value) or not value:
         return number(value)
-    return fixed(value, max(0, 1 - floor(log10(uncertainty))))
+    decimals = decimals_of(value, uncertainty, unit)
+    if (uncertainty and uncertainty >= SMALLEST) or round(value, decimals):
+        return fixed(value, decimals)
+    return f"< {number(NOTHING, 1) if abs(value) < NOTHING else fixed(10.0**-decimals, decimals)}"
+
+
+def decimals_of(value: float, uncertainty: float | None, unit: str) -> int:
+    """How many decimals :func:`measured` shows of a number that is not 0."""
+    if uncertainty and uncertainty >= SMALLEST:
+        return max(0, 1 - floor(log10(uncertainty)))
+    digits = 4 if abs(value) >= 100 or unit in ("m³", "m²") else 3
+    return max(0, min(DECIMALS.get(unit, 2), digits - 1 - floor(log10(abs(value)))))
+
+
+def decimals_of_column(values: Iterable[float]) -> int:
+    """How many decimals a column shows: the largest of its numbers has three digits, or two decimals if more."""
+    largest = max((abs(value) for value in values if isfinite(value)), default=0.0)
+    if not largest:
+        return 0
+    digits = 2 - floor(log10(largest))
+    return max(0, min(2, digits + 1) if digits < 3 else digits)
+
+
+def decimals_of_spreads(spreads: Iterable[float]) -> int:
+    """How many decimals a column of values shows whose uncertainties these are: the least has two digits; 4 at most."""
+    least = min((spread for spread in spreads if isfinite(spread) and spread > 0), default=0.01)
+    return max(0, min(4, 1 - floor(log10(least))))
 
 
 def fixed(value: float | None, decimals: int = 1) -> str:

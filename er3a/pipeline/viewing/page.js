@@ -57,7 +57,7 @@ function compare([a, x], [b, y], sign) {
 function makeSortable(table) {
   const body = table.tBodies[0];
   const written = [...body.rows];
-  if (written.length < 2 || !table.tHead) return; // a listing keeps its lines in order
+  if (written.length < 2 || !table.tHead || table.matches(".entries")) return; // listings and D-H tables keep their order
   const headers = [...table.tHead.rows[0].cells];
   headers.forEach((header, column) => {
     // No button element: browsers leave those out of a header that is repeated on the next printed sheet.
@@ -346,7 +346,7 @@ const HEADINGS = ["H2", "H3", "SUMMARY", "CAPTION"];
 const CONTAINERS = "h2, h3, p, ul, ol, dl, tr, figure, section, details";
 const WHOLE = "tr, li, dl, figure, .verdict, #turning, .player"; // found or not as one
 const BESIDE = "script, style, thead, .contents, .tools, .pickers"; // goes with what it belongs to
-const WARNING = "#decisions .decision.fail, .caveat, .assumed-shapes, .verdict, .robot h2, .robot .decision, p:has(strong)";
+const WARNING = "#decisions tr, .caveat, .assumed-shapes, .verdict, .robot h2, .robot .decision, p:has(strong)";
 
 // What a reader sees of an element, folded or not, in small letters.
 function allText(element) {
@@ -526,6 +526,9 @@ function addContents() {
   nav.append(details);
   document.querySelector("main").prepend(nav);
   const fit = () => (details.open = wide.matches);
+  const close = (event) => wide.matches || details.contains(event.target) || (details.open = false); // it covers the page
+  for (const event of ["pointerdown", "wheel", "touchmove"]) addEventListener(event, close, { passive: true });
+  addEventListener("keydown", (event) => event.key === "Escape" && !wide.matches && (details.open = false));
   const tell = () => {
     const read = headings.findLastIndex((heading) => heading.checkVisibility() && heading.getBoundingClientRect().top < 120);
     summary.textContent = read < 0 || wide.matches ? WORDS.contents : WORDS.contents + WORDS.colon + titles[read];
@@ -702,15 +705,16 @@ document.querySelectorAll(".scroll").forEach(fade);
 // A sheet of paper can't be unfolded.
 addEventListener("beforeprint", () => document.querySelectorAll(".provenance, details.section").forEach((details) => (details.open = true)));
 
-// On a phone each row of such a table is a card: its cells stand below one another, each after its column's name.
+// On a phone each row of a table of cards is one: its cells stand below one another, each after its column's name. A row
+// that an address leads to has these names too.
 function nameCells(table) {
   const names = [...table.tHead.rows[0].cells].map((header) => (header.innerText || header.textContent).replace(/\s+/g, " ").trim());
   for (const row of table.tBodies[0].rows) [...row.cells].forEach((cell, column) => (cell.dataset.column = names[column]));
-  table.classList.add("named");
+  table.classList.toggle("named", table.classList.contains("cards"));
 }
 
 for (const table of document.querySelectorAll("table")) {
-  if (table.classList.contains("cards")) nameCells(table);
+  if (table.classList.contains("cards") || table.querySelector("tbody tr[id]")) nameCells(table);
   makeSortable(table);
   const tools = document.createElement("p");
   tools.className = "tools";

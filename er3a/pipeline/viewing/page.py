@@ -33,6 +33,7 @@ from er3a.pipeline.messages.pages import GRADE_NAMES, GROUP_NAMES, Caveat, cavea
 from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
 from er3a.pipeline.results import (
     AbsentResults,
+    LeftOut,
     Provenance,
     Status,
     Stored,
@@ -71,7 +72,7 @@ SCRIPT_WORDS = {
     "contents": N_("Contents"),
     "filter": N_("Filter rows by"),
     "find": N_("Find on this page"),
-    "findAnywhere": N_("Find on all pages"),
+    "findAnywhere": N_("Find verdicts, headings, rows"),
     "found": N_("{count} places"),
     "none": N_("Nothing has all these words: try fewer, or others"),
     "noneAnywhere": N_("No verdict, heading or name of a row has all these words: try fewer, or look on a page"),
@@ -152,7 +153,10 @@ class Picture:
 
 @dataclass(frozen=True)
 class ShownFigure:
-    """A key figure in the page's language; the unit of ``part`` of a whole is the whole, in words."""
+    """A key figure in the page's language; the unit of ``part`` of a whole is the whole, in words.
+
+    ``measure`` : the unit as results name it
+    """
 
     name: str
     label: str
@@ -160,6 +164,12 @@ class ShownFigure:
     unit: str
     uncertainty: float | None
     part: bool
+    measure: str
+
+    @property
+    def text(self) -> str:
+        """The value with the digits that matter."""
+        return measured(self.value, self.uncertainty, self.measure)
 
 
 NUMERICS = {  # key figures that answer no question of a verdict
@@ -198,6 +208,19 @@ class Head:
     links: Mapping[str, str] = field(default_factory=dict)
 
     @property
+    def no_verdict(self) -> bool:
+        """Whether evidence contradicts the table that all rests on, so that nothing is said of the robot."""
+        first = self.caveats.get("validation")
+        return first is not None and first.status == "fail" and self.status != "not_computed"
+
+    @property
+    def sign(self) -> str:
+        """The classes of its mark, the same on every page: a pass beside what is expected to fail has its own."""
+        if self.no_verdict:
+            return "no_verdict"
+        return "pass as_meant" if self.status == "pass" and self.demonstrations else self.status
+
+    @property
     def finding(self) -> Any:
         """What the verdict says."""
         return self.summary.verdict.finding
@@ -225,10 +248,22 @@ class Head:
         return self.text.removesuffix(self.banner).rstrip()
 
 
-def head_of(stored: Stored[Any], links: Mapping[str, str] | None = None) -> Head:
-    """The head of a stage's page; ``links`` as of :class:`Head`."""
+EXAMINED_BY = {"torques": "dynamics"}  # what a stage leaves out, by the stage that examines it
+
+
+def _missed(found: LeftOut, pages: Sequence[str] | None) -> tuple[str, str]:
+    """What a verdict leaves out, and of which, or which of the robot's ``pages`` has it, where that is asked."""
+    named, stage = left_out_names(found), EXAMINED_BY.get(found.subject)
+    if stage and not named and pages is not None:
+        linked = Markup('<a href="{}.html">{}</a>').format(stage, tr(PAGES[stage]))
+        named = linked if stage in pages else tr("not examined in this study")
+    return left_out_text(found), named
+
+
+def head_of(stored: Stored[Any], links: Mapping[str, str] | None = None, pages: Sequence[str] | None = None) -> Head:
+    """The head of a stage's page; ``links`` as of :class:`Head`, ``pages``: of the robot."""
     verdict, stage = stored.results.summary.verdict, stored.stage
-    words = import_module(STAGES[stage].messages).FIGURES
+    words = import_module(STAGES[stage].messages).KEY_FIGURES
     shown = tuple(
         ShownFigure(
             figure.name,
@@ -237,6 +272,7 @@ def head_of(stored: Stored[Any], links: Mapping[str, str] | None = None) -> Head
             tr("of {total}", total=figure.of) if figure.of is not None else tr(figure.unit),
             figure.uncertainty,
             figure.of is not None,
+            figure.unit,
         )
         for figure in stored.results.summary.figures
     )
@@ -244,7 +280,7 @@ def head_of(stored: Stored[Any], links: Mapping[str, str] | None = None) -> Head
     meant = len(getattr(verdict.finding, "demonstrations", ()))
     found = say_reserved(verdict.finding, stored.results.summary.not_examined)
     text = joined([found, *listed(verdict.findings[1:])], " ")
-    missed = tuple((left_out_text(each), left_out_names(each)) for each in stored.results.summary.not_examined)
+    missed = tuple(_missed(each, pages) for each in stored.results.summary.not_examined)
     return Head(
         stored.robot,
         stage,
@@ -282,8 +318,35 @@ def render(
     provenance : of pages that show no stage
     context : what the template needs besides
     """
+    html = (
+        page_environment(template.parent)
+        .get_template(template.name)
+        .render(
+            style=(_HERE / "style.css").read_text(encoding="utf-8"),
+            script=(_HERE / "page.js").read_text(encoding="utf-8"),
+            script_words={key: tr(word) for key, word in SCRIPT_WORDS.items()},
+            terms=glossary(),
+            verdict_words=VERDICT_WORDS,
+            pages=PAGES,
+            language=language.current(),
+            summary=summary,
+            head=head,
+            command=command,
+            provenance=head.provenance if head else provenance,
+            preview=_preview(output.with_suffix(".webp")),
+            versions=_versions(),
+            commit=_commit(),
+            **context,
+        )
+    )
+    html = closed_up(html) if language.current() == "zh" else html
+    write_atomically(output, lambda file: file.write_text(html, encoding="utf-8"))
+
+
+def page_environment(*folders: Path) -> jinja2.Environment:
+    """Jinja as pages use it, with the templates of all pages and those of ``folders``."""
     environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader([template.parent, _HERE]),
+        loader=jinja2.FileSystemLoader([*folders, _HERE]),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
@@ -307,25 +370,7 @@ def render(
         "grade": partial(word, "grade", GRADE_NAMES),
         "group": partial(word, "group", GROUP_NAMES),
     }
-    html = environment.get_template(template.name).render(
-        style=(_HERE / "style.css").read_text(encoding="utf-8"),
-        script=(_HERE / "page.js").read_text(encoding="utf-8"),
-        script_words={key: tr(word) for key, word in SCRIPT_WORDS.items()},
-        terms=glossary(),
-        verdict_words=VERDICT_WORDS,
-        pages=PAGES,
-        language=language.current(),
-        summary=summary,
-        head=head,
-        command=command,
-        provenance=head.provenance if head else provenance,
-        preview=_preview(output.with_suffix(".webp")),
-        versions=_versions(),
-        commit=_commit(),
-        **context,
-    )
-    html = closed_up(html) if language.current() == "zh" else html
-    write_atomically(output, lambda file: file.write_text(html, encoding="utf-8"))
+    return environment
 
 
 def render_stage(
@@ -350,18 +395,18 @@ def render_stage(
     """
     name, stage = stored.robot, stored.stage
     shared = {
-        "head": head or head_of(stored, head_links),
+        "head": head or head_of(stored, head_links, study.pages(name)),
         "command": run_command(study, f"{name}/{stage}.html"),
         "robot": study.robot(name),
         "robot_pages": study.pages(name),
-        "box": "" if stage in ("validation", "workspace", "dynamics") else _box(study, stored),
+        "box": _tray_edges(study, stored) if STAGES[stage].obstacles else "",
     }
     template = _HERE.parent / "stages" / stage / "report.html.j2"
     render(template, output, stored.results.summary, **shared | context)
 
 
-def _box(study: Study, stored: Stored[Any]) -> str:
-    """The edges (mm) of the tray or box that the workspace page may place, which no other stage takes for an obstacle;
+def _tray_edges(study: Study, stored: Stored[Any]) -> str:
+    """The edges (mm) of the tray that the workspace page may place, which no other stage takes for an obstacle;
     empty where no place is asked for or recommended."""
     if "workspace" not in study.stages(stored.robot) or stored.rests_on.get("validation") == "fail":
         return ""

@@ -11,13 +11,16 @@ import numpy as np
 from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, syntax
 from er3a.programs.code_builder import variable_of
-from er3a.programs.evaluation import IN_DEGREES, Dialect, ProgramMemory, root
+from er3a.programs.evaluation import IN_DEGREES, Dialect, ProgramMemory, known, root
 from er3a.robots.masses import MassBody, moved
 
 FRAME_KEYS = ("X", "Y", "Z", "A", "B", "C")
 AXIS_KEYS = ("A1", "A2", "A3", "A4", "A5", "A6")
 AXIS_KINDS = ("AXIS", "E6AXIS")
+LEFT_OUT = "left out of"
 EXTERNAL_KEYS = ("E1", "E2", "E3", "E4", "E5", "E6")
+COORDINATES = frozenset((*FRAME_KEYS, *AXIS_KEYS, *EXTERNAL_KEYS))
+POSITION_KINDS = ("FRAME", "POS", "E6POS", *AXIS_KINDS)
 SIGN_ZERO = 1e-7  # rad; nearer to 0 a joint's sign says nothing
 NOT_NUMBERS = ("NAN", "INF", "INFINITY")
 Frames = tuple[instructions.NamedFrame, instructions.NamedFrame]
@@ -75,7 +78,7 @@ def relative(memory: ProgramMemory, value: syntax.Value, frames: Frames, said: t
         change = _joints(memory, value, text, missing=0.0)
         if memory.here.joints is None or not isinstance(change, instructions.JointTarget):
             return instructions.UnresolvedTarget(text, "position_unknown")
-        return instructions.JointTarget(memory.here.joints + change.joints)
+        return instructions.JointTarget(memory.here.joints + change.joints, change.external)
     if memory.read("$IPO_MODE") == "#TCP":
         return instructions.UnresolvedTarget(text, "external_tool")
     steps = syntax.Record(value.kind, (*((key, 0.0) for key in FRAME_KEYS if value.get(key) is None), *value.items))
@@ -83,11 +86,11 @@ def relative(memory: ProgramMemory, value: syntax.Value, frames: Frames, said: t
     if offset is None or seen is None:
         return instructions.UnresolvedTarget(text, "position_unknown")
     if in_tool:
-        return instructions.PoseTarget(seen @ offset)
+        return instructions.PoseTarget(seen @ offset, external=_external(value))
     found = seen.copy()
     found[:3, 3] += offset[:3, 3]
     found[:3, :3] = offset[:3, :3] @ seen[:3, :3]
-    return instructions.PoseTarget(found)
+    return instructions.PoseTarget(found, external=_external(value))
 
 
 def _unresolved(value: syntax.Unclear) -> instructions.UnresolvedTarget:
@@ -115,9 +118,17 @@ def _components(
 
 
 def _external(value: syntax.Record) -> tuple[tuple[str, float], ...]:
+    """Axes beside the arm that are given and not 0; NaN where the value is not known."""
     parts = dict(value.items)
-    given = ((key, syntax.number(parts[key])) for key in EXTERNAL_KEYS if key in parts)
-    return tuple((key, part) for key, part in given if part)
+    given = ((key, number) for key in EXTERNAL_KEYS if key in parts and (number := _of_axis(parts[key])))
+    return tuple(given)
+
+
+def _of_axis(value: syntax.Value) -> float:
+    """The value of an external axis; 0 of one that an assignment left out."""
+    if isinstance(value, syntax.Unclear):
+        return 0.0 if value.text.startswith(LEFT_OUT) else math.nan
+    return syntax.number(value) or 0.0
 
 
 def _joints(
@@ -316,10 +327,19 @@ def keep_setting(memory: ProgramMemory, name: str, expression: syntax.Expression
             _number(memory, "$BASE", "BASE_DATA", given)
         case "SIPO_MODE":
             memory.write("$IPO_MODE", given)
+        case "SORI_TYP" | "SORI_TYPE":
+            memory.write(name, _typed(given, "ORI_TYP", "#VAR"))
+        case "SCIRC_TYPE" | "SCIRC_TYP":
+            memory.write(name, _typed(given, "CIRC_TYP", "#BASE"))
         case _:
             if name in ("$TOOL", "$BASE"):
                 memory.write(name, syntax.Unclear(f"{expression.function}(...)"))
                 memory.shared.pop(name + "%name", None)
+
+
+def _typed(data: syntax.Value, name: str, usual: str) -> syntax.Value:
+    """How motion data say that the tool turns; as usual where they don't."""
+    return data.get(name) or usual if isinstance(data, syntax.Record) else data
 
 
 def _all_axes(memory: ProgramMemory, name: str, value: syntax.Value) -> None:
@@ -422,8 +442,10 @@ def _zone_data(memory: ProgramMemory, data: syntax.Value, usual: str) -> None:
 
 
 KINDS: dict[str, instructions.MotionKind] = {"PTP": "joint", "LIN": "line", "CIRC": "arc", "SPL": "spline"}
-MODAL = ("$TOOL", "$BASE", "$LOAD", "$VEL", "$ACC", "$APO", "$VEL_AXIS", "$ACC_AXIS", "$IPO_MODE")
+MODAL = ("$TOOL", "$BASE", "$LOAD", "$VEL", "$ACC", "$APO", "$VEL_AXIS", "$ACC_AXIS", "$IPO_MODE", "$ORI_TYPE")
 MODAL_DATA = ("PDAT_ACT", "LDAT_ACT", "FDAT_ACT", "%spline")
+READ_BY_NUMBER = ("TOOL_DATA", "BASE_DATA", "LOAD_DATA", "DEF_VEL_CP", "DEF_ACC_CP")
+"""What ``BAS`` and settings after WITH read without naming it."""
 HARMLESS_TEXT = """
 CAST_FROM CAST_TO CCLOSE CHECKHOME CIOCTL CLEAR_KRLMSG COPEN CREAD CWRITE DELETE_BACKWARD_BUFFER EB EB_ABS EK
 EKI_CHECK EKI_CHECKBUFFER EKI_CLEAR EKI_CLEARBUFFER EKI_CLOSE EKI_GETBOOL EKI_GETBOOLARRAY EKI_GETFRAME
@@ -446,19 +468,22 @@ READING = frozenset(READING_TEXT.split())
 """Functions of a controller that only read their arguments; others, as ``SREAD`` and ``EKI_GETREAL``, may set them."""
 OF_SETTINGS_TEXT = """
 SVEL_CP SVEL_JOINT SACC_CP SACC_JOINT SAPO SAPO_PTP STOOL STOOL2 SBASE SIPO_MODE SJERK SLOAD SGEAR_JERK SORI_TYP
-SORI_TYPE SCIRC_TYPE
+SORI_TYPE SCIRC_TYP SCIRC_TYPE SCIRC_M USE_CM_PRO_VALUES USE_CM_PRO_VALUES_ONLY
 """
 OF_SETTINGS = frozenset(OF_SETTINGS_TEXT.split())
 """Functions after WITH, which :func:`keep_setting` reads."""
 HARMLESS_VARIABLES_TEXT = """
-$ACCU_STATE $ADVANCE $ANOUT $AXWORKSPACE $CMD $CP_STATMON $CP_VEL_TYPE $CYCFLAG $CYCLE $DATE
-$ECO_LEVEL $ERR $EXT $FLAG $GEAR_JERK $H_POS $I_O_ACT $JERK $LOOP_MSG $MSG_T $OUT $OUT_NODRIVE $OV_APPL $OV_PRO $OV_ROB
-$PERI_RDY $PRO_ACT $PRO_MODE $PRO_STATE $RED_VEL $SOFT_PLCBOOL $SOFT_PLCINT $SOFT_PLCREAL $STOPNOAPROX $TIMER
-$TIMER_FLAG $TIMER_STOP $TORQMON $TORQMON_COM $TORQMON_DEF $TRACE $WBOXDISABLE $WORKSPACE
+$ACCU_STATE $ACC_EXTAX $ADVANCE $ANOUT $AXWORKSPACE $BWDSTART $CMD $COLLMON_TOL_PRO $CP_STATMON $CP_VEL_TYPE
+$CYCFLAG $CYCLE $DATE $ECO_LEVEL $ERR $EXT $FLAG $GEAR_JERK $H_POS $I_O_ACT $JERK $LOAD_A1 $LOAD_A2 $LOAD_A3
+$LOOP_MSG $MSG_T $OUT $OUT_NODRIVE $OV_APPL $OV_PRO $OV_ROB $PERI_RDY $PRO_ACT $PRO_MODE $PRO_STATE $RED_VEL
+$SOFT_PLCBOOL $SOFT_PLCINT $SOFT_PLCREAL $STOPNOAPROX $TIMER $TIMER_FLAG $TIMER_STOP $TORQMON $TORQMON_COM
+$TORQMON_DEF $TRACE $VEL_EXTAX $WBOXDISABLE $WORKSPACE
 """
 HARMLESS_VARIABLES = frozenset((*MODAL, *HARMLESS_VARIABLES_TEXT.split()))
 """System variables that are followed, or set nothing but speeds, stops, watches, signals and marks; another may make
 axes soft, shift paths (``$CORR_T``, ``$TECH``) or choose other postures (``$SINGUL_POS``)."""
+RUNNING = ("$CYCFLAG", "$DATE", "$OV_PRO", "$TIMER", "$TIMER_FLAG")
+"""System variables that change after they are set: watches, expressions that are evaluated again and again."""
 ORIENTATION_TYPES = {"$ORI_TYPE": ("#VAR", "#CONSTANT"), "$CIRC_TYPE": ("#BASE",)}
 """How the tool may turn on lines and arcs so that they are followed as they are meant."""
 CONTROLLER: dict[str, syntax.Value] = {
@@ -470,8 +495,10 @@ CONTROLLER: dict[str, syntax.Value] = {
     "$COLLISAVOID": False,
 }
 """What a controller of an arm without other axes has in variables that its own modules ask, if no error has come up."""
-HERE = ("$POS_ACT", "$POS_FOR", "$POS_INT", "$POS_ACT_MES")
-HERE_JOINTS = ("$AXIS_ACT", "$AXIS_FOR", "$AXIS_INT", "$AXIS_ACT_MEAS")
+HERE = ("$POS_ACT", "$POS_FOR", "$POS_ACT_MES")
+HERE_JOINTS = ("$AXIS_ACT", "$AXIS_FOR", "$AXIS_ACT_MEAS")
+WHERE_INTERRUPTED = ("$POS_INT", "$AXIS_INT")
+"""Where the arm was when an interrupt came, which is known nowhere."""
 
 
 BESIDE = 3  # operations
@@ -512,13 +539,14 @@ def _of_number(frame: syntax.Expression | None, number: syntax.Expression | None
 class KrlDialect(Dialect):
     """KRL, as a run needs it."""
 
-    modal = frozenset((*MODAL, *MODAL_DATA))
     frames = ("$TOOL", "$BASE")
     setters = frozenset(("BAS", "PULSE", "%SPLINE", "%ENDSPLINE"))
     whole_division = True
 
     def __init__(self, program: syntax.Program) -> None:
         """Numbers of tool and base count as followed where the frame is set beside each."""
+        changed = {variable_of(each.target) for each in program.operations() if isinstance(each, syntax.Assign)}
+        self.modal = frozenset((*MODAL, *MODAL_DATA, *changed.intersection(READ_BY_NUMBER)))
         self.numbers_only = {
             f"$ACT_{name}"
             for name in ("TOOL", "BASE")
@@ -529,6 +557,10 @@ class KrlDialect(Dialect):
     def is_signal(self, name: str) -> bool:
         """Outputs."""
         return name.startswith(("$OUT[", "$ANOUT["))
+
+    def runs_on(self, name: str) -> bool:
+        """Timers, cyclic flags, the override."""
+        return root(name) in RUNNING
 
     def is_followed(self, name: str, value: syntax.Value) -> bool:
         """Whether motions are followed as a variable asks that is set to a value."""
@@ -548,6 +580,16 @@ class KrlDialect(Dialect):
         """Tool and base keep the name of what they are set to."""
         return name in ("$TOOL", "$BASE")
 
+    def typed(self, kind: str, value: syntax.Value) -> syntax.Value:
+        """Coordinates are REAL, however they are written; a field of the program's own type is what it declares."""
+        if not isinstance(value, syntax.Record) or kind not in ("", *POSITION_KINDS):
+            return value
+        items = (
+            (key, float(each) if isinstance(each, int) and key in COORDINATES and not isinstance(each, bool) else each)
+            for key, each in value.items
+        )
+        return syntax.Record(value.kind, tuple(items))
+
     def assigned(self, old: syntax.Value, new: syntax.Value) -> syntax.Value:
         """A position that leaves out what the variable had: no source says whether the controller keeps that."""
         if (
@@ -557,7 +599,7 @@ class KrlDialect(Dialect):
         ):
             return new
         missing = tuple(
-            (key, syntax.Unclear(f"left out of {syntax.shown(new)}")) for key, _ in old.items if new.get(key) is None
+            (key, syntax.Unclear(f"{LEFT_OUT} {syntax.shown(new)}")) for key, _ in old.items if new.get(key) is None
         )
         return syntax.Record(new.kind, (*new.items, *missing))
 
@@ -613,20 +655,26 @@ class KrlDialect(Dialect):
 
     def motion(self, memory: ProgramMemory, move: syntax.Move) -> instructions.ArmMotion:
         """PTP, LIN, CIRC and their relatives and splines."""
-        kept = {name: memory.shared.get(name) for name in memory.shared if name in _SET} if move.settings else {}
-        angle = None
+        if not move.settings:
+            return self._motion(memory, move, None)
+        own = _SET.union(name for name, _ in move.settings)
+        kept, doubts = {name: value for name, value in memory.shared.items() if name in own}, dict(memory.doubts)
+        angle, doubt = None, ""
         for name, expression in move.settings:
             if name == "CA":
                 degrees = syntax.number(memory.value(expression))
                 angle = math.radians(degrees) if degrees is not None else math.nan
-            else:
-                keep_setting(memory, name, expression)
-        found = self._motion(memory, move, angle)
-        if move.settings:
-            for name in _SET & memory.shared.keys():
-                del memory.shared[name]
-            memory.shared.update({name: value for name, value in kept.items() if value is not None})
-            memory.kept.clear()
+                continue
+            keep_setting(memory, name, expression)
+            value = known(memory.read(name), name)
+            if not self.is_followed(name, value):
+                doubt = f"{name}={syntax.shown(value)}"
+        found = replace(self._motion(memory, move, angle), doubt=doubt)
+        for name in own & memory.shared.keys():
+            del memory.shared[name]
+        memory.shared.update(kept)
+        memory.doubts = doubts
+        memory.kept.clear()
         return found
 
     def _motion(self, memory: ProgramMemory, move: syntax.Move, angle: float | None) -> instructions.ArmMotion:
@@ -675,8 +723,9 @@ class KrlDialect(Dialect):
         """A motion's argument; to go to where the arm is, wherever that is, no joint moves."""
         if argument is None:
             return syntax.Unclear("")
-        here = isinstance(argument, syntax.Variable) and argument.name in HERE + HERE_JOINTS
-        if here and isinstance(memory.value(argument), syntax.Unclear):
+        name = argument.name if isinstance(argument, syntax.Variable) else ""
+        lost = name in WHERE_INTERRUPTED and memory.here.joints is None and memory.here.pose is None
+        if (lost or name in HERE + HERE_JOINTS) and isinstance(memory.value(argument), syntax.Unclear):
             return syntax.Record("E6AXIS", ())
         return memory.value(argument)
 
@@ -703,12 +752,13 @@ class KrlDialect(Dialect):
 
     def harmless(self, call: syntax.Invocation) -> bool:
         """Messages, files, signals."""
-        return call.function in HARMLESS or call.function in EVALUATED or call.function in OF_SETTINGS
+        return call.function in HARMLESS | EVALUATED | OF_SETTINGS or call.function == syntax.CYCLIC
 
 
-def sets_arguments(function: str) -> bool:
-    """Whether a function outside the program may set the variables that it is given: KRL passes them by reference."""
-    return not function.startswith("%") and function not in EVALUATED | OF_SETTINGS | READING
+def changed_arguments(call: syntax.Invocation) -> tuple[syntax.Expression | None, ...]:
+    """What a function outside the program may change: all that it is given, as KRL passes by reference."""
+    name = call.function
+    return () if name.startswith("%") or name in EVALUATED | OF_SETTINGS | READING else call.arguments
 
 
 _SET = frozenset(

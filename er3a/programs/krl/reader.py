@@ -23,8 +23,8 @@ from er3a.programs.code_builder import (
     variable_of,
     within,
 )
-from er3a.programs.instructions import Place
-from er3a.programs.krl.dialect import sets_arguments
+from er3a.programs.instructions import Aside, Place, Remark
+from er3a.programs.krl.dialect import HERE, HERE_JOINTS, changed_arguments
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, data_file_of, read_program_text
 from er3a.programs.program_findings import DataFileMissing, NameTwice, ProgramFinding
 
@@ -115,7 +115,7 @@ PTP LIN CIRC PTP_REL LIN_REL CIRC_REL SPTP SLIN SCIRC SPL SPTP_REL SLIN_REL SCIR
 """
 MOTIONS = frozenset(WORDS_OF_MOTIONS.split())
 WORDS_ASIDE = """
-EXT EXTFCT IMPORT ENUM STRUC CONTINUE ANIN ANOUT BRAKE TIME_BLOCK CONST_VEL ON_ERROR_PROCEED STOP
+EXT EXTFCT IMPORT ENUM STRUC CONTINUE ANOUT BRAKE CONST_VEL ON_ERROR_PROCEED STOP
 """
 ASIDES = frozenset(WORDS_ASIDE.split())
 OUTER_AXES = frozenset(["ASYPTP", "ASYCONT", "ASYSTOP", "ASYCANCEL"])  # which run beside the arm's own
@@ -228,6 +228,8 @@ class _Statement:
         if words.accept("="):
             value = words.expression()
             words.finish()
+            if _runs_ahead(self.builder) and any(_names(value, each) for each in (*HERE, *HERE_JOINTS)):
+                value = syntax.Constant(syntax.Unclear(f"{self.text} after CONTINUE"))
             self.builder.add(syntax.Assign(self.place, left, value, self.text))
             return
         words.finish()
@@ -311,15 +313,48 @@ def _case(reading: _Statement) -> None:
 
 
 def _wait(reading: _Statement) -> None:
-    words = reading.words
+    """The arm stops before a wait, unless a ``CONTINUE`` before it lets the program run ahead of the arm."""
+    words, stops = reading.words, not _runs_ahead(reading.builder)
     if words.accept("SEC"):
         seconds = words.expression()
         words.finish()
-        reading.builder.add(syntax.Waiting(reading.place, "seconds", seconds, reading.text))
+        reading.builder.add(syntax.Waiting(reading.place, "seconds", seconds, reading.text, stops))
         return
     words.expect("FOR")
     text = re.sub(r"(?i)^WAIT\s+FOR\s*", "", reading.text)
-    reading.builder.add(syntax.Waiting(reading.place, "condition", reading.condition(), text))
+    reading.builder.add(syntax.Waiting(reading.place, "condition", reading.condition(), text, stops))
+
+
+def _names(expression: syntax.Expression, name: str) -> bool:
+    """Whether a variable is in an expression."""
+    own = isinstance(expression, syntax.Variable) and expression.name == name
+    return own or any(_names(each, name) for each in syntax.inner(expression))
+
+
+def _runs_ahead(builder: CodeBuilder) -> bool:
+    """Whether the last statement, but for comments, is ``CONTINUE``."""
+    said = (each.instruction if isinstance(each, syntax.Fixed) else None for each in reversed(builder.code))
+    last = next((each for each in said if not isinstance(each, Remark)), None)
+    return isinstance(last, Aside) and last.text.upper() == "CONTINUE"
+
+
+def _anin(reading: _Statement) -> None:
+    """``ANIN ON X=20*S1+0`` sets the variable again and again: its value is nowhere known."""
+    if not reading.words.accept("ON"):
+        reading.builder.aside(reading.place, reading.text)
+        return
+    target = reading.words.reference()
+    reading.words.expect("=")
+    reading.builder.beside(reading.place, syntax.Invocation(syntax.CYCLIC, (target,)), reading.text, "interrupt")
+    reading.builder.unclear(reading.place, variable_of(target))
+
+
+def _time_block(reading: _Statement) -> None:
+    """``TIME_BLOCK END=0.05``: the time of a spline's part, in place of the programmed speeds."""
+    if reading.words.accept("END"):
+        reading.builder.unknown(reading.place, reading.text, may_move=False)
+    else:
+        reading.builder.aside(reading.place, reading.text)
 
 
 def _return(reading: _Statement) -> None:
@@ -386,8 +421,10 @@ HANDLERS: dict[str, Handler] = {
     "EXIT": _simple(lambda builder, place: builder.leave_loop(place)),
     "GOTO": _goto,
     "RETURN": _return,
-    "HALT": lambda reading: reading.builder.add(syntax.Waiting(reading.place, "operator", None, "HALT")),
+    "HALT": lambda reading: reading.builder.add(syntax.Waiting(reading.place, "operator", None, "HALT", stops=True)),
     "WAIT": _wait,
+    "ANIN": _anin,
+    "TIME_BLOCK": _time_block,
     "INTERRUPT": _interrupt,
     "TRIGGER": _do,
     "RESUME": lambda reading: reading.builder.unknown(reading.place, reading.text),  # the arm stops where it is
@@ -402,6 +439,12 @@ def _spline(reading: _Statement) -> None:
     form = "ENDSPLINE" if reading.text.upper().startswith("ENDSPLINE") else "SPLINE"
     begins = form == "SPLINE" and reading.words.accept("WITH")
     reading.builder.settings = tuple(reading.with_settings()) if begins else ()
+    if form == "ENDSPLINE" and reading.words.accept("C_SPL"):  # the zone of the block's last motion
+        code = reading.builder.code
+        at = next((i for i in reversed(range(len(code))) if isinstance(code[i], syntax.Move)), -1)
+        if at >= 0 and isinstance(last := code[at], syntax.Move):
+            code[at] = replace(last, words=(*last.words, "C_SPL"))
+    reading.words.finish()
     call = syntax.Invocation(f"%{form}", ())
     reading.builder.add(syntax.Doing(reading.place, call, reading.text))
 
@@ -489,7 +532,7 @@ def read_krl(source: ProgramText) -> syntax.Program:
             findings += more
     if data_file is None and lacks_data(routines, reader.data, CONFIG_NAMES):
         findings.append(DataFileMissing(source.path.with_suffix(".dat").name))
-    by_name, unlinked = linked([*called, *routines], sets_arguments)
+    by_name, unlinked = linked([*called, *routines], changed_arguments)
     return syntax.Program(
         "krl",
         source.path.stem,
@@ -577,10 +620,10 @@ class _KrlReader:
             builder.remark(place, comment)
 
     def _begin(self, kind: str, text: str, place: Place) -> CodeBuilder:
-        words = KrlWords(text)
+        words, returned = KrlWords(text), ""
         try:
             if kind == "DEFFCT":
-                words.name()
+                returned = words.name()
                 if words.accept("["):
                     words.arguments("]")
             name = words.name()
@@ -597,7 +640,10 @@ class _KrlReader:
                     break
         except MisreadError as error:
             raise fault(place, f"this head of a routine can't be read ({error})", "Write DEF NAME ( )") from None
-        return CodeBuilder(name, tuple(parameters), place)
+        builder = CodeBuilder(name, tuple(parameters), place)
+        if returned:
+            builder.add(syntax.Assign(place, syntax.Variable(syntax.RETURNED), None, "", returned, local=True))
+        return builder
 
 
 def split_comment(line: str, place: Place) -> tuple[str, str]:

@@ -60,7 +60,7 @@ class KrlWriter(writing.Writer):
         target = self._target(ready)
         via = None if ready.via is None else _frame_text(ready.via)
         if target is None or (motion.kind == "arc" and via is None):
-            self.left_out(motion)
+            self.omit(motion)
             return
         self._frame("$TOOL", motion.tool)
         self._frame("$BASE", motion.base)

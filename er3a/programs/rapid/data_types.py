@@ -22,7 +22,7 @@ from scipy.spatial.transform import Rotation
 
 from er3a.numerics.arrays import Reals
 from er3a.programs.instructions import MeantSolution, numbers_of, pose_of
-from er3a.programs.syntax import Record, Value, finite, number, numbers
+from er3a.programs.syntax import Record, Unclear, Value, finite, number, numbers
 from er3a.robots.masses import MassBody
 
 Shape = tuple["str | Shape", ...]
@@ -270,10 +270,10 @@ def quarters_of(joints: Reals) -> tuple[int, ...]:
 
 
 def external_axes(value: Value | None) -> tuple[tuple[str, float], ...]:
-    """Axes beside the arm that an extjoint moves: those that are there and not at 0."""
+    """Axes beside the arm that an extjoint moves: those that are there and not at 0; NaN where that is not known."""
     if not isinstance(value, Record):
         value = typed(value, EXTJOINT) if value is not None else None
     if not isinstance(value, Record):
         return ()
-    given = ((name.lower(), number(each)) for name, each in value.items)
-    return tuple((name, each) for name, each in given if each and abs(each) < NO_AXIS / 10)
+    given = ((name.lower(), math.nan if isinstance(each, Unclear) else number(each)) for name, each in value.items)
+    return tuple((name, each) for name, each in given if each and not abs(each) >= NO_AXIS / 10)

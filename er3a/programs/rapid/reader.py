@@ -15,7 +15,7 @@ from pathlib import Path
 
 from er3a.errors import InputError
 from er3a.programs import syntax
-from er3a.programs.code_builder import CodeBuilder, fault, linked, mapped, within
+from er3a.programs.code_builder import CodeBuilder, fault, linked, mapped, variable_of, within
 from er3a.programs.instructions import Place
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, read_program_text
 from er3a.programs.program_findings import NameTwice, NotSimulated, NotUnderstood, ProgramFinding
@@ -58,8 +58,18 @@ MOTIONS = frozenset(
 SEARCHES = ("SEARCHL", "SEARCHC")
 CALLING = ("MOVEJSYNC", "MOVELSYNC", "MOVECSYNC")
 """Motions that call a procedure, named by a text, where they end."""
-CHANGING = {"TPREADNUM": 0, "TPREADFK": 0, "TPREADDNUM": 0, "GETSYSDATA": 0, "GETDATAVAL": 1}
+CHANGING = {
+    "TPREADNUM": 0,
+    "TPREADFK": 0,
+    "TPREADDNUM": 0,
+    "GETSYSDATA": 0,
+    "GETDATAVAL": 1,
+    "BITCLEAR": 0,
+    "BITSET": 0,
+}
 """Instructions that change one of their arguments, by its number."""
+CHANGING_OPTIONS = frozenset(("TIMEFLAG", "VALUE", "VALUEATTIMEOUT", "BREAKFLAG"))
+"""Optional arguments that instructions and functions change."""
 READING = ("READ", "GET", "UNPACK", "RMQGET", "RMQREAD", "SOCKETRECEIVE", "SOCKETACCEPT", "UIMSGBOX", "PACK", "COPYRAW")
 """How instructions begin that may change any variable that they are given."""
 CHANGING_FUNCTIONS = {"STRTOVAL": 1, "TESTANDSET": 0, "GETNEXTSYM": 0}
@@ -80,6 +90,8 @@ WZSPHDEF
 NOT_SIMULATED = frozenset(NOT_SIMULATED_TEXT.split())
 """What is known to shape a motion or to move something else, and is not followed: it is named."""
 UPPER, ARITHMETIC, TYPED, STEP, LATE = "%UPPER", "%ARITHMETIC", "%TYPED", "%STEP", "%LATE"
+FAILED = "%FAILED"
+"""Whether an instruction ends with an error, which only the cell knows."""
 PASSING = "%PASSING"
 """Whether the arm may not be at the last target yet, as after a motion with a zone: the program goes on before."""
 ARRIVING = frozenset(("INPOS", "ZEROSPEED"))
@@ -248,7 +260,7 @@ def read_rapid(source: ProgramText) -> syntax.Program:
             each for each in reversed(data) if isinstance(each.target, syntax.Variable) and each.target.name == name
         )
         findings.append(NameTwice(name, last.place))
-    by_name, unlinked = linked([each for reader in readers for each in reader.routines])
+    by_name, unlinked = linked([each for reader in readers for each in reader.routines], changed_arguments)
     return syntax.Program(
         "rapid",
         source.path.stem,
@@ -259,6 +271,13 @@ def read_rapid(source: ProgramText) -> syntax.Program:
         (*findings, *unlinked),
         source.lines,
     )
+
+
+def changed_arguments(call: syntax.Invocation) -> list[syntax.Expression | None]:
+    """What a function of the controller changes of its arguments."""
+    at = CHANGING_FUNCTIONS.get(call.function)
+    by_name: list[syntax.Expression | None] = [each for key, each in call.keywords if key in CHANGING_OPTIONS]
+    return by_name if at is None else [*call.arguments[at : at + 1], *by_name]
 
 
 def _entry(own: list[syntax.Routine], routines: Mapping[str, syntax.Routine]) -> str:
@@ -391,6 +410,7 @@ class _ModuleReader:
         self.traps: set[str] = set()
         self.data: list[syntax.Assign] = []
         self.findings: list[ProgramFinding] = []
+        self.goes_on = any(each.text == "TRYNEXT" for each in cursor.tokens)
 
     def read(self) -> None:
         """Declarations and routines."""
@@ -551,9 +571,13 @@ class _BodyReader:
 
     def __init__(self, module: _ModuleReader, builder: CodeBuilder, scope: Scope):
         self.module, self.cursor, self.builder, self.scope = module, module.cursor, builder, scope
+        self.end = ""
+        self.leaves = False  # whether an error may end the routine here
 
     def read(self, end: str) -> None:
         """Instructions up to the word that ends the routine, which is not passed, with its handlers."""
+        self.end = end
+        self.leaves = end == "ENDPROC" and self._error_leaves()
         handler = self._handler_moves(end)
         while (token := self.cursor.next(comments=True)) is not None:
             if token.kind == "comment":
@@ -579,6 +603,8 @@ class _BodyReader:
                 self.cursor.head(")")
             inside.instructions(end)
             builder.add(syntax.Return(place))
+        changed = (each.target for each in builder.code if isinstance(each, syntax.Assign) and not each.local)
+        self.builder.unsettled |= set(map(variable_of, changed))
         if handler:
             self.module.routines.append(builder.routine(self.cursor.place()))
 
@@ -649,18 +675,6 @@ class _BodyReader:
             tuple((name, settled(each)) for name, each in named),
         )
 
-    def forget_changed(self, place: Place, expression: syntax.Expression, text: str) -> None:
-        """What a function in an expression changes has no known value after it."""
-        for each in syntax.inner(expression):
-            self.forget_changed(place, each, text)
-        if isinstance(expression, syntax.Invocation) and expression.function in CHANGING_FUNCTIONS:
-            at = CHANGING_FUNCTIONS[expression.function]
-            given = expression.arguments[at] if at < len(expression.arguments) else None
-            if isinstance(given, (syntax.Variable, syntax.Element, syntax.Member)):
-                self.builder.add(
-                    syntax.Assign(place, given, syntax.Constant(syntax.Unclear(expression.function.lower())), text)
-                )
-
     def late(self, place: Place, called: syntax.Expression, given: Given, text: str) -> None:
         """A call of the procedure that a text names when the program runs; the candidates are tried one by one."""
         prefix, whole = _prefix(called)
@@ -713,7 +727,6 @@ class _BodyReader:
             value = self.value(words)
             words.finish()
             builder.add(syntax.Assign(place, target, self.scope.typed(value, self.scope.shape_of(target, first)), text))
-            self.forget_changed(place, value, text)
             return
         words.take()
         if first in PLAIN_WORDS:
@@ -743,20 +756,25 @@ class _BodyReader:
             if name in CALLING and placed and placed[-1] is not None:
                 self.late(place, placed[-1], ((), ()), text)
             return
-        if name in LEAVING or (name.startswith("WAIT") and options & ARRIVING):
+        arrives = name.startswith("WAIT") and bool(options & ARRIVING)
+        if name in LEAVING or arrives:
             builder.add(syntax.Assign(place, syntax.Variable(PASSING), syntax.Constant(name in LEAVING), ""))
         if name == "WAITTIME" and placed:
-            builder.add(syntax.Waiting(place, "seconds", placed[0], text))
+            builder.add(syntax.Waiting(place, "seconds", placed[0], text, arrives))
             return
         if name == "CALLBYVAR" and len(placed) == 2 and placed[0] is not None and placed[1] is not None:
             suffix = syntax.Invocation("NUMTOSTR", (placed[1], syntax.Constant(0)))
             self.late(place, syntax.Invocation(ARITHMETIC, (syntax.Constant("+"), placed[0], suffix)), ((), ()), text)
             return
         if name in WAITS:
-            builder.add(syntax.Waiting(place, "condition", None, text))
+            builder.add(syntax.Waiting(place, "condition", None, text, arrives))
+            if self.leaves and "MAXTIME" in options and "TIMEFLAG" not in options:
+                builder.open_if(place, syntax.Invocation(FAILED, ()), text)
+                builder.add(syntax.Return(place))
+                builder.close("if", place)
         else:
             builder.add(syntax.Doing(place, syntax.Invocation(name, placed, named), text))
-        changed = [each for key, each in named if key in ("TIMEFLAG", "VALUE")]
+        changed = [each for key, each in named if key in CHANGING_OPTIONS]
         if name in CHANGING and CHANGING[name] < len(placed):
             changed.append(placed[CHANGING[name]] or syntax.Constant(0))
         if name.startswith(READING):
@@ -764,6 +782,18 @@ class _BodyReader:
         for each in changed:
             if isinstance(each, (syntax.Variable, syntax.Element, syntax.Member)):
                 builder.add(syntax.Assign(place, each, syntax.Constant(syntax.Unclear(f"what {name} gives")), text))
+
+    def _error_leaves(self) -> bool:
+        """Whether an error ends the routine: by its handler, or by a caller's, which goes on with what is next."""
+        at, tokens = self.cursor.at, self.cursor.tokens
+        handler: set[str] = set()
+        while at < len(tokens) and tokens[at].text != self.end:
+            if tokens[at].kind == "name" and (handler or tokens[at].text == "ERROR"):
+                handler.add(tokens[at].text)
+            at += 1
+        if not handler:
+            return self.module.goes_on
+        return bool(handler & {"RETURN", "RAISE"}) or not handler & {"RETRY", "TRYNEXT"}
 
     def _handler_moves(self, end: str) -> str:
         """The first of the routine's handlers that may move the arm; empty if none may."""
@@ -806,7 +836,6 @@ def _if(body: _BodyReader, place: Place) -> None:
         cursor.at += 1
         text = _words_text(cursor, start)
         found = body.condition(condition)
-        body.forget_changed(place, found, text)
         builder.open_if(place, found, text)
         body.instructions("ENDIF", "ELSEIF", "ELSE")
         while cursor.word() != "ENDIF":
@@ -831,7 +860,6 @@ def _if(body: _BodyReader, place: Place) -> None:
     except MisreadError:
         builder.unknown(place, text)
         return
-    body.forget_changed(place, test, text)
     kept = [each for each in tokens if each.kind != "comment"][words.at :]
     builder.open_if(place, test, cursor.text([each for each in tokens if each.kind != "comment"][: words.at]))
     body.instruction(place, kept)
@@ -950,16 +978,25 @@ def _goto(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None
 
 def _stop(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None:
     """Stop, after which the arm rests at its target, and Break, which does not wait for that."""
-    body.builder.add(syntax.Waiting(place, "operator", None, text))
-    body.builder.add(syntax.Assign(place, syntax.Variable(PASSING), syntax.Constant(text[:5].upper() == "BREAK"), ""))
+    breaks = text[:5].upper() == "BREAK"
+    body.builder.add(syntax.Waiting(place, "operator", None, text, stops=not breaks))
+    body.builder.add(syntax.Assign(place, syntax.Variable(PASSING), syntax.Constant(breaks), ""))
 
 
 def _halt(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None:
+    """EXIT and ExitCycle, after which the program begins again: from wherever the arm is, if a trap asks for it."""
+    if body.end == "ENDTRAP" and words.texts[0] == "EXITCYCLE":
+        body.builder.unknown(place, text)
     body.builder.add(syntax.Halt(place))
 
 
 def _leave(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None:
-    """RAISE, RETRY, TRYNEXT: where they lead to is known when an error comes about, so nothing follows here."""
+    """RAISE, RETRY, TRYNEXT: where they lead to is known when an error comes about, so nothing follows here.
+
+    RAISE in a trap leaves the routine that it came into, wherever the arm is.
+    """
+    if body.end == "ENDTRAP" and words.texts[0] == "RAISE":
+        body.builder.unknown(place, text)
     body.builder.add(syntax.Return(place))
 
 

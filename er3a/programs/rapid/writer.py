@@ -71,12 +71,12 @@ class RapidWriter(writing.Writer):
             if joints is None and isinstance(target, instructions.JointTarget):
                 joints = target.joints
             if joints is None or np.isnan(joints).any():
-                self.left_out(motion)
+                self.omit(motion)
                 return
             form, texts = "MoveAbsJ", [_joints_text(joints)]
         else:
             if ready.pose is None or (motion.kind == "arc" and ready.via is None) or motion.angle is not None:
-                self.left_out(motion)
+                self.omit(motion)
                 return
             form = {"arc": "MoveC", "joint": "MoveJ"}.get(motion.kind, "MoveL")
             conf = self._configuration(ready, "ConfJ" if motion.kind == "joint" else "ConfL")

@@ -101,7 +101,7 @@ class RplWriter(Writer):
             return
         target = self._target(ready)
         if target is None:
-            self.left_out(motion)
+            self.omit(motion)
             return
         if motion.kind == "spline":
             self.count["splines"] += 1
@@ -137,7 +137,7 @@ class RplWriter(Writer):
         joints = [None] if poses is None else self.resolver.solve(poses, frames, ready.joints_before)
         targets = [_joints_text(each) for each in joints if each is not None]
         if len(targets) < len(joints):
-            self.left_out(motion)
+            self.omit(motion)
             return
         self.count["arcs"] += 1
         self.count["chords"] += len(targets)

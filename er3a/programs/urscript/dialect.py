@@ -27,6 +27,7 @@ PARAMETERS = {
 DEFAULTS = {"movej": (1.4, 1.05), "movel": (1.2, 0.25), "movep": (1.2, 0.25), "movec": (1.2, 0.25)}
 ROBOT_BASE = instructions.NamedFrame("base", np.eye(4))
 PASSING = "%passing"  # whether the program goes on while the arm still moves to its last target
+STOPS = ("stopj", "stopl")
 READING = ("get_actual_", "get_target_", "get_forward_kin")  # beginnings of functions that read where the arm is
 NAME = re.compile(r"[A-Za-z_][\w.]*(\[[^]]*\])?")
 SAME_TURN = 1e-9
@@ -64,7 +65,7 @@ set_standard_analog_out set_standard_digital_input_action set_standard_digital_o
 set_tool_analog_input_domain set_tool_communication set_tool_digital_input_action set_tool_digital_out
 set_tool_digital_output_mode set_tool_output_mode set_tool_voltage sleep socket_close socket_get_var socket_open
 socket_read_ascii_float socket_read_binary_integer socket_read_byte_list socket_read_line socket_read_string
-socket_send_byte socket_send_int socket_send_line socket_send_string socket_set_var stopj stopl str_at str_cat
+socket_send_byte socket_send_int socket_send_line socket_send_string socket_set_var str_at str_cat
 str_empty str_find str_len str_sub sync textmsg time to_num to_str tool_contact tool_contact_examples varmsg
 write_output_boolean_register write_output_float_register write_output_integer_register write_port_bit
 write_port_register zero_ftsensor
@@ -145,12 +146,12 @@ class UrScriptDialect(Dialect):
             and isinstance(each.value, syntax.Invocation)
             and each.value.function == "rpc_factory"
         )
-        reads = any(word in line for line in program.lines for word in READING)
+        reads = any(word in line for line in program.lines for word in READING + STOPS)
         self.modal = frozenset(("%tcp", "%load", *((PASSING,) if reads else ())))
 
     local_by_default = True
     frames = ("%tcp",)
-    setters = frozenset(("set_tcp", *LOADS))
+    setters = frozenset(("set_tcp", *LOADS, *STOPS))
     first_index = 0
 
     def constant(self, memory: ProgramMemory, name: str) -> syntax.Value | None:
@@ -266,6 +267,8 @@ class UrScriptDialect(Dialect):
                 if isinstance(_load(memory.read("%load")), instructions.UnclearLoad)
                 else None
             )
+        if call.function in STOPS:  # within a blend the arm stops somewhere on its way
+            return instructions.Unknown(doing.text) if memory.read(PASSING) else instructions.Aside(doing.text)
         output = _placed(("n", "b"), values, keywords) if call.function in OUTPUTS else None
         if output is not None and len(output) == 2:
             return instructions.Output(

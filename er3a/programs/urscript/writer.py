@@ -71,7 +71,7 @@ class UrScriptWriter(writing.Writer):
         target = self._target(ready)
         base = motion.base
         if target is None or (motion.kind == "arc" and ready.via is None) or motion.angle is not None:
-            self.left_out(motion)
+            self.omit(motion)
             return
         if base.pose is None and base.name:
             self.name_tool(base.name)

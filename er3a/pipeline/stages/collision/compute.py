@@ -128,6 +128,7 @@ def compute(study: Study, name: str) -> model.CollisionResults:
     mounting = tuple(stated(model.Mounting, contact) for contact in base_contacts(robot, scene))
     matrix = _matrix(bodies)
     places_found = _places_summary(places)
+    meant = {each.name for each in motions if "collides" in each.expected}
     wrong = model.ShapesOverlap(bodies.in_error, space.whole.value) if bodies.in_error else None
     undecided = int((matrix.state == "undecided").sum())
     home_found = None if at_home is None else model.HomeCollides(at_home, float(-smallest[0] * 1000), space.whole.value)
@@ -140,7 +141,11 @@ def compute(study: Study, name: str) -> model.CollisionResults:
         *(space.whole.value, places_found.reached, places_found.clear, joined, undecided, assumed is not None),
         targets=len(at_targets),
         nearest=_nearest_target(at_targets),
-        colliding=tuple(model.CollidingPath(each.name, each.between) for each in on_paths if each.clearance_mm < 0),
+        colliding=tuple(
+            model.CollidingPath(each.name, each.between, each.name in meant)
+            for each in on_paths
+            if each.clearance_mm < 0
+        ),
     )
     return model.CollisionResults(
         summary=model.CollisionSummary(
@@ -201,7 +206,7 @@ def _left_out(study: Study, name: str, found: model.TargetClearances, motions: l
         yield LeftOut("paths", skipped)
     if unknown := tuple(each.name for each in motions if each.motion and np.isnan(each.motion.q).any()):
         yield LeftOut("path_stretches", unknown)
-    yield from by_subject(rest for each in motions if each.expect in (None, "safe") for rest in each.left_out)
+    yield from by_subject(rest for each in motions if each.meant_safe for rest in each.left_out)
 
 
 def _matrix(bodies: Bodies) -> model.MatrixRows:

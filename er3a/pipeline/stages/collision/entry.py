@@ -44,4 +44,5 @@ STAGE = Stage(
     settings={"collision": CollisionSettings, "trajectory": TrajectorySettings},
     inputs=_inputs,
     rests_on=("validation",),
+    obstacles=True,
 )

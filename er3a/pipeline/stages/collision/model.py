@@ -54,10 +54,11 @@ class NearestTarget(Finding):
 
 
 class CollidingPath(Finding):
-    """A path on which two bodies overlap, the deepest of them."""
+    """A path on which two bodies overlap, the deepest of them; ``expected``: whether its file expects that."""
 
     name: str
     pair: Pair
+    expected: bool = False
 
 
 class FreeSpace(Finding, code="collision.free_space"):
@@ -161,7 +162,7 @@ class MatrixRows(Table):
     watched: Flags = column("whether distances of the pair are measured")
     least_mm: Reals = column("of pairs that never meet, a proven lower bound of their distance")
     left_out_mm: Reals = column("radius of the region around the joint that is left out; 0 where none is")
-    boxes: Integers = column("boxes of joint vectors looked at to prove it")
+    boxes: Integers = column("ranges of joint values looked at to prove it")
     witness_deg: Reals = per_joint("a joint vector in which watched parts overlap; NaN: none")
     reason: Texts = column("what the person who decided on the pair wrote")
 

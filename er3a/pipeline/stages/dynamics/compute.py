@@ -257,7 +257,7 @@ def path_torques(
     wrist : joints whose moments by the load are wanted
     """
     entry, n, (outcomes, runs) = motion.entry, arm.robot.joints, judged
-    asked = entry.expect in (None, "safe")
+    asked = set(entry.expected) <= {"safe"}
     t = np.linspace(0.0, motion.built.duration, samples)
     q, qd, qdd = motion.rates(t)
     if not np.isfinite([q, qd, qdd]).all():
@@ -619,7 +619,7 @@ def _paths(
     judge_of = PathJudge(study.robot(name), surroundings, near_singular(trajectory), arm.limits)
     found, skipped, rest = [], [], list[LeftOut]()
     for each in study_motions(study, name, trajectory.checks_per_sample):
-        rest += each.left_out if each.expect in (None, "safe") else ()
+        rest += each.left_out if each.meant_safe else ()
         if each.motion is None:
             skipped.append(each.name)
         else:

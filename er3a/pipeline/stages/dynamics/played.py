@@ -5,7 +5,7 @@ from __future__ import annotations
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.player.motions import PlayedEvent, PlayedMotion
 from er3a.pipeline.stages.dynamics.model import DynamicsResults, JointLoad
-from er3a.pipeline.viewing.numbers import number
+from er3a.pipeline.viewing.numbers import measured
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
@@ -23,4 +23,9 @@ def motions(robot: Robot, results: DynamicsResults) -> list[PlayedMotion]:
 
 
 def _peak(load: JointLoad) -> str:
-    return tr("J{joint} at its peak: {peak} {unit}", joint=load.joint, peak=number(load.peak, 3), unit=load.unit)
+    return tr(
+        "J{joint} at its peak: {peak} {unit}",
+        joint=load.joint,
+        peak=measured(load.peak, None, load.unit),
+        unit=load.unit,
+    )

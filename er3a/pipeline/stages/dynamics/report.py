@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from er3a.pipeline.stages.dynamics import model
 from er3a.pipeline.stages.dynamics.played import motions
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import axis_label, new_figure, row_of_panels
-from er3a.pipeline.viewing.numbers import fixed, no_noise, number
+from er3a.pipeline.viewing.numbers import decimals_of, decimals_of_column, fixed, number
 from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINTS, MUTED
 
@@ -30,10 +31,15 @@ def joint_colour(joint: int) -> str:
     return JOINTS[joint % len(JOINTS)]
 
 
-def bound_text(bound: float) -> str:
-    """Four digits of an upper bound, rounded up, because fewer would claim more."""
-    digit = 10.0 ** (np.floor(np.log10(bound)) - 3) if bound else 1.0
-    return number(float(np.ceil(bound / digit - 1e-5) * digit), 4)
+def bound_text(bound: float, decimals: int) -> str:
+    """An upper bound, rounded up, because fewer digits would claim more."""
+    return fixed(float(np.ceil(bound * 10**decimals - 1e-5)) / 10**decimals, decimals)
+
+
+def within(value: float, tolerance: float, decimals: int = 2) -> str:
+    """A value with its tolerance, two digits of that and no more decimals than ``decimals``."""
+    shown = min(decimals, decimals_of(value, tolerance, "") if value else decimals)
+    return f"{fixed(value, shown)} ± {fixed(tolerance, shown)}"
 
 
 def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
@@ -68,12 +74,11 @@ def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
         ax.set_xlabel(axis_label(rows, "t_s"))
     most = max(model.PARTS, key=lambda part: getattr(load, part))
     caption = tr(
-        "J{joint} needs the greatest torque, {peak} ± {tolerance} {unit} at {t:.2f} s; largest contribution: "
+        "J{joint} needs the greatest torque, {peak} {unit} at {t:.2f} s; largest contribution: "
         "{part}. Shaded: uncertainty of the torques from the tolerances of masses and centres. Power below 0 is"
         " fed back to the drive.",
         joint=load.joint,
-        peak=number(load.peak, 3),
-        tolerance=number(load.tolerance, 2),
+        peak=within(load.peak, load.tolerance),
         unit=load.unit,
         t=load.peak_at_s,
         part=names[most],
@@ -95,13 +100,12 @@ def holding_figure(summary: model.DynamicsSummary) -> Picture:
     ax.grid(visible=False, axis="x")
     worst = model.hardest_held(summary.holding)
     caption = tr(
-        "At rest J{joint} needs the greatest holding torque: {torque} ± {tolerance} {unit}. No pose within the "
+        "At rest J{joint} needs the greatest holding torque: {torque} {unit}. No pose within the "
         "joint limits needs more than {bound} {unit} there, for the masses as given.",
         joint=worst.joint,
-        torque=number(abs(worst.torque), 3),
-        tolerance=number(worst.tolerance, 2),
+        torque=within(abs(worst.torque), worst.tolerance),
         unit=worst.unit,
-        bound=bound_text(worst.bound),
+        bound=bound_text(worst.bound, decimals_of_column([worst.bound])),
     )
     return Picture(figure, tr("Bars: the greatest holding torque at each joint, with its tolerance."), caption)
 
@@ -153,7 +157,7 @@ def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) ->
         links=_links(summary),
         uses=[_use(use) for use in summary.uses[:MAX_USES]],
         more_uses=max(0, len(summary.uses) - MAX_USES),
-        motors=[_motor(motor) for motor in summary.motors],
+        motors=_motors(summary.motors),
         paths=[_path(path) for path in summary.paths if path.counts],
         not_run=[_not_run(path) for path in summary.paths if not path.counts],
         nodes=_nodes(summary),
@@ -166,7 +170,7 @@ def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) ->
         wrist_uses=_wrist_uses(summary),
         units=_units(summary),
         holding=holding,
-        held=[_held(held) for held in summary.holding],
+        held=_held(summary.holding),
         diagram=diagram,
     )
 
@@ -176,7 +180,7 @@ def _links(summary: model.DynamicsSummary) -> list[list[str]]:
     for link in summary.masses.links if summary.masses else ():
         name = tr("base") if link.link == 0 else str(link.link)
         origin = tr("guessed") if link.estimated else tr("file") if link.mass_kg is not None else tr("unknown")
-        mass = number(link.mass_kg, 4) if link.mass_kg is not None else NONE
+        mass = fixed(link.mass_kg, 3) if link.mass_kg is not None else NONE
         rows.append([name, mass, ", ".join(fixed(value, 1) for value in link.centre_mm) or NONE, origin])
     return rows
 
@@ -207,13 +211,20 @@ def _label(joint: int, unit: model.Unit) -> str:
     return f"J{joint}" if unit == model.TORQUE else tr("J{joint} (slides)", joint=joint)
 
 
-def _motor(motor: model.MotorNeed) -> list[str]:
-    inertia = f"{number(motor.inertia_low, 2)} – {number(motor.inertia_high, 2)}"
-    needs = motor.peak, motor.rms, motor.holding, motor.speed, motor.power_w
+def _motors(motors: Sequence[model.MotorNeed]) -> list[list[str]]:
+    torque = decimals_of_column(value for motor in motors for value in (motor.peak, motor.holding))
+    power = decimals_of_column(motor.power_w for motor in motors)
+    inertia = decimals_of_column(motor.inertia_high for motor in motors)
+    return [_motor(motor, torque, power, inertia) for motor in motors]
+
+
+def _motor(motor: model.MotorNeed, torque: int, power: int, inertia: int) -> list[str]:
     return [
         _label(motor.joint, motor.unit),
-        *(number(no_noise(value), 3) for value in needs),
-        inertia,
+        *(fixed(value, torque) for value in (motor.peak, motor.rms, motor.holding)),
+        fixed(motor.speed, 1),
+        fixed(motor.power_w, power),
+        f"{fixed(motor.inertia_low, inertia)} – {fixed(motor.inertia_high, inertia)}",
         *(
             NONE if value is None else number(value, 3)
             for value in (
@@ -232,7 +243,7 @@ def _not_run(path: model.PathLoad) -> list[str]:
     if not path.complete:
         return [path.name, why, tr("not followed to its end")]
     worst = path.hardest
-    peak = f"{number(worst.peak, 3)} ± {number(worst.tolerance, 2)} {worst.unit} (J{worst.joint})"
+    peak = f"{within(worst.peak, worst.tolerance)} {worst.unit} (J{worst.joint})"
     return [Markup('<a href="#{0}">{0}</a>').format(path.name), why, peak]
 
 
@@ -253,9 +264,9 @@ def _path(path: model.PathLoad) -> list[str]:
         timed = say(path.no_law)
     return [
         Markup('<a href="#{0}">{0}</a>').format(path.name),
-        f"{number(worst.peak, 3)} ± {number(worst.tolerance, 2)} {worst.unit} (J{worst.joint})",
-        number(energy, 3),
-        number(back, 3),
+        f"{within(worst.peak, worst.tolerance)} {worst.unit} (J{worst.joint})",
+        fixed(energy, 2),
+        fixed(back, 2),
         _bound(path.payload),
         _bound(path.speed_scale),
         timed,
@@ -273,28 +284,44 @@ def _bound(bound: model.BindingLimit | None) -> str:
 
 
 def _joints(path: model.PathLoad) -> list[list[str]]:
+    torque, power, energy = (
+        decimals_of_column(value for load in path.joints for value in of(load))
+        for of in (
+            lambda load: (load.peak, *(getattr(load, part) for part in model.PARTS)),
+            lambda load: (load.power_w, load.braking_w),
+            lambda load: (load.work_j, load.recovered_j),
+        )
+    )
     return [
         [
             _label(load.joint, load.unit),
-            f"{number(no_noise(load.peak), 3)} ± {number(no_noise(load.tolerance), 2)}",
+            within(load.peak, load.tolerance, torque),
             moment(path.name, load.peak_at_s, fixed(load.peak_at_s, 2)),
-            f"{number(no_noise(load.rms), 3)} ± {number(no_noise(load.rms_tolerance), 2)}",
-            *(number(no_noise(getattr(load, part)), 3) for part in model.PARTS),
-            _both(load.power_w, load.braking_w),
-            _both(load.work_j, load.recovered_j),
+            within(load.rms, load.rms_tolerance, torque),
+            *(fixed(getattr(load, part), torque) for part in model.PARTS),
+            _both(load.power_w, load.braking_w, power),
+            _both(load.work_j, load.recovered_j, energy),
         ]
         for load in path.joints
     ]
 
 
-def _both(given: float, taken: float) -> Markup:
-    return Markup("{}<br>{}").format(number(no_noise(given), 3), number(no_noise(taken), 3))
+def _both(given: float, taken: float, decimals: int) -> Markup:
+    return Markup("{}<br>{}").format(fixed(given, decimals), fixed(taken, decimals))
 
 
-def _held(held: model.HoldingTorque) -> list[str]:
-    found, bound, tolerance = (no_noise(value) for value in (abs(held.torque), held.bound, held.tolerance))
-    pose = panel_link(held.q, ", ".join(fixed(value, 0) for value in held.q))
-    return [_label(held.joint, held.unit), number(found, 4), bound_text(bound), number(tolerance, 2), pose]
+def _held(holding: Sequence[model.HoldingTorque]) -> list[list[str]]:
+    decimals = decimals_of_column(held.bound for held in holding)
+    return [
+        [
+            _label(held.joint, held.unit),
+            fixed(abs(held.torque), decimals),
+            bound_text(held.bound, decimals),
+            fixed(held.tolerance, decimals),
+            panel_link(held.q, ", ".join(fixed(value, 0) for value in held.q)),
+        ]
+        for held in holding
+    ]
 
 
 def _wrist_uses(summary: model.DynamicsSummary) -> list[list[str]]:
@@ -307,7 +334,7 @@ def _wrist(summary: model.DynamicsSummary) -> list[list[str]]:
         [
             path.name,
             f"J{moment.joint}",
-            f"{number(no_noise(moment.moment_n_m), 3)} ± {number(no_noise(moment.tolerance), 2)}",
+            within(moment.moment_n_m, moment.tolerance),
             fixed(moment.t_s, 2),
         ]
         for path in summary.paths

@@ -39,4 +39,5 @@ STAGE = Stage(
     settings={"inverse": InverseSettings, "trajectory": TrajectorySettings},
     inputs=_inputs,
     rests_on=("validation",),
+    obstacles=True,
 )

@@ -464,13 +464,20 @@ def _rule_heading(robot: Robot, rule: str) -> str:
     return bracketed(_rule(rule), "" if unit == "1" else tr(unit)) + ">"
 
 
+def _measure(rule: str, value: float) -> str:
+    """What a rule ranks by, in the decimals that matter in its unit."""
+    unit = next((own.unit for name, own in RULES.items() if name == rule), "1")
+    decimals = 3 if rule == "manipulability" else 2 if unit in ("1", "s") else 1
+    return "∞" if np.isinf(value) else fixed(no_noise(value), decimals)
+
+
 def rule_rows(ranked: model.RankingRows, rules: list[str]) -> list[list[str]]:
     """One row for each branch: the measure of each rule, with its place; a dash for a rule that this target lacks."""
     rows, collides = [], tr("collides")
     for branch in np.unique(ranked.branch):
         own = ranked.take(ranked.branch == branch)
         cells = {
-            rule: f"{number(no_noise(measure), 3)}{NO_BREAK_SPACE}({place or collides})"
+            rule: f"{_measure(rule, measure)}{NO_BREAK_SPACE}({place or collides})"
             for rule, measure, place in zip(own.rule, own.measure, own.place)
         }
         rows.append([_on_one_line(own.label[0], int(branch)), *(cells.get(rule, "–") for rule in rules)])
@@ -654,6 +661,7 @@ def _joints(q_deg: Iterable[float]) -> str:
 
 
 def _listed(values: Iterable[float]) -> str:
-    """Numbers with one decimal where they need it, kept on one line."""
-    texts = (fixed(value, 1).removesuffix(".0") for value in values)
-    return f",{NO_BREAK_SPACE}".join(texts)
+    """Numbers, with one decimal where one of them needs it, kept on one line."""
+    texts = [fixed(value, 1) for value in values]
+    whole = all(text.endswith(".0") for text in texts)
+    return f",{NO_BREAK_SPACE}".join(text.removesuffix(".0") if whole else text for text in texts)

@@ -44,4 +44,8 @@ STAGE = Stage(
     inputs=_inputs,
     is_configured=lambda study, robot: study.entry(robot).programs is not None,
     rests_on=("validation",),
+    shows=("workspace",),
+    obstacles=True,
+    motions=N_("programs"),
+    may_run=True,
 )

@@ -7,11 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from er3a.pipeline.messages.expectations import outcome_word
+from er3a.pipeline.messages.expectations import as_expected, outcome_word
 from er3a.pipeline.messages.language import own_title, tr
 from er3a.pipeline.messages.programs import remedies, say
 from er3a.pipeline.messages.say import joined, say_first
 from er3a.pipeline.player.motions import Fault, FaultMoment, PlayedEvent, PlayedMotion, Weight, address_of
+from er3a.pipeline.stages.expectations import is_met
 from er3a.pipeline.stages.programs.model import FindingAt, ProgramMotion, ProgramsResults, ProgramSummary
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.program_check.program_check_findings import RANKS, Level, MotionCollides
@@ -46,7 +47,7 @@ def motions(robot: Robot, results: ProgramsResults) -> list[PlayedMotion]:
 
 def worst_first(programs: Sequence[ProgramSummary]) -> list[ProgramSummary]:
     """Those that fail first, of them those that were not expected to."""
-    return sorted(programs, key=lambda each: (-RANKS[each.outcome], each.expect == each.outcome))
+    return sorted(programs, key=lambda each: (-RANKS[each.outcome], is_met(each)))
 
 
 def faults(results: ProgramsResults) -> list[Fault]:
@@ -67,7 +68,8 @@ def faults(results: ProgramsResults) -> list[Fault]:
                 own_title(program.title),
                 WEIGHTS[program.outcome],
                 outcome_word(program.outcome),
-                program.expect == program.outcome,
+                is_met(program),
+                as_expected(program),
                 tuple(FaultMoment(say_first(m.finding), _where(program, m), _place(m, rows)) for m in told),
                 " ".join(dict.fromkeys(text for each in told for text in remedies_of(program, each)[:1])),
                 address_of("programs", program.name, first.program_s or 0.0, line_id(program.name, first.line * own)),

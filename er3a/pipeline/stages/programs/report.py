@@ -10,6 +10,7 @@ import numpy as np
 from markupsafe import Markup, escape
 
 from er3a.pipeline.messages.collision import solid_rows
+from er3a.pipeline.messages.expectations import as_expected
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.programs import cycle_text, level_word, remedies, remedy_at
 from er3a.pipeline.messages.say import bracketed, say
@@ -29,6 +30,7 @@ from er3a.pipeline.stages.programs.played import (
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.pipeline.viewing.page import render_stage
+from er3a.pipeline.viewing.tray import compared_with_tray, in_tray
 from er3a.program_check.program_check_findings import Level, worst_of
 from er3a.programs.languages import LANGUAGES
 
@@ -47,6 +49,8 @@ def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) ->
         output,
         head_links={each.name: f"#{each.name}" for each in summary.programs},
         sections=sections,
+        entered=None if stored.rests_on.get("validation") == "fail" else in_tray(study, stored),
+        compared_with_tray=compared_with_tray,
         limits_assumed=limits_assumed(
             summary.assumed_speed, any(each.subject == "own_accelerations" for each in summary.not_examined)
         ),
@@ -75,6 +79,7 @@ def _section(results: model.ProgramsResults, program: model.ProgramSummary) -> d
     return dict(
         program=program,
         status=program.outcome,
+        expected=as_expected(program),
         language=LANGUAGES[program.language].title,
         cycle=cycle_text(program),
         lines=_listing(program, text, rows, motion, found),

@@ -293,7 +293,7 @@ def path_summary(
         title=entry.title,
         kind=entry.kind,
         verdict=judgement.verdict_of(found, along),
-        expect=entry.expect,
+        expect=entry.expected,
         in_joint_space=followed is None,
         duration_s=float(motion.built.duration),
         samples=entry.samples,
@@ -384,12 +384,12 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
     turned: list[tuple[str, Reals, Reals]] = []
     for each in listed_motions(file, planning, required, settings.checks_per_sample):
         motion = each.motion
-        rest += each.left_out if each.expect in (None, "safe") else ()
+        rest += each.left_out if each.meant_safe else ()
         if motion is None:
-            known = each.outcome_unfollowed, each.expect, each.ends.t if each.ends else None
+            known = each.outcome_unfollowed, each.expected, each.ends.t if each.ends else None
             skipped.append(model.PathNotFollowed(each.name, each.title, wrist_partition_missing(robot), *known))
             continue
-        turned += _asked_of_tool(each.name, motion) if each.expect in (None, "safe") else ()
+        turned += _asked_of_tool(each.name, motion) if each.meant_safe else ()
         found = judgement.judge(robot, motion, near, limits)
         along = judgement.measured(surroundings, motion)
         avoided = avoidance.avoid(motion, found, along)
@@ -407,9 +407,7 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
     checks = model.PathChecks.stacked(tables).of_joints(robot.slides)
     own = checks.take(checks.sample)
     length = characteristic_length(robot)
-    clearance = {
-        path.name: path.clearance.least_mm / 1000 for path in paths if path.clearance and path.expect in (None, "safe")
-    }
+    clearance = {path.name: path.clearance.least_mm / 1000 for path in paths if path.clearance and path.meant_safe}
     assumed_shapes = shapes_assumed(robot, assumed_margin, clearance)
     summary = model.TrajectorySummary(
         verdict=_verdict(paths, skipped, assumed_shapes)
@@ -513,8 +511,8 @@ def _verdict(
 ) -> Verdict[model.AllSafe | model.SomeUnsafe | model.NoneSafe | ExpectationsUnmet]:
     if unmet := unmet_expectations([*paths, *skipped]):
         return Verdict("fail", unmet)
-    asked = [path for path in paths if path.expect in (None, "safe")]
-    unfollowed = [path for path in skipped if path.expect is None]
+    asked = [path for path in paths if path.meant_safe]
+    unfollowed = [path for path in skipped if not path.expect]
 
     def named(verdict: PathVerdict) -> tuple[str, ...]:
         return tuple(path.name for path in asked if path.verdict == verdict)
@@ -538,7 +536,7 @@ def _verdict(
         too_fast_if_assumed=named("too fast for the assumed limits"),
         undecided=named("undecided"),
         near_singular=named("near-singular"),
-        demonstrations=demonstrations(judged, "safe", lambda each: each.outcomes),
+        demonstrations=demonstrations(judged, "safe"),
         not_followed=tuple(path.name for path in unfollowed),
     )
     return Verdict(status, counts)
@@ -552,7 +550,7 @@ def _fails(path: model.PathSummary) -> bool:
 def _figures(
     paths: list[model.PathSummary], length: float, limits: model.LimitsUsed, shapes: ShapesAssumed | None
 ) -> tuple[Figure, ...]:
-    asked = [path for path in paths if path.expect in (None, "safe")]  # demonstrations are counted apart
+    asked = [path for path in paths if path.meant_safe]  # demonstrations are counted apart
     events = [event for path in asked for event in path.singularities]
     bounded = [path for path in paths if path.max_joint_speed_deg_s]
     agreement = max((path.velocity_check_deg_s * 1e6 for path in bounded), default=None)

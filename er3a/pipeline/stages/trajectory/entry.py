@@ -31,4 +31,8 @@ STAGE = Stage(
     settings={"trajectory": TrajectorySettings},
     inputs=_inputs,
     rests_on=("validation",),
+    shows=("workspace",),
+    obstacles=True,
+    motions=N_("paths"),
+    may_run=True,
 )

@@ -267,7 +267,7 @@ class PathSummary:
 
     Attributes
     ----------
-    expect : the verdict that its file expects
+    expect : what its file expects
     in_joint_space : whether it is a move of the joints, which singular poses do no harm
     branches : of the closed form, in the order in which they serve
     start_turn_deg : by which the arm turns at rest before it starts; None in joint space
@@ -289,7 +289,7 @@ class PathSummary:
     title: str
     kind: PathKind
     verdict: PathVerdict
-    expect: PathVerdict | None
+    expect: tuple[PathVerdict, ...]
     in_joint_space: bool
     duration_s: float
     samples: int
@@ -340,6 +340,11 @@ class PathSummary:
         return self.verdict
 
     @property
+    def meant_safe(self) -> bool:
+        """Whether it is given to be run, not to show a fault."""
+        return set(self.expect) <= {"safe"}
+
+    @property
     def outcomes(self) -> tuple[PathVerdict, ...]:
         """The verdict and, if it is another, that it collides: the first fault first."""
         parts = self.unreachable if self.verdict == "unreachable" else self.out_of_limits
@@ -370,7 +375,7 @@ class PathNotFollowed:
     ----------
     lacking : what the arm lacks for branches
     outcome : what it came to; ``undecided`` for an arm whose class has no way to follow it
-    expect : the verdict that its file expects
+    expect : what its file expects
     stops_at_s : of arms that are followed by their class, the time (s) beyond which the path is out of reach or asks a
         joint to leap; else None
     """
@@ -379,7 +384,7 @@ class PathNotFollowed:
     title: str
     lacking: ClosedFormMissing | None
     outcome: PathVerdict
-    expect: PathVerdict | None
+    expect: tuple[PathVerdict, ...]
     stops_at_s: float | None = None
 
     @property

@@ -44,7 +44,7 @@ class PartOfProgram:
     name: str
     title: str
     samples: int
-    expect: PathVerdict | None
+    expected: tuple[PathVerdict, ...]
     part: ProgramPart
     rest: tuple[int, ...]
 
@@ -79,7 +79,7 @@ def planned_entries(robot: Robot, entry: PathEntry | ProgramPath, source: Comman
         name = f"{entry.name}_{number}" if len(parts) > 1 else entry.name
         first, last = part.lines
         title = f"{entry.title}, lines {first} to {last}" if last > first else f"{entry.title}, line {first}"
-        yield PartOfProgram(name, title, entry.samples, entry.expect, part, rest)
+        yield PartOfProgram(name, title, entry.samples, entry.expected, part, rest)
 
 
 FOLLOWED_AT = 1030  # times at which a path of the tool is solved at least: its branches depend on no samples
@@ -314,10 +314,15 @@ class ListedMotion:
     listed: str
     name: str
     title: str
-    expect: PathVerdict | None
+    expected: tuple[PathVerdict, ...]
     motion: Motion | None
     ends: PathEndsError | None = None
     left_out: tuple[LeftOut, ...] = ()
+
+    @property
+    def meant_safe(self) -> bool:
+        """Whether it is given to be run, not to show a fault."""
+        return set(self.expected) <= {"safe"}
 
     @property
     def outcome_unfollowed(self) -> PathVerdict:
@@ -377,4 +382,4 @@ def listed_motions(
                 ("given_rates", motion.built.unread if motion else ()),
             )
             rest = tuple(LeftOut(of, (f"{listed.name}: {', '.join(map(str, own))}",)) for of, own in parts if own)
-            yield ListedMotion(listed.name, entry.name, entry.title, entry.expect, motion, ended, rest)
+            yield ListedMotion(listed.name, entry.name, entry.title, entry.expected, motion, ended, rest)

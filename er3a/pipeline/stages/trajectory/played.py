@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from er3a.pipeline.messages.expectations import outcome_word
+from er3a.pipeline.messages.expectations import as_expected, outcome_words
 from er3a.pipeline.messages.language import own_title, tr
 from er3a.pipeline.messages.programs import remedy, say
 from er3a.pipeline.messages.say import joined, sentence
@@ -20,8 +20,10 @@ from er3a.pipeline.messages.trajectory import (
     first_faults,
     path_text,
     repair_text,
+    switch_text,
 )
 from er3a.pipeline.player.motions import Fault, FaultMoment, Mark, PlayedEvent, PlayedMotion, Weight, address_of
+from er3a.pipeline.stages.expectations import is_met
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.planning.names import PathVerdict
@@ -61,7 +63,7 @@ def motions(robot: Robot, results: model.TrajectoryResults) -> list[PlayedMotion
 def worst_first(paths: Sequence[model.PathSummary]) -> list[model.PathSummary]:
     """Those that fail first, of them those that were not expected to."""
     ranks = ("fail", "caution", "plain")
-    return sorted(paths, key=lambda path: (ranks.index(WEIGHTS[path.verdict]), path.expect == path.verdict))
+    return sorted(paths, key=lambda path: (ranks.index(WEIGHTS[path.verdict]), is_met(path)))
 
 
 def faults(results: model.TrajectoryResults) -> list[Fault]:
@@ -75,14 +77,16 @@ def faults(results: model.TrajectoryResults) -> list[Fault]:
         wrong = [(clearance.t_s, say(near))] if clearance else _faults(path)
         status, verdict = shown_verdict(path, near)
         rows = results.checks.take(results.checks.path == path.name)
-        to_do, instead = _to_do(path, rows, results.summary)
+        own = results.avoidance.take(results.avoidance.path == path.name)
+        to_do, instead = _to_do(path, rows, own, results.summary)
         found.append(
             Fault(
                 path.name,
                 own_title(path.title),
                 status,
                 verdict,
-                path.expect == path.verdict != "safe",
+                path.verdict != "safe" and is_met(path),
+                as_expected(path),
                 tuple(_moment(text, t, rows) for t, text in wrong),
                 to_do,
                 address_of("trajectory", path.name, wrong[0][0] or 0.0, path.name),
@@ -119,19 +123,20 @@ def _assumed(part: model.Stretch[Any]) -> bool:
 
 
 def _to_do(
-    path: model.PathSummary, rows: model.PathChecks, summary: model.TrajectorySummary
+    path: model.PathSummary, rows: model.PathChecks, motions: model.AvoidanceRows, summary: model.TrajectorySummary
 ) -> tuple[str, tuple[str, str] | None]:
     """What to do instead of running a path as it is, and the motion that may be run with its address."""
     assumed = summary.verdict.shapes is not None
     if path.chosen:
         name = repaired(path)
-        repair = sentence("finding", finding=repair_text(path, summary.joint_limits, assumed=assumed))
+        repair_said = repair_text(path, summary.joint_limits, assumed=assumed)
+        repair = sentence("finding", finding=joined([repair_said, _switch(path, rows, motions)], ". "))
         return repair, (name, address_of("trajectory", name, 0.0, path.name))
     if path.verdict == "safe" and (near := near_assumed(path, summary)):
         return remedy(near), None
     last = path.sound_end
     if last is None:
-        todo = advised(path, rows, summary.joint_limits, assumed=assumed)
+        todo = advised(path, rows, motions, summary.joint_limits, assumed=assumed)
         return sentence("finding", finding=todo) if todo else "", None
     name = tr("{path}, up to {time} s", path=path.name, time=fixed(last.t_s, 3))
     end = end_text(path, last, assumed=assumed)
@@ -139,20 +144,34 @@ def _to_do(
 
 
 def advised(
-    path: model.PathSummary, rows: model.PathChecks, limits: model.LimitsUsed, *, assumed: bool = False
+    path: model.PathSummary,
+    rows: model.PathChecks,
+    motions: model.AvoidanceRows,
+    limits: model.LimitsUsed,
+    *,
+    assumed: bool = False,
 ) -> str | None:
     """What to do about a path; None where nothing is to be done.
 
-    ``rows``, ``limits``: of the path, of the joints; ``assumed``: whether clearance is that of assumed shapes.
+    ``rows``, ``motions``, ``limits``: of the path, of its repairs, of the joints; ``assumed``: whether clearance is
+    that of assumed shapes.
     """
     text = advice(path, limits, assumed=assumed)
     if text is None or path.chosen:
-        return text
+        return text and joined([text, _switch(path, rows, motions)], ". ")
     if not path.in_joint_space and len(rows) and rows.near_singular[0]:
         met = any(event.crossing and event.t_s <= rows.t_s[0] for event in path.singularities)
         return joined([sentence("advice.near#met" if met else "advice.near"), text], ". ")
     no_part = path.sound_end is None and WEIGHTS[path.verdict] == "fail"
     return joined([text, sentence("advice.no_part")], ". ") if no_part else text
+
+
+def _switch(path: model.PathSummary, rows: model.PathChecks, motions: model.AvoidanceRows) -> str:
+    """Where a motion on another IK solution begins, and whether the way there was checked; empty for other motions."""
+    own = motions.take(motions.strategy == path.strategy)
+    if path.strategy != "branch" or not len(rows) or not len(own):
+        return ""
+    return switch_text((own.q_deg[0] - rows.q_deg[0]).tolist(), path.sliding)
 
 
 def repaired(path: model.PathSummary) -> str:
@@ -164,7 +183,7 @@ def shown_verdict(path: model.PathSummary, near: ClearOfAssumed | None) -> tuple
     """A path's verdict in colour and words; ``near`` as of :func:`near_assumed`."""
     if path.verdict == "safe" and near:
         return "caution", tr("clear of assumed shapes only")
-    return WEIGHTS[path.verdict], joined(map(outcome_word, path.outcomes), ", ")
+    return WEIGHTS[path.verdict], outcome_words(path.outcomes)
 
 
 def near_assumed(path: model.PathSummary, summary: model.TrajectorySummary) -> ClearOfAssumed | None:

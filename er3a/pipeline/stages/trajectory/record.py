@@ -13,6 +13,7 @@ from matplotlib.colors import LogNorm
 
 from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Flags, Reals
+from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.trajectory import advice, event_word, path_text
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.trajectory.model import MotionRows, PathChecks, PathSummary, TrajectoryResults
@@ -91,8 +92,8 @@ def runs_of_path(robot: Robot, results: TrajectoryResults, path: PathSummary) ->
         yield Run(
             **_moved(robot, repaired),
             name=f"{path.name}, repaired",
-            text=f"## {path.name}, repaired\n{to_do}.",
-            outcome=to_do,
+            text=f"## {path.name}, repaired\n**{outcome_word('safe')}**: {to_do}.",
+            outcome=f"{outcome_word('safe')}: {to_do}",
             shapes=[*still, *_trail(repaired, MODEL)],
         )
 

@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 
 from er3a.pipeline.messages.collision import solid_rows
+from er3a.pipeline.messages.expectations import as_expected
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import N_, tr, with_unit
 from er3a.pipeline.messages.programs import remedy
-from er3a.pipeline.messages.say import joined, say
+from er3a.pipeline.messages.say import bracketed, joined, say
 from er3a.pipeline.messages.trajectory import (
+    adjoined,
     cause_text,
     event_distance,
     event_word,
@@ -43,6 +45,7 @@ from er3a.pipeline.viewing.conditions import condition_of, program_head
 from er3a.pipeline.viewing.figures import readings
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import packed_text, render_stage
+from er3a.pipeline.viewing.tray import compared_with_tray, in_tray
 from er3a.programs.languages import titles_unwritten
 from er3a.programs.writing import with_head_lines
 from er3a.robots.robot import Robot
@@ -68,7 +71,7 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
             results.programs.take((results.programs.path == path.name) & (i < count and not contradicted)), lines
         )
         drawn = _figure(figure, robot, path, rows, own, summary.near) if i < count else None
-        sections.append(_section(path, rows, drawn, links, summary))
+        sections.append(_section(path, rows, own, drawn, links, summary))
     assumed = [f"J{j + 1}" for j, is_assumed in enumerate(summary.joint_limits.speed_assumed) if is_assumed]
     render_stage(
         study,
@@ -76,11 +79,14 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         output,
         head_links={path.name: f"#{path.name}" for path in summary.paths},
         sections=sections,
+        entered=None if contradicted else in_tray(study, stored),
+        compared_with_tray=compared_with_tray,
         faults={fault.name: fault for fault in faults(results)},
         unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
         clearance=clearance_section(results, count),
         solids=solid_rows(scene),
         assumed=assumed,
+        assumed_speeds=_assumed_speeds(summary.joint_limits, robot),
         limits_assumed=limits_assumed(summary.joint_limits.speed_assumed, summary.joint_limits.acceleration_assumed),
         contradicted=contradicted,
         drawn_paths=count,
@@ -89,6 +95,16 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         drawing_head=drawing_head(),
         condition=condition_of(stored.validated),
     )
+
+
+def _assumed_speeds(limits: model.LimitsUsed, robot: Robot) -> str:
+    """The joint speeds that are assumed, each with its joints."""
+    joints: dict[str, list[str]] = {}
+    for j, (speed, assumed) in enumerate(zip(limits.speed_deg_s, limits.speed_assumed)):
+        if assumed:
+            shown = with_unit(number(speed, 4), "mm/s" if robot.slides[j] else "deg/s")
+            joints.setdefault(shown, []).append(f"J{j + 1}")
+    return joined([bracketed(speed, ", ".join(named)) for speed, named in joints.items()], ", ")
 
 
 def _programs(rows: model.ProgramFiles, head: Sequence[str]) -> list[dict[str, Any]]:
@@ -104,6 +120,7 @@ def _programs(rows: model.ProgramFiles, head: Sequence[str]) -> list[dict[str, A
 def _section(
     path: model.PathSummary,
     rows: model.PathChecks,
+    motions: model.AvoidanceRows,
     figure: dict[str, Any] | None,
     programs: list[dict[str, Any]],
     summary: model.TrajectorySummary,
@@ -115,9 +132,10 @@ def _section(
         status=status.replace("plain", "pass"),
         verdict=verdict,
         kind=kind_word(path.kind),
+        expected=as_expected(path),
         text=joined([path_text(path), say(near) if near else ""]),
         distance=_clear_of(path, assumed),
-        advice=advised(path, rows, summary.joint_limits, assumed=assumed),
+        advice=advised(path, rows, motions, summary.joint_limits, assumed=assumed),
         near=joined([say(near), remedy(near).rstrip(".。")], ". ") if near else "",
         branches=[branch_word(label) for label in path.branches],
         speed=_speed(path, summary.joint_limits),
@@ -135,7 +153,7 @@ def _clear_of(path: model.PathSummary, assumed: bool) -> str:
     """How near a path that passes comes to anything, by ``assumed`` shapes; empty where that is not known."""
     if path.clearance is None or path.verdict != "safe":
         return ""
-    far = number(path.clearance.least_mm, 3)
+    far = fixed(path.clearance.least_mm, 1)
     text = N_("{far} mm clear of assumed shapes: {pair}.") if assumed else N_("{far} mm clear: {pair}.")
     return tr(text, far=far, pair=say(path.clearance.between))
 
@@ -185,7 +203,8 @@ def _faults(path: model.PathSummary) -> list[list[str]]:
             cause_text(path, part),
         ]
         for word, part in sorted(
-            ((word, part) for word, stretches in kinds(path) for part in stretches), key=lambda each: each[1].t0_s
+            ((word, part) for word, stretches in kinds(path) for part in adjoined(stretches)),
+            key=lambda each: each[1].t0_s,
         )
     ]
 
@@ -196,7 +215,7 @@ def _strategies(path: model.PathSummary) -> list[list[str]]:
         return []
     clearance = _clearance(path.clearance.least_mm if path.clearance else None)
     ratios = _ratio(path.max_joint_speed_ratio), _ratio(path.max_joint_acceleration_ratio)
-    programmed = ["0", "0", *ratios, clearance, fixed(path.duration_s, 2), tr("the path to be repaired")]
+    programmed = ["0.00", "0.00", *ratios, clearance, fixed(path.duration_s, 2), tr("the path to be repaired")]
     rows = [[tr("as programmed"), *programmed]]
     for tried in path.avoidance:
         name = strategy_word(tried.name) + (" ←" if tried.name == path.strategy else "")
@@ -205,7 +224,7 @@ def _strategies(path: model.PathSummary) -> list[list[str]]:
         else:
             rows.append([name, *_costs(tried.motion), _remark(tried, tried.motion)])
     if path.fastest_s and not (path.out_of_limits or path.collisions or path.unreachable):
-        costs = ["0", "0", "1.00", "1.00", clearance, fixed(path.fastest_s, 2)]
+        costs = ["0.00", "0.00", "1.00", "1.00", clearance, fixed(path.fastest_s, 2)]
         remark = tr("for comparison: only with a speed that varies along the path as the limits allow")
         rows.append([tr("the path at its fastest"), *costs, remark])
     return rows
@@ -213,8 +232,8 @@ def _strategies(path: model.PathSummary) -> list[list[str]]:
 
 def _costs(motion: model.StrategyMotion) -> list[str]:
     return [
-        _small(motion.max_deviation_mm),
-        _small(motion.max_deviation_deg),
+        fixed(motion.max_deviation_mm, 2),
+        fixed(motion.max_deviation_deg, 2),
         _ratio(motion.max_joint_speed_ratio),
         _ratio(motion.max_joint_acceleration_ratio),
         _clearance(motion.clearance_mm),
@@ -236,10 +255,6 @@ def _remark(tried: model.TriedStrategy, motion: model.StrategyMotion) -> str:
 
 def _ratio(value: float | None) -> str:
     return tr("no bound") if value is None else fixed(value, 2)
-
-
-def _small(value: float) -> str:
-    return "0" if value < 5e-4 else number(value, 3)
 
 
 def _conclusion(path: model.PathSummary, rows: model.PathChecks) -> str:
@@ -268,12 +283,12 @@ def _speed(path: model.PathSummary, limits: model.LimitsUsed) -> str:
         return "–" if not path.joint_speed_bounded and path.verdict == "unreachable" else tr("unbounded")
     joint = max(range(len(speeds)), key=lambda j: speeds[j] / limits.speed_deg_s[j])
     unit = " mm/s" if joint + 1 in path.sliding else ""
-    return f"{number(speeds[joint], 3)}{unit} (J{joint + 1})"
+    return f"{fixed(speeds[joint], 1)}{unit} (J{joint + 1})"
 
 
 def _event_row(path: str, event: model.Singularity) -> list[str]:
-    until = f" – {fixed(event.until_s, 6)}" if event.until_s > event.t_s else ""
-    when = moment(path, event.t_s, fixed(event.t_s, 6) + until)
+    until = f" – {fixed(event.until_s, 3)}" if event.until_s > event.t_s else ""
+    when = moment(path, event.t_s, fixed(event.t_s, 3) + until)
     if event.crossing:
         return [event_word(event), when, tr("meets it"), "0"]
     return [event_word(event), when, tr("passes by"), event_distance(event)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Set
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from itertools import combinations, product
 from math import pi
 from typing import Any
@@ -46,7 +46,7 @@ VERDICTS: Mapping[str, Mapping[Status, str]] = {  # in the three words that a re
     },
     N_("not confirmed"): {
         "weak": N_("too loosely"),
-        "consistent": N_("only its own source gives it"),
+        "consistent": N_("may contradict another table, confirms none of its own values"),
         "open": N_("no document tells it from another value"),
     },
     N_("contradicted"): {"contradicted": N_("→ what the evidence gives")},
@@ -113,18 +113,12 @@ def evidence_section(
     legend, and the entries in words; rows of entries begin with the name, which is the address on the page.
 
     ``to_use``: the evidence of the table to use instead. What only its own source gives is marked so in both: that
-    document alone settles an entry of another table, but would be called no confirmation beside it.
+    document alone settles an entry of another table, which stays settled, but confirms nothing beside its own table.
     """
     if evidence is None:
         return None
     unconfirmed = {each.entry for each in to_use.entries if each.status == "consistent"} if to_use else set()
     of_one = [each.entry for each in evidence.entries if each.status in CONFIRMED and each.entry in unconfirmed]
-    evidence = replace(
-        evidence,
-        entries=tuple(
-            replace(each, status="consistent") if each.entry in of_one else each for each in evidence.entries
-        ),
-    )
     by_name = {each.entry: each for each in evidence.entries}
     joints = sorted({int(name[len(kind) :]) for name in by_name if (kind := name.rstrip("0123456789")) in COLUMNS})
     kinds = [kind for kind in COLUMNS if any(f"{kind}{joint}" in by_name for joint in joints)]
@@ -141,7 +135,7 @@ def evidence_section(
         else say(proposal)
         for proposal in evidence.proposals
     }
-    present = dict.fromkeys(each.status for each in numbers)
+    present = dict.fromkeys([*(each.status for each in numbers), *(["consistent"] if of_one else [])])
     return dict(
         columns=[tr(COLUMNS[kind]) for kind in kinds],
         rows=[
@@ -159,7 +153,7 @@ def evidence_section(
         open_columns=[tr(column) for column in DETAIL_COLUMNS],
         settled_columns=[tr(column) for column in DETAIL_COLUMNS[:-1]],
         open_rows=[[*_row(each), proposals.get(each.entry, "–")] for each in left],
-        settled_rows=[_row(each) for each in numbers if each.status in SETTLED],
+        settled_rows=[_row(each, each.entry in of_one) for each in numbers if each.status in SETTLED],
         unmet=not evidence.table_meets and evidence.other is None,
         other=_other(evidence) if evidence.other else None,
         readings=read,
@@ -171,12 +165,12 @@ def evidence_section(
 
 
 def verdict_legend(statuses: Iterable[Status]) -> list[tuple[str, list[tuple[Status, str, str]]]]:
-    """What the marks of these statuses mean: each verdict with its statuses, their marks and what they add to it."""
+    """What the marks of these statuses mean: each verdict with its statuses, in mark and word, and what they add."""
     present = set(statuses)
     return [
         (
             tr(verdict),
-            [(status, _mark(status), text and tr(text)) for status, text in each.items() if status in present],
+            [(status, _marked(status), text and tr(text)) for status, text in each.items() if status in present],
         )
         for verdict, each in VERDICTS.items()
         if not present.isdisjoint(each)
@@ -365,8 +359,10 @@ def other_robot(robot: Robot, evidence: TableEvidence | None) -> Robot | None:
 def _cell(each: EntryEvidence | None, evidence: TableEvidence, unconfirmed: Set[str]) -> dict[str, Any] | None:
     if each is None or each.value is None:
         return None
-    title = tr("{entry}: {status}", entry=each.entry, status=_status(each.status))
-    shown = dict(entry=each.entry, value=_value(each), status=each.status, mark=_mark(each.status), title=title)
+    of_one = each.status in CONFIRMED and each.entry in unconfirmed
+    title = tr("{entry}: {status}", entry=each.entry, status=_also_of_one(_status(each.status), of_one))
+    mark = joined([_mark(each.status), _mark("consistent") if of_one else ""], " ")
+    shown = dict(entry=each.entry, value=_value(each), status=each.status, mark=mark, title=title)
     gives = _gives(each, evidence)
     alone = gives and each.status == "contradicted" and each.entry in unconfirmed
     return shown | dict(gives=f"{gives} {_mark('consistent')}" if alone else gives)
@@ -393,11 +389,16 @@ def _plain(value: float) -> str:
     return fixed(value, 3).rstrip("0").rstrip(".")
 
 
-def _row(each: EntryEvidence) -> list[str]:
+def _also_of_one(status: str, of_one: bool) -> str:
+    """A status, and that only the source of the table to use gives the value."""
+    return joined([status, _mark("consistent") if of_one else ""], ", ")
+
+
+def _row(each: EntryEvidence, of_one: bool = False) -> list[str]:
     return [
         each.entry,
         with_unit(_value(each), each.unit),
-        _marked(each.status),
+        _also_of_one(_marked(each.status), of_one),
         _interval(each) if each.interval and each.status != "gauge" else "–",
         _tool_off(each),
         joined(each.by, ", ") or "–",

@@ -29,7 +29,7 @@ from er3a.pipeline.stages.validation.evidence_section import (
     table_to_use,
 )
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.numbers import fixed, number
+from er3a.pipeline.viewing.numbers import fixed, measured, number
 from er3a.pipeline.viewing.page import (
     Head,
     Picture,
@@ -103,14 +103,20 @@ def check_row(check: Judged) -> list[str]:
         source = sentence("graded", own_source=own_title(check.source), grade=grade)
     else:
         source = tr("the model itself")
-    return [say(check.subject), *values, f"{check.tolerance:g}", tr(check.unit), source]
+    return [say(check.subject), *values, _tolerance(check), tr(check.unit), source]
 
 
 def _value(value: float, check: model.Check) -> str:
-    """A value in its unit's decimals; errors of round trips, which are far smaller, with one digit."""
+    """A value in its unit's decimals; errors of round trips, which are far smaller, by what they are below."""
     if check.group == "round_trips" and 0 < abs(value) < 1e-3:
-        return number(value, 1)
+        return measured(value, None, check.unit)
     return fixed(value, DECIMALS[check.unit])
+
+
+def _tolerance(check: Judged) -> str:
+    """A check's tolerance as it is given."""
+    given = f"{check.tolerance:g}"
+    return number(check.tolerance, 1) if "e" in given else given
 
 
 def blank_row(check: model.Unjudged) -> list[str]:
@@ -440,7 +446,7 @@ def _label_rows(labels: model.KeyPoses, checks: Iterable[Judged]) -> list[list[s
         if check.group == "envelope":
             values = [fixed(check.expected, 1), fixed(check.measured, 2), fixed(check.difference, 2)]
             place = numbers[check.subject.whole]
-            rows.append((place, [str(place), say(check.subject), *values, f"{check.tolerance:g}"]))
+            rows.append((place, [str(place), say(check.subject), *values, _tolerance(check)]))
     return [row for _, row in sorted(rows, key=lambda row: row[0])]
 
 

@@ -20,7 +20,7 @@ from er3a.pipeline.messages.language import N_, own_title, tr
 from er3a.pipeline.messages.say import bracketed, joined, say, sentence
 from er3a.pipeline.stages.validation import model
 from er3a.pipeline.viewing.figures import axis_label, equal_scale, new_figure
-from er3a.pipeline.viewing.numbers import fixed
+from er3a.pipeline.viewing.numbers import decimals_of_spreads, fixed
 from er3a.pipeline.viewing.page import Picture
 from er3a.pipeline.viewing.palette import GRID, HIGHLIGHT, INK, LINK, MODEL, MUTED, REFERENCE
 from er3a.references.quantities import nearest_on_axis, point_of
@@ -313,6 +313,7 @@ def _calibration_story(calibration: model.SetCalibration, corrections: model.Cor
     found = calibration.result if isinstance(calibration.result, model.Calibrated) else None
     text = typographic(say(found.conclusion if found else calibration.result))
     own = corrections.take(corrections.reference_set == calibration.reference_set)
+    decimals = {unit: decimals_of_spreads(own.half_width[own.unit == unit]) for unit in np.unique(own.unit)}
     alt = tr("Correction of each estimated entry of the table with its 95 % interval, lengths and angles apart.")
     return dict(
         reference_set=calibration.reference_set,
@@ -332,7 +333,7 @@ def _calibration_story(calibration: model.SetCalibration, corrections: model.Cor
         more=typographic(say(found.more)) if found and found.more else "",
         picture=Picture(corrections_figure(own), alt, text) if len(own) else None,
         rows=[
-            [entry, fixed(nominal, 3), fixed(correction, 4), fixed(half_width, 4), tr(unit)]
+            [entry, *(fixed(value, decimals[unit]) for value in (nominal, correction, half_width)), tr(unit)]
             for entry, nominal, correction, half_width, unit in zip(
                 own.entry, own.nominal, own.correction, own.half_width, own.unit
             )

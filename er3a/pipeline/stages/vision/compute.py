@@ -450,8 +450,8 @@ def _left_out(
         yield LeftOut("real_camera")
     if found.boardless:
         yield LeftOut("boardless_images", tuple(each.sample for each in found.boardless))
-    if wrong := found.left_out[: len(found.left_out) - len(found.copies)]:
-        yield LeftOut("left_out_samples", wrong)
+    if found.rejected:
+        yield LeftOut("left_out_samples", found.rejected)
     if found.copies:
         yield LeftOut("copied_samples", found.copies)
     if zeros:
@@ -589,13 +589,21 @@ def verdict_of(
         return Verdict("fail", unmet)
     asked = [each for each in objects if each.expect in (None, "grasped")]
     missed = tuple(model.NotGraspedObject(each.name, each.refusal) for each in asked if each.refusal)
-    left_out = (*calibration.left_out, *(each.sample for each in calibration.boardless))
+    boardless = (each.sample for each in calibration.boardless)
     worst = max((each.error_mm.together for each in asked if each.error_mm), default=None)
     shown = demonstrations(objects, "grasped")
     assumed = tuple(each.name for each in asked if each.name in near)
     sound = len(asked) - len(missed) - len(assumed)
     counts = model.GraspCounts(
-        len(asked), sound, missed, left_out, worst, shown, calibration.simulated, assumed, _least_success(asked)
+        len(asked),
+        sound,
+        missed,
+        (*calibration.rejected, *calibration.copies, *boardless),
+        worst,
+        shown,
+        calibration.simulated,
+        assumed,
+        _least_success(asked),
     )
     if asked and len(missed) == len(asked):
         return Verdict("fail", counts)

@@ -70,4 +70,6 @@ STAGE = Stage(
     inputs=_inputs,
     is_configured=lambda study, robot: study.entry(robot).vision is not None,
     rests_on=("validation",),
+    obstacles=True,
+    motions=N_("grasps"),
 )

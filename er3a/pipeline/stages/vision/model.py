@@ -244,10 +244,9 @@ class CalibrationResult:
     intrinsics_estimated: bool = False
 
     @property
-    def left_out(self) -> tuple[str, ...]:
-        """The samples that the calibration does not use: they contradict the others, or are exact copies."""
-        wrong = tuple(each.sample for each in self.suspects if not isinstance(each, RepeatedPose))
-        return (*wrong, *self.copies)
+    def rejected(self) -> tuple[str, ...]:
+        """The samples that contradict the others, so that the calibration does not use them."""
+        return tuple(each.sample for each in self.suspects if not isinstance(each, RepeatedPose))
 
 
 @dataclass(frozen=True)

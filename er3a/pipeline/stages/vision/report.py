@@ -30,7 +30,7 @@ from er3a.pipeline.stages.vision import model
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.conditions import condition_of, program_head
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
-from er3a.pipeline.viewing.numbers import fixed, number
+from er3a.pipeline.viewing.numbers import decimals_of_spreads, fixed
 from er3a.pipeline.viewing.page import (
     Picture,
     panel_link,
@@ -283,23 +283,24 @@ def _poses(found: model.CalibrationResult) -> list[tuple[str, str, list[list[str
 
 
 def _pose_rows(pose: model.PoseEstimate) -> list[list[str]]:
+    mm, deg = decimals_of_spreads(pose.half_width_mm), decimals_of_spreads(pose.half_width_deg)
     shifts = [
-        [f"{axis} (mm)", fixed(value, 3), f"± {fixed(half, 3)}"]
+        [f"{axis} (mm)", fixed(value, mm), f"± {fixed(half, mm)}"]
         for axis, value, half in zip(AXES, pose.xyz_mm, pose.half_width_mm)
     ]
     names = (tr("roll"), tr("pitch"), tr("yaw"))
     turns = [
-        [bracketed(name, "°"), fixed(value, 4), tr("± {half} about {axis}", half=fixed(half, 4), axis=axis)]
+        [bracketed(name, "°"), fixed(value, deg), tr("± {half} about {axis}", half=fixed(half, deg), axis=axis)]
         for name, value, half, axis in zip(names, pose.rpy_deg, pose.half_width_deg, AXES)
     ]
     return [*shifts, *turns]
 
 
 def _methods(found: model.CalibrationResult) -> list[list[str]]:
-    rows = [[tr("maximum likelihood"), "", "", "", fixed(_rms(found), 3)]]
+    rows = [[tr("maximum likelihood"), "", "", "", fixed(_rms(found), 2)]]
     for each in found.methods:
-        numbers = (each.apart_mm, each.apart_deg, each.beyond, each.rms_mm)
-        cells = [tr("fails") if value is None else fixed(value, 3) for value in numbers]
+        numbers = ((each.apart_mm, 2), (each.apart_deg, 3), (each.beyond, 1), (each.rms_mm, 2))
+        cells = [tr("fails") if value is None else fixed(value, decimals) for value, decimals in numbers]
         rows.append([METHODS[each.method], *cells])
     return rows
 
@@ -336,8 +337,8 @@ def _directions(found: model.CalibrationResult) -> list[list[str]]:
     return [
         [
             direction_word(each),
-            tr("fails") if each.rms_mm is None else number(each.rms_mm, 3),
-            tr("fails") if each.rms_deg is None else number(each.rms_deg, 3),
+            tr("fails") if each.rms_mm is None else fixed(each.rms_mm, 2),
+            tr("fails") if each.rms_deg is None else fixed(each.rms_deg, 2),
             word("vision.direction_status", DIRECTION_STATUS, each.status),
         ]
         for each in found.directions
@@ -345,12 +346,14 @@ def _directions(found: model.CalibrationResult) -> list[list[str]]:
 
 
 def _corrections(found: model.TableResult) -> list[list[str]]:
+    units = {each.unit for each in found.entries}
+    decimals = {unit: decimals_of_spreads(e.half_width for e in found.entries if e.unit == unit) for unit in units}
     return [
         [
             each.entry,
-            with_unit(fixed(each.nominal, 3), each.unit),
-            fixed(each.correction, 4),
-            f"± {fixed(each.half_width, 4)}",
+            with_unit(fixed(each.nominal, decimals[each.unit]), each.unit),
+            fixed(each.correction, decimals[each.unit]),
+            f"± {fixed(each.half_width, decimals[each.unit])}",
             tr("differs") if abs(each.correction) > each.half_width else "",
         ]
         for each in found.entries

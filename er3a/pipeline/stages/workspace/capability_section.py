@@ -36,7 +36,7 @@ ROUNDING = 1e-6  # mm
 
 
 def best_text(results: model.WorkspaceResults, placement: model.PlacementSummary) -> str:
-    """Where to put the box, and what room that place has; its height is kept where others bring the arm nearer to a
+    """Where to put the tray, and what room that place has; its height is kept where others bring the arm nearer to a
     singular pose."""
     if not placement.named_places:
         return box_text(results.summary)
@@ -75,7 +75,7 @@ def _nearest_bodies(place: model.PlaceSummary) -> str:
 
 
 def _room(place: model.PlaceSummary, axes: str = "xyz") -> str:
-    """How far the box can be moved along axes, such as ``x ±25, y -50 to 0``, in whole mm that the room holds; empty
+    """How far the tray can be moved along axes, such as ``x ±25, y -50 to 0``, in whole mm that the room holds; empty
     where it can't."""
     if not any((*place.room_down_m[: len(axes)], *place.room_up_m[: len(axes)])):
         return ""
@@ -94,7 +94,7 @@ def place_row(name: str, place: model.PlaceSummary, capability: model.Capability
         branch = tr("with joints {joints} at several values", joints=numbers(capability.held_joints))
         branch = branch if capability.held_joints else tr("at several arm angles")
     elif place.branch is None:
-        branch = tr("changes within the box") if capability.named_branches else tr("not known: branches have no names")
+        branch = tr("changes within the tray") if capability.named_branches else tr("not known: branches have no names")
     elif place.status == place.branch_status:
         branch = branch_word(place.branch)
     else:
@@ -256,7 +256,7 @@ def placement_views(
     places: model.BoxPlaces,
     scene: Scene | None = None,
 ) -> Figure:
-    """Where the middle of the box can stand, from above and from the side, with the best places as boxes."""
+    """Where the middle of the tray can stand, from above and from the side, with the best places as boxes."""
     percent = 100 * places.manipulability_m3 / capability.overall.best_manipulability_m3
     figure, axes = new_figure(1, 2, width=12.0, height=5.6)
     provable = capability.core_m3 is not None
@@ -278,7 +278,7 @@ def placement_views(
         equal_scale(panel, f"{across} (mm)", f"{up} (mm)")
         panel.set_title(title)
         panel.grid(False)
-    figure.colorbar(mesh, ax=axes, label=tr("least manipulability in the box (% of the arm's best)"), shrink=0.85)
+    figure.colorbar(mesh, ax=axes, label=tr("least manipulability in the tray (% of the arm's best)"), shrink=0.85)
     handles = [
         Line2D([], [], color=INK, marker="o", markersize=4, linewidth=2.2, label=tr("arm, all joints 0")),
         Patch(facecolor="none", edgecolor=HIGHLIGHT, label=tr("best positions, numbered as in the table")),
@@ -380,7 +380,7 @@ def _placement_context(
         "place_rows": rows,
         "place_picture": Picture(
             placement_views(robot, capability, placement, results.places, scene),
-            tr("Possible positions of the box centre, from above and from the side, with the best ones"),
+            tr("Possible positions of the tray centre, from above and from the side, with the best ones"),
             _places_caption(placement, capability.core_m3 is not None),
         )
         if len(results.places)
@@ -612,36 +612,36 @@ def _task_text(task: model.TaskSummary, capability: model.CapabilitySummary) -> 
     }
     served = {
         "directions": tr(
-            "Task: a box of {box} mm in which the tool reaches every point, with its axis anywhere within {cone} deg "
+            "Task: a tray of {box} mm in which the tool reaches every point, with its axis anywhere within {cone} deg "
             "of ({direction}) and the joints at least {margin} deg from their limits.",
             **shown,
         ),
         "tilts": tr(
-            "Task: a box of {box} mm in which the tool reaches every point at every tilt within {cone} deg of "
+            "Task: a tray of {box} mm in which the tool reaches every point at every tilt within {cone} deg of "
             "({direction}) that the arm's plane allows, with the joints at least {margin} deg from their limits.",
             **shown,
         ),
         "turns": tr(
-            "Task: a box of {box} mm in which the tool reaches every point at some rotation about its axis; the axis "
+            "Task: a tray of {box} mm in which the tool reaches every point at some rotation about its axis; the axis "
             "must lie within {cone} deg of ({direction}), where it always points. Revolute joints stay at least "
             "{margin} deg from their limits.",
             **shown,
         ),
         "points": tr(
-            "Task: a box of {box} mm in which the tool reaches every point in any orientation. Revolute joints stay at "
-            "least {margin} deg from their limits.",
+            "Task: a tray of {box} mm in which the tool reaches every point in any orientation. Revolute joints stay "
+            "at least {margin} deg from their limits.",
             **shown,
         ),
     }[capability.asked]
     lowest, clear = fixed(task.lowest_mm, 0), fixed(task.clear_of_axis_mm, 0)
     if capability.bar_m:
         stands = tr(
-            "The box is level, as given or rotated by 90 deg, with its underside at {lowest} mm or higher.",
+            "The tray is level, as given or rotated by 90 deg, with its underside at {lowest} mm or higher.",
             lowest=lowest,
         )
     else:
         stands = tr(
-            "The box is level, as given or rotated by 90 deg, with its underside at {lowest} mm or higher, at least "
+            "The tray is level, as given or rotated by 90 deg, with its underside at {lowest} mm or higher, at least "
             "{clear} mm from axis 1.",
             lowest=lowest,
             clear=clear,
@@ -656,13 +656,13 @@ def _try_text(robot: Robot, task: model.TaskSummary) -> str:
     if np.allclose(robot.tool, np.eye(4)):
         return tr(
             "To see the arm at a position, type its centre, roll {roll}, pitch {pitch} and yaw 0 deg into the "
-            "teach panel. The robot has no tool here: the centre of its flange goes there. The box is not in the "
-            "panel's scene: its clearance leaves the box out.",
+            "teach panel. The robot has no tool here: the centre of its flange goes there. The tray is not in the "
+            "panel's scene: its clearance leaves the tray out.",
             **parts,
         )
     return tr(
         "To see the arm at a position, type its centre, roll {roll}, pitch {pitch} and yaw 0 deg into the teach"
-        " panel: the tool point goes there. The box is not in the panel's scene: its clearance leaves the box out.",
+        " panel: the tool point goes there. The tray is not in the panel's scene: its clearance leaves the tray out.",
         **parts,
     )
 
@@ -675,12 +675,12 @@ def _places_caption(placement: model.PlacementSummary, provable: bool) -> str:
     if not provable:
         return tr(
             "{fitting} grid positions pass by samples; proofs exist only for arms of six revolute joints with a "
-            "spherical wrist. A colour marks where the box's centre passes.",
+            "spherical wrist. A colour marks where the tray's centre passes.",
             fitting=number(placement.fitting),
         )
     return tr(
         "Of {fitting} grid positions that pass by samples, {proven} are proven for every point and direction. "
-        "A colour marks where the box's centre passes; grey spots pass by samples only. It shows the best value "
+        "A colour marks where the tray's centre passes; grey spots pass by samples only. It shows the best value "
         "along the line of sight.",
         fitting=number(placement.fitting),
         proven=number(placement.fitting_proven),

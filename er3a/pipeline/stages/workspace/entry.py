@@ -52,7 +52,7 @@ class WorkspaceSettings(StrictModel):
 
 
 class BoxTask(StrictModel):
-    """A box that the tool must serve, in the frame that the robot's base is placed in.
+    """A tray that the tool must serve, in the frame that the robot's base is placed in.
 
     ``box_mm`` are its edges along x, y, z (it may stand turned by 90 deg about z), ``lowest_mm`` the lowest height of
     its underside, ``clear_of_axis_mm`` the smallest distance of its points from axis 1. At every point the tool must
@@ -82,7 +82,7 @@ class CapabilitySettings(StrictModel):
 
     ``directions`` are spread over the sphere, with ``rolls`` about each where the roll matters (a tool beside axis 6,
     which takes as many times longer). The proofs of the dexterous core and of the listed places may look at
-    ``proof_poses`` neighbourhoods of poses each. ``scene`` holds what the arm may not touch where it serves the box.
+    ``proof_poses`` neighbourhoods of poses each. ``scene`` holds what the arm may not touch where it serves the tray.
     """
 
     directions: Annotated[int, Field(ge=12, le=10_000)] = 300
@@ -100,7 +100,7 @@ def _inputs(study: StudyFiles, robot: str) -> list[Path]:
 STAGE = Stage(
     name="workspace",
     title=N_("workspace"),
-    question=N_("What can it reach, where are the voids, and where can a pallet stand?"),
+    question=N_("What can it reach, where are the voids, and where can a tray stand?"),
     settings={"workspace": WorkspaceSettings, "capability": CapabilitySettings, "trajectory": TrajectorySettings},
     inputs=_inputs,
     rests_on=("validation",),

@@ -219,12 +219,12 @@ class CapabilityCells(Table):
 
 
 class BoxPlaces(Table):
-    """Positions of the box on the lattice that pass, the better of both turns at each."""
+    """Positions of the tray on the lattice that pass, the better of both turns at each."""
 
-    centre_m: Reals = vector("{}_m", "middle of the box in the base frame")
-    turned: Flags = column("whether the box stands turned by 90 deg about z")
+    centre_m: Reals = vector("{}_m", "middle of the tray in the base frame")
+    turned: Flags = column("whether the tray stands turned by 90 deg about z")
     slot: NDArray[np.int8] = column("number of the branch that serves it all, -1 if none does")
-    manipulability_m3: Singles = column("smallest |det J| over the box and its directions")
+    manipulability_m3: Singles = column("smallest |det J| over the tray and its directions")
     limit_margin_deg: Singles = column("smallest distance of joints from the task's limits")
     proven: Flags = column("whether every point and direction is proven")
 
@@ -423,7 +423,7 @@ class CapabilityMissing(Finding, code="workspace.capability_missing"):
 
 @dataclass(frozen=True)
 class TaskSummary:
-    """What was asked of places for the box, as in the study."""
+    """What was asked of places for the tray, as in the study."""
 
     box_mm: Triple
     tool_direction: Triple
@@ -434,32 +434,32 @@ class TaskSummary:
 
 
 class ToolPointsElsewhere(Finding, code="workspace.tool_points_elsewhere"):
-    """The box is nowhere served: the tool points along ``direction`` and can't tilt, which is not what is asked."""
+    """The tray is nowhere served: the tool points along ``direction`` and can't tilt, which is not what is asked."""
 
     task: TaskSummary
     direction: Triple
 
 
 class PlacementTooLong(Finding, code="workspace.placement_too_long"):
-    """Places were not looked for: with what a pose takes this arm, the lattice would have to be wider than the box."""
+    """Places were not looked for: with what a pose takes this arm, the lattice would have to be wider than the tray."""
 
     task: TaskSummary
 
 
 @dataclass(frozen=True)
 class PlaceSummary:
-    """One of the best places for the box.
+    """One of the best places for the tray.
 
     Attributes
     ----------
-    branch : configuration that serves it all, None if it changes within the box or has no name
-    manipulability_m3 : smallest over the box and its directions; manipulability_ratio : of the arm's best
+    branch : configuration that serves it all, None if it changes within the tray or has no name
+    manipulability_m3 : smallest over the tray and its directions; manipulability_ratio : of the arm's best
     limit_margin_deg : smallest distance of joints, and of sums of joints, from their limits, None without one branch,
         or without joints of less than a full turn
     clearance_mm : smallest distance of the arm from scene and itself over the samples, None if nothing can meet
     clearance_pair : the bodies that are so near each other
     limit_joint : the joint (from 1) that comes so near its limit
-    room_down_m, room_up_m : how far the box can be moved towards -x, -y, -z and +x, +y, +z, one at a time, as good
+    room_down_m, room_up_m : how far the tray can be moved towards -x, -y, -z and +x, +y, +z, one at a time, as good
     """
 
     centre_m: Triple
@@ -483,15 +483,15 @@ WhyNoStand = Literal["too_low", "too_small", "out_of_reach", "in_the_way"]
 
 @dataclass(frozen=True)
 class StandSummary:
-    """A level surface of the scene as a stand for the box.
+    """A level surface of the scene as a stand for the tray.
 
     Attributes
     ----------
     name : of its solid; height_m : in the base frame
     place : the best on it, None where none fits
-    served_from_m : how far above the box's underside the tool begins to reach all of it; None without a place
-    why_none : why no place fits: it lies lower than the task allows, has no room for the box, is out of the tool's
-        reach, or an arm that reaches all of the box comes too near to the scene or to itself
+    served_from_m : how far above the tray's underside the tool begins to reach all of it; None without a place
+    why_none : why no place fits: it lies lower than the task allows, has no room for the tray, is out of the tool's
+        reach, or an arm that reaches all of the tray comes too near to the scene or to itself
     above : where nothing fits on it, the best place over it, on something else between them; None where there is none
     """
 
@@ -513,7 +513,7 @@ class StandSummary:
 
 @dataclass(frozen=True)
 class PlacementSummary:
-    """Where the box can stand: numbers of lattice points and positions, and the best places.
+    """Where the tray can stand: numbers of lattice points and positions, and the best places.
 
     ``scene`` is the title of what the arm may not touch there; None in open space. Nor may it touch itself.
     ``margin_mm`` is what it keeps from both. ``stands`` are the level surfaces of the scene, the highest first.
@@ -541,7 +541,7 @@ class PlacementSummary:
 
     @property
     def best(self) -> PlaceSummary:
-        """Where to put the box: on a surface, else over one, else anywhere; there must be some place."""
+        """Where to put the tray: on a surface, else over one, else anywhere; there must be some place."""
         stand, over = self.stand, self.over
         return (stand and stand.place) or (over and over.above) or self.places[0]
 
@@ -554,7 +554,7 @@ class PlacementSummary:
 
     @property
     def stand(self) -> StandSummary | None:
-        """The surface to put the box on: one on which more of it is reached before others, then a proven one."""
+        """The surface to put the tray on: one on which more of it is reached before others, then a proven one."""
         fitting = [stand for stand in self.stands if stand.place and stand.served_from_m is not None]
         return min(
             fitting,
@@ -726,7 +726,7 @@ def capability(middles: Reals, found: Capability, tried: ClearPoses, bars: bool)
 
 
 def places(found: Places) -> BoxPlaces:
-    """Positions of the box."""
+    """Positions of the tray."""
     margin = np.where(np.isinf(found.limit_margin), np.nan, found.limit_margin)
     return BoxPlaces.of(found, manipulability_m3=found.manipulability, limit_margin=margin)
 

@@ -36,7 +36,7 @@ def record(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
         _note(results.summary),
         views={
             "Cloud, near half cut away": ["cloud/far/**"],
-            "Reachability, places for the box": ["capability/far/**", "places/**"],
+            "Reachability, places for the tray": ["capability/far/**", "places/**"],
             "Voids inside the hull": ["hull/**", "voids/**"],
         },
         shapes=_cloud(results) | _hull(results) | dict(_voids(results)) | dict(_capability(results)),
@@ -151,7 +151,7 @@ def _note(summary: model.WorkspaceSummary) -> str:
         "- above left: tool positions, the half between you and the arm cut away; yellow: high manipulability, dark: "
         "near-singular. `/workspace/cloud/near` is the rest",
         "- above right: cells by the ratio of tool directions reached there, dark blue none to yellow all, cut "
-        "likewise; the best places for the box by number, magenta if proven",
+        "likewise; the best places for the tray by number, magenta if proven",
     ]
     if summary.voids:
         lines += ["", "| void | volume (L) | of its mesh (L) | centre x, y, z (mm) |", "|---|---|---|---|"]

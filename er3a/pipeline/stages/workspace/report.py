@@ -119,11 +119,16 @@ def _void_row(row: int, void: model.VoidSummary) -> list[str]:
         str(row),
         word("workspace.void_kind", VOID_KINDS, void.kind),
         word("workspace.void_status", VOID_STATUS, void.status),
-        tr("{low} to {high}", low=number(low, 3), high=number(high, 3)),
+        _litres(low, high),
         *(", ".join(fixed(1000 * value, 0) for value in corner) for corner in (void.low_m, void.high_m)),
         say(void.cause),
         tr("yes") if void.holds_shoulder else tr("no"),
     ]
+
+
+def _litres(low: float, high: float) -> str:
+    """Bounds of a volume in litres, rounded outwards."""
+    return tr("{low} to {high}", low=fixed(np.floor(100 * low) / 100, 2), high=fixed(np.ceil(100 * high) / 100, 2))
 
 
 def _change_rows(summary: model.WorkspaceSummary) -> list[list[str]]:
@@ -133,9 +138,7 @@ def _change_rows(summary: model.WorkspaceSummary) -> list[list[str]]:
             bracketed(entry_word(change), tr(change.unit)),
             f"{change.given:g}".replace("-", "−"),
             f"{change.tried:g}".replace("-", "−"),
-            tr("{low} to {high}", low=number(change.left_litres[0], 3), high=number(change.left_litres[1], 3))
-            if change.left_litres
-            else tr("undecided"),
+            _litres(*change.left_litres) if change.left_litres else tr("undecided"),
         ]
         for change in (finding.single_changes if isinstance(finding, model.VoidUnexpected) else ())
     ]
