@@ -305,6 +305,29 @@ def test_the_wrist_is_compared_at_rest_and_along_the_paths(full):
 
 
 @pytest.mark.long
+def test_a_burst_between_the_times_computed_is_seen(tmp_path):
+    """A table of 200 s at 50 ms, in which joint 2 goes 1 deg there and back within 0.4 s; computed at 11 times."""
+    t = np.arange(4001) * 0.05
+    q = np.zeros((len(t), 6))
+    q[:, 0], q[:, 4] = t / 100, -60.0
+    burst = np.linspace(0, 1, 9)
+    rows = {True: q.copy(), False: q}
+    rows[True][2003:2012, 1] = 64 * (burst * (1 - burst)) ** 3
+    peaks = {}
+    for there, values in rows.items():
+        (folder := tmp_path / str(there)).mkdir()
+        head = ",".join(["t_s", *(f"q{j + 1}_deg" for j in range(6))])
+        np.savetxt(folder / "table.csv", np.c_[t, values], delimiter=",", header=head, comments="", fmt="%.9g")
+        table = {"name": "table", "title": "t", "kind": "table", "file": str(folder / "table.csv"), "samples": 11}
+        study = a_study(folder, limited(1.0), kept=(), settings={"samples": 11})
+        (folder / "paths.yaml").write_text(yaml.safe_dump({"kind": "paths", "paths": [table]}))
+        (path,) = computed(folder, study).results.summary.paths
+        peaks[there] = path.joints[1].peak
+    accelerations = np.gradient(np.gradient(np.radians(rows[True][:, 1]), t), t)
+    assert peaks[True] - peaks[False] > 0.5 * np.abs(accelerations).max()  # kg m^2: of the links alone it is more
+
+
+@pytest.mark.long
 def test_forces_on_the_tool_count_to_the_wrist_at_rest_and_along_the_paths(tmp_path, full):
     """60 N across the flange, 78.5 mm from joint 5's axis; the load's own mass is as before."""
     forced = CLAIM | {"body": LOAD, "force_n": [60.0, 0.0, 0.0]}

@@ -265,15 +265,16 @@ def path_torques(
         absent = model.PathLoad(entry.name, entry.title, outcomes, False, False, *nothing)
         return PathTorques(absent, asked, model.TorqueRows.empty(), None, np.full((n, 2), np.nan), None)
     timed, kinematic, no_law = _timings(arm, motion.joints, t, q)
-    evenly, t = t, np.union1d(t, motion.t)
-    t = np.union1d(t, within_short_pieces(motion, float(np.diff(t).max(initial=0.0))))
+    evenly, checked = t, np.union1d(t, motion.t)
+    t = np.union1d(checked, within_short_pieces(motion, float(np.diff(checked).max(initial=0.0))))
     rates = np.stack(motion.rates(t), axis=1)
     known = np.isfinite(rates).all(axis=(1, 2))
     t, (q, qd, qdd) = t[known], rates[known].swapaxes(0, 1)
     parts = torque_parts(arm.model, q, qd, qdd)
     tau, tolerance = parts.total, arm.tolerance(q, qd, qdd)
     needed = demand(t, qd, tau)
-    own = np.diagonal(arm.model.mass_matrix(q), axis1=1, axis2=2)
+    few = np.isin(t, checked)
+    own = np.diagonal(arm.model.mass_matrix(q[few]), axis1=1, axis2=2)
     payload, scale = _margins(arm, parts, t, q, qd, qdd)
     summary = model.PathLoad(
         name=entry.name,
@@ -302,7 +303,8 @@ def path_torques(
         power_w=tau * qd,
     ).take(np.isin(t, evenly))
     inertia = np.stack([own.min(axis=0), own.max(axis=0)], axis=1)
-    imbalance = power_imbalance(arm.model, parts, q, qd, qdd)
+    seen = TorqueParts(**{name: getattr(parts, name)[few] for name in model.PARTS})
+    imbalance = power_imbalance(arm.model, seen, q[few], qd[few], qdd[few])
     own_load = arm.load if summary.program_load_kg is not None else None
     return PathTorques(summary, asked, rows, needed, inertia, imbalance, own_load)
 
