@@ -123,6 +123,13 @@ def _stated(numbers: list[float]) -> Reals | None:
 
 
 def _numbers(source: ProgramText, line: int, row: list[str], columns: list[int], head: list[str]) -> list[float]:
+    if any(text.strip() for text in row[len(head) :]):
+        raise InputError(
+            source.path,
+            f"line {line}",
+            f"the row has {len(row)} cells under {len(head)} headings",
+            "Write decimals with a point, and a heading for each column",
+        )
     found = []
     for column in columns:
         text = row[column].strip() if column < len(row) else ""
