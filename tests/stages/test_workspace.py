@@ -139,7 +139,7 @@ def test_a_void_at_the_shoulder_names_the_limit_that_nothing_confirms_and_a_cont
             status != "fail",
             status == "fail",
         )
-        assert ("No path or program was checked with" in page) == (status != "fail")
+        assert ("No path or program was checked for collisions with" in page) == (status != "fail")
 
 
 def test_void_centres_have_no_inverse_solution(small_results, random):

@@ -234,13 +234,14 @@ def test_a_place_that_fewer_motions_meet_is_named():
         "programs": moving(ProgramsResults, ProgramMotion, "program", programs, {"through": (0.0, 376.0)}),
     }
     sound = {"programs": ["through"]}
-    assert "With its centre" not in passing(stored, robot, {}, sound).short(sound)
+    assert "Better put it" not in passing(stored, robot, {}, sound).short(sound)
     placement = stored["workspace"].results.summary.placement
     aside = replace(placement.places[0], centre_m=(0.35, 0.5, 0.4))
     floor = StandSummary("floor", 0.0, None, None, "in_the_way", aside)
     stored["workspace"].results.summary.placement = replace(placement, stands=(*placement.stands, floor))
     text = passing(stored, robot, {}, sound).short(sound)
-    assert "With its centre at (350, 500, 400) mm over floor it is in the way of 0 of these." in text
+    assert "Better put it on a stand 375 mm high on floor, its centre at (350, 500, 400) mm, 150 × 200 × 50 mm" in text
+    assert text.endswith("there it is in the way of 0 of these.")
 
 
 def test_the_rows_of_what_meets_the_tray_lead_to_that_moment(monkeypatch, tmp_path):

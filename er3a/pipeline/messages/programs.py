@@ -366,11 +366,13 @@ TEXTS = texts(
         ),
         "remedy.joint_move": (
             "From where this line starts, go by a joint move to the joint angles ({end}) deg: in the model it is "
-            "within limits, speeds and clear, at the joint speed assumed here."
+            "within limits, speeds and clear, at the joint speed assumed here. On the way the tool does not go "
+            "straight."
         ),
         "remedy.joint_moves": (
             "From where this line starts, go by joint moves to the joint angles ({via}) deg, then ({end}) deg: in the "
-            "model they are within limits, speeds and clear, at the joint speed assumed here."
+            "model they are within limits, speeds and clear, at the joint speed assumed here. On the way the tool "
+            "does not go straight."
         ),
         "remedy.zone_too_large": "Make the zone {half:.1f} mm at most.",
         "remedy.limit#above": (

@@ -189,18 +189,19 @@ TEXTS = texts(
         "box.nowhere": "Tray of {box} mm: no place was found where the tool reaches all of it.",
         "box.put#on": (
             "Planning only: the tray on {name}, its centre at ({centre}) mm. Tray: {box}; {reached}. No path or "
-            "program was checked with it: before you run any there, put it into the study's scene file as a box and "
-            "run again."
+            "program was checked for collisions with it: before you run any there, put it into the study's scene file "
+            "as a box and run again."
         ),
         "box.put#over": (
             "Planning only: the tray on a stand {gap} mm high on {name} (top at z = {height} mm), its centre at "
             "({centre}) mm. Tray: {box}; {reached}. No place directly on {none} works. No path or program was checked "
-            "with them: before you run any there, put both into the study's scene file as boxes and run again."
+            "for collisions with them: before you run any there, put both into the study's scene file as "
+            "boxes and run again."
         ),
         "box.put#free": (
             "Planning only: the tray with its centre at ({centre}) mm; no surface is known there. Tray: {box}; "
-            "{reached}. No path or program was checked with it: before you run any there, put it into the study's "
-            "scene file as a box and run again."
+            "{reached}. No path or program was checked for collisions with it: before you run any there, put it into "
+            "the study's scene file as a box and run again."
         ),
         "box.range": (
             "Keep the stand at {gap} mm: heights of {least} to {most} mm pass the same checks, some of them with the "

@@ -821,14 +821,23 @@ class Passing:
         tray, count = min(self.elsewhere, key=lambda each: each[1], default=(None, 0))
         if tray is None or count >= sum(map(len, met.values())):
             return said
-        centre = ", ".join(number(round(1000 * value)) for value in tray.centre)
         other = tr(
-            "With its centre at ({centre}) mm over {name} it is in the way of {count} of these.",
-            centre=centre,
-            name=own_title(tray.on),
+            "Better put it {where}, its centre at ({centre}) mm, {size} mm along x, y and z: there it is in the way of "
+            "{count} of these.",
+            where=_standing(tray),
+            centre=", ".join(number(round(1000 * value)) for value in tray.centre),
+            size=" × ".join(number(round(1000 * value)) for value in tray.high - tray.low),
             count=count,
         )
         return joined([said, other], " ")
+
+
+def _standing(tray: Tray) -> str:
+    """On what a tray stands."""
+    if tray.floor is None:
+        return tr("on {name}", name=own_title(tray.on))
+    gap = number(round(1000 * (tray.low[2] - tray.floor)))
+    return tr("on a stand {gap} mm high on {name}", gap=gap, name=own_title(tray.on))
 
 
 def passing(
