@@ -140,6 +140,8 @@ def _differing(value: object, node: yaml.Node, where: str) -> list[str]:
         return [
             word for key, part in node.value for word in _differing(members[key.value], part, f"{where}.{key.value}")
         ]
+    if where.endswith(".expect") and isinstance(value, list) and isinstance(node, yaml.ScalarNode):
+        value = value[0] if len(value) == 1 else value  # one word stands for a list of it
     if isinstance(value, list | tuple):
         if not isinstance(node, yaml.SequenceNode) or len(node.value) != len(value):
             return [f"{where}: a list of {len(value)} from {node.value!r:.80}"]

@@ -64,7 +64,9 @@ def test_index_cells_are_links_as_a_whole_and_what_is_open_stands_first(browser,
             assert browser.execute_script(CELLS_THAT_ARE_NO_LINK) == []
     orders = browser.execute_script(STATUSES)
     assert len(orders) == len(ROBOTS)
-    assert all(order == sorted(order, key=FIRST.index) for order in orders)
+    known = [[status for status in order if status != "no_verdict"] for order in orders]  # of a table not to be used
+    assert all(order == sorted(order, key=FIRST.index) for order in known)
+    assert sum(map(len, known)) > 2 * len(ROBOTS)
     drawn = browser.execute_script(
         "return [...document.querySelectorAll('.thumbnail polyline')].map(l => l.getBBox().height)"
     )

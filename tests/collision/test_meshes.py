@@ -20,12 +20,13 @@ from er3a.collision.bodies import Bodies
 from er3a.collision.matrix import collision_matrix
 from er3a.collision.meshes import hull_of, uncovered
 from er3a.errors import InputError
-from er3a.files.pieces_file import import_mesh, load_pieces
+from er3a.files.pieces_file import load_pieces
 from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.files.scene_file import load_scene
 from er3a.formats.mesh_file import read_mesh
 from er3a.formats.urdf import import_urdf
 from er3a.geometry.transforms import transform
+from er3a.pipeline.commands.robot_files import import_mesh
 from er3a.robots.robot import ConvexPiece, PairRule
 from testing.arms import made_of
 

@@ -105,7 +105,7 @@ def test_a_fault_ends_with_a_code_and_a_demonstration_is_counted_apart(tmp_path,
     assert (f"which fail as expected: {shown}" in said) == bool(shown)
     cells = (tmp_path / "index.html").read_text(encoding="utf-8").split('class="cells"')[1].split("<li>")
     (cell,) = (each for each in cells if f"{ROBOT}/trajectory.html" in each)
-    assert f'badge {status}"' in cell
+    assert f'class="badge {status}' in cell
     assert (f"{shown} expected to fail, and did" in cell) == bool(shown)
 
 

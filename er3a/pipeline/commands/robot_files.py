@@ -24,6 +24,7 @@ from er3a.pipeline.stages.registry import STAGES
 if TYPE_CHECKING:
     from er3a.calibration.observations import Measurement
     from er3a.calibration.outcomes import FixedName
+    from er3a.files.pieces_file import PiecesFile
     from er3a.robots.robot import Robot
 
 
@@ -140,8 +141,6 @@ def mesh(
     as_json: options.AsJson = False,
 ):
     """Split a mesh into convex pieces, for robot and scene files."""
-    from er3a.files.pieces_file import import_mesh
-
     if output.suffix != ".json":
         raise Er3aError(f"{output}: files of convex pieces end in .json; write --output {output.stem}.json")
     with shown_work(f"{file}: splitting into convex pieces"):
@@ -357,3 +356,44 @@ def schema(
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
     (docs / "dictionary.md").write_text(data_dictionary(), encoding="utf-8")
+
+
+DIGITS = 6
+"""Of corners, in mm: a nanometre."""
+
+
+def import_mesh(source: Path, output: Path, unit: Unit, threshold: float, seed: int) -> PiecesFile:
+    """Split a mesh into convex pieces and write them to a file.
+
+    Raises
+    ------
+    InputError
+        for a mesh that can't be used, see :func:`er3a.formats.mesh_file.read_mesh`
+    """
+    import numpy as np
+
+    from er3a.collision.meshes import convex_pieces
+    from er3a.files.kept_files import sha256, write_atomically
+    from er3a.files.pieces_file import PiecesFile, checksum_of
+    from er3a.formats.mesh_file import read_mesh
+
+    mesh = read_mesh(source, unit)
+    found = convex_pieces(mesh.vertices, mesh.faces, threshold, seed)
+    rounded = [np.round(piece * 1000, DIGITS).tolist() for piece in found.pieces]
+    content = PiecesFile(
+        kind="pieces",
+        source=source.name,
+        source_sha256=sha256(source),
+        unit=unit,
+        triangles=len(mesh.faces),
+        threshold=threshold,
+        seed=seed,
+        # with what rounding the corners may take away
+        uncovered_mm=float(np.ceil(found.uncovered * 1000 * 10**DIGITS) + 2) / 10**DIGITS,
+        excess_mm=round(found.excess * 1000, DIGITS),
+        sha256=checksum_of(rounded),
+        pieces_mm=rounded,
+    )
+    text = json.dumps(content.model_dump(), indent=1) + "\n"
+    write_atomically(output, lambda file: file.write_text(text, encoding="utf-8"))
+    return content

@@ -714,7 +714,7 @@ function nameCells(table) {
 }
 
 for (const table of document.querySelectorAll("table")) {
-  if (table.classList.contains("cards") || table.querySelector("tbody tr[id]")) nameCells(table);
+  if (table.tHead && (table.classList.contains("cards") || table.querySelector("tbody tr[id]"))) nameCells(table);
   makeSortable(table);
   const tools = document.createElement("p");
   tools.className = "tools";
