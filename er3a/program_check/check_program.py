@@ -253,9 +253,8 @@ def _not_examined(execution: Execution, located: tuple[LocatedFinding, ...], end
     missed = (found_in.MotionNotReached, found_in.NeverReached)
     found += [NotExamined(each.place, "motion") for each in located if isinstance(each.finding, missed)]
     found += [NotExamined(each.place, "way") for each in located if isinstance(each.finding, found_in.PathNotKnown)]
-    found += [
-        NotExamined(each.place, "course") for each in located if isinstance(each.finding, found_in.NotFollowedToEnd)
-    ]
+    ends = (found_in.NotFollowedToEnd, found_in.KeptToNextStart)
+    found += [NotExamined(each.place, "course") for each in located if isinstance(each.finding, ends)]
     strange = (found_in.MayMove, NotUnderstood, NotSimulated)
     found += [NotExamined(each.place, "instruction") for each in located if isinstance(each.finding, strange)]
     files = {each.place.file: i for i, each in enumerate(located)}
@@ -299,7 +298,12 @@ def _located(execution: Execution, robot: Robot, checker: StepChecker, end: int)
             found.append(LocatedFinding("caution", beside, step.place, step.calls))
         elif isinstance(what, Decision) and what.taken:
             found.append(LocatedFinding("note", found_in.BothSidesChecked(what.condition), step.place, step.calls))
-    found += [*_loads(execution, robot), *_stated_elsewhere(execution, robot)]
+    found += [*_loads(execution, robot), *_stated_elsewhere(execution, robot), *_not_set(execution)]
+    found += [
+        LocatedFinding("caution", found_in.FrameGivenTwice(each.name, each.moved_mm, each.turned_deg), each.place)
+        for each in execution.frames_twice
+    ]
+    found += [LocatedFinding("caution", found_in.KeptToNextStart(name), place) for name, place in execution.kept]
     found += [LocatedFinding("caution", other, ending.place) for ending, other in checker.returns]
     for ending in execution.endings:
         if ending.kind not in ("end", "repeats", "joins"):
@@ -340,6 +344,23 @@ def _loads(execution: Execution, robot: Robot) -> Iterator[LocatedFinding]:
         else:
             found = found_in.LoadNotExamined(load.mass)
         yield LocatedFinding(found_in.level_of(found), found, step.place, step.calls)
+
+
+def _not_set(execution: Execution) -> Iterator[LocatedFinding]:
+    """Tool and base that a program does not set, at the first motion that needs them."""
+    found: dict[Literal["tool", "base"], int] = {}
+    for number, step in enumerate(execution.steps):
+        what = step.instruction
+        if not isinstance(what, ArmMotion) or (what.kind == "joint" and not isinstance(what.target, PoseTarget)):
+            continue
+        if not what.tool.own:
+            found.setdefault("tool", number)
+        if not what.base.own and isinstance(what.target, PoseTarget):
+            found.setdefault("base", number)
+    if found:
+        step = execution.steps[min(found.values())]
+        kind: Literal["tool", "base", "both"] = "both" if len(found) > 1 else next(iter(found))
+        yield LocatedFinding("note", found_in.FramesFromRobotFile(kind), step.place, step.calls)
 
 
 STATED_MM, STATED_DEG = 1.0, 0.5

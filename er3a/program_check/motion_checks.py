@@ -16,6 +16,7 @@ import numpy as np
 from er3a.by_value import ByValue
 from er3a.collision.along import RateBounds
 from er3a.errors import NotWristPartitionedError, PoseError
+from er3a.geometry.transforms import log_rotation
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import NearSingular, determinant_factors
@@ -325,12 +326,9 @@ def tool_motion_path(
         shape = line(T_start, end, 1.0) if via is None else _arc(T_start, via, end, (1.0, None), motion.angle)
     except PoseError:
         return found_in.ArcHasNoCircle()
-    turn_length = TURN_LENGTH
-    if motion.turn_speed is not None and motion.speed is not None and motion.speed.unit == "m/s":
-        turn_length = motion.speed.value / motion.turn_speed
     if max(shape.length, TURN_LENGTH * shape.turned) < NO_WAY:
         return None
-    law = tool_law(motion, max(shape.length, turn_length * shape.turned), rules.assumed)
+    law, said = _turning_law(motion, (T_start, end), (shape.length, shape.turned), rules.assumed)
     path: Segment = (
         line(T_start, end, law.duration, None, law.ramp)
         if via is None
@@ -349,7 +347,45 @@ def tool_motion_path(
     )
     carried = bool(getattr(motion.target, "external", ()))
     moments = _followed_moments(followed, proof, way, rules, carried) | _arrival_moments(followed, given, way)
-    return replace(way, findings=tuple(moments), moments=moments)
+    return replace(way, findings=(*said, *moments), moments=moments)
+
+
+def _turning_law(
+    motion: ArmMotion, ends: tuple[Reals, Reals], size: tuple[float, float], assumed: AssumedRates
+) -> tuple[MotionLaw, tuple[found_in.CheckFinding, ...]]:
+    """The law of a line or arc: that of its path or of its tool's turn, whichever takes longer.
+
+    A turn whose speed the program does not give counts as a length; that is said where it decides.
+
+    Parameters
+    ----------
+    ends : T_world_tool (4, 4) at the start and at the end
+    size : m, of the path; rad, of the whole turn
+    """
+    length, turned = size
+    if motion.speed is not None and motion.speed.unit == "s" and motion.speed.value > 0:
+        return tool_law(motion, length, assumed), ()
+    about = log_rotation(ends[0][:3, :3].T @ ends[1][:3, :3])
+    laws: list[MotionLaw] = []
+    words, open_parts = [], []
+    for angle, limit in zip((float(np.hypot(about[1], about[2])), abs(float(about[0]))), motion.turning):
+        if limit is None or not limit.speed.value > 0:
+            open_parts.append(angle)
+            words.append("" if limit is None else limit.speed.text)
+        elif angle > NO_WAY:
+            ramp = _given(limit.acceleration, "rad/s2") or assumed.tool_acceleration / TURN_LENGTH
+            laws.append(law_of(angle, limit.speed.value, ramp))
+    turn = turned if len(open_parts) == len(motion.turning) else math.hypot(*open_parts)
+    turn_length, along = TURN_LENGTH, _given(motion.speed, "m/s")
+    if motion.turn_speed is not None and along is not None:
+        turn_length = along / motion.turn_speed
+    size_m = max(length, turn_length * turn)
+    laws += [tool_law(motion, size_m, assumed)] if size_m > 0 else []
+    law = max(laws, key=lambda each: each.duration)
+    if motion.turn_speed is not None or turn_length * turn <= length or law is not laws[-1]:
+        return law, ()
+    speed = (along or assumed.tool_speed) / TURN_LENGTH
+    return law, (found_in.TurnSpeedNotGiven(math.degrees(speed), next(filter(None, words), "")),)
 
 
 def _arc(T_start: Reals, via: Reals, end: Reals, time: tuple[float, float | None], angle: float | None) -> Arc:

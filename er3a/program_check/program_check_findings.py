@@ -49,6 +49,26 @@ class FrameOfSeveral(Finding):
     frame: Literal["tool", "base"]
 
 
+class FramesFromRobotFile(Finding):
+    """The program sets no tool, no base, or neither, before a pose; those of the robot file were taken."""
+
+    kind: Literal["tool", "base", "both"]
+
+
+class FrameGivenTwice(Finding):
+    """The program itself gives a frame that the check was given otherwise; the program's was taken."""
+
+    name: str
+    moved_mm: float
+    turned_deg: float
+
+
+class KeptToNextStart(Finding):
+    """A variable that decides motions is changed and keeps its value; only the first start was checked."""
+
+    name: str
+
+
 class ToolStatedElsewhere(Finding):
     """A table's pose of the tool is not where its joints put it; in the row where it is farthest away."""
 
@@ -300,6 +320,14 @@ class SpeedNotGiven(Finding):
     word: str = ""
 
 
+class TurnSpeedNotGiven(Finding):
+    """A line or arc takes as long as its tool turns, and the program does not give how fast it turns, or by ``word``,
+    which is not known; a speed (deg/s) was assumed."""
+
+    assumed_deg_s: float
+    word: str = ""
+
+
 class AccelerationNotKnown(Finding):
     """The program gives the acceleration by ``word``, whose value is not known; one was assumed."""
 
@@ -390,6 +418,9 @@ CheckFinding = (
     | FrameNotGiven
     | FrameTakenAsFlange
     | FrameOfSeveral
+    | FramesFromRobotFile
+    | FrameGivenTwice
+    | KeptToNextStart
     | ToolStatedElsewhere
     | FramesInDoubt
     | PathNotKnown
@@ -424,6 +455,7 @@ CheckFinding = (
     | ExternalAxesLeftOut
     | LineNotChecked
     | SpeedNotGiven
+    | TurnSpeedNotGiven
     | AccelerationNotKnown
     | MayMove
     | MovesBesideProgram
@@ -455,7 +487,13 @@ FAILS = frozenset(
 )
 NOTES = frozenset(
     (
-        *("frame_taken_as_flange", "speed_not_given", "load_not_examined"),
+        *(
+            "frame_taken_as_flange",
+            "frames_from_robot_file",
+            "speed_not_given",
+            "turn_speed_not_given",
+            "load_not_examined",
+        ),
         *("both_sides_checked", "program_form_inferred", "program_other_encoding"),
     )
 )
@@ -475,7 +513,7 @@ def level_of(finding: CheckFinding) -> Level:
         return "caution"
     if isinstance(finding, MotionCollides):
         return "fail" if any(touch.is_certain for touch in finding.touches) else "caution"
-    if isinstance(finding, SpeedNotGiven) and finding.word:
+    if isinstance(finding, SpeedNotGiven | TurnSpeedNotGiven) and finding.word:
         return "caution"
     if isinstance(finding, LoadNotExamined) and finding.mass_kg is None:
         return "caution"

@@ -844,6 +844,9 @@ class StepChecker:
         timed = motion.speed is not None and motion.speed.unit == "s"
         if motion.acceleration is not None and motion.acceleration.value == 0 and not timed:
             findings.append(found_in.AccelerationNotKnown(motion.acceleration.text))
+        for each in motion.turning:
+            if each is not None and each.acceleration is not None and each.acceleration.value == 0:
+                findings.append(found_in.AccelerationNotKnown(each.acceleration.text))
         if before is None:
             findings.append(found_in.PathNotKnown())
             findings += () if goal.joints is None else limit_findings(placed.arm, goal.joints)
@@ -1136,7 +1139,7 @@ def _key(motion: instructions.ArmMotion) -> Hashable:
     frames = tuple(
         (each.name, None if each.pose is None else each.pose.tobytes()) for each in (motion.tool, motion.base)
     )
-    rates = (motion.speed, motion.turn_speed, motion.acceleration)
+    rates = (motion.speed, motion.turn_speed, motion.turning, motion.acceleration)
     return (motion.kind, targets, motion.angle, rates, motion.zone, frames, motion.load, motion.doubt)
 
 

@@ -177,6 +177,7 @@ class Dialect(ABC):
     setters : functions outside the program that do not move the arm but set what motions use
     whole_division : whether whole numbers are divided to a whole number; None where this is not documented
     first_index : index of a list's first element
+    keeps_data : whether declared data keep what a run of the program sets, to its next start
     """
 
     modal: frozenset[str] = frozenset()
@@ -185,6 +186,7 @@ class Dialect(ABC):
     setters: frozenset[str] = frozenset()
     whole_division: bool | None = False
     first_index: int = 1
+    keeps_data: bool = True
 
     def __init__(self, program: syntax.Program) -> None:  # noqa: B027 - most languages need nothing of it
         """Some languages read the program's declarations."""
@@ -225,6 +227,10 @@ class Dialect(ABC):
         """The value of a predefined name, such as a frame or the arm's position; None if there is none."""
         return None
 
+    def frame_of(self, value: syntax.Value | None) -> Reals | None:
+        """The transform (4, 4), m, of a value that is a tool or a base; None for others."""
+        return None
+
     def listed(self, kind: str, values: tuple[syntax.Value, ...]) -> syntax.Value:
         """The value of ``[...]`` or ``p[...]``."""
         return values
@@ -263,6 +269,7 @@ class ProgramMemory:
     here : where the arm is
     doubts : instructions that are not understood, by the variables of motions that they may have set
     cell : what is known of the cell
+    watched : variables of which it is kept, in ``met``, what is read before the program has ``written`` it
     """
 
     def __init__(self, functions: Dialect, cell: Cell):
@@ -275,6 +282,9 @@ class ProgramMemory:
         self.kept: dict[object, object] = {}
         self.beside: frozenset[str] = frozenset()
         self.aliased: frozenset[str] = frozenset()
+        self.watched: frozenset[str] = frozenset()
+        self.met: set[str] = set()  # of all copies
+        self.written: set[str] = set()
 
     def copy(self) -> ProgramMemory:
         """An independent copy."""
@@ -282,6 +292,7 @@ class ProgramMemory:
         other.here = self.here
         other.shared, other.local, other.types = dict(self.shared), dict(self.local), self.types
         other.beside, other.aliased, other.doubts = self.beside, self.aliased, dict(self.doubts)
+        other.watched, other.met, other.written = self.watched, self.met, set(self.written)
         return other
 
     def lost(self, text: str) -> None:
@@ -297,6 +308,8 @@ class ProgramMemory:
             return self.local[name]
         if self.beside and root(name) in self.beside:
             return syntax.Unclear(name)
+        if self.watched and root(name) in self.watched and name not in self.written:
+            self.met.add(name)
         value = self.shared.get(name)
         return self.functions.constant(self, name) if value is None else value
 
@@ -311,6 +324,8 @@ class ProgramMemory:
             self.local[name] = value
         else:
             self.shared[name] = value
+            if self.watched and root(name) in self.watched:
+                self.written.add(name)
 
     def declare(self, name: str, kind: str, local: bool) -> None:
         """The type of a variable; a parameter of a routine takes it where that declares it."""
@@ -398,6 +413,13 @@ class ProgramMemory:
             indices = tuple(syntax.Constant(self.value(each)) for each in target.indices)
             return replace(target, of=self.settled(target.of), indices=indices)
         return target
+
+    def replaced(self, target: syntax.Expression) -> syntax.Value:
+        """The value that an assignment to a variable replaces, which the program does not read."""
+        watched, self.watched = self.watched, frozenset()
+        found = self.value(target)
+        self.watched = watched
+        return found
 
     def value(self, expression: syntax.Expression) -> syntax.Value:
         """The value of an expression."""

@@ -76,6 +76,16 @@ class Ending:
     beside: bool = False
 
 
+@dataclass(frozen=True, slots=True)
+class FrameTwice:
+    """A frame that the program itself gives otherwise than the cell: by how far its origin and its axes differ."""
+
+    name: str
+    place: Place
+    moved_mm: float
+    turned_deg: float
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Execution(ByValue):
     """A program that was run.
@@ -85,12 +95,16 @@ class Execution(ByValue):
     steps : of all ways; each names the one before it
     endings : one for each way
     unmet : instructions that are no motions, may move the arm for all that is known, and were not carried out
+    frames_twice : frames that the program and the cell give differently; the program's were taken
+    kept : variables of its data that decide motions and that it leaves changed to its next start, with where
     """
 
     program: Program
     steps: tuple[Step, ...]
     endings: tuple[Ending, ...]
     unmet: tuple[Place, ...] = ()
+    frames_twice: tuple[FrameTwice, ...] = ()
+    kept: tuple[tuple[str, Place], ...] = ()
 
     @property
     def complete(self) -> bool:

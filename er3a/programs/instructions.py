@@ -111,6 +111,14 @@ class Zone:
 FINE = Zone()
 
 
+@dataclass(frozen=True, slots=True)
+class Turning:
+    """The greatest speed (rad/s) and acceleration (rad/s2) of a part of the tool's turn, as a program gives them."""
+
+    speed: Rate
+    acceleration: Rate | None = None
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class NamedFrame(ByValue):
     """A tool (T_flange_tool) or base (T_robot_base) that targets refer to.
@@ -120,11 +128,13 @@ class NamedFrame(ByValue):
     name : as the program calls it (``TOOL_DATA[3]``, ``tool0``); empty if it names none
     pose : (4, 4), m; None if the program does not give it
     load : mass of a tool in the flange's frame; None if the program does not give it
+    own : whether the program sets it; False of what is taken from the robot file
     """
 
     name: str = ""
     pose: Reals | None = None
     load: MassBody | None = None
+    own: bool = True
 
     @property
     def one_of_several(self) -> bool:
@@ -216,6 +226,7 @@ class ArmMotion(ByValue):
     speed, acceleration : None where the program keeps the controller's values
     turn_speed : rad/s, at most, of the tool's turn on a line or arc; None if the program gives none: then turns count
         as lengths do
+    turning : the same in KRL, of the turn of the tool's x axis and of that about it; None where the program gives none
     load : what hangs on the flange, in its frame; None where the program says nothing
     doubt : an instruction before that is not understood, and may have set another tool, base or path; empty if there is
         none, and for targets that are no poses
@@ -233,6 +244,7 @@ class ArmMotion(ByValue):
     base: NamedFrame = field(default_factory=NamedFrame)
     spline_block: int | None = None
     turn_speed: float | None = None
+    turning: tuple[Turning | None, Turning | None] = (None, None)
     load: Load | None = None
     doubt: str = ""
 

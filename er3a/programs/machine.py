@@ -25,13 +25,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from er3a.errors import InputError, ShapeError
-from er3a.geometry.transforms import check_poses
+from er3a.geometry.transforms import check_poses, rotation_angle
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, syntax
 from er3a.programs.code_builder import variable_of
 from er3a.programs.evaluation import Cell, Dialect, Position, ProgramMemory, known, root
-from er3a.programs.execution import Ending, EndKind, Execution, KeepOn, RunLimits, Step
+from er3a.programs.execution import Ending, EndKind, Execution, FrameTwice, KeepOn, RunLimits, Step
 from er3a.programs.languages import LANGUAGES, not_written
 from er3a.robots.robot import Robot
 
@@ -94,6 +94,13 @@ def changed_beside(program: syntax.Program, dialect: Dialect, itself: str = "") 
     started = {name for name in routines if (name in asked or routines[name].thread) and name != itself}
     given = {name for what in beside for name in _given_back(program, what.function, what.arguments)}
     return (_changed_in(program, _with_called(program, started), dialect) | cyclic | given) - dialect.modal
+
+
+def _persisting(program: syntax.Program, dialect: Dialect) -> frozenset[str]:
+    """Variables of the program's data that it changes, and that keep their values to its next start."""
+    data = {target_name(each.target) for each in program.data} if dialect.keeps_data else set()
+    changed = {name for operation in program.operations() for name in _changed(operation)}
+    return frozenset(name for name in data & changed if name[:1] not in "$%")
 
 
 def _with_called(program: syntax.Program, names: Iterable[str]) -> set[str]:
@@ -173,8 +180,13 @@ class QuietBranch:
     changed: frozenset[str]
 
 
-def quiet_branches(program: syntax.Program, dialect: Dialect) -> dict[tuple[str, int], QuietBranch]:
-    """The quiet branches by routine and number: no side moves the arm, or changes what decides where it goes."""
+def quiet_branches(
+    program: syntax.Program, dialect: Dialect
+) -> tuple[dict[tuple[str, int], QuietBranch], frozenset[str]]:
+    """The quiet branches by routine and number: no side moves the arm, or changes what decides where it goes.
+
+    Second, the variables that decide that.
+    """
     moving = _moving(program, dialect)
     changes = _changes(program)
     found: dict[tuple[str, int], QuietBranch] = {}
@@ -199,7 +211,7 @@ def quiet_branches(program: syntax.Program, dialect: Dialect) -> dict[tuple[str,
             del found[key]
             origins |= conditions[key]
         waiting = list(origins - needed)
-    return found
+    return found, frozenset(needed)
 
 
 def _moving(program: syntax.Program, dialect: Dialect) -> set[str]:
@@ -492,6 +504,8 @@ class _Graph:
         return seen
 
 
+SAME_FRAME_MM, SAME_FRAME_DEG = 0.01, 0.001
+"""Frames that differ by less are one, written with fewer digits."""
 MANY_ROUNDS = 100  # of a loop to an unknown end, before more of them wait for all else
 ASKED_EVERY = 64  # operations
 
@@ -549,7 +563,12 @@ class Machine:
         self.deciding = deciding(program, dialect.modal)
         self.names_met: set[str] = set()
         self.deciding_names: list[str] = []  # of those, whole
-        self.quiet = quiet_branches(program, dialect)
+        self.quiet, needed = quiet_branches(program, dialect)
+        self.persisting = _persisting(program, dialect) & needed
+        self.first_values: dict[str, syntax.Value] = {}  # of these
+        self.changed_at: dict[str, instructions.Place] = {}  # likewise
+        self.kept: dict[str, instructions.Place] = {}
+        self.frames_twice: dict[str, FrameTwice] = {}
         self.moving = _moving(program, dialect)
         self.aliased = aliased_calls(program)
         self.passed: set[tuple[str, int]] = set()
@@ -576,6 +595,9 @@ class Machine:
         memory.beside = changed_beside(self.program, self.dialect)
         for each in self.program.data:
             self._assign(memory, each)
+        self.first_values = {name: value for name, value in memory.shared.items() if root(name) in self.persisting}
+        memory.watched = self.persisting | {root(name) for name in self.frames_twice}
+        of_data = set(self.frames_twice)
         entry = self.program.routines.get(self.program.entry)
         if entry is not None:
             frame = Frame(entry)
@@ -583,7 +605,15 @@ class Machine:
             self.waiting.append(ExecutionPath([frame], memory))
         while self.waiting:
             self._follow(self.waiting.pop())
-        return Execution(self.program, tuple(self.steps), tuple(self.endings), self._unmet())
+        twice = (each for name, each in self.frames_twice.items() if name not in of_data or name in memory.met)
+        return Execution(
+            self.program,
+            tuple(self.steps),
+            tuple(self.endings),
+            self._unmet(),
+            tuple(twice),
+            tuple(self.kept.items()),
+        )
 
     def _unmet(self) -> tuple[instructions.Place, ...]:
         """Instructions that are not motions, may move the arm as far as is known, and were not carried out."""
@@ -692,6 +722,10 @@ class Machine:
         self, way: ExecutionPath, kind: EndKind, place: instructions.Place, after: int | None = None, limit: int = 0
     ) -> None:
         """``after``: the step before the one that follows."""
+        if kind == "end" and not way.beside and self.changed_at:
+            values = way.memory.shared
+            changed = (root(name) for name in way.memory.met if values.get(name) != self.first_values.get(name))
+            self.kept.update({name: self.changed_at[name] for name in changed if name in self.changed_at})
         follows = None if after is None else self.first_after.get(after)
         self.endings.append(Ending(kind, way.step, place, follows, limit, way.beside))
 
@@ -714,9 +748,13 @@ class Machine:
         declared = each.type_name == "global" or not self.dialect.local_by_default
         local = each.local or (not declared and self._is_new(memory, name))
         if not each.type_name and isinstance(value, syntax.Record):
-            value = self.dialect.assigned(memory.value(each.target), value)
+            value = self.dialect.assigned(memory.replaced(each.target), value)
         doubt = memory.doubts.get(root(name)) if root(name) in names(each.value) or name != root(name) else None
         memory.assign(each.target, value, local)
+        if self.cell.frames:
+            self._compare_frame(memory, each)
+        if memory.watched and root(name) in self.persisting:
+            self.changed_at.setdefault(root(name), each.place)
         if doubt is not None:  # a part of it, or computed from what is in doubt
             memory.doubts[root(name)] = doubt
         if self.dialect.named(name):
@@ -725,6 +763,21 @@ class Machine:
             return None
         memory.doubts[self.dialect.doubted(name)] = each.text
         return instructions.Unknown(each.text, may_move=False)
+
+    def _compare_frame(self, memory: ProgramMemory, each: syntax.Assign) -> None:
+        """Keep that the program gives a frame that the cell gives otherwise."""
+        key = None if isinstance(each.target, syntax.Member) else memory.key(each.target)
+        if key is None or root(key) in names(each.value):  # changed, not given
+            return
+        called = key.rpartition("/")[2].lower()
+        given = next((pose for name, pose in self.cell.frames.items() if name.lower() == called), None)
+        own = None if given is None else self.dialect.frame_of(memory.replaced(each.target))
+        if given is None or own is None:
+            return
+        moved = 1000 * float(np.linalg.norm(given[:3, 3] - own[:3, 3]))
+        turned = float(np.degrees(rotation_angle(given[:3, :3], own[:3, :3])))
+        if moved > SAME_FRAME_MM or turned > SAME_FRAME_DEG:
+            self.frames_twice[key] = FrameTwice(key.rpartition("/")[2], each.place, moved, turned)
 
     def _is_new(self, memory: ProgramMemory, name: str) -> bool:
         start = root(name)
@@ -875,6 +928,8 @@ class Machine:
                 memory.forget(target_name(target))
             else:
                 memory.assign(target, known(frame.local.get(name), name))
+                if target_name(target) in self.persisting:
+                    self.changed_at.setdefault(target_name(target), frame.calls[-1])
         if frame.result:
             memory.write(frame.result, value, local=True)
 

@@ -106,6 +106,10 @@ REMEDIES: dict[str, str] = {
     "program_name_twice": N_("Remove one of the two definitions."),
     "program_nothing_moves": N_("Check that this is the program to run."),
     "speed_not_given": N_("Give a speed, as a number above 0, before the motion."),
+    "turn_speed_not_given": N_("Give the speed of the tool's turn: in KRL by $VEL.ORI1 and $VEL.ORI2."),
+    "frames_from_robot_file": N_("Set tool and base in the program before its first pose."),
+    "frame_given_twice": N_("Correct the one that is wrong, or remove it from the frames."),
+    "kept_to_next_start": N_("Set this variable at the program's beginning."),
     "acceleration_not_known": N_("Give the acceleration as a number."),
     "zone_without_size": N_("Give the zone's size: in mm, or for C_PTP in percent ($APO.CPTP)."),
     "spline_as_line": N_("Write straight lines of the spline (SLIN)."),
@@ -281,6 +285,31 @@ TEXTS = texts(
         "speed_not_given.share": "the program gives no speed; {percent:g} % were assumed for the duration",
         "speed_not_given.word": (
             "the speed '{word}' is not known, or not above 0; {assumed} was assumed for duration and joint speeds"
+        ),
+        "turn_speed_not_given": (
+            "the tool's turn decides how long this takes, and the program does not give its speed; "
+            "{assumed_deg_s:.0f} deg/s were assumed"
+        ),
+        "turn_speed_not_given.word": (
+            "the tool's turn decides how long this takes, and its speed '{word}' is not known, or not above 0; "
+            "{assumed_deg_s:.0f} deg/s were assumed"
+        ),
+        "frames_from_robot_file": by(
+            "kind",
+            tool="no tool is set before this pose; the robot file's was taken, and the controller may have another",
+            base="no base is set before this pose; the robot's was taken, and the controller may have another",
+            both=(
+                "neither tool nor base is set before this pose; the tool of the robot file and the base of the robot "
+                "were taken, and the controller may have others"
+            ),
+        ),
+        "frame_given_twice": (
+            "the program's own {name} was taken; that of the frames given for the check is {moved_mm:.1f} mm and "
+            "{turned_deg:.2f} deg from it"
+        ),
+        "kept_to_next_start": (
+            "{name} decides where the arm goes, and keeps what is set here: checked for the first start only, not for "
+            "later starts or cycles"
         ),
         "acceleration_not_known": (
             "the acceleration '{word}' is not known, or not above 0; one was assumed for duration and joint "
@@ -519,6 +548,13 @@ def _(found: found_in.SpeedNotGiven) -> str:
         return sentence("speed_not_given.word", word=found.word, assumed=assumed)
     if found.unit == "share":
         return sentence("speed_not_given.share", percent=found.assumed * 100)
+    return say_as(found)
+
+
+@say.register
+def _(found: found_in.TurnSpeedNotGiven) -> str:
+    if found.word:
+        return sentence("turn_speed_not_given.word", word=found.word, assumed_deg_s=found.assumed_deg_s)
     return say_as(found)
 
 

@@ -192,7 +192,7 @@ def _frame(memory: ProgramMemory, variable: str) -> instructions.NamedFrame:
     if value is None:
         if any(f"{variable}.{key}" in memory.shared for key in FRAME_KEYS):  # a part of one that nothing gives
             return instructions.NamedFrame(variable)
-        return instructions.NamedFrame("", memory.cell.tool if variable == "$TOOL" else memory.cell.base)
+        return instructions.NamedFrame("", memory.cell.tool if variable == "$TOOL" else memory.cell.base, own=False)
     said = memory.read(variable + "%name")
     name = said.upper() if isinstance(said, str) and said[:1] not in ("{", "") else ""
     own, pose = memory.local.get(name, memory.shared.get(name)), record_pose(value)
@@ -258,6 +258,9 @@ def _initial(memory: ProgramMemory) -> None:
     _all_axes(memory, "$VEL_AXIS", 100)
     _line_acceleration(memory, 100)
     memory.write("$VEL.CP", memory.read("DEF_VEL_CP") or syntax.Unclear("DEF_VEL_CP"))
+    for part in ("ORI1", "ORI2"):  # as the machine data say
+        for name in (f"$VEL.{part}", f"$ACC.{part}"):
+            memory.shared.pop(name, None)
     for part in ("CPTP", "CDIS", "CVEL", "CORI"):
         memory.write(f"$APO.{part}", memory.read(f"DEF_APO_{part}") or syntax.Unclear(f"DEF_APO_{part}"))
     memory.write("$ORI_TYPE", "#VAR")
@@ -576,6 +579,10 @@ class KrlDialect(Dialect):
         """A number of a frame: until that frame is set."""
         return {"$ACT_TOOL": "$TOOL", "$ACT_BASE": "$BASE"}.get(name, name)
 
+    def frame_of(self, value: syntax.Value | None) -> Reals | None:
+        """A frame's."""
+        return record_pose(value)
+
     def named(self, name: str) -> bool:
         """Tool and base keep the name of what they are set to."""
         return name in ("$TOOL", "$BASE")
@@ -705,6 +712,7 @@ class KrlDialect(Dialect):
             tool,
             base,
             block if isinstance(block, int) and block else None,
+            turning=(None, None) if kind == "joint" else (_turning(memory, "ORI1"), _turning(memory, "ORI2")),
             load=load,
         )
 
@@ -799,6 +807,14 @@ def _acceleration(memory: ProgramMemory, kind: instructions.MotionKind) -> instr
     if isinstance(value, syntax.Record):
         return syntax.rate_of(value.get("share"), "share")
     return syntax.rate_of(value, "m/s2")
+
+
+def _turning(memory: ProgramMemory, part: str) -> instructions.Turning | None:
+    """How fast the tool may turn on lines and arcs, deg/s and deg/s2: ORI1 of its direction, ORI2 about that."""
+    speed = syntax.rate_of(memory.read(f"$VEL.{part}"), "rad/s", math.degrees(1.0))
+    if speed is None:
+        return None
+    return instructions.Turning(speed, syntax.rate_of(memory.read(f"$ACC.{part}"), "rad/s2", math.degrees(1.0)))
 
 
 def _axis_share(memory: ProgramMemory, name: str) -> instructions.Rate | None:

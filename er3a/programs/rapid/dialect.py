@@ -118,6 +118,13 @@ class RapidDialect(Dialect):
         """Speeds, zones, tool and work object that every controller has."""
         return data_types.predefined(name)
 
+    def frame_of(self, value: syntax.Value | None) -> Reals | None:
+        """That of tooldata and wobjdata."""
+        kind = value.kind if isinstance(value, syntax.Record) else ""
+        if kind == "TOOLDATA":
+            return frame_of_tool(value)[0]
+        return frame_of_object(value)[0] if kind == "WOBJDATA" else None
+
     def function(self, memory: ProgramMemory, name: str, given: syntax.Invocation) -> syntax.Value:
         """Mathematics, positions, where the arm is; what is unknown, or called otherwise, is unclear."""
         values = tuple(UNCLEAR if each is None else memory.value(each) for each in given.arguments)

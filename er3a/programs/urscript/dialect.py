@@ -153,6 +153,7 @@ class UrScriptDialect(Dialect):
     frames = ("%tcp",)
     setters = frozenset(("set_tcp", *LOADS, *STOPS))
     first_index = 0
+    keeps_data = False
 
     def constant(self, memory: ProgramMemory, name: str) -> syntax.Value | None:
         """Numbers of the language."""
@@ -317,7 +318,7 @@ def _tool_value(memory: ProgramMemory) -> syntax.Value | None:
 def _tool(memory: ProgramMemory) -> instructions.NamedFrame:
     value = memory.read("%tcp")
     if value is None:
-        return instructions.NamedFrame("", memory.cell.tool)
+        return instructions.NamedFrame("", memory.cell.tool, own=False)
     pose = _pose(value)
     return instructions.NamedFrame(value.text if isinstance(value, syntax.Unclear) else "", pose)
 
