@@ -515,7 +515,7 @@ def level_of(finding: CheckFinding) -> Level:
         return "fail" if any(touch.is_certain for touch in finding.touches) else "caution"
     if isinstance(finding, SpeedNotGiven | TurnSpeedNotGiven) and finding.word:
         return "caution"
-    if isinstance(finding, LoadNotExamined) and finding.mass_kg is None:
+    if isinstance(finding, LoadNotExamined) and (finding.mass_kg is None or finding.text):
         return "caution"
     return "fail" if finding.code in FAILS else "note" if finding.code in NOTES else "caution"
 

@@ -130,6 +130,9 @@ def same(a: NamedFrame, b: NamedFrame) -> bool:
 WITH_FIELDS = ("$VEL", "$ACC", "$APO")
 """KRL variables whose fields are looked up by their full names, however they were set."""
 
+STRUCTURE = "%STRUC "
+"""With what the name begins under which the types of the fields of a KRL structure are kept."""
+
 LONGEST_TEXT = 10_000
 LARGEST_WHOLE = 2**62
 
@@ -498,8 +501,15 @@ class ProgramMemory:
         """A value as the type of the variable is that it is assigned to."""
         name = root(key)
         own = local or name in self.local
-        kind = str(self.local.get(f"{name}%type", "")) if own else self.types.get(name, "")
+        return self._of_kind(str(self.local.get(f"{name}%type", "")) if own else self.types.get(name, ""), value)
+
+    def _of_kind(self, kind: str, value: syntax.Value) -> syntax.Value:
+        """A value as a type has it, with its fields as theirs."""
         value = self.functions.typed(kind, value)
+        shape = self.shared.get(f"{STRUCTURE}{kind}")
+        if isinstance(value, syntax.Record) and isinstance(shape, syntax.Record):
+            items = ((key, self._of_kind(str(shape.get(key) or ""), each)) for key, each in value.items)
+            return syntax.Record(value.kind, tuple(items))
         if not isinstance(value, bool) and isinstance(value, (int, float)):
             if kind in ("REAL", "LREAL") and not isinstance(value, float):
                 return float(value)

@@ -580,6 +580,8 @@ class Machine:
         }
         self.started: set[Hashable] = set()  # what runs beside the program, by its state when it begins
         self.labels = {name: _labels(routine) for name, routine in program.routines.items()}
+        if any(isinstance(each, syntax.Halt) and each.again for each in program.operations()):
+            self.labels[program.entry] |= {0}
         self.loops = {name: _loops(routine) for name, routine in program.routines.items()}
         self.seen: dict[Hashable, tuple[int, int, int]] = {}  # way, count, last step
         self.waiting: list[ExecutionPath] = []
@@ -600,9 +602,9 @@ class Machine:
         of_data = set(self.frames_twice)
         entry = self.program.routines.get(self.program.entry)
         if entry is not None:
-            frame = Frame(entry)
-            memory.local, memory.aliased = frame.local, entry.unsettled
-            self.waiting.append(ExecutionPath([frame], memory))
+            way = ExecutionPath([], memory)
+            self._begin(way)
+            self.waiting.append(way)
         while self.waiting:
             self._follow(self.waiting.pop())
         twice = (each for name, each in self.frames_twice.items() if name not in of_data or name in memory.met)
@@ -614,6 +616,13 @@ class Machine:
             tuple(twice),
             tuple(self.kept.items()),
         )
+
+    def _begin(self, way: ExecutionPath) -> None:
+        """Go on with the program's beginning."""
+        entry = self.program.routines[self.program.entry]
+        way.frames = [Frame(entry)]
+        way.memory.local, way.memory.aliased = way.frames[0].local, entry.unsettled
+        way.memory.kept.clear()
 
     def _unmet(self) -> tuple[instructions.Place, ...]:
         """Instructions that are not motions, may move the arm as far as is known, and were not carried out."""
@@ -665,6 +674,12 @@ class Machine:
                 self._call(way, operation)
             elif isinstance(operation, syntax.Beside):
                 self._start(way, operation)
+            elif isinstance(operation, syntax.Halt) and operation.again and not way.beside:
+                if self._drifts(way, self.program.entry, -1):
+                    self._end(way, "drifts", operation.place, limit=self.limits.rounds)
+                    return
+                self._begin(way)
+                back = True
             elif isinstance(operation, (syntax.Return, syntax.Halt)):
                 if isinstance(operation, syntax.Halt) or len(way.frames) == 1:
                     self._end(way, "end", operation.place)
@@ -924,12 +939,12 @@ class Machine:
         aliased, memory.aliased = memory.aliased, frame.aliased
         memory.local = way.frames[-1].local
         for name, target in frame.outs:
+            if target_name(target) in self.persisting:
+                self.changed_at.setdefault(target_name(target), frame.calls[-1])
             if name in aliased:
                 memory.forget(target_name(target))
             else:
                 memory.assign(target, known(frame.local.get(name), name))
-                if target_name(target) in self.persisting:
-                    self.changed_at.setdefault(target_name(target), frame.calls[-1])
         if frame.result:
             memory.write(frame.result, value, local=True)
 

@@ -280,9 +280,10 @@ class Return:
 
 @dataclass(frozen=True, slots=True)
 class Halt:
-    """The program is over, wherever it is."""
+    """The program is over, wherever it is; or begins ``again``, with the arm and its data as they are."""
 
     place: Place
+    again: bool = False
 
 
 @dataclass(frozen=True, slots=True)

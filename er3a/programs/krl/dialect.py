@@ -441,7 +441,7 @@ def _zone_data(memory: ProgramMemory, data: syntax.Value, usual: str) -> None:
         memory.write("$APO.CPTP", min(distance, 100.0))
     else:
         memory.write("$APO.CDIS", distance)
-        memory.shared.pop("$APO.CPTP", None)
+        memory.write("$APO.CPTP", mode)
 
 
 KINDS: dict[str, instructions.MotionKind] = {"PTP": "joint", "LIN": "line", "CIRC": "arc", "SPL": "spline"}
@@ -691,6 +691,8 @@ class KrlDialect(Dialect):
         values = [self._argument(memory, each) for each in move.arguments]
         if len(values) != (2 if kind == "arc" else 1):
             values = [UNREAD, UNREAD]
+        if plain == move.form:
+            values = [_whole(memory, each, value) for each, value in zip(move.arguments, values)]
         make = relative if plain != move.form else target
         in_tool = "#TOOL" in move.words
         made = [make(memory, value, (tool, base), (move.text, in_tool)) for value in values]
@@ -763,6 +765,16 @@ class KrlDialect(Dialect):
         return call.function in HARMLESS | EVALUATED | OF_SETTINGS or call.function == syntax.CYCLIC
 
 
+def _whole(memory: ProgramMemory, argument: syntax.Expression | None, value: syntax.Value) -> syntax.Value:
+    """A position; of what a variable leaves out, no source says where it is taken from."""
+    held = isinstance(argument, (syntax.Variable, syntax.Member, syntax.Element))
+    if not held or not isinstance(value, syntax.Record) or not value.items:
+        return value
+    keys = AXIS_KEYS[: memory.cell.joints] if _has_axes(value) else FRAME_KEYS
+    missing = ((key, syntax.Unclear(f"{LEFT_OUT} {syntax.shown(value)}")) for key in keys if value.get(key) is None)
+    return syntax.Record(value.kind, (*value.items, *missing))
+
+
 def changed_arguments(call: syntax.Invocation) -> tuple[syntax.Expression | None, ...]:
     """What a function outside the program may change: all that it is given, as KRL passes by reference."""
     name = call.function
@@ -831,11 +843,11 @@ def _zone(memory: ProgramMemory, kind: instructions.MotionKind, words: tuple[str
     word = next((word for word in words if word.startswith("C_")), None)
     if word is None:
         return instructions.FINE
-    distance = syntax.number(memory.read("$APO.CDIS"))
-    share = syntax.number(memory.read("$APO.CPTP"))
+    distance, joint_zone = syntax.number(memory.read("$APO.CDIS")), memory.read("$APO.CPTP")
+    share = syntax.number(joint_zone)
     if (word == "C_PTP" or (word == "C_SPL" and kind == "joint")) and share is not None:
         return instructions.Zone("share", share / 100, word)
-    if word in ("C_DIS", "C_SPL", "C_PTP") and distance is not None:
+    if (word in ("C_DIS", "C_SPL") or (word == "C_PTP" and joint_zone == "#CDIS")) and distance is not None:
         return instructions.Zone("distance", distance / 1000, word)
     angle, slow = syntax.number(memory.read("$APO.CORI")), syntax.number(memory.read("$APO.CVEL"))
     if word == "C_ORI" and angle is not None:

@@ -23,6 +23,7 @@ from er3a.programs.code_builder import (
     variable_of,
     within,
 )
+from er3a.programs.evaluation import STRUCTURE
 from er3a.programs.instructions import Aside, Place, Remark
 from er3a.programs.krl.dialect import HERE, HERE_JOINTS, changed_arguments
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, data_file_of, read_program_text
@@ -115,7 +116,7 @@ PTP LIN CIRC PTP_REL LIN_REL CIRC_REL SPTP SLIN SCIRC SPL SPTP_REL SLIN_REL SCIR
 """
 MOTIONS = frozenset(WORDS_OF_MOTIONS.split())
 WORDS_ASIDE = """
-EXT EXTFCT IMPORT ENUM STRUC CONTINUE ANOUT BRAKE CONST_VEL ON_ERROR_PROCEED STOP
+EXT EXTFCT IMPORT ENUM CONTINUE ANOUT BRAKE CONST_VEL ON_ERROR_PROCEED STOP
 """
 ASIDES = frozenset(WORDS_ASIDE.split())
 OUTER_AXES = frozenset(["ASYPTP", "ASYCONT", "ASYSTOP", "ASYCANCEL"])  # which run beside the arm's own
@@ -200,7 +201,11 @@ class _Statement:
         if words.accept("INTERRUPT"):
             _interrupt(self)
             return
-        if words.next in ("STRUC", "ENUM"):
+        if words.next == "STRUC":
+            words.take()
+            _structure(self)
+            return
+        if words.next == "ENUM":
             self.builder.aside(self.place, self.text)
             return
         if words.accept("SIGNAL"):
@@ -394,6 +399,24 @@ def _do(reading: _Statement, at_any_time: bool = False) -> None:
         raise MisreadError("DO calls no routine and sets nothing")
 
 
+def _structure(reading: _Statement) -> None:
+    """``STRUC PART INT N, REAL X, Y``: the types of its fields, kept under the name of the type."""
+    words, kind = reading.words, ""
+    name, items = words.name(), []
+    while True:
+        field = words.name()
+        if words.kind == "name":
+            kind, field = field, words.name()
+        if words.accept("["):
+            words.arguments("]")
+        items.append((field, kind))
+        if not words.accept(","):
+            break
+    words.finish()
+    shape = syntax.Constant(syntax.Record(name, tuple(items)))
+    reading.builder.add(syntax.Assign(reading.place, syntax.Variable(f"{STRUCTURE}{name}"), shape, reading.text))
+
+
 def _goto(reading: _Statement) -> None:
     reading.builder.goto(reading.place, reading.words.name())
 
@@ -426,6 +449,7 @@ HANDLERS: dict[str, Handler] = {
     "ANIN": _anin,
     "TIME_BLOCK": _time_block,
     "INTERRUPT": _interrupt,
+    "STRUC": _structure,
     "TRIGGER": _do,
     "RESUME": lambda reading: reading.builder.unknown(reading.place, reading.text),  # the arm stops where it is
     "SPLINE": lambda reading: _spline(reading),
@@ -469,7 +493,7 @@ def apart(
         if isinstance(each.target, syntax.Variable) and not GLOBAL_NAME.search(each.text)
     }
     own |= {routine.name for routine in routines} - seen
-    names = {name: f"{module}/{name}" for name in own if not name.startswith("$")}
+    names = {name: f"{module}/{name}" for name in own if not name.startswith(("$", "%"))}
 
     def code(operations: Iterable[syntax.Operation]) -> tuple[syntax.Operation, ...]:
         return tuple(_renamed(operation, names) for operation in operations)

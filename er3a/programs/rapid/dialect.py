@@ -49,7 +49,7 @@ ISIGNALAO ISIGNALDI ISIGNALDO ISIGNALGI ISIGNALGO ISLEEP ITIMER IVARVALUE IWATCH
 OPEN OPENDIR PACKDNHEADER PACKRAWBYTES PDISPOFF PROCERRRECOVERY PULSEDO READANYBIN READBLOCK READCFGDATA READERRDATA
 READRAWBYTES REMOVEDIR REMOVEFILE RENAMEFILE RESET RESETPPMOVED RESTOPATH REWIND RMQEMPTYQUEUE RMQFINDSLOT RMQGETMESSAGE
 RMQGETMSGDATA RMQGETMSGHEADER RMQREADWAIT RMQSENDMESSAGE RMQSENDWAIT SAVE SAVECFGDATA SENDMESSAGE SET
-SETAO SETDATASEARCH SETDO SETGO SETSYSDATA SKIPWARN SOCKETACCEPT SOCKETBIND SOCKETCLOSE SOCKETCONNECT
+SETAO SETDATASEARCH SETDO SETGO SKIPWARN SOCKETACCEPT SOCKETBIND SOCKETCLOSE SOCKETCONNECT
 SOCKETCREATE SOCKETLISTEN SOCKETRECEIVE SOCKETRECEIVEFROM SOCKETSEND SOCKETSENDTO SPYSTART SPYSTOP STARTLOAD STOREPATH
 TEXTTABINSTALL TPERASE TPREADDNUM TPREADFK TPREADNUM TPSHOW TPWRITE TRIGGCHECKIO TRIGGEQUIP TRIGGINT TRIGGIO
 TRIGGRAMPAO TRIGGSPEED TRYINT UIMSGBOX UIMSGWRITE UIMSGWRITEABORT UISHOW UNLOAD UNPACKRAWBYTES WARMSTART
@@ -112,7 +112,7 @@ class RapidDialect(Dialect):
     """RAPID, as a run needs it."""
 
     modal = frozenset(MODAL)
-    setters = frozenset((*SETTINGS, *OUTPUTS, "EOFFSOFF", "GRIPLOAD"))
+    setters = frozenset((*SETTINGS, *OUTPUTS, "EOFFSOFF", "GRIPLOAD", "SETSYSDATA"))
 
     def constant(self, memory: ProgramMemory, name: str) -> syntax.Value | None:
         """Speeds, zones, tool and work object that every controller has."""
@@ -243,6 +243,9 @@ class RapidDialect(Dialect):
                 if data_types.load_of(data_types.typed(gripped, data_types.LOADDATA))
                 else instructions.Aside(doing.text)
             )
+        if call.function == "SETSYSDATA":
+            _set_active(memory, call)
+            return instructions.Aside(doing.text)
         if call.function in SETTINGS:
             return None if _set(memory, call) else instructions.Unknown(doing.text, may_move=False)
         if call.function in OUTPUTS and call.arguments:
@@ -255,7 +258,7 @@ class RapidDialect(Dialect):
     def harmless(self, call: syntax.Invocation) -> bool:
         """Functions and instructions whose exact name is known, and that set nothing."""
         name = call.function
-        if name in SETTINGS or name in (reader.LATE, "GRIPLOAD"):
+        if name in SETTINGS or name in (reader.LATE, "GRIPLOAD", "SETSYSDATA"):
             return False
         return (
             name[:1] == "%"
@@ -502,6 +505,22 @@ def _set(memory: ProgramMemory, call: syntax.Invocation) -> bool:
             return _displace(memory, call, values, options)
 
 
+def _set_active(memory: ProgramMemory, call: syntax.Invocation) -> None:
+    """1 SetSysData: the tool, object or load that is active, for which CRobT and CPos then say where the arm is."""
+    given = call.arguments[0] if len(call.arguments) == 1 and not call.keywords else None
+    value = UNCLEAR if given is None else memory.value(given)
+    kind, here = value.kind if isinstance(value, syntax.Record) else "", memory.here
+    if kind == "LOADDATA":
+        return
+    tool, base = here.tool, here.base
+    if kind == "TOOLDATA":
+        tool = _tool(memory, given, value)[0]
+    elif kind == "WOBJDATA":
+        base = _displaced(memory, _base(memory, given, value)[0])
+    pose = here.seen(tool, base, memory.cell.flange) if kind else None
+    memory.here = Position(here.joints, pose, tool, base) if pose is not None else Position()
+
+
 def _displace(
     memory: ProgramMemory, call: syntax.Invocation, values: list[syntax.Value], options: Mapping[str, syntax.Value]
 ) -> bool:
@@ -541,6 +560,8 @@ def arithmetic(sign: str, left: syntax.Value, right: syntax.Value) -> syntax.Val
         return left + right if len(left) + len(right) < 1000 else unclear
     a, b = syntax.number(left), syntax.number(right)
     if a is not None and b is not None:
+        if sign != "*" and a and b and max(abs(a), abs(b)) >= data_types.NO_AXIS / 10:  # an axis where it is
+            return unclear
         found = a + b if sign == "+" else a - b if sign == "-" else a * b
         whole = isinstance(left, int) and isinstance(right, int) and abs(found) < 2**53
         return int(found) if whole else found

@@ -90,6 +90,8 @@ WZSPHDEF
 NOT_SIMULATED = frozenset(NOT_SIMULATED_TEXT.split())
 """What is known to shape a motion or to move something else, and is not followed: it is named."""
 UPPER, ARITHMETIC, TYPED, STEP, LATE = "%UPPER", "%ARITHMETIC", "%TYPED", "%STEP", "%LATE"
+RAISING = ("SOCKET", "OPEN", "READ", "WRITE", "LOAD", "UNLOAD", "STARTLOAD", "RMQ", "COPYFILE", "REMOVE", "MAKEDIR")
+"""How instructions begin that often end with an error; any other may too, if less often."""
 FAILED = "%FAILED"
 """Whether an instruction ends with an error, which only the cell knows."""
 PASSING = "%PASSING"
@@ -767,13 +769,14 @@ class _BodyReader:
             self.late(place, syntax.Invocation(ARITHMETIC, (syntax.Constant("+"), placed[0], suffix)), ((), ()), text)
             return
         if name in WAITS:
-            builder.add(syntax.Waiting(place, "condition", None, text, arrives))
-            if self.leaves and "MAXTIME" in options and "TIMEFLAG" not in options:
-                builder.open_if(place, syntax.Invocation(FAILED, ()), text)
-                builder.add(syntax.Return(place))
-                builder.close("if", place)
+            asked = tuple(each for each in (*placed, *(each for _, each in named)) if each is not None)
+            builder.add(syntax.Waiting(place, "condition", syntax.Listed("", asked), text, arrives))
         else:
             builder.add(syntax.Doing(place, syntax.Invocation(name, placed, named), text))
+        if self.leaves and "TIMEFLAG" not in options and ("MAXTIME" in options or name.startswith(RAISING)):
+            builder.open_if(place, syntax.Invocation(FAILED, ()), text)
+            builder.add(syntax.Return(place))
+            builder.close("if", place)
         changed = [each for key, each in named if key in CHANGING_OPTIONS]
         if name in CHANGING and CHANGING[name] < len(placed):
             changed.append(placed[CHANGING[name]] or syntax.Constant(0))
@@ -987,7 +990,7 @@ def _halt(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None
     """EXIT and ExitCycle, after which the program begins again: from wherever the arm is, if a trap asks for it."""
     if body.end == "ENDTRAP" and words.texts[0] == "EXITCYCLE":
         body.builder.unknown(place, text)
-    body.builder.add(syntax.Halt(place))
+    body.builder.add(syntax.Halt(place, again=words.texts[0] == "EXITCYCLE" and body.end != "ENDTRAP"))
 
 
 def _leave(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None:
