@@ -231,7 +231,7 @@ def _moving(program: syntax.Program, dialect: Dialect) -> set[str]:
 def _moves(program: syntax.Program, operation: syntax.Operation, moving: set[str], dialect: Dialect) -> bool:
     """Whether an operation moves the arm, or has to be named where it is carried out."""
     match operation:
-        case syntax.Move() | syntax.Fixed(instruction=instructions.ArmMotion()):
+        case syntax.Move() | syntax.Fixed(instruction=instructions.ArmMotion()) | syntax.Halt(again=True):
             return True
         case syntax.Doing(what=what) if not (isinstance(what, syntax.Invocation) and dialect.harmless(what)):
             return True

@@ -185,6 +185,8 @@ end
 """
 BALL = Scene("ball", (Sphere("ball", transform(np.array([0.46921, -0.09252, 0.41923]), np.zeros(3)), 0.043),))
 DRAWN = ROBOT.replace(sources={**ROBOT.sources, "envelopes": replace(ROBOT.sources["envelopes"], grade="official")})
+GIVEN = "FRAME BASE_DATA[2]\nBASE_DATA[1]={X 0,Y 0,Z 0,A 0,B 0,C 0}"
+LIFTED = transform(np.array([0.0, 0.0, 0.1]), np.zeros(3))
 MENDED = {
     "target_out_of_reach": (krl(f"PTP {{X 3000,Y 0,Z 400,{DOWN}}}"), krl(f"PTP {{X 400,Y 0,Z 400,{DOWN}}}")),
     "way_out_of_reach": (krl("LIN {X 3000}"), krl("LIN {X 420}")),
@@ -297,6 +299,29 @@ MENDED = {
     ),
     "speed_not_given": ("DEF a( )\nPTP {A1 5}\nEND\n", krl("PTP {A1 5}")),
     "acceleration_not_known": (krl("BAS(#ACC_PTP,$ANIN[1])", "PTP {A1 5}"), krl("BAS(#ACC_PTP,50)", "PTP {A1 5}")),
+    "turn_speed_not_given": (
+        krl(SOFT, AT_HOME, "LIN_REL {A 5}"),
+        krl(SOFT, "$VEL.ORI1=30", "$VEL.ORI2=30", AT_HOME, "LIN_REL {A 5}"),
+    ),
+    "frames_from_robot_file": (
+        f"DEF a( )\n$VEL.CP=0.05\n{SOFT}\nBAS(#VEL_PTP,10)\n{AT_HOME}\nLIN_REL {{Z 5}}\nEND\n",
+        krl(SOFT, AT_HOME, "LIN_REL {Z 5}"),
+    ),
+    "frame_given_twice": (
+        (
+            krl("$BASE=BASE_DATA[1]", SOFT, AT_HOME, "LIN_REL {Z 5}"),
+            {"data": GIVEN, "frames": {"BASE_DATA[1]": LIFTED}},
+        ),
+        (krl("$BASE=BASE_DATA[1]", SOFT, AT_HOME, "LIN_REL {Z 5}"), {"data": GIVEN}),
+        (
+            krl("$BASE=BASE_DATA[1]", SOFT, AT_HOME, "LIN_REL {Z 5}"),
+            {"data": GIVEN.replace("Z 0", "Z 100"), "frames": {"BASE_DATA[1]": LIFTED}},
+        ),
+    ),
+    "kept_to_next_start": (
+        (krl("N=N+5", "PTP {A1 N}"), {"data": "INT N=0"}),
+        (krl("N=0", "N=N+5", "PTP {A1 N}"), {"data": "INT N=0"}),
+    ),
     "above_limit": (krl("PTP {A1 170}"), krl(f"PTP {{A1 {np.degrees(ROBOT.upper[0]):g}}}")),
     "below_limit": (krl("PTP {A1 -170}"), krl(f"PTP {{A1 {np.degrees(ROBOT.lower[0]):g}}}")),
     "motion_collides.solid": (  # round the post, by the via point that was found
