@@ -76,6 +76,12 @@ class ToolStatedElsewhere(Finding):
     turned_deg: float
 
 
+class PositionCompleted(Finding):
+    """A variable's position leaves coordinates out (``text``); they were taken from where the arm is."""
+
+    text: str
+
+
 class FramesInDoubt(Finding):
     """An instruction before, which is not understood, may have set another tool, base or path for this motion."""
 
@@ -422,6 +428,7 @@ CheckFinding = (
     | FrameGivenTwice
     | KeptToNextStart
     | ToolStatedElsewhere
+    | PositionCompleted
     | FramesInDoubt
     | PathNotKnown
     | TargetOutOfReach

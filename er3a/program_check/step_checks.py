@@ -1128,6 +1128,8 @@ def _said(motion: instructions.ArmMotion) -> list[found_in.CheckFinding]:
         found.append(found_in.MoreThanFullSpeed(100 * max(rates)))
     if motion.kind == "spline":
         found.append(found_in.SplineAsLine())
+    if motion.left_out:
+        found.append(found_in.PositionCompleted(motion.left_out))
     if motion.doubt:
         found.append(found_in.FramesInDoubt(motion.doubt))
     return found
@@ -1140,7 +1142,7 @@ def _key(motion: instructions.ArmMotion) -> Hashable:
         (each.name, None if each.pose is None else each.pose.tobytes()) for each in (motion.tool, motion.base)
     )
     rates = (motion.speed, motion.turn_speed, motion.turning, motion.acceleration)
-    return (motion.kind, targets, motion.angle, rates, motion.zone, frames, motion.load, motion.doubt)
+    return (motion.kind, targets, motion.angle, rates, motion.zone, frames, motion.load, motion.left_out, motion.doubt)
 
 
 def _target_key(target: instructions.Target | None) -> Hashable:

@@ -228,6 +228,7 @@ class ArmMotion(ByValue):
         as lengths do
     turning : the same in KRL, of the turn of the tool's x axis and of that about it; None where the program gives none
     load : what hangs on the flange, in its frame; None where the program says nothing
+    left_out : coordinates that a variable leaves out of its position, and that were taken from where the arm is
     doubt : an instruction before that is not understood, and may have set another tool, base or path; empty if there is
         none, and for targets that are no poses
     """
@@ -246,6 +247,7 @@ class ArmMotion(ByValue):
     turn_speed: float | None = None
     turning: tuple[Turning | None, Turning | None] = (None, None)
     load: Load | None = None
+    left_out: str = ""
     doubt: str = ""
 
 

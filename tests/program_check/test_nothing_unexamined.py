@@ -1081,8 +1081,8 @@ def test_the_worst_of_what_rounds_find_at_an_instruction_leads(tmp_path):
     ("body", "more", "wanted"),
     [
         ("FRAME F\nF={X 401,Y 0,Z 300,A 0,B 180,C 0}\nREAL X\nX=F.X/2\nPTP {A1 X}", "", 200.5),
-        ("AXIS Q\nQ={A1 5}\nQ.A1=Q.A1/2\nPTP {A1 Q.A1}", "", 2.5),
-        ("AXIS Q\nQ={A1 0}\nQ.A1=5\nQ.A1=Q.A1/2\nPTP {A1 Q.A1}", "", 2.5),
+        ("AXIS Q\nQ={A1 5}\nQ.A1=Q.A1/2\nPTP Q", "", 2.5),
+        ("AXIS Q\nQ={A1 0}\nQ.A1=5\nQ.A1=Q.A1/2\nPTP Q", "", 2.5),
         ("INT N\nN=2\nREAL X\nX=5/N\nPTP {A1 X}", "", 2.0),
         ("REAL X\nother( )\nX=12.7\nPTP {A1 X}", "DEF other( )\nINT X\nX=1\nEND\n", 12.7),
         ("turn(5)", "DEF turn(R:IN)\nREAL R\nR=R/2\nPTP {A1 R}\nEND\n", 2.5),

@@ -301,11 +301,15 @@ MENDED = {
     "acceleration_not_known": (krl("BAS(#ACC_PTP,$ANIN[1])", "PTP {A1 5}"), krl("BAS(#ACC_PTP,50)", "PTP {A1 5}")),
     "turn_speed_not_given": (
         krl(SOFT, AT_HOME, "LIN_REL {A 5}"),
-        krl(SOFT, "$VEL.ORI1=30", "$VEL.ORI2=30", AT_HOME, "LIN_REL {A 5}"),
+        krl(SOFT, "$VEL={CP 0.05,ORI1 30,ORI2 30}", "$ACC={CP 0.2,ORI1 60,ORI2 60}", AT_HOME, "LIN_REL {A 5}"),
     ),
     "frames_from_robot_file": (
         f"DEF a( )\n$VEL.CP=0.05\n{SOFT}\nBAS(#VEL_PTP,10)\n{AT_HOME}\nLIN_REL {{Z 5}}\nEND\n",
         krl(SOFT, AT_HOME, "LIN_REL {Z 5}"),
+    ),
+    "position_completed": (
+        krl("DECL AXIS Q", "Q={A1 5}", "PTP Q"),
+        krl("DECL AXIS Q", "Q={A1 5,A2 -10,A3 -10,A4 0,A5 -70,A6 0}", "PTP Q"),
     ),
     "frame_given_twice": (
         (

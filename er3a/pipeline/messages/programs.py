@@ -108,6 +108,7 @@ REMEDIES: dict[str, str] = {
     "speed_not_given": N_("Give a speed, as a number above 0, before the motion."),
     "turn_speed_not_given": N_("Give the speed of the tool's turn: in KRL by $VEL.ORI1 and $VEL.ORI2."),
     "frames_from_robot_file": N_("Set tool and base in the program before its first pose."),
+    "position_completed": N_("Give all coordinates of the position."),
     "frame_given_twice": N_("Correct the one that is wrong, or remove it from the frames."),
     "kept_to_next_start": N_("Set this variable at the program's beginning."),
     "acceleration_not_known": N_("Give the acceleration as a number."),
@@ -302,6 +303,9 @@ TEXTS = texts(
                 "neither tool nor base is set before this pose; the tool of the robot file and the base of the robot "
                 "were taken, and the controller may have others"
             ),
+        ),
+        "position_completed": (
+            "the position does not give {text}, taken from where the arm stands; no document says that of a variable"
         ),
         "frame_given_twice": (
             "the program's own {name} was taken; that of the frames given for the check is {moved_mm:.1f} mm and "

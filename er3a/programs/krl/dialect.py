@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from itertools import repeat
 from typing import NamedTuple
 
 import numpy as np
@@ -691,8 +692,7 @@ class KrlDialect(Dialect):
         values = [self._argument(memory, each) for each in move.arguments]
         if len(values) != (2 if kind == "arc" else 1):
             values = [UNREAD, UNREAD]
-        if plain == move.form:
-            values = [_whole(memory, each, value) for each, value in zip(move.arguments, values)]
+        left_out = () if plain != move.form else tuple(map(_left_out, repeat(memory), move.arguments, values))
         make = relative if plain != move.form else target
         in_tool = "#TOOL" in move.words
         made = [make(memory, value, (tool, base), (move.text, in_tool)) for value in values]
@@ -714,6 +714,7 @@ class KrlDialect(Dialect):
             tool,
             base,
             block if isinstance(block, int) and block else None,
+            left_out="; ".join(filter(None, left_out)),
             turning=(None, None) if kind == "joint" else (_turning(memory, "ORI1"), _turning(memory, "ORI2")),
             load=load,
         )
@@ -765,14 +766,13 @@ class KrlDialect(Dialect):
         return call.function in HARMLESS | EVALUATED | OF_SETTINGS or call.function == syntax.CYCLIC
 
 
-def _whole(memory: ProgramMemory, argument: syntax.Expression | None, value: syntax.Value) -> syntax.Value:
-    """A position; of what a variable leaves out, no source says where it is taken from."""
+def _left_out(memory: ProgramMemory, argument: syntax.Expression | None, value: syntax.Value) -> str:
+    """What a variable's position leaves out, which no source says where it is taken from; empty for nothing."""
     held = isinstance(argument, (syntax.Variable, syntax.Member, syntax.Element))
     if not held or not isinstance(value, syntax.Record) or not value.items:
-        return value
+        return ""
     keys = AXIS_KEYS[: memory.cell.joints] if _has_axes(value) else FRAME_KEYS
-    missing = ((key, syntax.Unclear(f"{LEFT_OUT} {syntax.shown(value)}")) for key in keys if value.get(key) is None)
-    return syntax.Record(value.kind, (*value.items, *missing))
+    return ", ".join(key for key in keys if value.get(key) is None)
 
 
 def changed_arguments(call: syntax.Invocation) -> tuple[syntax.Expression | None, ...]:
