@@ -150,6 +150,10 @@ def _ros_trajectory(path: Path) -> tuple[Reals, Reals, tuple[str, ...]]:
         raise InputError(path, None, "holds no joint trajectory", remedy)
     if not 2 <= len(points) <= MAX_ROWS:
         raise InputError(path, "points", f"the path has {_points(len(points))}", f"Give 2 to {MAX_ROWS} points")
+    beside = content.get("multi_dof_joint_trajectory")
+    if isinstance(beside, dict) and beside.get("points"):
+        problem = "moves more than the arm's joints, which is not followed"
+        raise InputError(path, "multi_dof_joint_trajectory", problem, "Give a trajectory of the arm alone")
     order = _joint_order(path, [str(name) for name in names])
     times, joints = np.empty(len(points)), np.empty((len(points), len(names)))
     for k, point in enumerate(points):

@@ -81,6 +81,7 @@ def point(**more):
     ("content", "told"),
     [
         ({"kind": "paths"}, "holds no joint trajectory"),
+        ({"joint_trajectory": ROS, "multi_dof_joint_trajectory": {"points": [{}]}}, "more than the arm's joints"),
         (changed(joint_names=["shoulder", "elbow", "wrist"]), "joint_names: joints can't be identified"),
         (changed(joint_names=["j1", "j1", "j2"]), "joint_names: joints can't be identified"),
         (changed(points=ROS["points"][:1]), "points: the path has"),

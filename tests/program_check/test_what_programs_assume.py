@@ -11,8 +11,10 @@ import pytest
 from er3a.geometry.transforms import transform
 from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.programs.instructions import JointTarget, PoseTarget
-from er3a.programs.languages import read_program
-from testing.program_texts import FRAMES, HOME, HOME_TEXT, NEAR, ROBOT, axes, check, codes, krl, motions
+from er3a.programs.languages import read_program, write_program
+from er3a.programs.machine import execute
+from er3a.programs.writing import WriteOptions
+from testing.program_texts import FRAMES, HOME, HOME_TEXT, NEAR, ROBOT, axes, check, codes, krl, motions, written
 
 SPEEDS = "$VEL.CP=0.1\n$ACC.CP=0.2\n$VEL_AXIS[1]=10\n"
 POSE = "{X 400,Y 0,Z 300,A %g,B 180,C 0}"
@@ -286,3 +288,26 @@ def test_a_line_that_begins_after_a_carriage_return_alone_is_named(tmp_path):
     for ends in ("\r", "\r\n"):
         (tmp_path / "a.src").write_bytes(text.replace("\r", "\n").replace("\n", ends).encode())
         assert "program_not_understood" not in codes(check_program(read_program(tmp_path / "a.src"), ROBOT))
+
+
+@pytest.mark.parametrize(("option", "named"), [("\\Corr", True), ("\\WObj:=wobj0", False)])
+def test_an_option_of_a_motion_that_may_shift_its_path_is_named(tmp_path, option, named):
+    found = check(tmp_path, rapid(f"MoveL p,v100,fine,tool0{option};"), "a.mod")
+    assert codes(found).get("program_not_simulated", []) == ([7] if named else [])
+
+
+def test_an_external_axis_of_rpl_whose_value_is_not_known_is_named(tmp_path):
+    (tmp_path / "a.var").write_text("Routine Var REAL x\n")
+    text = "x := fidbus.mtcp_ri[1];\nMJOINT(EPOINTJ(5,-10,-10,0,-70,0,x,0,0,0,0,0), v10perc, fine, tool0);\n"
+    assert codes(check(tmp_path, text, "a.pgm")) == {"external_axes_left_out": [2]}
+
+
+@pytest.mark.parametrize("language", ["krl", "rapid"])
+def test_a_program_that_is_written_turns_the_tool_no_faster(tmp_path, language):
+    turns = "$VEL.ORI1=20\n$VEL.ORI2=30\n$ACC.ORI1=40\n$ACC.ORI2=50"
+    body = f"{FRAMES}{SPEEDS}{turns}\nPTP {axes(NEAR)}\nLIN_REL {{Z 5}}"
+    listing = execute(written(tmp_path, krl(body), "a.src"), ROBOT, HOME).listing()
+    (text,) = (
+        each for name, each in write_program(listing, language, WriteOptions(ROBOT)).files.items() if name != ".dat"
+    )
+    assert all(line in text for line in turns.split()) if language == "krl" else "[100.0,20.0,5000,1000]" in text

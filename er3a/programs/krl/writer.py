@@ -119,6 +119,11 @@ class KrlWriter(writing.Writer):
             self.count["estimated"] += 1
         if motion.acceleration is not None and motion.acceleration.unit == "m/s2":
             self.set_once("$ACC.CP", f"$ACC.CP={writing.short(motion.acceleration.value)}")
+        for part, limit in zip(("ORI1", "ORI2"), motion.turning):
+            for name, rate in (("$VEL", limit and limit.speed), ("$ACC", limit and limit.acceleration)):
+                if rate is not None and rate.value > 0:
+                    text = f"{name}.{part}={writing.short(math.degrees(rate.value))}"
+                    self.set_once(f"{name}.{part}", text)
 
     def _joint_speed(self, ready: writing.ReadyMotion) -> None:
         speed = ready.motion.speed

@@ -56,6 +56,12 @@ MOTIONS = frozenset(
     )
 )
 SEARCHES = ("SEARCHL", "SEARCHC")
+OPTIONS_TEXT = """
+CONC FLANKS HIGHLEVEL ID INPOS LOWLEVEL NEGFLANK NOEOFFS POSFLANK PSTOP SSTOP STOP SUP T T2 T3 T4 T5 T6 T7 T8 TLOAD V
+WOBJ Z
+"""
+MOTION_OPTIONS = frozenset(OPTIONS_TEXT.split())
+"""Optional arguments of motions that are followed, or leave them as they are; ``\\Corr`` shifts the path."""
 CALLING = ("MOVEJSYNC", "MOVELSYNC", "MOVECSYNC")
 """Motions that call a procedure, named by a text, where they end."""
 CHANGING = {
@@ -748,6 +754,8 @@ class _BodyReader:
         if name in NOT_SIMULATED and not (name == "SINGAREA" and "OFF" in options):
             self.module.findings.append(NotSimulated(text, place))
         if name in MOTIONS:
+            if options - MOTION_OPTIONS:
+                self.module.findings.append(NotSimulated(text, place))
             builder.add(syntax.Move(place, name, placed, text, (), named))
             if name in SEARCHES:  # the arm stops where the signal comes, and the point sought is there
                 builder.unknown(place, text)

@@ -144,7 +144,8 @@ class RapidWriter(writing.Writer):
         if speed.unit == "m/s":
             self.set_once("vel", "VelSet 100,5000;")
             along = speed.value * 1000
-            turn = data_types.TURN_SPEED if motion.turn_speed is None else math.degrees(motion.turn_speed)
+            turns = [motion.turn_speed, *(each and each.speed.value for each in motion.turning)]
+            turn = min((math.degrees(each) for each in turns if each), default=data_types.TURN_SPEED)
             if along in data_types.TOOL_SPEEDS and abs(turn - data_types.TURN_SPEED) < 1e-9:
                 return f"v{along:g}"
             return (

@@ -155,7 +155,9 @@ def _target(value: syntax.Value, text: str) -> instructions.Target:
         return instructions.UnresolvedTarget(text, "not_understood")
     if not syntax.finite(plain):
         return instructions.UnresolvedTarget(text, "not_finite")
-    outer = tuple((key, part) for key in OUTER if (part := syntax.number(value.get(key))))
+    given_outer = ((key, value.get(key)) for key in OUTER)
+    known = ((key, math.nan if isinstance(each, syntax.Unclear) else syntax.number(each)) for key, each in given_outer)
+    outer = tuple((key, each) for key, each in known if each)
     if keys is JOINTS:
         return instructions.JointTarget(np.radians(plain), outer)
     given = ((key, value.get(key)) for key in CONFIGURATION)
