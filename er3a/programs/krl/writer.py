@@ -120,10 +120,13 @@ class KrlWriter(writing.Writer):
         if motion.acceleration is not None and motion.acceleration.unit == "m/s2":
             self.set_once("$ACC.CP", f"$ACC.CP={writing.short(motion.acceleration.value)}")
         for part, limit in zip(("ORI1", "ORI2"), motion.turning):
-            for name, rate in (("$VEL", limit and limit.speed), ("$ACC", limit and limit.acceleration)):
-                if rate is not None and rate.value > 0:
-                    text = f"{name}.{part}={writing.short(math.degrees(rate.value))}"
-                    self.set_once(f"{name}.{part}", text)
+            if limit is not None:
+                self._turn(f"$VEL.{part}", limit.speed)
+                self._turn(f"$ACC.{part}", limit.acceleration)
+
+    def _turn(self, name: str, rate: instructions.Rate | None) -> None:
+        if rate is not None and rate.value > 0:
+            self.set_once(name, f"{name}={writing.short(math.degrees(rate.value))}")
 
     def _joint_speed(self, ready: writing.ReadyMotion) -> None:
         speed = ready.motion.speed
