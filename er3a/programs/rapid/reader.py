@@ -98,6 +98,8 @@ NOT_SIMULATED = frozenset(NOT_SIMULATED_TEXT.split())
 UPPER, ARITHMETIC, TYPED, STEP, LATE = "%UPPER", "%ARITHMETIC", "%TYPED", "%STEP", "%LATE"
 RAISING = ("SOCKET", "OPEN", "READ", "WRITE", "LOAD", "UNLOAD", "STARTLOAD", "RMQ", "COPYFILE", "REMOVE", "MAKEDIR")
 """How instructions begin that often end with an error; any other may too, if less often."""
+BEGINNING = "%BEGINNING"
+"""Label of a routine's beginning."""
 FAILED = "%FAILED"
 """Whether an instruction ends with an error, which only the cell knows."""
 PASSING = "%PASSING"
@@ -342,6 +344,22 @@ def _private(tokens: list[Token]) -> set[str]:
     return found
 
 
+def _retried(tokens: list[Token]) -> set[str]:
+    """Names in procedures whose error handler carries out again, by RETRY, the call that an error came out of."""
+    found: set[str] = set()
+    names: set[str] = set()
+    handled = False
+    for word in (token.text for token in tokens if token.kind == "name"):
+        if word in ("PROC", "FUNC", "TRAP"):
+            names, handled = set(), False
+        handled = handled or word == "ERROR"
+        if handled and word == "RETRY":
+            found |= names
+        elif not handled:
+            names.add(word)
+    return found
+
+
 class Cursor:
     """The words of a module, read one after another."""
 
@@ -419,6 +437,7 @@ class _ModuleReader:
         self.data: list[syntax.Assign] = []
         self.findings: list[ProgramFinding] = []
         self.goes_on = any(each.text == "TRYNEXT" for each in cursor.tokens)
+        self.retried = _retried(cursor.tokens)
 
     def read(self) -> None:
         """Declarations and routines."""
@@ -581,11 +600,14 @@ class _BodyReader:
         self.module, self.cursor, self.builder, self.scope = module, module.cursor, builder, scope
         self.end = ""
         self.leaves = False  # whether an error may end the routine here
+        self.again = False  # whether it may make the caller carry the routine out again
 
     def read(self, end: str) -> None:
         """Instructions up to the word that ends the routine, which is not passed, with its handlers."""
         self.end = end
         self.leaves = end == "ENDPROC" and self._error_leaves()
+        self.again = end == "ENDPROC" and self.builder.name in self.module.retried and not self._handler_words()
+        self.builder.label(BEGINNING)
         handler = self._handler_moves(end)
         while (token := self.cursor.next(comments=True)) is not None:
             if token.kind == "comment":
@@ -781,10 +803,8 @@ class _BodyReader:
             builder.add(syntax.Waiting(place, "condition", syntax.Listed("", asked), text, arrives))
         else:
             builder.add(syntax.Doing(place, syntax.Invocation(name, placed, named), text))
-        if self.leaves and "TIMEFLAG" not in options and ("MAXTIME" in options or name.startswith(RAISING)):
-            builder.open_if(place, syntax.Invocation(FAILED, ()), text)
-            builder.add(syntax.Return(place))
-            builder.close("if", place)
+        if "TIMEFLAG" not in options and ("MAXTIME" in options or name.startswith(RAISING)):
+            self._fails(place, text)
         changed = [each for key, each in named if key in CHANGING_OPTIONS]
         if name in CHANGING and CHANGING[name] < len(placed):
             changed.append(placed[CHANGING[name]] or syntax.Constant(0))
@@ -794,14 +814,30 @@ class _BodyReader:
             if isinstance(each, (syntax.Variable, syntax.Element, syntax.Member)):
                 builder.add(syntax.Assign(place, each, syntax.Constant(syntax.Unclear(f"what {name} gives")), text))
 
+    def _fails(self, place: Place, text: str) -> None:
+        """An error may end the routine here, or begin it again."""
+        if self.leaves:
+            self.builder.open_if(place, syntax.Invocation(FAILED, ()), text)
+            self.builder.add(syntax.Return(place))
+            self.builder.close("if", place)
+        if self.again:
+            self.builder.open_if(place, syntax.Invocation(FAILED, ()), text)
+            self.builder.goto(place, BEGINNING)
+            self.builder.close("if", place)
+
+    def _handler_words(self) -> set[str]:
+        """The words of the routine's own error handler, itself among them; none if it has none."""
+        found: set[str] = set()
+        for token in self.cursor.tokens[self.cursor.at :]:
+            if token.text == self.end:
+                break
+            if token.kind == "name" and (found or token.text == "ERROR"):
+                found.add(token.text)
+        return found
+
     def _error_leaves(self) -> bool:
         """Whether an error ends the routine: by its handler, or by a caller's, which goes on with what is next."""
-        at, tokens = self.cursor.at, self.cursor.tokens
-        handler: set[str] = set()
-        while at < len(tokens) and tokens[at].text != self.end:
-            if tokens[at].kind == "name" and (handler or tokens[at].text == "ERROR"):
-                handler.add(tokens[at].text)
-            at += 1
+        handler = self._handler_words()
         if not handler:
             return self.module.goes_on
         return bool(handler & {"RETURN", "RAISE"}) or not handler & {"RETRY", "TRYNEXT"}
