@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import scipy
+from markupsafe import Markup, escape
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
@@ -22,40 +23,80 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import own_title, tr
 from er3a.pipeline.messages.say import bracketed, joined, say, word
-from er3a.pipeline.messages.workspace import STATUS, box_text, millimetres, range_text, stand_text
+from er3a.pipeline.messages.workspace import (
+    STATUS,
+    millimetres,
+    no_box_text,
+    range_text,
+    reached_text,
+    run_again_text,
+    stand_text,
+)
+from er3a.pipeline.player.motions import address_of
 from er3a.pipeline.player.turning import CIRCLE
 from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.workspace_figures import name_level, slide_names
+from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
-from er3a.pipeline.viewing.numbers import fixed, number
+from er3a.pipeline.viewing.numbers import at_least, at_most, fixed, number
 from er3a.pipeline.viewing.page import Picture
 from er3a.pipeline.viewing.palette import GRID, HIGHLIGHT, INK, MUTED
+from er3a.pipeline.viewing.tray import Placing, Tray, limit_text
 from er3a.robots.robot import Robot
 
 ROUNDING = 1e-6  # mm
 
 
-def best_text(results: model.WorkspaceResults, placement: model.PlacementSummary) -> str:
-    """Where to put the tray, and what room that place has; its height is kept where others bring the arm nearer to a
-    singular pose."""
-    if not placement.named_places:
-        return box_text(results.summary)
-    place, height = placement.best, range_text(placement, results.places)
+def tray_rows(
+    placing: Placing, results: model.WorkspaceResults, placement: model.PlacementSummary, payload: str
+) -> list[tuple[str, str]]:
+    """What to know of the tray where it is put, each under a title; ``payload``: what is known of the arm's."""
+    tray, stand = placing.tray, placing.tray.below
+    place, served = tray.place, (stand.served_from_m if stand and stand.place else None) or 0.0
+    reached = page.whole_sentence(reached_text(placement, place, served))
+    there = tr("What the arm can carry at the tray was not examined.")
+    return [
+        (tr("Place"), joined([tr("{place}.", place=tray.line), reached], " ")),
+        (tr("Margins"), _margins(tray, results, placement)),
+        (tr("Motions"), _hindered(placing)),
+        (
+            tr("Payload there"),
+            Markup('{} <a href="dynamics.html#payload">{}</a>').format(payload, there) if payload else there,
+        ),
+        (tr("What to do first"), run_again_text(results.summary, stand=tray.floor is not None)),
+    ]
+
+
+def _margins(tray: Tray, results: model.WorkspaceResults, placement: model.PlacementSummary) -> str:
+    """What room a place has; its height is kept where others bring the arm nearer to a singular pose."""
+    place, gaps = tray.place, tray.below.gaps_m if tray.below and tray.floor is not None else None
+    height = range_text(place, gaps, placement.task.limit_margin_deg, results.places)
     room = _room(place, "xy" if height else "xyz")
+    moved = tr("Reach and limits allow to move it by {room} mm, one direction at a time.", room=room) if room else ""
+    ratio = fixed(100 * place.manipulability_ratio, 1)
     texts = [
-        box_text(results.summary),
-        height,
-        tr("Other collisions were checked at samples only.") if place.status == "proven" else "",
-        tr(
-            "Reach and limits allow to move it by {room} mm, one direction at a time; its support may be smaller.",
-            room=room,
-        )
-        if room
-        else "",
         _nearest_limit(place),
         _nearest_bodies(place),
+        tr("Least manipulability: {ratio} % of the arm's best.", ratio=ratio),
+        moved,
+        height,
     ]
     return joined(texts, " ")
+
+
+def _hindered(placing: Placing) -> Markup:
+    """Of which motions the tray is in the way, each with a link to the moment; then what was compared."""
+    here = placing.tried[0]
+    links = [
+        Markup('<a href="{}">{}</a> ({})').format(address_of(stage, name, met.t, name), page.breakable(name), met.body)
+        for stage, names in placing.hindered(here).items()
+        for name in names
+        for met in [here.met[stage][name]]
+    ]
+    first = page.whole_sentence(placing.hindrance(here, most=0))
+    return Markup(" ").join(
+        [escape(first), *([Markup(", ").join(links) + "."] if links else []), escape(placing.compared)]
+    )
 
 
 def _nearest_limit(place: model.PlaceSummary) -> str:
@@ -106,7 +147,7 @@ def place_row(name: str, place: model.PlaceSummary, capability: model.Capability
         word("workspace.status", STATUS, place.status),
         branch,
         fixed(100 * place.manipulability_ratio, 1),
-        bracketed(fixed(place.limit_margin_deg, 1), f"J{place.limit_joint}" if place.limit_joint is not None else ""),
+        limit_text(place),
         bracketed(fixed(place.clearance_mm, 0), say(place.clearance_pair) if place.clearance_pair is not None else ""),
         _room(place) or fixed(0, 0),
     ]
@@ -342,8 +383,14 @@ def _draw_boxes(axes: Axes, listed: Sequence[tuple[str, model.PlaceSummary]], sh
         axes.annotate(text, (x, y), (3, -10), textcoords="offset points", color=HIGHLIGHT, fontsize=8, bbox=shade)
 
 
-def capability_context(robot: Robot, results: model.WorkspaceResults, scene: Scene | None = None) -> dict[str, Any]:
-    """What the template include ``capability.html.j2`` needs."""
+def capability_context(
+    robot: Robot,
+    results: model.WorkspaceResults,
+    scene: Scene | None = None,
+    placing: Placing | None = None,
+    payload: str = "",
+) -> dict[str, Any]:
+    """What the template include ``capability.html.j2`` needs; ``placing``: where to put the tray, if anywhere."""
     capability, placement = results.summary.capability, results.summary.placement
     if isinstance(capability, model.CapabilityMissing) or placement is None:
         return {"missing": say(capability)}
@@ -356,6 +403,11 @@ def capability_context(robot: Robot, results: model.WorkspaceResults, scene: Sce
         if capability.core_m3
         else tr("Reachability ignores collisions."),
         "task_text": _task_text(placement.task, capability),
+        "tray_line": placing.line if placing else no_box_text(results.summary),
+        "tray_places": placing.rows if placing else [],
+        "tray_rows": tray_rows(placing, results, placement, payload)
+        if placing and isinstance(placement, model.PlacementSummary)
+        else [],
     } | _placement_context(robot, results, capability, placement, scene)
 
 
@@ -367,14 +419,13 @@ def _placement_context(
     scene: Scene | None,
 ) -> dict[str, Any]:
     if not isinstance(placement, model.PlacementSummary):
-        return {"nowhere": say(placement), "best_text": ""}
+        return {"nowhere": say(placement)}
     rows = [place_row(name, place, capability) for name, place in placement.named_places]
     return {
         "nowhere": "",
         "placing_scene": placement.scene,
         "placing_margin": fixed(placement.margin_mm, 0),
         "try_text": _try_text(robot, placement.task) if capability.asked == "directions" else "",
-        "best_text": best_text(results, placement),
         "stands": [stand_text(stand, placement) for stand in placement.stands],
         "points_serving": placement.points_serving,
         "place_rows": rows,
@@ -595,8 +646,8 @@ def _core_text(capability: model.CapabilitySummary) -> str:
         "and at most {upper} L; both bounds are proven for all points and directions. By the {directions} "
         "sampled directions alone it would be {estimate} L.",
         directions=capability.directions,
-        lower=number(1000 * core.lower, 2),
-        upper=number(1000 * core.upper, 2),
+        lower=at_least(1000 * core.lower, "L"),
+        upper=at_most(1000 * core.upper, "L"),
         estimate=number(1000 * core.estimate, 2),
     )
 
