@@ -663,9 +663,16 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         ),
         "cells": [_cell(head) for head in sorted(heads.values(), key=lambda head: FIRST.index(head.status))],
         "expected": expected,
+        "meant": _meant(heads, expected),
         "not_examined": [tr(STAGES[stage].title) for stage in stages if stage not in heads],
         "not_asked": [tr(stage.title) for name, stage in STAGES.items() if name not in stages],
     }
+
+
+def _meant(heads: Mapping[str, Head], expected: Mapping[str, str]) -> str:
+    """Which stages fail as the study expects; empty where none does."""
+    named = [tr(STAGES[stage].title) for stage, head in heads.items() if head.status == "fail" == expected.get(stage)]
+    return tr("{count} expected to fail: {names}", count=len(named), names=joined(named, ", ")) if named else ""
 
 
 def proposed(finding: object) -> dict[str, str]:

@@ -344,6 +344,8 @@ def placing_of(study: Study, stored: Stored[Any]) -> Placing | None:
     found = {name: read_stage(beside / name, STAGES[name]) for name in names} if beside else {}
     found = {name: each for name, each in found.items() if not isinstance(each.results, AbsentResults)}
     found[stored.stage] = stored
+    if "workspace" not in found:
+        return None
     sound = {stage: sound_motions(found[stage].results) for stage in MOTIONS if stage in found}
     scenes = {stage: scene_of(study, stored.robot, stage) for stage in sound}
     return placing(found, study.robot(stored.robot), scenes, sound)

@@ -130,7 +130,7 @@ def _void_row(row: int, void: model.VoidSummary) -> list[str]:
     low, high = 1000 * void.volume_m3.lower, 1000 * void.volume_m3.upper
     return [
         str(row),
-        word("workspace.void_kind", VOID_KINDS, void.kind),
+        bracketed(word("workspace.void_kind", VOID_KINDS, void.kind), tr("shoulder") if void.holds_shoulder else ""),
         word("workspace.void_status", VOID_STATUS, void.status),
         _litres(low, high),
         *(
@@ -138,7 +138,6 @@ def _void_row(row: int, void: model.VoidSummary) -> list[str]:
             for corner in (void.centroid_m, void.low_m, void.high_m)
         ),
         say(void.cause),
-        tr("yes") if void.holds_shoulder else tr("no"),
     ]
 
 
