@@ -94,7 +94,7 @@ NOT_CARRIED_OUT = {  # a person looks at the controller, the cell or the file, o
     *("contradiction#one", "contradiction#more"),
     *("all_samples_equal#target", "void_advice#cause", "void_advice#predicate"),
     *("read_limit#lower", "read_limit#upper", "time_joint"),
-    *("payload.unknown", "payload.not_examined", "payload.ask", "box.no_tool"),
+    *("payload.unknown", "payload.not_examined", "payload.ask"),
     *("validation.left_open#turned", "validation.left_open#turned_at_least"),
     *("far_from_table", "far_from_table#rest"),
 }

@@ -171,7 +171,7 @@ TEXTS = texts(
         "void.larger": "Collisions of the arm are not counted, so what can't be reached is larger.",
         "void.no_tool": "With a tool the void is elsewhere.",
         "void.pocket": (
-            "Out of reach too, but open to the outside: a larger pocket of {lower} to {upper} litres, within {box} mm."
+            "Out of reach too, but open to the outside: a larger pocket of {lower} to {upper} L, within {box} mm."
         ),
         "void.more": Plural(
             "count", "There is {count} other enclosed void.", "There are {count} other enclosed voids."
