@@ -146,7 +146,7 @@ def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) ->
         study,
         stored,
         output,
-        payload=joined(payload_text(summary, robot), " "),
+        payload=payload_text(summary, robot)[0],  # what to ask for is the list of what is not known
         findings=listed(summary.findings),
         unknown=listed(summary.unknown),
         links=_links(summary),
