@@ -296,8 +296,12 @@ def placement_views(
     placement: model.PlacementSummary,
     places: model.BoxPlaces,
     scene: Scene | None = None,
+    trays: Sequence[Tray] = (),
 ) -> Figure:
-    """Where the middle of the tray can stand, from above and from the side, with the best places as boxes."""
+    """Where the middle of the tray can stand, from above and from the side, with the best places as boxes; ``trays`` on
+    or over surfaces besides these, by the surface's name."""
+    numbered = [place for _, place in placement.named_places]
+    over = [(own_title(each.below.name), each.place) for each in trays if each.below and each.place not in numbered]
     percent = 100 * places.manipulability_m3 / capability.overall.best_manipulability_m3
     figure, axes = new_figure(1, 2, width=12.0, height=5.6)
     provable = capability.core_m3 is not None
@@ -312,7 +316,7 @@ def placement_views(
         sure = np.ma.masked_where(~proven, value)
         mesh = panel.pcolormesh(*extent, sure.T, cmap=SHADES, vmin=0, vmax=top, rasterized=True)
         draw_scene(panel, scene, shown)
-        _draw_boxes(panel, placement.named_places, shown)
+        _draw_boxes(panel, [*placement.named_places, *over], shown)
         panel.plot(
             *skeleton(robot, np.zeros(robot.joints)).T[shown] * 1000, color=INK, linewidth=2.2, marker="o", markersize=3
         )
@@ -322,7 +326,7 @@ def placement_views(
     figure.colorbar(mesh, ax=axes, label=tr("least manipulability in the tray (% of the arm's best)"), shrink=0.85)
     handles = [
         Line2D([], [], color=INK, marker="o", markersize=4, linewidth=2.2, label=tr("arm, all joints 0")),
-        Patch(facecolor="none", edgecolor=HIGHLIGHT, label=tr("best positions, numbered as in the table")),
+        Patch(facecolor="none", edgecolor=HIGHLIGHT, label=tr("best positions, numbered or named as in the tables")),
         *([Patch(facecolor=GRID, label=tr("by samples only"))] if provable else []),
     ]
     if scene:
@@ -408,7 +412,7 @@ def capability_context(
         "tray_rows": tray_rows(placing, results, placement, payload)
         if placing and isinstance(placement, model.PlacementSummary)
         else [],
-    } | _placement_context(robot, results, capability, placement, scene)
+    } | _placement_context(robot, results, capability, placement, scene, placing)
 
 
 def _placement_context(
@@ -417,10 +421,12 @@ def _placement_context(
     capability: model.CapabilitySummary,
     placement: model.Placement,
     scene: Scene | None,
+    placing: Placing | None,
 ) -> dict[str, Any]:
     if not isinstance(placement, model.PlacementSummary):
         return {"nowhere": say(placement)}
     rows = [place_row(name, place, capability) for name, place in placement.named_places]
+    trays = [each.tray for each in placing.tried] if placing else []
     return {
         "nowhere": "",
         "placing_scene": placement.scene,
@@ -430,7 +436,7 @@ def _placement_context(
         "points_serving": placement.points_serving,
         "place_rows": rows,
         "place_picture": Picture(
-            placement_views(robot, capability, placement, results.places, scene),
+            placement_views(robot, capability, placement, results.places, scene, trays),
             tr("Possible positions of the tray centre, from above and from the side, with the best ones"),
             _places_caption(placement, capability.core_m3 is not None),
         )
