@@ -254,6 +254,8 @@ def test_the_place_that_fewest_motions_meet_comes_first():
     )
     assert [row[3] for row in found.rows] == ["0 of 1 programs", "1 of 1 programs"]
     assert found.met == {"programs": {}}  # of the place that is recommended
+    half = replace(found.tray.place, size_m=(0.0125, 0.15, 0.05))
+    assert replace(found.tray, place=half).edges == "12.5 × 150 × 50"
     many = {"programs": ["through", "a", "b", "c"]}
     met = {name: Meeting(1.0, "link 3") for name in many["programs"]}
     crowded = replace(found, tried=(replace(found.tried[0], met={"programs": met}),), sound=many)

@@ -15,7 +15,7 @@ from er3a.collision.scene import Box, Scene
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.messages.language import own_title, tr
+from er3a.pipeline.messages.language import as_text, own_title, tr
 from er3a.pipeline.messages.left_out import body_word
 from er3a.pipeline.messages.say import bracketed, joined
 from er3a.pipeline.messages.workspace import millimetres
@@ -92,7 +92,7 @@ class Tray:
     @property
     def edges(self) -> str:
         """Its edges along x, y and z, mm."""
-        return " × ".join(millimetres([edge]) for edge in self.place.size_m)
+        return " × ".join(as_text(1000 * edge, ".6g") for edge in self.place.size_m)
 
     @property
     def corners(self) -> tuple[Reals, Reals]:
