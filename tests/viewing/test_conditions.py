@@ -350,7 +350,11 @@ def test_the_motions_that_the_tray_hinders_are_listed_with_links_to_the_moment()
     results.summary.not_examined, results.places = [], None
     rows = dict(tray_rows(found, results, results.summary.placement, ""))
     assert rows["Motions"].startswith("In the way of 1 of the 1 motions that pass without it. <a href=")
-    assert 'href="programs.html?play=through&amp;t=2.75#through">through</a> (tool point).' in rows["Motions"]
+    assert 'href="programs.html?play=through&amp;t=2.75#player">through</a> (tool point).' in rows["Motions"]
+    assert "Others" not in rows["Motions"]
+    failing = placing(stored, load_robot("er3a_c60"), {}, {"programs": []})
+    others = dict(tray_rows(failing, results, results.summary.placement, ""))["Motions"]
+    assert others.startswith("No motion passes that it could be in the way of. Others that meet it: <a href=")
     assert rows["Payload there"] == "What the arm can carry at the tray was not examined."
     assert "put the tray and its stand into the study's scene file as boxes" in rows["What to do first"]
 

@@ -85,18 +85,25 @@ def _margins(tray: Tray, results: model.WorkspaceResults, placement: model.Place
 
 
 def _hindered(placing: Placing) -> Markup:
-    """Of which motions the tray is in the way, each with a link to the moment; then what was compared."""
-    here = placing.tried[0]
-    links = [
-        Markup('<a href="{}">{}</a> ({})').format(address_of(stage, name, met.t, name), page.breakable(name), met.body)
-        for stage, names in placing.hindered(here).items()
-        for name in names
-        for met in [here.met[stage][name]]
-    ]
+    """Of which motions the tray is in the way, each with a link to the moment; which others meet it; then what was
+    compared."""
+    here, hindered = placing.tried[0], placing.hindered(placing.tried[0])
+    named, others = list[Markup](), list[Markup]()
+    for stage, met in here.met.items():
+        for name, each in met.items():
+            link = Markup('<a href="{}">{}</a> ({})').format(
+                address_of(stage, name, each.t, "player"), page.breakable(name), each.body
+            )
+            (named if name in hindered.get(stage, ()) else others).append(link)
     first = page.whole_sentence(placing.hindrance(here, most=0))
-    return Markup(" ").join(
-        [escape(first), *([Markup(", ").join(links) + "."] if links else []), escape(placing.compared)]
-    )
+    texts = [escape(first), *_sentence(named), *_sentence(others, tr("Others that meet it")), escape(placing.compared)]
+    return Markup(" ").join(texts)
+
+
+def _sentence(links: Sequence[Markup], about: str = "") -> list[Markup]:
+    """Links as a sentence; none where there are none."""
+    lead = escape(about + tr(": ") if about else "")
+    return [lead + Markup(", ").join(links) + "."] if links else []
 
 
 def _nearest_limit(place: model.PlaceSummary) -> str:
