@@ -150,6 +150,7 @@ def test_a_void_at_the_shoulder_names_the_limit_that_nothing_confirms_and_a_cont
             status != "fail",
             status == "fail",
         )
+        assert "dynamics.html#payload" not in page  # it lies not beside these results
         assert ("into the study&#39;s scene file as boxes, and run again" in page) == (status != "fail")
 
 

@@ -50,19 +50,15 @@ ROUNDING = 1e-6  # mm
 def tray_rows(
     placing: Placing, results: model.WorkspaceResults, placement: model.PlacementSummary, payload: str
 ) -> list[tuple[str, str]]:
-    """What to know of the tray where it is put, each under a title; ``payload``: what is known of the arm's."""
+    """What to know of the tray where it is put, each under a title; ``payload``: what is known of it."""
     tray, stand = placing.tray, placing.tray.below
     place, served = tray.place, (stand.served_from_m if stand and stand.place else None) or 0.0
     reached = page.whole_sentence(reached_text(placement, place, served))
-    there = tr("What the arm can carry at the tray was not examined.")
     return [
         (tr("Place"), joined([tr("{place}.", place=tray.line), reached], " ")),
         (tr("Margins"), _margins(tray, results, placement)),
         (tr("Motions"), _hindered(placing)),
-        (
-            tr("Payload there"),
-            Markup('{} <a href="dynamics.html#payload">{}</a>').format(payload, there) if payload else there,
-        ),
+        (tr("Payload there"), payload),
         (tr("What to do first"), run_again_text(results.summary, stand=tray.floor is not None)),
     ]
 

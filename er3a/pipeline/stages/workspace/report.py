@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 
 from er3a.collision.scene import Scene
 from er3a.pipeline.messages.dynamics import payload_text
@@ -58,11 +59,14 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
 
 
 def _payload(study: Study, stored: Stored[model.WorkspaceResults]) -> str:
-    """What is known of the payload, from the results of the stage dynamics beside these."""
+    """What is known of the payload at the tray, from the results of the stage dynamics beside these."""
     folder = stored.folder.parent / "dynamics" if stored.folder else None
     summary = read_stage(folder, STAGES["dynamics"]).results.summary if folder and is_computed(folder) else None
     lead, _ = payload_text(summary, study.robot(stored.robot))
-    return lead
+    there = tr("What the arm can carry at the tray was not examined.")
+    if summary is None:
+        return joined([lead, there], " ")
+    return Markup('{} <a href="dynamics.html#payload">{}</a>').format(lead, there)
 
 
 def _context(
