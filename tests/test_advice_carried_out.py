@@ -69,7 +69,7 @@ CARRIED_OUT = {
     "turn_tool": "test_a_target_moved_or_turned_as_advised_is_reached_with_margin",
     "shift_tool": "test_a_target_moved_or_turned_as_advised_is_reached_with_margin",
     "move_obstacle": "test_the_obstacle_is_to_be_moved_only_where_the_arm_alone_keeps_its_margins",
-    **{f"box.put#{form}": AT_PLACES for form in ("on", "over", "free")},
+    **{f"box.run_again#{form}": AT_PLACES for form in ("tray", "stand")},
     **{f"{code}": OF_SETS for code in ("board_scale", "little_motion", "few_samples", "no_rotation", "angle_order")},
     **{f"{code}": OF_SETS for code in ("transposed_rotations", "parallel_axes", "quaternion_order", "position_axes")},
     **dict.fromkeys(("all_samples_equal#flange", "not_converged"), OF_SETS),
@@ -94,7 +94,7 @@ NOT_CARRIED_OUT = {  # a person looks at the controller, the cell or the file, o
     *("contradiction#one", "contradiction#more"),
     *("all_samples_equal#target", "void_advice#cause", "void_advice#predicate"),
     *("read_limit#lower", "read_limit#upper", "time_joint"),
-    *("payload.unknown", "payload.not_examined"),
+    *("payload.unknown", "payload.not_examined", "payload.ask"),
     *("validation.left_open#turned", "validation.left_open#turned_at_least"),
     *("far_from_table", "far_from_table#rest"),
 }

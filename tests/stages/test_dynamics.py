@@ -477,6 +477,24 @@ def test_rated_torques_bind_payload_and_speed_too(full):
     assert path.speed_scale.by in ("peak", "rms", "speed")
 
 
+def test_the_payload_is_one_line_with_what_limits_it_and_what_is_not_known(full):
+    """Least of all paths that count, rounded down; what is missing is counted there and named behind it."""
+    study, found = full
+    summary, robot = found.results.summary, study.robot("er3a_c60")
+    least = min((path for path in summary.paths if path.counts), key=lambda path: path.payload.value)
+    lead, rest = dynamics.payload_text(summary, robot)
+    down = np.floor(100 * least.payload.value) / 100
+    by = {"rms": "RMS", "peak": "peak"}[least.payload.by]
+    limit = f"At most {down:.2f} kg, limited by the {by} torque of J{least.payload.joint} on {least.name}, on the paths"
+    assert lead.startswith(limit)
+    assert ("not known and left out" in lead) == bool(summary.unknown) == bool(rest)
+    unknown = replace(summary, paths=(), unknown=(DataOpen("masses", (6,)), DataOpen("peak")))
+    lead, rest = dynamics.payload_text(unknown, robot)
+    assert lead.startswith("Not known, for lack of 2 quantities: mount nothing until the manufacturer gives the rated")
+    assert rest == "Ask for: mass, centre of mass and inertia of the links (link 6); peak torques of the drives."
+    assert dynamics.payload_text(None, robot)[0].startswith("Not examined in this study: mount nothing")
+
+
 def test_the_loads_moments_along_a_path_have_tolerances(full):
     """Mass 30 % and centre 20 mm along each axis, as its grade stands for: at rest no more than m g (L + 35 mm)."""
     for path in full[1].results.summary.paths:

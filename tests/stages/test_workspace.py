@@ -18,7 +18,7 @@ from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.wrist_partitioned import NoWristCentre
-from er3a.pipeline.messages.workspace import say, void_text
+from er3a.pipeline.messages.workspace import judged_void, say, void_text
 from er3a.pipeline.results import read_stage, write_results
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.registry import STAGES
@@ -120,6 +120,10 @@ def test_what_is_read_is_what_was_computed(found, tmp_path):
         assert (tmp_path / "again.parquet").read_bytes() == (tmp_path / f"{name}.parquet").read_bytes(), name
 
 
+def litres_outwards(bound_m3: float) -> float:
+    return np.floor(1e5 * bound_m3) / 100
+
+
 def test_a_void_at_the_shoulder_names_the_limit_that_nothing_confirms_and_a_contradicted_table_has_no_place(
     small_results, tmp_path
 ):
@@ -127,19 +131,27 @@ def test_a_void_at_the_shoulder_names_the_limit_that_nothing_confirms_and_a_cont
     stored = read_stage(small_results("workspace", name, study), STAGES["workspace"])
     lower = np.degrees(study.robot(name).lower[2])
     said = f"J3 ≥ {lower:.4g} deg, which nothing confirms (another limit, another void). Never widen".replace("-", "−")
-    text = void_text(stored.results.summary, confirmed=False)
+    lead, text = void_text(stored.results.summary, confirmed=False)
+    void = judged_void(stored.results.summary)
+    low, high = (litres_outwards(bound) for bound in (void.volume_m3.lower, -void.volume_m3.upper))
+    assert lead.startswith(f"{low:.2f} to {-high:.2f} L around the shoulder, centred at (")
+    assert lead.endswith("no target there can be reached. That is normal for the arm.")
     assert said in text
     assert "extended" not in text  # no recipe for a larger limit
     assert "Collisions of the arm are not counted" in text
-    assert "which nothing confirms" not in void_text(stored.results.summary)
+    assert "which nothing confirms" not in void_text(stored.results.summary)[1]
     for status in ("caution", "fail"):
         report(study, replace(stored, rests_on={"validation": status}), tmp_path / "page.html")
         page = (tmp_path / "page.html").read_text(encoding="utf-8")
-        assert ("Planning only: the tray on" in page, "No place for the tray is recommended" in page) == (
+        assert f"An enclosed void of at least {low:.2f} L" in page
+        assert f">{low:.2f} to {-high:.2f}</td>" in page  # the same bounds, outwards, wherever they stand
+        assert f"<dd>{low:.2f}<small>" in page
+        assert ("<dt>Payload there</dt>" in page, "No place for the tray is recommended" in page) == (
             status != "fail",
             status == "fail",
         )
-        assert ("No path or program was checked for collisions with" in page) == (status != "fail")
+        assert "dynamics.html#payload" not in page  # it lies not beside these results
+        assert ("into the study&#39;s scene file as boxes, and run again" in page) == (status != "fail")
 
 
 def test_void_centres_have_no_inverse_solution(small_results, random):
@@ -151,8 +163,8 @@ def test_void_centres_have_no_inverse_solution(small_results, random):
     assert summary.verdict.status == "caution"
     (void,) = (void for void in summary.enclosed_voids if not void.holds_shoulder)
     larger = replace(void, holds_shoulder=True, volume_m3=Bounds(0.5, 0.6))
-    text = void_text(replace(summary, voids=(larger, *summary.voids)))
-    assert "away from the shoulder" in text  # as the verdict has it
+    lead, text = void_text(replace(summary, voids=(larger, *summary.voids)))
+    assert "away from the shoulder" in lead  # as the verdict has it
     assert "1 other enclosed void" in text
 
     def solvable(position):
@@ -180,7 +192,7 @@ def test_void_centres_have_no_inverse_solution(small_results, random):
     assert low <= min(lost) < low + 0.3 * (high - low)
     assert high - 0.3 * (high - low) < max(lost) <= high
     box = f"z {round(1000 * low)} to {round(1000 * high)} mm of the base".replace("-", "−")
-    assert box in void_text(summary)
+    assert box in void_text(summary)[1]
 
 
 def test_full_turn_of_joint_1_gives_a_symmetric_cloud():

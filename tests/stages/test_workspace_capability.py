@@ -26,6 +26,7 @@ from er3a.pipeline.stages.workspace.model import CellLookup, ToolPointsElsewhere
 from er3a.pipeline.stages.workspace.tool_capability import ToolCapability, tool_capability
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.page import Picture
+from er3a.pipeline.viewing.tray import placing
 from er3a.robots.robot import Robot
 from er3a.workspace.capability import try_poses
 from er3a.workspace.directions import cone_directions, poses, roll_of, tool_rotations
@@ -51,8 +52,10 @@ def done() -> ToolCapability:
 def context_of(robot: Robot, found: ToolCapability) -> dict:
     """What the page takes, of results that hold nothing else."""
     verdict = SimpleNamespace(shapes=None)
-    summary = SimpleNamespace(capability=found.capability, placement=found.placement, verdict=verdict)
-    return capability_context(robot, SimpleNamespace(summary=summary, capability=found.cells, places=found.places))
+    summary = SimpleNamespace(capability=found.capability, placement=found.placement, verdict=verdict, not_examined=())
+    results = SimpleNamespace(summary=summary, capability=found.cells, places=found.places)
+    placed = placing({"workspace": SimpleNamespace(results=results)}, robot, {}, {})
+    return capability_context(robot, results, placing=placed)
 
 
 def test_summary_and_tables_belong_together(done):
@@ -181,7 +184,7 @@ def test_a_tool_that_points_elsewhere_is_told_so():
     assert isinstance(found.placement, ToolPointsElsewhere)
     context = context_of(robot, found)
     assert context["nowhere"].startswith("Nowhere: the arm can't tilt its tool")
-    assert context["best_text"] == ""
+    assert context["tray_line"].startswith("Tray of")
 
 
 @pytest.mark.long
@@ -245,7 +248,7 @@ def test_a_box_stands_on_a_surface_where_the_arm_leaves_it_room_or_is_told_why_n
     assert (free & found.within_limits).any(axis=1).all()
     assert stands["floor"].above is not None
     context = context_of(robot, done)
-    assert "the tray on table, its centre at" in context["best_text"]
+    assert context["tray_line"].startswith("On table, centre (")
     assert len(context["stands"]) == 4
 
 

@@ -31,12 +31,13 @@ from er3a.pipeline.stages.trajectory.model import AvoidanceRows, PathChecks, Tra
 from er3a.pipeline.stages.validation.model import LeftOpen, PartFound
 from er3a.pipeline.stages.vision.model import PathRows, VisionResults
 from er3a.pipeline.stages.workspace import capability_section
+from er3a.pipeline.stages.workspace.capability_section import tray_rows
 from er3a.pipeline.stages.workspace.entry import BoxTask
 from er3a.pipeline.stages.workspace.model import PlacementSummary, PlaceSummary, StandSummary
 from er3a.pipeline.stages.workspace.tool_capability import task_summary
 from er3a.pipeline.viewing import tray
-from er3a.pipeline.viewing.index import condition, passing, proposed
-from er3a.pipeline.viewing.tray import Meeting, first_inside
+from er3a.pipeline.viewing.index import condition, proposed
+from er3a.pipeline.viewing.tray import Meeting, first_inside, placing
 
 TALLY = CheckTally(24)
 TURNED = ToolOff(0.0, 180.0)
@@ -212,20 +213,24 @@ def test_the_index_names_what_passes_through_the_box_or_its_stand(over):
         ),
     }
     sound = {"trajectory": ["below", "beside"], "programs": ["through", "still"]}
-    found = passing(stored, load_robot("er3a_c60"), {}, sound)
+    found = placing(stored, load_robot("er3a_c60"), {}, sound)
     assert found.targets == (("on_edge", "under") if over else ("on_edge",))
-    said = found.text
+    said = found.compared
     assert said.startswith("“Meets the tray”: ")
     assert f"Targets in it or its stand: {', '.join(found.targets)}." in said
     enters = Meeting(pytest.approx(2.75), "tool point")
     below = {"below": enters} if over else {}
-    assert found.through == {"trajectory": {"into": enters} | below, "programs": {"through": enters}}
+    assert found.met == {"trajectory": {"into": enters} | below, "programs": {"through": enters}}
     assert said.endswith("Not compared, or not all of it: still, lost.")
-    counts = f"{'1 of the 2 paths, ' if over else ''}1 of the 2 programs"
-    assert f"is in the way of {counts} that pass without them" in found.short(sound)
+    names = "below, through" if over else "through"
+    count = 1 + over
+    assert found.line.endswith(f"in the way of {count} of the 4 motions that pass without it: {names}.")
+    assert found.rows == [
+        [found.tray.where, "350, 0, 400", "150 × 200 × 50", f"{int(over)} of 2 paths, 1 of 2 programs", "–", "–"]
+    ]
 
 
-def test_a_place_that_fewer_motions_meet_is_named():
+def test_the_place_that_fewest_motions_meet_comes_first():
     """The floor's is 500 mm to the side, where the tool point does not come."""
     robot = load_robot("er3a_c60")
     programs = SimpleNamespace(programs=named("through"))
@@ -234,14 +239,27 @@ def test_a_place_that_fewer_motions_meet_is_named():
         "programs": moving(ProgramsResults, ProgramMotion, "program", programs, {"through": (0.0, 376.0)}),
     }
     sound = {"programs": ["through"]}
-    assert "Better put it" not in passing(stored, robot, {}, sound).short(sound)
+    assert placing(stored, robot, {}, sound).line == (
+        "On a stand 275 mm high on table, centre (350, 0, 400) mm, edges 150 × 200 × 50 mm along x, y, z: in the way "
+        "of 1 of the 1 motions that pass without it: through."
+    )
     placement = stored["workspace"].results.summary.placement
     aside = replace(placement.places[0], centre_m=(0.35, 0.5, 0.4))
     floor = StandSummary("floor", 0.0, None, None, "in_the_way", aside)
     stored["workspace"].results.summary.placement = replace(placement, stands=(*placement.stands, floor))
-    text = passing(stored, robot, {}, sound).short(sound)
-    assert "Better put it on a stand 375 mm high on floor, its centre at (350, 500, 400) mm, 150 × 200 × 50 mm" in text
-    assert text.endswith("there it is in the way of 0 of these.")
+    found = placing(stored, robot, {}, sound)
+    assert found.line == (
+        "On a stand 375 mm high on floor, centre (350, 500, 400) mm, edges 150 × 200 × 50 mm along x, y, z: in the way "
+        "of none of the 1 motions that pass without it."
+    )
+    assert [row[3] for row in found.rows] == ["0 of 1 programs", "1 of 1 programs"]
+    assert found.met == {"programs": {}}  # of the place that is recommended
+    half = replace(found.tray.place, size_m=(0.0125, 0.15, 0.05))
+    assert replace(found.tray, place=half).edges == "12.5 × 150 × 50"
+    many = {"programs": ["through", "a", "b", "c"]}
+    met = {name: Meeting(1.0, "link 3") for name in many["programs"]}
+    crowded = replace(found, tried=(replace(found.tried[0], met={"programs": met}),), sound=many)
+    assert crowded.line.endswith("in the way of 4 of the 4 motions that pass without it.")  # too many to be named
 
 
 def test_the_rows_of_what_meets_the_tray_lead_to_that_moment(monkeypatch, tmp_path):
@@ -261,6 +279,7 @@ def test_the_rows_of_what_meets_the_tray_lead_to_that_moment(monkeypatch, tmp_pa
     assert tray.in_tray(study, stored) is None
     monkeypatch.setattr(tray, "is_computed", lambda folder: folder == tmp_path / "workspace")
     monkeypatch.setattr(tray, "read_stage", lambda folder, stage: placed())
+    monkeypatch.setattr(tray, "sound_motions", lambda results: ["into", "beside"])
     marked = tray.in_tray(study, stored)
     assert marked.keys() == {"into", "beside, repaired"}
     assert 'data-play="into"' in marked["into"]
@@ -283,17 +302,17 @@ def test_links_of_grasps_that_meet_the_tray_are_found_before_the_tool_point():
     empty = VisionResults(SimpleNamespace(objects=objects), *(None,) * 5)
     vision = SimpleNamespace(results=replace(empty, ways=ways))
     sound = {"vision": ["can"]}
-    found = passing({"workspace": placed(), "vision": vision}, robot, {}, sound)
+    found = placing({"workspace": placed(), "vision": vision}, robot, {}, sound)
     (place,) = tray.trays(placed().results)
     bodies = Bodies(robot, place.scene(None))
     t = np.linspace(0, 2, 2001)
     rows = np.radians(q[0] + t[:, None] / 2 * (q[1] - q[0]))
     link = t[bodies.overlaps(rows)[:, bodies.second < 0].any(axis=1).argmax()]
-    meeting = found.through["vision"]["can"]
+    meeting = found.met["vision"]["can"]
     assert 0 <= meeting.t - link < 0.05
     assert link < 2 * (1 - 100 / (350 * np.sin(np.radians(60))))
     assert meeting.body.startswith("link ")
-    assert "is in the way of 1 of the 1 grasps that pass" in found.short(sound)
+    assert found.line.endswith("in the way of 1 of the 1 motions that pass without it: can.")
 
 
 GRASPED = {"can": "grasped", "missed": "not graspable"}
@@ -304,12 +323,38 @@ GRASPED = {"can": "grasped", "missed": "not graspable"}
 )
 def test_the_workspace_page_moves_a_box_up_or_down_only_where_no_height_is_to_be_kept(monkeypatch, height, room):
     monkeypatch.setattr(capability_section, "range_text", lambda *_: height)
-    monkeypatch.setattr(capability_section, "box_text", lambda *_: "Put it there.")
-    placement = placed().results.summary.placement
+    results = placed().results
+    placement = results.summary.placement
     spot = replace(placement.best, room_down_m=(0.075, 0.2, 0.2), room_up_m=(0.075, 0.175, 0.05))
-    text = capability_section.best_text(SimpleNamespace(summary=None, places=None), replace(placement, places=(spot,)))
-    assert text.startswith(f"Put it there. {height}".strip())
-    assert f"allow to move it by {room} mm," in text
+    results.summary = SimpleNamespace(placement=replace(placement, places=(spot,)), not_examined=[LeftOut("tool")])
+    results.places = None
+    found = placing({"workspace": SimpleNamespace(results=results)}, load_robot("er3a_c60"), {}, {})
+    rows = dict(tray_rows(found, results, results.summary.placement, "At most 2 kg."))
+    moved = f"Reach and limits allow to move it by {room} mm, one direction at a time. {height}".strip()
+    assert rows["Margins"].endswith(moved)
+    assert rows["Payload there"] == "At most 2 kg."
+    assert rows["Place"].startswith("In the air: no surface is known there, centre (350, 0, 400) mm")
+    assert "put the tray into the study's scene file as a box, and run again" in rows["What to do first"]
+    assert "No tool is given" in rows["What to do first"]
+
+
+def test_the_motions_that_the_tray_hinders_are_listed_with_links_to_the_moment():
+    programs = SimpleNamespace(programs=named("through"))
+    stored = {
+        "workspace": placed(over=True),
+        "programs": moving(ProgramsResults, ProgramMotion, "program", programs, {"through": (0.0, 376.0)}),
+    }
+    found = placing(stored, load_robot("er3a_c60"), {}, {"programs": ["through"]})
+    results = stored["workspace"].results
+    results.summary.not_examined, results.places = [], None
+    rows = dict(tray_rows(found, results, results.summary.placement, ""))
+    assert rows["Motions"].startswith("In the way of 1 of the 1 motions that pass without it. <a href=")
+    assert 'href="programs.html?play=through&amp;t=2.75#player">through</a> (tool point).' in rows["Motions"]
+    assert "Others" not in rows["Motions"]
+    failing = placing(stored, load_robot("er3a_c60"), {}, {"programs": []})
+    others = dict(tray_rows(failing, results, results.summary.placement, ""))["Motions"]
+    assert others.startswith("No motion passes that it could be in the way of. Others that meet it: <a href=")
+    assert "put the tray and its stand into the study's scene file as boxes" in rows["What to do first"]
 
 
 def test_other_heights_of_a_stand_are_told_with_what_they_have_less_of():
@@ -317,26 +362,28 @@ def test_other_heights_of_a_stand_are_told_with_what_they_have_less_of():
     for 2 deg."""
     placement = placed(over=True).results.summary.placement
     spot = replace(placement.best, limit_margin_deg=10.0, room_down_m=(0.0, 0, 0.1), room_up_m=(0.0, 0, 0.1))
-    placement = replace(placement, stands=(replace(placement.stands[0], above=spot),))
+    gaps = replace(placement.stands[0], above=spot).gaps_m
     heights = np.array([[0.35, 0, 0.3], [0.35, 0, 0.4], [0.35, 0, 0.5], [0.0, 0, 0.4]])
     shares, margins = np.array([0.5, 1, 1.5, 0.1]), np.array([10.0, 8, 4, 0])
     places = SimpleNamespace(centre_m=heights, manipulability_m3=shares, limit_margin_deg=margins)
-    text = range_text(placement, places)
+    text = range_text(spot, gaps, placement.task.limit_margin_deg, places)
     assert "manipulability 50 % of that at 275 mm, 6.0 deg from a joint limit instead of 10.0 deg" in text
     alone = SimpleNamespace(centre_m=heights[1:2], manipulability_m3=shares[1:2], limit_margin_deg=margins[1:2])
-    assert range_text(placement, alone) == ""
+    assert range_text(spot, gaps, placement.task.limit_margin_deg, alone) == ""
+    assert range_text(spot, None, placement.task.limit_margin_deg, places) == ""  # on a surface itself
 
 
 def test_without_motions_or_without_a_place_nothing_is_said_to_be_free():
-    assert passing({}, None, {}, {}) is None
-    alone = passing({"workspace": placed()}, None, {}, {})
-    assert (alone.short({}), alone.text) == (
-        "No path, program or grasp was compared with the place of the tray.",
-        "",
-    )
+    assert placing({}, None, {}, {}) is None
+    alone = placing({"workspace": placed()}, None, {}, {})
+    assert alone.line.endswith(": no path, program or grasp was compared with it.")
+    assert alone.compared == ""
     clear = moving(
         ProgramsResults, ProgramMotion, "program", SimpleNamespace(programs=named("far")), {"far": (500.0, 0.0)}
     )
-    found = passing({"workspace": placed(), "programs": clear}, load_robot("er3a_c60"), {}, {"programs": ["far"]})
-    assert (found.through, found.short({"programs": ["far"]})) == ({"programs": {}}, "")
-    assert found.text.startswith("Neither the tool point nor a link's shape nor what is carried was found in the tray")
+    found = placing({"workspace": placed(), "programs": clear}, load_robot("er3a_c60"), {}, {"programs": ["far"]})
+    assert found.met == {"programs": {}}
+    assert found.line.endswith("in the way of none of the 1 motions that pass without it.")
+    assert found.compared.startswith("Neither the tool point nor a link's shape nor what is carried was found in the")
+    nothing = placing({"workspace": placed(), "programs": clear}, load_robot("er3a_c60"), {}, {"programs": []})
+    assert nothing.line.endswith("no motion passes that it could be in the way of.")

@@ -7,7 +7,16 @@ import re
 import pytest
 
 from er3a.pipeline.messages.language import alike
-from er3a.pipeline.viewing.numbers import decimals_of_column, decimals_of_spreads, fixed, measured, number
+from er3a.pipeline.viewing.numbers import (
+    at_least,
+    at_most,
+    decimals_of_column,
+    decimals_of_spreads,
+    fixed,
+    measured,
+    number,
+)
+from er3a.pipeline.viewing.page import ShownFigure
 from tests.browser.pages import PAGES_OF_EACH_KIND
 
 
@@ -98,3 +107,28 @@ def test_numbers_of_one_list_have_equally_many_decimals():
     assert alike([20, -30, 7.5, 0]) == ["20.0", "−30.0", "7.5", "0.0"]
     assert alike([20, -30.0001, -0.0]) == ["20", "−30", "0"]
     assert alike([10.103, -269.88]) == ["10.103", "−269.880"]
+
+
+@pytest.mark.parametrize(
+    ("value", "measure", "least", "most"),
+    [
+        (3.917848, "L", "3.91", "3.92"),
+        (229.8715, "L", "229.87", "229.88"),
+        (0.003456, "L", "0.00345", "0.00346"),
+        (1.32999, "m³", "1.329", "1.330"),
+        (11.8454, "m³", "11.84", "11.85"),
+        (0.31, "L", "0.310", "0.310"),  # as it is: 100 times that is not 31 to the last bit
+        (0.0, "L", "0", "0"),
+        (-2.347, 1, "−2.4", "−2.3"),
+        (12.0, 0, "12", "12"),
+        (float("inf"), "kg", "∞", "∞"),
+    ],
+)
+def test_bounds_are_rounded_outwards(value, measure, least, most):
+    assert (at_least(value, measure), at_most(value, measure)) == (least, most)
+
+
+@pytest.mark.parametrize(("name", "shown"), [("voids_lower", 3.91), ("voids_upper", 3.92), ("voids", 3.92)])
+def test_a_key_figure_that_is_a_bound_is_rounded_as_one(name, shown):
+    figure = ShownFigure(name, "voids", 3.917848, "L", None, False, "L")
+    assert (figure.text, figure.rounded) == (f"{shown:.2f}", shown)

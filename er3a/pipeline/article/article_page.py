@@ -50,7 +50,7 @@ from er3a.pipeline.study import ArticleTables, Study
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.figures import house_style, new_figure
 from er3a.pipeline.viewing.index import border_mm
-from er3a.pipeline.viewing.numbers import fixed, number
+from er3a.pipeline.viewing.numbers import at_least, at_most, fixed, number
 from er3a.pipeline.viewing.page import Picture, stage_head
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINT_NAMES, MODEL, MUTED, REFERENCE
 from er3a.planning.moves import JointMove
@@ -118,7 +118,9 @@ def _reach(
         if own.void_mm and own.void_litres:
             axes.plot(np.hypot(*own.void_mm[:2]), own.void_mm[2], "*", color=HIGHLIGHT, markersize=11)
             text = tr(
-                "void of {low} to {high} L", low=number(own.void_litres[0], 3), high=number(own.void_litres[1], 3)
+                "void of {low} to {high} L",
+                low=at_least(own.void_litres[0], "L"),
+                high=at_most(own.void_litres[1], "L"),
             )
             axes.annotate(text, (np.hypot(*own.void_mm[:2]), own.void_mm[2]), (8, 8), textcoords="offset points")
         axes.set(title=name, xlabel=tr("distance from axis 1 (mm)"), aspect="equal")
@@ -438,12 +440,14 @@ def _flat(table: TableNumbers) -> dict[str, Any]:
     for key, axes in (("tool", "xyz"), ("example", "xyz"), ("void", "xyz")):
         found |= {f"{key}_{axis}": value for axis, value in zip(axes, found[f"{key}_mm"] or (np.nan,) * 3)}
     found |= dict(zip(("example_roll", "example_pitch", "example_yaw"), found["example_rpy_deg"]))
-    found |= dict(zip(("volume_low", "volume_high"), found["volume_m3"]))
-    found |= dict(zip(("void_low", "void_high"), found["void_litres"] or (0.0, 0.0)))
+    low, high = table.volume_m3
+    found |= {"volume_low": at_least(low, "m³"), "volume_high": at_most(high, "m³")}
+    low, high = table.void_litres or (0.0, 0.0)
+    found |= {"void_low": at_least(low, "L"), "void_high": at_most(high, "L")}
     found["crossings"] = _times(table.line_crossings_s)
     found["other_voids"] = joined(
         (
-            tr("{low} to {high} L at z = {z} mm", low=fixed(low, 2), high=fixed(high, 2), z=fixed(z, 0))
+            tr("{low} to {high} L at z = {z} mm", low=at_least(low, "L"), high=at_most(high, "L"), z=fixed(z, 0))
             for low, high, z in table.other_voids
         ),
         ", ",
@@ -476,8 +480,8 @@ def _compared(numbers: ArticleNumbers) -> list[list[str]]:
         (tr("Tool at joint angles 0: x, y, z (mm)"), lambda t: ", ".join(fixed(v, 2) for v in t.tool_mm)),
         (tr("Branches of the article's target within the limits"), lambda t: f"{t.within_limits} / {t.solutions}"),
         (tr("Greatest reach of the tool from axis 1 (mm)"), lambda t: fixed(t.reach_mm, 1)),
-        (tr("Reached volume, proven (m³)"), lambda t: _between(t.volume_m3, 3)),
-        (tr("Largest enclosed void, proven (L)"), lambda t: _between(t.void_litres, 2) if t.void_litres else "–"),
+        (tr("Reached volume, proven (m³)"), lambda t: _between(t.volume_m3, "m³")),
+        (tr("Largest enclosed void, proven (L)"), lambda t: _between(t.void_litres, "L") if t.void_litres else "–"),
         (tr("Its centre: z (mm)"), lambda t: fixed(t.void_mm[2], 0) if t.void_mm else "–"),
         (tr("The article's straight line"), lambda t: outcome_word(t.line) if t.line else unexamined),  # type: ignore[arg-type]
         (tr("It is singular at t (s)"), lambda t: _times(t.line_crossings_s) if t.line else unexamined),
@@ -485,8 +489,8 @@ def _compared(numbers: ArticleNumbers) -> list[list[str]]:
     return [[label, *map(cell, (numbers.printed, numbers.corrected, numbers.real))] for label, cell in rows]
 
 
-def _between(bounds: tuple[float, float], decimals: int) -> str:
-    return f"{fixed(bounds[0], decimals)} … {fixed(bounds[1], decimals)}"
+def _between(bounds: tuple[float, float], unit: str) -> str:
+    return f"{at_least(bounds[0], unit)} … {at_most(bounds[1], unit)}"
 
 
 def _dh_rows(robot: Robot) -> list[list[str]]:

@@ -321,7 +321,7 @@ ITEMS = (
         N_("10 000 random joint vectors within the limits are drawn as a cloud."),
         N_(
             "So drawn here as printed: from z = {cloud_lowest_mm:.0f} mm on, out to {cloud_farthest_mm:.0f} mm "
-            "from axis 1. The workspace stage proves a volume between {p_volume_low:.2f} and {p_volume_high:.2f} "
+            "from axis 1. The workspace stage proves a volume between {p_volume_low} and {p_volume_high} "
             "m³."
         ),
     ),
@@ -332,8 +332,8 @@ ITEMS = (
         N_("The void"),
         N_("The workspace is a hollow shell; a region near and below the base can't be reached."),
         N_(
-            "As printed the largest void is of {p_void_low:.0f} to {p_void_high:.0f} L with its centre at z = "
-            "{p_void_z:.0f} mm; others: {p_other_voids}. With offset 2 = −90° {c_void_low:.2f} to {c_void_high:.2f} L "
+            "As printed the largest void is of {p_void_low} to {p_void_high} L with its centre at z = "
+            "{p_void_z:.0f} mm; others: {p_other_voids}. With offset 2 = −90° {c_void_low} to {c_void_high} L "
             "are left, at z = {c_void_z:.0f} mm (figure {figure_reach})."
         ),
         N_(
@@ -469,7 +469,7 @@ ITEMS = (
         N_("A hole in the cloud"),
         N_("A hole in the middle means wrong limits, or a direction turned round, of joints 2 and 3."),
         N_(
-            "The hole is there as printed ({p_void_low:.0f} L). {changes_gone} of {changes_tried} single changes "
+            "The hole is there as printed (at least {p_void_low} L). {changes_gone} of {changes_tried} single changes "
             "of offsets, directions, lengths and limits would take it away: {changes_named}. Of these the "
             "article's zero pose is met by: {changes_meeting}. Of {changes_undecided} changes it is not decided."
         ),

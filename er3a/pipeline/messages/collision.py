@@ -15,6 +15,7 @@ from er3a.pipeline.messages import left_out  # noqa: F401
 from er3a.pipeline.messages.language import N_, own_title, tr
 from er3a.pipeline.messages.say import Plural, by, joined, listed, say, say_as, sentence, texts, word
 from er3a.pipeline.stages.collision.model import BaseInSolid, FreeSpace, HomeCollides, NeverFree, ShapesOverlap
+from er3a.pipeline.viewing.numbers import at_least, at_most
 
 NAMED = 3
 KEY_FIGURES = {
@@ -80,13 +81,13 @@ TEXTS = texts(
         ),
         "collision.free_space#free": (
             "{percent:.1f} % of the joint space is collision-free. Of {places} cells reached, {clear} are proven "
-            "reachable without collision, {joined} of these by a proven motion from home; at most {lost:.1f} % of the "
+            "reachable without collision, {joined} of these by a proven motion from home; at most {lost} % of the "
             "cells are lost to collisions."
         ),
         "collision.free_space#assumed": (
             "With the assumed shapes {percent:.1f} % of the joint space is collision-free. Of {places} cells reached, "
             "{clear} are reachable without collision, {joined} of these by a collision-free motion from home; at most "
-            "{lost:.1f} % of the cells are lost to collisions."
+            "{lost} % of the cells are lost to collisions."
         ),
         "collision.free_space#doubt": (
             "Pairs of links that may or may not collide, and are therefore checked: {undecided}."
@@ -163,7 +164,7 @@ def _(found: FreeSpace) -> str:
         found,
         "assumed" if found.assumed else "free",
         percent=100 * found.free_ratio,
-        lost=100 * (1 - found.clear / found.places),
+        lost=at_most(100 * (1 - found.clear / found.places), 1),
     )
     targets = say_as(found, "targets") if found.nearest else ""
     paths = say_as(found, "paths") if found.colliding else ""
@@ -224,14 +225,14 @@ def why(
     match state:
         case "never" if assumed:
             return tr(
-                "The assumed shapes are at least {least:.1f} mm apart in every pose ({boxes} ranges of joint values).",
-                least=least_mm,
+                "The assumed shapes are at least {least} mm apart in every pose ({boxes} ranges of joint values).",
+                least=at_least(least_mm, 1),
                 boxes=boxes,
             )
         case "never":
             return tr(
-                "At least {least:.1f} mm apart in every pose; proven over {boxes} ranges of joint values.",
-                least=least_mm,
+                "At least {least} mm apart in every pose; proven over {boxes} ranges of joint values.",
+                least=at_least(least_mm, 1),
                 boxes=boxes,
             )
         case "allowed" | "watched":

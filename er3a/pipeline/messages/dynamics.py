@@ -14,6 +14,7 @@ from er3a.pipeline.messages.left_out import names_in_words
 from er3a.pipeline.messages.say import Plural, by, joined, say, say_as, sentence, texts, word
 from er3a.pipeline.results import Summary
 from er3a.pipeline.stages.dynamics import model
+from er3a.pipeline.viewing.numbers import at_least
 from er3a.robots.masses import NoBody
 from er3a.robots.robot import Grade, Robot
 
@@ -142,15 +143,24 @@ TEXTS = texts(
         ),
         "sum_off_weight": "the links' masses add to {sum_kg:.4g} kg, and the manufacturer states {weight_kg:.4g} kg",
         "payload.bounded": (
-            "At most {kg:.3g} kg on the paths that the model does not rule out, limited by torques on {path}."
+            "At most {kg} kg on the paths that the model does not rule out, limited by torques on {path}."
         ),
-        "payload.partly": "Left out, because not known: {what}.",
-        "payload.unknown": (
-            "Not known: mount nothing until the manufacturer gives the rated payload. Ask for: {what}."
+        "payload.bounded#joint": (
+            "At most {kg} kg, limited by the {by} torque of J{joint} on {path}, on the paths that the model does not "
+            "rule out."
         ),
+        "payload.partly": Plural(
+            "count", "{count} quantity is not known and left out.", "{count} quantities are not known and left out."
+        ),
+        "payload.left_out": "Left out, because not known: {what}.",
+        "payload.unknown": Plural(
+            "count",
+            "Not known, for lack of {count} quantity: mount nothing until the manufacturer gives the rated payload.",
+            "Not known, for lack of {count} quantities: mount nothing until the manufacturer gives the rated payload.",
+        ),
+        "payload.ask": "Ask for: {what}.",
         "payload.not_examined": (
-            "Not known: mount nothing until the manufacturer gives the rated payload. Whether the motors carry a load "
-            "was not examined."
+            "Not examined in this study: mount nothing until the manufacturer gives the rated payload."
         ),
         "payload.rated": (
             "The robot's file gives a rated payload of {kg:.3g} kg, which nothing confirms: don't rely on it."
@@ -160,8 +170,9 @@ TEXTS = texts(
 )
 
 
-def payload_text(summary: Summary | None, robot: Robot) -> str:
-    """What the arm can carry: the least of what its paths allow, or why that is unknown; and what its maker rates it.
+def payload_text(summary: Summary | None, robot: Robot) -> tuple[str, str]:
+    """What the arm can carry: the least of what its paths allow, what limits it and how much is not known, or that it
+    is unknown, and what its maker rates it; then what to ask for.
 
     ``summary`` is the stage's; None where it was not computed.
     """
@@ -172,15 +183,19 @@ def payload_text(summary: Summary | None, robot: Robot) -> str:
     missing = [say(each) for each in getattr(summary, "unknown", ())]
     if bounds:
         value, path = min(bounds, key=lambda bound: bound[0])
-        known = sentence("payload.bounded", kg=value, path=path.name)
-        known = joined([known, sentence("payload.partly", what=joined(missing)) if missing else ""], " ")
+        by = word("dynamics.binding", BINDING, path.payload.by) if path.payload and path.payload.by else ""
+        joint = path.payload.joint if path.payload else None
+        form = "payload.bounded#joint" if by and joint else "payload.bounded"
+        known = sentence(form, kg=at_least(value, "kg"), path=path.name, by=by, joint=joint)
+        open_ = sentence("payload.partly", count=len(missing)) if missing else ""
+        known, rest = joined([known, open_], " "), sentence("payload.left_out", what=joined(missing)) if missing else ""
     elif missing:
-        known = sentence("payload.unknown", what=joined(missing))
+        known, rest = sentence("payload.unknown", count=len(missing)), sentence("payload.ask", what=joined(missing))
     else:
-        known = sentence("payload.not_examined")
+        known, rest = sentence("payload.not_examined"), ""
     wrist = robot.masses.wrist
     rated = sentence("payload.rated", kg=wrist.payload) if wrist and np.isfinite(wrist.payload) else ""
-    return joined([known, rated], " ")
+    return joined([known, rated], " "), rest
 
 
 def need_word(need: model.Need) -> str:

@@ -8,10 +8,11 @@ import numpy as np
 
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.pipeline.messages.kinematics import sum_of_joints
-from er3a.pipeline.messages.language import N_, as_text, tr, with_unit
+from er3a.pipeline.messages.language import N_, as_text, own_title, tr, with_unit
 from er3a.pipeline.messages.say import Plural, joined, say, say_as, sentence, texts
 from er3a.pipeline.results import Summary
 from er3a.pipeline.stages.workspace import model
+from er3a.pipeline.viewing.numbers import at_least, at_most
 from er3a.workspace.causes import (
     Disappears,
     Geometry,
@@ -57,26 +58,25 @@ TEXTS = texts(
             "yet, so voids can't be judged."
         ),
         "workspace.on_surface#sphere": (
-            "The tool point moves on a sphere and reaches at least {lower:.4g} m² and at most {upper:.4g} m² of it."
+            "The tool point moves on a sphere and reaches at least {lower} m² and at most {upper} m² of it."
         ),
         "workspace.on_surface#unknown": "The tool point moves on a surface; its area was not computed.",
         "workspace.on_surface#curved": (
-            "The tool point moves on a curved surface of at most {upper:.4g} m²: the area that two joints sweep; "
+            "The tool point moves on a curved surface of at most {upper} m²: the area that two joints sweep; "
             "parts swept twice count twice."
         ),
         "workspace.on_surface#plane": (
-            "The tool point moves on a plane and reaches at least {lower:.4g} m² and at most {upper:.4g} m² of it."
+            "The tool point moves on a plane and reaches at least {lower} m² and at most {upper} m² of it."
         ),
         "workspace.void_unexpected": (
-            "An enclosed void of at least {litres:.3g} L lies at ({x}, {y}, {z}) mm, away from the shoulder, proven "
-            "empty."
+            "An enclosed void of at least {litres} L lies at ({x}, {y}, {z}) mm, away from the shoulder, proven empty."
         ),
         "workspace.void_uncertain": (
-            "An enclosed void of {litres:.3g} L may lie at ({x}, {y}, {z}) mm, away from the shoulder; there is no "
+            "An enclosed void of {litres} L may lie at ({x}, {y}, {z}) mm, away from the shoulder; there is no "
             "proof, and the samples can't tell."
         ),
         "workspace.void_at_shoulder": (
-            "An enclosed void of at least {litres:.3g} L, centred at ({x}, {y}, {z}) mm, surrounds the shoulder: the "
+            "An enclosed void of at least {litres} L, centred at ({x}, {y}, {z}) mm, surrounds the shoulder: the "
             "arm can't fold far enough to reach it. There is no other enclosed void that would hint at a wrong "
             "limit; this confirms none."
         ),
@@ -153,59 +153,44 @@ TEXTS = texts(
             "Not on {name} itself: an arm that reaches all of the tray comes within {margin} mm of the scene or of "
             "itself."
         ),
-        "stand.between": (
-            "On a stand {gap} mm high ({least} to {most} mm pass the same checks with less to spare) on {name}"
-            ": centre at ({centre}) mm."
-        ),
+        "void.none": "None.",
         "void.shoulder": (
-            "The tool point can't reach {lower:.3g} to {upper:.3g} litres around the shoulder, within {box} mm of the "
-            "base."
+            "{lower} to {upper} L around the shoulder, centred at ({centre}) mm: no target there can be reached."
         ),
         "void.away": (
-            "The tool point can't reach {lower:.3g} to {upper:.3g} litres away from the shoulder, within {box} mm of "
-            "the base."
+            "{lower} to {upper} L away from the shoulder, centred at ({centre}) mm: no target there can be reached."
         ),
+        "void.normal": "That is normal for the arm.",
+        "void.not_normal": "That is not normal: a limit, a zero or a direction of joint 2 or 3 may be wrong.",
+        "void.within": "It lies within {box} mm of the base.",
         "void.side": "{axis} {low} to {high}",
         "void.cause#limit": "What makes it: {limits}{unconfirmed}. Never widen a joint limit to reach there.",
         "void.unconfirmed": ", which nothing confirms (another limit, another void)",
         "void.rests": "The bounds hold for {limits}, which nothing confirms.",
         "void.cause#noun": "Its cause: {cause}.",
-        "void.expected": (
-            "This is normal for the arm: no target there can be reached. Collisions of the arm are not counted, so "
-            "what can't be reached is larger."
-        ),
+        "void.larger": "Collisions of the arm are not counted, so what can't be reached is larger.",
         "void.no_tool": "With a tool the void is elsewhere.",
         "void.pocket": (
-            "Out of reach too, but open to the outside: a larger pocket of {lower:.3g} to {upper:.3g} litres, within "
-            "{box} mm."
+            "Out of reach too, but open to the outside: a larger pocket of {lower} to {upper} L, within {box} mm."
         ),
         "void.more": Plural(
             "count", "There is {count} other enclosed void.", "There are {count} other enclosed voids."
         ),
-        "box.size#turned": "{box} mm, turned by 90 deg (x, y, z: {xyz} mm)",
-        "box.size#as_given": "{box} mm (x, y, z)",
         "box.contradicted": "No place for the tray is recommended: evidence contradicts this table.",
         "box.unknown": "Tray of {box} mm: {why}",
         "box.nowhere": "Tray of {box} mm: no place was found where the tool reaches all of it.",
-        "box.put#on": (
-            "Planning only: the tray on {name}, its centre at ({centre}) mm. Tray: {box}; {reached}. No path or "
-            "program was checked for collisions with it: before you run any there, put it into the study's scene file "
-            "as a box and run again."
+        "box.run_again#tray": (
+            "Before you run a motion there, put the tray into the study's scene file as a box, and run again: no path, "
+            "program or grasp was planned around it."
         ),
-        "box.put#over": (
-            "Planning only: the tray on a stand {gap} mm high on {name} (top at z = {height} mm), its centre at "
-            "({centre}) mm. Tray: {box}; {reached}. No place directly on {none} works. No path or program was checked "
-            "for collisions with them: before you run any there, put both into the study's scene file as "
-            "boxes and run again."
+        "box.run_again#stand": (
+            "Before you run a motion there, put the tray and its stand into the study's scene file as boxes, and run "
+            "again: no path, program or grasp was planned around them."
         ),
-        "box.put#free": (
-            "Planning only: the tray with its centre at ({centre}) mm; no surface is known there. Tray: {box}; "
-            "{reached}. No path or program was checked for collisions with it: before you run any there, put it into "
-            "the study's scene file as a box and run again."
-        ),
+        "box.no_tool": "No tool is given: the flange's own centre enters the tray. Repeat it with your tool's length.",
         "box.range": (
-            "Keep the stand at {gap} mm: heights of {least} to {most} mm pass the same checks, some of them with the "
-            "tray turned the other way, but the worst of them has less to spare: {spare}."
+            "Keep the stand at {gap} mm: of the heights that pass the same checks, {least} to {most} mm, some of them "
+            "with the tray turned the other way, the worst has less to spare: {spare}."
         ),
         "box.spare.manipulability": "manipulability {percent:.2g} % of that at {gap} mm",
         "box.spare.limits": "{least:.1f} deg from a joint limit instead of {here:.1f} deg",
@@ -219,9 +204,7 @@ TEXTS = texts(
         ),
         "box.tilt#down": "tilted up to {cone:g} deg from straight down",
         "box.tilt#along": "tilted up to {cone:g} deg from ({axis})",
-        "box.unchecked": (
-            "clearance to the scene was only sampled, collisions with the tray and its stand were not checked"
-        ),
+        "box.unchecked": ("the arm's clearance there was only sampled, and does not count the tray and its stand"),
         "workspace.tool_points_elsewhere": (
             "Nowhere: the arm can't tilt its tool, which points along ({x:.2f}, {y:.2f}, {z:.2f}) and not within the "
             "cone."
@@ -233,11 +216,12 @@ TEXTS = texts(
 @say.register
 def _(found: model.OnSurface) -> str:
     surface = found.surface
-    lower, upper = surface.lower, surface.upper
-    if upper is None:
+    if surface.upper is None:
         return say_as(found, "unknown")
-    if lower is None:
+    upper = at_most(surface.upper, "m²")
+    if surface.lower is None:
         return say_as(found, "curved", upper=upper)
+    lower = at_least(surface.lower, "m²")
     if surface.kind == "plane":
         return say_as(found, "plane", lower=lower, upper=upper)
     return say_as(found, "sphere", lower=lower, upper=upper)
@@ -301,9 +285,11 @@ def _advice(cause: VoidCause) -> str:
     return sentence("void_advice#cause", cause=say(cause))
 
 
-def _place(found: model.VoidUnexpected | model.VoidUncertain | model.VoidAtShoulder) -> dict[str, float | str]:
+def _place(found: model.VoidUnexpected | model.VoidUncertain | model.VoidAtShoulder) -> dict[str, str]:
     shown = {"x": found.x_mm, "y": found.y_mm, "z": found.z_mm}
-    return {"litres": found.litres} | {key: str(round(value)).replace("-", "−") for key, value in shown.items()}
+    return {"litres": at_least(found.litres, "L")} | {
+        key: str(round(value)).replace("-", "−") for key, value in shown.items()
+    }
 
 
 @say.register
@@ -375,62 +361,56 @@ def _(found: model.ToolPointsElsewhere) -> str:
     return say_as(found, x=x, y=y, z=z)
 
 
-def box_text(summary: Summary) -> str:
-    """Where to put the tray of the study; empty where places were not looked for."""
+def no_box_text(summary: Summary) -> str:
+    """Why there is no place for the tray of the study; empty where there is one, or none was looked for."""
     placement = getattr(summary, "placement", None)
     if placement is None:
         return ""
     asked = " × ".join(as_text(value, "g") for value in placement.task.box_mm)
     if not isinstance(placement, model.PlacementSummary):
         return sentence("box.unknown", box=asked, why=say(placement))
-    if not placement.named_places:
-        return sentence("box.nowhere", box=asked)
-    stand, over = placement.stand, placement.over
-    place = placement.best
-    served_from = stand.served_from_m or 0.0 if stand else 0.0
-    form = "upper" if served_from > SERVED_ALL_M else "all"
-    edges = ", ".join(as_text(round(1000 * edge), "d") for edge in place.size_m)
-    parts = {
-        "box": sentence("box.size#turned" if place.turned else "box.size#as_given", box=asked, xyz=edges),
-        "centre": millimetres(place.centre_m),
-        "reached": _reached(placement, place.status, form, served_from),
-    }
-    if stand:
-        return sentence("box.put#on", name=stand.name, **parts)
-    if over and over.gaps_m:
-        parts |= {"gap": millimetres(over.gaps_m[:1]), "height": millimetres([over.height_m])}
-        parts |= {"none": ", ".join(each.name for each in placement.stands)}
-        return sentence("box.put#over", name=over.name, **parts)
-    return sentence("box.put#free", **parts)
+    return "" if placement.named_places else sentence("box.nowhere", box=asked)
 
 
-def _reached(placement: model.PlacementSummary, status: str, form: str, served_from_m: float) -> str:
-    """How much of a tray the tool reaches, how it is tilted there, and what was not checked."""
+def reached_text(placement: model.PlacementSummary, place: model.PlaceSummary, served_from_m: float = 0.0) -> str:
+    """How much of a tray the tool reaches, from a height above its underside on, how it is tilted there, and what was
+    not checked."""
     axis, cone = placement.task.tool_direction, placement.task.cone_deg
     down = tuple(round(each, 6) for each in axis) == (0, 0, -1)
     tilt = sentence("box.tilt#down" if down else "box.tilt#along", cone=cone, axis=", ".join(f"{x:g}" for x in axis))
-    unchecked = sentence("box.unchecked")
-    served = millimetres([served_from_m])
-    return sentence(f"box.{status}#{form}", tilt=tilt, unchecked=unchecked, served_from=served)
+    form = "upper" if served_from_m > SERVED_ALL_M else "all"
+    served, unchecked = millimetres([served_from_m]), sentence("box.unchecked")
+    return sentence(f"box.{place.status}#{form}", tilt=tilt, unchecked=unchecked, served_from=served)
 
 
-def range_text(placement: model.PlacementSummary, places: model.BoxPlaces) -> str:
-    """How high the stand of the tray may be, and how near to a singular pose and to joint limits the arm comes over
-    that range; empty where no stand is needed or only one height serves."""
-    gaps = placement.over.gaps_m if placement.over and not placement.stand else None
+def run_again_text(summary: Summary, *, stand: bool) -> str:
+    """What to do before a motion is run beside the tray, or with a tool; ``stand``: whether the tray needs one."""
+    bare = any(each.subject == "tool" for each in summary.not_examined)
+    again = sentence("box.run_again#stand" if stand else "box.run_again#tray")
+    return joined([again, sentence("box.no_tool") if bare else ""], " ")
+
+
+def range_text(
+    place: model.PlaceSummary, gaps: tuple[float, float, float] | None, margin_deg: float, places: model.BoxPlaces
+) -> str:
+    """How high the stand of the tray at a place may be, and how near to a singular pose and to joint limits the arm
+    comes over that range; empty where no stand is needed or only one height serves.
+
+    ``gaps``: its height, the least and the most, m; ``margin_deg``: what the task asks of joints' limits
+    """
     if gaps is None or gaps[1] == gaps[2]:
         return ""
     gap, least, most = gaps
-    *xy, z = placement.best.centre_m
+    *xy, z = place.centre_m
     above = np.abs(places.centre_m[:, :2] - xy).max(axis=1) < SAME_PLACE_M
     heights = places.centre_m[:, 2] - z + gap
     above &= (least - SAME_PLACE_M < heights) & (heights < most + SAME_PLACE_M)
-    best, shown = placement.best, {"gap": millimetres([gap])}
-    worst = float(min(places.manipulability_m3[above], default=0.0)) / best.manipulability_m3
+    shown = {"gap": millimetres([gap])}
+    worst = float(min(places.manipulability_m3[above], default=0.0)) / place.manipulability_m3
     spare = [sentence("box.spare.manipulability", percent=100 * worst, **shown)] if worst < SAME_SHARE else []
-    near = float(min(places.limit_margin_deg[above], default=np.inf)) + placement.task.limit_margin_deg
-    if best.limit_margin_deg is not None and near < SAME_SHARE * best.limit_margin_deg:
-        spare.append(sentence("box.spare.limits", least=near, here=best.limit_margin_deg))
+    near = float(min(places.limit_margin_deg[above], default=np.inf)) + margin_deg
+    if place.limit_margin_deg is not None and near < SAME_SHARE * place.limit_margin_deg:
+        spare.append(sentence("box.spare.limits", least=near, here=place.limit_margin_deg))
     if not spare:
         return ""
     return sentence(
@@ -438,18 +418,24 @@ def range_text(placement: model.PlacementSummary, places: model.BoxPlaces) -> st
     )
 
 
-def void_text(summary: Summary, *, confirmed: bool = True) -> str:
-    """The void that the verdict tells of, with its bounds, place and cause, and a larger open pocket; empty where voids
-    were not judged. ``confirmed``: whether independent documents settle the joints' limits."""
+def void_text(summary: Summary, *, confirmed: bool = True) -> tuple[str, str]:
+    """The void that the verdict tells of: its bounds, centre and what it means; then where it lies, its cause and a
+    larger open pocket. Empty where voids were not judged. ``confirmed``: whether independent documents settle the
+    joints' limits."""
     finding = summary.verdict.finding
-    if isinstance(finding, model.NoVoid | model.VoidUncertain):
-        return say(finding)
+    if isinstance(finding, model.NoVoid):
+        return joined([sentence("void.none"), say(finding)], " "), ""
+    if isinstance(finding, model.VoidUncertain):
+        return say(finding), ""
     if not isinstance(summary, model.WorkspaceSummary) or not isinstance(
         finding, model.VoidAtShoulder | model.VoidUnexpected
     ):
-        return ""
+        return "", ""
     voids, judged = summary.enclosed_voids, judged_void(summary)
-    where = sentence("void.shoulder" if judged.holds_shoulder else "void.away", **_void_parts(judged))
+    normal = isinstance(finding, model.VoidAtShoulder)
+    where = "void.shoulder" if judged.holds_shoulder else "void.away"
+    means = "void.normal" if normal else "void.not_normal"
+    lead = joined([sentence(where, **_void_parts(judged)), sentence(means)], " ")
     limits = _limits(judged.cause)
     if is_predicate(judged.cause):
         unconfirmed = "" if confirmed else sentence("void.unconfirmed")
@@ -457,14 +443,12 @@ def void_text(summary: Summary, *, confirmed: bool = True) -> str:
     else:
         rests = sentence("void.rests", limits=limits) if limits and not confirmed else ""
         cause = joined([sentence("void.cause#noun", cause=say(judged.cause)), rests], " ")
-    expected = ""
-    if isinstance(finding, model.VoidAtShoulder):
-        bare = any(each.subject == "tool" for each in summary.not_examined)
-        expected = joined([sentence("void.expected"), sentence("void.no_tool") if bare else ""], " ")
+    bare = normal and any(each.subject == "tool" for each in summary.not_examined)
     more = sentence("void.more", count=len(voids) - 1) if len(voids) > 1 else ""
     pocket = max(summary.voids, key=lambda void: void.volume_m3.upper)
     open_one = sentence("void.pocket", **_void_parts(pocket)) if pocket.kind == "open" else ""
-    return joined([where, cause, expected, more, open_one], " ")
+    within, tool = sentence("void.within", **_void_parts(judged)), sentence("void.no_tool") if bare else ""
+    return lead, joined([within, cause, sentence("void.larger") if normal else "", tool, more, open_one], " ")
 
 
 def judged_void(summary: model.WorkspaceSummary) -> model.VoidSummary:
@@ -490,13 +474,18 @@ def _limits(cause: VoidCause) -> str:
     return joined(said, ", ")
 
 
-def _void_parts(void: model.VoidSummary) -> dict[str, float | str]:
+def _void_parts(void: model.VoidSummary) -> dict[str, str]:
     bounds = void.volume_m3
     box = [
         sentence("void.side", axis=axis, low=millimetres((low,)), high=millimetres((high,)))
         for axis, low, high in zip("xyz", void.low_m, void.high_m)
     ]
-    return {"lower": 1000 * bounds.lower, "upper": 1000 * bounds.upper, "box": joined(box, ", ")}
+    return {
+        "lower": at_least(1000 * bounds.lower, "L"),
+        "upper": at_most(1000 * bounds.upper, "L"),
+        "box": joined(box, ", "),
+        "centre": millimetres(void.centroid_m),
+    }
 
 
 def millimetres(values: Sequence[float]) -> str:
@@ -505,16 +494,10 @@ def millimetres(values: Sequence[float]) -> str:
 
 
 def stand_text(stand: model.StandSummary, placement: model.PlacementSummary) -> str:
-    """Whether the tray can stand on a surface; if not why, and how high what would have to stand between them is."""
-    named = {"name": stand.name, "height": millimetres([stand.height_m])}
+    """Whether the tray can stand on a surface, and if not why."""
+    named = {"name": own_title(stand.name), "height": millimetres([stand.height_m])}
     if stand.place and stand.served_from_m is not None:
-        form = "upper" if stand.served_from_m > SERVED_ALL_M else "all"
-        reached = _reached(placement, stand.place.status, form, stand.served_from_m)
+        reached = reached_text(placement, stand.place, stand.served_from_m)
         return sentence("stand.fits", reached=reached, centre=millimetres(stand.place.centre_m), **named)
     margin, lowest = as_text(placement.margin_mm, "g"), as_text(placement.task.lowest_mm, "g")
-    why = sentence(f"stand.{stand.why_none}", margin=margin, lowest=lowest, **named)
-    if stand.gaps_m is None or stand.above is None:
-        return why
-    gap, least, most = (millimetres([value]) for value in stand.gaps_m)
-    centre = millimetres(stand.above.centre_m)
-    return joined([why, sentence("stand.between", gap=gap, least=least, most=most, centre=centre, **named)], " ")
+    return sentence(f"stand.{stand.why_none}", margin=margin, lowest=lowest, **named)

@@ -23,7 +23,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull
 
-from er3a.collision.scene import Scene
 from er3a.files.kept_files import write_atomically
 from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Reals
@@ -33,7 +32,7 @@ from er3a.pipeline.messages.dynamics import payload_text
 from er3a.pipeline.messages.language import N_, own_title, tr
 from er3a.pipeline.messages.left_out import left_out_text, say_reserved
 from er3a.pipeline.messages.pages import caveat, decision, next_step
-from er3a.pipeline.messages.say import bracketed, joined, say
+from er3a.pipeline.messages.say import bracketed, joined, say, sentence
 from er3a.pipeline.messages.validation import (
     CONVENTIONS,
     condition,
@@ -43,7 +42,7 @@ from er3a.pipeline.messages.validation import (
     shortened,
     unconfirmed,
 )
-from er3a.pipeline.messages.workspace import box_text, judged_void, range_text, void_text
+from er3a.pipeline.messages.workspace import judged_void, no_box_text, run_again_text, void_text
 from er3a.pipeline.player.motions import Fault, FaultMoment
 from er3a.pipeline.results import (
     AbsentResults,
@@ -73,17 +72,16 @@ from er3a.pipeline.stages.validation.model import (
     TableEvidence,
     ValidationResults,
 )
-from er3a.pipeline.stages.vision.model import VisionResults
-from er3a.pipeline.stages.workspace.model import PlacementSummary, VoidSummary, WorkspaceResults, WorkspaceSummary
+from er3a.pipeline.stages.workspace.model import VoidSummary, WorkspaceResults, WorkspaceSummary
 from er3a.pipeline.study import Study
 from er3a.pipeline.sweeps import ENTRIES, entry_label
 from er3a.pipeline.verdicts import NOT_EXAMINED, StageVerdict, read_verdicts
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.figures import new_figure
-from er3a.pipeline.viewing.numbers import decimals_of, fixed, number
+from er3a.pipeline.viewing.numbers import at_least, at_most, fixed, number
 from er3a.pipeline.viewing.page import PAGES, Head, Picture, alternative_table, head_of, stage_head, status_word
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, MUTED, REFERENCE, VERDICTS
-from er3a.pipeline.viewing.tray import Meeting, Tray, compared_with_tray, met, scene_of, stored_motions, trays
+from er3a.pipeline.viewing.tray import MOTIONS, Placing, placing, scene_of, sound_motions
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 
@@ -174,15 +172,8 @@ def key_figures(folder: Path, stages: Sequence[str]) -> dict[tuple[str, str, str
             if figure.part and value is not None:  # the whole differs from robot to robot
                 found[title, figure.label, ""] = f"{figure.text} {unit}"
             else:
-                found[title, figure.label, unit] = _rounded(figure)
+                found[title, figure.label, unit] = figure.rounded
     return found
-
-
-def _rounded(figure: page.ShownFigure) -> float | int | None:
-    """The value with the digits that its page shows."""
-    if not isinstance(figure.value, float) or not np.isfinite(figure.value) or not figure.value:
-        return figure.value
-    return round(figure.value, decimals_of(figure.value, figure.uncertainty, figure.measure))
 
 
 def border_mm(workspace: WorkspaceResults | AbsentResults | None) -> list[list[list[float]]]:
@@ -339,7 +330,7 @@ def _caption(points: list[Point], own: float | None, unit: str, workspace: bool)
         parts = {"unit": unit}
         for end, point in enumerate((ordered[0], ordered[-1]), start=1):
             volume = point.workspace.volume_m3
-            parts |= {f"low_{end}": number(volume.lower), f"high_{end}": number(volume.upper)}
+            parts |= {f"low_{end}": at_least(volume.lower, "m³"), f"high_{end}": at_most(volume.upper, "m³")}
             parts[f"value_{end}"] = _plain(point.value)
         said.append(tr(text, **parts))
     if own is not None:
@@ -378,10 +369,10 @@ def _workspace_cells(point: Point) -> list[str]:
         return ["–"] * 6
     summary = point.workspace
     return [
-        number(summary.volume_m3.lower),
-        number(summary.volume_m3.upper),
+        at_least(summary.volume_m3.lower, "m³"),
+        at_most(summary.volume_m3.upper, "m³"),
         str(len(point.enclosed)),
-        number(point.litres("lower"), 3),
+        at_least(point.litres("lower"), "L"),
         str(len(summary.voids) - len(point.enclosed)),
         number(1000 * summary.reach_m.furthest_from_axis),
     ]
@@ -498,7 +489,6 @@ def _counts(verdicts: Sequence[StageVerdict]) -> dict[str, str]:
 
 
 SHOWN_FIGURES = 3
-MOTIONS = {name: stage.motions for name, stage in STAGES.items() if stage.motions}
 MAY_RUN = {name: motions for name, motions in MOTIONS.items() if STAGES[name].may_run}
 OF_ALL_RUNS = (  # what may turn any of them unsafe
     *("obstacles", "uncovered_links", "partial_links", "bare_tool", "base_inside", "allowed_contacts"),
@@ -528,6 +518,9 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         folder / "index.html",
         places=list(_places(study, folder, {each["robot"].name for each in robots if each["table"] == "fail"})),
         robots=robots,
+        entries_legend=verdict_legend(
+            status for each in robots if each["entries"] for status in each["entries"]["statuses"]
+        ),
         article=study.article is not None,
         questions={stage.name: stage.question for stage in STAGES.values()},
         shown_figures=SHOWN_FIGURES,
@@ -632,24 +625,21 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
     same_arm, instead = isinstance(finding, DefinedOtherwise), alternative_table(study, name, results.parent)
     unproven, settled = _settled(finding, _evidence(results))
     entries = evidence_section(robot, _evidence(results), _evidence(results.parent / instead) if instead else None)
-    box_range = _box_range(stored["workspace"].results) if "workspace" in stored else ""
     computed = {stage: each for stage, each in stored.items() if heads[stage].status != "not_computed"}
     runs = [_run(stage, name, computed[stage].results) for stage in MAY_RUN if stage in computed]
-    grasped = _grasped(computed["vision"].results) if "vision" in computed else []
+    grasped = sound_motions(computed["vision"].results) if "vision" in computed else []
     sound = {run["stage"]: run["sound"] for run in runs} | {"vision": grasped}
-    passes = passing(computed, robot, {stage: scene_of(study, name, stage) for stage in MOTIONS}, sound)
+    placed = placing(computed, robot, {stage: scene_of(study, name, stage) for stage in MOTIONS}, sound)
     return {
         "robot": robot,
         "table": table,
         "contradicted": table == "fail" and not same_arm,
         "may_run": table != "fail",
         "decision": decision(table, [*failed.values()], instead, unproven=unproven, same_arm=same_arm),
-        "settled": settled,
         "entries": entries,
-        "legend": verdict_legend(entries["statuses"]) if entries else [],
         "instead": {instead: f"#{instead}"} if instead else {},
         "dh_instead": {instead: f"#dh-{instead}"} if instead else {},
-        "answers": [*_answers(heads, robot, passes.short(sound) if passes else "", box_range)],
+        "answers": [*([settled] if settled else []), *_answers(heads, robot, placed)],
         "notes": {stage: _note(head, [run for run in runs if run["stage"] == stage]) for stage, head in heads.items()},
         "bare": any(
             _misses(heads[stage], "carried") or _misses(heads[stage], "tool") for stage in MAY_RUN if stage in heads
@@ -658,8 +648,8 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         "runs": runs,
         "grasped": grasped,
         "condition": condition(_parts(heads), getattr(finding, "unbounded", ())),
-        "box": joined([_without_box(), passes.text], " ") if passes else "",
-        "in_box": passes.through if passes else {},
+        "box": joined([_without_box(), placed.compared], " ") if placed else "",
+        "in_box": placed.met if placed else {},
         "shapes": next(
             (say(replace(shapes, near=())) for shapes in (head.shapes for head in heads.values()) if shapes), ""
         ),
@@ -673,9 +663,16 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         ),
         "cells": [_cell(head) for head in sorted(heads.values(), key=lambda head: FIRST.index(head.status))],
         "expected": expected,
+        "meant": _meant(heads, expected),
         "not_examined": [tr(STAGES[stage].title) for stage in stages if stage not in heads],
         "not_asked": [tr(stage.title) for name, stage in STAGES.items() if name not in stages],
     }
+
+
+def _meant(heads: Mapping[str, Head], expected: Mapping[str, str]) -> str:
+    """Which stages fail as the study expects; empty where none does."""
+    named = [tr(STAGES[stage].title) for stage, head in heads.items() if head.status == "fail" == expected.get(stage)]
+    return tr("{count} expected to fail: {names}", count=len(named), names=joined(named, ", ")) if named else ""
 
 
 def proposed(finding: object) -> dict[str, str]:
@@ -692,41 +689,57 @@ def proposed(finding: object) -> dict[str, str]:
     return {"measurement": joined(step, " "), "entry": entry.replace(" ", "")}
 
 
-def _settled(finding: object, evidence: TableEvidence | None) -> tuple[bool, str]:
+def _settled(finding: object, evidence: TableEvidence | None) -> tuple[bool, Answer | None]:
     """Whether nothing of a table's geometry is settled; and of one that is contradicted by what, of one that is settled
-    in part how much, and how far off the tool could be."""
+    in part what is not, how much is, and how far off the tool could be."""
+    title, place = tr("D-H table"), "validation.html"
     if isinstance(finding, Contradicted | AnotherArm):
-        return False, missed_text(finding)
+        return False, Answer(title, missed_text(finding), page=place)
     if not isinstance(finding, LeftOpen):
-        return False, ""
+        return False, None
     part = next((part for part in finding.parts if part.part == "geometry"), None)
     conflict = say(finding.contradiction) if finding.contradiction else ""
     sums = joined([each.entry for each in evidence.combinations] if evidence else [], ", ")
     counted = tr("Counted as one entry, because only the sum matters: {names}.", names=sums) if sums else ""
-    said = joined([settled_parts(finding), counted, *how_far_off(finding), conflict], " ")
-    return part is not None and not (part.settled or part.up_to_signs), said
+    names, said = unconfirmed(finding.parts, finding.unbounded), settled_parts(finding)
+    open_ = sentence("validation.left_open#open", names=names) if names else ""
+    lead = joined([open_ or said, conflict], " ")
+    rest = joined([said.removesuffix(open_).rstrip() if open_ else "", counted, *how_far_off(finding)], " ")
+    return part is not None and not (part.settled or part.up_to_signs), Answer(title, lead, rest, place)
 
 
-def _answers(heads: Mapping[str, Head], robot: Robot, passes: str, box_range: str) -> Iterator[tuple[str, str, str]]:
-    """What is asked of an arm first: the question, its answer and where it is shown; ``box_range``: how high the tray's
-    stand may be."""
+@dataclass(frozen=True)
+class Answer:
+    """An answer to what is asked of an arm first: in a line or two, the rest, and where it is shown; ``places``: of the
+    tray, where there are several."""
+
+    title: str
+    lead: str
+    rest: str = ""
+    page: str = ""
+    places: Sequence[Sequence[str]] = ()
+
+
+def _answers(heads: Mapping[str, Head], robot: Robot, placing: Placing | None) -> Iterator[Answer]:
+    """What is asked of an arm first; ``placing``: where to put the tray."""
     workspace = heads["workspace"].summary if "workspace" in heads else None
     if isinstance(workspace, WorkspaceSummary):
-        yield tr("Reach"), _reach_text(workspace, bare=_misses(heads["workspace"], "tool")), "workspace.html"
+        reach = _reach_text(workspace, bare=_misses(heads["workspace"], "tool"))
+        yield Answer(tr("Reach"), reach, page="workspace.html")
     summary = heads["dynamics"].summary if "dynamics" in heads else None
-    yield tr("Payload"), payload_text(summary, robot), "dynamics.html#payload" if summary else ""
-    if workspace:
-        place = ""
-        if isinstance(workspace, WorkspaceSummary) and workspace.enclosed_voids:
-            place = f"#void-{workspace.voids.index(judged_void(workspace)) + 1}"
-        yield tr("Void"), void_text(workspace, confirmed=_limits_confirmed(heads)), f"workspace.html{place}"
-    if workspace:
-        box = box_text(workspace)
-        if box and _misses(heads["workspace"], "tool"):
-            bare = tr("No tool is given: the flange's own centre enters the tray. Repeat it with your tool's length.")
-            box = joined([box, bare], " ")
-        box = joined([passes, box, box_range], " ") if box else ""
-        yield tr("Tray"), box, "workspace.html#placement"
+    yield Answer(tr("Payload"), *payload_text(summary, robot), "dynamics.html#payload" if summary else "")
+    if not workspace:
+        return
+    row = ""
+    if isinstance(workspace, WorkspaceSummary) and workspace.enclosed_voids:
+        row = f"#void-{workspace.voids.index(judged_void(workspace)) + 1}"
+    yield Answer(tr("Void"), *void_text(workspace, confirmed=_limits_confirmed(heads)), f"workspace.html{row}")
+    if placing is None:
+        yield Answer(tr("Tray"), no_box_text(workspace), page="workspace.html#placement")
+        return
+    rest = run_again_text(workspace, stand=placing.tray.floor is not None)
+    places = placing.rows if len(placing.rows) > 1 else ()
+    yield Answer(tr("Tray"), placing.line, rest, "workspace.html#placement", places)
 
 
 def _reach_text(summary: WorkspaceSummary, *, bare: bool) -> str:
@@ -736,23 +749,18 @@ def _reach_text(summary: WorkspaceSummary, *, bare: bool) -> str:
         fixed(1000 * value, 1)
         for value in (reach.nearest_to_axis, reach.furthest_from_axis, reach.lowest, reach.highest)
     )
-    point = tr("without a tool: the centre of the flange") if bare else tr("the tool point")
+    point = tr("the flange's centre (no tool is given)") if bare else tr("the tool point")
     return tr(
-        "{least} to {most} mm from axis 1 ({point}), {low} to {high} mm along it; {smallest} to {largest} m³ in all "
-        "(proven).",
+        "{least} to {most} mm from axis 1 and {low} to {high} mm along it, of {point}; {smallest} to {largest} m³ in "
+        "all (proven).",
         point=point,
-        **{"most": most, "least": least, "low": low, "high": high},
-        smallest=number(summary.volume_m3.lower),
-        largest=number(summary.volume_m3.upper),
+        least=least,
+        most=most,
+        low=low,
+        high=high,
+        smallest=at_least(summary.volume_m3.lower, "m³"),
+        largest=at_most(summary.volume_m3.upper, "m³"),
     )
-
-
-def _box_range(results: Any) -> str:
-    """How high the stand of a tray may be; empty where none is proposed."""
-    placement = getattr(results.summary, "placement", None)
-    if not isinstance(placement, PlacementSummary) or not placement.named_places:
-        return ""
-    return range_text(placement, results.places)
 
 
 def _limits_confirmed(heads: Mapping[str, Head]) -> bool:
@@ -771,110 +779,6 @@ def _misses(head: Head, subject: str) -> bool:
     return any(each.subject == subject for each in head.summary.not_examined)
 
 
-@dataclass(frozen=True)
-class Passing:
-    """What meets the tray where it is proposed, or what it stands on.
-
-    Attributes
-    ----------
-    through : per stage when each motion meets it first, by name
-    targets : those with a solution, whose tool points lie in it
-    unseen : names of motions that are not known, or not all
-    elsewhere : how many of the motions that pass meet it at another place, the best of each surface
-    """
-
-    through: Mapping[str, Mapping[str, Meeting]]
-    targets: tuple[str, ...]
-    unseen: tuple[str, ...]
-    elsewhere: tuple[tuple[Tray, int], ...] = ()
-
-    @property
-    def text(self) -> str:
-        """What was compared, and what of it was found."""
-        if not self.through:
-            return ""
-        said = [compared_with_tray({name: each for found in self.through.values() for name, each in found.items()})]
-        if self.targets:
-            said.append(tr("Targets in it or its stand: {names}.", names=joined(self.targets, ", ")))
-        if self.unseen:
-            said.append(tr("Not compared, or not all of it: {names}.", names=joined(self.unseen, ", ")))
-        return joined(said, " ")
-
-    def short(self, sound: Mapping[str, Sequence[str]]) -> str:
-        """How many there are among the names of what passes, per stage, and where there are fewer."""
-        if not self.through:
-            return tr("No path, program or grasp was compared with the place of the tray.")
-        met = {stage: found.keys() & sound.get(stage, ()) for stage, found in self.through.items()}
-        counts = [
-            tr(
-                "{count} of the {passing} {what}",
-                count=len(inside),
-                passing=len(sound.get(stage, ())),
-                what=tr(MOTIONS[stage]),
-            )
-            for stage, inside in met.items()
-            if inside
-        ]
-        if not counts:
-            return ""
-        said = tr("The tray or its stand is in the way of {runs} that pass without them.", runs=joined(counts, ", "))
-        tray, count = min(self.elsewhere, key=lambda each: each[1], default=(None, 0))
-        if tray is None or count >= sum(map(len, met.values())):
-            return said
-        other = tr(
-            "Better put it {where}, its centre at ({centre}) mm, {size} mm along x, y and z: there it is in the way of "
-            "{count} of these.",
-            where=_standing(tray),
-            centre=", ".join(number(round(1000 * value)) for value in tray.centre),
-            size=" × ".join(number(round(1000 * value)) for value in tray.high - tray.low),
-            count=count,
-        )
-        return joined([said, other], " ")
-
-
-def _standing(tray: Tray) -> str:
-    """On what a tray stands."""
-    if tray.floor is None:
-        return tr("on {name}", name=own_title(tray.on))
-    gap = number(round(1000 * (tray.low[2] - tray.floor)))
-    return tr("on a stand {gap} mm high on {name}", gap=gap, name=own_title(tray.on))
-
-
-def passing(
-    stored: Mapping[str, Stored[Any]],
-    robot: Robot,
-    scenes: Mapping[str, Scene | None],
-    sound: Mapping[str, Sequence[str]],
-) -> Passing | None:
-    """What meets the tray of the study where the workspace stage puts it; None if it puts none.
-
-    ``scenes``: of each stage, for what the arm carries. ``sound``: what passes in each, compared with other places too.
-    """
-    places = trays(stored["workspace"].results) if "workspace" in stored else []
-    if not places:
-        return None
-    motions = {stage: [*stored_motions(stored[stage].results, robot)] for stage in MOTIONS if stage in stored}
-    through = {stage: met(robot, places[0], scenes.get(stage), each) for stage, each in motions.items()}
-    unseen = [each.name for moved in motions.values() for each in moved if not each.whole]
-    for stage in motions:
-        unseen += [each.name for each in getattr(stored[stage].results.summary, "not_followed", ())]
-    passed = {stage: [each for each in moved if each.name in sound.get(stage, ())] for stage, moved in motions.items()}
-    elsewhere = [
-        (tray, sum(len(met(robot, tray, scenes.get(stage), each)) for stage, each in passed.items()))
-        for tray in places[1:]
-        if any(through[stage].keys() & {each.name for each in passed[stage]} for stage in passed)
-    ]
-    low, high = (1000 * corner for corner in places[0].corners)
-    targets = stored["inverse"].results.summary.targets if "inverse" in stored else ()
-    inside = (each.name for each in targets if each.chosen_deg and np.all((low <= each.xyz_mm) & (each.xyz_mm <= high)))
-    return Passing(through, tuple(inside), tuple(unseen), tuple(elsewhere))
-
-
-def _grasped(results: VisionResults) -> list[str]:
-    """Names of the objects that can be grasped."""
-    return [each.name for each in results.summary.objects if each.outcome == "grasped"]
-
-
 def _without_box() -> str:
     return tr(
         "These pass without the tray and its stand: put both into the study's scene file and run again before "
@@ -890,8 +794,7 @@ def _run(stage: str, robot: str, results: TrajectoryResults | ProgramsResults) -
     else:
         followed, lost, faults = results.summary.paths, len(results.summary.not_followed), path_faults(results)
     faults += _otherwise(stage, followed, {fault.name for fault in faults})
-    faulty = {fault.name for fault in faults}
-    sound = [each.name for each in followed if each.name not in faulty]
+    sound = sound_motions(results)
     left_out = [left_out_text(each) for each in results.summary.not_examined if each.subject in OF_ALL_RUNS]
     return {
         "stage": stage,

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from math import floor, isfinite, isnan, log10
+from collections.abc import Callable, Iterable
+from math import ceil, floor, isfinite, isnan, log10
 
 from er3a.pipeline.messages.language import as_number
 
@@ -14,6 +14,8 @@ SMALLEST = 1e-4  # uncertainty that is written without a power of ten
 NOTHING = 1e-6  # of a length or an angle: rounding, which nobody reads digits of
 DECIMALS = {"deg": 3, "m³": 3, "m²": 3, "%": 1, "deg/s": 1, "mm/s": 1, "µdeg/s": 0, "ppb": 0}
 """The decimals that matter in a unit, 2 in any other."""
+NOISE = 1e-6  # of the last decimal of a bound: rounding of the value itself
+MOST_DECIMALS = 6  # of a bound
 
 
 def no_noise(value: float) -> float:
@@ -83,3 +85,41 @@ def fixed(value: float | None, decimals: int = 1) -> str:
         return "–"
     text = f"{value:.{decimals}f}"
     return as_number(text.lstrip("-") if float(text) == 0 else text)
+
+
+def at_least(value: float, measure: int | str) -> str:
+    """A lower bound, its last decimal rounded down, because a rounded value would claim more than is known.
+
+    ``measure``: how many decimals, or the unit, which decides: see :func:`decimals_of_bound`.
+    """
+    return _shown(value, measure, rounded_down)
+
+
+def at_most(value: float, measure: int | str) -> str:
+    """An upper bound, its last decimal rounded up; ``measure`` as of :func:`at_least`."""
+    return _shown(value, measure, rounded_up)
+
+
+def rounded_down(value: float, decimals: int) -> float:
+    """A lower bound with so many decimals."""
+    return floor(value * 10**decimals + NOISE) / 10**decimals
+
+
+def rounded_up(value: float, decimals: int) -> float:
+    """An upper bound with so many decimals."""
+    return ceil(value * 10**decimals - NOISE) / 10**decimals
+
+
+def decimals_of_bound(value: float, unit: str) -> int:
+    """How many decimals a bound shows: four digits of volumes and areas, of anything else three, and two decimals."""
+    if not value or not isfinite(value):
+        return 0
+    digits, least = (4, 0) if unit in ("m³", "m²") else (3, 2)
+    return min(MOST_DECIMALS, max(least, digits - 1 - floor(log10(abs(value)))))
+
+
+def _shown(value: float, measure: int | str, rounded: Callable[[float, int], float]) -> str:
+    if not isfinite(value):
+        return number(value)
+    decimals = decimals_of_bound(value, measure) if isinstance(measure, str) else measure
+    return fixed(rounded(value, decimals), decimals)

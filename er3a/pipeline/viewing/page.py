@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from importlib import import_module
 from importlib.metadata import version
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -45,7 +46,17 @@ from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.stages.workspace.entry import CapabilitySettings
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import readings, svg_data_uri
-from er3a.pipeline.viewing.numbers import fixed, measured, number
+from er3a.pipeline.viewing.numbers import (
+    at_least,
+    at_most,
+    decimals_of,
+    decimals_of_bound,
+    fixed,
+    measured,
+    number,
+    rounded_down,
+    rounded_up,
+)
 from er3a.version import __version__
 
 _HERE = Path(__file__).parent
@@ -168,8 +179,20 @@ class ShownFigure:
 
     @property
     def text(self) -> str:
-        """The value with the digits that matter."""
+        """The value with the digits that matter; one that is named a bound is rounded as a bound."""
+        if isinstance(self.value, float) and self.name.endswith(("_lower", "_upper")):
+            return (at_least if self.name.endswith("_lower") else at_most)(self.value, self.measure)
         return measured(self.value, self.uncertainty, self.measure)
+
+    @property
+    def rounded(self) -> float | int | None:
+        """The number that the text shows."""
+        if not isinstance(self.value, float) or not isfinite(self.value) or not self.value:
+            return self.value
+        if self.name.endswith(("_lower", "_upper")):
+            decimals = decimals_of_bound(self.value, self.measure)
+            return (rounded_down if self.name.endswith("_lower") else rounded_up)(self.value, decimals)
+        return round(self.value, decimals_of(self.value, self.uncertainty, self.measure))
 
 
 NUMERICS = {  # key figures that answer no question of a verdict
@@ -362,6 +385,8 @@ def page_environment(*folders: Path) -> jinja2.Environment:
         "number": number,
         "measured": measured,
         "fixed": fixed,
+        "at_least": at_least,
+        "at_most": at_most,
         "tr": tr,
         "own": language.own_title,
         "sentence": whole_sentence,

@@ -1,8 +1,9 @@
-"""The tray where the workspace stage puts it: which motions meet it, or what it stands on."""
+"""The tray where the workspace stage can put it: which motions meet it, or what it stands on, and where it is in the
+way of the fewest."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,20 +15,28 @@ from er3a.collision.scene import Box, Scene
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.messages.language import tr
+from er3a.pipeline.messages.language import as_text, own_title, tr
 from er3a.pipeline.messages.left_out import body_word
-from er3a.pipeline.messages.say import joined
+from er3a.pipeline.messages.say import bracketed, joined
+from er3a.pipeline.messages.workspace import millimetres
 from er3a.pipeline.player.player import moment
-from er3a.pipeline.results import Stored, is_computed, read_stage
-from er3a.pipeline.stages.programs.model import ProgramsResults
+from er3a.pipeline.results import AbsentResults, Stored, is_computed, read_stage
+from er3a.pipeline.stages.expectations import unmet_expectations
+from er3a.pipeline.stages.programs.model import ProgramsResults, ProgramSummary
+from er3a.pipeline.stages.programs.played import faults as program_faults
 from er3a.pipeline.stages.registry import STAGES
-from er3a.pipeline.stages.trajectory.model import TrajectoryResults
+from er3a.pipeline.stages.trajectory.model import PathSummary, TrajectoryResults
+from er3a.pipeline.stages.trajectory.played import faults as path_faults
 from er3a.pipeline.stages.trajectory.played import repaired
 from er3a.pipeline.stages.vision.model import VisionResults
 from er3a.pipeline.stages.workspace.model import PlacementSummary, PlaceSummary, StandSummary
 from er3a.pipeline.study import Study
+from er3a.pipeline.viewing.numbers import fixed
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
+
+MOTIONS = {name: stage.motions for name, stage in STAGES.items() if stage.motions}
+NAMED = 3  # motions that a short line names
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,25 +45,59 @@ class Tray:
 
     Attributes
     ----------
-    low, high : (3,), m, its corners; floor : m, the height that its stand comes from, None without one
-    on : name of the surface below it
+    place : of the tray
+    below : the surface that it stands on or over, None in open space
     """
 
-    low: Reals
-    high: Reals
-    floor: float | None
-    on: str = ""
+    place: PlaceSummary
+    below: StandSummary | None
 
     @property
-    def centre(self) -> Reals:
-        """Its middle (3,), m."""
-        found: Reals = (self.low + self.high) / 2
+    def low(self) -> Reals:
+        """Its lower corner (3,), m."""
+        found: Reals = np.array(self.place.centre_m) - np.array(self.place.size_m) / 2
         return found
+
+    @property
+    def high(self) -> Reals:
+        """Its upper corner (3,), m."""
+        found: Reals = np.array(self.place.centre_m) + np.array(self.place.size_m) / 2
+        return found
+
+    @property
+    def floor(self) -> float | None:
+        """The height (m) that its stand comes from; None without one."""
+        return self.below.height_m if self.below and self.below.place is None else None
+
+    @property
+    def where(self) -> str:
+        """On what it stands."""
+        if self.below is None:
+            return tr("In the air: no surface is known there")
+        name = own_title(self.below.name)
+        if self.floor is None:
+            return tr("On {name}", name=name)
+        return tr("On a stand {gap} mm high on {name}", gap=millimetres([self.low[2] - self.floor]), name=name)
+
+    @property
+    def line(self) -> str:
+        """Where it stands, its centre and its edges."""
+        return tr(
+            "{where}, centre ({centre}) mm, edges {size} mm along x, y, z",
+            where=self.where,
+            centre=millimetres(self.place.centre_m),
+            size=self.edges,
+        )
+
+    @property
+    def edges(self) -> str:
+        """Its edges along x, y and z, mm."""
+        return " × ".join(as_text(1000 * edge, ".6g") for edge in self.place.size_m)
 
     @property
     def corners(self) -> tuple[Reals, Reals]:
         """Lower and upper corner (3,), m, of it and its stand together."""
-        low = self.low.copy()
+        low = self.low
         low[2] = low[2] if self.floor is None else min(low[2], self.floor)
         return low, self.high
 
@@ -89,19 +132,14 @@ class Meeting:
 
 
 def trays(workspace: Any) -> list[Tray]:
-    """The tray at its best place, then at the best one on or over each surface; empty if these results put none."""
+    """The tray at its best place, then at the best ones on or over other surfaces; empty if these results put none."""
     placement = getattr(workspace.summary, "placement", None)
     if not isinstance(placement, PlacementSummary) or not placement.named_places:
         return []
-    over = placement.over if placement.stand is None else placement.stand
-    standing = [(each, each.place or each.above) for each in placement.stands]
-    return [_tray(placement.best, over), *(_tray(place, stand) for stand, place in standing if place)]
-
-
-def _tray(place: PlaceSummary, stand: StandSummary | None) -> Tray:
-    centre, half = np.array(place.centre_m), np.array(place.size_m) / 2
-    below = stand is not None and stand.place is None
-    return Tray(centre - half, centre + half, stand.height_m if stand and below else None, stand.name if stand else "")
+    best = placement.best
+    below = placement.over if placement.stand is None else placement.stand
+    standing = [(stand.place or stand.above, stand) for stand in placement.stands]
+    return [Tray(best, below), *(Tray(place, stand) for place, stand in standing if place and place != best)]
 
 
 def stored_motions(results: object, robot: Robot) -> Iterator[StoredMotion]:
@@ -145,23 +183,187 @@ def scene_of(study: Study, robot: str, stage: str) -> Scene | None:
     return study.scene(robot, stage if stage == "vision" else "trajectory")
 
 
-def in_tray(study: Study, stored: Stored[Any]) -> Mapping[str, Markup] | None:
-    """Of each motion of a stage that meets the tray when it first does, as a link to that moment; None where the
-    robot's workspace stage puts no tray."""
-    folder = stored.folder.parent / "workspace" if stored.folder else None
-    placed = trays(read_stage(folder, STAGES["workspace"]).results) if folder and is_computed(folder) else []
-    if not placed:
+@dataclass(frozen=True, eq=False)
+class Tried:
+    """A tray at a place, and of each stage's motions by name when they meet it or its stand first."""
+
+    tray: Tray
+    met: Mapping[str, Mapping[str, Meeting]]
+
+
+@dataclass(frozen=True, eq=False)
+class Placing:
+    """Where to put the tray: of the best places on or over each surface the one in the way of the fewest motions that
+    pass without it, of equals the one that comes first.
+
+    Attributes
+    ----------
+    tried : that place, then the others
+    sound : per stage, in the order of ``met``, the names of motions that pass without the tray
+    targets : those with a solution, whose tool points lie in the tray or its stand
+    unseen : names of motions that are not known, or not all
+    """
+
+    tried: tuple[Tried, ...]
+    sound: Mapping[str, Sequence[str]]
+    targets: tuple[str, ...]
+    unseen: tuple[str, ...]
+
+    @property
+    def tray(self) -> Tray:
+        """The tray at that place."""
+        return self.tried[0].tray
+
+    @property
+    def met(self) -> Mapping[str, Mapping[str, Meeting]]:
+        """What meets it there."""
+        return self.tried[0].met
+
+    @property
+    def passing(self) -> int:
+        """How many motions pass without it."""
+        return sum(len(self.sound.get(stage, ())) for stage in self.met)
+
+    def hindered(self, tried: Tried) -> dict[str, list[str]]:
+        """Of motions that pass without the tray those that meet it at a place, per stage."""
+        found = {stage: [name for name in self.sound.get(stage, ()) if name in met] for stage, met in tried.met.items()}
+        return {stage: names for stage, names in found.items() if names}
+
+    def hindrance(self, tried: Tried, most: int = NAMED) -> str:
+        """Of how many of the motions that pass it is in the way at a place; of at most so many by name."""
+        names = [name for each in self.hindered(tried).values() for name in each]
+        if not tried.met:
+            return tr("no path, program or grasp was compared with it")
+        if not self.passing:
+            return tr("no motion passes that it could be in the way of")
+        if not names:
+            return tr("in the way of none of the {count} motions that pass without it", count=self.passing)
+        said = tr(
+            "in the way of {some} of the {count} motions that pass without it", some=len(names), count=self.passing
+        )
+        return said if len(names) > most else tr("{said}: {names}", said=said, names=joined(names, ", "))
+
+    @property
+    def line(self) -> str:
+        """Where to put the tray, and what it is in the way of, in one sentence."""
+        return tr("{place}: {hindrance}.", place=self.tray.line, hindrance=self.hindrance(self.tried[0]))
+
+    @property
+    def compared(self) -> str:
+        """What was compared with the tray, and what of it was found; empty where nothing was."""
+        if not self.met:
+            return ""
+        said = [compared_with_tray([name for found in self.met.values() for name in found])]
+        if self.targets:
+            said.append(tr("Targets in it or its stand: {names}.", names=joined(self.targets, ", ")))
+        if self.unseen:
+            said.append(tr("Not compared, or not all of it: {names}.", names=joined(self.unseen, ", ")))
+        return joined(said, " ")
+
+    @property
+    def rows(self) -> list[list[str]]:
+        """Each place as a row: where, centre, edges, what it is in the way of, margins."""
+        return [
+            [
+                each.tray.where,
+                millimetres(each.tray.place.centre_m),
+                each.tray.edges,
+                self._counted(each),
+                limit_text(each.tray.place),
+                fixed(each.tray.place.clearance_mm, 0),
+            ]
+            for each in self.tried
+        ]
+
+    def _counted(self, tried: Tried) -> str:
+        hindered = self.hindered(tried)
+        counts = [
+            tr("{some} of {count} {what}", some=len(hindered.get(stage, ())), count=len(names), what=tr(MOTIONS[stage]))
+            for stage in tried.met
+            if (names := self.sound.get(stage, ()))
+        ]
+        return joined(counts, ", ") or "–"
+
+
+def limit_text(place: PlaceSummary) -> str:
+    """How near to its limit a joint comes at a place, deg, and which."""
+    margin = fixed(place.limit_margin_deg, 1)
+    return bracketed(margin, f"J{place.limit_joint}" if place.limit_joint is not None else "")
+
+
+def placing(
+    stored: Mapping[str, Stored[Any]],
+    robot: Robot,
+    scenes: Mapping[str, Scene | None],
+    sound: Mapping[str, Sequence[str]],
+) -> Placing | None:
+    """Where to put the tray of the study among the places of the workspace stage; None if it puts none.
+
+    ``scenes``: of each stage, for what the arm carries. ``sound``: what passes in each.
+    """
+    places = trays(stored["workspace"].results) if "workspace" in stored else []
+    if not places:
         return None
-    robot = study.robot(stored.robot)
-    scene = scene_of(study, stored.robot, stored.stage)
-    firsts = met(robot, placed[0], scene, stored_motions(stored.results, robot))
+    motions = {stage: [*stored_motions(stored[stage].results, robot)] for stage in MOTIONS if stage in stored}
+    tried = [
+        Tried(tray, {stage: met(robot, tray, scenes.get(stage), each) for stage, each in motions.items()})
+        for tray in places
+    ]
+    best = min(
+        tried, key=lambda each: sum(len(found.keys() & sound.get(stage, ())) for stage, found in each.met.items())
+    )
+    unseen = [each.name for moved in motions.values() for each in moved if not each.whole]
+    for stage in motions:
+        unseen += [each.name for each in getattr(stored[stage].results.summary, "not_followed", ())]
+    low, high = (1000 * corner for corner in best.tray.corners)
+    targets = stored["inverse"].results.summary.targets if "inverse" in stored else ()
+    inside = (each.name for each in targets if each.chosen_deg and np.all((low <= each.xyz_mm) & (each.xyz_mm <= high)))
+    return Placing((best, *(each for each in tried if each is not best)), sound, tuple(inside), tuple(unseen))
+
+
+def sound_motions(results: object) -> list[str]:
+    """Names of a stage's motions that pass as they are."""
+    if isinstance(results, VisionResults):
+        return [each.name for each in results.summary.objects if each.outcome == "grasped"]
+    followed: Sequence[ProgramSummary | PathSummary]
+    if isinstance(results, ProgramsResults):
+        followed, faults = results.summary.programs, program_faults(results)
+    elif isinstance(results, TrajectoryResults):
+        followed, faults = results.summary.paths, path_faults(results)
+    else:
+        return []
+    unmet = unmet_expectations(followed)
+    faulty = {fault.name for fault in faults} | {each.name for each in (unmet.unmet if unmet else ())}
+    return [each.name for each in followed if each.name not in faulty]
+
+
+def placing_of(study: Study, stored: Stored[Any]) -> Placing | None:
+    """Where to put the tray, from the results that lie beside those of a stage; None if that is nowhere."""
+    beside = stored.folder.parent if stored.folder else None
+    names = [name for name in ("workspace", "inverse", *MOTIONS) if beside and is_computed(beside / name)]
+    found = {name: read_stage(beside / name, STAGES[name]) for name in names} if beside else {}
+    found = {name: each for name, each in found.items() if not isinstance(each.results, AbsentResults)}
+    found[stored.stage] = stored
+    if "workspace" not in found:
+        return None
+    sound = {stage: sound_motions(found[stage].results) for stage in MOTIONS if stage in found}
+    scenes = {stage: scene_of(study, stored.robot, stage) for stage in sound}
+    return placing(found, study.robot(stored.robot), scenes, sound)
+
+
+def in_tray(study: Study, stored: Stored[Any]) -> Mapping[str, Markup] | None:
+    """Of each motion of a stage that meets the tray when it first does, as a link to that moment; None where no place
+    of the tray is known."""
+    found = placing_of(study, stored)
+    if found is None:
+        return None
     return {
         name: moment(name, each.t, tr("meets the tray at {t:.2f} s: {body}", t=each.t, body=each.body))
-        for name, each in firsts.items()
+        for name, each in found.met.get(stored.stage, {}).items()
     }
 
 
-def compared_with_tray(met_it: Mapping[str, object] | None) -> str:
+def compared_with_tray(met_it: Collection[str] | None) -> str:
     """What a page says of motions that were compared with the tray, ``met_it`` those that do; empty for None."""
     if met_it is None:
         return ""

@@ -18,7 +18,7 @@ from er3a.pipeline.stages.dynamics import model
 from er3a.pipeline.stages.dynamics.played import motions
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import axis_label, new_figure, row_of_panels
-from er3a.pipeline.viewing.numbers import decimals_of, decimals_of_column, fixed, number
+from er3a.pipeline.viewing.numbers import at_least, at_most, decimals_of, decimals_of_column, fixed, number
 from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINTS, MUTED
 
@@ -29,11 +29,6 @@ STYLES = ("-", "--", ":", "-.", (0, (6, 2, 1, 2, 1, 2)))
 def joint_colour(joint: int) -> str:
     """The colour of a joint (from 0)."""
     return JOINTS[joint % len(JOINTS)]
-
-
-def bound_text(bound: float, decimals: int) -> str:
-    """An upper bound, rounded up, because fewer digits would claim more."""
-    return fixed(float(np.ceil(bound * 10**decimals - 1e-5)) / 10**decimals, decimals)
 
 
 def within(value: float, tolerance: float, decimals: int = 2) -> str:
@@ -105,7 +100,7 @@ def holding_figure(summary: model.DynamicsSummary) -> Picture:
         joint=worst.joint,
         torque=within(abs(worst.torque), worst.tolerance),
         unit=worst.unit,
-        bound=bound_text(worst.bound, decimals_of_column([worst.bound])),
+        bound=at_most(worst.bound, decimals_of_column([worst.bound])),
     )
     return Picture(figure, tr("Bars: the greatest holding torque at each joint, with its tolerance."), caption)
 
@@ -151,7 +146,7 @@ def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) ->
         study,
         stored,
         output,
-        payload=payload_text(summary, robot),
+        payload=payload_text(summary, robot)[0],  # what to ask for is the list of what is not known
         findings=listed(summary.findings),
         unknown=listed(summary.unknown),
         links=_links(summary),
@@ -191,7 +186,7 @@ def _use(use: model.Use) -> list[str]:
         f"J{use.joint}" if use.joint else NONE,
         use.path or tr("at rest"),
         number(use.asked, 3),
-        number(use.upper, 3),
+        at_most(use.upper, ""),
         number(use.allowed, 3),
         use.unit,
         fixed(100 * use.ratio, 0),
@@ -250,7 +245,7 @@ def _not_run(path: model.PathLoad) -> list[str]:
 def _nodes(summary: model.DynamicsSummary) -> list[list[str]]:
     """Shortest times under torques by the number of nodes, and the time that no motion undercuts."""
     return [
-        [path.name, number(each.nodes), fixed(each.time_s, 4), fixed(each.least_s, 4)]
+        [path.name, number(each.nodes), fixed(each.time_s, 4), at_least(each.least_s, 4)]
         for path in summary.paths
         for each in (path.torque_times if path.counts else ())
     ]
@@ -277,7 +272,7 @@ def _path(path: model.PathLoad) -> list[str]:
 def _bound(bound: model.BindingLimit | None) -> str:
     if bound is None:
         return NONE
-    value = tr("no bound") if bound.value is None else number(bound.value, 3)
+    value = tr("no bound") if bound.value is None else at_least(bound.value, "")
     if bound.by is None:
         return value
     return bracketed(value, joined([f"J{bound.joint}", word("dynamics.binding", BINDING, bound.by)], ", "))
@@ -316,7 +311,7 @@ def _held(holding: Sequence[model.HoldingTorque]) -> list[list[str]]:
         [
             _label(held.joint, held.unit),
             fixed(abs(held.torque), decimals),
-            bound_text(held.bound, decimals),
+            at_most(held.bound, decimals),
             fixed(held.tolerance, decimals),
             panel_link(held.q, ", ".join(fixed(value, 0) for value in held.q)),
         ]

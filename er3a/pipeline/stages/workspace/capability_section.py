@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import scipy
+from markupsafe import Markup, escape
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
@@ -22,40 +23,83 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import own_title, tr
 from er3a.pipeline.messages.say import bracketed, joined, say, word
-from er3a.pipeline.messages.workspace import STATUS, box_text, millimetres, range_text, stand_text
+from er3a.pipeline.messages.workspace import (
+    STATUS,
+    millimetres,
+    no_box_text,
+    range_text,
+    reached_text,
+    run_again_text,
+    stand_text,
+)
+from er3a.pipeline.player.motions import address_of
 from er3a.pipeline.player.turning import CIRCLE
 from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.workspace_figures import name_level, slide_names
+from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
-from er3a.pipeline.viewing.numbers import fixed, number
+from er3a.pipeline.viewing.numbers import at_least, at_most, fixed, number
 from er3a.pipeline.viewing.page import Picture
 from er3a.pipeline.viewing.palette import GRID, HIGHLIGHT, INK, MUTED
+from er3a.pipeline.viewing.tray import Placing, Tray, limit_text
 from er3a.robots.robot import Robot
 
 ROUNDING = 1e-6  # mm
 
 
-def best_text(results: model.WorkspaceResults, placement: model.PlacementSummary) -> str:
-    """Where to put the tray, and what room that place has; its height is kept where others bring the arm nearer to a
-    singular pose."""
-    if not placement.named_places:
-        return box_text(results.summary)
-    place, height = placement.best, range_text(placement, results.places)
+def tray_rows(
+    placing: Placing, results: model.WorkspaceResults, placement: model.PlacementSummary, payload: str
+) -> list[tuple[str, str]]:
+    """What to know of the tray where it is put, each under a title; ``payload``: what is known of it."""
+    tray, stand = placing.tray, placing.tray.below
+    place, served = tray.place, (stand.served_from_m if stand and stand.place else None) or 0.0
+    reached = page.whole_sentence(reached_text(placement, place, served))
+    return [
+        (tr("Place"), joined([tr("{place}.", place=tray.line), reached], " ")),
+        (tr("Margins"), _margins(tray, results, placement)),
+        (tr("Motions"), _hindered(placing)),
+        (tr("Payload there"), payload),
+        (tr("What to do first"), run_again_text(results.summary, stand=tray.floor is not None)),
+    ]
+
+
+def _margins(tray: Tray, results: model.WorkspaceResults, placement: model.PlacementSummary) -> str:
+    """What room a place has; its height is kept where others bring the arm nearer to a singular pose."""
+    place, gaps = tray.place, tray.below.gaps_m if tray.below and tray.floor is not None else None
+    height = range_text(place, gaps, placement.task.limit_margin_deg, results.places)
     room = _room(place, "xy" if height else "xyz")
+    moved = tr("Reach and limits allow to move it by {room} mm, one direction at a time.", room=room) if room else ""
+    ratio = fixed(100 * place.manipulability_ratio, 1)
     texts = [
-        box_text(results.summary),
-        height,
-        tr("Other collisions were checked at samples only.") if place.status == "proven" else "",
-        tr(
-            "Reach and limits allow to move it by {room} mm, one direction at a time; its support may be smaller.",
-            room=room,
-        )
-        if room
-        else "",
         _nearest_limit(place),
         _nearest_bodies(place),
+        tr("Least manipulability: {ratio} % of the arm's best.", ratio=ratio),
+        moved,
+        height,
     ]
     return joined(texts, " ")
+
+
+def _hindered(placing: Placing) -> Markup:
+    """Of which motions the tray is in the way, each with a link to the moment; which others meet it; then what was
+    compared."""
+    here, hindered = placing.tried[0], placing.hindered(placing.tried[0])
+    named, others = list[Markup](), list[Markup]()
+    for stage, met in here.met.items():
+        for name, each in met.items():
+            link = Markup('<a href="{}">{}</a> ({})').format(
+                address_of(stage, name, each.t, "player"), page.breakable(name), each.body
+            )
+            (named if name in hindered.get(stage, ()) else others).append(link)
+    first = page.whole_sentence(placing.hindrance(here, most=0))
+    texts = [escape(first), *_sentence(named), *_sentence(others, tr("Others that meet it")), escape(placing.compared)]
+    return Markup(" ").join(texts)
+
+
+def _sentence(links: Sequence[Markup], about: str = "") -> list[Markup]:
+    """Links as a sentence; none where there are none."""
+    lead = escape(about + tr(": ") if about else "")
+    return [lead + Markup(", ").join(links) + "."] if links else []
 
 
 def _nearest_limit(place: model.PlaceSummary) -> str:
@@ -106,7 +150,7 @@ def place_row(name: str, place: model.PlaceSummary, capability: model.Capability
         word("workspace.status", STATUS, place.status),
         branch,
         fixed(100 * place.manipulability_ratio, 1),
-        bracketed(fixed(place.limit_margin_deg, 1), f"J{place.limit_joint}" if place.limit_joint is not None else ""),
+        limit_text(place),
         bracketed(fixed(place.clearance_mm, 0), say(place.clearance_pair) if place.clearance_pair is not None else ""),
         _room(place) or fixed(0, 0),
     ]
@@ -255,8 +299,12 @@ def placement_views(
     placement: model.PlacementSummary,
     places: model.BoxPlaces,
     scene: Scene | None = None,
+    trays: Sequence[Tray] = (),
 ) -> Figure:
-    """Where the middle of the tray can stand, from above and from the side, with the best places as boxes."""
+    """Where the middle of the tray can stand, from above and from the side, with the best places as boxes; ``trays`` on
+    or over surfaces besides these, by the surface's name."""
+    numbered = [place for _, place in placement.named_places]
+    over = [(own_title(each.below.name), each.place) for each in trays if each.below and each.place not in numbered]
     percent = 100 * places.manipulability_m3 / capability.overall.best_manipulability_m3
     figure, axes = new_figure(1, 2, width=12.0, height=5.6)
     provable = capability.core_m3 is not None
@@ -271,7 +319,7 @@ def placement_views(
         sure = np.ma.masked_where(~proven, value)
         mesh = panel.pcolormesh(*extent, sure.T, cmap=SHADES, vmin=0, vmax=top, rasterized=True)
         draw_scene(panel, scene, shown)
-        _draw_boxes(panel, placement.named_places, shown)
+        _draw_boxes(panel, [*placement.named_places, *over], shown)
         panel.plot(
             *skeleton(robot, np.zeros(robot.joints)).T[shown] * 1000, color=INK, linewidth=2.2, marker="o", markersize=3
         )
@@ -281,7 +329,7 @@ def placement_views(
     figure.colorbar(mesh, ax=axes, label=tr("least manipulability in the tray (% of the arm's best)"), shrink=0.85)
     handles = [
         Line2D([], [], color=INK, marker="o", markersize=4, linewidth=2.2, label=tr("arm, all joints 0")),
-        Patch(facecolor="none", edgecolor=HIGHLIGHT, label=tr("best positions, numbered as in the table")),
+        Patch(facecolor="none", edgecolor=HIGHLIGHT, label=tr("best positions, numbered or named as in the tables")),
         *([Patch(facecolor=GRID, label=tr("by samples only"))] if provable else []),
     ]
     if scene:
@@ -342,8 +390,14 @@ def _draw_boxes(axes: Axes, listed: Sequence[tuple[str, model.PlaceSummary]], sh
         axes.annotate(text, (x, y), (3, -10), textcoords="offset points", color=HIGHLIGHT, fontsize=8, bbox=shade)
 
 
-def capability_context(robot: Robot, results: model.WorkspaceResults, scene: Scene | None = None) -> dict[str, Any]:
-    """What the template include ``capability.html.j2`` needs."""
+def capability_context(
+    robot: Robot,
+    results: model.WorkspaceResults,
+    scene: Scene | None = None,
+    placing: Placing | None = None,
+    payload: str = "",
+) -> dict[str, Any]:
+    """What the template include ``capability.html.j2`` needs; ``placing``: where to put the tray, if anywhere."""
     capability, placement = results.summary.capability, results.summary.placement
     if isinstance(capability, model.CapabilityMissing) or placement is None:
         return {"missing": say(capability)}
@@ -356,7 +410,12 @@ def capability_context(robot: Robot, results: model.WorkspaceResults, scene: Sce
         if capability.core_m3
         else tr("Reachability ignores collisions."),
         "task_text": _task_text(placement.task, capability),
-    } | _placement_context(robot, results, capability, placement, scene)
+        "tray_line": placing.line if placing else no_box_text(results.summary),
+        "tray_places": placing.rows if placing else [],
+        "tray_rows": tray_rows(placing, results, placement, payload)
+        if placing and isinstance(placement, model.PlacementSummary)
+        else [],
+    } | _placement_context(robot, results, capability, placement, scene, placing)
 
 
 def _placement_context(
@@ -365,21 +424,22 @@ def _placement_context(
     capability: model.CapabilitySummary,
     placement: model.Placement,
     scene: Scene | None,
+    placing: Placing | None,
 ) -> dict[str, Any]:
     if not isinstance(placement, model.PlacementSummary):
-        return {"nowhere": say(placement), "best_text": ""}
+        return {"nowhere": say(placement)}
     rows = [place_row(name, place, capability) for name, place in placement.named_places]
+    trays = [each.tray for each in placing.tried] if placing else []
     return {
         "nowhere": "",
         "placing_scene": placement.scene,
         "placing_margin": fixed(placement.margin_mm, 0),
         "try_text": _try_text(robot, placement.task) if capability.asked == "directions" else "",
-        "best_text": best_text(results, placement),
         "stands": [stand_text(stand, placement) for stand in placement.stands],
         "points_serving": placement.points_serving,
         "place_rows": rows,
         "place_picture": Picture(
-            placement_views(robot, capability, placement, results.places, scene),
+            placement_views(robot, capability, placement, results.places, scene, trays),
             tr("Possible positions of the tray centre, from above and from the side, with the best ones"),
             _places_caption(placement, capability.core_m3 is not None),
         )
@@ -595,8 +655,8 @@ def _core_text(capability: model.CapabilitySummary) -> str:
         "and at most {upper} L; both bounds are proven for all points and directions. By the {directions} "
         "sampled directions alone it would be {estimate} L.",
         directions=capability.directions,
-        lower=number(1000 * core.lower, 2),
-        upper=number(1000 * core.upper, 2),
+        lower=at_least(1000 * core.lower, "L"),
+        upper=at_most(1000 * core.upper, "L"),
         estimate=number(1000 * core.estimate, 2),
     )
 

@@ -104,5 +104,6 @@ STAGE = Stage(
     settings={"workspace": WorkspaceSettings, "capability": CapabilitySettings, "trajectory": TrajectorySettings},
     inputs=_inputs,
     rests_on=("validation",),
+    shows=("inverse", "trajectory", "programs", "vision", "dynamics"),
     sampled=True,
 )

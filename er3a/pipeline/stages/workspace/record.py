@@ -15,7 +15,7 @@ from er3a.pipeline.messages.workspace import VOID_STATUS
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.numbers import fixed
+from er3a.pipeline.viewing.numbers import at_least, at_most, fixed
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MUTED, REFERENCE, rgb
 from er3a.pipeline.viewing.recording import Logged, record_stage
 
@@ -160,5 +160,7 @@ def _note(summary: model.WorkspaceSummary) -> str:
         low, high = 1000 * void.volume_m3.lower, 1000 * void.volume_m3.upper
         status = word("workspace.void_status", VOID_STATUS, void.status)
         mesh = "not closed" if void.mesh_m3 is None else f"{1000 * void.mesh_m3:.4g}"
-        lines.append(f"| {void.kind}_{number}, {status} | {low:.3g} to {high:.3g} | {mesh} | {centre} |")
+        lines.append(
+            f"| {void.kind}_{number}, {status} | {at_least(low, 'L')} to {at_most(high, 'L')} | {mesh} | {centre} |"
+        )
     return "\n".join(lines)

@@ -6,18 +6,22 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 
 from er3a.collision.scene import Scene
+from er3a.pipeline.messages.dynamics import payload_text
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import bracketed, joined, say, sentence, word
 from er3a.pipeline.messages.workspace import VOID_KINDS, VOID_STATUS, entry_word
 from er3a.pipeline.player.player import drawing_head
-from er3a.pipeline.results import Stored
+from er3a.pipeline.results import Stored, is_computed, read_stage
+from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.workspace import model, workspace_figures
 from er3a.pipeline.stages.workspace.capability_section import capability_context
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.numbers import fixed, number
+from er3a.pipeline.viewing.numbers import at_least, at_most, fixed, number
 from er3a.pipeline.viewing.page import Picture, render_stage
+from er3a.pipeline.viewing.tray import Placing, placing_of
 from er3a.robots.robot import Robot
 from er3a.workspace.causes import joints_after
 
@@ -28,10 +32,11 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
     """Render the workspace page of a robot from its results."""
     robot, results = study.robot(stored.robot), stored.results
     summary, scene = results.summary, study.scene(stored.robot, "capability")
-    context = _context(robot, results, scene)
     contradicted = stored.rests_on.get("validation") == "fail"
+    placing = None if contradicted else placing_of(study, stored)
+    context = _context(robot, results, scene, placing, _payload(study, stored) if placing else "")
     if contradicted:
-        context |= dict.fromkeys(("nowhere", "best_text"), sentence("box.contradicted"))
+        context |= dict.fromkeys(("nowhere", "tray_line"), sentence("box.contradicted"))
     render_stage(
         study,
         stored,
@@ -43,7 +48,6 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
         pocket_mm=3000 * summary.pocket_block_m,
         turning=workspace_figures.in_space(robot, results, scene),
         drawing_head=drawing_head(),
-        puts_box=bool(getattr(summary.placement, "named_places", ())) and not contradicted,
         void_rows=[_void_row(n, void) for n, void in enumerate(summary.voids[:LISTED], start=1)],
         voids_more=max(0, len(summary.voids) - LISTED),
         change_rows=_change_rows(summary),
@@ -54,9 +58,22 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
     )
 
 
-def _context(robot: Robot, results: model.WorkspaceResults, scene: Scene | None) -> dict[str, Any]:
+def _payload(study: Study, stored: Stored[model.WorkspaceResults]) -> str:
+    """What is known of the payload at the tray, from the results of the stage dynamics beside these."""
+    folder = stored.folder.parent / "dynamics" if stored.folder else None
+    summary = read_stage(folder, STAGES["dynamics"]).results.summary if folder and is_computed(folder) else None
+    lead, _ = payload_text(summary, study.robot(stored.robot))
+    there = tr("What the arm can carry at the tray was not examined.")
+    if summary is None:
+        return joined([lead, there], " ")
+    return Markup('{} <a href="dynamics.html#payload">{}</a>').format(lead, there)
+
+
+def _context(
+    robot: Robot, results: model.WorkspaceResults, scene: Scene | None, placing: Placing | None, payload: str
+) -> dict[str, Any]:
     summary = results.summary
-    return capability_context(robot, results, scene) | {
+    return capability_context(robot, results, scene, placing, payload) | {
         "section": Picture(
             workspace_figures.sections(robot, results),
             tr("Sections across the slide of joint 1: density of the samples, and proven cells")
@@ -117,18 +134,20 @@ def _void_row(row: int, void: model.VoidSummary) -> list[str]:
     low, high = 1000 * void.volume_m3.lower, 1000 * void.volume_m3.upper
     return [
         str(row),
-        word("workspace.void_kind", VOID_KINDS, void.kind),
+        bracketed(word("workspace.void_kind", VOID_KINDS, void.kind), tr("shoulder") if void.holds_shoulder else ""),
         word("workspace.void_status", VOID_STATUS, void.status),
         _litres(low, high),
-        *(", ".join(fixed(1000 * value, 0) for value in corner) for corner in (void.low_m, void.high_m)),
+        *(
+            ", ".join(fixed(1000 * value, 0) for value in corner)
+            for corner in (void.centroid_m, void.low_m, void.high_m)
+        ),
         say(void.cause),
-        tr("yes") if void.holds_shoulder else tr("no"),
     ]
 
 
 def _litres(low: float, high: float) -> str:
     """Bounds of a volume in litres, rounded outwards."""
-    return tr("{low} to {high}", low=fixed(np.floor(100 * low) / 100, 2), high=fixed(np.ceil(100 * high) / 100, 2))
+    return tr("{low} to {high}", low=at_least(low, "L"), high=at_most(high, "L"))
 
 
 def _change_rows(summary: model.WorkspaceSummary) -> list[list[str]]:
@@ -219,7 +238,7 @@ def _curve_caption(summary: model.WorkspaceSummary, curve: model.GrowthCurve) ->
         )
     band = tr(
         "Use the band: the reached volume lies between {low} and {high} m³.",
-        low=number(volume.lower),
-        high=number(volume.upper),
+        low=at_least(volume.lower, "m³"),
+        high=at_most(volume.upper, "m³"),
     )
     return joined([touched, band], " ")
