@@ -57,7 +57,7 @@ def motions(robot: Robot, results: ProgramsResults) -> list[PlayedMotion]:
 
 
 def _found_event(program: ProgramSummary, found: FindingAt, rows: ProgramMotion) -> list[PlayedEvent]:
-    """A finding as long as its line lasts, a singular pose at its moment; none of a rate after the first of its line."""
+    """A finding as long as its line lasts, a singular pose at its moment; none of a rate after its line's first."""
     start = found.program_s or 0.0
     finding, weight = found.finding, WEIGHTS[found.level]
     if isinstance(finding, SINGULAR):
