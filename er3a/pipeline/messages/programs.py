@@ -271,8 +271,6 @@ TEXTS = texts(
             "{named} exceeds {limits}, at worst by more than {times:g} times",
             "{named} exceed {limits}, at worst by more than {times:g} times",
         ),
-        "programs.rates#known": "the known limits",
-        "programs.rates#assumed": "the assumed limits",
         "programs.cause": "{finding}: {pose}",
         "configuration_changes": "the configuration changes from {before} to {after}",
         "arrives_otherwise": (
@@ -621,7 +619,7 @@ def rates_text(paces: Sequence[Pace]) -> str:
     known = [isinstance(each, TooFast | AccelerationTooGreat) for each in paces]
     kinds = (TooFast | FasterThanAssumed, AccelerationTooGreat | AcceleratesMoreThanAssumed)
     worst = [min(alike, key=_pace) for kind in kinds if (alike := [each for each in paces if isinstance(each, kind)])]
-    limits = sentence("programs.rates#known" if any(known) else "programs.rates#assumed")
+    limits = sentence("rate_limits#known" if any(known) else "rate_limits#assumed")
     parts = {"joints": joints, "named": ", ".join(f"J{joint}" for joint in joints), "limits": limits}
     if all(over_limit(each) > FAR for each in worst):
         return sentence("programs.rates#far", times=FAR, **parts)

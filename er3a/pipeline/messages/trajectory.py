@@ -116,8 +116,6 @@ TEXTS = texts(
             "{named} exceeds {limits} until t = {end:.4g} s: {worst:; }",
             "{named} exceed {limits} until t = {end:.4g} s: {worst:; }",
         ),
-        "path.rates#known": "the known limits",
-        "path.rates#assumed": "the assumed limits",
         "path.rates#edge": Plural(
             "joints",
             "{named} exceeds {limits} from there on, without bound towards the edge of the reach",
@@ -488,7 +486,7 @@ def _rates(stretches: Sequence[model.Stretch[RateCause]], edge: float = math.inf
     run, again = _run(stretches)
     first, end = run[0], _end_of(run)
     joints = sorted({part.cause.joint for part in run})
-    limits = sentence("path.rates#assumed" if first.cause.code.endswith(IF_ASSUMED) else "path.rates#known")
+    limits = sentence("rate_limits#assumed" if first.cause.code.endswith(IF_ASSUMED) else "rate_limits#known")
     named = {"joints": joints, "named": ", ".join(f"J{joint}" for joint in joints), "limits": limits}
     if end >= edge - ADJOINING:
         return sentence("path.rates#edge", **named)

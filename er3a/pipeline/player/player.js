@@ -132,7 +132,7 @@ function draw() {
   picture.keepClear([motion.trails[0][0], motion.trails[0].at(-1), ...marks.map(({ from }) => from)], DOT * data.size);
   for (const { from, to, text } of marks) picture.word(text, scaled(add(from, to), 0.5), page.ink, page.halo);
   for (const [j, { status }] of failing()) {
-    picture.word(`J${j}`, moved(shown[0].poses[j], joints[j - 1].middle), status === "caution" ? data.colours.caution : page.touching, page.halo);
+    picture.word(`J${j}`, moved(shown[0].poses[j], joints[j - 1].middle), status === "caution" ? page.doubtful : page.touching, page.halo);
   }
   if (arms.length === 1) nameEnds(motion.trails[0]);
   for (const { text, at } of data.signs) picture.word(text, at, page.ink, page.halo);
@@ -183,7 +183,7 @@ function tellJoints() {
   const values = valuesAt(motion.times, motion.values[0], t).map((value, j) => value * (table.slides[j] ? 1000 : 180 / Math.PI));
   const rooms = data.joints.map(({ lower, upper }, i) => (lower === null ? Infinity : Math.min(values[i] - lower, upper - values[i])));
   const fails = failing();
-  const quiet = fails.size === 0 && !motion.events.some((event) => isNow(event) && event.bodies.length);
+  const quiet = fails.size === 0 && !motion.events.some((event) => isNow(event) && (event.status === "fail" || event.bodies.length));
   const least = new Map();
   data.joints.forEach(({ unit }, i) => (rooms[i] < (rooms[least.get(unit)] ?? Infinity) ? least.set(unit, i) : null));
   data.joints.forEach(({ unit }, i) => {
