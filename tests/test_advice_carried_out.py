@@ -64,6 +64,7 @@ CARRIED_OUT = {
     "advice.end": "test_a_path_that_ends_before_the_edge_of_the_reach_as_advised_is_safe",
     "advice.sound": "test_a_path_that_ends_before_the_edge_of_the_reach_as_advised_is_safe",
     "advice.end#assumed": "test_a_path_that_ends_where_its_advice_says_keeps_the_margin",
+    "advice.end#within": "test_a_path_that_ends_where_its_advice_says_keeps_the_margin",
     "advice.end#clear": "test_a_path_that_ends_where_its_advice_says_keeps_the_margin",
     "advice.within_reach": "test_a_path_that_ends_before_the_edge_of_the_reach_as_advised_is_safe",
     "turn_tool": "test_a_target_moved_or_turned_as_advised_is_reached_with_margin",

@@ -171,6 +171,36 @@ def test_a_link_into_a_fold_opens_it(browser, small_study):
     assert fold.find_element(By.CSS_SELECTOR, "a[href$='#line_clean']").is_displayed()
 
 
+@pytest.mark.parametrize(
+    ("page", "name", "words"),
+    [
+        ("trajectory", "line_wrist_near", ["wrist singularity", "762 of 360 deg/s", "Slow down from"]),
+        ("trajectory", "line_limits", ["link 2 and link 4 overlap", "below its lower limit", "end it there"]),
+        ("programs", "singular_line", ["J4 and J6 in line", "upper limit of 180 deg", "go by a joint move"]),
+        ("programs", "collision_with_table", ["link 6 and table", "move the target away"]),
+    ],
+)
+def test_what_a_link_of_the_index_leads_to_has_the_whole_answer_in_one_screen(browser, small_study, page, name, words):
+    """Verdict, cause, place, what to do instead, and the arm at that moment with its joints."""
+    with chromium.emulating(browser, width=1280, height=900):
+        browser.get((small_study.folder / "reports/index.html").as_uri())
+        link = browser.find_element(By.CSS_SELECTOR, f'#runs-er3a_c60 tbody a[href*="{page}.html?play={name}&"]')
+        browser.get(link.get_attribute("href"))
+        WebDriverWait(browser, PAUSE).until(
+            lambda _: browser.execute_script("return performance.getEntriesByName('player').length")
+        )
+        shown = "return [...document.querySelectorAll(arguments[0])].filter((e) => e.checkVisibility()).map((e) => {"
+        shown += "const { top, bottom } = e.getBoundingClientRect(); return [e.innerText, top, bottom]; })"
+        (card,) = browser.execute_script(shown, "section:has(> .brief) > .brief")
+        parts = [card, *browser.execute_script(shown, "section:has(> .brief) .badge")[:1]]
+        parts += browser.execute_script(shown, ".player canvas, .player .joints dl, .player .now-shown")
+        for text, top, bottom in parts[:-1]:
+            assert 0 <= top < bottom <= 900, text
+        assert parts[-1][1] < 880
+        for each in words:
+            assert each.lower() in card[0].lower()
+
+
 def test_back_leads_to_where_one_was(browser, small_study):
     browser.get((small_study.folder / "reports/index.html").as_uri())
     browser.find_element(By.CSS_SELECTOR, 'a[href="#runs-er3a_c60"]').click()

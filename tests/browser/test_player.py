@@ -243,6 +243,30 @@ def test_a_joint_beyond_its_limit_is_marked(browser, tmp_path):
     assert browser.execute_script(JOINTS)[2] == ["140.0 deg", "35.0 beyond", "least past"]
 
 
+def test_the_joints_that_fail_are_marked_instead_of_the_one_nearest_its_limit(browser, tmp_path):
+    q = bow(load_robot("er3a_c60")).q
+    events = [
+        PlayedEvent(0.5, 1.0, "too fast", "caution", joints=((4, "2.1 × its speed"), (6, "1.2 × its acc."))),
+        PlayedEvent(0.8, 1.0, "leaves limits", "fail", joints=((4, ""),)),
+        PlayedEvent(1.5, 1.6, "collision", "fail", ("link_6",)),
+    ]
+    written(tmp_path, player(load_robot("er3a_c60"), [PlayedMotion("path", "", T, q, events)]))
+    browser.get((tmp_path / "page.html").as_uri())
+    WebDriverWait(browser, 10).until(lambda _: clock(browser))
+    found = {}
+    for t in ("0.2", "0.6", "0.9", "1.5"):
+        words = browser.execute_async_script(WRITTEN, "path", t)
+        found[t] = [(room, mark) for _, room, mark in browser.execute_script(JOINTS)]
+        named = {text for text, *_ in words if text.startswith("J")}
+        assert named == ({"J4", "J6"} if t in ("0.6", "0.9") else set())
+    assert [mark for _, mark in found["0.2"]].count("least") == 1
+    assert found["0.6"][3] == ("2.1 × its speed", "doubtful")
+    assert found["0.6"][5] == ("1.2 × its acc.", "doubtful")
+    assert found["0.9"][3][1] == "past"
+    assert found["0.9"][3][0].endswith("to limit")
+    assert "least" not in {mark for t in ("0.6", "0.9", "1.5") for _, mark in found[t]}
+
+
 def test_another_motion_starts_at_its_start(page):
     page.execute_script(
         "const chooser = document.querySelector('.player .motion');"

@@ -110,7 +110,7 @@ def test_every_clearance_on_the_page_of_paths_is_called_that_of_assumed_shapes(s
         assert page.count("mm clear of assumed shapes") == page.count("mm clear") * of_assumed
         assert ("Clearance is that of assumed shapes" in page) == of_assumed
         for path in repaired:
-            assert ("Clearance is that" in repair_text(path, assumed=of_assumed)) == of_assumed
+            assert ("Clearance is that" in repair_text(path, shapes=found.verdict.shapes)) == of_assumed
 
 
 def test_a_program_of_a_path_near_assumed_shapes_says_so_in_its_head():

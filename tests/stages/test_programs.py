@@ -16,7 +16,7 @@ from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
 from er3a.files.robot_writer import write_robot
 from er3a.kinematics.forward import forward
-from er3a.pipeline.messages.programs import remedy
+from er3a.pipeline.messages.programs import remedy, say
 from er3a.pipeline.results import Stored, read_results
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages import run
@@ -138,8 +138,12 @@ def test_page_and_recording_are_written(study, stored, tmp_path):
         assert float(t) <= max(motion.take(motion.program == name).t_s, default=0.0) + 1e-9  # as it is rounded
         assert each.to_do
         program = next(own for own in stored["er3a_c60"].results.summary.programs if own.name == name)
-        moments = [own.program_s for own in program.findings if own.level in ("caution", "fail") and own.program_s]
-        assert float(t) == round(min(moments, default=0.0), 9)  # the earliest
+        gravest = [own for own in program.findings if own.level == program.outcome]
+        grave = min((own.program_s, own.finding.code) for own in gravest if own.program_s) if float(t) else (0.0, "")
+        if grave[1].startswith(("faster", "accelerates")):  # seen where the joint is fastest
+            assert grave[0] - 1e-9 <= float(t)
+        else:
+            assert float(t) == round(grave[0], 9)  # the earliest that weighs most
         for own in program.findings:  # the checker's own distance, of what it measures
             where = f" s into it (player: {own.program_s:.2f} s)" if own.program_s is not None else None
             (moment,) = [m for m in each.moments if where and m.when.endswith(where)][:1] or [None]
@@ -155,6 +159,34 @@ def test_page_and_recording_are_written(study, stored, tmp_path):
     assert not re.search(r"[;.:。；] *[:：]", fault.what), fault.what
     assert "go by a joint move to the joint angles (" in html
     assert (tmp_path / "programs.rrd").stat().st_size > 100_000
+
+
+@pytest.mark.long
+def test_a_line_past_a_singular_pose_is_told_by_it_then_by_what_weighs_most_then_by_what_follows(
+    stored, study, tmp_path
+):
+    results = stored["er3a_c60"].results
+    fault = next(each for each in faults(results) if each.name == "singular_line")
+    program = next(each for each in results.summary.programs if each.name == "singular_line")
+    found = {each.finding.code: each for each in program.findings}
+    passed = found["passes_singularity"]
+    assert fault.cause.startswith(
+        f"line 10, {passed.motion_s:.2f} s into it (player: {passed.program_s:.2f} s): passes"
+    )
+    assert fault.cause.endswith(": J4 and J6 in line")
+    limit, rates = fault.moments
+    assert limit.what.startswith("J4 goes above its upper limit of 180 deg")
+    assert rates.what == "J4, J5, J6 exceed the assumed limits, at worst by more than 10 times"
+    assert f"t={round(found['above_limit'].program_s, 9)}#singular_line" in fault.address
+    report(study, stored["er3a_c60"], tmp_path / "programs.html")
+    html = (tmp_path / "programs.html").read_text(encoding="utf-8")
+    listed = html[html.index('id="singular_line.10"') :]
+    order = [listed.index(words) for words in (": J4 and J6 in line", ": J4 goes above", ": J4 exceeds the assumed")]
+    assert order == sorted(order)
+    shown = next(each for each in motions(load_robot("er3a_c60"), results) if each.name == "singular_line")
+    now = [each for each in shown.events if each.t <= found["above_limit"].program_s <= each.until]
+    assert {joint for each in now for joint, _ in each.joints} == {4, 5, 6}
+    assert not [each for each in program.findings if re.search(r"\d\u202f\d{3}", say(each.finding))]
 
 
 @pytest.mark.long
@@ -174,7 +206,9 @@ def test_a_long_listing_keeps_the_line_that_is_wrong_and_no_line_has_another_pro
     html = (tmp_path / "programs.html").read_text(encoding="utf-8")
     ids = re.findall(r' id="([^"]+)"', html)
     assert len(ids) == len(set(ids))
-    places = {each.address.partition("#")[2] for each in faults(found.results)}
+    listed = faults(found.results)
+    assert {each.address.partition("#")[2] for each in listed} == {"far", "far-2"}
+    places = {each.moments[0].row for each in listed}
     assert places == {"far.462", "far-2.3"}
     assert places < set(ids)
 

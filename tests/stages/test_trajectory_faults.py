@@ -16,17 +16,25 @@ from er3a.files.path_file import load_paths
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
 from er3a.pipeline.messages.say import say
-from er3a.pipeline.messages.trajectory import _rates, adjoined, advice, end_text, first_faults, switch_text
+from er3a.pipeline.messages.trajectory import (
+    _rates,
+    adjoined,
+    advice,
+    cause_of,
+    end_text,
+    first_faults,
+    switch_text,
+)
 from er3a.pipeline.program_reports import programs_of
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.trajectory.compute import compute
 from er3a.pipeline.stages.trajectory.judgement import sound_end
 from er3a.pipeline.stages.trajectory.model import Singularity, Stretch
-from er3a.pipeline.stages.trajectory.played import advised, faults
+from er3a.pipeline.stages.trajectory.played import advised, faults, motions, slowed
 from er3a.pipeline.study import Study, load_study
 from er3a.pipeline.verdicts import read_verdicts
 from er3a.pipeline.viewing.index import write_index
-from er3a.planning.motion_faults import AccelerationTooGreatIfAssumed, PathOutOfReach, TooFastIfAssumed
+from er3a.planning.motion_faults import AccelerationTooGreatIfAssumed, PathOutOfReach, TooFast, TooFastIfAssumed
 from er3a.planning.tool_proof import Undecided
 from testing.motion_cases import judged, limits_of
 
@@ -149,8 +157,14 @@ def test_a_path_that_ends_where_its_advice_says_keeps_the_margin(tmp_path, name)
         assert 1000 * bodies.distances(bodies.ends(np.radians(q)), pairs).min() >= path.clear_until.margin_mm - 0.1
     xyz, rpy = re.search(r"x, y, z = (.*?) mm and roll, pitch, yaw = (.*?) deg", advice(path)).groups()
     end = {"xyz_mm": [float(x) for x in xyz.split(", ")], "rpy_deg": [float(x) for x in rpy.split(", ")]}
-    shown = end_text(path, path.sound_end, assumed=True)
-    assert f"also after a stop from there ({path.clear_until.stop_s:.2f} s); it touches if the true shapes" in shown
+    shapes = results.summary.verdict.shapes
+    shown = end_text(path, path.sound_end, shapes=shapes)
+    assert f"also after a stop from there ({path.clear_until.stop_s:.2f} s)" in shown
+    within = path.clear_until.margin_mm < shapes.margin_mm
+    assert shown.startswith("Not before the shapes are confirmed, which may be wrong by 20 mm: ") == within
+    assert shown.endswith("it touches if the true shapes are larger by more than that.") != within
+    assert ("by 20 mm, more than it keeps: confirm them first" in advice(path, shapes=shapes)) == within
+    assert "assumed shapes" not in end_text(path, path.sound_end, shapes=None)
     (shorter,) = paths_of(tmp_path, name, end=end, duration_s=path.duration_s * path.clear_until.s_m / path.length_m)
     assert not shorter.collisions
     assert not shorter.out_of_limits
@@ -268,7 +282,7 @@ def test_what_is_wrong_before_a_contact_ends_the_sound_part_of_a_path(tmp_path):
     assert "the arm is singular at the start" in advised(met, near, results.avoidance, limits)
     fast = replace(path.collisions[0], t0_s=0.7, cause=TooFastIfAssumed(2, 900.0, 180.0))
     several = replace(early, too_fast=(fast,), avoidance=path.avoidance * 2)
-    assert [t for t, _ in first_faults(several)] == [0.5, path.collisions[0].t0_s]
+    assert [told.t_s for told in first_faults(several)] == [0.5, path.collisions[0].t0_s]
     (fault,) = faults(replace(results, summary=replace(results.summary, paths=(several,))))
     assert (fault.when, fault.what[:18]) == ("0.500 s", "wrist singularity;")
     beyond = replace(several, unreachable=(replace(fast, t0_s=0.9, s0_m=0.1, cause=PathOutOfReach(())),))
@@ -370,6 +384,89 @@ def test_a_fault_of_rates_tells_all_its_joints_until_the_last_of_what_adjoins_is
     again = stretch(TooFastIfAssumed(1, 200.0, 180.0), 3.0, 3.1, 3.05)
     assert _rates([again, *parts]).endswith("; and again from t = 3 s")
     assert "J1" not in _rates([again, *parts])
+
+
+def test_a_rate_far_beyond_its_limit_is_no_figure():
+    """Towards a singular pose it has no bound, and its digits depend on where it was sampled."""
+    assert say(TooFastIfAssumed(4, 3600.0, 360.0)).endswith("at worst needing 3600 deg/s")
+    assert say(TooFastIfAssumed(4, 380330.0, 360.0)).endswith("at worst needing more than 10 times that")
+    assert say(AccelerationTooGreatIfAssumed(4, np.inf, 1440.0)).endswith("needing more than 10 times that")
+    (part,) = [stretch(AccelerationTooGreatIfAssumed(4, 161748.0, 1440.0), 1.0, 1.1, 1.05)]
+    assert "at worst J4 needs more than 10 times its 1440 deg/s² at t = 1.05 s" in _rates([part])
+
+
+def test_what_follows_from_another_fault_is_told_after_it_and_the_singular_pose_first(tmp_path):
+    """Speeds towards the edge of the reach come before it in time, and assumed limits are exceeded before known ones;
+    the player opens where the first of what is told is worst."""
+    results = compute(study_of(tmp_path, "line_wrist_near", "line_out"), ROBOT)
+    out, near = (
+        path for name in ("line_out", "line_wrist_near") for path in results.summary.paths if path.name == name
+    )
+    told = first_faults(out)
+    assert [each.follows for each in told] == [False, True]
+    assert told[1].t_s < told[0].t_s == out.unreachable[0].t0_s
+    assert told[1].text.endswith("without bound towards the edge of the reach")
+    assert cause_of(out).startswith("the edge of the reach: ")
+    (event,) = near.singularities
+    assert cause_of(near) == f"wrist singularity within 1.88 deg at t = {event.t_s:.4g} s: J4 and J6 in line"
+    assert cause_of(replace(near, singularities=())) == ""
+    assert cause_of(replace(near, singularities=(replace(event, t_s=0.5, until_s=0.5),))) == ""
+    fault = {each.name: each for each in faults(results)}["line_wrist_near"]
+    assert f"play=line_wrist_near&t={round(event.t_s, 6)}#" in fault.address
+    assert fault.when.endswith(f", at worst {event.t_s:.3f} s")
+    known = [replace(part, cause=TooFast(4, 762.0, 360.0)) for part in near.too_fast if part.cause.code[:4] == "too_"]
+    assumed = [part for part in near.too_fast if part.cause.code[:4] != "too_"]
+    both = first_faults(replace(near, too_fast=(*assumed, *known)))
+    assert ["known" in each.text for each in both] == [True, False]
+    assert both[1].t_s < both[0].t_s
+
+
+def test_where_a_repair_is_slower_is_told_with_the_least_share_of_the_speed(tmp_path):
+    """Against the tool's speed itself, of the repair and of the path at the same place, by differences."""
+    results = compute(study_of(tmp_path, "line_wrist_near"), ROBOT)
+    (path,), rows, repair = results.summary.paths, results.checks, results.avoidance
+    repair = repair.take(repair.strategy == "slow")
+    found = slowed(path, rows, repair)
+    first, last = min(part.t0_s for part in path.too_fast), max(part.t1_s for part in path.too_fast)
+    assert 0 <= first - found.start_s < 0.01
+    assert 0 <= found.end_s - last < 0.01
+    way = np.linalg.norm(repair.xyz_mm - repair.xyz_mm[0], axis=1)  # along a straight line
+    own, programmed = np.gradient(way, repair.t_s), np.gradient(1000 * rows.s_m, rows.t_s)
+    share = own / np.interp(way, 1000 * rows.s_m, programmed)
+    at = np.interp(way, 1000 * rows.s_m, rows.t_s)
+    outside = (at > 0.2) & (at < 3.8) & ((at < found.start_s - 0.05) | (at > found.end_s + 0.05))
+    np.testing.assert_allclose(share[outside], 1.0, atol=0.01)
+    inside = (at > found.start_s) & (at < found.end_s)
+    assert share[inside].min() == pytest.approx(found.part, abs=0.02)
+    (fault,) = faults(results)
+    said = f"Slow down from t = {found.start_s:.2f} to {found.end_s:.2f} s only, there to {int(100 * found.part)} % of"
+    assert fault.to_do.startswith(said)
+    assert dict(fault.facts)["all at one pace"].startswith("If its speed can't vary along the path, run all of it at")
+    assert slowed(replace(path, strategy="branch"), rows, repair) is None
+
+
+def test_the_player_marks_what_fails_and_says_so_of_paths_near_assumed_shapes_too(tmp_path):
+    results = compute(study_of(tmp_path, "line_collides", "line_wrist_near"), ROBOT)
+    robot = load_robot(ROBOT)
+    shown = {each.name: each for each in motions(robot, results)}
+    worst = results.summary.paths[0].too_fast or results.summary.paths[1].too_fast
+    t = next(part.worst_s for part in worst if part.cause.code.startswith("too_fast"))
+    now = [each for each in shown["line_wrist_near"].events if each.t <= t <= each.until]
+    assert dict(joint for each in now for joint in each.joints) == {4: "2.1 × its speed", 6: "2.1 × its speed"}
+    clear = next(path for path in results.summary.paths if path.name == "line_collides")
+    near = replace(clear, verdict="safe", collisions=(), clearance=replace(clear.clearance, least_mm=11.0, t_s=2.4))
+    verdict = results.summary.verdict
+    verdict = replace(verdict, shapes=replace(verdict.shapes, near=("line_collides",)))
+    (shown,) = motions(robot, replace(results, summary=replace(results.summary, paths=(near,), verdict=verdict)))
+    (event,) = shown.events
+    assert shown.text == event.text
+    assert event.text.startswith("clear of link 4 and post by 11.0 mm of assumed shapes only")
+    assert event.bodies == ("link_4", "post")
+    assert event.t <= 2.4 <= event.until
+    measured = results.clearance.take(results.clearance.path == "line_collides")
+    during = (measured.t_s >= event.t) & (measured.t_s <= event.until)
+    assert (measured.clearance_mm[during] < 20).all()
+    assert (measured.clearance_mm[measured.t_s < event.t][-1:] >= 20).all()
 
 
 def test_stretches_of_one_cause_that_adjoin_are_told_once():

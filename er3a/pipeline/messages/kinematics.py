@@ -76,6 +76,11 @@ SINGULARITIES = {
     "shoulder": N_("shoulder"),
     "dependent_axes": N_("rank loss"),
 }
+SINGULAR_POSES = {
+    "wrist": N_("J4 and J6 in line"),
+    "elbow": N_("the arm stretched or folded"),
+    "shoulder": N_("the wrist centre on axis 1"),
+}
 RULE_NAMES = {
     "nearest": N_("nearest"),
     "weighted": N_("weighted"),
@@ -183,6 +188,11 @@ def branch_word(label: Label | str, branch: int = 0) -> str:
 def singularity_word(kind: str) -> str:
     """The name of a type of singularity."""
     return word("singularity", SINGULARITIES, kind)
+
+
+def singular_pose(kind: str) -> str:
+    """How an arm stands in a singular pose of a type; empty where its name says all."""
+    return word("singular_pose", SINGULAR_POSES, kind) if kind in SINGULAR_POSES else ""
 
 
 @say.register

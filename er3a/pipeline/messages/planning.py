@@ -29,7 +29,7 @@ STRATEGIES: dict[StrategyName, str] = {
     "planned": N_("Use another motion instead, planned in joint space"),
 }
 
-MAX_SHOWN = 1e6  # of an acceleration; towards a singular pose or the edge of the reach it has no bound
+FAR = 10.0  # times a limit, beyond which a rate is no figure to act on: near a singular pose it has no bound
 
 
 TEXTS = texts(
@@ -66,22 +66,26 @@ TEXTS = texts(
         "ends_off_path": "it ends {distance_mm:.3g} mm and {angle_deg:.3g} deg from the path's end",
         "speed_exceeded": "a joint needs {ratio:.2f} times its greatest speed",
         "acceleration_exceeded": "a joint needs {ratio:.2f} times its greatest acceleration",
-        "too_fast": (
-            "J{joint} exceeds its limit of {limit_deg_s:g} {unit}/s, at worst needing {needed_deg_s:.0f} {unit}/s"
-        ),
+        "too_fast": "J{joint} exceeds its limit of {limit_deg_s:g} {unit}/s, at worst needing {needed}",
         "too_fast_if_assumed": (
-            "J{joint} exceeds the assumed limit of {limit_deg_s:g} {unit}/s, at worst needing {needed_deg_s:.0f} "
-            "{unit}/s"
+            "J{joint} exceeds the assumed limit of {limit_deg_s:g} {unit}/s, at worst needing {needed}"
         ),
         "acceleration_too_great": (
-            "J{joint} exceeds its limit of {limit_deg_s2:g} {unit}/s², at worst needing {needed} {unit}/s²"
+            "J{joint} exceeds its limit of {limit_deg_s2:g} {unit}/s², at worst needing {needed}"
         ),
         "acceleration_too_great_if_assumed": (
-            "J{joint} exceeds the assumed limit of {limit_deg_s2:g} {unit}/s², at worst needing {needed} {unit}/s²"
+            "J{joint} exceeds the assumed limit of {limit_deg_s2:g} {unit}/s², at worst needing {needed}"
         ),
+        "needed#value": "{value:.0f} {unit}",
+        "needed#far": "more than {times:g} times that",
         "jerk_too_great#needed": "J{joint} would need {needed:.0f} {unit}/s³; its jerk limit is {able:g} {unit}/s³",
         "jerk_too_great#step": "J{joint}'s acceleration has a step; its jerk limit is {able:g} {unit}/s³",
-        "rate_needed": "J{joint} needs {needed} of {limit:g} {unit}",
+        "rate_needed#value": "J{joint} needs {needed:.0f} of {limit:g} {unit}",
+        "rate_needed#far": "J{joint} needs more than {times:g} times its {limit:g} {unit}",
+        "rate_limits#known": "the known limits",
+        "rate_limits#assumed": "the assumed limits",
+        "times_needed#speed": "{times} × its speed",
+        "times_needed#acceleration": "{times} × its acc.",
         "undecided": "the bounds can't decide {what}",
     }
 )
@@ -94,16 +98,21 @@ def unit_of(slides: bool) -> str:
 
 @say.register
 def _(found: TooFast | TooFastIfAssumed) -> str:
-    return say_as(found, unit=unit_of(found.slides))
+    unit = unit_of(found.slides)
+    return say_as(found, unit=unit, needed=needed_text(found.needed_deg_s, found.ratio, f"{unit}/s"))
 
 
 @say.register
 def _(found: AccelerationTooGreat | AccelerationTooGreatIfAssumed) -> str:
-    return say_as(found, unit=unit_of(found.slides), needed=_shown(found.needed_deg_s2))
+    unit = unit_of(found.slides)
+    return say_as(found, unit=unit, needed=needed_text(found.needed_deg_s2, found.ratio, f"{unit}/s²"))
 
 
-def _shown(needed: float) -> str:
-    return as_text(needed, ".0f") if needed < MAX_SHOWN else tr("more than {most}", most=as_text(MAX_SHOWN, ".0f"))
+def needed_text(needed: float, ratio: float, unit: str) -> str:
+    """A rate that a joint would need, ``ratio`` times what it has; far beyond that it is no figure."""
+    if ratio > FAR:
+        return sentence("needed#far", times=FAR)
+    return sentence("needed#value", value=needed, unit=unit)
 
 
 @say.register
@@ -124,8 +133,14 @@ def rate_needed(cause: RateCause) -> str:
             needed, limit, per = cause.needed_deg_s2, cause.limit_deg_s2, "/s²"
         case _:
             needed, limit, per = cause.needed_deg_s, cause.limit_deg_s, "/s"
-    unit = unit_of(cause.slides) + per
-    return sentence("rate_needed", joint=cause.joint, needed=_shown(needed), limit=limit, unit=unit)
+    parts = {"needed": needed, "limit": limit, "unit": unit_of(cause.slides) + per, "times": FAR}
+    return sentence(f"rate_needed#{'far' if cause.ratio > FAR else 'value'}", joint=cause.joint, **parts)
+
+
+def times_needed(ratio: float, *, acceleration: bool) -> str:
+    """How many times its limit a joint needs, in a few letters."""
+    times = f"> {FAR:g}" if ratio > FAR else as_text(ratio, ".2g")
+    return sentence("times_needed#acceleration" if acceleration else "times_needed#speed", times=times)
 
 
 OPEN: dict[Quantity, str] = {

@@ -11,9 +11,9 @@ import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.pairs import LinkAndSolid
 from er3a.kinematics.singularity import SingularityType
 from er3a.pipeline.messages.expectations import demonstrated, outcome_word
-from er3a.pipeline.messages.kinematics import branch_word, singularity_word
+from er3a.pipeline.messages.kinematics import branch_word, singular_pose, singularity_word
 from er3a.pipeline.messages.language import N_, alike, tr
-from er3a.pipeline.messages.planning import unit_of
+from er3a.pipeline.messages.planning import FAR, needed_text, rate_needed, unit_of
 from er3a.pipeline.messages.say import Plural, by, joined, listed, say, say_as, sentence, texts, word
 from er3a.pipeline.stages.programs.model import FindingAt, ProgramCounts, ProgramSummary
 from er3a.planning.motion_faults import AboveLimit, AccelerationTooGreat, BelowLimit, TooFast
@@ -261,12 +261,22 @@ TEXTS = texts(
         "passes_singularity.mm": "passes the {type} singularity at {distance:.1f} mm, after {at:.1f} mm",
         "faster_than_assumed": (
             "J{joint} exceeds the assumed limit of {assumed_deg_s:g} {unit}/s (no document gives its speed), at worst "
-            "needing {needed_deg_s:.0f} {unit}/s"
+            "needing {needed}"
         ),
         "accelerates_more_than_assumed": (
-            "J{joint} exceeds the assumed limit of {assumed_deg_s2:g} {unit}/s², at worst needing "
-            "{needed_deg_s2:.0f} {unit}/s²"
+            "J{joint} exceeds the assumed limit of {assumed_deg_s2:g} {unit}/s², at worst needing {needed}"
         ),
+        "programs.rates": Plural(
+            "joints",
+            "{named} exceeds {limits}: {worst:, }",
+            "{named} exceed {limits}: {worst:, }",
+        ),
+        "programs.rates#far": Plural(
+            "joints",
+            "{named} exceeds {limits}, at worst by more than {times:g} times",
+            "{named} exceed {limits}, at worst by more than {times:g} times",
+        ),
+        "programs.cause": "{finding}: {pose}",
         "configuration_changes": "the configuration changes from {before} to {after}",
         "arrives_otherwise": (
             "the arm arrives in other joint angles than the target's: J{joint} differs by {difference_deg:.2f} {unit}"
@@ -486,13 +496,21 @@ def _(found: found_in.StretchOutOfReach) -> str:
 
 @say.register
 def _(
-    found: found_in.ConfigurationEnds
-    | found_in.FasterThanAssumed
-    | found_in.AcceleratesMoreThanAssumed
-    | found_in.ArrivesOtherwise
-    | found_in.LoopComesBackOtherwise,
+    found: found_in.ConfigurationEnds | found_in.ArrivesOtherwise | found_in.LoopComesBackOtherwise,
 ) -> str:
     return say_as(found, unit=unit_of(found.slides))
+
+
+@say.register
+def _(found: FasterThanAssumed) -> str:
+    unit = unit_of(found.slides)
+    return say_as(found, unit=unit, needed=needed_text(found.needed_deg_s, over_limit(found), f"{unit}/s"))
+
+
+@say.register
+def _(found: AcceleratesMoreThanAssumed) -> str:
+    unit = unit_of(found.slides)
+    return say_as(found, unit=unit, needed=needed_text(found.needed_deg_s2, over_limit(found), f"{unit}/s²"))
 
 
 @say.register
@@ -635,6 +653,47 @@ def _(found: ZoneTooLarge) -> str:
     return sentence("remedy.zone_too_large", half=found.motion_mm / 2)
 
 
+def rates_text(paces: Sequence[Pace]) -> str:
+    """What is too fast on a line, all joints together: of speeds and of accelerations the worst."""
+    joints = sorted({each.joint for each in paces})
+    known = [isinstance(each, TooFast | AccelerationTooGreat) for each in paces]
+    kinds = (TooFast | FasterThanAssumed, AccelerationTooGreat | AcceleratesMoreThanAssumed)
+    worst = [min(alike, key=_pace) for kind in kinds if (alike := [each for each in paces if isinstance(each, kind)])]
+    limits = sentence("rate_limits#known" if any(known) else "rate_limits#assumed")
+    parts = {"joints": joints, "named": ", ".join(f"J{joint}" for joint in joints), "limits": limits}
+    if all(over_limit(each) > FAR for each in worst):
+        return sentence("programs.rates#far", times=FAR, **parts)
+    return sentence("programs.rates", worst=tuple(map(_pace_needed, worst)), **parts)
+
+
+def over_limit(found: Pace) -> float:
+    """What a joint needs over what it has."""
+    match found:
+        case FasterThanAssumed():
+            return found.needed_deg_s / found.assumed_deg_s
+        case AcceleratesMoreThanAssumed():
+            return found.needed_deg_s2 / found.assumed_deg_s2
+        case _:
+            return found.ratio
+
+
+def _pace_needed(found: Pace) -> str:
+    match found:
+        case FasterThanAssumed():
+            return rate_needed(TooFast(found.joint, found.needed_deg_s, found.assumed_deg_s, found.slides))
+        case AcceleratesMoreThanAssumed():
+            return rate_needed(
+                AccelerationTooGreat(found.joint, found.needed_deg_s2, found.assumed_deg_s2, found.slides)
+            )
+        case _:
+            return rate_needed(found)
+
+
+def singular_cause(found: MeetsSingularity | PassesSingularity) -> str:
+    """That a line comes to a singular pose, and how the arm stands there."""
+    return sentence("programs.cause", finding=found, pose=singular_pose(found.type))
+
+
 def remedy_at(finding: CheckFinding, joint_moves: Sequence[Sequence[float]]) -> str:
     """What to do about a finding: ``joint_moves`` (deg) that pass, or else what mends it and was not tried here."""
     if not joint_moves:
@@ -647,15 +706,8 @@ def remedy_at(finding: CheckFinding, joint_moves: Sequence[Sequence[float]]) -> 
 
 def _pace(found: Pace) -> float:
     """The share of its pace at which the joint keeps its limit: speeds go with it, accelerations with its square."""
-    match found:
-        case TooFast():
-            return found.limit_deg_s / found.needed_deg_s
-        case FasterThanAssumed():
-            return found.assumed_deg_s / found.needed_deg_s
-        case AccelerationTooGreat():
-            return math.sqrt(found.limit_deg_s2 / found.needed_deg_s2)
-        case AcceleratesMoreThanAssumed():
-            return math.sqrt(found.assumed_deg_s2 / found.needed_deg_s2)
+    over = over_limit(found)
+    return 1 / over if isinstance(found, TooFast | FasterThanAssumed) else 1 / math.sqrt(over)
 
 
 def _slower(pace: float) -> str:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal, NamedTuple
 
 import er3a.pipeline.messages.collision  # noqa: F401
-from er3a.collision.pairs import LinkAndSolid
+from er3a.collision.pairs import LinkAndSolid, ShapesAssumed
 from er3a.pipeline.messages.expectations import demonstrated, outcome_word
-from er3a.pipeline.messages.kinematics import singularity_word
+from er3a.pipeline.messages.kinematics import singular_pose, singularity_word
 from er3a.pipeline.messages.language import N_, as_text, with_unit
 from er3a.pipeline.messages.left_out import names_in_words
 from er3a.pipeline.messages.planning import STRATEGIES as ADVICE
@@ -51,6 +51,18 @@ STRATEGIES: dict[StrategyName, str] = {
     "planned": N_("planned motion of the joints"),
 }
 BY_JOINTS: tuple[StrategyName, ...] = ("branch", "detour", "planned")  # ways that no path of the tool shows
+FactName = Literal["clearance", "time", "singularity", "limits", "start", "pace", "repair", "end"]
+FACTS: dict[FactName, str] = {
+    "clearance": N_("clearance"),
+    "time": N_("time"),
+    "singularity": N_("singularity"),
+    "limits": N_("joint limits"),
+    "start": N_("start"),
+    "pace": N_("all at one pace"),
+    "repair": N_("why"),
+    "end": N_("where it may end"),
+}
+"""What is said of a motion to be run instead, beside what it is."""
 MAX_PAIRS = 3
 NO_DEVIATION = 0.005  # mm or deg
 NO_TIME = 0.005  # s
@@ -104,8 +116,13 @@ TEXTS = texts(
             "{named} exceeds {limits} until t = {end:.4g} s: {worst:; }",
             "{named} exceed {limits} until t = {end:.4g} s: {worst:; }",
         ),
-        "path.rates#known": "the known limits",
-        "path.rates#assumed": "the assumed limits",
+        "path.rates#edge": Plural(
+            "joints",
+            "{named} exceeds {limits} from there on, without bound towards the edge of the reach",
+            "{named} exceed {limits} from there on, without bound towards the edge of the reach",
+        ),
+        "path.cause": "{event}: {pose}",
+        "path.cause#edge": "the edge of the reach: towards it the arm is stretched, and no joint speed is enough",
         "path.rate": "at worst {needed} at t = {t:.4g} s",
         "path.rates#again": "{rates}; and again from t = {again:.4g} s",
         "advice.out_of_reach": "it is out of reach {when}",
@@ -137,6 +154,10 @@ TEXTS = texts(
             "End it at t = {t:.4g} s, with the tool at x, y, z = {xyz} mm, {left:.2f} s before the first fault (a stop "
             "takes {stop:.2f} s), or move the path"
         ),
+        "advice.slow_there": (
+            "Slow down from t = {start:.2f} to {end:.2f} s only, there to {percent} % of the programmed speed at the "
+            "slowest"
+        ),
         "advice.no_part": "No part of it may be run as it is",
         "advice.end": (
             "End it there, with the tool at x, y, z = {xyz} mm: {left:.2f} s before the first fault (a stop takes "
@@ -150,9 +171,17 @@ TEXTS = texts(
             "End it there, with the tool at x, y, z = {xyz} mm: {margin:.1f} mm clear of assumed shapes, also after a "
             "stop from there ({stop:.2f} s); it touches if the true shapes are larger by more than that."
         ),
+        "advice.end#within": (
+            "Not before the shapes are confirmed, which may be wrong by {error:g} mm: end it there, with the tool at "
+            "x, y, z = {xyz} mm, {margin:.1f} mm clear of assumed shapes, also after a stop from there ({stop:.2f} s)."
+        ),
         "advice.chosen": "{way}: {tool}; {time}",
         "advice.chosen#clear": "{way}: {tool}; {time}; the arm keeps {clearance:.1f} mm of clearance",
         "advice.of_assumed": "Clearance is that of assumed shapes: the true ones may come nearer",
+        "advice.of_assumed#within": (
+            "Clearance is that of assumed shapes, which may be wrong by {error:g} mm, more than it keeps: confirm them "
+            "first"
+        ),
         "advice.slowly": "This is its shortest time, quicker than the {programmed:.2f} s programmed: another motion",
         "advice.near": "No part of it is safe: the arm is near-singular at the start",
         "advice.near#met": "No part of it is safe: the arm is singular at the start",
@@ -355,22 +384,62 @@ def cause_text(path: model.PathSummary, part: model.Stretch) -> str:  # type: ig
     return cause
 
 
-def first_faults(path: model.PathSummary) -> list[tuple[float, str]]:
-    """When (s) a path is wrong first, and how; then where it leaves reach or limits or collides, or else its gravest
-    fault. What is undecided counts only where it comes before all that is not."""
+class Told(NamedTuple):
+    """A fault of a path: when it begins (s), how it is said, when it is best seen, and whether another one of the path
+    leads to it."""
+
+    t_s: float
+    text: str
+    seen_s: float
+    follows: bool = False
+
+
+def first_faults(path: model.PathSummary) -> list[Told]:
+    """What is wrong first with a path, and where it leaves reach or limits or collides, or else its gravest fault: in
+    order of time, what only follows from others last. What is undecided counts only where it comes before all that is
+    not."""
     fast = [[part for part in path.too_fast if part.cause.code.endswith(IF_ASSUMED) is each] for each in (False, True)]
     grave: list[Sequence[model.Stretch[Any]]] = [path.unreachable, path.out_of_limits, path.collisions]
     firsts = [min(each, key=lambda part: part.t0_s) for each in grave if each]
-    found = [(part.t0_s, _with_worst(part, say_first(part.cause))) for part in firsts]
-    found += [(min(part.t0_s for part in each), _rates(each)) for each in fast if each]
-    edge = min((part.t0_s for part in path.unreachable), default=math.inf) - AT_EDGE
-    events = [] if path.in_joint_space else [each for each in path.singularities if each.crossing and each.t_s < edge]
-    found += [(event.t_s, sentence("path.singular", type=event_word(event))) for event in events[:1]]
-    found += [(jump.t_s, say(jump)) for jump in path.jumps[:1]]
+    found = [Told(part.t0_s, _with_worst(part, say_first(part.cause)), part.t0_s) for part in firsts]
+    edge = _edge(path)
+    known = min((part.t0_s for part in fast[0]), default=math.inf)
+    for each in filter(None, fast):
+        run, _ = _run(each)
+        seen, end = _worst_of_kinds(run)[0].worst_s, _end_of(run)
+        follows = end >= edge - ADJOINING or run[0].t0_s < known <= end + ADJOINING
+        found.append(Told(run[0].t0_s, _rates(each, edge), run[0].t0_s if seen is None else seen, follows))
+    events = [] if path.in_joint_space else [e for e in path.singularities if e.crossing and e.t_s < edge - AT_EDGE]
+    found += [Told(e.t_s, sentence("path.singular", type=event_word(e)), e.t_s) for e in events[:1]]
+    found += [Told(jump.t_s, say(jump), jump.t_s) for jump in path.jumps[:1]]
     open_ = min(path.undecided, key=lambda part: part.t0_s, default=None)
     if open_ and open_.t0_s < min(found, default=(math.inf,))[0]:
-        found.append((open_.t0_s, cause_text(path, open_)))
-    return sorted({*found[: max(1, sum(map(bool, grave)))], *sorted(found)[:1]})
+        found.append(Told(open_.t0_s, cause_text(path, open_), open_.t0_s))
+    told = {*found[: max(1, sum(map(bool, grave)))], *sorted(found)[:1]}
+    return sorted(told, key=lambda each: (each.follows, each))
+
+
+def _edge(path: model.PathSummary) -> float:
+    """When (s) a path first leaves the reach; infinite where it does not."""
+    return min((part.t0_s for part in path.unreachable), default=math.inf)
+
+
+def cause_of(path: model.PathSummary) -> str:
+    """The singular pose, or the edge of the reach, that a path's faults come from; empty where none is known."""
+    if path.in_joint_space or path.not_planned:
+        return ""
+    edge = _edge(path)
+    for event in path.singularities:
+        if event.t_s < edge - AT_EDGE and any(_beside(event, part) for part in path.too_fast):
+            pose = singular_pose(event.type)
+            return sentence("path.cause", event=say(event), pose=pose) if pose else say(event)
+    if path.verdict in ("singular", "near-singular") and path.singularities:
+        return singular_pose(path.singularities[0].type)
+    return sentence("path.cause#edge") if any(told.follows for told in first_faults(path)) and path.unreachable else ""
+
+
+def _beside(event: model.Singularity, part: model.Stretch[RateCause]) -> bool:
+    return part.t0_s - ADJOINING <= event.until_s and event.t_s <= part.t1_s + ADJOINING
 
 
 def adjoined(stretches: Sequence[model.Stretch[Any]]) -> list[model.Stretch[Any]]:
@@ -385,34 +454,45 @@ def adjoined(stretches: Sequence[model.Stretch[Any]]) -> list[model.Stretch[Any]
     return sorted(found, key=lambda part: part.t0_s)
 
 
-def _rates(stretches: Sequence[model.Stretch[RateCause]]) -> str:
-    """What is too fast first, of all joints: stretches that adjoin are one, and each kind of limit has its worst."""
+def _run(stretches: Sequence[model.Stretch[RateCause]]) -> tuple[list[model.Stretch[RateCause]], float | None]:
+    """The first of stretches with those that adjoin, and when (s) the next one begins."""
     first, *later = sorted(stretches, key=lambda part: part.t0_s)
     run = [first]
-    end, again = first.t1_s, None
     for part in later:
-        if part.t0_s > end + ADJOINING:
-            again = part.t0_s
-            break
+        if part.t0_s > _end_of(run) + ADJOINING:
+            return run, part.t0_s
         run.append(part)
-        end = max(end, part.t1_s)
-    if len(run) == 1 and not _lasts(first):
-        return say(first.cause)
+    return run, None
+
+
+def _end_of(run: Sequence[model.Stretch[RateCause]]) -> float:
+    return max(part.t1_s for part in run)
+
+
+def _worst_of_kinds(run: Sequence[model.Stretch[RateCause]]) -> list[model.Stretch[RateCause]]:
+    """Of each kind of limit the stretch that exceeds it most, speeds first."""
     kinds = dict.fromkeys((part.cause.code, part.cause.slides) for part in run)
-    worst = [
+    return [
         max((part for part in run if (part.cause.code, part.cause.slides) == kind), key=lambda part: part.cause.ratio)
         for kind in sorted(kinds, key=lambda kind: not kind[0].startswith("too_fast"))
     ]
+
+
+def _rates(stretches: Sequence[model.Stretch[RateCause]], edge: float = math.inf) -> str:
+    """What is too fast first, of all joints: stretches that adjoin are one, and each kind of limit has its worst.
+
+    ``edge``: when (s) the path leaves the reach; towards it speeds have no bound.
+    """
+    run, again = _run(stretches)
+    first, end = run[0], _end_of(run)
     joints = sorted({part.cause.joint for part in run})
-    limits = "path.rates#assumed" if first.cause.code.endswith(IF_ASSUMED) else "path.rates#known"
-    rates = sentence(
-        "path.rates",
-        joints=joints,
-        named=", ".join(f"J{joint}" for joint in joints),
-        limits=sentence(limits),
-        end=end,
-        worst=tuple(map(_worst_rate, worst)),
-    )
+    limits = sentence("rate_limits#assumed" if first.cause.code.endswith(IF_ASSUMED) else "rate_limits#known")
+    named = {"joints": joints, "named": ", ".join(f"J{joint}" for joint in joints), "limits": limits}
+    if end >= edge - ADJOINING:
+        return sentence("path.rates#edge", **named)
+    if len(run) == 1 and not _lasts(first):
+        return say(first.cause)
+    rates = sentence("path.rates", end=end, worst=tuple(map(_worst_rate, _worst_of_kinds(run))), **named)
     return rates if again is None else sentence("path.rates#again", rates=rates, again=again)
 
 
@@ -432,36 +512,62 @@ def _lasts(part: model.Stretch[Any]) -> bool:
     return part.t1_s - part.t0_s >= MOMENT
 
 
-def advice(path: model.PathSummary, limits: model.LimitsUsed | None = None, *, assumed: bool = False) -> str | None:
+class Slowed(NamedTuple):
+    """From when to when (s, as programmed) a motion on the path is slower than programmed, and to what part of it."""
+
+    start_s: float
+    end_s: float
+    part: float
+
+
+def advice(
+    path: model.PathSummary,
+    limits: model.LimitsUsed | None = None,
+    *,
+    shapes: ShapesAssumed | None = None,
+    slowed: Slowed | None = None,
+) -> str | None:
     """What to do about a path; None where nothing is to be done. ``limits``: of the joints, whose assumed ones are
-    named; ``assumed``: whether clearance is that of assumed shapes."""
+    named; ``shapes``: that clearance is that of assumed ones; ``slowed``: where a motion that repairs it is slower."""
     if not path.avoidance:
         return None
     if path.chosen:
-        slower = _slower_throughout(path) if path.strategy == "slow" else ""
-        return joined([repair_text(path, limits, assumed=assumed), slower], ". ")
-    if path.unreachable:
-        when = joined(map(_when, path.unreachable), ", ")
-        why = sentence("advice.out_of_reach", when=when)
-    else:
-        causes = [say(part.cause) for part in path.out_of_limits] or [reasons(tried) for tried in path.avoidance]
-        why = joined(dict.fromkeys(causes))
+        return joined([repair_text(path, limits, shapes=shapes, slowed=slowed), whole_pace(path)], ". ")
+    only = path.avoidance[0] if len(path.avoidance) == 1 else None
+    if only and only.name != "planned":
+        return no_repair(path)
+    return joined([no_repair(path), _until(path), _of_end(path, shapes)], ". ")
+
+
+def no_repair(path: model.PathSummary) -> str:
+    """Why no strategy repairs a path."""
     if len(path.avoidance) == 1:
         (only,) = path.avoidance
         if only.name == "planned":
-            none = sentence("advice.no_strategy", reason=reasons(only))
-            return joined([none, _until(path), _of_assumed(path, assumed)], ". ")
-        parts = {"way": word("advice", ADVICE, only.name), "reason": reasons(only)}
-        return sentence("advice.only", **parts)
-    none = _within_reach(path) or sentence("advice.none", why=why)
-    return joined([none, _until(path), _of_assumed(path, assumed)], ". ")
+            return sentence("advice.no_strategy", reason=reasons(only))
+        return sentence("advice.only", way=word("advice", ADVICE, only.name), reason=reasons(only))
+    if path.unreachable:
+        why = sentence("advice.out_of_reach", when=joined(map(_when, path.unreachable), ", "))
+    else:
+        causes = [say(part.cause) for part in path.out_of_limits] or [reasons(tried) for tried in path.avoidance]
+        why = joined(dict.fromkeys(causes))
+    return _within_reach(path) or sentence("advice.none", why=why)
 
 
-def _of_assumed(path: model.PathSummary, assumed: bool) -> str:
+def _of_end(path: model.PathSummary, shapes: ShapesAssumed | None) -> str:
     """That the clearance up to where a path may be run is that of assumed shapes; empty where none is named."""
     end, last = path.sound_end, path.clear_until
-    named = end is not None and last is not None and end.t_s >= last.t_s and not path.unreachable
-    return sentence("advice.of_assumed") if assumed and named else ""
+    if end is None or last is None or end.t_s < last.t_s or path.unreachable:
+        return ""
+    return _of_assumed(last.margin_mm, shapes)
+
+
+def _of_assumed(clearance_mm: float, shapes: ShapesAssumed | None) -> str:
+    """That a clearance is that of assumed shapes, and whether these may be wrong by more; empty where none are."""
+    if shapes is None:
+        return ""
+    form = "advice.of_assumed#within" if clearance_mm < shapes.margin_mm else "advice.of_assumed"
+    return sentence(form, error=shapes.margin_mm)
 
 
 def _until(path: model.PathSummary) -> str:
@@ -474,23 +580,30 @@ def _until(path: model.PathSummary) -> str:
     return sentence("advice.sound", t=end.t_s, **_end(end))
 
 
-def end_text(path: model.PathSummary, end: model.SoundEnd, *, assumed: bool) -> str:
+def end_text(path: model.PathSummary, end: model.SoundEnd, *, shapes: ShapesAssumed | None) -> str:
     """That a path may be run to a point of it, and by how much it is clear up to there, if that was measured, of
-    ``assumed`` shapes or of given ones."""
-    if last := path.clear_until:
-        parts = {"xyz": _numbers(end.xyz_mm, 1), "margin": last.margin_mm, "stop": last.stop_s}
-        return sentence("advice.end#assumed" if assumed else "advice.end#clear", **parts)
-    return sentence("advice.end", **_end(end))
+    assumed ``shapes`` or of given ones; that first, where assumed ones may be wrong by more."""
+    last = path.clear_until
+    if last is None:
+        return sentence("advice.end", **_end(end))
+    form = "clear" if shapes is None else "within" if last.margin_mm < shapes.margin_mm else "assumed"
+    parts = {"xyz": _numbers(end.xyz_mm, 1), "margin": last.margin_mm, "stop": last.stop_s}
+    return sentence(f"advice.end#{form}", error=shapes.margin_mm if shapes else None, **parts)
+
+
+def end_facts(path: model.PathSummary) -> list[tuple[FactName, str]]:
+    """Why a path that is to end earlier has no repair, and where exactly it may end."""
+    return [("repair", no_repair(path)), ("end", _until(path))]
 
 
 def _end(end: model.SoundEnd) -> dict[str, Any]:
     return {"xyz": _numbers(end.xyz_mm, 1), "left": end.left_s, "stop": end.stop_s}
 
 
-def _slower_throughout(path: model.PathSummary) -> str:
+def whole_pace(path: model.PathSummary) -> str:
     """The pace at which the whole path keeps the limits, and the setting that gives it; empty where none does."""
     speed, acceleration = path.max_joint_speed_ratio, path.max_joint_acceleration_ratio
-    if speed is None or acceleration is None or not _only_too_fast(path):
+    if path.strategy != "slow" or speed is None or acceleration is None or not _only_too_fast(path):
         return ""
     longer = PACE_MARGIN * max(1.0, speed, acceleration**0.5)
     return sentence("advice.slower", percent=100 / longer, needed=path.duration_s * longer)
@@ -501,9 +614,9 @@ def _within_reach(path: model.PathSummary) -> str:
     part = min(path.unreachable, key=lambda part: part.t0_s, default=None)
     if part is None or part.s0_m <= 0:
         return ""
-    first, what = first_faults(path)[0]
-    form = "advice.within_reach#later" if first < part.t0_s else "advice.within_reach"
-    return sentence(form, t=part.t0_s, far=part.s0_m * 1000, first=first, what=what)
+    first = min(first_faults(path))
+    form = "advice.within_reach#later" if first.t_s < part.t0_s else "advice.within_reach"
+    return sentence(form, t=part.t0_s, far=part.s0_m * 1000, first=first.t_s, what=first.text)
 
 
 def _clear(path: model.PathSummary) -> str:
@@ -532,35 +645,75 @@ def reasons(tried: model.TriedStrategy) -> str:
     return joined(listed(tried.reasons))
 
 
-def repair_text(path: model.PathSummary, limits: model.LimitsUsed | None = None, *, assumed: bool = False) -> str:
-    """What the strategy that was chosen does, what it costs, and what it takes of ``limits`` that are assumed;
-    ``assumed``: whether clearance is that of assumed shapes."""
-    tried = path.chosen
-    if tried is None or tried.motion is None:
-        raise ValueError(f"{path.name} has no motion that repairs it")
-    motion = tried.motion
+def repair_text(
+    path: model.PathSummary,
+    limits: model.LimitsUsed | None = None,
+    *,
+    shapes: ShapesAssumed | None = None,
+    slowed: Slowed | None = None,
+) -> str:
+    """All that is said of the strategy that was chosen; arguments as of :func:`advice`."""
+    facts = repair_facts(path, limits, shapes)
+    return joined([repair_lead(path, slowed), *(text for _, text in facts)], ". ")
+
+
+def repair_lead(path: model.PathSummary, slowed: Slowed | None = None) -> str:
+    """What the strategy that was chosen does, and what it costs."""
+    tried, motion = _chosen(path)
     tool = _leaves(motion.max_deviation_mm, motion.max_deviation_deg)
     swings = {j: swing for j, swing in enumerate(motion.joint_swing_deg, 1) if j not in path.sliding}
     if tried.name in BY_JOINTS and swings:
         joint = max(swings, key=swings.__getitem__)
         tool = sentence("advice.swing", tool=tool, joint=joint, swing=swings[joint])
-    clearance = None if motion.clearance_mm is None else math.floor(10 * motion.clearance_mm) / 10
-    chosen = sentence(
+    clearance = _clearance_kept(motion)
+    way = word("advice", ADVICE, tried.name)
+    if slowed:
+        percent = math.floor(100 * slowed.part)
+        way = sentence("advice.slow_there", start=slowed.start_s, end=slowed.end_s, percent=percent)
+    return sentence(
         "advice.chosen" if clearance is None else "advice.chosen#clear",
-        way=word("advice", ADVICE, tried.name),
+        way=way,
         tool=tool,
         time=_takes(motion.duration_s, path.duration_s, tried.name),
         clearance=clearance,
     )
+
+
+def _chosen(path: model.PathSummary) -> tuple[model.TriedStrategy, model.StrategyMotion]:
+    tried = path.chosen
+    if tried is None or tried.motion is None:
+        raise ValueError(f"{path.name} has no motion that repairs it")
+    return tried, tried.motion
+
+
+def _clearance_kept(motion: model.StrategyMotion) -> float | None:
+    """mm, rounded down as it is shown."""
+    return None if motion.clearance_mm is None else math.floor(10 * motion.clearance_mm) / 10
+
+
+def repair_facts(
+    path: model.PathSummary, limits: model.LimitsUsed | None, shapes: ShapesAssumed | None
+) -> list[tuple[FactName, str]]:
+    """What else is said of the strategy that was chosen, and what it takes of ``limits`` that are assumed."""
+    tried, motion = _chosen(path)
+    clearance = _clearance_kept(motion)
     passes = path.singularities and not path.in_joint_space and not motion.keeps_clear
-    near = sentence("advice.region") if passes else ""
-    other, slowly = tried.name == "planned", ""
-    if other and motion.duration_s < path.duration_s:
-        slowly = sentence("advice.slowly", programmed=path.duration_s)
+    quicker = tried.name == "planned" and motion.duration_s < path.duration_s
     unsaid = limits is None or not any(limits.speed_assumed)
-    full = sentence("advice.full_speed") if unsaid and (motion.max_joint_speed_ratio or 0.0) >= FULL_SPEED else ""
-    shapes = sentence("advice.of_assumed") if assumed and clearance is not None else ""
-    return joined([chosen, shapes, slowly, near, _of_limits(motion, limits) if limits else "", full], ". ")
+    full = unsaid and (motion.max_joint_speed_ratio or 0.0) >= FULL_SPEED
+    facts: list[tuple[FactName, str]] = [
+        ("clearance", "" if clearance is None else _of_assumed(clearance, shapes)),
+        ("time", sentence("advice.slowly", programmed=path.duration_s) if quicker else ""),
+        ("singularity", sentence("advice.region") if passes else ""),
+        ("limits", _of_limits(motion, limits) if limits else ""),
+        ("limits", sentence("advice.full_speed") if full else ""),
+    ]
+    return [(name, text) for name, text in facts if text]
+
+
+def fact_word(name: FactName) -> str:
+    """What a fact is about."""
+    return word("trajectory.fact", FACTS, name)
 
 
 def _of_limits(motion: model.StrategyMotion, limits: model.LimitsUsed) -> str:

@@ -18,7 +18,8 @@ Weight = Literal["plain", "caution", "fail"]
 class PlayedEvent:
     """Something to be seen from ``t`` to ``until`` (s); ``status`` (``plain``, ``caution``, ``fail``) colours it.
 
-    ``bodies`` (``base``, ``link_3``, names of solids) are red then.
+    ``bodies`` (``base``, ``link_3``, names of solids) are red then; ``joints`` (from 1) fail, each with what it would
+    need, in few words, or nothing.
     """
 
     t: float
@@ -26,6 +27,7 @@ class PlayedEvent:
     text: str
     status: Weight
     bodies: tuple[str, ...] = ()
+    joints: tuple[tuple[int, str], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -42,21 +44,27 @@ class Mark:
 @dataclass(frozen=True)
 class FaultMoment:
     """One thing that is wrong: ``when``, or in which line, and ``place``, how far along and where the tool point is
-    then; both empty where not known."""
+    then; both empty where not known. ``seen_s``: when the player shows it best; ``row``: the id of the line that it is
+    in, on the page."""
 
     what: str
     when: str = ""
     place: str = ""
+    seen_s: float | None = None
+    row: str = ""
 
 
 @dataclass(frozen=True)
 class Fault:
     """Why a path or a program may not be run as it is, and what to do instead.
 
-    ``moments``: what fails first, then what fails later and weighs more.
+    ``moments``: of a path what fails first, then what fails later and weighs more, then what only follows from it; of
+    a program what weighs most, then what fails before that. ``cause``: what all of it comes from, such as a singular
+    pose, empty where nothing is known.
     ``status`` and ``verdict``: of all of it; ``meant``: whether its file expects that, said in words by ``expected``
-    (empty where it expects nothing). ``address``: of the place on the robot's pages, which the player shows there;
-    ``instead``: a motion that may be run, and where the player shows it.
+    (empty where it expects nothing). ``facts``: what else is to be known of what to do, each after what it is about.
+    ``address``: of the place on the robot's pages, which the player shows there; ``instead``: a motion that may be run,
+    and where the player shows it.
     """
 
     name: str
@@ -69,6 +77,8 @@ class Fault:
     to_do: str
     address: str
     instead: tuple[str, str] | None = None
+    cause: str = ""
+    facts: tuple[tuple[str, str], ...] = ()
 
     @property
     def when(self) -> str:

@@ -6,14 +6,15 @@
  * parts of its picture; without a motion of its own a panel shows that of the figure's `data-play`.
  */
 
-import { add, column, scaled, subtract } from "er3a/algebra";
+import { add, column, moved, scaled, subtract } from "er3a/algebra";
 import { constantLinks } from "er3a/kinematics";
 import { Orbit } from "er3a/orbit";
 import { alongArm, ARM, eyeOf, Picture } from "er3a/scene";
-import { armLooks, recoloured, sceneSolids } from "er3a/solids";
+import { armLooks, drums, recoloured, sceneSolids } from "er3a/solids";
 import { decodeValues, posesOf, valuesAt } from "er3a/values";
 
 const DOT = 0.012; // of the arm's size
+const GRAVEST = ["fail", "caution", "plain"];
 const CLOSED = 0.02; // of the arm's size: a motion ends where it starts
 
 const place = document.getElementById("player");
@@ -27,6 +28,7 @@ const arms = [data, ...data.beside].map((arm, k) => {
   return { table: arm.table, links: constantLinks(arm.table), looks: armLooks(arm.table, data.size, data.colours, arm, carried) };
 });
 const surroundings = sceneSolids(data.scene);
+const joints = drums(table, data.size);
 const picture = new Picture(canvas);
 const floor = data.floor ?? column(table.base, 3)[2];
 
@@ -100,8 +102,10 @@ function frame(now) {
 const isNow = ({ t: from, until }) => t >= from - 1e-9 && t <= until + 1e-9;
 
 function draw() {
-  const touching = new Set(motion.events.filter(isNow).flatMap((event) => event.bodies));
-  const seen = (solids) => recoloured(solids, touching, data.colours.touching);
+  const now = motion.events.filter(isNow);
+  const bodies = (grave) => new Set(now.filter(({ status }) => (status === "caution") !== grave).flatMap((event) => event.bodies));
+  const [touching, doubtful] = [bodies(true), bodies(false)];
+  const seen = (solids) => recoloured(recoloured(solids, doubtful, data.colours.caution), touching, data.colours.touching);
   const shown = arms.flatMap((arm, k) => {
     const poses = posesOf(arm, valuesAt(motion.times, motion.values[k], t));
     return arm.looks(part("looks")?.value).map(({ solids, ghost }) => ({ solids: seen(solids), poses, ghost }));
@@ -127,6 +131,9 @@ function draw() {
   picture.keepClear(shown.flatMap(({ poses }) => alongArm(poses)), ARM * data.size);
   picture.keepClear([motion.trails[0][0], motion.trails[0].at(-1), ...marks.map(({ from }) => from)], DOT * data.size);
   for (const { from, to, text } of marks) picture.word(text, scaled(add(from, to), 0.5), page.ink, page.halo);
+  for (const [j, { status }] of failing()) {
+    picture.word(`J${j}`, moved(shown[0].poses[j], joints[j - 1].middle), status === "caution" ? page.doubtful : page.touching, page.halo);
+  }
   if (arms.length === 1) nameEnds(motion.trails[0]);
   for (const { text, at } of data.signs) picture.word(text, at, page.ink, page.halo);
   picture.names(surroundings, page.ink, page.halo, touching, page.touching);
@@ -154,7 +161,8 @@ function tell() {
   bar.value = String(t);
   clock.textContent = words.clock.replace("{t}", fixed(t, 3)).replace("{end}", fixed(end(), 3));
   bar.setAttribute("aria-valuetext", clock.textContent);
-  const text = motion.events.filter(isNow).map((event) => event.text).join(words.between) || motion.text;
+  const now = motion.events.filter(isNow).sort((a, b) => GRAVEST.indexOf(a.status) - GRAVEST.indexOf(b.status));
+  const text = now.map((event) => event.text).join(words.between) || motion.text;
   show(nowShown, text);
   tellJoints();
   for (const plot of plots) plot(motion.name, t);
@@ -164,19 +172,29 @@ function tell() {
   }
 }
 
-/** Joint values with their margins; the least of those in deg is marked, and of those in mm. */
+/** The joints that fail at this moment, each with how gravely and what it would need; of several causes the gravest. */
+function failing() {
+  const now = motion.events.filter(isNow).sort((a, b) => GRAVEST.indexOf(b.status) - GRAVEST.indexOf(a.status));
+  return new Map(now.flatMap(({ status, joints }) => joints.map(([j, needed]) => [j, { status, needed }])));
+}
+
+/** Joint values with their margins; those that fail are marked, or else the least of those in deg, and of those in mm. */
 function tellJoints() {
   const values = valuesAt(motion.times, motion.values[0], t).map((value, j) => value * (table.slides[j] ? 1000 : 180 / Math.PI));
   const rooms = data.joints.map(({ lower, upper }, i) => (lower === null ? Infinity : Math.min(values[i] - lower, upper - values[i])));
+  const fails = failing();
+  const quiet = fails.size === 0 && !motion.events.some((event) => isNow(event) && (event.status === "fail" || event.bodies.length));
   const least = new Map();
   data.joints.forEach(({ unit }, i) => (rooms[i] < (rooms[least.get(unit)] ?? Infinity) ? least.set(unit, i) : null));
   data.joints.forEach(({ unit }, i) => {
+    const fault = fails.get(i + 1);
     const past = rooms[i] <= -0.05; // what one decimal shows
     const text = rooms[i] === Infinity ? words.unlimited : past ? words.beyond : words.room;
     show(cells[i].value, fixed(values[i], 1) + (unit === "°" ? unit : ` ${unit}`));
-    show(cells[i].room, text.replace("{room}", fixed(Math.abs(rooms[i]), 1)));
-    cells[i].place.classList.toggle("least", least.get(unit) === i);
-    cells[i].place.classList.toggle("past", past);
+    show(cells[i].room, fault?.needed || text.replace("{room}", fixed(Math.abs(rooms[i]), 1)));
+    cells[i].place.classList.toggle("least", quiet && least.get(unit) === i);
+    cells[i].place.classList.toggle("doubtful", fault?.status === "caution");
+    cells[i].place.classList.toggle("past", past || (fault !== undefined && fault.status !== "caution"));
   });
 }
 
@@ -237,6 +255,15 @@ function withCursors(figure) {
   };
 }
 
+/** Scrolls each listing to what is shown of it. */
+function listed() {
+  for (const row of document.querySelectorAll(".listing .now")) {
+    const [box, own] = [row.closest(".listing"), row.getBoundingClientRect()];
+    const { top, bottom } = box.getBoundingClientRect();
+    if (own.top < top || own.bottom > bottom) box.scrollTop += own.top - top;
+  }
+}
+
 /** Keeps the player in sight below what the reader points at, whose lower edge is at ``edge`` in the window. */
 function dock(edge = 0) {
   const { top, bottom } = place.getBoundingClientRect();
@@ -273,6 +300,8 @@ for (const link of document.querySelectorAll("[data-t]")) {
     event.stopPropagation(); // a link to a moment within a row that leads to its end
     goTo(link.dataset.play, Number(link.dataset.t));
     dock(link.getBoundingClientRect().bottom);
+    tell();
+    listed();
   });
 }
 addEventListener("resize", refresh);
@@ -282,6 +311,8 @@ choose(decodeURIComponent(location.hash.slice(1)));
 if (motions.has(asked.get("play")) && Number.isFinite(Number(asked.get("t")))) {
   goTo(asked.get("play"), Number(asked.get("t")));
   dock();
+  tell();
+  listed();
 }
 part("controls").hidden = part("joints").hidden = false;
 refresh();

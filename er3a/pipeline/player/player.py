@@ -56,7 +56,10 @@ WORDS = {
     "speed": N_("speed ×"),
     "time": N_("time of the motion"),
     "clock": N_("t = {t} s of {end} s"),
-    "joints": N_("Joint values at this moment, and how far each is from the nearer of its limits; ▲ marks the least."),
+    "joints": N_(
+        "Joint values at this moment, and how far each is from the nearer of its limits. ✕ and ▲ mark joints that fail "
+        "then, with what they would need; if none does, ▲ marks the least."
+    ),
     "room": N_("{room} to limit"),
     "beyond": N_("{room} beyond"),
     "unlimited": N_("no limit"),

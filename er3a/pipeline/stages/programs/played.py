@@ -9,24 +9,35 @@ import numpy as np
 
 from er3a.pipeline.messages.expectations import as_expected, outcome_word
 from er3a.pipeline.messages.language import own_title, tr
-from er3a.pipeline.messages.programs import remedies, say
+from er3a.pipeline.messages.planning import times_needed
+from er3a.pipeline.messages.programs import Pace, over_limit, rates_text, remedies, say, singular_cause
 from er3a.pipeline.messages.say import joined, say_first
 from er3a.pipeline.player.motions import Fault, FaultMoment, PlayedEvent, PlayedMotion, Weight, address_of
 from er3a.pipeline.stages.expectations import is_met
 from er3a.pipeline.stages.programs.model import FindingAt, ProgramMotion, ProgramsResults, ProgramSummary
 from er3a.pipeline.viewing.numbers import fixed
-from er3a.program_check.program_check_findings import RANKS, Level, MotionCollides
+from er3a.planning.motion_faults import AboveLimit, AccelerationTooGreat, BelowLimit
+from er3a.program_check.program_check_findings import (
+    RANKS,
+    AcceleratesMoreThanAssumed,
+    Level,
+    MeetsSingularity,
+    MotionCollides,
+    PassesSingularity,
+)
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
+SINGULAR = MeetsSingularity | PassesSingularity
+MOMENT = 1e-6  # s
 WEIGHTS: dict[Level, Weight] = {"pass": "plain", "note": "plain", "caution": "caution", "fail": "fail"}
 
 
 def motions(robot: Robot, results: ProgramsResults) -> list[PlayedMotion]:
     """The programs as far as they were followed, the worst first, as the player shows them.
 
-    The motion of each line is an event with its text, its verdict and what touches; each finding is one at its moment.
-    ``q`` is (N, n), rad or m.
+    The motion of each line is an event with its text, its verdict and what touches; each finding is one from its
+    moment to the end of that motion, joints that are too fast together. ``q`` is (N, n), rad or m.
     """
     motions = []
     for program in worst_first(results.summary.programs):
@@ -37,12 +48,48 @@ def motions(robot: Robot, results: ProgramsResults) -> list[PlayedMotion]:
         for line, level, t0, t1 in stretches(rows):
             shown = tr("line {line}: {text}", line=line, text=words.get(line, "").strip().rstrip(";"))
             events.append(PlayedEvent(t0, t1, shown, WEIGHTS[level], touching(program, line)))
-        for each in program.findings:
+        for each in sorted(program.findings, key=cause_first):
             if each.program_s is not None:
-                events.append(PlayedEvent(each.program_s, each.program_s, say(each.finding), WEIGHTS[each.level]))
+                events += _found_event(program, each, rows)
         q = meant(robot, rows.q_deg)
         motions.append(PlayedMotion(program.name, "", rows.t_s, q, events, label=own_title(program.title)))
     return motions
+
+
+def _found_event(program: ProgramSummary, found: FindingAt, rows: ProgramMotion) -> list[PlayedEvent]:
+    """A finding as long as its line lasts, a singular pose at its moment; none of a rate after its line's first."""
+    start = found.program_s or 0.0
+    finding, weight = found.finding, WEIGHTS[found.level]
+    if isinstance(finding, SINGULAR):
+        return [PlayedEvent(start, start, singular_cause(finding), weight)]
+    end = min((t1 for _, _, t0, t1 in stretches(rows) if t0 - MOMENT <= start <= t1 + MOMENT), default=start)
+    if not isinstance(finding, Pace):
+        joint = getattr(finding, "joint", None)
+        joints = ((joint, ""),) if joint and isinstance(finding, AboveLimit | BelowLimit) else ()
+        return [PlayedEvent(start, max(start, end), say(finding), weight, joints=joints)]
+    paces = _paces(program, found)
+    if start > min(t for t, _ in paces) or finding != next(pace for t, pace in paces if t == start):
+        return []
+    needed: dict[int, str] = {}
+    for _, pace in paces:
+        brakes = isinstance(pace, AccelerationTooGreat | AcceleratesMoreThanAssumed)
+        needed.setdefault(pace.joint, times_needed(over_limit(pace), acceleration=brakes))
+    text = rates_text([pace for _, pace in paces])
+    return [PlayedEvent(start, max(start, end), text, weight, joints=tuple(needed.items()))]
+
+
+def _paces(program: ProgramSummary, found: FindingAt) -> list[tuple[float, Pace]]:
+    """From when on (s) joints are too fast at the line of a finding; the first of each joint is its gravest."""
+    here = [each for each in program.findings if (each.file, each.line) == (found.file, found.line)]
+    return [
+        (each.program_s, each.finding) for each in here if isinstance(each.finding, Pace) and each.program_s is not None
+    ]
+
+
+def cause_first(found: FindingAt) -> tuple[bool, int, bool, float]:
+    """By which the findings of a line are told: a singular pose, then what weighs most, of that joints that are too
+    fast last."""
+    return not isinstance(found.finding, SINGULAR), -RANKS[found.level], isinstance(found.finding, Pace), when(found)
 
 
 def worst_first(programs: Sequence[ProgramSummary]) -> list[ProgramSummary]:
@@ -51,17 +98,18 @@ def worst_first(programs: Sequence[ProgramSummary]) -> list[ProgramSummary]:
 
 
 def faults(results: ProgramsResults) -> list[Fault]:
-    """The programs that may not be run as they are, the worst first: of each the first finding, and the first of the
-    gravest level."""
+    """The programs that may not be run as they are, the worst first: of each the first finding of the gravest level,
+    and what comes before it."""
     found = []
     for program in worst_first(results.summary.programs):
         wrong = sorted((each for each in program.findings if WEIGHTS[each.level] != "plain"), key=moment_of)
         if not wrong or program.outcome == "pass":
             continue
         first, worst = wrong[0], min(wrong, key=lambda each: -RANKS[each.level])
-        told = [first] if worst.level == first.level else [first, worst]
-        own = first in of_line(program, first.line)
         rows = results.motion.take(results.motion.program == program.name)
+        cause = _cause(program, first) or _cause(program, worst)
+        told = [worst] if worst.level == first.level else [worst, first]
+        moments = tuple(_moment(program, each, rows) for each in told)
         found.append(
             Fault(
                 program.name,
@@ -70,12 +118,47 @@ def faults(results: ProgramsResults) -> list[Fault]:
                 outcome_word(program.outcome),
                 is_met(program),
                 as_expected(program),
-                tuple(FaultMoment(say_first(m.finding), _where(program, m), _place(m, rows)) for m in told),
+                moments,
                 " ".join(dict.fromkeys(text for each in told for text in remedies_of(program, each)[:1])),
-                address_of("programs", program.name, first.program_s or 0.0, line_id(program.name, first.line * own)),
+                address_of("programs", program.name, moments[0].seen_s or 0.0, program.name),
+                cause=cause or "",
             )
         )
     return found
+
+
+def _cause(program: ProgramSummary, found: FindingAt) -> str | None:
+    """The singular pose that a line with joints that are too fast comes to; None where it comes to none."""
+    here = [each for each in program.findings if (each.file, each.line) == (found.file, found.line)]
+    if not any(isinstance(each.finding, Pace) for each in here):
+        return None
+    said = [
+        tr("{where}: {text}", where=_where(program, each), text=singular_cause(each.finding))
+        for each in here
+        if isinstance(each.finding, SINGULAR)
+    ]
+    return next(iter(said), None)
+
+
+def _moment(program: ProgramSummary, found: FindingAt, rows: ProgramMotion) -> FaultMoment:
+    """A finding with its line, its time and its place; joints of a line that are too fast together, seen when the
+    joint is fastest."""
+    text, seen, where = say_first(found.finding), found.program_s, _where(program, found)
+    row = line_id(program.name, found.line) if found.line and found in of_line(program, found.line) else ""
+    if isinstance(found.finding, Pace) and seen is not None:
+        text = rates_text([pace for _, pace in _paces(program, found)])
+        fastest = _fastest(found.finding.joint, rows.take((rows.line == found.line) & (rows.t_s >= seen - MOMENT)))
+        if fastest is not None and fixed(fastest, 2) != fixed(seen, 2):
+            where, seen = tr("{when}, fastest at {time} s", when=where, time=fixed(fastest, 2)), fastest
+    return FaultMoment(text, where, _place(found, rows), seen, row)
+
+
+def _fastest(joint: int, rows: ProgramMotion) -> float | None:
+    """When (s) a joint changes most between the stored poses of a line; None where there are too few."""
+    if len(rows) < 3:
+        return None
+    speed = np.abs(np.diff(rows.q_deg[:, joint - 1]) / np.maximum(np.diff(rows.t_s), MOMENT))
+    return float(rows.t_s[int(speed.argmax())])
 
 
 def _place(found: FindingAt, rows: ProgramMotion) -> str:

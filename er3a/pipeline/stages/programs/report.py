@@ -12,13 +12,15 @@ from markupsafe import Markup, escape
 from er3a.pipeline.messages.collision import solid_rows
 from er3a.pipeline.messages.expectations import as_expected
 from er3a.pipeline.messages.language import tr
-from er3a.pipeline.messages.programs import cycle_text, level_word, remedies, remedy_at
+from er3a.pipeline.messages.programs import cycle_text, level_word, remedies, remedy_at, singular_cause
 from er3a.pipeline.messages.say import bracketed, say
 from er3a.pipeline.messages.trajectory import limits_assumed
 from er3a.pipeline.player.player import drawing_head, moment, player, stretch
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.programs import model
 from er3a.pipeline.stages.programs.played import (
+    SINGULAR,
+    cause_first,
     faults,
     line_id,
     motions,
@@ -28,6 +30,7 @@ from er3a.pipeline.stages.programs.played import (
     worst_first,
 )
 from er3a.pipeline.study import Study
+from er3a.pipeline.viewing.conditions import condition_of
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.pipeline.viewing.page import render_stage
 from er3a.pipeline.viewing.tray import compared_with_tray, in_tray
@@ -59,6 +62,7 @@ def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) ->
         bodies=[each.name for each in scene.solids] if scene else [],
         solids=solid_rows(scene),
         drawing_head=drawing_head(),
+        condition="" if stored.rests_on.get("validation") == "fail" else condition_of(stored.validated),
     )
 
 
@@ -90,7 +94,8 @@ def _section(results: model.ProgramsResults, program: model.ProgramSummary) -> d
 def _remark(name: str, each: model.FindingAt) -> Markup:
     """What was found, after the moment at which it begins: a link to it where the player shows it."""
     often = tr("{times} times that the line is carried out", times=each.times) if each.times > 1 else ""
-    text = escape(bracketed(say(each.finding), often))
+    said = singular_cause(each.finding) if isinstance(each.finding, SINGULAR) else say(each.finding)
+    text = escape(bracketed(said, often))
     if each.motion_s is None:
         return text
     at = tr("from {time} s into this line on", time=fixed(each.motion_s, 2))
@@ -140,7 +145,7 @@ def _listing(
                 text=words,
                 level=level,
                 word="" if level is None else level_word(level),
-                remarks=[_remark(name, each) for each in here],
+                remarks=[_remark(name, each) for each in sorted(here, key=cause_first)],
                 remedies=remedies(here, program.findings),
                 facts=_facts(rows, moves[number]),
                 stretch=leads[0],

@@ -7,30 +7,44 @@ from typing import Any
 
 import numpy as np
 
+from er3a.collision.pairs import ShapesAssumed
 from er3a.pipeline.messages.expectations import as_expected, outcome_words
 from er3a.pipeline.messages.language import own_title, tr
+from er3a.pipeline.messages.planning import rate_needed, times_needed
 from er3a.pipeline.messages.programs import remedy, say
 from er3a.pipeline.messages.say import joined, sentence
 from er3a.pipeline.messages.trajectory import (
     IF_ASSUMED,
+    FactName,
+    Slowed,
+    Told,
     advice,
+    cause_of,
     cause_text,
+    end_facts,
     end_text,
     event_word,
+    fact_word,
     first_faults,
     path_text,
-    repair_text,
+    repair_facts,
+    repair_lead,
     switch_text,
+    whole_pace,
 )
 from er3a.pipeline.player.motions import Fault, FaultMoment, Mark, PlayedEvent, PlayedMotion, Weight, address_of
 from er3a.pipeline.stages.expectations import is_met
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.viewing.numbers import fixed
+from er3a.planning.motion_faults import NeededAcceleration, NeededSpeed, RateCause
 from er3a.planning.names import PathVerdict
 from er3a.program_check.program_check_findings import ClearOfAssumed
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
+SLOWER = 0.97  # of the programmed pace, below which a motion counts as slower
+LARGEST_PART = 0.9  # of a path's time, up to which it is slower only there
+LEAST_WAY = 1e-6  # m
 WEIGHTS: dict[PathVerdict, Weight] = {
     "safe": "plain",
     "near-singular": "caution",
@@ -50,12 +64,13 @@ def motions(robot: Robot, results: model.TrajectoryResults) -> list[PlayedMotion
     checks, avoidance, motions = results.checks, results.avoidance, []
     for path in worst_first(results.summary.paths):
         rows = checks.take((checks.path == path.name) & checks.reachable)
-        motions.append(
-            PlayedMotion(path.name, path_text(path), rows.t_s, meant(robot, rows.q_deg), events(path), contact(path))
-        )
+        near = near_assumed(path, results.summary)
+        text = say(near) if near else path_text(path)
+        seen = [*events(path), *_near_events(path, near, results.clearance)]
+        motions.append(PlayedMotion(path.name, text, rows.t_s, meant(robot, rows.q_deg), seen, contact(path)))
         if path.chosen:
             repair = avoidance.take((avoidance.path == path.name) & (avoidance.strategy == path.strategy))
-            text = advice(path, results.summary.joint_limits) or ""
+            text = repair_lead(path, slowed(path, rows, repair))
             motions.append(PlayedMotion(repaired(path), text, repair.t_s, meant(robot, repair.q_deg)))
     return motions
 
@@ -74,11 +89,12 @@ def faults(results: model.TrajectoryResults) -> list[Fault]:
         if model.is_safe(path, results.summary.verdict.shapes):
             continue
         clearance = path.clearance if path.verdict == "safe" else None
-        wrong = [(clearance.t_s, say(near))] if clearance else _faults(path)
+        wrong = [Told(clearance.t_s, say(near), clearance.t_s)] if clearance else _faults(path)
         status, verdict = shown_verdict(path, near)
         rows = results.checks.take(results.checks.path == path.name)
         own = results.avoidance.take(results.avoidance.path == path.name)
-        to_do, instead = _to_do(path, rows, own, results.summary)
+        to_do, facts, instead = _to_do(path, rows, own, results.summary)
+        moments = tuple(_moment(told, rows) for told in wrong)
         found.append(
             Fault(
                 path.name,
@@ -87,34 +103,38 @@ def faults(results: model.TrajectoryResults) -> list[Fault]:
                 verdict,
                 path.verdict != "safe" and is_met(path),
                 as_expected(path),
-                tuple(_moment(text, t, rows) for t, text in wrong),
+                moments,
                 to_do,
-                address_of("trajectory", path.name, wrong[0][0] or 0.0, path.name),
+                address_of("trajectory", path.name, moments[0].seen_s or 0.0, path.name),
                 instead,
+                cause_of(path),
+                tuple((fact_word(name), text) for name, text in facts if text),
             )
         )
     return found
 
 
-def _faults(path: model.PathSummary) -> Sequence[tuple[float | None, str]]:
-    """What is wrong with a path that is not safe, and when (s), if it has a time: first, and what weighs more later."""
+def _faults(path: model.PathSummary) -> list[Told] | list[FaultMoment]:
+    """What is wrong with a path that is not safe, and when (s): first, and what weighs more later."""
     found = [] if path.not_planned else first_faults(path)
     if (path.verdict in ("singular", "near-singular") and len(found) <= 1) or not found:
         times = [] if path.not_planned else path.singular_times_s or [event.t_s for event in path.singularities]
-        return [(min(times, default=None), path_text(path))]
+        return [Told(min(times), path_text(path), min(times))] if times else [FaultMoment(path_text(path))]
     return found
 
 
-def _moment(what: str, t: float | None, rows: model.PathChecks) -> FaultMoment:
-    """A fault at a time (s) of a path, with the place of it between the path's rows."""
-    if t is None:
-        return FaultMoment(what)
-    when = tr("{time} s", time=fixed(t, 3))
+def _moment(told: Told | FaultMoment, rows: model.PathChecks) -> FaultMoment:
+    """A fault of a path with its time, when it is worst, and its place then, between the path's rows."""
+    if isinstance(told, FaultMoment):
+        return told
+    when = tr("{time} s", time=fixed(told.t_s, 3))
+    if fixed(told.seen_s, 3) != fixed(told.t_s, 3):
+        when = tr("{when}, at worst {time} s", when=when, time=fixed(told.seen_s, 3))
     if not len(rows):
-        return FaultMoment(what, when)
-    far, *xyz = (float(np.interp(t, rows.t_s, values)) for values in (1000 * rows.s_m, *rows.xyz_mm.T))
+        return FaultMoment(told.text, when, seen_s=told.seen_s)
+    far, *xyz = (float(np.interp(told.seen_s, rows.t_s, values)) for values in (1000 * rows.s_m, *rows.xyz_mm.T))
     place = tr("{far} mm, ({xyz})", far=fixed(far, 0), xyz=", ".join(fixed(value, 0) for value in xyz))
-    return FaultMoment(what, when, place if np.isfinite([far, *xyz]).all() else "")
+    return FaultMoment(told.text, when, place if np.isfinite([far, *xyz]).all() else "", told.seen_s)
 
 
 def _assumed(part: model.Stretch[Any]) -> bool:
@@ -124,23 +144,48 @@ def _assumed(part: model.Stretch[Any]) -> bool:
 
 def _to_do(
     path: model.PathSummary, rows: model.PathChecks, motions: model.AvoidanceRows, summary: model.TrajectorySummary
-) -> tuple[str, tuple[str, str] | None]:
-    """What to do instead of running a path as it is, and the motion that may be run with its address."""
-    assumed = summary.verdict.shapes is not None
+) -> tuple[str, list[tuple[FactName, str]], tuple[str, str] | None]:
+    """What to do instead of running a path as it is, what else is to be known of that, and the motion that may be run
+    with its address."""
+    shapes = summary.verdict.shapes
     if path.chosen:
-        name = repaired(path)
-        repair_said = repair_text(path, summary.joint_limits, assumed=assumed)
-        repair = sentence("finding", finding=joined([repair_said, _switch(path, rows, motions)], ". "))
-        return repair, (name, address_of("trajectory", name, 0.0, path.name))
+        name, repair = repaired(path), motions.take(motions.strategy == path.strategy)
+        lead = sentence("finding", finding=repair_lead(path, slowed(path, rows, repair)))
+        facts = repair_facts(path, summary.joint_limits, shapes)
+        facts += [("start", _switch(path, rows, motions)), ("pace", whole_pace(path))]
+        return lead, facts, (name, address_of("trajectory", name, 0.0, path.name))
     if path.verdict == "safe" and (near := near_assumed(path, summary)):
-        return remedy(near), None
+        return remedy(near), [], None
     last = path.sound_end
     if last is None:
-        todo = advised(path, rows, motions, summary.joint_limits, assumed=assumed)
-        return sentence("finding", finding=todo) if todo else "", None
+        todo = advised(path, rows, motions, summary.joint_limits, shapes=shapes)
+        return sentence("finding", finding=todo) if todo else "", [], None
     name = tr("{path}, up to {time} s", path=path.name, time=fixed(last.t_s, 3))
-    end = end_text(path, last, assumed=assumed)
-    return end, (name, address_of("trajectory", path.name, last.t_s, path.name, last.t_s))
+    address = address_of("trajectory", path.name, last.t_s, path.name, last.t_s)
+    return end_text(path, last, shapes=shapes), end_facts(path), (name, address)
+
+
+def slowed(path: model.PathSummary, rows: model.PathChecks, repair: model.AvoidanceRows) -> Slowed | None:
+    """Where a repair that keeps the path goes slower than programmed, or the path is too fast; None of others, and
+    where that is everywhere.
+
+    ``rows``, ``repair``: of the path and of its repair, compared where the tool point has come equally far.
+    """
+    if path.strategy != "slow" or len(repair) < 2 or len(rows) < 2:
+        return None
+    way = np.append(0.0, np.linalg.norm(np.diff(repair.xyz_mm, axis=0), axis=1).cumsum()) / 1000
+    if not np.isfinite(way[-1]) or way[-1] < LEAST_WAY:
+        return None
+    programmed = np.interp(way, rows.s_m, rows.t_s)
+    pace = np.diff(programmed) / np.diff(repair.t_s)
+    slow = np.flatnonzero(pace < SLOWER)
+    if not len(slow):
+        return None
+    start = min([programmed[slow[0]], *(part.t0_s for part in path.too_fast)])
+    end = max([programmed[slow[-1] + 1], *(part.t1_s for part in path.too_fast)])
+    if end - start > LARGEST_PART * path.duration_s:
+        return None
+    return Slowed(float(start), float(end), float(pace.min()))
 
 
 def advised(
@@ -149,14 +194,15 @@ def advised(
     motions: model.AvoidanceRows,
     limits: model.LimitsUsed,
     *,
-    assumed: bool = False,
+    shapes: ShapesAssumed | None = None,
 ) -> str | None:
     """What to do about a path; None where nothing is to be done.
 
-    ``rows``, ``motions``, ``limits``: of the path, of its repairs, of the joints; ``assumed``: whether clearance is
-    that of assumed shapes.
+    ``rows``, ``motions``, ``limits``: of the path, of its repairs, of the joints; ``shapes``: that clearance is that of
+    assumed ones.
     """
-    text = advice(path, limits, assumed=assumed)
+    repair = motions.take(motions.strategy == path.strategy) if path.chosen else motions
+    text = advice(path, limits, shapes=shapes, slowed=slowed(path, rows, repair))
     if text is None or path.chosen:
         return text and joined([text, _switch(path, rows, motions)], ". ")
     if not path.in_joint_space and len(rows) and rows.near_singular[0]:
@@ -202,12 +248,42 @@ def events(path: model.PathSummary) -> list[PlayedEvent]:
         PlayedEvent(
             s.t0_s,
             s.t1_s,
-            tr("{fault}: {cause}", fault=kind, cause=cause_text(path, s)),
+            tr("{fault}: {cause}", fault=kind, cause=_few_words(path, s)),
             _weight(path, s),
             _touching(s.cause),
+            _joints(s.cause),
         )
         for kind, s in faults
     ]
+
+
+def _few_words(path: model.PathSummary, part: model.Stretch[Any]) -> str:
+    """Why a stretch is an event."""
+    return rate_needed(part.cause) if isinstance(part.cause, RateCause) else cause_text(path, part)
+
+
+def _near_events(
+    path: model.PathSummary, near: ClearOfAssumed | None, clearance: model.Clearances
+) -> list[PlayedEvent]:
+    """From when to when a path is as near to assumed shapes as these may be wrong, at its nearest."""
+    if near is None or path.clearance is None:
+        return []
+    rows = clearance.take(clearance.path == path.name)
+    at = path.clearance.t_s
+    far = rows.t_s[~(rows.clearance_mm < near.margin_mm)]
+    start = min(rows.t_s[rows.t_s > max(far[far < at], default=-np.inf)], default=at)
+    end = max(rows.t_s[rows.t_s < min(far[far > at], default=np.inf)], default=at)
+    return [PlayedEvent(min(start, at), max(end, at), say(near), "caution", near.pair.names)]
+
+
+def _joints(cause: object) -> tuple[tuple[int, str], ...]:
+    """The joint that fails, if it is one, with what it would need of what it has."""
+    joint = getattr(cause, "joint", None)
+    if joint is None:
+        return ()
+    if not isinstance(cause, NeededSpeed | NeededAcceleration):
+        return ((joint, ""),)
+    return ((joint, times_needed(cause.ratio, acceleration=isinstance(cause, NeededAcceleration))),)
 
 
 def _weight(path: model.PathSummary, part: model.Stretch[Any]) -> Weight:

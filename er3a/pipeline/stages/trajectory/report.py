@@ -13,7 +13,7 @@ from er3a.pipeline.messages.collision import solid_rows
 from er3a.pipeline.messages.expectations import as_expected
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import N_, tr, with_unit
-from er3a.pipeline.messages.programs import remedy
+from er3a.pipeline.messages.planning import FAR
 from er3a.pipeline.messages.say import bracketed, joined, say
 from er3a.pipeline.messages.trajectory import (
     adjoined,
@@ -32,7 +32,6 @@ from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.stages.trajectory.path_figures import PathFigure, clearance_section, in_space
 from er3a.pipeline.stages.trajectory.played import (
-    advised,
     faults,
     kinds,
     motions,
@@ -136,8 +135,7 @@ def _section(
         expected=as_expected(path),
         text=joined([path_text(path), say(near) if near else ""]),
         distance=_clear_of(path, assumed),
-        advice=advised(path, rows, motions, summary.joint_limits, assumed=assumed),
-        near=joined([say(near), remedy(near).rstrip(".。")], ". ") if near else "",
+        near=near is not None,
         branches=[branch_word(label) for label in path.branches],
         speed=_speed(path, summary.joint_limits),
         events=[_event_row(path.name, event) for event in path.singularities],
@@ -255,14 +253,18 @@ def _remark(tried: model.TriedStrategy, motion: model.StrategyMotion) -> str:
 
 
 def _ratio(value: float | None) -> str:
-    return tr("no bound") if value is None else fixed(value, 2)
+    if value is None:
+        return tr("no bound")
+    return f"> {FAR:g}" if value > FAR else fixed(value, 2)
 
 
 def _conclusion(path: model.PathSummary, rows: model.PathChecks) -> str:
     """What the curves show, in one or two sentences."""
     condition, parts = rows.condition_number, []
     joint = path.fastest_joint
-    if path.max_joint_speed_deg_s and joint is not None:
+    if (path.max_joint_speed_ratio or 0.0) > FAR:
+        parts.append(tr("A joint would need more than {times:g} times its speed.", times=FAR))
+    elif path.max_joint_speed_deg_s and joint is not None:
         speed = number(path.max_joint_speed_deg_s[joint], 3)
         parts.append(tr("J{joint} is the fastest joint, with {speed} deg/s.", joint=joint + 1, speed=speed))
     elif rows.reachable.any():
