@@ -104,7 +104,7 @@ TEXTS = texts(
             "{named} exceeds {limits} until t = {end:.4g} s: {worst:; }",
             "{named} exceed {limits} until t = {end:.4g} s: {worst:; }",
         ),
-        "path.rates#known": "the known limits",
+        "path.rates#known": "the stated limits",
         "path.rates#assumed": "the assumed limits",
         "path.rate": "at worst {needed} at t = {t:.4g} s",
         "path.rates#again": "{rates}; and again from t = {again:.4g} s",
