@@ -21,7 +21,7 @@ function textOf(cell) {
 }
 
 const NUMBER = /[+−-]?\d+(?:\u202f\d{3})*(?:\.\d+)?(?:·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+|e[+−-]?\d+)?/u;
-const LEADING = new RegExp(`^(?:[^\\d:：=]*[:：=])?\\s*(?:${WORDS.bounds})?[^\\p{L}\\d+−-]*(${NUMBER.source})(?![\\p{L}\\d_.-])`, "u");
+const LEADING = new RegExp(`^(?:[^\\d:：=()（）.,;]{0,20}[:：=])?\\s*(?:${WORDS.bounds})?[^\\p{L}\\d+−-]*(${NUMBER.source})(?![\\p{L}\\d_.-])`, "u");
 
 // The number that a cell begins with, after a mark, its name ("t = 4 s") or "at least", and before a unit, a spread or
 // words; NaN if it begins otherwise.
@@ -338,7 +338,10 @@ function filterFor(table) {
     else address.searchParams.delete(number);
     history.replaceState(null, "", address);
   });
-  if (field.value) filter();
+  if (field.value) {
+    filter();
+    unfold(table);
+  }
   return box;
 }
 
@@ -657,10 +660,13 @@ function showOneOf(group) {
 // What an address leads to may be folded, or inside of what is.
 function unfoldTarget() {
   const aim = document.getElementById(decodeURIComponent(location.hash.slice(1)));
-  let folded = aim?.closest("details:not([open])");
-  if (!folded) return;
-  for (; folded; folded = folded.parentElement.closest("details")) folded.open = true;
+  if (!aim?.closest("details:not([open])")) return;
+  unfold(aim);
   aim.scrollIntoView();
+}
+
+function unfold(part) {
+  for (let fold = part.closest("details"); fold; fold = fold.parentElement.closest("details")) fold.open = true;
 }
 
 // Back leads to where one was: what was unfolded, and how far down.
