@@ -145,9 +145,7 @@ def test_a_filter_stays_in_the_address(browser, small_study):
     """Which opens the fold that the table is in."""
     browser.get((small_study.folder / "reports/er3a_c60/validation.html").as_uri())
     browser.execute_script("document.querySelectorAll('details').forEach((part) => (part.open = true))")
-    field = next(
-        each for each in browser.find_elements(By.CSS_SELECTOR, ".tools input[type=search]") if each.is_displayed()
-    )
+    field = browser.find_element(By.CSS_SELECTOR, "#table-not-settled + .tools input")
     table = "arguments[0].closest('.tools').previousElementSibling"
     shown = f"return [...{table}.querySelectorAll('tbody tr')].filter(row => !row.hidden).map(row => row.innerText)"
     everything = browser.execute_script(shown, field)
@@ -157,9 +155,8 @@ def test_a_filter_stays_in_the_address(browser, small_study):
     address = browser.current_url
     browser.get("about:blank")
     browser.get(address)
-    field = next(
-        each for each in browser.find_elements(By.CSS_SELECTOR, ".tools input[type=search]") if each.is_displayed()
-    )
+    field = browser.find_element(By.CSS_SELECTOR, "#table-not-settled + .tools input")
+    assert field.is_displayed()
     assert field.get_property("value") == "alpha6"
     assert browser.execute_script(shown, field) == kept
 

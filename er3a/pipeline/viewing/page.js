@@ -339,8 +339,8 @@ function filterFor(table) {
     history.replaceState(null, "", address);
   });
   if (field.value) {
+    unfold(table); // first: Chromium leaves room for nothing in a fold that is opened after its rows were measured
     filter();
-    unfold(table);
   }
   return box;
 }
