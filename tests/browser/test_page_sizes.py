@@ -47,6 +47,18 @@ const right = document.querySelector(".robot").getBoundingClientRect().right;
 const ends = [...document.querySelectorAll(".answers dd")].map((dd) => dd.getBoundingClientRect().right);
 return [folds.length, right, ends];
 """
+
+
+def test_a_contradicted_table_takes_six_screens_and_none_of_its_tables_is_cut(browser, small_study):
+    with chromium.emulating(browser, 1280, 900):
+        browser.get((small_study.folder / "reports/er3a_c60_article/validation.html").as_uri())
+        assert browser.execute_script("return document.documentElement.scrollHeight") <= 6 * 900
+        assert browser.execute_script(CUT) == []
+
+
+CUT = "return [...document.querySelectorAll('.scroll')].filter((e) => e.scrollWidth > e.clientWidth).map((e) => e.id)"
+
+
 NOT_PROSE = ".verdict p, .tools, .warning, .turns, .pickers, td p"
 MEASURES = """
 const size = parseFloat(getComputedStyle(document.documentElement).fontSize);

@@ -11,7 +11,7 @@ from selenium.webdriver.support.expected_conditions import staleness_of
 from selenium.webdriver.support.wait import WebDriverWait
 
 from testing import chromium
-from tests.browser.pages import PAGES_WITH_EACH_CONTROL, STAGE_PAGES, STAGE_PAGES_OF_EACH_KIND
+from tests.browser.pages import PAGES, PAGES_WITH_EACH_CONTROL, STAGE_PAGES, STAGE_PAGES_OF_EACH_KIND
 
 
 @pytest.mark.parametrize("page", PAGES_WITH_EACH_CONTROL)
@@ -142,10 +142,10 @@ return parts.map((heading) => heading.id);
 
 
 def test_a_filter_stays_in_the_address(browser, small_study):
+    """Which opens the fold that the table is in."""
     browser.get((small_study.folder / "reports/er3a_c60/validation.html").as_uri())
-    field = next(
-        each for each in browser.find_elements(By.CSS_SELECTOR, ".tools input[type=search]") if each.is_displayed()
-    )
+    browser.execute_script("document.querySelectorAll('details').forEach((part) => (part.open = true))")
+    field = browser.find_element(By.CSS_SELECTOR, "#table-not-settled + .tools input")
     table = "arguments[0].closest('.tools').previousElementSibling"
     shown = f"return [...{table}.querySelectorAll('tbody tr')].filter(row => !row.hidden).map(row => row.innerText)"
     everything = browser.execute_script(shown, field)
@@ -155,9 +155,8 @@ def test_a_filter_stays_in_the_address(browser, small_study):
     address = browser.current_url
     browser.get("about:blank")
     browser.get(address)
-    field = next(
-        each for each in browser.find_elements(By.CSS_SELECTOR, ".tools input[type=search]") if each.is_displayed()
-    )
+    field = browser.find_element(By.CSS_SELECTOR, "#table-not-settled + .tools input")
+    assert field.is_displayed()
     assert field.get_property("value") == "alpha6"
     assert browser.execute_script(shown, field) == kept
 
@@ -225,6 +224,7 @@ def test_words_are_found_over_all_pages_and_on_each(browser, small_study):
     browser.find_element(By.TAG_NAME, "body").send_keys("/")
     assert browser.switch_to.active_element == field
     field.send_keys("line_collides er3a-c60")
+    WebDriverWait(browser, PAUSE).until(lambda _: browser.find_elements(By.CSS_SELECTOR, ".elsewhere a"))
     links = browser.find_elements(By.CSS_SELECTOR, ".elsewhere a")
     assert {link.get_attribute("href").rsplit("/", 1)[1].split("?")[0] for link in links} >= {"trajectory.html"}
     found = browser.find_elements(By.CSS_SELECTOR, ".robot:not(.unfound)")
@@ -244,6 +244,33 @@ def test_words_are_found_over_all_pages_and_on_each(browser, small_study):
     field.send_keys("x" + Keys.BACKSPACE)
     assert not browser.find_elements(By.CLASS_NAME, "unfound")
     assert all(row.is_displayed() for row in rows)
+
+
+@pytest.mark.parametrize(
+    ("page", "text"),
+    [
+        ("er3a_c60/validation.html", "c and s are cosine and sine"),  # a paragraph of a folded section
+        ("er3a_c60_article/validation.html", "most that the entry moves the tool"),  # open on a page that is folded
+        ("er3a_c60/trajectory.html", "Motions are timed with joint speeds"),
+        ("er3_600/validation.html", "corner (85, −65) z"),  # a row of a folded table
+        ("er3a_c60/teach.html", "Drag to turn"),
+    ],
+)
+def test_the_index_finds_every_text_of_a_page_and_leads_to_it(browser, small_study, page, text):
+    browser.get((small_study.folder / "reports/index.html").as_uri() + f"?find={text.replace(' ', '+')}")
+    own = f'.elsewhere a[href^="{page}"]'
+    WebDriverWait(browser, PAUSE).until(lambda _: browser.find_elements(By.CSS_SELECTOR, own))
+    place = browser.find_elements(By.CSS_SELECTOR, own)[1]  # behind the page's title
+    assert text in place.text
+    browser.get(place.get_attribute("href"))
+    if page.endswith("teach.html"):
+        return
+    sought = browser.find_element(By.CLASS_NAME, "sought")
+    assert text in sought.text
+    top, bottom, height = browser.execute_script(
+        "const box = arguments[0].getBoundingClientRect(); return [box.top, box.bottom, innerHeight]", sought
+    )
+    assert 0 <= top < bottom <= height
 
 
 @pytest.mark.parametrize(
@@ -324,20 +351,24 @@ def test_joint_vectors_lead_to_the_teach_panel(browser, small_study):
     assert taken == pytest.approx(shown, abs=0.06)
 
 
-@pytest.mark.parametrize("page", ["compare.html", *STAGE_PAGES_OF_EACH_KIND])
+@pytest.mark.parametrize("page", [page for page in PAGES if not page.endswith("teach.html")])
 def test_every_table_sorts_by_every_column(browser, small_study, page):
+    """Numbers with units, signs, spreads, marks and "at least" by value, before words, empty cells last."""
     browser.get((small_study.folder / "reports" / page).as_uri())
     sorted_columns = browser.execute_script(SORT_ALL)
     assert bool(sorted_columns) == browser.execute_script(HAS_TABLES)
-    for numeric, written, rising, falling in sorted_columns:
+    for numeric, by_verdict, written, rising, falling in sorted_columns:
         assert sorted(rising) == sorted(falling) == sorted(written)
-        if numeric:
-            values = [float(plain(found[0])) for text in rising if (found := FIRST_NUMBER.search(text))]
-            assert values == sorted(values)
-        numbers = [value for value in map(shown_number, rising) if value is not None]
-        assert numbers == sorted(numbers)
-        if len(numbers) == len(rising):
-            assert list(map(shown_number, falling)) == sorted(numbers, reverse=True)
+        led = [float(plain(found[1])) for text in rising if (found := LEADING_NUMBER.match(text))]
+        numbered = [text for text in rising if re.search(r"\d", text)]
+        assert not numeric or len(led) == len(numbered), "a column of numbers has no other cells with numbers"
+        if by_verdict or 2 * len(led) <= len(numbered):
+            continue
+        assert led == sorted(led)
+        assert all(LEADING_NUMBER.match(text) for text in [*rising[: len(led)], *falling[: len(led)]])
+        assert [float(plain(LEADING_NUMBER.match(text)[1])) for text in falling[: len(led)]] == led[::-1]
+        ends = [text for text in rising if text in ("", "–")]
+        assert rising[len(rising) - len(ends) :] == ends
 
 
 def test_cells_with_units_signs_and_marks_sort_by_value(browser, tmp_path, small_study):
@@ -348,6 +379,7 @@ def test_cells_with_units_signs_and_marks_sort_by_value(browser, tmp_path, small
         "name": ["6R", "pick 2", "2-axis", "pick 10", "arm_3"],
         "pair": ["30<br>20", "4<br>500", "0", "", "12 to 9"],
         "time": ["t = 10.00 s", "t = 4.00 s", "one round: 5.1 to 6 s", "7 s", "–"],
+        "bound": ["no bound", "at least 9.42 to 10 mm", "none", "at least −9.5 mm", "9.5 mm"],
     }
     rising = {
         "unit": ["−2 mm", "5.12 mm", "13.8 mm", "1\u202f200 ± 3 mm", "–"],
@@ -355,6 +387,7 @@ def test_cells_with_units_signs_and_marks_sort_by_value(browser, tmp_path, small
         "mark": ["✓ 1.5·10⁻³ deg", "< 0.5 deg", "≥ 3 deg", "✓ 12 deg", "✗ 100 deg"],
         "pair": ["0", "4\n500", "12 to 9", "30\n20", ""],
         "time": ["t = 4.00 s", "one round: 5.1 to 6 s", "7 s", "t = 10.00 s", "–"],
+        "bound": ["at least −9.5 mm", "at least 9.42 to 10 mm", "9.5 mm", "no bound", "none"],
     }
     browser.get((small_study.folder / "reports/er3a_c60/inverse.html").as_uri())
     rows = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in zip(*shown.values()))
@@ -365,7 +398,7 @@ def test_cells_with_units_signs_and_marks_sort_by_value(browser, tmp_path, small
         "document.body.innerHTML = arguments[0]; makeSortable(document.querySelector('table'))",
         table.replace("< 0", "&lt; 0"),
     )
-    orders = dict(zip(shown, (column[2] for column in browser.execute_script(SORT_ALL))))
+    orders = dict(zip(shown, (column[3] for column in browser.execute_script(SORT_ALL))))
     assert orders | rising == orders
     assert sorted(orders["name"]) == sorted(shown["name"])
     assert orders["name"].index("pick 2") < orders["name"].index("pick 10")
@@ -373,11 +406,13 @@ def test_cells_with_units_signs_and_marks_sort_by_value(browser, tmp_path, small
 
 SORT_ALL = """
 for (const part of document.querySelectorAll("[data-one-of] > [hidden]")) part.hidden = false;
+for (const part of document.querySelectorAll("details")) part.open = true;
 const columns = [];
 for (const table of document.querySelectorAll("table")) {
   [...table.querySelectorAll(".sort")].forEach((control, column) => {
     const texts = () => [...table.tBodies[0].rows].map((row) => row.cells[column].innerText.trim());
-    const orders = [control.closest("th").classList.contains("n"), texts()];
+    const sorted = [...table.tBodies[0].rows].every((row) => row.cells[column]?.querySelector(".badge, .decision"));
+    const orders = [control.closest("th").classList.contains("n"), sorted, texts()];
     for (let press = 0; press < 2; press++) {
       control.click();
       orders.push(texts());
@@ -390,15 +425,10 @@ return columns;
 """
 
 
-FIRST_NUMBER = re.compile("[+−-]?\\d+(?:\u202f\\d{3})*(?:\\.\\d+)?(?:·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?")
-
-
-def shown_number(text: str) -> float | None:
-    """The value of a number as the pages write it; None for other texts."""
-    try:
-        return float(plain(text))
-    except ValueError:
-        return None
+LEADING_NUMBER = re.compile(
+    "(?:[a-z =]+[:=] )?(?:at least |at most |[✓✗<>≤≥±(⌀] ?)?"
+    "([+−-]?\\d+(?:\u202f\\d{3})*(?:\\.\\d+)?(?:·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?)(?![\\w.-])"
+)
 
 
 def plain(text: str) -> str:

@@ -40,7 +40,7 @@ from er3a.pipeline.stages import run
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.validation import compute as compute_module
 from er3a.pipeline.stages.validation.checks import checks_of_set, table_checks, verdict_of
-from er3a.pipeline.stages.validation.evidence_section import evidence_section
+from er3a.pipeline.stages.validation.evidence_section import evidence_section, table_to_use
 from er3a.pipeline.stages.validation.model import (
     RESULTS,
     AnotherArm,
@@ -525,6 +525,25 @@ def test_an_entry_that_only_the_source_of_the_table_to_use_gives_has_one_mark(su
     for each in (each for each in article.entries if each.entry in changed):
         words = {"settled": "✓ settled, one source", "settled_up_to_signs": "(✓) settled but for signs, one source"}
         assert settled[each.entry] == words[each.status]
+
+
+@pytest.mark.long
+def test_an_open_entry_has_both_its_values_in_every_table(summaries):
+    """alpha 6 and offset 6 of the article's table, which no document tells from half a turn, as those of the others."""
+    real, article = load_robot("er3a_c60"), load_robot("er3a_c60_article")
+    for name in ("er3a_c60", "er3a_c60_article", "er3_600"):
+        evidence = summaries[name].evidence
+        shown = {
+            cell["entry"]: (cell["value"], cell["gives"])
+            for _, cells in evidence_section(load_robot(name), evidence)["rows"]
+            for cell in cells
+            if cell and cell["status"] == "open"
+        }
+        assert {each.entry for each in evidence.entries if each.status == "open"} == shown.keys()
+        assert all(gives for _, gives in shown.values())
+        assert shown["alpha6"] == shown["offset6"] == ("0", "180")
+    *_, last = table_to_use(article, real, "", summaries["er3a_c60"].evidence)["rows"]
+    assert [cells for cells in last[1] if cells[2]] == [("0", False, "180", "?")] * 2
 
 
 def test_the_page_says_how_far_each_contradicted_entry_is_off(study, stored, summaries, tmp_path):

@@ -17,7 +17,7 @@ from er3a.pipeline.results import LeftOut, read_stage
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.validation.evidence_section import rounded_within, table_to_use
 from er3a.pipeline.study import load_study
-from er3a.pipeline.viewing.index import _PlacesOfPage, _tally, write_index
+from er3a.pipeline.viewing.index import _tally, _TextOfPage, write_index
 from er3a.pipeline.viewing.page import VERDICT_WORDS, Head, Numbering, _missed, _tray_edges, linked, page_environment
 from tests.conftest import ROOT
 
@@ -56,13 +56,13 @@ def test_the_table_to_use_is_whole_and_as_its_file_gives_it():
     rows = [[value for value, *_ in cells] for _, cells in section["rows"]]
     assert "Not confirmed: alpha 6, all limits. “One source”: only the source of er3a_c60 gives it" in section["text"]
     assert [mark for _, cells in section["rows"] for *_, mark in cells if mark] == ["?"]
-    assert section["rows"][5][1][1][2] == "?"
+    assert section["rows"][5][1][1][2:] == ("", "?")
     assert section["page"] == "../er3a_c60/validation.html"
     assert rows[1] == ["270", "0", "0", "−90", "−1", "−130", "90"]
-    marked = np.array([[differs for _, differs, _ in cells] for _, cells in section["rows"]])
+    marked = np.array([[differs for _, differs, *_ in cells] for _, cells in section["rows"]])
     assert marked[1].tolist() == [True, False, False, True, True, True, True]
     same = table_to_use(real, real, "", None)["rows"]
-    assert not any(differs or mark for _, cells in same for _, differs, mark in cells)
+    assert not any(differs or mark for _, cells in same for _, differs, _, mark in cells)
 
 
 @pytest.mark.parametrize(
@@ -106,7 +106,7 @@ def test_the_index_marks_each_entry_of_a_table_as_validation_found_it(small_resu
             else:
                 assert "→" not in rest
     for twin in ("alpha6", "offset6"):
-        assert re.search(rf'er3a_c60/validation.html#entry-{twin}">0</a> or 180 ', page)
+        assert re.search(rf'er3a_c60/validation.html#entry-{twin}">0</a> <span>or 180 ', page)
     assert "alpha6 = 180 (here 0), offset6 = 180 (here 0)" in page
     assert '<a href="#dh-er3a_c60">er3a_c60</a>' in page
     confirmed = legend.split("not confirmed")[0]
@@ -168,10 +168,19 @@ def test_what_another_page_examines_is_named_only_where_that_page_is():
     assert _missed(torques, None)[1] == ""
 
 
-def test_a_place_of_what_was_not_examined_says_so_in_the_search():
-    page = """<h2>Paths</h2><table><tr><td>line</td><td>safe</td></tr></table>
+def test_the_search_has_all_text_of_a_page_by_heading_and_says_what_was_not_examined():
+    page = """<nav>All robots</nav><main><p>Cau<b>tio</b>n: 2 of 3.</p>
+    <details><summary><h2>Paths</h2></summary><p>One<br>two</p><img alt="A curve">
+    <table><thead><tr><th>path</th></tr></thead>
+    <tr><td>line</td><td><p>safe</p></td></tr></table></details>
+    <h3>More</h3><button>Play</button><ul><li>a</li><li>bc <ul><li>de</li></ul></li></ul>
     <div id="table-not-examined"><table><tr><td>collisions of a gripper</td><td>-</td></tr></table></div>
-    <table><tr><td>line 2</td></tr></table>"""
-    parser = _PlacesOfPage()
+    <h2>Last</h2><table><tr><td>line 2</td></tr></table></main><footer>sha256</footer>"""
+    parser = _TextOfPage()
     parser.feed(page)
-    assert list(parser.texts) == ["Paths", "line", "not examined: collisions of a gripper", "line 2"]
+    assert {head: list(texts) for head, texts in parser.texts.items()} == {
+        "": ["Caution: 2 of 3."],
+        "Paths": ["Paths", "One two", "A curve", "line safe"],
+        "Paths More": ["More", "bc", "de", "not examined: collisions of a gripper -"],
+        "Last": ["Last", "line 2"],
+    }

@@ -83,14 +83,14 @@ TEXTS = texts(
         "dynamics.no_limits#at_rest": (
             "Holding still in the worst pose found takes {torque:.3g} ± {tolerance:.2g} {unit}, at J{joint}."
         ),
-        "dynamics.fits": "Fits: every quantity with a known limit is within it; highest utilisation: {use}.",
+        "dynamics.fits": "Fits: every quantity with a stated limit is within it; highest utilisation: {use}.",
         "dynamics.unlimited": "Unknown, wholly or in part: {what}.",
         "dynamics.marginal": (
             "Marginal: within the limits, but masses are too uncertain or doubtful to rely on it; highest "
             "utilisation: {use}."
         ),
         "dynamics.marginal#open": (
-            "Within the limits that are known, but not everything was examined; highest utilisation: {use}."
+            "Within the limits that are stated, but not everything was examined; highest utilisation: {use}."
         ),
         "dynamics.overload": Plural(
             "count",

@@ -82,7 +82,7 @@ TEXTS = texts(
         "jerk_too_great#step": "J{joint}'s acceleration has a step; its jerk limit is {able:g} {unit}/s³",
         "rate_needed#value": "J{joint} needs {needed:.0f} of {limit:g} {unit}",
         "rate_needed#far": "J{joint} needs more than {times:g} times its {limit:g} {unit}",
-        "rate_limits#known": "the known limits",
+        "rate_limits#known": "the stated limits",
         "rate_limits#assumed": "the assumed limits",
         "times_needed#speed": "{times} × its speed",
         "times_needed#acceleration": "{times} × its acc.",

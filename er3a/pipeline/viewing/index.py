@@ -8,6 +8,7 @@ and attributes follow Jenkins' schema ``junit-10.xsd``.
 
 from __future__ import annotations
 
+import json
 import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator, Mapping, Sequence, Set
@@ -496,8 +497,7 @@ OF_ALL_RUNS = (  # what may turn any of them unsafe
 )
 MAX_TALLIED = 3  # that do not pass, though nothing expects it, and are named beside their number
 MAX_FAULTS = 20  # of a robot's paths, and of its programs, that are listed
-PLACE_LETTERS = 160
-VOID_TAGS = ("br", "img", "input", "wbr", "hr")
+INLINE = ("a", "b", "code", "em", "i", "mark", "span", "strong", "sub", "sup", "wbr")  # no blank before or behind
 _NOT_READ = re.compile(r'<(script|style)\b.*?</\1>|\ssrc="data:[^"]*"|\sdata-[\w-]+="[^"]*"', re.DOTALL)
 FIRST = ("fail", "conflict", "caution", "no_reference", "not_computed", "pass")  # what is open stands first
 
@@ -513,10 +513,12 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         _entry(study, name, results / name) | {"thumbnail": thumbnail(study.robot(name), workspaces[name])}
         for name in study.robots
     ]
+    write_compare(study, results, workspaces, folder / "compare.html")
+    contradicted = {each["robot"].name for each in robots if each["table"] == "fail"}
     page.render(
         Path(__file__).with_name("index.html.j2"),
         folder / "index.html",
-        places=list(_places(study, folder, {each["robot"].name for each in robots if each["table"] == "fail"})),
+        places=page.packed_text(json.dumps([*_places(study, folder, contradicted)], ensure_ascii=False)),
         robots=robots,
         entries_legend=verdict_legend(
             status for each in robots if each["entries"] for status in each["entries"]["statuses"]
@@ -535,66 +537,77 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
             seed=study.seed,
         ),
     )
-    write_compare(study, results, workspaces, folder / "compare.html")
     write_junit(read_verdicts(study, results), folder / "junit.xml")
 
 
-class _PlacesOfPage(HTMLParser):
-    """Texts by which a reader finds a place of a page: its verdict, headings, captions, and the first cells of rows."""
+class _TextOfPage(HTMLParser):
+    """All text of a page's main part, folded or not: by heading, in the page's order, that of each block and row."""
 
-    NAMED = ("h2", "h3", "caption", "figcaption")
+    ROWS = ("caption", "table", "tr")
+    TEXTS = ("dl", "dt", "h2", "h3", "li", "ol", "p", "pre", "ul")
+    BLOCKS = frozenset((*ROWS, *TEXTS, "details", "div", "figcaption", "figure", "img", "main", "section", "summary"))
+    NOT_READ = frozenset(("button", "nav", "select", "svg", "thead"))
 
     def __init__(self) -> None:
         super().__init__()
-        self.texts: dict[str, None] = {}
-        self._depth, self._cells, self._parts, self._unexamined = 0, 0, list[str](), False
+        self.texts: dict[str, dict[str, None]] = {}
+        self._heads = {"h2": "", "h3": ""}
+        self._depth = dict.fromkeys(("main", "tr", *self.NOT_READ), 0)
+        self._parts, self._unexamined = list[str](), False
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self._unexamined |= dict(attrs).get("id") == "table-not-examined"
-        if tag == "tr":
-            self._cells = 0
-        elif tag in ("td", "th"):
-            self._cells += 1
-        verdict = tag == "section" and "verdict" in (dict(attrs).get("class") or "")
-        if self._depth or verdict or tag in self.NAMED or (tag == "td" and self._cells == 1):
-            self._depth += tag not in VOID_TAGS
-            if tag == "td" and self._unexamined:
-                self._parts = [tr("not examined"), tr(": ")]
+        named = dict(attrs)
+        self._between(tag)
+        if tag in self._depth:
+            self._depth[tag] += 1
+        self._unexamined |= named.get("id") == "table-not-examined"
+        if tag == "tr" and self._unexamined:
+            self._parts = [tr("not examined"), tr(": ")]
+        self.handle_data(named.get("alt") or "")
 
     def handle_endtag(self, tag: str) -> None:
+        if tag in self._depth:
+            self._depth[tag] -= 1
+        if tag in self._heads:
+            self._heads |= {"h3": ""} | {tag: " ".join("".join(self._parts).split())}
+        self._between(tag)
         self._unexamined &= tag != "table"
-        if not self._depth or tag in VOID_TAGS:
-            return
-        self._depth -= 1
-        if self._depth == 0:
-            text = " ".join("".join(self._parts).split())
-            self._parts = []
-            self.texts[text if len(text) <= PLACE_LETTERS else text[: PLACE_LETTERS - 1] + "…"] = None
-        elif tag in ("p", "small", "a", "dt", "dd"):
-            self._parts.append(" ")
 
     def handle_data(self, data: str) -> None:
-        if self._depth:
+        if self._depth["main"] and not any(self._depth[tag] for tag in self.NOT_READ):
             self._parts.append(data)
 
+    def _between(self, tag: str) -> None:
+        """Where a block begins or ends, what came before is one text; cells and what is in them stay in their row's."""
+        if tag not in self.BLOCKS or self._depth["tr"]:
+            self._parts.append("" if tag in INLINE else " ")
+            return
+        text = " ".join("".join(self._parts).split())
+        if len(text) > 1:
+            self.texts.setdefault(joined([*filter(None, self._heads.values())], " "), {})[text] = None
+        self._parts = []
 
-def _places(study: Study, folder: Path, contradicted: Set[str]) -> Iterator[tuple[str, str, list[str]]]:
-    """Of each page that is there its address, its title, and where a reader's words may stand on it; a title says which
-    robots' tables evidence contradicts."""
-    pages = [(name, stage) for name in study.names for stage in study.pages(name) if stage != "teach"]
+
+def _places(
+    study: Study, folder: Path, contradicted: Set[str]
+) -> Iterator[tuple[str, str, list[tuple[str, list[str]]]]]:
+    """Of each page that is there its address, its title, and by heading all of its text; a title says which robots'
+    tables evidence contradicts."""
+    pages = [(name, stage) for name in study.names for stage in study.pages(name)]
     warned = {name: tr("never use this table") if name in contradicted else "" for name in study.names}
     titles = {name: bracketed(own_title(study.robot(name).title), warned[name]) for name in study.names}
     named = {
         f"{name}/{stage}.html": tr("{robot}: {page}", robot=titles[name], page=tr(PAGES[stage]))
         for name, stage in pages
     }
+    named["compare.html"] = tr("Two robots")
     if study.article:
         named["article.html"] = tr("The article, item by item")
     for address, title in named.items():
         if (folder / address).is_file():
-            parser = _PlacesOfPage()
+            parser = _TextOfPage()
             parser.feed(_NOT_READ.sub("", (folder / address).read_text(encoding="utf-8")))
-            yield address, title, [text for text in parser.texts if len(text) > 1]
+            yield address, title, [(head, list(texts)) for head, texts in parser.texts.items()]
 
 
 def _workspace(folder: Path) -> WorkspaceResults | AbsentResults | None:

@@ -21,10 +21,10 @@ function textOf(cell) {
 }
 
 const NUMBER = /[+−-]?\d+(?:\u202f\d{3})*(?:\.\d+)?(?:·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+|e[+−-]?\d+)?/u;
-const LEADING = new RegExp(`^(?:[^\\d:：=]*[:：=])?[^\\p{L}\\d+−-]*(${NUMBER.source})(?![\\p{L}\\d_.-])`, "u");
+const LEADING = new RegExp(`^(?:[^\\d:：=()（）.,;]{0,20}[:：=])?\\s*(?:${WORDS.bounds})?[^\\p{L}\\d+−-]*(${NUMBER.source})(?![\\p{L}\\d_.-])`, "u");
 
-// The number that a cell begins with, after a mark or its name ("t = 4 s") and before a unit, a spread or words; NaN if
-// it begins otherwise.
+// The number that a cell begins with, after a mark, its name ("t = 4 s") or "at least", and before a unit, a spread or
+// words; NaN if it begins otherwise.
 function valueOf(text) {
   const exact = numberIn(text);
   const found = Number.isNaN(exact) && LEADING.exec(text);
@@ -38,10 +38,10 @@ function gravity(cell) {
   return GRAVEST.findIndex((status) => shown?.classList.contains(status));
 }
 
-// What each row of a column sorts by: if most cells begin with a number, that.
+// What each row of a column sorts by: if most cells with a number begin with it, that.
 function sortedBy(texts) {
-  const filled = texts.filter((text) => text !== "" && text !== "–");
-  const numeric = 2 * filled.filter((text) => !Number.isNaN(valueOf(text))).length > filled.length;
+  const numbered = texts.filter((text) => /\d/.test(text));
+  const numeric = 2 * numbered.filter((text) => !Number.isNaN(valueOf(text))).length > numbered.length;
   return texts.map((text) => [text, (numeric ? valueOf : numberIn)(text)]);
 }
 
@@ -338,7 +338,10 @@ function filterFor(table) {
     else address.searchParams.delete(number);
     history.replaceState(null, "", address);
   });
-  if (field.value) filter();
+  if (field.value) {
+    unfold(table); // first: Chromium leaves room for nothing in a fold that is opened after its rows were measured
+    filter();
+  }
   return box;
 }
 
@@ -429,9 +432,11 @@ function addFinder() {
     if (!words.length) open = null;
     dispatchEvent(new Event("resize")); // for what takes its size from what was not there
   };
+  const findAnywhere = () => (places ? find() : loadPlaces().then(find));
   field.addEventListener("input", () => {
-    find();
+    findAnywhere();
     const address = new URL(location.href);
+    address.searchParams.delete("at");
     if (field.value) address.searchParams.set("find", field.value);
     else address.searchParams.delete("find");
     history.replaceState(null, "", address);
@@ -448,32 +453,68 @@ function addFinder() {
     field.dispatchEvent(new Event("input"));
     document.getElementById(decodeURIComponent(location.hash.slice(1))).scrollIntoView();
   });
-  if (field.value) find();
+  if (!field.value) return;
+  findAnywhere();
+  goToPlace(main);
 }
 
 const SHOWN_PLACES = 4;
-let places = null; // of all pages, by page: its address, its title, texts
+const SHOWN_LETTERS = 160;
+const BEGINNING = 60; // letters by which an address names a place
+const PLACES = "h2, h3, summary, caption, figcaption, p, li, dt, dd, tr, img, div";
+let places = document.getElementById("places") ? null : []; // of all pages, by page: its address, its title, texts with what they are sought in
 
-// What other pages have that holds all words, by page.
+async function loadPlaces() {
+  const pages = await (await unpacked(document.getElementById("places").textContent)).json();
+  places = pages.map(([address, title, parts]) => {
+    const texts = parts.flatMap(([head, own]) => own.map((text) => ({ text, letters: sought(text), above: sought(`${title} ${head}`) })));
+    return { address, title, whole: sought(title), texts };
+  });
+}
+
+// What other pages have that holds all words, at least one of them itself and the others in a heading above it, by page.
+// Words that a page's title has lead to the page.
 function placesElsewhere(words) {
-  const listed = document.getElementById("places");
-  places ??= listed ? JSON.parse(listed.textContent) : [];
-  const holds = (text) => words.every((word) => sought(text).includes(word));
-  const found = places.map(([address, title, texts]) => ({
-    address, title, texts: texts.filter((text) => holds(`${title} ${text}`)),
-  }));
+  const holds = ({ letters, above }) => words.every((word) => letters.includes(word) || above.includes(word)) && words.some((word) => letters.includes(word));
+  const found = places.map(({ address, title, whole, texts }) => {
+    const held = texts.filter(holds).map(({ text }) => text);
+    return { address, title, texts: held.length || !words.every((word) => whole.includes(word)) ? held : [title] };
+  });
   return found.filter(({ texts }) => texts.length);
 }
 
-// A link to a page, which looks for the words there.
+// Of a long text the part with the first word that it holds.
+function excerpt(text, words) {
+  const at = Math.max(0, Math.min(...words.map((word) => sought(text).indexOf(word)).filter((place) => place >= 0)) - SHOWN_LETTERS / 3);
+  const from = Number.isFinite(at) && text.length > SHOWN_LETTERS ? Math.floor(at) : 0;
+  return (from ? "…" : "") + text.slice(from, from + SHOWN_LETTERS) + (from + SHOWN_LETTERS < text.length ? "…" : "");
+}
+
+const squeezed = (text) => text.replace(/\s+/g, "");
+
+// Links to a page, which looks for the words there, and to the first places that have them.
 function linkTo({ address, title, texts }, words) {
   const item = document.createElement("li");
-  const link = document.createElement("a");
-  link.href = `${address}?find=${encodeURIComponent(words.join(" "))}`;
-  link.textContent = title;
-  const more = texts.length > SHOWN_PLACES ? ` … (${texts.length})` : "";
-  item.append(link, `${WORDS.colon}${texts.slice(0, SHOWN_PLACES).join(" · ")}${more}`);
+  const link = (text, place) => {
+    const made = document.createElement("a");
+    const asked = new URLSearchParams({ find: words.join(" "), ...(place && { at: squeezed(place).slice(0, BEGINNING) }) });
+    made.href = `${address}?${asked}`;
+    made.textContent = text;
+    return made;
+  };
+  const shown = texts.slice(0, SHOWN_PLACES).flatMap((text) => [" · ", link(excerpt(text, words), text)]).slice(1);
+  item.append(link(title), WORDS.colon, ...shown, texts.length > SHOWN_PLACES ? ` … (${texts.length})` : "");
   return item;
+}
+
+// Where the text begins that the address names.
+function goToPlace(main) {
+  const beginning = new URLSearchParams(location.search).get("at");
+  const begins = (part) => squeezed(allText(part)).startsWith(beginning);
+  const place = beginning && [...main.querySelectorAll(PLACES)].find((part) => part.checkVisibility() && begins(part));
+  if (!place) return;
+  place.classList.add("sought");
+  place.scrollIntoView({ block: "center" });
 }
 
 // A table that goes on beyond its right edge fades there.
@@ -619,10 +660,13 @@ function showOneOf(group) {
 // What an address leads to may be folded, or inside of what is.
 function unfoldTarget() {
   const aim = document.getElementById(decodeURIComponent(location.hash.slice(1)));
-  let folded = aim?.closest("details:not([open])");
-  if (!folded) return;
-  for (; folded; folded = folded.parentElement.closest("details")) folded.open = true;
+  if (!aim?.closest("details:not([open])")) return;
+  unfold(aim);
   aim.scrollIntoView();
+}
+
+function unfold(part) {
+  for (let fold = part.closest("details"); fold; fold = fold.parentElement.closest("details")) fold.open = true;
 }
 
 // Back leads to where one was: what was unfolded, and how far down.
@@ -737,10 +781,15 @@ for (const figure of document.querySelectorAll("figure")) {
   image.after(tools);
 }
 
+// What travels packed.
+async function unpacked(text) {
+  const packed = await fetch(`data:application/gzip;base64,${text}`);
+  return new Response(packed.body.pipeThrough(new DecompressionStream("gzip")));
+}
+
 // A file that travels packed in its link is saved as it is.
 async function save(link) {
-  const packed = await fetch(`data:application/gzip;base64,${link.dataset.packed}`);
-  const text = await new Response(packed.body.pipeThrough(new DecompressionStream("gzip"))).blob();
+  const text = await (await unpacked(link.dataset.packed)).blob();
   const saved = Object.assign(document.createElement("a"), { href: URL.createObjectURL(text), download: link.download });
   saved.click();
   URL.revokeObjectURL(saved.href);

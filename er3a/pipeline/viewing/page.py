@@ -83,15 +83,16 @@ SCRIPT_WORDS = {
     "contents": N_("Contents"),
     "filter": N_("Filter rows by"),
     "find": N_("Find on this page"),
-    "findAnywhere": N_("Find verdicts, headings, rows"),
+    "findAnywhere": N_("Find on all pages"),
     "found": N_("{count} places"),
     "none": N_("Nothing has all these words: try fewer, or others"),
-    "noneAnywhere": N_("No verdict, heading or name of a row has all these words: try fewer, or look on a page"),
+    "noneAnywhere": N_("No page has all these words in one place: try fewer, or others"),
     "link": N_("link to this section"),
     "previous": N_("Previous"),
     "next": N_("Next"),
     "all": N_("all at once"),
     "colon": N_(": "),
+    "bounds": N_("at least|at most|up to|about"),  # words before a number by which cells are sorted all the same
 }
 
 

@@ -254,10 +254,10 @@ def _other(evidence: TableEvidence) -> dict[str, Any] | None:
         for kind in kinds:
             each = by_name.get(f"{kind}{joint}")
             if each is None:  # a limit of a joint that turns on and on
-                cells.append(("–", False, ""))
+                cells.append(("–", False, "", ""))
                 continue
             value = _other_value(found, each)
-            cells.append((_plain(value), abs(value - (each.value or 0.0)) > DIFFERS, ""))
+            cells.append((_plain(value), abs(value - (each.value or 0.0)) > DIFFERS, "", ""))
         rows.append((joint, cells))
     title, text = (word(found.code, words, found.code) for words in (OTHER_TITLES, OTHER_TEXTS))
     return dict(title=title, text=text, page="", columns=[tr(COLUMNS[kind]) for kind in kinds], rows=rows)
@@ -281,6 +281,13 @@ def _gives(each: EntryEvidence, evidence: TableEvidence) -> str:
         return ""
     value = _other_value(found, each)
     return _plain(value) if abs(value - (each.value or 0.0)) > DIFFERS else ""
+
+
+def _alone(each: EntryEvidence) -> str:
+    """Another value that an open entry may have though all others are right; empty where it has none."""
+    readings = [reading for reading in each.alternatives if reading.off.moves and not reading.excluded_by]
+    values = [dict(reading.entries) for reading in readings if each.status == "open"]
+    return next((_plain(value[each.entry]) for value in values if value.keys() == {each.entry}), "")
 
 
 def _allowed(evidence: TableEvidence) -> str:
@@ -310,10 +317,11 @@ def rounded_within(value: float, each: EntryEvidence) -> float:
 
 
 def table_to_use(robot: Robot, other: Robot, unconfirmed: str, evidence: TableEvidence | None) -> dict[str, Any]:
-    """The whole table of another robot of the study, limits included, as its file gives it: by joint its values, and
-    whether they differ, which is marked where both tables are of one convention. ``unconfirmed``: what of it nothing
-    settles; ``evidence``: of its entries, of which those that are not settled are marked."""
-    known = {each.entry: each.status for each in evidence.entries} if evidence else {}
+    """The whole table of another robot of the study, limits included, as its file gives it: by joint its values,
+    whether they differ, which is marked where both tables are of one convention, and what an open one may be as well.
+    ``unconfirmed``: what of it nothing settles; ``evidence``: of its entries, of which those that are not settled are
+    marked."""
+    known = {each.entry: each for each in evidence.entries} if evidence else {}
     kinds = [kind for kind in OTHER_COLUMNS if kind != "beta" or other.beta.any()]
     comparable = robot.convention == other.convention and robot.rows == other.rows and robot.joints == other.joints
     rows = []
@@ -321,13 +329,14 @@ def table_to_use(robot: Robot, other: Robot, unconfirmed: str, evidence: TableEv
         cells = []
         for kind in (*kinds, *LIMITS):
             if kind in LIMITS and k >= other.joints:
-                cells.append(("–", False, ""))
+                cells.append(("–", False, "", ""))
                 continue
             unit = MM if kind in LIMITS and other.slides[k] else IN_UNIT[kind]
             value = round(float(getattr(other, kind)[k]) * unit, 3)
             differs = comparable and abs(value - float(getattr(robot, kind)[k]) * unit) > DIFFERS
-            status = known.get(f"{kind}{k + 1}", "settled")
-            cells.append((_plain(value), differs, "" if status in SETTLED else _mark(status)))
+            each = known.get(f"{kind}{k + 1}")
+            mark = "" if each is None or each.status in SETTLED else _mark(each.status)
+            cells.append((_plain(value), differs, _alone(each) if each else "", mark))
         rows.append((k + 1, cells))
     source = other.sources.get("dh")
     parts = [tr("Source: {source}.", source=own_title(source.source))] if source else []
@@ -365,7 +374,7 @@ def _cell(each: EntryEvidence | None, evidence: TableEvidence, unconfirmed: Set[
     shown = dict(
         entry=each.entry, value=_value(each), status="consistent" if of_one else each.status, mark=mark, title=title
     )
-    gives = _gives(each, evidence)
+    gives = _gives(each, evidence) or _alone(each)
     alone = gives and each.status == "contradicted" and each.entry in unconfirmed
     return shown | dict(gives=f"{gives} {_mark('consistent')}" if alone else gives)
 

@@ -268,7 +268,6 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
         output,
         head=_head(stored, instead),
         robot=robot,
-        fold=contradicted,
         to_use=table_to_use(robot, study.robot(instead), unsettled, known) if instead else None,
         table_evidence=evidence_section(robot, summary.evidence, known),
         frames=_frames_picture(robot, summary),
