@@ -371,6 +371,7 @@ MIN_SPREAD = np.radians(1.0)
 LITTLE_TURN, LITTLE_SPREAD = np.radians(15), np.radians(10)
 EXCLUDED = 1e-3
 CONFIDENCE = 0.95
+CONTRADICTED = 1e-3  # probability of touched points as far off, below which they contradict the calibration
 MAX_FACTS = 10
 EXTRA_ROUNDS = 20
 SURE_SCALE = 3.0  # half widths of its interval, from 0; a vaguer factor comes of samples that don't fit at all
@@ -412,6 +413,14 @@ class TouchCheck(ByValue):
     difference: Reals
     half_width: Reals
     probability: float
+
+    @property
+    def contradiction(self) -> vision_findings.TouchContradicts | None:
+        """That the points contradict the calibration, if they do."""
+        if self.probability >= CONTRADICTED:
+            return None
+        largest = 1000 * float(np.linalg.norm(self.difference, axis=1).max())
+        return vision_findings.TouchContradicts(len(self.difference), largest, self.probability)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -337,7 +337,8 @@ def hand_eye(
                 [hand_eye_lines(found, offset, boardless), *sample_lines, *(correction_lines(table) if table else [])]
             )
         )
-    if grave_warnings(found.warnings) or found.directions[0].status == "excluded":
+    touched_elsewhere = found.touch is not None and found.touch.contradiction is not None
+    if grave_warnings(found.warnings) or found.directions[0].status == "excluded" or touched_elsewhere:
         raise typer.Exit(1)
 
 
