@@ -250,7 +250,7 @@ class HandEyeFile(StrictModel):
         if (self.samples is None) == (self.streams is None):
             raise ValueError("samples and streams: only one of the two is allowed, and one is needed | Give one")
         if self.streams and self.images:
-            raise ValueError("images: streams hold no images, only board poses | Give samples with images, or remove it")
+            raise ValueError("images: streams hold board poses, no images | Give samples with images, or remove it")
         if self.flange_standard_deviation and not (self.camera_standard_deviation or self.images):
             raise ValueError(
                 "flange_standard_deviation: can't be used while the camera's is estimated from the same residuals | "

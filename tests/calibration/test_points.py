@@ -29,7 +29,14 @@ from er3a.files.robot_writer import write_robot
 from er3a.geometry.transforms import rot_x, rot_y, translation
 from er3a.kinematics.chain import row_values
 from er3a.pipeline.cli import app
-from er3a.pipeline.messages.calibration import bar_texts, held_back_line, idle_texts
+from er3a.pipeline.messages.calibration import (
+    bar_texts,
+    calibration_record,
+    held_back_line,
+    held_back_warning,
+    idle_texts,
+    lines_of,
+)
 from er3a.pipeline.messages.say import say
 from er3a.robots.joint_limits import shown
 from er3a.robots.masses import GRAVITY
@@ -391,6 +398,36 @@ def test_an_interval_settles_a_table_whose_lengths_are_all_strokes():
     arm = gantry().replace(d=np.zeros(4))
     assert settles(arm, "mm", 1.0)
     assert not settles(arm, "mm", 400.0)
+
+
+@pytest.mark.long
+def test_held_back_positions_that_contradict_the_fit_are_told_first(random):
+    """Others of the same arm; the same from 3 mm beside, as of another frame or tool point; and far from all fitted."""
+    bench = Bench("six", random)
+    rows = bench.measured(40, 0.05)
+    found = er3a.calibrate(bench.robot, rows)
+    inside = [each for each in bench.measured(20, 0.05) if np.abs(each.pose).max() < 100]
+    beside = [replace(each, xyz_mm=tuple(np.add(each.xyz_mm, (3, 0, 0)))) for each in inside]
+    assert not held_back_warning(found, rows, inside)
+    (warning,) = held_back_warning(found, rows, beside)
+    assert lines_of(found, rows, beside).startswith(f"{len(inside)} positions held back contradict the calibration")
+    assert warning == calibration_record(found, bench.robot, rows, beside)["held_back_warning"]
+    near = [each for each in rows if each.pose[0] < 0]
+    (warning,) = held_back_warning(found, near, [each for each in beside if each.pose[0] > 0])
+    assert warning.startswith("The calibration does not hold beyond the fitted joint values")
+
+
+@pytest.mark.long
+def test_two_lines_whose_points_are_swapped_are_set_aside(random):
+    """They are so far out that no fit of all lines ends."""
+    bench = Bench("six", random)
+    rows = bench.measured(60, 0.05)
+    far = max(range(1, 60), key=lambda k: np.linalg.norm(np.subtract(rows[k].xyz_mm, rows[0].xyz_mm)))
+    points = rows[0].xyz_mm, rows[far].xyz_mm
+    rows[0], rows[far] = replace(rows[0], xyz_mm=points[1]), replace(rows[far], xyz_mm=points[0])
+    found = er3a.calibrate(bench.robot, rows)
+    assert [each.row for each in found.outliers] == [2, far + 2]
+    assert bench.error(found) < 0.1
 
 
 def test_a_worst_position_beyond_all_fitted_poses_is_named():

@@ -232,7 +232,7 @@ def calibrate(
     name = output.stem if output else f"{arm.name}_calibrated"
     alone = " (without terms beyond a robot file)" if found.beyond else ""
     corrected = found.robot.replace(name=name, title=f"{found.robot.title}, calibrated{alone}")
-    record = {"output": str(output) if output else None, **calibration_record(found, arm, others)}
+    record = {"output": str(output) if output else None, **calibration_record(found, arm, rows, others)}
     model = _write_calibrated(corrected, record, output) if output else None
     if html or rrd:
         from er3a.pipeline.viewing.calibration import measured_errors, record_calibration, write_calibration
@@ -246,7 +246,7 @@ def calibrate(
     if as_json:
         options.print_json(record)
         return
-    print(lines_of(found))
+    print(lines_of(found, rows, others))
     if others:
         print("\n".join(held_back_lines(found, rows, others)))
     for written in (html, rrd):
