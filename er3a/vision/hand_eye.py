@@ -643,11 +643,24 @@ def _warnings(
 
 
 def board_scale(samples: calibration_set.CalibrationSet, refined: Refined) -> tuple[float, float]:
-    """The factor by which distances seen have to grow to fit best, and half its 95 % interval."""
-    seen = np.concatenate([samples.target[:, :3, 3], np.zeros((len(samples), 3))], axis=1)
+    """The factor by which distances seen have to grow to fit best, and half its 95 % interval.
+
+    Errors that all samples share count too: a focal length estimated from the same images scales all distances.
+    """
+    factor, half_width = _scale_of(samples.target, samples, refined)
+    if samples.shared is not None:
+        shifted = (moved(samples.target, error) for error in np.moveaxis(samples.shared, 2, 0))
+        shifts = [_scale_of(target, samples, refined)[0] - factor for target in shifted]
+        half_width = float(np.hypot(half_width, scipy.special.ndtri((1 + CONFIDENCE) / 2) * np.linalg.norm(shifts)))
+    return factor, half_width
+
+
+def _scale_of(target: Reals, samples: calibration_set.CalibrationSet, refined: Refined) -> tuple[float, float]:
+    """The factor for board poses (N, 4, 4), and half its 95 % interval by their residuals."""
+    seen = np.concatenate([target[:, :3, 3], np.zeros((len(target), 3))], axis=1)
 
     def grown(X: Reals, Y: Reals, s: float) -> tuple[Reals, Reals, Reals]:
-        B = samples.target.copy()
+        B = target.copy()
         B[:, :3, 3] *= 1 + s
         return *residuals(samples.hand, B, X, Y), seen
 

@@ -342,6 +342,22 @@ def test_the_command_tells_positions_held_back(tmp_path):
         er3a.load_calibration(tmp_path / "mine.yaml", robot)
 
 
+def test_a_table_of_which_nothing_is_settled_is_not_written(tmp_path, random):
+    """Three positions in a tracker's frame: their fit takes lengths of metres for what its place does."""
+    robot = load_robot("er3_600")
+    q = random.uniform(-1, 1, (3, 6))
+    T = translation(1.5, -0.4, 0.3) @ rot_x(0.1) @ rot_y(1.0) @ er3a.forward(robot, q)
+    rows = [",".join(map(str, [*np.degrees(one), "flange", *xyz])) for one, xyz in zip(q, 1000 * T[:, :3, 3])]
+    header = ",".join([f"q{k}_deg" for k in range(1, 7)] + ["point", "x_mm", "y_mm", "z_mm"])
+    (tmp_path / "three.csv").write_text("\n".join([header, *rows]) + "\n")
+    words = ["calibrate", "er3_600", str(tmp_path / "three.csv"), "--output", str(tmp_path / "mine.yaml")]
+    done = CliRunner().invoke(app, words)
+    assert "settle 0 of" in done.output
+    assert isinstance(done.exception, Er3aError)
+    assert "not written, as these measurements settle none of the table's numbers" in str(done.exception)
+    assert not list(tmp_path.glob("mine*"))
+
+
 def bare_record(robot: er3a.Robot) -> dict:
     term = {"kind": "once", "joint": 2, "turns": 0, "by": 0, "coefficients": [1.0, 2.0]}
     entry = {"name": "d1", "nominal": 1000 * robot.d[0], "correction": 2.0}
