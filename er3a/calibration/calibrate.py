@@ -30,12 +30,14 @@ from er3a.calibration.cross_validation import (
     tilts_explain,
 )
 from er3a.calibration.fit import (
+    MIN_ALIGNED,
     PLAUSIBLE,
     ROUNDING,
     SCALE,
     BarLength,
     Fit,
     Subspace,
+    aligned,
     bar_lengths,
     covariance_by_poses,
     fit,
@@ -60,6 +62,7 @@ from er3a.calibration.outcomes import (
 )
 from er3a.calibration.parameters import (
     LEVELS,
+    MM,
     Parameter,
     corrected,
     coupled,
@@ -778,9 +781,13 @@ def _without_outliers(robot: Robot, every: PointObservations) -> Flags:
         try:
             found = _fitted(robot, choose_level(robot, observations.merged()), observations)
         except CalibrationError:
-            if observations is every:
+            if observations is not every:
+                return all_used
+            used = _near_table(robot, every)
+            if used.all() or (~used).mean() > MAX_OUTLIER_SHARE:
                 raise
-            return all_used
+            observations = every.take(used)
+            continue
         if len(found.after) <= 2 * len(found.kept):
             return all_used
         off = found.after * observations.deviation_mm
@@ -792,6 +799,23 @@ def _without_outliers(robot: Robot, every: PointObservations) -> Flags:
         if (~used).mean() > MAX_OUTLIER_SHARE:
             return all_used
         observations = observations.take(~far)
+
+
+def _near_table(robot: Robot, every: PointObservations) -> Flags:
+    """Points (P,) without those that are far out if only the base is moved, by the median of all: some are off by so
+    much that no fit of all ends. Points without all coordinates count as near."""
+    near = every.seen.all(axis=1) & (every.touched < 0)
+    whole, used = every.take(near), np.ones(near.sum(), dtype=bool)
+    points, measured = whole.positions(robot), whole.values_mm.reshape(-1, 3) / MM
+    for _ in range(OUTLIER_ROUNDS):
+        if used.sum() < MIN_ALIGNED:
+            return np.ones(len(near), dtype=bool)
+        S = aligned(points[used], measured[used])[0]
+        off = np.linalg.norm(points @ S[:3, :3].T + S[:3, 3] - measured, axis=1)
+        used = off <= FAR_OUT * MEDIAN_TO_DEVIATION * np.median(off)
+    found = np.ones(len(near), dtype=bool)
+    found[near] = used
+    return found
 
 
 def _out_of(observations: PointObservations, off_mm: Reals, usual_mm: Reals) -> Reals:

@@ -37,7 +37,7 @@ from er3a.numerics.si_units import in_si
 from er3a.robots.joint_limits import joint_columns, meant
 from er3a.robots.robot import Robot
 from er3a.vision.boards import Board, BoardlessImage, BoardNotFoundError, BoardViews, Camera, board_views
-from er3a.vision.calibration_set import CalibrationSet, Stream, TimeOffset, paired, time_offset
+from er3a.vision.calibration_set import SPAN_S, CalibrationSet, OffsetOpenError, Stream, TimeOffset, paired, time_offset
 
 FORMS: dict[str, tuple[str, ...]] = {
     **{name: TARGET_FORMS[name] for name in ("quaternion_wxyz", "rpy_deg", "matrix")},
@@ -249,6 +249,8 @@ class HandEyeFile(StrictModel):
     def _one_source_of_samples(self) -> Self:
         if (self.samples is None) == (self.streams is None):
             raise ValueError("samples and streams: only one of the two is allowed, and one is needed | Give one")
+        if self.streams and self.images:
+            raise ValueError("images: streams hold board poses, no images | Give samples with images, or remove it")
         if self.flange_standard_deviation and not (self.camera_standard_deviation or self.images):
             raise ValueError(
                 "flange_standard_deviation: can't be used while the camera's is estimated from the same residuals | "
@@ -287,7 +289,7 @@ def read_calibration(
     if head.streams is not None:
         hand = _stream(path.parent / head.streams.flange, "flange", robot)
         eye = _stream(path.parent / head.streams.target, "target", robot)
-        offset = time_offset(hand, eye, head.streams.widest_s)
+        offset = _offset(path, hand, eye, head.streams.widest_s)
         flange, target, times = paired(hand, eye, offset.offset, STREAM_SAMPLES)
         names, q = tuple(f"{t:.3f} s" for t in times), None
     else:
@@ -419,6 +421,25 @@ def _stream(table: Path, name: str, robot: Robot | None) -> Stream:
     flange = name == "flange"
     T = _flange(table, rows, header, robot)[0] if flange else poses_of(table, rows, name, _form(table, header, name))
     return Stream(t, T)
+
+
+def _offset(path: Path, hand: Stream, eye: Stream, widest: float) -> TimeOffset:
+    try:
+        return time_offset(hand, eye, widest)
+    except OffsetOpenError as error:
+        if error.end is not None:
+            problem = f"turns of arm and camera agree best at {error.end:.3g} s, an end of the range searched"
+            remedy = "Write a larger value, or check that both tables are of one recording"
+            raise InputError(path, "streams.widest_s", problem, remedy) from None
+    times = "; ".join(
+        f"{name}: {stream.t[0]:.10g} to {stream.t[-1]:.10g} s, {len(stream.t)} rows"
+        for name, stream in (("flange", hand), ("target", eye))
+    )
+    problem = (
+        f"the clocks can't be compared ({times}): it takes camera poses {SPAN_S:g} to {2 * SPAN_S:g} s apart while the "
+        f"arm was recorded for {widest:g} s (widest_s) before and after"
+    )
+    raise InputError(path, "streams", problem, "Record both for longer or more often, or make both t_s start together")
 
 
 def _touched(table: Path, robot: Robot | None = None) -> Reals:

@@ -15,7 +15,7 @@ import numpy as np
 import scipy
 
 from er3a.by_value import ByValue, Displayed, Sheet
-from er3a.errors import ShapeError
+from er3a.errors import Er3aError, ShapeError
 from er3a.geometry.transforms import check_poses, inverted, posed
 from er3a.numerics.arrays import Flags, Integers, Reals
 
@@ -103,6 +103,7 @@ GRID_S = 0.02
 SPAN_S = 0.4  # over which turns are compared
 INLIER = 3.0
 MAX_PAIRS = 2000
+MIN_PAIRS = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,10 +124,25 @@ class TimeOffset:
     pairs: int
 
 
+class OffsetOpenError(Er3aError):
+    """Two streams leave their offset open: ``pairs`` of the camera's poses can be compared with the arm's, which are
+    too few, or the best offset is the ``end`` of the range that was searched, s."""
+
+    def __init__(self, pairs: int, end: float | None = None):
+        self.pairs, self.end = pairs, end
+        too_few = f"only {pairs} pairs of poses can be compared, and it takes {MIN_PAIRS}"
+        super().__init__(too_few if end is None else f"the best offset, {end:.3g} s, is an end of the range searched")
+
+
 def time_offset(hand: Stream, eye: Stream, widest: float) -> TimeOffset:
     """Estimate the offset within +-``widest`` s.
 
     Robust: up to half of the compared rotations may be wrong.
+
+    Raises
+    ------
+    OffsetOpenError
+        if the streams have too little time in common, or the offset is not within the range
     """
     arm = scipy.spatial.transform.Slerp(hand.t, scipy.spatial.transform.Rotation.from_matrix(hand.T[:, :3, :3]))
     later = np.searchsorted(eye.t, eye.t + SPAN_S)
@@ -139,6 +155,8 @@ def time_offset(hand: Stream, eye: Stream, widest: float) -> TimeOffset:
     low, high = eye.t[first] - widest > hand.t[0], eye.t[last] + widest < hand.t[-1]
     kept = low & high
     first, last, turned = first[kept], last[kept], turned[kept]
+    if len(first) < MIN_PAIRS:
+        raise OffsetOpenError(len(first))
 
     def off(offset: float) -> Reals:
         there = arm(eye.t[last] + offset) * arm(eye.t[first] + offset).inv()
@@ -153,6 +171,8 @@ def time_offset(hand: Stream, eye: Stream, widest: float) -> TimeOffset:
         return float(np.sum(np.minimum((off(offset) / scale) ** 2, INLIER**2)))
 
     found = float(scipy.optimize.minimize_scalar(cost, bounds=(best - GRID_S, best + GRID_S), method="bounded").x)
+    if abs(found) > widest - GRID_S:
+        raise OffsetOpenError(len(first), float(np.copysign(widest, found)))
     rest, slope = off(found), (off(found + 1e-3) - off(found - 1e-3)) / 2e-3
     inlier = np.abs(rest) < INLIER * scale
     deviation = np.sqrt((rest[inlier] ** 2).mean() / max((slope[inlier] ** 2).sum(), 1e-300))

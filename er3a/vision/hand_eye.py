@@ -371,6 +371,7 @@ MIN_SPREAD = np.radians(1.0)
 LITTLE_TURN, LITTLE_SPREAD = np.radians(15), np.radians(10)
 EXCLUDED = 1e-3
 CONFIDENCE = 0.95
+CONTRADICTED = 1e-3  # probability of touched points as far off, below which they contradict the calibration
 MAX_FACTS = 10
 EXTRA_ROUNDS = 20
 SURE_SCALE = 3.0  # half widths of its interval, from 0; a vaguer factor comes of samples that don't fit at all
@@ -412,6 +413,14 @@ class TouchCheck(ByValue):
     difference: Reals
     half_width: Reals
     probability: float
+
+    @property
+    def contradiction(self) -> vision_findings.TouchContradicts | None:
+        """That the points contradict the calibration, if they do."""
+        if self.probability >= CONTRADICTED:
+            return None
+        largest = 1000 * float(np.linalg.norm(self.difference, axis=1).max())
+        return vision_findings.TouchContradicts(len(self.difference), largest, self.probability)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -634,11 +643,24 @@ def _warnings(
 
 
 def board_scale(samples: calibration_set.CalibrationSet, refined: Refined) -> tuple[float, float]:
-    """The factor by which distances seen have to grow to fit best, and half its 95 % interval."""
-    seen = np.concatenate([samples.target[:, :3, 3], np.zeros((len(samples), 3))], axis=1)
+    """The factor by which distances seen have to grow to fit best, and half its 95 % interval.
+
+    Errors that all samples share count too: a focal length estimated from the same images scales all distances.
+    """
+    factor, half_width = _scale_of(samples.target, samples, refined)
+    if samples.shared is not None:
+        shifted = (moved(samples.target, error) for error in np.moveaxis(samples.shared, 2, 0))
+        shifts = [_scale_of(target, samples, refined)[0] - factor for target in shifted]
+        half_width = float(np.hypot(half_width, scipy.special.ndtri((1 + CONFIDENCE) / 2) * np.linalg.norm(shifts)))
+    return factor, half_width
+
+
+def _scale_of(target: Reals, samples: calibration_set.CalibrationSet, refined: Refined) -> tuple[float, float]:
+    """The factor for board poses (N, 4, 4), and half its 95 % interval by their residuals."""
+    seen = np.concatenate([target[:, :3, 3], np.zeros((len(target), 3))], axis=1)
 
     def grown(X: Reals, Y: Reals, s: float) -> tuple[Reals, Reals, Reals]:
-        B = samples.target.copy()
+        B = target.copy()
         B[:, :3, 3] *= 1 + s
         return *residuals(samples.hand, B, X, Y), seen
 

@@ -186,6 +186,14 @@ CalibrationWarning = (
 )
 
 
+class TouchContradicts(Finding):
+    """Touched points, held out of the calibration, are not where it puts them."""
+
+    points: int
+    largest_mm: float
+    probability: float
+
+
 MUCH_SCATTER = 3.0
 _GRAVE = (NoMajority, BoardScale, UnexplainedResiduals, MovedBetween, NotConverged, JointZero, *get_args(OtherReading))
 

@@ -29,7 +29,14 @@ from er3a.files.robot_writer import write_robot
 from er3a.geometry.transforms import rot_x, rot_y, translation
 from er3a.kinematics.chain import row_values
 from er3a.pipeline.cli import app
-from er3a.pipeline.messages.calibration import bar_texts, held_back_line, idle_texts
+from er3a.pipeline.messages.calibration import (
+    bar_texts,
+    calibration_record,
+    held_back_line,
+    held_back_warning,
+    idle_texts,
+    lines_of,
+)
 from er3a.pipeline.messages.say import say
 from er3a.robots.joint_limits import shown
 from er3a.robots.masses import GRAVITY
@@ -335,6 +342,22 @@ def test_the_command_tells_positions_held_back(tmp_path):
         er3a.load_calibration(tmp_path / "mine.yaml", robot)
 
 
+def test_a_table_of_which_nothing_is_settled_is_not_written(tmp_path, random):
+    """Three positions in a tracker's frame: their fit takes lengths of metres for what its place does."""
+    robot = load_robot("er3_600")
+    q = random.uniform(-1, 1, (3, 6))
+    T = translation(1.5, -0.4, 0.3) @ rot_x(0.1) @ rot_y(1.0) @ er3a.forward(robot, q)
+    rows = [",".join(map(str, [*np.degrees(one), "flange", *xyz])) for one, xyz in zip(q, 1000 * T[:, :3, 3])]
+    header = ",".join([f"q{k}_deg" for k in range(1, 7)] + ["point", "x_mm", "y_mm", "z_mm"])
+    (tmp_path / "three.csv").write_text("\n".join([header, *rows]) + "\n")
+    words = ["calibrate", "er3_600", str(tmp_path / "three.csv"), "--output", str(tmp_path / "mine.yaml")]
+    done = CliRunner().invoke(app, words)
+    assert "settle 0 of" in done.output
+    assert isinstance(done.exception, Er3aError)
+    assert "not written, as these measurements settle none of the table's numbers" in str(done.exception)
+    assert not list(tmp_path.glob("mine*"))
+
+
 def bare_record(robot: er3a.Robot) -> dict:
     term = {"kind": "once", "joint": 2, "turns": 0, "by": 0, "coefficients": [1.0, 2.0]}
     entry = {"name": "d1", "nominal": 1000 * robot.d[0], "correction": 2.0}
@@ -391,6 +414,36 @@ def test_an_interval_settles_a_table_whose_lengths_are_all_strokes():
     arm = gantry().replace(d=np.zeros(4))
     assert settles(arm, "mm", 1.0)
     assert not settles(arm, "mm", 400.0)
+
+
+@pytest.mark.long
+def test_held_back_positions_that_contradict_the_fit_are_told_first(random):
+    """Others of the same arm; the same from 3 mm beside, as of another frame or tool point; and far from all fitted."""
+    bench = Bench("six", random)
+    rows = bench.measured(40, 0.05)
+    found = er3a.calibrate(bench.robot, rows)
+    inside = [each for each in bench.measured(20, 0.05) if np.abs(each.pose).max() < 100]
+    beside = [replace(each, xyz_mm=tuple(np.add(each.xyz_mm, (3, 0, 0)))) for each in inside]
+    assert not held_back_warning(found, rows, inside)
+    (warning,) = held_back_warning(found, rows, beside)
+    assert lines_of(found, rows, beside).startswith(f"{len(inside)} positions held back contradict the calibration")
+    assert warning == calibration_record(found, bench.robot, rows, beside)["held_back_warning"]
+    near = [each for each in rows if each.pose[0] < 0]
+    (warning,) = held_back_warning(found, near, [each for each in beside if each.pose[0] > 0])
+    assert warning.startswith("The calibration does not hold beyond the fitted joint values")
+
+
+@pytest.mark.long
+def test_two_lines_whose_points_are_swapped_are_set_aside(random):
+    """They are so far out that no fit of all lines ends."""
+    bench = Bench("six", random)
+    rows = bench.measured(60, 0.05)
+    far = max(range(1, 60), key=lambda k: np.linalg.norm(np.subtract(rows[k].xyz_mm, rows[0].xyz_mm)))
+    points = rows[0].xyz_mm, rows[far].xyz_mm
+    rows[0], rows[far] = replace(rows[0], xyz_mm=points[1]), replace(rows[far], xyz_mm=points[0])
+    found = er3a.calibrate(bench.robot, rows)
+    assert [each.row for each in found.outliers] == [2, far + 2]
+    assert bench.error(found) < 0.1
 
 
 def test_a_worst_position_beyond_all_fitted_poses_is_named():

@@ -285,6 +285,15 @@ def test_speeds_and_zones(case, tmp_path):
     assert (found.zone.kind, found.zone.value, found.zone.text) == (zone.kind, pytest.approx(zone.value), zone.text)
 
 
+def test_a_timed_motion_is_written_without_the_share_of_the_motion_before(tmp_path):
+    """What VelSet scales may be timed motions as well."""
+    turned = "[[10,0,0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
+    body = f"VelSet 10,5000; MoveAbsJ home,vmax,fine,tool0; MoveAbsJ {turned},v100\\T:=2,fine,tool0;"
+    text = write_program(run(tmp_path, body, robot=ROBOT).listing(), "rapid", WriteOptions(ROBOT)).files[".mod"]
+    settings = re.findall(r"VelSet [\d.]+|\\T:=", text)
+    assert settings == ["VelSet 10.0", "VelSet 100", "\\T:="]
+
+
 RAMPS = {  # instructions, acceleration of a line behind them
     "none": ("", None),
     "share": ("AccSet 50,100;", Rate(0.5, "share")),

@@ -107,6 +107,16 @@ def test_the_verdict_names_the_nearest_target_and_the_paths_that_collide(results
     assert f" {', '.join(met)}. " in say(found)
 
 
+def test_a_path_that_collides_though_it_is_meant_to_be_run_is_no_pass(tmp_path):
+    content = study_with(samples=1000, rounds=0).model_dump()
+    text = Path(content["robots"][NAME]["paths"]).read_text(encoding="utf-8")
+    (tmp_path / "paths.yaml").write_text(text.replace("    expect: collides\n", ""), encoding="utf-8")
+    content["robots"][NAME]["paths"] = str(tmp_path / "paths.yaml")
+    verdict = compute(Study.model_validate(content), NAME).summary.verdict
+    assert (verdict.status, verdict.finding.code) == ("fail", "collision.free_space")
+    assert "line_collides (link 4 and post; not expected)" in say(verdict.finding)
+
+
 def test_of_branches_that_are_alike_the_chosen_one_is_named(results):
     """Branches are counted, not their turns, as the inverse page counts them."""
     chosen = {each.name: each.q_deg for each in results.summary.closest if each.kind == "target"}

@@ -29,7 +29,8 @@ from er3a.vision.boards import (
     views_of_corners,
 )
 from er3a.vision.calibration_set import CalibrationSet
-from er3a.vision.hand_eye import calibrate_hand_eye
+from er3a.vision.hand_eye import board_scale, calibrate_hand_eye
+from er3a.vision.likelihood import PoseObservations, refine
 from testing.hand_eye_sets import off, pose
 from tests.vision.test_hand_eye_file import HEAD, columns, write
 
@@ -183,6 +184,31 @@ def test_intervals_include_intrinsics_that_are_estimated_from_the_same_images():
     narrow = calibrate_hand_eye(replace(samples, shared=None)).covariance[:6, :6]
     assert 0.5 < np.mean(squares) < 1.8
     assert np.mean([error @ np.linalg.solve(narrow, error) / 6 for error in errors]) > 3
+
+
+@pytest.mark.long
+def test_a_focal_length_that_its_images_leave_open_is_no_wrong_board():
+    """Images almost head-on hardly tell the focal length, which scales all distances as a board does."""
+    random, points = np.random.default_rng(5), board_points(CHESS)
+    X, Y = pose([120, 5, 30], [0.7, 0.1, 0.6]), pose([3, -4, 20], [0.02, 0.03, 0.05])
+    scales = []
+    for _ in range(12):
+        places = [
+            pose([*random.uniform(-4, 4, 2), random.uniform(-40, 40)], [*random.uniform(-0.12, 0.0, 2), z])
+            for z in random.uniform(0.45, 0.65, 12)
+        ]
+        flange = np.array([X @ T @ np.linalg.inv(Y) for T in places])
+        views = views_of_corners([points] * 12, seen_corners(random, places), SIZE)
+        samples = CalibrationSet(
+            "eye_to_hand", flange, views.target, camera_covariance=views.covariance, shared=views.shared
+        )
+        refined = refine(PoseObservations.of(samples), X, Y)
+        factor, half_width = board_scale(samples, refined)
+        alone = board_scale(replace(samples, shared=None), refined)[1]
+        scales.append([abs(factor - 1) / half_width, abs(factor - 1) / alone])
+    beyond, beyond_alone = (np.array(scales) > 1).sum(axis=0)
+    assert beyond <= 2
+    assert beyond_alone >= 6
 
 
 def test_an_image_of_another_size_and_squares_in_metres_are_named(tmp_path):

@@ -253,3 +253,69 @@ def test_the_command_ends_with_an_error_where_a_calibration_cant_be_used(tmp_pat
     found = CliRunner().invoke(app, ["hand-eye", str(wrong)])
     assert found.exit_code == 1
     assert "positions of the board have axes negated or swapped: read as (x, -y, -z)" in " ".join(found.output.split())
+
+
+def test_touched_points_that_contradict_a_calibration_end_the_command_with_code_1(tmp_path, poses):
+    """Points of the board, touched where it is, and 20 mm beside."""
+    flange, target = poses
+    table = columns(flange, "flange", "quaternion") | columns(target, "target", "quaternion")
+    file = write(tmp_path, table, HEAD.format(setup="eye_in_hand") + "touched: touched.csv\n")
+    on_board = np.array([[0, 0, 0], [100, 0, 0], [0, 80, 0], [100, 80, 0]])
+    codes = []
+    for beside in (0, 20):
+        touched = on_board @ Y_TRUE[:3, :3].T + 1000 * Y_TRUE[:3, 3] + [0, 0, beside]
+        rows = [",".join(map(str, row)) for row in np.hstack([on_board, touched]).tolist()]
+        (tmp_path / "touched.csv").write_text("\n".join([",".join(POINT_NAMES), *rows]) + "\n")
+        found = CliRunner().invoke(app, ["hand-eye", str(file)])
+        codes.append((found.exit_code, "touched points contradict the calibration" in found.output))
+        record = json.loads(CliRunner().invoke(app, ["hand-eye", str(file), "--json"]).stdout)
+        assert record["touch_contradicts"] == (beside > 0)
+    assert codes == [(0, False), (1, True)]
+
+
+def _streams(folder: Path, ahead: float, start: float = 0.0, every: float = 0.05, widest: str = "") -> Path:
+    """Streams of an arm that swings, the camera's clock so far behind (s); it is seen from ``start`` s on."""
+
+    def arm(t: np.ndarray) -> np.ndarray:
+        turns = np.stack([0.7 * np.sin(0.9 * t), 0.6 * np.sin(1.3 * t + 1), 0.8 * np.sin(0.7 * t + 2)], axis=1)
+        T = np.tile(np.eye(4), (len(t), 1, 1))
+        T[:, :3, :3] = Rotation.from_rotvec(turns).as_matrix()
+        T[:, :3, 3] = 0.2 * turns + [0.4, 0, 0.4]
+        return T
+
+    t_arm, t_eye = np.arange(0, 30, 0.02), start + np.arange(3, 27, every)
+    streams = f"streams: {{flange: hand.csv, target: samples.csv{widest}}}"
+    head = HEAD.format(setup="eye_in_hand").replace("samples: samples.csv", streams)
+    write(folder, {"t_s": t_arm} | columns(arm(t_arm), "flange", "quaternion"))
+    shutil.move(folder / "samples.csv", folder / "hand.csv")
+    target = seen("eye_in_hand", arm(t_eye))
+    return write(folder, {"t_s": t_eye - ahead} | columns(target, "target", "quaternion"), head)
+
+
+@pytest.mark.parametrize(
+    ("made", "told"),
+    [
+        ({"ahead": 2.3}, r"streams\.widest_s: turns of arm and camera agree best at 2 s, an end of the range searched"),
+        ({"ahead": 100.0}, r"can't be compared \(flange: 0 to 29\.98 s, 1500 rows; target: -97 to"),
+        (
+            {"ahead": 0.3, "every": 1.0},
+            r"it takes camera poses 0\.4 to 0\.8 s apart while the arm was recorded for 2 s",
+        ),
+    ],
+)
+def test_streams_whose_clocks_cant_be_compared_are_refused(made, told, tmp_path):
+    with pytest.raises(InputError, match=told):
+        read_calibration(_streams(tmp_path, **made), None)
+
+
+def test_a_wider_range_finds_the_offset_as_advised(tmp_path):
+    _, offset, _ = read_calibration(_streams(tmp_path, ahead=2.3, widest=", widest_s: 3"), None)
+    assert offset.offset == pytest.approx(2.3, abs=2e-3)
+
+
+def test_images_beside_streams_are_refused(tmp_path):
+    file = _streams(tmp_path, ahead=0.1)
+    board = "images: {board: {pattern: chessboard, squares: [9, 7], square_mm: 20}}\n"
+    file.write_text(file.read_text() + board)
+    with pytest.raises(InputError, match="streams hold board poses, no images"):
+        read_calibration(file, None)

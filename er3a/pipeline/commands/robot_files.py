@@ -232,8 +232,9 @@ def calibrate(
     name = output.stem if output else f"{arm.name}_calibrated"
     alone = " (without terms beyond a robot file)" if found.beyond else ""
     corrected = found.robot.replace(name=name, title=f"{found.robot.title}, calibrated{alone}")
-    record = {"output": str(output) if output else None, **calibration_record(found, arm, others)}
-    model = _write_calibrated(corrected, record, output) if output else None
+    settled = len(found.open) < len(found.estimates)
+    record = {"output": str(output) if output and settled else None, **calibration_record(found, arm, rows, others)}
+    model = _write_calibrated(corrected, record, output) if output and settled else None
     if html or rrd:
         from er3a.pipeline.viewing.calibration import measured_errors, record_calibration, write_calibration
     if html:
@@ -245,14 +246,19 @@ def calibrate(
         record_calibration(found, measured_errors(arm, rows, found), rrd)
     if as_json:
         options.print_json(record)
-        return
-    print(lines_of(found))
-    if others:
-        print("\n".join(held_back_lines(found, rows, others)))
-    for written in (html, rrd):
-        if written:
-            print(f"{written}: written")
-    print("\n".join(kept_lines(found, robot, output, model)))
+    else:
+        print(lines_of(found, rows, others))
+        if others:
+            print("\n".join(held_back_lines(found, rows, others)))
+        for written in (html, rrd):
+            if written:
+                print(f"{written}: written")
+    if output and not settled:
+        raise Er3aError(
+            f"{output}: not written, as these measurements settle none of the table's numbers; measure more"
+        )
+    if not as_json:
+        print("\n".join(kept_lines(found, robot, output, model)))
 
 
 @options.app.command(rich_help_panel=options.ROBOT_FILES)
@@ -337,7 +343,8 @@ def hand_eye(
                 [hand_eye_lines(found, offset, boardless), *sample_lines, *(correction_lines(table) if table else [])]
             )
         )
-    if grave_warnings(found.warnings) or found.directions[0].status == "excluded":
+    touched_elsewhere = found.touch is not None and found.touch.contradiction is not None
+    if grave_warnings(found.warnings) or found.directions[0].status == "excluded" or touched_elsewhere:
         raise typer.Exit(1)
 
 

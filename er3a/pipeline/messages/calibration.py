@@ -6,6 +6,8 @@ import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from er3a.calibration.calibrate import Beyond, Calibration, Estimate, TermEstimate
 from er3a.calibration.cross_validation import HeldOutErrors, TriedTerm
 from er3a.calibration.observations import Measurement
@@ -19,6 +21,8 @@ from er3a.pipeline.messages.say import say
 from er3a.robots.robot import Robot
 
 MUCH_SCATTER, LITTLE_SCATTER = 2.0, 0.3
+CONTRADICTING = 3.0
+"""Times the error at poses left out: positions held back that are farther off are not where the model puts them."""
 TERMS = {
     "ratio": N_("ratio"),
     "once": N_("once a turn"),
@@ -37,8 +41,8 @@ VERDICTS = {
 }
 
 
-def lines_of(found: Calibration) -> str:
-    """A calibration as lines of text for a terminal."""
+def lines_of(found: Calibration, fitted: Sequence[Measurement] = (), others: Sequence[Measurement] = ()) -> str:
+    """A calibration as lines of text for a terminal; ``others``: positions held back."""
     scatter = (
         f"scatter {found.scatter:.2f} standard deviations"
         if found.deviation_mm is None
@@ -46,6 +50,7 @@ def lines_of(found: Calibration) -> str:
     )
     lines = [
         *([say(found.wrong)] if found.wrong else []),
+        *held_back_warning(found, fitted, others),
         *_summary(found),
         *warning_texts(found),
         f"{found.coordinates} coordinates at {found.poses} poses; estimated: {level(found.level)}",
@@ -210,6 +215,38 @@ def held_back_line(fitted: Sequence[Measurement], others: Sequence[Measurement],
     )
 
 
+def held_back_warning(found: Calibration, fitted: Sequence[Measurement], others: Sequence[Measurement]) -> list[str]:
+    """That positions which the fit has not seen contradict it, or that it does not hold where no fitted pose is."""
+    expected = found.beyond.left_out if found.beyond else found.left_out
+    if not (expected and others):
+        return []
+    poses, seen = (np.array([each.pose for each in rows]) for rows in (others, fitted))
+    inside = ((poses >= seen.min(axis=0)) & (poses <= seen.max(axis=0))).all(axis=1)
+    distances, usual = found.distances_mm(others), max(expected.mean_mm, expected.far_mean_mm)
+    numbers = {"usual": f"{usual:.3g}"}
+    if inside.any() and (mean := float(distances[inside].mean())) > CONTRADICTING * usual:
+        return [
+            tr(
+                "{count} positions held back contradict the calibration: they are {mean} mm off on average, poses left "
+                "out {usual} mm. Check that both files have the same frame, point of the tool and units.",
+                count=int(inside.sum()),
+                mean=f"{mean:.3g}",
+                **numbers,
+            )
+        ]
+    if not inside.all() and (mean := float(distances[~inside].mean())) > CONTRADICTING * usual:
+        return [
+            tr(
+                "The calibration does not hold beyond the fitted joint values: {count} positions held back from there "
+                "are {mean} mm off on average, poses left out {usual} mm. Measure there, too.",
+                count=int((~inside).sum()),
+                mean=f"{mean:.3g}",
+                **numbers,
+            )
+        ]
+    return []
+
+
 def held_back_lines(found: Calibration, fitted: Sequence[Measurement], others: Sequence[Measurement]) -> list[str]:
     """Those by the model, and by what a robot file holds if the model has more terms."""
     lines = [held_back_line(fitted, others, found.distances_mm(others))]
@@ -350,13 +387,15 @@ def _coefficients(term: TermEstimate) -> str:
     return ", ".join(f"{as_text(value, '+.3f')} +- {1.96 * error:.3f}" for value, error in pairs) + " (1/1000)"
 
 
-def calibration_record(found: Calibration, robot: Robot, others: Sequence[Measurement] = ()) -> dict[str, object]:
+def calibration_record(
+    found: Calibration, robot: Robot, fitted: Sequence[Measurement] = (), others: Sequence[Measurement] = ()
+) -> dict[str, object]:
     """A calibration as plain data, for another program; corrections in mm and deg with half their 95 % interval.
 
     Parameters
     ----------
     robot : that the calibration started from
-    others : positions held back
+    fitted, others : measured positions that it rests on, and those held back
     """
     return {
         "start": starting_table(robot),
@@ -384,6 +423,7 @@ def calibration_record(found: Calibration, robot: Robot, others: Sequence[Measur
         "tried_for_file": [vars(each) for each in found.tried_for_file],
         "beyond": _beyond(found.beyond) if found.beyond else None,
         "held_back": _held_back(found, others) if others else None,
+        "held_back_warning": "".join(held_back_warning(found, fitted, others)) or None,
     }
 
 

@@ -171,7 +171,8 @@ TEXTS = texts(
         "no_positions": "there are no positions of single points to calibrate from",
         "no_correction_fits": (
             "no corrections make the table fit: after {steps} steps the positions are still {rest_mm:.3g} mm off. The "
-            "table has a gross fault or belongs to another arm; er3a.diagnose finds single faults"
+            "table has a gross fault or belongs to another arm, or lines hold the joints of other points; "
+            "er3a.diagnose finds single faults"
         ),
         "sockets_beside": (
             "the corrected table leaves {rest_mm:.3g} mm, which look like tilted axes with sockets beside the plane in "

@@ -426,6 +426,7 @@ def hand_eye_lines(found: HandEye, offset: TimeOffset | None, boardless: Sequenc
     if found.touch:
         far = 1000 * np.linalg.norm(found.touch.difference, axis=1).max()
         lines.append(f"touched points: {far:.2g} mm apart at most, probability {found.touch.probability:.2g}")
+        lines += [f"warning: {say(each)}" for each in (found.touch.contradiction,) if each]
     lines += [f"sample {say(each)}" for each in found.suspects]
     if found.without_suspects is not None:
         mm, deg = 1000 * found.without_suspects[0], np.degrees(found.without_suspects[1])
@@ -487,6 +488,7 @@ def hand_eye_record(
         "warnings": [{"code": each.code, "text": say(each)} for each in found.warnings],
         "time_offset_s": offset.offset if offset else None,
         "touch_probability": found.touch.probability if found.touch else None,
+        "touch_contradicts": found.touch is not None and found.touch.contradiction is not None,
         "table_corrections": _corrections_record(table) if table else None,
     }
 

@@ -27,6 +27,7 @@ from er3a.pipeline.messages.calibration import (
     VERDICTS,
     bar_texts,
     file_text,
+    held_back_warning,
     idle_texts,
     residual_texts,
     term_kind,
@@ -34,7 +35,7 @@ from er3a.pipeline.messages.calibration import (
 )
 from er3a.pipeline.messages.comparison import headline, layer_rows
 from er3a.pipeline.messages.language import N_, as_text, tr
-from er3a.pipeline.messages.say import bracketed, say
+from er3a.pipeline.messages.say import bracketed, joined, say
 from er3a.pipeline.results import Input, Provenance
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.figures import equal_scale, house_style, new_figure
@@ -120,6 +121,7 @@ def write_calibration(
     text = robot_text(robot_file(corrected))
     comparison = compare(robot, found.robot, tolerance_mm=1e-3, tolerance_deg=1e-3)
     residuals = found.beyond.residuals if found.beyond else found.residuals
+    beside = held_back_warning(found, measurements, held_back)
     table = str(files[0]) if len(files) > 1 else robot.name
     with house_style():
         page.render(
@@ -128,8 +130,8 @@ def write_calibration(
             command=shlex.join(command),
             provenance=Provenance(tuple(Input(str(f), sha256(f), {}) for f in files), code_digest(__name__)),
             arm=language.own_title(robot.title),
-            verdict="pass" if found.fits else "fail",
-            conclusion=say(found.conclusion),
+            verdict="fail" if not found.fits else "caution" if beside else "pass",
+            conclusion=joined([say(found.conclusion), *beside], " "),
             texts=_texts(found),
             figures=_figures(found, errors),
             errors=_errors(found, errors, held_back),

@@ -140,6 +140,7 @@ class RapidWriter(writing.Writer):
             self.set_once("vel", "VelSet 100,5000;")
             return "v100" if motion.kind != "joint" else "vmax"
         if speed.unit == "s":
+            self.set_once("vel", "VelSet 100,5000;")  # it may scale timed motions too
             return f"v1000\\T:={writing.short(speed.value)}"
         if speed.unit == "m/s":
             self.set_once("vel", "VelSet 100,5000;")

@@ -287,6 +287,8 @@ def _verdict(
         return Verdict("fail", model.BaseInSolid(inside))
     if known:
         return Verdict("fail" if isinstance(known, model.ShapesOverlap) else "caution", known)
+    if not all(each.expected for each in found.colliding):
+        return Verdict("fail", found)
     return Verdict("caution" if found.undecided or not found.joined else "pass", found)
 
 

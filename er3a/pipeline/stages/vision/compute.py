@@ -44,11 +44,11 @@ from er3a.vision.boards import ambiguous_tilts, projected
 from er3a.vision.calibration_set import TimeOffset
 from er3a.vision.grasp_motion import DEPTH, PARTS, GraspLeg
 from er3a.vision.grasping import ChosenGrasp, DetectedObject, GraspNeeds, GraspPlan, GraspTask, plan_grasp
-from er3a.vision.hand_eye import HandEye, MethodAnswer, calibrate_hand_eye, spread_of
+from er3a.vision.hand_eye import HandEye, MethodAnswer, TouchCheck, calibrate_hand_eye, spread_of
 from er3a.vision.next_view import FieldOfView, in_sight, next_view
 from er3a.vision.point_error import ArmAccuracy, SeenPoseError, error_sizes, seen_pose, seen_pose_error
 from er3a.vision.table_corrections import NoCorrections, TableCorrections, correct_table, zeros_tried
-from er3a.vision.vision_findings import HandEyeError, grave_warnings
+from er3a.vision.vision_findings import HandEyeError, TouchContradicts, grave_warnings
 
 MARGIN = 0.25  # of the objects' extent
 MIN_HALF = 0.2  # m, to each side of the objects' middle
@@ -325,14 +325,13 @@ def corner_rows(found: HandEye, images: SeenImages | None) -> model.CornerRows:
 
 STAGE_NAME = "vision"
 VIEW_STREAM = 0
-CONTRADICTED = 1e-3  # probability of touched points as far off, below which they contradict the calibration
 LEG_ROWS = 13
 
 Found = (
     model.CalibrationImpossible
     | model.CalibrationDoubtful
     | model.DirectionContradicted
-    | model.TouchContradicts
+    | TouchContradicts
     | model.GraspCounts
     | ExpectationsUnmet
 )
@@ -365,7 +364,7 @@ def compute(study: Study, name: str) -> model.VisionResults:
     to_add = _view_to_add(robot, found, task_file, head.board_mm, scene=scene, seed=seed)
     table = correct_table(found, robot, head.table_corrections) if head.table_corrections else None
     calibration = calibration_result(head, found, to_add, offset, table, images)
-    doubt = _doubt(calibration)
+    doubt = _doubt(calibration, found.touch)
     planned = []
     if not doubt:
         limits = (limits_of(robot, motions), study.seed)
@@ -491,8 +490,8 @@ def _camera_at(robot: Robot, found: HandEye, picture: Reals | None) -> Reals:
 
 
 def _doubt(
-    found: model.CalibrationResult,
-) -> model.CalibrationDoubtful | model.DirectionContradicted | model.TouchContradicts | None:
+    found: model.CalibrationResult, touch: TouchCheck | None
+) -> model.CalibrationDoubtful | model.DirectionContradicted | TouchContradicts | None:
     """Why no grasp may rest on a calibration; None if nothing contradicts it."""
     if doubts := grave_warnings(found.warnings):
         return model.CalibrationDoubtful(doubts)
@@ -502,10 +501,7 @@ def _doubt(
         return model.DirectionContradicted(
             best.flange_inverted, best.target_inverted, best.rms_mm or np.nan, given.rms_mm or 0.0
         )
-    if found.touch is not None and found.touch.probability < CONTRADICTED:
-        largest = max(float(np.linalg.norm(point.difference_mm)) for point in found.touch.points)
-        return model.TouchContradicts(len(found.touch.points), largest, found.touch.probability)
-    return None
+    return touch.contradiction if touch else None
 
 
 Planned = list[tuple[ObjectEntry, GraspPlan, SeenPoseError | None]]

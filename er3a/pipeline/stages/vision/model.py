@@ -25,6 +25,7 @@ from er3a.vision.vision_findings import (
     NotCalibratable,
     RepeatedPose,
     Suspect,
+    TouchContradicts,
 )
 
 
@@ -47,14 +48,6 @@ class DirectionContradicted(Finding):
     target_inverted: bool
     rms_mm: float
     rms_given_mm: float
-
-
-class TouchContradicts(Finding):
-    """Touched points, held out of the calibration, are not where it puts them."""
-
-    points: int
-    largest_mm: float
-    probability: float
 
 
 class NotGraspedObject(Finding):
