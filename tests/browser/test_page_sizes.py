@@ -31,24 +31,6 @@ def test_page_fits_phone_laptop_and_4k(browser, small_study, page):
             assert line <= 46 * size + 1
 
 
-@pytest.mark.parametrize("width", [390, 1280])
-def test_what_unfolds_in_a_robots_card_keeps_to_its_width(browser, small_study, width):
-    browser.get((small_study.folder / "reports/index.html").as_uri())
-    with chromium.emulating(browser, width, 900):
-        folds, right, ends = browser.execute_script(UNFOLDED)
-        assert folds > 2
-        assert max(ends) <= right + 1
-
-
-UNFOLDED = """
-const folds = [...document.querySelectorAll(".answers details")];
-for (const fold of folds) fold.open = true;
-const right = document.querySelector(".robot").getBoundingClientRect().right;
-const ends = [...document.querySelectorAll(".answers dd")].map((dd) => dd.getBoundingClientRect().right);
-return [folds.length, right, ends];
-"""
-
-
 def test_a_contradicted_table_takes_six_screens_and_none_of_its_tables_is_cut(browser, small_study):
     with chromium.emulating(browser, 1280, 900):
         browser.get((small_study.folder / "reports/er3a_c60_article/validation.html").as_uri())
@@ -94,3 +76,21 @@ def test_page_prints_on_a4_with_nothing_cut(browser, small_study, page):
         assert browser.find_element(By.CSS_SELECTOR, ".provenance dl").is_displayed()
     if browser.find_elements(By.ID, "turning"):
         assert browser.find_elements(By.CSS_SELECTOR, "#turning canvas"), "drawn for the printer too"
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+def test_what_unfolds_in_a_robots_card_keeps_to_its_width(browser, small_study, width):
+    browser.get((small_study.folder / "reports/index.html").as_uri())
+    with chromium.emulating(browser, width, 900):
+        folds, right, ends = browser.execute_script(UNFOLDED)
+        assert folds > 2
+        assert max(ends) <= right + 1
+
+
+UNFOLDED = """
+const folds = [...document.querySelectorAll(".answers details")];
+for (const fold of folds) fold.open = true;
+const right = document.querySelector(".robot").getBoundingClientRect().right;
+const ends = [...document.querySelectorAll(".answers dd")].map((dd) => dd.getBoundingClientRect().right);
+return [folds.length, right, ends];
+"""

@@ -371,12 +371,11 @@ def _cell(each: EntryEvidence | None, evidence: TableEvidence, unconfirmed: Set[
     of_one = each.status in CONFIRMED and each.entry in unconfirmed
     title = tr("{entry}: {status}", entry=each.entry, status=_also_of_one(_status(each.status), of_one))
     mark = joined([_mark(each.status), _mark("consistent") if of_one else ""], " ")
-    shown = dict(
-        entry=each.entry, value=_value(each), status="consistent" if of_one else each.status, mark=mark, title=title
-    )
+    shown = dict(entry=each.entry, value=_value(each), status=each.status, mark=mark, title=title)
     gives = _gives(each, evidence) or _alone(each)
     alone = gives and each.status == "contradicted" and each.entry in unconfirmed
-    return shown | dict(gives=f"{gives} {_mark('consistent')}" if alone else gives)
+    shown |= dict(gives=f"{gives} {_mark('consistent')}" if alone else gives)
+    return shown | dict(status="consistent") if of_one else shown  # not in the colour of what is confirmed
 
 
 def _mark(status: Status) -> str:
