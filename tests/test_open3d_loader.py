@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -25,3 +27,9 @@ def test_no_other_module_imports_open3d():
         if re.search(r"^\s*(import|from) open3d\b", path.read_text(encoding="utf-8"), re.MULTILINE)
     ]
     assert importing == ["geometry/open3d_loader.py"]
+
+
+def test_open3d_is_loaded_without_its_web_server():
+    words = "import sys, er3a.geometry.open3d_loader as here; here.load_open3d(); print('dash' in sys.modules)"
+    told = subprocess.run([sys.executable, "-c", words], capture_output=True, text=True, check=True)
+    assert told.stdout.strip() == "False"

@@ -2,13 +2,17 @@
 
 Open3D's Linux wheels need ``libusb-1.0.so.0``, which many systems lack. The ``libusb-package`` wheel carries it; loaded
 with global symbols before the import, it serves Open3D without a system package.
+
+Open3D loads the web server Dash besides, three quarters of its import, for one function that shows geometry in a
+browser. Nothing here calls it, so an empty module stands in for Dash meanwhile.
 """
 
 from __future__ import annotations
 
 import ctypes
 import sys
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from functools import cache
 from types import ModuleType
 
@@ -21,6 +25,21 @@ def load_open3d() -> ModuleType:
             import libusb_package
 
             ctypes.CDLL(str(libusb_package.get_library_path()), mode=ctypes.RTLD_GLOBAL)
-    import open3d
+    with _without_dash():
+        import open3d
 
     return open3d
+
+
+@contextmanager
+def _without_dash() -> Iterator[None]:
+    if "dash" in sys.modules:
+        yield
+        return
+    stand_in = ModuleType("dash")
+    vars(stand_in).update(dict.fromkeys(("html", "dcc", "Dash")))
+    sys.modules["dash"] = stand_in
+    try:
+        yield
+    finally:
+        del sys.modules["dash"]

@@ -112,8 +112,13 @@ def serve(listener: socket.socket) -> None:
 
 
 def load_libraries() -> None:
-    """Import what jobs import, but for Rerun, which starts threads as it is loaded: they do not survive a fork."""
+    """Import what jobs import, but for Rerun, which starts threads as it is loaded: they do not survive a fork.
+
+    Numba looks up what it knows of Python and NumPy before the first kernel that a process loads: 0.4 s of each job.
+    """
     from importlib import import_module
+
+    from numba.core.registry import cpu_target
 
     from er3a.pipeline.stages.registry import STAGES
 
@@ -124,6 +129,8 @@ def load_libraries() -> None:
                 stage.module(verb)
     for module in ("cli", "stages.run", "viewing.index", "teach.panel"):
         import_module(f"er3a.pipeline.{module}")
+    for context in (cpu_target.typing_context, cpu_target.target_context):
+        context.refresh()  # type: ignore[no-untyped-call]
 
 
 def _do(line: socket.socket) -> None:
