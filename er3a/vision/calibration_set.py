@@ -171,7 +171,7 @@ def time_offset(hand: Stream, eye: Stream, widest: float) -> TimeOffset:
         return float(np.sum(np.minimum((off(offset) / scale) ** 2, INLIER**2)))
 
     found = float(scipy.optimize.minimize_scalar(cost, bounds=(best - GRID_S, best + GRID_S), method="bounded").x)
-    if abs(found) > widest - GRID_S:
+    if abs(found) > widest - min(GRID_S, widest / 10):
         raise OffsetOpenError(len(first), float(np.copysign(widest, found)))
     rest, slope = off(found), (off(found + 1e-3) - off(found - 1e-3)) / 2e-3
     inlier = np.abs(rest) < INLIER * scale

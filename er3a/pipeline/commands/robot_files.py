@@ -247,12 +247,8 @@ def calibrate(
     if as_json:
         options.print_json(record)
     else:
-        print(lines_of(found, rows, others))
-        if others:
-            print("\n".join(held_back_lines(found, rows, others)))
-        for written in (html, rrd):
-            if written:
-                print(f"{written}: written")
+        lines = [lines_of(found, rows, others), *(held_back_lines(found, rows, others) if others else [])]
+        print("\n".join([*lines, *(f"{written}: written" for written in (html, rrd) if written)]))
     if output and not settled:
         raise Er3aError(
             f"{output}: not written, as these measurements settle none of the table's numbers; measure more"
