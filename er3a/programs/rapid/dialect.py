@@ -423,7 +423,7 @@ def _displaced(memory: ProgramMemory, base: instructions.NamedFrame) -> instruct
 def _speed(
     memory: ProgramMemory, value: syntax.Value, options: Mapping[str, syntax.Value], kind: instructions.MotionKind
 ) -> tuple[instructions.Rate | None, float | None]:
-    """Speed of the tool and of its turn (rad/s); 1 VelSet scales and bounds it, but no time: that is the faster reading."""
+    """Speed of the tool and of its turn (rad/s). 1 VelSet scales and bounds it, but no time, as the faster reading."""
     if "T" in options:
         return syntax.rate_of(options["T"], "s"), None
     share, most = _velocity(memory)
