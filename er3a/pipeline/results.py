@@ -123,6 +123,7 @@ LeftOutSubject = Literal[
     "strategies",
     "program_lines",
     "program_starts",
+    "program_again",
     "program_rest",
     "given_rates",
     "outer_axes",

@@ -72,6 +72,9 @@ TEXTS = texts(
             "by positions and times alone, and a controller that follows the given rates moves otherwise there"
         ),
         "left_out.program_starts": "motions from where the arm is not known to stand",
+        "left_out.program_again": (
+            "the way from a program's end to its beginning, where a controller runs it again and again"
+        ),
         "left_out.outer_axes": "axes beside the arm's, which are taken to be at rest",
         "left_out.controller_language": "whether the controller takes this robot language",
         "left_out.controller_ramps": "the controller's own ramps and blends, which decide times and corners",

@@ -121,6 +121,7 @@ def _left_out(programs: Sequence[model.ProgramSummary], unknown_starts: Sequence
     loads = tuple(dict.fromkeys(f"{each.name}: {text}" for each in programs for text in _loads(each)))
     if loads:
         yield LeftOut("program_loads", loads)
+    yield LeftOut("program_again")
     yield LeftOut("controller_language")
     yield LeftOut("controller_ramps")
     yield LeftOut("torques")
