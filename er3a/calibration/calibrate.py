@@ -99,8 +99,8 @@ TOGETHER = 0.5
 MAX_OUTLIER_SHARE = 0.1
 OUTLIER_ROUNDS = 3
 MEDIAN_TO_DEVIATION = 1.4826
-FAR_WIDEST = 2.0
-"""Times ``WIDEST``: a correction beyond is none of this arm."""
+FAR_WIDEST = {"mm": 1.0, "deg": 2.0}
+"""Times ``WIDEST``: a correction beyond is none of this arm. A joint may lose its zero; a length is wrong by less."""
 FAR_REST = 0.004
 """Of an arm's whole length: a root mean square that no tracker leaves of an arm whose table is right."""
 AS_GOOD = 1.1  # times what the table leaves
@@ -728,7 +728,7 @@ def _far_off(robot: Robot, estimates: Sequence[Estimate]) -> tuple[str, ...]:
         for each in estimates
         if each.parameter.joint
         and each.settled
-        and not settles(robot, each.unit, (abs(each.correction) - each.half_width) / FAR_WIDEST)
+        and not settles(robot, each.unit, (abs(each.correction) - each.half_width) / FAR_WIDEST[each.unit])
     )
 
 

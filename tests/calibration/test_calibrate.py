@@ -392,3 +392,17 @@ def test_a_frame_may_stand_at_a_measured_point(random, tmp_path):
     path = written(tmp_path, robot, np.random.default_rng(seed), lambda xyz: np.subtract(xyz, first))
     assert load_measurements(path, robot)[0].xyz_mm == (0, 0, 0)
     assert len(er3a.calibrate(robot, path).estimates) > 20
+
+
+def test_a_tool_that_was_measured_instead_of_the_flange_is_named(random):
+    robot, tool = load_robot("er3a_c60"), np.eye(4)
+    tool[:3, 3] = 0.015, 0.0, 0.101
+    q = random.uniform(-1, 1, (60, 6))
+    points = 1000 * er3a.forward(robot.replace(tool=tool), q)[:, :3, 3] + random.normal(0, 0.05, (60, 3))
+    rows = [
+        Measurement(k, tuple(pose), "flange", tuple(xyz), None)
+        for k, (pose, xyz) in enumerate(zip(np.degrees(q), points))
+    ]
+    found = er3a.calibrate(robot, rows)
+    assert "d6" in found.wrong.entries
+    assert not found.fits
