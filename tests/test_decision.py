@@ -30,6 +30,15 @@ def test_a_table_of_which_nothing_is_settled_is_told_from_one_that_is_nearly():
     assert decision("pass", [], unproven=True).startswith("Use it: ")
 
 
+@pytest.mark.parametrize(
+    ("unproven", "start"), [(True, "Don't rely on it yet: "), (False, "Use it for planning only: ")]
+)
+def test_where_references_contradict_each_other_nothing_is_said_to_contradict_the_table(unproven, start):
+    said = decision("caution", [], unproven=unproven, conflict="592.8 mm or 600.0 mm")
+    assert said.startswith(f"{start}references contradict each other (592.8 mm or 600.0 mm)")
+    assert "nothing contradicts" not in said
+
+
 @pytest.mark.parametrize(("end", "gap"), [(".", " "), (";", " "), ("。", ""), ("；", "")])
 def test_a_long_verdict_is_cut_at_the_end_of_a_clause_and_loses_nothing(end, gap):
     clauses = [f"clause {k}, 1.5 mm off, which has no end of its own" + end for k in range(20)]

@@ -229,6 +229,9 @@ def test_words_are_found_over_all_pages_and_on_each(browser, small_study):
     assert {link.get_attribute("href").rsplit("/", 1)[1].split("?")[0] for link in links} >= {"trajectory.html"}
     found = browser.find_elements(By.CSS_SELECTOR, ".robot:not(.unfound)")
     assert ["EFORT ER3A-C60" in each.text and "line_collides" in each.text for each in found] == [True]
+    assert all(each.rect["y"] < links[0].rect["y"] for each in found)  # what the index itself has comes first
+    assert browser.find_element(By.ID, "runs-er3a_c60").get_property("open")
+    assert browser.find_element(By.ID, "decisions").rect["y"] > found[0].rect["y"]
     link = next(link for link in links if "er3a_c60/trajectory.html" in link.get_attribute("href"))
     browser.get(link.get_attribute("href"))
     field = browser.find_element(By.CSS_SELECTOR, ".find input")
@@ -271,6 +274,31 @@ def test_the_index_finds_every_text_of_a_page_and_leads_to_it(browser, small_stu
         "const box = arguments[0].getBoundingClientRect(); return [box.top, box.bottom, innerHeight]", sought
     )
     assert 0 <= top < bottom <= height
+
+
+def test_a_place_inside_of_a_program_shows_that_program_whole_with_its_player(browser, small_study):
+    page = (small_study.folder / "reports/er3a_c60/programs.html").as_uri()
+    browser.get(f"{page}?find=singular_line&at=1DEFsingular_line")
+    assert "DEF singular_line" in browser.find_element(By.CLASS_NAME, "sought").text
+    assert browser.find_element(By.CSS_SELECTOR, ".find input").get_property("value") == ""
+    assert not browser.find_elements(By.CLASS_NAME, "unfound")
+    assert browser.find_element(By.CSS_SELECTOR, ".player canvas").is_displayed()
+    assert browser.find_element(By.ID, "singular_line").is_displayed()
+    assert not browser.find_element(By.ID, "out_of_reach").is_displayed()
+    assert browser.find_element(By.CSS_SELECTOR, ".player select").get_property("value") == "singular_line"
+
+
+def test_the_counts_of_the_first_table_lead_to_the_rows_that_fail(browser, small_study):
+    with chromium.emulating(browser, width=1280, height=900):
+        browser.get((small_study.folder / "reports/index.html").as_uri())
+        link = browser.find_element(By.CSS_SELECTOR, '#decisions a[href="#faults-er3a_c60-programs"]')
+        assert re.fullmatch(r"\d+ of \d+ programs pass", link.text)
+        link.click()
+        row = browser.find_element(By.CSS_SELECTOR, '#runs-er3a_c60 tr:has([href*="play=singular_line&"])')
+        bounds = "const { top, bottom } = arguments[0].getBoundingClientRect(); return [top, bottom]"
+        WebDriverWait(browser, PAUSE).until(lambda _: row.is_displayed())
+        top, bottom = browser.execute_script(bounds, row)
+        assert 0 <= top < bottom <= 900
 
 
 @pytest.mark.parametrize(

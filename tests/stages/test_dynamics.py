@@ -495,6 +495,18 @@ def test_the_payload_is_one_line_with_what_limits_it_and_what_is_not_known(full)
     assert dynamics.payload_text(None, robot)[0].startswith("Not examined in this study: mount nothing")
 
 
+@pytest.mark.parametrize("grade", ["official", "claim"])
+def test_a_rated_payload_counts_as_its_source_does(grade):
+    """What the maker's own document states is no reason to wait for the maker; what anybody claims is confirmed by
+    nothing."""
+    robot = er3a.load_robot("er3_600")
+    source = replace(robot.sources["wrist_load"], grade=grade)
+    said, _ = dynamics.payload_text(None, robot.replace(sources={**robot.sources, "wrist_load": source}))
+    official = "Quick manual (EC2-S cabinet), table 2-2 gives a rated payload of 3 kg; what moments and inertias the"
+    assert (official in said) == (grade == "official")
+    assert ("mount nothing" in said and "nothing confirms" in said) == (grade == "claim")
+
+
 def test_the_loads_moments_along_a_path_have_tolerances(full):
     """Mass 30 % and centre 20 mm along each axis, as its grade stands for: at rest no more than m g (L + 35 mm)."""
     for path in full[1].results.summary.paths:

@@ -76,6 +76,7 @@ def test_what_nothing_confirms_is_named_entry_by_entry_or_as_a_whole():
 
 def test_a_table_without_evidence_is_a_condition_and_a_confirmed_one_is_none():
     assert condition((), ()).startswith("Run no path or program on the arm until its table is confirmed")
+    assert condition(FOUND.parts, (), "joint speeds").endswith(", joint speeds (assumed).")
     assert condition([replace(part, settled=part.entries, up_to_signs=0, open=()) for part in FOUND.parts], ()) == ""
 
 
@@ -240,8 +241,8 @@ def test_the_place_that_fewest_motions_meet_comes_first():
     }
     sound = {"programs": ["through"]}
     assert placing(stored, robot, {}, sound).line == (
-        "On a stand 275 mm high on table, centre (350, 0, 400) mm, edges 150 × 200 × 50 mm along x, y, z: in the way "
-        "of 1 of the 1 motions that pass without it: through."
+        "On a stand 275 mm high on table (z = 100 mm), centre (350, 0, 400) mm, edges 150 × 200 × 50 mm along x, y, z: "
+        "in the way of 1 of the 1 motions that pass without it: through."
     )
     placement = stored["workspace"].results.summary.placement
     aside = replace(placement.places[0], centre_m=(0.35, 0.5, 0.4))
@@ -250,7 +251,7 @@ def test_the_place_that_fewest_motions_meet_comes_first():
     found = placing(stored, robot, {}, sound)
     assert found.line == (
         "On a stand 375 mm high on floor, centre (350, 500, 400) mm, edges 150 × 200 × 50 mm along x, y, z: in the way "
-        "of none of the 1 motions that pass without it."
+        "of none of the 1 motions that pass without it (1 programs); nothing was planned around it."
     )
     assert [row[3] for row in found.rows] == ["0 of 1 programs", "1 of 1 programs"]
     assert found.met == {"programs": {}}  # of the place that is recommended
@@ -330,7 +331,8 @@ def test_the_workspace_page_moves_a_box_up_or_down_only_where_no_height_is_to_be
     results.places = None
     found = placing({"workspace": SimpleNamespace(results=results)}, load_robot("er3a_c60"), {}, {})
     rows = dict(tray_rows(found, results, results.summary.placement, "At most 2 kg."))
-    moved = f"Reach and limits allow to move it by {room} mm, one direction at a time. {height}".strip()
+    moved = f"Reach and limits allow to move it by {room} mm, one direction at a time; motions were compared with it "
+    moved = f"{moved}at this place only. {height}".strip()
     assert rows["Margins"].endswith(moved)
     assert rows["Payload there"] == "At most 2 kg."
     assert rows["Place"].startswith("In the air: no surface is known there, centre (350, 0, 400) mm")
@@ -383,7 +385,8 @@ def test_without_motions_or_without_a_place_nothing_is_said_to_be_free():
     )
     found = placing({"workspace": placed(), "programs": clear}, load_robot("er3a_c60"), {}, {"programs": ["far"]})
     assert found.met == {"programs": {}}
-    assert found.line.endswith("in the way of none of the 1 motions that pass without it.")
+    parts = "(1 programs); nothing was planned around it."
+    assert found.line.endswith(f"in the way of none of the 1 motions that pass without it {parts}")
     assert found.compared.startswith("Neither the tool point nor a link's shape nor what is carried was found in the")
     nothing = placing({"workspace": placed(), "programs": clear}, load_robot("er3a_c60"), {}, {"programs": []})
     assert nothing.line.endswith("no motion passes that it could be in the way of.")

@@ -81,8 +81,9 @@ def test_the_index_marks_each_entry_of_a_table_as_validation_found_it(small_resu
         (tmp_path / name / "validation").symlink_to(small_results("validation", name, study).resolve())
     write_index(study, tmp_path, tmp_path)
     page = (tmp_path / "index.html").read_text(encoding="utf-8")
-    assert page.count('class="key entries"') == 1  # one for all tables
-    legend = page.split('class="key entries"')[1].split("</p>")[0]
+    legends = page.split('class="key entries"')[1:]
+    assert len(legends) == len(study.robots)  # above each table, where its link leads
+    legend = " ".join(each.split("</p>")[0] for each in legends)
     better = read_stage(tmp_path / "er3a_c60/validation", STAGES["validation"]).results.summary.evidence
     to_use = {each.entry: each.status for each in better.entries}
     for name in study.robots:
@@ -109,9 +110,11 @@ def test_the_index_marks_each_entry_of_a_table_as_validation_found_it(small_resu
         assert re.search(rf'er3a_c60/validation.html#entry-{twin}">0</a> <span>or 180 ', page)
     assert "alpha6 = 180 (here 0), offset6 = 180 (here 0)" in page
     assert '<a href="#dh-er3a_c60">er3a_c60</a>' in page
-    confirmed = legend.split("not confirmed")[0]
-    assert set(re.findall('class="(\\w+)"', confirmed)) == {"settled", "settled_up_to_signs", "gauge"}
-    assert "one source (may contradict another table, confirms none of its own values)" in page
+    groups = [re.findall(r"<strong>(.*?)</strong>: (.*?)(?=<strong>|$)", each.split("</p>")[0]) for each in legends]
+    marks = {verdict: set(re.findall('class="(\\w+)"', text)) for found in groups for verdict, text in found}
+    assert marks["confirmed"] <= {"settled", "settled_up_to_signs"}
+    assert marks["nothing to confirm"] == {"gauge"}
+    assert "one source (the only document that gives the value agrees with it, but confirms none of its own" in page
 
 
 def test_a_box_that_may_be_placed_is_named_where_nothing_recommends_against_it():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 
 import er3a.pipeline.messages.planning  # noqa: F401
@@ -9,7 +11,7 @@ from er3a.dynamics.margins import Binding
 from er3a.dynamics.plausibility import (
     ImpossibleInertia,
 )
-from er3a.pipeline.messages.language import N_
+from er3a.pipeline.messages.language import N_, own_title
 from er3a.pipeline.messages.left_out import names_in_words
 from er3a.pipeline.messages.say import Plural, by, joined, say, say_as, sentence, texts, word
 from er3a.pipeline.results import Summary
@@ -162,6 +164,15 @@ TEXTS = texts(
         "payload.not_examined": (
             "Not examined in this study: mount nothing until the manufacturer gives the rated payload."
         ),
+        "payload.not_examined#rated": "Not examined in this study.",
+        "payload.unknown#rated": Plural(
+            "count", "Not known, for lack of {count} quantity.", "Not known, for lack of {count} quantities."
+        ),
+        "payload.rated#official": "{source} gives a rated payload of {kg:.3g} kg; don't rely on it alone.",
+        "payload.rated#official_alone": (
+            "{source} gives a rated payload of {kg:.3g} kg; what moments and inertias the wrist allows is not given: "
+            "don't rely on it alone."
+        ),
         "payload.rated": (
             "The robot's file gives a rated payload of {kg:.3g} kg, which nothing confirms: don't rely on it."
         ),
@@ -181,6 +192,7 @@ def payload_text(summary: Summary | None, robot: Robot) -> tuple[str, str]:
         (path.payload.value, path) for path in paths if path.counts and path.payload and path.payload.value is not None
     ]
     missing = [say(each) for each in getattr(summary, "unknown", ())]
+    official = _rated(robot, official=True)
     if bounds:
         value, path = min(bounds, key=lambda bound: bound[0])
         by = word("dynamics.binding", BINDING, path.payload.by) if path.payload and path.payload.by else ""
@@ -190,12 +202,23 @@ def payload_text(summary: Summary | None, robot: Robot) -> tuple[str, str]:
         open_ = sentence("payload.partly", count=len(missing)) if missing else ""
         known, rest = joined([known, open_], " "), sentence("payload.left_out", what=joined(missing)) if missing else ""
     elif missing:
-        known, rest = sentence("payload.unknown", count=len(missing)), sentence("payload.ask", what=joined(missing))
+        known = sentence(f"payload.unknown{official and '#rated'}", count=len(missing))
+        rest = sentence("payload.ask", what=joined(missing))
     else:
-        known, rest = sentence("payload.not_examined"), ""
-    wrist = robot.masses.wrist
-    rated = sentence("payload.rated", kg=wrist.payload) if wrist and np.isfinite(wrist.payload) else ""
-    return joined([known, rated], " "), rest
+        known, rest = sentence(f"payload.not_examined{official and '#rated'}"), ""
+    return joined([known, official or _rated(robot)], " "), rest
+
+
+def _rated(robot: Robot, *, official: bool = False) -> str:
+    """The payload that the robot's file gives; ``official``: what its maker's own document gives, else nothing."""
+    wrist, source = robot.masses.wrist, robot.sources.get("wrist_load")
+    if wrist is None or not np.isfinite(wrist.payload):
+        return ""
+    if source is None or source.grade != "official":
+        return "" if official else sentence("payload.rated", kg=wrist.payload)
+    document, *_ = re.split("[;；]", own_title(source.source))
+    form = "official" if len(wrist.moment) and len(wrist.inertia) else "official_alone"
+    return sentence(f"payload.rated#{form}", source=document, kg=wrist.payload)
 
 
 def need_word(need: model.Need) -> str:

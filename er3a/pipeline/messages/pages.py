@@ -178,11 +178,13 @@ def decision(
     *,
     unproven: bool = False,
     same_arm: bool = False,
+    conflict: str = "",
 ) -> str:
     """What to do with a robot's model, from validation's status and the titles of the stages that failed.
 
     ``instead`` is a model of the same arm that evidence does not contradict; ``unproven``: independent documents settle
-    nothing of its geometry; ``same_arm``: the evidence is of this arm, defined otherwise.
+    nothing of its geometry; ``same_arm``: the evidence is of this arm, defined otherwise; ``conflict``: values of one
+    number about which references contradict each other.
     """
     if table == "not_examined":
         return tr("Its table has not been examined yet: run the stage validation before you use it.")
@@ -198,6 +200,18 @@ def decision(
         return tr(
             "Use it: every entry that moves the tool is settled by independent documents, and nothing here fails."
         )
+    if table == "caution" and conflict:
+        text = (
+            N_(
+                "Don't rely on it yet: references contradict each other ({values}), and no independent document "
+                "settles any of its geometry."
+            )
+            if unproven
+            else N_(
+                "Use it for planning only: references contradict each other ({values}), and part of it is not settled."
+            )
+        )
+        return tr(text, values=conflict)
     if table == "caution" and unproven:
         return tr(
             "Don't rely on it yet: nothing contradicts its table, but no independent document settles any of its "

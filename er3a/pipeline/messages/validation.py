@@ -282,11 +282,16 @@ def unconfirmed(parts: Sequence[PartFound], unbounded: Sequence[str] = ()) -> st
     return joined([*named, shortened(left)], ", ")
 
 
-def condition(parts: Sequence[PartFound], unbounded: Sequence[str]) -> str:
-    """What has to be confirmed before anything that passes is run on the arm; empty where all of its table is."""
+def condition(parts: Sequence[PartFound], unbounded: Sequence[str], assumed: str = "") -> str:
+    """What has to be confirmed before anything that passes is run on the arm; empty where all of its table is.
+
+    ``assumed``: what is assumed besides, as no document gives it.
+    """
     if not parts:
         return tr("Run no path or program on the arm until its table is confirmed.")
     names = unconfirmed(parts, unbounded)
+    if names and assumed:
+        names = joined([names, bracketed(assumed, tr("assumed"))], ", ")
     return names and tr("Run no path or program on the arm until these are confirmed: {entries}.", entries=names)
 
 
@@ -391,11 +396,15 @@ def _(found: AnotherArm) -> str:
 
 @say.register
 def _(found: Contradiction) -> str:
-    values = [_value(value, found.unit) for value in found.stated]
-    stated = _chained("or", values)
+    stated = stated_text(found)
     if not found.more:
         return say_as(found, "one", stated=stated)
     return say_as(found, "more", stated=stated)
+
+
+def stated_text(found: Contradiction) -> str:
+    """The values that references state about one number."""
+    return _chained("or", [_value(value, found.unit) for value in found.stated])
 
 
 def missed_text(found: Contradicted | AnotherArm) -> str:

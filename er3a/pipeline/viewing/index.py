@@ -41,6 +41,7 @@ from er3a.pipeline.messages.validation import (
     missed_text,
     settled_parts,
     shortened,
+    stated_text,
     unconfirmed,
 )
 from er3a.pipeline.messages.workspace import judged_void, no_box_text, run_again_text, void_text
@@ -63,7 +64,7 @@ from er3a.pipeline.stages.programs.played import faults as program_faults
 from er3a.pipeline.stages.registry import STAGES, all_messages
 from er3a.pipeline.stages.trajectory.model import PathSummary, TrajectoryResults
 from er3a.pipeline.stages.trajectory.played import faults as path_faults
-from er3a.pipeline.stages.validation.evidence_section import evidence_section, verdict_legend
+from er3a.pipeline.stages.validation.evidence_section import evidence_section
 from er3a.pipeline.stages.validation.model import (
     AnotherArm,
     Contradicted,
@@ -490,6 +491,7 @@ def _counts(verdicts: Sequence[StageVerdict]) -> dict[str, str]:
 
 
 SHOWN_FIGURES = 3
+RATES = ("own_speeds", "own_accelerations")
 MAY_RUN = {name: motions for name, motions in MOTIONS.items() if STAGES[name].may_run}
 OF_ALL_RUNS = (  # what may turn any of them unsafe
     *("obstacles", "uncovered_links", "partial_links", "bare_tool", "base_inside", "allowed_contacts"),
@@ -520,9 +522,6 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         folder / "index.html",
         places=page.packed_text(json.dumps([*_places(study, folder, contradicted)], ensure_ascii=False)),
         robots=robots,
-        entries_legend=verdict_legend(
-            status for each in robots if each["entries"] for status in each["entries"]["statuses"]
-        ),
         article=study.article is not None,
         questions={stage.name: stage.question for stage in STAGES.values()},
         shown_figures=SHOWN_FIGURES,
@@ -648,7 +647,9 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         "table": table,
         "contradicted": table == "fail" and not same_arm,
         "may_run": table != "fail",
-        "decision": decision(table, [*failed.values()], instead, unproven=unproven, same_arm=same_arm),
+        "decision": decision(
+            table, [*failed.values()], instead, unproven=unproven, same_arm=same_arm, conflict=_conflict(finding)
+        ),
         "entries": entries,
         "instead": {instead: f"#{instead}"} if instead else {},
         "dh_instead": {instead: f"#dh-{instead}"} if instead else {},
@@ -660,7 +661,8 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         "bodies": [each.name for each in scene.solids] if (scene := study.scene(name, "trajectory")) else [],
         "runs": runs,
         "grasped": grasped,
-        "condition": condition(_parts(heads), getattr(finding, "unbounded", ())),
+        "condition": condition(_parts(heads), getattr(finding, "unbounded", ()), rates := _assumed_rates(heads)),
+        "rates": rates,
         "box": joined([_without_box(), placed.compared], " ") if placed else "",
         "in_box": placed.met if placed else {},
         "shapes": next(
@@ -680,6 +682,20 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         "not_examined": [tr(STAGES[stage].title) for stage in stages if stage not in heads],
         "not_asked": [tr(stage.title) for name, stage in STAGES.items() if name not in stages],
     }
+
+
+def _conflict(finding: object) -> str:
+    """The values of one number about which references contradict each other; empty where they don't."""
+    found = getattr(finding, "contradiction", None)
+    return stated_text(found) if found else ""
+
+
+def _assumed_rates(heads: Mapping[str, Head]) -> str:
+    """Which of the joints' speeds and accelerations paths and programs rest on without a document."""
+    speeds, rates = ([_misses(heads[stage], each) for stage in MAY_RUN if stage in heads] for each in RATES)
+    if any(speeds) and any(rates):
+        return tr("joint speeds and accelerations")
+    return tr("joint speeds") if any(speeds) else tr("joint accelerations") if any(rates) else ""
 
 
 def _meant(heads: Mapping[str, Head], expected: Mapping[str, str]) -> str:
@@ -809,12 +825,14 @@ def _run(stage: str, robot: str, results: TrajectoryResults | ProgramsResults) -
     faults += _otherwise(stage, followed, {fault.name for fault in faults})
     sound = sound_motions(results)
     left_out = [left_out_text(each) for each in results.summary.not_examined if each.subject in OF_ALL_RUNS]
+    count = len(sound) + len(faults) + lost
     return {
         "stage": stage,
-        "count": len(followed) + lost,
+        "count": count,
         "sound": sound,
         "tally": _tally(stage, len(sound), faults, lost),
-        "links": {fault.name: f"{robot}/{fault.address}" for fault in faults},
+        "links": {fault.name: f"{robot}/{fault.address}" for fault in faults}
+        | {_passing(stage, len(sound), count): f"#faults-{robot}-{stage}" if faults else f"#runs-{robot}"},
         "faults": faults,
         "open": left_out,
         "no_pass": say(NoPass(missed)) if (missed := results.summary.verdict.missed) else "",
@@ -846,7 +864,7 @@ def _tally(stage: str, sound: int, faults: Sequence[Fault], lost: int) -> str:
     """How many paths or programs pass, how many of the others are expected not to, and which others do not."""
     others, count = [fault for fault in faults if not fault.meant], sound + len(faults) + lost
     meant = len(faults) - len(others)
-    passing = tr("{sound} of {count} {what} pass in the model", sound=sound, count=count, what=tr(MAY_RUN[stage]))
+    passing = tr("{counted} in the model", counted=_passing(stage, sound, count))
     rest = N_("the other one is expected to fail") if meant == 1 else N_("the other {count} are expected to fail")
     whole = N_("{count} expected to fail") if others or lost else rest
     named = [tr("{name}: {verdict}", name=fault.name, verdict=fault.verdict) for fault in others[:MAX_TALLIED]]
@@ -855,9 +873,13 @@ def _tally(stage: str, sound: int, faults: Sequence[Fault], lost: int) -> str:
     return joined([passing, tr(whole, count=meant) if meant else "", *named, more, left])
 
 
+def _passing(stage: str, sound: int, count: int) -> str:
+    return tr("{sound} of {count} {what} pass", sound=sound, count=count, what=tr(MAY_RUN[stage]))
+
+
 def _note(head: Head, runs: Sequence[Mapping[str, Any]]) -> str:
     """What stands beside a stage's name: how many of its paths or programs pass, where some do not, how many targets,
-    paths, programs or objects are expected to fail, or that its camera is simulated."""
+    paths, programs or objects are expected to fail, that its gripper has no shape or its camera is simulated."""
     if head.no_verdict:
         return ""
     parts = [
@@ -866,6 +888,8 @@ def _note(head: Head, runs: Sequence[Mapping[str, Any]]) -> str:
         if len(run["sound"]) < run["count"]
     ]
     parts += [tr("{count} expected to fail", count=head.demonstrations)] if head.demonstrations else []
+    if head.stage == "vision" and any(each.subject == "carried" for each in head.summary.verdict.missed):
+        parts.append(tr("gripper's shape not given"))
     return joined([*parts, tr("simulated") if _misses(head, "real_camera") else ""])
 
 

@@ -411,9 +411,10 @@ function addFinder() {
   field.placeholder = field.ariaLabel = document.getElementById("places") ? WORDS.findAnywhere : WORDS.find;
   field.value = new URLSearchParams(location.search).get("find") ?? "";
   status.role = "status";
-  elsewhere.className = "elsewhere";
+  elsewhere.className = elsewhere.id = "elsewhere";
   box.append(field, " ", status);
-  document.querySelector("header").append(box, elsewhere);
+  document.querySelector("header").append(box);
+  main.after(elsewhere); // what this page has itself comes first
   let open = null; // what was unfolded before
   const find = () => {
     const words = sought(field.value).split(/\s+/).filter(Boolean);
@@ -422,8 +423,15 @@ function addFinder() {
     const others = words.length ? placesElsewhere(words) : [];
     elsewhere.replaceChildren(...others.map((each) => linkTo(each, words)));
     const here = words.length ? keepFound(main, words, "") : 0;
-    const count = others.reduce((sum, { texts }) => sum + texts.length, here);
+    const away = others.reduce((sum, { texts }) => sum + texts.length, 0);
+    const count = here + away;
     status.textContent = !words.length ? "" : count ? WORDS.found.replace("{count}", count) : document.getElementById("places") ? WORDS.noneAnywhere : WORDS.none;
+    if (here && away) {
+      const below = document.createElement("a");
+      below.href = "#elsewhere";
+      below.textContent = WORDS.elsewhere.replace("{count}", away);
+      status.append(" · ", below);
+    }
     if (count) keepWarnings(main);
     if (!words.length || !count) { // all of the page
       for (const part of [main, ...main.querySelectorAll(".unfound")]) part.classList.remove("unfound", "finding");
@@ -455,7 +463,10 @@ function addFinder() {
   });
   if (!field.value) return;
   findAnywhere();
-  goToPlace(main);
+  goToPlace(main, () => {
+    field.value = "";
+    find();
+  });
 }
 
 const SHOWN_PLACES = 4;
@@ -508,11 +519,19 @@ function linkTo({ address, title, texts }, words) {
 }
 
 // Where the text begins that the address names.
-function goToPlace(main) {
+// Of parts that are shown one at a time that one is then shown, whole.
+function goToPlace(main, showAll) {
   const beginning = new URLSearchParams(location.search).get("at");
   const begins = (part) => squeezed(allText(part)).startsWith(beginning);
   const place = beginning && [...main.querySelectorAll(PLACES)].find((part) => part.checkVisibility() && begins(part));
   if (!place) return;
+  const part = place.closest("[data-one-of] > *");
+  if (part) {
+    showAll();
+    part.dispatchEvent(new Event("beforematch"));
+    history.replaceState(null, "", `#${part.querySelector("h2").id}`); // the player takes it up
+    unfold(place);
+  }
   place.classList.add("sought");
   place.scrollIntoView({ block: "center" });
 }

@@ -85,6 +85,7 @@ SCRIPT_WORDS = {
     "find": N_("Find on this page"),
     "findAnywhere": N_("Find on all pages"),
     "found": N_("{count} places"),
+    "elsewhere": N_("{count} of them on other pages"),
     "none": N_("Nothing has all these words: try fewer, or others"),
     "noneAnywhere": N_("No page has all these words in one place: try fewer, or others"),
     "link": N_("link to this section"),

@@ -75,6 +75,8 @@ class Tray:
         if self.below is None:
             return tr("In the air: no surface is known there")
         name = own_title(self.below.name)
+        if (height := millimetres([self.below.height_m])) != "0":
+            name = bracketed(name, f"z = {height} mm")
         if self.floor is None:
             return tr("On {name}", name=name)
         return tr("On a stand {gap} mm high on {name}", gap=millimetres([self.low[2] - self.floor]), name=name)
@@ -237,11 +239,22 @@ class Placing:
         if not self.passing:
             return tr("no motion passes that it could be in the way of")
         if not names:
-            return tr("in the way of none of the {count} motions that pass without it", count=self.passing)
+            return tr(
+                "in the way of none of the {count} motions that pass without it ({parts}); nothing was planned around "
+                "it",
+                count=self.passing,
+                parts=self._parts,
+            )
         said = tr(
             "in the way of {some} of the {count} motions that pass without it", some=len(names), count=self.passing
         )
         return said if len(names) > most else tr("{said}: {names}", said=said, names=joined(names, ", "))
+
+    @property
+    def _parts(self) -> str:
+        """Of how many paths, programs and grasps the motions that pass are made up."""
+        counts = [(len(self.sound.get(stage, ())), tr(MOTIONS[stage])) for stage in self.met]
+        return joined([tr("{count} {what}", count=count, what=what) for count, what in counts if count], ", ")
 
     @property
     def line(self) -> str:

@@ -42,11 +42,11 @@ VERDICTS: Mapping[str, Mapping[Status, str]] = {  # in the three words that a re
     N_("confirmed"): {
         "settled": "",
         "settled_up_to_signs": N_("as long as the open entries are right"),
-        "gauge": N_("only the sum counts"),
     },
+    N_("nothing to confirm"): {"gauge": N_("only the sum counts")},
     N_("not confirmed"): {
         "weak": N_("too loosely"),
-        "consistent": N_("may contradict another table, confirms none of its own values"),
+        "consistent": N_("the only document that gives the value agrees with it, but confirms none of its own values"),
         "open": N_("no document tells it from another value"),
     },
     N_("contradicted"): {"contradicted": N_("→ what the evidence gives")},
@@ -135,13 +135,14 @@ def evidence_section(
         else say(proposal)
         for proposal in evidence.proposals
     }
-    present = dict.fromkeys([*(each.status for each in numbers), *(["consistent"] if of_one else [])])
+    alone: list[Status] = ["consistent"] if of_one else []
+    present = dict.fromkeys([*(each.status for each in numbers), *alone])
     return dict(
         columns=[tr(COLUMNS[kind]) for kind in kinds],
         rows=[
             (joint, [_cell(by_name.get(f"{kind}{joint}"), evidence, unconfirmed) for kind in kinds]) for joint in joints
         ],
-        statuses=list(present),
+        verdicts=verdict_legend(present),
         allowed=_allowed(evidence),
         legend=[
             (status, _marked(status), word("status_meaning", STATUS_MEANINGS, status))

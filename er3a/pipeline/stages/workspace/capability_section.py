@@ -68,7 +68,11 @@ def _margins(tray: Tray, results: model.WorkspaceResults, placement: model.Place
     place, gaps = tray.place, tray.below.gaps_m if tray.below and tray.floor is not None else None
     height = range_text(place, gaps, placement.task.limit_margin_deg, results.places)
     room = _room(place, "xy" if height else "xyz")
-    moved = tr("Reach and limits allow to move it by {room} mm, one direction at a time.", room=room) if room else ""
+    moved = room and tr(
+        "Reach and limits allow to move it by {room} mm, one direction at a time; motions were compared with it at "
+        "this place only.",
+        room=room,
+    )
     ratio = fixed(100 * place.manipulability_ratio, 1)
     texts = [
         _nearest_limit(place),
