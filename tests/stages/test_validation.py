@@ -519,7 +519,7 @@ def test_an_entry_that_only_the_source_of_the_table_to_use_gives_has_one_mark(su
     assert changed == {f"direction{joint}" for joint in (1, 4, 6)}
     own = marks(evidence_section(load_robot("er3a_c60"), real))
     assert {own[entry] for entry in changed} == {"one source"}
-    assert {marks(beside)[entry] for entry in changed} == {"✓ one source", "(✓) one source"}
+    assert {marks(beside)[entry] for entry in changed} == {"✓ one source, agrees", "(✓) one source, agrees"}
     assert (alone["of_one"], beside["of_one"]) == ("", "direction 1, 4, 6")
     settled = {row[0]: row[2] for row in beside["settled_rows"]}  # as the results have them
     for each in (each for each in article.entries if each.entry in changed):

@@ -96,7 +96,9 @@ def test_the_index_marks_each_entry_of_a_table_as_validation_found_it(small_resu
             alone = name == "er3a_c60_article" and "settled" in entry.status and to_use[entry.entry] == "consistent"
             shown = "consistent" if alone else entry.status  # what one source gives is not coloured as confirmed
             assert (status, float(value.replace("−", "-"))) == (shown, round(entry.value, 3)), entry
-            assert ("✓ one source" in rest or "(✓) one source" in rest) == alone, entry  # beside the table to use
+            assert ("✓ one source, agrees" in rest or "(✓) one source, agrees" in rest) == alone, (
+                entry
+            )  # beside the table to use
             assert f'<span class="{status}">' in legend
             assert f"{STATUS_WORDS[status]}" in legend  # in the words of the validation page
             if status == "contradicted":

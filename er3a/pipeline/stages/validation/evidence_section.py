@@ -371,7 +371,7 @@ def _cell(each: EntryEvidence | None, evidence: TableEvidence, unconfirmed: Set[
         return None
     of_one = each.status in CONFIRMED and each.entry in unconfirmed
     title = tr("{entry}: {status}", entry=each.entry, status=_also_of_one(_status(each.status), of_one))
-    mark = joined([_mark(each.status), _mark("consistent") if of_one else ""], " ")
+    mark = joined([_mark(each.status), tr("one source, agrees") if of_one else ""], " ")
     shown = dict(entry=each.entry, value=_value(each), status=each.status, mark=mark, title=title)
     gives = _gives(each, evidence) or _alone(each)
     alone = gives and each.status == "contradicted" and each.entry in unconfirmed
