@@ -13,7 +13,7 @@ from er3a.kinematics.singularity import SingularityType
 from er3a.pipeline.messages.expectations import demonstrated, outcome_word
 from er3a.pipeline.messages.kinematics import branch_word, singular_pose, singularity_word
 from er3a.pipeline.messages.language import N_, alike, tr
-from er3a.pipeline.messages.planning import FAR, needed_text, rate_needed, unit_of
+from er3a.pipeline.messages.planning import UNBOUNDED, needed_text, rate_needed, unit_of
 from er3a.pipeline.messages.say import Plural, by, joined, listed, say, say_as, sentence, texts, word
 from er3a.pipeline.stages.programs.model import FindingAt, ProgramCounts, ProgramSummary
 from er3a.planning.motion_faults import AboveLimit, AccelerationTooGreat, BelowLimit, TooFast
@@ -661,8 +661,8 @@ def rates_text(paces: Sequence[Pace]) -> str:
     worst = [min(alike, key=_pace) for kind in kinds if (alike := [each for each in paces if isinstance(each, kind)])]
     limits = sentence("rate_limits#known" if any(known) else "rate_limits#assumed")
     parts = {"joints": joints, "named": ", ".join(f"J{joint}" for joint in joints), "limits": limits}
-    if all(over_limit(each) > FAR for each in worst):
-        return sentence("programs.rates#far", times=FAR, **parts)
+    if all(over_limit(each) > UNBOUNDED for each in worst):
+        return sentence("programs.rates#far", times=UNBOUNDED, **parts)
     return sentence("programs.rates", worst=tuple(map(_pace_needed, worst)), **parts)
 
 
