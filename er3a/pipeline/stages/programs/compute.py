@@ -191,6 +191,8 @@ def _finding_at(each: LocatedFinding, starts: Mapping[int, float]) -> model.Find
         own,
         None if own is None or start is None else start + own,
         each.joint_moves,
+        each.off_mm,
+        each.off_deg,
     )
 
 

@@ -75,7 +75,7 @@ def _section(results: model.ProgramsResults, program: model.ProgramSummary) -> d
             found[each.line].append(each)
         else:
             line = str(each.line) if each.line else "–"
-            to_do = remedy_at(each.finding, each.joint_moves) or "–"
+            to_do = remedy_at(each) or "–"
             elsewhere.append([each.file, line, level_word(each.level), _remark(program.name, each), to_do])
     text = results.lines.take(results.lines.program == program.name)
     rows = results.instructions.take(results.instructions.program == program.name)
