@@ -110,7 +110,7 @@ def faults(results: model.TrajectoryResults) -> list[Fault]:
         status, verdict = shown_verdict(path, near)
         own = results.avoidance.take(results.avoidance.path == path.name)
         to_do, facts, instead = _to_do(path, rows, own, results.summary)
-        moments = tuple(_moment(told, rows) for told in wrong)
+        moments = tuple(_linked(_moment(told, rows), path.name) for told in wrong)
         found.append(
             Fault(
                 path.name,
@@ -167,6 +167,15 @@ def _moment(told: Told | FaultMoment, rows: model.PathChecks) -> FaultMoment:
     far, *xyz = (float(np.interp(told.seen_s, rows.t_s, values)) for values in (1000 * rows.s_m, *rows.xyz_mm.T))
     place = tr("{far} mm, ({xyz})", far=fixed(far, 0), xyz=", ".join(fixed(value, 0) for value in xyz))
     return FaultMoment(told.text, when, place if np.isfinite([far, *xyz]).all() else "", told.seen_s)
+
+
+def _linked(moment: FaultMoment, path: str) -> FaultMoment:
+    """A moment with its address, where the player shows it."""
+    return (
+        moment
+        if moment.seen_s is None
+        else replace(moment, address=address_of("trajectory", path, moment.seen_s, path))
+    )
 
 
 def _assumed(part: model.Stretch[Any]) -> bool:
