@@ -40,6 +40,8 @@ CARRIED_OUT = {
     "configuration_changes": BY_JOINT_MOVES,
     "remedy.joint_move": BY_JOINT_MOVES,
     "remedy.joint_moves": BY_JOINT_MOVES,
+    "remedy.joint_move#off": BY_JOINT_MOVES,
+    "remedy.joint_moves#off": BY_JOINT_MOVES,
     "remedy.zone_too_large": OF_PROGRAMS,
     "remedy.limit#above": OF_PROGRAMS,
     "remedy.limit#below": OF_PROGRAMS,

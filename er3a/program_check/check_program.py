@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Hashable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -110,6 +110,7 @@ class LocatedFinding:
     step : number of the step that it was found at first, None where it belongs to none
     moment : s from the start of that step's motion, when it begins; None of what is about the motion as a whole
     joint_moves : (n,) each, deg: joint moves, one or two, that take the tool where that motion does, and pass
+    off_mm, off_deg : by how much the tool leaves that motion's line or arc on these; None of a joint motion
     """
 
     level: found_in.Level
@@ -120,6 +121,8 @@ class LocatedFinding:
     step: int | None = None
     moment: float | None = None
     joint_moves: tuple[tuple[float, ...], ...] = ()
+    off_mm: float | None = None
+    off_deg: float | None = None
 
 
 @dataclass(frozen=True)
@@ -402,18 +405,21 @@ def _with_joint_moves(
     located: tuple[LocatedFinding, ...], checker: StepChecker, keep_on: KeepOn | None
 ) -> tuple[LocatedFinding, ...]:
     """Findings, with joint moves that pass instead of the motion where some were found."""
-    moves: dict[int, tuple[tuple[float, ...], ...]] = {}
+    moves: dict[int, dict[str, Any]] = {}
     for each in located:
         if each.step is None or each.step in moves or each.finding.code not in BY_JOINT_MOVES:
             continue
         if len(moves) == MAX_ADVISED or (keep_on is not None and not keep_on("checking", each.step, 0)):
             break
         found = checker.joint_moves_instead(each.step)
-        moves[each.step] = tuple(tuple((np.round(np.degrees(row), 3) + 0.0).tolist()) for row in found)
+        off = checker.off_way(each.step, found) if found else None
+        moves[each.step] = dict(
+            joint_moves=tuple(tuple((np.round(np.degrees(row), 3) + 0.0).tolist()) for row in found),
+            off_mm=None if off is None else 1000 * off[0],
+            off_deg=None if off is None else float(np.degrees(off[1])),
+        )
     return tuple(
-        replace(each, joint_moves=moves[each.step])
-        if each.step in moves and each.finding.code in BY_JOINT_MOVES
-        else each
+        replace(each, **moves[each.step]) if each.step in moves and each.finding.code in BY_JOINT_MOVES else each
         for each in located
     )
 

@@ -53,6 +53,7 @@ from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import characteristic_length
 from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partition_missing
 from er3a.numerics.arrays import Reals
+from er3a.planning.avoidance.strategies import deviation
 from er3a.planning.follow import turned_difference
 from er3a.planning.tool_proof import inverse_and_reach
 from er3a.program_check import program_check_findings as found_in
@@ -609,6 +610,7 @@ class CheckedMotion(ByValue):
     moments: Mapping[found_in.CheckFinding, float] = field(default_factory=dict)
 
 
+MOVE_POINTS = 201  # of a joint move, at which its tool's distance from a way is measured
 MAX_SOLUTIONS = 8  # of a target, to which joint moves are tried
 MAX_MOTIONS_AGAIN = 1_000  # that are checked again after two ways with the same tool pose and other joints have joined
 VIA_TURNS = (20.0, 40.0)  # deg, by which joints are turned away on the way round
@@ -784,6 +786,20 @@ class StepChecker:
             if all(self._passes(checked.placed, start, end) for start, end in zip(starts, moves)):
                 return tuple(moves)
         return ()
+
+    def off_way(self, number: int, moves: tuple[Reals, ...]) -> tuple[float, float] | None:
+        """By how much the tool on joint moves (n,) leaves the way of a motion at most, m and rad; None of a motion
+        without a way of the tool.
+
+        Of each pose the way's nearest counts, where 1 mm weighs as much as 1 deg.
+        """
+        checked = self.motions[number]
+        if checked.start is None or checked.way is None or checked.way.tool_path is None:
+            return None
+        share = np.linspace(0, 1, MOVE_POINTS)[:, None]
+        q = np.concatenate([a + share * (b - a) for a, b in pairwise((checked.start, *moves))])
+        distance, angle, _ = deviation(checked.way.tool_path, forward(checked.placed.arm, q))
+        return float(distance.max()), float(angle.max())
 
     def _goal_pose(self, checked: CheckedMotion) -> Reals | None:
         """T_world_tool (4, 4), m, of a motion's target."""

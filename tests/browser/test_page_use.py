@@ -98,6 +98,9 @@ def test_the_contents_stand_at_the_side_where_there_is_room(browser, small_study
         browser.execute_script("scrollTo(0, document.body.scrollHeight / 2)")
         WebDriverWait(browser, PAUSE).until(lambda _: browser.execute_script(READ_SECTION))
         contents, text, inside = browser.execute_script(CONTENTS)
+        named = browser.find_element(By.CSS_SELECTOR, ".contents summary b")
+        assert named.text == "EFORT ER3A-C60"
+        assert named.is_displayed()
     assert (contents["right"] <= text["left"]) is beside
     assert contents["top"] >= 0
     assert inside

@@ -205,6 +205,19 @@ def test_it_tells_the_joint_values_and_how_far_each_is_from_its_nearer_limit(pag
     assert told[0][1].endswith("to limit")
 
 
+NEAREST = "return document.querySelector('.player .joints .nearest').innerText"
+SIGN = "return getComputedStyle(document.querySelector('.player .joints .least .room'), '::before').content"
+
+
+def test_without_a_fault_the_joint_nearest_its_limit_is_named_and_bears_no_sign_of_one(page):
+    page.execute_script("document.querySelector('[data-t]').click()")
+    until(page, lambda: "1.250 s" in clock(page))
+    cells = page.execute_script(JOINTS)
+    (least,) = (j for j, (_, _, mark) in enumerate(cells, 1) if mark == "least")
+    assert page.execute_script(NEAREST) == f"Nearest its limit: J{least}, {cells[least - 1][1].split()[0]} deg."
+    assert page.execute_script(SIGN) == "none"
+
+
 def test_joint_values_keep_their_place_while_it_plays_and_are_reached_by_keys(page):
     frame = "const r = document.querySelector('.player .joints').getBoundingClientRect(); return [r.height, r.width]"
     cells = (

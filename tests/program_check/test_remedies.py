@@ -107,7 +107,7 @@ def test_joint_moves_that_are_advised_pass(tmp_path, code, start, line):
 
     before = found(line)
     (advised,) = [each for each in before.findings if each.finding.code == code]
-    moves = [angles.split(", ") for angles in ANGLES.findall(remedy_at(advised.finding, advised.joint_moves))]
+    moves = [angles.split(", ") for angles in ANGLES.findall(remedy_at(advised))]
     assert moves
     lines = ["PTP {" + ",".join(f"A{i} {angle}" for i, angle in enumerate(move, 1)) + "}" for move in moves]
     after = found(*lines)
@@ -128,6 +128,13 @@ def test_of_the_solutions_one_is_advised_on_the_way_to_which_the_tool_hardly_tur
     R = forward(motion.placed.arm, motion.start + np.linspace(0, 1, 101)[:, None] * (end - motion.start))[:, :3, :3]
     turned = Rotation.from_matrix(R[0].T @ R).magnitude()
     assert np.degrees(turned.max()) < 15
+    points = forward(motion.placed.arm, motion.start + np.linspace(0, 1, 101)[:, None] * (end - motion.start))[:, :3, 3]
+    way = points[-1] - points[0]
+    off = np.linalg.norm(np.cross(points - points[0], way / np.linalg.norm(way)), axis=1)
+    assert 1000 * off.max() == pytest.approx(advised.off_mm, rel=0.02)
+    assert np.degrees(turned.max()) == pytest.approx(advised.off_deg, rel=0.02)  # the line keeps the orientation
+    first = f"leaves the programmed way by up to {advised.off_mm:.1f} mm and tilts by up to {advised.off_deg:.1f} deg"
+    assert first in remedy_at(advised).split(": ")[0]
 
 
 def test_what_no_joint_move_mends_says_so_by_not_advising_one(tmp_path):
@@ -135,7 +142,7 @@ def test_what_no_joint_move_mends_says_so_by_not_advising_one(tmp_path):
     options = CheckOptions(start=np.radians([0, -10, -10, 0, -70, 0]), scene=SCENE)
     found = check_program(read_program(tmp_path / "a.src"), ROBOT, options).findings
     assert [(each.finding.code, each.joint_moves) for each in found] == [("motion_collides", ())]
-    assert "joint move" not in remedy_at(found[0].finding, found[0].joint_moves)
+    assert "joint move" not in remedy_at(found[0])
 
 
 def rapid(*lines: str) -> str:

@@ -176,7 +176,10 @@ def test_a_line_past_a_singular_pose_is_told_by_it_then_by_what_weighs_most_then
     assert fault.cause.endswith(": J4 and J6 in line")
     limit, rates = fault.moments
     assert limit.what.startswith("J4 goes above its upper limit of 180 deg")
-    assert rates.what == "J4, J5, J6 exceed the assumed limits, at worst by more than 10 times"
+    assert rates.what == (
+        "J4, J5, J6 exceed the assumed limits: J4 needs about 3800 of 360 deg/s, "
+        "J4 needs about 160\u202f000 of 1440 deg/s²"
+    )
     assert f"t={round(found['above_limit'].program_s, 9)}#singular_line" in fault.address
     report(study, stored["er3a_c60"], tmp_path / "programs.html")
     html = (tmp_path / "programs.html").read_text(encoding="utf-8")
@@ -186,7 +189,25 @@ def test_a_line_past_a_singular_pose_is_told_by_it_then_by_what_weighs_most_then
     shown = next(each for each in motions(load_robot("er3a_c60"), results) if each.name == "singular_line")
     now = [each for each in shown.events if each.t <= found["above_limit"].program_s <= each.until]
     assert {joint for each in now for joint, _ in each.joints} == {4, 5, 6}
-    assert not [each for each in program.findings if re.search(r"\d\u202f\d{3}", say(each.finding))]
+    assert not [each for each in program.findings if re.search(r"\d\u202f\d*[1-9]\d* deg", say(each.finding))]
+
+
+@pytest.mark.long
+def test_a_fault_in_a_loop_names_its_round_and_each_fault_leads_to_its_moment(stored):
+    """Of the example's rounds the first ends at x = 380 mm and each further one 10 mm farther; the one that leaves the
+    reach starts at 600 mm."""
+    results = stored["er3a_c60"].results
+    found = {each.name: each for each in faults(results)}
+    worst, first = found["drifting_loop"].moments
+    program = next(each for each in results.summary.programs if each.name == "drifting_loop")
+    rounds = {each.finding.code: each.round for each in program.findings if each.round is not None}
+    assert rounds["way_out_of_reach"] == 2 + round((600 - 380) / 10)
+    assert worst.when.startswith(f"line 10, round {rounds['way_out_of_reach']}, 0.01 s into it (player: ")
+    assert first.when.startswith("line 10, round 14, ")
+    for name in ("drifting_loop", "singular_line", "outside_limits"):
+        for each in found[name].moments:
+            assert each.address == f"programs.html?play={name}&t={round(each.seen_s, 9)}#{name}"
+    assert not [each for each in program.findings if each.motion_s is None and each.round is not None]
 
 
 @pytest.mark.long

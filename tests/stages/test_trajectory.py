@@ -16,6 +16,7 @@ import yaml
 
 from er3a.collision.pairs import LinkAndSolid, PairOverlaps
 from er3a.errors import InputError
+from er3a.files.robot_library import load_robot
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
@@ -44,13 +45,14 @@ from er3a.pipeline.stages.trajectory.model import (
     TrajectoryResults,
     TriedStrategy,
 )
-from er3a.pipeline.stages.trajectory.played import faults
+from er3a.pipeline.stages.trajectory.played import faults, motions
 from er3a.pipeline.stages.trajectory.record import record
 from er3a.pipeline.stages.trajectory.report import report, strategies_shown
 from er3a.pipeline.study import Study, load_study
 from er3a.pipeline.teach import panel
 from er3a.pipeline.teach.panel import write_teach_page
 from er3a.pipeline.viewing.index import write_index
+from er3a.pipeline.viewing.tray import Meeting
 from er3a.planning import tool_proof
 from er3a.planning.avoidance.strategies import STRATEGIES
 from er3a.planning.motion_faults import AboveLimit
@@ -635,9 +637,58 @@ def test_what_is_undecided_beside_another_fault_is_no_open_question(results):
     path = by_name(results["er3a_c60"])["line_wrist_near"]
     part = path.undecided[0]
     assert path.verdict != "undecided"
-    assert cause_text(path, part).endswith("singular pose is met; the path is not safe in either case")
+    away = replace(path, singularities=(), verdict="too fast")
+    assert cause_text(away, part).endswith("singular pose is met; the path is not safe in either case")
+    assert cause_text(replace(away, verdict=path.verdict), part).endswith("singular pose is met")
     assert "either way" not in cause_text(replace(path, verdict="undecided"), part)
     assert "either way" not in cause_text(path, path.too_fast[0])
+
+
+def test_a_pass_beside_which_the_bounds_leave_it_open_is_told_in_one_sentence_everywhere(results):
+    """By table and player, also of the repair that keeps the path, at its own time."""
+    found = results["er3a_c60"]
+    path = by_name(found)["line_wrist_near"]
+    (event,) = path.singularities
+    text = cause_text(path, path.undecided[0])
+    start, end = path.undecided[0].t0_s, path.undecided[-1].t1_s
+    assert text == (
+        f"sampled, it passes the wrist singularity at {event.distance_deg:.3g} deg; between t = {start:.4g} and "
+        f"{end:.4g} s the bounds can't decide everywhere whether it is met"
+    )
+    shown = {each.name: each.events for each in motions(load_robot("er3a_c60"), found)}
+    (own,) = (each for each in shown[path.name] if "sampled" in each.text)
+    assert (own.t, own.until, own.text) == (start, end, f"near-singular: {text}")
+    assert not [each for each in shown[path.name] if "undecided" in each.text]
+    assert path.strategy == "slow"
+    (kept,) = shown[f"{path.name}, repaired"]
+    repair = found.avoidance.take((found.avoidance.path == path.name) & (found.avoidance.strategy == "slow"))
+    at = float(repair.t_s[int(np.argmin(np.abs(repair.q_deg[:, 4])))])
+    assert kept.t < at < kept.until
+    assert kept.text.startswith("near-singular: sampled, it passes the wrist singularity at 1.88 deg")
+
+
+def test_a_path_that_starts_near_singular_lists_that_first_with_its_distance(results):
+    found = results["er3_600"]
+    rows = found.checks.take(found.checks.path == "line_out")
+    (fault,) = (each for each in faults(found) if each.name == "line_out")
+    first = fault.moments[0]
+    assert first.what == f"near-singular at the start: {abs(rows.q_deg[0, 4]):.2f} deg from the wrist singularity"
+    assert (first.when, first.seen_s) == ("0.000 s", 0.0)
+    assert "near-singular" in fault.to_do or any("near-singular" in text for _, text in fault.facts)
+
+
+def test_a_repair_that_meets_the_tray_is_marked_wherever_it_is_offered(study, stored, tmp_path, monkeypatch):
+    """In its row, in the section's answer, beside its programs and in their heads, and in the player."""
+    met = {"line_limits, repaired": Meeting(0.21, "link 4")}
+    monkeypatch.setattr("er3a.pipeline.stages.trajectory.report.met_in_tray", lambda study, stored: met)
+    report(study, replace(stored["er3_600"], rests_on={"validation": "pass"}), tmp_path / "page.html")
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert page.count('data-t="0.21">meets the tray at 0.21 s: link 4</a>') == 3
+    assert page.count('"text": "meets the tray at 0.21 s: link 4"') == 1
+    for file, packed in re.findall(r'download="([^"]+)" data-packed="([^"]+)"', page):
+        text = gzip.decompress(base64.b64decode(packed)).decode()
+        told = "er3a: meets the tray that the workspace page places at 0.21 s" in text
+        assert told == (file.startswith("line_limits_repaired") and not file.endswith((".dat", ".var")))
 
 
 def test_the_readme_tells_of_the_path_that_it_shows_as_the_stage_does(results):

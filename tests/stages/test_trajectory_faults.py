@@ -15,6 +15,7 @@ from er3a.collision.bodies import Bodies
 from er3a.files.path_file import load_paths
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
+from er3a.pipeline.messages.planning import times_needed
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.messages.trajectory import (
     _rates,
@@ -386,13 +387,15 @@ def test_a_fault_of_rates_tells_all_its_joints_until_the_last_of_what_adjoins_is
     assert "J1" not in _rates([again, *parts])
 
 
-def test_a_rate_far_beyond_its_limit_is_no_figure():
-    """Towards a singular pose it has no bound, and its digits depend on where it was sampled."""
+def test_a_rate_far_beyond_its_limit_is_told_to_two_digits_and_none_where_it_has_no_bound():
+    """Near a singular pose its digits depend on where it was sampled; towards the edge of the reach it has no bound."""
     assert say(TooFastIfAssumed(4, 3600.0, 360.0)).endswith("at worst needing 3600 deg/s")
-    assert say(TooFastIfAssumed(4, 380330.0, 360.0)).endswith("at worst needing more than 10 times that")
-    assert say(AccelerationTooGreatIfAssumed(4, np.inf, 1440.0)).endswith("needing more than 10 times that")
-    (part,) = [stretch(AccelerationTooGreatIfAssumed(4, 161748.0, 1440.0), 1.0, 1.1, 1.05)]
-    assert "at worst J4 needs more than 10 times its 1440 deg/s² at t = 1.05 s" in _rates([part])
+    assert say(TooFastIfAssumed(4, 3786.6, 360.0)).endswith("at worst needing about 3800 deg/s")
+    assert say(TooFastIfAssumed(4, 380330.0, 360.0)).endswith("at worst needing more than 300 times that")
+    assert say(AccelerationTooGreatIfAssumed(4, np.inf, 1440.0)).endswith("needing more than 300 times that")
+    (part,) = [stretch(AccelerationTooGreatIfAssumed(4, 16748.0, 1440.0), 1.0, 1.1, 1.05)]
+    assert "at worst J4 needs about 17\u202f000 of 1440 deg/s² at t = 1.05 s" in _rates([part])
+    assert times_needed(112.0, acceleration=True) == "110 × its acc."
 
 
 def test_what_follows_from_another_fault_is_told_after_it_and_the_singular_pose_first(tmp_path):

@@ -29,7 +29,8 @@ STRATEGIES: dict[StrategyName, str] = {
     "planned": N_("Use another motion instead, planned in joint space"),
 }
 
-FAR = 10.0  # times a limit, beyond which a rate is no figure to act on: near a singular pose it has no bound
+FAR = 10.0  # times a limit, beyond which a rate is told to two digits: the others depend on where it was sampled
+UNBOUNDED = 300.0  # times a limit, beyond which a rate is no figure: towards the edge of the reach it has no bound
 
 
 TEXTS = texts(
@@ -77,10 +78,12 @@ TEXTS = texts(
             "J{joint} exceeds the assumed limit of {limit_deg_s2:g} {unit}/s², at worst needing {needed}"
         ),
         "needed#value": "{value:.0f} {unit}",
+        "needed#about": "about {value} {unit}",
         "needed#far": "more than {times:g} times that",
         "jerk_too_great#needed": "J{joint} would need {needed:.0f} {unit}/s³; its jerk limit is {able:g} {unit}/s³",
         "jerk_too_great#step": "J{joint}'s acceleration has a step; its jerk limit is {able:g} {unit}/s³",
         "rate_needed#value": "J{joint} needs {needed:.0f} of {limit:g} {unit}",
+        "rate_needed#about": "J{joint} needs about {needed} of {limit:g} {unit}",
         "rate_needed#far": "J{joint} needs more than {times:g} times its {limit:g} {unit}",
         "rate_limits#known": "the stated limits",
         "rate_limits#assumed": "the assumed limits",
@@ -109,10 +112,16 @@ def _(found: AccelerationTooGreat | AccelerationTooGreatIfAssumed) -> str:
 
 
 def needed_text(needed: float, ratio: float, unit: str) -> str:
-    """A rate that a joint would need, ``ratio`` times what it has; far beyond that it is no figure."""
+    """A rate that a joint would need, ``ratio`` times what it has; far beyond that it is rounded, then no figure."""
+    if ratio > UNBOUNDED:
+        return sentence("needed#far", times=UNBOUNDED)
     if ratio > FAR:
-        return sentence("needed#far", times=FAR)
+        return sentence("needed#about", value=_two_digits(needed), unit=unit)
     return sentence("needed#value", value=needed, unit=unit)
+
+
+def _two_digits(value: float) -> str:
+    return as_text(float(f"{value:.1e}"), ".0f")
 
 
 @say.register
@@ -133,13 +142,17 @@ def rate_needed(cause: RateCause) -> str:
             needed, limit, per = cause.needed_deg_s2, cause.limit_deg_s2, "/s²"
         case _:
             needed, limit, per = cause.needed_deg_s, cause.limit_deg_s, "/s"
-    parts = {"needed": needed, "limit": limit, "unit": unit_of(cause.slides) + per, "times": FAR}
-    return sentence(f"rate_needed#{'far' if cause.ratio > FAR else 'value'}", joint=cause.joint, **parts)
+    parts = {"joint": cause.joint, "limit": limit, "unit": unit_of(cause.slides) + per}
+    if cause.ratio > UNBOUNDED:
+        return sentence("rate_needed#far", times=UNBOUNDED, **parts)
+    if cause.ratio > FAR:
+        return sentence("rate_needed#about", needed=_two_digits(needed), **parts)
+    return sentence("rate_needed#value", needed=needed, **parts)
 
 
 def times_needed(ratio: float, *, acceleration: bool) -> str:
     """How many times its limit a joint needs, in a few letters."""
-    times = f"> {FAR:g}" if ratio > FAR else as_text(ratio, ".2g")
+    times = f"> {UNBOUNDED:g}" if ratio > UNBOUNDED else f"{float(f'{ratio:.2g}'):g}"
     return sentence("times_needed#acceleration" if acceleration else "times_needed#speed", times=times)
 
 

@@ -13,11 +13,12 @@ from er3a.kinematics.singularity import SingularityType
 from er3a.pipeline.messages.expectations import demonstrated, outcome_word
 from er3a.pipeline.messages.kinematics import branch_word, singular_pose, singularity_word
 from er3a.pipeline.messages.language import N_, alike, tr
-from er3a.pipeline.messages.planning import FAR, needed_text, rate_needed, unit_of
+from er3a.pipeline.messages.planning import UNBOUNDED, needed_text, rate_needed, unit_of
 from er3a.pipeline.messages.say import Plural, by, joined, listed, say, say_as, sentence, texts, word
 from er3a.pipeline.stages.programs.model import FindingAt, ProgramCounts, ProgramSummary
 from er3a.planning.motion_faults import AboveLimit, AccelerationTooGreat, BelowLimit, TooFast
 from er3a.program_check import program_check_findings as found_in
+from er3a.program_check.check_program import LocatedFinding
 from er3a.program_check.program_check_findings import (
     RANKS,
     AcceleratesMoreThanAssumed,
@@ -417,6 +418,16 @@ TEXTS = texts(
             "model they are within limits, speeds and clear, at the joint speed assumed here. On the way the tool "
             "does not go straight."
         ),
+        "remedy.joint_move#off": (
+            "From where this line starts, go by a joint move to the joint angles ({end}) deg, on which the tool leaves "
+            "the programmed way by up to {far:.1f} mm and tilts by up to {turned:.1f} deg from it: in the model it is "
+            "within limits, speeds and clear, at the joint speed assumed here."
+        ),
+        "remedy.joint_moves#off": (
+            "From where this line starts, go by joint moves to the joint angles ({via}) deg, then ({end}) deg, on "
+            "which the tool leaves the programmed way by up to {far:.1f} mm and tilts by up to {turned:.1f} deg from "
+            "it: in the model they are within limits, speeds and clear, at the joint speed assumed here."
+        ),
         "remedy.zone_too_large": "Make the zone {half:.1f} mm at most.",
         "remedy.limit#above": (
             "Give J{joint} {limit:g} {unit} at most; if the target is a pose, turn the tool otherwise there, or move "
@@ -661,8 +672,8 @@ def rates_text(paces: Sequence[Pace]) -> str:
     worst = [min(alike, key=_pace) for kind in kinds if (alike := [each for each in paces if isinstance(each, kind)])]
     limits = sentence("rate_limits#known" if any(known) else "rate_limits#assumed")
     parts = {"joints": joints, "named": ", ".join(f"J{joint}" for joint in joints), "limits": limits}
-    if all(over_limit(each) > FAR for each in worst):
-        return sentence("programs.rates#far", times=FAR, **parts)
+    if all(over_limit(each) > UNBOUNDED for each in worst):
+        return sentence("programs.rates#far", times=UNBOUNDED, **parts)
     return sentence("programs.rates", worst=tuple(map(_pace_needed, worst)), **parts)
 
 
@@ -694,14 +705,16 @@ def singular_cause(found: MeetsSingularity | PassesSingularity) -> str:
     return sentence("programs.cause", finding=found, pose=singular_pose(found.type))
 
 
-def remedy_at(finding: CheckFinding, joint_moves: Sequence[Sequence[float]]) -> str:
-    """What to do about a finding: ``joint_moves`` (deg) that pass, or else what mends it and was not tried here."""
-    if not joint_moves:
-        return remedy(finding)
-    *via, end = [", ".join(alike(row)).replace("−", "-") for row in joint_moves]  # to be copied into a program
-    if via:
-        return sentence("remedy.joint_moves", via=via[0], end=end)
-    return sentence("remedy.joint_move", end=end)
+def remedy_at(found: FindingAt | LocatedFinding) -> str:
+    """What to do about a finding: joint moves that pass, or else what mends it and was not tried here."""
+    if not found.joint_moves:
+        return remedy(found.finding)
+    *via, end = [", ".join(alike(row)).replace("−", "-") for row in found.joint_moves]  # to be copied into a program
+    parts = {"end": end, **({"via": via[0]} if via else {})}
+    form = "remedy.joint_moves" if via else "remedy.joint_move"
+    if found.off_mm is None:
+        return sentence(form, **parts)
+    return sentence(f"{form}#off", far=found.off_mm, turned=found.off_deg, **parts)
 
 
 def _pace(found: Pace) -> float:
@@ -724,21 +737,21 @@ def remedies(findings: Sequence[CheckFinding | FindingAt], program: Iterable[Fin
     """
     located = [each for each in findings if isinstance(each, FindingAt)]
     worst = max((RANKS[each.level] for each in located), default=0)
-    checked: list[tuple[CheckFinding, Sequence[Sequence[float]]]] = [
-        (each, ()) for each in findings if not isinstance(each, FindingAt)
+    checked: list[tuple[CheckFinding, FindingAt | None]] = [
+        (each, None) for each in findings if not isinstance(each, FindingAt)
     ]
-    checked += [(each.finding, each.joint_moves) for each in located if RANKS[each.level] == worst]
+    checked += [(each.finding, each if each.joint_moves else None) for each in located if RANKS[each.level] == worst]
     if any(moves for _, moves in checked):
         checked = [(each, moves) for each, moves in checked if not isinstance(each, PACED)]
     if any(isinstance(each, JointJumps) for each, _ in checked):
         checked = [(each, moves) for each, moves in checked if moves or not isinstance(each, ConfigurationChanges)]
     drifts = [each.finding for each in program if isinstance(each.finding, NotFollowedToEnd)]
     if worst == RANKS["fail"]:
-        checked = [*((each, ()) for each in drifts if each.kind == "drifts"), *checked]
+        checked = [*((each, None) for each in drifts if each.kind == "drifts"), *checked]
     paced = [each for each, _ in checked if isinstance(each, PACED)]
     slowest = min(paced, key=_pace, default=None)
     kept = [(each, moves) for each, moves in checked if not isinstance(each, PACED) or each is slowest]
-    return list(dict.fromkeys(text for each, moves in kept if (text := remedy_at(each, moves))))
+    return list(dict.fromkeys(text for each, moves in kept if (text := remedy_at(moves) if moves else remedy(each))))
 
 
 def cycle_text(program: ProgramSummary) -> str:

@@ -9,6 +9,7 @@ from typing import Any, Literal, NamedTuple
 
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.pairs import LinkAndSolid, ShapesAssumed
+from er3a.kinematics.singularity import SingularityType
 from er3a.pipeline.messages.expectations import demonstrated, outcome_word
 from er3a.pipeline.messages.kinematics import singular_pose, singularity_word
 from er3a.pipeline.messages.language import N_, as_text, with_unit
@@ -19,6 +20,7 @@ from er3a.pipeline.messages.say import Plural, joined, listed, say, say_first, s
 from er3a.pipeline.stages.trajectory import model
 from er3a.planning.motion_faults import JerkTooGreat, RateCause
 from er3a.planning.names import PathVerdict, StrategyName
+from er3a.planning.tool_proof import Undecided
 
 KEY_FIGURES = {
     "safe": N_("Paths that pass in the model, of those meant to"),
@@ -63,6 +65,8 @@ FACTS: dict[FactName, str] = {
     "end": N_("where it may end"),
 }
 """What is said of a motion to be run instead, beside what it is."""
+OPEN_VERDICTS: tuple[PathVerdict, ...] = ("undecided", "too fast for the assumed limits")
+"""Of paths that may be safe all the same, if nothing that is undecided is against it."""
 MAX_PAIRS = 3
 NO_DEVIATION = 0.005  # mm or deg
 NO_TIME = 0.005  # s
@@ -110,6 +114,11 @@ TEXTS = texts(
         "pair_touches": "{pair} overlap from t = {t0_s:.4g} s, up to {depth_mm:.1f} mm at t = {t_s:.4g} s",
         "bodies_overlap.more": "{touches}; and more later",
         "path.either_way": "{open}; the path is not safe in either case",
+        "path.passes_open": (
+            "sampled, it passes the {type} singularity at {distance}; between t = {start:.4g} and {end:.4g} s the "
+            "bounds can't decide everywhere whether it is met"
+        ),
+        "path.near_start": "near-singular at the start: {distance} from the {type} singularity",
         "path.singular": "{type} singularity",
         "path.rates": Plural(
             "joints",
@@ -379,9 +388,37 @@ def _(found: model.BodiesOverlap) -> str:
 def cause_text(path: model.PathSummary, part: model.Stretch) -> str:  # type: ignore[type-arg]
     """Why a stretch of a path is listed; what is undecided is no open question where something else decides."""
     cause = _with_worst(part, say(part.cause))
-    if part in path.undecided and path.verdict != "undecided":
-        return sentence("path.either_way", open=cause)
-    return cause
+    if not isinstance(part.cause, Undecided):
+        return cause
+    for event in path.singularities:
+        if (span := open_beside(path, event)) and span[0] <= part.t0_s and part.t1_s <= span[1]:
+            return passing_text(event, span)
+    return cause if path.verdict in OPEN_VERDICTS else sentence("path.either_way", open=cause)
+
+
+def open_beside(path: model.PathSummary, event: model.Singularity) -> tuple[float, float] | None:
+    """From when to when (s), about a pass of a singular set, it is not decided whether the set is met; None where it
+    is."""
+    own = [part for part in path.undecided if part.cause == Undecided("singular")]
+    start = end = event.t_s
+    for part in sorted(own, key=lambda part: -part.t1_s):
+        if part.t0_s <= event.until_s and part.t1_s >= start - ADJOINING:
+            start = min(start, part.t0_s)
+    for part in sorted(own, key=lambda part: part.t0_s):
+        if part.t1_s >= event.t_s and part.t0_s <= end + ADJOINING:
+            end = max(end, part.t1_s)
+    return None if event.crossing or start == end else (start, end)
+
+
+def passing_text(event: model.Singularity, span: tuple[float, float]) -> str:
+    """How near a path passes a singular set by its samples, and from when to when it may meet it all the same."""
+    parts = {"type": event_word(event), "distance": event_distance(event)}
+    return sentence("path.passes_open", start=span[0], end=span[1], **parts)
+
+
+def near_at_start(kind: SingularityType, distance: str) -> str:
+    """That a path starts so near a singular set; ``distance`` with its unit."""
+    return sentence("path.near_start", type=singularity_word(kind), distance=distance)
 
 
 class Told(NamedTuple):

@@ -44,14 +44,15 @@ class Mark:
 @dataclass(frozen=True)
 class FaultMoment:
     """One thing that is wrong: ``when``, or in which line, and ``place``, how far along and where the tool point is
-    then; both empty where not known. ``seen_s``: when the player shows it best; ``row``: the id of the line that it is
-    in, on the page."""
+    then; both empty where not known. ``seen_s``: when the player shows it best, at ``address`` on the robot's pages;
+    ``row``: the id of the line that it is in, on the page."""
 
     what: str
     when: str = ""
     place: str = ""
     seen_s: float | None = None
     row: str = ""
+    address: str = ""
 
 
 @dataclass(frozen=True)

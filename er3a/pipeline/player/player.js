@@ -178,7 +178,8 @@ function failing() {
   return new Map(now.flatMap(({ status, joints }) => joints.map(([j, needed]) => [j, { status, needed }])));
 }
 
-/** Joint values with their margins; those that fail are marked, or else the least of those in deg, and of those in mm. */
+/** Joint values with their margins; those that fail are marked, or else the least of those in deg, and of those in mm, is
+ * named. */
 function tellJoints() {
   const values = valuesAt(motion.times, motion.values[0], t).map((value, j) => value * (table.slides[j] ? 1000 : 180 / Math.PI));
   const rooms = data.joints.map(({ lower, upper }, i) => (lower === null ? Infinity : Math.min(values[i] - lower, upper - values[i])));
@@ -186,11 +187,14 @@ function tellJoints() {
   const quiet = fails.size === 0 && !motion.events.some((event) => isNow(event) && (event.status === "fail" || event.bodies.length));
   const least = new Map();
   data.joints.forEach(({ unit }, i) => (rooms[i] < (rooms[least.get(unit)] ?? Infinity) ? least.set(unit, i) : null));
+  const withUnit = (value, unit) => fixed(value, 1) + (unit === "°" ? unit : ` ${unit}`);
+  const nearest = [...least].filter(([, i]) => quiet && rooms[i] > -0.05).map(([unit, i]) => words.nearest_joint.replace("{joint}", `J${i + 1}`).replace("{room}", withUnit(rooms[i], unit)));
+  show(part("nearest"), nearest.length ? words.nearest.replace("{joints}", nearest.join(words.between)) : "");
   data.joints.forEach(({ unit }, i) => {
     const fault = fails.get(i + 1);
     const past = rooms[i] <= -0.05; // what one decimal shows
     const text = rooms[i] === Infinity ? words.unlimited : past ? words.beyond : words.room;
-    show(cells[i].value, fixed(values[i], 1) + (unit === "°" ? unit : ` ${unit}`));
+    show(cells[i].value, withUnit(values[i], unit));
     show(cells[i].room, fault?.needed || text.replace("{room}", fixed(Math.abs(rooms[i]), 1)));
     cells[i].place.classList.toggle("least", quiet && least.get(unit) === i);
     cells[i].place.classList.toggle("doubtful", fault?.status === "caution");

@@ -58,8 +58,10 @@ WORDS = {
     "clock": N_("t = {t} s of {end} s"),
     "joints": N_(
         "Joint values at this moment, and how far each is from the nearer of its limits. ✕ and ▲ mark joints that fail "
-        "then, with what they would need; if none does, ▲ marks the least."
+        "then, with what they would need."
     ),
+    "nearest": N_("Nearest its limit: {joints}."),
+    "nearest_joint": N_("{joint}, {room}"),
     "room": N_("{room} to limit"),
     "beyond": N_("{room} beyond"),
     "unlimited": N_("no limit"),

@@ -558,7 +558,7 @@ function nameHeading(heading, taken) {
   heading.append(" ", link);
 }
 
-// A list of the sections that stays in sight and names the one that is read.
+// A list of the sections that stays in sight and names the robot and the section that is read.
 function addContents() {
   const wide = matchMedia(document.body.classList.contains("wide") ? "not all" : "(min-width: 80rem)");
   const headings = [...document.querySelectorAll("main h2")];
@@ -577,6 +577,9 @@ function addContents() {
     return link;
   });
   const summary = document.createElement("summary");
+  const [robot, place] = [document.createElement("b"), document.createElement("span")];
+  robot.textContent = document.querySelector("main").dataset.robot ?? "";
+  summary.append(...(robot.textContent ? [robot, " "] : []), place);
   const details = document.createElement("details");
   details.append(summary, list);
   details.addEventListener("click", (event) => event.target.closest("a") && !wide.matches && (details.open = false));
@@ -591,7 +594,7 @@ function addContents() {
   addEventListener("keydown", (event) => event.key === "Escape" && !wide.matches && (details.open = false));
   const tell = () => {
     const read = headings.findLastIndex((heading) => heading.checkVisibility() && heading.getBoundingClientRect().top < 120);
-    summary.textContent = read < 0 || wide.matches ? WORDS.contents : WORDS.contents + WORDS.colon + titles[read];
+    place.textContent = read < 0 || wide.matches ? WORDS.contents : WORDS.contents + WORDS.colon + titles[read];
     links.forEach((link, i) => (i === read ? link.setAttribute("aria-current", "true") : link.removeAttribute("aria-current")));
   };
   list.addEventListener("click", (event) => {

@@ -132,6 +132,11 @@ class Meeting:
     t: float
     body: str
 
+    @property
+    def text(self) -> str:
+        """When, and with what."""
+        return tr("meets the tray at {t:.2f} s: {body}", t=self.t, body=self.body)
+
 
 def trays(workspace: Any) -> list[Tray]:
     """The tray at its best place, then at the best ones on or over other surfaces; empty if these results put none."""
@@ -364,16 +369,20 @@ def placing_of(study: Study, stored: Stored[Any]) -> Placing | None:
     return placing(found, study.robot(stored.robot), scenes, sound)
 
 
-def in_tray(study: Study, stored: Stored[Any]) -> Mapping[str, Markup] | None:
-    """Of each motion of a stage that meets the tray when it first does, as a link to that moment; None where no place
-    of the tray is known."""
+def met_in_tray(study: Study, stored: Stored[Any]) -> Mapping[str, Meeting] | None:
+    """Of each motion of a stage that meets the tray when it first does; None where no place of the tray is known."""
     found = placing_of(study, stored)
-    if found is None:
-        return None
-    return {
-        name: moment(name, each.t, tr("meets the tray at {t:.2f} s: {body}", t=each.t, body=each.body))
-        for name, each in found.met.get(stored.stage, {}).items()
-    }
+    return None if found is None else found.met.get(stored.stage, {})
+
+
+def in_tray(study: Study, stored: Stored[Any]) -> Mapping[str, Markup] | None:
+    """The same as links to these moments."""
+    return linked(met_in_tray(study, stored))
+
+
+def linked(met: Mapping[str, Meeting] | None) -> Mapping[str, Markup] | None:
+    """When motions meet the tray, as links to these moments of the page's player."""
+    return None if met is None else {name: moment(name, each.t, each.text) for name, each in met.items()}
 
 
 def compared_with_tray(met_it: Collection[str] | None) -> str:

@@ -157,6 +157,7 @@ def _summary(entry: ProgramEntry, check: ProgramCheck, starts: Mapping[int, floa
     levels = [OUTCOMES[verdict.level] for verdict in check.verdicts]
     clear = [verdict.least_clearance_mm for verdict in check.verdicts if verdict.least_clearance_mm is not None]
     found = [each for each in check.findings if not isinstance(each.finding, PairsUnexamined)]  # the verdict says it
+    rounds = _rounds(check, starts)
     return model.ProgramSummary(
         name=entry.name,
         title=entry.title,
@@ -172,13 +173,22 @@ def _summary(entry: ProgramEntry, check: ProgramCheck, starts: Mapping[int, floa
         failed=levels.count("fail"),
         cycle=check.cycle,
         least_clearance_mm=min(clear, default=None),
-        findings=tuple(_finding_at(each, starts) for each in found),
+        findings=tuple(_finding_at(each, starts, rounds) for each in found),
         not_examined=tuple(sorted({each.place.line for each in check.not_examined if each.what != "way"})),
     )
 
 
-def _finding_at(each: LocatedFinding, starts: Mapping[int, float]) -> model.FindingAt:
-    """``starts``: when (s) steps of the way that is kept begin."""
+def _rounds(check: ProgramCheck, starts: Mapping[int, float]) -> dict[int, int]:
+    """Of each step of the way that is kept at which time its line is carried out there, from 1; none of lines that are
+    once."""
+    times: dict[Place, list[int]] = {}
+    for number in starts:
+        times.setdefault(check.execution.steps[number].place, []).append(number)
+    return {number: k for numbers in times.values() if len(numbers) > 1 for k, number in enumerate(numbers, 1)}
+
+
+def _finding_at(each: LocatedFinding, starts: Mapping[int, float], rounds: Mapping[int, int]) -> model.FindingAt:
+    """``starts``: when (s) steps of the way that is kept begin; ``rounds``: as of :func:`_rounds`."""
     own = None if each.moment is None else float(each.moment)
     start = None if each.step is None else starts.get(each.step)
     return model.FindingAt(
@@ -190,7 +200,10 @@ def _finding_at(each: LocatedFinding, starts: Mapping[int, float]) -> model.Find
         _without_path(each.finding),
         own,
         None if own is None or start is None else start + own,
+        None if each.step is None or own is None or start is None else rounds.get(each.step),
         each.joint_moves,
+        each.off_mm,
+        each.off_deg,
     )
 
 

@@ -55,7 +55,9 @@ class FindingAt:
     file : the name of the file that holds the line
     motion_s : s from the start of the instruction's motion, when it begins; None of what is about a motion as a whole
     program_s : the same on the clock of the table of motion; None off the way that is kept there
+    round : of a line that is carried out more than once on that way, at which time that is, from 1
     joint_moves : (n,) each, deg: joint moves, one or two, that take the tool where the motion does, and pass
+    off_mm, off_deg : by how much the tool leaves the motion's line or arc on these; None of a joint motion
     """
 
     file: str
@@ -66,7 +68,10 @@ class FindingAt:
     finding: CheckFinding
     motion_s: float | None = None
     program_s: float | None = None
+    round: int | None = None
     joint_moves: tuple[tuple[float, ...], ...] = ()
+    off_mm: float | None = None
+    off_deg: float | None = None
 
 
 @dataclass(frozen=True)

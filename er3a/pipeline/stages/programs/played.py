@@ -150,7 +150,8 @@ def _moment(program: ProgramSummary, found: FindingAt, rows: ProgramMotion) -> F
         fastest = _fastest(found.finding.joint, rows.take((rows.line == found.line) & (rows.t_s >= seen - MOMENT)))
         if fastest is not None and fixed(fastest, 2) != fixed(seen, 2):
             where, seen = tr("{when}, fastest at {time} s", when=where, time=fixed(fastest, 2)), fastest
-    return FaultMoment(text, where, _place(found, rows), seen, row)
+    address = "" if seen is None else address_of("programs", program.name, seen, program.name)
+    return FaultMoment(text, where, _place(found, rows), seen, row, address)
 
 
 def _fastest(joint: int, rows: ProgramMotion) -> float | None:
@@ -181,6 +182,8 @@ def _where(program: ProgramSummary, found: FindingAt) -> str:
         return joined([found.file, line], ", ")
     if found.program_s is None or found.motion_s is None:
         return line
+    if found.round is not None:
+        line = tr("{line}, round {round}", line=line, round=found.round)
     own, clock = fixed(found.motion_s, 2), fixed(found.program_s, 2)
     return tr("{line}, {own} s into it (player: {clock} s)", line=line, own=own, clock=clock)
 

@@ -75,7 +75,7 @@ def _section(results: model.ProgramsResults, program: model.ProgramSummary) -> d
             found[each.line].append(each)
         else:
             line = str(each.line) if each.line else "–"
-            to_do = remedy_at(each.finding, each.joint_moves) or "–"
+            to_do = remedy_at(each) or "–"
             elsewhere.append([each.file, line, level_word(each.level), _remark(program.name, each), to_do])
     text = results.lines.take(results.lines.program == program.name)
     rows = results.instructions.take(results.instructions.program == program.name)
@@ -99,6 +99,8 @@ def _remark(name: str, each: model.FindingAt) -> Markup:
     if each.motion_s is None:
         return text
     at = tr("from {time} s into this line on", time=fixed(each.motion_s, 2))
+    if each.round is not None:
+        at = tr("round {round}, {at}", round=each.round, at=at)
     if each.program_s is not None:
         at = bracketed(at, tr("player: {time} s", time=fixed(each.program_s, 2)))
     shown = escape(at) if each.program_s is None else moment(name, each.program_s, at)

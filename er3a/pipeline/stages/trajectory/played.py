@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from er3a.collision.pairs import ShapesAssumed
+from er3a.kinematics.singularity import SingularityType
 from er3a.pipeline.messages.expectations import as_expected, outcome_words
-from er3a.pipeline.messages.language import own_title, tr
+from er3a.pipeline.messages.language import own_title, tr, with_unit
 from er3a.pipeline.messages.planning import rate_needed, times_needed
 from er3a.pipeline.messages.programs import remedy, say
 from er3a.pipeline.messages.say import joined, sentence
@@ -26,6 +28,9 @@ from er3a.pipeline.messages.trajectory import (
     event_word,
     fact_word,
     first_faults,
+    near_at_start,
+    open_beside,
+    passing_text,
     path_text,
     repair_facts,
     repair_lead,
@@ -59,19 +64,29 @@ WEIGHTS: dict[PathVerdict, Weight] = {
 }
 
 
-def motions(robot: Robot, results: model.TrajectoryResults) -> list[PlayedMotion]:
-    """The paths as programmed, as far as the arm reaches them, each followed by the motion that repairs it."""
+def motions(
+    robot: Robot, results: model.TrajectoryResults, more: Mapping[str, PlayedEvent] | None = None
+) -> list[PlayedMotion]:
+    """The paths as programmed, as far as the arm reaches them, each followed by the motion that repairs it.
+
+    ``more``: an event of motions, by their names.
+    """
+
+    def added(name: str) -> list[PlayedEvent]:
+        return [more[name]] if more and name in more else []
+
     checks, avoidance, motions = results.checks, results.avoidance, []
     for path in worst_first(results.summary.paths):
         rows = checks.take((checks.path == path.name) & checks.reachable)
         near = near_assumed(path, results.summary)
         text = say(near) if near else path_text(path)
-        seen = [*events(path), *_near_events(path, near, results.clearance)]
+        seen = [*events(path), *_near_events(path, near, results.clearance), *added(path.name)]
         motions.append(PlayedMotion(path.name, text, rows.t_s, meant(robot, rows.q_deg), seen, contact(path)))
         if path.chosen:
             repair = avoidance.take((avoidance.path == path.name) & (avoidance.strategy == path.strategy))
             text = repair_lead(path, slowed(path, rows, repair))
-            motions.append(PlayedMotion(repaired(path), text, repair.t_s, meant(robot, repair.q_deg)))
+            q, seen = meant(robot, repair.q_deg), [*_kept_passes(path, rows, repair), *added(repaired(path))]
+            motions.append(PlayedMotion(repaired(path), text, repair.t_s, q, seen))
     return motions
 
 
@@ -89,12 +104,13 @@ def faults(results: model.TrajectoryResults) -> list[Fault]:
         if model.is_safe(path, results.summary.verdict.shapes):
             continue
         clearance = path.clearance if path.verdict == "safe" else None
-        wrong = [Told(clearance.t_s, say(near), clearance.t_s)] if clearance else _faults(path)
-        status, verdict = shown_verdict(path, near)
         rows = results.checks.take(results.checks.path == path.name)
+        wrong = [Told(clearance.t_s, say(near), clearance.t_s)] if clearance else _faults(path)
+        wrong = [*_near_at_start(path, rows, results.summary.near), *wrong]
+        status, verdict = shown_verdict(path, near)
         own = results.avoidance.take(results.avoidance.path == path.name)
         to_do, facts, instead = _to_do(path, rows, own, results.summary)
-        moments = tuple(_moment(told, rows) for told in wrong)
+        moments = tuple(_linked(_moment(told, rows), path.name) for told in wrong)
         found.append(
             Fault(
                 path.name,
@@ -123,6 +139,22 @@ def _faults(path: model.PathSummary) -> list[Told] | list[FaultMoment]:
     return found
 
 
+def _near_at_start(path: model.PathSummary, rows: model.PathChecks, near: model.NearThresholds) -> list[Told]:
+    """That a path without a repair is near-singular from its start on, unless another fault is told of that moment."""
+    if path.chosen or path.in_joint_space or not len(rows) or not rows.near_singular[0]:
+        return []
+    if any(event.t_s <= rows.t_s[0] for event in path.singularities):
+        return []
+    parts: list[tuple[float, SingularityType, str]] = [
+        (abs(rows.wrist_deg[0]) / near.wrist_deg, "wrist", with_unit(fixed(abs(rows.wrist_deg[0]), 2), "deg")),
+        (abs(rows.elbow_deg[0]) / near.elbow_deg, "elbow", with_unit(fixed(abs(rows.elbow_deg[0]), 2), "deg")),
+        (abs(rows.shoulder_mm[0]) / near.shoulder_mm, "shoulder", f"{fixed(abs(rows.shoulder_mm[0]), 1)} mm"),
+    ]
+    share, kind, distance = min((part for part in parts if np.isfinite(part[0])), default=(np.inf, "wrist", ""))
+    start = float(rows.t_s[0])
+    return [Told(start, near_at_start(kind, distance), start)] if share <= 1 else []
+
+
 def _moment(told: Told | FaultMoment, rows: model.PathChecks) -> FaultMoment:
     """A fault of a path with its time, when it is worst, and its place then, between the path's rows."""
     if isinstance(told, FaultMoment):
@@ -135,6 +167,15 @@ def _moment(told: Told | FaultMoment, rows: model.PathChecks) -> FaultMoment:
     far, *xyz = (float(np.interp(told.seen_s, rows.t_s, values)) for values in (1000 * rows.s_m, *rows.xyz_mm.T))
     place = tr("{far} mm, ({xyz})", far=fixed(far, 0), xyz=", ".join(fixed(value, 0) for value in xyz))
     return FaultMoment(told.text, when, place if np.isfinite([far, *xyz]).all() else "", told.seen_s)
+
+
+def _linked(moment: FaultMoment, path: str) -> FaultMoment:
+    """A moment with its address, where the player shows it."""
+    return (
+        moment
+        if moment.seen_s is None
+        else replace(moment, address=address_of("trajectory", path, moment.seen_s, path))
+    )
 
 
 def _assumed(part: model.Stretch[Any]) -> bool:
@@ -242,8 +283,10 @@ def near_assumed(path: model.PathSummary, summary: model.TrajectorySummary) -> C
 
 def events(path: model.PathSummary) -> list[PlayedEvent]:
     """Singular poses and faults of a path."""
-    passes = [PlayedEvent(e.t_s, e.until_s, _singular(e), "caution") for e in path.singularities]
+    passes = [_pass(e, open_beside(path, e)) for e in path.singularities]
+    told = {passing_text(e, span) for e in path.singularities if (span := open_beside(path, e))}
     faults = [(kind, stretch) for kind, stretches in kinds(path) for stretch in stretches]
+    faults = [(kind, stretch) for kind, stretch in faults if cause_text(path, stretch) not in told]
     return passes + [
         PlayedEvent(
             s.t0_s,
@@ -255,6 +298,32 @@ def events(path: model.PathSummary) -> list[PlayedEvent]:
         )
         for kind, s in faults
     ]
+
+
+def _pass(event: model.Singularity, span: tuple[float, float] | None) -> PlayedEvent:
+    """A singular pose or a pass by one, as long as it is not decided which."""
+    if span is None:
+        return PlayedEvent(event.t_s, event.until_s, _singular(event), "caution")
+    return PlayedEvent(*span, tr("near-singular: {type}", type=passing_text(event, span)), "caution")
+
+
+def _kept_passes(path: model.PathSummary, rows: model.PathChecks, repair: model.AvoidanceRows) -> list[PlayedEvent]:
+    """The passes by singular poses of a motion that repairs a path and keeps to it: at its times."""
+    if path.strategy != "slow" or len(repair) < 2 or len(rows) < 2:
+        return []
+    way = np.append(0.0, np.linalg.norm(np.diff(repair.xyz_mm, axis=0), axis=1).cumsum()) / 1000
+    if not np.isfinite(way[-1]) or way[-1] < LEAST_WAY:
+        return []
+
+    def later(t: float) -> float:
+        return float(np.interp(np.interp(t, rows.t_s, rows.s_m), way, repair.t_s))
+
+    found = []
+    for event in path.singularities:
+        span = open_beside(path, event)
+        moved = replace(event, t_s=later(event.t_s), until_s=later(event.until_s))
+        found.append(_pass(moved, span and (later(span[0]), later(span[1]))))
+    return found
 
 
 def _few_words(path: model.PathSummary, part: model.Stretch[Any]) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ from er3a.collision.pairs import Pair
 from er3a.pipeline.messages.collision import solid_rows
 from er3a.pipeline.messages.expectations import as_expected
 from er3a.pipeline.messages.kinematics import branch_word
-from er3a.pipeline.messages.language import N_, tr, with_unit
+from er3a.pipeline.messages.language import N_, tr, using, with_unit
 from er3a.pipeline.messages.planning import FAR
 from er3a.pipeline.messages.say import bracketed, joined, say
 from er3a.pipeline.messages.trajectory import (
@@ -22,10 +22,13 @@ from er3a.pipeline.messages.trajectory import (
     event_word,
     kind_word,
     limits_assumed,
+    open_beside,
+    passing_text,
     path_text,
     reasons,
     strategy_word,
 )
+from er3a.pipeline.player.motions import PlayedEvent
 from er3a.pipeline.player.player import drawing_head, moment, player
 from er3a.pipeline.results import LeftOut, Stored
 from er3a.pipeline.settings import TrajectorySettings
@@ -36,6 +39,7 @@ from er3a.pipeline.stages.trajectory.played import (
     kinds,
     motions,
     near_assumed,
+    repaired,
     shown_verdict,
     worst_first,
 )
@@ -45,7 +49,7 @@ from er3a.pipeline.viewing.conditions import condition_of, program_head
 from er3a.pipeline.viewing.figures import readings
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import packed_text, render_stage
-from er3a.pipeline.viewing.tray import compared_with_tray, in_tray
+from er3a.pipeline.viewing.tray import Meeting, compared_with_tray, linked, met_in_tray
 from er3a.programs.languages import titles_unwritten
 from er3a.programs.writing import with_head_lines
 from er3a.robots.robot import Robot
@@ -65,11 +69,11 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
     box_asked = "workspace" in study.stages(stored.robot) and not contradicted
     boxes = [LeftOut("placed_box")] if box_asked else []
     lines = program_head(stored.validated, [*summary.not_examined, *boxes])
+    met = None if contradicted else met_in_tray(study, stored)
     for i, path in enumerate(paths):
         rows, own = checks.take(checks.path == path.name), avoidance.take(avoidance.path == path.name)
-        links = _programs(
-            results.programs.take((results.programs.path == path.name) & (i < count and not contradicted)), lines
-        )
+        files = results.programs.take((results.programs.path == path.name) & (i < count and not contradicted))
+        links = _programs(path, files, lines, met or {})
         drawn = _figure(figure, robot, path, rows, own, summary.near) if i < count else None
         sections.append(_section(path, rows, own, drawn, links, summary))
     assumed = [f"J{j + 1}" for j, is_assumed in enumerate(summary.joint_limits.speed_assumed) if is_assumed]
@@ -79,7 +83,7 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         output,
         head_links={path.name: f"#{path.name}" for path in summary.paths},
         sections=sections,
-        entered=None if contradicted else in_tray(study, stored),
+        entered=linked(met),
         compared_with_tray=compared_with_tray,
         faults={fault.name: fault for fault in faults(results)},
         unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
@@ -91,10 +95,14 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         contradicted=contradicted,
         drawn_paths=count,
         turning=in_space(robot, results, paths[:count], scene),
-        player=player(robot, motions(robot, results), scene),
+        player=player(robot, motions(robot, results, _tray_events(met or {})), scene),
         drawing_head=drawing_head(),
         condition=condition_of(stored.validated),
     )
+
+
+def _tray_events(met: Mapping[str, Meeting]) -> dict[str, PlayedEvent]:
+    return {name: PlayedEvent(each.t, each.t, each.text, "caution") for name, each in met.items()}
 
 
 def _assumed_speeds(limits: model.LimitsUsed, robot: Robot) -> str:
@@ -107,14 +115,28 @@ def _assumed_speeds(limits: model.LimitsUsed, robot: Robot) -> str:
     return joined([bracketed(speed, ", ".join(named)) for speed, named in joints.items()], ", ")
 
 
-def _programs(rows: model.ProgramFiles, head: Sequence[str]) -> list[dict[str, Any]]:
-    """The files to save, each with further lines at the beginning of its head."""
+def _programs(
+    path: model.PathSummary, rows: model.ProgramFiles, head: Sequence[str], met: Mapping[str, Meeting]
+) -> list[dict[str, Any]]:
+    """The files to save, each with further lines at the beginning of its head: ``head``, and in English when it meets
+    the tray; ``met``: by names of motions."""
     speeds = [
         ", ".join(with_unit(*speed.split(" ", 1)) for speed in text.split(", ") if speed)
         for text in rows.assumed_speed.tolist()
     ]
-    texts = zip(rows.file.tolist(), [with_head_lines(text, head) for text in rows.text.tolist()], speeds)
-    return [dict(file=file, packed=packed_text(text), empty=not text, assumed=speed) for file, text, speed in texts]
+    texts = zip(rows.file.tolist(), rows.text.tolist(), speeds)
+    found = [dict(file=file, text=text, empty=not text, assumed=speed) for file, text, speed in texts]
+    for each in found:
+        meeting = met.get(repaired(path) if _repairs(path, each) else path.name)
+        each["packed"] = packed_text(with_head_lines(each.pop("text"), [*head, *_in_head(meeting)]))
+    return found
+
+
+def _in_head(meeting: Meeting | None) -> list[str]:
+    with using("en"):
+        return (
+            [] if meeting is None else [tr("meets the tray that the workspace page places at {t:.2f} s", t=meeting.t)]
+        )
 
 
 def _section(
@@ -138,7 +160,7 @@ def _section(
         near=near is not None,
         branches=[branch_word(label) for label in path.branches],
         speed=_speed(path, summary.joint_limits),
-        events=[_event_row(path.name, event) for event in path.singularities],
+        events=[_event_row(path, event) for event in path.singularities],
         faults=_faults(path),
         strategies=strategies_shown(path),
         programs=[each for each in programs if not _repairs(path, each)],
@@ -289,9 +311,10 @@ def _speed(path: model.PathSummary, limits: model.LimitsUsed) -> str:
     return f"{fixed(speeds[joint], 1)}{unit} (J{joint + 1})"
 
 
-def _event_row(path: str, event: model.Singularity) -> list[str]:
+def _event_row(path: model.PathSummary, event: model.Singularity) -> list[str]:
     until = f" – {fixed(event.until_s, 3)}" if event.until_s > event.t_s else ""
-    when = moment(path, event.t_s, fixed(event.t_s, 3) + until)
+    when, span = moment(path.name, event.t_s, fixed(event.t_s, 3) + until), open_beside(path, event)
     if event.crossing:
         return [event_word(event), when, tr("meets it"), "0"]
-    return [event_word(event), when, tr("passes by"), event_distance(event)]
+    how = tr("passes by") if span is None else passing_text(event, span)
+    return [event_word(event), when, how, event_distance(event)]
