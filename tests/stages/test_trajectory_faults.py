@@ -420,7 +420,7 @@ def test_what_follows_from_another_fault_is_told_after_it_and_the_singular_pose_
     known = [replace(part, cause=TooFast(4, 762.0, 360.0)) for part in near.too_fast if part.cause.code[:4] == "too_"]
     assumed = [part for part in near.too_fast if part.cause.code[:4] != "too_"]
     both = first_faults(replace(near, too_fast=(*assumed, *known)))
-    assert ["known" in each.text for each in both] == [True, False]
+    assert ["the stated limits" in each.text for each in both] == [True, False]
     assert both[1].t_s < both[0].t_s
 
 
