@@ -72,7 +72,7 @@ def deciding(program: syntax.Program, modal: frozenset[str]) -> frozenset[str]:
             assigned.add(name)
             sources[name] |= used
     for routine in program.routines.values():
-        assigned |= {parameter.name for parameter in routine.parameters}
+        assigned |= {parameter.name for parameter in routine.parameters} | routine.unsettled
     waiting = list(needed)
     while waiting:
         for name in sources.get(waiting.pop(), set()) - needed:
@@ -124,8 +124,9 @@ def _next(operation: syntax.Operation) -> tuple[str, ...]:
 
 def _changed_in(program: syntax.Program, names: Iterable[str], dialect: Dialect) -> frozenset[str]:
     """Variables, not local ones, that routines change."""
-    code = [op for name in names for op in program.routines[name].code]
-    return frozenset(each for op in code for each in _shared(program, op, dialect))
+    routines = [program.routines[name] for name in names]
+    changed = {each for routine in routines for op in routine.code for each in _shared(program, op, dialect)}
+    return frozenset(changed.union(*(routine.unsettled for routine in routines)))
 
 
 def _given_back(program: syntax.Program, name: str, arguments: Iterable[syntax.Expression | None]) -> set[str]:
@@ -283,7 +284,10 @@ def _changes(program: syntax.Program) -> dict[str, set[str]]:
     """Variables that each routine may change, with those that it calls."""
     return _gathered(
         program,
-        {name: {each for op in routine.code for each in _changed(op)} for name, routine in program.routines.items()},
+        {
+            name: {each for op in routine.code for each in _changed(op)} | routine.unsettled
+            for name, routine in program.routines.items()
+        },
     )
 
 
@@ -945,8 +949,11 @@ class Machine:
                 memory.forget(target_name(target))
             else:
                 memory.assign(target, known(frame.local.get(name), name))
+        for name in frame.routine.unsettled - frame.local.keys():  # what a handler may have changed stays so
+            memory.forget(name)
         if frame.result:
-            memory.write(frame.result, value, local=True)
+            unsettled = syntax.RETURNED in frame.routine.unsettled
+            memory.write(frame.result, syntax.Unclear(frame.routine.name) if unsettled else value, local=True)
 
     def _drifts(self, way: ExecutionPath, routine: str, at: int) -> bool:
         rounds = way.rounds.get((routine, at), 0) + 1

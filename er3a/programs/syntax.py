@@ -352,7 +352,7 @@ class Routine:
     Attributes
     ----------
     thread : whether it runs beside the program, so that a run of the program does not carry it out
-    unsettled : variables that a handler of its errors may change at any time
+    unsettled : what a handler of its errors may set at any time: variables, settings, ``RETURNED`` for its value
     """
 
     name: str

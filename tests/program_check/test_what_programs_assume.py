@@ -323,3 +323,25 @@ def test_a_program_that_is_written_turns_the_tool_no_faster(tmp_path, language):
         each for name, each in write_program(listing, language, WriteOptions(ROBOT)).files.items() if name != ".dat"
     )
     assert all(line in text for line in turns.split()) if language == "krl" else "[100.0,20.0,5000,1000]" in text
+
+
+HANDLED = f"VAR num n:=5;\nVAR robtarget place:=[[400,0,300],[0,1,0,0],[0,0,0,0],{NONE}];\n"
+TO_PLACE = "MoveJ Offs(place,0,0,n),v50,fine,tool0;"
+WAIT = "WaitDI di1,1\\MaxTime:=3;\n"
+
+
+@pytest.mark.parametrize("called", ["grip;", "IF di2=1 grip;", "outer;"])
+@pytest.mark.parametrize(
+    "handler",
+    ["n:=50; TRYNEXT;", "n:=50; RETURN;", "place.trans.z:=350; TRYNEXT;", "PDispSet [[0,0,50],[1,0,0,0]]; TRYNEXT;"],
+)
+def test_what_a_handler_sets_is_not_known_where_its_routine_was_called(tmp_path, called, handler):
+    more = f"PROC grip()\n{WAIT}ERROR\n{handler}\nENDPROC\nPROC outer()\ngrip;\nENDPROC"
+    found = codes(check(tmp_path, rapid(f"{called}\n{TO_PLACE}", HANDLED, more), "a.mod"))
+    assert {"target_not_given", "frame_not_given"} & set(found)
+
+
+def test_what_a_function_gives_back_is_not_known_where_its_handler_gives_something_else(tmp_path):
+    ask = f"FUNC num ask()\n{WAIT}RETURN 5;\nERROR\nRETURN 50;\nENDFUNC"
+    found = codes(check(tmp_path, rapid(f"n:=ask();\n{TO_PLACE}", HANDLED, ask), "a.mod"))
+    assert "target_not_given" in found

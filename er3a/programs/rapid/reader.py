@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import bisect
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -634,7 +634,7 @@ class _BodyReader:
             inside.instructions(end)
             builder.add(syntax.Return(place))
         changed = (each.target for each in builder.code if isinstance(each, syntax.Assign) and not each.local)
-        self.builder.unsettled |= set(map(variable_of, changed))
+        self.builder.unsettled |= set(map(variable_of, changed)) | set(_set_by(builder.code))
         if handler:
             self.module.routines.append(builder.routine(self.cursor.place()))
 
@@ -854,6 +854,19 @@ class _BodyReader:
             if inside and (token.text in MOTIONS or token.text in self.module.procedures):
                 return inside
         return ""
+
+
+SETTINGS = {"PDISPON": "%PDISP", "PDISPSET": "%PDISP", "PDISPOFF": "%PDISP", "GRIPLOAD": "%GRIPLOAD"}
+"""Instructions that set what later motions depend on without naming it, as the dialect keeps it."""
+
+
+def _set_by(handler: Iterable[syntax.Operation]) -> Iterator[str]:
+    """What a handler sets besides variables: settings of motions, and the value of its function."""
+    for each in handler:
+        if isinstance(each, syntax.Return) and each.value is not None:
+            yield syntax.RETURNED
+        elif isinstance(each, syntax.Doing) and isinstance(each.what, syntax.Invocation):
+            yield from filter(None, [SETTINGS.get(each.what.function)])
 
 
 Given = tuple[tuple[syntax.Expression | None, ...], tuple[tuple[str, syntax.Expression], ...]]
