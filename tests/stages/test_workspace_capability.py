@@ -248,7 +248,7 @@ def test_a_box_stands_on_a_surface_where_the_arm_leaves_it_room_or_is_told_why_n
     assert (free & found.within_limits).any(axis=1).all()
     assert stands["floor"].above is not None
     context = context_of(robot, done)
-    assert context["tray_line"].startswith("On table, centre (")
+    assert context["tray_line"].startswith("On table (z = 100 mm), centre (")
     assert len(context["stands"]) == 4
 
 
