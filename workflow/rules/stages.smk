@@ -43,7 +43,7 @@ for stage in STAGES.values():
             results_of(stage.name),
         log:
             f"logs/{{robot}}/{stage.name}.compute.log",
-        priority: 3 if stage.name == "validation" else int(stage.sampled or stage.may_run)
+        priority: 3 if stage.name == "validation" else int(stage.sampled)
         conda:
             "../envs/er3a.yaml"
         resources:
