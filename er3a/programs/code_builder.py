@@ -46,7 +46,7 @@ class CodeBuilder:
         self.code: list[syntax.Operation] = []
         self.blocks: list[Block] = []
         self.settings: tuple[tuple[str, syntax.Expression], ...] = ()  # of each motion of a block
-        self.unsettled: set[str] = set()  # as of the routine
+        self.handler: list[syntax.Operation] = []  # as of the routine
         self._labels: dict[str, int] = {}
         self._gotos: list[tuple[int, str]] = []
         self._hidden = 0
@@ -220,7 +220,7 @@ class CodeBuilder:
                 raise fault(place, f"there is no label '{name}'", "Name a label of this routine")
             self.code[at] = syntax.GoTo(place, self._labels[name], endless=self._labels[name] <= at)
         code = (*self.code, syntax.Return(end))
-        return syntax.Routine(self.name, self.parameters, code, self.place, self.thread, frozenset(self.unsettled))
+        return syntax.Routine(self.name, self.parameters, code, self.place, self.thread, tuple(self.handler))
 
     def _open(self, kind: str, place: Place, word: str = "") -> None:
         if len(self.blocks) >= MAX_NESTED:

@@ -230,6 +230,10 @@ class Dialect(ABC):
         """The value of a predefined name, such as a frame or the arm's position; None if there is none."""
         return None
 
+    def sets(self, call: syntax.Invocation) -> frozenset[str]:
+        """What motions depend on without naming it, and a function outside the program may set."""
+        return frozenset() if self.harmless(call) else self.modal
+
     def frame_of(self, value: syntax.Value | None) -> Reals | None:
         """The transform (4, 4), m, of a value that is a tool or a base; None for others."""
         return None

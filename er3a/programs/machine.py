@@ -72,7 +72,8 @@ def deciding(program: syntax.Program, modal: frozenset[str]) -> frozenset[str]:
             assigned.add(name)
             sources[name] |= used
     for routine in program.routines.values():
-        assigned |= {parameter.name for parameter in routine.parameters} | routine.unsettled
+        assigned |= {parameter.name for parameter in routine.parameters}
+        assigned |= {name for operation in routine.handler for name in _changed(operation)}
     waiting = list(needed)
     while waiting:
         for name in sources.get(waiting.pop(), set()) - needed:
@@ -126,7 +127,21 @@ def _changed_in(program: syntax.Program, names: Iterable[str], dialect: Dialect)
     """Variables, not local ones, that routines change."""
     routines = [program.routines[name] for name in names]
     changed = {each for routine in routines for op in routine.code for each in _shared(program, op, dialect)}
-    return frozenset(changed.union(*(routine.unsettled for routine in routines)))
+    return frozenset(changed.union(*(unsettled(routine, dialect) for routine in routines)))
+
+
+def unsettled(routine: syntax.Routine, dialect: Dialect) -> frozenset[str]:
+    """What handlers of a routine's errors may set at any time: variables, what motions depend on without naming it,
+    and ``RETURNED`` for the routine's value."""
+    found: set[str] = set()
+    for each in routine.handler:
+        if isinstance(each, syntax.Assign) and not each.local:
+            found.add(variable_of(each.target))
+        elif isinstance(each, syntax.Doing):
+            found |= dialect.sets(each.what) if isinstance(each.what, syntax.Invocation) else dialect.modal
+        elif isinstance(each, syntax.Return) and each.value is not None:
+            found.add(syntax.RETURNED)
+    return frozenset(found)
 
 
 def _given_back(program: syntax.Program, name: str, arguments: Iterable[syntax.Expression | None]) -> set[str]:
@@ -222,7 +237,8 @@ def _moving(program: syntax.Program, dialect: Dialect) -> set[str]:
         more = {
             routine.name
             for routine in program.routines.values()
-            if routine.name not in moving and any(_moves(program, each, moving, dialect) for each in routine.code)
+            if routine.name not in moving
+            and any(_moves(program, each, moving, dialect) for each in (*routine.code, *routine.handler))
         }
         if not more:
             return moving
@@ -285,7 +301,7 @@ def _changes(program: syntax.Program) -> dict[str, set[str]]:
     return _gathered(
         program,
         {
-            name: {each for op in routine.code for each in _changed(op)} | routine.unsettled
+            name: {each for op in (*routine.code, *routine.handler) for each in _changed(op)}
             for name, routine in program.routines.items()
         },
     )
@@ -567,6 +583,7 @@ class Machine:
         self.deciding = deciding(program, dialect.modal)
         self.names_met: set[str] = set()
         self.deciding_names: list[str] = []  # of those, whole
+        self.unsettled = {name: unsettled(routine, dialect) for name, routine in program.routines.items()}
         self.quiet, needed = quiet_branches(program, dialect)
         self.persisting = _persisting(program, dialect) & needed
         self.first_values: dict[str, syntax.Value] = {}  # of these
@@ -625,7 +642,7 @@ class Machine:
         """Go on with the program's beginning."""
         entry = self.program.routines[self.program.entry]
         way.frames = [Frame(entry)]
-        way.memory.local, way.memory.aliased = way.frames[0].local, entry.unsettled
+        way.memory.local, way.memory.aliased = way.frames[0].local, self.unsettled[entry.name]
         way.memory.kept.clear()
 
     def _unmet(self) -> tuple[instructions.Place, ...]:
@@ -872,7 +889,7 @@ class Machine:
         calls = (*way.frames[-1].calls, call.place)
         way.frames.append(Frame(routine, 0, local, calls, call.result, outs, memory.aliased))
         memory.local = local
-        memory.aliased |= routine.unsettled
+        memory.aliased |= self.unsettled[routine.name]
         if self.aliased:
             memory.aliased |= self.aliased.get(call, frozenset())
         memory.kept.clear()
@@ -949,11 +966,12 @@ class Machine:
                 memory.forget(target_name(target))
             else:
                 memory.assign(target, known(frame.local.get(name), name))
-        for name in frame.routine.unsettled - frame.local.keys():  # what a handler may have changed stays so
+        handled = self.unsettled[frame.routine.name]
+        for name in handled - frame.local.keys():  # what a handler may have changed stays so
             memory.forget(name)
         if frame.result:
-            unsettled = syntax.RETURNED in frame.routine.unsettled
-            memory.write(frame.result, syntax.Unclear(frame.routine.name) if unsettled else value, local=True)
+            given = syntax.Unclear(frame.routine.name) if syntax.RETURNED in handled else value
+            memory.write(frame.result, given, local=True)
 
     def _drifts(self, way: ExecutionPath, routine: str, at: int) -> bool:
         rounds = way.rounds.get((routine, at), 0) + 1

@@ -352,7 +352,7 @@ class Routine:
     Attributes
     ----------
     thread : whether it runs beside the program, so that a run of the program does not carry it out
-    unsettled : what a handler of its errors may set at any time: variables, settings, ``RETURNED`` for its value
+    handler : what handlers of its errors do, at any time, as far as it is no motion
     """
 
     name: str
@@ -360,7 +360,7 @@ class Routine:
     code: tuple[Operation, ...]
     place: Place
     thread: bool = False
-    unsettled: frozenset[str] = frozenset()
+    handler: tuple[Operation, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -345,3 +345,9 @@ def test_what_a_function_gives_back_is_not_known_where_its_handler_gives_somethi
     ask = f"FUNC num ask()\n{WAIT}RETURN 5;\nERROR\nRETURN 50;\nENDFUNC"
     found = codes(check(tmp_path, rapid(f"n:=ask();\n{TO_PLACE}", HANDLED, ask), "a.mod"))
     assert "target_not_given" in found
+
+
+def test_an_output_or_an_acceleration_that_a_handler_sets_leaves_the_targets_known(tmp_path):
+    grip = f"PROC grip()\n{WAIT}ERROR\nReset do1;\nAccSet 50,50;\nTRYNEXT;\nENDPROC"
+    found = codes(check(tmp_path, rapid(f"grip;\n{TO_PLACE}", HANDLED, grip), "a.mod"))
+    assert not {"target_not_given", "frame_not_given"} & set(found)

@@ -24,9 +24,12 @@ JOINT_FORMS = ("MOVEJ", "TRIGGJ")
 ARC_FORMS = ("MOVEC", "TRIGGC", "SEARCHC")
 SLOWEST_RAMP = 20.0  # percent; 1 AccSet: smaller values count as 20
 FULL_SPEED = 5000.0  # mm/s, of VelSet where a program sets none
-SETTINGS = ("CONFJ", "CONFL", "ACCSET", "VELSET", "PDISPSET", "PDISPON", "PDISPOFF", "PATHACCLIM", "WORLDACCLIM")
-"""Instructions that later motions depend on, and that are followed."""
-MODAL = ("%CONFJ", "%CONFL", "%ACC", "%SPEED", "%PDISP", "%PATHACCLIM", "%WORLDACCLIM", "%GRIPLOAD")
+SETTINGS = {
+    **{name: f"%{name}" for name in ("CONFJ", "CONFL", "PATHACCLIM", "WORLDACCLIM")},
+    **{"ACCSET": "%ACC", "VELSET": "%SPEED"},
+    **dict.fromkeys(("PDISPSET", "PDISPON", "PDISPOFF"), "%PDISP"),
+}
+"""Instructions that later motions depend on, and that are followed, with the name under which each is kept."""
 OUTPUTS = frozenset(
     (
         *(
@@ -111,7 +114,7 @@ UNCLEAR = syntax.Unclear("")
 class RapidDialect(Dialect):
     """RAPID, as a run needs it."""
 
-    modal = frozenset(MODAL)
+    modal = frozenset((*SETTINGS.values(), "%GRIPLOAD"))
     setters = frozenset((*SETTINGS, *OUTPUTS, "EOFFSOFF", "GRIPLOAD", "SETSYSDATA"))
 
     def constant(self, memory: ProgramMemory, name: str) -> syntax.Value | None:
@@ -254,6 +257,13 @@ class RapidDialect(Dialect):
         if call.function == "EOFFSOFF" or self.harmless(call):
             return instructions.Aside(doing.text)
         return instructions.Unknown(doing.text)
+
+    def sets(self, call: syntax.Invocation) -> frozenset[str]:
+        """What one of the settings sets; outputs and the tool of ``CRobT`` set nothing of motions."""
+        name = call.function
+        if name in SETTINGS or name == "GRIPLOAD":
+            return frozenset((SETTINGS.get(name, "%GRIPLOAD"),))
+        return frozenset() if name in self.setters else super().sets(call)
 
     def harmless(self, call: syntax.Invocation) -> bool:
         """Functions and instructions whose exact name is known, and that set nothing."""

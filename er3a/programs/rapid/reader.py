@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import bisect
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from er3a.errors import InputError
 from er3a.programs import syntax
-from er3a.programs.code_builder import CodeBuilder, fault, linked, mapped, variable_of, within
+from er3a.programs.code_builder import CodeBuilder, fault, linked, mapped, within
 from er3a.programs.instructions import Place
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, read_program_text
 from er3a.programs.program_findings import NameTwice, NotSimulated, NotUnderstood, ProgramFinding
@@ -633,8 +633,7 @@ class _BodyReader:
                 self.cursor.head(")")
             inside.instructions(end)
             builder.add(syntax.Return(place))
-        changed = (each.target for each in builder.code if isinstance(each, syntax.Assign) and not each.local)
-        self.builder.unsettled |= set(map(variable_of, changed)) | set(_set_by(builder.code))
+        self.builder.handler += builder.code
         if handler:
             self.module.routines.append(builder.routine(self.cursor.place()))
 
@@ -854,19 +853,6 @@ class _BodyReader:
             if inside and (token.text in MOTIONS or token.text in self.module.procedures):
                 return inside
         return ""
-
-
-SETTINGS = {"PDISPON": "%PDISP", "PDISPSET": "%PDISP", "PDISPOFF": "%PDISP", "GRIPLOAD": "%GRIPLOAD"}
-"""Instructions that set what later motions depend on without naming it, as the dialect keeps it."""
-
-
-def _set_by(handler: Iterable[syntax.Operation]) -> Iterator[str]:
-    """What a handler sets besides variables: settings of motions, and the value of its function."""
-    for each in handler:
-        if isinstance(each, syntax.Return) and each.value is not None:
-            yield syntax.RETURNED
-        elif isinstance(each, syntax.Doing) and isinstance(each.what, syntax.Invocation):
-            yield from filter(None, [SETTINGS.get(each.what.function)])
 
 
 Given = tuple[tuple[syntax.Expression | None, ...], tuple[tuple[str, syntax.Expression], ...]]
