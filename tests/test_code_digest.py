@@ -91,6 +91,7 @@ EDITS = {
     "pipeline/viewing/style.css": (False, True),
     "pipeline/stages/made/script.js": (False, True),
     "workspace/general_proof.py": (False, False),
+    "programs/syntax.py": (False, False),
     "pipeline/stages/workspace/report.html.j2": (False, False),
     "pipeline/stages/workspace/compute.py": (False, False),
     "pipeline/cli.py": (False, False),

@@ -19,7 +19,7 @@ from er3a.pipeline.messages.kinematics import ARM_CLASSES as ARM_CLASS_WORDS
 from er3a.planning.avoidance.strategies import STRATEGIES
 from er3a.planning.names import StrategyName
 from er3a.programs.languages import LANGUAGES
-from er3a.programs.syntax import LanguageName
+from er3a.programs.program_names import LanguageName
 from er3a.selection.rule_names import RuleName
 from er3a.selection.select import RULES
 from testing.small_study import ROOT, environment, fresh
@@ -398,7 +398,7 @@ from er3a.programs.rpl.dialect import RplDialect
 PLAIN = Language("PLAIN", (".plain",), re.compile(r"(?m)^GO "), read_plain, RplDialect, PlainWriter, SIX_ANGLES)
 '''
     edits = {
-        "er3a/programs/syntax.py": (('"rapid", "csv"]', '"rapid", "csv", "plain"]'),),
+        "er3a/programs/program_names.py": (('"rapid", "csv"]', '"rapid", "csv", "plain"]'),),
         "er3a/programs/plain/__init__.py": "",
         "er3a/programs/plain/language.py": record,
         "er3a/programs/plain/reader.py": reader,

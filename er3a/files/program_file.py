@@ -11,7 +11,7 @@ from er3a.files.robot_file import Name, Placement, Text, check_placement
 from er3a.files.units import JointsDeg, joint_values
 from er3a.files.yaml_file import StrictModel, check_own_names, load
 from er3a.numerics.arrays import Reals
-from er3a.programs.syntax import ProgramOutcome
+from er3a.programs.program_names import ProgramOutcome
 from er3a.robots.robot import Robot
 
 

@@ -48,7 +48,7 @@ from er3a.program_check.program_check_findings import Level, worst_of
 from er3a.programs.instructions import Place
 from er3a.programs.languages import WITHOUT_JOINTS, not_written, read_program
 from er3a.programs.program_findings import WriteFinding
-from er3a.programs.syntax import LanguageName
+from er3a.programs.program_names import LanguageName
 from er3a.programs.writing import program_name
 from er3a.robots.robot import Robot
 from er3a.version import __version__

@@ -10,7 +10,7 @@ from er3a.collision.pairs import ASSUMED_MARGIN, PENETRATION_TOLERANCE
 from er3a.files.robot_file import Text
 from er3a.files.yaml_file import StrictModel
 from er3a.planning.names import ACCELERATION_TIME, StrategyName
-from er3a.programs.syntax import LanguageName
+from er3a.programs.program_names import LanguageName
 from er3a.robots.robot import MAX_JOINTS
 
 

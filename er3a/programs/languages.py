@@ -17,9 +17,10 @@ from er3a.programs.krl.language import KRL
 from er3a.programs.lexing import ProgramText, read_program_text
 from er3a.programs.program_findings import NothingMoves
 from er3a.programs.program_language import Language
+from er3a.programs.program_names import LanguageName
 from er3a.programs.rapid.language import RAPID
 from er3a.programs.rpl.language import RPL, XPL
-from er3a.programs.syntax import Fixed, LanguageName, Move, Program
+from er3a.programs.syntax import Fixed, Move, Program
 from er3a.programs.urscript.language import URSCRIPT
 from er3a.programs.writing import WriteOptions, WrittenProgram
 from er3a.robots.robot import Robot

@@ -11,6 +11,7 @@ from typing import Literal
 from er3a.by_value import ByValue
 from er3a.programs.instructions import Instruction, Place, Rate, RateUnit
 from er3a.programs.program_findings import ProgramFinding
+from er3a.programs.program_names import LanguageName
 
 POSE_KEYS = ("x", "y", "z", "rx", "ry", "rz")
 """Fields of a pose of URScript."""
@@ -131,8 +132,6 @@ RETURNED = "%returned"
 
 CYCLIC = "%CYCLIC"
 """What a :class:`Beside` asks for that sets its first argument again and again."""
-
-LanguageName = Literal["krl", "urscript", "rpl", "xpl", "rapid", "csv"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -432,6 +431,3 @@ def expressions_of(operation: Operation) -> tuple[Expression, ...]:
         case _:
             found = ()
     return tuple(each for each in found if each is not None)
-
-
-ProgramOutcome = Literal["pass", "caution", "fail"]

@@ -14,7 +14,7 @@ import typer
 from er3a.errors import Er3aError
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.commands.options import PROGRAMS, AsJson, FailOn, app, given_files, print_json, print_note
-from er3a.programs.syntax import LanguageName
+from er3a.programs.program_names import LanguageName
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 

@@ -36,7 +36,7 @@ from er3a.program_check.program_check_findings import (
 from er3a.programs import program_findings as text
 from er3a.programs.execution import EndKind
 from er3a.programs.instructions import Unresolved
-from er3a.programs.syntax import ProgramOutcome
+from er3a.programs.program_names import ProgramOutcome
 
 LEVELS: dict[Level, str] = {
     "pass": N_("pass"),

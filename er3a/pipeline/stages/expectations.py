@@ -9,7 +9,7 @@ from er3a.by_value import Finding
 from er3a.kinematics.solutions import TargetOutcome
 from er3a.pipeline.results import Status
 from er3a.planning.names import PathVerdict
-from er3a.programs.syntax import ProgramOutcome
+from er3a.programs.program_names import ProgramOutcome
 from er3a.vision.vision_findings import GraspOutcome
 
 Outcome = TargetOutcome | PathVerdict | ProgramOutcome | GraspOutcome

@@ -35,7 +35,7 @@ from er3a.programs.execution import RunLimits
 from er3a.programs.instructions import Pause, Place
 from er3a.programs.languages import read_program
 from er3a.programs.program_findings import NameTwice, NotUnderstood
-from er3a.programs.syntax import ProgramOutcome
+from er3a.programs.program_names import ProgramOutcome
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 

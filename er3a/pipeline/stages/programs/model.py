@@ -11,7 +11,7 @@ from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.program_check.check_program import CycleTime
 from er3a.program_check.program_check_findings import CheckFinding, Level
-from er3a.programs.syntax import LanguageName, ProgramOutcome
+from er3a.programs.program_names import LanguageName, ProgramOutcome
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from er3a.programs.csv_program import write_csv
 from er3a.programs.from_commands import listing_of
 from er3a.programs.languages import not_written, write_program
 from er3a.programs.program_findings import SpeedsOfAssumed, WriteFinding, WrittenNearAssumed, WrittenUnsafe
-from er3a.programs.syntax import LanguageName
+from er3a.programs.program_names import LanguageName
 from er3a.programs.writing import HEAD, WriteOptions, ascii_text, head_line, program_name
 from er3a.robots.joint_limits import joint_columns, meant, shown
 from er3a.robots.robot import Robot
