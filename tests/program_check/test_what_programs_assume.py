@@ -1,4 +1,4 @@
-"""What a program leaves to the controller, to the cell or to its next start: it is followed, or told with the verdict.
+"""What a program leaves to the controller, to the cell or to its next start: it is followed, or noted with the verdict.
 
 Expected times and joints are worked out by hand in the comments.
 """
@@ -90,10 +90,10 @@ def test_a_turn_at_the_speed_that_is_set_is_too_fast_for_a_joint(tmp_path):
 )
 def test_where_a_turn_decides_and_has_no_speed_the_assumed_one_is_told(tmp_path, name, text):
     found = check(tmp_path, text, name)
-    told = [each for each in found.findings if each.finding.code == "turn_speed_not_given"]
-    assert [each.level for each in told][-1:] == ["note"]
+    noted = [each for each in found.findings if each.finding.code == "turn_speed_not_given"]
+    assert [each.level for each in noted][-1:] == ["note"]
     speed = {"a.src": 0.1, "a.script": 0.25, "a.pgm": 0.05}[name]
-    assert told[-1].finding.assumed_deg_s == pytest.approx(np.degrees(speed / 0.1))  # as 0.1 m of the path
+    assert noted[-1].finding.assumed_deg_s == pytest.approx(np.degrees(speed / 0.1))  # as 0.1 m of the path
 
 
 def test_a_turning_speed_that_is_not_known_is_a_caution_where_the_turn_decides(tmp_path):
@@ -118,8 +118,8 @@ def test_a_turning_speed_that_is_not_known_is_a_caution_where_the_turn_decides(t
     ],
 )
 def test_a_tool_and_a_base_that_a_program_does_not_set_are_told_once(tmp_path, name, text, kind):
-    told = [each for each in check(tmp_path, text, name).findings if each.finding.code == "frames_from_robot_file"]
-    assert [(each.finding.kind, each.level) for each in told] == ([] if kind is None else [(kind, "note")])
+    noted = [each for each in check(tmp_path, text, name).findings if each.finding.code == "frames_from_robot_file"]
+    assert [(each.finding.kind, each.level) for each in noted] == ([] if kind is None else [(kind, "note")])
 
 
 @pytest.mark.parametrize("used", [True, False])
@@ -130,9 +130,9 @@ def test_a_frame_that_program_and_cell_give_differently_is_told_where_it_is_used
     text = krl(f"$TOOL=$NULLFRAME\n$BASE={'BASE_DATA[1]' if used else '$NULLFRAME'}\n{SPEEDS}LIN {POSE % 0}")
     given = {"BASE_DATA[1]": transform(np.array([0.01, 0.0, -0.1]), np.radians([0, 0, 2.0]))}
     found = check(tmp_path, text, "a.src", frames=given)
-    told = [each for each in found.findings if each.finding.code == "frame_given_twice"]
-    assert [each.place.file.name for each in told] == (["$config.dat"] if used else [])
-    for each in told:
+    noted = [each for each in found.findings if each.finding.code == "frame_given_twice"]
+    assert [each.place.file.name for each in noted] == (["$config.dat"] if used else [])
+    for each in noted:
         assert each.level == "caution"
         assert (each.finding.moved_mm, each.finding.turned_deg) == (pytest.approx(100.0), pytest.approx(2.0))
 
@@ -140,12 +140,12 @@ def test_a_frame_that_program_and_cell_give_differently_is_told_where_it_is_used
 def test_a_tool_of_rapid_that_the_cell_gives_otherwise_is_told(tmp_path):
     data = "PERS tooldata t1:=[TRUE,[[0,0,10],[1,0,0,0]],[1,[0,0,10],[1,0,0,0],0,0,0]];"
     (tmp_path / "a.mod").write_text(rapid("MoveL p,v100,fine,t1;", data))
-    for moved, told in ((0.05, [3]), (0.01, [])):
+    for moved, noted in ((0.05, [3]), (0.01, [])):
         options = CheckOptions(
             start=HOME, measures=False, frames={"t1": transform(np.array([0, 0, moved]), np.zeros(3))}
         )
         found = check_program(read_program(tmp_path / "a.mod"), ROBOT, options)
-        assert codes(found).get("frame_given_twice", []) == told
+        assert codes(found).get("frame_given_twice", []) == noted
 
 
 @pytest.mark.parametrize(
@@ -264,7 +264,7 @@ def test_types_of_structures_are_read_from_data_files_too(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("data", "line", "told"),
+    ("data", "line", "noted"),
     [
         ("E6POS XP={X 400,Y 0,Z 300}", "LIN XP", "position_completed"),
         ("E6AXIS XP={A1 10}", "PTP XP", "position_completed"),
@@ -275,9 +275,9 @@ def test_types_of_structures_are_read_from_data_files_too(tmp_path):
         ("E6POS XP={X 40,Y 0,Z 0}", "LIN_REL XP", None),
     ],
 )
-def test_what_a_data_file_does_not_give_of_a_point_is_told(tmp_path, data, line, told):
+def test_what_a_data_file_does_not_give_of_a_point_is_told(tmp_path, data, line, noted):
     found = codes(with_data(tmp_path, line, f"DECL {data}"))
-    assert {"position_completed", "target_not_given"} & found.keys() == ({told} if told else set())
+    assert {"position_completed", "target_not_given"} & found.keys() == ({noted} if noted else set())
 
 
 def test_a_zone_by_percent_whose_percent_is_not_set_has_no_known_size(tmp_path):

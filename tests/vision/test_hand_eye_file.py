@@ -183,27 +183,29 @@ def test_radians_are_told_from_degrees(tmp_path, poses):
         load_hand_eye(write(tmp_path, table), load_robot("er3a_c60"))
 
 
+def swinging(t: np.ndarray) -> np.ndarray:
+    """Poses (N, 4, 4), m, of a flange that swings, at times (N,) in s."""
+    turns = np.stack([0.7 * np.sin(0.9 * t), 0.6 * np.sin(1.3 * t + 1), 0.8 * np.sin(0.7 * t + 2)], axis=1)
+    T = np.tile(np.eye(4), (len(t), 1, 1))
+    T[:, :3, :3] = Rotation.from_rotvec(turns).as_matrix()
+    T[:, :3, 3] = 0.2 * turns + [0.4, 0, 0.4]
+    return T
+
+
 @pytest.mark.long
 def test_two_clocks_are_brought_together(tmp_path):
     """Streams of an arm that swings, the camera's clock 0.137 s behind; one pose in ten is a wrong detection."""
     random = np.random.default_rng(3)
 
-    def arm(t: np.ndarray) -> np.ndarray:
-        turns = np.stack([0.7 * np.sin(0.9 * t), 0.6 * np.sin(1.3 * t + 1), 0.8 * np.sin(0.7 * t + 2)], axis=1)
-        T = np.tile(np.eye(4), (len(t), 1, 1))
-        T[:, :3, :3] = Rotation.from_rotvec(turns).as_matrix()
-        T[:, :3, 3] = 0.2 * turns + [0.4, 0, 0.4]
-        return T
-
     t_arm, t_eye = np.arange(0, 40, 0.01), np.arange(1, 38, 0.05)
-    target = noisy(seen("eye_in_hand", arm(t_eye + 0.137)), random, 3e-4, 1e-3)
+    target = noisy(seen("eye_in_hand", swinging(t_eye + 0.137)), random, 3e-4, 1e-3)
     epoch = 1_491_416_776.0  # recorders write seconds since 1970
     wrong = random.choice(len(t_eye), len(t_eye) // 10, replace=False)
     target[wrong, :3, :3] = Rotation.random(len(wrong), random_state=4).as_matrix()
     head = HEAD.format(setup="eye_in_hand").replace(
         "samples: samples.csv", "streams: {flange: hand.csv, target: samples.csv}"
     )
-    write(tmp_path, {"t_s": epoch + t_arm} | columns(arm(t_arm), "flange", "quaternion"))
+    write(tmp_path, {"t_s": epoch + t_arm} | columns(swinging(t_arm), "flange", "quaternion"))
     shutil.move(tmp_path / "samples.csv", tmp_path / "hand.csv")
     path = write(tmp_path, {"t_s": epoch + t_eye} | columns(target, "target", "quaternion"), head)
     samples, offset, _ = read_calibration(path, None)
@@ -276,24 +278,17 @@ def test_touched_points_that_contradict_a_calibration_end_the_command_with_code_
 def _streams(folder: Path, ahead: float, start: float = 0.0, every: float = 0.05, widest: str = "") -> Path:
     """Streams of an arm that swings, the camera's clock so far behind (s); it is seen from ``start`` s on."""
 
-    def arm(t: np.ndarray) -> np.ndarray:
-        turns = np.stack([0.7 * np.sin(0.9 * t), 0.6 * np.sin(1.3 * t + 1), 0.8 * np.sin(0.7 * t + 2)], axis=1)
-        T = np.tile(np.eye(4), (len(t), 1, 1))
-        T[:, :3, :3] = Rotation.from_rotvec(turns).as_matrix()
-        T[:, :3, 3] = 0.2 * turns + [0.4, 0, 0.4]
-        return T
-
     t_arm, t_eye = np.arange(0, 30, 0.02), start + np.arange(3, 27, every)
     streams = f"streams: {{flange: hand.csv, target: samples.csv{widest}}}"
     head = HEAD.format(setup="eye_in_hand").replace("samples: samples.csv", streams)
-    write(folder, {"t_s": t_arm} | columns(arm(t_arm), "flange", "quaternion"))
+    write(folder, {"t_s": t_arm} | columns(swinging(t_arm), "flange", "quaternion"))
     shutil.move(folder / "samples.csv", folder / "hand.csv")
-    target = seen("eye_in_hand", arm(t_eye))
+    target = seen("eye_in_hand", swinging(t_eye))
     return write(folder, {"t_s": t_eye - ahead} | columns(target, "target", "quaternion"), head)
 
 
 @pytest.mark.parametrize(
-    ("made", "told"),
+    ("made", "reason"),
     [
         ({"ahead": 2.3}, r"streams\.widest_s: turns of arm and camera agree best at 2 s, an end of the range searched"),
         ({"ahead": 100.0}, r"can't be compared \(flange: 0 to 29\.98 s, 1500 rows; target: -97 to"),
@@ -303,8 +298,8 @@ def _streams(folder: Path, ahead: float, start: float = 0.0, every: float = 0.05
         ),
     ],
 )
-def test_streams_whose_clocks_cant_be_compared_are_refused(made, told, tmp_path):
-    with pytest.raises(InputError, match=told):
+def test_streams_whose_clocks_cant_be_compared_are_refused(made, reason, tmp_path):
+    with pytest.raises(InputError, match=reason):
         read_calibration(_streams(tmp_path, **made), None)
 
 

@@ -29,7 +29,7 @@ STRATEGIES: dict[StrategyName, str] = {
     "planned": N_("Use another motion instead, planned in joint space"),
 }
 
-FAR = 10.0  # times a limit, beyond which a rate is told to two digits: the others depend on where it was sampled
+FAR = 10.0  # times a limit, beyond which a rate is rounded to two digits: the others depend on where it was sampled
 UNBOUNDED = 300.0  # times a limit, beyond which a rate is no figure: towards the edge of the reach it has no bound
 
 

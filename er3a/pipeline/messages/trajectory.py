@@ -67,6 +67,7 @@ FACTS: dict[FactName, str] = {
 """What is said of a motion to be run instead, beside what it is."""
 OPEN_VERDICTS: tuple[PathVerdict, ...] = ("undecided", "too fast for the assumed limits")
 """Of paths that may be safe all the same, if nothing that is undecided is against it."""
+OPEN_SINGULAR = Undecided("singular")
 MAX_PAIRS = 3
 NO_DEVIATION = 0.005  # mm or deg
 NO_TIME = 0.005  # s
@@ -387,19 +388,31 @@ def _(found: model.BodiesOverlap) -> str:
 
 def cause_text(path: model.PathSummary, part: model.Stretch) -> str:  # type: ignore[type-arg]
     """Why a stretch of a path is listed; what is undecided is no open question where something else decides."""
+    if passed := pass_about(path, part):
+        return passing_text(*passed)
     cause = _with_worst(part, say(part.cause))
-    if not isinstance(part.cause, Undecided):
+    if not isinstance(part.cause, Undecided) or path.verdict in OPEN_VERDICTS:
         return cause
-    for event in path.singularities:
-        if (span := open_beside(path, event)) and span[0] <= part.t0_s and part.t1_s <= span[1]:
-            return passing_text(event, span)
-    return cause if path.verdict in OPEN_VERDICTS else sentence("path.either_way", open=cause)
+    return sentence("path.either_way", open=cause)
+
+
+def pass_about(
+    path: model.PathSummary,
+    part: model.Stretch,  # type: ignore[type-arg]
+) -> tuple[model.Singularity, tuple[float, float]] | None:
+    """The pass of a singular set that a stretch belongs to, on which it is not decided whether that is met, and from
+    when to when (s) that is so; None of other stretches."""
+    if part.cause == OPEN_SINGULAR:
+        for event in path.singularities:
+            if (span := open_beside(path, event)) and span[0] <= part.t0_s and part.t1_s <= span[1]:
+                return event, span
+    return None
 
 
 def open_beside(path: model.PathSummary, event: model.Singularity) -> tuple[float, float] | None:
     """From when to when (s), about a pass of a singular set, it is not decided whether the set is met; None where it
     is."""
-    own = [part for part in path.undecided if part.cause == Undecided("singular")]
+    own = [part for part in path.undecided if part.cause == OPEN_SINGULAR]
     start = end = event.t_s
     for part in sorted(own, key=lambda part: -part.t1_s):
         if part.t0_s <= event.until_s and part.t1_s >= start - ADJOINING:
@@ -421,7 +434,7 @@ def near_at_start(kind: SingularityType, distance: str) -> str:
     return sentence("path.near_start", type=singularity_word(kind), distance=distance)
 
 
-class Told(NamedTuple):
+class FaultText(NamedTuple):
     """A fault of a path: when it begins (s), how it is said, when it is best seen, and whether another one of the path
     leads to it."""
 
@@ -431,29 +444,29 @@ class Told(NamedTuple):
     follows: bool = False
 
 
-def first_faults(path: model.PathSummary) -> list[Told]:
+def first_faults(path: model.PathSummary) -> list[FaultText]:
     """What is wrong first with a path, and where it leaves reach or limits or collides, or else its gravest fault: in
     order of time, what only follows from others last. What is undecided counts only where it comes before all that is
     not."""
     fast = [[part for part in path.too_fast if part.cause.code.endswith(IF_ASSUMED) is each] for each in (False, True)]
     grave: list[Sequence[model.Stretch[Any]]] = [path.unreachable, path.out_of_limits, path.collisions]
     firsts = [min(each, key=lambda part: part.t0_s) for each in grave if each]
-    found = [Told(part.t0_s, _with_worst(part, say_first(part.cause)), part.t0_s) for part in firsts]
+    found = [FaultText(part.t0_s, _with_worst(part, say_first(part.cause)), part.t0_s) for part in firsts]
     edge = _edge(path)
     known = min((part.t0_s for part in fast[0]), default=math.inf)
     for each in filter(None, fast):
         run, _ = _run(each)
         seen, end = _worst_of_kinds(run)[0].worst_s, _end_of(run)
         follows = end >= edge - ADJOINING or run[0].t0_s < known <= end + ADJOINING
-        found.append(Told(run[0].t0_s, _rates(each, edge), run[0].t0_s if seen is None else seen, follows))
+        found.append(FaultText(run[0].t0_s, _rates(each, edge), run[0].t0_s if seen is None else seen, follows))
     events = [] if path.in_joint_space else [e for e in path.singularities if e.crossing and e.t_s < edge - AT_EDGE]
-    found += [Told(e.t_s, sentence("path.singular", type=event_word(e)), e.t_s) for e in events[:1]]
-    found += [Told(jump.t_s, say(jump), jump.t_s) for jump in path.jumps[:1]]
+    found += [FaultText(e.t_s, sentence("path.singular", type=event_word(e)), e.t_s) for e in events[:1]]
+    found += [FaultText(jump.t_s, say(jump), jump.t_s) for jump in path.jumps[:1]]
     open_ = min(path.undecided, key=lambda part: part.t0_s, default=None)
     if open_ and open_.t0_s < min(found, default=(math.inf,))[0]:
-        found.append(Told(open_.t0_s, cause_text(path, open_), open_.t0_s))
-    told = {*found[: max(1, sum(map(bool, grave)))], *sorted(found)[:1]}
-    return sorted(told, key=lambda each: (each.follows, each))
+        found.append(FaultText(open_.t0_s, cause_text(path, open_), open_.t0_s))
+    chosen = {*found[: max(1, sum(map(bool, grave)))], *sorted(found)[:1]}
+    return sorted(chosen, key=lambda each: (each.follows, each))
 
 
 def _edge(path: model.PathSummary) -> float:
@@ -472,7 +485,7 @@ def cause_of(path: model.PathSummary) -> str:
             return sentence("path.cause", event=say(event), pose=pose) if pose else say(event)
     if path.verdict in ("singular", "near-singular") and path.singularities:
         return singular_pose(path.singularities[0].type)
-    return sentence("path.cause#edge") if any(told.follows for told in first_faults(path)) and path.unreachable else ""
+    return sentence("path.cause#edge") if any(each.follows for each in first_faults(path)) and path.unreachable else ""
 
 
 def _beside(event: model.Singularity, part: model.Stretch[RateCause]) -> bool:

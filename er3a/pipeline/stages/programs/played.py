@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
@@ -68,7 +69,7 @@ def _found_event(program: ProgramSummary, found: FindingAt, rows: ProgramMotion)
         joints = ((joint, ""),) if joint and isinstance(finding, AboveLimit | BelowLimit) else ()
         return [PlayedEvent(start, max(start, end), say(finding), weight, joints=joints)]
     paces = _paces(program, found)
-    if start > min(t for t, _ in paces) or finding != next(pace for t, pace in paces if t == start):
+    if (start, finding) != min(paces, key=itemgetter(0)):
         return []
     needed: dict[int, str] = {}
     for _, pace in paces:
@@ -80,14 +81,19 @@ def _found_event(program: ProgramSummary, found: FindingAt, rows: ProgramMotion)
 
 def _paces(program: ProgramSummary, found: FindingAt) -> list[tuple[float, Pace]]:
     """From when on (s) joints are too fast at the line of a finding; the first of each joint is its gravest."""
-    here = [each for each in program.findings if (each.file, each.line) == (found.file, found.line)]
     return [
-        (each.program_s, each.finding) for each in here if isinstance(each.finding, Pace) and each.program_s is not None
+        (each.program_s, each.finding)
+        for each in _same_line(program, found)
+        if isinstance(each.finding, Pace) and each.program_s is not None
     ]
 
 
+def _same_line(program: ProgramSummary, found: FindingAt) -> list[FindingAt]:
+    return [each for each in program.findings if (each.file, each.line) == (found.file, found.line)]
+
+
 def cause_first(found: FindingAt) -> tuple[bool, int, bool, float]:
-    """By which the findings of a line are told: a singular pose, then what weighs most, of that joints that are too
+    """The order of a line's findings: a singular pose, then what weighs most, of that joints that are too
     fast last."""
     return not isinstance(found.finding, SINGULAR), -RANKS[found.level], isinstance(found.finding, Pace), when(found)
 
@@ -108,8 +114,8 @@ def faults(results: ProgramsResults) -> list[Fault]:
         first, worst = wrong[0], min(wrong, key=lambda each: -RANKS[each.level])
         rows = results.motion.take(results.motion.program == program.name)
         cause = _cause(program, first) or _cause(program, worst)
-        told = [worst] if worst.level == first.level else [worst, first]
-        moments = tuple(_moment(program, each, rows) for each in told)
+        shown = [worst] if worst.level == first.level else [worst, first]
+        moments = tuple(_moment(program, each, rows) for each in shown)
         found.append(
             Fault(
                 program.name,
@@ -119,7 +125,7 @@ def faults(results: ProgramsResults) -> list[Fault]:
                 is_met(program),
                 as_expected(program),
                 moments,
-                " ".join(dict.fromkeys(text for each in told for text in remedies_of(program, each)[:1])),
+                " ".join(dict.fromkeys(text for each in shown for text in remedies_of(program, each)[:1])),
                 address_of("programs", program.name, moments[0].seen_s or 0.0, program.name),
                 cause=cause or "",
             )
@@ -129,7 +135,7 @@ def faults(results: ProgramsResults) -> list[Fault]:
 
 def _cause(program: ProgramSummary, found: FindingAt) -> str | None:
     """The singular pose that a line with joints that are too fast comes to; None where it comes to none."""
-    here = [each for each in program.findings if (each.file, each.line) == (found.file, found.line)]
+    here = _same_line(program, found)
     if not any(isinstance(each.finding, Pace) for each in here):
         return None
     said = [

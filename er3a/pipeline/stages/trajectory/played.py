@@ -10,6 +10,7 @@ import numpy as np
 
 from er3a.collision.pairs import ShapesAssumed
 from er3a.kinematics.singularity import SingularityType
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.expectations import as_expected, outcome_words
 from er3a.pipeline.messages.language import own_title, tr, with_unit
 from er3a.pipeline.messages.planning import rate_needed, times_needed
@@ -18,8 +19,8 @@ from er3a.pipeline.messages.say import joined, sentence
 from er3a.pipeline.messages.trajectory import (
     IF_ASSUMED,
     FactName,
+    FaultText,
     Slowed,
-    Told,
     advice,
     cause_of,
     cause_text,
@@ -30,6 +31,7 @@ from er3a.pipeline.messages.trajectory import (
     first_faults,
     near_at_start,
     open_beside,
+    pass_about,
     passing_text,
     path_text,
     repair_facts,
@@ -49,7 +51,7 @@ from er3a.robots.robot import Robot
 
 SLOWER = 0.97  # of the programmed pace, below which a motion counts as slower
 LARGEST_PART = 0.9  # of a path's time, up to which it is slower only there
-LEAST_WAY = 1e-6  # m
+MIN_LENGTH = 1e-6  # m
 WEIGHTS: dict[PathVerdict, Weight] = {
     "safe": "plain",
     "near-singular": "caution",
@@ -105,12 +107,12 @@ def faults(results: model.TrajectoryResults) -> list[Fault]:
             continue
         clearance = path.clearance if path.verdict == "safe" else None
         rows = results.checks.take(results.checks.path == path.name)
-        wrong = [Told(clearance.t_s, say(near), clearance.t_s)] if clearance else _faults(path)
+        wrong = [FaultText(clearance.t_s, say(near), clearance.t_s)] if clearance else _faults(path)
         wrong = [*_near_at_start(path, rows, results.summary.near), *wrong]
         status, verdict = shown_verdict(path, near)
         own = results.avoidance.take(results.avoidance.path == path.name)
         to_do, facts, instead = _to_do(path, rows, own, results.summary)
-        moments = tuple(_linked(_moment(told, rows), path.name) for told in wrong)
+        moments = tuple(_linked(_moment(fault, rows), path.name) for fault in wrong)
         found.append(
             Fault(
                 path.name,
@@ -130,17 +132,17 @@ def faults(results: model.TrajectoryResults) -> list[Fault]:
     return found
 
 
-def _faults(path: model.PathSummary) -> list[Told] | list[FaultMoment]:
+def _faults(path: model.PathSummary) -> list[FaultText] | list[FaultMoment]:
     """What is wrong with a path that is not safe, and when (s): first, and what weighs more later."""
     found = [] if path.not_planned else first_faults(path)
     if (path.verdict in ("singular", "near-singular") and len(found) <= 1) or not found:
         times = [] if path.not_planned else path.singular_times_s or [event.t_s for event in path.singularities]
-        return [Told(min(times), path_text(path), min(times))] if times else [FaultMoment(path_text(path))]
+        return [FaultText(min(times), path_text(path), min(times))] if times else [FaultMoment(path_text(path))]
     return found
 
 
-def _near_at_start(path: model.PathSummary, rows: model.PathChecks, near: model.NearThresholds) -> list[Told]:
-    """That a path without a repair is near-singular from its start on, unless another fault is told of that moment."""
+def _near_at_start(path: model.PathSummary, rows: model.PathChecks, near: model.NearThresholds) -> list[FaultText]:
+    """That a path without a repair is near-singular from its start on, unless another fault begins at that moment."""
     if path.chosen or path.in_joint_space or not len(rows) or not rows.near_singular[0]:
         return []
     if any(event.t_s <= rows.t_s[0] for event in path.singularities):
@@ -152,21 +154,21 @@ def _near_at_start(path: model.PathSummary, rows: model.PathChecks, near: model.
     ]
     share, kind, distance = min((part for part in parts if np.isfinite(part[0])), default=(np.inf, "wrist", ""))
     start = float(rows.t_s[0])
-    return [Told(start, near_at_start(kind, distance), start)] if share <= 1 else []
+    return [FaultText(start, near_at_start(kind, distance), start)] if share <= 1 else []
 
 
-def _moment(told: Told | FaultMoment, rows: model.PathChecks) -> FaultMoment:
+def _moment(fault: FaultText | FaultMoment, rows: model.PathChecks) -> FaultMoment:
     """A fault of a path with its time, when it is worst, and its place then, between the path's rows."""
-    if isinstance(told, FaultMoment):
-        return told
-    when = tr("{time} s", time=fixed(told.t_s, 3))
-    if fixed(told.seen_s, 3) != fixed(told.t_s, 3):
-        when = tr("{when}, at worst {time} s", when=when, time=fixed(told.seen_s, 3))
+    if isinstance(fault, FaultMoment):
+        return fault
+    when = tr("{time} s", time=fixed(fault.t_s, 3))
+    if fixed(fault.seen_s, 3) != fixed(fault.t_s, 3):
+        when = tr("{when}, at worst {time} s", when=when, time=fixed(fault.seen_s, 3))
     if not len(rows):
-        return FaultMoment(told.text, when, seen_s=told.seen_s)
-    far, *xyz = (float(np.interp(told.seen_s, rows.t_s, values)) for values in (1000 * rows.s_m, *rows.xyz_mm.T))
+        return FaultMoment(fault.text, when, seen_s=fault.seen_s)
+    far, *xyz = (float(np.interp(fault.seen_s, rows.t_s, values)) for values in (1000 * rows.s_m, *rows.xyz_mm.T))
     place = tr("{far} mm, ({xyz})", far=fixed(far, 0), xyz=", ".join(fixed(value, 0) for value in xyz))
-    return FaultMoment(told.text, when, place if np.isfinite([far, *xyz]).all() else "", told.seen_s)
+    return FaultMoment(fault.text, when, place if np.isfinite([far, *xyz]).all() else "", fault.seen_s)
 
 
 def _linked(moment: FaultMoment, path: str) -> FaultMoment:
@@ -212,12 +214,10 @@ def slowed(path: model.PathSummary, rows: model.PathChecks, repair: model.Avoida
 
     ``rows``, ``repair``: of the path and of its repair, compared where the tool point has come equally far.
     """
-    if path.strategy != "slow" or len(repair) < 2 or len(rows) < 2:
+    length = _kept_length(path, rows, repair)
+    if length is None:
         return None
-    way = np.append(0.0, np.linalg.norm(np.diff(repair.xyz_mm, axis=0), axis=1).cumsum()) / 1000
-    if not np.isfinite(way[-1]) or way[-1] < LEAST_WAY:
-        return None
-    programmed = np.interp(way, rows.s_m, rows.t_s)
+    programmed = np.interp(length, rows.s_m, rows.t_s)
     pace = np.diff(programmed) / np.diff(repair.t_s)
     slow = np.flatnonzero(pace < SLOWER)
     if not len(slow):
@@ -227,6 +227,15 @@ def slowed(path: model.PathSummary, rows: model.PathChecks, repair: model.Avoida
     if end - start > LARGEST_PART * path.duration_s:
         return None
     return Slowed(float(start), float(end), float(pace.min()))
+
+
+def _kept_length(path: model.PathSummary, rows: model.PathChecks, repair: model.AvoidanceRows) -> Reals | None:
+    """The arc length (N,), m, of the tool point at the rows of a repair that keeps the path; None of others, and of
+    paths on which the tool point stays where it is."""
+    if path.strategy != "slow" or len(repair) < 2 or len(rows) < 2:
+        return None
+    length: Reals = np.append(0.0, np.linalg.norm(np.diff(repair.xyz_mm, axis=0), axis=1).cumsum()) / 1000
+    return length if np.isfinite(length[-1]) and length[-1] >= MIN_LENGTH else None
 
 
 def advised(
@@ -284,9 +293,7 @@ def near_assumed(path: model.PathSummary, summary: model.TrajectorySummary) -> C
 def events(path: model.PathSummary) -> list[PlayedEvent]:
     """Singular poses and faults of a path."""
     passes = [_pass(e, open_beside(path, e)) for e in path.singularities]
-    told = {passing_text(e, span) for e in path.singularities if (span := open_beside(path, e))}
-    faults = [(kind, stretch) for kind, stretches in kinds(path) for stretch in stretches]
-    faults = [(kind, stretch) for kind, stretch in faults if cause_text(path, stretch) not in told]
+    faults = [(kind, part) for kind, stretches in kinds(path) for part in stretches if not pass_about(path, part)]
     return passes + [
         PlayedEvent(
             s.t0_s,
@@ -309,14 +316,12 @@ def _pass(event: model.Singularity, span: tuple[float, float] | None) -> PlayedE
 
 def _kept_passes(path: model.PathSummary, rows: model.PathChecks, repair: model.AvoidanceRows) -> list[PlayedEvent]:
     """The passes by singular poses of a motion that repairs a path and keeps to it: at its times."""
-    if path.strategy != "slow" or len(repair) < 2 or len(rows) < 2:
-        return []
-    way = np.append(0.0, np.linalg.norm(np.diff(repair.xyz_mm, axis=0), axis=1).cumsum()) / 1000
-    if not np.isfinite(way[-1]) or way[-1] < LEAST_WAY:
+    length = _kept_length(path, rows, repair)
+    if length is None:
         return []
 
     def later(t: float) -> float:
-        return float(np.interp(np.interp(t, rows.t_s, rows.s_m), way, repair.t_s))
+        return float(np.interp(np.interp(t, rows.t_s, rows.s_m), length, repair.t_s))
 
     found = []
     for event in path.singularities:
