@@ -45,7 +45,10 @@ LEVELS: dict[Level, str] = {
     "fail": N_("fail"),
 }
 REASONS: dict[Unresolved, str] = {
-    "undefined": N_("the program does not define it"),
+    "undefined": N_(
+        "the program does not define it, or makes it of what is not known here, such as joint angles after a straight "
+        "line"
+    ),
     "not_finite": N_("it is no finite number"),
     "position_unknown": N_("it depends on where the arm stands, which is not known"),
     "external_tool": N_("the workpiece is moved along a fixed tool, which is not supported"),
