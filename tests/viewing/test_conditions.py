@@ -40,6 +40,7 @@ from er3a.pipeline.viewing.index import condition, proposed
 from er3a.pipeline.viewing.tray import Meeting, first_inside, placing
 
 TALLY = CheckTally(24)
+FILE = "data/robots/arm.yaml"
 TURNED = ToolOff(0.0, 180.0)
 FOUND = LeftOpen(
     CheckCounts(TALLY, TALLY, CheckTally()),
@@ -102,10 +103,11 @@ def test_a_turned_flange_moves_the_tip_of_a_tool():
 def test_other_entries_are_to_be_checked_only_where_there_are_others():
     only = replace(FOUND, parts=(PartFound("zero_and_directions", "open", 12, 11, 0, (), (), TURNED),))
     only = replace(only, unbounded=("direction1",))
-    assert "Then check the other" not in proposed(only)["measurement"]
-    assert "Then check the other" in proposed(replace(only, unbounded=("direction1", "direction2")))["measurement"]
-    assert "Then check the other" in proposed(FOUND)["measurement"]
-    assert "at reduced speed (T1), jog +J1 a few degrees" in proposed(FOUND)["measurement"]
+    assert "Then check the other" not in proposed(only, FILE)["measurement"]
+    assert "Then check the other" in proposed(replace(only, unbounded=("direction1", "direction2")), FILE)["measurement"]
+    assert "Then check the other" in proposed(FOUND, FILE)["measurement"]
+    assert "at reduced speed (T1), jog +J1 a few degrees" in proposed(FOUND, FILE)["measurement"]
+    assert f"turn its sign in {FILE}" in proposed(FOUND, FILE)["measurement"]
 
 
 def test_a_verdict_says_what_it_is_not_to_be_taken_for():

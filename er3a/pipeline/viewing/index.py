@@ -24,7 +24,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull
 
-from er3a.files.kept_files import write_atomically
+from er3a.files.kept_files import shown_path, write_atomically
 from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.code_digest import code_digest
@@ -674,7 +674,7 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
             failed,
             instead=instead,
             same_arm=same_arm,
-            **proposed(finding),
+            **proposed(finding, shown_path(study.robot_file(name))),
         ),
         "cells": [_cell(head) for head in sorted(heads.values(), key=lambda head: FIRST.index(head.status))],
         "expected": expected,
@@ -704,14 +704,14 @@ def _meant(heads: Mapping[str, Head], expected: Mapping[str, str]) -> str:
     return tr("{count} expected to fail: {names}", count=len(named), names=joined(named, ", ")) if named else ""
 
 
-def proposed(finding: object) -> dict[str, str]:
+def proposed(finding: object, robot_file: str) -> dict[str, str]:
     """The measurement that validation proposes, as :func:`next_step` takes it; empty where it proposes none."""
     if not isinstance(finding, LeftOpen) or finding.next_measurement is None:
         return {}
     proposal, entry = finding.next_measurement, finding.next_measurement.entry
-    seen = N_("If so, {entry} is correct; if not, turn its sign in the robot's file, and run again.")
+    seen = N_("If so, {entry} is correct; if not, turn its sign in {file}, and run again.")
     settles = seen if proposal.code == "look_at_motion" else N_("It settles {entry}.")
-    step = [page.whole_sentence(say(proposal)), tr(settles, entry=entry if " " in entry else shortened([entry]))]
+    step = [page.whole_sentence(say(proposal)), tr(settles, entry=entry if " " in entry else shortened([entry]), file=robot_file)]
     open_ = sum(part.entries - part.settled - part.up_to_signs for part in finding.parts)
     if open_ > 1 or any(name != entry for name in finding.unbounded):
         step.append(tr("Then check the other entries that are not settled, as that page says."))
