@@ -117,10 +117,14 @@ def test_comparison_shows_the_pair_that_is_picked(browser, small_study):
     assert shown() == ["er3a_c60", "er3a_c60_article"]
     key = browser.find_elements(By.CSS_SELECTOR, ".borders-key span")
     assert [each.text for each in key] == [load_robot(name).title for name in shown()]
-    styles = [
-        browser.execute_script("return getComputedStyle(arguments[0], '::before').borderTopStyle", each) for each in key
+    widths = [
+        browser.execute_script("return getComputedStyle(arguments[0], '::before').borderTopWidth", each) for each in key
     ]
-    assert styles == ["solid", "dashed"]  # as the borders are drawn
+    drawn = [
+        browser.find_element(By.CSS_SELECTOR, f"#borders g.{side}").value_of_css_property("stroke-width")
+        for side in ("a", "b")
+    ]
+    assert widths == drawn == ["5px", "2px"]  # a pair that coincides shows both
     Select(browser.find_element(By.ID, "robot-b")).select_by_value("er3_600")
     robots = [load_robot(name) for name in ("er3a_c60", "er3_600")]
     assert [float(text) for text in cells("J1 d")[:2]] == [round(robot.d[0] * 1000, 6) for robot in robots]

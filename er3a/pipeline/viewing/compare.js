@@ -47,6 +47,8 @@ function compareRobots() {
   for (const group of document.querySelectorAll("#borders g[data-robot]")) {
     group.setAttribute("class", pickers.map((picker, side) => (picker.value === group.dataset.robot ? "ab"[side] : "")).join(" ").trim());
   }
+  const thin = document.querySelector("#borders g.b");
+  thin?.parentNode.append(thin); // above the thick one
 }
 
 function picked() {
