@@ -667,6 +667,16 @@ def test_a_pass_beside_which_the_bounds_leave_it_open_is_told_in_one_sentence_ev
     assert kept.text.startswith("near-singular: sampled, it passes the wrist singularity at 1.88 deg")
 
 
+def test_what_else_is_open_beside_such_a_pass_is_told_apart(results):
+    path = by_name(results["er3a_c60"])["line_wrist_near"]
+    own = path.undecided[0]
+    other = replace(own, cause=tool_proof.Undecided("speed"))
+    both = replace(path, undecided=(*path.undecided, other))
+    assert cause_text(both, own) == cause_text(path, own)
+    assert "speed" in cause_text(both, other)
+    assert "wrist singularity" not in cause_text(both, other)
+
+
 def test_a_path_that_starts_near_singular_lists_that_first_with_its_distance(results):
     found = results["er3_600"]
     rows = found.checks.take(found.checks.path == "line_out")
