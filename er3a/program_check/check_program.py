@@ -256,7 +256,12 @@ def _not_examined(execution: Execution, located: tuple[LocatedFinding, ...], end
     missed = (found_in.MotionNotReached, found_in.NeverReached)
     found += [NotExamined(each.place, "motion") for each in located if isinstance(each.finding, missed)]
     found += [NotExamined(each.place, "way") for each in located if isinstance(each.finding, found_in.PathNotKnown)]
-    ends = (found_in.NotFollowedToEnd, found_in.KeptToNextStart)
+    ends = (
+        found_in.NotFollowedToEnd,
+        found_in.KeptToNextStart,
+        found_in.SetElsewhere,
+        found_in.WaitsForOthers,
+    )
     found += [NotExamined(each.place, "course") for each in located if isinstance(each.finding, ends)]
     strange = (found_in.MayMove, NotUnderstood, NotSimulated)
     found += [NotExamined(each.place, "instruction") for each in located if isinstance(each.finding, strange)]
@@ -299,6 +304,9 @@ def _located(execution: Execution, robot: Robot, checker: StepChecker, end: int)
         elif isinstance(what, MovesBeside) and what.kind != "entered":
             beside = found_in.MovesBesideProgram(what.routine, what.kind)
             found.append(LocatedFinding("caution", beside, step.place, step.calls))
+        elif isinstance(what, Pause) and what.by_others:
+            waits = found_in.WaitsForOthers(what.condition or "")
+            found.append(LocatedFinding("caution", waits, step.place, step.calls))
         elif isinstance(what, Decision) and what.taken:
             found.append(LocatedFinding("note", found_in.BothSidesChecked(what.condition), step.place, step.calls))
     found += [*_loads(execution, robot), *_stated_elsewhere(execution, robot), *_not_set(execution)]
@@ -307,6 +315,10 @@ def _located(execution: Execution, robot: Robot, checker: StepChecker, end: int)
         for each in execution.frames_twice
     ]
     found += [LocatedFinding("caution", found_in.KeptToNextStart(name), place) for name, place in execution.kept]
+    found += [
+        LocatedFinding("caution", found_in.SetElsewhere(name, place.file.name if place.file else "", place.line), top)
+        for name, place in execution.elsewhere
+    ]
     found += [LocatedFinding("caution", other, ending.place) for ending, other in checker.returns]
     for ending in execution.endings:
         if ending.kind not in ("end", "repeats", "joins"):

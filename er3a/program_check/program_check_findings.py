@@ -69,6 +69,20 @@ class KeptToNextStart(Finding):
     name: str
 
 
+class SetElsewhere(Finding):
+    """A variable that decides motions is set by another program too; the value of the data file was taken."""
+
+    name: str
+    file: str
+    line: int
+
+
+class WaitsForOthers(Finding):
+    """A wait for what is false, and what nothing that was read makes true: another task does, and may do more."""
+
+    condition: str
+
+
 class ToolStatedElsewhere(Finding):
     """A table's pose of the tool is not where its joints put it; in the row where it is farthest away."""
 
@@ -427,6 +441,8 @@ CheckFinding = (
     | FramesFromRobotFile
     | FrameGivenTwice
     | KeptToNextStart
+    | SetElsewhere
+    | WaitsForOthers
     | ToolStatedElsewhere
     | PositionCompleted
     | FramesInDoubt

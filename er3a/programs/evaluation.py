@@ -10,6 +10,7 @@ import math
 import operator
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
+from ctypes import c_float
 from dataclasses import dataclass, field, replace
 from typing import TypeGuard
 
@@ -135,6 +136,55 @@ STRUCTURE = "%STRUC "
 
 LONGEST_TEXT = 10_000
 LARGEST_WHOLE = 2**62
+SINGLE = 2.0**-24
+"""By which share of a number single precision may miss it."""
+
+
+class Rounded(float):
+    """A number as double precision has it; a controller that computes in single precision has it within ``error``."""
+
+    __slots__ = ("error",)
+
+    error: float
+
+    def __new__(cls, value: float, error: float) -> Rounded:
+        """The number, and how far off the controller's may be."""
+        found = super().__new__(cls, value)
+        found.error = error
+        return found
+
+
+def missed_by(value: syntax.Value) -> float:
+    """How far single precision may be from a number; 0 of what it holds exactly."""
+    if isinstance(value, Rounded):
+        return value.error
+    if not isinstance(value, float) or not math.isfinite(value) or c_float(value).value == value:
+        return 0.0
+    return abs(value) * SINGLE
+
+
+def computed_in_single(sign: str, left: syntax.Value, right: syntax.Value, found: float) -> float:
+    """A sum, product or the like of two numbers, with what single precision may make of it."""
+    errors = missed_by(left), missed_by(right)
+    if not any(errors) and not missed_by(found):
+        return found
+    a, b = abs(syntax.number(left) or 0.0), abs(syntax.number(right) or 0.0)
+    match sign:
+        case "*":
+            passed = a * errors[1] + b * errors[0] + errors[0] * errors[1]
+        case "/" if b > errors[1]:
+            passed = (errors[0] + abs(found) * errors[1]) / (b - errors[1])
+        case "+" | "-":
+            passed = sum(errors)
+        case _:
+            passed = math.inf
+    return Rounded(found, passed + abs(found) * SINGLE)
+
+
+def function_in_single(found: float) -> float:
+    """The value of a mathematical function, with what single precision may make of it and of its argument."""
+    return Rounded(found, 4 * SINGLE * max(abs(found), 1.0)) if missed_by(found) else found
+
 
 COMPARISONS: Mapping[str, Callable[[float, float], bool]] = {
     "<": operator.lt,
@@ -142,6 +192,7 @@ COMPARISONS: Mapping[str, Callable[[float, float], bool]] = {
     "<=": operator.le,
     ">=": operator.ge,
 }
+COMPARED = frozenset((*COMPARISONS, "==", "=", "<>", "!="))
 ARITHMETIC: Mapping[str, Callable[[float, float], float]] = {
     "+": operator.add,
     "-": operator.sub,
@@ -179,6 +230,8 @@ class Dialect(ABC):
     local_by_default : whether a routine's assignment to a name that nothing else knows makes a local variable
     setters : functions outside the program that do not move the arm but set what motions use
     whole_division : whether whole numbers are divided to a whole number; None where this is not documented
+    single_precision : whether numbers that are not whole have 32 bits
+    most_whole : the largest whole number that a variable holds exactly
     first_index : index of a list's first element
     keeps_data : whether declared data keep what a run of the program sets, to its next start
     """
@@ -188,6 +241,8 @@ class Dialect(ABC):
     local_by_default: bool = False
     setters: frozenset[str] = frozenset()
     whole_division: bool | None = False
+    single_precision: bool = False
+    most_whole: int = LARGEST_WHOLE
     first_index: int = 1
     keeps_data: bool = True
 
@@ -468,19 +523,19 @@ class ProgramMemory:
             found = None if key is None else self.read(key)
             if found is None and isinstance(of, syntax.Unclear):
                 return syntax.Unclear(key or of.text)
-        return syntax.Unclear(self._shown(expression)) if found is None else found
+        return syntax.Unclear(self.shown(expression)) if found is None else found
 
-    def _shown(self, target: syntax.Expression) -> str:
+    def shown(self, target: syntax.Expression) -> str:
         """A variable, field or element as text, with indices that are not known by their variables."""
         match target:
             case syntax.Variable(name=name):
                 return name
             case syntax.Member(of=of, name=name):
-                return f"{self._shown(of)}.{name}"
+                return f"{self.shown(of)}.{name}"
             case syntax.Element(of=of, indices=indices):
                 numbers = [syntax.number(self.value(each)) for each in indices]
-                shown = (self._shown(i) if n is None else f"{n:g}" for i, n in zip(indices, numbers))
-                return f"{self._shown(of)}[{','.join(shown)}]"
+                shown = (self.shown(i) if n is None else f"{n:g}" for i, n in zip(indices, numbers))
+                return f"{self.shown(of)}[{','.join(shown)}]"
         return "?"
 
     def _with_element(self, target: syntax.Element, value: syntax.Value) -> syntax.Value | None:
@@ -520,6 +575,8 @@ class ProgramMemory:
             if kind in ("INT", "DINT", "SINT", "LINT") and isinstance(value, float) and abs(value) < LARGEST_WHOLE:
                 if self.functions.whole_division is None and value % 1:
                     return syntax.Unclear(f"{value:g}, whose conversion to a whole number is not documented")
+                if self.functions.single_precision and abs(abs(value) % 1 - 0.5) <= missed_by(value) > 0:
+                    return syntax.Unclear(f"{value:.9g}, whose rounding to a whole number is open on the controller")
                 return int(math.copysign(math.floor(abs(value) + 0.5), value))  # KRL: from x.5 on it is x + 1
         return value
 
@@ -542,6 +599,8 @@ class ProgramMemory:
         for side in (left, right):
             if isinstance(side, syntax.Unclear):
                 return side
+        if self._too_near(sign, left, right):
+            return syntax.Unclear(f"{left:.9g} {sign} {right:.9g}, which rounding decides on the controller")
         if sign in ("==", "=", "<>", "!="):
             return (left == right) == (sign in ("==", "="))
         if sign in BITWISE:
@@ -553,6 +612,17 @@ class ProgramMemory:
         if sign in EXCLUSIVE and isinstance(left, bool) and isinstance(right, bool):
             return left != right
         return self._computed(sign, left, right)
+
+    def _too_near(self, sign: str, left: syntax.Value, right: syntax.Value) -> bool:
+        """Whether two numbers that are compared differ by no more than single precision may miss them."""
+        if not self.functions.single_precision or sign not in COMPARED:
+            return False
+        a, b = syntax.number(left), syntax.number(right)
+        if a is None or b is None or not (isinstance(left, float) or isinstance(right, float)):
+            return False
+        if a == b and not isinstance(left, Rounded) and not isinstance(right, Rounded):  # the same, rounded alike
+            return False
+        return abs(a - b) <= missed_by(left) + missed_by(right)
 
     def _quotient(self, a: float, b: float, whole: bool) -> syntax.Value:
         if not whole or self.functions.whole_division is False:
@@ -570,6 +640,14 @@ class ProgramMemory:
         if sign in COMPARISONS:
             return COMPARISONS[sign](a, b)
         whole = isinstance(left, int) and isinstance(right, int)
+        found = self._combined(sign, a, b, whole)
+        if whole and isinstance(found, (int, float)) and abs(found) > self.functions.most_whole:
+            return syntax.Unclear(f"{a:.0f} {sign} {b:.0f}, beyond what a whole number holds")
+        if self.functions.single_precision and isinstance(found, float):
+            return computed_in_single(sign, left, right, found)
+        return found
+
+    def _combined(self, sign: str, a: float, b: float, whole: bool) -> syntax.Value:
         try:
             if sign == "/":
                 return self._quotient(a, b, whole)
@@ -613,4 +691,6 @@ def _unary(sign: str, value: syntax.Value) -> syntax.Value:
     if plain is None:
         return syntax.Unclear(f"{sign} ...")
     assert isinstance(value, (int, float))
+    if isinstance(value, Rounded):
+        return Rounded(-value, value.error) if sign == "-" else value
     return -value if sign == "-" else value

@@ -97,6 +97,7 @@ class Execution(ByValue):
     unmet : instructions that are no motions, may move the arm for all that is known, and were not carried out
     frames_twice : frames that the program and the cell give differently; the program's were taken
     kept : variables of its data that decide motions and that it leaves changed to its next start, with where
+    elsewhere : variables of its data that decide motions and that other programs set, with where
     """
 
     program: Program
@@ -105,6 +106,7 @@ class Execution(ByValue):
     unmet: tuple[Place, ...] = ()
     frames_twice: tuple[FrameTwice, ...] = ()
     kept: tuple[tuple[str, Place], ...] = ()
+    elsewhere: tuple[tuple[str, Place], ...] = ()
 
     @property
     def complete(self) -> bool:

@@ -258,11 +258,13 @@ class Pause:
     Attributes
     ----------
     stops : whether the arm is known to stand at its target then, even after a motion with a zone
+    by_others : whether the condition is false, and nothing that was read makes it true
     """
 
     seconds: float | None = None
     condition: str | None = None
     stops: bool = False
+    by_others: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -71,6 +71,8 @@ def deciding(program: syntax.Program, modal: frozenset[str]) -> frozenset[str]:
             name = target_name(operation.target)
             assigned.add(name)
             sources[name] |= used
+        elif isinstance(operation, syntax.Waiting):
+            assigned |= used
     for routine in program.routines.values():
         assigned |= {parameter.name for parameter in routine.parameters}
         assigned |= {name for operation in routine.handler for name in _changed(operation)}
@@ -94,7 +96,8 @@ def changed_beside(program: syntax.Program, dialect: Dialect, itself: str = "") 
     cyclic = {name for what in beside if what.function == syntax.CYCLIC for name in names(what.arguments[0])}
     started = {name for name in routines if (name in asked or routines[name].thread) and name != itself}
     given = {name for what in beside for name in _given_back(program, what.function, what.arguments)}
-    return (_changed_in(program, _with_called(program, started), dialect) | cyclic | given) - dialect.modal
+    changed = _changed_in(program, _with_called(program, started), dialect) | program.beside
+    return (changed | cyclic | given) - dialect.modal
 
 
 def _persisting(program: syntax.Program, dialect: Dialect) -> frozenset[str]:
@@ -329,6 +332,8 @@ def _changed(operation: syntax.Operation) -> Iterator[str]:
             yield target_name(operation.target)
     elif isinstance(operation, syntax.Call):  # parameters may go both ways
         yield from (name for each in operation.arguments for name in names(each))
+    elif isinstance(operation, syntax.Waiting) and operation.kind == "condition":  # others may meet it
+        yield from names(operation.of)
 
 
 def aliased_calls(program: syntax.Program) -> dict[syntax.Call, frozenset[str]]:
@@ -584,8 +589,8 @@ class Machine:
         self.names_met: set[str] = set()
         self.deciding_names: list[str] = []  # of those, whole
         self.unsettled = {name: unsettled(routine, dialect) for name, routine in program.routines.items()}
-        self.quiet, needed = quiet_branches(program, dialect)
-        self.persisting = _persisting(program, dialect) & needed
+        self.quiet, self.needed = quiet_branches(program, dialect)
+        self.persisting = _persisting(program, dialect) & self.needed
         self.first_values: dict[str, syntax.Value] = {}  # of these
         self.changed_at: dict[str, instructions.Place] = {}  # likewise
         self.kept: dict[str, instructions.Place] = {}
@@ -619,7 +624,8 @@ class Machine:
         for each in self.program.data:
             self._assign(memory, each)
         self.first_values = {name: value for name, value in memory.shared.items() if root(name) in self.persisting}
-        memory.watched = self.persisting | {root(name) for name in self.frames_twice}
+        elsewhere = {name: place for name, place in self.program.elsewhere if name in self.needed}
+        memory.watched = self.persisting | {root(name) for name in self.frames_twice} | elsewhere.keys()
         of_data = set(self.frames_twice)
         entry = self.program.routines.get(self.program.entry)
         if entry is not None:
@@ -636,6 +642,7 @@ class Machine:
             self._unmet(),
             tuple(twice),
             tuple(self.kept.items()),
+            tuple((name, place) for name, place in elsewhere.items() if name in set(map(root, memory.met))),
         )
 
     def _begin(self, way: ExecutionPath) -> None:
@@ -736,7 +743,11 @@ class Machine:
             if signal is not None:
                 self._note(way, operation.place, signal)
         elif isinstance(operation, syntax.Waiting):
-            self._note(way, operation.place, self._pause(memory, operation))
+            pause = self._pause(memory, operation)
+            self._note(way, operation.place, pause)
+            if pause.by_others:
+                for name in names(operation.of):
+                    memory.forget(name)
         else:
             done = self.dialect.carry_out(memory, operation)
             if done is not None:
@@ -773,13 +784,17 @@ class Machine:
                 memory.write(each.target.name, syntax.Unset(each.target.name), each.local)
             return None
         value = memory.value(each.value)
-        name = memory.key(each.target) or each.text
+        key = memory.key(each.target)
+        name = key or memory.shown(each.target)
         if isinstance(each.value, syntax.Constant) and isinstance(value, syntax.Unclear):  # which part is not known
             memory.forget(root(name))
         if self.dialect.runs_on(name):
             value = syntax.Unclear(name)
         if self.dialect.is_signal(name):
-            memory.write(name, value if self.dialect.reads_back(name) else syntax.Unclear(name))
+            if key is None:  # one of them, or several
+                memory.forget(root(name))
+            else:
+                memory.write(name, value if self.dialect.reads_back(name) else syntax.Unclear(name))
             return instructions.Output(name, syntax.shown(value))
         declared = each.type_name == "global" or not self.dialect.local_by_default
         local = each.local or (not declared and self._is_new(memory, name))
@@ -823,7 +838,9 @@ class Machine:
         if waiting.kind == "operator":
             return instructions.Pause(stops=waiting.stops)
         if waiting.kind == "condition" or waiting.of is None:
-            return instructions.Pause(condition=waiting.text, stops=waiting.stops)
+            asked = None if waiting.of is None else memory.value(waiting.of)
+            fails = asked is False or (isinstance(asked, tuple) and any(each is False for each in asked))
+            return instructions.Pause(condition=waiting.text, stops=waiting.stops, by_others=fails)
         seconds = syntax.number(memory.value(waiting.of))
         return (
             instructions.Pause(seconds, stops=waiting.stops)

@@ -372,6 +372,8 @@ class Program(ByValue):
     data : declarations (of a .dat or .var file, or of global variables), carried out first
     findings : about the text
     slides : whether each joint of a table slides, its targets in m; empty of other programs
+    beside : variables that other tasks, which run beside the program, change
+    elsewhere : variables of its data that other programs set, which it does not call, with where
     """
 
     language: LanguageName
@@ -383,6 +385,8 @@ class Program(ByValue):
     findings: tuple[ProgramFinding, ...] = ()
     lines: tuple[str, ...] = field(default=(), repr=False)
     slides: tuple[bool, ...] = ()
+    beside: frozenset[str] = frozenset()
+    elsewhere: tuple[tuple[str, Place], ...] = ()
 
     def operations(self) -> Iterator[Operation]:
         """All that the text holds, whether it is ever reached or not."""

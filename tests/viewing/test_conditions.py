@@ -104,7 +104,9 @@ def test_other_entries_are_to_be_checked_only_where_there_are_others():
     only = replace(FOUND, parts=(PartFound("zero_and_directions", "open", 12, 11, 0, (), (), TURNED),))
     only = replace(only, unbounded=("direction1",))
     assert "Then check the other" not in proposed(only, FILE)["measurement"]
-    assert "Then check the other" in proposed(replace(only, unbounded=("direction1", "direction2")), FILE)["measurement"]
+    assert (
+        "Then check the other" in proposed(replace(only, unbounded=("direction1", "direction2")), FILE)["measurement"]
+    )
     assert "Then check the other" in proposed(FOUND, FILE)["measurement"]
     assert "at reduced speed (T1), jog +J1 a few degrees" in proposed(FOUND, FILE)["measurement"]
     assert f"turn its sign in {FILE}" in proposed(FOUND, FILE)["measurement"]

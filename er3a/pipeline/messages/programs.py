@@ -115,6 +115,10 @@ REMEDIES: dict[str, str] = {
     "position_completed": N_("Give all coordinates of the position."),
     "frame_given_twice": N_("Correct the one that is wrong, or remove it from the frames."),
     "kept_to_next_start": N_("Set this variable at the program's beginning."),
+    "set_elsewhere": N_("Set this variable at the program's beginning."),
+    "waits_for_others": N_(
+        "Look up what else the task sets that answers this wait, and set what motions use after the wait."
+    ),
     "acceleration_not_known": N_("Give the acceleration as a number."),
     "zone_without_size": N_("Give the zone's size: in mm, or for C_PTP in percent ($APO.CPTP)."),
     "spline_as_line": N_("Write straight lines of the spline (SLIN)."),
@@ -328,6 +332,14 @@ TEXTS = texts(
         "kept_to_next_start": (
             "{name} decides where the arm goes, and keeps what is set here: checked for the first start only, not for "
             "later starts or cycles"
+        ),
+        "set_elsewhere": (
+            "{name} decides where the arm goes, and {file} sets it too (line {line}): checked with the value of the "
+            "data file only"
+        ),
+        "waits_for_others": (
+            "'{condition}' is false here, and nothing that was read makes it true: another task does, and what else "
+            "that sets is not known"
         ),
         "acceleration_not_known": (
             "the acceleration '{word}' is not known, or not above 0; one was assumed for duration and joint "

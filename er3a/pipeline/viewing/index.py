@@ -711,7 +711,10 @@ def proposed(finding: object, robot_file: str) -> dict[str, str]:
     proposal, entry = finding.next_measurement, finding.next_measurement.entry
     seen = N_("If so, {entry} is correct; if not, turn its sign in {file}, and run again.")
     settles = seen if proposal.code == "look_at_motion" else N_("It settles {entry}.")
-    step = [page.whole_sentence(say(proposal)), tr(settles, entry=entry if " " in entry else shortened([entry]), file=robot_file)]
+    step = [
+        page.whole_sentence(say(proposal)),
+        tr(settles, entry=entry if " " in entry else shortened([entry]), file=robot_file),
+    ]
     open_ = sum(part.entries - part.settled - part.up_to_signs for part in finding.parts)
     if open_ > 1 or any(name != entry for name in finding.unbounded):
         step.append(tr("Then check the other entries that are not settled, as that page says."))

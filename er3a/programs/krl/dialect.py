@@ -12,7 +12,7 @@ import numpy as np
 from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, syntax
 from er3a.programs.code_builder import variable_of
-from er3a.programs.evaluation import IN_DEGREES, Dialect, ProgramMemory, known, root
+from er3a.programs.evaluation import IN_DEGREES, Dialect, ProgramMemory, function_in_single, known, root
 from er3a.robots.masses import MassBody, moved
 
 FRAME_KEYS = ("X", "Y", "Z", "A", "B", "C")
@@ -546,6 +546,8 @@ class KrlDialect(Dialect):
     frames = ("$TOOL", "$BASE")
     setters = frozenset(("BAS", "PULSE", "%SPLINE", "%ENDSPLINE"))
     whole_division = True
+    single_precision = True
+    most_whole = 2**31 - 1
 
     def __init__(self, program: syntax.Program) -> None:
         """Numbers of tool and base count as followed where the frame is set beside each."""
@@ -642,9 +644,9 @@ class KrlDialect(Dialect):
         plain = syntax.numbers(values)
         try:
             if name == "ATAN2" and plain is not None and len(plain) == 2:
-                return math.degrees(math.atan2(*plain))
+                return function_in_single(math.degrees(math.atan2(*plain)))
             if name in IN_DEGREES and plain is not None and len(plain) == 1:
-                return float(IN_DEGREES[name](plain[0]))
+                return function_in_single(float(IN_DEGREES[name](plain[0])))
         except (ValueError, OverflowError):
             pass
         return syntax.Unclear(f"{name}(...)")
@@ -758,6 +760,7 @@ class KrlDialect(Dialect):
             )
         if call.function == "PULSE" and call.arguments and call.arguments[0] is not None:
             name = memory.key(call.arguments[0]) or "$OUT"
+            memory.forget("$OUT")  # which is what it was again, but nobody knows when
             return instructions.Output(name, doing.text)
         return instructions.Aside(doing.text) if self.harmless(call) else instructions.Unknown(doing.text)
 

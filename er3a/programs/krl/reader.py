@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
 from er3a.errors import InputError
 from er3a.programs import syntax
 from er3a.programs.code_builder import (
+    ASSIGNED,
     CodeBuilder,
     fault,
     lacks_data,
@@ -25,7 +26,7 @@ from er3a.programs.code_builder import (
 )
 from er3a.programs.evaluation import STRUCTURE
 from er3a.programs.instructions import Aside, Place, Remark
-from er3a.programs.krl.dialect import HERE, HERE_JOINTS, changed_arguments
+from er3a.programs.krl.dialect import HERE, HERE_JOINTS, MODAL, changed_arguments
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, data_file_of, read_program_text
 from er3a.programs.program_findings import DataFileMissing, NameTwice, ProgramFinding
 
@@ -69,7 +70,8 @@ class KrlWords(Words):
         if self.kind == "whole":
             word = self.take()
             try:
-                return syntax.Constant(int(word[2:-1], 16 if word[1] in "Hh" else 2))
+                bits = int(word[2:-1], 16 if word[1] in "Hh" else 2)
+                return syntax.Constant(bits - 2**32 if 2**31 <= bits < 2**32 else bits)  # an INT has 32, with its sign
             except ValueError:
                 raise MisreadError(f"{word} is not a number") from None
         if self.accept("{"):
@@ -209,8 +211,10 @@ class _Statement:
             self.builder.aside(self.place, self.text)
             return
         if words.accept("SIGNAL"):
-            name = words.name()
-            self.signals[name] = words.expression()
+            name, signal = words.name(), words.expression()
+            if words.accept("TO"):  # several, of which it is not known what each has when they are set as a number
+                signal = syntax.Element(syntax.Variable(variable_of(signal)), (syntax.Opaque(name),))
+            self.signals[name] = signal
             self.builder.aside(self.place, self.text)
             return
         kind = words.name()
@@ -389,6 +393,8 @@ def _do(reading: _Statement, at_any_time: bool = False) -> None:
     if isinstance(what, syntax.Invocation):
         words.finish()
         reading.builder.beside(reading.place, what, reading.text, "interrupt")
+        if what.function == "PULSE":
+            reading.builder.unclear(reading.place, "$OUT")
     elif words.accept("="):
         if at_any_time:
             reading.builder.unknown(reading.place, reading.text, may_move=False)
@@ -538,19 +544,19 @@ def read_krl(source: ProgramText) -> syntax.Program:
     """
     reader = _KrlReader(source)
     findings: list[ProgramFinding] = [*source.findings]
+    shared = shared_data_of(source.path)
+    if shared is not None:
+        reader.read_data(read_program_text(shared))
+    of_controller = dict(reader.signals)
     data_file = data_file_of(source.path, ".dat")
     if data_file is not None:
         findings += reader.read_data(read_program_text(data_file))
-    shared = shared_data_of(source.path)
-    if shared is not None:
-        own, reader.data = reader.data, []
-        reader.read_data(read_program_text(shared))
-        reader.data += own
     routines = reader.read_routines()
+    beside, elsewhere = _changed_by_others(source.path, reader.data, of_controller)
     called: list[syntax.Routine] = []
     for file in modules_of(source.path):
         if all(routine.name != file.stem.upper() for routine in routines):
-            more_routines, more_data, more = _module(read_program_text(file))
+            more_routines, more_data, more = _module(read_program_text(file), of_controller)
             called += more_routines
             reader.data += more_data
             findings += more
@@ -566,12 +572,19 @@ def read_krl(source: ProgramText) -> syntax.Program:
         tuple(reader.data),
         (*findings, *unlinked),
         source.lines,
+        beside=beside,
+        elsewhere=elsewhere,
     )
 
 
-def _module(source: ProgramText) -> tuple[list[syntax.Routine], list[syntax.Assign], list[ProgramFinding]]:
-    """Routines, data and findings of another module."""
+Signals = Mapping[str, syntax.Expression]
+Read = tuple[list[syntax.Routine], list[syntax.Assign], list[ProgramFinding]]
+
+
+def _module(source: ProgramText, of_controller: Signals) -> Read:
+    """Routines, data and findings of another module; ``of_controller``: the signals that all modules know."""
     reader = _KrlReader(source)
+    reader.signals.update(of_controller)
     findings: list[ProgramFinding] = [*source.findings]
     data_file = data_file_of(source.path, ".dat")
     if data_file is not None:
@@ -687,6 +700,48 @@ def split_comment(line: str, place: Place) -> tuple[str, str]:
     return (line.strip(), "") if at < 0 else (line[:at].strip(), line[at + 1 :].strip())
 
 
+def _changed_by_others(
+    path: Path, data: Iterable[syntax.Assign], of_controller: Signals
+) -> tuple[frozenset[str], tuple[tuple[str, Place], ...]]:
+    """Variables that all modules see, as those of $config.dat and outputs: which of them submit programs change, beside
+    the program; and which other modules set that it does not call, with where."""
+    own = data_file_of(path, ".dat")
+    shared = {variable_of(each.target) for each in data if each.place.file != own or GLOBAL_NAME.search(each.text)}
+    beside: set[str] = set()
+    elsewhere: dict[str, Place] = {}
+    for file in _submits(path):
+        beside.update(name for name, _ in _set_in(read_program_text(file), shared, of_controller))
+    for file in _others(path):
+        for name, place in _set_in(read_program_text(file), shared, of_controller):
+            if not name.startswith("$"):
+                elsewhere.setdefault(name, place)
+    return frozenset(beside - {*MODAL}), tuple(elsewhere.items())
+
+
+def _set_in(source: ProgramText, shared: Container[str], of_controller: Signals) -> Iterable[tuple[str, Place]]:
+    """Variables of all modules, and the controller's, that a module sets, with where; all it may set if it can't be
+    read."""
+    found = ((ASSIGNED.match(line), number) for number, line in enumerate(source.lines, 1))
+    named = [(match[1].upper(), Place(source.path, number)) for match, number in found if match]
+    if not any(name in shared or name.startswith("$") or name in of_controller for name, _ in named):
+        return
+    try:
+        routines, _, _ = _module(source, of_controller)
+    except InputError:
+        yield from ((name, place) for name, place in named if name in shared or name.startswith("$"))
+        return
+    for operation in (each for routine in routines for each in routine.code):
+        targets: tuple[syntax.Expression | None, ...] = ()
+        if isinstance(operation, syntax.Assign) and not operation.local:
+            targets = (operation.target,)
+        elif isinstance(operation, syntax.Doing) and isinstance(operation.what, syntax.Invocation):
+            targets = changed_arguments(operation.what)
+        for target in targets:
+            name = "" if target is None else variable_of(target)
+            if name in shared or name.startswith("$"):
+                yield name, operation.place
+
+
 CALL = re.compile(r"\b([A-Za-z]\w*)\s*\(")
 MAX_MODULES = 200
 BASICS, BASICS_FILES = "BAS", ("bas.src", "BAS.SRC", "Bas.src", "BAS.src")
@@ -694,8 +749,9 @@ DEEPEST = 6  # folders of an archive
 
 
 def companions(path: Path) -> tuple[Path, ...]:
-    """What belongs to a .src file: the modules that it calls, the points of each, and the controller's own data."""
-    modules = modules_of(path)
+    """What belongs to a .src file: the modules that it calls, the points of each, and the controller's own data and
+    submit programs; and other modules, where these may set what all know."""
+    modules = (*modules_of(path), *_submits(path), *_others(path))
     data = (data_file_of(module, ".dat") for module in (path, *modules))
     return tuple(file for file in (*modules, *data, shared_data_of(path)) if file is not None)
 
@@ -726,6 +782,24 @@ def modules_of(path: Path) -> tuple[Path, ...]:
 def shared_data_of(path: Path) -> Path | None:
     """The controller's own $config.dat, with its tools, bases and points: beside a program, or as in an archive."""
     return _in_archive(path, ("$config.dat", "$CONFIG.DAT", "$Config.dat"))
+
+
+def _submits(path: Path) -> tuple[Path, ...]:
+    """Programs that a controller runs beside the robot's: beside a program, or as in an archive."""
+    beside = [each for each in sorted(path.parent.iterdir()) if each.suffix.lower() == ".sub" and each.is_file()]
+    system = _in_archive(path, ("sps.sub", "SPS.SUB", "SPS.sub"))
+    return tuple(beside if system is None or system in beside else (*beside, system))
+
+
+def _others(path: Path) -> tuple[Path, ...]:
+    """Modules of the same controller that a program does not call; none where all modules share no variable."""
+    shared, own = shared_data_of(path), data_file_of(path, ".dat")
+    if shared is None and (own is None or not GLOBAL_NAME.search(read_program_text(own).text)):
+        return ()
+    inside = path.parent if shared is None or shared.parent == path.parent else shared.parent.parent
+    called = {path.resolve(), *(each.resolve() for each in modules_of(path))}
+    found = (each for each in sorted(inside.rglob("*")) if each.suffix.lower() == ".src" and each.is_file())
+    return tuple(each for each in found if each.resolve() not in called)
 
 
 def _in_archive(path: Path, names: Iterable[str]) -> Path | None:

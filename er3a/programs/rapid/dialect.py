@@ -15,7 +15,15 @@ from scipy.spatial.transform import Rotation
 from er3a.geometry.transforms import rpy_of, transform
 from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, syntax
-from er3a.programs.evaluation import Dialect, Position, ProgramMemory
+from er3a.programs.evaluation import (
+    Dialect,
+    Position,
+    ProgramMemory,
+    Rounded,
+    computed_in_single,
+    function_in_single,
+    missed_by,
+)
 from er3a.programs.rapid import data_types, reader
 from er3a.robots.masses import moved, together
 
@@ -91,6 +99,7 @@ SWITCHES: Mapping[str, frozenset[str]] = {
     "EULERZYX": frozenset("XYZ"),
 }
 """What they take by name; a call with another, such as ``CRobT(\\TaskName:="T_ROB2")``, has no known value."""
+MOST_WHOLE = 2**23  # that a num holds exactly
 IN_DEGREES: Mapping[str, Callable[..., float]] = {
     "ABS": abs,
     "SQRT": math.sqrt,
@@ -116,6 +125,7 @@ class RapidDialect(Dialect):
 
     modal = frozenset((*SETTINGS.values(), "%GRIPLOAD"))
     setters = frozenset((*SETTINGS, *OUTPUTS, "EOFFSOFF", "GRIPLOAD", "SETSYSDATA"))
+    single_precision = True
 
     def constant(self, memory: ProgramMemory, name: str) -> syntax.Value | None:
         """Speeds, zones, tool and work object that every controller has."""
@@ -573,8 +583,8 @@ def arithmetic(sign: str, left: syntax.Value, right: syntax.Value) -> syntax.Val
         if sign != "*" and a and b and max(abs(a), abs(b)) >= data_types.NO_AXIS / 10:  # an axis where it is
             return unclear
         found = a + b if sign == "+" else a - b if sign == "-" else a * b
-        whole = isinstance(left, int) and isinstance(right, int) and abs(found) < 2**53
-        return int(found) if whole else found
+        whole = isinstance(left, int) and isinstance(right, int) and abs(found) <= MOST_WHOLE
+        return int(found) if whole else computed_in_single(sign, left, right, found)
     xyz, other = data_types.plain(left, 3), data_types.plain(right, 3)
     if xyz is not None and other is not None:
         p, q = np.array(xyz), np.array(other)
@@ -596,7 +606,7 @@ def _number_of(name: str, values: tuple[syntax.Value, ...]) -> syntax.Value | No
     except (ValueError, OverflowError, ZeroDivisionError):
         return None
     whole = name in ("ABS", "NUMTODNUM", "DNUMTONUM") and all(isinstance(each, int) for each in values)
-    return int(found) if whole else float(found)
+    return int(found) if whole else function_in_single(float(found))
 
 
 def _here(memory: ProgramMemory) -> Position:
@@ -704,7 +714,7 @@ def _of_data(name: str, values: tuple[syntax.Value, ...], named: Mapping[str, sy
             xyz = data_types.plain(values[0], 3)
             return None if xyz is None else float(np.linalg.norm(xyz))
         case "TRUNC" | "ROUND" if plain_values is not None:
-            return _rounded(name, plain_values[0], syntax.number(named.get("DEC")) or 0)
+            return _rounded(name, values[0], syntax.number(named.get("DEC")) or 0)
         case "DIM":
             return _dimension(values)
         case "PRESENT":
@@ -762,11 +772,15 @@ def _frame_of_points(values: tuple[syntax.Value, ...], named: Mapping[str, synta
     return data_types.pose_record(T)
 
 
-def _rounded(name: str, value: float, digits: float) -> syntax.Value:
-    scale = 10.0 ** int(digits)
+def _rounded(name: str, given: syntax.Value, digits: float) -> syntax.Value:
+    scale, value = 10.0 ** int(digits), syntax.number(given) or 0.0
+    beside = abs(value) * scale + (0.5 if name == "ROUND" else 0.0)
+    is_open = abs(beside - round(beside)) <= missed_by(given) * scale > 0
+    if is_open and not digits:
+        return syntax.Unclear(f"{name.lower()}({value:.9g}), which rounding decides on the controller")
     found = math.trunc(value * scale) if name == "TRUNC" else math.floor(abs(value) * scale + 0.5)
     signed = found if name == "TRUNC" else math.copysign(found, value)
-    return int(signed) if not digits else signed / scale
+    return int(signed) if not digits else Rounded(signed / scale, is_open / scale)
 
 
 def _dimension(values: tuple[syntax.Value, ...]) -> syntax.Value | None:

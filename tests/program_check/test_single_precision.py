@@ -1,0 +1,91 @@
+"""Numbers have 32 bits on controllers that say so: where that decides, both ways are followed.
+
+What the controller computes is worked out here with numpy's single precision.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from er3a.programs import syntax
+from er3a.programs.evaluation import Cell, ProgramMemory
+from er3a.programs.instructions import JointTarget
+from er3a.programs.krl.dialect import KrlDialect
+from er3a.programs.languages import read_program
+from er3a.programs.machine import execute
+from testing.program_texts import krl, motions
+
+EMPTY = syntax.Program("krl", "a", None, {}, "A")
+SIGNS = {"+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide}
+numbers = st.floats(-1000, 1000).map(lambda x: round(x, 3))
+
+
+def turns(folder, body: str) -> set[float]:
+    """Where joint 1 may go, deg."""
+    found = motions(folder, krl(body), "a.src")
+    return {
+        round(float(np.degrees(each.target.joints[0])), 6) for each in found if isinstance(each.target, JointTarget)
+    }
+
+
+def test_a_loop_over_tenths_is_followed_with_either_number_of_rounds(tmp_path):
+    rounds, sum_ = 0, np.float32(0)
+    while sum_ < np.float32(1):
+        rounds, sum_ = rounds + 1, sum_ + np.float32(0.1)
+    body = "REAL R\nINT N\nR=0.0\nN=0\nWHILE R<1.0\nR=R+0.1\nN=N+1\nENDWHILE\nPTP {A1 N}"
+    assert rounds in turns(tmp_path, body)  # 10; in double precision 11
+    exact = body.replace("0.1", "0.125")
+    assert turns(tmp_path, exact) == {8.0}  # eighths are exact in both: one way only
+
+
+@pytest.mark.parametrize(
+    ("condition", "both"),
+    [
+        ("R==16777217.0", True),  # R=16777216.0+1.0, which single precision has as 16777216
+        ("R>16777000.0", False),
+        ("0.1==0.1", False),
+        ("0.5+0.25==0.75", False),
+        ("0.1+0.2==0.3", True),
+        ("3*0.1<0.31", False),
+        ("SIN(180)==0.0", True),
+    ],
+)
+def test_a_comparison_is_open_where_rounding_decides_it(tmp_path, condition, both):
+    body = f"REAL R\nR=16777216.0+1.0\nIF {condition} THEN\nPTP {{A1 5}}\nELSE\nPTP {{A1 9}}\nENDIF"
+    assert (turns(tmp_path, body) >= {5.0, 9.0}) == both
+
+
+def test_whole_numbers_have_32_bits(tmp_path):
+    assert turns(tmp_path, "INT N\nN='HFFFFFFFF'\nPTP {A1 N}") == {-1.0}
+    over = "INT N\nN=2147483647\nN=N+1\nIF N>0 THEN\nPTP {A1 5}\nELSE\nPTP {A1 9}\nENDIF"
+    assert turns(tmp_path, over) == {5.0, 9.0}
+
+
+@given(st.lists(st.tuples(st.sampled_from(sorted(SIGNS)), numbers), min_size=1, max_size=8), numbers)
+def test_what_single_precision_computes_is_within_what_is_kept_of_it(steps, first):
+    memory = ProgramMemory(KrlDialect(EMPTY), Cell())
+    own, kept = np.float32(first), syntax.Constant(first)
+    for sign, number in steps:
+        with np.errstate(all="ignore"):
+            own = SIGNS[sign](own, np.float32(number))
+        kept = syntax.Constant(memory.value(syntax.Binary(sign, kept, syntax.Constant(number))))
+        if not np.isfinite(own) or isinstance(kept.value, syntax.Unclear):
+            return
+    for other in (float(own), float(np.nextafter(own, np.float32(np.inf)))):
+        said = memory.value(syntax.Binary("==", kept, syntax.Constant(other)))
+        assert isinstance(said, syntax.Unclear) or said == (other == float(own))
+    below = memory.value(syntax.Binary("<", kept, syntax.Constant(first)))
+    assert isinstance(below, syntax.Unclear) or below == bool(own < np.float32(first))
+
+
+def test_numbers_of_rapid_have_32_bits_too(tmp_path):
+    file = tmp_path / "a.mod"
+    file.write_text(
+        "MODULE a\nPROC main()\nVAR num r:=0;\nVAR num n:=0;\nWHILE r<1 DO\nr:=r+0.1;\nn:=n+1;\nENDWHILE\n"
+        "MoveAbsJ [[n,0,0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v50,fine,tool0;\nENDPROC\nENDMODULE\n"
+    )
+    found = [each.instruction for each in execute(read_program(file)).steps if hasattr(each.instruction, "target")]
+    assert {round(float(np.degrees(each.target.joints[0]))) for each in found} >= {10, 11}
