@@ -168,6 +168,14 @@ def _pose(memory: ProgramMemory, value: syntax.Record, frames: Frames, text: str
     )
 
 
+def _posture(position: syntax.Record, joints: Reals | None, name: str) -> syntax.Record:
+    """Where the arm is with its Turn, where its joints are known; its Status depends on the arm, and is not known."""
+    turn: syntax.Value = syntax.Unclear(f"T of {name}")
+    if joints is not None:
+        turn = sum(1 << i for i, each in enumerate(joints) if each < 0)
+    return position.having("S", syntax.Unclear(f"S of {name}")).having("T", turn)
+
+
 def _branch(turn: float | None, joints: int) -> instructions.MeantSolution | None:
     """What Turn says of a solution: bit i - 1 is set where axis i is below 0."""
     if turn is None:
@@ -246,7 +254,9 @@ def set_by_bas(memory: ProgramMemory, call: syntax.Invocation) -> bool:
             if command == "#CP_PARAMS":
                 _frames(memory)
             _line_speed(memory, _field(data, "VEL", "LDAT_ACT") if command == "#CP_DAT" else given)
-        case "#OUT_SYNC" | "#OUT_ASYNC" | "#GROUP" | "#ACC_GLUE":
+        case "#OUT_SYNC" | "#OUT_ASYNC":
+            memory.forget("$OUT")
+        case "#GROUP" | "#ACC_GLUE":
             pass
         case _:
             return False
@@ -265,7 +275,10 @@ def _initial(memory: ProgramMemory) -> None:
     for part in ("CPTP", "CDIS", "CVEL", "CORI"):
         memory.write(f"$APO.{part}", memory.read(f"DEF_APO_{part}") or syntax.Unclear(f"DEF_APO_{part}"))
     memory.write("$ORI_TYPE", "#VAR")
+    memory.write("$CIRC_TYPE", memory.read("DEF_CIRC_TYP") or "#BASE")
     memory.write("$IPO_MODE", "#BASE")
+    for switch, _ in (*CORRECTIONS["$TOOL"], *CORRECTIONS["$BASE"]):
+        memory.write(switch, False)
     _number(memory, "$BASE", "BASE_DATA", 0)
     _tool_number(memory, 1)
 
@@ -359,8 +372,24 @@ def _number(memory: ProgramMemory, variable: str, array: str, given: syntax.Valu
         memory.write(variable, syntax.Unclear(f"{array}[?]"))
         return
     name = f"{array}[{plain:g}]" if plain > 0 else "$NULLFRAME"
-    memory.write(variable, memory.read(name) or syntax.Unclear(name))
+    memory.write(variable, _corrected(memory, variable, memory.read(name) or syntax.Unclear(name)))
+    machine = memory.read(f"MACHINE_FRAME_DAT[{plain:g}]") if variable == "$BASE" else None
+    if isinstance(machine, syntax.Record) and syntax.number(machine.get("MACH_DEF_INDEX")):
+        memory.write(variable, syntax.Unclear(f"{name} on another machine"))
     memory.write(variable + "%name", name)
+
+
+def _corrected(memory: ProgramMemory, variable: str, frame: syntax.Value) -> syntax.Value:
+    """A tool or base with the corrections before and after it that controllers' own bas.src adds while these are on."""
+    for (switch, name), before in zip(CORRECTIONS[variable], (True, False)):
+        on = memory.read(switch)
+        if on is None or on is False:
+            continue
+        other = memory.read(name) or syntax.Unclear(name)
+        frame = memory.functions.product(*((other, frame) if before else (frame, other)))
+        if on is not True:
+            frame = syntax.Unclear(f"{syntax.shown(frame)}, if {switch}")
+    return frame
 
 
 def _tool_number(memory: ProgramMemory, given: syntax.Value) -> None:
@@ -430,6 +459,7 @@ def _line_data(memory: ProgramMemory, data: syntax.Value | None) -> None:
         _line_acceleration(memory, _field(data, "ACC", "LDAT_ACT"))
         _zone_data(memory, data, "#CDIS")
         memory.write("$ORI_TYPE", data.get("ORI_TYP") or "#VAR")
+        memory.write("$CIRC_TYPE", data.get("CIRC_TYP") or "#BASE")
 
 
 def _zone_data(memory: ProgramMemory, data: syntax.Value, usual: str) -> None:
@@ -448,7 +478,15 @@ def _zone_data(memory: ProgramMemory, data: syntax.Value, usual: str) -> None:
 KINDS: dict[str, instructions.MotionKind] = {"PTP": "joint", "LIN": "line", "CIRC": "arc", "SPL": "spline"}
 MODAL = ("$TOOL", "$BASE", "$LOAD", "$VEL", "$ACC", "$APO", "$VEL_AXIS", "$ACC_AXIS", "$IPO_MODE", "$ORI_TYPE")
 MODAL_DATA = ("PDAT_ACT", "LDAT_ACT", "FDAT_ACT", "%spline")
-READ_BY_NUMBER = ("TOOL_DATA", "BASE_DATA", "LOAD_DATA", "DEF_VEL_CP", "DEF_ACC_CP")
+CORRECTIONS = {
+    "$TOOL": (("TOOL_CORR_W_ON", "TOOL_CORR_W"), ("TOOL_CORR_ON", "TOOL_CORR")),
+    "$BASE": (("BASE_CORR_ON", "BASE_CORR"), ("M_BAS_COR_ON", "M_BASE_CORR")),
+}
+"""Switches and frames that controllers' own bas.src puts before and after the frame that it takes by its number."""
+READ_BY_NUMBER = (
+    *("TOOL_DATA", "BASE_DATA", "LOAD_DATA", "DEF_VEL_CP", "DEF_ACC_CP", "DEF_CIRC_TYP", "MACHINE_FRAME_DAT"),
+    *(name for pairs in CORRECTIONS.values() for pair in pairs for name in pair),
+)
 """What ``BAS`` and settings after WITH read without naming it."""
 HARMLESS_TEXT = """
 CAST_FROM CAST_TO CCLOSE CHECKHOME CIOCTL CLEAR_KRLMSG COPEN CREAD CWRITE DELETE_BACKWARD_BUFFER EB EB_ABS EK
@@ -478,10 +516,10 @@ OF_SETTINGS = frozenset(OF_SETTINGS_TEXT.split())
 """Functions after WITH, which :func:`keep_setting` reads."""
 HARMLESS_VARIABLES_TEXT = """
 $ACCU_STATE $ACC_EXTAX $ADVANCE $ANOUT $AXWORKSPACE $BWDSTART $CMD $COLLMON_TOL_PRO $CP_STATMON $CP_VEL_TYPE
-$CYCFLAG $CYCLE $DATE $ECO_LEVEL $ERR $EXT $FLAG $GEAR_JERK $H_POS $I_O_ACT $JERK $LOAD_A1 $LOAD_A2 $LOAD_A3
-$LOOP_MSG $MSG_T $OUT $OUT_NODRIVE $OV_APPL $OV_PRO $OV_ROB $PERI_RDY $PRO_ACT $PRO_MODE $PRO_STATE $RED_VEL
-$SOFT_PLCBOOL $SOFT_PLCINT $SOFT_PLCREAL $STOPNOAPROX $TIMER $TIMER_FLAG $TIMER_STOP $TORQMON $TORQMON_COM
-$TORQMON_DEF $TRACE $VEL_EXTAX $WBOXDISABLE $WORKSPACE
+$CYCFLAG $CYCLE $DATE $ECO_LEVEL $ERR $EXT $FLAG $GEAR_JERK $H_POS $I_O_ACT $JERK $LOOP_MSG $MSG_T $OUT $OUT_NODRIVE
+$OV_APPL $OV_PRO $OV_ROB $PERI_RDY $PRO_ACT $PRO_MODE $PRO_STATE $RED_VEL $SOFT_PLCBOOL $SOFT_PLCINT $SOFT_PLCREAL
+$STOPNOAPROX $TIMER $TIMER_FLAG $TIMER_STOP $TORQMON $TORQMON_COM $TORQMON_DEF $TRACE $VEL_EXTAX $WBOXDISABLE
+$WORKSPACE
 """
 HARMLESS_VARIABLES = frozenset((*MODAL, *HARMLESS_VARIABLES_TEXT.split()))
 """System variables that are followed, or set nothing but speeds, stops, watches, signals and marks; another may make
@@ -594,6 +632,8 @@ class KrlDialect(Dialect):
         """Coordinates are REAL, however they are written; a field of the program's own type is what it declares."""
         if not isinstance(value, syntax.Record) or kind not in ("", *POSITION_KINDS):
             return value
+        if kind == "FRAME":
+            value = syntax.Record(value.kind, tuple(each for each in value.items if each[0] not in ("S", "T")))
         items = (
             (key, float(each) if isinstance(each, int) and key in COORDINATES and not isinstance(each, bool) else each)
             for key, each in value.items
@@ -625,7 +665,7 @@ class KrlDialect(Dialect):
             return frame_record(mapped)
         if name in HERE:
             seen = memory.here.seen(tool_of(memory), base_of(memory), memory.cell.flange)
-            return None if seen is None else frame_record(seen, "E6POS")
+            return None if seen is None else _posture(frame_record(seen, "E6POS"), memory.here.joints, name)
         if name in HERE_JOINTS and memory.here.joints is not None:
             degrees = [math.degrees(each) for each in memory.here.joints]
             return syntax.Record("E6AXIS", tuple((f"A{i + 1}", each) for i, each in enumerate(degrees)))
@@ -752,10 +792,10 @@ class KrlDialect(Dialect):
         if call.function == "BAS":
             if not set_by_bas(memory, call):
                 return instructions.Unknown(doing.text)
-            turns = memory.read("$ORI_TYPE")
+            turns = ((memory.read(name), followed) for name, followed in ORIENTATION_TYPES.items())
             return (
                 None
-                if turns in (None, *ORIENTATION_TYPES["$ORI_TYPE"])
+                if all(value is None or value in followed for value, followed in turns)
                 else instructions.Unknown(doing.text, may_move=False)
             )
         if call.function == "PULSE" and call.arguments and call.arguments[0] is not None:
@@ -766,6 +806,8 @@ class KrlDialect(Dialect):
 
     def harmless(self, call: syntax.Invocation) -> bool:
         """Messages, files, signals."""
+        if call.function == "CWRITE" and syntax.Variable("$CMD") in call.arguments:  # commands, as to run a program
+            return False
         return call.function in HARMLESS | EVALUATED | OF_SETTINGS or call.function == syntax.CYCLIC
 
 

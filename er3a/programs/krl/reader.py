@@ -11,6 +11,8 @@ from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from er3a.errors import InputError
 from er3a.programs import syntax
 from er3a.programs.code_builder import (
@@ -26,9 +28,9 @@ from er3a.programs.code_builder import (
 )
 from er3a.programs.evaluation import STRUCTURE
 from er3a.programs.instructions import Aside, Place, Remark
-from er3a.programs.krl.dialect import HERE, HERE_JOINTS, MODAL, changed_arguments
+from er3a.programs.krl.dialect import HERE, HERE_JOINTS, MODAL, changed_arguments, record_pose
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, data_file_of, read_program_text
-from er3a.programs.program_findings import DataFileMissing, NameTwice, ProgramFinding
+from er3a.programs.program_findings import DataFileMissing, NameTwice, NotSimulated, ProgramFinding
 
 KRL = Lexicon(
     re.compile(
@@ -552,6 +554,7 @@ def read_krl(source: ProgramText) -> syntax.Program:
     if data_file is not None:
         findings += reader.read_data(read_program_text(data_file))
     routines = reader.read_routines()
+    findings += _robot_root(source.path)
     beside, elsewhere = _changed_by_others(source.path, reader.data, of_controller)
     called: list[syntax.Routine] = []
     for file in modules_of(source.path):
@@ -730,16 +733,19 @@ def _set_in(source: ProgramText, shared: Container[str], of_controller: Signals)
     except InputError:
         yield from ((name, place) for name, place in named if name in shared or name.startswith("$"))
         return
-    for operation in (each for routine in routines for each in routine.code):
-        targets: tuple[syntax.Expression | None, ...] = ()
-        if isinstance(operation, syntax.Assign) and not operation.local:
-            targets = (operation.target,)
-        elif isinstance(operation, syntax.Doing) and isinstance(operation.what, syntax.Invocation):
-            targets = changed_arguments(operation.what)
-        for target in targets:
-            name = "" if target is None else variable_of(target)
-            if name in shared or name.startswith("$"):
-                yield name, operation.place
+    for routine in routines:
+        declared = (each.target for each in routine.code if isinstance(each, syntax.Assign) and each.local)
+        own = {*map(variable_of, declared), *(each.name for each in routine.parameters)}
+        for operation in routine.code:
+            targets: tuple[syntax.Expression | None, ...] = ()
+            if isinstance(operation, syntax.Assign):
+                targets = (operation.target,)
+            elif isinstance(operation, syntax.Doing) and isinstance(operation.what, syntax.Invocation):
+                targets = changed_arguments(operation.what)
+            for target in targets:
+                name = "" if target is None else variable_of(target)
+                if name not in own and (name in shared or name.startswith("$")):
+                    yield name, operation.place
 
 
 CALL = re.compile(r"\b([A-Za-z]\w*)\s*\(")
@@ -753,7 +759,7 @@ def companions(path: Path) -> tuple[Path, ...]:
     submit programs; and other modules, where these may set what all know."""
     modules = (*modules_of(path), *_submits(path), *_others(path))
     data = (data_file_of(module, ".dat") for module in (path, *modules))
-    return tuple(file for file in (*modules, *data, shared_data_of(path)) if file is not None)
+    return tuple(file for file in (*modules, *data, shared_data_of(path), _machine_data(path)) if file is not None)
 
 
 def modules_of(path: Path) -> tuple[Path, ...]:
@@ -784,6 +790,26 @@ def shared_data_of(path: Path) -> Path | None:
     return _in_archive(path, ("$config.dat", "$CONFIG.DAT", "$Config.dat"))
 
 
+ROBROOT = re.compile(r"(?i)^\s*(?:FRAME\s+)?\$ROBROOT\s*=\s*\{\s*(?:FRAME\s*:)?([^}]*)\}")
+
+
+def _machine_data(path: Path) -> Path | None:
+    """The machine data of a program's controller."""
+    return _in_archive(path, ("$machine.dat", "$MACHINE.DAT", "$Machine.dat"), "Mada")
+
+
+def _robot_root(path: Path) -> Iterable[ProgramFinding]:
+    """That the machine data put the robot elsewhere than at the origin of the world, in which bases are given."""
+    file = _machine_data(path)
+    source = None if file is None else read_program_text(file)
+    for number, line in enumerate(source.lines, 1) if source else ():
+        if (match := ROBROOT.match(line)) is not None:
+            root = plain_record("FRAME", match[1])
+            pose = None if root is None else record_pose(root.value)
+            if pose is None or not np.allclose(pose, np.eye(4)):
+                yield NotSimulated(match[0].strip(), Place(file, number))
+
+
 def _submits(path: Path) -> tuple[Path, ...]:
     """Programs that a controller runs beside the robot's: beside a program, or as in an archive."""
     beside = [each for each in sorted(path.parent.iterdir()) if each.suffix.lower() == ".sub" and each.is_file()]
@@ -802,9 +828,9 @@ def _others(path: Path) -> tuple[Path, ...]:
     return tuple(each for each in found if each.resolve() not in called)
 
 
-def _in_archive(path: Path, names: Iterable[str]) -> Path | None:
+def _in_archive(path: Path, names: Iterable[str], inside: str = "System") -> Path | None:
     """A file of the controller beside a program, or in the folder System of its own folder or of one above it."""
-    for folder in (path.parent, *(above / "System" for above in list(path.resolve().parents)[:DEEPEST])):
+    for folder in (path.parent, *(above / inside for above in list(path.resolve().parents)[:DEEPEST])):
         for name in names:
             if (folder / name).is_file():
                 return folder / name
