@@ -85,11 +85,7 @@ def read_verdicts(study: Study, results: Path) -> list[StageVerdict]:
         results are damaged or of another format version, or no stage has any
     """
     with language.using("en"):
-        found = [
-            _stage_verdict(study, results, robot, stage)
-            for robot in study.names
-            for stage in study.stages(robot)
-        ]
+        found = [_stage_verdict(study, results, robot, stage) for robot in study.names for stage in study.stages(robot)]
     if all(verdict.status == NOT_EXAMINED for verdict in found):
         read_status(results / found[0].robot / found[0].stage)
     return found

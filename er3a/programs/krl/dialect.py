@@ -269,9 +269,12 @@ def _initial(memory: ProgramMemory) -> None:
     _all_axes(memory, "$VEL_AXIS", 100)
     _line_acceleration(memory, 100)
     memory.write("$VEL.CP", memory.read("DEF_VEL_CP") or syntax.Unclear("DEF_VEL_CP"))
-    for part in ("ORI1", "ORI2"):  # as the machine data say
-        for name in (f"$VEL.{part}", f"$ACC.{part}"):
+    for name in TURN_RATES:
+        given = memory.read(f"DEF_{name[1:].replace('.', '_')}")
+        if given is None:  # as the machine data say
             memory.shared.pop(name, None)
+        else:
+            memory.write(name, given)
     for part in ("CPTP", "CDIS", "CVEL", "CORI"):
         memory.write(f"$APO.{part}", memory.read(f"DEF_APO_{part}") or syntax.Unclear(f"DEF_APO_{part}"))
     memory.write("$ORI_TYPE", "#VAR")
@@ -478,6 +481,7 @@ def _zone_data(memory: ProgramMemory, data: syntax.Value, usual: str) -> None:
 KINDS: dict[str, instructions.MotionKind] = {"PTP": "joint", "LIN": "line", "CIRC": "arc", "SPL": "spline"}
 MODAL = ("$TOOL", "$BASE", "$LOAD", "$VEL", "$ACC", "$APO", "$VEL_AXIS", "$ACC_AXIS", "$IPO_MODE", "$ORI_TYPE")
 MODAL_DATA = ("PDAT_ACT", "LDAT_ACT", "FDAT_ACT", "%spline")
+TURN_RATES = ("$VEL.ORI1", "$VEL.ORI2", "$ACC.ORI1", "$ACC.ORI2")
 CORRECTIONS = {
     "$TOOL": (("TOOL_CORR_W_ON", "TOOL_CORR_W"), ("TOOL_CORR_ON", "TOOL_CORR")),
     "$BASE": (("BASE_CORR_ON", "BASE_CORR"), ("M_BAS_COR_ON", "M_BASE_CORR")),
@@ -485,6 +489,7 @@ CORRECTIONS = {
 """Switches and frames that controllers' own bas.src puts before and after the frame that it takes by its number."""
 READ_BY_NUMBER = (
     *("TOOL_DATA", "BASE_DATA", "LOAD_DATA", "DEF_VEL_CP", "DEF_ACC_CP", "DEF_CIRC_TYP", "MACHINE_FRAME_DAT"),
+    *("DEF_VEL_ORI1", "DEF_VEL_ORI2", "DEF_ACC_ORI1", "DEF_ACC_ORI2"),
     *(name for pairs in CORRECTIONS.values() for pair in pairs for name in pair),
 )
 """What ``BAS`` and settings after WITH read without naming it."""
