@@ -792,6 +792,7 @@ MAX_MODULES = 200
 OF_CONTROLLER = ("BAS", "USER_GRP", "IR_STOPM")
 """The controller's own modules that set what motions use, or that people edit."""
 DEEPEST = 6  # folders of an archive
+OF_ARCHIVE = ("System", "Mada", "TP")  # of its folders
 
 
 def companions(path: Path) -> tuple[Path, ...]:
@@ -827,7 +828,7 @@ def modules_of(path: Path) -> tuple[Path, ...]:
 def _all_modules(path: Path) -> list[Path]:
     """The modules of the controller that a program is for: those beside it, then all others of its archive."""
     above = list(path.resolve().parents)[:DEEPEST]
-    archive = next((folder for folder in above if (folder / "System").is_dir()), None)
+    archive = next((folder for folder in above if any((folder / each).is_dir() for each in OF_ARCHIVE)), None)
     beside = sorted(path.parent.iterdir())
     others = sorted(archive.rglob("*")) if archive else []
     here = path.parent.resolve()
