@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from er3a.geometry.transforms import transform
 from er3a.program_check.check_program import CheckOptions, check_program
@@ -572,3 +573,32 @@ def test_a_frame_by_an_index_that_is_known_is_called_by_its_number(tmp_path):
     assert "frame_of_several" not in codes(found)
     (moved,) = motions(tmp_path, krl(f"{FRAMES}$BASE=BASE_DATA[N]\nLIN {POSE % 0}"), "a.src")
     assert moved.base.name == "BASE_DATA[2]"
+
+
+@pytest.mark.parametrize(
+    ("turn", "told"),
+    [("A 60", False), ("C 60", False), ("A 60,C 60", True), ("A 3,C 3", False)],
+)
+def test_a_line_of_krl_that_swings_the_tool_and_turns_it_too_is_no_pass(tmp_path, turn, told):
+    """In the tool's frame: A swings its x axis, C turns about it."""
+    body = f"{FRAMES}{SPEEDS}LIN {POSE % 0}\nLIN_REL {{{turn}}} #TOOL"
+    found = [each.finding for each in check(tmp_path, krl(body), "a.src").findings if each.place.line == 8]
+    apart = [each.off_deg for each in found if each.code == "turns_otherwise"]
+    assert bool(apart) == told
+    if told:  # exp(s r) against exp(s swing) exp(s twist), worked out with scipy
+        z, x = (Rotation.from_euler(axis, 60, degrees=True).as_rotvec() for axis in "zx")
+        whole = (Rotation.from_rotvec(z) * Rotation.from_rotvec(x)).as_rotvec()
+        ways = (
+            Rotation.from_rotvec(s * whole).inv() * Rotation.from_rotvec(s * z) * Rotation.from_rotvec(s * x)
+            for s in (0.25, 0.5, 0.75)
+        )
+        assert apart == [pytest.approx(max(np.degrees(each.magnitude()) for each in ways))]
+
+
+@pytest.mark.parametrize(
+    ("before", "turn", "told"),
+    [(0, "A 20", False), (0, "B 20", True), (40, "B 20", True), (40, "A 20", False), (40, "B 20} #TOOL ;", False)],
+)
+def test_the_angles_of_a_relative_position_in_the_base_may_mean_two_things(tmp_path, before, turn, told):
+    body = f"{FRAMES}{SPEEDS}LIN {{X 400,Y 0,Z 300,A {before},B 170,C 0}}\nLIN_REL {{{turn}}}"
+    assert ("relative_turn_assumed" in codes(check(tmp_path, krl(body), "a.src"))) == told
