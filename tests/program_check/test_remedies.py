@@ -338,8 +338,8 @@ MENDED = {
         krl(SOFT, AT_HOME, "LIN_REL {A 60} #TOOL", "LIN_REL {C 60} #TOOL"),
     ),
     "relative_turn_assumed": (
-        krl(SOFT, AT_HOME, "LIN_REL {B 10,C 20}"),
-        krl(SOFT, AT_HOME, "LIN_REL {B 5} #TOOL"),
+        krl(SOFT, AT_HOME, "LIN_REL {A 20}", "LIN_REL {B 5}"),
+        krl(SOFT, AT_HOME, "LIN_REL {A 20}", "LIN_REL {B 5} #TOOL"),
     ),
     "waits_for_others": (
         (krl("N=0", "WAIT FOR N==1", "PTP {A1 N}"), {"data": "INT N=0"}),
