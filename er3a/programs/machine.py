@@ -95,7 +95,7 @@ def changed_beside(program: syntax.Program, dialect: Dialect, itself: str = "") 
     asked = {what.function for what in beside}
     cyclic = {name for what in beside if what.function == syntax.CYCLIC for name in names(what.arguments[0])}
     started = {name for name in routines if (name in asked or routines[name].thread) and name != itself}
-    given = {name for what in beside for name in _given_back(program, what.function, what.arguments)}
+    given = {name for what in beside for name in _given_back(program, what)}
     changed = _changed_in(program, _with_called(program, started), dialect) | program.beside
     return (changed | cyclic | given) - dialect.modal
 
@@ -147,22 +147,45 @@ def unsettled(routine: syntax.Routine, dialect: Dialect) -> frozenset[str]:
     return frozenset(found)
 
 
-def _given_back(program: syntax.Program, name: str, arguments: Iterable[syntax.Expression | None]) -> set[str]:
-    """Variables that a routine, or what it calls, changes as its parameters."""
-    parameters = program.routines[name].parameters if name in program.routines else ()
-    given = {
-        parameter.name: variable_of(each)
-        for parameter, each in zip(parameters, arguments)
+def _given(
+    routine: syntax.Routine, call: syntax.Call | syntax.Invocation
+) -> list[tuple[syntax.RoutineParameter, syntax.Expression]]:
+    """Parameters of a routine with their arguments, those by place first."""
+    places = [each for each in routine.parameters if not each.named]
+    by_name = {each.name: each for each in routine.parameters}
+    placed = [(parameter, each) for parameter, each in zip(places, call.arguments) if each is not None]
+    return [*placed, *((by_name[name], each) for name, each in call.keywords if name in by_name)]
+
+
+def _both_ways(
+    program: syntax.Program, call: syntax.Call | syntax.Invocation
+) -> list[tuple[str, syntax.Variable | syntax.Member | syntax.Element]]:
+    """Parameters that are the caller's own variables, with these."""
+    routine = program.routines.get(_called(call))
+    return [
+        (parameter.name, each)
+        for parameter, each in (() if routine is None else _given(routine, call))
         if parameter.out and isinstance(each, (syntax.Variable, syntax.Member, syntax.Element))
-    }
-    code = (op for each in _with_called(program, (name,)) for op in program.routines[each].code) if given else ()
+    ]
+
+
+def _called(call: syntax.Call | syntax.Invocation) -> str:
+    return call.routine if isinstance(call, syntax.Call) else call.function
+
+
+def _given_back(program: syntax.Program, call: syntax.Call | syntax.Invocation) -> set[str]:
+    """Variables that a routine, or what it calls, changes as its parameters."""
+    given = {name: variable_of(each) for name, each in _both_ways(program, call)}
+    code = (
+        (op for each in _with_called(program, (_called(call),)) for op in program.routines[each].code) if given else ()
+    )
     return {given[changed] for op in code for changed in _changed(op) if changed in given}
 
 
 def _shared(program: syntax.Program, operation: syntax.Operation, dialect: Dialect) -> Iterable[str]:
     """Variables, not local ones, that an operation changes."""
     if isinstance(operation, syntax.Call):
-        return _given_back(program, operation.routine, operation.arguments)
+        return _given_back(program, operation)
     if isinstance(operation, syntax.Assign):
         return () if operation.local else (target_name(operation.target),)
     if isinstance(operation, syntax.Doing) and not (
@@ -331,7 +354,7 @@ def _changed(operation: syntax.Operation) -> Iterator[str]:
         if value is not None and not itself:
             yield target_name(operation.target)
     elif isinstance(operation, syntax.Call):  # parameters may go both ways
-        yield from (name for each in operation.arguments for name in names(each))
+        yield from (name for each in syntax.expressions_of(operation) for name in names(each))
     elif isinstance(operation, syntax.Waiting) and operation.kind == "condition":  # others may meet it
         yield from names(operation.of)
 
@@ -349,9 +372,8 @@ def aliased_calls(program: syntax.Program) -> dict[syntax.Call, frozenset[str]]:
         own = _own_names(caller)
         for call in (each for each in caller.code if isinstance(each, syntax.Call)):
             given: dict[str, list[str]] = defaultdict(list)
-            for parameter, each in zip(program.routines[call.routine].parameters, call.arguments):
-                if parameter.out and isinstance(each, (syntax.Variable, syntax.Member, syntax.Element)):
-                    given[variable_of(each)].append(parameter.name)
+            for name, each in _both_ways(program, call):
+                given[variable_of(each)].append(name)
             shared = [
                 {variable, *parameters}
                 for variable, parameters in given.items()
@@ -893,16 +915,12 @@ class Machine:
 
     def _call(self, way: ExecutionPath, call: syntax.Call) -> None:
         routine, memory = self.program.routines[call.routine], way.memory
-        local, fits = _locals(routine, call.arguments, call.keywords, memory)
+        local, fits = _locals(routine, call, memory)
         if call.result == syntax.START:
             del local["%inside"]
         if not fits:
             self._note(way, call.place, instructions.Unknown(call.text, may_move=False))
-        outs = tuple(
-            (parameter.name, memory.settled(given))
-            for parameter, given in zip(routine.parameters, call.arguments)
-            if parameter.out and isinstance(given, (syntax.Variable, syntax.Member, syntax.Element))
-        )
+        outs = tuple((name, memory.settled(given)) for name, given in _both_ways(self.program, call))
         calls = (*way.frames[-1].calls, call.place)
         way.frames.append(Frame(routine, 0, local, calls, call.result, outs, memory.aliased))
         memory.local = local
@@ -929,7 +947,7 @@ class Machine:
         if routine is not None:
             other = way.fork(self.numbers, len(self.seen))
             other.step, other.beside = before, True
-            local, fits = _locals(routine, start.what.arguments, start.what.keywords, way.memory)
+            local, fits = _locals(routine, start.what, way.memory)
             other.frames = [Frame(routine, 0, local, (*way.frames[-1].calls, start.place))]
             other.memory.local = local
             other.memory.beside = self._changed_later(way) | changed_beside(self.program, self.dialect, name)
@@ -1020,26 +1038,22 @@ class Machine:
 
 
 def _locals(
-    routine: syntax.Routine,
-    arguments: tuple[syntax.Expression | None, ...],
-    keywords: tuple[tuple[str, syntax.Expression], ...],
-    memory: ProgramMemory,
+    routine: syntax.Routine, call: syntax.Call | syntax.Invocation, memory: ProgramMemory
 ) -> tuple[dict[str, syntax.Value], bool]:
     """Variables of a routine that begins, and whether it has a parameter for each argument."""
-    by_name = {name: memory.value(each) for name, each in keywords}
+    given = _given(routine, call)
+    values = {parameter.name: memory.value(each) for parameter, each in reversed(given)}
     local: dict[str, syntax.Value] = {"%inside": True}
-    for i, parameter in enumerate(routine.parameters):
-        given = arguments[i] if i < len(arguments) else None
-        if given is not None:
-            local[parameter.name] = memory.value(given)
-        elif parameter.name in by_name:
-            local[parameter.name] = by_name[parameter.name]
+    for parameter in routine.parameters:
+        if parameter.name in values:
+            local[parameter.name] = values[parameter.name]
         elif parameter.default is not None:
             local[parameter.name] = memory.value(parameter.default)
         else:
             local[parameter.name] = syntax.Unset(parameter.name)
-    fits = len(arguments) <= len(routine.parameters) and by_name.keys() <= {each.name for each in routine.parameters}
-    return local, fits
+    places = sum(not each.named for each in routine.parameters)
+    wanted = sum(each is not None for each in call.arguments) + len(call.keywords)
+    return local, len(call.arguments) <= places and len(given) == wanted
 
 
 def _labels(routine: syntax.Routine) -> frozenset[int]:

@@ -337,11 +337,19 @@ Operation = Assign | GoTo | Branch | Call | Beside | Return | Halt | Move | Wait
 
 @dataclass(frozen=True, slots=True)
 class RoutineParameter:
-    """A routine's parameter; ``out`` if the caller's variable gets its last value."""
+    """A routine's parameter.
+
+    Attributes
+    ----------
+    out : whether the caller's variable gets its last value
+    default : what it is where it is not given
+    named : whether it is given by its name alone, so that arguments by place pass it over
+    """
 
     name: str
     out: bool = False
     default: Expression | None = None
+    named: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -1159,6 +1159,44 @@ def test_a_routine_that_an_error_ends_is_followed(tmp_path, own, caller, leaves)
     assert len({tuple(np.round(np.append(each.start, each.end), 6)) for each in lines}) == 3 + leaves
 
 
+@pytest.mark.parametrize(
+    ("head", "call"),
+    [
+        ("\\INOUT num y", "sub1\\y:=n;"),
+        ("\\VAR num y", "sub1\\y:=n;"),
+        ("\\INOUT bool z|INOUT num y", "sub1\\y:=n;"),
+        ("\\INOUT num y", "outer\\y:=n;"),
+        ("\\INOUT num y", "IF ask(\\y:=n) SetDO do1,1;"),
+    ],
+)
+def test_what_a_routine_sets_by_an_optional_argument_is_the_callers(tmp_path, head, call):
+    sets = "IF Present(y) y:=40;"
+    more = f"PROC sub1({head})\n{sets}\nENDPROC\nPROC outer(\\INOUT num y)\nsub1\\y?y;\nENDPROC\n"
+    more += f"FUNC bool ask(\\INOUT num y)\n{sets}\nRETURN TRUE;\nENDFUNC\n"
+    last = motions(tmp_path, rapid(f"{call}\nMoveL Offs(p,0,n,0),v100,fine,tool0;", more), "a.mod")[-1]
+    assert last.target.pose[1, 3] == pytest.approx(0.04)
+
+
+def test_what_a_trap_sets_by_an_optional_argument_has_no_value(tmp_path):
+    more = "TRAP t1\nput\\y:=n;\nENDTRAP\nPROC put(\\INOUT num y)\ny:=40;\nENDPROC\n"
+    body = "CONNECT i1 WITH t1;\nISignalDI di1,1,i1;\nMoveL Offs(p,0,n,0),v100,fine,tool0;"
+    found = motions(tmp_path, rapid(body, more, "VAR intnum i1;\n"), "a.mod")
+    assert isinstance(found[-1].target, UnresolvedTarget)
+
+
+def test_an_optional_argument_and_a_variable_of_the_routine_are_two_names_of_one(tmp_path):
+    more = "PROC sub1(\\INOUT num y)\ny:=40;\nMoveL Offs(p,0,n,0),v100,fine,tool0;\nENDPROC\n"
+    assert isinstance(motions(tmp_path, rapid("sub1\\y:=n;", more), "a.mod")[-1].target, UnresolvedTarget)
+
+
+def test_arguments_by_place_pass_over_optional_parameters(tmp_path):
+    sub = "PROC sub1(\\num y,num x)\nIF Present(y) THEN\nn:=y;\nELSE\nn:=7;\nENDIF\n"
+    sub += "MoveL Offs(p,x,n,0),v100,fine,tool0;\nENDPROC\n"
+    _, with_y, without = motions(tmp_path, rapid("sub1\\y:=20,30;\nsub1 40;", sub), "a.mod")
+    np.testing.assert_allclose(1000 * with_y.target.pose[:2, 3], [430, 20])
+    np.testing.assert_allclose(1000 * without.target.pose[:2, 3], [440, 7])
+
+
 @pytest.mark.parametrize("word", ["ExitCycle", "RAISE my_err"])
 def test_a_trap_that_ends_the_cycle_or_the_routine_is_named(tmp_path, word):
     more = f"TRAP t1\n{word};\nENDTRAP\n"

@@ -571,7 +571,8 @@ def _parameters(tokens: list[Token], scope: Scope, place: Place) -> list[syntax.
             kind, name = words[-2], words[-1]
             shape = scope.types.get(kind, (kind,))
             scope.shapes[name] = ("[]", shape) if arrays else shape
-            found.append(syntax.RoutineParameter(name, out, syntax.Constant(ABSENT) if optional else None))
+            default = syntax.Constant(ABSENT) if optional else None
+            found.append(syntax.RoutineParameter(name, out, default, named=optional))
         elif words:
             raise fault(place, "a parameter has no type or no name", "Write PROC name(num n)")
 
