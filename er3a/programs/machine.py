@@ -115,7 +115,8 @@ def _with_called(program: syntax.Program, names: Iterable[str]) -> set[str]:
         name = waiting.pop()
         if name not in found:
             found.add(name)
-            waiting += [each for op in program.routines[name].code for each in _next(op) if each in program.routines]
+            following = (each for op in program.routines[name].operations for each in _next(op))
+            waiting += [each for each in following if each in program.routines]
     return found
 
 
@@ -127,24 +128,49 @@ def _next(operation: syntax.Operation) -> tuple[str, ...]:
 
 
 def _changed_in(program: syntax.Program, names: Iterable[str], dialect: Dialect) -> frozenset[str]:
-    """Variables, not local ones, that routines change."""
-    routines = [program.routines[name] for name in names]
-    changed = {each for routine in routines for op in routine.code for each in _shared(program, op, dialect)}
-    return frozenset(changed.union(*(unsettled(routine, dialect) for routine in routines)))
+    """Variables, not local ones, that routines and their handlers change, and what motions depend on."""
+    code = (op for name in names for op in program.routines[name].operations)
+    return frozenset(each for op in code for each in _shared(program, op, dialect))
 
 
-def unsettled(routine: syntax.Routine, dialect: Dialect) -> frozenset[str]:
-    """What handlers of a routine's errors may set at any time: variables, what motions depend on without naming it,
-    and ``RETURNED`` for the routine's value."""
-    found: set[str] = set()
-    for each in routine.handler:
-        if isinstance(each, syntax.Assign) and not each.local:
-            found.add(variable_of(each.target))
-        elif isinstance(each, syntax.Doing):
-            found |= dialect.sets(each.what) if isinstance(each.what, syntax.Invocation) else dialect.modal
-        elif isinstance(each, syntax.Return) and each.value is not None:
-            found.add(syntax.RETURNED)
-    return frozenset(found)
+def unsettled(program: syntax.Program, routine: syntax.Routine, dialect: Dialect) -> frozenset[str]:
+    """What handlers of a routine's errors, and what they call, may set at any time: variables, what motions depend on
+    without naming it, and ``RETURNED`` for the routine's value."""
+    called = {name for each in routine.handler for name in _next(each)}
+    found = _changed_in(program, _with_called(program, called), dialect)
+    found |= {name for each in routine.handler for name in _shared(program, each, dialect)}
+    gives = any(isinstance(each, syntax.Return) and each.value is not None for each in routine.handler)
+    return found | {syntax.RETURNED} if gives else found
+
+
+def errors_not_followed(program: syntax.Program, dialect: Dialect) -> tuple[instructions.Place, ...]:
+    """Handlers after which a program goes on that had an error.
+
+    One that only has carried out again what failed is not among them, if that is no routine of the program.
+    """
+    reached = {name: program.routines[name] for name in _with_called(program, (program.entry,))}
+    going_on = {
+        name
+        for name, each in reached.items()
+        if each.on_error is not None
+        and (each.on_error.goes_on or (each.on_error.again and _acts(program, each, dialect)))
+    }
+    below = _with_called(program, going_on)
+    return tuple(
+        each.on_error.place
+        for name, each in reached.items()
+        if each.on_error is not None and (name in going_on or (name in below and each.on_error.passed_on))
+    )
+
+
+def _acts(program: syntax.Program, routine: syntax.Routine, dialect: Dialect) -> bool:
+    """Whether a routine calls others, or its handler does anything that later instructions may depend on."""
+    acting = (syntax.Call, syntax.Beside, syntax.Move)
+    return (
+        any(isinstance(each, syntax.Call) for each in routine.code)
+        or any(isinstance(each, acting) or _may_move(each, dialect) for each in routine.handler)
+        or bool(unsettled(program, routine, dialect))
+    )
 
 
 def _given(
@@ -177,21 +203,21 @@ def _given_back(program: syntax.Program, call: syntax.Call | syntax.Invocation) 
     """Variables that a routine, or what it calls, changes as its parameters."""
     given = {name: variable_of(each) for name, each in _both_ways(program, call)}
     code = (
-        (op for each in _with_called(program, (_called(call),)) for op in program.routines[each].code) if given else ()
+        (op for each in _with_called(program, (_called(call),)) for op in program.routines[each].operations)
+        if given
+        else ()
     )
     return {given[changed] for op in code for changed in _changed(op) if changed in given}
 
 
 def _shared(program: syntax.Program, operation: syntax.Operation, dialect: Dialect) -> Iterable[str]:
-    """Variables, not local ones, that an operation changes."""
+    """Variables, not local ones, that an operation changes, and what motions depend on that it is known to set."""
     if isinstance(operation, syntax.Call):
         return _given_back(program, operation)
     if isinstance(operation, syntax.Assign):
         return () if operation.local else (target_name(operation.target),)
-    if isinstance(operation, syntax.Doing) and not (
-        isinstance(operation.what, syntax.Invocation) and dialect.harmless(operation.what)
-    ):
-        return dialect.modal
+    if isinstance(operation, syntax.Doing) and isinstance(operation.what, syntax.Invocation):
+        return dialect.sets(operation.what)
     return ()
 
 
@@ -263,8 +289,7 @@ def _moving(program: syntax.Program, dialect: Dialect) -> set[str]:
         more = {
             routine.name
             for routine in program.routines.values()
-            if routine.name not in moving
-            and any(_moves(program, each, moving, dialect) for each in (*routine.code, *routine.handler))
+            if routine.name not in moving and any(_moves(program, each, moving, dialect) for each in routine.operations)
         }
         if not more:
             return moving
@@ -327,7 +352,7 @@ def _changes(program: syntax.Program) -> dict[str, set[str]]:
     return _gathered(
         program,
         {
-            name: {each for op in (*routine.code, *routine.handler) for each in _changed(op)}
+            name: {each for op in routine.operations for each in _changed(op)}
             for name, routine in program.routines.items()
         },
     )
@@ -336,7 +361,7 @@ def _changes(program: syntax.Program) -> dict[str, set[str]]:
 def _gathered(program: syntax.Program, own: dict[str, set[str]]) -> dict[str, set[str]]:
     """Names by routine, with those of the routines that it calls."""
     called = {
-        name: {op.routine for op in routine.code if isinstance(op, syntax.Call)}
+        name: {op.routine for op in routine.operations if isinstance(op, syntax.Call)}
         for name, routine in program.routines.items()
     }
     while True:
@@ -610,7 +635,7 @@ class Machine:
         self.deciding = deciding(program, dialect.modal)
         self.names_met: set[str] = set()
         self.deciding_names: list[str] = []  # of those, whole
-        self.unsettled = {name: unsettled(routine, dialect) for name, routine in program.routines.items()}
+        self.unsettled = {name: unsettled(program, each, dialect) for name, each in program.routines.items()}
         self.quiet, self.needed = quiet_branches(program, dialect)
         self.persisting = _persisting(program, dialect) & self.needed
         self.first_values: dict[str, syntax.Value] = {}  # of these
@@ -665,6 +690,7 @@ class Machine:
             tuple(twice),
             tuple(self.kept.items()),
             tuple((name, place) for name, place in elsewhere.items() if name in set(map(root, memory.met))),
+            errors_not_followed(self.program, self.dialect),
         )
 
     def _begin(self, way: ExecutionPath) -> None:

@@ -48,6 +48,10 @@ ENDS = frozenset(
 """Words that no instruction goes on beyond."""
 DECLARED = ("VAR", "PERS", "CONST")
 HANDLERS = ("ERROR", "UNDO", "BACKWARD")
+GOING_ON = frozenset(("TRYNEXT", "RETURN", "EXITCYCLE"))
+"""Words by which an error handler lets the program go on; so may its end, of which no text was found."""
+AGAIN = frozenset(("RETRY", "STARTMOVERETRY"))
+"""Words by which it has carried out again what failed."""
 MOTIONS = frozenset(
     (
         *("MOVEJ", "MOVEL", "MOVEC", "MOVEABSJ", "MOVEJDO", "MOVELDO", "MOVECDO", "MOVEJAO", "MOVELAO", "MOVECAO"),
@@ -628,11 +632,16 @@ class _BodyReader:
         place = self.cursor.place()
         builder = CodeBuilder(name, tuple(map(syntax.RoutineParameter, known)), place)
         inside = _BodyReader(self.module, builder, self.scope)
-        while self.cursor.word() in HANDLERS:
+        while (word := self.cursor.word()) in HANDLERS:
+            at, first, begin = self.cursor.place(), len(builder.code), self.cursor.at
             self.cursor.at += 1
             if (token := self.cursor.next()) is not None and token.text == "(":
                 self.cursor.head(")")
             inside.instructions(end)
+            if word == "ERROR":
+                said = {each.text for each in self.cursor.tokens[begin : self.cursor.at] if each.kind == "name"}
+                goes_on = not GOING_ON.isdisjoint(said) or builder.comes_to_end(first)
+                self.builder.on_error = syntax.OnError(at, goes_on, not AGAIN.isdisjoint(said), "RAISE" in said)
             builder.add(syntax.Return(place))
         self.builder.handler += builder.code
         if handler:
@@ -838,9 +847,9 @@ class _BodyReader:
     def _error_leaves(self) -> bool:
         """Whether an error ends the routine: by its handler, or by a caller's, which goes on with what is next."""
         handler = self._handler_words()
-        if not handler:
+        if not handler or ("RAISE" in handler and "RETURN" not in handler):
             return self.module.goes_on
-        return bool(handler & {"RETURN", "RAISE"}) or not handler & {"RETRY", "TRYNEXT"}
+        return "RETURN" in handler or not handler & {"RETRY", "TRYNEXT", "EXIT"}
 
     def _handler_moves(self, end: str) -> str:
         """The first of the routine's handlers that may move the arm; empty if none may."""
