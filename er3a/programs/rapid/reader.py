@@ -102,8 +102,6 @@ NOT_SIMULATED = frozenset(NOT_SIMULATED_TEXT.split())
 UPPER, ARITHMETIC, TYPED, STEP, LATE = "%UPPER", "%ARITHMETIC", "%TYPED", "%STEP", "%LATE"
 RAISING = ("SOCKET", "OPEN", "READ", "WRITE", "LOAD", "UNLOAD", "STARTLOAD", "RMQ", "COPYFILE", "REMOVE", "MAKEDIR")
 """How instructions begin that often end with an error; any other may too, if less often."""
-BEGINNING = "%BEGINNING"
-"""Label of a routine's beginning."""
 FAILED = "%FAILED"
 """Whether an instruction ends with an error, which only the cell knows."""
 PASSING = "%PASSING"
@@ -348,22 +346,6 @@ def _private(tokens: list[Token]) -> set[str]:
     return found
 
 
-def _retried(tokens: list[Token]) -> set[str]:
-    """Names in procedures whose error handler carries out again, by RETRY, the call that an error came out of."""
-    found: set[str] = set()
-    names: set[str] = set()
-    handled = False
-    for word in (token.text for token in tokens if token.kind == "name"):
-        if word in ("PROC", "FUNC", "TRAP"):
-            names, handled = set(), False
-        handled = handled or word == "ERROR"
-        if handled and word == "RETRY":
-            found |= names
-        elif not handled:
-            names.add(word)
-    return found
-
-
 class Cursor:
     """The words of a module, read one after another."""
 
@@ -441,7 +423,6 @@ class _ModuleReader:
         self.data: list[syntax.Assign] = []
         self.findings: list[ProgramFinding] = []
         self.goes_on = any(each.text == "TRYNEXT" for each in cursor.tokens)
-        self.retried = _retried(cursor.tokens)
 
     def read(self) -> None:
         """Declarations and routines."""
@@ -605,14 +586,11 @@ class _BodyReader:
         self.module, self.cursor, self.builder, self.scope = module, module.cursor, builder, scope
         self.end = ""
         self.leaves = False  # whether an error may end the routine here
-        self.again = False  # whether it may make the caller carry the routine out again
 
     def read(self, end: str) -> None:
         """Instructions up to the word that ends the routine, which is not passed, with its handlers."""
         self.end = end
         self.leaves = end == "ENDPROC" and self._error_leaves()
-        self.again = end == "ENDPROC" and self.builder.name in self.module.retried and not self._handler_words()
-        self.builder.label(BEGINNING)
         handler = self._handler_moves(end)
         while (token := self.cursor.next(comments=True)) is not None:
             if token.kind == "comment":
@@ -824,14 +802,10 @@ class _BodyReader:
                 builder.add(syntax.Assign(place, each, syntax.Constant(syntax.Unclear(f"what {name} gives")), text))
 
     def _fails(self, place: Place, text: str) -> None:
-        """An error may end the routine here, or begin it again."""
+        """An error may end the routine here."""
         if self.leaves:
             self.builder.open_if(place, syntax.Invocation(FAILED, ()), text)
             self.builder.add(syntax.Return(place))
-            self.builder.close("if", place)
-        if self.again:
-            self.builder.open_if(place, syntax.Invocation(FAILED, ()), text)
-            self.builder.goto(place, BEGINNING)
             self.builder.close("if", place)
 
     def _handler_words(self) -> set[str]:
