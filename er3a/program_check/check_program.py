@@ -261,6 +261,7 @@ def _not_examined(execution: Execution, located: tuple[LocatedFinding, ...], end
         found_in.KeptToNextStart,
         found_in.SetElsewhere,
         found_in.WaitsForOthers,
+        found_in.ErrorsNotFollowed,
     )
     found += [NotExamined(each.place, "course") for each in located if isinstance(each.finding, ends)]
     strange = (found_in.MayMove, NotUnderstood, NotSimulated)
@@ -319,6 +320,7 @@ def _located(execution: Execution, robot: Robot, checker: StepChecker, end: int)
         LocatedFinding("caution", found_in.SetElsewhere(name, place.file.name if place.file else "", place.line), top)
         for name, place in execution.elsewhere
     ]
+    found += [LocatedFinding("caution", found_in.ErrorsNotFollowed(), place) for place in execution.errors]
     found += [LocatedFinding("caution", other, ending.place) for ending, other in checker.returns]
     for ending in execution.endings:
         if ending.kind not in ("end", "repeats", "joins"):

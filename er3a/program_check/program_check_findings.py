@@ -83,6 +83,10 @@ class WaitsForOthers(Finding):
     condition: str
 
 
+class ErrorsNotFollowed(Finding):
+    """A handler after which the program goes on that had an error; few errors are followed."""
+
+
 class ToolStatedElsewhere(Finding):
     """A table's pose of the tool is not where its joints put it; in the row where it is farthest away."""
 
@@ -457,6 +461,7 @@ CheckFinding = (
     | KeptToNextStart
     | SetElsewhere
     | WaitsForOthers
+    | ErrorsNotFollowed
     | ToolStatedElsewhere
     | PositionCompleted
     | TurnsOtherwise

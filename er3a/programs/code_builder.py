@@ -47,6 +47,7 @@ class CodeBuilder:
         self.blocks: list[Block] = []
         self.settings: tuple[tuple[str, syntax.Expression], ...] = ()  # of each motion of a block
         self.handler: list[syntax.Operation] = []  # as of the routine
+        self.on_error: syntax.OnError | None = None  # likewise
         self._labels: dict[str, int] = {}
         self._gotos: list[tuple[int, str]] = []
         self._hidden = 0
@@ -220,7 +221,30 @@ class CodeBuilder:
                 raise fault(place, f"there is no label '{name}'", "Name a label of this routine")
             self.code[at] = syntax.GoTo(place, self._labels[name], endless=self._labels[name] <= at)
         code = (*self.code, syntax.Return(end))
-        return syntax.Routine(self.name, self.parameters, code, self.place, self.thread, tuple(self.handler))
+        parts = self.name, self.parameters, code, self.place, self.thread
+        return syntax.Routine(*parts, tuple(self.handler), self.on_error)
+
+    def comes_to_end(self, first: int) -> bool:
+        """Whether the code from an operation on may be carried out to its end so far, but for a stop right there."""
+        seen: set[tuple[int, bool]] = set()
+        waiting = [(first, False)]
+        while waiting:
+            at, stopped = waiting.pop()
+            if at == len(self.code) and not stopped:
+                return True
+            if at == len(self.code) or (at, stopped) in seen:
+                continue
+            seen.add((at, stopped))
+            operation = self.code[at]
+            if isinstance(operation, syntax.GoTo):
+                waiting.append((operation.to if operation.to >= 0 else len(self.code), stopped))
+            elif isinstance(operation, syntax.Branch):
+                waiting += [(at + 1, False), (operation.otherwise, False)]
+            elif not isinstance(operation, (syntax.Return, syntax.Halt)):
+                stops = isinstance(operation, syntax.Waiting) and operation.kind == "operator"
+                hidden = isinstance(operation, syntax.Assign) and not operation.text
+                waiting.append((at + 1, stops or (stopped and hidden)))
+        return False
 
     def _open(self, kind: str, place: Place, word: str = "") -> None:
         if len(self.blocks) >= MAX_NESTED:
@@ -290,7 +314,12 @@ def linked(
             by_name[hidden] = replace(former, name=hidden)
         by_name[routine.name] = routine
     found += [finding for routine in by_name.values() for finding in not_understood(routine.code)]
-    return {name: _linked(routine, by_name, changed) for name, routine in by_name.items()}, tuple(found)
+    return {
+        name: replace(
+            routine, code=_linked(routine.code, by_name, changed), handler=_linked(routine.handler, by_name, changed)
+        )
+        for name, routine in by_name.items()
+    }, tuple(found)
 
 
 def lacks_data(routines: Iterable[syntax.Routine], data: Iterable[syntax.Assign], known: Container[str]) -> bool:
@@ -357,13 +386,15 @@ def _opaque(expression: syntax.Expression) -> Iterable[str]:
         yield from _opaque(each)
 
 
-def _linked(routine: syntax.Routine, known: Mapping[str, syntax.Routine], changed: Changed) -> syntax.Routine:
-    parts = (each for operation in routine.code if not _plain(operation) for each in syntax.expressions_of(operation))
+def _linked(
+    given: tuple[syntax.Operation, ...], known: Mapping[str, syntax.Routine], changed: Changed
+) -> tuple[syntax.Operation, ...]:
+    parts = (each for operation in given if not _plain(operation) for each in syntax.expressions_of(operation))
     if not any(each.function in known or any(changed(each)) for part in parts for each in _invoked(part)):
-        return routine
+        return given
     code: list[syntax.Operation] = []
     starts: list[int] = []
-    for operation in routine.code:
+    for operation in given:
         starts.append(len(code))
         calls = _Calls(known, operation.place)
         if (
@@ -386,7 +417,7 @@ def _linked(routine: syntax.Routine, known: Mapping[str, syntax.Routine], change
         ]
         code += [*calls.found, *unclear, last]
     starts.append(len(code))
-    return replace(routine, code=tuple(_moved(operation, starts) for operation in code))
+    return tuple(_moved(operation, starts) for operation in code)
 
 
 def _moved(operation: syntax.Operation, starts: list[int]) -> syntax.Operation:

@@ -286,8 +286,8 @@ class Dialect(ABC):
         return None
 
     def sets(self, call: syntax.Invocation) -> frozenset[str]:
-        """What motions depend on without naming it, and a function outside the program may set."""
-        return frozenset() if self.harmless(call) else self.modal
+        """What motions depend on without naming it, and a function outside the program is known to set."""
+        return frozenset()
 
     def frame_of(self, value: syntax.Value | None) -> Reals | None:
         """The transform (4, 4), m, of a value that is a tool or a base; None for others."""

@@ -98,6 +98,7 @@ class Execution(ByValue):
     frames_twice : frames that the program and the cell give differently; the program's were taken
     kept : variables of its data that decide motions and that it leaves changed to its next start, with where
     elsewhere : variables of its data that decide motions and that other programs set, with where
+    errors : handlers after which the program goes on that had an error
     """
 
     program: Program
@@ -107,6 +108,7 @@ class Execution(ByValue):
     frames_twice: tuple[FrameTwice, ...] = ()
     kept: tuple[tuple[str, Place], ...] = ()
     elsewhere: tuple[tuple[str, Place], ...] = ()
+    errors: tuple[Place, ...] = ()
 
     @property
     def complete(self) -> bool:

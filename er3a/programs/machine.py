@@ -95,7 +95,7 @@ def changed_beside(program: syntax.Program, dialect: Dialect, itself: str = "") 
     asked = {what.function for what in beside}
     cyclic = {name for what in beside if what.function == syntax.CYCLIC for name in names(what.arguments[0])}
     started = {name for name in routines if (name in asked or routines[name].thread) and name != itself}
-    given = {name for what in beside for name in _given_back(program, what.function, what.arguments)}
+    given = {name for what in beside for name in _given_back(program, what)}
     changed = _changed_in(program, _with_called(program, started), dialect) | program.beside
     return (changed | cyclic | given) - dialect.modal
 
@@ -115,7 +115,8 @@ def _with_called(program: syntax.Program, names: Iterable[str]) -> set[str]:
         name = waiting.pop()
         if name not in found:
             found.add(name)
-            waiting += [each for op in program.routines[name].code for each in _next(op) if each in program.routines]
+            following = (each for op in program.routines[name].operations for each in _next(op))
+            waiting += [each for each in following if each in program.routines]
     return found
 
 
@@ -127,48 +128,96 @@ def _next(operation: syntax.Operation) -> tuple[str, ...]:
 
 
 def _changed_in(program: syntax.Program, names: Iterable[str], dialect: Dialect) -> frozenset[str]:
-    """Variables, not local ones, that routines change."""
-    routines = [program.routines[name] for name in names]
-    changed = {each for routine in routines for op in routine.code for each in _shared(program, op, dialect)}
-    return frozenset(changed.union(*(unsettled(routine, dialect) for routine in routines)))
+    """Variables, not local ones, that routines and their handlers change, and what motions depend on."""
+    code = (op for name in names for op in program.routines[name].operations)
+    return frozenset(each for op in code for each in _shared(program, op, dialect))
 
 
-def unsettled(routine: syntax.Routine, dialect: Dialect) -> frozenset[str]:
-    """What handlers of a routine's errors may set at any time: variables, what motions depend on without naming it,
-    and ``RETURNED`` for the routine's value."""
-    found: set[str] = set()
-    for each in routine.handler:
-        if isinstance(each, syntax.Assign) and not each.local:
-            found.add(variable_of(each.target))
-        elif isinstance(each, syntax.Doing):
-            found |= dialect.sets(each.what) if isinstance(each.what, syntax.Invocation) else dialect.modal
-        elif isinstance(each, syntax.Return) and each.value is not None:
-            found.add(syntax.RETURNED)
-    return frozenset(found)
+def unsettled(program: syntax.Program, routine: syntax.Routine, dialect: Dialect) -> frozenset[str]:
+    """What handlers of a routine's errors, and what they call, may set at any time: variables, what motions depend on
+    without naming it, and ``RETURNED`` for the routine's value."""
+    called = {name for each in routine.handler for name in _next(each)}
+    found = _changed_in(program, _with_called(program, called), dialect)
+    found |= {name for each in routine.handler for name in _shared(program, each, dialect)}
+    gives = any(isinstance(each, syntax.Return) and each.value is not None for each in routine.handler)
+    return found | {syntax.RETURNED} if gives else found
 
 
-def _given_back(program: syntax.Program, name: str, arguments: Iterable[syntax.Expression | None]) -> set[str]:
-    """Variables that a routine, or what it calls, changes as its parameters."""
-    parameters = program.routines[name].parameters if name in program.routines else ()
-    given = {
-        parameter.name: variable_of(each)
-        for parameter, each in zip(parameters, arguments)
-        if parameter.out and isinstance(each, (syntax.Variable, syntax.Member, syntax.Element))
+def errors_not_followed(program: syntax.Program, dialect: Dialect) -> tuple[instructions.Place, ...]:
+    """Handlers after which a program goes on that had an error.
+
+    One that only has carried out again what failed is not among them, if that is no routine of the program.
+    """
+    reached = {name: program.routines[name] for name in _with_called(program, (program.entry,))}
+    going_on = {
+        name
+        for name, each in reached.items()
+        if each.on_error is not None
+        and (each.on_error.goes_on or (each.on_error.again and _acts(program, each, dialect)))
     }
-    code = (op for each in _with_called(program, (name,)) for op in program.routines[each].code) if given else ()
+    below = _with_called(program, going_on)
+    return tuple(
+        each.on_error.place
+        for name, each in reached.items()
+        if each.on_error is not None and (name in going_on or (name in below and each.on_error.passed_on))
+    )
+
+
+def _acts(program: syntax.Program, routine: syntax.Routine, dialect: Dialect) -> bool:
+    """Whether a routine calls others, or its handler does anything that later instructions may depend on."""
+    acting = (syntax.Call, syntax.Beside, syntax.Move)
+    return (
+        any(isinstance(each, syntax.Call) for each in routine.code)
+        or any(isinstance(each, acting) or _may_move(each, dialect) for each in routine.handler)
+        or bool(unsettled(program, routine, dialect))
+    )
+
+
+def _given(
+    routine: syntax.Routine, call: syntax.Call | syntax.Invocation
+) -> list[tuple[syntax.RoutineParameter, syntax.Expression]]:
+    """Parameters of a routine with their arguments, those by place first."""
+    places = [each for each in routine.parameters if not each.named]
+    by_name = {each.name: each for each in routine.parameters}
+    placed = [(parameter, each) for parameter, each in zip(places, call.arguments) if each is not None]
+    return [*placed, *((by_name[name], each) for name, each in call.keywords if name in by_name)]
+
+
+def _both_ways(
+    program: syntax.Program, call: syntax.Call | syntax.Invocation
+) -> list[tuple[str, syntax.Variable | syntax.Member | syntax.Element]]:
+    """Parameters that are the caller's own variables, with these."""
+    routine = program.routines.get(_called(call))
+    return [
+        (parameter.name, each)
+        for parameter, each in (() if routine is None else _given(routine, call))
+        if parameter.out and isinstance(each, (syntax.Variable, syntax.Member, syntax.Element))
+    ]
+
+
+def _called(call: syntax.Call | syntax.Invocation) -> str:
+    return call.routine if isinstance(call, syntax.Call) else call.function
+
+
+def _given_back(program: syntax.Program, call: syntax.Call | syntax.Invocation) -> set[str]:
+    """Variables that a routine, or what it calls, changes as its parameters."""
+    given = {name: variable_of(each) for name, each in _both_ways(program, call)}
+    code = (
+        (op for each in _with_called(program, (_called(call),)) for op in program.routines[each].operations)
+        if given
+        else ()
+    )
     return {given[changed] for op in code for changed in _changed(op) if changed in given}
 
 
 def _shared(program: syntax.Program, operation: syntax.Operation, dialect: Dialect) -> Iterable[str]:
-    """Variables, not local ones, that an operation changes."""
+    """Variables, not local ones, that an operation changes, and what motions depend on that it is known to set."""
     if isinstance(operation, syntax.Call):
-        return _given_back(program, operation.routine, operation.arguments)
+        return _given_back(program, operation)
     if isinstance(operation, syntax.Assign):
         return () if operation.local else (target_name(operation.target),)
-    if isinstance(operation, syntax.Doing) and not (
-        isinstance(operation.what, syntax.Invocation) and dialect.harmless(operation.what)
-    ):
-        return dialect.modal
+    if isinstance(operation, syntax.Doing) and isinstance(operation.what, syntax.Invocation):
+        return dialect.sets(operation.what)
     return ()
 
 
@@ -240,8 +289,7 @@ def _moving(program: syntax.Program, dialect: Dialect) -> set[str]:
         more = {
             routine.name
             for routine in program.routines.values()
-            if routine.name not in moving
-            and any(_moves(program, each, moving, dialect) for each in (*routine.code, *routine.handler))
+            if routine.name not in moving and any(_moves(program, each, moving, dialect) for each in routine.operations)
         }
         if not more:
             return moving
@@ -304,7 +352,7 @@ def _changes(program: syntax.Program) -> dict[str, set[str]]:
     return _gathered(
         program,
         {
-            name: {each for op in (*routine.code, *routine.handler) for each in _changed(op)}
+            name: {each for op in routine.operations for each in _changed(op)}
             for name, routine in program.routines.items()
         },
     )
@@ -313,7 +361,7 @@ def _changes(program: syntax.Program) -> dict[str, set[str]]:
 def _gathered(program: syntax.Program, own: dict[str, set[str]]) -> dict[str, set[str]]:
     """Names by routine, with those of the routines that it calls."""
     called = {
-        name: {op.routine for op in routine.code if isinstance(op, syntax.Call)}
+        name: {op.routine for op in routine.operations if isinstance(op, syntax.Call)}
         for name, routine in program.routines.items()
     }
     while True:
@@ -331,7 +379,7 @@ def _changed(operation: syntax.Operation) -> Iterator[str]:
         if value is not None and not itself:
             yield target_name(operation.target)
     elif isinstance(operation, syntax.Call):  # parameters may go both ways
-        yield from (name for each in operation.arguments for name in names(each))
+        yield from (name for each in syntax.expressions_of(operation) for name in names(each))
     elif isinstance(operation, syntax.Waiting) and operation.kind == "condition":  # others may meet it
         yield from names(operation.of)
 
@@ -349,9 +397,8 @@ def aliased_calls(program: syntax.Program) -> dict[syntax.Call, frozenset[str]]:
         own = _own_names(caller)
         for call in (each for each in caller.code if isinstance(each, syntax.Call)):
             given: dict[str, list[str]] = defaultdict(list)
-            for parameter, each in zip(program.routines[call.routine].parameters, call.arguments):
-                if parameter.out and isinstance(each, (syntax.Variable, syntax.Member, syntax.Element)):
-                    given[variable_of(each)].append(parameter.name)
+            for name, each in _both_ways(program, call):
+                given[variable_of(each)].append(name)
             shared = [
                 {variable, *parameters}
                 for variable, parameters in given.items()
@@ -588,7 +635,7 @@ class Machine:
         self.deciding = deciding(program, dialect.modal)
         self.names_met: set[str] = set()
         self.deciding_names: list[str] = []  # of those, whole
-        self.unsettled = {name: unsettled(routine, dialect) for name, routine in program.routines.items()}
+        self.unsettled = {name: unsettled(program, each, dialect) for name, each in program.routines.items()}
         self.quiet, self.needed = quiet_branches(program, dialect)
         self.persisting = _persisting(program, dialect) & self.needed
         self.first_values: dict[str, syntax.Value] = {}  # of these
@@ -643,6 +690,7 @@ class Machine:
             tuple(twice),
             tuple(self.kept.items()),
             tuple((name, place) for name, place in elsewhere.items() if name in set(map(root, memory.met))),
+            errors_not_followed(self.program, self.dialect),
         )
 
     def _begin(self, way: ExecutionPath) -> None:
@@ -894,16 +942,12 @@ class Machine:
 
     def _call(self, way: ExecutionPath, call: syntax.Call) -> None:
         routine, memory = self.program.routines[call.routine], way.memory
-        local, fits = _locals(routine, call.arguments, call.keywords, memory)
+        local, fits = _locals(routine, call, memory)
         if call.result == syntax.START:
             del local["%inside"]
         if not fits:
             self._note(way, call.place, instructions.Unknown(call.text, may_move=False))
-        outs = tuple(
-            (parameter.name, memory.settled(given))
-            for parameter, given in zip(routine.parameters, call.arguments)
-            if parameter.out and isinstance(given, (syntax.Variable, syntax.Member, syntax.Element))
-        )
+        outs = tuple((name, memory.settled(given)) for name, given in _both_ways(self.program, call))
         calls = (*way.frames[-1].calls, call.place)
         way.frames.append(Frame(routine, 0, local, calls, call.result, outs, memory.aliased))
         memory.local = local
@@ -930,7 +974,7 @@ class Machine:
         if routine is not None:
             other = way.fork(self.numbers, len(self.seen))
             other.step, other.beside = before, True
-            local, fits = _locals(routine, start.what.arguments, start.what.keywords, way.memory)
+            local, fits = _locals(routine, start.what, way.memory)
             other.frames = [Frame(routine, 0, local, (*way.frames[-1].calls, start.place))]
             other.memory.local = local
             other.memory.beside = self._changed_later(way) | changed_beside(self.program, self.dialect, name)
@@ -1021,26 +1065,22 @@ class Machine:
 
 
 def _locals(
-    routine: syntax.Routine,
-    arguments: tuple[syntax.Expression | None, ...],
-    keywords: tuple[tuple[str, syntax.Expression], ...],
-    memory: ProgramMemory,
+    routine: syntax.Routine, call: syntax.Call | syntax.Invocation, memory: ProgramMemory
 ) -> tuple[dict[str, syntax.Value], bool]:
     """Variables of a routine that begins, and whether it has a parameter for each argument."""
-    by_name = {name: memory.value(each) for name, each in keywords}
+    given = _given(routine, call)
+    values = {parameter.name: memory.value(each) for parameter, each in reversed(given)}
     local: dict[str, syntax.Value] = {"%inside": True}
-    for i, parameter in enumerate(routine.parameters):
-        given = arguments[i] if i < len(arguments) else None
-        if given is not None:
-            local[parameter.name] = memory.value(given)
-        elif parameter.name in by_name:
-            local[parameter.name] = by_name[parameter.name]
+    for parameter in routine.parameters:
+        if parameter.name in values:
+            local[parameter.name] = values[parameter.name]
         elif parameter.default is not None:
             local[parameter.name] = memory.value(parameter.default)
         else:
             local[parameter.name] = syntax.Unset(parameter.name)
-    fits = len(arguments) <= len(routine.parameters) and by_name.keys() <= {each.name for each in routine.parameters}
-    return local, fits
+    places = sum(not each.named for each in routine.parameters)
+    wanted = sum(each is not None for each in call.arguments) + len(call.keywords)
+    return local, len(call.arguments) <= places and len(given) == wanted
 
 
 def _labels(routine: syntax.Routine) -> frozenset[int]:

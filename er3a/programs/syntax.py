@@ -337,11 +337,37 @@ Operation = Assign | GoTo | Branch | Call | Beside | Return | Halt | Move | Wait
 
 @dataclass(frozen=True, slots=True)
 class RoutineParameter:
-    """A routine's parameter; ``out`` if the caller's variable gets its last value."""
+    """A routine's parameter.
+
+    Attributes
+    ----------
+    out : whether the caller's variable gets its last value
+    default : what it is where it is not given
+    named : whether it is given by its name alone, so that arguments by place pass it over
+    """
 
     name: str
     out: bool = False
     default: Expression | None = None
+    named: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class OnError:
+    """What may follow an error in a routine, by its handler.
+
+    Attributes
+    ----------
+    place : of the handler
+    goes_on : whether the program may go on with what is after the error, with the caller, or from its beginning
+    again : whether what failed may be carried out again
+    passed_on : whether the caller's handler may get the error
+    """
+
+    place: Place
+    goes_on: bool
+    again: bool
+    passed_on: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -351,7 +377,8 @@ class Routine:
     Attributes
     ----------
     thread : whether it runs beside the program, so that a run of the program does not carry it out
-    handler : what handlers of its errors do, at any time, as far as it is no motion
+    handler : what handlers of its errors do, at any time, without jumps
+    on_error : None where no handler takes its errors
     """
 
     name: str
@@ -360,6 +387,12 @@ class Routine:
     place: Place
     thread: bool = False
     handler: tuple[Operation, ...] = ()
+    on_error: OnError | None = None
+
+    @property
+    def operations(self) -> tuple[Operation, ...]:
+        """What it does, and what its handlers do."""
+        return (*self.code, *self.handler)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

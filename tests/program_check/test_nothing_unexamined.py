@@ -1159,6 +1159,137 @@ def test_a_routine_that_an_error_ends_is_followed(tmp_path, own, caller, leaves)
     assert len({tuple(np.round(np.append(each.start, each.end), 6)) for each in lines}) == 3 + leaves
 
 
+@pytest.mark.parametrize(
+    ("head", "call"),
+    [
+        ("\\INOUT num y", "sub1\\y:=n;"),
+        ("\\VAR num y", "sub1\\y:=n;"),
+        ("\\INOUT bool z|INOUT num y", "sub1\\y:=n;"),
+        ("\\INOUT num y", "outer\\y:=n;"),
+        ("\\INOUT num y", "IF ask(\\y:=n) SetDO do1,1;"),
+    ],
+)
+def test_what_a_routine_sets_by_an_optional_argument_is_the_callers(tmp_path, head, call):
+    sets = "IF Present(y) y:=40;"
+    more = f"PROC sub1({head})\n{sets}\nENDPROC\nPROC outer(\\INOUT num y)\nsub1\\y?y;\nENDPROC\n"
+    more += f"FUNC bool ask(\\INOUT num y)\n{sets}\nRETURN TRUE;\nENDFUNC\n"
+    last = motions(tmp_path, rapid(f"{call}\nMoveL Offs(p,0,n,0),v100,fine,tool0;", more), "a.mod")[-1]
+    assert last.target.pose[1, 3] == pytest.approx(0.04)
+
+
+def test_what_a_trap_sets_by_an_optional_argument_has_no_value(tmp_path):
+    more = "TRAP t1\nput\\y:=n;\nENDTRAP\nPROC put(\\INOUT num y)\ny:=40;\nENDPROC\n"
+    body = "CONNECT i1 WITH t1;\nISignalDI di1,1,i1;\nMoveL Offs(p,0,n,0),v100,fine,tool0;"
+    found = motions(tmp_path, rapid(body, more, "VAR intnum i1;\n"), "a.mod")
+    assert isinstance(found[-1].target, UnresolvedTarget)
+
+
+def test_an_optional_argument_and_a_variable_of_the_routine_are_two_names_of_one(tmp_path):
+    more = "PROC sub1(\\INOUT num y)\ny:=40;\nMoveL Offs(p,0,n,0),v100,fine,tool0;\nENDPROC\n"
+    assert isinstance(motions(tmp_path, rapid("sub1\\y:=n;", more), "a.mod")[-1].target, UnresolvedTarget)
+
+
+def test_arguments_by_place_pass_over_optional_parameters(tmp_path):
+    sub = "PROC sub1(\\num y,num x)\nIF Present(y) THEN\nn:=y;\nELSE\nn:=7;\nENDIF\n"
+    sub += "MoveL Offs(p,x,n,0),v100,fine,tool0;\nENDPROC\n"
+    _, with_y, without = motions(tmp_path, rapid("sub1\\y:=20,30;\nsub1 40;", sub), "a.mod")
+    np.testing.assert_allclose(1000 * with_y.target.pose[:2, 3], [430, 20])
+    np.testing.assert_allclose(1000 * without.target.pose[:2, 3], [440, 7])
+
+
+def handled(handler: str, sub: str = "SetDO do1,1;", own: str = "") -> str:
+    """A module whose main calls sub1; with the handler of main and sub1's own."""
+    more = f"PROC sub1()\n{sub}\n{own}ENDPROC\nPROC note1()\nIncr k;\nENDPROC\nFUNC bool set1(INOUT num x)\nx:=40;\n"
+    more += "RETURN TRUE;\nENDFUNC\nTRAP t1\nn:=40;\nENDTRAP\n"
+    data = "VAR num k;\nVAR intnum i1;\n"
+    return rapid(f"sub1;\nMoveL Offs(p,0,n,0),v100,fine,tool0;\n{handler}", more, data)
+
+
+NO_CALL = "MoveL p,v100,fine,tool0;\n"
+
+
+@pytest.mark.parametrize(
+    "handler",
+    [
+        "TRYNEXT;",
+        "RETURN;",
+        "ExitCycle;",
+        'TPWrite "late";',
+        "IF ERRNO=ERR_WAIT_MAXTIME RETRY;",
+        "IF ERRNO=ERR_WAIT_MAXTIME THEN\nRETRY;\nELSE\nStop;\nn:=5;\nENDIF",
+        "RETRY;",  # of sub1, which begins again where the arm is
+    ],
+)
+def test_a_handler_after_which_the_program_goes_on_is_named(tmp_path, handler):
+    found = check(tmp_path, handled(f"ERROR\n{handler}"), "a.mod")
+    named = [(each.level, each.place.line) for each in found.findings if each.finding.code == "errors_not_followed"]
+    assert named == [("caution", 12)]
+    assert [each.place.line for each in found.not_examined if each.what == "course"] == [12]
+
+
+@pytest.mark.parametrize(
+    ("handler", "named"),
+    [
+        ("RETRY;", False),
+        ('TPWrite "again";\nWaitTime 1;\nResetRetryCount;\nRETRY;', False),
+        ("SetDO do1,0;\nIF ERRNO=5 THEN\nRETRY;\nELSE\nRAISE;\nENDIF", False),
+        ("n:=5;\nRETRY;", True),
+        ("Incr k;\nIF k<3 RETRY;\nEXIT;", True),
+        ("note1;\nRETRY;", True),
+        ("IF set1(n) RETRY;\nEXIT;", True),
+        ("VelSet 50,500;\nRETRY;", True),
+        ("SetSysData tool0;\nRETRY;", True),
+        ("Mystery;\nRETRY;", True),
+        ("CONNECT i1 WITH t1;\nRETRY;", True),
+        ("MoveL p,v100,fine,tool0;\nRETRY;", True),
+        ("StartMoveRetry;", True),
+    ],
+)
+def test_a_handler_that_repeats_what_failed_is_named_where_it_does_more(tmp_path, handler, named):
+    text = handled(f"ERROR\n{handler}").replace("\nsub1;\n", f"\n{NO_CALL}")
+    assert ("errors_not_followed" in codes(check(tmp_path, text, "a.mod"))) == named
+
+
+@pytest.mark.parametrize(
+    "handler",
+    ["EXIT;", "n:=5;\nEXIT;", 'TPWrite "late";\nStop;', "RAISE;", "IF ERRNO=5 THEN\nStop;\nELSE\nEXIT;\nENDIF"],
+)
+def test_a_handler_that_ends_the_program_is_not_named(tmp_path, handler):
+    found = codes(check(tmp_path, handled("", own=f"ERROR\n{handler}\n"), "a.mod"))
+    assert "errors_not_followed" not in found
+
+
+@pytest.mark.parametrize("own", ["", "ERROR\nRAISE;\n"])
+def test_a_handler_that_passes_an_error_on_is_named_where_a_caller_goes_on(tmp_path, own):
+    found = codes(check(tmp_path, handled("ERROR\nTRYNEXT;", own=own), "a.mod"))
+    assert found["errors_not_followed"] == [12, *[17][: len(own)]]
+
+
+def test_a_handler_of_a_routine_that_nothing_calls_is_not_named(tmp_path):
+    text = handled("", own="ERROR\nTRYNEXT;\n").replace("\nsub1;\n", "\n")
+    assert "errors_not_followed" not in codes(check(tmp_path, text, "a.mod"))
+
+
+@pytest.mark.parametrize("handler", ["note1;\nRETRY;", "note1;\nTPErase;\nTRYNEXT;", "Mystery;\nRETRY;"])
+def test_what_a_handler_calls_changes_no_more_than_that_changes(tmp_path, handler):
+    found = check(tmp_path, handled("", own=f"ERROR\n{handler}\n"), "a.mod")
+    assert found.level == "caution"
+    assert set(codes(found)) & {"target_not_given", "frame_not_given", "load_not_examined"} == set()
+
+
+@pytest.mark.parametrize("handler", ["IF set1(n) TRYNEXT;", "b:=set1(n);\nTRYNEXT;", 'b:=StrToVal("40",n);\nTRYNEXT;'])
+def test_what_a_function_sets_in_a_handler_has_no_value(tmp_path, handler):
+    found = motions(tmp_path, handled("", own=f"ERROR\n{handler}\n"), "a.mod")
+    assert isinstance(found[-1].target, UnresolvedTarget)
+
+
+def test_the_position_is_not_known_where_a_handler_sets_the_active_tool(tmp_path):
+    body = "MoveL p,v100,fine,tool0;\nsub1;\nq:=CRobT();\nMoveL q,v100,fine,tool0;"
+    more = "PROC sub1()\nWaitDI di1,1\\MaxTime:=2;\nERROR\nSetSysData tool1;\nTRYNEXT;\nENDPROC\n"
+    found = motions(tmp_path, rapid(body, more, f"VAR robtarget q;\nPERS tooldata tool1:={ONE_TOOL};\n"), "a.mod")
+    assert isinstance(found[-1].target, UnresolvedTarget)
+
+
 @pytest.mark.parametrize("word", ["ExitCycle", "RAISE my_err"])
 def test_a_trap_that_ends_the_cycle_or_the_routine_is_named(tmp_path, word):
     more = f"TRAP t1\n{word};\nENDTRAP\n"

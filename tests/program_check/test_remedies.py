@@ -344,6 +344,10 @@ MENDED = {
     "waits_for_others": (
         (krl("N=0", "WAIT FOR N==1", "PTP {A1 N}"), {"data": "INT N=0"}),
         (krl("N=0", "WAIT FOR $IN[1]", "N=1", "PTP {A1 N}"), {"data": "INT N=0"}),
+    "errors_not_followed": (
+        rapid("MoveAbsJ [[0,-10,-10,0,-70,5],[9E9,9E9,9E9,9E9,9E9,9E9]],v50,fine,tool0;", "ERROR", "TRYNEXT;"),
+        rapid("MoveAbsJ [[0,-10,-10,0,-70,5],[9E9,9E9,9E9,9E9,9E9,9E9]],v50,fine,tool0;", "ERROR", "EXIT;"),
+        rapid("MoveAbsJ [[0,-10,-10,0,-70,5],[9E9,9E9,9E9,9E9,9E9,9E9]],v50,fine,tool0;", "ERROR", "Stop;"),
     ),
     "above_limit": (krl("PTP {A1 170}"), krl(f"PTP {{A1 {np.degrees(ROBOT.upper[0]):g}}}")),
     "below_limit": (krl("PTP {A1 -170}"), krl(f"PTP {{A1 {np.degrees(ROBOT.lower[0]):g}}}")),

@@ -222,16 +222,16 @@ def test_a_routine_of_the_program_in_the_condition_of_a_wait_is_carried_out(tmp_
     assert len(motions(tmp_path, rapid("WaitUntil there();", more=more), "a.mod")) == 2
 
 
-def test_a_routine_that_a_caller_carries_out_again_after_an_error_begins_where_the_arm_is(tmp_path):
-    """RETRY calls sub1 again while the arm is at its second point."""
-    sub = "PROC sub1()\nMoveL p,v100,fine,tool0;\nMoveL Offs(p,0,50,0),v100,fine,tool0;\n"
+@pytest.mark.parametrize(
+    ("handler", "named"), [("RETRY;", True), ("Incr k;\nIF k<3 RETRY;\nEXIT;", True), ("Stop;", False)]
+)
+def test_a_routine_that_a_caller_carries_out_again_after_an_error_is_named(tmp_path, handler, named):
+    """RETRY calls sub1 again while the arm is at its second point, and as often as handler and controller allow."""
+    sub = "PROC sub1()\nn:=n+100;\nMoveL Offs(p,0,n,0),v100,fine,tool0;\nMoveL Offs(p,0,50,0),v100,fine,tool0;\n"
     sub += "WaitDI di1,1\\MaxTime:=2;\nENDPROC"
-    starts = {}
-    for handler in ("RETRY", "Stop"):
-        found = check(tmp_path, rapid(f"sub1;\nERROR\n{handler};", more=sub), "a.mod")
-        steps = found.execution.steps
-        starts[handler] = {each.start.tobytes() for n, each in found.motions.items() if steps[n].place.line == 12}
-    assert [len(each) for each in starts.values()] == [2, 1]
+    found = codes(check(tmp_path, rapid(f"sub1;\nERROR\n{handler}", "VAR num k;\nVAR num n;\n", sub), "a.mod"))
+    assert ("errors_not_followed" in found) == named
+    assert not {"target_out_of_reach", "way_out_of_reach", "not_followed_to_end"} & set(found)
 
 
 def test_an_instruction_whose_error_ends_its_routine_is_followed_on_both_sides(tmp_path):

@@ -79,7 +79,7 @@ REMEDIES: dict[str, str] = {
     "configuration_not_met": N_("Teach the target again, or correct its configuration."),
     "configuration_guessed": N_("Give start_deg of the program, or begin with a move to joint angles."),
     "moves_beside": BY_HAND,
-    "never_reached": N_("Remove this motion, or check what leads to it as a program of its own."),
+    "never_reached": N_("Check what leads to this motion as a program of its own, or remove it if nothing does."),
     "pairs_unexamined": N_("Correct these shapes in the robot's file, or allow the pair there with a reason."),
     "zone_collides": N_("Make the zone smaller, or stop at the corner."),
     "zone_not_settled": N_("Stop at the corner, or make the zone smaller until this is no longer found."),
@@ -121,6 +121,7 @@ REMEDIES: dict[str, str] = {
     "waits_for_others": N_(
         "Look up what else the task sets that answers this wait, and set what motions use after the wait."
     ),
+    "errors_not_followed": N_("End the program in the handler, or watch at low speed what it does after an error."),
     "acceleration_not_known": N_("Give the acceleration as a number."),
     "zone_without_size": N_("Give the zone's size: in mm, or for C_PTP in percent ($APO.CPTP)."),
     "spline_as_line": N_("Write straight lines of the spline (SLIN)."),
@@ -238,8 +239,8 @@ TEXTS = texts(
         "may_move": "not understood, and may move the arm: {text}",
         "never_reached": by(
             "moves",
-            true="no branch of the program leads to this motion; it was not checked",
-            false="no branch of the program leads to this instruction, which may move the arm; it was not checked",
+            true="no branch that was followed leads to this motion; it was not checked",
+            false="no branch that was followed leads to this instruction, which may move the arm; it was not checked",
         ),
         "not_come_to": "not checked: the program was not followed as far as this motion",
         "both_sides_checked": "both sides were checked: {condition}",
@@ -350,6 +351,10 @@ TEXTS = texts(
         "waits_for_others": (
             "'{condition}' is false here, and nothing that was read makes it true: another task does, and what else "
             "that sets is not known"
+        ),
+        "errors_not_followed": (
+            "the program may go on after an error in this routine, or in one that it calls; that was followed for few "
+            "instructions only (waits with a time limit, files, sockets), and not all that is skipped or set then"
         ),
         "acceleration_not_known": (
             "the acceleration '{word}' is not known, or not above 0; one was assumed for duration and joint "

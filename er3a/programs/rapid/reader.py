@@ -48,6 +48,10 @@ ENDS = frozenset(
 """Words that no instruction goes on beyond."""
 DECLARED = ("VAR", "PERS", "CONST")
 HANDLERS = ("ERROR", "UNDO", "BACKWARD")
+GOING_ON = frozenset(("TRYNEXT", "RETURN", "EXITCYCLE"))
+"""Words by which an error handler lets the program go on; so may its end, of which no text was found."""
+AGAIN = frozenset(("RETRY", "STARTMOVERETRY"))
+"""Words by which it has carried out again what failed."""
 MOTIONS = frozenset(
     (
         *("MOVEJ", "MOVEL", "MOVEC", "MOVEABSJ", "MOVEJDO", "MOVELDO", "MOVECDO", "MOVEJAO", "MOVELAO", "MOVECAO"),
@@ -98,8 +102,6 @@ NOT_SIMULATED = frozenset(NOT_SIMULATED_TEXT.split())
 UPPER, ARITHMETIC, TYPED, STEP, LATE = "%UPPER", "%ARITHMETIC", "%TYPED", "%STEP", "%LATE"
 RAISING = ("SOCKET", "OPEN", "READ", "WRITE", "LOAD", "UNLOAD", "STARTLOAD", "RMQ", "COPYFILE", "REMOVE", "MAKEDIR")
 """How instructions begin that often end with an error; any other may too, if less often."""
-BEGINNING = "%BEGINNING"
-"""Label of a routine's beginning."""
 FAILED = "%FAILED"
 """Whether an instruction ends with an error, which only the cell knows."""
 PASSING = "%PASSING"
@@ -344,22 +346,6 @@ def _private(tokens: list[Token]) -> set[str]:
     return found
 
 
-def _retried(tokens: list[Token]) -> set[str]:
-    """Names in procedures whose error handler carries out again, by RETRY, the call that an error came out of."""
-    found: set[str] = set()
-    names: set[str] = set()
-    handled = False
-    for word in (token.text for token in tokens if token.kind == "name"):
-        if word in ("PROC", "FUNC", "TRAP"):
-            names, handled = set(), False
-        handled = handled or word == "ERROR"
-        if handled and word == "RETRY":
-            found |= names
-        elif not handled:
-            names.add(word)
-    return found
-
-
 class Cursor:
     """The words of a module, read one after another."""
 
@@ -437,7 +423,6 @@ class _ModuleReader:
         self.data: list[syntax.Assign] = []
         self.findings: list[ProgramFinding] = []
         self.goes_on = any(each.text == "TRYNEXT" for each in cursor.tokens)
-        self.retried = _retried(cursor.tokens)
 
     def read(self) -> None:
         """Declarations and routines."""
@@ -571,7 +556,8 @@ def _parameters(tokens: list[Token], scope: Scope, place: Place) -> list[syntax.
             kind, name = words[-2], words[-1]
             shape = scope.types.get(kind, (kind,))
             scope.shapes[name] = ("[]", shape) if arrays else shape
-            found.append(syntax.RoutineParameter(name, out, syntax.Constant(ABSENT) if optional else None))
+            default = syntax.Constant(ABSENT) if optional else None
+            found.append(syntax.RoutineParameter(name, out, default, named=optional))
         elif words:
             raise fault(place, "a parameter has no type or no name", "Write PROC name(num n)")
 
@@ -600,14 +586,11 @@ class _BodyReader:
         self.module, self.cursor, self.builder, self.scope = module, module.cursor, builder, scope
         self.end = ""
         self.leaves = False  # whether an error may end the routine here
-        self.again = False  # whether it may make the caller carry the routine out again
 
     def read(self, end: str) -> None:
         """Instructions up to the word that ends the routine, which is not passed, with its handlers."""
         self.end = end
         self.leaves = end == "ENDPROC" and self._error_leaves()
-        self.again = end == "ENDPROC" and self.builder.name in self.module.retried and not self._handler_words()
-        self.builder.label(BEGINNING)
         handler = self._handler_moves(end)
         while (token := self.cursor.next(comments=True)) is not None:
             if token.kind == "comment":
@@ -627,11 +610,16 @@ class _BodyReader:
         place = self.cursor.place()
         builder = CodeBuilder(name, tuple(map(syntax.RoutineParameter, known)), place)
         inside = _BodyReader(self.module, builder, self.scope)
-        while self.cursor.word() in HANDLERS:
+        while (word := self.cursor.word()) in HANDLERS:
+            at, first, begin = self.cursor.place(), len(builder.code), self.cursor.at
             self.cursor.at += 1
             if (token := self.cursor.next()) is not None and token.text == "(":
                 self.cursor.head(")")
             inside.instructions(end)
+            if word == "ERROR":
+                said = {each.text for each in self.cursor.tokens[begin : self.cursor.at] if each.kind == "name"}
+                goes_on = not GOING_ON.isdisjoint(said) or builder.comes_to_end(first)
+                self.builder.on_error = syntax.OnError(at, goes_on, not AGAIN.isdisjoint(said), "RAISE" in said)
             builder.add(syntax.Return(place))
         self.builder.handler += builder.code
         if handler:
@@ -814,14 +802,10 @@ class _BodyReader:
                 builder.add(syntax.Assign(place, each, syntax.Constant(syntax.Unclear(f"what {name} gives")), text))
 
     def _fails(self, place: Place, text: str) -> None:
-        """An error may end the routine here, or begin it again."""
+        """An error may end the routine here."""
         if self.leaves:
             self.builder.open_if(place, syntax.Invocation(FAILED, ()), text)
             self.builder.add(syntax.Return(place))
-            self.builder.close("if", place)
-        if self.again:
-            self.builder.open_if(place, syntax.Invocation(FAILED, ()), text)
-            self.builder.goto(place, BEGINNING)
             self.builder.close("if", place)
 
     def _handler_words(self) -> set[str]:
@@ -837,9 +821,9 @@ class _BodyReader:
     def _error_leaves(self) -> bool:
         """Whether an error ends the routine: by its handler, or by a caller's, which goes on with what is next."""
         handler = self._handler_words()
-        if not handler:
+        if not handler or ("RAISE" in handler and "RETURN" not in handler):
             return self.module.goes_on
-        return bool(handler & {"RETURN", "RAISE"}) or not handler & {"RETRY", "TRYNEXT"}
+        return "RETURN" in handler or not handler & {"RETRY", "TRYNEXT", "EXIT"}
 
     def _handler_moves(self, end: str) -> str:
         """The first of the routine's handlers that may move the arm; empty if none may."""
