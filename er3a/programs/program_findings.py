@@ -140,6 +140,13 @@ class WrittenNearAssumed(Finding):
     margin_mm: float
 
 
+class WrittenBesidePoints(Finding):
+    """The path that was checked passes beside its points, to which the program may go."""
+
+    path: str
+    missed: str
+
+
 WriteFinding = (
     ArcsSplit
     | ZonesDropped
@@ -154,4 +161,5 @@ WriteFinding = (
     | NotTranslated
     | WrittenUnsafe
     | WrittenNearAssumed
+    | WrittenBesidePoints
 )

@@ -171,6 +171,26 @@ def test_rates_that_a_trajectory_of_ros_gives_are_no_pass(study, tmp_path):
         assert verdict.status == ("caution" if named else "pass")
 
 
+@pytest.mark.parametrize("blend", [None, 3.0])
+def test_rows_that_a_table_passes_beside_though_nobody_asked_for_it_are_no_pass(study, tmp_path, blend):
+    """At a turn back, corners that are rounded over half of a side end far before the row; a program would go to it."""
+    rows = [0, -10, -10, 0, -70, 0], [0, 10, -10, 0, -70, 0], [0, -10, -10, 0, -70, 0]
+    lines = [",".join(map(str, (5 * k, *row))) for k, row in enumerate(rows)]
+    (tmp_path / "back.csv").write_text("\n".join(["t_s,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg", *lines]))
+    path = {"name": "back", "title": "Back", "kind": "table", "file": str(tmp_path / "back.csv"), "samples": 11}
+    path |= {} if blend is None else {"blend_deg": blend}
+    (tmp_path / "paths.yaml").write_text(json.dumps({"kind": "paths", "paths": [path]}))
+    results = trajectory(changed(study, {"paths": str(tmp_path / "paths.yaml")}), ROBOT)
+    (found,) = results.summary.paths
+    assert found.verdict == "safe"
+    assert found.corner_deviation_deg == pytest.approx(3 / 8 * (blend or 10))
+    missed = [each.names for each in results.summary.verdict.missed if each.subject == "missed_rows"]
+    assert missed == ([] if blend else [("back: 3.75 deg",)])
+    assert results.summary.verdict.status == ("pass" if blend else "caution")
+    krl = [text for language, text in zip(results.programs.language, results.programs.text) if language == "krl"]
+    assert [("may go to the points" in text) for text in krl[:1]] == ([True] if blend else [])
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("stage", ["inverse", "trajectory", "programs", "vision"])
 def test_what_is_expected_to_fail_alone_is_no_pass(study, tmp_path, stage):

@@ -71,6 +71,11 @@ TEXTS = texts(
             "velocities, accelerations and efforts that trajectory files give: between the points, motions are laid "
             "by positions and times alone, and a controller that follows the given rates moves otherwise there"
         ),
+        "left_out.missed_rows": (
+            "the points of tables that the motion passes beside, by up to so much: corners are rounded over half of "
+            "the shorter side, as neither blend_mm nor blend_deg is given (0 stops at each point), and a controller "
+            "that goes to the points or blends otherwise moves elsewhere"
+        ),
         "left_out.program_starts": "motions from where the arm is not known to stand",
         "left_out.program_again": (
             "the way from a program's end to its beginning, where a controller runs it again and again"

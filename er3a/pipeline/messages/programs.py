@@ -420,6 +420,10 @@ TEXTS = texts(
             "the path {path} is clear by {clearance_mm:.1f} mm of assumed shapes only, which may be wrong by "
             "{margin_mm:g} mm"
         ),
+        "written_beside_points": (
+            "the path {path} was checked with rounded corners that pass beside its points by up to {missed}; a "
+            "controller that stops at the points, or blends otherwise, moves elsewhere"
+        ),
         "remedy.clear_of_assumed": (
             "Keep {margin:g} mm between {pair}, or give shapes from a drawing or model in the robot's file."
         ),
