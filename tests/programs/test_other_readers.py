@@ -207,6 +207,14 @@ def test_a_table_over_time_is_written_and_read(tmp_path):
     assert said(execution)[1].speed.value == pytest.approx(3 / 19, abs=1e-6)
 
 
+@pytest.mark.parametrize("mark", [";", "\t"])
+def test_a_table_is_read_as_spreadsheets_write_it(tmp_path, mark):
+    rows = ["t_s,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg", "0,0,-10.5,-10,0,-70,0", "1,5.25,-10,-10,0,-70,0"]
+    text = "\n".join(row.replace(",", mark).replace(".", ",") for row in rows)
+    points = np.degrees([each.target.joints for each in said(run(tmp_path, "a.csv", text))])
+    np.testing.assert_allclose(points, [[0, -10.5, -10, 0, -70, 0], [5.25, -10, -10, 0, -70, 0]])
+
+
 def test_a_changed_solution_or_element_is_not_taken_for_the_old_one(tmp_path):
     text = "p1 = p[0.3,0,0.3,3.14,0,0]\nq = get_inverse_kin(p1)\nq[5] = q[5] + 0.5\nmovej(q)\n"
     text += "l = [0,0,0,0,0,0]\nl[read_input_integer_register(0)] = 1\nmovej(l)\n"
