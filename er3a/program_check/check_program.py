@@ -255,6 +255,11 @@ def _not_examined(execution: Execution, located: tuple[LocatedFinding, ...], end
     found = [NotExamined(place, "motion") for place in moves]
     missed = (found_in.MotionNotReached, found_in.NeverReached)
     found += [NotExamined(each.place, "motion") for each in located if isinstance(each.finding, missed)]
+    found += [
+        NotExamined(each.place, "motion")
+        for each in located
+        if isinstance(each.finding, found_in.TargetNotGiven) and each.level == "caution"
+    ]
     found += [NotExamined(each.place, "way") for each in located if isinstance(each.finding, found_in.PathNotKnown)]
     ends = (
         found_in.NotFollowedToEnd,

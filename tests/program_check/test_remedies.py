@@ -241,6 +241,7 @@ MENDED = {
     "spline_as_line": (
         krl(AT_HOME, "SPLINE", "SPL {A1 5,A2 -10,A3 -10,A4 0,A5 -70,A6 0}", "ENDSPLINE"),
         krl(AT_HOME, "SPLINE", "SLIN {A1 5,A2 -10,A3 -10,A4 0,A5 -70,A6 0}", "ENDSPLINE"),
+        krl(AT_HOME, "SPTP {A1 5,A2 -10,A3 -10,A4 0,A5 -70,A6 0}"),
     ),
     "zone_without_size": (RPL.format(**WORDS | {"zone": "wide"}), RPL.format(**WORDS | {"zone": "z1"})),
     "arc_has_no_circle": (
