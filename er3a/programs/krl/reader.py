@@ -480,6 +480,7 @@ def _spline(reading: _Statement) -> None:
 
 
 GLOBAL_ROUTINE = re.compile(r"(?im)^\s*GLOBAL\s+DEF(?:FCT\s+\w+(?:\s*\[[^\]]*\])?)?\s+(\w+)")
+PUBLISHED = re.compile(r"(?is)^\s*(?:&[^\n]*\s)*DEFDAT\s+\S+\s+PUBLIC\b.*\bGLOBAL\b")
 GLOBAL_NAME = re.compile(r"(?i)\bGLOBAL\b")
 
 
@@ -548,6 +549,7 @@ def read_krl(source: ProgramText) -> syntax.Program:
     if shared is not None:
         reader.read_data(read_program_text(shared))
     of_controller = dict(reader.signals)
+    findings += reader.read_published(source.path)
     data_file = data_file_of(source.path, ".dat")
     if data_file is not None:
         findings += reader.read_data(read_program_text(data_file))
@@ -611,6 +613,23 @@ class _KrlReader:
                         found.append(NameTwice(each.target.name, each.place))
                     seen[each.target.name] = True
                 self.data.append(each)
+        return found
+
+    def read_published(self, path: Path) -> list[ProgramFinding]:
+        """What ``.dat`` files of modules that a program does not call declare for all modules."""
+        known, found = {variable_of(each.target) for each in self.data}, list[ProgramFinding]()
+        for file in _published(path):
+            other = _KrlReader(read_program_text(file))
+            try:
+                other.read_data(other.source)
+            except InputError:
+                continue  # what it declares has no known value
+            for each in other.data:
+                if GLOBAL_NAME.search(each.text):
+                    name = variable_of(each.target)
+                    found += [NameTwice(name, each.place)] if name in known else []
+                    self.data.append(each)
+            known |= {variable_of(each.target) for each in self.data}
         return found
 
     def read_routines(self) -> list[syntax.Routine]:
@@ -752,7 +771,7 @@ def companions(path: Path) -> tuple[Path, ...]:
     """What belongs to a .src file: the modules that it calls, the points of each, and the controller's own data and
     submit programs; and other modules, where these may set what all know."""
     modules = (*modules_of(path), *_submits(path), *_others(path))
-    data = (data_file_of(module, ".dat") for module in (path, *modules))
+    data = (*(data_file_of(module, ".dat") for module in (path, *modules)), *_published(path))
     return tuple(file for file in (*modules, *data, shared_data_of(path)) if file is not None)
 
 
@@ -784,6 +803,16 @@ def shared_data_of(path: Path) -> Path | None:
     return _in_archive(path, ("$config.dat", "$CONFIG.DAT", "$Config.dat"))
 
 
+def _published(path: Path) -> tuple[Path, ...]:
+    """The ``.dat`` files that declare for all modules, but for those of modules that are read: beside a program, or in
+    all of its archive."""
+    archive = shared_data_of(path) is not None
+    modules = {path.stem.upper(), *(each.stem.upper() for each in modules_of(path)), "$CONFIG"}
+    others = (each for each in _of_controller(path, ".dat") if each.stem.upper() not in modules)
+    near = (each for each in others if archive or each.parent == path.parent)
+    return tuple(each for each in near if PUBLISHED.search(read_program_text(each).text))
+
+
 def _submits(path: Path) -> tuple[Path, ...]:
     """Programs that a controller runs beside the robot's: beside a program, or as in an archive."""
     beside = [each for each in sorted(path.parent.iterdir()) if each.suffix.lower() == ".sub" and each.is_file()]
@@ -794,12 +823,18 @@ def _submits(path: Path) -> tuple[Path, ...]:
 def _others(path: Path) -> tuple[Path, ...]:
     """Modules of the same controller that a program does not call; none where all modules share no variable."""
     shared, own = shared_data_of(path), data_file_of(path, ".dat")
-    if shared is None and (own is None or not GLOBAL_NAME.search(read_program_text(own).text)):
+    has_own = own is not None and GLOBAL_NAME.search(read_program_text(own).text)
+    if shared is None and not has_own and not _published(path):
         return ()
-    inside = path.parent if shared is None or shared.parent == path.parent else shared.parent.parent
     called = {path.resolve(), *(each.resolve() for each in modules_of(path))}
-    found = (each for each in sorted(inside.rglob("*")) if each.suffix.lower() == ".src" and each.is_file())
-    return tuple(each for each in found if each.resolve() not in called)
+    return tuple(each for each in _of_controller(path, ".src") if each.resolve() not in called)
+
+
+def _of_controller(path: Path, suffix: str) -> tuple[Path, ...]:
+    """Files of the controller that a program belongs to: in its folder and below; of an archive, in all of it."""
+    shared = shared_data_of(path)
+    inside = path.parent if shared is None or shared.parent == path.parent else shared.parent.parent
+    return tuple(each for each in sorted(inside.rglob("*")) if each.suffix.lower() == suffix and each.is_file())
 
 
 def _in_archive(path: Path, names: Iterable[str]) -> Path | None:
