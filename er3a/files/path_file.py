@@ -170,7 +170,7 @@ def _ros_trajectory(path: Path) -> tuple[Reals, Reals, tuple[str, ...]]:
 
 
 def _joint_order(path: Path, names: list[str]) -> list[int]:
-    """Where joints 1 to n stand, by the last numbers in their names, from 1 or 0 on; what stands before these is one."""
+    """Where joints 1 to n stand, by the last numbers in their names, from 1 or 0 on, which one text precedes."""
     found = [match for name in names if (match := re.fullmatch(r"(.*?)(\d+)\D*", name, re.DOTALL))]
     numbers, stems = [int(match[2]) for match in found], {match[1] for match in found}
     first = min(numbers, default=0)

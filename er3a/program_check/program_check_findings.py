@@ -517,7 +517,7 @@ NOTES = frozenset(
             "turn_speed_not_given",
             "load_not_examined",
         ),
-        *("both_sides_checked", "program_form_inferred", "program_other_encoding"),
+        *("both_sides_checked", "program_form_inferred", "program_other_encoding", "program_rows_from_rest"),
     )
 )
 

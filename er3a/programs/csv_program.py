@@ -23,7 +23,7 @@ from er3a.numerics.arrays import Reals
 from er3a.programs.code_builder import CodeBuilder
 from er3a.programs.instructions import ArmMotion, JointTarget, Place, Rate
 from er3a.programs.lexing import ProgramText
-from er3a.programs.program_findings import NothingMoves, NotUnderstood, ProgramFinding
+from er3a.programs.program_findings import NothingMoves, NotUnderstood, ProgramFinding, RowsFromRest
 from er3a.programs.program_language import Language
 from er3a.programs.rpl.dialect import RplDialect
 from er3a.programs.syntax import Fixed, Program
@@ -111,7 +111,12 @@ def read_csv_program(source: ProgramText) -> Program:
         builder.add(Fixed(place, ArmMotion("joint", target, "row", speed=speed)))
     other = [name for name in head if name not in (*names, TIME, *stated)]
     unread = [NotUnderstood(f"the column {name[:40]}", Place(source.path, kept[0][0])) for name in other]
-    findings: tuple[ProgramFinding, ...] = (*source.findings, *unread, *(() if table else (NothingMoves(),)))
+    streamed = timed is not None and len(table) > 2
+    findings: tuple[ProgramFinding, ...] = (
+        *(*source.findings, *unread),
+        *((RowsFromRest(Place(source.path, kept[0][0])),) if streamed else ()),
+        *(() if table else (NothingMoves(),)),
+    )
     routine = builder.routine(Place(source.path, len(source.lines)))
     return Program(
         *("csv", source.path.stem, source.path, {"MAIN": routine}, "MAIN"),

@@ -47,12 +47,25 @@ class OtherEncoding(Finding, code="program_other_encoding"):
     encoding: str
 
 
+class RowsFromRest(Finding, code="program_rows_from_rest"):
+    """The rows of a table over time were taken as moves from rest to rest, each in its time."""
+
+    place: Place
+
+
 class NothingMoves(Finding, code="program_nothing_moves"):
     """No instruction of the program moves the arm."""
 
 
 ProgramFinding = (
-    DataFileMissing | NameTwice | NotUnderstood | NotSimulated | FormInferred | OtherEncoding | NothingMoves
+    DataFileMissing
+    | NameTwice
+    | NotUnderstood
+    | NotSimulated
+    | FormInferred
+    | OtherEncoding
+    | RowsFromRest
+    | NothingMoves
 )
 
 
