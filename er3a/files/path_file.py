@@ -170,11 +170,11 @@ def _ros_trajectory(path: Path) -> tuple[Reals, Reals, tuple[str, ...]]:
 
 
 def _joint_order(path: Path, names: list[str]) -> list[int]:
-    """Where joints 1 to n stand, by the numbers in their names."""
-    found = [re.findall(r"\d+", name)[-1:] for name in names]
-    numbers = [int(each[0]) for each in found if each]
+    """Where joints 1 to n stand, by the last numbers in their names, from 1 or 0 on, which one text precedes."""
+    found = [match for name in names if (match := re.fullmatch(r"(.*?)(\d+)\D*", name, re.DOTALL))]
+    numbers, stems = [int(match[2]) for match in found], {match[1] for match in found}
     first = min(numbers, default=0)
-    if sorted(numbers) != list(range(first, first + len(names))):
+    if sorted(numbers) != list(range(first, first + len(names))) or first > 1 or len(stems) > 1:
         problem = f"joints can't be identified by {', '.join(names)}"
         raise InputError(path, "joint_names", problem, "Name them joint_1, joint_2 ... from the base on")
     return sorted(range(len(names)), key=numbers.__getitem__)

@@ -434,8 +434,9 @@ def programs_of(
         along = measured(surroundings, each.motion)
         if collisions(along):
             verdict = min((verdict, "collides"), key=PATH_VERDICTS.index)
-        if (verdict != "safe" and not unsafe) or not np.isfinite(each.motion.q[0]).all():
-            yield PathProgram(each.name, verdict, None)
+        elsewhere = language != "csv" and any(left.subject == "missed_rows" for left in each.left_out)
+        if ((verdict != "safe" or elsewhere) and not unsafe) or not np.isfinite(each.motion.q[0]).all():
+            yield PathProgram(each.name, verdict, None, left_out=each.left_out)
             continue
         near = near_assumed_shapes(robot, each.name, min_clearance(along), CheckOptions.assumed_margin)
         files, findings = written(robot, each.motion, verdict, language, near, task.limits.speed)

@@ -190,6 +190,7 @@ class Built:
     start_slot : closed-form branch (0..7) to begin on, where one is named
     repeated_rows : lines of the table that repeat the point before
     unread : what else the table's file gives at its points, which the motion does not follow
+    unasked : whether corners are rounded as nobody asked for: over half of the shorter side
     """
 
     joints: JointMove | JointSequence | PlannedMove | None = None
@@ -198,6 +199,7 @@ class Built:
     start_slot: int | None = None
     repeated_rows: tuple[int, ...] = ()
     unread: tuple[str, ...] = ()
+    unasked: bool = False
 
     @property
     def duration(self) -> float:
@@ -230,7 +232,9 @@ def build(robot: Robot, command: Command, ends: Mapping[str, Reals]) -> Built:
         case JointTableCommand():
             sizes = np.abs(np.diff(command.points, axis=0)).max(axis=1)
             joints = joint_sequence(command.points, _blends(sizes, command.blend), command.timing)
-            return Built(joints=joints, repeated_rows=command.repeated_rows, unread=command.unread)
+            return Built(
+                joints=joints, repeated_rows=command.repeated_rows, unread=command.unread, unasked=command.blend is None
+            )
         case ToolTableCommand():
             return _tool_table(robot, command)
         case PlanCommand():
@@ -309,7 +313,7 @@ def _tool_table(robot: Robot, command: ToolTableCommand) -> Built:
     sizes = np.array([max(part.length, part.turned * TURN_LENGTH) for part in segments])
     path = segment_path(segments, _blends(sizes, command.blend), command.timing)
     slot = _slot(robot, command.branch, command.source)
-    return Built(tool=path, start_slot=slot, repeated_rows=command.repeated_rows)
+    return Built(tool=path, start_slot=slot, repeated_rows=command.repeated_rows, unasked=command.blend is None)
 
 
 def _lines(command: ToolTableCommand) -> list[Segment]:

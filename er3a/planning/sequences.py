@@ -248,6 +248,7 @@ class SegmentPath(ByValue):
     arc_shares : (n, 2), where on its arc a piece starts and ends
     turned : rad, by how much the tool turns in all
     turns : half turns, as of :class:`er3a.planning.moves.ToolPath`
+    misses : (2,), m and rad, by how much its rounded corners pass their poses at most
     """
 
     duration: float
@@ -258,6 +259,7 @@ class SegmentPath(ByValue):
     arc_shares: Reals
     turned: float
     turns: tuple[tuple[int, Reals], ...]
+    misses: Reals
 
     @property
     def length(self) -> float:
@@ -357,11 +359,13 @@ class JointSequence:
     duration : s
     law : when the arm is where
     curve : joint angles (k = 6), rad, over the share of the path
+    misses : (k,), rad, by how much each joint passes the points of rounded corners at most
     """
 
     duration: float
     law: TimeLaw
     curve: Curve
+    misses: Reals
 
     def joints(self, t: Reals) -> Rates:
         """Angles (rad), velocities (rad/s) and accelerations (rad/s^2) at times (...,) in s; each (..., 6)."""
@@ -421,6 +425,7 @@ def segment_path(
     ]
     starts, ends = np.append(0.0, blends) / sizes, 1 - np.append(blends, 0.0) / sizes
     pieces: list[_Piece] = []
+    misses = np.zeros(2)
     for k, part in enumerate(segments):
         origin, u = part.T_start[:3, :3], np.array([starts[k], ends[k]])
         if u[1] - u[0] > RUNS_ON:
@@ -433,6 +438,8 @@ def segment_path(
             after = _beside(onward, starts[k + 1], sizes[k + 1], starts[k + 1])
             span = 2 * blends[k]
             pieces.append(_Piece(span, joining(before, after, span), onward.T_start[:3, :3]))
+            off = _midway(pieces[-1].coefficients) - np.append(onward.T_start[:3, 3], np.zeros(3))
+            misses = np.maximum(misses, [np.linalg.norm(off[:3]), np.linalg.norm(off[3:])])
     law, duration = _timed(sizes, np.asarray(blends) == 0, np.array(runs_on, bool), timing, ramp)
     return SegmentPath(
         duration=duration,
@@ -443,6 +450,7 @@ def segment_path(
         arc_shares=np.array([piece.arc_shares for piece in pieces]),
         turned=float(sum(part.turned for part in segments)),
         turns=tuple((k + 1, axis) for k, part in enumerate(segments) for _, axis in part.half_turns()),
+        misses=misses,
     )
 
 
@@ -457,7 +465,7 @@ def joint_sequence(points: Reals, blends: Reals, timing: float | Times, ramp: fl
     rates = steps / sizes[:, None]
     runs_on = np.abs(np.diff(rates, axis=0)).max(axis=1) < RUNS_ON
     spans, coefficients = [], []
-    still = np.zeros(points.shape[1])
+    still = misses = np.zeros(points.shape[1])
     cut = np.concatenate([[0.0], blends, [0.0]])
     for k in range(len(steps)):
         a, b = points[k] + cut[k] * rates[k], points[k + 1] - cut[k + 1] * rates[k]
@@ -470,8 +478,15 @@ def joint_sequence(points: Reals, blends: Reals, timing: float | Times, ramp: fl
             span = 2 * cut[k + 1]
             spans.append(span)
             coefficients.append(joining((b, rates[k], still), (onward, rates[k + 1], still), span))
+            misses = np.maximum(misses, np.abs(_midway(coefficients[-1]) - points[k + 1]))
     law, duration = _timed(sizes, np.asarray(blends) == 0, runs_on, timing, ramp)
-    return JointSequence(duration, law, _curve(spans, coefficients))
+    return JointSequence(duration, law, _curve(spans, coefficients), misses)
+
+
+def _midway(coefficients: Reals) -> Reals:
+    """Value (k,) of a piece in its middle."""
+    found: Reals = 0.5 ** np.arange(POWERS) @ coefficients
+    return found
 
 
 def _check(sizes: Reals, blends: Reals, unit: float, name: str) -> None:

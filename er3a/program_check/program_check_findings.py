@@ -538,7 +538,7 @@ NOTES = frozenset(
             "turn_speed_not_given",
             "load_not_examined",
         ),
-        *("both_sides_checked", "program_form_inferred", "program_other_encoding"),
+        *("both_sides_checked", "program_form_inferred", "program_other_encoding", "program_rows_from_rest"),
     )
 )
 
@@ -551,6 +551,8 @@ def level_of(finding: CheckFinding) -> Level:
         return "fail"
     if isinstance(finding, ArcGoesOn):
         return "caution" if finding.turns or finding.angle_deg is None else "note"
+    if isinstance(finding, TargetNotGiven) and finding.reason == "turns_with_arc":  # the program is not at fault
+        return "caution"
     if isinstance(finding, FrameNotGiven):
         return "fail" if finding.needed else "caution"
     if isinstance(finding, TargetOutOfReach | StretchOutOfReach) and finding.carried:

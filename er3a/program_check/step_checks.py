@@ -1142,7 +1142,7 @@ def _said(motion: instructions.ArmMotion) -> list[found_in.CheckFinding]:
     rates = [rate.value for rate in (motion.speed, motion.acceleration) if rate is not None and rate.unit == "share"]
     if rates and max(rates) > 1 + TOLERANCE:
         found.append(found_in.MoreThanFullSpeed(100 * max(rates)))
-    if motion.kind == "spline":
+    if motion.kind == "spline" or (motion.kind == "joint" and motion.spline_block is not None):
         found.append(found_in.SplineAsLine())
     if motion.left_out:
         found.append(found_in.PositionCompleted(motion.left_out))

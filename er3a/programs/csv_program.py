@@ -4,7 +4,8 @@ Columns, in this order: ``t_s`` (from 0, rising); ``q1_deg``, ``q2_deg`` ..., th
 (``q3_mm`` of one that slides); ``x_mm, y_mm, z_mm`` and
 ``roll_deg, pitch_deg, yaw_deg``, the tool in the base frame with R = Rz(yaw) Ry(pitch) Rx(roll). The arm goes where the
 joints are; a check compares the poses with them. Poses (or their angles) and ``t_s`` may be left out, and other columns
-are named as not understood. Lines that begin with ``#`` are comments.
+are named as not understood. Lines that begin with ``#`` are comments. Columns may be separated by semicolons or tabs,
+and numbers then be written with decimal commas.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from er3a.numerics.arrays import Reals
 from er3a.programs.code_builder import CodeBuilder
 from er3a.programs.instructions import ArmMotion, JointTarget, Place, Rate
 from er3a.programs.lexing import ProgramText
-from er3a.programs.program_findings import NothingMoves, NotUnderstood, ProgramFinding
+from er3a.programs.program_findings import NothingMoves, NotUnderstood, ProgramFinding, RowsFromRest
 from er3a.programs.program_language import Language
 from er3a.programs.rpl.dialect import RplDialect
 from er3a.programs.syntax import Fixed, Program
@@ -69,15 +70,21 @@ def read_csv_program(source: ProgramText) -> Program:
         for a column that is missing, a value that is not a finite number, times that do not rise
     """
     kept = [(i, line) for i, line in enumerate(source.lines, 1) if line.strip() and not line.startswith("#")]
-    rows = [next(csv.reader((line,))) for _, line in kept]  # each by itself: no quote goes on over lines
-    if not rows:
+    if not kept:
         raise InputError(source.path, None, "holds no rows", "Give the columns q1_deg, q2_deg ...")
+    mark = next((each for each in ";\t" if each in kept[0][1] and "," not in kept[0][1]), ",")
+    rows = [next(csv.reader((line,), delimiter=mark)) for _, line in kept]  # no quote goes on over lines
+    if mark != ",":
+        rows = _with_points(source, rows)
     head = [name.strip() for name in rows[0]]
     twice = next((name for name in head if head.count(name) > 1), None)
     units = {int(match[1]): match[2] for name in head if (match := JOINT_COLUMN.match(name))}
     names = tuple(f"q{i}_{units.get(i, 'deg')}" for i in range(1, max(units, default=1) + 1))
     slides = np.array([name.endswith("_mm") for name in names])
     missing = next((name for name in names if name not in head), None)
+    if not units:
+        problem = f"no joint is named by the first row ({', '.join(head)[:40]})"
+        raise InputError(source.path, f"line {kept[0][0]}", problem, "Give a header of columns q1_deg, q2_deg ...")
     if twice or missing:
         problem = f"the column {twice or missing} is {'there twice' if twice else 'missing'}"
         raise InputError(source.path, f"line {kept[0][0]}", problem, f"Give {', '.join(names)} once each")
@@ -104,7 +111,12 @@ def read_csv_program(source: ProgramText) -> Program:
         builder.add(Fixed(place, ArmMotion("joint", target, "row", speed=speed)))
     other = [name for name in head if name not in (*names, TIME, *stated)]
     unread = [NotUnderstood(f"the column {name[:40]}", Place(source.path, kept[0][0])) for name in other]
-    findings: tuple[ProgramFinding, ...] = (*source.findings, *unread, *(() if table else (NothingMoves(),)))
+    streamed = timed is not None and len(table) > 2
+    findings: tuple[ProgramFinding, ...] = (
+        *(*source.findings, *unread),
+        *((RowsFromRest(Place(source.path, kept[0][0])),) if streamed else ()),
+        *(() if table else (NothingMoves(),)),
+    )
     routine = builder.routine(Place(source.path, len(source.lines)))
     return Program(
         *("csv", source.path.stem, source.path, {"MAIN": routine}, "MAIN"),
@@ -112,6 +124,15 @@ def read_csv_program(source: ProgramText) -> Program:
         slides=tuple(slides.tolist()),
         lines=source.lines,
     )
+
+
+def _with_points(source: ProgramText, rows: list[list[str]]) -> list[list[str]]:
+    """Rows with decimal points, of a table in which commas separate nothing."""
+    comma, point = (next((text for row in rows[1:] for text in row if mark in text), "") for mark in ",.")
+    if comma and point:
+        problem = f"decimal commas and points in one table ('{comma[:40]}', '{point[:40]}')"
+        raise InputError(source.path, None, problem, "Write all numbers with a point")
+    return [[text.replace(",", ".") for text in row] for row in rows]
 
 
 def _stated(numbers: list[float]) -> Reals | None:
@@ -144,5 +165,5 @@ def _numbers(source: ProgramText, line: int, row: list[str], columns: list[int],
     return found
 
 
-SIGN = re.compile(r"(?m)^[^#\n]*\bq1_(?:deg|mm)\b[^\n]*,")
+SIGN = re.compile(r"(?m)^[^#\n]*\bq1_(?:deg|mm)\b[^\n]*[,;\t]")
 CSV = Language("CSV", (".csv",), SIGN, read_csv_program, RplDialect, writer=None, joints=None)

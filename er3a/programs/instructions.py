@@ -41,7 +41,13 @@ RateUnit = Literal["m/s", "m/s2", "rad/s", "rad/s2", "share", "s"]
 ZoneKind = Literal["fine", "distance", "angle", "share", "velocity", "named"]
 MotionKind = Literal["joint", "line", "arc", "spline"]
 Unresolved = Literal[
-    "undefined", "not_finite", "position_unknown", "external_tool", "not_understood", "too_many_joints"
+    "undefined",
+    "not_finite",
+    "position_unknown",
+    "external_tool",
+    "not_understood",
+    "too_many_joints",
+    "turns_with_arc",
 ]
 
 

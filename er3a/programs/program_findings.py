@@ -47,12 +47,25 @@ class OtherEncoding(Finding, code="program_other_encoding"):
     encoding: str
 
 
+class RowsFromRest(Finding, code="program_rows_from_rest"):
+    """The rows of a table over time were taken as moves from rest to rest, each in its time."""
+
+    place: Place
+
+
 class NothingMoves(Finding, code="program_nothing_moves"):
     """No instruction of the program moves the arm."""
 
 
 ProgramFinding = (
-    DataFileMissing | NameTwice | NotUnderstood | NotSimulated | FormInferred | OtherEncoding | NothingMoves
+    DataFileMissing
+    | NameTwice
+    | NotUnderstood
+    | NotSimulated
+    | FormInferred
+    | OtherEncoding
+    | RowsFromRest
+    | NothingMoves
 )
 
 
@@ -140,6 +153,13 @@ class WrittenNearAssumed(Finding):
     margin_mm: float
 
 
+class WrittenBesidePoints(Finding):
+    """The path that was checked passes beside its points, to which the program may go."""
+
+    path: str
+    missed: str
+
+
 WriteFinding = (
     ArcsSplit
     | ZonesDropped
@@ -154,4 +174,5 @@ WriteFinding = (
     | NotTranslated
     | WrittenUnsafe
     | WrittenNearAssumed
+    | WrittenBesidePoints
 )

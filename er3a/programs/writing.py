@@ -616,6 +616,9 @@ def head_line(finding: program_findings.WriteFinding) -> str:
         case program_findings.WrittenNearAssumed(path=path, clearance_mm=clearance, margin_mm=margin):
             near = f"clear by {clearance:.1f} mm of assumed shapes only, which may be wrong by {margin:g} mm"
             return f"NOT SETTLED: the path {ascii_text(path)} is {near}"
+        case program_findings.WrittenBesidePoints(path=path, missed=missed):
+            corners = f"rounds its corners by up to {missed} beside its points"
+            return f"NOT SETTLED: the checked path {ascii_text(path)} {corners}; a controller may go to the points"
         case program_findings.NotTranslated(instructions=count):
             return f"{count} instruction(s) of the other language as comments"
 

@@ -121,6 +121,9 @@ def test_rounding_passes_the_corner_as_the_formula_says(degrees):
     path = segment_path([line(a, b, 1), line(b, c, 1)], np.array([0.08]), 1.0)
     passed = np.linalg.norm(path.poses(np.array(0.5))[:3, 3] - b[:3, 3])
     np.testing.assert_allclose(passed, 3 / 8 * 0.08 * np.sin(g / 2), rtol=1e-9)
+    np.testing.assert_allclose(path.misses, [passed, 0.0], atol=1e-12)
+    back = joint_sequence(np.array([[0.0, 0.2], [1.0, 0.2], [0.0, 0.2]]), np.array([0.5]), 1.0)
+    np.testing.assert_allclose(back.misses, [3 / 8 * 0.5, 0.0])
 
 
 def test_sharp_corner_is_a_halt_and_a_straight_one_is_none():

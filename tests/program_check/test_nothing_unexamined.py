@@ -17,7 +17,7 @@ from er3a.errors import InputError
 from er3a.files.scene_file import load_scene
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
-from er3a.pipeline.messages.programs import say
+from er3a.pipeline.messages.programs import remedy_at, say
 from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.programs.csv_program import write_csv
 from er3a.programs.instructions import JointTarget, NamedFrame, UnresolvedTarget, numbers_of
@@ -1389,3 +1389,33 @@ def test_what_a_routine_beside_the_program_changes_by_reference_has_no_value(tmp
 def test_external_axes_are_named_in_every_motion(tmp_path, motion, named):
     found = check(tmp_path, krl(f"{AT_START}LIN {{X 400,Y 0,Z 300,{DOWN}}}\n{motion}"), "a.src")
     assert ("external_axes_left_out" in codes(found)) == named
+
+
+@pytest.mark.parametrize("value", ["[0,0,0.1,0,0,0]", '"x"', "1", "True", "p[0,0,read_input_float_register(0),0,0,0]"])
+def test_a_tool_of_urscript_that_is_no_pose_is_not_the_flange(tmp_path, value):
+    body = f"set_tcp(p[0,0,0.2,0,0,0])\nset_tcp({value})\nmovel(p[0.3,0,0.4,3.14,0,0], a=1.2, v=0.05)\n"
+    found = check(tmp_path, body, "a.script")
+    assert codes(found)["frame_not_given"] == [3]
+    assert found.verdicts[-1].level == "fail"
+
+
+def test_an_arc_whose_tool_turns_with_it_by_half_a_turn_or_more_is_not_examined(tmp_path):
+    """The program is right: the manual has it. Of less than half a turn it is followed."""
+    line = "set_tcp(p[0,0,0,0,0,0])\nmovel(p[0.4,0,0.4,3.14159,0,0])\nmovec(p[0.45,{y},0.4,3.14159,0,0],{end},mode=1)\n"
+    short = check(tmp_path, line.format(y=0.02, end="p[0.5,0,0.4,3.14159,0,0]"), "a.script")
+    assert "target_not_given" not in codes(short)
+    found = check(tmp_path, line.format(y=0.15, end="p[0.5,0,0.4,3.14159,0,0]"), "a.script")
+    (each,) = (each for each in found.findings if each.finding.code == "target_not_given")
+    assert (each.level, each.finding.reason) == ("caution", "turns_with_arc")
+    assert [each.place.line for each in found.not_examined if each.what == "motion"] == [3]
+    assert remedy_at(each) == "Write the arc as several of less than half a turn each."
+
+
+def test_how_a_spline_of_joint_moves_bends_is_not_examined(tmp_path):
+    body = (
+        "PTP_SPLINE\nSPTP {A1 5,A2 -10,A3 -10,A4 0,A5 -70,A6 0}\nSPTP {A1 9,A2 -20,A3 -10,A4 0,A5 -70,A6 0}\nENDSPLINE"
+    )
+    found = check(tmp_path, krl(f"{body}\nSPTP {{A1 5,A2 -10,A3 -10,A4 0,A5 -70,A6 0}}"), "a.src")
+    lines = codes(found)["spline_as_line"]
+    assert len(lines) == 2
+    assert [each.level for each in found.verdicts][-3:] == ["caution", "caution", "note"]  # of the speed

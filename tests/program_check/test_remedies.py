@@ -241,6 +241,7 @@ MENDED = {
     "spline_as_line": (
         krl(AT_HOME, "SPLINE", "SPL {A1 5,A2 -10,A3 -10,A4 0,A5 -70,A6 0}", "ENDSPLINE"),
         krl(AT_HOME, "SPLINE", "SLIN {A1 5,A2 -10,A3 -10,A4 0,A5 -70,A6 0}", "ENDSPLINE"),
+        krl(AT_HOME, "SPTP {A1 5,A2 -10,A3 -10,A4 0,A5 -70,A6 0}"),
     ),
     "zone_without_size": (RPL.format(**WORDS | {"zone": "wide"}), RPL.format(**WORDS | {"zone": "z1"})),
     "arc_has_no_circle": (
@@ -344,6 +345,7 @@ MENDED = {
     "waits_for_others": (
         (krl("N=0", "WAIT FOR N==1", "PTP {A1 N}"), {"data": "INT N=0"}),
         (krl("N=0", "WAIT FOR $IN[1]", "N=1", "PTP {A1 N}"), {"data": "INT N=0"}),
+    ),
     "errors_not_followed": (
         rapid("MoveAbsJ [[0,-10,-10,0,-70,5],[9E9,9E9,9E9,9E9,9E9,9E9]],v50,fine,tool0;", "ERROR", "TRYNEXT;"),
         rapid("MoveAbsJ [[0,-10,-10,0,-70,5],[9E9,9E9,9E9,9E9,9E9,9E9]],v50,fine,tool0;", "ERROR", "EXIT;"),

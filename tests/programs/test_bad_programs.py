@@ -46,6 +46,8 @@ LIMITS = RunLimits(operations=20_000, ways=50, rounds=20)
         ("a.script", "def a():\n  while (True):\nend\n", "has no end"),
         ("a.script", "end\n", "without a beginning"),
         ("a.csv", "t_s,q1_deg,q3_deg\n0,1,2\n", "q2_deg is missing"),
+        ("a.csv", "0,0,-10\n1,5,-10\n", "no joint is named by the first row (0, 0, -10)"),
+        ("a.csv", "t_s;q1_deg;q2_deg\n0;1,000;2.5\n", "decimal commas and points in one table ('1,000', '2.5')"),
         ("a.csv", "t_s,q1_deg,q2_deg\n0,0,-10\n1,1,5,-10,5\n", "5 cells under 3 headings"),
         ("a.csv", "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n0,0,nan,0,0,0\n", "not a finite number"),
         ("a.csv", "t_s,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n1,0,0,0,0,0,0\n1,0,0,0,0,0,0\n", "must rise"),

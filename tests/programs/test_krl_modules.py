@@ -82,3 +82,28 @@ def test_points_of_the_controller_are_found_from_each_folder_of_an_archive(tmp_p
     (tmp_path / "R1/System/$config.dat").write_text(config)
     (move,) = motions(tmp_path / folder, "DEF a( )\nPTP XHOME\nEND\n", "a.src")
     np.testing.assert_allclose(np.degrees(move.target.joints), [1, -10, 10, 0, -60, 0])
+
+
+@pytest.mark.parametrize("public", [True, False])
+def test_what_another_modules_data_declare_for_all_is_known(cell, public):
+    """Also of one that the program does not call; its own data file is not missing for that."""
+    alone, spread = cell.with_name("alone.src"), cell.with_name("points.dat")
+    alone.write_text("DEF ALONE( )\nPTP SPREAD\nEND\n")
+    head = f"DEFDAT POINTS{' PUBLIC' * public}\n"
+    spread.write_text(f"{head}DECL GLOBAL AXIS SPREAD={{A1 7,A2 0,A3 0,A4 0,A5 20,A6 0}}\nDECL AXIS HIDDEN\nENDDAT\n")
+    check = check_program(read_program(alone), load_robot("er3a_c60"), CheckOptions(start=np.zeros(6), measures=False))
+    codes = {each.finding.code for each in check.findings}
+    assert ({"target_not_given", "program_data_file_missing"} <= codes) != public
+    assert ("target_not_given" in codes) != public
+    assert (spread in files_of(alone)) == public
+    cell.with_name("setter.src").write_text("DEF SETTER( )\nSPREAD.A1=50\nEND\n")
+    check = check_program(read_program(alone), load_robot("er3a_c60"), CheckOptions(start=np.zeros(6), measures=False))
+    assert ("set_elsewhere" in {each.finding.code for each in check.findings}) == public
+
+
+def test_a_name_that_two_data_files_declare_for_all_is_told(cell):
+    for number in (1, 2):
+        text = f"DEFDAT P{number} PUBLIC\nDECL GLOBAL AXIS SPREAD={{A1 {number},A2 0,A3 0,A4 0,A5 20,A6 0}}\nENDDAT\n"
+        cell.with_name(f"p{number}.dat").write_text(text)
+    found = read_program(cell).findings
+    assert [(each.code, each.name) for each in found] == [("program_name_twice", "SPREAD")]

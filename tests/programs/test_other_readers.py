@@ -205,6 +205,16 @@ def test_a_table_over_time_is_written_and_read(tmp_path):
     poses = np.array([line.split(",")[7:10] for line in text.splitlines()[2:]], float)
     np.testing.assert_allclose(poses, forward(ROBOT, joints)[:, :3, 3] * 1000, atol=0.51e-6)
     assert said(execution)[1].speed.value == pytest.approx(3 / 19, abs=1e-6)
+    assert [each.code for each in execution.program.findings] == ["program_rows_from_rest"]
+
+
+@pytest.mark.parametrize("mark", [";", "\t"])
+def test_a_table_is_read_as_spreadsheets_write_it(tmp_path, mark):
+    rows = ["t_s,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg", "0,0,-10.5,-10,0,-70,0", "1,5.25,-10,-10,0,-70,0"]
+    text = "\n".join(row.replace(",", mark).replace(".", ",") for row in rows)
+    execution = run(tmp_path, "a.csv", text)
+    points = np.degrees([each.target.joints for each in said(execution)])
+    np.testing.assert_allclose(points, [[0, -10.5, -10, 0, -70, 0], [5.25, -10, -10, 0, -70, 0]])
 
 
 def test_a_changed_solution_or_element_is_not_taken_for_the_old_one(tmp_path):

@@ -67,9 +67,18 @@ TEXTS = texts(
         "left_out.strategies": "avoidance strategies that the study does not ask for",
         "left_out.program_lines": "lines of programs that were not examined, or not each time",
         "left_out.program_rest": "lines of programs that may move the arm but belong to no path checked",
+        "left_out.program_doubts": (
+            "what the check of programs finds beside reach, limits, speeds and collisions (by its codes, with lines): "
+            "the paths that are made of programs do not show it"
+        ),
         "left_out.given_rates": (
             "velocities, accelerations and efforts that trajectory files give: between the points, motions are laid "
             "by positions and times alone, and a controller that follows the given rates moves otherwise there"
+        ),
+        "left_out.missed_rows": (
+            "the points of tables that the motion passes beside, by up to so much: corners are rounded over half of "
+            "the shorter side, as neither blend_mm nor blend_deg is given (0 stops at each point), and a controller "
+            "that goes to the points or blends otherwise moves elsewhere"
         ),
         "left_out.program_starts": "motions from where the arm is not known to stand",
         "left_out.program_again": (

@@ -54,6 +54,7 @@ REASONS: dict[Unresolved, str] = {
     "external_tool": N_("the workpiece is moved along a fixed tool, which is not supported"),
     "not_understood": N_("it is not understood"),
     "too_many_joints": N_("it refers to axes that the arm does not have"),
+    "turns_with_arc": N_("how the tool turns with an arc of half a turn or more is not followed"),
 }
 NEARER = N_("Move the target or the workpiece nearer to the arm, or tilt the tool towards the arm.")
 OTHER_SOLUTION = N_(
@@ -92,7 +93,6 @@ REMEDIES: dict[str, str] = {
     "program_not_simulated": N_("Check on the controller what this instruction does to the motions after it."),
     "program_form_inferred": N_("Compare this element with what the controller does."),
     "external_axes_left_out": N_("Check by hand that the external axes stand as assumed."),
-    "target_not_given": N_("Give the target in the program or in its data file."),
     "frame_not_given": N_("Map the name to a frame under frames in the file that lists the programs."),
     "frame_taken_as_flange": N_(
         "Map the name to a frame under frames in the file that lists the programs, if a tool is mounted."
@@ -110,7 +110,10 @@ REMEDIES: dict[str, str] = {
     "program_name_twice": N_("Remove one of the two definitions."),
     "program_nothing_moves": N_("Check that this is the program to run."),
     "speed_not_given": N_("Give a speed, as a number above 0, before the motion."),
-    "turn_speed_not_given": N_("Give the speed of the tool's turn: in KRL by $VEL.ORI1 and $VEL.ORI2."),
+    "turn_speed_not_given": N_(
+        "Give the speed of the tool's turn (KRL: $VEL.ORI1 and $VEL.ORI2), or where the language has none, the time "
+        "of the motion (URScript: t)."
+    ),
     "frames_from_robot_file": N_("Set tool and base in the program before its first pose."),
     "position_completed": N_("Give all coordinates of the position."),
     "frame_given_twice": N_("Correct the one that is wrong, or remove it from the frames."),
@@ -124,7 +127,7 @@ REMEDIES: dict[str, str] = {
     "errors_not_followed": N_("End the program in the handler, or watch at low speed what it does after an error."),
     "acceleration_not_known": N_("Give the acceleration as a number."),
     "zone_without_size": N_("Give the zone's size: in mm, or for C_PTP in percent ($APO.CPTP)."),
-    "spline_as_line": N_("Write straight lines of the spline (SLIN)."),
+    "spline_as_line": N_("Write straight lines of the spline (SLIN), or joint moves outside of it (SPTP)."),
     "configuration_not_read": N_("Check on the controller that it takes this solution."),
     "load_not_examined": N_(
         "List the program as a path of a study: its stage dynamics computes torques with a load whose numbers are all "
@@ -136,6 +139,10 @@ SINGULAR: dict[SingularityType, str] = {
     "wrist": N_("Tilt the tool so that J5 stays away from 0."),
     "elbow": N_("Keep the path nearer to the arm, so that it is not stretched."),
     "shoulder": N_("Keep the wrist at a distance from axis 1."),
+}
+TARGETS: dict[Unresolved, str] = {
+    "undefined": N_("Give the target in the program or in its data file."),
+    "turns_with_arc": N_("Write the arc as several of less than half a turn each."),
 }
 STOPPED: dict[EndKind, str] = {
     "drifts": N_(
@@ -229,9 +236,7 @@ TEXTS = texts(
         "zone_too_large": "the zone of {zone_mm:.1f} mm is larger than half of a motion of {motion_mm:.1f} mm",
         "zone_without_size": "the size of the zone {zone} is not known; half of each motion was taken",
         "arc_has_no_circle": "the arc's points do not define a circle",
-        "spline_as_line": (
-            "the spline was checked as a straight line from point to point; how it bends was not examined"
-        ),
+        "spline_as_line": ("the spline was checked as straight from point to point; how it bends was not examined"),
         "external_axes_left_out": "external axes are assumed at rest: {axes:, }",
         "line_not_checked": (
             "the arm has no closed-form inverse: the line was not followed, only its target was checked"
@@ -373,6 +378,11 @@ TEXTS = texts(
         "program_name_twice": "{name} is declared twice; the later one counts",
         "program_not_understood": "not understood: {text}",
         "program_not_simulated": "not simulated: {text}",
+        "program_rows_from_rest": (
+            "each row was checked as a move from rest to rest in its time; an arm that runs through the rows needs less"
+            " speed and acceleration, and may leave the straight way between rows (a study's path of kind table follows "
+            "it as one motion)"
+        ),
         "program_form_inferred": "the structure of <{element}> is not documented; it was read like that of <while>",
         "program_other_encoding": "the file is not UTF-8; it was read as {encoding}",
         "program_nothing_moves": "no instruction moves the arm",
@@ -434,6 +444,10 @@ TEXTS = texts(
         "written_near_assumed": (
             "the path {path} is clear by {clearance_mm:.1f} mm of assumed shapes only, which may be wrong by "
             "{margin_mm:g} mm"
+        ),
+        "written_beside_points": (
+            "the path {path} was checked with rounded corners that pass beside its points by up to {missed}; a "
+            "controller that stops at the points, or blends otherwise, moves elsewhere"
         ),
         "remedy.clear_of_assumed": (
             "Keep {margin:g} mm between {pair}, or give shapes from a drawing or model in the robot's file."
@@ -647,6 +661,11 @@ def _(found: text.WrittenUnsafe) -> str:
 def remedy(finding: Any) -> str:
     """What to do about a finding, as a sentence in the language in use; empty where nothing is to be done."""
     return word("remedy", REMEDIES, finding.code) if finding.code in REMEDIES else ""
+
+
+@remedy.register
+def _(found: found_in.TargetNotGiven) -> str:
+    return word("remedy", TARGETS, found.reason if found.reason in TARGETS else "undefined")
 
 
 @remedy.register

@@ -497,6 +497,7 @@ def _spline(reading: _Statement) -> None:
 
 
 GLOBAL_ROUTINE = re.compile(r"(?im)^\s*GLOBAL\s+DEF(?:FCT\s+\w+(?:\s*\[[^\]]*\])?)?\s+(\w+)")
+PUBLISHED = re.compile(r"(?is)^\s*(?:&[^\n]*\s)*DEFDAT\s+\S+\s+PUBLIC\b.*\bGLOBAL\b")
 GLOBAL_NAME = re.compile(r"(?i)\bGLOBAL\b")
 
 
@@ -588,6 +589,7 @@ def read_krl(source: ProgramText) -> syntax.Program:
     if shared is not None:
         reader.read_data(read_program_text(shared))
     of_controller = dict(reader.signals)
+    findings += reader.read_published(source.path)
     data_file = data_file_of(source.path, ".dat")
     if data_file is not None:
         findings += reader.read_data(read_program_text(data_file))
@@ -653,6 +655,23 @@ class _KrlReader:
                         found.append(NameTwice(each.target.name, each.place))
                     seen[each.target.name] = True
                 self.data.append(each)
+        return found
+
+    def read_published(self, path: Path) -> list[ProgramFinding]:
+        """What ``.dat`` files of modules that a program does not call declare for all modules."""
+        known, found = {variable_of(each.target) for each in self.data}, list[ProgramFinding]()
+        for file in _published(path):
+            other = _KrlReader(read_program_text(file))
+            try:
+                other.read_data(other.source)
+            except InputError:
+                continue  # what it declares has no known value
+            for each in other.data:
+                if GLOBAL_NAME.search(each.text):
+                    name = variable_of(each.target)
+                    found += [NameTwice(name, each.place)] if name in known else []
+                    self.data.append(each)
+            known |= {variable_of(each.target) for each in self.data}
         return found
 
     def read_routines(self) -> list[syntax.Routine]:
@@ -799,7 +818,7 @@ def companions(path: Path) -> tuple[Path, ...]:
     """What belongs to a .src file: the modules that it calls, the points of each, and the controller's own data and
     submit programs; and other modules, where these may set what all know."""
     modules = (*modules_of(path), *_submits(path), *_others(path))
-    data = (data_file_of(module, ".dat") for module in (path, *modules))
+    data = (*(data_file_of(module, ".dat") for module in (path, *modules)), *_published(path))
     return tuple(file for file in (*modules, *data, shared_data_of(path), _machine_data(path)) if file is not None)
 
 
@@ -810,7 +829,7 @@ def modules_of(path: Path) -> tuple[Path, ...]:
     that they move nothing, those are read that set what motions use, or that people edit.
     """
     known: dict[str, Path] = {}
-    for each in _all_modules(path):
+    for each in _of_controller(path, ".src"):
         name = each.stem.upper()
         if each.parent == path.parent or name in OF_CONTROLLER or name not in HARMLESS:
             known.setdefault(name, each)
@@ -825,15 +844,15 @@ def modules_of(path: Path) -> tuple[Path, ...]:
     return tuple(found)
 
 
-def _all_modules(path: Path) -> list[Path]:
-    """The modules of the controller that a program is for: those beside it, then all others of its archive."""
+def _of_controller(path: Path, suffix: str) -> list[Path]:
+    """Files of the controller that a program is for: those beside it, then all others of its archive."""
     above = list(path.resolve().parents)[:DEEPEST]
     archive = next((folder for folder in above if any((folder / each).is_dir() for each in OF_ARCHIVE)), None)
     beside = sorted(path.parent.iterdir())
     others = sorted(archive.rglob("*")) if archive else []
     here = path.parent.resolve()
     found = (*beside, *(each for each in others if each.parent != here))
-    return [each for each in found if each.suffix.lower() == ".src" and each.is_file()]
+    return [each for each in found if each.suffix.lower() == suffix and each.is_file()]
 
 
 def shared_data_of(path: Path) -> Path | None:
@@ -861,6 +880,13 @@ def _robot_root(path: Path) -> Iterable[ProgramFinding]:
                 yield NotSimulated(match[0].strip(), Place(file, number))
 
 
+def _published(path: Path) -> tuple[Path, ...]:
+    """The ``.dat`` files that declare for all modules, but for those of modules that are read."""
+    modules = {path.stem.upper(), *(each.stem.upper() for each in modules_of(path)), "$CONFIG"}
+    others = (each for each in _of_controller(path, ".dat") if each.stem.upper() not in modules)
+    return tuple(each for each in others if PUBLISHED.search(read_program_text(each).text))
+
+
 def _submits(path: Path) -> tuple[Path, ...]:
     """Programs that a controller runs beside the robot's: beside a program, or as in an archive."""
     beside = [each for each in sorted(path.parent.iterdir()) if each.suffix.lower() == ".sub" and each.is_file()]
@@ -871,10 +897,11 @@ def _submits(path: Path) -> tuple[Path, ...]:
 def _others(path: Path) -> tuple[Path, ...]:
     """Modules of the same controller that a program does not call; none where all modules share no variable."""
     own = data_file_of(path, ".dat")
-    if shared_data_of(path) is None and (own is None or not GLOBAL_NAME.search(read_program_text(own).text)):
+    has_own = own is not None and GLOBAL_NAME.search(read_program_text(own).text)
+    if shared_data_of(path) is None and not has_own and not _published(path):
         return ()
     called = {path, *modules_of(path)}
-    return tuple(each for each in _all_modules(path) if each not in called)
+    return tuple(each for each in _of_controller(path, ".src") if each not in called)
 
 
 def _in_archive(path: Path, names: Iterable[str], inside: str = "System") -> Path | None:

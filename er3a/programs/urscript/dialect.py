@@ -250,10 +250,14 @@ class UrScriptDialect(Dialect):
         keywords = {key: memory.value(each) for key, each in call.keywords}
         if call.function == "set_tcp":
             given = _placed(("pose", "tcp_name"), values, keywords)
-            if given is None or "pose" not in given:
+            pose = None if given is None else given.get("pose")
+            if given is None or not isinstance(pose, (syntax.Record, syntax.Unclear)):
                 memory.write("%tcp", syntax.Unclear(doing.text))
                 return instructions.Unknown(doing.text)
-            memory.write("%tcp", given["pose"])
+            memory.write(
+                "%tcp",
+                pose if isinstance(pose, syntax.Unclear) or _pose(pose) is not None else syntax.Unclear(doing.text),
+            )
             return None
         if call.function == "set_gravity":
             given = _placed(("d",), values, keywords)
@@ -392,6 +396,8 @@ def _in_mode(
     if syntax.number(mode) == 0:
         return goal
     start = memory.here.seen(_tool(memory), ROBOT_BASE, memory.cell.flange)
+    if isinstance(goal, instructions.UnresolvedTarget):
+        return goal
     if (
         syntax.number(mode) != 1
         or not isinstance(goal, instructions.PoseTarget)
@@ -401,8 +407,10 @@ def _in_mode(
     if start is None:
         return instructions.UnresolvedTarget(text, "position_unknown")
     circle = instructions.centre_and_angle(start[:3, 3], via.pose[:3, 3], goal.pose[:3, 3])
-    if circle is None or circle[2] > HALF_A_TURN:
-        return instructions.UnresolvedTarget(text, "not_understood")
+    if circle is None:
+        return goal
+    if circle[2] > HALF_A_TURN:
+        return instructions.UnresolvedTarget(text, "turns_with_arc")
     pose = goal.pose.copy()
     pose[:3, :3] = scipy.spatial.transform.Rotation.from_rotvec(circle[2] * circle[1]).as_matrix() @ start[:3, :3]
     return instructions.PoseTarget(pose)

@@ -34,6 +34,7 @@ from er3a.pipeline.stages.trajectory import judgement, model
 from er3a.pipeline.stages.trajectory.motion import (
     Motion,
     by_subject,
+    corner_misses,
     limits_of,
     listed_motions,
     planning_of,
@@ -295,6 +296,7 @@ def path_summary(
     slots = [] if followed is None else [int(slot) for slot in dict.fromkeys(followed.slot) if slot >= 0]
     contacts = judgement.collisions(along)
     speed, acceleration = found.max_rates or (None, None)
+    missed_mm, missed_deg = corner_misses(robot, motion.built)
     return model.PathSummary(
         name=entry.name,
         title=entry.title,
@@ -307,8 +309,8 @@ def path_summary(
         length_m=float(motion.way(motion.samples[-1:])[0]),
         branches=tuple(labels[slot] for slot in slots),
         half_turns=_half_turns(motion),
-        corner_deviation_mm=_greatest(1000 * np.asarray(getattr(motion.built.tool, "deviation", []))),
-        corner_deviation_deg=_greatest(np.degrees(getattr(motion.built.joints, "deviation", []))),
+        corner_deviation_mm=missed_mm or None,
+        corner_deviation_deg=missed_deg or None,
         repeated_rows=tuple(motion.built.repeated_rows),
         sliding=tuple((np.flatnonzero(robot.slides) + 1).tolist()),
         start_turn_deg=None if followed is None else tuple(np.degrees(followed.start_turn).tolist()),
@@ -362,10 +364,6 @@ def _stretches(motion: Motion, intervals: Iterable[Interval[model.CauseT]]) -> t
         s0, s1 = (float(value) for value in motion.way(np.array([interval.start, interval.end])))
         found.append(model.Stretch(interval.start, interval.end, s0, s1, interval.cause, interval.worst))
     return tuple(found)
-
-
-def _greatest(values: Reals) -> float | None:
-    return float(values.max()) if values.size else None
 
 
 def compute(study: Study, name: str) -> model.TrajectoryResults:

@@ -274,6 +274,7 @@ class PathSummary:
     start_turn_deg : by which the arm turns at rest before it starts; None in joint space
     too_fast : where a joint exceeds a limit of speed, acceleration or jerk
     undecided : where the bounds between the poses that are solved leave something open
+    corner_deviation_mm, corner_deviation_deg : by how much rounded corners miss their points at most
     max_joint_speed_deg_s, max_joint_speed_ratio, max_joint_acceleration_ratio : None where speeds have no bound; speeds
         of prismatic joints (``sliding``, from 1) in mm/s
     velocity_check_deg_s : largest difference of joint velocities by the Jacobian and by differences of angles

@@ -28,18 +28,25 @@ from er3a.planning.follow import Followed
 from er3a.planning.moves import JointMove
 from er3a.planning.names import PathVerdict
 from er3a.planning.piecewise import Polynomials
-from er3a.planning.sequences import JointSequence
+from er3a.planning.sequences import TURN_LENGTH, JointSequence, SegmentPath
 from er3a.planning.timing import JointLimits, joint_limits, standing, straight
 from er3a.planning.tool_proof import ProofRequirements, ToolProof, follow_and_prove
 from er3a.planning.way_around import NoWayAround, PlannedMove, PlanningTask, WayAround, way_between
-from er3a.program_check.check_program import CheckOptions, ProgramPart, check_program, parts_of
+from er3a.program_check.check_program import CheckOptions, ProgramPart, check_program, doubts_of, parts_of
 from er3a.programs.languages import read_program
+from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 
 
 @dataclass(frozen=True, eq=False)
 class PartOfProgram:
-    """A stretch of a program as an entry of a path file; ``rest``: lines that no stretch of the program holds."""
+    """A stretch of a program as an entry of a path file.
+
+    Attributes
+    ----------
+    rest : lines that no stretch of the program holds
+    doubts : what the program's check finds that its stretches do not show
+    """
 
     name: str
     title: str
@@ -47,6 +54,7 @@ class PartOfProgram:
     expected: tuple[PathVerdict, ...]
     part: ProgramPart
     rest: tuple[int, ...]
+    doubts: tuple[str, ...] = ()
 
     @property
     def kind(self) -> Literal["joint_sequence", "sequence"]:
@@ -75,15 +83,45 @@ def planned_entries(robot: Robot, entry: PathEntry | ProgramPath, source: Comman
     start = None if entry.start_deg is None else np.radians(entry.start_deg)
     check = check_program(read_program(entry.program), robot, CheckOptions(start=start, measures=False))
     parts, rest = parts_of(check, robot, source)
+    doubts = doubts_of(check, rest)
     for number, part in enumerate(parts, 1):
         name = f"{entry.name}_{number}" if len(parts) > 1 else entry.name
         first, last = part.lines
         title = f"{entry.title}, lines {first} to {last}" if last > first else f"{entry.title}, line {first}"
-        yield PartOfProgram(name, title, entry.samples, entry.expected, part, rest)
+        yield PartOfProgram(name, title, entry.samples, entry.expected, part, rest, doubts)
 
 
 FOLLOWED_AT = 1030  # times at which a path of the tool is solved at least: its branches depend on no samples
 EQUAL_TIMES = 1e-12  # share of the duration
+MISSED = 1.0  # mm, from which a corner that passes beside its point is said to miss it
+MISSED_DEG = 0.1  # likewise of joints: about as much at half a metre
+
+
+def corner_misses(robot: Robot, built: Built) -> tuple[float, float]:
+    """By how much rounded corners miss their points at most: mm, and deg of the tool or of the joint that does most."""
+    if isinstance(built.tool, SegmentPath):
+        return float(1000 * built.tool.misses[0]), float(np.degrees(built.tool.misses[1]))
+    if not isinstance(built.joints, JointSequence):
+        return 0.0, 0.0
+    of_joints = shown(robot, built.joints.misses)
+    far, turned = (float(of_joints[kind].max(initial=0.0)) for kind in (robot.slides, ~robot.slides))
+    return far, turned
+
+
+def missed_points(robot: Robot, built: Built) -> str:
+    """By how much rounded corners pass beside their points, with unit; empty if by little.
+
+    A turn of the tool counts as in :data:`er3a.planning.sequences.TURN_LENGTH`.
+    """
+    far, turned = corner_misses(robot, built)
+    least = MISSED_DEG if built.tool is None else float(np.degrees(MISSED / 1000 / TURN_LENGTH))
+    parts = (f"{far:.3g} mm" if far > MISSED else "", f"{turned:.3g} deg" if turned > least else "")
+    return ", ".join(filter(None, parts))
+
+
+def rows_missed(robot: Robot, built: Built) -> str:
+    """The same of the rows of a table whose corners nobody asked to be rounded."""
+    return missed_points(robot, built) if built.unasked else ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -379,7 +417,9 @@ def listed_motions(
             ends[entry.name] = ends[listed.name] = end
             parts: tuple[tuple[LeftOutSubject, Sequence[object]], ...] = (
                 ("program_rest", entry.rest if isinstance(entry, PartOfProgram) else ()),
+                ("program_doubts", entry.doubts if isinstance(entry, PartOfProgram) else ()),
                 ("given_rates", motion.built.unread if motion else ()),
+                ("missed_rows", tuple(filter(None, [motion and rows_missed(task.robot, motion.built)]))),
             )
             rest = tuple(LeftOut(of, (f"{listed.name}: {', '.join(map(str, own))}",)) for of, own in parts if own)
             yield ListedMotion(listed.name, entry.name, entry.title, entry.expected, motion, ended, rest)

@@ -10,14 +10,20 @@ from er3a.collision.shapes import shapes_assumed
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.stages.trajectory.model import AvoidanceRows, MinClearance, ProgramFiles
-from er3a.pipeline.stages.trajectory.motion import Motion, PartOfProgram
+from er3a.pipeline.stages.trajectory.motion import Motion, PartOfProgram, missed_points, rows_missed
 from er3a.planning.commands import CommandSource, JointTableCommand, PlanCommand, ToolMoveCommand
 from er3a.planning.names import PathVerdict
 from er3a.planning.profiles import Times
 from er3a.programs.csv_program import write_csv
 from er3a.programs.from_commands import listing_of
 from er3a.programs.languages import not_written, write_program
-from er3a.programs.program_findings import SpeedsOfAssumed, WriteFinding, WrittenNearAssumed, WrittenUnsafe
+from er3a.programs.program_findings import (
+    SpeedsOfAssumed,
+    WriteFinding,
+    WrittenBesidePoints,
+    WrittenNearAssumed,
+    WrittenUnsafe,
+)
 from er3a.programs.program_names import LanguageName
 from er3a.programs.writing import HEAD, WriteOptions, ascii_text, head_line, program_name
 from er3a.robots.joint_limits import joint_columns, meant, shown
@@ -70,7 +76,9 @@ def written(
         ends = None
     load = motion.entry.part.load if isinstance(motion.entry, PartOfProgram) else None
     made = listing_of(command, robot, start, motion.entry.name, motion.entry.title, ends=ends, load=load)
-    options = WriteOptions(robot, start, notes=(*unsafe, *made.findings), head=head, assumed_speed=speed)
+    missed = missed_points(robot, motion.built)
+    beside = (WrittenBesidePoints(motion.entry.name, missed),) if missed else ()
+    options = WriteOptions(robot, start, notes=(*unsafe, *beside, *made.findings), head=head, assumed_speed=speed)
     program = write_program(made.listing, language, options)
     return program.files, program.findings
 
@@ -104,8 +112,9 @@ def program_files(
     rows: list[tuple[str, str, str, str]] = []
     name = program_name(motion.entry.name, LONGEST_NAME)
     allowed = verdict == "safe" or (write_unsafe and np.isfinite(motion.q[0]).all())
+    elsewhere = () if write_unsafe or not rows_missed(robot, motion.built) else set(languages) - {"csv"}
     for language in languages if allowed else ():
-        if not_written(language, robot):
+        if language in elsewhere or not_written(language, robot):
             continue
         files, said = written(robot, motion, verdict, language, near, speed)
         rows += [(language, name + suffix, text, _assumed(said)) for suffix, text in files.items()]
