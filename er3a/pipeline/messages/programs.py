@@ -365,8 +365,8 @@ TEXTS = texts(
         "program_not_simulated": "not simulated: {text}",
         "program_rows_from_rest": (
             "each row was checked as a move from rest to rest in its time; an arm that runs through the rows needs less"
-            " speed and acceleration, and may leave the straight way between rows (a study's path of kind table follows "
-            "it as one motion)"
+            " speed and acceleration, and may leave the straight way between rows (a study's path of kind table is "
+            "followed as one motion)"
         ),
         "program_form_inferred": "the structure of <{element}> is not documented; it was read like that of <while>",
         "program_other_encoding": "the file is not UTF-8; it was read as {encoding}",
