@@ -201,7 +201,7 @@ def _explain(fault: ErrorDetails, model: type[BaseModel]) -> tuple[str, str]:
         close = difflib.get_close_matches(str(key), known, n=1, cutoff=CLOSE)
         hint = f"Did you mean '{close[0]}'?" if close else "Remove it, or check its place in the file"
         if str(key) in known:
-            hint = "It is not known here: check its place in the file, as docs and schema give it"
+            hint = "It belongs elsewhere in the file: check its place"
         return f"unknown key {str(key)!r}", hint
     if kind == "union_tag_invalid":
         return f"'{fault['ctx']['tag']}' is not known", f"Write one of: {fault['ctx']['expected_tags']}".replace(

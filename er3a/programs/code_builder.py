@@ -15,7 +15,7 @@ from typing import Literal
 from er3a.errors import InputError
 from er3a.programs import syntax
 from er3a.programs.instructions import Aside, Place, Remark, Unknown
-from er3a.programs.program_findings import NameTwice, NotUnderstood, ProgramFinding
+from er3a.programs.program_findings import NameTwice, NotSimulated, NotUnderstood, ProgramFinding
 
 MAX_NESTED = 200
 ASSIGNED = re.compile(r"(?:(?:global|local)\s+)?([A-Za-z_$][\w$]*)[^=\"'(]*=(?!=)")
@@ -291,6 +291,7 @@ def fault(place: Place, problem: str, remedy: str) -> InputError:
     return InputError(place.file, place.where, problem, remedy)
 
 
+DECIDED_BY_ONE = ("AND", "OR", "&&", "||")
 Each = Callable[[syntax.Expression], syntax.Expression]
 Changed = Callable[[syntax.Invocation], Iterable[syntax.Expression | None]]
 """What a function outside the program may change of its arguments."""
@@ -314,6 +315,7 @@ def linked(
             by_name[hidden] = replace(former, name=hidden)
         by_name[routine.name] = routine
     found += [finding for routine in by_name.values() for finding in not_understood(routine.code)]
+    found += [finding for routine in by_name.values() for finding in _perhaps_called(routine, by_name)]
     return {
         name: replace(
             routine, code=_linked(routine.code, by_name, changed), handler=_linked(routine.handler, by_name, changed)
@@ -447,6 +449,33 @@ def _calls(expression: syntax.Expression, known: Mapping[str, syntax.Routine]) -
     if isinstance(expression, syntax.Invocation) and expression.function in known:
         return True
     return any(_calls(each, known) for each in syntax.inner(expression))
+
+
+def _perhaps_called(routine: syntax.Routine, known: Mapping[str, syntax.Routine]) -> Iterator[NotSimulated]:
+    """Calls behind ``and`` and ``or`` of routines that do more than to work out a value: whether a controller calls
+    them where what stands before decides is not known, and here they are always called."""
+    for operation in routine.code:
+        perhaps = (side for part in syntax.expressions_of(operation) for side in _second_sides(part))
+        called = {each.function for side in perhaps for each in _invoked(side)} & known.keys()
+        if any(_acts(known[name], known, {name}) for name in called):
+            yield NotSimulated(getattr(operation, "text", "") or ", ".join(sorted(called)), operation.place)
+
+
+def _second_sides(expression: syntax.Expression) -> Iterator[syntax.Expression]:
+    if isinstance(expression, syntax.Binary) and expression.operator.upper() in DECIDED_BY_ONE:
+        yield expression.right
+    for each in syntax.inner(expression):
+        yield from _second_sides(each)
+
+
+def _acts(routine: syntax.Routine, known: Mapping[str, syntax.Routine], seen: set[str]) -> bool:
+    """Whether a routine does more than to work out a value; ``seen`` grows by those that were asked."""
+    if any(isinstance(each, (syntax.Move, syntax.Fixed, syntax.Doing, syntax.Beside)) for each in routine.code):
+        return True
+    parts = (part for operation in routine.code for part in syntax.expressions_of(operation))
+    new = {each.function for part in parts for each in _invoked(part)} & known.keys() - seen
+    seen |= new
+    return any(_acts(known[name], known, seen) for name in new)
 
 
 class _Calls:

@@ -1419,3 +1419,14 @@ def test_how_a_spline_of_joint_moves_bends_is_not_examined(tmp_path):
     lines = codes(found)["spline_as_line"]
     assert len(lines) == 2
     assert [each.level for each in found.verdicts][-3:] == ["caution", "caution", "note"]  # of the speed
+
+
+@pytest.mark.parametrize(
+    ("body", "named"), [("movej({near})", True), ("set_tcp(p[0,0,0.1,0,0,0])", True), ("x=1", False)]
+)
+@pytest.mark.parametrize("word", ["or", "and"])
+def test_a_call_behind_and_or_or_that_does_more_than_compute_is_named(tmp_path, body, named, word):
+    """Here both sides are always worked out; no manual says whether a controller does, where one side decides."""
+    text = f"def lift():\n  {body.format(near=NEAR_TEXT)}\n  return True\nend\nif True {word} lift():\n  y=1\nend\n"
+    found = codes(check(tmp_path, f"{text}movej({FAR_TEXT})\n", "a.script"))
+    assert found.get("program_not_simulated", []) == ([5] if named else [])

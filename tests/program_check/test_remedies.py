@@ -193,6 +193,10 @@ end
 BALL = Scene("ball", (Sphere("ball", transform(np.array([0.46921, -0.09252, 0.41923]), np.zeros(3)), 0.043),))
 DRAWN = ROBOT.replace(sources={**ROBOT.sources, "envelopes": replace(ROBOT.sources["envelopes"], grade="official")})
 GIVEN = "FRAME BASE_DATA[2]\nBASE_DATA[1]={X 0,Y 0,Z 0,A 0,B 0,C 0}"
+SHARED = {
+    "$config.dat": "DEFDAT $CONFIG\nDECL GLOBAL REAL GZ=5.0\nENDDAT\n",
+    "other.src": "DEF other( )\nGZ=9.0\nEND\n",
+}
 LIFTED = transform(np.array([0.0, 0.0, 0.1]), np.zeros(3))
 MENDED = {
     "target_out_of_reach": (krl(f"PTP {{X 3000,Y 0,Z 400,{DOWN}}}"), krl(f"PTP {{X 400,Y 0,Z 400,{DOWN}}}")),
@@ -334,6 +338,10 @@ MENDED = {
         (krl("N=N+5", "PTP {A1 N}"), {"data": "INT N=0"}),
         (krl("N=0", "N=N+5", "PTP {A1 N}"), {"data": "INT N=0"}),
     ),
+    "set_elsewhere": (
+        (krl("PTP {A1 GZ}"), {"files": SHARED}),
+        (krl("GZ=5.0", "PTP {A1 GZ}"), {"files": SHARED}),
+    ),
     "turns_otherwise": (
         krl(SOFT, AT_HOME, "LIN_REL {A 60,C 60} #TOOL"),
         krl(SOFT, AT_HOME, "LIN_REL {A 60} #TOOL", "LIN_REL {C 60} #TOOL"),
@@ -436,11 +444,15 @@ def test_a_program_that_is_mended_as_advised_passes(tmp_path, code):
     def checked(program):
         text, given = program if isinstance(program, tuple) else (program, {})
         suffix = {"M": "mod", "D": "src", "d": "script", "t": "csv"}.get(text[0], "pgm") if text[:2] != "MJ" else "pgm"
-        options = {"start": HOME} | {key: value for key, value in given.items() if key not in ("data", "robot")}
+        options = {"start": HOME} | {
+            key: value for key, value in given.items() if key not in ("data", "robot", "files")
+        }
         (tmp_path / f"a.{suffix}").write_text(text)
         (tmp_path / "a.dat").unlink(missing_ok=True)
         if "data" in given:
             (tmp_path / "a.dat").write_text(f"DEFDAT a\nDECL {given['data']}\nENDDAT\n")
+        for name, held in given.get("files", {}).items():
+            (tmp_path / name).write_text(held)
         robot = given.get("robot", ROBOT)
         return check_program(read_program(tmp_path / f"a.{suffix}"), robot, CheckOptions(**options))
 

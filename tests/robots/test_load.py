@@ -249,6 +249,7 @@ def test_calibrated_tables_may_hold_short_lengths(write):
         (lambda c: c["limits"]["rows"].pop(), "limits.rows", "joint 6 is missing. Write one row for each joint"),
         (set_in("dh", "rows", 1, "beta_deg", to=0.1), "dh.rows[1].beta_deg", "not calibrated. Set dh.calibrated: true"),
         (rename("dh", 1, "a_mm", "a_m"), "dh.rows[1].a_m", "unknown key 'a_m'. Did you mean 'a_mm'?"),
+        (set_in("payload_kg", to=5), "payload_kg", "unknown key 'payload_kg'. It belongs elsewhere in the file"),
         (set_in("tol", to={}), "tol", "unknown key 'tol'. Did you mean 'tool'?"),
         (set_in("colour", to="red"), "colour", "unknown key 'colour'"),
         (delete("dh", "grade"), "dh.grade", "missing. Add the key 'grade'"),
