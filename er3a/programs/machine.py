@@ -701,12 +701,20 @@ class Machine:
         way.memory.kept.clear()
 
     def _unmet(self) -> tuple[instructions.Place, ...]:
-        """Instructions that are not motions, may move the arm as far as is known, and were not carried out."""
+        """Instructions that are not motions, may move the arm as far as is known, and were not carried out.
+
+        A call by a name that is known when it is reached is not among them: one of the routines that it may call was
+        carried out.
+        """
+        routines = self.program.routines.values()
+        code = [((each.name, at), operation) for each in routines for at, operation in enumerate(each.code)]
+        called = {(each.place, each.text) for key, each in code if isinstance(each, syntax.Call) and key in self.passed}
         return tuple(
             operation.place
-            for routine in self.program.routines.values()
-            for at, operation in enumerate(routine.code)
-            if (routine.name, at) not in self.passed and _may_move(operation, self.dialect)
+            for key, operation in code
+            if key not in self.passed
+            and (operation.place, getattr(operation, "text", "")) not in called
+            and _may_move(operation, self.dialect)
         )
 
     def _follow(self, way: ExecutionPath) -> None:

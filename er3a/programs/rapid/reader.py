@@ -78,7 +78,7 @@ CHANGING = {
     "BITSET": 0,
 }
 """Instructions that change one of their arguments, by its number."""
-CHANGING_OPTIONS = frozenset(("TIMEFLAG", "VALUE", "VALUEATTIMEOUT", "BREAKFLAG"))
+CHANGING_OPTIONS = frozenset(("TIMEFLAG", "VALUE", "VALUEATTIMEOUT", "BREAKFLAG", "ERRORNUMBER"))
 """Optional arguments that instructions and functions change."""
 READING = ("READ", "GET", "UNPACK", "RMQGET", "RMQREAD", "SOCKETRECEIVE", "SOCKETACCEPT", "UIMSGBOX", "PACK", "COPYRAW")
 """How instructions begin that may change any variable that they are given."""
@@ -483,6 +483,7 @@ class _ModuleReader:
         place, tokens = self.cursor.place(), self.cursor.simple()
         words = RapidWords(tokens)
         try:
+            elsewhere = words.next == "PERS"  # where it has no value here
             words.take()
             kind, name = words.name(), words.name()
             shape: Shape = scope.types.get(kind, (kind,))
@@ -510,7 +511,7 @@ class _ModuleReader:
             return
         if value is not None:
             value = scope.typed(scope.settled(value), shape)
-        elif initial is not None:
+        elif initial is not None and not elsewhere:
             value = syntax.Constant(initial)
         builder.add(syntax.Assign(place, syntax.Variable(name), value, self.cursor.text(tokens), kind, local))
 
