@@ -338,6 +338,18 @@ MENDED = {
         rapid("MoveAbsJ [[0,-10,-10,0,-70,5],[9E9,9E9,9E9,9E9,9E9,9E9]],v50,fine,tool0;", "ERROR", "EXIT;"),
         rapid("MoveAbsJ [[0,-10,-10,0,-70,5],[9E9,9E9,9E9,9E9,9E9,9E9]],v50,fine,tool0;", "ERROR", "Stop;"),
     ),
+    "turns_otherwise": (
+        krl(SOFT, AT_HOME, "LIN_REL {A 60,C 60} #TOOL"),
+        krl(SOFT, AT_HOME, "LIN_REL {A 60} #TOOL", "LIN_REL {C 60} #TOOL"),
+    ),
+    "relative_turn_assumed": (
+        krl(SOFT, AT_HOME, "LIN_REL {A 20}", "LIN_REL {B 5}"),
+        krl(SOFT, AT_HOME, "LIN_REL {A 20}", "LIN_REL {B 5} #TOOL"),
+    ),
+    "waits_for_others": (
+        (krl("N=0", "WAIT FOR N==1", "PTP {A1 N}"), {"data": "INT N=0"}),
+        (krl("N=0", "WAIT FOR $IN[1]", "N=1", "PTP {A1 N}"), {"data": "INT N=0"}),
+    ),
     "above_limit": (krl("PTP {A1 170}"), krl(f"PTP {{A1 {np.degrees(ROBOT.upper[0]):g}}}")),
     "below_limit": (krl("PTP {A1 -170}"), krl(f"PTP {{A1 {np.degrees(ROBOT.lower[0]):g}}}")),
     "motion_collides.solid": (  # round the post, by the via point that was found

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from er3a.geometry.transforms import transform
 from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.programs.instructions import JointTarget, PoseTarget
-from er3a.programs.languages import read_program, write_program
+from er3a.programs.languages import files_of, read_program, write_program
 from er3a.programs.machine import execute
 from er3a.programs.writing import WriteOptions
 from testing.program_texts import FRAMES, HOME, HOME_TEXT, NEAR, ROBOT, axes, check, codes, krl, motions, written
@@ -351,3 +352,253 @@ def test_an_output_or_an_acceleration_that_a_handler_sets_leaves_the_targets_kno
     grip = f"PROC grip()\n{WAIT}ERROR\nReset do1;\nAccSet 50,50;\nTRYNEXT;\nENDPROC"
     found = codes(check(tmp_path, rapid(f"grip;\n{TO_PLACE}", HANDLED, grip), "a.mod"))
     assert not {"target_not_given", "frame_not_given"} & set(found)
+
+
+GIVEN_OUT = "$OUT[8]=FALSE\n"
+ASK_OUT = "\nIF $OUT[8] THEN\nPTP {A1 5}\nELSE\nPTP {A1 9}\nENDIF"
+
+
+@pytest.mark.parametrize(
+    ("setting", "ways"),
+    [
+        ("", [9.0]),
+        ("GRIP=15", [5.0, 9.0]),  # $OUT[5] to $OUT[8] as one number
+        ("$OUT[N]=TRUE", [5.0, 9.0]),  # N is an input
+        ("PULSE($OUT[8],TRUE,0.5)", [5.0, 9.0]),
+        ("TRIGGER WHEN DISTANCE=0 DELAY=0 DO PULSE(ONE,TRUE,0.5)", [5.0, 9.0]),
+        ("ONE=TRUE", [5.0]),
+        ("BAS(#OUT_ASYNC)", [5.0, 9.0]),
+    ],
+)
+def test_an_output_that_is_set_under_another_name_is_not_taken_as_it_was(tmp_path, setting, ways):
+    data = "SIGNAL GRIP $OUT[5] TO $OUT[8]\nSIGNAL ONE $OUT[8]\nSIGNAL N $IN[1] TO $IN[4]"
+    (tmp_path / "a.dat").write_text(f"DEFDAT a\n{data}\nENDDAT\n")
+    assert sorted(set(np.round(joints(tmp_path, GIVEN_OUT + setting + ASK_OUT), 6))) == ways
+
+
+def test_a_signal_of_the_controller_is_known_to_the_modules_that_a_program_calls(tmp_path):
+    (tmp_path / "$config.dat").write_text("DEFDAT $CONFIG\nSIGNAL ONE $OUT[8]\nENDDAT\n")
+    (tmp_path / "sets.src").write_text("DEF sets( )\nONE=TRUE\nEND\n")
+    assert joints(tmp_path, f"{GIVEN_OUT}sets( ){ASK_OUT}") == [5.0]
+
+
+@pytest.mark.parametrize("condition", ["GO", "GO AND $IN[1]", "NOT (NOT GO)", "$OUT[3]", "N==4"])
+def test_a_wait_that_only_another_task_can_end_is_named_and_what_it_asks_is_open(tmp_path, condition):
+    body = f"GO=FALSE\nN=1\n$OUT[3]=FALSE\nWAIT FOR {condition}\nIF GO OR $OUT[3] OR N==4 THEN\nPTP {{A1 5}}\nENDIF"
+    found = with_data(tmp_path, body, "DECL BOOL GO\nDECL INT N")
+    assert codes(found)["waits_for_others"] == [10]
+    assert (10, "course") in [(each.place.line, each.what) for each in found.not_examined]
+    assert 5.0 in np.round(joints(tmp_path, body), 6)
+
+
+@pytest.mark.parametrize("condition", ["GO", "$IN[1]", "GO OR $IN[1]", "$TIMER[1]>0"])
+def test_a_wait_for_what_holds_or_for_an_input_is_not(tmp_path, condition):
+    found = with_data(tmp_path, f"GO=TRUE\nWAIT FOR {condition}\nPTP {{A1 5}}", "DECL BOOL GO")
+    assert "waits_for_others" not in codes(found)
+
+
+CONFIG = "DEFDAT $CONFIG PUBLIC\nDECL GLOBAL REAL GZ=5.0\nDECL GLOBAL INT UNUSED=1\nENDDAT\n"
+
+
+def test_what_a_submit_program_sets_has_no_known_value(tmp_path):
+    (tmp_path / "$config.dat").write_text(CONFIG)
+    assert joints(tmp_path, "PTP {A1 GZ}") == [5.0]
+    (tmp_path / "sps.sub").write_text("DEF SPS( )\nDECL REAL UNUSED\nUNUSED=3\nIF $IN[1] THEN\nGZ=30.0\nENDIF\nEND\n")
+    assert "target_not_given" in codes(check(tmp_path, krl("PTP {A1 GZ}"), "a.src"))
+    assert joints(tmp_path, "PTP {A1 UNUSED}") == [1.0]  # its own variable of that name is another
+
+
+@pytest.mark.parametrize(
+    ("body", "told"),
+    [("PTP {A1 GZ}", True), ("GZ=9\nPTP {A1 GZ}", False), ("PTP {A1 5}", False), ("$OUT[1]=GZ>1\nPTP {A1 5}", False)],
+)
+def test_a_variable_of_the_controller_that_another_program_sets_is_told(tmp_path, body, told):
+    (tmp_path / "$config.dat").write_text(CONFIG)
+    (tmp_path / "other.src").write_text("DEF other( )\nIF $IN[1] THEN\nGZ=30.0\nENDIF\nEND\n")
+    found = check(tmp_path, krl(body), "a.src")
+    said = [each.finding for each in found.findings if each.finding.code == "set_elsewhere"]
+    assert [(each.name, each.file, each.line) for each in said] == ([("GZ", "other.src", 3)] if told else [])
+    called = check(tmp_path, krl(f"other( )\n{body}"), "a.src")
+    assert "set_elsewhere" not in codes(called)  # what it calls is followed
+
+
+def test_files_that_decide_so_belong_to_the_program(tmp_path):
+    names = ["$config.dat", "$machine.dat", "other.src", "sps.sub"]
+    for name in names:
+        (tmp_path / name).write_text("DEF x( )\nEND\n" if name[0] != "$" else "DEFDAT x\nENDDAT\n")
+    (tmp_path / "a.src").write_text(krl("PTP {A1 5}"))
+    assert {each.name for each in files_of(tmp_path / "a.src")} == {"a.src", *names}
+
+
+@pytest.mark.parametrize(
+    ("before", "z"),
+    [
+        ("", 100),
+        ("BASE_CORR={X 0,Y 0,Z -30,A 0,B 0,C 0}\nBASE_CORR_ON=TRUE", 70),
+        ("M_BASE_CORR={X 0,Y 0,Z -20,A 0,B 0,C 0}\nM_BAS_COR_ON=TRUE", 80),
+        ("BASE_CORR={X 0,Y 0,Z -30,A 0,B 0,C 0}\nBASE_CORR_ON=FALSE", 100),
+        ("BASE_CORR={X 0,Y 0,Z -30,A 0,B 0,C 0}\nBASE_CORR_ON=$IN[1]", None),
+        ("BASE_CORR={X 0,Y 0,Z -30,A 0,B 0,C 0}\nBASE_CORR_ON=TRUE\nBAS(#INITMOV,0)", 100),
+        ("MACHINE_FRAME_DAT[1]={MACH_DEF_INDEX 2}", None),
+    ],
+)
+def test_bas_adds_the_corrections_that_are_on(tmp_path, before, z):
+    data = "BASE_DATA[1]={X 0,Y 0,Z 100,A 0,B 0,C 0}\nTOOL_DATA[1]={X 0,Y 0,Z 0,A 0,B 0,C 0}"
+    (tmp_path / "a.dat").write_text(f"DEFDAT a\n{data}\nENDDAT\n")
+    (found,) = motions(tmp_path, krl(f"{before}\nBAS(#TOOL,1)\nBAS(#BASE,1)\nLIN {POSE % 0}"), "a.src")
+    assert (None if found.base.pose is None else round(1000 * found.base.pose[2, 3], 6)) == z
+
+
+def test_arcs_that_turn_with_their_path_are_named_where_the_controller_s_data_say_so(tmp_path):
+    (tmp_path / "$config.dat").write_text("DEFDAT $CONFIG\nCIRC_TYPE DEF_CIRC_TYP=#PATH\nENDDAT\n")
+    assert 2 in codes(check(tmp_path, krl("BAS(#INITMOV,0)\nPTP {A1 5}"), "a.src"))["program_not_understood"]
+
+
+@pytest.mark.parametrize("line", ['CWRITE($CMD,S,M,"RUN /R1/UP( )")', "$LOAD_A3={M 8.0}"])
+def test_commands_and_loads_on_the_arm_are_no_pass(tmp_path, line):
+    found = check(tmp_path, krl(f"{line}\nPTP {{A1 5}}"), "a.src")
+    assert any(each.level == "caution" and each.place.line == 2 for each in found.findings)
+
+
+@pytest.mark.parametrize("kind", ["", "FRAME "])
+@pytest.mark.parametrize(("root", "named"), [("Z 270,A 0", True), ("Z 0,A 180", True), ("Z 0,A 0", False)])
+def test_a_robot_that_its_machine_data_put_elsewhere_is_no_pass(tmp_path, kind, root, named):
+    program = tmp_path / "KRC/R1/Program"
+    program.mkdir(parents=True)
+    (tmp_path / "KRC/R1/Mada").mkdir()
+    (tmp_path / "KRC/R1/Mada/$machine.dat").write_text(
+        f"DEFDAT $MACHINE PUBLIC\n{kind}$ROBROOT={{FRAME: X 0.0,Y 0.0,{root},B 0.0,C 0.0}} ;x\nENDDAT\n"
+    )
+    found = check(program, krl(f"{FRAMES}LIN {POSE % 0}"), "a.src")
+    assert ("program_not_simulated" in codes(found)) == named
+
+
+@pytest.mark.parametrize(
+    ("moves", "cautious"),
+    [
+        ("P=$POS_ACT\nPTP {A1 5,A6 -100}\nPTP P", True),  # two solutions have its Turn; its Status is not known
+        (f"LIN {POSE % 0}\nP=$POS_ACT\nPTP {{A1 5,A2 -10,A3 -10,A4 0,A5 -70,A6 0}}\nPTP P", True),
+        (f"LIN {POSE % 0}\nP=$POS_ACT\nPTP {{A1 5,A2 -10,A3 -10,A4 0,A5 -70,A6 0}}\nLIN P", False),
+        (f"LIN {POSE % 0}\nF=$POS_ACT\nPTP {{A1 5,A2 -10,A3 -10,A4 0,A5 -70,A6 0}}\nPTP F", False),  # no S, no T
+    ],
+)
+def test_a_position_that_is_read_keeps_status_and_turn(tmp_path, moves, cautious):
+    body = f"DECL E6POS P\nDECL FRAME F\n{FRAMES}{SPEEDS}{moves}"
+    assert ("configuration_not_read" in codes(check(tmp_path, krl(body), "a.src"))) == cautious
+
+
+def test_a_turn_that_was_read_is_gone_back_to(tmp_path):
+    """A6 was at -100 deg: the nearest solution after 250 deg would be 260 deg."""
+    body = "DECL E6POS P\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\nPTP {A6 -100}\nP=$POS_ACT\nPTP {A6 0}\nPTP {A6 130}\n"
+    found = check(tmp_path, krl(f"{body}PTP {{A6 250}}\nPTP P"), "a.src")
+    last = list(found.motions.values())[-1]
+    assert np.degrees(last.way.q[-1][5]) == pytest.approx(-100)
+
+
+CALLED = "DEF b( )\nPTP {A1 K}\nEND\n"
+
+
+@pytest.mark.parametrize(
+    ("own", "shared", "way"),
+    [
+        ("DECL INT K=5", "", None),  # b does not see it
+        ("DECL GLOBAL INT K=5", "", 5.0),
+        ("DECL INT K=5", "DECL GLOBAL INT K=9", 9.0),  # what b sees is the controller's
+        ("", "DECL GLOBAL INT K=9", 9.0),
+    ],
+)
+def test_a_module_does_not_see_what_its_caller_keeps_for_itself(tmp_path, own, shared, way):
+    (tmp_path / "a.dat").write_text(f"DEFDAT a PUBLIC\n{own}\nENDDAT\n")
+    (tmp_path / "$config.dat").write_text(f"DEFDAT $CONFIG\n{shared}\nENDDAT\n")
+    (tmp_path / "b.src").write_text(CALLED)
+    assert joints(tmp_path, "b( )") == ([] if way is None else [way])
+    if "K=5" in own:
+        assert joints(tmp_path, "PTP {A1 K}\nb( )")[0] == 5.0  # the program itself does
+
+
+def test_a_module_calls_the_module_of_a_name_and_not_its_caller_s_own_routine(tmp_path):
+    (tmp_path / "b.src").write_text("DEF b( )\nhelp( )\nEND\n")
+    (tmp_path / "help.src").write_text("DEF help( )\nPTP {A1 9}\nEND\n")
+    text = krl("b( )\nhelp( )", more="DEF help( )\nPTP {A1 5}\nEND\n")
+    found = motions(tmp_path, text, "a.src")
+    assert [round(float(np.degrees(each.target.joints[0]))) for each in found] == [9, 5]
+
+
+def test_a_parameter_of_a_module_is_not_the_variable_of_that_name(tmp_path):
+    (tmp_path / "b.src").write_text("DEF b(K:IN )\nINT K\nPTP {A1 K}\nEND\n")
+    (tmp_path / "b.dat").write_text("DEFDAT b\nDECL INT K=7\nENDDAT\n")
+    (tmp_path / "a.dat").write_text("DEFDAT a\nDECL INT K=5\nENDDAT\n")
+    assert joints(tmp_path, "b(9)") == [9.0]
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "TRIGGER WHEN DISTANCE=0 DELAY=F() DO $OUT[1]=TRUE",
+        "TRIGGER WHEN PATH=F() DELAY=0 DO $OUT[1]=TRUE",
+        "TRIGGER WHEN DISTANCE=0 DELAY=0 DO I=F()",
+        "STOP WHEN PATH=F() IF $IN[1]",
+        "ANIN ON X=1*F()+0",
+    ],
+)
+def test_a_function_is_followed_wherever_it_is_called(tmp_path, line):
+    more = "DEFFCT INT F( )\nN=9\nRETURN 0\nENDFCT\n"
+    (tmp_path / "a.dat").write_text("DEFDAT a\nDECL INT N=5\nENDDAT\n")
+    found = motions(tmp_path, krl(f"{line}\nPTP {{A1 N}}", more), "a.src")
+    assert [round(float(np.degrees(each.target.joints[0]))) for each in found] == [9]
+
+
+@pytest.mark.parametrize("folder", ["TP/Grip", "Program/sub", "System"])
+def test_modules_anywhere_in_an_archive_are_read(tmp_path, folder):
+    """USER_GRP is a controller's own name, whose file people edit."""
+    program, place = tmp_path / "KRC/R1/Program", tmp_path / "KRC/R1" / folder
+    for each in (program, place, tmp_path / "KRC/R1/System"):
+        each.mkdir(parents=True, exist_ok=True)
+    (place / "user_grp.src").write_text("GLOBAL DEF USER_GRP(N:IN)\nINT N\nPTP {A1 N}\nEND\n")
+    (place / "own.src").write_text("DEF own( )\nPTP {A1 9}\nEND\n")
+    assert joints(program, "USER_GRP(5)\nown( )") == [5.0, 9.0]
+
+
+def test_turning_speeds_of_the_controller_s_data_hold_after_initmov(tmp_path):
+    data = "REAL DEF_VEL_ORI1=20.0\nREAL DEF_VEL_ORI2=200.0\nREAL DEF_ACC_ORI1=20.0\nREAL DEF_ACC_ORI2=200.0\n"
+    (tmp_path / "$config.dat").write_text(f"DEFDAT $CONFIG\n{data}ENDDAT\n")
+    body = f"BAS(#INITMOV,0)\n{FRAMES}{SPEEDS}LIN {POSE % 0}\nLIN_REL {{A 60}}"
+    found = check(tmp_path, krl(body), "a.src")
+    assert list(found.motions.values())[-1].way.law.duration == pytest.approx(4.0)  # as of $VEL.ORI1 set directly
+
+
+def test_a_frame_by_an_index_that_is_known_is_called_by_its_number(tmp_path):
+    data = "BASE_DATA[2]={X 0,Y 0,Z 0,A 0,B 0,C 0}\nDECL INT N=2"
+    found = with_data(tmp_path, f"$BASE=BASE_DATA[N]\nLIN {POSE % 0}", data)
+    assert "frame_of_several" not in codes(found)
+    (moved,) = motions(tmp_path, krl(f"{FRAMES}$BASE=BASE_DATA[N]\nLIN {POSE % 0}"), "a.src")
+    assert moved.base.name == "BASE_DATA[2]"
+
+
+@pytest.mark.parametrize(
+    ("turn", "told"),
+    [("A 60", False), ("C 60", False), ("A 60,C 60", True), ("A 3,C 3", False)],
+)
+def test_a_line_of_krl_that_swings_the_tool_and_turns_it_too_is_no_pass(tmp_path, turn, told):
+    """In the tool's frame: A swings its x axis, C turns about it."""
+    body = f"{FRAMES}{SPEEDS}LIN {POSE % 0}\nLIN_REL {{{turn}}} #TOOL"
+    found = [each.finding for each in check(tmp_path, krl(body), "a.src").findings if each.place.line == 8]
+    apart = [each.off_deg for each in found if each.code == "turns_otherwise"]
+    assert bool(apart) == told
+    if told:  # exp(s r) against exp(s swing) exp(s twist), worked out with scipy
+        z, x = (Rotation.from_euler(axis, 60, degrees=True).as_rotvec() for axis in "zx")
+        whole = (Rotation.from_rotvec(z) * Rotation.from_rotvec(x)).as_rotvec()
+        ways = (
+            Rotation.from_rotvec(s * whole).inv() * Rotation.from_rotvec(s * z) * Rotation.from_rotvec(s * x)
+            for s in (0.25, 0.5, 0.75)
+        )
+        assert apart == [pytest.approx(max(np.degrees(each.magnitude()) for each in ways))]
+
+
+@pytest.mark.parametrize(
+    ("before", "turn", "told"),
+    [(0, "A 20", False), (0, "B 20", True), (40, "B 20", True), (40, "A 20", False), (40, "B 20} #TOOL ;", False)],
+)
+def test_the_angles_of_a_relative_position_in_the_base_may_mean_two_things(tmp_path, before, turn, told):
+    body = f"{FRAMES}{SPEEDS}LIN {{X 400,Y 0,Z 300,A {before},B 170,C 0}}\nLIN_REL {{{turn}}}"
+    assert ("relative_turn_assumed" in codes(check(tmp_path, krl(body), "a.src"))) == told

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from er3a.geometry.transforms import rotation_angle
 from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, syntax
 from er3a.programs.code_builder import variable_of
@@ -22,6 +23,7 @@ LEFT_OUT = "left out of"
 EXTERNAL_KEYS = ("E1", "E2", "E3", "E4", "E5", "E6")
 COORDINATES = frozenset((*FRAME_KEYS, *AXIS_KEYS, *EXTERNAL_KEYS))
 POSITION_KINDS = ("FRAME", "POS", "E6POS", *AXIS_KINDS)
+SAME_TURN = 1e-3  # rad
 SIGN_ZERO = 1e-7  # rad; nearer to 0 a joint's sign says nothing
 NOT_NUMBERS = ("NAN", "INF", "INFINITY")
 Frames = tuple[instructions.NamedFrame, instructions.NamedFrame]
@@ -92,6 +94,17 @@ def relative(memory: ProgramMemory, value: syntax.Value, frames: Frames, said: t
     found[:3, 3] += offset[:3, 3]
     found[:3, :3] = offset[:3, :3] @ seen[:3, :3]
     return instructions.PoseTarget(found, external=_external(value))
+
+
+def _turn_in_doubt(before: Reals | None, change: syntax.Value, goal: instructions.Target) -> float:
+    """How far (rad) a relative position's orientation is from that with its angles added to those before."""
+    if before is None or not isinstance(change, syntax.Record) or not isinstance(goal, instructions.PoseTarget):
+        return 0.0
+    added = [syntax.number(change.get(key)) or 0.0 for key in FRAME_KEYS[3:]]
+    numbers = np.add(instructions.numbers_of(before, "kuka"), (0.0, 0.0, 0.0, *added))
+    other = instructions.pose_of(tuple(numbers.tolist()), "kuka")
+    apart = float(rotation_angle(goal.pose[:3, :3], other[:3, :3]))
+    return apart if apart > SAME_TURN else 0.0
 
 
 def _unresolved(value: syntax.Unclear) -> instructions.UnresolvedTarget:
@@ -166,6 +179,14 @@ def _pose(memory: ProgramMemory, value: syntax.Record, frames: Frames, text: str
     return instructions.PoseTarget(
         instructions.pose_of(plain, "kuka"), configuration, external=_external(value), branch=branch
     )
+
+
+def _posture(position: syntax.Record, joints: Reals | None, name: str) -> syntax.Record:
+    """Where the arm is with its Turn, where its joints are known; its Status depends on the arm, and is not known."""
+    turn: syntax.Value = syntax.Unclear(f"T of {name}")
+    if joints is not None:
+        turn = sum(1 << i for i, each in enumerate(joints) if each < 0)
+    return position.having("S", syntax.Unclear(f"S of {name}")).having("T", turn)
 
 
 def _branch(turn: float | None, joints: int) -> instructions.MeantSolution | None:
@@ -246,7 +267,9 @@ def set_by_bas(memory: ProgramMemory, call: syntax.Invocation) -> bool:
             if command == "#CP_PARAMS":
                 _frames(memory)
             _line_speed(memory, _field(data, "VEL", "LDAT_ACT") if command == "#CP_DAT" else given)
-        case "#OUT_SYNC" | "#OUT_ASYNC" | "#GROUP" | "#ACC_GLUE":
+        case "#OUT_SYNC" | "#OUT_ASYNC":
+            memory.forget("$OUT")
+        case "#GROUP" | "#ACC_GLUE":
             pass
         case _:
             return False
@@ -259,13 +282,19 @@ def _initial(memory: ProgramMemory) -> None:
     _all_axes(memory, "$VEL_AXIS", 100)
     _line_acceleration(memory, 100)
     memory.write("$VEL.CP", memory.read("DEF_VEL_CP") or syntax.Unclear("DEF_VEL_CP"))
-    for part in ("ORI1", "ORI2"):  # as the machine data say
-        for name in (f"$VEL.{part}", f"$ACC.{part}"):
+    for name in TURN_RATES:
+        given = memory.read(f"DEF_{name[1:].replace('.', '_')}")
+        if given is None:  # as the machine data say
             memory.shared.pop(name, None)
+        else:
+            memory.write(name, given)
     for part in ("CPTP", "CDIS", "CVEL", "CORI"):
         memory.write(f"$APO.{part}", memory.read(f"DEF_APO_{part}") or syntax.Unclear(f"DEF_APO_{part}"))
     memory.write("$ORI_TYPE", "#VAR")
+    memory.write("$CIRC_TYPE", memory.read("DEF_CIRC_TYP") or "#BASE")
     memory.write("$IPO_MODE", "#BASE")
+    for switch, _ in (*CORRECTIONS["$TOOL"], *CORRECTIONS["$BASE"]):
+        memory.write(switch, False)
     _number(memory, "$BASE", "BASE_DATA", 0)
     _tool_number(memory, 1)
 
@@ -359,8 +388,24 @@ def _number(memory: ProgramMemory, variable: str, array: str, given: syntax.Valu
         memory.write(variable, syntax.Unclear(f"{array}[?]"))
         return
     name = f"{array}[{plain:g}]" if plain > 0 else "$NULLFRAME"
-    memory.write(variable, memory.read(name) or syntax.Unclear(name))
+    memory.write(variable, _corrected(memory, variable, memory.read(name) or syntax.Unclear(name)))
+    machine = memory.read(f"MACHINE_FRAME_DAT[{plain:g}]") if variable == "$BASE" else None
+    if isinstance(machine, syntax.Record) and syntax.number(machine.get("MACH_DEF_INDEX")):
+        memory.write(variable, syntax.Unclear(f"{name} on another machine"))
     memory.write(variable + "%name", name)
+
+
+def _corrected(memory: ProgramMemory, variable: str, frame: syntax.Value) -> syntax.Value:
+    """A tool or base with the corrections before and after it that controllers' own bas.src adds while these are on."""
+    for (switch, name), before in zip(CORRECTIONS[variable], (True, False)):
+        on = memory.read(switch)
+        if on is None or on is False:
+            continue
+        other = memory.read(name) or syntax.Unclear(name)
+        frame = memory.functions.product(*((other, frame) if before else (frame, other)))
+        if on is not True:
+            frame = syntax.Unclear(f"{syntax.shown(frame)}, if {switch}")
+    return frame
 
 
 def _tool_number(memory: ProgramMemory, given: syntax.Value) -> None:
@@ -430,6 +475,7 @@ def _line_data(memory: ProgramMemory, data: syntax.Value | None) -> None:
         _line_acceleration(memory, _field(data, "ACC", "LDAT_ACT"))
         _zone_data(memory, data, "#CDIS")
         memory.write("$ORI_TYPE", data.get("ORI_TYP") or "#VAR")
+        memory.write("$CIRC_TYPE", data.get("CIRC_TYP") or "#BASE")
 
 
 def _zone_data(memory: ProgramMemory, data: syntax.Value, usual: str) -> None:
@@ -448,7 +494,17 @@ def _zone_data(memory: ProgramMemory, data: syntax.Value, usual: str) -> None:
 KINDS: dict[str, instructions.MotionKind] = {"PTP": "joint", "LIN": "line", "CIRC": "arc", "SPL": "spline"}
 MODAL = ("$TOOL", "$BASE", "$LOAD", "$VEL", "$ACC", "$APO", "$VEL_AXIS", "$ACC_AXIS", "$IPO_MODE", "$ORI_TYPE")
 MODAL_DATA = ("PDAT_ACT", "LDAT_ACT", "FDAT_ACT", "%spline")
-READ_BY_NUMBER = ("TOOL_DATA", "BASE_DATA", "LOAD_DATA", "DEF_VEL_CP", "DEF_ACC_CP")
+TURN_RATES = ("$VEL.ORI1", "$VEL.ORI2", "$ACC.ORI1", "$ACC.ORI2")
+CORRECTIONS = {
+    "$TOOL": (("TOOL_CORR_W_ON", "TOOL_CORR_W"), ("TOOL_CORR_ON", "TOOL_CORR")),
+    "$BASE": (("BASE_CORR_ON", "BASE_CORR"), ("M_BAS_COR_ON", "M_BASE_CORR")),
+}
+"""Switches and frames that controllers' own bas.src puts before and after the frame that it takes by its number."""
+READ_BY_NUMBER = (
+    *("TOOL_DATA", "BASE_DATA", "LOAD_DATA", "DEF_VEL_CP", "DEF_ACC_CP", "DEF_CIRC_TYP", "MACHINE_FRAME_DAT"),
+    *("DEF_VEL_ORI1", "DEF_VEL_ORI2", "DEF_ACC_ORI1", "DEF_ACC_ORI2"),
+    *(name for pairs in CORRECTIONS.values() for pair in pairs for name in pair),
+)
 """What ``BAS`` and settings after WITH read without naming it."""
 HARMLESS_TEXT = """
 CAST_FROM CAST_TO CCLOSE CHECKHOME CIOCTL CLEAR_KRLMSG COPEN CREAD CWRITE DELETE_BACKWARD_BUFFER EB EB_ABS EK
@@ -478,10 +534,10 @@ OF_SETTINGS = frozenset(OF_SETTINGS_TEXT.split())
 """Functions after WITH, which :func:`keep_setting` reads."""
 HARMLESS_VARIABLES_TEXT = """
 $ACCU_STATE $ACC_EXTAX $ADVANCE $ANOUT $AXWORKSPACE $BWDSTART $CMD $COLLMON_TOL_PRO $CP_STATMON $CP_VEL_TYPE
-$CYCFLAG $CYCLE $DATE $ECO_LEVEL $ERR $EXT $FLAG $GEAR_JERK $H_POS $I_O_ACT $JERK $LOAD_A1 $LOAD_A2 $LOAD_A3
-$LOOP_MSG $MSG_T $OUT $OUT_NODRIVE $OV_APPL $OV_PRO $OV_ROB $PERI_RDY $PRO_ACT $PRO_MODE $PRO_STATE $RED_VEL
-$SOFT_PLCBOOL $SOFT_PLCINT $SOFT_PLCREAL $STOPNOAPROX $TIMER $TIMER_FLAG $TIMER_STOP $TORQMON $TORQMON_COM
-$TORQMON_DEF $TRACE $VEL_EXTAX $WBOXDISABLE $WORKSPACE
+$CYCFLAG $CYCLE $DATE $ECO_LEVEL $ERR $EXT $FLAG $GEAR_JERK $H_POS $I_O_ACT $JERK $LOOP_MSG $MSG_T $OUT $OUT_NODRIVE
+$OV_APPL $OV_PRO $OV_ROB $PERI_RDY $PRO_ACT $PRO_MODE $PRO_STATE $RED_VEL $SOFT_PLCBOOL $SOFT_PLCINT $SOFT_PLCREAL
+$STOPNOAPROX $TIMER $TIMER_FLAG $TIMER_STOP $TORQMON $TORQMON_COM $TORQMON_DEF $TRACE $VEL_EXTAX $WBOXDISABLE
+$WORKSPACE
 """
 HARMLESS_VARIABLES = frozenset((*MODAL, *HARMLESS_VARIABLES_TEXT.split()))
 """System variables that are followed, or set nothing but speeds, stops, watches, signals and marks; another may make
@@ -594,6 +650,8 @@ class KrlDialect(Dialect):
         """Coordinates are REAL, however they are written; a field of the program's own type is what it declares."""
         if not isinstance(value, syntax.Record) or kind not in ("", *POSITION_KINDS):
             return value
+        if kind == "FRAME":
+            value = syntax.Record(value.kind, tuple(each for each in value.items if each[0] not in ("S", "T")))
         items = (
             (key, float(each) if isinstance(each, int) and key in COORDINATES and not isinstance(each, bool) else each)
             for key, each in value.items
@@ -625,7 +683,7 @@ class KrlDialect(Dialect):
             return frame_record(mapped)
         if name in HERE:
             seen = memory.here.seen(tool_of(memory), base_of(memory), memory.cell.flange)
-            return None if seen is None else frame_record(seen, "E6POS")
+            return None if seen is None else _posture(frame_record(seen, "E6POS"), memory.here.joints, name)
         if name in HERE_JOINTS and memory.here.joints is not None:
             degrees = [math.degrees(each) for each in memory.here.joints]
             return syntax.Record("E6AXIS", tuple((f"A{i + 1}", each) for i, each in enumerate(degrees)))
@@ -702,6 +760,10 @@ class KrlDialect(Dialect):
             made = [self._unturned(memory, each, (tool, base)) for each in made]
         if kind != "joint":  # which ignores S and T
             made = [replace(each, branch=None) if isinstance(each, instructions.PoseTarget) else each for each in made]
+        in_doubt = 0.0
+        if plain != move.form and not in_tool:
+            before = memory.here.seen(tool, base, memory.cell.flange)
+            in_doubt = max(_turn_in_doubt(before, value, goal) for value, goal in zip(values, made))
         via = made[0] if kind == "arc" else None
         block = memory.shared.get("%spline")
         return instructions.ArmMotion(
@@ -717,6 +779,7 @@ class KrlDialect(Dialect):
             base,
             block if isinstance(block, int) and block else None,
             left_out="; ".join(filter(None, left_out)),
+            turn_in_doubt=in_doubt,
             turning=(None, None) if kind == "joint" else (_turning(memory, "ORI1"), _turning(memory, "ORI2")),
             load=load,
         )
@@ -752,10 +815,10 @@ class KrlDialect(Dialect):
         if call.function == "BAS":
             if not set_by_bas(memory, call):
                 return instructions.Unknown(doing.text)
-            turns = memory.read("$ORI_TYPE")
+            turns = ((memory.read(name), followed) for name, followed in ORIENTATION_TYPES.items())
             return (
                 None
-                if turns in (None, *ORIENTATION_TYPES["$ORI_TYPE"])
+                if all(value is None or value in followed for value, followed in turns)
                 else instructions.Unknown(doing.text, may_move=False)
             )
         if call.function == "PULSE" and call.arguments and call.arguments[0] is not None:
@@ -766,6 +829,8 @@ class KrlDialect(Dialect):
 
     def harmless(self, call: syntax.Invocation) -> bool:
         """Messages, files, signals."""
+        if call.function == "CWRITE" and syntax.Variable("$CMD") in call.arguments:  # commands, as to run a program
+            return False
         return call.function in HARMLESS | EVALUATED | OF_SETTINGS or call.function == syntax.CYCLIC
 
 
