@@ -21,6 +21,7 @@ from er3a.pipeline.messages.programs import say
 from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.programs.csv_program import write_csv
 from er3a.programs.instructions import JointTarget, NamedFrame, UnresolvedTarget, numbers_of
+from er3a.programs.languages import files_of
 from testing.arms import palletiser
 from testing.program_texts import (
     FAR,
@@ -1424,6 +1425,27 @@ def test_joints_of_a_point_are_known_where_its_error_is_asked_for(tmp_path):
 def test_persistent_data_whose_value_another_task_gives_have_none(tmp_path):
     found = motions(tmp_path, rapid("MoveL Offs(p,0,q,0),v100,fine,tool0;", data="PERS num q;\n"), "a.mod")
     assert isinstance(found[-1].target, UnresolvedTarget)
+
+
+@pytest.mark.parametrize(
+    ("line", "data", "own", "known"),
+    [
+        ("n2:=600;", "PERS num n2;", "PERS num n2:=0;\n", False),
+        ("Incr n2;", "PERS num n2:=0;", "PERS num n2:=0;\n", False),
+        ("IF n2=1 SetDO do1,1;", "PERS num n2:=0;", "PERS num n2:=0;\n", True),
+        ("n2:=600;", "VAR num n2;", "PERS num n2:=0;\n", True),
+        ("n2:=600;", "TASK PERS num n2:=0;", "PERS num n2:=0;\n", True),
+        ("n2:=600;", "PERS num n2;", "VAR num n2:=0;\n", True),
+    ],
+)
+def test_persistent_data_that_another_task_sets_have_no_value(tmp_path, line, data, own, known):
+    folders = [tmp_path / "RAPID" / task / "PROGMOD" for task in ("TASK1", "TASK2")]
+    for folder in folders:
+        folder.mkdir(parents=True)
+    (folders[1] / "cell.mod").write_text(f"MODULE cell\n{data}\nPROC main()\n{line}\nENDPROC\nENDMODULE\n")
+    last = motions(folders[0], rapid("MoveL Offs(p,0,n2,0),v100,fine,tool0;", data=own), "a.mod")[-1]
+    assert isinstance(last.target, UnresolvedTarget) != known
+    assert files_of(folders[0] / "a.mod") == (folders[0] / "a.mod", folders[1] / "cell.mod")
 
 
 def test_a_call_by_a_name_that_is_known_is_not_told_as_never_reached(tmp_path):
