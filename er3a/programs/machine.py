@@ -148,18 +148,18 @@ def errors_not_followed(program: syntax.Program, dialect: Dialect) -> tuple[inst
 
     One that only has carried out again what failed is not among them, if that is no routine of the program.
     """
-    reached = {name: program.routines[name] for name in _with_called(program, (program.entry,))}
+    reached = _with_called(program, (program.entry,))
+    handling = [(each, each.on_error) for each in program.routines.values() if each.on_error and each.name in reached]
     going_on = {
-        name
-        for name, each in reached.items()
-        if each.on_error is not None
-        and (each.on_error.goes_on or (each.on_error.again and _acts(program, each, dialect)))
+        each.name
+        for each, on_error in handling
+        if on_error.goes_on or (on_error.again and _acts(program, each, dialect))
     }
     below = _with_called(program, going_on)
     return tuple(
-        each.on_error.place
-        for name, each in reached.items()
-        if each.on_error is not None and (name in going_on or (name in below and each.on_error.passed_on))
+        on_error.place
+        for each, on_error in handling
+        if each.name in going_on or (each.name in below and on_error.passed_on)
     )
 
 
@@ -701,12 +701,20 @@ class Machine:
         way.memory.kept.clear()
 
     def _unmet(self) -> tuple[instructions.Place, ...]:
-        """Instructions that are not motions, may move the arm as far as is known, and were not carried out."""
+        """Instructions that are not motions, may move the arm as far as is known, and were not carried out.
+
+        A call by a name that is known when it is reached is not among them: one of the routines that it may call was
+        carried out.
+        """
+        routines = self.program.routines.values()
+        code = [((each.name, at), operation) for each in routines for at, operation in enumerate(each.code)]
+        called = {(each.place, each.text) for key, each in code if isinstance(each, syntax.Call) and key in self.passed}
         return tuple(
             operation.place
-            for routine in self.program.routines.values()
-            for at, operation in enumerate(routine.code)
-            if (routine.name, at) not in self.passed and _may_move(operation, self.dialect)
+            for key, operation in code
+            if key not in self.passed
+            and (operation.place, getattr(operation, "text", "")) not in called
+            and _may_move(operation, self.dialect)
         )
 
     def _follow(self, way: ExecutionPath) -> None:

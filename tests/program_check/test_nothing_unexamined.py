@@ -21,6 +21,7 @@ from er3a.pipeline.messages.programs import remedy_at, say
 from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.programs.csv_program import write_csv
 from er3a.programs.instructions import JointTarget, NamedFrame, UnresolvedTarget, numbers_of
+from er3a.programs.languages import files_of
 from testing.arms import palletiser
 from testing.program_texts import (
     FAR,
@@ -1430,3 +1431,92 @@ def test_a_call_behind_and_or_or_that_does_more_than_compute_is_named(tmp_path, 
     text = f"def lift():\n  {body.format(near=NEAR_TEXT)}\n  return True\nend\nif True {word} lift():\n  y=1\nend\n"
     found = codes(check(tmp_path, f"{text}movej({FAR_TEXT})\n", "a.script"))
     assert found.get("program_not_simulated", []) == ([5] if named else [])
+
+
+FROM_ABOVE = "MoveL Offs(p,0,{y},0),v100,{zone},tool0;\n"
+
+
+@pytest.mark.parametrize(
+    ("given", "named"), [("z1\\Z:=5", False), ("z1\\Z:=GInput(gi1)", True), ("z1\\Z:=n", True), ("own", True)]
+)
+def test_a_zone_whose_size_only_the_cell_knows_is_named(tmp_path, given, named):
+    body = f"n:=GInput(gi1);\nown:=z10;\nown.finep:=TestDI(di1);\n{FROM_ABOVE.format(y=0, zone=given)}"
+    found = codes(
+        check(tmp_path, rapid(body + FROM_ABOVE.format(y=50, zone="fine"), data="VAR zonedata own;\n"), "a.mod")
+    )
+    assert ("zone_without_size" in found) == named
+
+
+@pytest.mark.parametrize(("on", "named"), [("TRUE", False), ("FALSE", False), ("TestDI(di1)", True)])
+def test_a_limit_that_only_the_cell_knows_to_be_set_is_named(tmp_path, on, named):
+    line = f"PathAccLim {on}\\AccMax:=0.5,TRUE\\DecelMax:=3;\nMoveL p,v100,fine,tool0;"
+    found = check(tmp_path, rapid(line), "a.mod")
+    assert ("program_not_understood" in codes(found)) == named
+    (motion,) = (each.placed.motion for each in found.motions.values() if each.kind == "line")
+    limit = None if motion.acceleration is None else motion.acceleration.value
+    assert limit == {"TRUE": 0.5, "FALSE": 3.0}.get(on)
+
+
+def test_joints_of_a_point_are_known_where_its_error_is_asked_for(tmp_path):
+    body = "j:=CalcJointT(p,tool0\\ErrorNumber:=e);\nMoveAbsJ j,v100,fine,tool0;"
+    found = check(tmp_path, rapid(body, data="VAR jointtarget j;\nVAR errnum e;\n"), "a.mod")
+    assert "target_not_given" not in codes(found)
+
+
+def test_persistent_data_whose_value_another_task_gives_have_none(tmp_path):
+    found = motions(tmp_path, rapid("MoveL Offs(p,0,q,0),v100,fine,tool0;", data="PERS num q;\n"), "a.mod")
+    assert isinstance(found[-1].target, UnresolvedTarget)
+
+
+@pytest.mark.parametrize(
+    ("line", "data", "own", "known"),
+    [
+        ("n2:=600;", "PERS num n2;", "PERS num n2:=0;\n", False),
+        ("Incr n2;", "PERS num n2:=0;", "PERS num n2:=0;\n", False),
+        ("IF n2=1 SetDO do1,1;", "PERS num n2:=0;", "PERS num n2:=0;\n", True),
+        ("n2:=600;", "VAR num n2;", "PERS num n2:=0;\n", True),
+        ("n2:=600;", "TASK PERS num n2:=0;", "PERS num n2:=0;\n", True),
+        ("n2:=600;", "PERS num n2;", "VAR num n2:=0;\n", True),
+    ],
+)
+def test_persistent_data_that_another_task_sets_have_no_value(tmp_path, line, data, own, known):
+    folders = [tmp_path / "RAPID" / task / "PROGMOD" for task in ("TASK1", "TASK2")]
+    for folder in folders:
+        folder.mkdir(parents=True)
+    (folders[1] / "cell.mod").write_text(f"MODULE cell\n{data}\nPROC main()\n{line}\nENDPROC\nENDMODULE\n")
+    last = motions(folders[0], rapid("MoveL Offs(p,0,n2,0),v100,fine,tool0;", data=own), "a.mod")[-1]
+    assert isinstance(last.target, UnresolvedTarget) != known
+    assert files_of(folders[0] / "a.mod") == (folders[0] / "a.mod", folders[1] / "cell.mod")
+
+
+def test_a_call_by_a_name_that_is_known_is_not_told_as_never_reached(tmp_path):
+    more = "PROC goFar()\nMoveL Offs(p,0,50,0),v100,fine,tool0;\nENDPROC\n"
+    body = 's:="Far";\n%"go"+s%;\nMoveL p,v100,fine,tool0;'
+    found = codes(check(tmp_path, rapid(body, more, "VAR string s;\n"), "a.mod"))
+    assert "never_reached" not in found
+
+
+def test_options_that_a_caller_did_not_give_are_as_if_they_were_not_there(tmp_path):
+    more = "PROC go(\\num z,\\num v,\\switch i)\nMoveL p,v100\\V?v,z10\\Z?z\\Inpos?i,tool0;\nENDPROC\n"
+    found = motions(tmp_path, rapid("go;", more), "a.mod")[-1]
+    assert (found.zone.value, found.speed.value) == (pytest.approx(0.01), pytest.approx(0.1))
+
+
+@pytest.mark.parametrize(
+    ("line", "code"),
+    [
+        ("q.robconf.cf6:=GInput(gi1);", "configuration_not_read"),
+        ("q.robconf:=confs{GInput(gi1)};", "configuration_not_read"),
+        ("own.robhold:=TestDI(di1);", "frame_not_given"),
+        ("object.robhold:=TestDI(di1);", "frame_not_given"),
+        ("own.tload.mass:=GInput(gi1);", "load_not_examined"),
+    ],
+)
+def test_a_part_of_data_that_only_the_cell_knows_is_named(tmp_path, line, code):
+    data = "VAR robtarget q;\nVAR tooldata own;\nVAR wobjdata object;\nVAR confdata confs{2};\n"
+    data += f"CONST tooldata tool1:={ONE_TOOL};\n"
+    body = f"q:=p;\nown:=tool1;\nobject:=wobj0;\nConfJ\\On;\n{line}\nMoveJ q,v100,fine,own\\WObj:=object;"
+    found = check(tmp_path, rapid(body, data=data), "a.mod")
+    assert [each.finding.code for each in found.findings if each.level != "note" and each.finding.code == code] == [
+        code
+    ]

@@ -94,7 +94,8 @@ ASKED = frozenset(ASKED_TEXT.split())
 """Functions whose value only the running cell knows."""
 SWITCHES: Mapping[str, frozenset[str]] = {
     **dict.fromkeys(("CROBT", "CPOS"), frozenset(("TOOL", "WOBJ"))),
-    **dict.fromkeys(("CALCROBT", "CALCJOINTT"), frozenset(("WOBJ",))),
+    "CALCROBT": frozenset(("WOBJ",)),
+    "CALCJOINTT": frozenset(("WOBJ", "ERRORNUMBER")),
     **dict.fromkeys(("TRUNC", "ROUND"), frozenset(("DEC",))),
     "RELTOOL": frozenset(("RX", "RY", "RZ")),
     "EULERZYX": frozenset("XYZ"),
@@ -119,6 +120,7 @@ IN_DEGREES: Mapping[str, Callable[..., float]] = {
 JOINTS_OF = "%JOINTS_OF"
 """Kind of the joints of a target, which only the arm's table gives."""
 UNCLEAR = syntax.Unclear("")
+AS_IT_STANDS = syntax.Unclear("the configuration in which the arm stands")
 
 
 class RapidDialect(Dialect):
@@ -174,7 +176,8 @@ class RapidDialect(Dialect):
         joint = "ABSJ" in form or form.startswith(JOINT_FORMS)
         kind: instructions.MotionKind = "arc" if arc else "joint" if joint else "line"
         placed = list(move.arguments)
-        options = {name: memory.value(each) for name, each in move.settings}
+        given = ((name, memory.value(each)) for name, each in move.settings)
+        options = {name: value for name, value in given if value != reader.ABSENT}
         if form in reader.SEARCHES:  # signal, the point sought, targets, speed and tool; no zone
             placed = [*placed[2:-1], None, placed[-1]] if len(placed) == 5 + arc else []
         targets = 2 if arc else 1
@@ -211,7 +214,7 @@ class RapidDialect(Dialect):
             zone,
             *frames,
             turn_speed=turn,
-            load=_load(memory, tool, options.get("TLOAD")),
+            load=_load(memory, tool, values[tool_at], options.get("TLOAD")),
         )
 
     def _target(
@@ -239,7 +242,7 @@ class RapidDialect(Dialect):
         if pose is None:
             return instructions.UnresolvedTarget(text, "not_understood")
         conf = data_types.plain(data_types.part(value, "ROBCONF"), 4)
-        said_of = tuple(zip(("cf1", "cf4", "cf6", "cfx"), conf)) if conf is not None else ()
+        said_of = _said(data_types.part(value, "ROBCONF"))
         branch = data_types.branch_of(conf, memory.cell.joints) if checked else None
         kept = said_of if checked or kind != "joint" else ()
         return instructions.PoseTarget(pose, kept, external=external, branch=branch)
@@ -311,6 +314,19 @@ def _leaves(value: syntax.Value) -> list[syntax.Value]:
     return [each for values in inside for each in values]
 
 
+def _said(conf: syntax.Value | None) -> tuple[tuple[str, float | str], ...]:
+    """The parts of confdata, as text where they are not known; none where the arm's own configuration was read."""
+    if isinstance(conf, syntax.Unclear):
+        return (("robconf", conf.text),)
+    parts = conf.values() if isinstance(conf, syntax.Record) else ()
+    if len(parts) != 4 or AS_IT_STANDS in parts:
+        return ()
+    return tuple(
+        (name, number if (number := syntax.number(each)) is not None else syntax.shown(each))
+        for name, each in zip(("cf1", "cf4", "cf6", "cfx"), parts)
+    )
+
+
 def _joint_target(
     memory: ProgramMemory, value: syntax.Value, text: str, external: tuple[tuple[str, float], ...]
 ) -> instructions.Target:
@@ -343,14 +359,19 @@ def _joints_of(
         return instructions.UnresolvedTarget(text, "not_understood")
     conf = data_types.plain(data_types.part(target, "ROBCONF"), 4)
     found = np.linalg.inv(here) @ base @ pose @ np.linalg.inv(tool) @ now
-    said = tuple(zip(("cf1", "cf4", "cf6", "cfx"), conf)) if conf is not None else ()
+    said = _said(data_types.part(target, "ROBCONF"))
     return instructions.PoseTarget(found, said, branch=data_types.branch_of(conf, 6))
 
 
 def frame_of_tool(value: syntax.Value | None) -> tuple[Reals | None, bool]:
-    """T_flange_tool (4, 4) in m of tooldata, and whether the tool is stationary (3 tooldata: robhold)."""
+    """T_flange_tool (4, 4) in m of tooldata, and whether the tool is stationary (3 tooldata: robhold).
+
+    None where that is not known.
+    """
     data = data_types.typed(value, data_types.TOOLDATA) if value is not None else None
-    return data_types.pose_matrix(data_types.part(data, "TFRAME")), data_types.part(data, "ROBHOLD") is False
+    held = data_types.part(data, "ROBHOLD")
+    pose = None if isinstance(held, syntax.Unclear) else data_types.pose_matrix(data_types.part(data, "TFRAME"))
+    return pose, held is False
 
 
 def frame_of_object(value: syntax.Value | None) -> tuple[Reals | None, bool]:
@@ -365,8 +386,10 @@ def frame_of_object(value: syntax.Value | None) -> tuple[Reals | None, bool]:
         data_types.pose_matrix(data_types.part(data, "OFRAME")),
     )
     still = data_types.part(data, "UFPROG") is True
-    pose = user @ own if user is not None and own is not None and still else None
-    return pose, data_types.part(data, "ROBHOLD") is True
+    held = data_types.part(data, "ROBHOLD")
+    if user is None or own is None or not still or isinstance(held, syntax.Unclear):
+        return None, held is True
+    return user @ own, held is True
 
 
 def _name_of(expression: object) -> str:
@@ -390,7 +413,9 @@ def _tool(memory: ProgramMemory, expression: object, value: syntax.Value) -> tup
     ), stationary
 
 
-def _load(memory: ProgramMemory, tool: instructions.NamedFrame, total: syntax.Value | None) -> instructions.Load | None:
+def _load(
+    memory: ProgramMemory, tool: instructions.NamedFrame, data: syntax.Value, total: syntax.Value | None
+) -> instructions.Load | None:
     """What the program says hangs on the flange: the tool, and what GripLoad says is in it (in the tool's frame).
 
     ``\\TLoad`` says all of it; load0 there is as if it were not given (1 MoveL).
@@ -400,17 +425,26 @@ def _load(memory: ProgramMemory, tool: instructions.NamedFrame, total: syntax.Va
         return instructions.UnclearLoad(f"\\TLoad {total.text if isinstance(total, syntax.Unclear) else ''}".strip())
     if whole is not None and whole.mass > data_types.MIN_LOAD:
         return whole
+    stated = data_types.part(data_types.typed(data, data_types.TOOLDATA), "TLOAD")
+    own = instructions.UnclearLoad(f"tload ({tool.name})") if _is_open(stated) else tool.load
     value = memory.read("%GRIPLOAD")
     if value is None:
-        return tool.load
+        return own
     gripped = data_types.load_of(data_types.typed(value, data_types.LOADDATA))
     if gripped is None:
         return instructions.UnclearLoad(f"GripLoad {value.text if isinstance(value, syntax.Unclear) else ''}".strip())
-    if gripped.mass <= data_types.MIN_LOAD:
-        return tool.load
+    if gripped.mass <= data_types.MIN_LOAD or isinstance(own, instructions.UnclearLoad):
+        return own
     if tool.pose is None:
         return instructions.UnclearLoad(f"GripLoad ({tool.name})", gripped.mass)
-    return together([*([tool.load] if tool.load else []), moved(gripped, tool.pose)])
+    return together([*([own] if own else []), moved(gripped, tool.pose)])
+
+
+def _is_open(value: syntax.Value | None) -> bool:
+    """Whether a part of a value is not known."""
+    if isinstance(value, syntax.Record):
+        return any(map(_is_open, value.values()))
+    return isinstance(value, syntax.Unclear) or (isinstance(value, tuple) and any(map(_is_open, value)))
 
 
 def _base(
@@ -480,10 +514,11 @@ def _zone(value: syntax.Value, options: Mapping[str, syntax.Value], expression: 
         return instructions.FINE
     own = syntax.number(options.get("Z"))
     data = data_types.typed(value, data_types.ZONEDATA)
-    if own is None and data_types.part(data, "FINEP") is True:
+    stops = data_types.part(data, "FINEP")
+    if "Z" not in options and stops is True:
         return instructions.FINE
-    size = syntax.number(data_types.part(data, "PZONE_TCP")) if own is None else own
-    if size is None:
+    size = own if "Z" in options else syntax.number(data_types.part(data, "PZONE_TCP"))
+    if size is None or ("Z" not in options and isinstance(stops, syntax.Unclear)):
         return instructions.Zone("named", 0.0, _name_of(expression) or "zonedata")
     return (
         instructions.Zone("distance", size / 1000, _name_of(expression) if own is None else "")
@@ -509,10 +544,14 @@ def _set(memory: ProgramMemory, call: syntax.Invocation) -> bool:
             memory.write("%SPEED", syntax.Unclear("VelSet") if found is None else found)
             return found is not None
         case "PATHACCLIM" | "WORLDACCLIM":
-            limits = [syntax.number(options.get(key)) for key in ("ACCMAX", "DECELMAX", "ON")]
+            on = dict(zip(("ACCMAX", "DECELMAX"), values))
+            limits = [
+                syntax.number(options.get(key)) for key in ("ACCMAX", "DECELMAX", "ON") if on.get(key) is not False
+            ]
             given = [each for each in limits if each is not None]
-            memory.write(f"%{call.function}", min(given) if given else syntax.Unclear("off"))
-            return True
+            known = all(isinstance(each, bool) for each in on.values())
+            memory.write(f"%{call.function}", min(given) if given and known else syntax.Unclear("off"))
+            return known
         case "PDISPOFF":
             memory.write("%PDISP", data_types.pose_record(np.eye(4)))
             return True
@@ -643,7 +682,7 @@ def _of_position(
         if here.joints is not None and len(here.joints) == 6:
             conf = (*data_types.quarters_of(here.joints), -1)
         elif isinstance(here.pose, np.ndarray):
-            conf = (syntax.Unclear("cf1"),) * 4
+            conf = (AS_IT_STANDS,) * 4
         return data_types.pos_record(seen[:3, 3]) if name == "CPOS" else _robtarget(seen, conf)
     data = data_types.typed(values[0], data_types.JOINTTARGET if name == "CALCROBT" else data_types.ROBTARGET)
     given_tool, _ = _tool(memory, given.arguments[1], values[1])

@@ -78,7 +78,7 @@ CHANGING = {
     "BITSET": 0,
 }
 """Instructions that change one of their arguments, by its number."""
-CHANGING_OPTIONS = frozenset(("TIMEFLAG", "VALUE", "VALUEATTIMEOUT", "BREAKFLAG"))
+CHANGING_OPTIONS = frozenset(("TIMEFLAG", "VALUE", "VALUEATTIMEOUT", "BREAKFLAG", "ERRORNUMBER"))
 """Optional arguments that instructions and functions change."""
 READING = ("READ", "GET", "UNPACK", "RMQGET", "RMQREAD", "SOCKETRECEIVE", "SOCKETACCEPT", "UIMSGBOX", "PACK", "COPYRAW")
 """How instructions begin that may change any variable that they are given."""
@@ -282,6 +282,9 @@ def read_rapid(source: ProgramText) -> syntax.Program:
         tuple(data),
         (*findings, *unlinked),
         source.lines,
+        beside=frozenset(
+            _set_by_tasks(source.path) & {name for cursor in cursors for name in _shared(cursor.source.text)}
+        ),
     )
 
 
@@ -483,6 +486,7 @@ class _ModuleReader:
         place, tokens = self.cursor.place(), self.cursor.simple()
         words = RapidWords(tokens)
         try:
+            elsewhere = words.next == "PERS"  # where it has no value here
             words.take()
             kind, name = words.name(), words.name()
             shape: Shape = scope.types.get(kind, (kind,))
@@ -510,7 +514,7 @@ class _ModuleReader:
             return
         if value is not None:
             value = scope.typed(scope.settled(value), shape)
-        elif initial is not None:
+        elif initial is not None and not elsewhere:
             value = syntax.Constant(initial)
         builder.add(syntax.Assign(place, syntax.Variable(name), value, self.cursor.text(tokens), kind, local))
 
@@ -1089,6 +1093,10 @@ GLOBAL = re.compile(
 WORD = re.compile(r"[^\W\d]\w*")
 LATE_CALL = re.compile(r"(?m)(?:^|;)\s*%(?!%)(?!\s*\"\w*\"\s*%)|\bCallByVar\b", re.IGNORECASE)
 """A call of a procedure whose name the text does not give."""
+TASK = re.compile(r"(?i)TASK\d+")
+"""Folder of a task in a controller's backup."""
+SHARED = re.compile(r"(?i)(\b(?:LOCAL|TASK)\s+)?\bPERS\s+\w+\s+(\w+)")
+SET = re.compile(r"(?i)(?<![\w.\\])(\w+)(?:\{[^}]*\}|\.\w+)*\s*:=|\b(?:Incr|Decr|Add|Clear)\s+(\w+)")
 FOLDERS = {"PROGMOD": "SYSMOD", "SYSMOD": "PROGMOD"}
 """Folders of a task in a controller's backup."""
 MAX_MODULES = 200
@@ -1131,6 +1139,37 @@ def _beside(path: Path) -> list[Path]:
         for each in sorted(folder.iterdir())
         if each.suffix.lower() in SUFFIXES and each.is_file() and each.resolve() != path.resolve()
     ]
+
+
+def companions(path: Path) -> tuple[Path, ...]:
+    """The modules on which a program depends, with those of the controller's other tasks."""
+    return (*modules_of(path), *_of_tasks(path))
+
+
+def _of_tasks(path: Path) -> list[Path]:
+    """The modules of the other tasks in a controller's backup."""
+    task = path.resolve().parents[1] if path.resolve().parent.name.upper() in FOLDERS else path
+    if not TASK.fullmatch(task.name):
+        return []
+    others = (each for each in sorted(task.parent.iterdir()) if TASK.fullmatch(each.name) and each != task)
+    folders = (each for other in others for each in sorted(other.iterdir()) if each.name.upper() in FOLDERS)
+    modules = (each for folder in folders for each in sorted(folder.iterdir()) if each.suffix.lower() in SUFFIXES)
+    return [each for each in modules if not _is_encoded(each)]
+
+
+def _set_by_tasks(path: Path) -> set[str]:
+    """Persistent data that other tasks in a controller's backup set: data of one name are one."""
+    found: set[str] = set()
+    for module in _of_tasks(path):
+        text = COMMENT_OR_TEXT.sub(" ", read_program_text(module).text)
+        rest = SHARED.sub(" ", text)
+        found |= {name.upper() for pair in SET.findall(rest) for name in pair} & _shared(text)
+    return found
+
+
+def _shared(text: str) -> set[str]:
+    """Persistent data of a module that all tasks share."""
+    return {name.upper() for own, name in SHARED.findall(text) if not own}
 
 
 def _is_encoded(path: Path) -> bool:
