@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Hashable, Iterable, Iterator, Mapping
+from collections.abc import Hashable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any, Literal
@@ -538,7 +538,6 @@ def _cycle(
     return CycleTime(stopping - saved + pauses, stopping + pauses, pauses, waits, again is not None, complete)
 
 
-SAME_PLACE = 1e-9  # rad or m, within which a motion starts where the one before ends
 MAX_MOTION_SHARE = 0.49  # that a rounded corner takes
 
 
@@ -590,7 +589,7 @@ def parts_of(check: ProgramCheck, robot: Robot, source: CommandSource) -> tuple[
         before = groups[-1][-1][1] if groups else motion
         loads = before.placed.motion.load, motion.placed.motion.load
         same = groups and (before.kind == "joint") == (motion.kind == "joint") and loads[0] == loads[1]
-        if same and before.end is not None and np.allclose(before.end, motion.start, rtol=0, atol=SAME_PLACE):
+        if same:
             groups[-1].append((line, motion))
         else:
             groups.append([(line, motion)])
@@ -600,30 +599,6 @@ def parts_of(check: ProgramCheck, robot: Robot, source: CommandSource) -> tuple[
     if not groups:
         raise InputError(source.file, f"{source.field}.program", "no motion has a known start", "Give start_deg")
     return [_part(group) for group in groups], tuple(sorted({*rest.values()} - {0}))
-
-
-OF_PATHS = frozenset(
-    (
-        *("above_limit", "below_limit", "slide_exceeded", "combination_exceeded", "target_out_of_reach"),
-        *("way_out_of_reach", "configuration_ends", "meets_singularity", "passes_singularity", "turns_at_start"),
-        *("too_fast", "faster_than_assumed", "acceleration_too_great", "accelerates_more_than_assumed"),
-        *("motion_collides", "clear_of_assumed", "undecided", "arc_has_no_circle"),
-    )
-)
-"""Findings of motions that are judged again of a path with them."""
-
-
-def doubts_of(check: ProgramCheck, rest: Iterable[int]) -> tuple[str, ...]:
-    """What is a caution or worse of a program, though the paths made of it do not show it: codes, each with its lines,
-    but for lines that are named as the ``rest`` of :func:`parts_of`."""
-    lines: dict[str, list[int]] = {}
-    own, named = check.execution.program.file, {*rest}
-    for each in check.findings:
-        if each.level in ("caution", "fail") and each.finding.code not in OF_PATHS:
-            line = each.place.line if each.place.file == own else 0
-            if line not in named:
-                lines.setdefault(each.finding.code, []).append(line)
-    return tuple(f"{code} ({', '.join(map(str, found))})" if any(found) else code for code, found in lines.items())
 
 
 def _moving(check: ProgramCheck) -> dict[Hashable, int]:

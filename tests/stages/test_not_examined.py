@@ -171,44 +171,6 @@ def test_rates_that_a_trajectory_of_ros_gives_are_no_pass(study, tmp_path):
         assert verdict.status == ("caution" if named else "pass")
 
 
-@pytest.mark.parametrize(
-    ("body", "doubts"),
-    [
-        ("PTP {A1 5}", ()),
-        ("PTP {A1 5,E1 500}", ("external_axes_left_out (2)",)),
-        ("$CORR_T={Z -300}\nPTP {A1 5}", ("program_not_understood (2)",)),
-        ("PTP {A1 5} C_PTP\nPTP {A1 9}", ("zone_without_size (2)",)),
-        ("PTP {A1 175}", ()),
-    ],
-)
-def test_what_a_programs_check_finds_that_its_paths_do_not_show_is_no_pass(study, tmp_path, body, doubts):
-    """A check of the program names it; a study that lists it among its paths passed."""
-    (tmp_path / "a.src").write_text(f"DEF a( )\n{body}\nEND\n")
-    job = {"name": "job", "title": "Job", "kind": "program", "program": str(tmp_path / "a.src"), "samples": 11}
-    listed = {"kind": "paths", "paths": [job | {"start_deg": [0, -10, -10, 0, -70, 0]}]}
-    (tmp_path / "paths.yaml").write_text(yaml.safe_dump(listed))
-    found = trajectory(changed(study, {"paths": str(tmp_path / "paths.yaml")}), ROBOT).summary
-    missed = {each.subject: each.names for each in found.verdict.missed}
-    assert missed == ({"program_doubts": tuple(f"job: {each}" for each in doubts)} if doubts else {})
-    assert found.verdict.status == ("caution" if doubts else "fail" if "175" in body else "pass")
-
-
-@pytest.mark.parametrize("last", [-10, -12])
-def test_motions_about_one_from_an_unknown_place_are_not_joined(study, tmp_path, last):
-    """The move that the program never makes was checked, and written as a program; without length it ended the run."""
-    line = "LIN {X 400,Y 0,Z %d,A 0,B 0,C 180}\n"
-    moves = f"{line % 400}DRIVE_ANYWHERE( )\nPTP {{A1 0,A2 -10,A3 -10,A4 0,A5 -70,A6 0}}\n{line % (410 + last)}"
-    (tmp_path / "a.src").write_text(f"DEF a( )\n$VEL.CP=0.1\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\n{moves}END\n")
-    job = {"name": "job", "title": "Job", "kind": "program", "program": str(tmp_path / "a.src"), "samples": 11}
-    listed = {"kind": "paths", "paths": [job | {"start_deg": [0, -10, -10, 0, -70, 0]}]}
-    (tmp_path / "paths.yaml").write_text(yaml.safe_dump(listed))
-    required = proof_requirements(study.robot(ROBOT), study.trajectory)
-    task = planning_of(study.robot(ROBOT), study.trajectory, None, 0)
-    first, second = listed_motions(tmp_path / "paths.yaml", task, required, 5)
-    assert [each.title for each in (first, second)] == ["Job, line 5", "Job, line 8"]
-    np.testing.assert_allclose(second.motion.q[0], np.radians([0, -10, -10, 0, -70, 0]), atol=1e-9)
-
-
 @pytest.mark.parametrize("blend", [None, 3.0])
 def test_rows_that_a_table_passes_beside_though_nobody_asked_for_it_are_no_pass(study, tmp_path, blend):
     """At a turn back, corners that are rounded over half of a side end far before the row; a program would go to it."""
@@ -343,8 +305,7 @@ def test_paths_of_a_program_name_its_lines_that_they_leave_out(study, tmp_path, 
     task = planning_of(study.robot(ROBOT), study.trajectory, None, 0)
     motions = [*listed_motions(tmp_path / "paths.yaml", task, required, 5)]
     left_out = by_subject(rest for each in motions for rest in each.left_out)
-    rest = [each.names for each in left_out if each.subject == "program_rest"]
-    assert rest == ([(f"job: {lines}",)] if lines else [])
+    assert [each.names for each in left_out] == ([(f"job: {lines}",)] if lines else [])
 
 
 def test_what_a_scene_allows_and_shows_of_a_tool_is_named(study):

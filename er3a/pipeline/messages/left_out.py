@@ -67,10 +67,6 @@ TEXTS = texts(
         "left_out.strategies": "avoidance strategies that the study does not ask for",
         "left_out.program_lines": "lines of programs that were not examined, or not each time",
         "left_out.program_rest": "lines of programs that may move the arm but belong to no path checked",
-        "left_out.program_doubts": (
-            "what the check of programs finds beside reach, limits, speeds and collisions (by its codes, with lines): "
-            "the paths that are made of programs do not show it"
-        ),
         "left_out.given_rates": (
             "velocities, accelerations and efforts that trajectory files give: between the points, motions are laid "
             "by positions and times alone, and a controller that follows the given rates moves otherwise there"

@@ -32,7 +32,7 @@ from er3a.planning.sequences import TURN_LENGTH, JointSequence, SegmentPath
 from er3a.planning.timing import JointLimits, joint_limits, standing, straight
 from er3a.planning.tool_proof import ProofRequirements, ToolProof, follow_and_prove
 from er3a.planning.way_around import NoWayAround, PlannedMove, PlanningTask, WayAround, way_between
-from er3a.program_check.check_program import CheckOptions, ProgramPart, check_program, doubts_of, parts_of
+from er3a.program_check.check_program import CheckOptions, ProgramPart, check_program, parts_of
 from er3a.programs.languages import read_program
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
@@ -40,13 +40,7 @@ from er3a.robots.robot import Robot
 
 @dataclass(frozen=True, eq=False)
 class PartOfProgram:
-    """A stretch of a program as an entry of a path file.
-
-    Attributes
-    ----------
-    rest : lines that no stretch of the program holds
-    doubts : what the program's check finds that its stretches do not show
-    """
+    """A stretch of a program as an entry of a path file; ``rest``: lines that no stretch of the program holds."""
 
     name: str
     title: str
@@ -54,7 +48,6 @@ class PartOfProgram:
     expected: tuple[PathVerdict, ...]
     part: ProgramPart
     rest: tuple[int, ...]
-    doubts: tuple[str, ...] = ()
 
     @property
     def kind(self) -> Literal["joint_sequence", "sequence"]:
@@ -83,12 +76,11 @@ def planned_entries(robot: Robot, entry: PathEntry | ProgramPath, source: Comman
     start = None if entry.start_deg is None else np.radians(entry.start_deg)
     check = check_program(read_program(entry.program), robot, CheckOptions(start=start, measures=False))
     parts, rest = parts_of(check, robot, source)
-    doubts = doubts_of(check, rest)
     for number, part in enumerate(parts, 1):
         name = f"{entry.name}_{number}" if len(parts) > 1 else entry.name
         first, last = part.lines
         title = f"{entry.title}, lines {first} to {last}" if last > first else f"{entry.title}, line {first}"
-        yield PartOfProgram(name, title, entry.samples, entry.expected, part, rest, doubts)
+        yield PartOfProgram(name, title, entry.samples, entry.expected, part, rest)
 
 
 FOLLOWED_AT = 1030  # times at which a path of the tool is solved at least: its branches depend on no samples
@@ -417,7 +409,6 @@ def listed_motions(
             ends[entry.name] = ends[listed.name] = end
             parts: tuple[tuple[LeftOutSubject, Sequence[object]], ...] = (
                 ("program_rest", entry.rest if isinstance(entry, PartOfProgram) else ()),
-                ("program_doubts", entry.doubts if isinstance(entry, PartOfProgram) else ()),
                 ("given_rates", motion.built.unread if motion else ()),
                 ("missed_rows", tuple(filter(None, [motion and rows_missed(task.robot, motion.built)]))),
             )
