@@ -345,7 +345,7 @@ def test_paths_of_a_program_carry_what_its_check_finds(study, tmp_path, name):
     assert any(str(line) in each.when for each in fault.moments)
     assert "good" not in summary.verdict.finding.of_program
     text = dict(zip(results.programs.file, results.programs.text))[f"{doubtful[0].name}.src"]
-    assert f"er3a check-program says of the program that this path is of: {code} (" in text
+    assert f"er3a: check-program says of the program that this path is of: {code} (" in text
 
 
 def test_a_path_fails_where_its_program_does(study, tmp_path):
@@ -373,12 +373,17 @@ def test_a_line_that_is_left_out_breaks_the_path(study, tmp_path):
 def test_a_program_that_no_path_can_be_made_of_leaves_the_others(study, tmp_path):
     tool = "$BASE=$NULLFRAME\n$TOOL={X 0,Y 0,Z 99,A 0,B 0,C 0}\nPTP {near}\nLIN_REL {Z 5}"
     entry = {"paths": program_paths(tmp_path, {"unknown": "PTP XSEEN", "tool": tool, "sound": "PTP {near}"})}
+    listed = yaml.safe_load(Path(entry["paths"]).read_text())
+    then = {"name": "then", "title": "Then", "kind": "joint", "samples": 5, "duration_s": 3, "after": "tool"}
+    listed["paths"].append(then | {"end_deg": [5, -10, -10, 0, -70, 0]})
+    Path(entry["paths"]).write_text(yaml.safe_dump(listed))
     results = trajectory(changed(study, entry, trajectory={"avoidance": "slow"}), ROBOT)
     assert [each.name for each in results.summary.paths] == ["good", "sound"]
     lost = {each.name: each.refused for each in results.summary.not_followed}
     assert lost == {
         "unknown": "no motion has a known start",
         "tool": "line 5 moves another tool than the robot's",
+        "then": "the path 'tool' does not reach its end",
     }
     assert results.summary.verdict.status == "caution"
     assert set(subjects(results)["paths"].names) == {f"{name}: {why}" for name, why in lost.items()}

@@ -135,6 +135,7 @@ def write(
     from er3a.pipeline.program_reports import missed_collisions, missed_line, programs_of, shapes_line
     from er3a.pipeline.progress import shown_work
     from er3a.pipeline.stages.left_out import left_out_without_tool
+    from er3a.pipeline.stages.trajectory.motion import by_subject
     from er3a.pipeline.viewing.conditions import program_head
     from er3a.programs.program_findings import TargetsLeftOut
     from er3a.programs.writing import with_head_lines
@@ -156,7 +157,7 @@ def write(
         for finding in made.findings:
             print_note(f"{made.name}: {say(finding)}")
         refused += bool(made.left_out) or any(isinstance(finding, TargetsLeftOut) for finding in made.findings)
-    missed = dict.fromkeys(each for made in programs for each in made.left_out)
+    missed = by_subject(each for made in programs for each in made.left_out)
     for line in filter(None, (shapes_line(arm), missed_line((*alone, *missed)))):
         print_note(line)
     if refused:

@@ -383,7 +383,7 @@ class PathNotFollowed:
     expect : what its file expects
     stops_at_s : of arms that are followed by their class, the time (s) beyond which the path is out of reach or asks a
         joint to leap; else None
-    refused : why no path can be made of a program; empty for others
+    refused : why no path can be made of a program, or from its end; empty for others
     """
 
     name: str

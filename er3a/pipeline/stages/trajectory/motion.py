@@ -318,8 +318,9 @@ class ListedMotion:
     """A motion, the entry that it belongs to, and its name (a program's stretches have names of their own).
 
     ``motion`` is None for a path of the tool that an arm of its class can't be made to follow, or not to its end;
-    ``ends`` then says when and why it is not; ``refused`` why no path can be made of a program. ``left_out``: lines of
-    its program that no motion is of, what the program's check finds, and what its file gives beside points and times.
+    ``ends`` then says when and why it is not; ``refused`` why no path can be made of a program, or from its end.
+    ``left_out``: lines of its program that no motion is of, what the program's check finds, and what its file gives
+    beside points and times.
     """
 
     listed: str
@@ -380,16 +381,17 @@ def listed_motions(
     Raises
     ------
     InputError
-        for what can't be planned; of a program's path the motion says it
+        for what can't be planned; of a program's path, and what starts at its end, the motion says it
     """
     ends: dict[str, Reals] = {}
-    nowhere = np.full(task.robot.joints, np.nan)
+    nowhere, lost = np.full(task.robot.joints, np.nan), set[str]()
     for i, listed in enumerate(load_paths(file).paths):
         source = CommandSource(file, f"paths[{i}]")
         try:
             entries = [*planned_entries(task, listed, source, required.near)]
         except InputError as error:
             ends[listed.name] = nowhere
+            lost.add(listed.name)
             yield ListedMotion(listed.name, listed.name, listed.title, listed.expected, None, refused=error)
             continue
         for entry in entries:
@@ -401,9 +403,10 @@ def listed_motions(
             except PathEndsError as error:
                 ended = error
             except InputError as error:
-                if not isinstance(entry, PartOfProgram):
+                if not isinstance(entry, PartOfProgram) and getattr(entry, "after", None) not in lost:
                     raise
                 refused = error
+                lost |= {listed.name, entry.name}
             ends[entry.name] = ends[listed.name] = nowhere if motion is None else motion.q[-1]
             part = entry if isinstance(entry, PartOfProgram) else None
             parts: tuple[tuple[LeftOutSubject, Sequence[object]], ...] = (

@@ -81,7 +81,7 @@ def written(
 def _of_its_program(motion: Motion) -> list[str]:
     """What was found in the program that a path is of, and the path does not show."""
     found = at_lines(motion.entry) if isinstance(motion.entry, PartOfProgram) else []
-    return [f"er3a check-program says of the program that this path is of: {ascii_text(each)}" for each in found]
+    return [f"check-program says of the program that this path is of: {ascii_text(each)}" for each in found]
 
 
 def near_assumed_shapes(
