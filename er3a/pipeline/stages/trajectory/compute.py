@@ -33,6 +33,7 @@ from er3a.pipeline.stages.left_out import (
 from er3a.pipeline.stages.programs.model import finding_at
 from er3a.pipeline.stages.trajectory import judgement, model
 from er3a.pipeline.stages.trajectory.motion import (
+    ListedMotion,
     Motion,
     by_subject,
     limits_of,
@@ -394,9 +395,7 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
         motion = each.motion
         rest += each.left_out if each.meant_safe else ()
         if motion is None:
-            known = each.outcome_unfollowed, each.expected, each.ends.t if each.ends else None
-            lacking, why = (None, each.refused.problem) if each.refused else (wrist_partition_missing(robot), "")
-            skipped.append(model.PathNotFollowed(each.name, each.title, lacking, *known, why))
+            skipped.append(_not_followed(robot, each))
             continue
         turned += _asked_of_tool(each.name, motion) if each.meant_safe else ()
         found = judgement.judge(robot, motion, near, limits)
@@ -406,9 +405,8 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
         clearances.append(judgement.clearance_rows(each.name, along))
         strategies.append(avoided.rows)
         last = judgement.clear_until(surroundings, motion, found, along, margin, limits.acceleration)
-        of_program = tuple(map(finding_at, each.found))
         path = path_summary(robot, motion, found, along, avoided, limits)
-        path = replace(path, clear_until=last, of_program=of_program)
+        path = replace(path, clear_until=last, of_program=tuple(map(finding_at, each.found)))
         paths.append(replace(path, sound_end=judgement.sound_end(path, tables[-1], used)))
         repair = avoided.rows.take(avoided.rows.strategy == (avoided.chosen or ""))
         close = near_assumed_shapes(robot, each.name, path.clearance, assumed_margin)
@@ -449,6 +447,14 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
         clearance=model.Clearances.stacked(clearances),
         avoidance=model.AvoidanceRows.stacked(strategies).of_joints(robot.slides),
         programs=model.ProgramFiles.stacked(programs),
+    )
+
+
+def _not_followed(robot: Robot, listed: ListedMotion) -> model.PathNotFollowed:
+    lacking, why = (None, listed.refused.problem) if listed.refused else (wrist_partition_missing(robot), "")
+    stops = listed.ends.t if listed.ends else None
+    return model.PathNotFollowed(
+        listed.name, listed.title, lacking, listed.outcome_unfollowed, listed.expected, stops, why
     )
 
 
