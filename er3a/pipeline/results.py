@@ -509,6 +509,16 @@ def input_records(files: Iterable[Path]) -> tuple[Input, ...]:
     return tuple(Input(shown_path(file), sha256(file), grades_in(file)) for file in files)
 
 
+def changed_since(folder: Path, study: Study, robot: str, stage: str) -> tuple[str, ...]:
+    """What a stage's results rest on otherwise than it is now: files by their content, and the study's settings."""
+    stored = _record(folder)["provenance"]
+    then = {each["path"]: each["sha256"] for each in stored["inputs"]}
+    now = {shown_path(file): sha256(file) for file in study.inputs(robot, stage) if file.is_file()}
+    changed = [path for path in sorted(then.keys() | now.keys()) if then.get(path) != now.get(path)]
+    settings = json.loads(json.dumps(plain(study.computed_from(robot, stage))))
+    return (*changed, *(["the study's settings"] if settings != stored["config"] else []))
+
+
 def result_records(results: Path, robots: Iterable[str]) -> tuple[Input, ...]:
     """What provenance says of the results of robots: their lists of checksums, and the checksum of each."""
     files = [results / robot / stage / CHECKSUMS for robot in robots for stage in STAGES]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,6 +13,7 @@ from pydantic import Field, PrivateAttr, create_model, model_validator
 from er3a.collision.scene import Scene
 from er3a.errors import InputError
 from er3a.files.annotations import catalogues_beside, translations_in
+from er3a.files.kept_files import sha256, shown_path
 from er3a.files.robot_file import NAME_PATTERN, Name, Placement, RobotFile, Text, check_placement
 from er3a.files.robot_library import LoadFields, placement_transform, read_robot, robot_of, robot_path
 from er3a.files.scene_file import load_scene
@@ -218,6 +220,11 @@ class StudyBase(StrictModel):
         more = REGISTRY[stage].inputs(self, name) if stage in REGISTRY else self.scenes(name, "trajectory")
         robot = self.robot_file(name)
         return [robot, *pieces_named_in(robot), *more]
+
+    def inputs_digest(self, name: str, stage: str) -> str:
+        """One checksum of the files that a stage reads for a robot, by their names and contents."""
+        read = sorted((shown_path(file), sha256(file)) for file in self.inputs(name, stage) if file.is_file())
+        return hashlib.sha256(repr(read).encode()).hexdigest()
 
     def section(self, kind: type[SettingsT]) -> SettingsT:
         """The resolved settings of one kind, such as ``InverseSettings``."""

@@ -10,7 +10,7 @@ from typing import Literal
 from er3a.pipeline.messages import language
 from er3a.pipeline.messages.left_out import left_out_names, left_out_text, say_reserved
 from er3a.pipeline.messages.say import bracketed, joined, say_all, sentence
-from er3a.pipeline.results import NotComputed, Status, is_computed, read_status, read_verdict
+from er3a.pipeline.results import NotComputed, Status, changed_since, is_computed, read_status, read_verdict
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
 
@@ -30,6 +30,7 @@ class StageVerdict:
     demonstrations : how many targets, paths, programs or objects in it fail as they are meant to
     expected : what the study says that the status is to be, if it does
     not_examined : what the verdict leaves out, in English
+    outdated : files that have changed since, or "the study's settings": the verdict is none on what they are now
     """
 
     robot: str
@@ -40,6 +41,7 @@ class StageVerdict:
     demonstrations: int = 0
     expected: str | None = None
     not_examined: tuple[str, ...] = ()
+    outdated: tuple[str, ...] = ()
 
     @property
     def is_demonstration(self) -> bool:
@@ -67,9 +69,9 @@ class StageVerdict:
         """Whether this is a finding at a level.
 
         A stage that broke is one at each, for it hides what it would say, and so is one that did not come to what the
-        study expects; a demonstration is none.
+        study expects, or whose inputs have changed since; a demonstration is none.
         """
-        if self.broken or self.is_otherwise:
+        if self.broken or self.is_otherwise or self.outdated:
             return True
         return self.status in _COUNTED[level] and not self.is_demonstration
 
@@ -83,18 +85,14 @@ def read_verdicts(study: Study, results: Path) -> list[StageVerdict]:
         results are damaged or of another format version, or no stage has any
     """
     with language.using("en"):
-        found = [
-            _stage_verdict(results, robot, stage, study.entry(robot).expect.get(stage))
-            for robot in study.names
-            for stage in study.stages(robot)
-        ]
+        found = [_stage_verdict(study, results, robot, stage) for robot in study.names for stage in study.stages(robot)]
     if all(verdict.status == NOT_EXAMINED for verdict in found):
         read_status(results / found[0].robot / found[0].stage)
     return found
 
 
-def _stage_verdict(results: Path, robot: str, name: str, expected: str | None) -> StageVerdict:
-    folder, stage = results / robot / name, STAGES[name]
+def _stage_verdict(study: Study, results: Path, robot: str, name: str) -> StageVerdict:
+    folder, stage, expected = results / robot / name, STAGES[name], study.entry(robot).expect.get(name)
     if not is_computed(folder):
         unknown = sentence("stage.not_examined")
         return StageVerdict(robot, name, NOT_EXAMINED, "stage.not_examined", unknown, expected=expected)
@@ -104,4 +102,7 @@ def _stage_verdict(results: Path, robot: str, name: str, expected: str | None) -
     missed = tuple(bracketed(left_out_text(each), left_out_names(each)) for each in left_out)
     first, *others = verdict.findings
     text = joined([say_reserved(first, left_out), say_all(others)], " ")
-    return StageVerdict(robot, name, verdict.status, verdict.finding.code, text, shown, expected, missed)
+    outdated = changed_since(folder, study, robot, name)
+    if outdated:
+        text = sentence("stage.outdated", names=joined(outdated, ", "), text=text)
+    return StageVerdict(robot, name, verdict.status, verdict.finding.code, text, shown, expected, missed, outdated)

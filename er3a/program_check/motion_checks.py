@@ -16,7 +16,7 @@ import numpy as np
 from er3a.by_value import ByValue
 from er3a.collision.along import RateBounds
 from er3a.errors import NotWristPartitionedError, PoseError
-from er3a.geometry.transforms import log_rotation
+from er3a.geometry.transforms import exp_rotation, log_rotation, rotation_angle
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import NearSingular, determinant_factors
@@ -329,6 +329,7 @@ def tool_motion_path(
     if max(shape.length, TURN_LENGTH * shape.turned) < NO_WAY:
         return None
     law, said = _turning_law(motion, (T_start, end), (shape.length, shape.turned), rules.assumed)
+    said += _turns_otherwise(motion, T_start, end)
     path: Segment = (
         line(T_start, end, law.duration, None, law.ramp)
         if via is None
@@ -386,6 +387,30 @@ def _turning_law(
         return law, ()
     speed = (along or assumed.tool_speed) / TURN_LENGTH
     return law, (found_in.TurnSpeedNotGiven(math.degrees(speed), next(filter(None, words), "")),)
+
+
+KRL_LINES = ("LIN", "SLIN", "CIRC", "SCIRC")
+APART = math.radians(1.0)
+
+
+def _turns_otherwise(motion: ArmMotion, start: Reals, end: Reals) -> tuple[found_in.CheckFinding, ...]:
+    """That a line of KRL may turn the tool on another way than about one axis, as it is checked.
+
+    KRL has speeds of their own for the turn of the tool's x axis and for that about it, and no public text says on
+    which way the tool turns if it does both.
+    """
+    if motion.form.removesuffix("_REL") not in KRL_LINES:
+        return ()
+    turn = start[:3, :3].T @ end[:3, :3]
+    x = turn[:, 0]
+    side = math.hypot(x[1], x[2])
+    swing = np.array([0.0, -x[2], x[1]]) * (math.atan2(side, x[0]) / side if side > 0 else 0.0)
+    about_x = log_rotation(exp_rotation(-swing) @ turn)
+    shares = np.array([0.25, 0.5, 0.75])[:, None]
+    apart = rotation_angle(
+        exp_rotation(shares * log_rotation(turn)), exp_rotation(shares * swing) @ exp_rotation(shares * about_x)
+    ).max()
+    return (found_in.TurnsOtherwise(math.degrees(apart)),) if apart > APART else ()
 
 
 def _arc(T_start: Reals, via: Reals, end: Reals, time: tuple[float, float | None], angle: float | None) -> Arc:

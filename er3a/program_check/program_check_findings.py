@@ -96,6 +96,20 @@ class PositionCompleted(Finding):
     text: str
 
 
+class TurnsOtherwise(Finding):
+    """A line of KRL turns the tool in a way that no public text settles; it was checked with one turn about one axis,
+    from which swinging the tool's x axis and turning about it are ``off_deg`` away at most."""
+
+    off_deg: float
+
+
+class RelativeTurnAssumed(Finding):
+    """Angles of a relative position were taken for turns about the axes of the base; added to those of the position
+    before, they lead to an orientation that is ``off_deg`` from that."""
+
+    off_deg: float
+
+
 class FramesInDoubt(Finding):
     """An instruction before, which is not understood, may have set another tool, base or path for this motion."""
 
@@ -445,6 +459,8 @@ CheckFinding = (
     | WaitsForOthers
     | ToolStatedElsewhere
     | PositionCompleted
+    | TurnsOtherwise
+    | RelativeTurnAssumed
     | FramesInDoubt
     | PathNotKnown
     | TargetOutOfReach

@@ -1146,6 +1146,8 @@ def _said(motion: instructions.ArmMotion) -> list[found_in.CheckFinding]:
         found.append(found_in.SplineAsLine())
     if motion.left_out:
         found.append(found_in.PositionCompleted(motion.left_out))
+    if motion.turn_in_doubt:
+        found.append(found_in.RelativeTurnAssumed(math.degrees(motion.turn_in_doubt)))
     if motion.doubt:
         found.append(found_in.FramesInDoubt(motion.doubt))
     return found
@@ -1158,7 +1160,18 @@ def _key(motion: instructions.ArmMotion) -> Hashable:
         (each.name, None if each.pose is None else each.pose.tobytes()) for each in (motion.tool, motion.base)
     )
     rates = (motion.speed, motion.turn_speed, motion.turning, motion.acceleration)
-    return (motion.kind, targets, motion.angle, rates, motion.zone, frames, motion.load, motion.left_out, motion.doubt)
+    return (
+        motion.kind,
+        targets,
+        motion.angle,
+        rates,
+        motion.zone,
+        frames,
+        motion.load,
+        motion.left_out,
+        motion.doubt,
+        motion.turn_in_doubt,
+    )
 
 
 def _target_key(target: instructions.Target | None) -> Hashable:

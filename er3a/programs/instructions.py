@@ -229,6 +229,7 @@ class ArmMotion(ByValue):
     turning : the same in KRL, of the turn of the tool's x axis and of that about it; None where the program gives none
     load : what hangs on the flange, in its frame; None where the program says nothing
     left_out : coordinates that a variable leaves out of its position, and that were taken from where the arm is
+    turn_in_doubt : rad, by which a relative position turns otherwise where its angles are added to those before
     doubt : an instruction before that is not understood, and may have set another tool, base or path; empty if there is
         none, and for targets that are no poses
     """
@@ -248,6 +249,7 @@ class ArmMotion(ByValue):
     turning: tuple[Turning | None, Turning | None] = (None, None)
     load: Load | None = None
     left_out: str = ""
+    turn_in_doubt: float = 0.0
     doubt: str = ""
 
 

@@ -809,7 +809,8 @@ class Machine:
         if doubt is not None:  # a part of it, or computed from what is in doubt
             memory.doubts[root(name)] = doubt
         if self.dialect.named(name):
-            memory.write(name + "%name", each.text.partition("=")[2].strip())
+            of = memory.key(each.value) if isinstance(each.value, syntax.Element) else None
+            memory.write(name + "%name", of or each.text.partition("=")[2].strip())
         if self.dialect.is_followed(name, value):
             return None
         memory.doubts[self.dialect.doubted(name)] = each.text

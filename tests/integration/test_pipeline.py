@@ -23,6 +23,8 @@ from er3a.files.robot_library import load_robot
 from er3a.pipeline.cli import app
 from er3a.pipeline.results import FORMAT_VERSION, check_results, write_checksums
 from er3a.pipeline.stages.registry import STAGES as REGISTRY
+from er3a.pipeline.study import load_study
+from er3a.pipeline.verdicts import read_verdicts
 from testing.small_study import stages_of
 from tests.conftest import ALL_THERE
 
@@ -30,11 +32,13 @@ STAGES = ("validation", "workspace", "collision", "inverse", "trajectory", "dyna
 
 
 @contextmanager
-def edited(path: Path, old: str, new: str) -> Iterator[None]:
-    """Change a file for a while; content and times are put back."""
+def edited(path: Path, old: str, new: str, newer: bool = True) -> Iterator[None]:
+    """Change a file for a while, which may stay as old as it was; content and times are put back."""
     text, times = path.read_text(), path.stat()
     assert old in text
     path.write_text(text.replace(old, new, 1))
+    if not newer:
+        os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
     try:
         yield
     finally:
@@ -147,8 +151,8 @@ def test_edits_of_a_kinematics_module_a_table_and_references_rerun_what_rests_on
     data = small_study.folder / "data"
     with (
         edited(small_study.folder / "er3a/kinematics/neighbours.py", '"""', '"""Edited. '),
-        edited(data / "robots/er3_600.yaml", "d_mm: 367.5", "d_mm: 367.6"),
-        edited(data / "manual_refs/er3a_c60/axes.csv", "cad", "export"),
+        edited(data / "robots/er3_600.yaml", "d_mm: 367.5", "d_mm: 367.6", newer=False),  # as from a backup
+        edited(data / "manual_refs/er3a_c60/axes.csv", "cad", "export", newer=False),
     ):
         planned = small_study.planned()
     assert {f"er3_600: compute {stage}" for stage in STAGES} <= planned
@@ -161,6 +165,23 @@ def test_edits_of_a_kinematics_module_a_table_and_references_rerun_what_rests_on
     assert views("er3a_c60", "inverse") <= others
     recorded = {job.rpartition(" ")[2] for job in others if "record" in job}
     assert recorded == {"validation", "inverse"}, "pages of the other stages quote validation, their results do not"
+
+
+def test_verdicts_say_what_has_changed_since(small_study, monkeypatch):
+    monkeypatch.chdir(small_study.folder)
+
+    def outdated() -> dict[tuple[str, str], tuple[str, ...]]:
+        found = read_verdicts(load_study("config/small.yaml"), Path("results"))
+        changed = {(each.robot, each.stage): each for each in found if each.outdated}
+        assert all(each.counts("fail") and "run the study again" in each.text for each in changed.values())
+        return {place: each.outdated for place, each in changed.items()}
+
+    assert outdated() == {}
+    with edited(Path("data/manual_refs/er3a_c60/axes.csv"), "cad", "export", newer=False):
+        assert outdated()["er3a_c60", "validation"] == ("data/manual_refs/er3a_c60/axes.csv",)
+        assert {stage for _, stage in outdated()} == {"validation"}
+    with edited(Path("config/small.yaml"), "seed: 20261120", "seed: 20261121"):
+        assert set(outdated().values()) == {("the study's settings",)}
 
 
 @pytest.mark.long

@@ -333,6 +333,14 @@ MENDED = {
         (krl("N=N+5", "PTP {A1 N}"), {"data": "INT N=0"}),
         (krl("N=0", "N=N+5", "PTP {A1 N}"), {"data": "INT N=0"}),
     ),
+    "turns_otherwise": (
+        krl(SOFT, AT_HOME, "LIN_REL {A 60,C 60} #TOOL"),
+        krl(SOFT, AT_HOME, "LIN_REL {A 60} #TOOL", "LIN_REL {C 60} #TOOL"),
+    ),
+    "relative_turn_assumed": (
+        krl(SOFT, AT_HOME, "LIN_REL {A 20}", "LIN_REL {B 5}"),
+        krl(SOFT, AT_HOME, "LIN_REL {A 20}", "LIN_REL {B 5} #TOOL"),
+    ),
     "waits_for_others": (
         (krl("N=0", "WAIT FOR N==1", "PTP {A1 N}"), {"data": "INT N=0"}),
         (krl("N=0", "WAIT FOR $IN[1]", "N=1", "PTP {A1 N}"), {"data": "INT N=0"}),

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from er3a.geometry.transforms import transform
 from er3a.program_check.check_program import CheckOptions, check_program
@@ -492,3 +493,112 @@ def test_a_turn_that_was_read_is_gone_back_to(tmp_path):
     found = check(tmp_path, krl(f"{body}PTP {{A6 250}}\nPTP P"), "a.src")
     last = list(found.motions.values())[-1]
     assert np.degrees(last.way.q[-1][5]) == pytest.approx(-100)
+
+
+CALLED = "DEF b( )\nPTP {A1 K}\nEND\n"
+
+
+@pytest.mark.parametrize(
+    ("own", "shared", "way"),
+    [
+        ("DECL INT K=5", "", None),  # b does not see it
+        ("DECL GLOBAL INT K=5", "", 5.0),
+        ("DECL INT K=5", "DECL GLOBAL INT K=9", 9.0),  # what b sees is the controller's
+        ("", "DECL GLOBAL INT K=9", 9.0),
+    ],
+)
+def test_a_module_does_not_see_what_its_caller_keeps_for_itself(tmp_path, own, shared, way):
+    (tmp_path / "a.dat").write_text(f"DEFDAT a PUBLIC\n{own}\nENDDAT\n")
+    (tmp_path / "$config.dat").write_text(f"DEFDAT $CONFIG\n{shared}\nENDDAT\n")
+    (tmp_path / "b.src").write_text(CALLED)
+    assert joints(tmp_path, "b( )") == ([] if way is None else [way])
+    if "K=5" in own:
+        assert joints(tmp_path, "PTP {A1 K}\nb( )")[0] == 5.0  # the program itself does
+
+
+def test_a_module_calls_the_module_of_a_name_and_not_its_caller_s_own_routine(tmp_path):
+    (tmp_path / "b.src").write_text("DEF b( )\nhelp( )\nEND\n")
+    (tmp_path / "help.src").write_text("DEF help( )\nPTP {A1 9}\nEND\n")
+    text = krl("b( )\nhelp( )", more="DEF help( )\nPTP {A1 5}\nEND\n")
+    found = motions(tmp_path, text, "a.src")
+    assert [round(float(np.degrees(each.target.joints[0]))) for each in found] == [9, 5]
+
+
+def test_a_parameter_of_a_module_is_not_the_variable_of_that_name(tmp_path):
+    (tmp_path / "b.src").write_text("DEF b(K:IN )\nINT K\nPTP {A1 K}\nEND\n")
+    (tmp_path / "b.dat").write_text("DEFDAT b\nDECL INT K=7\nENDDAT\n")
+    (tmp_path / "a.dat").write_text("DEFDAT a\nDECL INT K=5\nENDDAT\n")
+    assert joints(tmp_path, "b(9)") == [9.0]
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "TRIGGER WHEN DISTANCE=0 DELAY=F() DO $OUT[1]=TRUE",
+        "TRIGGER WHEN PATH=F() DELAY=0 DO $OUT[1]=TRUE",
+        "TRIGGER WHEN DISTANCE=0 DELAY=0 DO I=F()",
+        "STOP WHEN PATH=F() IF $IN[1]",
+        "ANIN ON X=1*F()+0",
+    ],
+)
+def test_a_function_is_followed_wherever_it_is_called(tmp_path, line):
+    more = "DEFFCT INT F( )\nN=9\nRETURN 0\nENDFCT\n"
+    (tmp_path / "a.dat").write_text("DEFDAT a\nDECL INT N=5\nENDDAT\n")
+    found = motions(tmp_path, krl(f"{line}\nPTP {{A1 N}}", more), "a.src")
+    assert [round(float(np.degrees(each.target.joints[0]))) for each in found] == [9]
+
+
+@pytest.mark.parametrize("folder", ["TP/Grip", "Program/sub", "System"])
+def test_modules_anywhere_in_an_archive_are_read(tmp_path, folder):
+    """USER_GRP is a controller's own name, whose file people edit."""
+    program, place = tmp_path / "KRC/R1/Program", tmp_path / "KRC/R1" / folder
+    for each in (program, place, tmp_path / "KRC/R1/System"):
+        each.mkdir(parents=True, exist_ok=True)
+    (place / "user_grp.src").write_text("GLOBAL DEF USER_GRP(N:IN)\nINT N\nPTP {A1 N}\nEND\n")
+    (place / "own.src").write_text("DEF own( )\nPTP {A1 9}\nEND\n")
+    assert joints(program, "USER_GRP(5)\nown( )") == [5.0, 9.0]
+
+
+def test_turning_speeds_of_the_controller_s_data_hold_after_initmov(tmp_path):
+    data = "REAL DEF_VEL_ORI1=20.0\nREAL DEF_VEL_ORI2=200.0\nREAL DEF_ACC_ORI1=20.0\nREAL DEF_ACC_ORI2=200.0\n"
+    (tmp_path / "$config.dat").write_text(f"DEFDAT $CONFIG\n{data}ENDDAT\n")
+    body = f"BAS(#INITMOV,0)\n{FRAMES}{SPEEDS}LIN {POSE % 0}\nLIN_REL {{A 60}}"
+    found = check(tmp_path, krl(body), "a.src")
+    assert list(found.motions.values())[-1].way.law.duration == pytest.approx(4.0)  # as of $VEL.ORI1 set directly
+
+
+def test_a_frame_by_an_index_that_is_known_is_called_by_its_number(tmp_path):
+    data = "BASE_DATA[2]={X 0,Y 0,Z 0,A 0,B 0,C 0}\nDECL INT N=2"
+    found = with_data(tmp_path, f"$BASE=BASE_DATA[N]\nLIN {POSE % 0}", data)
+    assert "frame_of_several" not in codes(found)
+    (moved,) = motions(tmp_path, krl(f"{FRAMES}$BASE=BASE_DATA[N]\nLIN {POSE % 0}"), "a.src")
+    assert moved.base.name == "BASE_DATA[2]"
+
+
+@pytest.mark.parametrize(
+    ("turn", "told"),
+    [("A 60", False), ("C 60", False), ("A 60,C 60", True), ("A 3,C 3", False)],
+)
+def test_a_line_of_krl_that_swings_the_tool_and_turns_it_too_is_no_pass(tmp_path, turn, told):
+    """In the tool's frame: A swings its x axis, C turns about it."""
+    body = f"{FRAMES}{SPEEDS}LIN {POSE % 0}\nLIN_REL {{{turn}}} #TOOL"
+    found = [each.finding for each in check(tmp_path, krl(body), "a.src").findings if each.place.line == 8]
+    apart = [each.off_deg for each in found if each.code == "turns_otherwise"]
+    assert bool(apart) == told
+    if told:  # exp(s r) against exp(s swing) exp(s twist), worked out with scipy
+        z, x = (Rotation.from_euler(axis, 60, degrees=True).as_rotvec() for axis in "zx")
+        whole = (Rotation.from_rotvec(z) * Rotation.from_rotvec(x)).as_rotvec()
+        ways = (
+            Rotation.from_rotvec(s * whole).inv() * Rotation.from_rotvec(s * z) * Rotation.from_rotvec(s * x)
+            for s in (0.25, 0.5, 0.75)
+        )
+        assert apart == [pytest.approx(max(np.degrees(each.magnitude()) for each in ways))]
+
+
+@pytest.mark.parametrize(
+    ("before", "turn", "told"),
+    [(0, "A 20", False), (0, "B 20", True), (40, "B 20", True), (40, "A 20", False), (40, "B 20} #TOOL ;", False)],
+)
+def test_the_angles_of_a_relative_position_in_the_base_may_mean_two_things(tmp_path, before, turn, told):
+    body = f"{FRAMES}{SPEEDS}LIN {{X 400,Y 0,Z 300,A {before},B 170,C 0}}\nLIN_REL {{{turn}}}"
+    assert ("relative_turn_assumed" in codes(check(tmp_path, krl(body), "a.src"))) == told

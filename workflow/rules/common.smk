@@ -104,6 +104,11 @@ def computed_from(stage):
     return lambda wildcards: STUDY.computed_from(wildcards.robot, stage)
 
 
+def contents(stage):
+    """Params function: digest of the files that a stage reads: Snakemake sees a changed file only if it is newer."""
+    return lambda wildcards: STUDY.inputs_digest(wildcards.robot, stage)
+
+
 def code_of(stage, verb):
     """Digest of the modules that a verb of a stage uses: Snakemake doesn't see edits of an imported package."""
     return STAGES[stage].digest(verb)

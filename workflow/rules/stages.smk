@@ -25,6 +25,7 @@ for stage in STAGES.values():
                 "../envs/er3a.yaml"
             params:
                 settings=settings(stage.name),
+                contents=contents(stage.name),
                 code=code_digest(f"{stage.package}.sample"),
             message:
                 f"{{wildcards.robot}}: sample the {stage.name}, part {{wildcards.scatteritem}}"
@@ -51,6 +52,7 @@ for stage in STAGES.values():
         params:
             stage=stage.name,
             settings=computed_from(stage.name),
+            contents=contents(stage.name),
             code=code_of(stage.name, "compute"),
         message:
             f"{{wildcards.robot}}: compute {stage.name}"

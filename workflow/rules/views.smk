@@ -66,6 +66,7 @@ rule teach:
         language=LANGUAGE,
         caption=lambda wildcards: pages.of_teach_panel(titled(wildcards.robot)),
         settings=settings("trajectory"),
+        contents=contents("teach"),
         code=code_digest("er3a.pipeline.teach.panel"),
     message:
         "{wildcards.robot}: write the teach panel"

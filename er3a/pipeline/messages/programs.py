@@ -115,6 +115,8 @@ REMEDIES: dict[str, str] = {
     "position_completed": N_("Give all coordinates of the position."),
     "frame_given_twice": N_("Correct the one that is wrong, or remove it from the frames."),
     "kept_to_next_start": N_("Set this variable at the program's beginning."),
+    "turns_otherwise": N_("Turn the tool by a joint motion, or in parts: swing its x axis first, then turn about it."),
+    "relative_turn_assumed": N_("Give the target as an absolute position, or turn in the tool's frame (#TOOL)."),
     "set_elsewhere": N_("Set this variable at the program's beginning."),
     "waits_for_others": N_(
         "Look up what else the task sets that answers this wait, and set what motions use after the wait."
@@ -324,6 +326,14 @@ TEXTS = texts(
         ),
         "position_completed": (
             "the position does not give {text}, taken from where the arm stands; no document says that of a variable"
+        ),
+        "turns_otherwise": (
+            "on the way the tool was turned about one axis; no public text says how KRL turns it: a swing of its x "
+            "axis and a turn about that are up to {off_deg:.1f} deg from there"
+        ),
+        "relative_turn_assumed": (
+            "the angles were taken for turns about the axes of the base; added to the angles before, they lead to an "
+            "orientation {off_deg:.1f} deg from that"
         ),
         "frame_given_twice": (
             "the program's own {name} was taken; that of the frames given for the check is {moved_mm:.1f} mm and "

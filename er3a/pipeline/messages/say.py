@@ -86,6 +86,7 @@ TEXTS = texts(
         "more": "{count} more",
         "stage.not_computed": "Not computed: {reason}",
         "stage.not_examined": "This stage has not been computed yet.",
+        "stage.outdated": "Changed since, so this tells of what was before (run the study again): {names}. {text}",
     }
 )
 

@@ -474,7 +474,7 @@ def _outcome(verdict: StageVerdict) -> str | None:
     """The element that says how a case ended; None where it passed."""
     if verdict.broken:
         return "error"
-    if verdict.is_otherwise:
+    if verdict.is_otherwise or verdict.outdated:
         return "failure"
     if verdict.is_skipped:
         return "skipped"

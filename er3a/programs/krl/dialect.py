@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from er3a.geometry.transforms import rotation_angle
 from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, syntax
 from er3a.programs.code_builder import variable_of
@@ -22,6 +23,7 @@ LEFT_OUT = "left out of"
 EXTERNAL_KEYS = ("E1", "E2", "E3", "E4", "E5", "E6")
 COORDINATES = frozenset((*FRAME_KEYS, *AXIS_KEYS, *EXTERNAL_KEYS))
 POSITION_KINDS = ("FRAME", "POS", "E6POS", *AXIS_KINDS)
+SAME_TURN = 1e-3  # rad
 SIGN_ZERO = 1e-7  # rad; nearer to 0 a joint's sign says nothing
 NOT_NUMBERS = ("NAN", "INF", "INFINITY")
 Frames = tuple[instructions.NamedFrame, instructions.NamedFrame]
@@ -92,6 +94,17 @@ def relative(memory: ProgramMemory, value: syntax.Value, frames: Frames, said: t
     found[:3, 3] += offset[:3, 3]
     found[:3, :3] = offset[:3, :3] @ seen[:3, :3]
     return instructions.PoseTarget(found, external=_external(value))
+
+
+def _turn_in_doubt(before: Reals | None, change: syntax.Value, goal: instructions.Target) -> float:
+    """How far (rad) a relative position's orientation is from that with its angles added to those before."""
+    if before is None or not isinstance(change, syntax.Record) or not isinstance(goal, instructions.PoseTarget):
+        return 0.0
+    added = [syntax.number(change.get(key)) or 0.0 for key in FRAME_KEYS[3:]]
+    numbers = np.add(instructions.numbers_of(before, "kuka"), (0.0, 0.0, 0.0, *added))
+    other = instructions.pose_of(tuple(numbers.tolist()), "kuka")
+    apart = float(rotation_angle(goal.pose[:3, :3], other[:3, :3]))
+    return apart if apart > SAME_TURN else 0.0
 
 
 def _unresolved(value: syntax.Unclear) -> instructions.UnresolvedTarget:
@@ -269,9 +282,12 @@ def _initial(memory: ProgramMemory) -> None:
     _all_axes(memory, "$VEL_AXIS", 100)
     _line_acceleration(memory, 100)
     memory.write("$VEL.CP", memory.read("DEF_VEL_CP") or syntax.Unclear("DEF_VEL_CP"))
-    for part in ("ORI1", "ORI2"):  # as the machine data say
-        for name in (f"$VEL.{part}", f"$ACC.{part}"):
+    for name in TURN_RATES:
+        given = memory.read(f"DEF_{name[1:].replace('.', '_')}")
+        if given is None:  # as the machine data say
             memory.shared.pop(name, None)
+        else:
+            memory.write(name, given)
     for part in ("CPTP", "CDIS", "CVEL", "CORI"):
         memory.write(f"$APO.{part}", memory.read(f"DEF_APO_{part}") or syntax.Unclear(f"DEF_APO_{part}"))
     memory.write("$ORI_TYPE", "#VAR")
@@ -478,6 +494,7 @@ def _zone_data(memory: ProgramMemory, data: syntax.Value, usual: str) -> None:
 KINDS: dict[str, instructions.MotionKind] = {"PTP": "joint", "LIN": "line", "CIRC": "arc", "SPL": "spline"}
 MODAL = ("$TOOL", "$BASE", "$LOAD", "$VEL", "$ACC", "$APO", "$VEL_AXIS", "$ACC_AXIS", "$IPO_MODE", "$ORI_TYPE")
 MODAL_DATA = ("PDAT_ACT", "LDAT_ACT", "FDAT_ACT", "%spline")
+TURN_RATES = ("$VEL.ORI1", "$VEL.ORI2", "$ACC.ORI1", "$ACC.ORI2")
 CORRECTIONS = {
     "$TOOL": (("TOOL_CORR_W_ON", "TOOL_CORR_W"), ("TOOL_CORR_ON", "TOOL_CORR")),
     "$BASE": (("BASE_CORR_ON", "BASE_CORR"), ("M_BAS_COR_ON", "M_BASE_CORR")),
@@ -485,6 +502,7 @@ CORRECTIONS = {
 """Switches and frames that controllers' own bas.src puts before and after the frame that it takes by its number."""
 READ_BY_NUMBER = (
     *("TOOL_DATA", "BASE_DATA", "LOAD_DATA", "DEF_VEL_CP", "DEF_ACC_CP", "DEF_CIRC_TYP", "MACHINE_FRAME_DAT"),
+    *("DEF_VEL_ORI1", "DEF_VEL_ORI2", "DEF_ACC_ORI1", "DEF_ACC_ORI2"),
     *(name for pairs in CORRECTIONS.values() for pair in pairs for name in pair),
 )
 """What ``BAS`` and settings after WITH read without naming it."""
@@ -742,6 +760,10 @@ class KrlDialect(Dialect):
             made = [self._unturned(memory, each, (tool, base)) for each in made]
         if kind != "joint":  # which ignores S and T
             made = [replace(each, branch=None) if isinstance(each, instructions.PoseTarget) else each for each in made]
+        in_doubt = 0.0
+        if plain != move.form and not in_tool:
+            before = memory.here.seen(tool, base, memory.cell.flange)
+            in_doubt = max(_turn_in_doubt(before, value, goal) for value, goal in zip(values, made))
         via = made[0] if kind == "arc" else None
         block = memory.shared.get("%spline")
         return instructions.ArmMotion(
@@ -757,6 +779,7 @@ class KrlDialect(Dialect):
             base,
             block if isinstance(block, int) and block else None,
             left_out="; ".join(filter(None, left_out)),
+            turn_in_doubt=in_doubt,
             turning=(None, None) if kind == "joint" else (_turning(memory, "ORI1"), _turning(memory, "ORI2")),
             load=load,
         )

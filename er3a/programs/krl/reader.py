@@ -28,7 +28,7 @@ from er3a.programs.code_builder import (
 )
 from er3a.programs.evaluation import STRUCTURE
 from er3a.programs.instructions import Aside, Place, Remark
-from er3a.programs.krl.dialect import HERE, HERE_JOINTS, MODAL, changed_arguments, record_pose
+from er3a.programs.krl.dialect import HARMLESS, HERE, HERE_JOINTS, MODAL, changed_arguments, record_pose
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, data_file_of, read_program_text
 from er3a.programs.program_findings import DataFileMissing, NameTwice, NotSimulated, ProgramFinding
 
@@ -123,6 +123,7 @@ WORDS_ASIDE = """
 EXT EXTFCT IMPORT ENUM CONTINUE ANOUT BRAKE CONST_VEL ON_ERROR_PROCEED STOP
 """
 ASIDES = frozenset(WORDS_ASIDE.split())
+WITH_VALUES = frozenset(["ANOUT", "CONST_VEL", "STOP"])  # of these
 OUTER_AXES = frozenset(["ASYPTP", "ASYCONT", "ASYSTOP", "ASYCANCEL"])  # which run beside the arm's own
 Handler = Callable[["_Statement"], None]
 
@@ -171,7 +172,7 @@ class _Statement:
             words.take()
             HANDLERS[first](self)
         elif first in ASIDES:
-            self.builder.aside(self.place, self.text)
+            _aside(self)
         elif first in OUTER_AXES:
             self.builder.unknown(self.place, self.text, may_move=False)
         elif first in ("DECL", "GLOBAL", "CONST", "SIGNAL") or self._declares():
@@ -354,6 +355,7 @@ def _anin(reading: _Statement) -> None:
     if not reading.words.accept("ON"):
         reading.builder.aside(reading.place, reading.text)
         return
+    _functions_in(reading, reading.text)
     target = reading.words.reference()
     reading.words.expect("=")
     reading.builder.beside(reading.place, syntax.Invocation(syntax.CYCLIC, (target,)), reading.text, "interrupt")
@@ -390,6 +392,7 @@ def _do(reading: _Statement, at_any_time: bool = False) -> None:
     asked = re.search(r"(?i)\bDO\b(.*?)(\bPRIO\s*=.*)?$", reading.text)
     if asked is None:
         raise MisreadError("expected DO")
+    _functions_in(reading, reading.text[: asked.start()] + asked[1].partition("=")[2])
     words = KrlWords(asked[1])
     what = words.expression()
     if isinstance(what, syntax.Invocation):
@@ -405,6 +408,18 @@ def _do(reading: _Statement, at_any_time: bool = False) -> None:
         reading.builder.unclear(reading.place, variable_of(reading.known(what)))
     else:
         raise MisreadError("DO calls no routine and sets nothing")
+
+
+def _functions_in(reading: _Statement, text: str) -> None:
+    """Functions that are called somewhere in a line whose other parts move nothing; with what, is not followed."""
+    for name in CALL.findall(text):
+        reading.builder.add(syntax.Doing(reading.place, syntax.Invocation(name.upper(), ()), f"{name}(...)"))
+
+
+def _aside(reading: _Statement) -> None:
+    reading.builder.aside(reading.place, reading.text)
+    if reading.words.texts[0] in WITH_VALUES:
+        _functions_in(reading, reading.text)
 
 
 def _structure(reading: _Statement) -> None:
@@ -503,11 +518,34 @@ def apart(
     own |= {routine.name for routine in routines} - seen
     names = {name: f"{module}/{name}" for name in own if not name.startswith(("$", "%"))}
 
-    def code(operations: Iterable[syntax.Operation]) -> tuple[syntax.Operation, ...]:
-        return tuple(_renamed(operation, names) for operation in operations)
+    return [_with_names(each, names) for each in routines], [_as(each, names) for each in data]
 
-    placed = [replace(each, name=names.get(each.name, each.name), code=code(each.code)) for each in routines]
-    return placed, [each for each in code(data) if isinstance(each, syntax.Assign)]
+
+def _seen_here_alone(
+    source: ProgramText, routines: Iterable[syntax.Routine], data: Iterable[syntax.Assign]
+) -> dict[str, str]:
+    """Names of a program's own routines and data, which other modules do not see, with what those mean by them."""
+    own, module = data_file_of(source.path, ".dat"), source.path.stem.upper()
+    seen = {module, *(name.upper() for name in GLOBAL_ROUTINE.findall(source.text))}
+    names = {variable_of(each.target) for each in data if each.place.file == own and not GLOBAL_NAME.search(each.text)}
+    names |= {routine.name for routine in routines} - seen
+    return {name: f"/{name}" for name in names if not name.startswith(("$", "%"))}
+
+
+def _with_names(routine: syntax.Routine, names: Mapping[str, str]) -> syntax.Routine:
+    """A routine, and what it names but for its parameters and its own variables, under other names."""
+    declared = (each.target for each in routine.code if isinstance(each, syntax.Assign) and each.local)
+    own = {*map(variable_of, declared), *(each.name for each in routine.parameters)}
+    others = {name: other for name, other in names.items() if name not in own}
+    code = tuple(_renamed(operation, others) for operation in routine.code)
+    return replace(routine, name=names.get(routine.name, routine.name), code=code)
+
+
+def _as(data: syntax.Assign, names: Mapping[str, str]) -> syntax.Assign:
+    """Data, and what they name, under other names."""
+    found = _renamed(data, names)
+    assert isinstance(found, syntax.Assign)
+    return found
 
 
 def _renamed(operation: syntax.Operation, names: Mapping[str, str]) -> syntax.Operation:
@@ -557,12 +595,13 @@ def read_krl(source: ProgramText) -> syntax.Program:
     findings += _robot_root(source.path)
     beside, elsewhere = _changed_by_others(source.path, reader.data, of_controller)
     called: list[syntax.Routine] = []
+    hidden = _seen_here_alone(source, routines, reader.data)
+    reader.data = [each if each.place.file == data_file else _as(each, hidden) for each in reader.data]
     for file in modules_of(source.path):
-        if all(routine.name != file.stem.upper() for routine in routines):
-            more_routines, more_data, more = _module(read_program_text(file), of_controller)
-            called += more_routines
-            reader.data += more_data
-            findings += more
+        more_routines, more_data, more = _module(read_program_text(file), of_controller)
+        called += [_with_names(each, hidden) for each in more_routines]
+        reader.data += [_as(each, hidden) for each in more_data]
+        findings += more
     if data_file is None and lacks_data(routines, reader.data, CONFIG_NAMES):
         findings.append(DataFileMissing(source.path.with_suffix(".dat").name))
     by_name, unlinked = linked([*called, *routines], changed_arguments)
@@ -750,8 +789,10 @@ def _set_in(source: ProgramText, shared: Container[str], of_controller: Signals)
 
 CALL = re.compile(r"\b([A-Za-z]\w*)\s*\(")
 MAX_MODULES = 200
-BASICS, BASICS_FILES = "BAS", ("bas.src", "BAS.SRC", "Bas.src", "BAS.src")
+OF_CONTROLLER = ("BAS", "USER_GRP", "IR_STOPM")
+"""The controller's own modules that set what motions use, or that people edit."""
 DEEPEST = 6  # folders of an archive
+OF_ARCHIVE = ("System", "Mada", "TP")  # of its folders
 
 
 def companions(path: Path) -> tuple[Path, ...]:
@@ -765,24 +806,34 @@ def companions(path: Path) -> tuple[Path, ...]:
 def modules_of(path: Path) -> tuple[Path, ...]:
     """The modules that a .src file calls, and those that these call, in the order in which they are met.
 
-    They lie beside it; the controller's own bas.src may also lie where an archive has it.
+    They lie beside it, or anywhere in the controller's archive. Of the controller's own modules, of which it is known
+    that they move nothing, those are read that set what motions use, or that people edit.
     """
-    beside = {
-        each.stem.upper(): each
-        for each in sorted(path.parent.iterdir())
-        if each.suffix.lower() == ".src" and each.is_file()
-    }
-    if BASICS not in beside and (basics := _in_archive(path, BASICS_FILES)) is not None:
-        beside[BASICS] = basics
-    beside.pop(path.stem.upper(), None)
+    known: dict[str, Path] = {}
+    for each in _all_modules(path):
+        name = each.stem.upper()
+        if each.parent == path.parent or name in OF_CONTROLLER or name not in HARMLESS:
+            known.setdefault(name, each)
+    known.pop(path.stem.upper(), None)
     found: list[Path] = []
     waiting = [path]
-    while beside and waiting and len(found) < MAX_MODULES:
+    while known and waiting and len(found) < MAX_MODULES:
         called = dict.fromkeys(name.upper() for name in CALL.findall(read_program_text(waiting.pop(0)).text))
-        new = [beside.pop(name) for name in called if name in beside]
+        new = [known.pop(name) for name in called if name in known]
         found += new
         waiting += new
     return tuple(found)
+
+
+def _all_modules(path: Path) -> list[Path]:
+    """The modules of the controller that a program is for: those beside it, then all others of its archive."""
+    above = list(path.resolve().parents)[:DEEPEST]
+    archive = next((folder for folder in above if any((folder / each).is_dir() for each in OF_ARCHIVE)), None)
+    beside = sorted(path.parent.iterdir())
+    others = sorted(archive.rglob("*")) if archive else []
+    here = path.parent.resolve()
+    found = (*beside, *(each for each in others if each.parent != here))
+    return [each for each in found if each.suffix.lower() == ".src" and each.is_file()]
 
 
 def shared_data_of(path: Path) -> Path | None:
@@ -819,13 +870,11 @@ def _submits(path: Path) -> tuple[Path, ...]:
 
 def _others(path: Path) -> tuple[Path, ...]:
     """Modules of the same controller that a program does not call; none where all modules share no variable."""
-    shared, own = shared_data_of(path), data_file_of(path, ".dat")
-    if shared is None and (own is None or not GLOBAL_NAME.search(read_program_text(own).text)):
+    own = data_file_of(path, ".dat")
+    if shared_data_of(path) is None and (own is None or not GLOBAL_NAME.search(read_program_text(own).text)):
         return ()
-    inside = path.parent if shared is None or shared.parent == path.parent else shared.parent.parent
-    called = {path.resolve(), *(each.resolve() for each in modules_of(path))}
-    found = (each for each in sorted(inside.rglob("*")) if each.suffix.lower() == ".src" and each.is_file())
-    return tuple(each for each in found if each.resolve() not in called)
+    called = {path, *modules_of(path)}
+    return tuple(each for each in _all_modules(path) if each not in called)
 
 
 def _in_archive(path: Path, names: Iterable[str], inside: str = "System") -> Path | None:
