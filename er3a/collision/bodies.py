@@ -36,6 +36,7 @@ class Bodies:
 
     Attributes
     ----------
+    scene : as given; None for none
     capsules : all bodies that move; each has its ``link``
     first : (P,) int, number of the pair's body; of two links the one nearer to the base
     second : (P,) int, number of the other link's body, -1 for a solid
@@ -50,7 +51,7 @@ class Bodies:
     def __init__(self, robot: Robot, scene: Scene | None) -> None:
         if not isinstance(scene, Scene | None):
             raise Er3aError(f"the scene is a {type(scene).__name__}; expected what er3a.load_scene returns")
-        self.robot = robot
+        self.robot, self.scene = robot, scene
         own, carried = arm_bodies(robot), carried_bodies(robot, scene)
         matrix = collision_matrix(robot)
         watched, joined = list(matrix.watched), list(matrix.joined)

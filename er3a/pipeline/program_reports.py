@@ -427,6 +427,8 @@ def programs_of(
     for each in listed_motions(file, task, ProofRequirements(task.limits.rates, USUAL_NEAR), CHECKS_PER_SAMPLE):
         if only and each.listed not in only:
             continue
+        if each.refused:
+            raise each.refused
         if each.motion is None:
             yield PathProgram(each.name, each.outcome_unfollowed, None)
             continue

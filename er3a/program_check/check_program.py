@@ -539,6 +539,7 @@ def _cycle(
 
 
 MAX_MOTION_SHARE = 0.49  # that a rounded corner takes
+SAME_PLACE = 1e-6  # rad or m, by which the start of a motion may be off the end of the one before
 
 
 @dataclass(frozen=True, eq=False)
@@ -549,20 +550,36 @@ class ProgramPart:
     ----------
     lines : of the first and the last instruction
     load : what the program says hangs on the flange, as of its motions
+    found : of at least caution that the program's check finds, and that a check of the path alone does not: at its
+        motions, or at none of any stretch
     """
 
     kind: Literal["joint_sequence", "sequence"]
     lines: tuple[int, int]
     made: Command
     load: Load | None = None
+    found: tuple[LocatedFinding, ...] = ()
 
     def command(self, source: CommandSource) -> Command:
         """The path, with what errors call it."""
         return replace(self.made, source=source)
 
 
+FOUND_OF_PATHS = frozenset(
+    (
+        *("above_limit", "below_limit", "slide_exceeded", "combination_exceeded", "target_out_of_reach"),
+        *("way_out_of_reach", "configuration_ends", "meets_singularity", "passes_singularity", "undecided"),
+        *("motion_collides", "clear_of_assumed", "pairs_unexamined"),
+    )
+)
+"""Findings that a check of the path makes too: it follows the same joints. Speeds and zones are not among these: a
+stretch has one law of time, and one way round each corner or a stop there."""
+
+
 def parts_of(check: ProgramCheck, robot: Robot, source: CommandSource) -> tuple[list[ProgramPart], tuple[int, ...]]:
     """The way with the most motions, up to the first motion that can't be carried out; that one is the last.
+
+    A stretch ends where the next motion starts elsewhere, or something between them moves the arm, or may.
 
     Returns
     -------
@@ -574,31 +591,54 @@ def parts_of(check: ProgramCheck, robot: Robot, source: CommandSource) -> tuple[
     InputError
         for a program that does not move the arm, or whose tool is not the robot's
     """
-    groups: list[list[tuple[int, CheckedMotion]]] = []
-    rest = _moving(check)
+    groups: list[list[tuple[Place, CheckedMotion]]] = []
+    rest, joined = _moving(check), True
     for number in check.main:
-        motion = check.motions.get(number)
+        step, motion = check.execution.steps[number], check.motions.get(number)
         if motion is None or motion.stays or motion.start is None:
+            leads_on = not _may_move(step.instruction) if motion is None else motion.stays
+            joined = joined and leads_on
             continue
         if motion.way is None or motion.placed.motion.angle is not None:
             break
-        line = check.execution.steps[number].place.line
+        line = step.place.line
         if motion.kind != "joint" and not np.allclose(motion.placed.arm.tool, robot.tool, rtol=0, atol=1e-12):
             problem = f"line {line} moves another tool than the robot's"
             raise source.error("program", problem, "Give the robot this tool in its file or in the study")
-        before = groups[-1][-1][1] if groups else motion
-        loads = before.placed.motion.load, motion.placed.motion.load
-        same = groups and (before.kind == "joint") == (motion.kind == "joint") and loads[0] == loads[1]
-        if same:
-            groups[-1].append((line, motion))
+        if groups and joined and _goes_on(groups[-1][-1][1], motion):
+            groups[-1].append((step.place, motion))
         else:
-            groups.append([(line, motion)])
+            groups.append([(step.place, motion)])
+        joined = True
         rest.pop(_same_for(check, number), None)
         if motion.end is None:
             break
     if not groups:
         raise InputError(source.file, f"{source.field}.program", "no motion has a known start", "Give start_deg")
-    return [_part(group) for group in groups], tuple(sorted({*rest.values()} - {0}))
+    found = [each for each in check.findings if found_in.RANKS[each.level] >= found_in.RANKS["caution"]]
+    found = [replace(each, joint_moves=()) for each in found if each.finding.code not in FOUND_OF_PATHS]
+    whose = [{place for place, _ in group} for group in groups]
+    parts = [
+        replace(
+            _part([(place.line, motion) for place, motion in group]),
+            found=tuple(each for each in found if each.place in own or not any(each.place in other for other in whose)),
+        )
+        for group, own in zip(groups, whose)
+    ]
+    return parts, tuple(sorted({*rest.values()} - {0}))
+
+
+def _may_move(instruction: object) -> bool:
+    return isinstance(instruction, Unknown) and instruction.may_move
+
+
+def _goes_on(before: CheckedMotion, motion: CheckedMotion) -> bool:
+    """Whether a motion belongs to the stretch of the one before."""
+    assert before.end is not None
+    assert motion.start is not None
+    same_place = np.allclose(before.end, motion.start, rtol=0, atol=SAME_PLACE)
+    loads = before.placed.motion.load, motion.placed.motion.load
+    return bool(same_place and (before.kind == "joint") == (motion.kind == "joint") and loads[0] == loads[1])
 
 
 def _moving(check: ProgramCheck) -> dict[Hashable, int]:
@@ -610,7 +650,7 @@ def _moving(check: ProgramCheck) -> dict[Hashable, int]:
         if not motion.stays
     }
     for step in execution.steps:
-        if isinstance(step.instruction, Unknown) and step.instruction.may_move:
+        if _may_move(step.instruction):
             found[step.place] = execution.own_line(step)
     lines = {step.place: execution.own_line(step) for step in execution.steps}
     missed = (each for each in check.not_examined if each.what in ("motion", "course"))

@@ -54,6 +54,7 @@ from er3a.pipeline.stages.trajectory.motion import (
     planning_of,
     proof_requirements,
 )
+from er3a.pipeline.stages.trajectory.played import faults
 from er3a.pipeline.stages.trajectory.report import report
 from er3a.pipeline.stages.validation.compute import compute as validation
 from er3a.pipeline.stages.vision.compute import compute as vision
@@ -304,8 +305,108 @@ def test_paths_of_a_program_name_its_lines_that_they_leave_out(study, tmp_path, 
     required = proof_requirements(study.robot(ROBOT), study.trajectory)
     task = planning_of(study.robot(ROBOT), study.trajectory, None, 0)
     motions = [*listed_motions(tmp_path / "paths.yaml", task, required, 5)]
-    left_out = by_subject(rest for each in motions for rest in each.left_out)
-    assert [each.names for each in left_out] == ([(f"job: {lines}",)] if lines else [])
+    left_out = {each.subject: each.names for each in by_subject(rest for each in motions for rest in each.left_out)}
+    assert left_out.get("program_rest", ()) == ((f"job: {lines}",) if lines else ())
+
+
+def program_paths(folder: Path, programs: dict[str, str], start=(0, -10, -10, 0, -70, 0)) -> str:
+    """A path file with a good joint move and a path of each program, in KRL; {near} and {far} are joint targets."""
+    near, far = "{A1 10,A2 -15,A3 -5,A4 5,A5 -60,A6 10}", "{A1 20,A2 -5,A3 -15,A4 -5,A5 -65,A6 20}"
+    good = {"name": "good", "title": "Good", "kind": "joint", "samples": 5, "duration_s": 3}
+    paths = [good | {"start_deg": [0, -10, -10, 0, -70, 0], "end_deg": [5, -10, -10, 0, -70, 0]}]
+    for name, body in programs.items():
+        file = folder / f"{name}.src"
+        file.write_text(f"DEF {name}( )\n{body.replace('{near}', near).replace('{far}', far)}\nEND\n")
+        made = {"name": name, "title": name, "kind": "program", "program": str(file), "samples": 11}
+        paths.append(made | ({"start_deg": [*start]} if start else {}))
+    (folder / "paths.yaml").write_text(yaml.safe_dump({"kind": "paths", "paths": paths}))
+    return str(folder / "paths.yaml")
+
+
+DOUBTS = {
+    "external": ("PTP {near}\nPTP {A1 12,E1 500}", "external_axes_left_out", 3),
+    "spline": ("PTP {near}\nSPLINE\nSPL {X 430,Y 82,Z 460,A -2.6,B -8.9,C -173.6}\nENDSPLINE", "spline_as_line", 4),
+    "correction": ("PTP {near}\n$CORR_T={Z -300}\nLIN_REL {Z 10}", "program_not_understood", 3),
+    "interrupt": (
+        "INTERRUPT DECL 3 WHEN $IN[1]==TRUE DO AWAY( )\nINTERRUPT ON 3\nPTP {near}\nEND\nDEF AWAY( )\nPTP {far}",
+        "moves_beside",
+        2,
+    ),
+    "speed": ("$VEL_AXIS[1]=$ANIN[1]\nPTP {near}", "speed_not_given", 3),
+    "half": ("XSTART={A1 5}\nPTP XSTART\nPTP {near}", "position_completed", 3),
+    "zone": ("PTP {near} C_PTP\nPTP {far}", "zone_without_size", 2),
+}
+
+
+@pytest.mark.parametrize("name", DOUBTS)
+def test_paths_of_a_program_carry_what_its_check_finds(study, tmp_path, name):
+    """The path is safe, but its program in doubt: neither path nor stage passes, and code and line are named."""
+    body, code, line = DOUBTS[name]
+    job = "DECL E6AXIS XSTART\n" + body if name == "half" else body
+    line += name == "half"
+    entry = {"paths": program_paths(tmp_path, {"job": job})}
+    results = trajectory(changed(study, entry, trajectory={"avoidance": "slow"}), ROBOT)
+    summary = results.summary
+    named = subjects(results)["program_findings"].names
+    assert any(each.startswith(f"job: {code} (") and str(line) in each for each in named)
+    assert "program_findings" in NEVER_A_PASS
+    doubtful = [
+        each for each in summary.paths if (line, code) in {(at.line, at.finding.code) for at in each.of_program}
+    ]
+    assert doubtful
+    assert {each.name for each in doubtful} <= set(summary.verdict.finding.of_program)
+    assert all(each.verdict == "safe" for each in summary.paths), "only the program is in doubt"
+    assert summary.verdict.status == "caution"
+    assert code in say(NoPass(summary.verdict.missed))
+    assert {name: fault.status for name, fault in ((each.name, each) for each in faults(results))} == {
+        each: "caution" for each in summary.verdict.finding.of_program
+    }
+    (fault,) = (each for each in faults(results) if each.name == doubtful[0].name)
+    assert any(str(line) in each.when for each in fault.moments)
+    assert "good" not in summary.verdict.finding.of_program
+    text = dict(zip(results.programs.file, results.programs.text))[f"{doubtful[0].name}.src"]
+    assert f"er3a: check-program says of the program that this path is of: {code} (" in text
+
+
+def test_a_path_fails_where_its_program_does(study, tmp_path):
+    entry = {"paths": program_paths(tmp_path, {"job": "PTP {near}\nPTP XSEEN"})}
+    results = trajectory(changed(study, entry, trajectory={"avoidance": "slow"}), ROBOT)
+    (fault,) = faults(results)
+    assert (fault.name, fault.status) == ("job", "fail")
+    assert "job: target_not_given (3)" in subjects(results)["program_findings"].names
+    assert results.summary.verdict.status == "fail"
+
+
+def test_a_line_that_is_left_out_breaks_the_path(study, tmp_path):
+    """After a line that may move the arm, the next motion starts elsewhere: both are no one path."""
+    entry = {
+        "paths": program_paths(tmp_path, {"job": "PTP {near}\nDRIVE_ANYWHERE( )\nPTP {far}\nPTP {near}\nPTP {far}"})
+    }
+    required = proof_requirements(study.robot(ROBOT), study.trajectory)
+    task = planning_of(study.robot(ROBOT), study.trajectory, None, 0)
+    found = [each for each in listed_motions(Path(entry["paths"]), task, required, 5) if each.listed == "job"]
+    assert [each.title for each in found] == ["job, line 2", "job, lines 5 to 6"]
+    ends = [np.degrees(each.motion.q[[0, -1], 0]) for each in found]
+    np.testing.assert_allclose(ends, [[0, 10], [20, 20]], atol=1e-6)
+
+
+def test_a_program_that_no_path_can_be_made_of_leaves_the_others(study, tmp_path):
+    tool = "$BASE=$NULLFRAME\n$TOOL={X 0,Y 0,Z 99,A 0,B 0,C 0}\nPTP {near}\nLIN_REL {Z 5}"
+    entry = {"paths": program_paths(tmp_path, {"unknown": "PTP XSEEN", "tool": tool, "sound": "PTP {near}"})}
+    listed = yaml.safe_load(Path(entry["paths"]).read_text())
+    then = {"name": "then", "title": "Then", "kind": "joint", "samples": 5, "duration_s": 3, "after": "tool"}
+    listed["paths"].append(then | {"end_deg": [5, -10, -10, 0, -70, 0]})
+    Path(entry["paths"]).write_text(yaml.safe_dump(listed))
+    results = trajectory(changed(study, entry, trajectory={"avoidance": "slow"}), ROBOT)
+    assert [each.name for each in results.summary.paths] == ["good", "sound"]
+    lost = {each.name: each.refused for each in results.summary.not_followed}
+    assert lost == {
+        "unknown": "no motion has a known start",
+        "tool": "line 5 moves another tool than the robot's",
+        "then": "the path 'tool' does not reach its end",
+    }
+    assert results.summary.verdict.status == "caution"
+    assert set(subjects(results)["paths"].names) == {f"{name}: {why}" for name, why in lost.items()}
 
 
 def test_what_a_scene_allows_and_shows_of_a_tool_is_named(study):

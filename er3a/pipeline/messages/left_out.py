@@ -67,6 +67,9 @@ TEXTS = texts(
         "left_out.strategies": "avoidance strategies that the study does not ask for",
         "left_out.program_lines": "lines of programs that were not examined, or not each time",
         "left_out.program_rest": "lines of programs that may move the arm but belong to no path checked",
+        "left_out.program_findings": (
+            "what these programs do at lines where their check has a doubt or a fault (er3a check-program says more)"
+        ),
         "left_out.given_rates": (
             "velocities, accelerations and efforts that trajectory files give: between the points, motions are laid "
             "by positions and times alone, and a controller that follows the given rates moves otherwise there"

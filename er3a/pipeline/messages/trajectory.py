@@ -88,6 +88,7 @@ TEXTS = texts(
         ),
         "trajectory.not_followed": "{count} not followed to the end ({names})",
         "trajectory.fault": "{word}: {count} ({names})",
+        "trajectory.of_program": "doubt or fault in the program: {count} ({names})",
         "trajectory.near_assumed": "within the margin of assumed shapes: {count}",
         "dependent_axes": "axes {axes} dependent",
         "smallest_singular_value": "smallest singular value {value:.3g}",
@@ -248,7 +249,11 @@ def _(found: model.PathCounts) -> str:
     if found.not_followed:
         parts = {"count": len(found.not_followed), "names": joined(found.not_followed, ", ")}
         faults.append(sentence("trajectory.not_followed", **parts))
-    if near := found.paths - found.safe - len(found.not_followed) - sum(map(len, unsafe.values())):
+    if found.of_program:
+        parts = {"count": len(found.of_program), "names": joined(found.of_program, ", ")}
+        faults.append(sentence("trajectory.of_program", **parts))
+    other = len(found.not_followed) + len(found.of_program) + sum(map(len, unsafe.values()))
+    if near := found.paths - found.safe - other:
         faults.append(sentence("trajectory.near_assumed", count=near))
     sentences = [safe if found.paths else "", joined(faults, ", "), demonstrated(found.demonstrations, found.paths)]
     return sentence("finding", finding=joined(sentences))

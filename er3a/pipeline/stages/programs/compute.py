@@ -21,10 +21,9 @@ from er3a.pipeline.stages.programs import model
 from er3a.pipeline.stages.programs.entry import ProgramsSettings
 from er3a.pipeline.stages.trajectory.motion import limits_of, near_singular
 from er3a.pipeline.study import Study
-from er3a.program_check.check_program import CheckOptions, LocatedFinding, ProgramCheck, check_program
+from er3a.program_check.check_program import CheckOptions, ProgramCheck, check_program
 from er3a.program_check.motion_checks import AssumedRates
 from er3a.program_check.program_check_findings import (
-    CheckFinding,
     ExternalAxesLeftOut,
     Level,
     LoadAbovePayload,
@@ -34,7 +33,6 @@ from er3a.program_check.program_check_findings import (
 from er3a.programs.execution import RunLimits
 from er3a.programs.instructions import Pause, Place
 from er3a.programs.languages import read_program
-from er3a.programs.program_findings import NameTwice, NotUnderstood
 from er3a.programs.program_names import ProgramOutcome
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
@@ -173,7 +171,7 @@ def _summary(entry: ProgramEntry, check: ProgramCheck, starts: Mapping[int, floa
         failed=levels.count("fail"),
         cycle=check.cycle,
         least_clearance_mm=min(clear, default=None),
-        findings=tuple(_finding_at(each, starts, rounds) for each in found),
+        findings=tuple(model.finding_at(each, starts, rounds) for each in found),
         not_examined=tuple(sorted({each.place.line for each in check.not_examined if each.what != "way"})),
     )
 
@@ -185,33 +183,6 @@ def _rounds(check: ProgramCheck, starts: Mapping[int, float]) -> dict[int, int]:
     for number in starts:
         times.setdefault(check.execution.steps[number].place, []).append(number)
     return {number: k for numbers in times.values() if len(numbers) > 1 for k, number in enumerate(numbers, 1)}
-
-
-def _finding_at(each: LocatedFinding, starts: Mapping[int, float], rounds: Mapping[int, int]) -> model.FindingAt:
-    """``starts``: when (s) steps of the way that is kept begin; ``rounds``: as of :func:`_rounds`."""
-    own = None if each.moment is None else float(each.moment)
-    start = None if each.step is None else starts.get(each.step)
-    return model.FindingAt(
-        each.place.file.name if each.place.file else "",
-        each.place.line,
-        each.place.element,
-        each.level,
-        each.times,
-        _without_path(each.finding),
-        own,
-        None if own is None or start is None else start + own,
-        None if each.step is None or own is None or start is None else rounds.get(each.step),
-        each.joint_moves,
-        each.off_mm,
-        each.off_deg,
-    )
-
-
-def _without_path(finding: CheckFinding) -> CheckFinding:
-    """A finding whose own place names no folder of this machine."""
-    if isinstance(finding, (NameTwice, NotUnderstood)):
-        return replace(finding, place=Place(None, finding.place.line, finding.place.element))
-    return finding
 
 
 def _lines(name: str, check: ProgramCheck) -> model.Lines:

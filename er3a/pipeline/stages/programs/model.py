@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Any
 
 from er3a.by_value import Finding
 from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
-from er3a.program_check.check_program import CycleTime
+from er3a.program_check.check_program import CycleTime, LocatedFinding
 from er3a.program_check.program_check_findings import CheckFinding, Level
+from er3a.programs.instructions import Place
+from er3a.programs.program_findings import NameTwice, NotUnderstood
 from er3a.programs.program_names import LanguageName, ProgramOutcome
 
 
@@ -46,6 +51,9 @@ class NoPrograms(Finding, code="programs.none"):
     """The robot's file of programs names none."""
 
 
+NO_STEPS: Mapping[int, Any] = MappingProxyType({})
+
+
 @dataclass(frozen=True)
 class FindingAt:
     """A finding in the text of a program.
@@ -72,6 +80,41 @@ class FindingAt:
     joint_moves: tuple[tuple[float, ...], ...] = ()
     off_mm: float | None = None
     off_deg: float | None = None
+
+
+def finding_at(
+    each: LocatedFinding, starts: Mapping[int, float] = NO_STEPS, rounds: Mapping[int, int] = NO_STEPS
+) -> FindingAt:
+    """A finding of a program's check, as results hold it.
+
+    Parameters
+    ----------
+    starts : when (s) steps of the way that is kept begin
+    rounds : of each step of that way at which time its line is carried out there, from 1; none of lines that are once
+    """
+    own = None if each.moment is None else float(each.moment)
+    start = None if each.step is None else starts.get(each.step)
+    return FindingAt(
+        each.place.file.name if each.place.file else "",
+        each.place.line,
+        each.place.element,
+        each.level,
+        each.times,
+        _without_path(each.finding),
+        own,
+        None if own is None or start is None else start + own,
+        None if each.step is None or own is None or start is None else rounds.get(each.step),
+        each.joint_moves,
+        each.off_mm,
+        each.off_deg,
+    )
+
+
+def _without_path(finding: CheckFinding) -> CheckFinding:
+    """A finding whose own place names no folder of this machine."""
+    if isinstance(finding, (NameTwice, NotUnderstood)):
+        return replace(finding, place=Place(None, finding.place.line, finding.place.element))
+    return finding
 
 
 @dataclass(frozen=True)

@@ -30,8 +30,10 @@ from er3a.pipeline.stages.left_out import (
     left_out_of_rates,
     left_out_without_tool,
 )
+from er3a.pipeline.stages.programs.model import finding_at
 from er3a.pipeline.stages.trajectory import judgement, model
 from er3a.pipeline.stages.trajectory.motion import (
+    ListedMotion,
     Motion,
     by_subject,
     corner_misses,
@@ -391,8 +393,7 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
         motion = each.motion
         rest += each.left_out if each.meant_safe else ()
         if motion is None:
-            known = each.outcome_unfollowed, each.expected, each.ends.t if each.ends else None
-            skipped.append(model.PathNotFollowed(each.name, each.title, wrist_partition_missing(robot), *known))
+            skipped.append(_not_followed(robot, each))
             continue
         turned += _asked_of_tool(each.name, motion) if each.meant_safe else ()
         found = judgement.judge(robot, motion, near, limits)
@@ -402,7 +403,8 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
         clearances.append(judgement.clearance_rows(each.name, along))
         strategies.append(avoided.rows)
         last = judgement.clear_until(surroundings, motion, found, along, margin, limits.acceleration)
-        path = replace(path_summary(robot, motion, found, along, avoided, limits), clear_until=last)
+        path = path_summary(robot, motion, found, along, avoided, limits)
+        path = replace(path, clear_until=last, of_program=tuple(map(finding_at, each.found)))
         paths.append(replace(path, sound_end=judgement.sound_end(path, tables[-1], used)))
         repair = avoided.rows.take(avoided.rows.strategy == (avoided.chosen or ""))
         close = near_assumed_shapes(robot, each.name, path.clearance, assumed_margin)
@@ -446,6 +448,14 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
     )
 
 
+def _not_followed(robot: Robot, listed: ListedMotion) -> model.PathNotFollowed:
+    lacking, why = (None, listed.refused.problem) if listed.refused else (wrist_partition_missing(robot), "")
+    stops = listed.ends.t if listed.ends else None
+    return model.PathNotFollowed(
+        listed.name, listed.title, lacking, listed.outcome_unfollowed, listed.expected, stops, why
+    )
+
+
 def _of_collisions(
     bodies: Bodies,
     scene: Scene | None,
@@ -482,7 +492,8 @@ def _left_out(
 ) -> Iterator[LeftOut]:
     """Paths that were not followed or planned, stretches that bounds leave open, strategies not asked for."""
     if skipped:
-        yield LeftOut("paths", tuple(path.name for path in skipped))
+        whys = {path.name: f": {path.refused}" if path.refused else "" for path in skipped}
+        yield LeftOut("paths", tuple(name + why for name, why in whys.items()))
     if open_ := tuple(path.name for path in paths if path.undecided):
         yield LeftOut("path_stretches", open_)
     if unplanned := tuple(path.name for path in paths if path.verdict == "none found"):
@@ -556,13 +567,15 @@ def _verdict(
         near_singular=named("near-singular"),
         demonstrations=demonstrations(judged, "safe"),
         not_followed=tuple(path.name for path in unfollowed),
+        of_program=tuple(path.name for path in asked if path.verdict == "safe" and path.of_program),
     )
     return Verdict(status, counts)
 
 
 def _fails(path: model.PathSummary) -> bool:
-    """Whether a path can't be run as it is: it collides, leaves limits, or no joints follow it."""
-    return path.verdict in FAULTS or (path.verdict == "singular" and (bool(path.jumps) or not path.joint_speed_bounded))
+    """Whether a path can't be run as it is: it collides, leaves limits, no joints follow it, or its program fails."""
+    lost = path.verdict == "singular" and (bool(path.jumps) or not path.joint_speed_bounded)
+    return path.verdict in FAULTS or lost or any(each.level == "fail" for each in path.of_program)
 
 
 def _figures(

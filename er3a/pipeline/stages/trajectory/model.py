@@ -18,6 +18,7 @@ from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet
+from er3a.pipeline.stages.programs.model import FindingAt
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.planning.avoidance.strategies import NotUsable
 from er3a.planning.motion_faults import LimitCause, PathOutOfReach, RateCause
@@ -40,7 +41,7 @@ class PathCounts:
     """How many paths there are, how many are safe, and the names of the others by their verdict.
 
     Paths as near to assumed shapes as these may be wrong count as none of these, and neither do ``demonstrations``,
-    paths that fail as they are meant to.
+    paths that fail as they are meant to. ``of_program``: nothing is wrong with the path, but with the program.
     """
 
     paths: int
@@ -56,6 +57,7 @@ class PathCounts:
     near_singular: tuple[str, ...]
     demonstrations: tuple[Demonstration, ...]
     not_followed: tuple[str, ...] = ()
+    of_program: tuple[str, ...] = ()
 
 
 class AllSafe(PathCounts, Finding, code="trajectory.safe"):
@@ -285,6 +287,7 @@ class PathSummary:
     fastest_s : of the exact path under the joint limits; None where no motion follows it
     avoidance : the strategies tried; none where the path is safe
     strategy : the one to take
+    of_program : what the check of the program that it is of finds, of at least caution, and the path does not show
     """
 
     name: str
@@ -322,6 +325,7 @@ class PathSummary:
     sliding: tuple[int, ...] = ()
     clear_until: ClearUntil | None = None
     sound_end: SoundEnd | None = None
+    of_program: tuple[FindingAt, ...] = ()
 
     @property
     def fastest_joint(self) -> int | None:
@@ -380,6 +384,7 @@ class PathNotFollowed:
     expect : what its file expects
     stops_at_s : of arms that are followed by their class, the time (s) beyond which the path is out of reach or asks a
         joint to leap; else None
+    refused : why no path can be made of a program, or from its end; empty for others
     """
 
     name: str
@@ -388,6 +393,7 @@ class PathNotFollowed:
     outcome: PathVerdict
     expect: tuple[PathVerdict, ...]
     stops_at_s: float | None = None
+    refused: str = ""
 
     @property
     def outcomes(self) -> tuple[PathVerdict, ...]:
@@ -396,8 +402,9 @@ class PathNotFollowed:
 
 
 def is_safe(path: PathSummary, shapes: ShapesAssumed | None) -> bool:
-    """Whether nothing is wrong with a path, and it is not as near to assumed ``shapes`` as these may be wrong."""
-    return path.verdict == "safe" and not (shapes and path.name in shapes.near)
+    """Whether nothing is wrong with a path or at the lines of the program that it is of, and it is not as near to
+    assumed ``shapes`` as these may be wrong."""
+    return path.verdict == "safe" and not path.of_program and not (shapes and path.name in shapes.near)
 
 
 class TrajectorySummary(Summary):

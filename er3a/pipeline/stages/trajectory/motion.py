@@ -32,7 +32,7 @@ from er3a.planning.sequences import TURN_LENGTH, JointSequence, SegmentPath
 from er3a.planning.timing import JointLimits, joint_limits, standing, straight
 from er3a.planning.tool_proof import ProofRequirements, ToolProof, follow_and_prove
 from er3a.planning.way_around import NoWayAround, PlannedMove, PlanningTask, WayAround, way_between
-from er3a.program_check.check_program import CheckOptions, ProgramPart, check_program, parts_of
+from er3a.program_check.check_program import CheckOptions, LocatedFinding, ProgramPart, check_program, parts_of
 from er3a.programs.languages import read_program
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
@@ -40,7 +40,7 @@ from er3a.robots.robot import Robot
 
 @dataclass(frozen=True, eq=False)
 class PartOfProgram:
-    """A stretch of a program as an entry of a path file; ``rest``: lines that no stretch of the program holds."""
+    """A stretch of a program (``file``) as an entry of a path file; ``rest``: lines that no stretch holds."""
 
     name: str
     title: str
@@ -48,6 +48,7 @@ class PartOfProgram:
     expected: tuple[PathVerdict, ...]
     part: ProgramPart
     rest: tuple[int, ...]
+    file: Path
 
     @property
     def kind(self) -> Literal["joint_sequence", "sequence"]:
@@ -62,7 +63,9 @@ class PartOfProgram:
 PlannedEntry = PathEntry | PartOfProgram
 
 
-def planned_entries(robot: Robot, entry: PathEntry | ProgramPath, source: CommandSource) -> Iterator[PlannedEntry]:
+def planned_entries(
+    task: PlanningTask, entry: PathEntry | ProgramPath, source: CommandSource, near: NearSingular
+) -> Iterator[PlannedEntry]:
     """A path as it is, a program as its stretches, named by their numbers.
 
     Raises
@@ -74,13 +77,21 @@ def planned_entries(robot: Robot, entry: PathEntry | ProgramPath, source: Comman
         yield entry
         return
     start = None if entry.start_deg is None else np.radians(entry.start_deg)
-    check = check_program(read_program(entry.program), robot, CheckOptions(start=start, measures=False))
-    parts, rest = parts_of(check, robot, source)
+    options = CheckOptions(
+        start=start,
+        scene=task.bodies.scene if task.bodies else None,
+        near=near,
+        joint_limits=task.limits,
+        penetration_tolerance=task.tolerance,
+        measures=task.bodies is not None,
+    )
+    check = check_program(read_program(entry.program), task.robot, options)
+    parts, rest = parts_of(check, task.robot, source)
     for number, part in enumerate(parts, 1):
         name = f"{entry.name}_{number}" if len(parts) > 1 else entry.name
         first, last = part.lines
         title = f"{entry.title}, lines {first} to {last}" if last > first else f"{entry.title}, line {first}"
-        yield PartOfProgram(name, title, entry.samples, entry.expected, part, rest)
+        yield PartOfProgram(name, title, entry.samples, entry.expected, part, rest, Path(entry.program))
 
 
 FOLLOWED_AT = 1030  # times at which a path of the tool is solved at least: its branches depend on no samples
@@ -337,8 +348,9 @@ class ListedMotion:
     """A motion, the entry that it belongs to, and its name (a program's stretches have names of their own).
 
     ``motion`` is None for a path of the tool that an arm of its class can't be made to follow, or not to its end;
-    ``ends`` then says when and why it is not. ``left_out``: lines of its program that no motion is of, and
-    what its file gives beside points and times.
+    ``ends`` then says when and why it is not; ``refused`` why no path can be made of a program, or from its end.
+    ``left_out``: lines of its program that no motion is of, what the program's check finds, and what its file gives
+    beside points and times.
     """
 
     listed: str
@@ -348,6 +360,13 @@ class ListedMotion:
     motion: Motion | None
     ends: PathEndsError | None = None
     left_out: tuple[LeftOut, ...] = ()
+    refused: InputError | None = None
+
+    @property
+    def found(self) -> tuple[LocatedFinding, ...]:
+        """What the check of the program finds that the path is of, as far as it is about this path."""
+        entry = self.motion.entry if self.motion else None
+        return entry.part.found if isinstance(entry, PartOfProgram) else ()
 
     @property
     def meant_safe(self) -> bool:
@@ -392,25 +411,53 @@ def listed_motions(
     Raises
     ------
     InputError
-        for what can't be planned
+        for what can't be planned; of a program's path, and what starts at its end, the motion says it
     """
     ends: dict[str, Reals] = {}
+    nowhere, lost = np.full(task.robot.joints, np.nan), set[str]()
     for i, listed in enumerate(load_paths(file).paths):
         source = CommandSource(file, f"paths[{i}]")
-        for entry in planned_entries(task.robot, listed, source):
-            ended = None
+        try:
+            entries = [*planned_entries(task, listed, source, required.near)]
+        except InputError as error:
+            ends[listed.name] = nowhere
+            lost.add(listed.name)
+            yield ListedMotion(listed.name, listed.name, listed.title, listed.expected, None, refused=error)
+            continue
+        for entry in entries:
+            motion, ended, refused = None, None, None
             try:
                 motion = motion_of(task.robot, entry, checks_per_sample, source, ends, required, task=task)
             except NotWristPartitionedError:
-                motion = None
+                pass
             except PathEndsError as error:
-                motion, ended = None, error
-            end = np.full(task.robot.joints, np.nan) if motion is None else motion.q[-1]
-            ends[entry.name] = ends[listed.name] = end
+                ended = error
+            except InputError as error:
+                if not isinstance(entry, PartOfProgram) and getattr(entry, "after", None) not in lost:
+                    raise
+                refused = error
+                lost |= {listed.name, entry.name}
+            ends[entry.name] = ends[listed.name] = nowhere if motion is None else motion.q[-1]
+            part = entry if isinstance(entry, PartOfProgram) else None
             parts: tuple[tuple[LeftOutSubject, Sequence[object]], ...] = (
-                ("program_rest", entry.rest if isinstance(entry, PartOfProgram) else ()),
+                ("program_rest", part.rest if part else ()),
                 ("given_rates", motion.built.unread if motion else ()),
                 ("missed_rows", tuple(filter(None, [motion and rows_missed(task.robot, motion.built)]))),
             )
-            rest = tuple(LeftOut(of, (f"{listed.name}: {', '.join(map(str, own))}",)) for of, own in parts if own)
-            yield ListedMotion(listed.name, entry.name, entry.title, entry.expected, motion, ended, rest)
+            rest = [LeftOut(of, (f"{listed.name}: {', '.join(map(str, own))}",)) for of, own in parts if own]
+            if part and part.part.found:
+                rest.append(LeftOut("program_findings", tuple(f"{listed.name}: {at}" for at in at_lines(part))))
+            yield ListedMotion(
+                *(listed.name, entry.name, entry.title, entry.expected, motion, ended), tuple(rest), refused
+            )
+
+
+def at_lines(entry: PartOfProgram) -> list[str]:
+    """The codes of what the program's check finds of a stretch, each with its lines (in ``FILE:LINE`` of others)."""
+    own, lines = entry.file.name, dict[str, dict[str, None]]()
+    for each in entry.part.found:
+        named = lines.setdefault(each.finding.code, {})
+        if each.place.line:
+            other = each.place.file.name if each.place.file and each.place.file.name != own else ""
+            named[f"{other}:{each.place.line}" if other else f"{each.place.line}"] = None
+    return [f"{code} ({', '.join(named)})" if named else code for code, named in lines.items()]

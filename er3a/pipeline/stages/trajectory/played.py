@@ -14,7 +14,7 @@ from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.expectations import as_expected, outcome_words
 from er3a.pipeline.messages.language import own_title, tr, with_unit
 from er3a.pipeline.messages.planning import rate_needed, times_needed
-from er3a.pipeline.messages.programs import remedy, say
+from er3a.pipeline.messages.programs import remedies, remedy, say
 from er3a.pipeline.messages.say import joined, sentence
 from er3a.pipeline.messages.trajectory import (
     IF_ASSUMED,
@@ -52,6 +52,7 @@ from er3a.robots.robot import Robot
 SLOWER = 0.97  # of the programmed pace, below which a motion counts as slower
 LARGEST_PART = 0.9  # of a path's time, up to which it is slower only there
 MIN_LENGTH = 1e-6  # m
+RANKS: tuple[Weight, ...] = ("fail", "caution", "plain")
 WEIGHTS: dict[PathVerdict, Weight] = {
     "safe": "plain",
     "near-singular": "caution",
@@ -94,8 +95,14 @@ def motions(
 
 def worst_first(paths: Sequence[model.PathSummary]) -> list[model.PathSummary]:
     """Those that fail first, of them those that were not expected to."""
-    ranks = ("fail", "caution", "plain")
-    return sorted(paths, key=lambda path: (ranks.index(WEIGHTS[path.verdict]), is_met(path)))
+    return sorted(paths, key=lambda path: (RANKS.index(_weight_of(path)), is_met(path)))
+
+
+def _weight_of(path: model.PathSummary) -> Weight:
+    """That of its verdict, or of what was found in its program if that weighs more."""
+    weights: list[Weight] = [WEIGHTS[path.verdict]]
+    weights += ["fail" if each.level == "fail" else "caution" for each in path.of_program]
+    return min(weights, key=RANKS.index)
 
 
 def faults(results: model.TrajectoryResults) -> list[Fault]:
@@ -107,8 +114,11 @@ def faults(results: model.TrajectoryResults) -> list[Fault]:
             continue
         clearance = path.clearance if path.verdict == "safe" else None
         rows = results.checks.take(results.checks.path == path.name)
-        wrong = [FaultText(clearance.t_s, say(near), clearance.t_s)] if clearance else _faults(path)
-        wrong = [*_near_at_start(path, rows, results.summary.near), *wrong]
+        wrong: list[FaultText | FaultMoment] = [*_in_program(path)]
+        if near and clearance:
+            wrong.append(FaultText(clearance.t_s, say(near), clearance.t_s))
+        elif path.verdict != "safe":
+            wrong = [*_near_at_start(path, rows, results.summary.near), *_faults(path), *wrong]
         status, verdict = shown_verdict(path, near)
         own = results.avoidance.take(results.avoidance.path == path.name)
         to_do, facts, instead = _to_do(path, rows, own, results.summary)
@@ -139,6 +149,15 @@ def _faults(path: model.PathSummary) -> list[FaultText] | list[FaultMoment]:
         times = [] if path.not_planned else path.singular_times_s or [event.t_s for event in path.singularities]
         return [FaultText(min(times), path_text(path), min(times))] if times else [FaultMoment(path_text(path))]
     return found
+
+
+def _in_program(path: model.PathSummary) -> list[FaultMoment]:
+    """What was found in the program that a path is of, each text once with its lines, the worst first."""
+    lines: dict[str, dict[str, None]] = {}
+    for each in sorted(path.of_program, key=lambda each: each.level != "fail"):
+        line = tr("line {line}", line=each.line) if each.line else ""
+        lines.setdefault(say(each.finding), {})[line] = None
+    return [FaultMoment(text, joined(named, ", ")) for text, named in lines.items()]
 
 
 def _near_at_start(path: model.PathSummary, rows: model.PathChecks, near: model.NearThresholds) -> list[FaultText]:
@@ -197,8 +216,9 @@ def _to_do(
         facts = repair_facts(path, summary.joint_limits, shapes)
         facts += [("start", _switch(path, rows, motions)), ("pace", whole_pace(path))]
         return lead, facts, (name, address_of("trajectory", name, 0.0, path.name))
-    if path.verdict == "safe" and (near := near_assumed(path, summary)):
-        return remedy(near), [], None
+    if path.verdict == "safe":
+        near = near_assumed(path, summary)
+        return joined([*remedies(path.of_program), remedy(near) if near else ""], " "), [], None
     last = path.sound_end
     if last is None:
         todo = advised(path, rows, motions, summary.joint_limits, shapes=shapes)
@@ -277,6 +297,9 @@ def repaired(path: model.PathSummary) -> str:
 
 def shown_verdict(path: model.PathSummary, near: ClearOfAssumed | None) -> tuple[Weight, str]:
     """A path's verdict in colour and words; ``near`` as of :func:`near_assumed`."""
+    if path.verdict == "safe" and path.of_program:
+        weight = _weight_of(path)
+        return weight, tr("fault in its program") if weight == "fail" else tr("doubt in its program")
     if path.verdict == "safe" and near:
         return "caution", tr("clear of assumed shapes only")
     return WEIGHTS[path.verdict], outcome_words(path.outcomes)

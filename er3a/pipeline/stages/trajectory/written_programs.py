@@ -10,7 +10,7 @@ from er3a.collision.shapes import shapes_assumed
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.stages.trajectory.model import AvoidanceRows, MinClearance, ProgramFiles
-from er3a.pipeline.stages.trajectory.motion import Motion, PartOfProgram, missed_points, rows_missed
+from er3a.pipeline.stages.trajectory.motion import Motion, PartOfProgram, at_lines, missed_points, rows_missed
 from er3a.planning.commands import CommandSource, JointTableCommand, PlanCommand, ToolMoveCommand
 from er3a.planning.names import PathVerdict
 from er3a.planning.profiles import Times
@@ -57,7 +57,10 @@ def written(
     if not np.isfinite(start).all():
         raise ValueError(f"{motion.entry.name}: the start can't be reached")
     unsafe: tuple[WriteFinding, ...] = near if verdict == "safe" else (WrittenUnsafe(motion.entry.name, verdict),)
-    head = (f"path {motion.entry.name} for {ascii_text(robot.title)}: {ascii_text(motion.entry.title)}",)
+    head = (
+        f"path {motion.entry.name} for {ascii_text(robot.title)}: {ascii_text(motion.entry.title)}",
+        *_of_its_program(motion),
+    )
     if language == "csv":
         times = motion.samples
         joints = motion.joints(times)
@@ -81,6 +84,12 @@ def written(
     options = WriteOptions(robot, start, notes=(*unsafe, *beside, *made.findings), head=head, assumed_speed=speed)
     program = write_program(made.listing, language, options)
     return program.files, program.findings
+
+
+def _of_its_program(motion: Motion) -> list[str]:
+    """What was found in the program that a path is of, and the path does not show."""
+    found = at_lines(motion.entry) if isinstance(motion.entry, PartOfProgram) else []
+    return [f"check-program says of the program that this path is of: {ascii_text(each)}" for each in found]
 
 
 def near_assumed_shapes(
@@ -138,11 +147,16 @@ def _repair(
     q = meant(robot, rows.q_deg)
     if language == "csv":
         poses = np.linalg.inv(robot.base) @ forward(robot, q)
-        return {".csv": write_csv(rows.t_s, rows.q_deg, poses, (HEAD + comment,), joint_columns(robot))}, ()
+        comments = tuple(HEAD + line for line in (comment, *_of_its_program(motion)))
+        return {".csv": write_csv(rows.t_s, rows.q_deg, poses, comments, joint_columns(robot))}, ()
     kept = needed_points(q, STRAIGHT)
     command = JointTableCommand(q[kept], Times(rows.t_s[kept], np.arange(len(kept))))
     made = listing_of(command, robot, q[0], repair_name(motion.entry.name), motion.entry.title)
-    head = (comment, f"joint moves between points of the checked motion, within {np.degrees(STRAIGHT):.3f} deg of it")
+    head = (
+        comment,
+        *_of_its_program(motion),
+        f"joint moves between points of the checked motion, within {np.degrees(STRAIGHT):.3f} deg of it",
+    )
     options = WriteOptions(robot, q[0], notes=made.findings, head=head, assumed_speed=speed)
     program = write_program(made.listing, language, options)
     return program.files, program.findings
