@@ -123,7 +123,8 @@ def test_a_program_reads_verdicts_and_continuous_integration_an_exit_code(call, 
 
     found = json.loads(verdicts("--json").stdout)
     assert {each["robot"] for each in found} == set(small_study.robots)
-    assert {"robot", "stage", "status", "code", "text", "expected", "demonstrations", "not_examined"} == set(found[0])
+    told = {"robot", "stage", "status", "code", "text", "expected", "demonstrations", "not_examined", "outdated"}
+    assert set(found[0]) == told
     statuses = {each["status"] for each in found}
     assert verdicts("--fail-on", "fail").returncode == int("fail" in statuses)
     done = verdicts("--fail-on", "caution")

@@ -199,6 +199,8 @@ def _concerns_a_person(record: LogRecord) -> bool:
     text = record.getMessage()
     if "output files of rule index were not present" in text:  # it was written meanwhile, by this log
         return False
+    if "died with <Signals.SIGINT" in text:  # Ctrl-C came to the job before it came to the run, which tells of it
+        return False
     return record.levelno >= WARNING or text.startswith("Nothing to be done")
 
 

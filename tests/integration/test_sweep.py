@@ -101,4 +101,5 @@ def test_a_sweep_s_section_can_be_translated(swept, tmp_path, monkeypatch):
         write_index(load_study("config/small.yaml"), Path("results"), tmp_path)
     texts = [*PageTexts((tmp_path / "index.html").read_text(encoding="utf-8")).texts, *shown]
     own = texts_from_files(run.folder / "data") | texts_from_files(run.folder / "config") | {*ROBOTS, *VARIANTS}
+    own |= {f"data/robots/{robot}.yaml" for robot in ROBOTS}
     assert plain_words(texts, own) == []
