@@ -133,7 +133,8 @@ class RunLog(LogHandlerBase):
             logs = ", ".join(str(log) for log in job.get("log") or ())
             self._print(f"✗ {job.get('rule_msg') or job.get('rule_name')}: ended with an error; see {logs}")
         elif event == LogEvent.ERROR:
-            self._print(_error_line(record.getMessage()))
+            if "died with <Signals.SIGINT" not in record.getMessage():  # Ctrl-C, of which the run tells itself
+                self._print(_error_line(record.getMessage()))
         elif event is None and _concerns_a_person(record):
             self._print(record.getMessage())
 
@@ -198,8 +199,6 @@ class RunLog(LogHandlerBase):
 def _concerns_a_person(record: LogRecord) -> bool:
     text = record.getMessage()
     if "output files of rule index were not present" in text:  # it was written meanwhile, by this log
-        return False
-    if "died with <Signals.SIGINT" in text:  # Ctrl-C came to the job before it came to the run, which tells of it
         return False
     return record.levelno >= WARNING or text.startswith("Nothing to be done")
 
