@@ -353,6 +353,12 @@ def variable_of(target: syntax.Expression) -> str:
     return target.name if isinstance(target, syntax.Variable) else ""
 
 
+def own_names(routine: syntax.Routine) -> set[str]:
+    """Parameters and variables that a routine declares for itself."""
+    declared = (each.target for each in routine.code if isinstance(each, syntax.Assign) and each.local)
+    return {*(each.name for each in routine.parameters), *map(variable_of, declared)}
+
+
 def _variables(expression: syntax.Expression) -> Iterable[str]:
     if isinstance(expression, syntax.Variable):
         yield expression.name

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import operator
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from ctypes import c_float
 from dataclasses import dataclass, field, replace
 from typing import TypeGuard
@@ -181,9 +181,23 @@ def computed_in_single(sign: str, left: syntax.Value, right: syntax.Value, found
     return Rounded(found, passed + abs(found) * SINGLE)
 
 
-def function_in_single(found: float) -> float:
-    """The value of a mathematical function, with what single precision may make of it and of its argument."""
-    return Rounded(found, 4 * SINGLE * max(abs(found), 1.0)) if missed_by(found) else found
+def function_in_single(function: Callable[..., float], arguments: Sequence[syntax.Value]) -> float:
+    """The value of a mathematical function of numbers, with what single precision may make of it and of these.
+
+    Raises
+    ------
+    ValueError, OverflowError, ZeroDivisionError
+        as the function does
+    """
+    plain = [syntax.number(each) or 0.0 for each in arguments]
+    found, passed = float(function(*plain)), 0.0
+    for i, off in enumerate(map(missed_by, arguments)):
+        for beside in (plain[i] - off, plain[i] + off) if off else ():
+            try:
+                passed = max(passed, abs(function(*plain[:i], beside, *plain[i + 1 :]) - found))
+            except (ValueError, OverflowError, ZeroDivisionError):  # beside its domain, or its pole
+                passed = math.inf
+    return Rounded(found, passed + 4 * SINGLE * max(abs(found), 1.0)) if passed or missed_by(found) else found
 
 
 COMPARISONS: Mapping[str, Callable[[float, float], bool]] = {

@@ -29,7 +29,7 @@ from er3a.geometry.transforms import check_poses, rotation_angle
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, syntax
-from er3a.programs.code_builder import variable_of
+from er3a.programs.code_builder import own_names, variable_of
 from er3a.programs.evaluation import Cell, Dialect, Position, ProgramMemory, known, root
 from er3a.programs.execution import Ending, EndKind, Execution, FrameTwice, KeepOn, RunLimits, Step
 from er3a.programs.languages import LANGUAGES, not_written
@@ -394,7 +394,7 @@ def aliased_calls(program: syntax.Program) -> dict[syntax.Call, frozenset[str]]:
     uses = _gathered(program, {name: _used(each) for name, each in program.routines.items()})
     found: dict[syntax.Call, frozenset[str]] = {}
     for caller in program.routines.values():
-        own = _own_names(caller)
+        own = own_names(caller)
         for call in (each for each in caller.code if isinstance(each, syntax.Call)):
             given: dict[str, list[str]] = defaultdict(list)
             for name, each in _both_ways(program, call):
@@ -410,16 +410,10 @@ def aliased_calls(program: syntax.Program) -> dict[syntax.Call, frozenset[str]]:
     return found
 
 
-def _own_names(routine: syntax.Routine) -> set[str]:
-    """Parameters and variables that a routine declares for itself."""
-    declared = (each.target for each in routine.code if isinstance(each, syntax.Assign) and each.local)
-    return {*(each.name for each in routine.parameters), *map(target_name, declared)}
-
-
 def _used(routine: syntax.Routine) -> set[str]:
     """Variables, not its own, that a routine names."""
     parts = (part for op in routine.code for part in syntax.expressions_of(op))
-    return {name for part in parts for name in names(part)} - _own_names(routine)
+    return {name for part in parts for name in names(part)} - own_names(routine)
 
 
 def _value_of(routine: str) -> str:

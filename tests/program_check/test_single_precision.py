@@ -58,6 +58,16 @@ def test_a_comparison_is_open_where_rounding_decides_it(tmp_path, condition, bot
     assert (turns(tmp_path, body) >= {5.0, 9.0}) == both
 
 
+@pytest.mark.parametrize("expression", ["ABS(-S)==1.0", "SQRT(S)==1.0", "SIN(90.0*S)<1.0", "ATAN2(S,1.0)==45.0"])
+def test_a_function_passes_on_how_far_off_its_argument_may_be(tmp_path, expression):
+    """S is 1 in double precision; in single precision 0.7 + 0.2 + 0.1 may be another number."""
+    body = f"REAL S\nS=0.1+0.2+0.7\nIF {expression} THEN\nPTP {{A1 5}}\nELSE\nPTP {{A1 9}}\nENDIF"
+    assert turns(tmp_path, body) >= {5.0, 9.0}
+    assert (
+        len(turns(tmp_path, body.replace("0.1+0.2+0.7", "0.25+0.25+0.5").replace("ATAN2(S,1.0)==45.0", "S==1.0"))) == 1
+    )
+
+
 def test_whole_numbers_have_32_bits(tmp_path):
     assert turns(tmp_path, "INT N\nN='HFFFFFFFF'\nPTP {A1 N}") == {-1.0}
     over = "INT N\nN=2147483647\nN=N+1\nIF N>0 THEN\nPTP {A1 5}\nELSE\nPTP {A1 9}\nENDIF"

@@ -559,6 +559,17 @@ def test_modules_anywhere_in_an_archive_are_read(tmp_path, folder):
     assert joints(program, "USER_GRP(5)\nown( )") == [5.0, 9.0]
 
 
+def test_a_folder_that_is_no_archive_is_not_searched(tmp_path):
+    """As a system's own folder of that name, above a program that somebody keeps."""
+    mine, others = tmp_path / "home/mine", tmp_path / "System/deep"
+    for each in (mine, others):
+        each.mkdir(parents=True)
+    (others / "own.src").write_text("DEF own( )\nPTP {A1 9}\nEND\n")
+    found = check(mine, krl("own( )\nPTP {A1 5}"), "a.src")
+    assert codes(found)["may_move"] == [2]
+    assert files_of(mine / "a.src") == (mine / "a.src",)
+
+
 def test_turning_speeds_of_the_controller_s_data_hold_after_initmov(tmp_path):
     data = "REAL DEF_VEL_ORI1=20.0\nREAL DEF_VEL_ORI2=200.0\nREAL DEF_ACC_ORI1=20.0\nREAL DEF_ACC_ORI2=200.0\n"
     (tmp_path / "$config.dat").write_text(f"DEFDAT $CONFIG\n{data}ENDDAT\n")

@@ -236,7 +236,7 @@ TEXTS = texts(
         "zone_too_large": "the zone of {zone_mm:.1f} mm is larger than half of a motion of {motion_mm:.1f} mm",
         "zone_without_size": "the size of the zone {zone} is not known; half of each motion was taken",
         "arc_has_no_circle": "the arc's points do not define a circle",
-        "spline_as_line": ("the spline was checked as straight from point to point; how it bends was not examined"),
+        "spline_as_line": "the spline was checked as straight from point to point; how it bends was not examined",
         "external_axes_left_out": "external axes are assumed at rest: {axes:, }",
         "line_not_checked": (
             "the arm has no closed-form inverse: the line was not followed, only its target was checked"

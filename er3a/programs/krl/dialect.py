@@ -699,12 +699,12 @@ class KrlDialect(Dialect):
                 inverse[:3, :3] = pose[:3, :3].T
                 inverse[:3, 3] = -pose[:3, :3].T @ pose[:3, 3]
                 return frame_record(inverse)
-        plain = syntax.numbers(values)
+        numbers = [each for each in values if each is not None and syntax.number(each) is not None]
         try:
-            if name == "ATAN2" and plain is not None and len(plain) == 2:
-                return function_in_single(math.degrees(math.atan2(*plain)))
-            if name in IN_DEGREES and plain is not None and len(plain) == 1:
-                return function_in_single(float(IN_DEGREES[name](plain[0])))
+            if name == "ATAN2" and len(numbers) == len(values) == 2:
+                return function_in_single(lambda y, x: math.degrees(math.atan2(y, x)), numbers)
+            if name in IN_DEGREES and len(numbers) == len(values) == 1:
+                return function_in_single(IN_DEGREES[name], numbers)
         except (ValueError, OverflowError):
             pass
         return syntax.Unclear(f"{name}(...)")

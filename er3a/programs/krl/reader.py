@@ -23,6 +23,7 @@ from er3a.programs.code_builder import (
     linked,
     mapped,
     not_understood,
+    own_names,
     variable_of,
     within,
 )
@@ -535,8 +536,7 @@ def _seen_here_alone(
 
 def _with_names(routine: syntax.Routine, names: Mapping[str, str]) -> syntax.Routine:
     """A routine, and what it names but for its parameters and its own variables, under other names."""
-    declared = (each.target for each in routine.code if isinstance(each, syntax.Assign) and each.local)
-    own = {*map(variable_of, declared), *(each.name for each in routine.parameters)}
+    own = own_names(routine)
     others = {name: other for name, other in names.items() if name not in own}
     code = tuple(_renamed(operation, others) for operation in routine.code)
     return replace(routine, name=names.get(routine.name, routine.name), code=code)
@@ -792,8 +792,7 @@ def _set_in(source: ProgramText, shared: Container[str], of_controller: Signals)
         yield from ((name, place) for name, place in named if name in shared or name.startswith("$"))
         return
     for routine in routines:
-        declared = (each.target for each in routine.code if isinstance(each, syntax.Assign) and each.local)
-        own = {*map(variable_of, declared), *(each.name for each in routine.parameters)}
+        own = own_names(routine)
         for operation in routine.code:
             targets: tuple[syntax.Expression | None, ...] = ()
             if isinstance(operation, syntax.Assign):
@@ -811,7 +810,7 @@ MAX_MODULES = 200
 OF_CONTROLLER = ("BAS", "USER_GRP", "IR_STOPM")
 """The controller's own modules that set what motions use, or that people edit."""
 DEEPEST = 6  # folders of an archive
-OF_ARCHIVE = ("System", "Mada", "TP")  # of its folders
+OF_ARCHIVE = ("System", "Mada", "TP")  # folders beside Program, of which it has one
 
 
 def companions(path: Path) -> tuple[Path, ...]:
@@ -844,10 +843,15 @@ def modules_of(path: Path) -> tuple[Path, ...]:
     return tuple(found)
 
 
+def _is_archive(folder: Path) -> bool:
+    """Whether a folder is a controller's archive, by its folders: others above a program are not searched."""
+    return (folder / "Program").is_dir() and any((folder / each).is_dir() for each in OF_ARCHIVE)
+
+
 def _of_controller(path: Path, suffix: str) -> list[Path]:
     """Files of the controller that a program is for: those beside it, then all others of its archive."""
     above = list(path.resolve().parents)[:DEEPEST]
-    archive = next((folder for folder in above if any((folder / each).is_dir() for each in OF_ARCHIVE)), None)
+    archive = next((folder for folder in above if _is_archive(folder)), None)
     beside = sorted(path.parent.iterdir())
     others = sorted(archive.rglob("*")) if archive else []
     here = path.parent.resolve()
@@ -895,7 +899,7 @@ def _submits(path: Path) -> tuple[Path, ...]:
 
 
 def _others(path: Path) -> tuple[Path, ...]:
-    """Modules of the same controller that a program does not call; none where all modules share no variable."""
+    """Modules of the same controller that a program does not call; none where modules share no variables."""
     own = data_file_of(path, ".dat")
     has_own = own is not None and GLOBAL_NAME.search(read_program_text(own).text)
     if shared_data_of(path) is None and not has_own and not _published(path):

@@ -640,11 +640,11 @@ def _number_of(name: str, values: tuple[syntax.Value, ...]) -> syntax.Value | No
     if plain_values is None:
         return None
     try:
-        found = IN_DEGREES[name](*plain_values)
+        found = function_in_single(IN_DEGREES[name], values)
     except (ValueError, OverflowError, ZeroDivisionError):
         return None
     whole = name in ("ABS", "NUMTODNUM", "DNUMTONUM") and all(isinstance(each, int) for each in values)
-    return int(found) if whole else function_in_single(float(found))
+    return int(found) if whole else found
 
 
 def _here(memory: ProgramMemory) -> Position:
