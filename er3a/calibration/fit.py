@@ -379,7 +379,7 @@ def _fit(
 ) -> Fit:
     """``holding``: by how much corrections are held at 0, per rad or m."""
     kept, terms, deviation = tuple(kept), tuple(terms), observations.deviation_mm
-    nothing, start = np.zeros((1, len(kept))), _base_at(robot, kept, observations)
+    start = _base_at(robot, kept, observations)
     far = bool(start.any())  # a large turn is no small one behind another
     prior = np.full(sum(term.count for term in terms), 1 / TAKEN)
 
@@ -389,8 +389,8 @@ def _fit(
         errors = JointErrors(robot, terms, coefficients)
         return observations.shifted(errors.amounts(observations.row_values, observations.points(robot)))
 
-    def weighted(here: Robot, coefficients: Reals) -> Reals:
-        values = with_errors(coefficients).predict(here, kept, nothing)[0]
+    def weighted(amounts: Reals, coefficients: Reals) -> Reals:
+        values = with_errors(coefficients).predict(robot, kept, amounts[None])[0]
         return np.concatenate([(values - observations.values_mm) / deviation, prior * coefficients])
 
     def held(rest: Reals, amounts: Reals) -> Reals:
@@ -407,18 +407,17 @@ def _fit(
 
     n, k = len(observations), len(kept)
     unknowns = np.r_[start, np.zeros(len(prior))]
-    before = weighted(robot, unknowns[k:])[:n]
-    here = corrected(robot, kept, unknowns[:k])
-    rest = held(weighted(here, unknowns[k:]), unknowns[:k])
+    before = weighted(np.zeros(k), unknowns[k:])[:n]
+    rest = held(weighted(unknowns[:k], unknowns[k:]), unknowns[:k])
     for number in range(MAX_STEPS):
+        here = corrected(robot, kept, unknowns[:k])
         J = slopes(here, unknowns[:k], unknowns[k:])
         J = np.vstack([J, holding * np.eye(k, len(unknowns))]) if holding else J
         step = np.linalg.lstsq(J, -rest, rcond=None)[0]
         gain = np.linalg.norm(J @ step)
         for _ in range(HALVINGS):
             trial = unknowns + step
-            here = corrected(robot, kept, trial[:k])
-            new = held(weighted(here, trial[k:]), trial[:k])
+            new = held(weighted(trial[:k], trial[k:]), trial[:k])
             if new @ new <= rest @ rest * (1 + 1e-9):
                 break
             step = step / 2
@@ -426,7 +425,7 @@ def _fit(
         small = SMALL_CHANGE if number < STEPS else SLOW_CHANGE
         still = isinstance(observations, PointObservations) and gain < small * np.linalg.norm(rest)
         if still or np.abs(step).max() < SMALL_STEP + 1e-9 * np.abs(unknowns).max():
-            rows, last = with_errors(unknowns[k:]).independent(here)
+            rows, last = with_errors(unknowns[k:]).independent(corrected(robot, kept, unknowns[:k]))
             own = np.sqrt(rows**2 @ deviation**2)
             return Fit(
                 kept, terms, unknowns[:k], unknowns[k:], before, rest[:n], rows @ J[:n], rows @ rest[:n], own, last

@@ -293,10 +293,10 @@ class PointObservations:
         return np.empty((len(rows), 0)) if self.lifted is None else self.lifted[rows]
 
     def _along_axes(self, xyz: Reals) -> Reals:
-        """Coordinates (P, 3) along ``axes``, 0 across the plane if the arm is flat."""
+        """Coordinates (..., 3) along ``axes``, 0 across the plane if the arm is flat."""
         found: Reals = xyz @ self.axes.T
         if self.flat:
-            found[:, 2] = 0.0
+            found[..., 2] = 0.0
         return found
 
     def relative(self, xyz: Reals) -> Reals:
@@ -401,13 +401,17 @@ class PointObservations:
         values = np.empty((len(amounts), len(self)))
         for start in range(0, len(amounts), step):
             part = amounts[start : start + step]
-            T = frames_of(moved(join([own] * len(part)), parameters, part), robot, self.row_values)[:, :, -1]
-            for k, row in enumerate(part):
-                S, shift = placed(parameters, row) if row[placing].any() else (np.eye(4), np.zeros(3))
-                xyz = np.einsum("pij,pj->pi", T[k, :, :3, :3], points + self.on_tool[:, None] * shift)
-                world = robot.base @ S @ base_inverse
-                xyz = (xyz + T[k, :, :3, 3]) @ world[:3, :3].T + world[:3, 3]
-                values[start + k] = MM * self.relative(xyz)[self.seen]
+            tables = moved(own[np.zeros(len(part), dtype=np.int64)], parameters, part)
+            T = frames_of(tables, robot, self.row_values)[:, :, -1]
+            S, shift = np.tile(np.eye(4), (len(part), 1, 1)), np.zeros((len(part), 3))
+            for k in np.flatnonzero(part[:, placing].any(axis=1)):
+                S[k], shift[k] = placed(parameters, part[k])
+            world = robot.base @ S @ base_inverse
+            xyz = points + self.on_tool[:, None] * shift[:, None]
+            xyz = np.einsum("hpij,hpj->hpi", T[..., :3, :3], xyz) + T[..., :3, 3]
+            xyz = xyz @ world[:, :3, :3].swapaxes(1, 2) + world[:, None, :3, 3]
+            seen = [self.relative(each) for each in xyz] if self.kinds else self._along_axes(xyz)
+            values[start : start + step] = MM * np.asarray(seen)[:, self.seen]
         return values
 
     def positions(self, robot: Robot) -> Reals:

@@ -7,7 +7,7 @@ Base and tool are corrected behind what the robot's file says of them: the base 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -109,11 +109,13 @@ def parallel_pairs(robot: Robot) -> list[tuple[int, tuple[int, int]]]:
 def moved(tables: Tables, parameters: Sequence[Parameter], amounts: Reals) -> Tables:
     """One table of the batch for each row of amounts (H, p), in m and rad, added to the entries; amounts of base and
     tool change no table."""
+    columns: dict[str, Reals] = {}
     for parameter, amount in zip(parameters, amounts.T):
         if parameter.joint:
-            entry = getattr(tables, parameter.column)[:, [parameter.joint - 1]]
-            tables = tables.with_column(parameter.column, [parameter.joint - 1], entry + amount[:, None])
-    return tables
+            if parameter.column not in columns:
+                columns[parameter.column] = getattr(tables, parameter.column).copy()
+            columns[parameter.column][:, parameter.joint - 1] += amount
+    return replace(tables, **columns)
 
 
 def placed(parameters: Sequence[Parameter], amounts: Reals) -> tuple[Reals, Reals]:
