@@ -267,6 +267,7 @@ def _not_examined(execution: Execution, located: tuple[LocatedFinding, ...], end
         found_in.SetElsewhere,
         found_in.WaitsForOthers,
         found_in.ErrorsNotFollowed,
+        found_in.FramesDecide,
     )
     found += [NotExamined(each.place, "course") for each in located if isinstance(each.finding, ends)]
     strange = (found_in.MayMove, NotUnderstood, NotSimulated)
@@ -369,20 +370,27 @@ def _loads(execution: Execution, robot: Robot) -> Iterator[LocatedFinding]:
 
 
 def _not_set(execution: Execution) -> Iterator[LocatedFinding]:
-    """Tool and base that a program does not set, at the first motion that needs them."""
-    found: dict[Literal["tool", "base"], int] = {}
+    """Tool and base that a program does not set: at the first motion or line that needs them, and where they decide."""
+    needed = [(each.before, each.place, each.calls, each.kinds) for each in execution.unset if not each.decides]
     for number, step in enumerate(execution.steps):
         what = step.instruction
         if not isinstance(what, ArmMotion) or (what.kind == "joint" and not isinstance(what.target, PoseTarget)):
             continue
-        if not what.tool.own:
-            found.setdefault("tool", number)
-        if not what.base.own and isinstance(what.target, PoseTarget):
-            found.setdefault("base", number)
-    if found:
-        step = execution.steps[min(found.values())]
-        kind: Literal["tool", "base", "both"] = "both" if len(found) > 1 else next(iter(found))
-        yield LocatedFinding("note", found_in.FramesFromRobotFile(kind), step.place, step.calls)
+        own = {"tool": what.tool.own, "base": what.base.own or not isinstance(what.target, PoseTarget)}
+        kinds: frozenset[str] = frozenset(kind for kind, is_own in own.items() if not is_own)
+        if kinds:
+            needed.append((number, step.place, step.calls, kinds))
+    if needed:
+        _, place, calls, _ = min(needed, key=lambda each: each[0])
+        all_kinds = frozenset[str]().union(*(kinds for *_, kinds in needed))
+        yield LocatedFinding("note", found_in.FramesFromRobotFile(_both(all_kinds)), place, calls)
+    for each in execution.unset:
+        if each.decides:
+            yield LocatedFinding("caution", found_in.FramesDecide(_both(each.kinds)), each.place, each.calls)
+
+
+def _both(kinds: frozenset[str]) -> Literal["tool", "base", "both"]:
+    return "both" if len(kinds) > 1 else "tool" if "tool" in kinds else "base"
 
 
 STATED_MM, STATED_DEG = 1.0, 0.5

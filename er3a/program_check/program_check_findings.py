@@ -55,6 +55,13 @@ class FramesFromRobotFile(Finding):
     kind: Literal["tool", "base", "both"]
 
 
+class FramesDecide(Finding):
+    """A pose that decides which way the program takes is read with a tool, base or both that it does not set; those of
+    the robot file were taken."""
+
+    kind: Literal["tool", "base", "both"]
+
+
 class FrameGivenTwice(Finding):
     """The program itself gives a frame that the check was given otherwise; the program's was taken."""
 
@@ -457,6 +464,7 @@ CheckFinding = (
     | FrameTakenAsFlange
     | FrameOfSeveral
     | FramesFromRobotFile
+    | FramesDecide
     | FrameGivenTwice
     | KeptToNextStart
     | SetElsewhere

@@ -346,6 +346,7 @@ class ProgramMemory:
     doubts : instructions that are not understood, by the variables of motions that they may have set
     cell : what is known of the cell
     watched : variables of which it is kept, in ``met``, what is read before the program has ``written`` it
+    unset : tool and base that a pose was read with, and that the program has not set; whoever asks empties it
     """
 
     def __init__(self, functions: Dialect, cell: Cell):
@@ -361,6 +362,7 @@ class ProgramMemory:
         self.watched: frozenset[str] = frozenset()
         self.met: set[str] = set()  # of all copies
         self.written: set[str] = set()
+        self.unset: set[str] = set()
 
     def copy(self) -> ProgramMemory:
         """An independent copy."""
@@ -375,6 +377,20 @@ class ProgramMemory:
         """Something that is not understood may have moved the arm and set its tool and base."""
         self.here = Position()
         self.doubts.update(dict.fromkeys(self.functions.frames, text))
+
+    def seen(self, here: Position, tool: NamedFrame, base: NamedFrame) -> Reals | None:
+        """T_base_tool (4, 4) of a position, as the program reads it; None if it can't be known."""
+        found = here.seen(tool, base, self.cell.flange)
+        if found is not None:
+            self.note_unset(tool, base)
+        return found
+
+    def note_unset(self, tool: NamedFrame, base: NamedFrame) -> None:
+        """Keep which of these the program has not set."""
+        if not tool.own:
+            self.unset.add("tool")
+        if not base.own:
+            self.unset.add("base")
 
     def read(self, name: str) -> syntax.Value | None:
         """The value of a full name, or None."""

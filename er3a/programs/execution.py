@@ -86,6 +86,24 @@ class FrameTwice:
     turned_deg: float
 
 
+@dataclass(frozen=True, slots=True)
+class FramesUnset:
+    """A pose that the program reads with a tool or base that it has not set, and that motions depend on.
+
+    Attributes
+    ----------
+    kinds : ``tool`` and ``base``, which of them it has not set
+    before : number of the step that is carried out next
+    decides : whether the way that the program takes may depend on it
+    """
+
+    kinds: frozenset[str]
+    place: Place
+    calls: tuple[Place, ...]
+    before: int
+    decides: bool
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Execution(ByValue):
     """A program that was run.
@@ -99,6 +117,7 @@ class Execution(ByValue):
     kept : variables of its data that decide motions and that it leaves changed to its next start, with where
     elsewhere : variables of its data that decide motions and that other programs set, with where
     errors : handlers after which the program goes on that had an error
+    unset : poses that it reads with a tool or base that it has not set
     """
 
     program: Program
@@ -109,6 +128,7 @@ class Execution(ByValue):
     kept: tuple[tuple[str, Place], ...] = ()
     elsewhere: tuple[tuple[str, Place], ...] = ()
     errors: tuple[Place, ...] = ()
+    unset: tuple[FramesUnset, ...] = ()
 
     @property
     def complete(self) -> bool:

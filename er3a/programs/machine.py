@@ -31,7 +31,7 @@ from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, syntax
 from er3a.programs.code_builder import own_names, variable_of
 from er3a.programs.evaluation import Cell, Dialect, Position, ProgramMemory, known, root
-from er3a.programs.execution import Ending, EndKind, Execution, FrameTwice, KeepOn, RunLimits, Step
+from er3a.programs.execution import Ending, EndKind, Execution, FramesUnset, FrameTwice, KeepOn, RunLimits, Step
 from er3a.programs.languages import LANGUAGES, not_written
 from er3a.robots.robot import Robot
 
@@ -250,10 +250,10 @@ class QuietBranch:
 
 def quiet_branches(
     program: syntax.Program, dialect: Dialect
-) -> tuple[dict[tuple[str, int], QuietBranch], frozenset[str]]:
+) -> tuple[dict[tuple[str, int], QuietBranch], frozenset[str], frozenset[str]]:
     """The quiet branches by routine and number: no side moves the arm, or changes what decides where it goes.
 
-    Second, the variables that decide that.
+    Second, the variables that decide that; third, those of them that decide on a side of the other branches.
     """
     moving = _moving(program, dialect)
     changes = _changes(program)
@@ -279,7 +279,12 @@ def quiet_branches(
             del found[key]
             origins |= conditions[key]
         waiting = list(origins - needed)
-    return found, frozenset(needed)
+    choosing: set[str] = set()
+    waiting = [name for key, used in conditions.items() if key not in found for name in used]
+    while waiting:
+        choosing.update(waiting)
+        waiting = [source for name in waiting for source in sources.get(name, set()) - choosing]
+    return found, frozenset(needed), frozenset(choosing)
 
 
 def _moving(program: syntax.Program, dialect: Dialect) -> set[str]:
@@ -630,12 +635,13 @@ class Machine:
         self.names_met: set[str] = set()
         self.deciding_names: list[str] = []  # of those, whole
         self.unsettled = {name: unsettled(program, each, dialect) for name, each in program.routines.items()}
-        self.quiet, self.needed = quiet_branches(program, dialect)
+        self.quiet, self.needed, self.choosing = quiet_branches(program, dialect)
         self.persisting = _persisting(program, dialect) & self.needed
         self.first_values: dict[str, syntax.Value] = {}  # of these
         self.changed_at: dict[str, instructions.Place] = {}  # likewise
         self.kept: dict[str, instructions.Place] = {}
         self.frames_twice: dict[str, FrameTwice] = {}
+        self.unset: dict[tuple[instructions.Place, bool], FramesUnset] = {}
         self.moving = _moving(program, dialect)
         self.aliased = aliased_calls(program)
         self.passed: set[tuple[str, int]] = set()
@@ -685,6 +691,7 @@ class Machine:
             tuple(self.kept.items()),
             tuple((name, place) for name, place in elsewhere.items() if name in set(map(root, memory.met))),
             errors_not_followed(self.program, self.dialect),
+            tuple(self.unset.values()),
         )
 
     def _begin(self, way: ExecutionPath) -> None:
@@ -734,6 +741,7 @@ class Machine:
             back = False
             at = frame.at
             frame.at += 1
+            way.memory.unset.clear()
             self.passed.add((frame.routine.name, at))
             if (strange := self.strange.get((frame.routine.name, at))) is not None:
                 self._note(way, operation.place, instructions.Unknown(strange))
@@ -765,6 +773,34 @@ class Machine:
                 self._return(way, operation)
             else:
                 self._carry_out(way, frame, operation)
+            if way.memory.unset:
+                self._keep_unset(way, frame, at, operation)
+
+    def _keep_unset(self, way: ExecutionPath, frame: Frame, at: int, operation: syntax.Operation) -> None:
+        """Keep that an operation has read a pose with a tool or base that is not set, if motions depend on it."""
+        match operation:
+            case syntax.Branch():
+                decides = used = (frame.routine.name, at) not in self.quiet
+            case syntax.Assign() | syntax.Return() | syntax.Call():
+                into = self._changed_by(frame.routine, operation)
+                decides, used = bool(self.choosing & into), bool(self.needed & into)
+            case _:
+                decides, used = False, _moves(self.program, operation, self.moving, self.dialect)
+        if used:
+            found = FramesUnset(frozenset(way.memory.unset), operation.place, frame.calls, len(self.steps), decides)
+            self.unset.setdefault((operation.place, decides), found)
+
+    def _changed_by(
+        self, routine: syntax.Routine, operation: syntax.Assign | syntax.Return | syntax.Call
+    ) -> frozenset[str]:
+        """Names under which the values of an operation are known after it."""
+        match operation:
+            case syntax.Assign(target=target):
+                return frozenset((target_name(target),))
+            case syntax.Return():
+                return frozenset((_value_of(routine.name),))
+            case syntax.Call(routine=called):
+                return frozenset(each.name for each in self.program.routines[called].parameters)
 
     def _carry_out(
         self,

@@ -319,6 +319,10 @@ MENDED = {
         f"DEF a( )\n$VEL.CP=0.05\n{SOFT}\nBAS(#VEL_PTP,10)\n{AT_HOME}\nLIN_REL {{Z 5}}\nEND\n",
         krl(SOFT, AT_HOME, "LIN_REL {Z 5}"),
     ),
+    "frames_decide": (
+        f"DEF a( )\nDECL POS XP\n{SOFT}\nXP=$POS_ACT\nIF XP.Z>400 THEN\nPTP {{A1 5}}\nENDIF\nPTP {{A1 6}}\nEND\n",
+        krl("DECL POS XP", SOFT, "XP=$POS_ACT", "IF XP.Z>400 THEN", "PTP {A1 5}", "ENDIF", "PTP {A1 6}"),
+    ),
     "position_completed": (
         krl("DECL AXIS Q", "Q={A1 5}", "PTP Q"),
         krl("DECL AXIS Q", "Q={A1 5,A2 -10,A3 -10,A4 0,A5 -70,A6 0}", "PTP Q"),

@@ -15,7 +15,20 @@ from er3a.programs.instructions import JointTarget, PoseTarget
 from er3a.programs.languages import files_of, read_program, write_program
 from er3a.programs.machine import execute
 from er3a.programs.writing import WriteOptions
-from testing.program_texts import FRAMES, HOME, HOME_TEXT, NEAR, ROBOT, axes, check, codes, krl, motions, written
+from testing.program_texts import (
+    FRAMES,
+    HOME,
+    HOME_TEXT,
+    NEAR,
+    NEAR_TEXT,
+    ROBOT,
+    axes,
+    check,
+    codes,
+    krl,
+    motions,
+    written,
+)
 
 SPEEDS = "$VEL.CP=0.1\n$ACC.CP=0.2\n$VEL_AXIS[1]=10\n"
 POSE = "{X 400,Y 0,Z 300,A %g,B 180,C 0}"
@@ -121,6 +134,49 @@ def test_a_turning_speed_that_is_not_known_is_a_caution_where_the_turn_decides(t
 def test_a_tool_and_a_base_that_a_program_does_not_set_are_told_once(tmp_path, name, text, kind):
     noted = [each for each in check(tmp_path, text, name).findings if each.finding.code == "frames_from_robot_file"]
     assert [(each.finding.kind, each.level) for each in noted] == ([] if kind is None else [(kind, "note")])
+
+
+LIFT = f"if here[2] > 0.3:\n movej({NEAR_TEXT})\nend\nmovej({HOME_TEXT})"
+ROBOT_TCP = "set_tcp(p[0,0,0,0,0,0])"
+
+
+@pytest.mark.parametrize(
+    ("body", "told"),
+    [
+        (f"here = get_actual_tcp_pose()\n{LIFT}", [("frames_decide", "caution", 3)]),
+        (f"here = get_forward_kin()\n{LIFT}", [("frames_decide", "caution", 3)]),
+        (f"z = get_tcp_offset()\nhere = z\n{LIFT}", [("frames_decide", "caution", 3)]),
+        (f"{LIFT.replace('here', 'get_target_tcp_pose()')}", [("frames_decide", "caution", 3)]),
+        (f"{ROBOT_TCP}\nhere = get_actual_tcp_pose()\n{LIFT}", []),
+        (f"here = get_actual_tool_flange_pose()\n{LIFT}", []),
+        (f"here = get_forward_kin({NEAR_TEXT}, p[0,0,0,0,0,0])\n{LIFT}", []),
+        ("here = get_actual_tcp_pose()\ntextmsg(here)\nif here[2] > 0.3:\n textmsg(1)\nend", []),
+        (
+            "here = get_actual_tcp_pose()\nmovej([here[2], -0.2, -0.2, 0, -1.2, 0])",
+            [("frames_from_robot_file", "note", 3)],
+        ),
+    ],
+)
+def test_a_pose_that_is_read_with_a_tool_that_is_not_set_and_decides_is_no_pass(tmp_path, body, told):
+    found = check(tmp_path, f"def a():\n movej({HOME_TEXT})\n{body}\nend\n", "a.script")
+    of_frames = ("frames_decide", "frames_from_robot_file")
+    said = [
+        (each.finding.code, each.level, each.place.line) for each in found.findings if each.finding.code in of_frames
+    ]
+    assert said == told
+    course = [each.place.line for each in found.not_examined if each.what == "course"]
+    assert course == [line for code, _, line in told if code == "frames_decide"]
+
+
+def test_a_routine_that_decides_by_where_the_tool_is_is_told_where_that_is_read(tmp_path):
+    low = "def low():\n here = get_actual_tcp_pose()\n return here[2] < 0.3\nend\n"
+    text = f"def a():\n{low} if low():\n movej({NEAR_TEXT})\nend\n movej({HOME_TEXT})\nend\n"
+    assert codes(check(tmp_path, text, "a.script")).get("frames_decide") == [3]
+    body = f"XP=$POS_ACT\nIF XP.Z>300 THEN\nPTP {axes(NEAR)}\nENDIF\nPTP {axes(HOME)}"
+    for set_before, told in (("", "both"), ("$TOOL=$NULLFRAME\n", "base"), (FRAMES, None)):
+        found = check(tmp_path, krl(f"DECL POS XP\n{set_before}{SPEEDS}{body}"), "a.src").findings
+        kinds = [each.finding.kind for each in found if each.finding.code == "frames_decide"]
+        assert kinds == ([] if told is None else [told])
 
 
 @pytest.mark.parametrize("used", [True, False])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.programs.csv_program import write_csv
 from er3a.programs.instructions import (
@@ -230,6 +231,15 @@ def test_a_changed_solution_or_element_is_not_taken_for_the_old_one(tmp_path):
     (tmp_path / "a.src").write_text(f"DEF a( )\n{body}END\n")
     (motion,) = execute(read_program(tmp_path / "a.src")).listing().motions
     assert isinstance(motion.target, UnresolvedTarget)
+
+
+@pytest.mark.parametrize(
+    "read", ["get_forward_kin()", "get_forward_kin(tcp=p[0,0,0.1,0,0,0])", "get_actual_tcp_pose()"]
+)
+def test_where_the_tool_is_after_a_pose_is_that_pose(tmp_path, read):
+    text = f"set_tcp(p[0,0,0.1,0,0,0])\nmovel(p[0.4,0,0.4,0,3.1,0])\nmovel(pose_trans({read}, p[0,0,0.02,0,0,0]))\n"
+    first, second = run(tmp_path, "a.script", text).listing().motions
+    assert second.target.pose == pytest.approx(first.target.pose @ transform([0, 0, 0.02], np.zeros(3)))
 
 
 def test_structures_lists_and_remote_objects_of_urscript(tmp_path):

@@ -115,6 +115,7 @@ REMEDIES: dict[str, str] = {
         "of the motion (URScript: t)."
     ),
     "frames_from_robot_file": N_("Set tool and base in the program before its first pose."),
+    "frames_decide": N_("Set tool and base in the program before it reads where the arm is."),
     "position_completed": N_("Give all coordinates of the position."),
     "frame_given_twice": N_("Correct the one that is wrong, or remove it from the frames."),
     "kept_to_next_start": N_("Set this variable at the program's beginning."),
@@ -328,6 +329,21 @@ TEXTS = texts(
             both=(
                 "neither tool nor base is set before this pose; the tool of the robot file and the base of the robot "
                 "were taken, and the controller may have others"
+            ),
+        ),
+        "frames_decide": by(
+            "kind",
+            tool=(
+                "which way the program takes depends on this pose, and no tool is set before: the robot file's was "
+                "taken, and with another one on the controller it may take a way that was not checked"
+            ),
+            base=(
+                "which way the program takes depends on this pose, and no base is set before: the robot's was taken, "
+                "and with another one on the controller it may take a way that was not checked"
+            ),
+            both=(
+                "which way the program takes depends on this pose, and neither tool nor base is set before: those of "
+                "the robot file were taken, and with others on the controller it may take a way that was not checked"
             ),
         ),
         "position_completed": (

@@ -682,7 +682,7 @@ class KrlDialect(Dialect):
         if (mapped := memory.cell.frames.get(name)) is not None:
             return frame_record(mapped)
         if name in HERE:
-            seen = memory.here.seen(tool_of(memory), base_of(memory), memory.cell.flange)
+            seen = memory.seen(memory.here, tool_of(memory), base_of(memory))
             return None if seen is None else _posture(frame_record(seen, "E6POS"), memory.here.joints, name)
         if name in HERE_JOINTS and memory.here.joints is not None:
             degrees = [math.degrees(each) for each in memory.here.joints]

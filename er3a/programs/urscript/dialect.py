@@ -455,16 +455,19 @@ def _of_position(memory: ProgramMemory, name: str, given: dict[str, syntax.Value
         return None if here.joints is None else tuple(map(float, here.joints))
     if name in ("get_actual_tcp_pose", "get_target_tcp_pose", "get_target_waypoint", "get_actual_tool_flange_pose"):
         tool = instructions.NamedFrame("flange", np.eye(4)) if name.endswith("flange_pose") else _tool(memory)
-        seen = here.seen(tool, ROBOT_BASE, memory.cell.flange)
+        seen = memory.seen(here, tool, ROBOT_BASE)
         return None if seen is None else _record(seen)
     if name == "get_tcp_offset":
-        offset = _tool(memory).pose
-        return None if offset is None else _record(offset)
-    if name == "get_forward_kin" and memory.cell.flange is not None:
-        joints = _joints(given["q"]) if "q" in given else here.joints
-        tool_pose = _pose(given["tcp"]) if "tcp" in given else _tool(memory).pose
-        if joints is not None and tool_pose is not None:
-            return _record(memory.cell.flange(joints) @ tool_pose)
+        tool = _tool(memory)
+        memory.note_unset(tool, ROBOT_BASE)
+        return None if tool.pose is None else _record(tool.pose)
+    if name == "get_forward_kin":
+        tool = instructions.NamedFrame("", _pose(given["tcp"])) if "tcp" in given else _tool(memory)
+        joints = _joints(given["q"]) if "q" in given else None
+        if "q" in given and joints is None:
+            return None
+        seen = memory.seen(here if joints is None else Position(joints), tool, ROBOT_BASE)
+        return None if seen is None else _record(seen)
     if name == "get_inverse_kin" and isinstance(pose := given.get("x"), syntax.Record):
         near = given.get("qnear", () if memory.here.joints is None else tuple(map(float, memory.here.joints)))
         tool_value = given.get("tcp", _tool_value(memory))
