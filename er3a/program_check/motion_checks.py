@@ -330,6 +330,9 @@ def tool_motion_path(
         return None
     law, said = _turning_law(motion, (T_start, end), (shape.length, shape.turned), rules.assumed)
     said += _turns_otherwise(motion, T_start, end)
+    if shape.turned > np.pi - SIDE_OPEN:
+        x, y, z = (np.round(arm.base[:3, :3].T @ shape.rotation / shape.turned, 3) + 0.0).tolist()
+        said += (found_in.TurnsEitherWay((x, y, z)),)
     path: Segment = (
         line(T_start, end, law.duration, None, law.ramp)
         if via is None
@@ -391,6 +394,8 @@ def _turning_law(
 
 KRL_LINES = ("LIN", "SLIN", "CIRC", "SCIRC")
 APART = math.radians(1.0)
+SIDE_OPEN = 1e-5
+"""rad from half a turn, within which a controller's rounding may take the turn the other way round."""
 
 
 def _turns_otherwise(motion: ArmMotion, start: Reals, end: Reals) -> tuple[found_in.CheckFinding, ...]:

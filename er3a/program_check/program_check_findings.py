@@ -114,6 +114,13 @@ class TurnsOtherwise(Finding):
     off_deg: float
 
 
+class TurnsEitherWay(Finding):
+    """A line or arc turns the tool by half a turn, to which both ways are as long; it was checked with the turn about
+    ``axis`` of the robot's base, and no public text says which way a controller takes."""
+
+    axis: tuple[float, float, float]
+
+
 class RelativeTurnAssumed(Finding):
     """Angles of a relative position were taken for turns about the axes of the base; added to those of the position
     before, they lead to an orientation that is ``off_deg`` from that."""
@@ -473,6 +480,7 @@ CheckFinding = (
     | ToolStatedElsewhere
     | PositionCompleted
     | TurnsOtherwise
+    | TurnsEitherWay
     | RelativeTurnAssumed
     | FramesInDoubt
     | PathNotKnown

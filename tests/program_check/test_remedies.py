@@ -350,6 +350,11 @@ MENDED = {
         krl(SOFT, AT_HOME, "LIN_REL {A 60,C 60} #TOOL"),
         krl(SOFT, AT_HOME, "LIN_REL {A 60} #TOOL", "LIN_REL {C 60} #TOOL"),
     ),
+    "turns_either_way": (
+        krl(SOFT, AT_HOME, "LIN_REL {A 180} #TOOL"),
+        krl(SOFT, AT_HOME, "LIN_REL {A 90} #TOOL", "LIN_REL {A 90} #TOOL"),
+        krl(SOFT, AT_HOME, "PTP_REL {A6 180}"),
+    ),
     "relative_turn_assumed": (
         krl(SOFT, AT_HOME, "LIN_REL {A 20}", "LIN_REL {B 5}"),
         krl(SOFT, AT_HOME, "LIN_REL {A 20}", "LIN_REL {B 5} #TOOL"),

@@ -663,6 +663,28 @@ def test_a_line_of_krl_that_swings_the_tool_and_turns_it_too_is_no_pass(tmp_path
 
 
 @pytest.mark.parametrize(
+    ("first", "second", "told"),
+    [
+        ("3.1416, 0, 0", "0, 3.1416, 0", True),  # half a turn about z, to 1e-11 rad
+        ("3.14, 0, 0", "0, 3.14, 0", True),
+        ("3.1416, 0, 0", "0.05, 3.1416, 0", False),
+        ("3.1416, 0, 0", "3.1416, 0.1, 0", False),
+    ],
+)
+def test_half_a_turn_is_no_pass_since_it_may_go_either_way(tmp_path, first, second, told):
+    text = f"set_tcp(p[0,0,0,0,0,0])\nmovej({HOME_TEXT})\nmovel(p[0.4,0,0.4,{first}])\nmovel(p[0.4,0,0.45,{second}])\n"
+    found = [each for each in check(tmp_path, text, "a.script").findings if each.finding.code == "turns_either_way"]
+    assert [(each.place.line, each.level) for each in found] == ([(4, "caution")] if told else [])
+    assert all(each.finding.axis == pytest.approx((0.0, 0.0, 1.0), abs=2e-3) for each in found)
+
+
+@pytest.mark.parametrize("turn", ["A 180", "C 180"])
+def test_half_a_turn_of_krl_is_no_pass(tmp_path, turn):
+    body = f"{FRAMES}{SPEEDS}LIN {POSE % 0}\nLIN_REL {{{turn}}} #TOOL"
+    assert 8 in codes(check(tmp_path, krl(body), "a.src"))["turns_either_way"]
+
+
+@pytest.mark.parametrize(
     ("before", "turn", "told"),
     [(0, "A 20", False), (0, "B 20", True), (40, "B 20", True), (40, "A 20", False), (40, "B 20} #TOOL ;", False)],
 )

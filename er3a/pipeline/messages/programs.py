@@ -120,6 +120,7 @@ REMEDIES: dict[str, str] = {
     "frame_given_twice": N_("Correct the one that is wrong, or remove it from the frames."),
     "kept_to_next_start": N_("Set this variable at the program's beginning."),
     "turns_otherwise": N_("Turn the tool by a joint motion, or in parts: swing its x axis first, then turn about it."),
+    "turns_either_way": N_("Turn the tool in two lines by 90 deg each, or by a joint motion."),
     "relative_turn_assumed": N_("Give the target as an absolute position, or turn in the tool's frame (#TOOL)."),
     "set_elsewhere": N_("Set this variable at the program's beginning."),
     "waits_for_others": N_(
@@ -352,6 +353,10 @@ TEXTS = texts(
         "turns_otherwise": (
             "on the way the tool was turned about one axis; no public text says how KRL turns it: a swing of its x "
             "axis and a turn about that are up to {off_deg:.1f} deg from there"
+        ),
+        "turns_either_way": (
+            "the tool turns by 180 deg, and both ways round are equally far: it was turned about ({axis}) of the base; "
+            "no public text says which way the controller takes"
         ),
         "relative_turn_assumed": (
             "the angles were taken for turns about the axes of the base; added to the angles before, they lead to an "
@@ -632,6 +637,11 @@ def _(found: found_in.ArcGoesOn) -> str:
     if found.turns:
         return sentence("arc_goes_on.turns", angle=found.angle_deg)
     return say_as(found)
+
+
+@say.register
+def _(found: found_in.TurnsEitherWay) -> str:
+    return say_as(found, axis=", ".join(f"{part:g}" for part in found.axis))
 
 
 @say.register
