@@ -9,7 +9,7 @@ has times; otherwise it is left out.
 
 A joint trajectory of ROS or MoveIt (``trajectory_msgs/JointTrajectory``, or ``moveit_msgs/RobotTrajectory`` around it)
 as YAML or JSON is a timed table of joints. Only positions and times of its points are used; the number in a joint's
-name is its place.
+name is its place. Keys that these messages do not have are refused.
 """
 
 from __future__ import annotations
@@ -56,6 +56,9 @@ MAX_ROWS = 200_000
 SAME_POINT = 1e-9  # m or rad
 MAX_RAD = 10 * 2 * math.pi
 UNREAD = ("velocities", "accelerations", "effort")
+IN_POINT = frozenset(("positions", "time_from_start", *UNREAD))
+IN_TRAJECTORY = frozenset(("header", "joint_names", "points"))
+IN_ROBOT_TRAJECTORY = frozenset(("joint_trajectory", "multi_dof_joint_trajectory"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,12 +157,16 @@ def _ros_trajectory(path: Path) -> tuple[Reals, Reals, tuple[str, ...]]:
     if isinstance(beside, dict) and beside.get("points"):
         problem = "moves more than the arm's joints, which is not followed"
         raise InputError(path, "multi_dof_joint_trajectory", problem, "Give a trajectory of the arm alone")
+    if body is not content:
+        _only(path, "", content, IN_ROBOT_TRAJECTORY)
+    _only(path, "" if body is content else "joint_trajectory.", body, IN_TRAJECTORY)
     order = _joint_order(path, [str(name) for name in names])
     times, joints = np.empty(len(points)), np.empty((len(points), len(names)))
     for k, point in enumerate(points):
         values = point.get("positions") if isinstance(point, dict) else None
         if not isinstance(values, list) or len(values) != len(names) or not all(map(_is_number, values)):
             raise InputError(path, f"points[{k}].positions", f"not {len(names)} numbers", "Give one for each joint")
+        _only(path, f"points[{k}].", point, IN_POINT)
         joints[k], times[k] = values, _seconds(path, k, point.get("time_from_start"))
     _check_times(path, [f"points[{k}].time_from_start" for k in range(len(points))], times)
     if np.abs(joints).max() > MAX_RAD:
@@ -167,6 +174,15 @@ def _ros_trajectory(path: Path) -> tuple[Reals, Reals, tuple[str, ...]]:
         problem = f"{np.abs(joints[k]).max():g} rad are more than ten turns"
         raise InputError(path, f"points[{k}].positions", problem, "Write radians, or metres for a prismatic joint")
     return times, joints[:, order], tuple(name for name in UNREAD if any(point.get(name) for point in points))
+
+
+def _only(path: Path, where: str, given: dict[str, Any], known: frozenset[str]) -> None:
+    """Refuse what no message of ROS has there: it would not be followed."""
+    for key in given.keys() - known:
+        problem = f"not followed: joint trajectories of ROS have only {', '.join(sorted(known))} here"
+        raise InputError(
+            path, f"{where}{key}", problem, "Correct the key or remove it; give each motion a file of its own"
+        )
 
 
 def _joint_order(path: Path, names: list[str]) -> list[int]:

@@ -61,7 +61,8 @@ ROS = {
 @pytest.mark.parametrize("name", ["move.json", "move.yaml"])
 @pytest.mark.parametrize("wrapped", [False, True])
 def test_a_trajectory_of_ros_is_a_timed_table_in_the_order_of_its_joints(tmp_path, name, wrapped):
-    content = {"joint_trajectory": ROS, "multi_dof_joint_trajectory": {}} if wrapped else ROS
+    ros = ROS | {"header": {"frame_id": "base"}}
+    content = {"joint_trajectory": ros, "multi_dof_joint_trajectory": {}} if wrapped else ros
     (tmp_path / name).write_text(json.dumps(content))
     table = read_path_table(tmp_path / name)
     np.testing.assert_array_equal(table.joints, [[0.1, 0.2, 0.3], [0.4, 0.5, 0.6], [0.4, 0.5, 0.6]])
@@ -94,6 +95,12 @@ def point(**more):
         (point(time_from_start=None), r"points\[1\].time_from_start: no time"),
         (point(time_from_start={"seconds": 1}), "no time"),
         (point(time_from_start=0), "not later than 0 s"),
+        (point(velocity=[0, 0, 0]), r"points\[1\].velocity: not followed"),
+        (changed(speed_scaling=0.5), "speed_scaling: not followed"),
+        ({"joint_trajectory": ROS, "return_trajectory": ROS}, "return_trajectory: not followed"),
+        ({"joint_trajectory": ROS, "trajectory_start": {}}, "trajectory_start: not followed"),
+        ({"joint_trajectory": changed(more=1)}, r"joint_trajectory\.more: not followed"),
+        (changed(joint_trajectory=ROS), "(joint_names|points): not followed"),
     ],
 )
 def test_what_is_no_trajectory_of_ros_is_one_clear_error(tmp_path, content, told):
