@@ -18,7 +18,7 @@ from er3a.kinematics.forward import forward
 from er3a.kinematics.solutions import branch_labels
 from er3a.numerics.arrays import Reals
 from er3a.planning.moves import JointMove, Segment, ToolPath, line, rotation_between
-from er3a.planning.profiles import Ends, Times
+from er3a.planning.profiles import Ends, LegTimes, Times
 from er3a.planning.sequences import TURN_LENGTH, JointSequence, arc, joint_sequence, segment_path
 from er3a.planning.way_around import PlannedMove
 from er3a.robots.robot import Robot
@@ -80,12 +80,13 @@ class JointSequenceCommand(_Command):
     Attributes
     ----------
     blend : rad of the joint that turns most, over which each corner is rounded on either side
-    ramp : share of the time of each ramp of a trapezoid; None for the quintic
+    duration : s in all, shared out by size between stops; or of each move
+    ramp : of the former, share of the time of each ramp of a trapezoid; None for the quintic
     """
 
     points: Reals
     blend: float
-    duration: float
+    duration: float | LegTimes
     ramp: float | None = None
 
 
@@ -117,11 +118,11 @@ class ToolMoveCommand(_Command):
 
 @dataclass(frozen=True, eq=False)
 class ToolSequenceCommand(_Command):
-    """Lines and arcs one after another; ``ramp`` as of :class:`JointSequenceCommand`."""
+    """Lines and arcs one after another; ``duration`` and ``ramp`` as of :class:`JointSequenceCommand`."""
 
     start: Start
     segments: tuple[SegmentCommand, ...]
-    duration: float
+    duration: float | LegTimes
     ramp: float | None = None
 
 

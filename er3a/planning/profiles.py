@@ -39,6 +39,20 @@ class Times:
     corner: Integers
 
 
+@dataclass(frozen=True, eq=False)
+class LegTimes:
+    """How long each leg of a sequence takes, from corner to corner; at a corner that is not rounded it stops.
+
+    Attributes
+    ----------
+    times : (n,), s
+    ramps : (n,), s, of each ramp of a leg's trapezoid, where it starts from rest or comes to it
+    """
+
+    times: Reals
+    ramps: Reals
+
+
 def check_times(t: Reals, start: float, end: float) -> None:
     """:class:`er3a.Er3aError` for times (...,) in s before the start or after the end of a motion; NaN passes."""
     slack = BEYOND * (end - start)
@@ -77,13 +91,13 @@ def quintic(
     return x, dx / duration, ddx / duration**2
 
 
-def trapezoid(t: Reals, duration: float, ramp: float) -> Rates:
+def trapezoid(t: Reals, duration: float, ramp: float | Reals) -> Rates:
     """Progress from 0 to 1 at a velocity that rises, stays and falls, each ramp taking its share of the time [2]_.
 
     Parameters
     ----------
     t : (...,), s, from 0 to ``duration``
-    ramp : share of the time, greater than 0, at most 1/2
+    ramp : share of the time, greater than 0, at most 1/2; or (...,)
 
     Returns
     -------
@@ -125,12 +139,12 @@ class FromRestToRest:
     Attributes
     ----------
     times, progress : (k,), s and shares of the path, of the halts, start and end among them; both rise
-    ramp : share of the time of each ramp of a trapezoid
+    ramp : share of the time of each ramp of a trapezoid; (k - 1,), of each of them
     """
 
     times: Reals
     progress: Reals
-    ramp: float | None = None
+    ramp: float | Reals | None = None
 
     @property
     def breaks(self) -> Reals:
@@ -153,7 +167,10 @@ class FromRestToRest:
         duration = self.times[i] - self.times[i - 1]
         tau = np.clip((t - self.times[i - 1]) / duration, 0.0, 1.0)
         one, zero = np.array(1.0), np.array(0.0)
-        x, dx, ddx = quintic(tau, 1.0, zero, one) if self.ramp is None else trapezoid(tau, 1.0, self.ramp)
+        if self.ramp is None:
+            x, dx, ddx = quintic(tau, 1.0, zero, one)
+        else:
+            x, dx, ddx = trapezoid(tau, 1.0, self.ramp if np.ndim(self.ramp) == 0 else np.asarray(self.ramp)[i - 1])
         step = self.progress[i] - self.progress[i - 1]
         return self.progress[i - 1] + step * x, step * dx / duration, step * ddx / duration**2
 

@@ -31,7 +31,7 @@ from er3a.geometry.transforms import check_poses, exp_rotation, posed
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.planning.moves import Segment, rotation_between
 from er3a.planning.piecewise import MotionInParts, PiecewiseMotion, polynomial_motion
-from er3a.planning.profiles import FromRestToRest, Rates, TimeLaw, Times, Timetable, times_at
+from er3a.planning.profiles import FromRestToRest, LegTimes, Rates, TimeLaw, Times, Timetable, times_at
 
 ON_A_LINE = 1e-6  # rad; three points this near to a straight line fix no circle
 
@@ -400,7 +400,7 @@ class _Piece:
 
 
 def segment_path(
-    segments: Many[Segment], blends: Reals, timing: float | Times, ramp: float | None = None
+    segments: Many[Segment], blends: Reals, timing: float | Times | LegTimes, ramp: float | None = None
 ) -> SegmentPath:
     """Put segments together.
 
@@ -408,7 +408,7 @@ def segment_path(
     ----------
     segments : each starting where the one before ends, none of length 0; their durations are ignored
     blends : (n - 1,), m, over which length on either side each corner is rounded; 0 for a corner to stop at
-    timing : s, divided between halts by path length; or the times of the corners
+    timing : s, divided between halts by path length; or the times of the corners; or those of the legs
     ramp : share of the time of each ramp of a trapezoid between halts; None for the quintic
 
     Raises
@@ -454,7 +454,9 @@ def segment_path(
     )
 
 
-def joint_sequence(points: Reals, blends: Reals, timing: float | Times, ramp: float | None = None) -> JointSequence:
+def joint_sequence(
+    points: Reals, blends: Reals, timing: float | Times | LegTimes, ramp: float | None = None
+) -> JointSequence:
     """The path through joint angles ``points`` (n, 6) in rad; ``blends`` in rad of the joint that turns most.
 
     The rest is as for :func:`segment_path`.
@@ -515,11 +517,16 @@ def _curve(spans: list[float], coefficients: list[Reals]) -> Curve:
 
 
 def _timed(
-    sizes: Reals, sharp: Flags, runs_on: Flags, timing: float | Times, ramp: float | None
+    sizes: Reals, sharp: Flags, runs_on: Flags, timing: float | Times | LegTimes, ramp: float | None
 ) -> tuple[TimeLaw, float]:
     """The law of time, and the duration."""
     corners = np.concatenate([[0.0], np.cumsum(sizes)]) / sizes.sum()
     corners[-1] = 1.0
+    if isinstance(timing, LegTimes):
+        halts = np.flatnonzero(np.concatenate([[True], sharp, [True]]))
+        times = np.concatenate([[0.0], np.cumsum(timing.times)])[halts]
+        ramps = (timing.ramps[halts[:-1]] + timing.ramps[halts[1:] - 1]) / 2 / np.diff(times)
+        return FromRestToRest(times, corners[halts], np.minimum(ramps, 0.5)), float(times[-1])
     halt = np.concatenate([[True], sharp & ~runs_on, [True]])
     if isinstance(timing, Times):
         return Timetable(timing.times, corners[timing.corner], halt[timing.corner]), float(timing.times[-1])

@@ -28,9 +28,11 @@ from er3a.planning.commands import (
     ToolSequenceCommand,
 )
 from er3a.planning.names import ACCELERATION_TIME
+from er3a.planning.profiles import LegTimes
+from er3a.planning.sequences import TURN_LENGTH
 from er3a.planning.timing import JointLimits, joint_limits
 from er3a.program_check import program_check_findings as found_in
-from er3a.program_check.motion_checks import RAMP_OF_A_DURATION, AssumedRates, CheckRules, MotionPath
+from er3a.program_check.motion_checks import AssumedRates, CheckRules, MotionPath
 from er3a.program_check.step_checks import CheckedMotion, StepChecker, obstacles_of
 from er3a.programs.execution import Ending, Execution, KeepOn, RunLimits
 from er3a.programs.instructions import (
@@ -577,11 +579,12 @@ FOUND_OF_PATHS = frozenset(
     (
         *("above_limit", "below_limit", "slide_exceeded", "combination_exceeded", "target_out_of_reach"),
         *("way_out_of_reach", "configuration_ends", "meets_singularity", "passes_singularity", "undecided"),
-        *("motion_collides", "clear_of_assumed", "pairs_unexamined"),
+        *("motion_collides", "pairs_unexamined"),
     )
 )
-"""Findings that a check of the path makes too: it follows the same joints. Speeds and zones are not among these: a
-stretch has one law of time, and one way round each corner or a stop there."""
+"""Findings that a check of the path makes too: it follows the same joints. Speeds and zones are not among these:
+between stops a stretch has one law of time, and one way round each corner or a stop there; nor are clearances, which
+may be those of a corner's rounding."""
 
 
 def parts_of(check: ProgramCheck, robot: Robot, source: CommandSource) -> tuple[list[ProgramPart], tuple[int, ...]]:
@@ -676,24 +679,52 @@ def _part(group: list[tuple[int, CheckedMotion]]) -> ProgramPart:
     lines = (group[0][0], group[-1][0])
     motions = [motion for _, motion in group]
     ways = [motion.way for motion in motions if motion.way is not None]
-    duration = sum(way.law.duration for way in ways)
     start = motions[0].start
     assert start is not None
     if motions[0].kind == "joint":
         points = np.stack([start, *(motion.end for motion in motions if motion.end is not None)])
-        joint_moves = JointSequenceCommand(points, 0.0, duration, RAMP_OF_A_DURATION)
+        joint_moves = JointSequenceCommand(points, 0.0, _leg_times(ways, [0.0] * len(ways)))
         return ProgramPart("joint_sequence", lines, joint_moves, motions[0].placed.motion.load)
-    blends = [_blend(motion, way, after) for motion, (way, after) in zip(motions, pairwise(ways))] + [0.0]
+    blends = [_blend(one, other) for one, other in pairwise(motions)] + [0.0]
     segments = tuple(_segment(motion, blend) for motion, blend in zip(motions, blends))
-    command = ToolSequenceCommand(Start(joints=start), segments, duration, RAMP_OF_A_DURATION)
+    command = ToolSequenceCommand(Start(joints=start), segments, _leg_times(ways, blends))
     return ProgramPart("sequence", lines, command, motions[0].placed.motion.load)
 
 
-def _blend(motion: CheckedMotion, way: MotionPath, after: MotionPath) -> float:
+def _leg_times(ways: list[MotionPath], blends: list[float]) -> LegTimes:
+    """How long the motions take, as checked, without the ramps that rounded corners (m, at the ends) save."""
+    rounded = [False, *(blend > 0 for blend in blends)]
+    laws = [way.law for way in ways]
+    times = [law.duration - sum(ends) * law.saved_by_blend for law, ends in zip(laws, pairwise(rounded))]
+    return LegTimes(np.array(times), np.array([law.ramp * law.duration for law in laws]))
+
+
+SAME_PACE = 0.01
+
+
+def _blend(motion: CheckedMotion, after: CheckedMotion) -> float:
+    """m, over which the corner between two motions is rounded: a stop if it is none of this size, or the speed changes,
+    since between stops a path has one speed."""
     zone = motion.placed.motion.zone
-    if zone.kind != "distance":
+    known = [way for way in (motion.way, after.way) if way is not None]
+    if zone.kind != "distance" or len(known) < 2:
         return 0.0
-    return min(zone.value, MAX_MOTION_SHARE * way.length, MAX_MOTION_SHARE * after.length)
+    paces = [_size(way) / (way.law.duration * (1 - way.law.ramp)) for way in known]
+    if not _same_speed(motion, after) and abs(paces[0] - paces[1]) > SAME_PACE * max(paces):
+        return 0.0
+    return min(zone.value, *(MAX_MOTION_SHARE * way.length for way in known))
+
+
+def _same_speed(motion: CheckedMotion, after: CheckedMotion) -> bool:
+    """Whether two motions are to have one speed, though one may be too short to come to it."""
+    said = [(each.speed, each.turn_speed, each.turning) for each in (motion.placed.motion, after.placed.motion)]
+    speed, turn_speed, turning = said[0]
+    turns = turn_speed is not None or turning != (None, None)  # has a speed of its own, which may decide
+    return said[0] == said[1] and not turns and (speed is None or speed.unit != "s")
+
+
+def _size(way: MotionPath) -> float:
+    return max(way.length, TURN_LENGTH * way.turned)
 
 
 def _segment(checked: CheckedMotion, blend: float) -> SegmentCommand:

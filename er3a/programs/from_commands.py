@@ -12,7 +12,7 @@ import scipy
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.planning import commands
-from er3a.planning.profiles import Times
+from er3a.planning.profiles import LegTimes, Times
 from er3a.planning.sequences import TURN_LENGTH
 from er3a.programs import instructions
 from er3a.programs.program_findings import HalfTurnsSplit, WriteFinding
@@ -128,9 +128,11 @@ class _Making:
             pose = end
         return np.array(found)
 
-    def segments(self, parts: tuple[commands.SegmentCommand, ...], timing: float | Reals, ends: Reals | None) -> None:
+    def segments(
+        self, parts: tuple[commands.SegmentCommand, ...], timing: float | LegTimes | Reals, ends: Reals | None
+    ) -> None:
         """Lines and arcs; ``timing`` in all, or of each."""
-        times = _shared(self.sizes(parts), timing) if isinstance(timing, float | int) else timing
+        times = timing if isinstance(timing, np.ndarray) else _shared(self.sizes(parts), timing)
         for i, part in enumerate(parts):
             end = self.to_robot @ part.end
             zone = (
@@ -199,8 +201,10 @@ def _joint_sizes(points: Reals) -> Reals:
     return found
 
 
-def _shared(sizes: Reals, duration: float) -> Reals:
-    """A duration shared out by size."""
+def _shared(sizes: Reals, duration: float | LegTimes) -> Reals:
+    """A duration shared out by size, if those of the parts are not given."""
+    if isinstance(duration, LegTimes):
+        return duration.times
     total = sizes.sum()
     found: Reals = duration * (sizes / total if total > 0 else np.full(len(sizes), 1 / len(sizes)))
     return found

@@ -17,10 +17,12 @@ from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.solutions import branch_labels
-from er3a.program_check.check_program import CheckOptions, check_program
+from er3a.planning.commands import CommandSource, build
+from er3a.program_check.check_program import CheckOptions, check_program, parts_of
 from er3a.programs.instructions import numbers_of
 from er3a.programs.languages import read_program
-from testing.program_texts import axes
+from testing.program_texts import HOME_TEXT, axes
+from testing.program_texts import check as check_text
 from testing.singular_poses import branch_of
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -375,3 +377,39 @@ def test_an_arc_whose_angle_is_not_known_is_not_checked(tmp_path):
     check = check_program(read_program(path), ROBOT, CheckOptions(start=np.zeros(6), measures=False))
     assert {"arc_goes_on"} <= codes(check)
     assert check.level == "caution"
+
+
+def stretches(folder, *lines):
+    """The stretches of a URScript program from the home position, built, without the move to its beginning."""
+    text = f"set_tcp(p[0,0,0,0,0,0])\nmovej({HOME_TEXT})\n" + "\n".join(lines) + "\n"
+    found = check_text(folder, text, "a.script")
+    parts, rest = parts_of(found, ROBOT, CommandSource(folder / "a.script", "a"))
+    assert rest == ()
+    return [build(ROBOT, part.made, {}) for part in parts], found
+
+
+def test_joint_moves_of_a_stretch_keep_the_times_of_the_program(tmp_path):
+    """1 rad at 1 rad/s and 1.4 rad/s2: 1 + 1/1.4 s; 0.1 rad at 0.02 rad/s and 0.5 rad/s2: 5 + 0.04 s."""
+    fast, slow = HOME + np.eye(6)[0], HOME + 1.1 * np.eye(6)[0]
+    moves = (f"movej({fast.tolist()}, a=1.4, v=1.0)", f"movej({slow.tolist()}, a=0.5, v=0.02)")
+    (made,), _ = stretches(tmp_path, *moves)
+    t = np.linspace(0, made.duration, 2001)
+    speed = np.abs(made.joints.joints(t)[1][:, 0])
+    assert made.duration == pytest.approx(1 + 1 / 1.4 + 5.04)
+    assert speed[t < 1.7].max() == pytest.approx(1.0)
+    assert speed[t > 1.72].max() == pytest.approx(0.02)
+
+
+@pytest.mark.parametrize(("speed", "seconds"), [(0.1, 2.0), (0.01, 1.1 + 10.01)])
+def test_lines_of_a_stretch_keep_the_times_of_the_program(tmp_path, speed, seconds):
+    """100 mm each at 0.1 m/s and 1 m/s2: 1.1 s from rest to rest. Of two in one go the ramps between them are saved."""
+    poses = ("p[0.4,0,0.4,3.1,0,0]", "p[0.4,0,0.5,3.1,0,0]", "p[0.4,0.1,0.5,3.1,0,0]")
+    speeds = (0.1, 0.1, speed)
+    (made,), found = stretches(
+        tmp_path, *(f"movel({pose}, a=1, v={v}, r={r})" for pose, v, r in zip(poses, speeds, (0, 0.02, 0)))
+    )
+    first = list(found.motions.values())[1].way.law.duration
+    assert made.duration == pytest.approx(first + seconds + (0.1 if speed == 0.1 else 0))
+    t = np.linspace(first + 1.2, made.duration, 2001)
+    progress = made.tool.progress(t)[1] * made.tool.length
+    assert progress.max() == pytest.approx(speed, rel=0.05)  # the rounding is shorter than the corner
