@@ -19,8 +19,9 @@ proven harmless:
   it. No arm is built like that, so the shapes are wrong: the overlap is left out, and every result that does not
   examine it has to say so;
 - *guessed*: shapes guessed from a table (:mod:`er3a.collision.shapes`) that would be joined, but the table gives the
-  link between them no length (its housing is missing), and the rest of the two overlaps in many of the joint vectors
-  drawn (``POOR_GUESS``). The pair is left out, and results have to say so;
+  link between them no length (its housing is missing), or they are neighbours between three parallel axes (the table
+  does not say how far apart they lie along these), and the rest of the two overlaps in many of the joint vectors drawn
+  (``POOR_GUESS``). The pair is left out, and results have to say so;
 - *meets*: a joint vector in which they overlap was found, and one in which they don't: checked;
 - *undecided*: none of this within the number of boxes: checked.
 
@@ -41,7 +42,8 @@ import scipy
 from er3a.collision.distances import FREE, MEETS, ROOM, Layout, measure, pair_distance, place, search_boxes
 from er3a.collision.pairs import BASE, PENETRATION_TOLERANCE, TRIED
 from er3a.collision.scene import Box, Scene
-from er3a.collision.shapes import Body, arm_bodies, arm_shapes, layout_of, link_frames, solid_bodies
+from er3a.collision.shapes import PARALLEL, Body, arm_bodies, arm_shapes, layout_of, link_frames, solid_bodies
+from er3a.kinematics.chain import TO_NEXT_AXIS, link_parts
 from er3a.kinematics.forward import frames
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.quasi_random import quasi_random_points
@@ -236,15 +238,24 @@ def collision_matrix(robot: Robot) -> CollisionMatrix:
 
 def _without_poor_guesses(robot: Robot, matrix: CollisionMatrix) -> CollisionMatrix:
     """The matrix of guessed shapes, without joined pairs of which what is left overlaps in many joint vectors, because
-    the link between them has no length in the table."""
+    the link between them has no length in the table, or it does not say whether they lie side by side."""
     left: dict[tuple[str, str], list[tuple[Body, Body]]] = {}
     for pair, joined in zip(matrix.watched, matrix.joined):
-        if joined and pair[1].link > pair[0].link + 1:
+        if joined and (pair[1].link > pair[0].link + 1 or _may_pass(robot, pair[0].link)):
             left.setdefault((pair[0].name, pair[1].name), []).append(pair)
     poor = {names for names, pairs in left.items() if _overlap(robot, pairs).any(axis=1).mean() >= POOR_GUESS}
     rows = (replace(row, state="guessed") if (row.first, row.second) in poor else row for row in matrix.rows)
     kept = [(p, joined) for p, joined in zip(matrix.watched, matrix.joined) if (p[0].name, p[1].name) not in poor]
     return CollisionMatrix(tuple(rows), tuple(pair for pair, _ in kept), tuple(joined for _, joined in kept))
+
+
+def _may_pass(robot: Robot, link: int) -> bool:
+    """Whether a link and the next may lie side by side for all that the table says: along three parallel axes that
+    turn it gives only the sum of how far the links shift."""
+    if not 0 < link < robot.rows - 1 or robot.sliding[link - 1 : link + 2].any():
+        return False
+    turns = link_parts(robot)[link : link + 2, TO_NEXT_AXIS, 2, 2]
+    return bool((np.abs(turns) > 1 - PARALLEL).all())
 
 
 def matrix_of(robot: Robot, pairs: Sequence[tuple[Body, Body]], rules: Sequence[PairRule]) -> CollisionMatrix:

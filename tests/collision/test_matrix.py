@@ -251,6 +251,18 @@ def test_a_guess_that_overlaps_at_many_poses_refuses_none_of_them_and_is_named()
     assert not Bodies(stated, None).free(np.radians([[0.0, 45.0, -30.0, 0.0, 60.0, 0.0]])).any()
 
 
+def test_neighbours_between_three_parallel_axes_may_lie_side_by_side():
+    """As upper arm and forearm of a UR, which bends its elbow to about 160 deg. Others are checked as before."""
+    arm = load_robot("ur5e")
+    states = {names: row.state for names, row in rows_of(arm).items()}
+    assert states["link_2", "link_3"] == "guessed"
+    assert states["link_3", "link_4"] == "joined"
+    assert states["link_2", "link_4"] == "meets"
+    bodies = Bodies(arm, None)
+    assert LinkPair(2, 3) in bodies.unexamined
+    assert bodies.free(np.radians([[0.0, -90.0, 145.0, -90.0, -90.0, 0.0]])).all()
+
+
 def box_around(link: int, low: tuple[float, float, float], high: tuple[float, float, float]) -> ConvexPiece:
     return ConvexPiece(
         link, tuple((x, y, z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])), 0.0
