@@ -180,7 +180,7 @@ def _solved(placed: PlacedMotion, target: instructions.PoseTarget, pose: Reals, 
     try:
         found = inverse(placed.arm, pose, reference, self_motion_rows=True)
     except PoseError:
-        return Goal(None, None, False, (found_in.TargetNotGiven("", "not_finite"),))
+        return Goal(None, None, False, (found_in.TargetNotGiven("", "too_far"),))
     if not len(found.q):
         return Goal(None, pose, True, (*placed.taken, found_in.TargetOutOfReach(found.unsolved, bool(target.external))))
     rows = found.q[found.within_limits] if found.within_limits.any() else found.q

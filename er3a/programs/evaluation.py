@@ -141,7 +141,8 @@ SINGLE = 2.0**-24
 
 
 class Rounded(float):
-    """A number as double precision has it; a controller that computes in single precision has it within ``error``."""
+    """A number as double precision has it; a controller that computes in single precision, or measures it, has it
+    within ``error``."""
 
     __slots__ = ("error",)
 
@@ -644,13 +645,14 @@ class ProgramMemory:
         return self._computed(sign, left, right)
 
     def _too_near(self, sign: str, left: syntax.Value, right: syntax.Value) -> bool:
-        """Whether two numbers that are compared differ by no more than single precision may miss them."""
-        if not self.functions.single_precision or sign not in COMPARED:
+        """Whether two numbers that are compared differ by no more than what rounding, or measuring, may miss."""
+        rounded = isinstance(left, Rounded) or isinstance(right, Rounded)
+        if sign not in COMPARED or not (self.functions.single_precision or rounded):
             return False
         a, b = syntax.number(left), syntax.number(right)
         if a is None or b is None or not (isinstance(left, float) or isinstance(right, float)):
             return False
-        if a == b and not isinstance(left, Rounded) and not isinstance(right, Rounded):  # the same, rounded alike
+        if a == b and not rounded:  # the same, rounded alike
             return False
         return abs(a - b) <= missed_by(left) + missed_by(right)
 

@@ -43,6 +43,7 @@ MotionKind = Literal["joint", "line", "arc", "spline"]
 Unresolved = Literal[
     "undefined",
     "not_finite",
+    "too_far",
     "position_unknown",
     "external_tool",
     "not_understood",

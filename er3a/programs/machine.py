@@ -1053,10 +1053,10 @@ class Machine:
 
     def _return(self, way: ExecutionPath, operation: syntax.Return) -> None:
         memory = way.memory
-        value: syntax.Value = syntax.Unclear("a value")
+        frame = way.frames.pop()
+        value: syntax.Value = syntax.Unclear(f"{frame.routine.name}(), which returns nothing")
         if operation.value is not None:
             value = memory.typed(syntax.RETURNED, memory.value(operation.value))
-        frame = way.frames.pop()
         aliased, memory.aliased = memory.aliased, frame.aliased
         memory.local = way.frames[-1].local
         for name, target in frame.outs:

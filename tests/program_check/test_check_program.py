@@ -379,6 +379,11 @@ def test_an_arc_whose_angle_is_not_known_is_not_checked(tmp_path):
     assert check.level == "caution"
 
 
+def test_a_target_in_millimetres_for_metres_says_so(tmp_path):
+    found = check_text(tmp_path, f"movej({HOME_TEXT})\nmovel(p[400,0,300,3.1,0,0])\n").findings
+    assert [each.finding.reason for each in found if each.finding.code == "target_not_given"] == ["too_far"]
+
+
 def stretches(folder, *lines):
     """The stretches of a URScript program from the home position, built, without the move to its beginning."""
     text = f"set_tcp(p[0,0,0,0,0,0])\nmovej({HOME_TEXT})\n" + "\n".join(lines) + "\n"

@@ -136,6 +136,36 @@ def test_a_tool_and_a_base_that_a_program_does_not_set_are_told_once(tmp_path, n
     assert [(each.finding.kind, each.level) for each in noted] == ([] if kind is None else [(kind, "note")])
 
 
+@pytest.mark.parametrize(
+    ("read", "condition", "both"),
+    [
+        ("get_actual_joint_positions()", "q[0] == 0", True),
+        ("get_actual_joint_positions()", "q[0] <= 0", True),
+        ("get_actual_joint_positions()", "q[0] <= 0.01", False),
+        ("get_target_joint_positions()", "q[0] == 0", False),
+        ("get_actual_tool_flange_pose()", "q[1] <= 0", True),
+        ("get_actual_tool_flange_pose()", "q[1] < 0.1", False),
+    ],
+)
+def test_what_is_measured_is_not_exact(tmp_path, read, condition, both):
+    text = f"def a():\n movej({HOME_TEXT})\n q = {read}\n if {condition}:\n movej({NEAR_TEXT})\n end\nend\n"
+    assert ("both_sides_checked" in codes(check(tmp_path, text, "a.script"))) == both
+
+
+@pytest.mark.parametrize(
+    ("begin", "end"),
+    [
+        ("force_mode(p[0,0,0,0,0,0],[0,0,1,0,0,0],[0,0,10,0,0,0],2,[1,1,1,1,1,1])", "end_force_mode()"),
+        ("path_offset_enable()", "path_offset_disable()"),
+        ("track_conveyor_linear(p[1,0,0,0,0,0],500)", "stop_conveyor_tracking()"),
+    ],
+)
+def test_what_changes_every_motion_until_it_is_ended_stays_in_doubt_until_then(tmp_path, begin, end):
+    moves = f"movej({HOME_TEXT})\nmovej({NEAR_TEXT})\n"
+    text = f"{begin}\nset_tcp(p[0,0,0,0,0,0])\n{moves}{end}\n{moves}"
+    assert codes(check(tmp_path, text, "a.script"))["frames_in_doubt"] == [3, 4]
+
+
 LIFT = f"if here[2] > 0.3:\n movej({NEAR_TEXT})\nend\nmovej({HOME_TEXT})"
 ROBOT_TCP = "set_tcp(p[0,0,0,0,0,0])"
 

@@ -50,6 +50,7 @@ REASONS: dict[Unresolved, str] = {
         "line"
     ),
     "not_finite": N_("it is no finite number"),
+    "too_far": N_("it is more than 100 m away, as where millimetres were written for metres"),
     "position_unknown": N_("it depends on where the arm stands, which is not known"),
     "external_tool": N_("the workpiece is moved along a fixed tool, which is not supported"),
     "not_understood": N_("it is not understood"),
@@ -101,7 +102,7 @@ REMEDIES: dict[str, str] = {
         "Give the index in the program, or check it once with each frame that the index may choose."
     ),
     "tool_stated_elsewhere": N_("Make the table anew for this arm and its tool, or leave its pose columns out."),
-    "frames_in_doubt": N_("Set tool and base after it, or remove it."),
+    "frames_in_doubt": N_("Set tool and base after it, end what it begins, or remove it."),
     "way_not_known": N_("Give start_deg of the program, or mend the motion before."),
     "not_come_to": FURTHER,
     "rest_not_checked": N_("Give the check more time or motions, or split the program and check its parts."),
@@ -143,6 +144,7 @@ SINGULAR: dict[SingularityType, str] = {
     "shoulder": N_("Keep the wrist at a distance from axis 1."),
 }
 TARGETS: dict[Unresolved, str] = {
+    "too_far": N_("Write the target in the unit of the language: metres in URScript, mm in the others."),
     "undefined": N_("Give the target in the program or in its data file."),
     "turns_with_arc": N_("Write the arc as several of less than half a turn each."),
 }
@@ -192,7 +194,8 @@ TEXTS = texts(
         ),
         "frame_taken_as_flange": "{name} is not given; the flange was taken for it",
         "frames_in_doubt": (
-            "checked with the tool and base that are known, but {text}, which is not understood, may have changed them"
+            "checked with the tool, base and way that are known, but {text}, which is not understood, may have changed "
+            "them"
         ),
         "way_not_known": "the start of the motion is not known; only the target was checked",
         "more_than_full_speed": "asks for {percent:g} % of the joints' speed or acceleration",

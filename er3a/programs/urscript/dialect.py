@@ -13,7 +13,7 @@ import scipy
 from er3a.geometry.transforms import rpy_of, transform
 from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, syntax
-from er3a.programs.evaluation import Dialect, Position, ProgramMemory
+from er3a.programs.evaluation import Dialect, Position, ProgramMemory, Rounded
 from er3a.programs.urscript.reader import CHANGED, LIST_METHODS, THREAD
 from er3a.robots.masses import MassBody
 
@@ -31,6 +31,16 @@ STOPS = ("stopj", "stopl")
 READING = ("get_actual_", "get_target_", "get_forward_kin")  # beginnings of functions that read where the arm is
 NAME = re.compile(r"[A-Za-z_][\w.]*(\[[^]]*\])?")
 SAME_TURN = 1e-9
+MEASURED = 1e-3
+"""rad or m, by which an actual position may be off the one that was asked for."""
+MODE = "%mode"  # what changes the way of each motion until it is ended; empty if nothing does
+MODES = {
+    "force_mode": "end_force_mode",
+    "path_offset_enable": "path_offset_disable",
+    "track_conveyor_linear": "stop_conveyor_tracking",
+    "track_conveyor_circular": "stop_conveyor_tracking",
+}
+"""Functions that do so, with those that end it."""
 MOUNTED = 0.02  # rad, within which two mountings are one
 HALF_A_TURN = math.pi - 1e-6
 HARMLESS_TEXT = """
@@ -147,7 +157,7 @@ class UrScriptDialect(Dialect):
             and each.value.function == "rpc_factory"
         )
         reads = any(word in line for line in program.lines for word in READING + STOPS)
-        self.modal = frozenset(("%tcp", "%load", *((PASSING,) if reads else ())))
+        self.modal = frozenset(("%tcp", "%load", MODE, *((PASSING,) if reads else ())))
 
     local_by_default = True
     frames = ("%tcp",)
@@ -240,6 +250,7 @@ class UrScriptDialect(Dialect):
             _tool(memory),
             ROBOT_BASE,
             load=_load(memory.read("%load")),
+            doubt=str(memory.read(MODE) or ""),
         )
 
     def carry_out(self, memory: ProgramMemory, doing: syntax.Doing) -> instructions.Instruction | None:
@@ -259,6 +270,10 @@ class UrScriptDialect(Dialect):
                 pose if isinstance(pose, syntax.Unclear) or _pose(pose) is not None else syntax.Unclear(doing.text),
             )
             return None
+        if call.function in MODES:
+            memory.write(MODE, doing.text)
+        elif call.function in MODES.values():
+            memory.write(MODE, "")
         if call.function == "set_gravity":
             given = _placed(("d",), values, keywords)
             return _mounted(memory, None if given is None else given.get("d"), doing.text)
@@ -452,11 +467,17 @@ def _of_position(memory: ProgramMemory, name: str, given: dict[str, syntax.Value
     """
     here = Position() if memory.read(PASSING) and name != "get_target_waypoint" else memory.here
     if name in ("get_actual_joint_positions", "get_target_joint_positions"):
-        return None if here.joints is None else tuple(map(float, here.joints))
+        if here.joints is None:
+            return None
+        return tuple(_measured(each) if "actual" in name else each for each in map(float, here.joints))
     if name in ("get_actual_tcp_pose", "get_target_tcp_pose", "get_target_waypoint", "get_actual_tool_flange_pose"):
         tool = instructions.NamedFrame("flange", np.eye(4)) if name.endswith("flange_pose") else _tool(memory)
         seen = memory.seen(here, tool, ROBOT_BASE)
-        return None if seen is None else _record(seen)
+        if seen is None or "actual" not in name:
+            return None if seen is None else _record(seen)
+        return syntax.Record(
+            "p", tuple((key, _measured(syntax.number(each) or 0.0)) for key, each in _record(seen).items)
+        )
     if name == "get_tcp_offset":
         tool = _tool(memory)
         memory.note_unset(tool, ROBOT_BASE)
@@ -475,6 +496,10 @@ def _of_position(memory: ProgramMemory, name: str, given: dict[str, syntax.Value
         if plain and (tool_value is None or _pose(tool_value) is not None):
             return syntax.Solved(pose, near, tool_value, memory.here.key())
     return None
+
+
+def _measured(value: float) -> Rounded:
+    return Rounded(value, MEASURED)
 
 
 def _changed(values: list[syntax.Value | None], unclear: syntax.Unclear) -> syntax.Value:

@@ -52,11 +52,45 @@ PLAIN = re.compile(
 )
 
 
+STATEMENT = re.compile(
+    r"(?:[A-Za-z_][\w.]*\s*(?:\(|(?:\[[^]]*\]\s*)?=(?!=))|(?:end|break|continue|return|halt|if|while|global|local)\b)"
+)
+"""With what a statement begins for sure."""
+
+
+class MoreError(MisreadError):
+    """Another statement follows on the line."""
+
+    def __init__(self, at: int):
+        super().__init__("another statement follows")
+        self.at = at
+
+
 class UrWords(Words):
     """Words of a statement of URScript."""
 
     def __init__(self, text: str):
         super().__init__(UR, text)
+        self.text = text
+
+    def finish(self) -> None:
+        """Nothing may follow but another statement: :class:`MoreError`."""
+        self.accept(";")
+        if self.kind != "end":
+            start = [match.start() for match in UR.pattern.finditer(self.text)][self.at]
+            if STATEMENT.match(self.text, start):
+                raise MoreError(start)
+        super().finish()
+
+    def parts_of(self, found: syntax.Expression) -> syntax.Expression:
+        """Elements of matrices, ``m[1,0]``, as those of lists of lists."""
+        made = super().parts_of(found)
+        if not isinstance(made, syntax.Element) or len(made.indices) < 2:
+            return made
+        found = made.of
+        for index in made.indices:
+            found = syntax.Element(found, (index,))
+        return found
 
     def special(self) -> syntax.Expression | None:
         """Lists and poses, with an index after them."""
@@ -76,11 +110,16 @@ class UrWords(Words):
         if numbers is not None and len(numbers) == len(syntax.POSE_KEYS):
             return syntax.Constant(syntax.Record("p", tuple(zip(syntax.POSE_KEYS, numbers))))
         if numbers is not None:
-            return syntax.Listed(kind, tuple(map(syntax.Constant, numbers)))
+            return self._pose_or_element(tuple(map(syntax.Constant, numbers)))
         placed, _ = self.arguments("]")
         if None in placed:
             raise MisreadError("an element is missing")
-        return syntax.Listed(kind, tuple(each for each in placed if each is not None))
+        given = tuple(each for each in placed if each is not None)
+        return self._pose_or_element(given) if kind else syntax.Listed(kind, given)
+
+    def _pose_or_element(self, given: tuple[syntax.Expression, ...]) -> syntax.Expression:
+        """``p[...]``: a pose has six numbers; with one it is an element of a variable of this name."""
+        return syntax.Element(syntax.Variable("p"), given) if len(given) == 1 else syntax.Listed("p", given)
 
     def _numbers(self) -> tuple[int | float, ...] | None:
         """Numbers alone up to the closing bracket, which is passed; None, with nothing passed, for anything else."""
@@ -230,7 +269,10 @@ class _UrReader:
             builder.remark(place, text)
             return
         try:
-            self._read(builder, UrWords(text.removesuffix(";")), place, text)
+            self._read(builder, UrWords(text), place, text)
+        except MoreError as more:
+            self._statement(place, text[: more.at].strip())
+            self._statement(place, text[more.at :].strip())
         except MisreadError:
             if re.match(r"(else|elif)\b", text) is not None:  # of a block that is open
                 raise fault(place, f"'{text[:60]}' can't be read", "Correct this line") from None
@@ -268,6 +310,10 @@ class _UrReader:
             words.take()
             _run(builder, words, place, text)
         elif first in ("join", "kill", "enter_critical", "exit_critical", "pass") and follows not in ("=", "("):
+            words.take()
+            if first in ("join", "kill"):
+                words.expression()
+            words.finish()
             builder.aside(place, text)
         else:
             _plain(builder, words, place, text)
@@ -350,11 +396,14 @@ def _block(builder: CodeBuilder, first: str, words: UrWords, place: Place, text:
         words.finish()
         builder.next_arm(place, None, text)
         return
+    closed = False
     try:
         condition = words.expression()
-        words.accept(":")
+        closed = words.accept(":")
         words.finish()
-    except MisreadError:
+    except MisreadError as error:
+        if closed and isinstance(error, MoreError):
+            raise
         condition = syntax.Opaque(text.partition(" ")[2].rstrip(":"))
     source = text.rstrip(":")
     if first == "if":
