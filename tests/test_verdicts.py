@@ -11,6 +11,7 @@ import yaml
 from lxml import etree
 
 from er3a.errors import ResultError
+from er3a.files.kept_files import shown_path
 from er3a.pipeline.stages import run
 from er3a.pipeline.study import Study
 from er3a.pipeline.verdicts import StageVerdict, read_verdicts
@@ -140,6 +141,40 @@ def test_an_index_without_validation_says_so(study, tmp_path, monkeypatch):
     page = (tmp_path / "index.html").read_text(encoding="utf-8")
     assert "Its table has not been examined yet" in page
     assert "er3_600/teach.html" not in page
+
+
+@pytest.mark.long
+def test_an_index_over_inputs_that_changed_since_says_so_as_verdicts_and_report_do(study, tmp_path, monkeypatch):
+    """As a run of another stage writes it: what was computed before passes no longer."""
+    monkeypatch.chdir(ROOT)
+    entry = study.robots["er3_600"]
+    paths = tmp_path / "paths.yaml"
+    paths.write_text(Path(entry.paths).read_text(encoding="utf-8"), encoding="utf-8")
+    content = study.model_dump()
+    content["robots"]["er3_600"]["paths"] = str(paths)
+    study = Study.model_validate(content)
+    run.compute("dynamics", study, "er3_600", tmp_path / "results/er3_600/dynamics")
+
+    def pages() -> list[str]:
+        write_index(study, tmp_path / "results", tmp_path)
+        return [(tmp_path / name).read_text(encoding="utf-8") for name in ("index.html", "compare.html")]
+
+    badge = '<span class="badge no_verdict">changed since</span>'
+    before = pages()
+    assert not any("Changed since" in page for page in before)
+    assert before[0].count(badge) == 1  # in the legend
+    paths.write_text(paths.read_text(encoding="utf-8") + "# later\n", encoding="utf-8")
+    index, compared = pages()
+    file, said = (
+        shown_path(paths),
+        "Changed since, so what stands here tells of what was before (run the study again): ",
+    )
+    assert index.count(f"{said}{file}.") == 2  # in the table of decisions, and in the arm's section
+    assert compared.count(f"{said}{file}.") == 1
+    assert f"Changed since, so this tells of what was before (run the study again): {file}." in index
+    assert index.count(badge) == 2
+    assert 'title="changed since">dynamics (changed since)</a>' in index
+    assert etree.parse(tmp_path / "junit.xml").getroot().get("failures") == "1"
 
 
 MOVE = "movej([0, -0.2, -0.2, 0, -1.2, 0], a=1, v=0.5)\n"
