@@ -574,7 +574,8 @@ def _parsed(path: Path, stored: dict[str, Any], kind: type[Results[Any]]) -> tup
         raise ResultError(path, f"damaged (verdict without {error})") from None
 
 
-OVERALL = ("index.html", "compare.html", "junit.xml")
+JUNIT = "junit.xml"
+OVERALL = ("index.html", "compare.html", JUNIT)
 
 
 def write_checksum(path: Path) -> None:

@@ -1,16 +1,12 @@
 """The pages over all robots: the index (robots x stages, verdicts and key figures) and the comparison of two.
 
 Variants of a sweep are listed only in the section of their sweep.
-
-A study's verdicts as a JUnit report for continuous integration: a suite for each robot, a case for each stage. Elements
-and attributes follow Jenkins' schema ``junit-10.xsd``.
 """
 
 from __future__ import annotations
 
 import json
 import re
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from html.parser import HTMLParser
@@ -24,7 +20,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull
 
-from er3a.files.kept_files import shown_path, write_atomically
+from er3a.files.kept_files import shown_path
 from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.code_digest import code_digest
@@ -78,7 +74,7 @@ from er3a.pipeline.stages.validation.model import (
 from er3a.pipeline.stages.workspace.model import VoidSummary, WorkspaceResults, WorkspaceSummary
 from er3a.pipeline.study import Study
 from er3a.pipeline.sweeps import ENTRIES, entry_label
-from er3a.pipeline.verdicts import NOT_EXAMINED, StageVerdict, read_verdicts
+from er3a.pipeline.verdicts import NOT_EXAMINED, StageVerdict, read_verdicts, write_junit
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.figures import new_figure
 from er3a.pipeline.viewing.numbers import at_least, at_most, fixed, number
@@ -447,68 +443,6 @@ def _reach(workspace: WorkspaceResults) -> list[Reals]:
 
 def _points(line: Reals) -> str:
     return " ".join(f"{x:.0f},{-z:.0f}" for x, z in line)
-
-
-_NO_XML = re.compile(r"[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-
-
-def write_junit(verdicts: Sequence[StageVerdict], output: Path) -> None:
-    """Write the report.
-
-    A verdict of ``fail`` is a failure, a stage that broke an error; ``no_reference``, and a stage that does not apply
-    to the robot or has not been computed yet, are skipped; a caution passes. What fails as it is meant to is no
-    failure, and counts as a demonstration; what the study expects otherwise is a failure. What passes says its verdict,
-    and each case lists what was not examined.
-    """
-    root = ElementTree.Element("testsuites", {"name": "er3a"} | _counts(verdicts))
-    for robot in dict.fromkeys(verdict.robot for verdict in verdicts):
-        own = [verdict for verdict in verdicts if verdict.robot == robot]
-        skipped = sum(_outcome(verdict) == "skipped" for verdict in own)
-        suite = ElementTree.SubElement(root, "testsuite", {"name": robot} | _counts(own) | {"skipped": str(skipped)})
-        for verdict in own:
-            _add_case(suite, verdict)
-    ElementTree.indent(root)
-    content = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
-    write_atomically(output, lambda file: file.write_bytes(content))
-
-
-def _add_case(suite: ElementTree.Element, verdict: StageVerdict) -> None:
-    case = ElementTree.SubElement(suite, "testcase", classname=f"er3a.{verdict.robot}", name=verdict.stage)
-    text = _NO_XML.sub("?", verdict.text)
-    if outcome := _outcome(verdict):
-        ElementTree.SubElement(case, outcome, message=text, type=verdict.code)
-    lines = []
-    if verdict.is_demonstration:
-        lines.append(f"demonstration, {verdict.status} as expected: {text}")
-    elif verdict.status in ("pass", "caution"):
-        lines.append(f"{verdict.status}: {text}")
-    if verdict.demonstrations:
-        lines.append(f"demonstrations, which fail as expected: {verdict.demonstrations}")
-    if verdict.is_otherwise:
-        lines.append(f"expected: {verdict.expected}")
-    lines += [f"not examined: {_NO_XML.sub('?', each)}" for each in verdict.not_examined]
-    if lines:
-        ElementTree.SubElement(case, "system-out").text = "\n".join(lines)
-
-
-def _outcome(verdict: StageVerdict) -> str | None:
-    """The element that says how a case ended; None where it passed."""
-    if verdict.broken:
-        return "error"
-    if verdict.is_otherwise or verdict.outdated:
-        return "failure"
-    if verdict.is_skipped:
-        return "skipped"
-    return "failure" if verdict.status == "fail" and not verdict.is_demonstration else None
-
-
-def _counts(verdicts: Sequence[StageVerdict]) -> dict[str, str]:
-    outcomes = [_outcome(verdict) for verdict in verdicts]
-    return {
-        "tests": str(len(outcomes)),
-        "failures": str(outcomes.count("failure")),
-        "errors": str(outcomes.count("error")),
-    }
 
 
 SHOWN_FIGURES = 3
