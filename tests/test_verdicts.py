@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -10,11 +11,14 @@ import pytest
 import yaml
 from lxml import etree
 
-from er3a.errors import ResultError
+from er3a.errors import InputError, ResultError
+from er3a.files.kept_files import shown_path
+from er3a.pipeline.results import write_checksum
+from er3a.pipeline.run_study import run_study
 from er3a.pipeline.stages import run
 from er3a.pipeline.study import Study
-from er3a.pipeline.verdicts import StageVerdict, read_verdicts
-from er3a.pipeline.viewing.index import write_index, write_junit
+from er3a.pipeline.verdicts import StageVerdict, read_verdicts, write_junit
+from er3a.pipeline.viewing.index import write_index
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -94,6 +98,61 @@ def test_demonstrations_are_counted_apart_and_expectations_that_are_not_met_fail
         assert counted == ["collision"]
 
 
+def in_order(report: Path) -> Path:
+    """A report of an earlier run, with its checksum."""
+    write_junit((GOOD, CAUTION), report)
+    write_checksum(report)
+    return report
+
+
+def the_error(report: Path) -> str:
+    """What a report says that holds one error, and nothing of an earlier run."""
+    tree = etree.parse(report)
+    etree.XMLSchema(etree.parse(SCHEMA)).assertValid(tree)
+    assert [tree.getroot().get(key) for key in ("tests", "failures", "errors")] == ["1", "0", "1"]
+    (case,) = tree.iter("testcase")
+    (error,) = case
+    assert (case.get("name"), error.tag) == ("run", "error")
+    return error.get("message")
+
+
+def test_a_run_that_an_input_keeps_from_starting_leaves_an_error_in_place_of_older_verdicts(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    report = in_order(tmp_path / "reports/junit.xml")
+    Path("study.yaml").write_text("kind: study\nrobots: 7\n", encoding="utf-8")
+    with pytest.raises(InputError) as told:
+        run_study(Path("study.yaml"), Path("results"), Path("reports"), [])
+    assert the_error(report) == str(told.value)
+    assert "study.yaml" in str(told.value)
+
+
+def test_jobs_that_fail_leave_an_error_which_the_next_run_takes_away(study, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    report, found = in_order(tmp_path / "reports/junit.xml"), []
+
+    def snakemake(words: list[str]) -> bool:
+        found.append(report.is_file())
+        return len(found) > 1
+
+    monkeypatch.setattr("er3a.pipeline.run_study.check_study", lambda file: study)
+    monkeypatch.setattr("er3a.pipeline.run_study._snakemake", snakemake)
+    monkeypatch.setattr("er3a.pipeline.run_study._end_when_asked", lambda *folders: None)
+    monkeypatch.setattr("er3a.pipeline.run_study._taken_lock", lambda: os.open(os.devnull, os.O_RDWR))
+    started = Path("study.yaml"), Path("results"), Path("reports"), ["--verbose", "--executor", "local"]
+    assert not run_study(*started)
+    assert "did not end well" in the_error(report)
+    assert run_study(*started)
+    assert found == [True, False], "Snakemake makes a report again that is missing"
+    assert capsys.readouterr().err == ""
+
+
+def test_no_report_is_made_where_none_was(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError):
+        run_study(Path("study.yaml"), Path("results"), Path("reports"), [])
+    assert not Path("reports").exists()
+
+
 def test_what_counts_from_which_level_on():
     assert [verdict for verdict in ALL if verdict.counts("fail")] == [BAD, BROKEN]
     assert [verdict for verdict in ALL if verdict.counts("caution")] == [CAUTION, BAD, BROKEN]
@@ -140,6 +199,40 @@ def test_an_index_without_validation_says_so(study, tmp_path, monkeypatch):
     page = (tmp_path / "index.html").read_text(encoding="utf-8")
     assert "Its table has not been examined yet" in page
     assert "er3_600/teach.html" not in page
+
+
+@pytest.mark.long
+def test_an_index_over_inputs_that_changed_since_says_so_as_verdicts_and_report_do(study, tmp_path, monkeypatch):
+    """As a run of another stage writes it: what was computed before passes no longer."""
+    monkeypatch.chdir(ROOT)
+    entry = study.robots["er3_600"]
+    paths = tmp_path / "paths.yaml"
+    paths.write_text(Path(entry.paths).read_text(encoding="utf-8"), encoding="utf-8")
+    content = study.model_dump()
+    content["robots"]["er3_600"]["paths"] = str(paths)
+    study = Study.model_validate(content)
+    run.compute("dynamics", study, "er3_600", tmp_path / "results/er3_600/dynamics")
+
+    def pages() -> list[str]:
+        write_index(study, tmp_path / "results", tmp_path)
+        return [(tmp_path / name).read_text(encoding="utf-8") for name in ("index.html", "compare.html")]
+
+    badge = '<span class="badge no_verdict">changed since</span>'
+    before = pages()
+    assert not any("Changed since" in page for page in before)
+    assert before[0].count(badge) == 1  # in the legend
+    paths.write_text(paths.read_text(encoding="utf-8") + "# later\n", encoding="utf-8")
+    index, compared = pages()
+    file, said = (
+        shown_path(paths),
+        "Changed since, so what stands here tells of what was before (run the study again): ",
+    )
+    assert index.count(f"{said}{file}.") == 2  # in the table of decisions, and in the arm's section
+    assert compared.count(f"{said}{file}.") == 1
+    assert f"Changed since, so this tells of what was before (run the study again): {file}." in index
+    assert index.count(badge) == 2
+    assert 'title="changed since">dynamics (changed since)</a>' in index
+    assert etree.parse(tmp_path / "junit.xml").getroot().get("failures") == "1"
 
 
 MOVE = "movej([0, -0.2, -0.2, 0, -1.2, 0], a=1, v=0.5)\n"

@@ -32,6 +32,7 @@ from er3a.collision.pairs import Pair, PairsUnexamined, ShapesAssumed
 from er3a.errors import ResultError
 from er3a.files.annotations import grades_in
 from er3a.files.kept_files import read_bytes, sha256, shown_path, write_atomically
+from er3a.pipeline.messages.language import N_
 from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.study import STAGES, Study
 from er3a.pipeline.tables import adapter, table_types
@@ -42,6 +43,7 @@ goes, or gets another name, unit or meaning. What is only added does not raise i
 """
 BESIDE = ("unexamined", "shapes", "missed")
 """What a verdict can have beside its finding."""
+THE_SETTINGS = N_("the study's settings")
 SUMMARY = "summary.json"
 CHECKSUMS = "SHA256SUMS"
 
@@ -518,7 +520,7 @@ def changed_since(folder: Path, study: Study, robot: str, stage: str) -> tuple[s
     now = {shown_path(file): sha256(file) for file in study.inputs(robot, stage) if file.is_file()}
     changed = [path for path in sorted(then.keys() | now.keys()) if then.get(path) != now.get(path)]
     settings = json.loads(json.dumps(plain(study.computed_from(robot, stage))))
-    return (*changed, *(["the study's settings"] if settings != stored["config"] else []))
+    return (*changed, *([THE_SETTINGS] if settings != stored["config"] else []))
 
 
 def result_records(results: Path, robots: Iterable[str]) -> tuple[Input, ...]:
@@ -572,7 +574,8 @@ def _parsed(path: Path, stored: dict[str, Any], kind: type[Results[Any]]) -> tup
         raise ResultError(path, f"damaged (verdict without {error})") from None
 
 
-OVERALL = ("index.html", "compare.html", "junit.xml")
+JUNIT = "junit.xml"
+OVERALL = ("index.html", "compare.html", JUNIT)
 
 
 def write_checksum(path: Path) -> None:

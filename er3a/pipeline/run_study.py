@@ -40,9 +40,10 @@ from er3a.errors import Er3aError, ResultError
 from er3a.files.kept_files import ROOT, half_written, read_checked
 from er3a.pipeline import job_server
 from er3a.pipeline.check import check_study
-from er3a.pipeline.results import OVERALL, check_checksum, check_results
+from er3a.pipeline.results import JUNIT, OVERALL, check_checksum, check_results, checksum_file
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
+from er3a.pipeline.verdicts import write_junit_error
 
 
 def corrupted(study: Study, results: Path, reports: Path) -> Iterator[tuple[Path, ResultError]]:
@@ -259,7 +260,33 @@ def run_study(study_file: Path, results: Path, reports: Path, words: Sequence[st
     if asked.dryrun:
         return _dry_run(study_file, results, reports, words)
     lock = _taken_lock()
+    try:
+        done = _run(study_file, results, reports, words, asked, lock)
+    except Er3aError as error:
+        _report_error(reports, str(error))
+        raise
+    if not done:
+        _report_error(reports, "The run did not end well: its output on standard error, and logs/, say why.")
+    return done
+
+
+def _report_error(reports: Path, problem: str) -> None:
+    """Have continuous integration find an error, not the verdicts of an earlier run, if it finds a report at all.
+
+    The report gets no checksum, so that the next run makes it again.
+    """
+    report = reports / JUNIT
+    if report.is_file():
+        with suppress(Er3aError, OSError):  # what went wrong first is what a person is told
+            checksum_file(report).unlink(missing_ok=True)
+            write_junit_error(problem, report)
+
+
+def _run(study_file: Path, results: Path, reports: Path, words: Sequence[str], asked: Namespace, lock: int) -> bool:
+    """Check a study and run it; whether all jobs were done."""
     study = check_study(study_file)
+    if not checksum_file(reports / JUNIT).is_file():
+        (reports / JUNIT).unlink(missing_ok=True)
     for path in (*half_written(results), *half_written(reports)):
         path.unlink()
     for path, fault in corrupted(study, results, reports):
@@ -341,6 +368,7 @@ def _end_when_asked(results: Path, reports: Path) -> None:
         for output in (1, 2):  # Snakemake's threads would tell of each job
             os.dup2(silence, output)
         _end_processes_below()
+        _report_error(reports, f"The run was ended by {name}.")
         for path in (*half_written(results), *half_written(reports), *(_STATE / "locks").glob("*")):
             path.unlink(missing_ok=True)
         atexit._run_exitfuncs()  # Snakemake's temporary folder goes

@@ -1,12 +1,20 @@
-"""The verdicts of a finished study, for the terminal, other programs and continuous integration."""
+"""The verdicts of a finished study, for the terminal, other programs and continuous integration.
+
+The latter reads a JUnit report: a suite for each robot, a case for each stage. Elements and attributes follow Jenkins'
+schema ``junit-10.xsd``.
+"""
 
 from __future__ import annotations
 
+import re
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Literal
 
+from er3a.files.kept_files import write_atomically
 from er3a.pipeline.messages import language
 from er3a.pipeline.messages.left_out import left_out_names, left_out_text, say_reserved
 from er3a.pipeline.messages.say import bracketed, joined, say_all, sentence
@@ -106,3 +114,79 @@ def _stage_verdict(study: Study, results: Path, robot: str, name: str) -> StageV
     if outdated:
         text = sentence("stage.outdated", names=joined(outdated, ", "), text=text)
     return StageVerdict(robot, name, verdict.status, verdict.finding.code, text, shown, expected, missed, outdated)
+
+
+_NO_XML = re.compile(r"[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+def write_junit(verdicts: Sequence[StageVerdict], output: Path) -> None:
+    """Write the JUnit report.
+
+    A verdict of ``fail`` is a failure, a stage that broke an error; ``no_reference``, and a stage that does not apply
+    to the robot or has not been computed yet, are skipped; a caution passes. What fails as it is meant to is no
+    failure, and counts as a demonstration; what the study expects otherwise is a failure. What passes says its verdict,
+    and each case lists what was not examined.
+    """
+    root = ElementTree.Element("testsuites", {"name": "er3a"} | _counts(verdicts))
+    for robot in dict.fromkeys(verdict.robot for verdict in verdicts):
+        own = [verdict for verdict in verdicts if verdict.robot == robot]
+        skipped = sum(_outcome(verdict) == "skipped" for verdict in own)
+        suite = ElementTree.SubElement(root, "testsuite", {"name": robot} | _counts(own) | {"skipped": str(skipped)})
+        for verdict in own:
+            _add_case(suite, verdict)
+    _write_xml(root, output)
+
+
+def write_junit_error(problem: str, output: Path) -> None:
+    """Write a report of a run that did not end well: one case, an error, in place of all verdicts."""
+    counts = {"tests": "1", "failures": "0", "errors": "1"}
+    root = ElementTree.Element("testsuites", {"name": "er3a"} | counts)
+    suite = ElementTree.SubElement(root, "testsuite", {"name": "er3a", "skipped": "0"} | counts)
+    case = ElementTree.SubElement(suite, "testcase", classname="er3a", name="run")
+    ElementTree.SubElement(case, "error", message=_NO_XML.sub("?", problem), type="run")
+    _write_xml(root, output)
+
+
+def _write_xml(root: ElementTree.Element, output: Path) -> None:
+    ElementTree.indent(root)
+    content = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
+    write_atomically(output, lambda file: file.write_bytes(content))
+
+
+def _add_case(suite: ElementTree.Element, verdict: StageVerdict) -> None:
+    case = ElementTree.SubElement(suite, "testcase", classname=f"er3a.{verdict.robot}", name=verdict.stage)
+    text = _NO_XML.sub("?", verdict.text)
+    if outcome := _outcome(verdict):
+        ElementTree.SubElement(case, outcome, message=text, type=verdict.code)
+    lines = []
+    if verdict.is_demonstration:
+        lines.append(f"demonstration, {verdict.status} as expected: {text}")
+    elif verdict.status in ("pass", "caution"):
+        lines.append(f"{verdict.status}: {text}")
+    if verdict.demonstrations:
+        lines.append(f"demonstrations, which fail as expected: {verdict.demonstrations}")
+    if verdict.is_otherwise:
+        lines.append(f"expected: {verdict.expected}")
+    lines += [f"not examined: {_NO_XML.sub('?', each)}" for each in verdict.not_examined]
+    if lines:
+        ElementTree.SubElement(case, "system-out").text = "\n".join(lines)
+
+
+def _outcome(verdict: StageVerdict) -> str | None:
+    """The element that says how a case ended; None where it passed."""
+    if verdict.broken:
+        return "error"
+    if verdict.is_otherwise or verdict.outdated:
+        return "failure"
+    if verdict.is_skipped:
+        return "skipped"
+    return "failure" if verdict.status == "fail" and not verdict.is_demonstration else None
+
+
+def _counts(verdicts: Sequence[StageVerdict]) -> dict[str, str]:
+    outcomes = [_outcome(verdict) for verdict in verdicts]
+    return {
+        "tests": str(len(outcomes)),
+        "failures": str(outcomes.count("failure")),
+        "errors": str(outcomes.count("error")),
+    }

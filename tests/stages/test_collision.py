@@ -117,6 +117,33 @@ def test_a_path_that_collides_though_it_is_meant_to_be_run_is_no_pass(tmp_path):
     assert "line_collides (link 4 and post; not expected)" in say(verdict.finding)
 
 
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("expect", "other", "status"),
+    [(None, False, "fail"), (None, True, "caution"), ("collides", False, "pass"), ("collides", True, "pass")],
+)
+def test_a_target_that_collides_in_every_solution_is_no_pass_unless_its_file_expects_it(
+    expect, other, status, tmp_path
+):
+    """The flange is to point straight down below a block: link 6 is in the block on every branch."""
+    blocked = {"name": "blocked", "xyz_mm": [450, 0, 310], "rpy_deg": [180, 0, 0]}
+    free = {"name": "free", "xyz_mm": [0, -450, 310], "rpy_deg": [180, 0, 0]}
+    targets = [blocked | ({"expect": expect} if expect else {}), *([free] if other else [])]
+    (tmp_path / "targets.yaml").write_text(json.dumps({"kind": "targets", "targets": targets}), encoding="utf-8")
+    block = {"name": "block", "size_mm": [200, 200, 150], "xyz_mm": [450, 0, 390]}
+    content = study_with(scene_file(tmp_path, boxes=[block]), samples=1000, rounds=0).model_dump()
+    content["robots"][NAME]["targets"] = str(tmp_path / "targets.yaml")
+    path = {"name": "a", "title": "A", "kind": "joint", "samples": 20, "duration_s": 2.0}
+    path |= {"start_deg": [90, 0, 0, 0, 0, 0], "end_deg": [100, 0, 0, 0, 30, 0]}
+    (tmp_path / "paths.yaml").write_text(json.dumps({"kind": "paths", "paths": [path]}), encoding="utf-8")
+    content["robots"][NAME]["paths"] = str(tmp_path / "paths.yaml")
+    verdict = compute(Study.model_validate(content), NAME).summary.verdict
+    assert (verdict.status, verdict.finding.code) == (status, "collision.free_space")
+    meant = "as expected" if expect else "not expected"
+    assert say(verdict.finding).startswith("1 target collides in every solution within the limits: blocked (")
+    assert f"; {meant}). " in say(verdict.finding)
+
+
 def test_of_branches_that_are_alike_the_chosen_one_is_named(results):
     """Branches are counted, not their turns, as the inverse page counts them."""
     chosen = {each.name: each.q_deg for each in results.summary.closest if each.kind == "target"}

@@ -1,3 +1,4 @@
+import hashlib
 import os
 import shlex
 import sys
@@ -107,6 +108,13 @@ def computed_from(stage):
 def contents(stage):
     """Params function: digest of the files that a stage reads: Snakemake sees a changed file only if it is newer."""
     return lambda wildcards: STUDY.inputs_digest(wildcards.robot, stage)
+
+
+def rested_on(wildcards):
+    """Params function: digest of what all results rest on, which the index compares with what it is now."""
+    all_of = [(robot, stage) for robot in ROBOTS for stage in STUDY.stages(robot)]
+    now = [(*of, STUDY.inputs_digest(*of), STUDY.computed_from(*of)) for of in all_of]
+    return hashlib.sha256(repr(now).encode()).hexdigest()
 
 
 def code_of(stage, verb):

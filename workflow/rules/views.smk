@@ -100,6 +100,7 @@ rule index:
         language=LANGUAGE,
         captions=[pages.of_index(), pages.of_comparison()],
         expected={name: STUDY.entry(name).expect for name in STUDY.robots},
+        rested_on=rested_on,
         code=code_digest("er3a.pipeline.viewing.index", *all_messages()),
     message:
         "write the index"

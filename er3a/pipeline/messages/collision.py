@@ -7,6 +7,7 @@ from typing import assert_never
 
 import numpy as np
 
+from er3a.by_value import Finding
 from er3a.collision.matrix import PairState
 from er3a.collision.pairs import BASE, TRIED, Pair, PairsUnexamined, ShapesAssumed
 from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Sphere
@@ -102,6 +103,12 @@ TEXTS = texts(
         "collision.free_space#paths": Plural(
             "colliding", "{count} path collides: {colliding:, }.", "{count} paths collide: {colliding:, }."
         ),
+        "colliding_target": by("expected", true="{name} ({pair}; as expected)", false="{name} ({pair}; not expected)"),
+        "collision.free_space#blocked": Plural(
+            "blocked",
+            "{count} target collides in every solution within the limits: {named}.",
+            "{count} targets collide in every solution within the limits: {named}.",
+        ),
         "collision.free_space#none": "No collision-free configuration was found.",
     }
 )
@@ -115,10 +122,13 @@ def _(found: Pair) -> str:
 
 @say.register
 def _(found: PairsUnexamined) -> str:
-    named = listed(found.pairs[:NAMED])
-    if len(found.pairs) > NAMED:
-        named.append(sentence("more", count=len(found.pairs) - NAMED))
-    return say_as(found, pairs=joined(named, ", "))
+    return say_as(found, pairs=_first_of(found.pairs))
+
+
+def _first_of(findings: Sequence[Finding]) -> str:
+    """The first few, and how many more there are."""
+    more = [sentence("more", count=len(findings) - NAMED)] if len(findings) > NAMED else []
+    return joined([*listed(findings[:NAMED]), *more], ", ")
 
 
 @say.register
@@ -158,18 +168,19 @@ def _(found: HomeCollides) -> str:
 
 @say.register
 def _(found: FreeSpace) -> str:
-    if not found.clear:
-        return say_as(found, "none")
-    free = say_as(
-        found,
-        "assumed" if found.assumed else "free",
-        percent=100 * found.free_ratio,
-        lost=at_most(100 * (1 - found.clear / found.places), 1),
-    )
+    free = say_as(found, "none")
+    if found.clear:
+        free = say_as(
+            found,
+            "assumed" if found.assumed else "free",
+            percent=100 * found.free_ratio,
+            lost=at_most(100 * (1 - found.clear / found.places), 1),
+        )
     targets = say_as(found, "targets") if found.nearest else ""
     paths = say_as(found, "paths") if found.colliding else ""
+    blocked = say_as(found, "blocked", named=_first_of(found.blocked)) if found.blocked else ""
     doubt = say_as(found, "doubt") if found.undecided else ""
-    return joined([targets, paths, free, doubt], " ")
+    return joined([blocked, targets, paths, free, doubt], " ")
 
 
 def solid_rows(scene: Scene | None) -> list[list[str]]:

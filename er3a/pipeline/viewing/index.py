@@ -1,16 +1,12 @@
 """The pages over all robots: the index (robots x stages, verdicts and key figures) and the comparison of two.
 
 Variants of a sweep are listed only in the section of their sweep.
-
-A study's verdicts as a JUnit report for continuous integration: a suite for each robot, a case for each stage. Elements
-and attributes follow Jenkins' schema ``junit-10.xsd``.
 """
 
 from __future__ import annotations
 
 import json
 import re
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from html.parser import HTMLParser
@@ -24,7 +20,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull
 
-from er3a.files.kept_files import shown_path, write_atomically
+from er3a.files.kept_files import shown_path
 from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.code_digest import code_digest
@@ -47,6 +43,7 @@ from er3a.pipeline.messages.validation import (
 from er3a.pipeline.messages.workspace import judged_void, no_box_text, run_again_text, void_text
 from er3a.pipeline.player.motions import Fault, FaultMoment
 from er3a.pipeline.results import (
+    THE_SETTINGS,
     AbsentResults,
     Input,
     NoPass,
@@ -77,7 +74,7 @@ from er3a.pipeline.stages.validation.model import (
 from er3a.pipeline.stages.workspace.model import VoidSummary, WorkspaceResults, WorkspaceSummary
 from er3a.pipeline.study import Study
 from er3a.pipeline.sweeps import ENTRIES, entry_label
-from er3a.pipeline.verdicts import NOT_EXAMINED, StageVerdict, read_verdicts
+from er3a.pipeline.verdicts import NOT_EXAMINED, StageVerdict, read_verdicts, write_junit
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.figures import new_figure
 from er3a.pipeline.viewing.numbers import at_least, at_most, fixed, number
@@ -88,10 +85,13 @@ from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 
 BORDER_POINT = "tool_point"
+MAX_CHANGED = 6  # files that have changed since, and are named
 Workspaces = Mapping[str, WorkspaceResults | AbsentResults | None]
+Outdated = Mapping[tuple[str, str], tuple[str, ...]]
+"""What has changed since stages were computed, by robot and stage."""
 
 
-def write_compare(study: Study, results: Path, workspaces: Workspaces, output: Path) -> None:
+def write_compare(study: Study, results: Path, workspaces: Workspaces, outdated: Outdated, output: Path) -> None:
     """Render ``compare.html`` from the tables and summaries of all robots, and their workspaces."""
     robots = {name: study.robot(name) for name in study.robots}
     values = {
@@ -122,6 +122,7 @@ def write_compare(study: Study, results: Path, workspaces: Workspaces, output: P
             name: caveat(read_foundation(folder) if is_computed(folder) else "not_computed")
             for name, folder in validated.items()
         },
+        outdated={name: changed_text(outdated, {name}) for name in robots},
         low=corners.min(axis=0).tolist(),
         high=corners.max(axis=0).tolist(),
         compare_script=Path(__file__).with_name("compare.js").read_text(encoding="utf-8"),
@@ -178,6 +179,21 @@ def key_figures(folder: Path, stages: Sequence[str]) -> dict[tuple[str, str, str
     return found
 
 
+def changed_text(outdated: Outdated, robots: Set[str]) -> str:
+    """What has changed since any stage of robots was computed; empty where nothing has."""
+    names = dict.fromkeys(each for (robot, _), changed in outdated.items() if robot in robots for each in changed)
+    if not names:
+        return ""
+    text = N_("Changed since, so what stands here tells of what was before (run the study again): {names}.")
+    return tr(text, names=_changed_names([*names]))
+
+
+def _changed_names(changed: Sequence[str]) -> str:
+    named = [tr(each) if each == THE_SETTINGS else each for each in changed[:MAX_CHANGED]]
+    more = [sentence("more", count=len(changed) - MAX_CHANGED)] if len(changed) > MAX_CHANGED else []
+    return joined([*named, *more], ", ")
+
+
 def border_mm(workspace: WorkspaceResults | AbsentResults | None) -> list[list[list[float]]]:
     """The arcs of the tool point's border in the section through axis 1: lists of (radius, height) in mm."""
     if not isinstance(workspace, WorkspaceResults):
@@ -214,9 +230,9 @@ class Point:
         return 1000 * sum(getattr(void.volume_m3, bound) for void in self.enclosed)
 
 
-def sweep_sections(study: Study, results: Path) -> list[dict[str, Any]]:
+def sweep_sections(study: Study, results: Path, outdated: Outdated) -> list[dict[str, Any]]:
     """What the template shows of each sweep of the study whose variants have all been computed."""
-    return [_section(study, name, results) for name in study.sweeps if _is_whole(study, name, results)]
+    return [_section(study, name, results, outdated) for name in study.sweeps if _is_whole(study, name, results)]
 
 
 def _is_whole(study: Study, name: str, results: Path) -> bool:
@@ -224,7 +240,7 @@ def _is_whole(study: Study, name: str, results: Path) -> bool:
     return all(is_computed(results / variant / stage) for variant in variants for stage in study.stages(variant))
 
 
-def _section(study: Study, name: str, results: Path) -> dict[str, Any]:
+def _section(study: Study, name: str, results: Path, outdated: Outdated) -> dict[str, Any]:
     sweep = study.sweeps[name]
     variants = [variant for variant in study.variants.values() if variant.sweep == name]
     points = [
@@ -243,6 +259,7 @@ def _section(study: Study, name: str, results: Path) -> dict[str, Any]:
         "name": name,
         "title": title,
         "count": len(points),
+        "outdated": changed_text(outdated, {variant.name for variant in variants}),
         "picture": Picture(
             _figure(points, bracketed(what, tr(unit)), own, sweep.stages),
             tr("Results of {count} variants against {what}", count=len(points), what=what),
@@ -428,68 +445,6 @@ def _points(line: Reals) -> str:
     return " ".join(f"{x:.0f},{-z:.0f}" for x, z in line)
 
 
-_NO_XML = re.compile(r"[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-
-
-def write_junit(verdicts: Sequence[StageVerdict], output: Path) -> None:
-    """Write the report.
-
-    A verdict of ``fail`` is a failure, a stage that broke an error; ``no_reference``, and a stage that does not apply
-    to the robot or has not been computed yet, are skipped; a caution passes. What fails as it is meant to is no
-    failure, and counts as a demonstration; what the study expects otherwise is a failure. What passes says its verdict,
-    and each case lists what was not examined.
-    """
-    root = ElementTree.Element("testsuites", {"name": "er3a"} | _counts(verdicts))
-    for robot in dict.fromkeys(verdict.robot for verdict in verdicts):
-        own = [verdict for verdict in verdicts if verdict.robot == robot]
-        skipped = sum(_outcome(verdict) == "skipped" for verdict in own)
-        suite = ElementTree.SubElement(root, "testsuite", {"name": robot} | _counts(own) | {"skipped": str(skipped)})
-        for verdict in own:
-            _add_case(suite, verdict)
-    ElementTree.indent(root)
-    content = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
-    write_atomically(output, lambda file: file.write_bytes(content))
-
-
-def _add_case(suite: ElementTree.Element, verdict: StageVerdict) -> None:
-    case = ElementTree.SubElement(suite, "testcase", classname=f"er3a.{verdict.robot}", name=verdict.stage)
-    text = _NO_XML.sub("?", verdict.text)
-    if outcome := _outcome(verdict):
-        ElementTree.SubElement(case, outcome, message=text, type=verdict.code)
-    lines = []
-    if verdict.is_demonstration:
-        lines.append(f"demonstration, {verdict.status} as expected: {text}")
-    elif verdict.status in ("pass", "caution"):
-        lines.append(f"{verdict.status}: {text}")
-    if verdict.demonstrations:
-        lines.append(f"demonstrations, which fail as expected: {verdict.demonstrations}")
-    if verdict.is_otherwise:
-        lines.append(f"expected: {verdict.expected}")
-    lines += [f"not examined: {_NO_XML.sub('?', each)}" for each in verdict.not_examined]
-    if lines:
-        ElementTree.SubElement(case, "system-out").text = "\n".join(lines)
-
-
-def _outcome(verdict: StageVerdict) -> str | None:
-    """The element that says how a case ended; None where it passed."""
-    if verdict.broken:
-        return "error"
-    if verdict.is_otherwise or verdict.outdated:
-        return "failure"
-    if verdict.is_skipped:
-        return "skipped"
-    return "failure" if verdict.status == "fail" and not verdict.is_demonstration else None
-
-
-def _counts(verdicts: Sequence[StageVerdict]) -> dict[str, str]:
-    outcomes = [_outcome(verdict) for verdict in verdicts]
-    return {
-        "tests": str(len(outcomes)),
-        "failures": str(outcomes.count("failure")),
-        "errors": str(outcomes.count("error")),
-    }
-
-
 SHOWN_FIGURES = 3
 RATES = ("own_speeds", "own_accelerations")
 MAY_RUN = {name: motions for name, motions in MOTIONS.items() if STAGES[name].may_run}
@@ -508,15 +463,17 @@ FIRST = ("fail", "conflict", "caution", "no_reference", "not_computed", "pass") 
 def write_index(study: Study, results: Path, folder: Path) -> None:
     """Render ``index.html``, ``compare.html`` and ``junit.xml`` from the results of all robots and stages.
 
-    Stages that have not been computed yet are named as such.
+    Stages that have not been computed yet are named as such, and those whose inputs have changed since.
     The comparison offers the robots that are written in the study, not the variants that sweeps make of them.
     """
+    verdicts = read_verdicts(study, results)
+    outdated = {(each.robot, each.stage): each.outdated for each in verdicts if each.outdated}
     workspaces = {name: _workspace(results / name / "workspace") for name in study.robots}
     robots = [
-        _entry(study, name, results / name) | {"thumbnail": thumbnail(study.robot(name), workspaces[name])}
+        _entry(study, name, results / name, outdated) | {"thumbnail": thumbnail(study.robot(name), workspaces[name])}
         for name in study.robots
     ]
-    write_compare(study, results, workspaces, folder / "compare.html")
+    write_compare(study, results, workspaces, outdated, folder / "compare.html")
     contradicted = {each["robot"].name for each in robots if each["table"] == "fail"}
     page.render(
         Path(__file__).with_name("index.html.j2"),
@@ -529,7 +486,7 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         run_words=MAY_RUN,
         conventions=CONVENTIONS,
         most_faults=MAX_FAULTS,
-        sweeps=sweep_sections(study, results),
+        sweeps=sweep_sections(study, results, outdated),
         command=page.run_command(study, "index.html"),
         provenance=Provenance(
             inputs=result_records(results, study.names),
@@ -537,7 +494,7 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
             seed=study.seed,
         ),
     )
-    write_junit(read_verdicts(study, results), folder / "junit.xml")
+    write_junit(verdicts, folder / "junit.xml")
 
 
 class _TextOfPage(HTMLParser):
@@ -622,8 +579,9 @@ def _evidence(results: Path) -> TableEvidence | None:
     return stored.summary.evidence if isinstance(stored, ValidationResults) else None
 
 
-def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
+def _entry(study: Study, name: str, results: Path, outdated: Outdated) -> dict[str, Any]:
     """What the index shows of a robot."""
+    changed = {stage: files for (robot_name, stage), files in outdated.items() if robot_name == name}
     robot, expected = study.robot(name), study.entry(name).expect
     stages = [stage for stage in study.stages(name) if stage in STAGES]
     stored = {stage: read_stage(results / stage, STAGES[stage]) for stage in stages if is_computed(results / stage)}
@@ -655,7 +613,11 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         "instead": {instead: f"#{instead}"} if instead else {},
         "dh_instead": {instead: f"#dh-{instead}"} if instead else {},
         "answers": [*([settled] if settled else []), *_answers(heads, robot, placed)],
-        "notes": {stage: _note(head, [run for run in runs if run["stage"] == stage]) for stage, head in heads.items()},
+        "outdated": changed_text(outdated, {name}),
+        "notes": {
+            stage: tr("changed since") if stage in changed else _note(head, [r for r in runs if r["stage"] == stage])
+            for stage, head in heads.items()
+        },
         "bare": any(
             _misses(heads[stage], "carried") or _misses(heads[stage], "tool") for stage in MAY_RUN if stage in heads
         ),
@@ -677,7 +639,10 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
             same_arm=same_arm,
             **proposed(finding, shown_path(study.robot_file(name))),
         ),
-        "cells": [_cell(head) for head in sorted(heads.values(), key=lambda head: FIRST.index(head.status))],
+        "cells": [
+            _cell(head, changed.get(head.stage, ()))
+            for head in sorted(heads.values(), key=lambda head: (head.stage not in changed, FIRST.index(head.status)))
+        ],
         "expected": expected,
         "meant": _meant(heads, expected),
         "not_examined": [tr(STAGES[stage].title) for stage in stages if stage not in heads],
@@ -897,10 +862,19 @@ def _note(head: Head, runs: Sequence[Mapping[str, Any]]) -> str:
     return joined([*parts, tr("simulated") if _misses(head, "real_camera") else ""])
 
 
-def _cell(head: Head) -> dict[str, Any]:
-    """What the index says of a stage: its answer and the rest of its text, without what all stages of a robot share."""
+def _cell(head: Head, changed: Sequence[str]) -> dict[str, Any]:
+    """What the index says of a stage: its answer and the rest of its text, without what all stages of a robot share;
+    before it what has ``changed`` since."""
     verdict = head.summary.verdict
     unexamined = [say(found) for found in verdict.findings[1:] if found is not verdict.shapes]
     near = near_shapes(verdict.shapes.margin_mm, verdict.shapes.near) if verdict.shapes else ""
     lead, rest = page.led(joined([say_reserved(head.finding, head.summary.not_examined), *unexamined, near], " "))
-    return {"head": head, "lead": lead, "rest": rest}
+    if changed:
+        lead = sentence("stage.outdated", names=_changed_names(changed), text=lead)
+    return {
+        "head": head,
+        "sign": "no_verdict" if changed else head.sign,
+        "changed": changed,
+        "lead": lead,
+        "rest": rest,
+    }

@@ -26,13 +26,16 @@ from er3a.pipeline.stages.trajectory.motion import ListedMotion, by_subject, stu
 from er3a.pipeline.study import Study
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
-from er3a.selection.nearest import nearest
+from er3a.selection.nearest import AllCollide, nearest
 from er3a.selection.select import refusals_of
 
 
-def target_clearances(robot: Robot, bodies: Bodies, file: str) -> tuple[model.TargetClearances, list[model.Closest]]:
-    """Clearance of all solutions within the limits, and of the chosen ones where they are nearest to what."""
-    tables, closest = [], []
+def target_clearances(
+    robot: Robot, bodies: Bodies, file: str
+) -> tuple[model.TargetClearances, list[model.Closest], tuple[model.CollidingTarget, ...]]:
+    """Clearance of all solutions within the limits, of the chosen ones where they are nearest to what, and the targets
+    that none is chosen of, because all collide."""
+    tables, closest, blocked = [], [], []
     targets = load_targets(file, robot)
     for target in targets:
         solutions = inverse(robot, target.T, target.q_ref, self_motion_rows=True)
@@ -52,14 +55,18 @@ def target_clearances(robot: Robot, bodies: Bodies, file: str) -> tuple[model.Ta
                 between=[bodies.pairs[k].label if k >= 0 else "" for k in pair],
             )
         )
-        chosen = nearest(robot, solutions, target.q_ref, refusals_of(bodies, solutions)).chosen
+        choice = nearest(robot, solutions, target.q_ref, refusals_of(bodies, solutions))
+        chosen = choice.chosen
+        if isinstance(choice.reason, AllCollide):
+            expected = target.expect == "collides"
+            blocked.append(model.CollidingTarget(target.name, choice.reason.overlap.pair, expected))
         if chosen is not None:
             at = int(np.flatnonzero(rows == chosen)[0])
             if pair[at] >= 0:
                 closest.append(
                     _closest(bodies, (target.name, "target", None), solutions.q[chosen], distance[at], pair[at])
                 )
-    return model.TargetClearances.stacked(tables).of_joints(robot.slides), closest
+    return model.TargetClearances.stacked(tables).of_joints(robot.slides), closest, tuple(blocked)
 
 
 def path_clearances(
@@ -121,7 +128,7 @@ def compute(study: Study, name: str) -> model.CollisionResults:
     at_home = bodies.pairs[nearest[0]] if nearest[0] >= 0 and smallest[0] < 0 else None
     if at_home is None:
         places.joined[:] = free_space.joined_to_home(bodies, places, home, settings.neighbours)
-    targets, at_targets = target_clearances(robot, bodies, study.entry(name).targets)
+    targets, at_targets, blocked = target_clearances(robot, bodies, study.entry(name).targets)
     tolerance = settings.penetration_tolerance_mm / 1000
     motions = list(study_motions(study, name, CHECKS))
     paths, on_paths = path_clearances(motions, bodies, tolerance)
@@ -147,6 +154,7 @@ def compute(study: Study, name: str) -> model.CollisionResults:
             for each in on_paths
             if each.clearance_mm < 0
         ),
+        blocked=blocked,
     )
     return model.CollisionResults(
         summary=model.CollisionSummary(
@@ -287,9 +295,10 @@ def _verdict(
         return Verdict("fail", model.BaseInSolid(inside))
     if known:
         return Verdict("fail" if isinstance(known, model.ShapesOverlap) else "caution", known)
-    if not all(each.expected for each in found.colliding):
+    blocked = not all(each.expected for each in found.blocked)
+    if not all(each.expected for each in found.colliding) or (blocked and not found.targets):
         return Verdict("fail", found)
-    return Verdict("caution" if found.undecided or not found.joined else "pass", found)
+    return Verdict("caution" if found.undecided or not found.joined or blocked else "pass", found)
 
 
 def _figures(space: free_space.JointSpace, places: model.PlacesSummary, matrix: model.MatrixRows) -> tuple[Figure, ...]:

@@ -61,6 +61,17 @@ class CollidingPath(Finding):
     expected: bool = False
 
 
+class CollidingTarget(Finding):
+    """A target all of whose solutions within the limits collide, with the overlap of the one with the widest margin.
+
+    ``expected``: whether its file expects that.
+    """
+
+    name: str
+    pair: Pair
+    expected: bool = False
+
+
 class FreeSpace(Finding, code="collision.free_space"):
     """How much of joint space and of the reached places is free.
 
@@ -70,6 +81,7 @@ class FreeSpace(Finding, code="collision.free_space"):
     undecided : pairs of links of which it is not known whether they can meet
     assumed : whether the shapes of the arm's links are, so that nothing is proven of the arm itself
     targets, nearest : how many have a chosen solution, and the nearest of these; colliding : paths that do
+    blocked : targets that collide in every solution
     """
 
     free_ratio: float
@@ -81,6 +93,7 @@ class FreeSpace(Finding, code="collision.free_space"):
     targets: int = 0
     nearest: NearestTarget | None = None
     colliding: tuple[CollidingPath, ...] = ()
+    blocked: tuple[CollidingTarget, ...] = ()
 
 
 @dataclass(frozen=True)
