@@ -108,6 +108,7 @@ REMEDIES: dict[str, str] = {
     "loop_comes_back_otherwise": N_("Turn the tool back within the loop, so that each round ends as it began."),
     "program_data_file_missing": N_("Put the data file beside the program."),
     "program_name_twice": N_("Remove one of the two definitions."),
+    "program_module_twice": N_("Remove the one that the controller does not have."),
     "program_nothing_moves": N_("Check that this is the program to run."),
     "speed_not_given": N_("Give a speed, as a number above 0, before the motion."),
     "turn_speed_not_given": N_(
@@ -376,6 +377,7 @@ TEXTS = texts(
         ),
         "program_data_file_missing": "{file} is missing, which holds the program's points",
         "program_name_twice": "{name} is declared twice; the later one counts",
+        "program_module_twice": "{name} is here too, and differs: {taken} was taken",
         "program_not_understood": "not understood: {text}",
         "program_not_simulated": "not simulated: {text}",
         "program_rows_from_rest": (
