@@ -306,7 +306,8 @@ def _moves(program: syntax.Program, operation: syntax.Operation, moving: set[str
         case syntax.Call(routine=routine) if routine in moving:
             return True
         case syntax.Beside():
-            return _is_strange(program, operation, dialect) or _moves_beside(program, operation, moving, dialect)
+            strange = _is_strange(program, operation, dialect) or bool(_given_back(program, operation.what))
+            return strange or _moves_beside(program, operation, moving, dialect)
         case syntax.Assign(value=value) if value is not None:
             name = _full_name(operation.target)
             given = value.value if isinstance(value, syntax.Constant) else syntax.Unclear("")
@@ -966,6 +967,9 @@ class Machine:
         """
         name = start.what.function
         routine = self.program.routines.get(name)
+        if changed := _given_back(self.program, start.what):  # which is changed at any time, also if it is local
+            way.memory.aliased |= changed
+            way.memory.kept.clear()
         if not _is_strange(self.program, start, self.dialect) and not _moves_beside(
             self.program, start, self.moving, self.dialect
         ):
@@ -1028,6 +1032,9 @@ class Machine:
                 self.changed_at.setdefault(target_name(target), frame.calls[-1])
             if name in aliased:
                 memory.forget(target_name(target))
+            elif _is_whole_list(target):
+                for key, part in _parts(frame.local, name):
+                    memory.write(target_name(target) + key, part)
             else:
                 memory.assign(target, known(frame.local.get(name), name))
         handled = self.unsettled[frame.routine.name]
@@ -1073,6 +1080,12 @@ def _locals(
     given = _given(routine, call)
     values = {parameter.name: memory.value(each) for parameter, each in reversed(given)}
     local: dict[str, syntax.Value] = {"%inside": True}
+    for parameter, each in given:
+        if _is_whole_list(each):
+            named = {**memory.shared, **memory.local}
+            for key, value in _parts(named, target_name(each)):
+                local[parameter.name + key] = memory.read(target_name(each) + key) or value
+            values[parameter.name] = local.get(parameter.name, syntax.Unset(parameter.name))
     for parameter in routine.parameters:
         if parameter.name in values:
             local[parameter.name] = values[parameter.name]
@@ -1083,6 +1096,16 @@ def _locals(
     places = sum(not each.named for each in routine.parameters)
     wanted = sum(each is not None for each in call.arguments) + len(call.keywords)
     return local, len(call.arguments) <= places and len(given) == wanted
+
+
+def _is_whole_list(given: syntax.Expression) -> bool:
+    """Whether an argument is a list with all its elements: KRL's ``A[]``."""
+    return isinstance(given, syntax.Element) and not given.indices and isinstance(given.of, syntax.Variable)
+
+
+def _parts(values: Mapping[str, syntax.Value], name: str) -> list[tuple[str, syntax.Value]]:
+    """What a list has under its name and those of its elements, by what follows its name."""
+    return [(key[len(name) :], value) for key, value in values.items() if root(key) == name]
 
 
 def _labels(routine: syntax.Routine) -> frozenset[int]:

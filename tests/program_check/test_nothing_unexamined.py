@@ -915,6 +915,66 @@ def test_an_element_given_by_reference_is_the_one_that_was_meant_at_the_call(tmp
     np.testing.assert_allclose(np.degrees(found.target.joints), [40, -10, -10, 0, -70, 0])
 
 
+OF_LISTS = (
+    "DEF put(Q[]:OUT,N:IN)\nREAL Q[]\nINT N\nQ[N]=44\nEND\n"
+    "DEF both(Q[])\nREAL Q[],R[3]\nput(Q[],2)\nQ[2]=Q[2]+1\nR[2]=70\nEND\n"
+    "DEFFCT REAL total(W[]:OUT,N:IN)\nREAL W[]\nINT N,K\nREAL S\nS=0\n"
+    "FOR K=1 TO N\nS=S+W[K]\nENDFOR\nRETURN(S)\nENDFCT\n"
+    "DEF twice(Q[])\nREAL Q[]\nQ[2]=44\nPTP {A1 A[2],A2 A[1]}\nEND\n"
+)
+
+
+@pytest.mark.parametrize("local", [True, False])
+@pytest.mark.parametrize(
+    ("body", "angles"),
+    [
+        ("put(A[],2)\nPTP {A1 A[2],A2 A[1]}", (44, -7)),
+        ("put(A[],1)\nPTP {A1 A[2],A2 B[2]}", (5, -30)),
+        ("PTP {A1 total(A[],2),A2 A[1]}", (-2, -7)),
+        ("both(A[])\nPTP {A1 A[2],A2 A[1]}", (45, -7)),
+    ],
+)
+def test_a_list_that_a_routine_gets_keeps_its_elements_but_for_those_that_are_set(tmp_path, local, body, angles):
+    (tmp_path / "a.dat").write_text("DEFDAT a\nDECL REAL A[3]\nDECL REAL B[3]\nENDDAT\n")
+    body = f"{'REAL A[3],B[3]' * local}\nA[1]=-7\nA[2]=5\nB[2]=-30\n{body}"
+    (found,) = motions(tmp_path, krl(body, OF_LISTS), "a.src")
+    np.testing.assert_allclose(np.degrees(found.target.joints[:2]), angles, atol=1e-6)
+
+
+def test_a_list_with_two_names_that_is_changed_by_one_of_them_has_no_known_elements(tmp_path):
+    (tmp_path / "a.dat").write_text("DEFDAT a\nDECL REAL A[3]\nA[1]=-7\nA[2]=5\nENDDAT\n")
+    (found,) = motions(tmp_path, krl("twice(A[])", OF_LISTS), "a.src")
+    assert isinstance(found.target, UnresolvedTarget)
+
+
+def test_a_list_given_to_a_routine_that_is_not_known_has_no_known_elements(tmp_path):
+    body = "REAL A[3]\nA[2]=5\nput(A[])\nPTP {A1 A[2]}"
+    found = motions(tmp_path, krl(body, 'DEF put(Q[])\nREAL Q[]\nSREAD(S[],ST,OFS,"%f",Q[2])\nEND\n'), "a.src")
+    assert isinstance(found[0].target, UnresolvedTarget)
+
+
+def test_an_element_that_a_routines_own_list_never_got_is_not_that_of_the_data(tmp_path):
+    (tmp_path / "a.dat").write_text("DEFDAT a\nDECL REAL A[3]\nA[2]=5\nENDDAT\n")
+    (found,) = motions(tmp_path, krl("sub( )", "DEF sub( )\nREAL A[3]\nPTP {A1 A[2]}\nEND\n"), "a.src")
+    assert isinstance(found.target, UnresolvedTarget)
+
+
+@pytest.mark.parametrize(
+    "start",
+    ["INTERRUPT DECL 4 WHEN $IN[1]==TRUE DO put(%s)", "TRIGGER WHEN DISTANCE=1 DELAY=0 DO put(%s)", "setup(%s)"],
+)
+@pytest.mark.parametrize(("given", "element"), [("I", ""), ("A[2]", ""), ("A[]", "[2]")])
+@pytest.mark.parametrize("used", ["I", "A[2]", "J"])
+def test_what_an_interrupt_gets_by_reference_has_no_value_also_if_it_is_local(tmp_path, start, given, element, used):
+    """Also where a routine starts the interrupt with what it got by reference itself."""
+    head = f"Q{'[]' * bool(element)}"
+    more = f"DEF put({head}:OUT)\nREAL {head}\nQ{element}=44\nEND\n"
+    more += f"DEF setup({head}:OUT)\nREAL {head}\nINTERRUPT DECL 4 WHEN $IN[1] DO put({head})\nWAIT SEC 1\nEND\n"
+    body = f"REAL I,J,A[3]\nI=5\nJ=5\nA[2]=5\n{start % given}\nPTP {axes(HOME)}\nPTP {{A1 {used}}}"
+    found = motions(tmp_path, krl(body, more), "a.src")
+    assert isinstance(found[-1].target, UnresolvedTarget) == (given[0] == used[0])
+
+
 @pytest.mark.parametrize("kind", ["INOUT", "VAR", "PERS"])
 def test_a_variable_of_rapid_under_two_names_has_no_value(tmp_path, kind):
     at = "[[g,-10,-10,0,-70,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
