@@ -864,7 +864,8 @@ class Machine:
             memory.write(name + "%name", of or each.text.partition("=")[2].strip())
         if self.dialect.is_followed(name, value):
             return None
-        memory.doubts[self.dialect.doubted(name)] = each.text
+        if doubted := self.dialect.doubted(name):
+            memory.doubts[doubted] = each.text
         return instructions.Unknown(each.text, may_move=False)
 
     def _compare_frame(self, memory: ProgramMemory, each: syntax.Assign) -> None:

@@ -612,6 +612,12 @@ ZERO = "{X 0,Y 0,Z 0,A 0,B 0,C 0}"
         (f"$CORR_T={ZERO}", [6]),
         ("$TCP_IPO=FALSE", [6]),
         ("$TCP_IPO=FALSE\n$TCP_IPO=TRUE", []),
+        ("$FILTER=4", []),
+        ("$LOAD_A3={M 8.0}", []),
+        ("$ACT_EX_AX=-1", []),
+        ("$ACT_EX_AX=2", [6]),
+        ("$JOINT_OFFSET[1]=0", []),
+        ("$JOINT_OFFSET[1]=5", [6]),
         (f"{LINE}\nFOR I=1 TO 2\n{LINE}\nelsewhere()\nENDFOR\nBAS(#TOOL,0)\nBAS(#BASE,0)", [6]),
     ],
 )
@@ -1580,3 +1586,41 @@ def test_a_part_of_data_that_only_the_cell_knows_is_named(tmp_path, line, code):
     assert [each.finding.code for each in found.findings if each.level != "note" and each.finding.code == code] == [
         code
     ]
+
+
+SHIPPED = (
+    "DEFDAT $CONFIG\nINT $EDIT_MODE=1\nINT $ACT_GROUP='B0001'\nSTRUC RECIPE REAL HEIGHT,FRAME OFFSET\n"
+    "DECL RECIPE $RECIPE={HEIGHT 5.0}\nDECL LOAD LOAD_A1_DATA={M -1.0,CM {X 0.0,Y 0.0,Z 0.0,A 0.0,B 0.0,C 0.0}}\n"
+    "DECL INT COMPL_GROUP='B1111'\nDECL FRAME TOOL_DATA[16]\nDECL FRAME BASE_DATA[32]\n"
+    "TOOL_DATA[2]={X 0,Y 0,Z 50,A 0,B 0,C 0}\nBASE_DATA[3]={X 50,Y 0,Z 0,A 0,B 0,C 0}\nENDDAT\n"
+)
+BASICS = (
+    "DEF BAS(WHAT:IN,NUMBER:IN)\nDECL BAS_COMMAND WHAT\nREAL NUMBER\nINT N\nN=NUMBER\nSWITCH WHAT\nCASE #INITMOV\n"
+    "$FILTER=$DEF_FLT_PTP\n$LOAD_A1.M=0\n$LOAD_A1.CM={X 0.0,Y 0.0,Z 0.0,A 0.0,B 0.0,C 0.0}\n$LOAD_A2.M=LOAD_A1_DATA.M\n"
+    "$LOAD_A2.CM=LOAD_A1_DATA.CM\n$LOAD_A3.M=$DEF_LA3_M\n$LOAD_A3.J=$DEF_LA3_J\n$ACT_GROUP=COMPL_GROUP\n"
+    "CASE #TOOL\nT(N)\nCASE #BASE\nB(N)\nENDSWITCH\nEND\n"
+    "DEF T(N:IN)\nINT N\nIF N<=0 THEN\n$TOOL=$NULLFRAME\nELSE\nIF TOOL_CORR_ON THEN\n$TOOL=TOOL_DATA[N]:TOOL_CORR\n"
+    "ELSE\n$TOOL=TOOL_DATA[N]\nENDIF\nENDIF\nIF $ADAP_ACC<>#NONE THEN\n$LOAD.M=-1\nENDIF\n$ACT_TOOL=N\nEND\n"
+    "DEF B(N:IN)\nINT N\n$BASE=BASE_DATA[N]\n$JERK=1\n$JERK=1\n$JERK=1\n$ACT_BASE=N\n$ACT_EX_AX=-1\nEND\n"
+    "GLOBAL DEFFCT FRAME STOOL2(F:IN)\nDECL FDAT F\n$ACT_TOOL=F.TOOL_NO\n$ACT_BASE=F.BASE_NO\n"
+    "RETURN TOOL_DATA[F.TOOL_NO]\nENDFCT\n"
+)
+
+
+def test_what_a_controllers_own_modules_and_data_set_is_no_doubt_about_tool_and_base(tmp_path):
+    """As an archive has it whose programs are as they should be."""
+    (tmp_path / "$config.dat").write_text(SHIPPED)
+    (tmp_path / "bas.src").write_text(BASICS)
+    body = f"BAS(#INITMOV,0)\nTOOL_CORR_ON=FALSE\nBAS(#TOOL,2)\nBAS(#BASE,3)\n$RECIPE.HEIGHT=7\nPTP {axes(NEAR)}"
+    found = check(tmp_path, krl(f"{body}\n{LINE}\nPTP {{A1 $RECIPE.HEIGHT}}"), "a.src")
+    assert not {"program_not_understood", "frames_in_doubt", "may_move", "target_not_given"} & codes(found).keys()
+    line = motions(tmp_path, krl(f"{body}\n{LINE}"), "a.src")[-1]
+    assert (line.tool.pose[2, 3], line.base.pose[0, 3]) == (0.05, 0.05)
+
+
+@pytest.mark.parametrize("line", ["$ACT_TOOL=2", "$LOAD_A1.M=5", "$LOAD_A3=LOAD_A3_DATA", "$FILTER=16", "$CORR_T.X=5"])
+def test_what_else_such_variables_are_set_to_is_named(tmp_path, line):
+    (tmp_path / "$config.dat").write_text(SHIPPED)
+    found = codes(check(tmp_path, krl(f"{FRAMES}{line}\nPTP {axes(NEAR)}\n{LINE}"), "a.src"))
+    assert found["program_not_understood"] == [4]
+    assert ("frames_in_doubt" in found) == (line.startswith(("$ACT", "$CORR")))

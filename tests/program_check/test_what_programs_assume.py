@@ -450,6 +450,22 @@ def test_whatever_another_program_of_the_archive_may_set_has_no_known_value_or_i
 
 
 @pytest.mark.parametrize("called", [True, False])
+def test_what_bas_does_to_the_homes_of_a_new_controller_is_left_out(tmp_path, called):
+    """It asks for the kind of the arm; each submit program calls it."""
+    home = "DEFDAT $CONFIG\nDECL AXIS XHOME={A1 5,A2 -10,A3 -10,A4 0,A5 -70,A6 0}\nENDDAT\n"
+    basics = (
+        "DEF BAS(WHAT:IN,N:IN)\nEND\nGLOBAL DEF BASISTECH_PLC_INIT( )\nHOMES( )\nEND\nDEF HOMES( )\nXHOME=$H_POS\nEND\n"
+    )
+    submit = "DEF SPS( )\nBASISTECH_PLC_INIT( )\nEND\n"
+    for name, text in (("System/$config.dat", home), ("System/bas.src", basics), ("System/sps.sub", submit)):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    (tmp_path / "Program").mkdir()
+    found = codes(check(tmp_path / "Program", krl(f"{'BAS(#INITMOV,0)' * called}\nPTP XHOME"), "a.src"))
+    assert not {"set_elsewhere", "target_not_given"} & found.keys()
+
+
+@pytest.mark.parametrize("called", [True, False])
 def test_a_routine_that_the_program_does_not_call_may_set_a_variable_too(tmp_path, called):
     (tmp_path / "$config.dat").write_text(CONFIG)
     (tmp_path / "lib.src").write_text("DEF lib( )\nEND\nGLOBAL DEF PRESET( )\nGZ=30.0\nEND\n")

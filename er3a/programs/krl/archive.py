@@ -132,7 +132,7 @@ class ControllerFiles:
         has_own = own is not None and GLOBAL_NAME.search(self.text(own))
         if self.config is None and not has_own and not self.published:
             return ()
-        return tuple(each for each in self._programs(".src") if each not in self.modules)
+        return tuple(each for each in self._programs(".src") if each not in self.modules and not is_basics(each))
 
     @cached_property
     def config(self) -> Path | None:
@@ -178,6 +178,12 @@ class ControllerFiles:
         folder = self.archive or self.path.parent.resolve()
         found = file.resolve()
         return found.relative_to(folder).as_posix() if found.is_relative_to(folder) else file.name
+
+
+def is_basics(file: Path) -> bool:
+    """Whether a module is the controller's bas.src: what it does for other programs than this one, as to give a new
+    controller its home positions, is left out."""
+    return file.stem.upper() == "BAS"
 
 
 def _with_data(file: Path) -> tuple[Path, Path | None]:

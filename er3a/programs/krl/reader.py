@@ -28,7 +28,7 @@ from er3a.programs.code_builder import (
 )
 from er3a.programs.evaluation import STRUCTURE
 from er3a.programs.instructions import Aside, Place, Remark, Unknown
-from er3a.programs.krl.archive import CALL, GLOBAL_NAME, ControllerFiles
+from er3a.programs.krl.archive import CALL, GLOBAL_NAME, ControllerFiles, is_basics
 from er3a.programs.krl.dialect import (
     HERE,
     HERE_JOINTS,
@@ -823,7 +823,7 @@ class _SetByOthers:
     def elsewhere(self, uncalled: Iterable[syntax.Routine]) -> dict[str, Place]:
         """What modules set that the program does not call, with where; also ``uncalled`` routines of those it calls."""
         found: dict[str, Place] = {}
-        for routine in uncalled:
+        for routine in (each for each in uncalled if each.place.file is None or not is_basics(each.place.file)):
             found |= {name: place for name, place in self._set_by(routine).items() if name in self.shared}
         for file in self.files.others:
             if self.shared & set(map(str.upper, NAME.findall(self.files.text(file)))):
