@@ -976,8 +976,8 @@ class Machine:
         ):
             self._note(way, start.place, instructions.Aside(start.text))
             return
-        before = way.step
-        self._note(way, start.place, instructions.MovesBeside(name, start.kind, start.text))
+        before, sets = way.step, self._only_set(start)
+        self._note(way, start.place, instructions.MovesBeside(name, start.kind, start.text, sets))
         if routine is not None:
             other = way.fork(self.numbers, len(self.seen))
             other.step, other.beside = before, True
@@ -996,8 +996,17 @@ class Machine:
                     self._note(other, start.place, instructions.MovesBeside(name, "entered", start.text))
                 if not fits:
                     self._note(other, start.place, instructions.Unknown(start.text, may_move=False))
-        if start.kind == "thread":
+        way.memory.doubts.update((frame, start.text) for frame in self.dialect.frames if frame in sets)
+        if start.kind == "thread" and not sets:
             way.memory.here = Position()
+
+    def _only_set(self, start: syntax.Beside) -> tuple[str, ...]:
+        """What motions depend on and a routine beside the program sets; none if it may move the arm."""
+        name = start.what.function
+        if name in self.moving or name not in self.program.routines:
+            return ()
+        changed = _changed_in(self.program, _with_called(self.program, (name,)), self.dialect)
+        return tuple(sorted(changed & self.dialect.modal))
 
     def _changed_later(self, way: ExecutionPath) -> frozenset[str]:
         """Names of the variables, of those that have names in motions, that a way may still change."""

@@ -243,7 +243,7 @@ def test_what_an_interrupt_sets_is_followed_on_both_sides(tmp_path):
 def test_an_interrupt_that_sets_a_frame_is_named_and_leaves_the_programs_own_frames(tmp_path):
     body = f"{FRAMES}INTERRUPT DECL 4 WHEN $IN[1] DO shift( )\nPTP {axes(NEAR)}\nLIN_REL {{Z 5}}"
     found = check(tmp_path, krl(body, "DEF shift( )\n$BASE={X 0,Y 0,Z 10,A 0,B 0,C 0}\nEND\n"), "a.src")
-    assert codes(found) == {"moves_beside": [4], "speed_not_given": [5, 6]}
+    assert codes(found) == {"moves_beside": [4], "speed_not_given": [5, 6], "frames_in_doubt": [6]}
     assert found.level == "caution"
 
 
@@ -884,6 +884,23 @@ def test_the_way_back_to_where_an_interrupt_came_is_a_way_that_is_not_known(tmp_
     found = check(tmp_path, krl(f"INTERRUPT DECL 5 WHEN $IN[1] DO hit( )\n{AT_START}PTP {axes(NEAR)}", more), "a.src")
     assert found.level == "caution"
     assert "moves_beside" in codes(found)
+
+
+@pytest.mark.parametrize("start", ["INTERRUPT DECL 5 WHEN $IN[1] DO", "TRIGGER WHEN DISTANCE=0 DELAY=0 DO"])
+@pytest.mark.parametrize(
+    ("sets", "names", "doubted"),
+    [
+        ("$BASE={X 0,Y 50,Z 0,A 0,B 0,C 0}", "$BASE", [5]),
+        ("$TOOL=$NULLFRAME\n$VEL.CP=1.9", "$TOOL, $VEL", [5]),
+        ("$VEL.CP=1.9", "$VEL", []),
+    ],
+)
+def test_a_routine_that_only_sets_what_motions_use_is_named_with_that(tmp_path, start, sets, names, doubted):
+    found = check(tmp_path, krl(f"{AT_START}{start} hit( )\n{LINE}", f"DEF hit( )\n{sets}\nEND\n"), "a.src")
+    (beside,) = (each for each in found.findings if each.finding.code == "moves_beside")
+    assert (beside.finding.kind, beside.finding.names, beside.level) == ("sets", names, "caution")
+    lines = [each.place.line for each in found.findings if each.finding.code == "frames_in_doubt"]
+    assert lines == [beside.place.line + 1] * bool(doubted)
 
 
 # One variable under two names

@@ -190,9 +190,7 @@ TEXTS = texts(
             "the joints were taken"
         ),
         "frame_taken_as_flange": "{name} is not given; the flange was taken for it",
-        "frames_in_doubt": (
-            "checked with the tool and base that are known, but {text}, which is not understood, may have changed them"
-        ),
+        "frames_in_doubt": ("checked with the tool and base that are known, but {text} may have changed them"),
         "way_not_known": "the start of the motion is not known; only the target was checked",
         "more_than_full_speed": "asks for {percent:g} % of the joints' speed or acceleration",
         "joint_jumps": "J{joint} turns by {angle_deg:.1f} deg while the tool moves by {moved_mm:.1f} mm",
@@ -224,6 +222,10 @@ TEXTS = texts(
             interrupt=(
                 "the interrupt {routine} can move the arm at any time; its motions were checked apart, from where it "
                 "is not known"
+            ),
+            sets=(
+                "{routine} runs beside the program from here on and can set {names}; the motions after it were checked "
+                "without that"
             ),
         ),
         "clear_of_assumed": (
