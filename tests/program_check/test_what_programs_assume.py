@@ -438,7 +438,7 @@ def test_whatever_another_program_of_the_archive_may_set_has_no_known_value_or_i
     files = {
         "System/$config.dat": CONFIG,
         "Program/lib.src": LIBRARY,
-        place: f"DEF other( )\n{line}\nEND\n{OWN_ROUTINES}",
+        place: f"DEF other( )\n  {line}\nEND\n{OWN_ROUTINES}",
     }
     for name, text in files.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
