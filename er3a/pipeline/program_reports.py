@@ -112,8 +112,14 @@ def _error_line(checked: CheckedFile) -> str:
     error = checked.error
     assert error is not None
     line = _line_in(error)
-    where = f"{shown(checked.file)}:{line}" if line else shown(checked.file)
+    file = shown(_file_of(checked, error))
+    where = f"{file}:{line}" if line else file
     return f"{where}: error: {error.problem}. {error.remedy} [{UNREADABLE}]"
+
+
+def _file_of(checked: CheckedFile, error: InputError) -> Path:
+    """The file that can't be read: the program's own, or a module that it calls."""
+    return checked.file if error.file is None else Path(error.file)
 
 
 def _line_in(error: InputError) -> int:
@@ -222,7 +228,8 @@ def json_of(checked: Iterable[CheckedFile]) -> list[dict[str, Any]]:
         if each.check is None:
             error = each.error
             assert error is not None
-            problem = {"line": _line_in(error), "problem": error.problem, "remedy": error.remedy}
+            where = {"file": _uri(_file_of(each, error)), "line": _line_in(error)}
+            problem = {**where, "problem": error.problem, "remedy": error.remedy}
             found.append({"file": _uri(each.file), "level": "fail", "error": problem})
             continue
         check = each.check
@@ -294,7 +301,7 @@ def sarif_of(checked: Sequence[CheckedFile]) -> dict[str, Any]:
             error = each.error
             assert error is not None
             text = f"{error.problem}. {error.remedy}"
-            place = Place(each.file, max(_line_in(error), 1))
+            place = Place(_file_of(each, error), max(_line_in(error), 1))
             results.append(_result((UNREADABLE, "fail", text), place, each.file.name, seen))
             rules[UNREADABLE] = "fail"
             continue

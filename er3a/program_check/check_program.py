@@ -311,7 +311,8 @@ def _located(execution: Execution, robot: Robot, checker: StepChecker, end: int)
             unknown = found_in.MayMove(what.text) if what.may_move else NotUnderstood(what.text, step.place)
             found.append(LocatedFinding("caution", unknown, step.place, step.calls))
         elif isinstance(what, MovesBeside) and what.kind != "entered":
-            beside = found_in.MovesBesideProgram(what.routine, what.kind)
+            sets = ", ".join(what.sets)
+            beside = found_in.MovesBesideProgram(what.routine, "sets" if sets else what.kind, sets)
             found.append(LocatedFinding("caution", beside, step.place, step.calls))
         elif isinstance(what, Pause) and what.by_others:
             waits = found_in.WaitsForOthers(what.condition or "")

@@ -393,10 +393,12 @@ class MayMove(Finding):
 
 
 class MovesBesideProgram(Finding, code="moves_beside"):
-    """A concurrent routine moves the arm; its motions were not checked together with the program's."""
+    """A concurrent routine moves the arm; its motions were not checked together with the program's. Or (``sets``) it
+    moves nothing, but sets ``names`` on which motions depend; these were checked without that."""
 
     routine: str
-    kind: Literal["thread", "interrupt"]
+    kind: Literal["thread", "interrupt", "sets"]
+    names: str = ""
 
 
 class NeverReached(Finding):

@@ -399,6 +399,8 @@ class ProgramMemory:
             return syntax.Unclear(f"{name}, which may be changed elsewhere")
         if name in self.local:
             return self.local[name]
+        if self.local and root(name) in self.local:  # a part that was never set, not that of a shared variable
+            return None
         if self.beside and root(name) in self.beside:
             return syntax.Unclear(name)
         if self.watched and root(name) in self.watched and name not in self.written:

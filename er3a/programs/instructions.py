@@ -320,11 +320,13 @@ class MovesBeside:
     Attributes
     ----------
     kind : ``entered`` where an interrupt's own way begins, with the arm anywhere
+    sets : what motions depend on and it sets, if it moves nothing itself
     """
 
     routine: str
     kind: Literal["thread", "interrupt", "entered"]
     text: str
+    sets: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

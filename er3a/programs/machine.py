@@ -311,7 +311,8 @@ def _moves(program: syntax.Program, operation: syntax.Operation, moving: set[str
         case syntax.Call(routine=routine) if routine in moving:
             return True
         case syntax.Beside():
-            return _is_strange(program, operation, dialect) or _moves_beside(program, operation, moving, dialect)
+            strange = _is_strange(program, operation, dialect) or bool(_given_back(program, operation.what))
+            return strange or _moves_beside(program, operation, moving, dialect)
         case syntax.Assign(value=value) if value is not None:
             name = _full_name(operation.target)
             given = value.value if isinstance(value, syntax.Constant) else syntax.Unclear("")
@@ -899,7 +900,8 @@ class Machine:
             memory.write(name + "%name", of or each.text.partition("=")[2].strip())
         if self.dialect.is_followed(name, value):
             return None
-        memory.doubts[self.dialect.doubted(name)] = each.text
+        if doubted := self.dialect.doubted(name):
+            memory.doubts[doubted] = each.text
         return instructions.Unknown(each.text, may_move=False)
 
     def _compare_frame(self, memory: ProgramMemory, each: syntax.Assign) -> None:
@@ -1002,13 +1004,16 @@ class Machine:
         """
         name = start.what.function
         routine = self.program.routines.get(name)
+        if changed := _given_back(self.program, start.what):  # which is changed at any time, also if it is local
+            way.memory.aliased |= changed
+            way.memory.kept.clear()
         if not _is_strange(self.program, start, self.dialect) and not _moves_beside(
             self.program, start, self.moving, self.dialect
         ):
             self._note(way, start.place, instructions.Aside(start.text))
             return
-        before = way.step
-        self._note(way, start.place, instructions.MovesBeside(name, start.kind, start.text))
+        before, sets = way.step, self._only_set(start)
+        self._note(way, start.place, instructions.MovesBeside(name, start.kind, start.text, sets))
         if routine is not None:
             other = way.fork(self.numbers, len(self.seen))
             other.step, other.beside = before, True
@@ -1027,8 +1032,17 @@ class Machine:
                     self._note(other, start.place, instructions.MovesBeside(name, "entered", start.text))
                 if not fits:
                     self._note(other, start.place, instructions.Unknown(start.text, may_move=False))
-        if start.kind == "thread":
+        way.memory.doubts.update((frame, start.text) for frame in self.dialect.frames if frame in sets)
+        if start.kind == "thread" and not sets:
             way.memory.here = Position()
+
+    def _only_set(self, start: syntax.Beside) -> tuple[str, ...]:
+        """What motions depend on and a routine beside the program sets; none if it may move the arm."""
+        name = start.what.function
+        if name in self.moving or name not in self.program.routines:
+            return ()
+        changed = _changed_in(self.program, _with_called(self.program, (name,)), self.dialect)
+        return tuple(sorted(changed & self.dialect.modal))
 
     def _changed_later(self, way: ExecutionPath) -> frozenset[str]:
         """Names of the variables, of those that have names in motions, that a way may still change."""
@@ -1064,6 +1078,9 @@ class Machine:
                 self.changed_at.setdefault(target_name(target), frame.calls[-1])
             if name in aliased:
                 memory.forget(target_name(target))
+            elif _is_whole_list(target):
+                for key, part in _parts(frame.local, name):
+                    memory.write(target_name(target) + key, part)
             else:
                 memory.assign(target, known(frame.local.get(name), name))
         handled = self.unsettled[frame.routine.name]
@@ -1109,6 +1126,12 @@ def _locals(
     given = _given(routine, call)
     values = {parameter.name: memory.value(each) for parameter, each in reversed(given)}
     local: dict[str, syntax.Value] = {"%inside": True}
+    for parameter, each in given:
+        if _is_whole_list(each):
+            named = {**memory.shared, **memory.local}
+            for key, value in _parts(named, target_name(each)):
+                local[parameter.name + key] = memory.read(target_name(each) + key) or value
+            values[parameter.name] = local.get(parameter.name, syntax.Unset(parameter.name))
     for parameter in routine.parameters:
         if parameter.name in values:
             local[parameter.name] = values[parameter.name]
@@ -1119,6 +1142,16 @@ def _locals(
     places = sum(not each.named for each in routine.parameters)
     wanted = sum(each is not None for each in call.arguments) + len(call.keywords)
     return local, len(call.arguments) <= places and len(given) == wanted
+
+
+def _is_whole_list(given: syntax.Expression) -> bool:
+    """Whether an argument is a list with all its elements: KRL's ``A[]``."""
+    return isinstance(given, syntax.Element) and not given.indices and isinstance(given.of, syntax.Variable)
+
+
+def _parts(values: Mapping[str, syntax.Value], name: str) -> list[tuple[str, syntax.Value]]:
+    """What a list has under its name and those of its elements, by what follows its name."""
+    return [(key[len(name) :], value) for key, value in values.items() if root(key) == name]
 
 
 def _labels(routine: syntax.Routine) -> frozenset[int]:

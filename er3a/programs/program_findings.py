@@ -20,6 +20,15 @@ class NameTwice(Finding, code="program_name_twice"):
     place: Place
 
 
+class ModuleTwice(Finding, code="program_module_twice"):
+    """A module, or the controller's data, of which there is another one that differs, at ``place``; ``taken``: the one
+    that was read."""
+
+    name: str
+    taken: str
+    place: Place
+
+
 class NotUnderstood(Finding, code="program_not_understood"):
     """A piece of text that is kept, but not understood."""
 
@@ -60,6 +69,7 @@ class NothingMoves(Finding, code="program_nothing_moves"):
 ProgramFinding = (
     DataFileMissing
     | NameTwice
+    | ModuleTwice
     | NotUnderstood
     | NotSimulated
     | FormInferred

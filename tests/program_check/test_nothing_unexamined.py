@@ -243,7 +243,7 @@ def test_what_an_interrupt_sets_is_followed_on_both_sides(tmp_path):
 def test_an_interrupt_that_sets_a_frame_is_named_and_leaves_the_programs_own_frames(tmp_path):
     body = f"{FRAMES}INTERRUPT DECL 4 WHEN $IN[1] DO shift( )\nPTP {axes(NEAR)}\nLIN_REL {{Z 5}}"
     found = check(tmp_path, krl(body, "DEF shift( )\n$BASE={X 0,Y 0,Z 10,A 0,B 0,C 0}\nEND\n"), "a.src")
-    assert codes(found) == {"moves_beside": [4], "speed_not_given": [5, 6]}
+    assert codes(found) == {"moves_beside": [4], "speed_not_given": [5, 6], "frames_in_doubt": [6]}
     assert found.level == "caution"
 
 
@@ -612,6 +612,12 @@ ZERO = "{X 0,Y 0,Z 0,A 0,B 0,C 0}"
         (f"$CORR_T={ZERO}", [6]),
         ("$TCP_IPO=FALSE", [6]),
         ("$TCP_IPO=FALSE\n$TCP_IPO=TRUE", []),
+        ("$FILTER=4", []),
+        ("$LOAD_A3={M 8.0}", []),
+        ("$ACT_EX_AX=-1", []),
+        ("$ACT_EX_AX=2", [6]),
+        ("$JOINT_OFFSET[1]=0", []),
+        ("$JOINT_OFFSET[1]=5", [6]),
         (f"{LINE}\nFOR I=1 TO 2\n{LINE}\nelsewhere()\nENDFOR\nBAS(#TOOL,0)\nBAS(#BASE,0)", [6]),
     ],
 )
@@ -880,6 +886,23 @@ def test_the_way_back_to_where_an_interrupt_came_is_a_way_that_is_not_known(tmp_
     assert "moves_beside" in codes(found)
 
 
+@pytest.mark.parametrize("start", ["INTERRUPT DECL 5 WHEN $IN[1] DO", "TRIGGER WHEN DISTANCE=0 DELAY=0 DO"])
+@pytest.mark.parametrize(
+    ("sets", "names", "doubted"),
+    [
+        ("$BASE={X 0,Y 50,Z 0,A 0,B 0,C 0}", "$BASE", [5]),
+        ("$TOOL=$NULLFRAME\n$VEL.CP=1.9", "$TOOL, $VEL", [5]),
+        ("$VEL.CP=1.9", "$VEL", []),
+    ],
+)
+def test_a_routine_that_only_sets_what_motions_use_is_named_with_that(tmp_path, start, sets, names, doubted):
+    found = check(tmp_path, krl(f"{AT_START}{start} hit( )\n{LINE}", f"DEF hit( )\n{sets}\nEND\n"), "a.src")
+    (beside,) = (each for each in found.findings if each.finding.code == "moves_beside")
+    assert (beside.finding.kind, beside.finding.names, beside.level) == ("sets", names, "caution")
+    lines = [each.place.line for each in found.findings if each.finding.code == "frames_in_doubt"]
+    assert lines == [beside.place.line + 1] * bool(doubted)
+
+
 # One variable under two names
 
 
@@ -913,6 +936,66 @@ def test_an_element_given_by_reference_is_the_one_that_was_meant_at_the_call(tmp
     more = "DEF sub(P:OUT)\nREAL P\nI=2\nP=40\nEND\n"
     (found,) = motions(tmp_path, krl("sub(V[I])\nPTP {A1 V[1],A2 -10,A3 V[2],A4 0,A5 -70,A6 0}", more), "a.src")
     np.testing.assert_allclose(np.degrees(found.target.joints), [40, -10, -10, 0, -70, 0])
+
+
+OF_LISTS = (
+    "DEF put(Q[]:OUT,N:IN)\nREAL Q[]\nINT N\nQ[N]=44\nEND\n"
+    "DEF both(Q[])\nREAL Q[],R[3]\nput(Q[],2)\nQ[2]=Q[2]+1\nR[2]=70\nEND\n"
+    "DEFFCT REAL total(W[]:OUT,N:IN)\nREAL W[]\nINT N,K\nREAL S\nS=0\n"
+    "FOR K=1 TO N\nS=S+W[K]\nENDFOR\nRETURN(S)\nENDFCT\n"
+    "DEF twice(Q[])\nREAL Q[]\nQ[2]=44\nPTP {A1 A[2],A2 A[1]}\nEND\n"
+)
+
+
+@pytest.mark.parametrize("local", [True, False])
+@pytest.mark.parametrize(
+    ("body", "angles"),
+    [
+        ("put(A[],2)\nPTP {A1 A[2],A2 A[1]}", (44, -7)),
+        ("put(A[],1)\nPTP {A1 A[2],A2 B[2]}", (5, -30)),
+        ("PTP {A1 total(A[],2),A2 A[1]}", (-2, -7)),
+        ("both(A[])\nPTP {A1 A[2],A2 A[1]}", (45, -7)),
+    ],
+)
+def test_a_list_that_a_routine_gets_keeps_its_elements_but_for_those_that_are_set(tmp_path, local, body, angles):
+    (tmp_path / "a.dat").write_text("DEFDAT a\nDECL REAL A[3]\nDECL REAL B[3]\nENDDAT\n")
+    body = f"{'REAL A[3],B[3]' * local}\nA[1]=-7\nA[2]=5\nB[2]=-30\n{body}"
+    (found,) = motions(tmp_path, krl(body, OF_LISTS), "a.src")
+    np.testing.assert_allclose(np.degrees(found.target.joints[:2]), angles, atol=1e-6)
+
+
+def test_a_list_with_two_names_that_is_changed_by_one_of_them_has_no_known_elements(tmp_path):
+    (tmp_path / "a.dat").write_text("DEFDAT a\nDECL REAL A[3]\nA[1]=-7\nA[2]=5\nENDDAT\n")
+    (found,) = motions(tmp_path, krl("twice(A[])", OF_LISTS), "a.src")
+    assert isinstance(found.target, UnresolvedTarget)
+
+
+def test_a_list_given_to_a_routine_that_is_not_known_has_no_known_elements(tmp_path):
+    body = "REAL A[3]\nA[2]=5\nput(A[])\nPTP {A1 A[2]}"
+    found = motions(tmp_path, krl(body, 'DEF put(Q[])\nREAL Q[]\nSREAD(S[],ST,OFS,"%f",Q[2])\nEND\n'), "a.src")
+    assert isinstance(found[0].target, UnresolvedTarget)
+
+
+def test_an_element_that_a_routines_own_list_never_got_is_not_that_of_the_data(tmp_path):
+    (tmp_path / "a.dat").write_text("DEFDAT a\nDECL REAL A[3]\nA[2]=5\nENDDAT\n")
+    (found,) = motions(tmp_path, krl("sub( )", "DEF sub( )\nREAL A[3]\nPTP {A1 A[2]}\nEND\n"), "a.src")
+    assert isinstance(found.target, UnresolvedTarget)
+
+
+@pytest.mark.parametrize(
+    "start",
+    ["INTERRUPT DECL 4 WHEN $IN[1]==TRUE DO put(%s)", "TRIGGER WHEN DISTANCE=1 DELAY=0 DO put(%s)", "setup(%s)"],
+)
+@pytest.mark.parametrize(("given", "element"), [("I", ""), ("A[2]", ""), ("A[]", "[2]")])
+@pytest.mark.parametrize("used", ["I", "A[2]", "J"])
+def test_what_an_interrupt_gets_by_reference_has_no_value_also_if_it_is_local(tmp_path, start, given, element, used):
+    """Also where a routine starts the interrupt with what it got by reference itself."""
+    head = f"Q{'[]' * bool(element)}"
+    more = f"DEF put({head}:OUT)\nREAL {head}\nQ{element}=44\nEND\n"
+    more += f"DEF setup({head}:OUT)\nREAL {head}\nINTERRUPT DECL 4 WHEN $IN[1] DO put({head})\nWAIT SEC 1\nEND\n"
+    body = f"REAL I,J,A[3]\nI=5\nJ=5\nA[2]=5\n{start % given}\nPTP {axes(HOME)}\nPTP {{A1 {used}}}"
+    found = motions(tmp_path, krl(body, more), "a.src")
+    assert isinstance(found[-1].target, UnresolvedTarget) == (given[0] == used[0])
 
 
 @pytest.mark.parametrize("kind", ["INOUT", "VAR", "PERS"])
@@ -1520,3 +1603,41 @@ def test_a_part_of_data_that_only_the_cell_knows_is_named(tmp_path, line, code):
     assert [each.finding.code for each in found.findings if each.level != "note" and each.finding.code == code] == [
         code
     ]
+
+
+SHIPPED = (
+    "DEFDAT $CONFIG\nINT $EDIT_MODE=1\nINT $ACT_GROUP='B0001'\nSTRUC RECIPE REAL HEIGHT,FRAME OFFSET\n"
+    "DECL RECIPE $RECIPE={HEIGHT 5.0}\nDECL LOAD LOAD_A1_DATA={M -1.0,CM {X 0.0,Y 0.0,Z 0.0,A 0.0,B 0.0,C 0.0}}\n"
+    "DECL INT COMPL_GROUP='B1111'\nDECL FRAME TOOL_DATA[16]\nDECL FRAME BASE_DATA[32]\n"
+    "TOOL_DATA[2]={X 0,Y 0,Z 50,A 0,B 0,C 0}\nBASE_DATA[3]={X 50,Y 0,Z 0,A 0,B 0,C 0}\nENDDAT\n"
+)
+BASICS = (
+    "DEF BAS(WHAT:IN,NUMBER:IN)\nDECL BAS_COMMAND WHAT\nREAL NUMBER\nINT N\nN=NUMBER\nSWITCH WHAT\nCASE #INITMOV\n"
+    "$FILTER=$DEF_FLT_PTP\n$LOAD_A1.M=0\n$LOAD_A1.CM={X 0.0,Y 0.0,Z 0.0,A 0.0,B 0.0,C 0.0}\n$LOAD_A2.M=LOAD_A1_DATA.M\n"
+    "$LOAD_A2.CM=LOAD_A1_DATA.CM\n$LOAD_A3.M=$DEF_LA3_M\n$LOAD_A3.J=$DEF_LA3_J\n$ACT_GROUP=COMPL_GROUP\n"
+    "CASE #TOOL\nT(N)\nCASE #BASE\nB(N)\nENDSWITCH\nEND\n"
+    "DEF T(N:IN)\nINT N\nIF N<=0 THEN\n$TOOL=$NULLFRAME\nELSE\nIF TOOL_CORR_ON THEN\n$TOOL=TOOL_DATA[N]:TOOL_CORR\n"
+    "ELSE\n$TOOL=TOOL_DATA[N]\nENDIF\nENDIF\nIF $ADAP_ACC<>#NONE THEN\n$LOAD.M=-1\nENDIF\n$ACT_TOOL=N\nEND\n"
+    "DEF B(N:IN)\nINT N\n$BASE=BASE_DATA[N]\n$JERK=1\n$JERK=1\n$JERK=1\n$ACT_BASE=N\n$ACT_EX_AX=-1\nEND\n"
+    "GLOBAL DEFFCT FRAME STOOL2(F:IN)\nDECL FDAT F\n$ACT_TOOL=F.TOOL_NO\n$ACT_BASE=F.BASE_NO\n"
+    "RETURN TOOL_DATA[F.TOOL_NO]\nENDFCT\n"
+)
+
+
+def test_what_a_controllers_own_modules_and_data_set_is_no_doubt_about_tool_and_base(tmp_path):
+    """As an archive has it whose programs are as they should be."""
+    (tmp_path / "$config.dat").write_text(SHIPPED)
+    (tmp_path / "bas.src").write_text(BASICS)
+    body = f"BAS(#INITMOV,0)\nTOOL_CORR_ON=FALSE\nBAS(#TOOL,2)\nBAS(#BASE,3)\n$RECIPE.HEIGHT=7\nPTP {axes(NEAR)}"
+    found = check(tmp_path, krl(f"{body}\n{LINE}\nPTP {{A1 $RECIPE.HEIGHT}}"), "a.src")
+    assert not {"program_not_understood", "frames_in_doubt", "may_move", "target_not_given"} & codes(found).keys()
+    line = motions(tmp_path, krl(f"{body}\n{LINE}"), "a.src")[-1]
+    assert (line.tool.pose[2, 3], line.base.pose[0, 3]) == (0.05, 0.05)
+
+
+@pytest.mark.parametrize("line", ["$ACT_TOOL=2", "$LOAD_A1.M=5", "$LOAD_A3=LOAD_A3_DATA", "$FILTER=16", "$CORR_T.X=5"])
+def test_what_else_such_variables_are_set_to_is_named(tmp_path, line):
+    (tmp_path / "$config.dat").write_text(SHIPPED)
+    found = codes(check(tmp_path, krl(f"{FRAMES}{line}\nPTP {axes(NEAR)}\n{LINE}"), "a.src"))
+    assert found["program_not_understood"] == [4]
+    assert ("frames_in_doubt" in found) == (line.startswith(("$ACT", "$CORR")))

@@ -197,6 +197,10 @@ SHARED = {
     "$config.dat": "DEFDAT $CONFIG\nDECL GLOBAL REAL GZ=5.0\nENDDAT\n",
     "other.src": "DEF other( )\nGZ=9.0\nEND\n",
 }
+PICKS = {
+    "lib1.src": "DEF lib1( )\nEND\nGLOBAL DEF PICK( )\nPTP {A1 5}\nEND\n",
+    "lib2.src": "DEF lib2( )\nEND\nGLOBAL DEF PICK( )\nPTP {A1 9}\nEND\n",
+}
 LIFTED = transform(np.array([0.0, 0.0, 0.1]), np.zeros(3))
 MENDED = {
     "target_out_of_reach": (krl(f"PTP {{X 3000,Y 0,Z 400,{DOWN}}}"), krl(f"PTP {{X 400,Y 0,Z 400,{DOWN}}}")),
@@ -308,6 +312,10 @@ MENDED = {
     "program_name_twice": (
         krl("b( )", more="DEF b( )\nPTP {A1 5}\nEND\nDEF b( )\nPTP {A1 9}\nEND\n"),
         krl("b( )", more="DEF b( )\nPTP {A1 9}\nEND\n"),
+    ),
+    "program_module_twice": (
+        (krl("PICK( )"), {"files": PICKS}),
+        (krl("PICK( )"), {"files": PICKS | {"lib2.src": "DEF lib2( )\nEND\n"}}),
     ),
     "speed_not_given": ("DEF a( )\nPTP {A1 5}\nEND\n", krl("PTP {A1 5}")),
     "acceleration_not_known": (krl("BAS(#ACC_PTP,$ANIN[1])", "PTP {A1 5}"), krl("BAS(#ACC_PTP,50)", "PTP {A1 5}")),

@@ -494,6 +494,79 @@ def test_what_a_submit_program_sets_has_no_known_value(tmp_path):
     assert joints(tmp_path, "PTP {A1 UNUSED}") == [1.0]  # its own variable of that name is another
 
 
+SETTERS = {
+    "assigned": "GZ=30.0",
+    "by the controller's function": 'RET=EKI_GETREAL("X","Y",GZ)',
+    "read": 'SREAD(S[],STATE,OFFSET,"%f",GZ)',
+    "given to a routine that sets it": "SETIT(GZ)",
+    "given on to one that does": "GIVEON(GZ)",
+    "given to another module's routine": "SETZ(GZ)",
+    "cyclically": "ANIN ON GZ=1.0*$ANIN[1]",
+    "counted": "FOR GZ=1 TO 3\nENDFOR",
+    "when interrupted": "INTERRUPT DECL 4 WHEN $IN[1] DO GZ=4",
+    "by an interrupt's routine": "INTERRUPT DECL 4 WHEN $IN[1] DO SETIT(GZ)",
+    "by what is not understood": "SETALL TO GZ",
+}
+KEEPERS = ("OTHER=GZ", "LOOKAT(GZ)", "LOOKZ(GZ)", 'EKI_SETREAL("X","Y",GZ)', "IF GZ==1 THEN\nENDIF")
+OWN_ROUTINES = (
+    "DEF SETIT(P:OUT)\nREAL P\nP=90\nEND\nDEF GIVEON(P:OUT)\nREAL P\nSETIT(P)\nEND\n"
+    "DEF LOOKAT(P:OUT)\nREAL P,Q\nQ=P\nEND\n"
+)
+LIBRARY = "DEF LIB( )\nEND\nGLOBAL DEF SETZ(P)\nREAL P\nP=90\nEND\nGLOBAL DEF LOOKZ(P:IN)\nREAL P\nP=90\nEND\n"
+
+
+@pytest.mark.parametrize("line", [*SETTERS.values(), *KEEPERS])
+@pytest.mark.parametrize(
+    "place", ["Program/sub/other.sub", "System/other.sub", "Program/other.sub", "Program/x/a.sub", "TP/other.src"]
+)
+def test_whatever_another_program_of_the_archive_may_set_has_no_known_value_or_is_told(tmp_path, line, place):
+    """A submit program may lie anywhere, and under any name."""
+    files = {
+        "System/$config.dat": CONFIG,
+        "Program/lib.src": LIBRARY,
+        place: f"DEF other( )\n  {line}\nEND\n{OWN_ROUTINES}",
+    }
+    for name, text in files.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    (tmp_path / "Program/x").mkdir(exist_ok=True)
+    found = codes(check(tmp_path / "Program/x", krl("PTP {A1 GZ}"), "a.src"))
+    code = "target_not_given" if place.endswith("sub") else "set_elsewhere"
+    assert (code in found) == (line in SETTERS.values())
+
+
+@pytest.mark.parametrize("called", [True, False])
+def test_what_bas_does_to_the_homes_of_a_new_controller_is_left_out(tmp_path, called):
+    """It asks for the kind of the arm; each submit program calls it."""
+    home = "DEFDAT $CONFIG\nDECL AXIS XHOME={A1 5,A2 -10,A3 -10,A4 0,A5 -70,A6 0}\nENDDAT\n"
+    basics = (
+        "DEF BAS(WHAT:IN,N:IN)\nEND\nGLOBAL DEF BASISTECH_PLC_INIT( )\nHOMES( )\nEND\nDEF HOMES( )\nXHOME=$H_POS\nEND\n"
+    )
+    submit = "DEF SPS( )\nBASISTECH_PLC_INIT( )\nEND\n"
+    for name, text in (("System/$config.dat", home), ("System/bas.src", basics), ("System/sps.sub", submit)):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    (tmp_path / "Program").mkdir()
+    found = codes(check(tmp_path / "Program", krl(f"{'BAS(#INITMOV,0)' * called}\nPTP XHOME"), "a.src"))
+    assert not {"set_elsewhere", "target_not_given"} & found.keys()
+
+
+@pytest.mark.parametrize("called", [True, False])
+def test_a_routine_that_the_program_does_not_call_may_set_a_variable_too(tmp_path, called):
+    (tmp_path / "$config.dat").write_text(CONFIG)
+    (tmp_path / "lib.src").write_text("DEF lib( )\nEND\nGLOBAL DEF PRESET( )\nGZ=30.0\nEND\n")
+    body = "lib( )\nGZ=5\nPRESET( )\nPTP {A1 GZ}" if called else "lib( )\nPTP {A1 GZ}"
+    assert ("set_elsewhere" in codes(check(tmp_path, krl(body), "a.src"))) != called
+
+
+@pytest.mark.parametrize("line", ["$OUT[7]=$IN[3]", "PULSE($OUT[7],TRUE,0.5)", "USERPLC( )"])
+def test_what_a_submit_program_makes_of_outputs_is_not_known(tmp_path, line):
+    (tmp_path / "sps.sub").write_text(f"DEF SPS( )\nLOOP\n{line}\nENDLOOP\nEND\n")
+    (tmp_path / "userplc.src").write_text("DEF USERPLC( )\n$OUT[7]=$IN[3]\nEND\n")
+    body = "$OUT[7]=FALSE\nWAIT SEC 1\nIF $OUT[7] THEN\nPTP {A1 40}\nENDIF"
+    assert joints(tmp_path, body) == [40.0]
+
+
 @pytest.mark.parametrize(
     ("body", "told"),
     [("PTP {A1 GZ}", True), ("GZ=9\nPTP {A1 GZ}", False), ("PTP {A1 5}", False), ("$OUT[1]=GZ>1\nPTP {A1 5}", False)],

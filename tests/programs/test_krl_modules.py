@@ -9,6 +9,7 @@ import pytest
 
 from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
+from er3a.pipeline.program_reports import checked_file, json_of, lines_of, sarif_of
 from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.programs.instructions import ArmMotion
 from er3a.programs.languages import files_of, read_program
@@ -107,3 +108,100 @@ def test_a_name_that_two_data_files_declare_for_all_is_told(cell):
         cell.with_name(f"p{number}.dat").write_text(text)
     found = read_program(cell).findings
     assert [(each.code, each.name) for each in found] == [("program_name_twice", "SPREAD")]
+
+
+def archive(folder: Path, files: dict[str, str]) -> None:
+    """Files of a controller's archive, in which ``Program/a.src`` is checked."""
+    for name in ("Program/a.src", "TP/x"):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+    for name, text in files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(text.encode("latin-1"))
+
+
+UP = "GLOBAL DEF GOUP(A:IN)\nREAL A\nPTP {A1 A}\nEND\nGLOBAL DEFFCT REAL HALF(A:IN)\nREAL A\nRETURN A/2\nENDFCT\n"
+
+
+@pytest.mark.parametrize("place", ["Program/mylib.src", "Program/lib/mylib.src", "TP/x/mylib.src"])
+def test_global_routines_are_known_in_all_modules_whatever_theirs_is_called(tmp_path, place):
+    archive(tmp_path, {place: f"DEF mylib( )\nEND\n{UP}DEF hidden( )\nPTP {{A1 70}}\nEND\n"})
+    text = "DEF a( )\nGOUP(20.0)\nPTP {A1 HALF(30)}\nown( )\nhidden( )\nEND\nDEF own( )\nPTP {A1 7}\nEND\n"
+    found = motions(tmp_path / "Program", text, "a.src")
+    np.testing.assert_allclose([np.degrees(each.target.joints[0]) for each in found], [20, 15, 7])
+    program = read_program(tmp_path / "Program/a.src")
+    check = check_program(program, load_robot("er3a_c60"), CheckOptions(start=np.zeros(6), measures=False))
+    assert [each.place.line for each in check.findings if each.finding.code == "may_move"] == [5]
+    assert not [each.code for each in program.findings]
+
+
+def test_a_global_routine_gives_way_to_one_of_the_modules_own(tmp_path):
+    archive(tmp_path, {"Program/mylib.src": f"DEF mylib( )\nEND\n{UP}"})
+    text = "DEF a( )\nGOUP(20.0)\nEND\nDEF GOUP(A:IN)\nREAL A\nPTP {A1 -5}\nEND\n"
+    (found,) = motions(tmp_path / "Program", text, "a.src")
+    np.testing.assert_allclose(np.degrees(found.target.joints[0]), -5)
+
+
+@pytest.mark.parametrize(
+    ("files", "told"),
+    [
+        ({"Program/a/pick.src": "PTP {A1 20}", "Program/b/pick.src": "PTP {A1 60}"}, ["PICK", "Program/a/pick.src"]),
+        ({"Program/a/pick.src": "PTP {A1 20}", "Program/b/pick.src": "PTP {A1 20} ;copy"}, []),
+        ({"Program/pick.src": "PTP {A1 20}", "Program/old/pick.src": "PTP {A1 60}"}, ["PICK", "Program/pick.src"]),
+        ({"Program/a/pick.src": "PTP {A1 20}", "Program/b/other.src": "PTP {A1 60}"}, []),
+    ],
+)
+def test_a_second_module_of_one_name_is_told(tmp_path, files, told):
+    """A controller refuses two modules of one name, and which of them it has is not known."""
+    archive(tmp_path, {name: f"DEF PICK( )\n{text}\nEND\n" for name, text in files.items()})
+    (found,) = motions(tmp_path / "Program", "DEF a( )\nPICK( )\nEND\n", "a.src")
+    np.testing.assert_allclose(np.degrees(found.target.joints[0]), 20)
+    said = read_program(tmp_path / "Program/a.src").findings
+    assert [part for each in said for part in (each.name, each.taken)] == told
+    assert [each.code for each in said] == ["program_module_twice"] * (len(told) // 2)
+
+
+def test_points_that_differ_make_a_module_another_one(tmp_path):
+    files = {f"Program/{each}/pick.src": "DEF PICK( )\nPTP XP\nEND\n" for each in "ab"}
+    for each, angle in (("a", 20), ("b", 60)):
+        files[f"Program/{each}/pick.dat"] = f"DEFDAT PICK\nDECL AXIS XP={{A1 {angle}}}\nENDDAT\n"
+    archive(tmp_path, files | {"Program/a.src": "DEF a( )\nPICK( )\nEND\n"})
+    assert [each.code for each in read_program(tmp_path / "Program/a.src").findings] == ["program_module_twice"]
+
+
+@pytest.mark.parametrize("folder", ["System", "SYSTEM"])
+@pytest.mark.parametrize("same", [True, False])
+def test_the_archives_own_data_come_before_a_copy_beside_the_program(tmp_path, folder, same):
+    config = "DEFDAT $CONFIG\nE6AXIS XHOME={A1 1,A2 -10,A3 10,A4 0,A5 -60,A6 0}\nENDDAT\n"
+    copy = config if same else config.replace("A1 1", "A1 5")
+    archive(tmp_path, {f"{folder}/$config.dat": config, "Program/$config.dat": copy})
+    (found,) = motions(tmp_path / "Program", "DEF a( )\nPTP XHOME\nEND\n", "a.src")
+    np.testing.assert_allclose(np.degrees(found.target.joints[0]), 1)
+    said = read_program(tmp_path / "Program/a.src").findings
+    assert [each.code for each in said] == ["program_module_twice"] * (not same)
+    (tmp_path / f"{folder}/$config.dat").unlink()
+    (found,) = motions(tmp_path / "Program", "DEF a( )\nPTP XHOME\nEND\n", "a.src")
+    np.testing.assert_allclose(np.degrees(found.target.joints[0]), 1 if same else 5)
+
+
+@pytest.mark.parametrize("called", [True, False])
+def test_a_module_that_is_no_text_is_named_and_the_program_is_read(tmp_path, called):
+    archive(tmp_path, {"Program/bin.src": "\x01\x02", "Program/bin.dat": "\x01", "System/x.sub": "\x01\x02"})
+    text = f"DEF a( )\nPTP {{A1 5}}\n{'BIN( )' * called}\nEND\n"
+    assert motions(tmp_path / "Program", text, "a.src")
+    program = read_program(tmp_path / "Program/a.src")
+    assert {(each.code, each.place.file.name) for each in program.findings} == {
+        ("program_not_understood", "bin.src"),
+        ("program_not_understood", "x.sub"),
+    }
+    check = check_program(program, load_robot("er3a_c60"), CheckOptions(start=np.zeros(6), measures=False))
+    assert ("may_move" in {each.finding.code for each in check.findings}) == called
+
+
+def test_what_is_wrong_in_a_called_module_is_told_at_that_module(cell):
+    deeper = cell.with_name("deeper.src")
+    deeper.write_text('DEF DEEPER( )\nMsg("a\nEND\n')
+    checked = checked_file(cell, load_robot("er3a_c60"), CheckOptions(measures=False))
+    assert lines_of(checked)[0].startswith(f"{deeper}:2: error: a text has no end")
+    (result,) = sarif_of([checked])["runs"][0]["results"]
+    assert result["locations"][0]["physicalLocation"]["artifactLocation"]["uri"].endswith("deeper.src")
+    assert json_of([checked])[0]["error"]["file"].endswith("deeper.src")

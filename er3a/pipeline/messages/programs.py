@@ -109,6 +109,7 @@ REMEDIES: dict[str, str] = {
     "loop_comes_back_otherwise": N_("Turn the tool back within the loop, so that each round ends as it began."),
     "program_data_file_missing": N_("Put the data file beside the program."),
     "program_name_twice": N_("Remove one of the two definitions."),
+    "program_module_twice": N_("Remove the one that the controller does not have."),
     "program_nothing_moves": N_("Check that this is the program to run."),
     "speed_not_given": N_("Give a speed, as a number above 0, before the motion."),
     "turn_speed_not_given": N_(
@@ -194,8 +195,7 @@ TEXTS = texts(
         ),
         "frame_taken_as_flange": "{name} is not given; the flange was taken for it",
         "frames_in_doubt": (
-            "checked with the tool, base and way that are known, but {text}, which is not understood, may have changed "
-            "them"
+            "checked with the tool, base and way that are known, but {text} may have changed them"
         ),
         "way_not_known": "the start of the motion is not known; only the target was checked",
         "more_than_full_speed": "asks for {percent:g} % of the joints' speed or acceleration",
@@ -228,6 +228,10 @@ TEXTS = texts(
             interrupt=(
                 "the interrupt {routine} can move the arm at any time; its motions were checked apart, from where it "
                 "is not known"
+            ),
+            sets=(
+                "{routine} runs beside the program from here on and can set {names}; the motions after it were checked "
+                "without that"
             ),
         ),
         "clear_of_assumed": (
@@ -400,6 +404,7 @@ TEXTS = texts(
         ),
         "program_data_file_missing": "{file} is missing, which holds the program's points",
         "program_name_twice": "{name} is declared twice; the later one counts",
+        "program_module_twice": "{name} is here too, and differs: {taken} was taken",
         "program_not_understood": "not understood: {text}",
         "program_not_simulated": "not simulated: {text}",
         "program_rows_from_rest": (

@@ -507,14 +507,14 @@ READ_BY_NUMBER = (
 )
 """What ``BAS`` and settings after WITH read without naming it."""
 HARMLESS_TEXT = """
-CAST_FROM CAST_TO CCLOSE CHECKHOME CIOCTL CLEAR_KRLMSG COPEN CREAD CWRITE DELETE_BACKWARD_BUFFER EB EB_ABS EK
-EKI_CHECK EKI_CHECKBUFFER EKI_CLEAR EKI_CLEARBUFFER EKI_CLOSE EKI_GETBOOL EKI_GETBOOLARRAY EKI_GETFRAME
-EKI_GETFRAMEARRAY EKI_GETINT EKI_GETINTARRAY EKI_GETREAL EKI_GETREALARRAY EKI_GETSTRING EKI_INIT EKI_LOCK
-EKI_OPEN EKI_SEND EKI_SETBOOL EKI_SETFRAME EKI_SETINT EKI_SETREAL EKI_SETSTRING EKI_UNLOCK EO ERR_CLEAR
-ERR_RAISE EXISTS_KRLDLG EXISTS_KRLMSG FORWARD GETVARSTATE GET_MSGBUFFER GET_SIG_INF GET_SYSTEM_DATA INVERSE
-IR_STOPM LK MSGDIALOG MSGINFO MSGLOG MSGNOTIFY MSGQUIT MSGSTATE P00 PULSE RESET_CD_PARAMS SET_CD_PARAMS
-SET_KRLDLG SET_KRLMSG SREAD STRADD STRCLEAR STRCOMP STRCOPY STRDECLLEN STRFIND STRLEN STRTOBOOL
-STRTOFRAME STRTOINT STRTOPOS STRTOREAL STRTOSTRING SWRITE USER_GRP VARSTATE VAR_STATE
+BASISTECH_PLC_INIT BASISTECH_PLC_LOOP CAST_FROM CAST_TO CCLOSE CHECKHOME CIOCTL CLEAR_KRLMSG COPEN CREAD CWRITE
+DELETE_BACKWARD_BUFFER EB EB_ABS EK EKI_CHECK EKI_CHECKBUFFER EKI_CLEAR EKI_CLEARBUFFER EKI_CLOSE EKI_GETBOOL
+EKI_GETBOOLARRAY EKI_GETFRAME EKI_GETFRAMEARRAY EKI_GETINT EKI_GETINTARRAY EKI_GETREAL EKI_GETREALARRAY EKI_GETSTRING
+EKI_INIT EKI_LOCK EKI_OPEN EKI_SEND EKI_SETBOOL EKI_SETFRAME EKI_SETINT EKI_SETREAL EKI_SETSTRING EKI_UNLOCK EO
+ERR_CLEAR ERR_RAISE EXISTS_KRLDLG EXISTS_KRLMSG FORWARD GETVARSTATE GET_MSGBUFFER GET_SIG_INF GET_SYSTEM_DATA INVERSE
+IR_STOPM LK MSGDIALOG MSGINFO MSGLOG MSGNOTIFY MSGQUIT MSGSTATE P00 PULSE RESET_CD_PARAMS SET_CD_PARAMS SET_KRLDLG
+SET_KRLMSG SREAD STRADD STRCLEAR STRCOMP STRCOPY STRDECLLEN STRFIND STRLEN STRTOBOOL STRTOFRAME STRTOINT STRTOPOS
+STRTOREAL STRTOSTRING SWRITE SYNC TQM_INI USER_GRP VARSTATE VAR_STATE
 """
 HARMLESS = frozenset(HARMLESS_TEXT.split())
 """Functions of the controller that move nothing and set no frame."""
@@ -533,15 +533,20 @@ SORI_TYPE SCIRC_TYP SCIRC_TYPE SCIRC_M USE_CM_PRO_VALUES USE_CM_PRO_VALUES_ONLY
 OF_SETTINGS = frozenset(OF_SETTINGS_TEXT.split())
 """Functions after WITH, which :func:`keep_setting` reads."""
 HARMLESS_VARIABLES_TEXT = """
-$ACCU_STATE $ACC_EXTAX $ADVANCE $ANOUT $AXWORKSPACE $BWDSTART $CMD $COLLMON_TOL_PRO $CP_STATMON $CP_VEL_TYPE
-$CYCFLAG $CYCLE $DATE $ECO_LEVEL $ERR $EXT $FLAG $GEAR_JERK $H_POS $I_O_ACT $JERK $LOOP_MSG $MSG_T $OUT $OUT_NODRIVE
-$OV_APPL $OV_PRO $OV_ROB $PERI_RDY $PRO_ACT $PRO_MODE $PRO_STATE $RED_VEL $SOFT_PLCBOOL $SOFT_PLCINT $SOFT_PLCREAL
-$STOPNOAPROX $TIMER $TIMER_FLAG $TIMER_STOP $TORQMON $TORQMON_COM $TORQMON_DEF $TRACE $VEL_EXTAX $WBOXDISABLE
-$WORKSPACE
+$ACCU_STATE $ACC_EXTAX $ACT_GROUP $ADVANCE $ANOUT $AXWORKSPACE $BWDSTART $CMD $COLLMON_TOL_PRO $CP_STATMON
+$CP_VEL_TYPE $CYCFLAG $CYCLE $DATE $ECO_LEVEL $EDIT_MODE $ERR $EXT $FLAG $GEAR_JERK $H_POS $I_O_ACT $JERK $LOOP_MSG
+$MSG_T $OUT $OUT_NODRIVE $OV_APPL $OV_PRO $OV_ROB $PERI_RDY $PRO_ACT $PRO_MODE $PRO_STATE $RED_VEL $SOFT_PLCBOOL
+$SOFT_PLCINT $SOFT_PLCREAL $STOPNOAPROX $TIMER $TIMER_FLAG $TIMER_STOP $TORQMON $TORQMON_COM $TORQMON_DEF $TRACE
+$VEL_EXTAX $WBOXDISABLE $WORKSPACE
 """
 HARMLESS_VARIABLES = frozenset((*MODAL, *HARMLESS_VARIABLES_TEXT.split()))
 """System variables that are followed, or set nothing but speeds, stops, watches, signals and marks; another may make
 axes soft, shift paths (``$CORR_T``, ``$TECH``) or choose other postures (``$SINGUL_POS``)."""
+LOADS_OF_ARM = ("$LOAD_A1", "$LOAD_A2", "$LOAD_A3")
+OF_DYNAMICS = (*LOADS_OF_ARM, "$FILTER")
+"""System variables that are not followed, and change neither tool nor base nor path: loads on the arm, ramps."""
+DEFAULTS = "$DEF_"
+"""How the machine data's own values begin, which the controller has unless a program sets others."""
 RUNNING = ("$CYCFLAG", "$DATE", "$OV_PRO", "$TIMER", "$TIMER_FLAG")
 """System variables that change after they are set: watches, expressions that are evaluated again and again."""
 ORIENTATION_TYPES = {"$ORI_TYPE": ("#VAR", "#CONSTANT"), "$CIRC_TYPE": ("#BASE",)}
@@ -576,14 +581,24 @@ class Settings(NamedTuple):
 
 
 def _set_alone(code: tuple[syntax.Operation, ...], number: str, frame: str) -> bool:
-    """Whether somewhere a number is set, and no frame right after it, nor the frame of that number right before."""
+    """Whether somewhere a number is set, and no frame right after it, nor the frame of that number before."""
     sets = [(variable_of(each.target), each.value) if isinstance(each, syntax.Assign) else ("", None) for each in code]
+    frames = [value for name, value in sets if name == frame]
     return any(
         name == number
         and frame not in (other for other, _ in sets[i : i + BESIDE + 1])
         and not any(other == frame and _of_number(value, given) for other, value in sets[max(i - BESIDE, 0) : i])
+        and not any(_takes(value, f"{frame[1:]}_DATA", given) for value in frames)
         for i, (name, given) in enumerate(sets)
     )
+
+
+def _takes(value: syntax.Expression | None, array: str, number: syntax.Expression | None) -> bool:
+    """Whether an expression has the element of an array that a number tells."""
+    match value:
+        case syntax.Element(of=syntax.Variable(name=name), indices=(index,)) if name == array and index == number:
+            return True
+    return any(_takes(each, array, number) for each in syntax.inner(value))
 
 
 def _of_number(frame: syntax.Expression | None, number: syntax.Expression | None) -> bool:
@@ -594,6 +609,21 @@ def _of_number(frame: syntax.Expression | None, number: syntax.Expression | None
         case syntax.Element(of=syntax.Variable(name="TOOL_DATA" | "BASE_DATA"), indices=(index,)), _:
             return index == number or (isinstance(index, syntax.Variable) and index.name in ("$ACT_TOOL", "$ACT_BASE"))
     return True
+
+
+def _is_declared(data: syntax.Assign) -> bool:
+    """Whether a variable like ``$RECIPE`` is declared in $config.dat: no system's, but the cell's own."""
+    file = data.place.file
+    return bool(data.type_name) and file is not None and file.name.startswith("$")
+
+
+def _as_delivered(name: str, value: syntax.Value) -> bool:
+    """Whether loads on the arm and ramps are those of the machine data, or a load is none; its mass decides that."""
+    if isinstance(value, syntax.Unclear):
+        return value.text.startswith(DEFAULTS)
+    mass = syntax.number(value.get("M") if isinstance(value, syntax.Record) else value)
+    of, _, part = name.partition(".")
+    return of in LOADS_OF_ARM and (part not in ("", "M") or (mass is not None and mass <= 0))
 
 
 class KrlDialect(Dialect):
@@ -609,11 +639,12 @@ class KrlDialect(Dialect):
         """Numbers of tool and base count as followed where the frame is set beside each."""
         changed = {variable_of(each.target) for each in program.operations() if isinstance(each, syntax.Assign)}
         self.modal = frozenset((*MODAL, *MODAL_DATA, *changed.intersection(READ_BY_NUMBER)))
+        self.declared = frozenset(variable_of(each.target) for each in program.data if _is_declared(each))
         self.numbers_only = {
             f"$ACT_{name}"
             for name in ("TOOL", "BASE")
             for routine in program.routines.values()
-            if _set_alone(routine.code, f"$ACT_{name}", f"${name}")
+            if routine.name not in OF_SETTINGS and _set_alone(routine.code, f"$ACT_{name}", f"${name}")
         }
 
     def is_signal(self, name: str) -> bool:
@@ -632,11 +663,18 @@ class KrlDialect(Dialect):
             return value == CONTROLLER[name]
         if name in ("$ACT_TOOL", "$ACT_BASE"):
             return name not in self.numbers_only
-        return not name.startswith("$") or root(name) in HARMLESS_VARIABLES
+        of, plain = root(name), syntax.number(value)
+        if of in OF_DYNAMICS:
+            return _as_delivered(name, value)
+        if of in ("$ACT_EX_AX", "$JOINT_OFFSET"):  # no external axis, no offset
+            return plain is not None and plain <= 0 and (plain == 0 or of == "$ACT_EX_AX")
+        return not name.startswith("$") or of in HARMLESS_VARIABLES or of in self.declared
 
     def doubted(self, name: str) -> str:
-        """A number of a frame: until that frame is set."""
-        return {"$ACT_TOOL": "$TOOL", "$ACT_BASE": "$BASE"}.get(name, name)
+        """A number of a frame: until that frame is set; empty for what changes no motion's frame or path."""
+        if root(name) in OF_DYNAMICS:
+            return ""
+        return {"$ACT_TOOL": "$TOOL", "$ACT_BASE": "$BASE", "$ACT_EX_AX": "$BASE"}.get(name, name)
 
     def frame_of(self, value: syntax.Value | None) -> Reals | None:
         """A frame's."""

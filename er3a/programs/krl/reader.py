@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Container, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,7 +16,6 @@ import numpy as np
 from er3a.errors import InputError
 from er3a.programs import syntax
 from er3a.programs.code_builder import (
-    ASSIGNED,
     CodeBuilder,
     fault,
     lacks_data,
@@ -28,10 +27,19 @@ from er3a.programs.code_builder import (
     within,
 )
 from er3a.programs.evaluation import STRUCTURE
-from er3a.programs.instructions import Aside, Place, Remark
-from er3a.programs.krl.dialect import HARMLESS, HERE, HERE_JOINTS, MODAL, changed_arguments, record_pose
+from er3a.programs.instructions import Aside, Place, Remark, Unknown
+from er3a.programs.krl.archive import CALL, GLOBAL_NAME, ControllerFiles, is_basics
+from er3a.programs.krl.dialect import (
+    HERE,
+    HERE_JOINTS,
+    MODAL,
+    MODAL_DATA,
+    READ_BY_NUMBER,
+    changed_arguments,
+    record_pose,
+)
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, data_file_of, read_program_text
-from er3a.programs.program_findings import DataFileMissing, NameTwice, NotSimulated, ProgramFinding
+from er3a.programs.program_findings import DataFileMissing, NameTwice, NotSimulated, NotUnderstood, ProgramFinding
 
 KRL = Lexicon(
     re.compile(
@@ -498,8 +506,8 @@ def _spline(reading: _Statement) -> None:
 
 
 GLOBAL_ROUTINE = re.compile(r"(?im)^\s*GLOBAL\s+DEF(?:FCT\s+\w+(?:\s*\[[^\]]*\])?)?\s+(\w+)")
-PUBLISHED = re.compile(r"(?is)^\s*(?:&[^\n]*\s)*DEFDAT\s+\S+\s+PUBLIC\b.*\bGLOBAL\b")
-GLOBAL_NAME = re.compile(r"(?i)\bGLOBAL\b")
+NAME = re.compile(r"[A-Za-z_$][\w$]*")
+SETTING = re.compile(r"\(|(?<![=<>])=(?!=)")
 
 
 def apart(
@@ -583,27 +591,27 @@ def read_krl(source: ProgramText) -> syntax.Program:
     InputError
         for texts and blocks without an end, and for a file that defines no routine
     """
-    reader = _KrlReader(source)
+    reader, files = _KrlReader(source), ControllerFiles(source.path)
     findings: list[ProgramFinding] = [*source.findings]
-    shared = shared_data_of(source.path)
-    if shared is not None:
-        reader.read_data(read_program_text(shared))
+    if files.config is not None:
+        reader.read_data(read_program_text(files.config))
     of_controller = dict(reader.signals)
-    findings += reader.read_published(source.path)
+    findings += reader.read_published(files.published)
     data_file = data_file_of(source.path, ".dat")
     if data_file is not None:
         findings += reader.read_data(read_program_text(data_file))
     routines = reader.read_routines()
-    findings += _robot_root(source.path)
-    beside, elsewhere = _changed_by_others(source.path, reader.data, of_controller)
+    findings += [*_robot_root(files.machine_data), *files.twice()]
+    others = _SetByOthers(files, _known_to_all(files, reader.data, data_file), of_controller)
     called: list[syntax.Routine] = []
     hidden = _seen_here_alone(source, routines, reader.data)
     reader.data = [each if each.place.file == data_file else _as(each, hidden) for each in reader.data]
-    for file in modules_of(source.path):
+    for file in files.modules:
         more_routines, more_data, more = _module(read_program_text(file), of_controller)
         called += [_with_names(each, hidden) for each in more_routines]
         reader.data += [_as(each, hidden) for each in more_data]
         findings += more
+    findings += [NotUnderstood(file.name, Place(file, 1)) for file in files.unread]
     if data_file is None and lacks_data(routines, reader.data, CONFIG_NAMES):
         findings.append(DataFileMissing(source.path.with_suffix(".dat").name))
     by_name, unlinked = linked([*called, *routines], changed_arguments)
@@ -616,9 +624,28 @@ def read_krl(source: ProgramText) -> syntax.Program:
         tuple(reader.data),
         (*findings, *unlinked),
         source.lines,
-        beside=beside,
-        elsewhere=elsewhere,
+        beside=others.beside(),
+        elsewhere=tuple(others.elsewhere(_uncalled([*called, *routines], routines[0].name)).items()),
     )
+
+
+def _uncalled(routines: Iterable[syntax.Routine], entry: str) -> Iterable[syntax.Routine]:
+    """Routines that the one named ``entry`` and what it calls or starts do not call."""
+    by_name = {each.name: each for each in routines}
+    waiting = [entry]
+    while waiting:
+        routine = by_name.pop(waiting.pop(), None)
+        if routine is not None:
+            waiting += [each.function for operation in routine.code for each in _invocations(operation)]
+    return by_name.values()
+
+
+def _known_to_all(files: ControllerFiles, data: Iterable[syntax.Assign], own: Path | None) -> frozenset[str]:
+    """Variables that all modules see, as those of $config.dat, of those that the program uses."""
+    texts = (files.text(each) for each in (files.path, *files.modules))
+    used = {name.upper() for text in texts for name in NAME.findall(text)} | {*READ_BY_NUMBER, *MODAL_DATA}
+    known = (variable_of(each.target) for each in data if each.place.file != own or GLOBAL_NAME.search(each.text))
+    return frozenset(used.intersection(known))
 
 
 Signals = Mapping[str, syntax.Expression]
@@ -657,10 +684,10 @@ class _KrlReader:
                 self.data.append(each)
         return found
 
-    def read_published(self, path: Path) -> list[ProgramFinding]:
+    def read_published(self, files: Iterable[Path]) -> list[ProgramFinding]:
         """What ``.dat`` files of modules that a program does not call declare for all modules."""
         known, found = {variable_of(each.target) for each in self.data}, list[ProgramFinding]()
-        for file in _published(path):
+        for file in files:
             other = _KrlReader(read_program_text(file))
             try:
                 other.read_data(other.source)
@@ -761,120 +788,124 @@ def split_comment(line: str, place: Place) -> tuple[str, str]:
     return (line.strip(), "") if at < 0 else (line[:at].strip(), line[at + 1 :].strip())
 
 
-def _changed_by_others(
-    path: Path, data: Iterable[syntax.Assign], of_controller: Signals
-) -> tuple[frozenset[str], tuple[tuple[str, Place], ...]]:
-    """Variables that all modules see, as those of $config.dat and outputs: which of them submit programs change, beside
-    the program; and which other modules set that it does not call, with where."""
-    own = data_file_of(path, ".dat")
-    shared = {variable_of(each.target) for each in data if each.place.file != own or GLOBAL_NAME.search(each.text)}
-    beside: set[str] = set()
-    elsewhere: dict[str, Place] = {}
-    for file in _submits(path):
-        beside.update(name for name, _ in _set_in(read_program_text(file), shared, of_controller))
-    for file in _others(path):
-        for name, place in _set_in(read_program_text(file), shared, of_controller):
-            if not name.startswith("$"):
-                elsewhere.setdefault(name, place)
-    return frozenset(beside - {*MODAL}), tuple(elsewhere.items())
+class _SetByOthers:
+    """What submit programs and modules that the program does not call may set of what all modules know: by an
+    assignment, or by handing it over by reference.
 
-
-def _set_in(source: ProgramText, shared: Container[str], of_controller: Signals) -> Iterable[tuple[str, Place]]:
-    """Variables of all modules, and the controller's, that a module sets, with where; all it may set if it can't be
-    read."""
-    found = ((ASSIGNED.match(line), number) for number, line in enumerate(source.lines, 1))
-    named = [(match[1].upper(), Place(source.path, number)) for match, number in found if match]
-    if not any(name in shared or name.startswith("$") or name in of_controller for name, _ in named):
-        return
-    try:
-        routines, _, _ = _module(source, of_controller)
-    except InputError:
-        yield from ((name, place) for name, place in named if name in shared or name.startswith("$"))
-        return
-    for routine in routines:
-        own = own_names(routine)
-        for operation in routine.code:
-            targets: tuple[syntax.Expression | None, ...] = ()
-            if isinstance(operation, syntax.Assign):
-                targets = (operation.target,)
-            elif isinstance(operation, syntax.Doing) and isinstance(operation.what, syntax.Invocation):
-                targets = changed_arguments(operation.what)
-            for target in targets:
-                name = "" if target is None else variable_of(target)
-                if name not in own and (name in shared or name.startswith("$")):
-                    yield name, operation.place
-
-
-CALL = re.compile(r"\b([A-Za-z]\w*)\s*\(")
-MAX_MODULES = 200
-OF_CONTROLLER = ("BAS", "USER_GRP", "IR_STOPM")
-"""The controller's own modules that set what motions use, or that people edit."""
-DEEPEST = 6  # folders of an archive
-OF_ARCHIVE = ("System", "Mada", "TP")  # folders beside Program, of which it has one
-
-
-def companions(path: Path) -> tuple[Path, ...]:
-    """What belongs to a .src file: the modules that it calls, the points of each, and the controller's own data and
-    submit programs; and other modules, where these may set what all know."""
-    modules = (*modules_of(path), *_submits(path), *_others(path))
-    data = (*(data_file_of(module, ".dat") for module in (path, *modules)), *_published(path))
-    return tuple(file for file in (*modules, *data, shared_data_of(path), _machine_data(path)) if file is not None)
-
-
-def modules_of(path: Path) -> tuple[Path, ...]:
-    """The modules that a .src file calls, and those that these call, in the order in which they are met.
-
-    They lie beside it, or anywhere in the controller's archive. Of the controller's own modules, of which it is known
-    that they move nothing, those are read that set what motions use, or that people edit.
+    Parameters
+    ----------
+    shared : the names that count, without outputs
+    of_controller : the signals that all modules know
     """
-    known: dict[str, Path] = {}
-    for each in _of_controller(path, ".src"):
-        name = each.stem.upper()
-        if each.parent == path.parent or name in OF_CONTROLLER or name not in HARMLESS:
-            known.setdefault(name, each)
-    known.pop(path.stem.upper(), None)
-    found: list[Path] = []
-    waiting = [path]
-    while known and waiting and len(found) < MAX_MODULES:
-        called = dict.fromkeys(name.upper() for name in CALL.findall(read_program_text(waiting.pop(0)).text))
-        new = [known.pop(name) for name in called if name in known]
-        found += new
-        waiting += new
-    return tuple(found)
+
+    def __init__(self, files: ControllerFiles, shared: frozenset[str], of_controller: Signals):
+        self.files, self.shared, self.of_controller = files, shared, of_controller
+        self.routines: dict[str, syntax.Routine] = {}
+        self.modules: dict[Path, tuple[syntax.Routine, ...] | None] = {}
+        self.changes: dict[str, dict[str, Place]] = {}
+
+    def beside(self) -> frozenset[str]:
+        """What submit programs set, with the routines that they call."""
+        found: set[str] = set()
+        seen: set[str] = set()
+        for file in self.files.submits:
+            found.update(self._named_in(file))
+            waiting = list(self._read(file) or ())
+            while waiting:
+                routine = waiting.pop()
+                if routine.name not in seen:
+                    seen.add(routine.name)
+                    found.update(self._set_by(routine))
+                    invoked = (each.function for op in routine.code for each in _invocations(op))
+                    waiting += [each for each in map(self._routine, invoked) if each is not None]
+        return frozenset(found - {*MODAL})
+
+    def elsewhere(self, uncalled: Iterable[syntax.Routine]) -> dict[str, Place]:
+        """What modules set that the program does not call, with where; also ``uncalled`` routines of those it calls."""
+        found: dict[str, Place] = {}
+        for routine in (each for each in uncalled if each.place.file is None or not is_basics(each.place.file)):
+            found |= {name: place for name, place in self._set_by(routine).items() if name in self.shared}
+        for file in self.files.others:
+            if self.shared & set(map(str.upper, NAME.findall(self.files.text(file)))):
+                for each in (self._named_in(file), *map(self._set_by, self._read(file) or ())):
+                    found |= {name: place for name, place in each.items() if name in self.shared and name not in found}
+        return found
+
+    def _set_by(self, routine: syntax.Routine) -> dict[str, Place]:
+        own = own_names(routine)
+        found = self._changed(routine).items()
+        return {name: at for name, at in found if name not in own and (name in self.shared or name.startswith("$"))}
+
+    def _changed(self, routine: syntax.Routine) -> dict[str, Place]:
+        """Variables and parameters that a routine may change, with where."""
+        if routine.name in self.changes:
+            return self.changes[routine.name]
+        found = self.changes[routine.name] = {each.name: routine.place for each in routine.parameters if each.out}
+        changed = {variable_of(target): op.place for op in reversed(routine.code) for target in self._targets(op)}
+        unread = [op for op in routine.code if isinstance(op, syntax.Fixed) and isinstance(op.instruction, Unknown)]
+        for op in unread:
+            if isinstance(op.instruction, Unknown) and op.instruction.may_move:
+                changed |= {name.upper(): op.place for name in NAME.findall(op.instruction.text)}
+        found.clear()  # of which all that it may give back counted while it was asked
+        found |= changed
+        return found
+
+    def _targets(self, operation: syntax.Operation) -> Iterable[syntax.Expression]:
+        if isinstance(operation, syntax.Assign) and operation.value is not None:
+            yield operation.target
+        for call in _invocations(operation):
+            routine = self._routine(call.function)
+            given = (syntax.Variable("$OUT"),) if call.function == "PULSE" else changed_arguments(call)
+            if routine is not None:
+                changed = self._changed(routine)
+                pairs = zip(routine.parameters, call.arguments)
+                given = tuple(each for parameter, each in pairs if parameter.out and parameter.name in changed)
+            yield from (each for each in given if each is not None)
+
+    def _routine(self, name: str) -> syntax.Routine | None:
+        """A routine by its name, as all modules see it or as its own does."""
+        for file in self.files.routines.get(name, ())[:1]:
+            self._read(file)
+        return self.routines.get(name)
+
+    def _read(self, file: Path) -> tuple[syntax.Routine, ...] | None:
+        """The routines of a module; None if it can't be read."""
+        if file not in self.modules:
+            source = self.files.source(file)
+            try:
+                read = None if source is None else _module(source, self.of_controller)
+            except InputError:
+                read = None
+            self.modules[file] = None if read is None else tuple(read[0])
+            self.routines |= {each.name: each for each in self.modules[file] or () if each.name not in self.routines}
+        return self.modules[file]
+
+    def _named_in(self, file: Path) -> dict[str, Place]:
+        """What a module that can't be read may set: what it names in assignments and calls."""
+        if self._read(file) is not None:
+            return {}
+        lines = enumerate(self.files.text(file).upper().split("\n"), 1)
+        named = ((name, number) for number, line in lines if SETTING.search(line) for name in NAME.findall(line))
+        return {name: Place(file, number) for name, number in named if name in self.shared or name.startswith("$")}
 
 
-def _is_archive(folder: Path) -> bool:
-    """Whether a folder is a controller's archive, by its folders: others above a program are not searched."""
-    return (folder / "Program").is_dir() and any((folder / each).is_dir() for each in OF_ARCHIVE)
-
-
-def _of_controller(path: Path, suffix: str) -> list[Path]:
-    """Files of the controller that a program is for: those beside it, then all others of its archive."""
-    above = list(path.resolve().parents)[:DEEPEST]
-    archive = next((folder for folder in above if _is_archive(folder)), None)
-    beside = sorted(path.parent.iterdir())
-    others = sorted(archive.rglob("*")) if archive else []
-    here = path.parent.resolve()
-    found = (*beside, *(each for each in others if each.parent != here))
-    return [each for each in found if each.suffix.lower() == suffix and each.is_file()]
-
-
-def shared_data_of(path: Path) -> Path | None:
-    """The controller's own $config.dat, with its tools, bases and points: beside a program, or as in an archive."""
-    return _in_archive(path, ("$config.dat", "$CONFIG.DAT", "$Config.dat"))
+def _invocations(operation: syntax.Operation) -> Iterable[syntax.Invocation]:
+    """The calls in an operation, also of what it starts beside the program."""
+    waiting = list(syntax.expressions_of(operation))
+    if isinstance(operation, syntax.Beside):
+        yield operation.what
+    while waiting:
+        each = waiting.pop()
+        if isinstance(each, syntax.Invocation):
+            yield each
+        waiting += syntax.inner(each)
 
 
 ROBROOT = re.compile(r"(?i)^\s*(?:FRAME\s+)?\$ROBROOT\s*=\s*\{\s*(?:FRAME\s*:)?([^}]*)\}")
 
 
-def _machine_data(path: Path) -> Path | None:
-    """The machine data of a program's controller."""
-    return _in_archive(path, ("$machine.dat", "$MACHINE.DAT", "$Machine.dat"), "Mada")
-
-
-def _robot_root(path: Path) -> Iterable[ProgramFinding]:
+def _robot_root(file: Path | None) -> Iterable[ProgramFinding]:
     """That the machine data put the robot elsewhere than at the origin of the world, in which bases are given."""
-    file = _machine_data(path)
     source = None if file is None else read_program_text(file)
     for number, line in enumerate(source.lines, 1) if source else ():
         if (match := ROBROOT.match(line)) is not None:
@@ -884,34 +915,6 @@ def _robot_root(path: Path) -> Iterable[ProgramFinding]:
                 yield NotSimulated(match[0].strip(), Place(file, number))
 
 
-def _published(path: Path) -> tuple[Path, ...]:
-    """The ``.dat`` files that declare for all modules, but for those of modules that are read."""
-    modules = {path.stem.upper(), *(each.stem.upper() for each in modules_of(path)), "$CONFIG"}
-    others = (each for each in _of_controller(path, ".dat") if each.stem.upper() not in modules)
-    return tuple(each for each in others if PUBLISHED.search(read_program_text(each).text))
-
-
-def _submits(path: Path) -> tuple[Path, ...]:
-    """Programs that a controller runs beside the robot's: beside a program, or as in an archive."""
-    beside = [each for each in sorted(path.parent.iterdir()) if each.suffix.lower() == ".sub" and each.is_file()]
-    system = _in_archive(path, ("sps.sub", "SPS.SUB", "SPS.sub"))
-    return tuple(beside if system is None or system in beside else (*beside, system))
-
-
-def _others(path: Path) -> tuple[Path, ...]:
-    """Modules of the same controller that a program does not call; none where modules share no variables."""
-    own = data_file_of(path, ".dat")
-    has_own = own is not None and GLOBAL_NAME.search(read_program_text(own).text)
-    if shared_data_of(path) is None and not has_own and not _published(path):
-        return ()
-    called = {path, *modules_of(path)}
-    return tuple(each for each in _of_controller(path, ".src") if each not in called)
-
-
-def _in_archive(path: Path, names: Iterable[str], inside: str = "System") -> Path | None:
-    """A file of the controller beside a program, or in the folder System of its own folder or of one above it."""
-    for folder in (path.parent, *(above / inside for above in list(path.resolve().parents)[:DEEPEST])):
-        for name in names:
-            if (folder / name).is_file():
-                return folder / name
-    return None
+def companions(path: Path) -> tuple[Path, ...]:
+    """What belongs to a .src file."""
+    return ControllerFiles(path).companions
