@@ -28,6 +28,7 @@ from er3a.planning.commands import (
     ToolSequenceCommand,
 )
 from er3a.planning.names import ACCELERATION_TIME
+from er3a.planning.sequences import ArcWithPath
 from er3a.planning.timing import JointLimits, joint_limits
 from er3a.program_check import program_check_findings as found_in
 from er3a.program_check.motion_checks import RAMP_OF_A_DURATION, AssumedRates, CheckRules, MotionPath
@@ -44,10 +45,12 @@ from er3a.programs.instructions import (
     PoseTarget,
     UnclearLoad,
     Unknown,
+    turns_apart,
 )
 from er3a.programs.machine import execute
 from er3a.programs.program_findings import NotSimulated, NotUnderstood
 from er3a.programs.syntax import Fixed, Move, Program
+from er3a.programs.writing import SAME_TURN
 from er3a.robots.robot import Robot
 
 ASSUMED_SPEED, ASSUMED_SLIDE = np.radians(180.0), 0.5  # rad/s and m/s
@@ -599,7 +602,7 @@ def parts_of(check: ProgramCheck, robot: Robot, source: CommandSource) -> tuple[
             leads_on = not _may_move(step.instruction) if motion is None else motion.stays
             joined = joined and leads_on
             continue
-        if motion.way is None or motion.placed.motion.angle is not None:
+        if motion.way is None or motion.placed.motion.angle is not None or _turns_with_path(motion):
             break
         line = step.place.line
         if motion.kind != "joint" and not np.allclose(motion.placed.arm.tool, robot.tool, rtol=0, atol=1e-12):
@@ -626,6 +629,16 @@ def parts_of(check: ProgramCheck, robot: Robot, source: CommandSource) -> tuple[
         for group, own in zip(groups, whose)
     ]
     return parts, tuple(sorted({*rest.values()} - {0}))
+
+
+def _turns_with_path(checked: CheckedMotion) -> bool:
+    """Whether an arc turns the tool otherwise than that of a path, which turns it about one axis."""
+    way = checked.way.tool_path if checked.way else None
+    via, base = checked.placed.motion.via, checked.placed.base
+    if not isinstance(way, ArcWithPath) or not isinstance(via, PoseTarget) or base is None:
+        return False
+    start, end = way.poses(np.array([0.0, 1.0]))
+    return turns_apart(start, base @ via.pose, end) > SAME_TURN
 
 
 def _may_move(instruction: object) -> bool:

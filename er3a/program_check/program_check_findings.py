@@ -336,6 +336,10 @@ class ArcGoesOn(Finding):
     turns: bool
 
 
+class ArcTurnInDoubt(Finding):
+    """The orientation of the arc's point does not tell in which sense the tool turns; the nearer one was checked."""
+
+
 class SplineAsLine(Finding):
     """A spline was checked as a straight line between its points."""
 
@@ -495,6 +499,7 @@ CheckFinding = (
     | ZoneWithoutSize
     | ArcHasNoCircle
     | ArcGoesOn
+    | ArcTurnInDoubt
     | SplineAsLine
     | ExternalAxesLeftOut
     | LineNotChecked

@@ -155,6 +155,10 @@ def krl(*lines: str, more: str = "") -> str:
     return HEAD + "".join(f"{line}\n" for line in lines) + f"END\n{more}"
 
 
+REST, SLOW = "[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]", "v10,fine,tool0;"
+AT_POINT = f"ConfJ\\Off;ConfL\\Off;MoveJ [[400,0,400],[0,0,1,0],{REST}],v50,fine,tool0;"
+
+
 def last(check):
     """Where the arm stands behind the last motion."""
     return list(check.motions.values())[-1].end
@@ -256,6 +260,10 @@ MENDED = {
     "arc_goes_on": (
         krl(f"LIN {{X 400,Y 0,Z 400,{DOWN}}}", "CIRC {X 420,Y 20},{X 440,Y 0,A 10},CA 270"),
         krl(f"LIN {{X 400,Y 0,Z 400,{DOWN}}}", "CIRC {X 420,Y 20},{X 440,Y 0}", "CIRC {X 434,Y -14},{X 420,Y -20}"),
+    ),
+    "arc_turn_in_doubt": (
+        rapid(AT_POINT, f"MoveC [[420,20,400],[0,0.7071068,0.7071068,0],{REST}],[[440,0,400],[0,0,1,0],{REST}],{SLOW}"),
+        rapid(AT_POINT, f"MoveC [[420,20,400],[0,0,1,0],{REST}],[[440,0,400],[0,0,1,0],{REST}],{SLOW}"),
     ),
     "target_not_given": (
         krl("PTP XTHERE"),

@@ -85,6 +85,7 @@ REMEDIES: dict[str, str] = {
     "zone_collides": N_("Make the zone smaller, or stop at the corner."),
     "zone_not_settled": N_("Stop at the corner, or make the zone smaller until this is no longer found."),
     "arc_has_no_circle": N_("Teach the arc's via point off the straight line between its ends, or use a line."),
+    "arc_turn_in_doubt": N_("Give the arc's via point the orientation that the tool shall have there."),
     "arc_goes_on": N_("Check on the controller where the arc ends, or split it into arcs that end at targets."),
     "undecided": N_("Keep the path farther from singular poses and limits, or run this line slowly under supervision."),
     "line_not_checked": BY_HAND,
@@ -302,6 +303,10 @@ TEXTS = texts(
         "bodies_touch": "{pair} after {at_mm:.1f} mm, up to {depth_mm:.1f} mm deep",
         "bodies_touch.enlarged": "{touch} (these shapes are up to {enlarged_mm:.1f} mm larger than the meshes in them)",
         "bodies_touch.joint": "{pair} after {t_s:.2f} s, up to {depth_mm:.1f} mm deep",
+        "arc_turn_in_doubt": (
+            "the orientation of the arc's via point does not tell in which direction the tool turns; the one that "
+            "comes nearer to it was checked"
+        ),
         "arc_goes_on": "the arc ends after {angle_deg:g} deg, not at its target",
         "arc_goes_on.unknown": "the angle at which the arc ends is not known; the arc was not checked",
         "arc_goes_on.turns": (
@@ -439,6 +444,11 @@ TEXTS = texts(
             "arcs",
             "{count} arc written as {lines} lines that stay within {deviation:g} mm of it",
             "{count} arcs written as {lines} lines that stay within {deviation:g} mm of them",
+        ),
+        "written_arcs_turn_otherwise": Plural(
+            "arcs",
+            "{count} arc turns the tool about one axis, and not with the path as the arc that was read",
+            "{count} arcs turn the tool about one axis, and not with the path as the arcs that were read",
         ),
         "written_unsafe": "the path {path} is not safe: {verdict}",
         "written_near_assumed": (
