@@ -428,6 +428,12 @@ class LoopComesBackOtherwise(Finding):
     slides: bool = False
 
 
+class BegunAgain(Finding):
+    """At this motion more is found (by their ``codes``) if the program is begun again from where it ends."""
+
+    codes: tuple[str, ...]
+
+
 class LoadNotExamined(Finding):
     """From here on the program says what hangs on the flange; no torque is computed with it.
 
@@ -514,6 +520,7 @@ CheckFinding = (
     | BothSidesChecked
     | NotFollowedToEnd
     | LoopComesBackOtherwise
+    | BegunAgain
     | LoadNotExamined
     | LoadAbovePayload
 )

@@ -158,6 +158,8 @@ def krl(*lines: str, more: str = "") -> str:
 REST, SLOW = "[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]", "v10,fine,tool0;"
 AT_POINT = f"ConfJ\\Off;ConfL\\Off;MoveJ [[400,0,400],[0,0,1,0],{REST}],v50,fine,tool0;"
 
+TURNS = [f"MoveAbsJ [[0,-10,-10,0,-70,{turn}],[9E9,9E9,9E9,9E9,9E9,9E9]],v50,fine,tool0;" for turn in (-120, 0, 120)]
+
 
 def last(check):
     """Where the arm stands behind the last motion."""
@@ -308,6 +310,10 @@ MENDED = {
         (krl("PTP {A1 5}", "PTP {A1 6}", "PTP {A1 7}"), {"most_motions": 2}),
         krl("PTP {A1 5}", "PTP {A1 6}", "PTP {A1 7}"),
         (krl("PTP {A1 5}", "PTP {A1 6}"), {"most_motions": 2}),
+    ),
+    "begun_again": (
+        rapid(*TURNS),
+        rapid(*TURNS, TURNS[1]),
     ),
     "loop_comes_back_otherwise": (
         (krl(*LOOP, "ENDLOOP"), {"limits": RunLimits(rounds=5)}),

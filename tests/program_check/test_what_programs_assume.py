@@ -178,6 +178,36 @@ def test_a_module_variable_of_rapid_keeps_its_value_to_the_next_cycle(tmp_path):
     assert "kept_to_next_start" not in codes(check(tmp_path, local, "a.mod"))
 
 
+def at_turn(degrees: float) -> str:
+    return f"MoveAbsJ [[0,-10,-10,0,-70,{degrees}],{NONE}],v50,fine,tool0;\n"
+
+
+@pytest.mark.parametrize(
+    ("data", "body", "told"),
+    [
+        ("", at_turn(-120) + at_turn(0) + at_turn(120), {5: ["whole_turn"]}),
+        ("", at_turn(-120) + at_turn(0) + at_turn(120) + at_turn(0), {}),
+        ("", at_turn(-120) + at_turn(0) + at_turn(120) + "EXIT;\n", {}),
+        ("", "WHILE TRUE DO\n" + at_turn(-120) + at_turn(0) + "ENDWHILE\n", {}),
+        # up from where the arm is, which is too high at the end of the first round
+        (
+            "VAR robtarget q;",
+            "q:=CRobT(\\Tool:=tool0\\WObj:=wobj0);\nMoveL Offs(q,0,0,250),v100,fine,tool0;\n",
+            {6: ["target_out_of_reach"]},
+        ),
+    ],
+)
+def test_a_program_of_rapid_is_begun_again_from_where_it_ends(tmp_path, data, body, told):
+    """As in run mode Continuous: what is found then alone is a caution; what is found is not twice."""
+    text = f"MODULE a\n{data}\nPROC main()\nConfL\\Off;\n{body}ENDPROC\nENDMODULE\n"
+    found = check(tmp_path, text, "a.mod")
+    again = {each.place.line: each for each in found.findings if each.finding.code == "begun_again"}
+    assert {line: [code for code in each.finding.codes if code in told[line]] for line, each in again.items()} == told
+    assert {each.level for each in again.values()} <= {"caution"}
+    assert not any(found.execution.steps[number].again for number in found.main)
+    assert {each.times for each in found.verdicts} <= ({1, 2} if "WHILE" in body else {1})
+
+
 def test_a_cycle_that_is_left_begins_again_from_where_the_arm_is(tmp_path):
     """Its first line is followed from the point at which it was left too."""
     body = "MoveL p,v100,fine,tool0;\nIF di1=1 ExitCycle;\nMoveL Offs(p,0,50,0),v100,fine,tool0;"

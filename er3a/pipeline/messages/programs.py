@@ -106,6 +106,7 @@ REMEDIES: dict[str, str] = {
     "way_not_known": N_("Give start_deg of the program, or mend the motion before."),
     "not_come_to": FURTHER,
     "rest_not_checked": N_("Give the check more time or motions, or split the program and check its parts."),
+    "begun_again": N_("Let the program end where it begins, and write the way there at its end: it is checked then."),
     "loop_comes_back_otherwise": N_("Turn the tool back within the loop, so that each round ends as it began."),
     "program_data_file_missing": N_("Put the data file beside the program."),
     "program_name_twice": N_("Remove one of the two definitions."),
@@ -375,6 +376,10 @@ TEXTS = texts(
             "targets, for reach and limits, but not the motions between them"
         ),
         "rest_not_checked": "only the first {checked} motions that are carried out were checked, none from here on",
+        "begun_again": (
+            "if the controller begins the program again from where it ends (run mode Continuous), this motion has: "
+            "{codes:, }"
+        ),
         "loop_comes_back_otherwise": (
             "the loop begins again with J{joint} {difference_deg:.2f} {unit} from where it was in the round that was "
             "checked"

@@ -279,18 +279,20 @@ def read_rapid(source: ProgramText) -> syntax.Program:
         )
         findings.append(NameTwice(name, last.place))
     by_name, unlinked = linked([each for reader in readers for each in reader.routines], changed_arguments)
+    entry = _entry(own, by_name)
     return syntax.Program(
         "rapid",
         source.path.stem,
         source.path,
         by_name,
-        _entry(own, by_name),
+        entry,
         tuple(data),
         (*findings, *unlinked),
         source.lines,
         beside=frozenset(
             _set_by_tasks(source.path) & {name for cursor in cursors for name in _shared(cursor.source.text)}
         ),
+        cyclic=entry == "MAIN",
     )
 
 
