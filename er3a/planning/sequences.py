@@ -83,6 +83,53 @@ class Arc(Segment):
         return np.cos(turn) * spoke + np.sin(turn) * np.cross(self.normal, spoke)
 
 
+@dataclass(frozen=True, eq=False)
+class ArcWithPath(Arc):
+    """An arc whose circle carries the tool along, which turns by ``rotation`` beside that.
+
+    With n the normal and a the angle, R(s) = exp(s a n) exp(s rotation) R_0, so that its angular velocity is
+    exp(s a n) (a n + rotation): of constant size.
+    """
+
+    @property
+    def turned(self) -> float:
+        """See :class:`er3a.planning.moves.ToolPath`."""
+        return float(np.linalg.norm(self._turning))
+
+    @property
+    def turning_bend(self) -> float:
+        """Size (rad) of the derivative of the angular velocity by progress."""
+        return float(self.angle * np.linalg.norm(np.cross(self.normal, self.rotation)))
+
+    def poses(self, progress: Reals) -> Reals:
+        """See :class:`er3a.planning.moves.ToolPath`."""
+        beside = super().poses(progress)
+        beside[..., :3, :3] = self._carried(np.asarray(progress, float)) @ beside[..., :3, :3]
+        return beside
+
+    def twists(self, progress: Reals) -> tuple[Reals, Reals]:
+        """See :class:`er3a.planning.moves.ToolPath`."""
+        first, second = super().twists(progress)
+        first[..., 3:] = self._carried(np.asarray(progress, float)) @ self._turning
+        second[..., 3:] = self.angle * np.cross(self.normal, first[..., 3:])
+        return first, second
+
+    def twist_bounds(self, start: Reals, end: Reals) -> Reals:
+        """See :class:`er3a.planning.moves.ToolPath`."""
+        bounds = super().twist_bounds(start, end).copy()
+        bounds[..., 0, 1] = self.turned
+        bounds[..., 1:, 1] = self.turning_bend * self.angle ** np.arange(3.0)
+        return bounds
+
+    @property
+    def _turning(self) -> Reals:
+        found: Reals = self.angle * self.normal + self.rotation
+        return found
+
+    def _carried(self, progress: Reals) -> Reals:
+        return exp_rotation(self.angle * progress[..., None] * self.normal)
+
+
 def arc(
     T_start: Reals,
     via: Reals,

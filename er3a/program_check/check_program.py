@@ -29,12 +29,12 @@ from er3a.planning.commands import (
 )
 from er3a.planning.names import ACCELERATION_TIME
 from er3a.planning.profiles import LegTimes
-from er3a.planning.sequences import TURN_LENGTH
+from er3a.planning.sequences import TURN_LENGTH, ArcWithPath
 from er3a.planning.timing import JointLimits, joint_limits
 from er3a.program_check import program_check_findings as found_in
 from er3a.program_check.motion_checks import AssumedRates, CheckRules, MotionPath
 from er3a.program_check.step_checks import CheckedMotion, StepChecker, obstacles_of
-from er3a.programs.execution import Ending, Execution, KeepOn, RunLimits
+from er3a.programs.execution import Ending, Execution, KeepOn, RunLimits, Step
 from er3a.programs.instructions import (
     ArmMotion,
     Decision,
@@ -46,10 +46,12 @@ from er3a.programs.instructions import (
     PoseTarget,
     UnclearLoad,
     Unknown,
+    turns_apart,
 )
 from er3a.programs.machine import execute
 from er3a.programs.program_findings import NotSimulated, NotUnderstood
 from er3a.programs.syntax import Fixed, Move, Program
+from er3a.programs.writing import SAME_TURN
 from er3a.robots.robot import Robot
 
 ASSUMED_SPEED, ASSUMED_SLIDE = np.radians(180.0), 0.5  # rad/s and m/s
@@ -178,7 +180,7 @@ class ProgramCheck(ByValue):
     ----------
     findings : in the order of the text; like ones of one instruction grouped
     verdicts : of each motion instruction
-    motions : as they were carried out, by the number of their step
+    motions : as they were carried out, by the number of their step; of a second round only what the first never meets
     main : numbers of the steps of the way with the most motions
     not_examined : in the order of the text; each has a finding, of at least caution but for the way of a motion whose
         start is not known
@@ -217,7 +219,8 @@ def check_program(program: Program, robot: Robot, options: CheckOptions | None =
         for a start without one value for each joint, and a frame that is not a rigid transform
     """
     options = options or CheckOptions()
-    execution = execute(program, robot, options.start, options.frames, options.limits, options.keep_on)
+    followed = replace(options.limits, second_round=True)
+    execution = execute(program, robot, options.start, options.frames, followed, options.keep_on)
     limits = assumed_limits(robot, options)
     around = options.scene, options.penetration_tolerance, options.assumed_margin
     obstacles = obstacles_of(robot, *around) if options.measures else None
@@ -230,13 +233,15 @@ def check_program(program: Program, robot: Robot, options: CheckOptions | None =
     located = _located(execution, robot, checker, end)
     located = _with_joint_moves(located, checker, options.keep_on)
     missed = _not_examined(execution, located, end)
-    verdicts = _verdicts(program, execution, checker.motions, located, missed)
+    first = _first_met(execution)
+    motions = {number: motion for number, motion in checker.motions.items() if number in first}
+    verdicts = _verdicts(program, execution, motions, located, missed)
     level: found_in.Level = found_in.worst_of(each.level for each in located)
     main = execution.main() if execution.endings else None
     way = () if main is None else execution.way(main)
-    cycle = _cycle(execution, checker.motions, main, way)
+    cycle = _cycle(execution, motions, main, way)
     shapes = shapes_assumed(robot, options.assumed_margin, {}) if options.measures else None
-    return ProgramCheck(execution, level, located, verdicts, checker.motions, way, cycle, missed, shapes)
+    return ProgramCheck(execution, level, located, verdicts, motions, way, cycle, missed, shapes)
 
 
 def _checked_until(checker: StepChecker, options: CheckOptions) -> int:
@@ -296,16 +301,21 @@ def _located(execution: Execution, robot: Robot, checker: StepChecker, end: int)
         for number, each_wrong in wrong.items():
             step = execution.steps[number]
             found += [LocatedFinding(found_in.level_of(each), each, step.place, step.calls) for each in each_wrong]
-    for number, motion in checker.motions.items():
-        step = execution.steps[number]
-        found += [
-            LocatedFinding(found_in.level_of(each), each, step.place, step.calls, 1, number, motion.moments.get(each))
-            for each in motion.findings
-        ]
+    steps = _first_met(execution)
+    for number, step in steps.items():
+        motion = checker.motions.get(number)
+        if motion is not None:
+            found += [
+                LocatedFinding(
+                    found_in.level_of(each), each, step.place, step.calls, 1, number, motion.moments.get(each)
+                )
+                for each in motion.findings
+            ]
+    found += _begun_again(execution, checker, found)
     arms = checker.obstacles.bodies.values() if checker.obstacles else ()
     if pairs := tuple(dict.fromkeys(pair for bodies in arms for pair in bodies.unexamined)):
         found.append(LocatedFinding("caution", PairsUnexamined(pairs), top))
-    for step in execution.steps:
+    for step in steps.values():
         what = step.instruction
         if isinstance(what, Unknown):
             unknown = found_in.MayMove(what.text) if what.may_move else NotUnderstood(what.text, step.place)
@@ -352,6 +362,26 @@ def _located(execution: Execution, robot: Robot, checker: StepChecker, end: int)
     return tuple(
         sorted(grouped, key=lambda each: (order[str(each.place.file)], each.place.line, -found_in.RANKS[each.level]))
     )
+
+
+def _first_met(execution: Execution) -> dict[int, Step]:
+    """Steps by number, without those of a second round where the first comes to the same place."""
+    seen = {step.place for step in execution.steps if not step.again}
+    return {i: step for i, step in enumerate(execution.steps) if not (step.again and step.place in seen)}
+
+
+def _begun_again(execution: Execution, checker: StepChecker, found: list[LocatedFinding]) -> Iterator[LocatedFinding]:
+    """What is found at motions in the second round alone, to which a controller may go on or not."""
+    known = {(each.place, each.finding.code) for each in found}
+    told: dict[Place, list[str]] = {}
+    for number, motion in checker.motions.items():
+        step = execution.steps[number]
+        if step.again:
+            grave = (each.code for each in motion.findings if found_in.level_of(each) in ("caution", "fail"))
+            told.setdefault(step.place, []).extend(code for code in grave if (step.place, code) not in known)
+    for place, codes in told.items():
+        if codes:
+            yield LocatedFinding("caution", found_in.BegunAgain(tuple(dict.fromkeys(codes))), place)
 
 
 def _loads(execution: Execution, robot: Robot) -> Iterator[LocatedFinding]:
@@ -611,7 +641,7 @@ def parts_of(check: ProgramCheck, robot: Robot, source: CommandSource) -> tuple[
             leads_on = not _may_move(step.instruction) if motion is None else motion.stays
             joined = joined and leads_on
             continue
-        if motion.way is None or motion.placed.motion.angle is not None:
+        if motion.way is None or motion.placed.motion.angle is not None or _turns_with_path(motion):
             break
         line = step.place.line
         if motion.kind != "joint" and not np.allclose(motion.placed.arm.tool, robot.tool, rtol=0, atol=1e-12):
@@ -638,6 +668,16 @@ def parts_of(check: ProgramCheck, robot: Robot, source: CommandSource) -> tuple[
         for group, own in zip(groups, whose)
     ]
     return parts, tuple(sorted({*rest.values()} - {0}))
+
+
+def _turns_with_path(checked: CheckedMotion) -> bool:
+    """Whether an arc turns the tool otherwise than that of a path, which turns it about one axis."""
+    way = checked.way.tool_path if checked.way else None
+    via, base = checked.placed.motion.via, checked.placed.base
+    if not isinstance(way, ArcWithPath) or not isinstance(via, PoseTarget) or base is None:
+        return False
+    start, end = way.poses(np.array([0.0, 1.0]))
+    return turns_apart(start, base @ via.pose, end) > SAME_TURN
 
 
 def _may_move(instruction: object) -> bool:

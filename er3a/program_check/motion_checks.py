@@ -28,11 +28,11 @@ from er3a.planning.follow import Followed
 from er3a.planning.moves import Segment, line
 from er3a.planning.piecewise import polynomial_motion
 from er3a.planning.profiles import trapezoid
-from er3a.planning.sequences import TURN_LENGTH, Arc, arc
+from er3a.planning.sequences import TURN_LENGTH, Arc, ArcWithPath, arc
 from er3a.planning.timing import JointLimits
 from er3a.planning.tool_proof import ProofRequirements, ToolProof, follow_and_prove
 from er3a.program_check import program_check_findings as found_in
-from er3a.programs.instructions import ArmMotion, Rate
+from er3a.programs.instructions import ArmMotion, Rate, turn_beside_path
 from er3a.robots.joint_limits import joint_shown
 from er3a.robots.robot import Robot
 from er3a.robots.whole_turns import LIMIT_TOLERANCE
@@ -233,12 +233,18 @@ class MotionPath(ByValue):
     tool_path: Segment | None = None
     moments: Mapping[found_in.CheckFinding, float] = field(default_factory=dict)
 
-    def sagitta(self, share: float) -> float:
-        """By how much (m) a share of the tool's way bulges over the straight line between its ends."""
-        if not isinstance(self.tool_path, Arc):
-            return 0.0
-        half = min(self.tool_path.angle * share / 2, np.pi)
-        return float(self.tool_path.radius * (1 - np.cos(half)))
+    def sagitta(self, share: float) -> tuple[float, float]:
+        """By how much (m, rad) a share of the tool's way bulges over the straight line between its ends.
+
+        Of a turn that is the eighth of its second derivative, and for what the rotation vectors' own frame bends of
+        turns up to 1 rad, beyond which nothing is proven of corners, as much again.
+        """
+        path = self.tool_path
+        if not isinstance(path, Arc):
+            return 0.0, 0.0
+        half = min(path.angle * share / 2, np.pi)
+        turn = path.turning_bend * share**2 / 4 if isinstance(path, ArcWithPath) else 0.0
+        return float(path.radius * (1 - np.cos(half))), turn
 
     def along_mm(self, t: float) -> float:
         """Length (mm) of the tool point's path up to a time."""
@@ -318,12 +324,12 @@ def tool_motion_path(
 
     Parameters
     ----------
-    goal : T_world_tool (4, 4) at the end; joints (n,) there, where the program gives them; the arc's point (3,), m
+    goal : T_world_tool (4, 4) at the end; joints (n,) there, where the program gives them; the arc's point (4, 4), m
     """
     end, given, via = goal
     T_start = forward(arm, start)
     try:
-        shape = line(T_start, end, 1.0) if via is None else _arc(T_start, via, end, (1.0, None), motion.angle)
+        shape = line(T_start, end, 1.0) if via is None else _arc(T_start, via, end, (1.0, None), motion)
     except PoseError:
         return found_in.ArcHasNoCircle()
     if max(shape.length, TURN_LENGTH * shape.turned) < NO_WAY:
@@ -333,10 +339,12 @@ def tool_motion_path(
     if shape.turned > np.pi - SIDE_OPEN:
         x, y, z = (np.round(arm.base[:3, :3].T @ shape.rotation / shape.turned, 3) + 0.0).tolist()
         said += (found_in.TurnsEitherWay((x, y, z)),)
+    if via is not None and isinstance(shape, ArcWithPath) and _beside(T_start, via, end, shape)[1]:
+        said += (found_in.ArcTurnInDoubt(),)
     path: Segment = (
         line(T_start, end, law.duration, None, law.ramp)
         if via is None
-        else _arc(T_start, via, end, (law.duration, law.ramp), motion.angle)
+        else _arc(T_start, via, end, (law.duration, law.ramp), motion)
     )
     times = np.linspace(0.0, law.duration, _points(path.length, path.turned))
     try:
@@ -418,12 +426,19 @@ def _turns_otherwise(motion: ArmMotion, start: Reals, end: Reals) -> tuple[found
     return (found_in.TurnsOtherwise(math.degrees(apart)),) if apart > APART else ()
 
 
-def _arc(T_start: Reals, via: Reals, end: Reals, time: tuple[float, float | None], angle: float | None) -> Arc:
+def _arc(T_start: Reals, via: Reals, end: Reals, time: tuple[float, float | None], motion: ArmMotion) -> Arc:
     """An arc in a time (s) with a ramp; with an angle (rad) of its own that far along its circle."""
-    made = arc(T_start, via, end, time[0], None, time[1])
+    made, angle = arc(T_start, via[:3, 3], end, time[0], None, time[1]), motion.angle
+    if motion.with_path:
+        rotation = _beside(T_start, via, end, made)[0]
+        return ArcWithPath(T_start, rotation, made.duration, False, made.ramp, made.centre, made.normal, made.angle)
     if angle is None:
         return made
     return replace(made, normal=made.normal if angle > 0 else -made.normal, angle=abs(angle))
+
+
+def _beside(T_start: Reals, via: Reals, end: Reals, made: Arc) -> tuple[Reals, bool]:
+    return turn_beside_path(T_start, via, end, (made.centre, made.normal, made.angle))
 
 
 def _followed_moments(

@@ -350,6 +350,10 @@ class ArcGoesOn(Finding):
     turns: bool
 
 
+class ArcTurnInDoubt(Finding):
+    """The orientation of the arc's point does not tell in which sense the tool turns; the nearer one was checked."""
+
+
 class SplineAsLine(Finding):
     """A spline was checked as a straight line between its points."""
 
@@ -440,6 +444,12 @@ class LoopComesBackOtherwise(Finding):
     slides: bool = False
 
 
+class BegunAgain(Finding):
+    """At this motion more is found (by their ``codes``) if the program is begun again from where it ends."""
+
+    codes: tuple[str, ...]
+
+
 class LoadNotExamined(Finding):
     """From here on the program says what hangs on the flange; no torque is computed with it.
 
@@ -513,6 +523,7 @@ CheckFinding = (
     | ZoneWithoutSize
     | ArcHasNoCircle
     | ArcGoesOn
+    | ArcTurnInDoubt
     | SplineAsLine
     | ExternalAxesLeftOut
     | LineNotChecked
@@ -527,6 +538,7 @@ CheckFinding = (
     | BothSidesChecked
     | NotFollowedToEnd
     | LoopComesBackOtherwise
+    | BegunAgain
     | LoadNotExamined
     | LoadAbovePayload
 )

@@ -299,14 +299,14 @@ class ZonePatch:
     corner : T_world_tool (4, 4), m
     sides : (2, 3), m, from the corner to where the zone begins and to where it ends
     turns : (2, 3), rotation vectors, likewise, in the world's frame
-    slack : m, by which the tool point may be off the triangle
+    slack : m and rad, by which the tool may be off the triangle
     """
 
     arm: Robot
     corner: Reals
     sides: Reals
     turns: Reals
-    slack: float
+    slack: tuple[float, float]
 
     def poses(self, at: Reals) -> Reals:
         """T_world_tool (k, 4, 4) at coordinates (k, 2)."""
@@ -346,7 +346,8 @@ class ZonePatch:
         angles = np.linalg.norm(turning, axis=1)
         twists = np.concatenate([edges @ self.sides / near.length, turning], axis=1)
         # a twist turns with the tool, by no more than the tool does; slack adds to what has to be gone
-        aside = [near.size @ np.repeat([self.slack / near.length, turned * angle], 3) for angle in angles]
+        off, off_turn = self.slack[0] / near.length, self.slack[1]
+        aside = [near.size @ np.repeat([off, off_turn + turned * angle], 3) for angle in angles]
         first = np.abs(twists @ near.inverse.T) + np.stack(aside)
         moved = FIRST_GUESS * np.maximum(first.max(axis=0), first.max() / 5)
         for _ in range(ATTEMPTS):
@@ -366,7 +367,7 @@ class ZonePatch:
             for i in range(2)
             for j in range(2)
         )
-        slack: Reals = grown @ near.size @ np.repeat([self.slack / near.length, 0.0], 3)
+        slack: Reals = grown @ near.size @ np.repeat([off, off_turn], 3)
         return grown @ bent / 8 + slack, slack
 
 
@@ -431,17 +432,18 @@ class NearJoints:
         return found
 
 
-def patch_of(arm: Robot, corners: Reals, slack: float) -> ZonePatch:
+def patch_of(arm: Robot, corners: Reals, slack: tuple[float, float] = (0.0, 0.0)) -> ZonePatch:
     """The poses between joints (3, n) where the zone begins, at the corner, and where it ends."""
     poses = forward(arm, corners)
     turns = Rotation.from_matrix(poses[[0, 2], :3, :3] @ poses[1, :3, :3].T).as_rotvec()
     return ZonePatch(arm, poses[1], poses[[0, 2], :3, 3] - poses[1, :3, 3], turns, slack)
 
 
-def bend_of_line(arm: Robot, q: Reals, slack: float) -> Reals:
+def bend_of_line(arm: Robot, q: Reals, slack: tuple[float, float] = (0.0, 0.0)) -> Reals:
     """By how much joints (n,) are off the chord at most on a line through solved joints (k, n), rad.
 
-    ``slack`` (m) is by how far the way may be off the straight lines between them; infinite where nothing is proven.
+    ``slack`` (m, rad) is by how far the way may be off the straight lines between them; infinite where nothing is
+    proven.
     """
     shares = np.linspace(0, 1, len(q))[:, None]
     nodes = np.abs(q - q[0] - shares * (q[-1] - q[0])).max(axis=0)
@@ -924,13 +926,13 @@ class StepChecker:
         return self._measured(CheckedMotion(kind, placed, before, way, way.end, seen, moments=way.moments))
 
     def _via(self, placed: PlacedMotion, before: Reals) -> Reals | None:
-        """The arc's point (3,), m."""
+        """The arc's point: T_world_tool (4, 4), m."""
         target = placed.motion.via
         if isinstance(target, instructions.PoseTarget) and placed.base is not None:
-            point: Reals = (placed.base @ target.pose)[:3, 3]
-            return point
+            pose: Reals = placed.base @ target.pose
+            return pose
         if isinstance(target, instructions.JointTarget):
-            return forward(placed.arm, np.where(np.isnan(target.joints), before, target.joints))[:3, 3]
+            return forward(placed.arm, np.where(np.isnan(target.joints), before, target.joints))
         return None
 
     def _measured(self, motion: CheckedMotion) -> CheckedMotion:
@@ -1020,7 +1022,8 @@ class StepChecker:
         if way.tool_path is None or after.tool_path is None or way.arm is not after.arm:
             bend = _bend(way, 1 - shares[0], 1.0) + _bend(after, 0.0, shares[1])
             return zone_clearance(bodies, corners, tolerance, bend, margin=margin)
-        slack = max(way.sagitta(shares[0]), after.sagitta(shares[1]))
+        before, then = way.sagitta(shares[0]), after.sagitta(shares[1])
+        slack = max(before[0], then[0]), max(before[1], then[1])
         return zone_clearance(bodies, corners, tolerance, patch=patch_of(way.arm, corners, slack), margin=margin)
 
     def _rounded(self, way: MotionPath, after: MotionPath, motion: CheckedMotion) -> tuple[found_in.CheckFinding, ...]:
@@ -1171,6 +1174,7 @@ def _key(motion: instructions.ArmMotion) -> Hashable:
         motion.left_out,
         motion.doubt,
         motion.turn_in_doubt,
+        motion.with_path,
     )
 
 

@@ -28,12 +28,14 @@ class RunLimits:
     ways : sides of branches on what only the cell knows, without those that come into a state that was followed
     rounds : of a loop without end whose state does not repeat
     depth : of calls within calls
+    second_round : whether a program that may be begun again when it is over is, up to where it does what it did
     """
 
     operations: int = 2_000_000
     ways: int = 2_000
     rounds: int = 1_000
     depth: int = 40
+    second_round: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,12 +47,14 @@ class Step:
     place : its place in the text
     calls : where the routines around it were called, the outermost first
     before : number of the step before it; -1 for the first
+    again : whether it is met only as the program is begun again when it is over
     """
 
     instruction: Instruction
     place: Place
     calls: tuple[Place, ...]
     before: int
+    again: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +70,7 @@ class Ending:
     repeats_from : number of the step that follows the last, where it repeats or joins; None if no step does
     limit : that was met, as a number: of operations, sides of branches, rounds or calls; 0 if none was
     beside : whether the way is that of a thread or interrupt, which runs beside the program
+    again : whether the way is that of the program's second round
     """
 
     kind: EndKind
@@ -74,6 +79,7 @@ class Ending:
     repeats_from: int | None = None
     limit: int = 0
     beside: bool = False
+    again: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,11 +161,12 @@ class Execution(ByValue):
         return tuple(reversed(found))
 
     def main(self) -> Ending:
-        """The program's own way with the most motions; the first of them if there are several."""
+        """The program's own way with the most motions, in its first round; the first of them if there are several."""
         moves = [0] * (len(self.steps) + 1)
         for i, step in enumerate(self.steps):
             moves[i] = moves[step.before] + isinstance(step.instruction, ArmMotion)
-        return max(self.endings, key=lambda ending: (moves[ending.step] > 0 and not ending.beside, moves[ending.step]))
+        first = [each for each in self.endings if not each.again]
+        return max(first, key=lambda ending: (moves[ending.step] > 0 and not ending.beside, moves[ending.step]))
 
     def round_from(self, ending: Ending) -> int | None:
         """Number of the step from which a way repeats itself for ever; None if it does not."""

@@ -33,7 +33,7 @@ import numpy as np
 import scipy
 
 from er3a.by_value import ByValue
-from er3a.geometry.transforms import rpy_of, transform
+from er3a.geometry.transforms import exp_rotation, log_rotation, rotation_angle, rpy_of, transform
 from er3a.numerics.arrays import Reals
 from er3a.robots.masses import MassBody
 
@@ -234,6 +234,7 @@ class ArmMotion(ByValue):
     turn_speed : rad/s, at most, of the tool's turn on a line or arc; None if the program gives none: then turns count
         as lengths do
     turning : the same in KRL, of the turn of the tool's x axis and of that about it; None where the program gives none
+    with_path : whether an arc turns the tool with the path (:func:`turn_beside_path`), not about one axis of the base
     load : what hangs on the flange, in its frame; None where the program says nothing
     left_out : coordinates that a variable leaves out of its position, and that were taken from where the arm is
     turn_in_doubt : rad, by which a relative position turns otherwise where its angles are added to those before
@@ -258,6 +259,7 @@ class ArmMotion(ByValue):
     left_out: str = ""
     turn_in_doubt: float = 0.0
     doubt: str = ""
+    with_path: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -381,7 +383,7 @@ ON_A_LINE = 1e-9
 MAX_LINES = 10_000
 
 
-def arc_poses(start: Reals, via: Reals, end: Reals, shares: Reals) -> Reals | None:
+def arc_poses(start: Reals, via: Reals, end: Reals, shares: Reals, with_path: bool = False) -> Reals | None:
     """Poses (n, 4, 4) on the arc from a pose through a point to another, at shares (n,) of its angle.
 
     The tool turns evenly from the one orientation to the other, the shorter way.
@@ -389,6 +391,7 @@ def arc_poses(start: Reals, via: Reals, end: Reals, shares: Reals) -> Reals | No
     Parameters
     ----------
     start, via, end : (4, 4), m
+    with_path : whether the tool turns with the path instead (:func:`turn_beside_path`)
 
     Returns
     -------
@@ -402,11 +405,53 @@ def arc_poses(start: Reals, via: Reals, end: Reals, shares: Reals) -> Reals | No
     turn = (angle * shares)[:, None]
     poses = np.tile(np.eye(4), (len(shares), 1, 1))
     poses[:, :3, 3] = centre + np.cos(turn) * spoke + np.sin(turn) * np.cross(normal, spoke)
-    rotation = scipy.spatial.transform.Rotation.from_matrix(end[:3, :3] @ start[:3, :3].T).as_rotvec()
-    poses[:, :3, :3] = (
-        scipy.spatial.transform.Rotation.from_rotvec(shares[:, None] * rotation).as_matrix() @ start[:3, :3]
-    )
+    if with_path:
+        beside, _ = turn_beside_path(start, via, end, circle)
+        poses[:, :3, :3] = exp_rotation(turn * normal) @ exp_rotation(shares[:, None] * beside) @ start[:3, :3]
+        return poses
+    rotation = log_rotation(end[:3, :3] @ start[:3, :3].T)
+    poses[:, :3, :3] = exp_rotation(shares[:, None] * rotation) @ start[:3, :3]
     return poses
+
+
+SHORT_TURN = math.pi / 2
+"""A turn beside the path up to which the shorter sense is meant, whatever the point on the arc says."""
+
+
+def turn_beside_path(start: Reals, via: Reals, end: Reals, circle: tuple[Reals, Reals, float]) -> tuple[Reals, bool]:
+    """How the tool turns beside the path on an arc that turns it with the path, and whether the sense is in doubt.
+
+    The circle's own turn carries the tool along; beside that it turns evenly about one axis, which is carried along
+    too. Of the two senses of that turn the one is taken that passes nearer to the orientation of the arc's point.
+
+    Parameters
+    ----------
+    start, via, end : (4, 4), m, of which ``via`` is the arc's point
+    circle : as of :func:`centre_and_angle`
+
+    Returns
+    -------
+    turn : (3,), rad, rotation vector as it is at the start
+    in_doubt : whether that orientation is about as far from both
+    """
+    centre, normal, angle = circle
+    spoke, to_via = start[:3, 3] - centre, via[:3, 3] - centre
+    share = np.arctan2(normal @ np.cross(spoke, to_via), spoke @ to_via) % (2 * np.pi) / angle
+    turn = log_rotation(exp_rotation(-angle * normal) @ end[:3, :3] @ start[:3, :3].T)
+    size = float(np.linalg.norm(turn))
+    if size <= SHORT_TURN:
+        return turn, False
+    senses = turn, turn * (1 - 2 * np.pi / size)
+    there = (exp_rotation(share * angle * normal) @ exp_rotation(share * each) @ start[:3, :3] for each in senses)
+    off = [float(rotation_angle(via[:3, :3], each)) for each in there]
+    return senses[int(off[1] < off[0])], min(off) > max(off) / 2
+
+
+def turns_apart(start: Reals, via: Reals, end: Reals) -> float:
+    """By how much (rad) an arc that turns the tool with the path is from one that turns it about one axis."""
+    shares = np.array([0.25, 0.5, 0.75])
+    one, other = (arc_poses(start, via, end, shares, with_path) for with_path in (False, True))
+    return 0.0 if one is None or other is None else float(rotation_angle(one[:, :3, :3], other[:, :3, :3]).max())
 
 
 def centre_and_angle(start: Reals, via: Reals, end: Reals) -> tuple[Reals, Reals, float] | None:
@@ -444,7 +489,7 @@ def arc_end(start: Reals, via: Reals, target: Reals, angle: float) -> Reals | No
     return end
 
 
-def chords(start: Reals, via: Reals, end: Reals, deviation: float) -> Reals | None:
+def chords(start: Reals, via: Reals, end: Reals, deviation: float, with_path: bool = False) -> Reals | None:
     """Poses (n, 4, 4) after the start, lines between which stay within ``deviation`` (m) of the arc."""
     circle = centre_and_angle(start[:3, 3], via[:3, 3], end[:3, 3])
     if circle is None:
@@ -453,7 +498,7 @@ def chords(start: Reals, via: Reals, end: Reals, deviation: float) -> Reals | No
     radius = float(np.linalg.norm(start[:3, 3] - centre))
     widest = 2 * math.acos(max(1 - deviation / radius, 0.0)) if radius > 0 else angle
     count = min(max(math.ceil(angle / max(widest, 1e-6)), 1), MAX_LINES)
-    found = arc_poses(start, via, end, np.arange(1, count + 1) / count)
+    found = arc_poses(start, via, end, np.arange(1, count + 1) / count, with_path)
     if found is not None:
         found[-1] = end
     return found

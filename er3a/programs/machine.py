@@ -610,6 +610,7 @@ class ExecutionPath:
     rounds: dict[tuple[str, int], int] = field(default_factory=dict)
     line: tuple[tuple[int, int], ...] = ()  # ways that it comes from, each with the count of states until then
     beside: bool = False  # whether it runs beside the program
+    again: bool = False  # whether it is the program's second round
 
     def fork(self, new: int, states: int) -> ExecutionPath:
         """Another that goes its own way from here."""
@@ -617,7 +618,7 @@ class ExecutionPath:
         memory = self.memory.copy()
         memory.local = frames[-1].local
         line = (*self.line, (self.number, states))
-        return ExecutionPath(frames, memory, self.step, new, dict(self.rounds), line, self.beside)
+        return ExecutionPath(frames, memory, self.step, new, dict(self.rounds), line, self.beside, self.again)
 
 
 class Machine:
@@ -627,6 +628,7 @@ class Machine:
         self, program: syntax.Program, dialect: Dialect, cell: Cell, limits: RunLimits, keep_on: KeepOn | None = None
     ):
         self.program, self.dialect, self.cell, self.limits = program, dialect, cell, limits
+        self.cyclic = program.cyclic and limits.second_round
         self.keep_on = keep_on
         self.stopped = False
         self.steps: list[Step] = []
@@ -659,6 +661,9 @@ class Machine:
         self.loops = {name: _loops(routine) for name, routine in program.routines.items()}
         self.seen: dict[Hashable, tuple[int, int, int]] = {}  # way, count, last step
         self.waiting: list[ExecutionPath] = []
+        self.second: list[ExecutionPath] = []  # rounds, which wait for all else
+        self.begun: set[Hashable] = set()  # states in which the program was begun
+        self.after_moves: dict[Hashable, int] = {}  # states behind motions, with the step
         self.ways = 1
         self.numbers = 1  # of ways that were begun, those that joined others too
         self.sides: Counter[tuple[str, int, bool]] = Counter()  # how often each side of a branch was taken
@@ -679,9 +684,10 @@ class Machine:
         if entry is not None:
             way = ExecutionPath([], memory)
             self._begin(way)
+            self.begun.add(self._state(way))
             self.waiting.append(way)
-        while self.waiting:
-            self._follow(self.waiting.pop())
+        while self.waiting or self.second:
+            self._follow(self.waiting.pop() if self.waiting else self.second.pop())
         twice = (each for name, each in self.frames_twice.items() if name not in of_data or name in memory.met)
         return Execution(
             self.program,
@@ -701,6 +707,28 @@ class Machine:
         way.frames = [Frame(entry)]
         way.memory.local, way.memory.aliased = way.frames[0].local, self.unsettled[entry.name]
         way.memory.kept.clear()
+
+    def _begin_again(self, way: ExecutionPath) -> None:
+        """Follow the second round of a program that is over, up to where it is in a state of the first."""
+        if not self.cyclic or way.beside or way.again:
+            return
+        self._begin(way)
+        state = self._state(way)
+        if state not in self.begun:
+            self.begun.add(state)
+            way.again, way.number, way.line = True, self.numbers, ()
+            self.numbers += 1
+            self.second.append(way)
+
+    def _comes_to_first_round(self, way: ExecutionPath) -> int | None:
+        """The step after which the first round of a program was in the state that a way is in behind a motion."""
+        if not self.cyclic or way.beside:
+            return None
+        state = self._state(way)
+        if not way.again:
+            self.after_moves.setdefault(state, way.step)
+            return None
+        return self.after_moves.get(state)
 
     def _unmet(self) -> tuple[instructions.Place, ...]:
         """Instructions that are not motions, may move the arm as far as is known, and were not carried out.
@@ -770,12 +798,18 @@ class Machine:
             elif isinstance(operation, (syntax.Return, syntax.Halt)):
                 if isinstance(operation, syntax.Halt) or len(way.frames) == 1:
                     self._end(way, "end", operation.place)
+                    if isinstance(operation, syntax.Return):
+                        self._begin_again(way)
                     return
                 self._return(way, operation)
             else:
                 self._carry_out(way, frame, operation)
             if way.memory.unset:
                 self._keep_unset(way, frame, at, operation)
+            moved = isinstance(operation, syntax.Move)
+            if moved and (first := self._comes_to_first_round(way)) is not None:
+                self._end(way, "joins", operation.place, first)
+                return
 
     def _keep_unset(self, way: ExecutionPath, frame: Frame, at: int, operation: syntax.Operation) -> None:
         """Keep that an operation has read a pose with a tool or base that is not set, if motions depend on it."""
@@ -844,7 +878,7 @@ class Machine:
 
     def _note(self, way: ExecutionPath, place: instructions.Place, instruction: instructions.Instruction) -> None:
         self.first_after.setdefault(way.step, len(self.steps))
-        self.steps.append(Step(instruction, place, way.frames[-1].calls, way.step))
+        self.steps.append(Step(instruction, place, way.frames[-1].calls, way.step, way.again))
         way.step = len(self.steps) - 1
 
     def _is_stopped(self) -> bool:
@@ -856,12 +890,12 @@ class Machine:
         self, way: ExecutionPath, kind: EndKind, place: instructions.Place, after: int | None = None, limit: int = 0
     ) -> None:
         """``after``: the step before the one that follows."""
-        if kind == "end" and not way.beside and self.changed_at:
+        if kind == "end" and not (way.beside or way.again) and self.changed_at:
             values = way.memory.shared
             changed = (root(name) for name in way.memory.met if values.get(name) != self.first_values.get(name))
             self.kept.update({name: self.changed_at[name] for name in changed if name in self.changed_at})
         follows = None if after is None else self.first_after.get(after)
-        self.endings.append(Ending(kind, way.step, place, follows, limit, way.beside))
+        self.endings.append(Ending(kind, way.step, place, follows, limit, way.beside, way.again))
 
     def _assign(self, memory: ProgramMemory, each: syntax.Assign) -> instructions.Output | instructions.Unknown | None:
         if each.type_name and isinstance(each.target, syntax.Variable):
@@ -1097,13 +1131,7 @@ class Machine:
 
     def _met(self, way: ExecutionPath) -> tuple[EndKind, int] | None:
         """Whether this way (it repeats) or another (it joins) was in this state before, and after which step."""
-        memory, last = way.memory, len(way.frames) - 1
-        frames = tuple(
-            (frame.routine.name, frame.at, self._kept(memory.local if i == last else frame.local))
-            for i, frame in enumerate(way.frames)
-        )
-        doubts = frozenset(memory.doubts.items())
-        key = (frames, self._kept(memory.shared), memory.here.key(), doubts, memory.aliased)
+        key = self._state(way)
         found = self.seen.get(key)
         if found is None:
             self.seen[key] = (way.number, len(self.seen), way.step)
@@ -1111,6 +1139,16 @@ class Machine:
         other, count, step = found
         own = other == way.number or any(other == earlier and count < until for earlier, until in way.line)
         return ("repeats" if own else "joins"), step
+
+    def _state(self, way: ExecutionPath) -> Hashable:
+        """A key that is equal for ways that go on alike."""
+        memory, last = way.memory, len(way.frames) - 1
+        frames = tuple(
+            (frame.routine.name, frame.at, self._kept(memory.local if i == last else frame.local))
+            for i, frame in enumerate(way.frames)
+        )
+        doubts = frozenset(memory.doubts.items())
+        return frames, self._kept(memory.shared), memory.here.key(), doubts, memory.aliased
 
     def _kept(self, values: dict[str, syntax.Value]) -> frozenset[tuple[str, syntax.Value]]:
         new = values.keys() - self.names_met

@@ -87,6 +87,12 @@ class ArcsSplit(Finding, code="written_arcs_split"):
     deviation_m: float
 
 
+class ArcsTurnOtherwise(Finding, code="written_arcs_turn_otherwise"):
+    """Arcs on which the tool turns with the path were written in a language whose arcs turn it about one axis."""
+
+    arcs: int
+
+
 class ZonesDropped(Finding, code="written_zones_dropped"):
     """Zones that the language has no equal for were written as stops."""
 
@@ -172,6 +178,7 @@ class WrittenBesidePoints(Finding):
 
 WriteFinding = (
     ArcsSplit
+    | ArcsTurnOtherwise
     | ZonesDropped
     | SplinesAsLines
     | SpeedsEstimated

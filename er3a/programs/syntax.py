@@ -407,6 +407,7 @@ class Program(ByValue):
     slides : whether each joint of a table slides, its targets in m; empty of other programs
     beside : variables that other tasks, which run beside the program, change
     elsewhere : variables of its data that other programs set, which it does not call, with where
+    cyclic : whether a controller may begin it again when it is over
     """
 
     language: LanguageName
@@ -420,6 +421,7 @@ class Program(ByValue):
     slides: tuple[bool, ...] = ()
     beside: frozenset[str] = frozenset()
     elsewhere: tuple[tuple[str, Place], ...] = ()
+    cyclic: bool = False
 
     def operations(self) -> Iterator[Operation]:
         """All that the text holds, whether it is ever reached or not."""

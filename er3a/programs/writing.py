@@ -29,6 +29,7 @@ MAX_AT_ONCE = 2_000  # motions whose joints are solved together
 MAX_ROUNDS = 10  # over them
 
 Frames = tuple[instructions.NamedFrame, instructions.NamedFrame]
+SAME_TURN = math.radians(0.01)  # by which poses on an arc may differ
 NO_SIDE = 1e-9  # m or rad, of a signed distance that is on no side
 
 
@@ -67,6 +68,15 @@ class ReadyMotion:
         if self.motion.kind == "arc" and self.via is not None:
             return instructions.arc_length(self.pose_before, self.via, self.pose)
         return float(np.linalg.norm(self.pose[:3, 3] - self.pose_before[:3, 3]))
+
+    @property
+    def turn_matters(self) -> bool:
+        """Whether the motion is an arc on which it makes a difference how the tool turns, as far as is known."""
+        if self.motion.kind != "arc":
+            return False
+        if self.pose is None or self.pose_before is None or self.via is None:
+            return True
+        return instructions.turns_apart(self.pose_before, self.via, self.pose) > SAME_TURN
 
 
 class Resolver:
@@ -294,7 +304,7 @@ def _between(motion: instructions.ArmMotion, start: Reals) -> Reals:
     shares = np.arange(1, count + 1) / count
     poses = None
     if motion.kind == "arc" and isinstance(motion.via, instructions.PoseTarget):
-        poses = instructions.arc_poses(start, motion.via.pose, end, shares)
+        poses = instructions.arc_poses(start, motion.via.pose, end, shares, motion.with_path)
     if poses is None:
         poses = np.tile(np.eye(4), (count, 1, 1))
         poses[:, :3, 3] = start[:3, 3] + shares[:, None] * (end[:3, 3] - start[:3, 3])
@@ -578,6 +588,7 @@ class Writer(ABC):
 
 
 COUNTED: dict[str, Callable[[int], program_findings.WriteFinding]] = {
+    "turned": program_findings.ArcsTurnOtherwise,
     "zones": program_findings.ZonesDropped,
     "splines": program_findings.SplinesAsLines,
     "estimated": program_findings.SpeedsEstimated,
@@ -593,6 +604,8 @@ def head_line(finding: program_findings.WriteFinding) -> str:
     match finding:
         case program_findings.ArcsSplit(arcs=arcs, lines=lines, deviation_m=deviation):
             return f"{arcs} arc(s) as {lines} lines that stay within {deviation * 1000:g} mm"
+        case program_findings.ArcsTurnOtherwise(arcs=count):
+            return f"{count} arc(s) turn the tool about one axis, and not with the path as those that were read"
         case program_findings.ZonesDropped(zones=count):
             return f"{count} zone(s) without equal in this language: the arm stops there"
         case program_findings.SplinesAsLines(points=count):

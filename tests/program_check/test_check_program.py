@@ -366,7 +366,7 @@ END
     np.testing.assert_allclose(forward(ROBOT, way.joints_at(shares))[:, :3, 3], wanted, atol=1e-9)
     radians = np.radians(180 - angle * np.array([0.0, 0.25, 0.5]))  # half the arc bulges over its chord by
     start, middle, end = 0.03 * np.stack([np.cos(radians), np.sin(radians)], axis=1)
-    assert way.sagitta(0.5) == pytest.approx(np.linalg.norm(middle - (start + end) / 2))
+    assert way.sagitta(0.5) == (pytest.approx(np.linalg.norm(middle - (start + end) / 2)), 0.0)
     after = list(check.motions.values())[-1]
     np.testing.assert_allclose(forward(ROBOT, after.end)[:3, 3], wanted[-1] + [0, 0, 0.01], atol=1e-7)
 

@@ -1238,7 +1238,7 @@ def test_a_routine_that_an_error_ends_is_followed(tmp_path, own, caller, leaves)
     sub = "PROC sub1()\nMoveL p,v100,fine,tool0;\nWaitDI di1,1\\MaxTime:=2;\nMoveL Offs(p,0,0,100),v100,fine,tool0;\n"
     text = rapid(f"sub1;\nMoveL Offs(p,0,50,0),v100,fine,tool0;\n{caller}", f"{sub}{own}ENDPROC\n")
     found = check(tmp_path, text, "a.mod")
-    assert (len(found.execution.endings) > 1) == leaves
+    assert (sum(not each.again for each in found.execution.endings) > 1) == leaves
     lines = [each for each in found.motions.values() if each.kind == "line"]
     assert len({tuple(np.round(np.append(each.start, each.end), 6)) for each in lines}) == 3 + leaves
 

@@ -155,6 +155,12 @@ def krl(*lines: str, more: str = "") -> str:
     return HEAD + "".join(f"{line}\n" for line in lines) + f"END\n{more}"
 
 
+REST, SLOW = "[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]", "v10,fine,tool0;"
+AT_POINT = f"ConfJ\\Off;ConfL\\Off;MoveJ [[400,0,400],[0,0,1,0],{REST}],v50,fine,tool0;"
+
+TURNS = [f"MoveAbsJ [[0,-10,-10,0,-70,{turn}],[9E9,9E9,9E9,9E9,9E9,9E9]],v50,fine,tool0;" for turn in (-120, 0, 120)]
+
+
 def last(check):
     """Where the arm stands behind the last motion."""
     return list(check.motions.values())[-1].end
@@ -261,6 +267,10 @@ MENDED = {
         krl(f"LIN {{X 400,Y 0,Z 400,{DOWN}}}", "CIRC {X 420,Y 20},{X 440,Y 0,A 10},CA 270"),
         krl(f"LIN {{X 400,Y 0,Z 400,{DOWN}}}", "CIRC {X 420,Y 20},{X 440,Y 0}", "CIRC {X 434,Y -14},{X 420,Y -20}"),
     ),
+    "arc_turn_in_doubt": (
+        rapid(AT_POINT, f"MoveC [[420,20,400],[0,0.7071068,0.7071068,0],{REST}],[[440,0,400],[0,0,1,0],{REST}],{SLOW}"),
+        rapid(AT_POINT, f"MoveC [[420,20,400],[0,0,1,0],{REST}],[[440,0,400],[0,0,1,0],{REST}],{SLOW}"),
+    ),
     "target_not_given": (
         krl("PTP XTHERE"),
         (krl("PTP XTHERE"), {"data": "E6AXIS XTHERE={A1 10,A2 -10,A3 -10,A4 0,A5 -70,A6 0}"}),
@@ -304,6 +314,10 @@ MENDED = {
         (krl("PTP {A1 5}", "PTP {A1 6}", "PTP {A1 7}"), {"most_motions": 2}),
         krl("PTP {A1 5}", "PTP {A1 6}", "PTP {A1 7}"),
         (krl("PTP {A1 5}", "PTP {A1 6}"), {"most_motions": 2}),
+    ),
+    "begun_again": (
+        rapid(*TURNS),
+        rapid(*TURNS, TURNS[1]),
     ),
     "loop_comes_back_otherwise": (
         (krl(*LOOP, "ENDLOOP"), {"limits": RunLimits(rounds=5)}),

@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from er3a.geometry.transforms import transform
-from er3a.program_check.check_program import CheckOptions, check_program
+from er3a.geometry.transforms import rotation_angle, transform
+from er3a.kinematics.forward import forward
+from er3a.planning.commands import CommandSource
+from er3a.program_check.check_program import CheckOptions, check_program, parts_of
 from er3a.programs.instructions import JointTarget, PoseTarget
 from er3a.programs.languages import files_of, read_program, write_program
 from er3a.programs.machine import execute
@@ -260,6 +262,36 @@ def test_a_module_variable_of_rapid_keeps_its_value_to_the_next_cycle(tmp_path):
     assert codes(found)["kept_to_next_start"] == [8]
     local = rapid("n:=0;\nMoveL Offs(p,n*30,0,0),v100,fine,tool0;\nn:=n+1;", "VAR num n:=0;")
     assert "kept_to_next_start" not in codes(check(tmp_path, local, "a.mod"))
+
+
+def at_turn(degrees: float) -> str:
+    return f"MoveAbsJ [[0,-10,-10,0,-70,{degrees}],{NONE}],v50,fine,tool0;\n"
+
+
+@pytest.mark.parametrize(
+    ("data", "body", "told"),
+    [
+        ("", at_turn(-120) + at_turn(0) + at_turn(120), {5: ["whole_turn"]}),
+        ("", at_turn(-120) + at_turn(0) + at_turn(120) + at_turn(0), {}),
+        ("", at_turn(-120) + at_turn(0) + at_turn(120) + "EXIT;\n", {}),
+        ("", "WHILE TRUE DO\n" + at_turn(-120) + at_turn(0) + "ENDWHILE\n", {}),
+        # up from where the arm is, which is too high at the end of the first round
+        (
+            "VAR robtarget q;",
+            "q:=CRobT(\\Tool:=tool0\\WObj:=wobj0);\nMoveL Offs(q,0,0,250),v100,fine,tool0;\n",
+            {6: ["target_out_of_reach"]},
+        ),
+    ],
+)
+def test_a_program_of_rapid_is_begun_again_from_where_it_ends(tmp_path, data, body, told):
+    """As in run mode Continuous: what is found then alone is a caution; what is found is not twice."""
+    text = f"MODULE a\n{data}\nPROC main()\nConfL\\Off;\n{body}ENDPROC\nENDMODULE\n"
+    found = check(tmp_path, text, "a.mod")
+    again = {each.place.line: each for each in found.findings if each.finding.code == "begun_again"}
+    assert {line: [code for code in each.finding.codes if code in told[line]] for line, each in again.items()} == told
+    assert {each.level for each in again.values()} <= {"caution"}
+    assert not any(found.execution.steps[number].again for number in found.main)
+    assert {each.times for each in found.verdicts} <= ({1, 2} if "WHILE" in body else {1})
 
 
 def test_a_cycle_that_is_left_begins_again_from_where_the_arm_is(tmp_path):
@@ -794,3 +826,74 @@ def test_half_a_turn_of_krl_is_no_pass(tmp_path, turn):
 def test_the_angles_of_a_relative_position_in_the_base_may_mean_two_things(tmp_path, before, turn, told):
     body = f"{FRAMES}{SPEEDS}LIN {{X 400,Y 0,Z 300,A {before},B 170,C 0}}\nLIN_REL {{{turn}}}"
     assert ("relative_turn_assumed" in codes(check(tmp_path, krl(body), "a.src"))) == told
+
+
+def on_circle(degrees: float, yaw: float, tilt: float = 0.0) -> str:
+    """A robtarget on a circle of 30 mm, of a tool that looks down, tilted, and is turned about the circle's axis."""
+    turn = Rotation.from_euler("ZX", [yaw, 180 - tilt], degrees=True).as_quat()[[3, 0, 1, 2]]
+    x, y = 400 + 30 * np.cos(np.radians(degrees)), 30 * np.sin(np.radians(degrees))
+    return f"[[{x:.9f},{y:.9f},300],[{','.join(f'{each:.12f}' for each in turn)}],[0,0,0,0],{NONE}]"
+
+
+def on_arc(first: str, point: str, last: str, mode: str = "") -> str:
+    at = "v100,fine,tool0;"
+    return rapid(f"ConfJ\\Off;\nMoveJ {first},{at}\n{mode}MoveC {point},{last},{at}")
+
+
+@pytest.mark.parametrize(
+    ("ends", "yaws", "tilt", "mode", "middle"),
+    [
+        ((-100, 100), (-100, 0, 100), 0, "", 0),  # with the path, though that is no shorter way
+        ((-100, 100), (0, 0, 0), 0, "", 0),  # as it was all the way, though the path turns by 200 deg
+        ((-90, 90), (-90, 0, 90), 0, "", 0),
+        ((-100, 100), (-100, 0, 100), 0, "CirPathMode\\ObjectFrame;\n", 180),  # 160 deg the other way round
+        ((-75, 75), (-75, 0, 75), 30, "", 0),  # half of the tilt, about the axis that is carried along
+        ((-75, 75), (-75, 0, 75), 30, "CirPathMode;\n", 0),
+    ],
+)
+def test_an_arc_of_rapid_turns_the_tool_with_the_path(tmp_path, ends, yaws, tilt, mode, middle):
+    """As Basic Characteristics RAPID, MoveC, says; the orientation of the arc's point chooses between two senses."""
+    start, point, end = on_circle(ends[0], yaws[0]), on_circle(0, yaws[1], tilt / 2), on_circle(ends[1], yaws[2], tilt)
+    found = check(tmp_path, on_arc(start, point, end, mode), "a.mod")
+    arc = list(found.motions.values())[-1]
+    assert arc.way is not None
+    assert not {each.code for each in arc.findings} & {"arc_turn_in_doubt", "way_out_of_reach"}
+    assert "program_not_simulated" not in codes(found)
+    R = forward(ROBOT, arc.way.joints_at(np.array([0.5])))[0, :3, :3]
+    wanted = Rotation.from_euler("ZX", [middle, 180 - tilt / 2], degrees=True).as_matrix()
+    assert np.degrees(rotation_angle(R, wanted)) < 1e-4
+
+
+def test_a_point_on_an_arc_whose_orientation_is_as_far_from_both_senses_is_a_caution(tmp_path):
+    ends = on_circle(-90, 0), on_circle(90, 0)
+    assert "arc_turn_in_doubt" in codes(check(tmp_path, on_arc(ends[0], on_circle(0, 90), ends[1]), "a.mod"))
+    assert "arc_turn_in_doubt" not in codes(check(tmp_path, on_arc(ends[0], on_circle(0, 20), ends[1]), "a.mod"))
+
+
+def test_what_else_circular_paths_may_be_told_is_named(tmp_path):
+    text = on_arc(on_circle(-90, 0), on_circle(0, 0), on_circle(90, 0), "CirPathMode\\CirPointOri;\n")
+    assert codes(check(tmp_path, text, "a.mod"))["program_not_simulated"] == [9]
+
+
+def test_an_arc_that_turns_with_the_path_is_no_arc_of_a_path(tmp_path):
+    """A path's arcs turn about one axis: what does otherwise is left out, and what does not is none the less."""
+    for yaws, parts in (((-75, 0, 75), 1), ((0, 0, 0), 2)):
+        text = on_arc(*(on_circle(*each) for each in zip((-75, 0, 75), yaws, (0, 10, 20) if parts == 1 else (0, 0, 0))))
+        found = check(tmp_path, text, "a.mod")
+        made, rest = parts_of(found, ROBOT, CommandSource())
+        assert (len(made), rest) == (parts, () if parts == 2 else (9,))
+
+
+def test_arcs_are_written_so_that_they_turn_as_they_were_read_or_that_is_told(tmp_path):
+    with_path = on_arc(on_circle(-75, -75), on_circle(0, 0, 10), on_circle(75, 75, 20))
+    about_axis = with_path.replace("MoveC", "CirPathMode\\ObjectFrame;\nMoveC")
+    for text, mode in ((with_path, "PathFrame"), (about_axis, "ObjectFrame")):
+        listing = execute(written(tmp_path, text, "a.mod"), ROBOT, HOME).listing()
+        again = write_program(listing, "rapid", WriteOptions(ROBOT, HOME)).files[".mod"]
+        assert f"CirPathMode \\{mode};" in again
+        assert motions(tmp_path, again, "b.mod")[-1].with_path == (mode == "PathFrame")
+        for language in ("krl", "urscript"):
+            told = {each.code for each in write_program(listing, language, WriteOptions(ROBOT, HOME)).findings}
+            assert ("written_arcs_turn_otherwise" in told) == (mode == "PathFrame")
+    plain = execute(written(tmp_path, on_arc(*(on_circle(each, 0) for each in (-75, 0, 75))), "a.mod"), ROBOT, HOME)
+    assert "CirPathMode" not in write_program(plain.listing(), "rapid", WriteOptions(ROBOT, HOME)).files[".mod"]

@@ -114,7 +114,7 @@ def test_no_overlap_of_a_way_between_two_lines_goes_unnoticed(seed, turn):
         if made is None:
             continue
         corners, T = made
-        found = zone_clearance(BODIES, corners, 0.001, patch=patch_of(ROBOT, corners, 0.0))
+        found = zone_clearance(BODIES, corners, 0.001, patch=patch_of(ROBOT, corners))
         told.append(type(found))
         t = np.linspace(0, 1, 21)
         shares = np.concatenate([np.stack([(1 - t) ** 2, t**2], axis=1), rng.dirichlet(np.ones(3), 30)[:, :2]])
@@ -146,7 +146,7 @@ def test_joints_bend_within_a_triangle_of_poses_by_no_more_than_is_said():
         if made is None:
             continue
         corners, _ = made
-        patch = patch_of(ROBOT, corners, 0.0)
+        patch = patch_of(ROBOT, corners)
         bend, _ = patch.bend(WHOLE, corners)
         if not np.isfinite(bend).all():
             continue
@@ -175,7 +175,7 @@ def test_no_column_of_the_jacobian_gets_longer_than_is_said():
 def test_a_corner_through_a_singular_pose_is_not_settled():
     q = np.radians([0.0, -10.0, -10.0, 0.0, 0.0, 0.0])
     corners = q + np.radians([[-1, 0, 0, 0, 1, 0], [0, 0, 0, 0, 0, 0], [0, 1, 0, 0, -1, 0]])
-    found = zone_clearance(BODIES, corners, 0.001, patch=patch_of(ROBOT, corners, 0.0))
+    found = zone_clearance(BODIES, corners, 0.001, patch=patch_of(ROBOT, corners))
     assert isinstance(found, ZoneNotSettled)
 
 
@@ -186,11 +186,11 @@ def test_joints_of_a_line_leave_the_chord_by_no_more_than_is_said():
         made = line_corner(rng, 0.05, 0.1)
         if made is None:
             continue
-        patch = patch_of(ROBOT, made[0], 0.0)
+        patch = patch_of(ROBOT, made[0])
         shares = np.linspace(0, 1, 161)
         at = np.stack([np.zeros(161), shares], axis=1)
         q = patch.joints(at, made[0][1] + shares[:, None] * (made[0][2] - made[0][1]))
-        bend = bend_of_line(ROBOT, q[::10], 0.0)
+        bend = bend_of_line(ROBOT, q[::10])
         if not np.isfinite(bend).all():
             continue
         proven += 1

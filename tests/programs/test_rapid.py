@@ -548,7 +548,7 @@ def test_the_motions_that_are_read_are_listed():
 
 UNFOLLOWED = (
     *("SingArea\\Wrist;", "ActUnit CNV1;", "SyncMoveOn sync1,tasks;", "SoftAct 1,20;", "EOffsSet [1,0,0,0,0,0];"),
-    *("MoveExtJ home,vrot10,fine;", "CirPathMode\\PathFrame;", "SpeedRefresh 50;", "IndReset Station,1;"),
+    *("MoveExtJ home,vrot10,fine;", "CirPathMode\\CirPointOri;", "SpeedRefresh 50;", "IndReset Station,1;"),
 )
 
 

@@ -86,6 +86,7 @@ REMEDIES: dict[str, str] = {
     "zone_collides": N_("Make the zone smaller, or stop at the corner."),
     "zone_not_settled": N_("Stop at the corner, or make the zone smaller until this is no longer found."),
     "arc_has_no_circle": N_("Teach the arc's via point off the straight line between its ends, or use a line."),
+    "arc_turn_in_doubt": N_("Give the arc's via point the orientation that the tool shall have there."),
     "arc_goes_on": N_("Check on the controller where the arc ends, or split it into arcs that end at targets."),
     "undecided": N_("Keep the path farther from singular poses and limits, or run this line slowly under supervision."),
     "line_not_checked": BY_HAND,
@@ -106,6 +107,7 @@ REMEDIES: dict[str, str] = {
     "way_not_known": N_("Give start_deg of the program, or mend the motion before."),
     "not_come_to": FURTHER,
     "rest_not_checked": N_("Give the check more time or motions, or split the program and check its parts."),
+    "begun_again": N_("Let the program end where it begins, and write the way there at its end: it is checked then."),
     "loop_comes_back_otherwise": N_("Turn the tool back within the loop, so that each round ends as it began."),
     "program_data_file_missing": N_("Put the data file beside the program."),
     "program_name_twice": N_("Remove one of the two definitions."),
@@ -311,6 +313,10 @@ TEXTS = texts(
         "bodies_touch": "{pair} after {at_mm:.1f} mm, up to {depth_mm:.1f} mm deep",
         "bodies_touch.enlarged": "{touch} (these shapes are up to {enlarged_mm:.1f} mm larger than the meshes in them)",
         "bodies_touch.joint": "{pair} after {t_s:.2f} s, up to {depth_mm:.1f} mm deep",
+        "arc_turn_in_doubt": (
+            "the orientation of the arc's via point does not tell in which direction the tool turns; the one that "
+            "comes nearer to it was checked"
+        ),
         "arc_goes_on": "the arc ends after {angle_deg:g} deg, not at its target",
         "arc_goes_on.unknown": "the angle at which the arc ends is not known; the arc was not checked",
         "arc_goes_on.turns": (
@@ -398,6 +404,10 @@ TEXTS = texts(
             "targets, for reach and limits, but not the motions between them"
         ),
         "rest_not_checked": "only the first {checked} motions that are carried out were checked, none from here on",
+        "begun_again": (
+            "if the controller begins the program again from where it ends (run mode Continuous), this motion has: "
+            "{codes:, }"
+        ),
         "loop_comes_back_otherwise": (
             "the loop begins again with J{joint} {difference_deg:.2f} {unit} from where it was in the round that was "
             "checked"
@@ -468,6 +478,11 @@ TEXTS = texts(
             "arcs",
             "{count} arc written as {lines} lines that stay within {deviation:g} mm of it",
             "{count} arcs written as {lines} lines that stay within {deviation:g} mm of them",
+        ),
+        "written_arcs_turn_otherwise": Plural(
+            "arcs",
+            "{count} arc turns the tool about one axis, and not with the path as the arc that was read",
+            "{count} arcs turn the tool about one axis, and not with the path as the arcs that were read",
         ),
         "written_unsafe": "the path {path} is not safe: {verdict}",
         "written_near_assumed": (

@@ -69,6 +69,7 @@ class KrlWriter(writing.Writer):
         if motion.kind == "spline":
             self.count["splines"] += 1
         if motion.kind == "arc":
+            self.count["turned"] += motion.with_path and ready.turn_matters
             angle = "" if motion.angle is None else f", CA {writing.fixed(math.degrees(motion.angle), DIGITS)}"
             self.lines.append(f"CIRC {via}, {target}{angle}{zone}")
         else:

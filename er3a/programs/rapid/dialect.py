@@ -34,7 +34,7 @@ SLOWEST_RAMP = 20.0  # percent; 1 AccSet: smaller values count as 20
 FULL_SPEED = 5000.0  # mm/s, of VelSet where a program sets none
 SETTINGS = {
     **{name: f"%{name}" for name in ("CONFJ", "CONFL", "PATHACCLIM", "WORLDACCLIM")},
-    **{"ACCSET": "%ACC", "VELSET": "%SPEED"},
+    **{"ACCSET": "%ACC", "VELSET": "%SPEED", "CIRPATHMODE": "%ARCS"},
     **dict.fromkeys(("PDISPSET", "PDISPON", "PDISPOFF"), "%PDISP"),
 }
 """Instructions that later motions depend on, and that are followed, with the name under which each is kept."""
@@ -203,6 +203,7 @@ class RapidDialect(Dialect):
         via = made[0] if arc else None
         if isinstance(via, instructions.PoseTarget):
             via = replace(via, branch=None)
+        about_one_axis = memory.read("%ARCS") if arc else None
         return instructions.ArmMotion(
             kind,
             made[-1],
@@ -215,6 +216,8 @@ class RapidDialect(Dialect):
             *frames,
             turn_speed=turn,
             load=_load(memory, tool, values[tool_at], options.get("TLOAD")),
+            doubt="CirPathMode" if isinstance(about_one_axis, syntax.Unclear) else "",
+            with_path=arc and about_one_axis is not True,
         )
 
     def _target(
@@ -263,6 +266,10 @@ class RapidDialect(Dialect):
         if call.function == "SETSYSDATA":
             _set_active(memory, call)
             return instructions.Aside(doing.text)
+        if call.function == "CIRPATHMODE":
+            options = {key for key, _ in call.keywords}
+            memory.write("%ARCS", options == {"OBJECTFRAME"})
+            return None if options in reader.FOLLOWED[call.function] else instructions.Aside(doing.text)
         if call.function in SETTINGS:
             return None if _set(memory, call) else instructions.Unknown(doing.text, may_move=False)
         if call.function in OUTPUTS and call.arguments:

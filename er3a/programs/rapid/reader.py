@@ -99,6 +99,12 @@ WZSPHDEF
 """
 NOT_SIMULATED = frozenset(NOT_SIMULATED_TEXT.split())
 """What is known to shape a motion or to move something else, and is not followed: it is named."""
+FOLLOWED: Mapping[str, tuple[set[str], ...]] = {
+    "SINGAREA": ({"OFF"},),
+    "CIRPATHMODE": (set(), {"PATHFRAME"}, {"OBJECTFRAME"}),
+}
+"""Options with which some of these are followed. CirPathMode: an arc turns the tool with the path, as where nothing is
+said, or about one axis."""
 UPPER, ARITHMETIC, TYPED, STEP, LATE = "%UPPER", "%ARITHMETIC", "%TYPED", "%STEP", "%LATE"
 RAISING = ("SOCKET", "OPEN", "READ", "WRITE", "LOAD", "UNLOAD", "STARTLOAD", "RMQ", "COPYFILE", "REMOVE", "MAKEDIR")
 """How instructions begin that often end with an error; any other may too, if less often."""
@@ -273,18 +279,20 @@ def read_rapid(source: ProgramText) -> syntax.Program:
         )
         findings.append(NameTwice(name, last.place))
     by_name, unlinked = linked([each for reader in readers for each in reader.routines], changed_arguments)
+    entry = _entry(own, by_name)
     return syntax.Program(
         "rapid",
         source.path.stem,
         source.path,
         by_name,
-        _entry(own, by_name),
+        entry,
         tuple(data),
         (*findings, *unlinked),
         source.lines,
         beside=frozenset(
             _set_by_tasks(source.path) & {name for cursor in cursors for name in _shared(cursor.source.text)}
         ),
+        cyclic=entry == "MAIN",
     )
 
 
@@ -764,7 +772,7 @@ class _BodyReader:
         """An instruction of the controller."""
         builder, (placed, named) = self.builder, given
         options = {key for key, _ in named}
-        if name in NOT_SIMULATED and not (name == "SINGAREA" and "OFF" in options):
+        if name in NOT_SIMULATED and options not in FOLLOWED.get(name, ()):
             self.module.findings.append(NotSimulated(text, place))
         if name in MOTIONS:
             if options - MOTION_OPTIONS:

@@ -90,6 +90,8 @@ class RapidWriter(writing.Writer):
         )
         load = motion.load if isinstance(motion.load, MassBody) else motion.tool.load
         tool = self._frame(replace(motion.tool, load=load), "tool")
+        if ready.turn_matters:
+            self.set_once("arcs", f"CirPathMode \\{'PathFrame' if motion.with_path else 'ObjectFrame'};")
         self._set_before(motion)
         self.lines.append(f"{form} {','.join(texts)},{speed},{zone},{tool}{base};")
 

@@ -132,7 +132,7 @@ class RplWriter(Writer):
         motion = ready.motion
         poses = None
         if ready.pose is not None and ready.pose_before is not None and ready.via is not None and motion.angle is None:
-            poses = chords(ready.pose_before, ready.via, ready.pose, self.options.arc_deviation)
+            poses = chords(ready.pose_before, ready.via, ready.pose, self.options.arc_deviation, motion.with_path)
         frames = (motion.tool, motion.base)
         joints = [None] if poses is None else self.resolver.solve(poses, frames, ready.joints_before)
         targets = [_joints_text(each) for each in joints if each is not None]

@@ -82,6 +82,7 @@ class UrScriptWriter(writing.Writer):
             form = "movej"
         elif motion.kind == "arc":
             form = "movec"
+            self.count["turned"] += motion.with_path and ready.turn_matters
         else:
             form = "movep" if motion.form == "movep" else "movel"
         via = "" if ready.via is None else f"{_pose_text(self._in_robot(ready, ready.via))}, "

@@ -164,7 +164,7 @@ def _summary(entry: ProgramEntry, check: ProgramCheck, starts: Mapping[int, floa
         outcome=OUTCOMES[worst_of(each.level for each in found)],
         expect=entry.expect,
         complete=check.execution.complete,
-        ways=len(check.execution.endings),
+        ways=sum(not each.again for each in check.execution.endings),
         motions=len(levels),
         passed=levels.count("pass"),
         caution=levels.count("caution"),
