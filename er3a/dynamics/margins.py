@@ -304,8 +304,10 @@ def wrist_use(
     """
     heaviest, ratio = load.mass + off[0], 1 + off[0] / load.mass if load.mass else 1.0
     joints = sorted({joint for joint, _ in (*wrist.moment, *wrist.inertia)})
-    found, bounds = worst_levers(robot, np.array(load.centre), [joint - 1 for joint in joints])
-    far = dict(zip(joints, zip(found.tolist(), (bounds + off[1]).tolist())))
+    far: dict[int, tuple[float, float]] = {}
+    if joints:  # a wrist of which the payload alone is known has none
+        found, bounds = worst_levers(robot, np.array(load.centre), [joint - 1 for joint in joints])
+        far = dict(zip(joints, zip(found.tolist(), (bounds + off[1]).tolist())))
     uses = [WristUse("payload", None, load.mass, heaviest, wrist.payload)] if np.isfinite(wrist.payload) else []
     pushed = any(load.force) or any(load.moment)
     for joint, allowed in wrist.moment:

@@ -343,6 +343,19 @@ def test_forces_on_the_tool_count_to_the_wrist_at_rest_and_along_the_paths(tmp_p
     assert more[5] != 0
 
 
+@pytest.mark.parametrize("wrist_load", [{"payload_kg": 1.0}, {}])
+def test_a_wrist_of_which_no_moment_is_known_is_compared_by_its_payload_alone(tmp_path, wrist_load):
+    def only(content: dict[str, Any]) -> None:
+        limited(1.0)(content)
+        content["wrist_load"] = CLAIM | wrist_load
+
+    study = a_study(tmp_path, only, entry={"payload": CLAIM | {"body": LOAD}}, kept=ONE)
+    found = computed(tmp_path, study)
+    rated = [use for use in found.results.summary.uses if use.quantity in ("payload", "moment", "inertia")]
+    assert [(use.quantity, use.asked) for use in rated] == ([("payload", 1.5)] if wrist_load else [])
+    assert found.status == ("fail" if wrist_load else "caution")
+
+
 def test_beyond_the_limits_it_is_an_overload(tmp_path, full):
     study = a_study(tmp_path, limited(0.3), entry={"payload": CLAIM | {"body": LOAD}}, kept=ONE)
     beyond = computed(tmp_path, study)
