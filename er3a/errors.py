@@ -40,6 +40,28 @@ class InputWarning(UserWarning):
     """A value in a file or an argument is allowed but looks like a mistake."""
 
 
+class DoubtfulUnit(InputWarning):
+    """A number in a file may be in another unit than its key says; no verdict that rests on it passes.
+
+    Parameters
+    ----------
+    key : where it stands within ``part``, which is a piece of the file's content; of the whole file without one
+    shown : the number with its unit; other : the unit that it may be in, in plural
+    file : None for values given in Python
+    """
+
+    def __init__(
+        self, key: str, shown: str, other: str, *, part: object = None, more: str = "", file: str | Path | None = None
+    ):
+        self.key, self.shown, self.other, self.part, self.more, self.file = key, shown, other, part, more, file
+        where = ": ".join(_line(str(each)) for each in (file, key) if each)
+        super().__init__(f"{where}: {shown} may be {other}{more}" if where else f"{shown} may be {other}{more}")
+
+    def at(self, file: str | Path | None, key: str) -> DoubtfulUnit:
+        """The same, with its file and its whole key."""
+        return DoubtfulUnit(key, self.shown, self.other, more=self.more, file=file)
+
+
 class ArgumentError(Er3aError, TypeError):
     """An argument has a type that can't be used."""
 

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from er3a.errors import InputError
+from er3a.errors import DoubtfulUnit, InputError
 from er3a.files.robot_library import load_robot
 from er3a.files.target_file import TargetEntry, load_targets, read_targets
 from er3a.kinematics.forward import forward
@@ -154,6 +154,12 @@ def test_small_angles_that_are_degrees_pass(rpy):
     assert TargetEntry(**PLACE, rpy_deg=rpy).rpy_deg == rpy
 
 
+@pytest.mark.parametrize("rpy", [[0, 1.5708, 0], [3.14, 0, 0], [0, 0, -0.7854], [0.52, -0.31, 1.2], [0, 1.047, 6]])
+def test_small_angles_that_look_like_radians_are_doubted(rpy):
+    with pytest.warns(DoubtfulUnit, match="may be radians"):
+        TargetEntry(**PLACE, rpy_deg=rpy)
+
+
 def test_target_at_the_origin_passes():
     assert TargetEntry(name="a", xyz_mm=[0, 0, 0], rpy_deg=[0, 0, 0]).xyz_mm == [0, 0, 0]
 
@@ -193,6 +199,14 @@ def test_table_takes_each_form_of_orientation(table, form, header, values):
     expected = [values[0:3], values[3:6], values[6:9]] if form == "matrix" else values
     np.testing.assert_allclose(target.T, pose(**{form: expected}))
     assert target.q_ref_deg == (1, 2, 3, 4, 5, 60)
+
+
+def test_a_table_says_in_a_column_that_its_small_angles_are_degrees(table):
+    header, *rows = TABLE.replace("0,90,0,", "0,1.5708,0,").splitlines()
+    with pytest.warns(DoubtfulUnit, match=r"some\.csv: targets\[0\]\.rpy_deg: \[0, 1\.5708, 0\] deg may be radians"):
+        read_targets(table("\n".join([header, *rows])))
+    confirmed = [f"{header},units_checked", *(f"{row},yes" for row in rows)]
+    assert read_targets(table("\n".join(confirmed)))[0].rpy_deg == [0, 1.5708, 0]
 
 
 @pytest.mark.parametrize(

@@ -57,6 +57,11 @@ class CsvColumn:
     quantity: str = "length or angle"
 
 
+UNITS_CHECKED = "units_checked"
+CHECKED_COLUMN = {UNITS_CHECKED: CsvColumn(str, optional=True, choices=("yes",), always=False)}
+"""The column that says yes where numbers which look like metres or radians are mm and degrees."""
+
+
 def read_csv(path: str | Path, columns: Mapping[str, CsvColumn], lines: Lines | None = None) -> list[dict[str, Any]]:
     """Read a CSV file with exactly these columns (any order); rows as dicts with a ``row`` key (file line).
 

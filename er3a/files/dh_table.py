@@ -24,8 +24,9 @@ from typing import Any, Literal
 from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn, Lines, check_widths, read_csv, read_lines
 from er3a.files.robot_file import SHORTEST_PLAIN_LENGTH_MM, RobotFile, far_normals
-from er3a.files.units import MAX_DEG, RADIANS_BELOW_DEG, look_like_radians
+from er3a.files.units import MAX_DEG, look_like_radians
 from er3a.files.yaml_file import parse
+from er3a.numerics.si_units import RADIANS_BELOW_DEG
 from er3a.robots.robot import CONVENTIONS, MAX_JOINTS, Convention, Grade
 
 _NUMBER, _OF_KIND = CsvColumn(float), CsvColumn(float, optional=True)

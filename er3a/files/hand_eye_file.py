@@ -29,7 +29,7 @@ from er3a.files.csv_file import CsvColumn, read_csv, read_header
 from er3a.files.robot_file import Text
 from er3a.files.target_file import FORMS as TARGET_FORMS
 from er3a.files.units import JOINT_COLUMN, METRES_BELOW_MM, WIDEST_IN_RADIANS
-from er3a.files.yaml_file import StrictModel, load
+from er3a.files.yaml_file import InputFile, StrictModel, load
 from er3a.geometry.transforms import exp_rotation, posed, transform
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
@@ -219,7 +219,7 @@ class SeenImages:
     boardless: tuple[BoardlessImage, ...]
 
 
-class HandEyeFile(StrictModel):
+class HandEyeFile(InputFile):
     """A calibration set. ``simulated: true``: it was not recorded by a camera; verdicts say so.
 
     ``camera_standard_deviation`` is that of T_camera_board in the camera's axes; it is estimated if not given.

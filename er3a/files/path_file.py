@@ -4,7 +4,8 @@ Paths as CSV tables, one point per row: of the tool, or of the joints; with or w
 
 Columns of the tool: ``x_mm``, ``y_mm``, ``z_mm`` and those of one form of orientation
 (:data:`er3a.files.target_file.FORMS`). Columns of the joints: ``q1_deg`` .. ``qn_deg``, or ``q3_mm`` for a prismatic
-joint. Both may have ``t_s``, which starts at 0 and rises. A row that repeats the point before is a stop if the table
+joint. Both may have ``t_s``, which starts at 0 and rises, and ``units_checked``, with yes in each row where small
+angles are degrees although they look like radians. A row that repeats the point before is a stop if the table
 has times; otherwise it is left out.
 
 A joint trajectory of ROS or MoveIt (``trajectory_msgs/JointTrajectory``, or ``moveit_msgs/RobotTrajectory`` around it)
@@ -16,7 +17,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeGuard, get_args
@@ -26,7 +27,7 @@ import scipy
 from pydantic import BeforeValidator, Field, model_validator
 
 from er3a.errors import InputError
-from er3a.files.csv_file import CsvColumn, read_csv, read_header
+from er3a.files.csv_file import CHECKED_COLUMN, UNITS_CHECKED, CsvColumn, read_csv, read_header
 from er3a.files.kept_files import given_file
 from er3a.files.robot_file import Name, Text
 from er3a.files.target_file import FORMS, KNOWN_FORMS, POSITION, Orientation
@@ -37,10 +38,11 @@ from er3a.files.units import (
     Triple,
     check_degrees,
     check_millimetres,
+    doubt_degrees,
     joint_rates,
     joint_values,
 )
-from er3a.files.yaml_file import StrictModel, check_own_names, load, read_yaml
+from er3a.files.yaml_file import InputFile, StrictModel, check_own_names, load, read_yaml
 from er3a.geometry.transforms import ORTHONORMAL_TOLERANCE, transform
 from er3a.kinematics.classes.class_solvers import BranchLabel
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -116,7 +118,7 @@ def read_path_table(path: str | Path) -> PathTable:
         raise InputError(path, "header", f"the table has {problem}", remedy)
     columns = own if of_joints else (*POSITION, *FORMS[forms[0]])
     timed = {"t_s": CsvColumn()} if "t_s" in header else {}
-    rows = read_csv(path, timed | {name: CsvColumn() for name in columns})
+    rows = read_csv(path, timed | {name: CsvColumn() for name in columns} | CHECKED_COLUMN)
     if len(rows) < 2:
         raise InputError(path, None, f"the path has {_points(len(rows))}", "Give at least two rows")
     if len(rows) > MAX_ROWS:
@@ -227,7 +229,7 @@ def _row_joints(path: Path, rows: list[dict[str, Any]], names: tuple[str, ...]) 
     turning = [name for name in names if name.endswith("_deg")]
     values = np.array([[row[name] for name in names] for row in rows])
     if turning:
-        _block(path, rows, turning, "give the path as poses of the tool")
+        _block(path, rows, turning)
     q: Reals = np.where([name.endswith("_mm") for name in names], values / 1000, np.radians(values))
     return q
 
@@ -249,11 +251,11 @@ def _check_times(path: Path, places: Sequence[str], times: Reals) -> None:
 
 
 def _poses(path: Path, lines: Integers, rows: list[dict[str, Any]], form: str) -> Reals:
-    position = _block(path, rows, POSITION)
+    position = _block(path, rows, POSITION, check_millimetres)
     T = transform(position / 1000, np.zeros_like(position))
     names = FORMS[form]
     if form in ("rpy_deg", "zyz_deg"):
-        angles = _block(path, rows, names, "give the orientation as a quaternion or a matrix")
+        angles = _block(path, rows, names)
         order = "ZYX" if form == "rpy_deg" else "ZYZ"
         T[:, :3, :3] = scipy.spatial.transform.Rotation.from_euler(
             order, angles[:, ::-1] if form == "rpy_deg" else angles, degrees=True
@@ -279,23 +281,23 @@ def _poses(path: Path, lines: Integers, rows: list[dict[str, Any]], form: str) -
     return T
 
 
-def _block(path: Path, rows: list[dict[str, Any]], names: Sequence[str], otherwise: str | None = None) -> Reals:
-    """The values of columns of one kind, their unit judged by the largest row: others may well be small.
-
-    Parameters
-    ----------
-    otherwise : for degrees, how to write such small angles if degrees are meant; None for millimetres
-    """
+def _block(
+    path: Path,
+    rows: list[dict[str, Any]],
+    names: Sequence[str],
+    check: Callable[[Sequence[float]], None] = check_degrees,
+) -> Reals:
+    """The values of columns of one kind, their unit judged by the largest row: others may well be small."""
     values = np.array([[row[name] for name in names] for row in rows])
     top = int(np.argmax(np.abs(values).max(axis=1)))
+    where, largest = _where(rows[top]["row"], names), values[top].tolist()
     try:
-        if otherwise:
-            check_degrees(values[top].tolist(), otherwise)
-        else:
-            check_millimetres(values[top].tolist())
+        check(largest)
     except ValueError as error:
         problem, _, remedy = str(error).partition(" | ")
-        raise InputError(path, _where(rows[top]["row"], names), problem, remedy) from None
+        raise InputError(path, where, problem, remedy) from None
+    if check is check_degrees and not all(row[UNITS_CHECKED] for row in rows):
+        doubt_degrees(largest, key=where, file=path)
     return values
 
 
@@ -638,7 +640,7 @@ class ProgramPath(NamedPath):
 PathEntry = PlanPath | JointPath | JointSequencePath | LinePath | ArcPath | SequencePath | TablePath
 
 
-class PathFile(StrictModel):
+class PathFile(InputFile):
     """A list of named paths."""
 
     kind: Literal["paths"]

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from er3a.files.robot_file import Name, Placement, Text, check_placement
 from er3a.files.units import JointsDeg, joint_values
-from er3a.files.yaml_file import StrictModel, check_own_names, load
+from er3a.files.yaml_file import InputFile, StrictModel, check_own_names, load
 from er3a.numerics.arrays import Reals
 from er3a.programs.program_names import ProgramOutcome
 from er3a.robots.robot import Robot
@@ -30,7 +30,7 @@ class ProgramEntry(StrictModel):
         return None if self.start_deg is None else joint_values(robot, self.start_deg, f"{self.name}.start_deg")
 
 
-class ProgramsFile(StrictModel):
+class ProgramsFile(InputFile):
     """Programs and frames.
 
     ``frames`` maps names of tools and bases in programs (``TOOL_DATA[3]``, ``tool1``) to frames: a tool in the flange's

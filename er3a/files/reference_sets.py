@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import warnings
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,12 +13,13 @@ from typing import Any
 import numpy as np
 import scipy
 
-from er3a.errors import InputError
-from er3a.files.csv_file import CsvColumn, Written, read_csv
+from er3a.errors import InputError, InputWarning
+from er3a.files.csv_file import CHECKED_COLUMN, UNITS_CHECKED, CsvColumn, Written, read_csv
 from er3a.files.kept_files import names, own_or_shipped
 from er3a.files.robot_file import NAME_PATTERN
-from er3a.files.units import MIN_SPAN_MM, WIDEST_IN_RADIANS, suspect
+from er3a.files.units import MIN_SPAN_MM, WIDEST_IN_RADIANS, doubt
 from er3a.numerics.arrays import Reals
+from er3a.numerics.si_units import NEAR_STEP, STEP_IN_RADIANS
 from er3a.references.quantities import ZERO_POSE, NotOfArm, Pose, Quantity, Rotation3, not_of_arm
 from er3a.references.reference import NO_DOCUMENT, Document, Documents, Reference, ReferenceSet, Row, conflicts
 from er3a.references.rows import ENVELOPE_CORNERS, ENVELOPE_EXTENTS, KINDS, check_complete, reference_set
@@ -32,14 +34,13 @@ _WORD, _NUMBER, _JOINT = CsvColumn(str), CsvColumn(Written), CsvColumn(int)
 _OPTIONAL, _OF_SLIDES = CsvColumn(Written, optional=True), CsvColumn(Written, optional=True, always=False)
 STATED_AS = "stated_as"
 STANDARD_DEVIATION = "standard_deviation"
-UNITS_CHECKED = "units_checked"
 UNCERTAINTIES = ("uncertainty_mm", "uncertainty_deg", "uncertainty_deg_s", "uncertainty_mm_s")
 _SOURCE = {
     "source": _WORD,
     "grade": CsvColumn(str, choices=tuple(GRADES)),
     "origin": _WORD,
     STATED_AS: CsvColumn(str, optional=True, choices=("half_width", STANDARD_DEVIATION), always=False),
-    UNITS_CHECKED: CsvColumn(str, optional=True, choices=("yes",), always=False),
+    **CHECKED_COLUMN,
 }
 _POINT = CsvColumn(str, choices=("flange", "wrist_centre"))
 _XYZ = ("x_mm", "y_mm", "z_mm")
@@ -429,7 +430,6 @@ def _known(names: Iterable[str]) -> str:
 
 SHORTEST_BESIDE_LONG_MM, LONG_MM = 2.0, 100.0
 WIDE_DEG = 30.0
-STEP_IN_RADIANS, NEAR_STEP = math.pi / 12, 2e-3  # 15 deg, written with four digits
 LENGTHS = ("x_mm", "y_mm", "z_mm", "value_mm", "lower_mm", "upper_mm", "speed_mm_s")
 _COORDINATES = LENGTHS[:3]
 LONGEST_ARM = 4.0  # times the farther of both points from the base
@@ -482,7 +482,8 @@ def load_references(name_or_folder: str | Path, robot: Robot | None = None) -> R
         return reference_set(folder.name, tables, documents)
     aside = {row: why for rows in tables.values() for row in rows if (why := _not_of_arm(row, robot))}
     for row, why in aside.items():
-        suspect(f"{folder / row.kind}.csv: row {row.line} is set aside: {_WHY[why].format(robot=robot)}")
+        told = f"{folder / row.kind}.csv: row {row.line} is set aside: {_WHY[why].format(robot=robot)}"
+        warnings.warn(told, InputWarning, stacklevel=2)
     usable = {kind: tuple(row for row in rows if row not in aside) for kind, rows in tables.items()}
     return replace(reference_set(folder.name, usable, documents), set_aside=tuple(aside.items()))
 
@@ -647,7 +648,7 @@ def _check_angles(path: Path, table: list[Fields]) -> None:
                 if all_small:
                     problem = f"{fields[column]:g} deg looks like radians"
                     raise InputError(path, where, problem, f"Write {degrees}; {AS_WRITTEN}")
-                suspect(f"{path}: {where}: {fields[column]:g} deg may be radians; those would be {degrees}")
+                doubt(None, where, f"{fields[column]:g} deg", "radians", more=f"; those would be {degrees}", file=path)
 
 
 def _check_arcs(path: Path, table: list[Fields]) -> None:

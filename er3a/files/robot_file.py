@@ -15,17 +15,20 @@ from pydantic import AfterValidator, Field, field_validator, model_validator
 from er3a.files.units import (
     MAX_DEG,
     MAX_DISTANCE_MM,
-    RADIANS_BELOW_DEG,
+    RESIDUE_MM,
+    SHORTEST_PLAIN_LENGTH_MM,
     Triple,
     check_degrees,
+    doubt,
+    doubt_degrees,
+    doubt_millimetres,
     look_like_radians,
-    suspect,
 )
-from er3a.files.yaml_file import StrictModel
+from er3a.files.yaml_file import InputFile, StrictModel
 from er3a.geometry.transforms import rot_z, transform
 from er3a.kinematics.chain import constant_links, joint_starts
 from er3a.numerics.arrays import Reals
-from er3a.numerics.si_units import in_si
+from er3a.numerics.si_units import RADIANS_BELOW_DEG, in_si, is_part_of_pi
 from er3a.robots.masses import Drives, LinkMass, MassBody, Masses, WristLoad, moved, no_body
 from er3a.robots.robot import MAX_JOINTS, Grade, PairRule, Robot, Visual
 
@@ -99,14 +102,11 @@ class BodyFields(StrictModel):
 
     @model_validator(mode="after")
     def _a_body(self):
-        if (
-            0 < max(map(abs, self.centre_mm)) < METRES_BELOW_MM
-            and self.mass_kg > METRES_ABOVE_KG
-            and any(self.inertia_kg_m2)
-        ):
+        off = max(map(abs, self.centre_mm))
+        if MIN_CENTRE_MM < off < METRES_BELOW_MM and self.mass_kg > METRES_ABOVE_KG:
             radius_mm = 1000 * float(np.sqrt(max(self.inertia_kg_m2[:3]) / self.mass_kg))
-            if max(map(abs, self.centre_mm)) > MIN_CENTRE_MM and radius_mm > FAR_WIDER * max(map(abs, self.centre_mm)):
-                suspect(f"centre_mm: {self.centre_mm} mm may be metres")
+            if radius_mm > FAR_WIDER * off or not any(self.inertia_kg_m2):
+                doubt(self, "centre_mm", f"{self.centre_mm} mm", "metres")
         if max(map(abs, self.centre_mm)) > MAX_DISTANCE_MM:
             raise ValueError(f"centre_mm: {self.centre_mm} is more than 100 m | Write mm")
         if problem := no_body(self.body):
@@ -133,7 +133,8 @@ class JointOrigin(Placement):
 
     @model_validator(mode="after")
     def _in_degrees(self):
-        check_degrees(self.rpy_deg, "round them to whole degrees")
+        check_degrees(self.rpy_deg)
+        doubt_degrees(self.rpy_deg, self, "rpy_deg")
         return self
 
 
@@ -303,11 +304,9 @@ def _wrist(group: WristLoadGroup) -> WristLoad:
     )
 
 
-SHORTEST_PLAIN_LENGTH_MM = 2.0
 LONGEST_LENGTH_MM = 20_000.0
 FAR_NORMAL_MM = 5_000.0
 MAX_NORMAL_MM = 1e8  # of axes that are parallel to 0.001 mrad
-RESIDUE_MM = 1e-3
 MIN_LONGEST_MM = 10.0
 """A length as short as that is what a derivation leaves over, in mm or in metres."""
 FASTEST_DEG_S = 36_000.0
@@ -474,8 +473,7 @@ class Capsule(StrictModel):
     @field_validator("from_mm", "to_mm")
     @classmethod
     def _plain_lengths(cls, values):
-        if RESIDUE_MM < max(map(abs, values)) < SHORTEST_PLAIN_LENGTH_MM:
-            suspect(f"envelopes.capsules: {values} mm may be metres")
+        doubt_millimetres(values, values)
         if max(map(abs, values)) > LONGEST_LENGTH_MM:
             raise ValueError(f"{values} mm is longer than any robot's link | Write the point in mm")
         return values
@@ -583,7 +581,7 @@ class CollisionPairs(StrictModel):
                 seen.add(pair)
 
 
-class RobotFile(StrictModel):
+class RobotFile(InputFile):
     """A robot file: data/robots/NAME.yaml."""
 
     kind: Literal["robot"]
@@ -713,9 +711,10 @@ class RobotFile(StrictModel):
             _check_angle(f"zero.rows[{i}].offset_deg", self.zero.rows[i].offset_deg or 0.0)
         self._check_far_normals()
         angles = [row.alpha_deg for row in self.dh.rows] + [row.offset_deg or 0.0 for row in self.zero.rows]
-        if look_like_radians(angles):
+        all_small = max(map(abs, angles)) < RADIANS_BELOW_DEG
+        if look_like_radians(angles) or (all_small and any(map(is_part_of_pi, angles))):
             small = ", ".join(f"{angle:g}" for angle in angles if 0 < abs(angle) < RADIANS_BELOW_DEG)
-            suspect(f"dh.rows, zero.rows: {small} deg may be radians")
+            doubt(self, "dh.rows, zero.rows", f"{small} deg", "radians")
         for key in ("base", "flange", "tool"):
             check_placement(key, getattr(self, key), self.dh.calibrated and key == "base")
         longest, least = max(max(abs(row.a_mm), abs(row.d_mm)) for row in self.dh.rows), MIN_LONGEST_MM
@@ -746,7 +745,7 @@ class RobotFile(StrictModel):
             if row.lower_deg is not None
         ]
         if len(spans) > 1 and 0 < max(spans) <= RADIANS_BELOW:
-            suspect(f"limits.rows: the widest limit is {max(spans):g} deg; they may be radians")
+            doubt(self, "limits.rows", f"{max(spans):g} deg", "radians", more=", of which none is wider")
         return self
 
 
@@ -787,7 +786,7 @@ def _check_limit(field: str, row: JointLimitRow | CombinedLimitRow, sliding: boo
     if sliding and max(abs(lower), abs(upper)) > MAX_DISTANCE_MM:
         raise ValueError(f"{field}: {named} slides more than 100 m | Write mm, not micrometres")
     if sliding and 0 < max(abs(lower), abs(upper)) < SHORTEST_PLAIN_LENGTH_MM:
-        suspect(f"{field}: {lower:g} to {upper:g} mm may be metres")
+        doubt(row, "", f"{lower:g} to {upper:g} mm", "metres")
 
 
 def coupling_matrix(group: Coupling, rows: int, joints: int) -> Reals:
@@ -804,10 +803,11 @@ def check_placement(field: str, placement: Placement | None, calibrated: bool = 
     not of lengths below 2 mm that were calibrated."""
     if placement is None:
         return
-    if RESIDUE_MM < max(map(abs, placement.xyz_mm)) < SHORTEST_PLAIN_LENGTH_MM and not calibrated:
-        suspect(f"{field}.xyz_mm: {placement.xyz_mm} mm may be metres")
-    if look_like_radians(placement.rpy_deg):
-        suspect(f"{field}.rpy_deg: {placement.rpy_deg} deg may be radians")
+    if not calibrated:
+        doubt_millimetres(placement.xyz_mm, placement, "xyz_mm")
+    small = max(map(abs, placement.rpy_deg)) < RADIANS_BELOW_DEG
+    if look_like_radians(placement.rpy_deg) or (small and any(map(is_part_of_pi, placement.rpy_deg))):
+        doubt(placement, "rpy_deg", f"{placement.rpy_deg} deg", "radians")
     if max(abs(value) for value in placement.xyz_mm) > MAX_DISTANCE_MM:
         raise ValueError(f"{field}.xyz_mm: {placement.xyz_mm} is more than 100 m | Write mm, not micrometres")
     for i, value in enumerate(placement.rpy_deg):

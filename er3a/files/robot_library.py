@@ -15,6 +15,7 @@ from er3a.files import robot_file
 from er3a.files.dh_table import read_dh_table
 from er3a.files.kept_files import ROOT, names, own_or_shipped
 from er3a.files.pieces_file import load_pieces
+from er3a.files.units import doubt_millimetres
 from er3a.files.yaml_file import StrictModel, load
 from er3a.geometry.transforms import rot_x, rot_y, translation
 from er3a.geometry.vectors import wrap_to_pi
@@ -249,6 +250,9 @@ class LoadFields(StrictModel):
         if self.body and self.body.mass_kg > robot_file.HEAVIEST_PAYLOAD_KG:
             kg = self.body.mass_kg
             raise ValueError(f"body.mass_kg: {kg:g} kg is more than any robot carries | Write {kg / 1000:g} if it is g")
+        if self.body:
+            doubt_millimetres(self.body.centre_mm, self.body, "centre_mm")
+        robot_file.check_placement("mesh", self.mesh)
         return self
 
     @property

@@ -15,7 +15,7 @@ from er3a.files.kept_files import own_or_shipped
 from er3a.files.pieces_file import load_pieces
 from er3a.files.robot_file import CollisionPairs, DecidedPair, Name, PiecesPath, Text
 from er3a.files.units import MAX_DISTANCE_MM, PositionMm, RpyDeg, Triple
-from er3a.files.yaml_file import StrictModel, load
+from er3a.files.yaml_file import InputFile, StrictModel, load
 from er3a.geometry.transforms import transform
 
 SMALLEST_OBSTACLE_MM = 2.0
@@ -131,7 +131,7 @@ class AllowedPairs(CollisionPairs):
     watch: Annotated[list[DecidedPair], Field(max_length=0)] = []
 
 
-class SceneFile(StrictModel):
+class SceneFile(InputFile):
     """data/scenes/NAME.yaml. ``collision``: allowed contacts between the arm, carried objects and solids."""
 
     kind: Literal["scene"]

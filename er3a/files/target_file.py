@@ -3,7 +3,8 @@
 Targets as a CSV table: one row each, position in mm and the orientation in one of the four named forms.
 
 Columns: ``name``, ``x_mm``, ``y_mm``, ``z_mm``; the columns of one form (``FORMS``); optionally ``note``,
-``expect`` (may stay empty) and ``q1_ref_deg`` .. ``qn_ref_deg`` (of prismatic joints in mm).
+``expect`` (may stay empty), ``q1_ref_deg`` .. ``qn_ref_deg`` (of prismatic joints in mm), and ``units_checked``, with
+yes in each row where small angles are degrees although they look like radians.
 """
 
 from __future__ import annotations
@@ -19,10 +20,10 @@ from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
 from er3a.errors import InputError
-from er3a.files.csv_file import CsvColumn, read_csv, read_header
+from er3a.files.csv_file import CHECKED_COLUMN, UNITS_CHECKED, CsvColumn, read_csv, read_header
 from er3a.files.robot_file import Name
-from er3a.files.units import JointsDeg, PositionMm, Triple, as_degrees, joint_values
-from er3a.files.yaml_file import StrictModel, check_own_names, load, parse
+from er3a.files.units import JointsDeg, PositionMm, RpyDeg, Triple, joint_values
+from er3a.files.yaml_file import InputFile, StrictModel, check_own_names, load, parse
 from er3a.geometry.transforms import ORTHONORMAL_TOLERANCE, posed, rot_y, rot_z, transform
 from er3a.kinematics.forward import forward
 from er3a.kinematics.solutions import Target, TargetOutcome
@@ -41,7 +42,8 @@ REFERENCE = tuple(f"q{joint}_ref_deg" for joint in range(1, MAX_JOINTS + 1))
 
 
 def read_target_table(path: str | Path) -> list[dict[str, Any]]:
-    """Rows of a CSV file as the mappings that a target file in YAML holds, each with a ``row`` key (file line).
+    """Rows of a CSV file as the mappings that a target file in YAML holds, each with the keys ``row`` (file line) and
+    ``units_checked``.
 
     Raises
     ------
@@ -58,7 +60,7 @@ def read_target_table(path: str | Path) -> list[dict[str, Any]]:
     columns = {"name": CsvColumn(str)} | {name: CsvColumn() for name in (*POSITION, *FORMS[form])}
     columns |= {name: CsvColumn(str, optional=True) for name in TEXTS if name in present}
     last = max((number for number, name in enumerate(REFERENCE, 1) if name in present), default=0)
-    columns |= {name: CsvColumn() for name in REFERENCE[:last]}
+    columns |= {name: CsvColumn() for name in REFERENCE[:last]} | CHECKED_COLUMN
     return [_target(row, form, REFERENCE[:last]) for row in read_csv(path, columns)]
 
 
@@ -67,7 +69,7 @@ def _without_one_form(header: list[str], forms: list[str]) -> str:
         return "the file is empty"
     if forms:
         return f"the table has two forms of orientation, {forms[0]} and {forms[1]}"
-    strange = [name for name in header if name.strip() not in ("name", *TEXTS, *POSITION, *REFERENCE)]
+    strange = [name for name in header if name.strip() not in ("name", *TEXTS, *POSITION, *REFERENCE, UNITS_CHECKED)]
     return "the table has no orientation" + (f" that is known, but {', '.join(strange)}" if strange else "")
 
 
@@ -76,6 +78,7 @@ def _target(row: dict[str, Any], form: str, reference: tuple[str, ...]) -> dict[
     target = {"row": row["row"], "name": row["name"], "xyz_mm": [row[name] for name in POSITION]}
     target[form] = [values[0:3], values[3:6], values[6:9]] if form == "matrix" else values
     target |= {name: row[name] for name in TEXTS if row.get(name)}
+    target[UNITS_CHECKED] = row[UNITS_CHECKED]
     if reference:
         target["q_ref_deg"] = [row[name] for name in reference]
     return target
@@ -85,7 +88,6 @@ MAX_TARGETS = 20_000
 UNIT_LENGTH_TOLERANCE = 1e-6
 EULER_KEY = re.compile(r"euler\w*|[xyz]{3}(_(deg|rad))?", re.IGNORECASE)
 
-Angles = Annotated[Triple, as_degrees("give the orientation as a quaternion or a matrix")]
 Line = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\r\n]*$")]
 
 
@@ -100,8 +102,8 @@ class Orientation(StrictModel):
     matrix : rotation matrix by rows, orthonormal to 1e-6; the nearest exact rotation is used
     """
 
-    rpy_deg: Angles | None = None
-    zyz_deg: Angles | None = None
+    rpy_deg: RpyDeg | None = None
+    zyz_deg: RpyDeg | None = None
     quaternion_wxyz: Annotated[list[float], Field(min_length=4, max_length=4)] | None = None
     matrix: Annotated[list[Triple], Field(min_length=3, max_length=3)] | None = None
 
@@ -216,7 +218,7 @@ class TargetEntry(Orientation):
         return T
 
 
-class TargetFile(StrictModel):
+class TargetFile(InputFile):
     """data/targets/ROBOT.yaml."""
 
     kind: Literal["targets"]
@@ -267,9 +269,10 @@ def read_targets(path: str | Path) -> tuple[TargetEntry, ...]:
 
 def _targets_of_table(path: Path) -> tuple[TargetEntry, ...]:
     rows = read_target_table(path)
-    lines = [row.pop("row") for row in rows]
+    lines, checked = ([row.pop(key) for row in rows] for key in ("row", UNITS_CHECKED))
     try:
-        return tuple(parse(TargetFile, {"kind": "targets", "targets": rows}, path).targets)
+        content = {"kind": "targets", "targets": rows, UNITS_CHECKED: all(checked)}
+        return tuple(parse(TargetFile, content, path).targets)
     except InputError as error:
         where = re.match(r"targets\[(\d+)\]\.?(\w*)", error.field or "")
         if where is None:

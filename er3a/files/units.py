@@ -1,7 +1,8 @@
 """Types and checks of file fields that detect metres or radians in place of mm and degrees.
 
-A check raises ``ValueError`` with a text ``problem | remedy``, which the YAML reader turns into an InputError. Angles
-below 2 pi are always legal as degrees; several that look like radians give only a warning.
+A check raises ``ValueError`` with a text ``problem | remedy``, which the YAML reader turns into an InputError. Small
+angles and lengths that are legal and look like radians or metres give a :class:`er3a.errors.DoubtfulUnit`: a warning,
+which keeps the verdicts that rest on them from passing (:func:`noted_doubts`).
 """
 
 from __future__ import annotations
@@ -9,27 +10,31 @@ from __future__ import annotations
 import math
 import re
 import warnings
-from collections.abc import Sequence
-from typing import Annotated
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import AfterValidator, Field
 
-from er3a.errors import InputError, InputWarning
+from er3a.errors import DoubtfulUnit, InputError
 from er3a.numerics.arrays import Reals
+from er3a.numerics.si_units import NEAR_QUARTER, RADIANS_BELOW_DEG, may_be_radians
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import MAX_JOINTS, Robot
 
 JOINT_COLUMN = re.compile(r"q([1-9]\d?)_(deg|mm)")
 METRES_BELOW_MM = 5.0
 MAX_DISTANCE_MM = 100_000.0
-RADIANS_BELOW_DEG = 6.3
 MAX_DEG = 3600.0
 MIN_SPAN_MM = 10.0
 """A table whose lengths are all below is in metres."""
 WIDEST_IN_RADIANS = 2.01 * math.pi
 """A table whose angles (deg) are all below is in radians."""
-WHOLE_DEGREES = "nothing is to be done"
+RESIDUE_MM = 1e-3
+SHORTEST_PLAIN_LENGTH_MM = 2.0
+"""Lengths between both, of which none is longer, look like metres."""
 
 
 def check_millimetres(values: Sequence[float]) -> None:
@@ -42,14 +47,11 @@ def check_millimetres(values: Sequence[float]) -> None:
         raise ValueError(f"{shown} mm is more than 100 m | Write mm, not micrometres")
 
 
-def check_degrees(values: Sequence[float], otherwise: str, slides: bool = False) -> None:
-    """Reject angles of more than ten turns; warn of those that look like radians.
-
-    All within +-6.3, they look so if two are not whole numbers.
+def check_degrees(values: Sequence[float], slides: bool = False) -> None:
+    """Reject angles of more than ten turns.
 
     Parameters
     ----------
-    otherwise : how to write such small angles if degrees are meant
     slides : whether some can be mm of prismatic joints; :func:`joint_values` knows which
     """
     largest = max(abs(value) for value in values)
@@ -57,28 +59,62 @@ def check_degrees(values: Sequence[float], otherwise: str, slides: bool = False)
     if largest > (MAX_DISTANCE_MM if slides else MAX_DEG):
         much = "more than ten turns, or than 100 m" if slides else "more than ten turns"
         raise ValueError(f"{shown} deg is {much} | Write degrees within +-{MAX_DEG:g}")
-    broken = sum(value != round(value) for value in values)
-    if largest < RADIANS_BELOW_DEG and broken >= 2:
-        converted = ", ".join(f"{math.degrees(value):.4g}" for value in values)
-        suspect(f"{shown} deg may be radians: those would be {converted}; if degrees are meant, {otherwise}")
 
 
-def suspect(text: str) -> None:
-    """Warn of a value that may be right, and looks like a mistake."""
-    warnings.warn(text, InputWarning, stacklevel=3)
+def doubt_degrees(values: Sequence[float], part: object = None, key: str = "", file: Path | None = None) -> None:
+    """Warn of angles that :func:`er3a.numerics.si_units.may_be_radians`."""
+    if may_be_radians(values):
+        shown, converted = (", ".join(f"{value:.6g}" for value in each) for each in (values, np.degrees(values)))
+        doubt(part, key, f"[{shown}] deg", "radians", more=f": those would be {converted}", file=file)
+
+
+def doubt_millimetres(values: Sequence[float], part: object = None, key: str = "") -> None:
+    """Warn of lengths that look like metres: all below 2 mm, and not all as good as zero."""
+    if RESIDUE_MM < max(map(abs, values)) < SHORTEST_PLAIN_LENGTH_MM:
+        doubt(part, key, f"{list(values)} mm", "metres")
+
+
+def doubt(part: object, key: str, shown: str, other: str, *, more: str = "", file: str | Path | None = None) -> None:
+    """Warn of a number whose unit is doubtful, as :class:`er3a.errors.DoubtfulUnit` takes it."""
+    warnings.warn(DoubtfulUnit(key, shown, other, part=part, more=more, file=file), stacklevel=3)
+
+
+@contextmanager
+def noted_doubts() -> Iterator[list[DoubtfulUnit]]:
+    """The doubts about units in what is read meanwhile, each once; they are warned of at its end."""
+    told: set[str] = set()
+    noted: list[DoubtfulUnit] = []
+    show = warnings.showwarning
+
+    def note(message: Warning | str, *rest: Any, **named: Any) -> None:
+        if not isinstance(message, DoubtfulUnit):
+            show(message, *rest, **named)
+        elif str(message) not in told:
+            told.add(str(message))
+            noted.append(message)
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("always", DoubtfulUnit)
+            warnings.showwarning = note
+            yield noted
+    finally:
+        for each in noted:
+            warnings.warn(each, stacklevel=3)
 
 
 def look_like_radians(values: Sequence[float]) -> bool:
     """Whether two or more angles (deg) are within 0.002 of multiples of pi/2, and below 6.3."""
     quarters = [value / (math.pi / 2) for value in values if 0 < abs(value) < RADIANS_BELOW_DEG]
-    return sum(round(each) != 0 and abs(each - round(each)) * math.pi / 2 < 2e-3 for each in quarters) >= 2
+    return sum(round(each) != 0 and abs(each - round(each)) * math.pi / 2 < NEAR_QUARTER for each in quarters) >= 2
 
 
-def as_degrees(otherwise: str, slides: bool = False) -> AfterValidator:
-    """:func:`check_degrees` for a list of angles, as part of a type."""
+def as_degrees(slides: bool = False) -> AfterValidator:
+    """:func:`check_degrees` and :func:`doubt_degrees` for a list of angles, as part of a type."""
 
     def checked(values: list[float]) -> list[float]:
-        check_degrees(values, otherwise, slides)
+        check_degrees(values, slides)
+        doubt_degrees(values, values)
         return values
 
     return AfterValidator(checked)
@@ -111,9 +147,16 @@ def as_millimetres(values: list[float]) -> list[float]:
     return values
 
 
+def _looked_at(values: list[float]) -> list[float]:
+    doubt_millimetres(values, values)
+    return values
+
+
 Triple = Annotated[list[float], Field(min_length=3, max_length=3)]
 Joints = Annotated[list[float], Field(min_length=1, max_length=MAX_JOINTS)]
 """One value for each joint: degrees, or mm of those that slide."""
 PositionMm = Annotated[Triple, AfterValidator(as_millimetres)]
-RpyDeg = Annotated[Triple, as_degrees(WHOLE_DEGREES)]
-JointsDeg = Annotated[Joints, as_degrees(WHOLE_DEGREES, slides=True)]
+CentreMm = Annotated[Triple, AfterValidator(_looked_at)]
+"""Lengths of which :func:`doubt_millimetres` warns."""
+RpyDeg = Annotated[Triple, as_degrees()]
+JointsDeg = Annotated[Joints, as_degrees(slides=True)]

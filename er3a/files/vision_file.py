@@ -14,7 +14,7 @@ from er3a.files.hand_eye_file import Positive, StandardDeviations
 from er3a.files.robot_file import Name, Placement, Text
 from er3a.files.target_file import UNIT_LENGTH_TOLERANCE, Line
 from er3a.files.units import PositionMm, RpyDeg, Triple
-from er3a.files.yaml_file import StrictModel, check_own_names, load
+from er3a.files.yaml_file import InputFile, StrictModel, check_own_names, load
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import in_si
 from er3a.robots.robot import Robot
@@ -137,7 +137,7 @@ class ObjectEntry(StrictModel):
         )
 
 
-class VisionFile(StrictModel):
+class VisionFile(InputFile):
     """data/vision/NAME.yaml. ``calibration``: a calibration set beside it.
 
     ``home_deg``: joint position before the grasp; ``picture_deg``: joint position in which a camera on the flange saw

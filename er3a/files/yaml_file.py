@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import re
 import warnings
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -13,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import ErrorDetails
 from yaml.composer import Composer
 
-from er3a.errors import InputError, InputWarning
+from er3a.errors import DoubtfulUnit, InputError, InputWarning
 from er3a.formats.mesh_file import read_text
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -46,6 +47,15 @@ class StrictModel(BaseModel):
     """Base of all file models: no unknown keys, no NaN, no silent conversion of types."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+
+class InputFile(StrictModel):
+    """The base of files that people write.
+
+    ``units_checked: true`` says that numbers which look like radians or metres are degrees and mm all the same.
+    """
+
+    units_checked: bool = False
 
 
 class _PlainLoader(Composer, yaml.CSafeLoader):
@@ -145,15 +155,15 @@ def read_yaml(path: str | Path) -> dict[str, Any]:
 def parse(model: type[Model], data: dict[str, Any], path: str | Path | None) -> Model:
     """Validate ``data`` as ``model``; the first fault is raised as :class:`InputError`.
 
-    Values that look like a mistake give an :class:`InputWarning` that names the file.
+    Values that look like a mistake give an :class:`InputWarning` that names the file, and numbers of doubtful unit one
+    that names their place in it, unless the file says that its units are checked.
     """
     try:
         with warnings.catch_warnings(record=True) as seen:
             warnings.simplefilter("always")
             valid = model.model_validate(data)
-        for warning in seen:
-            text = f"{path}: {warning.message}" if path and warning.category is InputWarning else warning.message
-            warnings.warn(text, warning.category, stacklevel=3)
+        for told in _told(seen, valid, path):
+            warnings.warn(told, stacklevel=3)
         return valid
     except ValidationError as error:
         faults = error.errors()
@@ -165,6 +175,33 @@ def parse(model: type[Model], data: dict[str, Any], path: str | Path | None) -> 
         if len(faults) > 1:
             remedy += f" ({len(faults) - 1} more to correct after this one)"
         raise InputError(path, field or None, problem, remedy) from None
+
+
+def _told(seen: list[warnings.WarningMessage], valid: BaseModel, path: str | Path | None) -> Iterator[Warning]:
+    """Warnings with the file and the place that they are about; none of values that were tried and not taken."""
+    doubts = [warning.message for warning in seen if isinstance(warning.message, DoubtfulUnit)]
+    places = {id(part): place for place, part in _parts(valid)} if doubts else {}
+    for doubt in doubts if not getattr(valid, "units_checked", False) else ():
+        if (place := places.get(id(doubt.part))) is not None:
+            yield doubt.at(path, _dotted((*place, *filter(None, [doubt.key]))))
+    for warning in seen:
+        if not isinstance(warning.message, DoubtfulUnit):
+            named = path and warning.category is InputWarning
+            yield warning.category(f"{path}: {warning.message}") if named else warning.message  # type: ignore[misc]
+
+
+def _parts(part: object, place: tuple[int | str, ...] = ()) -> Iterator[tuple[tuple[int | str, ...], object]]:
+    """A file's content and all of its parts, each with its place."""
+    yield place, part
+    inner: Iterable[tuple[int | str, object]] = ()
+    if isinstance(part, BaseModel):
+        keys = type(part).model_fields
+        inner = [(keys[name].alias or name, value) for name, value in part.__dict__.items()]
+    elif isinstance(part, dict | list):
+        inner = part.items() if isinstance(part, dict) else enumerate(part)
+    for key, each in inner:
+        if isinstance(each, BaseModel | dict | list):
+            yield from _parts(each, (*place, key))
 
 
 def load(model: type[Model], path: str | Path) -> Model:

@@ -1,13 +1,14 @@
 """Units by the ending of a quantity's name.
 
 Files, tables and summaries use names such as ``clearance_mm`` and ``q_deg``; the library has the same quantities in SI,
-as ``clearance`` and ``q``. This module converts between them.
+as ``clearance`` and ``q``. This module converts between them, and says when degrees look like radians.
 """
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields
 from typing import Any, TypeVar
 
@@ -36,7 +37,25 @@ TEXTS = {
 """How tables write each ending."""
 _NAME = re.compile(rf"(.+?)_({'|'.join(sorted(TEXTS, key=len, reverse=True))})")
 
+RADIANS_BELOW_DEG = 6.3
+STEP_IN_RADIANS, NEAR_STEP = math.pi / 12, 2e-3  # 15 deg, written with four digits
+NEAR_QUARTER = 2e-3  # rad, of a quarter of a turn written with three digits
+
 KindT = TypeVar("KindT")
+
+
+def may_be_radians(degrees: Sequence[float]) -> bool:
+    """Whether angles in degrees look like radians: all within +-6.3, and two no whole numbers or one a part of pi."""
+    broken = sum(value != round(value) for value in degrees)
+    small = max(map(abs, degrees), default=0.0) < RADIANS_BELOW_DEG
+    return small and (broken >= 2 or any(map(is_part_of_pi, degrees)))
+
+
+def is_part_of_pi(value: float) -> bool:
+    """Whether a number is a multiple of pi/2 or pi/12, as it is written with three digits or more."""
+    steps, quarters = value / STEP_IN_RADIANS, value / (math.pi / 2)
+    near_step = round(steps) and abs(steps - round(steps)) < NEAR_STEP
+    return bool(near_step or (round(quarters) and abs(quarters - round(quarters)) * math.pi / 2 < NEAR_QUARTER))
 
 
 def split_unit(name: str) -> tuple[str, str]:

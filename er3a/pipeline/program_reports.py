@@ -23,13 +23,14 @@ from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import PENETRATION_TOLERANCE
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import shapes_assumed
-from er3a.errors import InputError
+from er3a.errors import DoubtfulUnit, InputError
 from er3a.files.path_file import load_paths
+from er3a.files.units import noted_doubts
 from er3a.kinematics.singularity import USUAL_NEAR
 from er3a.pipeline.messages.language import as_text
 from er3a.pipeline.messages.programs import remedy_at, say
 from er3a.pipeline.results import NEVER_A_PASS, LeftOut, NoPass, plain
-from er3a.pipeline.stages.left_out import left_out_of_collisions
+from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_of_units
 from er3a.pipeline.stages.trajectory.judgement import Surroundings, collisions, judge, measured, min_clearance
 from er3a.pipeline.stages.trajectory.motion import listed_motions
 from er3a.pipeline.stages.trajectory.written_programs import LONGEST_NAME, near_assumed_shapes, written
@@ -77,13 +78,16 @@ class CheckedFile:
         return "fail" if self.check is None else self.check.level
 
 
-def checked_file(file: Path, robot: Robot, options: CheckOptions) -> CheckedFile:
-    """Read a program and check it; no motion of it passes where obstacles or shapes are missing."""
+def checked_file(file: Path, robot: Robot, options: CheckOptions, doubts: Sequence[DoubtfulUnit] = ()) -> CheckedFile:
+    """Read a program and check it; no motion of it passes where obstacles or shapes are missing, or with ``doubts``
+    about the units of what it is checked by."""
     try:
-        check = check_program(read_program(file), robot, options)
+        with noted_doubts() as own:
+            program = read_program(file)
+        check = check_program(program, robot, options)
     except InputError as error:
         return CheckedFile(file, None, error)
-    missed = missed_collisions(robot, options.scene, check.arms)
+    missed = (*missed_collisions(robot, options.scene, check.arms), *left_out_of_units([*doubts, *own]))
     if missed:
         verdicts = tuple(replace(each, level=worst_of((each.level, "caution"))) for each in check.verdicts)
         check = replace(check, level=worst_of((check.level, "caution")), verdicts=verdicts)

@@ -207,6 +207,7 @@ LeftOutSubject = Literal[
     "base_contacts",
     "base_inside",
     "places_in_solids",
+    "units",
 ]
 
 NEVER_A_PASS: frozenset[LeftOutSubject] = frozenset(
@@ -224,6 +225,7 @@ NEVER_A_PASS: frozenset[LeftOutSubject] = frozenset(
             "other_gravity",
         ),
         *("arm_errors", "objects_out_of_view", "hidden_voids", "orientations", "base_inside", "places_in_solids"),
+        "units",
     )
 )
 """What no verdict passes without; the rest bounds what a verdict is about, and stands in the table alone."""

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Iterator
+import warnings
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 from pydantic import Field, PrivateAttr, create_model, model_validator
 
 from er3a.collision.scene import Scene
-from er3a.errors import InputError
+from er3a.errors import DoubtfulUnit, InputError
 from er3a.files.annotations import catalogues_beside, translations_in
 from er3a.files.kept_files import sha256, shown_path
 from er3a.files.robot_file import NAME_PATTERN, Name, Placement, RobotFile, Text, check_placement
 from er3a.files.robot_library import LoadFields, placement_transform, read_robot, robot_of, robot_path
 from er3a.files.scene_file import load_scene
-from er3a.files.yaml_file import StrictModel, load, read_yaml
+from er3a.files.units import noted_doubts
+from er3a.files.yaml_file import InputFile, StrictModel, load, read_yaml
 from er3a.pipeline.messages.language import LANGUAGES, LanguageCode
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.registry import STAGES as REGISTRY
@@ -98,7 +100,7 @@ class ReportSettings(StrictModel):
     language: LanguageCode = "en"
 
 
-class StudyBase(StrictModel):
+class StudyBase(InputFile):
     """A study file; the stages' own keys are added by the registry."""
 
     kind: Literal["study"]
@@ -108,6 +110,7 @@ class StudyBase(StrictModel):
     article: ArticleTables | None = None
     report: ReportSettings = ReportSettings()
     _file: Path | None = PrivateAttr(default=None)
+    _doubts: tuple[DoubtfulUnit, ...] = PrivateAttr(default=())
 
     @property
     def file(self) -> Path | None:
@@ -190,6 +193,7 @@ class StudyBase(StrictModel):
     def robot(self, name: str) -> Robot:
         """The robot with the study's base and tool."""
         entry, content = self.entry(name), self.table(name)
+        self._doubt(name, "base", "tool")
         base, tool = entry.base or content.base, entry.tool or content.tool
         if variant := self.variants.get(name):
             tool = variant.tool(tool)
@@ -198,7 +202,18 @@ class StudyBase(StrictModel):
     def loads(self, name: str) -> list[LoadFields]:
         """What hangs on the flange: the tool, then the payload, as far as the study says."""
         entry = self.entry(name)
+        self._doubt(name, "tool_load", "payload")
         return [load for load in (entry.tool_load, entry.payload) if load]
+
+    def _doubt(self, name: str, *keys: str) -> None:
+        """Tell again what is doubtful of a robot's entry, to those who rest on it."""
+        begins = tuple(f"robots.{self._base(name)}.{key}." for key in keys)
+        self._tell(each for each in self._doubts if each.key.startswith(begins))
+
+    @staticmethod
+    def _tell(doubts: Iterable[DoubtfulUnit]) -> None:
+        for each in doubts:
+            warnings.warn(each, stacklevel=4)
 
     def assumed_margin(self, name: str) -> float:
         """The distance (m) from a robot's shapes within which nothing is settled if they are assumed; the study's, for
@@ -231,6 +246,7 @@ class StudyBase(StrictModel):
         for stage in REGISTRY.values():
             for key, model in stage.settings.items():
                 if model is kind:
+                    self._tell(each for each in self._doubts if each.key.startswith(f"{key}."))
                     return getattr(self, key)
         raise KeyError(kind.__name__)
 
@@ -254,7 +270,8 @@ class StudyBase(StrictModel):
             settings["scene"] = str(scene) if scene else None
         if key in REGISTRY:
             settings |= REGISTRY[key].extra_inputs(self, name)
-        return {"seed": self.seed, "robot": entry, key: settings}
+        checked = {"units_checked": True} if self.units_checked else {}
+        return {"seed": self.seed, "robot": entry, key: settings} | checked
 
     def article_pages(self) -> dict[str, str]:
         """The files of the page on the article by language, the study's own first; none without ``article``."""
@@ -325,6 +342,7 @@ else:
 
 def load_study(path: str | Path) -> Study:
     """Read and check a study file; the files it names are checked by the stages that read them."""
-    study = load(Study, path)
-    study._file = Path(path)
+    with noted_doubts() as doubts:
+        study = load(Study, path)
+    study._file, study._doubts = Path(path), tuple(doubts)
     return study

@@ -3,8 +3,9 @@
 Columns, in this order: ``t_s`` (from 0, rising); ``q1_deg``, ``q2_deg`` ..., the joints
 (``q3_mm`` of one that slides); ``x_mm, y_mm, z_mm`` and
 ``roll_deg, pitch_deg, yaw_deg``, the tool in the base frame with R = Rz(yaw) Ry(pitch) Rx(roll). The arm goes where the
-joints are; a check compares the poses with them. Poses (or their angles) and ``t_s`` may be left out, and other columns
-are named as not understood. Lines that begin with ``#`` are comments. Columns may be separated by semicolons or tabs,
+joints are; a check compares the poses with them. Poses (or their angles) and ``t_s`` may be left out; a column
+``units_checked`` that says yes in each row confirms small angles that look like radians; other columns are named as not
+understood. Lines that begin with ``#`` are comments. Columns may be separated by semicolons or tabs,
 and numbers then be written with decimal commas.
 """
 
@@ -13,13 +14,15 @@ from __future__ import annotations
 import csv
 import math
 import re
+import warnings
 from itertools import pairwise
 
 import numpy as np
 
-from er3a.errors import InputError
+from er3a.errors import DoubtfulUnit, InputError
 from er3a.geometry.transforms import rpy_of, transform
 from er3a.numerics.arrays import Reals
+from er3a.numerics.si_units import may_be_radians
 from er3a.programs.code_builder import CodeBuilder
 from er3a.programs.instructions import ArmMotion, JointTarget, Place, Rate
 from er3a.programs.lexing import ProgramText
@@ -32,6 +35,7 @@ TIME = "t_s"
 JOINT_COLUMN = re.compile(r"q([1-9]\d?)_(deg|mm)$")
 POSE_COLUMNS = ("x_mm", "y_mm", "z_mm", "roll_deg", "pitch_deg", "yaw_deg")
 DECIMALS = 6
+UNITS_CHECKED = "units_checked"
 
 
 def write_csv(
@@ -109,7 +113,9 @@ def read_csv_program(source: ProgramText) -> Program:
         pose = _stated(values[len(names) : len(names) + len(stated)])
         target = JointTarget(np.where(slides, given / 1000, np.radians(given)), stated=pose)
         builder.add(Fixed(place, ArmMotion("joint", target, "row", speed=speed)))
-    other = [name for name in head if name not in (*names, TIME, *stated)]
+    if not _units_checked(head, rows[1:]):
+        _doubt_radians(source, np.array([values[: len(names)] for values in table])[:, ~slides], kept[1:])
+    other = [name for name in head if name not in (*names, TIME, *stated, UNITS_CHECKED)]
     unread = [NotUnderstood(f"the column {name[:40]}", Place(source.path, kept[0][0])) for name in other]
     streamed = timed is not None and len(table) > 2
     findings: tuple[ProgramFinding, ...] = (
@@ -124,6 +130,24 @@ def read_csv_program(source: ProgramText) -> Program:
         slides=tuple(slides.tolist()),
         lines=source.lines,
     )
+
+
+def _units_checked(head: list[str], rows: list[list[str]]) -> bool:
+    """Whether each row says that its small angles are degrees although they look like radians."""
+    at = head.index(UNITS_CHECKED) if UNITS_CHECKED in head else None
+    return at is not None and all(row[at : at + 1] == ["yes"] for row in rows)
+
+
+def _doubt_radians(source: ProgramText, degrees: Reals, lines: list[tuple[int, str]]) -> None:
+    """Warn of angles (n, k) that look like radians, judged by the row with the largest: others may well be small."""
+    if not degrees.size:
+        return
+    row = int(np.abs(degrees).max(axis=1).argmax())
+    angles = degrees[row].tolist()
+    if may_be_radians(angles):
+        shown = ", ".join(f"{value:g}" for value in angles)
+        told = DoubtfulUnit(f"line {lines[row][0]}", f"[{shown}] deg", "radians", file=source.path)
+        warnings.warn(told, stacklevel=4)
 
 
 def _with_points(source: ProgramText, rows: list[list[str]]) -> list[list[str]]:

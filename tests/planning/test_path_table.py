@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from er3a.errors import InputError
+from er3a.errors import DoubtfulUnit, InputError
 from er3a.files.path_file import read_path_table
 from er3a.geometry.transforms import transform
 
@@ -46,6 +46,14 @@ def test_joint_angles_and_times(tmp_path):
     table = read_path_table(write(tmp_path, header, [0, *[0.0] * 6], [1.5, 10, 20, 30, 40, 50, 60]))
     np.testing.assert_allclose(table.joints[1], np.radians([10, 20, 30, 40, 50, 60]))
     np.testing.assert_array_equal(table.times, [0, 1.5])
+
+
+def test_joints_that_look_like_radians_are_doubted_unless_a_column_confirms_them(tmp_path):
+    header, rows = "q1_deg,q2_deg,q3_deg", [[0, -1.03, 0.45], [0, -1.03, 0]]
+    with pytest.warns(DoubtfulUnit, match=r"path\.csv: row 2, column q1_deg, q2_deg, q3_deg: .* may be radians"):
+        read_path_table(write(tmp_path, header, *rows))
+    table = read_path_table(write(tmp_path, f"{header},units_checked", *([*row, "yes"] for row in rows)))
+    np.testing.assert_allclose(table.joints, np.radians(rows))
 
 
 ROS = {

@@ -146,6 +146,33 @@ def test_no_motion_passes_without_obstacles_shapes_or_contacts(tmp_path):
         assert ("therefore no pass" in run(*words).stderr) == bool(expected)
 
 
+@pytest.mark.filterwarnings("ignore::er3a.errors.DoubtfulUnit")
+def test_no_motion_passes_by_numbers_that_look_like_another_unit(tmp_path):
+    scene, program = yaml.safe_load(Path(SCENE).read_text()), "data/programs/weld_seam.src"
+    scene["boxes"][0]["rpy_deg"] = [0, 0, 1.5708]
+    turned, confirmed = tmp_path / "turned.yaml", tmp_path / "confirmed.yaml"
+    turned.write_text(yaml.safe_dump(scene))
+    confirmed.write_text(yaml.safe_dump(scene | {"units_checked": True}))
+    head, row = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg", "0,-1.03,0.45,0,0.99,0"
+    table, checked = tmp_path / "table.csv", tmp_path / "checked.csv"
+    table.write_text(f"{head}\n0,0,0,0,0,0\n{row}\n")
+    checked.write_text(f"{head},units_checked\n0,0,0,0,0,0,yes\n{row},yes\n")
+    for file, scene_file, start, expected in (
+        (program, str(turned), HOME, "turned.yaml: boxes[0].rpy_deg: [0, 0, 1.5708] deg"),
+        (program, str(confirmed), HOME, ""),
+        (str(table), SCENE, HOME, "table.csv: line 3: [0, -1.03, 0.45, 0, 0.99, 0] deg"),
+        (str(checked), SCENE, HOME, ""),
+        (str(checked), SCENE, row, f"--start: [{row.replace(',', ', ')}] deg"),
+        (str(checked), SCENE, f"{row} deg", ""),
+    ):
+        words = ("check-program", file, "--robot", "er3a_c60", "--start", start, "--scene", scene_file)
+        found = json.loads(run(*words, "--json").stdout)[0]
+        named = [each["names"] for each in found["not_examined"] if each["what"] == "units"]
+        assert [name.rpartition("/")[2] for names in named for name in names] == ([expected] if expected else [])
+        assert not expected or {each["level"] for each in found["motions"]} & {"caution", "fail"}
+        assert not any(each["code"] == "not_understood" for each in found["findings"])
+
+
 def test_sarif_has_rules_places_and_fingerprints_that_stay(tmp_path):
     def log(file: Path) -> dict:
         output = tmp_path / "found.sarif"

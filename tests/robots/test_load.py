@@ -342,7 +342,7 @@ def test_a_robot_can_t_be_a_missing_file(tmp_path):
         (scale("dh", ("alpha_deg",), np.pi / 180), "dh.rows, zero.rows: .* deg may be radians"),
         (
             scale("limits", ("lower_deg", "upper_deg"), np.pi / 180),
-            "limits.rows: the widest limit is .* may be radians",
+            "limits.rows: .* deg may be radians",
         ),
         (with_tool(xyz_mm=[0, 0, 0.15]), r"tool.xyz_mm: \[0.0, 0.0, 0.15\] mm may be metres"),
         (with_tool(rpy_deg=[3.1416, 1.5708, 0]), r"tool.rpy_deg: .* deg may be radians"),

@@ -20,9 +20,11 @@ from er3a.collision.matrix import base_contacts, collision_matrix, solids_met
 from er3a.collision.pairs import ASSUMED_MARGIN, link_label
 from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Sphere
 from er3a.collision.shapes import arm_shapes, covered_lengths, has_bare_tool, link_frames, shapes_assumed
+from er3a.files.path_file import load_paths
 from er3a.files.robot_file import Placement
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
+from er3a.files.target_file import load_targets
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import MIN_SINGULAR_VALUE
@@ -35,13 +37,16 @@ from er3a.pipeline.results import (
     LeftOut,
     LeftOutSubject,
     NoPass,
+    Results,
     Summary,
     Verdict,
     read_results,
     summary_type,
 )
+from er3a.pipeline.stages import run
 from er3a.pipeline.stages.collision.compute import compute as collision
 from er3a.pipeline.stages.collision.model import FreeSpace
+from er3a.pipeline.stages.dynamics.entry import DynamicsSettings
 from er3a.pipeline.stages.inverse.compute import compute as inverse
 from er3a.pipeline.stages.left_out import left_out_in_solids, left_out_of_collisions, left_out_of_orientations
 from er3a.pipeline.stages.programs.compute import compute as programs
@@ -452,6 +457,100 @@ def test_what_is_carried_has_to_reach_from_the_last_link_to_the_tools_tip(solids
     assert has_bare_tool(robot, scene) is bare
     found = left_out_of_collisions(robot, bodies_of(robot, scene), scene)
     assert (LeftOut("bare_tool", ("tool",)) in found) is bare
+
+
+def in_doubt(kind: str, content: dict, confirmed: bool) -> dict:
+    """What stands in a file, or in a study's entry, with one number in another unit."""
+    radians, metres = [0, 1.5708, 0], [0, 0, 0.3]
+    if kind == "scene":
+        content["boxes"][0]["rpy_deg"] = radians
+    elif kind == "carried":
+        box = {"name": "gripper", "size_mm": [50, 50, 90], "xyz_mm": [0, 0, 50], "rpy_deg": radians}
+        content["carried"] = {"boxes": [box]}
+    elif kind == "targets":
+        content["targets"][0] = {"name": "one", "q_deg": [0, -0.52, 0.31, 0, 1.2, 0]}
+    elif kind == "paths":
+        content["paths"][0] |= {"kind": "joint", "start_deg": [0.0] * 6, "end_deg": [0, -0.52, 0.31, 0, 1.2, 0]}
+    elif kind == "robot":
+        content["tool"] = {"source": "x", "grade": "cad", "xyz_mm": metres}
+    elif kind == "masses":
+        content["inertia"]["links"][1]["centre_mm"] = [0.15, 0, 0]
+    elif kind == "base":
+        content["robots"][ROBOT]["base"] = {"xyz_mm": metres}
+    elif kind == "payload":
+        load = {"source": "x", "grade": "cad", "body": {"mass_kg": 2.3, "centre_mm": metres}}
+        content["robots"][ROBOT]["payload"] = load
+    elif kind == "mesh":
+        mesh = {"file": "part.stl", "density_kg_m3": 1000, "xyz_mm": metres}
+        content["robots"][ROBOT]["tool_load"] = {"source": "x", "grade": "cad", "mesh": mesh}
+    else:
+        content["dynamics"] = content.get("dynamics", {}) | {"payload_centre_mm": metres}
+    return content | ({"units_checked": True} if confirmed else {})
+
+
+@pytest.mark.filterwarnings("ignore::er3a.errors.DoubtfulUnit")
+@pytest.mark.parametrize("confirmed", [False, True])
+@pytest.mark.parametrize(
+    ("kind", "stage", "place"),
+    [
+        ("scene", "trajectory", "scene.yaml: boxes[0].rpy_deg: [0, 1.5708, 0] deg"),
+        ("carried", "collision", "scene.yaml: carried.boxes[0].rpy_deg: [0, 1.5708, 0] deg"),
+        ("targets", "inverse", "targets.yaml: targets[0].q_deg: [0, -0.52, 0.31, 0, 1.2, 0] deg"),
+        ("paths", "trajectory", "paths.yaml: paths[0].end_deg: [0, -0.52, 0.31, 0, 1.2, 0] deg"),
+        ("robot", "inverse", f"{ROBOT}.yaml: tool.xyz_mm: [0.0, 0.0, 0.3] mm"),
+        ("masses", "dynamics", f"{ROBOT}.yaml: inertia.links[1].centre_mm: [0.15, 0.0, 0.0] mm"),
+        ("masses", "trajectory", ""),
+        ("base", "trajectory", f"study.yaml: robots.{ROBOT}.base.xyz_mm: [0.0, 0.0, 0.3] mm"),
+        ("payload", "dynamics", f"study.yaml: robots.{ROBOT}.payload.body.centre_mm: [0.0, 0.0, 0.3] mm"),
+        ("payload", "trajectory", ""),
+        ("mesh", "dynamics", f"study.yaml: robots.{ROBOT}.tool_load.mesh.xyz_mm: [0.0, 0.0, 0.3] mm"),
+        ("settings", "dynamics", "study.yaml: dynamics.payload_centre_mm: [0.0, 0.0, 0.3] mm"),
+    ],
+)
+def test_a_number_that_looks_like_another_unit_is_no_pass_where_it_is_read(
+    tmp_path, monkeypatch, kind, stage, place, confirmed
+):
+    """The stage reads what it does, and would pass; a file that confirms its units is not doubted."""
+    sources = {
+        "targets": f"data/targets/{ROBOT}.yaml",
+        "paths": f"data/paths/{ROBOT}.yaml",
+        "scene": "data/scenes/table_and_post.yaml",
+        "robot": f"data/robots/{ROBOT}.yaml",
+        "study": "config/small.yaml",
+    }
+    of = {"carried": "scene", "masses": "robot"}.get(kind, kind if kind in sources else "study")
+    files = {each: tmp_path / f"{ROBOT if each == 'robot' else each}.yaml" for each in sources}
+    for each, source in sources.items():
+        content = yaml.safe_load(Path(source).read_text(encoding="utf-8"))
+        if each == "study":
+            entry = {"file": str(files["robot"]), **{key: str(files[key]) for key in ("targets", "paths", "scene")}}
+            content["robots"] = {ROBOT: entry}
+        content = in_doubt(kind, content, confirmed) if each == of else content
+        files[each].write_text(yaml.safe_dump(content), encoding="utf-8")
+    read = load_study(files["study"])
+
+    def passing(study: Study, name: str) -> Results:
+        robot = study.robot(name)
+        load_targets(study.entry(name).targets, robot)
+        load_paths(study.entry(name).paths)
+        study.scene(name, "trajectory")
+        if stage == "dynamics":
+            study.loads(name)
+            study.section(DynamicsSettings)
+        return Results(Summary(Verdict("pass", NoPass(())), ()))
+
+    written = []
+    monkeypatch.setattr(STAGES[stage].module("compute"), "compute", passing)
+    monkeypatch.setattr(run, "write_results", lambda *given: written.append(given[-1]))
+    run.compute(stage, read, ROBOT, tmp_path)
+    (verdict,) = [each.summary.verdict for each in written]
+    expected = place and not confirmed
+    assert verdict.status == ("caution" if expected else "pass")
+    named = [name.rpartition("/")[2] for missed in verdict.missed for name in missed.names]
+    assert named == ([place] if expected else [])
+    assert not expected or place in say_all(verdict.findings)
+    settled = {"units_checked"} & read.computed_from(ROBOT, stage).keys()
+    assert bool(settled) == (confirmed and of == "study")  # another answer computes the stage again
 
 
 def test_a_target_near_assumed_shapes_is_a_caution(study, tmp_path):

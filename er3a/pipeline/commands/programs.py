@@ -26,6 +26,14 @@ SHARE_OF_FOLLOWING = 0.5  # of the time; the rest is for checking what was follo
 
 
 RobotOption = Annotated[str, typer.Option("--robot", help="a robot's name or file")]
+StartOption = Annotated[
+    str | None,
+    typer.Option(help="joint values before the program, deg or mm: 0,-10,... (deg at the end confirms small ones)"),
+]
+FramesFile = Annotated[
+    Path | None,
+    typer.Option(callback=given_files, help="a file of kind programs: the frames of TOOL_DATA[3] and other names"),
+]
 SceneFile = Annotated[Path | None, typer.Option(callback=given_files, help="a scene file: the obstacles")]
 
 
@@ -40,11 +48,8 @@ def check_program(
     ],
     *,
     robot: RobotOption,
-    start: Annotated[str | None, typer.Option(help="joint values before the program, deg or mm: 0,-10,...")] = None,
-    frames: Annotated[
-        Path | None,
-        typer.Option(callback=given_files, help="a file of kind programs: the frames of TOOL_DATA[3] and other names"),
-    ] = None,
+    start: StartOption = None,
+    frames: FramesFile = None,
     scene: SceneFile = None,
     verdicts: Annotated[
         bool, typer.Option("--verdicts", help="print a line for each motion, also for those that pass")
@@ -64,6 +69,7 @@ def check_program(
     from er3a.files.program_file import load_programs
     from er3a.files.robot_library import load_robot
     from er3a.files.scene_file import load_scene
+    from er3a.files.units import noted_doubts
     from er3a.numerics.jit import compiling_beside
     from er3a.pipeline.program_reports import (
         checked_file,
@@ -80,17 +86,20 @@ def check_program(
     from er3a.program_check.check_program import CheckOptions
     from er3a.program_check.program_check_findings import RANKS
 
-    arm = load_robot(robot)
-    options = CheckOptions(
-        start=_joints(start, arm),
-        frames=load_programs(frames).transforms() if frames else {},
-        scene=load_scene(scene) if scene else None,
-        most_motions=most_motions,
-    )
+    with noted_doubts() as doubts:
+        arm = load_robot(robot)
+        options = CheckOptions(
+            start=_joints(start, arm),
+            frames=load_programs(frames).transforms() if frames else {},
+            scene=load_scene(scene) if scene else None,
+            most_motions=most_motions,
+        )
     first_compiled = compiling_beside(search_boxes, checked_file, files[0], arm, replace(options, measures=False))
     budget = TimeBudget(seconds, len(files))
     with shown_work("reading") as at, first_compiled:
-        checked = [checked_file(file, arm, replace(options, keep_on=_until(budget, file, at))) for file in files]
+        checked = [
+            checked_file(file, arm, replace(options, keep_on=_until(budget, file, at)), doubts) for file in files
+        ]
     if sarif is not None:
         _write(sarif, json.dumps(sarif_of(checked), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
     if as_json:
@@ -130,21 +139,22 @@ def write(
     given speed is lost."""
     from er3a.files.robot_library import load_robot
     from er3a.files.scene_file import load_scene
+    from er3a.files.units import noted_doubts
     from er3a.pipeline.messages.expectations import outcome_word
     from er3a.pipeline.messages.programs import say
     from er3a.pipeline.program_reports import missed_collisions, missed_line, programs_of, shapes_line
     from er3a.pipeline.progress import shown_work
-    from er3a.pipeline.stages.left_out import left_out_without_tool
+    from er3a.pipeline.stages.left_out import left_out_of_units, left_out_without_tool
     from er3a.pipeline.stages.trajectory.motion import by_subject
     from er3a.pipeline.viewing.conditions import program_head
     from er3a.programs.program_findings import TargetsLeftOut
     from er3a.programs.writing import with_head_lines
 
-    arm, around = load_robot(robot), load_scene(scene) if scene else None
-    refused, alone = 0, missed_collisions(arm, around)
-    head = program_head(None, (*alone, *left_out_without_tool(arm)))
-    with shown_work(f"{paths}: checking each path"):
+    with noted_doubts() as doubts, shown_work(f"{paths}: checking each path"):
+        arm, around = load_robot(robot), load_scene(scene) if scene else None
         programs = list(programs_of(paths, arm, language, around, only, unsafe))
+    refused, alone = 0, (*missed_collisions(arm, around), *left_out_of_units(doubts))
+    head = program_head(None, (*alone, *left_out_without_tool(arm)))
     for made in programs:
         if made.files is None:
             refused += 1
@@ -188,11 +198,14 @@ def _until(budget: TimeBudget, file: Path, at: Callable[[str], None]) -> KeepOn:
 
 
 def _joints(text: str | None, robot: Robot) -> Reals | None:
-    """Joint values (n,) in rad or m from a list in degrees, mm of prismatic joints."""
+    """Joint values (n,) in rad or m from a list in degrees, mm of prismatic joints; a "deg" at its end confirms small
+    ones, which look like radians."""
+    from er3a.files.units import doubt_degrees
+
     if text is None:
         return None
     try:
-        found = [float(part) for part in text.replace(",", " ").split()]
+        found = [float(part) for part in text.removesuffix("deg").replace(",", " ").split()]
     except ValueError:
         found = []
     if len(found) != len(robot.lower) or not np.isfinite(found).all():
@@ -200,4 +213,6 @@ def _joints(text: str | None, robot: Robot) -> Reals | None:
         raise Er3aError(
             f"--start is '{text}'; expected {count} joint values (deg; mm of a slide), such as {','.join('0' * count)}"
         )
+    if not text.endswith("deg"):
+        doubt_degrees(found, key="--start")
     return meant(robot, np.array(found))

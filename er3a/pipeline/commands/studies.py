@@ -75,21 +75,26 @@ def check(
 ):
     """Check input files: print the kind of each file, or its error."""
     from er3a.files.robot_library import load_robot
+    from er3a.files.units import noted_doubts
     from er3a.pipeline.check import check_file, stage_forms
 
     found: list[dict[str, object]] = []
     for file in files:
         try:
-            kind = check_file(file)
+            with noted_doubts() as doubts:
+                kind = check_file(file)
         except Er3aError as error:
             options.print_error(error)
             parts = {key: getattr(error, key, None) for key in ("field", "problem", "remedy")}
             found.append({"file": str(file), "in_order": False, **parts})
             continue
         forms = stage_forms(load_robot(file)) if kind == "a robot" else {}
-        found.append({"file": str(file), "in_order": True, "kind": kind} | ({"stages": forms} if forms else {}))
+        more: dict[str, object] = {"stages": forms} if forms else {}
+        more |= {"doubtful_units": [str(each) for each in doubts]} if doubts else {}
+        found.append({"file": str(file), "in_order": True, "kind": kind} | more)
         if not as_json:
-            print(f"{file}: {kind}, in order")
+            but = f" but for {len(doubts)} doubtful unit{'s' if len(doubts) > 1 else ''}" if doubts else ""
+            print(f"{file}: {kind}, in order{but}")
             for stage, form in forms.items():
                 print(f"  {stage}: {form}")
     if as_json:

@@ -183,6 +183,10 @@ TEXTS = texts(
         "left_out.places_in_solids": (
             "whether these places, or the scene, are right: they lie inside solids on which they don't stand"
         ),
+        "left_out.units": (
+            "whether numbers that look like radians or metres are degrees and mm, as their keys say: convert them, or "
+            "confirm them by `units_checked: true` in their file (in a table: a column)"
+        ),
         "left_out.box_directions": (
             "directions of the tray's cone: the arm's joints don't set them all, and those that they don't are not "
             "asked"

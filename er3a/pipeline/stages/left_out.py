@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,6 +13,8 @@ from er3a.collision.matrix import PairState, base_contacts
 from er3a.collision.pairs import PENETRATION_TOLERANCE, link_label
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import COVERED, arm_shapes, depths_in, has_bare_tool
+from er3a.errors import DoubtfulUnit
+from er3a.files.kept_files import shown_path
 from er3a.geometry.transforms import rotation_angle
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Flags, Reals
@@ -77,6 +80,18 @@ def left_out_of_collisions(
     carried = [LeftOut("carried_shapes" if carries else "carried")]
     shallow = [] if tolerance_mm is None else [LeftOut("shallow_overlaps", amount=tolerance_mm)]
     return (*obstacles, *carried, *listed, *shallow)
+
+
+NAMED_DOUBTS = 20
+
+
+def left_out_of_units(doubts: Sequence[DoubtfulUnit]) -> tuple[LeftOut, ...]:
+    """Numbers of input files whose unit is in doubt, each with its file and place; of many how many more."""
+    files = [shown_path(Path(each.file)) if each.file else "" for each in doubts]
+    places = [": ".join(filter(None, (file, each.key, each.shown))) for file, each in zip(files, doubts)]
+    rest = len(places) - NAMED_DOUBTS
+    names = (*places[:NAMED_DOUBTS], *([f"+ {rest}"] if rest > 0 else []))
+    return (LeftOut("units", names),) if places else ()
 
 
 def left_out_in_solids(scene: Scene | None, places: Iterable[tuple[str, Reals, float]]) -> tuple[LeftOut, ...]:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import sys
 import traceback
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Protocol
 
-from er3a.errors import Er3aError, InputError, ResultError, WriteError
+from er3a.errors import DoubtfulUnit, Er3aError, InputError, ResultError, WriteError
+from er3a.files.units import noted_doubts
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import (
     AbsentResults,
@@ -22,6 +24,7 @@ from er3a.pipeline.results import (
     read_stage,
     write_results,
 )
+from er3a.pipeline.stages.left_out import left_out_of_units
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.study import Study
@@ -53,7 +56,9 @@ def compute(name: str, study: Study, robot: str, folder: Path, parts: list[Path]
     absent : why the stage was not computed, in words; None if it was
     """
     stage = STAGES[name]
-    results = _computed(stage, study, robot, {"parts": parts} if stage.sampled else {})
+    with noted_doubts() as doubts:
+        results = _computed(stage, study, robot, {"parts": parts} if stage.sampled else {})
+    results = _in_doubt(results, [each for each in doubts if stage.weighs or not each.key.startswith(MASSES)])
     write_results(folder, study, robot, stage, results)
     if isinstance(results, AbsentResults):
         import_module(stage.messages)
@@ -62,6 +67,18 @@ def compute(name: str, study: Study, robot: str, folder: Path, parts: list[Path]
         stage.compiled.parent.mkdir(parents=True, exist_ok=True)
         stage.compiled.touch()
     return None
+
+
+MASSES = "inertia."
+
+
+def _in_doubt(results: Results[Any], doubts: list[DoubtfulUnit]) -> Results[Any]:
+    """Results whose verdict is no pass where inputs that were read hold numbers of doubtful unit."""
+    if not doubts or isinstance(results, AbsentResults):
+        return results
+    summary = results.summary
+    left_out = (*summary.not_examined, *left_out_of_units(doubts))
+    return replace(results, summary=replace(summary, not_examined=left_out))
 
 
 def _computed(stage: Stage, study: Study, robot: str, extra: dict[str, Any]) -> Results[Any]:

@@ -60,6 +60,7 @@ class Stage:
     sampled : whether ``compute`` gathers parts that jobs of their own have sampled
     obstacles : whether it looks for collisions; its page then says that the workspace's tray is no obstacle
     motions : in plural and marked with ``N_``, what its motions are; the index compares them with the tray
+    weighs : whether it looks at the masses of the arm's links
     may_run : whether the index says which of its motions may be run
     """
 
@@ -78,6 +79,7 @@ class Stage:
     sampled: bool = False
     obstacles: bool = False
     motions: str = ""
+    weighs: bool = False
     may_run: bool = False
 
     def module(self, name: str) -> Any:

@@ -15,7 +15,7 @@ from er3a.pipeline.results import LeftOut, LeftOutSubject, read_stage
 from er3a.pipeline.stages.registry import STAGES
 
 WARNED_OF: tuple[LeftOutSubject, ...] = (
-    *("obstacles", "tool", "bare_tool", "carried", "gripped_parts", "placed_box", "torques", "ways_between"),
+    *("obstacles", "tool", "bare_tool", "carried", "gripped_parts", "placed_box", "torques", "ways_between", "units"),
 )
 
 

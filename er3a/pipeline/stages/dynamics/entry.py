@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from er3a.files.units import Triple
+from er3a.files.units import CentreMm
 from er3a.files.yaml_file import StrictModel
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.settings import TrajectorySettings
@@ -25,7 +25,7 @@ class DynamicsSettings(StrictModel):
 
     gravity_m_s2: Annotated[float, Field(ge=0, le=30)] = 9.81
     samples: Annotated[int, Field(ge=11, le=20_000)] = 401
-    payload_centre_mm: Triple = [0.0, 0.0, 50.0]
+    payload_centre_mm: CentreMm = [0.0, 0.0, 50.0]
     payload_gyration_mm: Annotated[float, Field(ge=0, le=1000)] = 30.0
     capsule_density_kg_m3: Annotated[float, Field(ge=10, le=20_000)] | None = None
 
@@ -43,5 +43,6 @@ STAGE = Stage(
     inputs=_inputs,
     extra_inputs=lambda study, robot: {"loads": [load.model_dump() for load in study.loads(robot)]},
     rests_on=("validation",),
+    weighs=True,
 )
 """Settings of the trajectory stage say how fast joints of unknown speed are taken to be."""
