@@ -24,7 +24,7 @@ from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.chain import row_values
 from er3a.kinematics.forward import forward, forward_of_rows
 from er3a.numerics.arrays import Reals
-from er3a.robots.robot import Robot, Source
+from er3a.robots.robot import CombinedLimit, Robot, Source
 
 VerdictWord = Literal["equal", "same_arm", "other_arm", "other_joint_count"]
 CauseCode = Literal[
@@ -131,13 +131,18 @@ class PlacementLayer:
 
 @dataclass(frozen=True)
 class RangeDifference:
-    """A limit or speed of a joint: ``a``, and ``b`` in A's zero and direction."""
+    """A limit or speed of a joint: ``a``, and ``b`` in A's zero and direction.
+
+    ``factors`` : of a limit on a sum of joints, one for each joint, the first that is not 0 being 1 and that of
+    ``joint``; None for the arm that has no such limit
+    """
 
     joint: int
     entry: Literal["lower", "upper", "speed"]
-    a: float
-    b: float
+    a: float | None
+    b: float | None
     unit: str
+    factors: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -373,7 +378,54 @@ def _limits(robot_a: Robot, robot_b: Robot, signs: Reals, zeros: Reals, toleranc
             if abs(own - other) > tolerance:
                 unit = "mm" if slides else "deg"
                 found.append(RangeDifference(j + 1, entry, scale * own, scale * other, unit))  # type: ignore[arg-type]
+    of_b = robot_b.replace(lower=lower, upper=upper, combined=_sums_of_b(robot_b, signs, zeros))
+    found += _sums_differ(robot_a, of_b, tolerances)
     return RangeLayer(not found, tuple(found))
+
+
+UNLIMITED = -np.inf, np.inf
+
+
+def _sums_differ(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances) -> Iterator[RangeDifference]:
+    """Limits on sums of joints that differ, both arms having A's zeros and directions."""
+    own, other = _binding_sums(robot_a), _binding_sums(robot_b)
+    for factors in sorted({*own, *other}):
+        joints = np.flatnonzero(factors)
+        sliding = bool(robot_a.slides[joints].all())
+        scale, unit = (1000.0, "mm") if sliding else (math.degrees(1.0), "deg")
+        tolerance = tolerances.length if sliding else tolerances.angle
+        for a, b, entry in zip(own.get(factors, UNLIMITED), other.get(factors, UNLIMITED), ("lower", "upper")):
+            if a != b and not abs(a - b) <= tolerance:
+                one, there = (scale * end if math.isfinite(end) else None for end in (a, b))
+                yield RangeDifference(int(joints[0]) + 1, entry, one, there, unit, factors)  # type: ignore[arg-type]
+
+
+def _binding_sums(robot: Robot) -> dict[tuple[float, ...], tuple[float, float]]:
+    """Limits on sums by their factors, of which the first is made 1; infinite where the joints' own limits do more."""
+    found: dict[tuple[float, ...], tuple[float, float]] = {}
+    for limit in robot.combined:
+        factors = np.array(limit.factors)
+        if not factors.any():
+            continue
+        first = factors[np.flatnonzero(factors)[0]]
+        factors, (lower, upper) = factors / first, sorted((limit.lower / first, limit.upper / first))
+        reached = np.stack([factors * robot.lower, factors * robot.upper])
+        reached[:, robot.continuous & (factors != 0)] = np.array([[-np.inf], [np.inf]])
+        low, high = reached.min(axis=0).sum(), reached.max(axis=0).sum()
+        key = tuple((np.round(factors, ROUNDED) + 0.0).tolist())
+        least, most = found.get(key, UNLIMITED)
+        found[key] = max(least, lower if lower > low else -np.inf), min(most, upper if upper < high else np.inf)
+    return found
+
+
+def _sums_of_b(robot: Robot, signs: Reals, zeros: Reals) -> tuple[CombinedLimit, ...]:
+    """B's limits on sums as A's joints show them."""
+    found = []
+    for limit in robot.combined:
+        factors = signs * np.array(limit.factors)
+        off = float(factors @ zeros)
+        found.append(CombinedLimit(tuple(factors.tolist()), limit.lower + off, limit.upper + off))
+    return tuple(found)
 
 
 def _limits_of_b(robot: Robot, signs: Reals, zeros: Reals) -> tuple[Reals, Reals]:
@@ -612,8 +664,9 @@ def _corrected(
     # Corrected zeros and directions make A's joint values those of B.
     ends = np.sort(np.stack([signs * (end - joint_zeros) for end in (robot_a.lower, robot_a.upper)]), axis=0)
     lower, upper, continuous = ends[0], ends[1], robot_a.continuous
+    combined = _sums_of_b(robot_a, signs, -signs * joint_zeros)
     if limits.same is False or (_known(robot_b, "limits") and not _known(robot_a, "limits")):
-        lower, upper, continuous = robot_b.lower, robot_b.upper, robot_b.continuous
+        lower, upper, continuous, combined = robot_b.lower, robot_b.upper, robot_b.continuous, robot_b.combined
     speed = np.where(np.isfinite(robot_b.speed), robot_b.speed, robot_a.speed)
     text = f"{robot_a.name}, corrected by {robot_b.name}"
     sources = {group: Source(text, source.grade) for group, source in robot_a.sources.items()}
@@ -630,6 +683,7 @@ def _corrected(
         lower=lower,
         upper=upper,
         continuous=continuous,
+        combined=combined,
         speed=speed,
         base=base,
         flange=flange,

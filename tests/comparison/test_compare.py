@@ -15,7 +15,8 @@ from er3a.files.robot_writer import write_robot
 from er3a.formats.urdf_tree import read_chain
 from er3a.geometry.transforms import rot_x, rot_z
 from er3a.pipeline.cli import app
-from er3a.pipeline.messages.comparison import headline
+from er3a.pipeline.messages.comparison import headline, layer_rows
+from er3a.robots.robot import CombinedLimit
 from testing.arm_pairs import KINDS, Arm, defined_elsewhere, flange_at, name, random_arm, with_wrong_entries
 from testing.arms import made_of
 from testing.published_tables import PAIRS, best_alignment_mm, urdf_flange, urdf_path, write_csv
@@ -254,6 +255,37 @@ def test_limits_are_compared_as_the_other_arms_zeros_and_directions_have_them():
     found = er3a.compare(right, other.replace(upper=other.upper + np.radians([0, 0, 0, 0, 2, 0]))).limits
     assert [(each.joint, each.entry) for each in found.differences] == [(5, "upper")]
     assert found.differences[0].b - found.differences[0].a == pytest.approx(2)
+
+
+def test_limits_on_sums_of_joints_are_compared_as_the_other_arms_zeros_and_directions_have_them():
+    right = er3a.load_robot("er3a_c60")
+    limit = CombinedLimit((0.0, 1.0, 1.0, 0.0, 0.0, 0.0), *np.radians([-60.0, 90.0]))
+    for one, other, shown in (
+        (right, right.replace(combined=(limit,)), "J2 + J3 lower none → -60 deg, J2 + J3 upper none → 90 deg"),
+        (right.replace(combined=(limit,)), right, "J2 + J3 lower -60 → none deg, J2 + J3 upper 90 → none deg"),
+        (
+            right.replace(combined=(limit,)),
+            right.replace(combined=(replace(limit, upper=np.radians(80.0)),)),
+            "J2 + J3 upper 90 → 80 deg",
+        ),
+    ):
+        found = er3a.compare(one, other)
+        assert (found.verdict, found.limits.same) == ("same_arm", False)
+        assert dict((row[0], row[2]) for row in layer_rows(found))["limits"].startswith(shown)
+        assert found.corrected.combined == other.combined
+    moved, turned = np.radians([0, 30, -20, 0, 10, 0]), np.where(np.arange(6) == 2, -1, 1)
+    ends = turned * (right.lower - right.direction * moved), turned * (right.upper - right.direction * moved)
+    same = {"offset": right.offset + moved, "direction": turned * right.direction}
+    other = right.replace(**same, lower=np.minimum(*ends), upper=np.maximum(*ends))
+    off = float((right.direction * moved)[1:3].sum())
+    as_there = CombinedLimit((0.0, -2.0, 2.0, 0.0, 0.0, 0.0), -2 * (limit.upper - off), -2 * (limit.lower - off))
+    found = er3a.compare(right.replace(combined=(limit,)), other.replace(combined=(as_there,)))
+    assert found.limits.same
+    (there,) = found.corrected.combined
+    np.testing.assert_allclose(there.factors, [0, 1, -1, 0, 0, 0])
+    np.testing.assert_allclose([there.lower, there.upper], [limit.lower - off, limit.upper - off])
+    wide = CombinedLimit(limit.factors, -10.0, 10.0)  # which the joints' own limits keep
+    assert er3a.compare(right, right.replace(combined=(wide,))).verdict == "equal"
 
 
 def test_what_is_aligned_exactly_is_0_mm_off_in_words():

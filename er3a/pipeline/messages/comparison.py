@@ -153,4 +153,13 @@ def _(found: RangeLayer) -> str:
 
 @say.register
 def _(found: RangeDifference) -> str:
-    return f"J{found.joint} {found.entry} {found.a:.6g} → {found.b:.6g} {found.unit}"
+    a, b = (tr("none") if value is None else f"{value:.6g}" for value in (found.a, found.b))
+    named = f"J{found.joint}" if not found.factors else _sum(found.factors)
+    return f"{named} {found.entry} {a} → {b} {found.unit}"
+
+
+def _sum(factors: tuple[float, ...]) -> str:
+    """J2 + J3 of factors 0, 1, 1."""
+    terms = [(factor, f"J{joint}") for joint, factor in enumerate(factors, 1) if factor]
+    sized = [(factor, name if abs(factor) == 1 else f"{abs(factor):.6g} {name}") for factor, name in terms]
+    return "".join(f" {'-' if factor < 0 else '+'} {text}" for factor, text in sized).removeprefix(" + ")
