@@ -905,7 +905,7 @@ def test_how_one_motion_turns_the_tool_is_followed_or_named(tmp_path, kind, by_d
     (tmp_path / "a.dat").write_text(f"DEFDAT a\nDECL LDAT L1={data}\nENDDAT\n")
     body = f"{AT_START}LIN {{X 400,Y 0,Z 300,{DOWN}}}\nSLIN {{X 400,Y 50,Z 300,A 30,B 180,C 0}} WITH {setting}"
     found = check(tmp_path, krl(body), "a.src")
-    assert ("frames_in_doubt" in codes(found)) == (kind in ("#JOINT", "#IGNORE"))
+    assert ("turn_not_followed" in codes(found)) == (kind in ("#JOINT", "#IGNORE"))
     (*_, last) = (step.instruction for step in found.execution.steps)
     before = transform(np.zeros(3), np.radians([0, 180, 0]))[:3, :3]
     assert (np.abs(last.target.pose[:3, :3] - before).max() < 1e-9) == (kind == "#CONSTANT")
@@ -916,7 +916,25 @@ def test_an_arc_that_turns_along_its_path_is_named(tmp_path, setting):
     (tmp_path / "a.dat").write_text("DEFDAT a\nDECL LDAT L1={VEL 0.1,ACC 100,CIRC_TYP #PATH}\nENDDAT\n")
     arc = f"SCIRC {{X 410,Y 10,Z 300,{DOWN}}},{{X 400,Y 20,Z 300,{DOWN}}} WITH {setting}"
     body = f"{AT_START}LIN {{X 400,Y 0,Z 300,{DOWN}}}\n{arc}"
-    assert "frames_in_doubt" in codes(check(tmp_path, krl(body), "a.src"))
+    assert codes(check(tmp_path, krl(body), "a.src"))["turn_not_followed"] == [9]
+
+
+@pytest.mark.parametrize(
+    ("setting", "lines"),
+    [
+        ("$ORI_TYPE=#JOINT", [11, 12]),
+        ("$CIRC_TYPE=#PATH", [12]),
+        ("$ORI_TYPE=LDAT_ACT.ORI_TYP", [11, 12]),
+        ("LDAT_ACT={VEL 0.1,ACC 100,APO_DIST 0,APO_FAC 50,ORI_TYP #JOINT}\nBAS(#CP_DAT)", [12, 13]),
+    ],
+)
+def test_how_the_tool_turns_leaves_no_doubt_about_frames_and_counts_where_it_matters(tmp_path, setting, lines):
+    """Each motion that it concerns is named, and among what was not examined, and a joint motion is none of them."""
+    moves = f"LIN {{X 400,Y 0,Z 300,{DOWN}}}\nCIRC {{X 410,Y 10,Z 300,{DOWN}}},{{X 400,Y 20,Z 300,{DOWN}}}"
+    found = check(tmp_path, krl(f"{AT_START}{setting}\nPTP {axes(HOME)}\n{moves}\nPTP {axes(NEAR)}"), "a.src")
+    assert codes(found)["turn_not_followed"] == [each - 1 for each in lines]
+    assert "frames_in_doubt" not in codes(found)
+    assert {each - 1 for each in lines} <= {each.place.line for each in found.not_examined}
 
 
 @pytest.mark.parametrize("name", ["$POS_INT", "$AXIS_INT"])

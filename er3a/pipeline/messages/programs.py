@@ -120,6 +120,7 @@ REMEDIES: dict[str, str] = {
     "frame_given_twice": N_("Correct the one that is wrong, or remove it from the frames."),
     "kept_to_next_start": N_("Set this variable at the program's beginning."),
     "turns_otherwise": N_("Turn the tool by a joint motion, or in parts: swing its x axis first, then turn about it."),
+    "turn_not_followed": N_("Set $ORI_TYPE=#VAR and $CIRC_TYPE=#BASE for it, or make it a joint motion."),
     "relative_turn_assumed": N_("Give the target as an absolute position, or turn in the tool's frame (#TOOL)."),
     "set_elsewhere": N_("Set this variable at the program's beginning."),
     "waits_for_others": N_(
@@ -339,6 +340,10 @@ TEXTS = texts(
         "turns_otherwise": (
             "on the way the tool was turned about one axis; no public text says how KRL turns it: a swing of its x "
             "axis and a turn about that are up to {off_deg:.1f} deg from there"
+        ),
+        "turn_not_followed": (
+            "checked with the tool turning evenly to the target's orientation; {text} asks for another turn, which is "
+            "not followed"
         ),
         "relative_turn_assumed": (
             "the angles were taken for turns about the axes of the base; added to the angles before, they lead to an "
