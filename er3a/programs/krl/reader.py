@@ -602,7 +602,8 @@ def read_krl(source: ProgramText) -> syntax.Program:
         findings += reader.read_data(read_program_text(data_file))
     routines = reader.read_routines()
     findings += [*_robot_root(files.machine_data), *files.twice()]
-    others = _SetByOthers(files, _known_to_all(files, reader.data, data_file), of_controller)
+    shared = _known_to_all(files, reader.data, data_file)
+    others = _SetByOthers(files, shared, of_controller)
     called: list[syntax.Routine] = []
     hidden = _seen_here_alone(source, routines, reader.data)
     reader.data = [each if each.place.file == data_file else _as(each, hidden) for each in reader.data]
@@ -611,7 +612,8 @@ def read_krl(source: ProgramText) -> syntax.Program:
         called += [_with_names(each, hidden) for each in more_routines]
         reader.data += [_as(each, hidden) for each in more_data]
         findings += more
-    findings += [NotUnderstood(file.name, Place(file, 1)) for file in files.unread]
+    unread = (each for each in files.unread if shared or each.suffix.lower() == ".sub")  # which sets outputs too
+    findings += [NotUnderstood(file.name, Place(file, 1)) for file in unread]
     if data_file is None and lacks_data(routines, reader.data, CONFIG_NAMES):
         findings.append(DataFileMissing(source.path.with_suffix(".dat").name))
     by_name, unlinked = linked([*called, *routines], changed_arguments)
