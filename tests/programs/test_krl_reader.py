@@ -342,20 +342,30 @@ AXES = "PTP {{A1 {}, A2 0, A3 0, A4 0, A5 -60, A6 0}}"
 @pytest.mark.parametrize(
     ("body", "more"),
     [
-        ("S(A[])", "DEF S(X[]:OUT)\nINT X[]\nX[K]=50\nEND"),
-        ("S(A[])", "DEF S(X[]:OUT)\nINT X[]\nGETTHEM(X[])\nEND"),
-        ("B[2]=50\nA[]=B[]", ""),
-        ('SREAD("50",STATE,OFFSET,"%d",A[1])', ""),
-        ('I=EKI_GETINT("Cell","Angle",A[1])', ""),
-        ('IF EKI_GETINT("Cell","Angle",A[1]) THEN\nWAIT SEC 1\nENDIF', ""),
-        ("CAST_FROM(BUFFER[],OFFSET,A[])", ""),
-        ("LOST(A[])", ""),
+        ("S(A[])", "DEF S(X[]:OUT)\nINT X[]\nX[1]=50\nEND"),
+        ("S(A[])", "DEF S(X[]:OUT)\nINT X[]\nT(X[])\nEND\nDEF T(Y[]:OUT)\nINT Y[]\nY[1]=50\nEND"),
+        ("I=F(A[])", "DEFFCT INT F(X[]:OUT)\nINT X[]\nX[1]=50\nRETURN 1\nENDFCT"),
+        ("B[2]=50\nA[]=B[]", None),
+        ('SREAD("50",STATE,OFFSET,"%d",A[1])', None),
+        ('I=EKI_GETINT("Cell","Angle",A[1])', None),
+        ('IF EKI_GETINT("Cell","Angle",A[1]) THEN\nWAIT SEC 1\nENDIF', None),
+        ("CAST_FROM(BUFFER[],OFFSET,A[])", None),
+        ("LOST(A[])", None),
     ],
 )
 def test_what_is_passed_by_reference_does_not_keep_its_old_value(body, more, tmp_path):
-    found = run(tmp_path, f"DECL INT A[2],B[2],I\nA[1]=3\nA[2]=4\n{body}\n{AXES.format('A[1]')}", more=more)
-    assert [each.target for each in moves(found) if isinstance(each.target, JointTarget)] == []
+    """It has that which a routine of the program gives it, or none that is known."""
+    found = run(tmp_path, f"DECL INT A[2],B[2],I\nA[1]=3\nA[2]=4\n{body}\n{AXES.format('A[1]')}", more=more or "")
+    known = [each.target.joints[0] for each in moves(found) if isinstance(each.target, JointTarget)]
+    np.testing.assert_allclose(np.degrees(known), [50] if more else [])
     assert moves(found)
+
+
+@pytest.mark.parametrize("inside", ["X[K]=50", "GETTHEM(X[])"])
+def test_a_list_of_which_an_unknown_element_is_set_has_none_that_is_known(inside, tmp_path):
+    more = f"DEF S(X[]:OUT)\nINT X[],K\n{inside}\nEND"
+    found = run(tmp_path, f"DECL INT A[2]\nA[1]=3\nS(A[])\n{AXES.format('A[1]')}", more=more)
+    assert [each.target for each in moves(found) if isinstance(each.target, JointTarget)] == []
 
 
 @pytest.mark.parametrize(
