@@ -277,7 +277,7 @@ def _not_examined(execution: Execution, located: tuple[LocatedFinding, ...], end
         found_in.FramesDecide,
     )
     found += [NotExamined(each.place, "course") for each in located if isinstance(each.finding, ends)]
-    strange = (found_in.MayMove, NotUnderstood, NotSimulated)
+    strange = (found_in.MayMove, found_in.TurnNotFollowed, NotUnderstood, NotSimulated)
     found += [NotExamined(each.place, "instruction") for each in located if isinstance(each.finding, strange)]
     files = {each.place.file: i for i, each in enumerate(located)}
     order = dict.fromkeys(found)

@@ -121,6 +121,13 @@ class TurnsEitherWay(Finding):
     axis: tuple[float, float, float]
 
 
+class TurnNotFollowed(Finding):
+    """A setting (``text``) asks for another turn of the tool than the one with which a line or arc of KRL was checked:
+    evenly to the target's orientation."""
+
+    text: str
+
+
 class RelativeTurnAssumed(Finding):
     """Angles of a relative position were taken for turns about the axes of the base; added to those of the position
     before, they lead to an orientation that is ``off_deg`` from that."""
@@ -493,6 +500,7 @@ CheckFinding = (
     | PositionCompleted
     | TurnsOtherwise
     | TurnsEitherWay
+    | TurnNotFollowed
     | RelativeTurnAssumed
     | FramesInDoubt
     | PathNotKnown

@@ -1151,6 +1151,8 @@ def _said(motion: instructions.ArmMotion) -> list[found_in.CheckFinding]:
         found.append(found_in.PositionCompleted(motion.left_out))
     if motion.turn_in_doubt:
         found.append(found_in.RelativeTurnAssumed(math.degrees(motion.turn_in_doubt)))
+    if motion.turns:
+        found.append(found_in.TurnNotFollowed(motion.turns))
     if motion.doubt:
         found.append(found_in.FramesInDoubt(motion.doubt))
     return found
@@ -1175,6 +1177,7 @@ def _key(motion: instructions.ArmMotion) -> Hashable:
         motion.doubt,
         motion.turn_in_doubt,
         motion.with_path,
+        motion.turns,
     )
 
 

@@ -131,6 +131,9 @@ def same(a: NamedFrame, b: NamedFrame) -> bool:
 WITH_FIELDS = ("$VEL", "$ACC", "$APO")
 """KRL variables whose fields are looked up by their full names, however they were set."""
 
+HELD_BESIDE = "%beside"
+"""Under this a routine's own memory keeps which of its variables others change, too, as it has handed them over."""
+
 STRUCTURE = "%STRUC "
 """With what the name begins under which the types of the fields of a KRL structure are kept."""
 
@@ -416,7 +419,8 @@ class ProgramMemory:
         if name in WITH_FIELDS and isinstance(value, syntax.Record):
             self.shared.update({f"{name}.{field}": part for field, part in value.items})
         if local or (self.local and root(name) in self.local):
-            self.local[name] = value
+            handed = self.local.get(HELD_BESIDE, ())
+            self.local[name] = syntax.Unclear(name) if isinstance(handed, tuple) and root(name) in handed else value
         else:
             self.shared[name] = value
             if self.watched and root(name) in self.watched:
@@ -458,6 +462,24 @@ class ProgramMemory:
             self.forget(root(key))
         elif whole in self.local or whole in self.shared:
             self.write(whole, syntax.Unclear(f"{whole}, whose element was set"))
+
+    def elements(self, target: syntax.Expression, name: str) -> dict[str, syntax.Value]:
+        """Elements of a whole list ``A[]`` that are kept by their full names, as those of a list ``name``."""
+        start = _whole(self.key(target))
+        if not start:
+            return {}
+        kept = self.local if root(start) in self.local else {**self.shared, **self.cell.frames}
+        found = [each for each in kept if each.startswith(start)]
+        return {f"{name}[{each[len(start) :]}": known(self.read(each), each) for each in found}
+
+    def take_back(self, target: syntax.Expression, name: str, local: Mapping[str, syntax.Value]) -> None:
+        """Set a variable to what a routine's own ``name`` holds at its end; all elements of a whole list ``A[]``."""
+        start = _whole(self.key(target))
+        if not start:
+            self.assign(target, known(local.get(name), name))
+            return
+        for each in [each for each in local if each.startswith(f"{name}[")]:
+            self.write(f"{start}{each[len(name) + 1 :]}", local[each])
 
     def forget(self, variable: str) -> None:
         """Make a variable unclear, with all its fields and elements."""
@@ -708,6 +730,11 @@ def root(name: str) -> str:
     dot, bracket = name.find("."), name.find("[")
     ends = [at for at in (dot, bracket) if at > 0]
     return name[: min(ends)] if ends else name
+
+
+def _whole(name: str | None) -> str:
+    """``A[`` of a whole list ``A[]``; empty for other names."""
+    return name[:-1] if name is not None and name.endswith("[]") else ""
 
 
 def _is_whole(value: syntax.Value) -> TypeGuard[int]:

@@ -238,6 +238,7 @@ class ArmMotion(ByValue):
     load : what hangs on the flange, in its frame; None where the program says nothing
     left_out : coordinates that a variable leaves out of its position, and that were taken from where the arm is
     turn_in_doubt : rad, by which a relative position turns otherwise where its angles are added to those before
+    turns : a setting that asks for another turn of the tool than is followed; empty for none
     doubt : an instruction before that is not understood, and may have set another tool, base or path; empty if there is
         none, and for targets that are no poses
     """
@@ -258,6 +259,7 @@ class ArmMotion(ByValue):
     load: Load | None = None
     left_out: str = ""
     turn_in_doubt: float = 0.0
+    turns: str = ""
     doubt: str = ""
     with_path: bool = False
 

@@ -30,7 +30,7 @@ from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, syntax
 from er3a.programs.code_builder import own_names, variable_of
-from er3a.programs.evaluation import Cell, Dialect, Position, ProgramMemory, known, root
+from er3a.programs.evaluation import HELD_BESIDE, Cell, Dialect, Position, ProgramMemory, known, root
 from er3a.programs.execution import Ending, EndKind, Execution, FramesUnset, FrameTwice, KeepOn, RunLimits, Step
 from er3a.programs.languages import LANGUAGES, not_written
 from er3a.robots.robot import Robot
@@ -93,11 +93,21 @@ def changed_beside(program: syntax.Program, dialect: Dialect, itself: str = "") 
     routines = program.routines
     beside = [each.what for each in program.operations() if isinstance(each, syntax.Beside)]
     asked = {what.function for what in beside}
-    cyclic = {name for what in beside if what.function == syntax.CYCLIC for name in names(what.arguments[0])}
     started = {name for name in routines if (name in asked or routines[name].thread) and name != itself}
-    given = {name for what in beside for name in _given_back(program, what)}
+    handed = {name for what in beside for name in _handed(program, what)}
     changed = _changed_in(program, _with_called(program, started), dialect) | program.beside
-    return (changed | cyclic | given) - dialect.modal
+    return (changed | handed) - dialect.modal
+
+
+def _handed(program: syntax.Program, what: syntax.Invocation) -> set[str]:
+    """Variables that are handed over to what runs beside the program, and changed by it."""
+    return set(names(what.arguments[0])) if what.function == syntax.CYCLIC else _given_back(program, what)
+
+
+def _handed_by(program: syntax.Program, routine: syntax.Routine) -> frozenset[str]:
+    """A routine's own variables that it hands over to what runs beside the program, and that are changed there."""
+    beside = [each.what for each in routine.code if isinstance(each, syntax.Beside)]
+    return frozenset(name for what in beside for name in _handed(program, what)) & own_names(routine)
 
 
 def _persisting(program: syntax.Program, dialect: Dialect) -> frozenset[str]:
@@ -311,8 +321,7 @@ def _moves(program: syntax.Program, operation: syntax.Operation, moving: set[str
         case syntax.Call(routine=routine) if routine in moving:
             return True
         case syntax.Beside():
-            strange = _is_strange(program, operation, dialect) or bool(_given_back(program, operation.what))
-            return strange or _moves_beside(program, operation, moving, dialect)
+            return _is_strange(program, operation, dialect) or _moves_beside(program, operation, moving, dialect)
         case syntax.Assign(value=value) if value is not None:
             name = _full_name(operation.target)
             given = value.value if isinstance(value, syntax.Constant) else syntax.Unclear("")
@@ -638,6 +647,7 @@ class Machine:
         self.names_met: set[str] = set()
         self.deciding_names: list[str] = []  # of those, whole
         self.unsettled = {name: unsettled(program, each, dialect) for name, each in program.routines.items()}
+        self.handed = {name: _handed_by(program, each) for name, each in program.routines.items()}
         self.quiet, self.needed, self.choosing = quiet_branches(program, dialect)
         self.persisting = _persisting(program, dialect) & self.needed
         self.first_values: dict[str, syntax.Value] = {}  # of these
@@ -705,6 +715,7 @@ class Machine:
         """Go on with the program's beginning."""
         entry = self.program.routines[self.program.entry]
         way.frames = [Frame(entry)]
+        self._hold(way.frames[0].local, entry)
         way.memory.local, way.memory.aliased = way.frames[0].local, self.unsettled[entry.name]
         way.memory.kept.clear()
 
@@ -1017,6 +1028,7 @@ class Machine:
     def _call(self, way: ExecutionPath, call: syntax.Call) -> None:
         routine, memory = self.program.routines[call.routine], way.memory
         local, fits = _locals(routine, call, memory)
+        self._hold(local, routine)
         if call.result == syntax.START:
             del local["%inside"]
         if not fits:
@@ -1038,9 +1050,6 @@ class Machine:
         """
         name = start.what.function
         routine = self.program.routines.get(name)
-        if changed := _given_back(self.program, start.what):  # which is changed at any time, also if it is local
-            way.memory.aliased |= changed
-            way.memory.kept.clear()
         if not _is_strange(self.program, start, self.dialect) and not _moves_beside(
             self.program, start, self.moving, self.dialect
         ):
@@ -1051,12 +1060,16 @@ class Machine:
         if routine is not None:
             other = way.fork(self.numbers, len(self.seen))
             other.step, other.beside = before, True
-            local, fits = _locals(routine, start.what, way.memory)
+            other.memory.beside = self._changed_later(way) | changed_beside(self.program, self.dialect, name)
+            given_in = way.memory
+            if start.kind == "interrupt":  # which gets what it is given when it comes
+                other.memory.here, given_in = Position(), other.memory
+                for each in other.memory.beside & set(map(root, other.memory.local)):
+                    given_in.forget(each)
+            local, fits = _locals(routine, start.what, given_in)
+            self._hold(local, routine)
             other.frames = [Frame(routine, 0, local, (*way.frames[-1].calls, start.place))]
             other.memory.local = local
-            other.memory.beside = self._changed_later(way) | changed_beside(self.program, self.dialect, name)
-            if start.kind == "interrupt":
-                other.memory.here = Position()
             state = (name, frozenset(local.items()), self._kept(other.memory.shared), other.memory.here.key())
             if state not in self.started:
                 self.started.add(state)
@@ -1077,6 +1090,12 @@ class Machine:
             return ()
         changed = _changed_in(self.program, _with_called(self.program, (name,)), self.dialect)
         return tuple(sorted(changed & self.dialect.modal))
+
+    def _hold(self, local: dict[str, syntax.Value], routine: syntax.Routine) -> None:
+        """Keep that nothing is known of what a routine that begins hands over to what runs beside the program."""
+        if handed := self.handed[routine.name]:
+            local |= {name: syntax.Unclear(name) for name in local if root(name) in handed}
+            local[HELD_BESIDE] = tuple(sorted(handed))
 
     def _changed_later(self, way: ExecutionPath) -> frozenset[str]:
         """Names of the variables, of those that have names in motions, that a way may still change."""
@@ -1112,11 +1131,8 @@ class Machine:
                 self.changed_at.setdefault(target_name(target), frame.calls[-1])
             if name in aliased:
                 memory.forget(target_name(target))
-            elif _is_whole_list(target):
-                for key, part in _parts(frame.local, name):
-                    memory.write(target_name(target) + key, part)
             else:
-                memory.assign(target, known(frame.local.get(name), name))
+                memory.take_back(target, name, frame.local)
         handled = self.unsettled[frame.routine.name]
         for name in handled - frame.local.keys():  # what a handler may have changed stays so
             memory.forget(name)
@@ -1165,11 +1181,7 @@ def _locals(
     values = {parameter.name: memory.value(each) for parameter, each in reversed(given)}
     local: dict[str, syntax.Value] = {"%inside": True}
     for parameter, each in given:
-        if _is_whole_list(each):
-            named = {**memory.shared, **memory.local}
-            for key, value in _parts(named, target_name(each)):
-                local[parameter.name + key] = memory.read(target_name(each) + key) or value
-            values[parameter.name] = local.get(parameter.name, syntax.Unset(parameter.name))
+        local |= memory.elements(each, parameter.name)
     for parameter in routine.parameters:
         if parameter.name in values:
             local[parameter.name] = values[parameter.name]
@@ -1180,16 +1192,6 @@ def _locals(
     places = sum(not each.named for each in routine.parameters)
     wanted = sum(each is not None for each in call.arguments) + len(call.keywords)
     return local, len(call.arguments) <= places and len(given) == wanted
-
-
-def _is_whole_list(given: syntax.Expression) -> bool:
-    """Whether an argument is a list with all its elements: KRL's ``A[]``."""
-    return isinstance(given, syntax.Element) and not given.indices and isinstance(given.of, syntax.Variable)
-
-
-def _parts(values: Mapping[str, syntax.Value], name: str) -> list[tuple[str, syntax.Value]]:
-    """What a list has under its name and those of its elements, by what follows its name."""
-    return [(key[len(name) :], value) for key, value in values.items() if root(key) == name]
 
 
 def _labels(routine: syntax.Routine) -> frozenset[int]:

@@ -240,6 +240,53 @@ def test_what_an_interrupt_sets_is_followed_on_both_sides(tmp_path):
     assert codes(found)["above_limit"] == [5]
 
 
+@pytest.mark.parametrize(
+    ("start", "more"),
+    [
+        ("INTERRUPT DECL 4 WHEN $IN[1] DO count(I)", "DEF count(K:OUT)\nINT K\nK=K+1\nEND\n"),
+        ("TRIGGER WHEN DISTANCE=1 DELAY=0 DO count(I) PRIO=-1", "DEF count(K)\nINT K\nK=K+1\nEND\n"),
+        ("INTERRUPT DECL 4 WHEN $IN[1] DO count(A[])", "DEF count(K[]:OUT)\nINT K[]\nK[1]=30\nEND\n"),
+        (
+            "outer(I)",
+            "DEF outer(N:OUT)\nINT N\nINTERRUPT DECL 4 WHEN $IN[1] DO count(N)\nINTERRUPT ON 4\nEND\n"
+            "DEF count(K:OUT)\nINT K\nK=K+1\nEND\n",
+        ),
+        ("ANIN ON I=1.0*$ANIN[1]\nI=3\nA[1]=3", ""),
+    ],
+)
+@pytest.mark.parametrize("of_data", [True, False])
+def test_what_an_interrupt_or_trigger_gets_by_reference_and_changes_has_no_value(tmp_path, start, more, of_data):
+    declared = "DECL INT I=3\nDECL INT A[2]\nA[1]=3\n"
+    (tmp_path / "a.dat").write_text(f"DEFDAT a\n{declared if of_data else ''}ENDDAT\n")
+    own = "" if of_data else "DECL INT I,A[2]\nI=3\nA[1]=3\n"
+    axis = "A[1]" if "A[]" in start else "I"
+    body = f"{own}PTP {axes(HOME)}\n{start}\nWAIT SEC 1\nPTP {{A1 {axis}}}"
+    assert isinstance(motions(tmp_path, krl(body, more), "a.src")[-1].target, UnresolvedTarget)
+
+
+def test_a_routines_own_variable_is_not_that_of_its_name_that_an_interrupt_changes(tmp_path):
+    (tmp_path / "a.dat").write_text("DEFDAT a\nDECL INT I=1\nENDDAT\n")
+    more = "DEF count(K:OUT)\nINT K\nK=K+1\nEND\nDEF sub( )\nINT I\nFOR I=1 TO 2\nPTP {A1 I}\nENDFOR\nEND\n"
+    body = f"PTP {axes(HOME)}\nINTERRUPT DECL 4 WHEN $IN[1] DO count(I)\nsub( )"
+    found = motions(tmp_path, krl(body, more), "a.src")[1:]
+    np.testing.assert_allclose([np.degrees(each.target.joints[0]) for each in found], [1, 2])
+
+
+def test_what_an_interrupt_only_reads_keeps_its_value(tmp_path):
+    more = "DEF show(K)\nINT K\n$OUT[1]=K>2\nEND\n"
+    body = f"DECL INT I\nI=3\nPTP {axes(HOME)}\nINTERRUPT DECL 4 WHEN $IN[1] DO show(I)\nPTP {{A1 I}}"
+    assert isinstance(motions(tmp_path, krl(body, more), "a.src")[-1].target, JointTarget)
+
+
+@pytest.mark.parametrize("own", ["DECL INT I\n", ""])
+def test_an_interrupt_gets_the_value_of_the_time_at_which_it_comes(tmp_path, own):
+    (tmp_path / "a.dat").write_text("DEFDAT a\nDECL INT I=1\nENDDAT\n")
+    body = f"{own}I=1\nINTERRUPT DECL 4 WHEN $IN[1] DO go(I,5)\nPTP {axes(HOME)}\nI=3"
+    more = "DEF go(K:IN,N:IN)\nINT K,N\nPTP {A1 N,A2 -10,A3 -10,A4 0,A5 -70,A6 0}\nPTP {A1 K}\nEND\n"
+    found = motions(tmp_path, krl(body, more), "a.src")
+    assert sum(isinstance(each.target, UnresolvedTarget) for each in found) == 1
+
+
 def test_an_interrupt_that_sets_a_frame_is_named_and_leaves_the_programs_own_frames(tmp_path):
     body = f"{FRAMES}INTERRUPT DECL 4 WHEN $IN[1] DO shift( )\nPTP {axes(NEAR)}\nLIN_REL {{Z 5}}"
     found = check(tmp_path, krl(body, "DEF shift( )\n$BASE={X 0,Y 0,Z 10,A 0,B 0,C 0}\nEND\n"), "a.src")
@@ -858,7 +905,7 @@ def test_how_one_motion_turns_the_tool_is_followed_or_named(tmp_path, kind, by_d
     (tmp_path / "a.dat").write_text(f"DEFDAT a\nDECL LDAT L1={data}\nENDDAT\n")
     body = f"{AT_START}LIN {{X 400,Y 0,Z 300,{DOWN}}}\nSLIN {{X 400,Y 50,Z 300,A 30,B 180,C 0}} WITH {setting}"
     found = check(tmp_path, krl(body), "a.src")
-    assert ("frames_in_doubt" in codes(found)) == (kind in ("#JOINT", "#IGNORE"))
+    assert ("turn_not_followed" in codes(found)) == (kind in ("#JOINT", "#IGNORE"))
     (*_, last) = (step.instruction for step in found.execution.steps)
     before = transform(np.zeros(3), np.radians([0, 180, 0]))[:3, :3]
     assert (np.abs(last.target.pose[:3, :3] - before).max() < 1e-9) == (kind == "#CONSTANT")
@@ -869,7 +916,25 @@ def test_an_arc_that_turns_along_its_path_is_named(tmp_path, setting):
     (tmp_path / "a.dat").write_text("DEFDAT a\nDECL LDAT L1={VEL 0.1,ACC 100,CIRC_TYP #PATH}\nENDDAT\n")
     arc = f"SCIRC {{X 410,Y 10,Z 300,{DOWN}}},{{X 400,Y 20,Z 300,{DOWN}}} WITH {setting}"
     body = f"{AT_START}LIN {{X 400,Y 0,Z 300,{DOWN}}}\n{arc}"
-    assert "frames_in_doubt" in codes(check(tmp_path, krl(body), "a.src"))
+    assert codes(check(tmp_path, krl(body), "a.src"))["turn_not_followed"] == [9]
+
+
+@pytest.mark.parametrize(
+    ("setting", "lines"),
+    [
+        ("$ORI_TYPE=#JOINT", [11, 12]),
+        ("$CIRC_TYPE=#PATH", [12]),
+        ("$ORI_TYPE=LDAT_ACT.ORI_TYP", [11, 12]),
+        ("LDAT_ACT={VEL 0.1,ACC 100,APO_DIST 0,APO_FAC 50,ORI_TYP #JOINT}\nBAS(#CP_DAT)", [12, 13]),
+    ],
+)
+def test_how_the_tool_turns_leaves_no_doubt_about_frames_and_counts_where_it_matters(tmp_path, setting, lines):
+    """Each motion that it concerns is named, and among what was not examined, and a joint motion is none of them."""
+    moves = f"LIN {{X 400,Y 0,Z 300,{DOWN}}}\nCIRC {{X 410,Y 10,Z 300,{DOWN}}},{{X 400,Y 20,Z 300,{DOWN}}}"
+    found = check(tmp_path, krl(f"{AT_START}{setting}\nPTP {axes(HOME)}\n{moves}\nPTP {axes(NEAR)}"), "a.src")
+    assert codes(found)["turn_not_followed"] == [each - 1 for each in lines]
+    assert "frames_in_doubt" not in codes(found)
+    assert {each - 1 for each in lines} <= {each.place.line for each in found.not_examined}
 
 
 @pytest.mark.parametrize("name", ["$POS_INT", "$AXIS_INT"])

@@ -360,6 +360,11 @@ MENDED = {
             {"data": GIVEN.replace("Z 0", "Z 100"), "frames": {"BASE_DATA[1]": LIFTED}},
         ),
     ),
+    "turn_not_followed": (
+        krl(AT_HOME, "$ORI_TYPE=#JOINT", "LIN_REL {Z 5}"),
+        krl(AT_HOME, "$ORI_TYPE=#VAR", "LIN_REL {Z 5}"),
+        krl(AT_HOME, "PTP {A1 5}"),
+    ),
     "kept_to_next_start": (
         (krl("N=N+5", "PTP {A1 N}"), {"data": "INT N=0"}),
         (krl("N=0", "N=N+5", "PTP {A1 N}"), {"data": "INT N=0"}),

@@ -591,6 +591,22 @@ def test_a_routine_that_the_program_does_not_call_may_set_a_variable_too(tmp_pat
     assert ("set_elsewhere" in codes(check(tmp_path, krl(body), "a.src"))) != called
 
 
+@pytest.mark.parametrize(
+    ("more", "told"),
+    [
+        ("GLOBAL DEF PRESET( )\nGZ=30.0\nEND\n", True),
+        ("GLOBAL DEF PRESET( )\nHELP( )\nEND\nDEF HELP( )\nGZ=30.0\nEND\n", True),
+        ("DEF PRESET( )\nGZ=30.0\nEND\n", False),
+    ],
+)
+@pytest.mark.parametrize("own", [True, False])
+def test_a_routine_that_nobody_calls_counts_where_other_modules_see_it(tmp_path, own, more, told):
+    (tmp_path / "$config.dat").write_text(CONFIG)
+    (tmp_path / "lib.src").write_text(f"DEF lib( )\nEND\n{'' if own else more}")
+    found = codes(check(tmp_path, krl("lib( )\nPTP {A1 GZ}", more if own else ""), "a.src"))
+    assert ("set_elsewhere" in found) == told
+
+
 @pytest.mark.parametrize("line", ["$OUT[7]=$IN[3]", "PULSE($OUT[7],TRUE,0.5)", "USERPLC( )"])
 def test_what_a_submit_program_makes_of_outputs_is_not_known(tmp_path, line):
     (tmp_path / "sps.sub").write_text(f"DEF SPS( )\nLOOP\n{line}\nENDLOOP\nEND\n")

@@ -185,8 +185,13 @@ def test_the_archives_own_data_come_before_a_copy_beside_the_program(tmp_path, f
 
 @pytest.mark.parametrize("called", [True, False])
 def test_a_module_that_is_no_text_is_named_and_the_program_is_read(tmp_path, called):
-    archive(tmp_path, {"Program/bin.src": "\x01\x02", "Program/bin.dat": "\x01", "System/x.sub": "\x01\x02"})
-    text = f"DEF a( )\nPTP {{A1 5}}\n{'BIN( )' * called}\nEND\n"
+    """Where it may set what the program uses."""
+    archive(tmp_path, {"Program/bin.src": "\x01\x02", "Program/bin.dat": "\x01"})
+    text = f"DEF a( )\nPTP {{A1 GZ}}\n{'BIN( )' * called}\nEND\n"
+    assert motions(tmp_path / "Program", text.replace("GZ", "5"), "a.src")
+    assert not read_program(tmp_path / "Program/a.src").findings
+    config = "DEFDAT $CONFIG\nDECL REAL GZ=5.0\nENDDAT\n"
+    archive(tmp_path, {"System/x.sub": "\x01\x02", "System/$config.dat": config})
     assert motions(tmp_path / "Program", text, "a.src")
     program = read_program(tmp_path / "Program/a.src")
     assert {(each.code, each.place.file.name) for each in program.findings} == {

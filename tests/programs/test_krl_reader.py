@@ -345,18 +345,70 @@ AXES = "PTP {{A1 {}, A2 0, A3 0, A4 0, A5 -60, A6 0}}"
         ("S(A[])", "DEF S(X[]:OUT)\nINT X[]\nX[1]=50\nEND"),
         ("S(A[])", "DEF S(X[]:OUT)\nINT X[]\nT(X[])\nEND\nDEF T(Y[]:OUT)\nINT Y[]\nY[1]=50\nEND"),
         ("I=F(A[])", "DEFFCT INT F(X[]:OUT)\nINT X[]\nX[1]=50\nRETURN 1\nENDFCT"),
-        ("B[2]=50\nA[]=B[]", ""),
-        ('SREAD("50",STATE,OFFSET,"%d",A[1])', ""),
-        ('I=EKI_GETINT("Cell","Angle",A[1])', ""),
-        ('IF EKI_GETINT("Cell","Angle",A[1]) THEN\nWAIT SEC 1\nENDIF', ""),
-        ("CAST_FROM(BUFFER[],OFFSET,A[])", ""),
-        ("LOST(A[])", ""),
+        ("B[2]=50\nA[]=B[]", None),
+        ('SREAD("50",STATE,OFFSET,"%d",A[1])', None),
+        ('I=EKI_GETINT("Cell","Angle",A[1])', None),
+        ('IF EKI_GETINT("Cell","Angle",A[1]) THEN\nWAIT SEC 1\nENDIF', None),
+        ("CAST_FROM(BUFFER[],OFFSET,A[])", None),
+        ("LOST(A[])", None),
     ],
 )
 def test_what_is_passed_by_reference_does_not_keep_its_old_value(body, more, tmp_path):
-    found = run(tmp_path, f"DECL INT A[2],B[2],I\nA[1]=3\nA[2]=4\n{body}\n{AXES.format('A[1]')}", more=more)
-    assert [each.target for each in moves(found) if isinstance(each.target, JointTarget)] == []
+    """It has that which a routine of the program gives it, or none that is known."""
+    found = run(tmp_path, f"DECL INT A[2],B[2],I\nA[1]=3\nA[2]=4\n{body}\n{AXES.format('A[1]')}", more=more or "")
+    known = [each.target.joints[0] for each in moves(found) if isinstance(each.target, JointTarget)]
+    np.testing.assert_allclose(np.degrees(known), [50] if more else [])
     assert moves(found)
+
+
+@pytest.mark.parametrize("inside", ["X[K]=50", "GETTHEM(X[])"])
+def test_a_list_of_which_an_unknown_element_is_set_has_none_that_is_known(inside, tmp_path):
+    more = f"DEF S(X[]:OUT)\nINT X[],K\n{inside}\nEND"
+    found = run(tmp_path, f"DECL INT A[2]\nA[1]=3\nS(A[])\n{AXES.format('A[1]')}", more=more)
+    assert [each.target for each in moves(found) if isinstance(each.target, JointTarget)] == []
+
+
+@pytest.mark.parametrize(
+    ("body", "more", "turns"),
+    [
+        ("S(A[])", "DEF S(X[]:OUT)\nINT X[]\nX[1]=50\nEND", 50),
+        ("S(A[])", "DEF S(X[]:OUT)\nINT X[]\nT(X[])\nEND\nDEF T(Y[]:OUT)\nINT Y[]\nY[1]=Y[1]+40\nEND", 43),
+        ("A[1]=F(A[],2)", "DEFFCT INT F(X[]:OUT,N:IN)\nINT X[],N\nRETURN X[1]+X[N]\nENDFCT", 7),
+        ("S(A[])", "DEF S(X[])\nINT X[],K\nFOR K=1 TO 2\nX[K]=X[K]*10\nENDFOR\nEND", 30),
+        ("R.V[1]=8\nS(R.V[])\nA[1]=R.V[1]", "DEF S(X[]:OUT)\nINT X[]\nX[1]=X[1]+1\nEND", 9),
+        ("M[1,2]=9\nS(M[,])\nA[1]=M[1,2]", "DEF S(X[,]:OUT)\nINT X[,]\nX[1,2]=X[1,2]+1\nEND", 10),
+    ],
+)
+def test_the_elements_of_a_list_pass_into_a_routine_that_is_read_and_come_back(body, more, turns, tmp_path):
+    found = run(
+        tmp_path, f"DECL ROW_OF R\nDECL INT A[2],M[2,2]\nA[1]=3\nA[2]=4\n{body}\n{AXES.format('A[1]')}", more=more
+    )
+    (move,) = moves(found)
+    assert np.degrees(move.target.joints[0]) == pytest.approx(turns)
+
+
+def test_a_list_of_points_is_handed_over_and_kept_as_it_is(tmp_path):
+    data = "DEFDAT weld\nDECL E6AXIS XP[2]\nXP[1]={A1 5,A2 0,A3 0,A4 0,A5 -60,A6 0}\n"
+    data += "XP[2]={A1 7,A2 0,A3 0,A4 0,A5 -60,A6 0}\nENDDAT\n"
+    more = "DEF GO(Q[]:OUT,N:IN)\nDECL E6AXIS Q[]\nINT N,K\nFOR K=1 TO N\nPTP Q[K]\nENDFOR\nEND"
+    found = run(tmp_path, "GO(XP[],2)", data=data, more=more)
+    np.testing.assert_allclose([np.degrees(each.target.joints[0]) for each in moves(found)], [5, 7])
+    assert found.kept == ()
+
+
+def test_an_element_that_a_list_never_got_is_not_handed_over_from_one_of_the_data(tmp_path):
+    data = "DEFDAT weld\nDECL REAL H[2]\nH[2]=5\nENDDAT\n"
+    more = f"DEF SUB()\nREAL H[2]\nH[1]=3\nGO(H[])\nEND\nDEF GO(X[])\nREAL X[]\n{AXES.format('X[2]')}\nEND"
+    (move,) = moves(run(tmp_path, "SUB()", data=data, more=more))
+    assert not isinstance(move.target, JointTarget)
+
+
+def test_what_a_routine_changes_in_a_list_of_the_data_is_kept_to_the_next_start(tmp_path):
+    data = "DEFDAT weld\nDECL REAL H[2]\nH[1]=5\nH[2]=0\nENDDAT\n"
+    body = f"{AXES.format('H[1]')}\nRAISE(H[])\n{AXES.format('H[1]')}"
+    found = run(tmp_path, body, data=data, more="DEF RAISE(X[]:OUT)\nREAL X[]\nX[1]=X[1]+10\nEND")
+    np.testing.assert_allclose([np.degrees(each.target.joints[0]) for each in moves(found)], [5, 15])
+    assert [name for name, _ in found.kept] == ["H"]
 
 
 def test_functions_that_only_read_their_arguments_keep_them(tmp_path):

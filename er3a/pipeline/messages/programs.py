@@ -125,6 +125,7 @@ REMEDIES: dict[str, str] = {
     "kept_to_next_start": N_("Set this variable at the program's beginning."),
     "turns_otherwise": N_("Turn the tool by a joint motion, or in parts: swing its x axis first, then turn about it."),
     "turns_either_way": N_("Turn the tool in two lines by 90 deg each, or by a joint motion."),
+    "turn_not_followed": N_("Set $ORI_TYPE=#VAR and $CIRC_TYPE=#BASE for it, or make it a joint motion."),
     "relative_turn_assumed": N_("Give the target as an absolute position, or turn in the tool's frame (#TOOL)."),
     "set_elsewhere": N_("Set this variable at the program's beginning."),
     "waits_for_others": N_(
@@ -370,6 +371,10 @@ TEXTS = texts(
         "turns_either_way": (
             "the tool turns by 180 deg, and both ways round are equally far: it was turned about ({axis}) of the base; "
             "no public text says which way the controller takes"
+        ),
+        "turn_not_followed": (
+            "checked with the tool turning evenly to the target's orientation; {text} asks for another turn, which is "
+            "not followed"
         ),
         "relative_turn_assumed": (
             "the angles were taken for turns about the axes of the base; added to the angles before, they lead to an "

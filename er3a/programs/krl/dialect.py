@@ -514,7 +514,7 @@ EKI_INIT EKI_LOCK EKI_OPEN EKI_SEND EKI_SETBOOL EKI_SETFRAME EKI_SETINT EKI_SETR
 ERR_CLEAR ERR_RAISE EXISTS_KRLDLG EXISTS_KRLMSG FORWARD GETVARSTATE GET_MSGBUFFER GET_SIG_INF GET_SYSTEM_DATA INVERSE
 IR_STOPM LK MSGDIALOG MSGINFO MSGLOG MSGNOTIFY MSGQUIT MSGSTATE P00 PULSE RESET_CD_PARAMS SET_CD_PARAMS SET_KRLDLG
 SET_KRLMSG SREAD STRADD STRCLEAR STRCOMP STRCOPY STRDECLLEN STRFIND STRLEN STRTOBOOL STRTOFRAME STRTOINT STRTOPOS
-STRTOREAL STRTOSTRING SWRITE SYNC TQM_INI USER_GRP VARSTATE VAR_STATE
+STRTOREAL STRTOSTRING SWRITE SYNC TQM_FIFO_READ TQM_INI USER_GRP VARSTATE VAR_STATE
 """
 HARMLESS = frozenset(HARMLESS_TEXT.split())
 """Functions of the controller that move nothing and set no frame."""
@@ -672,7 +672,7 @@ class KrlDialect(Dialect):
 
     def doubted(self, name: str) -> str:
         """A number of a frame: until that frame is set; empty for what changes no motion's frame or path."""
-        if root(name) in OF_DYNAMICS:
+        if root(name) in OF_DYNAMICS or name in ORIENTATION_TYPES:
             return ""
         return {"$ACT_TOOL": "$TOOL", "$ACT_BASE": "$BASE", "$ACT_EX_AX": "$BASE"}.get(name, name)
 
@@ -773,7 +773,7 @@ class KrlDialect(Dialect):
                 continue
             keep_setting(memory, name, expression)
             value = known(memory.read(name), name)
-            if not self.is_followed(name, value):
+            if name not in ORIENTATION_TYPES and not self.is_followed(name, value):
                 doubt = f"{name}={syntax.shown(value)}"
         found = replace(self._motion(memory, move, angle), doubt=doubt)
         for name in own & memory.shared.keys():
@@ -819,8 +819,19 @@ class KrlDialect(Dialect):
             left_out="; ".join(filter(None, left_out)),
             turn_in_doubt=in_doubt,
             turning=(None, None) if kind == "joint" else (_turning(memory, "ORI1"), _turning(memory, "ORI2")),
+            turns=self._turns(memory, kind),
             load=load,
         )
+
+    def _turns(self, memory: ProgramMemory, kind: instructions.MotionKind) -> str:
+        """The setting of how the tool turns on lines and arcs that is not followed; empty for none."""
+        if kind == "joint":
+            return ""
+        given = ((name, memory.read(name)) for name in ORIENTATION_TYPES if kind == "arc" or name != "$CIRC_TYPE")
+        other = (
+            f"{name}={syntax.shown(value)}" for name, value in given if value and not self.is_followed(name, value)
+        )
+        return ", ".join(other)
 
     def _unturned(self, memory: ProgramMemory, goal: instructions.Target, frames: Frames) -> instructions.Target:
         """The target with the orientation that the tool has before: ``$ORI_TYPE=#CONSTANT``."""

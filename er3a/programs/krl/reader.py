@@ -602,7 +602,8 @@ def read_krl(source: ProgramText) -> syntax.Program:
         findings += reader.read_data(read_program_text(data_file))
     routines = reader.read_routines()
     findings += [*_robot_root(files.machine_data), *files.twice()]
-    others = _SetByOthers(files, _known_to_all(files, reader.data, data_file), of_controller)
+    shared = _known_to_all(files, reader.data, data_file)
+    others = _SetByOthers(files, shared, of_controller)
     called: list[syntax.Routine] = []
     hidden = _seen_here_alone(source, routines, reader.data)
     reader.data = [each if each.place.file == data_file else _as(each, hidden) for each in reader.data]
@@ -611,7 +612,8 @@ def read_krl(source: ProgramText) -> syntax.Program:
         called += [_with_names(each, hidden) for each in more_routines]
         reader.data += [_as(each, hidden) for each in more_data]
         findings += more
-    findings += [NotUnderstood(file.name, Place(file, 1)) for file in files.unread]
+    unread = (each for each in files.unread if shared or each.suffix.lower() == ".sub")  # which sets outputs too
+    findings += [NotUnderstood(file.name, Place(file, 1)) for file in unread]
     if data_file is None and lacks_data(routines, reader.data, CONFIG_NAMES):
         findings.append(DataFileMissing(source.path.with_suffix(".dat").name))
     by_name, unlinked = linked([*called, *routines], changed_arguments)
@@ -625,19 +627,31 @@ def read_krl(source: ProgramText) -> syntax.Program:
         (*findings, *unlinked),
         source.lines,
         beside=others.beside(),
-        elsewhere=tuple(others.elsewhere(_uncalled([*called, *routines], routines[0].name)).items()),
+        elsewhere=tuple(others.elsewhere(_uncalled([*called, *routines], routines[0].name, hidden)).items()),
     )
 
 
-def _uncalled(routines: Iterable[syntax.Routine], entry: str) -> Iterable[syntax.Routine]:
-    """Routines that the one named ``entry`` and what it calls or starts do not call."""
+def _uncalled(routines: Iterable[syntax.Routine], entry: str, hidden: Mapping[str, str]) -> list[syntax.Routine]:
+    """Routines that other modules may call, and what these call, but for those that ``entry`` and what it calls do.
+
+    No other module sees those that are ``hidden``, and a called module's own, which are named ``MODULE/NAME``.
+    """
     by_name = {each.name: each for each in routines}
-    waiting = [entry]
+    own = _reached(by_name, [entry])
+    others = _reached(by_name, [name for name in by_name if name not in hidden and "/" not in name])
+    return [by_name[name] for name in others if name not in own]
+
+
+def _reached(by_name: Mapping[str, syntax.Routine], names: list[str]) -> dict[str, None]:
+    """Routines with what they call or start, in the order in which they are met."""
+    found: dict[str, None] = {}
+    waiting = names
     while waiting:
-        routine = by_name.pop(waiting.pop(), None)
-        if routine is not None:
-            waiting += [each.function for operation in routine.code for each in _invocations(operation)]
-    return by_name.values()
+        name = waiting.pop()
+        if name in by_name and name not in found:
+            found[name] = None
+            waiting += [each.function for operation in by_name[name].code for each in _invocations(operation)]
+    return found
 
 
 def _known_to_all(files: ControllerFiles, data: Iterable[syntax.Assign], own: Path | None) -> frozenset[str]:
