@@ -716,3 +716,36 @@ def test_arcs_are_written_so_that_they_turn_as_they_were_read_or_that_is_told(tm
             assert ("written_arcs_turn_otherwise" in told) == (mode == "PathFrame")
     plain = execute(written(tmp_path, on_arc(*(on_circle(each, 0) for each in (-75, 0, 75))), "a.mod"), ROBOT, HOME)
     assert "CirPathMode" not in write_program(plain.listing(), "rapid", WriteOptions(ROBOT, HOME)).files[".mod"]
+
+
+@pytest.mark.parametrize(
+    ("frame", "named"),
+    [
+        ('-use_joint_5 "rob1_6" -base_frame_pos_x 0\\\n      -base_frame_pos_z 0.9 -base_frame_orient_u0 0', True),
+        ('-base_frame_coordinated "M7DM1"', True),
+        ("-base_frame_pos_z 0 -base_frame_orient_u0 1 -base_frame_orient_u3 0", False),
+        ("-gravity_beta 0", False),
+    ],
+)
+def test_a_robot_that_its_configuration_puts_elsewhere_is_no_pass(tmp_path, frame, named):
+    """As for KRL: what is a work object in the world is not one in the robot's base."""
+    inside = tmp_path / "backup/RAPID/TASK1/PROGMOD"
+    inside.mkdir(parents=True)
+    (tmp_path / "backup/SYSPAR").mkdir()
+    text = f'MOC:CFG_1.0:6:0::\n#\nROBOT:\n\n      -name "ROB_1" -use_joint_0 "rob1_1"\\\n      {frame}\n#\n'
+    (tmp_path / "backup/SYSPAR/MOC.cfg").write_text(text + 'SINGLE:\n      -name "M7DM1" -base_frame_pos_x 1\n')
+    found = check(inside, rapid("MoveL p,v100,fine,tool0;"), "a.mod")
+    assert [each.place.line for each in found.findings if each.finding.code == "program_not_simulated"] == [5] * named
+    assert [each.place.file.name for each in found.not_examined] == ["MOC.cfg"] * named
+    assert "MOC.cfg" in {each.name for each in files_of(inside / "a.mod")}
+
+
+@pytest.mark.parametrize("other", ["T_COMM", "T_COMM/PROGMOD", "TASK2/PROGMOD"])
+def test_what_another_task_sets_has_no_known_value_whatever_its_folder_is_called(tmp_path, other):
+    own = other.replace("T_COMM", "T_ROB1").replace("TASK2", "TASK1")
+    for folder in (own, other):
+        (tmp_path / folder).mkdir(parents=True)
+    data = "PERS num height:=20;"
+    (tmp_path / other / "comm.mod").write_text(f"MODULE comm\n{data}\nPROC main()\nheight:=50;\nENDPROC\nENDMODULE\n")
+    found = check(tmp_path / own, rapid("MoveL Offs(p,0,0,height),v100,fine,tool0;", data), "a.mod")
+    assert codes(found)["target_not_given"] == [7]

@@ -279,6 +279,7 @@ def read_rapid(source: ProgramText) -> syntax.Program:
         )
         findings.append(NameTwice(name, last.place))
     by_name, unlinked = linked([each for reader in readers for each in reader.routines], changed_arguments)
+    findings += _base_frames(source.path)
     entry = _entry(own, by_name)
     return syntax.Program(
         "rapid",
@@ -1101,8 +1102,8 @@ GLOBAL = re.compile(
 WORD = re.compile(r"[^\W\d]\w*")
 LATE_CALL = re.compile(r"(?m)(?:^|;)\s*%(?!%)(?!\s*\"\w*\"\s*%)|\bCallByVar\b", re.IGNORECASE)
 """A call of a procedure whose name the text does not give."""
-TASK = re.compile(r"(?i)TASK\d+")
-"""Folder of a task in a controller's backup."""
+TASK = re.compile(r"(?i)TASK\d+|T_\w+")
+"""Folder of a task in a controller's backup, or in a project: T_ROB1, T_COMM."""
 SHARED = re.compile(r"(?i)(\b(?:LOCAL|TASK)\s+)?\bPERS\s+\w+\s+(\w+)")
 SET = re.compile(r"(?i)(?<![\w.\\])(\w+)(?:\{[^}]*\}|\.\w+)*\s*:=|\b(?:Incr|Decr|Add|Clear)\s+(\w+)")
 FOLDERS = {"PROGMOD": "SYSMOD", "SYSMOD": "PROGMOD"}
@@ -1150,19 +1151,61 @@ def _beside(path: Path) -> list[Path]:
 
 
 def companions(path: Path) -> tuple[Path, ...]:
-    """The modules on which a program depends, with those of the controller's other tasks."""
-    return (*modules_of(path), *_of_tasks(path))
+    """The modules on which a program depends, with those of the controller's other tasks and its configuration."""
+    configured = _configuration(path, "MOC.cfg")
+    return (*modules_of(path), *_of_tasks(path), *((configured,) if configured else ()))
 
 
 def _of_tasks(path: Path) -> list[Path]:
-    """The modules of the other tasks in a controller's backup."""
-    task = path.resolve().parents[1] if path.resolve().parent.name.upper() in FOLDERS else path
+    """The modules of the other tasks in a controller's backup, or beside the folder of a task."""
+    folder = path.resolve().parent
+    task = folder.parent if folder.name.upper() in FOLDERS else folder
     if not TASK.fullmatch(task.name):
         return []
     others = (each for each in sorted(task.parent.iterdir()) if TASK.fullmatch(each.name) and each != task)
-    folders = (each for other in others for each in sorted(other.iterdir()) if each.name.upper() in FOLDERS)
-    modules = (each for folder in folders for each in sorted(folder.iterdir()) if each.suffix.lower() in SUFFIXES)
-    return [each for each in modules if not _is_encoded(each)]
+    inside = [each for other in others if other.is_dir() for each in sorted(other.iterdir())]
+    inside += [file for each in inside if each.name.upper() in FOLDERS for file in sorted(each.iterdir())]
+    return [each for each in inside if each.suffix.lower() in SUFFIXES and each.is_file() and not _is_encoded(each)]
+
+
+HIGHEST = 4
+"""How many folders above a program may be that of the controller's backup."""
+NO_BASE_FRAME = {"pos_x": 0.0, "pos_y": 0.0, "pos_z": 0.0, "orient_u0": 1.0}
+BASE_FRAME = re.compile(r"""-base_frame_(pos_[xyz]|orient_u[0-3]|coordinated)\s+("[^"]*"|\S+)""")
+
+
+def _configuration(path: Path, name: str) -> Path | None:
+    """A file of the configuration in the backup that a program belongs to."""
+    folders = (each / "SYSPAR" / name for each in list(path.resolve().parents)[:HIGHEST])
+    return next((each for each in folders if each.is_file()), None)
+
+
+def _base_frames(path: Path) -> Iterable[ProgramFinding]:
+    """That the configuration puts a robot elsewhere than at the origin of the world, in which work objects are."""
+    file = _configuration(path, "MOC.cfg")
+    inside, entry, first = False, "", 0
+    for number, line in enumerate(read_program_text(file).lines if file else (), 1):
+        if re.match(r"\w+:", line) or line.startswith("#"):
+            inside = line.startswith("ROBOT:")
+        entry, first = (entry + line, first) if entry else (line, number)
+        if line.rstrip().endswith("\\"):
+            entry = entry.rstrip().removesuffix("\\") + " "
+            continue
+        if inside and any(map(_is_moved, BASE_FRAME.findall(entry))):
+            yield NotSimulated(" ".join(each[0] for each in BASE_FRAME.finditer(entry)), Place(file, first))
+        entry = ""
+
+
+def _is_moved(part: tuple[str, str]) -> bool:
+    """Whether a part of a base frame puts it elsewhere, or on something that moves."""
+    name, text = part
+    if name == "coordinated":
+        return bool(text.strip('"'))
+    try:
+        value = abs(float(text)) if name == "orient_u0" else float(text)
+    except ValueError:
+        return True
+    return abs(value - NO_BASE_FRAME.get(name, 0.0)) > 1e-9
 
 
 def _set_by_tasks(path: Path) -> set[str]:
