@@ -749,3 +749,22 @@ def test_what_another_task_sets_has_no_known_value_whatever_its_folder_is_called
     (tmp_path / other / "comm.mod").write_text(f"MODULE comm\n{data}\nPROC main()\nheight:=50;\nENDPROC\nENDMODULE\n")
     found = check(tmp_path / own, rapid("MoveL Offs(p,0,0,height),v100,fine,tool0;", data), "a.mod")
     assert codes(found)["target_not_given"] == [7]
+
+
+@pytest.mark.parametrize("wait", ["WaitDI di1,1", "WaitUntil di1=1", "WaitUntil n=2", "WaitTestAndSet busy"])
+def test_a_wait_that_ends_anyhow_waits_for_no_other_task(tmp_path, wait):
+    """Its flag is what it gives, not what it asks; nor is it kept to the next start."""
+    option = "" if wait.endswith("busy") else "\\MaxTime:=3\\TimeFlag:=late"
+    data = "VAR bool late;\nVAR bool busy;\nVAR num n:=1;"
+    body = f"{wait}{option};\nMoveL p,v100,fine,tool0;\nIF late MoveL Offs(p,0,0,20),v100,fine,tool0;"
+    assert not {"waits_for_others", "kept_to_next_start"} & codes(check(tmp_path, rapid(body, data), "a.mod")).keys()
+
+
+def test_a_text_that_may_name_what_runs_already_is_a_caution_and_no_error(tmp_path):
+    routines = f"PROC serve()\nSocketReceive s1\\Str:=cmd;\n%cmd%;\nENDPROC\nPROC up()\n{at_turn(20)}ENDPROC"
+    body = "WHILE TRUE DO\nserve;\nENDWHILE"
+    found = check(tmp_path, rapid(body, "VAR string cmd;\nVAR socketdev s1;", routines), "a.mod")
+    ends = [each for each in found.findings if each.finding.code == "not_followed_to_end"]
+    assert [(each.level, each.finding.kind, each.place.line) for each in ends] == [("caution", "guessed", 14)]
+    assert found.level == "caution"
+    assert {each.place.line for each in found.verdicts if each.times} == {6, 17}

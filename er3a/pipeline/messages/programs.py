@@ -154,6 +154,7 @@ STOPPED: dict[EndKind, str] = {
     "branches": FURTHER,
     "stopped": FURTHER,
     "recursion": N_("Give the routine a condition to return."),
+    "guessed": N_("Call routines by their names, chosen by a test of the text."),
 }
 STAYS_MM = 1.0  # that a tool moves when it stays where it is
 Pace = TooFast | FasterThanAssumed | AccelerationTooGreat | AcceleratesMoreThanAssumed
@@ -260,6 +261,9 @@ TEXTS = texts(
             ),
             stopped="the program was followed no further than here: the time for it was over",
             recursion="routines call themselves or each other without end",
+            guessed=(
+                "which routine is called is known on the cell alone; that it is one that runs already was not followed"
+            ),
         ),
         "target_not_given.named": "the target {name} is not known: {reason}",
         "target_not_given": "the target is not known: {reason}",

@@ -76,6 +76,7 @@ CHANGING = {
     "GETDATAVAL": 1,
     "BITCLEAR": 0,
     "BITSET": 0,
+    "WAITTESTANDSET": 0,
 }
 """Instructions that change one of their arguments, by its number."""
 CHANGING_OPTIONS = frozenset(("TIMEFLAG", "VALUE", "VALUEATTIMEOUT", "BREAKFLAG", "ERRORNUMBER"))
@@ -799,8 +800,10 @@ class _BodyReader:
             self.late(place, syntax.Invocation(ARITHMETIC, (syntax.Constant("+"), placed[0], suffix)), ((), ()), text)
             return
         if name in WAITS:
-            asked = tuple(each for each in (*placed, *(each for _, each in named)) if each is not None)
-            builder.add(syntax.Waiting(place, "condition", syntax.Listed("", asked), text, arrives))
+            told = (each for key, each in named if key not in CHANGING_OPTIONS)  # the others are what it gives back
+            asked = tuple(each for each in (*placed, *told) if each is not None)
+            ends = "TIMEFLAG" in options or name == "WAITTESTANDSET"  # which waits for what is true
+            builder.add(syntax.Waiting(place, "condition", syntax.Listed("", asked), text, arrives, ends))
         else:
             builder.add(syntax.Doing(place, syntax.Invocation(name, placed, named), text))
         if "TIMEFLAG" not in options and ("MAXTIME" in options or name.startswith(RAISING)):
