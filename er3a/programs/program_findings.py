@@ -20,6 +20,14 @@ class NameTwice(Finding, code="program_name_twice"):
     place: Place
 
 
+class BegunWithin(Finding, code="program_begun_within"):
+    """The file is a part of a program that begins in another ``file``; it was followed from ``routine`` alone."""
+
+    routine: str
+    file: str
+    place: Place
+
+
 class NotUnderstood(Finding, code="program_not_understood"):
     """A piece of text that is kept, but not understood."""
 
@@ -60,6 +68,7 @@ class NothingMoves(Finding, code="program_nothing_moves"):
 ProgramFinding = (
     DataFileMissing
     | NameTwice
+    | BegunWithin
     | NotUnderstood
     | NotSimulated
     | FormInferred

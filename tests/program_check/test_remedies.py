@@ -162,6 +162,8 @@ TURNS = [f"MoveAbsJ [[0,-10,-10,0,-70,{turn}],[9E9,9E9,9E9,9E9,9E9,9E9]],v50,fin
 
 CALLED = ("PROC up()", TURNS[0], "ENDPROC", "PROC serve()", "VAR string text;", "SocketReceive s\\Str:=text;")
 
+BESIDE_MAIN = f"MODULE a\nPROC up()\n{TURNS[0]}\nENDPROC\nENDMODULE\n"
+
 
 def last(check):
     """Where the arm stands behind the last motion."""
@@ -324,6 +326,10 @@ MENDED = {
     "loop_comes_back_otherwise": (
         (krl(*LOOP, "ENDLOOP"), {"limits": RunLimits(rounds=5)}),
         krl(*LOOP, *THIRDS[1::-1], THIRDS[2], "ENDLOOP"),
+    ),
+    "program_begun_within": (
+        (BESIDE_MAIN, {"files": {"b.mod": rapid("up;")}}),
+        (rapid("up;").replace("ENDMODULE", BESIDE_MAIN.replace("MODULE a", "")), {"files": {"b.mod": BESIDE_MAIN}}),
     ),
     "program_name_twice": (
         krl("b( )", more="DEF b( )\nPTP {A1 5}\nEND\nDEF b( )\nPTP {A1 9}\nEND\n"),

@@ -768,3 +768,14 @@ def test_a_text_that_may_name_what_runs_already_is_a_caution_and_no_error(tmp_pa
     assert [(each.level, each.finding.kind, each.place.line) for each in ends] == [("caution", "guessed", 14)]
     assert found.level == "caution"
     assert {each.place.line for each in found.verdicts if each.times} == {6, 17}
+
+
+@pytest.mark.parametrize(("main", "named"), [("MAIN", True), ("other", False), ("main", None)])
+def test_a_module_that_is_checked_without_the_main_that_calls_it_is_no_pass(tmp_path, main, named):
+    """What main sets before, as a displacement, is not known to it."""
+    helper = f"MODULE helper\n{TARGET}PROC path()\nMoveL p,v100,fine,tool0;\nENDPROC\nENDMODULE\n"
+    called = "PDispSet [[0,0,-250],[1,0,0,0]];\npath;\n" if named is not None else "Stop;\n"
+    (tmp_path / "cell.mod").write_text(f"MODULE cell\nPROC {main}()\n{called}ENDPROC\nENDMODULE\n")
+    found = check(tmp_path, helper, "helper.mod")
+    assert codes(found).get("program_begun_within", []) == [3] * bool(named)
+    assert [(each.place.line, each.what) for each in found.not_examined] == [(3, "course")] * bool(named)

@@ -109,6 +109,7 @@ REMEDIES: dict[str, str] = {
     "begun_again": N_("Let the program end where it begins, and write the way there at its end: it is checked then."),
     "loop_comes_back_otherwise": N_("Turn the tool back within the loop, so that each round ends as it began."),
     "program_data_file_missing": N_("Put the data file beside the program."),
+    "program_begun_within": N_("Check the module with main: it takes this one with it."),
     "program_name_twice": N_("Remove one of the two definitions."),
     "program_nothing_moves": N_("Check that this is the program to run."),
     "speed_not_given": N_("Give a speed, as a number above 0, before the motion."),
@@ -389,6 +390,9 @@ TEXTS = texts(
             "checked"
         ),
         "program_data_file_missing": "{file} is missing, which holds the program's points",
+        "program_begun_within": (
+            "followed from {routine} alone: the program begins in {file}, and what it sets before was not examined"
+        ),
         "program_name_twice": "{name} is declared twice; the later one counts",
         "program_not_understood": "not understood: {text}",
         "program_not_simulated": "not simulated: {text}",

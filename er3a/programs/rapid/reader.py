@@ -18,7 +18,7 @@ from er3a.programs import syntax
 from er3a.programs.code_builder import CodeBuilder, fault, linked, mapped, within
 from er3a.programs.instructions import Place
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, read_program_text
-from er3a.programs.program_findings import NameTwice, NotSimulated, NotUnderstood, ProgramFinding
+from er3a.programs.program_findings import BegunWithin, NameTwice, NotSimulated, NotUnderstood, ProgramFinding
 from er3a.programs.rapid.data_types import SHAPES, Shape, starting
 
 PATTERN = re.compile(
@@ -282,6 +282,9 @@ def read_rapid(source: ProgramText) -> syntax.Program:
     by_name, unlinked = linked([each for reader in readers for each in reader.routines], changed_arguments)
     findings += _base_frames(source.path)
     entry = _entry(own, by_name)
+    main = None if entry == "MAIN" or entry not in by_name else _main_of(source.path)
+    if main is not None:
+        findings.append(BegunWithin(entry.lower(), main.name, by_name[entry].place))
     return syntax.Program(
         "rapid",
         source.path.stem,
@@ -1137,6 +1140,12 @@ def modules_of(path: Path) -> tuple[Path, ...]:
             late = late or calls
         found += new
     return tuple(found)
+
+
+def _main_of(path: Path) -> Path | None:
+    """The module with ``main`` of the program that a module belongs to; None if there is none beside it."""
+    texts = (each for each in _beside(path) if not _is_encoded(each) and "MAIN" in _names(each)[1])
+    return next((each for each in texts if path.resolve() in map(Path.resolve, modules_of(each))), None)
 
 
 def _beside(path: Path) -> list[Path]:
