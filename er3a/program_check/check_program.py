@@ -49,7 +49,7 @@ from er3a.programs.instructions import (
     turns_apart,
 )
 from er3a.programs.machine import execute
-from er3a.programs.program_findings import NotSimulated, NotUnderstood
+from er3a.programs.program_findings import BegunWithin, NotSimulated, NotUnderstood
 from er3a.programs.syntax import Fixed, Move, Program
 from er3a.programs.writing import SAME_TURN
 from er3a.robots.robot import Robot
@@ -275,6 +275,7 @@ def _not_examined(execution: Execution, located: tuple[LocatedFinding, ...], end
         found_in.WaitsForOthers,
         found_in.ErrorsNotFollowed,
         found_in.FramesDecide,
+        BegunWithin,
     )
     found += [NotExamined(each.place, "course") for each in located if isinstance(each.finding, ends)]
     strange = (found_in.MayMove, found_in.TurnNotFollowed, NotUnderstood, NotSimulated)

@@ -797,6 +797,11 @@ class Machine:
                 if len(way.frames) > self.limits.depth:
                     self._end(way, "recursion", operation.place, limit=self.limits.depth)
                     return
+                if self._is_guessed(way, operation) and any(
+                    each.routine.name == operation.routine for each in way.frames
+                ):
+                    self._end(way, "guessed", operation.place)
+                    return
                 self._call(way, operation)
             elif isinstance(operation, syntax.Beside):
                 self._start(way, operation)
@@ -974,7 +979,8 @@ class Machine:
         if waiting.kind == "condition" or waiting.of is None:
             asked = None if waiting.of is None else memory.value(waiting.of)
             fails = asked is False or (isinstance(asked, tuple) and any(each is False for each in asked))
-            return instructions.Pause(condition=waiting.text, stops=waiting.stops, by_others=fails)
+            by_others = fails and not waiting.ends
+            return instructions.Pause(condition=waiting.text, stops=waiting.stops, by_others=by_others)
         seconds = syntax.number(memory.value(waiting.of))
         return (
             instructions.Pause(seconds, stops=waiting.stops)
@@ -1024,6 +1030,15 @@ class Machine:
         other.frames[-1].at = branch.otherwise
         self._note(holding, branch.place, instructions.Decision(branch.text, True))
         self._note(other, branch.place, instructions.Decision(branch.text, False))
+
+    def _is_guessed(self, way: ExecutionPath, call: syntax.Call) -> bool:
+        """Whether a routine is called that a text may name or not, as its value is not known."""
+        last = self.steps[way.step] if way.step >= 0 else None
+        return (
+            last is not None
+            and isinstance(last.instruction, instructions.Decision)
+            and (last.place, last.instruction.condition) == (call.place, call.text)
+        )
 
     def _call(self, way: ExecutionPath, call: syntax.Call) -> None:
         routine, memory = self.program.routines[call.routine], way.memory

@@ -29,6 +29,14 @@ class ModuleTwice(Finding, code="program_module_twice"):
     place: Place
 
 
+class BegunWithin(Finding, code="program_begun_within"):
+    """The file is a part of a program that begins in another ``file``; it was followed from ``routine`` alone."""
+
+    routine: str
+    file: str
+    place: Place
+
+
 class NotUnderstood(Finding, code="program_not_understood"):
     """A piece of text that is kept, but not understood."""
 
@@ -70,6 +78,7 @@ ProgramFinding = (
     DataFileMissing
     | NameTwice
     | ModuleTwice
+    | BegunWithin
     | NotUnderstood
     | NotSimulated
     | FormInferred

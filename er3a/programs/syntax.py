@@ -306,13 +306,17 @@ class Move:
 
 @dataclass(frozen=True, slots=True)
 class Waiting:
-    """A wait of so many ``seconds``, or for a condition, or for the operator; ``stops`` as of ``Pause``."""
+    """A wait of so many ``seconds``, or for a condition, or for the operator; ``stops`` as of ``Pause``.
+
+    ``ends`` where it is over even if the condition is false.
+    """
 
     place: Place
     kind: Literal["seconds", "condition", "operator"]
     of: Expression | None
     text: str
     stops: bool = False
+    ends: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -160,6 +160,10 @@ AT_POINT = f"ConfJ\\Off;ConfL\\Off;MoveJ [[400,0,400],[0,0,1,0],{REST}],v50,fine
 
 TURNS = [f"MoveAbsJ [[0,-10,-10,0,-70,{turn}],[9E9,9E9,9E9,9E9,9E9,9E9]],v50,fine,tool0;" for turn in (-120, 0, 120)]
 
+CALLED = ("PROC up()", TURNS[0], "ENDPROC", "PROC serve()", "VAR string text;", "SocketReceive s\\Str:=text;")
+
+BESIDE_MAIN = f"MODULE a\nPROC up()\n{TURNS[0]}\nENDPROC\nENDMODULE\n"
+
 
 def last(check):
     """Where the arm stands behind the last motion."""
@@ -310,6 +314,10 @@ MENDED = {
         krl("b(3)", more="DEF b(n:IN)\nINT n\nPTP {A1 5}\nb(n-1)\nEND\n"),
         krl("b(3)", more="DEF b(n:IN)\nINT n\nPTP {A1 5}\nIF n<1 THEN\nRETURN\nENDIF\nb(n-1)\nEND\n"),
     ),
+    "not_followed_to_end.guessed": (
+        rapid("WHILE TRUE DO", "serve;", "ENDWHILE", "ENDPROC", *CALLED, "%text%;"),
+        rapid("WHILE TRUE DO", "serve;", "ENDWHILE", "ENDPROC", *CALLED, 'IF text="up" up;'),
+    ),
     "rest_not_checked": (
         (krl("PTP {A1 5}", "PTP {A1 6}", "PTP {A1 7}"), {"most_motions": 2}),
         krl("PTP {A1 5}", "PTP {A1 6}", "PTP {A1 7}"),
@@ -322,6 +330,10 @@ MENDED = {
     "loop_comes_back_otherwise": (
         (krl(*LOOP, "ENDLOOP"), {"limits": RunLimits(rounds=5)}),
         krl(*LOOP, *THIRDS[1::-1], THIRDS[2], "ENDLOOP"),
+    ),
+    "program_begun_within": (
+        (BESIDE_MAIN, {"files": {"b.mod": rapid("up;")}}),
+        (rapid("up;").replace("ENDMODULE", BESIDE_MAIN.replace("MODULE a", "")), {"files": {"b.mod": BESIDE_MAIN}}),
     ),
     "program_name_twice": (
         krl("b( )", more="DEF b( )\nPTP {A1 5}\nEND\nDEF b( )\nPTP {A1 9}\nEND\n"),

@@ -913,3 +913,113 @@ def test_arcs_are_written_so_that_they_turn_as_they_were_read_or_that_is_told(tm
             assert ("written_arcs_turn_otherwise" in told) == (mode == "PathFrame")
     plain = execute(written(tmp_path, on_arc(*(on_circle(each, 0) for each in (-75, 0, 75))), "a.mod"), ROBOT, HOME)
     assert "CirPathMode" not in write_program(plain.listing(), "rapid", WriteOptions(ROBOT, HOME)).files[".mod"]
+
+
+@pytest.mark.parametrize(
+    ("frame", "named"),
+    [
+        ('-use_joint_5 "rob1_6" -base_frame_pos_x 0\\\n      -base_frame_pos_z 0.9 -base_frame_orient_u0 0', True),
+        ('-base_frame_coordinated "M7DM1"', True),
+        ("-base_frame_pos_z 0 -base_frame_orient_u0 1 -base_frame_orient_u3 0", False),
+        ("-gravity_beta 0", False),
+    ],
+)
+def test_a_robot_that_its_configuration_puts_elsewhere_is_no_pass(tmp_path, frame, named):
+    """As for KRL: what is a work object in the world is not one in the robot's base."""
+    inside = tmp_path / "backup/RAPID/TASK1/PROGMOD"
+    inside.mkdir(parents=True)
+    (tmp_path / "backup/SYSPAR").mkdir()
+    text = f'MOC:CFG_1.0:6:0::\n#\nROBOT:\n\n      -name "ROB_1" -use_joint_0 "rob1_1"\\\n      {frame}\n#\n'
+    (tmp_path / "backup/SYSPAR/MOC.cfg").write_text(text + 'SINGLE:\n      -name "M7DM1" -base_frame_pos_x 1\n')
+    found = check(inside, rapid("MoveL p,v100,fine,tool0;"), "a.mod")
+    assert [each.place.line for each in found.findings if each.finding.code == "program_not_simulated"] == [5] * named
+    assert [each.place.file.name for each in found.not_examined] == ["MOC.cfg"] * named
+    assert "MOC.cfg" in {each.name for each in files_of(inside / "a.mod")}
+
+
+@pytest.mark.parametrize("other", ["T_COMM", "T_COMM/PROGMOD", "TASK2/PROGMOD"])
+def test_what_another_task_sets_has_no_known_value_whatever_its_folder_is_called(tmp_path, other):
+    own = other.replace("T_COMM", "T_ROB1").replace("TASK2", "TASK1")
+    for folder in (own, other):
+        (tmp_path / folder).mkdir(parents=True)
+    data = "PERS num height:=20;"
+    (tmp_path / other / "comm.mod").write_text(f"MODULE comm\n{data}\nPROC main()\nheight:=50;\nENDPROC\nENDMODULE\n")
+    found = check(tmp_path / own, rapid("MoveL Offs(p,0,0,height),v100,fine,tool0;", data), "a.mod")
+    assert codes(found)["target_not_given"] == [7]
+
+
+@pytest.mark.parametrize("wait", ["WaitDI di1,1", "WaitUntil di1=1", "WaitUntil n=2", "WaitTestAndSet busy"])
+def test_a_wait_that_ends_anyhow_waits_for_no_other_task(tmp_path, wait):
+    """Its flag is what it gives, not what it asks; nor is it kept to the next start."""
+    option = "" if wait.endswith("busy") else "\\MaxTime:=3\\TimeFlag:=late"
+    data = "VAR bool late;\nVAR bool busy;\nVAR num n:=1;"
+    body = f"{wait}{option};\nMoveL p,v100,fine,tool0;\nIF late MoveL Offs(p,0,0,20),v100,fine,tool0;"
+    assert not {"waits_for_others", "kept_to_next_start"} & codes(check(tmp_path, rapid(body, data), "a.mod")).keys()
+
+
+def test_a_text_that_may_name_what_runs_already_is_a_caution_and_no_error(tmp_path):
+    routines = f"PROC serve()\nSocketReceive s1\\Str:=cmd;\n%cmd%;\nENDPROC\nPROC up()\n{at_turn(20)}ENDPROC"
+    body = "WHILE TRUE DO\nserve;\nENDWHILE"
+    found = check(tmp_path, rapid(body, "VAR string cmd;\nVAR socketdev s1;", routines), "a.mod")
+    ends = [each for each in found.findings if each.finding.code == "not_followed_to_end"]
+    assert [(each.level, each.finding.kind, each.place.line) for each in ends] == [("caution", "guessed", 14)]
+    assert found.level == "caution"
+    assert {each.place.line for each in found.verdicts if each.times} == {6, 17}
+
+
+@pytest.mark.parametrize(("main", "named"), [("MAIN", True), ("other", False), ("main", None)])
+def test_a_module_that_is_checked_without_the_main_that_calls_it_is_no_pass(tmp_path, main, named):
+    """What main sets before, as a displacement, is not known to it."""
+    helper = f"MODULE helper\n{TARGET}PROC path()\nMoveL p,v100,fine,tool0;\nENDPROC\nENDMODULE\n"
+    called = "PDispSet [[0,0,-250],[1,0,0,0]];\npath;\n" if named is not None else "Stop;\n"
+    (tmp_path / "cell.mod").write_text(f"MODULE cell\nPROC {main}()\n{called}ENDPROC\nENDMODULE\n")
+    found = check(tmp_path, helper, "helper.mod")
+    assert codes(found).get("program_begun_within", []) == [3] * bool(named)
+    assert [(each.place.line, each.what) for each in found.not_examined] == [(3, "course")] * bool(named)
+
+
+@pytest.mark.parametrize(("zone", "known"), [("fine", True), ("z10", False)])
+def test_a_procedure_that_is_called_within_a_corner_is_none_that_comes_before_the_next_line(tmp_path, zone, known):
+    """Of the next line's target the program reads the variables before the arm is in the corner."""
+    body = f'n:=0;\nMoveLSync p,v100,{zone},tool0,"shift";\nMoveL Offs(p,0,0,n),v100,fine,tool0;'
+    last = motions(tmp_path, rapid(body, "VAR num n;", "PROC shift()\nn:=n+50;\nENDPROC"), "a.mod")[-1]
+    assert isinstance(last.target, PoseTarget) == known
+    moving = rapid(body, "VAR num n;", "PROC shift()\nMoveL Offs(p,0,50,0),v100,fine,tool0;\nENDPROC")
+    assert ("moves_beside" in codes(check(tmp_path, moving, "a.mod"))) != known
+
+
+def test_what_is_computed_of_joints_and_targets_goes_with_the_displacement(tmp_path):
+    """By ABB's manual both functions are for the program displacement that is active: 20 mm up."""
+    data = f"VAR robtarget r;VAR jointtarget j;CONST jointtarget h:=[[0,-10,-10,0,-70,0],{NONE}];"
+    there = "r:=CalcRobT(h,tool0);\nMoveL r,v100,fine,tool0;"
+    plain, moved = (
+        motions(tmp_path, rapid(before + there, data), "a.mod")[-1]
+        for before in ("", "PDispSet [[0,0,20],[1,0,0,0]];\n")
+    )
+    assert moved.target.pose[2, 3] == pytest.approx(plain.target.pose[2, 3] - 0.02)
+    there = "j:=CalcJointT(p,tool0);\nMoveAbsJ j,v100,fine,tool0;"
+    moved = motions(tmp_path, rapid("PDispSet [[0,0,20],[1,0,0,0]];\n" + there, data), "a.mod")[-1]
+    assert not isinstance(moved.target, PoseTarget | JointTarget)
+
+
+@pytest.mark.parametrize(
+    ("routine", "named"),
+    [
+        ("height:=-150;", True),
+        ("PDispSet [[0,0,-150],[1,0,0,0]];", True),
+        ("SetDO do1,0; ! height:=3", False),
+        ("unused:=2;", False),
+        (None, True),
+    ],
+)
+def test_a_routine_that_the_controller_calls_at_an_event_is_named_if_it_may_change_motions(tmp_path, routine, named):
+    inside = tmp_path / "RAPID/TASK1/PROGMOD"
+    inside.mkdir(parents=True)
+    (tmp_path / "SYSPAR").mkdir()
+    hooks = 'CAB_EXEC_HOOKS:\n\n      -Routine "rStart" -Shelf "START"\n#\nCAB_TASKS:\n      -Routine "rOther"\n'
+    (tmp_path / "SYSPAR/SYS.cfg").write_text(f"SYS:CFG_1.0:6:0::\n#\n{hooks}")
+    if routine is not None:
+        text = f"MODULE ev\nVAR num unused;\nPROC rStart()\n{routine}\nENDPROC\nENDMODULE\n"
+        (inside / "ev.mod").write_text(text)
+    found = check(inside, rapid("MoveL Offs(p,0,0,height),v100,fine,tool0;", "VAR num height:=0;"), "a.mod")
+    assert [each.place.line for each in found.findings if each.finding.code == "program_not_simulated"] == [5] * named

@@ -110,6 +110,7 @@ REMEDIES: dict[str, str] = {
     "begun_again": N_("Let the program end where it begins, and write the way there at its end: it is checked then."),
     "loop_comes_back_otherwise": N_("Turn the tool back within the loop, so that each round ends as it began."),
     "program_data_file_missing": N_("Put the data file beside the program."),
+    "program_begun_within": N_("Check the module with main: it takes this one with it."),
     "program_name_twice": N_("Remove one of the two definitions."),
     "program_module_twice": N_("Remove the one that the controller does not have."),
     "program_nothing_moves": N_("Check that this is the program to run."),
@@ -160,6 +161,7 @@ STOPPED: dict[EndKind, str] = {
     "branches": FURTHER,
     "stopped": FURTHER,
     "recursion": N_("Give the routine a condition to return."),
+    "guessed": N_("Call routines by their names, chosen by a test of the text."),
 }
 STAYS_MM = 1.0  # that a tool moves when it stays where it is
 Pace = TooFast | FasterThanAssumed | AccelerationTooGreat | AcceleratesMoreThanAssumed
@@ -270,6 +272,9 @@ TEXTS = texts(
             ),
             stopped="the program was followed no further than here: the time for it was over",
             recursion="routines call themselves or each other without end",
+            guessed=(
+                "which routine is called is known on the cell alone; that it is one that runs already was not followed"
+            ),
         ),
         "target_not_given.named": "the target {name} is not known: {reason}",
         "target_not_given": "the target is not known: {reason}",
@@ -418,6 +423,9 @@ TEXTS = texts(
             "checked"
         ),
         "program_data_file_missing": "{file} is missing, which holds the program's points",
+        "program_begun_within": (
+            "followed from {routine} alone: the program begins in {file}, and what it sets before was not examined"
+        ),
         "program_name_twice": "{name} is declared twice; the later one counts",
         "program_module_twice": "{name} is here too, and differs: {taken} was taken",
         "program_not_understood": "not understood: {text}",

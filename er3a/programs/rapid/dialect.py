@@ -23,6 +23,7 @@ from er3a.programs.evaluation import (
     computed_in_single,
     function_in_single,
     missed_by,
+    same,
 )
 from er3a.programs.rapid import data_types, reader
 from er3a.robots.masses import moved, together
@@ -694,7 +695,10 @@ def _of_position(
     data = data_types.typed(values[0], data_types.JOINTTARGET if name == "CALCROBT" else data_types.ROBTARGET)
     given_tool, _ = _tool(memory, given.arguments[1], values[1])
     base, _ = _base(memory, words.get("WOBJ"), named.get("WOBJ"))
+    base = _displaced(memory, base)
     if name == "CALCJOINTT":
+        if not same(base, _base(memory, words.get("WOBJ"), named.get("WOBJ"))[0]):
+            return None
         wobj = named.get("WOBJ") or data_types.predefined("WOBJ0")
         if data_types.pose_matrix(data) is None or wobj is None:
             return None

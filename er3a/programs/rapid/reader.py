@@ -18,7 +18,7 @@ from er3a.programs import syntax
 from er3a.programs.code_builder import CodeBuilder, fault, linked, mapped, within
 from er3a.programs.instructions import Place
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, read_program_text
-from er3a.programs.program_findings import NameTwice, NotSimulated, NotUnderstood, ProgramFinding
+from er3a.programs.program_findings import BegunWithin, NameTwice, NotSimulated, NotUnderstood, ProgramFinding
 from er3a.programs.rapid.data_types import SHAPES, Shape, starting
 
 PATTERN = re.compile(
@@ -76,6 +76,7 @@ CHANGING = {
     "GETDATAVAL": 1,
     "BITCLEAR": 0,
     "BITSET": 0,
+    "WAITTESTANDSET": 0,
 }
 """Instructions that change one of their arguments, by its number."""
 CHANGING_OPTIONS = frozenset(("TIMEFLAG", "VALUE", "VALUEATTIMEOUT", "BREAKFLAG", "ERRORNUMBER"))
@@ -279,7 +280,12 @@ def read_rapid(source: ProgramText) -> syntax.Program:
         )
         findings.append(NameTwice(name, last.place))
     by_name, unlinked = linked([each for reader in readers for each in reader.routines], changed_arguments)
+    findings += _base_frames(source.path)
+    findings += _event_routines(source.path, {each.text for cursor in cursors for each in cursor.tokens})
     entry = _entry(own, by_name)
+    main = None if entry == "MAIN" or entry not in by_name else _main_of(source.path)
+    if main is not None:
+        findings.append(BegunWithin(entry.lower(), main.name, by_name[entry].place))
     return syntax.Program(
         "rapid",
         source.path.stem,
@@ -785,7 +791,7 @@ class _BodyReader:
                         syntax.Assign(place, placed[1], syntax.Constant(syntax.Unclear(f"what {name} finds")), text)
                     )
             if name in CALLING and placed and placed[-1] is not None:
-                self.late(place, placed[-1], ((), ()), text)
+                self._at_corner(place, placed, options, text)
             return
         arrives = name.startswith("WAIT") and bool(options & ARRIVING)
         if name in LEAVING or arrives:
@@ -798,8 +804,10 @@ class _BodyReader:
             self.late(place, syntax.Invocation(ARITHMETIC, (syntax.Constant("+"), placed[0], suffix)), ((), ()), text)
             return
         if name in WAITS:
-            asked = tuple(each for each in (*placed, *(each for _, each in named)) if each is not None)
-            builder.add(syntax.Waiting(place, "condition", syntax.Listed("", asked), text, arrives))
+            told = (each for key, each in named if key not in CHANGING_OPTIONS)  # the others are what it gives back
+            asked = tuple(each for each in (*placed, *told) if each is not None)
+            ends = "TIMEFLAG" in options or name == "WAITTESTANDSET"  # which waits for what is true
+            builder.add(syntax.Waiting(place, "condition", syntax.Listed("", asked), text, arrives, ends))
         else:
             builder.add(syntax.Doing(place, syntax.Invocation(name, placed, named), text))
         if "TIMEFLAG" not in options and ("MAXTIME" in options or name.startswith(RAISING)):
@@ -812,6 +820,20 @@ class _BodyReader:
         for each in changed:
             if isinstance(each, (syntax.Variable, syntax.Element, syntax.Member)):
                 builder.add(syntax.Assign(place, each, syntax.Constant(syntax.Unclear(f"what {name} gives")), text))
+
+    def _at_corner(
+        self, place: Place, placed: tuple[syntax.Expression | None, ...], options: set[str], text: str
+    ) -> None:
+        """The procedure that a motion calls: where it stops, or somewhere on the way round its corner."""
+        called, zone = placed[-1], placed[-3] if len(placed) > 2 else None
+        assert called is not None
+        prefix, whole = _prefix(called)
+        name = self.scope.private.get(prefix.upper(), prefix.upper())
+        stops = "INPOS" in options or (isinstance(zone, syntax.Variable) and zone.name == "FINE")
+        if stops or not whole or name not in self.module.procedures:
+            self.late(place, called, ((), ()), text)
+        else:
+            self.builder.beside(place, syntax.Invocation(name, ()), text, "interrupt")
 
     def _fails(self, place: Place, text: str) -> None:
         """An error may end the routine here."""
@@ -1101,8 +1123,8 @@ GLOBAL = re.compile(
 WORD = re.compile(r"[^\W\d]\w*")
 LATE_CALL = re.compile(r"(?m)(?:^|;)\s*%(?!%)(?!\s*\"\w*\"\s*%)|\bCallByVar\b", re.IGNORECASE)
 """A call of a procedure whose name the text does not give."""
-TASK = re.compile(r"(?i)TASK\d+")
-"""Folder of a task in a controller's backup."""
+TASK = re.compile(r"(?i)TASK\d+|T_\w+")
+"""Folder of a task in a controller's backup, or in a project: T_ROB1, T_COMM."""
 SHARED = re.compile(r"(?i)(\b(?:LOCAL|TASK)\s+)?\bPERS\s+\w+\s+(\w+)")
 SET = re.compile(r"(?i)(?<![\w.\\])(\w+)(?:\{[^}]*\}|\.\w+)*\s*:=|\b(?:Incr|Decr|Add|Clear)\s+(\w+)")
 FOLDERS = {"PROGMOD": "SYSMOD", "SYSMOD": "PROGMOD"}
@@ -1135,6 +1157,12 @@ def modules_of(path: Path) -> tuple[Path, ...]:
     return tuple(found)
 
 
+def _main_of(path: Path) -> Path | None:
+    """The module with ``main`` of the program that a module belongs to; None if there is none beside it."""
+    texts = (each for each in _beside(path) if not _is_encoded(each) and "MAIN" in _names(each)[1])
+    return next((each for each in texts if path.resolve() in map(Path.resolve, modules_of(each))), None)
+
+
 def _beside(path: Path) -> list[Path]:
     folders = [path.parent]
     other = FOLDERS.get(path.resolve().parent.name.upper())
@@ -1150,19 +1178,105 @@ def _beside(path: Path) -> list[Path]:
 
 
 def companions(path: Path) -> tuple[Path, ...]:
-    """The modules on which a program depends, with those of the controller's other tasks."""
-    return (*modules_of(path), *_of_tasks(path))
+    """The modules on which a program depends, with those of the controller's other tasks and its configuration."""
+    configured = (_configuration(path, name) for name in ("MOC.cfg", "SYS.cfg"))
+    return (*modules_of(path), *_of_tasks(path), *filter(None, configured))
 
 
 def _of_tasks(path: Path) -> list[Path]:
-    """The modules of the other tasks in a controller's backup."""
-    task = path.resolve().parents[1] if path.resolve().parent.name.upper() in FOLDERS else path
+    """The modules of the other tasks in a controller's backup, or beside the folder of a task."""
+    folder = path.resolve().parent
+    task = folder.parent if folder.name.upper() in FOLDERS else folder
     if not TASK.fullmatch(task.name):
         return []
     others = (each for each in sorted(task.parent.iterdir()) if TASK.fullmatch(each.name) and each != task)
-    folders = (each for other in others for each in sorted(other.iterdir()) if each.name.upper() in FOLDERS)
-    modules = (each for folder in folders for each in sorted(folder.iterdir()) if each.suffix.lower() in SUFFIXES)
-    return [each for each in modules if not _is_encoded(each)]
+    inside = [each for other in others if other.is_dir() for each in sorted(other.iterdir())]
+    inside += [file for each in inside if each.name.upper() in FOLDERS for file in sorted(each.iterdir())]
+    return [each for each in inside if each.suffix.lower() in SUFFIXES and each.is_file() and not _is_encoded(each)]
+
+
+HIGHEST = 4
+"""How many folders above a program may be that of the controller's backup."""
+NO_BASE_FRAME = {"pos_x": 0.0, "pos_y": 0.0, "pos_z": 0.0, "orient_u0": 1.0}
+BASE_FRAME = re.compile(r"""-base_frame_(pos_[xyz]|orient_u[0-3]|coordinated)\s+("[^"]*"|\S+)""")
+
+
+HOOK = re.compile(r"""(?i)-Routine\s+"(\w+)\"""")
+PROCEDURE = re.compile(r"(?s)\bPROC\s+(\w+)(.*?)\bENDPROC\b")
+SETTING = re.compile("PDISP|EOFFS|CONF[JL]$|VELSET|ACCSET|GRIPLOAD|SETSYSDATA|SINGAREA|CIRPATHMODE|SOFTACT|WZ")
+"""How instructions begin that set what later motions depend on."""
+
+
+def _configuration(path: Path, name: str) -> Path | None:
+    """A file of the configuration in the backup that a program belongs to."""
+    folders = (each / "SYSPAR" / name for each in list(path.resolve().parents)[:HIGHEST])
+    return next((each for each in folders if each.is_file()), None)
+
+
+def _entries(file: Path | None, section: str) -> Iterable[tuple[str, Place]]:
+    """The entries of a section of a configuration, each in one line."""
+    inside, entry, first = False, "", 0
+    for number, line in enumerate(read_program_text(file).lines if file else (), 1):
+        if re.match(r"\w+:", line) or line.startswith("#"):
+            inside = line.startswith(f"{section}:")
+        entry, first = (entry + line, first) if entry else (line, number)
+        if line.rstrip().endswith("\\"):
+            entry = entry.rstrip().removesuffix("\\") + " "
+            continue
+        if inside and entry.lstrip().startswith("-"):
+            yield " ".join(entry.split()), Place(file, first)
+        entry = ""
+
+
+def _base_frames(path: Path) -> Iterable[ProgramFinding]:
+    """That the configuration puts a robot elsewhere than at the origin of the world, in which work objects are."""
+    for entry, place in _entries(_configuration(path, "MOC.cfg"), "ROBOT"):
+        if any(map(_is_moved, BASE_FRAME.findall(entry))):
+            yield NotSimulated(" ".join(each[0] for each in BASE_FRAME.finditer(entry)), place)
+
+
+def _procedure_texts(modules: Iterable[Path]) -> dict[str, str]:
+    """What stands in the procedures of modules, by name, all in capital letters."""
+    text = "\n".join(COMMENT_OR_TEXT.sub(" ", read_program_text(each).text) for each in modules).upper()
+    return {match[1]: match[2] for match in PROCEDURE.finditer(text)}
+
+
+def _event_routines(path: Path, used: set[str]) -> Iterable[ProgramFinding]:
+    """Routines that the controller calls at events, as a start, and that may change what a program does.
+
+    Parameters
+    ----------
+    used : names in the modules of the program, in capital letters
+    """
+    hooks = [
+        (match[1].upper(), entry, place)
+        for entry, place in _entries(_configuration(path, "SYS.cfg"), "CAB_EXEC_HOOKS")
+        if (match := HOOK.search(entry)) is not None
+    ]
+    if not hooks:
+        return
+    procedures = _procedure_texts([path, *(each for each in _beside(path) if not _is_encoded(each))])
+    others = _procedure_texts(_of_tasks(path))
+    for name, entry, place in hooks:
+        inside = procedures.get(name)
+        if inside is None and name in others:
+            continue
+        words = set(WORD.findall(inside or ""))
+        changes = {each for pair in SET.findall(inside or "") for each in pair} & used
+        if inside is None or changes or words & (MOTIONS | procedures.keys()) or any(map(SETTING.match, words)):
+            yield NotSimulated(entry, place)
+
+
+def _is_moved(part: tuple[str, str]) -> bool:
+    """Whether a part of a base frame puts it elsewhere, or on something that moves."""
+    name, text = part
+    if name == "coordinated":
+        return bool(text.strip('"'))
+    try:
+        value = abs(float(text)) if name == "orient_u0" else float(text)
+    except ValueError:
+        return True
+    return abs(value - NO_BASE_FRAME.get(name, 0.0)) > 1e-9
 
 
 def _set_by_tasks(path: Path) -> set[str]:
