@@ -613,7 +613,7 @@ def changed(lines):
 @pytest.mark.parametrize(
     "lines",
     [
-        ["p = get_actual_tcp_pose()", "p[2] = p[2] + 0.03", "movel(p)"],  # p[2] reads as a pose of one number
+        ["p = get_actual_tcp_pose()", "p[6] = p[2] + 0.03", "movel(p)"],
         ["q = get_actual_joint_positions()", "q[6] = 0.3", "movej(q)"],
         ["q = get_actual_joint_positions()", "q[-1] = 0.3", "movej(q)"],
         ["q = get_actual_joint_positions()", "q[0.6] = 0.3", "movej(q)"],
@@ -626,6 +626,16 @@ def test_a_list_whose_changed_element_is_not_settled_is_no_target(tmp_path, line
         (2 + len(lines), "fail")
     ]
     assert "target_not_given" in {each.finding.code for each in checked.findings}
+
+
+def test_an_element_of_a_variable_p_is_no_pose_of_one_number(tmp_path):
+    """As in programs that run: a pose has six numbers."""
+    lines = ["p = get_actual_tcp_pose()", "p[2] = p[2] + 0.03", "movel(p)", "movel(p[0.3, 0.1])"]
+    checked = check(tmp_path, changed(lines), "a.script")
+    first, raised, _ = (each.instruction for each in checked.execution.steps)
+    moved = raised.target.pose[:3, 3] - forward(ROBOT, first.target.joints)[:3, 3]
+    assert moved == pytest.approx([0, 0, 0.03])
+    assert [(each.line, each.level) for each in checked.verdicts][-1] == (6, "fail")
 
 
 @pytest.mark.parametrize("line", ["get_target() = 0.3", "[0.1, 0.2] = 0.3", "p[0.3, 0.1, 0.4, 0, 3, 0] = 0.3"])

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from er3a.programs import syntax
 from er3a.programs.evaluation import Cell, ProgramMemory
-from er3a.programs.instructions import JointTarget
+from er3a.programs.instructions import Decision, JointTarget
 from er3a.programs.krl.dialect import KrlDialect
 from er3a.programs.languages import read_program
 from er3a.programs.machine import execute
@@ -99,3 +99,36 @@ def test_numbers_of_rapid_have_32_bits_too(tmp_path):
     )
     found = [each.instruction for each in execute(read_program(file)).steps if hasattr(each.instruction, "target")]
     assert {round(float(np.degrees(each.target.joints[0]))) for each in found} >= {10, 11}
+
+
+@pytest.mark.parametrize(
+    ("body", "rounds"),
+    [
+        ("x = 0\nn = 0\nwhile x < 1.0:\n x = x + 0.1\n n = n + 1\nend", {10, 11}),
+        ("x = 0\nn = 0\nwhile x < 1.0:\n x = x + 0.125\n n = n + 1\nend", {8}),
+        ("n = 0\nif sqrt(2) * sqrt(2) == 2:\n n = 1\nend", {0, 1}),
+        ("x = [3, 4]\nn = x[floor(0.3 * 4)]", {4}),
+        ("n = 0\nif abs(-2) == 2:\n n = 1\nend", {1}),
+    ],
+)
+def test_numbers_of_urscript_have_32_bits(tmp_path, body, rounds):
+    found = motions(tmp_path, f"{body}\nmovej([n * 0.0625, 0, 0, 0, 0, 0])\n", "a.script")
+    assert {float(each.target.joints[0] / 0.0625) for each in found} == rounds
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("a.script", "n = 2147483647\nn = n + 1\nif n > 0:\n movej([0.1, 0, 0, 0, 0, 0])\nend\n"),
+        (
+            "a.pgm",
+            "n := 2147483647;\nn := n + 1;\nIF n > 0 THEN\nMJOINT(POINTJ(3,0,0,0,0,0),v50perc,fine,tool0);\nEND_IF;\n",
+        ),
+    ],
+)
+def test_a_whole_number_beyond_32_bits_is_not_known(tmp_path, name, text):
+    if name == "a.pgm":
+        (tmp_path / "a.var").write_text("n : DINT\n")
+    (tmp_path / name).write_text(text)
+    steps = execute(read_program(tmp_path / name)).steps
+    assert any(isinstance(step.instruction, Decision) for step in steps)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +13,14 @@ import scipy
 from er3a.geometry.transforms import rpy_of, transform
 from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, syntax
-from er3a.programs.evaluation import Dialect, Position, ProgramMemory, Rounded
+from er3a.programs.evaluation import (
+    Dialect,
+    Position,
+    ProgramMemory,
+    Rounded,
+    function_in_single,
+    missed_by,
+)
 from er3a.programs.urscript.reader import CHANGED, LIST_METHODS, THREAD
 from er3a.robots.masses import MassBody
 
@@ -140,11 +147,15 @@ PLAIN: dict[str, Callable[..., float]] = {
 
 
 class UrScriptDialect(Dialect):
-    """URScript, as a run needs it.
+    """URScript, as a run needs it. Its numbers have 32 bits [1]_.
 
     Attributes
     ----------
     servers : names of variables that hold what ``rpc_factory`` gives: other processes, which move nothing here
+
+    References
+    ----------
+    .. [1] Universal Robots, *User Manual UR5/CB3*, version 3.4.5, section 14.3; *User Manual UR16e*, section 7.2.
     """
 
     def __init__(self, program: syntax.Program):
@@ -164,6 +175,8 @@ class UrScriptDialect(Dialect):
     setters = frozenset(("set_tcp", *LOADS, *STOPS))
     first_index = 0
     keeps_data = False
+    single_precision = True
+    most_whole = 2**31 - 1
 
     def constant(self, memory: ProgramMemory, name: str) -> syntax.Value | None:
         """Numbers of the language."""
@@ -195,9 +208,10 @@ class UrScriptDialect(Dialect):
         if found is None:
             found = _of_lists(name, placed)
         if found is None and name in PLAIN:
-            plain = syntax.numbers(tuple(placed.get(key) for key in SIGNATURES[name]))
+            given_values = tuple(placed.get(key) for key in SIGNATURES[name])
             try:
-                found = None if plain is None else PLAIN[name](*plain)
+                known = syntax.numbers(given_values) is not None
+                found = _of_numbers(PLAIN[name], given_values) if known else None
             except (ValueError, OverflowError, ZeroDivisionError, TypeError):
                 found = None
         return unclear if found is None else found
@@ -496,6 +510,13 @@ def _of_position(memory: ProgramMemory, name: str, given: dict[str, syntax.Value
         if plain and (tool_value is None or _pose(tool_value) is not None):
             return syntax.Solved(pose, near, tool_value, memory.here.key())
     return None
+
+
+def _of_numbers(function: Callable[..., float], values: Sequence[syntax.Value]) -> float:
+    """A function of numbers; of whole ones that gives a whole one, that."""
+    plain = syntax.numbers(tuple(values)) or ()
+    found = function(*plain)
+    return found if isinstance(found, int) and not any(map(missed_by, values)) else function_in_single(function, values)
 
 
 def _measured(value: float) -> Rounded:
