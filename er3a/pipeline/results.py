@@ -194,6 +194,7 @@ LeftOutSubject = Literal[
     "places",
     "sampled_places",
     "between_places",
+    "tray_nowhere",
     "placed_box",
     "uncovered_links",
     "partial_links",

@@ -104,6 +104,7 @@ def test_the_verdict_names_the_nearest_target_and_the_paths_that_collide(results
         if each.kind == "path" and each.clearance_mm < 0
     ]
     assert met
+    assert len(found.demonstrations) == len(met)  # counted apart, as the stages of paths and targets count them
     assert f" {', '.join(met)}. " in say(found)
 
 
@@ -142,6 +143,7 @@ def test_a_target_that_collides_in_every_solution_is_no_pass_unless_its_file_exp
     meant = "as expected" if expect else "not expected"
     assert say(verdict.finding).startswith("1 target collides in every solution within the limits: blocked (")
     assert f"; {meant}). " in say(verdict.finding)
+    assert len(verdict.finding.demonstrations) == int(bool(expect))
 
 
 def test_of_branches_that_are_alike_the_chosen_one_is_named(results):

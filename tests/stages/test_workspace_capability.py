@@ -19,6 +19,7 @@ from er3a.geometry.transforms import transform
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.forward import forward
 from er3a.kinematics.solutions import branch_labels
+from er3a.pipeline.messages.left_out import left_out_text
 from er3a.pipeline.stages.workspace.capability_section import capability_context
 from er3a.pipeline.stages.workspace.compute import _left_out
 from er3a.pipeline.stages.workspace.entry import CapabilitySettings
@@ -202,9 +203,11 @@ def test_no_place_is_no_error():
     assert context["place_rows"] == []
     assert context["place_picture"] is None
     proven = SimpleNamespace(proof=SimpleNamespace(bounds=(1.0, 1.0), width=0.1))
-    left_out = {each.subject for each in _left_out(SimpleNamespace(samples=1000), proven, None, (), done)}
+    left_out = {each.subject: each for each in _left_out(SimpleNamespace(samples=1000), proven, None, (), done)}
     assert "between_places" in left_out
     assert "placed_box" not in left_out  # none was placed
+    assert left_out["tray_nowhere"].names == ("2000 × 2000 × 100 mm",)
+    assert "no place was found" in left_out_text(left_out["tray_nowhere"])
 
 
 def test_a_box_lower_than_the_layers_of_places_stands_whole_or_is_told_why_not():

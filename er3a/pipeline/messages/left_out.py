@@ -178,6 +178,10 @@ TEXTS = texts(
             "points and directions between those asked, at {amount:,.0f} places for the tray that pass by samples only"
         ),
         "left_out.between_places": "places for the tray between grid points {amount:.0f} mm apart",
+        "left_out.tray_nowhere": (
+            "motions into the tray: no place was found where the tool reaches all of it, which the verdict does not "
+            "count"
+        ),
         "left_out.base_contacts": "whether the base is mounted where it overlaps these solids, as is assumed",
         "left_out.base_inside": "collisions of the base, whose middle lies in these solids: scene or base is misplaced",
         "left_out.places_in_solids": (

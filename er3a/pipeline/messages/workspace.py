@@ -77,7 +77,7 @@ TEXTS = texts(
         ),
         "workspace.void_at_shoulder": (
             "An enclosed void of at least {litres} L, centred at ({x}, {y}, {z}) mm, surrounds the shoulder: the "
-            "arm can't fold far enough to reach it. There is no other enclosed void that would hint at a wrong "
+            "arm can't fold far enough to reach it. No other enclosed void was found that would hint at a wrong "
             "limit; this confirms none."
         ),
         "workspace.no_void#sampled": "The samples leave no enclosed void inside the hull; no proof.",

@@ -95,6 +95,11 @@ class FreeSpace(Finding, code="collision.free_space"):
     colliding: tuple[CollidingPath, ...] = ()
     blocked: tuple[CollidingTarget, ...] = ()
 
+    @property
+    def demonstrations(self) -> tuple[CollidingTarget | CollidingPath, ...]:
+        """What collides as it is meant to."""
+        return tuple(each for each in (*self.blocked, *self.colliding) if each.expected)
+
 
 @dataclass(frozen=True)
 class FreeShare:

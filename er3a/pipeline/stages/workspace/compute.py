@@ -307,6 +307,8 @@ def _left_out(
         yield LeftOut("undecided_core", amount=1000 * (found.core_m3.upper - found.core_m3.lower))
     if isinstance(placement, model.PlacementTooLong):
         yield LeftOut("places")
+    elif placement and not getattr(placement, "named_places", ()):
+        yield LeftOut("tray_nowhere", (f"{' × '.join(f'{edge:g}' for edge in placement.task.box_mm)} mm",))
     if isinstance(placement, model.PlacementSummary):
         if placement.fitting > placement.fitting_proven:
             yield LeftOut("sampled_places", amount=placement.fitting - placement.fitting_proven)
