@@ -711,8 +711,8 @@ class RobotFile(InputFile):
             _check_angle(f"zero.rows[{i}].offset_deg", self.zero.rows[i].offset_deg or 0.0)
         self._check_far_normals()
         angles = [row.alpha_deg for row in self.dh.rows] + [row.offset_deg or 0.0 for row in self.zero.rows]
-        all_small = max(map(abs, angles)) < RADIANS_BELOW_DEG
-        if look_like_radians(angles) or (all_small and any(map(is_part_of_pi, angles))):
+        turned = [angle for angle in angles if angle]
+        if look_like_radians(turned * 2 if len(turned) == 1 else turned):
             small = ", ".join(f"{angle:g}" for angle in angles if 0 < abs(angle) < RADIANS_BELOW_DEG)
             doubt(self, "dh.rows, zero.rows", f"{small} deg", "radians")
         for key in ("base", "flange", "tool"):

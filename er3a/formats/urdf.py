@@ -411,11 +411,14 @@ def _robot_of_chain(
     sliding = np.array([joint.type == "prismatic" for joint in moving])
     table = table_from_axes(directions, points, T)
     plain = np.array_equal(coupling, np.eye(*coupling.shape))
-    limits, notes = _limits(path, sources)
+    limits, notes, assumed = _limits(sources)
     speed = np.array([joint.speed if joint.speed < FASTEST else math.nan for joint in sources])
     held, speed, more = _held_by_followers(moving, coupling, shift, limits, speed)
     continuous = np.array([joint.type == "continuous" for joint in sources]) & (held == limits).all(axis=1)
     groups = ("dh", "zero", "limits", "speeds", "base", "flange", *(() if plain else ("coupling",)))
+    stated = dict.fromkeys(groups, Source(f"Derived from the joint axes of {path.name}", "export"))
+    if assumed:
+        stated["limits"] = Source(f"As {path.name} states them, but for {', '.join(assumed)}: assumed", "inferred")
     robot = Robot(
         name=robot_name(path),
         title=path.stem[:200] or sources[0].name,
@@ -424,7 +427,7 @@ def _robot_of_chain(
         upper=held[:, 1],
         speed=speed,
         zero_pose="As the URDF has it with all joints at 0.",
-        sources=dict.fromkeys(groups, Source(f"Derived from the joint axes of {path.name}", "export")),
+        sources=stated,
         sliding=sliding,
         coupling=None if plain else coupling,
         continuous=continuous,
@@ -583,9 +586,9 @@ def _motion(joint: urdf_tree.UrdfJoint, values: Reals) -> Reals:
     return T
 
 
-def _limits(path: Path, sources: list[urdf_tree.UrdfJoint]) -> tuple[Reals, list[str]]:
-    """Limits (n, 2), rad or m, and what was assumed of them."""
-    rows, notes = [], []
+def _limits(sources: list[urdf_tree.UrdfJoint]) -> tuple[Reals, list[str], list[str]]:
+    """Limits (n, 2), rad or m, notes, and the joints that the file gives none, or none that can be."""
+    rows, notes, assumed = [], [], []
     for joint in sources:
         lower, upper = joint.lower, joint.upper
         if joint.type == "continuous":
@@ -596,9 +599,11 @@ def _limits(path: Path, sources: list[urdf_tree.UrdfJoint]) -> tuple[Reals, list
             turns = joint.type == "revolute"
             half, shown = (NO_RANGE, "180 deg") if turns else (NO_SLIDE_M, f"{NO_SLIDE_M * 1000:g} mm")
             notes.append(f"joint {joint.name} has {has}: +-{shown} were assumed")
+            assumed.append(joint.name)
             lower, upper = -half, half
         elif joint.type == "revolute" and max(abs(lower), abs(upper)) > MAX_TURNED:
             notes.append(f"joint {joint.name} has limits beyond ten turns (in radians): +-180 deg were assumed")
+            assumed.append(joint.name)
             lower, upper = -NO_RANGE, NO_RANGE
         elif joint.type == "revolute" and max(abs(lower), abs(upper)) > MANY_TURNS:
             shown = f"{lower:g} to {upper:g} rad"
@@ -607,7 +612,7 @@ def _limits(path: Path, sources: list[urdf_tree.UrdfJoint]) -> tuple[Reals, list
             notes.append(f"joint {joint.name} has limits beyond {MAX_SLID_M:g} m: it was held to that")
             lower, upper = max(lower, -MAX_SLID_M), min(upper, MAX_SLID_M)
         rows.append((lower, upper))
-    return np.array(rows), notes
+    return np.array(rows), notes, assumed
 
 
 def _held_by_followers(

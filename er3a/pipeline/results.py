@@ -209,6 +209,7 @@ LeftOutSubject = Literal[
     "base_inside",
     "places_in_solids",
     "units",
+    "own_limits",
 ]
 
 NEVER_A_PASS: frozenset[LeftOutSubject] = frozenset(
@@ -226,7 +227,7 @@ NEVER_A_PASS: frozenset[LeftOutSubject] = frozenset(
             "other_gravity",
         ),
         *("arm_errors", "objects_out_of_view", "hidden_voids", "orientations", "base_inside", "places_in_solids"),
-        "units",
+        *("units", "own_limits"),
     )
 )
 """What no verdict passes without; the rest bounds what a verdict is about, and stands in the table alone."""

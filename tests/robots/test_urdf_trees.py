@@ -247,7 +247,8 @@ def test_what_urdfs_leave_out_or_overdo_is_assumed_with_a_note(written):
     for word in ("far has limits beyond 100 m", "open has no limits: +-1000 mm", "0.5 mm is taken as one of 2 mm"):
         assert word in told
     write_robot(imported.robot, path.with_suffix(".yaml"))
-    load_robot(path.with_suffix(".yaml"))
+    limits = load_robot(path.with_suffix(".yaml")).sources["limits"]
+    assert (limits.grade, "but for open: assumed" in limits.source) == ("inferred", True)
 
 
 def test_a_frame_beside_the_arm_can_be_its_base(tmp_path):

@@ -553,6 +553,23 @@ def test_a_number_that_looks_like_another_unit_is_no_pass_where_it_is_read(
     assert bool(settled) == (confirmed and of == "study")  # another answer computes the stage again
 
 
+@pytest.mark.parametrize(("grade", "status"), [("inferred", "caution"), ("claim", "pass")])
+def test_limits_that_are_assumed_are_no_pass(tmp_path, monkeypatch, grade, status):
+    content = yaml.safe_load(Path(f"data/robots/{ROBOT}.yaml").read_text(encoding="utf-8"))
+    content["limits"] |= {"grade": grade, "source": "As arm.urdf states them, but for j1: assumed"}
+    (tmp_path / f"{ROBOT}.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
+    study = yaml.safe_load(Path("config/small.yaml").read_text(encoding="utf-8"))
+    study["robots"] = {ROBOT: study["robots"][ROBOT] | {"file": str(tmp_path / f"{ROBOT}.yaml")}}
+    written = []
+    passing = Results(Summary(Verdict("pass", NoPass(())), ()))
+    monkeypatch.setattr(run, "write_results", lambda *given: written.append(given[-1].summary.verdict))
+    for stage in ("trajectory", "validation"):
+        monkeypatch.setattr(STAGES[stage].module("compute"), "compute", lambda study, name: passing)
+        run.compute(stage, Study.model_validate(study), ROBOT, tmp_path)
+    assert [verdict.status for verdict in written] == [status, "pass"]
+    assert [each.names for each in written[0].missed] == [(content["limits"]["source"],)] * (status == "caution")
+
+
 def test_a_target_near_assumed_shapes_is_a_caution(study, tmp_path):
     """The arm stands 9.4 mm above the table; nothing settles whether it does."""
     (tmp_path / "targets.yaml").write_text("kind: targets\ntargets:\n- {name: a, q_deg: [0, -10, -10, 0, -70, 0]}\n")

@@ -94,6 +94,12 @@ def left_out_of_units(doubts: Sequence[DoubtfulUnit]) -> tuple[LeftOut, ...]:
     return (LeftOut("units", names),) if places else ()
 
 
+def left_out_of_limits(robot: Robot) -> tuple[LeftOut, ...]:
+    """That limits of joints are assumed, with what the robot's file says of them."""
+    found = robot.sources.get("limits")
+    return (LeftOut("own_limits", (found.source,)),) if found and found.grade == "inferred" else ()
+
+
 def left_out_in_solids(scene: Scene | None, places: Iterable[tuple[str, Reals, float]]) -> tuple[LeftOut, ...]:
     """Places, by name, whose point (3,), m, of the world is in a solid, and deeper than it may be sunk, m."""
     found = [

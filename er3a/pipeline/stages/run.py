@@ -11,11 +11,12 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Protocol
 
-from er3a.errors import DoubtfulUnit, Er3aError, InputError, ResultError, WriteError
+from er3a.errors import Er3aError, InputError, ResultError, WriteError
 from er3a.files.units import noted_doubts
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import (
     AbsentResults,
+    LeftOut,
     NotComputed,
     Results,
     Stored,
@@ -24,7 +25,7 @@ from er3a.pipeline.results import (
     read_stage,
     write_results,
 )
-from er3a.pipeline.stages.left_out import left_out_of_units
+from er3a.pipeline.stages.left_out import left_out_of_limits, left_out_of_units
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.study import Study
@@ -58,7 +59,9 @@ def compute(name: str, study: Study, robot: str, folder: Path, parts: list[Path]
     stage = STAGES[name]
     with noted_doubts() as doubts:
         results = _computed(stage, study, robot, {"parts": parts} if stage.sampled else {})
-    results = _in_doubt(results, [each for each in doubts if stage.weighs or not each.key.startswith(MASSES)])
+    assumed = left_out_of_limits(study.robot(robot)) if stage.rests_on else ()
+    doubts = [each for each in doubts if stage.weighs or not each.key.startswith(MASSES)]
+    results = _in_doubt(results, (*assumed, *left_out_of_units(doubts)))
     write_results(folder, study, robot, stage, results)
     if isinstance(results, AbsentResults):
         import_module(stage.messages)
@@ -72,13 +75,12 @@ def compute(name: str, study: Study, robot: str, folder: Path, parts: list[Path]
 MASSES = "inertia."
 
 
-def _in_doubt(results: Results[Any], doubts: list[DoubtfulUnit]) -> Results[Any]:
-    """Results whose verdict is no pass where inputs that were read hold numbers of doubtful unit."""
-    if not doubts or isinstance(results, AbsentResults):
+def _in_doubt(results: Results[Any], left_out: tuple[LeftOut, ...]) -> Results[Any]:
+    """Results whose verdict is no pass by numbers of doubtful unit in the inputs read, or by assumed limits."""
+    if not left_out or isinstance(results, AbsentResults):
         return results
     summary = results.summary
-    left_out = (*summary.not_examined, *left_out_of_units(doubts))
-    return replace(results, summary=replace(summary, not_examined=left_out))
+    return replace(results, summary=replace(summary, not_examined=(*summary.not_examined, *left_out)))
 
 
 def _computed(stage: Stage, study: Study, robot: str, extra: dict[str, Any]) -> Results[Any]:

@@ -15,7 +15,8 @@ from er3a.pipeline.results import LeftOut, LeftOutSubject, read_stage
 from er3a.pipeline.stages.registry import STAGES
 
 WARNED_OF: tuple[LeftOutSubject, ...] = (
-    *("obstacles", "tool", "bare_tool", "carried", "gripped_parts", "placed_box", "torques", "ways_between", "units"),
+    *("obstacles", "tool", "bare_tool", "carried", "gripped_parts", "placed_box", "torques", "ways_between"),
+    *("units", "own_limits"),
 )
 
 

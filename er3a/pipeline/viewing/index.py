@@ -451,7 +451,7 @@ MAY_RUN = {name: motions for name, motions in MOTIONS.items() if STAGES[name].ma
 OF_ALL_RUNS = (  # what may turn any of them unsafe
     *("obstacles", "uncovered_links", "partial_links", "bare_tool", "base_inside", "allowed_contacts"),
     *("program_rest", "program_findings", "given_rates", "missed_rows", "controller_language", "tool", "carried"),
-    *("units", "torques"),
+    *("units", "own_limits", "torques"),
 )
 MAX_TALLIED = 3  # that do not pass, though nothing expects it, and are named beside their number
 MAX_FAULTS = 20  # of a robot's paths, and of its programs, that are listed
