@@ -413,6 +413,12 @@ def _robot_of_chain(
     plain = np.array_equal(coupling, np.eye(*coupling.shape))
     limits, notes, assumed = _limits(sources)
     speed = np.array([joint.speed if joint.speed < FASTEST else math.nan for joint in sources])
+    notes += [
+        f"joint {joint.name} has a speed of {joint.speed:g} {'m/s' if joint.type == 'prismatic' else 'rad/s'}, "
+        "which counts as unknown; a URDF's are in radians and metres"
+        for joint in sources
+        if FASTEST <= joint.speed < math.inf
+    ]
     held, speed, more = _held_by_followers(moving, coupling, shift, limits, speed)
     continuous = np.array([joint.type == "continuous" for joint in sources]) & (held == limits).all(axis=1)
     groups = ("dh", "zero", "limits", "speeds", "base", "flange", *(() if plain else ("coupling",)))

@@ -231,7 +231,7 @@ def test_urdfs_of_packages_from_import_to_the_inverse(packaged, name, arm_class,
 
 
 def test_what_urdfs_leave_out_or_overdo_is_assumed_with_a_note(written):
-    far = '<limit lower="-1000" upper="5" velocity="2" effort="0"/>'
+    far = '<limit lower="-1000" upper="5" velocity="180" effort="0"/>'
     sphere = '<link name="ball"><collision><geometry><sphere radius="0.0005"/></geometry></collision></link>'
     path = written(
         joint("far", "prismatic", "base", "a", more=far),
@@ -244,6 +244,8 @@ def test_what_urdfs_leave_out_or_overdo_is_assumed_with_a_note(written):
     assert imported.robot.lower[:2].tolist() == [-100, -1]
     assert imported.robot.upper[:2].tolist() == [5, 1]
     told = " ".join(imported.notes)
+    assert np.isnan(imported.robot.speed[0])
+    assert "joint far has a speed of 180 m/s, which counts as unknown" in told
     for word in ("far has limits beyond 100 m", "open has no limits: +-1000 mm", "0.5 mm is taken as one of 2 mm"):
         assert word in told
     write_robot(imported.robot, path.with_suffix(".yaml"))

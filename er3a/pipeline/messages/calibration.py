@@ -216,6 +216,22 @@ def held_back_line(fitted: Sequence[Measurement], others: Sequence[Measurement],
 
 
 def held_back_warning(found: Calibration, fitted: Sequence[Measurement], others: Sequence[Measurement]) -> list[str]:
+    """That positions held back were fitted, that others contradict the fit, or that it does not hold elsewhere."""
+    fitted_too = {(each.pose, each.point) for each in fitted}
+    unseen = [each for each in others if (each.pose, each.point) not in fitted_too]
+    if (seen := len(others) - len(unseen)) and not unseen:
+        return [tr("All positions held back are at poses that were fitted too: they test nothing. Hold others back.")]
+    also = tr(
+        "{count} positions held back are at poses that were fitted too: they test nothing, and make the error of the "
+        "others look small. Take them out of one of the files.",
+        count=seen,
+    )
+    return [*([also] if seen else []), *_held_back_contradicts(found, fitted, unseen)]
+
+
+def _held_back_contradicts(
+    found: Calibration, fitted: Sequence[Measurement], others: Sequence[Measurement]
+) -> list[str]:
     """That positions which the fit has not seen contradict it, or that it does not hold where no fitted pose is."""
     expected = found.beyond.left_out if found.beyond else found.left_out
     if not (expected and others):
@@ -423,7 +439,7 @@ def calibration_record(
         "tried_for_file": [vars(each) for each in found.tried_for_file],
         "beyond": _beyond(found.beyond) if found.beyond else None,
         "held_back": _held_back(found, others) if others else None,
-        "held_back_warning": "".join(held_back_warning(found, fitted, others)) or None,
+        "held_back_warning": " ".join(held_back_warning(found, fitted, others)) or None,
     }
 
 
