@@ -30,7 +30,7 @@ from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, syntax
 from er3a.programs.code_builder import own_names, variable_of
-from er3a.programs.evaluation import HELD_BESIDE, Cell, Dialect, Position, ProgramMemory, known, root
+from er3a.programs.evaluation import HELD_BESIDE, Cell, Dialect, Position, ProgramMemory, root
 from er3a.programs.execution import Ending, EndKind, Execution, FramesUnset, FrameTwice, KeepOn, RunLimits, Step
 from er3a.programs.languages import LANGUAGES, not_written
 from er3a.robots.robot import Robot
