@@ -23,7 +23,6 @@ from er3a.programs.evaluation import (
     computed_in_single,
     function_in_single,
     missed_by,
-    same,
 )
 from er3a.programs.rapid import data_types, reader
 from er3a.robots.masses import moved, together
@@ -695,14 +694,15 @@ def _of_position(
     data = data_types.typed(values[0], data_types.JOINTTARGET if name == "CALCROBT" else data_types.ROBTARGET)
     given_tool, _ = _tool(memory, given.arguments[1], values[1])
     base, _ = _base(memory, words.get("WOBJ"), named.get("WOBJ"))
-    base = _displaced(memory, base)
     if name == "CALCJOINTT":
-        if not same(base, _base(memory, words.get("WOBJ"), named.get("WOBJ"))[0]):
-            return None
         wobj = named.get("WOBJ") or data_types.predefined("WOBJ0")
-        if data_types.pose_matrix(data) is None or wobj is None:
+        pose, moved_by = data_types.pose_matrix(data), memory.read("%PDISP")
+        shift = np.eye(4) if moved_by is None else data_types.pose_matrix(moved_by)
+        if not isinstance(data, syntax.Record) or pose is None or shift is None or wobj is None:
             return None
+        data = data_types.moved_target(data, shift @ pose)
         return syntax.Record(JOINTS_OF, (("TARGET", data), ("TOOL", values[1]), ("WOBJ", wobj)))
+    base = _displaced(memory, base)
     degrees_given = data_types.plain(data_types.part(data, "ROBAX"), 6)
     flange = memory.cell.flange
     if (
@@ -714,7 +714,7 @@ def _of_position(
     ):
         return None
     joints = np.radians(degrees_given)
-    pose: Reals = np.linalg.inv(base.pose) @ flange(joints) @ given_tool.pose
+    pose = np.linalg.inv(base.pose) @ flange(joints) @ given_tool.pose
     return _robtarget(pose, (*data_types.quarters_of(joints), -1))
 
 
