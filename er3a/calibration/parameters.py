@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -109,7 +109,7 @@ def parallel_pairs(robot: Robot) -> list[tuple[int, tuple[int, int]]]:
 def moved(tables: Tables, parameters: Sequence[Parameter], amounts: Reals) -> Tables:
     """One table of the batch for each row of amounts (H, p), in m and rad, added to the entries; amounts of base and
     tool change no table."""
-    columns: dict[str, Reals] = {}
+    columns: dict[str, Any] = {}
     for parameter, amount in zip(parameters, amounts.T):
         if parameter.joint:
             if parameter.column not in columns:

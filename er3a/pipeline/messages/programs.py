@@ -199,9 +199,7 @@ TEXTS = texts(
             "the joints were taken"
         ),
         "frame_taken_as_flange": "{name} is not given; the flange was taken for it",
-        "frames_in_doubt": (
-            "checked with the tool, base and way that are known, but {text} may have changed them"
-        ),
+        "frames_in_doubt": ("checked with the tool, base and way that are known, but {text} may have changed them"),
         "way_not_known": "the start of the motion is not known; only the target was checked",
         "more_than_full_speed": "asks for {percent:g} % of the joints' speed or acceleration",
         "joint_jumps": "J{joint} turns by {angle_deg:.1f} deg while the tool moves by {moved_mm:.1f} mm",

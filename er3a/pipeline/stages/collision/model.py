@@ -98,7 +98,8 @@ class FreeSpace(Finding, code="collision.free_space"):
     @property
     def demonstrations(self) -> tuple[CollidingTarget | CollidingPath, ...]:
         """What collides as it is meant to."""
-        return tuple(each for each in (*self.blocked, *self.colliding) if each.expected)
+        collide: tuple[CollidingTarget | CollidingPath, ...] = (*self.blocked, *self.colliding)
+        return tuple(each for each in collide if each.expected)
 
 
 @dataclass(frozen=True)
