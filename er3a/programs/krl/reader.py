@@ -28,7 +28,7 @@ from er3a.programs.code_builder import (
 )
 from er3a.programs.evaluation import STRUCTURE
 from er3a.programs.instructions import Aside, Place, Remark, Unknown
-from er3a.programs.krl.archive import CALL, GLOBAL_NAME, ControllerFiles, is_basics
+from er3a.programs.krl.controller_files import CALL, GLOBAL_NAME, ControllerFiles, is_basics
 from er3a.programs.krl.dialect import (
     HERE,
     HERE_JOINTS,
