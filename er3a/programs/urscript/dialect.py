@@ -208,9 +208,9 @@ class UrScriptDialect(Dialect):
         if found is None:
             found = _of_lists(name, placed)
         if found is None and name in PLAIN:
-            given_values = tuple(placed.get(key) for key in SIGNATURES[name])
+            given_values = [placed[key] for key in SIGNATURES[name] if key in placed]
             try:
-                known = syntax.numbers(given_values) is not None
+                known = len(given_values) == len(SIGNATURES[name]) and syntax.numbers(tuple(given_values)) is not None
                 found = _of_numbers(PLAIN[name], given_values) if known else None
             except (ValueError, OverflowError, ZeroDivisionError, TypeError):
                 found = None
