@@ -208,10 +208,10 @@ class UrScriptDialect(Dialect):
         if found is None:
             found = _of_lists(name, placed)
         if found is None and name in PLAIN:
-            numbers = [value for key in SIGNATURES[name] if (value := placed.get(key)) is not None]
+            given_values = [placed[key] for key in SIGNATURES[name] if key in placed]
             try:
-                known = len(numbers) == len(SIGNATURES[name]) and syntax.numbers(tuple(numbers)) is not None
-                found = _of_numbers(PLAIN[name], numbers) if known else None
+                known = len(given_values) == len(SIGNATURES[name]) and syntax.numbers(tuple(given_values)) is not None
+                found = _of_numbers(PLAIN[name], given_values) if known else None
             except (ValueError, OverflowError, ZeroDivisionError, TypeError):
                 found = None
         return unclear if found is None else found
