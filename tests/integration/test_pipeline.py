@@ -9,6 +9,7 @@ import json
 import os
 import re
 import shutil
+import xml.etree.ElementTree as ElementTree
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -21,7 +22,7 @@ from typer.testing import CliRunner
 from er3a.errors import ResultError
 from er3a.files.robot_library import load_robot
 from er3a.pipeline.cli import app
-from er3a.pipeline.results import FORMAT_VERSION, check_results, write_checksums
+from er3a.pipeline.results import FORMAT_VERSION, check_results, checksum_file, write_checksums
 from er3a.pipeline.stages.registry import STAGES as REGISTRY
 from er3a.pipeline.study import load_study
 from er3a.pipeline.verdicts import read_verdicts
@@ -225,8 +226,17 @@ def test_what_is_missing_damaged_or_of_an_older_version_is_made_again(small_stud
 
 
 def test_bad_input_is_one_error_before_anything_runs(small_study):
+    """Continuous integration reads it in place of the verdicts of the run before."""
+    report = small_study.folder / "reports/junit.xml"
+    before = {path: path.read_bytes() for path in (report, checksum_file(report))}
     with edited(small_study.folder / "data/manual_refs/er3_600/axes.csv", "x_mm", "x_cm"):
         done = small_study.make_run(check=False)
+    try:
+        (error,) = ElementTree.parse(report).iter("error")
+        assert "axes.csv" in error.get("message", "")
+    finally:
+        for path, content in before.items():
+            path.write_bytes(content)
     assert done.returncode == 2
     assert "axes.csv" in done.stderr
     assert "column x_cm" in done.stderr
