@@ -47,6 +47,7 @@ CARRIED_OUT = {
     "remedy.limit#below": OF_PROGRAMS,
     **{f"remedy.collision#{form}": OF_PROGRAMS for form in ("solid", "links", "solid_at_target")},
     **{f"remedy.joint_jumps#{form}": OF_PROGRAMS for form in ("stays", "moves")},
+    "left_out.units": "test_a_number_that_looks_like_another_unit_is_no_pass_where_it_is_read",
     "remedy.slower": "test_a_line_at_the_pace_advised_passes",
     "remedy.clear_of_assumed": "test_a_motion_that_passes_near_assumed_shapes_is_a_caution",
     "pairs_unexamined": "test_shapes_in_error_are_an_error_of_the_shapes",

@@ -30,7 +30,7 @@ from er3a.kinematics.singularity import USUAL_NEAR
 from er3a.pipeline.messages.language import as_text
 from er3a.pipeline.messages.programs import remedy_at, say
 from er3a.pipeline.results import NEVER_A_PASS, LeftOut, NoPass, plain
-from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_of_units
+from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_of_limits, left_out_of_units
 from er3a.pipeline.stages.trajectory.judgement import Surroundings, collisions, judge, measured, min_clearance
 from er3a.pipeline.stages.trajectory.motion import listed_motions
 from er3a.pipeline.stages.trajectory.written_programs import LONGEST_NAME, near_assumed_shapes, written
@@ -87,7 +87,11 @@ def checked_file(file: Path, robot: Robot, options: CheckOptions, doubts: Sequen
         check = check_program(program, robot, options)
     except InputError as error:
         return CheckedFile(file, None, error)
-    missed = (*missed_collisions(robot, options.scene, check.arms), *left_out_of_units([*doubts, *own]))
+    missed = (
+        *missed_collisions(robot, options.scene, check.arms),
+        *left_out_of_limits(robot),
+        *left_out_of_units([*doubts, *own]),
+    )
     if missed:
         verdicts = tuple(replace(each, level=worst_of((each.level, "caution"))) for each in check.verdicts)
         check = replace(check, level=worst_of((check.level, "caution")), verdicts=verdicts)

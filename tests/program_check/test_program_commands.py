@@ -127,10 +127,15 @@ def test_no_motion_passes_without_obstacles_shapes_or_contacts(tmp_path):
     (tmp_path / "allowing.yaml").write_text(yaml.safe_dump(scene))
     robot["envelopes"]["capsules"] = robot["envelopes"]["capsules"][:2]
     (tmp_path / "er3a_c60.yaml").write_text(yaml.safe_dump(robot))
+    (tmp_path / "assumed").mkdir()
+    guessed = yaml.safe_load(Path("data/robots/er3a_c60.yaml").read_text())
+    guessed["limits"] |= {"source": "Assumed", "grade": "inferred"}
+    (tmp_path / "assumed/er3a_c60.yaml").write_text(yaml.safe_dump(guessed))
     for arm, scene_file, expected in (
         ("er3a_c60", SCENE, []),
         ("er3a_c60", None, [("obstacles", [])]),
         ("er3a_c60", str(tmp_path / "allowing.yaml"), [("allowed_contacts", ["link_6/table"])]),
+        (str(tmp_path / "assumed/er3a_c60.yaml"), SCENE, [("own_limits", ["Assumed"])]),
         (str(tmp_path / "er3a_c60.yaml"), SCENE, [("uncovered_links", ["link_2", "link_3", "link_4", "link_6"])]),
     ):
         around = ("--scene", scene_file) if scene_file else ()
