@@ -77,6 +77,7 @@ CHANGING = {
     "BITCLEAR": 0,
     "BITSET": 0,
     "WAITTESTANDSET": 0,
+    "IVARVALUE": 2,
 }
 """Instructions that change one of their arguments, by its number."""
 CHANGING_OPTIONS = frozenset(("TIMEFLAG", "VALUE", "VALUEATTIMEOUT", "BREAKFLAG", "ERRORNUMBER"))
@@ -987,8 +988,8 @@ def _test(body: _BodyReader, place: Place) -> None:
     """``TEST subject CASE 1, 2: ... DEFAULT: ... ENDTEST``."""
     cursor = body.cursor
     cursor.at += 1
-    subject = body.condition(cursor.until("CASE", "DEFAULT", "ENDTEST"))
-    body.builder.open_switch(place, subject)
+    asked = cursor.until("CASE", "DEFAULT", "ENDTEST")
+    body.builder.open_switch(place, body.condition(asked), f"TEST {cursor.text(asked)}")
     while (word := cursor.word()) != "ENDTEST":
         if word not in ("CASE", "DEFAULT"):
             raise fault(place, "the TEST that begins here has no end", "Close it with ENDTEST")
@@ -1006,7 +1007,7 @@ def _test(body: _BodyReader, place: Place) -> None:
                 words.finish()
             except MisreadError as error:
                 raise fault(at, f"this CASE can't be read ({error})", "Write CASE 1, 2:") from None
-        body.builder.case(at, values, text)
+        body.builder.case(at, values, f"CASE {text}")
         body.instructions("CASE", "DEFAULT", "ENDTEST")
     body.builder.close("switch", cursor.place())
     cursor.at += 1
