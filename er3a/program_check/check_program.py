@@ -375,11 +375,16 @@ def _begun_again(execution: Execution, checker: StepChecker, found: list[Located
     for number, motion in checker.motions.items():
         step = execution.steps[number]
         if step.again:
-            grave = (each.code for each in motion.findings if found_in.level_of(each) in ("caution", "fail"))
+            grave = (each.code for each in motion.findings if _is_of_its_own(each))
             told.setdefault(step.place, []).extend(code for code in grave if (step.place, code) not in known)
     for place, codes in told.items():
         if codes:
             yield LocatedFinding("caution", found_in.BegunAgain(tuple(dict.fromkeys(codes))), place)
+
+
+def _is_of_its_own(finding: found_in.CheckFinding) -> bool:
+    """Whether a finding is no note, nor only that what was before left the start unknown, which is told there."""
+    return found_in.level_of(finding) in ("caution", "fail") and not isinstance(finding, found_in.PathNotKnown)
 
 
 def _loads(execution: Execution, robot: Robot) -> Iterator[LocatedFinding]:

@@ -779,3 +779,50 @@ def test_a_module_that_is_checked_without_the_main_that_calls_it_is_no_pass(tmp_
     found = check(tmp_path, helper, "helper.mod")
     assert codes(found).get("program_begun_within", []) == [3] * bool(named)
     assert [(each.place.line, each.what) for each in found.not_examined] == [(3, "course")] * bool(named)
+
+
+@pytest.mark.parametrize(("zone", "known"), [("fine", True), ("z10", False)])
+def test_a_procedure_that_is_called_within_a_corner_is_none_that_comes_before_the_next_line(tmp_path, zone, known):
+    """Of the next line's target the program reads the variables before the arm is in the corner."""
+    body = f'n:=0;\nMoveLSync p,v100,{zone},tool0,"shift";\nMoveL Offs(p,0,0,n),v100,fine,tool0;'
+    last = motions(tmp_path, rapid(body, "VAR num n;", "PROC shift()\nn:=n+50;\nENDPROC"), "a.mod")[-1]
+    assert isinstance(last.target, PoseTarget) == known
+    moving = rapid(body, "VAR num n;", "PROC shift()\nMoveL Offs(p,0,50,0),v100,fine,tool0;\nENDPROC")
+    assert ("moves_beside" in codes(check(tmp_path, moving, "a.mod"))) != known
+
+
+def test_what_is_computed_of_joints_and_targets_goes_with_the_displacement(tmp_path):
+    """By ABB's manual both functions are for the program displacement that is active: 20 mm up."""
+    data = f"VAR robtarget r;VAR jointtarget j;CONST jointtarget h:=[[0,-10,-10,0,-70,0],{NONE}];"
+    there = "r:=CalcRobT(h,tool0);\nMoveL r,v100,fine,tool0;"
+    plain, moved = (
+        motions(tmp_path, rapid(before + there, data), "a.mod")[-1]
+        for before in ("", "PDispSet [[0,0,20],[1,0,0,0]];\n")
+    )
+    assert moved.target.pose[2, 3] == pytest.approx(plain.target.pose[2, 3] - 0.02)
+    there = "j:=CalcJointT(p,tool0);\nMoveAbsJ j,v100,fine,tool0;"
+    moved = motions(tmp_path, rapid("PDispSet [[0,0,20],[1,0,0,0]];\n" + there, data), "a.mod")[-1]
+    np.testing.assert_allclose((moved.base.pose @ moved.target.pose)[:3, 3], [0.4, 0, 0.32], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("routine", "named"),
+    [
+        ("height:=-150;", True),
+        ("PDispSet [[0,0,-150],[1,0,0,0]];", True),
+        ("SetDO do1,0; ! height:=3", False),
+        ("unused:=2;", False),
+        (None, True),
+    ],
+)
+def test_a_routine_that_the_controller_calls_at_an_event_is_named_if_it_may_change_motions(tmp_path, routine, named):
+    inside = tmp_path / "RAPID/TASK1/PROGMOD"
+    inside.mkdir(parents=True)
+    (tmp_path / "SYSPAR").mkdir()
+    hooks = 'CAB_EXEC_HOOKS:\n\n      -Routine "rStart" -Shelf "START"\n#\nCAB_TASKS:\n      -Routine "rOther"\n'
+    (tmp_path / "SYSPAR/SYS.cfg").write_text(f"SYS:CFG_1.0:6:0::\n#\n{hooks}")
+    if routine is not None:
+        text = f"MODULE ev\nVAR num unused;\nPROC rStart()\n{routine}\nENDPROC\nENDMODULE\n"
+        (inside / "ev.mod").write_text(text)
+    found = check(inside, rapid("MoveL Offs(p,0,0,height),v100,fine,tool0;", "VAR num height:=0;"), "a.mod")
+    assert [each.place.line for each in found.findings if each.finding.code == "program_not_simulated"] == [5] * named

@@ -696,9 +696,13 @@ def _of_position(
     base, _ = _base(memory, words.get("WOBJ"), named.get("WOBJ"))
     if name == "CALCJOINTT":
         wobj = named.get("WOBJ") or data_types.predefined("WOBJ0")
-        if data_types.pose_matrix(data) is None or wobj is None:
+        pose, moved_by = data_types.pose_matrix(data), memory.read("%PDISP")
+        shift = np.eye(4) if moved_by is None else data_types.pose_matrix(moved_by)
+        if not isinstance(data, syntax.Record) or pose is None or shift is None or wobj is None:
             return None
+        data = data_types.moved_target(data, shift @ pose)
         return syntax.Record(JOINTS_OF, (("TARGET", data), ("TOOL", values[1]), ("WOBJ", wobj)))
+    base = _displaced(memory, base)
     degrees_given = data_types.plain(data_types.part(data, "ROBAX"), 6)
     flange = memory.cell.flange
     if (
@@ -710,7 +714,7 @@ def _of_position(
     ):
         return None
     joints = np.radians(degrees_given)
-    pose: Reals = np.linalg.inv(base.pose) @ flange(joints) @ given_tool.pose
+    pose = np.linalg.inv(base.pose) @ flange(joints) @ given_tool.pose
     return _robtarget(pose, (*data_types.quarters_of(joints), -1))
 
 

@@ -282,6 +282,7 @@ def read_rapid(source: ProgramText) -> syntax.Program:
         findings.append(NameTwice(name, last.place))
     by_name, unlinked = linked([each for reader in readers for each in reader.routines], changed_arguments)
     findings += _base_frames(source.path)
+    findings += _event_routines(source.path, {each.text for cursor in cursors for each in cursor.tokens})
     entry = _entry(own, by_name)
     main = None if entry == "MAIN" or entry not in by_name else _main_of(source.path)
     if main is not None:
@@ -791,7 +792,7 @@ class _BodyReader:
                         syntax.Assign(place, placed[1], syntax.Constant(syntax.Unclear(f"what {name} finds")), text)
                     )
             if name in CALLING and placed and placed[-1] is not None:
-                self.late(place, placed[-1], ((), ()), text)
+                self._at_corner(place, placed, options, text)
             return
         arrives = name.startswith("WAIT") and bool(options & ARRIVING)
         if name in LEAVING or arrives:
@@ -820,6 +821,20 @@ class _BodyReader:
         for each in changed:
             if isinstance(each, (syntax.Variable, syntax.Element, syntax.Member)):
                 builder.add(syntax.Assign(place, each, syntax.Constant(syntax.Unclear(f"what {name} gives")), text))
+
+    def _at_corner(
+        self, place: Place, placed: tuple[syntax.Expression | None, ...], options: set[str], text: str
+    ) -> None:
+        """The procedure that a motion calls: where it stops, or somewhere on the way round its corner."""
+        called, zone = placed[-1], placed[-3] if len(placed) > 2 else None
+        assert called is not None
+        prefix, whole = _prefix(called)
+        name = self.scope.private.get(prefix.upper(), prefix.upper())
+        stops = "INPOS" in options or (isinstance(zone, syntax.Variable) and zone.name == "FINE")
+        if stops or not whole or name not in self.module.procedures:
+            self.late(place, called, ((), ()), text)
+        else:
+            self.builder.beside(place, syntax.Invocation(name, ()), text, "interrupt")
 
     def _fails(self, place: Place, text: str) -> None:
         """An error may end the routine here."""
@@ -1165,8 +1180,8 @@ def _beside(path: Path) -> list[Path]:
 
 def companions(path: Path) -> tuple[Path, ...]:
     """The modules on which a program depends, with those of the controller's other tasks and its configuration."""
-    configured = _configuration(path, "MOC.cfg")
-    return (*modules_of(path), *_of_tasks(path), *((configured,) if configured else ()))
+    configured = (_configuration(path, name) for name in ("MOC.cfg", "SYS.cfg"))
+    return (*modules_of(path), *_of_tasks(path), *filter(None, configured))
 
 
 def _of_tasks(path: Path) -> list[Path]:
@@ -1187,26 +1202,70 @@ NO_BASE_FRAME = {"pos_x": 0.0, "pos_y": 0.0, "pos_z": 0.0, "orient_u0": 1.0}
 BASE_FRAME = re.compile(r"""-base_frame_(pos_[xyz]|orient_u[0-3]|coordinated)\s+("[^"]*"|\S+)""")
 
 
+HOOK = re.compile(r"""(?i)-Routine\s+"(\w+)\"""")
+PROCEDURE = re.compile(r"(?s)\bPROC\s+(\w+)(.*?)\bENDPROC\b")
+SETTING = re.compile("PDISP|EOFFS|CONF[JL]$|VELSET|ACCSET|GRIPLOAD|SETSYSDATA|SINGAREA|CIRPATHMODE|SOFTACT|WZ")
+"""How instructions begin that set what later motions depend on."""
+
+
 def _configuration(path: Path, name: str) -> Path | None:
     """A file of the configuration in the backup that a program belongs to."""
     folders = (each / "SYSPAR" / name for each in list(path.resolve().parents)[:HIGHEST])
     return next((each for each in folders if each.is_file()), None)
 
 
-def _base_frames(path: Path) -> Iterable[ProgramFinding]:
-    """That the configuration puts a robot elsewhere than at the origin of the world, in which work objects are."""
-    file = _configuration(path, "MOC.cfg")
+def _entries(file: Path | None, section: str) -> Iterable[tuple[str, Place]]:
+    """The entries of a section of a configuration, each in one line."""
     inside, entry, first = False, "", 0
     for number, line in enumerate(read_program_text(file).lines if file else (), 1):
         if re.match(r"\w+:", line) or line.startswith("#"):
-            inside = line.startswith("ROBOT:")
+            inside = line.startswith(f"{section}:")
         entry, first = (entry + line, first) if entry else (line, number)
         if line.rstrip().endswith("\\"):
             entry = entry.rstrip().removesuffix("\\") + " "
             continue
-        if inside and any(map(_is_moved, BASE_FRAME.findall(entry))):
-            yield NotSimulated(" ".join(each[0] for each in BASE_FRAME.finditer(entry)), Place(file, first))
+        if inside and entry.lstrip().startswith("-"):
+            yield " ".join(entry.split()), Place(file, first)
         entry = ""
+
+
+def _base_frames(path: Path) -> Iterable[ProgramFinding]:
+    """That the configuration puts a robot elsewhere than at the origin of the world, in which work objects are."""
+    for entry, place in _entries(_configuration(path, "MOC.cfg"), "ROBOT"):
+        if any(map(_is_moved, BASE_FRAME.findall(entry))):
+            yield NotSimulated(" ".join(each[0] for each in BASE_FRAME.finditer(entry)), place)
+
+
+def _procedure_texts(modules: Iterable[Path]) -> dict[str, str]:
+    """What stands in the procedures of modules, by name, all in capital letters."""
+    text = "\n".join(COMMENT_OR_TEXT.sub(" ", read_program_text(each).text) for each in modules).upper()
+    return {match[1]: match[2] for match in PROCEDURE.finditer(text)}
+
+
+def _event_routines(path: Path, used: set[str]) -> Iterable[ProgramFinding]:
+    """Routines that the controller calls at events, as a start, and that may change what a program does.
+
+    Parameters
+    ----------
+    used : names in the modules of the program, in capital letters
+    """
+    hooks = [
+        (match[1].upper(), entry, place)
+        for entry, place in _entries(_configuration(path, "SYS.cfg"), "CAB_EXEC_HOOKS")
+        if (match := HOOK.search(entry)) is not None
+    ]
+    if not hooks:
+        return
+    procedures = _procedure_texts([path, *(each for each in _beside(path) if not _is_encoded(each))])
+    others = _procedure_texts(_of_tasks(path))
+    for name, entry, place in hooks:
+        inside = procedures.get(name)
+        if inside is None and name in others:
+            continue
+        words = set(WORD.findall(inside or ""))
+        changes = {each for pair in SET.findall(inside or "") for each in pair} & used
+        if inside is None or changes or words & (MOTIONS | procedures.keys()) or any(map(SETTING.match, words)):
+            yield NotSimulated(entry, place)
 
 
 def _is_moved(part: tuple[str, str]) -> bool:
