@@ -32,6 +32,7 @@ class Block:
     skips: list[int] = field(default_factory=list)  # branches or jumps to the next arm, or to the next round
     subject: syntax.Expression | None = None
     step: syntax.Expression | None = None
+    text: str = ""  # its first line, of a switch
     word: str = ""  # what it is called in the text
 
 
@@ -145,10 +146,10 @@ class CodeBuilder:
         span = syntax.Binary("*", syntax.Binary("-", limit, counter), by)
         self._test(place, syntax.Binary(">=", span, syntax.Constant(0)), text)
 
-    def open_switch(self, place: Place, subject: syntax.Expression) -> None:
+    def open_switch(self, place: Place, subject: syntax.Expression, text: str) -> None:
         """``SWITCH subject``."""
         self._open("switch", place)
-        self.blocks[-1].subject = subject
+        self.blocks[-1].subject, self.blocks[-1].text = subject, text
 
     def case(self, place: Place, values: list[syntax.Expression] | None, text: str) -> None:
         """``CASE values``, or ``DEFAULT`` for None."""
@@ -164,7 +165,7 @@ class CodeBuilder:
         condition = tests[0]
         for test in tests[1:]:
             condition = syntax.Binary("OR", condition, test)
-        self._test(place, condition, text)
+        self._test(place, condition, f"{block.text} {text}")
 
     def close(self, kind: str, place: Place, until: syntax.Expression | None = None, text: str = "") -> None:
         """End of the innermost block, which must be of this kind."""

@@ -48,10 +48,11 @@ def read_program(path: str | Path) -> Program:
         for a file that is none of these, or with unterminated blocks, strings or comments
     """
     path = Path(path)
-    owner = next((each for each in LANGUAGES.values() if each.points and each.points == path.suffix.lower()), None)
-    if owner is not None:
-        remedy = f"Give its {owner.suffixes[0]} file"
-        raise InputError(path, None, "holds the points of a program, not the program", remedy)
+    for each in LANGUAGES.values():
+        held = {each.points: "holds the points", each.contents: "lists the modules"}.get(path.suffix.lower() or "none")
+        if held is not None:
+            remedy = f"Give its {each.suffixes[0]} file"
+            raise InputError(path, None, f"{held} of a program, not the program", remedy)
     source = read_program_text(path)
     program = LANGUAGES[language_of(source)].reader(source)
     if not _moves(program) and not any(isinstance(each, NothingMoves) for each in program.findings):

@@ -30,6 +30,7 @@ class Language:
     writer : None of a table over time (:func:`er3a.programs.csv_program.write_csv`)
     joints : how many joint angles a target can have; None for any number, of prismatic joints too
     points : suffix of the file with a program's points, where they stand in one of their own
+    contents : suffix of a file that only lists a program's modules
     companions : what finds the files that belong to a program: modules that it calls, points, the controller's data
     """
 
@@ -42,4 +43,5 @@ class Language:
     joints: range | None
     opening: str = ""
     points: str = ""
+    contents: str = ""
     companions: Callable[[Path], tuple[Path, ...]] = lambda path: ()

@@ -937,7 +937,7 @@ def test_a_robot_that_its_configuration_puts_elsewhere_is_no_pass(tmp_path, fram
     assert "MOC.cfg" in {each.name for each in files_of(inside / "a.mod")}
 
 
-@pytest.mark.parametrize("other", ["T_COMM", "T_COMM/PROGMOD", "TASK2/PROGMOD"])
+@pytest.mark.parametrize("other", ["T_COMM", "T_COMM/PROGMOD", "T_COMM/modules", "TASK2/PROGMOD"])
 def test_what_another_task_sets_has_no_known_value_whatever_its_folder_is_called(tmp_path, other):
     own = other.replace("T_COMM", "T_ROB1").replace("TASK2", "TASK1")
     for folder in (own, other):
@@ -946,6 +946,27 @@ def test_what_another_task_sets_has_no_known_value_whatever_its_folder_is_called
     (tmp_path / other / "comm.mod").write_text(f"MODULE comm\n{data}\nPROC main()\nheight:=50;\nENDPROC\nENDMODULE\n")
     found = check(tmp_path / own, rapid("MoveL Offs(p,0,0,height),v100,fine,tool0;", data), "a.mod")
     assert codes(found)["target_not_given"] == [7]
+
+
+@pytest.mark.parametrize(
+    ("done", "sets"),
+    [
+        ('GetDataVal "x",height;', True),
+        ("ok:=StrToVal(text,height);", True),
+        ("ReadRawBytes raw,1,height;", True),
+        ("TPReadNum height,text;", True),
+        ("IF height>5 n:=height;", False),
+    ],
+)
+def test_what_another_task_reads_into_shared_data_is_set_there(tmp_path, done, sets):
+    """The data may be declared in another module of the same task."""
+    for folder in ("TASK1", "TASK2"):
+        (tmp_path / folder).mkdir()
+    data = "PERS num height:=20;"
+    (tmp_path / "TASK2/data.sys").write_text(f"MODULE data\n{data}\nENDMODULE\n")
+    (tmp_path / "TASK2/comm.mod").write_text(f"MODULE comm\nPROC main()\n{done}\nENDPROC\nENDMODULE\n")
+    found = check(tmp_path / "TASK1", rapid("MoveL Offs(p,0,0,height),v100,fine,tool0;", data), "a.mod")
+    assert ("target_not_given" in codes(found)) == sets
 
 
 @pytest.mark.parametrize("wait", ["WaitDI di1,1", "WaitUntil di1=1", "WaitUntil n=2", "WaitTestAndSet busy"])

@@ -56,6 +56,7 @@ LIMITS = RunLimits(operations=20_000, ways=50, rounds=20)
         ("a.src", "DEF a( )\nSWITCH i\nCASE {\nENDSWITCH\nEND\n", "line 3: this CASE can't be read"),
         ("a.txt", "hello\n", "not a known robot program"),
         ("a.dat", "DEFDAT A\nENDDAT\n", "Give its .src file"),
+        ("a.pgf", "<Program>\n<Module>a.mod</Module>\n</Program>\n", "lists the modules of a program"),
     ],
 )
 def test_one_clear_error(name, text, told, tmp_path):

@@ -61,6 +61,23 @@ def test_a_grippers_own_waits_are_passed_and_the_motions_behind_are_checked(tmp_
     assert {execution.steps[i].place.line for i in execution.motions} == {26, 28}
 
 
+@pytest.mark.parametrize(
+    ("name", "text", "told"),
+    [
+        (
+            "a.mod",
+            "MODULE a\nPROC main()\nTEST GInput(gi1)\nCASE 1,2:\nStop;\nENDTEST\nENDPROC\nENDMODULE\n",
+            "TEST GInput(gi1) CASE 1,2",
+        ),
+        ("a.src", "DEF a( )\nSWITCH $IN[1]\nCASE TRUE\nHALT\nENDSWITCH\nEND\n", "SWITCH $IN[1] CASE TRUE"),
+        ("a.pgm", "CASE i OF\n1,2: DWELL(1);\nEND_CASE;\n", "CASE i OF 1,2"),
+    ],
+)
+def test_a_case_is_told_with_what_its_values_are_compared_with(name, text, told, tmp_path):
+    steps = execute(program_of(tmp_path, name, text)).steps
+    assert {each.instruction.condition for each in steps if isinstance(each.instruction, Decision)} == {told}
+
+
 def test_a_side_that_changes_where_the_arm_goes_is_followed(tmp_path):
     text = "DEF p( )\nDECL REAL z\nz=0\nIF $IN[1] THEN\nz=10\nENDIF\nPTP {A1 0,A2 z,A3 0,A4 0,A5 0,A6 0}\nEND\n"
     steps = execute(program_of(tmp_path, "p.src", text)).steps

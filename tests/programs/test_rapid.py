@@ -492,7 +492,13 @@ def test_modules_share_what_is_not_local(tmp_path):
 
 
 def test_what_an_instruction_reads_has_no_known_value(tmp_path):
-    for body in ("TPReadNum n,text;", "flag:=StrToVal(text,n);", "IF StrToVal(text,n) Stop;", "ReadRawBytes raw,n;"):
+    for body in (
+        "TPReadNum n,text;",
+        "flag:=StrToVal(text,n);",
+        "IF StrToVal(text,n) Stop;",
+        "ReadRawBytes raw,n;",
+        'IVarValue "x:",1,n,x;',
+    ):
         assert isinstance(move(tmp_path, f"{body} MoveL Offs(p,n,0,0),@;").target, UnresolvedTarget), body
 
 

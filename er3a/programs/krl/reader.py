@@ -469,7 +469,7 @@ HANDLERS: dict[str, Handler] = {
     "ENDFOR": _simple(lambda builder, place: builder.close("for", place)),
     "REPEAT": _simple(lambda builder, place: builder.open_repeat(place)),
     "UNTIL": lambda reading: reading.builder.close("repeat", reading.place, reading.condition(), reading.text),
-    "SWITCH": lambda reading: reading.builder.open_switch(reading.place, reading.condition()),
+    "SWITCH": lambda reading: reading.builder.open_switch(reading.place, reading.condition(), reading.text),
     "CASE": _case,
     "DEFAULT": _simple(lambda builder, place: builder.case(place, None, "")),
     "ENDSWITCH": _simple(lambda builder, place: builder.close("switch", place)),

@@ -18,5 +18,6 @@ RAPID = Language(
     dialect=RapidDialect,
     writer=RapidWriter,
     joints=SIX_ANGLES,
+    contents=".pgf",
     companions=companions,
 )

@@ -77,6 +77,7 @@ CHANGING = {
     "BITCLEAR": 0,
     "BITSET": 0,
     "WAITTESTANDSET": 0,
+    "IVARVALUE": 2,
 }
 """Instructions that change one of their arguments, by its number."""
 CHANGING_OPTIONS = frozenset(("TIMEFLAG", "VALUE", "VALUEATTIMEOUT", "BREAKFLAG", "ERRORNUMBER"))
@@ -1002,8 +1003,8 @@ def _test(body: _BodyReader, place: Place) -> None:
     """``TEST subject CASE 1, 2: ... DEFAULT: ... ENDTEST``."""
     cursor = body.cursor
     cursor.at += 1
-    subject = body.condition(cursor.until("CASE", "DEFAULT", "ENDTEST"))
-    body.builder.open_switch(place, subject)
+    asked = cursor.until("CASE", "DEFAULT", "ENDTEST")
+    body.builder.open_switch(place, body.condition(asked), f"TEST {cursor.text(asked)}")
     while (word := cursor.word()) != "ENDTEST":
         if word not in ("CASE", "DEFAULT"):
             raise fault(place, "the TEST that begins here has no end", "Close it with ENDTEST")
@@ -1021,7 +1022,7 @@ def _test(body: _BodyReader, place: Place) -> None:
                 words.finish()
             except MisreadError as error:
                 raise fault(at, f"this CASE can't be read ({error})", "Write CASE 1, 2:") from None
-        body.builder.case(at, values, text)
+        body.builder.case(at, values, f"CASE {text}")
         body.instructions("CASE", "DEFAULT", "ENDTEST")
     body.builder.close("switch", cursor.place())
     cursor.at += 1
@@ -1127,6 +1128,11 @@ TASK = re.compile(r"(?i)TASK\d+|T_\w+")
 """Folder of a task in a controller's backup, or in a project: T_ROB1, T_COMM."""
 SHARED = re.compile(r"(?i)(\b(?:LOCAL|TASK)\s+)?\bPERS\s+\w+\s+(\w+)")
 SET = re.compile(r"(?i)(?<![\w.\\])(\w+)(?:\{[^}]*\}|\.\w+)*\s*:=|\b(?:Incr|Decr|Add|Clear)\s+(\w+)")
+GIVEN = re.compile(
+    rf"(?i)\b(?:(?:{'|'.join(READING)})\w*|{'|'.join((*CHANGING, *CHANGING_FUNCTIONS))})\b([^;]*)"
+    rf"|\\(?:{'|'.join(sorted(CHANGING_OPTIONS))})\s*:=\s*(\w+)"
+)
+"""What is given to instructions that may change it."""
 FOLDERS = {"PROGMOD": "SYSMOD", "SYSMOD": "PROGMOD"}
 """Folders of a task in a controller's backup."""
 MAX_MODULES = 200
@@ -1185,13 +1191,11 @@ def companions(path: Path) -> tuple[Path, ...]:
 
 def _of_tasks(path: Path) -> list[Path]:
     """The modules of the other tasks in a controller's backup, or beside the folder of a task."""
-    folder = path.resolve().parent
-    task = folder.parent if folder.name.upper() in FOLDERS else folder
-    if not TASK.fullmatch(task.name):
+    task = next((each for each in list(path.resolve().parents)[:HIGHEST] if TASK.fullmatch(each.name)), None)
+    if task is None:
         return []
     others = (each for each in sorted(task.parent.iterdir()) if TASK.fullmatch(each.name) and each != task)
-    inside = [each for other in others if other.is_dir() for each in sorted(other.iterdir())]
-    inside += [file for each in inside if each.name.upper() in FOLDERS for file in sorted(each.iterdir())]
+    inside = (file for other in others for file in sorted(other.rglob("*")))
     return [each for each in inside if each.suffix.lower() in SUFFIXES and each.is_file() and not _is_encoded(each)]
 
 
@@ -1281,12 +1285,14 @@ def _is_moved(part: tuple[str, str]) -> bool:
 
 def _set_by_tasks(path: Path) -> set[str]:
     """Persistent data that other tasks in a controller's backup set: data of one name are one."""
-    found: set[str] = set()
+    changed, shared = set(), set()
     for module in _of_tasks(path):
         text = COMMENT_OR_TEXT.sub(" ", read_program_text(module).text)
         rest = SHARED.sub(" ", text)
-        found |= {name.upper() for pair in SET.findall(rest) for name in pair} & _shared(text)
-    return found
+        changed |= {name.upper() for found in SET.findall(rest) for name in found}
+        changed |= {name.upper() for words in GIVEN.findall(rest) for name in WORD.findall(" ".join(words))}
+        shared |= _shared(text)
+    return changed & shared
 
 
 def _shared(text: str) -> set[str]:

@@ -300,7 +300,7 @@ def _block(builder: CodeBuilder, place: Place, text: str, first: str) -> bool:
             condition = re.sub(r"\s*\bEND_REPEAT$", "", inner)
             builder.close("repeat", place, expression(condition), text)
         case "CASE":
-            builder.open_switch(place, expression(_until(inner, "OF", place)))
+            builder.open_switch(place, expression(_until(inner, "OF", place)), text)
         case "END_IF" | "END_WHILE" | "END_FOR" | "END_CASE":
             kind = {"END_CASE": "switch"}.get(first, first[4:].lower())
             builder.close(kind, place)
