@@ -246,7 +246,7 @@ COURSES = {  # instructions, x of the targets in their order, relative to p
         [7, 3, 3, 7, 3, 4, 3],
     ),
     "exit": ("MoveL p,@; EXIT; #1;", [0]),
-    "called_at_the_end": ('MoveLSync p,v100,z10,tool0,"mark"; #n; MORE PROC mark() n:=9; ENDPROC', [0, 9]),
+    "called_at_the_end": ('MoveLSync p,v100,fine,tool0,"mark"; #n; MORE PROC mark() n:=9; ENDPROC', [0, 9]),
 }
 
 
