@@ -336,11 +336,11 @@ def tool_motion_path(
         return None
     law, said = _turning_law(motion, (T_start, end), (shape.length, shape.turned), rules.assumed)
     said += _turns_otherwise(motion, T_start, end)
-    if shape.turned > np.pi - SIDE_OPEN:
+    if via is not None and isinstance(shape, ArcWithPath):
+        said += (found_in.ArcTurnInDoubt(),) if _beside(T_start, via, end, shape)[1] else ()
+    elif shape.turned > np.pi - SIDE_OPEN:
         x, y, z = (np.round(arm.base[:3, :3].T @ shape.rotation / shape.turned, 3) + 0.0).tolist()
         said += (found_in.TurnsEitherWay((x, y, z)),)
-    if via is not None and isinstance(shape, ArcWithPath) and _beside(T_start, via, end, shape)[1]:
-        said += (found_in.ArcTurnInDoubt(),)
     path: Segment = (
         line(T_start, end, law.duration, None, law.ramp)
         if via is None
