@@ -417,7 +417,8 @@ def arc_poses(start: Reals, via: Reals, end: Reals, shares: Reals, with_path: bo
 
 
 SHORT_TURN = math.pi / 2
-"""A turn beside the path up to which the shorter sense is meant, whatever the point on the arc says."""
+"""A turn beside the path up to which the shorter sense is taken; in doubt if the point on the arc says otherwise."""
+NO_TURN = math.radians(1)
 
 
 def turn_beside_path(start: Reals, via: Reals, end: Reals, circle: tuple[Reals, Reals, float]) -> tuple[Reals, bool]:
@@ -441,11 +442,13 @@ def turn_beside_path(start: Reals, via: Reals, end: Reals, circle: tuple[Reals, 
     share = np.arctan2(normal @ np.cross(spoke, to_via), spoke @ to_via) % (2 * np.pi) / angle
     turn = log_rotation(exp_rotation(-angle * normal) @ end[:3, :3] @ start[:3, :3].T)
     size = float(np.linalg.norm(turn))
-    if size <= SHORT_TURN:
+    if size <= NO_TURN:
         return turn, False
     senses = turn, turn * (1 - 2 * np.pi / size)
     there = (exp_rotation(share * angle * normal) @ exp_rotation(share * each) @ start[:3, :3] for each in senses)
     off = [float(rotation_angle(via[:3, :3], each)) for each in there]
+    if size <= SHORT_TURN:
+        return turn, off[1] < off[0]
     return senses[int(off[1] < off[0])], min(off) > max(off) / 2
 
 

@@ -884,6 +884,10 @@ def test_a_point_on_an_arc_whose_orientation_is_as_far_from_both_senses_is_a_cau
     ends = on_circle(-90, 0), on_circle(90, 0)
     assert "arc_turn_in_doubt" in codes(check(tmp_path, on_arc(ends[0], on_circle(0, 90), ends[1]), "a.mod"))
     assert "arc_turn_in_doubt" not in codes(check(tmp_path, on_arc(ends[0], on_circle(0, 20), ends[1]), "a.mod"))
+    short = on_circle(-45, 0), on_circle(45, 0)  # which turns back by 90 deg beside the path
+    for yaw, doubted in ((0, False), (180, True)):
+        found = codes(check(tmp_path, on_arc(short[0], on_circle(0, yaw), short[1]), "a.mod"))
+        assert ("arc_turn_in_doubt" in found) == doubted
 
 
 def test_what_else_circular_paths_may_be_told_is_named(tmp_path):
