@@ -1465,6 +1465,13 @@ def test_a_position_that_is_read_after_continue_is_not_known(tmp_path):
     assert not isinstance(stopped.target, UnresolvedTarget)
 
 
+@pytest.mark.parametrize(("before", "ways"), [("CONTINUE\n", {5.0, 9.0}), ("", {5.0})])
+def test_what_asks_for_the_position_after_continue_is_not_decided(tmp_path, before, ways):
+    ask = f"{AT_START}{before}IF $AXIS_ACT.A1<1 THEN\nPTP {{A1 5}}\nELSE\nPTP {{A1 9}}\nENDIF"
+    found = motions(tmp_path, krl(f"PTP {axes(HOME)}\n{ask}"), "a.src")
+    assert {round(float(np.degrees(each.target.joints[0])), 6) for each in found[-2:]} & {5.0, 9.0} == ways
+
+
 ONE_TOOL = "[TRUE,[[0,0,100],[1,0,0,0]],[1,[0,0,0],[1,0,0,0],0,0,0]]"
 TOOLS = f"VAR num n;\nPERS tooldata tools{{2}}:=[{ONE_TOOL},{ONE_TOOL}];\n"
 STEP = "MoveL [[300,50,200],[0,1,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v50,fine,tools{n};"

@@ -50,9 +50,9 @@ def with_data(folder, body: str, data: str, **options):
     return check(folder, krl(FRAMES + SPEEDS + body), "a.src", **options)
 
 
-def joints(folder, body: str) -> list[float]:
+def joints(folder, body: str, more: str = "") -> list[float]:
     """Where joint 1 goes, deg, on each motion of a KRL program."""
-    found = motions(folder, krl(body), "a.src")
+    found = motions(folder, krl(body, more), "a.src")
     return [float(np.degrees(each.target.joints[0])) for each in found if isinstance(each.target, JointTarget)]
 
 
@@ -494,6 +494,26 @@ def test_an_output_that_is_set_under_another_name_is_not_taken_as_it_was(tmp_pat
     assert sorted(set(np.round(joints(tmp_path, GIVEN_OUT + setting + ASK_OUT), 6))) == ways
 
 
+@pytest.mark.parametrize("called", [True, False])
+def test_a_signal_that_a_module_declares_for_all_is_an_output(tmp_path, called):
+    (tmp_path / "io.dat").write_text("DEFDAT IO PUBLIC\nGLOBAL SIGNAL GRIP $OUT[8]\nENDDAT\n")
+    (tmp_path / "io.src").write_text("DEF io( )\nEND\n")
+    call = "io( )\n" if called else ""
+    assert joints(tmp_path, f"{call}{GIVEN_OUT}GRIP=TRUE{ASK_OUT}") == [5.0]
+
+
+@pytest.mark.parametrize(("signal", "way"), [("$OUT[8]", [5.0]), ("$OUT[5] TO $OUT[8]", [5.0, 9.0])])
+def test_a_routine_that_gets_a_signal_sets_the_output(tmp_path, signal, way):
+    (tmp_path / "a.dat").write_text(f"DEFDAT a\nSIGNAL GRIP {signal}\nENDDAT\n")
+    more = "DEF SETIT(S:OUT)\nBOOL S\nS=TRUE\nEND\n"
+    assert sorted(set(joints(tmp_path, f"{GIVEN_OUT}SETIT(GRIP){ASK_OUT}", more))) == pytest.approx(way)
+
+
+def test_a_signal_is_no_point_that_a_data_file_lacks(tmp_path):
+    (tmp_path / "$config.dat").write_text("DEFDAT $CONFIG\nSIGNAL GRIP $OUT[8]\nENDDAT\n")
+    assert "program_data_file_missing" not in codes(check(tmp_path, krl("IF GRIP THEN\nENDIF"), "a.src"))
+
+
 def test_a_signal_of_the_controller_is_known_to_the_modules_that_a_program_calls(tmp_path):
     (tmp_path / "$config.dat").write_text("DEFDAT $CONFIG\nSIGNAL ONE $OUT[8]\nENDDAT\n")
     (tmp_path / "sets.src").write_text("DEF sets( )\nONE=TRUE\nEND\n")
@@ -605,6 +625,14 @@ def test_a_routine_that_nobody_calls_counts_where_other_modules_see_it(tmp_path,
     (tmp_path / "lib.src").write_text(f"DEF lib( )\nEND\n{'' if own else more}")
     found = codes(check(tmp_path, krl("lib( )\nPTP {A1 GZ}", more if own else ""), "a.src"))
     assert ("set_elsewhere" in found) == told
+
+
+@pytest.mark.parametrize(("name", "code"), [("sps.sub", "target_not_given"), ("other.src", "set_elsewhere")])
+def test_what_a_called_module_declares_for_all_may_be_set_by_others(tmp_path, name, code):
+    (tmp_path / "lib.dat").write_text(CONFIG.replace("$CONFIG", "LIB"))
+    (tmp_path / "lib.src").write_text("DEF lib( )\nEND\n")
+    (tmp_path / name).write_text(f"DEF {name[:-4]}( )\nGZ=30.0\nEND\n")
+    assert code in codes(check(tmp_path, krl("lib( )\nPTP {A1 GZ}"), "a.src"))
 
 
 @pytest.mark.parametrize("line", ["$OUT[7]=$IN[3]", "PULSE($OUT[7],TRUE,0.5)", "USERPLC( )"])
@@ -764,6 +792,21 @@ def test_modules_anywhere_in_an_archive_are_read(tmp_path, folder):
     (place / "user_grp.src").write_text("GLOBAL DEF USER_GRP(N:IN)\nINT N\nPTP {A1 N}\nEND\n")
     (place / "own.src").write_text("DEF own( )\nPTP {A1 9}\nEND\n")
     assert joints(program, "USER_GRP(5)\nown( )") == [5.0, 9.0]
+
+
+@pytest.mark.parametrize(("folder", "read"), [("Program/lib", True), ("System", False), ("TP/Sync", False)])
+def test_a_users_module_of_the_name_of_a_controllers_own_is_read(tmp_path, folder, read):
+    for each in ("Program/x", "System", folder):
+        (tmp_path / each).mkdir(parents=True, exist_ok=True)
+    (tmp_path / folder / "sync.src").write_text("DEF SYNC( )\nPTP {A1 9}\nEND\n")
+    assert joints(tmp_path / "Program/x", "SYNC( )\nPTP {A1 5}") == ([9.0, 5.0] if read else [5.0])
+
+
+def test_an_archive_is_known_however_its_letters_are_written(tmp_path):
+    for each in ("PROGRAM/x", "PROGRAM/y", "SYSTEM"):
+        (tmp_path / each).mkdir(parents=True)
+    (tmp_path / "PROGRAM/y/own.src").write_text("DEF own( )\nPTP {A1 9}\nEND\n")
+    assert joints(tmp_path / "PROGRAM/x", "own( )") == [9.0]
 
 
 def test_a_folder_that_is_no_archive_is_not_searched(tmp_path):
