@@ -635,6 +635,21 @@ def test_what_a_called_module_declares_for_all_may_be_set_by_others(tmp_path, na
     assert code in codes(check(tmp_path, krl("lib( )\nPTP {A1 GZ}"), "a.src"))
 
 
+@pytest.mark.parametrize("frames", [{}, {"BASE_DATA[3]": np.eye(4)}])
+@pytest.mark.parametrize("own", ["", "BASE_DATA[5]=$NULLFRAME\n"])
+def test_a_base_that_a_submit_program_sets_is_not_known(tmp_path, own, frames):
+    (tmp_path / "$config.dat").write_text("DEFDAT $CONFIG\nBASE_DATA[3]={X 0,Y 0,Z 0,A 0,B 0,C 0}\nENDDAT\n")
+    (tmp_path / "sps.sub").write_text("DEF SPS( )\nBASE_DATA[3].Y=$ANIN[1]\nEND\n")
+    body = f"{FRAMES}{SPEEDS}{own}$BASE=BASE_DATA[3]\nLIN {POSE % 0}"
+    assert "frame_not_given" in codes(check(tmp_path, krl(body), "a.src", frames=frames))
+
+
+def test_the_programs_number_is_not_known_after_p00(tmp_path):
+    (tmp_path / "$config.dat").write_text("DEFDAT $CONFIG\nINT PGNO=0\nENDDAT\n")
+    body = "P00(#EXT_PGNO,#PGNO_GET,DMY[],0)\nSWITCH PGNO\nCASE 1\nPTP {A1 5}\nDEFAULT\nPTP {A1 9}\nENDSWITCH"
+    assert sorted(joints(tmp_path, body)) == pytest.approx([5.0, 9.0])
+
+
 @pytest.mark.parametrize("line", ["$OUT[7]=$IN[3]", "PULSE($OUT[7],TRUE,0.5)", "USERPLC( )"])
 def test_what_a_submit_program_makes_of_outputs_is_not_known(tmp_path, line):
     (tmp_path / "sps.sub").write_text(f"DEF SPS( )\nLOOP\n{line}\nENDLOOP\nEND\n")
@@ -693,6 +708,67 @@ def test_arcs_that_turn_with_their_path_are_named_where_the_controller_s_data_sa
 def test_commands_and_loads_on_the_arm_are_no_pass(tmp_path, line):
     found = check(tmp_path, krl(f"{line}\nPTP {{A1 5}}"), "a.src")
     assert any(each.level == "caution" and each.place.line == 2 for each in found.findings)
+
+
+@pytest.mark.parametrize(
+    ("before", "ask", "ways"),
+    [
+        ("ON_ERROR_PROCEED\nR=STRTOINT(S[],N)", "$ERR.NUMBER==0", [5.0, 9.0]),
+        ("", "$ERR.NUMBER==0", [5.0]),
+        ("PTP {A1 20}", "$AXIS_ACT.A1>=20", [5.0, 9.0]),
+        ("PTP {A1 20}", "$AXIS_ACT.A1>=19.9", [5.0]),
+        ("$SOFT_PLCBOOL[1]=FALSE", "$SOFT_PLCBOOL[1]", [5.0, 9.0]),
+        ("STOP=1", "STOP==1", [5.0]),
+    ],
+)
+def test_what_the_controller_may_have_otherwise_does_not_decide(tmp_path, before, ask, ways):
+    body = f"PTP {axes(HOME)}\n{before}\nIF {ask} THEN\nPTP {{A1 5}}\nELSE\nPTP {{A1 9}}\nENDIF"
+    assert sorted({*np.round(joints(tmp_path, body), 6)} & {5.0, 9.0}) == ways
+
+
+def test_bas_asks_for_an_error_that_is_none(tmp_path):
+    asking = "ON_ERROR_PROCEED\nR=N\nIF $ERR.NUMBER==0 THEN\nPTP {A1 5}\nELSE\nPTP {A1 9}\nENDIF"
+    (tmp_path / "bas.src").write_text(f"DEF BAS(WHAT:IN,N:IN)\n{asking}\nEND\n")
+    assert joints(tmp_path, "ON_ERROR_PROCEED\nBAS(#INITMOV,0)") == [5.0]
+
+
+@pytest.mark.parametrize(
+    ("lines", "told"),
+    [
+        ("$IPO_MODE=UNKNOWN", "target_not_given"),
+        ("$VEL=UNKNOWN", "speed_not_given"),
+        ("$ACC=UNKNOWN", "acceleration_not_known"),
+        ("$APO=UNKNOWN", "zone_without_size"),
+        ("BAS(#FRAMES)", "frame_not_given"),
+        ("LDAT_ACT=UNKNOWN\nBAS(#CP_DAT)", "turn_not_followed"),
+        ("LDAT_ACT={VEL 0.1,ACC 10,APO_DIST UNKNOWN,ORI_TYP #VAR}\nBAS(#CP_DAT)", "zone_without_size"),
+        ('RET=EKI_GETFRAME("A","B",$BASE)', "frame_not_given"),
+    ],
+)
+def test_a_setting_of_unknown_value_is_not_the_one_before(tmp_path, lines, told):
+    line = f"LIN {POSE % 0} C_DIS\nLIN {POSE % 5}"
+    for before, found in (("", False), (lines, True)):
+        text = krl(f"{FRAMES}{SPEEDS}$IPO_MODE=#BASE\n$APO.CDIS=1\n$ORI_TYPE=#VAR\n{before}\n{line}")
+        assert (told in codes(check(tmp_path, text, "a.src"))) == found
+
+
+@pytest.mark.parametrize(
+    ("setting", "following", "told"),
+    [
+        ("$APO={CDIS 5,CORI 5}", f"LIN {POSE % 0} C_ORI\nLIN {POSE % 5}", "zone_without_size"),
+        ("$ACC_AXIS[1]=SACC_JOINT(UNKNOWN)", "", "acceleration_not_known"),
+        ("$LOAD=SLOAD(3)", "", "load_not_examined"),
+    ],
+)
+def test_what_stands_after_with_counts_and_for_its_motion_alone(tmp_path, setting, following, told):
+    load = "LOAD_DATA[3]={M 2,CM {X 0,Y 0,Z 0,A 0,B 0,C 0},J {X 0,Y 0,Z 0}}"
+    found = with_data(tmp_path, f"SPTP {axes(NEAR)} WITH {setting}\n{following}", load)
+    assert told in codes(found)
+
+
+@pytest.mark.parametrize("target", ["{X 400,Y 0,Z 300,A 0,B 180,C 0,Q 5}", "{A1 5,A7 90}"])
+def test_a_position_with_fields_that_none_has_is_none(tmp_path, target):
+    assert "target_not_given" in codes(check(tmp_path, krl(f"{FRAMES}{SPEEDS}PTP {target}"), "a.src"))
 
 
 @pytest.mark.parametrize("kind", ["", "FRAME "])

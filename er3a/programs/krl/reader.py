@@ -130,7 +130,7 @@ PTP LIN CIRC PTP_REL LIN_REL CIRC_REL SPTP SLIN SCIRC SPL SPTP_REL SLIN_REL SCIR
 """
 MOTIONS = frozenset(WORDS_OF_MOTIONS.split())
 WORDS_ASIDE = """
-EXT EXTFCT IMPORT ENUM CONTINUE ANOUT BRAKE CONST_VEL ON_ERROR_PROCEED STOP
+EXT EXTFCT IMPORT ENUM CONTINUE ANOUT BRAKE CONST_VEL STOP
 """
 ASIDES = frozenset(WORDS_ASIDE.split())
 WITH_VALUES = frozenset(["ANOUT", "CONST_VEL", "STOP"])  # of these
@@ -201,7 +201,7 @@ class _Statement:
         elif first in HANDLERS and words.texts[words.at + 1] != "=":
             words.take()
             HANDLERS[first](self)
-        elif first in ASIDES:
+        elif first in ASIDES and words.texts[words.at + 1] != "=":
             _aside(self)
         elif first in OUTER_AXES:
             self.builder.unknown(self.place, self.text, may_move=False)
@@ -463,6 +463,13 @@ def _structure(reading: _Statement) -> None:
     reading.builder.add(syntax.Assign(reading.place, syntax.Variable(f"{STRUCTURE}{name}"), shape, reading.text))
 
 
+def _on_error_proceed(reading: _Statement) -> None:
+    """The next line may fail, and the program goes on; in the controller's bas.src it asks what is there, and it is."""
+    number: syntax.Value = 0 if is_basics(reading.place.file or Path()) else syntax.Unclear("$ERR.NUMBER")
+    target, value = syntax.Variable("$ERR.NUMBER"), syntax.Constant(number)
+    reading.builder.add(syntax.Assign(reading.place, target, value, reading.text))
+
+
 def _goto(reading: _Statement) -> None:
     reading.builder.goto(reading.place, reading.words.name())
 
@@ -497,6 +504,7 @@ HANDLERS: dict[str, Handler] = {
     "INTERRUPT": _interrupt,
     "STRUC": _structure,
     "TRIGGER": _do,
+    "ON_ERROR_PROCEED": _on_error_proceed,
     "RESUME": lambda reading: reading.builder.unknown(reading.place, reading.text),  # the arm stops where it is
     "SPLINE": lambda reading: _spline(reading),
     "PTP_SPLINE": lambda reading: _spline(reading),
