@@ -609,6 +609,7 @@ class Settings(NamedTuple):
     speed: instructions.Rate | None
     acceleration: instructions.Rate | None
     zone: instructions.Zone
+    entry: instructions.Zone
     load: instructions.Load | None
 
 
@@ -814,7 +815,7 @@ class KrlDialect(Dialect):
     def _motion(self, memory: ProgramMemory, move: syntax.Move, angle: float | None) -> instructions.ArmMotion:
         plain = move.form.removesuffix("_REL")
         kind = KINDS[plain.removeprefix("S") if plain != "SPL" else plain]
-        tool, base, speed, acceleration, zone, load = _settings(memory, kind, move)
+        tool, base, speed, acceleration, zone, entry, load = _settings(memory, kind, move)
         values = [self._argument(memory, each) for each in move.arguments]
         if len(values) != (2 if kind == "arc" else 1):
             values = [UNREAD, UNREAD]
@@ -849,6 +850,7 @@ class KrlDialect(Dialect):
             turning=(None, None) if kind == "joint" else (_turning(memory, "ORI1"), _turning(memory, "ORI2")),
             turns=self._turns(memory, kind),
             load=load,
+            entry=entry,
         )
 
     def _turns(self, memory: ProgramMemory, kind: instructions.MotionKind) -> str:
@@ -947,6 +949,7 @@ def _settings(memory: ProgramMemory, kind: instructions.MotionKind, move: syntax
             _speed(memory, kind),
             _acceleration(memory, kind),
             _zone(memory, kind, move.words),
+            _zone(memory, kind, ("C_PTP",) if kind == "joint" else ("C_DIS",)),
             _load(memory),
         )
         memory.kept[key] = found
@@ -987,9 +990,12 @@ def _axis_share(memory: ProgramMemory, name: str) -> instructions.Rate | None:
 
 
 def _zone(memory: ProgramMemory, kind: instructions.MotionKind, words: tuple[str, ...]) -> instructions.Zone:
-    word = next((word for word in words if word.startswith("C_")), None)
-    if word is None:
+    given = [word for word in words if word.startswith("C_")]
+    if not given:
         return instructions.FINE
+    word = given[0]
+    if kind == "joint" and {"C_ORI", "C_VEL"}.intersection(given):  # which hold on the line or arc after it
+        return instructions.Zone("named", 0.0, " ".join(given))
     distance, joint_zone = syntax.number(memory.read("$APO.CDIS")), memory.read("$APO.CPTP")
     share = syntax.number(joint_zone)
     if (word == "C_PTP" or (word == "C_SPL" and kind == "joint")) and share is not None:
