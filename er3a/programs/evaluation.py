@@ -128,7 +128,7 @@ def same(a: NamedFrame, b: NamedFrame) -> bool:
     return a.name == b.name and a.pose is None and b.pose is None
 
 
-WITH_FIELDS = ("$VEL", "$ACC", "$APO")
+WITH_FIELDS = {"$APO": ("CDIS", "CPTP", "CORI", "CVEL")} | dict.fromkeys(("$VEL", "$ACC"), ("CP", "ORI1", "ORI2"))
 """KRL variables whose fields are looked up by their full names, however they were set."""
 
 HELD_BESIDE = "%beside"
@@ -421,8 +421,10 @@ class ProgramMemory:
         self.kept.clear()
         if self.doubts:
             self.doubts.pop(name, None)
-        if name in WITH_FIELDS and isinstance(value, syntax.Record):
-            self.shared.update({f"{name}.{field}": part for field, part in value.items})
+        if name in WITH_FIELDS:
+            unknown = tuple((field, syntax.Unclear(f"{name}.{field}")) for field in WITH_FIELDS[name])
+            parts = value.items if isinstance(value, syntax.Record) else unknown
+            self.shared.update({f"{name}.{field}": part for field, part in parts})
         if local or (self.local and root(name) in self.local):
             handed = self.local.get(HELD_BESIDE, ())
             self.local[name] = syntax.Unclear(name) if isinstance(handed, tuple) and root(name) in handed else value
