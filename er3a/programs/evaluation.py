@@ -654,10 +654,11 @@ class ProgramMemory:
         for side in (left, right):
             if isinstance(side, syntax.Unclear):
                 return side
-        if self._too_near(sign, left, right):
-            return syntax.Unclear(f"{left:.9g} {sign} {right:.9g}, which rounding decides on the controller")
         if sign in ("==", "=", "<>", "!="):
-            return (left == right) == (sign in ("==", "="))
+            same = self._equal(left, right)
+            return same == (sign in ("==", "=")) if isinstance(same, bool) else same
+        if self._too_near(sign, left, right):
+            return _decided_by_rounding(sign, left, right)
         if sign in BITWISE:
             return (
                 BITWISE[sign](left, right)
@@ -667,6 +668,22 @@ class ProgramMemory:
         if sign in EXCLUSIVE and isinstance(left, bool) and isinstance(right, bool):
             return left != right
         return self._computed(sign, left, right)
+
+    def _equal(self, left: syntax.Value, right: syntax.Value) -> bool | syntax.Unclear:
+        """Whether two values are equal; unclear if that rests on a part which is unclear or near enough to be equal."""
+        for side in (left, right):
+            if isinstance(side, syntax.Unclear):
+                return side
+            if isinstance(side, syntax.Solved):  # which only the arm's table gives
+                return syntax.Unclear(syntax.shown(side))
+        if self._too_near("==", left, right):
+            return _decided_by_rounding("==", left, right)
+        parts = _parts(left), _parts(right)
+        if not parts[0] or not parts[1] or parts[0].keys() != parts[1].keys():
+            return left == right
+        found = [self._equal(parts[0][key], parts[1][key]) for key in parts[0]]
+        unclear = next((each for each in found if isinstance(each, syntax.Unclear)), True)
+        return unclear if all(each is not False for each in found) else False
 
     def _too_near(self, sign: str, left: syntax.Value, right: syntax.Value) -> bool:
         """Whether two numbers that are compared differ by no more than what rounding, or measuring, may miss."""
@@ -730,6 +747,17 @@ def root(name: str) -> str:
     dot, bracket = name.find("."), name.find("[")
     ends = [at for at in (dot, bracket) if at > 0]
     return name[: min(ends)] if ends else name
+
+
+def _parts(value: syntax.Value) -> dict[str, syntax.Value]:
+    """The parts of a list or record, by place or name; empty of other values."""
+    if isinstance(value, syntax.Record):
+        return {f"{value.kind} {key}": each for key, each in value.items}
+    return {str(i): each for i, each in enumerate(value)} if isinstance(value, tuple) else {}
+
+
+def _decided_by_rounding(sign: str, left: syntax.Value, right: syntax.Value) -> syntax.Unclear:
+    return syntax.Unclear(f"{left:.9g} {sign} {right:.9g}, which rounding decides on the controller")
 
 
 def _whole(name: str | None) -> str:
