@@ -58,6 +58,13 @@ class FormInferred(Finding, code="program_form_inferred"):
     place: Place
 
 
+class JointSpeedInferred(Finding, code="program_joint_speed_inferred"):
+    """A joint motion at a speed of the tool, for which no source says how long it takes; the first of a program."""
+
+    word: str
+    place: Place
+
+
 class OtherEncoding(Finding, code="program_other_encoding"):
     """The text is not UTF-8; it was read as ``encoding``."""
 
@@ -82,6 +89,7 @@ ProgramFinding = (
     | NotUnderstood
     | NotSimulated
     | FormInferred
+    | JointSpeedInferred
     | OtherEncoding
     | RowsFromRest
     | NothingMoves

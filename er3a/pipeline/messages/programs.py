@@ -94,6 +94,7 @@ REMEDIES: dict[str, str] = {
     "program_not_understood": BY_HAND,
     "program_not_simulated": N_("Check on the controller what this instruction does to the motions after it."),
     "program_form_inferred": N_("Compare this element with what the controller does."),
+    "program_joint_speed_inferred": N_("Give the speed of joint motions in percent (v50perc)."),
     "external_axes_left_out": N_("Check by hand that the external axes stand as assumed."),
     "frame_not_given": N_("Map the name to a frame under frames in the file that lists the programs."),
     "frame_taken_as_flange": N_(
@@ -434,6 +435,10 @@ TEXTS = texts(
             "follows it as one motion)"
         ),
         "program_form_inferred": "the structure of <{element}> is not documented; it was read like that of <while>",
+        "program_joint_speed_inferred": (
+            "how long joint motions at speeds of the tool ('{word}') take is not documented; as long as the tool's "
+            "straight way at that speed was assumed"
+        ),
         "program_other_encoding": "the file is not UTF-8; it was read as {encoding}",
         "program_nothing_moves": "no instruction moves the arm",
         "load_not_examined": "{mass_kg:g} kg on the flange from here on; torques with this load are not examined",
