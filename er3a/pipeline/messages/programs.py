@@ -464,6 +464,11 @@ TEXTS = texts(
             "{count} speed above 100 % written as 100 %",
             "{count} speeds above 100 % written as 100 %",
         ),
+        "written_speeds_raised": Plural(
+            "motions",
+            "{count} speed below the least that has a name, which was taken: faster than what was checked",
+            "{count} speeds below the least that has a name, which was taken: faster than what was checked",
+        ),
         "written_speeds_of_assumed": Plural(
             "motions",
             "{count} speed written with an assumed {assumed} as 100 %: the controller's 100 % may be far from that",
@@ -471,8 +476,8 @@ TEXTS = texts(
         ),
         "written_half_turns_split": Plural(
             "lines",
-            "{count} line that turns the tool by 180 deg written in two halves, which fixes the sense",
-            "{count} lines that turn the tool by 180 deg written in two halves, which fixes the sense",
+            "{count} line or arc that turns the tool by 180 deg written in two halves, which fixes the sense",
+            "{count} lines or arcs that turn the tool by 180 deg written in two halves, which fixes the sense",
         ),
         "written_targets_left_out": Plural(
             "motions",
