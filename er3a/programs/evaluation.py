@@ -678,6 +678,8 @@ class ProgramMemory:
                 return syntax.Unclear(syntax.shown(side))
         if self._too_near("==", left, right):
             return _decided_by_rounding("==", left, right)
+        if _sort(left) is not _sort(right):  # which languages refuse, or convert
+            return syntax.Unclear(f"{syntax.shown(left)} == {syntax.shown(right)}")
         parts = _parts(left), _parts(right)
         if not parts[0] or not parts[1] or parts[0].keys() != parts[1].keys():
             return left == right
@@ -747,6 +749,11 @@ def root(name: str) -> str:
     dot, bracket = name.find("."), name.find("[")
     ends = [at for at in (dot, bracket) if at > 0]
     return name[: min(ends)] if ends else name
+
+
+def _sort(value: syntax.Value) -> type:
+    """The type of a value; whole numbers and others are one."""
+    return float if syntax.number(value) is not None else type(value)
 
 
 def _parts(value: syntax.Value) -> dict[str, syntax.Value]:

@@ -491,6 +491,9 @@ def test_a_list_that_a_method_within_an_expression_changes_is_not_the_old_one(tm
         ("[read_input_float_register(0), 1] == [2, 1]", True),
         ("[read_input_float_register(0), 1] == [2, 3]", False),
         ("[1, 2] == [1, 2, 3]", False),
+        ("[True] == [1]", True),
+        ("True == 1", True),
+        ("1 == 1.0", False),
         (f"get_inverse_kin(get_actual_tool_flange_pose()) == {HOME_TEXT}", True),
     ],
 )
