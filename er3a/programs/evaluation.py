@@ -181,7 +181,7 @@ def computed_in_single(sign: str, left: syntax.Value, right: syntax.Value, found
         case "+" | "-":
             passed = sum(errors)
         case _:
-            passed = math.inf
+            passed = _passed_on(ARITHMETIC.get(sign, operator.pow), (left, right), found)
     return Rounded(found, passed + abs(found) * SINGLE)
 
 
@@ -191,17 +191,26 @@ def function_in_single(function: Callable[..., float], arguments: Sequence[synta
     Raises
     ------
     ValueError, OverflowError, ZeroDivisionError
-        as the function does
+        as the function does; ValueError also of a whole number that rounding may make another
     """
-    plain = [syntax.number(each) or 0.0 for each in arguments]
-    found, passed = float(function(*plain)), 0.0
+    found = function(*(syntax.number(each) or 0.0 for each in arguments))
+    passed = _passed_on(function, arguments, found)
+    if isinstance(found, int) and passed >= 0.5:
+        raise ValueError("rounding decides")
+    found = float(found)
+    return Rounded(found, passed + 4 * SINGLE * max(abs(found), 1.0)) if passed or missed_by(found) else found
+
+
+def _passed_on(function: Callable[..., float], arguments: Sequence[syntax.Value], found: float) -> float:
+    """How far off the value of a function may be for what single precision may make of its arguments."""
+    plain, passed = [syntax.number(each) or 0.0 for each in arguments], 0.0
     for i, off in enumerate(map(missed_by, arguments)):
         for beside in (plain[i] - off, plain[i] + off) if off else ():
             try:
                 passed = max(passed, abs(function(*plain[:i], beside, *plain[i + 1 :]) - found))
             except (ValueError, OverflowError, ZeroDivisionError):  # beside its domain, or its pole
                 passed = math.inf
-    return Rounded(found, passed + 4 * SINGLE * max(abs(found), 1.0)) if passed or missed_by(found) else found
+    return passed
 
 
 COMPARISONS: Mapping[str, Callable[[float, float], bool]] = {
@@ -719,7 +728,9 @@ class ProgramMemory:
         if whole and isinstance(found, (int, float)) and abs(found) > self.functions.most_whole:
             return syntax.Unclear(f"{a:.0f} {sign} {b:.0f}, beyond what a whole number holds")
         if self.functions.single_precision and isinstance(found, float):
-            return computed_in_single(sign, left, right, found)
+            in_single = computed_in_single(sign, left, right, found)
+            jumps = sign in ("%", "MOD") and missed_by(in_single) > abs(b) / 2
+            return _decided_by_rounding(sign, left, right) if jumps else in_single
         return found
 
     def _combined(self, sign: str, a: float, b: float, whole: bool) -> syntax.Value:

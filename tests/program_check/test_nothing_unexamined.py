@@ -115,6 +115,11 @@ def test_the_first_of_several_routines_that_no_other_calls_is_the_program_and_th
     assert [(each.place.line, each.what) for each in found.not_examined] == [(9, "motion")]
 
 
+def test_a_secondary_program_is_not_the_program(tmp_path):
+    text = f"sec s():\n  set_digital_out(1, True)\nend\ndef a():\n  movej({NEAR_TEXT})\nend\n"
+    assert codes(check(tmp_path, text)) == {}
+
+
 def test_a_routine_that_calls_itself_can_be_the_program(tmp_path):
     found = check(tmp_path, f"def Main():\n  movej({NEAR_TEXT})\n  Main()\nend\n")
     assert "not_followed_to_end" in codes(found)

@@ -337,7 +337,7 @@ class _UrReader:
         words.finish()
         if len(self.open) > 50:
             raise fault(place, "more than 50 routines within each other", "Nest fewer")
-        self.open.append(CodeBuilder(name, tuple(parameters), place, thread=kind == "thread"))
+        self.open.append(CodeBuilder(name, tuple(parameters), place, thread=kind in ("thread", "sec")))
 
     def _close(self, builder: CodeBuilder, place: Place) -> None:
         if builder.blocks:
