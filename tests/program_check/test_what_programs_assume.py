@@ -168,6 +168,15 @@ def test_what_changes_every_motion_until_it_is_ended_stays_in_doubt_until_then(t
     assert codes(check(tmp_path, text, "a.script"))["frames_in_doubt"] == [3, 4]
 
 
+def test_where_force_mode_leads_the_arm_is_not_known(tmp_path):
+    begin = "force_mode(p[0,0,0,0,0,0],[0,0,1,0,0,0],[0,0,10,0,0,0],2,[1,1,1,1,1,1])"
+    read = "q = get_actual_joint_positions()"
+    text = f"{begin}\nset_tcp(p[0,0,0,0,0,0])\nmovej({HOME_TEXT})\n{read}\nend_force_mode()\nmovej({NEAR_TEXT})\n"
+    found = codes(check(tmp_path, f"{text}movej(q)\n", "a.script"))
+    assert found["way_not_known"] == [3, 6]
+    assert found["target_not_given"] == [7]
+
+
 LIFT = f"if here[2] > 0.3:\n movej({NEAR_TEXT})\nend\nmovej({HOME_TEXT})"
 ROBOT_TCP = "set_tcp(p[0,0,0,0,0,0])"
 
