@@ -467,6 +467,9 @@ def in_doubt(kind: str, content: dict, confirmed: bool) -> dict:
     elif kind == "carried":
         box = {"name": "gripper", "size_mm": [50, 50, 90], "xyz_mm": [0, 0, 50], "rpy_deg": radians}
         content["carried"] = {"boxes": [box]}
+    elif kind == "hulls":
+        points = [[x, y, z] for x in (-0.05, 0.05) for y in (-0.05, 0.05) for z in (0, 0.3)]
+        content["envelopes"]["hulls"] = [{"link": 4, "points_mm": points}]
     elif kind == "targets":
         content["targets"][0] = {"name": "one", "q_deg": [0, -0.52, 0.31, 0, 1.2, 0]}
     elif kind == "paths":
@@ -498,6 +501,7 @@ def in_doubt(kind: str, content: dict, confirmed: bool) -> dict:
         ("targets", "inverse", "targets.yaml: targets[0].q_deg: [0, -0.52, 0.31, 0, 1.2, 0] deg"),
         ("paths", "trajectory", "paths.yaml: paths[0].end_deg: [0, -0.52, 0.31, 0, 1.2, 0] deg"),
         ("robot", "inverse", f"{ROBOT}.yaml: tool.xyz_mm: [0.0, 0.0, 0.3] mm"),
+        ("hulls", "trajectory", f"{ROBOT}.yaml: envelopes.hulls[0].points_mm: 0.3 mm at most"),
         ("masses", "dynamics", f"{ROBOT}.yaml: inertia.links[1].centre_mm: [0.15, 0.0, 0.0] mm"),
         ("masses", "trajectory", ""),
         ("base", "trajectory", f"study.yaml: robots.{ROBOT}.base.xyz_mm: [0.0, 0.0, 0.3] mm"),
@@ -518,7 +522,7 @@ def test_a_number_that_looks_like_another_unit_is_no_pass_where_it_is_read(
         "robot": f"data/robots/{ROBOT}.yaml",
         "study": "config/small.yaml",
     }
-    of = {"carried": "scene", "masses": "robot"}.get(kind, kind if kind in sources else "study")
+    of = {"carried": "scene", "masses": "robot", "hulls": "robot"}.get(kind, kind if kind in sources else "study")
     files = {each: tmp_path / f"{ROBOT if each == 'robot' else each}.yaml" for each in sources}
     for each, source in sources.items():
         content = yaml.safe_load(Path(source).read_text(encoding="utf-8"))
