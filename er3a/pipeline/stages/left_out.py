@@ -95,16 +95,20 @@ def left_out_of_units(doubts: Sequence[DoubtfulUnit]) -> tuple[LeftOut, ...]:
     return (LeftOut("units", names),) if places else ()
 
 
+def left_out_of_limits(robot: Robot) -> tuple[LeftOut, ...]:
+    """That limits of joints are assumed, with what the robot's file says of them."""
+    found = robot.sources.get("limits")
+    return (LeftOut("own_limits", (found.source,)),) if found and found.grade == "inferred" else ()
+
+
 OWN_VALUES = ("dh", "zero", "speeds", "coupling", "base", "flange", "tool")
 
 
-def left_out_of_assumed(robot: Robot, replaced: Collection[str] = ()) -> tuple[LeftOut, ...]:
-    """That values of the robot's file are assumed: limits of joints with what the file says of them, other groups by
-    their names, without those that the study has ``replaced``."""
-    assumed = {group: source for group, source in robot.sources.items() if source.grade == "inferred"}
-    limits = (LeftOut("own_limits", (assumed["limits"].source,)),) if "limits" in assumed else ()
-    others = tuple(group for group in OWN_VALUES if group in assumed and group not in replaced)
-    return (*limits, *((LeftOut("own_values", others),) if others else ()))
+def left_out_of_values(robot: Robot, replaced: Collection[str]) -> tuple[LeftOut, ...]:
+    """Other groups of the robot's file that are assumed, without those that the study has ``replaced``."""
+    assumed = [group for group in OWN_VALUES if group in robot.sources and robot.sources[group].grade == "inferred"]
+    names = tuple(group for group in assumed if group not in replaced)
+    return (LeftOut("own_values", names),) if names else ()
 
 
 def left_out_in_solids(scene: Scene | None, places: Iterable[tuple[str, Reals, float]]) -> tuple[LeftOut, ...]:
