@@ -62,7 +62,7 @@ TEXTS = texts(
         "left_out.scene_shapes": "whether what stands in the cell is shaped and placed as the scene's file says",
         "left_out.shallow_overlaps": "overlaps of less than {amount:g} mm between the points measured",
         "left_out.own_limits": "the joints' real limits: the robot's file assumes all or some of them",
-        "left_out.own_values": "whether these values are the arm's: the robot's file assumes them (grade: inferred)",
+        "left_out.own_values": "whether these values are the arm's: the robot's file grades them as inferred",
         "left_out.own_speeds": "the joints' real speeds: no document gives them, so speeds are assumed",
         "left_out.own_accelerations": (
             "the joints' real accelerations: no document gives them, so accelerations are assumed"
