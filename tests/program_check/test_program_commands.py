@@ -229,6 +229,19 @@ def test_paths_are_written_and_unsafe_ones_refused(tmp_path):
     assert read_program(tmp_path / "line_clean.src").findings == ()
 
 
+def test_a_program_settles_what_its_path_leaves_open(tmp_path):
+    """The half turn is written as two halves, and the first pose is gone to by its joints."""
+    start, end = (f"{{xyz_mm: [400, {y}, 400], rpy_deg: [180, 0, {yaw}]}}" for y, yaw in ((0, 0), (60, 180)))
+    (tmp_path / "paths.yaml").write_text(
+        "kind: paths\npaths:\n  - {name: turn, title: Turn, kind: line, samples: 30, duration_s: 6, "
+        f"start: {start}, end: {end}}}\n"
+    )
+    words = ("program", "write", str(tmp_path / "paths.yaml"), "--robot", "er3a_c60", "--language", "krl")
+    done = run(*words, "--output", str(tmp_path))
+    assert done.exit_code == 0, done.stderr
+    assert (tmp_path / "turn.src").is_file()
+
+
 def test_a_program_is_written_as_the_paths_of_its_stretches(tmp_path):
     paths = tmp_path / "paths.yaml"
     paths.write_text(

@@ -455,6 +455,10 @@ def listed_motions(
             )
 
 
+CHOSEN: tuple[LeftOutSubject, ...] = ("half_turns", "start_branches", "arm_angles")
+"""What a path leaves open, and a program that is written of it settles."""
+
+
 def _chosen(robot: Robot, motion: Motion) -> Iterator[LeftOutSubject]:
     """What a path of the tool leaves open, and was chosen here."""
     built = motion.built
