@@ -210,6 +210,11 @@ LeftOutSubject = Literal[
     "places_in_solids",
     "units",
     "own_limits",
+    "own_values",
+    "joined_whole",
+    "half_turns",
+    "arm_angles",
+    "start_branches",
 ]
 
 NEVER_A_PASS: frozenset[LeftOutSubject] = frozenset(
@@ -224,6 +229,7 @@ NEVER_A_PASS: frozenset[LeftOutSubject] = frozenset(
             "program_findings",
             "given_rates",
             "missed_rows",
+            "half_turns",
             "other_gravity",
         ),
         *("arm_errors", "objects_out_of_view", "hidden_voids", "orientations", "base_inside", "places_in_solids"),
