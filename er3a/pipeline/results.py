@@ -201,6 +201,7 @@ LeftOutSubject = Literal[
     "allowed_contacts",
     "bare_tool",
     "arm_errors",
+    "contradicted_table",
     "objects_out_of_view",
     "hidden_voids",
     "orientations",
@@ -227,7 +228,7 @@ NEVER_A_PASS: frozenset[LeftOutSubject] = frozenset(
             "other_gravity",
         ),
         *("arm_errors", "objects_out_of_view", "hidden_voids", "orientations", "base_inside", "places_in_solids"),
-        *("units", "own_limits"),
+        *("units", "own_limits", "contradicted_table"),
     )
 )
 """What no verdict passes without; the rest bounds what a verdict is about, and stands in the table alone."""
