@@ -33,6 +33,7 @@ from er3a.errors import ResultError
 from er3a.files.annotations import grades_in
 from er3a.files.kept_files import read_bytes, sha256, shown_path, write_atomically
 from er3a.pipeline.messages.language import N_
+from er3a.pipeline.stages.registry import STAGES as REGISTRY
 from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.study import STAGES, Study
 from er3a.pipeline.tables import adapter, table_types
@@ -44,6 +45,7 @@ goes, or gets another name, unit or meaning. What is only added does not raise i
 BESIDE = ("unexamined", "shapes", "missed")
 """What a verdict can have beside its finding."""
 THE_SETTINGS = N_("the study's settings")
+THE_CODE = N_("er3a itself")
 SUMMARY = "summary.json"
 CHECKSUMS = "SHA256SUMS"
 
@@ -519,13 +521,17 @@ def input_records(files: Iterable[Path]) -> tuple[Input, ...]:
 
 
 def changed_since(folder: Path, study: Study, robot: str, stage: str) -> tuple[str, ...]:
-    """What a stage's results rest on otherwise than it is now: files by their content, and the study's settings."""
+    """What a stage's results rest on otherwise than it is now: files by their content, the settings, the code."""
     stored = _record(folder)["provenance"]
     then = {each["path"]: each["sha256"] for each in stored["inputs"]}
     now = {shown_path(file): sha256(file) for file in study.inputs(robot, stage) if file.is_file()}
     changed = [path for path in sorted(then.keys() | now.keys()) if then.get(path) != now.get(path)]
     settings = json.loads(json.dumps(plain(study.computed_from(robot, stage))))
-    return (*changed, *([THE_SETTINGS] if settings != stored["config"] else []))
+    if settings != stored["config"]:
+        changed.append(THE_SETTINGS)
+    if REGISTRY[stage].digest("compute") != stored["code"]:
+        changed.append(THE_CODE)
+    return tuple(changed)
 
 
 def result_records(results: Path, robots: Iterable[str]) -> tuple[Input, ...]:
