@@ -19,6 +19,7 @@ from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.vision.compute import _left_out, figures_of, verdict_of
 from er3a.pipeline.stages.vision.model import VisionResults
 from er3a.pipeline.study import load_study
+from er3a.pipeline.viewing.tray import sound_motions
 from testing.hand_eye_sets import pose
 from testing.on_demand import OnDemand
 from tests.vision.test_boards import CHARUCO, board_places, rendered
@@ -73,6 +74,21 @@ def test_objects_within_the_margin_of_assumed_shapes_count_apart(folders):
         assert (f"{len(near)} more only if" in say(verdict.finding)) == bool(near)
         figures = {each.name: each.value for each in figures_of(summary.calibration, summary.objects, near)}
         assert figures["objects_grasped"] == clear
+
+
+@pytest.mark.long
+def test_only_grasps_that_pass_are_told_to_succeed(folders):
+    results = read_results(folders["er3a_c60"], VisionResults).results
+    verdict, (can, *others) = results.summary.verdict, results.summary.objects
+
+    def told(near=(), expect="grasped"):
+        objects, shapes = (replace(can, expect=expect), *others), replace(verdict.shapes, near=near)
+        summary = replace(results.summary, objects=objects, verdict=replace(verdict, shapes=shapes))
+        return sound_motions(replace(results, summary=summary))
+
+    assert told() == ["can", "box"]
+    assert told(near=("box",)) == ["can"]
+    assert told(expect="not graspable") == ["box"]
 
 
 @pytest.mark.long

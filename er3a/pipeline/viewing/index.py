@@ -625,6 +625,9 @@ def _entry(study: Study, name: str, results: Path, outdated: Outdated) -> dict[s
         "bodies": [each.name for each in scene.solids] if (scene := study.scene(name, "trajectory")) else [],
         "runs": runs,
         "grasped": grasped,
+        "grasps_missed": say(NoPass(missed))
+        if "vision" in computed and (missed := computed["vision"].results.summary.verdict.missed)
+        else "",
         "condition": condition(_parts(heads), getattr(finding, "unbounded", ()), rates := _assumed_rates(heads)),
         "rates": rates,
         "box": joined([_without_box(), placed.compared], " ") if placed else "",
