@@ -585,8 +585,8 @@ def _parsed(path: Path, stored: dict[str, Any], kind: type[Results[Any]]) -> tup
         raise ResultError(path, f"damaged (verdict without {error})") from None
 
 
-JUNIT = "junit.xml"
-OVERALL = ("index.html", "compare.html", JUNIT)
+INDEX, JUNIT = "index.html", "junit.xml"
+OVERALL = (INDEX, "compare.html", JUNIT)
 
 
 def write_checksum(path: Path) -> None:

@@ -24,6 +24,7 @@ from argparse import Namespace
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext, redirect_stderr, suppress
 from dataclasses import dataclass
+from html import escape
 from io import StringIO
 from logging import WARNING, LogRecord
 from pathlib import Path
@@ -37,10 +38,12 @@ from snakemake_interface_logger_plugins.registry import LoggerPluginRegistry
 from snakemake_interface_logger_plugins.settings import LogHandlerSettingsBase
 
 from er3a.errors import Er3aError, ResultError
-from er3a.files.kept_files import ROOT, half_written, read_checked
+from er3a.files.kept_files import ROOT, half_written, read_checked, write_atomically
 from er3a.pipeline import job_server
 from er3a.pipeline.check import check_study
-from er3a.pipeline.results import JUNIT, OVERALL, check_checksum, check_results, checksum_file
+from er3a.pipeline.messages import language
+from er3a.pipeline.messages.language import tr
+from er3a.pipeline.results import INDEX, JUNIT, OVERALL, check_checksum, check_results, checksum_file
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
 from er3a.pipeline.verdicts import write_junit_error
@@ -273,20 +276,37 @@ def run_study(study_file: Path, results: Path, reports: Path, words: Sequence[st
 def _report_error(reports: Path, problem: str) -> None:
     """Have continuous integration find an error, not the verdicts of an earlier run, if it finds a report at all.
 
-    The report gets no checksum, so that the next run makes it again.
+    The index says it first. Both get no checksum, so that the next run makes them again.
     """
-    report = reports / JUNIT
-    if report.is_file():
-        with suppress(Er3aError, OSError):  # what went wrong first is what a person is told
-            checksum_file(report).unlink(missing_ok=True)
-            write_junit_error(problem, report)
+    writers = {reports / JUNIT: write_junit_error, reports / INDEX: write_index_error}
+    for report, write in writers.items():
+        if report.is_file():
+            with suppress(Er3aError, OSError):  # what went wrong first is what a person is told
+                checksum_file(report).unlink(missing_ok=True)
+                write(problem, report)
+
+
+_MAIN, _FAILED = re.compile(r"<main\b[^>]*>"), re.compile(r'<p class="failed-run">.*?</p>\n', re.DOTALL)
+_LANGUAGE = re.compile(r'<html lang="(\w+)"')
+
+
+def write_index_error(problem: str, output: Path) -> None:
+    """Have an index say first that the run after it did not end well, in its language."""
+    page = _FAILED.sub("", output.read_text(encoding="utf-8"))
+    found = _LANGUAGE.search(page)
+    with language.using(found[1] if found and found[1] in language.LANGUAGES else "en"):
+        said = tr("The last run did not end well, so what stands here is of an earlier one: {problem}", problem=problem)
+    told = f'<p class="failed-run"><strong>{escape(said)}</strong></p>\n'
+    page = _MAIN.sub(lambda main: f"{main[0]}\n{told}", page, count=1)
+    write_atomically(output, lambda file: file.write_text(page, encoding="utf-8"))
 
 
 def _run(study_file: Path, results: Path, reports: Path, words: Sequence[str], asked: Namespace, lock: int) -> bool:
     """Check a study and run it; whether all jobs were done."""
     study = check_study(study_file)
-    if not checksum_file(reports / JUNIT).is_file():
-        (reports / JUNIT).unlink(missing_ok=True)
+    for report in (reports / JUNIT, reports / INDEX):
+        if not checksum_file(report).is_file():
+            report.unlink(missing_ok=True)
     for path in (*half_written(results), *half_written(reports)):
         path.unlink()
     for path, fault in corrupted(study, results, reports):
