@@ -6,6 +6,7 @@ import os
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -16,6 +17,7 @@ from er3a.files.kept_files import shown_path
 from er3a.pipeline.results import check_checksum, write_checksum
 from er3a.pipeline.run_study import run_study, write_index_error
 from er3a.pipeline.stages import run
+from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.study import Study
 from er3a.pipeline.verdicts import StageVerdict, read_verdicts, write_junit
@@ -252,6 +254,27 @@ def test_an_index_over_inputs_that_changed_since_says_so_as_verdicts_and_report_
     assert index.count(badge) == 2
     assert 'title="changed since">dynamics (changed since)</a>' in index
     assert etree.parse(tmp_path / "junit.xml").getroot().get("failures") == "1"
+
+
+def test_an_input_that_is_edited_while_a_stage_is_computed_makes_its_verdict_outdated(study, tmp_path, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    paths = tmp_path / "paths.yaml"
+    paths.write_text(Path(study.robots["er3_600"].paths).read_text(encoding="utf-8"), encoding="utf-8")
+    content = study.model_dump()
+    content["robots"]["er3_600"]["paths"] = str(paths)
+    study = Study.model_validate(content)
+    dynamics = STAGES["dynamics"].module("compute")
+    computed = dynamics.compute(study, "er3_600")
+
+    def edited(study: Study, name: str) -> Any:
+        paths.write_text(paths.read_text(encoding="utf-8") + "# later\n", encoding="utf-8")
+        return computed
+
+    for compute, outdated in ((lambda study, name: computed, ()), (edited, (shown_path(paths),))):
+        monkeypatch.setattr(dynamics, "compute", compute)
+        run.compute("dynamics", study, "er3_600", tmp_path / "er3_600/dynamics")
+        (found,) = (each for each in read_verdicts(study, tmp_path) if each.status != "not_examined")
+        assert found.outdated == outdated
 
 
 @pytest.mark.long

@@ -353,8 +353,13 @@ class AbsentResults(Results[Summary]):
     """In place of the results of a stage that was not computed; its verdict is a finding that says why."""
 
 
-def write_results(folder: Path, study: Study, robot: str, stage: Stage, results: Results[Any]) -> None:
-    """Write a stage's tables, summary and checksums into a folder; tables without rows if it was not computed."""
+def write_results(
+    folder: Path, study: Study, robot: str, stage: Stage, results: Results[Any], read: tuple[Input, ...] | None = None
+) -> None:
+    """Write a stage's tables, summary and checksums into a folder; tables without rows if it was not computed.
+
+    ``read``: the inputs as they were before it was computed, as one may be edited meanwhile; by default as they are.
+    """
     kind = AbsentResults if isinstance(results, AbsentResults) else type(results)
     for name, table in table_types(stage.module("model").RESULTS).items():
         rows = table.empty() if kind is AbsentResults else getattr(results, name)
@@ -363,7 +368,7 @@ def write_results(folder: Path, study: Study, robot: str, stage: Stage, results:
     own = {part.name: plain(getattr(summary, part.name)) for part in fields(summary)}
     own["verdict"] = _verdict_record(summary.verdict)
     origin = Provenance(
-        inputs=input_records(study.inputs(robot, stage.name)),
+        inputs=input_records(study.inputs(robot, stage.name)) if read is None else read,
         config=study.computed_from(robot, stage.name),
         seed=study.seed,
         code=stage.digest("compute"),

@@ -569,7 +569,7 @@ def test_a_number_that_looks_like_another_unit_is_no_pass_where_it_is_read(
 
     written = []
     monkeypatch.setattr(STAGES[stage].module("compute"), "compute", passing)
-    monkeypatch.setattr(run, "write_results", lambda *given: written.append(given[-1]))
+    monkeypatch.setattr(run, "write_results", lambda *given: written.append(given[4]))
     run.compute(stage, read, ROBOT, tmp_path)
     (verdict,) = [each.summary.verdict for each in written]
     expected = place and not confirmed
@@ -590,7 +590,7 @@ def test_limits_that_are_assumed_are_no_pass(tmp_path, monkeypatch, grade, statu
     study["robots"] = {ROBOT: study["robots"][ROBOT] | {"file": str(tmp_path / f"{ROBOT}.yaml")}}
     written = []
     passing = Results(Summary(Verdict("pass", NoPass(())), ()))
-    monkeypatch.setattr(run, "write_results", lambda *given: written.append(given[-1].summary.verdict))
+    monkeypatch.setattr(run, "write_results", lambda *given: written.append(given[4].summary.verdict))
     for stage in ("trajectory", "validation"):
         monkeypatch.setattr(STAGES[stage].module("compute"), "compute", lambda study, name: passing)
         run.compute(stage, Study.model_validate(study), ROBOT, tmp_path)
