@@ -136,6 +136,10 @@ def read_dh_table(
     if _far_normals(rows, convention):
         notes.append("d of more than 5 m that cancel: read as a calibrated table, with Hayati's beta in place of them")
     content = _content(rows, given, name, convention, path.name)
+    if convention == "standard" and "convention" not in given:
+        content["dh"]["source"] += ", read as standard D-H, which it does not say"
+    if "direction" not in given and "offset_deg" in given:
+        content["zero"]["source"] += "; it gives no directions: all were assumed as +1"
     if short or 0 < max((length for length, *_ in lengths), default=0.0) < SHORTEST_ARM_MM:
         content["dh"]["calibrated"] = True  # lengths of a millimetre or less are meant
     return parse(RobotFile, content, path), tuple(notes)

@@ -744,6 +744,8 @@ def test_files_that_decide_so_belong_to_the_program(tmp_path):
         (tmp_path / name).write_text("DEF x( )\nEND\n" if name[0] != "$" else "DEFDAT x\nENDDAT\n")
     (tmp_path / "a.src").write_text(krl("PTP {A1 5}"))
     assert {each.name for each in files_of(tmp_path / "a.src")} == {"a.src", *names}
+    (tmp_path / "a.txt").write_text((tmp_path / "a.src").read_text())  # read by what it holds, not by its name
+    assert {each.name for each in files_of(tmp_path / "a.txt")} >= {"a.txt", *names}
 
 
 @pytest.mark.parametrize(
