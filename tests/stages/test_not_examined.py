@@ -1085,7 +1085,7 @@ def test_values_of_the_robots_file_that_are_assumed_are_named(tmp_path, monkeypa
     study["robots"] = {ROBOT: study["robots"][ROBOT] | {"file": str(tmp_path / f"{ROBOT}.yaml")} | (given or {})}
     written = []
     passing = Results(Summary(Verdict("pass", NoPass(())), ()))
-    monkeypatch.setattr(run, "write_results", lambda *given: written.append(given[-1].summary))
+    monkeypatch.setattr(run, "write_results", lambda *given: written.append(given[4].summary))
     monkeypatch.setattr(STAGES["trajectory"].module("compute"), "compute", lambda study, name: passing)
     run.compute("trajectory", Study.model_validate(study), ROBOT, tmp_path)
     assert written[0].verdict.status == "pass"

@@ -12,7 +12,7 @@ from er3a.comparison.mechanism import TOLERANCE_DEG, TOLERANCE_MM
 from er3a.errors import Er3aError
 from er3a.files.dh_table import AngleUnit, LengthUnit
 from er3a.pipeline.commands.options import ROBOT_FILES, AsJson, Xacro, app, print_json, print_note
-from er3a.robots.robot import Convention
+from er3a.robots.robot import Convention, Robot
 
 if TYPE_CHECKING:
     from er3a.comparison.compare import Comparison
@@ -47,8 +47,6 @@ def compare(
     as_json: AsJson = False,
 ):
     """Do A and B describe the same arm? Lists the entries that differ. Exit code 1 if any do."""
-    import numpy as np
-
     from er3a.comparison.compare import best_of
     from er3a.files.arm_file import read_arm, read_arms
     from er3a.files.units import noted_doubts
@@ -81,12 +79,9 @@ def compare(
     )
     name, found = ranked[0]
     notes = [f"{source}: {note}" for source, read in ((a, first), (name, others[name])) for note in read.notes]
+    notes += _apart_by_tools((a, arm), (name, others[name].robot))
     compared = {Path(a).name, Path(name).name}
     doubts = [str(each) for each in doubtful if not (folder.is_dir() and Path(each.file or "").name not in compared)]
-    tool = others[name].robot.tool
-    if not np.allclose(arm.tool, tool, rtol=0.0, atol=TOOLS_EQUAL):
-        apart = 1000 * float(np.linalg.norm(arm.tool[:3, 3] - tool[:3, 3]))
-        notes.append(f"{a} and {name}: tools are not compared; these differ (their points by {apart:.3g} mm)")
     for note in notes:
         print_note(note)
     if output is not None and found.corrected is not None:
@@ -107,6 +102,17 @@ def compare(
                 print(f"{written}: written")
     if found.verdict != "equal":
         raise typer.Exit(1)
+
+
+def _apart_by_tools(one: tuple[str, Robot], other: tuple[str, Robot]) -> list[str]:
+    """That the tools of two arms differ, which are not compared; nothing if they are alike."""
+    import numpy as np
+
+    tools = one[1].tool, other[1].tool
+    if np.allclose(*tools, rtol=0.0, atol=TOOLS_EQUAL):
+        return []
+    apart = 1000 * float(np.linalg.norm(tools[0][:3, 3] - tools[1][:3, 3]))
+    return [f"{one[0]} and {other[0]}: tools are not compared; these differ (their points by {apart:.3g} mm)"]
 
 
 def _print(ranked: list[tuple[str, Comparison]], folder: bool, doubts: list[str]) -> None:
