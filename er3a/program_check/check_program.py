@@ -373,7 +373,7 @@ def _first_met(execution: Execution) -> dict[int, Step]:
 
 def _begun_again(execution: Execution, checker: StepChecker, found: list[LocatedFinding]) -> Iterator[LocatedFinding]:
     """What is found at motions in the second round alone, to which a controller may go on or not."""
-    known = {(each.place, each.finding.code) for each in found}
+    known = {(each.place, each.finding.code) for each in found if each.level in ("caution", "fail")}
     told: dict[Place, list[str]] = {}
     for number, motion in checker.motions.items():
         step = execution.steps[number]

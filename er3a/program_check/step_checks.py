@@ -1167,6 +1167,8 @@ def _key(motion: instructions.ArmMotion) -> Hashable:
     rates = (motion.speed, motion.turn_speed, motion.turning, motion.acceleration)
     return (
         motion.kind,
+        motion.form,
+        motion.spline_block is None,
         targets,
         motion.angle,
         rates,

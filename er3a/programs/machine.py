@@ -693,7 +693,7 @@ class Machine:
         self.numbers = 1  # of ways that were begun, those that joined others too
         self.sides: Counter[tuple[str, int, bool]] = Counter()  # how often each side of a branch was taken
         self.cut: set[instructions.Place] = set()
-        self.waited: set[tuple[str, int]] = set()  # labels of loops that wait for what others change
+        self.waited: set[Hashable] = set()  # states of loops that wait for what others change
         self.first_after: dict[int, int] = {}  # step by the one before it
 
     def run(self) -> Execution:
@@ -1197,17 +1197,17 @@ class Machine:
     def _waits_on(self, way: ExecutionPath, before: int) -> bool:
         """Whether a way that repeats itself without a motion waits for what others change, and goes on behind that.
 
-        What its conditions ask has no known value from here then. That happens once at each place.
+        What its conditions ask has no known value from here then. That happens once in each state.
         """
-        at, place = way.step, (way.frames[-1].routine.name, way.frames[-1].at)
+        at, state = way.step, self._state(way)
         while at > before:
             if isinstance(self.steps[at].instruction, instructions.ArmMotion):
                 return False
             at = self.steps[at].before
-        asked = [] if place in self.waited or not self._leads_to_motion(way) else self._asked_in_loop(way)
+        asked = [] if state in self.waited or not self._leads_to_motion(way) else self._asked_in_loop(way)
         if not asked:
             return False
-        self.waited.add(place)
+        self.waited.add(state)
         self._note(way, asked[0].place, instructions.Pause(condition=asked[0].text, by_others=True))
         for name in {name for each in asked for name in names(each.condition)}:
             way.memory.forget(name)
