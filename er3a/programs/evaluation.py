@@ -381,6 +381,7 @@ class ProgramMemory:
         self.met: set[str] = set()  # of all copies
         self.written: set[str] = set()
         self.unset: set[str] = set()
+        self.parted: set[str] = set()  # of all copies: variables of which parts are kept under their full names
 
     def copy(self) -> ProgramMemory:
         """An independent copy."""
@@ -389,6 +390,7 @@ class ProgramMemory:
         other.shared, other.local, other.types = dict(self.shared), dict(self.local), self.types
         other.beside, other.aliased, other.doubts = self.beside, self.aliased, dict(self.doubts)
         other.watched, other.met, other.written = self.watched, self.met, set(self.written)
+        other.parted = self.parted
         return other
 
     def lost(self, text: str) -> None:
@@ -428,6 +430,8 @@ class ProgramMemory:
     def write(self, name: str, value: syntax.Value, local: bool = False) -> None:
         """Set the value of a full name."""
         self.kept.clear()
+        if "." in name or "[" in name:
+            self.parted.add(root(name))
         if self.doubts:
             self.doubts.pop(name, None)
         if name in WITH_FIELDS:
@@ -464,6 +468,8 @@ class ProgramMemory:
         if key is not None:
             if "[" in key:
                 self._forget_overlapping(key)
+            elif key in self.parted and isinstance(value, syntax.Unclear):
+                self.forget(key)
             self.write(key, self.typed(key, value, local), local)
         else:  # an element changes, but which one is not known: none of its list is known from here
             while isinstance(target, (syntax.Member, syntax.Element)):

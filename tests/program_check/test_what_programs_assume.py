@@ -304,6 +304,16 @@ def test_a_loop_without_a_motion_that_nothing_comes_behind_waits_for_none(tmp_pa
     assert "waits_for_others" not in codes(found)
 
 
+def test_a_variable_that_is_unknown_as_a_whole_has_no_known_part(tmp_path):
+    found = with_data(tmp_path, "XP.A1=50\nXP=YP\nPTP {A1 XP.A1}", "INT N=0")
+    assert codes(found)["target_not_given"] == [9]
+
+
+def test_the_same_joint_move_bends_within_a_spline_alone(tmp_path):
+    body = "SPTP {A1 10}\nPTP {A1 0}\nPTP_SPLINE\nSPTP {A1 10}\nENDSPLINE"
+    assert codes(with_data(tmp_path, body, "INT N=0"))["spline_as_line"] == [10]
+
+
 def test_a_call_of_what_moves_that_no_way_leads_to_is_named_where_its_file_is_another(tmp_path):
     (tmp_path / "work.src").write_text(LATER.format(wait=""))
     found = with_data(tmp_path, "PTP {A1 5}\nIF GO THEN\nwork( )\nENDIF", "DECL GLOBAL BOOL GO=FALSE")

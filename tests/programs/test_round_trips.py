@@ -27,8 +27,10 @@ from er3a.programs.languages import read_program, write_program
 from er3a.programs.machine import execute
 from er3a.programs.program_findings import (
     ArcsSplit,
+    ExternalAxesDropped,
     HalfTurnsSplit,
     NotTranslated,
+    OneSideWritten,
     SpeedsCut,
     SpeedsEstimated,
     SpeedsOfAssumed,
@@ -287,6 +289,19 @@ def test_what_a_language_has_no_equal_for_is_said_in_the_head():
     narrow = ArmMotion("joint", JointTarget(a), speed=Rate(0.5, "share"), zone=Zone("distance", 0.0))
     rapid = write_program(Listing("narrow", (narrow,)), "rapid", WriteOptions(ROBOT))
     assert (rapid.findings, ",vmax,fine," in rapid.files[".mod"]) == ((ZonesDropped(1),), True)
+
+
+def test_branches_and_external_axes_that_are_left_out_are_said_in_the_head(tmp_path):
+    text = (
+        "DEF a( )\nPTP {E6AXIS: A1 5,A2 -10,A3 -10,A4 0,A5 -70,A6 0,E1 100}\nIF $IN[1] THEN\nPTP {A1 9}\nENDIF\nEND\n"
+    )
+    (tmp_path / "a.src").write_text(text)
+    listing = execute(read_program(tmp_path / "a.src"), ROBOT).listing()
+    written = write_program(listing, "urscript", WriteOptions(ROBOT))
+    assert {OneSideWritten(1), ExternalAxesDropped(1)} <= set(written.findings)
+    head = written.files[".script"].split("movej")[0]
+    assert "1 branch(es) of which one side alone" in head
+    assert "without their external axes" in head
 
 
 def test_only_an_assumed_speed_that_decides_is_named():
