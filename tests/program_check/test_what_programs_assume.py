@@ -509,6 +509,13 @@ def test_a_routine_that_gets_a_signal_sets_the_output(tmp_path, signal, way):
     assert sorted(set(joints(tmp_path, f"{GIVEN_OUT}SETIT(GRIP){ASK_OUT}", more))) == pytest.approx(way)
 
 
+@pytest.mark.parametrize(("head", "way"), [("DEF SETIT(GRIP:IN)\nBOOL GRIP", 9.0), ("DEF SETIT(X:IN)", 5.0)])
+def test_a_parameter_with_the_name_of_a_signal_is_the_parameter(tmp_path, head, way):
+    (tmp_path / "$config.dat").write_text("DEFDAT $CONFIG\nSIGNAL GRIP $OUT[8]\nENDDAT\n")
+    more = f"{head}\nGRIP=TRUE\nEND\n"
+    assert joints(tmp_path, f"{GIVEN_OUT}SETIT(FALSE){ASK_OUT}", more) == [way]
+
+
 def test_a_signal_is_no_point_that_a_data_file_lacks(tmp_path):
     (tmp_path / "$config.dat").write_text("DEFDAT $CONFIG\nSIGNAL GRIP $OUT[8]\nENDDAT\n")
     assert "program_data_file_missing" not in codes(check(tmp_path, krl("IF GRIP THEN\nENDIF"), "a.src"))
@@ -771,7 +778,13 @@ def test_a_position_with_fields_that_none_has_is_none(tmp_path, target):
     assert "target_not_given" in codes(check(tmp_path, krl(f"{FRAMES}{SPEEDS}PTP {target}"), "a.src"))
 
 
-@pytest.mark.parametrize("kind", ["", "FRAME "])
+@pytest.mark.parametrize(("coordinate", "named"), [("270.0", True), ("0.0", False), ("-1.5E2", True)])
+def test_a_part_of_where_the_machine_data_put_the_robot_counts_too(tmp_path, coordinate, named):
+    (tmp_path / "$machine.dat").write_text(f"DEFDAT $MACHINE\nFRAME $ROBROOT\n$ROBROOT.Z={coordinate} ;mm\nENDDAT\n")
+    assert ("program_not_simulated" in codes(check(tmp_path, krl("PTP {A1 5}"), "a.src"))) == named
+
+
+@pytest.mark.parametrize("kind", ["", "FRAME ", "DECL FRAME "])
 @pytest.mark.parametrize(("root", "named"), [("Z 270,A 0", True), ("Z 0,A 180", True), ("Z 0,A 0", False)])
 def test_a_robot_that_its_machine_data_put_elsewhere_is_no_pass(tmp_path, kind, root, named):
     program = tmp_path / "KRC/R1/Program"
