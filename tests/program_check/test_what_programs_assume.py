@@ -405,6 +405,26 @@ def test_a_zone_by_percent_whose_percent_is_not_set_has_no_known_size(tmp_path):
     assert "zone_without_size" not in codes(check(tmp_path, krl(f"{FRAMES}{SPEEDS}$APO.CPTP=30\n{body}"), "a.src"))
 
 
+@pytest.mark.parametrize(
+    ("data", "zone"),
+    [
+        ("PDAT_ACT={VEL 10,ACC 10,APO_DIST 5,APO_MODE #CDIS}\nBAS(#PTP_DAT)", ("share", 0.4)),
+        ("LDAT_ACT={VEL 0.1,ACC 10,APO_DIST 5}\nBAS(#CP_DAT)", ("share", 0.4)),
+        ("PDAT_ACT={VEL 10,ACC 10,APO_DIST 5}\nBAS(#PTP_DAT)", ("share", 0.05)),
+    ],
+)
+def test_a_distance_of_motion_data_leaves_the_percent_of_joint_moves(tmp_path, data, zone):
+    moved = motions(tmp_path, krl(f"$APO.CPTP=40\n{data}\nPTP {axes(NEAR)} C_PTP"), "a.src")[-1]
+    assert moved.zone.kind == zone[0]
+    assert moved.zone.value == pytest.approx(zone[1])
+
+
+def test_data_of_lines_that_leave_out_how_arcs_turn_mean_the_controllers_way(tmp_path):
+    data = "DEF_CIRC_TYP=#PATH\nDECL LDAT LDAT_ACT={VEL 0.1,ACC 10,APO_DIST 5,ORI_TYP #VAR}"
+    arc = f"LIN {POSE % 0}\nCIRC {{X 390,Y 20,Z 300}},{{X 400,Y 40,Z 300}}"
+    assert "turn_not_followed" in codes(with_data(tmp_path, f"BAS(#CP_DAT)\n{arc}", data))
+
+
 def test_a_load_of_which_a_part_is_given_is_a_caution(tmp_path):
     found = check(tmp_path, krl(f"{FRAMES}{SPEEDS}$LOAD.M=2\nPTP {axes(NEAR)}"), "a.src")
     assert [(each.finding.code, each.level) for each in found.findings] == [("load_not_examined", "caution")]
