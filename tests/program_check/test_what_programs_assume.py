@@ -419,6 +419,13 @@ def test_a_distance_of_motion_data_leaves_the_percent_of_joint_moves(tmp_path, d
     assert moved.zone.value == pytest.approx(zone[1])
 
 
+def test_a_speed_of_bas_is_not_bounded_by_the_one_of_initmov(tmp_path):
+    """Some controllers' own bas.src do that, others don't."""
+    (tmp_path / "$config.dat").write_text("DEFDAT $CONFIG\nREAL DEF_VEL_CP=2.0\nENDDAT\n")
+    moved = motions(tmp_path, krl(f"BAS(#VEL_CP,3)\n{FRAMES}LIN {POSE % 0}"), "a.src")[-1]
+    assert moved.speed.value == 3.0
+
+
 def test_data_of_lines_that_leave_out_how_arcs_turn_mean_the_controllers_way(tmp_path):
     data = "DEF_CIRC_TYP=#PATH\nDECL LDAT LDAT_ACT={VEL 0.1,ACC 10,APO_DIST 5,ORI_TYP #VAR}"
     arc = f"LIN {POSE % 0}\nCIRC {{X 390,Y 20,Z 300}},{{X 400,Y 40,Z 300}}"
@@ -585,6 +592,7 @@ SETTERS = {
     "when interrupted": "INTERRUPT DECL 4 WHEN $IN[1] DO GZ=4",
     "by an interrupt's routine": "INTERRUPT DECL 4 WHEN $IN[1] DO SETIT(GZ)",
     "by what is not understood": "SETALL TO GZ",
+    "by a command": 'CWRITE($CMD,STATE,MODE,"=GZ 30")',
 }
 KEEPERS = ("OTHER=GZ", "LOOKAT(GZ)", "LOOKZ(GZ)", 'EKI_SETREAL("X","Y",GZ)', "IF GZ==1 THEN\nENDIF")
 OWN_ROUTINES = (

@@ -264,8 +264,8 @@ def set_by_bas(memory: ProgramMemory, call: syntax.Invocation) -> bool:
             _joint_speed(memory, given)
         case "#ACC_PTP":
             _all_axes(memory, "$ACC_AXIS", given)
-        case "#VEL_CP":
-            _line_speed(memory, given)
+        case "#VEL_CP":  # which some controllers bound by DEF_VEL_CP, others by their machine data
+            memory.write("$VEL.CP", given)
         case "#ACC_CP":
             _line_acceleration(memory, given)
         case "#TOOL":
@@ -288,7 +288,7 @@ def set_by_bas(memory: ProgramMemory, call: syntax.Invocation) -> bool:
             _line_data(memory, data)
             if command == "#CP_PARAMS":
                 _frames(memory)
-            _line_speed(memory, _field(data, "VEL", "LDAT_ACT") if command == "#CP_DAT" else given)
+            memory.write("$VEL.CP", _field(data, "VEL", "LDAT_ACT") if command == "#CP_DAT" else given)
         case "#OUT_SYNC" | "#OUT_ASYNC":
             memory.forget("$OUT")
         case "#GROUP" | "#ACC_GLUE":
@@ -330,11 +330,6 @@ def _field(data: syntax.Value | None, name: str, kept_as: str) -> syntax.Value:
 def _joint_speed(memory: ProgramMemory, percent: syntax.Value) -> None:
     plain = syntax.number(percent)
     _all_axes(memory, "$VEL_AXIS", percent if plain is None else min(plain, 100.0))
-
-
-def _line_speed(memory: ProgramMemory, speed: syntax.Value) -> None:
-    plain, most = syntax.number(speed), syntax.number(memory.read("DEF_VEL_CP"))
-    memory.write("$VEL.CP", speed if plain is None or most is None else min(plain, most))
 
 
 def _line_acceleration(memory: ProgramMemory, percent: syntax.Value) -> None:

@@ -946,6 +946,9 @@ class _SetByOthers:
         for call in _invocations(operation):
             routine = self._routine(call.function)
             given = (syntax.Variable("$OUT"),) if call.function == "PULSE" else changed_arguments(call)
+            if call.function == "CWRITE":  # a command may set what its text names
+                texts = (str(each.value) for each in call.arguments if isinstance(each, syntax.Constant))
+                given = tuple(syntax.Variable(name.upper()) for text in texts for name in NAME.findall(text))
             if routine is not None:
                 changed = self._changed(routine)
                 pairs = zip(routine.parameters, call.arguments)
