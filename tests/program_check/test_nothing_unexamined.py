@@ -115,6 +115,11 @@ def test_the_first_of_several_routines_that_no_other_calls_is_the_program_and_th
     assert [(each.place.line, each.what) for each in found.not_examined] == [(9, "motion")]
 
 
+def test_a_secondary_program_is_not_the_program(tmp_path):
+    text = f"sec s():\n  set_digital_out(1, True)\nend\ndef a():\n  movej({NEAR_TEXT})\nend\n"
+    assert codes(check(tmp_path, text)) == {}
+
+
 def test_a_routine_that_calls_itself_can_be_the_program(tmp_path):
     found = check(tmp_path, f"def Main():\n  movej({NEAR_TEXT})\n  Main()\nend\n")
     assert "not_followed_to_end" in codes(found)
@@ -474,6 +479,38 @@ def test_a_list_that_a_method_changes_is_not_the_old_one(tmp_path):
     grown, unclear = (each.target for each in motions(tmp_path, text))
     np.testing.assert_allclose(grown.joints, [0, 0, 0, 0, 0, 0.1])
     assert unclear.reason == "not_understood"
+
+
+@pytest.mark.parametrize("line", ["x = l.pop() + 1", "if l.pop() > 5:\n  x = 1\nend", "textmsg(l.pop())"])
+def test_a_list_that_a_method_within_an_expression_changes_is_not_the_old_one(tmp_path, line):
+    text = f"l = [1,2,3]\n{line}\nif length(l) == 3:\n  movej({NEAR_TEXT})\nend\nmovej({HOME_TEXT})\n"
+    assert "both_sides_checked" in codes(check(tmp_path, text))
+
+
+@pytest.mark.parametrize(
+    ("condition", "both"),
+    [
+        (f"get_actual_joint_positions() == {HOME_TEXT}", True),
+        (f"get_actual_joint_positions() == {NEAR_TEXT}", False),
+        (f"get_target_joint_positions() == {HOME_TEXT}", False),
+        ("[read_input_float_register(0), 1] == [2, 1]", True),
+        ("[read_input_float_register(0), 1] == [2, 3]", False),
+        ("[1, 2] == [1, 2, 3]", False),
+        ("[True] == [1]", True),
+        ("True == 1", True),
+        ("1 == 1.0", False),
+        (f"get_inverse_kin(get_actual_tool_flange_pose()) == {HOME_TEXT}", True),
+    ],
+)
+def test_lists_are_equal_only_as_far_as_their_parts_are_known_to_be(tmp_path, condition, both):
+    text = f"movej({HOME_TEXT})\nif not {condition}:\n  movej({NEAR_TEXT})\nend\nmovej({HOME_TEXT})\n"
+    assert ("both_sides_checked" in codes(check(tmp_path, text))) == both
+
+
+@pytest.mark.parametrize("settings", ["a=1, v=0.1, v=0.5", "v=0.1, v=x", "r=0, v=0.1, r=0.1"])
+def test_what_is_given_twice_by_name_is_not_understood(tmp_path, settings):
+    found = check(tmp_path, f"x = 0.5\nmovej({HOME_TEXT}, {settings})\nmovej({NEAR_TEXT})\n")
+    assert codes(found)["may_move"] == [2]
 
 
 # what touches first is named first
