@@ -264,7 +264,7 @@ class ArmMotion(ByValue):
     turns: str = ""
     doubt: str = ""
     with_path: bool = False
-    entry: Zone | None = None
+    entry: Zone | None = field(default=None, compare=False)  # which other motions decide
 
 
 @dataclass(frozen=True, slots=True)
@@ -377,7 +377,7 @@ def alike(a: object, b: object) -> bool:
     if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
         return isinstance(a, np.ndarray) and isinstance(b, np.ndarray) and np.array_equal(a, b, equal_nan=True)
     if is_dataclass(a) and type(a) is type(b):
-        return all(alike(getattr(a, part.name), getattr(b, part.name)) for part in fields(a))
+        return all(alike(getattr(a, part.name), getattr(b, part.name)) for part in fields(a) if part.compare)
     return a == b
 
 

@@ -629,6 +629,11 @@ def test_what_a_trigger_sets_is_not_known_after_it(tmp_path, line):
     assert {"target_not_given", "frame_not_given"} & codes(found).keys()
 
 
+def test_what_a_trigger_sets_may_come_after_a_later_line(tmp_path):
+    body = f"DECL INT N\nTRIGGER WHEN DISTANCE=1 DELAY=0 DO N=40\nPTP {axes(NEAR)}\nN=5\nPTP {{A1 N}}"
+    assert "target_not_given" in codes(check(tmp_path, krl(body), "a.src"))
+
+
 def test_a_variable_that_an_interrupt_sets_itself_is_named(tmp_path):
     body = f"DECL INT hit\nINTERRUPT DECL 4 WHEN $IN[1] DO hit=3\nPTP {axes(NEAR)}"
     assert codes(check(tmp_path, f"DEF a( )\n{body}\nEND\n", "a.src"))["program_not_understood"] == [3]

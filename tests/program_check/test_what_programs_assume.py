@@ -481,6 +481,33 @@ def test_a_zone_by_percent_whose_percent_is_not_set_has_no_known_size(tmp_path):
     assert "zone_without_size" not in codes(check(tmp_path, krl(f"{FRAMES}{SPEEDS}$APO.CPTP=30\n{body}"), "a.src"))
 
 
+@pytest.mark.parametrize(
+    ("data", "zone"),
+    [
+        ("PDAT_ACT={VEL 10,ACC 10,APO_DIST 5,APO_MODE #CDIS}\nBAS(#PTP_DAT)", ("share", 0.4)),
+        ("LDAT_ACT={VEL 0.1,ACC 10,APO_DIST 5}\nBAS(#CP_DAT)", ("share", 0.4)),
+        ("PDAT_ACT={VEL 10,ACC 10,APO_DIST 5}\nBAS(#PTP_DAT)", ("share", 0.05)),
+    ],
+)
+def test_a_distance_of_motion_data_leaves_the_percent_of_joint_moves(tmp_path, data, zone):
+    moved = motions(tmp_path, krl(f"$APO.CPTP=40\n{data}\nPTP {axes(NEAR)} C_PTP"), "a.src")[-1]
+    assert moved.zone.kind == zone[0]
+    assert moved.zone.value == pytest.approx(zone[1])
+
+
+def test_a_speed_of_bas_is_not_bounded_by_the_one_of_initmov(tmp_path):
+    """Some controllers' own bas.src do that, others don't."""
+    (tmp_path / "$config.dat").write_text("DEFDAT $CONFIG\nREAL DEF_VEL_CP=2.0\nENDDAT\n")
+    moved = motions(tmp_path, krl(f"BAS(#VEL_CP,3)\n{FRAMES}LIN {POSE % 0}"), "a.src")[-1]
+    assert moved.speed.value == 3.0
+
+
+def test_data_of_lines_that_leave_out_how_arcs_turn_mean_the_controllers_way(tmp_path):
+    data = "DEF_CIRC_TYP=#PATH\nDECL LDAT LDAT_ACT={VEL 0.1,ACC 10,APO_DIST 5,ORI_TYP #VAR}"
+    arc = f"LIN {POSE % 0}\nCIRC {{X 390,Y 20,Z 300}},{{X 400,Y 40,Z 300}}"
+    assert "turn_not_followed" in codes(with_data(tmp_path, f"BAS(#CP_DAT)\n{arc}", data))
+
+
 def test_a_load_of_which_a_part_is_given_is_a_caution(tmp_path):
     found = check(tmp_path, krl(f"{FRAMES}{SPEEDS}$LOAD.M=2\nPTP {axes(NEAR)}"), "a.src")
     assert [(each.finding.code, each.level) for each in found.findings] == [("load_not_examined", "caution")]
@@ -585,6 +612,13 @@ def test_a_routine_that_gets_a_signal_sets_the_output(tmp_path, signal, way):
     assert sorted(set(joints(tmp_path, f"{GIVEN_OUT}SETIT(GRIP){ASK_OUT}", more))) == pytest.approx(way)
 
 
+@pytest.mark.parametrize(("head", "way"), [("DEF SETIT(GRIP:IN)\nBOOL GRIP", 9.0), ("DEF SETIT(X:IN)", 5.0)])
+def test_a_parameter_with_the_name_of_a_signal_is_the_parameter(tmp_path, head, way):
+    (tmp_path / "$config.dat").write_text("DEFDAT $CONFIG\nSIGNAL GRIP $OUT[8]\nENDDAT\n")
+    more = f"{head}\nGRIP=TRUE\nEND\n"
+    assert joints(tmp_path, f"{GIVEN_OUT}SETIT(FALSE){ASK_OUT}", more) == [way]
+
+
 def test_a_signal_is_no_point_that_a_data_file_lacks(tmp_path):
     (tmp_path / "$config.dat").write_text("DEFDAT $CONFIG\nSIGNAL GRIP $OUT[8]\nENDDAT\n")
     assert "program_data_file_missing" not in codes(check(tmp_path, krl("IF GRIP THEN\nENDIF"), "a.src"))
@@ -634,6 +668,7 @@ SETTERS = {
     "when interrupted": "INTERRUPT DECL 4 WHEN $IN[1] DO GZ=4",
     "by an interrupt's routine": "INTERRUPT DECL 4 WHEN $IN[1] DO SETIT(GZ)",
     "by what is not understood": "SETALL TO GZ",
+    "by a command": 'CWRITE($CMD,STATE,MODE,"=GZ 30")',
 }
 KEEPERS = ("OTHER=GZ", "LOOKAT(GZ)", "LOOKZ(GZ)", 'EKI_SETREAL("X","Y",GZ)', "IF GZ==1 THEN\nENDIF")
 OWN_ROUTINES = (
@@ -849,7 +884,13 @@ def test_a_position_with_fields_that_none_has_is_none(tmp_path, target):
     assert "target_not_given" in codes(check(tmp_path, krl(f"{FRAMES}{SPEEDS}PTP {target}"), "a.src"))
 
 
-@pytest.mark.parametrize("kind", ["", "FRAME "])
+@pytest.mark.parametrize(("coordinate", "named"), [("270.0", True), ("0.0", False), ("-1.5E2", True)])
+def test_a_part_of_where_the_machine_data_put_the_robot_counts_too(tmp_path, coordinate, named):
+    (tmp_path / "$machine.dat").write_text(f"DEFDAT $MACHINE\nFRAME $ROBROOT\n$ROBROOT.Z={coordinate} ;mm\nENDDAT\n")
+    assert ("program_not_simulated" in codes(check(tmp_path, krl("PTP {A1 5}"), "a.src"))) == named
+
+
+@pytest.mark.parametrize("kind", ["", "FRAME ", "DECL FRAME "])
 @pytest.mark.parametrize(("root", "named"), [("Z 270,A 0", True), ("Z 0,A 180", True), ("Z 0,A 0", False)])
 def test_a_robot_that_its_machine_data_put_elsewhere_is_no_pass(tmp_path, kind, root, named):
     program = tmp_path / "KRC/R1/Program"

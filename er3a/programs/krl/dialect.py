@@ -264,8 +264,8 @@ def set_by_bas(memory: ProgramMemory, call: syntax.Invocation) -> bool:
             _joint_speed(memory, given)
         case "#ACC_PTP":
             _all_axes(memory, "$ACC_AXIS", given)
-        case "#VEL_CP":
-            _line_speed(memory, given)
+        case "#VEL_CP":  # which some controllers bound by DEF_VEL_CP, others by their machine data
+            memory.write("$VEL.CP", given)
         case "#ACC_CP":
             _line_acceleration(memory, given)
         case "#TOOL":
@@ -288,7 +288,7 @@ def set_by_bas(memory: ProgramMemory, call: syntax.Invocation) -> bool:
             _line_data(memory, data)
             if command == "#CP_PARAMS":
                 _frames(memory)
-            _line_speed(memory, _field(data, "VEL", "LDAT_ACT") if command == "#CP_DAT" else given)
+            memory.write("$VEL.CP", _field(data, "VEL", "LDAT_ACT") if command == "#CP_DAT" else given)
         case "#OUT_SYNC" | "#OUT_ASYNC":
             memory.forget("$OUT")
         case "#GROUP" | "#ACC_GLUE":
@@ -332,11 +332,6 @@ def _joint_speed(memory: ProgramMemory, percent: syntax.Value) -> None:
     _all_axes(memory, "$VEL_AXIS", percent if plain is None else min(plain, 100.0))
 
 
-def _line_speed(memory: ProgramMemory, speed: syntax.Value) -> None:
-    plain, most = syntax.number(speed), syntax.number(memory.read("DEF_VEL_CP"))
-    memory.write("$VEL.CP", speed if plain is None or most is None else min(plain, most))
-
-
 def _line_acceleration(memory: ProgramMemory, percent: syntax.Value) -> None:
     plain, full = syntax.number(percent), syntax.number(memory.read("DEF_ACC_CP"))
     if plain is None:
@@ -373,9 +368,10 @@ def keep_setting(memory: ProgramMemory, name: str, expression: syntax.Expression
         case "SACC_CP":
             _line_acceleration(memory, _field(given, "ACC", name))
         case "SAPO":
-            _zone_data(memory, given, "#CDIS")
+            memory.write("$APO.CDIS", _field(given, "APO_DIST", name))
         case "SAPO_PTP":
-            _zone_data(memory, given, "#CPTP")
+            if _zone_data(memory, given, "#CDIS") == "#CDIS":
+                memory.write("$APO.CPTP", "#CDIS")  # 100 on the controller, so that the distance decides
         case "STOOL2" if isinstance(given, syntax.Record):
             _tool_data(memory, given)
         case "SBASE":
@@ -394,7 +390,7 @@ def keep_setting(memory: ProgramMemory, name: str, expression: syntax.Expression
                 memory.shared.pop(name + "%name", None)
 
 
-def _typed(data: syntax.Value, name: str, usual: str) -> syntax.Value:
+def _typed(data: syntax.Value, name: str, usual: syntax.Value) -> syntax.Value:
     """How motion data say that the tool turns; as usual where they don't."""
     return data.get(name) or usual if isinstance(data, syntax.Record) else data
 
@@ -503,13 +499,14 @@ def _joint_data(memory: ProgramMemory, data: syntax.Value | None) -> None:
 def _line_data(memory: ProgramMemory, data: syntax.Value | None) -> None:
     given = syntax.Unclear("LDAT_ACT") if data is None else data
     _line_acceleration(memory, _field(given, "ACC", "LDAT_ACT"))
-    _zone_data(memory, given, "#CDIS")
+    memory.write("$APO.CDIS", _field(given, "APO_DIST", "LDAT_ACT"))
     memory.write("$ORI_TYPE", _typed(given, "ORI_TYP", "#VAR"))
-    memory.write("$CIRC_TYPE", _typed(given, "CIRC_TYP", "#BASE"))
+    memory.write("$CIRC_TYPE", _typed(given, "CIRC_TYP", memory.read("DEF_CIRC_TYP") or "#BASE"))
 
 
-def _zone_data(memory: ProgramMemory, data: syntax.Value | None, usual: str) -> None:
-    """``APO_DIST`` of motion data: mm, or percent of a joint motion; unclear where it, or its unit, is not known."""
+def _zone_data(memory: ProgramMemory, data: syntax.Value | None, usual: str) -> syntax.Value:
+    """``APO_DIST`` of a joint motion's data, in percent or mm as its mode, which is returned, says; unclear where one
+    of the two is not known. The other size stays as it is, as in controllers' own bas.src."""
     given = data.get("APO_MODE") if isinstance(data, syntax.Record) else None
     mode, distance = given or usual, syntax.number(_field(data, "APO_DIST", "zone"))
     if distance is None or isinstance(mode, syntax.Unclear):
@@ -519,7 +516,7 @@ def _zone_data(memory: ProgramMemory, data: syntax.Value | None, usual: str) -> 
         memory.write("$APO.CPTP", min(distance, 100.0))
     else:
         memory.write("$APO.CDIS", distance)
-        memory.write("$APO.CPTP", mode)
+    return mode
 
 
 KINDS: dict[str, instructions.MotionKind] = {"PTP": "joint", "LIN": "line", "CIRC": "arc", "SPL": "spline"}

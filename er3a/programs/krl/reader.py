@@ -35,6 +35,7 @@ from er3a.programs.krl.dialect import (
     HERE_JOINTS,
     MODAL,
     MODAL_DATA,
+    POSITION_KINDS,
     READ_BY_NUMBER,
     changed_arguments,
     record_pose,
@@ -134,6 +135,7 @@ EXT EXTFCT IMPORT ENUM CONTINUE ANOUT BRAKE CONST_VEL STOP
 """
 ASIDES = frozenset(WORDS_ASIDE.split())
 WITH_VALUES = frozenset(["ANOUT", "CONST_VEL", "STOP"])  # of these
+TYPES = frozenset(["INT", "REAL", "BOOL", "CHAR", *POSITION_KINDS])
 OUTER_AXES = frozenset(["ASYPTP", "ASYCONT", "ASYSTOP", "ASYCANCEL"])  # which run beside the arm's own
 Handler = Callable[["_Statement"], None]
 
@@ -149,11 +151,8 @@ def statement(
     if inside_data and (plain := PLAIN_DATA.match(text)) is not None and (found := plain_record("", plain[3])):
         builder.add(syntax.Assign(place, syntax.Variable(plain[2].upper()), found, text, plain[1].upper()))
         return
-    reading, first, ahead = (
-        _Statement(builder, place, text, signals, inside_data),
-        len(builder.code),
-        _runs_ahead(builder),
-    )
+    reading = _Statement(builder, place, text, signals, inside_data)
+    first, ahead = len(builder.code), _runs_ahead(builder)
     try:
         reading.read()
     except MisreadError as error:
@@ -163,8 +162,8 @@ def statement(
         builder.unread(place, text, not inside_data, folds=True)
     except RecursionError:
         raise InputError(place.file, place.where, "nested too deeply", "Split this line") from None
-    if ahead or not signals.keys().isdisjoint(reading.words.texts):
-        meant = partial(_meant, signals=signals, ahead=text if ahead else "")
+    if ahead or reading.denoted:
+        meant = partial(_meant, signals=reading.denoted, ahead=text if ahead else "")
         builder.code[first:] = [mapped(each, meant) for each in builder.code[first:]]
 
 
@@ -190,6 +189,16 @@ class _Statement:
         self.builder, self.place, self.text, self.signals = builder, place, text, signals
         self.inside_data = inside_data
         self.words = KrlWords(text)
+        self.denoted = self._denoted()
+
+    def _denoted(self) -> dict[str, syntax.Expression]:
+        """Signals that the line names, but for those whose names the routine has for something of its own."""
+        named = self.signals.keys() & set(self.words.texts)
+        if not named:
+            return {}
+        own = {variable_of(each.target) for each in self.builder.code if isinstance(each, syntax.Assign) and each.local}
+        own.update(each.name for each in self.builder.parameters)
+        return {name: self.signals[name] for name in named - own}
 
     def read(self) -> None:
         words, first = self.words, self.words.next
@@ -226,8 +235,10 @@ class _Statement:
         return found
 
     def _declares(self) -> bool:
+        """Whether two names stand there; among instructions, unless the first is a type, they are no declaration."""
         kinds, texts = self.words.kinds, self.words.texts
-        return kinds[0] == "name" == kinds[1] and len(texts) > 2 and texts[2] in ("", "=", ",", "[")
+        named = kinds[0] == "name" == kinds[1] and len(texts) > 2 and texts[2] in ("", "=", ",", "[")
+        return named and (self.inside_data or texts[0] in TYPES or not any(map(_acts, self.builder.code)))
 
     def _declaration(self) -> None:
         words = self.words
@@ -281,7 +292,7 @@ class _Statement:
     def known(self, expression: syntax.Expression) -> syntax.Expression:
         """The signal that a name denotes."""
         if isinstance(expression, syntax.Variable):
-            return self.signals.get(expression.name, expression)
+            return self.denoted.get(expression.name, expression)
         return expression
 
     def _motion(self, form: str) -> None:
@@ -318,6 +329,11 @@ class _Statement:
                 return settings
 
 
+def _acts(operation: syntax.Operation) -> bool:
+    """Whether an operation is more than a declaration."""
+    return not isinstance(operation, syntax.Fixed) and not (isinstance(operation, syntax.Assign) and operation.local)
+
+
 def _text_of(expression: syntax.Expression) -> str:
     match expression:
         case syntax.Variable(name=name):
@@ -346,10 +362,18 @@ def _for(reading: _Statement) -> None:
     reading.builder.open_for(reading.place, name, first, last, step, reading.text)
 
 
+def _switch(reading: _Statement) -> None:
+    """What is asked is worked out once, though each CASE compares it."""
+    asked = syntax.Variable(f"%asked{len(reading.builder.code)}")
+    reading.builder.add(syntax.Assign(reading.place, asked, reading.condition(), "", local=True))
+    reading.builder.open_switch(reading.place, asked, reading.text)
+
+
 def _case(reading: _Statement) -> None:
     values = [reading.words.expression()]
     while reading.words.accept(","):
         values.append(reading.words.expression())
+    reading.words.finish()
     reading.builder.case(reading.place, values, reading.text)
 
 
@@ -408,7 +432,7 @@ def _interrupt(reading: _Statement) -> None:
 
 
 def _do(reading: _Statement, at_any_time: bool = False) -> None:
-    """A routine after DO, which runs whenever a condition holds; or an assignment, from which on the value is unclear.
+    """A routine after DO, which runs whenever a condition holds; or an assignment, so that the value is nowhere known.
 
     An interrupt (``at_any_time``) may assign again and again: it is named.
     """
@@ -424,11 +448,15 @@ def _do(reading: _Statement, at_any_time: bool = False) -> None:
         if what.function == "PULSE":
             reading.builder.unclear(reading.place, "$OUT")
     elif words.accept("="):
+        target = reading.known(what)
         if at_any_time:
             reading.builder.unknown(reading.place, reading.text, may_move=False)
-        else:
+        if variable_of(target).startswith("$"):
             reading.builder.aside(reading.place, reading.text)
-        reading.builder.unclear(reading.place, variable_of(reading.known(what)))
+        else:  # later than lines after it, as the program runs ahead of the arm
+            changed = syntax.Invocation(syntax.CYCLIC, (target,))
+            reading.builder.beside(reading.place, changed, reading.text, "interrupt")
+        reading.builder.unclear(reading.place, variable_of(target))
     else:
         raise MisreadError("DO calls no routine and sets nothing")
 
@@ -490,7 +518,7 @@ HANDLERS: dict[str, Handler] = {
     "ENDFOR": _simple(lambda builder, place: builder.close("for", place)),
     "REPEAT": _simple(lambda builder, place: builder.open_repeat(place)),
     "UNTIL": lambda reading: reading.builder.close("repeat", reading.place, reading.condition(), reading.text),
-    "SWITCH": lambda reading: reading.builder.open_switch(reading.place, reading.condition(), reading.text),
+    "SWITCH": _switch,
     "CASE": _case,
     "DEFAULT": _simple(lambda builder, place: builder.case(place, None, "")),
     "ENDSWITCH": _simple(lambda builder, place: builder.close("switch", place)),
@@ -543,24 +571,26 @@ def apart(
     """
     routines, data, module = list(routines), list(data), source.path.stem.upper()
     seen = {module, *(name.upper() for name in GLOBAL_ROUTINE.findall(source.text))}
-    own = {
-        each.target.name
-        for each in data
-        if isinstance(each.target, syntax.Variable) and not GLOBAL_NAME.search(each.text)
-    }
+    own = {variable_of(each.target) for each in data} - _global_names(data)
     own |= {routine.name for routine in routines} - seen
     names = {name: f"{module}/{name}" for name in own if not name.startswith(("$", "%"))}
 
     return [_with_names(each, names) for each in routines], [_as(each, names) for each in data]
 
 
+def _global_names(data: Iterable[syntax.Assign]) -> set[str]:
+    """Variables that data declare for all modules; lines that set their elements say so no more."""
+    return {variable_of(each.target) for each in data if GLOBAL_NAME.search(each.text)}
+
+
 def _seen_here_alone(
     source: ProgramText, routines: Iterable[syntax.Routine], data: Iterable[syntax.Assign]
 ) -> dict[str, str]:
     """Names of a program's own routines and data, which other modules do not see, with what those mean by them."""
-    own, module = data_file_of(source.path, ".dat"), source.path.stem.upper()
+    file, module = data_file_of(source.path, ".dat"), source.path.stem.upper()
     seen = {module, *(name.upper() for name in GLOBAL_ROUTINE.findall(source.text))}
-    names = {variable_of(each.target) for each in data if each.place.file == own and not GLOBAL_NAME.search(each.text)}
+    own = [each for each in data if each.place.file == file]
+    names = {variable_of(each.target) for each in own} - _global_names(own)
     names |= {routine.name for routine in routines} - seen
     return {name: f"/{name}" for name in names if not name.startswith(("$", "%"))}
 
@@ -617,7 +647,7 @@ def read_krl(source: ProgramText) -> syntax.Program:
     reader, files = _KrlReader(source), ControllerFiles(source.path)
     findings: list[ProgramFinding] = [*source.findings]
     if files.config is not None:
-        reader.read_data(read_program_text(files.config))
+        findings += reader.read_data(read_program_text(files.config))
     for file in files.public_data:
         reader.read_signals(file)
     of_controller = dict(reader.signals)
@@ -637,6 +667,7 @@ def read_krl(source: ProgramText) -> syntax.Program:
         called += [_with_names(each, hidden) for each in more_routines]
         reader.data += [_as(each, hidden) for each in more_data]
         findings += more
+    findings += _structures_twice(reader.data)
     shared = _known_to_all(files, seen_by_all)
     others = _SetByOthers(files, shared, of_controller)
     unread = (each for each in files.unread if shared or each.suffix.lower() == ".sub")  # which sets outputs too
@@ -656,6 +687,15 @@ def read_krl(source: ProgramText) -> syntax.Program:
         beside=others.beside(),
         elsewhere=tuple(others.elsewhere(_uncalled([*called, *routines], routines[0].name, hidden)).items()),
     )
+
+
+def _structures_twice(data: Iterable[syntax.Assign]) -> Iterable[NameTwice]:
+    """Types of one name that modules declare otherwise, of which the last is taken for all."""
+    shapes: dict[str, syntax.Expression | None] = {}
+    for each in data:
+        name = variable_of(each.target)
+        if name.startswith(STRUCTURE) and shapes.setdefault(name, each.value) != each.value:
+            yield NameTwice(name.removeprefix(STRUCTURE), each.place)
 
 
 def _uncalled(routines: Iterable[syntax.Routine], entry: str, hidden: Mapping[str, str]) -> list[syntax.Routine]:
@@ -743,10 +783,10 @@ class _KrlReader:
                 other.read_data(other.source)
             except InputError:
                 continue  # what it declares has no known value
+            shown = _global_names(other.data)
             for each in other.data:
-                if GLOBAL_NAME.search(each.text):
-                    name = variable_of(each.target)
-                    found += [NameTwice(name, each.place)] if name in known else []
+                if (name := variable_of(each.target)) in shown:
+                    found += [NameTwice(name, each.place)] if each.type_name and name in known else []
                     self.data.append(each)
             known |= {variable_of(each.target) for each in self.data}
         return found
@@ -906,6 +946,9 @@ class _SetByOthers:
         for call in _invocations(operation):
             routine = self._routine(call.function)
             given = (syntax.Variable("$OUT"),) if call.function == "PULSE" else changed_arguments(call)
+            if call.function == "CWRITE":  # a command may set what its text names
+                texts = (str(each.value) for each in call.arguments if isinstance(each, syntax.Constant))
+                given = tuple(syntax.Variable(name.upper()) for text in texts for name in NAME.findall(text))
             if routine is not None:
                 changed = self._changed(routine)
                 pairs = zip(routine.parameters, call.arguments)
@@ -951,18 +994,26 @@ def _invocations(operation: syntax.Operation) -> Iterable[syntax.Invocation]:
         waiting += syntax.inner(each)
 
 
-ROBROOT = re.compile(r"(?i)^\s*(?:FRAME\s+)?\$ROBROOT\s*=\s*\{\s*(?:FRAME\s*:)?([^}]*)\}")
+ROBROOT = re.compile(r"(?i)\s*(?:(?:DECL|GLOBAL|CONST|FRAME)\s+)*\$ROBROOT(\.\w+)?\s*=\s*([^;]*)")
+NO_OFFSET = re.compile(r"[-+]?0*\.?0*(?:[eE][-+]?\d+)?\s*")
 
 
 def _robot_root(file: Path | None) -> Iterable[ProgramFinding]:
     """That the machine data put the robot elsewhere than at the origin of the world, in which bases are given."""
     source = None if file is None else read_program_text(file)
     for number, line in enumerate(source.lines, 1) if source else ():
-        if (match := ROBROOT.match(line)) is not None:
-            root = plain_record("FRAME", match[1])
-            pose = None if root is None else record_pose(root.value)
-            if pose is None or not np.allclose(pose, np.eye(4)):
-                yield NotSimulated(match[0].strip(), Place(file, number))
+        if (match := ROBROOT.match(line)) is not None and not _is_origin(match[2], whole=not match[1]):
+            yield NotSimulated(match[0].strip(), Place(file, number))
+
+
+def _is_origin(text: str, whole: bool) -> bool:
+    """Whether a frame, or a coordinate of one, is 0."""
+    if not whole:
+        return NO_OFFSET.fullmatch(text) is not None
+    frame = re.fullmatch(r"(?i)\{\s*(?:FRAME\s*:)?([^}]*)\}\s*", text)
+    root = None if frame is None else plain_record("FRAME", frame[1])
+    pose = None if root is None else record_pose(root.value)
+    return pose is not None and bool(np.allclose(pose, np.eye(4)))
 
 
 def companions(path: Path) -> tuple[Path, ...]:
