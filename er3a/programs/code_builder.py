@@ -147,7 +147,12 @@ class CodeBuilder:
         self._test(place, syntax.Binary(">=", span, syntax.Constant(0)), text)
 
     def open_switch(self, place: Place, subject: syntax.Expression, text: str) -> None:
-        """``SWITCH subject``."""
+        """``SWITCH subject``; functions in it are called once."""
+        if any(True for _ in _invoked(subject)):
+            self._hidden += 1
+            value = syntax.Variable(f"%subject{self._hidden}")
+            self.add(syntax.Assign(place, value, subject, text, local=True))
+            subject = value
         self._open("switch", place)
         self.blocks[-1].subject, self.blocks[-1].text = subject, text
 

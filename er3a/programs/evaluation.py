@@ -499,6 +499,12 @@ class ProgramMemory:
         if isinstance(target.of, syntax.Member) and isinstance(self.value(target.of.of), syntax.Record):
             self.assign(target.of, syntax.Unclear(f"{target.of.name}, partly changed"))  # the record has no such part
             return True
+        part: syntax.Expression = target
+        while isinstance(part, (syntax.Member, syntax.Element)):
+            if isinstance(part, syntax.Member) and isinstance(self.replaced(part.of), tuple):  # which names no parts
+                self.assign(part.of, syntax.Unclear(f"{self.shown(part.of)}, partly changed"))
+                return True
+            part = part.of
         kept = None if name is None else self.read(name)
         if kept is None or not isinstance(of, syntax.Unclear):
             return False
@@ -657,7 +663,8 @@ class ProgramMemory:
         if self._too_near(sign, left, right):
             return syntax.Unclear(f"{left:.9g} {sign} {right:.9g}, which rounding decides on the controller")
         if sign in ("==", "=", "<>", "!="):
-            return (left == right) == (sign in ("==", "="))
+            equal = self._equal(left, right)
+            return syntax.Unclear(f"... {sign} ...") if equal is None else equal == (sign in ("==", "="))
         if sign in BITWISE:
             return (
                 BITWISE[sign](left, right)
@@ -667,6 +674,22 @@ class ProgramMemory:
         if sign in EXCLUSIVE and isinstance(left, bool) and isinstance(right, bool):
             return left != right
         return self._computed(sign, left, right)
+
+    def _equal(self, left: syntax.Value, right: syntax.Value) -> bool | None:
+        """Whether two values are equal, of records and lists by their parts; None where that is not known."""
+        structured = isinstance(left, (syntax.Record, tuple)) or isinstance(right, (syntax.Record, tuple))
+        if not structured:
+            return left == right
+        a, b = _parts(left), _parts(right)
+        if len(a) != len(b):
+            return None
+        pairs = list(zip(a, b))
+        open_ones = [
+            any(isinstance(each, syntax.Unclear) for each in pair) or self._too_near("=", *pair) for pair in pairs
+        ]
+        if any(one != other for (one, other), is_open in zip(pairs, open_ones) if not is_open):
+            return False
+        return None if any(open_ones) else True
 
     def _too_near(self, sign: str, left: syntax.Value, right: syntax.Value) -> bool:
         """Whether two numbers that are compared differ by no more than what rounding, or measuring, may miss."""
@@ -723,6 +746,12 @@ class ProgramMemory:
 def known(found: syntax.Value | None, name: str) -> syntax.Value:
     """The value of a name; unclear if it has none."""
     return syntax.Unclear(name) if found is None or isinstance(found, syntax.Unset) else found
+
+
+def _parts(value: syntax.Value) -> list[syntax.Value]:
+    """The single values in a record or list, in their order."""
+    inside = value.values() if isinstance(value, syntax.Record) else value
+    return [part for each in inside for part in _parts(each)] if isinstance(inside, tuple) else [inside]
 
 
 def root(name: str) -> str:
