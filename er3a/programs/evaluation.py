@@ -210,7 +210,8 @@ COMPARISONS: Mapping[str, Callable[[float, float], bool]] = {
     "<=": operator.le,
     ">=": operator.ge,
 }
-COMPARED = frozenset((*COMPARISONS, "==", "=", "<>", "!="))
+EQUAL, UNEQUAL = ("==", "="), ("<>", "!=")
+COMPARED = frozenset((*COMPARISONS, *EQUAL, *UNEQUAL))
 ARITHMETIC: Mapping[str, Callable[[float, float], float]] = {
     "+": operator.add,
     "-": operator.sub,
@@ -286,6 +287,10 @@ class Dialect(ABC):
     def doubted(self, name: str) -> str:
         """The variable after whose next assignment motions no longer depend on one that is not simulated."""
         return name
+
+    def starts_anew(self, data: syntax.Assign) -> bool:
+        """Whether a variable of the data has its first value again where a program without end is begun anew."""
+        return False
 
     def typed(self, kind: str, value: syntax.Value) -> syntax.Value:
         """What a variable of a declared kind, empty for none, holds after a value is assigned to it."""
@@ -660,11 +665,11 @@ class ProgramMemory:
         for side in (left, right):
             if isinstance(side, syntax.Unclear):
                 return side
+        if sign in EQUAL or sign in UNEQUAL:
+            same = self._equal(sign, left, right)
+            return same if isinstance(same, syntax.Unclear) else same == (sign in EQUAL)
         if self._too_near(sign, left, right):
-            return syntax.Unclear(f"{left:.9g} {sign} {right:.9g}, which rounding decides on the controller")
-        if sign in ("==", "=", "<>", "!="):
-            equal = self._equal(left, right)
-            return syntax.Unclear(f"... {sign} ...") if equal is None else equal == (sign in ("==", "="))
+            return _decided_by_rounding(sign, left, right)
         if sign in BITWISE:
             return (
                 BITWISE[sign](left, right)
@@ -675,21 +680,20 @@ class ProgramMemory:
             return left != right
         return self._computed(sign, left, right)
 
-    def _equal(self, left: syntax.Value, right: syntax.Value) -> bool | None:
-        """Whether two values are equal, of records and lists by their parts; None where that is not known."""
-        structured = isinstance(left, (syntax.Record, tuple)) or isinstance(right, (syntax.Record, tuple))
-        if not structured:
+    def _equal(self, sign: str, left: syntax.Value, right: syntax.Value) -> bool | syntax.Unclear:
+        """Whether two values are equal; of records and lists, whether all their parts are."""
+        for side in (left, right):
+            if isinstance(side, syntax.Unclear):
+                return side
+        if self._too_near(sign, left, right):
+            return _decided_by_rounding(sign, left, right)
+        parts = [each.values() if isinstance(each, syntax.Record) else each for each in (left, right)]
+        a, b = parts
+        if not (isinstance(a, tuple) and isinstance(b, tuple)) or len(a) != len(b):
             return left == right
-        a, b = _parts(left), _parts(right)
-        if len(a) != len(b):
-            return None
-        pairs = list(zip(a, b))
-        open_ones = [
-            any(isinstance(each, syntax.Unclear) for each in pair) or self._too_near("=", *pair) for pair in pairs
-        ]
-        if any(one != other for (one, other), is_open in zip(pairs, open_ones) if not is_open):
-            return False
-        return None if any(open_ones) else True
+        found = [self._equal(sign, one, other) for one, other in zip(a, b)]
+        unclear = (each for each in found if isinstance(each, syntax.Unclear))
+        return False if False in found else next(unclear, True)
 
     def _too_near(self, sign: str, left: syntax.Value, right: syntax.Value) -> bool:
         """Whether two numbers that are compared differ by no more than what rounding, or measuring, may miss."""
@@ -748,17 +752,16 @@ def known(found: syntax.Value | None, name: str) -> syntax.Value:
     return syntax.Unclear(name) if found is None or isinstance(found, syntax.Unset) else found
 
 
-def _parts(value: syntax.Value) -> list[syntax.Value]:
-    """The single values in a record or list, in their order."""
-    inside = value.values() if isinstance(value, syntax.Record) else value
-    return [part for each in inside for part in _parts(each)] if isinstance(inside, tuple) else [inside]
-
-
 def root(name: str) -> str:
     """The variable of a full name: ``XP`` of ``XP[3]`` and ``XP.X``."""
     dot, bracket = name.find("."), name.find("[")
     ends = [at for at in (dot, bracket) if at > 0]
     return name[: min(ends)] if ends else name
+
+
+def _decided_by_rounding(sign: str, left: syntax.Value, right: syntax.Value) -> syntax.Unclear:
+    numbers = [f"{syntax.number(each):.9g}" for each in (left, right)]
+    return syntax.Unclear(f"{numbers[0]} {sign} {numbers[1]}, which rounding decides on the controller")
 
 
 def _whole(name: str | None) -> str:

@@ -271,7 +271,7 @@ class Pause:
     Attributes
     ----------
     stops : whether the arm is known to stand at its target then, even after a motion with a zone
-    by_others : whether the condition is false, and nothing that was read makes it true
+    by_others : whether nothing that was read ends the wait
     """
 
     seconds: float | None = None

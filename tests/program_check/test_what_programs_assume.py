@@ -249,6 +249,8 @@ def test_a_tool_of_rapid_that_the_cell_gives_otherwise_is_told(tmp_path):
         ("E6AXIS X={A1 0,A2 -10,A3 -10,A4 0,A5 -70,A6 0}", "X={A1 5,A2 -10,A3 -10,A4 0,A5 -70,A6 0}\nPTP X", []),
         ("E6AXIS X={A1 0,A2 -10,A3 -10,A4 0,A5 -70,A6 0}", "X.A1=X.A1+5\nPTP X", [7]),
         ("INT N=0", "LOOP\nPTP {A1 N}\nN=5-N\nENDLOOP", []),  # which has no end
+        ("INT N=0", "PTP {A1 N}\nLOOP\nN=5\nPTP {A1 9}\nENDLOOP", [9]),  # but another beginning
+        ("INT N=0", "IF $IN[1] THEN\nN=0\nENDIF\nPTP {A1 N}\nN=5", [8]),  # on the way that does not set it
     ],
 )
 def test_a_variable_that_decides_motions_and_keeps_its_value_to_the_next_start_is_no_pass(tmp_path, data, body, lines):
@@ -262,6 +264,61 @@ def test_a_module_variable_of_rapid_keeps_its_value_to_the_next_cycle(tmp_path):
     assert codes(found)["kept_to_next_start"] == [8]
     local = rapid("n:=0;\nMoveL Offs(p,n*30,0,0),v100,fine,tool0;\nn:=n+1;", "VAR num n:=0;")
     assert "kept_to_next_start" not in codes(check(tmp_path, local, "a.mod"))
+
+
+@pytest.mark.parametrize(("kind", "lines"), [("PERS", [9]), ("VAR", [])])
+def test_of_an_endless_program_of_rapid_data_that_persist_keep_their_value_to_the_next_start(tmp_path, kind, lines):
+    """A VAR has its first value again where the program pointer is set to main."""
+    body = "MoveL Offs(p,n*30,0,0),v100,fine,tool0;\nWHILE TRUE DO\nn:=1;\nMoveL p,v100,fine,tool0;\nENDWHILE"
+    found = check(tmp_path, rapid(body, f"{kind} num n:=0;"), "a.mod")
+    assert codes(found).get("kept_to_next_start", []) == lines
+
+
+LATER = "GLOBAL DEF work( )\n{wait}PTP {{A1 30}}\nEND\n"
+BUSY = "WHILE GO==FALSE\nWAIT SEC 0.1\nENDWHILE\n"
+
+
+@pytest.mark.parametrize("inside", [False, True])
+def test_a_loop_that_only_another_task_ends_is_told_and_what_comes_behind_it_is_checked(tmp_path, inside):
+    (tmp_path / "work.src").write_text(LATER.format(wait=BUSY if inside else ""))
+    body = "PTP {A1 5}\n" + ("" if inside else BUSY) + "work( )"
+    found = with_data(tmp_path, body, "DECL GLOBAL BOOL GO=FALSE")
+    waits = [each for each in found.findings if each.finding.code == "waits_for_others"]
+    assert [(each.level, each.place.file.name) for each in waits] == [("caution", "work.src" if inside else "a.src")]
+    assert [each.what for each in found.not_examined] == ["course"]
+    assert [(each.place.file.name, each.times) for each in found.verdicts] == [("a.src", 1), ("work.src", 1)]
+
+
+@pytest.mark.parametrize("body", ["LOOP\nWAIT SEC 1\nENDLOOP", "WHILE GO==FALSE\nWAIT SEC 1\nENDWHILE"])
+def test_a_loop_without_a_motion_that_nothing_comes_behind_waits_for_none(tmp_path, body):
+    found = with_data(tmp_path, f"PTP {{A1 5}}\n{body}", "DECL GLOBAL BOOL GO=FALSE")
+    assert "waits_for_others" not in codes(found)
+
+
+def test_a_call_of_what_moves_that_no_way_leads_to_is_named_where_its_file_is_another(tmp_path):
+    (tmp_path / "work.src").write_text(LATER.format(wait=""))
+    found = with_data(tmp_path, "PTP {A1 5}\nIF GO THEN\nwork( )\nENDIF", "DECL GLOBAL BOOL GO=FALSE")
+    assert codes(found)["never_reached"] == [9]
+
+
+@pytest.mark.parametrize("given", ["v", "q{1}"])
+def test_what_a_routine_gives_back_by_a_parameter_goes_on_on_both_ways(tmp_path, given):
+    routine = "PROC choose(INOUT num x)\nIF di1=1 THEN\nx:=10;\nELSE\nx:=20;\nENDIF\nENDPROC"
+    turn = f"MoveAbsJ [[{given},-10,-10,0,-70,0],{NONE}],v50,fine,tool0;"
+    text = rapid(f"choose {given};\n{turn}", "VAR num v;\nVAR num q{1};", routine)
+    turns = [np.degrees(each.target.joints[0]) for each in motions(tmp_path, text, "a.mod")[1:]]
+    assert sorted(turns) == [pytest.approx(10), pytest.approx(20)]
+
+
+@pytest.mark.parametrize(
+    ("asked", "sides"),
+    [("a=[2,0,0]", 2), ("a<>[2,0,0]", 2), ("a=[2,1,0]", 1), ("b=[2,0,0]", 1), ("c=[0.3,0,0]", 2)],
+)
+def test_values_with_an_unknown_part_are_equal_or_not(tmp_path, asked, sides):
+    """But for those that another part tells apart. 0.1 + 0.2 is 0.3 or not, by the controller's rounding."""
+    data = "VAR pos a;\nVAR pos b:=[2,0,0];\nVAR pos c;"
+    body = f"a.x:=ai1;\nc.x:=0.1+0.2;\nIF {asked} THEN\n{at_turn(20)}ELSE\n{at_turn(30)}ENDIF"
+    assert len(motions(tmp_path, rapid(body, data), "a.mod")) == 1 + sides
 
 
 def at_turn(degrees: float) -> str:
