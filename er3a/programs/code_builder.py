@@ -534,8 +534,8 @@ def within(expression: syntax.Expression, each: Each) -> syntax.Expression:
 def mapped(operation: syntax.Operation, each: Each) -> syntax.Operation:
     """An operation with its expressions replaced."""
     match operation:
-        case syntax.Assign(value=value):
-            return replace(operation, value=None if value is None else each(value))
+        case syntax.Assign(target=target, value=value):
+            return replace(operation, target=within(target, each), value=None if value is None else each(value))
         case syntax.Branch(condition=condition):
             return replace(operation, condition=each(condition))
         case syntax.Return(value=value):

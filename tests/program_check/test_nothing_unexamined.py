@@ -1408,6 +1408,13 @@ def test_what_a_test_asks_is_worked_out_once(tmp_path):
     assert 1000 * last.target.pose[1, 3] == pytest.approx(20)
 
 
+def test_a_function_that_says_which_element_is_set_is_carried_out(tmp_path):
+    more = "FUNC num counted()\nIncr n;\nRETURN n;\nENDFUNC\n"
+    body = "list{counted()}:=30;\nMoveL Offs(p,n,list{2},0),v100,fine,tool0;"
+    found = motions(tmp_path, rapid(body, more, "VAR num list{3};\n"), "a.mod")
+    np.testing.assert_allclose(1000 * found[-1].target.pose[:2, 3], [402, 30])
+
+
 @pytest.mark.parametrize(
     "call",
     [

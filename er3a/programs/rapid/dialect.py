@@ -203,7 +203,8 @@ class RapidDialect(Dialect):
         ]
         speed, turn = _speed(memory, values[targets], options, kind)
         zone = instructions.FINE if form in reader.SEARCHES else _zone(values[zone_at], options, placed[zone_at])
-        memory.write(reader.PASSING, zone.kind != "fine" or "CONC" in options)
+        stops = zone.kind == "fine" and (form in reader.SEARCHES or _stops(values[zone_at], options))
+        memory.write(reader.PASSING, not stops or "CONC" in options)
         via = made[0] if arc else None
         if isinstance(via, instructions.PoseTarget):
             via = replace(via, branch=None)
@@ -525,6 +526,12 @@ def _acceleration(memory: ProgramMemory, kind: instructions.MotionKind) -> instr
         return instructions.Rate(min(given), "m/s2")
     percent = syntax.number(memory.read("%ACC"))
     return None if percent is None else instructions.Rate(percent / 100, "share")
+
+
+def _stops(value: syntax.Value, options: Mapping[str, syntax.Value]) -> bool:
+    """Whether a program waits until the arm is at the target: a zone of no size is none at which it does."""
+    finep = data_types.part(data_types.typed(value, data_types.ZONEDATA), "FINEP")
+    return "INPOS" in options or ("Z" not in options and finep is True)
 
 
 def _zone(value: syntax.Value, options: Mapping[str, syntax.Value], expression: object) -> instructions.Zone:
