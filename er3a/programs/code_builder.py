@@ -348,7 +348,7 @@ def lacks_data(routines: Iterable[syntax.Routine], data: Iterable[syntax.Assign]
                 expressions = () if operation.value is None else (operation.value,)
             elif isinstance(operation, syntax.Move):
                 expressions = tuple(each for each in operation.arguments[:1] if each is not None)
-            used.update(name for each in expressions for name in _variables(each))
+            used.update(name for each in expressions for name in variables(each))
     return any(name[0] not in "$%" and name not in known for name in used - given)
 
 
@@ -365,11 +365,12 @@ def own_names(routine: syntax.Routine) -> set[str]:
     return {*(each.name for each in routine.parameters), *map(variable_of, declared)}
 
 
-def _variables(expression: syntax.Expression) -> Iterable[str]:
+def variables(expression: syntax.Expression) -> Iterable[str]:
+    """The variables in an expression."""
     if isinstance(expression, syntax.Variable):
         yield expression.name
     for each in syntax.inner(expression):
-        yield from _variables(each)
+        yield from variables(each)
 
 
 def not_understood(code: Iterable[syntax.Operation]) -> Iterable[NotUnderstood]:

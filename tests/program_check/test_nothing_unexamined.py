@@ -1383,6 +1383,14 @@ def test_the_type_of_data_may_stand_in_a_module_that_gives_nothing_else(tmp_path
     assert 1000 * last.target.pose[2, 3] == pytest.approx(300)
 
 
+def test_data_may_be_made_of_constants_of_any_module(tmp_path):
+    text = "MODULE shelf\nCONST num lower:=higher-50;\nCONST num higher:=above;\nPERS pos s:=[1,lower,1];\nENDMODULE\n"
+    (tmp_path / "shelf.mod").write_text(text)
+    body = "MoveL Offs(p,0,s.y,0),v100,fine,tool0;"
+    (*_, last) = motions(tmp_path, rapid(body, data="CONST num above:=80;\n"), "a.mod")
+    assert 1000 * last.target.pose[1, 3] == pytest.approx(30)
+
+
 @pytest.mark.parametrize(
     ("condition", "sides"),
     [

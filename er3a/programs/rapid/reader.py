@@ -15,7 +15,16 @@ from pathlib import Path
 
 from er3a.errors import InputError
 from er3a.programs import syntax
-from er3a.programs.code_builder import CodeBuilder, fault, linked, mapped, not_understood, within
+from er3a.programs.code_builder import (
+    CodeBuilder,
+    fault,
+    linked,
+    mapped,
+    not_understood,
+    variable_of,
+    variables,
+    within,
+)
 from er3a.programs.instructions import Place
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, read_program_text
 from er3a.programs.program_findings import BegunWithin, NameTwice, NotSimulated, NotUnderstood, ProgramFinding
@@ -296,7 +305,7 @@ def read_rapid(source: ProgramText) -> syntax.Program:
         source.path,
         by_name,
         entry,
-        tuple(data),
+        _in_order(data),
         (*findings, *unlinked),
         source.lines,
         beside=frozenset(
@@ -324,6 +333,21 @@ def _read_in_turn(readers: Iterable[_ModuleReader]) -> None:
     for reader in readers:
         reader.scope.shapes = shared | reader.scope.shapes
         reader.read_routines()
+
+
+def _in_order(data: list[syntax.Assign]) -> tuple[syntax.Assign, ...]:
+    """Data with those first that others are made of, in whatever module they stand."""
+    found: list[syntax.Assign] = []
+    while data:
+        names = {variable_of(each.target) for each in data}
+        later: list[syntax.Assign] = []
+        for each in data:
+            ready = each.value is None or names.isdisjoint(variables(each.value))
+            (found if ready else later).append(each)
+        if len(later) == len(data):  # of each other
+            break
+        data = later
+    return (*found, *data)
 
 
 def changed_arguments(call: syntax.Invocation) -> list[syntax.Expression | None]:
