@@ -322,6 +322,7 @@ def linked(
         by_name[routine.name] = routine
     found += [finding for routine in by_name.values() for finding in not_understood(routine.code)]
     found += [finding for routine in by_name.values() for finding in _perhaps_called(routine, by_name)]
+    found += [finding for routine in by_name.values() for finding in _read_before(routine, by_name)]
     return {
         name: replace(
             routine, code=_linked(routine.code, by_name, changed), handler=_linked(routine.handler, by_name, changed)
@@ -472,6 +473,41 @@ def _perhaps_called(routine: syntax.Routine, known: Mapping[str, syntax.Routine]
         called = {each.function for side in perhaps for each in _invoked(side)} & known.keys()
         if any(_acts(known[name], known, {name}) for name in called):
             yield NotSimulated(getattr(operation, "text", "") or ", ".join(sorted(called)), operation.place)
+
+
+def _read_before(routine: syntax.Routine, known: Mapping[str, syntax.Routine]) -> Iterator[NotSimulated]:
+    """Operations that read a variable before they call a routine that changes it: here routines are called first."""
+    for operation in routine.code:
+        parts = syntax.expressions_of(operation)
+        if not any(_calls(part, known) for part in parts):
+            continue
+        if isinstance(operation, syntax.Assign):
+            parts = (*syntax.inner(operation.target), *parts[1:])
+        met: set[str] = set()
+        if any(met & _sets(called, known, set()) for part in parts for called in _in_turn(part, known, met)):
+            yield NotSimulated(getattr(operation, "text", "") or "...", operation.place)
+
+
+def _in_turn(expression: syntax.Expression, known: Mapping[str, syntax.Routine], met: set[str]) -> Iterator[str]:
+    """The routines that an expression calls, from left to right; ``met`` grows by the variables before each."""
+    for each in syntax.inner(expression):
+        yield from _in_turn(each, known, met)
+    if isinstance(expression, syntax.Variable):
+        met.add(expression.name)
+    elif isinstance(expression, syntax.Invocation) and expression.function in known:
+        yield expression.function
+
+
+def _sets(name: str, known: Mapping[str, syntax.Routine], seen: set[str]) -> set[str]:
+    """Variables, not its own, that a routine and those that it calls set; ``seen`` grows by those that were asked."""
+    seen.add(name)
+    own = own_names(known[name])
+    assigned = (each for each in known[name].code if isinstance(each, syntax.Assign) and not each.local)
+    found = {variable_of(each.target) for each in assigned} - own
+    parts = (part for operation in known[name].code for part in syntax.expressions_of(operation))
+    for called in {each.function for part in parts for each in _invoked(part)} & known.keys():
+        found |= set() if called in seen else _sets(called, known, seen)
+    return found
 
 
 def _second_sides(expression: syntax.Expression) -> Iterator[syntax.Expression]:

@@ -1383,6 +1383,27 @@ def test_the_type_of_data_may_stand_in_a_module_that_gives_nothing_else(tmp_path
     assert 1000 * last.target.pose[2, 3] == pytest.approx(300)
 
 
+@pytest.mark.parametrize(
+    ("line", "named"),
+    [
+        ("WHILE n<3 AND counted()<5 DO\nSetDO do1,1;\nENDWHILE", True),
+        ("MoveL Offs(p,n,outer(),0),v100,fine,tool0;", True),
+        ("n:=n+counted();", True),
+        ("n:=counted()+n;", False),
+        ("n:=counted();", False),
+        ("list{n}:=counted();", True),
+        ("n:=n+plain();", False),
+        ("n:=n+plain()+counted();", True),
+    ],
+)
+def test_a_variable_that_is_read_before_a_function_changes_it_is_named(tmp_path, line, named):
+    """Functions are carried out before the line that holds them."""
+    more = "FUNC num counted()\nIncr n;\nRETURN n;\nENDFUNC\nFUNC num outer()\nRETURN counted();\nENDFUNC\n"
+    more += "FUNC num plain()\nVAR num n:=2;\nn:=3;\nRETURN n;\nENDFUNC\n"
+    found = codes(check(tmp_path, rapid(line, more, "VAR num list{3};\n"), "a.mod"))
+    assert found.get("program_not_simulated", []) == ([9] if named else [])
+
+
 def test_data_may_be_made_of_constants_of_any_module(tmp_path):
     text = "MODULE shelf\nCONST num lower:=higher-50;\nCONST num higher:=above;\nPERS pos s:=[1,lower,1];\nENDMODULE\n"
     (tmp_path / "shelf.mod").write_text(text)
