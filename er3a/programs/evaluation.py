@@ -739,8 +739,10 @@ class ProgramMemory:
                 return syntax.Unclear("a root of a negative number") if isinstance(power, complex) else power
             if sign not in ARITHMETIC:
                 return syntax.Unclear(f"... {sign} ...")
-            if sign in ("%", "MOD") and min(a, b) < 0 and a % b:
+            if sign in ("%", "MOD", "DIV") and min(a, b) < 0 and a % b:
                 return syntax.Unclear(f"{a:g} {sign} {b:g}, whose sign is not documented")
+            if sign in ("MOD", "DIV") and (a % 1 or b % 1):
+                return syntax.Unclear(f"{a:g} {sign} {b:g}, of what is not whole")
             found = ARITHMETIC[sign](a, b)
         except (ZeroDivisionError, OverflowError, ValueError):
             return syntax.Unclear("a division by zero or an overflow")

@@ -1404,6 +1404,17 @@ def test_a_variable_that_is_read_before_a_function_changes_it_is_named(tmp_path,
     assert found.get("program_not_simulated", []) == ([9] if named else [])
 
 
+@pytest.mark.parametrize(
+    ("quotient", "y"),
+    [("9 DIV 2", 4), ("(-8) DIV 2", -4), ("(-9) DIV 2", None), ("9.5 DIV 2", None), ("9 MOD 2.5", None)],
+)
+def test_a_quotient_that_no_source_settles_has_no_value(tmp_path, quotient, y):
+    """Basic Characteristics RAPID, 5-26: operands that are not whole are illegal; of negative ones it says nothing."""
+    (*_, last) = motions(tmp_path, rapid(f"MoveL Offs(p,0,{quotient},0),v100,fine,tool0;"), "a.mod")
+    known = None if isinstance(last.target, UnresolvedTarget) else round(1000 * last.target.pose[1, 3])
+    assert known == y
+
+
 def test_data_may_be_made_of_constants_of_any_module(tmp_path):
     text = "MODULE shelf\nCONST num lower:=higher-50;\nCONST num higher:=above;\nPERS pos s:=[1,lower,1];\nENDMODULE\n"
     (tmp_path / "shelf.mod").write_text(text)
