@@ -578,6 +578,7 @@ NOTES = frozenset(
             "load_not_examined",
         ),
         *("both_sides_checked", "program_form_inferred", "program_other_encoding", "program_rows_from_rest"),
+        "program_joint_speed_inferred",
     )
 )
 

@@ -128,7 +128,7 @@ def same(a: NamedFrame, b: NamedFrame) -> bool:
     return a.name == b.name and a.pose is None and b.pose is None
 
 
-WITH_FIELDS = ("$VEL", "$ACC", "$APO")
+WITH_FIELDS = {"$APO": ("CDIS", "CPTP", "CORI", "CVEL")} | dict.fromkeys(("$VEL", "$ACC"), ("CP", "ORI1", "ORI2"))
 """KRL variables whose fields are looked up by their full names, however they were set."""
 
 HELD_BESIDE = "%beside"
@@ -181,7 +181,7 @@ def computed_in_single(sign: str, left: syntax.Value, right: syntax.Value, found
         case "+" | "-":
             passed = sum(errors)
         case _:
-            passed = math.inf
+            passed = _passed_on(ARITHMETIC.get(sign, operator.pow), (left, right), found)
     return Rounded(found, passed + abs(found) * SINGLE)
 
 
@@ -191,17 +191,26 @@ def function_in_single(function: Callable[..., float], arguments: Sequence[synta
     Raises
     ------
     ValueError, OverflowError, ZeroDivisionError
-        as the function does
+        as the function does; ValueError also of a whole number that rounding may make another
     """
-    plain = [syntax.number(each) or 0.0 for each in arguments]
-    found, passed = float(function(*plain)), 0.0
+    found = function(*(syntax.number(each) or 0.0 for each in arguments))
+    passed = _passed_on(function, arguments, found)
+    if isinstance(found, int) and passed >= 0.5:
+        raise ValueError("rounding decides")
+    found = float(found)
+    return Rounded(found, passed + 4 * SINGLE * max(abs(found), 1.0)) if passed or missed_by(found) else found
+
+
+def _passed_on(function: Callable[..., float], arguments: Sequence[syntax.Value], found: float) -> float:
+    """How far off the value of a function may be for what single precision may make of its arguments."""
+    plain, passed = [syntax.number(each) or 0.0 for each in arguments], 0.0
     for i, off in enumerate(map(missed_by, arguments)):
         for beside in (plain[i] - off, plain[i] + off) if off else ():
             try:
                 passed = max(passed, abs(function(*plain[:i], beside, *plain[i + 1 :]) - found))
             except (ValueError, OverflowError, ZeroDivisionError):  # beside its domain, or its pole
                 passed = math.inf
-    return Rounded(found, passed + 4 * SINGLE * max(abs(found), 1.0)) if passed or missed_by(found) else found
+    return passed
 
 
 COMPARISONS: Mapping[str, Callable[[float, float], bool]] = {
@@ -421,8 +430,10 @@ class ProgramMemory:
         self.kept.clear()
         if self.doubts:
             self.doubts.pop(name, None)
-        if name in WITH_FIELDS and isinstance(value, syntax.Record):
-            self.shared.update({f"{name}.{field}": part for field, part in value.items})
+        if name in WITH_FIELDS:
+            unknown = tuple((field, syntax.Unclear(f"{name}.{field}")) for field in WITH_FIELDS[name])
+            parts = value.items if isinstance(value, syntax.Record) else unknown
+            self.shared.update({f"{name}.{field}": part for field, part in parts})
         if local or (self.local and root(name) in self.local):
             handed = self.local.get(HELD_BESIDE, ())
             self.local[name] = syntax.Unclear(name) if isinstance(handed, tuple) and root(name) in handed else value
@@ -666,7 +677,7 @@ class ProgramMemory:
             if isinstance(side, syntax.Unclear):
                 return side
         if sign in EQUAL or sign in UNEQUAL:
-            same = self._equal(sign, left, right)
+            same = self._equal(left, right)
             return same if isinstance(same, syntax.Unclear) else same == (sign in EQUAL)
         if self._too_near(sign, left, right):
             return _decided_by_rounding(sign, left, right)
@@ -680,20 +691,21 @@ class ProgramMemory:
             return left != right
         return self._computed(sign, left, right)
 
-    def _equal(self, sign: str, left: syntax.Value, right: syntax.Value) -> bool | syntax.Unclear:
-        """Whether two values are equal; of records and lists, whether all their parts are."""
+    def _equal(self, left: syntax.Value, right: syntax.Value) -> bool | syntax.Unclear:
+        """Whether two values are equal; unclear if that rests on a part which is unclear or near enough to be equal."""
         for side in (left, right):
             if isinstance(side, syntax.Unclear):
                 return side
-        if self._too_near(sign, left, right):
-            return _decided_by_rounding(sign, left, right)
-        parts = [each.values() if isinstance(each, syntax.Record) else each for each in (left, right)]
-        a, b = parts
-        if not (isinstance(a, tuple) and isinstance(b, tuple)) or len(a) != len(b):
-            return left == right
-        found = [self._equal(sign, one, other) for one, other in zip(a, b)]
-        unclear = (each for each in found if isinstance(each, syntax.Unclear))
-        return False if False in found else next(unclear, True)
+            if isinstance(side, syntax.Solved):  # which only the arm's table gives
+                return syntax.Unclear(syntax.shown(side))
+        if self._too_near("==", left, right):
+            return _decided_by_rounding("==", left, right)
+        one, other = _parts(left), _parts(right)
+        if one is None or other is None or len(one) != len(other):
+            alike = _sort(left) is _sort(right)  # others languages refuse, or convert
+            return left == right if alike else syntax.Unclear(f"{syntax.shown(left)} == {syntax.shown(right)}")
+        found = [self._equal(*pair) for pair in zip(one, other)]
+        return False if False in found else next((each for each in found if isinstance(each, syntax.Unclear)), True)
 
     def _too_near(self, sign: str, left: syntax.Value, right: syntax.Value) -> bool:
         """Whether two numbers that are compared differ by no more than what rounding, or measuring, may miss."""
@@ -727,7 +739,9 @@ class ProgramMemory:
         if whole and isinstance(found, (int, float)) and abs(found) > self.functions.most_whole:
             return syntax.Unclear(f"{a:.0f} {sign} {b:.0f}, beyond what a whole number holds")
         if self.functions.single_precision and isinstance(found, float):
-            return computed_in_single(sign, left, right, found)
+            in_single = computed_in_single(sign, left, right, found)
+            jumps = sign in ("%", "MOD") and missed_by(in_single) > abs(b) / 2
+            return _decided_by_rounding(sign, left, right) if jumps else in_single
         return found
 
     def _combined(self, sign: str, a: float, b: float, whole: bool) -> syntax.Value:
@@ -759,6 +773,18 @@ def root(name: str) -> str:
     dot, bracket = name.find("."), name.find("[")
     ends = [at for at in (dot, bracket) if at > 0]
     return name[: min(ends)] if ends else name
+
+
+def _sort(value: syntax.Value) -> type:
+    """The type of a value; whole numbers and others are one."""
+    return float if syntax.number(value) is not None else type(value)
+
+
+def _parts(value: syntax.Value) -> tuple[syntax.Value, ...] | None:
+    """The parts of a list or record, in their order; None of other values."""
+    if isinstance(value, syntax.Record):
+        return value.values()
+    return value if isinstance(value, tuple) else None
 
 
 def _decided_by_rounding(sign: str, left: syntax.Value, right: syntax.Value) -> syntax.Unclear:

@@ -81,8 +81,10 @@ def listing_of(
             sizes = making.sizes(tuple(map(commands.SegmentCommand, command.poses[1:])))
             halves = np.append(np.minimum(sizes[:-1], sizes[1:]) / 2, 0.0)  # as er3a.planning.commands rounds corners
             blends = halves if command.blend is None else np.minimum(halves, command.blend)
+            axis = command.half_turn_axis
             parts = tuple(
-                commands.SegmentCommand(pose, blend=float(blend)) for pose, blend in zip(command.poses[1:], blends)
+                commands.SegmentCommand(pose, None, axis, float(blend))
+                for pose, blend in zip(command.poses[1:], blends)
             )
             making.halts = _halts(command.timing, len(parts))
             making.segments(parts, _row_times(command.timing, sizes), ends)
@@ -140,15 +142,15 @@ class _Making:
                 if part.blend > 0 and i not in self.halts
                 else instructions.FINE
             )
-            seconds = float(times[i])
+            pieces = self._pieces(end, part)
+            rate = instructions.Rate(float(times[i]) / len(pieces), "s")
             joints = None if ends is None else ends[i]
-            if part.via is not None:
-                via = end.copy()
-                via[:3, 3] = (self.to_robot @ np.append(part.via, 1.0))[:3]
-                rate, target = instructions.Rate(seconds, "s"), instructions.PoseTarget(end, joints=joints)
-                self.found.append(self._motion("arc", target, rate, zone, instructions.PoseTarget(via)))
-            else:
-                self._line(end, part.half_turn_axis, seconds, zone, joints)
+            for piece, via in pieces:
+                last = piece is end
+                target = instructions.PoseTarget(piece, joints=joints if last else None)
+                point = None if via is None else instructions.PoseTarget(_moved_to(piece, via))
+                form: instructions.MotionKind = "line" if via is None else "arc"
+                self.found.append(self._motion(form, target, rate, zone if last else instructions.FINE, point))
             self.pose = end
             self._rest(i)
 
@@ -156,27 +158,25 @@ class _Making:
         if number in self.halts:
             self.found.append(instructions.Pause(self.halts[number]))
 
-    def _line(
-        self, end: Reals, axis: Reals | None, seconds: float, zone: instructions.Zone, joints: Reals | None
-    ) -> None:
+    def _pieces(self, end: Reals, part: commands.SegmentCommand) -> list[tuple[Reals, Reals | None]]:
+        """Ends (4, 4) of a segment's pieces, with the points (3,) of arcs: two if the tool turns by half a turn, which
+        fixes the sense."""
         turn = _turn(self.pose, end)
-        if abs(float(np.linalg.norm(turn)) - np.pi) < HALF_TURN_WITHIN:
-            self.split += 1
-            middle = self.pose.copy()
-            middle[:3, 3] = (self.pose[:3, 3] + end[:3, 3]) / 2
-            sense = _sense(turn / np.pi, None if axis is None else self.to_robot[:3, :3] @ axis)
-            middle[:3, :3] = (
-                scipy.spatial.transform.Rotation.from_rotvec(sense * turn / 2).as_matrix() @ self.pose[:3, :3]
-            )
-            seconds /= 2
-            self.found.append(
-                self._motion(
-                    "line", instructions.PoseTarget(middle), instructions.Rate(seconds, "s"), instructions.FINE
-                )
-            )
-        self.found.append(
-            self._motion("line", instructions.PoseTarget(end, joints=joints), instructions.Rate(seconds, "s"), zone)
-        )
+        via = None if part.via is None else (self.to_robot @ np.append(part.via, 1.0))[:3]
+        if abs(float(np.linalg.norm(turn)) - np.pi) >= HALF_TURN_WITHIN:
+            return [(end, via)]
+        shares = np.array([0.25, 0.5, 0.75])
+        axis = None if part.half_turn_axis is None else self.to_robot[:3, :3] @ part.half_turn_axis
+        turned = scipy.spatial.transform.Rotation.from_rotvec(_sense(turn / np.pi, axis) * turn / 2).as_matrix()
+        middle = self.pose.copy()
+        middle[:3, :3] = turned @ self.pose[:3, :3]
+        self.split += 1
+        if via is None:
+            return [(_moved_to(middle, (self.pose[:3, 3] + end[:3, 3]) / 2), None), (end, None)]
+        arc = instructions.arc_poses(self.pose, _moved_to(end, via), end, shares)
+        assert arc is not None  # as of a path that was built
+        first, half, second = arc[:, :3, 3]
+        return [(_moved_to(middle, half), first), (end, second)]
 
     def _motion(
         self,
@@ -189,6 +189,13 @@ class _Making:
         return instructions.ArmMotion(
             kind, target, via=via, speed=speed, zone=zone, tool=self.tool, base=self.base, load=self.load
         )
+
+
+def _moved_to(pose: Reals, point: Reals) -> Reals:
+    """A pose (4, 4) at another point (3,)."""
+    found = pose.copy()
+    found[:3, 3] = point
+    return found
 
 
 def _plain(zones: list[instructions.Zone]) -> list[instructions.Zone]:

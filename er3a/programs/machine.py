@@ -96,8 +96,8 @@ def changed_beside(program: syntax.Program, dialect: Dialect, itself: str = "") 
     asked = {what.function for what in beside}
     started = {name for name in routines if (name in asked or routines[name].thread) and name != itself}
     handed = {name for what in beside for name in _handed(program, what)}
-    changed = _changed_in(program, _with_called(program, started), dialect) | program.beside
-    return (changed | handed) - dialect.modal
+    changed = _changed_in(program, _with_called(program, started), dialect)
+    return ((changed | handed) - dialect.modal) | program.beside
 
 
 def _handed(program: syntax.Program, what: syntax.Invocation) -> set[str]:

@@ -593,6 +593,7 @@ COUNTED: dict[str, Callable[[int], program_findings.WriteFinding]] = {
     "splines": program_findings.SplinesAsLines,
     "estimated": program_findings.SpeedsEstimated,
     "cut": program_findings.SpeedsCut,
+    "raised": program_findings.SpeedsRaised,
     "left out": program_findings.TargetsLeftOut,
     "rounded": program_findings.ValuesRounded,
     "foreign": program_findings.NotTranslated,
@@ -614,10 +615,12 @@ def head_line(finding: program_findings.WriteFinding) -> str:
             return f"{count} duration(s) as speeds: the controller's ramps decide the time"
         case program_findings.SpeedsCut(motions=count):
             return f"{count} speed(s) above 100 %, which was taken"
+        case program_findings.SpeedsRaised(motions=count):
+            return f"{count} speed(s) below the least that has a name, which was taken: FASTER than what was checked"
         case program_findings.SpeedsOfAssumed(motions=count, assumed=assumed):
             return f"{count} speed(s) with an assumed {assumed} as 100 %, which may be far from the controller's 100 %"
         case program_findings.HalfTurnsSplit(lines=count):
-            return f"{count} line(s) that turn the tool by 180 deg in two halves, to fix the sense"
+            return f"{count} line(s) or arc(s) that turn the tool by 180 deg in two halves, to fix the sense"
         case program_findings.TargetsLeftOut(motions=count):
             return f"{count} motion(s) left out: their targets are not known"
         case program_findings.ToolNotGiven(name=name):

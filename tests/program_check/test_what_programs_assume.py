@@ -50,9 +50,9 @@ def with_data(folder, body: str, data: str, **options):
     return check(folder, krl(FRAMES + SPEEDS + body), "a.src", **options)
 
 
-def joints(folder, body: str) -> list[float]:
+def joints(folder, body: str, more: str = "") -> list[float]:
     """Where joint 1 goes, deg, on each motion of a KRL program."""
-    found = motions(folder, krl(body), "a.src")
+    found = motions(folder, krl(body, more), "a.src")
     return [float(np.degrees(each.target.joints[0])) for each in found if isinstance(each.target, JointTarget)]
 
 
@@ -166,6 +166,15 @@ def test_what_changes_every_motion_until_it_is_ended_stays_in_doubt_until_then(t
     moves = f"movej({HOME_TEXT})\nmovej({NEAR_TEXT})\n"
     text = f"{begin}\nset_tcp(p[0,0,0,0,0,0])\n{moves}{end}\n{moves}"
     assert codes(check(tmp_path, text, "a.script"))["frames_in_doubt"] == [3, 4]
+
+
+def test_where_force_mode_leads_the_arm_is_not_known(tmp_path):
+    begin = "force_mode(p[0,0,0,0,0,0],[0,0,1,0,0,0],[0,0,10,0,0,0],2,[1,1,1,1,1,1])"
+    read = "q = get_actual_joint_positions()"
+    text = f"{begin}\nset_tcp(p[0,0,0,0,0,0])\nmovej({HOME_TEXT})\n{read}\nend_force_mode()\nmovej({NEAR_TEXT})\n"
+    found = codes(check(tmp_path, f"{text}movej(q)\n", "a.script"))
+    assert found["way_not_known"] == [3, 6]
+    assert found["target_not_given"] == [7]
 
 
 LIFT = f"if here[2] > 0.3:\n movej({NEAR_TEXT})\nend\nmovej({HOME_TEXT})"
@@ -551,6 +560,26 @@ def test_an_output_that_is_set_under_another_name_is_not_taken_as_it_was(tmp_pat
     assert sorted(set(np.round(joints(tmp_path, GIVEN_OUT + setting + ASK_OUT), 6))) == ways
 
 
+@pytest.mark.parametrize("called", [True, False])
+def test_a_signal_that_a_module_declares_for_all_is_an_output(tmp_path, called):
+    (tmp_path / "io.dat").write_text("DEFDAT IO PUBLIC\nGLOBAL SIGNAL GRIP $OUT[8]\nENDDAT\n")
+    (tmp_path / "io.src").write_text("DEF io( )\nEND\n")
+    call = "io( )\n" if called else ""
+    assert joints(tmp_path, f"{call}{GIVEN_OUT}GRIP=TRUE{ASK_OUT}") == [5.0]
+
+
+@pytest.mark.parametrize(("signal", "way"), [("$OUT[8]", [5.0]), ("$OUT[5] TO $OUT[8]", [5.0, 9.0])])
+def test_a_routine_that_gets_a_signal_sets_the_output(tmp_path, signal, way):
+    (tmp_path / "a.dat").write_text(f"DEFDAT a\nSIGNAL GRIP {signal}\nENDDAT\n")
+    more = "DEF SETIT(S:OUT)\nBOOL S\nS=TRUE\nEND\n"
+    assert sorted(set(joints(tmp_path, f"{GIVEN_OUT}SETIT(GRIP){ASK_OUT}", more))) == pytest.approx(way)
+
+
+def test_a_signal_is_no_point_that_a_data_file_lacks(tmp_path):
+    (tmp_path / "$config.dat").write_text("DEFDAT $CONFIG\nSIGNAL GRIP $OUT[8]\nENDDAT\n")
+    assert "program_data_file_missing" not in codes(check(tmp_path, krl("IF GRIP THEN\nENDIF"), "a.src"))
+
+
 def test_a_signal_of_the_controller_is_known_to_the_modules_that_a_program_calls(tmp_path):
     (tmp_path / "$config.dat").write_text("DEFDAT $CONFIG\nSIGNAL ONE $OUT[8]\nENDDAT\n")
     (tmp_path / "sets.src").write_text("DEF sets( )\nONE=TRUE\nEND\n")
@@ -664,6 +693,29 @@ def test_a_routine_that_nobody_calls_counts_where_other_modules_see_it(tmp_path,
     assert ("set_elsewhere" in found) == told
 
 
+@pytest.mark.parametrize(("name", "code"), [("sps.sub", "target_not_given"), ("other.src", "set_elsewhere")])
+def test_what_a_called_module_declares_for_all_may_be_set_by_others(tmp_path, name, code):
+    (tmp_path / "lib.dat").write_text(CONFIG.replace("$CONFIG", "LIB"))
+    (tmp_path / "lib.src").write_text("DEF lib( )\nEND\n")
+    (tmp_path / name).write_text(f"DEF {name[:-4]}( )\nGZ=30.0\nEND\n")
+    assert code in codes(check(tmp_path, krl("lib( )\nPTP {A1 GZ}"), "a.src"))
+
+
+@pytest.mark.parametrize("frames", [{}, {"BASE_DATA[3]": np.eye(4)}])
+@pytest.mark.parametrize("own", ["", "BASE_DATA[5]=$NULLFRAME\n"])
+def test_a_base_that_a_submit_program_sets_is_not_known(tmp_path, own, frames):
+    (tmp_path / "$config.dat").write_text("DEFDAT $CONFIG\nBASE_DATA[3]={X 0,Y 0,Z 0,A 0,B 0,C 0}\nENDDAT\n")
+    (tmp_path / "sps.sub").write_text("DEF SPS( )\nBASE_DATA[3].Y=$ANIN[1]\nEND\n")
+    body = f"{FRAMES}{SPEEDS}{own}$BASE=BASE_DATA[3]\nLIN {POSE % 0}"
+    assert "frame_not_given" in codes(check(tmp_path, krl(body), "a.src", frames=frames))
+
+
+def test_the_programs_number_is_not_known_after_p00(tmp_path):
+    (tmp_path / "$config.dat").write_text("DEFDAT $CONFIG\nINT PGNO=0\nENDDAT\n")
+    body = "P00(#EXT_PGNO,#PGNO_GET,DMY[],0)\nSWITCH PGNO\nCASE 1\nPTP {A1 5}\nDEFAULT\nPTP {A1 9}\nENDSWITCH"
+    assert sorted(joints(tmp_path, body)) == pytest.approx([5.0, 9.0])
+
+
 @pytest.mark.parametrize("line", ["$OUT[7]=$IN[3]", "PULSE($OUT[7],TRUE,0.5)", "USERPLC( )"])
 def test_what_a_submit_program_makes_of_outputs_is_not_known(tmp_path, line):
     (tmp_path / "sps.sub").write_text(f"DEF SPS( )\nLOOP\n{line}\nENDLOOP\nEND\n")
@@ -692,6 +744,8 @@ def test_files_that_decide_so_belong_to_the_program(tmp_path):
         (tmp_path / name).write_text("DEF x( )\nEND\n" if name[0] != "$" else "DEFDAT x\nENDDAT\n")
     (tmp_path / "a.src").write_text(krl("PTP {A1 5}"))
     assert {each.name for each in files_of(tmp_path / "a.src")} == {"a.src", *names}
+    (tmp_path / "a.txt").write_text((tmp_path / "a.src").read_text())  # read by what it holds, not by its name
+    assert {each.name for each in files_of(tmp_path / "a.txt")} >= {"a.txt", *names}
 
 
 @pytest.mark.parametrize(
@@ -722,6 +776,67 @@ def test_arcs_that_turn_with_their_path_are_named_where_the_controller_s_data_sa
 def test_commands_and_loads_on_the_arm_are_no_pass(tmp_path, line):
     found = check(tmp_path, krl(f"{line}\nPTP {{A1 5}}"), "a.src")
     assert any(each.level == "caution" and each.place.line == 2 for each in found.findings)
+
+
+@pytest.mark.parametrize(
+    ("before", "ask", "ways"),
+    [
+        ("ON_ERROR_PROCEED\nR=STRTOINT(S[],N)", "$ERR.NUMBER==0", [5.0, 9.0]),
+        ("", "$ERR.NUMBER==0", [5.0]),
+        ("PTP {A1 20}", "$AXIS_ACT.A1>=20", [5.0, 9.0]),
+        ("PTP {A1 20}", "$AXIS_ACT.A1>=19.9", [5.0]),
+        ("$SOFT_PLCBOOL[1]=FALSE", "$SOFT_PLCBOOL[1]", [5.0, 9.0]),
+        ("STOP=1", "STOP==1", [5.0]),
+    ],
+)
+def test_what_the_controller_may_have_otherwise_does_not_decide(tmp_path, before, ask, ways):
+    body = f"PTP {axes(HOME)}\n{before}\nIF {ask} THEN\nPTP {{A1 5}}\nELSE\nPTP {{A1 9}}\nENDIF"
+    assert sorted({*np.round(joints(tmp_path, body), 6)} & {5.0, 9.0}) == ways
+
+
+def test_bas_asks_for_an_error_that_is_none(tmp_path):
+    asking = "ON_ERROR_PROCEED\nR=N\nIF $ERR.NUMBER==0 THEN\nPTP {A1 5}\nELSE\nPTP {A1 9}\nENDIF"
+    (tmp_path / "bas.src").write_text(f"DEF BAS(WHAT:IN,N:IN)\n{asking}\nEND\n")
+    assert joints(tmp_path, "ON_ERROR_PROCEED\nBAS(#INITMOV,0)") == [5.0]
+
+
+@pytest.mark.parametrize(
+    ("lines", "told"),
+    [
+        ("$IPO_MODE=UNKNOWN", "target_not_given"),
+        ("$VEL=UNKNOWN", "speed_not_given"),
+        ("$ACC=UNKNOWN", "acceleration_not_known"),
+        ("$APO=UNKNOWN", "zone_without_size"),
+        ("BAS(#FRAMES)", "frame_not_given"),
+        ("LDAT_ACT=UNKNOWN\nBAS(#CP_DAT)", "turn_not_followed"),
+        ("LDAT_ACT={VEL 0.1,ACC 10,APO_DIST UNKNOWN,ORI_TYP #VAR}\nBAS(#CP_DAT)", "zone_without_size"),
+        ('RET=EKI_GETFRAME("A","B",$BASE)', "frame_not_given"),
+    ],
+)
+def test_a_setting_of_unknown_value_is_not_the_one_before(tmp_path, lines, told):
+    line = f"LIN {POSE % 0} C_DIS\nLIN {POSE % 5}"
+    for before, found in (("", False), (lines, True)):
+        text = krl(f"{FRAMES}{SPEEDS}$IPO_MODE=#BASE\n$APO.CDIS=1\n$ORI_TYPE=#VAR\n{before}\n{line}")
+        assert (told in codes(check(tmp_path, text, "a.src"))) == found
+
+
+@pytest.mark.parametrize(
+    ("setting", "following", "told"),
+    [
+        ("$APO={CDIS 5,CORI 5}", f"LIN {POSE % 0} C_ORI\nLIN {POSE % 5}", "zone_without_size"),
+        ("$ACC_AXIS[1]=SACC_JOINT(UNKNOWN)", "", "acceleration_not_known"),
+        ("$LOAD=SLOAD(3)", "", "load_not_examined"),
+    ],
+)
+def test_what_stands_after_with_counts_and_for_its_motion_alone(tmp_path, setting, following, told):
+    load = "LOAD_DATA[3]={M 2,CM {X 0,Y 0,Z 0,A 0,B 0,C 0},J {X 0,Y 0,Z 0}}"
+    found = with_data(tmp_path, f"SPTP {axes(NEAR)} WITH {setting}\n{following}", load)
+    assert told in codes(found)
+
+
+@pytest.mark.parametrize("target", ["{X 400,Y 0,Z 300,A 0,B 180,C 0,Q 5}", "{A1 5,A7 90}"])
+def test_a_position_with_fields_that_none_has_is_none(tmp_path, target):
+    assert "target_not_given" in codes(check(tmp_path, krl(f"{FRAMES}{SPEEDS}PTP {target}"), "a.src"))
 
 
 @pytest.mark.parametrize("kind", ["", "FRAME "])
@@ -821,6 +936,21 @@ def test_modules_anywhere_in_an_archive_are_read(tmp_path, folder):
     (place / "user_grp.src").write_text("GLOBAL DEF USER_GRP(N:IN)\nINT N\nPTP {A1 N}\nEND\n")
     (place / "own.src").write_text("DEF own( )\nPTP {A1 9}\nEND\n")
     assert joints(program, "USER_GRP(5)\nown( )") == [5.0, 9.0]
+
+
+@pytest.mark.parametrize(("folder", "read"), [("Program/lib", True), ("System", False), ("TP/Sync", False)])
+def test_a_users_module_of_the_name_of_a_controllers_own_is_read(tmp_path, folder, read):
+    for each in ("Program/x", "System", folder):
+        (tmp_path / each).mkdir(parents=True, exist_ok=True)
+    (tmp_path / folder / "sync.src").write_text("DEF SYNC( )\nPTP {A1 9}\nEND\n")
+    assert joints(tmp_path / "Program/x", "SYNC( )\nPTP {A1 5}") == ([9.0, 5.0] if read else [5.0])
+
+
+def test_an_archive_is_known_however_its_letters_are_written(tmp_path):
+    for each in ("PROGRAM/x", "PROGRAM/y", "SYSTEM"):
+        (tmp_path / each).mkdir(parents=True)
+    (tmp_path / "PROGRAM/y/own.src").write_text("DEF own( )\nPTP {A1 9}\nEND\n")
+    assert joints(tmp_path / "PROGRAM/x", "own( )") == [9.0]
 
 
 def test_a_folder_that_is_no_archive_is_not_searched(tmp_path):

@@ -251,6 +251,8 @@ def test_where_the_tool_is_after_a_pose_is_that_pose(tmp_path, read):
         "p = [0.1, 0.0]\nmovej([p[0],0,0,0,0,0])\np[1] = 0.2\nmovej([p[1],0,0,0,0,0])",
         "if True: movej([0.1,0,0,0,0,0]) end\nenter_critical movej([0.2,0,0,0,0,0])\nexit_critical",
         "def f(x): movej([x,0,0,0,0,0]) end\nf(0.1) f(0.2)",
+        "if True:\n movej([0.1,0,0,0,0,0]);\nend;\nmovej([0.2,0,0,0,0,0])",
+        "if True:\n movej([0.1,0,0,0,0,0])\nend: movej([0.2,0,0,0,0,0])",
     ],
 )
 def test_statements_of_one_line_matrices_and_a_variable_p(tmp_path, text):

@@ -287,7 +287,10 @@ class UrScriptDialect(Dialect):
         if call.function in MODES:
             memory.write(MODE, doing.text)
         elif call.function in MODES.values():
+            was_on = memory.read(MODE)
             memory.write(MODE, "")
+            if was_on:  # and has led the arm elsewhere
+                return instructions.Unknown(doing.text)
         if call.function == "set_gravity":
             given = _placed(("d",), values, keywords)
             return _mounted(memory, None if given is None else given.get("d"), doing.text)
@@ -473,13 +476,14 @@ def _of_position(memory: ProgramMemory, name: str, given: dict[str, syntax.Value
     """Functions of where the arm is, and of its table.
 
     After a motion with a blend radius the program goes on where the arm enters it [1]_, so that what it reads of the
-    arm is not known; the waypoint is.
+    arm is not known; the waypoint is. Nor is it known while something changes the way of each motion (:data:`MODES`).
 
     References
     ----------
     .. [1] Universal Robots, *User Manual UR5/CB3*, version 3.10, section 14.6, conditional blend trajectories.
     """
-    here = Position() if memory.read(PASSING) and name != "get_target_waypoint" else memory.here
+    elsewhere = memory.read(PASSING) or memory.read(MODE)
+    here = Position() if elsewhere and name != "get_target_waypoint" else memory.here
     if name in ("get_actual_joint_positions", "get_target_joint_positions"):
         if here.joints is None:
             return None
