@@ -521,6 +521,12 @@ class ProgramMemory:
         if isinstance(target.of, syntax.Member) and isinstance(self.value(target.of.of), syntax.Record):
             self.assign(target.of, syntax.Unclear(f"{target.of.name}, partly changed"))  # the record has no such part
             return True
+        part: syntax.Expression = target
+        while isinstance(part, (syntax.Member, syntax.Element)):
+            if isinstance(part, syntax.Member) and isinstance(self.replaced(part.of), tuple):  # which names no parts
+                self.assign(part.of, syntax.Unclear(f"{self.shown(part.of)}, partly changed"))
+                return True
+            part = part.of
         kept = None if name is None else self.read(name)
         if kept is None or not isinstance(of, syntax.Unclear):
             return False
@@ -753,8 +759,10 @@ class ProgramMemory:
                 return syntax.Unclear("a root of a negative number") if isinstance(power, complex) else power
             if sign not in ARITHMETIC:
                 return syntax.Unclear(f"... {sign} ...")
-            if sign in ("%", "MOD") and min(a, b) < 0 and a % b:
+            if sign in ("%", "MOD", "DIV") and min(a, b) < 0 and a % b:
                 return syntax.Unclear(f"{a:g} {sign} {b:g}, whose sign is not documented")
+            if sign in ("MOD", "DIV") and (a % 1 or b % 1):
+                return syntax.Unclear(f"{a:g} {sign} {b:g}, of what is not whole")
             found = ARITHMETIC[sign](a, b)
         except (ZeroDivisionError, OverflowError, ValueError):
             return syntax.Unclear("a division by zero or an overflow")

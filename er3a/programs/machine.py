@@ -767,6 +767,8 @@ class Machine:
         """
         routines = self.program.routines.values()
         code = [((each.name, at), operation) for each in routines for at, operation in enumerate(each.code)]
+        followed = {each.place for routine in routines for each in routine.code}
+        code += [((each.name, -1), op) for each in routines for op in each.handler if op.place not in followed]
         called = {(each.place, each.text) for key, each in code if isinstance(each, syntax.Call) and key in self.passed}
         entered = {name for name, _ in self.passed}
         return tuple(
