@@ -292,9 +292,9 @@ class UrScriptDialect(Dialect):
         if call.function in MODES:
             memory.write(MODE, doing.text)
         elif call.function in MODES.values():
-            was_on = memory.read(MODE)
+            moved = memory.read(MODE) and memory.here.key() != Position().key()
             memory.write(MODE, "")
-            if was_on:  # and has led the arm elsewhere
+            if moved:  # to a target, from which the mode has led the arm away
                 return instructions.Unknown(doing.text)
         if call.function == "set_gravity":
             given = _placed(("d",), values, keywords)
