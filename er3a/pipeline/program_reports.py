@@ -32,7 +32,7 @@ from er3a.pipeline.messages.programs import remedy_at, say
 from er3a.pipeline.results import NEVER_A_PASS, LeftOut, NoPass, plain
 from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_of_limits, left_out_of_units
 from er3a.pipeline.stages.trajectory.judgement import Surroundings, collisions, judge, measured, min_clearance
-from er3a.pipeline.stages.trajectory.motion import listed_motions
+from er3a.pipeline.stages.trajectory.motion import CHOSEN, listed_motions
 from er3a.pipeline.stages.trajectory.written_programs import LONGEST_NAME, near_assumed_shapes, written
 from er3a.planning.names import PATH_VERDICTS, PathVerdict
 from er3a.planning.tool_proof import ProofRequirements
@@ -451,13 +451,12 @@ def programs_of(
         along = measured(surroundings, each.motion)
         if collisions(along):
             verdict = min((verdict, "collides"), key=PATH_VERDICTS.index)
-        elsewhere = language != "csv" and any(left.subject == "missed_rows" for left in each.left_out)
+        rest = tuple(left for left in each.left_out if left.subject not in CHOSEN)
+        elsewhere = language != "csv" and any(left.subject == "missed_rows" for left in rest)
         if ((verdict != "safe" or elsewhere) and not unsafe) or not np.isfinite(each.motion.q[0]).all():
-            yield PathProgram(each.name, verdict, None, left_out=each.left_out)
+            yield PathProgram(each.name, verdict, None, left_out=rest)
             continue
         near = near_assumed_shapes(robot, each.name, min_clearance(along), CheckOptions.assumed_margin)
         files, findings = written(robot, each.motion, verdict, language, near, task.limits.speed)
         name = program_name(each.name, LONGEST_NAME)
-        yield PathProgram(
-            each.name, verdict, {name + suffix: text for suffix, text in files.items()}, findings, each.left_out
-        )
+        yield PathProgram(each.name, verdict, {name + suffix: text for suffix, text in files.items()}, findings, rest)

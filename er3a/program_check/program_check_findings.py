@@ -85,7 +85,8 @@ class SetElsewhere(Finding):
 
 
 class WaitsForOthers(Finding):
-    """A wait for what is false, and what nothing that was read makes true: another task does, and may do more."""
+    """A wait for what is false, or a loop that goes on without a motion; nothing that was read ends it, but another
+    task does, which may do more."""
 
     condition: str
 

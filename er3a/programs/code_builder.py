@@ -422,7 +422,7 @@ def _linked(
             syntax.Assign(operation.place, given, syntax.Opaque(f"{each.function}(...)"), f"{each.function}(...)")
             for each in outside
             for given in changed(each)
-            if isinstance(given, (syntax.Variable, syntax.Member, syntax.Element)) and not _of_system(given)
+            if isinstance(given, (syntax.Variable, syntax.Member, syntax.Element))
         ]
         code += [*calls.found, *unclear, last]
     starts.append(len(code))
@@ -443,13 +443,6 @@ def _invoked(expression: syntax.Expression) -> Iterator[syntax.Invocation]:
         yield expression
     for each in syntax.inner(expression):
         yield from _invoked(each)
-
-
-def _of_system(target: syntax.Expression) -> bool:
-    """Whether a variable is the controller's own, such as ``$POS_ACT``."""
-    while isinstance(target, (syntax.Member, syntax.Element)):
-        target = target.of
-    return isinstance(target, syntax.Variable) and target.name.startswith("$")
 
 
 def _calls(expression: syntax.Expression, known: Mapping[str, syntax.Routine]) -> bool:

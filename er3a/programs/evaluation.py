@@ -128,7 +128,7 @@ def same(a: NamedFrame, b: NamedFrame) -> bool:
     return a.name == b.name and a.pose is None and b.pose is None
 
 
-WITH_FIELDS = ("$VEL", "$ACC", "$APO")
+WITH_FIELDS = {"$APO": ("CDIS", "CPTP", "CORI", "CVEL")} | dict.fromkeys(("$VEL", "$ACC"), ("CP", "ORI1", "ORI2"))
 """KRL variables whose fields are looked up by their full names, however they were set."""
 
 HELD_BESIDE = "%beside"
@@ -219,7 +219,8 @@ COMPARISONS: Mapping[str, Callable[[float, float], bool]] = {
     "<=": operator.le,
     ">=": operator.ge,
 }
-COMPARED = frozenset((*COMPARISONS, "==", "=", "<>", "!="))
+EQUAL, UNEQUAL = ("==", "="), ("<>", "!=")
+COMPARED = frozenset((*COMPARISONS, *EQUAL, *UNEQUAL))
 ARITHMETIC: Mapping[str, Callable[[float, float], float]] = {
     "+": operator.add,
     "-": operator.sub,
@@ -295,6 +296,10 @@ class Dialect(ABC):
     def doubted(self, name: str) -> str:
         """The variable after whose next assignment motions no longer depend on one that is not simulated."""
         return name
+
+    def starts_anew(self, data: syntax.Assign) -> bool:
+        """Whether a variable of the data has its first value again where a program without end is begun anew."""
+        return False
 
     def typed(self, kind: str, value: syntax.Value) -> syntax.Value:
         """What a variable of a declared kind, empty for none, holds after a value is assigned to it."""
@@ -425,8 +430,10 @@ class ProgramMemory:
         self.kept.clear()
         if self.doubts:
             self.doubts.pop(name, None)
-        if name in WITH_FIELDS and isinstance(value, syntax.Record):
-            self.shared.update({f"{name}.{field}": part for field, part in value.items})
+        if name in WITH_FIELDS:
+            unknown = tuple((field, syntax.Unclear(f"{name}.{field}")) for field in WITH_FIELDS[name])
+            parts = value.items if isinstance(value, syntax.Record) else unknown
+            self.shared.update({f"{name}.{field}": part for field, part in parts})
         if local or (self.local and root(name) in self.local):
             handed = self.local.get(HELD_BESIDE, ())
             self.local[name] = syntax.Unclear(name) if isinstance(handed, tuple) and root(name) in handed else value
@@ -663,9 +670,9 @@ class ProgramMemory:
         for side in (left, right):
             if isinstance(side, syntax.Unclear):
                 return side
-        if sign in ("==", "=", "<>", "!="):
+        if sign in EQUAL or sign in UNEQUAL:
             same = self._equal(left, right)
-            return same == (sign in ("==", "=")) if isinstance(same, bool) else same
+            return same if isinstance(same, syntax.Unclear) else same == (sign in EQUAL)
         if self._too_near(sign, left, right):
             return _decided_by_rounding(sign, left, right)
         if sign in BITWISE:
@@ -687,14 +694,12 @@ class ProgramMemory:
                 return syntax.Unclear(syntax.shown(side))
         if self._too_near("==", left, right):
             return _decided_by_rounding("==", left, right)
-        if _sort(left) is not _sort(right):  # which languages refuse, or convert
-            return syntax.Unclear(f"{syntax.shown(left)} == {syntax.shown(right)}")
-        parts = _parts(left), _parts(right)
-        if not parts[0] or not parts[1] or parts[0].keys() != parts[1].keys():
-            return left == right
-        found = [self._equal(parts[0][key], parts[1][key]) for key in parts[0]]
-        unclear = next((each for each in found if isinstance(each, syntax.Unclear)), True)
-        return unclear if all(each is not False for each in found) else False
+        one, other = _parts(left), _parts(right)
+        if one is None or other is None or len(one) != len(other):
+            alike = _sort(left) is _sort(right)  # others languages refuse, or convert
+            return left == right if alike else syntax.Unclear(f"{syntax.shown(left)} == {syntax.shown(right)}")
+        found = [self._equal(*pair) for pair in zip(one, other)]
+        return False if False in found else next((each for each in found if isinstance(each, syntax.Unclear)), True)
 
     def _too_near(self, sign: str, left: syntax.Value, right: syntax.Value) -> bool:
         """Whether two numbers that are compared differ by no more than what rounding, or measuring, may miss."""
@@ -767,15 +772,16 @@ def _sort(value: syntax.Value) -> type:
     return float if syntax.number(value) is not None else type(value)
 
 
-def _parts(value: syntax.Value) -> dict[str, syntax.Value]:
-    """The parts of a list or record, by place or name; empty of other values."""
+def _parts(value: syntax.Value) -> tuple[syntax.Value, ...] | None:
+    """The parts of a list or record, in their order; None of other values."""
     if isinstance(value, syntax.Record):
-        return {f"{value.kind} {key}": each for key, each in value.items}
-    return {str(i): each for i, each in enumerate(value)} if isinstance(value, tuple) else {}
+        return value.values()
+    return value if isinstance(value, tuple) else None
 
 
 def _decided_by_rounding(sign: str, left: syntax.Value, right: syntax.Value) -> syntax.Unclear:
-    return syntax.Unclear(f"{left:.9g} {sign} {right:.9g}, which rounding decides on the controller")
+    numbers = [f"{syntax.number(each):.9g}" for each in (left, right)]
+    return syntax.Unclear(f"{numbers[0]} {sign} {numbers[1]}, which rounding decides on the controller")
 
 
 def _whole(name: str | None) -> str:

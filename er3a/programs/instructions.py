@@ -241,6 +241,8 @@ class ArmMotion(ByValue):
     turns : a setting that asks for another turn of the tool than is followed; empty for none
     doubt : an instruction before that is not understood, and may have set another tool, base or path; empty if there is
         none, and for targets that are no poses
+    entry : how much of it a corner before it may take, where the zone there is a share of the motion before alone
+        (KRL's C_PTP); None where that zone holds for both
     """
 
     kind: MotionKind
@@ -262,6 +264,7 @@ class ArmMotion(ByValue):
     turns: str = ""
     doubt: str = ""
     with_path: bool = False
+    entry: Zone | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -271,7 +274,7 @@ class Pause:
     Attributes
     ----------
     stops : whether the arm is known to stand at its target then, even after a motion with a zone
-    by_others : whether the condition is false, and nothing that was read makes it true
+    by_others : whether nothing that was read ends the wait
     """
 
     seconds: float | None = None

@@ -1219,6 +1219,28 @@ def test_all_of_a_joint_move_within_a_zones_distance_is_looked_at(tmp_path):
     assert codes(found)["zone_collides"] == [9]
 
 
+@pytest.mark.long
+@pytest.mark.parametrize(("share", "told"), [(40, False), (100, True)])
+def test_a_corner_of_joint_moves_ends_by_the_share_of_the_next_one(tmp_path, share, told):
+    """The ball stands where the corner comes by if the next move gives half of itself, not a fifth."""
+    at = np.eye(4)
+    at[:3, 3] = [0.253, 0.237, 0.489]
+    begin, corner, end = "{A1 -60,A2 -10,A3 -10,A5 -70}", "{A1 60}", "{A2 30,A3 -60}"
+    body = f"{FRAMES}{SLOW}$APO.CPTP=40\nPTP {begin}\nPTP {corner} C_PTP\n$APO.CPTP={share}\nPTP {end}"
+    options = {"scene": Scene("ball", (Sphere("ball", at, 0.005),)), "measures": True}
+    found = check(tmp_path, krl(body), "a.src", start=np.radians([-60, -10, -10, 0, -70, 0]), **options)
+    assert ("zone_collides" in codes(found)) == told
+
+
+@pytest.mark.parametrize(
+    ("words", "distance", "told"),
+    [("C_PTP", "", True), ("C_PTP", "$APO.CDIS=5\n", False), ("C_PTP C_VEL", "$APO.CDIS=5\n", True)],
+)
+def test_how_much_of_a_line_a_corner_after_a_joint_move_takes_is_known_or_told(tmp_path, words, distance, told):
+    body = f"{AT_START}$APO.CPTP=10\n{distance}PTP {{X 400,Y 0,Z 300,{DOWN}}} {words}\nLIN {{X 400,Y 50,Z 300,{DOWN}}}"
+    assert ("zone_without_size" in codes(check(tmp_path, krl(body), "a.src"))) == told
+
+
 def test_a_wait_after_a_stop_is_no_corner(tmp_path):
     text = (CORNER["a.pgm"] % "DWELL(0.1);").replace("z95", "fine")
     found = check(tmp_path, text, "a.pgm")
@@ -1509,6 +1531,13 @@ def test_a_position_that_is_read_after_continue_is_not_known(tmp_path):
     ahead, stopped = (motions(tmp_path, krl(f"FRAME F\n{line % each}"), "a.src")[-1] for each in ("CONTINUE\n", ""))
     assert isinstance(ahead.target, UnresolvedTarget)
     assert not isinstance(stopped.target, UnresolvedTarget)
+
+
+@pytest.mark.parametrize(("before", "ways"), [("CONTINUE\n", {5.0, 9.0}), ("", {5.0})])
+def test_what_asks_for_the_position_after_continue_is_not_decided(tmp_path, before, ways):
+    ask = f"{AT_START}{before}IF $AXIS_ACT.A1<1 THEN\nPTP {{A1 5}}\nELSE\nPTP {{A1 9}}\nENDIF"
+    found = motions(tmp_path, krl(f"PTP {axes(HOME)}\n{ask}"), "a.src")
+    assert {round(float(np.degrees(each.target.joints[0])), 6) for each in found[-2:]} & {5.0, 9.0} == ways
 
 
 ONE_TOOL = "[TRUE,[[0,0,100],[1,0,0,0]],[1,[0,0,0],[1,0,0,0],0,0,0]]"

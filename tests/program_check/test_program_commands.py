@@ -250,6 +250,19 @@ def test_a_joint_move_that_its_speeds_at_the_ends_bend_is_written_as_points_of_i
     assert (len(moves[1]), lowest[1]) == (2, pytest.approx(-10))
 
 
+def test_a_program_settles_what_its_path_leaves_open(tmp_path):
+    """The half turn is written as two halves, and the first pose is gone to by its joints."""
+    start, end = (f"{{xyz_mm: [400, {y}, 400], rpy_deg: [180, 0, {yaw}]}}" for y, yaw in ((0, 0), (60, 180)))
+    (tmp_path / "paths.yaml").write_text(
+        "kind: paths\npaths:\n  - {name: turn, title: Turn, kind: line, samples: 30, duration_s: 6, "
+        f"start: {start}, end: {end}}}\n"
+    )
+    words = ("program", "write", str(tmp_path / "paths.yaml"), "--robot", "er3a_c60", "--language", "krl")
+    done = run(*words, "--output", str(tmp_path))
+    assert done.exit_code == 0, done.stderr
+    assert (tmp_path / "turn.src").is_file()
+
+
 def test_a_program_is_written_as_the_paths_of_its_stretches(tmp_path):
     paths = tmp_path / "paths.yaml"
     paths.write_text(

@@ -47,7 +47,9 @@ def test_each_module_has_its_own_points_and_routines(cell):
     assert [run.own_line(step) for step in steps] == [3, 5, 5, 5, 5, 5, 5, 7, 11]
 
 
-def test_files_are_those_that_it_calls(cell):
+def test_files_are_those_that_it_calls_and_those_that_may_set_what_all_know(cell):
+    assert {file.name for file in files_of(cell)} == FILES.keys()
+    cell.with_name("Pick.dat").write_text(FILES["Pick.dat"].replace("GLOBAL ", ""))
     assert {file.name for file in files_of(cell)} == FILES.keys() - {"other.src"}
 
 

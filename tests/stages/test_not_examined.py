@@ -25,6 +25,7 @@ from er3a.files.robot_file import Placement
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
 from er3a.files.target_file import load_targets
+from er3a.files.vision_file import load_vision
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import MIN_SINGULAR_VALUE
@@ -67,6 +68,7 @@ from er3a.pipeline.stages.workspace.compute import compute as workspace
 from er3a.pipeline.stages.workspace.entry import BoxTask
 from er3a.pipeline.stages.workspace.model import CapabilityMissing
 from er3a.pipeline.study import Study, load_study
+from er3a.pipeline.viewing.conditions import program_head
 from er3a.references.rows import GROUPS
 from er3a.robots.robot import ConvexPiece, Envelope, PairRule, Robot, Visual
 
@@ -119,6 +121,18 @@ def test_paths_name_what_their_settings_leave_out(study, tmp_path):
     assert "scene_shapes" not in found
     absent = "scene_shapes" if study.scene(ROBOT, "trajectory") is None else "obstacles"
     assert {"scene_shapes", "obstacles"} - more.keys() == {absent}
+
+
+@pytest.mark.parametrize(("grade", "names"), [("inferred", tuple(f"J{j}" for j in range(1, 7))), ("claim", None)])
+def test_joint_speeds_that_the_robots_file_guesses_are_named_as_assumed(study, tmp_path, grade, names):
+    content = yaml.safe_load(Path(f"data/robots/{ROBOT}.yaml").read_text(encoding="utf-8"))
+    rows = [{"joint": j, "speed_deg_s": 180.0} for j in range(1, 7)]
+    content["speeds"] = {"source": "As arms of this size", "grade": grade, "rows": rows}
+    (tmp_path / f"{ROBOT}.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
+    entry = {"paths": one_path(tmp_path), "file": str(tmp_path / f"{ROBOT}.yaml")}
+    found = trajectory(changed(study, entry, trajectory={"avoidance": "slow"}), ROBOT)
+    assert (subjects(found)["own_speeds"].names if names else subjects(found).get("own_speeds")) == names
+    assert found.summary.joint_limits.speed_assumed == (names is not None,) * 6
 
 
 @pytest.mark.long
@@ -467,6 +481,9 @@ def in_doubt(kind: str, content: dict, confirmed: bool) -> dict:
     elif kind == "carried":
         box = {"name": "gripper", "size_mm": [50, 50, 90], "xyz_mm": [0, 0, 50], "rpy_deg": radians}
         content["carried"] = {"boxes": [box]}
+    elif kind == "hulls":
+        points = [[x, y, z] for x in (-0.05, 0.05) for y in (-0.05, 0.05) for z in (0, 0.3)]
+        content["envelopes"]["hulls"] = [{"link": 4, "points_mm": points}]
     elif kind == "targets":
         content["targets"][0] = {"name": "one", "q_deg": [0, -0.52, 0.31, 0, 1.2, 0]}
     elif kind == "paths":
@@ -483,6 +500,12 @@ def in_doubt(kind: str, content: dict, confirmed: bool) -> dict:
     elif kind == "mesh":
         mesh = {"file": "part.stl", "density_kg_m3": 1000, "xyz_mm": metres}
         content["robots"][ROBOT]["tool_load"] = {"source": "x", "grade": "cad", "mesh": mesh}
+    elif kind == "vision":
+        content["home_deg"] = [0, 0.349, -0.349, 0, -1.5708, 0]
+    elif kind == "grasp":
+        content["objects"][0]["grasps"][0]["xyz_mm"] = [0.0, 0.0, 0.12]
+    elif kind == "detector":
+        content["objects"][0]["standard_deviation"]["position_mm"] = [0.0004, 0.0004, 0.0008]
     else:
         content["dynamics"] = content.get("dynamics", {}) | {"payload_centre_mm": metres}
     return content | ({"units_checked": True} if confirmed else {})
@@ -498,12 +521,16 @@ def in_doubt(kind: str, content: dict, confirmed: bool) -> dict:
         ("targets", "inverse", "targets.yaml: targets[0].q_deg: [0, -0.52, 0.31, 0, 1.2, 0] deg"),
         ("paths", "trajectory", "paths.yaml: paths[0].end_deg: [0, -0.52, 0.31, 0, 1.2, 0] deg"),
         ("robot", "inverse", f"{ROBOT}.yaml: tool.xyz_mm: [0.0, 0.0, 0.3] mm"),
+        ("hulls", "trajectory", f"{ROBOT}.yaml: envelopes.hulls[0].points_mm: 0.3 mm at most"),
         ("masses", "dynamics", f"{ROBOT}.yaml: inertia.links[1].centre_mm: [0.15, 0.0, 0.0] mm"),
         ("masses", "trajectory", ""),
         ("base", "trajectory", f"study.yaml: robots.{ROBOT}.base.xyz_mm: [0.0, 0.0, 0.3] mm"),
         ("payload", "dynamics", f"study.yaml: robots.{ROBOT}.payload.body.centre_mm: [0.0, 0.0, 0.3] mm"),
         ("payload", "trajectory", ""),
         ("mesh", "dynamics", f"study.yaml: robots.{ROBOT}.tool_load.mesh.xyz_mm: [0.0, 0.0, 0.3] mm"),
+        ("vision", "vision", "vision.yaml: home_deg: [0, 0.349, -0.349, 0, -1.5708, 0] deg"),
+        ("grasp", "vision", "vision.yaml: objects[0].grasps[0].xyz_mm: [0.0, 0.0, 0.12] mm"),
+        ("detector", "vision", "vision.yaml: objects[0].standard_deviation.position_mm: [0.0004, 0.0004, 0.0008] mm"),
         ("settings", "dynamics", "study.yaml: dynamics.payload_centre_mm: [0.0, 0.0, 0.3] mm"),
     ],
 )
@@ -516,9 +543,11 @@ def test_a_number_that_looks_like_another_unit_is_no_pass_where_it_is_read(
         "paths": f"data/paths/{ROBOT}.yaml",
         "scene": "data/scenes/table_and_post.yaml",
         "robot": f"data/robots/{ROBOT}.yaml",
+        "vision": f"data/vision/{ROBOT}.yaml",
         "study": "config/small.yaml",
     }
-    of = {"carried": "scene", "masses": "robot"}.get(kind, kind if kind in sources else "study")
+    of_files = {"carried": "scene", "masses": "robot", "hulls": "robot", "grasp": "vision", "detector": "vision"}
+    of = of_files.get(kind, kind if kind in sources else "study")
     files = {each: tmp_path / f"{ROBOT if each == 'robot' else each}.yaml" for each in sources}
     for each, source in sources.items():
         content = yaml.safe_load(Path(source).read_text(encoding="utf-8"))
@@ -537,11 +566,13 @@ def test_a_number_that_looks_like_another_unit_is_no_pass_where_it_is_read(
         if stage == "dynamics":
             study.loads(name)
             study.section(DynamicsSettings)
+        if stage == "vision":
+            load_vision(files["vision"], robot)
         return Results(Summary(Verdict("pass", NoPass(())), ()))
 
     written = []
     monkeypatch.setattr(STAGES[stage].module("compute"), "compute", passing)
-    monkeypatch.setattr(run, "write_results", lambda *given: written.append(given[-1]))
+    monkeypatch.setattr(run, "write_results", lambda *given: written.append(given[4]))
     run.compute(stage, read, ROBOT, tmp_path)
     (verdict,) = [each.summary.verdict for each in written]
     expected = place and not confirmed
@@ -562,7 +593,7 @@ def test_limits_that_are_assumed_are_no_pass(tmp_path, monkeypatch, grade, statu
     study["robots"] = {ROBOT: study["robots"][ROBOT] | {"file": str(tmp_path / f"{ROBOT}.yaml")}}
     written = []
     passing = Results(Summary(Verdict("pass", NoPass(())), ()))
-    monkeypatch.setattr(run, "write_results", lambda *given: written.append(given[-1].summary.verdict))
+    monkeypatch.setattr(run, "write_results", lambda *given: written.append(given[4].summary.verdict))
     for stage in ("trajectory", "validation"):
         monkeypatch.setattr(STAGES[stage].module("compute"), "compute", lambda study, name: passing)
         run.compute(stage, Study.model_validate(study), ROBOT, tmp_path)
@@ -767,6 +798,7 @@ def test_a_grasp_passes_by_no_object_out_of_view_and_no_arm_without_errors(study
         ("objects_out_of_view", ("can",), {"view": content["view"] | {"horizontal_deg": 5}}),
         ("objects_out_of_view", ("can",), {"view": content["view"] | {"farthest_mm": 900}}),
         ("arm_errors", (), {"arm": {"source": "none", "repeatability_mm": 0.02}}),
+        ("arm_errors", (), {"arm": content["arm"] | {"table_angle_standard_deviation_deg": 0.0}}),
     ):
         (tmp_path / "vision.yaml").write_text(yaml.safe_dump(content | more), encoding="utf-8")
         verdict = vision(changed(study, own, vision=few), ROBOT).summary.verdict
@@ -806,6 +838,8 @@ def test_what_no_verdict_passes_without_turns_it_and_is_said():
             ).verdict
             assert verdict.status == ("caution" if status == "pass" and subject in NEVER_A_PASS else status)
             assert ("no pass" in say_all(verdict.findings)) == (subject in NEVER_A_PASS)
+        if subject in NEVER_A_PASS:  # programs say it too, as who gets one may never see a page
+            assert program_head(None, [LeftOut(subject, amount=3.0)])[-1].startswith("not checked: ")
     many = LeftOut("allowed_contacts", tuple(f"link_{k}/table" for k in range(9)))
     assert say(NoPass((many,))).endswith("link_5/table, 3 more).")
 
@@ -1028,8 +1062,55 @@ def test_pairs_that_are_left_out_whole_are_not_named_as_joined():
     guessed = {f"{row.first}/{row.second}" for row in bodies.matrix if row.state == "guessed" and row.left_out}
     found = {each.subject: each.names for each in left_out_of_collisions(arm, bodies, None)}
     assert guessed
-    assert guessed.isdisjoint(found["joined_pairs"])
+    assert guessed.isdisjoint({*found.get("joined_pairs", ()), *found["joined_whole"]})
     assert guessed <= {*found["unexamined_pairs"]}
+
+
+def test_pairs_of_which_nothing_is_left_beyond_their_joint_are_not_said_to_be_examined():
+    bodies = bodies_of(load_robot("er3_600"), None)
+    measured = {pair.label for pair in bodies.pairs}
+    found = {each.subject: each.names for each in left_out_of_collisions(bodies.robot, bodies, None)}
+    assert found["joined_whole"] == ("link_2/link_3", "link_3/link_4")
+    assert measured.isdisjoint(found["joined_whole"])
+    assert measured >= {*found["joined_pairs"]}
+
+
+@pytest.mark.parametrize(("given", "named"), [(None, ("zero", "tool")), ({"tool": {}}, ("zero",))])
+def test_values_of_the_robots_file_that_are_assumed_are_named(tmp_path, monkeypatch, given, named):
+    content = yaml.safe_load(Path(f"data/robots/{ROBOT}.yaml").read_text(encoding="utf-8"))
+    content["zero"]["grade"] = "inferred"
+    content["tool"] = {"source": "x", "grade": "inferred", "xyz_mm": [0, 0, 50]}
+    (tmp_path / f"{ROBOT}.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
+    study = yaml.safe_load(Path("config/small.yaml").read_text(encoding="utf-8"))
+    study["robots"] = {ROBOT: study["robots"][ROBOT] | {"file": str(tmp_path / f"{ROBOT}.yaml")} | (given or {})}
+    written = []
+    passing = Results(Summary(Verdict("pass", NoPass(())), ()))
+    monkeypatch.setattr(run, "write_results", lambda *given: written.append(given[4].summary))
+    monkeypatch.setattr(STAGES["trajectory"].module("compute"), "compute", lambda study, name: passing)
+    run.compute("trajectory", Study.model_validate(study), ROBOT, tmp_path)
+    assert written[0].verdict.status == "pass"
+    assert [(each.subject, each.names) for each in written[0].not_examined] == [("own_values", named)]
+
+
+@pytest.mark.parametrize(
+    ("arm", "given", "status", "named"),
+    [
+        (ROBOT, {}, "caution", {"half_turns": ("turn: 1",), "start_branches": ("turn",)}),
+        (ROBOT, {"half_turn_axis": [0, 0, 1], "start_branch": "front, elbow up, flip"}, "pass", {}),
+        ("lbr_iiwa_14", {"half_turn_axis": [0, 0, 1]}, "pass", {"start_branches": ("turn",), "arm_angles": ("turn",)}),
+    ],
+)
+def test_what_a_path_leaves_open_is_named(tmp_path, arm, given, status, named):
+    """The sense of half a turn is no pass; branch and arm angle that were chosen here are told."""
+    start, end = ({"xyz_mm": [400, y, 400], "rpy_deg": [180, 0, yaw]} for y, yaw in ((0, 0), (30, 180)))
+    path = {"name": "turn", "title": "T", "kind": "line", "start": start, "end": end, "samples": 10, "duration_s": 5.0}
+    (tmp_path / "paths.yaml").write_text(yaml.safe_dump({"kind": "paths", "paths": [path | given]}), encoding="utf-8")
+    robot, settings = load_robot(arm), load_study("config/small.yaml").trajectory
+    task = planning_of(robot, settings, None, 0)
+    (listed,) = listed_motions(tmp_path / "paths.yaml", task, proof_requirements(robot, settings), 1)
+    assert {each.subject: each.names for each in listed.left_out} == named
+    summary = Summary(Verdict("pass", NoPass(())), (), not_examined=listed.left_out)
+    assert summary.verdict.status == status
 
 
 @pytest.mark.parametrize(

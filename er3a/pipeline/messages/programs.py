@@ -397,8 +397,8 @@ TEXTS = texts(
             "data file only"
         ),
         "waits_for_others": (
-            "'{condition}' is false here, and nothing that was read makes it true: another task does, and what else "
-            "that sets is not known"
+            "nothing that was read ends this wait ('{condition}'): another task does, and what else that sets is not "
+            "known"
         ),
         "errors_not_followed": (
             "the program may go on after an error in this routine, or in one that it calls; that was followed for few "

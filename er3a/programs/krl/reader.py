@@ -9,6 +9,7 @@ import math
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -129,7 +130,7 @@ PTP LIN CIRC PTP_REL LIN_REL CIRC_REL SPTP SLIN SCIRC SPL SPTP_REL SLIN_REL SCIR
 """
 MOTIONS = frozenset(WORDS_OF_MOTIONS.split())
 WORDS_ASIDE = """
-EXT EXTFCT IMPORT ENUM CONTINUE ANOUT BRAKE CONST_VEL ON_ERROR_PROCEED STOP
+EXT EXTFCT IMPORT ENUM CONTINUE ANOUT BRAKE CONST_VEL STOP
 """
 ASIDES = frozenset(WORDS_ASIDE.split())
 WITH_VALUES = frozenset(["ANOUT", "CONST_VEL", "STOP"])  # of these
@@ -148,7 +149,11 @@ def statement(
     if inside_data and (plain := PLAIN_DATA.match(text)) is not None and (found := plain_record("", plain[3])):
         builder.add(syntax.Assign(place, syntax.Variable(plain[2].upper()), found, text, plain[1].upper()))
         return
-    reading = _Statement(builder, place, text, signals, inside_data)
+    reading, first, ahead = (
+        _Statement(builder, place, text, signals, inside_data),
+        len(builder.code),
+        _runs_ahead(builder),
+    )
     try:
         reading.read()
     except MisreadError as error:
@@ -158,6 +163,22 @@ def statement(
         builder.unread(place, text, not inside_data, folds=True)
     except RecursionError:
         raise InputError(place.file, place.where, "nested too deeply", "Split this line") from None
+    if ahead or not signals.keys().isdisjoint(reading.words.texts):
+        meant = partial(_meant, signals=signals, ahead=text if ahead else "")
+        builder.code[first:] = [mapped(each, meant) for each in builder.code[first:]]
+
+
+def _meant(expression: syntax.Expression, signals: Mapping[str, syntax.Expression], ahead: str) -> syntax.Expression:
+    """An expression with the outputs that routines get by the names of signals; where the arm is, is not known of a
+    line that runs ``ahead`` of it, if that is not empty."""
+    if isinstance(expression, syntax.Variable) and ahead and expression.name in (*HERE, *HERE_JOINTS):
+        return syntax.Constant(syntax.Unclear(f"{ahead} after CONTINUE"))
+    if isinstance(expression, syntax.Invocation):
+        given = (
+            signals.get(each.name, each) if isinstance(each, syntax.Variable) else each for each in expression.arguments
+        )
+        expression = replace(expression, arguments=tuple(given))
+    return within(expression, partial(_meant, signals=signals, ahead=ahead))
 
 
 class _Statement:
@@ -180,7 +201,7 @@ class _Statement:
         elif first in HANDLERS and words.texts[words.at + 1] != "=":
             words.take()
             HANDLERS[first](self)
-        elif first in ASIDES:
+        elif first in ASIDES and words.texts[words.at + 1] != "=":
             _aside(self)
         elif first in OUTER_AXES:
             self.builder.unknown(self.place, self.text, may_move=False)
@@ -225,7 +246,8 @@ class _Statement:
         if words.accept("SIGNAL"):
             name, signal = words.name(), words.expression()
             if words.accept("TO"):  # several, of which it is not known what each has when they are set as a number
-                signal = syntax.Element(syntax.Variable(variable_of(signal)), (syntax.Opaque(name),))
+                one_of_them = syntax.Constant(syntax.Unclear(name))
+                signal = syntax.Element(syntax.Variable(variable_of(signal)), (one_of_them,))
             self.signals[name] = signal
             self.builder.aside(self.place, self.text)
             return
@@ -249,8 +271,6 @@ class _Statement:
         if words.accept("="):
             value = words.expression()
             words.finish()
-            if _runs_ahead(self.builder) and any(_names(value, each) for each in (*HERE, *HERE_JOINTS)):
-                value = syntax.Constant(syntax.Unclear(f"{self.text} after CONTINUE"))
             self.builder.add(syntax.Assign(self.place, left, value, self.text))
             return
         words.finish()
@@ -344,12 +364,6 @@ def _wait(reading: _Statement) -> None:
     words.expect("FOR")
     text = re.sub(r"(?i)^WAIT\s+FOR\s*", "", reading.text)
     reading.builder.add(syntax.Waiting(reading.place, "condition", reading.condition(), text, stops))
-
-
-def _names(expression: syntax.Expression, name: str) -> bool:
-    """Whether a variable is in an expression."""
-    own = isinstance(expression, syntax.Variable) and expression.name == name
-    return own or any(_names(each, name) for each in syntax.inner(expression))
 
 
 def _runs_ahead(builder: CodeBuilder) -> bool:
@@ -449,6 +463,13 @@ def _structure(reading: _Statement) -> None:
     reading.builder.add(syntax.Assign(reading.place, syntax.Variable(f"{STRUCTURE}{name}"), shape, reading.text))
 
 
+def _on_error_proceed(reading: _Statement) -> None:
+    """The next line may fail, and the program goes on; in the controller's bas.src it asks what is there, and it is."""
+    number: syntax.Value = 0 if is_basics(reading.place.file or Path()) else syntax.Unclear("$ERR.NUMBER")
+    target, value = syntax.Variable("$ERR.NUMBER"), syntax.Constant(number)
+    reading.builder.add(syntax.Assign(reading.place, target, value, reading.text))
+
+
 def _goto(reading: _Statement) -> None:
     reading.builder.goto(reading.place, reading.words.name())
 
@@ -483,6 +504,7 @@ HANDLERS: dict[str, Handler] = {
     "INTERRUPT": _interrupt,
     "STRUC": _structure,
     "TRIGGER": _do,
+    "ON_ERROR_PROCEED": _on_error_proceed,
     "RESUME": lambda reading: reading.builder.unknown(reading.place, reading.text),  # the arm stops where it is
     "SPLINE": lambda reading: _spline(reading),
     "PTP_SPLINE": lambda reading: _spline(reading),
@@ -506,6 +528,7 @@ def _spline(reading: _Statement) -> None:
 
 
 GLOBAL_ROUTINE = re.compile(r"(?im)^\s*GLOBAL\s+DEF(?:FCT\s+\w+(?:\s*\[[^\]]*\])?)?\s+(\w+)")
+GLOBAL_SIGNAL = re.compile(r"(?i)\s*(?:DECL\s+)?GLOBAL\s+SIGNAL\b")
 NAME = re.compile(r"[A-Za-z_$][\w$]*")
 SETTING = re.compile(r"\(|(?<![=<>])=(?!=)")
 
@@ -595,6 +618,8 @@ def read_krl(source: ProgramText) -> syntax.Program:
     findings: list[ProgramFinding] = [*source.findings]
     if files.config is not None:
         reader.read_data(read_program_text(files.config))
+    for file in files.public_data:
+        reader.read_signals(file)
     of_controller = dict(reader.signals)
     findings += reader.read_published(files.published)
     data_file = data_file_of(source.path, ".dat")
@@ -602,19 +627,21 @@ def read_krl(source: ProgramText) -> syntax.Program:
         findings += reader.read_data(read_program_text(data_file))
     routines = reader.read_routines()
     findings += [*_robot_root(files.machine_data), *files.twice()]
-    shared = _known_to_all(files, reader.data, data_file)
-    others = _SetByOthers(files, shared, of_controller)
     called: list[syntax.Routine] = []
     hidden = _seen_here_alone(source, routines, reader.data)
+    seen_by_all = [each for each in reader.data if each.place.file != data_file or GLOBAL_NAME.search(each.text)]
     reader.data = [each if each.place.file == data_file else _as(each, hidden) for each in reader.data]
     for file in files.modules:
         more_routines, more_data, more = _module(read_program_text(file), of_controller)
+        seen_by_all += [each for each in more_data if GLOBAL_NAME.search(each.text)]
         called += [_with_names(each, hidden) for each in more_routines]
         reader.data += [_as(each, hidden) for each in more_data]
         findings += more
+    shared = _known_to_all(files, seen_by_all)
+    others = _SetByOthers(files, shared, of_controller)
     unread = (each for each in files.unread if shared or each.suffix.lower() == ".sub")  # which sets outputs too
     findings += [NotUnderstood(file.name, Place(file, 1)) for file in unread]
-    if data_file is None and lacks_data(routines, reader.data, CONFIG_NAMES):
+    if data_file is None and lacks_data(routines, reader.data, CONFIG_NAMES | reader.signals.keys()):
         findings.append(DataFileMissing(source.path.with_suffix(".dat").name))
     by_name, unlinked = linked([*called, *routines], changed_arguments)
     return syntax.Program(
@@ -654,12 +681,11 @@ def _reached(by_name: Mapping[str, syntax.Routine], names: list[str]) -> dict[st
     return found
 
 
-def _known_to_all(files: ControllerFiles, data: Iterable[syntax.Assign], own: Path | None) -> frozenset[str]:
-    """Variables that all modules see, as those of $config.dat, of those that the program uses."""
+def _known_to_all(files: ControllerFiles, seen: Iterable[syntax.Assign]) -> frozenset[str]:
+    """Variables of data that all modules see, as those of $config.dat, of those that the program uses."""
     texts = (files.text(each) for each in (files.path, *files.modules))
     used = {name.upper() for text in texts for name in NAME.findall(text)} | {*READ_BY_NUMBER, *MODAL_DATA}
-    known = (variable_of(each.target) for each in data if each.place.file != own or GLOBAL_NAME.search(each.text))
-    return frozenset(used.intersection(known))
+    return frozenset(used.intersection(variable_of(each.target) for each in seen))
 
 
 Signals = Mapping[str, syntax.Expression]
@@ -697,6 +723,16 @@ class _KrlReader:
                     seen[each.target.name] = True
                 self.data.append(each)
         return found
+
+    def read_signals(self, file: Path) -> None:
+        """The signals that a ``.dat`` file declares for all modules."""
+        source = read_program_text(file)
+        for number, line in enumerate(source.lines, 1):
+            if GLOBAL_SIGNAL.match(line):
+                place = Place(file, number)
+                statement(
+                    CodeBuilder("", (), place), place, split_comment(line, place)[0], self.signals, inside_data=True
+                )
 
     def read_published(self, files: Iterable[Path]) -> list[ProgramFinding]:
         """What ``.dat`` files of modules that a program does not call declare for all modules."""

@@ -141,6 +141,10 @@ class RapidDialect(Dialect):
             return frame_of_tool(value)[0]
         return frame_of_object(value)[0] if kind == "WOBJDATA" else None
 
+    def starts_anew(self, data: syntax.Assign) -> bool:
+        """Whether it is a VAR, which has its first value again where the program pointer is set to main."""
+        return data.text.upper().startswith("VAR")
+
     def function(self, memory: ProgramMemory, name: str, given: syntax.Invocation) -> syntax.Value:
         """Mathematics, positions, where the arm is; what is unknown, or called otherwise, is unclear."""
         values = tuple(UNCLEAR if each is None else memory.value(each) for each in given.arguments)

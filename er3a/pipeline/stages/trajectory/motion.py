@@ -14,6 +14,7 @@ from er3a.collision.along import RateBounds
 from er3a.collision.bodies import Bodies
 from er3a.errors import InputError, NotWristPartitionedError, PoseError
 from er3a.files.path_file import PathEntry, ProgramPath, load_paths
+from er3a.kinematics.by_class import arm_solver
 from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import NearSingular
@@ -443,13 +444,30 @@ def listed_motions(
                 ("program_rest", part.rest if part else ()),
                 ("given_rates", motion.built.unread if motion else ()),
                 ("missed_rows", tuple(filter(None, [motion and rows_missed(task.robot, motion.built)]))),
+                ("half_turns", motion.built.turns_open if motion and not part else ()),
             )
             rest = [LeftOut(of, (f"{listed.name}: {', '.join(map(str, own))}",)) for of, own in parts if own]
+            rest += [LeftOut(of, (listed.name,)) for of in (_chosen(task.robot, motion) if motion and not part else ())]
             if part and part.part.found:
                 rest.append(LeftOut("program_findings", tuple(f"{listed.name}: {at}" for at in at_lines(part))))
             yield ListedMotion(
                 *(listed.name, entry.name, entry.title, entry.expected, motion, ended), tuple(rest), refused
             )
+
+
+CHOSEN: tuple[LeftOutSubject, ...] = ("half_turns", "start_branches", "arm_angles")
+"""What a path leaves open, and a program that is written of it settles."""
+
+
+def _chosen(robot: Robot, motion: Motion) -> Iterator[LeftOutSubject]:
+    """What a path of the tool leaves open, and was chosen here."""
+    built = motion.built
+    if built.tool is None:
+        return
+    if built.q_start is None and built.start_slot is None:
+        yield "start_branches"
+    if arm_solver(robot).chain.code == "arm_angle":
+        yield "arm_angles"
 
 
 def at_lines(entry: PartOfProgram) -> list[str]:
