@@ -1121,7 +1121,8 @@ class Machine:
                     self._note(other, start.place, instructions.MovesBeside(name, "entered", start.text))
                 if not fits:
                     self._note(other, start.place, instructions.Unknown(start.text, may_move=False))
-        way.memory.doubts.update((frame, start.text) for frame in self.dialect.frames if frame in sets)
+        changed = _changed_in(self.program, _with_called(self.program, (name,)), self.dialect)
+        way.memory.doubts.update((frame, start.text) for frame in self.dialect.frames if frame in changed)
         if start.kind == "thread" and not sets:
             way.memory.here = Position()
 

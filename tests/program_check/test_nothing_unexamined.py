@@ -183,6 +183,15 @@ def test_behind_the_start_of_a_thread_that_moves_the_place_is_not_known(tmp_path
     assert found.level == "caution"
 
 
+def test_a_tool_is_in_doubt_behind_the_start_of_a_thread_that_sets_it(tmp_path):
+    text = (
+        "thread T():\n  set_tcp(p[0,0,0.2,0,0,0])\nend\n"
+        f"set_tcp(p[0,0,0,0,0,0])\nmovej({HOME_TEXT})\nrun T()\nmovej({NEAR_TEXT})\n"
+        f"movel({text_of(forward(ROBOT, HOME))})\n"
+    )
+    assert codes(check(tmp_path, text))["frames_in_doubt"] == [8]
+
+
 def test_a_thread_that_is_never_started_is_not_passed(tmp_path):
     found = check(tmp_path, f"def Main():\n  thread T():\n    movej({NEAR_TEXT})\n  end\n  movej({FAR_TEXT})\nend\n")
     assert codes(found) == {"never_reached": [3]}

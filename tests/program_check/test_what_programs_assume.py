@@ -175,6 +175,7 @@ def test_where_force_mode_leads_the_arm_is_not_known(tmp_path):
     found = codes(check(tmp_path, f"{text}movej(q)\n", "a.script"))
     assert found["way_not_known"] == [3, 6]
     assert found["target_not_given"] == [7]
+    assert codes(check(tmp_path, f"{begin}\nsleep(1)\nend_force_mode()\n", "a.script"))["may_move"] == [1]
 
 
 LIFT = f"if here[2] > 0.3:\n movej({NEAR_TEXT})\nend\nmovej({HOME_TEXT})"
