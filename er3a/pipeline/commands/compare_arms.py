@@ -16,6 +16,7 @@ from er3a.robots.robot import Convention
 
 if TYPE_CHECKING:
     from er3a.comparison.compare import Comparison
+    from er3a.files.arm_file import ReadArm
 
 MAX_TOLERANCE = 1000.0  # mm, and deg
 MATCHES_SHOWN = 5  # of a folder
@@ -47,8 +48,6 @@ def compare(
     as_json: AsJson = False,
 ):
     """Do A and B describe the same arm? Lists the entries that differ. Exit code 1 if any do."""
-    import numpy as np
-
     from er3a.comparison.compare import best_of
     from er3a.files.arm_file import read_arm, read_arms
     from er3a.files.units import noted_doubts
@@ -80,13 +79,9 @@ def compare(
         tolerance_deg=tolerance_deg,
     )
     name, found = ranked[0]
-    notes = [f"{source}: {note}" for source, read in ((a, first), (name, others[name])) for note in read.notes]
+    notes = _notes((a, first), (name, others[name]))
     compared = {Path(a).name, Path(name).name}
     doubts = [str(each) for each in doubtful if not (folder.is_dir() and Path(each.file or "").name not in compared)]
-    tool = others[name].robot.tool
-    if not np.allclose(arm.tool, tool, rtol=0.0, atol=TOOLS_EQUAL):
-        apart = 1000 * float(np.linalg.norm(arm.tool[:3, 3] - tool[:3, 3]))
-        notes.append(f"{a} and {name}: tools are not compared; these differ (their points by {apart:.3g} mm)")
     for note in notes:
         print_note(note)
     if output is not None and found.corrected is not None:
@@ -107,6 +102,18 @@ def compare(
                 print(f"{written}: written")
     if found.verdict != "equal":
         raise typer.Exit(1)
+
+
+def _notes(one: tuple[str, ReadArm], other: tuple[str, ReadArm]) -> list[str]:
+    """What was assumed in reading two arms, by their names, and that their tools differ."""
+    import numpy as np
+
+    notes = [f"{source}: {note}" for source, read in (one, other) for note in read.notes]
+    (a, first), (b, second) = one, other
+    if not np.allclose(first.robot.tool, second.robot.tool, rtol=0.0, atol=TOOLS_EQUAL):
+        apart = 1000 * float(np.linalg.norm(first.robot.tool[:3, 3] - second.robot.tool[:3, 3]))
+        notes.append(f"{a} and {b}: tools are not compared; these differ (their points by {apart:.3g} mm)")
+    return notes
 
 
 def _print(ranked: list[tuple[str, Comparison]], folder: bool, doubts: list[str]) -> None:
