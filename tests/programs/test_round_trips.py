@@ -9,6 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from er3a.files.robot_library import load_robot
+from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.planning.commands import (
     JointSequenceCommand,
@@ -223,18 +224,31 @@ def test_joint_tables_become_joint_moves():
     assert sum(each.speed.value for each in listing.motions[1:]) == pytest.approx(4.0)
 
 
-def test_a_turn_by_180_deg_is_written_in_two_halves_of_the_sense_that_is_asked():
-    q = np.radians([0.0, -20.0, 15.0, 0.0, -60.0, 0.0])
-    T = forward(ROBOT, q)
+@pytest.mark.parametrize("kind", ["line", "arc", "table"])
+@pytest.mark.parametrize("roll", [0.0, np.pi])
+@pytest.mark.parametrize(("axis", "sense"), [(None, 1), (np.array([0.0, 0.0, -1.0]), -1)])
+def test_a_turn_by_180_deg_is_written_in_two_halves_of_the_sense_that_is_asked(kind, roll, axis, sense):
+    """Also of an arm that hangs from a ceiling, whose own base is the other way up than the path's frame."""
+    q, robot = np.radians([0.0, -20.0, 15.0, 0.0, -60.0, 0.0]), ROBOT.replace(base=transform(np.zeros(3), [roll, 0, 0]))
+    T = forward(robot, q)
     end = T.copy()
     end[:3, :3] = Rotation.from_rotvec([0, 0, np.pi]).as_matrix() @ T[:3, :3]
-    for axis, sense in ((None, 1), (np.array([0.0, 0.0, -1.0]), -1)):
-        part = SegmentCommand(end, half_turn_axis=axis)
-        path = listing_of(ToolSequenceCommand(Start(joints=q), (part,), 2.0), ROBOT, q)
-        assert path.findings == (HalfTurnsSplit(1),)
-        middle = path.listing.motions[1].target.pose
-        turn = Rotation.from_matrix(middle[:3, :3] @ T[:3, :3].T).as_rotvec()
-        np.testing.assert_allclose(turn, [0, 0, sense * np.pi / 2], atol=1e-9)
+    end[:3, 3] += [0.0, 0.04, 0.0]
+    via = T[:3, 3] + [0.02, 0.02, 0.0] if kind == "arc" else None
+    command = ToolSequenceCommand(Start(joints=q), (SegmentCommand(end, via, axis),), 2.0)
+    if kind == "table":
+        command = ToolTableCommand(np.array([T, end]), ("a", "b"), 2.0, half_turn_axis=axis)
+    path = listing_of(command, robot, q)
+    assert path.findings == (HalfTurnsSplit(1),)
+    half, rest = path.listing.motions[1:]
+    middle = robot.base @ half.target.pose
+    turn = Rotation.from_matrix(middle[:3, :3] @ T[:3, :3].T).as_rotvec()
+    np.testing.assert_allclose(turn, [0, 0, sense * np.pi / 2], atol=1e-9)
+    np.testing.assert_allclose(robot.base @ rest.target.pose, end, atol=1e-12)
+    assert (half.speed.value, rest.speed.value) == (1.0, 1.0)
+    for point in [half.target, half.via, rest.via] if kind == "arc" else []:
+        place = (robot.base @ point.pose)[:3, 3]
+        np.testing.assert_allclose(np.linalg.norm(place - T[:3, 3] - [0, 0.02, 0]), 0.02, atol=1e-12)
 
 
 @pytest.mark.parametrize(("axis", "sense"), [(None, 1), (np.array([0.0, 0.0, -1.0]), -1)])
