@@ -312,6 +312,14 @@ def test_peaks_are_not_missed_between_few_samples(tmp_path):
     np.testing.assert_allclose(found[11], found[2001], rtol=2e-3)
 
 
+def test_no_torque_with_its_tolerance_is_above_the_peak_with_its_own(full):
+    results = full[1].results
+    for path in (each for each in results.summary.paths if each.complete):
+        rows = results.torques.take(results.torques.path == path.name)
+        upper = (np.abs(rows.torque) + rows.tolerance).max(axis=0)
+        assert all(load.peak + load.tolerance >= most - 1e-9 for load, most in zip(path.joints, upper.tolist()))
+
+
 def test_the_wrist_is_compared_at_rest_and_along_the_paths(full):
     uses = [use for use in full[1].results.summary.uses if use.quantity == "moment"]
     at_rest = {use.joint: use.asked for use in uses if use.path is None}
