@@ -200,6 +200,9 @@ def test_what_a_study_does_not_say_of_tool_payload_and_links_is_open(full, tmp_p
     study, body = full[0], {"mass_kg": 0.5, "centre_mm": [0, 0, 50]}
     entry = study.robots["er3a_c60"]
     tool = Placement(xyz_mm=[0, 0, 120], rpy_deg=[0, 0, 0])
+    (gripper := tmp_path / "gripper.yaml").write_text(
+        "kind: scene\ntitle: A gripper\ncarried: {boxes: [{name: gripper, size_mm: [40, 40, 90], xyz_mm: [0, 0, 9]}]}\n"
+    )
     whole, point, none = (LoadFields(**CLAIM, body=each) for each in (LOAD, body, body | {"mass_kg": 0}))
     nowhere = LoadFields(**CLAIM, body={key: value for key, value in LOAD.items() if key != "centre_mm"})
     guess = LoadFields(source="a guess", grade="inferred", body=LOAD)
@@ -210,6 +213,7 @@ def test_what_a_study_does_not_say_of_tool_payload_and_links_is_open(full, tmp_p
         ({"payload": nowhere}, ("load_centre",)),
         ({"payload": guess}, ("load_guess",)),
         ({"tool": tool}, ("tool",)),
+        ({"scene": str(gripper)}, ("tool",)),
         ({"tool": tool, "tool_load": none}, ()),
         ({"payload": none, "tool_load": whole}, ()),
     ):

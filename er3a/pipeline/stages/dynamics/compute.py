@@ -104,7 +104,8 @@ def open_of_load(study: Study, name: str, of_programs: Iterable[Load] = ()) -> t
     entry, loads = study.entry(name), study.loads(name)
     if not loads:
         return ("load",)
-    has_tool = not np.array_equal(study.robot(name).tool, np.eye(4))
+    scene = study.scene(name, "trajectory")  # what has a shape on the flange, or a tip beside it, has a mass
+    has_tool = bool(scene and scene.carried) or not np.array_equal(study.robot(name).tool, np.eye(4))
     bodies = [each.body for each in loads if each.body and each.body.mass_kg]
     inertias = [*(body.inertia_kg_m2 for body in bodies), *(load.inertia for load in of_programs)]
     asked: dict[model.LoadPart, bool] = {
