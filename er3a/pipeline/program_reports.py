@@ -29,6 +29,7 @@ from er3a.files.units import noted_doubts
 from er3a.kinematics.singularity import USUAL_NEAR
 from er3a.pipeline.messages.language import as_text
 from er3a.pipeline.messages.programs import remedy_at, say
+from er3a.pipeline.messages.trajectory import limits_assumed
 from er3a.pipeline.results import NEVER_A_PASS, LeftOut, NoPass, plain
 from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_of_limits, left_out_of_units
 from er3a.pipeline.stages.trajectory.judgement import Surroundings, collisions, judge, measured, min_clearance
@@ -51,6 +52,7 @@ from er3a.programs.languages import WITHOUT_JOINTS, not_written, read_program
 from er3a.programs.program_findings import WriteFinding
 from er3a.programs.program_names import LanguageName
 from er3a.programs.writing import program_name
+from er3a.robots.joint_limits import speeds_given
 from er3a.robots.robot import Robot
 from er3a.version import __version__
 
@@ -64,13 +66,15 @@ UNREADABLE = "unreadable"
 class CheckedFile:
     """A program file with its check, or with the error that it could not be read for.
 
-    ``missed``: what was not examined and may turn each motion's verdict, which therefore is no pass.
+    ``missed``: what was not examined and may turn each motion's verdict, which therefore is no pass. ``robot``: that it
+    was checked for.
     """
 
     file: Path
     check: ProgramCheck | None
     error: InputError | None = None
     missed: tuple[LeftOut, ...] = ()
+    robot: Robot | None = None
 
     @property
     def level(self) -> Level:
@@ -95,7 +99,7 @@ def checked_file(file: Path, robot: Robot, options: CheckOptions, doubts: Sequen
     if missed:
         verdicts = tuple(replace(each, level=worst_of((each.level, "caution"))) for each in check.verdicts)
         check = replace(check, level=worst_of((check.level, "caution")), verdicts=verdicts)
-    return CheckedFile(file, check, missed=missed)
+    return CheckedFile(file, check, missed=missed, robot=robot)
 
 
 def missed_collisions(robot: Robot, scene: Scene | None, arms: Iterable[tuple[str, Robot]] = ()) -> tuple[LeftOut, ...]:
@@ -193,6 +197,15 @@ def shapes_line(robot: Robot) -> str:
     return "" if found is None else say(found)
 
 
+def rates_line(robot: Robot) -> str:
+    """That accelerations are assumed, which no document gives, and speeds as far as none does."""
+    return limits_assumed((~speeds_given(robot)).tolist(), True)
+
+
+def _assumed_speeds(robot: Robot) -> list[str]:
+    return [f"J{joint + 1}" for joint in np.flatnonzero(~speeds_given(robot)).tolist()]
+
+
 def missed_line(missed: tuple[LeftOut, ...]) -> str:
     """What was not examined of all motions; empty where nothing is missing."""
     return say(NoPass(missed)) if missed else ""
@@ -255,6 +268,8 @@ def json_of(checked: Iterable[CheckedFile]) -> list[dict[str, Any]]:
                     *({**_place_record(one.place), "what": one.what, "names": []} for one in check.not_examined),
                 ],
                 "shapes_assumed": check.shapes is not None,
+                "speeds_assumed": [] if each.robot is None else _assumed_speeds(each.robot),
+                "accelerations_assumed": True,
                 "cycle": plain(check.cycle),
                 "findings": [_finding_record(one) for one in check.findings],
                 "motions": [_verdict_record(one) for one in check.verdicts],
@@ -342,6 +357,8 @@ def _notifications(checked: Sequence[CheckedFile]) -> list[dict[str, Any]]:
             found.append(("not_examined", f"not examined, or not each time: {one.what}", one.place))
         if each.check and each.check.shapes:
             found.append((each.check.shapes.code, say(each.check.shapes), Place(each.file)))
+        if each.robot is not None:
+            found.append(("rates_assumed", rates_line(each.robot), Place(each.file)))
     return [
         {"level": "warning", "descriptor": {"id": code}, "message": {"text": text}, "locations": [_location(place)]}
         for code, text, place in found

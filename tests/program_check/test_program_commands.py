@@ -103,6 +103,7 @@ def test_what_is_not_examined_is_named_in_text_json_and_sarif(tmp_path):
         of.setdefault(each["descriptor"]["id"], []).append(each)
     assert [each["locations"][0]["physicalLocation"]["region"]["startLine"] for each in of["not_examined"]] == lines
     assert [each["message"]["text"][:24] for each in of["shapes_assumed"]] == ["Link shapes are assumed "]
+    assert [each["message"]["text"][:24] for each in of["rates_assumed"]] == ["Joint speeds and acceler"]
     assert "not examined, or not each time: motions of lines" in check(*cut).stderr
 
 
@@ -263,7 +264,9 @@ def test_assumed_shapes_and_ways_from_nowhere_are_named():
     done = run("check-program", *words)
     (record,) = json.loads(done.stdout)
     assert record["shapes_assumed"] is True
+    assert (record["speeds_assumed"], record["accelerations_assumed"]) == ([f"J{j}" for j in range(1, 7)], True)
     assert {each["what"] for each in record["not_examined"]} == {"way"}
     done = check("data/programs/weld_seam.src", "--verdicts")
     assert "mm of assumed shapes [motion]" in done.stdout
     assert "Link shapes are assumed" in done.stderr
+    assert "Joint speeds and accelerations are assumed: what passes may be too fast for the arm." in done.stderr

@@ -78,6 +78,7 @@ def check_program(
         lines_of,
         missed_line,
         not_examined_line,
+        rates_line,
         sarif_of,
         shapes_line,
         summary_line,
@@ -110,7 +111,8 @@ def check_program(
                 print(line)
         of_files = [line(each) for each in checked for line in (cycle_line, not_examined_line)]
         missed = tuple(dict.fromkeys(left for each in checked for left in each.missed))
-        for line in filter(None, (*of_files, shapes_line(arm), missed_line(missed), summary_line(checked))):
+        assumed = shapes_line(arm), rates_line(arm)
+        for line in filter(None, (*of_files, *assumed, missed_line(missed), summary_line(checked))):
             print_note(line)
     if any(each.check is None for each in checked):
         raise typer.Exit(2)
