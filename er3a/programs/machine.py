@@ -586,12 +586,12 @@ class _Graph:
         return seen
 
 
-def _reached(next_to: Sequence[Sequence[int]] | Mapping[int, Sequence[int]], first: int) -> set[int]:
-    """Operations of a routine that may come after one, or before it, by what comes next to each."""
+def _reached(after: Sequence[Sequence[int]], first: int) -> set[int]:
+    """Operations of a routine that may come after one, by those that come next after each."""
     seen: set[int] = set()
     waiting = [first]
     while waiting:
-        for each in next_to[waiting.pop()]:
+        for each in after[waiting.pop()]:
             if each not in seen:
                 seen.add(each)
                 waiting.append(each)
@@ -693,7 +693,7 @@ class Machine:
         self.numbers = 1  # of ways that were begun, those that joined others too
         self.sides: Counter[tuple[str, int, bool]] = Counter()  # how often each side of a branch was taken
         self.cut: set[instructions.Place] = set()
-        self.ahead: dict[tuple[str, int], tuple[bool, list[syntax.Branch]]] = {}  # as of _ahead
+        self.ahead: dict[tuple[str, int], tuple[bool, list[syntax.Branch] | None]] = {}  # as of _ahead
         self.waited: set[Hashable] = set()  # states of loops that wait for what others change
         self.first_after: dict[int, int] = {}  # step by the one before it
 
@@ -1223,25 +1223,25 @@ class Machine:
         return any(self._ahead(frame)[0] for frame in way.frames)
 
     def _asked_in_loop(self, way: ExecutionPath) -> list[syntax.Branch]:
-        """Branches with variables on the round that a way goes, in the innermost routine that has such a round."""
+        """Branches on variables of known value in the loop in which a way is, and in none within it."""
         rounds = (self._ahead(frame)[1] for frame in reversed(way.frames))
-        return next(filter(None, rounds), [])
+        found = next((each for each in rounds if each is not None), [])
+        return [each for each in found if not isinstance(way.memory.value(each.condition), syntax.Unclear)]
 
-    def _ahead(self, frame: Frame) -> tuple[bool, list[syntax.Branch]]:
-        """Whether anything that may follow in a routine may move the arm; and its branches with variables from which
-        it may come back to where it is."""
+    def _ahead(self, frame: Frame) -> tuple[bool, list[syntax.Branch] | None]:
+        """Whether anything that may follow in a routine may move the arm; and the branches with variables of the
+        innermost loop around where it is, if there is one."""
         key = (frame.routine.name, frame.at)
         if key not in self.ahead:
-            after = _Graph(frame.routine).after
-            before: dict[int, list[int]] = defaultdict(list)
-            for at, following in enumerate(after):
-                for each in following:
-                    before[each].append(at)
-            code = frame.routine.code
+            code, after = frame.routine.code, _Graph(frame.routine).after
             reached = _reached(after, frame.at) - {len(code)}
             moves = any(_moves(self.program, code[at], self.moving, self.dialect) for at in reached)
-            coming = (code[at] for at in sorted(reached & _reached(before, frame.at)))
-            asked = [each for each in coming if isinstance(each, syntax.Branch) and any(names(each.condition))]
+            back = [(to, at) for at, following in enumerate(after) for to in following if to <= frame.at <= at]
+            asked = None
+            if back:
+                start, end = min(back, key=lambda loop: loop[1] - loop[0])
+                inside = (code[at] for at in range(start, end + 1))
+                asked = [each for each in inside if isinstance(each, syntax.Branch) and any(names(each.condition))]
             self.ahead[key] = moves, asked
         return self.ahead[key]
 
