@@ -78,6 +78,10 @@ def test_check_for_programs(call, tmp_path):
     assert second["in_order"] is False
     assert second["problem"] == "missing"
     assert done.stderr.startswith(f"error: {bad}: ")
+    (tmp_path / "odd.src").write_text("DEF odd()\nFOO BAR\nPTP {A1 400}\nEND\n")  # readable, and no more
+    told = "what it does, for which see er3a check-program"
+    assert json.loads(call("check", tmp_path / "odd.src", "--json").stdout)[0]["not_examined"] == [told]
+    assert call("check", tmp_path / "odd.src").stdout.endswith(f"a robot program, in order; not examined: {told}\n")
 
 
 def test_notes_go_to_standard_error_and_results_to_standard_output(call, tmp_path):

@@ -162,6 +162,20 @@ def test_a_robot_goes_through_the_stages_that_are_named(study_with):
     assert len(study.stages("er3a_c60")) == len(STAGES)
 
 
+@pytest.mark.parametrize("stage", ["programs", "dynamics"])
+def test_an_expectation_of_a_stage_that_does_not_run_is_refused(study_with, stage):
+    """Nothing would ever hold it against what the stage comes to."""
+    named = ["validation", "workspace", "trajectory", "programs"]
+
+    def change(content):
+        content["robots"]["er3a_c60"].update(stages=named, programs=None, expect={stage: "pass"})
+
+    with pytest.raises(
+        InputError, match=rf"robots\.er3a_c60\.expect\.{stage}: the robot does not go through this stage"
+    ):
+        study_with(change)
+
+
 @pytest.mark.parametrize(
     ("stages", "told"),
     [(["workspace"], "validation is missing"), (["validation", "workspace", "painting"], "no stage 'painting'")],

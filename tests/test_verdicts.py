@@ -6,6 +6,7 @@ import os
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -16,6 +17,8 @@ from er3a.files.kept_files import shown_path
 from er3a.pipeline.results import write_checksum
 from er3a.pipeline.run_study import run_study
 from er3a.pipeline.stages import run
+from er3a.pipeline.stages.registry import STAGES
+from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.study import Study
 from er3a.pipeline.verdicts import StageVerdict, read_verdicts, write_junit
 from er3a.pipeline.viewing.index import write_index
@@ -233,6 +236,40 @@ def test_an_index_over_inputs_that_changed_since_says_so_as_verdicts_and_report_
     assert index.count(badge) == 2
     assert 'title="changed since">dynamics (changed since)</a>' in index
     assert etree.parse(tmp_path / "junit.xml").getroot().get("failures") == "1"
+
+
+def test_an_input_that_is_edited_while_a_stage_is_computed_makes_its_verdict_outdated(study, tmp_path, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    paths = tmp_path / "paths.yaml"
+    paths.write_text(Path(study.robots["er3_600"].paths).read_text(encoding="utf-8"), encoding="utf-8")
+    content = study.model_dump()
+    content["robots"]["er3_600"]["paths"] = str(paths)
+    study = Study.model_validate(content)
+    dynamics = STAGES["dynamics"].module("compute")
+    computed = dynamics.compute(study, "er3_600")
+
+    def edited(study: Study, name: str) -> Any:
+        paths.write_text(paths.read_text(encoding="utf-8") + "# later\n", encoding="utf-8")
+        return computed
+
+    for compute, outdated in ((lambda study, name: computed, ()), (edited, (shown_path(paths),))):
+        monkeypatch.setattr(dynamics, "compute", compute)
+        run.compute("dynamics", study, "er3_600", tmp_path / "er3_600/dynamics")
+        (found,) = (each for each in read_verdicts(study, tmp_path) if each.status != "not_examined")
+        assert found.outdated == outdated
+
+
+@pytest.mark.long
+def test_verdicts_of_another_er3a_are_outdated(study, tmp_path, monkeypatch):
+    """As after an upgrade, which may have mended what passed wrongly: they count until the study is run again."""
+    monkeypatch.chdir(ROOT)
+    run.compute("dynamics", study, "er3_600", tmp_path / "er3_600/dynamics")
+    (before,) = (each for each in read_verdicts(study, tmp_path) if each.status != "not_examined")
+    assert before.outdated == ()
+    monkeypatch.setattr(Stage, "digest", lambda stage, verb: "another")
+    (after,) = (each for each in read_verdicts(study, tmp_path) if each.status != "not_examined")
+    assert (after.outdated, after.counts("fail")) == (("er3a itself",), True)
+    assert "Changed since" in after.text
 
 
 MOVE = "movej([0, -0.2, -0.2, 0, -1.2, 0], a=1, v=0.5)\n"

@@ -28,7 +28,7 @@ from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn, read_csv, read_header
 from er3a.files.robot_file import Text
 from er3a.files.target_file import FORMS as TARGET_FORMS
-from er3a.files.units import JOINT_COLUMN, METRES_BELOW_MM, WIDEST_IN_RADIANS
+from er3a.files.units import JOINT_COLUMN, METRES_BELOW_MM, WIDEST_IN_RADIANS, doubt
 from er3a.files.yaml_file import InputFile, StrictModel, load
 from er3a.geometry.transforms import exp_rotation, posed, transform
 from er3a.kinematics.forward import forward
@@ -136,6 +136,8 @@ STREAM_SAMPLES = 60
 SHOWN_HEADER = 60
 EXAMPLE = "flange_x_mm, .., flange_qw, .., flange_qz, target_x_mm, .., target_qz (lengths in mm)"
 MIN_SQUARE_MM = 0.5
+MIN_DEVIATION_MM = 5e-3
+"""Of a camera or an arm; less is in metres."""
 EPOCH_DIGITS = 10  # of the seconds since 1970, which recorders write
 POINTS = {f"{part}_{c}_mm": CsvColumn() for part in ("seen", "touched") for c in "xyz"}
 
@@ -147,6 +149,12 @@ class StandardDeviations(StrictModel):
 
     position_mm: Positive | Annotated[list[Positive], Field(min_length=3, max_length=3)]
     rotation_deg: Positive | Annotated[list[Positive], Field(min_length=3, max_length=3)]
+
+    @model_validator(mode="after")
+    def _in_mm(self) -> Self:
+        if np.max(self.position_mm) < MIN_DEVIATION_MM:
+            doubt(self, "position_mm", f"{self.position_mm} mm", "metres")
+        return self
 
     def covariance(self) -> Reals:
         """(6, 6), m and rad."""

@@ -13,7 +13,7 @@ from er3a.errors import InputError
 from er3a.files.hand_eye_file import Positive, StandardDeviations
 from er3a.files.robot_file import Name, Placement, Text
 from er3a.files.target_file import UNIT_LENGTH_TOLERANCE, Line
-from er3a.files.units import PositionMm, RpyDeg, Triple
+from er3a.files.units import CentreMm, JointsDeg, PositionMm, RpyDeg, doubt
 from er3a.files.yaml_file import InputFile, StrictModel, check_own_names, load
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import in_si
@@ -24,6 +24,8 @@ from er3a.vision.point_error import ArmAccuracy
 from er3a.vision.vision_findings import GraspOutcome
 
 MAX_OBJECTS = 30
+MIN_REPEATABILITY_MM = 5e-4
+"""Of the best arms a twentieth; less is in metres."""
 Angle = Annotated[float, Field(gt=0, lt=180)]
 Tolerances = Annotated[list[Positive], Field(min_length=3, max_length=3)]
 
@@ -58,11 +60,17 @@ class ArmAccuracyEntry(StrictModel):
     table_length_standard_deviation_mm: Annotated[float, Field(ge=0, le=100)] = 0.0
     table_angle_standard_deviation_deg: Annotated[float, Field(ge=0, le=10)] = 0.0
 
+    @model_validator(mode="after")
+    def _in_mm(self) -> Self:
+        if 0 < self.repeatability_mm < MIN_REPEATABILITY_MM:
+            doubt(self, "repeatability_mm", f"{self.repeatability_mm:g} mm", "metres")
+        return self
+
     @property
     def states_all(self) -> bool:
         """Whether it says how well the arm repeats, and how well its table is known."""
         table = self.table_length_standard_deviation_mm, self.table_angle_standard_deviation_deg
-        return self.repeatability_mm > 0 and max(table) > 0
+        return self.repeatability_mm > 0 and min(table) > 0
 
     def accuracy(self) -> ArmAccuracy:
         """In the units of the library."""
@@ -85,7 +93,7 @@ class GraspEntry(Placement):
     """The tool in the object's frame; its z axis is the direction of approach."""
 
     name: Name
-    xyz_mm: Triple
+    xyz_mm: CentreMm
     rpy_deg: RpyDeg
 
     def grasp(self) -> Grasp:
@@ -151,8 +159,8 @@ class VisionFile(InputFile):
     view: ViewEntry
     arm: ArmAccuracyEntry
     gripper: GripperEntry
-    home_deg: Annotated[list[float], Field(min_length=1, max_length=16)]
-    picture_deg: Annotated[list[float], Field(min_length=1, max_length=16)] | None = None
+    home_deg: JointsDeg
+    picture_deg: JointsDeg | None = None
     objects: Annotated[list[ObjectEntry], Field(min_length=1, max_length=MAX_OBJECTS)]
 
     @model_validator(mode="after")

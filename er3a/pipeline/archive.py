@@ -14,7 +14,7 @@ from rocrate.rocrate import ROCrate
 
 from er3a.errors import ResultError
 from er3a.files.kept_files import ROOT, write_atomically
-from er3a.pipeline.results import OVERALL, check_results
+from er3a.pipeline.results import OVERALL, THE_CODE, changed_since, check_results
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import load_study
 from er3a.version import __version__
@@ -44,13 +44,16 @@ def archive(study_file: Path, results: Path, reports: Path, output: Path) -> int
     Raises
     ------
     ResultError
-        a stage has no results, or a page or recording is missing
+        a stage has no results, or those of other inputs or settings; or a page or recording is missing
     """
     study = load_study(study_file)
     files = {Path("config") / study_file.name: study_file}
     for name in study.names:
         for stage in study.stages(name):
-            check_results(results / name / stage)
+            folder = results / name / stage
+            check_results(folder)
+            if changed := [each for each in changed_since(folder, study, name, stage) if each != THE_CODE]:
+                raise ResultError(folder, f"computed before these changed: {', '.join(changed)}", "Run the study again")
             files |= {Path("results") / name / stage / file.name: file for file in (results / name / stage).iterdir()}
             files |= {_place(file): file for file in study.inputs(name, stage)}
             if "record" in STAGES[stage].views:

@@ -161,6 +161,7 @@ _WORDS = {
     "hand_eye": "a calibration set",
     "vision": "objects before a camera",
 }
+PROGRAM = "a robot program"
 SIX = 6
 
 
@@ -207,7 +208,7 @@ def check_file(path: Path) -> str:
         return _check_table(path)
     if path.suffix.lower() in SUFFIXES and path.suffix != ".csv":
         read_program(path)
-        return "a robot program"
+        return PROGRAM
     if path.suffix not in (".yaml", ".yml"):
         if not path.exists():
             raise InputError(path, None, "there is no such file", "Check the path")

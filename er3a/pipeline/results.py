@@ -33,6 +33,7 @@ from er3a.errors import ResultError
 from er3a.files.annotations import grades_in
 from er3a.files.kept_files import read_bytes, sha256, shown_path, write_atomically
 from er3a.pipeline.messages.language import N_
+from er3a.pipeline.stages.registry import STAGES as REGISTRY
 from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.study import STAGES, Study
 from er3a.pipeline.tables import adapter, table_types
@@ -44,6 +45,7 @@ goes, or gets another name, unit or meaning. What is only added does not raise i
 BESIDE = ("unexamined", "shapes", "missed")
 """What a verdict can have beside its finding."""
 THE_SETTINGS = N_("the study's settings")
+THE_CODE = N_("er3a itself")
 SUMMARY = "summary.json"
 CHECKSUMS = "SHA256SUMS"
 
@@ -201,6 +203,7 @@ LeftOutSubject = Literal[
     "allowed_contacts",
     "bare_tool",
     "arm_errors",
+    "contradicted_table",
     "objects_out_of_view",
     "hidden_voids",
     "orientations",
@@ -233,7 +236,7 @@ NEVER_A_PASS: frozenset[LeftOutSubject] = frozenset(
             "other_gravity",
         ),
         *("arm_errors", "objects_out_of_view", "hidden_voids", "orientations", "base_inside", "places_in_solids"),
-        *("units", "own_limits"),
+        *("units", "own_limits", "contradicted_table"),
     )
 )
 """What no verdict passes without; the rest bounds what a verdict is about, and stands in the table alone."""
@@ -356,8 +359,13 @@ class AbsentResults(Results[Summary]):
     """In place of the results of a stage that was not computed; its verdict is a finding that says why."""
 
 
-def write_results(folder: Path, study: Study, robot: str, stage: Stage, results: Results[Any]) -> None:
-    """Write a stage's tables, summary and checksums into a folder; tables without rows if it was not computed."""
+def write_results(
+    folder: Path, study: Study, robot: str, stage: Stage, results: Results[Any], read: tuple[Input, ...] | None = None
+) -> None:
+    """Write a stage's tables, summary and checksums into a folder; tables without rows if it was not computed.
+
+    ``read``: the inputs as they were before it was computed, as one may be edited meanwhile; by default as they are.
+    """
     kind = AbsentResults if isinstance(results, AbsentResults) else type(results)
     for name, table in table_types(stage.module("model").RESULTS).items():
         rows = table.empty() if kind is AbsentResults else getattr(results, name)
@@ -366,7 +374,7 @@ def write_results(folder: Path, study: Study, robot: str, stage: Stage, results:
     own = {part.name: plain(getattr(summary, part.name)) for part in fields(summary)}
     own["verdict"] = _verdict_record(summary.verdict)
     origin = Provenance(
-        inputs=input_records(study.inputs(robot, stage.name)),
+        inputs=input_records(study.inputs(robot, stage.name)) if read is None else read,
         config=study.computed_from(robot, stage.name),
         seed=study.seed,
         code=stage.digest("compute"),
@@ -524,13 +532,17 @@ def input_records(files: Iterable[Path]) -> tuple[Input, ...]:
 
 
 def changed_since(folder: Path, study: Study, robot: str, stage: str) -> tuple[str, ...]:
-    """What a stage's results rest on otherwise than it is now: files by their content, and the study's settings."""
+    """What a stage's results rest on otherwise than it is now: files by their content, the settings, the code."""
     stored = _record(folder)["provenance"]
     then = {each["path"]: each["sha256"] for each in stored["inputs"]}
     now = {shown_path(file): sha256(file) for file in study.inputs(robot, stage) if file.is_file()}
     changed = [path for path in sorted(then.keys() | now.keys()) if then.get(path) != now.get(path)]
     settings = json.loads(json.dumps(plain(study.computed_from(robot, stage))))
-    return (*changed, *([THE_SETTINGS] if settings != stored["config"] else []))
+    if settings != stored["config"]:
+        changed.append(THE_SETTINGS)
+    if REGISTRY[stage].digest("compute") != stored["code"]:
+        changed.append(THE_CODE)
+    return tuple(changed)
 
 
 def result_records(results: Path, robots: Iterable[str]) -> tuple[Input, ...]:

@@ -143,6 +143,16 @@ class StudyBase(InputFile):
                 raise ValueError(f"article.{role}: '{name}' does not go through the stage trajectory | Add it")
         return self
 
+    @model_validator(mode="after")
+    def _expectations_are_of_stages_that_run(self):
+        for name, entry in self.robots.items():
+            if left_out := [stage for stage in entry.expect if stage not in self.stages(name)]:
+                problem = f"robots.{name}.expect.{left_out[0]}: the robot does not go through this stage"
+                raise ValueError(
+                    f"{problem} | Give it what the stage reads, name it in its stages, or remove this line"
+                )
+        return self
+
     @property
     def variants(self) -> dict[str, Variant]:
         """The robots that the sweeps make, by name."""

@@ -38,7 +38,8 @@ class StageVerdict:
     demonstrations : how many targets, paths, programs or objects in it fail as they are meant to
     expected : what the study says that the status is to be, if it does
     not_examined : what the verdict leaves out, in English
-    outdated : files that have changed since, or "the study's settings": the verdict is none on what they are now
+    outdated : files that have changed since, "the study's settings" or "er3a itself": the verdict is none on what they
+        are now
     """
 
     robot: str

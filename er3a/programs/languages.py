@@ -83,9 +83,14 @@ def language_of(source: ProgramText) -> LanguageName:
 
 
 def files_of(path: Path) -> tuple[Path, ...]:
-    """A program's file and those that belong to it: modules that it calls, points, the controller's own data."""
-    name = SUFFIXES.get(path.suffix.lower())
-    return (path, *(LANGUAGES[name].companions(path) if name is not None and path.is_file() else ()))
+    """A program's file and those that belong to it: modules that it calls, points, the controller's own data.
+
+    Of one that is in none of the languages no others are known.
+    """
+    try:
+        return (path, *LANGUAGES[language_of(read_program_text(path))].companions(path))
+    except InputError:
+        return (path,)
 
 
 def _moves(program: Program) -> bool:

@@ -58,6 +58,12 @@ class LimitsExceeded(Finding):
     joints: tuple[Exceeded, ...]
 
 
+def speeds_given(robot: Robot) -> Flags:
+    """Joints (n,) whose maximum speed the robot's file gives, by a source that is no guess."""
+    found, source = np.isfinite(robot.speed), robot.sources.get("speeds")
+    return found & (source is None or source.grade != "inferred")
+
+
 def within(robot: Robot, q: Reals) -> Flags:
     """Whether joint values (..., n) in rad or m lie within all limits, to 1e-9 rad or m; shape (...,)."""
     outside = np.maximum(q - robot.upper, robot.lower - q)

@@ -79,25 +79,31 @@ def _joint_leg(part: Part, start: Reals, end: Reals, limits: JointLimits) -> Gra
     return GraspLeg(part, move.duration, lambda t: move.joints(t)[0], motion.rate_bounds, end)
 
 
-def transfer(task: PlanningTask, start: Reals, end: Reals) -> tuple[GraspLeg, ...] | NoWayAround:
-    """Legs from joints (n,) to joints (n,), rad, on which nothing touches; or why there are none."""
+def transfer(task: PlanningTask, start: Reals, end: Reals, needed: float) -> tuple[GraspLeg, ...] | NoWayAround:
+    """Legs from joints (n,) to joints (n,), rad, on which nothing touches; or why there are none.
+
+    Where the straight move comes nearer to something than ``needed`` (m), a way around is tried; of both the one is
+    taken that keeps farther away.
+    """
     if outside := limits_exceeded(task.robot, start):
         return EndOutsideLimits("start", outside)
     straight = joint_legs("move", np.stack([start, end]), task.limits)
-    if task.bodies is None or _touches_nothing(task.bodies, straight):
+    if task.bodies is None or ((clear := _clearance(task.bodies, straight)) > 0 and clear >= needed):
         return straight
     found = way_around(task, start, end)
     if not isinstance(found, WayAround):
-        return found
+        return straight if clear > 0 else found
     legs = joint_legs("move", found.corners, task.limits)
-    if not (within(task.robot, found.corners).all() and _touches_nothing(task.bodies, legs)):
+    around = _clearance(task.bodies, legs) if within(task.robot, found.corners).all() else 0.0
+    if max(clear, around) <= 0:
         return NoneFound(task.rounds)
-    return legs
+    return legs if around > clear else straight
 
 
-def _touches_nothing(bodies: Bodies, legs: tuple[GraspLeg, ...]) -> bool:
+def _clearance(bodies: Bodies, legs: tuple[GraspLeg, ...]) -> float:
+    """What the arm keeps clear by along legs, m; infinite where nothing can meet."""
     smallest = min_clearance(bodies, legs)
-    return smallest is None or smallest[0] > 0
+    return np.inf if smallest is None else smallest[0]
 
 
 def tool_leg(

@@ -139,7 +139,7 @@ class LineUnproven(Finding):
 
 
 class PathCollides(Finding, code="way_collides"):
-    """Something is nearer than asked on a straight line."""
+    """Something is nearer than asked on a straight line, or on the way from where the arm waits."""
 
     part: Part
     pair: Pair
@@ -353,12 +353,14 @@ def _followed(task: GraspTask, candidate: _Candidate, target: DetectedObject) ->
         lines += legs
     q_before = lines[0].joints(np.zeros(1))[0]
     planning = PlanningTask(robot, task.bodies, PLANNING_TOLERANCE, task.limits, task.seed)
-    moves = transfer(planning, task.home, q_before)
+    moves = transfer(planning, task.home, q_before, needs.clearance)
     if not isinstance(moves, tuple):
         return NoTransfer(moves)
     every = np.concatenate([leg.sampled(LEG_POINTS)[1] for leg in lines])
     limit = float(limit_margin(robot, every).min())
     value = float(conditioning(robot, every).smallest_singular_value.min())
+    if (refusal := _too_near(task, "move", moves)) is not None:
+        return refusal
     smallest = min_clearance(task.bodies, (*moves, *lines)) if task.bodies is not None else None
     asked = (
         (limit, needs.limit_margin),

@@ -13,7 +13,6 @@ from functools import lru_cache
 import numpy as np
 
 from er3a.geometry.transforms import skew, step_between
-from er3a.kinematics.chain import JOINTS
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
@@ -73,9 +72,9 @@ def table_covariance(robot: Robot, q: Reals, accuracy: ArmAccuracy) -> Reals:
         ("alpha", accuracy.angle_deviation),
         ("offset", accuracy.angle_deviation),
     ):
-        for joint in range(JOINTS if deviation else 0):
+        for row in range(robot.rows if deviation else 0):
             entries = np.array(getattr(robot, name))
-            entries[joint] += TABLE_STEP
+            entries[row] += TABLE_STEP
             step = step_between(at, forward(robot.replace(**{name: entries}), q)) / TABLE_STEP
             out += deviation**2 * step[..., :, None] * step[..., None, :]
     return out

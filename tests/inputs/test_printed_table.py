@@ -119,3 +119,14 @@ def test_one_short_length_makes_no_table_of_metres(tmp_path, longest, unit):
     content, notes = read_dh_table(tmp_path / "arm.csv", "arm", as_printed=True)
     assert robot_of(content).a == pytest.approx([0.35, 0.007, 0.175])
     assert any("metres" in note for note in notes) == (unit == "m")
+
+
+@pytest.mark.parametrize("said", [True, False])
+def test_a_robot_made_of_a_table_says_what_the_table_does_not(tmp_path, said):
+    """The convention and the directions are in the robot's file, whose pages show the source."""
+    head, more = "joint,a_mm,alpha_deg,d_mm,offset_deg", ",direction,convention" if said else ""
+    rows = [f"{joint},100,90,200,0{',1,standard' if said else ''}" for joint in (1, 2, 3)]
+    (tmp_path / "arm.csv").write_text("\n".join([head + more, *rows]) + "\n")
+    content, _ = read_dh_table(tmp_path / "arm.csv", "arm")
+    assert ("read as standard D-H, which it does not say" in content.dh.source) == (not said)
+    assert ("gives no directions" in content.zero.source) == (not said)

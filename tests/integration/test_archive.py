@@ -25,8 +25,8 @@ def pack(small_study, tmp_path, monkeypatch):
     """Packs the small study, cut down to the robots that are named."""
     monkeypatch.chdir(small_study.folder)
 
-    def packed(*robots: str) -> Path:
-        study = yaml.safe_load(Path("config/small.yaml").read_text())
+    def packed(*robots: str, **settings: object) -> Path:
+        study = yaml.safe_load(Path("config/small.yaml").read_text()) | settings
         study["robots"] = {robot: study["robots"][robot] for robot in robots}
         (tmp_path / "small.yaml").write_text(yaml.safe_dump(study))
         count = archive(tmp_path / "small.yaml", Path("results"), Path("reports"), tmp_path / "study.zip")
@@ -81,3 +81,8 @@ def test_an_unfinished_study_is_one_error(small_study, tmp_path, monkeypatch):
     with pytest.raises(ResultError, match="missing"):
         archive(folder / "config/small.yaml", folder / "results", tmp_path / "reports", tmp_path / "study.zip")
     assert not list(tmp_path.glob("*.zip"))
+
+
+def test_results_of_other_settings_than_those_at_hand_are_not_packed(pack, small_study):
+    with pytest.raises(ResultError, match=r"computed before these changed: the study's settings\. Run the study again"):
+        pack("er3_600", seed=7)

@@ -201,10 +201,14 @@ def test_what_a_study_does_not_say_of_tool_payload_and_links_is_open(full, tmp_p
     entry = study.robots["er3a_c60"]
     tool = Placement(xyz_mm=[0, 0, 120], rpy_deg=[0, 0, 0])
     whole, point, none = (LoadFields(**CLAIM, body=each) for each in (LOAD, body, body | {"mass_kg": 0}))
+    nowhere = LoadFields(**CLAIM, body={key: value for key, value in LOAD.items() if key != "centre_mm"})
+    guess = LoadFields(source="a guess", grade="inferred", body=LOAD)
     for more, needs in (
         ({"payload": None}, ("load",)),
         ({"payload": None, "tool_load": whole}, ("carried",)),
         ({"payload": point}, ("load_inertia",)),
+        ({"payload": nowhere}, ("load_centre",)),
+        ({"payload": guess}, ("load_guess",)),
         ({"tool": tool}, ("tool",)),
         ({"tool": tool, "tool_load": none}, ()),
         ({"payload": none, "tool_load": whole}, ()),
@@ -217,6 +221,23 @@ def test_what_a_study_does_not_say_of_tool_payload_and_links_is_open(full, tmp_p
     links = tuple(replace(each, body=nothing) if each.link == 3 else each for each in robot.masses.links)
     without = robot.replace(masses=replace(robot.masses, links=links))
     assert unknowns(without, ("load",)) == (DataOpen("masses", (3,)), DataOpen("load"))
+
+
+@pytest.mark.parametrize(("group", "need"), [("drives", "drives_guess"), ("wrist_load", "wrist_guess")])
+def test_limits_that_are_guessed_settle_nothing(full, tmp_path, group, need):
+    def guessed(content: dict[str, Any]) -> None:
+        limited(1.0)(content)
+        content[group] |= {"grade": "inferred"}
+
+    found = computed(tmp_path, a_study(tmp_path, guessed, entry={"payload": CLAIM | {"body": LOAD}}, kept=ONE))
+    summary = found.results.summary
+    assert (full[1].status, found.status, summary.verdict.finding.unknown) == ("pass", "caution", (need,))
+    left = {each.subject: each.names for each in summary.not_examined}
+    if group == "drives":
+        assert len(left["peak_torques"]) == len(left["rated_torques"]) == 6
+        assert "rests on guesses: the drives' limits" in dynamics.payload_text(summary, full[0].robot("er3a_c60"))[0]
+    else:
+        assert left["wrist_limits"] == ()
 
 
 def test_limits_that_no_path_was_held_against_are_no_pass(full):
@@ -578,5 +599,6 @@ def test_the_load_that_a_program_names_counts_for_its_stretches(tmp_path):
     left = {each.subject: each.names for each in summary.not_examined}
     assert left["program_loads"] == ("moves_3: set_payload(get_flag(1))",)
     assert "program_loads" in [each.subject for each in summary.verdict.missed]
+    assert left["load"] == ("load_inertia",)  # of 2 kg that the program gives no inertia
     report(study, found, tmp_path / "page.html")
     assert "With 2 kg on the flange, which the program names" in (tmp_path / "page.html").read_text(encoding="utf-8")

@@ -25,6 +25,7 @@ from er3a.files.robot_file import Placement
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
 from er3a.files.target_file import load_targets
+from er3a.files.vision_file import load_vision
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import MIN_SINGULAR_VALUE
@@ -67,6 +68,7 @@ from er3a.pipeline.stages.workspace.compute import compute as workspace
 from er3a.pipeline.stages.workspace.entry import BoxTask
 from er3a.pipeline.stages.workspace.model import CapabilityMissing
 from er3a.pipeline.study import Study, load_study
+from er3a.pipeline.viewing.conditions import program_head
 from er3a.references.rows import GROUPS
 from er3a.robots.robot import ConvexPiece, Envelope, PairRule, Robot, Visual
 
@@ -119,6 +121,18 @@ def test_paths_name_what_their_settings_leave_out(study, tmp_path):
     assert "scene_shapes" not in found
     absent = "scene_shapes" if study.scene(ROBOT, "trajectory") is None else "obstacles"
     assert {"scene_shapes", "obstacles"} - more.keys() == {absent}
+
+
+@pytest.mark.parametrize(("grade", "names"), [("inferred", tuple(f"J{j}" for j in range(1, 7))), ("claim", None)])
+def test_joint_speeds_that_the_robots_file_guesses_are_named_as_assumed(study, tmp_path, grade, names):
+    content = yaml.safe_load(Path(f"data/robots/{ROBOT}.yaml").read_text(encoding="utf-8"))
+    rows = [{"joint": j, "speed_deg_s": 180.0} for j in range(1, 7)]
+    content["speeds"] = {"source": "As arms of this size", "grade": grade, "rows": rows}
+    (tmp_path / f"{ROBOT}.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
+    entry = {"paths": one_path(tmp_path), "file": str(tmp_path / f"{ROBOT}.yaml")}
+    found = trajectory(changed(study, entry, trajectory={"avoidance": "slow"}), ROBOT)
+    assert (subjects(found)["own_speeds"].names if names else subjects(found).get("own_speeds")) == names
+    assert found.summary.joint_limits.speed_assumed == (names is not None,) * 6
 
 
 @pytest.mark.long
@@ -486,6 +500,12 @@ def in_doubt(kind: str, content: dict, confirmed: bool) -> dict:
     elif kind == "mesh":
         mesh = {"file": "part.stl", "density_kg_m3": 1000, "xyz_mm": metres}
         content["robots"][ROBOT]["tool_load"] = {"source": "x", "grade": "cad", "mesh": mesh}
+    elif kind == "vision":
+        content["home_deg"] = [0, 0.349, -0.349, 0, -1.5708, 0]
+    elif kind == "grasp":
+        content["objects"][0]["grasps"][0]["xyz_mm"] = [0.0, 0.0, 0.12]
+    elif kind == "detector":
+        content["objects"][0]["standard_deviation"]["position_mm"] = [0.0004, 0.0004, 0.0008]
     else:
         content["dynamics"] = content.get("dynamics", {}) | {"payload_centre_mm": metres}
     return content | ({"units_checked": True} if confirmed else {})
@@ -508,6 +528,9 @@ def in_doubt(kind: str, content: dict, confirmed: bool) -> dict:
         ("payload", "dynamics", f"study.yaml: robots.{ROBOT}.payload.body.centre_mm: [0.0, 0.0, 0.3] mm"),
         ("payload", "trajectory", ""),
         ("mesh", "dynamics", f"study.yaml: robots.{ROBOT}.tool_load.mesh.xyz_mm: [0.0, 0.0, 0.3] mm"),
+        ("vision", "vision", "vision.yaml: home_deg: [0, 0.349, -0.349, 0, -1.5708, 0] deg"),
+        ("grasp", "vision", "vision.yaml: objects[0].grasps[0].xyz_mm: [0.0, 0.0, 0.12] mm"),
+        ("detector", "vision", "vision.yaml: objects[0].standard_deviation.position_mm: [0.0004, 0.0004, 0.0008] mm"),
         ("settings", "dynamics", "study.yaml: dynamics.payload_centre_mm: [0.0, 0.0, 0.3] mm"),
     ],
 )
@@ -520,9 +543,11 @@ def test_a_number_that_looks_like_another_unit_is_no_pass_where_it_is_read(
         "paths": f"data/paths/{ROBOT}.yaml",
         "scene": "data/scenes/table_and_post.yaml",
         "robot": f"data/robots/{ROBOT}.yaml",
+        "vision": f"data/vision/{ROBOT}.yaml",
         "study": "config/small.yaml",
     }
-    of = {"carried": "scene", "masses": "robot", "hulls": "robot"}.get(kind, kind if kind in sources else "study")
+    of_files = {"carried": "scene", "masses": "robot", "hulls": "robot", "grasp": "vision", "detector": "vision"}
+    of = of_files.get(kind, kind if kind in sources else "study")
     files = {each: tmp_path / f"{ROBOT if each == 'robot' else each}.yaml" for each in sources}
     for each, source in sources.items():
         content = yaml.safe_load(Path(source).read_text(encoding="utf-8"))
@@ -541,11 +566,13 @@ def test_a_number_that_looks_like_another_unit_is_no_pass_where_it_is_read(
         if stage == "dynamics":
             study.loads(name)
             study.section(DynamicsSettings)
+        if stage == "vision":
+            load_vision(files["vision"], robot)
         return Results(Summary(Verdict("pass", NoPass(())), ()))
 
     written = []
     monkeypatch.setattr(STAGES[stage].module("compute"), "compute", passing)
-    monkeypatch.setattr(run, "write_results", lambda *given: written.append(given[-1]))
+    monkeypatch.setattr(run, "write_results", lambda *given: written.append(given[4]))
     run.compute(stage, read, ROBOT, tmp_path)
     (verdict,) = [each.summary.verdict for each in written]
     expected = place and not confirmed
@@ -566,7 +593,7 @@ def test_limits_that_are_assumed_are_no_pass(tmp_path, monkeypatch, grade, statu
     study["robots"] = {ROBOT: study["robots"][ROBOT] | {"file": str(tmp_path / f"{ROBOT}.yaml")}}
     written = []
     passing = Results(Summary(Verdict("pass", NoPass(())), ()))
-    monkeypatch.setattr(run, "write_results", lambda *given: written.append(given[-1].summary.verdict))
+    monkeypatch.setattr(run, "write_results", lambda *given: written.append(given[4].summary.verdict))
     for stage in ("trajectory", "validation"):
         monkeypatch.setattr(STAGES[stage].module("compute"), "compute", lambda study, name: passing)
         run.compute(stage, Study.model_validate(study), ROBOT, tmp_path)
@@ -771,6 +798,7 @@ def test_a_grasp_passes_by_no_object_out_of_view_and_no_arm_without_errors(study
         ("objects_out_of_view", ("can",), {"view": content["view"] | {"horizontal_deg": 5}}),
         ("objects_out_of_view", ("can",), {"view": content["view"] | {"farthest_mm": 900}}),
         ("arm_errors", (), {"arm": {"source": "none", "repeatability_mm": 0.02}}),
+        ("arm_errors", (), {"arm": content["arm"] | {"table_angle_standard_deviation_deg": 0.0}}),
     ):
         (tmp_path / "vision.yaml").write_text(yaml.safe_dump(content | more), encoding="utf-8")
         verdict = vision(changed(study, own, vision=few), ROBOT).summary.verdict
@@ -810,6 +838,8 @@ def test_what_no_verdict_passes_without_turns_it_and_is_said():
             ).verdict
             assert verdict.status == ("caution" if status == "pass" and subject in NEVER_A_PASS else status)
             assert ("no pass" in say_all(verdict.findings)) == (subject in NEVER_A_PASS)
+        if subject in NEVER_A_PASS:  # programs say it too, as who gets one may never see a page
+            assert program_head(None, [LeftOut(subject, amount=3.0)])[-1].startswith("not checked: ")
     many = LeftOut("allowed_contacts", tuple(f"link_{k}/table" for k in range(9)))
     assert say(NoPass((many,))).endswith("link_5/table, 3 more).")
 
@@ -1055,7 +1085,7 @@ def test_values_of_the_robots_file_that_are_assumed_are_named(tmp_path, monkeypa
     study["robots"] = {ROBOT: study["robots"][ROBOT] | {"file": str(tmp_path / f"{ROBOT}.yaml")} | (given or {})}
     written = []
     passing = Results(Summary(Verdict("pass", NoPass(())), ()))
-    monkeypatch.setattr(run, "write_results", lambda *given: written.append(given[-1].summary))
+    monkeypatch.setattr(run, "write_results", lambda *given: written.append(given[4].summary))
     monkeypatch.setattr(STAGES["trajectory"].module("compute"), "compute", lambda study, name: passing)
     run.compute("trajectory", Study.model_validate(study), ROBOT, tmp_path)
     assert written[0].verdict.status == "pass"

@@ -11,13 +11,15 @@ import pytest
 from PIL import Image
 
 from er3a.files.kept_files import ROOT
+from er3a.files.vision_file import load_vision
 from er3a.pipeline.messages.vision import say
 from er3a.pipeline.results import read_results
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.registry import STAGES
-from er3a.pipeline.stages.vision.compute import figures_of, verdict_of
+from er3a.pipeline.stages.vision.compute import _left_out, figures_of, verdict_of
 from er3a.pipeline.stages.vision.model import VisionResults
 from er3a.pipeline.study import load_study
+from er3a.pipeline.viewing.tray import sound_motions
 from testing.hand_eye_sets import pose
 from testing.on_demand import OnDemand
 from tests.vision.test_boards import CHARUCO, board_places, rendered
@@ -51,7 +53,7 @@ def test_objects_are_grasped_as_expected_and_the_turned_board_is_named(folders):
     assert summary.verdict.shapes.near == ()
     left = {each.subject: each.names for each in summary.not_examined}
     assert left["left_out_samples"] == ("pose_12",)
-    assert {"real_camera", "detections", "gripped_parts", "shallow_overlaps"} <= left.keys()
+    assert {"real_camera", "detections", "gripped_parts", "shallow_overlaps", "tool"} <= left.keys()
     assert "touched_points" not in left
     assert {each.name: each.outcome for each in summary.objects} == {
         "can": "grasped",
@@ -72,6 +74,43 @@ def test_objects_within_the_margin_of_assumed_shapes_count_apart(folders):
         assert (f"{len(near)} more only if" in say(verdict.finding)) == bool(near)
         figures = {each.name: each.value for each in figures_of(summary.calibration, summary.objects, near)}
         assert figures["objects_grasped"] == clear
+
+
+@pytest.mark.long
+def test_only_grasps_that_pass_are_told_to_succeed(folders):
+    results = read_results(folders["er3a_c60"], VisionResults).results
+    verdict, (can, *others) = results.summary.verdict, results.summary.objects
+
+    def told(near=(), expect="grasped"):
+        objects, shapes = (replace(can, expect=expect), *others), replace(verdict.shapes, near=near)
+        summary = replace(results.summary, objects=objects, verdict=replace(verdict, shapes=shapes))
+        return sound_motions(replace(results, summary=summary))
+
+    assert told() == ["can", "box"]
+    assert told(near=("box",)) == ["can"]
+    assert told(expect="not graspable") == ["box"]
+
+
+@pytest.mark.long
+def test_an_object_without_a_grasp_is_not_grasped_whatever_refuses_it(folders):
+    summary = read_results(folders["er3a_c60"], VisionResults).results.summary
+    (can, *_), none = summary.objects, {"grasp": None, "refusal": None, "expect": None}
+    lost = replace(can, **none, outcome="not graspable")
+    for objects, status, grasped in (((can, lost), "caution", 1), ((lost,), "fail", 0)):
+        verdict = verdict_of(replace(summary.calibration, warnings=()), objects, ())
+        assert (verdict.status, verdict.finding.grasped) == (status, grasped)
+
+
+@pytest.mark.long
+def test_a_table_that_its_own_samples_contradict_is_no_pass(folders):
+    summary = read_results(folders["er3a_c60"], VisionResults).results.summary
+    table, file = summary.calibration.table, load_vision(ROOT / "data/vision/er3a_c60.yaml")
+    for probability, named in ((0.5, []), (0.001, [tuple(each.entry for each in table.entries)])):
+        found = replace(summary.calibration, table=replace(table, probability=probability))
+        left = tuple(_left_out(found, file, (), 0.0))
+        assert [each.names for each in left if each.subject == "contradicted_table"] == named
+        missed = replace(summary, not_examined=left).verdict.missed
+        assert ("contradicted_table" in {each.subject for each in missed}) == bool(named)
 
 
 @pytest.mark.long

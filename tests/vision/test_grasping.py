@@ -12,6 +12,7 @@ import pytest
 
 from er3a.collision.along import clearance
 from er3a.collision.bodies import Bodies
+from er3a.collision.scene import Sphere
 from er3a.files.hand_eye_file import load_hand_eye
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
@@ -21,7 +22,7 @@ from er3a.kinematics.forward import forward
 from er3a.pipeline.messages.vision import say
 from er3a.pipeline.stages.vision.compute import grasp_programs
 from er3a.planning.timing import joint_limits
-from er3a.planning.way_around import EndOutsideLimits, PlannerMissing
+from er3a.planning.way_around import EndOutsideLimits, NoneFound, PlannerMissing
 from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.programs.languages import read_program
 from er3a.robots.joint_limits import within
@@ -34,6 +35,7 @@ from er3a.vision.grasping import (
     GraspTask,
     GraspUnlikely,
     NoTransfer,
+    PathCollides,
     plan_grasp,
 )
 from er3a.vision.hand_eye import calibrate_hand_eye
@@ -170,6 +172,20 @@ def test_table_errors_are_those_of_tables_with_drawn_entries():
     np.testing.assert_allclose(np.diag(np.cov(np.array(seen).T)), np.diag(parts.table - expected), rtol=0.12)
 
 
+@pytest.mark.parametrize("arm", ["lbr_iiwa_14", "scara"])
+def test_errors_of_every_row_of_the_table_count(arm):
+    robot = scara() if arm == "scara" else load_robot(arm)
+    accuracy, q = ArmAccuracy(length_deviation=1e-3), np.full(robot.joints, 0.1)
+    rows = [table_covariance(robot, q, replace(accuracy, length_deviation=0.0))]
+    for name in ("a", "d"):
+        for row in range(robot.rows):
+            entries = np.array(getattr(robot, name))
+            entries[row] += 1e-6
+            step = step_between(forward(robot, q), forward(robot.replace(**{name: entries}), q)) / 1e-6
+            rows.append(1e-6 * np.outer(step, step))
+    np.testing.assert_allclose(table_covariance(robot, q, accuracy), sum(rows), rtol=1e-6, atol=1e-14)
+
+
 def test_the_next_view_sees_the_board_is_free_and_keeps_its_promise(cell):
     made, robot, found = cell
     scene = load_scene(SCENE)
@@ -256,6 +272,31 @@ def test_rates_of_the_motion_keep_the_limits(round_the_post):
         if leg.part != "move":
             tool = forward(robot, q)[:, :3, 3]
             assert np.linalg.norm(np.diff(tool, axis=0), axis=1).max() / t[1] <= SPEED * (1 + 1e-6)
+
+
+@pytest.mark.long
+def test_the_move_to_the_approach_keeps_the_clearance_asked_for(monkeypatch):
+    home = np.radians([-60, 20, -20, 0, -90, 0])
+    robot, task, plan = chosen_from(home)
+    middle = forward(robot, (home + plan.chosen.q_before)[None] / 2)[0, :3, 3]
+    outward = middle * [1, 1, 0] / np.hypot(*middle[:2])
+    bump = Sphere("bump", transform(middle + 0.057 * outward, np.zeros(3)), 0.02)
+    scene = replace(task.scene, solids=(*task.scene.solids, bump))
+    passed = clearance(robot, np.linspace(home, plan.chosen.q_before, 201), scene).distance.min()
+    assert 0 < passed < NEEDS.clearance
+    monkeypatch.setattr("er3a.vision.grasp_motion.way_around", lambda *given: NoneFound(1))
+    file, task, _ = task_of(FIXED, robot)
+    near = replace(task, home=home, scene=scene, bodies=Bodies(robot, scene))
+    target = file.objects[0].detected()
+    found = calibrate_hand_eye(load_hand_eye(FOLDER / "fixed_camera.yaml", robot))
+    T = seen_pose(found, target.T_camera_object)
+    refused = plan_grasp(near, target, T, lambda q: target.covariance).refusal
+    assert isinstance(refused, PathCollides)
+    assert (refused.part, "bump" in say(refused)) == ("move", True)
+    closer = replace(near, needs=replace(NEEDS, clearance=0.001))
+    assert plan_grasp(closer, target, T, lambda q: target.covariance).chosen.clearance == pytest.approx(
+        passed, abs=5e-4
+    )
 
 
 @pytest.mark.long

@@ -21,6 +21,8 @@ from er3a.files.vision_file import load_vision
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.pipeline.cli import app
+from er3a.pipeline.messages.left_out import left_out_text
+from er3a.pipeline.results import LeftOut
 from er3a.pipeline.stages.vision.entry import vision_files
 from er3a.robots.joint_limits import joint_columns
 from testing import camera_cells
@@ -272,6 +274,13 @@ def test_touched_points_that_contradict_a_calibration_end_the_command_with_code_
         codes.append((found.exit_code, "touched points contradict the calibration" in found.output))
         record = json.loads(CliRunner().invoke(app, ["hand-eye", str(file), "--json"]).stdout)
         assert record["touch_contradicts"] == (beside > 0)
+        told = (left_out_text(LeftOut(each)) for each in ("joint_zeros", "touched_points", "real_camera"))
+        assert [each in record["not_examined"] for each in told] == [True, False, False]
+    file.write_text(file.read_text().replace("touched: touched.csv", "simulated: true"))
+    untouched = CliRunner().invoke(app, ["hand-eye", str(file)]).output
+    assert all(
+        f"not examined: {left_out_text(LeftOut(each))}" in untouched for each in ("touched_points", "real_camera")
+    )
     assert codes == [(0, False), (1, True)]
 
 

@@ -113,7 +113,7 @@ def contents(stage):
 def rested_on(wildcards):
     """Params function: digest of what all results rest on, which the index compares with what it is now."""
     all_of = [(robot, stage) for robot in ROBOTS for stage in STUDY.stages(robot)]
-    now = [(*of, STUDY.inputs_digest(*of), STUDY.computed_from(*of)) for of in all_of]
+    now = [(*of, STUDY.inputs_digest(*of), STUDY.computed_from(*of), code_of(of[1], "compute")) for of in all_of]
     return hashlib.sha256(repr(now).encode()).hexdigest()
 
 

@@ -306,18 +306,19 @@ def hand_eye(
     from er3a.files.hand_eye_file import HandEyeFile, read_calibration
     from er3a.files.robot_library import load_robot
     from er3a.files.yaml_file import load
-    from er3a.pipeline.messages.left_out import left_out_text
-    from er3a.pipeline.messages.say import say
+    from er3a.pipeline.messages.left_out import left_out_names, left_out_text
+    from er3a.pipeline.messages.say import bracketed, say
     from er3a.pipeline.messages.vision import correction_lines, hand_eye_lines, hand_eye_record
     from er3a.pipeline.results import LeftOut
     from er3a.vision.boards import ambiguous_tilts
     from er3a.vision.hand_eye import calibrate_hand_eye
-    from er3a.vision.table_corrections import correct_table, zeros_tried
+    from er3a.vision.table_corrections import TABLE_CONTRADICTED, TableCorrections, correct_table, zeros_tried
     from er3a.vision.vision_findings import HandEyeError, grave_warnings
 
     # What is printed is for the controller, and so in the robot's own base, wherever its file places that.
     arm = load_robot(robot).replace(base=np.eye(4)) if robot else None
-    asked = load(HandEyeFile, file).table_corrections
+    head = load(HandEyeFile, file)
+    asked = head.table_corrections
     with shown_work(f"{file}: reading the samples") as at:
         samples, offset, images = read_calibration(file, arm)
         open_tilts = ambiguous_tilts(images.views, samples.names) if images else ()
@@ -330,15 +331,22 @@ def hand_eye(
         at(f"{file}: estimating corrections of the table")
         table = correct_table(found, arm, asked) if arm and asked else None
     boardless = images.boardless if images else ()
+    wrong = isinstance(table, TableCorrections) and table.probability < TABLE_CONTRADICTED
+    missed = {
+        LeftOut("real_camera"): head.simulated,
+        LeftOut("copied_samples", found.copies): bool(found.copies),
+        LeftOut("joint_zeros", unseen): bool(unseen) or arm is None,
+        LeftOut("small_joint_zeros", amount=least_zero): bool(least_zero),
+        LeftOut("touched_points"): found.touch is None,
+        LeftOut("contradicted_table"): wrong,
+    }
+    not_examined = [bracketed(left_out_text(each), left_out_names(each)) for each, is_so in missed.items() if is_so]
     if as_json:
-        options.print_json(hand_eye_record(found, offset, table, boardless, open_tilts))
+        record = hand_eye_record(found, offset, table, boardless, open_tilts)
+        options.print_json(record | {"not_examined": not_examined})
     else:
         sample_lines = [f"sample {say(each)}" for each in (*open_tilts, *boardless)]
-        missed = (
-            *([LeftOut("joint_zeros", unseen)] if unseen else []),
-            LeftOut("small_joint_zeros", amount=least_zero),
-        )
-        sample_lines += [f"not examined: {left_out_text(each)}" for each in missed if each.names or each.amount]
+        sample_lines += [f"not examined: {each}" for each in not_examined]
         print(
             "\n".join(
                 [hand_eye_lines(found, offset, boardless), *sample_lines, *(correction_lines(table) if table else [])]

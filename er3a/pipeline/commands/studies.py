@@ -65,6 +65,9 @@ def new(
         typer.secho(f"WARNING: {shortcoming}", fg="red", bold=True, err=True)
 
 
+WHAT_IT_DOES = "what it does, for which see er3a check-program"
+
+
 @options.app.command(rich_help_panel=options.FIRST)
 def check(
     files: Annotated[
@@ -76,7 +79,7 @@ def check(
     """Check input files: print the kind of each file, or its error."""
     from er3a.files.robot_library import load_robot
     from er3a.files.units import noted_doubts
-    from er3a.pipeline.check import check_file, stage_forms
+    from er3a.pipeline.check import PROGRAM, check_file, stage_forms
 
     found: list[dict[str, object]] = []
     for file in files:
@@ -91,10 +94,12 @@ def check(
         forms = stage_forms(load_robot(file)) if kind == "a robot" else {}
         more: dict[str, object] = {"stages": forms} if forms else {}
         more |= {"doubtful_units": [str(each) for each in doubts]} if doubts else {}
+        more |= {"not_examined": [WHAT_IT_DOES]} if kind == PROGRAM else {}
         found.append({"file": str(file), "in_order": True, "kind": kind} | more)
         if not as_json:
             but = f" but for {len(doubts)} doubtful unit{'s' if len(doubts) > 1 else ''}" if doubts else ""
-            print(f"{file}: {kind}, in order{but}")
+            only = f"; not examined: {WHAT_IT_DOES}" if kind == PROGRAM else ""
+            print(f"{file}: {kind}, in order{but}{only}")
             for stage, form in forms.items():
                 print(f"  {stage}: {form}")
     if as_json:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from typing import get_args
 
 import numpy as np
 
@@ -40,7 +41,11 @@ NEEDS: dict[model.Need, str] = {
     "load": N_("mass, centre and inertia of tool and payload"),
     "tool": N_("mass of the tool"),
     "carried": N_("mass of what the tool carries"),
+    "load_centre": N_("centre of mass of tool or payload"),
     "load_inertia": N_("inertia of tool or payload"),
+    "drives_guess": N_("the drives' limits, which the robot's file guesses"),
+    "wrist_guess": N_("the wrist's limits, which the robot's file guesses"),
+    "load_guess": N_("the mass of tool or payload, which the study guesses"),
 }
 names_in_words("load", "dynamics.need", NEEDS)
 KEY_FIGURES = {
@@ -154,6 +159,8 @@ TEXTS = texts(
         "payload.partly": Plural(
             "count", "{count} quantity is not known and left out.", "{count} quantities are not known and left out."
         ),
+        "payload.guessed": "It rests on guesses: {what}.",
+        "payload.guessed_masses": "the masses of the links",
         "payload.left_out": "Left out, because not known: {what}.",
         "payload.unknown": Plural(
             "count",
@@ -191,7 +198,8 @@ def payload_text(summary: Summary | None, robot: Robot) -> tuple[str, str]:
     bounds = [
         (path.payload.value, path) for path in paths if path.counts and path.payload and path.payload.value is not None
     ]
-    missing = [say(each) for each in getattr(summary, "unknown", ())]
+    open_of = getattr(summary, "unknown", ())
+    missing = [say(each) for each in open_of if each.what not in get_args(model.Guess)]
     official = _rated(robot, official=True)
     if bounds:
         value, path = min(bounds, key=lambda bound: bound[0])
@@ -200,13 +208,22 @@ def payload_text(summary: Summary | None, robot: Robot) -> tuple[str, str]:
         form = "payload.bounded#joint" if by and joint else "payload.bounded"
         known = sentence(form, kg=at_least(value, "kg"), path=path.name, by=by, joint=joint)
         open_ = sentence("payload.partly", count=len(missing)) if missing else ""
-        known, rest = joined([known, open_], " "), sentence("payload.left_out", what=joined(missing)) if missing else ""
+        known = joined([known, _guesses(summary), open_], " ")
+        rest = sentence("payload.left_out", what=joined(missing)) if missing else ""
     elif missing:
         known = sentence(f"payload.unknown{official and '#rated'}", count=len(missing))
         rest = sentence("payload.ask", what=joined(missing))
     else:
         known, rest = sentence(f"payload.not_examined{official and '#rated'}"), ""
     return joined([known, official or _rated(robot)], " "), rest
+
+
+def _guesses(summary: Summary | None) -> str:
+    """On which guesses the torques and their limits rest; empty where they rest on none."""
+    masses = getattr(summary, "masses", None)
+    found = [sentence("payload.guessed_masses")] if masses and masses.grade == "inferred" else []
+    found += [say(each) for each in getattr(summary, "unknown", ()) if each.what in get_args(model.Guess)]
+    return sentence("payload.guessed", what=joined(found)) if found else ""
 
 
 def _rated(robot: Robot, *, official: bool = False) -> str:

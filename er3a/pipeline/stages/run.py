@@ -22,6 +22,7 @@ from er3a.pipeline.results import (
     Stored,
     Summary,
     Verdict,
+    input_records,
     read_stage,
     write_results,
 )
@@ -57,12 +58,13 @@ def compute(name: str, study: Study, robot: str, folder: Path, parts: list[Path]
     absent : why the stage was not computed, in words; None if it was
     """
     stage = STAGES[name]
+    read = input_records(file for file in study.inputs(robot, name) if file.is_file())
     with noted_doubts() as doubts:
         results = _computed(stage, study, robot, {"parts": parts} if stage.sampled else {})
     assumed = _assumed(study, robot) if stage.rests_on else ()
     doubts = [each for each in doubts if stage.weighs or not each.key.startswith(MASSES)]
     results = _in_doubt(results, (*assumed, *left_out_of_units(doubts)))
-    write_results(folder, study, robot, stage, results)
+    write_results(folder, study, robot, stage, results, read)
     if isinstance(results, AbsentResults):
         import_module(stage.messages)
         return say(results.summary.verdict.finding)

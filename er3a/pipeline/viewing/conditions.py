@@ -11,13 +11,12 @@ from pathlib import Path
 from er3a.pipeline.messages import language
 from er3a.pipeline.messages.left_out import left_out_text
 from er3a.pipeline.messages.validation import condition
-from er3a.pipeline.results import LeftOut, LeftOutSubject, read_stage
+from er3a.pipeline.results import NEVER_A_PASS, LeftOut, LeftOutSubject, read_stage
 from er3a.pipeline.stages.registry import STAGES
 
-WARNED_OF: tuple[LeftOutSubject, ...] = (
-    *("obstacles", "tool", "bare_tool", "carried", "gripped_parts", "placed_box", "torques", "ways_between"),
-    *("units", "own_limits"),
-)
+WARNED_OF: frozenset[LeftOutSubject] = NEVER_A_PASS | {
+    *("tool", "carried", "gripped_parts", "placed_box", "torques", "ways_between"),
+}
 
 
 def condition_of(validated: Path | None) -> str:

@@ -43,6 +43,7 @@ from er3a.pipeline.messages.validation import (
 from er3a.pipeline.messages.workspace import judged_void, no_box_text, run_again_text, void_text
 from er3a.pipeline.player.motions import Fault, FaultMoment
 from er3a.pipeline.results import (
+    THE_CODE,
     THE_SETTINGS,
     AbsentResults,
     Input,
@@ -189,7 +190,7 @@ def changed_text(outdated: Outdated, robots: Set[str]) -> str:
 
 
 def _changed_names(changed: Sequence[str]) -> str:
-    named = [tr(each) if each == THE_SETTINGS else each for each in changed[:MAX_CHANGED]]
+    named = [tr(each) if each in (THE_SETTINGS, THE_CODE) else each for each in changed[:MAX_CHANGED]]
     more = [sentence("more", count=len(changed) - MAX_CHANGED)] if len(changed) > MAX_CHANGED else []
     return joined([*named, *more], ", ")
 
@@ -624,6 +625,9 @@ def _entry(study: Study, name: str, results: Path, outdated: Outdated) -> dict[s
         "bodies": [each.name for each in scene.solids] if (scene := study.scene(name, "trajectory")) else [],
         "runs": runs,
         "grasped": grasped,
+        "grasps_missed": say(NoPass(missed))
+        if "vision" in computed and (missed := computed["vision"].results.summary.verdict.missed)
+        else "",
         "condition": condition(_parts(heads), getattr(finding, "unbounded", ()), rates := _assumed_rates(heads)),
         "rates": rates,
         "box": joined([_without_box(), placed.compared], " ") if placed else "",

@@ -28,7 +28,7 @@ from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.trajectory.model import PathSummary, TrajectoryResults
 from er3a.pipeline.stages.trajectory.played import faults as path_faults
 from er3a.pipeline.stages.trajectory.played import repaired
-from er3a.pipeline.stages.vision.model import VisionResults
+from er3a.pipeline.stages.vision.model import ObjectResult, VisionResults
 from er3a.pipeline.stages.workspace.model import PlacementSummary, PlaceSummary, StandSummary
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.numbers import fixed
@@ -342,7 +342,7 @@ def placing(
 def sound_motions(results: object) -> list[str]:
     """Names of a stage's motions that pass as they are."""
     if isinstance(results, VisionResults):
-        return [each.name for each in results.summary.objects if each.outcome == "grasped"]
+        return [each.name for each in results.summary.objects if each.grasp and _is_sound(each, results)]
     followed: Sequence[ProgramSummary | PathSummary]
     if isinstance(results, ProgramsResults):
         followed, faults = results.summary.programs, program_faults(results)
@@ -353,6 +353,12 @@ def sound_motions(results: object) -> list[str]:
     unmet = unmet_expectations(followed)
     faulty = {fault.name for fault in faults} | {each.name for each in (unmet.unmet if unmet else ())}
     return [each.name for each in followed if each.name not in faulty]
+
+
+def _is_sound(grasped: ObjectResult, results: VisionResults) -> bool:
+    """Whether a grasp passes: no other outcome was expected, and no assumed shape is near it."""
+    shapes = results.summary.verdict.shapes
+    return grasped.expect in (None, "grasped") and (shapes is None or grasped.name not in shapes.near)
 
 
 def placing_of(study: Study, stored: Stored[Any]) -> Placing | None:

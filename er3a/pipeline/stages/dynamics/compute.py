@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import get_args
@@ -16,7 +16,7 @@ from er3a.dynamics.arm_model import ArmModel, arm_model, drives_of, estimated_li
 from er3a.dynamics.plausibility import MassFinding, MissingLink, has_mass, mass_findings
 from er3a.dynamics.torque_timing import fastest_under_torques
 from er3a.dynamics.torques import Demand, TorqueParts, demand, known, power_imbalance, torque_parts, worst_holding
-from er3a.files.robot_library import load_of
+from er3a.files.robot_library import LoadFields, load_of
 from er3a.kinematics.singularity import NearSingular
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.results import Figure, LeftOut, LeftOutSubject, Status, Verdict
@@ -38,7 +38,7 @@ from er3a.planning.timing import JointLimits, NoTimeLaw, TimingError, fastest, n
 from er3a.programs.instructions import UnclearLoad
 from er3a.robots.joint_limits import shown
 from er3a.robots.masses import LinkMass, Load, MassBody, Masses, no_body, together
-from er3a.robots.robot import Grade, Robot
+from er3a.robots.robot import Grade, Robot, Source
 
 DynamicsVerdict = Verdict[model.NoData | model.NoLimits | model.AllWithin | model.Marginal | model.Overload]
 
@@ -89,20 +89,30 @@ def unknowns(robot: Robot, of_load: Sequence[model.Need]) -> tuple[model.DataOpe
         ("wrist_inertia", last - {joint for joint, _ in (wrist.inertia if wrist else ())}),
     )
     found += [model.DataOpen(what, tuple(sorted(missing))) for what, missing in asked if missing]
+    groups: tuple[tuple[model.Need, str], ...] = (("drives_guess", "drives"), ("wrist_guess", "wrist_load"))
+    found += [model.DataOpen(what) for what, group in groups if _is_guess(robot.sources.get(group))]
     return (*found, *map(model.DataOpen, of_load))
 
 
-def open_of_load(study: Study, name: str) -> tuple[model.Need, ...]:
-    """What the study does not say of tool and payload; a mass of 0 says that there is none."""
+def _is_guess(source: Source | LoadFields | None) -> bool:
+    return source is not None and source.grade == "inferred"
+
+
+def open_of_load(study: Study, name: str, of_programs: Iterable[Load] = ()) -> tuple[model.Need, ...]:
+    """What the study does not say of tool and payload, or guesses, and programs that name loads not of theirs; a mass
+    of 0 says that there is none."""
     entry, loads = study.entry(name), study.loads(name)
     if not loads:
         return ("load",)
     has_tool = not np.array_equal(study.robot(name).tool, np.eye(4))
-    points = any(each.body and each.body.mass_kg and not any(each.body.inertia_kg_m2) for each in loads)
+    bodies = [each.body for each in loads if each.body and each.body.mass_kg]
+    inertias = [*(body.inertia_kg_m2 for body in bodies), *(load.inertia for load in of_programs)]
     asked: dict[model.LoadPart, bool] = {
         "tool": has_tool and not entry.tool_load,
         "carried": not entry.payload,
-        "load_inertia": points,
+        "load_centre": any("centre_mm" not in body.model_fields_set for body in bodies),
+        "load_inertia": not all(map(any, inertias)),
+        "load_guess": any(map(_is_guess, loads)),
     }
     return tuple(part for part, is_open in asked.items() if is_open)
 
@@ -485,7 +495,8 @@ def compute(study: Study, name: str) -> model.DynamicsResults:
     )
     uses = tuple(sorted(uses, key=lambda use: -use.ratio))
     findings = mass_findings(robot) if moving else ()
-    unknown = unknowns(robot, open_of_load(study, name))
+    of_programs = [path.load for path in paths if path.load and path.summary.counts]
+    unknown = unknowns(robot, open_of_load(study, name, of_programs))
     masses = _masses_used(given, robot, load, (grade, load_grade if load else None), settings)
     imbalances = [path.imbalance for path in paths if path.imbalance is not None]
     summary = model.DynamicsSummary(
@@ -564,16 +575,18 @@ def _left_out(
     samples: int,
 ) -> tuple[LeftOut, ...]:
     """What the files leave open, paths that count for nothing, and what the model and its samples can't see."""
-    subjects: dict[model.Need, LeftOutSubject] = {
-        "masses": "link_masses",
-        "peak": "peak_torques",
-        "rated": "rated_torques",
-        "armature": "rotor_inertias",
-        "friction": "friction",
-        "wrist_moment": "wrist_limits",
-        "wrist_inertia": "wrist_limits",
-        "payload": "wrist_limits",
-        "load": "load",
+    subjects: dict[model.Need, tuple[LeftOutSubject, ...]] = {
+        "masses": ("link_masses",),
+        "peak": ("peak_torques",),
+        "rated": ("rated_torques",),
+        "armature": ("rotor_inertias",),
+        "friction": ("friction",),
+        "drives_guess": ("peak_torques", "rated_torques"),
+        "wrist_moment": ("wrist_limits",),
+        "wrist_inertia": ("wrist_limits",),
+        "wrist_guess": ("wrist_limits",),
+        "payload": ("wrist_limits",),
+        "load": ("load",),
     }
     names: dict[LeftOutSubject, set[int]] = {}
     parts = [each.what for each in unknown if each.what in get_args(model.LoadPart)]
@@ -581,8 +594,9 @@ def _left_out(
         if each.what in parts:
             continue
         everything = range(1, (robot.rows if each.what == "masses" else robot.joints) + 1)
-        whole = each.what in ("load", "payload")
-        names.setdefault(subjects[each.what], set()).update(() if whole else each.numbers or everything)
+        whole = each.what in ("load", "payload", "wrist_guess")
+        for subject in subjects[each.what]:
+            names.setdefault(subject, set()).update(() if whole else each.numbers or everything)
     found = [
         LeftOut(subject, tuple(f"{'' if subject == 'link_masses' else 'J'}{number}" for number in sorted(numbers)))
         for subject, numbers in names.items()

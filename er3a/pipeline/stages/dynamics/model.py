@@ -27,15 +27,18 @@ TORQUE, FORCE = get_args(Unit)
 EITHER = N_("N m or N")
 PARTS = ("gravity", "inertia", "velocity", "friction", "tool")
 Quantity = Literal["peak", "rms", "holding"] | WristQuantity
-LoadPart = Literal["tool", "carried", "load_inertia"]
+Guess = Literal["drives_guess", "wrist_guess", "load_guess"]
+"""What is compared, and settles nothing, because its source is a guess."""
+LoadPart = Literal["tool", "carried", "load_centre", "load_inertia", "load_guess"]
 Need = (
     Literal["masses", "peak", "rated", "armature", "friction", "wrist_moment", "wrist_inertia", "payload", "load"]
     | LoadPart
+    | Guess
 )
 
 
 class DataOpen(Finding, code="dynamics.unknown"):
-    """Something that the files leave open, with the joints or links concerned; none: all."""
+    """Something that the files leave open, or guess, with the joints or links concerned; none: all."""
 
     what: Need
     numbers: tuple[int, ...] = ()

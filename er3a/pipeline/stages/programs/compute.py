@@ -34,7 +34,7 @@ from er3a.programs.execution import RunLimits
 from er3a.programs.instructions import Pause, Place
 from er3a.programs.languages import read_program
 from er3a.programs.program_names import ProgramOutcome
-from er3a.robots.joint_limits import shown
+from er3a.robots.joint_limits import shown, speeds_given
 from er3a.robots.robot import Robot
 
 OUTCOMES: dict[Level, ProgramOutcome] = {"pass": "pass", "note": "pass", "caution": "caution", "fail": "fail"}
@@ -77,7 +77,7 @@ def compute(study: Study, name: str) -> model.ProgramsResults:
             verdict=_verdict(summaries).without(bodies_of(robot, scene).unexamined).resting_on(assumed),
             figures=_figures(summaries),
             scene=scene.title if scene else None,
-            assumed_speed=tuple(bool(value) for value in ~np.isfinite(robot.speed)),
+            assumed_speed=tuple(bool(value) for value in ~speeds_given(robot)),
             programs=tuple(summaries),
             not_examined=(
                 *left_out_of_collisions(
@@ -88,7 +88,7 @@ def compute(study: Study, name: str) -> model.ProgramsResults:
                     arms,
                     _judged(summaries, motions),
                 ),
-                *left_out_of_rates(np.isfinite(robot.speed), not limits.acceleration_assumed, jerk=False),
+                *left_out_of_rates(speeds_given(robot), not limits.acceleration_assumed, jerk=False),
                 *_left_out(summaries, unknown_starts),
             ),
         ),

@@ -50,7 +50,7 @@ from er3a.planning.motion_faults import Interval, SingularEvent
 from er3a.planning.names import PathVerdict, StrategyName
 from er3a.planning.timing import JointLimits, Timed, TimingError, fastest, nodes_along
 from er3a.planning.way_around import PlanningTask, WayAround, way_between
-from er3a.robots.joint_limits import shown, within
+from er3a.robots.joint_limits import shown, speeds_given, within
 from er3a.robots.robot import Robot
 
 MIN_RATIO = 1e-3  # of the limits, below which a path counts as standing still
@@ -430,7 +430,7 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
         not_followed=tuple(skipped),
         not_examined=(
             *_of_collisions(surroundings.bodies, scene, settings, paths, checks),
-            *left_out_of_rates(np.isfinite(robot.speed), not used.acceleration_assumed, limits.jerk is not None),
+            *left_out_of_rates(speeds_given(robot), not used.acceleration_assumed, limits.jerk is not None),
             *_left_out(paths, skipped, only),
             *by_subject(rest),
             *left_out_of_orientations(robot, turned),
@@ -479,7 +479,7 @@ def _asked_of_tool(name: str, motion: Motion) -> Iterator[tuple[str, Reals, Real
 def _limits_used(robot: Robot, limits: JointLimits, settings: TrajectorySettings) -> model.LimitsUsed:
     return model.LimitsUsed(
         speed_deg_s=_shown(robot, limits.speed),
-        speed_assumed=tuple(bool(value) for value in ~np.isfinite(robot.speed)),
+        speed_assumed=tuple(bool(value) for value in ~speeds_given(robot)),
         acceleration_deg_s2=_shown(robot, limits.acceleration),
         acceleration_assumed=limits.acceleration_assumed,
         acceleration_time_s=settings.acceleration_time_s,

@@ -26,7 +26,12 @@ from er3a.numerics.si_units import from_si, stated
 from er3a.pipeline.results import Figure, LeftOut, Verdict
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, pass_of, unmet_expectations
-from er3a.pipeline.stages.left_out import left_out_in_solids, left_out_of_collisions, left_out_of_rates
+from er3a.pipeline.stages.left_out import (
+    left_out_in_solids,
+    left_out_of_collisions,
+    left_out_of_rates,
+    left_out_without_tool,
+)
 from er3a.pipeline.stages.trajectory.motion import limits_of
 from er3a.pipeline.stages.vision import model
 from er3a.pipeline.stages.vision.entry import VisionSettings
@@ -38,7 +43,7 @@ from er3a.programs.from_commands import TO_START
 from er3a.programs.languages import not_written, write_program
 from er3a.programs.program_names import LanguageName
 from er3a.programs.writing import HEAD, WriteOptions, ascii_text, program_name
-from er3a.robots.joint_limits import joint_columns, meant, shown
+from er3a.robots.joint_limits import joint_columns, meant, shown, speeds_given
 from er3a.robots.robot import Robot
 from er3a.vision.boards import ambiguous_tilts, projected
 from er3a.vision.calibration_set import TimeOffset
@@ -47,7 +52,13 @@ from er3a.vision.grasping import ChosenGrasp, DetectedObject, GraspNeeds, GraspP
 from er3a.vision.hand_eye import HandEye, MethodAnswer, TouchCheck, calibrate_hand_eye, spread_of
 from er3a.vision.next_view import FieldOfView, in_sight, next_view
 from er3a.vision.point_error import ArmAccuracy, SeenPoseError, error_sizes, seen_pose, seen_pose_error
-from er3a.vision.table_corrections import NoCorrections, TableCorrections, correct_table, zeros_tried
+from er3a.vision.table_corrections import (
+    TABLE_CONTRADICTED,
+    NoCorrections,
+    TableCorrections,
+    correct_table,
+    zeros_tried,
+)
 from er3a.vision.vision_findings import HandEyeError, TouchContradicts, grave_warnings
 
 MARGIN = 0.25  # of the objects' extent
@@ -386,8 +397,9 @@ def compute(study: Study, name: str) -> model.VisionResults:
         not_examined=(
             *_left_out(calibration, task_file, unseen_zeros, least_zero),
             *left_out_of_collisions(robot, bodies, scene, 1000 * DEPTH, q_deg=ways.q_deg),
-            *left_out_of_rates(np.isfinite(robot.speed), *_rates_given(motions)),
+            *left_out_of_rates(speeds_given(robot), *_rates_given(motions)),
             *left_out_in_solids(scene, _places(robot, task_file, found, picture)),
+            *left_out_without_tool(robot),
             LeftOut("torques"),
         ),
     )
@@ -458,6 +470,8 @@ def _left_out(
         yield LeftOut("objects_out_of_view", hidden)
     if not file.arm.states_all:
         yield LeftOut("arm_errors")
+    if isinstance(found.table, model.TableResult) and found.table.probability < TABLE_CONTRADICTED:
+        yield LeftOut("contradicted_table", tuple(each.entry for each in found.table.entries))
     if found.simulated:
         yield LeftOut("real_camera")
     if found.boardless:
@@ -602,7 +616,8 @@ def verdict_of(
     worst = max((each.error_mm.together for each in asked if each.error_mm), default=None)
     shown = demonstrations(objects, "grasped")
     assumed = tuple(each.name for each in asked if each.name in near)
-    sound = len(asked) - len(missed) - len(assumed)
+    grasped = [each for each in asked if each.grasp]
+    sound = len(grasped) - len(assumed)
     counts = model.GraspCounts(
         len(asked),
         sound,
@@ -614,9 +629,9 @@ def verdict_of(
         assumed,
         _least_success(asked),
     )
-    if asked and len(missed) == len(asked):
+    if asked and not grasped:
         return Verdict("fail", counts)
-    return Verdict("caution" if missed or calibration.warnings else pass_of(asked), counts)
+    return Verdict("caution" if len(grasped) < len(asked) or calibration.warnings else pass_of(asked), counts)
 
 
 def _least_success(objects: Sequence[model.ObjectResult]) -> float | None:
