@@ -427,8 +427,13 @@ def _robot_of_chain(
     continuous = np.array([joint.type == "continuous" for joint in sources]) & (held == limits).all(axis=1)
     groups = ("dh", "zero", "limits", "speeds", "base", "flange", *(() if plain else ("coupling",)))
     stated = dict.fromkeys(groups, Source(f"Derived from the joint axes of {path.name}", "export"))
+    if doubtful := [joint.name for joint in found.joints if joint.doubtful]:
+        text = f"Derived from the joint axes of {path.name}; places of {', '.join(doubtful)} may be in other units"
+        stated |= dict.fromkeys(("dh", "zero", "base", "flange"), Source(text, "inferred"))
     if assumed:
-        stated["limits"] = Source(f"As {path.name} states them, but for {', '.join(assumed)}: assumed", "inferred")
+        stated["limits"] = Source(
+            f"As {path.name} states them, but for {', '.join(assumed)}: assumed or in doubt", "inferred"
+        )
     robot = Robot(
         name=robot_name(path),
         title=path.stem[:200] or sources[0].name,
@@ -599,7 +604,8 @@ def _motion(joint: urdf_tree.UrdfJoint, values: Reals) -> Reals:
 
 
 def _limits(sources: list[urdf_tree.UrdfJoint]) -> tuple[Reals, list[str], list[str]]:
-    """Limits (n, 2), rad or m, notes, and the joints that the file gives none, or none that can be."""
+    """Limits (n, 2), rad or m, notes, and the joints that the file gives none, none that can be, or some that may be
+    in degrees."""
     rows, notes, assumed = [], [], []
     for joint in sources:
         lower, upper = joint.lower, joint.upper
@@ -620,6 +626,7 @@ def _limits(sources: list[urdf_tree.UrdfJoint]) -> tuple[Reals, list[str], list[
         elif joint.type == "revolute" and max(abs(lower), abs(upper)) > MANY_TURNS:
             shown = f"{lower:g} to {upper:g} rad"
             notes.append(f"joint {joint.name} has limits of more than two turns ({shown}); a URDF's are in radians")
+            assumed.append(joint.name)
         elif joint.type == "prismatic" and max(abs(lower), abs(upper)) > MAX_SLID_M:
             notes.append(f"joint {joint.name} has limits beyond {MAX_SLID_M:g} m: it was held to that")
             lower, upper = max(lower, -MAX_SLID_M), min(upper, MAX_SLID_M)

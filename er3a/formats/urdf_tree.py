@@ -72,7 +72,8 @@ class Mimic:
 class UrdfJoint:
     """One joint: its place in its parent link's frame, and how it moves.
 
-    ``lower``, ``upper``, ``speed`` are in rad or m, NaN where the file says nothing.
+    ``lower``, ``upper``, ``speed`` are in rad or m, NaN where the file says nothing. ``doubtful``: whether its place
+    may be in other units.
     """
 
     name: str
@@ -86,6 +87,7 @@ class UrdfJoint:
     speed: float
     mimic: Mimic | None
     notes: tuple[str, ...] = ()
+    doubtful: bool = False
 
     @property
     def moves(self) -> bool:
@@ -379,6 +381,7 @@ def _joint(path: Path, element: ElementTree.Element, snap: bool) -> UrdfJoint:
     if snap:
         rpy = _snapped(rpy, where, notes)
     notes += _perhaps_rounded(rpy, where)
+    doubtful = bool((np.abs(xyz) > FAR_APART_M).any() or (np.abs(rpy) > WHOLE_TURN).any())
     if (np.abs(xyz) > FAR_APART_M).any():
         notes.append(f"{where} stands {np.abs(xyz).max():g} m from the one before it; a URDF's lengths are in metres")
     if (np.abs(rpy) > WHOLE_TURN).any():
@@ -413,7 +416,7 @@ def _joint(path: Path, element: ElementTree.Element, snap: bool) -> UrdfJoint:
         follows = Mimic(mimic.get("joint", ""), *factors)
     parent, child = _link(path, element, "parent"), _link(path, element, "child")
     placed, axis_of = transform(xyz, rpy), direction / (np.linalg.norm(direction) or 1.0)
-    return UrdfJoint(name, kind, parent, child, placed, axis_of, lower, upper, speed, follows, tuple(notes))
+    return UrdfJoint(name, kind, parent, child, placed, axis_of, lower, upper, speed, follows, tuple(notes), doubtful)
 
 
 def _numbers(

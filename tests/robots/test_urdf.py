@@ -195,13 +195,18 @@ def test_a_base_within_a_loop_of_joints_is_refused(tmp_path):
 
 
 def test_numbers_that_can_be_other_units_are_taken_with_a_note(tmp_path):
-    notes = import_urdf(written(tmp_path, urdf([("revolute", "0 0 60", "0 90 0", "0 0 1"), *REAL_ARM[1:]]))).notes
+    far = import_urdf(written(tmp_path, urdf([("revolute", "0 0 60", "0 90 0", "0 0 1"), *REAL_ARM[1:]])))
+    notes, source = far.notes, far.robot.sources["dh"]
+    assert (source.grade, "places of j1 may be in other units" in source.source) == ("inferred", True)
     assert any("stands 60 m from" in note and "in metres" in note for note in notes)
     assert any("turned by 90 rad" in note and "in radians" in note for note in notes)
-    many = import_urdf(written(tmp_path, urdf(limit='<limit lower="-45" upper="45" velocity="3"/>'))).notes
-    assert sum("more than two turns (-45 to 45 rad)" in note for note in many) == 5  # the sixth turns without end
-    plain = import_urdf(written(tmp_path, urdf(limit='<limit lower="-12.56" upper="12.56" velocity="3"/>'))).notes
-    assert not any("radians" in note or "metres" in note for note in plain)
+    many = import_urdf(written(tmp_path, urdf(limit='<limit lower="-45" upper="45" velocity="3"/>')))
+    told = ["more than two turns (-45 to 45 rad)" in note for note in many.notes]
+    assert sum(told) == 5  # the sixth turns without end
+    assert many.robot.sources["limits"].grade == "inferred"  # so that no verdict passes by them
+    plain = import_urdf(written(tmp_path, urdf(limit='<limit lower="-12.56" upper="12.56" velocity="3"/>')))
+    assert not any("radians" in note or "metres" in note for note in plain.notes)
+    assert {source.grade for source in plain.robot.sources.values()} == {"export"}
 
 
 def test_an_axis_of_any_length_is_a_direction(tmp_path, random):
