@@ -275,12 +275,14 @@ class Pause:
     ----------
     stops : whether the arm is known to stand at its target then, even after a motion with a zone
     by_others : whether nothing that was read ends the wait
+    looped : whether a loop waits; the condition is the line at its head
     """
 
     seconds: float | None = None
     condition: str | None = None
     stops: bool = False
     by_others: bool = False
+    looped: bool = False
 
 
 @dataclass(frozen=True, slots=True)

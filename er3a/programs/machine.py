@@ -1213,7 +1213,7 @@ class Machine:
         if not asked:
             return False
         self.waited.add(state)
-        self._note(way, asked[0].place, instructions.Pause(condition=asked[0].text, by_others=True))
+        self._note(way, asked[0].place, instructions.Pause(condition=asked[0].text, by_others=True, looped=True))
         for name in {name for each in asked for name in names(each.condition)}:
             way.memory.forget(name)
         return True

@@ -550,8 +550,8 @@ class Writer(ABC):
                 self.comment(f"disabled: {text}")
             case instructions.Aside(text=text) | instructions.Unknown(text=text) | instructions.MovesBeside(text=text):
                 self._foreign(text, self.own)
-            case instructions.Pause(condition=condition):
-                if condition is None or self.own:
+            case instructions.Pause(condition=condition, looped=looped):
+                if condition is None or (self.own and not looped):
                     self.pause(instruction)
                 else:
                     self._foreign(f"wait for {condition}", False)
