@@ -28,9 +28,15 @@ from er3a.files.path_file import load_paths
 from er3a.files.units import noted_doubts
 from er3a.kinematics.singularity import USUAL_NEAR
 from er3a.pipeline.messages.language import as_text
+from er3a.pipeline.messages.left_out import left_out_names, left_out_text
 from er3a.pipeline.messages.programs import remedy_at, say
 from er3a.pipeline.results import NEVER_A_PASS, LeftOut, NoPass, plain
-from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_of_limits, left_out_of_units
+from er3a.pipeline.stages.left_out import (
+    left_out_of_collisions,
+    left_out_of_limits,
+    left_out_of_rates,
+    left_out_of_units,
+)
 from er3a.pipeline.stages.trajectory.judgement import Surroundings, collisions, judge, measured, min_clearance
 from er3a.pipeline.stages.trajectory.motion import CHOSEN, listed_motions
 from er3a.pipeline.stages.trajectory.written_programs import LONGEST_NAME, near_assumed_shapes, written
@@ -64,13 +70,15 @@ UNREADABLE = "unreadable"
 class CheckedFile:
     """A program file with its check, or with the error that it could not be read for.
 
-    ``missed``: what was not examined and may turn each motion's verdict, which therefore is no pass.
+    ``missed``: what was not examined and may turn each motion's verdict, which therefore is no pass. ``assumed``: on
+    what the rest is judged that no document gives.
     """
 
     file: Path
     check: ProgramCheck | None
     error: InputError | None = None
     missed: tuple[LeftOut, ...] = ()
+    assumed: tuple[LeftOut, ...] = ()
 
     @property
     def level(self) -> Level:
@@ -95,7 +103,8 @@ def checked_file(file: Path, robot: Robot, options: CheckOptions, doubts: Sequen
     if missed:
         verdicts = tuple(replace(each, level=worst_of((each.level, "caution"))) for each in check.verdicts)
         check = replace(check, level=worst_of((check.level, "caution")), verdicts=verdicts)
-    return CheckedFile(file, check, missed=missed)
+    known = np.isfinite(robot.speed), not assumed_limits(robot, options).acceleration_assumed
+    return CheckedFile(file, check, missed=missed, assumed=left_out_of_rates(*known, jerk=True))
 
 
 def missed_collisions(robot: Robot, scene: Scene | None, arms: Iterable[tuple[str, Robot]] = ()) -> tuple[LeftOut, ...]:
@@ -198,6 +207,13 @@ def missed_line(missed: tuple[LeftOut, ...]) -> str:
     return say(NoPass(missed)) if missed else ""
 
 
+def assumed_line(checked: Sequence[CheckedFile]) -> str:
+    """What no document gives and was assumed of the joints' speeds and accelerations; empty where all is given."""
+    found = dict.fromkeys(each for one in checked for each in one.assumed)
+    parts = [left_out_text(each) + (f" ({left_out_names(each)})" if each.names else "") for each in found]
+    return f"not examined: {'; '.join(parts)}" if parts else ""
+
+
 def not_examined_line(checked: CheckedFile) -> str:
     """Which lines were not examined, or not each time that they are carried out; empty if all were."""
     if checked.check is None or not checked.check.not_examined:
@@ -255,6 +271,7 @@ def json_of(checked: Iterable[CheckedFile]) -> list[dict[str, Any]]:
                     *({**_place_record(one.place), "what": one.what, "names": []} for one in check.not_examined),
                 ],
                 "shapes_assumed": check.shapes is not None,
+                "assumed": [{"what": one.subject, "names": one.names} for one in each.assumed],
                 "cycle": plain(check.cycle),
                 "findings": [_finding_record(one) for one in check.findings],
                 "motions": [_verdict_record(one) for one in check.verdicts],
@@ -338,6 +355,7 @@ def _notifications(checked: Sequence[CheckedFile]) -> list[dict[str, Any]]:
     found = []
     for each in checked:
         found += [("not_examined", missed_line((one,)), Place(each.file)) for one in each.missed]
+        found += [(one.subject, left_out_text(one), Place(each.file)) for one in each.assumed]
         for one in each.check.not_examined if each.check else ():
             found.append(("not_examined", f"not examined, or not each time: {one.what}", one.place))
         if each.check and each.check.shapes:

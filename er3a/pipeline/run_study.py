@@ -301,7 +301,7 @@ def mark_pages(reports: Path, problem: str | None) -> None:
         before, times = page.read_bytes(), page.stat()
         after = _LAST_RUN.sub(b"", before)
         if problem is not None and (found := _BODY.search(after)):
-            with language.using("zh" if found[1] == b"zh" else "en"):
+            with language.using(next((each for each in language.LANGUAGES if each == found[1].decode()), "en")):
                 text = escape(sentence("page.last_run", problem=problem)).encode()
             told = b'<!-- last run --><p class="decision fail" role="alert">' + text + b"</p><!-- /last run -->"
             after = after[: found.end()] + told + after[found.end() :]

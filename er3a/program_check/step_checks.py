@@ -631,6 +631,7 @@ class StepChecker:
         self._known: dict[Hashable, CheckedMotion] = {}
         self._corners: dict[Hashable, tuple[found_in.CheckFinding, ...]] = {}
         self._again = 0  # motions that were checked from other joints
+        self.elsewhere: set[tuple[int, found_in.CheckFinding]] = set()  # by step, found from other joints alone
         self._following: dict[int, list[int]] = defaultdict(list)
         for number, step in enumerate(execution.steps):
             self._following[step.before].append(number)
@@ -730,6 +731,7 @@ class StepChecker:
                 if self._again > MAX_MOTIONS_AGAIN:
                     return False
                 motion = self.motions[number] if same else self._motion(what, joints)
+                self.elsewhere |= {(number, each) for each in motion.findings} - self._found_at(number)
                 self._add(number, motion.findings, motion.moments)
                 if last is not None:
                     self._add(before[0], self._corner_findings(last, motion))
@@ -743,6 +745,9 @@ class StepChecker:
                 last = motion if after[0] == number else None
             waiting += [(each, joints, after, last) for each in self._following[number]]
         return True
+
+    def _found_at(self, number: int) -> set[tuple[int, found_in.CheckFinding]]:
+        return {(number, each) for each in self.motions[number].findings}
 
     def _add(
         self,
@@ -1172,6 +1177,8 @@ def _key(motion: instructions.ArmMotion) -> Hashable:
     rates = (motion.speed, motion.turn_speed, motion.turning, motion.acceleration)
     return (
         motion.kind,
+        motion.form,
+        motion.spline_block is None,
         targets,
         motion.angle,
         rates,

@@ -381,6 +381,7 @@ class ProgramMemory:
         self.met: set[str] = set()  # of all copies
         self.written: set[str] = set()
         self.unset: set[str] = set()
+        self.parted: set[str] = set()  # of all copies: variables of which parts are kept under their full names
 
     def copy(self) -> ProgramMemory:
         """An independent copy."""
@@ -389,6 +390,7 @@ class ProgramMemory:
         other.shared, other.local, other.types = dict(self.shared), dict(self.local), self.types
         other.beside, other.aliased, other.doubts = self.beside, self.aliased, dict(self.doubts)
         other.watched, other.met, other.written = self.watched, self.met, set(self.written)
+        other.parted = self.parted
         return other
 
     def lost(self, text: str) -> None:
@@ -428,6 +430,8 @@ class ProgramMemory:
     def write(self, name: str, value: syntax.Value, local: bool = False) -> None:
         """Set the value of a full name."""
         self.kept.clear()
+        if "." in name or "[" in name:
+            self.parted.add(root(name))
         if self.doubts:
             self.doubts.pop(name, None)
         if name in WITH_FIELDS:
@@ -464,6 +468,8 @@ class ProgramMemory:
         if key is not None:
             if "[" in key:
                 self._forget_overlapping(key)
+            elif key in self.parted and isinstance(value, syntax.Unclear):
+                self.forget(key)
             self.write(key, self.typed(key, value, local), local)
         else:  # an element changes, but which one is not known: none of its list is known from here
             while isinstance(target, (syntax.Member, syntax.Element)):
@@ -515,6 +521,12 @@ class ProgramMemory:
         if isinstance(target.of, syntax.Member) and isinstance(self.value(target.of.of), syntax.Record):
             self.assign(target.of, syntax.Unclear(f"{target.of.name}, partly changed"))  # the record has no such part
             return True
+        part: syntax.Expression = target
+        while isinstance(part, (syntax.Member, syntax.Element)):
+            if isinstance(part, syntax.Member) and isinstance(self.replaced(part.of), tuple):  # which names no parts
+                self.assign(part.of, syntax.Unclear(f"{self.shown(part.of)}, partly changed"))
+                return True
+            part = part.of
         kept = None if name is None else self.read(name)
         if kept is None or not isinstance(of, syntax.Unclear):
             return False
@@ -747,8 +759,10 @@ class ProgramMemory:
                 return syntax.Unclear("a root of a negative number") if isinstance(power, complex) else power
             if sign not in ARITHMETIC:
                 return syntax.Unclear(f"... {sign} ...")
-            if sign in ("%", "MOD") and min(a, b) < 0 and a % b:
+            if sign in ("%", "MOD", "DIV") and min(a, b) < 0 and a % b:
                 return syntax.Unclear(f"{a:g} {sign} {b:g}, whose sign is not documented")
+            if sign in ("MOD", "DIV") and (a % 1 or b % 1):
+                return syntax.Unclear(f"{a:g} {sign} {b:g}, of what is not whole")
             found = ARITHMETIC[sign](a, b)
         except (ZeroDivisionError, OverflowError, ValueError):
             return syntax.Unclear("a division by zero or an overflow")

@@ -12,14 +12,14 @@ import scipy
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.planning import commands
+from er3a.planning.moves import line, rotation_between
 from er3a.planning.profiles import LegTimes, Times
-from er3a.planning.sequences import TURN_LENGTH
+from er3a.planning.sequences import TURN_LENGTH, arc
 from er3a.programs import instructions
 from er3a.programs.program_findings import HalfTurnsSplit, WriteFinding
 from er3a.robots.robot import Robot
 
 TO_START = instructions.Rate(0.1, "share")
-HALF_TURN_WITHIN = 1e-9  # rad, and of the axis
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +83,7 @@ def listing_of(
             blends = halves if command.blend is None else np.minimum(halves, command.blend)
             axis = command.half_turn_axis
             parts = tuple(
-                commands.SegmentCommand(pose, None, axis, float(blend))
+                commands.SegmentCommand(pose, half_turn_axis=axis, blend=float(blend))
                 for pose, blend in zip(command.poses[1:], blends)
             )
             making.halts = _halts(command.timing, len(parts))
@@ -142,15 +142,7 @@ class _Making:
                 if part.blend > 0 and i not in self.halts
                 else instructions.FINE
             )
-            pieces = self._pieces(end, part)
-            rate = instructions.Rate(float(times[i]) / len(pieces), "s")
-            joints = None if ends is None else ends[i]
-            for piece, via in pieces:
-                last = piece is end
-                target = instructions.PoseTarget(piece, joints=joints if last else None)
-                point = None if via is None else instructions.PoseTarget(_moved_to(piece, via))
-                form: instructions.MotionKind = "line" if via is None else "arc"
-                self.found.append(self._motion(form, target, rate, zone if last else instructions.FINE, point))
+            self._segment(part, end, float(times[i]), zone, None if ends is None else ends[i])
             self.pose = end
             self._rest(i)
 
@@ -158,25 +150,24 @@ class _Making:
         if number in self.halts:
             self.found.append(instructions.Pause(self.halts[number]))
 
-    def _pieces(self, end: Reals, part: commands.SegmentCommand) -> list[tuple[Reals, Reals | None]]:
-        """Ends (4, 4) of a segment's pieces, with the points (3,) of arcs: two if the tool turns by half a turn, which
-        fixes the sense."""
-        turn = _turn(self.pose, end)
-        via = None if part.via is None else (self.to_robot @ np.append(part.via, 1.0))[:3]
-        if abs(float(np.linalg.norm(turn)) - np.pi) >= HALF_TURN_WITHIN:
-            return [(end, via)]
-        shares = np.array([0.25, 0.5, 0.75])
-        axis = None if part.half_turn_axis is None else self.to_robot[:3, :3] @ part.half_turn_axis
-        turned = scipy.spatial.transform.Rotation.from_rotvec(_sense(turn / np.pi, axis) * turn / 2).as_matrix()
-        middle = self.pose.copy()
-        middle[:3, :3] = turned @ self.pose[:3, :3]
-        self.split += 1
-        if via is None:
-            return [(_moved_to(middle, (self.pose[:3, 3] + end[:3, 3]) / 2), None), (end, None)]
-        arc = instructions.arc_poses(self.pose, _moved_to(end, via), end, shares)
-        assert arc is not None  # as of a path that was built
-        first, half, second = arc[:, :3, 3]
-        return [(_moved_to(middle, half), first), (end, second)]
+    def _segment(
+        self, part: commands.SegmentCommand, end: Reals, seconds: float, zone: instructions.Zone, joints: Reals | None
+    ) -> None:
+        """A line or an arc; one with half a turn as two halves of it, so that its sense is fixed."""
+        here, halves = np.linalg.inv(self.to_robot) @ self.pose, [(1.0, end, zone, joints)]
+        half_turn = rotation_between(here, part.end)[1]
+        axis = part.half_turn_axis if half_turn else None
+        shape = line(here, part.end, 1.0, axis) if part.via is None else arc(here, part.via, part.end, 1.0, axis)
+        if half_turn:
+            self.split += 1
+            halves = [(0.5, self.to_robot @ shape.poses(np.array(0.5)), instructions.FINE, None), (0.5, *halves[0][1:])]
+        for k, (share, target, stop, known) in enumerate(halves):
+            via = None
+            if part.via is not None:
+                at = part.via if not half_turn else shape.points(np.array(0.25 + 0.5 * k))
+                via = instructions.PoseTarget(_moved_to(target, (self.to_robot @ np.append(at, 1.0))[:3]))
+            goal, rate = instructions.PoseTarget(target, joints=known), instructions.Rate(share * seconds, "s")
+            self.found.append(self._motion("line" if via is None else "arc", goal, rate, stop, via))
 
     def _motion(
         self,
@@ -236,11 +227,3 @@ def _halts(timing: float | Times, count: int) -> dict[int, float]:
 def _turn(start: Reals, end: Reals) -> Reals:
     found: Reals = scipy.spatial.transform.Rotation.from_matrix(end[:3, :3] @ start[:3, :3].T).as_rotvec()
     return found
-
-
-def _sense(axis: Reals, wanted: Reals | None) -> float:
-    """+1 or -1, the sense of a half turn: of :func:`er3a.planning.moves.rotation_between`."""
-    if wanted is not None:
-        return float(np.sign(axis @ wanted)) or 1.0
-    upward = next((part for part in axis[::-1] if abs(part) > HALF_TURN_WITHIN), 1.0)
-    return float(np.sign(upward))

@@ -356,6 +356,7 @@ class Listing:
     name : of the program, in ASCII letters, digits and underscores
     repeats_from : number of the instruction with which it begins again after the last; None if it ends there
     language : in which conditions, signals and unknown text are; empty if in none
+    one_sided : branches of the program of which these instructions are one side
     """
 
     name: str
@@ -363,6 +364,7 @@ class Listing:
     title: str = ""
     repeats_from: int | None = None
     language: str = ""
+    one_sided: int = 0
 
     @property
     def motions(self) -> tuple[ArmMotion, ...]:

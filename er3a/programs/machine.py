@@ -19,7 +19,7 @@ References
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Hashable, Iterable, Iterator, Mapping
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -586,13 +586,13 @@ class _Graph:
         return seen
 
 
-def _reached(graph: _Graph, first: int) -> set[int]:
-    """Operations that may be carried out after coming to one."""
+def _reached(next_to: Sequence[Sequence[int]] | Mapping[int, Sequence[int]], first: int) -> set[int]:
+    """Operations of a routine that may come after one, or before it, by what comes next to each."""
     seen: set[int] = set()
     waiting = [first]
     while waiting:
-        for each in graph.after[waiting.pop()]:
-            if each not in seen and each != graph.end:
+        for each in next_to[waiting.pop()]:
+            if each not in seen:
                 seen.add(each)
                 waiting.append(each)
     return seen
@@ -693,7 +693,8 @@ class Machine:
         self.numbers = 1  # of ways that were begun, those that joined others too
         self.sides: Counter[tuple[str, int, bool]] = Counter()  # how often each side of a branch was taken
         self.cut: set[instructions.Place] = set()
-        self.waited: set[tuple[str, int]] = set()  # labels of loops that wait for what others change
+        self.ahead: dict[tuple[str, int], tuple[bool, list[syntax.Branch]]] = {}  # as of _ahead
+        self.waited: set[Hashable] = set()  # states of loops that wait for what others change
         self.first_after: dict[int, int] = {}  # step by the one before it
 
     def run(self) -> Execution:
@@ -766,6 +767,8 @@ class Machine:
         """
         routines = self.program.routines.values()
         code = [((each.name, at), operation) for each in routines for at, operation in enumerate(each.code)]
+        followed = {each.place for routine in routines for each in routine.code}
+        code += [((each.name, -1), op) for each in routines for op in each.handler if op.place not in followed]
         called = {(each.place, each.text) for key, each in code if isinstance(each, syntax.Call) and key in self.passed}
         entered = {name for name, _ in self.passed}
         return tuple(
@@ -793,7 +796,8 @@ class Machine:
                 self._end(way, "stopped", operation.place)
                 return
             if frame.at in self.labels[frame.routine.name]:
-                self.read_before.setdefault((frame.routine.name, frame.at), frozenset(way.memory.met))
+                if (label := (frame.routine.name, frame.at)) not in self.read_before:
+                    self.read_before[label] = frozenset(way.memory.met)
                 met = self._met(way) if back or self.numbers > 1 else None
                 if met is not None and not (met[0] == "repeats" and self._waits_on(way, met[1])):
                     kind, step = met
@@ -1117,7 +1121,8 @@ class Machine:
                     self._note(other, start.place, instructions.MovesBeside(name, "entered", start.text))
                 if not fits:
                     self._note(other, start.place, instructions.Unknown(start.text, may_move=False))
-        way.memory.doubts.update((frame, start.text) for frame in self.dialect.frames if frame in sets)
+        changed = _changed_in(self.program, _with_called(self.program, (name,)), self.dialect)
+        way.memory.doubts.update((frame, start.text) for frame in self.dialect.frames if frame in changed)
         if start.kind == "thread" and not sets:
             way.memory.here = Position()
 
@@ -1197,17 +1202,17 @@ class Machine:
     def _waits_on(self, way: ExecutionPath, before: int) -> bool:
         """Whether a way that repeats itself without a motion waits for what others change, and goes on behind that.
 
-        What its conditions ask has no known value from here then. That happens once at each place.
+        What its conditions ask has no known value from here then. That happens once in each state.
         """
-        at, place = way.step, (way.frames[-1].routine.name, way.frames[-1].at)
+        at, state = way.step, self._state(way)
         while at > before:
             if isinstance(self.steps[at].instruction, instructions.ArmMotion):
                 return False
             at = self.steps[at].before
-        asked = [] if place in self.waited or not self._leads_to_motion(way) else self._asked_in_loop(way)
+        asked = [] if state in self.waited or not self._leads_to_motion(way) else self._asked_in_loop(way)
         if not asked:
             return False
-        self.waited.add(place)
+        self.waited.add(state)
         self._note(way, asked[0].place, instructions.Pause(condition=asked[0].text, by_others=True))
         for name in {name for each in asked for name in names(each.condition)}:
             way.memory.forget(name)
@@ -1215,26 +1220,30 @@ class Machine:
 
     def _leads_to_motion(self, way: ExecutionPath) -> bool:
         """Whether any side of the branches behind where a way is moves the arm, or may."""
-        return any(
-            _moves(self.program, frame.routine.code[at], self.moving, self.dialect)
-            for frame in way.frames
-            for at in _reached(_Graph(frame.routine), frame.at)
-        )
+        return any(self._ahead(frame)[0] for frame in way.frames)
 
     def _asked_in_loop(self, way: ExecutionPath) -> list[syntax.Branch]:
         """Branches with variables on the round that a way goes, in the innermost routine that has such a round."""
-        for frame in reversed(way.frames):
-            graph = _Graph(frame.routine)
-            found = [
-                each
-                for at in sorted(_reached(graph, frame.at))
-                if isinstance(each := frame.routine.code[at], syntax.Branch)
-                and any(names(each.condition))
-                and frame.at in _reached(graph, at)
-            ]
-            if found:
-                return found
-        return []
+        rounds = (self._ahead(frame)[1] for frame in reversed(way.frames))
+        return next(filter(None, rounds), [])
+
+    def _ahead(self, frame: Frame) -> tuple[bool, list[syntax.Branch]]:
+        """Whether anything that may follow in a routine may move the arm; and its branches with variables from which
+        it may come back to where it is."""
+        key = (frame.routine.name, frame.at)
+        if key not in self.ahead:
+            after = _Graph(frame.routine).after
+            before: dict[int, list[int]] = defaultdict(list)
+            for at, following in enumerate(after):
+                for each in following:
+                    before[each].append(at)
+            code = frame.routine.code
+            reached = _reached(after, frame.at) - {len(code)}
+            moves = any(_moves(self.program, code[at], self.moving, self.dialect) for at in reached)
+            coming = (code[at] for at in sorted(reached & _reached(before, frame.at)))
+            asked = [each for each in coming if isinstance(each, syntax.Branch) and any(names(each.condition))]
+            self.ahead[key] = moves, asked
+        return self.ahead[key]
 
     def _state(self, way: ExecutionPath) -> Hashable:
         """A key that is equal for ways that go on alike."""

@@ -177,6 +177,18 @@ class NotTranslated(Finding, code="written_not_translated"):
     instructions: int
 
 
+class OneSideWritten(Finding, code="written_one_side"):
+    """Branches of a program were left out: the way with the most motions alone was written."""
+
+    branches: int
+
+
+class ExternalAxesDropped(Finding, code="written_external_axes_dropped"):
+    """Motions were written without the external axes that the program gives."""
+
+    motions: int
+
+
 class WrittenUnsafe(Finding):
     """The path is not safe, and was written because the user requested it."""
 
@@ -213,6 +225,8 @@ WriteFinding = (
     | ToolNotGiven
     | ValuesRounded
     | NotTranslated
+    | OneSideWritten
+    | ExternalAxesDropped
     | WrittenUnsafe
     | WrittenNearAssumed
     | WrittenBesidePoints

@@ -183,6 +183,15 @@ def test_behind_the_start_of_a_thread_that_moves_the_place_is_not_known(tmp_path
     assert found.level == "caution"
 
 
+def test_a_tool_is_in_doubt_behind_the_start_of_a_thread_that_sets_it(tmp_path):
+    text = (
+        "thread T():\n  set_tcp(p[0,0,0.2,0,0,0])\nend\n"
+        f"set_tcp(p[0,0,0,0,0,0])\nmovej({HOME_TEXT})\nrun T()\nmovej({NEAR_TEXT})\n"
+        f"movel({text_of(forward(ROBOT, HOME))})\n"
+    )
+    assert codes(check(tmp_path, text))["frames_in_doubt"] == [8]
+
+
 def test_a_thread_that_is_never_started_is_not_passed(tmp_path):
     found = check(tmp_path, f"def Main():\n  thread T():\n    movej({NEAR_TEXT})\n  end\n  movej({FAR_TEXT})\nend\n")
     assert codes(found) == {"never_reached": [3]}
@@ -1418,6 +1427,218 @@ def test_arguments_by_place_pass_over_optional_parameters(tmp_path):
     _, with_y, without = motions(tmp_path, rapid("sub1\\y:=20,30;\nsub1 40;", sub), "a.mod")
     np.testing.assert_allclose(1000 * with_y.target.pose[:2, 3], [430, 20])
     np.testing.assert_allclose(1000 * without.target.pose[:2, 3], [440, 7])
+
+
+OTHER_POINT = "[[400,0,500],[0,1,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
+
+
+@pytest.mark.parametrize(
+    ("lines", "z"),
+    [
+        (f"there:={OTHER_POINT};\nthere.trans.z:=350;", 350),
+        ("there.trans:=[400,0,500];\nthere.trans.z:=there.trans.z-150;", 350),
+        (f"there:=cell.place;\ncell.place:={OTHER_POINT};\ncell.place.trans.z:=350;\nthere:=cell.place;", 350),
+    ],
+)
+def test_a_part_of_data_of_another_module_is_set_after_the_whole(tmp_path, lines, z):
+    """Its type stands in the module that declares it; the type of a record may be the main module's."""
+    shelf = f"MODULE shelf\nPERS robtarget there:={AT_P};\nPERS spot cell:=[1,{AT_P}];\nENDMODULE\n"
+    (tmp_path / "shelf.mod").write_text(shelf)
+    data = "RECORD spot\nnum count;\nrobtarget place;\nENDRECORD\n"
+    (*_, last) = motions(tmp_path, rapid(f"{lines}\nMoveL there,v100,fine,tool0;", data=data), "a.mod")
+    assert 1000 * last.target.pose[2, 3] == pytest.approx(z)
+
+
+def test_the_type_of_data_may_stand_in_a_module_that_gives_nothing_else(tmp_path):
+    (tmp_path / "kinds.mod").write_text("MODULE kinds\nRECORD spot\nrobtarget place;\nENDRECORD\nENDMODULE\n")
+    data = f"VAR spot cell:=[{AT_P}];\n"
+    (*_, last) = motions(tmp_path, rapid("MoveL cell.place,v100,fine,tool0;", data=data), "a.mod")
+    assert 1000 * last.target.pose[2, 3] == pytest.approx(300)
+
+
+@pytest.mark.parametrize(
+    ("line", "named"),
+    [
+        ("WHILE n<3 AND counted()<5 DO\nSetDO do1,1;\nENDWHILE", True),
+        ("MoveL Offs(p,n,outer(),0),v100,fine,tool0;", True),
+        ("n:=n+counted();", True),
+        ("n:=counted()+n;", False),
+        ("n:=counted();", False),
+        ("list{n}:=counted();", True),
+        ("n:=n+plain();", False),
+        ("n:=n+plain()+counted();", True),
+    ],
+)
+def test_a_variable_that_is_read_before_a_function_changes_it_is_named(tmp_path, line, named):
+    """Functions are carried out before the line that holds them."""
+    more = "FUNC num counted()\nIncr n;\nRETURN n;\nENDFUNC\nFUNC num outer()\nRETURN counted();\nENDFUNC\n"
+    more += "FUNC num plain()\nVAR num n:=2;\nn:=3;\nRETURN n;\nENDFUNC\n"
+    found = codes(check(tmp_path, rapid(line, more, "VAR num list{3};\n"), "a.mod"))
+    assert found.get("program_not_simulated", []) == ([9] if named else [])
+
+
+@pytest.mark.parametrize(
+    ("quotient", "y"),
+    [("9 DIV 2", 4), ("(-8) DIV 2", -4), ("(-9) DIV 2", None), ("9.5 DIV 2", None), ("9 MOD 2.5", None)],
+)
+def test_a_quotient_that_no_source_settles_has_no_value(tmp_path, quotient, y):
+    """Basic Characteristics RAPID, 5-26: operands that are not whole are illegal; of negative ones it says nothing."""
+    (*_, last) = motions(tmp_path, rapid(f"MoveL Offs(p,0,{quotient},0),v100,fine,tool0;"), "a.mod")
+    known = None if isinstance(last.target, UnresolvedTarget) else round(1000 * last.target.pose[1, 3])
+    assert known == y
+
+
+def test_data_may_be_made_of_constants_of_any_module(tmp_path):
+    text = "MODULE shelf\nCONST num lower:=higher-50;\nCONST num higher:=above;\nPERS pos s:=[1,lower,1];\nENDMODULE\n"
+    (tmp_path / "shelf.mod").write_text(text)
+    body = "MoveL Offs(p,0,s.y,0),v100,fine,tool0;"
+    (*_, last) = motions(tmp_path, rapid(body, data="CONST num above:=80;\n"), "a.mod")
+    assert 1000 * last.target.pose[1, 3] == pytest.approx(30)
+
+
+@pytest.mark.parametrize(
+    ("condition", "sides"),
+    [
+        ("p.trans=[400,0,300]", {1}),
+        ("p.trans<>[400,0,300]", {2}),
+        ("p.trans=[400,0,301]", {2}),
+        ("3*[0.1,0.2,0.3]=[0.3,0.6,0.9]", {1, 2}),
+        ("q=[400,0,300]", {1, 2}),
+        ("q=[401,0,300]", {2}),
+    ],
+)
+def test_positions_are_compared_by_their_parts(tmp_path, condition, sides):
+    """Named or not; within what rounding may make of them, or where one is not known, both sides are followed."""
+    body = f"q:=[400,0,GInput(gi1)];\nIF {condition} THEN\nn:=1;\nELSE\nn:=2;\nENDIF\n"
+    _, *found = motions(tmp_path, rapid(f"{body}MoveL Offs(p,0,n,0),v100,fine,tool0;", data="VAR pos q;\n"), "a.mod")
+    assert {round(1000 * each.target.pose[1, 3]) for each in found} == sides
+
+
+def test_what_a_test_asks_is_worked_out_once(tmp_path):
+    more = "FUNC num counted()\nIncr n;\nRETURN n;\nENDFUNC\n"
+    body = "TEST counted()\nCASE 1:\nn:=10;\nCASE 2:\nn:=20;\nCASE 3:\nn:=30;\nENDTEST\n"
+    (*_, last) = motions(tmp_path, rapid(f"{body}MoveL Offs(p,0,n,0),v100,fine,tool0;", more), "a.mod")
+    assert 1000 * last.target.pose[1, 3] == pytest.approx(20)
+
+
+def test_a_function_that_says_which_element_is_set_is_carried_out(tmp_path):
+    more = "FUNC num counted()\nIncr n;\nRETURN n;\nENDFUNC\n"
+    body = "list{counted()}:=30;\nMoveL Offs(p,n,list{2},0),v100,fine,tool0;"
+    found = motions(tmp_path, rapid(body, more, "VAR num list{3};\n"), "a.mod")
+    np.testing.assert_allclose(1000 * found[-1].target.pose[:2, 3], [402, 30])
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        "Round(12.3\\Dec:=n)",
+        "Trunc(12.3\\Dec:=n)",
+        "Dim(list,n)",
+        'StrLen(StrPart("abc",0,1))',
+        'StrLen(StrPart("abc",3,2))',
+    ],
+)
+def test_a_function_of_what_is_not_known_has_no_value(tmp_path, call):
+    body = f"n:=GInput(gi1);\nMoveL Offs(p,0,{call},0),v100,fine,tool0;"
+    (*_, last) = motions(tmp_path, rapid(body, data="VAR num list{2,3};\n"), "a.mod")
+    assert isinstance(last.target, UnresolvedTarget)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        *(f"{word} MoveL Offs(p,0,0,-200),v100,fine,tool0;" for word in ("Stop", "Break", "GOTO there")),
+        "CONNECT i1 WITH t1 MoveL Offs(p,0,0,-200),v100,fine,tool0;",
+        "MoveL p,v100,fine,tool0,wobj0;",
+        "MoveL p,v100,fine,tool0\\WObj:=wobj0,wobj0;",
+    ],
+)
+def test_what_follows_an_instruction_that_takes_no_more_is_not_dropped(tmp_path, line):
+    more, data = "TRAP t1\nENDTRAP\n", "VAR intnum i1;\n"
+    found = check(tmp_path, rapid(f"{line}\nthere:\nMoveL p,v100,fine,tool0;", more, data), "a.mod")
+    assert {"may_move", "target_not_given"} & codes(found).keys()
+
+
+@pytest.mark.parametrize("line", ["Stop\\NoRegain;", "Stop\\AllMoveTasks;", "Stop;", "Break;"])
+def test_a_stop_with_its_switches_is_understood(tmp_path, line):
+    assert "may_move" not in codes(check(tmp_path, rapid(f"{line}\nMoveL p,v100,fine,tool0;"), "a.mod"))
+
+
+@pytest.mark.parametrize(
+    ("line", "kept"),
+    [
+        ("q.trans.z:=100 @ 3;", False),
+        ("list{1}:=5 $;", False),
+        ('SetDataVal "n",50;', False),
+        ("SetupCyclicBool n,di1=1;", False),
+        ("RMQSendWait slot,sent,message,n;", False),
+        ("b:=ReadDir(folder,n);", False),
+        ("b:=UIListView(\\Result:=n,items);", False),
+        ("m:=5 $;", True),
+    ],
+)
+def test_what_a_line_may_set_that_is_not_understood_has_no_value(tmp_path, line, kept):
+    data = f"VAR robtarget q:={AT_P};\nVAR num list{{2}};\nVAR num m;\n"
+    body = f"{line}\nMoveL Offs(q,0,n,list{{1}}),v100,fine,tool0;"
+    (*_, last) = motions(tmp_path, rapid(body, data=data), "a.mod")
+    assert isinstance(last.target, UnresolvedTarget) != kept
+
+
+def test_external_axes_that_are_not_known_as_a_whole_are_named(tmp_path):
+    more = "FUNC extjoint where()\nVAR robtarget q;\nq:=CRobT();\nRETURN q.extax;\nENDFUNC\n"
+    body = "MoveL Offs(p,0,9,0),v100,z10,tool0;\nq:=p;\nq.extax:=where();\nMoveL q,v100,fine,tool0;"
+    (*_, last) = motions(tmp_path, rapid(body, more, "VAR robtarget q;\n"), "a.mod")
+    assert [name for name, _ in last.target.external] == ["extax"]
+
+
+def test_data_in_the_first_line_of_a_module_count(tmp_path):
+    text = rapid("MoveL Offs(p,0,first,0),v100,fine,tool0;").replace("MODULE a\n", "MODULE a VAR num first:=30; ")
+    (*_, last) = motions(tmp_path, text, "a.mod")
+    assert 1000 * last.target.pose[1, 3] == pytest.approx(30)
+
+
+def test_a_list_of_lists_is_one_as_a_parameter_too(tmp_path):
+    more = "PROC lower(INOUT robtarget q{*,*},num z)\nq{1,2}.trans.z:=z;\nENDPROC\n"
+    body = '%"low"+s% q,350;\nMoveL q{1,2},v100,fine,tool0;'
+    data = f'VAR string s:="er";\nVAR robtarget q{{1,2}}:=[[{AT_P},{AT_P}]];\n'
+    (*_, last) = motions(tmp_path, rapid(body, more, data), "a.mod")
+    assert 1000 * last.target.pose[2, 3] == pytest.approx(350)
+
+
+@pytest.mark.parametrize(("file", "named"), [("shelf.mod", False), ("other.mod", True), ("", True)])
+def test_a_module_that_is_loaded_and_was_not_read_is_named(tmp_path, file, named):
+    (tmp_path / "shelf.mod").write_text("MODULE shelf\nPROC go()\nMoveL p,v100,fine,tool0;\nENDPROC\nENDMODULE\n")
+    given = f'"HOME:/parts/{file}"' if file else "s"
+    body = f'Load \\Dynamic,{given};\n%"go"%;'
+    found = codes(check(tmp_path, rapid(body, data="VAR string s;\n"), "a.mod"))
+    assert ("program_not_simulated" in found) == named
+
+
+def test_what_is_not_understood_in_a_handler_is_named(tmp_path):
+    body = "MoveL p,v100,fine,tool0;\nERROR\nArcL p,v100,seam1,weave1,z10,tool0;\nb:=5 @;\nEXIT;"
+    found = codes(check(tmp_path, rapid(body), "a.mod"))
+    assert found["never_reached"] == [10, 11]
+    assert found["program_not_understood"] == [11]
+
+
+@pytest.mark.parametrize(
+    ("place", "name", "lines"),
+    [
+        ("Rob2", "Rob1", "n2:=600;"),
+        ("T_COM", "T_ROB1", "put n2;"),
+        ("", "", "n2:=600;"),
+    ],
+)
+def test_persistent_data_are_set_by_tasks_in_other_places(tmp_path, place, name, lines):
+    """In folders with names of robots, by reference, and by a module beside it with a main that moves nothing."""
+    for each in {place, name}:
+        (tmp_path / each).mkdir(exist_ok=True)
+    put = "PROC put(PERS num x)\nx:=600;\nENDPROC\n"
+    text = f"MODULE cell\nPERS num n2:=0;\nPROC main()\n{lines}\nENDPROC\n{put}ENDMODULE\n"
+    (tmp_path / place / "cell.mod").write_text(text)
+    text = rapid("MoveL Offs(p,0,n2,0),v100,fine,tool0;", data="PERS num n2:=0;\n")
+    assert isinstance(motions(tmp_path / name, text, "a.mod")[-1].target, UnresolvedTarget)
+    assert files_of(tmp_path / name / "a.mod")[-1].name == "cell.mod"
 
 
 def handled(handler: str, sub: str = "SetDO do1,1;", own: str = "") -> str:

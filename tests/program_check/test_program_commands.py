@@ -108,6 +108,19 @@ def test_what_is_not_examined_is_named_in_text_json_and_sarif(tmp_path):
     assert "not examined, or not each time: motions of lines" in check(*cut).stderr
 
 
+@pytest.mark.parametrize(("arm", "speeds"), [("er3a_c60", [f"J{i}" for i in range(1, 7)]), ("er3_600", None)])
+def test_speeds_and_accelerations_that_no_document_gives_are_named(tmp_path, arm, speeds):
+    (tmp_path / "a.src").write_text("DEF a( )\nPTP {A1 5}\nEND\n")
+    words = ("check-program", str(tmp_path / "a.src"), "--robot", arm, "--start", "0,-10,-10,0,-70,0")
+    sarif = tmp_path / "found.sarif"
+    result = run(*words, "--json", "--sarif", str(sarif))
+    named = {each["what"]: each["names"] for each in json.loads(result.stdout)[0]["assumed"]}
+    assert named == ({} if speeds is None else {"own_speeds": speeds}) | {"own_accelerations": []}
+    (log,) = json.loads(sarif.read_text())["runs"]
+    assert named.keys() <= {each["descriptor"]["id"] for each in log["invocations"][0]["toolExecutionNotifications"]}
+    assert ("so speeds are assumed (J1, J2" in run(*words).stderr) == (speeds is not None)
+
+
 def test_a_check_that_ends_early_is_no_pass_and_names_no_time_of_the_whole():
     """Whatever ended it; the exit code is that of a caution."""
     words = ("check-program", "data/programs/palletise.src", "--robot", "er3a_c60", "--start", HOME, "--scene", SCENE)

@@ -175,6 +175,7 @@ def test_where_force_mode_leads_the_arm_is_not_known(tmp_path):
     found = codes(check(tmp_path, f"{text}movej(q)\n", "a.script"))
     assert found["way_not_known"] == [3, 6]
     assert found["target_not_given"] == [7]
+    assert codes(check(tmp_path, f"{begin}\nsleep(1)\nend_force_mode()\n", "a.script"))["may_move"] == [1]
 
 
 LIFT = f"if here[2] > 0.3:\n movej({NEAR_TEXT})\nend\nmovej({HOME_TEXT})"
@@ -302,6 +303,16 @@ def test_a_loop_that_only_another_task_ends_is_told_and_what_comes_behind_it_is_
 def test_a_loop_without_a_motion_that_nothing_comes_behind_waits_for_none(tmp_path, body):
     found = with_data(tmp_path, f"PTP {{A1 5}}\n{body}", "DECL GLOBAL BOOL GO=FALSE")
     assert "waits_for_others" not in codes(found)
+
+
+def test_a_variable_that_is_unknown_as_a_whole_has_no_known_part(tmp_path):
+    found = with_data(tmp_path, "XP.A1=50\nXP=YP\nPTP {A1 XP.A1}", "INT N=0")
+    assert codes(found)["target_not_given"] == [9]
+
+
+def test_the_same_joint_move_bends_within_a_spline_alone(tmp_path):
+    body = "SPTP {A1 10}\nPTP {A1 0}\nPTP_SPLINE\nSPTP {A1 10}\nENDSPLINE"
+    assert codes(with_data(tmp_path, body, "INT N=0"))["spline_as_line"] == [10]
 
 
 def test_a_call_of_what_moves_that_no_way_leads_to_is_named_where_its_file_is_another(tmp_path):

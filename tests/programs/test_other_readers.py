@@ -194,6 +194,11 @@ def test_statements_outside_of_a_routine_are_the_program(tmp_path):
     assert [[place.line for place in step.calls] for step in execution.steps] == [[4], [5]]
 
 
+def test_a_table_without_rows_moves_nothing(tmp_path):
+    (tmp_path / "a.csv").write_text("q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n")
+    assert [each.code for each in read_program(tmp_path / "a.csv").findings] == ["program_nothing_moves"]
+
+
 def test_a_table_over_time_is_written_and_read(tmp_path):
     rng = np.random.default_rng(6)
     joints = rng.uniform(ROBOT.lower, ROBOT.upper, (20, 6))

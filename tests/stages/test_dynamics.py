@@ -200,6 +200,9 @@ def test_what_a_study_does_not_say_of_tool_payload_and_links_is_open(full, tmp_p
     study, body = full[0], {"mass_kg": 0.5, "centre_mm": [0, 0, 50]}
     entry = study.robots["er3a_c60"]
     tool = Placement(xyz_mm=[0, 0, 120], rpy_deg=[0, 0, 0])
+    (gripper := tmp_path / "gripper.yaml").write_text(
+        "kind: scene\ntitle: A gripper\ncarried: {boxes: [{name: gripper, size_mm: [40, 40, 90], xyz_mm: [0, 0, 9]}]}\n"
+    )
     whole, point, none = (LoadFields(**CLAIM, body=each) for each in (LOAD, body, body | {"mass_kg": 0}))
     nowhere = LoadFields(**CLAIM, body={key: value for key, value in LOAD.items() if key != "centre_mm"})
     guess = LoadFields(source="a guess", grade="inferred", body=LOAD)
@@ -210,6 +213,7 @@ def test_what_a_study_does_not_say_of_tool_payload_and_links_is_open(full, tmp_p
         ({"payload": nowhere}, ("load_centre",)),
         ({"payload": guess}, ("load_guess",)),
         ({"tool": tool}, ("tool",)),
+        ({"scene": str(gripper)}, ("tool",)),
         ({"tool": tool, "tool_load": none}, ()),
         ({"payload": none, "tool_load": whole}, ()),
     ):
@@ -310,6 +314,14 @@ def test_peaks_are_not_missed_between_few_samples(tmp_path):
         (path,) = computed(folder, study).results.summary.paths
         found[samples] = np.array([(load.peak, load.rms) for load in path.joints])
     np.testing.assert_allclose(found[11], found[2001], rtol=2e-3)
+
+
+def test_no_torque_with_its_tolerance_is_above_the_peak_with_its_own(full):
+    results = full[1].results
+    for path in (each for each in results.summary.paths if each.complete):
+        rows = results.torques.take(results.torques.path == path.name)
+        upper = (np.abs(rows.torque) + rows.tolerance).max(axis=0)
+        assert all(load.peak + load.tolerance >= most - 1e-9 for load, most in zip(path.joints, upper.tolist()))
 
 
 def test_the_wrist_is_compared_at_rest_and_along_the_paths(full):

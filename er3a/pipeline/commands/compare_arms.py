@@ -12,10 +12,11 @@ from er3a.comparison.mechanism import TOLERANCE_DEG, TOLERANCE_MM
 from er3a.errors import Er3aError
 from er3a.files.dh_table import AngleUnit, LengthUnit
 from er3a.pipeline.commands.options import ROBOT_FILES, AsJson, Xacro, app, print_json, print_note
-from er3a.robots.robot import Convention, Robot
+from er3a.robots.robot import Convention
 
 if TYPE_CHECKING:
     from er3a.comparison.compare import Comparison
+    from er3a.files.arm_file import ReadArm
 
 MAX_TOLERANCE = 1000.0  # mm, and deg
 MATCHES_SHOWN = 5  # of a folder
@@ -78,8 +79,7 @@ def compare(
         tolerance_deg=tolerance_deg,
     )
     name, found = ranked[0]
-    notes = [f"{source}: {note}" for source, read in ((a, first), (name, others[name])) for note in read.notes]
-    notes += _apart_by_tools((a, arm), (name, others[name].robot))
+    notes = _notes((a, first), (name, others[name]))
     compared = {Path(a).name, Path(name).name}
     doubts = [str(each) for each in doubtful if not (folder.is_dir() and Path(each.file or "").name not in compared)]
     for note in notes:
@@ -104,15 +104,16 @@ def compare(
         raise typer.Exit(1)
 
 
-def _apart_by_tools(one: tuple[str, Robot], other: tuple[str, Robot]) -> list[str]:
-    """That the tools of two arms differ, which are not compared; nothing if they are alike."""
+def _notes(one: tuple[str, ReadArm], other: tuple[str, ReadArm]) -> list[str]:
+    """What was assumed in reading two arms, by their names, and that their tools differ."""
     import numpy as np
 
-    tools = one[1].tool, other[1].tool
-    if np.allclose(*tools, rtol=0.0, atol=TOOLS_EQUAL):
-        return []
-    apart = 1000 * float(np.linalg.norm(tools[0][:3, 3] - tools[1][:3, 3]))
-    return [f"{one[0]} and {other[0]}: tools are not compared; these differ (their points by {apart:.3g} mm)"]
+    notes = [f"{source}: {note}" for source, read in (one, other) for note in read.notes]
+    (a, first), (b, second) = one, other
+    if not np.allclose(first.robot.tool, second.robot.tool, rtol=0.0, atol=TOOLS_EQUAL):
+        apart = 1000 * float(np.linalg.norm(first.robot.tool[:3, 3] - second.robot.tool[:3, 3]))
+        notes.append(f"{a} and {b}: tools are not compared; these differ (their points by {apart:.3g} mm)")
+    return notes
 
 
 def _print(ranked: list[tuple[str, Comparison]], folder: bool, doubts: list[str]) -> None:

@@ -128,7 +128,10 @@ def import_calibration(
     from er3a.files.robot_library import load_robot
     from er3a.files.robot_writer import write_robot
 
-    found = load_factory_calibration(file, load_robot(robot))
+    nominal = load_robot(robot)
+    found = load_factory_calibration(file, nominal)
+    if nominal.envelopes or nominal.hulls or nominal.references or nominal.masses != found.masses:
+        options.print_note(f"{output}: without shapes, masses and references of {robot}: they belong to its own table")
     write_robot(found.replace(name=output.stem, title=f"{found.title}, as calibrated by its factory"), output)
     print(f"{output}: written")
 

@@ -495,6 +495,16 @@ TEXTS = texts(
             "{count} instruction of the other language kept as a comment",
             "{count} instructions of the other language kept as comments",
         ),
+        "written_one_side": Plural(
+            "branches",
+            "{count} branch of which one side alone was written: what the other does is left out",
+            "{count} branches of which one side alone was written: what the others do is left out",
+        ),
+        "written_external_axes_dropped": Plural(
+            "motions",
+            "{count} motion written without its external axes",
+            "{count} motions written without their external axes",
+        ),
         "written_arcs_split": Plural(
             "arcs",
             "{count} arc written as {lines} lines that stay within {deviation:g} mm of it",

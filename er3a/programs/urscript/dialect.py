@@ -178,6 +178,11 @@ class UrScriptDialect(Dialect):
     single_precision = True
     most_whole = 2**31 - 1
 
+    def sets(self, call: syntax.Invocation) -> frozenset[str]:
+        """The tool, the load, and what changes the way of each motion from there on."""
+        names = {"set_tcp": "%tcp"} | dict.fromkeys(LOADS, "%load") | dict.fromkeys(MODES, MODE)
+        return frozenset((names[call.function],)) if call.function in names else frozenset()
+
     def constant(self, memory: ProgramMemory, name: str) -> syntax.Value | None:
         """Numbers of the language."""
         return math.pi if name == "MATH_PI" else None
@@ -287,9 +292,9 @@ class UrScriptDialect(Dialect):
         if call.function in MODES:
             memory.write(MODE, doing.text)
         elif call.function in MODES.values():
-            was_on = memory.read(MODE)
+            moved = memory.read(MODE) and memory.here.key() != Position().key()
             memory.write(MODE, "")
-            if was_on:  # and has led the arm elsewhere
+            if moved:  # to a target, from which the mode has led the arm away
                 return instructions.Unknown(doing.text)
         if call.function == "set_gravity":
             given = _placed(("d",), values, keywords)

@@ -104,7 +104,8 @@ def open_of_load(study: Study, name: str, of_programs: Iterable[Load] = ()) -> t
     entry, loads = study.entry(name), study.loads(name)
     if not loads:
         return ("load",)
-    has_tool = not np.array_equal(study.robot(name).tool, np.eye(4))
+    scene = study.scene(name, "trajectory")  # what has a shape on the flange, or a tip beside it, has a mass
+    has_tool = bool(scene and scene.carried) or not np.array_equal(study.robot(name).tool, np.eye(4))
     bodies = [each.body for each in loads if each.body and each.body.mass_kg]
     inertias = [*(body.inertia_kg_m2 for body in bodies), *(load.inertia for load in of_programs)]
     asked: dict[model.LoadPart, bool] = {
@@ -336,7 +337,7 @@ def within_short_pieces(motion: Motion, step: float) -> Reals:
 def _joint_loads(
     robot: Robot, t: Reals, parts: TorqueParts, tolerance: Reals, asked: Demand
 ) -> tuple[model.JointLoad, ...]:
-    found = []
+    found, most = [], (np.abs(parts.total) + tolerance).max(axis=0)
     for j, slides in enumerate(robot.slides):
         at = int(asked.peak_at[j])
         found.append(
@@ -344,7 +345,7 @@ def _joint_loads(
                 joint=j + 1,
                 unit=model.FORCE if slides else model.TORQUE,
                 peak=float(asked.peak[j]),
-                tolerance=float(tolerance[at, j]),
+                tolerance=float(most[j] - asked.peak[j]),
                 peak_at_s=float(t[at]),
                 rms=float(asked.rms[j]),
                 rms_tolerance=float(np.sqrt(np.mean(tolerance[:, j] ** 2))),
@@ -404,8 +405,9 @@ def _wrist_moments(
     by_mass = arm.model.rigid_torques(q, qd, qdd) - arm.bare.rigid_torques(q, qd, qdd)
     by_load = np.abs(by_mass + arm.model.tool_torques(q))
     off = margins.load_tolerance(arm.model, q, qd, qdd, arm.load_grade)
-    most = [(j, int(by_load[:, j - 1].argmax())) for j in wrist]
-    return tuple(model.WristMoment(j, float(by_load[at, j - 1]), float(off[at, j - 1]), float(t[at])) for j, at in most)
+    peak, most = by_load.max(axis=0), (by_load + off).max(axis=0)
+    when = t[by_load.argmax(axis=0)]
+    return tuple(model.WristMoment(j, *(float(each[j - 1]) for each in (peak, most - peak, when))) for j in wrist)
 
 
 def _bound(margin: margins.Margin | None, t: Reals) -> model.BindingLimit | None:

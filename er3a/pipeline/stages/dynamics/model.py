@@ -206,7 +206,7 @@ class JointLoad:
 
     Attributes
     ----------
-    tolerance : of the peak; rms_tolerance : of the RMS torque
+    tolerance : by which the torque may be above the peak at any time; rms_tolerance : of the RMS torque
     gravity, inertia, velocity, friction, tool : largest of each part
     power_w, braking_w : largest given and taken back
     """
@@ -245,7 +245,7 @@ class BindingLimit:
 @dataclass(frozen=True)
 class WristMoment:
     """The largest moment that the load makes about a wrist axis along a path, with accelerations and what the
-    surroundings do to the tool."""
+    surroundings do to the tool; ``tolerance``: by which it may be above that at any time."""
 
     joint: int
     moment_n_m: float

@@ -14,6 +14,7 @@ from er3a.collision.along import RateBounds
 from er3a.collision.bodies import Bodies
 from er3a.errors import InputError, NotWristPartitionedError, PoseError
 from er3a.files.path_file import PathEntry, ProgramPath, load_paths
+from er3a.files.units import joint_values
 from er3a.kinematics.by_class import arm_solver
 from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.inverse import inverse
@@ -35,7 +36,7 @@ from er3a.planning.tool_proof import ProofRequirements, ToolProof, follow_and_pr
 from er3a.planning.way_around import NoWayAround, PlannedMove, PlanningTask, WayAround, way_between
 from er3a.program_check.check_program import CheckOptions, LocatedFinding, ProgramPart, check_program, parts_of
 from er3a.programs.languages import read_program
-from er3a.robots.joint_limits import shown
+from er3a.robots.joint_limits import meant, shown
 from er3a.robots.robot import Robot
 
 
@@ -77,7 +78,7 @@ def planned_entries(
     if not isinstance(entry, ProgramPath):
         yield entry
         return
-    start = None if entry.start_deg is None else np.radians(entry.start_deg)
+    start = None if entry.start_deg is None else joint_values(task.robot, entry.start_deg, "start_deg")
     options = CheckOptions(
         start=start,
         scene=task.bodies.scene if task.bodies else None,
@@ -340,7 +341,7 @@ def limits_of(robot: Robot, settings: TrajectorySettings) -> JointLimits:
         if values is not None and len(values) != count:
             problem = f"{len(values)} values for the {count} joints of {robot.name}"
             raise InputError(None, f"trajectory.{name}", problem, "Give one for each joint")
-        given.append(None if values is None else np.radians(values))
+        given.append(None if values is None else meant(robot, np.array(values)))
     return joint_limits(robot, assumed_speeds(robot, settings), settings.acceleration_time_s, *given)
 
 
