@@ -20,6 +20,7 @@ rule all:
     default_target: True
     input:
         "reports/index.html",
+        "reports/junit.xml",  # which a run that did not end well takes away
         [f"reports/{page}" for page in STUDY.article_pages().values()],
         of_all("reports/{robot}/{stage}.rrd", "record"),
         # Named too, so that a result that was deleted is made again although its views are still there.

@@ -14,8 +14,8 @@ from lxml import etree
 
 from er3a.errors import InputError, ResultError
 from er3a.files.kept_files import shown_path
-from er3a.pipeline.results import check_checksum, write_checksum
-from er3a.pipeline.run_study import run_study, write_index_error
+from er3a.pipeline.results import write_checksum
+from er3a.pipeline.run_study import run_study
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.stage import Stage
@@ -127,24 +127,6 @@ def test_a_run_that_an_input_keeps_from_starting_leaves_an_error_in_place_of_old
         run_study(Path("study.yaml"), Path("results"), Path("reports"), [])
     assert the_error(report) == str(told.value)
     assert "study.yaml" in str(told.value)
-
-
-def test_an_index_says_first_that_the_run_after_it_did_not_end_well(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    index, said = tmp_path / "reports/index.html", "The last run did not end well"
-    index.parent.mkdir()
-    index.write_text('<html lang="xx">\n<main id="m">\n<p>All pass.</p>\n</main>\n', encoding="utf-8")
-    write_checksum(index)
-    Path("study.yaml").write_text("kind: study\nrobots: 7\n", encoding="utf-8")
-    with pytest.raises(InputError):
-        run_study(Path("study.yaml"), Path("results"), Path("reports"), [])
-    assert "study.yaml" in index.read_text(encoding="utf-8")
-    write_index_error("<again>", index)
-    page = index.read_text(encoding="utf-8")
-    assert (page.count(said), "study.yaml" in page, "&lt;again&gt;" in page) == (1, False, True)
-    assert page.index(said) < page.index("All pass.")
-    with pytest.raises(ResultError):  # so that the next run makes it again
-        check_checksum(index)
 
 
 def test_jobs_that_fail_leave_an_error_which_the_next_run_takes_away(study, tmp_path, monkeypatch, capsys):

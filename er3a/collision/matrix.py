@@ -177,6 +177,7 @@ class JudgedPair:
     lower_bound : m, a lower bound of the distance of bodies that never meet; NaN for others
     left_out : m, radius of the region around the joint that is left out, 0 where there is none
     boxes : how many boxes of joint vectors were examined
+    whole : whether nothing of one of them is left without the region around the joint
     hub : (3,), m, in the outer link's frame, where a joint is proven to hold the two; None where none is
     """
 
@@ -187,6 +188,7 @@ class JudgedPair:
     left_out: float = 0.0
     boxes: int = 0
     hub: Reals | None = None
+    whole: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,7 +204,7 @@ class Held:
 class MatrixRow:
     """What holds of two links, or of a link and what is carried; as :class:`JudgedPair`, over all of their bodies.
 
-    ``hides``: that an allowed pair would be watched otherwise.
+    ``hides``: that an allowed pair would be watched otherwise; ``whole``: that nothing of them is left to be watched.
     """
 
     first: str
@@ -214,6 +216,7 @@ class MatrixRow:
     boxes: int
     reason: str = ""
     hides: bool = False
+    whole: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -293,7 +296,7 @@ def _allowing(matrix: CollisionMatrix, rules: Sequence[PairRule]) -> CollisionMa
 
     def let(row: MatrixRow, pair: frozenset[str]) -> MatrixRow:
         witness = row.witness if pair in named else None
-        found = replace(row, state="allowed", witness=witness, lower_bound=np.nan, left_out=0.0)
+        found = replace(row, state="allowed", witness=witness, lower_bound=np.nan, left_out=0.0, whole=False)
         return replace(found, reason=allowed[pair], hides=pair in named)
 
     rows = ((row, frozenset((row.first, row.second))) for row in matrix.rows)
@@ -408,7 +411,7 @@ def _together(robot: Robot, found: list[JudgedPair], boxes: int) -> list[JudgedP
             bodies = tuple(pair for each in judged for pair in each.bodies)
             witness = next((each.witness for each in judged if each.witness is not None), None)
             looked += sum(each.boxes for each in judged)
-            return [*harmless, JudgedPair("joined", bodies, witness, left_out=radius, boxes=looked)]
+            return [*harmless, JudgedPair("joined", bodies, witness, left_out=radius, boxes=looked, whole=not rest)]
         radius *= GROWTH
     return [*harmless, JudgedPair("overlaps", witness=q, boxes=looked)]
 
@@ -510,9 +513,9 @@ def _joined(
             watched = tuple(pair for each in found for pair in each.bodies)
             witness = next((each.witness for each in found if each.witness is not None), None)
             looked = held.boxes + sum(each.boxes for each in found)
-            return JudgedPair("joined", watched, witness, left_out=radius, boxes=looked, hub=held.hub)
+            return JudgedPair("joined", watched, witness, left_out=radius, boxes=looked, hub=held.hub, whole=not rest)
         radius *= GROWTH
-    return JudgedPair("joined", left_out=radius, boxes=held.boxes, hub=held.hub)
+    return JudgedPair("joined", left_out=radius, boxes=held.boxes, hub=held.hub, whole=True)
 
 
 def _without_joining(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: int) -> list[JudgedPair] | None:
@@ -566,6 +569,7 @@ def _row(first: str, second: str, found: Sequence[JudgedPair], reason: str) -> M
         max(each.left_out for each in found),
         sum(each.boxes for each in found),
         reason,
+        whole=not watched and any(each.whole for each in found),
     )
 
 

@@ -131,7 +131,7 @@ class PlacementLayer:
 
 @dataclass(frozen=True)
 class RangeDifference:
-    """A limit or speed of a joint: ``a``, and ``b`` in A's zero and direction.
+    """A limit or speed of a joint: ``a``, and ``b`` in A's zero and direction; None for a joint without limits.
 
     ``factors`` : of a limit on a sum of joints, one for each joint, the first that is not 0 being 1 and that of
     ``joint``; None for the arm that has no such limit
@@ -147,7 +147,7 @@ class RangeDifference:
 
 @dataclass(frozen=True)
 class RangeLayer:
-    """Limits or speeds; ``same`` is None where one side gives none."""
+    """Limits or speeds; ``same`` is None where one side gives none, or nothing differs but some are not given."""
 
     same: bool | None
     differences: tuple[RangeDifference, ...] = ()
@@ -370,14 +370,13 @@ def _limits(robot_a: Robot, robot_b: Robot, signs: Reals, zeros: Reals, toleranc
     lower, upper = _limits_of_b(robot_b, signs, zeros)
     found = []
     for j in range(robot_a.joints):
-        slides = bool(robot_a.slides[j])
+        slides, ends = bool(robot_a.slides[j]), (robot_a.continuous[j], robot_b.continuous[j])
         scale, tolerance = (1000.0, tolerances.length) if slides else (math.degrees(1.0), tolerances.angle)
-        if robot_a.continuous[j] and robot_b.continuous[j]:
-            continue
         for entry, own, other in (("lower", robot_a.lower[j], lower[j]), ("upper", robot_a.upper[j], upper[j])):
-            if abs(own - other) > tolerance:
+            if ends[0] != ends[1] or (not any(ends) and abs(own - other) > tolerance):
                 unit = "mm" if slides else "deg"
-                found.append(RangeDifference(j + 1, entry, scale * own, scale * other, unit))  # type: ignore[arg-type]
+                one, there = (None if free else scale * end for free, end in zip(ends, (own, other)))
+                found.append(RangeDifference(j + 1, entry, one, there, unit))  # type: ignore[arg-type]
     of_b = robot_b.replace(lower=lower, upper=upper, combined=_sums_of_b(robot_b, signs, zeros))
     found += _sums_differ(robot_a, of_b, tolerances)
     return RangeLayer(not found, tuple(found))
@@ -445,7 +444,7 @@ def _speeds(robot_a: Robot, robot_b: Robot) -> RangeLayer:
         own, other = scale * float(robot_a.speed[j]), scale * float(robot_b.speed[j])
         if abs(own - other) > SAME_RATIO * max(abs(own), abs(other)):
             found.append(RangeDifference(j + 1, "speed", own, other, unit))
-    return RangeLayer(not found, tuple(found))
+    return RangeLayer(False if found else True if both.all() else None, tuple(found))
 
 
 # How far the flange is off --------------------------------------------------------------------------------------------

@@ -123,22 +123,27 @@ def read_dh_table(
     for row in rows:
         _check_kind(path, row, given)
     kinds = {_unit(row) for row in rows}
-    if convention == "standard" and "convention" not in given:
-        notes.append("the table was read as standard D-H; --convention modified if it is Craig's")
-    if not given & {"offset_deg", "direction"}:
-        notes.append("no column offset_deg or direction: joint angles are taken to be the table's own")
-    if "deg" in kinds and "lower_deg" not in given:
-        notes.append(f"no limits in the table: +-{ASSUMED_LIMIT_DEG:g} deg were assumed for all joints that turn")
-    if "mm" in kinds and "lower_mm" not in given:
-        notes.append(f"no limits in the table: 0 to {ASSUMED_SLIDE_MM:g} mm were assumed for all joints that slide")
-    if any(f"speed_{unit}_s" not in given for unit in kinds):
-        notes.append("no speeds in the table: those that the study assumes stand in for them")
+    notes += _assumed(given, kinds, convention)
     if _far_normals(rows, convention):
         notes.append("d of more than 5 m that cancel: read as a calibrated table, with Hayati's beta in place of them")
     content = _content(rows, given, name, convention, path.name)
     if short or 0 < max((length for length, *_ in lengths), default=0.0) < SHORTEST_ARM_MM:
         content["dh"]["calibrated"] = True  # lengths of a millimetre or less are meant
     return parse(RobotFile, content, path), tuple(notes)
+
+
+def _assumed(given: set[str], kinds: set[str], convention: Convention) -> Iterator[str]:
+    """What is assumed because no column of the table says it."""
+    if convention == "standard" and "convention" not in given:
+        yield "the table was read as standard D-H; --convention modified if it is Craig's"
+    if not given & {"offset_deg", "direction"}:
+        yield "no column offset_deg or direction: joint angles are taken to be the table's own"
+    if "deg" in kinds and "lower_deg" not in given:
+        yield f"no limits in the table: +-{ASSUMED_LIMIT_DEG:g} deg were assumed for all joints that turn"
+    if "mm" in kinds and "lower_mm" not in given:
+        yield f"no limits in the table: 0 to {ASSUMED_SLIDE_MM:g} mm were assumed for all joints that slide"
+    if any(f"speed_{unit}_s" not in given for unit in kinds):
+        yield "no speeds in the table: those that the study assumes stand in for them"
 
 
 def _unit_of(column: str) -> str:

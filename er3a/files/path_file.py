@@ -10,7 +10,8 @@ has times; otherwise it is left out.
 
 A joint trajectory of ROS or MoveIt (``trajectory_msgs/JointTrajectory``, or ``moveit_msgs/RobotTrajectory`` around it)
 as YAML or JSON is a timed table of joints. Only positions and times of its points are used; the number in a joint's
-name is its place. Keys that these messages do not have are refused.
+name is its place (Universal Robots: ``shoulder_pan_joint`` to ``wrist_3_joint``). Keys that these messages do not have
+are refused.
 """
 
 from __future__ import annotations
@@ -57,6 +58,7 @@ LONGEST_S = 3600.0
 MAX_ROWS = 200_000
 SAME_POINT = 1e-9  # m or rad
 MAX_RAD = 10 * 2 * math.pi
+UR_JOINTS = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
 UNREAD = ("velocities", "accelerations", "effort")
 IN_POINT = frozenset(("positions", "time_from_start", *UNREAD))
 IN_TRAJECTORY = frozenset(("header", "joint_names", "points"))
@@ -188,7 +190,12 @@ def _only(path: Path, where: str, given: dict[str, Any], known: frozenset[str]) 
 
 
 def _joint_order(path: Path, names: list[str]) -> list[int]:
-    """Where joints 1 to n stand, by the last numbers in their names, from 1 or 0 on, which one text precedes."""
+    """Where joints 1 to n stand, by the last numbers in their names, from 1 or 0 on, which one text precedes; those of
+    Universal Robots by their words."""
+    words = [match for name in names if (match := re.fullmatch(rf"(.*?)({'|'.join(UR_JOINTS)})(?:_joint)?", name))]
+    alike = len(words) == len(names) and len({match[1] for match in words}) == 1
+    if alike and sorted(match[2] for match in words) == sorted(UR_JOINTS):
+        return sorted(range(len(names)), key=lambda k: UR_JOINTS.index(words[k][2]))
     found = [match for name in names if (match := re.fullmatch(r"(.*?)(\d+)\D*", name, re.DOTALL))]
     numbers, stems = [int(match[2]) for match in found], {match[1] for match in found}
     first = min(numbers, default=0)

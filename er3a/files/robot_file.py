@@ -493,6 +493,16 @@ class LinkHull(StrictModel):
     margin_mm: Annotated[float, Field(ge=0, le=LONGEST_LENGTH_MM)] = 0.0
     points_mm: Annotated[list[Triple], Field(min_length=4, max_length=1000)]
 
+    @field_validator("points_mm")
+    @classmethod
+    def _plain_lengths(cls, points):
+        farthest = max(abs(value) for point in points for value in point)
+        if RESIDUE_MM < farthest < SHORTEST_PLAIN_LENGTH_MM:
+            doubt(points, "", f"{farthest:g} mm at most", "metres")
+        if farthest > LONGEST_LENGTH_MM:
+            raise ValueError(f"{farthest:g} mm is longer than any robot's link | Write the points in mm")
+        return points
+
 
 class Envelopes(Sourced):
     """Shapes of links and tool, for collision checks: capsules and convex pieces."""
@@ -505,6 +515,8 @@ class Envelopes(Sourced):
     def _holds_a_shape(self):
         if not (self.capsules or self.meshes or self.hulls):
             raise ValueError("no shapes | Write capsules, meshes or hulls, or leave envelopes out")
+        for i, mesh in enumerate(self.meshes):
+            check_placement(f"meshes[{i}]", mesh)
         return self
 
 

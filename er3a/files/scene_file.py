@@ -14,11 +14,14 @@ from er3a.collision import scene as library
 from er3a.files.kept_files import own_or_shipped
 from er3a.files.pieces_file import load_pieces
 from er3a.files.robot_file import CollisionPairs, DecidedPair, Name, PiecesPath, Text
-from er3a.files.units import MAX_DISTANCE_MM, PositionMm, RpyDeg, Triple
+from er3a.files.units import MAX_DISTANCE_MM, SHORTEST_PLAIN_LENGTH_MM, PositionMm, RpyDeg, Triple, doubt
 from er3a.files.yaml_file import InputFile, StrictModel, load
 from er3a.geometry.transforms import transform
 
 SMALLEST_OBSTACLE_MM = 2.0
+THIN_MM = 1.0
+PLAIN_OBSTACLE_MM = 10.0
+"""What stands in a cell is longer; a shorter one may be written in metres."""
 MAX_LINKS = 30
 SHAPES = ("boxes", "cylinders", "spheres", "planes", "meshes")
 
@@ -62,6 +65,8 @@ class CylinderObstacle(Obstacle):
     @model_validator(mode="after")
     def _large_enough(self) -> Self:
         _check_size(max(2 * self.radius_mm, self.length_mm))
+        if self.radius_mm < THIN_MM:
+            doubt(self, "radius_mm", f"{self.radius_mm:g} mm", "metres")
         return self
 
     def solid(self) -> library.Cylinder:
@@ -110,6 +115,12 @@ class PlaneObstacle(StrictModel):
             raise ValueError("the normal has no direction | Write a vector of about unit length out of the solid")
         return values
 
+    @model_validator(mode="after")
+    def _plain_offset(self) -> Self:
+        if 0 < abs(self.offset_mm) < SHORTEST_PLAIN_LENGTH_MM and not self.offset_mm.is_integer():
+            doubt(self, "offset_mm", f"{self.offset_mm:g} mm", "metres")
+        return self
+
     def solid(self) -> library.Plane:
         """In the units of the library."""
         length = np.linalg.norm(self.normal)
@@ -144,6 +155,17 @@ class SceneFile(InputFile):
     meshes: list[MeshObstacle] = []
     carried: Carried = Carried()
     collision: AllowedPairs = AllowedPairs()
+
+    @model_validator(mode="after")
+    def _plain_solids(self) -> Self:
+        """What is carried may be small; what stands in the cell is not."""
+        for box in self.boxes:
+            if max(box.size_mm) < PLAIN_OBSTACLE_MM:
+                doubt(box, "size_mm", f"{box.size_mm} mm", "metres")
+        for ball in self.spheres:
+            if 2 * ball.radius_mm < PLAIN_OBSTACLE_MM:
+                doubt(ball, "radius_mm", f"{ball.radius_mm:g} mm", "metres")
+        return self
 
     def scene(self) -> library.Scene:
         """In the units of the library."""

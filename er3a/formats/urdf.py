@@ -34,6 +34,7 @@ import scipy
 from er3a.by_value import ByValue, Displayed, Sheet, shortly
 from er3a.collision.matrix import collision_matrix
 from er3a.collision.meshes import simplified
+from er3a.collision.shapes import arm_shapes
 from er3a.errors import Er3aError, InputError
 from er3a.formats import urdf_tree
 from er3a.geometry.transforms import rot_y, rot_z, rpy_of
@@ -266,7 +267,7 @@ def import_urdf(
     given = _chain_forward(found.joints, q @ coupling.T + shift)
     misfit = np.linalg.norm((forward(robot, q) - given)[:, :3, 3], axis=1).max()
     root, placed = urdf_tree.urdf_root(path), link_places(found, shift)
-    envelopes, hulls, shaped = link_shapes(path, root, robot, placed, _asked(split))
+    envelopes, hulls, shaped, lost = link_shapes(path, root, robot, placed, _asked(split))
     visuals, unseen = link_visuals(path, root, robot, placed)
     names = tuple(joint.name for joint in sources)
     masses, weighed, changed = urdf_tree.masses_from_urdf(root, robot, placed, [joint.name for joint in moving], names)
@@ -276,6 +277,9 @@ def import_urdf(
         "drives": masses.drives is not None,
     }
     more = {group: Source(f"As {path.name} states it", "export") for group, there in stated.items() if there}
+    if lost and stated["envelopes"]:
+        text = f"As {path.name} states it, but for shapes of {', '.join(lost)} that could not be read"
+        more["envelopes"] = Source(text, "inferred")
     if changed:
         which = f"{len(changed)} links" if len(changed) > 1 else f"link {changed[0]}"
         text = f"As {path.name} states it, but for the inertia of {which}, for which the nearest possible one was taken"
@@ -484,10 +488,11 @@ def link_places(found: urdf_tree.UrdfChain, shift: Reals) -> urdf_tree.LinkPlace
 
 def link_shapes(
     path: Path, root: ElementTree.Element, robot: Robot, placed: urdf_tree.LinkPlaces, split: urdf_tree.Split | None
-) -> tuple[tuple[Envelope, ...], tuple[ConvexPiece, ...], tuple[str, ...]]:
-    """The collision geometry of a URDF, in the frames of the links of the robot made from it, and notes in words."""
+) -> tuple[tuple[Envelope, ...], tuple[ConvexPiece, ...], tuple[str, ...], tuple[str, ...]]:
+    """The collision geometry of a URDF, in the frames of the links of the robot made from it, notes in words, and the
+    links of which a shape could not be read."""
     zero = np.concatenate([robot.base[None], frames(robot, np.zeros(robot.joints))])
-    envelopes, hulls, notes = list[Envelope](), list[ConvexPiece](), list[str]()
+    envelopes, hulls, notes, lost = list[Envelope](), list[ConvexPiece](), list[str](), list[str]()
     for link in root.findall("link"):
         shapes, place = link.findall("collision"), placed(link.get("name", "?"))
         if place is None:
@@ -497,20 +502,21 @@ def link_shapes(
         T, number = place
         made = list[Envelope | ConvexPiece | urdf_tree.CylinderOfLink]()
         for collision in shapes:
-            frame = np.linalg.inv(zero[number]) @ T
+            frame, name = np.linalg.inv(zero[number]) @ T, link.get("name", "?")
+            found: list[Envelope | ConvexPiece | urdf_tree.CylinderOfLink] = []
             try:
-                made += urdf_tree.collision_shapes(
-                    path, link.get("name", "?"), collision, (frame, number), notes, split
-                )
+                found = urdf_tree.collision_shapes(path, name, collision, (frame, number), notes, split)
             except InputError as error:
-                notes.append(f"link {link.get('name')} has a shape that is left out ({error})")
+                notes.append(f"link {name} has a shape that is left out ({error})")
+            made += found
+            lost += [] if found or name in lost else [name]
         for shape in urdf_tree.with_capsules(made):
             if isinstance(shape, Envelope):
                 envelopes.append(shape)
             else:
                 hulls.append(shape)
     capsules, pieces = sorted(envelopes, key=lambda each: each.link), sorted(hulls, key=lambda each: each.link)
-    return tuple(capsules), tuple(pieces), tuple(notes)
+    return tuple(capsules), tuple(pieces), tuple(notes), tuple(lost)
 
 
 def link_visuals(
@@ -743,9 +749,12 @@ def export_srdf(robot: Robot) -> str:
     Pairs of links that are disabled: those that are proven apart in all joint vectors within the limits (Never),
     that a joint joins (Adjacent), that the robot's file allows to touch (User), and whose shapes overlap in every
     joint vector (Default), which is an error of the shapes: a comment names them. What er3a still checks of links
-    that a joint joins, away from that joint, SRDF has no words for: :func:`pairs_checked_in_part` names them.
+    that a joint joins, away from that joint, SRDF has no words for: :func:`pairs_checked_in_part` names them. A comment
+    says on what shapes the pairs rest, where no document gives them.
     """
     root = ElementTree.Element("robot", name=robot.name)
+    if rests := assumed_pairs(robot):
+        root.append(ElementTree.Comment(f" {rests} "))
     group = ElementTree.SubElement(root, "group", name="arm")
     ElementTree.SubElement(group, "chain", base_link="base", tip_link="tool")
     for row in collision_matrix(robot).rows:
@@ -756,6 +765,15 @@ def export_srdf(robot: Robot) -> str:
         ElementTree.SubElement(root, "disable_collisions", link1=row.first, link2=row.second, reason=REASONS[row.state])
     ElementTree.indent(root)
     return '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def assumed_pairs(robot: Robot) -> str:
+    """That the pairs of an SRDF rest on shapes which no document gives; empty where one does."""
+    shapes = arm_shapes(robot)
+    if not shapes.assumed:
+        return ""
+    made = "the robot's file assumes, or gives in part" if shapes.given else "er3a guesses from the table"
+    return f"pairs are disabled by shapes that {made}: with other shapes they may meet"
 
 
 def pairs_not_checked(robot: Robot) -> tuple[str, ...]:

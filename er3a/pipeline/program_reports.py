@@ -28,12 +28,17 @@ from er3a.files.path_file import load_paths
 from er3a.files.units import noted_doubts
 from er3a.kinematics.singularity import USUAL_NEAR
 from er3a.pipeline.messages.language import as_text
+from er3a.pipeline.messages.left_out import left_out_names, left_out_text
 from er3a.pipeline.messages.programs import remedy_at, say
-from er3a.pipeline.messages.trajectory import limits_assumed
 from er3a.pipeline.results import NEVER_A_PASS, LeftOut, NoPass, plain
-from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_of_limits, left_out_of_units
+from er3a.pipeline.stages.left_out import (
+    left_out_of_collisions,
+    left_out_of_limits,
+    left_out_of_rates,
+    left_out_of_units,
+)
 from er3a.pipeline.stages.trajectory.judgement import Surroundings, collisions, judge, measured, min_clearance
-from er3a.pipeline.stages.trajectory.motion import listed_motions
+from er3a.pipeline.stages.trajectory.motion import CHOSEN, listed_motions
 from er3a.pipeline.stages.trajectory.written_programs import LONGEST_NAME, near_assumed_shapes, written
 from er3a.planning.names import PATH_VERDICTS, PathVerdict
 from er3a.planning.tool_proof import ProofRequirements
@@ -52,7 +57,6 @@ from er3a.programs.languages import WITHOUT_JOINTS, not_written, read_program
 from er3a.programs.program_findings import WriteFinding
 from er3a.programs.program_names import LanguageName
 from er3a.programs.writing import program_name
-from er3a.robots.joint_limits import speeds_given
 from er3a.robots.robot import Robot
 from er3a.version import __version__
 
@@ -66,15 +70,15 @@ UNREADABLE = "unreadable"
 class CheckedFile:
     """A program file with its check, or with the error that it could not be read for.
 
-    ``missed``: what was not examined and may turn each motion's verdict, which therefore is no pass. ``robot``: that it
-    was checked for.
+    ``missed``: what was not examined and may turn each motion's verdict, which therefore is no pass. ``assumed``: on
+    what the rest is judged that no document gives.
     """
 
     file: Path
     check: ProgramCheck | None
     error: InputError | None = None
     missed: tuple[LeftOut, ...] = ()
-    robot: Robot | None = None
+    assumed: tuple[LeftOut, ...] = ()
 
     @property
     def level(self) -> Level:
@@ -99,7 +103,8 @@ def checked_file(file: Path, robot: Robot, options: CheckOptions, doubts: Sequen
     if missed:
         verdicts = tuple(replace(each, level=worst_of((each.level, "caution"))) for each in check.verdicts)
         check = replace(check, level=worst_of((check.level, "caution")), verdicts=verdicts)
-    return CheckedFile(file, check, missed=missed, robot=robot)
+    known = np.isfinite(robot.speed), not assumed_limits(robot, options).acceleration_assumed
+    return CheckedFile(file, check, missed=missed, assumed=left_out_of_rates(*known, jerk=True))
 
 
 def missed_collisions(robot: Robot, scene: Scene | None, arms: Iterable[tuple[str, Robot]] = ()) -> tuple[LeftOut, ...]:
@@ -197,18 +202,16 @@ def shapes_line(robot: Robot) -> str:
     return "" if found is None else say(found)
 
 
-def rates_line(robot: Robot) -> str:
-    """That accelerations are assumed, which no document gives, and speeds as far as none does."""
-    return limits_assumed((~speeds_given(robot)).tolist(), True)
-
-
-def _assumed_speeds(robot: Robot) -> list[str]:
-    return [f"J{joint + 1}" for joint in np.flatnonzero(~speeds_given(robot)).tolist()]
-
-
 def missed_line(missed: tuple[LeftOut, ...]) -> str:
     """What was not examined of all motions; empty where nothing is missing."""
     return say(NoPass(missed)) if missed else ""
+
+
+def assumed_line(checked: Sequence[CheckedFile]) -> str:
+    """What no document gives and was assumed of the joints' speeds and accelerations; empty where all is given."""
+    found = dict.fromkeys(each for one in checked for each in one.assumed)
+    parts = [left_out_text(each) + (f" ({left_out_names(each)})" if each.names else "") for each in found]
+    return f"not examined: {'; '.join(parts)}" if parts else ""
 
 
 def not_examined_line(checked: CheckedFile) -> str:
@@ -268,8 +271,7 @@ def json_of(checked: Iterable[CheckedFile]) -> list[dict[str, Any]]:
                     *({**_place_record(one.place), "what": one.what, "names": []} for one in check.not_examined),
                 ],
                 "shapes_assumed": check.shapes is not None,
-                "speeds_assumed": [] if each.robot is None else _assumed_speeds(each.robot),
-                "accelerations_assumed": True,
+                "assumed": [{"what": one.subject, "names": one.names} for one in each.assumed],
                 "cycle": plain(check.cycle),
                 "findings": [_finding_record(one) for one in check.findings],
                 "motions": [_verdict_record(one) for one in check.verdicts],
@@ -353,12 +355,11 @@ def _notifications(checked: Sequence[CheckedFile]) -> list[dict[str, Any]]:
     found = []
     for each in checked:
         found += [("not_examined", missed_line((one,)), Place(each.file)) for one in each.missed]
+        found += [(one.subject, left_out_text(one), Place(each.file)) for one in each.assumed]
         for one in each.check.not_examined if each.check else ():
             found.append(("not_examined", f"not examined, or not each time: {one.what}", one.place))
         if each.check and each.check.shapes:
             found.append((each.check.shapes.code, say(each.check.shapes), Place(each.file)))
-        if each.robot is not None:
-            found.append(("rates_assumed", rates_line(each.robot), Place(each.file)))
     return [
         {"level": "warning", "descriptor": {"id": code}, "message": {"text": text}, "locations": [_location(place)]}
         for code, text, place in found
@@ -468,13 +469,12 @@ def programs_of(
         along = measured(surroundings, each.motion)
         if collisions(along):
             verdict = min((verdict, "collides"), key=PATH_VERDICTS.index)
-        elsewhere = language != "csv" and any(left.subject == "missed_rows" for left in each.left_out)
+        rest = tuple(left for left in each.left_out if left.subject not in CHOSEN)
+        elsewhere = language != "csv" and any(left.subject == "missed_rows" for left in rest)
         if ((verdict != "safe" or elsewhere) and not unsafe) or not np.isfinite(each.motion.q[0]).all():
-            yield PathProgram(each.name, verdict, None, left_out=each.left_out)
+            yield PathProgram(each.name, verdict, None, left_out=rest)
             continue
         near = near_assumed_shapes(robot, each.name, min_clearance(along), CheckOptions.assumed_margin)
         files, findings = written(robot, each.motion, verdict, language, near, task.limits.speed)
         name = program_name(each.name, LONGEST_NAME)
-        yield PathProgram(
-            each.name, verdict, {name + suffix: text for suffix, text in files.items()}, findings, each.left_out
-        )
+        yield PathProgram(each.name, verdict, {name + suffix: text for suffix, text in files.items()}, findings, rest)

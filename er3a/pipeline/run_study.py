@@ -24,6 +24,7 @@ from argparse import Namespace
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext, redirect_stderr, suppress
 from dataclasses import dataclass
+from functools import partial
 from html import escape
 from io import StringIO
 from logging import WARNING, LogRecord
@@ -42,8 +43,8 @@ from er3a.files.kept_files import ROOT, half_written, read_checked, write_atomic
 from er3a.pipeline import job_server
 from er3a.pipeline.check import check_study
 from er3a.pipeline.messages import language
-from er3a.pipeline.messages.language import tr
-from er3a.pipeline.results import INDEX, JUNIT, OVERALL, check_checksum, check_results, checksum_file
+from er3a.pipeline.messages.say import sentence
+from er3a.pipeline.results import JUNIT, OVERALL, check_checksum, check_results, checksum_file
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
 from er3a.pipeline.verdicts import write_junit_error
@@ -274,39 +275,47 @@ def run_study(study_file: Path, results: Path, reports: Path, words: Sequence[st
 
 
 def _report_error(reports: Path, problem: str) -> None:
-    """Have continuous integration find an error, not the verdicts of an earlier run, if it finds a report at all.
+    """Have people and continuous integration find an error, not the verdicts of an earlier run, if they find any.
 
-    The index says it first. Both get no checksum, so that the next run makes them again.
+    The report gets no checksum, so that the next run makes it again; it takes the error off the pages.
     """
-    writers = {reports / JUNIT: write_junit_error, reports / INDEX: write_index_error}
-    for report, write in writers.items():
-        if report.is_file():
-            with suppress(Er3aError, OSError):  # what went wrong first is what a person is told
-                checksum_file(report).unlink(missing_ok=True)
-                write(problem, report)
+    report = reports / JUNIT
+    with suppress(Er3aError, OSError):
+        mark_pages(reports, problem)
+    if report.is_file():
+        with suppress(Er3aError, OSError):  # what went wrong first is what a person is told
+            checksum_file(report).unlink(missing_ok=True)
+            write_junit_error(problem, report)
 
 
-_MAIN, _FAILED = re.compile(r"<main\b[^>]*>"), re.compile(r'<p class="failed-run">.*?</p>\n', re.DOTALL)
-_LANGUAGE = re.compile(r'<html lang="(\w+)"')
+_LAST_RUN = re.compile(rb"<!-- last run -->.*?<!-- /last run -->", re.DOTALL)
+_BODY = re.compile(rb"<html lang=\"(\w+).*?<body[^>]*>", re.DOTALL)
 
 
-def write_index_error(problem: str, output: Path) -> None:
-    """Have an index say first that the run after it did not end well, in its language."""
-    page = _FAILED.sub("", output.read_text(encoding="utf-8"))
-    found = _LANGUAGE.search(page)
-    with language.using(found[1] if found and found[1] in language.LANGUAGES else "en"):
-        said = tr("The last run did not end well, so what stands here is of an earlier one: {problem}", problem=problem)
-    told = f'<p class="failed-run"><strong>{escape(said)}</strong></p>\n'
-    page = _MAIN.sub(lambda main: f"{main[0]}\n{told}", page, count=1)
-    write_atomically(output, lambda file: file.write_text(page, encoding="utf-8"))
+def mark_pages(reports: Path, problem: str | None) -> None:
+    """Say on each page that is there how the last run ended badly; without a problem, take that off again.
+
+    The pages' times and checksums stay: no page is made again for it.
+    """
+    for page in reports.rglob("*.html"):
+        before, times = page.read_bytes(), page.stat()
+        after = _LAST_RUN.sub(b"", before)
+        if problem is not None and (found := _BODY.search(after)):
+            with language.using(next((each for each in language.LANGUAGES if each == found[1].decode()), "en")):
+                text = escape(sentence("page.last_run", problem=problem)).encode()
+            told = b'<!-- last run --><p class="decision fail" role="alert">' + text + b"</p><!-- /last run -->"
+            after = after[: found.end()] + told + after[found.end() :]
+        if after != before:
+            write_atomically(page, partial(Path.write_bytes, data=after))
+            os.utime(page, ns=(times.st_atime_ns, times.st_mtime_ns))
 
 
 def _run(study_file: Path, results: Path, reports: Path, words: Sequence[str], asked: Namespace, lock: int) -> bool:
     """Check a study and run it; whether all jobs were done."""
     study = check_study(study_file)
-    for report in (reports / JUNIT, reports / INDEX):
-        if not checksum_file(report).is_file():
-            report.unlink(missing_ok=True)
+    mark_pages(reports, None)
+    if not checksum_file(reports / JUNIT).is_file():
+        (reports / JUNIT).unlink(missing_ok=True)
     for path in (*half_written(results), *half_written(reports)):
         path.unlink()
     for path, fault in corrupted(study, results, reports):

@@ -20,7 +20,8 @@ class TrajectorySettings(StrictModel):
     ``avoidance`` chooses the avoidance strategy, or compares all of them. Joints of unknown speed are taken to do
     ``assumed_speed_deg_s`` (those beyond its end the last of it), those that slide ``assumed_speed_mm_s``; all joints
     to reach full speed in ``acceleration_time_s``, unless their maximum accelerations are given
-    (``acceleration_deg_s2``, one for each joint). ``jerk_deg_s3`` bounds the jerk; left out, nothing does.
+    (``acceleration_deg_s2``, one for each joint; mm of those that slide). ``jerk_deg_s3`` bounds the jerk likewise;
+    left out, nothing does.
     ``scene`` holds the obstacles; no overlap with them deeper than ``penetration_tolerance_mm`` goes unnoticed between
     points. Where the shapes of the arm's links are inferred, claimed or guessed, a verdict within
     ``assumed_margin_mm`` of them is a caution. Safe paths are written as programs in the languages ``programs``; others

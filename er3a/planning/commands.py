@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
@@ -192,6 +192,7 @@ class Built:
     repeated_rows : lines of the table that repeat the point before
     unread : what else the table's file gives at its points, which the motion does not follow
     unasked : whether corners are rounded as nobody asked for: over half of the shorter side
+    turns_open : numbers of segments that turn the tool by half a turn, and nobody said which way
     """
 
     joints: JointMove | JointSequence | PlannedMove | None = None
@@ -201,6 +202,7 @@ class Built:
     repeated_rows: tuple[int, ...] = ()
     unread: tuple[str, ...] = ()
     unasked: bool = False
+    turns_open: tuple[int, ...] = ()
 
     @property
     def duration(self) -> float:
@@ -278,8 +280,8 @@ def _tool(robot: Robot, command: ToolMoveCommand | ToolSequenceCommand, ends: Ma
         raise source.error("start", "a path of the tool starts somewhere", "Give joint angles, a pose or a path before")
     slot = _slot(robot, command.start.branch, source)
     if isinstance(command, ToolMoveCommand):
-        path: ToolPath = _segment(pose, command.segment, command.duration, command.ramp, source)
-        return Built(tool=path, q_start=q_start, start_slot=slot)
+        only = _segment(pose, command.segment, command.duration, command.ramp, source)
+        return Built(tool=only, q_start=q_start, start_slot=slot, turns_open=_turns_open([only], [command.segment]))
     segments: list[Segment] = []
     for k, part in enumerate(command.segments):
         here = CommandSource(source.file, f"{source.field}.segments[{k}]")
@@ -287,11 +289,17 @@ def _tool(robot: Robot, command: ToolMoveCommand | ToolSequenceCommand, ends: Ma
         pose = part.end
     blends = np.array([part.blend for part in command.segments[:-1]])
     try:
-        path = segment_path(segments, blends, command.duration, command.ramp)
+        path: ToolPath = segment_path(segments, blends, command.duration, command.ramp)
     except PathError as error:
         part_name = f"segments[{error.segment - 1}]"
         raise source.error(part_name, f"the segment {error.problem}", "Correct its end or blend_mm") from None
-    return Built(tool=path, q_start=q_start, start_slot=slot)
+    return Built(tool=path, q_start=q_start, start_slot=slot, turns_open=_turns_open(segments, command.segments))
+
+
+def _turns_open(segments: Sequence[Segment], parts: Sequence[SegmentCommand | ToolTableCommand]) -> tuple[int, ...]:
+    """The numbers of segments that turn by half a turn, of which the commands do not say which way."""
+    pairs = enumerate(zip(segments, parts), 1)
+    return tuple(k for k, (segment, part) in pairs if segment.half_turn and part.half_turn_axis is None)
 
 
 def _segment(
@@ -314,7 +322,13 @@ def _tool_table(robot: Robot, command: ToolTableCommand) -> Built:
     sizes = np.array([max(part.length, part.turned * TURN_LENGTH) for part in segments])
     path = segment_path(segments, _blends(sizes, command.blend), command.timing)
     slot = _slot(robot, command.branch, command.source)
-    return Built(tool=path, start_slot=slot, repeated_rows=command.repeated_rows, unasked=command.blend is None)
+    return Built(
+        tool=path,
+        start_slot=slot,
+        repeated_rows=command.repeated_rows,
+        unasked=command.blend is None,
+        turns_open=_turns_open(segments, [command] * len(segments)),
+    )
 
 
 def _lines(command: ToolTableCommand) -> list[Segment]:

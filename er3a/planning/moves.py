@@ -3,7 +3,7 @@
 Joint moves run on a quintic; lines on a quintic or a trapezoid, from rest to rest. The orientation turns
 about one fixed axis at a rate proportional to the position's (slerp [1]_), in the shorter direction.
 
-A rotation by exactly half a turn is equally short in both directions. It is then taken counter-clockwise as seen from
+A rotation by half a turn is equally short in both directions. It is then taken counter-clockwise as seen from
 above: of the two opposite axes, the one that points up (+Z of the base), if level the one towards +Y, if that is 0 too
 towards +X. A path may choose the other one by naming an axis.
 
@@ -30,7 +30,7 @@ from er3a.numerics.arrays import Reals
 from er3a.planning.piecewise import PiecewiseMotion, polynomial_motion
 from er3a.planning.profiles import BEYOND, Ends, FromRestToRest, Rates, TimeLaw, check_times, quintic
 
-HALF_TURN_TOLERANCE = 1e-9
+HALF_TURN_TOLERANCE = 1e-5  # rad, and of the axis: six digits of a quaternion or a matrix leave so much open
 
 
 @runtime_checkable
@@ -254,8 +254,8 @@ def rotation_between(T_start: Reals, T_end: Reals, half_turn_axis: Reals | None 
     half_turn = bool(abs(angle - np.pi) < HALF_TURN_TOLERANCE)
     if half_turn_axis is not None and not half_turn:
         raise PoseError(f"half_turn_axis is given, but the rotation is by {np.degrees(angle):.6g} deg, not by 180 deg")
-    if half_turn:
-        rotation = rotation * _sense(rotation / angle, half_turn_axis)
+    if half_turn and _sense(rotation / angle, half_turn_axis) < 0:
+        rotation = rotation * (1.0 - 2.0 * np.pi / angle)
     return rotation, half_turn
 
 
@@ -273,6 +273,6 @@ def _sense(axis: Reals, wanted: Reals | None) -> float:
             raise PoseError(f"half_turn_axis is at right angles to the axis of the half turn, ({shown})")
         return float(np.sign(side))
     for component in axis[::-1]:
-        if abs(component) > 1e-9:
+        if abs(component) > HALF_TURN_TOLERANCE:
             return float(np.sign(component))
     return 1.0

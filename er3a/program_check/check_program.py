@@ -308,7 +308,9 @@ def _located(execution: Execution, robot: Robot, checker: StepChecker, end: int)
         if motion is not None:
             found += [
                 LocatedFinding(
-                    found_in.level_of(each), each, step.place, step.calls, 1, number, motion.moments.get(each)
+                    *(found_in.level_of(each), each, step.place, step.calls, 1),
+                    step=None if (number, each) in checker.elsewhere else number,
+                    moment=motion.moments.get(each),
                 )
                 for each in motion.findings
             ]
@@ -373,7 +375,7 @@ def _first_met(execution: Execution) -> dict[int, Step]:
 
 def _begun_again(execution: Execution, checker: StepChecker, found: list[LocatedFinding]) -> Iterator[LocatedFinding]:
     """What is found at motions in the second round alone, to which a controller may go on or not."""
-    known = {(each.place, each.finding.code) for each in found}
+    known = {(each.place, each.finding.code) for each in found if each.level in ("caution", "fail")}
     told: dict[Place, list[str]] = {}
     for number, motion in checker.motions.items():
         step = execution.steps[number]
@@ -619,9 +621,9 @@ FOUND_OF_PATHS = frozenset(
         *("motion_collides", "pairs_unexamined"),
     )
 )
-"""Findings that a check of the path makes too: it follows the same joints. Speeds and zones are not among these:
-between stops a stretch has one law of time, and one way round each corner or a stop there; nor are clearances, which
-may be those of a corner's rounding."""
+"""Findings that a check of the path makes too, of the motions that it is made of: it follows the same joints. Speeds
+and zones are not among these: between stops a stretch has one law of time, and one way round each corner or a stop
+there; nor are clearances, which may be those of a corner's rounding."""
 
 
 def parts_of(check: ProgramCheck, robot: Robot, source: CommandSource) -> tuple[list[ProgramPart], tuple[int, ...]]:
@@ -640,6 +642,7 @@ def parts_of(check: ProgramCheck, robot: Robot, source: CommandSource) -> tuple[
         for a program that does not move the arm, or whose tool is not the robot's
     """
     groups: list[list[tuple[Place, CheckedMotion]]] = []
+    kept: set[int | None] = set()  # steps
     rest, joined = _moving(check), True
     for number in check.main:
         step, motion = check.execution.steps[number], check.motions.get(number)
@@ -658,13 +661,14 @@ def parts_of(check: ProgramCheck, robot: Robot, source: CommandSource) -> tuple[
         else:
             groups.append([(step.place, motion)])
         joined = True
+        kept.add(number)
         rest.pop(_same_for(check, number), None)
         if motion.end is None:
             break
     if not groups:
         raise InputError(source.file, f"{source.field}.program", "no motion has a known start", "Give start_deg")
     found = [each for each in check.findings if found_in.RANKS[each.level] >= found_in.RANKS["caution"]]
-    found = [replace(each, joint_moves=()) for each in found if each.finding.code not in FOUND_OF_PATHS]
+    found = [replace(each, joint_moves=()) for each in found if not _is_of_path(each, kept)]
     whose = [{place for place, _ in group} for group in groups]
     parts = [
         replace(
@@ -674,6 +678,12 @@ def parts_of(check: ProgramCheck, robot: Robot, source: CommandSource) -> tuple[
         for group, own in zip(groups, whose)
     ]
     return parts, tuple(sorted({*rest.values()} - {0}))
+
+
+def _is_of_path(found: LocatedFinding, kept: set[int | None]) -> bool:
+    """Whether a check of the path that these steps make finds the same."""
+    of_pairs = isinstance(found.finding, PairsUnexamined)
+    return found.finding.code in FOUND_OF_PATHS and (of_pairs or found.step in kept)
 
 
 def _turns_with_path(checked: CheckedMotion) -> bool:

@@ -85,7 +85,8 @@ class SetElsewhere(Finding):
 
 
 class WaitsForOthers(Finding):
-    """A wait for what is false, and what nothing that was read makes true: another task does, and may do more."""
+    """A wait for what is false, or a loop that goes on without a motion; nothing that was read ends it, but another
+    task does, which may do more."""
 
     condition: str
 
@@ -577,6 +578,7 @@ NOTES = frozenset(
             "load_not_examined",
         ),
         *("both_sides_checked", "program_form_inferred", "program_other_encoding", "program_rows_from_rest"),
+        "program_joint_speed_inferred",
     )
 )
 

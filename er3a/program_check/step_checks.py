@@ -631,6 +631,7 @@ class StepChecker:
         self._known: dict[Hashable, CheckedMotion] = {}
         self._corners: dict[Hashable, tuple[found_in.CheckFinding, ...]] = {}
         self._again = 0  # motions that were checked from other joints
+        self.elsewhere: set[tuple[int, found_in.CheckFinding]] = set()  # by step, found from other joints alone
         self._following: dict[int, list[int]] = defaultdict(list)
         for number, step in enumerate(execution.steps):
             self._following[step.before].append(number)
@@ -730,6 +731,7 @@ class StepChecker:
                 if self._again > MAX_MOTIONS_AGAIN:
                     return False
                 motion = self.motions[number] if same else self._motion(what, joints)
+                self.elsewhere |= {(number, each) for each in motion.findings} - self._found_at(number)
                 self._add(number, motion.findings, motion.moments)
                 if last is not None:
                     self._add(before[0], self._corner_findings(last, motion))
@@ -743,6 +745,9 @@ class StepChecker:
                 last = motion if after[0] == number else None
             waiting += [(each, joints, after, last) for each in self._following[number]]
         return True
+
+    def _found_at(self, number: int) -> set[tuple[int, found_in.CheckFinding]]:
+        return {(number, each) for each in self.motions[number].findings}
 
     def _add(
         self,
@@ -1007,10 +1012,11 @@ class StepChecker:
         """Findings on the corner between two motions if a zone rounds it."""
         zone = motion.placed.motion.zone
         findings: list[found_in.CheckFinding] = []
-        if zone.kind in ("named", "velocity"):
+        entry = after.placed.motion.entry if zone.kind == "share" else None
+        if zone.kind in ("named", "velocity") or (entry is not None and entry.kind == "named"):
             findings.append(found_in.ZoneWithoutSize(zone.text))
         if zone.kind != "fine" and motion.way is not None and after.way is not None:
-            findings += self._rounded(motion.way, after.way, motion)
+            findings += self._rounded(motion.way, after.way, motion, entry)
         return findings
 
     def _round_corner(
@@ -1026,18 +1032,23 @@ class StepChecker:
         slack = max(before[0], then[0]), max(before[1], then[1])
         return zone_clearance(bodies, corners, tolerance, patch=patch_of(way.arm, corners, slack), margin=margin)
 
-    def _rounded(self, way: MotionPath, after: MotionPath, motion: CheckedMotion) -> tuple[found_in.CheckFinding, ...]:
-        key = (id(way), id(after))
+    def _rounded(
+        self, way: MotionPath, after: MotionPath, motion: CheckedMotion, entry: instructions.Zone | None
+    ) -> tuple[found_in.CheckFinding, ...]:
+        key = (id(way), id(after), entry)
         if key not in self._corners:
-            self._corners[key] = self._zone_findings(way, after, motion)
+            self._corners[key] = self._zone_findings(way, after, motion, entry)
         return self._corners[key]
 
     def _zone_findings(
-        self, way: MotionPath, after: MotionPath, motion: CheckedMotion
+        self, way: MotionPath, after: MotionPath, motion: CheckedMotion, entry: instructions.Zone | None
     ) -> tuple[found_in.CheckFinding, ...]:
-        shares = [_zone_share(motion.placed.motion, part) for part in (way, after)]
-        found: list[found_in.CheckFinding] = []
+        """``entry``: how much of the second motion the corner may take, if not as much as the zone says."""
         zone = motion.placed.motion.zone
+        shares = [_zone_share(zone, part) for part in (way, after)]
+        if entry is not None and entry.kind != "named":
+            shares[1] = max(shares[1], _zone_share(entry, after))
+        found: list[found_in.CheckFinding] = []
         if zone.kind == "distance" and max(shares) > MAX_MOTION_SHARE + TOLERANCE:
             found.append(found_in.ZoneTooLarge(zone.value * 1000, min(way.length, after.length) * 1000))
         if self.obstacles is None or motion.clearance is None or motion.clearance < 0:
@@ -1087,9 +1098,8 @@ def _bend(way: MotionPath, first: float, last: float) -> Reals:
     return bend_of_line(way.arm, q, way.sagitta((last - first) / BEND_PARTS))
 
 
-def _zone_share(motion: instructions.ArmMotion, way: MotionPath) -> float:
-    """The share of a way that its zone may take; over one half where the zone is larger than that."""
-    zone = motion.zone
+def _zone_share(zone: instructions.Zone, way: MotionPath) -> float:
+    """The share of a way that a zone may take; over one half where the zone is larger than that."""
     match zone.kind:
         case "distance":
             return zone.value / way.length if way.length > TOLERANCE else MAX_MOTION_SHARE
@@ -1167,6 +1177,8 @@ def _key(motion: instructions.ArmMotion) -> Hashable:
     rates = (motion.speed, motion.turn_speed, motion.turning, motion.acceleration)
     return (
         motion.kind,
+        motion.form,
+        motion.spline_block is None,
         targets,
         motion.angle,
         rates,

@@ -147,7 +147,12 @@ class CodeBuilder:
         self._test(place, syntax.Binary(">=", span, syntax.Constant(0)), text)
 
     def open_switch(self, place: Place, subject: syntax.Expression, text: str) -> None:
-        """``SWITCH subject``."""
+        """``SWITCH subject``; functions in it are called once."""
+        if any(True for _ in _invoked(subject)):
+            self._hidden += 1
+            value = syntax.Variable(f"%subject{self._hidden}")
+            self.add(syntax.Assign(place, value, subject, text, local=True))
+            subject = value
         self._open("switch", place)
         self.blocks[-1].subject, self.blocks[-1].text = subject, text
 
@@ -317,6 +322,7 @@ def linked(
         by_name[routine.name] = routine
     found += [finding for routine in by_name.values() for finding in not_understood(routine.code)]
     found += [finding for routine in by_name.values() for finding in _perhaps_called(routine, by_name)]
+    found += [finding for routine in by_name.values() for finding in _read_before(routine, by_name)]
     return {
         name: replace(
             routine, code=_linked(routine.code, by_name, changed), handler=_linked(routine.handler, by_name, changed)
@@ -343,7 +349,7 @@ def lacks_data(routines: Iterable[syntax.Routine], data: Iterable[syntax.Assign]
                 expressions = () if operation.value is None else (operation.value,)
             elif isinstance(operation, syntax.Move):
                 expressions = tuple(each for each in operation.arguments[:1] if each is not None)
-            used.update(name for each in expressions for name in _variables(each))
+            used.update(name for each in expressions for name in variables(each))
     return any(name[0] not in "$%" and name not in known for name in used - given)
 
 
@@ -360,11 +366,12 @@ def own_names(routine: syntax.Routine) -> set[str]:
     return {*(each.name for each in routine.parameters), *map(variable_of, declared)}
 
 
-def _variables(expression: syntax.Expression) -> Iterable[str]:
+def variables(expression: syntax.Expression) -> Iterable[str]:
+    """The variables in an expression."""
     if isinstance(expression, syntax.Variable):
         yield expression.name
     for each in syntax.inner(expression):
-        yield from _variables(each)
+        yield from variables(each)
 
 
 def not_understood(code: Iterable[syntax.Operation]) -> Iterable[NotUnderstood]:
@@ -422,7 +429,7 @@ def _linked(
             syntax.Assign(operation.place, given, syntax.Opaque(f"{each.function}(...)"), f"{each.function}(...)")
             for each in outside
             for given in changed(each)
-            if isinstance(given, (syntax.Variable, syntax.Member, syntax.Element)) and not _of_system(given)
+            if isinstance(given, (syntax.Variable, syntax.Member, syntax.Element))
         ]
         code += [*calls.found, *unclear, last]
     starts.append(len(code))
@@ -445,13 +452,6 @@ def _invoked(expression: syntax.Expression) -> Iterator[syntax.Invocation]:
         yield from _invoked(each)
 
 
-def _of_system(target: syntax.Expression) -> bool:
-    """Whether a variable is the controller's own, such as ``$POS_ACT``."""
-    while isinstance(target, (syntax.Member, syntax.Element)):
-        target = target.of
-    return isinstance(target, syntax.Variable) and target.name.startswith("$")
-
-
 def _calls(expression: syntax.Expression, known: Mapping[str, syntax.Routine]) -> bool:
     if isinstance(expression, syntax.Invocation) and expression.function in known:
         return True
@@ -466,6 +466,41 @@ def _perhaps_called(routine: syntax.Routine, known: Mapping[str, syntax.Routine]
         called = {each.function for side in perhaps for each in _invoked(side)} & known.keys()
         if any(_acts(known[name], known, {name}) for name in called):
             yield NotSimulated(getattr(operation, "text", "") or ", ".join(sorted(called)), operation.place)
+
+
+def _read_before(routine: syntax.Routine, known: Mapping[str, syntax.Routine]) -> Iterator[NotSimulated]:
+    """Operations that read a variable before they call a routine that changes it: here routines are called first."""
+    for operation in routine.code:
+        parts = syntax.expressions_of(operation)
+        if not any(_calls(part, known) for part in parts):
+            continue
+        if isinstance(operation, syntax.Assign):
+            parts = (*syntax.inner(operation.target), *parts[1:])
+        met: set[str] = set()
+        if any(met & _sets(called, known, set()) for part in parts for called in _in_turn(part, known, met)):
+            yield NotSimulated(getattr(operation, "text", "") or "...", operation.place)
+
+
+def _in_turn(expression: syntax.Expression, known: Mapping[str, syntax.Routine], met: set[str]) -> Iterator[str]:
+    """The routines that an expression calls, from left to right; ``met`` grows by the variables before each."""
+    for each in syntax.inner(expression):
+        yield from _in_turn(each, known, met)
+    if isinstance(expression, syntax.Variable):
+        met.add(expression.name)
+    elif isinstance(expression, syntax.Invocation) and expression.function in known:
+        yield expression.function
+
+
+def _sets(name: str, known: Mapping[str, syntax.Routine], seen: set[str]) -> set[str]:
+    """Variables, not its own, that a routine and those that it calls set; ``seen`` grows by those that were asked."""
+    seen.add(name)
+    own = own_names(known[name])
+    assigned = (each for each in known[name].code if isinstance(each, syntax.Assign) and not each.local)
+    found = {variable_of(each.target) for each in assigned} - own
+    parts = (part for operation in known[name].code for part in syntax.expressions_of(operation))
+    for called in {each.function for part in parts for each in _invoked(part)} & known.keys():
+        found |= set() if called in seen else _sets(called, known, seen)
+    return found
 
 
 def _second_sides(expression: syntax.Expression) -> Iterator[syntax.Expression]:
@@ -529,8 +564,8 @@ def within(expression: syntax.Expression, each: Each) -> syntax.Expression:
 def mapped(operation: syntax.Operation, each: Each) -> syntax.Operation:
     """An operation with its expressions replaced."""
     match operation:
-        case syntax.Assign(value=value):
-            return replace(operation, value=None if value is None else each(value))
+        case syntax.Assign(target=target, value=value):
+            return replace(operation, target=within(target, each), value=None if value is None else each(value))
         case syntax.Branch(condition=condition):
             return replace(operation, condition=each(condition))
         case syntax.Return(value=value):

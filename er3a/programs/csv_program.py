@@ -113,7 +113,7 @@ def read_csv_program(source: ProgramText) -> Program:
         pose = _stated(values[len(names) : len(names) + len(stated)])
         target = JointTarget(np.where(slides, given / 1000, np.radians(given)), stated=pose)
         builder.add(Fixed(place, ArmMotion("joint", target, "row", speed=speed)))
-    if not _units_checked(head, rows[1:]):
+    if table and not _units_checked(head, rows[1:]):
         _doubt_radians(source, np.array([values[: len(names)] for values in table])[:, ~slides], kept[1:])
     other = [name for name in head if name not in (*names, TIME, *stated, UNITS_CHECKED)]
     unread = [NotUnderstood(f"the column {name[:40]}", Place(source.path, kept[0][0])) for name in other]

@@ -128,7 +128,7 @@ def same(a: NamedFrame, b: NamedFrame) -> bool:
     return a.name == b.name and a.pose is None and b.pose is None
 
 
-WITH_FIELDS = ("$VEL", "$ACC", "$APO")
+WITH_FIELDS = {"$APO": ("CDIS", "CPTP", "CORI", "CVEL")} | dict.fromkeys(("$VEL", "$ACC"), ("CP", "ORI1", "ORI2"))
 """KRL variables whose fields are looked up by their full names, however they were set."""
 
 HELD_BESIDE = "%beside"
@@ -181,7 +181,7 @@ def computed_in_single(sign: str, left: syntax.Value, right: syntax.Value, found
         case "+" | "-":
             passed = sum(errors)
         case _:
-            passed = math.inf
+            passed = _passed_on(ARITHMETIC.get(sign, operator.pow), (left, right), found)
     return Rounded(found, passed + abs(found) * SINGLE)
 
 
@@ -191,17 +191,26 @@ def function_in_single(function: Callable[..., float], arguments: Sequence[synta
     Raises
     ------
     ValueError, OverflowError, ZeroDivisionError
-        as the function does
+        as the function does; ValueError also of a whole number that rounding may make another
     """
-    plain = [syntax.number(each) or 0.0 for each in arguments]
-    found, passed = float(function(*plain)), 0.0
+    found = function(*(syntax.number(each) or 0.0 for each in arguments))
+    passed = _passed_on(function, arguments, found)
+    if isinstance(found, int) and passed >= 0.5:
+        raise ValueError("rounding decides")
+    found = float(found)
+    return Rounded(found, passed + 4 * SINGLE * max(abs(found), 1.0)) if passed or missed_by(found) else found
+
+
+def _passed_on(function: Callable[..., float], arguments: Sequence[syntax.Value], found: float) -> float:
+    """How far off the value of a function may be for what single precision may make of its arguments."""
+    plain, passed = [syntax.number(each) or 0.0 for each in arguments], 0.0
     for i, off in enumerate(map(missed_by, arguments)):
         for beside in (plain[i] - off, plain[i] + off) if off else ():
             try:
                 passed = max(passed, abs(function(*plain[:i], beside, *plain[i + 1 :]) - found))
             except (ValueError, OverflowError, ZeroDivisionError):  # beside its domain, or its pole
                 passed = math.inf
-    return Rounded(found, passed + 4 * SINGLE * max(abs(found), 1.0)) if passed or missed_by(found) else found
+    return passed
 
 
 COMPARISONS: Mapping[str, Callable[[float, float], bool]] = {
@@ -210,7 +219,8 @@ COMPARISONS: Mapping[str, Callable[[float, float], bool]] = {
     "<=": operator.le,
     ">=": operator.ge,
 }
-COMPARED = frozenset((*COMPARISONS, "==", "=", "<>", "!="))
+EQUAL, UNEQUAL = ("==", "="), ("<>", "!=")
+COMPARED = frozenset((*COMPARISONS, *EQUAL, *UNEQUAL))
 ARITHMETIC: Mapping[str, Callable[[float, float], float]] = {
     "+": operator.add,
     "-": operator.sub,
@@ -286,6 +296,10 @@ class Dialect(ABC):
     def doubted(self, name: str) -> str:
         """The variable after whose next assignment motions no longer depend on one that is not simulated."""
         return name
+
+    def starts_anew(self, data: syntax.Assign) -> bool:
+        """Whether a variable of the data has its first value again where a program without end is begun anew."""
+        return False
 
     def typed(self, kind: str, value: syntax.Value) -> syntax.Value:
         """What a variable of a declared kind, empty for none, holds after a value is assigned to it."""
@@ -367,6 +381,7 @@ class ProgramMemory:
         self.met: set[str] = set()  # of all copies
         self.written: set[str] = set()
         self.unset: set[str] = set()
+        self.parted: set[str] = set()  # of all copies: variables of which parts are kept under their full names
 
     def copy(self) -> ProgramMemory:
         """An independent copy."""
@@ -375,6 +390,7 @@ class ProgramMemory:
         other.shared, other.local, other.types = dict(self.shared), dict(self.local), self.types
         other.beside, other.aliased, other.doubts = self.beside, self.aliased, dict(self.doubts)
         other.watched, other.met, other.written = self.watched, self.met, set(self.written)
+        other.parted = self.parted
         return other
 
     def lost(self, text: str) -> None:
@@ -414,10 +430,14 @@ class ProgramMemory:
     def write(self, name: str, value: syntax.Value, local: bool = False) -> None:
         """Set the value of a full name."""
         self.kept.clear()
+        if "." in name or "[" in name:
+            self.parted.add(root(name))
         if self.doubts:
             self.doubts.pop(name, None)
-        if name in WITH_FIELDS and isinstance(value, syntax.Record):
-            self.shared.update({f"{name}.{field}": part for field, part in value.items})
+        if name in WITH_FIELDS:
+            unknown = tuple((field, syntax.Unclear(f"{name}.{field}")) for field in WITH_FIELDS[name])
+            parts = value.items if isinstance(value, syntax.Record) else unknown
+            self.shared.update({f"{name}.{field}": part for field, part in parts})
         if local or (self.local and root(name) in self.local):
             handed = self.local.get(HELD_BESIDE, ())
             self.local[name] = syntax.Unclear(name) if isinstance(handed, tuple) and root(name) in handed else value
@@ -448,6 +468,8 @@ class ProgramMemory:
         if key is not None:
             if "[" in key:
                 self._forget_overlapping(key)
+            elif key in self.parted and isinstance(value, syntax.Unclear):
+                self.forget(key)
             self.write(key, self.typed(key, value, local), local)
         else:  # an element changes, but which one is not known: none of its list is known from here
             while isinstance(target, (syntax.Member, syntax.Element)):
@@ -499,6 +521,12 @@ class ProgramMemory:
         if isinstance(target.of, syntax.Member) and isinstance(self.value(target.of.of), syntax.Record):
             self.assign(target.of, syntax.Unclear(f"{target.of.name}, partly changed"))  # the record has no such part
             return True
+        part: syntax.Expression = target
+        while isinstance(part, (syntax.Member, syntax.Element)):
+            if isinstance(part, syntax.Member) and isinstance(self.replaced(part.of), tuple):  # which names no parts
+                self.assign(part.of, syntax.Unclear(f"{self.shown(part.of)}, partly changed"))
+                return True
+            part = part.of
         kept = None if name is None else self.read(name)
         if kept is None or not isinstance(of, syntax.Unclear):
             return False
@@ -654,10 +682,11 @@ class ProgramMemory:
         for side in (left, right):
             if isinstance(side, syntax.Unclear):
                 return side
+        if sign in EQUAL or sign in UNEQUAL:
+            same = self._equal(left, right)
+            return same if isinstance(same, syntax.Unclear) else same == (sign in EQUAL)
         if self._too_near(sign, left, right):
-            return syntax.Unclear(f"{left:.9g} {sign} {right:.9g}, which rounding decides on the controller")
-        if sign in ("==", "=", "<>", "!="):
-            return (left == right) == (sign in ("==", "="))
+            return _decided_by_rounding(sign, left, right)
         if sign in BITWISE:
             return (
                 BITWISE[sign](left, right)
@@ -667,6 +696,22 @@ class ProgramMemory:
         if sign in EXCLUSIVE and isinstance(left, bool) and isinstance(right, bool):
             return left != right
         return self._computed(sign, left, right)
+
+    def _equal(self, left: syntax.Value, right: syntax.Value) -> bool | syntax.Unclear:
+        """Whether two values are equal; unclear if that rests on a part which is unclear or near enough to be equal."""
+        for side in (left, right):
+            if isinstance(side, syntax.Unclear):
+                return side
+            if isinstance(side, syntax.Solved):  # which only the arm's table gives
+                return syntax.Unclear(syntax.shown(side))
+        if self._too_near("==", left, right):
+            return _decided_by_rounding("==", left, right)
+        one, other = _parts(left), _parts(right)
+        if one is None or other is None or len(one) != len(other):
+            alike = _sort(left) is _sort(right)  # others languages refuse, or convert
+            return left == right if alike else syntax.Unclear(f"{syntax.shown(left)} == {syntax.shown(right)}")
+        found = [self._equal(*pair) for pair in zip(one, other)]
+        return False if False in found else next((each for each in found if isinstance(each, syntax.Unclear)), True)
 
     def _too_near(self, sign: str, left: syntax.Value, right: syntax.Value) -> bool:
         """Whether two numbers that are compared differ by no more than what rounding, or measuring, may miss."""
@@ -700,7 +745,9 @@ class ProgramMemory:
         if whole and isinstance(found, (int, float)) and abs(found) > self.functions.most_whole:
             return syntax.Unclear(f"{a:.0f} {sign} {b:.0f}, beyond what a whole number holds")
         if self.functions.single_precision and isinstance(found, float):
-            return computed_in_single(sign, left, right, found)
+            in_single = computed_in_single(sign, left, right, found)
+            jumps = sign in ("%", "MOD") and missed_by(in_single) > abs(b) / 2
+            return _decided_by_rounding(sign, left, right) if jumps else in_single
         return found
 
     def _combined(self, sign: str, a: float, b: float, whole: bool) -> syntax.Value:
@@ -712,8 +759,10 @@ class ProgramMemory:
                 return syntax.Unclear("a root of a negative number") if isinstance(power, complex) else power
             if sign not in ARITHMETIC:
                 return syntax.Unclear(f"... {sign} ...")
-            if sign in ("%", "MOD") and min(a, b) < 0 and a % b:
+            if sign in ("%", "MOD", "DIV") and min(a, b) < 0 and a % b:
                 return syntax.Unclear(f"{a:g} {sign} {b:g}, whose sign is not documented")
+            if sign in ("MOD", "DIV") and (a % 1 or b % 1):
+                return syntax.Unclear(f"{a:g} {sign} {b:g}, of what is not whole")
             found = ARITHMETIC[sign](a, b)
         except (ZeroDivisionError, OverflowError, ValueError):
             return syntax.Unclear("a division by zero or an overflow")
@@ -730,6 +779,23 @@ def root(name: str) -> str:
     dot, bracket = name.find("."), name.find("[")
     ends = [at for at in (dot, bracket) if at > 0]
     return name[: min(ends)] if ends else name
+
+
+def _sort(value: syntax.Value) -> type:
+    """The type of a value; whole numbers and others are one."""
+    return float if syntax.number(value) is not None else type(value)
+
+
+def _parts(value: syntax.Value) -> tuple[syntax.Value, ...] | None:
+    """The parts of a list or record, in their order; None of other values."""
+    if isinstance(value, syntax.Record):
+        return value.values()
+    return value if isinstance(value, tuple) else None
+
+
+def _decided_by_rounding(sign: str, left: syntax.Value, right: syntax.Value) -> syntax.Unclear:
+    numbers = [f"{syntax.number(each):.9g}" for each in (left, right)]
+    return syntax.Unclear(f"{numbers[0]} {sign} {numbers[1]}, which rounding decides on the controller")
 
 
 def _whole(name: str | None) -> str:

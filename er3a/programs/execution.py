@@ -188,7 +188,9 @@ class Execution(ByValue):
             del kept[start:]
             start -= length
         instructions = tuple(self.steps[i].instruction for i in kept)
-        return Listing(self.program.name, instructions, repeats_from=start, language=self.program.language)
+        sides = {self.steps[i].place for i in way if isinstance(self.steps[i].instruction, Decision)}
+        name, language = self.program.name, self.program.language
+        return Listing(name, instructions, repeats_from=start, language=language, one_sided=len(sides))
 
     def _same_round(self, kept: list[int], start: int) -> bool:
         """Whether what is repeated was carried out right before already."""

@@ -12,14 +12,14 @@ import scipy
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.planning import commands
+from er3a.planning.moves import line, rotation_between
 from er3a.planning.profiles import LegTimes, Times
-from er3a.planning.sequences import TURN_LENGTH
+from er3a.planning.sequences import TURN_LENGTH, arc
 from er3a.programs import instructions
 from er3a.programs.program_findings import HalfTurnsSplit, WriteFinding
 from er3a.robots.robot import Robot
 
 TO_START = instructions.Rate(0.1, "share")
-HALF_TURN_WITHIN = 1e-9  # rad, and of the axis
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,8 +81,10 @@ def listing_of(
             sizes = making.sizes(tuple(map(commands.SegmentCommand, command.poses[1:])))
             halves = np.append(np.minimum(sizes[:-1], sizes[1:]) / 2, 0.0)  # as er3a.planning.commands rounds corners
             blends = halves if command.blend is None else np.minimum(halves, command.blend)
+            axis = command.half_turn_axis
             parts = tuple(
-                commands.SegmentCommand(pose, blend=float(blend)) for pose, blend in zip(command.poses[1:], blends)
+                commands.SegmentCommand(pose, half_turn_axis=axis, blend=float(blend))
+                for pose, blend in zip(command.poses[1:], blends)
             )
             making.halts = _halts(command.timing, len(parts))
             making.segments(parts, _row_times(command.timing, sizes), ends)
@@ -140,15 +142,7 @@ class _Making:
                 if part.blend > 0 and i not in self.halts
                 else instructions.FINE
             )
-            seconds = float(times[i])
-            joints = None if ends is None else ends[i]
-            if part.via is not None:
-                via = end.copy()
-                via[:3, 3] = (self.to_robot @ np.append(part.via, 1.0))[:3]
-                rate, target = instructions.Rate(seconds, "s"), instructions.PoseTarget(end, joints=joints)
-                self.found.append(self._motion("arc", target, rate, zone, instructions.PoseTarget(via)))
-            else:
-                self._line(end, part.half_turn_axis, seconds, zone, joints)
+            self._segment(part, end, float(times[i]), zone, None if ends is None else ends[i])
             self.pose = end
             self._rest(i)
 
@@ -156,27 +150,24 @@ class _Making:
         if number in self.halts:
             self.found.append(instructions.Pause(self.halts[number]))
 
-    def _line(
-        self, end: Reals, axis: Reals | None, seconds: float, zone: instructions.Zone, joints: Reals | None
+    def _segment(
+        self, part: commands.SegmentCommand, end: Reals, seconds: float, zone: instructions.Zone, joints: Reals | None
     ) -> None:
-        turn = _turn(self.pose, end)
-        if abs(float(np.linalg.norm(turn)) - np.pi) < HALF_TURN_WITHIN:
+        """A line or an arc; one with half a turn as two halves of it, so that its sense is fixed."""
+        here, halves = np.linalg.inv(self.to_robot) @ self.pose, [(1.0, end, zone, joints)]
+        half_turn = rotation_between(here, part.end)[1]
+        axis = part.half_turn_axis if half_turn else None
+        shape = line(here, part.end, 1.0, axis) if part.via is None else arc(here, part.via, part.end, 1.0, axis)
+        if half_turn:
             self.split += 1
-            middle = self.pose.copy()
-            middle[:3, 3] = (self.pose[:3, 3] + end[:3, 3]) / 2
-            sense = _sense(turn / np.pi, None if axis is None else self.to_robot[:3, :3] @ axis)
-            middle[:3, :3] = (
-                scipy.spatial.transform.Rotation.from_rotvec(sense * turn / 2).as_matrix() @ self.pose[:3, :3]
-            )
-            seconds /= 2
-            self.found.append(
-                self._motion(
-                    "line", instructions.PoseTarget(middle), instructions.Rate(seconds, "s"), instructions.FINE
-                )
-            )
-        self.found.append(
-            self._motion("line", instructions.PoseTarget(end, joints=joints), instructions.Rate(seconds, "s"), zone)
-        )
+            halves = [(0.5, self.to_robot @ shape.poses(np.array(0.5)), instructions.FINE, None), (0.5, *halves[0][1:])]
+        for k, (share, target, stop, known) in enumerate(halves):
+            via = None
+            if part.via is not None:
+                at = part.via if not half_turn else shape.points(np.array(0.25 + 0.5 * k))
+                via = instructions.PoseTarget(_moved_to(target, (self.to_robot @ np.append(at, 1.0))[:3]))
+            goal, rate = instructions.PoseTarget(target, joints=known), instructions.Rate(share * seconds, "s")
+            self.found.append(self._motion("line" if via is None else "arc", goal, rate, stop, via))
 
     def _motion(
         self,
@@ -189,6 +180,13 @@ class _Making:
         return instructions.ArmMotion(
             kind, target, via=via, speed=speed, zone=zone, tool=self.tool, base=self.base, load=self.load
         )
+
+
+def _moved_to(pose: Reals, point: Reals) -> Reals:
+    """A pose (4, 4) at another point (3,)."""
+    found = pose.copy()
+    found[:3, 3] = point
+    return found
 
 
 def _plain(zones: list[instructions.Zone]) -> list[instructions.Zone]:
@@ -229,11 +227,3 @@ def _halts(timing: float | Times, count: int) -> dict[int, float]:
 def _turn(start: Reals, end: Reals) -> Reals:
     found: Reals = scipy.spatial.transform.Rotation.from_matrix(end[:3, :3] @ start[:3, :3].T).as_rotvec()
     return found
-
-
-def _sense(axis: Reals, wanted: Reals | None) -> float:
-    """+1 or -1, the sense of a half turn: of :func:`er3a.planning.moves.rotation_between`."""
-    if wanted is not None:
-        return float(np.sign(axis @ wanted)) or 1.0
-    upward = next((part for part in axis[::-1] if abs(part) > HALF_TURN_WITHIN), 1.0)
-    return float(np.sign(upward))

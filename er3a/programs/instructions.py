@@ -241,6 +241,8 @@ class ArmMotion(ByValue):
     turns : a setting that asks for another turn of the tool than is followed; empty for none
     doubt : an instruction before that is not understood, and may have set another tool, base or path; empty if there is
         none, and for targets that are no poses
+    entry : how much of it a corner before it may take, where the zone there is a share of the motion before alone
+        (KRL's C_PTP); None where that zone holds for both
     """
 
     kind: MotionKind
@@ -262,6 +264,7 @@ class ArmMotion(ByValue):
     turns: str = ""
     doubt: str = ""
     with_path: bool = False
+    entry: Zone | None = field(default=None, compare=False)  # which other motions decide
 
 
 @dataclass(frozen=True, slots=True)
@@ -271,7 +274,7 @@ class Pause:
     Attributes
     ----------
     stops : whether the arm is known to stand at its target then, even after a motion with a zone
-    by_others : whether the condition is false, and nothing that was read makes it true
+    by_others : whether nothing that was read ends the wait
     """
 
     seconds: float | None = None
@@ -353,6 +356,7 @@ class Listing:
     name : of the program, in ASCII letters, digits and underscores
     repeats_from : number of the instruction with which it begins again after the last; None if it ends there
     language : in which conditions, signals and unknown text are; empty if in none
+    one_sided : branches of the program of which these instructions are one side
     """
 
     name: str
@@ -360,6 +364,7 @@ class Listing:
     title: str = ""
     repeats_from: int | None = None
     language: str = ""
+    one_sided: int = 0
 
     @property
     def motions(self) -> tuple[ArmMotion, ...]:
@@ -372,7 +377,7 @@ def alike(a: object, b: object) -> bool:
     if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
         return isinstance(a, np.ndarray) and isinstance(b, np.ndarray) and np.array_equal(a, b, equal_nan=True)
     if is_dataclass(a) and type(a) is type(b):
-        return all(alike(getattr(a, part.name), getattr(b, part.name)) for part in fields(a))
+        return all(alike(getattr(a, part.name), getattr(b, part.name)) for part in fields(a) if part.compare)
     return a == b
 
 

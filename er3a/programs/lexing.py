@@ -130,6 +130,8 @@ class Words:
             if named_next and self.kind == "name" and self.texts[self.at + 1] == "=":
                 name = self.take()
                 self.take()
+                if name in dict(named):
+                    raise MisreadError(f"'{name}' is given twice")
                 named.append((name, self.expression()))
             else:
                 placed.append(None if self.next in (",", close) and self.kind == "mark" else self.expression())

@@ -19,7 +19,7 @@ References
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Hashable, Iterable, Iterator, Mapping
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -67,6 +67,7 @@ def deciding(program: syntax.Program, modal: frozenset[str]) -> frozenset[str]:
             needed |= used
             if isinstance(operation, syntax.Call):
                 assigned |= {*used, operation.result}
+                needed |= {name for name, _ in _both_ways(program, operation)}  # they become the caller's variables
         elif isinstance(operation, syntax.Assign):
             name = target_name(operation.target)
             assigned.add(name)
@@ -95,8 +96,8 @@ def changed_beside(program: syntax.Program, dialect: Dialect, itself: str = "") 
     asked = {what.function for what in beside}
     started = {name for name in routines if (name in asked or routines[name].thread) and name != itself}
     handed = {name for what in beside for name in _handed(program, what)}
-    changed = _changed_in(program, _with_called(program, started), dialect) | program.beside
-    return (changed | handed) - dialect.modal
+    changed = _changed_in(program, _with_called(program, started), dialect)
+    return ((changed | handed) - dialect.modal) | program.beside
 
 
 def _handed(program: syntax.Program, what: syntax.Invocation) -> set[str]:
@@ -585,6 +586,18 @@ class _Graph:
         return seen
 
 
+def _reached(next_to: Sequence[Sequence[int]] | Mapping[int, Sequence[int]], first: int) -> set[int]:
+    """Operations of a routine that may come after one, or before it, by what comes next to each."""
+    seen: set[int] = set()
+    waiting = [first]
+    while waiting:
+        for each in next_to[waiting.pop()]:
+            if each not in seen:
+                seen.add(each)
+                waiting.append(each)
+    return seen
+
+
 SAME_FRAME_MM, SAME_FRAME_DEG = 0.01, 0.001
 """Frames that differ by less are one, written with fewer digits."""
 MANY_ROUNDS = 100  # of a loop to an unknown end, before more of them wait for all else
@@ -650,6 +663,7 @@ class Machine:
         self.handed = {name: _handed_by(program, each) for name, each in program.routines.items()}
         self.quiet, self.needed, self.choosing = quiet_branches(program, dialect)
         self.persisting = _persisting(program, dialect) & self.needed
+        self.started_anew = {target_name(each.target) for each in program.data if dialect.starts_anew(each)}
         self.first_values: dict[str, syntax.Value] = {}  # of these
         self.changed_at: dict[str, instructions.Place] = {}  # likewise
         self.kept: dict[str, instructions.Place] = {}
@@ -670,6 +684,7 @@ class Machine:
             self.labels[program.entry] |= {0}
         self.loops = {name: _loops(routine) for name, routine in program.routines.items()}
         self.seen: dict[Hashable, tuple[int, int, int]] = {}  # way, count, last step
+        self.read_before: dict[tuple[str, int], frozenset[str]] = {}  # of the persisting, before a label was come to
         self.waiting: list[ExecutionPath] = []
         self.second: list[ExecutionPath] = []  # rounds, which wait for all else
         self.begun: set[Hashable] = set()  # states in which the program was begun
@@ -678,6 +693,8 @@ class Machine:
         self.numbers = 1  # of ways that were begun, those that joined others too
         self.sides: Counter[tuple[str, int, bool]] = Counter()  # how often each side of a branch was taken
         self.cut: set[instructions.Place] = set()
+        self.ahead: dict[tuple[str, int], tuple[bool, list[syntax.Branch]]] = {}  # as of _ahead
+        self.waited: set[Hashable] = set()  # states of loops that wait for what others change
         self.first_after: dict[int, int] = {}  # step by the one before it
 
     def run(self) -> Execution:
@@ -744,18 +761,25 @@ class Machine:
     def _unmet(self) -> tuple[instructions.Place, ...]:
         """Instructions that are not motions, may move the arm as far as is known, and were not carried out.
 
+        Of a routine that was entered, calls of routines that move it are among them.
         A call by a name that is known when it is reached is not among them: one of the routines that it may call was
         carried out.
         """
         routines = self.program.routines.values()
         code = [((each.name, at), operation) for each in routines for at, operation in enumerate(each.code)]
+        followed = {each.place for routine in routines for each in routine.code}
+        code += [((each.name, -1), op) for each in routines for op in each.handler if op.place not in followed]
         called = {(each.place, each.text) for key, each in code if isinstance(each, syntax.Call) and key in self.passed}
+        entered = {name for name, _ in self.passed}
         return tuple(
             operation.place
             for key, operation in code
             if key not in self.passed
             and (operation.place, getattr(operation, "text", "")) not in called
-            and _may_move(operation, self.dialect)
+            and (
+                _may_move(operation, self.dialect)
+                or (key[0] in entered and isinstance(operation, syntax.Call) and operation.routine in self.moving)
+            )
         )
 
     def _follow(self, way: ExecutionPath) -> None:
@@ -771,9 +795,11 @@ class Machine:
             if self._is_stopped():
                 self._end(way, "stopped", operation.place)
                 return
-            if (back or self.numbers > 1) and frame.at in self.labels[frame.routine.name]:
-                met = self._met(way)
-                if met is not None:
+            if frame.at in self.labels[frame.routine.name]:
+                if (label := (frame.routine.name, frame.at)) not in self.read_before:
+                    self.read_before[label] = frozenset(way.memory.met)
+                met = self._met(way) if back or self.numbers > 1 else None
+                if met is not None and not (met[0] == "repeats" and self._waits_on(way, met[1])):
                     kind, step = met
                     self._end(way, kind, operation.place, step)
                     self.ways -= kind == "joins"
@@ -906,9 +932,10 @@ class Machine:
         self, way: ExecutionPath, kind: EndKind, place: instructions.Place, after: int | None = None, limit: int = 0
     ) -> None:
         """``after``: the step before the one that follows."""
-        if kind == "end" and not (way.beside or way.again) and self.changed_at:
-            values = way.memory.shared
-            changed = (root(name) for name in way.memory.met if values.get(name) != self.first_values.get(name))
+        if kind in ("end", "repeats") and not (way.beside or way.again) and self.changed_at:
+            values, label = way.memory.shared, (way.frames[-1].routine.name, way.frames[-1].at)
+            met = way.memory.met if kind == "end" else self.read_before[label] - self.started_anew
+            changed = (root(name) for name in met if values.get(name) != self.first_values.get(name))
             self.kept.update({name: self.changed_at[name] for name in changed if name in self.changed_at})
         follows = None if after is None else self.first_after.get(after)
         self.endings.append(Ending(kind, way.step, place, follows, limit, way.beside, way.again))
@@ -1094,7 +1121,8 @@ class Machine:
                     self._note(other, start.place, instructions.MovesBeside(name, "entered", start.text))
                 if not fits:
                     self._note(other, start.place, instructions.Unknown(start.text, may_move=False))
-        way.memory.doubts.update((frame, start.text) for frame in self.dialect.frames if frame in sets)
+        changed = _changed_in(self.program, _with_called(self.program, (name,)), self.dialect)
+        way.memory.doubts.update((frame, start.text) for frame in self.dialect.frames if frame in changed)
         if start.kind == "thread" and not sets:
             way.memory.here = Position()
 
@@ -1171,6 +1199,52 @@ class Machine:
         own = other == way.number or any(other == earlier and count < until for earlier, until in way.line)
         return ("repeats" if own else "joins"), step
 
+    def _waits_on(self, way: ExecutionPath, before: int) -> bool:
+        """Whether a way that repeats itself without a motion waits for what others change, and goes on behind that.
+
+        What its conditions ask has no known value from here then. That happens once in each state.
+        """
+        at, state = way.step, self._state(way)
+        while at > before:
+            if isinstance(self.steps[at].instruction, instructions.ArmMotion):
+                return False
+            at = self.steps[at].before
+        asked = [] if state in self.waited or not self._leads_to_motion(way) else self._asked_in_loop(way)
+        if not asked:
+            return False
+        self.waited.add(state)
+        self._note(way, asked[0].place, instructions.Pause(condition=asked[0].text, by_others=True))
+        for name in {name for each in asked for name in names(each.condition)}:
+            way.memory.forget(name)
+        return True
+
+    def _leads_to_motion(self, way: ExecutionPath) -> bool:
+        """Whether any side of the branches behind where a way is moves the arm, or may."""
+        return any(self._ahead(frame)[0] for frame in way.frames)
+
+    def _asked_in_loop(self, way: ExecutionPath) -> list[syntax.Branch]:
+        """Branches with variables on the round that a way goes, in the innermost routine that has such a round."""
+        rounds = (self._ahead(frame)[1] for frame in reversed(way.frames))
+        return next(filter(None, rounds), [])
+
+    def _ahead(self, frame: Frame) -> tuple[bool, list[syntax.Branch]]:
+        """Whether anything that may follow in a routine may move the arm; and its branches with variables from which
+        it may come back to where it is."""
+        key = (frame.routine.name, frame.at)
+        if key not in self.ahead:
+            after = _Graph(frame.routine).after
+            before: dict[int, list[int]] = defaultdict(list)
+            for at, following in enumerate(after):
+                for each in following:
+                    before[each].append(at)
+            code = frame.routine.code
+            reached = _reached(after, frame.at) - {len(code)}
+            moves = any(_moves(self.program, code[at], self.moving, self.dialect) for at in reached)
+            coming = (code[at] for at in sorted(reached & _reached(before, frame.at)))
+            asked = [each for each in coming if isinstance(each, syntax.Branch) and any(names(each.condition))]
+            self.ahead[key] = moves, asked
+        return self.ahead[key]
+
     def _state(self, way: ExecutionPath) -> Hashable:
         """A key that is equal for ways that go on alike."""
         memory, last = way.memory, len(way.frames) - 1
@@ -1178,8 +1252,8 @@ class Machine:
             (frame.routine.name, frame.at, self._kept(memory.local if i == last else frame.local))
             for i, frame in enumerate(way.frames)
         )
-        doubts = frozenset(memory.doubts.items())
-        return frames, self._kept(memory.shared), memory.here.key(), doubts, memory.aliased
+        doubts, written = frozenset(memory.doubts.items()), frozenset(memory.written)
+        return frames, self._kept(memory.shared), memory.here.key(), doubts, memory.aliased, written
 
     def _kept(self, values: dict[str, syntax.Value]) -> frozenset[tuple[str, syntax.Value]]:
         new = values.keys() - self.names_met

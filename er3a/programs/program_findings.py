@@ -58,6 +58,13 @@ class FormInferred(Finding, code="program_form_inferred"):
     place: Place
 
 
+class JointSpeedInferred(Finding, code="program_joint_speed_inferred"):
+    """A joint motion at a speed of the tool, for which no source says how long it takes; the first of a program."""
+
+    word: str
+    place: Place
+
+
 class OtherEncoding(Finding, code="program_other_encoding"):
     """The text is not UTF-8; it was read as ``encoding``."""
 
@@ -82,6 +89,7 @@ ProgramFinding = (
     | NotUnderstood
     | NotSimulated
     | FormInferred
+    | JointSpeedInferred
     | OtherEncoding
     | RowsFromRest
     | NothingMoves
@@ -120,6 +128,12 @@ class SpeedsEstimated(Finding, code="written_speeds_estimated"):
     motions: int
 
 
+class SpeedsRaised(Finding, code="written_speeds_raised"):
+    """Speeds below the least that has a name were written as that one."""
+
+    motions: int
+
+
 class SpeedsCut(Finding, code="written_speeds_cut"):
     """Speeds above what the joints can do were written as the largest."""
 
@@ -134,7 +148,7 @@ class SpeedsOfAssumed(Finding, code="written_speeds_of_assumed"):
 
 
 class HalfTurnsSplit(Finding, code="written_half_turns_split"):
-    """Lines with a turn by 180 deg were written as two halves, so that the sense of the turn is fixed."""
+    """Lines and arcs with a turn by 180 deg were written as two halves, so that the sense of the turn is fixed."""
 
     lines: int
 
@@ -161,6 +175,18 @@ class NotTranslated(Finding, code="written_not_translated"):
     """Signals, waits for conditions and unknown text of another language were written as comments."""
 
     instructions: int
+
+
+class OneSideWritten(Finding, code="written_one_side"):
+    """Branches of a program were left out: the way with the most motions alone was written."""
+
+    branches: int
+
+
+class ExternalAxesDropped(Finding, code="written_external_axes_dropped"):
+    """Motions were written without the external axes that the program gives."""
+
+    motions: int
 
 
 class WrittenUnsafe(Finding):
@@ -192,12 +218,15 @@ WriteFinding = (
     | SplinesAsLines
     | SpeedsEstimated
     | SpeedsCut
+    | SpeedsRaised
     | SpeedsOfAssumed
     | HalfTurnsSplit
     | TargetsLeftOut
     | ToolNotGiven
     | ValuesRounded
     | NotTranslated
+    | OneSideWritten
+    | ExternalAxesDropped
     | WrittenUnsafe
     | WrittenNearAssumed
     | WrittenBesidePoints

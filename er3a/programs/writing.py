@@ -536,6 +536,7 @@ class Writer(ABC):
             case ReadyMotion(motion=motion):
                 if motion.acceleration is not None and motion.acceleration.value <= 0:  # not known
                     instruction = replace(instruction, motion=replace(motion, acceleration=None))
+                self.count["external"] += any(getattr(each, "external", ()) for each in (motion.target, motion.via))
                 if motion.load != self.load:
                     self.load = motion.load
                     if isinstance(motion.load, instructions.UnclearLoad):
@@ -581,6 +582,8 @@ class Writer(ABC):
         found: list[program_findings.WriteFinding] = []
         if count["arcs"]:
             found.append(program_findings.ArcsSplit(count["arcs"], count["chords"], self.options.arc_deviation))
+        if self.listing.one_sided:
+            found.append(program_findings.OneSideWritten(self.listing.one_sided))
         found += [make(count[key]) for key, make in COUNTED.items() if count[key]]
         if count["of assumed"]:
             found.append(program_findings.SpeedsOfAssumed(count["of assumed"], ", ".join(sorted(self.assumed))))
@@ -593,9 +596,11 @@ COUNTED: dict[str, Callable[[int], program_findings.WriteFinding]] = {
     "splines": program_findings.SplinesAsLines,
     "estimated": program_findings.SpeedsEstimated,
     "cut": program_findings.SpeedsCut,
+    "raised": program_findings.SpeedsRaised,
     "left out": program_findings.TargetsLeftOut,
     "rounded": program_findings.ValuesRounded,
     "foreign": program_findings.NotTranslated,
+    "external": program_findings.ExternalAxesDropped,
 }
 
 
@@ -614,10 +619,12 @@ def head_line(finding: program_findings.WriteFinding) -> str:
             return f"{count} duration(s) as speeds: the controller's ramps decide the time"
         case program_findings.SpeedsCut(motions=count):
             return f"{count} speed(s) above 100 %, which was taken"
+        case program_findings.SpeedsRaised(motions=count):
+            return f"{count} speed(s) below the least that has a name, which was taken: FASTER than what was checked"
         case program_findings.SpeedsOfAssumed(motions=count, assumed=assumed):
             return f"{count} speed(s) with an assumed {assumed} as 100 %, which may be far from the controller's 100 %"
         case program_findings.HalfTurnsSplit(lines=count):
-            return f"{count} line(s) that turn the tool by 180 deg in two halves, to fix the sense"
+            return f"{count} line(s) or arc(s) that turn the tool by 180 deg in two halves, to fix the sense"
         case program_findings.TargetsLeftOut(motions=count):
             return f"{count} motion(s) left out: their targets are not known"
         case program_findings.ToolNotGiven(name=name):
@@ -632,6 +639,10 @@ def head_line(finding: program_findings.WriteFinding) -> str:
         case program_findings.WrittenBesidePoints(path=path, missed=missed):
             corners = f"rounds its corners by up to {missed} beside its points"
             return f"NOT SETTLED: the checked path {ascii_text(path)} {corners}; a controller may go to the points"
+        case program_findings.OneSideWritten(branches=count):
+            return f"{count} branch(es) of which one side alone is written: what the others do is left out"
+        case program_findings.ExternalAxesDropped(motions=count):
+            return f"{count} motion(s) without their external axes"
         case program_findings.NotTranslated(instructions=count):
             return f"{count} instruction(s) of the other language as comments"
 

@@ -39,6 +39,7 @@ def along(robot, scene, move, shown=ENDS):
     )
 
 
+@pytest.mark.filterwarnings("ignore::er3a.errors.DoubtfulUnit")  # so small that they may be metres
 @pytest.mark.parametrize(
     "obstacle",
     [
@@ -96,6 +97,7 @@ def test_a_whole_turn_at_constant_speed_may_have_met_something():
     assert len(clearance_along(Bodies(robot, scene), joints, rates, ENDS, ENDS, 0.09).contacts) == 1
 
 
+@pytest.mark.filterwarnings("ignore::er3a.errors.DoubtfulUnit")
 def test_obstacle_that_is_passed_by_is_not_met(robot):
     move, at = swing(robot)
     wire = {"name": "wire", "radius_mm": 0.2, "length_mm": 2}

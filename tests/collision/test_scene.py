@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from er3a.collision.scene import Box, Cylinder, Plane, Sphere
-from er3a.errors import InputError
+from er3a.errors import DoubtfulUnit, InputError
 from er3a.files.scene_file import load_scene
 from er3a.geometry.transforms import translation
 
@@ -90,3 +90,26 @@ def test_wrong_file_is_refused_with_file_and_field(case, tmp_path):
     assert caught.value.file == str(path)
     assert caught.value.field == field
     assert words in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("shapes", "told"),
+    [
+        ({"planes": [PLANE | {"offset_mm": 0.35}]}, r"planes\[0\]\.offset_mm: 0\.35 mm may be metres"),
+        ({"cylinders": [CYLINDER | {"radius_mm": 0.04}]}, r"cylinders\[0\]\.radius_mm: 0\.04 mm may be metres"),
+        (
+            {"boxes": [BOX | {"size_mm": [2.5, 3, 0.04]}]},
+            r"boxes\[0\]\.size_mm: \[2\.5, 3\.0, 0\.04\] mm may be metres",
+        ),
+        ({"spheres": [SPHERE | {"radius_mm": 1.5}]}, r"spheres\[0\]\.radius_mm: 1\.5 mm may be metres"),
+    ],
+)
+def test_sizes_that_look_like_metres_are_doubted(shapes, told, tmp_path):
+    with pytest.warns(DoubtfulUnit, match=told):
+        load_scene(write(tmp_path, **shapes))
+
+
+def test_small_parts_are_carried_and_floors_are_a_millimetre_below(tmp_path, recwarn):
+    part = {"name": "screw", "size_mm": [3, 3, 8], "xyz_mm": [0, 0, 20]}
+    load_scene(write(tmp_path, planes=[PLANE | {"offset_mm": -1}], carried={"boxes": [part]}))
+    assert not [each for each in recwarn if each.category is DoubtfulUnit]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +14,7 @@ from er3a.comparison.compare import best_of
 from er3a.files.arm_file import read_arm
 from er3a.files.robot_writer import write_robot
 from er3a.formats.urdf_tree import read_chain
-from er3a.geometry.transforms import rot_x, rot_z
+from er3a.geometry.transforms import rot_x, rot_z, translation
 from er3a.pipeline.cli import app
 from er3a.pipeline.messages.comparison import headline, layer_rows
 from er3a.robots.robot import CombinedLimit
@@ -310,6 +311,45 @@ def test_tools_that_differ_are_said_not_to_be_compared(tmp_path):
         done = CliRunner().invoke(app, ["compare", "er3a_c60", other])
         assert done.exit_code == 0
         assert ("tools are not compared; these differ (their points by 100 mm)" in done.stderr) == told
+
+
+def test_a_joint_without_limits_differs_from_one_of_a_turn():
+    arm = er3a.load_robot("er3_600")
+    lower, upper = np.array(arm.lower), np.array(arm.upper)
+    lower[5], upper[5] = -np.pi, np.pi
+    limited = arm.replace(lower=lower, upper=upper)
+    endless = limited.replace(continuous=np.arange(6) == 5)
+    found = er3a.compare(endless, limited)
+    assert (found.verdict, found.limits.same) == ("same_arm", False)
+    assert [(each.joint, each.a, round(each.b)) for each in found.limits.differences] == [
+        (6, None, -180),
+        (6, None, 180),
+    ]
+    assert er3a.compare(endless, endless).verdict == "equal"
+
+
+def test_what_is_not_compared_is_named_beside_equal():
+    arm = er3a.load_robot("er3_600")
+    speed = np.array(arm.speed)
+    speed[3] = np.nan
+    assert headline(er3a.compare(arm, arm)) == "equal: the same arm, usable as printed"
+    found = er3a.compare(arm, arm.replace(speed=speed))
+    assert (found.verdict, found.speeds.same) == ("equal", None)
+    assert headline(found) == "equal: the same arm, usable as printed; not compared: speeds"
+
+
+def test_numbers_of_doubtful_unit_stand_where_the_verdict_does(tmp_path):
+    arm = er3a.load_robot("er3_600").replace(name="arm", references=(), tool=translation(0, 0, 0.0002))
+    write_robot(arm, tmp_path / "arm.yaml")
+    words = ["compare", str(tmp_path / "arm.yaml"), str(tmp_path / "arm.yaml"), "--html", str(tmp_path / "page.html")]
+    told = f"{tmp_path / 'arm.yaml'}: tool.xyz_mm: [0.0, 0.0, 0.2] mm may be metres"
+    with pytest.warns(er3a.InputWarning):
+        assert f"units       in doubt {told}" in CliRunner().invoke(app, words).stdout
+    with pytest.warns(er3a.InputWarning):
+        record = json.loads(CliRunner().invoke(app, [*words, "--json"]).stdout)
+    assert record["doubtful_units"] == [told]
+    assert record["notes"] == []
+    assert "mm may be metres" in (tmp_path / "page.html").read_text(encoding="utf-8")
 
 
 def test_the_arm_that_fits_best_comes_first():

@@ -23,6 +23,7 @@ from er3a.errors import ResultError
 from er3a.files.robot_library import load_robot
 from er3a.pipeline.cli import app
 from er3a.pipeline.results import FORMAT_VERSION, check_results, checksum_file, write_checksums
+from er3a.pipeline.run_study import mark_pages
 from er3a.pipeline.stages.registry import STAGES as REGISTRY
 from er3a.pipeline.study import load_study
 from er3a.pipeline.verdicts import read_verdicts
@@ -226,14 +227,24 @@ def test_what_is_missing_damaged_or_of_an_older_version_is_made_again(small_stud
 
 
 def test_bad_input_is_one_error_before_anything_runs(small_study):
-    """Continuous integration reads it in place of the verdicts of the run before."""
+    """Continuous integration reads it in place of the verdicts of the run before, and each page says so."""
     report = small_study.folder / "reports/junit.xml"
+    pages = {page: (page.read_bytes(), page.stat().st_mtime_ns) for page in report.parent.rglob("*.html")}
     before = {path: path.read_bytes() for path in (report, checksum_file(report))}
     with edited(small_study.folder / "data/manual_refs/er3_600/axes.csv", "x_mm", "x_cm"):
         done = small_study.make_run(check=False)
     try:
         (error,) = ElementTree.parse(report).iter("error")
         assert "axes.csv" in error.get("message", "")
+        for page in pages:
+            (told,) = re.findall(
+                "did not end well, so this page may tell of what was before: (.*?)</p>", page.read_text()
+            )
+            assert "axes.csv" in told
+        report.unlink()  # as the next run does
+        assert "write the index" in small_study.planned()
+        mark_pages(report.parent, None)
+        assert {page: (page.read_bytes(), page.stat().st_mtime_ns) for page in pages} == pages
     finally:
         for path, content in before.items():
             path.write_bytes(content)

@@ -126,7 +126,9 @@ def test_half_turns_of_a_sequence_are_told_and_chosen(tmp_path):
     ((segment, axis),) = built(tmp_path, SEQUENCE | {"segments": [turned, back]}).tool.half_turns()
     assert segment == 1
     np.testing.assert_allclose(axis, [0, 0, 1], atol=1e-12)
+    assert built(tmp_path, SEQUENCE | {"segments": [turned, back]}).turns_open == (1,)
     chosen = SEQUENCE | {"segments": [turned | {"half_turn_axis": [0, 0, -1]}, back]}
+    assert built(tmp_path, chosen).turns_open == ()
     np.testing.assert_allclose(built(tmp_path, chosen).tool.half_turns()[0][1], [0, 0, -1], atol=1e-12)
 
 
@@ -135,8 +137,10 @@ def test_half_turn_of_a_table_is_told_and_chosen(tmp_path):
         "x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg\n300,0,300,180,0,0\n300,100,300,180,0,180\n400,100,300,180,0,180\n"
     )
     np.testing.assert_allclose(built(tmp_path, TABLE, rows).tool.half_turns()[0][1], [0, 0, 1], atol=1e-12)
+    assert built(tmp_path, TABLE, rows).turns_open == (1,)
     chosen = built(tmp_path, TABLE | {"half_turn_axis": [0, 0, -1]}, rows)
     np.testing.assert_allclose(chosen.tool.half_turns()[0][1], [0, 0, -1], atol=1e-12)
+    assert chosen.turns_open == ()
     with pytest.raises(InputError, match=r"half_turn_axis: on the way to row 3 of .*right angles"):
         built(tmp_path, TABLE | {"half_turn_axis": [1, 0, 0]}, rows)
     with pytest.raises(InputError, match=r"half_turn_axis: nothing in the table turns by 180 deg"):

@@ -87,6 +87,19 @@ def test_half_turn_axis_points_up_then_left_then_forward(axis):
     np.testing.assert_allclose(line(np.eye(4), end, 1.0).rotation, np.pi * np.abs(axis), atol=1e-12)
 
 
+@pytest.mark.parametrize("off", [-2e-6, 0.0, 2e-6])
+@pytest.mark.parametrize(("axis", "sign"), [(None, 1), ([0, 0, -1], -1)])
+def test_the_last_digit_of_an_orientation_decides_no_way_round(off, axis, sign):
+    """Half a turn as six digits write it goes as half a turn does, and ends at the very pose."""
+    start, end = (
+        transform(np.array([0.4, y, 0.3]), np.array([0, 0, turn])) for y, turn in ((0, 0), (0.1, np.pi + off))
+    )
+    way = line(start, end, 2.0, None if axis is None else np.array(axis, float))
+    assert way.half_turn
+    np.testing.assert_allclose(way.rotation, [0, 0, sign * np.pi + off], atol=1e-9)
+    np.testing.assert_allclose(way.at(np.array(2.0)), end, atol=1e-9)
+
+
 def test_half_turn_axis_that_cannot_choose_is_refused():
     quarter, half = transform([0.1, 0, 0], [0, 0, np.pi / 2]), transform([0.1, 0, 0], [0, 0, np.pi])
     with pytest.raises(PoseError, match="half_turn_axis is given, but the rotation is by 90 deg"):

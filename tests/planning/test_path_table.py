@@ -78,6 +78,21 @@ def test_a_trajectory_of_ros_is_a_timed_table_in_the_order_of_its_joints(tmp_pat
     np.testing.assert_array_equal(table.repeated, [False, False, True])
 
 
+@pytest.mark.parametrize("prefix", ["", "left_"])
+def test_joints_of_universal_robots_are_known_by_their_words(tmp_path, prefix):
+    """``joint_states`` has them by the alphabet."""
+    parts = ("elbow", "shoulder_lift", "shoulder_pan", "wrist_1", "wrist_2", "wrist_3")
+    rows = [{"positions": [3 + k, 2, 1, 4, 5, 6], "time_from_start": {"sec": k, "nanosec": 0}} for k in range(2)]
+    ros = {"joint_names": [f"{prefix}{part}_joint" for part in parts], "points": rows}
+    (tmp_path / "move.json").write_text(json.dumps(ros))
+    np.testing.assert_array_equal(read_path_table(tmp_path / "move.json").joints[0], [1, 2, 3, 4, 5, 6])
+    names = ros["joint_names"]
+    for other in (["right_elbow_joint", *names[1:]], [*names[1:], "rail"]):
+        (tmp_path / "move.json").write_text(json.dumps(ros | {"joint_names": other}))
+        with pytest.raises(InputError, match="joint_names: joints can't be identified"):
+            read_path_table(tmp_path / "move.json")
+
+
 def changed(**more):
     return ROS | more
 

@@ -21,7 +21,7 @@ from er3a.planning.commands import CommandSource, build
 from er3a.program_check.check_program import CheckOptions, check_program, parts_of
 from er3a.programs.instructions import numbers_of
 from er3a.programs.languages import read_program
-from testing.program_texts import HOME_TEXT, axes
+from testing.program_texts import HOME_TEXT, NEAR_TEXT, axes
 from testing.program_texts import check as check_text
 from testing.singular_poses import branch_of
 
@@ -391,6 +391,20 @@ def stretches(folder, *lines):
     parts, rest = parts_of(found, ROBOT, CommandSource(folder / "a.script", "a"))
     assert rest == ()
     return [build(ROBOT, part.made, {}) for part in parts], found
+
+
+@pytest.mark.parametrize("start", [HOME, None])
+def test_a_fault_at_a_motion_that_no_stretch_holds_goes_with_all_of_them(tmp_path, start):
+    """It is on the other side of a branch, or behind a start that is not known; one of a stretch is not told twice."""
+    beyond = f"movej({(HOME + 5 * np.eye(6)[0]).tolist()})"
+    moves = f"  movej({HOME_TEXT})\n  movej({NEAR_TEXT})"
+    body = f"{beyond}\n{moves}" if start is None else f"if get_digital_in(0):\n{moves}\nelse:\n  {beyond}\nend"
+    found = check_text(tmp_path, f"set_tcp(p[0,0,0,0,0,0])\n{body}\n", "a.script", start=start)
+    parts, _ = parts_of(found, ROBOT, CommandSource(tmp_path / "a.script", "a"))
+    assert [[each.level for each in part.found if each.finding.code == "above_limit"] for part in parts] == [["fail"]]
+    within = check_text(tmp_path, f"set_tcp(p[0,0,0,0,0,0])\nmovej({NEAR_TEXT})\n{beyond}\n", "a.script")
+    ((held,), _) = parts_of(within, ROBOT, CommandSource(tmp_path / "a.script", "a"))
+    assert "above_limit" not in {each.finding.code for each in held.found}
 
 
 def test_joint_moves_of_a_stretch_keep_the_times_of_the_program(tmp_path):

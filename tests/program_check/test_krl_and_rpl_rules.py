@@ -192,6 +192,65 @@ def test_a_way_whose_course_is_not_known_is_no_pass(tmp_path, text, name, code):
     assert found.level == "caution"
 
 
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("a.pgm", "MJOINT(POINTJ(5,-10,-10,0,-70,0), {0}, fine, tool0);\n" * 2),
+        ("a.XPL", "<mjoint><target>POINTJ(5,-10,-10,0,-70,0)</target><speed>{0}</speed><zone>fine</zone></mjoint>" * 2),
+    ],
+)
+@pytest.mark.parametrize("speed", ["v200", "v20perc"])
+def test_a_joint_motion_at_a_speed_of_the_tool_is_told_once(tmp_path, name, text, speed):
+    """No source tells how long it takes; files of controllers have it."""
+    body = (
+        XML.format(declared="", body=text.format(speed), more="", behind="") if name == "a.XPL" else text.format(speed)
+    )
+    found = codes(check(tmp_path, body, name))
+    assert len(found.get("program_joint_speed_inferred", [])) == (speed == "v200")
+
+
+def test_a_zone_that_a_motion_of_rpl_lacks_has_no_known_size(tmp_path):
+    text = 2 * "MJOINT(POINTJ({},-10,-10,0,-70,0), v10perc);\n"
+    assert codes(check(tmp_path, text.format(5, 10), "a.pgm"))["zone_without_size"] == [1]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "IF({0}) THEN\n{1} END_IF;",
+        "WHILE({0}) DO\n{1} END_WHILE;",
+        "REPEAT {1} UNTIL(NOT({0})) END_REPEAT;",
+        "IF({0})THEN {1} END_IF;",
+    ],
+)
+def test_conditions_of_rpl_need_no_space_before_them(tmp_path, text):
+    move = "MJOINT(POINTJ(5,-10,-10,0,-70,0), v10perc, fine, tool0);"
+    found = check(tmp_path, text.format("1 = 2", move), "a.pgm")
+    assert "program_not_understood" not in codes(found)
+    assert "both_sides_checked" not in codes(found)
+    asked = codes(check(tmp_path, text.format("MOVEIT()", move), "a.pgm"))
+    assert asked["may_move"][0] == 1
+    chosen = f"i := 2;\nCASE(i) OF 1: MJOINT(far, v10perc, fine, tool0); 2: {move} END_CASE;"
+    assert [each.target.joints[0] for each in motions(tmp_path, chosen, "a.pgm")] == [np.radians(5)]
+
+
+def test_what_an_assignment_of_rpl_that_is_not_understood_sets_has_no_value(tmp_path):
+    text = "P := POINTJ(5,-10,-10,0,-70,0);\nP := OFFSET(P, 1 2);\nMJOINT(P, v10perc, fine, tool0);\n"
+    assert motions(tmp_path, text, "a.pgm")[0].target.reason == "undefined"
+    parts = "<set><dest>P</dest><expr>POINTJ({},-10,-10,0,-70,0)</expr>{}</set>"
+    move = "<mjoint><target>P</target><speed>v20perc</speed><zone>fine</zone><tool>tool0</tool></mjoint>"
+    body = parts.format(5, "") + parts.format(9, "<by>2</by>") + move
+    found = motions(tmp_path, XML.format(declared="", body=body, more="", behind=""), "a.XPL")
+    assert found[0].target.reason == "undefined"
+
+
+@pytest.mark.parametrize(("scope", "known"), [("Routine", True), ("Input", False)])
+def test_what_a_caller_gives_is_not_what_the_point_file_says(tmp_path, scope, known):
+    (tmp_path / "a.var").write_text(f"{scope} Var BOOL go := FALSE;\n", encoding="utf-8")
+    text = "IF go THEN MJOINT(POINTJ(5,-10,-10,0,-70,0), v10perc, fine, tool0); END_IF;\n"
+    assert ("both_sides_checked" in codes(check(tmp_path, text, "a.pgm"))) != known
+
+
 def test_motions_with_more_targets_than_they_have_are_not_understood(tmp_path):
     for body in (f"PTP {axes(NEAR)}, {axes(FAR)}", f"{FRAMES}CIRC {pose_text(NEAR)}"):
         assert motions(tmp_path, krl(body), "a.src")[-1].target.reason == "not_understood"

@@ -115,6 +115,11 @@ def test_the_first_of_several_routines_that_no_other_calls_is_the_program_and_th
     assert [(each.place.line, each.what) for each in found.not_examined] == [(9, "motion")]
 
 
+def test_a_secondary_program_is_not_the_program(tmp_path):
+    text = f"sec s():\n  set_digital_out(1, True)\nend\ndef a():\n  movej({NEAR_TEXT})\nend\n"
+    assert codes(check(tmp_path, text)) == {}
+
+
 def test_a_routine_that_calls_itself_can_be_the_program(tmp_path):
     found = check(tmp_path, f"def Main():\n  movej({NEAR_TEXT})\n  Main()\nend\n")
     assert "not_followed_to_end" in codes(found)
@@ -176,6 +181,15 @@ def test_behind_the_start_of_a_thread_that_moves_the_place_is_not_known(tmp_path
     found = check(tmp_path, text)
     assert codes(found) == {"moves_beside": [5], "way_not_known": [6]}
     assert found.level == "caution"
+
+
+def test_a_tool_is_in_doubt_behind_the_start_of_a_thread_that_sets_it(tmp_path):
+    text = (
+        "thread T():\n  set_tcp(p[0,0,0.2,0,0,0])\nend\n"
+        f"set_tcp(p[0,0,0,0,0,0])\nmovej({HOME_TEXT})\nrun T()\nmovej({NEAR_TEXT})\n"
+        f"movel({text_of(forward(ROBOT, HOME))})\n"
+    )
+    assert codes(check(tmp_path, text))["frames_in_doubt"] == [8]
 
 
 def test_a_thread_that_is_never_started_is_not_passed(tmp_path):
@@ -476,6 +490,38 @@ def test_a_list_that_a_method_changes_is_not_the_old_one(tmp_path):
     assert unclear.reason == "not_understood"
 
 
+@pytest.mark.parametrize("line", ["x = l.pop() + 1", "if l.pop() > 5:\n  x = 1\nend", "textmsg(l.pop())"])
+def test_a_list_that_a_method_within_an_expression_changes_is_not_the_old_one(tmp_path, line):
+    text = f"l = [1,2,3]\n{line}\nif length(l) == 3:\n  movej({NEAR_TEXT})\nend\nmovej({HOME_TEXT})\n"
+    assert "both_sides_checked" in codes(check(tmp_path, text))
+
+
+@pytest.mark.parametrize(
+    ("condition", "both"),
+    [
+        (f"get_actual_joint_positions() == {HOME_TEXT}", True),
+        (f"get_actual_joint_positions() == {NEAR_TEXT}", False),
+        (f"get_target_joint_positions() == {HOME_TEXT}", False),
+        ("[read_input_float_register(0), 1] == [2, 1]", True),
+        ("[read_input_float_register(0), 1] == [2, 3]", False),
+        ("[1, 2] == [1, 2, 3]", False),
+        ("[True] == [1]", True),
+        ("True == 1", True),
+        ("1 == 1.0", False),
+        (f"get_inverse_kin(get_actual_tool_flange_pose()) == {HOME_TEXT}", True),
+    ],
+)
+def test_lists_are_equal_only_as_far_as_their_parts_are_known_to_be(tmp_path, condition, both):
+    text = f"movej({HOME_TEXT})\nif not {condition}:\n  movej({NEAR_TEXT})\nend\nmovej({HOME_TEXT})\n"
+    assert ("both_sides_checked" in codes(check(tmp_path, text))) == both
+
+
+@pytest.mark.parametrize("settings", ["a=1, v=0.1, v=0.5", "v=0.1, v=x", "r=0, v=0.1, r=0.1"])
+def test_what_is_given_twice_by_name_is_not_understood(tmp_path, settings):
+    found = check(tmp_path, f"x = 0.5\nmovej({HOME_TEXT}, {settings})\nmovej({NEAR_TEXT})\n")
+    assert codes(found)["may_move"] == [2]
+
+
 # what touches first is named first
 
 
@@ -590,6 +636,11 @@ def test_what_a_trigger_sets_is_not_known_after_it(tmp_path, line):
     found = check(tmp_path, f"DEF a( )\n{body}\nEND\n", "a.src")
     assert found.level == "fail"
     assert {"target_not_given", "frame_not_given"} & codes(found).keys()
+
+
+def test_what_a_trigger_sets_may_come_after_a_later_line(tmp_path):
+    body = f"DECL INT N\nTRIGGER WHEN DISTANCE=1 DELAY=0 DO N=40\nPTP {axes(NEAR)}\nN=5\nPTP {{A1 N}}"
+    assert "target_not_given" in codes(check(tmp_path, krl(body), "a.src"))
 
 
 def test_a_variable_that_an_interrupt_sets_itself_is_named(tmp_path):
@@ -1173,6 +1224,28 @@ def test_all_of_a_joint_move_within_a_zones_distance_is_looked_at(tmp_path):
     assert codes(found)["zone_collides"] == [9]
 
 
+@pytest.mark.long
+@pytest.mark.parametrize(("share", "told"), [(40, False), (100, True)])
+def test_a_corner_of_joint_moves_ends_by_the_share_of_the_next_one(tmp_path, share, told):
+    """The ball stands where the corner comes by if the next move gives half of itself, not a fifth."""
+    at = np.eye(4)
+    at[:3, 3] = [0.253, 0.237, 0.489]
+    begin, corner, end = "{A1 -60,A2 -10,A3 -10,A5 -70}", "{A1 60}", "{A2 30,A3 -60}"
+    body = f"{FRAMES}{SLOW}$APO.CPTP=40\nPTP {begin}\nPTP {corner} C_PTP\n$APO.CPTP={share}\nPTP {end}"
+    options = {"scene": Scene("ball", (Sphere("ball", at, 0.005),)), "measures": True}
+    found = check(tmp_path, krl(body), "a.src", start=np.radians([-60, -10, -10, 0, -70, 0]), **options)
+    assert ("zone_collides" in codes(found)) == told
+
+
+@pytest.mark.parametrize(
+    ("words", "distance", "told"),
+    [("C_PTP", "", True), ("C_PTP", "$APO.CDIS=5\n", False), ("C_PTP C_VEL", "$APO.CDIS=5\n", True)],
+)
+def test_how_much_of_a_line_a_corner_after_a_joint_move_takes_is_known_or_told(tmp_path, words, distance, told):
+    body = f"{AT_START}$APO.CPTP=10\n{distance}PTP {{X 400,Y 0,Z 300,{DOWN}}} {words}\nLIN {{X 400,Y 50,Z 300,{DOWN}}}"
+    assert ("zone_without_size" in codes(check(tmp_path, krl(body), "a.src"))) == told
+
+
 def test_a_wait_after_a_stop_is_no_corner(tmp_path):
     text = (CORNER["a.pgm"] % "DWELL(0.1);").replace("z95", "fine")
     found = check(tmp_path, text, "a.pgm")
@@ -1356,6 +1429,218 @@ def test_arguments_by_place_pass_over_optional_parameters(tmp_path):
     np.testing.assert_allclose(1000 * without.target.pose[:2, 3], [440, 7])
 
 
+OTHER_POINT = "[[400,0,500],[0,1,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
+
+
+@pytest.mark.parametrize(
+    ("lines", "z"),
+    [
+        (f"there:={OTHER_POINT};\nthere.trans.z:=350;", 350),
+        ("there.trans:=[400,0,500];\nthere.trans.z:=there.trans.z-150;", 350),
+        (f"there:=cell.place;\ncell.place:={OTHER_POINT};\ncell.place.trans.z:=350;\nthere:=cell.place;", 350),
+    ],
+)
+def test_a_part_of_data_of_another_module_is_set_after_the_whole(tmp_path, lines, z):
+    """Its type stands in the module that declares it; the type of a record may be the main module's."""
+    shelf = f"MODULE shelf\nPERS robtarget there:={AT_P};\nPERS spot cell:=[1,{AT_P}];\nENDMODULE\n"
+    (tmp_path / "shelf.mod").write_text(shelf)
+    data = "RECORD spot\nnum count;\nrobtarget place;\nENDRECORD\n"
+    (*_, last) = motions(tmp_path, rapid(f"{lines}\nMoveL there,v100,fine,tool0;", data=data), "a.mod")
+    assert 1000 * last.target.pose[2, 3] == pytest.approx(z)
+
+
+def test_the_type_of_data_may_stand_in_a_module_that_gives_nothing_else(tmp_path):
+    (tmp_path / "kinds.mod").write_text("MODULE kinds\nRECORD spot\nrobtarget place;\nENDRECORD\nENDMODULE\n")
+    data = f"VAR spot cell:=[{AT_P}];\n"
+    (*_, last) = motions(tmp_path, rapid("MoveL cell.place,v100,fine,tool0;", data=data), "a.mod")
+    assert 1000 * last.target.pose[2, 3] == pytest.approx(300)
+
+
+@pytest.mark.parametrize(
+    ("line", "named"),
+    [
+        ("WHILE n<3 AND counted()<5 DO\nSetDO do1,1;\nENDWHILE", True),
+        ("MoveL Offs(p,n,outer(),0),v100,fine,tool0;", True),
+        ("n:=n+counted();", True),
+        ("n:=counted()+n;", False),
+        ("n:=counted();", False),
+        ("list{n}:=counted();", True),
+        ("n:=n+plain();", False),
+        ("n:=n+plain()+counted();", True),
+    ],
+)
+def test_a_variable_that_is_read_before_a_function_changes_it_is_named(tmp_path, line, named):
+    """Functions are carried out before the line that holds them."""
+    more = "FUNC num counted()\nIncr n;\nRETURN n;\nENDFUNC\nFUNC num outer()\nRETURN counted();\nENDFUNC\n"
+    more += "FUNC num plain()\nVAR num n:=2;\nn:=3;\nRETURN n;\nENDFUNC\n"
+    found = codes(check(tmp_path, rapid(line, more, "VAR num list{3};\n"), "a.mod"))
+    assert found.get("program_not_simulated", []) == ([9] if named else [])
+
+
+@pytest.mark.parametrize(
+    ("quotient", "y"),
+    [("9 DIV 2", 4), ("(-8) DIV 2", -4), ("(-9) DIV 2", None), ("9.5 DIV 2", None), ("9 MOD 2.5", None)],
+)
+def test_a_quotient_that_no_source_settles_has_no_value(tmp_path, quotient, y):
+    """Basic Characteristics RAPID, 5-26: operands that are not whole are illegal; of negative ones it says nothing."""
+    (*_, last) = motions(tmp_path, rapid(f"MoveL Offs(p,0,{quotient},0),v100,fine,tool0;"), "a.mod")
+    known = None if isinstance(last.target, UnresolvedTarget) else round(1000 * last.target.pose[1, 3])
+    assert known == y
+
+
+def test_data_may_be_made_of_constants_of_any_module(tmp_path):
+    text = "MODULE shelf\nCONST num lower:=higher-50;\nCONST num higher:=above;\nPERS pos s:=[1,lower,1];\nENDMODULE\n"
+    (tmp_path / "shelf.mod").write_text(text)
+    body = "MoveL Offs(p,0,s.y,0),v100,fine,tool0;"
+    (*_, last) = motions(tmp_path, rapid(body, data="CONST num above:=80;\n"), "a.mod")
+    assert 1000 * last.target.pose[1, 3] == pytest.approx(30)
+
+
+@pytest.mark.parametrize(
+    ("condition", "sides"),
+    [
+        ("p.trans=[400,0,300]", {1}),
+        ("p.trans<>[400,0,300]", {2}),
+        ("p.trans=[400,0,301]", {2}),
+        ("3*[0.1,0.2,0.3]=[0.3,0.6,0.9]", {1, 2}),
+        ("q=[400,0,300]", {1, 2}),
+        ("q=[401,0,300]", {2}),
+    ],
+)
+def test_positions_are_compared_by_their_parts(tmp_path, condition, sides):
+    """Named or not; within what rounding may make of them, or where one is not known, both sides are followed."""
+    body = f"q:=[400,0,GInput(gi1)];\nIF {condition} THEN\nn:=1;\nELSE\nn:=2;\nENDIF\n"
+    _, *found = motions(tmp_path, rapid(f"{body}MoveL Offs(p,0,n,0),v100,fine,tool0;", data="VAR pos q;\n"), "a.mod")
+    assert {round(1000 * each.target.pose[1, 3]) for each in found} == sides
+
+
+def test_what_a_test_asks_is_worked_out_once(tmp_path):
+    more = "FUNC num counted()\nIncr n;\nRETURN n;\nENDFUNC\n"
+    body = "TEST counted()\nCASE 1:\nn:=10;\nCASE 2:\nn:=20;\nCASE 3:\nn:=30;\nENDTEST\n"
+    (*_, last) = motions(tmp_path, rapid(f"{body}MoveL Offs(p,0,n,0),v100,fine,tool0;", more), "a.mod")
+    assert 1000 * last.target.pose[1, 3] == pytest.approx(20)
+
+
+def test_a_function_that_says_which_element_is_set_is_carried_out(tmp_path):
+    more = "FUNC num counted()\nIncr n;\nRETURN n;\nENDFUNC\n"
+    body = "list{counted()}:=30;\nMoveL Offs(p,n,list{2},0),v100,fine,tool0;"
+    found = motions(tmp_path, rapid(body, more, "VAR num list{3};\n"), "a.mod")
+    np.testing.assert_allclose(1000 * found[-1].target.pose[:2, 3], [402, 30])
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        "Round(12.3\\Dec:=n)",
+        "Trunc(12.3\\Dec:=n)",
+        "Dim(list,n)",
+        'StrLen(StrPart("abc",0,1))',
+        'StrLen(StrPart("abc",3,2))',
+    ],
+)
+def test_a_function_of_what_is_not_known_has_no_value(tmp_path, call):
+    body = f"n:=GInput(gi1);\nMoveL Offs(p,0,{call},0),v100,fine,tool0;"
+    (*_, last) = motions(tmp_path, rapid(body, data="VAR num list{2,3};\n"), "a.mod")
+    assert isinstance(last.target, UnresolvedTarget)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        *(f"{word} MoveL Offs(p,0,0,-200),v100,fine,tool0;" for word in ("Stop", "Break", "GOTO there")),
+        "CONNECT i1 WITH t1 MoveL Offs(p,0,0,-200),v100,fine,tool0;",
+        "MoveL p,v100,fine,tool0,wobj0;",
+        "MoveL p,v100,fine,tool0\\WObj:=wobj0,wobj0;",
+    ],
+)
+def test_what_follows_an_instruction_that_takes_no_more_is_not_dropped(tmp_path, line):
+    more, data = "TRAP t1\nENDTRAP\n", "VAR intnum i1;\n"
+    found = check(tmp_path, rapid(f"{line}\nthere:\nMoveL p,v100,fine,tool0;", more, data), "a.mod")
+    assert {"may_move", "target_not_given"} & codes(found).keys()
+
+
+@pytest.mark.parametrize("line", ["Stop\\NoRegain;", "Stop\\AllMoveTasks;", "Stop;", "Break;"])
+def test_a_stop_with_its_switches_is_understood(tmp_path, line):
+    assert "may_move" not in codes(check(tmp_path, rapid(f"{line}\nMoveL p,v100,fine,tool0;"), "a.mod"))
+
+
+@pytest.mark.parametrize(
+    ("line", "kept"),
+    [
+        ("q.trans.z:=100 @ 3;", False),
+        ("list{1}:=5 $;", False),
+        ('SetDataVal "n",50;', False),
+        ("SetupCyclicBool n,di1=1;", False),
+        ("RMQSendWait slot,sent,message,n;", False),
+        ("b:=ReadDir(folder,n);", False),
+        ("b:=UIListView(\\Result:=n,items);", False),
+        ("m:=5 $;", True),
+    ],
+)
+def test_what_a_line_may_set_that_is_not_understood_has_no_value(tmp_path, line, kept):
+    data = f"VAR robtarget q:={AT_P};\nVAR num list{{2}};\nVAR num m;\n"
+    body = f"{line}\nMoveL Offs(q,0,n,list{{1}}),v100,fine,tool0;"
+    (*_, last) = motions(tmp_path, rapid(body, data=data), "a.mod")
+    assert isinstance(last.target, UnresolvedTarget) != kept
+
+
+def test_external_axes_that_are_not_known_as_a_whole_are_named(tmp_path):
+    more = "FUNC extjoint where()\nVAR robtarget q;\nq:=CRobT();\nRETURN q.extax;\nENDFUNC\n"
+    body = "MoveL Offs(p,0,9,0),v100,z10,tool0;\nq:=p;\nq.extax:=where();\nMoveL q,v100,fine,tool0;"
+    (*_, last) = motions(tmp_path, rapid(body, more, "VAR robtarget q;\n"), "a.mod")
+    assert [name for name, _ in last.target.external] == ["extax"]
+
+
+def test_data_in_the_first_line_of_a_module_count(tmp_path):
+    text = rapid("MoveL Offs(p,0,first,0),v100,fine,tool0;").replace("MODULE a\n", "MODULE a VAR num first:=30; ")
+    (*_, last) = motions(tmp_path, text, "a.mod")
+    assert 1000 * last.target.pose[1, 3] == pytest.approx(30)
+
+
+def test_a_list_of_lists_is_one_as_a_parameter_too(tmp_path):
+    more = "PROC lower(INOUT robtarget q{*,*},num z)\nq{1,2}.trans.z:=z;\nENDPROC\n"
+    body = '%"low"+s% q,350;\nMoveL q{1,2},v100,fine,tool0;'
+    data = f'VAR string s:="er";\nVAR robtarget q{{1,2}}:=[[{AT_P},{AT_P}]];\n'
+    (*_, last) = motions(tmp_path, rapid(body, more, data), "a.mod")
+    assert 1000 * last.target.pose[2, 3] == pytest.approx(350)
+
+
+@pytest.mark.parametrize(("file", "named"), [("shelf.mod", False), ("other.mod", True), ("", True)])
+def test_a_module_that_is_loaded_and_was_not_read_is_named(tmp_path, file, named):
+    (tmp_path / "shelf.mod").write_text("MODULE shelf\nPROC go()\nMoveL p,v100,fine,tool0;\nENDPROC\nENDMODULE\n")
+    given = f'"HOME:/parts/{file}"' if file else "s"
+    body = f'Load \\Dynamic,{given};\n%"go"%;'
+    found = codes(check(tmp_path, rapid(body, data="VAR string s;\n"), "a.mod"))
+    assert ("program_not_simulated" in found) == named
+
+
+def test_what_is_not_understood_in_a_handler_is_named(tmp_path):
+    body = "MoveL p,v100,fine,tool0;\nERROR\nArcL p,v100,seam1,weave1,z10,tool0;\nb:=5 @;\nEXIT;"
+    found = codes(check(tmp_path, rapid(body), "a.mod"))
+    assert found["never_reached"] == [10, 11]
+    assert found["program_not_understood"] == [11]
+
+
+@pytest.mark.parametrize(
+    ("place", "name", "lines"),
+    [
+        ("Rob2", "Rob1", "n2:=600;"),
+        ("T_COM", "T_ROB1", "put n2;"),
+        ("", "", "n2:=600;"),
+    ],
+)
+def test_persistent_data_are_set_by_tasks_in_other_places(tmp_path, place, name, lines):
+    """In folders with names of robots, by reference, and by a module beside it with a main that moves nothing."""
+    for each in {place, name}:
+        (tmp_path / each).mkdir(exist_ok=True)
+    put = "PROC put(PERS num x)\nx:=600;\nENDPROC\n"
+    text = f"MODULE cell\nPERS num n2:=0;\nPROC main()\n{lines}\nENDPROC\n{put}ENDMODULE\n"
+    (tmp_path / place / "cell.mod").write_text(text)
+    text = rapid("MoveL Offs(p,0,n2,0),v100,fine,tool0;", data="PERS num n2:=0;\n")
+    assert isinstance(motions(tmp_path / name, text, "a.mod")[-1].target, UnresolvedTarget)
+    assert files_of(tmp_path / name / "a.mod")[-1].name == "cell.mod"
+
+
 def handled(handler: str, sub: str = "SetDO do1,1;", own: str = "") -> str:
     """A module whose main calls sub1; with the handler of main and sub1's own."""
     more = f"PROC sub1()\n{sub}\n{own}ENDPROC\nPROC note1()\nIncr k;\nENDPROC\nFUNC bool set1(INOUT num x)\nx:=40;\n"
@@ -1463,6 +1748,13 @@ def test_a_position_that_is_read_after_continue_is_not_known(tmp_path):
     ahead, stopped = (motions(tmp_path, krl(f"FRAME F\n{line % each}"), "a.src")[-1] for each in ("CONTINUE\n", ""))
     assert isinstance(ahead.target, UnresolvedTarget)
     assert not isinstance(stopped.target, UnresolvedTarget)
+
+
+@pytest.mark.parametrize(("before", "ways"), [("CONTINUE\n", {5.0, 9.0}), ("", {5.0})])
+def test_what_asks_for_the_position_after_continue_is_not_decided(tmp_path, before, ways):
+    ask = f"{AT_START}{before}IF $AXIS_ACT.A1<1 THEN\nPTP {{A1 5}}\nELSE\nPTP {{A1 9}}\nENDIF"
+    found = motions(tmp_path, krl(f"PTP {axes(HOME)}\n{ask}"), "a.src")
+    assert {round(float(np.degrees(each.target.joints[0])), 6) for each in found[-2:]} & {5.0, 9.0} == ways
 
 
 ONE_TOOL = "[TRUE,[[0,0,100],[1,0,0,0]],[1,[0,0,0],[1,0,0,0],0,0,0]]"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 from typer.testing import CliRunner
@@ -17,6 +18,7 @@ from er3a.pipeline.commands.options import app
 from er3a.pipeline.program_reports import PathProgram
 from er3a.pipeline.results import LeftOut
 from er3a.programs.languages import read_program
+from er3a.programs.machine import execute
 from er3a.programs.program_findings import TargetsLeftOut
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -103,8 +105,20 @@ def test_what_is_not_examined_is_named_in_text_json_and_sarif(tmp_path):
         of.setdefault(each["descriptor"]["id"], []).append(each)
     assert [each["locations"][0]["physicalLocation"]["region"]["startLine"] for each in of["not_examined"]] == lines
     assert [each["message"]["text"][:24] for each in of["shapes_assumed"]] == ["Link shapes are assumed "]
-    assert [each["message"]["text"][:24] for each in of["rates_assumed"]] == ["Joint speeds and acceler"]
     assert "not examined, or not each time: motions of lines" in check(*cut).stderr
+
+
+@pytest.mark.parametrize(("arm", "speeds"), [("er3a_c60", [f"J{i}" for i in range(1, 7)]), ("er3_600", None)])
+def test_speeds_and_accelerations_that_no_document_gives_are_named(tmp_path, arm, speeds):
+    (tmp_path / "a.src").write_text("DEF a( )\nPTP {A1 5}\nEND\n")
+    words = ("check-program", str(tmp_path / "a.src"), "--robot", arm, "--start", "0,-10,-10,0,-70,0")
+    sarif = tmp_path / "found.sarif"
+    result = run(*words, "--json", "--sarif", str(sarif))
+    named = {each["what"]: each["names"] for each in json.loads(result.stdout)[0]["assumed"]}
+    assert named == ({} if speeds is None else {"own_speeds": speeds}) | {"own_accelerations": []}
+    (log,) = json.loads(sarif.read_text())["runs"]
+    assert named.keys() <= {each["descriptor"]["id"] for each in log["invocations"][0]["toolExecutionNotifications"]}
+    assert ("so speeds are assumed (J1, J2" in run(*words).stderr) == (speeds is not None)
 
 
 def test_a_check_that_ends_early_is_no_pass_and_names_no_time_of_the_whole():
@@ -230,6 +244,38 @@ def test_paths_are_written_and_unsafe_ones_refused(tmp_path):
     assert read_program(tmp_path / "line_clean.src").findings == ()
 
 
+def test_a_joint_move_that_its_speeds_at_the_ends_bend_is_written_as_points_of_its_way(tmp_path):
+    paths, ends = tmp_path / "paths.yaml", "start_deg: [0,-10,-10,0,-70,0], end_deg: [40,-10,-10,0,-70,0]"
+    rates = "start_velocity_deg_s: [0,-40,0,0,0,0], end_velocity_deg_s: [{0},{1},0,0,0,0]"
+    path = "  - {{name: {0}, title: P, kind: joint, samples: 60, duration_s: 3, {1}, {2}}}\n"
+    straight = "end_velocity_deg_s: [10,0,0,0,0,0]"
+    paths.write_text(
+        f"kind: paths\npaths:\n{path.format('bent', ends, rates.format(0, 40))}{path.format('even', ends, straight)}"
+    )
+    words = ("program", "write", str(paths), "--robot", "er3a_c60", "--language", "urscript", "--output", str(tmp_path))
+    assert run(*words).exit_code == 0
+    moves = [
+        [move.target.joints for move in execute(read_program(tmp_path / f"{name}.script")).listing().motions]
+        for name in ("bent", "even")
+    ]
+    lowest = [np.degrees(min(joints[1] for joints in each)) for each in moves]
+    assert lowest[0] < -25
+    assert (len(moves[1]), lowest[1]) == (2, pytest.approx(-10))
+
+
+def test_a_program_settles_what_its_path_leaves_open(tmp_path):
+    """The half turn is written as two halves, and the first pose is gone to by its joints."""
+    start, end = (f"{{xyz_mm: [400, {y}, 400], rpy_deg: [180, 0, {yaw}]}}" for y, yaw in ((0, 0), (60, 180)))
+    (tmp_path / "paths.yaml").write_text(
+        "kind: paths\npaths:\n  - {name: turn, title: Turn, kind: line, samples: 30, duration_s: 6, "
+        f"start: {start}, end: {end}}}\n"
+    )
+    words = ("program", "write", str(tmp_path / "paths.yaml"), "--robot", "er3a_c60", "--language", "krl")
+    done = run(*words, "--output", str(tmp_path))
+    assert done.exit_code == 0, done.stderr
+    assert (tmp_path / "turn.src").is_file()
+
+
 def test_a_program_is_written_as_the_paths_of_its_stretches(tmp_path):
     paths = tmp_path / "paths.yaml"
     paths.write_text(
@@ -264,9 +310,7 @@ def test_assumed_shapes_and_ways_from_nowhere_are_named():
     done = run("check-program", *words)
     (record,) = json.loads(done.stdout)
     assert record["shapes_assumed"] is True
-    assert (record["speeds_assumed"], record["accelerations_assumed"]) == ([f"J{j}" for j in range(1, 7)], True)
     assert {each["what"] for each in record["not_examined"]} == {"way"}
     done = check("data/programs/weld_seam.src", "--verdicts")
     assert "mm of assumed shapes [motion]" in done.stdout
     assert "Link shapes are assumed" in done.stderr
-    assert "Joint speeds and accelerations are assumed: what passes may be too fast for the arm." in done.stderr

@@ -261,6 +261,10 @@ MENDED = {
         krl(AT_HOME, "SPLINE", "SLIN {A1 5,A2 -10,A3 -10,A4 0,A5 -70,A6 0}", "ENDSPLINE"),
         krl(AT_HOME, "SPTP {A1 5,A2 -10,A3 -10,A4 0,A5 -70,A6 0}"),
     ),
+    "program_joint_speed_inferred": (
+        RPL.format(**WORDS | {"speed": "v200"}),
+        RPL.format(**WORDS | {"speed": "v50perc"}),
+    ),
     "zone_without_size": (RPL.format(**WORDS | {"zone": "wide"}), RPL.format(**WORDS | {"zone": "z1"})),
     "arc_has_no_circle": (
         krl(f"LIN {{X 400,Y 0,Z 400,{DOWN}}}", f"CIRC {{X 420,Y 0,Z 400,{DOWN}}},{{X 440,Y 0,Z 400,{DOWN}}}"),

@@ -109,11 +109,21 @@ def test_numbers_of_rapid_have_32_bits_too(tmp_path):
         ("n = 0\nif sqrt(2) * sqrt(2) == 2:\n n = 1\nend", {0, 1}),
         ("x = [3, 4]\nn = x[floor(0.3 * 4)]", {4}),
         ("n = 0\nif abs(-2) == 2:\n n = 1\nend", {1}),
+        ("n = floor(7 / 3) + ceil(0.3 / 0.2)", {4}),
+        ("n = 0.75 % 0.5 * 4", {1}),
+        ("n = floor((0.1 + 0.3) % 0.3 * 10 + 0.5)", {1}),
+        ("n = floor((0.1 + 0.2) ^ 2 * 100 + 0.5)", {9}),
     ],
 )
 def test_numbers_of_urscript_have_32_bits(tmp_path, body, rounds):
     found = motions(tmp_path, f"{body}\nmovej([n * 0.0625, 0, 0, 0, 0, 0])\n", "a.script")
     assert {float(each.target.joints[0] / 0.0625) for each in found} == rounds
+
+
+@pytest.mark.parametrize("number", ["floor(0.3 / 0.1)", "ceil(0.1 + 0.2 + 0.7)", "(0.1 + 0.2) % 0.1"])
+def test_what_rounding_makes_another_number_has_no_value(tmp_path, number):
+    (found,) = motions(tmp_path, f"n = {number}\nmovej([n * 0.0625, 0, 0, 0, 0, 0])\n", "a.script")
+    assert found.target.reason == "not_understood"
 
 
 @pytest.mark.parametrize(

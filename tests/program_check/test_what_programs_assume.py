@@ -50,9 +50,9 @@ def with_data(folder, body: str, data: str, **options):
     return check(folder, krl(FRAMES + SPEEDS + body), "a.src", **options)
 
 
-def joints(folder, body: str) -> list[float]:
+def joints(folder, body: str, more: str = "") -> list[float]:
     """Where joint 1 goes, deg, on each motion of a KRL program."""
-    found = motions(folder, krl(body), "a.src")
+    found = motions(folder, krl(body, more), "a.src")
     return [float(np.degrees(each.target.joints[0])) for each in found if isinstance(each.target, JointTarget)]
 
 
@@ -168,6 +168,16 @@ def test_what_changes_every_motion_until_it_is_ended_stays_in_doubt_until_then(t
     assert codes(check(tmp_path, text, "a.script"))["frames_in_doubt"] == [3, 4]
 
 
+def test_where_force_mode_leads_the_arm_is_not_known(tmp_path):
+    begin = "force_mode(p[0,0,0,0,0,0],[0,0,1,0,0,0],[0,0,10,0,0,0],2,[1,1,1,1,1,1])"
+    read = "q = get_actual_joint_positions()"
+    text = f"{begin}\nset_tcp(p[0,0,0,0,0,0])\nmovej({HOME_TEXT})\n{read}\nend_force_mode()\nmovej({NEAR_TEXT})\n"
+    found = codes(check(tmp_path, f"{text}movej(q)\n", "a.script"))
+    assert found["way_not_known"] == [3, 6]
+    assert found["target_not_given"] == [7]
+    assert codes(check(tmp_path, f"{begin}\nsleep(1)\nend_force_mode()\n", "a.script"))["may_move"] == [1]
+
+
 LIFT = f"if here[2] > 0.3:\n movej({NEAR_TEXT})\nend\nmovej({HOME_TEXT})"
 ROBOT_TCP = "set_tcp(p[0,0,0,0,0,0])"
 
@@ -249,6 +259,8 @@ def test_a_tool_of_rapid_that_the_cell_gives_otherwise_is_told(tmp_path):
         ("E6AXIS X={A1 0,A2 -10,A3 -10,A4 0,A5 -70,A6 0}", "X={A1 5,A2 -10,A3 -10,A4 0,A5 -70,A6 0}\nPTP X", []),
         ("E6AXIS X={A1 0,A2 -10,A3 -10,A4 0,A5 -70,A6 0}", "X.A1=X.A1+5\nPTP X", [7]),
         ("INT N=0", "LOOP\nPTP {A1 N}\nN=5-N\nENDLOOP", []),  # which has no end
+        ("INT N=0", "PTP {A1 N}\nLOOP\nN=5\nPTP {A1 9}\nENDLOOP", [9]),  # but another beginning
+        ("INT N=0", "IF $IN[1] THEN\nN=0\nENDIF\nPTP {A1 N}\nN=5", [8]),  # on the way that does not set it
     ],
 )
 def test_a_variable_that_decides_motions_and_keeps_its_value_to_the_next_start_is_no_pass(tmp_path, data, body, lines):
@@ -262,6 +274,71 @@ def test_a_module_variable_of_rapid_keeps_its_value_to_the_next_cycle(tmp_path):
     assert codes(found)["kept_to_next_start"] == [8]
     local = rapid("n:=0;\nMoveL Offs(p,n*30,0,0),v100,fine,tool0;\nn:=n+1;", "VAR num n:=0;")
     assert "kept_to_next_start" not in codes(check(tmp_path, local, "a.mod"))
+
+
+@pytest.mark.parametrize(("kind", "lines"), [("PERS", [9]), ("VAR", [])])
+def test_of_an_endless_program_of_rapid_data_that_persist_keep_their_value_to_the_next_start(tmp_path, kind, lines):
+    """A VAR has its first value again where the program pointer is set to main."""
+    body = "MoveL Offs(p,n*30,0,0),v100,fine,tool0;\nWHILE TRUE DO\nn:=1;\nMoveL p,v100,fine,tool0;\nENDWHILE"
+    found = check(tmp_path, rapid(body, f"{kind} num n:=0;"), "a.mod")
+    assert codes(found).get("kept_to_next_start", []) == lines
+
+
+LATER = "GLOBAL DEF work( )\n{wait}PTP {{A1 30}}\nEND\n"
+BUSY = "WHILE GO==FALSE\nWAIT SEC 0.1\nENDWHILE\n"
+
+
+@pytest.mark.parametrize("inside", [False, True])
+def test_a_loop_that_only_another_task_ends_is_told_and_what_comes_behind_it_is_checked(tmp_path, inside):
+    (tmp_path / "work.src").write_text(LATER.format(wait=BUSY if inside else ""))
+    body = "PTP {A1 5}\n" + ("" if inside else BUSY) + "work( )"
+    found = with_data(tmp_path, body, "DECL GLOBAL BOOL GO=FALSE")
+    waits = [each for each in found.findings if each.finding.code == "waits_for_others"]
+    assert [(each.level, each.place.file.name) for each in waits] == [("caution", "work.src" if inside else "a.src")]
+    assert [each.what for each in found.not_examined] == ["course"]
+    assert [(each.place.file.name, each.times) for each in found.verdicts] == [("a.src", 1), ("work.src", 1)]
+
+
+@pytest.mark.parametrize("body", ["LOOP\nWAIT SEC 1\nENDLOOP", "WHILE GO==FALSE\nWAIT SEC 1\nENDWHILE"])
+def test_a_loop_without_a_motion_that_nothing_comes_behind_waits_for_none(tmp_path, body):
+    found = with_data(tmp_path, f"PTP {{A1 5}}\n{body}", "DECL GLOBAL BOOL GO=FALSE")
+    assert "waits_for_others" not in codes(found)
+
+
+def test_a_variable_that_is_unknown_as_a_whole_has_no_known_part(tmp_path):
+    found = with_data(tmp_path, "XP.A1=50\nXP=YP\nPTP {A1 XP.A1}", "INT N=0")
+    assert codes(found)["target_not_given"] == [9]
+
+
+def test_the_same_joint_move_bends_within_a_spline_alone(tmp_path):
+    body = "SPTP {A1 10}\nPTP {A1 0}\nPTP_SPLINE\nSPTP {A1 10}\nENDSPLINE"
+    assert codes(with_data(tmp_path, body, "INT N=0"))["spline_as_line"] == [10]
+
+
+def test_a_call_of_what_moves_that_no_way_leads_to_is_named_where_its_file_is_another(tmp_path):
+    (tmp_path / "work.src").write_text(LATER.format(wait=""))
+    found = with_data(tmp_path, "PTP {A1 5}\nIF GO THEN\nwork( )\nENDIF", "DECL GLOBAL BOOL GO=FALSE")
+    assert codes(found)["never_reached"] == [9]
+
+
+@pytest.mark.parametrize("given", ["v", "q{1}"])
+def test_what_a_routine_gives_back_by_a_parameter_goes_on_on_both_ways(tmp_path, given):
+    routine = "PROC choose(INOUT num x)\nIF di1=1 THEN\nx:=10;\nELSE\nx:=20;\nENDIF\nENDPROC"
+    turn = f"MoveAbsJ [[{given},-10,-10,0,-70,0],{NONE}],v50,fine,tool0;"
+    text = rapid(f"choose {given};\n{turn}", "VAR num v;\nVAR num q{1};", routine)
+    turns = [np.degrees(each.target.joints[0]) for each in motions(tmp_path, text, "a.mod")[1:]]
+    assert sorted(turns) == [pytest.approx(10), pytest.approx(20)]
+
+
+@pytest.mark.parametrize(
+    ("asked", "sides"),
+    [("a=[2,0,0]", 2), ("a<>[2,0,0]", 2), ("a=[2,1,0]", 1), ("b=[2,0,0]", 1), ("c=[0.3,0,0]", 2)],
+)
+def test_values_with_an_unknown_part_are_equal_or_not(tmp_path, asked, sides):
+    """But for those that another part tells apart. 0.1 + 0.2 is 0.3 or not, by the controller's rounding."""
+    data = "VAR pos a;\nVAR pos b:=[2,0,0];\nVAR pos c;"
+    body = f"a.x:=ai1;\nc.x:=0.1+0.2;\nIF {asked} THEN\n{at_turn(20)}ELSE\n{at_turn(30)}ENDIF"
+    assert len(motions(tmp_path, rapid(body, data), "a.mod")) == 1 + sides
 
 
 def at_turn(degrees: float) -> str:
@@ -405,6 +482,33 @@ def test_a_zone_by_percent_whose_percent_is_not_set_has_no_known_size(tmp_path):
     assert "zone_without_size" not in codes(check(tmp_path, krl(f"{FRAMES}{SPEEDS}$APO.CPTP=30\n{body}"), "a.src"))
 
 
+@pytest.mark.parametrize(
+    ("data", "zone"),
+    [
+        ("PDAT_ACT={VEL 10,ACC 10,APO_DIST 5,APO_MODE #CDIS}\nBAS(#PTP_DAT)", ("share", 0.4)),
+        ("LDAT_ACT={VEL 0.1,ACC 10,APO_DIST 5}\nBAS(#CP_DAT)", ("share", 0.4)),
+        ("PDAT_ACT={VEL 10,ACC 10,APO_DIST 5}\nBAS(#PTP_DAT)", ("share", 0.05)),
+    ],
+)
+def test_a_distance_of_motion_data_leaves_the_percent_of_joint_moves(tmp_path, data, zone):
+    moved = motions(tmp_path, krl(f"$APO.CPTP=40\n{data}\nPTP {axes(NEAR)} C_PTP"), "a.src")[-1]
+    assert moved.zone.kind == zone[0]
+    assert moved.zone.value == pytest.approx(zone[1])
+
+
+def test_a_speed_of_bas_is_not_bounded_by_the_one_of_initmov(tmp_path):
+    """Some controllers' own bas.src do that, others don't."""
+    (tmp_path / "$config.dat").write_text("DEFDAT $CONFIG\nREAL DEF_VEL_CP=2.0\nENDDAT\n")
+    moved = motions(tmp_path, krl(f"BAS(#VEL_CP,3)\n{FRAMES}LIN {POSE % 0}"), "a.src")[-1]
+    assert moved.speed.value == 3.0
+
+
+def test_data_of_lines_that_leave_out_how_arcs_turn_mean_the_controllers_way(tmp_path):
+    data = "DEF_CIRC_TYP=#PATH\nDECL LDAT LDAT_ACT={VEL 0.1,ACC 10,APO_DIST 5,ORI_TYP #VAR}"
+    arc = f"LIN {POSE % 0}\nCIRC {{X 390,Y 20,Z 300}},{{X 400,Y 40,Z 300}}"
+    assert "turn_not_followed" in codes(with_data(tmp_path, f"BAS(#CP_DAT)\n{arc}", data))
+
+
 def test_a_load_of_which_a_part_is_given_is_a_caution(tmp_path):
     found = check(tmp_path, krl(f"{FRAMES}{SPEEDS}$LOAD.M=2\nPTP {axes(NEAR)}"), "a.src")
     assert [(each.finding.code, each.level) for each in found.findings] == [("load_not_examined", "caution")]
@@ -494,6 +598,33 @@ def test_an_output_that_is_set_under_another_name_is_not_taken_as_it_was(tmp_pat
     assert sorted(set(np.round(joints(tmp_path, GIVEN_OUT + setting + ASK_OUT), 6))) == ways
 
 
+@pytest.mark.parametrize("called", [True, False])
+def test_a_signal_that_a_module_declares_for_all_is_an_output(tmp_path, called):
+    (tmp_path / "io.dat").write_text("DEFDAT IO PUBLIC\nGLOBAL SIGNAL GRIP $OUT[8]\nENDDAT\n")
+    (tmp_path / "io.src").write_text("DEF io( )\nEND\n")
+    call = "io( )\n" if called else ""
+    assert joints(tmp_path, f"{call}{GIVEN_OUT}GRIP=TRUE{ASK_OUT}") == [5.0]
+
+
+@pytest.mark.parametrize(("signal", "way"), [("$OUT[8]", [5.0]), ("$OUT[5] TO $OUT[8]", [5.0, 9.0])])
+def test_a_routine_that_gets_a_signal_sets_the_output(tmp_path, signal, way):
+    (tmp_path / "a.dat").write_text(f"DEFDAT a\nSIGNAL GRIP {signal}\nENDDAT\n")
+    more = "DEF SETIT(S:OUT)\nBOOL S\nS=TRUE\nEND\n"
+    assert sorted(set(joints(tmp_path, f"{GIVEN_OUT}SETIT(GRIP){ASK_OUT}", more))) == pytest.approx(way)
+
+
+@pytest.mark.parametrize(("head", "way"), [("DEF SETIT(GRIP:IN)\nBOOL GRIP", 9.0), ("DEF SETIT(X:IN)", 5.0)])
+def test_a_parameter_with_the_name_of_a_signal_is_the_parameter(tmp_path, head, way):
+    (tmp_path / "$config.dat").write_text("DEFDAT $CONFIG\nSIGNAL GRIP $OUT[8]\nENDDAT\n")
+    more = f"{head}\nGRIP=TRUE\nEND\n"
+    assert joints(tmp_path, f"{GIVEN_OUT}SETIT(FALSE){ASK_OUT}", more) == [way]
+
+
+def test_a_signal_is_no_point_that_a_data_file_lacks(tmp_path):
+    (tmp_path / "$config.dat").write_text("DEFDAT $CONFIG\nSIGNAL GRIP $OUT[8]\nENDDAT\n")
+    assert "program_data_file_missing" not in codes(check(tmp_path, krl("IF GRIP THEN\nENDIF"), "a.src"))
+
+
 def test_a_signal_of_the_controller_is_known_to_the_modules_that_a_program_calls(tmp_path):
     (tmp_path / "$config.dat").write_text("DEFDAT $CONFIG\nSIGNAL ONE $OUT[8]\nENDDAT\n")
     (tmp_path / "sets.src").write_text("DEF sets( )\nONE=TRUE\nEND\n")
@@ -538,6 +669,7 @@ SETTERS = {
     "when interrupted": "INTERRUPT DECL 4 WHEN $IN[1] DO GZ=4",
     "by an interrupt's routine": "INTERRUPT DECL 4 WHEN $IN[1] DO SETIT(GZ)",
     "by what is not understood": "SETALL TO GZ",
+    "by a command": 'CWRITE($CMD,STATE,MODE,"=GZ 30")',
 }
 KEEPERS = ("OTHER=GZ", "LOOKAT(GZ)", "LOOKZ(GZ)", 'EKI_SETREAL("X","Y",GZ)', "IF GZ==1 THEN\nENDIF")
 OWN_ROUTINES = (
@@ -607,6 +739,29 @@ def test_a_routine_that_nobody_calls_counts_where_other_modules_see_it(tmp_path,
     assert ("set_elsewhere" in found) == told
 
 
+@pytest.mark.parametrize(("name", "code"), [("sps.sub", "target_not_given"), ("other.src", "set_elsewhere")])
+def test_what_a_called_module_declares_for_all_may_be_set_by_others(tmp_path, name, code):
+    (tmp_path / "lib.dat").write_text(CONFIG.replace("$CONFIG", "LIB"))
+    (tmp_path / "lib.src").write_text("DEF lib( )\nEND\n")
+    (tmp_path / name).write_text(f"DEF {name[:-4]}( )\nGZ=30.0\nEND\n")
+    assert code in codes(check(tmp_path, krl("lib( )\nPTP {A1 GZ}"), "a.src"))
+
+
+@pytest.mark.parametrize("frames", [{}, {"BASE_DATA[3]": np.eye(4)}])
+@pytest.mark.parametrize("own", ["", "BASE_DATA[5]=$NULLFRAME\n"])
+def test_a_base_that_a_submit_program_sets_is_not_known(tmp_path, own, frames):
+    (tmp_path / "$config.dat").write_text("DEFDAT $CONFIG\nBASE_DATA[3]={X 0,Y 0,Z 0,A 0,B 0,C 0}\nENDDAT\n")
+    (tmp_path / "sps.sub").write_text("DEF SPS( )\nBASE_DATA[3].Y=$ANIN[1]\nEND\n")
+    body = f"{FRAMES}{SPEEDS}{own}$BASE=BASE_DATA[3]\nLIN {POSE % 0}"
+    assert "frame_not_given" in codes(check(tmp_path, krl(body), "a.src", frames=frames))
+
+
+def test_the_programs_number_is_not_known_after_p00(tmp_path):
+    (tmp_path / "$config.dat").write_text("DEFDAT $CONFIG\nINT PGNO=0\nENDDAT\n")
+    body = "P00(#EXT_PGNO,#PGNO_GET,DMY[],0)\nSWITCH PGNO\nCASE 1\nPTP {A1 5}\nDEFAULT\nPTP {A1 9}\nENDSWITCH"
+    assert sorted(joints(tmp_path, body)) == pytest.approx([5.0, 9.0])
+
+
 @pytest.mark.parametrize("line", ["$OUT[7]=$IN[3]", "PULSE($OUT[7],TRUE,0.5)", "USERPLC( )"])
 def test_what_a_submit_program_makes_of_outputs_is_not_known(tmp_path, line):
     (tmp_path / "sps.sub").write_text(f"DEF SPS( )\nLOOP\n{line}\nENDLOOP\nEND\n")
@@ -669,7 +824,74 @@ def test_commands_and_loads_on_the_arm_are_no_pass(tmp_path, line):
     assert any(each.level == "caution" and each.place.line == 2 for each in found.findings)
 
 
-@pytest.mark.parametrize("kind", ["", "FRAME "])
+@pytest.mark.parametrize(
+    ("before", "ask", "ways"),
+    [
+        ("ON_ERROR_PROCEED\nR=STRTOINT(S[],N)", "$ERR.NUMBER==0", [5.0, 9.0]),
+        ("", "$ERR.NUMBER==0", [5.0]),
+        ("PTP {A1 20}", "$AXIS_ACT.A1>=20", [5.0, 9.0]),
+        ("PTP {A1 20}", "$AXIS_ACT.A1>=19.9", [5.0]),
+        ("$SOFT_PLCBOOL[1]=FALSE", "$SOFT_PLCBOOL[1]", [5.0, 9.0]),
+        ("STOP=1", "STOP==1", [5.0]),
+    ],
+)
+def test_what_the_controller_may_have_otherwise_does_not_decide(tmp_path, before, ask, ways):
+    body = f"PTP {axes(HOME)}\n{before}\nIF {ask} THEN\nPTP {{A1 5}}\nELSE\nPTP {{A1 9}}\nENDIF"
+    assert sorted({*np.round(joints(tmp_path, body), 6)} & {5.0, 9.0}) == ways
+
+
+def test_bas_asks_for_an_error_that_is_none(tmp_path):
+    asking = "ON_ERROR_PROCEED\nR=N\nIF $ERR.NUMBER==0 THEN\nPTP {A1 5}\nELSE\nPTP {A1 9}\nENDIF"
+    (tmp_path / "bas.src").write_text(f"DEF BAS(WHAT:IN,N:IN)\n{asking}\nEND\n")
+    assert joints(tmp_path, "ON_ERROR_PROCEED\nBAS(#INITMOV,0)") == [5.0]
+
+
+@pytest.mark.parametrize(
+    ("lines", "told"),
+    [
+        ("$IPO_MODE=UNKNOWN", "target_not_given"),
+        ("$VEL=UNKNOWN", "speed_not_given"),
+        ("$ACC=UNKNOWN", "acceleration_not_known"),
+        ("$APO=UNKNOWN", "zone_without_size"),
+        ("BAS(#FRAMES)", "frame_not_given"),
+        ("LDAT_ACT=UNKNOWN\nBAS(#CP_DAT)", "turn_not_followed"),
+        ("LDAT_ACT={VEL 0.1,ACC 10,APO_DIST UNKNOWN,ORI_TYP #VAR}\nBAS(#CP_DAT)", "zone_without_size"),
+        ('RET=EKI_GETFRAME("A","B",$BASE)', "frame_not_given"),
+    ],
+)
+def test_a_setting_of_unknown_value_is_not_the_one_before(tmp_path, lines, told):
+    line = f"LIN {POSE % 0} C_DIS\nLIN {POSE % 5}"
+    for before, found in (("", False), (lines, True)):
+        text = krl(f"{FRAMES}{SPEEDS}$IPO_MODE=#BASE\n$APO.CDIS=1\n$ORI_TYPE=#VAR\n{before}\n{line}")
+        assert (told in codes(check(tmp_path, text, "a.src"))) == found
+
+
+@pytest.mark.parametrize(
+    ("setting", "following", "told"),
+    [
+        ("$APO={CDIS 5,CORI 5}", f"LIN {POSE % 0} C_ORI\nLIN {POSE % 5}", "zone_without_size"),
+        ("$ACC_AXIS[1]=SACC_JOINT(UNKNOWN)", "", "acceleration_not_known"),
+        ("$LOAD=SLOAD(3)", "", "load_not_examined"),
+    ],
+)
+def test_what_stands_after_with_counts_and_for_its_motion_alone(tmp_path, setting, following, told):
+    load = "LOAD_DATA[3]={M 2,CM {X 0,Y 0,Z 0,A 0,B 0,C 0},J {X 0,Y 0,Z 0}}"
+    found = with_data(tmp_path, f"SPTP {axes(NEAR)} WITH {setting}\n{following}", load)
+    assert told in codes(found)
+
+
+@pytest.mark.parametrize("target", ["{X 400,Y 0,Z 300,A 0,B 180,C 0,Q 5}", "{A1 5,A7 90}"])
+def test_a_position_with_fields_that_none_has_is_none(tmp_path, target):
+    assert "target_not_given" in codes(check(tmp_path, krl(f"{FRAMES}{SPEEDS}PTP {target}"), "a.src"))
+
+
+@pytest.mark.parametrize(("coordinate", "named"), [("270.0", True), ("0.0", False), ("-1.5E2", True)])
+def test_a_part_of_where_the_machine_data_put_the_robot_counts_too(tmp_path, coordinate, named):
+    (tmp_path / "$machine.dat").write_text(f"DEFDAT $MACHINE\nFRAME $ROBROOT\n$ROBROOT.Z={coordinate} ;mm\nENDDAT\n")
+    assert ("program_not_simulated" in codes(check(tmp_path, krl("PTP {A1 5}"), "a.src"))) == named
+
+
+@pytest.mark.parametrize("kind", ["", "FRAME ", "DECL FRAME "])
 @pytest.mark.parametrize(("root", "named"), [("Z 270,A 0", True), ("Z 0,A 180", True), ("Z 0,A 0", False)])
 def test_a_robot_that_its_machine_data_put_elsewhere_is_no_pass(tmp_path, kind, root, named):
     program = tmp_path / "KRC/R1/Program"
@@ -766,6 +988,21 @@ def test_modules_anywhere_in_an_archive_are_read(tmp_path, folder):
     (place / "user_grp.src").write_text("GLOBAL DEF USER_GRP(N:IN)\nINT N\nPTP {A1 N}\nEND\n")
     (place / "own.src").write_text("DEF own( )\nPTP {A1 9}\nEND\n")
     assert joints(program, "USER_GRP(5)\nown( )") == [5.0, 9.0]
+
+
+@pytest.mark.parametrize(("folder", "read"), [("Program/lib", True), ("System", False), ("TP/Sync", False)])
+def test_a_users_module_of_the_name_of_a_controllers_own_is_read(tmp_path, folder, read):
+    for each in ("Program/x", "System", folder):
+        (tmp_path / each).mkdir(parents=True, exist_ok=True)
+    (tmp_path / folder / "sync.src").write_text("DEF SYNC( )\nPTP {A1 9}\nEND\n")
+    assert joints(tmp_path / "Program/x", "SYNC( )\nPTP {A1 5}") == ([9.0, 5.0] if read else [5.0])
+
+
+def test_an_archive_is_known_however_its_letters_are_written(tmp_path):
+    for each in ("PROGRAM/x", "PROGRAM/y", "SYSTEM"):
+        (tmp_path / each).mkdir(parents=True)
+    (tmp_path / "PROGRAM/y/own.src").write_text("DEF own( )\nPTP {A1 9}\nEND\n")
+    assert joints(tmp_path / "PROGRAM/x", "own( )") == [9.0]
 
 
 def test_a_folder_that_is_no_archive_is_not_searched(tmp_path):

@@ -47,7 +47,9 @@ def test_each_module_has_its_own_points_and_routines(cell):
     assert [run.own_line(step) for step in steps] == [3, 5, 5, 5, 5, 5, 5, 7, 11]
 
 
-def test_files_are_those_that_it_calls(cell):
+def test_files_are_those_that_it_calls_and_those_that_may_set_what_all_know(cell):
+    assert {file.name for file in files_of(cell)} == FILES.keys()
+    cell.with_name("Pick.dat").write_text(FILES["Pick.dat"].replace("GLOBAL ", ""))
     assert {file.name for file in files_of(cell)} == FILES.keys() - {"other.src"}
 
 
@@ -100,6 +102,54 @@ def test_what_another_modules_data_declare_for_all_is_known(cell, public):
     cell.with_name("setter.src").write_text("DEF SETTER( )\nSPREAD.A1=50\nEND\n")
     check = check_program(read_program(alone), load_robot("er3a_c60"), CheckOptions(start=np.zeros(6), measures=False))
     assert ("set_elsewhere" in {each.finding.code for each in check.findings}) == public
+
+
+LIST = "DEFDAT %s PUBLIC\nDECL GLOBAL AXIS L[2]\nL[1]={A1 3,A2 0,A3 0,A4 0,A5 20,A6 0}\nENDDAT\n"
+
+
+def where_joint_1_goes(path: Path) -> list[float]:
+    steps = execute(read_program(path), load_robot("er3a_c60"), np.zeros(6)).steps
+    return [
+        float(np.degrees(step.instruction.target.joints[0]))
+        for step in steps
+        if isinstance(step.instruction, ArmMotion)
+    ]
+
+
+@pytest.mark.parametrize("called", [True, False])
+def test_elements_of_a_list_that_another_module_declares_for_all_are_known(cell, called):
+    cell.with_name("lists.dat").write_text(LIST % "LISTS")
+    cell.with_name("lists.src").write_text("DEF LISTS( )\nEND\n")
+    cell.write_text(f"DEF CELL( )\n{'LISTS( )' * called}\nPTP L[1]\nEND\n")
+    assert where_joint_1_goes(cell) == pytest.approx([3])
+
+
+def test_an_element_of_a_programs_own_list_that_all_know_is_set_by_what_it_calls(cell):
+    cell.with_suffix(".dat").write_text(LIST % "CELL")
+    cell.with_name("lists.src").write_text("DEF LISTS( )\nL[1].A1=40\nEND\n")
+    cell.write_text("DEF CELL( )\nLISTS( )\nPTP L[1]\nEND\n")
+    assert where_joint_1_goes(cell) == pytest.approx([40])
+
+
+@pytest.mark.parametrize(
+    ("line", "code"),
+    [
+        ("DECL INT N=5\nDECL INT N=6", "program_name_twice"),
+        (";a\rN=6", "program_not_understood"),
+        ("N = = 6", "program_not_understood"),
+    ],
+)
+def test_what_is_wrong_in_the_controllers_data_is_told(cell, line, code):
+    cell.with_name("$config.dat").write_text(f"DEFDAT $CONFIG\n{line}\nENDDAT\n")
+    told = [(each.code, each.place.file.name) for each in read_program(cell).findings if hasattr(each, "place")]
+    assert (code, "$config.dat") in told
+
+
+@pytest.mark.parametrize(("kind", "told"), [("REAL", True), ("INT", False)])
+def test_a_structure_that_two_modules_declare_otherwise_is_told(cell, kind, told):
+    cell.with_suffix(".dat").write_text(f"{FILES['cell.dat'][:-7]}STRUC PART {kind} N\nENDDAT\n")
+    cell.with_name("Pick.dat").write_text(f"{FILES['Pick.dat'][:-7]}STRUC PART INT N\nENDDAT\n")
+    assert ("program_name_twice" in [each.code for each in read_program(cell).findings]) == told
 
 
 def test_a_name_that_two_data_files_declare_for_all_is_told(cell):

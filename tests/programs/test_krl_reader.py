@@ -296,6 +296,25 @@ def test_the_zone_of_a_joint_spline_is_that_of_its_data(tmp_path):
     assert (line.zone.kind, line.zone.value) == ("distance", 0.05)
 
 
+@pytest.mark.parametrize(("line", "named"), [("KLIN XP1", True), ("INT XP1", False), ("DECL PART XP1", False)])
+def test_two_names_among_instructions_are_a_declaration_only_by_a_known_type(tmp_path, line, named):
+    execution = run(tmp_path, f"PTP {{A1 5}}\n{line}\nPTP {{A1 6}}")
+    found = [each.instruction for each in execution.steps if isinstance(each.instruction, Unknown)]
+    assert [each.may_move for each in found] == [True] * named
+
+
+def test_what_a_switch_asks_is_worked_out_once(tmp_path):
+    more = "DEFFCT INT NEXT( )\nN=N+1\nRETURN N\nENDFCT\n"
+    body = "SWITCH NEXT( )\nCASE 2\nPTP {A1 2}\nCASE 1\nPTP {A1 1}\nENDSWITCH\nPTP {A1 N}"
+    found = moves(run(tmp_path, body, data="DEFDAT a\nINT N=0\nENDDAT\n", more=more))
+    assert [round(float(np.degrees(each.target.joints[0]))) for each in found] == [1, 1]
+
+
+def test_a_case_whose_values_can_not_be_read_is_an_error(tmp_path):
+    with pytest.raises(InputError, match="CASE"):
+        run(tmp_path, "SWITCH N\nCASE 1 2\nENDSWITCH")
+
+
 @pytest.mark.parametrize(
     "line",
     ["中文", "LIN {X 1} 中", "PTP é {A1 1}", "X=1 µ", "'", "°", "\\", "LIN {X 1,}", "PTP {A1 1,A1 2}", "LIN {X a,X b}"],

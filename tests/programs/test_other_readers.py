@@ -194,6 +194,11 @@ def test_statements_outside_of_a_routine_are_the_program(tmp_path):
     assert [[place.line for place in step.calls] for step in execution.steps] == [[4], [5]]
 
 
+def test_a_table_without_rows_moves_nothing(tmp_path):
+    (tmp_path / "a.csv").write_text("q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n")
+    assert [each.code for each in read_program(tmp_path / "a.csv").findings] == ["program_nothing_moves"]
+
+
 def test_a_table_over_time_is_written_and_read(tmp_path):
     rng = np.random.default_rng(6)
     joints = rng.uniform(ROBOT.lower, ROBOT.upper, (20, 6))
@@ -251,6 +256,8 @@ def test_where_the_tool_is_after_a_pose_is_that_pose(tmp_path, read):
         "p = [0.1, 0.0]\nmovej([p[0],0,0,0,0,0])\np[1] = 0.2\nmovej([p[1],0,0,0,0,0])",
         "if True: movej([0.1,0,0,0,0,0]) end\nenter_critical movej([0.2,0,0,0,0,0])\nexit_critical",
         "def f(x): movej([x,0,0,0,0,0]) end\nf(0.1) f(0.2)",
+        "if True:\n movej([0.1,0,0,0,0,0]);\nend;\nmovej([0.2,0,0,0,0,0])",
+        "if True:\n movej([0.1,0,0,0,0,0])\nend: movej([0.2,0,0,0,0,0])",
     ],
 )
 def test_statements_of_one_line_matrices_and_a_variable_p(tmp_path, text):

@@ -314,6 +314,7 @@ def test_accelerations(case, tmp_path):
 STANDING = {  # what comes before a position is read, and whether the arm stands at p then
     "stop_point": ("MoveL p,@;", True),
     "zone": ("MoveL p,v100,z50,tool0;", False),
+    "zone_of_no_size": ("MoveL p,v100,z0\\Z:=0,tool0;", False),
     "zone_and_time": ("MoveL p,v100,z50,tool0; WaitTime 1;", False),
     "zone_and_arrival": ("MoveL p,v100,z50,tool0; WaitRob\\InPos;", True),
     "zone_and_time_behind_arrival": ("MoveL p,v100,z50,tool0; WaitTime\\InPos,0;", True),

@@ -9,6 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from er3a.files.robot_library import load_robot
+from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.planning.commands import (
     JointSequenceCommand,
@@ -27,11 +28,14 @@ from er3a.programs.languages import read_program, write_program
 from er3a.programs.machine import execute
 from er3a.programs.program_findings import (
     ArcsSplit,
+    ExternalAxesDropped,
     HalfTurnsSplit,
     NotTranslated,
+    OneSideWritten,
     SpeedsCut,
     SpeedsEstimated,
     SpeedsOfAssumed,
+    SpeedsRaised,
     TargetsLeftOut,
     ToolNotGiven,
     ValuesRounded,
@@ -220,18 +224,57 @@ def test_joint_tables_become_joint_moves():
     assert sum(each.speed.value for each in listing.motions[1:]) == pytest.approx(4.0)
 
 
-def test_a_turn_by_180_deg_is_written_in_two_halves_of_the_sense_that_is_asked():
+@pytest.mark.parametrize("kind", ["line", "arc", "table"])
+@pytest.mark.parametrize("roll", [0.0, np.pi])
+@pytest.mark.parametrize(("axis", "sense"), [(None, 1), (np.array([0.0, 0.0, -1.0]), -1)])
+def test_a_turn_by_180_deg_is_written_in_two_halves_of_the_sense_that_is_asked(kind, roll, axis, sense):
+    """Also of an arm that hangs from a ceiling, whose own base is the other way up than the path's frame."""
+    q, robot = np.radians([0.0, -20.0, 15.0, 0.0, -60.0, 0.0]), ROBOT.replace(base=transform(np.zeros(3), [roll, 0, 0]))
+    T = forward(robot, q)
+    end = T.copy()
+    end[:3, :3] = Rotation.from_rotvec([0, 0, np.pi]).as_matrix() @ T[:3, :3]
+    end[:3, 3] += [0.0, 0.04, 0.0]
+    via = T[:3, 3] + [0.02, 0.02, 0.0] if kind == "arc" else None
+    command = ToolSequenceCommand(Start(joints=q), (SegmentCommand(end, via, axis),), 2.0)
+    if kind == "table":
+        command = ToolTableCommand(np.array([T, end]), ("a", "b"), 2.0, half_turn_axis=axis)
+    path = listing_of(command, robot, q)
+    assert path.findings == (HalfTurnsSplit(1),)
+    half, rest = path.listing.motions[1:]
+    middle = robot.base @ half.target.pose
+    turn = Rotation.from_matrix(middle[:3, :3] @ T[:3, :3].T).as_rotvec()
+    np.testing.assert_allclose(turn, [0, 0, sense * np.pi / 2], atol=1e-9)
+    np.testing.assert_allclose(robot.base @ rest.target.pose, end, atol=1e-12)
+    assert (half.speed.value, rest.speed.value) == (1.0, 1.0)
+    for point in [half.target, half.via, rest.via] if kind == "arc" else []:
+        place = (robot.base @ point.pose)[:3, 3]
+        np.testing.assert_allclose(np.linalg.norm(place - T[:3, 3] - [0, 0.02, 0]), 0.02, atol=1e-12)
+
+
+@pytest.mark.parametrize(("axis", "sense"), [(None, 1), (np.array([0.0, 0.0, -1.0]), -1)])
+def test_so_is_one_of_an_arc_or_of_a_table(axis, sense):
     q = np.radians([0.0, -20.0, 15.0, 0.0, -60.0, 0.0])
     T = forward(ROBOT, q)
     end = T.copy()
     end[:3, :3] = Rotation.from_rotvec([0, 0, np.pi]).as_matrix() @ T[:3, :3]
-    for axis, sense in ((None, 1), (np.array([0.0, 0.0, -1.0]), -1)):
-        part = SegmentCommand(end, half_turn_axis=axis)
-        path = listing_of(ToolSequenceCommand(Start(joints=q), (part,), 2.0), ROBOT, q)
+    end[:3, 3] += [0.0, 0.06, 0.0]
+    arc = SegmentCommand(end, T[:3, 3] + [0.03, 0.03, 0.0], axis)
+    table = ToolTableCommand(np.stack([T, end]), ("row 2", "row 3"), 2.0, half_turn_axis=axis)
+    for command, points in (
+        (ToolSequenceCommand(Start(joints=q), (arc,), 2.0), [[0.03, 0.03, 0]]),
+        (table, [[0, 0.03, 0]]),
+    ):
+        path = listing_of(command, ROBOT, q)
         assert path.findings == (HalfTurnsSplit(1),)
-        middle = path.listing.motions[1].target.pose
-        turn = Rotation.from_matrix(middle[:3, :3] @ T[:3, :3].T).as_rotvec()
+        _, first, second = path.listing.motions
+        turn = Rotation.from_matrix(first.target.pose[:3, :3] @ T[:3, :3].T).as_rotvec()
         np.testing.assert_allclose(turn, [0, 0, sense * np.pi / 2], atol=1e-9)
+        np.testing.assert_allclose(first.target.pose[:3, 3] - T[:3, 3], points[0], atol=1e-9)
+        np.testing.assert_array_equal(second.target.pose, end)
+        assert (first.speed.value, second.speed.value) == (1.0, 1.0)
+        if first.via is not None:
+            spoke = 0.03 * np.sqrt(0.5)
+            np.testing.assert_allclose(first.via.pose[:3, 3] - T[:3, 3], [spoke, 0.03 - spoke, 0], atol=1e-9)
 
 
 def test_what_a_language_has_no_equal_for_is_said_in_the_head():
@@ -254,9 +297,25 @@ def test_what_a_language_has_no_equal_for_is_said_in_the_head():
         assert words in head
     rpl = write_program(Listing("mixed", moves[1:2]), "rpl", WriteOptions(ROBOT, start=a))
     assert {type(each) for each in rpl.findings} == {SpeedsEstimated, SpeedsOfAssumed, ValuesRounded}
+    slow = write_program(Listing("slow", (replace(moves[1], speed=Rate(9000.0, "s")),)), "rpl", WriteOptions(ROBOT, a))
+    assert {type(each) for each in slow.findings} == {SpeedsEstimated, SpeedsOfAssumed, SpeedsRaised}
+    assert "FASTER than what was checked" in slow.files[".pgm"]
     narrow = ArmMotion("joint", JointTarget(a), speed=Rate(0.5, "share"), zone=Zone("distance", 0.0))
     rapid = write_program(Listing("narrow", (narrow,)), "rapid", WriteOptions(ROBOT))
     assert (rapid.findings, ",vmax,fine," in rapid.files[".mod"]) == ((ZonesDropped(1),), True)
+
+
+def test_branches_and_external_axes_that_are_left_out_are_said_in_the_head(tmp_path):
+    text = (
+        "DEF a( )\nPTP {E6AXIS: A1 5,A2 -10,A3 -10,A4 0,A5 -70,A6 0,E1 100}\nIF $IN[1] THEN\nPTP {A1 9}\nENDIF\nEND\n"
+    )
+    (tmp_path / "a.src").write_text(text)
+    listing = execute(read_program(tmp_path / "a.src"), ROBOT).listing()
+    written = write_program(listing, "urscript", WriteOptions(ROBOT))
+    assert {OneSideWritten(1), ExternalAxesDropped(1)} <= set(written.findings)
+    head = written.files[".script"].split("movej")[0]
+    assert "1 branch(es) of which one side alone" in head
+    assert "without their external axes" in head
 
 
 def test_only_an_assumed_speed_that_decides_is_named():

@@ -19,6 +19,7 @@ from er3a.files.yaml_file import parse
 from er3a.formats.urdf import export_urdf, import_urdf
 from er3a.geometry.transforms import rot_x, rot_y, rot_z, translation
 from er3a.pipeline.cli import app
+from er3a.robots.robot import Envelope
 
 # A UR3's, as its owner published it (MyRobotLab/pyrobotlab, issue 145).
 CONF = """\
@@ -78,10 +79,12 @@ def test_a_controllers_own_file_is_the_same_arm_with_small_numbers(tmp_path, ran
     assert_is(found, published(), random, 1e-12)
     np.testing.assert_allclose(found.a, A / 1000, atol=1e-3)
     assert found.beta.any()
-    write_robot(nominal(), tmp_path / "ur3.yaml")
+    shaped = nominal().replace(envelopes=(Envelope(1, (0.0, 0.0, 0.0), (0.0, 0.0, 0.1), 0.05),))
+    write_robot(shaped, tmp_path / "ur3.yaml")
     words = ["import-calibration", str(path), "--robot", str(tmp_path / "ur3.yaml")]
     done = CliRunner().invoke(app, [*words, "--output", str(tmp_path / "mine.yaml")])
     assert done.exit_code == 0, done.output
+    assert "without shapes, masses and references" in done.stderr
     assert_is(load_robot(tmp_path / "mine.yaml"), published(), random, 1e-12)
     compared = er3a.compare(found, load_robot(tmp_path / "mine.yaml"))
     assert compared.geometry.same

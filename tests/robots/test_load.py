@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 import yaml
 
-from er3a.errors import InputError, InputWarning, ShapeError
+from er3a.errors import DoubtfulUnit, InputError, InputWarning, ShapeError
+from er3a.files.robot_file import Envelopes
 from er3a.files.robot_library import ROBOTS, load_robot
+from er3a.files.yaml_file import parse
 from er3a.robots.robot import GRADES
 from testing.arms import make_arm, placement
 
@@ -334,6 +336,13 @@ def test_numbers_may_be_written_in_the_usual_ways(write, text):
 def test_a_robot_can_t_be_a_missing_file(tmp_path):
     error = refusal(tmp_path / "arm.yaml")
     assert error.problem == "there is no such file"
+
+
+@pytest.mark.parametrize(("key", "value"), [("xyz_mm", [0, 0, 0.12]), ("rpy_deg", [1.5708, 0, 0])])
+def test_the_placement_of_a_links_mesh_is_doubted_as_any_other(key, value):
+    mesh = {"link": 1, "pieces": "link.json", key: value}
+    with pytest.warns(DoubtfulUnit, match=rf"meshes\[0\]\.{key}: "):
+        parse(Envelopes, {"source": "x", "grade": "cad", "meshes": [mesh]}, None)
 
 
 @pytest.mark.parametrize(

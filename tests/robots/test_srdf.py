@@ -13,7 +13,7 @@ from er3a.collision.pairs import link_label
 from er3a.files.robot_library import load_robot
 from er3a.files.robot_writer import write_robot
 from er3a.pipeline.cli import app
-from er3a.robots.robot import CombinedLimit
+from er3a.robots.robot import CombinedLimit, Source
 
 
 @pytest.mark.parametrize("name", ["er3a_c60", "er3_600"])
@@ -41,6 +41,22 @@ def test_pairs_left_to_check_are_those_that_are_watched(name, tmp_path):
     assert ("link_2", "link_4") in folds  # the forearm folds onto the upper arm
     for first, second in disabled:
         assert (f"{first} and {second} are disabled" in done.stderr) == ((first, second) in folds)
+
+
+@pytest.mark.parametrize(
+    ("grade", "told"),
+    [("cad", ""), ("inferred", "by shapes that the robot's file assumes"), (None, "by shapes that er3a guesses from")],
+)
+def test_pairs_that_rest_on_assumed_shapes_say_so(grade, told, tmp_path):
+    arm = load_robot("er3_600").replace(name="arm", references=())
+    sources = {**arm.sources, "envelopes": Source("x", grade or "cad")}
+    arm = arm.replace(sources=sources) if grade else arm.replace(envelopes=())
+    write_robot(arm, tmp_path / "arm.yaml")
+    asked = ["export-urdf", str(tmp_path / "arm.yaml"), "--output", str(tmp_path / "arm.urdf")]
+    done = CliRunner().invoke(app, [*asked, "--srdf", str(tmp_path / "arm.srdf")])
+    assert ("pairs are disabled" in done.stderr) == bool(told)
+    assert told in done.stderr
+    assert told in (tmp_path / "arm.srdf").read_text(encoding="utf-8")
 
 
 def test_limits_on_sums_of_joints_are_told_to_be_left_out(tmp_path):

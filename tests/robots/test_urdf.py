@@ -10,6 +10,7 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
+from er3a.collision.shapes import arm_shapes
 from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
 from er3a.files.robot_writer import write_robot
@@ -216,6 +217,17 @@ def test_a_flat_mesh_is_a_shape(tmp_path):
     assert len(piece.points) == 3
     sides = np.linalg.norm(np.diff(np.array(piece.points)[[0, 1, 2, 0]], axis=0), axis=1)
     np.testing.assert_allclose(np.sort(sides), [1, 2, np.sqrt(5)])
+
+
+@pytest.mark.parametrize(("more", "grade"), [("", "export"), ('<mesh filename="lost.stl"/>', "inferred")])
+def test_shapes_of_which_one_could_not_be_read_are_assumed(tmp_path, more, grade):
+    box = '<box size="0.1 0.1 0.1"/>'
+    text = shaped(box).replace("</link>", "") + (shaped(more).partition(">")[2] if more else "</link>")
+    found = import_urdf(written(tmp_path, urdf(extra=text)))
+    source = found.robot.sources["envelopes"]
+    assert source.grade == grade
+    assert ("but for shapes of l6 that could not be read" in source.source) == bool(more)
+    assert arm_shapes(found.robot).assumed or not more
 
 
 @pytest.mark.parametrize(("unit", "side"), [("", 0.12), ('<unit name="mm" meter="0.001"/>', 0.12), ("", 120.0)])

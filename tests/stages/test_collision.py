@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -178,7 +179,7 @@ CAGES = {
     ),
     "home collides": (
         {"spheres": [{"name": "lamp", "radius_mm": 60, "xyz_mm": [374, 0, 700]}]},
-        ("caution", "collision.home_collides"),
+        ("fail", "collision.home_collides"),  # the study's paths meet the lamp, too
     ),
 }
 
@@ -190,6 +191,26 @@ def test_scenes_that_leave_nothing_have_one_verdict(case, tmp_path):
     study = study_with(scene_file(tmp_path, **shapes), samples=1000, rounds=0)
     verdict = compute(study, NAME).summary.verdict
     assert (verdict.status, verdict.finding.code) == expected
+
+
+@pytest.mark.parametrize(
+    ("ends_deg", "status", "told"),
+    [((-20, 20), "fail", r"1 path collides: through \(.*; not expected\)\. "), ((90, 100), "caution", "")],
+)
+def test_a_home_that_collides_hides_no_path_that_does(ends_deg, status, told, tmp_path):
+    content = study_with(scene_file(tmp_path, **CAGES["home collides"][0]), samples=1000, rounds=0).model_dump()
+    start, end = ([q1, 0, 0, 0, 0, 0] for q1 in ends_deg)
+    path = {"name": "through", "title": "A", "kind": "joint", "samples": 20, "duration_s": 2.0}
+    contents = {
+        "paths": {"kind": "paths", "paths": [path | {"start_deg": start, "end_deg": end}]},
+        "targets": {"kind": "targets", "targets": [{"name": "free", "xyz_mm": [0, -450, 310], "rpy_deg": [180, 0, 0]}]},
+    }
+    for part, written in contents.items():
+        (tmp_path / f"{part}.yaml").write_text(json.dumps(written), encoding="utf-8")
+        content["robots"][NAME][part] = str(tmp_path / f"{part}.yaml")
+    verdict = compute(Study.model_validate(content), NAME).summary.verdict
+    assert (verdict.status, verdict.finding.code) == (status, "collision.home_collides")
+    assert re.search(rf"\(free, .*?\)\. {told}In the home pose ", say(verdict.finding))
 
 
 @pytest.mark.long

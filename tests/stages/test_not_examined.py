@@ -481,6 +481,9 @@ def in_doubt(kind: str, content: dict, confirmed: bool) -> dict:
     elif kind == "carried":
         box = {"name": "gripper", "size_mm": [50, 50, 90], "xyz_mm": [0, 0, 50], "rpy_deg": radians}
         content["carried"] = {"boxes": [box]}
+    elif kind == "hulls":
+        points = [[x, y, z] for x in (-0.05, 0.05) for y in (-0.05, 0.05) for z in (0, 0.3)]
+        content["envelopes"]["hulls"] = [{"link": 4, "points_mm": points}]
     elif kind == "targets":
         content["targets"][0] = {"name": "one", "q_deg": [0, -0.52, 0.31, 0, 1.2, 0]}
     elif kind == "paths":
@@ -518,6 +521,7 @@ def in_doubt(kind: str, content: dict, confirmed: bool) -> dict:
         ("targets", "inverse", "targets.yaml: targets[0].q_deg: [0, -0.52, 0.31, 0, 1.2, 0] deg"),
         ("paths", "trajectory", "paths.yaml: paths[0].end_deg: [0, -0.52, 0.31, 0, 1.2, 0] deg"),
         ("robot", "inverse", f"{ROBOT}.yaml: tool.xyz_mm: [0.0, 0.0, 0.3] mm"),
+        ("hulls", "trajectory", f"{ROBOT}.yaml: envelopes.hulls[0].points_mm: 0.3 mm at most"),
         ("masses", "dynamics", f"{ROBOT}.yaml: inertia.links[1].centre_mm: [0.15, 0.0, 0.0] mm"),
         ("masses", "trajectory", ""),
         ("base", "trajectory", f"study.yaml: robots.{ROBOT}.base.xyz_mm: [0.0, 0.0, 0.3] mm"),
@@ -542,9 +546,8 @@ def test_a_number_that_looks_like_another_unit_is_no_pass_where_it_is_read(
         "vision": f"data/vision/{ROBOT}.yaml",
         "study": "config/small.yaml",
     }
-    of = {"carried": "scene", "masses": "robot", "grasp": "vision", "detector": "vision"}.get(
-        kind, kind if kind in sources else "study"
-    )
+    of_files = {"carried": "scene", "masses": "robot", "hulls": "robot", "grasp": "vision", "detector": "vision"}
+    of = of_files.get(kind, kind if kind in sources else "study")
     files = {each: tmp_path / f"{ROBOT if each == 'robot' else each}.yaml" for each in sources}
     for each, source in sources.items():
         content = yaml.safe_load(Path(source).read_text(encoding="utf-8"))
@@ -1059,8 +1062,55 @@ def test_pairs_that_are_left_out_whole_are_not_named_as_joined():
     guessed = {f"{row.first}/{row.second}" for row in bodies.matrix if row.state == "guessed" and row.left_out}
     found = {each.subject: each.names for each in left_out_of_collisions(arm, bodies, None)}
     assert guessed
-    assert guessed.isdisjoint(found["joined_pairs"])
+    assert guessed.isdisjoint({*found.get("joined_pairs", ()), *found["joined_whole"]})
     assert guessed <= {*found["unexamined_pairs"]}
+
+
+def test_pairs_of_which_nothing_is_left_beyond_their_joint_are_not_said_to_be_examined():
+    bodies = bodies_of(load_robot("er3_600"), None)
+    measured = {pair.label for pair in bodies.pairs}
+    found = {each.subject: each.names for each in left_out_of_collisions(bodies.robot, bodies, None)}
+    assert found["joined_whole"] == ("link_2/link_3", "link_3/link_4")
+    assert measured.isdisjoint(found["joined_whole"])
+    assert measured >= {*found["joined_pairs"]}
+
+
+@pytest.mark.parametrize(("given", "named"), [(None, ("zero", "tool")), ({"tool": {}}, ("zero",))])
+def test_values_of_the_robots_file_that_are_assumed_are_named(tmp_path, monkeypatch, given, named):
+    content = yaml.safe_load(Path(f"data/robots/{ROBOT}.yaml").read_text(encoding="utf-8"))
+    content["zero"]["grade"] = "inferred"
+    content["tool"] = {"source": "x", "grade": "inferred", "xyz_mm": [0, 0, 50]}
+    (tmp_path / f"{ROBOT}.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
+    study = yaml.safe_load(Path("config/small.yaml").read_text(encoding="utf-8"))
+    study["robots"] = {ROBOT: study["robots"][ROBOT] | {"file": str(tmp_path / f"{ROBOT}.yaml")} | (given or {})}
+    written = []
+    passing = Results(Summary(Verdict("pass", NoPass(())), ()))
+    monkeypatch.setattr(run, "write_results", lambda *given: written.append(given[4].summary))
+    monkeypatch.setattr(STAGES["trajectory"].module("compute"), "compute", lambda study, name: passing)
+    run.compute("trajectory", Study.model_validate(study), ROBOT, tmp_path)
+    assert written[0].verdict.status == "pass"
+    assert [(each.subject, each.names) for each in written[0].not_examined] == [("own_values", named)]
+
+
+@pytest.mark.parametrize(
+    ("arm", "given", "status", "named"),
+    [
+        (ROBOT, {}, "caution", {"half_turns": ("turn: 1",), "start_branches": ("turn",)}),
+        (ROBOT, {"half_turn_axis": [0, 0, 1], "start_branch": "front, elbow up, flip"}, "pass", {}),
+        ("lbr_iiwa_14", {"half_turn_axis": [0, 0, 1]}, "pass", {"start_branches": ("turn",), "arm_angles": ("turn",)}),
+    ],
+)
+def test_what_a_path_leaves_open_is_named(tmp_path, arm, given, status, named):
+    """The sense of half a turn is no pass; branch and arm angle that were chosen here are told."""
+    start, end = ({"xyz_mm": [400, y, 400], "rpy_deg": [180, 0, yaw]} for y, yaw in ((0, 0), (30, 180)))
+    path = {"name": "turn", "title": "T", "kind": "line", "start": start, "end": end, "samples": 10, "duration_s": 5.0}
+    (tmp_path / "paths.yaml").write_text(yaml.safe_dump({"kind": "paths", "paths": [path | given]}), encoding="utf-8")
+    robot, settings = load_robot(arm), load_study("config/small.yaml").trajectory
+    task = planning_of(robot, settings, None, 0)
+    (listed,) = listed_motions(tmp_path / "paths.yaml", task, proof_requirements(robot, settings), 1)
+    assert {each.subject: each.names for each in listed.left_out} == named
+    summary = Summary(Verdict("pass", NoPass(())), (), not_examined=listed.left_out)
+    assert summary.verdict.status == status
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ import yaml
 
 from er3a.collision.pairs import LinkAndSolid, PairOverlaps
 from er3a.errors import InputError
+from er3a.files.path_file import ProgramPath
 from er3a.files.robot_library import load_robot
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
@@ -35,6 +36,7 @@ from er3a.pipeline.results import (
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.registry import STAGES
+from er3a.pipeline.stages.trajectory import motion
 from er3a.pipeline.stages.trajectory.compute import compute
 from er3a.pipeline.stages.trajectory.model import (
     FASTEST,
@@ -45,6 +47,7 @@ from er3a.pipeline.stages.trajectory.model import (
     TrajectoryResults,
     TriedStrategy,
 )
+from er3a.pipeline.stages.trajectory.motion import limits_of, near_singular, planned_entries, planning_of
 from er3a.pipeline.stages.trajectory.played import faults, motions
 from er3a.pipeline.stages.trajectory.record import record
 from er3a.pipeline.stages.trajectory.report import report, strategies_shown
@@ -55,7 +58,9 @@ from er3a.pipeline.viewing.index import write_index
 from er3a.pipeline.viewing.tray import Meeting
 from er3a.planning import tool_proof
 from er3a.planning.avoidance.strategies import STRATEGIES
+from er3a.planning.commands import CommandSource
 from er3a.planning.motion_faults import AboveLimit
+from testing.arms import scara
 from testing.on_demand import OnDemand
 from testing.readme import README, answer
 
@@ -707,3 +712,26 @@ def test_the_readme_tells_of_the_path_that_it_shows_as_the_stage_does(results):
     assert {(pair.link, pair.solid) for pair in met} == {(4, "post"), (6, "post")}
     assert f"links 4 and 6 meet a post from {path.collisions[0].t0_s:.3f} s on" in answer("Is a path safe")
     assert f"{path.collisions[0].t0_s:.3f} s" in (README.parent / "README.zh-CN.md").read_text(encoding="utf-8")
+
+
+def test_study_and_path_files_give_joints_that_slide_in_mm(monkeypatch):
+    """Accelerations, jerks and the start of a program were read as degrees: a slide's limits were 17 times too wide."""
+    robot, given = scara(), [500.0, 600.0, 800.0, 900.0]
+    settings = load_study("config/small.yaml").trajectory
+    settings = settings.model_copy(update={"acceleration_deg_s2": given, "jerk_deg_s3": given})
+    meant, limits = np.array([*np.radians(given[:2]), 0.8, np.radians(900.0)]), limits_of(robot, settings)
+    np.testing.assert_allclose(limits.acceleration, meant)
+    np.testing.assert_allclose(limits.jerk, meant)
+    starts = []
+
+    def check(program, robot, options):
+        starts.append(options.start)
+        raise InputError(None, None, "not checked here", "")
+
+    monkeypatch.setattr(motion, "check_program", check)
+    path = {"name": "a", "title": "A", "kind": "program", "samples": 9, "program": "data/programs/weld_seam.src"}
+    entry = ProgramPath.model_validate(path | {"start_deg": [500.0, -20.0, 150.0, 0.0]})
+    task = planning_of(robot, settings, None, 0)
+    with pytest.raises(InputError, match="not checked here"):
+        list(planned_entries(task, entry, CommandSource(Path("paths.yaml"), "paths[0]"), near_singular(settings)))
+    np.testing.assert_allclose(starts[0], [*np.radians([500.0, -20.0]), 0.15, 0.0])

@@ -64,6 +64,7 @@ for stage in STAGES.values():
             stage.name
         input:
             "reports/index.html",
+            "reports/junit.xml",
             [
                 path.format(robot=robot)
                 for robot in ROBOTS

@@ -16,6 +16,7 @@ from er3a.robots.robot import Convention
 
 if TYPE_CHECKING:
     from er3a.comparison.compare import Comparison
+    from er3a.files.arm_file import ReadArm
 
 MAX_TOLERANCE = 1000.0  # mm, and deg
 MATCHES_SHOWN = 5  # of a folder
@@ -47,10 +48,9 @@ def compare(
     as_json: AsJson = False,
 ):
     """Do A and B describe the same arm? Lists the entries that differ. Exit code 1 if any do."""
-    import numpy as np
-
     from er3a.comparison.compare import best_of
     from er3a.files.arm_file import read_arm, read_arms
+    from er3a.files.units import noted_doubts
     from er3a.robots.robot import to_modified, to_standard
 
     for option, value in (("--tolerance-mm", tolerance_mm), ("--tolerance-deg", tolerance_deg)):
@@ -60,14 +60,15 @@ def compare(
         raise Er3aError(f"--output is '{output}'; robot files end in .yaml")
     options: dict[str, Any] = {"convention": convention, "length_unit": length_unit, "angle_unit": angle_unit}
     options |= {"base": base, "tip": tip}
-    first = read_arm(a, xacro=xacro or (), **options)
-    folder = Path(b)
-    if folder.is_dir():
-        others, left_out = read_arms(folder, **options)
-        for problem in left_out:
-            print_note(problem)
-    else:
-        others = {b: read_arm(b, xacro=xacro or (), **options)}
+    folder, left_out = Path(b), tuple[str, ...]()
+    with noted_doubts() as doubtful:
+        first = read_arm(a, xacro=xacro or (), **options)
+        if folder.is_dir():
+            others, left_out = read_arms(folder, **options)
+        else:
+            others = {b: read_arm(b, xacro=xacro or (), **options)}
+    for problem in left_out:
+        print_note(problem)
     arm = first.robot
     if not first.printed and len(others) == 1 and (second := next(iter(others.values()))).printed:
         arm = (to_modified if second.robot.convention == "modified" else to_standard)(arm)
@@ -78,13 +79,11 @@ def compare(
         tolerance_deg=tolerance_deg,
     )
     name, found = ranked[0]
-    for source, read in ((a, first), (name, others[name])):
-        for note in read.notes:
-            print_note(f"{source}: {note}")
-    tool = others[name].robot.tool
-    if not np.allclose(arm.tool, tool, rtol=0.0, atol=TOOLS_EQUAL):
-        apart = 1000 * float(np.linalg.norm(arm.tool[:3, 3] - tool[:3, 3]))
-        print_note(f"{a} and {name}: tools are not compared; these differ (their points by {apart:.3g} mm)")
+    notes = _notes((a, first), (name, others[name]))
+    compared = {Path(a).name, Path(name).name}
+    doubts = [str(each) for each in doubtful if not (folder.is_dir() and Path(each.file or "").name not in compared)]
+    for note in notes:
+        print_note(note)
     if output is not None and found.corrected is not None:
         from er3a.files.robot_writer import write_robot
 
@@ -93,11 +92,11 @@ def compare(
         from er3a.pipeline.viewing.comparison import write_comparison
 
         where = str(folder / name) if folder.is_dir() else name
-        write_comparison((a, arm), (where, others[name].robot), found, html, (tolerance_mm, tolerance_deg))
+        write_comparison((a, arm), (where, others[name].robot), found, html, (tolerance_mm, tolerance_deg), doubts)
     if as_json:
-        print_json(_record(ranked, folder.is_dir()))
+        print_json(_record(ranked, folder.is_dir()) | {"notes": notes, "doubtful_units": doubts})
     else:
-        _print(ranked, folder.is_dir())
+        _print(ranked, folder.is_dir(), doubts)
         for written in (output if found.corrected is not None else None, html):
             if written is not None:
                 print(f"{written}: written")
@@ -105,16 +104,28 @@ def compare(
         raise typer.Exit(1)
 
 
-def _print(ranked: list[tuple[str, Comparison]], folder: bool) -> None:
+def _notes(one: tuple[str, ReadArm], other: tuple[str, ReadArm]) -> list[str]:
+    """What was assumed in reading two arms, by their names, and that their tools differ."""
+    import numpy as np
+
+    notes = [f"{source}: {note}" for source, read in (one, other) for note in read.notes]
+    (a, first), (b, second) = one, other
+    if not np.allclose(first.robot.tool, second.robot.tool, rtol=0.0, atol=TOOLS_EQUAL):
+        apart = 1000 * float(np.linalg.norm(first.robot.tool[:3, 3] - second.robot.tool[:3, 3]))
+        notes.append(f"{a} and {b}: tools are not compared; these differ (their points by {apart:.3g} mm)")
+    return notes
+
+
+def _print(ranked: list[tuple[str, Comparison]], folder: bool, doubts: list[str]) -> None:
     """Print the best comparison, layer by layer; for a folder, first the best matches."""
-    from er3a.pipeline.messages.comparison import headline, layer_rows
+    from er3a.pipeline.messages.comparison import doubt_rows, headline, layer_rows
 
     if folder:
         for other, each in ranked[:MATCHES_SHOWN]:
             print(f"{other}: {headline(each)}")
         print()
     print(headline(ranked[0][1]))
-    for layer, state, detail in layer_rows(ranked[0][1]):
+    for layer, state, detail in (*layer_rows(ranked[0][1]), *doubt_rows(doubts)):
         print(f"  {layer:<11} {state:<8} {detail}".rstrip())
 
 

@@ -72,13 +72,13 @@ def check_program(
     from er3a.files.units import noted_doubts
     from er3a.numerics.jit import compiling_beside
     from er3a.pipeline.program_reports import (
+        assumed_line,
         checked_file,
         cycle_line,
         json_of,
         lines_of,
         missed_line,
         not_examined_line,
-        rates_line,
         sarif_of,
         shapes_line,
         summary_line,
@@ -111,8 +111,8 @@ def check_program(
                 print(line)
         of_files = [line(each) for each in checked for line in (cycle_line, not_examined_line)]
         missed = tuple(dict.fromkeys(left for each in checked for left in each.missed))
-        assumed = shapes_line(arm), rates_line(arm)
-        for line in filter(None, (*of_files, *assumed, missed_line(missed), summary_line(checked))):
+        of_arm = (shapes_line(arm), assumed_line(checked))
+        for line in filter(None, (*of_files, *of_arm, missed_line(missed), summary_line(checked))):
             print_note(line)
     if any(each.check is None for each in checked):
         raise typer.Exit(2)

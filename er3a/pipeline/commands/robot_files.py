@@ -92,13 +92,15 @@ def export_urdf(
     """Write a robot as URDF."""
     from er3a.files.kept_files import write_atomically
     from er3a.files.robot_library import load_robot
-    from er3a.formats.urdf import export_srdf, pairs_checked_in_part, pairs_not_checked
+    from er3a.formats.urdf import assumed_pairs, export_srdf, pairs_checked_in_part, pairs_not_checked
     from er3a.formats.urdf import export_urdf as urdf_text
 
     arm = load_robot(robot)
     texts = {output: urdf_text(arm, output.with_name(f"{output.stem}_meshes"))}
     if srdf is not None:
         texts[srdf] = export_srdf(arm)
+        if rests := assumed_pairs(arm):
+            options.print_note(f"{srdf}: {rests}")
         for pair in pairs_not_checked(arm):
             options.print_note(f"{srdf}: {pair} overlap where no arm can; their shapes are in error, not checked")
         for pair in pairs_checked_in_part(arm):
@@ -126,7 +128,10 @@ def import_calibration(
     from er3a.files.robot_library import load_robot
     from er3a.files.robot_writer import write_robot
 
-    found = load_factory_calibration(file, load_robot(robot))
+    nominal = load_robot(robot)
+    found = load_factory_calibration(file, nominal)
+    if nominal.envelopes or nominal.hulls or nominal.references or nominal.masses != found.masses:
+        options.print_note(f"{output}: without shapes, masses and references of {robot}: they belong to its own table")
     write_robot(found.replace(name=output.stem, title=f"{found.title}, as calibrated by its factory"), output)
     print(f"{output}: written")
 

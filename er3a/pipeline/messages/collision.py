@@ -163,7 +163,8 @@ def _(found: BaseInSolid) -> str:
 
 @say.register
 def _(found: HomeCollides) -> str:
-    return say_as(found, percent=100 * found.free_ratio)
+    home = say_as(found, percent=100 * found.found.free_ratio)
+    return joined([*_asked(found.found), home], " ")
 
 
 @say.register
@@ -176,11 +177,16 @@ def _(found: FreeSpace) -> str:
             percent=100 * found.free_ratio,
             lost=at_most(100 * (1 - found.clear / found.places), 1),
         )
+    doubt = say_as(found, "doubt") if found.undecided else ""
+    return joined([*_asked(found), free, doubt], " ")
+
+
+def _asked(found: FreeSpace) -> list[str]:
+    """What targets and paths come to, a sentence each."""
     targets = say_as(found, "targets") if found.nearest else ""
     paths = say_as(found, "paths") if found.colliding else ""
     blocked = say_as(found, "blocked", named=_first_of(found.blocked)) if found.blocked else ""
-    doubt = say_as(found, "doubt") if found.undecided else ""
-    return joined([blocked, targets, paths, free, doubt], " ")
+    return [blocked, targets, paths]
 
 
 def solid_rows(scene: Scene | None) -> list[list[str]]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from er3a.comparison.compare import (
     Cause,
     Comparison,
@@ -54,7 +56,8 @@ def headline(found: Comparison) -> str:
         a, b = found.joints
         return tr("{verdict}: {a} and {b}", verdict=text, a=a, b=b) if found.verdict == "other_joint_count" else text
     if found.verdict == "equal":
-        return text
+        missing = [tr(shown) for name, shown in LAYERS.items() if getattr(getattr(found, name), "same", True) is None]
+        return tr("{verdict}; not compared: {layers}", verdict=text, layers=", ".join(missing)) if missing else text
     return tr(
         "{verdict} (at the worst joint angles the flange is {printed:.1f} mm and {turned:.1f} deg off as printed, "
         "{aligned:.4g} mm and {aligned_deg:.3g} deg aligned)",
@@ -75,6 +78,11 @@ def layer_rows(found: Comparison) -> list[tuple[str, str, str]]:
             continue
         rows.append((tr(shown), tr(STATES[layer.same]), _detail(name, found)))
     return rows
+
+
+def doubt_rows(doubts: Iterable[str]) -> list[tuple[str, str, str]]:
+    """The same of numbers whose unit is in doubt."""
+    return [(tr("units"), tr("in doubt"), each) for each in doubts]
 
 
 def _detail(name: str, found: Comparison) -> str:

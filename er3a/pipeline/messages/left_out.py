@@ -8,6 +8,7 @@ from typing import TypeVar
 from er3a.by_value import Finding
 from er3a.collision.pairs import BASE, link_label
 from er3a.pipeline.messages.language import own_title, tr
+from er3a.pipeline.messages.pages import GROUP_NAMES
 from er3a.pipeline.messages.say import bracketed, joined, say, say_as, sentence, texts, word
 from er3a.pipeline.results import LeftOut, LeftOutSubject, NoPass
 
@@ -52,6 +53,10 @@ TEXTS = texts(
         "left_out.joined_pairs": (
             "overlaps of these links where they meet at a joint, and how near they come; the rest of them is examined"
         ),
+        "left_out.joined_whole": (
+            "collisions of these links: they meet at a joint, and one of them lies as a whole in the region around it "
+            "that is left out"
+        ),
         "left_out.unmeasured_pairs": "how near these links, which meet at a joint, come elsewhere before they overlap",
         "left_out.unmeasured_pairs#apart": (
             "how near these links, which meet at a joint, come elsewhere before they overlap, but for the poses that "
@@ -60,6 +65,7 @@ TEXTS = texts(
         "left_out.scene_shapes": "whether what stands in the cell is shaped and placed as the scene's file says",
         "left_out.shallow_overlaps": "overlaps of less than {amount:g} mm between the points measured",
         "left_out.own_limits": "the joints' real limits: the robot's file assumes all or some of them",
+        "left_out.own_values": "whether these values are the arm's: the robot's file grades them as inferred",
         "left_out.own_speeds": "the joints' real speeds: no document gives them, so speeds are assumed",
         "left_out.own_accelerations": (
             "the joints' real accelerations: no document gives them, so accelerations are assumed"
@@ -82,6 +88,17 @@ TEXTS = texts(
             "the points of tables that the motion passes beside, by up to so much: corners are rounded over half of "
             "the shorter side, as neither blend_mm nor blend_deg is given (0 stops at each point), and a controller "
             "that goes to the points or blends otherwise moves elsewhere"
+        ),
+        "left_out.half_turns": (
+            "the other way round, where the tool turns by exactly 180 deg (segments by their numbers): no "
+            "`half_turn_axis` says which, and a controller may turn it either way"
+        ),
+        "left_out.start_branches": (
+            "other branches of paths that begin at a pose and name none: the arm may stand on another one"
+        ),
+        "left_out.arm_angles": (
+            "other arm angles: these paths leave them open, and a controller that holds the elbow elsewhere moves the "
+            "links elsewhere"
         ),
         "left_out.program_starts": "motions from where the arm is not known to stand",
         "left_out.program_again": (
@@ -218,6 +235,9 @@ NameT = TypeVar("NameT", bound=str)
 def names_in_words(subject: LeftOutSubject, code: str, words: Mapping[NameT, str]) -> None:
     """Say a subject's names by a table of words marked with ``N_``; a stage's messages call this."""
     _words[subject] = code, {str(name): text for name, text in words.items()}
+
+
+names_in_words("own_values", "group", GROUP_NAMES)
 
 
 def say_reserved(finding: Finding, not_examined: Iterable[LeftOut]) -> str:

@@ -94,6 +94,7 @@ REMEDIES: dict[str, str] = {
     "program_not_understood": BY_HAND,
     "program_not_simulated": N_("Check on the controller what this instruction does to the motions after it."),
     "program_form_inferred": N_("Compare this element with what the controller does."),
+    "program_joint_speed_inferred": N_("Give the speed of joint motions in percent (v50perc)."),
     "external_axes_left_out": N_("Check by hand that the external axes stand as assumed."),
     "frame_not_given": N_("Map the name to a frame under frames in the file that lists the programs."),
     "frame_taken_as_flange": N_(
@@ -396,8 +397,8 @@ TEXTS = texts(
             "data file only"
         ),
         "waits_for_others": (
-            "'{condition}' is false here, and nothing that was read makes it true: another task does, and what else "
-            "that sets is not known"
+            "nothing that was read ends this wait ('{condition}'): another task does, and what else that sets is not "
+            "known"
         ),
         "errors_not_followed": (
             "the program may go on after an error in this routine, or in one that it calls; that was followed for few "
@@ -434,6 +435,10 @@ TEXTS = texts(
             "follows it as one motion)"
         ),
         "program_form_inferred": "the structure of <{element}> is not documented; it was read like that of <while>",
+        "program_joint_speed_inferred": (
+            "how long joint motions at speeds of the tool ('{word}') take is not documented; as long as the tool's "
+            "straight way at that speed was assumed"
+        ),
         "program_other_encoding": "the file is not UTF-8; it was read as {encoding}",
         "program_nothing_moves": "no instruction moves the arm",
         "load_not_examined": "{mass_kg:g} kg on the flange from here on; torques with this load are not examined",
@@ -459,6 +464,11 @@ TEXTS = texts(
             "{count} speed above 100 % written as 100 %",
             "{count} speeds above 100 % written as 100 %",
         ),
+        "written_speeds_raised": Plural(
+            "motions",
+            "{count} speed below the least that has a name, which was taken: faster than what was checked",
+            "{count} speeds below the least that has a name, which was taken: faster than what was checked",
+        ),
         "written_speeds_of_assumed": Plural(
             "motions",
             "{count} speed written with an assumed {assumed} as 100 %: the controller's 100 % may be far from that",
@@ -466,8 +476,8 @@ TEXTS = texts(
         ),
         "written_half_turns_split": Plural(
             "lines",
-            "{count} line that turns the tool by 180 deg written in two halves, which fixes the sense",
-            "{count} lines that turn the tool by 180 deg written in two halves, which fixes the sense",
+            "{count} line or arc that turns the tool by 180 deg written in two halves, which fixes the sense",
+            "{count} lines or arcs that turn the tool by 180 deg written in two halves, which fixes the sense",
         ),
         "written_targets_left_out": Plural(
             "motions",
@@ -484,6 +494,16 @@ TEXTS = texts(
             "instructions",
             "{count} instruction of the other language kept as a comment",
             "{count} instructions of the other language kept as comments",
+        ),
+        "written_one_side": Plural(
+            "branches",
+            "{count} branch of which one side alone was written: what the other does is left out",
+            "{count} branches of which one side alone was written: what the others do is left out",
+        ),
+        "written_external_axes_dropped": Plural(
+            "motions",
+            "{count} motion written without its external axes",
+            "{count} motions written without their external axes",
         ),
         "written_arcs_split": Plural(
             "arcs",

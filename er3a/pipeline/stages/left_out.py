@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -41,12 +41,12 @@ def left_out_of_collisions(
     q_deg : (N, n), joints that clearances are told of, NaN where they are not known; mm of those that slide
     """
 
-    def pairs(state: PairState) -> tuple[str, ...]:
+    def pairs(state: PairState, whole: bool = False) -> tuple[str, ...]:
         others = ("meets", "undecided", "watched") if state == "joined" else ()  # some of their bodies are joined
         return tuple(
             f"{row.first}/{row.second}"
             for row in bodies.matrix
-            if row.state == state or (row.left_out and row.state in others)
+            if (row.state == state or (row.left_out and row.state in others)) and row.whole is whole
         )
 
     carries, tip = bool(scene and scene.carried), "tool" if robot.tool[:3, 3].any() else "flange"
@@ -67,6 +67,7 @@ def left_out_of_collisions(
         ("unexamined_pairs", tuple(pair.label for pair in bodies.unexamined)),
         ("allowed_pairs", tuple(name for name in allowed if name not in hidden)),
         ("joined_pairs", pairs("joined")),
+        ("joined_whole", pairs("joined", whole=True)),
     ]
     listed = [LeftOut(subject, names) for subject, names in found if names]
     if shapes.partial:
@@ -98,6 +99,16 @@ def left_out_of_limits(robot: Robot) -> tuple[LeftOut, ...]:
     """That limits of joints are assumed, with what the robot's file says of them."""
     found = robot.sources.get("limits")
     return (LeftOut("own_limits", (found.source,)),) if found and found.grade == "inferred" else ()
+
+
+OWN_VALUES = ("dh", "zero", "speeds", "coupling", "base", "flange", "tool")
+
+
+def left_out_of_values(robot: Robot, replaced: Collection[str]) -> tuple[LeftOut, ...]:
+    """Other groups of the robot's file that are assumed, without those that the study has ``replaced``."""
+    assumed = [group for group in OWN_VALUES if group in robot.sources and robot.sources[group].grade == "inferred"]
+    names = tuple(group for group in assumed if group not in replaced)
+    return (LeftOut("own_values", names),) if names else ()
 
 
 def left_out_in_solids(scene: Scene | None, places: Iterable[tuple[str, Reals, float]]) -> tuple[LeftOut, ...]:

@@ -26,7 +26,7 @@ from er3a.pipeline.results import (
     read_stage,
     write_results,
 )
-from er3a.pipeline.stages.left_out import left_out_of_limits, left_out_of_units
+from er3a.pipeline.stages.left_out import left_out_of_limits, left_out_of_units, left_out_of_values
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.study import Study
@@ -61,7 +61,7 @@ def compute(name: str, study: Study, robot: str, folder: Path, parts: list[Path]
     read = input_records(file for file in study.inputs(robot, name) if file.is_file())
     with noted_doubts() as doubts:
         results = _computed(stage, study, robot, {"parts": parts} if stage.sampled else {})
-    assumed = left_out_of_limits(study.robot(robot)) if stage.rests_on else ()
+    assumed = _assumed(study, robot) if stage.rests_on else ()
     doubts = [each for each in doubts if stage.weighs or not each.key.startswith(MASSES)]
     results = _in_doubt(results, (*assumed, *left_out_of_units(doubts)))
     write_results(folder, study, robot, stage, results, read)
@@ -72,6 +72,13 @@ def compute(name: str, study: Study, robot: str, folder: Path, parts: list[Path]
         stage.compiled.parent.mkdir(parents=True, exist_ok=True)
         stage.compiled.touch()
     return None
+
+
+def _assumed(study: Study, name: str) -> tuple[LeftOut, ...]:
+    """What the robot's file assumes of the values that its stages rest on."""
+    robot, entry = study.robot(name), study.entry(name)
+    replaced = [group for group in ("base", "tool") if getattr(entry, group)]
+    return (*left_out_of_limits(robot), *left_out_of_values(robot, replaced))
 
 
 MASSES = "inertia."

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from er3a.files.kept_files import sha256
 from er3a.files.robot_writer import robot_file, robot_text
 from er3a.kinematics.chain import constant_links, joint_starts
 from er3a.pipeline.code_digest import code_digest
-from er3a.pipeline.messages.comparison import headline, layer_rows
+from er3a.pipeline.messages.comparison import doubt_rows, headline, layer_rows
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import bracketed
 from er3a.pipeline.results import Input, Provenance
@@ -26,9 +27,15 @@ COLUMNS = ("a", "alpha", "d", "offset", "direction")
 
 
 def write_comparison(
-    one: tuple[str, Robot], other: tuple[str, Robot], found: Comparison, output: Path, tolerances: tuple[float, float]
+    one: tuple[str, Robot],
+    other: tuple[str, Robot],
+    found: Comparison,
+    output: Path,
+    tolerances: tuple[float, float],
+    doubts: Sequence[str] = (),
 ) -> None:
-    """Render a comparison as a page; ``one`` and ``other``: as they were named on the command line, and read."""
+    """Render a comparison as a page; ``one`` and ``other``: as they were named on the command line, and read;
+    ``doubts``: about units in them."""
     corrected = found.corrected
     text = "" if corrected is None else robot_text(robot_file(corrected))
     lengths, angles = (f"{value:g}" for value in tolerances)
@@ -42,7 +49,7 @@ def write_comparison(
         names=(one[0], other[0]),
         verdict=found.verdict,
         headline=headline(found),
-        layers=layer_rows(found),
+        layers=[*layer_rows(found), *doubt_rows(doubts)],
         columns=_columns(),
         rows=[] if corrected is None else _rows(one[1], corrected),
         corrected=text,

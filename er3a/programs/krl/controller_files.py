@@ -25,6 +25,7 @@ OF_CONTROLLER = ("BAS", "USER_GRP", "IR_STOPM")
 """The controller's own modules that set what motions use, or that people edit."""
 DEEPEST = 6  # folders of an archive
 OF_ARCHIVE = ("System", "Mada", "TP")  # folders beside Program, of which it has one
+OF_CONTROLLER_FOLDERS = frozenset(map(str.lower, OF_ARCHIVE))
 
 
 class ControllerFiles:
@@ -81,11 +82,17 @@ class ControllerFiles:
             module = file.stem.upper()
             shown = (name.upper() for is_global, name in ROUTINE.findall(self.text(file)) if is_global)
             for name in dict.fromkeys((module, *shown)):
-                known = name in HARMLESS | OF_SETTINGS
-                if file.parent == self.path.parent or name in OF_CONTROLLER or not known:
+                known = name in HARMLESS | OF_SETTINGS and self._is_of_controller(file)
+                if name in OF_CONTROLLER or not known:
                     found[name].append(file)
         found.pop(self.path.stem.upper(), None)
         return dict(found)
+
+    def _is_of_controller(self, file: Path) -> bool:
+        """Whether a module lies where controllers keep their own, and not beside the program."""
+        if self.archive is None or file.parent == self.path.parent or not file.is_relative_to(self.archive):
+            return False
+        return file.relative_to(self.archive).parts[0].lower() in OF_CONTROLLER_FOLDERS
 
     @cached_property
     def modules(self) -> tuple[Path, ...]:
@@ -119,18 +126,24 @@ class ControllerFiles:
         return tuple(dict.fromkeys((*self._programs(".sub"), *([] if system is None else [system]))))
 
     @cached_property
-    def published(self) -> tuple[Path, ...]:
-        """The ``.dat`` files that declare for all modules, but for those of modules that are read."""
-        modules = {self.path.stem.upper(), *(each.stem.upper() for each in self.modules), "$CONFIG"}
-        others = (each for each in self._all if each.suffix.lower() == ".dat" and each.stem.upper() not in modules)
+    def public_data(self) -> tuple[Path, ...]:
+        """The ``.dat`` files that declare for all modules, but for $config.dat and the program's own."""
+        own = {self.path.stem.upper(), "$CONFIG"}
+        others = (each for each in self._all if each.suffix.lower() == ".dat" and each.stem.upper() not in own)
         return tuple(each for each in others if PUBLISHED.search(getattr(self.source(each), "text", "")))
+
+    @property
+    def published(self) -> tuple[Path, ...]:
+        """Those of them whose modules are not read."""
+        modules = {each.stem.upper() for each in self.modules}
+        return tuple(each for each in self.public_data if each.stem.upper() not in modules)
 
     @cached_property
     def others(self) -> tuple[Path, ...]:
         """Modules of the controller that the program does not call; none where modules share no variables."""
         own = data_file_of(self.path, ".dat")
         has_own = own is not None and GLOBAL_NAME.search(self.text(own))
-        if self.config is None and not has_own and not self.published:
+        if self.config is None and not has_own and not self.public_data:
             return ()
         return tuple(each for each in self._programs(".src") if each not in self.modules and not is_basics(each))
 
@@ -193,7 +206,7 @@ def _with_data(file: Path) -> tuple[Path, Path | None]:
 
 def _is_archive(folder: Path) -> bool:
     """Whether a folder is a controller's archive, by its folders: others above a program are not searched."""
-    return (folder / "Program").is_dir() and any((folder / each).is_dir() for each in OF_ARCHIVE)
+    return _named(folder, "Program") is not None and any(_named(folder, each) for each in OF_ARCHIVE)
 
 
 def _named(folder: Path | None, name: str) -> Path | None:

@@ -13,7 +13,7 @@ from er3a.geometry.transforms import rotation_angle
 from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, syntax
 from er3a.programs.code_builder import variable_of
-from er3a.programs.evaluation import IN_DEGREES, Dialect, ProgramMemory, function_in_single, known, root
+from er3a.programs.evaluation import IN_DEGREES, Dialect, ProgramMemory, Rounded, function_in_single, known, root
 from er3a.robots.masses import MassBody, moved
 
 FRAME_KEYS = ("X", "Y", "Z", "A", "B", "C")
@@ -22,9 +22,11 @@ AXIS_KINDS = ("AXIS", "E6AXIS")
 LEFT_OUT = "left out of"
 EXTERNAL_KEYS = ("E1", "E2", "E3", "E4", "E5", "E6")
 COORDINATES = frozenset((*FRAME_KEYS, *AXIS_KEYS, *EXTERNAL_KEYS))
+POSITION_FIELDS = COORDINATES | {"S", "T"}
 POSITION_KINDS = ("FRAME", "POS", "E6POS", *AXIS_KINDS)
 SAME_TURN = 1e-3  # rad
 SIGN_ZERO = 1e-7  # rad; nearer to 0 a joint's sign says nothing
+OFF_MM, OFF_DEG = 0.1, 0.01
 NOT_NUMBERS = ("NAN", "INF", "INFINITY")
 Frames = tuple[instructions.NamedFrame, instructions.NamedFrame]
 UNREAD = syntax.Unclear("")
@@ -59,21 +61,32 @@ def target(memory: ProgramMemory, value: syntax.Value, frames: Frames, said: tup
     text = said[0]
     if isinstance(value, syntax.Unclear) and value is not UNREAD:
         return _unresolved(value)
-    if not isinstance(value, syntax.Record):
+    if not isinstance(value, syntax.Record) or not _is_position(value):
         return instructions.UnresolvedTarget(text, "not_understood")
-    if memory.read("$IPO_MODE") == "#TCP":
-        return instructions.UnresolvedTarget(text, "external_tool")
     if _has_axes(value):
-        return (
-            instructions.UnresolvedTarget(text, "not_understood") if is_frame(value) else _joints(memory, value, text)
-        )
-    return _pose(memory, value, frames, text)
+        return _joints(memory, value, text)
+    return _by_fixed_tool(memory, text) or _pose(memory, value, frames, text)
+
+
+def _is_position(value: syntax.Record) -> bool:
+    """Whether a record has fields of positions alone, and not both coordinates and axes."""
+    return all(key in POSITION_FIELDS for key, _ in value.items) and not (_has_axes(value) and is_frame(value))
+
+
+def _by_fixed_tool(memory: ProgramMemory, text: str) -> instructions.UnresolvedTarget | None:
+    """That the workpiece is moved along a fixed tool, or may be; None where it is known that the tool is moved."""
+    mode = memory.read("$IPO_MODE")
+    if mode in (None, "#BASE"):
+        return None
+    if isinstance(mode, syntax.Unclear):
+        return instructions.UnresolvedTarget(f"$IPO_MODE={mode.text}", "undefined")
+    return instructions.UnresolvedTarget(text, "external_tool")
 
 
 def relative(memory: ProgramMemory, value: syntax.Value, frames: Frames, said: tuple[str, bool]) -> instructions.Target:
     """A target given by its difference from where the arm is."""
     text, in_tool = said
-    if not isinstance(value, syntax.Record):
+    if not isinstance(value, syntax.Record) or not _is_position(value):
         if isinstance(value, syntax.Unclear) and value is not UNREAD:
             return _unresolved(value)
         return instructions.UnresolvedTarget(text, "not_understood")
@@ -82,8 +95,8 @@ def relative(memory: ProgramMemory, value: syntax.Value, frames: Frames, said: t
         if memory.here.joints is None or not isinstance(change, instructions.JointTarget):
             return instructions.UnresolvedTarget(text, "position_unknown")
         return instructions.JointTarget(memory.here.joints + change.joints, change.external)
-    if memory.read("$IPO_MODE") == "#TCP":
-        return instructions.UnresolvedTarget(text, "external_tool")
+    if (fixed := _by_fixed_tool(memory, text)) is not None:
+        return fixed
     steps = syntax.Record(value.kind, (*((key, 0.0) for key in FRAME_KEYS if value.get(key) is None), *value.items))
     offset, seen = record_pose(steps), memory.here.seen(*frames, memory.cell.flange)
     if offset is None or seen is None:
@@ -181,6 +194,15 @@ def _pose(memory: ProgramMemory, value: syntax.Record, frames: Frames, text: str
     )
 
 
+def _read(position: syntax.Record) -> syntax.Record:
+    """A position as a controller reads it from its arm, which is within ``OFF_MM`` and ``OFF_DEG`` of it."""
+    items = (
+        (key, Rounded(float(syntax.number(each) or 0.0), OFF_MM if key in "XYZ" else OFF_DEG))
+        for key, each in position.items
+    )
+    return syntax.Record(position.kind, tuple(items))
+
+
 def _posture(position: syntax.Record, joints: Reals | None, name: str) -> syntax.Record:
     """Where the arm is with its Turn, where its joints are known; its Status depends on the arm, and is not known."""
     turn: syntax.Value = syntax.Unclear(f"T of {name}")
@@ -217,11 +239,11 @@ def _frame(memory: ProgramMemory, variable: str) -> instructions.NamedFrame:
         return instructions.NamedFrame("", memory.cell.tool if variable == "$TOOL" else memory.cell.base, own=False)
     said = memory.read(variable + "%name")
     name = said.upper() if isinstance(said, str) and said[:1] not in ("{", "") else ""
-    own, pose = memory.local.get(name, memory.shared.get(name)), record_pose(value)
+    own, pose = memory.read(name) if name else None, record_pose(value)
     if isinstance(value, syntax.Unclear):
         name = name or value.text
-        if isinstance(own, syntax.Unclear) and not isinstance(own, syntax.Unset):  # the program has changed it
-            name = f"{name}={own.text}"
+        if isinstance(own, syntax.Unclear) and not isinstance(own, syntax.Unset):  # the program or others change it
+            name = f"{name}, changed" if own.text == name else f"{name}={own.text}"
     elif pose is None and is_frame(value):
         name = syntax.shown(value)
     mapped = memory.cell.frames.get(name)
@@ -242,8 +264,8 @@ def set_by_bas(memory: ProgramMemory, call: syntax.Invocation) -> bool:
             _joint_speed(memory, given)
         case "#ACC_PTP":
             _all_axes(memory, "$ACC_AXIS", given)
-        case "#VEL_CP":
-            _line_speed(memory, given)
+        case "#VEL_CP":  # which some controllers bound by DEF_VEL_CP, others by their machine data
+            memory.write("$VEL.CP", given)
         case "#ACC_CP":
             _line_acceleration(memory, given)
         case "#TOOL":
@@ -266,7 +288,7 @@ def set_by_bas(memory: ProgramMemory, call: syntax.Invocation) -> bool:
             _line_data(memory, data)
             if command == "#CP_PARAMS":
                 _frames(memory)
-            _line_speed(memory, _field(data, "VEL", "LDAT_ACT") if command == "#CP_DAT" else given)
+            memory.write("$VEL.CP", _field(data, "VEL", "LDAT_ACT") if command == "#CP_DAT" else given)
         case "#OUT_SYNC" | "#OUT_ASYNC":
             memory.forget("$OUT")
         case "#GROUP" | "#ACC_GLUE":
@@ -310,11 +332,6 @@ def _joint_speed(memory: ProgramMemory, percent: syntax.Value) -> None:
     _all_axes(memory, "$VEL_AXIS", percent if plain is None else min(plain, 100.0))
 
 
-def _line_speed(memory: ProgramMemory, speed: syntax.Value) -> None:
-    plain, most = syntax.number(speed), syntax.number(memory.read("DEF_VEL_CP"))
-    memory.write("$VEL.CP", speed if plain is None or most is None else min(plain, most))
-
-
 def _line_acceleration(memory: ProgramMemory, percent: syntax.Value) -> None:
     plain, full = syntax.number(percent), syntax.number(memory.read("DEF_ACC_CP"))
     if plain is None:
@@ -346,18 +363,21 @@ def keep_setting(memory: ProgramMemory, name: str, expression: syntax.Expression
             memory.write("$VEL.CP", given)
         case "SVEL_JOINT":
             _all_axes(memory, "$VEL_AXIS", given)
-        case "SACC_JOINT" if isinstance(given, syntax.Record):
-            _all_axes(memory, "$ACC_AXIS", given.get("ACC") or syntax.Unclear(name))
+        case "SACC_JOINT":
+            _all_axes(memory, "$ACC_AXIS", _field(given, "ACC", name))
         case "SACC_CP":
             _line_acceleration(memory, _field(given, "ACC", name))
         case "SAPO":
-            _zone_data(memory, given, "#CDIS")
+            memory.write("$APO.CDIS", _field(given, "APO_DIST", name))
         case "SAPO_PTP":
-            _zone_data(memory, given, "#CPTP")
+            if _zone_data(memory, given, "#CDIS") == "#CDIS":
+                memory.write("$APO.CPTP", "#CDIS")  # 100 on the controller, so that the distance decides
         case "STOOL2" if isinstance(given, syntax.Record):
             _tool_data(memory, given)
         case "SBASE":
             _number(memory, "$BASE", "BASE_DATA", given)
+        case "SLOAD":
+            _load_number(memory, given)
         case "SIPO_MODE":
             memory.write("$IPO_MODE", given)
         case "SORI_TYP" | "SORI_TYPE":
@@ -370,7 +390,7 @@ def keep_setting(memory: ProgramMemory, name: str, expression: syntax.Expression
                 memory.shared.pop(name + "%name", None)
 
 
-def _typed(data: syntax.Value, name: str, usual: str) -> syntax.Value:
+def _typed(data: syntax.Value, name: str, usual: syntax.Value) -> syntax.Value:
     """How motion data say that the tool turns; as usual where they don't."""
     return data.get(name) or usual if isinstance(data, syntax.Record) else data
 
@@ -411,9 +431,15 @@ def _corrected(memory: ProgramMemory, variable: str, frame: syntax.Value) -> syn
 def _tool_number(memory: ProgramMemory, given: syntax.Value) -> None:
     """Tool and load by their number, as controllers' own bas.src sets both."""
     _number(memory, "$TOOL", "TOOL_DATA", given)
+    _load_number(memory, given)
+
+
+def _load_number(memory: ProgramMemory, given: syntax.Value) -> None:
     for name in _load_parts(memory):
         del memory.shared[name]
-    memory.write("$LOAD", memory.read(f"LOAD_DATA[{syntax.number(given) or 0:g}]") or 0)
+    number = syntax.number(given)
+    unknown = syntax.Unclear("LOAD_DATA[?]")
+    memory.write("$LOAD", unknown if number is None else memory.read(f"LOAD_DATA[{number:g}]") or 0)
 
 
 def _load_parts(memory: ProgramMemory) -> list[str]:
@@ -449,7 +475,7 @@ def load_of(value: syntax.Value | None) -> instructions.Load | None:
 
 
 def _tool_data(memory: ProgramMemory, data: syntax.Record) -> None:
-    _tool_number(memory, data.get("TOOL_NO") or 0)
+    _tool_number(memory, _field(data, "TOOL_NO", "FDAT"))
     memory.write("$IPO_MODE", data.get("IPO_FRAME") or "#BASE")
 
 
@@ -457,38 +483,40 @@ def _frames(memory: ProgramMemory) -> None:
     data = memory.read("FDAT_ACT")
     if isinstance(data, syntax.Record):
         _tool_data(memory, data)
-        _number(memory, "$BASE", "BASE_DATA", data.get("BASE_NO") or 0)
-    elif isinstance(data, syntax.Unclear):
+        _number(memory, "$BASE", "BASE_DATA", _field(data, "BASE_NO", "FDAT"))
+    else:
+        of = data.text if isinstance(data, syntax.Unclear) else "FDAT_ACT"
         for variable in ("$TOOL", "$BASE"):
-            memory.write(variable, syntax.Unclear(f"{variable[1:]} of {data.text}"))
+            memory.write(variable, syntax.Unclear(f"{variable[1:]} of {of}"))
             memory.shared.pop(variable + "%name", None)
 
 
 def _joint_data(memory: ProgramMemory, data: syntax.Value | None) -> None:
-    if isinstance(data, syntax.Record):
-        _all_axes(memory, "$ACC_AXIS", data.get("ACC") or syntax.Unclear("ACC"))
-        _zone_data(memory, data, "#CPTP")
+    _all_axes(memory, "$ACC_AXIS", _field(data, "ACC", "PDAT_ACT"))
+    _zone_data(memory, data, "#CPTP")
 
 
 def _line_data(memory: ProgramMemory, data: syntax.Value | None) -> None:
-    if isinstance(data, syntax.Record):
-        _line_acceleration(memory, _field(data, "ACC", "LDAT_ACT"))
-        _zone_data(memory, data, "#CDIS")
-        memory.write("$ORI_TYPE", data.get("ORI_TYP") or "#VAR")
-        memory.write("$CIRC_TYPE", data.get("CIRC_TYP") or "#BASE")
+    given = syntax.Unclear("LDAT_ACT") if data is None else data
+    _line_acceleration(memory, _field(given, "ACC", "LDAT_ACT"))
+    memory.write("$APO.CDIS", _field(given, "APO_DIST", "LDAT_ACT"))
+    memory.write("$ORI_TYPE", _typed(given, "ORI_TYP", "#VAR"))
+    memory.write("$CIRC_TYPE", _typed(given, "CIRC_TYP", memory.read("DEF_CIRC_TYP") or "#BASE"))
 
 
-def _zone_data(memory: ProgramMemory, data: syntax.Value, usual: str) -> None:
-    """``APO_DIST`` of motion data: mm, or percent of a joint motion."""
-    distance = syntax.number(data.get("APO_DIST")) if isinstance(data, syntax.Record) else None
-    if not isinstance(data, syntax.Record) or distance is None:
-        return
-    mode = data.get("APO_MODE") or usual
-    if mode == "#CPTP":
+def _zone_data(memory: ProgramMemory, data: syntax.Value | None, usual: str) -> syntax.Value:
+    """``APO_DIST`` of a joint motion's data, in percent or mm as its mode, which is returned, says; unclear where one
+    of the two is not known. The other size stays as it is, as in controllers' own bas.src."""
+    given = data.get("APO_MODE") if isinstance(data, syntax.Record) else None
+    mode, distance = given or usual, syntax.number(_field(data, "APO_DIST", "zone"))
+    if distance is None or isinstance(mode, syntax.Unclear):
+        for part in ("CDIS", "CPTP"):
+            memory.write(f"$APO.{part}", syntax.Unclear("APO_DIST"))
+    elif mode == "#CPTP":
         memory.write("$APO.CPTP", min(distance, 100.0))
     else:
         memory.write("$APO.CDIS", distance)
-        memory.write("$APO.CPTP", mode)
+    return mode
 
 
 KINDS: dict[str, instructions.MotionKind] = {"PTP": "joint", "LIN": "line", "CIRC": "arc", "SPL": "spline"}
@@ -522,7 +550,7 @@ EVALUATED = frozenset((*IN_DEGREES, "ATAN2", "INV_POS"))
 READING_TEXT = """
 BAS CHECKHOME CLEAR_KRLMSG CWRITE EKI_CHECKBUFFER EKI_CLEAR EKI_CLEARBUFFER EKI_CLOSE EKI_INIT EKI_LOCK EKI_OPEN
 EKI_SEND EKI_SETBOOL EKI_SETFRAME EKI_SETINT EKI_SETREAL EKI_SETSTRING EKI_UNLOCK EXISTS_KRLMSG MSGINFO MSGLOG MSGNOTIFY
-MSGQUIT MSGSTATE P00 PULSE STRCOMP STRDECLLEN STRFIND STRLEN VARSTATE VAR_STATE
+MSGQUIT MSGSTATE PULSE STRCOMP STRDECLLEN STRFIND STRLEN VARSTATE VAR_STATE
 """
 READING = frozenset(READING_TEXT.split())
 """Functions of a controller that only read their arguments; others, as ``SREAD`` and ``EKI_GETREAL``, may set them."""
@@ -547,8 +575,9 @@ OF_DYNAMICS = (*LOADS_OF_ARM, "$FILTER")
 """System variables that are not followed, and change neither tool nor base nor path: loads on the arm, ramps."""
 DEFAULTS = "$DEF_"
 """How the machine data's own values begin, which the controller has unless a program sets others."""
-RUNNING = ("$CYCFLAG", "$DATE", "$OV_PRO", "$TIMER", "$TIMER_FLAG")
-"""System variables that change after they are set: watches, expressions that are evaluated again and again."""
+RUNNING = ("$CYCFLAG", "$DATE", "$OV_PRO", "$SOFT_PLCBOOL", "$SOFT_PLCINT", "$SOFT_PLCREAL", "$TIMER", "$TIMER_FLAG")
+"""System variables that change after they are set: watches, expressions that are evaluated again and again, what the
+PLC of the controller writes."""
 ORIENTATION_TYPES = {"$ORI_TYPE": ("#VAR", "#CONSTANT"), "$CIRC_TYPE": ("#BASE",)}
 """How the tool may turn on lines and arcs so that they are followed as they are meant."""
 CONTROLLER: dict[str, syntax.Value] = {
@@ -577,6 +606,7 @@ class Settings(NamedTuple):
     speed: instructions.Rate | None
     acceleration: instructions.Rate | None
     zone: instructions.Zone
+    entry: instructions.Zone
     load: instructions.Load | None
 
 
@@ -659,11 +689,11 @@ class KrlDialect(Dialect):
         """Whether motions are followed as a variable asks that is set to a value."""
         if name in ORIENTATION_TYPES:
             return value in ORIENTATION_TYPES[name]
-        if name in CONTROLLER:
+        of, plain = root(name), syntax.number(value)
+        if name in CONTROLLER and of not in HARMLESS_VARIABLES:
             return value == CONTROLLER[name]
         if name in ("$ACT_TOOL", "$ACT_BASE"):
             return name not in self.numbers_only
-        of, plain = root(name), syntax.number(value)
         if of in OF_DYNAMICS:
             return _as_delivered(name, value)
         if of in ("$ACT_EX_AX", "$JOINT_OFFSET"):  # no external axis, no offset
@@ -721,10 +751,10 @@ class KrlDialect(Dialect):
             return frame_record(mapped)
         if name in HERE:
             seen = memory.seen(memory.here, tool_of(memory), base_of(memory))
-            return None if seen is None else _posture(frame_record(seen, "E6POS"), memory.here.joints, name)
+            return None if seen is None else _posture(_read(frame_record(seen, "E6POS")), memory.here.joints, name)
         if name in HERE_JOINTS and memory.here.joints is not None:
             degrees = [math.degrees(each) for each in memory.here.joints]
-            return syntax.Record("E6AXIS", tuple((f"A{i + 1}", each) for i, each in enumerate(degrees)))
+            return _read(syntax.Record("E6AXIS", tuple((f"A{i + 1}", each) for i, each in enumerate(degrees))))
         return None
 
     def function(self, memory: ProgramMemory, name: str, given: syntax.Invocation) -> syntax.Value:
@@ -763,8 +793,7 @@ class KrlDialect(Dialect):
         """PTP, LIN, CIRC and their relatives and splines."""
         if not move.settings:
             return self._motion(memory, move, None)
-        own = _SET.union(name for name, _ in move.settings)
-        kept, doubts = {name: value for name, value in memory.shared.items() if name in own}, dict(memory.doubts)
+        kept, doubts = dict(memory.shared), dict(memory.doubts)
         angle, doubt = None, ""
         for name, expression in move.settings:
             if name == "CA":
@@ -776,17 +805,14 @@ class KrlDialect(Dialect):
             if name not in ORIENTATION_TYPES and not self.is_followed(name, value):
                 doubt = f"{name}={syntax.shown(value)}"
         found = replace(self._motion(memory, move, angle), doubt=doubt)
-        for name in own & memory.shared.keys():
-            del memory.shared[name]
-        memory.shared.update(kept)
-        memory.doubts = doubts
+        memory.shared, memory.doubts = kept, doubts
         memory.kept.clear()
         return found
 
     def _motion(self, memory: ProgramMemory, move: syntax.Move, angle: float | None) -> instructions.ArmMotion:
         plain = move.form.removesuffix("_REL")
         kind = KINDS[plain.removeprefix("S") if plain != "SPL" else plain]
-        tool, base, speed, acceleration, zone, load = _settings(memory, kind, move)
+        tool, base, speed, acceleration, zone, entry, load = _settings(memory, kind, move)
         values = [self._argument(memory, each) for each in move.arguments]
         if len(values) != (2 if kind == "arc" else 1):
             values = [UNREAD, UNREAD]
@@ -821,6 +847,7 @@ class KrlDialect(Dialect):
             turning=(None, None) if kind == "joint" else (_turning(memory, "ORI1"), _turning(memory, "ORI2")),
             turns=self._turns(memory, kind),
             load=load,
+            entry=entry,
         )
 
     def _turns(self, memory: ProgramMemory, kind: instructions.MotionKind) -> str:
@@ -893,17 +920,19 @@ def _left_out(memory: ProgramMemory, argument: syntax.Expression | None, value: 
 
 
 def changed_arguments(call: syntax.Invocation) -> tuple[syntax.Expression | None, ...]:
-    """What a function outside the program may change: all that it is given, as KRL passes by reference."""
+    """What a function outside the program may change: all that it is given, as KRL passes by reference, but for system
+    variables that nothing sets; and the program's number by ``P00``."""
     name = call.function
-    return () if name.startswith("%") or name in EVALUATED | OF_SETTINGS | READING else call.arguments
+    if name == "P00":
+        return (syntax.Variable("PGNO"),)
+    if name.startswith("%") or name in EVALUATED | OF_SETTINGS | READING:
+        return ()
+    return tuple(each for each in call.arguments if each is not None and _is_set(variable_of(each)))
 
 
-_SET = frozenset(
-    (
-        *(*MODAL, "$VEL.CP", "$ACC.CP", "$APO.CDIS", "$APO.CPTP", "$TOOL%name", "$BASE%name"),
-        *(f"${kind}_AXIS[{i}]" for kind in ("VEL", "ACC") for i in range(1, 7)),
-    )
-)
+def _is_set(name: str) -> bool:
+    """Whether a variable may be set: no system variable but those that motions use, outputs and flags."""
+    return not name.startswith("$") or name in (*MODAL, "$ANOUT", "$FLAG", "$OUT")
 
 
 def _settings(memory: ProgramMemory, kind: instructions.MotionKind, move: syntax.Move) -> Settings:
@@ -917,6 +946,7 @@ def _settings(memory: ProgramMemory, kind: instructions.MotionKind, move: syntax
             _speed(memory, kind),
             _acceleration(memory, kind),
             _zone(memory, kind, move.words),
+            _zone(memory, kind, ("C_PTP",) if kind == "joint" else ("C_DIS",)),
             _load(memory),
         )
         memory.kept[key] = found
@@ -957,9 +987,12 @@ def _axis_share(memory: ProgramMemory, name: str) -> instructions.Rate | None:
 
 
 def _zone(memory: ProgramMemory, kind: instructions.MotionKind, words: tuple[str, ...]) -> instructions.Zone:
-    word = next((word for word in words if word.startswith("C_")), None)
-    if word is None:
+    given = [word for word in words if word.startswith("C_")]
+    if not given:
         return instructions.FINE
+    word = given[0]
+    if kind == "joint" and {"C_ORI", "C_VEL"}.intersection(given):  # which hold on the line or arc after it
+        return instructions.Zone("named", 0.0, " ".join(given))
     distance, joint_zone = syntax.number(memory.read("$APO.CDIS")), memory.read("$APO.CPTP")
     share = syntax.number(joint_zone)
     if (word == "C_PTP" or (word == "C_SPL" and kind == "joint")) and share is not None:

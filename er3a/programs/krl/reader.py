@@ -9,6 +9,7 @@ import math
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -34,6 +35,7 @@ from er3a.programs.krl.dialect import (
     HERE_JOINTS,
     MODAL,
     MODAL_DATA,
+    POSITION_KINDS,
     READ_BY_NUMBER,
     changed_arguments,
     record_pose,
@@ -129,10 +131,11 @@ PTP LIN CIRC PTP_REL LIN_REL CIRC_REL SPTP SLIN SCIRC SPL SPTP_REL SLIN_REL SCIR
 """
 MOTIONS = frozenset(WORDS_OF_MOTIONS.split())
 WORDS_ASIDE = """
-EXT EXTFCT IMPORT ENUM CONTINUE ANOUT BRAKE CONST_VEL ON_ERROR_PROCEED STOP
+EXT EXTFCT IMPORT ENUM CONTINUE ANOUT BRAKE CONST_VEL STOP
 """
 ASIDES = frozenset(WORDS_ASIDE.split())
 WITH_VALUES = frozenset(["ANOUT", "CONST_VEL", "STOP"])  # of these
+TYPES = frozenset(["INT", "REAL", "BOOL", "CHAR", *POSITION_KINDS])
 OUTER_AXES = frozenset(["ASYPTP", "ASYCONT", "ASYSTOP", "ASYCANCEL"])  # which run beside the arm's own
 Handler = Callable[["_Statement"], None]
 
@@ -149,6 +152,7 @@ def statement(
         builder.add(syntax.Assign(place, syntax.Variable(plain[2].upper()), found, text, plain[1].upper()))
         return
     reading = _Statement(builder, place, text, signals, inside_data)
+    first, ahead = len(builder.code), _runs_ahead(builder)
     try:
         reading.read()
     except MisreadError as error:
@@ -158,6 +162,22 @@ def statement(
         builder.unread(place, text, not inside_data, folds=True)
     except RecursionError:
         raise InputError(place.file, place.where, "nested too deeply", "Split this line") from None
+    if ahead or reading.denoted:
+        meant = partial(_meant, signals=reading.denoted, ahead=text if ahead else "")
+        builder.code[first:] = [mapped(each, meant) for each in builder.code[first:]]
+
+
+def _meant(expression: syntax.Expression, signals: Mapping[str, syntax.Expression], ahead: str) -> syntax.Expression:
+    """An expression with the outputs that routines get by the names of signals; where the arm is, is not known of a
+    line that runs ``ahead`` of it, if that is not empty."""
+    if isinstance(expression, syntax.Variable) and ahead and expression.name in (*HERE, *HERE_JOINTS):
+        return syntax.Constant(syntax.Unclear(f"{ahead} after CONTINUE"))
+    if isinstance(expression, syntax.Invocation):
+        given = (
+            signals.get(each.name, each) if isinstance(each, syntax.Variable) else each for each in expression.arguments
+        )
+        expression = replace(expression, arguments=tuple(given))
+    return within(expression, partial(_meant, signals=signals, ahead=ahead))
 
 
 class _Statement:
@@ -169,6 +189,16 @@ class _Statement:
         self.builder, self.place, self.text, self.signals = builder, place, text, signals
         self.inside_data = inside_data
         self.words = KrlWords(text)
+        self.denoted = self._denoted()
+
+    def _denoted(self) -> dict[str, syntax.Expression]:
+        """Signals that the line names, but for those whose names the routine has for something of its own."""
+        named = self.signals.keys() & set(self.words.texts)
+        if not named:
+            return {}
+        own = {variable_of(each.target) for each in self.builder.code if isinstance(each, syntax.Assign) and each.local}
+        own.update(each.name for each in self.builder.parameters)
+        return {name: self.signals[name] for name in named - own}
 
     def read(self) -> None:
         words, first = self.words, self.words.next
@@ -180,7 +210,7 @@ class _Statement:
         elif first in HANDLERS and words.texts[words.at + 1] != "=":
             words.take()
             HANDLERS[first](self)
-        elif first in ASIDES:
+        elif first in ASIDES and words.texts[words.at + 1] != "=":
             _aside(self)
         elif first in OUTER_AXES:
             self.builder.unknown(self.place, self.text, may_move=False)
@@ -205,8 +235,10 @@ class _Statement:
         return found
 
     def _declares(self) -> bool:
+        """Whether two names stand there; among instructions, unless the first is a type, they are no declaration."""
         kinds, texts = self.words.kinds, self.words.texts
-        return kinds[0] == "name" == kinds[1] and len(texts) > 2 and texts[2] in ("", "=", ",", "[")
+        named = kinds[0] == "name" == kinds[1] and len(texts) > 2 and texts[2] in ("", "=", ",", "[")
+        return named and (self.inside_data or texts[0] in TYPES or not any(map(_acts, self.builder.code)))
 
     def _declaration(self) -> None:
         words = self.words
@@ -225,7 +257,8 @@ class _Statement:
         if words.accept("SIGNAL"):
             name, signal = words.name(), words.expression()
             if words.accept("TO"):  # several, of which it is not known what each has when they are set as a number
-                signal = syntax.Element(syntax.Variable(variable_of(signal)), (syntax.Opaque(name),))
+                one_of_them = syntax.Constant(syntax.Unclear(name))
+                signal = syntax.Element(syntax.Variable(variable_of(signal)), (one_of_them,))
             self.signals[name] = signal
             self.builder.aside(self.place, self.text)
             return
@@ -249,8 +282,6 @@ class _Statement:
         if words.accept("="):
             value = words.expression()
             words.finish()
-            if _runs_ahead(self.builder) and any(_names(value, each) for each in (*HERE, *HERE_JOINTS)):
-                value = syntax.Constant(syntax.Unclear(f"{self.text} after CONTINUE"))
             self.builder.add(syntax.Assign(self.place, left, value, self.text))
             return
         words.finish()
@@ -261,7 +292,7 @@ class _Statement:
     def known(self, expression: syntax.Expression) -> syntax.Expression:
         """The signal that a name denotes."""
         if isinstance(expression, syntax.Variable):
-            return self.signals.get(expression.name, expression)
+            return self.denoted.get(expression.name, expression)
         return expression
 
     def _motion(self, form: str) -> None:
@@ -298,6 +329,11 @@ class _Statement:
                 return settings
 
 
+def _acts(operation: syntax.Operation) -> bool:
+    """Whether an operation is more than a declaration."""
+    return not isinstance(operation, syntax.Fixed) and not (isinstance(operation, syntax.Assign) and operation.local)
+
+
 def _text_of(expression: syntax.Expression) -> str:
     match expression:
         case syntax.Variable(name=name):
@@ -326,10 +362,18 @@ def _for(reading: _Statement) -> None:
     reading.builder.open_for(reading.place, name, first, last, step, reading.text)
 
 
+def _switch(reading: _Statement) -> None:
+    """What is asked is worked out once, though each CASE compares it."""
+    asked = syntax.Variable(f"%asked{len(reading.builder.code)}")
+    reading.builder.add(syntax.Assign(reading.place, asked, reading.condition(), "", local=True))
+    reading.builder.open_switch(reading.place, asked, reading.text)
+
+
 def _case(reading: _Statement) -> None:
     values = [reading.words.expression()]
     while reading.words.accept(","):
         values.append(reading.words.expression())
+    reading.words.finish()
     reading.builder.case(reading.place, values, reading.text)
 
 
@@ -344,12 +388,6 @@ def _wait(reading: _Statement) -> None:
     words.expect("FOR")
     text = re.sub(r"(?i)^WAIT\s+FOR\s*", "", reading.text)
     reading.builder.add(syntax.Waiting(reading.place, "condition", reading.condition(), text, stops))
-
-
-def _names(expression: syntax.Expression, name: str) -> bool:
-    """Whether a variable is in an expression."""
-    own = isinstance(expression, syntax.Variable) and expression.name == name
-    return own or any(_names(each, name) for each in syntax.inner(expression))
 
 
 def _runs_ahead(builder: CodeBuilder) -> bool:
@@ -394,7 +432,7 @@ def _interrupt(reading: _Statement) -> None:
 
 
 def _do(reading: _Statement, at_any_time: bool = False) -> None:
-    """A routine after DO, which runs whenever a condition holds; or an assignment, from which on the value is unclear.
+    """A routine after DO, which runs whenever a condition holds; or an assignment, so that the value is nowhere known.
 
     An interrupt (``at_any_time``) may assign again and again: it is named.
     """
@@ -410,11 +448,15 @@ def _do(reading: _Statement, at_any_time: bool = False) -> None:
         if what.function == "PULSE":
             reading.builder.unclear(reading.place, "$OUT")
     elif words.accept("="):
+        target = reading.known(what)
         if at_any_time:
             reading.builder.unknown(reading.place, reading.text, may_move=False)
-        else:
+        if variable_of(target).startswith("$"):
             reading.builder.aside(reading.place, reading.text)
-        reading.builder.unclear(reading.place, variable_of(reading.known(what)))
+        else:  # later than lines after it, as the program runs ahead of the arm
+            changed = syntax.Invocation(syntax.CYCLIC, (target,))
+            reading.builder.beside(reading.place, changed, reading.text, "interrupt")
+        reading.builder.unclear(reading.place, variable_of(target))
     else:
         raise MisreadError("DO calls no routine and sets nothing")
 
@@ -449,6 +491,13 @@ def _structure(reading: _Statement) -> None:
     reading.builder.add(syntax.Assign(reading.place, syntax.Variable(f"{STRUCTURE}{name}"), shape, reading.text))
 
 
+def _on_error_proceed(reading: _Statement) -> None:
+    """The next line may fail, and the program goes on; in the controller's bas.src it asks what is there, and it is."""
+    number: syntax.Value = 0 if is_basics(reading.place.file or Path()) else syntax.Unclear("$ERR.NUMBER")
+    target, value = syntax.Variable("$ERR.NUMBER"), syntax.Constant(number)
+    reading.builder.add(syntax.Assign(reading.place, target, value, reading.text))
+
+
 def _goto(reading: _Statement) -> None:
     reading.builder.goto(reading.place, reading.words.name())
 
@@ -469,7 +518,7 @@ HANDLERS: dict[str, Handler] = {
     "ENDFOR": _simple(lambda builder, place: builder.close("for", place)),
     "REPEAT": _simple(lambda builder, place: builder.open_repeat(place)),
     "UNTIL": lambda reading: reading.builder.close("repeat", reading.place, reading.condition(), reading.text),
-    "SWITCH": lambda reading: reading.builder.open_switch(reading.place, reading.condition(), reading.text),
+    "SWITCH": _switch,
     "CASE": _case,
     "DEFAULT": _simple(lambda builder, place: builder.case(place, None, "")),
     "ENDSWITCH": _simple(lambda builder, place: builder.close("switch", place)),
@@ -483,6 +532,7 @@ HANDLERS: dict[str, Handler] = {
     "INTERRUPT": _interrupt,
     "STRUC": _structure,
     "TRIGGER": _do,
+    "ON_ERROR_PROCEED": _on_error_proceed,
     "RESUME": lambda reading: reading.builder.unknown(reading.place, reading.text),  # the arm stops where it is
     "SPLINE": lambda reading: _spline(reading),
     "PTP_SPLINE": lambda reading: _spline(reading),
@@ -506,6 +556,7 @@ def _spline(reading: _Statement) -> None:
 
 
 GLOBAL_ROUTINE = re.compile(r"(?im)^\s*GLOBAL\s+DEF(?:FCT\s+\w+(?:\s*\[[^\]]*\])?)?\s+(\w+)")
+GLOBAL_SIGNAL = re.compile(r"(?i)\s*(?:DECL\s+)?GLOBAL\s+SIGNAL\b")
 NAME = re.compile(r"[A-Za-z_$][\w$]*")
 SETTING = re.compile(r"\(|(?<![=<>])=(?!=)")
 
@@ -520,24 +571,26 @@ def apart(
     """
     routines, data, module = list(routines), list(data), source.path.stem.upper()
     seen = {module, *(name.upper() for name in GLOBAL_ROUTINE.findall(source.text))}
-    own = {
-        each.target.name
-        for each in data
-        if isinstance(each.target, syntax.Variable) and not GLOBAL_NAME.search(each.text)
-    }
+    own = {variable_of(each.target) for each in data} - _global_names(data)
     own |= {routine.name for routine in routines} - seen
     names = {name: f"{module}/{name}" for name in own if not name.startswith(("$", "%"))}
 
     return [_with_names(each, names) for each in routines], [_as(each, names) for each in data]
 
 
+def _global_names(data: Iterable[syntax.Assign]) -> set[str]:
+    """Variables that data declare for all modules; lines that set their elements say so no more."""
+    return {variable_of(each.target) for each in data if GLOBAL_NAME.search(each.text)}
+
+
 def _seen_here_alone(
     source: ProgramText, routines: Iterable[syntax.Routine], data: Iterable[syntax.Assign]
 ) -> dict[str, str]:
     """Names of a program's own routines and data, which other modules do not see, with what those mean by them."""
-    own, module = data_file_of(source.path, ".dat"), source.path.stem.upper()
+    file, module = data_file_of(source.path, ".dat"), source.path.stem.upper()
     seen = {module, *(name.upper() for name in GLOBAL_ROUTINE.findall(source.text))}
-    names = {variable_of(each.target) for each in data if each.place.file == own and not GLOBAL_NAME.search(each.text)}
+    own = [each for each in data if each.place.file == file]
+    names = {variable_of(each.target) for each in own} - _global_names(own)
     names |= {routine.name for routine in routines} - seen
     return {name: f"/{name}" for name in names if not name.startswith(("$", "%"))}
 
@@ -594,7 +647,9 @@ def read_krl(source: ProgramText) -> syntax.Program:
     reader, files = _KrlReader(source), ControllerFiles(source.path)
     findings: list[ProgramFinding] = [*source.findings]
     if files.config is not None:
-        reader.read_data(read_program_text(files.config))
+        findings += reader.read_data(read_program_text(files.config))
+    for file in files.public_data:
+        reader.read_signals(file)
     of_controller = dict(reader.signals)
     findings += reader.read_published(files.published)
     data_file = data_file_of(source.path, ".dat")
@@ -602,19 +657,22 @@ def read_krl(source: ProgramText) -> syntax.Program:
         findings += reader.read_data(read_program_text(data_file))
     routines = reader.read_routines()
     findings += [*_robot_root(files.machine_data), *files.twice()]
-    shared = _known_to_all(files, reader.data, data_file)
-    others = _SetByOthers(files, shared, of_controller)
     called: list[syntax.Routine] = []
     hidden = _seen_here_alone(source, routines, reader.data)
+    seen_by_all = [each for each in reader.data if each.place.file != data_file or GLOBAL_NAME.search(each.text)]
     reader.data = [each if each.place.file == data_file else _as(each, hidden) for each in reader.data]
     for file in files.modules:
         more_routines, more_data, more = _module(read_program_text(file), of_controller)
+        seen_by_all += [each for each in more_data if GLOBAL_NAME.search(each.text)]
         called += [_with_names(each, hidden) for each in more_routines]
         reader.data += [_as(each, hidden) for each in more_data]
         findings += more
+    findings += _structures_twice(reader.data)
+    shared = _known_to_all(files, seen_by_all)
+    others = _SetByOthers(files, shared, of_controller)
     unread = (each for each in files.unread if shared or each.suffix.lower() == ".sub")  # which sets outputs too
     findings += [NotUnderstood(file.name, Place(file, 1)) for file in unread]
-    if data_file is None and lacks_data(routines, reader.data, CONFIG_NAMES):
+    if data_file is None and lacks_data(routines, reader.data, CONFIG_NAMES | reader.signals.keys()):
         findings.append(DataFileMissing(source.path.with_suffix(".dat").name))
     by_name, unlinked = linked([*called, *routines], changed_arguments)
     return syntax.Program(
@@ -629,6 +687,15 @@ def read_krl(source: ProgramText) -> syntax.Program:
         beside=others.beside(),
         elsewhere=tuple(others.elsewhere(_uncalled([*called, *routines], routines[0].name, hidden)).items()),
     )
+
+
+def _structures_twice(data: Iterable[syntax.Assign]) -> Iterable[NameTwice]:
+    """Types of one name that modules declare otherwise, of which the last is taken for all."""
+    shapes: dict[str, syntax.Expression | None] = {}
+    for each in data:
+        name = variable_of(each.target)
+        if name.startswith(STRUCTURE) and shapes.setdefault(name, each.value) != each.value:
+            yield NameTwice(name.removeprefix(STRUCTURE), each.place)
 
 
 def _uncalled(routines: Iterable[syntax.Routine], entry: str, hidden: Mapping[str, str]) -> list[syntax.Routine]:
@@ -654,12 +721,11 @@ def _reached(by_name: Mapping[str, syntax.Routine], names: list[str]) -> dict[st
     return found
 
 
-def _known_to_all(files: ControllerFiles, data: Iterable[syntax.Assign], own: Path | None) -> frozenset[str]:
-    """Variables that all modules see, as those of $config.dat, of those that the program uses."""
+def _known_to_all(files: ControllerFiles, seen: Iterable[syntax.Assign]) -> frozenset[str]:
+    """Variables of data that all modules see, as those of $config.dat, of those that the program uses."""
     texts = (files.text(each) for each in (files.path, *files.modules))
     used = {name.upper() for text in texts for name in NAME.findall(text)} | {*READ_BY_NUMBER, *MODAL_DATA}
-    known = (variable_of(each.target) for each in data if each.place.file != own or GLOBAL_NAME.search(each.text))
-    return frozenset(used.intersection(known))
+    return frozenset(used.intersection(variable_of(each.target) for each in seen))
 
 
 Signals = Mapping[str, syntax.Expression]
@@ -698,6 +764,16 @@ class _KrlReader:
                 self.data.append(each)
         return found
 
+    def read_signals(self, file: Path) -> None:
+        """The signals that a ``.dat`` file declares for all modules."""
+        source = read_program_text(file)
+        for number, line in enumerate(source.lines, 1):
+            if GLOBAL_SIGNAL.match(line):
+                place = Place(file, number)
+                statement(
+                    CodeBuilder("", (), place), place, split_comment(line, place)[0], self.signals, inside_data=True
+                )
+
     def read_published(self, files: Iterable[Path]) -> list[ProgramFinding]:
         """What ``.dat`` files of modules that a program does not call declare for all modules."""
         known, found = {variable_of(each.target) for each in self.data}, list[ProgramFinding]()
@@ -707,10 +783,10 @@ class _KrlReader:
                 other.read_data(other.source)
             except InputError:
                 continue  # what it declares has no known value
+            shown = _global_names(other.data)
             for each in other.data:
-                if GLOBAL_NAME.search(each.text):
-                    name = variable_of(each.target)
-                    found += [NameTwice(name, each.place)] if name in known else []
+                if (name := variable_of(each.target)) in shown:
+                    found += [NameTwice(name, each.place)] if each.type_name and name in known else []
                     self.data.append(each)
             known |= {variable_of(each.target) for each in self.data}
         return found
@@ -870,6 +946,9 @@ class _SetByOthers:
         for call in _invocations(operation):
             routine = self._routine(call.function)
             given = (syntax.Variable("$OUT"),) if call.function == "PULSE" else changed_arguments(call)
+            if call.function == "CWRITE":  # a command may set what its text names
+                texts = (str(each.value) for each in call.arguments if isinstance(each, syntax.Constant))
+                given = tuple(syntax.Variable(name.upper()) for text in texts for name in NAME.findall(text))
             if routine is not None:
                 changed = self._changed(routine)
                 pairs = zip(routine.parameters, call.arguments)
@@ -915,18 +994,26 @@ def _invocations(operation: syntax.Operation) -> Iterable[syntax.Invocation]:
         waiting += syntax.inner(each)
 
 
-ROBROOT = re.compile(r"(?i)^\s*(?:FRAME\s+)?\$ROBROOT\s*=\s*\{\s*(?:FRAME\s*:)?([^}]*)\}")
+ROBROOT = re.compile(r"(?i)\s*(?:(?:DECL|GLOBAL|CONST|FRAME)\s+)*\$ROBROOT(\.\w+)?\s*=\s*([^;]*)")
+NO_OFFSET = re.compile(r"[-+]?0*\.?0*(?:[eE][-+]?\d+)?\s*")
 
 
 def _robot_root(file: Path | None) -> Iterable[ProgramFinding]:
     """That the machine data put the robot elsewhere than at the origin of the world, in which bases are given."""
     source = None if file is None else read_program_text(file)
     for number, line in enumerate(source.lines, 1) if source else ():
-        if (match := ROBROOT.match(line)) is not None:
-            root = plain_record("FRAME", match[1])
-            pose = None if root is None else record_pose(root.value)
-            if pose is None or not np.allclose(pose, np.eye(4)):
-                yield NotSimulated(match[0].strip(), Place(file, number))
+        if (match := ROBROOT.match(line)) is not None and not _is_origin(match[2], whole=not match[1]):
+            yield NotSimulated(match[0].strip(), Place(file, number))
+
+
+def _is_origin(text: str, whole: bool) -> bool:
+    """Whether a frame, or a coordinate of one, is 0."""
+    if not whole:
+        return NO_OFFSET.fullmatch(text) is not None
+    frame = re.fullmatch(r"(?i)\{\s*(?:FRAME\s*:)?([^}]*)\}\s*", text)
+    root = None if frame is None else plain_record("FRAME", frame[1])
+    pose = None if root is None else record_pose(root.value)
+    return pose is not None and bool(np.allclose(pose, np.eye(4)))
 
 
 def companions(path: Path) -> tuple[Path, ...]:

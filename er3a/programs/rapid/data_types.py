@@ -273,6 +273,8 @@ def external_axes(value: Value | None) -> tuple[tuple[str, float], ...]:
     """Axes beside the arm that an extjoint moves: those that are there and not at 0; NaN where that is not known."""
     if not isinstance(value, Record):
         value = typed(value, EXTJOINT) if value is not None else None
+    if isinstance(value, Unclear):
+        return (("extax", math.nan),)
     if not isinstance(value, Record):
         return ()
     given = ((name.lower(), math.nan if isinstance(each, Unclear) else number(each)) for name, each in value.items)

@@ -141,6 +141,10 @@ class RapidDialect(Dialect):
             return frame_of_tool(value)[0]
         return frame_of_object(value)[0] if kind == "WOBJDATA" else None
 
+    def starts_anew(self, data: syntax.Assign) -> bool:
+        """Whether it is a VAR, which has its first value again where the program pointer is set to main."""
+        return data.text.upper().startswith("VAR")
+
     def function(self, memory: ProgramMemory, name: str, given: syntax.Invocation) -> syntax.Value:
         """Mathematics, positions, where the arm is; what is unknown, or called otherwise, is unclear."""
         values = tuple(UNCLEAR if each is None else memory.value(each) for each in given.arguments)
@@ -181,7 +185,7 @@ class RapidDialect(Dialect):
         if form in reader.SEARCHES:  # signal, the point sought, targets, speed and tool; no zone
             placed = [*placed[2:-1], None, placed[-1]] if len(placed) == 5 + arc else []
         targets = 2 if arc else 1
-        if len(placed) < targets + 3:
+        if not targets + 3 <= len(placed) <= targets + 3 + _beside_motion(form):
             unknown = instructions.UnresolvedTarget(move.text, "not_understood")
             return instructions.ArmMotion(kind, unknown, form, unknown if arc else None)
         at_end = form.startswith("TRIGG")
@@ -199,7 +203,8 @@ class RapidDialect(Dialect):
         ]
         speed, turn = _speed(memory, values[targets], options, kind)
         zone = instructions.FINE if form in reader.SEARCHES else _zone(values[zone_at], options, placed[zone_at])
-        memory.write(reader.PASSING, zone.kind != "fine" or "CONC" in options)
+        stops = zone.kind == "fine" and (form in reader.SEARCHES or _stops(values[zone_at], options))
+        memory.write(reader.PASSING, not stops or "CONC" in options)
         via = made[0] if arc else None
         if isinstance(via, instructions.PoseTarget):
             via = replace(via, branch=None)
@@ -296,6 +301,14 @@ class RapidDialect(Dialect):
             or name in ASKED
             or name in ASIDE_NAMED | reader.WAITS
         )
+
+
+def _beside_motion(form: str) -> int:
+    """How many arguments a motion has beside targets, speed, zone and tool: an output and its value, a procedure, an
+    event."""
+    if form.endswith(("DO", "AO", "GO")):
+        return 2
+    return 1 if form.endswith("SYNC") or form in ("TRIGGJ", "TRIGGL", "TRIGGC", "TRIGGABSJ") else 0
 
 
 SPELLED = {
@@ -513,6 +526,12 @@ def _acceleration(memory: ProgramMemory, kind: instructions.MotionKind) -> instr
         return instructions.Rate(min(given), "m/s2")
     percent = syntax.number(memory.read("%ACC"))
     return None if percent is None else instructions.Rate(percent / 100, "share")
+
+
+def _stops(value: syntax.Value, options: Mapping[str, syntax.Value]) -> bool:
+    """Whether a program waits until the arm is at the target: a zone of no size is none at which it does."""
+    finep = data_types.part(data_types.typed(value, data_types.ZONEDATA), "FINEP")
+    return "INPOS" in options or ("Z" not in options and finep is True)
 
 
 def _zone(value: syntax.Value, options: Mapping[str, syntax.Value], expression: object) -> instructions.Zone:
@@ -763,7 +782,8 @@ def _of_data(name: str, values: tuple[syntax.Value, ...], named: Mapping[str, sy
             xyz = data_types.plain(values[0], 3)
             return None if xyz is None else float(np.linalg.norm(xyz))
         case "TRUNC" | "ROUND" if plain_values is not None:
-            return _rounded(name, values[0], syntax.number(named.get("DEC")) or 0)
+            digits = 0.0 if named.get("DEC", reader.ABSENT) == reader.ABSENT else syntax.number(named["DEC"])
+            return None if digits is None else _rounded(name, values[0], digits)
         case "DIM":
             return _dimension(values)
         case "PRESENT":
@@ -772,7 +792,9 @@ def _of_data(name: str, values: tuple[syntax.Value, ...], named: Mapping[str, sy
             return len(values[0])
         case "STRPART" if isinstance(values[0], str):
             start, length = syntax.number(values[1]), syntax.number(values[2])
-            return None if start is None or length is None else values[0][int(start) - 1 : int(start) - 1 + int(length)]
+            if start is None or length is None or not 1 <= start <= start + length <= len(values[0]) + 1:
+                return None
+            return values[0][int(start) - 1 : int(start) - 1 + int(length)]
         case "NUMTOSTR" if plain_values is not None:
             return f"{plain_values[0]:.{int(plain_values[1])}f}" if 0 <= plain_values[1] <= 15 else None
         case "VALTOSTR" if isinstance(values[0], (int, float)) and not isinstance(values[0], bool):
@@ -835,6 +857,8 @@ def _rounded(name: str, given: syntax.Value, digits: float) -> syntax.Value:
 def _dimension(values: tuple[syntax.Value, ...]) -> syntax.Value | None:
     """2 Dim: how many elements an array has in a dimension."""
     found, level = values[0], syntax.number(values[1])
-    for _ in range(int(level or 1) - 1):
+    if level is None:
+        return None
+    for _ in range(int(level) - 1):
         found = found[0] if isinstance(found, tuple) and found else ()
     return len(found) if isinstance(found, tuple) and found else None

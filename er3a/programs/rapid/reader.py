@@ -15,7 +15,16 @@ from pathlib import Path
 
 from er3a.errors import InputError
 from er3a.programs import syntax
-from er3a.programs.code_builder import CodeBuilder, fault, linked, mapped, within
+from er3a.programs.code_builder import (
+    CodeBuilder,
+    fault,
+    linked,
+    mapped,
+    not_understood,
+    variable_of,
+    variables,
+    within,
+)
 from er3a.programs.instructions import Place
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, read_program_text
 from er3a.programs.program_findings import BegunWithin, NameTwice, NotSimulated, NotUnderstood, ProgramFinding
@@ -78,13 +87,17 @@ CHANGING = {
     "BITSET": 0,
     "WAITTESTANDSET": 0,
     "IVARVALUE": 2,
+    "SETUPCYCLICBOOL": 0,
 }
 """Instructions that change one of their arguments, by its number."""
-CHANGING_OPTIONS = frozenset(("TIMEFLAG", "VALUE", "VALUEATTIMEOUT", "BREAKFLAG", "ERRORNUMBER"))
+CHANGING_OPTIONS = frozenset(("TIMEFLAG", "VALUE", "VALUEATTIMEOUT", "BREAKFLAG", "ERRORNUMBER", "RESULT"))
 """Optional arguments that instructions and functions change."""
-READING = ("READ", "GET", "UNPACK", "RMQGET", "RMQREAD", "SOCKETRECEIVE", "SOCKETACCEPT", "UIMSGBOX", "PACK", "COPYRAW")
+READING = (
+    *("READ", "GET", "UNPACK", "RMQGET", "RMQREAD", "RMQSENDWAIT", "SOCKETRECEIVE", "SOCKETACCEPT", "UIMSGBOX"),
+    *("PACK", "COPYRAW"),
+)
 """How instructions begin that may change any variable that they are given."""
-CHANGING_FUNCTIONS = {"STRTOVAL": 1, "TESTANDSET": 0, "GETNEXTSYM": 0}
+CHANGING_FUNCTIONS = {"STRTOVAL": 1, "TESTANDSET": 0, "GETNEXTSYM": 0, "GETNEXTMECHUNIT": 1, "READDIR": 1}
 """Functions that change one of their arguments, by its number."""
 WAITS = frozenset(
     (
@@ -268,10 +281,9 @@ def read_rapid(source: ProgramText) -> syntax.Program:
     for cursor in cursors:
         module, own_module = cursor.source.path.stem.upper(), cursor.source is source
         private = {} if own_module else {name: f"{module}/{name}" for name in _private(cursor.tokens)}
-        reader = _ModuleReader(cursor, Scope(types, private), procedures)
-        reader.read()
-        readers.append(reader)
-        findings += [*cursor.source.findings, *reader.findings]
+        readers.append(_ModuleReader(cursor, Scope(types, private), procedures))
+    _read_in_turn(readers)
+    findings += [each for reader in readers for each in (*reader.cursor.source.findings, *reader.findings)]
     own = [each for each in readers[-1].routines if each.name not in readers[-1].traps]
     data = [each for reader in readers for each in reader.data]
     names = [each.target.name for each in data if isinstance(each.target, syntax.Variable)]
@@ -293,7 +305,7 @@ def read_rapid(source: ProgramText) -> syntax.Program:
         source.path,
         by_name,
         entry,
-        tuple(data),
+        _in_order(data),
         (*findings, *unlinked),
         source.lines,
         beside=frozenset(
@@ -301,6 +313,41 @@ def read_rapid(source: ProgramText) -> syntax.Program:
         ),
         cyclic=entry == "MAIN",
     )
+
+
+def _read_in_turn(readers: Iterable[_ModuleReader]) -> None:
+    """Types, then data, then routines, of all modules: a routine may use what stands in a module after its own."""
+    readers = list(readers)
+    for reader in readers:
+        reader.find()
+    for reader in readers * 2:  # one type may be made of another that stands later
+        reader.read_types()
+    for reader in readers:
+        reader.read_data()
+    shared = {
+        name: shape
+        for reader in readers
+        for name, shape in reader.scope.shapes.items()
+        if name not in reader.scope.private
+    }
+    for reader in readers:
+        reader.scope.shapes = shared | reader.scope.shapes
+        reader.read_routines()
+
+
+def _in_order(data: list[syntax.Assign]) -> tuple[syntax.Assign, ...]:
+    """Data with those first that others are made of, in whatever module they stand."""
+    found: list[syntax.Assign] = []
+    while data:
+        names = {variable_of(each.target) for each in data}
+        later: list[syntax.Assign] = []
+        for each in data:
+            ready = each.value is None or names.isdisjoint(variables(each.value))
+            (found if ready else later).append(each)
+        if len(later) == len(data):  # of each other
+            break
+        data = later
+    return (*found, *data)
 
 
 def changed_arguments(call: syntax.Invocation) -> list[syntax.Expression | None]:
@@ -346,7 +393,7 @@ def _procedures(tokens: list[Token]) -> dict[str, int]:
             if at < len(tokens) and tokens[at].text != ")":
                 count = 1 if tokens[at].text != "\\" else 0
                 while at < len(tokens) and tokens[at].text != ")":
-                    count += tokens[at].text == "," and tokens[min(at + 1, len(tokens) - 1)].text != "\\"
+                    count += tokens[at].text == "," and tokens[min(at + 1, len(tokens) - 1)].text not in "\\*"
                     at += 1
             found[tokens[i + 1].text] = count
     return found
@@ -441,9 +488,12 @@ class _ModuleReader:
         self.data: list[syntax.Assign] = []
         self.findings: list[ProgramFinding] = []
         self.goes_on = any(each.text == "TRYNEXT" for each in cursor.tokens)
+        self.types_at: list[int] = []
+        self.data_at: list[int] = []
+        self.routines_at: list[int] = []
 
-    def read(self) -> None:
-        """Declarations and routines."""
+    def find(self) -> None:
+        """Where types, data and routines begin: they are read one kind after another, in all modules of the program."""
         while (token := self.cursor.next()) is not None:
             if token.text in ("MODULE", "ENDMODULE") and token.kind == "name":
                 self._skip_head(token)
@@ -451,22 +501,47 @@ class _ModuleReader:
             first = self.cursor.at
             while self.cursor.word() in ("LOCAL", "TASK"):
                 self.cursor.at += 1
-            word = self.cursor.word()
+            word, begin, place = self.cursor.word(), self.cursor.at, self.cursor.place()
             if word in DECLARED:
-                builder = CodeBuilder("", (), self.cursor.place())
-                self.declaration(builder, self.scope, local=False)
-                self._keep(builder)
-            elif word == "RECORD":
-                self._record()
+                self.data_at.append(begin)
+                self.cursor.simple()
             elif word == "ALIAS":
-                _, kind, name, *_ = [*self.cursor.simple(), *[Token("end", "", "", 0, 0, 0)] * 3]
-                self.scope.types[name.text] = self.scope.types.get(kind.text, (kind.text,))
-            elif word in ("PROC", "FUNC", "TRAP"):
-                self._routine(word)
+                self.types_at.append(begin)
+                self.cursor.simple()
+            elif word in ("RECORD", "PROC", "FUNC", "TRAP"):
+                (self.types_at if word == "RECORD" else self.routines_at).append(begin)
+                self.cursor.until(f"END{word}")
+                if word == "RECORD" and not self.cursor.word():
+                    raise fault(place, "the RECORD that begins here has no end", "Close it with ENDRECORD")
+                self.cursor.at += 1
             else:
                 self.cursor.at = first
                 place, text = self.cursor.place(), self.cursor.text(self.cursor.simple())
                 self.findings.append(NotUnderstood(text, place))
+
+    def read_types(self) -> None:
+        """Records, and other names of types."""
+        for at in self.types_at:
+            self.cursor.at = at
+            if self.cursor.word() == "RECORD":
+                self._record()
+            else:
+                _, kind, name, *_ = [*self.cursor.simple(), *[Token("end", "", "", 0, 0, 0)] * 3]
+                self.scope.types[name.text] = self.scope.types.get(kind.text, (kind.text,))
+
+    def read_data(self) -> None:
+        """Declarations outside routines."""
+        for at in self.data_at:
+            self.cursor.at = at
+            builder = CodeBuilder("", (), self.cursor.place())
+            self.declaration(builder, self.scope, local=False)
+            self._keep(builder)
+
+    def read_routines(self) -> None:
+        """Routines, once the types of all data are known."""
+        for at in self.routines_at:
+            self.cursor.at = at
+            self._routine(self.cursor.word())
 
     def _keep(self, builder: CodeBuilder) -> None:
         for each in builder.code:
@@ -478,8 +553,7 @@ class _ModuleReader:
     def _skip_head(self, token: Token) -> None:
         self.cursor.at += 1
         if token.text == "MODULE":
-            while (name := self.cursor.next()) is not None and name.line == token.line and name.text != "(":
-                self.cursor.at += 1
+            self.cursor.take()
             if (after := self.cursor.next()) is not None and after.text == "(":
                 self.cursor.until(")")
                 self.cursor.at += 1
@@ -574,24 +648,28 @@ def _parameters(tokens: list[Token], scope: Scope, place: Place) -> list[syntax.
         if len(words) >= 2:
             kind, name = words[-2], words[-1]
             shape = scope.types.get(kind, (kind,))
-            scope.shapes[name] = ("[]", shape) if arrays else shape
+            for _ in range(arrays):
+                shape = ("[]", shape)
+            scope.shapes[name] = shape
             default = syntax.Constant(ABSENT) if optional else None
             found.append(syntax.RoutineParameter(name, out, default, named=optional))
         elif words:
             raise fault(place, "a parameter has no type or no name", "Write PROC name(num n)")
 
-    arrays = 0
+    arrays, within_braces = 0, False
     for token in tokens:
         if token.kind == "comment":
             continue
-        if token.text in (",", "\\", "|"):
+        if token.text in "{}":
+            within_braces = token.text == "{"
+        elif within_braces:
+            arrays += token.text == "*"
+        elif token.text in (",", "\\", "|"):
             finish()
             words, out, arrays = [], False, 0
             optional = token.text != "," or False
         elif token.text in ("INOUT", "VAR", "PERS") and not words:
             out = True
-        elif token.text == "{":
-            arrays += 1
         elif token.kind == "name":
             words.append(token.text)
     finish()
@@ -643,6 +721,8 @@ class _BodyReader:
         self.builder.handler += builder.code
         if handler:
             self.module.routines.append(builder.routine(self.cursor.place()))
+        else:
+            self.module.findings += not_understood(builder.code)
 
     def instructions(self, *ends: str) -> None:
         """Instructions up to one of these words, or a handler's, which is not passed."""
@@ -678,15 +758,15 @@ class _BodyReader:
             self._instruction(place, words, text)
         except MisreadError:
             self.builder.unknown(place, text)
-            if words.texts[1:2] == [":="] and words.kinds[0] == "name":
-                name = words.texts[0]
-                self.builder.add(
-                    syntax.Assign(
-                        place, self.scope.settled(syntax.Variable(name)), syntax.Constant(syntax.Unclear(name)), text
-                    )
-                )
+            if ":=" in words.texts and words.kinds[0] == "name" and words.texts[1] in (":=", ".", "{"):
+                self._unclear(place, words.texts[0], text)
         except RecursionError:
             raise InputError(place.file, place.where, "nested too deeply", "Split this line") from None
+
+    def _unclear(self, place: Place, name: str, text: str) -> None:
+        """A variable of which nothing is known from here."""
+        value = syntax.Constant(syntax.Unclear(name))
+        self.builder.add(syntax.Assign(place, self.scope.settled(syntax.Variable(name)), value, text))
 
     def condition(self, tokens: list[Token]) -> syntax.Expression:
         """A condition; one that is not understood is kept."""
@@ -781,6 +861,8 @@ class _BodyReader:
         options = {key for key, _ in named}
         if name in NOT_SIMULATED and options not in FOLLOWED.get(name, ()):
             self.module.findings.append(NotSimulated(text, place))
+        if name in ("LOAD", "STARTLOAD") and not self._is_beside(placed, dict(named).get("FILE")):
+            self.module.findings.append(NotSimulated(text, place))
         if name in MOTIONS:
             if options - MOTION_OPTIONS:
                 self.module.findings.append(NotSimulated(text, place))
@@ -816,11 +898,21 @@ class _BodyReader:
         changed = [each for key, each in named if key in CHANGING_OPTIONS]
         if name in CHANGING and CHANGING[name] < len(placed):
             changed.append(placed[CHANGING[name]] or syntax.Constant(0))
+        if name == "SETDATAVAL" and isinstance(placed[0] if placed else None, syntax.Constant):
+            self._unclear(place, str(getattr(placed[0], "value", "")).upper(), text)
         if name.startswith(READING):
             changed += [each for each in (*placed, *(each for _, each in named)) if each is not None]
         for each in changed:
             if isinstance(each, (syntax.Variable, syntax.Element, syntax.Member)):
                 builder.add(syntax.Assign(place, each, syntax.Constant(syntax.Unclear(f"what {name} gives")), text))
+
+    def _is_beside(self, placed: tuple[syntax.Expression | None, ...], file: syntax.Expression | None) -> bool:
+        """Whether a module that the program loads lies beside it, so that it is read where it is used."""
+        given = file or (placed[0] if placed else None)
+        if not isinstance(given, syntax.Constant) or not isinstance(given.value, str):
+            return False
+        name = re.split(r"[:/\\]", given.value)[-1].upper()
+        return name in (each.name.upper() for each in _beside(self.cursor.source.path))
 
     def _at_corner(
         self, place: Place, placed: tuple[syntax.Expression | None, ...], options: set[str], text: str
@@ -1038,11 +1130,15 @@ def _return(body: _BodyReader, place: Place, words: RapidWords, text: str) -> No
 
 
 def _goto(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None:
-    body.builder.goto(place, words.name())
+    name = words.name()
+    words.finish()
+    body.builder.goto(place, name)
 
 
 def _stop(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None:
     """Stop, after which the arm rests at its target, and Break, which does not wait for that."""
+    if words.arguments("")[0]:
+        raise MisreadError("Stop has switches alone")
     breaks = text[:5].upper() == "BREAK"
     body.builder.add(syntax.Waiting(place, "operator", None, text, stops=not breaks))
     body.builder.add(syntax.Assign(place, syntax.Variable(PASSING), syntax.Constant(breaks), ""))
@@ -1050,6 +1146,7 @@ def _stop(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None
 
 def _halt(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None:
     """EXIT and ExitCycle, after which the program begins again: from wherever the arm is, if a trap asks for it."""
+    words.finish()
     if body.end == "ENDTRAP" and words.texts[0] == "EXITCYCLE":
         body.builder.unknown(place, text)
     body.builder.add(syntax.Halt(place, again=words.texts[0] == "EXITCYCLE" and body.end != "ENDTRAP"))
@@ -1060,6 +1157,9 @@ def _leave(body: _BodyReader, place: Place, words: RapidWords, text: str) -> Non
 
     RAISE in a trap leaves the routine that it came into, wherever the arm is.
     """
+    if words.texts[0] == "RAISE" and words.kind != "end":  # the number of an error
+        words.expression()
+    words.finish()
     if body.end == "ENDTRAP" and words.texts[0] == "RAISE":
         body.builder.unknown(place, text)
     body.builder.add(syntax.Return(place))
@@ -1070,6 +1170,7 @@ def _connect(body: _BodyReader, place: Place, words: RapidWords, text: str) -> N
     words.reference()
     words.expect("WITH")
     name = words.name()
+    words.finish()
     body.builder.beside(place, syntax.Invocation(body.scope.private.get(name, name), ()), text, "interrupt")
 
 
@@ -1119,13 +1220,14 @@ SUFFIXES = (".mod", ".prg", ".sys", ".modx", ".sysx")
 HEADER = re.compile(r"(?s)\A\s*%%%.*?%%%")
 COMMENT_OR_TEXT = re.compile(r'(![^\n]*)|("(?:[^"\n]|"")*")')
 GLOBAL = re.compile(
-    r"(?i)\b(LOCAL\s+)?(?:(?:TASK\s+)?(?:CONST|PERS|VAR)\s+\w+\s+(\w+)|(?:PROC|TRAP)\s+(\w+)|FUNC\s+\w+\s+(\w+))"
+    r"(?i)\b(LOCAL\s+)?(?:(?:TASK\s+)?(?:CONST|PERS|VAR)\s+\w+\s+(\w+)|(?:PROC|TRAP|RECORD)\s+(\w+)"
+    r"|(?:FUNC|ALIAS)\s+\w+\s+(\w+))"
 )
 WORD = re.compile(r"[^\W\d]\w*")
 LATE_CALL = re.compile(r"(?m)(?:^|;)\s*%(?!%)(?!\s*\"\w*\"\s*%)|\bCallByVar\b", re.IGNORECASE)
 """A call of a procedure whose name the text does not give."""
-TASK = re.compile(r"(?i)TASK\d+|T_\w+")
-"""Folder of a task in a controller's backup, or in a project: T_ROB1, T_COMM."""
+TASK = re.compile(r"(?i)TASK\d+|T(?:ASK)?_\w+|ROB(?:OT)?_?(?:\d+|[LR]|LEFT|RIGHT)")
+"""Folder of a task in a controller's backup, or in a project: T_ROB1, T_COMM, ROB1."""
 SHARED = re.compile(r"(?i)(\b(?:LOCAL|TASK)\s+)?\bPERS\s+\w+\s+(\w+)")
 SET = re.compile(r"(?i)(?<![\w.\\])(\w+)(?:\{[^}]*\}|\.\w+)*\s*:=|\b(?:Incr|Decr|Add|Clear)\s+(\w+)")
 GIVEN = re.compile(
@@ -1133,6 +1235,8 @@ GIVEN = re.compile(
     rf"|\\(?:{'|'.join(sorted(CHANGING_OPTIONS))})\s*:=\s*(\w+)"
 )
 """What is given to instructions that may change it."""
+TAKING = re.compile(r"(?i)\b(?:PROC|FUNC\s+\w+)\s+(\w+)\s*\([^)]*\b(?:INOUT|VAR|PERS)\b")
+"""A routine that gets a variable by reference."""
 FOLDERS = {"PROGMOD": "SYSMOD", "SYSMOD": "PROGMOD"}
 """Folders of a task in a controller's backup."""
 MAX_MODULES = 200
@@ -1190,7 +1294,20 @@ def companions(path: Path) -> tuple[Path, ...]:
 
 
 def _of_tasks(path: Path) -> list[Path]:
-    """The modules of the other tasks in a controller's backup, or beside the folder of a task."""
+    """The modules of the other tasks in a controller's backup, or beside the folder of a task, or in the same folder:
+    one with persistent data and a ``main`` of its own that moves nothing."""
+    return [*_tasks_beside(path), *_tasks_in_folders(path)]
+
+
+def _tasks_beside(path: Path) -> Iterable[Path]:
+    for each in _beside(path):
+        if not _is_encoded(each):
+            used, given, _ = _names(each)
+            if "MAIN" in given and used.isdisjoint(MOTIONS) and _shared(read_program_text(each).text):
+                yield each
+
+
+def _tasks_in_folders(path: Path) -> list[Path]:
     task = next((each for each in list(path.resolve().parents)[:HIGHEST] if TASK.fullmatch(each.name)), None)
     if task is None:
         return []
@@ -1291,6 +1408,9 @@ def _set_by_tasks(path: Path) -> set[str]:
         rest = SHARED.sub(" ", text)
         changed |= {name.upper() for found in SET.findall(rest) for name in found}
         changed |= {name.upper() for words in GIVEN.findall(rest) for name in WORD.findall(" ".join(words))}
+        for routine in TAKING.findall(text):
+            called = re.findall(rf"(?i)\b{routine}\b([^;]*)", rest)
+            changed |= {name.upper() for words in called for name in WORD.findall(words)}
         shared |= _shared(text)
     return changed & shared
 

@@ -109,7 +109,7 @@ def _zone(word: str) -> instructions.Zone:
     match = ZONE.match(word)
     if match is not None:
         return instructions.Zone("distance", float(match[1]) / 1000, word)
-    return instructions.FINE if word in ("fine", "") else instructions.Zone("named", 0.0, word)
+    return instructions.FINE if word == "fine" else instructions.Zone("named", 0.0, word or "not given")
 
 
 def _point(name: str, values: list[syntax.Value | None]) -> syntax.Value:

@@ -14,7 +14,13 @@ from er3a.programs import syntax
 from er3a.programs.code_builder import CodeBuilder, fault, lacks_data, linked, variable_of
 from er3a.programs.instructions import Place
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, data_file_of, read_program_text
-from er3a.programs.program_findings import DataFileMissing, NameTwice, NotUnderstood, ProgramFinding
+from er3a.programs.program_findings import (
+    DataFileMissing,
+    JointSpeedInferred,
+    NameTwice,
+    NotUnderstood,
+    ProgramFinding,
+)
 
 RPL = Lexicon(
     re.compile(
@@ -51,6 +57,7 @@ PLAIN = re.compile(
 )
 POINT = re.compile(r'\s*(POINT[JC])\s*\(([-+.,0-9eE\s]*)(?:,\s*"(\w+)"((?:\s*,\s*[-+]?\d+)*)\s*)?\)\s*$')
 WORD = re.compile(r"[^\W\d]\w*$")
+TOOL_SPEED = re.compile(r"v\d+$", re.IGNORECASE)
 
 
 class RplWords(Words):
@@ -151,7 +158,7 @@ def _plain_motion(builder: CodeBuilder, place: Place, plain: re.Match[str]) -> b
 BREAKS = re.compile(r"\(\*(?!\s*,)|//|[\"';\n]|\b(?:THEN|DO|ELSE|REPEAT|OF)\b")
 CASE_LABEL = re.compile(r"\s*(-?\w+(?:\s*,\s*-?\w+)*)\s*:(?!=)")
 VARIABLE = re.compile(
-    r"\s*(?:Routine|Module|Input|Output|Global|Local)\s+(?:Var|Const|Retain|Persistent)\s+(\w+)\s+(\w+)"
+    r"\s*(Routine|Module|Input|Output|Global|Local)\s+(?:Var|Const|Retain|Persistent)\s+(\w+)\s+(\w+)"
     r"\s*(\[[^\]]*\])?\s*(?::?=\s*(.*?))?\s*;?\s*$",
     re.IGNORECASE,
 )
@@ -178,7 +185,7 @@ def read_rpl(source: ProgramText) -> syntax.Program:
     if data_file_of(source.path, ".var") is None and lacks_data([routine], data, LIBRARY_NAMES):
         findings.append(DataFileMissing(source.path.with_suffix(".var").name))
     by_name, more = linked([routine])
-    findings = [*source.findings, *findings, *more, *alike([routine], data)]
+    findings = [*source.findings, *findings, *more, *alike([routine], data), *joint_speeds([routine])]
     return syntax.Program(
         "rpl", source.path.stem, source.path, by_name, MAIN, tuple(data), tuple(findings), source.lines
     )
@@ -199,6 +206,14 @@ def alike(routines: Iterable[syntax.Routine], data: Iterable[syntax.Assign]) -> 
                 yield NotUnderstood(f"{first}, {name}", each.place)
 
 
+def joint_speeds(routines: Iterable[syntax.Routine]) -> list[JointSpeedInferred]:
+    """The first joint motion at a speed of the tool: no source says how long it takes then."""
+    moves = (each for routine in routines for each in routine.code if isinstance(each, syntax.Move))
+    speeds = ((each.place, each.arguments[1]) for each in moves if each.form == "MJOINT" and len(each.arguments) > 1)
+    words = ((place, each.name) for place, each in speeds if isinstance(each, syntax.Variable))
+    return [JointSpeedInferred(word, place) for place, word in words if TOOL_SPEED.match(word)][:1]
+
+
 def _variables(source: ProgramText) -> tuple[list[syntax.Assign], list[ProgramFinding]]:
     """Declarations of the .var file."""
     path = data_file_of(source.path, ".var")
@@ -214,11 +229,13 @@ def _variables(source: ProgramText) -> tuple[list[syntax.Assign], list[ProgramFi
             if line.strip() and not line.strip().startswith(("(*", "//")):
                 found.append(NotUnderstood(line.strip(), place))
             continue
-        kind, name, _, first = match.groups()
+        scope, kind, name, _, first = match.groups()
         if name in seen:
             found.append(NameTwice(name, place))
         seen.add(name)
         value = initial(first, kind.upper()) if first else None
+        if scope.upper() == "INPUT":  # which the caller gives
+            value = syntax.Constant(syntax.Unclear(name))
         data.append(syntax.Assign(place, syntax.Variable(name), value, line.strip(), kind.upper()))
     return data, found
 
@@ -272,14 +289,14 @@ def _statement(builder: CodeBuilder, place: Place, text: str) -> None:
         if not _block(builder, place, text, first):
             plain_statement(builder, place, text)
     except MisreadError:
-        builder.unknown(place, text)
+        builder.unread(place, text)
     except RecursionError:
         raise InputError(place.file, place.where, "nested too deeply", "Split this statement") from None
 
 
 def _block(builder: CodeBuilder, place: Place, text: str, first: str) -> bool:
     """Begin or end a block, or leave one; False if the statement does neither."""
-    inner = text.partition(" ")[2]
+    inner = text[len(first) :].strip()
     match first:
         case "IF":
             builder.open_if(place, expression(_until(inner, "THEN", place)), text)

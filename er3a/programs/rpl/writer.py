@@ -165,7 +165,7 @@ class RplWriter(Writer):
 
     def _rounded(self, value: float, names: tuple[int, ...]) -> int:
         found = names[max(bisect_right(names, value * (1 + 1e-9)) - 1, 0)]
-        self.count["rounded"] += abs(found - value) > 1e-6
+        self.count["raised" if found > value else "rounded"] += abs(found - value) > 1e-6
         return found
 
     def _zone(self, zone: Zone) -> str:

@@ -17,7 +17,7 @@ from er3a.programs.code_builder import CodeBuilder, fault, linked
 from er3a.programs.instructions import Disabled, Place
 from er3a.programs.lexing import ProgramText
 from er3a.programs.program_findings import FormInferred, NotUnderstood
-from er3a.programs.rpl.reader import WORD, alike, expression, initial
+from er3a.programs.rpl.reader import WORD, alike, expression, initial, joint_speeds
 
 DEEPEST_ELEMENT = 100
 DECLARATION = re.compile(r"\s*<\?xml[^>]*\?>")
@@ -181,6 +181,7 @@ def read_xpl(source: ProgramText) -> syntax.Program:
         *(each for reader in readers for each in reader.inferred),
         *unread,
         *alike(routines, data),
+        *joint_speeds(routines),
     )
     return syntax.Program(
         "xpl", source.path.stem, source.path, by_name, entry.text_of("Name"), data, found, source.lines
@@ -257,7 +258,7 @@ class _Pou:
                     self.whole.append(element)
                 elif (unread := next(element.unread(), None)) is not None and not disabled:
                     self.whole.append(element)
-                    builder.unknown(place, f"{text_of(element)} <{unread.tag}> {' '.join(_texts(unread))}")
+                    builder.unread(place, f"{text_of(element)} <{unread.tag}> {' '.join(_texts(unread))}")
 
     def _leave_out(self, element: XmlNode, within: tuple[XmlNode, ...]) -> None:
         """Nothing of an element is to be read, nor of the bodies that it names."""

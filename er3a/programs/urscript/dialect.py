@@ -178,6 +178,11 @@ class UrScriptDialect(Dialect):
     single_precision = True
     most_whole = 2**31 - 1
 
+    def sets(self, call: syntax.Invocation) -> frozenset[str]:
+        """The tool, the load, and what changes the way of each motion from there on."""
+        names = {"set_tcp": "%tcp"} | dict.fromkeys(LOADS, "%load") | dict.fromkeys(MODES, MODE)
+        return frozenset((names[call.function],)) if call.function in names else frozenset()
+
     def constant(self, memory: ProgramMemory, name: str) -> syntax.Value | None:
         """Numbers of the language."""
         return math.pi if name == "MATH_PI" else None
@@ -287,7 +292,10 @@ class UrScriptDialect(Dialect):
         if call.function in MODES:
             memory.write(MODE, doing.text)
         elif call.function in MODES.values():
+            moved = memory.read(MODE) and memory.here.key() != Position().key()
             memory.write(MODE, "")
+            if moved:  # to a target, from which the mode has led the arm away
+                return instructions.Unknown(doing.text)
         if call.function == "set_gravity":
             given = _placed(("d",), values, keywords)
             return _mounted(memory, None if given is None else given.get("d"), doing.text)
@@ -473,13 +481,14 @@ def _of_position(memory: ProgramMemory, name: str, given: dict[str, syntax.Value
     """Functions of where the arm is, and of its table.
 
     After a motion with a blend radius the program goes on where the arm enters it [1]_, so that what it reads of the
-    arm is not known; the waypoint is.
+    arm is not known; the waypoint is. Nor is it known while something changes the way of each motion (:data:`MODES`).
 
     References
     ----------
     .. [1] Universal Robots, *User Manual UR5/CB3*, version 3.10, section 14.6, conditional blend trajectories.
     """
-    here = Position() if memory.read(PASSING) and name != "get_target_waypoint" else memory.here
+    elsewhere = memory.read(PASSING) or memory.read(MODE)
+    here = Position() if elsewhere and name != "get_target_waypoint" else memory.here
     if name in ("get_actual_joint_positions", "get_target_joint_positions"):
         if here.joints is None:
             return None

@@ -151,7 +151,7 @@ def read_urscript(source: ProgramText) -> syntax.Program:
     """
     reader = _UrReader(source)
     routines = reader.read()
-    by_name, findings = linked(routines)
+    by_name, findings = linked(routines, _changed_by)
     return syntax.Program(
         "urscript",
         source.path.stem,
@@ -262,8 +262,8 @@ class _UrReader:
                 if self.within_unread < 0:
                     self.unread, self.within_unread = None, 0
             return
-        if (plain := PLAIN.match(text)) is not None and plain[1] in MOTIONS and plain[3].count(",") == 5:
-            builder.add(_plain_motion(place, plain))
+        if (plain := PLAIN.match(text)) is not None and (move := _plain_motion(place, plain)) is not None:
+            builder.add(move)
             return
         if text.startswith("$"):
             builder.remark(place, text)
@@ -295,7 +295,10 @@ class _UrReader:
         elif first in ("if", "while", "elif", "else"):
             words.take()
             _block(builder, first, words, place, text)
-        elif first == "end" and follows in ("", ":"):
+        elif first == "end" and follows in ("", ":", ";"):
+            words.take()
+            words.accept(":")
+            words.finish()
             self._close(builder, place)
         elif first == "return":
             words.take()
@@ -334,7 +337,7 @@ class _UrReader:
         words.finish()
         if len(self.open) > 50:
             raise fault(place, "more than 50 routines within each other", "Nest fewer")
-        self.open.append(CodeBuilder(name, tuple(parameters), place, thread=kind == "thread"))
+        self.open.append(CodeBuilder(name, tuple(parameters), place, thread=kind in ("thread", "sec")))
 
     def _close(self, builder: CodeBuilder, place: Place) -> None:
         if builder.blocks:
@@ -349,13 +352,15 @@ class _UrReader:
             self.outermost.append(builder.name)
 
 
-def _plain_motion(place: Place, plain: re.Match[str]) -> syntax.Move:
-    """A motion to numbers alone, without a look at its words."""
+def _plain_motion(place: Place, plain: re.Match[str]) -> syntax.Move | None:
+    """A motion to numbers alone, without a look at its words; None if it is another call, or names one thing twice."""
+    pairs = [part.split("=") for part in plain[4].split(",")[1:]]
+    settings = {name.strip(): syntax.Constant(float(value)) for name, value in pairs}
+    if plain[1] not in MOTIONS or len(settings) < len(pairs):
+        return None
     numbers = tuple(map(float, plain[3].split(",")))
     target = syntax.Constant(syntax.Record("p", tuple(zip(syntax.POSE_KEYS, numbers))) if plain[2] else numbers)
-    pairs = (part.split("=") for part in plain[4].split(",")[1:])
-    settings = tuple((name.strip(), syntax.Constant(float(value))) for name, value in pairs)
-    return syntax.Move(place, plain[1], (target,), plain.group(), (), settings)
+    return syntax.Move(place, plain[1], (target,), plain.group(), (), tuple(settings.items()))
 
 
 def _split(line: str, place: Place) -> tuple[str, str, int]:
@@ -469,6 +474,12 @@ def _method(builder: CodeBuilder, call: syntax.Invocation, place: Place, text: s
         )
     )
     return True
+
+
+def _changed_by(call: syntax.Invocation) -> tuple[syntax.Variable, ...]:
+    """The list that a method changes, wherever in an expression it is called."""
+    name, _, method = call.function.partition(".")
+    return (syntax.Variable(name.partition("[")[0]),) if method in LIST_METHODS else ()
 
 
 def _called(operation: syntax.Operation) -> Iterator[str]:

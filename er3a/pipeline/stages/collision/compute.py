@@ -123,11 +123,11 @@ def compute(study: Study, name: str) -> model.CollisionResults:
     space = free_space.sample_joint_space(bodies, settings.samples, np.random.default_rng([study.seed, SAMPLES_STREAM]))
     random = np.random.default_rng([study.seed, PLACES_STREAM])
     places = free_space.find_places(bodies, space, settings.cells_across, settings.rounds, random)
-    home = np.clip(np.zeros(robot.joints), robot.lower, robot.upper)
-    smallest, nearest = bodies.min_distance(home[None])
+    q_home = np.clip(np.zeros(robot.joints), robot.lower, robot.upper)
+    smallest, nearest = bodies.min_distance(q_home[None])
     at_home = bodies.pairs[nearest[0]] if nearest[0] >= 0 and smallest[0] < 0 else None
     if at_home is None:
-        places.joined[:] = free_space.joined_to_home(bodies, places, home, settings.neighbours)
+        places.joined[:] = free_space.joined_to_home(bodies, places, q_home, settings.neighbours)
     targets, at_targets, blocked = target_clearances(robot, bodies, study.entry(name).targets)
     tolerance = settings.penetration_tolerance_mm / 1000
     motions = list(study_motions(study, name, CHECKS))
@@ -139,7 +139,6 @@ def compute(study: Study, name: str) -> model.CollisionResults:
     meant = {each.name for each in motions if "collides" in each.expected}
     wrong = model.ShapesOverlap(bodies.in_error, space.whole.value) if bodies.in_error else None
     undecided = int((matrix.state == "undecided").sum())
-    home_found = None if at_home is None else model.HomeCollides(at_home, float(-smallest[0] * 1000), space.whole.value)
     closest = (*at_targets, *on_paths)
     assumed = shapes_assumed(
         robot, study.assumed_margin(name), {each.name: each.clearance_mm / 1000 for each in closest}
@@ -156,9 +155,10 @@ def compute(study: Study, name: str) -> model.CollisionResults:
         ),
         blocked=blocked,
     )
+    home = None if at_home is None else model.HomeCollides(at_home, float(-smallest[0] * 1000), free)
     return model.CollisionResults(
         summary=model.CollisionSummary(
-            verdict=_verdict(pairs, mounting, wrong or home_found, free)
+            verdict=_verdict(pairs, mounting, wrong, free, home)
             .without(() if wrong else bodies.unexamined)
             .resting_on(assumed),
             figures=_figures(space, places_found, matrix),
@@ -167,7 +167,7 @@ def compute(study: Study, name: str) -> model.CollisionResults:
             of_itself=_share(space.of_itself),
             of_scene=_share(space.of_scene),
             whole=_share(space.whole),
-            home_deg=None if at_home else tuple(shown(robot, home).tolist()),
+            home_deg=None if at_home else tuple(shown(robot, q_home).tolist()),
             proven_m=free_space.DEPTH,
             penetration_tolerance_mm=settings.penetration_tolerance_mm,
             places=places_found,
@@ -286,19 +286,20 @@ def _places_summary(places: free_space.ClearPlaces) -> model.PlacesSummary:
 def _verdict(
     pairs: model.PairShares,
     mounting: tuple[model.Mounting, ...],
-    known: model.ShapesOverlap | model.HomeCollides | None,
+    wrong: model.ShapesOverlap | None,
     found: model.FreeSpace,
+    home: model.HomeCollides | None,
 ) -> Verdict[model.NeverFree | model.ShapesOverlap | model.BaseInSolid | model.HomeCollides | model.FreeSpace]:
     if pairs.always.any():
         return Verdict("fail", model.NeverFree(tuple(pairs.between[pairs.always]), found.assumed))
     if inside := tuple(contact.solid for contact in mounting if contact.inside):
         return Verdict("fail", model.BaseInSolid(inside))
-    if known:
-        return Verdict("fail" if isinstance(known, model.ShapesOverlap) else "caution", known)
+    if wrong:
+        return Verdict("fail", wrong)
     blocked = not all(each.expected for each in found.blocked)
     if not all(each.expected for each in found.colliding) or (blocked and not found.targets):
-        return Verdict("fail", found)
-    return Verdict("caution" if found.undecided or not found.joined or blocked else "pass", found)
+        return Verdict("fail", home or found)
+    return Verdict("caution" if home or found.undecided or not found.joined or blocked else "pass", home or found)
 
 
 def _figures(space: free_space.JointSpace, places: model.PlacesSummary, matrix: model.MatrixRows) -> tuple[Figure, ...]:

@@ -37,14 +37,6 @@ class BaseInSolid(Finding, code="collision.base_in_solid"):
     solids: tuple[str, ...]
 
 
-class HomeCollides(Finding, code="collision.home_collides"):
-    """At home, all joints at 0 or as near to it as the limits allow, something overlaps."""
-
-    pair: Pair
-    depth_mm: float
-    free_ratio: float
-
-
 class NearestTarget(Finding):
     """The target whose chosen solution is the nearest to anything."""
 
@@ -100,6 +92,20 @@ class FreeSpace(Finding, code="collision.free_space"):
         """What collides as it is meant to."""
         collide: tuple[CollidingTarget | CollidingPath, ...] = (*self.blocked, *self.colliding)
         return tuple(each for each in collide if each.expected)
+
+
+class HomeCollides(Finding, code="collision.home_collides"):
+    """At home, all joints at 0 or as near to it as the limits allow, something overlaps; ``found``: what holds besides,
+    but for what can be reached from there."""
+
+    pair: Pair
+    depth_mm: float
+    found: FreeSpace
+
+    @property
+    def demonstrations(self) -> tuple[CollidingTarget | CollidingPath, ...]:
+        """What collides as it is meant to."""
+        return self.found.demonstrations
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,8 @@ from er3a.collision.along import RateBounds
 from er3a.collision.bodies import Bodies
 from er3a.errors import InputError, NotWristPartitionedError, PoseError
 from er3a.files.path_file import PathEntry, ProgramPath, load_paths
+from er3a.files.units import joint_values
+from er3a.kinematics.by_class import arm_solver
 from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import NearSingular
@@ -34,7 +36,7 @@ from er3a.planning.tool_proof import ProofRequirements, ToolProof, follow_and_pr
 from er3a.planning.way_around import NoWayAround, PlannedMove, PlanningTask, WayAround, way_between
 from er3a.program_check.check_program import CheckOptions, LocatedFinding, ProgramPart, check_program, parts_of
 from er3a.programs.languages import read_program
-from er3a.robots.joint_limits import shown
+from er3a.robots.joint_limits import meant, shown
 from er3a.robots.robot import Robot
 
 
@@ -76,7 +78,7 @@ def planned_entries(
     if not isinstance(entry, ProgramPath):
         yield entry
         return
-    start = None if entry.start_deg is None else np.radians(entry.start_deg)
+    start = None if entry.start_deg is None else joint_values(task.robot, entry.start_deg, "start_deg")
     options = CheckOptions(
         start=start,
         scene=task.bodies.scene if task.bodies else None,
@@ -339,7 +341,7 @@ def limits_of(robot: Robot, settings: TrajectorySettings) -> JointLimits:
         if values is not None and len(values) != count:
             problem = f"{len(values)} values for the {count} joints of {robot.name}"
             raise InputError(None, f"trajectory.{name}", problem, "Give one for each joint")
-        given.append(None if values is None else np.radians(values))
+        given.append(None if values is None else meant(robot, np.array(values)))
     return joint_limits(robot, assumed_speeds(robot, settings), settings.acceleration_time_s, *given)
 
 
@@ -443,13 +445,30 @@ def listed_motions(
                 ("program_rest", part.rest if part else ()),
                 ("given_rates", motion.built.unread if motion else ()),
                 ("missed_rows", tuple(filter(None, [motion and rows_missed(task.robot, motion.built)]))),
+                ("half_turns", motion.built.turns_open if motion and not part else ()),
             )
             rest = [LeftOut(of, (f"{listed.name}: {', '.join(map(str, own))}",)) for of, own in parts if own]
+            rest += [LeftOut(of, (listed.name,)) for of in (_chosen(task.robot, motion) if motion and not part else ())]
             if part and part.part.found:
                 rest.append(LeftOut("program_findings", tuple(f"{listed.name}: {at}" for at in at_lines(part))))
             yield ListedMotion(
                 *(listed.name, entry.name, entry.title, entry.expected, motion, ended), tuple(rest), refused
             )
+
+
+CHOSEN: tuple[LeftOutSubject, ...] = ("half_turns", "start_branches", "arm_angles")
+"""What a path leaves open, and a program that is written of it settles."""
+
+
+def _chosen(robot: Robot, motion: Motion) -> Iterator[LeftOutSubject]:
+    """What a path of the tool leaves open, and was chosen here."""
+    built = motion.built
+    if built.tool is None:
+        return
+    if built.q_start is None and built.start_slot is None:
+        yield "start_branches"
+    if arm_solver(robot).chain.code == "arm_angle":
+        yield "arm_angles"
 
 
 def at_lines(entry: PartOfProgram) -> list[str]:

@@ -11,7 +11,13 @@ from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.stages.trajectory.model import AvoidanceRows, MinClearance, ProgramFiles
 from er3a.pipeline.stages.trajectory.motion import Motion, PartOfProgram, at_lines, missed_points, rows_missed
-from er3a.planning.commands import CommandSource, JointTableCommand, PlanCommand, ToolMoveCommand
+from er3a.planning.commands import (
+    CommandSource,
+    JointMoveCommand,
+    JointTableCommand,
+    PlanCommand,
+    ToolMoveCommand,
+)
 from er3a.planning.names import PathVerdict
 from er3a.planning.profiles import Times
 from er3a.programs.csv_program import write_csv
@@ -31,7 +37,7 @@ from er3a.robots.robot import Robot
 
 LONGEST_NAME = 24
 REPAIRED = "_repaired"
-STRAIGHT = 1e-4  # rad or m: by how much joints that move straight between written points may be off a repaired motion
+STRAIGHT = 1e-4  # rad or m: by how much joints that move straight between written points may be off a motion
 
 
 def written(
@@ -74,6 +80,11 @@ def written(
     if isinstance(command, PlanCommand):  # a planned motion is written as the points that its samples are
         timing = Times(motion.samples, np.arange(len(motion.samples)))
         command = JointTableCommand(motion.joints(motion.samples), timing)
+    elif isinstance(command, JointMoveCommand):  # speeds of the joints at its ends may bend its way
+        kept = needed_points(motion.joints(motion.samples), STRAIGHT)
+        if len(kept) > 2:
+            timing = Times(motion.samples[kept], np.arange(len(kept)))
+            command = JointTableCommand(motion.joints(motion.samples[kept]), timing)
     ends: Reals | None = motion.q[-1:] if isinstance(command, ToolMoveCommand) else None
     if ends is not None and not np.isfinite(ends).all():
         ends = None
