@@ -127,10 +127,6 @@ def read_dh_table(
     if _far_normals(rows, convention):
         notes.append("d of more than 5 m that cancel: read as a calibrated table, with Hayati's beta in place of them")
     content = _content(rows, given, name, convention, path.name)
-    if convention == "standard" and "convention" not in given:
-        content["dh"]["source"] += ", read as standard D-H, which it does not say"
-    if "direction" not in given and "offset_deg" in given:
-        content["zero"]["source"] += "; it gives no directions: all were assumed as +1"
     if short or 0 < max((length for length, *_ in lengths), default=0.0) < SHORTEST_ARM_MM:
         content["dh"]["calibrated"] = True  # lengths of a millimetre or less are meant
     return parse(RobotFile, content, path), tuple(notes)
@@ -295,7 +291,7 @@ def _content(rows: list[dict[str, Any]], given: set[str], name: str, convention:
         return {key: row[key]}
 
     units = {_unit(row) for row in rows}
-    content = {
+    content: dict[str, Any] = {
         "kind": "robot",
         "name": name,
         "title": name,
@@ -304,6 +300,10 @@ def _content(rows: list[dict[str, Any]], given: set[str], name: str, convention:
         "zero": group(zero, known=bool(given & {"offset_deg", "direction"})),
         "limits": group(limits, known=all(f"lower_{unit}" in given for unit in units)),
     }
+    if convention == "standard" and "convention" not in given:
+        content["dh"]["source"] += ", read as standard D-H, which it does not say"
+    if "direction" not in given and "offset_deg" in given:
+        content["zero"]["source"] += "; it gives no directions: all were assumed as +1"
     if all(f"speed_{unit}_s" in given for unit in units):
         content["speeds"] = group(speed, known=True)
     return content
