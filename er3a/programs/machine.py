@@ -19,7 +19,7 @@ References
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -586,13 +586,13 @@ class _Graph:
         return seen
 
 
-def _reached(after: Sequence[Sequence[int]], first: int) -> set[int]:
-    """Operations of a routine that may come after one, by those that come next after each."""
+def _reached(graph: _Graph, first: int) -> set[int]:
+    """Operations that may be carried out after coming to one."""
     seen: set[int] = set()
     waiting = [first]
     while waiting:
-        for each in after[waiting.pop()]:
-            if each not in seen:
+        for each in graph.after[waiting.pop()]:
+            if each not in seen and each != graph.end:
                 seen.add(each)
                 waiting.append(each)
     return seen
@@ -633,6 +633,7 @@ class ExecutionPath:
     line: tuple[tuple[int, int], ...] = ()  # ways that it comes from, each with the count of states until then
     beside: bool = False  # whether it runs beside the program
     again: bool = False  # whether it is the program's second round
+    asked: dict[tuple[str, int], int] = field(default_factory=dict)  # the budget at branches with known values, last
 
     def fork(self, new: int, states: int) -> ExecutionPath:
         """Another that goes its own way from here."""
@@ -640,7 +641,8 @@ class ExecutionPath:
         memory = self.memory.copy()
         memory.local = frames[-1].local
         line = (*self.line, (self.number, states))
-        return ExecutionPath(frames, memory, self.step, new, dict(self.rounds), line, self.beside, self.again)
+        rounds, asked = dict(self.rounds), dict(self.asked)
+        return ExecutionPath(frames, memory, self.step, new, rounds, line, self.beside, self.again, asked)
 
 
 class Machine:
@@ -683,7 +685,7 @@ class Machine:
         if any(isinstance(each, syntax.Halt) and each.again for each in program.operations()):
             self.labels[program.entry] |= {0}
         self.loops = {name: _loops(routine) for name, routine in program.routines.items()}
-        self.seen: dict[Hashable, tuple[int, int, int]] = {}  # way, count, last step
+        self.seen: dict[Hashable, tuple[int, int, int, int]] = {}  # way, count, last step, budget
         self.read_before: dict[tuple[str, int], frozenset[str]] = {}  # of the persisting, before a label was come to
         self.waiting: list[ExecutionPath] = []
         self.second: list[ExecutionPath] = []  # rounds, which wait for all else
@@ -693,7 +695,7 @@ class Machine:
         self.numbers = 1  # of ways that were begun, those that joined others too
         self.sides: Counter[tuple[str, int, bool]] = Counter()  # how often each side of a branch was taken
         self.cut: set[instructions.Place] = set()
-        self.ahead: dict[tuple[str, int], tuple[bool, list[syntax.Branch] | None]] = {}  # as of _ahead
+        self.moves_behind: dict[tuple[str, int], bool] = {}  # by routine and number
         self.waited: set[Hashable] = set()  # states of loops that wait for what others change
         self.first_after: dict[int, int] = {}  # step by the one before it
 
@@ -1019,6 +1021,7 @@ class Machine:
         """Go on, on the side that the condition chooses, or on both; whether that is backwards."""
         holds = way.memory.value(branch.condition)
         if isinstance(holds, bool):
+            way.asked[frame.routine.name, at] = self.budget
             if not holds:
                 frame.at = branch.otherwise
             return not holds and branch.otherwise <= at
@@ -1193,9 +1196,9 @@ class Machine:
         key = self._state(way)
         found = self.seen.get(key)
         if found is None:
-            self.seen[key] = (way.number, len(self.seen), way.step)
+            self.seen[key] = (way.number, len(self.seen), way.step, self.budget)
             return None
-        other, count, step = found
+        other, count, step, _ = found
         own = other == way.number or any(other == earlier and count < until for earlier, until in way.line)
         return ("repeats" if own else "joins"), step
 
@@ -1209,8 +1212,10 @@ class Machine:
             if isinstance(self.steps[at].instruction, instructions.ArmMotion):
                 return False
             at = self.steps[at].before
-        asked = [] if state in self.waited or not self._leads_to_motion(way) else self._asked_in_loop(way)
-        if not asked:
+        budget = self.seen[state][3]
+        branches = (self.program.routines[name].code[at] for (name, at), when in way.asked.items() if when <= budget)
+        asked = [each for each in branches if isinstance(each, syntax.Branch) and any(names(each.condition))]
+        if not asked or state in self.waited or not self._leads_to_motion(way):
             return False
         self.waited.add(state)
         self._note(way, asked[0].place, instructions.Pause(condition=asked[0].text, by_others=True, looped=True))
@@ -1220,30 +1225,16 @@ class Machine:
 
     def _leads_to_motion(self, way: ExecutionPath) -> bool:
         """Whether any side of the branches behind where a way is moves the arm, or may."""
-        return any(self._ahead(frame)[0] for frame in way.frames)
+        return any(self._moves_behind(frame.routine, frame.at) for frame in way.frames)
 
-    def _asked_in_loop(self, way: ExecutionPath) -> list[syntax.Branch]:
-        """Branches on variables of known value in the loop in which a way is, and in none within it."""
-        rounds = (self._ahead(frame)[1] for frame in reversed(way.frames))
-        found = next((each for each in rounds if each is not None), [])
-        return [each for each in found if not isinstance(way.memory.value(each.condition), syntax.Unclear)]
-
-    def _ahead(self, frame: Frame) -> tuple[bool, list[syntax.Branch] | None]:
-        """Whether anything that may follow in a routine may move the arm; and the branches with variables of the
-        innermost loop around where it is, if there is one."""
-        key = (frame.routine.name, frame.at)
-        if key not in self.ahead:
-            code, after = frame.routine.code, _Graph(frame.routine).after
-            reached = _reached(after, frame.at) - {len(code)}
-            moves = any(_moves(self.program, code[at], self.moving, self.dialect) for at in reached)
-            back = [(to, at) for at, following in enumerate(after) for to in following if to <= frame.at <= at]
-            asked = None
-            if back:
-                start, end = min(back, key=lambda loop: loop[1] - loop[0])
-                inside = (code[at] for at in range(start, end + 1))
-                asked = [each for each in inside if isinstance(each, syntax.Branch) and any(names(each.condition))]
-            self.ahead[key] = moves, asked
-        return self.ahead[key]
+    def _moves_behind(self, routine: syntax.Routine, at: int) -> bool:
+        key = (routine.name, at)
+        if key not in self.moves_behind:
+            behind = _reached(_Graph(routine), at)
+            self.moves_behind[key] = any(
+                _moves(self.program, routine.code[each], self.moving, self.dialect) for each in behind
+            )
+        return self.moves_behind[key]
 
     def _state(self, way: ExecutionPath) -> Hashable:
         """A key that is equal for ways that go on alike."""
