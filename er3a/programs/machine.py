@@ -1209,7 +1209,8 @@ class Machine:
         """
         at, state = way.step, self._state(way)
         while at > before:
-            if isinstance(self.steps[at].instruction, instructions.ArmMotion):
+            done = self.steps[at].instruction
+            if isinstance(done, instructions.ArmMotion) or (isinstance(done, instructions.Unknown) and done.may_move):
                 return False
             at = self.steps[at].before
         budget = self.seen[state][3]

@@ -315,6 +315,13 @@ def test_the_same_joint_move_bends_within_a_spline_alone(tmp_path):
     assert codes(with_data(tmp_path, body, "INT N=0"))["spline_as_line"] == [10]
 
 
+def test_a_loop_that_may_move_the_arm_is_no_wait(tmp_path):
+    body = "PTP {A1 5}\nWHILE GO==FALSE\nNUDGE( )\nENDWHILE\nPTP {A1 30}"
+    found = codes(with_data(tmp_path, body, "DECL GLOBAL BOOL GO=FALSE"))
+    assert "waits_for_others" not in found
+    assert found["may_move"] == [9]
+
+
 def test_a_call_of_what_moves_that_no_way_leads_to_is_named_where_its_file_is_another(tmp_path):
     (tmp_path / "work.src").write_text(LATER.format(wait=""))
     found = with_data(tmp_path, "PTP {A1 5}\nIF GO THEN\nwork( )\nENDIF", "DECL GLOBAL BOOL GO=FALSE")
