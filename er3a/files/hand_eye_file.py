@@ -12,7 +12,7 @@ Rotation vectors (axis times angle, in rad) are used by OpenCV and by the pendan
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import takewhile
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -299,6 +299,7 @@ def read_calibration(
         eye = _stream(path.parent / head.streams.target, "target", robot)
         offset = _offset(path, hand, eye, head.streams.widest_s)
         flange, target, times = paired(hand, eye, offset.offset, STREAM_SAMPLES)
+        offset = replace(offset, unused=len(eye.t) - len(times))
         names, q = tuple(f"{t:.3f} s" for t in times), None
     else:
         table = path.parent / str(head.samples)

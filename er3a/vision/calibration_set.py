@@ -116,12 +116,16 @@ class Stream:
 
 @dataclass(frozen=True)
 class TimeOffset:
-    """The camera's time plus ``offset`` is the arm's, s, with half its 95 % interval; angles differ by ``rms``, rad."""
+    """The camera's time plus ``offset`` is the arm's, s, with half its 95 % interval; angles differ by ``rms``, rad.
+
+    ``unused``: poses of the camera that no sample was made of.
+    """
 
     offset: float
     half_width: float
     rms: float
     pairs: int
+    unused: int = 0
 
 
 class OffsetOpenError(Er3aError):

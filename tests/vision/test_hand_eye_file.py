@@ -317,6 +317,15 @@ def test_a_wider_range_finds_the_offset_as_advised(tmp_path):
     assert offset.offset == pytest.approx(2.3, abs=2e-3)
 
 
+def test_poses_of_a_stream_that_no_sample_was_made_of_are_counted(tmp_path):
+    """24 s at 20 poses/s, of which 60 are taken."""
+    file = _streams(tmp_path, ahead=0.1)
+    samples, offset, _ = read_calibration(file, None)
+    assert (len(samples), offset.unused) == (60, 480 - 60)
+    told = CliRunner().invoke(app, ["hand-eye", str(file)]).output
+    assert f"not examined: {left_out_text(LeftOut('stream_poses', amount=420))}" in told
+
+
 def test_images_beside_streams_are_refused(tmp_path):
     file = _streams(tmp_path, ahead=0.1)
     board = "images: {board: {pattern: chessboard, squares: [9, 7], square_mm: 20}}\n"

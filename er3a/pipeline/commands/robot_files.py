@@ -334,6 +334,7 @@ def hand_eye(
     wrong = isinstance(table, TableCorrections) and table.probability < TABLE_CONTRADICTED
     missed = {
         LeftOut("real_camera"): head.simulated,
+        LeftOut("stream_poses", amount=offset.unused if offset else 0): bool(offset and offset.unused),
         LeftOut("copied_samples", found.copies): bool(found.copies),
         LeftOut("joint_zeros", unseen): bool(unseen) or arm is None,
         LeftOut("small_joint_zeros", amount=least_zero): bool(least_zero),

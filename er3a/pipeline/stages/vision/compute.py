@@ -478,6 +478,8 @@ def _left_out(
         yield LeftOut("boardless_images", tuple(each.sample for each in found.boardless))
     if found.rejected:
         yield LeftOut("left_out_samples", found.rejected)
+    if found.time_offset and found.time_offset.unused:
+        yield LeftOut("stream_poses", amount=found.time_offset.unused)
     if found.copies:
         yield LeftOut("copied_samples", found.copies)
     if zeros:

@@ -143,11 +143,12 @@ class ViewToAdd:
 
 @dataclass(frozen=True)
 class OffsetResult:
-    """The camera's clock plus this is the arm's, with half its 95 % interval."""
+    """The camera's clock plus this is the arm's, with half its 95 % interval; of ``unused`` poses no sample was made."""
 
     offset_s: float
     half_width_s: float
     rms_deg: float
+    unused: int = 0
 
 
 @dataclass(frozen=True)
