@@ -143,7 +143,7 @@ class ViewToAdd:
 
 @dataclass(frozen=True)
 class OffsetResult:
-    """The camera's clock plus this is the arm's, with half its 95 % interval; of ``unused`` poses no sample was made."""
+    """The camera's clock plus this is the arm's, with half its 95 % interval; ``unused``: poses without a sample."""
 
     offset_s: float
     half_width_s: float
