@@ -695,7 +695,7 @@ class Machine:
         self.numbers = 1  # of ways that were begun, those that joined others too
         self.sides: Counter[tuple[str, int, bool]] = Counter()  # how often each side of a branch was taken
         self.cut: set[instructions.Place] = set()
-        self.moves_behind: dict[tuple[str, int], bool] = {}  # by routine and number
+        self.stuck: list[tuple[ExecutionPath, list[syntax.Branch], int]] = []  # ways that repeat themselves, as asked
         self.waited: set[Hashable] = set()  # states of loops that wait for what others change
         self.first_after: dict[int, int] = {}  # step by the one before it
 
@@ -715,7 +715,7 @@ class Machine:
             self._begin(way)
             self.begun.add(self._state(way))
             self.waiting.append(way)
-        while self.waiting or self.second:
+        while self.waiting or self.second or self._go_on_behind_waits():
             self._follow(self.waiting.pop() if self.waiting else self.second.pop())
         twice = (each for name, each in self.frames_twice.items() if name not in of_data or name in memory.met)
         return Execution(
@@ -801,8 +801,11 @@ class Machine:
                 if (label := (frame.routine.name, frame.at)) not in self.read_before:
                     self.read_before[label] = frozenset(way.memory.met)
                 met = self._met(way) if back or self.numbers > 1 else None
-                if met is not None and not (met[0] == "repeats" and self._waits_on(way, met[1])):
+                if met is not None:
                     kind, step = met
+                    if kind == "repeats" and (asked := self._asked_in_round(way, step)):
+                        self.stuck.append((way, asked, step))
+                        return
                     self._end(way, kind, operation.place, step)
                     self.ways -= kind == "joins"
                     return
@@ -1202,40 +1205,47 @@ class Machine:
         own = other == way.number or any(other == earlier and count < until for earlier, until in way.line)
         return ("repeats" if own else "joins"), step
 
-    def _waits_on(self, way: ExecutionPath, before: int) -> bool:
-        """Whether a way that repeats itself without a motion waits for what others change, and goes on behind that.
-
-        What its conditions ask has no known value from here then. That happens once in each state.
-        """
+    def _asked_in_round(self, way: ExecutionPath, before: int) -> list[syntax.Branch]:
+        """What a way asked of variables in the round by which it repeats itself; nothing if the arm moves in it."""
         at, state = way.step, self._state(way)
         while at > before:
             done = self.steps[at].instruction
             if isinstance(done, instructions.ArmMotion) or (isinstance(done, instructions.Unknown) and done.may_move):
-                return False
+                return []
             at = self.steps[at].before
+        if state in self.waited:
+            return []
+        self.waited.add(state)
         budget = self.seen[state][3]
         branches = (self.program.routines[name].code[at] for (name, at), when in way.asked.items() if when <= budget)
-        asked = [each for each in branches if isinstance(each, syntax.Branch) and any(names(each.condition))]
-        if not asked or state in self.waited or not self._leads_to_motion(way):
-            return False
-        self.waited.add(state)
-        self._note(way, asked[0].place, instructions.Pause(condition=asked[0].text, by_others=True, looped=True))
-        for name in {name for each in asked for name in names(each.condition)}:
-            way.memory.forget(name)
-        return True
+        return [each for each in branches if isinstance(each, syntax.Branch) and any(names(each.condition))]
 
-    def _leads_to_motion(self, way: ExecutionPath) -> bool:
-        """Whether any side of the branches behind where a way is moves the arm, or may."""
-        return any(self._moves_behind(frame.routine, frame.at) for frame in way.frames)
+    def _go_on_behind_waits(self) -> bool:
+        """Whether ways go on that repeat themselves without a motion, while motions behind them were never come to.
 
-    def _moves_behind(self, routine: syntax.Routine, at: int) -> bool:
-        key = (routine.name, at)
-        if key not in self.moves_behind:
-            behind = _reached(_Graph(routine), at)
-            self.moves_behind[key] = any(
-                _moves(self.program, routine.code[each], self.moving, self.dialect) for each in behind
-            )
-        return self.moves_behind[key]
+        Such a way waits for what others change: what it asked has no known value from there on. The others end.
+        """
+        stuck, self.stuck = self.stuck, []
+        for way, asked, step in stuck:
+            frame = way.frames[-1]
+            if any(self._has_unmet_behind(each) for each in way.frames):
+                self._note(
+                    way, asked[0].place, instructions.Pause(condition=asked[0].text, by_others=True, looped=True)
+                )
+                for name in {name for each in asked for name in names(each.condition)}:
+                    way.memory.forget(name)
+                self.waiting.append(way)
+            else:
+                self._end(way, "repeats", frame.routine.code[frame.at].place, step)
+        return bool(self.waiting)
+
+    def _has_unmet_behind(self, frame: Frame) -> bool:
+        """Whether anything that may follow in a routine moves the arm, or may, and was never carried out."""
+        code, name = frame.routine.code, frame.routine.name
+        behind = _reached(_Graph(frame.routine), frame.at)
+        return any(
+            (name, at) not in self.passed and _moves(self.program, code[at], self.moving, self.dialect) for at in behind
+        )
 
     def _state(self, way: ExecutionPath) -> Hashable:
         """A key that is equal for ways that go on alike."""

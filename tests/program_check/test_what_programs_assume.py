@@ -315,6 +315,17 @@ def test_the_same_joint_move_bends_within_a_spline_alone(tmp_path):
     assert codes(with_data(tmp_path, body, "INT N=0"))["spline_as_line"] == [10]
 
 
+def test_a_loop_that_an_input_ends_waits_for_no_other_task(tmp_path):
+    """What else it asks is known, and stays so."""
+    text = (
+        "def a():\n  debug = False\n  while True:\n    if debug:\n      textmsg(1)\n    end\n"
+        "    if get_digital_in(1):\n      movej([0, -0.2, -0.2, 0, -1.2, 0])\n    end\n    sync()\n  end\nend\n"
+    )
+    found = check(tmp_path, text, "a.script")
+    assert "waits_for_others" not in codes(found)
+    assert len(found.verdicts) == 1
+
+
 def test_a_loop_that_may_move_the_arm_is_no_wait(tmp_path):
     body = "PTP {A1 5}\nWHILE GO==FALSE\nNUDGE( )\nENDWHILE\nPTP {A1 30}"
     found = codes(with_data(tmp_path, body, "DECL GLOBAL BOOL GO=FALSE"))
