@@ -21,6 +21,7 @@ from er3a.programs.code_builder import (
     linked,
     mapped,
     not_understood,
+    own_names,
     variable_of,
     variables,
     within,
@@ -28,7 +29,7 @@ from er3a.programs.code_builder import (
 from er3a.programs.instructions import Place
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, read_program_text
 from er3a.programs.program_findings import BegunWithin, NameTwice, NotSimulated, NotUnderstood, ProgramFinding
-from er3a.programs.rapid.data_types import SHAPES, Shape, starting
+from er3a.programs.rapid.data_types import SHAPES, Shape, predefined, starting
 
 PATTERN = re.compile(
     rf"""(?P<comment>![^\n]*)|(?P<text>"(?:[^"\n]|"")*")|(?P<number>0[xX][\da-fA-F]+|0[oO][0-7]+|0[bB][01]+|{NUMBER})|(?P<name>[^\W\d]\w*)"""
@@ -132,6 +133,8 @@ ARRIVING = frozenset(("INPOS", "ZEROSPEED"))
 LEAVING = ("STOPMOVE", "STARTMOVE", "STARTMOVERETRY", "RESTOPATH", "CLEARPATH")
 """Instructions that stop a motion on its way, or begin one again that the program does not wait for."""
 ABSENT = "%absent"
+REGISTERS = ("REG1", "REG2", "REG3", "REG4", "REG5")
+"""Numbers that a controller's own module declares."""
 MAX_LATE = 200
 MAX_ELEMENTS = 1000
 
@@ -302,10 +305,13 @@ def read_rapid(source: ProgramText) -> syntax.Program:
             each for each in reversed(data) if isinstance(each.target, syntax.Variable) and each.target.name == name
         )
         findings.append(NameTwice(name, last.place))
-    by_name, unlinked = linked([each for reader in readers for each in reader.routines], changed_arguments)
+    routines = [each for reader in readers for each in reader.routines]
+    by_name, unlinked = linked(routines, changed_arguments)
     findings += _base_frames(source.path)
     findings += _event_routines(source.path, {each.text for cursor in cursors for each in cursor.tokens})
     entry = _entry(own, by_name)
+    if entry == "MAIN" and not encoded:  # all of a program
+        findings += _undeclared(routines, {*names, *REGISTERS})
     main = None if entry == "MAIN" or entry not in by_name else _main_of(source.path)
     if main is not None:
         findings.append(BegunWithin(entry.lower(), main.name, by_name[entry].place))
@@ -325,6 +331,29 @@ def read_rapid(source: ProgramText) -> syntax.Program:
         ),
         cyclic=entry == "MAIN",
     )
+
+
+def _undeclared(routines: Iterable[syntax.Routine], declared: set[str]) -> Iterable[NotUnderstood]:
+    """Assignments to what nothing declares: mistyped names, unless motions and values are made of others, of a module
+    that was not found, which may declare these too."""
+    found: dict[str, NotUnderstood] = {}
+    given: set[str] = set()
+    for routine in routines:
+        known = declared | own_names(routine)
+        for each in routine.code:
+            if isinstance(each, syntax.Move | syntax.Assign):
+                given |= {name for of in syntax.expressions_of(each) for name in variables(of)} - known
+            if isinstance(each, syntax.Assign) and not _is_unclear(each.value):
+                name = variable_of(each.target)
+                if name not in known and "%" not in name:
+                    found.setdefault(name, NotUnderstood(each.text, each.place))
+    others = (name for name in given - found.keys() if "%" not in name)
+    is_missing = any(predefined(name.removeprefix("/")) is None for name in others)
+    return () if is_missing else found.values()
+
+
+def _is_unclear(value: syntax.Expression | None) -> bool:
+    return isinstance(value, syntax.Constant) and isinstance(value.value, syntax.Unclear)
 
 
 def _read_in_turn(readers: Iterable[_ModuleReader]) -> None:
@@ -887,6 +916,8 @@ class _BodyReader:
         if name in LEAVING or arrives:
             builder.add(syntax.Assign(place, syntax.Variable(PASSING), syntax.Constant(name in LEAVING), ""))
         if name == "WAITTIME" and placed:
+            if isinstance(placed[0], syntax.Constant) and (syntax.number(placed[0].value) or 0.0) < 0.0:
+                self.module.findings.append(NotUnderstood(text, place))  # 0 is the least
             builder.add(syntax.Waiting(place, "seconds", placed[0], text, arrives))
             return
         if name == "CALLBYVAR" and len(placed) == 2 and placed[0] is not None and placed[1] is not None:
@@ -1044,7 +1075,8 @@ def _while(body: _BodyReader, place: Place) -> None:
 
 
 def _for(body: _BodyReader, place: Place) -> None:
-    """``FOR i FROM first TO last STEP step DO``; without a step it counts towards the last."""
+    """``FOR i FROM first TO last STEP step DO``; without a step it counts towards the last. The program can only read
+    the counter."""
     cursor = body.cursor
     cursor.at += 1
     tokens = cursor.head("DO")
@@ -1066,6 +1098,8 @@ def _for(body: _BodyReader, place: Place) -> None:
     body.builder.open_for(place, name, first, last, step, cursor.text(tokens))
     inside = len(code) - 1
     _inside(body, place, "for", "ENDFOR")
+    sets = (each for each in code[inside:] if isinstance(each, syntax.Assign) and variable_of(each.target) == name)
+    body.module.findings += [NotUnderstood(each.text, each.place) for each in sets if each.text]
     body.scope.own &= own
     _hide(code, before, inside, name)
 
