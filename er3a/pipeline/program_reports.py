@@ -312,9 +312,11 @@ def finite(value: Any) -> Any:
 
 
 def _verdict_record(verdict: MotionVerdict) -> dict[str, Any]:
+    """``called_at``: where that is in another file, the line of the call in the program's own."""
     record = plain(verdict)
     record.pop("place")
-    return {**_place_record(verdict.place), **record}
+    line = record.pop("line")
+    return {**_place_record(verdict.place), "called_at": line if line != verdict.place.line else None, **record}
 
 
 def sarif_of(checked: Sequence[CheckedFile]) -> dict[str, Any]:

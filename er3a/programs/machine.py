@@ -723,6 +723,7 @@ class Machine:
             tuple(self.steps),
             tuple(self.endings),
             self._unmet(),
+            frozenset(name for name, _ in self.passed),
             tuple(twice),
             tuple(self.kept.items()),
             tuple((name, place) for name, place in elsewhere.items() if name in set(map(root, memory.met))),

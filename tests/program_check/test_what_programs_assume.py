@@ -339,6 +339,17 @@ def test_a_call_of_what_moves_that_no_way_leads_to_is_named_where_its_file_is_an
     assert codes(found)["never_reached"] == [9]
 
 
+def test_motions_of_a_called_module_that_no_way_leads_to_are_named(tmp_path):
+    """Each among what was not examined, and the first of its routine as a finding; routines that none calls are not."""
+    pick = "DEF pick(S :IN)\nINT S\nIF S==1 THEN\nPTP {A1 5}\nELSE\nPTP {A1 9}\nPTP {A1 8}\nENDIF\nEND\n"
+    (tmp_path / "pick.src").write_text(pick + "GLOBAL DEF other( )\nPTP {A1 7}\nEND\n")
+    found = with_data(tmp_path, "PTP {A1 1}\npick(1)", "")
+    places = [(each.place.file.name, each.place.line) for each in found.findings if each.finding.code == "never_reached"]
+    assert places == [("pick.src", 6)]
+    assert [(each.what, each.place.line) for each in found.not_examined] == [("motion", 6), ("motion", 7)]
+    assert found.level == "caution"
+
+
 @pytest.mark.parametrize("given", ["v", "q{1}"])
 def test_what_a_routine_gives_back_by_a_parameter_goes_on_on_both_ways(tmp_path, given):
     routine = "PROC choose(INOUT num x)\nIF di1=1 THEN\nx:=10;\nELSE\nx:=20;\nENDIF\nENDPROC"
