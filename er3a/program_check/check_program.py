@@ -315,7 +315,7 @@ def _located(execution: Execution, robot: Robot, checker: StepChecker, end: int)
             ]
     found += _begun_again(execution, checker, found)
     arms = checker.obstacles.bodies.values() if checker.obstacles else ()
-    if pairs := tuple(dict.fromkeys(pair for bodies in arms for pair in bodies.unexamined)):
+    if pairs := tuple(dict.fromkeys(pair for bodies in arms for pair in bodies.in_error)):
         found.append(LocatedFinding("caution", PairsUnexamined(pairs), top))
     for step in steps.values():
         what = step.instruction

@@ -344,7 +344,9 @@ def test_motions_of_a_called_module_that_no_way_leads_to_are_named(tmp_path):
     pick = "DEF pick(S :IN)\nINT S\nIF S==1 THEN\nPTP {A1 5}\nELSE\nPTP {A1 9}\nPTP {A1 8}\nENDIF\nEND\n"
     (tmp_path / "pick.src").write_text(pick + "GLOBAL DEF other( )\nPTP {A1 7}\nEND\n")
     found = with_data(tmp_path, "PTP {A1 1}\npick(1)", "")
-    places = [(each.place.file.name, each.place.line) for each in found.findings if each.finding.code == "never_reached"]
+    places = [
+        (each.place.file.name, each.place.line) for each in found.findings if each.finding.code == "never_reached"
+    ]
     assert places == [("pick.src", 6)]
     assert [(each.what, each.place.line) for each in found.not_examined] == [("motion", 6), ("motion", 7)]
     assert found.level == "caution"
