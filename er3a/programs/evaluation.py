@@ -450,7 +450,7 @@ class ProgramMemory:
                 self.written.add(name)
 
     def declare(self, name: str, kind: str, local: bool, sizes: tuple[int, ...] = ()) -> None:
-        """The type of a variable, and the sizes of a list; a parameter of a routine takes them where that declares it."""
+        """The type of a variable, and sizes of a list; a parameter of a routine takes them where that declares it."""
         if sizes:
             (self.local if local else self.shared)[name + SIZES] = sizes
         if not local:
