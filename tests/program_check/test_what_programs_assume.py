@@ -119,6 +119,15 @@ def test_a_turning_speed_that_is_not_known_is_a_caution_where_the_turn_decides(t
     assert "turn_speed_not_given" not in codes(check(tmp_path, krl(f"{body}LIN_REL {{Z 5}}"), "a.src"))
 
 
+@pytest.mark.parametrize("word", ["$VEL.CP={}", "BAS(#VEL_CP,{})", "WITH"])
+@pytest.mark.parametrize(("speed", "told"), [(250, True), (5, True), (3, False), (0.25, False)])
+def test_a_speed_along_the_path_that_no_controller_takes_is_a_caution(tmp_path, word, speed, told):
+    """250 is mm/s, typed where m/s are meant."""
+    line = f"SLIN_REL {{Z 5}} WITH $VEL.CP={speed}" if word == "WITH" else f"{word.format(speed)}\nLIN_REL {{Z 5}}"
+    found = check(tmp_path, krl(f"{FRAMES}{SPEEDS}{line}"), "a.src")
+    assert [each.level for each in found.findings if each.finding.code == "speed_not_given"] == ["caution"] * told
+
+
 @pytest.mark.parametrize(
     ("name", "text", "kind"),
     [
