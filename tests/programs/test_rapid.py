@@ -492,6 +492,31 @@ def test_modules_share_what_is_not_local(tmp_path):
     np.testing.assert_allclose([each.target.pose[:2, 3] * 1000 for each in found], [[15, 57], [6, 6]])
 
 
+def test_what_another_module_declares_local_is_not_seen(tmp_path):
+    point = "robtarget q:=[[{},6,7],[1,0,0,0],[0,0,0,0]," + NONE + "];\n"
+    shared = tmp_path / "points.mod"
+    sub = "MODULE sub\n PROC second() MoveL q,v100,fine,tool0; helper; ENDPROC\nENDMODULE\n"
+    (tmp_path / "sub.mod").write_text(sub)
+    own = f"second; helper; MoveL q,@; MORE LOCAL CONST {point.format(5)} LOCAL PROC helper() n:=n+1; ENDPROC"
+    path = saved(tmp_path, own)
+
+    execution = execute(read_program(path))
+    hidden, of_main = motions(execution)
+    assert of_main.target.pose[0, 3] == pytest.approx(0.005)
+    assert isinstance(hidden.target, UnresolvedTarget)
+    assert Unknown("helper") in [step.instruction for step in execution.steps]
+
+    shared.write_text(f"MODULE points\n CONST {point.format(8)} PROC helper() n:=n+5; ENDPROC\nENDMODULE\n")
+    program = read_program(path)
+    assert not program.findings
+    found = motions(execute(program))
+    np.testing.assert_allclose([each.target.pose[0, 3] for each in found], [0.008, 0.005])
+
+    shared.write_text(f"MODULE points\n LOCAL CONST {point.format(8)} LOCAL PROC helper() n:=n+5; ENDPROC\nENDMODULE\n")
+    path = saved(tmp_path, "MoveL q,@;")
+    assert isinstance(motions(execute(read_program(path)))[0].target, UnresolvedTarget)
+
+
 def test_what_an_instruction_reads_has_no_known_value(tmp_path):
     for body in (
         "TPReadNum n,text;",

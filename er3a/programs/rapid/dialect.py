@@ -131,8 +131,8 @@ class RapidDialect(Dialect):
     single_precision = True
 
     def constant(self, memory: ProgramMemory, name: str) -> syntax.Value | None:
-        """Speeds, zones, tool and work object that every controller has."""
-        return data_types.predefined(name)
+        """Speeds, zones, tool and work object that every controller has, those that a module hides in itself too."""
+        return data_types.predefined(name.removeprefix("/"))
 
     def frame_of(self, value: syntax.Value | None) -> Reals | None:
         """That of tooldata and wobjdata."""

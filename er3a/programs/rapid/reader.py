@@ -222,7 +222,8 @@ class Scope:
     Attributes
     ----------
     shapes : types of variables; own : names that only the routine has
-    private : names that only the module has, with those under which the program has them
+    private : names that mean something else in the module than in the program's first, with those under which the
+        program has them
     """
 
     types: dict[str, Shape]
@@ -230,13 +231,21 @@ class Scope:
     shapes: dict[str, Shape] = field(default_factory=dict)
     own: set[str] = field(default_factory=set)
 
+    def meant(self, name: str) -> str:
+        """The name under which the program has what the module names so outside its routines."""
+        return self.private.get(name, name)
+
+    def type_of(self, kind: str) -> Shape:
+        """The type that the module names so."""
+        return self.types.get(self.meant(kind), (kind,))
+
     def settled(self, expression: syntax.Expression) -> syntax.Expression:
         """An expression with the module's own names, and with sums and products that RAPID has for positions too."""
         expression = within(expression, self.settled)
         if isinstance(expression, syntax.Variable) and expression.name not in self.own:
-            return replace(expression, name=self.private.get(expression.name, expression.name))
+            return replace(expression, name=self.meant(expression.name))
         if isinstance(expression, syntax.Invocation):
-            return replace(expression, function=self.private.get(expression.function, expression.function))
+            return replace(expression, function=self.meant(expression.function))
         if isinstance(expression, syntax.Binary) and expression.operator in ("+", "-", "*"):
             return syntax.Invocation(
                 ARITHMETIC, (syntax.Constant(expression.operator), expression.left, expression.right)
@@ -251,7 +260,7 @@ class Scope:
         if isinstance(target, syntax.Member):
             parts = (each for each in self.shape_of(target.of, name) or () if isinstance(each, tuple))
             return next((each[1] for each in parts if each[0] == target.name and isinstance(each[1], tuple)), None)
-        return self.shapes.get(name)
+        return self.shapes.get(name if name in self.own else self.meant(name))
 
     def typed(self, value: syntax.Expression, shape: Shape | None) -> syntax.Expression:
         """A value with the names of its type's components."""
@@ -277,10 +286,11 @@ def read_rapid(source: ProgramText) -> syntax.Program:
     types: dict[str, Shape] = dict(SHAPES)
     encoded = [each.name for each in _beside(source.path) if _is_encoded(each)]  # which may hold what is used here
     findings: list[ProgramFinding] = [NotUnderstood(name, Place(source.path)) for name in encoded]
+    hidden = {name: f"/{name}" for name in _private(cursors[-1].tokens)}  # what other modules mean by these
     readers = []
     for cursor in cursors:
         module, own_module = cursor.source.path.stem.upper(), cursor.source is source
-        private = {} if own_module else {name: f"{module}/{name}" for name in _private(cursor.tokens)}
+        private = {} if own_module else hidden | {name: f"{module}/{name}" for name in _private(cursor.tokens)}
         readers.append(_ModuleReader(cursor, Scope(types, private), procedures))
     _read_in_turn(readers)
     findings += [each for reader in readers for each in (*reader.cursor.source.findings, *reader.findings)]
@@ -309,7 +319,9 @@ def read_rapid(source: ProgramText) -> syntax.Program:
         (*findings, *unlinked),
         source.lines,
         beside=frozenset(
-            _set_by_tasks(source.path) & {name for cursor in cursors for name in _shared(cursor.source.text)}
+            reader.scope.meant(name)
+            for reader in readers
+            for name in _set_by_tasks(source.path) & _shared(reader.cursor.source.text)
         ),
         cyclic=entry == "MAIN",
     )
@@ -324,12 +336,7 @@ def _read_in_turn(readers: Iterable[_ModuleReader]) -> None:
         reader.read_types()
     for reader in readers:
         reader.read_data()
-    shared = {
-        name: shape
-        for reader in readers
-        for name, shape in reader.scope.shapes.items()
-        if name not in reader.scope.private
-    }
+    shared = {name: shape for reader in readers for name, shape in reader.scope.shapes.items()}
     for reader in readers:
         reader.scope.shapes = shared | reader.scope.shapes
         reader.read_routines()
@@ -527,7 +534,7 @@ class _ModuleReader:
                 self._record()
             else:
                 _, kind, name, *_ = [*self.cursor.simple(), *[Token("end", "", "", 0, 0, 0)] * 3]
-                self.scope.types[name.text] = self.scope.types.get(kind.text, (kind.text,))
+                self.scope.types[self.scope.meant(name.text)] = self.scope.type_of(kind.text)
 
     def read_data(self) -> None:
         """Declarations outside routines."""
@@ -566,9 +573,9 @@ class _ModuleReader:
         while self.cursor.word() not in ("ENDRECORD", ""):
             words = [each.text for each in self.cursor.simple() if each.kind == "name"]
             if len(words) == 2:
-                items.append((words[1], self.scope.types.get(words[0], (words[0],))))
+                items.append((words[1], self.scope.type_of(words[0])))
         self.cursor.at += 1
-        self.scope.types[name] = (name, *items)
+        self.scope.types[self.scope.meant(name)] = (name, *items)
 
     def declaration(self, builder: CodeBuilder, scope: Scope, local: bool) -> None:
         """``VAR num n{3} := [1, 2, 3];``"""
@@ -578,7 +585,7 @@ class _ModuleReader:
             elsewhere = words.next == "PERS"  # where it has no value here
             words.take()
             kind, name = words.name(), words.name()
-            shape: Shape = scope.types.get(kind, (kind,))
+            shape = scope.type_of(kind)
             sizes: list[syntax.Expression] = []
             if words.accept("{"):
                 sizes.append(words.expression())
@@ -591,11 +598,11 @@ class _ModuleReader:
                 count = syntax.number(size.value) if isinstance(size, syntax.Constant) else None
                 known = count is not None and 0 < count <= MAX_ELEMENTS
                 initial = (initial,) * int(count or 0) if known and initial is not None else None
-            scope.shapes[name] = shape
             if local:
                 scope.own.add(name)
             else:
-                name = scope.private.get(name, name)
+                name = scope.meant(name)
+            scope.shapes[name] = shape
             value: syntax.Expression | None = words.expression() if words.accept(":=") else None
             words.finish()
         except MisreadError:
@@ -615,7 +622,7 @@ class _ModuleReader:
         name = self.cursor.word()
         self.cursor.at += 1
         scope = Scope(self.scope.types, self.scope.private, dict(self.scope.shapes))
-        name = scope.private.get(name, name)
+        name = scope.meant(name)
         parameters: list[syntax.RoutineParameter] = []
         opened = self.cursor.next()
         if word != "TRAP":
@@ -647,7 +654,7 @@ def _parameters(tokens: list[Token], scope: Scope, place: Place) -> list[syntax.
     def finish() -> None:
         if len(words) >= 2:
             kind, name = words[-2], words[-1]
-            shape = scope.types.get(kind, (kind,))
+            shape = scope.type_of(kind)
             for _ in range(arrays):
                 shape = ("[]", shape)
             scope.shapes[name] = shape
@@ -796,7 +803,7 @@ class _BodyReader:
         prefix, whole = _prefix(called)
         prefix = prefix.upper()
         if whole:
-            self.builder.add(syntax.Doing(place, syntax.Invocation(prefix, *given), text))
+            self.builder.add(syntax.Doing(place, syntax.Invocation(self.scope.meant(prefix), *given), text))
             return
         fitting = [
             name
@@ -812,7 +819,7 @@ class _BodyReader:
                 self.builder.open_if(place, test, text)
             else:
                 self.builder.next_arm(place, test, text)
-            self.builder.add(syntax.Doing(place, syntax.Invocation(name, *given), text))
+            self.builder.add(syntax.Doing(place, syntax.Invocation(self.scope.meant(name), *given), text))
         self.builder.next_arm(place, None, text)
         self.builder.add(syntax.Doing(place, syntax.Invocation(LATE, ()), text))
         self.builder.close("if", place)
@@ -849,7 +856,7 @@ class _BodyReader:
             PLAIN_WORDS[first](self, place, words, text)
             return
         given = self.given(words)
-        name = self.scope.private.get(first, first)
+        name = self.scope.meant(first)
         if name in self.module.procedures:
             builder.add(syntax.Doing(place, syntax.Invocation(name, *given), text))
         else:
@@ -921,7 +928,7 @@ class _BodyReader:
         called, zone = placed[-1], placed[-3] if len(placed) > 2 else None
         assert called is not None
         prefix, whole = _prefix(called)
-        name = self.scope.private.get(prefix.upper(), prefix.upper())
+        name = self.scope.meant(prefix.upper())
         stops = "INPOS" in options or (isinstance(zone, syntax.Variable) and zone.name == "FINE")
         if stops or not whole or name not in self.module.procedures:
             self.late(place, called, ((), ()), text)
@@ -1171,7 +1178,7 @@ def _connect(body: _BodyReader, place: Place, words: RapidWords, text: str) -> N
     words.expect("WITH")
     name = words.name()
     words.finish()
-    body.builder.beside(place, syntax.Invocation(body.scope.private.get(name, name), ()), text, "interrupt")
+    body.builder.beside(place, syntax.Invocation(body.scope.meant(name), ()), text, "interrupt")
 
 
 def _counted(change: int | None) -> Callable[[_BodyReader, Place, RapidWords, str], None]:
