@@ -42,8 +42,8 @@ class Bodies:
     second : (P,) int, number of the other link's body, -1 for a solid
     pairs : P, what meets what
     matrix : what was found of each pair of links
-    unexamined : pairs whose shapes overlap where no arm's can (:mod:`er3a.collision.matrix`), so that they are left
-        out; in_error : of these, those whose shapes are given, or overlap in all joint vectors tried
+    in_error : pairs whose shapes overlap where no arm's can (:mod:`er3a.collision.matrix`), so that they are left out
+    guessed : pairs of neighbours that are left out because capsules guessed from a table can't show how near they come
     joined : (P,), whether a joint joins the two, so that only overlap of what is left of them means anything
     layout : the same as arrays, solids among the bodies
     """
@@ -69,7 +69,7 @@ class Bodies:
         kept = [frozenset((a.name, b.name)) not in allowed for a, b in watched]
         watched, joined = list(compress(watched, kept)), list(compress(joined, kept)) + [False] * len(around)
         numbers = {link_label(k): k for k in range(robot.rows + 1)}
-        self.in_error, guessed = (
+        self.in_error, self.guessed = (
             tuple[Pair, ...](
                 LinkPair(numbers[row.first], numbers[row.second])
                 if row.second in numbers
@@ -79,7 +79,6 @@ class Bodies:
             )
             for state in ("overlaps", "guessed")
         )
-        self.unexamined = self.in_error + guessed
         number: dict[int, int] = {}
         bodies: list[Body] = []
         for body in (*(body for pair in watched for body in pair), *moving, *solids):

@@ -104,7 +104,14 @@ def checked_file(file: Path, robot: Robot, options: CheckOptions, doubts: Sequen
         verdicts = tuple(replace(each, level=worst_of((each.level, "caution"))) for each in check.verdicts)
         check = replace(check, level=worst_of((check.level, "caution")), verdicts=verdicts)
     known = np.isfinite(robot.speed), not assumed_limits(robot, options).acceleration_assumed
-    return CheckedFile(file, check, missed=missed, assumed=left_out_of_rates(*known, jerk=True))
+    assumed = (*left_out_of_rates(*known, jerk=True), *_guessed_pairs(robot, options))
+    return CheckedFile(file, check, missed=missed, assumed=assumed)
+
+
+def _guessed_pairs(robot: Robot, options: CheckOptions) -> tuple[LeftOut, ...]:
+    """Neighbouring links of which guessed shapes show nothing."""
+    pairs = bodies_of(robot, options.scene).guessed if options.measures else ()
+    return (LeftOut("guessed_pairs", tuple(pair.label for pair in pairs)),) if pairs else ()
 
 
 def missed_collisions(robot: Robot, scene: Scene | None, arms: Iterable[tuple[str, Robot]] = ()) -> tuple[LeftOut, ...]:
@@ -208,7 +215,7 @@ def missed_line(missed: tuple[LeftOut, ...]) -> str:
 
 
 def assumed_line(checked: Sequence[CheckedFile]) -> str:
-    """What no document gives and was assumed of the joints' speeds and accelerations; empty where all is given."""
+    """What no document gives and was assumed or guessed: joint speeds, accelerations, shapes; empty if nothing."""
     found = dict.fromkeys(each for one in checked for each in one.assumed)
     parts = [left_out_text(each) + (f" ({left_out_names(each)})" if each.names else "") for each in found]
     return f"not examined: {'; '.join(parts)}" if parts else ""
@@ -312,9 +319,11 @@ def finite(value: Any) -> Any:
 
 
 def _verdict_record(verdict: MotionVerdict) -> dict[str, Any]:
+    """``called_at``: where that is in another file, the line of the call in the program's own."""
     record = plain(verdict)
     record.pop("place")
-    return {**_place_record(verdict.place), **record}
+    line = record.pop("line")
+    return {**_place_record(verdict.place), "called_at": line if line != verdict.place.line else None, **record}
 
 
 def sarif_of(checked: Sequence[CheckedFile]) -> dict[str, Any]:

@@ -113,6 +113,7 @@ LeftOutSubject = Literal[
     "obstacles",
     "bare_links",
     "unexamined_pairs",
+    "guessed_pairs",
     "allowed_pairs",
     "joined_pairs",
     "unmeasured_pairs",

@@ -260,8 +260,7 @@ def _not_examined(execution: Execution, located: tuple[LocatedFinding, ...], end
     """``end``: number of the first step that was not checked."""
     moves = (step.place for step in execution.steps[end:] if isinstance(step.instruction, ArmMotion))
     found = [NotExamined(place, "motion") for place in moves]
-    missed = (found_in.MotionNotReached, found_in.NeverReached)
-    found += [NotExamined(each.place, "motion") for each in located if isinstance(each.finding, missed)]
+    found += [NotExamined(place, "motion") for places in _unreached(execution).values() for place in places]
     found += [
         NotExamined(each.place, "motion")
         for each in located
@@ -316,7 +315,7 @@ def _located(execution: Execution, robot: Robot, checker: StepChecker, end: int)
             ]
     found += _begun_again(execution, checker, found)
     arms = checker.obstacles.bodies.values() if checker.obstacles else ()
-    if pairs := tuple(dict.fromkeys(pair for bodies in arms for pair in bodies.unexamined)):
+    if pairs := tuple(dict.fromkeys(pair for bodies in arms for pair in bodies.in_error)):
         found.append(LocatedFinding("caution", PairsUnexamined(pairs), top))
     for step in steps.values():
         what = step.instruction
@@ -348,11 +347,9 @@ def _located(execution: Execution, robot: Robot, checker: StepChecker, end: int)
         if ending.kind not in ("end", "repeats", "joins"):
             stopped = found_in.NotFollowedToEnd(ending.kind, ending.limit)
             found.append(LocatedFinding(found_in.level_of(stopped), stopped, ending.place))
-    unmet = dict.fromkeys(place for place in execution.unmet if place.file == program.file)
-    unreached = dict.fromkeys(_unreached(execution))
-    for place in dict.fromkeys([*unreached, *unmet]):
+    for place, moves in _first_unreached(execution):
         missed: found_in.CheckFinding = (
-            found_in.NeverReached(place in unreached) if execution.complete else found_in.MotionNotReached()
+            found_in.NeverReached(moves) if execution.complete else found_in.MotionNotReached()
         )
         found.append(LocatedFinding(found_in.level_of(missed), missed, place))
     groups: dict[tuple[Place, str, str], list[LocatedFinding]] = defaultdict(list)
@@ -504,10 +501,26 @@ def _place_of(finding: found_in.CheckFinding, top: Place) -> Place:
     return place if isinstance(place, Place) else top
 
 
-def _unreached(execution: Execution) -> tuple[Place, ...]:
-    met = {step.place for step in execution.steps}
-    texts = _motion_texts(execution.program)
-    return tuple(place for place, _ in texts if place not in met and place.file == execution.program.file)
+def _unreached(execution: Execution) -> dict[str, dict[Place, bool]]:
+    """Motions that no way comes to, and instructions that may move the arm (False), by routine: of the program's own
+    file and of the routines of other files that are called."""
+    program, met = execution.program, {step.place for step in execution.steps}
+    motions, unmet = {place for place, _ in _motion_texts(program)} - met, {*execution.unmet}
+    found: dict[str, dict[Place, bool]] = {}
+    for name, routine in program.routines.items():
+        places = (each.place for each in routine.operations if each.place in motions or each.place in unmet)
+        here = {each: each in motions for each in places if each.file == program.file or name in execution.entered}
+        if here:
+            found[name] = here
+    return found
+
+
+def _first_unreached(execution: Execution) -> Iterator[tuple[Place, bool]]:
+    """These, of routines of other files the first alone, whose others are like it."""
+    own = execution.program.file
+    for places in _unreached(execution).values():
+        yield from (each for each in places.items() if each[0].file == own)
+        yield from [each for each in places.items() if each[0].file != own][:1]
 
 
 def _motion_texts(program: Program) -> list[tuple[Place, str]]:

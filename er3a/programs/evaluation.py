@@ -134,6 +134,9 @@ WITH_FIELDS = {"$APO": ("CDIS", "CPTP", "CORI", "CVEL")} | dict.fromkeys(("$VEL"
 HELD_BESIDE = "%beside"
 """Under this a routine's own memory keeps which of its variables others change, too, as it has handed them over."""
 
+SIZES = "%sizes"
+"""With what the name ends under which the last index in each dimension of a declared list of KRL is kept."""
+
 STRUCTURE = "%STRUC "
 """With what the name begins under which the types of the fields of a KRL structure are kept."""
 
@@ -446,8 +449,10 @@ class ProgramMemory:
             if self.watched and root(name) in self.watched:
                 self.written.add(name)
 
-    def declare(self, name: str, kind: str, local: bool) -> None:
-        """The type of a variable; a parameter of a routine takes it where that declares it."""
+    def declare(self, name: str, kind: str, local: bool, sizes: tuple[int, ...] = ()) -> None:
+        """The type of a variable, and sizes of a list; a parameter of a routine takes them where that declares it."""
+        if sizes:
+            (self.local if local else self.shared)[name + SIZES] = sizes
         if not local:
             self.types[name] = kind
             return
@@ -492,7 +497,10 @@ class ProgramMemory:
             return {}
         kept = self.local if root(start) in self.local else {**self.shared, **self.cell.frames}
         found = [each for each in kept if each.startswith(start)]
-        return {f"{name}[{each[len(start) :]}": known(self.read(each), each) for each in found}
+        sizes = self._sizes(root(start))
+        return {f"{name}[{each[len(start) :]}": known(self.read(each), each) for each in found} | (
+            {name + SIZES: sizes} if sizes else {}
+        )
 
     def take_back(self, target: syntax.Expression, name: str, local: Mapping[str, syntax.Value]) -> None:
         """Set a variable to what a routine's own ``name`` holds at its end; all elements of a whole list ``A[]``."""
@@ -545,10 +553,28 @@ class ProgramMemory:
             case syntax.Element(of=of, indices=indices):
                 start = self.key(of)
                 found = [syntax.number(self.value(each)) for each in indices]
-                if start is None or None in found:
+                if start is None or None in found or self.outside(target):
                     return None
                 return f"{start}[{','.join(f'{each:g}' for each in found)}]"
         return None
+
+    def outside(self, target: syntax.Expression) -> str:
+        """The element in a target that its list's declaration has not, as text; empty for none."""
+        while isinstance(target, (syntax.Member, syntax.Element)):
+            if isinstance(target, syntax.Element) and isinstance(target.of, syntax.Variable):
+                name, sizes = target.of.name, self._sizes(target.of.name)
+                found = [syntax.number(self.value(each)) for each in target.indices]
+                pairs = zip(found, sizes) if len(found) == len(sizes) else ()
+                system = name.startswith("$") and any(each is not None and each < 1 for each in found)
+                if system or any(each is not None and not 1 <= each <= size for each, size in pairs):
+                    return f"{self.shown(target)} of {name}[{','.join(map(str, sizes))}]"
+            target = target.of
+        return ""
+
+    def _sizes(self, name: str) -> tuple[int, ...]:
+        """The last index in each dimension of a declared list of KRL; none where that is not known."""
+        found = (self.local if name in self.local else self.shared).get(name + SIZES)
+        return tuple(each for each in found if isinstance(each, int)) if isinstance(found, tuple) else ()
 
     def settled(self, target: syntax.Expression) -> syntax.Expression:
         """A variable, field or element with its indices as they are now."""
@@ -605,7 +631,7 @@ class ProgramMemory:
             key = self.key(expression)
             found = None if key is None else self.read(key)
             if found is None and isinstance(of, syntax.Unclear):
-                return syntax.Unclear(key or of.text)
+                return syntax.Unclear(key or self.outside(expression) or of.text)
         return syntax.Unclear(self.shown(expression)) if found is None else found
 
     def shown(self, target: syntax.Expression) -> str:

@@ -120,6 +120,7 @@ class Execution(ByValue):
     steps : of all ways; each names the one before it
     endings : one for each way
     unmet : instructions that are no motions, may move the arm for all that is known, and were not carried out
+    entered : names of the routines that a way came to
     frames_twice : frames that the program and the cell give differently; the program's were taken
     kept : variables of its data that decide motions and that it leaves changed to its next start, with where
     elsewhere : variables of its data that decide motions and that other programs set, with where
@@ -131,6 +132,7 @@ class Execution(ByValue):
     steps: tuple[Step, ...]
     endings: tuple[Ending, ...]
     unmet: tuple[Place, ...] = ()
+    entered: frozenset[str] = frozenset()
     frames_twice: tuple[FrameTwice, ...] = ()
     kept: tuple[tuple[str, Place], ...] = ()
     elsewhere: tuple[tuple[str, Place], ...] = ()

@@ -723,6 +723,7 @@ class Machine:
             tuple(self.steps),
             tuple(self.endings),
             self._unmet(),
+            frozenset(name for name, _ in self.passed),
             tuple(twice),
             tuple(self.kept.items()),
             tuple((name, place) for name, place in elsewhere.items() if name in set(map(root, memory.met))),
@@ -947,7 +948,7 @@ class Machine:
 
     def _assign(self, memory: ProgramMemory, each: syntax.Assign) -> instructions.Output | instructions.Unknown | None:
         if each.type_name and isinstance(each.target, syntax.Variable):
-            memory.declare(each.target.name, each.type_name, each.local)
+            memory.declare(each.target.name, each.type_name, each.local, each.sizes)
         if each.value is None:
             if isinstance(each.target, syntax.Variable) and each.target.name not in memory.local:
                 memory.write(each.target.name, syntax.Unset(each.target.name), each.local)
@@ -955,6 +956,9 @@ class Machine:
         value = memory.value(each.value)
         key = memory.key(each.target)
         name = key or memory.shown(each.target)
+        if memory.outside(each.target):  # where a controller stops
+            memory.forget(root(name))
+            return instructions.Unknown(each.text, may_move=False)
         if isinstance(each.value, syntax.Constant) and isinstance(value, syntax.Unclear):  # which part is not known
             memory.forget(root(name))
         if self.dialect.runs_on(name):

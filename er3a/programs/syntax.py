@@ -218,7 +218,8 @@ Expression = Constant | Variable | Member | Element | Invocation | Unary | Binar
 
 @dataclass(frozen=True, slots=True)
 class Assign:
-    """``target = value``; ``type_name`` where it is declared here, in the routine alone if ``local``."""
+    """``target = value``; ``type_name`` where it is declared here, in the routine alone if ``local``; ``sizes``: the
+    last index in each dimension of a list of KRL that is declared here."""
 
     place: Place
     target: Expression
@@ -226,6 +227,7 @@ class Assign:
     text: str
     type_name: str = ""
     local: bool = False
+    sizes: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

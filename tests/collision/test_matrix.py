@@ -245,8 +245,8 @@ def test_a_guess_that_overlaps_at_many_poses_refuses_none_of_them_and_is_named()
     assert states["base", "link_2"] == states["link_2", "link_4"] == "guessed"
     q = quasi_random_points(arm.lower, arm.upper, 2000)
     assert np.array_equal(Bodies(bare, None).free(q), Bodies(arm, None).free(q))
-    assert Bodies(bare, None).unexamined == (LinkPair(0, 2), LinkPair(2, 4))
-    assert Bodies(bare, None).in_error == Bodies(arm, None).unexamined == ()
+    assert Bodies(bare, None).guessed == (LinkPair(0, 2), LinkPair(2, 4))
+    assert Bodies(bare, None).in_error == Bodies(arm, None).in_error == ()
     stated = bare.replace(envelopes=arm_shapes(bare).capsules)
     assert not Bodies(stated, None).free(np.radians([[0.0, 45.0, -30.0, 0.0, 60.0, 0.0]])).any()
 
@@ -259,7 +259,7 @@ def test_neighbours_between_three_parallel_axes_may_lie_side_by_side():
     assert states["link_3", "link_4"] == "joined"
     assert states["link_2", "link_4"] == "meets"
     bodies = Bodies(arm, None)
-    assert LinkPair(2, 3) in bodies.unexamined
+    assert LinkPair(2, 3) in bodies.guessed
     assert bodies.free(np.radians([[0.0, -90.0, 145.0, -90.0, -90.0, 0.0]])).all()
 
 
@@ -286,7 +286,7 @@ def test_boxes_of_a_wrist_are_held_by_their_joints_also_across_two_of_them():
     states = {names: row.state for names, row in rows_of(robot).items()}
     assert states["link_1", "link_2"] == states["link_2", "link_3"] == states["link_1", "link_3"] == "joined"
     bodies = Bodies(robot, None)
-    assert bodies.unexamined == ()
+    assert bodies.in_error == ()
     assert bodies.free(np.zeros((1, 3))).all()
 
 
@@ -329,7 +329,7 @@ def test_links_that_overlap_always_only_as_a_whole_are_joined_or_in_error():
     for more, state in ((bearing, "joined"), ((), "overlaps")):
         robot = arm.replace(hulls=(*sides, bar, *more))
         assert rows_of(robot)["base", "link_1"].state == state
-        assert Bodies(robot, None).unexamined == (() if state == "joined" else (LinkPair(0, 1),))
+        assert Bodies(robot, None).in_error == (() if state == "joined" else (LinkPair(0, 1),))
     opened = arm.replace(hulls=(*sides[:3], bar, *bearing))
     assert rows_of(opened)["base", "link_1"].state == "meets"
 
@@ -340,11 +340,11 @@ def test_what_overlaps_in_every_pose_without_a_joint_is_an_error_of_the_shapes()
     swollen = robot.replace(envelopes=(Envelope(0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 3.0), *robot.envelopes[1:]))
     rows, bodies = rows_of(swollen), Bodies(swollen, None)
     assert {names[1] for names, row in rows.items() if row.state == "overlaps"} == {"link_3", "link_4", "link_6"}
-    assert bodies.unexamined == (LinkPair(0, 3), LinkPair(0, 4), LinkPair(0, 6))
-    assert not {pair for pair in bodies.pairs if pair in bodies.unexamined}
+    assert bodies.in_error == (LinkPair(0, 3), LinkPair(0, 4), LinkPair(0, 6))
+    assert not {pair for pair in bodies.pairs if pair in bodies.in_error}
     q = np.random.default_rng(1).uniform(robot.lower, robot.upper, (200, 6))
     alone = Bodies(robot.replace(envelopes=robot.envelopes[1:]), None)
     np.testing.assert_array_equal(bodies.free(q), alone.free(q))
     assert 0.05 < bodies.free(q).mean() < 1
     allowed = tuple(PairRule("base", f"link_{k}", "allow", "made so") for k in (3, 4, 6))
-    assert Bodies(swollen.replace(pair_rules=allowed), None).unexamined == ()
+    assert Bodies(swollen.replace(pair_rules=allowed), None).in_error == ()

@@ -128,7 +128,7 @@ def test_its_targets_are_reached_and_its_paths_are_safe(written, monkeypatch):
     assert kinds == ({"joint_move"} if name == "lbr_iiwa_14" else {"joint_move", "line", "arc"})
     text = " ".join(Path("README.md").read_text(encoding="utf-8").split())
     assert "poses that the arm reaches within its limits, away from singular poses and clear of collisions" in text
-    unexamined = bodies_of(load_robot(name), None).unexamined  # of guessed shapes that always overlap
+    unexamined = bodies_of(load_robot(name), None).in_error  # of guessed shapes that always overlap
     assert ("Read this first" in text) == bool(unexamined)
 
 

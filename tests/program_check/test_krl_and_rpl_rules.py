@@ -456,3 +456,11 @@ def test_a_turn_that_two_solutions_have_is_not_known_to_mean_the_nearest(tmp_pat
     turn = int(((own < 0) << np.arange(6)).sum())
     checked = check(tmp_path, krl(f"{FRAMES}PTP {{{target},S 2,T {turn}}}"), "a.src")
     assert codes(checked).get("configuration_not_read") == (None if alike == 1 else [4])
+
+
+def test_numbers_of_rpl_that_rounding_decides_on_are_followed_both_ways(tmp_path):
+    """REAL has 32 bits, in which 0.1 + 0.2 is 0.3."""
+    turn = "MJOINT(POINTJ({},-10,-10,0,-70,0), v50perc, fine, tool0);\n"
+    text = "x := 0.1 + 0.2;\nq := 20;\nIF x = 0.3 THEN\nq := 30;\nEND_IF;\n" + turn.format("q")
+    found = check(tmp_path, text, "a.pgm")
+    assert [each.times for each in found.verdicts] == [2]

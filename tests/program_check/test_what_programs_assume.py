@@ -119,6 +119,15 @@ def test_a_turning_speed_that_is_not_known_is_a_caution_where_the_turn_decides(t
     assert "turn_speed_not_given" not in codes(check(tmp_path, krl(f"{body}LIN_REL {{Z 5}}"), "a.src"))
 
 
+@pytest.mark.parametrize("word", ["$VEL.CP={}", "BAS(#VEL_CP,{})", "WITH"])
+@pytest.mark.parametrize(("speed", "told"), [(250, True), (5, True), (3, False), (0.25, False)])
+def test_a_speed_along_the_path_that_no_controller_takes_is_a_caution(tmp_path, word, speed, told):
+    """250 is mm/s, typed where m/s are meant."""
+    line = f"SLIN_REL {{Z 5}} WITH $VEL.CP={speed}" if word == "WITH" else f"{word.format(speed)}\nLIN_REL {{Z 5}}"
+    found = check(tmp_path, krl(f"{FRAMES}{SPEEDS}{line}"), "a.src")
+    assert [each.level for each in found.findings if each.finding.code == "speed_not_given"] == ["caution"] * told
+
+
 @pytest.mark.parametrize(
     ("name", "text", "kind"),
     [
@@ -337,6 +346,19 @@ def test_a_call_of_what_moves_that_no_way_leads_to_is_named_where_its_file_is_an
     (tmp_path / "work.src").write_text(LATER.format(wait=""))
     found = with_data(tmp_path, "PTP {A1 5}\nIF GO THEN\nwork( )\nENDIF", "DECL GLOBAL BOOL GO=FALSE")
     assert codes(found)["never_reached"] == [9]
+
+
+def test_motions_of_a_called_module_that_no_way_leads_to_are_named(tmp_path):
+    """Each among what was not examined, and the first of its routine as a finding; routines that none calls are not."""
+    pick = "DEF pick(S :IN)\nINT S\nIF S==1 THEN\nPTP {A1 5}\nELSE\nPTP {A1 9}\nPTP {A1 8}\nENDIF\nEND\n"
+    (tmp_path / "pick.src").write_text(pick + "GLOBAL DEF other( )\nPTP {A1 7}\nEND\n")
+    found = with_data(tmp_path, "PTP {A1 1}\npick(1)", "")
+    places = [
+        (each.place.file.name, each.place.line) for each in found.findings if each.finding.code == "never_reached"
+    ]
+    assert places == [("pick.src", 6)]
+    assert [(each.what, each.place.line) for each in found.not_examined] == [("motion", 6), ("motion", 7)]
+    assert found.level == "caution"
 
 
 @pytest.mark.parametrize("given", ["v", "q{1}"])

@@ -11,7 +11,7 @@ from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
 from er3a.pipeline.program_reports import checked_file, json_of, lines_of, sarif_of
 from er3a.program_check.check_program import CheckOptions, check_program
-from er3a.programs.instructions import ArmMotion
+from er3a.programs.instructions import ArmMotion, JointTarget
 from er3a.programs.languages import files_of, read_program
 from er3a.programs.machine import execute
 from testing.program_texts import motions
@@ -102,6 +102,18 @@ def test_what_another_modules_data_declare_for_all_is_known(cell, public):
     cell.with_name("setter.src").write_text("DEF SETTER( )\nSPREAD.A1=50\nEND\n")
     check = check_program(read_program(alone), load_robot("er3a_c60"), CheckOptions(start=np.zeros(6), measures=False))
     assert ("set_elsewhere" in {each.finding.code for each in check.findings}) == public
+
+
+@pytest.mark.parametrize("public", [True, False])
+@pytest.mark.parametrize("called", [True, False])
+def test_what_is_declared_for_all_is_seen_by_none_if_its_data_are_not_public(cell, called, public):
+    data = f"DEFDAT {'OWNER' if called else 'CELL'}{' PUBLIC' * public}\nDECL GLOBAL REAL AT=7\nENDDAT\n"
+    go = "PTP {A1 AT,A2 0,A3 0,A4 0,A5 20,A6 0}\n"
+    cell.with_name("owner.src").write_text(f"DEF OWNER( )\n{'' if called else go}END\n")
+    cell.with_name("owner.dat" if called else "cell.dat").write_text(data)
+    cell.write_text(f"DEF CELL( )\nOWNER( )\n{go if called else ''}END\n")
+    (step,) = (each for each in execute(read_program(cell)).steps if isinstance(each.instruction, ArmMotion))
+    assert isinstance(step.instruction.target, JointTarget) == public
 
 
 LIST = "DEFDAT %s PUBLIC\nDECL GLOBAL AXIS L[2]\nL[1]={A1 3,A2 0,A3 0,A4 0,A5 20,A6 0}\nENDDAT\n"

@@ -263,6 +263,7 @@ def test_external_axes_are_kept(tmp_path):
         ("DEF a()\nPTP {A1 0}\n", "has no END"),
         ("DEF (\nEND\n", "head of a routine"),
         ("PTP {A1 0}\n", "outside of any routine"),
+        ("DEF a()\nINT I\nFOR I=1 TO 2 STEP 0\nENDFOR\nEND\n", "STEP 0"),
     ],
 )
 def test_what_has_no_end_is_an_error_with_its_line(text, told, tmp_path):
@@ -447,3 +448,35 @@ def test_functions_that_only_read_their_arguments_keep_them(tmp_path):
 def test_a_text_and_its_letters_change_together(body, tmp_path):
     found = run(tmp_path, f"DECL CHAR S[9]\n{body}\n{AXES.format(5)}\nELSE\n{AXES.format(7)}\nENDIF")
     assert len(moves(found)) == 2  # both sides
+
+
+@pytest.mark.parametrize(
+    ("body", "data", "reached", "told"),
+    [
+        ("DECL AXIS P[3]\nP[3]={AT}\nPTP P[3]", "", 1, False),
+        ("DECL AXIS P[3]\nP[0]={AT}\nPTP P[0]", "", 0, True),
+        ("DECL AXIS P[3]\nP[4]={AT}\nPTP P[4]", "", 0, True),
+        ("INT I\nDECL AXIS P[3]\nFOR I=1 TO 4\nP[I]={AT}\nP[I].A1=5\nPTP P[I]\nENDFOR", "", 3, True),
+        ("INT M[2,2]\nM[2,1]=5\nPTP {A1 M[2,1],A2 0,A3 0,A4 0,A5 30,A6 0}", "", 1, False),
+        ("INT M[2,2]\nM[3,1]=5\nPTP {A1 M[3,1],A2 0,A3 0,A4 0,A5 30,A6 0}", "", 0, True),
+        ("PTP XP[2]\nPTP XP[1]", "DECL AXIS XP[2]\nXP[1]={AT}\nXP[2]={AT}", 2, False),
+        ("PTP XP[3]", "DECL AXIS XP[2]\nXP[3]={AT}", 0, True),
+        ("S(XP[])\nPTP XP[1]", "DECL AXIS XP[2]\nXP[1]={AT}", 0, True),
+        ("S(XP[])\nPTP XP[1]", "DECL AXIS XP[3]\nXP[1]={AT}", 1, False),
+    ],
+)
+def test_an_element_that_a_list_is_not_declared_with_is_none_and_told(body, data, reached, told, tmp_path):
+    """Indices begin at 1, and a controller stops at one outside of the declaration."""
+    at = "{A1 10,A2 0,A3 0,A4 0,A5 30,A6 0}"
+    more = f"DEF S(Q[]:OUT)\nDECL AXIS Q[]\nQ[3]={at}\nEND"
+    found = run(tmp_path, body.replace("{AT}", at), f"DEFDAT weld\n{data}\nENDDAT\n".replace("{AT}", at), more)
+    given = [each for each in moves(found) if isinstance(each.target, JointTarget)]
+    assert len(given) == reached
+    lines = [each for step in found.steps if isinstance(each := step.instruction, Unknown)]
+    assert bool(lines or any(isinstance(each, NotUnderstood) for each in found.program.findings)) == told
+
+
+def test_an_output_below_the_first_is_told(tmp_path):
+    steps = [step.instruction for step in run(tmp_path, "$OUT[0]=TRUE\n$OUT[1]=TRUE").steps]
+    assert [(each.text, each.may_move) for each in steps if isinstance(each, Unknown)] == [("$OUT[0]=TRUE", False)]
+    assert [each.name for each in steps if isinstance(each, Output)] == ["$OUT[1]"]

@@ -1063,7 +1063,7 @@ def test_pairs_that_are_left_out_whole_are_not_named_as_joined():
     found = {each.subject: each.names for each in left_out_of_collisions(arm, bodies, None)}
     assert guessed
     assert guessed.isdisjoint({*found.get("joined_pairs", ()), *found["joined_whole"]})
-    assert guessed <= {*found["unexamined_pairs"]}
+    assert guessed <= {*found["guessed_pairs"]}
 
 
 def test_pairs_of_which_nothing_is_left_beyond_their_joint_are_not_said_to_be_examined():

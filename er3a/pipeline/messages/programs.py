@@ -115,7 +115,7 @@ REMEDIES: dict[str, str] = {
     "program_name_twice": N_("Remove one of the two definitions."),
     "program_module_twice": N_("Remove the one that the controller does not have."),
     "program_nothing_moves": N_("Check that this is the program to run."),
-    "speed_not_given": N_("Give a speed, as a number above 0, before the motion."),
+    "speed_not_given": N_("Give a speed, as a number above 0, before the motion (KRL: $VEL.CP in m/s, 3 at most)."),
     "turn_speed_not_given": N_(
         "Give the speed of the tool's turn (KRL: $VEL.ORI1 and $VEL.ORI2), or where the language has none, the time "
         "of the motion (URScript: t)."
@@ -331,7 +331,8 @@ TEXTS = texts(
         "speed_not_given": "the program gives no speed; {assumed:g} m/s were assumed for the duration",
         "speed_not_given.share": "the program gives no speed; {percent:g} % were assumed for the duration",
         "speed_not_given.word": (
-            "the speed '{word}' is not known, or not above 0; {assumed} was assumed for duration and joint speeds"
+            "the speed '{word}' is not known, not above 0, or more than a controller takes; {assumed} was assumed for "
+            "duration and joint speeds"
         ),
         "turn_speed_not_given": (
             "the tool's turn decides how long this takes, and the program does not give its speed; "

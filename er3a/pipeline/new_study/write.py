@@ -646,9 +646,9 @@ def _found(arm: Arm) -> FoundTasks:
 
 def _unexamined(arm: Arm, search: TaskSearch) -> list[str]:
     """Which collisions were not looked at, if any."""
-    if not search.bodies.unexamined:
+    if not search.bodies.in_error:
         return []
-    pairs = ", ".join(pair.label for pair in search.bodies.unexamined)
+    pairs = ", ".join(pair.label for pair in search.bodies.in_error)
     return [f"Collisions of {pairs} were not examined: these shapes overlap where no arm's can. {_remedy(arm)}"]
 
 

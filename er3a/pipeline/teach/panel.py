@@ -380,11 +380,11 @@ def singular_sets(robot: Robot) -> dict[str, Any] | None:
 def clearance_data(robot: Robot, scene: Scene | None) -> dict[str, Any]:
     """The bodies whose distances the panel watches and their pairs, as ``clearance.js`` takes them; SI units."""
     found = Bodies(robot, scene)
-    layout = found.layout
+    layout, left_out = found.layout, found.in_error + found.guessed
     shapes = shapes_assumed(robot, 0.0, {})
     return {
         "near": NEAR_TOUCH,
-        "unexamined": say(PairsUnexamined(found.unexamined)) if found.unexamined else None,
+        "unexamined": say(PairsUnexamined(left_out)) if left_out else None,
         "assumed": say(shapes) if shapes else "",
         "unmeasured": unmeasured_text(found.unmeasured),
         "allowed": [

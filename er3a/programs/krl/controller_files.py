@@ -19,6 +19,7 @@ COMMENT = re.compile(r";[^\n]*")
 CALL = re.compile(r"\b([A-Za-z]\w*)\s*\(")
 ROUTINE = re.compile(r"(?im)^\s*(GLOBAL\s+)?DEF(?:FCT\s+\w+(?:\s*\[[^\]]*\])?)?\s+(\w+)")
 PUBLISHED = re.compile(r"(?is)^\s*(?:&[^\n]*\s)*DEFDAT\s+\S+\s+PUBLIC\b.*\bGLOBAL\b")
+PUBLIC = re.compile(r"(?im)^[ \t]*DEFDAT[ \t]+\S+[ \t]+PUBLIC\b")
 GLOBAL_NAME = re.compile(r"(?i)\bGLOBAL\b")
 MAX_MODULES = 200
 OF_CONTROLLER = ("BAS", "USER_GRP", "IR_STOPM")

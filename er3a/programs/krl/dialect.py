@@ -25,6 +25,8 @@ COORDINATES = frozenset((*FRAME_KEYS, *AXIS_KEYS, *EXTERNAL_KEYS))
 POSITION_FIELDS = COORDINATES | {"S", "T"}
 POSITION_KINDS = ("FRAME", "POS", "E6POS", *AXIS_KINDS)
 SAME_TURN = 1e-3  # rad
+MOST_SPEED = 3.0  # m/s
+"""What controllers take along a path at most: ``$VEL_MA.CP`` of their machine data."""
 SIGN_ZERO = 1e-7  # rad; nearer to 0 a joint's sign says nothing
 OFF_MM, OFF_DEG = 0.1, 0.01
 NOT_NUMBERS = ("NAN", "INF", "INFINITY")
@@ -956,7 +958,10 @@ def _settings(memory: ProgramMemory, kind: instructions.MotionKind, move: syntax
 def _speed(memory: ProgramMemory, kind: instructions.MotionKind) -> instructions.Rate | None:
     if kind == "joint":
         return _axis_share(memory, "$VEL_AXIS")
-    return syntax.rate_of(memory.read("$VEL.CP"), "m/s")
+    speed = syntax.rate_of(memory.read("$VEL.CP"), "m/s")
+    if speed is not None and speed.value > MOST_SPEED:
+        return instructions.Rate(0.0, "m/s", f"$VEL.CP={speed.value:g}")
+    return speed
 
 
 def _acceleration(memory: ProgramMemory, kind: instructions.MotionKind) -> instructions.Rate | None:

@@ -29,7 +29,7 @@ from er3a.programs.code_builder import (
 )
 from er3a.programs.evaluation import STRUCTURE
 from er3a.programs.instructions import Aside, Place, Remark, Unknown
-from er3a.programs.krl.controller_files import CALL, GLOBAL_NAME, ControllerFiles, is_basics
+from er3a.programs.krl.controller_files import CALL, GLOBAL_NAME, PUBLIC, ControllerFiles, is_basics
 from er3a.programs.krl.dialect import (
     HERE,
     HERE_JOINTS,
@@ -267,11 +267,10 @@ class _Statement:
             words.arguments("]")
         while True:
             target: syntax.Expression = syntax.Variable(words.name())
-            if words.accept("["):
-                words.arguments("]")
+            sizes = _sizes(words.arguments("]")[0]) if words.accept("[") else ()
             value = words.expression() if words.accept("=") else None
             local = not self.inside_data
-            self.builder.add(syntax.Assign(self.place, target, value, self.text, kind, local))
+            self.builder.add(syntax.Assign(self.place, target, value, self.text, kind, local, sizes))
             if not words.accept(","):
                 break
         words.finish()
@@ -329,6 +328,23 @@ class _Statement:
                 return settings
 
 
+def _sizes(given: Iterable[syntax.Expression | None]) -> tuple[int, ...]:
+    """The sizes of a declared list; none where they are no numbers."""
+    found = [each.value if isinstance(each, syntax.Constant) else None for each in given]
+    whole = tuple(each for each in found if isinstance(each, int))
+    return whole if len(whole) == len(found) else ()
+
+
+def _is_outside(target: syntax.Expression, sizes: Mapping[str, tuple[int, ...]]) -> bool:
+    """Whether a target is an element that its list's declaration has not."""
+    while isinstance(target, syntax.Member):
+        target = target.of
+    if not isinstance(target, syntax.Element):
+        return False
+    found, declared = _sizes(target.indices), sizes.get(variable_of(target), ())
+    return len(found) == len(declared) and not all(1 <= each <= size for each, size in zip(found, declared))
+
+
 def _acts(operation: syntax.Operation) -> bool:
     """Whether an operation is more than a declaration."""
     return not isinstance(operation, syntax.Fixed) and not (isinstance(operation, syntax.Assign) and operation.local)
@@ -359,6 +375,8 @@ def _for(reading: _Statement) -> None:
     last = words.expression()
     step = words.expression() if words.accept("STEP") else None
     words.finish()
+    if isinstance(step, syntax.Constant) and step.value == 0:
+        raise MisreadError("STEP 0")
     reading.builder.open_for(reading.place, name, first, last, step, reading.text)
 
 
@@ -571,15 +589,18 @@ def apart(
     """
     routines, data, module = list(routines), list(data), source.path.stem.upper()
     seen = {module, *(name.upper() for name in GLOBAL_ROUTINE.findall(source.text))}
-    own = {variable_of(each.target) for each in data} - _global_names(data)
+    own = {variable_of(each.target) for each in data} - _global_names(data_file_of(source.path, ".dat"), data)
     own |= {routine.name for routine in routines} - seen
     names = {name: f"{module}/{name}" for name in own if not name.startswith(("$", "%"))}
 
     return [_with_names(each, names) for each in routines], [_as(each, names) for each in data]
 
 
-def _global_names(data: Iterable[syntax.Assign]) -> set[str]:
-    """Variables that data declare for all modules; lines that set their elements say so no more."""
+def _global_names(file: Path | None, data: Iterable[syntax.Assign]) -> set[str]:
+    """Variables that the data of a file declare for all modules, which others see if the file is ``PUBLIC``; lines
+    that set their elements say so no more."""
+    if file is None or not PUBLIC.search(read_program_text(file).text):
+        return set()
     return {variable_of(each.target) for each in data if GLOBAL_NAME.search(each.text)}
 
 
@@ -590,7 +611,7 @@ def _seen_here_alone(
     file, module = data_file_of(source.path, ".dat"), source.path.stem.upper()
     seen = {module, *(name.upper() for name in GLOBAL_ROUTINE.findall(source.text))}
     own = [each for each in data if each.place.file == file]
-    names = {variable_of(each.target) for each in own} - _global_names(own)
+    names = {variable_of(each.target) for each in own} - _global_names(file, own)
     names |= {routine.name for routine in routines} - seen
     return {name: f"/{name}" for name in names if not name.startswith(("$", "%"))}
 
@@ -659,7 +680,8 @@ def read_krl(source: ProgramText) -> syntax.Program:
     findings += [*_robot_root(files.machine_data), *files.twice()]
     called: list[syntax.Routine] = []
     hidden = _seen_here_alone(source, routines, reader.data)
-    seen_by_all = [each for each in reader.data if each.place.file != data_file or GLOBAL_NAME.search(each.text)]
+    shown = _global_names(data_file, (each for each in reader.data if each.place.file == data_file))
+    seen_by_all = [each for each in reader.data if each.place.file != data_file or variable_of(each.target) in shown]
     reader.data = [each if each.place.file == data_file else _as(each, hidden) for each in reader.data]
     for file in files.modules:
         more_routines, more_data, more = _module(read_program_text(file), of_controller)
@@ -755,8 +777,11 @@ class _KrlReader:
         self._read_lines(source, builder, inside_data=True)
         found: list[ProgramFinding] = [*source.findings, *not_understood(builder.code)]
         seen: dict[str, bool] = {}
+        sizes: dict[str, tuple[int, ...]] = {}
         for each in builder.code:
             if isinstance(each, syntax.Assign):
+                sizes |= {variable_of(each.target): each.sizes} if each.sizes else {}
+                found += [NotUnderstood(each.text, each.place)] if _is_outside(each.target, sizes) else []
                 if isinstance(each.target, syntax.Variable) and each.type_name:
                     if seen.get(each.target.name):
                         found.append(NameTwice(each.target.name, each.place))
@@ -783,7 +808,7 @@ class _KrlReader:
                 other.read_data(other.source)
             except InputError:
                 continue  # what it declares has no known value
-            shown = _global_names(other.data)
+            shown = _global_names(file, other.data)
             for each in other.data:
                 if (name := variable_of(each.target)) in shown:
                     found += [NameTwice(name, each.place)] if each.type_name and name in known else []

@@ -159,7 +159,7 @@ def compute(study: Study, name: str) -> model.CollisionResults:
     return model.CollisionResults(
         summary=model.CollisionSummary(
             verdict=_verdict(pairs, mounting, wrong, free, home)
-            .without(() if wrong else bodies.unexamined)
+            .without(() if wrong else bodies.in_error)
             .resting_on(assumed),
             figures=_figures(space, places_found, matrix),
             scene=scene.title if scene else None,

@@ -416,7 +416,7 @@ def compute(study: Study, name: str) -> model.InverseResults:
     worst = _worst_residuals(solutions, trips)
     summary = model.InverseSummary(
         verdict=_verdict(results, worst, trips, bool(scene and scene.solids))
-        .without(bodies_of(robot, scene).unexamined)
+        .without(bodies_of(robot, scene).in_error)
         .resting_on(rests_on),
         figures=_figures(results, worst, trips),
         mix=settings.mix,

@@ -418,7 +418,7 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
     assumed_shapes = shapes_assumed(robot, assumed_margin, clearance)
     summary = model.TrajectorySummary(
         verdict=_verdict(paths, skipped, assumed_shapes)
-        .without(surroundings.bodies.unexamined)
+        .without(surroundings.bodies.in_error)
         .resting_on(assumed_shapes),
         figures=_figures(paths, length, used, assumed_shapes),
         characteristic_length_m=length,

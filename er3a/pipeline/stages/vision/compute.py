@@ -387,7 +387,7 @@ def compute(study: Study, name: str) -> model.VisionResults:
     bodies = bodies_of(robot, scene)
     ways = _all_ways(robot, planned)
     summary = model.VisionSummary(
-        verdict=judged.without(bodies.unexamined).resting_on(shapes),
+        verdict=judged.without(bodies.in_error).resting_on(shapes),
         figures=figures_of(calibration, objects, near),
         title=task_file.title,
         scene=title,

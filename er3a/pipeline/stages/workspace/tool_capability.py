@@ -236,7 +236,7 @@ def tool_capability(
         robot, settings, task, plan, scene=scene, margin=margin, best=float(found.manipulability.max())
     )
     return ToolCapability(
-        summary, placement, model.capability(middles, found, tried, frame.bar > 0), places, bodies.unexamined
+        summary, placement, model.capability(middles, found, tried, frame.bar > 0), places, bodies.in_error
     )
 
 
