@@ -559,15 +559,20 @@ class ProgramMemory:
         return None
 
     def outside(self, target: syntax.Expression) -> str:
-        """The element in a target that its list's declaration has not, as text; empty for none."""
+        """The element in a target that its list's declaration has not, as text; empty for none.
+
+        One whose frame is given to the check counts as declared. Of system variables only an index that is typed does.
+        """
         while isinstance(target, (syntax.Member, syntax.Element)):
             if isinstance(target, syntax.Element) and isinstance(target.of, syntax.Variable):
                 name, sizes = target.of.name, self._sizes(target.of.name)
                 found = [syntax.number(self.value(each)) for each in target.indices]
                 pairs = zip(found, sizes) if len(found) == len(sizes) else ()
-                system = name.startswith("$") and any(each is not None and each < 1 for each in found)
-                if system or any(each is not None and not 1 <= each <= size for each, size in pairs):
-                    return f"{self.shown(target)} of {name}[{','.join(map(str, sizes))}]"
+                typed = [syntax.number(each.value) for each in target.indices if isinstance(each, syntax.Constant)]
+                system = name.startswith("$") and any(each is not None and each < 1 for each in typed)
+                beyond = any(each is not None and not 1 <= each <= size for each, size in pairs)
+                if (system or beyond) and (shown := self.shown(target)) not in self.cell.frames:
+                    return f"{shown} of {name}[{','.join(map(str, sizes))}]"
             target = target.of
         return ""
 

@@ -46,7 +46,7 @@ def rapid(body: str, data: str = "", more: str = "") -> str:
 
 def with_data(folder, body: str, data: str, **options):
     """The check of a KRL program whose .dat has these lines."""
-    (folder / "a.dat").write_text(f"DEFDAT a\n{data}\nENDDAT\n")
+    (folder / "a.dat").write_text(f"DEFDAT a PUBLIC\n{data}\nENDDAT\n")
     return check(folder, krl(FRAMES + SPEEDS + body), "a.src", **options)
 
 

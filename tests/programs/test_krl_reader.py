@@ -480,3 +480,12 @@ def test_an_output_below_the_first_is_told(tmp_path):
     steps = [step.instruction for step in run(tmp_path, "$OUT[0]=TRUE\n$OUT[1]=TRUE").steps]
     assert [(each.text, each.may_move) for each in steps if isinstance(each, Unknown)] == [("$OUT[0]=TRUE", False)]
     assert [each.name for each in steps if isinstance(each, Output)] == ["$OUT[1]"]
+
+
+def test_a_tool_beyond_the_declared_ones_is_the_one_that_is_given(tmp_path):
+    (tmp_path / "$config.dat").write_text("DEFDAT $CONFIG PUBLIC\nDECL FRAME TOOL_DATA[16]\nENDDAT\n")
+    body = "$TOOL=TOOL_DATA[20]\nLIN {X 400,Y 0,Z 450,A 0,B 0,C 180}"
+    for given in ({}, {"TOOL_DATA[20]": np.eye(4)}):
+        (found,) = moves(run(tmp_path, body, frames=given))
+        assert found.tool.name.startswith("TOOL_DATA[20]")
+        assert (found.tool.pose is not None) == bool(given)
