@@ -33,6 +33,7 @@ PLAYED = r'id="player-data">(.*?)</script>'
 TOLERANCE_MM = 1.0  # an overlap that the study lets go unnoticed
 SCENE = {
     "kind": "scene",
+    "units_checked": True,
     "title": "A slab, and small things before, in and behind it",
     "boxes": [{"name": "slab", "size_mm": [120, 300, 300], "xyz_mm": [200, 100, 860]}],
     "spheres": [
