@@ -303,8 +303,8 @@ def mark_pages(reports: Path, problem: str | None) -> None:
         if problem is not None and (found := _BODY.search(after)):
             with language.using(next((each for each in language.LANGUAGES if each == found[1].decode()), "en")):
                 text = escape(sentence("page.last_run", problem=problem)).encode()
-            told = b'<!-- last run --><p class="decision fail" role="alert">' + text + b"</p><!-- /last run -->"
-            after = after[: found.end()] + told + after[found.end() :]
+            notice = b'<!-- last run --><p class="decision fail" role="alert">' + text + b"</p><!-- /last run -->"
+            after = after[: found.end()] + notice + after[found.end() :]
         if after != before:
             write_atomically(page, partial(Path.write_bytes, data=after))
             os.utime(page, ns=(times.st_atime_ns, times.st_mtime_ns))

@@ -1336,7 +1336,7 @@ def companions(path: Path) -> tuple[Path, ...]:
 
 def _of_tasks(path: Path) -> list[Path]:
     """The modules of the other tasks in a controller's backup, or beside the folder of a task, or in the same folder:
-    one with persistent data and a ``main`` of its own that moves nothing."""
+    one with persistent data whose own ``main`` moves nothing."""
     return [*_tasks_beside(path), *_tasks_in_folders(path)]
 
 

@@ -100,7 +100,7 @@ def _is_guess(source: Source | LoadFields | None) -> bool:
 
 def open_of_load(study: Study, name: str, of_programs: Iterable[Load] = ()) -> tuple[model.Need, ...]:
     """What the study does not say of tool and payload, or guesses, and programs that name loads not of theirs; a mass
-    of 0 says that there is none."""
+    of 0 stands for none."""
     entry, loads = study.entry(name), study.loads(name)
     if not loads:
         return ("load",)
