@@ -110,8 +110,8 @@ class LocatedFinding:
     Attributes
     ----------
     calls : where the routines were called, the outermost first, when it was found first
-    times : how often the instruction was carried out with it
-    step : number of the step that it was found at first, None where it belongs to none
+    times : how often the instruction was carried out with it; its numbers are of the worst time
+    step : number of the step that these were found at, None where it belongs to none; of a contact the first
     moment : s from the start of that step's motion, when it begins; None of what is about the motion as a whole
     joint_moves : (n,) each, deg: joint moves, one or two, that take the tool where that motion does, and pass
     off_mm, off_deg : by how much the tool leaves that motion's line or arc on these; None of a joint motion
@@ -355,13 +355,25 @@ def _located(execution: Execution, robot: Robot, checker: StepChecker, end: int)
     groups: dict[tuple[Place, str, str], list[LocatedFinding]] = defaultdict(list)
     for each in found:
         groups[each.place, each.finding.code, _which(each.finding)].append(each)
-    grouped = [
-        replace(max(same, key=lambda each: found_in.RANKS[each.level]), times=len(same)) for same in groups.values()
-    ]
+    grouped = [_at_worst(same) for same in groups.values()]
     order = {path: i for i, path in enumerate(dict.fromkeys(str(each.place.file) for each in grouped))}
     return tuple(
         sorted(grouped, key=lambda each: (order[str(each.place.file)], each.place.line, -found_in.RANKS[each.level]))
     )
+
+
+def _at_worst(same: list[LocatedFinding]) -> LocatedFinding:
+    """One of like findings of an instruction: the worst; of contacts the first, with the greatest depths of all."""
+
+    def gravity(each: LocatedFinding) -> tuple[int, float]:
+        size = 0.0 if isinstance(each.finding, found_in.MotionCollides) else found_in.gravity(each.finding)
+        return found_in.RANKS[each.level], size
+
+    worst = max(same, key=gravity)
+    if isinstance(worst.finding, found_in.MotionCollides):
+        others = [each.finding for each in same if isinstance(each.finding, found_in.MotionCollides)]
+        worst = replace(worst, finding=worst.finding.with_touches_of(others))
+    return replace(worst, times=len(same))
 
 
 def _first_met(execution: Execution) -> dict[int, Step]:
@@ -491,7 +503,7 @@ def _with_joint_moves(
 
 def _which(finding: found_in.CheckFinding) -> str:
     """Key that distinguishes findings of one code at one instruction."""
-    names = ("joint", "type", "name", "text", "condition", "kind", "mass_kg")
+    names = ("joint", "joints", "side", "type", "name", "text", "condition", "kind", "mass_kg")
     return " ".join(f"{getattr(finding, name)}" for name in names if hasattr(finding, name))
 
 

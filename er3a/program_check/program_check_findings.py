@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Literal
 
 from er3a.by_value import Finding
@@ -306,6 +307,18 @@ class MotionCollides(Finding):
         """How far the tool has come when the first bodies touch; None of a joint move."""
         return self.touches[0].at_mm
 
+    def with_touches_of(self, others: Iterable[MotionCollides]) -> MotionCollides:
+        """The same, each pair as deep as in any of the others, and followed by pairs that touch only there."""
+        deepest: dict[Pair, BodiesTouch] = {touch.pair: touch for touch in self.touches}
+        for touch in (touch for other in others for touch in other.touches):
+            first = deepest.setdefault(touch.pair, touch)
+            deepest[touch.pair] = replace(
+                first,
+                depth_mm=max(first.depth_mm, touch.depth_mm),
+                at_target=first.at_target or touch.at_target,
+            )
+        return MotionCollides(tuple(deepest.values()))
+
 
 class ClearOfAssumed(Finding):
     """The clearance to assumed shapes is less than their assumed uncertainty."""
@@ -604,6 +617,28 @@ def level_of(finding: CheckFinding) -> Level:
     if isinstance(finding, LoadNotExamined) and (finding.mass_kg is None or finding.text):
         return "caution"
     return "fail" if finding.code in FAILS else "note" if finding.code in NOTES else "caution"
+
+
+SIZES = (
+    *("depth_mm", "needed_deg_s", "needed_deg_s2", "percent", "excess_mm", "excess"),
+    *("angle_deg", "difference_deg", "off_deg"),
+)
+"""Parameters of which the greater is the worse."""
+
+
+def gravity(finding: CheckFinding) -> float:
+    """How far a finding goes: of like ones at one instruction the greatest is the worst. 0 where it has no size."""
+    if isinstance(finding, AboveLimit | BelowLimit):
+        return abs(finding.reached_deg - finding.limit_deg)
+    if isinstance(finding, ClearOfAssumed):
+        return -finding.clearance_mm
+    if isinstance(finding, ZoneNotSettled):
+        return -finding.least_mm
+    if isinstance(finding, PassesSingularity):
+        return -finding.distance
+    if isinstance(finding, ZoneTooLarge):
+        return finding.zone_mm / max(finding.motion_mm, 1e-9)
+    return max((abs(getattr(finding, name, None) or 0.0) for name in SIZES), default=0.0)
 
 
 def worst_of(levels: Iterable[Level]) -> Level:

@@ -242,6 +242,36 @@ def test_a_zone_that_allows_a_collision_is_a_caution(tmp_path):
     assert "zone_collides" not in codes(stop)
 
 
+def test_what_a_loop_finds_again_is_told_as_it_is_at_worst(tmp_path):
+    deeper = "INT I\nDECL E6AXIS J\nJ={A1 0,A2 -10,A3 -10,A4 0,A5 0,A6 0}\nFOR I=1 TO 3\nPTP J\n"
+    body = deeper + "IF I==2 THEN\nJ.A5=-140\nELSE\nJ.A5=-120\nENDIF\nPTP J\nENDFOR"
+    below = next(each for each in checked(body, tmp_path).findings if each.finding.code == "below_limit")
+    assert below.finding.reached_deg == pytest.approx(-140)
+
+
+def test_a_loop_tells_each_pair_that_touches_in_any_round_as_deep_as_in_all(tmp_path):
+    T = forward(ROBOT, HOME)
+    radius = max(each.radius for each in arm_shapes(ROBOT).capsules if each.link == 6)
+
+    def ball(name: str, aside: float, down: float) -> Sphere:
+        place = np.eye(4)
+        place[:3, 3] = T[:3, 3] + [0.0, aside, -down - radius]
+        return Sphere(name, place, 0.02)
+
+    scene = Scene("balls", (ball("near", 0.0, 0.1), ball("aside", 0.13, 0.15)))
+    x, y, z = (1000 * T[:3, 3]).round(6)
+    dips = f"INT I\nDECL FRAME F\nF={{X {x}, Y {y}, Z {z}, A 0, B 0, C 180}}\nFOR I=0 TO 1\n"
+    check = checked(f"{dips}F.Z={z}-90-15*I\nLIN F\nF.Z={z}\nLIN F\nENDFOR", tmp_path, scene=scene)
+    down = next(each for each in check.findings if each.finding.code == "motion_collides")
+    (near,) = down.finding.touches
+    assert near.depth_mm == pytest.approx(25, abs=0.5)
+    assert near.at_mm == pytest.approx(80, abs=0.5)
+    there = f"F.Y={y}+130*I\nLIN F\nF.Z={z}-90-50*I\nLIN F\nF.Z={z}\nLIN F"
+    check = checked(f"{dips}{there}\nENDFOR", tmp_path, scene=scene)
+    down = next(each for each in check.findings if each.finding.code == "motion_collides")
+    assert [touch.pair.label.split("/")[-1] for touch in down.finding.touches] == ["near", "aside"]
+
+
 def test_frames_make_targets_of_a_named_tool_and_base_known(tmp_path):
     body = "$TOOL=TOOL_DATA[3]\n$BASE=BASE_DATA[2]\nLIN {X 300, Y 50, Z 200, A 0, B 0, C 180}"
     assert {each.finding.code for each in checked(body, tmp_path).findings if each.level == "fail"} == {
