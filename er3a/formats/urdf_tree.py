@@ -401,6 +401,7 @@ def _joint(path: Path, element: ElementTree.Element, snap: bool) -> UrdfJoint:
         if lower > upper:
             notes.append(f"{where} has its lower limit {lower:g} above the upper {upper:g}: they were swapped")
             lower, upper = upper, lower
+    lower, upper = _within_soft_limits(path, element, (lower, upper), notes)
     if kind in MOVING and limit is not None and (limit.get("velocity") or "inf") != "inf":
         speed = _numbers(path, where, limit, "velocity", (0.0,))[0] or math.nan
         if speed < 0:
@@ -417,6 +418,29 @@ def _joint(path: Path, element: ElementTree.Element, snap: bool) -> UrdfJoint:
     parent, child = _link(path, element, "parent"), _link(path, element, "child")
     placed, axis_of = transform(xyz, rpy), direction / (np.linalg.norm(direction) or 1.0)
     return UrdfJoint(name, kind, parent, child, placed, axis_of, lower, upper, speed, follows, tuple(notes), doubtful)
+
+
+def _within_soft_limits(
+    path: Path, joint: ElementTree.Element, limits: tuple[float, float], notes: list[str]
+) -> tuple[float, float]:
+    """Limits of a joint, NaN where it has none, held within those of its safety controller, as MoveIt plans."""
+    soft, where = joint.find("safety_controller"), f"joint {joint.get('name', '?')}"
+    keys = ("soft_lower_limit", "soft_upper_limit")
+    if soft is None or not any(key in soft.attrib for key in keys) or joint.get("type") not in MOVING:
+        return limits
+    least, most = (_numbers(path, where, soft, key, (0.0,))[0] for key in keys)
+    told = f"{where} has soft limits {least:g} to {most:g} (safety_controller)"
+    if joint.get("type") == "continuous":
+        notes.append(f"{told}, but is continuous: they are not kept")
+        return limits
+    none_given = limits == (0, 0)
+    lower, upper = (least, most) if none_given else (float(np.fmax(limits[0], least)), float(np.fmin(limits[1], most)))
+    if lower >= upper:
+        notes.append(f"{told}, which leave nothing of its limits: they are not kept")
+        return limits
+    if (lower, upper) != limits:
+        notes.append(f"{told}: its limits are held to {lower:g} to {upper:g}")
+    return lower, upper
 
 
 def _numbers(

@@ -209,6 +209,22 @@ def test_numbers_that_can_be_other_units_are_taken_with_a_note(tmp_path):
     assert {source.grade for source in plain.robot.sources.values()} == {"export"}
 
 
+def test_soft_limits_of_a_safety_controller_hold_the_joint(tmp_path):
+    def arm(soft: str, limit: str = '<limit lower="-2" upper="2" velocity="3"/>'):
+        return import_urdf(written(tmp_path, urdf(limit=f"{limit}<safety_controller {soft}/>")))
+
+    held = arm('k_velocity="1" soft_lower_limit="-1" soft_upper_limit="2.5"')
+    np.testing.assert_allclose(np.stack([held.robot.lower, held.robot.upper])[:, 0], [-1, 2])
+    assert sum("soft limits -1 to 2.5 (safety_controller): its limits are held to -1 to 2" in n for n in held.notes) == 5
+    unsaid = arm('k_velocity="1"')  # the specification's 0 and 0 are meant by nobody
+    np.testing.assert_allclose(unsaid.robot.upper[0], 2)
+    beyond = arm('soft_lower_limit="3" soft_upper_limit="4"')
+    np.testing.assert_allclose(beyond.robot.upper[0], 2)
+    assert any("leave nothing of its limits" in note for note in beyond.notes)
+    alone = arm('soft_lower_limit="-1" soft_upper_limit="1"', '<limit effort="1" velocity="3"/>')
+    np.testing.assert_allclose(alone.robot.upper[0], 1)
+
+
 def test_an_axis_of_any_length_is_a_direction(tmp_path, random):
     long = urdf([(kind, xyz, rpy, "0 0 1e300") for kind, xyz, rpy, _ in REAL_ARM])
     q = random.uniform(-2, 2, (20, 6))
