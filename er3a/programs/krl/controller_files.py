@@ -3,6 +3,7 @@ the controller's archive."""
 
 from __future__ import annotations
 
+import os
 import re
 from collections import defaultdict
 from collections.abc import Iterable
@@ -39,9 +40,25 @@ class ControllerFiles:
 
     def __init__(self, path: Path):
         self.path = path
-        above = list(path.resolve().parents)[:DEEPEST]
-        self.archive = next((folder for folder in above if _is_archive(folder)), None)
         self._texts: dict[Path, ProgramText | None] = {}
+        self._names: dict[Path, dict[str, str]] = {}
+        self._above = list(path.resolve().parents)[:DEEPEST]
+        self.archive = next((folder for folder in self._above if self._is_archive(folder)), None)
+
+    def _is_archive(self, folder: Path) -> bool:
+        """Whether a folder is a controller's archive, by its folders: others above a program are not searched."""
+        return self._named(folder, "Program") is not None and any(self._named(folder, each) for each in OF_ARCHIVE)
+
+    def _named(self, folder: Path, name: str) -> Path | None:
+        """What a folder holds under a name, however its letters are written; nothing where it may not be read."""
+        if folder not in self._names:
+            try:
+                held = sorted(os.listdir(folder), reverse=True)  # of folders above, which may hold thousands
+            except OSError:
+                held = []
+            self._names[folder] = {each.lower(): each for each in held} | {each: each for each in held}
+        found = self._names[folder].get(name, self._names[folder].get(name.lower()))
+        return None if found is None else folder / found
 
     def source(self, file: Path) -> ProgramText | None:
         """The text of a file; None for one that is not text."""
@@ -160,10 +177,9 @@ class ControllerFiles:
 
     def _own(self, name: str, inside: str) -> Path | None:
         """A file of the controller: in its archive, beside the program, or in a folder of the program's or above it."""
-        above = list(self.path.resolve().parents)[:DEEPEST]
-        folders = (*(_named(folder, inside) for folder in (self.archive,) if folder), self.path.parent)
-        for folder in (*folders, *(_named(each, inside) for each in above)):
-            if folder is not None and (found := _named(folder, name)) is not None and found.is_file():
+        archive = [] if self.archive is None else [self._named(self.archive, inside)]
+        for folder in (*archive, self.path.parent, *(self._named(each, inside) for each in self._above)):
+            if folder is not None and (found := self._named(folder, name)) is not None and found.is_file():
                 return found
         return None
 
@@ -178,7 +194,7 @@ class ControllerFiles:
     def twice(self) -> Iterable[ModuleTwice]:
         """Modules that the program calls, and $config.dat, of which there is another one that differs."""
         pairs = [(self.routines[name][0], file, name) for name in self._called for file in self.routines[name][1:]]
-        beside = _named(self.path.parent, "$config.dat")
+        beside = self._named(self.path.parent, "$config.dat")
         if self.config is not None and beside is not None:
             pairs.append((self.config, beside, beside.name))
         for taken, other, name in pairs:
@@ -203,20 +219,3 @@ def is_basics(file: Path) -> bool:
 def _with_data(file: Path) -> tuple[Path, Path | None]:
     """A module with its data."""
     return file, data_file_of(file, ".dat") if file.suffix.lower() == ".src" else None
-
-
-def _is_archive(folder: Path) -> bool:
-    """Whether a folder is a controller's archive, by its folders: others above a program are not searched."""
-    return _named(folder, "Program") is not None and any(_named(folder, each) for each in OF_ARCHIVE)
-
-
-def _named(folder: Path | None, name: str) -> Path | None:
-    """What a folder holds under a name, however its letters are written."""
-    if folder is None or not folder.is_dir():
-        return None
-    if (folder / name).exists():
-        return folder / name
-    try:
-        return next((each for each in sorted(folder.iterdir()) if each.name.lower() == name.lower()), None)
-    except OSError:  # a folder above that may not be read
-        return None
