@@ -584,7 +584,6 @@ FAILS = frozenset(
 NOTES = frozenset(
     (
         *(
-            "frame_taken_as_flange",
             "frames_from_robot_file",
             "speed_not_given",
             "turn_speed_not_given",
@@ -596,6 +595,10 @@ NOTES = frozenset(
 )
 
 
+NOT_AT_FAULT = ("turns_with_arc", "perhaps_changed", "position_unknown")
+"""Why a target may not be known though the program determines it."""
+
+
 def level_of(finding: CheckFinding) -> Level:
     """Severity of a finding; ``fail`` where the program can't be executed as written."""
     if isinstance(finding, MeetsSingularity):
@@ -604,7 +607,7 @@ def level_of(finding: CheckFinding) -> Level:
         return "fail"
     if isinstance(finding, ArcGoesOn):
         return "caution" if finding.turns or finding.angle_deg is None else "note"
-    if isinstance(finding, TargetNotGiven) and finding.reason == "turns_with_arc":  # the program is not at fault
+    if isinstance(finding, TargetNotGiven) and finding.reason in NOT_AT_FAULT:
         return "caution"
     if isinstance(finding, FrameNotGiven):
         return "fail" if finding.needed else "caution"
@@ -636,9 +639,17 @@ def gravity(finding: CheckFinding) -> float:
         return -finding.least_mm
     if isinstance(finding, PassesSingularity):
         return -finding.distance
+    if isinstance(finding, TargetOutOfReach | StretchOutOfReach):
+        return min((_misses_by(each) for each in finding.reasons), default=0.0)
     if isinstance(finding, ZoneTooLarge):
         return finding.zone_mm / max(finding.motion_mm, 1e-9)
     return max((abs(getattr(finding, name, None) or 0.0) for name in SIZES), default=0.0)
+
+
+def _misses_by(reason: Unsolved) -> float:
+    """mm by which the arm misses a pose, deg if its wrist tilts too little."""
+    miss = getattr(reason.why, "miss", None)
+    return float(miss.position_mm if miss is not None else getattr(reason.why, "gap_mm", 0.0))
 
 
 def worst_of(levels: Iterable[Level]) -> Level:

@@ -300,16 +300,19 @@ def fault(place: Place, problem: str, remedy: str) -> InputError:
 DECIDED_BY_ONE = ("AND", "OR", "&&", "||")
 Each = Callable[[syntax.Expression], syntax.Expression]
 Changed = Callable[[syntax.Invocation], Iterable[syntax.Expression | None]]
-"""What a function outside the program may change of its arguments."""
+"""What a function outside the program changes of its arguments, or may change."""
 
 
 def linked(
-    routines: Iterable[syntax.Routine], changed: Changed = lambda call: ()
+    routines: Iterable[syntax.Routine],
+    changed: Changed = lambda call: (),
+    perhaps: Changed = lambda call: (),
 ) -> tuple[dict[str, syntax.Routine], tuple[ProgramFinding, ...]]:
     """The routines by name, with calls of each other taken out of expressions; and the findings about the text.
 
     Of two routines with one name the later one counts; the other is kept under a name that nothing calls. What a
-    function outside the program may change of its arguments (``changed``) is unclear from its call on.
+    function outside the program changes of its arguments (``changed``), or may change (``perhaps``), is unclear from
+    its call on.
     """
     found: list[ProgramFinding] = []
     by_name: dict[str, syntax.Routine] = {}
@@ -325,7 +328,9 @@ def linked(
     found += [finding for routine in by_name.values() for finding in _read_before(routine, by_name)]
     return {
         name: replace(
-            routine, code=_linked(routine.code, by_name, changed), handler=_linked(routine.handler, by_name, changed)
+            routine,
+            code=_linked(routine.code, by_name, changed, perhaps),
+            handler=_linked(routine.handler, by_name, changed, perhaps),
         )
         for name, routine in by_name.items()
     }, tuple(found)
@@ -403,10 +408,11 @@ def _opaque(expression: syntax.Expression) -> Iterable[str]:
 
 
 def _linked(
-    given: tuple[syntax.Operation, ...], known: Mapping[str, syntax.Routine], changed: Changed
+    given: tuple[syntax.Operation, ...], known: Mapping[str, syntax.Routine], changed: Changed, perhaps: Changed
 ) -> tuple[syntax.Operation, ...]:
     parts = (each for operation in given if not _plain(operation) for each in syntax.expressions_of(operation))
-    if not any(each.function in known or any(changed(each)) for part in parts for each in _invoked(part)):
+    outer = [each for part in parts for each in _invoked(part)]
+    if not any(each.function in known or any(changed(each)) or any(perhaps(each)) for each in outer):
         return given
     code: list[syntax.Operation] = []
     starts: list[int] = []
@@ -426,14 +432,22 @@ def _linked(
             last = mapped(operation, calls.out)
         outside = [each for part in syntax.expressions_of(last) if not _plain(last) for each in _invoked(part)]
         unclear = [
-            syntax.Assign(operation.place, given, syntax.Opaque(f"{each.function}(...)"), f"{each.function}(...)")
+            syntax.Assign(operation.place, given, syntax.Opaque(text, doubt), text)
             for each in outside
-            for given in changed(each)
+            for which, doubt in ((changed, False), (perhaps, True))
+            for given, text in ((given, _call_text(operation, each)) for given in which(each))
             if isinstance(given, (syntax.Variable, syntax.Member, syntax.Element))
         ]
         code += [*calls.found, *unclear, last]
     starts.append(len(code))
     return tuple(_moved(operation, starts) for operation in code)
+
+
+def _call_text(operation: syntax.Operation, call: syntax.Invocation) -> str:
+    """What a call is named by: the line that it is."""
+    if isinstance(operation, syntax.Doing) and operation.what is call:
+        return operation.text
+    return f"{call.function}(...)"
 
 
 def _moved(operation: syntax.Operation, starts: list[int]) -> syntax.Operation:

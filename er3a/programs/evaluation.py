@@ -19,7 +19,15 @@ import numpy as np
 from er3a.by_value import ByValue
 from er3a.numerics.arrays import Reals
 from er3a.programs import syntax
-from er3a.programs.instructions import ArmMotion, Instruction, JointTarget, NamedFrame, PoseTarget, arc_end
+from er3a.programs.instructions import (
+    ArmMotion,
+    Instruction,
+    JointTarget,
+    NamedFrame,
+    PoseTarget,
+    UnresolvedTarget,
+    arc_end,
+)
 
 NO_FRAME = NamedFrame()
 MAX_ROBOT_AXES = 6
@@ -616,8 +624,8 @@ class ProgramMemory:
                 return syntax.Record(kind, tuple((name, self.value(each)) for name, each in items))
             case syntax.Listed(kind=kind, items=listed):
                 return self.functions.listed(kind, tuple(map(self.value, listed)))
-            case syntax.Opaque(text=text):
-                return syntax.Unclear(text)
+            case syntax.Opaque(text=text, doubt=doubt):
+                return syntax.PerhapsChanged(text) if doubt else syntax.Unclear(text)
 
     def _part(self, expression: syntax.Member | syntax.Element) -> syntax.Value:
         of = self.value(expression.of)
@@ -798,6 +806,17 @@ class ProgramMemory:
         except (ZeroDivisionError, OverflowError, ValueError):
             return syntax.Unclear("a division by zero or an overflow")
         return int(found) if whole and abs(found) < 2**53 else found
+
+
+NOT_NUMBERS = ("NAN", "INF", "INFINITY")
+
+
+def unresolved(value: syntax.Unclear, text: str = "") -> UnresolvedTarget:
+    """A target that is made of an unclear value; ``text``: what it is called where that has no text of its own."""
+    if isinstance(value, syntax.PerhapsChanged):
+        return UnresolvedTarget(value.text, "perhaps_changed")
+    is_number = value.text.upper().lstrip("+-") in NOT_NUMBERS
+    return UnresolvedTarget(value.text or text, "not_finite" if is_number else "undefined")
 
 
 def known(found: syntax.Value | None, name: str) -> syntax.Value:

@@ -42,6 +42,7 @@ ZoneKind = Literal["fine", "distance", "angle", "share", "velocity", "named"]
 MotionKind = Literal["joint", "line", "arc", "spline"]
 Unresolved = Literal[
     "undefined",
+    "perhaps_changed",
     "not_finite",
     "too_far",
     "position_unknown",

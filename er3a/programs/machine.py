@@ -49,6 +49,14 @@ def target_name(target: syntax.Expression) -> str:
     return next(iter(names(target)), "")
 
 
+def _doubt_of(move: syntax.Move, memory: ProgramMemory) -> str:
+    """What may have set another tool, base or path for a motion to a pose; of frames that it names, for these."""
+    own = {name for name, _ in move.settings}
+    used = {name for each in syntax.expressions_of(move) for name in names(each)}
+    doubts = memory.doubts.items()
+    return next((text for name, text in doubts if name not in own and (name[0] in "$%" or name in used)), "")
+
+
 def deciding(program: syntax.Program, modal: frozenset[str]) -> frozenset[str]:
     """Names of the variables that change while the program runs and on which its motions depend.
 
@@ -895,10 +903,7 @@ class Machine:
         if isinstance(operation, syntax.Move):
             motion = self.dialect.motion(memory, operation)
             if not motion.doubt and memory.doubts and isinstance(motion.target, instructions.PoseTarget):
-                own = {name for name, _ in operation.settings}
-                motion = replace(
-                    motion, doubt=next((text for name, text in memory.doubts.items() if name not in own), "")
-                )
+                motion = replace(motion, doubt=_doubt_of(operation, memory))
             self._note(way, operation.place, motion)
             memory.here = memory.here.after(motion, memory.cell.flange)
         elif isinstance(operation, syntax.Fixed):
@@ -923,6 +928,9 @@ class Machine:
                 self._note(way, operation.place, done)
                 if isinstance(done, instructions.Unknown) and done.may_move:
                     memory.lost(done.text)
+                    given = (name for each in syntax.expressions_of(operation) for name in names(each))
+                    frames = (name for name in given if self.dialect.frame_of(memory.read(name)) is not None)
+                    memory.doubts.update(dict.fromkeys(frames, done.text))
 
     def _note(self, way: ExecutionPath, place: instructions.Place, instruction: instructions.Instruction) -> None:
         self.first_after.setdefault(way.step, len(self.steps))

@@ -30,6 +30,11 @@ class Unset(Unclear):
 
 
 @dataclass(frozen=True, slots=True)
+class PerhapsChanged(Unclear):
+    """What a variable holds after something that is not understood, which may have changed it: ``text``."""
+
+
+@dataclass(frozen=True, slots=True)
 class Record:
     """Named values, in the language's own units: a position, a frame, a pose of URScript.
 
@@ -208,9 +213,10 @@ class Listed:
 
 @dataclass(frozen=True, slots=True)
 class Opaque:
-    """An expression that is not understood."""
+    """An expression that is not understood; with ``doubt`` it may be what a variable held before."""
 
     text: str
+    doubt: bool = False
 
 
 Expression = Constant | Variable | Member | Element | Invocation | Unary | Binary | Aggregate | Listed | Opaque

@@ -80,7 +80,8 @@ def test_each_fault_is_found(name):
 @pytest.mark.parametrize("suffix", [".src", ".script", ".pgm"])
 def test_the_examples_pass_and_their_times_agree_over_languages(suffix):
     scene = load_scene(ROOT / "data/scenes/table_and_post.yaml")
-    options = CheckOptions(start=HOME, scene=scene)
+    frames = load_programs(ROOT / "data/programs/er3a_c60.yaml").transforms()
+    options = CheckOptions(start=HOME, scene=scene, frames=frames)
     check = check_program(read_program(ROOT / f"data/programs/weld_seam{suffix}"), ROBOT, options)
     assert [each for each in check.findings if each.level in ("caution", "fail")] == []
     assert all(verdict.times for verdict in check.verdicts)

@@ -2008,3 +2008,53 @@ def test_what_else_such_variables_are_set_to_is_named(tmp_path, line):
     found = codes(check(tmp_path, krl(f"{FRAMES}{line}\nPTP {axes(NEAR)}\n{LINE}"), "a.src"))
     assert found["program_not_understood"] == [4]
     assert ("frames_in_doubt" in found) == (line.startswith(("$ACT", "$CORR")))
+
+
+@pytest.mark.parametrize("call", ["FindPart n;", "b:=FindPart(n);", '%"FindPart"% n;', "GetPart n;", "FindPart\\Into:=n;"])
+def test_what_a_routine_that_no_file_holds_gets_by_reference_has_no_known_value(tmp_path, call):
+    found = check(tmp_path, rapid(f"{call}\nMoveJ p,v50,fine,tool0;\nMoveL Offs(p,0,n,0),v50,fine,tool0;"), "a.mod")
+    (missed,) = (each for each in found.findings if each.finding.code == "target_not_given")
+    assert (missed.level, missed.finding.reason) == ("caution", "perhaps_changed")
+    assert [each.level for each in found.verdicts][2] == "caution"
+    assert any(each.place.line == missed.place.line and each.what == "motion" for each in found.not_examined)
+    constant = check(tmp_path, rapid("FindPart p;\nMoveJ p,v50,fine,tool0;"), "a.mod")
+    assert "target_not_given" not in codes(constant)
+    set_anew = check(tmp_path, rapid(f"{call}\nn:=5;\nMoveJ Offs(p,0,n,0),v50,fine,tool0;"), "a.mod")
+    assert "target_not_given" not in codes(set_anew)
+
+
+def test_both_sides_follow_what_such_a_routine_may_have_changed(tmp_path):
+    asked = "AskPLC n;\nIF n=2 THEN\nMoveJ p,v50,fine,tool0;\nENDIF"
+    assert "both_sides_checked" in codes(check(tmp_path, rapid(asked), "a.mod"))
+
+
+def test_a_tool_that_such_a_routine_is_given_is_in_doubt_where_it_is_used(tmp_path):
+    data = "PERS tooldata tG:=[TRUE,[[0,0,50],[1,0,0,0]],[1,[0,0,20],[1,0,0,0],0,0,0]];\n"
+    body = "MeasureTool tG;\nMoveJ p,v50,fine,tool0;\nMoveJ p,v50,fine,tG;"
+    found = check(tmp_path, rapid(body, data=data), "a.mod")
+    (doubt,) = (each for each in found.findings if each.finding.code == "frames_in_doubt")
+    assert doubt.place.line == max(each.place.line for each in found.verdicts)
+
+
+def test_a_relative_motion_from_where_the_arm_is_not_known_to_stand_is_no_fail(tmp_path):
+    found = check(tmp_path, f"DEF a( )\n{FRAMES}LIN_REL {{Z 10}}\nEND\n", "a.src", start=None)
+    (missed,) = (each for each in found.findings if each.finding.code == "target_not_given")
+    assert (missed.level, missed.finding.reason) == ("caution", "position_unknown")
+    wrong = check(tmp_path, f"DEF a( )\nREAL X\n{FRAMES}LIN_REL {{Z X}}\nEND\n", "a.src", start=None)
+    assert wrong.level == "fail"  # the program itself does not say how far
+
+
+def test_a_tool0_of_rpl_that_is_not_mapped_is_a_caution(tmp_path):
+    text = 'MLIN(POINTC(328.5,132.1,505.8,-0.2,-11.5,-166.5,"CFG0",0,0,0), v100, fine, tool0);'
+    found = check(tmp_path, text, "a.pgm")
+    assert [each.level for each in found.findings if each.finding.code == "frame_taken_as_flange"] == ["caution"]
+    given = check(tmp_path, text, "a.pgm", frames={"tool0": np.eye(4)})
+    assert "frame_taken_as_flange" not in codes(given)
+
+
+def test_the_sign_of_a_position_may_be_turned(tmp_path):
+    body = "c:=-d;\nMoveJ Offs(p,c.x,-c.y,-(c.z+1)),v50,fine,tool0;"
+    data = "VAR pos c;\nVAR pos d:=[10,20,30];\n"
+    plain = motions(tmp_path, rapid("MoveJ Offs(p,-10,20,29),v50,fine,tool0;", data=data), "a.mod")[-1]
+    turned = motions(tmp_path, rapid(body, data=data), "a.mod")[-1]
+    np.testing.assert_allclose(turned.target.pose, plain.target.pose)

@@ -49,6 +49,7 @@ REASONS: dict[Unresolved, str] = {
         "the program does not define it, or makes it of what is not known here, such as joint angles after a straight "
         "line"
     ),
+    "perhaps_changed": N_("something that is not understood may have changed it"),
     "not_finite": N_("it is no finite number"),
     "too_far": N_("it is more than 100 m away, as where millimetres were written for metres"),
     "position_unknown": N_("it depends on where the arm stands, which is not known"),
@@ -152,6 +153,7 @@ SINGULAR: dict[SingularityType, str] = {
 TARGETS: dict[Unresolved, str] = {
     "too_far": N_("Write the target in the unit of the language: metres in URScript, mm in the others."),
     "undefined": N_("Give the target in the program or in its data file."),
+    "perhaps_changed": N_("Put the module that holds what is called beside the program, or give the target after it."),
     "turns_with_arc": N_("Write the arc as several of less than half a turn each."),
 }
 STOPPED: dict[EndKind, str] = {
@@ -254,7 +256,7 @@ TEXTS = texts(
         "line_not_checked": (
             "the arm has no closed-form inverse: the line was not followed, only its target was checked"
         ),
-        "may_move": "not understood, and may move the arm: {text}",
+        "may_move": "not understood, and may move the arm or change the program's data: {text}",
         "never_reached": by(
             "moves",
             true="no branch that was followed leads to this motion; it was not checked",
@@ -277,6 +279,7 @@ TEXTS = texts(
         ),
         "target_not_given.named": "the target {name} is not known: {reason}",
         "target_not_given": "the target is not known: {reason}",
+        "target_not_given.perhaps": "the target is not known: {name}, which is not understood, may have changed it",
         "target_out_of_reach": "the target is out of reach: {reasons:; }",
         "target_out_of_reach.bare": "the target is out of reach",
         "target_out_of_reach.carried": "the target is out of reach while the external axes rest",
@@ -605,6 +608,8 @@ def _(found: found_in.TargetNotGiven) -> str:
     reason = word("target_reason", REASONS, found.reason)
     if not found.target:
         return say_as(found, reason=reason)
+    if found.reason == "perhaps_changed":
+        return sentence("target_not_given.perhaps", name=found.target)
     return sentence("target_not_given.named", name=found.target, reason=reason)
 
 

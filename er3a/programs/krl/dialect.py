@@ -13,7 +13,16 @@ from er3a.geometry.transforms import rotation_angle
 from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, syntax
 from er3a.programs.code_builder import variable_of
-from er3a.programs.evaluation import IN_DEGREES, Dialect, ProgramMemory, Rounded, function_in_single, known, root
+from er3a.programs.evaluation import (
+    IN_DEGREES,
+    Dialect,
+    ProgramMemory,
+    Rounded,
+    function_in_single,
+    known,
+    root,
+    unresolved,
+)
 from er3a.robots.masses import MassBody, moved
 
 FRAME_KEYS = ("X", "Y", "Z", "A", "B", "C")
@@ -29,7 +38,6 @@ MOST_SPEED = 3.0  # m/s
 """What controllers take along a path at most: ``$VEL_MA.CP`` of their machine data."""
 SIGN_ZERO = 1e-7  # rad; nearer to 0 a joint's sign says nothing
 OFF_MM, OFF_DEG = 0.1, 0.01
-NOT_NUMBERS = ("NAN", "INF", "INFINITY")
 Frames = tuple[instructions.NamedFrame, instructions.NamedFrame]
 UNREAD = syntax.Unclear("")
 """The value of a motion's arguments that are more or fewer than it has."""
@@ -62,7 +70,7 @@ def target(memory: ProgramMemory, value: syntax.Value, frames: Frames, said: tup
     """What a position in a motion means; ``said`` is the line, and whether a relative position is meant by the tool."""
     text = said[0]
     if isinstance(value, syntax.Unclear) and value is not UNREAD:
-        return _unresolved(value)
+        return unresolved(value)
     if not isinstance(value, syntax.Record) or not _is_position(value):
         return instructions.UnresolvedTarget(text, "not_understood")
     if _has_axes(value):
@@ -90,16 +98,21 @@ def relative(memory: ProgramMemory, value: syntax.Value, frames: Frames, said: t
     text, in_tool = said
     if not isinstance(value, syntax.Record) or not _is_position(value):
         if isinstance(value, syntax.Unclear) and value is not UNREAD:
-            return _unresolved(value)
+            return unresolved(value)
         return instructions.UnresolvedTarget(text, "not_understood")
     if _has_axes(value):
         change = _joints(memory, value, text, missing=0.0)
-        if memory.here.joints is None or not isinstance(change, instructions.JointTarget):
+        if not isinstance(change, instructions.JointTarget):
+            return change
+        if memory.here.joints is None:
             return instructions.UnresolvedTarget(text, "position_unknown")
         return instructions.JointTarget(memory.here.joints + change.joints, change.external)
     if (fixed := _by_fixed_tool(memory, text)) is not None:
         return fixed
     steps = syntax.Record(value.kind, (*((key, 0.0) for key in FRAME_KEYS if value.get(key) is None), *value.items))
+    given = _components(steps, FRAME_KEYS, text)
+    if isinstance(given, instructions.UnresolvedTarget):
+        return given
     offset, seen = record_pose(steps), memory.here.seen(*frames, memory.cell.flange)
     if offset is None or seen is None:
         return instructions.UnresolvedTarget(text, "position_unknown")
@@ -122,11 +135,6 @@ def _turn_in_doubt(before: Reals | None, change: syntax.Value, goal: instruction
     return apart if apart > SAME_TURN else 0.0
 
 
-def _unresolved(value: syntax.Unclear) -> instructions.UnresolvedTarget:
-    reason = value.text.upper().lstrip("+-") in NOT_NUMBERS
-    return instructions.UnresolvedTarget(value.text, "not_finite" if reason else "undefined")
-
-
 def _components(
     value: syntax.Record, keys: tuple[str, ...], text: str
 ) -> list[float | None] | instructions.UnresolvedTarget:
@@ -136,7 +144,7 @@ def _components(
     for key in keys:
         part = given.get(key)
         if isinstance(part, syntax.Unclear):
-            return _unresolved(part)
+            return unresolved(part)
         plain = syntax.number(part)
         if part is not None and plain is None:
             return instructions.UnresolvedTarget(text, "not_understood")

@@ -696,7 +696,7 @@ def read_krl(source: ProgramText) -> syntax.Program:
     findings += [NotUnderstood(file.name, Place(file, 1)) for file in unread]
     if data_file is None and lacks_data(routines, reader.data, CONFIG_NAMES | reader.signals.keys()):
         findings.append(DataFileMissing(source.path.with_suffix(".dat").name))
-    by_name, unlinked = linked([*called, *routines], changed_arguments)
+    by_name, unlinked = linked([*called, *routines], perhaps=changed_arguments)
     return syntax.Program(
         "krl",
         source.path.stem,

@@ -23,8 +23,9 @@ from er3a.programs.evaluation import (
     computed_in_single,
     function_in_single,
     missed_by,
+    unresolved,
 )
-from er3a.programs.rapid import data_types, reader
+from er3a.programs.rapid import data_types, known_names, reader
 from er3a.robots.masses import moved, together
 
 ROBOT_BASE = instructions.NamedFrame("wobj0", np.eye(4))
@@ -32,66 +33,7 @@ JOINT_FORMS = ("MOVEJ", "TRIGGJ")
 ARC_FORMS = ("MOVEC", "TRIGGC", "SEARCHC")
 SLOWEST_RAMP = 20.0  # percent; 1 AccSet: smaller values count as 20
 FULL_SPEED = 5000.0  # mm/s, of VelSet where a program sets none
-SETTINGS = {
-    **{name: f"%{name}" for name in ("CONFJ", "CONFL", "PATHACCLIM", "WORLDACCLIM")},
-    **{"ACCSET": "%ACC", "VELSET": "%SPEED", "CIRPATHMODE": "%ARCS"},
-    **dict.fromkeys(("PDISPSET", "PDISPON", "PDISPOFF"), "%PDISP"),
-}
-"""Instructions that later motions depend on, and that are followed, with the name under which each is kept."""
-SETS = {**SETTINGS, "GRIPLOAD": "%GRIPLOAD", "SETSYSDATA": reader.PASSING}
-OUTPUTS = frozenset(
-    (
-        *(
-            "SETDO",
-            "SETAO",
-            "SETGO",
-            "SET",
-            "RESET",
-            "PULSEDO",
-            "INVERTDO",
-        ),
-        *("MOTIONSUP", "TRIGGIO", "TRIGGEQUIP", "TRIGGINT", "TRIGGSPEED", "TRIGGCHECKIO", "TRIGGRAMPAO"),
-    )
-)
-HARMLESS_TEXT = """
-ACTEVENTBUFFER ALIASIO BITCLEAR BITSET BOOKERRNO CANCELLOAD CLEARIOBUFF CLEARRAWBYTES CLKRESET CLKSTART CLKSTOP CLOSE
-CLOSEDIR COPYFILE COPYRAWBYTES DEACTEVENTBUFFER ERRLOG ERRRAISE ERRWRITE EXITCYCLE FRICIDINIT GETDATAVAL GETSYSDATA
-GETTRAPDATA IDELETE IDISABLE IENABLE IERROR INVERTDO IODISABLE IOENABLE IPERS IRMQMESSAGE ISIGNALAI
-ISIGNALAO ISIGNALDI ISIGNALDO ISIGNALGI ISIGNALGO ISLEEP ITIMER IVARVALUE IWATCH LOAD MAKEDIR MECHUNITLOAD MOTIONSUP
-OPEN OPENDIR PACKDNHEADER PACKRAWBYTES PDISPOFF PROCERRRECOVERY PULSEDO READANYBIN READBLOCK READCFGDATA READERRDATA
-READRAWBYTES REMOVEDIR REMOVEFILE RENAMEFILE RESET RESETPPMOVED RESETRETRYCOUNT RESTOPATH REWIND RMQEMPTYQUEUE
-RMQFINDSLOT RMQGETMESSAGE RMQGETMSGDATA RMQGETMSGHEADER RMQREADWAIT RMQSENDMESSAGE RMQSENDWAIT SAVE SAVECFGDATA
-SENDMESSAGE SET SETAO SETDATASEARCH SETDO SETGO SKIPWARN SOCKETACCEPT SOCKETBIND SOCKETCLOSE SOCKETCONNECT
-SOCKETCREATE SOCKETLISTEN SOCKETRECEIVE SOCKETRECEIVEFROM SOCKETSEND SOCKETSENDTO SPYSTART SPYSTOP STARTLOAD STOREPATH
-TEXTTABINSTALL TPERASE TPREADDNUM TPREADFK TPREADNUM TPSHOW TPWRITE TRIGGCHECKIO TRIGGEQUIP TRIGGINT TRIGGIO
-TRIGGRAMPAO TRIGGSPEED TRYINT UIMSGBOX UIMSGWRITE UIMSGWRITEABORT UISHOW UNLOAD UNPACKRAWBYTES WARMSTART
-WRITE WRITEANYBIN WRITEBIN WRITEBLOCK WRITECFGDATA WRITERAWBYTES WRITESTRBIN STOPMOVE STARTMOVE STOPMOVERESET
-"""
-HARMLESS = frozenset(HARMLESS_TEXT.split())
-"""Instructions that move nothing and set nothing that motions depend on (1, by their names)."""
-ASIDE_NAMED = reader.NOT_SIMULATED - {"CORRWRITE", "SYNCTOSENSOR"} | {"EOFFSOFF"}
-"""Instructions that are named as not simulated: the arm itself goes where its targets say."""
-PARAMETERS: Mapping[str, int] = {
-    **{"OFFS": 4, "RELTOOL": 4, "POSEMULT": 2, "POSEINV": 1, "POSEVECT": 2, "ORIENTZYX": 3, "EULERZYX": 1},
-    **{"NORIENT": 1, "DEFFRAME": 3, "DISTANCE": 2, "DOTPROD": 2, "VECTMAGN": 1, "CROBT": 0, "CJOINTT": 0, "CPOS": 0},
-    **{"CTOOL": 0, "CWOBJ": 0, "CALCROBT": 2, "CALCJOINTT": 2, "ABS": 1, "SQRT": 1, "SIN": 1, "COS": 1, "TAN": 1},
-    **{"ASIN": 1, "ACOS": 1, "ATAN": 1, "ATAN2": 2, "POW": 2, "EXP": 1, "TRUNC": 1, "ROUND": 1, "DIM": 2},
-    **{"STRLEN": 1, "STRPART": 3, "STRMAP": 3, "NUMTOSTR": 2, "VALTOSTR": 1, "PRESENT": 1, "BITAND": 2, "BITOR": 2},
-    **{"MIRPOS": 2, "NUMTODNUM": 1, "DNUMTONUM": 1},
-}
-"""Functions that are evaluated, with the number of their arguments."""
-ASKED_TEXT = """
-AINPUT AOUTPUT DINPUT DOUTPUT GINPUT GOUTPUT TESTDI TESTANDSET CLKREAD CDATE CTIME GETTIME CSPEEDOVERRIDE ISPERS ISVAR
-ISSTOPMOVEACT OPMODE RUNMODE ROBOS ROBNAME TASKRUNROB TASKRUNMEC GETTASKNAME GETMECUNITNAME GETNEXTMECHUNIT ISSYSID
-ISMECHUNITACTIVE ISFILE FILESIZE FSSIZE READBIN READDIR READMOTOR READNUM READSTR READSTRBIN READVAR SOCKETGETSTATUS
-SOCKETPEEK STRDIGCALC STRDIGCMP STRFIND STRFORMAT STRMATCH STRMEMB STRORDER STRTOBYTE STRTOVAL BYTETOSTR BITCHECK BITLSH
-BITNEG BITRSH BITXOR DECTOHEX HEXTODEC UIALPHAENTRY UICLIENTEXIST UIDNUMENTRY UIDNUMTUNE UILISTVIEW UIMESSAGEBOX
-UINUMENTRY UINUMTUNE GETSIGNALORIGIN IOUNITSTATE VALIDIO EVENTTYPE EXECHANDLER EXECLEVEL MOTORTEMP
-NONMOTIONMODE PATHLEVEL PPMOVEDINMANMODE RAWBYTESLEN RMQGETSLOTNAME TASKS TYPE TRIGGDATAVALID ARGNAME CSPEED
-GETAXISDISTANCE GETMAXNUMBEROFCYCLICBOOL GETNEXTSYM GETSYSINFO GETMODALPAYLOADMODE
-"""
-ASKED = frozenset(ASKED_TEXT.split())
-"""Functions whose value only the running cell knows."""
+SETS = {**known_names.SETTINGS, "GRIPLOAD": "%GRIPLOAD", "SETSYSDATA": reader.PASSING}
 SWITCHES: Mapping[str, frozenset[str]] = {
     **dict.fromkeys(("CROBT", "CPOS"), frozenset(("TOOL", "WOBJ"))),
     "CALCROBT": frozenset(("WOBJ",)),
@@ -126,8 +68,8 @@ AS_IT_STANDS = syntax.Unclear("the configuration in which the arm stands")
 class RapidDialect(Dialect):
     """RAPID, as a run needs it."""
 
-    modal = frozenset((*SETTINGS.values(), "%GRIPLOAD"))
-    setters = frozenset((*SETTINGS, *OUTPUTS, "EOFFSOFF", "GRIPLOAD", "SETSYSDATA"))
+    modal = frozenset((*known_names.SETTINGS.values(), "%GRIPLOAD"))
+    setters = frozenset((*known_names.SETTINGS, *known_names.OUTPUTS, "EOFFSOFF", "GRIPLOAD", "SETSYSDATA"))
     single_precision = True
 
     def constant(self, memory: ProgramMemory, name: str) -> syntax.Value | None:
@@ -160,7 +102,7 @@ class RapidDialect(Dialect):
         if name == reader.STEP:
             first, last = syntax.number(values[0]), syntax.number(values[1])
             return syntax.Unclear("a step") if first is None or last is None else 1 if first <= last else -1
-        if PARAMETERS.get(name) != len(values) or named.keys() - SWITCHES.get(name, frozenset()):
+        if known_names.PARAMETERS.get(name) != len(values) or named.keys() - SWITCHES.get(name, frozenset()):
             return unclear
         if name in ("CROBT", "CJOINTT", "CPOS", "CTOOL", "CWOBJ", "CALCROBT", "CALCJOINTT"):
             found = _of_position(memory, name, values, named, given)
@@ -236,7 +178,7 @@ class RapidDialect(Dialect):
         """What a target means; ``said`` is the line, the motion's kind, and whether it wants joint angles."""
         text, kind, absolute = said
         if isinstance(value, syntax.Unclear):
-            return instructions.UnresolvedTarget(value.text or text, "undefined")
+            return unresolved(value, text)
         if isinstance(value, syntax.Record) and value.kind == JOINTS_OF and absolute:
             return _joints_of(value, frames, text)
         value = data_types.typed(value, data_types.JOINTTARGET if absolute else data_types.ROBTARGET)
@@ -245,7 +187,7 @@ class RapidDialect(Dialect):
             return _joint_target(memory, value, text, external)
         unclear = next((each for each in _leaves(value) if isinstance(each, syntax.Unclear)), None)
         if unclear is not None:
-            return instructions.UnresolvedTarget(unclear.text, "undefined")
+            return unresolved(unclear)
         pose = data_types.pose_matrix(value)
         if pose is None:
             return instructions.UnresolvedTarget(text, "not_understood")
@@ -274,10 +216,10 @@ class RapidDialect(Dialect):
         if call.function == "CIRPATHMODE":
             options = {key for key, _ in call.keywords}
             memory.write("%ARCS", options == {"OBJECTFRAME"})
-            return None if options in reader.FOLLOWED[call.function] else instructions.Aside(doing.text)
-        if call.function in SETTINGS:
+            return None if options in known_names.FOLLOWED[call.function] else instructions.Aside(doing.text)
+        if call.function in known_names.SETTINGS:
             return None if _set(memory, call) else instructions.Unknown(doing.text, may_move=False)
-        if call.function in OUTPUTS and call.arguments:
+        if call.function in known_names.OUTPUTS and call.arguments:
             first = call.arguments[0]
             return instructions.Output(first.name if isinstance(first, syntax.Variable) else call.function, doing.text)
         if call.function == "EOFFSOFF" or self.harmless(call):
@@ -292,15 +234,9 @@ class RapidDialect(Dialect):
     def harmless(self, call: syntax.Invocation) -> bool:
         """Functions and instructions whose exact name is known, and that set nothing."""
         name = call.function
-        if name in SETTINGS or name in (reader.LATE, "GRIPLOAD", "SETSYSDATA"):
+        if name in known_names.SETTINGS or name in (reader.LATE, "GRIPLOAD", "SETSYSDATA"):
             return False
-        return (
-            name[:1] == "%"
-            or name in PARAMETERS
-            or name in HARMLESS
-            or name in ASKED
-            or name in ASIDE_NAMED | reader.WAITS
-        )
+        return known_names.is_known(name)
 
 
 def _beside_motion(form: str) -> int:
@@ -354,7 +290,7 @@ def _joint_target(
     values = axes.values() if isinstance(axes, syntax.Record) else ()
     unclear = next((each for each in values if isinstance(each, syntax.Unclear)), None)
     if unclear is not None:
-        return instructions.UnresolvedTarget(unclear.text, "undefined")
+        return unresolved(unclear)
     degrees = data_types.plain(axes, 6)
     if degrees is None:
         return instructions.UnresolvedTarget(text, "not_understood")

@@ -29,6 +29,7 @@ from er3a.programs.code_builder import (
 from er3a.programs.instructions import Place
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, read_program_text
 from er3a.programs.program_findings import BegunWithin, NameTwice, NotSimulated, NotUnderstood, ProgramFinding
+from er3a.programs.rapid import known_names
 from er3a.programs.rapid.data_types import SHAPES, Shape, predefined, starting
 
 PATTERN = re.compile(
@@ -78,49 +79,6 @@ MOTION_OPTIONS = frozenset(OPTIONS_TEXT.split())
 """Optional arguments of motions that are followed, or leave them as they are; ``\\Corr`` shifts the path."""
 CALLING = ("MOVEJSYNC", "MOVELSYNC", "MOVECSYNC")
 """Motions that call a procedure, named by a text, where they end."""
-CHANGING = {
-    "TPREADNUM": 0,
-    "TPREADFK": 0,
-    "TPREADDNUM": 0,
-    "GETSYSDATA": 0,
-    "GETDATAVAL": 1,
-    "BITCLEAR": 0,
-    "BITSET": 0,
-    "WAITTESTANDSET": 0,
-    "IVARVALUE": 2,
-    "SETUPCYCLICBOOL": 0,
-}
-"""Instructions that change one of their arguments, by its number."""
-CHANGING_OPTIONS = frozenset(("TIMEFLAG", "VALUE", "VALUEATTIMEOUT", "BREAKFLAG", "ERRORNUMBER", "RESULT"))
-"""Optional arguments that instructions and functions change."""
-READING = (
-    *("READ", "GET", "UNPACK", "RMQGET", "RMQREAD", "RMQSENDWAIT", "SOCKETRECEIVE", "SOCKETACCEPT", "UIMSGBOX"),
-    *("PACK", "COPYRAW"),
-)
-"""How instructions begin that may change any variable that they are given."""
-CHANGING_FUNCTIONS = {"STRTOVAL": 1, "TESTANDSET": 0, "GETNEXTSYM": 0, "GETNEXTMECHUNIT": 1, "READDIR": 1}
-"""Functions that change one of their arguments, by its number."""
-WAITS = frozenset(
-    (
-        *("WAITDI", "WAITDO", "WAITAI", "WAITAO", "WAITGI", "WAITGO", "WAITUNTIL", "WAITSYNCTASK", "WAITTESTANDSET"),
-        *("WAITROB", "WAITLOAD", "WAITSENSOR", "WAITWOBJ"),
-    )
-)
-NOT_SIMULATED_TEXT = """
-ACTUNIT CIRPATHMODE CORRCON CORRWRITE DEACTUNIT DROPWOBJ EOFFSON EOFFSSET INDAMOVE INDCMOVE INDDMOVE INDRESET
-INDRMOVE MOTIONPROCESSMODESET MOVEEXTJ PATHRESOL SINGAREA SOFTACT SOFTDEACT SPEEDREFRESH SUPSYNCSENSOROFF
-SUPSYNCSENSORON SYNCMOVEOFF SYNCMOVEON SYNCMOVERESUME SYNCMOVESUSPEND SYNCMOVEUNDO SYNCTOSENSOR TRIGGSPEED
-WAITSYNCTASK WAITWOBJ WZBOXDEF WZCYLDEF WZDISABLE WZDOSET WZENABLE WZFREE WZHOMEJOINTDEF WZLIMJOINTDEF WZLIMSUP
-WZSPHDEF
-"""
-NOT_SIMULATED = frozenset(NOT_SIMULATED_TEXT.split())
-"""What is known to shape a motion or to move something else, and is not followed: it is named."""
-FOLLOWED: Mapping[str, tuple[set[str], ...]] = {
-    "SINGAREA": ({"OFF"},),
-    "CIRPATHMODE": (set(), {"PATHFRAME"}, {"OBJECTFRAME"}),
-}
-"""Options with which some of these are followed. CirPathMode: an arc turns the tool with the path, as where nothing is
-said, or about one axis."""
 UPPER, ARITHMETIC, TYPED, STEP, LATE = "%UPPER", "%ARITHMETIC", "%TYPED", "%STEP", "%LATE"
 RAISING = ("SOCKET", "OPEN", "READ", "WRITE", "LOAD", "UNLOAD", "STARTLOAD", "RMQ", "COPYFILE", "REMOVE", "MAKEDIR")
 """How instructions begin that often end with an error; any other may too, if less often."""
@@ -253,6 +211,8 @@ class Scope:
             return syntax.Invocation(
                 ARITHMETIC, (syntax.Constant(expression.operator), expression.left, expression.right)
             )
+        if isinstance(expression, syntax.Unary) and expression.operator == "-" and _may_be_position(expression.of):
+            return syntax.Invocation(ARITHMETIC, (syntax.Constant("*"), syntax.Constant(-1), expression.of))
         return expression
 
     def shape_of(self, target: syntax.Expression, name: str) -> Shape | None:
@@ -306,7 +266,10 @@ def read_rapid(source: ProgramText) -> syntax.Program:
         )
         findings.append(NameTwice(name, last.place))
     routines = [each for reader in readers for each in reader.routines]
-    by_name, unlinked = linked(routines, changed_arguments)
+    fixed = _fixed(routines, data)
+    by_name, unlinked = linked(
+        routines, known_names.changed_arguments, lambda call: known_names.perhaps_changed(call, fixed)
+    )
     findings += _base_frames(source.path)
     findings += _event_routines(source.path, {each.text for cursor in cursors for each in cursor.tokens})
     entry = _entry(own, by_name)
@@ -386,11 +349,26 @@ def _in_order(data: list[syntax.Assign]) -> tuple[syntax.Assign, ...]:
     return (*found, *data)
 
 
-def changed_arguments(call: syntax.Invocation) -> list[syntax.Expression | None]:
-    """What a function of the controller changes of its arguments."""
-    at = CHANGING_FUNCTIONS.get(call.function)
-    by_name: list[syntax.Expression | None] = [each for key, each in call.keywords if key in CHANGING_OPTIONS]
-    return by_name if at is None else [*call.arguments[at : at + 1], *by_name]
+def _may_be_position(expression: syntax.Expression) -> bool:
+    """Whether an expression whose sign is turned may be a pos, and not a number for sure."""
+    if isinstance(expression, syntax.Invocation) and expression.function == ARITHMETIC:
+        return True
+    return isinstance(expression, (syntax.Variable, syntax.Member, syntax.Element))
+
+
+OF_MOTIONS = frozenset(("TOOLDATA", "WOBJDATA", "LOADDATA", "SPEEDDATA", "ZONEDATA"))
+
+
+def _fixed(routines: Iterable[syntax.Routine], data: Iterable[syntax.Assign]) -> set[str]:
+    """Names of constants, and of data of motions, which hardly any routine changes that is given them."""
+    operations = [*data, *(each for routine in routines for each in routine.code)]
+    declared = (each for each in operations if isinstance(each, syntax.Assign) and each.type_name)
+    found = {
+        variable_of(each.target)
+        for each in declared
+        if each.text.upper().startswith("CONST") or each.type_name in OF_MOTIONS
+    }
+    return found | {each.name for routine in routines for each in routine.parameters if not each.out}
 
 
 def _entry(own: list[syntax.Routine], routines: Mapping[str, syntax.Routine]) -> str:
@@ -895,7 +873,7 @@ class _BodyReader:
         """An instruction of the controller."""
         builder, (placed, named) = self.builder, given
         options = {key for key, _ in named}
-        if name in NOT_SIMULATED and options not in FOLLOWED.get(name, ()):
+        if name in known_names.NOT_SIMULATED and options not in known_names.FOLLOWED.get(name, ()):
             self.module.findings.append(NotSimulated(text, place))
         if name in ("LOAD", "STARTLOAD") and not self._is_beside(placed, dict(named).get("FILE")):
             self.module.findings.append(NotSimulated(text, place))
@@ -924,8 +902,10 @@ class _BodyReader:
             suffix = syntax.Invocation("NUMTOSTR", (placed[1], syntax.Constant(0)))
             self.late(place, syntax.Invocation(ARITHMETIC, (syntax.Constant("+"), placed[0], suffix)), ((), ()), text)
             return
-        if name in WAITS:
-            told = (each for key, each in named if key not in CHANGING_OPTIONS)  # the others are what it gives back
+        if name in known_names.WAITS:
+            told = (
+                each for key, each in named if key not in known_names.CHANGING_OPTIONS
+            )  # the others are what it gives back
             asked = tuple(each for each in (*placed, *told) if each is not None)
             ends = "TIMEFLAG" in options or name == "WAITTESTANDSET"  # which waits for what is true
             builder.add(syntax.Waiting(place, "condition", syntax.Listed("", asked), text, arrives, ends))
@@ -933,12 +913,12 @@ class _BodyReader:
             builder.add(syntax.Doing(place, syntax.Invocation(name, placed, named), text))
         if "TIMEFLAG" not in options and ("MAXTIME" in options or name.startswith(RAISING)):
             self._fails(place, text)
-        changed = [each for key, each in named if key in CHANGING_OPTIONS]
-        if name in CHANGING and CHANGING[name] < len(placed):
-            changed.append(placed[CHANGING[name]] or syntax.Constant(0))
+        changed = [each for key, each in named if key in known_names.CHANGING_OPTIONS]
+        if name in known_names.CHANGING and known_names.CHANGING[name] < len(placed):
+            changed.append(placed[known_names.CHANGING[name]] or syntax.Constant(0))
         if name == "SETDATAVAL" and isinstance(placed[0] if placed else None, syntax.Constant):
             self._unclear(place, str(getattr(placed[0], "value", "")).upper(), text)
-        if name.startswith(READING):
+        if name.startswith(known_names.READING) and known_names.is_known(name):
             changed += [each for each in (*placed, *(each for _, each in named)) if each is not None]
         for each in changed:
             if isinstance(each, (syntax.Variable, syntax.Element, syntax.Member)):
@@ -1271,9 +1251,10 @@ TASK = re.compile(r"(?i)TASK\d+|T(?:ASK)?_\w+|ROB(?:OT)?_?(?:\d+|[LR]|LEFT|RIGHT
 """Folder of a task in a controller's backup, or in a project: T_ROB1, T_COMM, ROB1."""
 SHARED = re.compile(r"(?i)(\b(?:LOCAL|TASK)\s+)?\bPERS\s+\w+\s+(\w+)")
 SET = re.compile(r"(?i)(?<![\w.\\])(\w+)(?:\{[^}]*\}|\.\w+)*\s*:=|\b(?:Incr|Decr|Add|Clear)\s+(\w+)")
+CHANGERS = (*(f"{name}\\w*" for name in known_names.READING), *known_names.CHANGING, *known_names.CHANGING_FUNCTIONS)
 GIVEN = re.compile(
-    rf"(?i)\b(?:(?:{'|'.join(READING)})\w*|{'|'.join((*CHANGING, *CHANGING_FUNCTIONS))})\b([^;]*)"
-    rf"|\\(?:{'|'.join(sorted(CHANGING_OPTIONS))})\s*:=\s*(\w+)"
+    rf"(?i)\b(?:{'|'.join(CHANGERS)})\b([^;]*)"
+    rf"|\\(?:{'|'.join(sorted(known_names.CHANGING_OPTIONS))})\s*:=\s*(\w+)"
 )
 """What is given to instructions that may change it."""
 TAKING = re.compile(r"(?i)\b(?:PROC|FUNC\s+\w+)\s+(\w+)\s*\([^)]*\b(?:INOUT|VAR|PERS)\b")

@@ -10,7 +10,7 @@ import numpy as np
 
 from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, syntax
-from er3a.programs.evaluation import IN_DEGREES, Dialect, ProgramMemory, root
+from er3a.programs.evaluation import IN_DEGREES, Dialect, ProgramMemory, root, unresolved
 from er3a.programs.rpl.reader import CONFIGURATION, FIELDS, JOINTS, LIBRARY_NAMES, OUTER, POSITION
 
 SPEED = re.compile(r"v(\d+(?:\.\d+)?)(perc)?$", re.IGNORECASE)
@@ -141,8 +141,7 @@ def _offset(point: syntax.Record, by: list[syntax.Value | None]) -> syntax.Value
 
 def _target(value: syntax.Value, text: str) -> instructions.Target:
     if isinstance(value, syntax.Unclear):
-        finite_word = value.text.upper().lstrip("+-") not in ("NAN", "INF")
-        return instructions.UnresolvedTarget(value.text, "undefined" if finite_word else "not_finite")
+        return unresolved(value)
     if not isinstance(value, syntax.Record):
         return instructions.UnresolvedTarget(text, "not_understood")
     if not {key for key, _ in value.items} <= set(FIELDS.get(value.kind, ())):
