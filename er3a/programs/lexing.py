@@ -264,6 +264,8 @@ def read_program_text(path: Path) -> ProgramText:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise InputError(path, None, f"can't be read ({reason})", "Check the path and its permissions") from None
+    if raw.startswith(b"PK\x03\x04"):
+        raise InputError(path, None, "is a ZIP archive", "Unpack it, and name a program in its folder")
     text, encoding = decoded(raw, path)
     text = text.replace("\r\n", "\n")
     alone = re.finditer("\r", text) if "\n" in text else ()

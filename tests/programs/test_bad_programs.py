@@ -199,3 +199,9 @@ def test_numbers_of_many_digits_and_long_words_are_read_at_once(tmp_path):
     (tmp_path / "a.src").write_text("DEF a( )\nPTP {A1 1} " + "C_A" * 40 + "!\nEND\n")
     assert read_program(tmp_path / "a.script").findings == ()
     assert "program_not_understood" in [each.code for each in read_program(tmp_path / "a.src").findings]
+
+
+def test_an_archive_is_to_be_unpacked(tmp_path):
+    (tmp_path / "a.src").write_bytes(b"PK\x03\x04\x14\x00\x00\x00")
+    with pytest.raises(InputError, match="is a ZIP archive. Unpack it"):
+        read_program(tmp_path / "a.src")

@@ -393,12 +393,12 @@ TEXTS = texts(
             "{turned_deg:.2f} deg from it"
         ),
         "kept_to_next_start": (
-            "{name} decides where the arm goes, and keeps what is set here: checked for the first start only, not for "
-            "later starts or cycles"
+            "motions depend on {name}, which keeps what is set here: checked for the first start only, not for later "
+            "starts or cycles"
         ),
         "set_elsewhere": (
-            "{name} decides where the arm goes, and {file} sets it too (line {line}): checked with the value of the "
-            "data file only"
+            "motions depend on {name}, and {file} sets it too (line {line}): checked with the value of the data file "
+            "only"
         ),
         "waits_for_others": (
             "nothing that was read ends this wait ('{condition}'): another task does, and what else that sets is not "
