@@ -2019,6 +2019,9 @@ def test_what_a_routine_that_no_file_holds_gets_by_reference_has_no_known_value(
     assert any(each.place.line == missed.place.line and each.what == "motion" for each in found.not_examined)
     constant = check(tmp_path, rapid("FindPart p;\nMoveJ p,v50,fine,tool0;"), "a.mod")
     assert "target_not_given" not in codes(constant)
+    same_name = "PROC other(num n)\nCONST num n:=1;\nENDPROC\n"  # of a parameter of another routine
+    again = check(tmp_path, rapid(f"{call}\nMoveJ Offs(p,0,n,0),v50,fine,tool0;", same_name), "a.mod")
+    assert "target_not_given" in codes(again)
     set_anew = check(tmp_path, rapid(f"{call}\nn:=5;\nMoveJ Offs(p,0,n,0),v50,fine,tool0;"), "a.mod")
     assert "target_not_given" not in codes(set_anew)
 

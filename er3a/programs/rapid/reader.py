@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import bisect
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -359,16 +359,17 @@ def _may_be_position(expression: syntax.Expression) -> bool:
 OF_MOTIONS = frozenset(("TOOLDATA", "WOBJDATA", "LOADDATA", "SPEEDDATA", "ZONEDATA"))
 
 
-def _fixed(routines: Iterable[syntax.Routine], data: Iterable[syntax.Assign]) -> set[str]:
-    """Names of constants, and of data of motions, which hardly any routine changes that is given them."""
+def _fixed(routines: Sequence[syntax.Routine], data: Sequence[syntax.Assign]) -> set[str]:
+    """Names of constants, and of data of motions, which hardly any routine changes that is given them; none that is
+    something else in another routine."""
     operations = [*data, *(each for routine in routines for each in routine.code)]
-    declared = (each for each in operations if isinstance(each, syntax.Assign) and each.type_name)
-    found = {
-        variable_of(each.target)
-        for each in declared
-        if each.text.upper().startswith("CONST") or each.type_name in OF_MOTIONS
+    declared = [each for each in operations if isinstance(each, syntax.Assign) and each.type_name]
+    fixed = [each.text.upper().startswith("CONST") or each.type_name in OF_MOTIONS for each in declared]
+    names = [variable_of(each.target) for each in declared]
+    return {name for name, is_fixed in zip(names, fixed) if is_fixed} - {
+        *(name for name, is_fixed in zip(names, fixed) if not is_fixed),
+        *(each.name for routine in routines for each in routine.parameters),
     }
-    return found | {each.name for routine in routines for each in routine.parameters if not each.out}
 
 
 def _entry(own: list[syntax.Routine], routines: Mapping[str, syntax.Routine]) -> str:
