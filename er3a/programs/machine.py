@@ -1116,8 +1116,10 @@ class Machine:
             self._note(way, start.place, instructions.Aside(start.text))
             return
         before, sets = way.step, self._only_set(start)
-        self._note(way, start.place, instructions.MovesBeside(name, start.kind, start.text, sets))
-        if routine is not None:
+        if routine is None:  # nothing of it can be followed
+            self._note(way, start.place, instructions.Unknown(start.text))
+        else:
+            self._note(way, start.place, instructions.MovesBeside(name, start.kind, start.text, sets))
             other = way.fork(self.numbers, len(self.seen))
             other.step, other.beside = before, True
             other.memory.beside = self._changed_later(way) | changed_beside(self.program, self.dialect, name)

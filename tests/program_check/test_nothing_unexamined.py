@@ -243,7 +243,9 @@ def test_an_interrupt_that_only_sets_signals_and_the_controllers_own_are_none(tm
 )
 def test_an_interrupt_or_trigger_of_an_unknown_routine_is_named(tmp_path, line):
     found = check(tmp_path, krl(f"{line}\nPTP {axes(NEAR)}"), "a.src")
-    assert codes(found)["moves_beside"] == [2]
+    assert codes(found)["may_move"] == [2]
+    assert "moves_beside" not in codes(found)  # which says that its motions were checked
+    assert [(each.place.line, each.what) for each in found.not_examined][:1] == [(2, "instruction")]
     assert found.level == "caution"
 
 
@@ -855,8 +857,8 @@ AT_START = f"{FRAMES}{SLOW}PTP {axes(HOME)}\n"
         ("$ACT_TOOL=3", "", "program_not_understood"),
         ("$ORI_TYPE=#JOINT", "", "program_not_understood"),
         ("shift( )", "DEF shift( )\n$CORR_T={X 0,Y 0,Z 50,A 0,B 0,C 0}\nEND\n", "program_not_understood"),
-        ("INTERRUPT DECL 5 WHEN $IN[2] DO elsewhere( )", "", "moves_beside"),
-        ("TRIGGER WHEN DISTANCE=0 DELAY=0 DO elsewhere( ) PRIO=-1", "", "moves_beside"),
+        ("INTERRUPT DECL 5 WHEN $IN[2] DO elsewhere( )", "", "may_move"),
+        ("TRIGGER WHEN DISTANCE=0 DELAY=0 DO elsewhere( ) PRIO=-1", "", "may_move"),
         (
             "INTERRUPT DECL 5 WHEN $IN[2] DO lift( )",
             "DEF lift( )\n$BASE={X 0,Y 0,Z 100,A 0,B 0,C 0}\nEND\n",
@@ -881,11 +883,11 @@ def test_a_thread_or_trap_that_nobody_knows_is_named_in_a_branch_that_moves_noth
     text = (
         f"def a():\n  movej({HOME_TEXT})\n  if get_digital_in(1):\n    run flee()\n  end\n  movej({NEAR_TEXT})\nend\n"
     )
-    assert codes(check(tmp_path, text))["moves_beside"] == [4]
+    assert codes(check(tmp_path, text))["may_move"] == [4]
     joints = "[[0,-10,-10,0,-70,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
     text = f"MODULE a\nVAR intnum i;\nPROC main()\nMoveAbsJ {joints},v50,fine,tool0;\nIF di1=1 THEN\n"
     text += f"CONNECT i WITH flee;\nENDIF\nMoveAbsJ {joints},v50,fine,tool0;\nENDPROC\nENDMODULE\n"
-    assert codes(check(tmp_path, text, "a.mod"))["moves_beside"] == [6]
+    assert codes(check(tmp_path, text, "a.mod"))["may_move"] == [6]
 
 
 def test_an_output_and_a_wait_in_a_branch_are_still_passed_by(tmp_path):
@@ -2010,7 +2012,9 @@ def test_what_else_such_variables_are_set_to_is_named(tmp_path, line):
     assert ("frames_in_doubt" in found) == (line.startswith(("$ACT", "$CORR")))
 
 
-@pytest.mark.parametrize("call", ["FindPart n;", "b:=FindPart(n);", '%"FindPart"% n;', "GetPart n;", "FindPart\\Into:=n;"])
+@pytest.mark.parametrize(
+    "call", ["FindPart n;", "b:=FindPart(n);", '%"FindPart"% n;', "GetPart n;", "FindPart\\Into:=n;"]
+)
 def test_what_a_routine_that_no_file_holds_gets_by_reference_has_no_known_value(tmp_path, call):
     found = check(tmp_path, rapid(f"{call}\nMoveJ p,v50,fine,tool0;\nMoveL Offs(p,0,n,0),v50,fine,tool0;"), "a.mod")
     (missed,) = (each for each in found.findings if each.finding.code == "target_not_given")

@@ -68,6 +68,12 @@ def test_what_comes_otherwise_is_named_with_both_outcomes():
     assert demonstrations([Came("out", "safe", "unreachable")], "safe") == ()
 
 
+def test_what_expects_nothing_and_fails_is_named_beside_an_expectation_that_is_not_met():
+    judged = [Came("out", "safe", "unreachable"), Came("line", "collides"), Came("arc", "safe")]
+    found = unmet_expectations(judged, "safe")
+    assert say(found).endswith(" Besides, of what expects nothing: line (collides).")
+
+
 def test_files_hold_expectations(tmp_path):
     table = tmp_path / "targets.csv"
     table.write_text(

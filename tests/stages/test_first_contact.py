@@ -19,6 +19,7 @@ from er3a.files.scene_file import load_scene
 from er3a.pipeline.messages.trajectory import path_text
 from er3a.pipeline.results import read_results
 from er3a.pipeline.stages import run
+from er3a.pipeline.stages.collision.model import RESULTS as COLLISION
 from er3a.pipeline.stages.trajectory.model import RESULTS
 from er3a.pipeline.study import load_study
 from er3a.program_check.check_program import CheckOptions, check_program
@@ -57,22 +58,29 @@ PATHS = [
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory):
-    """The stage's results on both paths, and the folder of its page and files."""
+def asked(tmp_path_factory):
+    """A study of both paths, and the folder of its files."""
     folder = tmp_path_factory.mktemp("first")
     paths = [path | {"title": "Made", "duration_s": DURATION} for path in PATHS]
     for name, content in (("scene", SCENE), ("paths", {"kind": "paths", "paths": paths})):
         (folder / f"{name}.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
     study = load_study("config/small.yaml")
     files = {name: str(folder / f"{name}.yaml") for name in ("scene", "paths")}
-    asked = {"avoidance": "slow", "programs": ["krl", "urscript"], "write_unsafe": True}
-    asked["penetration_tolerance_mm"] = TOLERANCE_MM
+    options = {"avoidance": "slow", "programs": ["krl", "urscript"], "write_unsafe": True}
+    options["penetration_tolerance_mm"] = TOLERANCE_MM
     study = study.model_copy(
         update={
             "robots": {ROBOT: study.robots[ROBOT].model_copy(update=files)},
-            "trajectory": study.trajectory.model_copy(update=asked),
+            "trajectory": study.trajectory.model_copy(update=options),
         }
     )
+    return study, folder
+
+
+@pytest.fixture(scope="module")
+def made(asked):
+    """The stage's results on both paths, and the folder of its page and files."""
+    study, folder = asked
     run.compute("trajectory", study, ROBOT, folder / "results")
     run.show("report", "trajectory", study, ROBOT, folder / "results", folder / "page.html")
     return read_results(folder / "results", RESULTS).results, folder
@@ -143,3 +151,12 @@ def test_the_program_of_a_path_touches_first_what_the_path_does(made, tmp_path, 
     assert collision.at_mm == pytest.approx(1000 * part.s0_m, abs=0.1)
     for ours, theirs in zip(collision.touches, part.cause.touches):
         assert ours.depth_mm == pytest.approx(theirs.depth_mm, abs=0.1)
+
+
+def test_the_collision_stage_names_what_touches_first_on_a_path(made, asked):
+    study, folder = asked
+    run.compute("collision", study, ROBOT, folder / "collision")
+    verdict = read_results(folder / "collision", COLLISION).results.summary.verdict
+    colliding = {each.name: each.pair for each in getattr(verdict.finding, "found", verdict.finding).colliding}
+    first = {path.name: path.collisions[0].cause.touches[0].pair for path in made[0].summary.paths}
+    assert colliding == first

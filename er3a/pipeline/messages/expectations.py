@@ -8,6 +8,7 @@ from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.say import Plural, joined, listed, say, say_as, sentence, texts, word
 from er3a.pipeline.stages.expectations import (
     Demonstration,
+    ExpectationsUnmet,
     Judged,
     Outcome,
     UnmetExpectation,
@@ -43,6 +44,7 @@ TEXTS = texts(
             "{count} of {expectations} expectations is not met: {unmet:; }.",
             "{count} of {expectations} expectations are not met: {unmet:; }.",
         ),
+        "expectations_unmet.others": "Besides, of what expects nothing: {named}.",
         "demonstrations": "{count} expected to fail, and did: {named}",
         "demonstrations#alone": "{count} expected to fail, and did: {named}; nothing else is given to be judged",
         "demonstration": "{name} ({outcome})",
@@ -91,3 +93,9 @@ def _(found: Demonstration) -> str:
 @say.register
 def _(found: UnmetExpectation) -> str:
     return say_as(found, found=outcome_words(found.found), expected=outcome_words(found.expected))
+
+
+@say.register
+def _(found: ExpectationsUnmet) -> str:
+    others = sentence("expectations_unmet.others", named=joined(listed(found.others), ", ")) if found.others else ""
+    return joined([say_as(found, count=len(found.unmet)), others], " ")

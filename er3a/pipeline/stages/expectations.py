@@ -31,10 +31,11 @@ class Demonstration(Finding):
 
 
 class ExpectationsUnmet(Finding):
-    """Of so many expectations these are not met."""
+    """Of so many expectations these are not met; ``others``: of what expects nothing, what is not sound."""
 
     expectations: int
     unmet: tuple[UnmetExpectation, ...]
+    others: tuple[Demonstration, ...] = ()
 
 
 class Judged(Protocol):
@@ -70,13 +71,16 @@ def is_met(judged: Judged) -> bool:
     return set(expected_of(judged)) == set(came_to(judged))
 
 
-def unmet_expectations(judged: Iterable[Judged]) -> ExpectationsUnmet | None:
-    """The expectations that are not met; None if all are."""
-    expected = [each for each in judged if expected_of(each)]
+def unmet_expectations(judged: Iterable[Judged], sound: Outcome | None = None) -> ExpectationsUnmet | None:
+    """The expectations that are not met, with what else is not ``sound``; None if all are met."""
+    all_judged = list(judged)
+    expected = [each for each in all_judged if expected_of(each)]
     unmet = tuple(
         UnmetExpectation(each.name, expected_of(each), came_to(each)) for each in expected if not is_met(each)
     )
-    return ExpectationsUnmet(len(expected), unmet) if unmet else None
+    rest = [each for each in all_judged if not expected_of(each)]
+    others = tuple(Demonstration(each.name, came_to(each)) for each in rest if sound and each.outcome != sound)
+    return ExpectationsUnmet(len(expected), unmet, others) if unmet else None
 
 
 def pass_of(asked: Collection[Judged]) -> Status:

@@ -71,9 +71,9 @@ def target_clearances(
 
 def path_clearances(
     motions: Iterable[ListedMotion], bodies: Bodies, tolerance: float
-) -> tuple[model.PathClearances, list[model.Closest]]:
-    """Clearance over time of each path, and where each is nearest to anything."""
-    tables, closest = [], []
+) -> tuple[model.PathClearances, list[model.Closest], dict[str, Pair]]:
+    """Clearance over time of each path, where each is nearest to anything, and what touches first on it."""
+    tables, closest, first = [], [], dict[str, Pair]()
     for entry in motions:
         motion = entry.motion
         if motion is None:
@@ -97,11 +97,13 @@ def path_clearances(
                 to_mm=near[:, 1] * 1000,
             )
         )
+        if along.contacts:
+            first[entry.name] = along.contacts[0].pairs[0]
         at = along.closest
         if at >= 0 and pair[at] >= 0:
             about = (entry.name, "path", float(along.t[at]))
             closest.append(_closest(bodies, about, q[at], along.distance[at], pair[at]))
-    return model.PathClearances.stacked(tables).of_joints(bodies.robot.slides), closest
+    return model.PathClearances.stacked(tables).of_joints(bodies.robot.slides), closest, first
 
 
 def _closest(bodies: Bodies, about: tuple, q: Reals, distance: float, pair: int) -> model.Closest:
@@ -131,7 +133,7 @@ def compute(study: Study, name: str) -> model.CollisionResults:
     targets, at_targets, blocked = target_clearances(robot, bodies, study.entry(name).targets)
     tolerance = settings.penetration_tolerance_mm / 1000
     motions = list(study_motions(study, name, CHECKS))
-    paths, on_paths = path_clearances(motions, bodies, tolerance)
+    paths, on_paths, first_touch = path_clearances(motions, bodies, tolerance)
     pairs = _pair_shares(bodies, space)
     mounting = tuple(stated(model.Mounting, contact) for contact in base_contacts(robot, scene))
     matrix = _matrix(bodies)
@@ -149,7 +151,7 @@ def compute(study: Study, name: str) -> model.CollisionResults:
         targets=len(at_targets),
         nearest=_nearest_target(at_targets),
         colliding=tuple(
-            model.CollidingPath(each.name, each.between, each.name in meant)
+            model.CollidingPath(each.name, first_touch.get(each.name, each.between), each.name in meant)
             for each in on_paths
             if each.clearance_mm < 0
         ),

@@ -46,7 +46,7 @@ class NearestTarget(Finding):
 
 
 class CollidingPath(Finding):
-    """A path on which two bodies overlap, the deepest of them; ``expected``: whether its file expects that."""
+    """A path on which two bodies overlap, the first to touch; ``expected``: whether its file expects that."""
 
     name: str
     pair: Pair

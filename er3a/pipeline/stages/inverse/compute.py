@@ -488,7 +488,7 @@ def _verdict(
     lost = trips.poses - trips.own_found if trips else 0
     if lost or position > REPRODUCED_M or orientation > REPRODUCED_RAD:
         return Verdict("fail", model.NotReproduced(position * 1000, float(np.degrees(orientation)), lost))
-    if unmet := unmet_expectations(targets):
+    if unmet := unmet_expectations(targets, "reached"):
         return Verdict("fail", unmet)
     shown = demonstrations(targets, "reached")
     asked = [target for target in targets if target.expect in (None, "reached")]

@@ -261,7 +261,7 @@ def _verdict(
 ]:
     if not programs:
         return Verdict("no_reference", model.NoPrograms())
-    if unmet := unmet_expectations(programs):
+    if unmet := unmet_expectations(programs, "pass"):
         return Verdict("fail", unmet)
     asked = [each for each in programs if each.expect in (None, "pass")]
     caution, failed = (tuple(each.name for each in asked if each.outcome == outcome) for outcome in ("caution", "fail"))

@@ -538,7 +538,7 @@ def _checks(
 def _verdict(
     paths: list[model.PathSummary], skipped: list[model.PathNotFollowed], shapes: ShapesAssumed | None
 ) -> Verdict[model.AllSafe | model.SomeUnsafe | model.NoneSafe | ExpectationsUnmet]:
-    if unmet := unmet_expectations([*paths, *skipped]):
+    if unmet := unmet_expectations([*paths, *skipped], "safe"):
         return Verdict("fail", unmet)
     asked = [path for path in paths if path.meant_safe]
     unfollowed = [path for path in skipped if not path.expect]

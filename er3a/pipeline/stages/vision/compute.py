@@ -610,7 +610,7 @@ def verdict_of(
     calibration: model.CalibrationResult, objects: tuple[model.ObjectResult, ...], near: tuple[str, ...]
 ) -> Verdict[Found]:
     """``near``: objects whose grasps come within the margin of assumed shapes, which are not counted as grasped."""
-    if unmet := unmet_expectations(objects):
+    if unmet := unmet_expectations(objects, "grasped"):
         return Verdict("fail", unmet)
     asked = [each for each in objects if each.expect in (None, "grasped")]
     missed = tuple(model.NotGraspedObject(each.name, each.refusal) for each in asked if each.refusal)
