@@ -83,6 +83,16 @@ def test_the_scale_is_named_as_not_examined_where_lengths_were_measured():
     assert common_scale(relative) is None
 
 
+def test_positions_held_back_from_a_fit_of_few_poses_are_not_examined():
+    """No poses were left out, so nothing says how far off others may be."""
+    rows = measured(arm(), 6)
+    found = er3a.calibrate(arm(), rows)
+    text, _ = not_examined_texts(found, measured(arm(), 5, seed=5))
+    assert text.startswith("whether positions held back contradict the result")
+    assert text in lines_of(found, rows, measured(arm(), 5, seed=5))
+    assert text not in lines_of(found, rows)
+
+
 def written(path: Path, rows: list[Measurement]) -> str:
     with path.open("w", newline="", encoding="utf-8") as file:
         out = csv.writer(file)

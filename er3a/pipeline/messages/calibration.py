@@ -98,7 +98,7 @@ def lines_of(found: Calibration, fitted: Sequence[Measurement] = (), others: Seq
         lines += _beyond_lines(found.beyond)
     if found.more:
         lines.append(f"to estimate more: {say(found.more)}")
-    lines += [f"not examined: {text}" for text in not_examined_texts(found) if fitted]
+    lines += [f"not examined: {text}" for text in not_examined_texts(found, others) if fitted]
     return "\n".join(lines)
 
 
@@ -119,10 +119,14 @@ def scale_texts(found: Calibration) -> list[str]:
     ]
 
 
-def not_examined_texts(found: Calibration) -> list[str]:
-    """What the corrections take for granted."""
-    if not scale_is_assumed(found):
-        return []
+def not_examined_texts(found: Calibration, others: Sequence[Measurement] = ()) -> list[str]:
+    """What the corrections take for granted, and what ``others``, held back, can't tell."""
+    untold = others and not (found.beyond.left_out if found.beyond else found.left_out)
+    texts = [tr("whether positions held back contradict the result: too few poses were fitted to leave some out")]
+    return [*(texts if untold else []), *(_scale_not_examined() if scale_is_assumed(found) else [])]
+
+
+def _scale_not_examined() -> list[str]:
     return [
         tr(
             "the scale of the measuring device, or of lengths stated with the measurements: it counts as exact, and "
@@ -490,7 +494,7 @@ def calibration_record(
         "held_back_warning": " ".join(held_back_warning(found, fitted, others)) or None,
         "held_back_contradicts": held_back_contradicts(found, fitted, others),
         "scale_warning": " ".join(scale_texts(found)) or None,
-        "not_examined": not_examined_texts(found) if fitted else [],
+        "not_examined": not_examined_texts(found, others) if fitted else [],
     }
 
 

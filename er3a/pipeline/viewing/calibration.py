@@ -134,7 +134,7 @@ def write_calibration(
             arm=language.own_title(robot.title),
             verdict="fail" if not found.fits else "caution" if beside else "pass",
             conclusion=joined([say(found.conclusion), *beside], " "),
-            texts=_texts(found),
+            texts=_texts(found, held_back),
             figures=_figures(found, errors),
             errors=_errors(found, errors, held_back),
             recording=recording,
@@ -159,7 +159,7 @@ def write_calibration(
         )
 
 
-def _texts(found: Calibration) -> list[str]:
+def _texts(found: Calibration, held_back: Sequence[Measurement]) -> list[str]:
     texts = [
         tr(
             "{settled} of {all} numbers are settled by {coordinates} coordinates at {poses} poses.",
@@ -174,7 +174,7 @@ def _texts(found: Calibration) -> list[str]:
     ]
     if found.more:
         texts.append(say(found.more))
-    return texts + [tr("Not examined: {what}.", what=each) for each in not_examined_texts(found)]
+    return texts + [tr("Not examined: {what}.", what=each) for each in not_examined_texts(found, held_back)]
 
 
 def _figures(found: Calibration, errors: MeasuredErrors) -> list[ShownFigure]:
