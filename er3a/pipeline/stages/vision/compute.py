@@ -480,7 +480,7 @@ def _left_out(
     file: VisionFile,
     zeros: tuple[str, ...],
     least_zero: float,
-    frames: tuple[LeftOutSubject, ...],
+    frames: tuple[LeftOutSubject, ...] = (),
 ) -> Iterator[LeftOut]:
     """What the calibration does not rest on, what nothing checks it against, and what grasps leave open.
 
