@@ -61,6 +61,10 @@ CARRIED_OUT = {
     "strategy.stop": "test_stop_rests_on_the_path_before_the_region",
     "strategy.planned": "test_planned_motions_touch_nothing_and_keep_their_limits",
     "advice.slower": "test_the_slower_pace_that_is_advised_keeps_the_limits",
+    **dict.fromkeys(
+        ("advice.slower#table", "advice.slower#program"),
+        "test_a_table_and_a_program_at_the_slower_pace_that_is_advised_keep_the_limits",
+    ),
     **dict.fromkeys(("advice.full_speed", "advice.limits#both", "advice.limits#speed"), AT_OVERRIDE),
     "advice.clear_until": "test_a_path_that_ends_where_its_advice_says_keeps_the_margin",
     "advice.clear_until#links": "test_a_path_that_ends_where_its_advice_says_keeps_the_margin",

@@ -148,6 +148,29 @@ def test_a_file_that_leads_to_a_missing_one_is_not_in_order(tmp_path, monkeypatc
         check_file(Path("a.yaml"))
 
 
+@pytest.mark.parametrize(
+    ("header", "more", "told"),
+    [
+        ("t_s,", {"duration_s": 349.4}, r"paths\[0\]\.duration_s: the table's t_s gives it too"),
+        ("", {}, r"paths\[0\]\.duration_s: missing, and the table has no column t_s"),
+        ("t_s,", {"blend_mm": 5}, r"paths\[0\]\.blend_mm: the table holds joint angles"),
+        ("t_s,", {}, None),
+    ],
+)
+def test_a_path_file_is_held_against_the_table_that_it_names(tmp_path, monkeypatch, header, more, told):
+    """Without a robot, as `er3a check paths.yaml` reads it."""
+    monkeypatch.chdir(tmp_path)
+    rows = [f"{'0,' if header else ''}0,0,0,0,45,0", f"{'2,' if header else ''}5,0,0,0,45,0"]
+    Path("t1.csv").write_text("\n".join([f"{header}q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg", *rows]))
+    path = {"name": "own", "title": "Own", "kind": "table", "file": "t1.csv", "samples": 11} | more
+    Path("paths.yaml").write_text(json.dumps({"kind": "paths", "paths": [path]}))
+    if told is None:
+        assert check_file(Path("paths.yaml")) == "paths"
+        return
+    with pytest.raises(InputError, match=told):
+        check_file(Path("paths.yaml"))
+
+
 def test_files_of_a_project_are_checked_from_any_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert check_file(ROOT / "data/programs/er3a_c60.yaml") == "programs"

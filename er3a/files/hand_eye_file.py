@@ -295,16 +295,19 @@ def read_calibration(
     per_sample: Reals | None = None
     shared: Reals | None = None
     if head.streams is not None:
-        hand = _stream(path.parent / head.streams.flange, "flange", robot)
+        flange_table = path.parent / head.streams.flange
+        hand = _stream(flange_table, "flange", robot)
         eye = _stream(path.parent / head.streams.target, "target", robot)
         offset = _offset(path, hand, eye, head.streams.widest_s)
         flange, target, times = paired(hand, eye, offset.offset, STREAM_SAMPLES)
         offset = replace(offset, unused=len(eye.t) - len(times))
         names, q = tuple(f"{t:.3f} s" for t in times), None
+        of_joints = bool(_joint_columns(read_header(flange_table)))
     else:
         table = path.parent / str(head.samples)
         rows, header = sample_rows(table)
         flange, q = _flange(table, rows, header, robot)
+        of_joints = q is not None
         names = tuple(str(row.get("name") or f"row {row['row']}") for row in rows)
         if head.images is not None:
             images = _targets_of_images(table, rows, names, head.images)
@@ -327,6 +330,7 @@ def read_calibration(
         touched=_touched(path.parent / head.touched, robot) if head.touched else None,
         touch_deviation=head.touch_standard_deviation_mm / 1000,
         shared=shared,
+        of_joints=of_joints,
     )
     return samples, offset, images
 

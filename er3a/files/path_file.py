@@ -569,6 +569,26 @@ class TablePath(NamedPath):
     start_branch: Text | None = None
     half_turn_axis: Triple | None = None
 
+    def table(self, source: commands.CommandSource) -> PathTable:
+        """The table as it stands.
+
+        Raises
+        ------
+        InputError
+            for a table that can't be read, or does not go with ``duration_s`` and the blends, whatever the robot
+        """
+        table = read_path_table(self.file)
+        if table.times is None and self.duration_s is None:
+            problem, remedy = "missing, and the table has no column t_s", "Give duration_s, or times in the table"
+            raise source.error("duration_s", problem, remedy)
+        if table.times is not None and self.duration_s is not None:
+            raise source.error("duration_s", "the table's t_s gives it too", "Remove one of the two")
+        if table.joints is not None and self.blend_mm is not None:
+            raise source.error("blend_mm", "the table holds joint angles", "Write blend_deg")
+        if table.joints is None and self.blend_deg is not None:
+            raise source.error("blend_deg", "the table holds poses", "Write blend_mm")
+        return table
+
     def command(self, source: commands.CommandSource, robot: Robot) -> commands.Command:
         """The table's points in SI units, without those that repeat the point before.
 
@@ -577,31 +597,21 @@ class TablePath(NamedPath):
         InputError
             for a table that can't be read, or does not go with ``duration_s`` and the blends
         """
-        table = read_path_table(self.file)
+        table = self.table(source)
         kept = ~table.repeated
-        timing: float | Times
-        if table.times is None and self.duration_s is not None:
-            timing = self.duration_s
-        elif table.times is not None and self.duration_s is None:
+        timing: float | Times | None = self.duration_s
+        if table.times is not None:
             timing = Times(table.times, np.cumsum(kept) - 1)
-        elif table.times is None:
-            problem, remedy = "missing, and the table has no column t_s", "Give duration_s, or times in the table"
-            raise source.error("duration_s", problem, remedy)
-        else:
-            raise source.error("duration_s", "the table's t_s gives it too", "Remove one of the two")
+        assert timing is not None
         repeated = tuple(table.rows[table.repeated].tolist())
         if table.joints is not None:
             slides = tuple(robot.slides.tolist())
             if len(slides) != table.joints.shape[1] or table.sliding not in (None, slides):
                 columns = ", ".join(joint_columns(robot))
                 raise source.error("file", f"its joints are not those of {robot.name}", f"Give the columns {columns}")
-            if self.blend_mm is not None:
-                raise source.error("blend_mm", "the table holds joint angles", "Write blend_deg")
             blend = None if self.blend_deg is None else float(self.blend_deg * np.radians(1.0))
             return commands.JointTableCommand(table.joints[kept], timing, blend, repeated, table.unread, source=source)
         assert table.poses is not None
-        if self.blend_deg is not None:
-            raise source.error("blend_deg", "the table holds poses", "Write blend_mm")
         return commands.ToolTableCommand(
             table.poses[kept],
             tuple(f"row {row} of {table.file}" for row in table.rows[kept]),

@@ -22,6 +22,10 @@ SMALLEST_OBSTACLE_MM = 2.0
 THIN_MM = 1.0
 PLAIN_OBSTACLE_MM = 10.0
 """What stands in a cell is longer; a shorter one may be written in metres."""
+FURNITURE_MM = 100.0
+"""A scene with something as long is in mm."""
+FAR_IN_METRES = 20.0
+"""A place farther out than this is none of an arm's cell if it is in metres."""
 MAX_LINKS = 30
 SHAPES = ("boxes", "cylinders", "spheres", "planes", "meshes")
 
@@ -158,12 +162,15 @@ class SceneFile(InputFile):
 
     @model_validator(mode="after")
     def _plain_solids(self) -> Self:
-        """What is carried may be small; what stands in the cell is not."""
+        """What is carried may be small; what stands in the cell is not, but for a pin between larger things."""
+        longest = [max(box.size_mm) for box in self.boxes] + [2 * ball.radius_mm for ball in self.spheres]
+        longest += [max(2 * each.radius_mm, each.length_mm) for each in self.cylinders]
+        in_mm = max(longest, default=0.0) >= FURNITURE_MM
         for box in self.boxes:
-            if max(box.size_mm) < PLAIN_OBSTACLE_MM:
+            if max(box.size_mm) < PLAIN_OBSTACLE_MM and not (in_mm and _is_pin(box.xyz_mm, min(box.size_mm))):
                 doubt(box, "size_mm", f"{box.size_mm} mm", "metres")
         for ball in self.spheres:
-            if 2 * ball.radius_mm < PLAIN_OBSTACLE_MM:
+            if 2 * ball.radius_mm < PLAIN_OBSTACLE_MM and not (in_mm and _is_pin(ball.xyz_mm, ball.radius_mm)):
                 doubt(ball, "radius_mm", f"{ball.radius_mm:g} mm", "metres")
         return self
 
@@ -207,6 +214,11 @@ def load_scene(path: str | Path) -> library.Scene:
         naming file, field and remedy
     """
     return load(SceneFile, path).scene()
+
+
+def _is_pin(xyz_mm: list[float], least: float) -> bool:
+    """Whether a small solid can't be in metres: it would be a block of metres each way, and far from any arm."""
+    return least >= THIN_MM and max(map(abs, xyz_mm)) > FAR_IN_METRES
 
 
 def _check_size(longest: float) -> None:

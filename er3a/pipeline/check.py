@@ -87,7 +87,7 @@ def _check_paths(path: Path, robot: Robot | None = None) -> None:
             except InputError as error:
                 raise error if error.file else source.error(error.field or "", error.problem, error.remedy) from None
         elif isinstance(planned, TablePath):
-            read_path_table(planned.file)
+            planned.table(CommandSource(path, f"paths[{i}]"))
 
 
 def _check_command(robot: Robot, name: str, command: Command, ends: dict[str, Reals]) -> None:

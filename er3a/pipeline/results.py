@@ -220,6 +220,8 @@ LeftOutSubject = Literal[
     "half_turns",
     "arm_angles",
     "start_branches",
+    "flange_poses",
+    "base_poses",
 ]
 
 NEVER_A_PASS: frozenset[LeftOutSubject] = frozenset(
@@ -238,7 +240,7 @@ NEVER_A_PASS: frozenset[LeftOutSubject] = frozenset(
             "other_gravity",
         ),
         *("arm_errors", "objects_out_of_view", "hidden_voids", "orientations", "base_inside", "places_in_solids"),
-        *("units", "own_limits", "contradicted_table"),
+        *("units", "own_limits", "contradicted_table", "flange_poses", "base_poses"),
     )
 )
 """What no verdict passes without; the rest bounds what a verdict is about, and stands in the table alone."""

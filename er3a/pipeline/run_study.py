@@ -326,7 +326,7 @@ def _run(study_file: Path, results: Path, reports: Path, words: Sequence[str], a
     if any((_STATE / "locks").glob("*")):
         print("note: a run that was cut off left its lock; going on where it stopped", file=sys.stderr)
         unlock = [sys.executable, "-m", "snakemake", *snakemake, "--unlock", "--quiet", "all", *study_words]
-        subprocess.run(unlock, check=True)
+        subprocess.run(unlock, check=True, env=os.environ | {"PYTHONWARNINGS": "ignore::UserWarning"})  # told above
     os.set_inheritable(lock, True)  # held until the last job of this run has ended
     _end_when_asked(results, reports)
     sys.stdout.flush()

@@ -38,6 +38,7 @@ class CalibrationSet(ByValue, Displayed):
         of k independent errors that all samples share (intrinsics estimated from their images); None if there are none
     flange_covariance : (6, 6) of T_base_flange, in the base's axes
     q : (N, n), rad, joint angles, if they were recorded
+    of_joints : whether ``flange`` was computed from joint values by the robot's table, also where these are not kept
     touched : (M, 2, 3), m: points in the frame of a fixed camera, or on a fixed board, and the same points in the
         robot's base as the robot touched them; not used in the calibration
     touch_deviation : standard deviation of a touch, m, in each coordinate
@@ -58,6 +59,7 @@ class CalibrationSet(ByValue, Displayed):
     touched: Reals | None = None
     touch_deviation: float = 0.0
     shared: Reals | None = None
+    of_joints: bool = False
 
     def __post_init__(self) -> None:
         for name in ("flange", "target"):
@@ -83,6 +85,11 @@ class CalibrationSet(ByValue, Displayed):
     def hand(self) -> Reals:
         """F (N, 4, 4) of F X B = Y: T_base_flange for a camera on the flange, T_flange_base for a fixed one."""
         return self.flange if self.setup == "eye_in_hand" else inverted(self.flange)
+
+    @property
+    def states_joints(self) -> bool:
+        """Whether joint values say where the flange was; recorded poses may be a tool's, or in another frame."""
+        return self.of_joints or self.q is not None
 
     def take(self, rows: Flags | Integers) -> CalibrationSet:
         """The chosen samples: a mask (N,) or numbers."""

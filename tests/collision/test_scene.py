@@ -109,6 +109,26 @@ def test_sizes_that_look_like_metres_are_doubted(shapes, told, tmp_path):
         load_scene(write(tmp_path, **shapes))
 
 
+PIN = {"name": "pin", "xyz_mm": [400, 0, 250], "radius_mm": 3}
+TABLE = {"name": "bench", "size_mm": [1000, 800, 40], "xyz_mm": [500, 0, -20]}
+
+
+@pytest.mark.parametrize(
+    ("shapes", "is_doubted"),
+    [
+        ({"boxes": [TABLE], "spheres": [PIN]}, False),
+        ({"boxes": [TABLE, {"name": "nut", "size_mm": [8, 8, 4], "xyz_mm": [400, 0, 2]}]}, False),
+        ({"spheres": [PIN]}, True),
+        ({"boxes": [TABLE], "spheres": [PIN | {"xyz_mm": [6, 0, 2]}]}, True),  # a place that may be in metres too
+        ({"boxes": [TABLE, {"name": "wall", "size_mm": [2.5, 3, 0.04], "xyz_mm": [900, 0, 500]}]}, True),
+        ({"boxes": [TABLE | {"size_mm": [2.5, 8, 0.04], "xyz_mm": [6, 0, 0]}], "spheres": [PIN]}, True),
+    ],
+)
+def test_a_small_part_beside_larger_things_is_in_mm(shapes, is_doubted, tmp_path, recwarn):
+    load_scene(write(tmp_path, **shapes))
+    assert bool([each for each in recwarn if each.category is DoubtfulUnit]) == is_doubted
+
+
 def test_small_parts_are_carried_and_floors_are_a_millimetre_below(tmp_path, recwarn):
     part = {"name": "screw", "size_mm": [3, 3, 8], "xyz_mm": [0, 0, 20]}
     load_scene(write(tmp_path, planes=[PLANE | {"offset_mm": -1}], carried={"boxes": [part]}))

@@ -816,6 +816,47 @@ def test_a_grasp_passes_by_no_object_out_of_view_and_no_arm_without_errors(study
     assert summary.verdict.finding.left_out == ("pose_12", "again")
 
 
+def by_poses(folder: Path, name: str, robot: Robot, **more) -> None:
+    """A camera's set of the data with the flange's poses in place of joint values; ``more``: other keys, None: none."""
+    for file in Path("data/vision").glob(f"{name}*"):
+        shutil.copy(file, folder)
+    head, *rows = [line.split(",") for line in (folder / f"{name}.csv").read_text(encoding="utf-8").splitlines()]
+    T = forward(robot.without_tool(), np.radians(np.array([row[1:7] for row in rows], float)))
+    poses = np.column_stack([1000 * T[:, :3, 3], T[:, :3, :3].reshape(-1, 9)])
+    names = [*(f"flange_{c}_mm" for c in "xyz"), *(f"flange_r{r}{c}" for r in "123" for c in "123")]
+    lines = [[head[0], *names, *head[7:]], *([row[0], *map(str, pose), *row[7:]] for row, pose in zip(rows, poses))]
+    (folder / f"{name}.csv").write_text("\n".join(",".join(line) for line in lines), encoding="utf-8")
+    content = yaml.safe_load((folder / f"{name}.yaml").read_text(encoding="utf-8")) | more
+    content = {key: value for key, value in content.items() if value is not None and key != "table_corrections"}
+    (folder / f"{name}.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("name", "camera", "more", "subject"),
+    [
+        ("er3_600", "carried_camera", {}, None),
+        ("er3_600", "carried_camera", {"simulated": None}, "flange_poses"),
+        ("er3a_c60", "fixed_camera", {"simulated": None}, None),
+        ("er3a_c60", "fixed_camera", {"simulated": None, "touched": None}, "base_poses"),
+    ],
+)
+def test_recorded_poses_that_no_joint_values_confirm_are_no_pass(study, tmp_path, name, camera, more, subject):
+    """They may be a tool's or in another frame; touched points confirm a fixed camera's place alone."""
+    by_poses(tmp_path, camera, load_robot(name), **more)
+    content = yaml.safe_load(Path(f"data/vision/{name}.yaml").read_text(encoding="utf-8"))
+    content["objects"] = content["objects"][:1]
+    (tmp_path / "vision.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
+    entry = study.robots[name].model_copy(update={"vision": str(tmp_path / "vision.yaml"), "stages": None})
+    section = study.vision.model_copy(update={"map_cells": 4})
+    results = vision(study.model_copy(update={"robots": {name: entry}, "vision": section}), name)
+    verdict = results.summary.verdict
+    assert verdict.status == "caution"  # no gripper has a shape
+    assert [each.subject for each in verdict.missed if each.subject != "carried"] == ([subject] if subject else [])
+    krl = [text for file, text in zip(results.programs.file, results.programs.text) if file.endswith(".src")]
+    assert ["no joint values tell" in text for text in krl] == [bool(subject)]
+
+
 def test_what_no_verdict_passes_without_turns_it_and_is_said():
     """Whatever a stage computes, its summary makes no pass of it; obstacles turn no reach and no torque.
 

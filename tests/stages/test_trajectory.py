@@ -607,6 +607,34 @@ def test_the_slower_pace_that_is_advised_keeps_the_limits(study, results, tmp_pa
     assert hardly.too_fast
 
 
+@pytest.mark.parametrize("times_in", ["table", "program"])
+def test_a_table_and_a_program_at_the_slower_pace_that_is_advised_keep_the_limits(study, tmp_path, times_in):
+    """The times of the table multiplied, and those of the program's motions as an override stretches them."""
+    rows = [0, -30, -10, 0, -50, 0], [-10, -30, -10, 0, -50, 60], [-20, -30, -10, 0, -50, 120]
+
+    def at(longer: float) -> PathSummary:
+        times = [0.2 * longer * k for k in range(3)]
+        lines = [",".join(map(str, (t, *row))) for t, row in zip(times, rows)]
+        (tmp_path / "own.csv").write_text("\n".join(["t_s,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg", *lines]))
+        moves = [f"  movej({np.radians(row).tolist()}, t={times[1]})" for row in rows[1:]]
+        (tmp_path / "own.script").write_text("\n".join(["def own():", *moves, "end"]))
+        entry = {"name": "own", "title": "Own", "samples": 11} | {
+            "table": {"kind": "table", "file": str(tmp_path / "own.csv"), "blend_deg": 0},
+            "program": {"kind": "program", "program": str(tmp_path / "own.script"), "start_deg": rows[0]},
+        }[times_in]
+        return by_name(compute(with_paths(study, tmp_path, entry), "er3a_c60"))["own"]
+
+    path = at(1.0)
+    assert path.too_fast
+    said = re.search(r"at ([\d.]+) % of the programmed speed: (multiply the times|this is the program)", advice(path))
+    longer = 100 / float(said[1])
+    if times_in == "table":
+        longer = float(re.search(r"multiply the times of its table by ([\d.]+)", advice(path))[1])
+    assert "duration_s" not in advice(path)
+    assert not at(longer).too_fast
+    assert at(0.97 * longer).too_fast
+
+
 def test_at_the_override_that_is_advised_a_controller_ten_times_as_fast_keeps_the_assumed_speeds(results):
     """The stored joint angles in ten times the time; the share of the limits that is named is that of differences."""
     found, advised = results["er3a_c60"], 0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -9,7 +11,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 from scipy.stats import t as student
 
-from er3a.geometry.transforms import moved
+from er3a.geometry.transforms import moved, transform
 from er3a.pipeline.messages.vision import say
 from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.classic_methods import METHOD_NAMES, solved_by
@@ -397,6 +399,21 @@ def test_sets_that_determine_nothing_say_why():
     found = refusal(about_z)
     assert isinstance(found, ParallelTurns)
     assert abs(found.axis[2]) == pytest.approx(1)
+
+
+def test_touched_points_do_not_tell_a_tools_poses_from_the_flanges():
+    """What a carried camera saw of the base is where it was, but the camera is off the flange by the tool."""
+    flange = a_set("eye_in_hand", 21)
+    tool = transform(np.array([0.0, 0.02, 0.16]), np.zeros(3))
+    points = np.random.default_rng(4).uniform(-0.1, 0.1, (6, 3))
+    base = points @ Y_TRUE[:3, :3].T + Y_TRUE[:3, 3]
+    touches = {"touched": np.stack([points, base], axis=1), "touch_deviation": 1e-3}
+    for T, off_m in ((np.eye(4), 0.0), (tool, np.linalg.norm(tool[:3, 3]))):
+        found = calibrate_hand_eye(replace(flange, flange=flange.flange @ T, **touches))
+        assert found.touch.probability > 0.001
+        assert found.touch.contradiction is None
+        assert np.linalg.norm((T @ found.X)[:3, 3] - X_TRUE[:3, 3]) < 2e-3
+        assert np.linalg.norm(found.X[:3, 3] - X_TRUE[:3, 3]) == pytest.approx(off_m, abs=0.1 * off_m + 2e-3)
 
 
 def test_touched_points_judge_the_calibration():

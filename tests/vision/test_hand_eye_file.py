@@ -274,13 +274,19 @@ def test_touched_points_that_contradict_a_calibration_end_the_command_with_code_
         codes.append((found.exit_code, "touched points contradict the calibration" in found.output))
         record = json.loads(CliRunner().invoke(app, ["hand-eye", str(file), "--json"]).stdout)
         assert record["touch_contradicts"] == (beside > 0)
-        told = (left_out_text(LeftOut(each)) for each in ("joint_zeros", "touched_points", "real_camera"))
-        assert [each in record["not_examined"] for each in told] == [True, False, False]
-    file.write_text(file.read_text().replace("touched: touched.csv", "simulated: true"))
+        subjects = ("joint_zeros", "touched_points", "real_camera", "flange_poses", "base_poses")
+        told = (left_out_text(LeftOut(each)) for each in subjects)
+        assert [each in record["not_examined"] for each in told] == [True, False, False, True, False]
+    text = file.read_text()
+    file.write_text(text.replace("touched: touched.csv", ""))
+    unconfirmed = CliRunner().invoke(app, ["hand-eye", str(file)]).output
+    assert all(left_out_text(LeftOut(each)) in unconfirmed for each in ("flange_poses", "base_poses"))
+    file.write_text(text.replace("touched: touched.csv", "simulated: true"))
     untouched = CliRunner().invoke(app, ["hand-eye", str(file)]).output
     assert all(
         f"not examined: {left_out_text(LeftOut(each))}" in untouched for each in ("touched_points", "real_camera")
     )
+    assert "recorded poses" not in untouched
     assert codes == [(0, False), (1, True)]
 
 
@@ -310,6 +316,25 @@ def _streams(folder: Path, ahead: float, start: float = 0.0, every: float = 0.05
 def test_streams_whose_clocks_cant_be_compared_are_refused(made, reason, tmp_path):
     with pytest.raises(InputError, match=reason):
         read_calibration(_streams(tmp_path, **made), None)
+
+
+def test_a_stream_of_joint_values_says_where_the_flange_was(tmp_path):
+    """Its samples keep no joint values, but their poses are the table's."""
+    robot, file = load_robot("er3a_c60"), _streams(tmp_path, ahead=0.1)
+    assert not read_calibration(file, None)[0].states_joints
+    t = np.arange(0, 30, 0.02)
+    q = 20 * np.sin(t[:, None] * [0.9, 1.1, 1.3, 1.5, 1.7, 1.9])
+    table = {"t_s": t} | {f"q{j + 1}_deg": q[:, j] for j in range(6)}
+    rows = [list(table), *np.column_stack(list(table.values())).tolist()]
+    (tmp_path / "hand.csv").write_text("\n".join(",".join(map(str, row)) for row in rows))
+    t_eye = np.arange(3, 27, 0.05)
+    angles = np.radians(20 * np.sin(t_eye[:, None] * [0.9, 1.1, 1.3, 1.5, 1.7, 1.9]))
+    target = seen("eye_in_hand", forward(robot.without_tool(), angles))
+    shutil.copy(file, tmp_path / "head.yaml")
+    write(tmp_path, {"t_s": t_eye} | columns(target, "target", "quaternion"), (tmp_path / "head.yaml").read_text())
+    samples, _, _ = read_calibration(file, robot)
+    assert samples.q is None
+    assert samples.states_joints
 
 
 def test_a_wider_range_finds_the_offset_as_advised(tmp_path):

@@ -3,12 +3,14 @@ import os
 import shlex
 import sys
 import time
+import warnings
 
 from snakemake.dag import PeriodicityDetector
 
 from er3a.pipeline.code_digest import code_digest
-from er3a.errors import Er3aError
+from er3a.errors import Er3aError, InputWarning
 from er3a.files.kept_files import view_command
+from er3a.pipeline.commands.options import print_warning
 from er3a.pipeline.messages import language, pages
 from er3a.pipeline.messages.language import catalogue_file, tr
 from er3a.pipeline.stages.registry import STAGES, all_messages
@@ -24,8 +26,15 @@ if len(workflow.overwrite_configfiles) > 1 or workflow.config_settings.config:
 
 STUDY_FILE = str(next(iter(workflow.overwrite_configfiles), DEFAULT_STUDY))
 
+# Where `er3a run` reads this in its own process, it has told of doubtful numbers; otherwise they are told as it does.
+IS_TOLD = warnings.showwarning is print_warning
+warnings.showwarning = print_warning
+
 try:
-    STUDY = load_study(STUDY_FILE)
+    with warnings.catch_warnings():
+        if IS_TOLD:
+            warnings.simplefilter("ignore", InputWarning)
+        STUDY = load_study(STUDY_FILE)
 except Er3aError as error:
     raise WorkflowError(str(error)) from None
 

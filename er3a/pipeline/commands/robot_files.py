@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from er3a.errors import Er3aError
+from er3a.errors import Er3aError, InputError
 from er3a.files.robot_file import NAME_PATTERN
 from er3a.formats.mesh_file import Unit
 from er3a.pipeline.commands import options
@@ -22,6 +22,7 @@ from er3a.pipeline.progress import shown_work
 from er3a.pipeline.stages.registry import STAGES
 
 if TYPE_CHECKING:
+    from er3a.calibration.calibrate import Calibration
     from er3a.calibration.observations import Measurement
     from er3a.calibration.outcomes import FixedName
     from er3a.files.pieces_file import PiecesFile
@@ -168,6 +169,25 @@ def _print_plan(arm: Robot, rows: Sequence[Measurement], count: int, fixed: Sequ
     options.print_json(plan_record(proposed)) if as_json else print(plan_lines(proposed, arm))
 
 
+def _check_options(file: Path | None, output: Path | None, html: Path | None, rrd: Path | None, words: str) -> None:
+    """Before the long work begins: a language, positions where they are to be shown, a name for a robot."""
+    if words not in LANGUAGES:
+        raise Er3aError(f"--language is '{words}'; known: {', '.join(LANGUAGES)}")
+    if file is None and (html or rrd):
+        raise Er3aError(
+            f"--{'html' if html else 'rrd'} shows measured positions; give a CSV of them, not a reference set"
+        )
+    if output and not re.fullmatch(NAME_PATTERN, output.stem):
+        problem = f"'{output.stem}' can't be a robot's name"
+        raise InputError(output, "--output", problem, "Use a to z, 0 to 9, - and _, 64 at most, as in mine.yaml")
+
+
+def _renamed(found: Calibration, name: str) -> Robot:
+    """The corrected robot as it is written."""
+    alone = " (without terms beyond a robot file)" if found.beyond else ""
+    return found.robot.replace(name=name, title=f"{found.robot.title}, calibrated{alone}")
+
+
 def _write_calibrated(corrected: Robot, record: dict[str, object], output: Path) -> Path:
     """Write the robot file, and beside it the whole model, whose path is returned."""
     from er3a.files.kept_files import write_atomically
@@ -202,6 +222,8 @@ def calibrate(
     Joint errors beyond D-H (ratio, once and twice a turn, sag) are fitted if they improve poses left out of the fit.
     The whole model goes to NAME_model.json, for er3a.load_calibration in Python. The robot file has the table that is
     best without such errors, and ratios and couplings as its coupling.
+
+    Exit code 1 if positions held back contradict the result, which is written all the same.
     """
     from er3a.calibration.observations import check_poses
     from er3a.calibration.outcomes import CalibrationError
@@ -212,13 +234,8 @@ def calibrate(
     from er3a.pipeline.messages.calibration import calibration_record, held_back_lines, kept_lines, lines_of
     from er3a.pipeline.messages.say import say
 
-    if words not in LANGUAGES:
-        raise Er3aError(f"--language is '{words}'; known: {', '.join(LANGUAGES)}")
     file = Path(measurements) if measurements.lower().endswith(".csv") else None
-    if file is None and (html or rrd):
-        raise Er3aError(
-            f"--{'html' if html else 'rrd'} shows measured positions; give a CSV of them, not a reference set"
-        )
+    _check_options(file, output, html, rrd, words)
     arm = load_robot(robot)
     rows = load_measurements(file, arm) if file else ()
     if plan:
@@ -234,9 +251,7 @@ def calibrate(
             found = calibrate_robot(arm, source, [each.value for each in fixed or ()])
     except CalibrationError as error:
         raise Er3aError(say(error.finding)) from None
-    name = output.stem if output else f"{arm.name}_calibrated"
-    alone = " (without terms beyond a robot file)" if found.beyond else ""
-    corrected = found.robot.replace(name=name, title=f"{found.robot.title}, calibrated{alone}")
+    corrected = _renamed(found, output.stem if output else f"{arm.name}_calibrated")
     settled = len(found.open) < len(found.estimates)
     record = {"output": str(output) if output and settled else None, **calibration_record(found, arm, rows, others)}
     model = _write_calibrated(corrected, record, output) if output and settled else None
@@ -258,8 +273,11 @@ def calibrate(
         raise Er3aError(
             f"{output}: not written, as these measurements settle none of the table's numbers; measure more"
         )
+    contradicted = bool(record["held_back_contradicts"])
     if not as_json:
-        print("\n".join(kept_lines(found, robot, output, model)))
+        print("\n".join(kept_lines(found, robot, output, model, contradicted=contradicted)))
+    if contradicted:
+        raise typer.Exit(1)
 
 
 @options.app.command(rich_help_panel=options.ROBOT_FILES)
@@ -332,6 +350,7 @@ def hand_eye(
         table = correct_table(found, arm, asked) if arm and asked else None
     boardless = images.boardless if images else ()
     wrong = isinstance(table, TableCorrections) and table.probability < TABLE_CONTRADICTED
+    recorded = not (head.simulated or samples.states_joints)
     missed = {
         LeftOut("real_camera"): head.simulated,
         LeftOut("stream_poses", amount=offset.unused if offset else 0): bool(offset and offset.unused),
@@ -339,6 +358,8 @@ def hand_eye(
         LeftOut("joint_zeros", unseen): bool(unseen) or arm is None,
         LeftOut("small_joint_zeros", amount=least_zero): bool(least_zero),
         LeftOut("touched_points"): found.touch is None,
+        LeftOut("flange_poses"): recorded,
+        LeftOut("base_poses"): recorded and found.touch is None,
         LeftOut("contradicted_table"): wrong,
     }
     not_examined = [bracketed(left_out_text(each), left_out_names(each)) for each, is_so in missed.items() if is_so]

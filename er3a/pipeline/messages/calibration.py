@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from er3a.calibration.calibrate import Beyond, Calibration, Estimate, TermEstimate
+from er3a.calibration.common_scale import common_scale, scale_is_assumed
 from er3a.calibration.cross_validation import HeldOutErrors, TriedTerm
 from er3a.calibration.observations import Measurement
 from er3a.calibration.plan import Plan
@@ -51,6 +52,7 @@ def lines_of(found: Calibration, fitted: Sequence[Measurement] = (), others: Seq
     lines = [
         *([say(found.wrong)] if found.wrong else []),
         *held_back_warning(found, fitted, others),
+        *scale_texts(found),
         *_summary(found),
         *warning_texts(found),
         f"{found.coordinates} coordinates at {found.poses} poses; estimated: {level(found.level)}",
@@ -96,7 +98,41 @@ def lines_of(found: Calibration, fitted: Sequence[Measurement] = (), others: Seq
         lines += _beyond_lines(found.beyond)
     if found.more:
         lines.append(f"to estimate more: {say(found.more)}")
+    lines += [f"not examined: {text}" for text in not_examined_texts(found, others) if fitted]
     return "\n".join(lines)
+
+
+def scale_texts(found: Calibration) -> list[str]:
+    """That one factor explains the corrections of all lengths, which a measuring device with a wrong scale makes."""
+    scale = common_scale(found)
+    if scale is None:
+        return []
+    return [
+        tr(
+            "One factor explains the corrections of all lengths: {factor:.5f} ± {half_width:.5f} (95 %, from "
+            "{lengths}). A wrong scale of the measuring device does the same, and these measurements can't tell which "
+            "is wrong. Check the device by a known length, and its units and temperature.",
+            factor=scale.factor,
+            half_width=scale.half_width,
+            lengths=", ".join(scale.lengths),
+        )
+    ]
+
+
+def not_examined_texts(found: Calibration, others: Sequence[Measurement] = ()) -> list[str]:
+    """What the corrections take for granted, and what ``others``, held back, can't tell."""
+    untold = others and not (found.beyond.left_out if found.beyond else found.left_out)
+    texts = [tr("whether positions held back contradict the result: too few poses were fitted to leave some out")]
+    return [*(texts if untold else []), *(_scale_not_examined() if scale_is_assumed(found) else [])]
+
+
+def _scale_not_examined() -> list[str]:
+    return [
+        tr(
+            "the scale of the measuring device, or of lengths stated with the measurements: it counts as exact, and "
+            "all lengths of the arm are off by the same share as it is"
+        )
+    ]
 
 
 def warning_texts(found: Calibration) -> list[str]:
@@ -139,17 +175,23 @@ def _summary(found: Calibration) -> list[str]:
     ]
 
 
-def kept_lines(found: Calibration, robot: str, output: Path | None, model: Path | None) -> list[str]:
+def kept_lines(
+    found: Calibration, robot: str, output: Path | None, model: Path | None, *, contradicted: bool = False
+) -> list[str]:
     """How to go on with the corrected arm: the whole model first.
 
     Parameters
     ----------
     robot : as the command was given it; output, model : the files that were written, if any
+    contradicted : whether positions held back contradict it
     """
     python = f"er3a.load_calibration('{model or 'FILE_model.json'}', er3a.load_robot('{robot}')).forward(q)"
     if output is None or model is None:
         return [f"keep it: --output FILE.yaml writes the robot file, and FILE_model.json for {python} in Python"]
-    lines = [f"{model}: written; the whole model: {python} in Python, or"]
+    lines = []
+    if contradicted:
+        lines.append("written although positions held back contradict it: don't use these files until that is settled")
+    lines.append(f"{model}: written; the whole model: {python} in Python, or")
     lines.append(f"    er3a predict {shlex.quote(str(model))} JOINTS.csv --robot {shlex.quote(robot)}")
     lines.append(f"{output}: written" + (f"; {text}" if (text := file_text(found)) else ""))
     if found.ratios:
@@ -217,8 +259,7 @@ def held_back_line(fitted: Sequence[Measurement], others: Sequence[Measurement],
 
 def held_back_warning(found: Calibration, fitted: Sequence[Measurement], others: Sequence[Measurement]) -> list[str]:
     """That positions held back were fitted, that others contradict the fit, or that it does not hold elsewhere."""
-    fitted_too = {(each.pose, each.point) for each in fitted}
-    unseen = [each for each in others if (each.pose, each.point) not in fitted_too]
+    unseen = _unseen(fitted, others)
     if (seen := len(others) - len(unseen)) and not unseen:
         return [tr("All positions held back are at poses that were fitted too: they test nothing. Hold others back.")]
     also = tr(
@@ -227,6 +268,17 @@ def held_back_warning(found: Calibration, fitted: Sequence[Measurement], others:
         count=seen,
     )
     return [*([also] if seen else []), *_held_back_contradicts(found, fitted, unseen)]
+
+
+def held_back_contradicts(found: Calibration, fitted: Sequence[Measurement], others: Sequence[Measurement]) -> bool:
+    """Whether positions held back are not where the model puts them."""
+    return bool(_held_back_contradicts(found, fitted, _unseen(fitted, others)))
+
+
+def _unseen(fitted: Sequence[Measurement], others: Sequence[Measurement]) -> list[Measurement]:
+    """Those that were not fitted too."""
+    fitted_too = {(each.pose, each.point) for each in fitted}
+    return [each for each in others if (each.pose, each.point) not in fitted_too]
 
 
 def _held_back_contradicts(
@@ -440,6 +492,9 @@ def calibration_record(
         "beyond": _beyond(found.beyond) if found.beyond else None,
         "held_back": _held_back(found, others) if others else None,
         "held_back_warning": " ".join(held_back_warning(found, fitted, others)) or None,
+        "held_back_contradicts": held_back_contradicts(found, fitted, others),
+        "scale_warning": " ".join(scale_texts(found)) or None,
+        "not_examined": not_examined_texts(found, others) if fitted else [],
     }
 
 

@@ -150,6 +150,14 @@ TEXTS = texts(
             "wrong joint zeros below {amount:g} deg: the samples do not tell them from noise, or they are not named"
         ),
         "left_out.touched_points": "where the arm really touches what the camera sees: no touched points are given",
+        "left_out.flange_poses": (
+            "whether the recorded poses are the flange's, as the robot's table has it, and not a tool's: the samples "
+            "hold no joint values to compare them with"
+        ),
+        "left_out.base_poses": (
+            "whether the recorded poses are in the robot's own base, not in a frame set at its controller: the samples "
+            "hold no joint values to compare them with, and no touched points are given"
+        ),
         "left_out.detections": "whether detected objects are where the detector says, within the deviations stated",
         "left_out.gripped_parts": "collisions of the objects themselves and of a part in the gripper",
         "left_out.unjoined_cells": (

@@ -144,6 +144,14 @@ TEXTS = texts(
             "If its speed can't vary along the path, run all of it at {percent:.3g} % of the programmed speed: "
             "duration_s {needed:.4g} in the path file"
         ),
+        "advice.slower#table": (
+            "If its speed can't vary along the path, run all of it at {percent:.3g} % of the programmed speed: "
+            "multiply the times of its table by {longer:.4g}"
+        ),
+        "advice.slower#program": (
+            "If its speed can't vary along the path, run all of it at {percent:.3g} % of the programmed speed: this is "
+            "the program's override"
+        ),
         "advice.clear_until": (
             "It keeps {margin:.1f} mm of clearance up to t = {t:.4g} s ({far:.1f} mm) and in a stop from there "
             "({stop:.2f} s): end the path there, with the tool at x, y, z = {xyz} mm and roll, pitch, yaw = {rpy} deg "
@@ -661,7 +669,8 @@ def whole_pace(path: model.PathSummary) -> str:
     if path.strategy != "slow" or speed is None or acceleration is None or not _only_too_fast(path):
         return ""
     longer = PACE_MARGIN * max(1.0, speed, acceleration**0.5)
-    return sentence("advice.slower", percent=100 / longer, needed=path.duration_s * longer)
+    form = "advice.slower" if path.times_in == "path_file" else f"advice.slower#{path.times_in}"
+    return sentence(form, percent=100 / longer, needed=path.duration_s * longer, longer=longer)
 
 
 def _within_reach(path: model.PathSummary) -> str:

@@ -29,7 +29,9 @@ from er3a.pipeline.messages.calibration import (
     file_text,
     held_back_warning,
     idle_texts,
+    not_examined_texts,
     residual_texts,
+    scale_texts,
     term_kind,
     warning_texts,
 )
@@ -121,7 +123,7 @@ def write_calibration(
     text = robot_text(robot_file(corrected))
     comparison = compare(robot, found.robot, tolerance_mm=1e-3, tolerance_deg=1e-3)
     residuals = found.beyond.residuals if found.beyond else found.residuals
-    beside = held_back_warning(found, measurements, held_back)
+    beside = [*held_back_warning(found, measurements, held_back), *scale_texts(found)]
     table = str(files[0]) if len(files) > 1 else robot.name
     with house_style():
         page.render(
@@ -132,7 +134,7 @@ def write_calibration(
             arm=language.own_title(robot.title),
             verdict="fail" if not found.fits else "caution" if beside else "pass",
             conclusion=joined([say(found.conclusion), *beside], " "),
-            texts=_texts(found),
+            texts=_texts(found, held_back),
             figures=_figures(found, errors),
             errors=_errors(found, errors, held_back),
             recording=recording,
@@ -157,7 +159,7 @@ def write_calibration(
         )
 
 
-def _texts(found: Calibration) -> list[str]:
+def _texts(found: Calibration, held_back: Sequence[Measurement]) -> list[str]:
     texts = [
         tr(
             "{settled} of {all} numbers are settled by {coordinates} coordinates at {poses} poses.",
@@ -172,7 +174,7 @@ def _texts(found: Calibration) -> list[str]:
     ]
     if found.more:
         texts.append(say(found.more))
-    return texts
+    return texts + [tr("Not examined: {what}.", what=each) for each in not_examined_texts(found, held_back)]
 
 
 def _figures(found: Calibration, errors: MeasuredErrors) -> list[ShownFigure]:

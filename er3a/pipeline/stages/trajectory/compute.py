@@ -41,6 +41,7 @@ from er3a.pipeline.stages.trajectory.motion import (
     listed_motions,
     planning_of,
     proof_requirements,
+    times_in,
 )
 from er3a.pipeline.stages.trajectory.written_programs import near_assumed_shapes, program_files
 from er3a.pipeline.study import Study
@@ -303,6 +304,7 @@ def path_summary(
         name=entry.name,
         title=entry.title,
         kind=entry.kind,
+        times_in=times_in(entry),
         verdict=judgement.verdict_of(found, along),
         expect=entry.expected,
         in_joint_space=followed is None,

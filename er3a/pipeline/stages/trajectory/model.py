@@ -27,6 +27,7 @@ from er3a.planning.tool_proof import Undecided
 from er3a.planning.way_around import NoWayAround
 
 PathKind = Literal["joint", "joint_sequence", "line", "arc", "sequence", "table", "plan"]
+TimesIn = Literal["path_file", "table", "program"]
 FASTEST: Literal["fastest"] = "fastest"
 """In the table of strategies: the path itself, as fast as the joints can."""
 
@@ -288,6 +289,7 @@ class PathSummary:
     avoidance : the strategies tried; none where the path is safe
     strategy : the one to take
     of_program : what the check of the program that it is of finds, of at least caution, and the path does not show
+    times_in : what gives its times: the path file, a table, or a program
     """
 
     name: str
@@ -326,6 +328,7 @@ class PathSummary:
     clear_until: ClearUntil | None = None
     sound_end: SoundEnd | None = None
     of_program: tuple[FindingAt, ...] = ()
+    times_in: TimesIn = "path_file"
 
     @property
     def fastest_joint(self) -> int | None:

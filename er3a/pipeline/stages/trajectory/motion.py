@@ -13,7 +13,7 @@ import scipy
 from er3a.collision.along import RateBounds
 from er3a.collision.bodies import Bodies
 from er3a.errors import InputError, NotWristPartitionedError, PoseError
-from er3a.files.path_file import PathEntry, ProgramPath, load_paths
+from er3a.files.path_file import PathEntry, ProgramPath, TablePath, load_paths
 from er3a.files.units import joint_values
 from er3a.kinematics.by_class import arm_solver
 from er3a.kinematics.forward import forward, jacobian
@@ -23,6 +23,7 @@ from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.results import LeftOut, LeftOutSubject
 from er3a.pipeline.settings import TrajectorySettings
+from er3a.pipeline.stages.trajectory.model import TimesIn
 from er3a.pipeline.study import Study
 from er3a.planning.class_follow import PathEndsError, follow_by_class
 from er3a.planning.commands import Built, Command, CommandSource, PlanCommand, build
@@ -63,6 +64,13 @@ class PartOfProgram:
 
 
 PlannedEntry = PathEntry | PartOfProgram
+
+
+def times_in(entry: PlannedEntry) -> TimesIn:
+    """Where the times of a path stand."""
+    if isinstance(entry, PartOfProgram):
+        return "program"
+    return "table" if isinstance(entry, TablePath) and entry.duration_s is None else "path_file"
 
 
 def planned_entries(

@@ -23,7 +23,7 @@ from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.si_units import from_si, stated
-from er3a.pipeline.results import Figure, LeftOut, Verdict
+from er3a.pipeline.results import Figure, LeftOut, LeftOutSubject, Verdict
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, pass_of, unmet_expectations
 from er3a.pipeline.stages.left_out import (
@@ -129,6 +129,7 @@ LONGEST_NAME = 24
 GRIPPER_S = 1.0
 CLOSE = "close the gripper here"  # in a controller's file, which is plain ASCII
 SIMULATED = "the camera is simulated: put in the position that a real one measures before you run this"
+FRAMES_OPEN = "no joint values tell whether the camera was calibrated with the flange's poses, in the arm's base"
 NO_LOAD = "whether the arm may carry the object was not examined"
 CSV_POINTS = 41
 
@@ -142,14 +143,16 @@ def grasp_programs(
     *,
     speed: Reals,
     simulated: bool,
+    frames_open: bool = False,
 ) -> model.GraspPrograms:
     """A grasp in each language that has this arm's joints.
 
-    ``speed`` : (n,), the joints' greatest, rad/s or m/s; ``simulated``: whether the camera is.
+    ``speed`` : (n,), the joints' greatest, rad/s or m/s; ``simulated``: whether the camera is;
+    ``frames_open``: whether it was calibrated with recorded poses alone
     """
     own = program_name(f"grasp_{name}", LONGEST_NAME)
     what = f"grasp {ascii_text(chosen.grasp)} of {ascii_text(name)} by {ascii_text(robot.title)}, from where it waits"
-    head = (what, *([SIMULATED] if simulated else []), NO_LOAD)
+    head = (what, *([SIMULATED] if simulated else []), *([FRAMES_OPEN] if frames_open else []), NO_LOAD)
     rows: list[tuple[str, str, str]] = []
     for language in languages:
         if not_written(language, robot):
@@ -375,7 +378,7 @@ def compute(study: Study, name: str) -> model.VisionResults:
     to_add = _view_to_add(robot, found, task_file, head.board_mm, scene=scene, seed=seed)
     table = correct_table(found, robot, head.table_corrections) if head.table_corrections else None
     calibration = calibration_result(head, found, to_add, offset, table, images)
-    doubt = _doubt(calibration, found.touch)
+    doubt, frames = _doubt(calibration, found.touch), _open_frames(found, head)
     planned = []
     if not doubt:
         limits = (limits_of(robot, motions), study.seed)
@@ -395,7 +398,7 @@ def compute(study: Study, name: str) -> model.VisionResults:
         calibration=calibration,
         objects=objects,
         not_examined=(
-            *_left_out(calibration, task_file, unseen_zeros, least_zero),
+            *_left_out(calibration, task_file, unseen_zeros, least_zero, frames),
             *left_out_of_collisions(robot, bodies, scene, 1000 * DEPTH, q_deg=ways.q_deg),
             *left_out_of_rates(speeds_given(robot), *_rates_given(motions)),
             *left_out_in_solids(scene, _places(robot, task_file, found, picture)),
@@ -415,9 +418,8 @@ def compute(study: Study, name: str) -> model.VisionResults:
         camera_covariance=np.mean([each.standard_deviation.covariance() for each in task_file.objects], axis=0),
         cells=settings.map_cells,
     )
-    written = partial(
-        grasp_programs, speed=limits_of(robot, motions).speed, languages=motions.programs, simulated=head.simulated
-    )
+    speed, languages, is_open = limits_of(robot, motions).speed, motions.programs, bool(frames)
+    written = partial(grasp_programs, speed=speed, languages=languages, simulated=head.simulated, frames_open=is_open)
     return model.VisionResults(
         summary,
         sample_rows(found, robot),
@@ -460,10 +462,30 @@ def _without_calibration(summary: model.VisionSummary) -> model.VisionResults:
     )
 
 
+def _open_frames(found: HandEye, head: HandEyeFile) -> tuple[LeftOutSubject, ...]:
+    """Of which frames grasps rest on recorded poses that no joint values are compared with.
+
+    A tool's pose in place of the flange's moves a camera on the flange by as much, and what it sees of the base not at
+    all, so touched points agree. A fixed camera stays where it is, in the frame that poses and touched points are in.
+    """
+    if head.simulated or found.samples.states_joints:
+        return ()
+    if head.setup == "eye_in_hand":
+        return ("flange_poses",)
+    return ("base_poses",) if found.touch is None else ()
+
+
 def _left_out(
-    found: model.CalibrationResult, file: VisionFile, zeros: tuple[str, ...], least_zero: float
+    found: model.CalibrationResult,
+    file: VisionFile,
+    zeros: tuple[str, ...],
+    least_zero: float,
+    frames: tuple[LeftOutSubject, ...] = (),
 ) -> Iterator[LeftOut]:
-    """What the calibration does not rest on, what nothing checks it against, and what grasps leave open."""
+    """What the calibration does not rest on, what nothing checks it against, and what grasps leave open.
+
+    ``frames``: as :func:`_open_frames` gives them.
+    """
     places = np.array([each.pose()[:3, 3] for each in file.objects])
     seen = in_sight(file.view.view(NO_BOARD), places)
     if hidden := tuple(each.name for each, visible in zip(file.objects, seen) if not visible):
@@ -488,6 +510,7 @@ def _left_out(
         yield LeftOut("small_joint_zeros", amount=least_zero)
     if found.touch is None:
         yield LeftOut("touched_points")
+    yield from (LeftOut(subject) for subject in frames)
     yield LeftOut("detections")
     yield LeftOut("gripped_parts")
 
