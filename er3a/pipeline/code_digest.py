@@ -83,6 +83,7 @@ def _public() -> dict[str, str]:
     return {}
 
 
+@cache
 def _file(module: str) -> Path | None:
     path = _ROOT.joinpath(*module.split(".")).with_suffix(".py")
     return path if module.partition(".")[0] == _PACKAGE.name and path.is_file() else None
