@@ -215,7 +215,9 @@ def test_soft_limits_of_a_safety_controller_hold_the_joint(tmp_path):
 
     held = arm('k_velocity="1" soft_lower_limit="-1" soft_upper_limit="2.5"')
     np.testing.assert_allclose(np.stack([held.robot.lower, held.robot.upper])[:, 0], [-1, 2])
-    assert sum("soft limits -1 to 2.5 (safety_controller): its limits are held to -1 to 2" in n for n in held.notes) == 5
+    assert (
+        sum("soft limits -1 to 2.5 (safety_controller): its limits are held to -1 to 2" in n for n in held.notes) == 5
+    )
     unsaid = arm('k_velocity="1"')  # the specification's 0 and 0 are meant by nobody
     np.testing.assert_allclose(unsaid.robot.upper[0], 2)
     beyond = arm('soft_lower_limit="3" soft_upper_limit="4"')
