@@ -6,6 +6,7 @@ import difflib
 import re
 import warnings
 from collections.abc import Iterable, Iterator
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -123,6 +124,19 @@ def vanished(text: str, value: float) -> bool:
     return value == 0 and re.search("[1-9]", text.lower().partition("e")[0]) is not None
 
 
+@lru_cache(maxsize=128)
+def _content(text: str) -> Any:
+    """What a text holds; the start of a run reads the file of each robot a dozen times."""
+    return yaml.load(text, Loader=_PlainLoader)
+
+
+def _own(content: Any) -> Any:
+    """Lists and mappings of one's own, which may be changed."""
+    if isinstance(content, dict):
+        return {key: _own(value) for key, value in content.items()}
+    return [_own(value) for value in content] if isinstance(content, list) else content
+
+
 def read_yaml(path: str | Path) -> dict[str, Any]:
     """Read a YAML file whose top level is a mapping.
 
@@ -134,7 +148,7 @@ def read_yaml(path: str | Path) -> dict[str, Any]:
     path = Path(path)
     text = read_text(path, MAX_YAML_BYTES)
     try:
-        data = yaml.load(text, Loader=_PlainLoader)
+        data = _own(_content(text))
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
         where = f"line {mark.line + 1}, column {mark.column + 1}" if mark else None

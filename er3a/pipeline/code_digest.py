@@ -30,8 +30,13 @@ def code_digest(*modules: str) -> str:
             raise ModuleNotFoundError(f"er3a has no module '{module}'")
     digest = hashlib.sha256()
     for path in sorted(_sources(modules)):
-        digest.update(path.relative_to(_PACKAGE).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
+        digest.update(_named_source(path))
     return digest.hexdigest()
+
+
+@cache
+def _named_source(path: Path) -> bytes:
+    return path.relative_to(_PACKAGE).as_posix().encode() + b"\0" + path.read_bytes() + b"\0"
 
 
 def _sources(modules: Iterable[str]) -> set[Path]:
@@ -83,6 +88,7 @@ def _public() -> dict[str, str]:
     return {}
 
 
+@cache
 def _file(module: str) -> Path | None:
     path = _ROOT.joinpath(*module.split(".")).with_suffix(".py")
     return path if module.partition(".")[0] == _PACKAGE.name and path.is_file() else None

@@ -138,3 +138,14 @@ def test_models_are_frozen(write):
     whole = load(Whole, write("kind: whole\n"))
     with pytest.raises(ValueError, match="frozen"):
         whole.count = 2
+
+
+def test_who_reads_a_file_may_change_what_it_holds(tmp_path):
+    path = tmp_path / "a.yaml"
+    path.write_text("list: [1, {key: [2]}]\n", encoding="utf-8")
+    first = read_yaml(path)
+    first["list"][1]["key"].append(3)
+    first["other"] = first.pop("list")
+    assert read_yaml(path) == {"list": [1, {"key": [2]}]}
+    path.write_text("list: [4]\n", encoding="utf-8")
+    assert read_yaml(path) == {"list": [4]}

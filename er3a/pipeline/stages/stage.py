@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Protocol
 
 from er3a.by_value import Finding
+from er3a.errors import ResultError, WriteError
+from er3a.files.kept_files import read_checked, write_checked
 from er3a.files.robot_library import LoadFields
 from er3a.files.yaml_file import StrictModel
 from er3a.numerics.jit import cache_folder
@@ -93,10 +96,17 @@ class Stage:
 
     @property
     def tables(self) -> list[str]:
-        """The names of the stage's tables."""
+        """The names of the stage's tables; noted beside the kernels, as Snakemake would import all models for them."""
+        digest = code_digest(f"{self.package}.model", "er3a.pipeline.tables")[:16]
+        noted = cache_folder() / "tables" / f"{self.name}-{digest}"
+        with suppress(OSError, ResultError):
+            return read_checked(noted).decode().split()
         from er3a.pipeline.tables import table_types
 
-        return list(table_types(self.module("model").RESULTS))
+        names = list(table_types(self.module("model").RESULTS))
+        with suppress(WriteError):
+            write_checked(noted, " ".join(names).encode())
+        return names
 
     @property
     def messages(self) -> str:
