@@ -499,13 +499,15 @@ class Writer(ABC):
         return float(moved[lead] / self._greatest_speed(lead) / seconds)
 
     def leading_joint_speed(self, ready: ReadyMotion) -> float | None:
-        """The speed of a joint motion as that of the joint that moves most, rad/s."""
+        """The speed of a joint motion as that of the joint that moves most, rad/s; the mean one where it has a time."""
         speed = ready.motion.speed
-        if speed is None or speed.value <= 0 or speed.unit not in ("share", "rad/s"):
+        if speed is None or speed.value <= 0 or speed.unit not in ("share", "rad/s", "s"):
             return None
         if speed.unit == "rad/s":
             return speed.value
         moved = _moved(ready)
+        if speed.unit == "s":
+            return None if moved is None else float(moved.max()) / speed.value
         return speed.value * self._greatest_speed(0 if moved is None else int(np.argmax(moved)))
 
     def _speed_of(self, joint: int) -> tuple[float, str]:
@@ -681,6 +683,12 @@ def short(value: float, digits: int = 6) -> str:
     """A number with up to so many digits after the point, at least one."""
     text = fixed(value, digits).rstrip("0")
     return text + "0" if text.endswith(".") else text
+
+
+def cut(value: float, digits: int = 6) -> str:
+    """The same, never more than the number: a zone of half a motion must not become larger than that."""
+    size: float = 10.0**digits
+    return short(math.floor(value * size * (1 + 1e-12)) / size, digits)
 
 
 def principal_axes(load: MassBody) -> tuple[Reals, Reals]:

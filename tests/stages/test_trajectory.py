@@ -17,6 +17,7 @@ import yaml
 from er3a.collision.pairs import LinkAndSolid, PairOverlaps
 from er3a.errors import InputError
 from er3a.files.path_file import ProgramPath
+from er3a.files.program_file import load_programs
 from er3a.files.robot_library import load_robot
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
@@ -60,6 +61,8 @@ from er3a.planning import tool_proof
 from er3a.planning.avoidance.strategies import STRATEGIES
 from er3a.planning.commands import CommandSource
 from er3a.planning.motion_faults import AboveLimit
+from er3a.program_check.check_program import CheckOptions, check_program
+from er3a.programs.languages import read_program
 from testing.arms import scara
 from testing.on_demand import OnDemand
 from testing.readme import README, answer
@@ -763,3 +766,27 @@ def test_study_and_path_files_give_joints_that_slide_in_mm(monkeypatch):
     with pytest.raises(InputError, match="not checked here"):
         list(planned_entries(task, entry, CommandSource(Path("paths.yaml"), "paths[0]"), near_singular(settings)))
     np.testing.assert_allclose(starts[0], [*np.radians([500.0, -20.0]), 0.15, 0.0])
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["er3a_c60", "er3_600"])
+def test_every_program_that_is_written_passes_the_check_of_programs(stored, study, tmp_path, name):
+    files = stored[name].results.programs
+    for file, text in zip(files.file, files.text):
+        (tmp_path / file).write_text(text, encoding="utf-8")
+    options = CheckOptions(
+        frames=load_programs(study.entry(name).programs).transforms(),
+        scene=study.scene(name, "trajectory"),
+        joint_limits=limits_of(study.robot(name), study.section(TrajectorySettings)),
+    )
+    checked = 0
+    for file in (each for each in files.file if each.endswith((".src", ".script", ".pgm", ".mod"))):
+        program = read_program(tmp_path / file)
+        first = next(iter(check_program(program, study.robot(name), replace(options, measures=False)).motions.values()))
+        found = check_program(program, study.robot(name), replace(options, start=first.end))
+        wrong = {each.finding.code for each in found.findings if each.level in ("caution", "fail")}
+        # A path near assumed shapes says so itself; a repair may lead through a singular pose, or turn a joint back.
+        of_repair = {"configuration_changes", "whole_turn"} if "_repaired" in file else set()
+        assert wrong <= {"clear_of_assumed"} | of_repair, file
+        checked += 1
+    assert checked >= 6

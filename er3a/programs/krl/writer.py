@@ -148,7 +148,7 @@ class KrlWriter(writing.Writer):
             return ""
         word, variable, value = found
         if variable:
-            self.set_once(variable, f"{variable}={writing.short(value, 3)}")
+            self.set_once(variable, f"{variable}={writing.cut(value, 3)}")
         return f" {word}"
 
 

@@ -171,7 +171,7 @@ class RapidWriter(writing.Writer):
             return "fine"
         size = zone.value * 1000
         name = next((name.lower() for name, sizes in data_types.ZONES.items() if abs(sizes[0] - size) < 1e-9), "")
-        own, wide, turn = (writing.short(share * size) for share in (1.0, 1.5, 0.15))
+        own, wide, turn = (writing.cut(share * size) for share in (1.0, 1.5, 0.15))
         return name or f"[FALSE,{own},{wide},{wide},{turn},{wide},{turn}]"
 
     def _set_before(self, motion: instructions.ArmMotion) -> None:

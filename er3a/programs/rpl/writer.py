@@ -144,9 +144,20 @@ class RplWriter(Writer):
         speed = self._speed(ready)
         longest = (ready.length or 0.0) / len(targets) / 2
         passing = Zone("distance", min(max(longest, MIN_CHORD_ZONE), MAX_CHORD_ZONE))
+        last = motion.zone
+        if last.kind == "distance" and last.value > passing.value:  # a zone takes half of a line at most
+            last = passing
+        self._shorten_zone(passing)
         for i, target in enumerate(targets):
-            zone = motion.zone if i == len(targets) - 1 else passing
-            self._move("mlin", target, motion, speed, zone)
+            self._move("mlin", target, motion, speed, last if i == len(targets) - 1 else passing)
+
+    def _shorten_zone(self, most: Zone) -> None:
+        """Make the zone of the motion before no larger than one."""
+        before = self.items[-1] if self.items else None
+        found = ZONE.match(dict(before.parts).get("zone", "")) if before is not None else None
+        if before is not None and found and float(found[1]) > most.value * 1000:
+            parts = tuple((key, self._zone(most) if key == "zone" else text) for key, text in before.parts)
+            self.items[-1] = RplItem(before.kind, parts)
 
     def _speed(self, ready: ReadyMotion) -> str:
         """The name of a speed: the one that was read, or the next slower one."""

@@ -11,6 +11,8 @@ from er3a.programs.urscript.dialect import DEFAULTS
 from er3a.robots.masses import MassBody
 
 DIGITS = 9
+TIMED_RAMP = 1 / 3
+"""Share of a motion's time in which it gets to its speed, where that time alone is given."""
 
 
 class UrScriptWriter(writing.Writer):
@@ -19,6 +21,7 @@ class UrScriptWriter(writing.Writer):
     languages = ("urscript",)
     longest_name = 40
     indent = "  "
+    stops = False  # whether the arm stops where the program has a zone that URScript has not
     loop = ("while (True):", "end")
     wait = ("sleep({})", 'popup("Go on?", "Program", False, False, blocking=True)', "{}")
 
@@ -114,14 +117,20 @@ class UrScriptWriter(writing.Writer):
         self.set_once("tcp", f"set_tcp({_pose_text(tool.pose)})")
 
     def _speed(self, ready: writing.ReadyMotion, form: str) -> str:
-        """Acceleration and speed, or the motion's time."""
+        """Acceleration and speed, or the motion's time, unless that is too short for a motion from rest to rest."""
         motion = ready.motion
         usual_a, usual_v = DEFAULTS[form]
         joint = motion.kind == "joint"
         given = motion.acceleration
         a = given.value if given is not None and given.unit == ("rad/s2" if joint else "m/s2") else usual_a
         speed = motion.speed
-        if speed is not None and speed.unit == "s" and form in ("movej", "movel") and speed.value > 0:
+        stops, self.stops = self.stops, motion.zone.kind not in ("fine", "distance")
+        timed = speed is not None and speed.unit == "s" and speed.value > 0
+        if speed is not None and timed and form == "movej" and (stops or self.stops or self._is_short(ready)):
+            self.count["estimated"] += 1
+            v = self.leading_joint_speed(ready)
+            return f", a={writing.short(a)}, v={writing.short(usual_v if v is None else v)}"
+        if speed is not None and timed and form in ("movej", "movel"):
             return f", a={writing.short(a)}, t={writing.short(speed.value)}"
         v = self.leading_joint_speed(ready) if joint else writing.tool_speed(ready)
         if v is None and joint and (seconds := writing.duration(ready)) is not None:
@@ -130,10 +139,18 @@ class UrScriptWriter(writing.Writer):
             self.count["estimated"] += 1
         return f", a={writing.short(a)}, v={writing.short(v if v is not None and v > 0 else usual_v)}"
 
+    def _is_short(self, ready: writing.ReadyMotion) -> bool:
+        """Whether a joint would be too fast if it moved in the motion's time with ramps of a third of it each."""
+        speed, before, after = ready.motion.speed, ready.joints_before, ready.joints
+        if speed is None or before is None or after is None or self.robot is None:
+            return False
+        peak = np.abs(after - before) / speed.value / (1 - TIMED_RAMP)
+        return any(float(each) > self._speed_of(joint)[0] for joint, each in enumerate(peak))
+
     def _zone(self, ready: writing.ReadyMotion) -> str:
         zone = ready.motion.zone
         if zone.kind == "distance" and zone.value > 0:
-            return f", r={writing.short(zone.value)}"
+            return f", r={writing.cut(zone.value)}"
         self.count["zones"] += zone.kind != "fine"
         return ""
 
