@@ -22,6 +22,8 @@ MAX_BYTES = 50_000_000
 
 Lines = list[tuple[int, list[str]]]
 """Fields of a file's lines, with the lines' numbers."""
+OWN_HEAD = re.compile(r"(?m)^# er3a: .*$")
+"""Remarks at the head of a table of motion that er3a has written."""
 
 
 class Written(float):
@@ -93,6 +95,11 @@ def read_header(path: str | Path) -> list[str]:
     return [name.strip() for name in lines[0][1]] if lines else []
 
 
+def is_own(path: str | Path) -> bool:
+    """Whether er3a has written a table of motion, with its remarks at the head, joints and where these put the tool."""
+    return OWN_HEAD.match(read_text(Path(path), MAX_BYTES)) is not None
+
+
 def read_column(path: str | Path, column: str) -> list[str]:
     """The texts in a column of a CSV file that has been checked, [] if it has no such column."""
     (_, header), *rows = read_lines(Path(path))
@@ -103,9 +110,10 @@ def read_column(path: str | Path, column: str) -> list[str]:
 def read_lines(path: Path) -> Lines:
     """Lines of a CSV file that aren't blank, with their numbers; the first is the header.
 
-    Spreadsheets of some countries separate by semicolons and write decimal commas, which are read as points.
+    Spreadsheets of some countries separate by semicolons and write decimal commas, which are read as points. The head
+    of a table of motion that er3a has written is left out.
     """
-    text = read_text(path, MAX_BYTES)
+    text = OWN_HEAD.sub("", read_text(path, MAX_BYTES))
     header = text.lstrip().partition("\n")[0]
     mark = next((each for each in ";\t" if each in header and "," not in header), ",")
     reader = csv.reader(io.StringIO(text), strict=True, delimiter=mark)

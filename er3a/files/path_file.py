@@ -28,7 +28,7 @@ import scipy
 from pydantic import BeforeValidator, Field, model_validator
 
 from er3a.errors import InputError
-from er3a.files.csv_file import CHECKED_COLUMN, UNITS_CHECKED, CsvColumn, read_csv, read_header
+from er3a.files.csv_file import CHECKED_COLUMN, UNITS_CHECKED, CsvColumn, is_own, read_csv, read_header
 from er3a.files.kept_files import given_file
 from er3a.files.robot_file import Name, Text
 from er3a.files.target_file import FORMS, KNOWN_FORMS, POSITION, Orientation
@@ -105,6 +105,9 @@ def read_path_table(path: str | Path) -> PathTable:
         repeated = _repeated(path, np.abs(np.diff(values, axis=0)).max(axis=1))
         return PathTable(path, np.arange(1, len(values) + 1), at, None, values, repeated, None, unread)
     header = set(read_header(path))
+    of_pose = {*POSITION, *(name for columns in FORMS.values() for name in columns)}
+    beside = header & of_pose if is_own(path) else set()  # where the joints put the tool
+    header -= beside
     forms = [form for form, columns in FORMS.items() if header & set(columns)]
     own = _joint_columns(path, header)
     of_joints = bool(own)
@@ -120,7 +123,7 @@ def read_path_table(path: str | Path) -> PathTable:
         raise InputError(path, "header", f"the table has {problem}", remedy)
     columns = own if of_joints else (*POSITION, *FORMS[forms[0]])
     timed = {"t_s": CsvColumn()} if "t_s" in header else {}
-    rows = read_csv(path, timed | {name: CsvColumn() for name in columns} | CHECKED_COLUMN)
+    rows = read_csv(path, timed | {name: CsvColumn() for name in (*columns, *sorted(beside))} | CHECKED_COLUMN)
     if len(rows) < 2:
         raise InputError(path, None, f"the path has {_points(len(rows))}", "Give at least two rows")
     if len(rows) > MAX_ROWS:

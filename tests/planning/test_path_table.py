@@ -10,7 +10,11 @@ from scipy.spatial.transform import Rotation
 
 from er3a.errors import DoubtfulUnit, InputError
 from er3a.files.path_file import read_path_table
+from er3a.files.robot_library import load_robot
 from er3a.geometry.transforms import transform
+from er3a.kinematics.forward import forward
+from er3a.programs.csv_program import write_csv
+from er3a.robots.joint_limits import joint_columns
 
 RPY = "x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg"
 POSES = [[300, -50, 250, 175, 5, 10], [320, 0, 250, 180, 10, 20], [300, 50, 260, 175, 0, 40]]
@@ -46,6 +50,17 @@ def test_joint_angles_and_times(tmp_path):
     table = read_path_table(write(tmp_path, header, [0, *[0.0] * 6], [1.5, 10, 20, 30, 40, 50, 60]))
     np.testing.assert_allclose(table.joints[1], np.radians([10, 20, 30, 40, 50, 60]))
     np.testing.assert_array_equal(table.times, [0, 1.5])
+
+
+def test_a_table_of_motion_that_er3a_has_written_is_read_by_its_joints(tmp_path):
+    robot = load_robot("er3a_c60")
+    times, q_deg = np.array([0.0, 0.5, 1.5]), np.array([[0, -10, -10, 0, -70, 0], [9, -8, -7, 6, -50, 4], [20.0] * 6])
+    poses = forward(robot, np.radians(q_deg))
+    (tmp_path / "a.csv").write_text(write_csv(times, q_deg, poses, ("er3a: path a", "er3a: b"), joint_columns(robot)))
+    table = read_path_table(tmp_path / "a.csv")
+    np.testing.assert_allclose(table.joints, np.radians(q_deg), atol=1e-8)
+    np.testing.assert_allclose(table.times, times)
+    assert table.rows.tolist() == [4, 5, 6]  # as an editor numbers them
 
 
 def test_joints_that_look_like_radians_are_doubted_unless_a_column_confirms_them(tmp_path):
