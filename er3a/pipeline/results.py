@@ -222,6 +222,7 @@ LeftOutSubject = Literal[
     "start_branches",
     "flange_poses",
     "base_poses",
+    "given_intrinsics",
 ]
 
 NEVER_A_PASS: frozenset[LeftOutSubject] = frozenset(

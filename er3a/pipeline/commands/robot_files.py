@@ -360,6 +360,7 @@ def hand_eye(
         LeftOut("touched_points"): found.touch is None,
         LeftOut("flange_poses"): recorded,
         LeftOut("base_poses"): recorded and found.touch is None,
+        LeftOut("given_intrinsics"): images is not None and images.views.shared is None,
         LeftOut("contradicted_table"): wrong,
     }
     not_examined = [bracketed(left_out_text(each), left_out_names(each)) for each, is_so in missed.items() if is_so]

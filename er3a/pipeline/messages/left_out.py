@@ -154,6 +154,10 @@ TEXTS = texts(
             "whether the recorded poses are the flange's, as the robot's table has it, and not a tool's: the samples "
             "hold no joint values to compare them with"
         ),
+        "left_out.given_intrinsics": (
+            "errors of the camera's intrinsics: the file gives them, and they count as exact; the intervals do not "
+            "include them"
+        ),
         "left_out.base_poses": (
             "whether the recorded poses are in the robot's own base, not in a frame set at its controller: the samples "
             "hold no joint values to compare them with, and no touched points are given"

@@ -262,6 +262,7 @@ def calibration_result(
         boardless=boardless,
         copies=found.copies,
         intrinsics_estimated=images is not None and images.views.shared is not None,
+        intrinsics_given=images is not None and images.views.shared is None,
     )
 
 
@@ -510,6 +511,8 @@ def _left_out(
         yield LeftOut("small_joint_zeros", amount=least_zero)
     if found.touch is None:
         yield LeftOut("touched_points")
+    if found.intrinsics_given:
+        yield LeftOut("given_intrinsics")
     yield from (LeftOut(subject) for subject in frames)
     yield LeftOut("detections")
     yield LeftOut("gripped_parts")

@@ -204,6 +204,7 @@ class CalibrationResult:
     copies : samples left out as exact copies of earlier ones
     open_tilts : images that leave open which way the board is tilted; boardless : images left out, without a board
     intrinsics_estimated : from the same images; the intervals include their errors
+    intrinsics_given : with the images, as exact
     """
 
     title: str
@@ -236,6 +237,7 @@ class CalibrationResult:
     boardless: tuple[BoardlessImage, ...] = ()
     copies: tuple[str, ...] = ()
     intrinsics_estimated: bool = False
+    intrinsics_given: bool = False
 
     @property
     def rejected(self) -> tuple[str, ...]:
