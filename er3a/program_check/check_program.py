@@ -110,8 +110,8 @@ class LocatedFinding:
     Attributes
     ----------
     calls : where the routines were called, the outermost first, when it was found first
-    times : how often the instruction was carried out with it; its numbers are of the worst time
-    step : number of the step that these were found at, None where it belongs to none; of a contact the first
+    times : how often the instruction was carried out with it; it says how far that goes at worst
+    step : number of the step that it was found at first, None where it belongs to none
     moment : s from the start of that step's motion, when it begins; None of what is about the motion as a whole
     joint_moves : (n,) each, deg: joint moves, one or two, that take the tool where that motion does, and pass
     off_mm, off_deg : by how much the tool leaves that motion's line or arc on these; None of a joint motion
@@ -363,17 +363,16 @@ def _located(execution: Execution, robot: Robot, checker: StepChecker, end: int)
 
 
 def _at_worst(same: list[LocatedFinding]) -> LocatedFinding:
-    """One of like findings of an instruction: the worst; of contacts the first, with the greatest depths of all."""
-
-    def gravity(each: LocatedFinding) -> tuple[int, float]:
-        size = 0.0 if isinstance(each.finding, found_in.MotionCollides) else found_in.gravity(each.finding)
-        return found_in.RANKS[each.level], size
-
-    worst = max(same, key=gravity)
-    if isinstance(worst.finding, found_in.MotionCollides):
+    """One of like findings of an instruction: when and where it is so first, and how far it goes at worst."""
+    level = max((each.level for each in same), key=found_in.RANKS.__getitem__)
+    grave = [each for each in same if each.level == level]
+    first, found = grave[0], max((each.finding for each in grave), key=found_in.gravity)
+    if isinstance(first.finding, found_in.MotionCollides):
         others = [each.finding for each in same if isinstance(each.finding, found_in.MotionCollides)]
-        worst = replace(worst, finding=worst.finding.with_touches_of(others))
-    return replace(worst, times=len(same))
+        found = first.finding.with_touches_of(others)
+    elif (at_mm := getattr(first.finding, "at_mm", None)) is not None:
+        found = replace(found, at_mm=at_mm)  # type: ignore[call-arg]
+    return replace(first, finding=found, times=len(same))
 
 
 def _first_met(execution: Execution) -> dict[int, Step]:
