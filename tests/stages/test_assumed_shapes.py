@@ -109,6 +109,7 @@ def test_every_clearance_on_the_page_of_paths_is_called_that_of_assumed_shapes(s
         page = (tmp_path / "page.html").read_text(encoding="utf-8")
         assert page.count("mm clear of assumed shapes") == page.count("mm clear") * of_assumed
         assert ("Clearance is that of assumed shapes" in page) == of_assumed
+        assert ("Paths with a collision, of those meant to be safe, with assumed shapes" in page) == of_assumed
         for path in repaired:
             assert ("Clearance is that" in repair_text(path, shapes=found.verdict.shapes)) == of_assumed
 

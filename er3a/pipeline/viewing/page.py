@@ -287,6 +287,21 @@ def _missed(found: LeftOut, pages: Sequence[str] | None) -> tuple[str, str]:
     return left_out_text(found), named
 
 
+OF_SHAPES = frozenset(
+    (
+        *("free_of_collisions", "free_of_itself", "free_of_scene", "clear_places", "joined_places", "lost_volume"),
+        *("colliding", "least_clearance"),
+    )
+)
+"""Key figures that rest on the shapes of the arm."""
+
+
+def _figure_text(stage: str, name: str, text: str, assumed: bool) -> str:
+    """What a key figure is, with the grade of the shapes that it rests on; ``assumed``: whether these are."""
+    said = language.translated(f"{stage}.figure", text)
+    return tr("{figure}, with assumed shapes", figure=said) if assumed and name in OF_SHAPES else said
+
+
 def head_of(stored: Stored[Any], links: Mapping[str, str] | None = None, pages: Sequence[str] | None = None) -> Head:
     """The head of a stage's page; ``links`` as of :class:`Head`, ``pages``: of the robot."""
     verdict, stage = stored.results.summary.verdict, stored.stage
@@ -294,7 +309,7 @@ def head_of(stored: Stored[Any], links: Mapping[str, str] | None = None, pages: 
     shown = tuple(
         ShownFigure(
             figure.name,
-            language.translated(f"{stage}.figure", words[figure.name]),
+            _figure_text(stage, figure.name, words[figure.name], verdict.shapes is not None),
             figure.value,
             tr("of {total}", total=figure.of) if figure.of is not None else tr(figure.unit),
             figure.uncertainty,
