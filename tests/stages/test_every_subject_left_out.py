@@ -20,6 +20,7 @@ import yaml
 from er3a.collision.along import bodies_of
 from er3a.collision.scene import Scene, Sphere
 from er3a.errors import DoubtfulUnit
+from er3a.files.robot_file import Placement
 from er3a.files.robot_library import load_robot
 from er3a.files.vision_file import load_vision
 from er3a.kinematics.solutions import MANY_TARGETS, ByClass, ClosedForm, Iteration
@@ -28,6 +29,7 @@ from er3a.pipeline.messages.left_out import left_out_text
 from er3a.pipeline.results import LeftOut, LeftOutSubject
 from er3a.pipeline.stages.collision.compute import compute as collision
 from er3a.pipeline.stages.dynamics.compute import unknowns
+from er3a.pipeline.stages.dynamics.entry import DynamicsSettings
 from er3a.pipeline.stages.left_out import (
     left_out_of_collisions,
     left_out_of_limits,
@@ -214,6 +216,33 @@ def test_cells_that_are_all_found_are_not_listed(reached, clear, joined):
     assert tuple(own(places)) == (*lost, *unjoined, LeftOut("within_cells", amount=50.0))
 
 
+def a_motion(*, followed=True, known=True, rest: Listed = (), meant_safe=True) -> SimpleNamespace:
+    q = np.array([[0.0], [0.0 if known else np.nan]])
+    return of(name="a", motion=of(q=q) if followed else None, left_out=rest, meant_safe=meant_safe)
+
+
+@pytest.mark.parametrize(
+    ("solved", "many", "motion", "expected"),
+    [
+        (True, 1, a_motion(), ()),
+        (False, 1, a_motion(), (LeftOut("targets", ("near",)),)),
+        (True, 0, a_motion(), (LeftOut("turns", amount=0),)),
+        (True, 1, a_motion(followed=False), (LeftOut("paths", ("a",)),)),
+        (True, 1, a_motion(known=False), (LeftOut("path_stretches", ("a",)),)),
+        (True, 1, a_motion(rest=(LeftOut("program_rest", ("a: 3",)),)), (LeftOut("program_rest", ("a: 3",)),)),
+        (True, 1, a_motion(rest=(LeftOut("program_rest", ("a: 3",)),), meant_safe=False), ()),
+    ],
+)
+def test_clearances_of_targets_and_paths(study, tmp_path, monkeypatch, solved, many, motion, expected):
+    targets = {"kind": "targets", "targets": [{"name": "near", "q_deg": [0, -10, -10, 0, -70, 0]}]}
+    (tmp_path / "targets.yaml").write_text(yaml.safe_dump(targets), encoding="utf-8")
+    entry = study.robots[ROBOT].model_copy(update={"targets": str(tmp_path / "targets.yaml")})
+    made = study.model_copy(update={"robots": {ROBOT: entry}})
+    monkeypatch.setattr(STAGES["collision"].module("compute"), "MANY_TARGETS", many)
+    found = of(target=np.array(["near"] if solved else ["another"]))
+    assert left_out("collision", made, ROBOT, found, [motion]) == expected
+
+
 def of_collisions(robot: Robot, scene: Scene | None = None, **more) -> dict[str, LeftOut]:
     listed = left_out_of_collisions(robot, bodies_of(robot, scene), scene, **more)
     assert len({each.subject for each in listed}) == len(listed)
@@ -327,6 +356,21 @@ def test_torques(given, more):
     assert not differs(left_out("dynamics", load_robot(ROBOT), **settings), OF_TORQUES, more)
 
 
+@pytest.mark.parametrize(
+    ("gravity", "base", "expected"),
+    [
+        (9.81, Placement(xyz_mm=[0.0, 0.0, 500.0]), ()),
+        (9.81, None, (LeftOut("mounting"),)),
+        (1.62, Placement(xyz_mm=[0.0, 0.0, 500.0]), (LeftOut("other_gravity", amount=1.62),)),
+    ],
+)
+def test_weight(study, gravity, base, expected):
+    entry = study.robots[ROBOT].model_copy(update={"base": base})
+    made = study.model_copy(update={"robots": {ROBOT: entry}})
+    own = STAGES["dynamics"].module("compute")._weight
+    assert tuple(own(made, ROBOT, DynamicsSettings(gravity_m_s2=gravity))) == expected
+
+
 # --- workspace ---
 
 TASK = TaskSummary((300.0, 200.0, 50.0), (0.0, 0.0, -1.0), 15.0, 2.0, 0.0, 100.0)
@@ -385,6 +429,18 @@ def test_reach_and_what_the_tool_can_do(given, more, less):
     voids = [of(status=status) for status in own["voids"]]
     found = left_out("workspace", of(samples=700), proven, own["surface"], voids, tool)
     assert not differs(found, OF_TOOL, more, less)
+
+
+def test_a_tray_in_a_solid():
+    place = of(centre_m=(0.5, 0.0, 0.125), size_m=(0.2, 0.15, 0.05))
+    own, robot = STAGES["workspace"].module("compute")._in_solids, load_robot(ROBOT)
+    inside, beside = np.eye(4), np.eye(4)
+    inside[:3, 3], beside[:3, 3] = (0.5, 0, 0.125), (0.8, 0, 0.125)
+    for middle, expected in ((inside, (LeftOut("places_in_solids", ("1: ball",)),)), (beside, ())):
+        scene = Scene("a", (Sphere("ball", middle, 0.01),))
+        assert tuple(own(robot, scene, placed((place,)))) == expected
+        assert tuple(own(robot, None, placed((place,)))) == ()
+        assert tuple(own(robot, scene, PlacementTooLong(TASK))) == ()
 
 
 # --- validation ---
@@ -450,6 +506,14 @@ def test_a_table(given, more, less):
     settings = of(round_trips=400, reach_starts=3)
     rest = [own[name] for name in ("diagnoses", "calibrations", "trips", "evidence")]
     assert not differs(left_out("validation", settings, checks, *rest), OF_TABLE, more, less)
+
+
+def test_tool_and_base_of_the_study():
+    own, robot = STAGES["validation"].module("compute")._left_out_of_places, load_robot(ROBOT)
+    turned = np.diag([-1.0, -1.0, 1.0, 1.0])
+    for names in ((), ("tool",), ("base",), ("tool", "base")):
+        expected = (LeftOut("tool_and_base", names),) if names else ()
+        assert tuple(own(robot.replace(**dict.fromkeys(names, turned)), robot)) == expected
 
 
 # --- vision ---
