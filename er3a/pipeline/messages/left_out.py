@@ -77,7 +77,9 @@ TEXTS = texts(
         "left_out.jerk": "jerk: no limit is given",
         "left_out.torques": "torques, payload and deflection of the arm",
         "left_out.paths": "paths that were not followed to their end",
-        "left_out.path_stretches": "stretches that the computed bounds can't decide",
+        "left_out.path_stretches": (
+            "stretches of paths that the computed bounds can't decide, or along which no pose of the arm is known"
+        ),
         "left_out.strategies": "avoidance strategies that the study does not ask for",
         "left_out.program_lines": "lines of programs that were not examined, or not each time",
         "left_out.program_rest": "lines of programs that may move the arm but belong to no path checked",

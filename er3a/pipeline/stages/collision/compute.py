@@ -178,9 +178,7 @@ def compute(study: Study, name: str) -> model.CollisionResults:
             not_examined=(
                 *_of_collisions(bodies, scene, settings, _judged(closest, paths, motions)),
                 LeftOut("joint_vectors", amount=settings.samples),
-                LeftOut("lost_cells", amount=places_found.reached - places_found.clear),
-                LeftOut("unjoined_cells", amount=places_found.clear - places_found.joined),
-                LeftOut("within_cells", amount=1000 * places_found.cell_m),
+                *_left_out_of_places(places_found),
                 *_left_out(study, name, targets, motions),
                 *left_out_without_tool(robot),
             ),
@@ -216,6 +214,15 @@ def _nearest_target(closest: list[model.Closest]) -> model.NearestTarget | None:
         return None
     least = min(closest, key=lambda each: each.clearance_mm)
     return model.NearestTarget(least.name, least.clearance_mm, least.between)
+
+
+def _left_out_of_places(places: model.PlacesSummary) -> Iterator[LeftOut]:
+    """Cells of which the search leaves something open, if there are any, and what lies beside those found."""
+    if lost := places.reached - places.clear:
+        yield LeftOut("lost_cells", amount=lost)
+    if unjoined := places.clear - places.joined:
+        yield LeftOut("unjoined_cells", amount=unjoined)
+    yield LeftOut("within_cells", amount=1000 * places.cell_m)
 
 
 def _left_out(study: Study, name: str, found: model.TargetClearances, motions: list[ListedMotion]) -> Iterator[LeftOut]:
