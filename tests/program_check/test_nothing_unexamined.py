@@ -2065,3 +2065,29 @@ def test_the_sign_of_a_position_may_be_turned(tmp_path):
     plain = motions(tmp_path, rapid("MoveJ Offs(p,-10,20,29),v50,fine,tool0;", data=data), "a.mod")[-1]
     turned = motions(tmp_path, rapid(body, data=data), "a.mod")[-1]
     np.testing.assert_allclose(turned.target.pose, plain.target.pose)
+
+
+@pytest.mark.parametrize("line", ["INTERRUPT ON 21", "INTERRUPT ON", "INTERRUPT ENABLE 21"])
+def test_an_interrupt_that_no_file_declares_is_named_where_it_is_switched_on(tmp_path, line):
+    found = check(tmp_path, krl(f"{FRAMES}{line}\nPTP {axes(NEAR)}"), "a.src")
+    assert codes(found)["program_not_simulated"] == [4]
+    assert [(each.place.line, each.what) for each in found.not_examined] == [(4, "instruction")]
+    own = "INTERRUPT DECL 21 WHEN $STOPMESS==TRUE DO IR_STOPM ( )"
+    assert "program_not_simulated" not in codes(check(tmp_path, krl(f"{own}\n{line}\nPTP {axes(NEAR)}"), "a.src"))
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        *("IWatch i1;", "ISignalDI di1,1,i1;", "ITimer 5,i1;", "TriggInt t,5,i1;", "IPers n,i1;"),
+        "TriggL p,v50,t,fine,tool0;",
+    ],
+)
+def test_an_interrupt_or_trigger_that_no_module_sets_up_is_named(tmp_path, line):
+    data = "VAR intnum i1;\nVAR triggdata t;\n"
+    found = check(tmp_path, rapid(f"{line}\nMoveJ p,v50,fine,tool0;", data=data), "a.mod")
+    assert "program_not_simulated" in codes(found)
+    ready = "CONNECT i1 WITH tr1;\nTriggIO t,5\\DOp:=do1,1;\n"
+    more = 'TRAP tr1\nTPWrite "a";\nENDTRAP\n'
+    known = check(tmp_path, rapid(f"{ready}{line}\nMoveJ p,v50,fine,tool0;", more, data), "a.mod")
+    assert "program_not_simulated" not in codes(known)

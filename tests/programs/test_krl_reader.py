@@ -8,7 +8,7 @@ import pytest
 from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
-from er3a.programs.instructions import Aside, Decision, JointTarget, MovesBeside, Output, Pause, PoseTarget, Unknown
+from er3a.programs.instructions import Aside, Decision, JointTarget, Output, Pause, PoseTarget, Unknown
 from er3a.programs.languages import read_program
 from er3a.programs.machine import execute
 from er3a.programs.program_findings import DataFileMissing, NameTwice, NotUnderstood
@@ -231,7 +231,7 @@ def test_triggers_and_interrupts_move_nothing_unless_they_call(tmp_path):
     body += "\nTRIGGER WHEN PATH=0 DELAY=0 DO $OUT[1]=TRUE"
     body += "\nINTERRUPT DECL 4 WHEN $IN[1] DO flee()"
     kinds = [type(step.instruction) for step in run(tmp_path, body).steps]
-    assert kinds == [Aside, Aside, MovesBeside]
+    assert kinds == [Aside, Aside, Unknown]  # no file holds what it calls
 
 
 def test_a_missing_data_file_and_a_name_given_twice_are_findings(tmp_path):

@@ -153,7 +153,9 @@ SINGULAR: dict[SingularityType, str] = {
 TARGETS: dict[Unresolved, str] = {
     "too_far": N_("Write the target in the unit of the language: metres in URScript, mm in the others."),
     "undefined": N_("Give the target in the program or in its data file."),
-    "perhaps_changed": N_("Put the module that holds what is called beside the program, or give the target after it."),
+    "perhaps_changed": N_(
+        "Check the program together with the module that holds what is called, or give the target after the call."
+    ),
     "turns_with_arc": N_("Write the arc as several of less than half a turn each."),
 }
 STOPPED: dict[EndKind, str] = {
@@ -250,7 +252,7 @@ TEXTS = texts(
         ),
         "zone_too_large": (
             "the zone of {zone_mm:.1f} mm is larger than half of a motion of {motion_mm:.1f} mm: checked with half, "
-            "but a controller may round more, or leave the point out"
+            "but a controller may round more, or skip the point"
         ),
         "zone_without_size": "the size of the zone {zone} is not known; half of each motion was taken",
         "arc_has_no_circle": "the arc's points do not define a circle",

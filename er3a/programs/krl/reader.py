@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -678,6 +678,7 @@ def read_krl(source: ProgramText) -> syntax.Program:
         findings += reader.read_data(read_program_text(data_file))
     routines = reader.read_routines()
     findings += [*_robot_root(files.machine_data), *files.twice()]
+    findings += _interrupts_of_others(source, [text for each in files.modules if (text := files.source(each))])
     called: list[syntax.Routine] = []
     hidden = _seen_here_alone(source, routines, reader.data)
     shown = _global_names(data_file, (each for each in reader.data if each.place.file == data_file))
@@ -1017,6 +1018,21 @@ def _invocations(operation: syntax.Operation) -> Iterable[syntax.Invocation]:
         if isinstance(each, syntax.Invocation):
             yield each
         waiting += syntax.inner(each)
+
+
+INTERRUPT_ON = re.compile(r"(?i)\s*INTERRUPT\s+(?:ON|ENABLE)\b\s*([^;]*)")
+INTERRUPT_DECL = re.compile(r"(?i)\s*(?:GLOBAL\s+)?INTERRUPT\s+DECL\s+(\S+)")
+
+
+def _interrupts_of_others(source: ProgramText, called: Sequence[ProgramText]) -> Iterable[NotSimulated]:
+    """Lines of the program that switch interrupts on which no file that is read declares: a caller's, or a submit's."""
+    lines = [line for text in (source, *called) for line in text.lines]
+    declared = {match[1].upper() for line in lines if (match := INTERRUPT_DECL.match(line)) is not None}
+    for number, line in enumerate(source.lines, 1):
+        if (match := INTERRUPT_ON.match(line)) is not None:
+            asked = match[1].strip().upper()
+            if asked not in declared and not (declared and not asked.isdigit()):
+                yield NotSimulated(line.strip(), Place(source.path, number))
 
 
 ROBROOT = re.compile(r"(?i)\s*(?:(?:DECL|GLOBAL|CONST|FRAME)\s+)*\$ROBROOT(\.\w+)?\s*=\s*([^;]*)")

@@ -50,6 +50,10 @@ FOLLOWED: Mapping[str, tuple[set[str], ...]] = {
 }
 """Options with which some of these are followed. CirPathMode: an arc turns the tool with the path, as where nothing is
 said, or about one axis."""
+INTERRUPTING = frozenset(("IWATCH", "ITIMER", "IPERS", "IERROR", "IRMQMESSAGE", "TRIGGINT"))
+"""Instructions that, like ISignalDI, order an interrupt, whose number comes last: it runs the trap of its CONNECT."""
+TRIGGERS = frozenset(("TRIGGIO", "TRIGGEQUIP", "TRIGGINT", "TRIGGSPEED", "TRIGGCHECKIO", "TRIGGRAMPAO"))
+"""Instructions that say what happens on the way of a TriggL and its like."""
 SETTINGS = {
     **{name: f"%{name}" for name in ("CONFJ", "CONFL", "PATHACCLIM", "WORLDACCLIM")},
     **{"ACCSET": "%ACC", "VELSET": "%SPEED", "CIRPATHMODE": "%ARCS"},

@@ -270,6 +270,8 @@ def read_rapid(source: ProgramText) -> syntax.Program:
     by_name, unlinked = linked(
         routines, known_names.changed_arguments, lambda call: known_names.perhaps_changed(call, fixed)
     )
+    connected = {name for reader in readers for name in reader.connected}
+    findings += [each for reader in readers for name, each in reader.ordered if name not in connected]
     findings += _base_frames(source.path)
     findings += _event_routines(source.path, {each.text for cursor in cursors for each in cursor.tokens})
     entry = _entry(own, by_name)
@@ -502,6 +504,8 @@ class _ModuleReader:
         self.traps: set[str] = set()
         self.data: list[syntax.Assign] = []
         self.findings: list[ProgramFinding] = []
+        self.connected: set[str] = set()  # interrupts that a trap belongs to, and triggers that are set up
+        self.ordered: list[tuple[str, NotSimulated]] = []  # those that are asked for, with the line
         self.goes_on = any(each.text == "TRYNEXT" for each in cursor.tokens)
         self.types_at: list[int] = []
         self.data_at: list[int] = []
@@ -876,9 +880,16 @@ class _BodyReader:
         options = {key for key, _ in named}
         if name in known_names.NOT_SIMULATED and options not in known_names.FOLLOWED.get(name, ()):
             self.module.findings.append(NotSimulated(text, place))
+        if (name.startswith("ISIGNAL") or name in known_names.INTERRUPTING) and placed:
+            self.module.ordered.append((variable_of(placed[-1] or syntax.Constant(0)), NotSimulated(text, place)))
         if name in ("LOAD", "STARTLOAD") and not self._is_beside(placed, dict(named).get("FILE")):
             self.module.findings.append(NotSimulated(text, place))
+        if name in known_names.TRIGGERS and placed and placed[0] is not None:
+            self.module.connected.add(variable_of(placed[0]))
         if name in MOTIONS:
+            trigger = next(iter(placed[3 if name == "TRIGGC" else 2 :]), None)
+            if name in ("TRIGGL", "TRIGGC", "TRIGGJ", "TRIGGABSJ") and trigger is not None:
+                self.module.ordered.append((variable_of(trigger), NotSimulated(text, place)))
             if options - MOTION_OPTIONS:
                 self.module.findings.append(NotSimulated(text, place))
             builder.add(syntax.Move(place, name, placed, text, (), named))
@@ -1189,7 +1200,7 @@ def _leave(body: _BodyReader, place: Place, words: RapidWords, text: str) -> Non
 
 def _connect(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None:
     """``CONNECT number WITH trap;``"""
-    words.reference()
+    body.module.connected.add(variable_of(body.scope.settled(words.reference())))
     words.expect("WITH")
     name = words.name()
     words.finish()
