@@ -429,17 +429,17 @@ def _within_soft_limits(
     if soft is None or not any(key in soft.attrib for key in keys) or joint.get("type") not in MOVING:
         return limits
     least, most = (_numbers(path, where, soft, key, (0.0,))[0] for key in keys)
-    told = f"{where} has soft limits {least:g} to {most:g} (safety_controller)"
+    said = f"{where} has soft limits {least:g} to {most:g} (safety_controller)"
     if joint.get("type") == "continuous":
-        notes.append(f"{told}, but is continuous: they are not kept")
+        notes.append(f"{said}, but is continuous: they are not kept")
         return limits
     none_given = limits == (0, 0)
     lower, upper = (least, most) if none_given else (float(np.fmax(limits[0], least)), float(np.fmin(limits[1], most)))
     if lower >= upper:
-        notes.append(f"{told}, which leave nothing of its limits: they are not kept")
+        notes.append(f"{said}, which leave nothing of its limits: they are not kept")
         return limits
     if (lower, upper) != limits:
-        notes.append(f"{told}: its limits are held to {lower:g} to {upper:g}")
+        notes.append(f"{said}: its limits are held to {lower:g} to {upper:g}")
     return lower, upper
 
 

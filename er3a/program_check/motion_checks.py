@@ -32,12 +32,10 @@ from er3a.planning.sequences import TURN_LENGTH, Arc, ArcWithPath, arc
 from er3a.planning.timing import JointLimits
 from er3a.planning.tool_proof import ProofRequirements, ToolProof, follow_and_prove
 from er3a.program_check import program_check_findings as found_in
-from er3a.programs.instructions import ArmMotion, Rate, turn_beside_path
+from er3a.programs.instructions import RAMP_OF_A_DURATION, ArmMotion, Rate, turn_beside_path
 from er3a.robots.joint_limits import joint_shown
 from er3a.robots.robot import Robot
 from er3a.robots.whole_turns import LIMIT_TOLERANCE
-
-RAMP_OF_A_DURATION = 1 / 3  # of the time that a program gives for a motion, on the way up and on the way down
 
 
 @dataclass(frozen=True)

@@ -117,6 +117,8 @@ class Zone:
 
 
 FINE = Zone()
+RAMP_OF_A_DURATION = 1 / 3
+"""Share of the time that a program gives for a motion, on the way up and on the way down."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,13 +6,11 @@ import numpy as np
 
 from er3a.numerics.arrays import Reals
 from er3a.programs import writing
-from er3a.programs.instructions import Output, PoseTarget, numbers_of
+from er3a.programs.instructions import RAMP_OF_A_DURATION, Output, PoseTarget, numbers_of
 from er3a.programs.urscript.dialect import DEFAULTS
 from er3a.robots.masses import MassBody
 
 DIGITS = 9
-TIMED_RAMP = 1 / 3
-"""Share of a motion's time in which it gets to its speed, where that time alone is given."""
 
 
 class UrScriptWriter(writing.Writer):
@@ -140,11 +138,11 @@ class UrScriptWriter(writing.Writer):
         return f", a={writing.short(a)}, v={writing.short(v if v is not None and v > 0 else usual_v)}"
 
     def _is_short(self, ready: writing.ReadyMotion) -> bool:
-        """Whether a joint would be too fast if it moved in the motion's time with ramps of a third of it each."""
+        """Whether a joint would be too fast if it moved in the motion's time with ramps as check-program takes them."""
         speed, before, after = ready.motion.speed, ready.joints_before, ready.joints
         if speed is None or before is None or after is None or self.robot is None:
             return False
-        peak = np.abs(after - before) / speed.value / (1 - TIMED_RAMP)
+        peak = np.abs(after - before) / speed.value / (1 - RAMP_OF_A_DURATION)
         return any(float(each) > self._speed_of(joint)[0] for joint, each in enumerate(peak))
 
     def _zone(self, ready: writing.ReadyMotion) -> str:
