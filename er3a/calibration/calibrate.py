@@ -104,6 +104,7 @@ FAR_WIDEST = {"mm": 1.0, "deg": 2.0}
 FAR_REST = 0.004
 """Of an arm's whole length: a root mean square that no tracker leaves of an arm whose table is right."""
 AS_GOOD = 1.1  # times what the table leaves
+NEAR_STEPS = 15  # a table that is not far off is fitted in about four
 FEW_SPARE = 10
 """Degrees of freedom below which what remains says how large noise is, but not where; at least as many as numbers."""
 
@@ -743,7 +744,8 @@ def _wrong(robot: Robot, observations: PointObservations, found: Calibration) ->
     kept = [each.parameter for each in found.estimates]
     for swapped, opposite, columns in _mistakes(robot):
         with suppress(CalibrationError):
-            other = fit(robot, kept, replace(observations, row_values=observations.row_values @ columns.T))
+            turned = replace(observations, row_values=observations.row_values @ columns.T)
+            other = fit(robot, kept, turned, most_steps=NEAR_STEPS)
             rms = float(np.sqrt(np.mean((other.after * observations.deviation_mm) ** 2)))
             plain = np.full(len(kept), 0.0)
             if rms <= AS_GOOD * found.rms_after_mm and not _far_off(

@@ -354,11 +354,18 @@ def _base_at(robot: Robot, kept: Sequence[Parameter], observations: Observations
     return amounts
 
 
-def fit(robot: Robot, kept: Sequence[Parameter], observations: Observations, terms: Sequence[JointTerm] = ()) -> Fit:
+def fit(
+    robot: Robot,
+    kept: Sequence[Parameter],
+    observations: Observations,
+    terms: Sequence[JointTerm] = (),
+    most_steps: int = MAX_STEPS,
+) -> Fit:
     """Corrections, and coefficients of terms (of measured points only), that meet the observations best.
 
     Points that touch something may be met best by quite another arm, if they settle little or some are outliers. If the
     steps don't end, or end there, corrections are taken to be small (``PLAUSIBLE``), and none of them is settled.
+    ``most_steps``: where only small corrections are of interest, a few are enough.
 
     Raises
     ------
@@ -366,16 +373,21 @@ def fit(robot: Robot, kept: Sequence[Parameter], observations: Observations, ter
         if the steps don't end
     """
     if not (isinstance(observations, PointObservations) and observations.all_touched):
-        return _fit(robot, kept, observations, terms, 0.0)
+        return _fit(robot, kept, observations, terms, 0.0, most_steps)
     with suppress(CalibrationError):
-        found = _fit(robot, kept, observations, terms, 0.0)
+        found = _fit(robot, kept, observations, terms, 0.0, most_steps)
         if np.abs(found.amounts).max() < FAR_OFF * PLAUSIBLE:
             return found
-    return replace(_fit(robot, kept, observations, terms, 1 / PLAUSIBLE), ran_off=True)
+    return replace(_fit(robot, kept, observations, terms, 1 / PLAUSIBLE, most_steps), ran_off=True)
 
 
 def _fit(
-    robot: Robot, kept: Sequence[Parameter], observations: Observations, terms: Sequence[JointTerm], holding: float
+    robot: Robot,
+    kept: Sequence[Parameter],
+    observations: Observations,
+    terms: Sequence[JointTerm],
+    holding: float,
+    most_steps: int,
 ) -> Fit:
     """``holding``: by how much corrections are held at 0, per rad or m."""
     kept, terms, deviation = tuple(kept), tuple(terms), observations.deviation_mm
@@ -409,7 +421,7 @@ def _fit(
     unknowns = np.r_[start, np.zeros(len(prior))]
     before = weighted(np.zeros(k), unknowns[k:])[:n]
     rest = held(weighted(unknowns[:k], unknowns[k:]), unknowns[:k])
-    for number in range(MAX_STEPS):
+    for number in range(most_steps):
         here = corrected(robot, kept, unknowns[:k])
         J = slopes(here, unknowns[:k], unknowns[k:])
         J = np.vstack([J, holding * np.eye(k, len(unknowns))]) if holding else J
@@ -432,7 +444,7 @@ def _fit(
             )
     rest_mm = float(np.sqrt(np.mean((rest[:n] * deviation) ** 2)))
     raise CalibrationError(
-        NoCorrectionFits(MAX_STEPS, rest_mm),
-        f"no corrections make the table fit: after {MAX_STEPS} steps the positions are still {rest_mm:.3g} mm off. "
+        NoCorrectionFits(most_steps, rest_mm),
+        f"no corrections make the table fit: after {most_steps} steps the positions are still {rest_mm:.3g} mm off. "
         "The table has a gross fault or is another arm's; er3a.diagnose names single faults",
     )
