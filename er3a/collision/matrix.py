@@ -33,6 +33,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from itertools import combinations, compress, product
 from typing import Literal
 
@@ -232,6 +233,7 @@ class CollisionMatrix:
 
 
 @derived
+@lru_cache(maxsize=32)  # of equal robots too: who checks many programs loads the arm for each
 def collision_matrix(robot: Robot) -> CollisionMatrix:
     """The matrix of an arm without anything carried."""
     matrix = _judged_matrix(robot, list(combinations(arm_bodies(robot), 2)), robot.pair_rules)
