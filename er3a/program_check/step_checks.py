@@ -832,11 +832,8 @@ class StepChecker:
         move = instructions.ArmMotion(
             "joint", instructions.JointTarget(end), speed=speed, tool=placed.motion.tool, base=placed.motion.base
         )
-        found = self._checked(move, start)
-        return found.way is not None and found_in.worst_of(found_in.level_of(each) for each in found.findings) in (
-            "pass",
-            "note",
-        )
+        found = self._checked(move, start, measured=False)
+        return _good(found) and _good(self._measured(found))
 
     def _motion(self, motion: instructions.ArmMotion, before: Reals | None) -> CheckedMotion:
         key = (_key(motion), None if before is None else before.tobytes())
@@ -844,7 +841,8 @@ class StepChecker:
             self._known[key] = self._checked(motion, before)
         return self._known[key]
 
-    def _checked(self, motion: instructions.ArmMotion, before: Reals | None) -> CheckedMotion:
+    def _checked(self, motion: instructions.ArmMotion, before: Reals | None, measured: bool = True) -> CheckedMotion:
+        """``measured``: whether clearance along joint moves is, too."""
         placed = self.arms.placed(motion)
         goal = goal_of(placed, motion.target, before)
         findings: list[found_in.CheckFinding] = [*goal.findings, *_said(motion)]
@@ -875,7 +873,8 @@ class StepChecker:
             findings += () if goal.joints is None else limit_findings(placed.arm, goal.joints)
             return CheckedMotion(motion.kind, placed, None, None, goal.joints, tuple(findings))
         if motion.kind == "joint":
-            return self._joint_move(placed, goal, before, findings)
+            move = self._joint_move(placed, goal, before, findings)
+            return self._measured(move) if measured else move
         return self._tool_move(placed, goal, before, findings)
 
     def _joint_move(
@@ -893,7 +892,7 @@ class StepChecker:
         beyond = np.maximum(goal.joints - placed.arm.upper, placed.arm.lower - goal.joints).max()
         if beyond > TURN:  # no arm gets there, and nothing goes on from there
             return CheckedMotion("joint", placed, before, None, None, found, moments=way.moments)
-        return self._measured(CheckedMotion("joint", placed, before, way, way.end, found, moments=way.moments))
+        return CheckedMotion("joint", placed, before, way, way.end, found, moments=way.moments)
 
     def _tool_move(
         self, placed: PlacedMotion, goal: Goal, before: Reals, findings: list[found_in.CheckFinding]
@@ -1127,6 +1126,12 @@ def _vias(arm: Robot, start: Reals, end: Reals) -> Reals:
     away = np.zeros((len(VIA_TURNS) * len(turns), len(middle)))
     away[:, 1:3] = np.radians(np.kron(np.array(VIA_TURNS)[:, None], turns))[:, : len(middle) - 1]
     return _as_written(np.clip(middle + away, arm.lower, arm.upper))
+
+
+def _good(motion: CheckedMotion) -> bool:
+    """Whether a motion has a way and no finding more severe than a note."""
+    worst = found_in.worst_of(found_in.level_of(each) for each in motion.findings)
+    return motion.way is not None and worst in ("pass", "note")
 
 
 def _as_written(q: Reals) -> Reals:
