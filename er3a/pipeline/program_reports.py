@@ -233,9 +233,12 @@ def not_examined_line(checked: CheckedFile) -> str:
     }
     lines: dict[tuple[Path | None, str], list[int]] = {}
     for each in checked.check.not_examined:
-        lines.setdefault((each.place.file, words[each.what]), []).append(each.place.line)
+        if each.place.line:
+            lines.setdefault((each.place.file, words[each.what] + " "), []).append(each.place.line)
+        else:
+            lines[each.place.file, "the course of the whole"] = []
     parts = [
-        f"{what} {_line_ranges(found)}" + (f" of {shown(file)}" if file != checked.file else "")
+        f"{what}{_line_ranges(found)}" + (f" of {shown(file)}" if file != checked.file else "")
         for (file, what), found in lines.items()
     ]
     return f"{shown(checked.file)}: not examined, or not each time: {'; '.join(parts)}"

@@ -7,6 +7,7 @@ A language gives the regular expression of its words and the ranks of its operat
 from __future__ import annotations
 
 import codecs
+import os
 import re
 import stat
 from collections.abc import Mapping
@@ -281,12 +282,17 @@ def read_program_text(path: Path) -> ProgramText:
 
 
 def data_file_of(path: Path, suffix: str) -> Path | None:
-    """The file with the same name and another suffix beside a file, however its letters are written."""
+    """The file with the same name and another suffix beside a file, however the letters of both are written.
+
+    Controllers take ``HOME.src`` and ``home.dat`` for one module. One that is written as the file itself comes first.
+    """
     for name in (path.stem + suffix, path.stem + suffix.upper(), path.stem + suffix.capitalize()):
         beside = path.with_name(name)
         if beside.is_file():
             return beside
-    return None
+    meant = (path.stem + suffix).lower()
+    like = sorted(name for name in os.listdir(path.parent) if name.lower() == meant) if path.parent.is_dir() else []
+    return next((path.with_name(name) for name in like if path.with_name(name).is_file()), None)
 
 
 def decoded(raw: bytes, path: Path | None = None) -> tuple[str, str]:

@@ -9,7 +9,7 @@ import pytest
 
 from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
-from er3a.pipeline.program_reports import checked_file, json_of, lines_of, sarif_of
+from er3a.pipeline.program_reports import checked_file, json_of, lines_of, not_examined_line, sarif_of
 from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.programs.instructions import ArmMotion, JointTarget
 from er3a.programs.languages import files_of, read_program
@@ -51,6 +51,13 @@ def test_files_are_those_that_it_calls_and_those_that_may_set_what_all_know(cell
     assert {file.name for file in files_of(cell)} == FILES.keys()
     cell.with_name("Pick.dat").write_text(FILES["Pick.dat"].replace("GLOBAL ", ""))
     assert {file.name for file in files_of(cell)} == FILES.keys() - {"other.src"}
+
+
+@pytest.mark.parametrize("name", ["CELL.DAT", "Cell.Dat", "cElL.dat"])
+def test_a_module_is_one_however_the_letters_of_its_files_are_written(cell, name):
+    cell.with_name("cell.dat").rename(cell.with_name(name))
+    (first, *_) = execute(read_program(cell), load_robot("er3a_c60"), np.zeros(6)).listing().motions
+    assert first.target.joints[0] == pytest.approx(np.radians(10))
 
 
 def test_what_is_wrong_in_a_module_stands_at_its_own_line(cell):
@@ -272,3 +279,11 @@ def test_what_is_wrong_in_a_called_module_is_told_at_that_module(cell):
     (result,) = sarif_of([checked])["runs"][0]["results"]
     assert result["locations"][0]["physicalLocation"]["artifactLocation"]["uri"].endswith("deeper.src")
     assert json_of([checked])[0]["error"]["file"].endswith("deeper.src")
+
+
+def test_what_another_module_sets_leaves_the_course_of_the_whole_open(tmp_path):
+    (tmp_path / "$config.dat").write_text("DEFDAT $CONFIG\nDECL GLOBAL INT PGNO=1\nENDDAT\n")
+    (tmp_path / "part.src").write_text("DEF PART( )\nPTP {A1 PGNO}\nEND\n")
+    (tmp_path / "cell.src").write_text("DEF CELL( )\nPGNO=2\nEND\n")
+    checked = checked_file(tmp_path / "part.src", load_robot("er3a_c60"), CheckOptions(measures=False))
+    assert "not examined, or not each time: the course of the whole" in not_examined_line(checked)

@@ -489,3 +489,17 @@ def test_a_tool_beyond_the_declared_ones_is_the_one_that_is_given(tmp_path):
         (found,) = moves(run(tmp_path, body, frames=given))
         assert found.tool.name.startswith("TOOL_DATA[20]")
         assert (found.tool.pose is not None) == bool(given)
+
+
+def test_where_the_arm_is_becomes_the_base(tmp_path):
+    """0, 0, 50 in a base at the arm's own position is 50 mm further along the tool's z."""
+    body = """$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\nPTP {A1 0,A2 -10,A3 -10,A4 0,A5 -70,A6 0}
+$BASE=$POS_ACT
+LIN {X 0,Y 0,Z 50,A 0,B 0,C 0}
+$TOOL=$POS_ACT
+PTP {A1 5}"""
+    robot = load_robot("er3a_c60")
+    first, line, last = moves(run(tmp_path, body, robot=robot, start=np.zeros(6)))
+    here, there = forward(robot, first.target.joints), (line.base.pose @ line.target.pose)[:3, 3]
+    np.testing.assert_allclose(there, (here @ [0, 0, 0.05, 1])[:3], rtol=0, atol=1e-3)
+    assert last.tool.name == "$POS_ACT"

@@ -249,7 +249,7 @@ def _frame(memory: ProgramMemory, variable: str) -> instructions.NamedFrame:
         return instructions.NamedFrame("", memory.cell.tool if variable == "$TOOL" else memory.cell.base, own=False)
     said = memory.read(variable + "%name")
     name = said.upper() if isinstance(said, str) and said[:1] not in ("{", "") else ""
-    own, pose = memory.read(name) if name else None, record_pose(value)
+    own, pose = memory.read(name) if name and name not in HERE else None, record_pose(value)
     if isinstance(value, syntax.Unclear):
         name = name or value.text
         if isinstance(own, syntax.Unclear) and not isinstance(own, syntax.Unset):  # the program or others change it
@@ -572,9 +572,9 @@ OF_SETTINGS = frozenset(OF_SETTINGS_TEXT.split())
 """Functions after WITH, which :func:`keep_setting` reads."""
 HARMLESS_VARIABLES_TEXT = """
 $ACCU_STATE $ACC_EXTAX $ACT_GROUP $ADVANCE $ANOUT $AXWORKSPACE $BWDSTART $CMD $COLLMON_TOL_PRO $CP_STATMON
-$CP_VEL_TYPE $CYCFLAG $CYCLE $DATE $ECO_LEVEL $EDIT_MODE $ERR $EXT $FLAG $GEAR_JERK $H_POS $I_O_ACT $JERK $LOOP_MSG
-$MSG_T $OUT $OUT_NODRIVE $OV_APPL $OV_PRO $OV_ROB $PERI_RDY $PRO_ACT $PRO_MODE $PRO_STATE $RED_VEL $SOFT_PLCBOOL
-$SOFT_PLCINT $SOFT_PLCREAL $STOPNOAPROX $TIMER $TIMER_FLAG $TIMER_STOP $TORQMON $TORQMON_COM $TORQMON_DEF $TRACE
+$CP_VEL_TYPE $CYCFLAG $CYCLE $DATE $ECO_LEVEL $EDIT_MODE $ERR $EXT $FLAG $GEAR_JERK $H_POS $I_O_ACT $JERK $LOOP_CONT
+$LOOP_MSG $MSG_T $OUT $OUT_NODRIVE $OV_APPL $OV_PRO $OV_ROB $PERI_RDY $PRO_ACT $PRO_MODE $PRO_STATE $RED_VEL
+$SOFT_PLCBOOL $SOFT_PLCINT $SOFT_PLCREAL $STOPNOAPROX $TIMER $TIMER_FLAG $TIMER_STOP $TORQMON $TORQMON_COM $TORQMON_DEF $TRACE
 $VEL_EXTAX $WBOXDISABLE $WORKSPACE
 """
 HARMLESS_VARIABLES = frozenset((*MODAL, *HARMLESS_VARIABLES_TEXT.split()))
