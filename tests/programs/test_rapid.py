@@ -560,6 +560,43 @@ def test_what_a_controller_takes_is_not_named(case, tmp_path):
     assert not read_program(saved(tmp_path, ALLOWED[case])).findings
 
 
+SET_CONSTANTS = {  # instructions in the third line after main's head, the constant
+    "of_the_module": ("size:=3;", "SIZE"),
+    "a_part": ("p.trans.x:=10;", "P"),
+    "an_element": ("pts{1}:=down;", "PTS"),
+    "increased": ("Incr size;", "SIZE"),
+    "cleared": ("Clear size;", "SIZE"),
+    "of_the_routine": ("n:=1;", "N"),
+    "behind_a_condition": ("IF flag size:=3;", "SIZE"),
+    "in_a_handler": ("MoveL p,@; ERROR size:=3; RETRY;", "SIZE"),
+}
+
+
+@pytest.mark.parametrize("case", SET_CONSTANTS)
+def test_a_constant_that_is_assigned_to_is_an_error_with_its_line_and_name(case, tmp_path):
+    line, name = SET_CONSTANTS[case]
+    local = "CONST num n:=1;" if name == "N" else "VAR num other;"
+    path = saved(tmp_path, f"    {local}\n    MoveL p,@;\n    {line}")
+    first = path.read_text(encoding="utf-8").split("\n").index("  PROC main()") + 1
+    with pytest.raises(InputError) as caught:
+        read_program(path)
+    assert f"line {first + 3}: {name} is a constant" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        "VAR num size; size:=3; MoveL p,@;",
+        "FOR size FROM 1 TO 3 DO MoveL p,@; ENDFOR",
+        "other 4; MoveL p,@; MORE PROC other(num size) size:=3; ENDPROC",
+        'ReadRawBytes raw,size; SetDataVal "size",n; MoveL p,@;',
+        "n:=1; other; MoveL p,@; MORE PROC other() CONST num n:=4; ENDPROC",
+    ],
+)
+def test_what_only_has_the_name_of_a_constant_may_be_set(body, tmp_path):
+    assert motions(execute(read_program(saved(tmp_path, body))))
+
+
 def test_what_an_instruction_reads_has_no_known_value(tmp_path):
     for body in (
         "TPReadNum n,text;",

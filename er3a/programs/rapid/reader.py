@@ -242,7 +242,7 @@ def read_rapid(source: ProgramText) -> syntax.Program:
     Raises
     ------
     InputError
-        for texts and blocks without an end
+        for texts and blocks without an end, and for a constant that is assigned to
     """
     cursors = [Cursor(text) for text in (*map(read_program_text, modules_of(source.path)), source)]
     procedures = {name: count for cursor in cursors for name, count in _procedures(cursor.tokens).items()}
@@ -266,6 +266,7 @@ def read_rapid(source: ProgramText) -> syntax.Program:
         )
         findings.append(NameTwice(name, last.place))
     routines = [each for reader in readers for each in reader.routines]
+    _refuse_set_constants(routines, data)
     fixed = _fixed(routines, data)
     by_name, unlinked = linked(
         routines, known_names.changed_arguments, lambda call: known_names.perhaps_changed(call, fixed)
@@ -315,6 +316,35 @@ def _undeclared(routines: Iterable[syntax.Routine], declared: set[str]) -> Itera
     others = (name for name in given - found.keys() if "%" not in name)
     is_missing = any(predefined(name.removeprefix("/")) is None for name in others)
     return () if is_missing else found.values()
+
+
+def _refuse_set_constants(routines: Iterable[syntax.Routine], data: Iterable[syntax.Assign]) -> None:
+    """Refuse a program that assigns something to a constant, as a controller refuses to load it.
+
+    Raises
+    ------
+    InputError
+        with the line and the constant's name
+    """
+    shared = _constants(data)
+    for routine in routines:
+        code = [each for each in (*routine.code, *routine.handler) if isinstance(each, syntax.Assign)]
+        fixed = _constants(each for each in code if each.local) | (shared - own_names(routine))
+        for each in code:
+            name = variable_of(each.target)
+            if name in fixed and each.text and not each.type_name and not _is_unclear(each.value):
+                problem = f"{name.rpartition('/')[2]} is a constant (CONST), which no instruction can change"
+                raise fault(each.place, problem, "Declare it with VAR or PERS, or remove this line")
+
+
+def _constants(declarations: Iterable[syntax.Assign]) -> set[str]:
+    """Names that are declared as constants, and as nothing else."""
+    declared = [
+        (variable_of(each.target), each.text.upper().startswith("CONST")) for each in declarations if each.type_name
+    ]
+    return {name for name, is_constant in declared if is_constant} - {
+        name for name, is_constant in declared if not is_constant
+    }
 
 
 def _is_unclear(value: syntax.Expression | None) -> bool:
