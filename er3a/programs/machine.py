@@ -19,7 +19,7 @@ References
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Hashable, Iterable, Iterator, Mapping
+from collections.abc import Container, Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -105,7 +105,7 @@ def changed_beside(program: syntax.Program, dialect: Dialect, itself: str = "") 
     started = {name for name in routines if (name in asked or routines[name].thread) and name != itself}
     handed = {name for what in beside for name in _handed(program, what)}
     changed = _changed_in(program, _with_called(program, started), dialect)
-    return ((changed | handed) - dialect.modal) | program.beside
+    return ((changed | handed) - dialect.modal) | program.beside | given_to_unknown(program, dialect).keys()
 
 
 def _handed(program: syntax.Program, what: syntax.Invocation) -> set[str]:
@@ -113,10 +113,28 @@ def _handed(program: syntax.Program, what: syntax.Invocation) -> set[str]:
     return set(names(what.arguments[0])) if what.function == syntax.CYCLIC else _given_back(program, what)
 
 
-def _handed_by(program: syntax.Program, routine: syntax.Routine) -> frozenset[str]:
-    """A routine's own variables that it hands over to what runs beside the program, and that are changed there."""
+def given_to_unknown(program: syntax.Program, dialect: Dialect) -> dict[str, str]:
+    """Variables that interrupts get by reference whose routines no file holds, with the line that says so.
+
+    A thread gets copies.
+    """
+    starts = [each for each in program.operations() if isinstance(each, syntax.Beside) and each.kind == "interrupt"]
+    return {
+        name: each.text
+        for each in reversed(starts)  # of several lines, the first
+        if _is_strange(program, each, dialect)
+        for given in (*each.what.arguments, *(value for _, value in each.what.keywords))
+        if given is not None and (name := variable_of(given)) and name[0] not in "$%"
+    }
+
+
+def _handed_by(program: syntax.Program, routine: syntax.Routine, unknown: Container[str]) -> frozenset[str]:
+    """A routine's own variables that it hands over to what runs beside the program, and that are, or may be
+    (``unknown``), changed there."""
     beside = [each.what for each in routine.code if isinstance(each, syntax.Beside)]
-    return frozenset(name for what in beside for name in _handed(program, what)) & own_names(routine)
+    given = (name for what in beside for each in what.arguments if each is not None for name in names(each))
+    handed = {name for what in beside for name in _handed(program, what)} | {each for each in given if each in unknown}
+    return frozenset(handed) & own_names(routine)
 
 
 def _persisting(program: syntax.Program, dialect: Dialect) -> frozenset[str]:
@@ -670,7 +688,8 @@ class Machine:
         self.names_met: set[str] = set()
         self.deciding_names: list[str] = []  # of those, whole
         self.unsettled = {name: unsettled(program, each, dialect) for name, each in program.routines.items()}
-        self.handed = {name: _handed_by(program, each) for name, each in program.routines.items()}
+        self.given_away = given_to_unknown(program, dialect)
+        self.handed = {name: _handed_by(program, each, self.given_away) for name, each in program.routines.items()}
         self.quiet, self.needed, self.choosing = quiet_branches(program, dialect)
         self.persisting = _persisting(program, dialect) & self.needed
         self.started_anew = {target_name(each.target) for each in program.data if dialect.starts_anew(each)}
@@ -711,6 +730,7 @@ class Machine:
         """Follow all ways."""
         memory = ProgramMemory(self.dialect, self.cell)
         memory.beside = changed_beside(self.program, self.dialect)
+        memory.given_away = self.given_away
         for each in self.program.data:
             self._assign(memory, each)
         self.first_values = {name: value for name, value in memory.shared.items() if root(name) in self.persisting}
@@ -743,7 +763,7 @@ class Machine:
         """Go on with the program's beginning."""
         entry = self.program.routines[self.program.entry]
         way.frames = [Frame(entry)]
-        self._hold(way.frames[0].local, entry)
+        self._hold(way.memory, way.frames[0].local, entry)
         way.memory.local, way.memory.aliased = way.frames[0].local, self.unsettled[entry.name]
         way.memory.kept.clear()
 
@@ -1088,7 +1108,7 @@ class Machine:
     def _call(self, way: ExecutionPath, call: syntax.Call) -> None:
         routine, memory = self.program.routines[call.routine], way.memory
         local, fits = _locals(routine, call, memory)
-        self._hold(local, routine)
+        self._hold(memory, local, routine)
         if call.result == syntax.START:
             del local["%inside"]
         if not fits:
@@ -1129,7 +1149,7 @@ class Machine:
                 for each in other.memory.beside & set(map(root, other.memory.local)):
                     given_in.forget(each)
             local, fits = _locals(routine, start.what, given_in)
-            self._hold(local, routine)
+            self._hold(other.memory, local, routine)
             other.frames = [Frame(routine, 0, local, (*way.frames[-1].calls, start.place))]
             other.memory.local = local
             state = (name, frozenset(local.items()), self._kept(other.memory.shared), other.memory.here.key())
@@ -1154,10 +1174,10 @@ class Machine:
         changed = _changed_in(self.program, _with_called(self.program, (name,)), self.dialect)
         return tuple(sorted(changed & self.dialect.modal))
 
-    def _hold(self, local: dict[str, syntax.Value], routine: syntax.Routine) -> None:
+    def _hold(self, memory: ProgramMemory, local: dict[str, syntax.Value], routine: syntax.Routine) -> None:
         """Keep that nothing is known of what a routine that begins hands over to what runs beside the program."""
         if handed := self.handed[routine.name]:
-            local |= {name: syntax.Unclear(name) for name in local if root(name) in handed}
+            local |= {name: memory.by_others(name) for name in local if root(name) in handed}
             local[HELD_BESIDE] = tuple(sorted(handed))
 
     def _changed_later(self, way: ExecutionPath) -> frozenset[str]:

@@ -2091,3 +2091,42 @@ def test_an_interrupt_or_trigger_that_no_module_sets_up_is_named(tmp_path, line)
     more = 'TRAP tr1\nTPWrite "a";\nENDTRAP\n'
     known = check(tmp_path, rapid(f"{ready}{line}\nMoveJ p,v50,fine,tool0;", more, data), "a.mod")
     assert "program_not_simulated" not in codes(known)
+
+
+@pytest.mark.parametrize(
+    ("start", "later"),
+    [
+        ("INTERRUPT DECL 3 WHEN $IN[1]==TRUE DO FOO(H)", ""),
+        ("INTERRUPT DECL 3 WHEN $IN[1]==TRUE DO FOO(H)", "H=10\n"),  # the interrupt may come after this, too
+        ("INTERRUPT DECL 3 WHEN $IN[1]==TRUE DO FOO(1,H)", ""),
+        ("TRIGGER WHEN DISTANCE=0 DELAY=0 DO FOO(H) PRIO=-1", ""),
+    ],
+)
+@pytest.mark.parametrize("local", [True, False])
+def test_what_an_unknown_routine_beside_the_program_gets_by_reference_is_in_doubt(tmp_path, start, later, local):
+    (tmp_path / "a.dat").write_text(f"DEFDAT a\n{'' if local else 'DECL REAL H=5'}\nENDDAT\n")
+    declared = "DECL REAL H\n" if local else ""
+    body = f"{declared}H=5\n{start}\n{later}PTP {axes(HOME)}\nPTP {{A1 H}}"
+    found = check(tmp_path, krl(body), "a.src")
+    (missed,) = (each for each in found.findings if each.finding.code == "target_not_given")
+    assert (missed.level, missed.finding.reason) == ("caution", "perhaps_changed")
+    assert start in say(missed.finding)
+    assert "motion" in [each.what for each in found.not_examined]
+
+
+def test_of_a_known_routine_beside_the_program_an_input_stays_known(tmp_path):
+    more = "DEF FOO(X:IN)\nREAL X\n$OUT[1]=X>3\nEND\n"
+    body = f"DECL REAL H\nH=5\nINTERRUPT DECL 3 WHEN $IN[1]==TRUE DO FOO(H)\nPTP {axes(HOME)}\nPTP {{A1 H}}"
+    assert "target_not_given" not in codes(check(tmp_path, krl(body, more), "a.src"))
+
+
+@pytest.mark.parametrize("fits", [False, True])
+def test_what_a_call_by_an_unknown_name_gets_by_reference_is_in_doubt(tmp_path, fits):
+    call = '%"take_"+NumToStr(GInput(gi1),0)% n;'
+    more = "PROC take_1(num i)\nENDPROC\n" if fits else ""
+    body = f"n:=20;\n{call}\nMoveJ p,v50,fine,tool0;\nMoveJ Offs(p,0,n,0),v50,fine,tool0;"
+    found = check(tmp_path, rapid(body, more), "a.mod")
+    (missed,) = (each for each in found.findings if each.finding.code == "target_not_given")
+    assert (missed.level, missed.finding.reason) == ("caution", "perhaps_changed")
+    assert call.removesuffix(";") in say(missed.finding)
+    assert [each.place.line for each in found.not_examined if each.what == "motion"] == [missed.place.line]

@@ -79,7 +79,7 @@ MOTION_OPTIONS = frozenset(OPTIONS_TEXT.split())
 """Optional arguments of motions that are followed, or leave them as they are; ``\\Corr`` shifts the path."""
 CALLING = ("MOVEJSYNC", "MOVELSYNC", "MOVECSYNC")
 """Motions that call a procedure, named by a text, where they end."""
-UPPER, ARITHMETIC, TYPED, STEP, LATE = "%UPPER", "%ARITHMETIC", "%TYPED", "%STEP", "%LATE"
+UPPER, ARITHMETIC, TYPED, STEP, LATE = "%UPPER", "%ARITHMETIC", "%TYPED", "%STEP", known_names.LATE
 RAISING = ("SOCKET", "OPEN", "READ", "WRITE", "LOAD", "UNLOAD", "STARTLOAD", "RMQ", "COPYFILE", "REMOVE", "MAKEDIR")
 """How instructions begin that often end with an error; any other may too, if less often."""
 FAILED = "%FAILED"
@@ -852,8 +852,9 @@ class _BodyReader:
             for name, count in self.module.procedures.items()
             if name.startswith(prefix) and count == len(given[0]) and name != "MAIN"
         ]
+        none_fits = syntax.Doing(place, syntax.Invocation(LATE, *given), text)
         if not fitting or len(fitting) > MAX_LATE:
-            self.builder.unknown(place, text)
+            self.builder.add(none_fits)
             return
         for i, name in enumerate(fitting):
             test = syntax.Binary("=", syntax.Invocation(UPPER, (called,)), syntax.Constant(name))
@@ -863,7 +864,7 @@ class _BodyReader:
                 self.builder.next_arm(place, test, text)
             self.builder.add(syntax.Doing(place, syntax.Invocation(self.scope.meant(name), *given), text))
         self.builder.next_arm(place, None, text)
-        self.builder.add(syntax.Doing(place, syntax.Invocation(LATE, ()), text))
+        self.builder.add(none_fits)
         self.builder.close("if", place)
 
     def _remark(self, token: Token) -> None:
