@@ -2130,3 +2130,12 @@ def test_what_a_call_by_an_unknown_name_gets_by_reference_is_in_doubt(tmp_path, 
     assert (missed.level, missed.finding.reason) == ("caution", "perhaps_changed")
     assert call.removesuffix(";") in say(missed.finding)
     assert [each.place.line for each in found.not_examined if each.what == "motion"] == [missed.place.line]
+
+
+def test_a_point_that_a_controller_may_skip_where_blends_overlap_is_named(tmp_path):
+    points = (((0.38, 0.16), 0), ((0.4, 0.16), 0.015), ((0.4, 0.14), 0.015), ((0.38, 0.14), 0))
+    lines = "".join(f"  movel(p[{x},{y},0.32,0,{np.pi},0],v=0.1,r={r})\n" for (x, y), r in points)
+    found = check(tmp_path, f"def a():\n  set_tcp(p[0,0,0,0,0,0])\n{lines}end\n")
+    skipped = [each for each in found.findings if each.finding.code == "zone_too_large"]
+    assert [(each.level, each.place.line) for each in skipped] == [("caution", 4), ("caution", 5)]
+    assert "skip the point: the way without it was not followed" in say(skipped[0].finding)

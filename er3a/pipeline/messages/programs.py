@@ -251,8 +251,9 @@ TEXTS = texts(
             "{least_mm:.1f} mm"
         ),
         "zone_too_large": (
-            "the zone of {zone_mm:.1f} mm is larger than half of a motion of {motion_mm:.1f} mm: checked with half, "
-            "but a controller may round more, or skip the point"
+            "the zone of {zone_mm:.1f} mm is larger than half of a motion of {motion_mm:.1f} mm: checked with half; a "
+            "controller may round more, or, as UR's where blends overlap, skip the point: the way without it was not "
+            "followed"
         ),
         "zone_without_size": "the size of the zone {zone} is not known; half of each motion was taken",
         "arc_has_no_circle": "the arc's points do not define a circle",
