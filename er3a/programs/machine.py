@@ -1081,7 +1081,8 @@ class Machine:
             self.waiting.append(other)
             return False
         if branch.place not in self.cut:
-            self._end(way, "branches", branch.place, limit=self.limits.ways)
+            kind: EndKind = "rounds" if at in self.loops[frame.routine.name] else "branches"
+            self._end(way, kind, branch.place, limit=self.limits.ways)
             self.cut.add(branch.place)
         taken = self.sides[yes] <= self.sides[no]
         self.sides[yes if taken else no] += 1

@@ -20,6 +20,7 @@ from er3a.kinematics.forward import forward
 from er3a.pipeline.messages.programs import remedy_at, say
 from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.programs.csv_program import write_csv
+from er3a.programs.execution import RunLimits
 from er3a.programs.instructions import JointTarget, NamedFrame, UnresolvedTarget, numbers_of
 from er3a.programs.languages import files_of
 from testing.arms import palletiser
@@ -2139,3 +2140,19 @@ def test_a_point_that_a_controller_may_skip_where_blends_overlap_is_named(tmp_pa
     skipped = [each for each in found.findings if each.finding.code == "zone_too_large"]
     assert [(each.level, each.place.line) for each in skipped] == [("caution", 4), ("caution", 5)]
     assert "skip the point: the way without it was not followed" in say(skipped[0].finding)
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("a.src", "DEF a(N:IN)\nINT I,N\nFOR I=1 TO N\nPTP {A1 1}\nPTP {A1 2}\nENDFOR\nEND\n"),
+        ("a.src", "DEF a( )\nINT I\nFOR I=1 TO $IN[1]\nPTP {A1 I}\nPTP {A1 2}\nENDFOR\nEND\n"),
+        ("a.pgm", "(* *)\n\nFOR i := 1 TO n DO\nMJOINT(POINTJ(0,-10,-10,0,-70,i),v5perc,fine,tool0);\nEND_FOR;\n"),
+    ],
+)
+def test_that_the_number_of_a_loops_rounds_is_not_known_and_was_cut_is_named(tmp_path, name, text):
+    found = check(tmp_path, text, name, limits=RunLimits(ways=20))
+    (cut,) = (each for each in found.findings if each.finding.code == "not_followed_to_end")
+    assert (cut.level, cut.place.line, cut.finding.kind) == ("caution", 3, "rounds")
+    assert "how often this loop goes round is known on the cell alone" in say(cut.finding)
+    assert (3, "course") in [(each.place.line, each.what) for each in found.not_examined]

@@ -164,6 +164,7 @@ STOPPED: dict[EndKind, str] = {
     ),
     "operations": FURTHER,
     "branches": FURTHER,
+    "rounds": FURTHER,
     "stopped": FURTHER,
     "recursion": N_("Give the routine a condition to return."),
     "guessed": N_("Call routines by their names, chosen by a test of the text."),
@@ -276,6 +277,10 @@ TEXTS = texts(
             operations="the program was followed for {limit} instructions, and no further than here",
             branches=(
                 "not each side of this branch was followed: the program has more than {limit} sequences of its branches"
+            ),
+            rounds=(
+                "how often this loop goes round is known on the cell alone; not each number of rounds was followed, as "
+                "the program has more than {limit} sequences of its branches"
             ),
             stopped="the program was followed no further than here: the time for it was over",
             recursion="routines call themselves or each other without end",
