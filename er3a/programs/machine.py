@@ -630,6 +630,24 @@ MANY_ROUNDS = 100  # of a loop to an unknown end, before more of them wait for a
 ASKED_EVERY = 64  # operations
 
 
+@dataclass(frozen=True, slots=True)
+class FirstMet:
+    """When a way first was in a state.
+
+    Attributes
+    ----------
+    way : its number
+    count : of states that were met before, by all ways
+    step : number of the last step before it
+    budget : operations that were left
+    """
+
+    way: int
+    count: int
+    step: int
+    budget: int
+
+
 @dataclass(slots=True)
 class Frame:
     """A routine that runs."""
@@ -712,7 +730,7 @@ class Machine:
         if any(isinstance(each, syntax.Halt) and each.again for each in program.operations()):
             self.labels[program.entry] |= {0}
         self.loops = {name: _loops(routine) for name, routine in program.routines.items()}
-        self.seen: dict[Hashable, tuple[int, int, int, int]] = {}  # way, count, last step, budget
+        self.seen: dict[Hashable, FirstMet] = {}
         self.read_before: dict[tuple[str, int], frozenset[str]] = {}  # of the persisting, before a label was come to
         self.waiting: list[ExecutionPath] = []
         self.second: list[ExecutionPath] = []  # rounds, which wait for all else
@@ -1234,11 +1252,10 @@ class Machine:
         key = self._state(way)
         found = self.seen.get(key)
         if found is None:
-            self.seen[key] = (way.number, len(self.seen), way.step, self.budget)
+            self.seen[key] = FirstMet(way.number, len(self.seen), way.step, self.budget)
             return None
-        other, count, step, _ = found
-        own = other == way.number or any(other == earlier and count < until for earlier, until in way.line)
-        return ("repeats" if own else "joins"), step
+        before = any(found.way == earlier and found.count < until for earlier, until in way.line)
+        return ("repeats" if before or found.way == way.number else "joins"), found.step
 
     def _asked_in_round(self, way: ExecutionPath, before: int) -> list[syntax.Branch]:
         """What a way asked of variables in the round by which it repeats itself; nothing if the arm moves in it."""
@@ -1251,7 +1268,7 @@ class Machine:
         if state in self.waited:
             return []
         self.waited.add(state)
-        budget = self.seen[state][3]
+        budget = self.seen[state].budget
         branches = (self.program.routines[name].code[at] for (name, at), when in way.asked.items() if when <= budget)
         return [each for each in branches if isinstance(each, syntax.Branch) and any(names(each.condition))]
 
