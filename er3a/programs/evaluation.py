@@ -441,6 +441,18 @@ class ProgramMemory:
         value = self.shared.get(name)
         return self.functions.constant(self, name) if value is None else value
 
+    def fixed_unknown(self, name: str) -> syntax.Unclear | None:
+        """What was assigned to a variable, if only the cell knows it, and nothing but an assignment changes it: a
+        variable of a routine, or of a program whose data end with it. None of others."""
+        if name in self.aliased or name in self.beside or name[:1] in "$%":
+            return None
+        handed = self.local.get(HELD_BESIDE, ())
+        if name in self.local:
+            value = None if isinstance(handed, tuple) and name in handed else self.local[name]
+        else:
+            value = None if self.functions.keeps_data else self.shared.get(name)
+        return value if type(value) is syntax.Unclear else None
+
     def by_others(self, name: str) -> syntax.Unclear:
         """What a variable holds that others may change at any time."""
         text = self.given_away.get(root(name))
@@ -532,9 +544,9 @@ class ProgramMemory:
         self.kept.clear()
         for values, more in ((self.local, ()), (self.shared, self.cell.frames)):
             for name in [each for each in (*values, *more) if root(each) == variable]:
-                values[name] = syntax.Unclear(f"{name}, changed")
+                values[name] = syntax.Forgotten(f"{name}, changed")
         if not any(root(name) == variable for name in (*self.local, *self.shared)):
-            self.shared[variable] = syntax.Unclear(f"{variable}, changed")
+            self.shared[variable] = syntax.Forgotten(f"{variable}, changed")
 
     def _set_field(self, target: syntax.Member, value: syntax.Value) -> bool:
         """Assign a field of a stored record; False if the field is stored under its full name."""

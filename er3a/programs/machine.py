@@ -2,8 +2,9 @@
 
 A loop is followed until its state (place, variables that decide motions, position of the arm) repeats. If a condition
 depends on what only the cell knows, both sides are followed; a path that reaches a state that another path had ends
-there. Further rounds of a loop with an unknown end are postponed until all else was followed. Beyond the limit, the
-side that was taken less often is followed, and each such branch is named.
+there. A routine's own variable that is asked twice, and is not set between, has one value for both. Further rounds of a
+loop with an unknown end are postponed until all else was followed. Beyond the limit, the side that was taken less often
+is followed, and each such branch is named.
 
 Branches whose sides move nothing and meet again.
 
@@ -612,6 +613,36 @@ class _Graph:
         return seen
 
 
+def _asked_of(condition: syntax.Expression) -> tuple[str, bool] | None:
+    """The variable that a condition asks, and nothing else, with the value that it has where the condition holds."""
+    match condition:
+        case syntax.Variable(name=name):
+            return name, True
+        case syntax.Unary(operator="NOT" | "not" | "!", of=of) if (asked := _asked_of(of)) is not None:
+            return asked[0], not asked[1]
+        case syntax.Binary(
+            operator="==" | "=", left=syntax.Variable(name=name), right=syntax.Constant(value=bool(value))
+        ):
+            return name, value
+    return None
+
+
+def _asked_again(routine: syntax.Routine, at: int, name: str) -> bool:
+    """Whether a routine may ask a variable again after an operation, before it sets it."""
+    graph, seen, waiting = _Graph(routine), {at}, [at]
+    while waiting:
+        for each in graph.after[waiting.pop()]:
+            operation = routine.code[each] if each != graph.end else None
+            asked = _asked_of(operation.condition) if isinstance(operation, syntax.Branch) else None
+            if asked is not None and asked[0] == name:
+                return True
+            is_set = isinstance(operation, syntax.Assign) and target_name(operation.target) == name
+            if operation is not None and each not in seen and not is_set:
+                seen.add(each)
+                waiting.append(each)
+    return False
+
+
 def _reached(graph: _Graph, first: int) -> set[int]:
     """Operations that may be carried out after coming to one."""
     seen: set[int] = set()
@@ -659,10 +690,11 @@ class Frame:
     result: str = ""
     outs: tuple[tuple[str, syntax.Expression], ...] = ()
     aliased: frozenset[str] = frozenset()  # of the memory, before it was called
+    told: dict[str, syntax.Unclear] = field(default_factory=dict)  # what variables held that a side has told
 
     def copy(self) -> Frame:
         """Another that goes its own way from here."""
-        return replace(self, local=dict(self.local))
+        return replace(self, local=dict(self.local), told=dict(self.told))
 
 
 @dataclass(slots=True)
@@ -731,6 +763,7 @@ class Machine:
             self.labels[program.entry] |= {0}
         self.loops = {name: _loops(routine) for name, routine in program.routines.items()}
         self.seen: dict[Hashable, FirstMet] = {}
+        self.asked_again: dict[tuple[str, int], bool] = {}
         self.read_before: dict[tuple[str, int], frozenset[str]] = {}  # of the persisting, before a label was come to
         self.waiting: list[ExecutionPath] = []
         self.second: list[ExecutionPath] = []  # rounds, which wait for all else
@@ -951,6 +984,7 @@ class Machine:
             elif isinstance(operation.instruction, instructions.Unknown) and operation.instruction.may_move:
                 memory.lost(operation.instruction.text)
         elif isinstance(operation, syntax.Assign):
+            frame.told.pop(target_name(operation.target), None)
             signal = self._assign(memory, operation)
             if signal is not None:
                 self._note(way, operation.place, signal)
@@ -1075,6 +1109,7 @@ class Machine:
         holds = way.memory.value(branch.condition)
         if isinstance(holds, bool):
             way.asked[frame.routine.name, at] = self.budget
+            self._forget_told(way.memory, frame, branch, at)
             if not holds:
                 frame.at = branch.otherwise
             return not holds and branch.otherwise <= at
@@ -1092,10 +1127,10 @@ class Machine:
             self.numbers += 1
             self.sides.update((yes, no))
             if self.sides[yes] > MANY_ROUNDS and at in self.loops[frame.routine.name]:
-                self._take_sides(branch, holding=other, other=way)
+                self._take_sides(branch, at, holding=other, other=way)
                 self.waiting.insert(0, other)
                 return False
-            self._take_sides(branch, holding=way, other=other)
+            self._take_sides(branch, at, holding=way, other=other)
             self.waiting.append(other)
             return False
         if branch.place not in self.cut:
@@ -1109,11 +1144,38 @@ class Machine:
             frame.at = branch.otherwise
         return not taken and branch.otherwise <= at
 
-    def _take_sides(self, branch: syntax.Branch, holding: ExecutionPath, other: ExecutionPath) -> None:
-        """One way on the side of the condition, another on the other side."""
+    def _take_sides(self, branch: syntax.Branch, at: int, holding: ExecutionPath, other: ExecutionPath) -> None:
+        """One way on the side of the condition, another on the other side; each knows from there on what it tells of a
+        variable, as long as that may be asked again."""
+        asked = _asked_of(branch.condition)
+        if asked is not None and (held := self._told_by(holding, asked[0], at)) is not None:
+            name, value = asked
+            for way, holds in ((holding, True), (other, False)):
+                way.memory.write(name, value == holds)
+                way.frames[-1].told[name] = held
         other.frames[-1].at = branch.otherwise
         self._note(holding, branch.place, instructions.Decision(branch.text, True))
         self._note(other, branch.place, instructions.Decision(branch.text, False))
+
+    def _told_by(self, way: ExecutionPath, name: str, at: int) -> syntax.Unclear | None:
+        """What a variable of a way holds, of which a branch will tell its sides; None if it tells them nothing."""
+        frame = way.frames[-1]
+        if name in dict(frame.outs) or self.dialect.is_signal(name) or self.dialect.runs_on(name):
+            return None
+        held = way.memory.fixed_unknown(name)
+        return held if held is not None and self._is_asked_again(frame.routine, at, name) else None
+
+    def _forget_told(self, memory: ProgramMemory, frame: Frame, branch: syntax.Branch, at: int) -> None:
+        """Forget what a side has told of a variable that is not asked again, so that ways can meet."""
+        asked = _asked_of(branch.condition) if frame.told else None
+        if asked is not None and asked[0] in frame.told and not self._is_asked_again(frame.routine, at, asked[0]):
+            memory.write(asked[0], frame.told.pop(asked[0]))
+
+    def _is_asked_again(self, routine: syntax.Routine, at: int, name: str) -> bool:
+        key = (routine.name, at)  # at which one variable is asked
+        if key not in self.asked_again:
+            self.asked_again[key] = _asked_again(routine, at, name)
+        return self.asked_again[key]
 
     def _is_guessed(self, way: ExecutionPath, call: syntax.Call) -> bool:
         """Whether a routine is called that a text may name or not, as its value is not known."""
