@@ -164,7 +164,7 @@ STOPPED: dict[EndKind, str] = {
     ),
     "operations": FURTHER,
     "branches": FURTHER,
-    "rounds": FURTHER,
+    "rounds": N_("Give the loop a number of rounds in the program, the greatest that it may have."),
     "stopped": FURTHER,
     "recursion": N_("Give the routine a condition to return."),
     "guessed": N_("Call routines by their names, chosen by a test of the text."),
