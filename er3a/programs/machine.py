@@ -759,7 +759,9 @@ class Machine:
         }
         self.started: set[Hashable] = set()  # what runs beside the program, by its state when it begins
         self.labels = {name: _labels(routine) for name, routine in program.routines.items()}
-        if any(isinstance(each, syntax.Halt) and each.again for each in program.operations()):
+        if program.entry in self.labels and any(
+            isinstance(each, syntax.Halt) and each.again for each in program.operations()
+        ):
             self.labels[program.entry] |= {0}
         self.loops = {name: _loops(routine) for name, routine in program.routines.items()}
         self.seen: dict[Hashable, FirstMet] = {}

@@ -753,3 +753,10 @@ def test_a_displacement_that_is_not_known_is_the_frame_that_the_cell_gives(tmp_p
         check = check_program(read_program(file), ROBOT, CheckOptions(np.zeros(6), frames=frames, measures=False))
         found[name] = [each.finding.name for each in check.findings if each.finding.code == "frame_not_given"]
     assert found == {"unknown": ["PDispOn"], "given": []}
+
+
+def test_a_module_of_data_alone_beside_one_that_begins_again_has_no_motions(tmp_path):
+    (tmp_path / "b.mod").write_text("MODULE b\nPERS num k:=1;\nPROC again()\nk:=2;\nExitCycle;\nENDPROC\nENDMODULE\n")
+    (tmp_path / "a.mod").write_text("MODULE a\nPERS num m:=k;\nENDMODULE\n")
+    found = check_program(read_program(tmp_path / "a.mod"), ROBOT, CheckOptions(measures=False))
+    assert "program_nothing_moves" in {each.finding.code for each in found.findings}
