@@ -370,6 +370,7 @@ class ProgramMemory:
     types : declared types by name
     kept : what a language caches until the next assignment
     beside : variables that a concurrent thread changes, so that their values are unclear
+    given_away : of these, those that something unknown may change, with its text
     aliased : variables that may be changed now under another name, or by a handler, so that their values are unclear
     here : where the arm is
     doubts : instructions that are not understood, by the variables of motions that they may have set
@@ -387,6 +388,7 @@ class ProgramMemory:
         self.types: dict[str, str] = {}
         self.kept: dict[object, object] = {}
         self.beside: frozenset[str] = frozenset()
+        self.given_away: Mapping[str, str] = {}
         self.aliased: frozenset[str] = frozenset()
         self.watched: frozenset[str] = frozenset()
         self.met: set[str] = set()  # of all copies
@@ -400,6 +402,7 @@ class ProgramMemory:
         other.here = self.here
         other.shared, other.local, other.types = dict(self.shared), dict(self.local), self.types
         other.beside, other.aliased, other.doubts = self.beside, self.aliased, dict(self.doubts)
+        other.given_away = self.given_away
         other.watched, other.met, other.written = self.watched, self.met, set(self.written)
         other.parted = self.parted
         return other
@@ -432,11 +435,28 @@ class ProgramMemory:
         if self.local and root(name) in self.local:  # a part that was never set, not that of a shared variable
             return None
         if self.beside and root(name) in self.beside:
-            return syntax.Unclear(name)
+            return self.by_others(name)
         if self.watched and root(name) in self.watched and name not in self.written:
             self.met.add(name)
         value = self.shared.get(name)
         return self.functions.constant(self, name) if value is None else value
+
+    def fixed_unknown(self, name: str) -> syntax.Unclear | None:
+        """What was assigned to a variable, if only the cell knows it, and nothing but an assignment changes it: a
+        variable of a routine, or of a program whose data end with it. None of others."""
+        if name in self.aliased or name in self.beside or name[:1] in "$%":
+            return None
+        handed = self.local.get(HELD_BESIDE, ())
+        if name in self.local:
+            value = None if isinstance(handed, tuple) and name in handed else self.local[name]
+        else:
+            value = None if self.functions.keeps_data else self.shared.get(name)
+        return value if type(value) is syntax.Unclear else None
+
+    def by_others(self, name: str) -> syntax.Unclear:
+        """What a variable holds that others may change at any time."""
+        text = self.given_away.get(root(name))
+        return syntax.Unclear(name) if text is None else syntax.PerhapsChanged(text)
 
     def write(self, name: str, value: syntax.Value, local: bool = False) -> None:
         """Set the value of a full name."""
@@ -451,7 +471,7 @@ class ProgramMemory:
             self.shared.update({f"{name}.{field}": part for field, part in parts})
         if local or (self.local and root(name) in self.local):
             handed = self.local.get(HELD_BESIDE, ())
-            self.local[name] = syntax.Unclear(name) if isinstance(handed, tuple) and root(name) in handed else value
+            self.local[name] = self.by_others(name) if isinstance(handed, tuple) and root(name) in handed else value
         else:
             self.shared[name] = value
             if self.watched and root(name) in self.watched:
@@ -524,9 +544,9 @@ class ProgramMemory:
         self.kept.clear()
         for values, more in ((self.local, ()), (self.shared, self.cell.frames)):
             for name in [each for each in (*values, *more) if root(each) == variable]:
-                values[name] = syntax.Unclear(f"{name}, changed")
+                values[name] = syntax.Forgotten(f"{name}, changed")
         if not any(root(name) == variable for name in (*self.local, *self.shared)):
-            self.shared[variable] = syntax.Unclear(f"{variable}, changed")
+            self.shared[variable] = syntax.Forgotten(f"{variable}, changed")
 
     def _set_field(self, target: syntax.Member, value: syntax.Value) -> bool:
         """Assign a field of a stored record; False if the field is stored under its full name."""

@@ -10,7 +10,9 @@ from er3a.by_value import ByValue
 from er3a.programs.instructions import ArmMotion, Decision, Instruction, Listing, Place, alike
 from er3a.programs.syntax import Program
 
-EndKind = Literal["end", "repeats", "joins", "drifts", "operations", "branches", "stopped", "recursion", "guessed"]
+EndKind = Literal[
+    "end", "repeats", "joins", "drifts", "operations", "branches", "rounds", "stopped", "recursion", "guessed"
+]
 
 Phase = Literal["following", "checking"]
 KeepOn = Callable[[Phase, int, int], bool]
@@ -65,8 +67,9 @@ class Ending:
     ----------
     kind : it is over; it ``repeats`` what it did, for ever; it ``joins`` another way, being in its state; it
         ``drifts``, being a loop for ever whose state does not repeat; or a limit of the run was met (``operations``,
-        ``branches``: the other side of this one was not followed), or of calls within calls; or it was ``stopped``; or
-        a routine that runs already would be called, if the name was ``guessed`` rightly
+        ``branches``: the other side of this one was not followed, ``rounds``: nor was it of a loop's, of which only the
+        cell knows how often it goes round), or of calls within calls; or it was ``stopped``; or a routine that runs
+        already would be called, if the name was ``guessed`` rightly
     step : number of its last step; -1 if it has none
     repeats_from : number of the step that follows the last, where it repeats or joins; None if no step does
     limit : that was met, as a number: of operations, sides of branches, rounds or calls; 0 if none was

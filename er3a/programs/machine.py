@@ -2,8 +2,9 @@
 
 A loop is followed until its state (place, variables that decide motions, position of the arm) repeats. If a condition
 depends on what only the cell knows, both sides are followed; a path that reaches a state that another path had ends
-there. Further rounds of a loop with an unknown end are postponed until all else was followed. Beyond the limit, the
-side that was taken less often is followed, and each such branch is named.
+there. A routine's own variable that is asked twice, and is not set between, has one value for both. Further rounds of a
+loop with an unknown end are postponed until all else was followed. Beyond the limit, the side that was taken less often
+is followed, and each such branch is named.
 
 Branches whose sides move nothing and meet again.
 
@@ -19,7 +20,7 @@ References
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Hashable, Iterable, Iterator, Mapping
+from collections.abc import Container, Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -105,7 +106,7 @@ def changed_beside(program: syntax.Program, dialect: Dialect, itself: str = "") 
     started = {name for name in routines if (name in asked or routines[name].thread) and name != itself}
     handed = {name for what in beside for name in _handed(program, what)}
     changed = _changed_in(program, _with_called(program, started), dialect)
-    return ((changed | handed) - dialect.modal) | program.beside
+    return ((changed | handed) - dialect.modal) | program.beside | given_to_unknown(program, dialect).keys()
 
 
 def _handed(program: syntax.Program, what: syntax.Invocation) -> set[str]:
@@ -113,10 +114,28 @@ def _handed(program: syntax.Program, what: syntax.Invocation) -> set[str]:
     return set(names(what.arguments[0])) if what.function == syntax.CYCLIC else _given_back(program, what)
 
 
-def _handed_by(program: syntax.Program, routine: syntax.Routine) -> frozenset[str]:
-    """A routine's own variables that it hands over to what runs beside the program, and that are changed there."""
+def given_to_unknown(program: syntax.Program, dialect: Dialect) -> dict[str, str]:
+    """Variables that interrupts get by reference whose routines no file holds, with the line that says so.
+
+    A thread gets copies.
+    """
+    starts = [each for each in program.operations() if isinstance(each, syntax.Beside) and each.kind == "interrupt"]
+    return {
+        name: each.text
+        for each in reversed(starts)  # of several lines, the first
+        if _is_strange(program, each, dialect)
+        for given in (*each.what.arguments, *(value for _, value in each.what.keywords))
+        if given is not None and (name := variable_of(given)) and name[0] not in "$%"
+    }
+
+
+def _handed_by(program: syntax.Program, routine: syntax.Routine, unknown: Container[str]) -> frozenset[str]:
+    """A routine's own variables that it hands over to what runs beside the program, and that are, or may be
+    (``unknown``), changed there."""
     beside = [each.what for each in routine.code if isinstance(each, syntax.Beside)]
-    return frozenset(name for what in beside for name in _handed(program, what)) & own_names(routine)
+    given = (name for what in beside for each in what.arguments if each is not None for name in names(each))
+    handed = {name for what in beside for name in _handed(program, what)} | {each for each in given if each in unknown}
+    return frozenset(handed) & own_names(routine)
 
 
 def _persisting(program: syntax.Program, dialect: Dialect) -> frozenset[str]:
@@ -594,6 +613,36 @@ class _Graph:
         return seen
 
 
+def _asked_of(condition: syntax.Expression) -> tuple[str, bool] | None:
+    """The variable that a condition asks, and nothing else, with the value that it has where the condition holds."""
+    match condition:
+        case syntax.Variable(name=name):
+            return name, True
+        case syntax.Unary(operator="NOT" | "not" | "!", of=of) if (asked := _asked_of(of)) is not None:
+            return asked[0], not asked[1]
+        case syntax.Binary(
+            operator="==" | "=", left=syntax.Variable(name=name), right=syntax.Constant(value=bool(value))
+        ):
+            return name, value
+    return None
+
+
+def _asked_again(routine: syntax.Routine, at: int, name: str) -> bool:
+    """Whether a routine may ask a variable again after an operation, before it sets it."""
+    graph, seen, waiting = _Graph(routine), {at}, [at]
+    while waiting:
+        for each in graph.after[waiting.pop()]:
+            operation = routine.code[each] if each != graph.end else None
+            asked = _asked_of(operation.condition) if isinstance(operation, syntax.Branch) else None
+            if asked is not None and asked[0] == name:
+                return True
+            is_set = isinstance(operation, syntax.Assign) and target_name(operation.target) == name
+            if operation is not None and each not in seen and not is_set:
+                seen.add(each)
+                waiting.append(each)
+    return False
+
+
 def _reached(graph: _Graph, first: int) -> set[int]:
     """Operations that may be carried out after coming to one."""
     seen: set[int] = set()
@@ -612,6 +661,24 @@ MANY_ROUNDS = 100  # of a loop to an unknown end, before more of them wait for a
 ASKED_EVERY = 64  # operations
 
 
+@dataclass(frozen=True, slots=True)
+class FirstMet:
+    """When a way first was in a state.
+
+    Attributes
+    ----------
+    way : its number
+    count : of states that were met before, by all ways
+    step : number of the last step before it
+    budget : operations that were left
+    """
+
+    way: int
+    count: int
+    step: int
+    budget: int
+
+
 @dataclass(slots=True)
 class Frame:
     """A routine that runs."""
@@ -623,10 +690,11 @@ class Frame:
     result: str = ""
     outs: tuple[tuple[str, syntax.Expression], ...] = ()
     aliased: frozenset[str] = frozenset()  # of the memory, before it was called
+    told: dict[str, syntax.Unclear] = field(default_factory=dict)  # what variables held that a side has told
 
     def copy(self) -> Frame:
         """Another that goes its own way from here."""
-        return replace(self, local=dict(self.local))
+        return replace(self, local=dict(self.local), told=dict(self.told))
 
 
 @dataclass(slots=True)
@@ -670,7 +738,8 @@ class Machine:
         self.names_met: set[str] = set()
         self.deciding_names: list[str] = []  # of those, whole
         self.unsettled = {name: unsettled(program, each, dialect) for name, each in program.routines.items()}
-        self.handed = {name: _handed_by(program, each) for name, each in program.routines.items()}
+        self.given_away = given_to_unknown(program, dialect)
+        self.handed = {name: _handed_by(program, each, self.given_away) for name, each in program.routines.items()}
         self.quiet, self.needed, self.choosing = quiet_branches(program, dialect)
         self.persisting = _persisting(program, dialect) & self.needed
         self.started_anew = {target_name(each.target) for each in program.data if dialect.starts_anew(each)}
@@ -690,10 +759,13 @@ class Machine:
         }
         self.started: set[Hashable] = set()  # what runs beside the program, by its state when it begins
         self.labels = {name: _labels(routine) for name, routine in program.routines.items()}
-        if any(isinstance(each, syntax.Halt) and each.again for each in program.operations()):
+        if program.entry in self.labels and any(
+            isinstance(each, syntax.Halt) and each.again for each in program.operations()
+        ):
             self.labels[program.entry] |= {0}
         self.loops = {name: _loops(routine) for name, routine in program.routines.items()}
-        self.seen: dict[Hashable, tuple[int, int, int, int]] = {}  # way, count, last step, budget
+        self.seen: dict[Hashable, FirstMet] = {}
+        self.asked_again: dict[tuple[str, int], bool] = {}
         self.read_before: dict[tuple[str, int], frozenset[str]] = {}  # of the persisting, before a label was come to
         self.waiting: list[ExecutionPath] = []
         self.second: list[ExecutionPath] = []  # rounds, which wait for all else
@@ -711,6 +783,7 @@ class Machine:
         """Follow all ways."""
         memory = ProgramMemory(self.dialect, self.cell)
         memory.beside = changed_beside(self.program, self.dialect)
+        memory.given_away = self.given_away
         for each in self.program.data:
             self._assign(memory, each)
         self.first_values = {name: value for name, value in memory.shared.items() if root(name) in self.persisting}
@@ -743,7 +816,7 @@ class Machine:
         """Go on with the program's beginning."""
         entry = self.program.routines[self.program.entry]
         way.frames = [Frame(entry)]
-        self._hold(way.frames[0].local, entry)
+        self._hold(way.memory, way.frames[0].local, entry)
         way.memory.local, way.memory.aliased = way.frames[0].local, self.unsettled[entry.name]
         way.memory.kept.clear()
 
@@ -913,6 +986,7 @@ class Machine:
             elif isinstance(operation.instruction, instructions.Unknown) and operation.instruction.may_move:
                 memory.lost(operation.instruction.text)
         elif isinstance(operation, syntax.Assign):
+            frame.told.pop(target_name(operation.target), None)
             signal = self._assign(memory, operation)
             if signal is not None:
                 self._note(way, operation.place, signal)
@@ -1037,6 +1111,7 @@ class Machine:
         holds = way.memory.value(branch.condition)
         if isinstance(holds, bool):
             way.asked[frame.routine.name, at] = self.budget
+            self._forget_told(way.memory, frame, branch, at)
             if not holds:
                 frame.at = branch.otherwise
             return not holds and branch.otherwise <= at
@@ -1054,14 +1129,15 @@ class Machine:
             self.numbers += 1
             self.sides.update((yes, no))
             if self.sides[yes] > MANY_ROUNDS and at in self.loops[frame.routine.name]:
-                self._take_sides(branch, holding=other, other=way)
+                self._take_sides(branch, at, holding=other, other=way)
                 self.waiting.insert(0, other)
                 return False
-            self._take_sides(branch, holding=way, other=other)
+            self._take_sides(branch, at, holding=way, other=other)
             self.waiting.append(other)
             return False
         if branch.place not in self.cut:
-            self._end(way, "branches", branch.place, limit=self.limits.ways)
+            kind: EndKind = "rounds" if at in self.loops[frame.routine.name] else "branches"
+            self._end(way, kind, branch.place, limit=self.limits.ways)
             self.cut.add(branch.place)
         taken = self.sides[yes] <= self.sides[no]
         self.sides[yes if taken else no] += 1
@@ -1070,11 +1146,38 @@ class Machine:
             frame.at = branch.otherwise
         return not taken and branch.otherwise <= at
 
-    def _take_sides(self, branch: syntax.Branch, holding: ExecutionPath, other: ExecutionPath) -> None:
-        """One way on the side of the condition, another on the other side."""
+    def _take_sides(self, branch: syntax.Branch, at: int, holding: ExecutionPath, other: ExecutionPath) -> None:
+        """One way on the side of the condition, another on the other side; each knows from there on what it tells of a
+        variable, as long as that may be asked again."""
+        asked = _asked_of(branch.condition)
+        if asked is not None and (held := self._told_by(holding, asked[0], at)) is not None:
+            name, value = asked
+            for way, holds in ((holding, True), (other, False)):
+                way.memory.write(name, value == holds)
+                way.frames[-1].told[name] = held
         other.frames[-1].at = branch.otherwise
         self._note(holding, branch.place, instructions.Decision(branch.text, True))
         self._note(other, branch.place, instructions.Decision(branch.text, False))
+
+    def _told_by(self, way: ExecutionPath, name: str, at: int) -> syntax.Unclear | None:
+        """What a variable of a way holds, of which a branch will tell its sides; None if it tells them nothing."""
+        frame = way.frames[-1]
+        if name in dict(frame.outs) or self.dialect.is_signal(name) or self.dialect.runs_on(name):
+            return None
+        held = way.memory.fixed_unknown(name)
+        return held if held is not None and self._is_asked_again(frame.routine, at, name) else None
+
+    def _forget_told(self, memory: ProgramMemory, frame: Frame, branch: syntax.Branch, at: int) -> None:
+        """Forget what a side has told of a variable that is not asked again, so that ways can meet."""
+        asked = _asked_of(branch.condition) if frame.told else None
+        if asked is not None and asked[0] in frame.told and not self._is_asked_again(frame.routine, at, asked[0]):
+            memory.write(asked[0], frame.told.pop(asked[0]))
+
+    def _is_asked_again(self, routine: syntax.Routine, at: int, name: str) -> bool:
+        key = (routine.name, at)  # at which one variable is asked
+        if key not in self.asked_again:
+            self.asked_again[key] = _asked_again(routine, at, name)
+        return self.asked_again[key]
 
     def _is_guessed(self, way: ExecutionPath, call: syntax.Call) -> bool:
         """Whether a routine is called that a text may name or not, as its value is not known."""
@@ -1088,7 +1191,7 @@ class Machine:
     def _call(self, way: ExecutionPath, call: syntax.Call) -> None:
         routine, memory = self.program.routines[call.routine], way.memory
         local, fits = _locals(routine, call, memory)
-        self._hold(local, routine)
+        self._hold(memory, local, routine)
         if call.result == syntax.START:
             del local["%inside"]
         if not fits:
@@ -1129,7 +1232,7 @@ class Machine:
                 for each in other.memory.beside & set(map(root, other.memory.local)):
                     given_in.forget(each)
             local, fits = _locals(routine, start.what, given_in)
-            self._hold(local, routine)
+            self._hold(other.memory, local, routine)
             other.frames = [Frame(routine, 0, local, (*way.frames[-1].calls, start.place))]
             other.memory.local = local
             state = (name, frozenset(local.items()), self._kept(other.memory.shared), other.memory.here.key())
@@ -1154,10 +1257,10 @@ class Machine:
         changed = _changed_in(self.program, _with_called(self.program, (name,)), self.dialect)
         return tuple(sorted(changed & self.dialect.modal))
 
-    def _hold(self, local: dict[str, syntax.Value], routine: syntax.Routine) -> None:
+    def _hold(self, memory: ProgramMemory, local: dict[str, syntax.Value], routine: syntax.Routine) -> None:
         """Keep that nothing is known of what a routine that begins hands over to what runs beside the program."""
         if handed := self.handed[routine.name]:
-            local |= {name: syntax.Unclear(name) for name in local if root(name) in handed}
+            local |= {name: memory.by_others(name) for name in local if root(name) in handed}
             local[HELD_BESIDE] = tuple(sorted(handed))
 
     def _changed_later(self, way: ExecutionPath) -> frozenset[str]:
@@ -1213,11 +1316,10 @@ class Machine:
         key = self._state(way)
         found = self.seen.get(key)
         if found is None:
-            self.seen[key] = (way.number, len(self.seen), way.step, self.budget)
+            self.seen[key] = FirstMet(way.number, len(self.seen), way.step, self.budget)
             return None
-        other, count, step, _ = found
-        own = other == way.number or any(other == earlier and count < until for earlier, until in way.line)
-        return ("repeats" if own else "joins"), step
+        before = any(found.way == earlier and found.count < until for earlier, until in way.line)
+        return ("repeats" if before or found.way == way.number else "joins"), found.step
 
     def _asked_in_round(self, way: ExecutionPath, before: int) -> list[syntax.Branch]:
         """What a way asked of variables in the round by which it repeats itself; nothing if the arm moves in it."""
@@ -1230,7 +1332,7 @@ class Machine:
         if state in self.waited:
             return []
         self.waited.add(state)
-        budget = self.seen[state][3]
+        budget = self.seen[state].budget
         branches = (self.program.routines[name].code[at] for (name, at), when in way.asked.items() if when <= budget)
         return [each for each in branches if isinstance(each, syntax.Branch) and any(names(each.condition))]
 

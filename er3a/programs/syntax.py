@@ -35,6 +35,11 @@ class PerhapsChanged(Unclear):
 
 
 @dataclass(frozen=True, slots=True)
+class Forgotten(Unclear):
+    """What a variable holds that was changed where the program was not followed, or that others may change."""
+
+
+@dataclass(frozen=True, slots=True)
 class Record:
     """Named values, in the language's own units: a position, a frame, a pose of URScript.
 

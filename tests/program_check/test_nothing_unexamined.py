@@ -20,6 +20,7 @@ from er3a.kinematics.forward import forward
 from er3a.pipeline.messages.programs import remedy_at, say
 from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.programs.csv_program import write_csv
+from er3a.programs.execution import RunLimits
 from er3a.programs.instructions import JointTarget, NamedFrame, UnresolvedTarget, numbers_of
 from er3a.programs.languages import files_of
 from testing.arms import palletiser
@@ -2091,3 +2092,67 @@ def test_an_interrupt_or_trigger_that_no_module_sets_up_is_named(tmp_path, line)
     more = 'TRAP tr1\nTPWrite "a";\nENDTRAP\n'
     known = check(tmp_path, rapid(f"{ready}{line}\nMoveJ p,v50,fine,tool0;", more, data), "a.mod")
     assert "program_not_simulated" not in codes(known)
+
+
+@pytest.mark.parametrize(
+    ("start", "later"),
+    [
+        ("INTERRUPT DECL 3 WHEN $IN[1]==TRUE DO FOO(H)", ""),
+        ("INTERRUPT DECL 3 WHEN $IN[1]==TRUE DO FOO(H)", "H=10\n"),  # the interrupt may come after this, too
+        ("INTERRUPT DECL 3 WHEN $IN[1]==TRUE DO FOO(1,H)", ""),
+        ("TRIGGER WHEN DISTANCE=0 DELAY=0 DO FOO(H) PRIO=-1", ""),
+    ],
+)
+@pytest.mark.parametrize("local", [True, False])
+def test_what_an_unknown_routine_beside_the_program_gets_by_reference_is_in_doubt(tmp_path, start, later, local):
+    (tmp_path / "a.dat").write_text(f"DEFDAT a\n{'' if local else 'DECL REAL H=5'}\nENDDAT\n")
+    declared = "DECL REAL H\n" if local else ""
+    body = f"{declared}H=5\n{start}\n{later}PTP {axes(HOME)}\nPTP {{A1 H}}"
+    found = check(tmp_path, krl(body), "a.src")
+    (missed,) = (each for each in found.findings if each.finding.code == "target_not_given")
+    assert (missed.level, missed.finding.reason) == ("caution", "perhaps_changed")
+    assert start in say(missed.finding)
+    assert "motion" in [each.what for each in found.not_examined]
+
+
+def test_of_a_known_routine_beside_the_program_an_input_stays_known(tmp_path):
+    more = "DEF FOO(X:IN)\nREAL X\n$OUT[1]=X>3\nEND\n"
+    body = f"DECL REAL H\nH=5\nINTERRUPT DECL 3 WHEN $IN[1]==TRUE DO FOO(H)\nPTP {axes(HOME)}\nPTP {{A1 H}}"
+    assert "target_not_given" not in codes(check(tmp_path, krl(body, more), "a.src"))
+
+
+@pytest.mark.parametrize("fits", [False, True])
+def test_what_a_call_by_an_unknown_name_gets_by_reference_is_in_doubt(tmp_path, fits):
+    call = '%"take_"+NumToStr(GInput(gi1),0)% n;'
+    more = "PROC take_1(num i)\nENDPROC\n" if fits else ""
+    body = f"n:=20;\n{call}\nMoveJ p,v50,fine,tool0;\nMoveJ Offs(p,0,n,0),v50,fine,tool0;"
+    found = check(tmp_path, rapid(body, more), "a.mod")
+    (missed,) = (each for each in found.findings if each.finding.code == "target_not_given")
+    assert (missed.level, missed.finding.reason) == ("caution", "perhaps_changed")
+    assert call.removesuffix(";") in say(missed.finding)
+    assert [each.place.line for each in found.not_examined if each.what == "motion"] == [missed.place.line]
+
+
+def test_a_point_that_a_controller_may_skip_where_blends_overlap_is_named(tmp_path):
+    points = (((0.38, 0.16), 0), ((0.4, 0.16), 0.015), ((0.4, 0.14), 0.015), ((0.38, 0.14), 0))
+    lines = "".join(f"  movel(p[{x},{y},0.32,0,{np.pi},0],v=0.1,r={r})\n" for (x, y), r in points)
+    found = check(tmp_path, f"def a():\n  set_tcp(p[0,0,0,0,0,0])\n{lines}end\n")
+    skipped = [each for each in found.findings if each.finding.code == "zone_too_large"]
+    assert [(each.level, each.place.line) for each in skipped] == [("caution", 4), ("caution", 5)]
+    assert "skip the point: the way without it was not followed" in say(skipped[0].finding)
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("a.src", "DEF a(N:IN)\nINT I,N\nFOR I=1 TO N\nPTP {A1 1}\nPTP {A1 2}\nENDFOR\nEND\n"),
+        ("a.src", "DEF a( )\nINT I\nFOR I=1 TO $IN[1]\nPTP {A1 I}\nPTP {A1 2}\nENDFOR\nEND\n"),
+        ("a.pgm", "(* *)\n\nFOR i := 1 TO n DO\nMJOINT(POINTJ(0,-10,-10,0,-70,i),v5perc,fine,tool0);\nEND_FOR;\n"),
+    ],
+)
+def test_that_the_number_of_a_loops_rounds_is_not_known_and_was_cut_is_named(tmp_path, name, text):
+    found = check(tmp_path, text, name, limits=RunLimits(ways=20))
+    (cut,) = (each for each in found.findings if each.finding.code == "not_followed_to_end")
+    assert (cut.level, cut.place.line, cut.finding.kind) == ("caution", 3, "rounds")
+    assert "how often this loop goes round is known on the cell alone" in say(cut.finding)
+    assert (3, "course") in [(each.place.line, each.what) for each in found.not_examined]

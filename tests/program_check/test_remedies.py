@@ -305,6 +305,10 @@ MENDED = {
         ),
         krl(*(line for k in range(6) for line in (f"IF $IN[{k}] THEN", f"PTP {{A1 {k}}}", "ENDIF"))),
     ),
+    "not_followed_to_end.rounds": (
+        (krl("FOR i=1 TO $ANIN[1]", "PTP {A1 5}", "PTP {A1 0}", "ENDFOR"), {"limits": RunLimits(ways=3)}),
+        krl("FOR i=1 TO 20", "PTP {A1 5}", "PTP {A1 0}", "ENDFOR"),
+    ),
     "not_come_to": (
         (krl("FOR i=1 TO 40", "PTP {A1 5}", "PTP {A1 0}", "ENDFOR", AT_HOME), {"limits": RunLimits(operations=60)}),
         krl("FOR i=1 TO 40", "PTP {A1 5}", "PTP {A1 0}", "ENDFOR", AT_HOME),

@@ -8,7 +8,7 @@ import pytest
 from er3a.files.robot_library import load_robot
 from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.programs.execution import RunLimits
-from er3a.programs.instructions import Decision, JointTarget
+from er3a.programs.instructions import ArmMotion, Decision, JointTarget
 from er3a.programs.languages import read_program
 from er3a.programs.machine import Machine, execute
 from tests.programs.test_round_trips import ROBOT
@@ -183,9 +183,63 @@ def test_a_loop_to_an_unknown_end_leaves_branches_for_what_is_behind_it(tmp_path
         step.before for step in execution.steps if isinstance(step.instruction, Decision) and step.place.line == 7
     ]
     assert len(behind) > len(set(behind)), "both sides were followed from one state"
-    assert {each.place.line for each in execution.endings if each.kind == "branches"} == {4, 7}
+    assert {each.place.line: each.kind for each in execution.endings if each.kind != "end"} == {
+        4: "rounds",
+        7: "branches",
+    }
     cut = execute(program_of(tmp_path, "p.src", text), ROBOT, limits=RunLimits(ways=1))
-    assert {each.kind for each in cut.endings} == {"branches", "end"}, "it leaves the loop"
+    assert [each.place.line for each in cut.endings if each.kind == "rounds"] == [4]
+    assert {each.kind for each in cut.endings} == {"rounds", "branches", "end"}, "it leaves the loop"
+
+
+def sides(first, second, before="SW=$IN[1]\n", between="", declared="BOOL SW\n", more=""):
+    """A program that asks twice, and moves axis 1 on each of the four sides."""
+    asked = f"IF {first} THEN\nPTP {{A1 1}}\nELSE\nPTP {{A1 2}}\nENDIF\n{between}"
+    asked += f"IF {second} THEN\nPTP {{A1 3}}\nELSE\nPTP {{A1 4}}\nENDIF\n"
+    return f"DEF p( )\n{declared}PTP {{A1 0,A2 0,A3 0,A4 0,A5 30,A6 0}}\n{before}{asked}END\n{more}"
+
+
+ONCE, OPPOSITE = {(1, 3), (2, 4)}, {(1, 4), (2, 3)}
+ANY = ONCE | OPPOSITE
+SET = "DEF set(V:OUT)\nBOOL V\nV=$IN[1]\nEND\n"
+ASKED_TWICE = {  # the program, which sides of the two branches one run may take
+    "once": (sides("SW", "SW"), ONCE),
+    "not": (sides("SW", "NOT SW"), OPPOSITE),
+    "compared": (sides("SW==TRUE", "SW==FALSE"), OPPOSITE),
+    "input": (sides("$IN[1]", "$IN[1]"), ANY),
+    "set_again": (sides("SW", "SW", between="SW=$IN[1]\n"), ANY),
+    "set_by_a_routine": (sides("SW", "SW", between="set(SW)\n", more=SET), ANY),
+    "set_in_a_routine": (sides("SW", "SW", before="set(SW)\n", more=SET), ONCE),
+    "perhaps_set": (sides("SW", "SW", between="IF $IN[2] THEN\nSW=$IN[1]\nENDIF\n"), ANY),
+    "two_variables": (sides("SW", "TW", "SW=$IN[1]\nTW=SW\n", declared="BOOL SW,TW\n"), ANY),
+    "not_its_own": (sides("SW", "SW", declared=""), ANY),
+    "nothing_assigned": (sides("SW", "SW", before=""), ANY),
+    "interrupt": (sides("SW", "SW", "INTERRUPT DECL 3 WHEN $IN[2] DO set(SW)\nSW=$IN[1]\n", more=SET), ANY),
+    "unknown_interrupt": (sides("SW", "SW", "INTERRUPT DECL 3 WHEN $IN[2] DO FOO(SW)\nSW=$IN[1]\n"), ANY),
+}
+
+
+@pytest.mark.parametrize("case", ASKED_TWICE)
+def test_a_variable_that_is_read_once_has_one_value_at_both_branches(case, tmp_path):
+    text, wanted = ASKED_TWICE[case]
+    execution = execute(program_of(tmp_path, "p.src", text), ROBOT)
+    found = set()
+    for ending in (each for each in execution.endings if not each.beside):
+        way = [execution.steps[i].instruction for i in execution.way(ending)]
+        moved = [round(np.degrees(each.target.joints[0])) for each in way if isinstance(each, ArmMotion)]
+        found.add(tuple(each for each in moved if each))
+    assert {each for each in found if len(each) == 2} == wanted  # shorter ones join another between the two
+
+
+def test_ways_meet_behind_the_last_branch_that_asks_a_variable(tmp_path):
+    asked = "SW=$IN[1]\nIF SW THEN\nPTP {A1 1}\nENDIF\nIF SW THEN\nPTP {A1 2}\nENDIF\nPTP {A1 0}\n"
+    start = "DEF p( )\nBOOL SW\nPTP {A1 0,A2 0,A3 0,A4 0,A5 30,A6 0}\n"
+    text = f"{start}SW=$IN[1]\nLOOP\n{asked}ENDLOOP\nEND\n"
+    execution = execute(program_of(tmp_path, "p.src", text), ROBOT)
+    assert execution.complete
+    assert len([each for each in execution.steps if isinstance(each.instruction, Decision)]) == 4, (
+        "two rounds, of one branch each"
+    )
 
 
 @pytest.mark.parametrize("phase", ["following", "checking"])

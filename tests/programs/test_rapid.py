@@ -528,36 +528,64 @@ def test_types_that_two_modules_declare_local_are_two(tmp_path):
     np.testing.assert_allclose([each.target.pose[:2, 3] * 1000 for each in found], [[103, 204], [105, 206]])
 
 
-REFUSED = {  # instructions, the one that a controller refuses
-    "undeclared": ("zz:=5; zz:=zz+1; MoveL Offs(p,zz,0,0),@;", "zz:=5"),
-    "undeclared_element": ("zz{2}:=5; MoveL p,@;", "zz{2}:=5"),
-    "undeclared_with_another": ("Incr zz; MoveL p,@;", "Incr zz"),
-    "declared_in_another_routine": ("zz:=5; MoveL p,@; MORE PROC other() VAR num zz; zz:=1; ENDPROC", "zz:=5"),
-    "counter": ("FOR i FROM 1 TO 3 DO i:=i+1; MoveL p,@; ENDFOR", "i:=i+1"),
-    "counter_with_another": ("FOR i FROM 1 TO 3 DO Incr i; MoveL p,@; ENDFOR", "Incr i"),
-    "negative_wait": ("WaitTime -1; MoveL p,@;", "WaitTime -1"),
+REFUSED = {  # instructions, the one that a controller refuses; none if it takes them all
+    "undeclared": ("zz:=5; zz:=zz+1; MoveL Offs(p,zz,0,0),@;", ["zz:=5"]),
+    "undeclared_element": ("zz{2}:=5; MoveL p,@;", ["zz{2}:=5"]),
+    "undeclared_with_another": ("Incr zz; MoveL p,@;", ["Incr zz"]),
+    "declared_in_another_routine": ("zz:=5; MoveL p,@; MORE PROC other() VAR num zz; zz:=1; ENDPROC", ["zz:=5"]),
+    "counter": ("FOR i FROM 1 TO 3 DO i:=i+1; MoveL p,@; ENDFOR", ["i:=i+1"]),
+    "counter_with_another": ("FOR i FROM 1 TO 3 DO Incr i; MoveL p,@; ENDFOR", ["Incr i"]),
+    "negative_wait": ("WaitTime -1; MoveL p,@;", ["WaitTime -1"]),
+    "registers": ("reg1:=5; Incr reg5; MoveL p,@;", []),
+    "counters": ("FOR i FROM 1 TO 3 DO FOR k FROM i TO 3 STEP 1 DO n:=i; MoveL p,@; ENDFOR ENDFOR", []),
+    "a_counter_that_hides_data": ("FOR n FROM 1 TO 3 DO MoveL p,@; ENDFOR n:=1;", []),
+    "parameters": ("other n; MoveL p,@; MORE PROC other(INOUT num a \\num b) a:=1; b:=2; ENDPROC", []),
+    "another_module_is_missing": ("zz:=5; MoveL far_away,@;", []),
+    "no_wait": ("WaitTime 0; MoveL p,@;", []),
 }
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_what_a_controller_refuses_is_named(case, tmp_path):
-    body, text = REFUSED[case]
-    assert [each.text for each in read_program(saved(tmp_path, body)).findings] == [text]
+def test_what_a_controller_refuses_is_named_and_nothing_else(case, tmp_path):
+    body, refused = REFUSED[case]
+    assert [each.text for each in read_program(saved(tmp_path, body)).findings] == refused
 
 
-ALLOWED = {
-    "registers": "reg1:=5; Incr reg5; MoveL p,@;",
-    "counters": "FOR i FROM 1 TO 3 DO FOR k FROM i TO 3 STEP 1 DO n:=i; MoveL p,@; ENDFOR ENDFOR",
-    "a_counter_that_hides_data": "FOR n FROM 1 TO 3 DO MoveL p,@; ENDFOR n:=1;",
-    "parameters": "other n; MoveL p,@; MORE PROC other(INOUT num a \\num b) a:=1; b:=2; ENDPROC",
-    "another_module_is_missing": "zz:=5; MoveL far_away,@;",
-    "no_wait": "WaitTime 0; MoveL p,@;",
+SET_CONSTANTS = {  # instructions in the third line after main's head, the constant
+    "of_the_module": ("size:=3;", "SIZE"),
+    "a_part": ("p.trans.x:=10;", "P"),
+    "an_element": ("pts{1}:=down;", "PTS"),
+    "increased": ("Incr size;", "SIZE"),
+    "cleared": ("Clear size;", "SIZE"),
+    "of_the_routine": ("n:=1;", "N"),
+    "behind_a_condition": ("IF flag size:=3;", "SIZE"),
+    "in_a_handler": ("MoveL p,@; ERROR size:=3; RETRY;", "SIZE"),
 }
 
 
-@pytest.mark.parametrize("case", ALLOWED)
-def test_what_a_controller_takes_is_not_named(case, tmp_path):
-    assert not read_program(saved(tmp_path, ALLOWED[case])).findings
+@pytest.mark.parametrize("case", SET_CONSTANTS)
+def test_a_constant_that_is_assigned_to_is_an_error_with_its_line_and_name(case, tmp_path):
+    line, name = SET_CONSTANTS[case]
+    local = "CONST num n:=1;" if name == "N" else "VAR num other;"
+    path = saved(tmp_path, f"    {local}\n    MoveL p,@;\n    {line}")
+    first = path.read_text(encoding="utf-8").split("\n").index("  PROC main()") + 1
+    with pytest.raises(InputError) as caught:
+        read_program(path)
+    assert f"line {first + 3}: {name} is a constant" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        "VAR num size; size:=3; MoveL p,@;",
+        "FOR size FROM 1 TO 3 DO MoveL p,@; ENDFOR",
+        "other 4; MoveL p,@; MORE PROC other(num size) size:=3; ENDPROC",
+        'ReadRawBytes raw,size; SetDataVal "size",n; MoveL p,@;',
+        "n:=1; other; MoveL p,@; MORE PROC other() CONST num n:=4; ENDPROC",
+    ],
+)
+def test_what_only_has_the_name_of_a_constant_may_be_set(body, tmp_path):
+    assert motions(execute(read_program(saved(tmp_path, body))))
 
 
 def test_what_an_instruction_reads_has_no_known_value(tmp_path):
@@ -725,3 +753,10 @@ def test_a_displacement_that_is_not_known_is_the_frame_that_the_cell_gives(tmp_p
         check = check_program(read_program(file), ROBOT, CheckOptions(np.zeros(6), frames=frames, measures=False))
         found[name] = [each.finding.name for each in check.findings if each.finding.code == "frame_not_given"]
     assert found == {"unknown": ["PDispOn"], "given": []}
+
+
+def test_a_module_of_data_alone_beside_one_that_begins_again_has_no_motions(tmp_path):
+    (tmp_path / "b.mod").write_text("MODULE b\nPERS num k:=1;\nPROC again()\nk:=2;\nExitCycle;\nENDPROC\nENDMODULE\n")
+    (tmp_path / "a.mod").write_text("MODULE a\nPERS num m:=k;\nENDMODULE\n")
+    found = check_program(read_program(tmp_path / "a.mod"), ROBOT, CheckOptions(measures=False))
+    assert "program_nothing_moves" in {each.finding.code for each in found.findings}

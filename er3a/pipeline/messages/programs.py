@@ -164,6 +164,7 @@ STOPPED: dict[EndKind, str] = {
     ),
     "operations": FURTHER,
     "branches": FURTHER,
+    "rounds": N_("Give the loop a number of rounds in the program, the greatest that it may have."),
     "stopped": FURTHER,
     "recursion": N_("Give the routine a condition to return."),
     "guessed": N_("Call routines by their names, chosen by a test of the text."),
@@ -251,8 +252,9 @@ TEXTS = texts(
             "{least_mm:.1f} mm"
         ),
         "zone_too_large": (
-            "the zone of {zone_mm:.1f} mm is larger than half of a motion of {motion_mm:.1f} mm: checked with half, "
-            "but a controller may round more, or skip the point"
+            "the zone of {zone_mm:.1f} mm is larger than half of a motion of {motion_mm:.1f} mm: checked with half; a "
+            "controller may round more, or, as UR's where blends overlap, skip the point: the way without it was not "
+            "followed"
         ),
         "zone_without_size": "the size of the zone {zone} is not known; half of each motion was taken",
         "arc_has_no_circle": "the arc's points do not define a circle",
@@ -275,6 +277,10 @@ TEXTS = texts(
             operations="the program was followed for {limit} instructions, and no further than here",
             branches=(
                 "not each side of this branch was followed: the program has more than {limit} sequences of its branches"
+            ),
+            rounds=(
+                "how often this loop goes round is known on the cell alone; not each number of rounds was followed, as "
+                "the program has more than {limit} sequences of its branches"
             ),
             stopped="the program was followed no further than here: the time for it was over",
             recursion="routines call themselves or each other without end",

@@ -7,6 +7,8 @@ from collections.abc import Container, Mapping
 from er3a.programs import syntax
 from er3a.programs.code_builder import variable_of
 
+LATE = "%LATE"
+"""A call by a text that names no procedure of the program."""
 CHANGING = {
     "TPREADNUM": 0,
     "TPREADFK": 0,
@@ -135,7 +137,7 @@ def perhaps_changed(call: syntax.Invocation, fixed: Container[str]) -> list[synt
 
     ``fixed``: names of constants, and of data that hardly any routine changes, such as tools.
     """
-    if is_known(call.function):
+    if is_known(call.function) and call.function != LATE:
         return []
     given = (each for each in (*call.arguments, *(each for _, each in call.keywords)) if each is not None)
     return [each for each in given if (name := variable_of(each)) and name not in fixed]

@@ -79,7 +79,7 @@ MOTION_OPTIONS = frozenset(OPTIONS_TEXT.split())
 """Optional arguments of motions that are followed, or leave them as they are; ``\\Corr`` shifts the path."""
 CALLING = ("MOVEJSYNC", "MOVELSYNC", "MOVECSYNC")
 """Motions that call a procedure, named by a text, where they end."""
-UPPER, ARITHMETIC, TYPED, STEP, LATE = "%UPPER", "%ARITHMETIC", "%TYPED", "%STEP", "%LATE"
+UPPER, ARITHMETIC, TYPED, STEP, LATE = "%UPPER", "%ARITHMETIC", "%TYPED", "%STEP", known_names.LATE
 RAISING = ("SOCKET", "OPEN", "READ", "WRITE", "LOAD", "UNLOAD", "STARTLOAD", "RMQ", "COPYFILE", "REMOVE", "MAKEDIR")
 """How instructions begin that often end with an error; any other may too, if less often."""
 FAILED = "%FAILED"
@@ -242,7 +242,7 @@ def read_rapid(source: ProgramText) -> syntax.Program:
     Raises
     ------
     InputError
-        for texts and blocks without an end
+        for texts and blocks without an end, and for a constant that is assigned to
     """
     cursors = [Cursor(text) for text in (*map(read_program_text, modules_of(source.path)), source)]
     procedures = {name: count for cursor in cursors for name, count in _procedures(cursor.tokens).items()}
@@ -266,6 +266,7 @@ def read_rapid(source: ProgramText) -> syntax.Program:
         )
         findings.append(NameTwice(name, last.place))
     routines = [each for reader in readers for each in reader.routines]
+    _refuse_set_constants(routines, data)
     fixed = _fixed(routines, data)
     by_name, unlinked = linked(
         routines, known_names.changed_arguments, lambda call: known_names.perhaps_changed(call, fixed)
@@ -315,6 +316,35 @@ def _undeclared(routines: Iterable[syntax.Routine], declared: set[str]) -> Itera
     others = (name for name in given - found.keys() if "%" not in name)
     is_missing = any(predefined(name.removeprefix("/")) is None for name in others)
     return () if is_missing else found.values()
+
+
+def _refuse_set_constants(routines: Iterable[syntax.Routine], data: Iterable[syntax.Assign]) -> None:
+    """Refuse a program that assigns something to a constant, as a controller refuses to load it.
+
+    Raises
+    ------
+    InputError
+        with the line and the constant's name
+    """
+    shared = _constants(data)
+    for routine in routines:
+        code = [each for each in (*routine.code, *routine.handler) if isinstance(each, syntax.Assign)]
+        fixed = _constants(each for each in code if each.local) | (shared - own_names(routine))
+        for each in code:
+            name = variable_of(each.target)
+            if name in fixed and each.text and not each.type_name and not _is_unclear(each.value):
+                problem = f"{name.rpartition('/')[2]} is a constant (CONST), which no instruction can change"
+                raise fault(each.place, problem, "Declare it with VAR or PERS, or remove this line")
+
+
+def _constants(declarations: Iterable[syntax.Assign]) -> set[str]:
+    """Names that are declared as constants, and as nothing else."""
+    declared = [
+        (variable_of(each.target), each.text.upper().startswith("CONST")) for each in declarations if each.type_name
+    ]
+    return {name for name, is_constant in declared if is_constant} - {
+        name for name, is_constant in declared if not is_constant
+    }
 
 
 def _is_unclear(value: syntax.Expression | None) -> bool:
@@ -822,8 +852,9 @@ class _BodyReader:
             for name, count in self.module.procedures.items()
             if name.startswith(prefix) and count == len(given[0]) and name != "MAIN"
         ]
+        none_fits = syntax.Doing(place, syntax.Invocation(LATE, *given), text)
         if not fitting or len(fitting) > MAX_LATE:
-            self.builder.unknown(place, text)
+            self.builder.add(none_fits)
             return
         for i, name in enumerate(fitting):
             test = syntax.Binary("=", syntax.Invocation(UPPER, (called,)), syntax.Constant(name))
@@ -833,7 +864,7 @@ class _BodyReader:
                 self.builder.next_arm(place, test, text)
             self.builder.add(syntax.Doing(place, syntax.Invocation(self.scope.meant(name), *given), text))
         self.builder.next_arm(place, None, text)
-        self.builder.add(syntax.Doing(place, syntax.Invocation(LATE, ()), text))
+        self.builder.add(none_fits)
         self.builder.close("if", place)
 
     def _remark(self, token: Token) -> None:
