@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -13,9 +14,10 @@ from scipy.stats import t as student
 
 from er3a.geometry.transforms import moved, transform
 from er3a.pipeline.messages.vision import say
+from er3a.pipeline.stages.vision.compute import _open_frames
 from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.classic_methods import METHOD_NAMES, solved_by
-from er3a.vision.hand_eye import calibrate_hand_eye, position_axes
+from er3a.vision.hand_eye import TouchCheck, calibrate_hand_eye, position_axes
 from er3a.vision.likelihood import PoseObservations, flange_to_camera, refine, residuals
 from er3a.vision.setup_changes import moved_between
 from er3a.vision.vision_findings import (
@@ -315,6 +317,23 @@ def test_axes_negated_or_swapped_in_positions_are_named(setup, stream, axes):
     assert (named.stream, named.axes) == (stream, axes)
     assert named.rms_other_mm < 3 < 15 < named.rms_given_mm
     assert grave_warnings(found.warnings) == (named,)
+
+
+@pytest.mark.parametrize("setup", SETUPS)
+def test_recorded_poses_are_doubted_where_nothing_is_compared_with_them(setup):
+    """Of one rule: the command lists all frames, grasps rest on the camera's alone."""
+    own = "flange_poses" if setup == "eye_in_hand" else "base_poses"
+    for joints, touched, simulated, frames in (
+        (False, False, False, ("flange_poses", "base_poses")),
+        (False, True, False, ("flange_poses",)),
+        (True, False, False, ()),
+        (False, False, True, ()),
+    ):
+        found = calibrate_hand_eye(a_set(setup, 9, of_joints=joints))
+        found = replace(found, touch=TouchCheck(np.zeros((1, 3)), np.ones((1, 3)), 1.0) if touched else None)
+        assert found.open_frames(simulated) == frames
+        head = SimpleNamespace(setup=setup, simulated=simulated)
+        assert _open_frames(found, head) == tuple(each for each in frames if each == own)
 
 
 def test_residuals_that_nothing_explains_are_an_error():

@@ -464,16 +464,13 @@ def _without_calibration(summary: model.VisionSummary) -> model.VisionResults:
 
 
 def _open_frames(found: HandEye, head: HandEyeFile) -> tuple[LeftOutSubject, ...]:
-    """Of which frames grasps rest on recorded poses that no joint values are compared with.
+    """Of the frames that nothing is compared with, the one that the camera is in: grasps rest on no other.
 
     A tool's pose in place of the flange's moves a camera on the flange by as much, and what it sees of the base not at
     all, so touched points agree. A fixed camera stays where it is, in the frame that poses and touched points are in.
     """
-    if head.simulated or found.samples.states_joints:
-        return ()
-    if head.setup == "eye_in_hand":
-        return ("flange_poses",)
-    return ("base_poses",) if found.touch is None else ()
+    camera_in: LeftOutSubject = "flange_poses" if head.setup == "eye_in_hand" else "base_poses"
+    return tuple(each for each in found.open_frames(head.simulated) if each == camera_in)
 
 
 def _left_out(
