@@ -463,13 +463,6 @@ class HandEye(ByValue, Displayed):
         """Names of samples left out as equal to an earlier one in both poses."""
         return tuple(name for name, copy in zip(self.samples.names, _copies(self.samples)) if copy)
 
-    def open_frames(self, simulated: bool) -> tuple[vision_findings.OpenFrame, ...]:
-        """Of which frames the poses rest on recorded ones that nothing is compared with: joint values say which flange
-        and base are meant, touched points where the base is; simulated poses are known."""
-        if simulated or self.samples.states_joints:
-            return ()
-        return ("flange_poses", "base_poses") if self.touch is None else ("flange_poses",)
-
     def sheet(self) -> Sheet:
         """The twelve numbers with half their 95 % intervals."""
         in_hand = self.samples.setup == "eye_in_hand"

@@ -88,9 +88,6 @@ class PositionAxes(Finding):
     rms_other_mm: float
 
 
-OpenFrame = Literal["flange_poses", "base_poses"]
-"""What recorded poses may not be: the flange's, and in the robot's own base."""
-
 ReadingKind = Literal[
     "quaternion_order", "angle_order", "transposed_rotations", "position_axes", "other_direction", "joint_zero"
 ]

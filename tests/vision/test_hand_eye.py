@@ -18,7 +18,7 @@ from er3a.pipeline.messages.vision import say
 from er3a.pipeline.stages.vision.compute import _open_frames
 from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.classic_methods import METHOD_NAMES, solved_by
-from er3a.vision.hand_eye import TouchCheck, calibrate_hand_eye, position_axes
+from er3a.vision.hand_eye import calibrate_hand_eye, position_axes
 from er3a.vision.likelihood import PoseObservations, flange_to_camera, refine, residuals
 from er3a.vision.setup_changes import moved_between
 from er3a.vision.vision_findings import (
@@ -331,11 +331,10 @@ def test_recorded_poses_are_doubted_where_nothing_is_compared_with_them(setup):
         (True, False, False, ()),
         (False, False, True, ()),
     ):
-        found = calibrate_hand_eye(a_set(setup, 9, of_joints=joints))
-        found = replace(found, touch=TouchCheck(np.zeros((1, 3)), np.ones((1, 3)), 1.0) if touched else None)
-        assert found.open_frames(simulated) == frames
+        samples = a_set(setup, 9, of_joints=joints, touched=np.zeros((3, 2, 3)) if touched else None)
+        assert samples.open_frames(simulated) == frames
         head = SimpleNamespace(setup=setup, simulated=simulated)
-        assert _open_frames(found, head) == tuple(each for each in frames if each == own)
+        assert _open_frames(samples, head) == tuple(each for each in frames if each == own)
 
 
 def test_residuals_that_nothing_explains_are_an_error():

@@ -350,7 +350,7 @@ def hand_eye(
         table = correct_table(found, arm, asked) if arm and asked else None
     boardless = images.boardless if images else ()
     wrong = isinstance(table, TableCorrections) and table.probability < TABLE_CONTRADICTED
-    open_frames = found.open_frames(head.simulated)
+    open_frames = samples.open_frames(head.simulated)
     missed = {
         LeftOut("real_camera"): head.simulated,
         LeftOut("stream_poses", amount=offset.unused if offset else 0): bool(offset and offset.unused),
