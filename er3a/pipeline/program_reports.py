@@ -11,7 +11,7 @@ import hashlib
 import math
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -30,12 +30,11 @@ from er3a.kinematics.singularity import USUAL_NEAR
 from er3a.pipeline.messages.language import as_text
 from er3a.pipeline.messages.left_out import left_out_names, left_out_text
 from er3a.pipeline.messages.programs import remedy_at, say
-from er3a.pipeline.results import NEVER_A_PASS, LeftOut, NoPass, plain
+from er3a.pipeline.results import LeftOut, NoPass, plain
 from er3a.pipeline.stages.left_out import (
-    left_out_of_collisions,
-    left_out_of_limits,
     left_out_of_rates,
     left_out_of_units,
+    missed_of_program,
 )
 from er3a.pipeline.stages.trajectory.judgement import Surroundings, collisions, judge, measured, min_clearance
 from er3a.pipeline.stages.trajectory.motion import CHOSEN, listed_motions
@@ -51,7 +50,7 @@ from er3a.program_check.check_program import (
     assumed_limits,
     check_program,
 )
-from er3a.program_check.program_check_findings import Level, worst_of
+from er3a.program_check.program_check_findings import Level
 from er3a.programs.instructions import Place
 from er3a.programs.languages import WITHOUT_JOINTS, not_written, read_program
 from er3a.programs.program_findings import WriteFinding
@@ -95,14 +94,8 @@ def checked_file(file: Path, robot: Robot, options: CheckOptions, doubts: Sequen
         check = check_program(program, robot, options)
     except InputError as error:
         return CheckedFile(file, None, error)
-    missed = (
-        *missed_collisions(robot, options.scene, check.arms),
-        *left_out_of_limits(robot),
-        *left_out_of_units([*doubts, *own]),
-    )
-    if missed:
-        verdicts = tuple(replace(each, level=worst_of((each.level, "caution"))) for each in check.verdicts)
-        check = replace(check, level=worst_of((check.level, "caution")), verdicts=verdicts)
+    missed = (*missed_of_program(robot, options.scene, check.arms), *left_out_of_units([*doubts, *own]))
+    check = check.short_of(bool(missed))
     known = np.isfinite(robot.speed), not assumed_limits(robot, options).acceleration_assumed
     assumed = (*left_out_of_rates(*known, jerk=True), *_guessed_pairs(robot, options))
     return CheckedFile(file, check, missed=missed, assumed=assumed)
@@ -112,12 +105,6 @@ def _guessed_pairs(robot: Robot, options: CheckOptions) -> tuple[LeftOut, ...]:
     """Neighbouring links of which guessed shapes show nothing."""
     pairs = bodies_of(robot, options.scene).guessed if options.measures else ()
     return (LeftOut("guessed_pairs", tuple(pair.label for pair in pairs)),) if pairs else ()
-
-
-def missed_collisions(robot: Robot, scene: Scene | None, arms: Iterable[tuple[str, Robot]] = ()) -> tuple[LeftOut, ...]:
-    """What a check for collisions leaves out without which nothing passes; ``arms`` with the tools of programs."""
-    left_out = left_out_of_collisions(robot, bodies_of(robot, scene), scene, arms=arms)
-    return tuple(each for each in left_out if each.subject in NEVER_A_PASS)
 
 
 def lines_of(checked: CheckedFile, verdicts: bool = False) -> list[str]:

@@ -162,6 +162,7 @@ LeftOutSubject = Literal[
     "touched_points",
     "detections",
     "gripped_parts",
+    "grasps",
     "unjoined_cells",
     "within_cells",
     "targets",

@@ -197,6 +197,13 @@ class ProgramCheck(ByValue):
     not_examined: tuple[NotExamined, ...] = ()
     shapes: ShapesAssumed | None = None
 
+    def short_of(self, missed: bool) -> ProgramCheck:
+        """The check where something was not examined of any motion: none of its verdicts is a pass."""
+        if not missed:
+            return self
+        verdicts = tuple(replace(each, level=found_in.worst_of((each.level, "caution"))) for each in self.verdicts)
+        return replace(self, level=found_in.worst_of((self.level, "caution")), verdicts=verdicts)
+
     @property
     def arms(self) -> tuple[tuple[str, Robot], ...]:
         """The robot with each tool that motions have, and the name that the program gives the tool."""

@@ -20,6 +20,8 @@ from er3a.geometry.transforms import check_poses, inverted, posed
 from er3a.numerics.arrays import Flags, Integers, Reals
 
 Setup = Literal["eye_in_hand", "eye_to_hand"]
+OpenFrame = Literal["flange_poses", "base_poses"]
+"""What recorded poses may not be: the flange's, and in the robot's own base."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -85,6 +87,13 @@ class CalibrationSet(ByValue, Displayed):
     def hand(self) -> Reals:
         """F (N, 4, 4) of F X B = Y: T_base_flange for a camera on the flange, T_flange_base for a fixed one."""
         return self.flange if self.setup == "eye_in_hand" else inverted(self.flange)
+
+    def open_frames(self, simulated: bool) -> tuple[OpenFrame, ...]:
+        """Of which frames recorded poses may be others, as nothing is compared with them: joint values say which flange
+        and base are meant, touched points where the base is; simulated poses are known."""
+        if simulated or self.states_joints:
+            return ()
+        return ("flange_poses", "base_poses") if self.touched is None else ("flange_poses",)
 
     @property
     def states_joints(self) -> bool:

@@ -512,8 +512,9 @@ def calibrate_hand_eye(samples: calibration_set.CalibrationSet) -> HandEye:
     directions = directions_tried(kept, refined)
     warnings += _warnings(kept, refined, greatest, apart, directions)
     share = _places(kept.flange) / len(kept)  # samples at one place count as one
-    others = [each.code for each in vision_findings.grave_warnings(warnings) if each.code != "unexplained_residuals"]
-    if not others and share > MOSTLY_APART and (step := moved_between(samples.take(once), used[once], refined)):
+    named = {each.code for each in vision_findings.grave_warnings(warnings)} - {"unexplained_residuals", "more_scatter"}
+    if not named and share > MOSTLY_APART and (step := moved_between(samples.take(once), used[once], refined)):
+        warnings = [replace(w, tried=()) if isinstance(w, vision_findings.MoreScatter) else w for w in warnings]
         warnings.append(step)
     covariance = refined.covariance / share + _shared_covariance(kept, refined)
     half_width = scipy.special.stdtrit(refined.freedom * share, (1 + CONFIDENCE) / 2) * np.sqrt(np.diag(covariance))
@@ -636,6 +637,9 @@ def _warnings(
     if abs(factor - 1) > max(2 * half_width, MIN_SCALE_ERROR) and factor > SURE_SCALE * half_width:
         found.append(vision_findings.BoardScale(factor, half_width))
     size, turn = _misfit(refined.residual)
+    if [each.code for each in vision_findings.grave_warnings(found)] == ["more_scatter"]:
+        tried = vision_findings.READINGS if size >= 1 else vision_findings.READINGS_IN_SMALL
+        return [replace(each, tried=tried) if isinstance(each, vision_findings.MoreScatter) else each for each in found]
     if size > 1 and not vision_findings.grave_warnings(found):
         distance = float(1000 * np.sqrt((refined.residual[:, :3] ** 2).mean()))
         found.append(vision_findings.UnexplainedResiduals(distance, turn, vision_findings.READINGS))

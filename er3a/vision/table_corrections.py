@@ -36,6 +36,7 @@ from er3a.vision.vision_findings import (
     CalibrationWarning,
     HandEyeError,
     JointZero,
+    MoreScatter,
     UnexplainedResiduals,
     grave_warnings,
 )
@@ -202,7 +203,7 @@ EXPLAINED_BY_A_ZERO = {"board_scale", "unexplained_residuals", "moved_between", 
 
 
 def _zeros_too(warning: CalibrationWarning) -> CalibrationWarning:
-    if isinstance(warning, UnexplainedResiduals):
+    if isinstance(warning, UnexplainedResiduals | MoreScatter) and warning.tried:
         return replace(warning, tried=(*warning.tried, "joint_zero"))
     return warning
 

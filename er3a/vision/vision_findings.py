@@ -93,6 +93,8 @@ ReadingKind = Literal[
 ]
 READINGS: tuple[ReadingKind, ...] = tuple(kind for kind in get_args(ReadingKind) if kind != "joint_zero")
 """What is tried of all samples; zeros only where joint values are recorded."""
+READINGS_IN_SMALL: tuple[ReadingKind, ...] = ("position_axes", "other_direction")
+"""What is tried too where residuals are smaller than wrong rotations make them."""
 
 
 class UnexplainedResiduals(Finding):
@@ -131,10 +133,14 @@ class FewSamples(Finding):
 
 
 class MoreScatter(Finding):
-    """The residuals are larger than the stated standard deviations allow."""
+    """The residuals are larger than the stated standard deviations allow.
+
+    ``tried``: causes of which none explains them; empty where a cause is named, and where no calibration is refused.
+    """
 
     scatter: float
     largest: float
+    tried: tuple[ReadingKind, ...] = ()
 
 
 class MovedBetween(Finding):

@@ -12,7 +12,6 @@ import pytest
 from typer.testing import CliRunner
 
 import er3a
-from er3a.calibration.common_scale import common_scale
 from er3a.calibration.observations import Measurement
 from er3a.calibration.outcomes import NotToldApart, SetsScale
 from er3a.errors import InputError
@@ -45,7 +44,7 @@ def test_one_factor_of_all_lengths_is_named_with_its_interval(name):
     factor = 1.002
     rows = measured(arm(name), 30, factor)
     found = er3a.calibrate(arm(name), rows)
-    scale = common_scale(found)
+    scale = found.common_scale
     assert abs(scale.factor - factor) < 1.5 * scale.half_width < 2e-4
     (told,) = scale_texts(found)
     assert lines_of(found, rows).startswith(told)
@@ -59,7 +58,7 @@ def test_lengths_that_cant_be_told_apart_scale_together():
     assert any(isinstance(why, NotToldApart) and set(why.entries) == {"d2", "d3"} for why in found.held)
     (shift,) = (each for each in found.estimates if each.name in ("d2", "d3"))
     assert shift.correction == pytest.approx(-0.8, abs=shift.half_width)
-    scale = common_scale(found)
+    scale = found.common_scale
     assert abs(scale.factor - 0.99) < 1.5 * scale.half_width < 2e-4
     assert shift.name in scale.lengths
 
@@ -69,7 +68,7 @@ def test_right_lengths_and_one_wrong_length_are_no_scale(off_mm):
     robot = arm()
     truth = robot.replace(a=robot.a + np.array([0, off_mm / 1000, 0, 0, 0, 0]))
     found = er3a.calibrate(robot, measured(truth, 30))
-    assert common_scale(found) is None
+    assert found.common_scale is None
     assert scale_texts(found) == []
 
 
@@ -80,7 +79,7 @@ def test_the_scale_is_named_as_not_examined_where_lengths_were_measured():
     assert f"not examined: {text}" in lines_of(found, rows)
     relative = replace(found, held=(*found.held, SetsScale("a2")))  # nothing but touched places: no length was measured
     assert not_examined_texts(relative) == []
-    assert common_scale(relative) is None
+    assert relative.common_scale is None
 
 
 def test_positions_held_back_from_a_fit_of_few_poses_are_not_examined():

@@ -16,7 +16,10 @@ from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
 from er3a.files.robot_writer import write_robot
 from er3a.kinematics.forward import forward
+from er3a.pipeline.messages.expectations import outcome_word
+from er3a.pipeline.messages.language import using
 from er3a.pipeline.messages.programs import remedy, say
+from er3a.pipeline.program_reports import checked_file
 from er3a.pipeline.results import Stored, read_results
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages import run
@@ -29,6 +32,7 @@ from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.trajectory.compute import compute as compute_paths
 from er3a.pipeline.study import Study, load_study
 from er3a.planning.motion_faults import AccelerationTooGreat
+from er3a.program_check.check_program import CheckOptions
 from er3a.programs.csv_program import write_csv
 from er3a.robots.joint_limits import joint_columns
 from testing.arms import scara
@@ -363,3 +367,28 @@ def test_an_arm_that_slides_has_millimetres_in_tables_player_and_recording(tmp_p
     assert len(runs) == 2
     for each in runs:
         np.testing.assert_allclose(1000 * forward(robot, each.q)[:, :3, 3], results.motion.xyz_mm, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("tool_mm", "expect", "level"), [(0, None, "pass"), (400, None, "caution"), (400, "pass", "caution")]
+)
+def test_a_tool_without_a_shape_is_a_caution_in_row_stage_and_command_alike(study, tmp_path, tool_mm, expect, level):
+    """What its file expects is of its motions: that it passes is met, and it is no demonstration."""
+    lines = ["DEF job( )", f"$TOOL={{X 0,Y 0,Z {tool_mm},A 0,B 0,C 0}}" if tool_mm else ""]
+    lines += ["$VEL_AXIS[1]=30", "PTP {A1 0,A2 -10,A3 -10,A4 0,A5 -70,A6 0}", "PTP {A1 5}", "END"]
+    (tmp_path / "job.src").write_text("\n".join(filter(None, lines)), encoding="utf-8")
+    job = {"name": "job", "title": "Job", "file": str(tmp_path / "job.src")} | ({"expect": expect} if expect else {})
+    start = {"start_deg": [0, -10, -10, 0, -70, 0]}
+    listed = {"kind": "programs", "programs": [job | start]}
+    (tmp_path / "programs.yaml").write_text(json.dumps(listed), encoding="utf-8")
+    results = compute_programs(with_entry(study, programs=str(tmp_path / "programs.yaml")), "er3a_c60")
+    summary, (row,) = results.summary, results.summary.programs
+    robot = study.robot("er3a_c60")
+    options = CheckOptions(scene=study.scene("er3a_c60", "trajectory"), start=np.radians(start["start_deg"]))
+    checked = checked_file(tmp_path / "job.src", robot, options)
+    assert (row.outcome, summary.verdict.status, checked.level) == (level, level, level)
+    assert checked.check.level == level
+    assert set(results.instructions.level) == {each.level for each in checked.check.verdicts} == {level}
+    assert (row.judged, summary.verdict.finding.demonstrations) == ("pass", ())
+    with using("zh"):
+        assert outcome_word(row.outcome) == {"pass": "通过", "caution": "注意"}.get(row.outcome)

@@ -399,8 +399,8 @@ def test_a_rate_far_beyond_its_limit_is_told_to_two_digits_and_none_where_it_has
 
 
 def test_what_follows_from_another_fault_is_told_after_it_and_the_singular_pose_first(tmp_path):
-    """Speeds towards the edge of the reach come before it in time, and assumed limits are exceeded before known ones;
-    the player opens where the first of what is told is worst."""
+    """Speeds towards the edge of the reach come before it in time and are told after it. Of assumed limits and known
+    ones the earliest is told first, with the word that it is assumed; the player opens where that is worst."""
     results = compute(study_of(tmp_path, "line_wrist_near", "line_out"), ROBOT)
     out, near = (
         path for name in ("line_out", "line_wrist_near") for path in results.summary.paths if path.name == name
@@ -420,8 +420,9 @@ def test_what_follows_from_another_fault_is_told_after_it_and_the_singular_pose_
     known = [replace(part, cause=TooFast(4, 762.0, 360.0)) for part in near.too_fast if part.cause.code[:4] == "too_"]
     assumed = [part for part in near.too_fast if part.cause.code[:4] != "too_"]
     both = first_faults(replace(near, too_fast=(*assumed, *known)))
-    assert ["the stated limits" in each.text for each in both] == [True, False]
-    assert both[1].t_s < both[0].t_s
+    assert ["the stated limits" in each.text for each in both] == [False, True]
+    assert "the assumed limits" in both[0].text
+    assert both[0].t_s < both[1].t_s
 
 
 def test_where_a_repair_is_slower_is_told_with_the_least_share_of_the_speed(tmp_path):

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import base64
 import re
+import shutil
 from dataclasses import replace
 
 import numpy as np
 import pytest
+import yaml
 from PIL import Image
 
 from er3a.files.kept_files import ROOT
@@ -214,3 +216,31 @@ def test_images_come_with_their_reprojected_corners(study, tmp_path):
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert "detected and reprojected corners" in page
     assert "magnified" in page
+
+
+@pytest.mark.parametrize("turning", [False, True])
+def test_samples_without_a_calibration_leave_every_object_unexamined(study, tmp_path, turning):
+    """All samples at one pose determine nothing; with some, but a wrong one, no grasp rests on it either."""
+    for file in (ROOT / "data/vision").glob("fixed_camera*"):
+        shutil.copy(file, tmp_path)
+    content = yaml.safe_load((ROOT / "data/vision/er3a_c60.yaml").read_text(encoding="utf-8"))
+    (tmp_path / "vision.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
+    head, *rows = (tmp_path / "fixed_camera.csv").read_text(encoding="utf-8").splitlines()
+    if turning:
+        poses = [row.split(",") for row in rows]
+        k = head.split(",").index("target_x_mm")
+        mixed = [[*row[:k], str(float(row[k]) + 200 * (-1) ** n), *row[k + 1 :]] for n, row in enumerate(poses)]
+        rows = [",".join(row) for row in mixed]
+    else:
+        rows = [f"p{n}" + rows[0][rows[0].index(",") :] for n in range(6)]
+    (tmp_path / "fixed_camera.csv").write_text("\n".join([head, *rows, ""]), encoding="utf-8")
+    entry = study.entry("er3a_c60").model_copy(update={"vision": str(tmp_path / "vision.yaml")})
+    section = study.vision.model_copy(update={"map_cells": 4})
+    given = study.model_copy(update={"robots": {"er3a_c60": entry}, "vision": section})
+    summary = STAGE.module("compute").compute(given, "er3a_c60").summary
+    assert summary.verdict.status == "fail"
+    assert (summary.calibration is not None) == turning
+    left = {each.subject: each.names for each in summary.not_examined}
+    assert left["grasps"] == tuple(each["name"] for each in content["objects"])
+    assert {"real_camera", "joint_zeros", "detections", "gripped_parts", "torques", "shallow_overlaps"} <= left.keys()
+    assert {"carried", "tool"} <= left.keys()

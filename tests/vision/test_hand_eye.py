@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -12,7 +13,9 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import t as student
 
 from er3a.geometry.transforms import moved, transform
+from er3a.pipeline.messages.language import using
 from er3a.pipeline.messages.vision import say
+from er3a.pipeline.stages.vision.compute import _open_frames
 from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.classic_methods import METHOD_NAMES, solved_by
 from er3a.vision.hand_eye import calibrate_hand_eye, position_axes
@@ -20,6 +23,7 @@ from er3a.vision.likelihood import PoseObservations, flange_to_camera, refine, r
 from er3a.vision.setup_changes import moved_between
 from er3a.vision.vision_findings import (
     READINGS,
+    READINGS_IN_SMALL,
     AllSamplesEqual,
     AngleOrder,
     BoardScale,
@@ -317,6 +321,22 @@ def test_axes_negated_or_swapped_in_positions_are_named(setup, stream, axes):
     assert grave_warnings(found.warnings) == (named,)
 
 
+@pytest.mark.parametrize("setup", SETUPS)
+def test_recorded_poses_are_doubted_where_nothing_is_compared_with_them(setup):
+    """Of one rule: the command lists all frames, grasps rest on the camera's alone."""
+    own = "flange_poses" if setup == "eye_in_hand" else "base_poses"
+    for joints, touched, simulated, frames in (
+        (False, False, False, ("flange_poses", "base_poses")),
+        (False, True, False, ("flange_poses",)),
+        (True, False, False, ()),
+        (False, False, True, ()),
+    ):
+        samples = a_set(setup, 9, of_joints=joints, touched=np.zeros((3, 2, 3)) if touched else None)
+        assert samples.open_frames(simulated) == frames
+        head = SimpleNamespace(setup=setup, simulated=simulated)
+        assert _open_frames(samples, head) == tuple(each for each in frames if each == own)
+
+
 def test_residuals_that_nothing_explains_are_an_error():
     samples = a_set("eye_in_hand", 14)
     samples.target[:, :3, 3] += np.random.default_rng(3).normal(0, 0.1, (15, 3))
@@ -326,6 +346,32 @@ def test_residuals_that_nothing_explains_are_an_error():
     assert grave.rms_mm > 30
     assert set(grave.tried) == set(READINGS)
     assert "nothing tried explains them" in say(grave)
+
+
+@pytest.mark.parametrize(("off_m", "tried"), [(0.1, READINGS), (0.008, READINGS_IN_SMALL)])
+def test_residuals_that_nothing_explains_name_causes_tried_with_stated_deviations_too(off_m, tried):
+    """Small ones only those that may leave small ones; words in both languages."""
+    samples = a_set("eye_in_hand", 14, camera_covariance=covariance(15))
+    samples.target[:, :3, 3] += np.random.default_rng(5).normal(0, off_m, (15, 3))
+    (grave,) = grave_warnings(calibrate_hand_eye(samples).warnings)
+    assert isinstance(grave, MoreScatter)
+    assert grave.tried == tried
+    assert "times the stated standard deviations" in say(grave)
+    assert "nothing tried explains them" in say(grave)
+    assert "axes of positions negated or swapped" in say(grave)
+    assert ("order of quaternions" in say(grave)) == (tried == READINGS)
+    with using("zh"):
+        assert "所尝试的原因都不能解释" in say(grave)
+
+
+@pytest.mark.parametrize("stated", [False, True])
+def test_a_step_of_the_setup_is_named_with_and_without_stated_deviations(stated):
+    samples = a_set("eye_in_hand", 14, **({"camera_covariance": covariance(15)} if stated else {}))
+    samples.target[8:] = moved(np.eye(4), np.array([0.02, 0.01, 0, 0, 0, 0.02])) @ samples.target[8:]
+    found = calibrate_hand_eye(samples)
+    (step,) = [each for each in found.warnings if isinstance(each, MovedBetween)]
+    assert (step.sample, step.what) == (samples.names[8], "camera")
+    assert all(each.tried == () for each in found.warnings if isinstance(each, MoreScatter))
 
 
 def test_motions_near_half_turns_and_few_wide_ones_spoil_no_closed_form():

@@ -144,9 +144,9 @@ def write(
     from er3a.files.units import noted_doubts
     from er3a.pipeline.messages.expectations import outcome_word
     from er3a.pipeline.messages.programs import say
-    from er3a.pipeline.program_reports import missed_collisions, missed_line, programs_of, shapes_line
+    from er3a.pipeline.program_reports import missed_line, programs_of, shapes_line
     from er3a.pipeline.progress import shown_work
-    from er3a.pipeline.stages.left_out import left_out_of_limits, left_out_of_units, left_out_without_tool
+    from er3a.pipeline.stages.left_out import left_out_of_units, left_out_without_tool, missed_of_program
     from er3a.pipeline.stages.trajectory.motion import by_subject
     from er3a.pipeline.viewing.conditions import program_head
     from er3a.programs.program_findings import TargetsLeftOut
@@ -155,7 +155,7 @@ def write(
     with noted_doubts() as doubts, shown_work(f"{paths}: checking each path"):
         arm, around = load_robot(robot), load_scene(scene) if scene else None
         programs = list(programs_of(paths, arm, language, around, only, unsafe))
-    refused, alone = 0, (*missed_collisions(arm, around), *left_out_of_limits(arm), *left_out_of_units(doubts))
+    refused, alone = 0, (*missed_of_program(arm, around), *left_out_of_units(doubts))
     head = program_head(None, (*alone, *left_out_without_tool(arm)))
     for made in programs:
         if made.files is None:

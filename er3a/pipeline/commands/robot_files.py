@@ -350,7 +350,7 @@ def hand_eye(
         table = correct_table(found, arm, asked) if arm and asked else None
     boardless = images.boardless if images else ()
     wrong = isinstance(table, TableCorrections) and table.probability < TABLE_CONTRADICTED
-    recorded = not (head.simulated or samples.states_joints)
+    open_frames = samples.open_frames(head.simulated)
     missed = {
         LeftOut("real_camera"): head.simulated,
         LeftOut("stream_poses", amount=offset.unused if offset else 0): bool(offset and offset.unused),
@@ -358,8 +358,8 @@ def hand_eye(
         LeftOut("joint_zeros", unseen): bool(unseen) or arm is None,
         LeftOut("small_joint_zeros", amount=least_zero): bool(least_zero),
         LeftOut("touched_points"): found.touch is None,
-        LeftOut("flange_poses"): recorded,
-        LeftOut("base_poses"): recorded and found.touch is None,
+        LeftOut("flange_poses"): "flange_poses" in open_frames,
+        LeftOut("base_poses"): "base_poses" in open_frames,
         LeftOut("given_intrinsics"): images is not None and images.views.shared is None,
         LeftOut("contradicted_table"): wrong,
     }

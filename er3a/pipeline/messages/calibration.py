@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from er3a.calibration.calibrate import Beyond, Calibration, Estimate, TermEstimate
-from er3a.calibration.common_scale import common_scale, scale_is_assumed
 from er3a.calibration.cross_validation import HeldOutErrors, TriedTerm
 from er3a.calibration.observations import Measurement
 from er3a.calibration.plan import Plan
@@ -104,7 +103,7 @@ def lines_of(found: Calibration, fitted: Sequence[Measurement] = (), others: Seq
 
 def scale_texts(found: Calibration) -> list[str]:
     """That one factor explains the corrections of all lengths, which a measuring device with a wrong scale makes."""
-    scale = common_scale(found)
+    scale = found.common_scale
     if scale is None:
         return []
     return [
@@ -123,7 +122,7 @@ def not_examined_texts(found: Calibration, others: Sequence[Measurement] = ()) -
     """What the corrections take for granted, and what ``others``, held back, can't tell."""
     untold = others and not (found.beyond.left_out if found.beyond else found.left_out)
     texts = [tr("whether positions held back contradict the result: too few poses were fitted to leave some out")]
-    return [*(texts if untold else []), *(_scale_not_examined() if scale_is_assumed(found) else [])]
+    return [*(texts if untold else []), *(_scale_not_examined() if found.scale_is_assumed else [])]
 
 
 def _scale_not_examined() -> list[str]:

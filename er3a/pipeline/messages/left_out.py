@@ -166,6 +166,7 @@ TEXTS = texts(
         ),
         "left_out.detections": "whether detected objects are where the detector says, within the deviations stated",
         "left_out.gripped_parts": "collisions of the objects themselves and of a part in the gripper",
+        "left_out.grasps": "where these objects are and how they can be grasped: there is no calibration to rest on",
         "left_out.unjoined_cells": (
             "whether {amount:,.0f} clear cells can be reached from home: no chain of straight joint moves was found"
         ),

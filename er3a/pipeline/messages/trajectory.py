@@ -466,11 +466,10 @@ def first_faults(path: model.PathSummary) -> list[FaultText]:
     firsts = [min(each, key=lambda part: part.t0_s) for each in grave if each]
     found = [FaultText(part.t0_s, _with_worst(part, say_first(part.cause)), part.t0_s) for part in firsts]
     edge = _edge(path)
-    known = min((part.t0_s for part in fast[0]), default=math.inf)
     for each in filter(None, fast):
         run, _ = _run(each)
         seen, end = _worst_of_kinds(run)[0].worst_s, _end_of(run)
-        follows = end >= edge - ADJOINING or run[0].t0_s < known <= end + ADJOINING
+        follows = end >= edge - ADJOINING
         found.append(FaultText(run[0].t0_s, _rates(each, edge), run[0].t0_s if seen is None else seen, follows))
     events = [] if path.in_joint_space else [e for e in path.singularities if e.crossing and e.t_s < edge - AT_EDGE]
     found += [FaultText(e.t_s, sentence("path.singular", type=event_word(e)), e.t_s) for e in events[:1]]

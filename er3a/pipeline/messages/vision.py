@@ -32,6 +32,7 @@ from er3a.vision.table_corrections import TABLE_CONTRADICTED, NoCorrections, Tab
 from er3a.vision.vision_findings import (
     AngleOrder,
     DirectionTried,
+    MoreScatter,
     ParallelTurns,
     PositionAxes,
     QuaternionOrder,
@@ -195,6 +196,12 @@ TEXTS = texts(
             "the residuals are {scatter:.3g} times the stated standard deviations, where chance explains at most "
             "{largest:.2f}: the arm's table, its repeatability or the camera is worse than stated"
         ),
+        "more_scatter#tried": (
+            "the residuals are {scatter:.3g} times the stated standard deviations, where chance explains at most "
+            "{largest:.2f}, and nothing tried explains them ({causes}): check the order of the samples, the board's "
+            "size, which tool and which base the poses belong to, and of two recordings by how much their clocks "
+            "differ (widest_s), or the arm's table, its repeatability or the camera is worse than stated"
+        ),
         "moved_between": by(
             "what",
             camera="from {sample} on the camera stands {moved_mm:.2g} mm and {moved_deg:.2g} deg elsewhere: give one "
@@ -339,8 +346,16 @@ def _(found: QuaternionOrder | AngleOrder | TransposedRotations | PositionAxes) 
 
 @say.register
 def _(found: UnexplainedResiduals) -> str:
-    causes = [word("vision.reading", READING_WORDS, kind) for kind in found.tried]
-    return say_as(found, causes=joined(causes, ", "))
+    return say_as(found, causes=_causes(found.tried))
+
+
+@say.register
+def _(found: MoreScatter) -> str:
+    return say_as(found, "tried", causes=_causes(found.tried)) if found.tried else say_as(found)
+
+
+def _causes(tried: tuple[ReadingKind, ...]) -> str:
+    return joined([word("vision.reading", READING_WORDS, kind) for kind in tried], ", ")
 
 
 @say.register

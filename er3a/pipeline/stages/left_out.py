@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from er3a.collision.along import bodies_of
 from er3a.collision.bodies import Bodies
 from er3a.collision.matrix import PairState, base_contacts
 from er3a.collision.pairs import PENETRATION_TOLERANCE, link_label
@@ -18,7 +19,7 @@ from er3a.files.kept_files import shown_path
 from er3a.geometry.transforms import rotation_angle
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Flags, Reals
-from er3a.pipeline.results import LeftOut, LeftOutSubject
+from er3a.pipeline.results import NEVER_A_PASS, LeftOut, LeftOutSubject
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
@@ -147,3 +148,10 @@ def left_out_of_rates(speed_known: Flags, acceleration: bool, jerk: bool) -> tup
     speeds = (LeftOut("own_speeds", assumed),) if assumed else ()
     accelerations = () if acceleration else (LeftOut("own_accelerations"),)
     return (*speeds, *accelerations, *(() if jerk else (LeftOut("jerk"),)))
+
+
+def missed_of_program(robot: Robot, scene: Scene | None, arms: Iterable[tuple[str, Robot]] = ()) -> tuple[LeftOut, ...]:
+    """What is not examined of any motion of a program without which none passes; ``arms`` with the tools that it sets:
+    for its row in a study, and for ``er3a check-program``."""
+    found = left_out_of_collisions(robot, bodies_of(robot, scene), scene, arms=arms)
+    return (*(each for each in found if each.subject in NEVER_A_PASS), *left_out_of_limits(robot))

@@ -16,7 +16,7 @@ from er3a.numerics.arrays import Reals
 from er3a.pipeline.results import Figure, LeftOut, Status, Verdict
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, pass_of, unmet_expectations
-from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_of_rates
+from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_of_rates, missed_of_program
 from er3a.pipeline.stages.programs import model
 from er3a.pipeline.stages.programs.entry import ProgramsSettings
 from er3a.pipeline.stages.trajectory.motion import limits_of, near_singular
@@ -58,6 +58,7 @@ def compute(study: Study, name: str) -> model.ProgramsResults:
     motions: list[model.ProgramMotion] = []
     for entry in listed.programs:
         check = check_program(read_program(entry.file), robot, replace(options, start=entry.start(robot)))
+        check = check.short_of(bool(missed_of_program(robot, scene, check.arms)))
         motion, starts = _motion(entry.name, check, robot)
         summaries.append(_summary(entry, check, starts))
         if any(each.what == "way" for each in check.not_examined):
@@ -161,7 +162,8 @@ def _summary(entry: ProgramEntry, check: ProgramCheck, starts: Mapping[int, floa
         title=entry.title,
         file=entry.file,
         language=check.execution.program.language,
-        outcome=OUTCOMES[worst_of(each.level for each in found)],
+        outcome=OUTCOMES[check.level],
+        judged=OUTCOMES[worst_of(each.level for each in found)],
         expect=entry.expect,
         complete=check.execution.complete,
         ways=sum(not each.again for each in check.execution.endings),
@@ -269,7 +271,8 @@ def _verdict(
     status: Status = "fail" if failed else "caution" if caution else pass_of(asked)
     passed = len(asked) - len(caution) - len(failed)
     missed = tuple(each.name for each in asked if each.not_examined)
-    return Verdict(status, finding(len(asked), passed, caution, failed, demonstrations(programs, "pass"), missed))
+    shown = [each for each in programs if each.expect != "pass"]
+    return Verdict(status, finding(len(asked), passed, caution, failed, demonstrations(shown, "pass"), missed))
 
 
 def _figures(programs: list[model.ProgramSummary]) -> tuple[Figure, ...]:

@@ -123,7 +123,9 @@ class ProgramSummary:
 
     Attributes
     ----------
-    file : as the study names it; expect : the verdict that its file expects
+    file : as the study names it
+    outcome : no pass where something was not examined of all its motions, as a tool without a shape; judged : without
+        that; expect : the verdict that its file expects of what is judged
     complete : whether every way through it was followed to its end, or until it repeats
     ways : through the program, by the sides of its branches
     motions : instructions of the text; passed, caution, failed : of these
@@ -136,6 +138,7 @@ class ProgramSummary:
     file: str
     language: LanguageName
     outcome: ProgramOutcome
+    judged: ProgramOutcome
     expect: ProgramOutcome | None
     complete: bool
     ways: int
@@ -147,6 +150,11 @@ class ProgramSummary:
     least_clearance_mm: float | None
     findings: tuple[FindingAt, ...]
     not_examined: tuple[int, ...] = ()
+
+    @property
+    def outcomes(self) -> tuple[ProgramOutcome, ...]:
+        """What it came to, for what its file expects."""
+        return (self.judged if self.expect else self.outcome,)
 
 
 class ProgramsSummary(Summary):

@@ -46,7 +46,7 @@ from er3a.programs.writing import HEAD, WriteOptions, ascii_text, program_name
 from er3a.robots.joint_limits import joint_columns, meant, shown, speeds_given
 from er3a.robots.robot import Robot
 from er3a.vision.boards import ambiguous_tilts, projected
-from er3a.vision.calibration_set import TimeOffset
+from er3a.vision.calibration_set import CalibrationSet, TimeOffset
 from er3a.vision.grasp_motion import DEPTH, PARTS, GraspLeg
 from er3a.vision.grasping import ChosenGrasp, DetectedObject, GraspNeeds, GraspPlan, GraspTask, plan_grasp
 from er3a.vision.hand_eye import HandEye, MethodAnswer, TouchCheck, calibrate_hand_eye, spread_of
@@ -370,7 +370,22 @@ def compute(study: Study, name: str) -> model.VisionResults:
     except HandEyeError as error:
         verdict: Verdict[Found] = Verdict("fail", model.CalibrationImpossible(error.finding))
         return _without_calibration(
-            model.VisionSummary(verdict, (), task_file.title, title, settings.least_success, None, ())
+            model.VisionSummary(
+                verdict=verdict,
+                figures=(),
+                title=task_file.title,
+                scene=title,
+                least_success=settings.least_success,
+                calibration=None,
+                objects=(),
+                not_examined=(
+                    *_left_out_without_calibration(samples, head, task_file, offset, images),
+                    *left_out_of_collisions(robot, bodies_of(robot, scene), scene, 1000 * DEPTH),
+                    *left_out_of_rates(speeds_given(robot), *_rates_given(motions)),
+                    *left_out_without_tool(robot),
+                    LeftOut("torques"),
+                ),
+            )
         )
     picture = None if head.setup == "eye_to_hand" else meant(robot, np.array(task_file.picture_deg))
     camera = _camera_at(robot, found, picture)
@@ -379,7 +394,7 @@ def compute(study: Study, name: str) -> model.VisionResults:
     to_add = _view_to_add(robot, found, task_file, head.board_mm, scene=scene, seed=seed)
     table = correct_table(found, robot, head.table_corrections) if head.table_corrections else None
     calibration = calibration_result(head, found, to_add, offset, table, images)
-    doubt, frames = _doubt(calibration, found.touch), _open_frames(found, head)
+    doubt, frames = _doubt(calibration, found.touch), _open_frames(samples, head)
     planned = []
     if not doubt:
         limits = (limits_of(robot, motions), study.seed)
@@ -399,6 +414,7 @@ def compute(study: Study, name: str) -> model.VisionResults:
         calibration=calibration,
         objects=objects,
         not_examined=(
+            *((_no_grasps(task_file),) if doubt else ()),
             *_left_out(calibration, task_file, unseen_zeros, least_zero, frames),
             *left_out_of_collisions(robot, bodies, scene, 1000 * DEPTH, q_deg=ways.q_deg),
             *left_out_of_rates(speeds_given(robot), *_rates_given(motions)),
@@ -463,17 +479,55 @@ def _without_calibration(summary: model.VisionSummary) -> model.VisionResults:
     )
 
 
-def _open_frames(found: HandEye, head: HandEyeFile) -> tuple[LeftOutSubject, ...]:
-    """Of which frames grasps rest on recorded poses that no joint values are compared with.
+def _left_out_of_file(file: VisionFile) -> Iterator[LeftOut]:
+    """What the file of the cell leaves open whatever the samples say: objects out of view, errors of the arm."""
+    places = np.array([each.pose()[:3, 3] for each in file.objects])
+    seen = in_sight(file.view.view(NO_BOARD), places)
+    if hidden := tuple(each.name for each, visible in zip(file.objects, seen) if not visible):
+        yield LeftOut("objects_out_of_view", hidden)
+    if not file.arm.states_all:
+        yield LeftOut("arm_errors")
+
+
+def _no_grasps(file: VisionFile) -> LeftOut:
+    """The objects that no grasp is looked for of, as no calibration says where they are."""
+    return LeftOut("grasps", tuple(each.name for each in file.objects))
+
+
+def _left_out_without_calibration(
+    samples: CalibrationSet,
+    head: HandEyeFile,
+    file: VisionFile,
+    offset: TimeOffset | None,
+    images: SeenImages | None,
+) -> Iterator[LeftOut]:
+    """What nobody looked at where the samples determine no calibration: no object, and nothing that checks it."""
+    yield _no_grasps(file)
+    yield from _left_out_of_file(file)
+    if head.simulated:
+        yield LeftOut("real_camera")
+    if images and images.boardless:
+        yield LeftOut("boardless_images", tuple(each.sample for each in images.boardless))
+    if offset and offset.unused:
+        yield LeftOut("stream_poses", amount=offset.unused)
+    yield LeftOut("joint_zeros")
+    if samples.touched is None:
+        yield LeftOut("touched_points")
+    if images and images.views.shared is None:
+        yield LeftOut("given_intrinsics")
+    yield from (LeftOut(subject) for subject in _open_frames(samples, head))
+    yield LeftOut("detections")
+    yield LeftOut("gripped_parts")
+
+
+def _open_frames(samples: CalibrationSet, head: HandEyeFile) -> tuple[LeftOutSubject, ...]:
+    """Of the frames that nothing is compared with, the one that the camera is in: grasps rest on no other.
 
     A tool's pose in place of the flange's moves a camera on the flange by as much, and what it sees of the base not at
     all, so touched points agree. A fixed camera stays where it is, in the frame that poses and touched points are in.
     """
-    if head.simulated or found.samples.states_joints:
-        return ()
-    if head.setup == "eye_in_hand":
-        return ("flange_poses",)
-    return ("base_poses",) if found.touch is None else ()
+    camera_in: LeftOutSubject = "flange_poses" if head.setup == "eye_in_hand" else "base_poses"
+    return tuple(each for each in samples.open_frames(head.simulated) if each == camera_in)
 
 
 def _left_out(
@@ -487,12 +541,7 @@ def _left_out(
 
     ``frames``: as :func:`_open_frames` gives them.
     """
-    places = np.array([each.pose()[:3, 3] for each in file.objects])
-    seen = in_sight(file.view.view(NO_BOARD), places)
-    if hidden := tuple(each.name for each, visible in zip(file.objects, seen) if not visible):
-        yield LeftOut("objects_out_of_view", hidden)
-    if not file.arm.states_all:
-        yield LeftOut("arm_errors")
+    yield from _left_out_of_file(file)
     if isinstance(found.table, model.TableResult) and found.table.probability < TABLE_CONTRADICTED:
         yield LeftOut("contradicted_table", tuple(each.entry for each in found.table.entries))
     if found.simulated:
