@@ -54,6 +54,23 @@ def test_a_table_is_known_by_its_header_wherever_it_stands(tmp_path, text, kind)
     assert check_file(tmp_path / "mine.csv") == kind
 
 
+POINTS = "[{positions: [0, 0], time_from_start: {sec: 0}}, {positions: [0.1, 0], time_from_start: {sec: 1}}]"
+TRAJECTORY = f"{{joint_names: [joint_1, joint_2], points: {POINTS}}}\n"
+
+
+@pytest.mark.parametrize("ending", ["json", "yaml", "yml"])
+@pytest.mark.parametrize("form", ["{}", "{{joint_trajectory: {}}}"])
+def test_a_trajectory_of_ros_is_a_path_as_paths_take_it(tmp_path, ending, form):
+    text = form.format(TRAJECTORY.strip())
+    file = tmp_path / f"ros.{ending}"
+    as_json = json.dumps(yaml.safe_load(text))
+    file.write_text(as_json if ending == "json" else text, encoding="utf-8")
+    assert check_file(file) == "a path"
+    file.write_text(as_json.replace("[0, 0]", "[0, NaN]"), encoding="utf-8")
+    with pytest.raises(InputError, match=r"points\[0\]\.positions: not 2 numbers"):
+        check_file(file)
+
+
 @pytest.mark.parametrize(
     ("file", "old", "new", "told"),
     [
@@ -109,6 +126,7 @@ def test_a_path_that_no_run_would_follow_is_refused_before_it(tmp_path, monkeypa
         ("a.yaml", "name: x\n", "kind: missing"),
         ("a.yaml", "kind: robto\n", "kind: 'robto' is not known"),
         ("a.txt", "kind: robot\n", "'.txt' files are none"),
+        ("a.json", '{"name": "x"}', "'.json' files are none"),
         ("other.csv", "a,b\n1,2\n", "other.csv"),
         ("a.yaml", "kind: targets\ntargets: []\n", "targets"),
         ("a.yaml", "kind: paths\npaths:\n- {name: a, kind: linear}\n", "paths[0].kind: 'linear' is not known"),

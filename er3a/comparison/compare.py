@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Set
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 import scipy
@@ -39,6 +39,7 @@ CauseCode = Literal[
     "scale",
     "rows_shifted",
 ]
+Uncompared = Literal["limits", "speeds", "tool", "envelopes", "pair_rules", "inertia", "drives", "wrist_load", "weight"]
 Columns = dict[str, Reals | str]
 SAMPLES = 192
 SWEEPS = 2
@@ -174,6 +175,8 @@ class Comparison(ByValue):
     as_printed_deg, aligned_deg : the same of the angle between the flanges' orientations
     corrected : A's table with all differing entries corrected, so that it describes B's arm; None if the numbers of
         joints differ
+    not_examined : what the verdict leaves out: limits and speeds that are not all given, and groups of the robot file
+        that both arms give and no layer compares
     """
 
     verdict: VerdictWord
@@ -191,6 +194,7 @@ class Comparison(ByValue):
     aligned_deg: float | None = None
     joints: tuple[int, int] = (0, 0)
     corrected: Robot | None = None
+    not_examined: tuple[Uncompared, ...] = ()
 
     @property
     def different_entries(self) -> int:
@@ -223,10 +227,11 @@ def compare(
 def _compared(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances, explain: bool = True) -> Comparison:
     """What :func:`compare` finds; without causes if they are not to be explained."""
     counts = robot_a.joints, robot_b.joints
+    beside = given_by_both(beside_the_table(robot_a), beside_the_table(robot_b))
     if counts[0] != counts[1] or robot_a.rows != robot_b.rows:
-        return Comparison("other_joint_count", joints=counts)
+        return Comparison("other_joint_count", joints=counts, not_examined=beside)
     if (kinds := robot_a.sliding != robot_b.sliding).any():
-        return Comparison("other_arm", _other_kinds(robot_a, kinds), joints=counts)
+        return Comparison("other_arm", _other_kinds(robot_a, kinds), joints=counts, not_examined=beside)
     a, b = mechanism.mechanism_of(robot_a), mechanism.mechanism_of(robot_b)
     found = mechanism.match(a, b, tolerances)
     same = not found.differences and found.unexplained == 0
@@ -259,7 +264,29 @@ def _compared(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances, 
     off = _distances(robot_a, robot_b, found)
     corrected = _corrected(robot_a, robot_b, found, tolerances, limits, signs=reverses, joint_zeros=joint_zeros)
     layers = geometry, zero, directions, base, flange, coupled, limits, speeds
-    return Comparison(verdict, *layers, *off, counts, corrected)
+    ranges: dict[Uncompared, RangeLayer] = {"limits": limits, "speeds": speeds}
+    missing = tuple(name for name, layer in ranges.items() if layer.same is None)
+    return Comparison(verdict, *layers, *off, counts, corrected, (*missing, *beside))
+
+
+def beside_the_table(robot: Robot) -> frozenset[Uncompared]:
+    """Groups that a robot gives and a comparison does not look at."""
+    masses = robot.masses
+    given: dict[Uncompared, bool] = {
+        "tool": not np.array_equal(robot.tool, np.eye(4)),
+        "envelopes": bool(robot.envelopes or robot.hulls),
+        "pair_rules": bool(robot.pair_rules),
+        "inertia": bool(masses.links),
+        "drives": masses.drives is not None,
+        "wrist_load": masses.wrist is not None,
+        "weight": not math.isnan(masses.weight),
+    }
+    return frozenset(group for group, there in given.items() if there)
+
+
+def given_by_both(one: Set[Uncompared], other: Set[Uncompared]) -> tuple[Uncompared, ...]:
+    """Groups that two arms give, in a fixed order."""
+    return tuple(group for group in get_args(Uncompared) if group in one and group in other)
 
 
 def best_of(

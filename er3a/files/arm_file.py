@@ -11,12 +11,13 @@ from pathlib import Path
 
 import numpy as np
 
+from er3a.comparison.compare import Uncompared, beside_the_table
 from er3a.errors import InputError
 from er3a.files.dh_table import AngleUnit, LengthUnit, read_dh_table
 from er3a.files.kept_files import write_atomically
 from er3a.files.reference_sets import FILE, load_references
 from er3a.files.robot_library import load_robot, robot_of
-from er3a.formats.urdf import UrdfStatements, urdf_statements, urdf_table
+from er3a.formats.urdf import UrdfStatements, urdf_groups, urdf_statements, urdf_table
 from er3a.formats.urdf_tree import plain_urdf
 from er3a.geometry.transforms import rpy_of
 from er3a.numerics.arrays import Flags, Reals
@@ -28,11 +29,13 @@ READ = (".csv", ".yaml", ".yml", ".urdf", ".xacro")
 
 @dataclass(frozen=True)
 class ReadArm:
-    """``printed``: whether the table was given, not derived; ``notes``: assumptions."""
+    """``printed``: whether the table was given, not derived; ``notes``: assumptions; ``beside``: what the file gives
+    that a comparison doesn't look at."""
 
     robot: Robot
     printed: bool
     notes: tuple[str, ...] = ()
+    beside: frozenset[Uncompared] = frozenset()
 
 
 def read_arm(
@@ -65,13 +68,16 @@ def read_arm(
         content, notes = read_dh_table(
             path, robot_name(path), convention, length_unit=length_unit, angle_unit=angle_unit, as_printed=True
         )
-        return ReadArm(robot_of(content), True, notes)
+        robot = robot_of(content)
+        return ReadArm(robot, True, notes, beside_the_table(robot))
     if path.suffix in (".urdf", ".xacro", ".xml"):
         with plain_urdf(path, xacro) as plain:
             robot, assumed = urdf_table(plain, base=base, tip=tip)
-        return ReadArm(robot.replace(name=robot_name(path)), False, assumed)
+            beside = urdf_groups(plain, base=base, tip=tip)
+        return ReadArm(robot.replace(name=robot_name(path)), False, assumed, beside)
     if path.suffix in (".yaml", ".yml") or (not path.suffix and not path.exists()):
-        return ReadArm(load_robot(source), True)
+        robot = load_robot(source)
+        return ReadArm(robot, True, beside=beside_the_table(robot))
     raise InputError(
         path, None, "is not a kind of file that describes an arm", f"Give one that ends in {', '.join(READ)}"
     )

@@ -58,6 +58,7 @@ LONGEST_S = 3600.0
 MAX_ROWS = 200_000
 SAME_POINT = 1e-9  # m or rad
 MAX_RAD = 10 * 2 * math.pi
+TRAJECTORIES = (".yaml", ".yml", ".json")  # endings of joint trajectories of ROS and MoveIt
 UR_JOINTS = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
 UNREAD = ("velocities", "accelerations", "effort")
 IN_POINT = frozenset(("positions", "time_from_start", *UNREAD))
@@ -100,7 +101,7 @@ def read_path_table(path: str | Path) -> PathTable:
         orientation
     """
     path = given_file(Path(path))
-    if path.suffix in (".yaml", ".yml", ".json"):
+    if path.suffix in TRAJECTORIES:
         at, values, unread = _ros_trajectory(path)
         repeated = _repeated(path, np.abs(np.diff(values, axis=0)).max(axis=1))
         return PathTable(path, np.arange(1, len(values) + 1), at, None, values, repeated, None, unread)
@@ -148,6 +149,18 @@ def _repeated(path: Path, size: Reals) -> Flags:
     if repeated[1:].all():
         raise InputError(path, None, f"all {len(repeated)} points are the same", "Give points that differ")
     return repeated
+
+
+def is_ros_trajectory(path: Path) -> bool:
+    """Whether a YAML or JSON file is meant as a joint trajectory of ROS or MoveIt and not as a file of er3a's own.
+
+    Raises
+    ------
+    InputError
+        if it is no YAML
+    """
+    content = read_yaml(path)
+    return "kind" not in content and not content.keys().isdisjoint({"joint_trajectory", "joint_names", "points"})
 
 
 def _ros_trajectory(path: Path) -> tuple[Reals, Reals, tuple[str, ...]]:

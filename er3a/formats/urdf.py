@@ -27,6 +27,7 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import scipy
@@ -300,6 +301,26 @@ def urdf_table(path: str | Path, *, base: str | None = None, tip: str | None = N
     chain = urdf_tree.read_chain(path, base, tip, False)
     robot, *_, notes = _robot_of_chain(path, chain)
     return robot, (*chain.notes, *notes)
+
+
+def urdf_groups(
+    path: str | Path, *, base: str | None = None, tip: str | None = None
+) -> frozenset[Literal["envelopes", "inertia", "drives"]]:
+    """Groups beside :func:`urdf_table` for whose links and joints the URDF states anything: no meshes are read.
+
+    Parameters and errors are those of :func:`import_urdf`.
+    """
+    path = Path(path)
+    chain, root = urdf_tree.read_chain(path, base, tip, False), urdf_tree.urdf_root(path)
+    names = {name for joint in chain.joints for name in (joint.parent, joint.child)}
+    links = [link for link in root.findall("link") if link.get("name") in names]
+    moving = [joint.name for joint in chain.joints if joint.moves]
+    stated: dict[Literal["envelopes", "inertia", "drives"], bool] = {
+        "envelopes": any(link.find("collision") is not None for link in links),
+        "inertia": any(link.find("inertial") is not None for link in links),
+        "drives": urdf_tree.drives_of(root, moving) is not None,
+    }
+    return frozenset(group for group, there in stated.items() if there)
 
 
 @dataclass(frozen=True, eq=False)

@@ -544,7 +544,7 @@ def masses_from_urdf(
     if found and missing:
         notes.append(f"no mass is given for what moves with {', '.join(missing)}")
     links = tuple(LinkMass(number, together(bodies)) for number, bodies in sorted(found.items()))
-    return Masses(links=links, drives=_drives(root, names)), tuple(notes), tuple(changed)
+    return Masses(links=links, drives=drives_of(root, names)), tuple(notes), tuple(changed)
 
 
 def write_masses(robot: Robot, names: Sequence[str], root: ElementTree.Element) -> None:
@@ -605,7 +605,8 @@ def _changed(name: str, problem: NoBody, given: MassBody, taken: MassBody) -> st
     return f"link {name} has a principal moment of inertia {what}; its mass and centre stay, and {instead}"
 
 
-def _drives(root: ElementTree.Element, names: Sequence[str]) -> Drives | None:
+def drives_of(root: ElementTree.Element, names: Sequence[str]) -> Drives | None:
+    """What a URDF states of the drives of the joints ``names``; None if nothing."""
     joints = {joint.get("name", "?"): joint for joint in root.findall("joint")}
     coulomb, viscous, effort = (
         np.array([_number(joints[name].find(tag), key, math.nan) for name in names])

@@ -14,7 +14,15 @@ from er3a.files.by_name import load_measurements
 from er3a.files.csv_file import read_header
 from er3a.files.dh_table import is_printed_table, read_dh_table
 from er3a.files.hand_eye_file import HandEyeFile, check_samples, load_hand_eye, sample_rows
-from er3a.files.path_file import PathFile, ProgramPath, TablePath, load_paths, read_path_table
+from er3a.files.path_file import (
+    TRAJECTORIES,
+    PathFile,
+    ProgramPath,
+    TablePath,
+    is_ros_trajectory,
+    load_paths,
+    read_path_table,
+)
 from er3a.files.program_file import ProgramsFile, load_programs
 from er3a.files.reference_sets import FILE as DOCUMENTS
 from er3a.files.reference_sets import (
@@ -209,11 +217,19 @@ def check_file(path: Path) -> str:
     if path.suffix.lower() in SUFFIXES and path.suffix != ".csv":
         read_program(path)
         return PROGRAM
+    if path.suffix in TRAJECTORIES and is_ros_trajectory(path):
+        read_path_table(path)
+        return "a path"
     if path.suffix not in (".yaml", ".yml"):
         if not path.exists():
             raise InputError(path, None, "there is no such file", "Check the path")
         ending = f"'{path.suffix}' files" if path.suffix else "files without an ending"
-        raise InputError(path, None, f"{ending} are none of er3a's inputs", "Give a .yaml or .csv file")
+        raise InputError(
+            path,
+            None,
+            f"{ending} are none of er3a's inputs",
+            "Give a .yaml or .csv file, or a trajectory of ROS (.json)",
+        )
     kind = read_yaml(path).get("kind")
     if not isinstance(kind, str) or kind not in _CHECKS:
         problem = "missing" if kind is None else f"'{kind}' is not known"

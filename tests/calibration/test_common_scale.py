@@ -125,6 +125,32 @@ def test_positions_held_back_that_contradict_the_result_end_the_command_with_cod
         assert CliRunner().invoke(app, [*held[:-2], "--json"]).exit_code == (name == "wrong.csv")
 
 
+@pytest.mark.parametrize(
+    ("point", "sign", "first", "code"),
+    [
+        ("flange", 1, "Measurements and table don't belong together: corrections of d6 are far beyond", 1),
+        ("tool", -1, "Measurements and table belong together if J4 moves the other way.", 1),
+        ("tool", 1, "the ", 0),
+    ],
+)
+def test_measurements_and_a_table_that_do_not_fit_end_the_command_with_code_1(tmp_path, point, sign, first, code):
+    """The files are written, and the output says that they are not to be used."""
+    from er3a.files.robot_writer import write_robot
+
+    write_robot(arm().replace(name="mine", references=()), tmp_path / "mine.yaml")
+    rows = [
+        replace(row, point=point, pose=(*row.pose[:3], sign * row.pose[3], *row.pose[4:]))
+        for row in measured(arm(), 40)
+    ]
+    words = ["calibrate", str(tmp_path / "mine.yaml"), written(tmp_path / "rows.csv", rows)]
+    done = CliRunner().invoke(app, [*words, "--output", str(tmp_path / "new.yaml")])
+    assert done.exit_code == code, done.output
+    assert done.stdout.startswith(first)
+    assert (tmp_path / "new.yaml").is_file()
+    told = "written although measurements and table don't fit: don't use these files until that is settled"
+    assert (told in done.stdout) == bool(code)
+
+
 def test_a_name_that_no_robot_may_have_is_told_before_the_fit(tmp_path, monkeypatch):
     def fit(*_):
         raise AssertionError("the fit has begun")

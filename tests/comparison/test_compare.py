@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +18,7 @@ from er3a.formats.urdf_tree import read_chain
 from er3a.geometry.transforms import rot_x, rot_z, translation
 from er3a.pipeline.cli import app
 from er3a.pipeline.messages.comparison import headline, layer_rows
+from er3a.robots.masses import LinkMass, MassBody, Masses
 from er3a.robots.robot import CombinedLimit
 from testing.arm_pairs import KINDS, Arm, defined_elsewhere, flange_at, name, random_arm, with_wrong_entries
 from testing.arms import made_of
@@ -332,10 +334,75 @@ def test_what_is_not_compared_is_named_beside_equal():
     arm = er3a.load_robot("er3_600")
     speed = np.array(arm.speed)
     speed[3] = np.nan
-    assert headline(er3a.compare(arm, arm)) == "equal: the same arm, usable as printed"
+    equal = "equal: the same arm, usable as printed (at the worst joint angles the flange is 0.0 mm and 0.00 deg off)"
+    bare = arm.replace(envelopes=(), hulls=(), pair_rules=(), masses=Masses())
+    assert headline(er3a.compare(arm, bare)) == equal
+    arm = bare
     found = er3a.compare(arm, arm.replace(speed=speed))
     assert (found.verdict, found.speeds.same) == ("equal", None)
-    assert headline(found) == "equal: the same arm, usable as printed; not compared: speeds"
+    assert headline(found) == f"{equal}; not compared: speeds"
+    assert found.not_examined == ("speeds",)
+
+
+def test_beside_equal_stands_how_far_the_flange_is_off_within_the_tolerances():
+    arm = er3a.load_robot("er3_600")
+    found = er3a.compare(arm, arm.replace(a=arm.a + 0.0004, alpha=arm.alpha + np.radians(0.08)))
+    assert found.verdict == "equal"
+    assert found.as_printed_mm > 1 > found.geometry.worst_mm
+    shown = f"the flange is {found.as_printed_mm:.1f} mm and {found.as_printed_deg:.2f} deg off"
+    assert headline(found).startswith(f"equal: the same arm, usable as printed (at the worst joint angles {shown})")
+
+
+def test_what_both_arms_give_and_no_layer_compares_is_named_and_only_that():
+    arm = er3a.load_robot("er3a_c60")
+    weighed = arm.replace(tool=translation(0, 0, 0.1), masses=Masses((LinkMass(1, MassBody(5.0)),), weight=60.0))
+    heavier = weighed.replace(masses=Masses((LinkMass(1, MassBody(9.0)),), weight=90.0))
+    found = er3a.compare(weighed, heavier)
+    assert found.not_examined == ("speeds", "tool", "envelopes", "inertia", "weight")
+    assert headline(found).endswith("deg off); not compared: speeds, tool, shapes of links, masses, weight")
+    assert layer_rows(found)[-4:] == [
+        (name, "not compared", "") for name in ("tool", "shapes of links", "masses", "weight")
+    ]
+    bare = arm.replace(envelopes=(), hulls=(), pair_rules=(), masses=Masses())
+    assert er3a.compare(weighed, bare).not_examined == ("speeds",)
+    seven = er3a.load_robot("lbr_iiwa_14").replace(masses=weighed.masses, tool=arm.tool)
+    assert er3a.compare(seven, weighed).verdict == "other_joint_count"
+    assert er3a.compare(seven, weighed).not_examined[-2:] == ("inertia", "weight")
+
+
+INERTIAL = '<inertial><mass value="{mass}"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+OF_URDF = """<robot name="r"><link name="base"/>
+<link name="one">{inertial}</link><link name="two"/><link name="beside">{beside}</link>
+<joint name="j1" type="revolute"><parent link="base"/><child link="one"/><axis xyz="0 0 1"/>
+<limit lower="-1" upper="1" effort="{effort}" velocity="1"/></joint>
+<joint name="j2" type="revolute"><parent link="one"/><child link="two"/><origin xyz="0.3 0 0.2"/><axis xyz="0 1 0"/>
+<limit lower="-1" upper="1" effort="{effort}" velocity="1"/></joint>
+<joint name="camera" type="fixed"><parent link="base"/><child link="beside"/></joint></robot>"""
+
+
+def test_masses_drives_and_shapes_of_two_urdfs_are_named_as_not_compared(tmp_path):
+    shape = '<collision><geometry><mesh filename="package://nowhere/none.stl"/></geometry></collision>'
+    links = {
+        "one": (INERTIAL.format(mass=5) + shape, 10),
+        "two": (INERTIAL.format(mass=9) + shape, 30),
+        "bare": ("", 0),
+    }
+    for file, (inertial, effort) in links.items():
+        text = OF_URDF.format(inertial=inertial, beside=shape, effort=effort)
+        (tmp_path / f"{file}.urdf").write_text(text, encoding="utf-8")
+
+    def ran(one, other, *more):
+        files = [str(tmp_path / f"{each}.urdf") for each in (one, other)]
+        return CliRunner().invoke(app, ["compare", *files, "--tip", "two", *more])
+
+    done = ran("one", "two", "--html", str(tmp_path / "page.html"))
+    assert done.exit_code == 0
+    told = "not compared: shapes of links, masses, drives"
+    assert done.output.splitlines()[0].endswith(told)
+    assert re.search(r"^  masses +not compared$", done.output, re.MULTILINE)
+    assert told in (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert json.loads(ran("one", "two", "--json").output)["not_examined"] == ["envelopes", "inertia", "drives"]
+    assert json.loads(ran("one", "bare", "--json").output)["not_examined"] == []
 
 
 def test_numbers_of_doubtful_unit_stand_where_the_verdict_does(tmp_path):

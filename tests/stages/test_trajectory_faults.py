@@ -27,10 +27,15 @@ from er3a.pipeline.messages.trajectory import (
     switch_text,
 )
 from er3a.pipeline.program_reports import programs_of
+from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages import run
+from er3a.pipeline.stages.dynamics.compute import PathJudge
+from er3a.pipeline.stages.expectations import is_met
 from er3a.pipeline.stages.trajectory.compute import compute
-from er3a.pipeline.stages.trajectory.judgement import sound_end
+from er3a.pipeline.stages.trajectory.judgement import Surroundings, sound_end
 from er3a.pipeline.stages.trajectory.model import Singularity, Stretch
+from er3a.pipeline.stages.trajectory.motion import limits_of as limits_in
+from er3a.pipeline.stages.trajectory.motion import near_singular, study_motions
 from er3a.pipeline.stages.trajectory.played import advised, faults, motions, slowed
 from er3a.pipeline.study import Study, load_study
 from er3a.pipeline.verdicts import read_verdicts
@@ -227,6 +232,38 @@ def test_all_that_a_path_came_to_is_named_everywhere_in_the_order_of_time(tmp_pa
     late = replace(path, collisions=(replace(path.collisions[0], t0_s=path.out_of_limits[0].t0_s + 0.1),))
     assert late.outcomes == ("leaves limits", "collides")
     assert replace(path, collisions=()).outcomes == ("leaves limits",)
+
+
+@pytest.mark.parametrize(
+    ("name", "duration", "came_to"),
+    [
+        ("line_collides", 4, ("collides",)),
+        ("line_collides", 0.1, ("too fast", "collides")),
+        ("line_limits", 0.1, ("too fast", "leaves limits")),
+        ("line_out", 4, ("unreachable",)),  # too fast only in the last 5 ms before the edge of the reach
+        ("line_out", 0.2, ("too fast", "unreachable")),
+    ],
+)
+def test_too_fast_beside_what_is_expected_is_another_outcome_unless_it_follows_from_it(
+    tmp_path, name, duration, came_to
+):
+    changes = {"robot": "er3_600", "duration_s": duration, "settings": {"avoidance": "slow"}}
+    alone = next(each for each in came_to if each != "too fast")
+    summary = summary_of(tmp_path, name, expect={name: alone}, **changes)
+    (path,) = summary.paths
+    assert path.outcomes == came_to
+    known = [part for part in path.too_fast if part.cause.code == "too_fast"]
+    assert bool(known) == (name == "line_out" or duration < 1)
+    assert (summary.verdict.status == "fail") == (len(came_to) > 1)
+    if len(came_to) > 1:
+        assert f"{name} ({', '.join(came_to)}; expected: {alone})" in say(summary.verdict.finding)
+        assert is_met(replace(path, expect=came_to))
+    study, robot = study_of(tmp_path, name, **changes), load_robot("er3_600")
+    trajectory = study.section(TrajectorySettings)
+    surroundings = Surroundings(Bodies(robot, study.scene("er3_600", "trajectory")), 0.001)
+    judge_of = PathJudge(robot, surroundings, near_singular(trajectory), limits_in(robot, trajectory))
+    (each,) = study_motions(study, "er3_600", trajectory.checks_per_sample)
+    assert judge_of.judged(each.motion)[0] == came_to  # the stage of dynamics says the same
 
 
 def test_a_line_that_only_another_branch_can_end_is_singular():

@@ -162,6 +162,25 @@ def test_without_a_driver_the_preview_is_empty_and_one_line_says_why(small_study
     assert (tmp_path / "inverse.webp").read_bytes() == b""
 
 
+RANGE = "AbsoluteTimeRange {{ min: TimeInt({}), max: TimeInt({}) }}"
+ENDED = "the Rerun viewer ended without a picture{} (docs/recordings.md tells what it needs)"
+
+
+@pytest.mark.parametrize(
+    ("messages", "said"),
+    [
+        ("", ""),
+        (f"{RANGE.format(0, 'MAX')} < {RANGE.format(0, 24)}\n", ""),
+        ("thread 'main' panicked at 'assertion failed: Foo { a: 1 }'\nnote: run with\n", ""),
+        ("starting\nError: Failed to create a window: no suitable adapter found\n", True),
+        ("thread 'main' panicked at 'Could not open a display'\nnote: run with\n", ": Could not open a display"),
+    ],
+)
+def test_of_a_viewer_that_ends_only_words_about_an_error_are_told(messages, said):
+    said = f": {messages.splitlines()[-1]}" if said is True else said
+    assert viewer._why(messages) == ENDED.format(said)
+
+
 def luminance(colour: tuple[int, int, int]) -> float:
     """Relative luminance of an sRGB colour, as WCAG 2 defines it."""
     linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in (value / 255 for value in colour)]

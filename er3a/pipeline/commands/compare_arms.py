@@ -78,6 +78,7 @@ def compare(
         tolerance_mm=tolerance_mm,
         tolerance_deg=tolerance_deg,
     )
+    ranked = [(each, _beside(found, first, others[each])) for each, found in ranked]
     name, found = ranked[0]
     notes = _notes((a, first), (name, others[name]))
     compared = {Path(a).name, Path(name).name}
@@ -102,6 +103,16 @@ def compare(
                 print(f"{written}: written")
     if found.verdict != "equal":
         raise typer.Exit(1)
+
+
+def _beside(found: Comparison, first: ReadArm, other: ReadArm) -> Comparison:
+    """A comparison of two tables, with what both files give beside them."""
+    from dataclasses import replace
+
+    from er3a.comparison.compare import given_by_both
+
+    ranges = (each for each in found.not_examined if each in ("limits", "speeds"))
+    return replace(found, not_examined=(*ranges, *given_by_both(first.beside, other.beside)))
 
 
 def _notes(one: tuple[str, ReadArm], other: tuple[str, ReadArm]) -> list[str]:

@@ -223,7 +223,8 @@ def calibrate(
     The whole model goes to NAME_model.json, for er3a.load_calibration in Python. The robot file has the table that is
     best without such errors, and ratios and couplings as its coupling.
 
-    Exit code 1 if positions held back contradict the result, which is written all the same.
+    Exit code 1 if measurements and table don't fit (what remains or is corrected is far beyond errors of arms and of
+    measuring), or positions held back contradict the result. It is written all the same.
     """
     from er3a.calibration.observations import check_poses
     from er3a.calibration.outcomes import CalibrationError
@@ -276,7 +277,7 @@ def calibrate(
     contradicted = bool(record["held_back_contradicts"])
     if not as_json:
         print("\n".join(kept_lines(found, robot, output, model, contradicted=contradicted)))
-    if contradicted:
+    if contradicted or not found.fits:
         raise typer.Exit(1)
 
 

@@ -49,7 +49,7 @@ def lines_of(found: Calibration, fitted: Sequence[Measurement] = (), others: Seq
         else f"standard deviation of a coordinate, estimated: {_deviations(found)}"
     )
     lines = [
-        *([say(found.wrong)] if found.wrong else []),
+        *([] if found.fits else [say(found.conclusion)]),
         *held_back_warning(found, fitted, others),
         *scale_texts(found),
         *_summary(found),
@@ -188,8 +188,9 @@ def kept_lines(
     if output is None or model is None:
         return [f"keep it: --output FILE.yaml writes the robot file, and FILE_model.json for {python} in Python"]
     lines = []
-    if contradicted:
-        lines.append("written although positions held back contradict it: don't use these files until that is settled")
+    doubts = {"positions held back contradict it": contradicted, "measurements and table don't fit": not found.fits}
+    if against := " and ".join(each for each, holds in doubts.items() if holds):
+        lines.append(f"written although {against}: don't use these files until that is settled")
     lines.append(f"{model}: written; the whole model: {python} in Python, or")
     lines.append(f"    er3a predict {shlex.quote(str(model))} JOINTS.csv --robot {shlex.quote(robot)}")
     lines.append(f"{output}: written" + (f"; {text}" if (text := file_text(found)) else ""))

@@ -12,8 +12,10 @@ from er3a.comparison.compare import (
     PlacementLayer,
     RangeDifference,
     RangeLayer,
+    Uncompared,
 )
 from er3a.pipeline.messages.language import N_, tr, with_unit
+from er3a.pipeline.messages.pages import GROUP_NAMES
 from er3a.pipeline.messages.say import joined, say, word
 
 LAYERS = {
@@ -46,6 +48,7 @@ CAUSES = {
     "scale": N_("all lengths are scaled"),
     "rows_shifted": N_("values stand a row too high or too low"),
 }
+PAIR_RULES = N_("rules for pairs of links")
 STATES = {True: N_("agrees"), False: N_("differs"), None: N_("not given")}
 
 
@@ -56,8 +59,14 @@ def headline(found: Comparison) -> str:
         a, b = found.joints
         return tr("{verdict}: {a} and {b}", verdict=text, a=a, b=b) if found.verdict == "other_joint_count" else text
     if found.verdict == "equal":
-        missing = [tr(shown) for name, shown in LAYERS.items() if getattr(getattr(found, name), "same", True) is None]
-        return tr("{verdict}; not compared: {layers}", verdict=text, layers=", ".join(missing)) if missing else text
+        off = tr(
+            "{verdict} (at the worst joint angles the flange is {printed:.1f} mm and {turned:.2f} deg off)",
+            verdict=text,
+            printed=found.as_printed_mm,
+            turned=found.as_printed_deg,
+        )
+        missing = joined([_uncompared(each) for each in found.not_examined], ", ")
+        return tr("{verdict}; not compared: {layers}", verdict=off, layers=missing) if missing else off
     return tr(
         "{verdict} (at the worst joint angles the flange is {printed:.1f} mm and {turned:.1f} deg off as printed, "
         "{aligned:.4g} mm and {aligned_deg:.3g} deg aligned)",
@@ -77,7 +86,12 @@ def layer_rows(found: Comparison) -> list[tuple[str, str, str]]:
         if layer is None or (name == "coupling" and layer.same):
             continue
         rows.append((tr(shown), tr(STATES[layer.same]), _detail(name, found)))
-    return rows
+    beside = [each for each in found.not_examined if each not in LAYERS]
+    return [*rows, *((_uncompared(each), tr("not compared"), "") for each in beside)]
+
+
+def _uncompared(name: Uncompared) -> str:
+    return tr(LAYERS.get(name) or (PAIR_RULES if name == "pair_rules" else GROUP_NAMES[name]))
 
 
 def doubt_rows(doubts: Iterable[str]) -> list[tuple[str, str, str]]:

@@ -259,7 +259,18 @@ def _shoot(port: int, viewer: subprocess.Popen[bytes], shot: Path) -> None:
     raise Er3aError(f"the viewer drew no steady picture in {PATIENCE_S} s")
 
 
+AN_ERROR = re.compile(
+    r"\b(error|fail(ed|s|ure)?|can't|cannot|can not|could not|couldn't|unable|missing|not found|no such|denied|refused|"
+    r"requires?|unsupported|not supported|incompatible|invalid|no suitable|no adapter)\b",
+    re.IGNORECASE,
+)
+OF_CODE = re.compile(r"\w::\w|\w \{|\}|^[|=^~ ]*$")
+"""Names and values of a program's own, which tell a user nothing."""
+
+
 def _why(messages: str) -> str:
+    """That the viewer ended, and its last words if they tell of an error."""
     panic = re.search(r"panicked at '(.+?)'\n", messages, flags=re.DOTALL)
-    said = panic[1] if panic else (messages.strip().splitlines() or ["without a word"])[-1]
-    return f"the Rerun viewer ended: {said} (docs/recordings.md tells what it needs)"
+    last = panic[1] if panic else (messages.strip().splitlines() or [""])[-1].strip()
+    said = f": {last}" if AN_ERROR.search(last) and not OF_CODE.search(last) else ""
+    return f"the Rerun viewer ended without a picture{said} (docs/recordings.md tells what it needs)"

@@ -252,7 +252,7 @@ class PathJudge:
     def judged(self, motion: Motion) -> tuple[tuple[PathVerdict, ...], bool]:
         """What a motion came to, and whether it may be run."""
         found = judge(self.robot, motion, self.near, self.limits)
-        outcomes = outcomes_of(found, measured(self.surroundings, motion))
+        outcomes = outcomes_of(found, measured(self.surroundings, motion), float(motion.built.duration))
         return outcomes, set(outcomes).isdisjoint(NOT_TO_BE_RUN) and found.speed_bounded
 
 

@@ -271,7 +271,7 @@ class PathLoad:
 
     Attributes
     ----------
-    outcomes : of the trajectory stage's checks: the verdict and, if it is another, that it collides, in order of time
+    outcomes : of the trajectory stage's checks: the verdict and whatever else makes it a fail, in order of time
     counts : whether it may be run; motors, limits and key figures rest on such paths alone
     complete : whether the arm can follow it all along; nothing else is known of one that it can't
     payload, speed_scale : None where no torque limit is known

@@ -25,7 +25,6 @@ from er3a.planning.tool_proof import Undecided
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 
-ASSUMED = (motion_faults.TooFastIfAssumed, motion_faults.AccelerationTooGreatIfAssumed)
 STEPS_TO_CONTACT, ATTEMPTS = 1000, 5
 BEFORE_STOP = 0.99  # of the time until limits or reach are left, where the motion is not solved any more
 SPEED_STEP = 1e-5  # share of the duration
@@ -108,7 +107,7 @@ def judge(robot: Robot, motion: Motion, near: NearSingular, limits: JointLimits)
 
 
 def _verdict(found: Faults, beyond: bool, jumps: bool, of_tool: bool) -> PathVerdict:
-    known = [part for part in found.fast if not isinstance(part.cause, ASSUMED)]
+    known = [part for part in found.fast if not isinstance(part.cause, model.ASSUMED)]
     faults: dict[PathVerdict, object] = {
         "unreachable": beyond,
         "leaves limits": found.limits,
@@ -230,11 +229,16 @@ def verdict_of(found: Judgement, along: ClearanceAlong) -> PathVerdict:
     return min(verdicts, key=PATH_VERDICTS.index)
 
 
-def outcomes_of(found: Judgement, along: ClearanceAlong) -> tuple[PathVerdict, ...]:
-    """The gravest verdict on a motion and, if it is another, that it collides: the first fault first."""
-    verdict = verdict_of(found, along)
-    starts = [part.start for part in (found.beyond if verdict == "unreachable" else found.limits)]
-    return model.in_order(verdict, starts, [contact.start for contact in along.contacts])
+def outcomes_of(found: Judgement, along: ClearanceAlong, duration: float) -> tuple[PathVerdict, ...]:
+    """All that a motion of a ``duration`` (s) came to, as :func:`er3a.pipeline.stages.trajectory.model.in_order` names
+    it."""
+    spans: dict[PathVerdict, list[tuple[float, float]]] = {
+        "unreachable": [(part.start, part.end) for part in found.beyond],
+        "leaves limits": [(part.start, part.end) for part in found.limits],
+        "collides": [(contact.start, contact.end) for contact in along.contacts],
+        "too fast": [(part.start, part.end) for part in found.fast if not isinstance(part.cause, model.ASSUMED)],
+    }
+    return model.in_order(verdict_of(found, along), spans, duration)
 
 
 def min_clearance(along: ClearanceAlong) -> model.MinClearance | None:

@@ -5,9 +5,9 @@ Times count from a path's start, ways along the tool point's path. Angles are th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Generic, Literal, TypeVar
+from typing import Any, Generic, Literal, TypeVar
 
 from er3a.by_value import Finding
 from er3a.collision.pairs import Pair, PairOverlaps, PairTooNear, ShapesAssumed
@@ -21,7 +21,13 @@ from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet
 from er3a.pipeline.stages.programs.model import FindingAt
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.planning.avoidance.strategies import NotUsable
-from er3a.planning.motion_faults import LimitCause, PathOutOfReach, RateCause
+from er3a.planning.motion_faults import (
+    AccelerationTooGreatIfAssumed,
+    LimitCause,
+    PathOutOfReach,
+    RateCause,
+    TooFastIfAssumed,
+)
 from er3a.planning.names import PathVerdict, StrategyName
 from er3a.planning.tool_proof import Undecided
 from er3a.planning.way_around import NoWayAround
@@ -33,6 +39,11 @@ FASTEST: Literal["fastest"] = "fastest"
 
 SAME_SPEED = 1e-9
 """Speeds whose relative difference is less are equal but for rounding."""
+
+ASSUMED = (TooFastIfAssumed, AccelerationTooGreatIfAssumed)
+AT_EDGE, AROUND_EDGE = 0.001, 0.1
+"""Shares of a path's duration: how near to the edge of the reach counts as at it, and how long before or after it
+joints may be too fast because of it."""
 
 CauseT = TypeVar("CauseT", bound=Finding)
 
@@ -355,10 +366,16 @@ class PathSummary:
 
     @property
     def outcomes(self) -> tuple[PathVerdict, ...]:
-        """The verdict and, if it is another, that it collides: the first fault first."""
-        parts = self.unreachable if self.verdict == "unreachable" else self.out_of_limits
-        starts = [part.t0_s for part in parts]
-        return in_order(self.verdict, starts, [part.t0_s for part in self.collisions])
+        """All that it came to, as :func:`in_order` names it."""
+        known = [part for part in self.too_fast if not isinstance(part.cause, ASSUMED)]
+        faults: dict[PathVerdict, Sequence[Stretch[Any]]] = {
+            "unreachable": self.unreachable,
+            "leaves limits": self.out_of_limits,
+            "collides": self.collisions,
+            "too fast": known,
+        }
+        spans = {name: [(part.t0_s, part.t1_s) for part in parts] for name, parts in faults.items()}
+        return in_order(self.verdict, spans, self.duration_s)
 
     @property
     def chosen(self) -> TriedStrategy | None:
@@ -366,14 +383,36 @@ class PathSummary:
         return next((tried for tried in self.avoidance if tried.name == self.strategy), None)
 
 
-def in_order(verdict: PathVerdict, starts: Sequence[float], collisions: Sequence[float]) -> tuple[PathVerdict, ...]:
-    """A path's verdict and, if it is another, that it collides: the first fault first.
+def in_order(
+    verdict: PathVerdict, spans: Mapping[PathVerdict, Sequence[tuple[float, float]]], duration: float
+) -> tuple[PathVerdict, ...]:
+    """A path's verdict and whatever else makes it a fail by itself, the first fault first.
 
-    ``starts``, ``collisions``: when (s) it leaves limits or reach, and when bodies begin to overlap.
+    Where a path leaves the reach it is too fast at any pace, so that follows from being unreachable. Where no motion
+    was planned, only collisions of the straight move are told.
+
+    Parameters
+    ----------
+    spans : from when to when (s) it has each fault: ``unreachable``, and what can stand beside a verdict
+    duration : s, of the whole path
     """
-    if not collisions or verdict == "collides":
-        return (verdict,)
-    return ("collides", verdict) if min(collisions) < min(starts, default=0.0) else (verdict, "collides")
+    edges = [edge for span in spans["unreachable"] for edge in span]
+    besides: dict[PathVerdict, list[float]] = {name: [start for start, _ in found] for name, found in spans.items()}
+    besides["too fast"] = [span[0] for span in spans["too fast"] if not _by_the_edge(span, edges, duration)]
+    if verdict == "none found":
+        besides = {"collides": besides["collides"]}
+    starts = {name: min(found) for name, found in besides.items() if found}
+    starts.setdefault(verdict, 0.0)
+    return tuple(sorted((verdict, *(name for name in starts if name != verdict)), key=starts.__getitem__))
+
+
+def _by_the_edge(span: tuple[float, float], edges: Iterable[float], duration: float) -> bool:
+    """Whether a stretch of time (s) runs up to the edge of the reach, or begins there, and is short."""
+    start, end = span
+    at, around = AT_EDGE * duration, AROUND_EDGE * duration
+    return any(
+        start <= edge + at and end >= edge - at and start >= edge - around and end <= edge + around for edge in edges
+    )
 
 
 @dataclass(frozen=True)
