@@ -352,7 +352,7 @@ def _beyond_joint(robot: Robot, pair: tuple[Body, Body], found: JudgedPair, join
     """
     for each in joined:
         if each.region and each.region[0][0] is pair[0] and found.state in ("meets", "undecided", "overlaps"):
-            rest = _cut(robot, pair, each.region[1], each.left_out, Held(each.hub, found.boxes), BOXES) or found
+            rest = _cut(robot, pair, (each.region[1], each.left_out), Held(each.hub, found.boxes), BOXES) or found
             return rest if found.state == "overlaps" else replace(rest, region=None)
     return found
 
@@ -594,23 +594,24 @@ def _joined(
     last, radius = np.inf, sum(girth(body, centre) for body, centre in zip(pair, centres))
     while radius < SETTLED * last:  # girths of less and less of the bodies, until they hold for what is cut off
         radius, last = sum(girth(body, centre, radius) for body, centre in zip(pair, centres)), radius
-    found = _cut(robot, pair, centres, radius, held, boxes, most)
+    found = _cut(robot, pair, (centres, radius), held, boxes, most=most)
     return found or JudgedPair("overlaps", witness=apart, boxes=held.boxes)
 
 
 def _cut(
     robot: Robot,
     pair: tuple[Body, Body],
-    centres: list[Reals],
-    radius: float,
+    region: tuple[list[Reals], float],
     held: Held,
     boxes: int,
+    *,
     most: float = np.inf,
 ) -> JudgedPair | None:
-    """Two bodies without the region of ``radius`` (m) around their joint, which grows until the rest comes apart.
+    """Two bodies without the region around their joint (centres, radius in m), which grows until the rest comes apart.
 
     None if it would have to be larger than ``most`` (m) by more than one step.
     """
+    centres, radius = region
     for _ in range(GROWTHS):
         if radius > most * GROWTH:
             return None
@@ -621,8 +622,8 @@ def _cut(
             watched = tuple(pair for each in found for pair in each.bodies)
             witness = next((each.witness for each in found if each.witness is not None), None)
             looked = held.boxes + sum(each.boxes for each in found)
-            region = pair, centres
-            return JudgedPair("joined", watched, witness, np.nan, radius, looked, held.hub, not rest, region)
+            cut = pair, centres
+            return JudgedPair("joined", watched, witness, np.nan, radius, looked, held.hub, not rest, cut)
         radius *= GROWTH
     return JudgedPair("joined", left_out=radius, boxes=held.boxes, hub=held.hub, whole=True, region=(pair, centres))
 
