@@ -599,7 +599,7 @@ NOTES = frozenset(
 )
 
 
-NOT_AT_FAULT = ("turns_with_arc", "perhaps_changed", "position_unknown")
+NOT_AT_FAULT = ("turns_with_arc", "perhaps_changed", "not_evaluated", "position_unknown")
 """Why a target may not be known though the program determines it."""
 
 

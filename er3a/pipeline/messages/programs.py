@@ -50,6 +50,7 @@ REASONS: dict[Unresolved, str] = {
         "line"
     ),
     "perhaps_changed": N_("something that is not understood may have changed it"),
+    "not_evaluated": N_("the program computes it by what is not evaluated here"),
     "not_finite": N_("it is no finite number"),
     "too_far": N_("it is more than 100 m away, as where millimetres were written for metres"),
     "position_unknown": N_("it depends on where the arm stands, which is not known"),
@@ -156,6 +157,7 @@ TARGETS: dict[Unresolved, str] = {
     "perhaps_changed": N_(
         "Check the program together with the module that holds what is called, or give the target after the call."
     ),
+    "not_evaluated": N_("Write the value that it has in the program, or compute it by numbers and arithmetic alone."),
     "turns_with_arc": N_("Write the arc as several of less than half a turn each."),
 }
 STOPPED: dict[EndKind, str] = {
