@@ -97,7 +97,7 @@ CARRIED_OUT = {
 }
 NOT_CARRIED_OUT = {  # a person looks at the controller, the cell or the file, or takes another picture
     *("configuration_not_read", "program_not_simulated", "program_form_inferred", "external_axes_left_out"),
-    *("program_nothing_moves", "line_not_checked", "written_tool_not_given", "stopped.stopped"),
+    *("program_nothing_moves", "more_scatter#tried", "line_not_checked", "written_tool_not_given", "stopped.stopped"),
     *("centre_outside", "unlikely_density", "unlikely_inertia", "unexplained_residuals"),
     *("contradiction#one", "contradiction#more"),
     *("all_samples_equal#target", "void_advice#cause", "void_advice#predicate"),

@@ -75,7 +75,8 @@ class Bodies:
                 if row.second in numbers
                 else CarriedAndLink(row.second, numbers[row.first])
                 for row in self.matrix
-                if row.state == state and frozenset((row.first, row.second)) not in allowed
+                if (row.state == state or (state == "guessed" and row.coarse))
+                and frozenset((row.first, row.second)) not in allowed
             )
             for state in ("overlaps", "guessed")
         )

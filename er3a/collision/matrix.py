@@ -21,7 +21,9 @@ proven harmless:
 - *guessed*: shapes guessed from a table (:mod:`er3a.collision.shapes`) that would be joined, but the table gives the
   link between them no length (its housing is missing), or they are neighbours between three parallel axes (the table
   does not say how far apart they lie along these), and the rest of the two overlaps in many of the joint vectors drawn
-  (``POOR_GUESS``). The pair is left out, and results have to say so;
+  (``POOR_GUESS``). Or that link has no length, less is left of one of the two than it is thick, and nothing is found
+  that this meets, as across most wrists. The pair is left out, and results have to say so. A tool changes nothing of
+  this: the capsule that leads to its point is judged apart, without the region that is left out of its link;
 - *meets*: a joint vector in which they overlap was found, and one in which they don't: checked;
 - *undecided*: none of this within the number of boxes: checked.
 
@@ -31,7 +33,7 @@ as if they weren't allowed, and if they would be checked then, no verdict passes
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import combinations, compress, product
@@ -180,6 +182,7 @@ class JudgedPair:
     boxes : how many boxes of joint vectors were examined
     whole : whether nothing of one of them is left without the region around the joint
     hub : (3,), m, in the outer link's frame, where a joint is proven to hold the two; None where none is
+    region : the pair that a joint joins, and the centres (3,), m, of what is left out, each in its own link's frame
     """
 
     state: PairState
@@ -190,6 +193,7 @@ class JudgedPair:
     boxes: int = 0
     hub: Reals | None = None
     whole: bool = False
+    region: tuple[tuple[Body, Body], list[Reals]] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,7 +209,8 @@ class Held:
 class MatrixRow:
     """What holds of two links, or of a link and what is carried; as :class:`JudgedPair`, over all of their bodies.
 
-    ``hides``: that an allowed pair would be watched otherwise; ``whole``: that nothing of them is left to be watched.
+    ``hides``: that an allowed pair would be watched otherwise; ``whole``: that nothing of them is left to be watched;
+    ``coarse``: that guessed shapes of the two are left out, or that of the tool which one holds, and the rest watched.
     """
 
     first: str
@@ -218,6 +223,7 @@ class MatrixRow:
     reason: str = ""
     hides: bool = False
     whole: bool = False
+    coarse: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,22 +242,64 @@ class CollisionMatrix:
 @lru_cache(maxsize=32)  # of equal robots too: who checks many programs loads the arm for each
 def collision_matrix(robot: Robot) -> CollisionMatrix:
     """The matrix of an arm without anything carried."""
-    matrix = _judged_matrix(robot, list(combinations(arm_bodies(robot), 2)), robot.pair_rules)
-    matrix = matrix if arm_shapes(robot).given else _without_poor_guesses(robot, matrix)
-    return _allowing(matrix, robot.pair_rules)
+    if not arm_shapes(robot).given:
+        return _allowing(_matrix_of_guesses(robot), robot.pair_rules)
+    return matrix_of(robot, list(combinations(arm_bodies(robot), 2)), robot.pair_rules)
 
 
-def _without_poor_guesses(robot: Robot, matrix: CollisionMatrix) -> CollisionMatrix:
-    """The matrix of guessed shapes, without joined pairs of which what is left overlaps in many joint vectors, because
-    the link between them has no length in the table, or it does not say whether they lie side by side."""
-    left: dict[tuple[str, str], list[tuple[Body, Body]]] = {}
-    for pair, joined in zip(matrix.watched, matrix.joined):
-        if joined and (pair[1].link > pair[0].link + 1 or _may_pass(robot, pair[0].link)):
-            left.setdefault((pair[0].name, pair[1].name), []).append(pair)
-    poor = {names for names, pairs in left.items() if _overlap(robot, pairs).any(axis=1).mean() >= POOR_GUESS}
-    rows = (replace(row, state="guessed") if (row.first, row.second) in poor else row for row in matrix.rows)
-    kept = [(p, joined) for p, joined in zip(matrix.watched, matrix.joined) if (p[0].name, p[1].name) not in poor]
-    return CollisionMatrix(tuple(rows), tuple(pair for pair, _ in kept), tuple(joined for _, joined in kept))
+def _matrix_of_guesses(robot: Robot) -> CollisionMatrix:
+    """The matrix of guessed shapes: of the links, and of what leads to a tool's point beside them."""
+    bare = {(body.link, body.points.tobytes()) for body in arm_bodies(robot.replace(tool=np.eye(4)))}
+    is_own = [(body.link, body.points.tobytes()) in bare for body in arm_bodies(robot)]
+    links, tool = (list(compress(arm_bodies(robot), part)) for part in (is_own, np.logical_not(is_own)))
+    found = _judged(robot, list(combinations(links, 2)), robot.pair_rules)
+    poor = {names for names, pairs in found.items() if _says_nothing(robot, pairs)}
+    regions = {names: [each for each in pairs if each.region] for names, pairs in found.items()}
+    more = _judged(robot, list(product(links, tool)), robot.pair_rules, regions)
+    poor_tool = {n for n, pairs in more.items() if _mostly_overlaps(robot, [each for each in pairs if each.region])}
+    rows, kept = [], {}
+    for names in dict.fromkeys((*found, *more)):
+        every = [*found.get(names, ()), *more.get(names, ())]
+        kept[names] = [
+            each for part, bad in ((found, poor), (more, poor_tool)) if names not in bad for each in part.get(names, ())
+        ]
+        row = _row(*names, every, _reason(names, robot.pair_rules))
+        if names in poor | poor_tool:
+            watched = any(each.bodies for each in kept[names])
+            row = replace(_row(*names, kept[names], ""), coarse=True) if watched else replace(row, state="guessed")
+        rows.append(row)
+    return CollisionMatrix(tuple(rows), *_watched(kept.values()))
+
+
+def _says_nothing(robot: Robot, pairs: Sequence[JudgedPair]) -> bool:
+    """Whether guessed shapes of two links are too coarse to show collisions of them."""
+    return _mostly_overlaps(robot, pairs) or _hardly_left(pairs)
+
+
+def _mostly_overlaps(robot: Robot, pairs: Sequence[JudgedPair]) -> bool:
+    """Whether what is left of joined pairs overlaps in many joint vectors, because the link between them has no length
+    in the table, or it does not say whether they lie side by side."""
+    joined = [pair for each in pairs if each.state == "joined" for pair in each.bodies]
+    left = [pair for pair in joined if pair[1].link > pair[0].link + 1 or _may_pass(robot, pair[0].link)]
+    return bool(left) and bool(_overlap(robot, left).any(axis=1).mean() >= POOR_GUESS)
+
+
+def _hardly_left(pairs: Sequence[JudgedPair]) -> bool:
+    """Whether less than its thickness is left of one of two bodies across a link without length, and nothing of their
+    links was found to meet."""
+    regions = [(each.left_out, *each.region) for each in pairs if each.region]
+    if not regions or any(each.bodies if each.region is None else each.witness is not None for each in pairs):
+        return False
+    return all(
+        pair[1].link > pair[0].link + 1
+        and any(_length(trimmed(body, centre, radius)) < body.radius for body, centre in zip(pair, centres))
+        for radius, pair, centres in regions
+    )
+
+
+def _length(parts: Sequence[Body]) -> float:
+    """The length of lines together, m."""
+    return sum(float(np.linalg.norm(part.points[-1] - part.points[0])) for part in parts)
 
 
 def _may_pass(robot: Robot, link: int) -> bool:
@@ -265,27 +313,66 @@ def _may_pass(robot: Robot, link: int) -> bool:
 
 def matrix_of(robot: Robot, pairs: Sequence[tuple[Body, Body]], rules: Sequence[PairRule]) -> CollisionMatrix:
     """Judge pairs of bodies of different links."""
-    return _allowing(_judged_matrix(robot, pairs, rules), rules)
+    return _allowing(_as_matrix(_judged(robot, pairs, rules), rules), rules)
 
 
-def _judged_matrix(robot: Robot, pairs: Sequence[tuple[Body, Body]], rules: Sequence[PairRule]) -> CollisionMatrix:
-    """The same; pairs that are allowed are judged as if they weren't."""
+def _judged(
+    robot: Robot,
+    pairs: Sequence[tuple[Body, Body]],
+    rules: Sequence[PairRule],
+    regions: Mapping[tuple[str, str], Sequence[JudgedPair]] | None = None,
+) -> dict[tuple[str, str], list[JudgedPair]]:
+    """Judgements of pairs of bodies of different links, by the names of the two; as if none were allowed.
+
+    ``regions``: of other bodies of the links, that joints join: what is left out of these is left out of ``pairs`` too
+    """
     by_names: dict[tuple[str, str], list[tuple[Body, Body]]] = {}
     for first, second in pairs:
         if first.link != second.link:
             inner, outer = (first, second) if first.link < second.link else (second, first)
             by_names.setdefault((inner.name, outer.name), []).append((inner, outer))
-    decided = {frozenset((rule.first, rule.second)): rule for rule in rules if rule.rule == "watch"}
-    rows, watched = [], list[tuple[tuple[Body, Body], bool]]()
+    decided = {frozenset((rule.first, rule.second)) for rule in rules if rule.rule == "watch"}
+    found = {}
     for names, bodies in by_names.items():
-        rule = decided.get(frozenset(names))
-        if rule:
-            found = [JudgedPair("watched", tuple(bodies))]
+        if frozenset(names) in decided:
+            found[names] = [JudgedPair("watched", tuple(bodies))]
         else:
-            found = _together(robot, judged_pairs(robot, bodies, BOXES), BOXES)
-        rows.append(_row(*names, found, rule.reason if rule else ""))
-        watched += [(pair, each.state == "joined") for each in found for pair in each.bodies]
-    return CollisionMatrix(tuple(rows), tuple(pair for pair, _ in watched), tuple(joined for _, joined in watched))
+            judged = judged_pairs(robot, bodies, BOXES)
+            if regions:
+                judged = [_beyond_joint(robot, *each, regions.get(names, ())) for each in zip(bodies, judged)]
+            found[names] = _together(robot, judged, BOXES)
+    return found
+
+
+def _beyond_joint(robot: Robot, pair: tuple[Body, Body], found: JudgedPair, joined: Sequence[JudgedPair]) -> JudgedPair:
+    """The judgement of a link and what leads to a tool's point, without the region of a joint that joins the link and
+    the one with the tool.
+
+    Its own ``region`` is kept only where the two overlap always: else they are no pair that a joint joins.
+    """
+    for each in joined:
+        if each.region and each.region[0][0] is pair[0] and found.state in ("meets", "undecided", "overlaps"):
+            rest = _cut(robot, pair, (each.region[1], each.left_out), Held(each.hub, found.boxes), BOXES) or found
+            return rest if found.state == "overlaps" else replace(rest, region=None)
+    return found
+
+
+def _as_matrix(found: Mapping[tuple[str, str], Sequence[JudgedPair]], rules: Sequence[PairRule]) -> CollisionMatrix:
+    """Judgements, by the names of the two links, as rows and as pairs of bodies."""
+    rows = (_row(*names, pairs, _reason(names, rules)) for names, pairs in found.items())
+    return CollisionMatrix(tuple(rows), *_watched(found.values()))
+
+
+def _reason(names: tuple[str, str], rules: Sequence[PairRule]) -> str:
+    """Why a rule has two links watched; empty where none does."""
+    decided = {frozenset((rule.first, rule.second)): rule.reason for rule in rules if rule.rule == "watch"}
+    return decided.get(frozenset(names), "")
+
+
+def _watched(found: Iterable[Sequence[JudgedPair]]) -> tuple[tuple[tuple[Body, Body], ...], tuple[bool, ...]]:
+    """The pairs of bodies to be watched, and of each whether a joint joins them."""
+    watched = [(pair, each.state == "joined") for pairs in found for each in pairs for pair in each.bodies]
+    return tuple(pair for pair, _ in watched), tuple(joined for _, joined in watched)
 
 
 def _allowing(matrix: CollisionMatrix, rules: Sequence[PairRule]) -> CollisionMatrix:
@@ -298,7 +385,9 @@ def _allowing(matrix: CollisionMatrix, rules: Sequence[PairRule]) -> CollisionMa
 
     def let(row: MatrixRow, pair: frozenset[str]) -> MatrixRow:
         witness = row.witness if pair in named else None
-        found = replace(row, state="allowed", witness=witness, lower_bound=np.nan, left_out=0.0, whole=False)
+        found = replace(
+            row, state="allowed", witness=witness, lower_bound=np.nan, left_out=0.0, whole=False, coarse=False
+        )
         return replace(found, reason=allowed[pair], hides=pair in named)
 
     rows = ((row, frozenset((row.first, row.second))) for row in matrix.rows)
@@ -505,9 +594,27 @@ def _joined(
     last, radius = np.inf, sum(girth(body, centre) for body, centre in zip(pair, centres))
     while radius < SETTLED * last:  # girths of less and less of the bodies, until they hold for what is cut off
         radius, last = sum(girth(body, centre, radius) for body, centre in zip(pair, centres)), radius
+    found = _cut(robot, pair, (centres, radius), held, boxes, most=most)
+    return found or JudgedPair("overlaps", witness=apart, boxes=held.boxes)
+
+
+def _cut(
+    robot: Robot,
+    pair: tuple[Body, Body],
+    region: tuple[list[Reals], float],
+    held: Held,
+    boxes: int,
+    *,
+    most: float = np.inf,
+) -> JudgedPair | None:
+    """Two bodies without the region around their joint (centres, radius in m), which grows until the rest comes apart.
+
+    None if it would have to be larger than ``most`` (m) by more than one step.
+    """
+    centres, radius = region
     for _ in range(GROWTHS):
         if radius > most * GROWTH:
-            return JudgedPair("overlaps", witness=apart, boxes=held.boxes)
+            return None
         parts = [trimmed(body, centre, radius) for body, centre in zip(pair, centres)]
         rest = [(first, second) for first in parts[0] for second in parts[1]]
         found = _without_joining(robot, rest, boxes)
@@ -515,9 +622,10 @@ def _joined(
             watched = tuple(pair for each in found for pair in each.bodies)
             witness = next((each.witness for each in found if each.witness is not None), None)
             looked = held.boxes + sum(each.boxes for each in found)
-            return JudgedPair("joined", watched, witness, left_out=radius, boxes=looked, hub=held.hub, whole=not rest)
+            cut = pair, centres
+            return JudgedPair("joined", watched, witness, np.nan, radius, looked, held.hub, not rest, cut)
         radius *= GROWTH
-    return JudgedPair("joined", left_out=radius, boxes=held.boxes, hub=held.hub, whole=True)
+    return JudgedPair("joined", left_out=radius, boxes=held.boxes, hub=held.hub, whole=True, region=(pair, centres))
 
 
 def _without_joining(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: int) -> list[JudgedPair] | None:

@@ -245,8 +245,8 @@ def default_envelopes(robot: Robot) -> tuple[Envelope, ...]:
             found += _pieces(robot, 1, size, [(along, across)])
         else:
             found += _pieces(robot, k + 1, size, [(np.zeros(3), along), (along, across)])
-    T = frames(robot, np.zeros(robot.joints))
-    found += _pieces(robot, last, size, [(across, (np.linalg.inv(T[last - 1]) @ T[last])[:3, 3])])
+    flange, point = _end(robot.replace(tool=np.eye(4))), _end(robot)
+    found += _pieces(robot, last, size, [(across, flange), (flange, point)])
     return tuple(found)
 
 

@@ -298,9 +298,11 @@ class BodiesTouch(Finding):
 
 
 class MotionCollides(Finding):
-    """Bodies overlap during the motion, in the order of first contact."""
+    """Bodies overlap during the motion, in the order of first contact; ``assumed``: no document gives the arm's
+    shapes."""
 
     touches: tuple[BodiesTouch, ...]
+    assumed: bool = False
 
     @property
     def at_mm(self) -> float | None:
@@ -317,7 +319,7 @@ class MotionCollides(Finding):
                 depth_mm=max(first.depth_mm, touch.depth_mm),
                 at_target=first.at_target or touch.at_target,
             )
-        return MotionCollides(tuple(deepest.values()))
+        return MotionCollides(tuple(deepest.values()), self.assumed)
 
 
 class ClearOfAssumed(Finding):
@@ -329,10 +331,12 @@ class ClearOfAssumed(Finding):
 
 
 class ZoneCollides(Finding):
-    """The programmed path is free of collisions, but not every path that the corner's zone allows."""
+    """The programmed path is free of collisions, but not every path that the corner's zone allows; ``assumed`` as of
+    :class:`MotionCollides`."""
 
     pair: Pair
     depth_mm: float
+    assumed: bool = False
 
 
 class ZoneNotSettled(Finding):
@@ -595,7 +599,7 @@ NOTES = frozenset(
 )
 
 
-NOT_AT_FAULT = ("turns_with_arc", "perhaps_changed", "position_unknown")
+NOT_AT_FAULT = ("turns_with_arc", "perhaps_changed", "not_evaluated", "position_unknown")
 """Why a target may not be known though the program determines it."""
 
 

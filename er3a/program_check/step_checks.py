@@ -576,7 +576,8 @@ class Obstacles:
     def hit(self, arm: Robot, touches: Iterable[found_in.BodiesTouch]) -> found_in.MotionCollides:
         """A collision, with what is known of the shapes that overlap."""
         return found_in.MotionCollides(
-            tuple(replace(each, enlarged_mm=1000 * enlarged_by(arm, self.scene, each.pair.names)) for each in touches)
+            tuple(replace(each, enlarged_mm=1000 * enlarged_by(arm, self.scene, each.pair.names)) for each in touches),
+            arm_shapes(arm).assumed,
         )
 
 
@@ -1066,7 +1067,9 @@ class StepChecker:
         if np.isfinite(corners).all():
             hit = self._round_corner(way, after, corners, (share_before, share_after))
             margin = self.obstacles.assumed_margin
-            if hit is not None:
+            if isinstance(hit, found_in.ZoneCollides):
+                found.append(replace(hit, assumed=arm_shapes(way.arm).assumed))
+            elif hit is not None:
                 found.append(hit)
             elif 0 < margin <= motion.clearance:
                 near = self._round_corner(way, after, corners, (share_before, share_after), margin)

@@ -307,12 +307,13 @@ def linked(
     routines: Iterable[syntax.Routine],
     changed: Changed = lambda call: (),
     perhaps: Changed = lambda call: (),
+    of_arguments: Container[str] = (),
 ) -> tuple[dict[str, syntax.Routine], tuple[ProgramFinding, ...]]:
     """The routines by name, with calls of each other taken out of expressions; and the findings about the text.
 
     Of two routines with one name the later one counts; the other is kept under a name that nothing calls. What a
     function outside the program changes of its arguments (``changed``), or may change (``perhaps``), is unclear from
-    its call on.
+    its call on; or the function's own value, of those in ``of_arguments``, which follows from its arguments alone.
     """
     found: list[ProgramFinding] = []
     by_name: dict[str, syntax.Routine] = {}
@@ -329,8 +330,8 @@ def linked(
     return {
         name: replace(
             routine,
-            code=_linked(routine.code, by_name, changed, perhaps),
-            handler=_linked(routine.handler, by_name, changed, perhaps),
+            code=_linked(routine.code, by_name, changed, perhaps, of_arguments),
+            handler=_linked(routine.handler, by_name, changed, perhaps, of_arguments),
         )
         for name, routine in by_name.items()
     }, tuple(found)
@@ -408,7 +409,11 @@ def _opaque(expression: syntax.Expression) -> Iterable[str]:
 
 
 def _linked(
-    given: tuple[syntax.Operation, ...], known: Mapping[str, syntax.Routine], changed: Changed, perhaps: Changed
+    given: tuple[syntax.Operation, ...],
+    known: Mapping[str, syntax.Routine],
+    changed: Changed,
+    perhaps: Changed,
+    of_arguments: Container[str],
 ) -> tuple[syntax.Operation, ...]:
     parts = (each for operation in given if not _plain(operation) for each in syntax.expressions_of(operation))
     outer = [each for part in parts for each in _invoked(part)]
@@ -432,7 +437,7 @@ def _linked(
             last = mapped(operation, calls.out)
         outside = [each for part in syntax.expressions_of(last) if not _plain(last) for each in _invoked(part)]
         unclear = [
-            syntax.Assign(operation.place, given, syntax.Opaque(text, doubt), text)
+            syntax.Assign(operation.place, given, _given_by(each, given, of_arguments, text, doubt), text)
             for each in outside
             for which, doubt in ((changed, False), (perhaps, True))
             for given, text in ((given, _call_text(operation, each)) for given in which(each))
@@ -441,6 +446,15 @@ def _linked(
         code += [*calls.found, *unclear, last]
     starts.append(len(code))
     return tuple(_moved(operation, starts) for operation in code)
+
+
+def _given_by(
+    call: syntax.Invocation, given: syntax.Expression, of_arguments: Container[str], text: str, doubt: bool
+) -> syntax.Expression:
+    """What a call outside the program gives to one of its arguments, which it does not read if ``of_arguments``."""
+    if call.function not in of_arguments:
+        return syntax.Opaque(text, doubt)
+    return replace(call, arguments=tuple(each for each in call.arguments if each is not given))
 
 
 def _call_text(operation: syntax.Operation, call: syntax.Invocation) -> str:

@@ -663,6 +663,8 @@ class ProgramMemory:
         else:
             key = self.key(expression)
             found = None if key is None else self.read(key)
+            if found is None and isinstance(of, syntax.NotEvaluated):
+                return of
             if found is None and isinstance(of, syntax.Unclear):
                 return syntax.Unclear(key or self.outside(expression) or of.text)
         return syntax.Unclear(self.shown(expression)) if found is None else found
@@ -796,7 +798,9 @@ class ProgramMemory:
             return left + right
         a, b = syntax.number(left), syntax.number(right)
         if a is None or b is None:
-            return syntax.Unclear(f"... {sign} ...")
+            both = left + right if isinstance(left, tuple) and isinstance(right, tuple) else ()
+            summed = sign in ("+", "-") and bool(both) and syntax.numbers(both) is not None  # by some controllers
+            return syntax.NotEvaluated(f"... {sign} ...") if summed else syntax.Unclear(f"... {sign} ...")
         if sign in COMPARISONS:
             return COMPARISONS[sign](a, b)
         whole = isinstance(left, int) and isinstance(right, int)
@@ -835,6 +839,8 @@ def unresolved(value: syntax.Unclear, text: str = "") -> UnresolvedTarget:
     """A target that is made of an unclear value; ``text``: what it is called where that has no text of its own."""
     if isinstance(value, syntax.PerhapsChanged):
         return UnresolvedTarget(value.text, "perhaps_changed")
+    if isinstance(value, syntax.NotEvaluated):
+        return UnresolvedTarget(value.text, "not_evaluated")
     is_number = value.text.upper().lstrip("+-") in NOT_NUMBERS
     return UnresolvedTarget(value.text or text, "not_finite" if is_number else "undefined")
 

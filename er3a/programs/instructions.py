@@ -43,6 +43,7 @@ MotionKind = Literal["joint", "line", "arc", "spline"]
 Unresolved = Literal[
     "undefined",
     "perhaps_changed",
+    "not_evaluated",
     "not_finite",
     "too_far",
     "position_unknown",

@@ -40,6 +40,11 @@ class Forgotten(Unclear):
 
 
 @dataclass(frozen=True, slots=True)
+class NotEvaluated(Unclear):
+    """What the program alone determines, by a function or an operator that is not evaluated here: ``text``."""
+
+
+@dataclass(frozen=True, slots=True)
 class Record:
     """Named values, in the language's own units: a position, a frame, a pose of URScript.
 

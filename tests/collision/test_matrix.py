@@ -245,10 +245,73 @@ def test_a_guess_that_overlaps_at_many_poses_refuses_none_of_them_and_is_named()
     assert states["base", "link_2"] == states["link_2", "link_4"] == "guessed"
     q = quasi_random_points(arm.lower, arm.upper, 2000)
     assert np.array_equal(Bodies(bare, None).free(q), Bodies(arm, None).free(q))
-    assert Bodies(bare, None).guessed == (LinkPair(0, 2), LinkPair(2, 4))
+    assert Bodies(bare, None).guessed == (LinkPair(0, 2), LinkPair(2, 4), LinkPair(4, 6))
     assert Bodies(bare, None).in_error == Bodies(arm, None).in_error == ()
     stated = bare.replace(envelopes=arm_shapes(bare).capsules)
     assert not Bodies(stated, None).free(np.radians([[0.0, 45.0, -30.0, 0.0, 60.0, 0.0]])).any()
+
+
+TABLES = {  # a mm, alpha deg, d mm, limits deg
+    "irb120": (
+        (0, 270, 70, 0, 0, 0),
+        (-90, 0, -90, 90, -90, 0),
+        (290, 0, 0, 302, 0, 72),
+        (165, 110, 110, 160, 120, 400),
+    ),
+    "kr6": ((25, 455, 35, 0, 0, 0), (-90, 0, -90, 90, -90, 0), (400, 0, 0, 420, 0, 80), (170, 190, 156, 185, 120, 350)),
+    "puma": (
+        (0, 432, 20, 0, 0, 0),
+        (90, 0, -90, 90, -90, 0),
+        (672, 0, 150, 432, 0, 56),
+        (160, 225, 225, 170, 100, 266),
+    ),
+}
+
+
+def bare_table(name: str, tool_mm: tuple[float, float, float]) -> Robot:
+    a, alpha, d, limits = (np.array(each, float) for each in TABLES[name])
+    tool = np.eye(4)
+    tool[:3, 3] = np.array(tool_mm) / 1e3
+    return Robot(
+        name, name, "standard", a / 1e3, np.radians(alpha), d / 1e3, np.ones(6), np.zeros(6), -np.radians(limits),
+        np.radians(limits), tool=tool,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("name", TABLES)
+@pytest.mark.parametrize("length_mm", [0, 1, 30, 100, 250])
+def test_a_straight_tool_changes_nothing_across_a_wrist_of_guessed_shapes(name, length_mm):
+    """The two beside the wrist are named as not examined, and no pose within the limits is refused for them."""
+    bodies = Bodies(bare_table(name, (0, 0, length_mm)), None)
+    assert LinkPair(4, 6) in bodies.guessed
+    assert LinkPair(4, 6) not in bodies.pairs
+
+
+def test_a_bent_tool_is_watched_beyond_the_wrist_of_guessed_shapes():
+    """Where it enters the forearm it refuses a pose, and the two links are named as without it."""
+    bodies = Bodies(bare_table("irb120", (150, 0, 30)), None)
+    assert LinkPair(4, 6) in bodies.guessed
+    assert LinkPair(4, 6) in bodies.pairs
+    assert bodies.joined[bodies.pairs.index(LinkPair(4, 6))]
+    q = np.zeros((2, 6))
+    q[0, 4], q[1, 4] = np.radians(30), np.radians(-118)
+    found = [{pair.label for pair in np.array(bodies.pairs)[row]} for row in bodies.overlaps(q)]
+    assert "link_4/link_6" not in found[0]
+    q[1, 5] = np.pi
+    turned = [{pair.label for pair in np.array(bodies.pairs)[row]} for row in bodies.overlaps(q)]
+    assert "link_4/link_6" in found[1] | turned[1]
+
+
+def test_a_tool_does_not_put_guessed_shapes_in_error():
+    """As of a UR10, whose flange is as near to link 4 as its housings are thick."""
+    arm = Robot.from_dh(
+        [0, -0.612, -0.5723, 0, 0, 0],
+        [np.pi / 2, 0, 0, np.pi / 2, -np.pi / 2, 0],
+        [0.1273, 0, 0, 0.16394, 0.1157, 0.0922],
+    )
+    tool = np.eye(4)
+    tool[2, 3] = 0.1
+    assert Bodies(arm, None).in_error == Bodies(arm.replace(tool=tool), None).in_error == ()
 
 
 def test_neighbours_between_three_parallel_axes_may_lie_side_by_side():

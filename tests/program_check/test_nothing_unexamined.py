@@ -5,6 +5,8 @@ Poses and joints that are expected are those of the manuals' definitions, worked
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -2156,3 +2158,60 @@ def test_that_the_number_of_a_loops_rounds_is_not_known_and_was_cut_is_named(tmp
     assert (cut.level, cut.place.line, cut.finding.kind) == ("caution", 3, "rounds")
     assert "how often this loop goes round is known on the cell alone" in say(cut.finding)
     assert (3, "course") in [(each.place.line, each.what) for each in found.not_examined]
+
+
+@pytest.mark.parametrize(
+    "line",
+    ['b:=StrToVal("5",n);', 'n:=StrMatch("Robotics",1,"bo");', "b:=StrToVal(NumToStr(2.5,1),n);"],
+)
+def test_what_follows_from_the_text_of_rapid_by_a_function_that_is_not_evaluated_is_a_caution(tmp_path, line):
+    found = check(tmp_path, rapid(f"{line}\nMoveJ Offs(p,n,0,0),v50,fine,tool0;"), "a.mod")
+    (missed,) = (each for each in found.findings if each.finding.code == "target_not_given")
+    assert (missed.level, missed.finding.reason) == ("caution", "not_evaluated")
+    assert "kept_to_next_start" not in codes(found)
+    outside = check(tmp_path, rapid("b:=StrToVal(ReadStr(f),n);\nMoveJ Offs(p,n,0,0),v50,fine,tool0;"), "a.mod")
+    assert [each.level for each in outside.findings if each.finding.code == "target_not_given"] == ["fail"]
+
+
+@pytest.mark.parametrize(
+    ("computed", "value"),
+    [
+        ("BitAnd(12,10)", 8),
+        ("BitOr(12,10)", 14),
+        ("BitXOr(12,10)", 6),
+        ("BitNeg(250)", 5),
+        ("BitLSh(129,1)", 2),
+        ("BitRSh(129,1)", 64),
+    ],
+)
+def test_bits_of_rapid_are_those_of_bytes(tmp_path, computed, value):
+    there, here = (
+        motions(tmp_path, rapid(f"MoveJ Offs(p,{each},0,0),v50,fine,tool0;"), "a.mod")[-1] for each in (computed, value)
+    )
+    assert np.array_equal(there.target.pose, here.target.pose)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        'movej([0, to_num(str_cat("-0", ".2")), -0.2, 0, -1.2, 0])',
+        "movej([0, -binary_list_to_integer([True]), -0.2, 0, -1.2, 0])",
+        "movej([0, -0.2, -0.2, 0, -1.2, 0] + [0.1, 0, 0, 0, 0, 0])",
+    ],
+)
+def test_what_follows_from_the_text_of_urscript_by_what_is_not_evaluated_is_a_caution(tmp_path, line):
+    found = check(tmp_path, f"def a():\n  {line}\nend\n", "a.script")
+    (missed,) = (each for each in found.findings if each.finding.code == "target_not_given")
+    assert (missed.level, missed.finding.reason) == ("caution", "not_evaluated")
+    read = check(tmp_path, "def a():\n  movej([0, to_num(socket_read_string()), -0.2, 0, -1.2, 0])\nend\n", "a.script")
+    assert [each.level for each in read.findings if each.finding.code == "target_not_given"] == ["fail"]
+
+
+@pytest.mark.parametrize("grade", ["official", "inferred"])
+def test_a_collision_of_assumed_shapes_says_so(tmp_path, grade):
+    robot = ROBOT.replace(sources={**ROBOT.sources, "envelopes": replace(ROBOT.sources["envelopes"], grade=grade)})
+    down = written(tmp_path, f"movej({text_of_joints(np.radians([0.0, -123.0, 56.0, 0.0, -70.0, 0.0]))})\n", "a.script")
+    found = check_program(down, robot, CheckOptions(start=HOME, scene=TABLE))
+    said = [say(each.finding) for each in found.findings if each.finding.code == "motion_collides"]
+    assert said
+    assert all(("of assumed shapes" in each) == (grade == "inferred") for each in said)

@@ -26,6 +26,7 @@ from er3a.program_check.program_check_findings import (
     FasterThanAssumed,
     JointJumps,
     MotionCollides,
+    TargetNotGiven,
     ZoneTooLarge,
 )
 from er3a.programs.execution import RunLimits
@@ -283,6 +284,10 @@ MENDED = {
         krl("PTP XTHERE"),
         (krl("PTP XTHERE"), {"data": "E6AXIS XTHERE={A1 10,A2 -10,A3 -10,A4 0,A5 -70,A6 0}"}),
     ),
+    "target_not_given.not_evaluated": (
+        rapid('b:=StrToVal("5",n);', "MoveJ Offs(p,n,0,0),v50,fine,tool0;"),
+        rapid("n:=5;", "MoveJ Offs(p,n,0,0),v50,fine,tool0;"),
+    ),
     "program_data_file_missing": (
         krl("PTP XP1"),
         (krl("PTP XP1"), {"data": "E6AXIS XP1={A1 10,A2 -10,A3 -10,A4 0,A5 -70,A6 0}"}),
@@ -488,6 +493,8 @@ def form(finding) -> str:
             return "solid_at_target" if any(touch.at_target for touch in finding.touches) else "solid"
         case JointJumps():
             return "stays" if finding.moved_mm < STAYS_MM else "moves"
+        case TargetNotGiven():
+            return finding.reason
     return getattr(finding, "kind", getattr(finding, "type", ""))
 
 

@@ -267,8 +267,8 @@ def why(
         case "guessed":
             return tr(
                 "Joints hold them, and the table does not say how long the link between them is, or how far apart they "
-                "lie side by side, so the guessed shapes overlap in a tenth or more of the joint vectors tried. Not "
-                "checked: give shapes in the robot's file."
+                "lie side by side, so the guessed shapes overlap in a tenth or more of the joint vectors tried, or one "
+                "lies nearly whole in the region around the joint. Not checked: give shapes in the robot's file."
             )
     if not left_out_mm:
         return tr("They collide at joint values ({witness}).", witness=witness)

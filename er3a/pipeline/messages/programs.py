@@ -50,6 +50,7 @@ REASONS: dict[Unresolved, str] = {
         "line"
     ),
     "perhaps_changed": N_("something that is not understood may have changed it"),
+    "not_evaluated": N_("the program computes it by what is not evaluated here"),
     "not_finite": N_("it is no finite number"),
     "too_far": N_("it is more than 100 m away, as where millimetres were written for metres"),
     "position_unknown": N_("it depends on where the arm stands, which is not known"),
@@ -156,6 +157,7 @@ TARGETS: dict[Unresolved, str] = {
     "perhaps_changed": N_(
         "Check the program together with the module that holds what is called, or give the target after the call."
     ),
+    "not_evaluated": N_("Write the value that it has in the program, or compute it by numbers and arithmetic alone."),
     "turns_with_arc": N_("Write the arc as several of less than half a turn each."),
 }
 STOPPED: dict[EndKind, str] = {
@@ -247,6 +249,9 @@ TEXTS = texts(
             "clear of {pair} by {clearance_mm:.1f} mm of assumed shapes only, which may be wrong by {margin_mm:g} mm"
         ),
         "zone_collides": "a corner path that the blending zone allows collides: {pair}, {depth_mm:.1f} mm deep",
+        "zone_collides.assumed": (
+            "a corner path that the blending zone allows collides, by assumed shapes: {pair}, {depth_mm:.1f} mm deep"
+        ),
         "zone_not_settled": (
             "not every corner path that the zone allows is proven clear; the nearest measured passes at "
             "{least_mm:.1f} mm"
@@ -329,6 +334,8 @@ TEXTS = texts(
         ),
         "motion_collides": "collision: {touches}",
         "motion_collides.more": "collision: {touches}; and more later",
+        "motion_collides.assumed": "collision of assumed shapes: {touches}",
+        "motion_collides.assumed_more": "collision of assumed shapes: {touches}; and more later",
         "bodies_touch": "{pair} after {at_mm:.1f} mm, up to {depth_mm:.1f} mm deep",
         "bodies_touch.enlarged": "{touch} (these shapes are up to {enlarged_mm:.1f} mm larger than the meshes in them)",
         "bodies_touch.joint": "{pair} after {t_s:.2f} s, up to {depth_mm:.1f} mm deep",
@@ -685,8 +692,14 @@ def _(found: found_in.ConfigurationChanges) -> str:
 def _(found: found_in.MotionCollides) -> str:
     parts = {"touches": joined(listed(found.touches[:MAX_PAIRS]))}
     if len(found.touches) > MAX_PAIRS:
-        return sentence("motion_collides.more", **parts)
-    return say_as(found, **parts)
+        return sentence("motion_collides.assumed_more" if found.assumed else "motion_collides.more", **parts)
+    return sentence("motion_collides.assumed", **parts) if found.assumed else say_as(found, **parts)
+
+
+@say.register
+def _(found: found_in.ZoneCollides) -> str:
+    code = "zone_collides.assumed" if found.assumed else "zone_collides"
+    return sentence(code, pair=say(found.pair), depth_mm=found.depth_mm)
 
 
 @say.register

@@ -102,6 +102,10 @@ class RapidDialect(Dialect):
         if name == reader.STEP:
             first, last = syntax.number(values[0]), syntax.number(values[1])
             return syntax.Unclear("a step") if first is None or last is None else 1 if first <= last else -1
+        if name in known_names.NOT_EVALUATED:
+            read = [each for place, each in enumerate(values) if place != known_names.CHANGING_FUNCTIONS.get(name)]
+            first_unclear = next((each for each in (*read, *named.values()) if isinstance(each, syntax.Unclear)), None)
+            return first_unclear or syntax.NotEvaluated(unclear.text)
         if known_names.PARAMETERS.get(name) != len(values) or named.keys() - SWITCHES.get(name, frozenset()):
             return unclear
         if name in ("CROBT", "CJOINTT", "CPOS", "CTOOL", "CWOBJ", "CALCROBT", "CALCJOINTT"):
@@ -735,9 +739,22 @@ def _of_data(name: str, values: tuple[syntax.Value, ...], named: Mapping[str, sy
             return f"{plain_values[0]:.{int(plain_values[1])}f}" if 0 <= plain_values[1] <= 15 else None
         case "VALTOSTR" if isinstance(values[0], (int, float)) and not isinstance(values[0], bool):
             return f"{values[0]:g}"
-        case "BITAND" | "BITOR" if isinstance(values[0], int) and isinstance(values[1], int):
-            return values[0] & values[1] if name == "BITAND" else values[0] | values[1]
-    return None
+    return _of_bytes(name, plain_values) if name.startswith("BIT") and plain_values is not None else None
+
+
+def _of_bytes(name: str, values: tuple[float, ...]) -> syntax.Value | None:
+    """2 BitAnd and its like: of whole numbers from 0 to 255; bits count from 1, and those shifted out are lost."""
+    whole = [int(each) for each in values]
+    if any(each % 1 or not 0 <= each <= 255 for each in values):
+        return None
+    first, second = whole[0], whole[-1]
+    if name in ("BITAND", "BITOR", "BITXOR"):
+        return {"BITAND": first & second, "BITOR": first | second, "BITXOR": first ^ second}[name]
+    if name == "BITNEG":
+        return 255 - first
+    if name == "BITCHECK":
+        return bool(first >> (second - 1) & 1) if 1 <= second <= 8 else None
+    return (first << second & 255 if name == "BITLSH" else first >> second) if second <= 8 else None
 
 
 def _shifted(name: str, values: tuple[syntax.Value, ...], named: Mapping[str, syntax.Value]) -> syntax.Value | None:

@@ -101,6 +101,7 @@ PARAMETERS: Mapping[str, int] = {
     **{"CTOOL": 0, "CWOBJ": 0, "CALCROBT": 2, "CALCJOINTT": 2, "ABS": 1, "SQRT": 1, "SIN": 1, "COS": 1, "TAN": 1},
     **{"ASIN": 1, "ACOS": 1, "ATAN": 1, "ATAN2": 2, "POW": 2, "EXP": 1, "TRUNC": 1, "ROUND": 1, "DIM": 2},
     **{"STRLEN": 1, "STRPART": 3, "STRMAP": 3, "NUMTOSTR": 2, "VALTOSTR": 1, "PRESENT": 1, "BITAND": 2, "BITOR": 2},
+    **{"BITXOR": 2, "BITNEG": 1, "BITLSH": 2, "BITRSH": 2, "BITCHECK": 2},
     **{"MIRPOS": 2, "NUMTODNUM": 1, "DNUMTONUM": 1},
 }
 """Functions that are evaluated, with the number of their arguments."""
@@ -108,21 +109,38 @@ ASKED_TEXT = """
 AINPUT AOUTPUT DINPUT DOUTPUT GINPUT GOUTPUT TESTDI TESTANDSET CLKREAD CDATE CTIME GETTIME CSPEEDOVERRIDE ISPERS ISVAR
 ISSTOPMOVEACT OPMODE RUNMODE ROBOS ROBNAME TASKRUNROB TASKRUNMEC GETTASKNAME GETMECUNITNAME GETNEXTMECHUNIT ISSYSID
 ISMECHUNITACTIVE ISFILE FILESIZE FSSIZE READBIN READDIR READMOTOR READNUM READSTR READSTRBIN READVAR SOCKETGETSTATUS
-SOCKETPEEK STRDIGCALC STRDIGCMP STRFIND STRFORMAT STRMATCH STRMEMB STRORDER STRTOBYTE STRTOVAL BYTETOSTR BITCHECK BITLSH
-BITNEG BITRSH BITXOR DECTOHEX HEXTODEC UIALPHAENTRY UICLIENTEXIST UIDNUMENTRY UIDNUMTUNE UILISTVIEW UIMESSAGEBOX
+SOCKETPEEK UIALPHAENTRY UICLIENTEXIST UIDNUMENTRY UIDNUMTUNE UILISTVIEW UIMESSAGEBOX
 UINUMENTRY UINUMTUNE GETSIGNALORIGIN IOUNITSTATE VALIDIO EVENTTYPE EXECHANDLER EXECLEVEL MOTORTEMP
 NONMOTIONMODE PATHLEVEL PPMOVEDINMANMODE RAWBYTESLEN RMQGETSLOTNAME TASKS TYPE TRIGGDATAVALID ARGNAME CSPEED
 GETAXISDISTANCE GETMAXNUMBEROFCYCLICBOOL GETNEXTSYM GETSYSINFO GETMODALPAYLOADMODE
 """
 ASKED = frozenset(ASKED_TEXT.split())
 """Functions whose value only the running cell knows."""
+NOT_EVALUATED = frozenset(
+    (
+        *(
+            "STRDIGCALC",
+            "STRDIGCMP",
+            "STRFIND",
+            "STRFORMAT",
+            "STRMATCH",
+            "STRMEMB",
+            "STRORDER",
+            "STRTOBYTE",
+            "STRTOVAL",
+        ),
+        *("BYTETOSTR", "DECTOHEX", "HEXTODEC"),
+    )
+)
+"""Functions whose value follows from their arguments alone, and that are not evaluated."""
 
 
 def is_known(name: str) -> bool:
     """Whether it is known of an instruction or function, which the program does not hold, what it does."""
     if name[:1] == "%" or name in SETTINGS or name in OUTPUTS or name in ("GRIPLOAD", "SETSYSDATA"):
         return True
-    return name in PARAMETERS or name in HARMLESS or name in ASKED or name in ASIDE_NAMED or name in WAITS
+    evaluated = name in PARAMETERS or name in NOT_EVALUATED
+    return evaluated or name in HARMLESS or name in ASKED or name in ASIDE_NAMED or name in WAITS
 
 
 def changed_arguments(call: syntax.Invocation) -> list[syntax.Expression | None]:

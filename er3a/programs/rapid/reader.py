@@ -269,7 +269,10 @@ def read_rapid(source: ProgramText) -> syntax.Program:
     _refuse_set_constants(routines, data)
     fixed = _fixed(routines, data)
     by_name, unlinked = linked(
-        routines, known_names.changed_arguments, lambda call: known_names.perhaps_changed(call, fixed)
+        routines,
+        known_names.changed_arguments,
+        lambda call: known_names.perhaps_changed(call, fixed),
+        known_names.NOT_EVALUATED,
     )
     connected = {name for reader in readers for name in reader.connected}
     findings += [each for reader in readers for name, each in reader.ordered if name not in connected]

@@ -20,6 +20,7 @@ from er3a.programs.evaluation import (
     Rounded,
     function_in_single,
     missed_by,
+    unresolved,
 )
 from er3a.programs.urscript.reader import CHANGED, LIST_METHODS, THREAD
 from er3a.robots.masses import MassBody
@@ -89,6 +90,13 @@ write_port_register zero_ftsensor
 """
 HARMLESS = frozenset(HARMLESS_TEXT.split())
 """Functions of the language that move nothing and set no frame; any other name may be anybody's and do anything."""
+NOT_EVALUATED = frozenset(
+    (
+        *("binary_list_to_integer", "integer_to_binary_list", "str_at", "str_cat", "str_empty", "str_find", "str_len"),
+        *("str_sub", "to_num", "to_str"),
+    )
+)
+"""Of these, functions whose value follows from their arguments alone, and that are not evaluated."""
 OUTPUTS = {
     "set_digital_out": "digital_out",
     "set_standard_digital_out": "standard_digital_out",
@@ -204,6 +212,9 @@ class UrScriptDialect(Dialect):
         unclear = syntax.Unclear(f"{name}({', '.join('' if each is None else syntax.shown(each) for each in values)})")
         if name == CHANGED:
             return _changed(values, unclear)
+        if name in NOT_EVALUATED and None not in values and not keywords:
+            first_unclear = next((each for each in values if isinstance(each, syntax.Unclear)), None)
+            return first_unclear or syntax.NotEvaluated(unclear.text)
         placed = _placed(SIGNATURES.get(name), values, keywords)
         if placed is None:
             return unclear
@@ -401,6 +412,8 @@ def _target(memory: ProgramMemory, value: syntax.Value, text: str) -> instructio
     match value:
         case syntax.Solved():
             return _solved_target(memory, value, text)
+        case syntax.NotEvaluated():
+            return unresolved(value)
         case syntax.Unclear(text=unclear):
             if unclear.lower() in ("nan", "inf"):
                 return instructions.UnresolvedTarget(unclear, "not_finite")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -369,24 +369,10 @@ def compute(study: Study, name: str) -> model.VisionResults:
         found, unseen_zeros, least_zero = zeros_tried(calibrate_hand_eye(samples), robot)
     except HandEyeError as error:
         verdict: Verdict[Found] = Verdict("fail", model.CalibrationImpossible(error.finding))
-        return _without_calibration(
-            model.VisionSummary(
-                verdict=verdict,
-                figures=(),
-                title=task_file.title,
-                scene=title,
-                least_success=settings.least_success,
-                calibration=None,
-                objects=(),
-                not_examined=(
-                    *_left_out_without_calibration(samples, head, task_file, offset, images),
-                    *left_out_of_collisions(robot, bodies_of(robot, scene), scene, 1000 * DEPTH),
-                    *left_out_of_rates(speeds_given(robot), *_rates_given(motions)),
-                    *left_out_without_tool(robot),
-                    LeftOut("torques"),
-                ),
-            )
-        )
+        left = _left_out_without_calibration(samples, head, task_file, offset, images)
+        left_out = (*left, *_left_out_of_motions(robot, bodies_of(robot, scene), scene, motions))
+        summary = model.VisionSummary(verdict, (), task_file.title, title, settings.least_success, None, ())
+        return _without_calibration(replace(summary, not_examined=left_out))
     picture = None if head.setup == "eye_to_hand" else meant(robot, np.array(task_file.picture_deg))
     camera = _camera_at(robot, found, picture)
     places = {each.name: camera @ each.pose() for each in task_file.objects}
@@ -416,11 +402,8 @@ def compute(study: Study, name: str) -> model.VisionResults:
         not_examined=(
             *((_no_grasps(task_file),) if doubt else ()),
             *_left_out(calibration, task_file, unseen_zeros, least_zero, frames),
-            *left_out_of_collisions(robot, bodies, scene, 1000 * DEPTH, q_deg=ways.q_deg),
-            *left_out_of_rates(speeds_given(robot), *_rates_given(motions)),
+            *_left_out_of_motions(robot, bodies, scene, motions, ways.q_deg),
             *left_out_in_solids(scene, _places(robot, task_file, found, picture)),
-            *left_out_without_tool(robot),
-            LeftOut("torques"),
         ),
     )
     map_task = MapTask(
@@ -487,6 +470,17 @@ def _left_out_of_file(file: VisionFile) -> Iterator[LeftOut]:
         yield LeftOut("objects_out_of_view", hidden)
     if not file.arm.states_all:
         yield LeftOut("arm_errors")
+
+
+def _left_out_of_motions(
+    robot: Robot, bodies: Bodies, scene: Scene | None, settings: TrajectorySettings, q_deg: Reals | None = None
+) -> Iterator[LeftOut]:
+    """What of collisions, speeds and torques nobody looks at; ``q_deg``: the ways (N, n) that were looked at."""
+    ways = {} if q_deg is None else {"q_deg": q_deg}
+    yield from left_out_of_collisions(robot, bodies, scene, 1000 * DEPTH, **ways)
+    yield from left_out_of_rates(speeds_given(robot), *_rates_given(settings))
+    yield from left_out_without_tool(robot)
+    yield LeftOut("torques")
 
 
 def _no_grasps(file: VisionFile) -> LeftOut:
