@@ -328,6 +328,7 @@ def hand_eye(
     from er3a.pipeline.messages.say import bracketed, say
     from er3a.pipeline.messages.vision import correction_lines, hand_eye_lines, hand_eye_record
     from er3a.pipeline.results import LeftOut
+    from er3a.pipeline.stages.left_out import left_out_of_intrinsics
     from er3a.vision.boards import ambiguous_tilts
     from er3a.vision.hand_eye import calibrate_hand_eye
     from er3a.vision.table_corrections import TABLE_CONTRADICTED, TableCorrections, correct_table, zeros_tried
@@ -351,6 +352,8 @@ def hand_eye(
     boardless = images.boardless if images else ()
     wrong = isinstance(table, TableCorrections) and table.probability < TABLE_CONTRADICTED
     recorded = not (head.simulated or samples.states_joints)
+    estimated = images is not None and images.views.shared is not None
+    intrinsics = left_out_of_intrinsics(images is not None, estimated, head.simulated, found.touch is not None)
     missed = {
         LeftOut("real_camera"): head.simulated,
         LeftOut("stream_poses", amount=offset.unused if offset else 0): bool(offset and offset.unused),
@@ -360,7 +363,7 @@ def hand_eye(
         LeftOut("touched_points"): found.touch is None,
         LeftOut("flange_poses"): recorded,
         LeftOut("base_poses"): recorded and found.touch is None,
-        LeftOut("given_intrinsics"): images is not None and images.views.shared is None,
+        **{LeftOut(each): True for each in intrinsics},
         LeftOut("contradicted_table"): wrong,
     }
     not_examined = [bracketed(left_out_text(each), left_out_names(each)) for each, is_so in missed.items() if is_so]

@@ -147,3 +147,15 @@ def left_out_of_rates(speed_known: Flags, acceleration: bool, jerk: bool) -> tup
     speeds = (LeftOut("own_speeds", assumed),) if assumed else ()
     accelerations = () if acceleration else (LeftOut("own_accelerations"),)
     return (*speeds, *accelerations, *(() if jerk else (LeftOut("jerk"),)))
+
+
+def left_out_of_intrinsics(
+    of_images: bool, estimated: bool, simulated: bool, touched: bool
+) -> tuple[LeftOutSubject, ...]:
+    """What a calibration leaves open of the camera's intrinsics; those of poses given as numbers are known to nobody.
+
+    Touched points that contradict a calibration end it, so that those given agree.
+    """
+    if of_images:
+        return () if estimated else ("given_intrinsics",)
+    return ("pose_intrinsics",) if simulated or touched else ("open_intrinsics",)

@@ -29,6 +29,7 @@ from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations,
 from er3a.pipeline.stages.left_out import (
     left_out_in_solids,
     left_out_of_collisions,
+    left_out_of_intrinsics,
     left_out_of_rates,
     left_out_without_tool,
 )
@@ -380,6 +381,9 @@ def compute(study: Study, name: str) -> model.VisionResults:
     table = correct_table(found, robot, head.table_corrections) if head.table_corrections else None
     calibration = calibration_result(head, found, to_add, offset, table, images)
     doubt, frames = _doubt(calibration, found.touch), _open_frames(found, head)
+    intrinsics = left_out_of_intrinsics(
+        images is not None, calibration.intrinsics_estimated, head.simulated, found.touch is not None
+    )
     planned = []
     if not doubt:
         limits = (limits_of(robot, motions), study.seed)
@@ -399,7 +403,7 @@ def compute(study: Study, name: str) -> model.VisionResults:
         calibration=calibration,
         objects=objects,
         not_examined=(
-            *_left_out(calibration, task_file, unseen_zeros, least_zero, frames),
+            *_left_out(calibration, task_file, unseen_zeros, least_zero, (*intrinsics, *frames)),
             *left_out_of_collisions(robot, bodies, scene, 1000 * DEPTH, q_deg=ways.q_deg),
             *left_out_of_rates(speeds_given(robot), *_rates_given(motions)),
             *left_out_in_solids(scene, _places(robot, task_file, found, picture)),
@@ -485,7 +489,7 @@ def _left_out(
 ) -> Iterator[LeftOut]:
     """What the calibration does not rest on, what nothing checks it against, and what grasps leave open.
 
-    ``frames``: as :func:`_open_frames` gives them.
+    ``frames``: as :func:`_open_frames` gives them, and what is open of the intrinsics.
     """
     places = np.array([each.pose()[:3, 3] for each in file.objects])
     seen = in_sight(file.view.view(NO_BOARD), places)
@@ -511,8 +515,6 @@ def _left_out(
         yield LeftOut("small_joint_zeros", amount=least_zero)
     if found.touch is None:
         yield LeftOut("touched_points")
-    if found.intrinsics_given:
-        yield LeftOut("given_intrinsics")
     yield from (LeftOut(subject) for subject in frames)
     yield LeftOut("detections")
     yield LeftOut("gripped_parts")
