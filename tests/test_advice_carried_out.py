@@ -80,7 +80,7 @@ CARRIED_OUT = {
     **{f"box.run_again#{form}": AT_PLACES for form in ("tray", "stand")},
     **{f"{code}": OF_SETS for code in ("board_scale", "little_motion", "few_samples", "no_rotation", "angle_order")},
     **{f"{code}": OF_SETS for code in ("transposed_rotations", "parallel_axes", "quaternion_order", "position_axes")},
-    **dict.fromkeys(("all_samples_equal#flange", "not_converged"), OF_SETS),
+    **dict.fromkeys(("all_samples_equal#flange", "not_converged", "focal_length", "principal_point"), OF_SETS),
     "joint_zero": "test_a_joint_zero_that_is_off_is_named_and_one_that_no_sample_shows_is_not_examined",
     **{f"moved_between#{what}": OF_SETS for what in ("camera", "board")},
     **{f"measure_angle#{column}": MEASURED for column in ("offset", "alpha")},

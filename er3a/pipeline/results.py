@@ -224,6 +224,8 @@ LeftOutSubject = Literal[
     "flange_poses",
     "base_poses",
     "given_intrinsics",
+    "pose_intrinsics",
+    "open_intrinsics",
 ]
 
 NEVER_A_PASS: frozenset[LeftOutSubject] = frozenset(
@@ -242,7 +244,7 @@ NEVER_A_PASS: frozenset[LeftOutSubject] = frozenset(
             "other_gravity",
         ),
         *("arm_errors", "objects_out_of_view", "hidden_voids", "orientations", "base_inside", "places_in_solids"),
-        *("units", "own_limits", "contradicted_table", "flange_poses", "base_poses"),
+        *("units", "own_limits", "contradicted_table", "flange_poses", "base_poses", "open_intrinsics"),
     )
 )
 """What no verdict passes without; the rest bounds what a verdict is about, and stands in the table alone."""

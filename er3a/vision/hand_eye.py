@@ -30,7 +30,6 @@ from er3a.by_value import ByValue, Displayed, Sheet, shortly
 from er3a.geometry.transforms import (
     inverted,
     log_rotation,
-    moved,
     posed,
     quaternion_of,
     rotation_angle,
@@ -42,6 +41,7 @@ from er3a.geometry.transforms import (
 from er3a.numerics.arrays import Flags, Reals
 from er3a.vision import calibration_set, vision_findings
 from er3a.vision.classic_methods import METHOD_NAMES, MethodName, mean_pose, solved_by
+from er3a.vision.distance_errors import CONFIDENCE, wrong_distances
 from er3a.vision.likelihood import UNKNOWNS, PoseObservations, Refined, refine, residuals, whitening
 from er3a.vision.setup_changes import moved_between
 
@@ -370,12 +370,8 @@ MIN_TURN = np.radians(0.5)
 MIN_SPREAD = np.radians(1.0)
 LITTLE_TURN, LITTLE_SPREAD = np.radians(15), np.radians(10)
 EXCLUDED = 1e-3
-CONFIDENCE = 0.95
 CONTRADICTED = 1e-3  # probability of touched points as far off, below which they contradict the calibration
 MAX_FACTS = 10
-EXTRA_ROUNDS = 20
-SURE_SCALE = 3.0  # half widths of its interval, from 0; a vaguer factor comes of samples that don't fit at all
-MIN_SCALE_ERROR = 2e-3
 DIRECTIONS = ((False, False), (True, True), (True, False), (False, True))
 
 
@@ -633,9 +629,8 @@ def _warnings(
     if directions[0].status == "excluded":
         best = next(each for each in directions if each.status == "best")
         return [*found, vision_findings.OtherDirection(best.flange_inverted, best.target_inverted)]
-    factor, half_width = board_scale(samples, refined)
-    if abs(factor - 1) > max(2 * half_width, MIN_SCALE_ERROR) and factor > SURE_SCALE * half_width:
-        found.append(vision_findings.BoardScale(factor, half_width))
+    if wrong := wrong_distances(samples, refined):
+        found.append(wrong)
     size, turn = _misfit(refined.residual)
     if [each.code for each in vision_findings.grave_warnings(found)] == ["more_scatter"]:
         tried = vision_findings.READINGS if size >= 1 else vision_findings.READINGS_IN_SMALL
@@ -644,55 +639,6 @@ def _warnings(
         distance = float(1000 * np.sqrt((refined.residual[:, :3] ** 2).mean()))
         found.append(vision_findings.UnexplainedResiduals(distance, turn, vision_findings.READINGS))
     return found
-
-
-def board_scale(samples: calibration_set.CalibrationSet, refined: Refined) -> tuple[float, float]:
-    """The factor by which distances seen have to grow to fit best, and half its 95 % interval.
-
-    Errors that all samples share count too: a focal length estimated from the same images scales all distances.
-    """
-    factor, half_width = _scale_of(samples.target, samples, refined)
-    if samples.shared is not None:
-        shifted = (moved(samples.target, error) for error in np.moveaxis(samples.shared, 2, 0))
-        shifts = [_scale_of(target, samples, refined)[0] - factor for target in shifted]
-        half_width = float(np.hypot(half_width, scipy.special.ndtri((1 + CONFIDENCE) / 2) * np.linalg.norm(shifts)))
-    return factor, half_width
-
-
-def _scale_of(target: Reals, samples: calibration_set.CalibrationSet, refined: Refined) -> tuple[float, float]:
-    """The factor for board poses (N, 4, 4), and half its 95 % interval by their residuals."""
-    seen = np.concatenate([target[:, :3, 3], np.zeros((len(target), 3))], axis=1)
-
-    def grown(X: Reals, Y: Reals, s: float) -> tuple[Reals, Reals, Reals]:
-        B = target.copy()
-        B[:, :3, 3] *= 1 + s
-        return *residuals(samples.hand, B, X, Y), seen
-
-    more, half_width, _ = fit_extra_parameter(grown, (refined.X, refined.Y), refined.deviations)
-    return 1 + more, half_width
-
-
-def fit_extra_parameter(
-    at: Callable[[Reals, Reals, float], tuple[Reals, Reals, Reals]], poses: tuple[Reals, Reals], deviations: Reals
-) -> tuple[float, float, Reals]:
-    """One more unknown beside the twelve: its value, half its 95 % interval, and the residuals (N, 6) with it.
-
-    ``at(X, Y, value)`` gives residuals (N, 6), their derivatives by the twelve (N, 6, 12), and by the value (N, 6).
-    """
-    (X, Y), value = poses, 0.0
-    weight = 1 / np.repeat(deviations, 3)
-    for _ in range(EXTRA_ROUNDS):
-        raw, J, own = at(X, Y, value)
-        J = (np.concatenate([J, own[..., None]], axis=2) * weight[:, None]).reshape(-1, UNKNOWNS + 1)
-        r = (raw * weight).ravel()
-        inverse = np.linalg.pinv(J.T @ J)
-        step = -inverse @ (J.T @ r)
-        X, Y, value = moved(X, step[:6]), moved(Y, step[6:12]), float(value + step[12])
-        if np.abs(step).max() < 1e-10:
-            break
-    free = max(len(r) - UNKNOWNS - 1, 1)
-    half_width = scipy.special.stdtrit(free, (1 + CONFIDENCE) / 2) * np.sqrt(r @ r / free * inverse[12, 12])
-    return value, float(half_width), raw
 
 
 def _answer(

@@ -31,7 +31,8 @@ from er3a.robots.joint_limits import joint_names
 from er3a.robots.robot import Robot
 from er3a.vision import likelihood
 from er3a.vision.calibration_set import CalibrationSet
-from er3a.vision.hand_eye import CONFIDENCE, HandEye, calibrate_hand_eye, fit_extra_parameter
+from er3a.vision.distance_errors import CONFIDENCE, fit_extra_parameter
+from er3a.vision.hand_eye import HandEye, calibrate_hand_eye
 from er3a.vision.vision_findings import (
     CalibrationWarning,
     HandEyeError,
@@ -199,7 +200,9 @@ def zeros_tried(found: HandEye, robot: Robot) -> tuple[HandEye, tuple[str, ...],
     return replace(found, warnings=(zero, *others)), tuple(unseen), smallest
 
 
-EXPLAINED_BY_A_ZERO = {"board_scale", "unexplained_residuals", "moved_between", "more_scatter"}
+EXPLAINED_BY_A_ZERO = {
+    *("board_scale", "focal_length", "principal_point", "unexplained_residuals", "moved_between", "more_scatter")
+}
 
 
 def _zeros_too(warning: CalibrationWarning) -> CalibrationWarning:
@@ -221,7 +224,7 @@ class _Turned:
         return forward(self.robot.without_tool(), self.samples.q + value * np.eye(self.robot.joints)[self.k])
 
     def at(self, X: Reals, Y: Reals, value: float) -> tuple[Reals, Reals, Reals]:
-        """The argument ``at`` of :func:`er3a.vision.hand_eye.fit_extra_parameter`."""
+        """The argument ``at`` of :func:`er3a.vision.distance_errors.fit_extra_parameter`."""
         flange, setup = self.flange(value), self.samples.setup
         F = flange if setup == "eye_in_hand" else inverted(flange)
         raw, J = likelihood.residuals(F, self.samples.target, X, Y)

@@ -119,6 +119,26 @@ class BoardScale(Finding):
     half_width: float
 
 
+class FocalLength(Finding):
+    """Distances along the camera's axis are larger by this factor, those across are right, as by a wrong focal length:
+    the right one is about as many times as long."""
+
+    factor: float
+    half_width: float
+
+
+class PrincipalPoint(Finding):
+    """The board is seen shifted along the camera's ``axis``: the principal point is off by as many percent of the focal
+    length, and too large where this is positive."""
+
+    axis: Literal["x", "y"]
+    percent: float
+    half_width_percent: float
+
+
+WrongDistances = BoardScale | FocalLength | PrincipalPoint
+
+
 class LittleMotion(Finding):
     """The samples turn little: the largest angle between two, and of the rotation axes to their common direction."""
 
@@ -183,6 +203,8 @@ CalibrationWarning = (
     | UnexplainedResiduals
     | OtherDirection
     | BoardScale
+    | FocalLength
+    | PrincipalPoint
     | LittleMotion
     | FewSamples
     | MoreScatter
@@ -201,7 +223,11 @@ class TouchContradicts(Finding):
 
 
 MUCH_SCATTER = 3.0
-_GRAVE = (NoMajority, BoardScale, UnexplainedResiduals, MovedBetween, NotConverged, JointZero, *get_args(OtherReading))
+_GRAVE = (
+    *(NoMajority, UnexplainedResiduals, MovedBetween, NotConverged, JointZero),
+    *get_args(WrongDistances),
+    *get_args(OtherReading),
+)
 
 
 def grave_warnings(warnings: Iterable[CalibrationWarning]) -> tuple[CalibrationWarning, ...]:

@@ -32,6 +32,7 @@ from er3a.pipeline.stages.dynamics.compute import unknowns
 from er3a.pipeline.stages.dynamics.entry import DynamicsSettings
 from er3a.pipeline.stages.left_out import (
     left_out_of_collisions,
+    left_out_of_intrinsics,
     left_out_of_limits,
     left_out_of_rates,
     left_out_of_units,
@@ -520,7 +521,22 @@ def test_tool_and_base_of_the_study():
 
 OF_GRASPS = LeftOut("detections"), LeftOut("gripped_parts")
 CALIBRATED = {"table": None, "simulated": False, "boardless": (), "rejected": (), "time_offset": None, "copies": ()}
-CALIBRATED |= {"touch": "some points", "intrinsics_given": False}
+CALIBRATED |= {"touch": "some points"}
+
+
+@pytest.mark.parametrize(
+    ("images", "simulated", "setup", "touched", "expected"),
+    [
+        (of(views=of(shared="estimated")), False, "eye_in_hand", None, ()),
+        (of(views=of(shared=None)), False, "eye_to_hand", "points", ("given_intrinsics",)),
+        (None, False, "eye_to_hand", None, ("open_intrinsics",)),
+        (None, False, "eye_to_hand", "points", ("pose_intrinsics",)),
+        (None, False, "eye_in_hand", "points", ("open_intrinsics",)),  # they show where the board is
+        (None, True, "eye_in_hand", None, ("pose_intrinsics",)),
+    ],
+)
+def test_intrinsics_of_images_and_of_poses(images, simulated, setup, touched, expected):
+    assert left_out_of_intrinsics(of(setup=setup, touched=touched), images, simulated) == expected
 
 
 @pytest.mark.parametrize(
@@ -536,7 +552,6 @@ CALIBRATED |= {"touch": "some points", "intrinsics_given": False}
         ({"zeros": ("J1", "J6")}, (LeftOut("joint_zeros", ("J1", "J6")),)),
         ({"least_zero": 0.5}, (LeftOut("small_joint_zeros", amount=0.5),)),
         ({"touch": None}, (LeftOut("touched_points"),)),
-        ({"intrinsics_given": True}, (LeftOut("given_intrinsics"),)),
         ({"frames": ("flange_poses", "base_poses")}, (LeftOut("flange_poses"), LeftOut("base_poses"))),
         ({"view": {"farthest_mm": 900.0}}, (LeftOut("objects_out_of_view", ("can",)),)),
         ({"arm": {"repeatability_mm": 0.0}}, (LeftOut("arm_errors"),)),

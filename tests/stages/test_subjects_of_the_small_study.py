@@ -17,8 +17,8 @@ DRIVES = (
     "drive_behaviour mounting"
 )
 CAMERA = (
-    f"{REAL_ARM} {RATES} real_camera joint_zeros small_joint_zeros detections gripped_parts shallow_overlaps tool "
-    "torques"
+    f"{REAL_ARM} {RATES} real_camera pose_intrinsics joint_zeros small_joint_zeros detections gripped_parts "
+    "shallow_overlaps tool torques"
 )
 PLACES = "joint_vectors undecided_volume colliding_reach tool_directions lost_cells between_places placed_box tool"
 FREE_SPACE = "joint_vectors lost_cells unjoined_cells within_cells targets path_stretches tool shallow_overlaps"

@@ -29,7 +29,8 @@ from er3a.vision.boards import (
     views_of_corners,
 )
 from er3a.vision.calibration_set import CalibrationSet
-from er3a.vision.hand_eye import board_scale, calibrate_hand_eye
+from er3a.vision.distance_errors import board_scale
+from er3a.vision.hand_eye import calibrate_hand_eye
 from er3a.vision.likelihood import PoseObservations, refine
 from testing.hand_eye_sets import off, pose
 from tests.vision.test_hand_eye_file import HEAD, columns, write

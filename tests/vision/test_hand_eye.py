@@ -18,6 +18,7 @@ from er3a.pipeline.messages.vision import say
 from er3a.pipeline.stages.vision.compute import _open_frames
 from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.classic_methods import METHOD_NAMES, solved_by
+from er3a.vision.distance_errors import wrong_distances
 from er3a.vision.hand_eye import calibrate_hand_eye, position_axes
 from er3a.vision.likelihood import PoseObservations, flange_to_camera, refine, residuals
 from er3a.vision.setup_changes import moved_between
@@ -29,6 +30,7 @@ from er3a.vision.vision_findings import (
     BoardScale,
     FarFromFit,
     FewSamples,
+    FocalLength,
     HandEyeError,
     LittleMotion,
     MoreScatter,
@@ -38,6 +40,7 @@ from er3a.vision.vision_findings import (
     OtherReading,
     ParallelTurns,
     PositionAxes,
+    PrincipalPoint,
     QuaternionOrder,
     RepeatedPose,
     RotationMismatch,
@@ -275,6 +278,57 @@ def test_a_board_of_another_size_is_named_with_the_factor():
     samples.target[:, :3, 3] /= 1.05
     scale = [each for each in calibrate_hand_eye(samples).warnings if isinstance(each, BoardScale)]
     assert scale[0].factor == pytest.approx(1.05, abs=scale[0].half_width)
+
+
+SQUARES = np.stack([*np.meshgrid(0.02 * np.arange(9), 0.02 * np.arange(6)), np.zeros((6, 9))], axis=2).reshape(-1, 3)
+PIXELS = np.array([[900.0, 0, 640], [0, 900, 360], [0, 0, 1]])
+
+
+def by_solve_pnp(setup: str, seed: int, given: np.ndarray) -> CalibrationSet:
+    """Poses that OpenCV computes by intrinsics ``given`` from corners that a camera with others sees, 0.1 px off."""
+    random, kept, poses = np.random.default_rng(seed), [], []
+    for turn in random.uniform(-30, 30, (30, 3)):
+        T = pose(turn, random.uniform([-0.28, -0.17, 0.4], [0.12, 0.07, 0.7]))
+        seen_at = (SQUARES @ T[:3, :3].T + T[:3, 3]) @ PIXELS.T
+        corners = seen_at[:, :2] / seen_at[:, 2:] + random.normal(0, 0.1, (len(SQUARES), 2))
+        _, rotation, position = cv2.solvePnP(SQUARES, corners, given, None)
+        found = np.eye(4)
+        found[:3, :3], found[:3, 3] = cv2.Rodrigues(rotation)[0], position[:, 0]
+        F = Y_TRUE @ np.linalg.inv(X_TRUE @ T)
+        kept.append(F if setup == "eye_in_hand" else np.linalg.inv(F))
+        poses.append(found)
+    return CalibrationSet(setup, np.array(kept), np.array(poses))
+
+
+@pytest.mark.parametrize("setup", SETUPS)
+def test_poses_computed_with_a_wrong_focal_length_or_principal_point_are_named(setup):
+    """No sample shows it alone; the camera is off by several mm."""
+    for factor in (0.95, 1.02, 1.05):
+        found = calibrate_hand_eye(by_solve_pnp(setup, 5, PIXELS * [[factor], [factor], [1]]))
+        assert np.linalg.norm(off(found.X, X_TRUE)[:3]) > 0.003
+        (named,) = grave_warnings(found.warnings)
+        assert isinstance(named, FocalLength)
+        assert named.factor == pytest.approx(1 / factor, abs=0.01)
+    for axis, pixels in (("x", 25), ("y", -25)):
+        given = PIXELS.copy()
+        given["xy".index(axis), 2] += pixels
+        (named,) = grave_warnings(calibrate_hand_eye(by_solve_pnp(setup, 6, given)).warnings)
+        assert isinstance(named, PrincipalPoint)
+        assert (named.axis, named.percent) == (axis, pytest.approx(100 * pixels / 900, abs=0.8))
+    for seed in range(7, 10):
+        assert not grave_warnings(calibrate_hand_eye(by_solve_pnp(setup, seed, PIXELS)).warnings)
+
+
+@pytest.mark.long
+def test_sound_sets_have_the_right_board_and_intrinsics():
+    """At 10 to 40 samples, with the camera's deviations stated and estimated."""
+    wrong = []
+    for seed, count in enumerate((10, 14, 20, 30, 40) * 8):
+        for setup in SETUPS:
+            stated = {"camera_covariance": covariance(count)} if seed % 2 else {}
+            samples = a_set(setup, 300 + seed, count, **stated)
+            wrong.append(wrong_distances(samples, refine(PoseObservations.of(samples), X_TRUE, Y_TRUE)))
+    assert wrong == [None] * 80
 
 
 @pytest.mark.long
@@ -571,6 +625,12 @@ def scaled(samples: CalibrationSet, factor: float) -> CalibrationSet:
     return samples
 
 
+def stretched(samples: CalibrationSet, to: int, of: int, share: float) -> CalibrationSet:
+    """The set with a share of one coordinate of the board's positions added to another, or to itself."""
+    samples.target[:, to, 3] += share * samples.target[:, of, 3]
+    return samples
+
+
 SMALL = Rotation.from_rotvec(np.random.default_rng(2).normal(0, 0.03, (12, 3)))
 ABOUT_Z = Rotation.from_euler("z", np.linspace(-60, 60, 10)[:, None], degrees=True)
 STILL = Rotation.from_rotvec(np.tile([0.1, 0.2, 0.3], (6, 1)))
@@ -595,6 +655,14 @@ MENDED = {
     "board_scale": (
         lambda: scaled(a_set("eye_in_hand", 13, 20), 1 / 1.05),
         lambda samples, found: scaled(samples, found.factor),
+    ),
+    "focal_length": (
+        lambda: stretched(a_set("eye_in_hand", 13, 20), 2, 2, 0.02),
+        lambda samples, found: stretched(samples, 2, 2, found.factor - 1),
+    ),
+    "principal_point": (
+        lambda: stretched(a_set("eye_in_hand", 13, 20), 0, 2, 0.02),
+        lambda samples, found: stretched(samples, "xy".index(found.axis), 2, found.percent / 100),
     ),
     "few_samples": (lambda: a_set("eye_in_hand", 3, 5), lambda samples, _: with_poses_added(samples)),
     "not_converged": (lambda: a_set("eye_in_hand", 5, 3), lambda samples, _: with_poses_added(samples)),

@@ -329,6 +329,7 @@ def hand_eye(
     from er3a.pipeline.messages.say import bracketed, say
     from er3a.pipeline.messages.vision import correction_lines, hand_eye_lines, hand_eye_record
     from er3a.pipeline.results import LeftOut
+    from er3a.pipeline.stages.left_out import left_out_of_intrinsics
     from er3a.vision.boards import ambiguous_tilts
     from er3a.vision.hand_eye import calibrate_hand_eye
     from er3a.vision.table_corrections import TABLE_CONTRADICTED, TableCorrections, correct_table, zeros_tried
@@ -361,7 +362,7 @@ def hand_eye(
         LeftOut("touched_points"): found.touch is None,
         LeftOut("flange_poses"): "flange_poses" in open_frames,
         LeftOut("base_poses"): "base_poses" in open_frames,
-        LeftOut("given_intrinsics"): images is not None and images.views.shared is None,
+        **{LeftOut(each): True for each in left_out_of_intrinsics(samples, images, head.simulated)},
         LeftOut("contradicted_table"): wrong,
     }
     not_examined = [bracketed(left_out_text(each), left_out_names(each)) for each, is_so in missed.items() if is_so]

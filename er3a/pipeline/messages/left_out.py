@@ -160,6 +160,14 @@ TEXTS = texts(
             "errors of the camera's intrinsics: the file gives them, and they count as exact; the intervals do not "
             "include them"
         ),
+        "left_out.pose_intrinsics": (
+            "errors of the camera's intrinsics: the board's poses were computed with intrinsics that the set doesn't "
+            "give; errors of theirs are in no interval"
+        ),
+        "left_out.open_intrinsics": (
+            "errors of the camera's intrinsics: the board's poses were computed with intrinsics that the set doesn't "
+            "give; errors of theirs are in no interval, and no touched points show where the camera is"
+        ),
         "left_out.base_poses": (
             "whether the recorded poses are in the robot's own base, not in a frame set at its controller: the samples "
             "hold no joint values to compare them with, and no touched points are given"

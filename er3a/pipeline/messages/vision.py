@@ -188,6 +188,16 @@ TEXTS = texts(
             "the samples fit a board {factor:.4g} ± {half_width:.1g} times as large: check the stated size of its "
             "squares, the units, or the camera's focal length"
         ),
+        "focal_length": (
+            "the samples fit with distances along the camera's axis {factor:.4g} ± {half_width:.1g} times as large, as "
+            "if the focal length, by which the board's poses were computed, had to be as many times as long: estimate "
+            "the camera's intrinsics again, check that they are of this image size, and compute the poses with them"
+        ),
+        "principal_point": (
+            "the samples fit with the board {percent:+.2g} ± {half_width_percent:.1g} % of its distance farther along "
+            "the camera's {axis}, as if the principal point, with which the board's poses were computed, were off by "
+            "that share of the focal length: estimate the camera's intrinsics again, and compute the poses with them"
+        ),
         "little_motion": (
             "the samples rotate by at most {greatest_turn_deg:.3g} deg, about axes within {axes_apart_deg:.2g} deg of "
             "one direction: add poses rotated by 30 deg or more about a second axis"

@@ -15,6 +15,7 @@ from er3a.collision.pairs import PENETRATION_TOLERANCE, link_label
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import COVERED, arm_shapes, depths_in, has_bare_tool
 from er3a.errors import DoubtfulUnit
+from er3a.files.hand_eye_file import SeenImages
 from er3a.files.kept_files import shown_path
 from er3a.geometry.transforms import rotation_angle
 from er3a.kinematics.forward import forward
@@ -22,6 +23,7 @@ from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.results import NEVER_A_PASS, LeftOut, LeftOutSubject
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
+from er3a.vision.calibration_set import CalibrationSet
 
 
 def left_out_of_collisions(
@@ -155,3 +157,17 @@ def missed_of_program(robot: Robot, scene: Scene | None, arms: Iterable[tuple[st
     for its row in a study, and for ``er3a check-program``."""
     found = left_out_of_collisions(robot, bodies_of(robot, scene), scene, arms=arms)
     return (*(each for each in found if each.subject in NEVER_A_PASS), *left_out_of_limits(robot))
+
+
+def left_out_of_intrinsics(
+    samples: CalibrationSet, images: SeenImages | None, simulated: bool
+) -> tuple[LeftOutSubject, ...]:
+    """What a calibration leaves open of the camera's intrinsics; those of poses given as numbers are known to nobody.
+
+    Touched points that contradict a calibration end it, so that those given agree. They show where a fixed camera is;
+    of a camera on the flange they show where the board is, and a wrong focal length may leave that as it is.
+    """
+    if images is not None:
+        return ("given_intrinsics",) if images.views.shared is None else ()
+    confirmed = simulated or (samples.setup == "eye_to_hand" and samples.touched is not None)
+    return ("pose_intrinsics",) if confirmed else ("open_intrinsics",)

@@ -29,6 +29,7 @@ from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations,
 from er3a.pipeline.stages.left_out import (
     left_out_in_solids,
     left_out_of_collisions,
+    left_out_of_intrinsics,
     left_out_of_rates,
     left_out_without_tool,
 )
@@ -381,6 +382,7 @@ def compute(study: Study, name: str) -> model.VisionResults:
     table = correct_table(found, robot, head.table_corrections) if head.table_corrections else None
     calibration = calibration_result(head, found, to_add, offset, table, images)
     doubt, frames = _doubt(calibration, found.touch), _open_frames(samples, head)
+    intrinsics = left_out_of_intrinsics(samples, images, head.simulated)
     planned = []
     if not doubt:
         limits = (limits_of(robot, motions), study.seed)
@@ -401,7 +403,7 @@ def compute(study: Study, name: str) -> model.VisionResults:
         objects=objects,
         not_examined=(
             *((_no_grasps(task_file),) if doubt else ()),
-            *_left_out(calibration, task_file, unseen_zeros, least_zero, frames),
+            *_left_out(calibration, task_file, unseen_zeros, least_zero, (*intrinsics, *frames)),
             *_left_out_of_motions(robot, bodies, scene, motions, ways.q_deg),
             *left_out_in_solids(scene, _places(robot, task_file, found, picture)),
         ),
@@ -507,9 +509,8 @@ def _left_out_without_calibration(
     yield LeftOut("joint_zeros")
     if samples.touched is None:
         yield LeftOut("touched_points")
-    if images and images.views.shared is None:
-        yield LeftOut("given_intrinsics")
-    yield from (LeftOut(subject) for subject in _open_frames(samples, head))
+    open_of_poses = (*left_out_of_intrinsics(samples, images, head.simulated), *_open_frames(samples, head))
+    yield from (LeftOut(subject) for subject in open_of_poses)
     yield LeftOut("detections")
     yield LeftOut("gripped_parts")
 
@@ -533,7 +534,7 @@ def _left_out(
 ) -> Iterator[LeftOut]:
     """What the calibration does not rest on, what nothing checks it against, and what grasps leave open.
 
-    ``frames``: as :func:`_open_frames` gives them.
+    ``frames``: as :func:`_open_frames` gives them, and what is open of the intrinsics.
     """
     yield from _left_out_of_file(file)
     if isinstance(found.table, model.TableResult) and found.table.probability < TABLE_CONTRADICTED:
@@ -554,8 +555,6 @@ def _left_out(
         yield LeftOut("small_joint_zeros", amount=least_zero)
     if found.touch is None:
         yield LeftOut("touched_points")
-    if found.intrinsics_given:
-        yield LeftOut("given_intrinsics")
     yield from (LeftOut(subject) for subject in frames)
     yield LeftOut("detections")
     yield LeftOut("gripped_parts")
