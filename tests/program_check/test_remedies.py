@@ -285,8 +285,9 @@ MENDED = {
         (krl("PTP XTHERE"), {"data": "E6AXIS XTHERE={A1 10,A2 -10,A3 -10,A4 0,A5 -70,A6 0}"}),
     ),
     "target_not_given.not_evaluated": (
-        rapid('b:=StrToVal("5",n);', "MoveJ Offs(p,n,0,0),v50,fine,tool0;"),
-        rapid("n:=5;", "MoveJ Offs(p,n,0,0),v50,fine,tool0;"),
+        rapid(f'MoveAbsJ [[StrMatch("abc",1,"c"),-10,-10,0,-70,0],{NONE}],v50,fine,tool0;'),
+        rapid(f"MoveAbsJ [[3,-10,-10,0,-70,0],{NONE}],v50,fine,tool0;"),
+        rapid(f"MoveAbsJ [[1+2,-10,-10,0,-70,0],{NONE}],v50,fine,tool0;"),
     ),
     "program_data_file_missing": (
         krl("PTP XP1"),
