@@ -528,15 +528,16 @@ CALIBRATED |= {"touch": "some points"}
     ("images", "simulated", "setup", "touched", "expected"),
     [
         (of(views=of(shared="estimated")), False, "eye_in_hand", None, ()),
-        (of(views=of(shared=None)), False, "eye_to_hand", "points", ("given_intrinsics",)),
-        (None, False, "eye_to_hand", None, ("open_intrinsics",)),
-        (None, False, "eye_to_hand", "points", ("pose_intrinsics",)),
-        (None, False, "eye_in_hand", "points", ("open_intrinsics",)),  # they show where the board is
-        (None, True, "eye_in_hand", None, ("pose_intrinsics",)),
+        (of(views=of(shared=None)), False, "eye_to_hand", "points", (LeftOut("given_intrinsics"),)),
+        (None, False, "eye_to_hand", None, (LeftOut("open_intrinsics"),)),
+        (None, False, "eye_to_hand", "points", (LeftOut("pose_intrinsics"),)),
+        (None, False, "eye_in_hand", "points", (LeftOut("open_intrinsics"),)),  # they show where the board is
+        (None, True, "eye_in_hand", None, (LeftOut("pose_intrinsics"),)),
     ],
 )
 def test_intrinsics_of_images_and_of_poses(images, simulated, setup, touched, expected):
-    assert left_out_of_intrinsics(of(setup=setup, touched=touched), images, simulated) == expected
+    found = left_out_of_intrinsics(of(setup=setup, touched=touched), images, simulated)
+    assert tuple(map(LeftOut, found)) == expected
 
 
 @pytest.mark.parametrize(
