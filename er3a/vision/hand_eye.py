@@ -415,8 +415,12 @@ class TouchCheck(ByValue):
         """That the points contradict the calibration, if they do."""
         if self.probability >= CONTRADICTED:
             return None
-        largest = 1000 * float(np.linalg.norm(self.difference, axis=1).max())
-        return vision_findings.TouchContradicts(len(self.difference), largest, self.probability)
+        return vision_findings.TouchContradicts(len(self.difference), 1000 * self.largest, self.probability)
+
+    @property
+    def largest(self) -> float:
+        """How far a point is off at most, m."""
+        return float(np.linalg.norm(self.difference, axis=1).max())
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -50,6 +50,7 @@ from er3a.references.rows import GROUPS
 from er3a.robots.masses import Drives, Masses
 from er3a.robots.robot import Envelope, Robot, Source
 from er3a.vision.boards import BoardlessImage
+from er3a.vision.hand_eye import TouchCheck
 
 ROBOT = "er3a_c60"
 Listed = tuple[LeftOut, ...]
@@ -527,17 +528,25 @@ CALIBRATED |= {"touch": "some points"}
 @pytest.mark.parametrize(
     ("images", "simulated", "setup", "touched", "expected"),
     [
-        (of(views=of(shared="estimated")), False, "eye_in_hand", None, ()),
-        (of(views=of(shared=None)), False, "eye_to_hand", "points", (LeftOut("given_intrinsics"),)),
-        (None, False, "eye_to_hand", None, (LeftOut("open_intrinsics"),)),
-        (None, False, "eye_to_hand", "points", (LeftOut("pose_intrinsics"),)),
-        (None, False, "eye_in_hand", "points", (LeftOut("open_intrinsics"),)),  # they show where the board is
-        (None, True, "eye_in_hand", None, (LeftOut("pose_intrinsics"),)),
+        (of(views=of(shared="estimated")), False, "eye_in_hand", False, ()),
+        (of(views=of(shared=None)), False, "eye_to_hand", True, (LeftOut("given_intrinsics"),)),
+        (None, False, "eye_to_hand", False, (LeftOut("open_intrinsics"),)),
+        (None, False, "eye_to_hand", True, (LeftOut("pose_intrinsics"),)),
+        (None, False, "eye_in_hand", True, (LeftOut("open_intrinsics"),)),  # they show where the board is
+        (None, True, "eye_in_hand", False, (LeftOut("pose_intrinsics"),)),
     ],
 )
 def test_intrinsics_of_images_and_of_poses(images, simulated, setup, touched, expected):
-    found = left_out_of_intrinsics(of(setup=setup, touched=touched), images, simulated)
+    found = left_out_of_intrinsics(of(setup=setup), images, simulated, touched)
     assert tuple(map(LeftOut, found)) == expected
+
+
+def test_touched_points_confirm_what_the_gripper_needs_and_no_more():
+    """Points 5.2 mm off may be no contradiction where intervals are wide."""
+    near, wide = [0.001, 0.0, 0.0], np.full((2, 3), 0.01)
+    close, far = (TouchCheck(np.array([near, off]), wide, 0.5) for off in ([0.0, 0.002, 0.0], [0.005, 0.0, 0.0015]))
+    within = STAGES["vision"].module("compute").touched_within
+    assert [within(each, (4.0, 6.0, 6.0)) for each in (None, close, far)] == [False, True, False]
 
 
 @pytest.mark.parametrize(

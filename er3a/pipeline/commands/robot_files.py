@@ -362,7 +362,7 @@ def hand_eye(
         LeftOut("touched_points"): found.touch is None,
         LeftOut("flange_poses"): "flange_poses" in open_frames,
         LeftOut("base_poses"): "base_poses" in open_frames,
-        **{LeftOut(each): True for each in left_out_of_intrinsics(samples, images, head.simulated)},
+        **{LeftOut(each): True for each in left_out_of_intrinsics(samples, images, head.simulated, bool(found.touch))},
         LeftOut("contradicted_table"): wrong,
     }
     not_examined = [bracketed(left_out_text(each), left_out_names(each)) for each, is_so in missed.items() if is_so]

@@ -166,7 +166,7 @@ TEXTS = texts(
         ),
         "left_out.open_intrinsics": (
             "errors of the camera's intrinsics: the board's poses were computed with intrinsics that the set doesn't "
-            "give; errors of theirs are in no interval, and no touched points show where the camera is"
+            "give; errors of theirs are in no interval, and no touched points show closely enough where the camera is"
         ),
         "left_out.base_poses": (
             "whether the recorded poses are in the robot's own base, not in a frame set at its controller: the samples "

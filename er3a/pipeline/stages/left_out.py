@@ -160,14 +160,14 @@ def missed_of_program(robot: Robot, scene: Scene | None, arms: Iterable[tuple[st
 
 
 def left_out_of_intrinsics(
-    samples: CalibrationSet, images: SeenImages | None, simulated: bool
+    samples: CalibrationSet, images: SeenImages | None, simulated: bool, touched: bool
 ) -> tuple[LeftOutSubject, ...]:
     """What a calibration leaves open of the camera's intrinsics; those of poses given as numbers are known to nobody.
 
-    Touched points that contradict a calibration end it, so that those given agree. They show where a fixed camera is;
-    of a camera on the flange they show where the board is, and a wrong focal length may leave that as it is.
+    ``touched``: whether touched points agree with it. They show where a fixed camera is; of a camera on the flange they
+    show where the board is, and a wrong focal length may leave that as it is.
     """
     if images is not None:
         return ("given_intrinsics",) if images.views.shared is None else ()
-    confirmed = simulated or (samples.setup == "eye_to_hand" and samples.touched is not None)
+    confirmed = simulated or (samples.setup == "eye_to_hand" and touched)
     return ("pose_intrinsics",) if confirmed else ("open_intrinsics",)

@@ -382,7 +382,8 @@ def compute(study: Study, name: str) -> model.VisionResults:
     table = correct_table(found, robot, head.table_corrections) if head.table_corrections else None
     calibration = calibration_result(head, found, to_add, offset, table, images)
     doubt, frames = _doubt(calibration, found.touch), _open_frames(samples, head)
-    intrinsics = left_out_of_intrinsics(samples, images, head.simulated)
+    touched = touched_within(found.touch, task_file.gripper.tolerance_mm)
+    intrinsics = left_out_of_intrinsics(samples, images, head.simulated, touched)
     planned = []
     if not doubt:
         limits = (limits_of(robot, motions), study.seed)
@@ -509,10 +510,16 @@ def _left_out_without_calibration(
     yield LeftOut("joint_zeros")
     if samples.touched is None:
         yield LeftOut("touched_points")
-    open_of_poses = (*left_out_of_intrinsics(samples, images, head.simulated), *_open_frames(samples, head))
+    open_of_poses = (*left_out_of_intrinsics(samples, images, head.simulated, False), *_open_frames(samples, head))
     yield from (LeftOut(subject) for subject in open_of_poses)
     yield LeftOut("detections")
     yield LeftOut("gripped_parts")
+
+
+def touched_within(touch: TouchCheck | None, tolerance_mm: Sequence[float]) -> bool:
+    """Whether touched points show that the calibration is as exact as the gripper needs it; intervals that are wide for
+    another error, as a lens's distortion, contradict no points that are farther off."""
+    return touch is not None and 1000 * touch.largest <= min(tolerance_mm)
 
 
 def _open_frames(samples: CalibrationSet, head: HandEyeFile) -> tuple[LeftOutSubject, ...]:
