@@ -32,6 +32,7 @@ from er3a.pipeline.messages.left_out import left_out_names, left_out_text
 from er3a.pipeline.messages.programs import remedy_at, say
 from er3a.pipeline.results import LeftOut, NoPass, plain
 from er3a.pipeline.stages.left_out import (
+    guessed_pairs,
     left_out_of_rates,
     left_out_of_units,
     missed_of_program,
@@ -97,14 +98,11 @@ def checked_file(file: Path, robot: Robot, options: CheckOptions, doubts: Sequen
     missed = (*missed_of_program(robot, options.scene, check.arms), *left_out_of_units([*doubts, *own]))
     check = check.short_of(bool(missed))
     known = np.isfinite(robot.speed), not assumed_limits(robot, options).acceleration_assumed
-    assumed = (*left_out_of_rates(*known, jerk=True), *_guessed_pairs(robot, options))
+    assumed = left_out_of_rates(*known, jerk=True)
+    arms = (robot, *(arm for _, arm in check.arms)) if options.measures else ()
+    if guessed := guessed_pairs(bodies_of(arm, options.scene) for arm in arms):
+        assumed = (*assumed, LeftOut("guessed_pairs", guessed))
     return CheckedFile(file, check, missed=missed, assumed=assumed)
-
-
-def _guessed_pairs(robot: Robot, options: CheckOptions) -> tuple[LeftOut, ...]:
-    """Neighbouring links of which guessed shapes show nothing."""
-    pairs = bodies_of(robot, options.scene).guessed if options.measures else ()
-    return (LeftOut("guessed_pairs", tuple(pair.label for pair in pairs)),) if pairs else ()
 
 
 def lines_of(checked: CheckedFile, verdicts: bool = False) -> list[str]:

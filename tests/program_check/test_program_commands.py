@@ -15,11 +15,13 @@ from er3a.pipeline import (
     program_reports,
 )
 from er3a.pipeline.commands.options import app
-from er3a.pipeline.program_reports import PathProgram
+from er3a.pipeline.program_reports import PathProgram, checked_file
 from er3a.pipeline.results import LeftOut
+from er3a.program_check.check_program import CheckOptions
 from er3a.programs.languages import read_program
 from er3a.programs.machine import execute
 from er3a.programs.program_findings import TargetsLeftOut
+from tests.collision.test_matrix import bare_table
 
 ROOT = Path(__file__).resolve().parents[2]
 FAULTS = "data/programs/faults"
@@ -317,3 +319,16 @@ def test_assumed_shapes_and_ways_from_nowhere_are_named():
     done = check("data/programs/weld_seam.src", "--verdicts")
     assert "mm of assumed shapes [motion]" in done.stdout
     assert "Link shapes are assumed" in done.stderr
+
+
+@pytest.mark.parametrize(("tool", "named"), [("[200,0,0]", True), ("[0,0,100]", False)])
+def test_a_pair_that_guessed_shapes_say_nothing_of_with_a_programs_tool_is_named(tmp_path, tool, named):
+    """The sideways tool lies along the forearm where J5 is at 90 deg."""
+    data = f"PERS tooldata t1:=[TRUE,[{tool},[1,0,0,0]],[1,[0,0,50],[1,0,0,0],0,0,0]];"
+    move = "MoveAbsJ [[0,0,0,0,90,0],[9E9,9E9,9E9,9E9,9E9,9E9]]\\NoEOffs,v100,fine,t1;"
+    (tmp_path / "a.mod").write_text(f"MODULE M\n{data}\nPROC main()\n{move}\nENDPROC\nENDMODULE\n")
+    flangeless = bare_table("irb120", (0, 0, 0))
+    flangeless = flangeless.replace(d=flangeless.d * [1, 1, 1, 1, 1, 0])
+    checked = checked_file(tmp_path / "a.mod", flangeless, CheckOptions(start=np.zeros(6)))
+    (pairs,) = (each.names for each in checked.assumed if each.subject == "guessed_pairs")
+    assert ("link_4/link_6" in pairs) is named

@@ -50,8 +50,8 @@ TEXTS = texts(
         "left_out.objects_out_of_view": "whether the camera can have seen objects that lie out of its stated view",
         "left_out.unexamined_pairs": "collisions of pairs whose shapes can't be right",
         "left_out.guessed_pairs": (
-            "collisions of these links with each other: they are neighbours, and shapes guessed from the table can't "
-            "show how near they come; only the joints' limits keep them apart"
+            "collisions of these links, and of a tool on the second, with each other: they are neighbours, and shapes "
+            "guessed from the table can't show how near they come; only the joints' limits keep the links apart"
         ),
         "left_out.allowed_pairs": ("collisions of pairs that the robot's file allows: they never meet, or always do"),
         "left_out.joined_pairs": (

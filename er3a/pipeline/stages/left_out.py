@@ -52,6 +52,7 @@ def left_out_of_collisions(
             if (row.state == state or (row.left_out and row.state in others)) and row.whole is whole
         )
 
+    arms = tuple(arms)
     carries, tip = bool(scene and scene.carried), "tool" if robot.tool[:3, 3].any() else "flange"
     shapes, rules = arm_shapes(robot), scene.pair_rules if scene else ()
     solids = {solid.name for solid in scene.solids} if scene else set()
@@ -68,7 +69,7 @@ def left_out_of_collisions(
         ("bare_tool", tuple(bare)),
         ("bare_links", tuple(link_label(link) for link in shapes.bare if link not in shapes.uncovered)),
         ("unexamined_pairs", tuple(pair.label for pair in bodies.in_error)),
-        ("guessed_pairs", tuple(pair.label for pair in bodies.guessed)),
+        ("guessed_pairs", guessed_pairs([bodies, *(bodies_of(arm, scene) for _, arm in arms)])),
         ("allowed_pairs", tuple(name for name in allowed if name not in hidden)),
         ("joined_pairs", pairs("joined")),
         ("joined_whole", pairs("joined", whole=True)),
@@ -85,6 +86,11 @@ def left_out_of_collisions(
     carried = [LeftOut("carried_shapes" if carries else "carried")]
     shallow = [] if tolerance_mm is None else [LeftOut("shallow_overlaps", amount=tolerance_mm)]
     return (*obstacles, *carried, *listed, *shallow)
+
+
+def guessed_pairs(bodies: Iterable[Bodies]) -> tuple[str, ...]:
+    """Pairs of links of which guessed shapes show nothing, of an arm or with any of its tools."""
+    return tuple(dict.fromkeys(pair.label for each in bodies for pair in each.guessed))
 
 
 NAMED_DOUBTS = 20
