@@ -44,7 +44,9 @@ LISTED = {
     ("er3_600", "dynamics"): f"{DRIVES} own_values",
     ("er3_600", "vision"): f"{CAMERA} own_values",
     ("er3a_c60_article", "validation"): f"{REFERENCES} calibration near_singular_poses",
-    ("er3a_c60_article", "workspace"): f"{BODIES} {PLACES} undecided_core sampled_places allowed_pairs",
+    ("er3a_c60_article", "workspace"): (
+        f"scene_shapes carried guessed_pairs {PLACES} undecided_core sampled_places allowed_pairs"
+    ),
 }
 
 
