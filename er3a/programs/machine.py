@@ -690,11 +690,11 @@ class Frame:
     result: str = ""
     outs: tuple[tuple[str, syntax.Expression], ...] = ()
     aliased: frozenset[str] = frozenset()  # of the memory, before it was called
-    told: dict[str, syntax.Unclear] = field(default_factory=dict)  # what variables held that a side has told
+    decided: dict[str, syntax.Unclear] = field(default_factory=dict)  # what variables held that a side has decided
 
     def copy(self) -> Frame:
         """Another that goes its own way from here."""
-        return replace(self, local=dict(self.local), told=dict(self.told))
+        return replace(self, local=dict(self.local), decided=dict(self.decided))
 
 
 @dataclass(slots=True)
@@ -986,7 +986,7 @@ class Machine:
             elif isinstance(operation.instruction, instructions.Unknown) and operation.instruction.may_move:
                 memory.lost(operation.instruction.text)
         elif isinstance(operation, syntax.Assign):
-            frame.told.pop(target_name(operation.target), None)
+            frame.decided.pop(target_name(operation.target), None)
             signal = self._assign(memory, operation)
             if signal is not None:
                 self._note(way, operation.place, signal)
@@ -1111,7 +1111,7 @@ class Machine:
         holds = way.memory.value(branch.condition)
         if isinstance(holds, bool):
             way.asked[frame.routine.name, at] = self.budget
-            self._forget_told(way.memory, frame, branch, at)
+            self._forget_decided(way.memory, frame, branch, at)
             if not holds:
                 frame.at = branch.otherwise
             return not holds and branch.otherwise <= at
@@ -1150,16 +1150,16 @@ class Machine:
         """One way on the side of the condition, another on the other side; each knows from there on what it tells of a
         variable, as long as that may be asked again."""
         asked = _asked_of(branch.condition)
-        if asked is not None and (held := self._told_by(holding, asked[0], at)) is not None:
+        if asked is not None and (held := self._decided_by(holding, asked[0], at)) is not None:
             name, value = asked
             for way, holds in ((holding, True), (other, False)):
                 way.memory.write(name, value == holds)
-                way.frames[-1].told[name] = held
+                way.frames[-1].decided[name] = held
         other.frames[-1].at = branch.otherwise
         self._note(holding, branch.place, instructions.Decision(branch.text, True))
         self._note(other, branch.place, instructions.Decision(branch.text, False))
 
-    def _told_by(self, way: ExecutionPath, name: str, at: int) -> syntax.Unclear | None:
+    def _decided_by(self, way: ExecutionPath, name: str, at: int) -> syntax.Unclear | None:
         """What a variable of a way holds, of which a branch will tell its sides; None if it tells them nothing."""
         frame = way.frames[-1]
         if name in dict(frame.outs) or self.dialect.is_signal(name) or self.dialect.runs_on(name):
@@ -1167,11 +1167,11 @@ class Machine:
         held = way.memory.fixed_unknown(name)
         return held if held is not None and self._is_asked_again(frame.routine, at, name) else None
 
-    def _forget_told(self, memory: ProgramMemory, frame: Frame, branch: syntax.Branch, at: int) -> None:
-        """Forget what a side has told of a variable that is not asked again, so that ways can meet."""
-        asked = _asked_of(branch.condition) if frame.told else None
-        if asked is not None and asked[0] in frame.told and not self._is_asked_again(frame.routine, at, asked[0]):
-            memory.write(asked[0], frame.told.pop(asked[0]))
+    def _forget_decided(self, memory: ProgramMemory, frame: Frame, branch: syntax.Branch, at: int) -> None:
+        """Forget what a side has decided of a variable that is not asked again, so that ways can meet."""
+        asked = _asked_of(branch.condition) if frame.decided else None
+        if asked is not None and asked[0] in frame.decided and not self._is_asked_again(frame.routine, at, asked[0]):
+            memory.write(asked[0], frame.decided.pop(asked[0]))
 
     def _is_asked_again(self, routine: syntax.Routine, at: int, name: str) -> bool:
         key = (routine.name, at)  # at which one variable is asked

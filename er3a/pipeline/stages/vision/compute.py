@@ -479,8 +479,7 @@ def _left_out_of_motions(
     robot: Robot, bodies: Bodies, scene: Scene | None, settings: TrajectorySettings, q_deg: Reals | None = None
 ) -> Iterator[LeftOut]:
     """What of collisions, speeds and torques nobody looks at; ``q_deg``: the ways (N, n) that were looked at."""
-    ways = {} if q_deg is None else {"q_deg": q_deg}
-    yield from left_out_of_collisions(robot, bodies, scene, 1000 * DEPTH, **ways)
+    yield from left_out_of_collisions(robot, bodies, scene, 1000 * DEPTH, q_deg=q_deg)
     yield from left_out_of_rates(speeds_given(robot), *_rates_given(settings))
     yield from left_out_without_tool(robot)
     yield LeftOut("torques")
