@@ -16,7 +16,7 @@ unexport PYTHONDONTWRITEBYTECODE
 # Many small matrices: threads of BLAS only wait for each other.
 export OPENBLAS_NUM_THREADS ?= 1
 export OMP_NUM_THREADS ?= 1
-.PHONY: help run test test-all view archive lint format schema words lock clean distclean campaigns docs pictures release-check
+.PHONY: help run test test-all view lint format schema words lock clean distclean campaigns docs pictures release-check
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## /  make \1\t/' | expand -t 18
@@ -33,9 +33,6 @@ test-all: $(VENV)/dev.stamp  ## set up and run all tests, the long ones too
 view: $(VENV)/run.stamp  ## open the recordings in the Rerun viewer (ROBOT=er3a_c60 for one arm)
 	@$(BIN)/er3a view $(ROBOT)
 
-archive: $(VENV)/run.stamp  ## pack the finished study into er3a-study.zip, with RO-Crate metadata
-	@$(BIN)/er3a archive --study "$$STUDY"
-
 lint: $(VENV)/dev.stamp  ## check format, types, imports and lint of Python and Snakemake code
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
@@ -43,6 +40,7 @@ lint: $(VENV)/dev.stamp  ## check format, types, imports and lint of Python and 
 	$(BIN)/lint-imports
 	$(BIN)/snakefmt --check Snakefile workflow
 	$(BIN)/snakemake --lint
+	$(BIN)/python -m testing.budget
 
 format: $(VENV)/dev.stamp  ## format Python and Snakemake code
 	$(BIN)/ruff format .

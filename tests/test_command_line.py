@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
@@ -155,19 +154,6 @@ def test_a_second_run_does_nothing_and_ends_with_1_for_findings_and_with_2_for_a
     assert "\x1b" not in done.stdout + done.stderr
     done = call("run", "--study", "nowhere.yaml", "--fail-on", "fail")
     assert (done.returncode, done.stderr) == (2, "error: nowhere.yaml: there is no such file. Check the path\n")
-
-
-@pytest.mark.long
-def test_diff_ends_with_1_if_anything_differs(call, small_study, tmp_path):
-    results = small_study.folder / "results"
-    same = call("diff", results, results)
-    assert (same.returncode, same.stdout) == (0, "Nothing differs.\n")
-    assert json.loads(call("diff", results, results, "--json").stdout) == []
-    fewer = shutil.copytree(results, tmp_path / "fewer")
-    shutil.rmtree(fewer / small_study.robots[0] / "inverse")
-    done = call("diff", results, fewer, "--json")
-    assert done.returncode == 1
-    assert json.loads(done.stdout)[0]["stage"] == "inverse"
 
 
 def test_long_work_says_what_it_does_and_for_how_long(capsys, monkeypatch):

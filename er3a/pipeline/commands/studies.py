@@ -1,4 +1,4 @@
-"""Commands for a study: new, check, run, verdicts, view, diff, archive."""
+"""Commands for a study: new, check, run, verdicts, view."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import shlex
 import subprocess
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import asdict, astuple
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,7 +15,6 @@ import typer
 from er3a.errors import Er3aError
 from er3a.files.dh_table import AngleUnit, LengthUnit
 from er3a.pipeline.commands import options
-from er3a.pipeline.messages import language
 from er3a.pipeline.progress import shown_work
 from er3a.pipeline.study import load_study
 from er3a.robots.robot import Convention
@@ -187,43 +186,3 @@ def view(
     with without_statistics() as environment:
         done = subprocess.run(viewer_command(recordings), env=environment, check=False)
     raise typer.Exit(done.returncode)
-
-
-@options.app.command(rich_help_panel=options.FIRST)
-def diff(
-    old: Annotated[Path, typer.Argument(help="a results folder")],
-    new: Annotated[Path, typer.Argument(help="the results folder to compare with it")],
-    output: Annotated[Path | None, typer.Option(help="also write the differences as a page")] = None,
-    words: Annotated[str, typer.Option("--language", help=" | ".join(language.LANGUAGES))] = "en",
-    as_json: options.AsJson = False,
-):
-    """List the differences of two results folders: verdicts, key figures, tables. Exit code 1 if there are any."""
-    from er3a.pipeline.viewing.diff import COLUMNS, changes, write_diff
-
-    if words not in language.LANGUAGES:
-        raise Er3aError(f"--language is '{words}'; known: {', '.join(language.LANGUAGES)}")
-    language.use(words)
-    found = changes(old, new)
-    if as_json:
-        options.print_json([asdict(change) for change in found])
-    elif found:
-        options.print_table([language.tr(column) for column in COLUMNS], map(astuple, found))
-    else:
-        print(language.tr("Nothing differs."))
-    if output:
-        write_diff(old, new, found, output)
-    if found:
-        raise typer.Exit(1)
-
-
-@options.app.command(rich_help_panel=options.FIRST)
-def archive(
-    output: Annotated[Path, typer.Option(help="the zip to write")] = Path("er3a-study.zip"),
-    study: options.StudyFile = options.DEFAULT_STUDY,
-    results: options.Results = options.DEFAULT_RESULTS,
-    reports: options.Reports = options.DEFAULT_REPORTS,
-):
-    """Pack a finished study into one zip with RO-Crate metadata."""
-    from er3a.pipeline.archive import archive as pack
-
-    print(f"{output}: written, {pack(study, results, reports, output)} files with RO-Crate metadata")
