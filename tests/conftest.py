@@ -51,7 +51,6 @@ LONGEST_FILES = (
     "stages/test_trajectory.py",
     "workspace/test_general.py",
     "calibration/test_points.py",
-    "test_recipes.py",
     "integration/test_offices.py",
     "test_command_line.py",
 )

@@ -13,10 +13,6 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 LONGEST_FUNCTION = 80
 MAX_POSITIONAL = 6
-IN_EVERY_STAGE = {"entry", "model", "compute", "played", "record", "report"}
-IN_EVERY_LANGUAGE = {"language", "reader", "dialect", "writer"}
-LANGUAGES = "er3a/programs"  # a folder of it is a language of robot programs
-MESSAGES = "er3a/pipeline/messages"  # its modules are named after those that they speak for
 KERNELS = {"kernel", "inner_kernel"}
 
 
@@ -71,28 +67,6 @@ def test_no_function_takes_many_positional_arguments():
     taken = {place: [each.arg for each in (*node.args.posonlyargs, *node.args.args)] for place, node in functions()}
     many = {place for place, names in taken.items() if len({*names} - {"self", "cls"}) > MAX_POSITIONAL}
     assert many == set()
-
-
-def test_no_two_modules_of_different_rooms_share_a_name():
-    places: dict[str, set[str]] = defaultdict(set)
-    for path in map(Path, trees()):
-        shared = IN_EVERY_LANGUAGE if path.parent.parent.as_posix() == LANGUAGES else IN_EVERY_STAGE
-        if path.parent.as_posix() != MESSAGES and path.stem not in {"__init__", *shared}:
-            places[path.stem].add(path.as_posix())
-    assert several(places) == {}
-
-
-def test_stages_alone_have_the_modules_of_a_stage():
-    contract = [Path(path) for path in trees() if Path(path).stem in IN_EVERY_STAGE]
-    assert {path.parent.parent.as_posix() for path in contract} == {"er3a/pipeline/stages"}
-
-
-def test_languages_of_programs_have_the_same_modules():
-    modules = defaultdict(set)
-    for path in map(Path, trees()):
-        if path.parent.parent.as_posix() == LANGUAGES:
-            modules[path.parent.name].add(path.stem)
-    assert [name for name, found in modules.items() if not found >= IN_EVERY_LANGUAGE - {"dialect"}] == []
 
 
 def test_no_two_classes_share_a_name():
@@ -158,18 +132,6 @@ def names_of(module: ast.Module) -> set[str]:
     return {*defined, *assigned, *(alias.asname or alias.name for alias in imported)}
 
 
-def test_a_rooms_face_names_all_of_its_modules_or_few_and_nothing_else():
-    for face in (path for path in trees() if path.endswith("/__init__.py") and path.count("/") > 1):
-        room = face.removesuffix("__init__.py")
-        inside = {path for path in trees() if path.startswith(room) and path != face}
-        modules = {Path(path).stem for path in inside if path.count("/") == room.count("/")}
-        known = {path.removeprefix(room).partition("/")[0].removesuffix(".py") for path in inside}
-        known.update(*(names_of(trees()[path]) for path in inside))
-        named = set(re.findall(r"``(\w+)``", ast.get_docstring(trees()[face]) or ""))
-        assert named <= known, (face, named - known)
-        assert len(named & modules) < 2 or modules <= named, (face, modules - named)
-
-
 def test_the_guide_names_rooms_and_modules_that_are_there():
     guide = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
     named = re.findall(r"`([\w/]+(?:/|\.py))`", " ".join(re.findall(r"^\| (`.+?) \|", guide, flags=re.MULTILINE)))
@@ -186,16 +148,3 @@ def test_what_the_package_offers_is_there():
 
 
 IDENTIFIER = re.compile(r"`(_?[A-Za-z][A-Za-z0-9_]*_[A-Za-z0-9_]*|[A-Z][a-z]+[A-Z]\w*)(?:\(\))?`")
-
-
-def test_names_in_recipes_and_decisions_stand_in_the_tree():
-    """Backticked identifiers of the two documents that maintainers go by; those of their own examples aside."""
-    folders = ("er3a", "tests", "testing", "benchmarks", "workflow", "config", "data/manual_refs", "docs")
-    kinds = {".py", ".js", ".j2", ".yaml", ".smk", ".md", ".css", ".csv", ".json"}
-    files = [path for folder in folders for path in (ROOT / folder).rglob("*") if path.suffix in kinds]
-    documents = {ROOT / "CONTRIBUTING.md", ROOT / "docs/architecture.md"}
-    text = "\n".join(path.read_text(encoding="utf-8") for path in files if path not in documents)
-    known = set(re.findall(r"\w+", text))
-    named = {name for path in documents for name in IDENTIFIER.findall(path.read_text(encoding="utf-8"))}
-    assert len(named) > 150
-    assert sorted(named - known) == []
