@@ -80,6 +80,9 @@ INDEX_EVERY_S = 25.0
 HEAVY = {"sample_workspace": 6.0, "compute_workspace": 8.0, "compute_validation": 5.0, "compute_programs": 5.0}
 """Jobs beside the others, by rule: what they take on average, in units of a page."""
 
+_JOB_ENDED = re.compile(r"2> (\S+)' (?:died with <Signals\.\w+: (\d+)>|returned non-zero exit status (\d+))")
+"""How a job ended, of which a line of its own tells: its log, and the signal or the exit code."""
+
 Expected = Mapping[tuple[str, str], str]
 
 
@@ -119,6 +122,7 @@ class RunLog(LogHandlerBase):
         self._jobs: dict[int, tuple[str, dict[str, str], float]] = {}
         self._sampled: dict[tuple[str, str], float] = {}
         self._left: dict[str, int] = {}
+        self._killed: dict[str, int] = {}
         self._done = 0.0
         self._index: subprocess.Popen[bytes] | None = None
         self._indexed = -INDEX_EVERY_S
@@ -136,10 +140,16 @@ class RunLog(LogHandlerBase):
             self._finish(record.__dict__["job_id"])
         elif event == LogEvent.JOB_ERROR:
             job = record.__dict__
-            logs = ", ".join(str(log) for log in job.get("log") or ())
-            self._print(f"✗ {job.get('rule_msg') or job.get('rule_name')}: ended with an error; see {logs}")
+            name, logs = job.get("rule_msg") or job.get("rule_name"), [str(log) for log in job.get("log") or ()]
+            self._print(f"✗ {name}: ended with an error; see {', '.join(logs)}")
+            if (number := self._killed.get(*logs[:1], 0)) and (log := Path(logs[0])).is_file():
+                why = "; out of memory?" if number == signal.SIGKILL else ""
+                with log.open("a", encoding="utf-8") as told:  # where reasons are looked for when the run has ended
+                    told.write(f"\nerror: {name}: killed (signal {number}{why})\n")
         elif event == LogEvent.ERROR:
-            if "died with <Signals.SIGINT" not in record.getMessage():  # Ctrl-C, of which the run tells itself
+            if ended := _JOB_ENDED.search(record.getMessage()):
+                self._killed[ended[1]] = int(ended[2] or max(int(ended[3]) - 128, 0))
+            else:
                 self._print(_error_line(record.getMessage()))
         elif event is None and _concerns_a_person(record):
             self._print(record.getMessage())
@@ -261,7 +271,7 @@ def run_study(study_file: Path, results: Path, reports: Path, words: Sequence[st
     InputError
         the study, or a file that it leads to, can't be used
     """
-    asked = _parsed(words)
+    asked = parsed(words)
     if asked.dryrun:
         return _dry_run(study_file, results, reports, words, asked)
     lock = _taken_lock()
@@ -377,7 +387,7 @@ def _one_at_first() -> list[str]:
     return ["--resources", *(f"compiles_{stage}=1" for stage in new)] if new else []
 
 
-def _parsed(words: Sequence[str]) -> Namespace:
+def parsed(words: Sequence[str]) -> Namespace:
     """What words request of Snakemake, such as ``-np`` or ``--dry-run``."""
     from snakemake.cli import get_argument_parser
     from snakemake.exceptions import CliException
