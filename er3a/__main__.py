@@ -1,15 +1,18 @@
-"""`er3a` and `python -m er3a`."""
+"""The commands: `er3a`, `python -m er3a`, and `rerun-importer-er3a`, which Rerun's viewer calls."""
 
 from __future__ import annotations
 
 import os
 import sys
 
-from er3a.pipeline.job_server import SETTINGS, hand_over
+from er3a.pipeline.working_folder import distrust
 
 
 def main() -> None:
     """Have a running study's server do the job, or do it here."""
+    distrust()
+    from er3a.pipeline.job_server import SETTINGS, hand_over
+
     code = hand_over(sys.argv[1:])
     if code is None:
         for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):  # many small matrices: threads of BLAS only wait
@@ -18,6 +21,14 @@ def main() -> None:
 
         command_line()
     sys.exit(code)
+
+
+def draw_for_rerun() -> int:
+    """Draw a file for Rerun's viewer; the exit code that it knows."""
+    distrust()
+    from er3a.pipeline.viewing.importer import main as draw
+
+    return draw()
 
 
 if __name__ == "__main__":

@@ -138,6 +138,7 @@ EXAMPLE = "flange_x_mm, .., flange_qw, .., flange_qz, target_x_mm, .., target_qz
 MIN_SQUARE_MM = 0.5
 MIN_DEVIATION_MM = 5e-3
 """Of a camera or an arm; less is in metres."""
+PICTURES = ("PNG", "JPEG", "TIFF", "BMP", "WEBP", "PPM")  # of others, some are drawn by programs that are called for it
 EPOCH_DIGITS = 10  # of the seconds since 1970, which recorders write
 POINTS = {f"{part}_{c}_mm": CsvColumn() for part in ("seen", "touched") for c in "xyz"}
 
@@ -502,7 +503,7 @@ def _targets_of_images(
 def grey_image(file: Path) -> NDArray[np.uint8]:
     """A picture's grey levels (h, w)."""
     try:
-        with Image.open(file) as image:
+        with Image.open(file, formats=PICTURES) as image:
             return np.asarray(image.convert("L"))
     except (OSError, ValueError) as error:
         reason = "there is no such file" if isinstance(error, FileNotFoundError) else "is not a readable image"

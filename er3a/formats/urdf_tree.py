@@ -17,14 +17,18 @@ ignore.
 
 from __future__ import annotations
 
+import json
 import math
 import re
+import subprocess
+import sys
 import tempfile
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Protocol
 
@@ -890,7 +894,9 @@ def mesh_of(path: Path, name: str) -> Path | None:
 
 
 COMMENT = re.compile("<!--.*?-->", re.DOTALL)
-FOLDERS_UP = 4  # in and beside which packages are looked for
+EXPANDING_S = 30  # the largest public ones take two
+UNBOUNDED = "Look for an expression without end, such as 9**9**9"
+ARGUMENTS = "Give its arguments: --xacro NAME:=VALUE; keep its packages in folders beside it"
 EXTRA = "Install it: pip install 'er3a[xacro]'; or expand the file elsewhere: xacro FILE > arm.urdf"
 
 
@@ -936,40 +942,23 @@ def _argument(path: Path, text: str) -> tuple[str, str]:
 
 
 def _expanded(path: Path, values: dict[str, str]) -> str:
-    """The URDF's text, its meshes named by where they are; those not found keep their names."""
+    """The URDF's text, its meshes named by where they are; those not found keep their names.
+
+    A xacro file is a program: another process expands it, in limited time and memory.
+    """
+    if find_spec("xacrodoc") is None:
+        raise InputError(path, None, "is xacro, which xacrodoc expands", EXTRA)
+    command = [sys.executable, "-P", "-m", "er3a.formats.xacro_expansion", str(path), json.dumps(values)]
     try:
-        from xacrodoc import XacroDoc, packages
-    except ImportError:
-        raise InputError(path, None, "is xacro, which xacrodoc expands", EXTRA) from None
-    packages.reset()
-    packages.update_package_cache(_packages_near(path))
-    try:
-        text = XacroDoc.from_file(path, subargs=values, resolve_packages=False).to_urdf_string()
-        root = ElementTree.fromstring(text)
-    except Exception as error:  # whatever a macro makes its expander stumble over
-        reason = " ".join(str(error).split())[:200] or type(error).__name__
-        remedy = "Give its arguments: --xacro NAME:=VALUE; keep its packages in folders beside it"
-        raise InputError(path, None, f"can't be expanded ({reason})", remedy) from None
+        done = subprocess.run(command, capture_output=True, timeout=EXPANDING_S, check=False)
+    except subprocess.TimeoutExpired:
+        raise InputError(path, None, f"is not expanded after {EXPANDING_S} s", UNBOUNDED) from None
+    text, reason = (words.decode("utf-8", "replace") for words in (done.stdout, done.stderr))
+    if done.returncode:
+        reason = reason.strip().rpartition("\n")[2][:200] or f"its expansion ended with {done.returncode}"
+        raise InputError(path, None, f"can't be expanded ({reason})", ARGUMENTS)
+    root = ElementTree.fromstring(text)
     for mesh in root.iter("mesh"):
         if (file := mesh_of(path, mesh.get("filename", ""))) is not None:
             mesh.set("filename", f"file://{file.resolve()}")
     return ElementTree.tostring(root, encoding="unicode")
-
-
-def _packages_near(path: Path) -> dict[str, Path]:
-    """Packages by name: folders above the file, nearest last, and beside those; ``package.xml`` renames one."""
-    found: dict[str, Path] = {}
-    for above in reversed(path.resolve().parents[:FOLDERS_UP]):
-        found |= {folder.name: folder for folder in (*sorted(above.glob("*/")), above)}
-        for manifest in (*sorted(above.glob("*/package.xml")), above / "package.xml"):
-            if manifest.is_file():
-                found[_package_name(manifest)] = manifest.parent
-    return found
-
-
-def _package_name(manifest: Path) -> str:
-    try:
-        name = ElementTree.parse(manifest).findtext("name")
-    except ElementTree.ParseError:
-        name = None
-    return (name or manifest.parent.name).strip()

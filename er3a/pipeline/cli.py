@@ -37,6 +37,7 @@ def main() -> None:
     warnings.showwarning = print_warning
     signal.signal(signal.SIGTERM, _end)
     try:
+        _refuse_files_as_options(sys.argv[1:])
         raise SystemExit(app(standalone_mode=False, prog_name="er3a"))
     except _UsageError as error:
         _complain_of_usage(error)
@@ -56,6 +57,14 @@ def main() -> None:
     except OSError as error:
         print_error(f"{error.filename or 'the system'}: {error.strerror or error}")
     raise SystemExit(2)
+
+
+def _refuse_files_as_options(words: list[str]) -> None:
+    """Refuse an option that is also a file here: a pattern, or a hook, names all files of a folder."""
+    options = words[: words.index("--")] if "--" in words else words
+    for word in options:
+        if word.startswith("-") and os.path.lexists(word):
+            raise Er3aError(f"{word} is a file of this folder, read as an option; write -- before the names of files")
 
 
 def _end(number: int, frame: FrameType | None) -> None:

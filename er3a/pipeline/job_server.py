@@ -56,7 +56,7 @@ def hand_over(words: Sequence[str]) -> int | None:
         except OSError:
             return None
         code = line.recv(_CODE.size)
-    return _CODE.unpack(code)[0] if code else 1  # no code: the child was killed; its last words are on standard error
+    return _CODE.unpack(code)[0] if code else 128 + signal.SIGKILL  # no code: the child was killed
 
 
 @contextmanager

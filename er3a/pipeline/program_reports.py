@@ -30,6 +30,8 @@ from er3a.kinematics.singularity import USUAL_NEAR
 from er3a.pipeline.messages.language import as_text
 from er3a.pipeline.messages.left_out import left_out_names, left_out_text
 from er3a.pipeline.messages.programs import remedy_at, say
+from er3a.pipeline.messages.say import excerpt
+from er3a.pipeline.progress import TimeOverError, time_limit
 from er3a.pipeline.results import LeftOut, NoPass, plain
 from er3a.pipeline.stages.left_out import (
     guessed_pairs,
@@ -64,6 +66,7 @@ BASE = "%SRCROOT%"
 SARIF_SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 WORDS: dict[Level, str] = {"fail": "error", "caution": "warning", "note": "note", "pass": "pass"}
 UNREADABLE = "unreadable"
+DAY_S = 86_400.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,13 +89,18 @@ class CheckedFile:
         return "fail" if self.check is None else self.check.level
 
 
-def checked_file(file: Path, robot: Robot, options: CheckOptions, doubts: Sequence[DoubtfulUnit] = ()) -> CheckedFile:
-    """Read a program and check it; no motion of it passes where obstacles or shapes are missing, or with ``doubts``
-    about the units of what it is checked by."""
+def checked_file(
+    file: Path, robot: Robot, options: CheckOptions, doubts: Sequence[DoubtfulUnit] = (), seconds: float = DAY_S
+) -> CheckedFile:
+    """Read a program, in limited time, and check it; no motion of it passes where obstacles or shapes are missing, or
+    with ``doubts`` about the units of what it is checked by."""
     try:
-        with noted_doubts() as own:
+        with noted_doubts() as own, time_limit(seconds):
             program = read_program(file)
         check = check_program(program, robot, options)
+    except TimeOverError:
+        remedy = "Give more --seconds, or split the program"
+        return CheckedFile(file, None, InputError(file, None, f"is not read after {seconds:.0f} s", remedy))
     except InputError as error:
         return CheckedFile(file, None, error)
     missed = (*missed_of_program(robot, options.scene, check.arms), *left_out_of_units([*doubts, *own]))
@@ -143,7 +151,7 @@ def _finding_line(each: LocatedFinding) -> str:
 
 
 def _verdict_line(verdict: MotionVerdict, of_what: str) -> str:
-    parts = [f"{verdict.text}"]
+    parts = [excerpt(verdict.text)]
     if verdict.duration_s is not None:
         parts.append(f"{verdict.duration_s:.2f} s")
     if verdict.least_clearance_mm is not None:

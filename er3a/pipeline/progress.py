@@ -3,6 +3,7 @@ log."""
 
 from __future__ import annotations
 
+import signal
 import sys
 import threading
 import time
@@ -87,6 +88,28 @@ def work_clock() -> float:
     from er3a.numerics.jit import compile_seconds  # numba only where work is timed: all commands load this file
 
     return time.monotonic() - compile_seconds()
+
+
+class TimeOverError(Exception):
+    """A block has not ended in its time."""
+
+
+@contextmanager
+def time_limit(seconds: float) -> Iterator[None]:
+    """Raise :class:`TimeOverError` in a block that goes on for longer; only in the main thread, and not on Windows."""
+    if not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def end(*_: object) -> None:
+        raise TimeOverError
+
+    before, rest = signal.signal(signal.SIGALRM, end), signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, *rest)
+        signal.signal(signal.SIGALRM, before)
 
 
 class TimeBudget:

@@ -15,6 +15,7 @@ import fcntl
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -79,6 +80,9 @@ INDEX_EVERY_S = 25.0
 HEAVY = {"sample_workspace": 6.0, "compute_workspace": 8.0, "compute_validation": 5.0, "compute_programs": 5.0}
 """Jobs beside the others, by rule: what they take on average, in units of a page."""
 
+_JOB_ENDED = re.compile(r"2> (\S+)' (?:died with <Signals\.\w+: (\d+)>|returned non-zero exit status (\d+))")
+"""How a job ended, of which a line of its own tells: its log, and the signal or the exit code."""
+
 Expected = Mapping[tuple[str, str], str]
 
 
@@ -118,6 +122,7 @@ class RunLog(LogHandlerBase):
         self._jobs: dict[int, tuple[str, dict[str, str], float]] = {}
         self._sampled: dict[tuple[str, str], float] = {}
         self._left: dict[str, int] = {}
+        self._killed: dict[str, int] = {}
         self._done = 0.0
         self._index: subprocess.Popen[bytes] | None = None
         self._indexed = -INDEX_EVERY_S
@@ -135,10 +140,16 @@ class RunLog(LogHandlerBase):
             self._finish(record.__dict__["job_id"])
         elif event == LogEvent.JOB_ERROR:
             job = record.__dict__
-            logs = ", ".join(str(log) for log in job.get("log") or ())
-            self._print(f"✗ {job.get('rule_msg') or job.get('rule_name')}: ended with an error; see {logs}")
+            name, logs = job.get("rule_msg") or job.get("rule_name"), [str(log) for log in job.get("log") or ()]
+            self._print(f"✗ {name}: ended with an error; see {', '.join(logs)}")
+            if (number := self._killed.get(*logs[:1], 0)) and (log := Path(logs[0])).is_file():
+                why = "; out of memory?" if number == signal.SIGKILL else ""
+                with log.open("a", encoding="utf-8") as told:  # where reasons are looked for when the run has ended
+                    told.write(f"\nerror: {name}: killed (signal {number}{why})\n")
         elif event == LogEvent.ERROR:
-            if "died with <Signals.SIGINT" not in record.getMessage():  # Ctrl-C, of which the run tells itself
+            if ended := _JOB_ENDED.search(record.getMessage()):
+                self._killed[ended[1]] = int(ended[2] or max(int(ended[3]) - 128, 0))
+            else:
                 self._print(_error_line(record.getMessage()))
         elif event is None and _concerns_a_person(record):
             self._print(record.getMessage())
@@ -260,9 +271,9 @@ def run_study(study_file: Path, results: Path, reports: Path, words: Sequence[st
     InputError
         the study, or a file that it leads to, can't be used
     """
-    asked = _parsed(words)
+    asked = parsed(words)
     if asked.dryrun:
-        return _dry_run(study_file, results, reports, words)
+        return _dry_run(study_file, results, reports, words, asked)
     lock = _taken_lock()
     try:
         done = _run(study_file, results, reports, words, asked, lock)
@@ -321,12 +332,9 @@ def _run(study_file: Path, results: Path, reports: Path, words: Sequence[str], a
     for path, fault in corrupted(study, results, reports):
         print(f"note: {fault.file}: {fault.problem}; it is made again", file=sys.stderr)
         path.unlink()
-    snakemake = ["--snakefile", str(ROOT / "Snakefile")]
-    study_words = ["--configfile", str(study_file)]  # last: Snakemake takes all words after it for more such files
     if any((_STATE / "locks").glob("*")):
         print("note: a run that was cut off left its lock; going on where it stopped", file=sys.stderr)
-        unlock = [sys.executable, "-m", "snakemake", *snakemake, "--unlock", "--quiet", "all", *study_words]
-        subprocess.run(unlock, check=True, env=os.environ | {"PYTHONWARNINGS": "ignore::UserWarning"})  # told above
+        _unlock()
     os.set_inheritable(lock, True)  # held until the last job of this run has ended
     _end_when_asked(results, reports)
     sys.stdout.flush()
@@ -338,7 +346,36 @@ def _run(study_file: Path, results: Path, reports: Path, words: Sequence[str], a
     with job_server.running(lock) if on_this_machine else nullcontext():
         first = _one_at_first() if on_this_machine and not asked.resources else []
         # Options that take as many words as follow stand before one that takes one.
-        return _snakemake([*first, *shown, *snakemake, *plain, *words, *study_words])
+        return _snakemake([*first, *shown, *plain, *words, *_of_er3a(study_file, asked)])
+
+
+def _of_er3a(study_file: Path, asked: Namespace) -> list[str]:
+    """The words that name er3a's workflow and profile, and the study. They are the last ones: Snakemake takes all words
+    after ``--configfile`` for more studies.
+
+    A profile holds Python that Snakemake evaluates. It would take that of the working folder unasked, and would look
+    there for a name that is meant for er3a's or the user's own: a folder's profile has to be named by a path.
+
+    Raises
+    ------
+    RunError
+        for a profile's name that this folder has, too
+    """
+    named = asked.workflow_profile or "default"
+    own = ROOT / "profiles" / named
+    places = [(name, name) for name in asked.profile or ()]
+    if not own.is_dir():
+        places += [(named, named), (named, f"profiles/{named}")]
+    for name, place in places:
+        if not os.path.dirname(name) and os.path.lexists(place):
+            raise RunError(f"the profile {name} is also in this folder; if you trust it, name it as ./{place}")
+    profile = str(own if own.is_dir() else named)
+    return ["--snakefile", str(ROOT / "Snakefile"), "--workflow-profile", profile, "--configfile", str(study_file)]
+
+
+def _unlock() -> None:
+    """Clear Snakemake's own lock, which a run that holds ours may."""
+    shutil.rmtree(_STATE / "locks", ignore_errors=True)
 
 
 def _one_at_first() -> list[str]:
@@ -350,7 +387,7 @@ def _one_at_first() -> list[str]:
     return ["--resources", *(f"compiles_{stage}=1" for stage in new)] if new else []
 
 
-def _parsed(words: Sequence[str]) -> Namespace:
+def parsed(words: Sequence[str]) -> Namespace:
     """What words request of Snakemake, such as ``-np`` or ``--dry-run``."""
     from snakemake.cli import get_argument_parser
     from snakemake.exceptions import CliException
@@ -372,12 +409,12 @@ def _parsed(words: Sequence[str]) -> Namespace:
     return asked
 
 
-def _dry_run(study_file: Path, results: Path, reports: Path, words: Sequence[str]) -> bool:
+def _dry_run(study_file: Path, results: Path, reports: Path, words: Sequence[str], asked: Namespace) -> bool:
     """Say what a run would do, and change nothing."""
     for _, fault in corrupted(check_study(study_file), results, reports):
         print(f"note: {fault.file}: {fault.problem}; a run makes it again", file=sys.stderr)
     sys.stdout.flush()
-    return _snakemake(["--snakefile", str(ROOT / "Snakefile"), *words, "--nolock", "--configfile", str(study_file)])
+    return _snakemake([*words, "--nolock", *_of_er3a(study_file, asked)])
 
 
 def _end_when_asked(results: Path, reports: Path) -> None:
@@ -398,8 +435,9 @@ def _end_when_asked(results: Path, reports: Path) -> None:
             os.dup2(silence, output)
         _end_processes_below()
         _report_error(reports, f"The run was ended by {name}.")
-        for path in (*half_written(results), *half_written(reports), *(_STATE / "locks").glob("*")):
+        for path in (*half_written(results), *half_written(reports)):
             path.unlink(missing_ok=True)
+        _unlock()
         atexit._run_exitfuncs()  # Snakemake's temporary folder goes
         os._exit(128 + number)  # waits for no thread
 

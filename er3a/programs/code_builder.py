@@ -18,7 +18,7 @@ from er3a.programs.instructions import Aside, Place, Remark, Unknown
 from er3a.programs.program_findings import NameTwice, NotSimulated, NotUnderstood, ProgramFinding
 
 MAX_NESTED = 200
-ASSIGNED = re.compile(r"(?:(?:global|local)\s+)?([A-Za-z_$][\w$]*)[^=\"'(]*=(?!=)")
+ASSIGNED = re.compile(r"(?:(?:global|local)\s+)?([A-Za-z_$][\w$]*+)[^=\"'(]*+=(?!=)")
 
 
 @dataclass

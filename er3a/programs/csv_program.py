@@ -77,7 +77,7 @@ def read_csv_program(source: ProgramText) -> Program:
     if not kept:
         raise InputError(source.path, None, "holds no rows", "Give the columns q1_deg, q2_deg ...")
     mark = next((each for each in ";\t" if each in kept[0][1] and "," not in kept[0][1]), ",")
-    rows = [next(csv.reader((line,), delimiter=mark)) for _, line in kept]  # no quote goes on over lines
+    rows = [_cells(source, number, line, mark) for number, line in kept]
     if mark != ",":
         rows = _with_points(source, rows)
     head = [name.strip() for name in rows[0]]
@@ -130,6 +130,14 @@ def read_csv_program(source: ProgramText) -> Program:
         slides=tuple(slides.tolist()),
         lines=source.lines,
     )
+
+
+def _cells(source: ProgramText, number: int, line: str, mark: str) -> list[str]:
+    """A line's cells; no quote goes on over lines."""
+    try:
+        return next(csv.reader((line,), delimiter=mark))
+    except csv.Error as error:
+        raise InputError(source.path, f"line {number}", f"not valid CSV ({error})", "Correct this line") from None
 
 
 def _units_checked(head: list[str], rows: list[list[str]]) -> bool:

@@ -19,9 +19,9 @@ from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
 if TYPE_CHECKING:
-    from er3a.pipeline.progress import TimeBudget
     from er3a.programs.execution import KeepOn, Phase
 
+LEAST_S = 1.0  # to read a file for which no time is left
 SHARE_OF_FOLLOWING = 0.5  # of the time; the rest is for checking what was followed
 
 
@@ -98,9 +98,11 @@ def check_program(
     first_compiled = compiling_beside(search_boxes, checked_file, files[0], arm, replace(options, measures=False))
     budget = TimeBudget(seconds, len(files))
     with shown_work("reading") as at, first_compiled:
-        checked = [
-            checked_file(file, arm, replace(options, keep_on=_until(budget, file, at)), doubts) for file in files
-        ]
+        checked = []
+        for file in files:
+            start, end = budget.next_piece()
+            own = replace(options, keep_on=_until(start, end, file, at))
+            checked.append(checked_file(file, arm, own, doubts, max(end - start, LEAST_S)))
     if sarif is not None:
         _write(sarif, json.dumps(sarif_of(checked), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
     if as_json:
@@ -184,11 +186,10 @@ def _write(file: Path, text: str) -> None:
     write_atomically(file, lambda path: path.write_text(text, encoding="utf-8"))
 
 
-def _until(budget: TimeBudget, file: Path, at: Callable[[str], None]) -> KeepOn:
+def _until(start: float, end: float, file: Path, at: Callable[[str], None]) -> KeepOn:
     """Whether a file's part of the time is not over; ``at`` shows how far its check is."""
     from er3a.pipeline.progress import work_clock
 
-    start, end = budget.next_piece()
     ends = {"following": start + SHARE_OF_FOLLOWING * (end - start), "checking": end}
 
     def keep_on(phase: Phase, done: int, of: int) -> bool:

@@ -6,13 +6,14 @@ import shlex
 import subprocess
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from er3a.errors import Er3aError
+from er3a.errors import Er3aError, ResultError
 from er3a.files.dh_table import AngleUnit, LengthUnit
 from er3a.pipeline.commands import options
 from er3a.pipeline.progress import shown_work
@@ -117,11 +118,16 @@ def run(
     fail_on: Annotated[options.FailOn | None, typer.Option(help="exit code 1 for this verdict or a worse one")] = None,
 ):
     """Run the study in this folder; finished parts are not run again."""
-    from er3a.pipeline.run_study import run_study
+    from er3a.pipeline.run_study import parsed, run_study
     from er3a.pipeline.verdicts import read_verdicts
 
     if not run_study(study, options.DEFAULT_RESULTS, options.DEFAULT_REPORTS, words or []):
         raise typer.Exit(2)
+    asked = parsed(words or [])
+    if not (fail_on or asked.dryrun or asked.targets):  # of the whole study: what changed in the meantime
+        with suppress(ResultError):  # such as after an option that only lists something
+            found = read_verdicts(load_study(study), options.DEFAULT_RESULTS)
+            _end_with_findings([verdict for verdict in found if verdict.outdated], options.FailOn.fail)
     if fail_on:
         _end_with_findings(read_verdicts(load_study(study), options.DEFAULT_RESULTS), fail_on)
 

@@ -54,6 +54,7 @@ class By:
     texts: Mapping[str, str]
 
 
+EXCERPT = 200  # letters of a user's text
 Text = str | Plural
 _texts: dict[str, Text] = {}
 _fields: dict[str, str] = {}  # of keys whose form is decided by a field of the finding
@@ -107,9 +108,14 @@ def say(finding: Any) -> str:
     return say_as(finding, str(getattr(finding, field)).lower() if field else "")
 
 
+def excerpt(part: Any) -> Any:
+    """A text out of a user's file, as long as a message may repeat it; other parts as they are."""
+    return f"{part[:EXCERPT]} …" if isinstance(part, str) and len(part) > EXCERPT else part
+
+
 def say_as(finding: Finding, variant: str = "", /, **parts: Any) -> str:
     """A finding as one of its texts, with parts besides its own fields or in place of them."""
-    fields = {name: getattr(finding, name) for name in finding.__dataclass_fields__}
+    fields = {name: excerpt(getattr(finding, name)) for name in finding.__dataclass_fields__}
     return sentence(f"{finding.code}#{variant}" if variant else finding.code, **fields | parts)
 
 

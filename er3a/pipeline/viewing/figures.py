@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import matplotlib
@@ -199,13 +199,20 @@ _IN_ADDRESSES = str.maketrans({letter: f"%{ord(letter):02X}" for letter in '%#<>
 _BLANKS = re.compile(r"\s*(?<![=\"])([A-Za-z])\s+(?=[-\d])|\s+(?=[z\"])")
 
 
-def house_style() -> AbstractContextManager[None]:
-    """The look of all figures of the pages, in the language of the pages, for what is drawn within it."""
-    if language.current() != "zh":
-        return matplotlib.rc_context(STYLE)
-    present = {font.name for font in fontManager.ttflist}
-    chinese = [name for name in CHINESE_FONTS if name in present][:1]
-    return matplotlib.rc_context(STYLE | {"font.sans-serif": [*FONTS, *chinese]})
+@contextmanager
+def house_style() -> Iterator[None]:
+    """The look of all figures of the pages, in the language of the pages, for what is drawn within it.
+
+    A ``matplotlibrc`` counts for nothing: one in the study's folder could have LaTeX write the texts.
+    """
+    chinese = []
+    if language.current() == "zh":
+        present = {font.name for font in fontManager.ttflist}
+        chinese = [name for name in CHINESE_FONTS if name in present][:1]
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(STYLE | {"font.sans-serif": [*FONTS, *chinese]})
+        yield
 
 
 def new_figure(rows: int = 1, columns: int = 1, width: float = 9.0, height: float = 4.5, **subplots):

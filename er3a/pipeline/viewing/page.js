@@ -89,9 +89,11 @@ function makeSortable(table) {
   });
 }
 
+// A spreadsheet takes for a formula what begins as one; an apostrophe before it says that it is a text.
 function csvOf(table) {
   const quoted = (text) => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
-  return [...table.rows].map((row) => [...row.cells].flatMap(partsOf).map((text) => quoted(plain(text))).join(",")).join("\n") + "\n";
+  const asText = (text) => (/^[=+@\t\r]/.test(text) || (text[0] === "-" && Number.isNaN(Number(text))) ? `'${text}` : text);
+  return [...table.rows].map((row) => [...row.cells].flatMap(partsOf).map((text) => quoted(asText(plain(text)))).join(",")).join("\n") + "\n";
 }
 
 // A cell's texts: of a D-H table's entry its value, and apart from it what is known of it.

@@ -1,0 +1,93 @@
+"""``python -m er3a.formats.xacro_expansion FILE ARGUMENTS``: the URDF that a xacro file makes, on standard output.
+
+Its expressions are Python. xacrodoc keeps builtins from them and refuses names with two underscores, but neither in
+lambdas and comprehensions, nor from ``$(eval ...)``, nor from ``python.vars``; so the rest is refused here. Memory and
+files written are limited by the system, time by the process that calls this one. The last line on standard error says
+why nothing could be made.
+"""
+
+from __future__ import annotations
+
+import ast
+import json
+import re
+import sys
+import xml.etree.ElementTree as ElementTree
+from contextlib import redirect_stdout, suppress
+from pathlib import Path
+from typing import Any
+
+MOST_TEXT = 20_000_000  # letters of a URDF
+MOST_MEMORY = 2_000_000_000  # bytes of addresses; the interpreter and xacrodoc take a tenth
+FOLDERS_UP = 4  # in and beside which packages are looked for
+INNER = re.compile(r"_|(gi|cr|ag|tb)_")  # attributes that lead from a value to the interpreter
+
+
+def main(file: str, arguments: str) -> None:
+    """Expand a file with arguments, a JSON object of texts; exit code 1 if it can't be."""
+    _limit()
+    try:
+        with redirect_stdout(sys.stderr):
+            text = _expanded(Path(file), json.loads(arguments))
+    except Exception as error:  # whatever a macro makes its expander stumble over
+        print("\n" + (" ".join(str(error).split()) or type(error).__name__), file=sys.stderr)
+        sys.exit(1)
+    sys.stdout.buffer.write(text.encode())
+
+
+def _limit() -> None:
+    with suppress(ImportError):  # Windows has no such limits
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
+
+
+def _expanded(path: Path, values: dict[str, str]) -> str:
+    import xacro
+    from xacro import substitution_args
+    from xacrodoc import XacroDoc, packages
+
+    evaluate = xacro.safe_eval
+
+    def checked(expression: str, *names: Any) -> Any:
+        for node in ast.walk(ast.parse(expression.strip(), mode="eval")):
+            name = getattr(node, "attr", None) or getattr(node, "id", "")
+            if INNER.match(name) and (isinstance(node, ast.Attribute) or name.startswith("__")):
+                raise ValueError(f"the name {name} is refused in expressions")
+        return evaluate(expression, *names)
+
+    def refused(expression: str, context: object) -> str:
+        raise ValueError("$(eval) is refused: write ${...}")
+
+    xacro.safe_eval, substitution_args._eval = checked, refused
+    del xacro._global_symbols["python"]["vars"]
+    packages.reset()
+    packages.update_package_cache(_packages_near(path))
+    text: str = XacroDoc.from_file(path, subargs=values, resolve_packages=False).to_urdf_string()
+    if len(text) > MOST_TEXT:
+        raise ValueError(f"the URDF would have more than {MOST_TEXT:,} letters")
+    return text
+
+
+def _packages_near(path: Path) -> dict[str, Path]:
+    """Packages by name: folders above the file, nearest last, and beside those; ``package.xml`` renames one."""
+    found: dict[str, Path] = {}
+    for above in reversed(path.resolve().parents[:FOLDERS_UP]):
+        found |= {folder.name: folder for folder in (*sorted(above.glob("*/")), above)}
+        for manifest in (*sorted(above.glob("*/package.xml")), above / "package.xml"):
+            if manifest.is_file():
+                found[_package_name(manifest)] = manifest.parent
+    return found
+
+
+def _package_name(manifest: Path) -> str:
+    try:
+        name = ElementTree.parse(manifest).findtext("name")
+    except ElementTree.ParseError:
+        name = None
+    return (name or manifest.parent.name).strip()
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
