@@ -130,8 +130,8 @@ def _with_three_slides(links: Reals, sliding: Flags) -> class_solvers.ChainSolve
 def _with_arm_angle(links: Reals, sliding: Flags) -> class_solvers.ChainSolver | None:
     if len(sliding) != 7 or sliding.any():
         return None
-    arm, spare = arm_angle_arm(links), arm_angle_arm(links, frame_along(axes_of(links)[0][0])[0])
-    return None if arm is None or spare is None else class_solvers.ArmAngle(arm, spare)
+    arm = arm_angle_arm(links)
+    return None if arm is None else class_solvers.ArmAngle(arm)
 
 
 def _as_scara(links: Reals, sliding: Flags) -> class_solvers.ChainSolver | None:
