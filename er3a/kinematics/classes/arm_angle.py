@@ -147,9 +147,10 @@ OUT_OF_REACH = 1e-6  # of the squared reach, beyond what a search takes for solv
 class ArmAngleConstants(NamedTuple):
     """The arm with all joints at 0, m and rad.
 
-    ``reference`` is axis 1, ``across`` a direction across it. ``elbow`` has as rows the direction from axis 4 to S, the one across it, and axis 4. ``base`` and ``forearm`` bring
-    the base's and the elbow's coordinates into the frames before axis 1 and axis 5. ``axis_3``, ``beside_3`` are
-    directions after joint 3 in the elbow's coordinates, ``axis_7_in_tool`` and ``beside_7_in_tool`` after joint 7.
+    ``reference`` is axis 1, ``across`` a direction across it. ``elbow`` has as rows the direction from axis 4 to S, the
+    one across it, and axis 4. ``base`` and ``forearm`` bring the base's and the elbow's coordinates into the frames
+    before axis 1 and axis 5. ``axis_3``, ``beside_3`` are directions after joint 3 in the elbow's coordinates,
+    ``axis_7_in_tool`` and ``beside_7_in_tool`` after joint 7.
     """
 
     shoulder: Vector
