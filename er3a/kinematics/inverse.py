@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,10 +82,20 @@ def inverse(
         found = _by_class(robot, T, q_ref, redundancy, self_motion_rows)
     else:
         found = _by_closed_form(robot, T, q_ref)
-    return _at_exit(found, T, q_ref if redundancy is None else None)
+    return _at_exit(robot, found, T, q_ref if redundancy is None else None)
 
 
-def _by_closed_form(robot: Robot, T: Reals, q_ref: Reals) -> solutions.Solutions:
+class _Found(NamedTuple):
+    """Rows (k, n) and their branches (k,), as :class:`er3a.kinematics.solutions.Solutions` has them."""
+
+    q: Reals
+    branch: Integers
+    method: solutions.Method
+    unsolved: tuple[solutions.Unsolved, ...]
+    families: Sequence[Family | SelfMotionCurve] = ()
+
+
+def _by_closed_form(robot: Robot, T: Reals, q_ref: Reals) -> _Found:
     q, fault, gap = (batch[0] for batch in solve_slots(robot, T[None], q_ref[None], keep_folds=True, keep_free=True))
     continua = families(robot, T, q, q_ref)
     q = _free_joints_near(robot, T, q, q_ref, continua)
@@ -99,19 +109,16 @@ def _by_closed_form(robot: Robot, T: Reals, q_ref: Reals) -> solutions.Solutions
         if family.within_limits and max_joint_move(np.concatenate(rows), family.q0).min() > SAME_MEMBER:
             slots.append(family.branches[0])
             rows.append(family.q0[None])
-    q, branch = _stacked(slots, rows, 6)
-    inside = within(robot, q)
-    unsolved = _unsolved(robot, fault, gap)
-    return solutions.Solutions(robot, q, np.ones_like(inside), inside, branch, unsolved=unsolved, families=continua)
+    return _Found(*_stacked(slots, rows, 6), solutions.ClosedForm(), _unsolved(robot, fault, gap), continua)
 
 
-def _at_exit(found: solutions.Solutions, T: Reals, own: Reals | None) -> solutions.Solutions:
+def _at_exit(robot: Robot, found: _Found, T: Reals, own: Reals | None) -> solutions.Solutions:
     """The solutions that forward kinematics confirms; those that turn the tool from the pose come last.
 
     ``own`` (n,) is a reference that joins the rows if it keeps the limits, solves the pose to rounding and is none of
     them: next to two singularities roots are known to 1e-8 rad only, so the arm's own row can lie beyond a limit.
     """
-    robot, q, branch, unsolved = found.robot, found.q, found.branch, found.unsolved
+    q, branch, method, unsolved, motions = found
     rows, failing = confirmed(robot, np.broadcast_to(T, (len(q), 4, 4)), q)
     kept, certain = np.isfinite(rows[:, 0]), not failing.any()
     if len(q) and not kept.any():
@@ -128,16 +135,15 @@ def _at_exit(found: solutions.Solutions, T: Reals, own: Reals | None) -> solutio
             unsolved = tuple(each for each in unsolved if not isinstance(each, solutions.PoseUnsolved))
     freed = None if task_mask(robot).all() else misses(robot, T, q)[2]
     order = np.arange(len(q)) if freed is None else np.argsort(np.where(freed <= CONFIRMS, 0.0, freed), kind="stable")
-    motions = found.families
     if isinstance(motions, tuple):
         motions = tuple(each for each in motions if confirms(robot, T, each.q0))
-    return replace(
-        found,
-        q=q[order],
+    return solutions.Solutions(
+        robot,
+        q[order],
         solved=np.ones(len(q), dtype=bool),
         within_limits=within(robot, q[order]),
         branch=branch[order],
-        method=found.method if certain else solutions.in_doubt(found.method),
+        method=method if certain else solutions.in_doubt(method),
         unsolved=unsolved,
         families=motions,
         freed_turn=None if freed is None else freed[order],
@@ -150,9 +156,7 @@ def _stacked(branches: list[int], rows: list[Reals], joints: int) -> tuple[Reals
     return q, np.repeat(np.array(branches, dtype=int), [len(turns) for turns in rows])
 
 
-def _by_class(
-    robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, self_motion_rows: bool
-) -> solutions.Solutions:
+def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, self_motion_rows: bool) -> _Found:
     solver = by_class.arm_solver(robot).chain
     if isinstance(solver, UnsolvedChain):
         return _by_iteration(robot, T, q_ref)
@@ -194,10 +198,8 @@ def _by_class(
             position, rotation = (float(np.asarray(error)) for error in (near.position_error, near.rotation_error))
             miss = solutions.NearestMiss(position * 1000, float(np.degrees(rotation)))
             unsolved = (solutions.PoseUnsolved(0, solutions.NoSolutionOfClass(miss)),)
-    q, branch = _stacked(branches, rows, robot.joints)
-    inside = within(robot, q)
     method = solutions.ByClass(solver.code, bool(certain), bool(solutions.slot_labels(robot)))
-    return solutions.Solutions(robot, q, np.ones_like(inside), inside, branch, method, unsolved, traced)
+    return _Found(*_stacked(branches, rows, robot.joints), method, unsolved, traced)
 
 
 def is_complete(robot: Robot, certainty: Integers) -> Flags:
@@ -230,13 +232,11 @@ def _near_solved(robot: Robot, T: Reals, q: Reals, q_ref: Reals) -> tuple[list[i
     return [0], [_rows_of_branch(robot, q, q_ref)]
 
 
-def _by_iteration(robot: Robot, T: Reals, q_ref: Reals) -> solutions.Solutions:
+def _by_iteration(robot: Robot, T: Reals, q_ref: Reals) -> _Found:
     arms = all_found(robot, T, starts_of(robot))
-    q, branch = _stacked(list(range(len(arms))), [_rows_of_branch(robot, q, q_ref) for q in arms], robot.joints)
-    inside = within(robot, q)
+    rows = _stacked(list(range(len(arms))), [_rows_of_branch(robot, q, q_ref) for q in arms], robot.joints)
     unsolved = () if len(arms) else solve(robot, T, respect_limits=False).unsolved
-    method = solutions.Iteration(starts_of(robot), missing_class(robot))
-    return solutions.Solutions(robot, q, np.ones_like(inside), inside, branch, method, unsolved)
+    return _Found(*rows, solutions.Iteration(starts_of(robot), missing_class(robot)), unsolved)
 
 
 def starts_of(robot: Robot) -> int:
