@@ -16,6 +16,7 @@ from typing import overload
 import numpy as np
 
 from er3a.errors import ShapeError
+from er3a.geometry.transforms import frame_along, rotation_angle, transposed
 from er3a.geometry.vectors import TURN
 from er3a.kinematics.chain import constant_links, joint_starts, size_of
 from er3a.kinematics.classes.arm_angle import is_out_of_reach
@@ -40,9 +41,10 @@ from er3a.robots.robot import Robot, derived
 from er3a.robots.whole_turns import LIMIT_TOLERANCE, shortest_move, uncoupling, uncoupling_of_linkage
 
 SAME_ROW = 1e-6  # rad or parts of the arm's size
-SOLVES = 1e-9
+CONFIRMS = 1e-9  # m and rad by which a row may miss what is asked: far above the rounding of a closed form
 OWN_SOLVES, MISSED = 1e-12, 1e-4  # m and parts of 1; rad or m from all rows
 MAYBE_SAME = 1e-2  # rad
+IN_LINE = 1e-9  # rad by which an axis that is taken as the tool's z may be askew
 SPREAD = 1e-13
 MAX_CURVES, MAX_ON_SURFACE = 24, 2
 MOVES_BELOW = 3e-8  # smallest singular value above which rows of three parallel axes, known to rounding, can't move
@@ -54,18 +56,23 @@ SCANNED = 16  # values of a redundancy parameter from which self-motions are col
 
 @dataclass(frozen=True, eq=False)
 class ArmSolver:
-    """An arm's chain of m rows as its solver takes it; ``uncouple`` (n, m) undoes the coupling, None where there is
-    none."""
+    """An arm's chain of m rows as its solver takes it.
+
+    ``uncouple`` (n, m) undoes the coupling, None where there is none. ``task_frame`` (4, 4) turns the tool's frame to
+    that of the task, in which z is the axis that five joints leave open, or that a SCARA turns about.
+    """
 
     chain: ChainSolver
     links: Reals
     sliding: Flags
     size: float
+    task_frame: Reals
     uncouple: Reals | None = None
 
     def poses_at(self, T: Reals) -> PoseChain:
         """The chain with one pose (4, 4) and what its class meets of it."""
-        return PoseChain.of(self.links, self.sliding, T, self.size, TRACED.get(self.chain.code, POSE))
+        links = np.concatenate([self.links[:-1], self.links[-1:] @ self.task_frame])
+        return PoseChain.of(links, self.sliding, T @ self.task_frame, self.size, TRACED.get(self.chain.code, POSE))
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,8 +106,14 @@ def arm_solver(robot: Robot) -> ArmSolver:
     if robot.coupling is not None and uncouple is None:
         uncouple = uncoupling_of_linkage(robot)
         chain = Unsolved(robot.joints) if uncouple is None else _linked(robot, chain_solver(links, sliding), uncouple)
-        return ArmSolver(chain, links, sliding, size_of(links), uncouple)
-    return ArmSolver(chain_solver(links, sliding), links, sliding, size_of(links), uncouple)
+        return ArmSolver(chain, links, sliding, size_of(links), np.eye(4), uncouple)
+    last = links[-1, 2, :3]  # the last joint's axis in the tool's frame
+    pointing = last if np.array_equal(robot.tool[:3, :3], np.eye(3)) else np.array([0.0, 0.0, 1.0])
+    chain, frame = chain_solver(links, sliding, pointing), np.eye(4)
+    axis = {"free_roll": pointing, "scara": last}.get(chain.code, frame[2, :3])
+    if np.hypot(axis[0], axis[1]) > IN_LINE:
+        frame[:3, :3] = frame_along(axis).T
+    return ArmSolver(chain, links, sliding, size_of(links), frame, uncouple)
 
 
 def _linked(robot: Robot, chain: ChainSolver, uncouple: Reals) -> ChainSolver:
@@ -178,18 +191,23 @@ def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, values: Reals, cer
             continue
         surface = sum(curve.dimension > 1 for curve in curves)
         if len(curves) >= MAX_CURVES or surface >= MAX_ON_SURFACE:
-            if not chain.moves(x) and chain.error(x) < SOLVES:
+            if not chain.moves(x):
                 alone.append(x)
             continue
         stuck = solver.chain.code == "three_parallel" and chain.smallest(x) > MOVES_BELOW
         curve = None if stuck else chain.curve(x)
         if curve is not None:
             curves.append(curve)
-        elif chain.error(x) < SOLVES:
+        else:
             alone.append(x)
     single = np.array([x for x in alone if not any(chain.holds(curve, x) for curve in curves)])
     single = single.reshape(-1, len(solver.sliding))
-    motions = [each for curve in curves for each in self_motion_of(robot, T, chain, curve, q_ref)]
+    motions = [
+        motion
+        for curve in curves
+        for motion in self_motion_of(robot, T, chain, curve, q_ref)
+        if confirms(robot, T, np.array([motion.q0, motion.max_margin_member])).all()
+    ]
     motions.sort(key=lambda motion: (not motion.within_limits, float(np.linalg.norm(motion.q0 - q_ref))))
     return Settled(to_joints(robot, single), tuple(motions))
 
@@ -436,11 +454,50 @@ def slot_of(robot: Robot, T: Reals, q: Reals) -> int:
 
 @derived
 def task_mask(robot: Robot) -> Reals:
-    """Which of x, y, z and the rotations about x, y, z of the tool's frame the arm's solutions meet, six of 1 or 0.
+    """Which of x, y, z and the rotations about x, y, z of the frame of :func:`with_task_frame` the arm's solutions
+    meet, six of 1 or 0.
 
     All, but for arms with fewer than six joints: five leave the turn about the tool's axis (if they can't do it
-    themselves), a SCARA the tool's tilt, three joints the orientation.
+    themselves), a SCARA the tool's tilt, three joints the orientation. The tool's axis is its z where the robot's tool
+    is turned from the flange, which says where it points; else the direction of the last joint's axis.
     """
     mask = np.array(ARM_CLASSES[arm_solver(robot).chain.code].task, dtype=float)
     mask.setflags(write=False)
     return mask
+
+
+@derived
+def with_task_frame(robot: Robot) -> Robot:
+    """The robot with its tool turned to the frame in which :func:`task_mask` counts; most often itself."""
+    frame = arm_solver(robot).task_frame
+    return robot if np.array_equal(frame, np.eye(4)) else robot.replace(tool=robot.tool @ frame)
+
+
+def misses(robot: Robot, T: Reals, q: Reals) -> tuple[Reals, Reals, Reals]:
+    """By how much rows (..., n) miss poses (..., 4, 4), by forward kinematics; NaN for rows that hold NaN.
+
+    Returns
+    -------
+    position : (...,), m; rotation : (...,), rad, both in what the arm's task asks
+    freed : (...,), rad, the tool's turn from the pose in what the task leaves open; 0 where it leaves nothing
+    """
+    back = forward(robot, q)
+    position = np.linalg.norm(back[..., :3, 3] - T[..., :3, 3], axis=-1)
+    rotation, asked = (
+        rotation_angle(back[..., :3, :3], T[..., :3, :3]),
+        tuple(task_mask(robot)[3:].astype(int).tolist()),
+    )
+    if all(asked):
+        return position, rotation, np.zeros_like(rotation)
+    F = arm_solver(robot).task_frame[:3, :3]
+    R, freed = F.T @ transposed(T[..., :3, :3]) @ back[..., :3, :3] @ F, rotation
+    if asked == (1, 1, 0):
+        return position, np.arctan2(np.hypot(R[..., 0, 2], R[..., 1, 2]), R[..., 2, 2]), freed
+    about_z = np.arctan2(R[..., 1, 0] - R[..., 0, 1], R[..., 0, 0] + R[..., 1, 1])
+    return position, np.abs(about_z) * asked[2], freed
+
+
+def confirms(robot: Robot, T: Reals, q: Reals) -> Flags:
+    """Whether forward kinematics confirms rows (..., n) of poses (..., 4, 4) to ``CONFIRMS``; False for NaN."""
+    position, rotation, _ = misses(robot, T, q)
+    return np.asarray((position <= CONFIRMS) & (rotation <= CONFIRMS))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +12,12 @@ from er3a.errors import PoseError, ShapeError
 from er3a.geometry.transforms import check_poses
 from er3a.geometry.vectors import max_joint_move, wrap_to_pi
 from er3a.kinematics import by_class, solutions
+from er3a.kinematics.by_class import CONFIRMS, confirms, misses, task_mask
 from er3a.kinematics.classes.chain_solvers import Unsolved as UnsolvedChain
 from er3a.kinematics.classes.class_solvers import ARM_CLASSES, LinkedRows
 from er3a.kinematics.classes.six_revolute import CERTAIN
 from er3a.kinematics.closed_form import FREE, OFF_AXIS, ORIENTATION, REACHED, TOO_FAR
+from er3a.kinematics.confirmed import confirmed
 from er3a.kinematics.families import Family, families
 from er3a.kinematics.forward import checked_joints, forward
 from er3a.kinematics.numerical import all_found, nearest_arm, solve
@@ -51,7 +54,10 @@ def inverse(
     with a spherical wrist also the one half a turn further, for the branch that meets there. Arms with more than six
     joints have rows at the given value of their redundancy parameter. Their self-motions (``families``) are traced when
     they are first read, which takes about 0.3 s. Arms with fewer than six joints meet the part of the pose that
-    :func:`er3a.kinematics.by_class.task_mask` returns.
+    :func:`er3a.kinematics.by_class.task_mask` returns; rows that meet all of it come first (``freed_turn``).
+
+    Forward kinematics confirms each row to 1e-9 m and rad. Where a row of the class had to be improved or dropped for
+    it, the solutions are not certain to be all.
 
     Parameters
     ----------
@@ -73,7 +79,23 @@ def inverse(
         raise ShapeError("T", T.shape, "(4, 4)")
     q_ref = checked_reference(robot, q_ref)
     if wrist_partition_missing(robot) or robot.coupling is not None:
-        return _by_class(robot, T, q_ref, redundancy, self_motion_rows)
+        found = _by_class(robot, T, q_ref, redundancy, self_motion_rows)
+    else:
+        found = _by_closed_form(robot, T, q_ref)
+    return _at_exit(robot, found, T, q_ref if redundancy is None else None)
+
+
+class _Found(NamedTuple):
+    """Rows (k, n) and their branches (k,), as :class:`er3a.kinematics.solutions.Solutions` has them."""
+
+    q: Reals
+    branch: Integers
+    method: solutions.Method
+    unsolved: tuple[solutions.Unsolved, ...]
+    families: Sequence[Family | SelfMotionCurve] = ()
+
+
+def _by_closed_form(robot: Robot, T: Reals, q_ref: Reals) -> _Found:
     q, fault, gap = (batch[0] for batch in solve_slots(robot, T[None], q_ref[None], keep_folds=True, keep_free=True))
     continua = families(robot, T, q, q_ref)
     q = _free_joints_near(robot, T, q, q_ref, continua)
@@ -87,28 +109,45 @@ def inverse(
         if family.within_limits and max_joint_move(np.concatenate(rows), family.q0).min() > SAME_MEMBER:
             slots.append(family.branches[0])
             rows.append(family.q0[None])
-    _with_own(robot, T, q_ref, q, slots, rows)
-    q, branch = _stacked(slots, rows, 6)
-    inside = within(robot, q)
-    unsolved = _unsolved(robot, fault, gap)
-    return solutions.Solutions(robot, q, np.ones_like(inside), inside, branch, unsolved=unsolved, families=continua)
+    return _Found(*_stacked(slots, rows, 6), solutions.ClosedForm(), _unsolved(robot, fault, gap), continua)
 
 
-def _with_own(robot: Robot, T: Reals, q_ref: Reals, q: Reals, slots: list[int], rows: list[Reals]) -> None:
-    """Add the reference to the rows if it solves the pose to rounding and is none of them.
+def _at_exit(robot: Robot, found: _Found, T: Reals, own: Reals | None) -> solutions.Solutions:
+    """The solutions that forward kinematics confirms; those that turn the tool from the pose come last.
 
-    Next to two singularities roots are known to 1e-8 rad only, so the arm's own row can lie beyond a limit that its
-    joints keep.
+    ``own`` (n,) is a reference that joins the rows if it keeps the limits, solves the pose to rounding and is none of
+    them: next to two singularities roots are known to 1e-8 rad only, so the arm's own row can lie beyond a limit.
     """
-    if not slots or not within(robot, q_ref) or np.abs(forward(robot, q_ref) - T).max() > SOLVES:
-        return
-    listed = np.concatenate(rows)
-    near = max_joint_move(listed, q_ref)
-    if (within(robot, listed) & (near < SAME_MEMBER)).any():
-        return
-    away = np.abs(wrap_to_pi(q - q_ref)).max(axis=1)
-    slots.append(int(np.nanargmin(away)))
-    rows.append(q_ref[None])
+    q, branch, method, unsolved, motions = found
+    rows, failing = confirmed(robot, np.broadcast_to(T, (len(q), 4, 4)), q)
+    kept, certain = np.isfinite(rows[:, 0]), not failing.any()
+    if len(q) and not kept.any():
+        position, rotation, _ = misses(robot, T, q)
+        nearest = solutions.NearestMiss(float(position.min() * 1000), float(np.degrees(rotation.min())))
+        unsolved = (solutions.PoseUnsolved(0, solutions.NoSolutionOfClass(nearest)),)
+    q, branch = rows[kept], branch[kept]
+    if own is not None and within(robot, own) and np.abs(forward(robot, own) - T).max() <= SOLVES:
+        away = max_joint_move(q, own)
+        if away[within(robot, q)].min(initial=np.inf) > SAME_MEMBER:
+            certain = certain and bool(away.min(initial=np.inf) <= MISSED)
+            branch = np.append(branch, branch[away.argmin()] if len(q) else 0)
+            q = np.concatenate([q, own[None]])
+            unsolved = tuple(each for each in unsolved if not isinstance(each, solutions.PoseUnsolved))
+    freed = None if task_mask(robot).all() else misses(robot, T, q)[2]
+    order = np.arange(len(q)) if freed is None else np.argsort(np.where(freed <= CONFIRMS, 0.0, freed), kind="stable")
+    if isinstance(motions, tuple):
+        motions = tuple(each for each in motions if confirms(robot, T, each.q0))
+    return solutions.Solutions(
+        robot,
+        q[order],
+        solved=np.ones(len(q), dtype=bool),
+        within_limits=within(robot, q[order]),
+        branch=branch[order],
+        method=method if certain else solutions.in_doubt(method),
+        unsolved=unsolved,
+        families=motions,
+        freed_turn=None if freed is None else freed[order],
+    )
 
 
 def _stacked(branches: list[int], rows: list[Reals], joints: int) -> tuple[Reals, Integers]:
@@ -117,9 +156,7 @@ def _stacked(branches: list[int], rows: list[Reals], joints: int) -> tuple[Reals
     return q, np.repeat(np.array(branches, dtype=int), [len(turns) for turns in rows])
 
 
-def _by_class(
-    robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, self_motion_rows: bool
-) -> solutions.Solutions:
+def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, self_motion_rows: bool) -> _Found:
     solver = by_class.arm_solver(robot).chain
     if isinstance(solver, UnsolvedChain):
         return _by_iteration(robot, T, q_ref)
@@ -148,12 +185,6 @@ def _by_class(
             if max_joint_move(np.concatenate([np.empty((0, robot.joints)), *rows]), row).min(initial=np.inf) > MISSED:
                 branches.append(by_class.slot_of(robot, T, row))
                 rows.append(_rows_of_branch(robot, row, q_ref))
-    if redundancy is None and within(robot, q_ref) and np.abs(forward(robot, q_ref) - T).max() <= SOLVES:
-        listed = np.concatenate([np.empty((0, robot.joints)), *rows])
-        if max_joint_move(listed, q_ref).min(initial=np.inf) > MISSED:  # a double root that rounding takes off the axis
-            branches.append(by_class.slot_of(robot, T, q_ref))
-            rows.append(q_ref[None])
-            certain = False
     unsolved: tuple[solutions.Unsolved, ...] = ()
     if not branches:
         open_pose = bool(solver.parameters)
@@ -167,10 +198,8 @@ def _by_class(
             position, rotation = (float(np.asarray(error)) for error in (near.position_error, near.rotation_error))
             miss = solutions.NearestMiss(position * 1000, float(np.degrees(rotation)))
             unsolved = (solutions.PoseUnsolved(0, solutions.NoSolutionOfClass(miss)),)
-    q, branch = _stacked(branches, rows, robot.joints)
-    inside = within(robot, q)
     method = solutions.ByClass(solver.code, bool(certain), bool(solutions.slot_labels(robot)))
-    return solutions.Solutions(robot, q, np.ones_like(inside), inside, branch, method, unsolved, traced)
+    return _Found(*_stacked(branches, rows, robot.joints), method, unsolved, traced)
 
 
 def is_complete(robot: Robot, certainty: Integers) -> Flags:
@@ -183,11 +212,12 @@ def is_complete(robot: Robot, certainty: Integers) -> Flags:
 def missed_row(robot: Robot, T: Reals, q_ref: Reals) -> solutions.Solutions:
     """What a search from the reference (n,) finds at a pose that the arm's class has no row for, within the limits if
     it can."""
-    open_pose = bool(by_class.parameters_of(robot))
-    near = nearest_arm(robot, T, q_ref, by_class.task_mask(robot), open_pose)
+    open_pose, mask = bool(by_class.parameters_of(robot)), task_mask(robot)
+    robot, T = by_class.with_task_frame(robot), T @ by_class.arm_solver(robot).task_frame
+    near = nearest_arm(robot, T, q_ref, mask, open_pose)
     if open_pose or not near.solved or within(robot, near.q):
         return near
-    inside = nearest_arm(robot, T, q_ref, by_class.task_mask(robot), True)
+    inside = nearest_arm(robot, T, q_ref, mask, True)
     return inside if inside.solved else near
 
 
@@ -202,16 +232,11 @@ def _near_solved(robot: Robot, T: Reals, q: Reals, q_ref: Reals) -> tuple[list[i
     return [0], [_rows_of_branch(robot, q, q_ref)]
 
 
-def _by_iteration(robot: Robot, T: Reals, q_ref: Reals) -> solutions.Solutions:
+def _by_iteration(robot: Robot, T: Reals, q_ref: Reals) -> _Found:
     arms = all_found(robot, T, starts_of(robot))
-    solves = np.abs(forward(robot, q_ref) - T).max() <= SOLVES
-    if solves and not (len(arms) and max_joint_move(np.asarray(arms), q_ref).min() < SAME_MEMBER):
-        arms = np.concatenate([np.reshape(arms, (-1, robot.joints)), q_ref[None]])  # random starts miss singular arms
-    q, branch = _stacked(list(range(len(arms))), [_rows_of_branch(robot, q, q_ref) for q in arms], robot.joints)
-    inside = within(robot, q)
+    rows = _stacked(list(range(len(arms))), [_rows_of_branch(robot, q, q_ref) for q in arms], robot.joints)
     unsolved = () if len(arms) else solve(robot, T, respect_limits=False).unsolved
-    method = solutions.Iteration(starts_of(robot), missing_class(robot))
-    return solutions.Solutions(robot, q, np.ones_like(inside), inside, branch, method, unsolved)
+    return _Found(*rows, solutions.Iteration(starts_of(robot), missing_class(robot)), unsolved)
 
 
 def starts_of(robot: Robot) -> int:

@@ -568,6 +568,11 @@ def nearest_arm(robot: Robot, T: Reals, q0: Reals, mask: Reals, respect_limits: 
     return search.solutions(np.ascontiguousarray(T), q0, respect_limits, MISS_RESTARTS, threads=1, explained=False)
 
 
+def polished(robot: Robot, T: Reals, q: Reals, mask: Reals) -> Reals:
+    """Joint values (k, n) to which the iteration, blind to limits, leads from those given (k, n) at poses (k, 4, 4)."""
+    return _Search(robot, mask, np.full(2, 1e-12), seed=0).run(T, q, False, 0, 1)[0]
+
+
 def all_found(robot: Robot, T: Reals, starts: int) -> Reals:
     """Different joint solutions (k, n), angles in (-pi, pi], found from that many random starts for one pose (4, 4).
 

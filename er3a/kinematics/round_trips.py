@@ -13,7 +13,7 @@ import numpy as np
 from er3a.geometry.transforms import rotation_angle
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.batch import inverse_batch
-from er3a.kinematics.by_class import arm_solver, parameters_of, task_mask
+from er3a.kinematics.by_class import arm_solver, misses, parameters_of
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import NearSingular
 from er3a.kinematics.wrist_partitioned import solve_slots
@@ -81,19 +81,15 @@ def batch_round_trips(robot: Robot, random: np.random.Generator, poses: int) -> 
     T = forward(robot, own)
     solved = inverse_batch(robot, T, own if parameters_of(robot) else None)
     q, valid = solved.q, solved.solved
-    back = forward(robot, q[valid])
-    asked = np.repeat(T, valid.sum(axis=1), axis=0)
+    position, orientation, _ = misses(robot, np.repeat(T, valid.sum(axis=1), axis=0), q[valid])
     away = q - own[:, None]
     difference = np.abs(shortest_move(robot, away)).max(axis=2)
     difference = np.where(valid, difference, np.inf).min(axis=1)
-    turned = rotation_angle(back[:, :3, :3], asked[:, :3, :3])
-    if not task_mask(robot).all():  # the arm's task leaves orientation open
-        turned = np.zeros(1)
     return BatchRoundTrips(
         poses=poses,
         solutions=int(valid.sum()),
-        worst_position=float(np.linalg.norm(back[:, :3, 3] - asked[:, :3, 3], axis=1).max(initial=0.0)),
-        worst_orientation=float(turned.max(initial=0.0)),
+        worst_position=float(position.max(initial=0.0)),
+        worst_orientation=float(orientation.max(initial=0.0)),
         own_found=int((difference < SAME_JOINTS_RAD).sum()),
         worst_own=float(difference.max()),
         counts_within_limits=np.bincount(solved.within_limits.sum(axis=1), minlength=q.shape[1] + 1),

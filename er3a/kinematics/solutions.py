@@ -131,6 +131,13 @@ class ByClass(Finding):
 Method = ClosedForm | ByClass | Iteration
 
 
+def in_doubt(method: Method) -> Method:
+    """The method, no longer certain that its solutions are all."""
+    if isinstance(method, ClosedForm):
+        return ByClass(method.arm_class, certain=False, named=True)
+    return replace(method, certain=False) if isinstance(method, ByClass) else method
+
+
 class WristTiltsTooLittle(Finding):
     """The wrist would have to tilt further than it can."""
 
@@ -242,6 +249,8 @@ class Solutions(ByValue, Displayed):
     position_error, rotation_error : (...,), m and rad, of the degrees of freedom in the ``mask`` of ``solve``
     starts : (...,) int, starts that ``solve`` used; 0 where none succeeded
     certain : of ``inverse_batch`` for other classes (N,): whether the solver left no doubt that these are all
+    freed_turn : (...,), rad, of arms whose joints can't meet all of a pose (``task_mask``): by how much the tool is
+        turned from the pose in what is left open, 0 where all of it is met; None for other arms
     """
 
     robot: Robot
@@ -257,6 +266,7 @@ class Solutions(ByValue, Displayed):
     rotation_error: Reals | None = None
     starts: Integers | None = None
     certain: Flags | None = None
+    freed_turn: Reals | None = None
 
     @cached_property
     def turn(self) -> Integers:
@@ -284,7 +294,7 @@ class Solutions(ByValue, Displayed):
 
     def take(self, rows: NDArray[Any]) -> Solutions:
         """Some of the solutions of one pose."""
-        names = "q", "solved", "within_limits", "branch"
+        names = "q", "solved", "within_limits", "branch", *(("freed_turn",) if self.freed_turn is not None else ())
         return replace(self, **{name: getattr(self, name)[rows] for name in names})
 
     def without_turns(self) -> Solutions:
@@ -304,15 +314,20 @@ class Solutions(ByValue, Displayed):
         return f"{np.count_nonzero(self.solved)} solutions, {np.count_nonzero(self.within_limits)} within the limits"
 
     def _sheet_of_pose(self) -> Sheet:
+        turned = () if self.freed_turn is None else (np.degrees(self.freed_turn),)
         rows = (
-            (row, label, *angles, bool(inside), why)
-            for row, label, angles, inside, why in zip(
-                range(len(self.q)), self.label, shown(self.robot, self.q), self.within_limits, self.reason
+            (row, label, *more, bool(inside), why)
+            for row, label, more, inside, why in zip(
+                range(len(self.q)),
+                self.label,
+                np.column_stack([shown(self.robot, self.q), *turned]),
+                self.within_limits,
+                self.reason,
             )
         )
         return Sheet.of_table(
             f"Solutions of one pose of {self.robot.name}: {self._counted()} ({self.method.code})",
-            ("row", "branch", *joint_columns(self.robot), "within", "reason"),
+            ("row", "branch", *joint_columns(self.robot), *("turned_deg" for _ in turned), "within", "reason"),
             rows,
             len(self.q),
             facts=(

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from er3a.geometry.vectors import fibonacci_sphere
-from er3a.kinematics.by_class import arm_solver
+from er3a.kinematics.by_class import arm_solver, with_task_frame
 from er3a.kinematics.chain import axes_at_zero_theta
 from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
@@ -156,7 +156,7 @@ def asked_of(robot: Robot, rolls: int) -> AskedOrientations | None:
     if code == "scara":
         return AskedOrientations("turns", none, tool, axes[int(np.flatnonzero(~robot.sliding)[0])])
     if code == "free_roll":
-        return AskedOrientations("directions", none, tool, axis)
+        return AskedOrientations("directions", none, tool, axis) if with_task_frame(robot) is robot else None
     if robot.rows != robot.joints:  # a linkage decides the tool's orientation
         return None
     if code == "planar_wrist":

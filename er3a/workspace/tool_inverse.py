@@ -20,6 +20,7 @@ from er3a.kinematics.by_class import (
     parameters_of,
     slots_of_class,
     task_mask,
+    with_task_frame,
 )
 from er3a.kinematics.classes.chain_solvers import LockedJoint, Unsolved
 from er3a.kinematics.classes.class_solvers import ARM_CLASSES, ChainSolver, PaddedChain
@@ -166,7 +167,7 @@ def generic_manipulability(robot: Robot, q: Reals, chosen: Flags) -> Reals:
     J, found = jacobian(robot, q[chosen]), np.zeros(chosen.shape)
     mask = task_mask(robot) > 0
     if not mask.all() and arm_solver(robot).chain.code != "scara":  # of a SCARA the other rows are 0
-        R = forward(robot, q[chosen])[:, :3, :3]
+        R = forward(with_task_frame(robot), q[chosen])[:, :3, :3]
         J = np.concatenate([J[:, :3], R.swapaxes(-1, -2) @ J[:, 3:]], axis=1)[:, mask]
     gram = J @ J.swapaxes(-1, -2) if J.shape[-2] <= J.shape[-1] else J.swapaxes(-1, -2) @ J
     size = np.abs(np.linalg.det(J)) if J.shape[-2] == J.shape[-1] else np.sqrt(np.maximum(0.0, np.linalg.det(gram)))

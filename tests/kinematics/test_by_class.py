@@ -19,6 +19,7 @@ from er3a.kinematics.numerical import solve
 from er3a.kinematics.self_motions import to_rows
 from er3a.kinematics.singularity import dependent_axes, rank_losses, scaled_jacobian
 from er3a.robots.robot import CombinedLimit, Robot
+from testing.arms import placement
 
 pytestmark = pytest.mark.long  # kernels that take half a minute to compile
 
@@ -33,6 +34,7 @@ SCARA = ([0.325, 0.225, 0, 0], [0, np.pi, 0, 0], [0.4, 0, 0.1, 0.05])
 VERTICAL = ([0, 0.3, 0.25, 0, 0], [H, 0, 0, H, 0], [0.3, 0, 0, 0, 0.1])
 COUPLED = np.eye(6)
 COUPLED[2, 1] = 1.0
+TURNED = placement([0, 0, 0], [0, 0, 0.3])  # a tool that says where it points
 
 
 def arm(rows, sliding=None, most=3.0, **more):
@@ -52,7 +54,7 @@ ARMS = {
     "redundant": (arm(PANDA), 16),
     "scara": (arm(SCARA, [0, 0, 1, 0]), 2),
     "planar_wrist": (arm(VERTICAL), 8),
-    "free_roll": (arm(tuple(column[:5] for column in UR5)), 8),
+    "free_roll": (arm(tuple(column[:5] for column in UR5), tool=TURNED), 8),
     "position": (arm(([0, 0.3, 0.25], [H, 0, 0], [0.3, 0, 0])), 8),
 }
 
@@ -465,7 +467,7 @@ def missed_task(code, T, asked):
 @pytest.mark.parametrize("name", OPEN_TASKS)
 def test_where_orientation_is_open_joints_that_can_move_on_the_target_are_a_family(name, random):
     rows, sliding, own, moving = OPEN_TASKS[name]
-    robot, own = arm(rows, sliding, most=3.2), np.array(own)
+    robot, own = arm(rows, sliding, most=3.2, tool=TURNED), np.array(own)
     code, T = inverse(robot, forward(robot, own)).method.arm_class, forward(robot, own)
     for reference in (own, np.zeros(len(own)), random.uniform(robot.lower, robot.upper)):
         found = inverse(robot, T, reference)
@@ -520,7 +522,7 @@ def test_three_joints_bring_the_point_there_in_every_way_whatever_its_orientatio
 def test_a_part_of_a_closed_curve_runs_to_the_limit_on_either_side():
     """A limit takes a little of the curve, next to the reference: the rest is more than half of it, to one side."""
     rows, _, own, _ = OPEN_TASKS["roll of a UR's flange"]
-    robot = arm(rows, most=9.0)
+    robot = arm(rows, most=9.0, tool=TURNED)
     T, cut = forward(robot, np.array(own)), 0
     for whole in inverse(robot, T, np.array(own)).families:
         members = whole.members(np.linspace(*whole.range, 800))

@@ -199,7 +199,7 @@ PACKAGED = {
     "talos_data/robots/talos_left_arm.urdf": "general_six",
     "panda_description/urdf/panda.urdf": "redundant",
     "xarm_description/urdf/xarm7.urdf": "redundant",
-    "so_arm_description/urdf/so100.urdf": "free_roll",
+    "so_arm_description/urdf/so100.urdf": "planar_wrist",
     "xacro/lynxmotion_al5d_description/urdf/al5d_robot.urdf": "planar_wrist",
     "finger_edu_description/robots/finger_edu.urdf": "position",
 }

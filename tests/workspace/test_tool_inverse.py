@@ -32,6 +32,7 @@ from testing.arms import (
     made_of,
     make_arm,
     palletiser,
+    placement,
     pose_errors,
     scara,
 )
@@ -60,7 +61,8 @@ def gantry_with_wrist() -> Robot:
 def free_roll() -> Robot:
     """Five joints that can point the tool, but not choose the turn about it."""
     rows = [("R", 50, 90, 300, -170, 170), ("R", 350, 0, 0, -10, 170), ("R", 300, 0, 0, -150, 150)]
-    return made_of([*rows, ("R", 0, 90, 0, -150, 150), ("R", 60, 90, 90, -180, 180)])
+    turned = placement([0, 0, 0], [0, 0, 0.3])  # the tool says where it points: not along axis 5
+    return made_of([*rows, ("R", 0, 90, 0, -150, 150), ("R", 60, 90, 90, -180, 180)], tool=turned)
 
 
 def coupled() -> Robot:

@@ -1,9 +1,11 @@
 """Seven revolute joints whose first three axes meet in S and last three in W, at a given arm angle: eight solutions.
 
 The distance of S and W gives joint 4 by two roots. The arm then turns as a whole about the line S W; the arm angle
-tells by how much: it is the angle about that line from the plane with a reference direction (axis 1 unless given) to
-the elbow, the direction ``+-(axis 4 x S W)``, + where joint 4 is bent in the positive sense [1]_. Shoulder and wrist
-are three joints through a point each, with two roots. The slot is ``4 elbow + 2 shoulder + wrist``.
+tells by how much: it is the angle about that line from the plane with a reference direction to the elbow, the direction
+``+-(axis 4 x S W)``, + where joint 4 is bent in the positive sense [1]_. The reference is axis 1, or a direction across
+it where S W lies along axis 1 to ``ALONG``. Where S and W are one point (equal upper arm and forearm, folded) the line
+has any direction, and is taken across axis 1. Shoulder and wrist are three joints through a point each, with two roots.
+The slot is ``4 elbow + 2 shoulder + wrist``.
 
 Three revolute joints through one point: their angles from a rotation, by two roots.
 
@@ -137,20 +139,24 @@ SLOTS = 8
 BLOCK = 64
 MEETS_M = 1e-9
 NEAR = 1e-9
+ALONG = 1e-6  # sine of the angle between S W and axis 1, below which rounding would move the arm angle by 1e-10 rad
+ONE_POINT = 1e-15  # parts of the reach: nearer S and W are known to be one point only
 OUT_OF_REACH = 1e-6  # of the squared reach, beyond what a search takes for solved
 
 
 class ArmAngleConstants(NamedTuple):
     """The arm with all joints at 0, m and rad.
 
-    ``elbow`` has as rows the direction from axis 4 to S, the one across it, and axis 4. ``base`` and ``forearm`` bring
-    the base's and the elbow's coordinates into the frames before axis 1 and axis 5. ``axis_3``, ``beside_3`` are
-    directions after joint 3 in the elbow's coordinates, ``axis_7_in_tool`` and ``beside_7_in_tool`` after joint 7.
+    ``reference`` is axis 1, ``across`` a direction across it. ``elbow`` has as rows the direction from axis 4 to S, the
+    one across it, and axis 4. ``base`` and ``forearm`` bring the base's and the elbow's coordinates into the frames
+    before axis 1 and axis 5. ``axis_3``, ``beside_3`` are directions after joint 3 in the elbow's coordinates,
+    ``axis_7_in_tool`` and ``beside_7_in_tool`` after joint 7.
     """
 
     shoulder: Vector
     wrist_in_tool: Vector
     reference: Vector
+    across: Vector
     elbow: Rows
     base: Rows
     forearm: Rows
@@ -174,11 +180,8 @@ class ArmAngleArm:
     constants: ArmAngleConstants
 
 
-def arm_angle_arm(links: Reals, reference: Reals | None = None) -> ArmAngleArm | None:
-    """The solver for links (8, 4, 4), or None if the chain is of another kind. Axes meet to 1e-9 m.
-
-    ``reference`` (3,) is the direction that the arm angle is taken from, in the base frame; None means axis 1.
-    """
+def arm_angle_arm(links: Reals) -> ArmAngleArm | None:
+    """The solver for links (8, 4, 4), or None if the chain is of another kind. Axes meet to 1e-9 m."""
     axes, points = axes_of(links)
     (S, shoulder_miss), (W, wrist_miss) = meeting_point(axes[:3], points[:3]), meeting_point(axes[4:], points[4:])
     if not max(shoulder_miss, wrist_miss) < MEETS_M:
@@ -198,11 +201,11 @@ def arm_angle_arm(links: Reals, reference: Reals | None = None) -> ArmAngleArm |
     first, G = spherical_constants(axes[:3], base)
     forearm = frame_along(axes[4])
     last, H = spherical_constants(axes[4:], forearm)
-    reference = axes[0] if reference is None else np.asarray(reference, float)
     constants = ArmAngleConstants(
         shoulder=vector_of(S),
         wrist_in_tool=vector_of(T[:3, :3].T @ (W - T[:3, 3])),
-        reference=vector_of(reference / np.linalg.norm(reference)),
+        reference=vector_of(axes[0]),
+        across=vector_of(base[0]),
         elbow=rows_of_vectors(elbow),
         base=rows_of_vectors(base),
         forearm=rows_of_vectors(forearm @ elbow.T),
@@ -226,8 +229,8 @@ def solve_at_arm_angle(arm: ArmAngleArm, T: Reals, psi: Reals | float) -> tuple[
     Returns
     -------
     q : (N, 8, 7), rad, in (-pi, pi]; NaN where a slot has none
-    singular : (N,), where S W lies along the reference (no arm angle is defined: another reference is needed), a wrist
-        or shoulder is within 1e-9 of a singularity, or the arm within 1e-9 m of stretched or folded
+    singular : (N,), where a wrist or shoulder is within 1e-9 of a singularity, or the arm within 1e-9 m of stretched or
+        folded
     """
     T = np.ascontiguousarray(T, dtype=float)
     angles = np.ascontiguousarray(np.broadcast_to(np.asarray(psi, float), (len(T),)))
@@ -255,10 +258,14 @@ def arm_angles_of(arm: ArmAngleArm, q: Reals) -> Reals:
     R3 = front[:, :3, :3] @ zero[:3, :3].T
     T = poses_of(arm.links, flat)
     n = T[:, :3, 3] + T[:, :3, :3] @ np.array(k.wrist_in_tool) - np.array(k.shoulder)
+    distance, across = np.linalg.norm(n, axis=1)[:, None], np.array(k.across)
+    n = np.where(distance > ONE_POINT * (k.upper_arm + k.lower_arm), n, across)
     n /= np.linalg.norm(n, axis=1)[:, None]
     bend = np.sin(flat[:, 3] + k.zero_4)
     e = np.cross(R3 @ np.array(k.elbow[2]), n) * np.where(bend < 0, -1.0, 1.0)[:, None]
-    r = np.array(k.reference) - (n @ np.array(k.reference))[:, None] * n
+    along = np.linalg.norm(np.cross(n, k.reference), axis=1)[:, None] < ALONG
+    r = np.where(along, across, np.array(k.reference))
+    r = r - np.einsum("ni,ni->n", n, r)[:, None] * n
     psi = np.arctan2(np.einsum("ni,ni->n", n, np.cross(r, e)), np.einsum("ni,ni->n", r, e))
     return np.asarray(psi.reshape(q.shape[:-1]))
 
@@ -300,20 +307,27 @@ def solve_arm_angle_blocks(k: ArmAngleConstants, T: Reals, psi: Reals, q: Reals,
 def _turned_about_line(k: ArmAngleConstants, T: Reals, psi: Reals, start: int, size: int, w: Reals) -> None:
     """Rows 0-8 of ``w``: n, e and n x e in the frame before axis 1; 9-14 axis 7 and the vector beside it along those;
     37 the distance of S and W, 38 whether the pose is singular."""
+    t, u, across = k.wrist_in_tool, k.shoulder, k.across
+    shortest = ONE_POINT * (k.upper_arm + k.lower_arm)
     for i in range(BLOCK):
         m = start + min(i, size - 1)
-        t, u = k.wrist_in_tool, k.shoulder
         vx = T[m, 0, 0] * t[0] + T[m, 0, 1] * t[1] + T[m, 0, 2] * t[2] + T[m, 0, 3] - u[0]
         vy = T[m, 1, 0] * t[0] + T[m, 1, 1] * t[1] + T[m, 1, 2] * t[2] + T[m, 1, 3] - u[1]
         vz = T[m, 2, 0] * t[0] + T[m, 2, 1] * t[1] + T[m, 2, 2] * t[2] + T[m, 2, 3] - u[2]
         distance = np.sqrt(vx * vx + vy * vy + vz * vz)
-        per = 1.0 / distance
+        one_point = distance < shortest
+        per = 1.0 / (1.0 if one_point else distance)
         nx, ny, nz = vx * per, vy * per, vz * per
+        nx, ny, nz = across[0] if one_point else nx, across[1] if one_point else ny, across[2] if one_point else nz
         r = k.reference
-        # e = cos r + sin n x r with r made perpendicular; n x r needs no projection
         ax, ay, az = ny * r[2] - nz * r[1], nz * r[0] - nx * r[2], nx * r[1] - ny * r[0]
-        length = np.sqrt(ax * ax + ay * ay + az * az)
-        per = 1.0 / length
+        along = ax * ax + ay * ay + az * az < ALONG * ALONG
+        rx, ry, rz = across[0] if along else r[0], across[1] if along else r[1], across[2] if along else r[2]
+        # e = cos r + sin n x r with r made perpendicular; n x r once more, because a short one is not across n
+        ax, ay, az = ny * rz - nz * ry, nz * rx - nx * rz, nx * ry - ny * rx
+        over = ax * nx + ay * ny + az * nz
+        ax, ay, az = ax - over * nx, ay - over * ny, az - over * nz
+        per = 1.0 / np.sqrt(ax * ax + ay * ay + az * az)
         ax, ay, az = ax * per, ay * per, az * per
         bx, by, bz = ay * nz - az * ny, az * nx - ax * nz, ax * ny - ay * nx
         c, s = cos_sin(psi[m])
@@ -334,7 +348,7 @@ def _turned_about_line(k: ArmAngleConstants, T: Reals, psi: Reals, start: int, s
         w[10 * BLOCK + i], w[13 * BLOCK + i] = ex * zx + ey * zy + ez * zz, ex * xx + ey * xy + ez * xz
         w[11 * BLOCK + i], w[14 * BLOCK + i] = fx * zx + fy * zy + fz * zz, fx * xx + fy * xy + fz * xz
         w[37 * BLOCK + i] = distance
-        w[38 * BLOCK + i] = 1.0 if (length < NEAR) | (distance < NEAR) else 0.0
+        w[38 * BLOCK + i] = 1.0 if distance < NEAR else 0.0
 
 
 @inner_kernel
@@ -353,16 +367,21 @@ def _elbow(k: ArmAngleConstants, w: Reals, sign: float) -> None:
         far, near = max(far, 0.0), max(near, 0.0)
         root_far, root_near = np.sqrt(far), np.sqrt(near)
         bend = 2.0 * sign * arctan2(root_near, root_far)
-        per = 1.0 / (far + near)
-        c, s = (far - near) * per, 2.0 * sign * root_far * root_near * per
         theta = bend - k.zero_4
         theta -= TURN * np.ceil(theta * (1.0 / TURN) - 0.5)
         w[36 * BLOCK + i] = theta if valid else np.nan
-        per = 1.0 / distance
-        x, y, h = (k.lower_arm * c - k.upper_arm) * per, k.lower_arm * s * per, k.height * per
+        # S W in the elbow's coordinates, by its own length: far and near add up to 4 upper arm forearm
+        per = 1.0 / (far + near)
+        x = (k.lower_arm - k.upper_arm) - 2.0 * k.lower_arm * near * per
+        y, h = 2.0 * sign * k.lower_arm * root_far * root_near * per, k.height
+        length = np.sqrt(x * x + y * y + h * h)
+        one_point = length < ONE_POINT * reach
+        per = 1.0 / (1.0 if one_point else length)
+        x, y, h = x * per, sign if one_point else y * per, h * per
         length = np.sqrt(x * x + y * y)
-        per = sign / length
-        ex, ey = -y * per, x * per
+        beside = length < ONE_POINT  # axis 4 along S W
+        per = sign / (1.0 if beside else length)
+        ex, ey = -sign if beside else -y * per, x * per
         fx, fy, fz = -h * ey, h * ex, x * ey - y * ex
         for vector in range(2):
             v0, v1, v2 = k.axis_3 if vector == 0 else k.beside_3

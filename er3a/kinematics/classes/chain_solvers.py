@@ -91,9 +91,12 @@ class Unsolved(class_solvers.WithoutParameters):
         return np.full((len(T), self.slots, self.joints), np.nan), np.full(len(T), CONTINUUM)
 
 
-def chain_solver(links: Reals, sliding: Flags) -> class_solvers.ChainSolver:
+def chain_solver(links: Reals, sliding: Flags, pointing: Reals | None = None) -> class_solvers.ChainSolver:
     """The solver of a chain with constant links (n + 1, 4, 4), m, whose joints are prismatic where ``sliding`` (n,)
-    says so."""
+    says so.
+
+    ``pointing`` (3,), in the tool's frame, is the axis about which five joints leave the tool's turn open; None: its z.
+    """
     links, sliding = np.ascontiguousarray(links, dtype=float), np.asarray(sliding, dtype=bool)
     for recognised_as in CLOSED_FORMS:
         if (solver := recognised_as(links, sliding)) is not None:
@@ -101,7 +104,9 @@ def chain_solver(links: Reals, sliding: Flags) -> class_solvers.ChainSolver:
     n = len(sliding)
     if n == 6:
         return _by_elimination(links, sliding)
-    return _locked(links, sliding) if n > 6 else _completed(links, sliding)
+    if n > 6:
+        return _locked(links, sliding)
+    return _completed(links, sliding, np.array([0.0, 0.0, 1.0]) if pointing is None else pointing)
 
 
 def _with_spherical_wrist(links: Reals, sliding: Flags) -> class_solvers.ChainSolver | None:
@@ -130,8 +135,8 @@ def _with_three_slides(links: Reals, sliding: Flags) -> class_solvers.ChainSolve
 def _with_arm_angle(links: Reals, sliding: Flags) -> class_solvers.ChainSolver | None:
     if len(sliding) != 7 or sliding.any():
         return None
-    arm, spare = arm_angle_arm(links), arm_angle_arm(links, frame_along(axes_of(links)[0][0])[0])
-    return None if arm is None or spare is None else class_solvers.ArmAngle(arm, spare)
+    arm = arm_angle_arm(links)
+    return None if arm is None else class_solvers.ArmAngle(arm)
 
 
 def _as_scara(links: Reals, sliding: Flags) -> class_solvers.ChainSolver | None:
@@ -233,13 +238,13 @@ def _locked(links: Reals, sliding: Flags) -> class_solvers.ChainSolver:
     return LockedJoint(links, sliding, joint, rest if at_end else None, "redundant", rest.slots, parameters)
 
 
-def _completed(links: Reals, sliding: Flags) -> class_solvers.ChainSolver:
+def _completed(links: Reals, sliding: Flags, pointing: Reals) -> class_solvers.ChainSolver:
     """The chain with joints at the tool, or before its last joint, that make it a chain of six."""
     n = len(sliding)
     if not full_rank(links, sliding):
         return Unsolved(n, "dependent")
     best: tuple[int, class_solvers.ChainSolver] | None = None
-    for code, places, candidate in _completions(links, n):
+    for code, places, candidate in _completions(links, n, pointing):
         more = np.zeros(6, dtype=bool)
         more[[j for j in range(6) if j not in places]] = sliding
         # where the added joints must be 0, not only where they would turn the tool elsewhere
@@ -256,13 +261,17 @@ def _completed(links: Reals, sliding: Flags) -> class_solvers.ChainSolver:
     return Unsolved(n) if best is None else best[1]
 
 
-def _completions(links: Reals, n: int) -> list[tuple[class_solvers.ArmClassCode, tuple[int, ...], Reals]]:
+def _completions(
+    links: Reals, n: int, pointing: Reals
+) -> list[tuple[class_solvers.ArmClassCode, tuple[int, ...], Reals]]:
     """Code, places of the added joints, and links (7, 4, 4) with them; the last is made for any chain."""
     eye = np.eye(4)
     axes, _ = axes_of(links)
     found: list[tuple[class_solvers.ArmClassCode, tuple[int, ...], Reals]] = []
     if n == 5:
-        found.append(("free_roll", (5,), np.concatenate([links, eye[None]])))
+        turn = eye.copy()
+        turn[:3, :3] = frame_along(pointing).T
+        found.append(("free_roll", (5,), np.concatenate([links[:-1], [links[-1] @ turn, turn.T]])))
         across = np.cross(axes[3], axes[4])
         if np.linalg.norm(across) > 1e-6:
             found.append(("planar_wrist", (4,), _with_joint_between(links, 4, across)))

@@ -257,23 +257,16 @@ class ArmAngle:
     """Seven joints with a spherical shoulder and wrist."""
 
     arm: ArmAngleArm
-    spare: ArmAngleArm  # with another reference
     code: ArmClassCode = "arm_angle"
     slots: int = 8
     parameters: tuple[Redundancy, ...] = (Redundancy(-1, "arm_angle"),)
 
     def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
         q, singular = solve_at_arm_angle(self.arm, T, values[:, 0])
-        lost = np.flatnonzero(singular & np.isnan(q).all(axis=(1, 2)))
-        if lost.size:  # shoulder and wrist may be in line with the reference
-            q[lost] = solve_at_arm_angle(self.spare, T[lost], np.nan_to_num(values[lost, 0]))[0]
         return q, np.where(singular, CONTINUUM, CERTAIN)
 
     def values_of(self, x: Reals) -> Reals:
-        angles = arm_angles_of(self.arm, x)
-        if np.isnan(angles).any():
-            angles = np.where(np.isnan(angles), arm_angles_of(self.spare, x), angles)
-        return angles[..., None]
+        return arm_angles_of(self.arm, x)[..., None]
 
     def seeds(self, T: Reals) -> list[Reals]:
         return []

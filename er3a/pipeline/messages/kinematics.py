@@ -63,7 +63,9 @@ ARM_CLASSES = {
     "arm_angle": N_("spherical shoulder and wrist: up to 8 solutions in closed form at each arm angle"),
     "redundant": N_("more than six joints: solutions at given values of the redundant ones, and self-motions"),
     "scara": N_("SCARA: two solutions for x, y, z and yaw in closed form"),
-    "free_roll": N_("five joints: solutions for the tool point and the tool's axis; the roll about it is free"),
+    "free_roll": N_(
+        "five joints: the roll about the tool's axis is free (z of a tool turned from the flange, else axis 5)"
+    ),
     "planar_wrist": N_("fewer than six joints: solutions of poses that they can reach exactly"),
     "position": N_("three joints: solutions for the tool point"),
     "dependent": N_("joints that move the tool in fewer ways than there are joints: by iteration"),

@@ -14,15 +14,14 @@ from er3a.collision.pairs import PairOverlaps
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import shapes_assumed
 from er3a.files.target_file import load_targets
-from er3a.geometry.transforms import rotation_angle, rpy_of, transform
+from er3a.geometry.transforms import rpy_of, transform
 from er3a.kinematics.batch import inverse_batch
-from er3a.kinematics.by_class import arm_solver, task_mask
+from er3a.kinematics.by_class import arm_solver, misses
 from er3a.kinematics.chain import axes_at_zero_theta
 from er3a.kinematics.classes.chain_solvers import Unsolved
 from er3a.kinematics.closed_form import ORIENTATION
 from er3a.kinematics.cuspidal import cuspidal_move
 from er3a.kinematics.families import Family
-from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.neighbours import Usable, neighbours
 from er3a.kinematics.round_trips import MAX_BY_CLASS, SAME_JOINTS_RAD, BatchRoundTrips, batch_round_trips
@@ -140,8 +139,8 @@ def collides(rows: model.SolutionRows) -> Flags:
 def _rows(
     robot: Robot, target: Target, solutions: Solutions, choice: Choice, refused: tuple[Refusal | None, ...]
 ) -> model.SolutionRows:
-    q, T, count = solutions.q, target.T, len(solutions.q)
-    back = forward(robot, q)
+    q, count = solutions.q, len(solutions.q)
+    position, orientation, freed = misses(robot, target.T, q)
     rank = np.zeros(count, dtype=int)
     rank[choice.order] = np.arange(1, len(choice.order) + 1)
     return model.SolutionRows.of(
@@ -151,25 +150,15 @@ def _rows(
         refusal=refused,
         rank=rank,
         first_of_branch=_first_of_branch(solutions.branch, rank),
-        position_residual=np.linalg.norm(back[:, :3, 3] - T[:3, 3], axis=1),
-        orientation_residual=_missed_orientation(robot, back[:, :3, :3], T[:3, :3]),
+        position_residual=position,
+        orientation_residual=orientation,
+        freed_turn=freed,
         manipulability=conditioning(robot, q, characteristic_length(robot)).manipulability,
         singular=_singular(robot, solutions),
         limit_margin=limit_margin(robot, q),
         greatest_move=choice.max_joint_move,
         distance=choice.distance,
     )
-
-
-def _missed_orientation(robot: Robot, R: Reals, asked: Reals) -> Reals:
-    """By how much (n,), rad, rotations R (n, 3, 3) miss the one asked for, in what the arm's task asks of it."""
-    mask = task_mask(robot)[3:]
-    if mask.all():
-        return rotation_angle(R, np.tile(asked, (len(R), 1, 1)))
-    if not len(R):
-        return np.zeros(0)
-    missed = scipy.spatial.transform.Rotation.from_matrix(asked.T @ R).as_rotvec()
-    return np.asarray(np.linalg.norm(mask * missed, axis=1), dtype=float)
 
 
 def _singular(robot: Robot, solutions: Solutions) -> Flags:

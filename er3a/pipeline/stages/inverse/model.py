@@ -316,6 +316,7 @@ class SolutionRows(Table):
     first_of_branch: Flags = column("whether it is the branch's best")
     position_residual_mm: Reals = column("by how much forward kinematics misses the target")
     orientation_residual_deg: Reals = column("by how much forward kinematics misses the target")
+    freed_turn_deg: Reals = column("the tool's turn from the target in what fewer than six joints leave open; else 0")
     manipulability: Reals = column("of the Jacobian with lengths divided by the wrist's reach")
     singular: Flags = vector(
         "singular_{}",

@@ -646,6 +646,8 @@ def _outcome(branches: model.SolutionRows, k: int, place: int, turns: int) -> st
     taken = tr("chosen") if branches.rank[k] == 1 else tr("place {place}", place=place)
     if turns > 1:
         taken = tr("{taken}, {turns} turns", taken=taken, turns=turns)
+    if (freed := float(branches.freed_turn_deg[k])) > SAME:
+        taken = tr("{taken}; tool turned by {angle}", taken=taken, angle=with_unit(fixed(freed, 1), "deg"))
     kinds = [kind for kind, on in zip(model.SINGULAR_PARTS, branches.singular[k]) if on]
     if not kinds:
         return taken
