@@ -27,7 +27,7 @@ from er3a.planning.profiles import Rates, check_times
 from er3a.planning.sequences import POWERS, Curve, joining
 
 FIT = 3.0  # times the mean rates beside a point, and the part of them, that the rate at the point may be
-NOISE = 0.01  # of the largest mean rate of a trajectory: measured or rounded rates differ by so much
+NOISE = 0.1  # of the largest mean rate of a trajectory: by so much samples of accelerations that step miss their means
 SAME_RATE = 1e-6  # of the largest rate: steps that rounding makes
 
 
