@@ -26,7 +26,7 @@ from er3a.files.csv_file import CsvColumn, Lines, check_widths, read_csv, read_l
 from er3a.files.robot_file import SHORTEST_PLAIN_LENGTH_MM, RobotFile, far_normals
 from er3a.files.units import MAX_DEG, look_like_radians
 from er3a.files.yaml_file import parse
-from er3a.numerics.si_units import RADIANS_BELOW_DEG
+from er3a.numerics.si_units import RADIANS_BELOW_DEG, limit_in_degrees
 from er3a.robots.robot import CONVENTIONS, MAX_JOINTS, Convention, Grade
 
 _NUMBER, _OF_KIND = CsvColumn(float), CsvColumn(float, optional=True)
@@ -96,7 +96,11 @@ def read_dh_table(
     converted = {column: scale for column, name in names.items() if (scale := _usual_unit(name)[1]) is not None}
     rows = [{_usual_unit(column)[0]: value for column, value in row.items()} for row in rows]
     for row in rows:
-        row |= {column: row[column] * scale for column, scale in converted.items() if row[column] is not None}
+        row |= {
+            column: _converted(column, row[column], scale)
+            for column, scale in converted.items()
+            if row[column] is not None
+        }
     convention = printed.convention or convention
     notes = [*printed.notes, *_in_own_units(path, rows, length_unit, angle_unit, as_printed, {*converted})]
     lengths = [(abs(row[key]), row, key) for row in rows for key in ("a_mm", "d_mm") if row[key]]
@@ -195,12 +199,20 @@ def _in_own_units(
     for row in rows:
         for column, value in row.items():
             if column not in own and isinstance(value, float):
-                row[column] = value * (DEGREES["rad"] if column in turned else _scale_of(column, unit))
+                scale = DEGREES["rad"] if column in turned else _scale_of(column, unit)
+                row[column] = _converted(column, value, scale)
     for row in twice:
         alpha, once = row["alpha_deg"], math.radians(row["alpha_deg"])
         row["alpha_deg"] = once
         problem = f"{alpha:g} deg is more than ten turns: read as {once:.6g} deg that were converted twice"
         yield f"row {row['row']}, column alpha_deg: {problem}"
+
+
+def _converted(column: str, value: float, scale: float) -> float:
+    """A value in mm or degrees; one in radians as :func:`er3a.numerics.si_units.limit_in_degrees` if it is a limit."""
+    if scale == DEGREES["rad"] and column in ("lower_deg", "upper_deg"):
+        return limit_in_degrees(value, 1 if column == "lower_deg" else -1)
+    return value * scale
 
 
 def _scale_of(column: str, length_unit: LengthUnit) -> float:

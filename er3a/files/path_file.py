@@ -50,6 +50,7 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.planning import commands
 from er3a.planning.names import PathVerdict
 from er3a.planning.profiles import Times
+from er3a.planning.stated_rates import StatedRates
 from er3a.robots.joint_limits import joint_columns
 from er3a.robots.robot import MAX_JOINTS, Robot
 
@@ -60,8 +61,8 @@ SAME_POINT = 1e-9  # m or rad
 MAX_RAD = 10 * 2 * math.pi
 TRAJECTORIES = (".yaml", ".yml", ".json")  # endings of joint trajectories of ROS and MoveIt
 UR_JOINTS = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
-UNREAD = ("velocities", "accelerations", "effort")
-IN_POINT = frozenset(("positions", "time_from_start", *UNREAD))
+RATES = ("velocities", "accelerations")
+IN_POINT = frozenset(("positions", "time_from_start", *RATES, "effort"))
 IN_TRAJECTORY = frozenset(("header", "joint_names", "points"))
 IN_ROBOT_TRAJECTORY = frozenset(("joint_trajectory", "multi_dof_joint_trajectory"))
 
@@ -78,7 +79,7 @@ class PathTable:
     joints : (n, joints), rad or m; None for a table of the tool
     sliding : for a table of joints, which of them are in mm; None if the units are not stated, as in ROS
     repeated : (n,) bool, whether a row repeats the point before
-    unread : other values at the points of a ROS trajectory, which are not used
+    rates : what a ROS trajectory states at its points beside joints and times; None for other tables
     """
 
     file: Path
@@ -88,7 +89,7 @@ class PathTable:
     joints: Reals | None
     repeated: Flags
     sliding: tuple[bool, ...] | None = ()
-    unread: tuple[str, ...] = ()
+    rates: StatedRates | None = None
 
 
 def read_path_table(path: str | Path) -> PathTable:
@@ -102,9 +103,10 @@ def read_path_table(path: str | Path) -> PathTable:
     """
     path = given_file(Path(path))
     if path.suffix in TRAJECTORIES:
-        at, values, unread = _ros_trajectory(path)
-        repeated = _repeated(path, np.abs(np.diff(values, axis=0)).max(axis=1))
-        return PathTable(path, np.arange(1, len(values) + 1), at, None, values, repeated, None, unread)
+        at, values, rates = _ros_trajectory(path)
+        _repeated(path, np.abs(np.diff(values, axis=0)).max(axis=1))
+        kept = np.zeros(len(values), bool)
+        return PathTable(path, np.arange(1, len(values) + 1), at, None, values, kept, None, rates)
     header = set(read_header(path))
     of_pose = {*POSITION, *(name for columns in FORMS.values() for name in columns)}
     beside = header & of_pose if is_own(path) else set()  # where the joints put the tool
@@ -163,8 +165,8 @@ def is_ros_trajectory(path: Path) -> bool:
     return "kind" not in content and not content.keys().isdisjoint({"joint_trajectory", "joint_names", "points"})
 
 
-def _ros_trajectory(path: Path) -> tuple[Reals, Reals, tuple[str, ...]]:
-    """Times (n,) in s, joint values (n, joints) in rad or m, and what is not taken, of a joint trajectory of ROS."""
+def _ros_trajectory(path: Path) -> tuple[Reals, Reals, StatedRates]:
+    """Times (n,) in s, joint values (n, joints) in rad or m, and their rates, of a joint trajectory of ROS."""
     content = read_yaml(path)
     body = content.get("joint_trajectory", content)
     names, points = (body.get("joint_names"), body.get("points")) if isinstance(body, dict) else (None, None)
@@ -181,19 +183,31 @@ def _ros_trajectory(path: Path) -> tuple[Reals, Reals, tuple[str, ...]]:
         _only(path, "", content, IN_ROBOT_TRAJECTORY)
     _only(path, "" if body is content else "joint_trajectory.", body, IN_TRAJECTORY)
     order = _joint_order(path, [str(name) for name in names])
-    times, joints = np.empty(len(points)), np.empty((len(points), len(names)))
+    times, (joints, velocities, accelerations) = np.empty(len(points)), np.full((3, len(points), len(names)), np.nan)
     for k, point in enumerate(points):
-        values = point.get("positions") if isinstance(point, dict) else None
-        if not isinstance(values, list) or len(values) != len(names) or not all(map(_is_number, values)):
-            raise InputError(path, f"points[{k}].positions", f"not {len(names)} numbers", "Give one for each joint")
-        _only(path, f"points[{k}].", point, IN_POINT)
-        joints[k], times[k] = values, _seconds(path, k, point.get("time_from_start"))
+        given = point if isinstance(point, dict) else {}
+        joints[k] = _joint_numbers(path, f"points[{k}].positions", given.get("positions"), len(names))
+        for rates, key in zip((velocities, accelerations), RATES):
+            if given.get(key):
+                rates[k] = _joint_numbers(path, f"points[{k}].{key}", given[key], len(names))
+        if given.get("accelerations") and not given.get("velocities"):
+            problem = "accelerations without velocities, between which no controller interpolates"
+            raise InputError(path, f"points[{k}].accelerations", problem, "Give velocities too, or leave them out")
+        _only(path, f"points[{k}].", given, IN_POINT)
+        times[k] = _seconds(path, k, given.get("time_from_start"))
     _check_times(path, [f"points[{k}].time_from_start" for k in range(len(points))], times)
     if np.abs(joints).max() > MAX_RAD:
         k = int(np.abs(joints).max(axis=1).argmax())
         problem = f"{np.abs(joints[k]).max():g} rad are more than ten turns"
         raise InputError(path, f"points[{k}].positions", problem, "Write radians, or metres for a prismatic joint")
-    return times, joints[:, order], tuple(name for name in UNREAD if any(point.get(name) for point in points))
+    return times, joints[:, order], StatedRates(velocities[:, order], accelerations[:, order])
+
+
+def _joint_numbers(path: Path, where: str, values: object, count: int) -> list[float]:
+    """One number for each joint, or :class:`InputError`."""
+    if not isinstance(values, list) or len(values) != count or not all(map(_is_number, values)):
+        raise InputError(path, where, f"not {count} numbers", "Give one for each joint")
+    return values
 
 
 def _only(path: Path, where: str, given: dict[str, Any], known: frozenset[str]) -> None:
@@ -601,6 +615,8 @@ class TablePath(NamedPath):
             raise source.error("duration_s", "the table's t_s gives it too", "Remove one of the two")
         if table.joints is not None and self.blend_mm is not None:
             raise source.error("blend_mm", "the table holds joint angles", "Write blend_deg")
+        if table.rates is not None and self.blend_deg is not None:
+            raise source.error("blend_deg", "a trajectory of ROS goes through its points", "Remove it")
         if table.joints is None and self.blend_deg is not None:
             raise source.error("blend_deg", "the table holds poses", "Write blend_mm")
         return table
@@ -626,7 +642,7 @@ class TablePath(NamedPath):
                 columns = ", ".join(joint_columns(robot))
                 raise source.error("file", f"its joints are not those of {robot.name}", f"Give the columns {columns}")
             blend = None if self.blend_deg is None else float(self.blend_deg * np.radians(1.0))
-            return commands.JointTableCommand(table.joints[kept], timing, blend, repeated, table.unread, source=source)
+            return commands.JointTableCommand(table.joints[kept], timing, blend, repeated, table.rates, source=source)
         assert table.poses is not None
         return commands.ToolTableCommand(
             table.poses[kept],

@@ -43,6 +43,7 @@ from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import forward, frames
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.quasi_random import quasi_random_points
+from er3a.numerics.si_units import decimals
 from er3a.robots.robot import MAX_JOINTS, ConvexPiece, Envelope, Robot, Source, Visual, robot_name
 
 PARALLEL = 1e-12
@@ -200,7 +201,7 @@ NO_SLIDE_M, MAX_SLID_M = 1.0, 100.0
 LOOKED_AT, TURNED_ALONE = 12, 75.0  # poses, deg
 STEP_RAD = math.pi / 12
 MIN_DECIMALS = 4  # of lengths in m: a file that prints fewer left zeros out
-MANY_TURNS, MAX_TURNED = 4 * math.pi + 0.01, 20 * math.pi
+MANY_TURNS = 4 * math.pi + 0.01
 FOLLOWS = 1e-6  # rad or m
 DRAWN_TRIANGLES = 4000  # of an arm: what a page paints at each step of a motion
 FASTEST = 100.0  # rad/s or m/s; what URDFs give above stands for a speed that no one knows
@@ -406,20 +407,15 @@ def _rounding(root: ElementTree.Element, chain: urdf_tree.UrdfChain) -> tuple[fl
         origin for joint in root.findall("joint") if joint.get("name") in names for origin in joint.iter("origin")
     ]
     lengths, angles = ([word for origin in origins for word in origin.get(key, "").split()] for key in ("xyz", "rpy"))
-    digits = max((_decimals(word) for word in lengths if float(word)), default=MIN_DECIMALS)
-    most = max((_decimals(word) for word in angles if float(word)), default=MIN_DECIMALS)
+    digits = max((decimals(word) for word in lengths if float(word)), default=MIN_DECIMALS)
+    most = max((decimals(word) for word in angles if float(word)), default=MIN_DECIMALS)
     total = 0.0
     for word in angles:
-        value, own = abs(float(word)), 0.5 * 10.0 ** -_decimals(word)
+        value, own = abs(float(word)), 0.5 * 10.0 ** -decimals(word)
         lacks = abs(value - round(value / STEP_RAD) * STEP_RAD)
         total += 0.0 if not value else lacks if lacks <= own else 0.5 * 10.0**-most
     counted = sum(any(float(word) for word in origin.get("xyz", "").split()) for origin in origins)
     return counted * 0.5 * 10.0 ** -max(digits, MIN_DECIMALS), total
-
-
-def _decimals(word: str) -> int:
-    mantissa, _, exponent = word.lower().partition("e")
-    return len(mantissa.partition(".")[2]) - int(exponent or 0)
 
 
 def _robot_of_chain(
@@ -631,7 +627,7 @@ def _limits(sources: list[urdf_tree.UrdfJoint]) -> tuple[Reals, list[str], list[
     for joint in sources:
         lower, upper = joint.lower, joint.upper
         if joint.type == "continuous":
-            notes.append(f"joint {joint.name} is continuous: it has no limits, and one turn is sampled")
+            notes.append(f"joint {joint.name} is continuous: one turn is sampled")
             lower, upper = -math.pi, math.pi
         elif lower == upper == 0 or (math.isnan(lower) and math.isnan(upper)):
             has = "no limits" if math.isnan(lower) else "the limits 0 and 0"
@@ -640,7 +636,7 @@ def _limits(sources: list[urdf_tree.UrdfJoint]) -> tuple[Reals, list[str], list[
             notes.append(f"joint {joint.name} has {has}: +-{shown} were assumed")
             assumed.append(joint.name)
             lower, upper = -half, half
-        elif joint.type == "revolute" and max(abs(lower), abs(upper)) > MAX_TURNED:
+        elif joint.type == "revolute" and max(abs(lower), abs(upper)) > urdf_tree.MAX_TURNED:
             notes.append(f"joint {joint.name} has limits beyond ten turns (in radians): +-180 deg were assumed")
             assumed.append(joint.name)
             lower, upper = -NO_RANGE, NO_RANGE

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import json
 import math
+import posixpath
 import re
 import subprocess
 import sys
@@ -43,6 +44,7 @@ from er3a.formats.mesh_file import read_link_mesh, read_link_vertices, read_text
 from er3a.geometry.transforms import rpy_of, transform, translation
 from er3a.kinematics.forward import frames
 from er3a.numerics.arrays import Integers, Reals
+from er3a.numerics.si_units import limit_in_degrees
 from er3a.robots.masses import Drives, LinkMass, MassBody, Masses, NoBody, moved, nearest_body, no_body, together
 from er3a.robots.robot import ConvexPiece, Envelope, Robot
 
@@ -60,6 +62,7 @@ EXPAND = "Expand it first: xacro FILE > arm.urdf"
 DEFINITIONS = ("property", "arg")  # of xacro
 PREFIXED = re.compile(r"(</?[\w.-]+):([\w.-]+)")
 WHOLE_TURN = 2 * math.pi + SNAP_RAD
+MAX_TURNED = 20 * math.pi
 FAR_APART_M, MAX_APART_M = 5.0, 100.0
 
 
@@ -396,16 +399,23 @@ def _joint(path: Path, element: ElementTree.Element, snap: bool) -> UrdfJoint:
         raise InputError(path, where, "the axis has no length", 'Write for example <axis xyz="0 0 1"/>')
     direction = direction / (longest or 1.0)  # so that no square overflows
     lower, upper, speed = math.nan, math.nan, math.nan
-    if kind in ("revolute", "prismatic") and limit is not None:
+    if kind in MOVING and limit is not None:
         lower, upper = (_numbers(path, where, limit, key, (math.nan,))[0] for key in ("lower", "upper"))
-        if math.isnan(lower) != math.isnan(upper):  # the specification's default
+        if kind != "continuous" and math.isnan(lower) != math.isnan(upper):  # the specification's default
             missing = "lower" if math.isnan(lower) else "upper"
             notes.append(f"{where} has no {missing} limit: 0 was taken")
             lower, upper = np.nan_to_num([lower, upper]).tolist()
         if lower > upper:
             notes.append(f"{where} has its lower limit {lower:g} above the upper {upper:g}: they were swapped")
             lower, upper = upper, lower
-    lower, upper = _within_soft_limits(path, element, (lower, upper), notes)
+    if kind == "continuous":
+        kind = "revolute" if -MAX_TURNED <= lower < upper <= MAX_TURNED else kind
+        if lower < upper:
+            taken = "they are kept" if kind == "revolute" else "beyond ten turns they are none"
+            notes.append(f"{where} is continuous with limits {lower:g} to {upper:g}: {taken}")
+    lower, upper = _within_soft_limits(path, element, kind, (lower, upper), notes)
+    if kind == "revolute":
+        lower, upper = math.radians(limit_in_degrees(lower, 1)), math.radians(limit_in_degrees(upper, -1))
     if kind in MOVING and limit is not None and (limit.get("velocity") or "inf") != "inf":
         speed = _numbers(path, where, limit, "velocity", (0.0,))[0] or math.nan
         if speed < 0:
@@ -425,16 +435,16 @@ def _joint(path: Path, element: ElementTree.Element, snap: bool) -> UrdfJoint:
 
 
 def _within_soft_limits(
-    path: Path, joint: ElementTree.Element, limits: tuple[float, float], notes: list[str]
+    path: Path, joint: ElementTree.Element, kind: str, limits: tuple[float, float], notes: list[str]
 ) -> tuple[float, float]:
     """Limits of a joint, NaN where it has none, held within those of its safety controller, as MoveIt plans."""
     soft, where = joint.find("safety_controller"), f"joint {joint.get('name', '?')}"
     keys = ("soft_lower_limit", "soft_upper_limit")
-    if soft is None or not any(key in soft.attrib for key in keys) or joint.get("type") not in MOVING:
+    if soft is None or not any(key in soft.attrib for key in keys) or kind not in MOVING:
         return limits
     least, most = (_numbers(path, where, soft, key, (0.0,))[0] for key in keys)
     said = f"{where} has soft limits {least:g} to {most:g} (safety_controller)"
-    if joint.get("type") == "continuous":
+    if kind == "continuous":
         notes.append(f"{said}, but is continuous: they are not kept")
         return limits
     none_given = limits == (0, 0)
@@ -886,11 +896,22 @@ def _quality(mesh: str, found: ConvexPieces) -> str:
 
 def mesh_of(path: Path, name: str) -> Path | None:
     """The mesh's file that a URDF names, beside it or in a package above it; None if there is none."""
-    package, _, rest = name.removeprefix("package://").partition("/")
-    places = [path.parent / name.removeprefix("file://")]
-    if name.startswith("package://"):
-        places = [place for parent in path.resolve().parents for place in (parent / package / rest, parent / rest)]
+    places = _in_package(path, name) if name.startswith("package://") else [path.parent / name.removeprefix("file://")]
     return next((place for place in places if place.is_file()), None)
+
+
+def _in_package(path: Path, name: str) -> Iterator[Path]:
+    """Where the file of a package may be: in a folder of its name above the URDF or beside such a folder, in the one
+    whose ``package.xml`` has that name, or in a folder above that was given another; nowhere out of the package."""
+    package, _, rest = name.removeprefix("package://").partition("/")
+    rest = posixpath.normpath(rest.lstrip("/"))
+    if ".." in (package, rest.partition("/")[0]):
+        return
+    above = path.resolve().parents
+    yield from (folder / package / rest for folder in above)
+    if package in (near := _packages_near(path)):
+        yield near[package] / rest
+    yield from (folder / rest for folder in above[:FOLDERS_UP])
 
 
 COMMENT = re.compile("<!--.*?-->", re.DOTALL)

@@ -10,7 +10,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 
@@ -39,6 +39,7 @@ _NAME = re.compile(rf"(.+?)_({'|'.join(sorted(TEXTS, key=len, reverse=True))})")
 
 RADIANS_BELOW_DEG = 6.3
 STEP_IN_RADIANS, NEAR_STEP = math.pi / 12, 2e-3  # 15 deg, written with four digits
+ROUND_DEG, ROUNDED_BY = (0.1, 1.0), 0.05  # half a last digit is at most so much of the distance of round numbers
 NEAR_QUARTER = 2e-3  # rad, of a quarter of a turn written with three digits
 
 KindT = TypeVar("KindT")
@@ -56,6 +57,26 @@ def is_part_of_pi(value: float) -> bool:
     steps, quarters = value / STEP_IN_RADIANS, value / (math.pi / 2)
     near_step = round(steps) and abs(steps - round(steps)) < NEAR_STEP
     return bool(near_step or (round(quarters) and abs(quarters - round(quarters)) * math.pi / 2 < NEAR_QUARTER))
+
+
+def decimals(word: str) -> int:
+    """How many decimals a number is written with."""
+    mantissa, _, exponent = word.lower().partition("e")
+    return len(mantissa.partition(".")[2]) - int(exponent or 0)
+
+
+def limit_in_degrees(limit: float, inward: Literal[1, -1]) -> float:
+    """A joint limit, rad, in degrees: as the file has it, or the round number of degrees of which it is a rounding, if
+    that lies ``inward`` of it. So 3.1416 is an upper limit (-1) of 180 deg, not of 180.0004.
+
+    Round are tenths of a degree or, of limits with three decimals, degrees: by chance few limits come so near to one.
+    """
+    degrees, half = math.degrees(limit), math.degrees(0.5 * 10.0 ** -decimals(repr(float(limit))))
+    grid = next((grid for grid in ROUND_DEG if half <= ROUNDED_BY * grid), None)
+    if grid is None or not math.isfinite(limit):
+        return degrees
+    whole = round(round(degrees / grid) * grid, 1)
+    return whole if abs(whole - degrees) <= half and (whole - degrees) * inward > 0 else degrees
 
 
 def split_unit(name: str) -> tuple[str, str]:

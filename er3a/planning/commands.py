@@ -20,6 +20,7 @@ from er3a.numerics.arrays import Reals
 from er3a.planning.moves import JointMove, Segment, ToolPath, line, rotation_between
 from er3a.planning.profiles import Ends, LegTimes, Times
 from er3a.planning.sequences import TURN_LENGTH, JointSequence, arc, joint_sequence, segment_path
+from er3a.planning.stated_rates import StatedMotion, StatedRates, stated_motion
 from er3a.planning.way_around import PlannedMove
 from er3a.robots.robot import Robot
 
@@ -135,14 +136,14 @@ class JointTableCommand(_Command):
     timing : s in all, or when the points are passed
     blend : rad, over which corners are rounded at most; None for half of the shorter side
     repeated_rows : lines of the table that repeat the point before
-    unread : what else the file gives at the points, which the motion does not follow
+    rates : what the points state beside their times, for a motion through them all; None to round corners
     """
 
     points: Reals
     timing: float | Times
     blend: float | None = None
     repeated_rows: tuple[int, ...] = ()
-    unread: tuple[str, ...] = ()
+    rates: StatedRates | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,17 +191,15 @@ class Built:
     q_start : (6,), rad, joints at the start, where they are given
     start_slot : closed-form branch (0..7) to begin on, where one is named
     repeated_rows : lines of the table that repeat the point before
-    unread : what else the table's file gives at its points, which the motion does not follow
     unasked : whether corners are rounded as nobody asked for: over half of the shorter side
     turns_open : numbers of segments that turn the tool by half a turn, and nobody said which way
     """
 
-    joints: JointMove | JointSequence | PlannedMove | None = None
+    joints: JointMove | JointSequence | StatedMotion | PlannedMove | None = None
     tool: ToolPath | None = None
     q_start: Reals | None = None
     start_slot: int | None = None
     repeated_rows: tuple[int, ...] = ()
-    unread: tuple[str, ...] = ()
     unasked: bool = False
     turns_open: tuple[int, ...] = ()
 
@@ -233,11 +232,11 @@ def build(robot: Robot, command: Command, ends: Mapping[str, Reals]) -> Built:
         case ToolMoveCommand() | ToolSequenceCommand():
             return _tool(robot, command, ends)
         case JointTableCommand():
+            if command.rates is not None and isinstance(command.timing, Times):
+                return Built(joints=stated_motion(command.timing.times, command.points, command.rates))
             sizes = np.abs(np.diff(command.points, axis=0)).max(axis=1)
             joints = joint_sequence(command.points, _blends(sizes, command.blend), command.timing)
-            return Built(
-                joints=joints, repeated_rows=command.repeated_rows, unread=command.unread, unasked=command.blend is None
-            )
+            return Built(joints=joints, repeated_rows=command.repeated_rows, unasked=command.blend is None)
         case ToolTableCommand():
             return _tool_table(robot, command)
         case PlanCommand():

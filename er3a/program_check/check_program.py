@@ -328,7 +328,7 @@ def _located(execution: Execution, robot: Robot, checker: StepChecker, end: int)
         what = step.instruction
         if isinstance(what, Unknown):
             unknown = found_in.MayMove(what.text) if what.may_move else NotUnderstood(what.text, step.place)
-            found.append(LocatedFinding("caution", unknown, step.place, step.calls))
+            found.append(LocatedFinding("fail" if what.stops else "caution", unknown, step.place, step.calls))
         elif isinstance(what, MovesBeside) and what.kind != "entered":
             sets = ", ".join(what.sets)
             beside = found_in.MovesBesideProgram(what.routine, "sets" if sets else what.kind, sets)

@@ -607,6 +607,7 @@ class ProgramMemory:
     def _sizes(self, name: str) -> tuple[int, ...]:
         """The last index in each dimension of a declared list of KRL; none where that is not known."""
         found = (self.local if name in self.local else self.shared).get(name + SIZES)
+        found = self.functions.constant(self, name + SIZES) if found is None else found
         return tuple(each for each in found if isinstance(each, int)) if isinstance(found, tuple) else ()
 
     def settled(self, target: syntax.Expression) -> syntax.Expression:

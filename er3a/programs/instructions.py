@@ -320,10 +320,11 @@ class Aside:
 
 @dataclass(frozen=True, slots=True)
 class Unknown:
-    """What is not understood; ``may_move`` if it can move the arm for all that is known."""
+    """What is not understood; ``may_move`` if it can move the arm for all that is known; ``stops``: the controller."""
 
     text: str
     may_move: bool = True
+    stops: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -1038,9 +1038,9 @@ class Machine:
         value = memory.value(each.value)
         key = memory.key(each.target)
         name = key or memory.shown(each.target)
-        if memory.outside(each.target):  # where a controller stops
+        if memory.outside(each.target):
             memory.forget(root(name))
-            return instructions.Unknown(each.text, may_move=False)
+            return instructions.Unknown(each.text, may_move=False, stops=True)
         if isinstance(each.value, syntax.Constant) and isinstance(value, syntax.Unclear):  # which part is not known
             memory.forget(root(name))
         if self.dialect.runs_on(name):

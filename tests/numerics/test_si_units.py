@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from er3a.numerics.si_units import in_si, split_unit, stated, unit_text
+from er3a.numerics.si_units import in_si, limit_in_degrees, split_unit, stated, unit_text
 
 
 @dataclass(frozen=True)
@@ -28,6 +28,24 @@ class Written:
     turn_deg: float
     gap_mm: float | None
     count: int
+
+
+@pytest.mark.parametrize("digits", [2, 3, 4, 5, 6, 8])
+def test_a_limit_that_is_a_rounding_of_round_degrees_is_rounded_inward_and_never_outward(digits):
+    for degrees in (180, 170, 110, 147.5, 360, 0.5, 162.3):
+        printed = float(round(np.radians(degrees), digits))
+        left = len(f"{printed}".partition(".")[2])  # a number does not know of the zeros at its end
+        known = left > 3 or (left == 3 and degrees == round(degrees))
+        for sign in (1, -1):
+            found = limit_in_degrees(sign * printed, -sign)
+            beyond = known and printed > np.radians(degrees)
+            assert found == (sign * degrees if beyond else np.degrees(sign * printed))
+            assert limit_in_degrees(sign * printed, sign) * sign >= np.degrees(printed)
+
+
+@pytest.mark.parametrize("limit", [1.0, -2.5, 3.1, 2.97, 3.1420, 2.0, np.pi, np.nan])
+def test_other_limits_in_radians_are_as_they_are_written(limit):
+    assert limit_in_degrees(limit, 1 if limit < 0 else -1) == pytest.approx(np.degrees(limit), abs=0.03, nan_ok=True)
 
 
 def test_the_ending_of_a_name_is_its_unit():

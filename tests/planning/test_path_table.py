@@ -75,7 +75,10 @@ ROS = {
     "joint_names": ["joint_3", "joint_1", "joint_2"],
     "points": [
         {"positions": [0.3, 0.1, 0.2], "velocities": [0, 0, 0], "time_from_start": {"sec": 0, "nanosec": 0}},
-        {"positions": [0.6, 0.4, 0.5], "time_from_start": {"secs": 1, "nsecs": 500_000_000}},
+        {
+            **{"positions": [0.6, 0.4, 0.5], "velocities": [3, 1, 2], "accelerations": [6, 4, 5], "effort": []},
+            "time_from_start": {"secs": 1, "nsecs": 500_000_000},
+        },
         {"positions": [0.6, 0.4, 0.5], "time_from_start": 2},
     ],
 }
@@ -90,7 +93,9 @@ def test_a_trajectory_of_ros_is_a_timed_table_in_the_order_of_its_joints(tmp_pat
     table = read_path_table(tmp_path / name)
     np.testing.assert_array_equal(table.joints, [[0.1, 0.2, 0.3], [0.4, 0.5, 0.6], [0.4, 0.5, 0.6]])
     np.testing.assert_allclose(table.times, [0, 1.5, 2], rtol=1e-15)
-    np.testing.assert_array_equal(table.repeated, [False, False, True])
+    assert not table.repeated.any()  # the motion goes through all points at their times
+    np.testing.assert_array_equal(table.rates.velocities, [[0, 0, 0], [1, 2, 3], [np.nan] * 3])
+    np.testing.assert_array_equal(table.rates.accelerations, [[np.nan] * 3, [4, 5, 6], [np.nan] * 3])
 
 
 @pytest.mark.parametrize("prefix", ["", "left_"])
@@ -133,6 +138,8 @@ def point(**more):
         (point(time_from_start=None), r"points\[1\].time_from_start: no time"),
         (point(time_from_start={"seconds": 1}), "no time"),
         (point(time_from_start=0), "not later than 0 s"),
+        (point(velocities=[1, 2]), r"points\[1\].velocities: not 3 numbers"),
+        (point(velocities=[]), r"points\[1\].accelerations: accelerations without velocities"),
         (point(velocity=[0, 0, 0]), r"points\[1\].velocity: not followed"),
         (changed(speed_scaling=0.5), "speed_scaling: not followed"),
         ({"joint_trajectory": ROS, "return_trajectory": ROS}, "return_trajectory: not followed"),

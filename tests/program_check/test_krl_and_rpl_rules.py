@@ -32,6 +32,12 @@ def test_whole_numbers_are_joined_bit_by_bit(tmp_path):
     np.testing.assert_allclose(found, [2, 7, 5, -7])
 
 
+def test_an_index_beyond_a_list_is_a_fault_in_its_line(tmp_path):
+    body = f"DECL AXIS P[2]\n$VEL_AXIS[6]=50\n$VEL_AXIS[7]=50\nP[2]={axes(NEAR)}\nPTP P[2]\nP[3]={axes(NEAR)}"
+    found = check(tmp_path, krl(body), "a.src").findings
+    assert [each.place.line for each in found if each.level == "fail"] == [4, 7]
+
+
 CONFIG = """DEFDAT $CONFIG
 DECL FRAME TOOL_DATA[16]
 TOOL_DATA[1]={X 0.0,Y 0.0,Z 107.7,A 0.0,B 0.0,C 0.0}

@@ -463,6 +463,9 @@ def test_a_text_and_its_letters_change_together(body, tmp_path):
         ("PTP XP[3]", "DECL AXIS XP[2]\nXP[3]={AT}", 0, True),
         ("S(XP[])\nPTP XP[1]", "DECL AXIS XP[2]\nXP[1]={AT}", 0, True),
         ("S(XP[])\nPTP XP[1]", "DECL AXIS XP[3]\nXP[1]={AT}", 1, False),
+        ("$VEL_AXIS[6]=50\n$ACC_AXIS[1]=50\nPTP {AT}", "", 1, False),
+        ("$VEL_AXIS[7]=50\nPTP {AT}", "", 1, True),
+        ("INT I\nFOR I=1 TO 7\n$ACC_AXIS[I]=50\nENDFOR\nPTP {AT}", "", 1, True),
     ],
 )
 def test_an_element_that_a_list_is_not_declared_with_is_none_and_told(body, data, reached, told, tmp_path):

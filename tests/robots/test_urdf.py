@@ -103,7 +103,7 @@ def test_snapping_gives_the_real_arm_and_says_what_it_changed(tmp_path):
     np.testing.assert_allclose(got.alpha, real.alpha, atol=1e-12)
     assert "joint j2: angle 1.5708 rad taken as 90 deg" in imported.notes
     assert any("continuous" in note for note in imported.notes)
-    assert got.continuous.tolist() == [False] * 5 + [True]
+    assert (got.continuous.any(), got.lower[5], got.upper[5]) == (False, -2, 2)  # as the file states them
     path = tmp_path / "arm.yaml"
     write_robot(got, path)
     q = np.random.default_rng(1).uniform(-3, 3, (100, 6))
@@ -202,7 +202,7 @@ def test_numbers_that_can_be_other_units_are_taken_with_a_note(tmp_path):
     assert any("turned by 90 rad" in note and "in radians" in note for note in notes)
     many = import_urdf(written(tmp_path, urdf(limit='<limit lower="-45" upper="45" velocity="3"/>')))
     told = ["more than two turns (-45 to 45 rad)" in note for note in many.notes]
-    assert sum(told) == 5  # the sixth turns without end
+    assert sum(told) == 6
     assert many.robot.sources["limits"].grade == "inferred"  # so that no verdict passes by them
     plain = import_urdf(written(tmp_path, urdf(limit='<limit lower="-12.56" upper="12.56" velocity="3"/>')))
     assert not any("radians" in note or "metres" in note for note in plain.notes)
@@ -216,7 +216,7 @@ def test_soft_limits_of_a_safety_controller_hold_the_joint(tmp_path):
     held = arm('k_velocity="1" soft_lower_limit="-1" soft_upper_limit="2.5"')
     np.testing.assert_allclose(np.stack([held.robot.lower, held.robot.upper])[:, 0], [-1, 2])
     assert (
-        sum("soft limits -1 to 2.5 (safety_controller): its limits are held to -1 to 2" in n for n in held.notes) == 5
+        sum("soft limits -1 to 2.5 (safety_controller): its limits are held to -1 to 2" in n for n in held.notes) == 6
     )
     unsaid = arm('k_velocity="1"')  # the specification's 0 and 0 are meant by nobody
     np.testing.assert_allclose(unsaid.robot.upper[0], 2)
@@ -225,6 +225,48 @@ def test_soft_limits_of_a_safety_controller_hold_the_joint(tmp_path):
     assert any("leave nothing of its limits" in note for note in beyond.notes)
     alone = arm('soft_lower_limit="-1" soft_upper_limit="1"', '<limit effort="1" velocity="3"/>')
     np.testing.assert_allclose(alone.robot.upper[0], 1)
+
+
+@pytest.mark.parametrize(
+    ("limit", "ends"),
+    [
+        ('lower="-6.2831853" upper="6.2831853"', (-6.2831853, 6.2831853)),
+        ('lower="-1.5" upper="1.5"', (-1.5, 1.5)),
+        ("", None),
+        ('lower="0" upper="0"', None),
+        ('lower="0"', None),
+        ('lower="-1e16" upper="1e16"', None),
+    ],
+)
+def test_limits_that_a_continuous_joint_states_are_kept(tmp_path, limit, ends):
+    got = import_urdf(written(tmp_path, urdf(limit=f'<limit {limit} effort="1" velocity="1"/>')))
+    assert got.robot.continuous[5] == (ends is None)
+    assert (got.robot.lower[5], got.robot.upper[5]) == pytest.approx(ends or (-np.pi, np.pi), rel=1e-15)
+    assert [note for note in got.notes if "joint j6 " in note and "0 was taken" in note] == []
+
+
+@pytest.mark.parametrize("urdf_file", ["arm.urdf", "name/urdf/arm.urdf", "robots/arm.urdf", "robots/urdf/arm.urdf"])
+@pytest.mark.parametrize(
+    ("mesh", "named", "found"),
+    [
+        ("name/meshes/x.stl", "name/meshes/x.stl", True),
+        ("name/meshes/x.stl", "name/urdf/../meshes/x.stl", True),
+        ("renamed/meshes/x.stl", "name/meshes/x.stl", True),  # by its package.xml
+        ("secret/x.stl", "name/../secret/x.stl", False),
+        ("secret/x.stl", "../secret/x.stl", False),
+        ("secret/x.stl", "name/{root}/secret/x.stl", False),
+    ],
+)
+def test_a_package_holds_its_meshes_and_no_others(tmp_path, urdf_file, mesh, named, found):
+    for folder in ("name" if mesh.startswith("secret") else ".", Path(urdf_file).parent, Path(mesh).parent):
+        (tmp_path / folder).mkdir(parents=True, exist_ok=True)
+    if mesh.startswith("renamed"):
+        (tmp_path / "renamed/package.xml").write_text("<package><name>name</name></package>")
+    trimesh.creation.box((0.1, 0.1, 0.2)).export(tmp_path / mesh)
+    text = urdf(extra=shaped(f'<mesh filename="package://{named.format(root=tmp_path)}"/>'))
+    (tmp_path / urdf_file).write_text(text)
+    renamed = mesh.startswith("renamed") and urdf_file.startswith("name")  # the file is in a package of that name
+    assert bool(import_urdf(tmp_path / urdf_file).robot.hulls) == (found and not renamed)
 
 
 def test_an_axis_of_any_length_is_a_direction(tmp_path, random):

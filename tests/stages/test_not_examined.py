@@ -176,12 +176,12 @@ def test_a_path_that_collides_passes_by_no_allowed_contact_missing_shape_or_miss
             assert left_out_text(verdict.missed[0]) in say_all(verdict.findings)
 
 
-def test_rates_that_a_trajectory_of_ros_gives_are_no_pass(study, tmp_path):
-    """By its velocities, a controller would leave the way between the points, and the limits of speed with it."""
+def test_rates_that_do_not_go_together_in_a_trajectory_of_ros_are_no_pass(study, tmp_path):
+    """Without velocities the motion starts at once; with them it is judged by the cubic that a controller makes."""
     ends = [0, -0.2, -0.2, 0, -1.2, 0], [0.1, -0.3, -0.2, 0, -1.2, 0]
     points = [{"positions": q, "time_from_start": 2 * k} for k, q in enumerate(ends)]
-    for rates, named in (({}, ()), ({"velocities": [50.0] * 6, "effort": []}, ("move: velocities",))):
-        body = {"joint_names": [f"joint_{k}" for k in range(1, 7)], "points": [points[0], points[1] | rates]}
+    for rates, named in (({}, ("move: J1 0 s 0 / 2.86 deg/s",)), ({"velocities": [0] * 6, "effort": [1] * 6}, ())):
+        body = {"joint_names": [f"joint_{k}" for k in range(1, 7)], "points": [point | rates for point in points]}
         (tmp_path / "move.json").write_text(json.dumps(body))
         path = {"name": "move", "title": "Move", "kind": "table", "file": str(tmp_path / "move.json"), "samples": 11}
         (tmp_path / "paths.yaml").write_text(json.dumps({"kind": "paths", "paths": [path]}))
@@ -189,6 +189,8 @@ def test_rates_that_a_trajectory_of_ros_gives_are_no_pass(study, tmp_path):
         verdict = results.summary.verdict
         assert [each.names for each in verdict.missed if each.subject == "given_rates"] == ([named] if named else [])
         assert verdict.status == ("caution" if named else "pass")
+        speed = results.summary.paths[0].max_joint_speed_deg_s[0]
+        assert speed == pytest.approx(np.degrees(0.05 if named else 0.075), rel=1e-12)
 
 
 @pytest.mark.parametrize("blend", [None, 3.0])

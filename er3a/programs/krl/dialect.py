@@ -15,6 +15,7 @@ from er3a.programs import instructions, syntax
 from er3a.programs.code_builder import variable_of
 from er3a.programs.evaluation import (
     IN_DEGREES,
+    SIZES,
     Dialect,
     ProgramMemory,
     Rounded,
@@ -531,6 +532,8 @@ def _zone_data(memory: ProgramMemory, data: syntax.Value | None, usual: str) -> 
 
 KINDS: dict[str, instructions.MotionKind] = {"PTP": "joint", "LIN": "line", "CIRC": "arc", "SPL": "spline"}
 MODAL = ("$TOOL", "$BASE", "$LOAD", "$VEL", "$ACC", "$APO", "$VEL_AXIS", "$ACC_AXIS", "$IPO_MODE", "$ORI_TYPE")
+SIZES_BY_AXES = frozenset(f"{name}{SIZES}" for name in ("$VEL_AXIS", "$ACC_AXIS", "$VEL_AXIS_C", "$ACC_AXIS_C"))
+"""Sizes of the system's lists with an element for each axis of the arm; external axes have lists of their own."""
 MODAL_DATA = ("PDAT_ACT", "LDAT_ACT", "FDAT_ACT", "%spline")
 TURN_RATES = ("$VEL.ORI1", "$VEL.ORI2", "$ACC.ORI1", "$ACC.ORI2")
 CORRECTIONS = {
@@ -755,6 +758,8 @@ class KrlDialect(Dialect):
             return frame_record(instructions.pose_of((0.0,) * 6, "kuka"))
         if name == "$NUM_AX":
             return memory.cell.joints
+        if name in SIZES_BY_AXES:
+            return (max(len(AXIS_KEYS), memory.cell.joints),)
         if name in CONTROLLER:
             return CONTROLLER[name]
         if (mapped := memory.cell.frames.get(name)) is not None:

@@ -32,6 +32,7 @@ from er3a.planning.moves import JointMove
 from er3a.planning.names import PathVerdict
 from er3a.planning.piecewise import Polynomials
 from er3a.planning.sequences import TURN_LENGTH, JointSequence, SegmentPath
+from er3a.planning.stated_rates import StatedMotion
 from er3a.planning.timing import JointLimits, joint_limits, standing, straight
 from er3a.planning.tool_proof import ProofRequirements, ToolProof, follow_and_prove
 from er3a.planning.way_around import NoWayAround, PlannedMove, PlanningTask, WayAround, way_between
@@ -135,6 +136,17 @@ def missed_points(robot: Robot, built: Built) -> str:
 def rows_missed(robot: Robot, built: Built) -> str:
     """The same of the rows of a table whose corners nobody asked to be rounded."""
     return missed_points(robot, built) if built.unasked else ""
+
+
+def misfits(robot: Robot, built: Built) -> tuple[str, ...]:
+    """Rates of a trajectory that do not go together: joint, time, the one and the other."""
+    found = built.joints.misfits if isinstance(built.joints, StatedMotion) else ()
+    named = []
+    for each in found:
+        scale, unit = (1000.0, "mm") if robot.slides[each.joint] else (float(np.degrees(1.0)), "deg")
+        rates = f"{scale * each.stated:.3g} / {scale * each.other:.3g} {unit}/s{'²' * (each.order == 2)}"
+        named.append(f"J{each.joint + 1} {each.t:g} s {rates}")
+    return tuple(named)
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,7 +296,7 @@ def _joint_motion(
     robot: Robot,
     entry: PlannedEntry,
     built: Built,
-    move: JointMove | JointSequence | PlannedMove,
+    move: JointMove | JointSequence | StatedMotion | PlannedMove,
     samples: Reals,
     checks: Reals,
 ) -> Motion:
@@ -305,7 +317,7 @@ def _joint_motion(
         tool=lambda t: forward(robot, move.joints(t)[0]),
         way=way,
         followed=None,
-        polynomials=move.in_parts() if isinstance(move, JointSequence) else move.polynomials(),
+        polynomials=move.in_parts() if isinstance(move, JointSequence | StatedMotion) else move.polynomials(),
         proof=None,
     )
 
@@ -451,7 +463,7 @@ def listed_motions(
             part = entry if isinstance(entry, PartOfProgram) else None
             parts: tuple[tuple[LeftOutSubject, Sequence[object]], ...] = (
                 ("program_rest", part.rest if part else ()),
-                ("given_rates", motion.built.unread if motion else ()),
+                ("given_rates", misfits(task.robot, motion.built) if motion else ()),
                 ("missed_rows", tuple(filter(None, [motion and rows_missed(task.robot, motion.built)]))),
                 ("half_turns", motion.built.turns_open if motion and not part else ()),
             )

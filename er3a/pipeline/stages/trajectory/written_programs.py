@@ -13,13 +13,14 @@ from er3a.pipeline.stages.trajectory.model import AvoidanceRows, MinClearance, P
 from er3a.pipeline.stages.trajectory.motion import Motion, PartOfProgram, at_lines, missed_points, rows_missed
 from er3a.planning.commands import (
     CommandSource,
-    JointMoveCommand,
     JointTableCommand,
     PlanCommand,
     ToolMoveCommand,
 )
+from er3a.planning.moves import JointMove
 from er3a.planning.names import PathVerdict
 from er3a.planning.profiles import Times
+from er3a.planning.stated_rates import StatedMotion
 from er3a.programs.csv_program import write_csv
 from er3a.programs.from_commands import listing_of
 from er3a.programs.languages import not_written, write_program
@@ -80,11 +81,12 @@ def written(
     if isinstance(command, PlanCommand):  # a planned motion is written as the points that its samples are
         timing = Times(motion.samples, np.arange(len(motion.samples)))
         command = JointTableCommand(motion.joints(motion.samples), timing)
-    elif isinstance(command, JointMoveCommand):  # speeds of the joints at its ends may bend its way
-        kept = needed_points(motion.joints(motion.samples), STRAIGHT)
+    elif isinstance(motion.built.joints, JointMove | StatedMotion):  # rates at its points may bend its way
+        assert motion.polynomials is not None
+        times = np.union1d(motion.samples, motion.polynomials.times)
+        kept = needed_points(motion.joints(times), STRAIGHT)
         if len(kept) > 2:
-            timing = Times(motion.samples[kept], np.arange(len(kept)))
-            command = JointTableCommand(motion.joints(motion.samples[kept]), timing)
+            command = JointTableCommand(motion.joints(times[kept]), Times(times[kept], np.arange(len(kept))))
     ends: Reals | None = motion.q[-1:] if isinstance(command, ToolMoveCommand) else None
     if ends is not None and not np.isfinite(ends).all():
         ends = None
