@@ -12,6 +12,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Set
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -61,8 +62,14 @@ ANGLE_UNITS = {
     math.degrees(math.degrees(1.0)): "deg → π/180 rad",
 }
 USUAL_SUM = 0.1, 2.5  # m, of the lengths a, or d, of an arm's table
-WIDEST_ANGLE = math.radians(6.3), math.radians(1000.0)  # rad; the widest of an arm's twists, offsets, limits or speeds
-FINEST = 5e-3  # a tolerance of lengths is no more than this part of an arm's lengths together
+STRANGER = math.log(1.5)  # how much farther outside of these a table has to be than another to be the one in error
+NARROWEST = math.radians(6.3)  # rad, or rad/s: the widest of an arm's twists, offsets, limits or speeds is above it,
+WIDEST, FASTEST = (
+    math.radians(361.0),
+    math.radians(1000.0),
+)  # and not above these, of angles in the table, and in ranges
+TINY = 0.01  # m, of all lengths of two arms that are both in another unit
+FINEST = 5e-3  # by which part of all its lengths such an arm may differ
 SHIFTED = ("a", "alpha", "d"), ("a", "alpha"), ("d",), ("a",), ("alpha",)
 
 
@@ -259,8 +266,9 @@ def _compared(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances, 
         differs = _other_kinds(robot_a, kinds)
         return Comparison("other_arm", geometry=differs, joints=counts, not_examined=beside)
     printed = robot_a, robot_b
-    lengths = max(float(np.abs(robot.a).sum() + np.abs(robot.d).sum()) for robot in printed)
-    tolerances = replace(tolerances, length=min(tolerances.length, FINEST * lengths or tolerances.length))
+    size = max(float(np.abs(robot.a).sum() + np.abs(robot.d).sum()) for robot in printed)
+    if 0 < size < TINY:
+        tolerances = replace(tolerances, length=min(tolerances.length, FINEST * size))
     slips = _unit_slips(robot_a, robot_b, tolerances, explain)
     robot_a, robot_b = in_units(robot_a, slips, "a"), in_units(robot_b, slips, "b")
     a, b = mechanism.mechanism_of(robot_a), mechanism.mechanism_of(robot_b)
@@ -599,13 +607,14 @@ def _unit_slips(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances
         a, b = (mechanism.mechanism_of(robot, ends=False) for robot in arms(slips))
         return mechanism.is_same_mechanism(a, b, tolerances)
 
+    @cache
     def rank(slips: tuple[Cause, ...]) -> tuple[float, int, int]:
         found = mechanism.match(*map(mechanism.mechanism_of, arms(slips)), tolerances)
         return found.rank[0], found.layers, sum(len(each.entries) for each in slips)
 
     sets = [(*lengths, *angles) for lengths, angles in options]
-    fits = [slips for slips in sets if same(slips)] if len(sets) > 1 or len(offsets) > 1 else [()]
-    if not fits and explain:
+    fits = [slips for slips in sets if same(slips)] if len(sets) * len(offsets) > 1 else [()]
+    if not fits and explain and len(sets) > 1:
         nearest = min(sets, key=rank)
         fits = [nearest] if 2 * rank(nearest)[0] < rank(())[0] else []
     every = [(*slips, *more) for slips in fits for more in offsets]
@@ -654,10 +663,11 @@ def _length_cause(robot_a: Robot, robot_b: Robot, columns: tuple[str, ...], fact
         sums = [float(np.abs(getattr(robot, column)).sum()) for column in columns]
         return sum(max(math.log(USUAL_SUM[0] / x), math.log(x / USUAL_SUM[1]), 0.0) for x in sums)
 
-    a, b = strange(robot_a), strange(robot_b)
-    if b > a:
+    stranger = strange(robot_b) - strange(robot_a)
+    if stranger > STRANGER:
         factor = min(UNITS, key=lambda each: abs(math.log(each * factor)))
-    return Cause("unit", "a" if a > b else "b" if b > a else None, columns, factor, UNITS[factor])
+        return Cause("unit", "b", columns, factor, UNITS[factor])
+    return Cause("unit", "a" if stranger < -STRANGER else None, columns, factor, UNITS[factor])
 
 
 def _angle_slips(robot_a: Robot, robot_b: Robot, columns: tuple[str, ...]) -> list[tuple[Cause, ...]]:
@@ -665,11 +675,11 @@ def _angle_slips(robot_a: Robot, robot_b: Robot, columns: tuple[str, ...]) -> li
     found: list[tuple[Cause, ...]] = [()]
     sides: dict[Literal["a", "b"], Robot] = {"a": robot_a, "b": robot_b}
     for side, robot in sides.items():
-        turning = ~robot.slides if columns[0] in ("lower", "speed") else slice(None)
+        turning, most = (~robot.slides, FASTEST) if columns in RANGES.values() else (slice(None), WIDEST)
         values = np.abs(np.concatenate([getattr(robot, column)[turning] for column in columns]))
         widest = float(values[np.isfinite(values)].max(initial=0.0))
-        for factor, unit in ANGLE_UNITS.items():
-            if WIDEST_ANGLE[0] < widest * factor < WIDEST_ANGLE[1]:
+        for factor, unit in () if NARROWEST < widest < most else ANGLE_UNITS.items():
+            if NARROWEST < widest * factor < most:
                 found.append((Cause("angle_unit", side, columns, factor, unit),))
     return found
 
