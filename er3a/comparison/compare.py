@@ -61,13 +61,12 @@ ANGLE_UNITS = {
     math.radians(1.0): "180/π deg → deg",
     math.degrees(math.degrees(1.0)): "deg → π/180 rad",
 }
-USUAL_SUM = 0.1, 2.5  # m, of the lengths a, or d, of an arm's table
+USUAL_SUMS = {2: (0.25, 4.0), 1: (0.1, 2.5)}  # m, of the lengths a and d of an arm's table, and of one of both
+LEAST_SUM = 0.02  # m, of one of both, where two units are as near as cm and mm
+NEAR_UNITS = math.log(20.0)
 STRANGER = math.log(1.5)  # how much farther outside of these a table has to be than another to be the one in error
-NARROWEST = math.radians(6.3)  # rad, or rad/s: the widest of an arm's twists, offsets, limits or speeds is above it,
-WIDEST, FASTEST = (
-    math.radians(361.0),
-    math.radians(1000.0),
-)  # and not above these, of angles in the table, and in ranges
+USUAL_ANGLES = {"alpha": (6.3, 361.0), "offset": (6.3, 361.0), "lower": (6.3, 1000.0), "speed": (20.0, 1500.0)}
+"""Between which (deg, deg/s) the widest of an arm's angles is: no radians, and not converted once too often."""
 TINY = 0.01  # m, of all lengths of two arms that are both in another unit
 FINEST = 5e-3  # by which part of all its lengths such an arm may differ
 SHIFTED = ("a", "alpha", "d"), ("a", "alpha"), ("d",), ("a",), ("alpha",)
@@ -659,9 +658,13 @@ def _length_cause(robot_a: Robot, robot_b: Robot, columns: tuple[str, ...], fact
     """That columns of A, times a factor, are those of B: a slip of the table whose lengths no arm has. Of two that arms
     have it can be either's."""
 
+    least, most = USUAL_SUMS[len(columns)]
+    if len(columns) == 1 and abs(math.log(factor)) < NEAR_UNITS:
+        least = LEAST_SUM
+
     def strange(robot: Robot) -> float:
-        sums = [float(np.abs(getattr(robot, column)).sum()) for column in columns]
-        return sum(max(math.log(USUAL_SUM[0] / x), math.log(x / USUAL_SUM[1]), 0.0) for x in sums)
+        size = sum(float(np.abs(getattr(robot, column)).sum()) for column in columns)
+        return max(math.log(least / size), math.log(size / most), 0.0)
 
     stranger = strange(robot_b) - strange(robot_a)
     if stranger > STRANGER:
@@ -675,11 +678,11 @@ def _angle_slips(robot_a: Robot, robot_b: Robot, columns: tuple[str, ...]) -> li
     found: list[tuple[Cause, ...]] = [()]
     sides: dict[Literal["a", "b"], Robot] = {"a": robot_a, "b": robot_b}
     for side, robot in sides.items():
-        turning, most = (~robot.slides, FASTEST) if columns in RANGES.values() else (slice(None), WIDEST)
+        turning = ~robot.slides if columns in RANGES.values() else slice(None)
         values = np.abs(np.concatenate([getattr(robot, column)[turning] for column in columns]))
-        widest = float(values[np.isfinite(values)].max(initial=0.0))
-        for factor, unit in () if NARROWEST < widest < most else ANGLE_UNITS.items():
-            if NARROWEST < widest * factor < most:
+        widest, (least, most) = math.degrees(values[np.isfinite(values)].max(initial=0.0)), USUAL_ANGLES[columns[0]]
+        for factor, unit in () if least < widest < most else ANGLE_UNITS.items():
+            if least < widest * factor < most:
                 found.append((Cause("angle_unit", side, columns, factor, unit),))
     return found
 

@@ -225,9 +225,9 @@ def test_arms_that_only_stand_or_count_otherwise_have_no_length_of_the_wrong_sig
 @pytest.mark.parametrize(
     ("columns", "factor"),
     [
-        ("a d", 25.4),
+        ("a d", 10.0),
         ("a d", 1000.0),
-        ("a", 10.0),
+        ("a", 25.4),
         ("d", 1000.0),
         ("alpha", np.degrees(1.0)),
         ("alpha offset", np.radians(1.0)),
@@ -239,7 +239,7 @@ def test_arms_that_only_stand_or_count_otherwise_have_no_length_of_the_wrong_sig
 @pytest.mark.parametrize("side", ["a", "b"])
 def test_a_unit_that_makes_two_tables_equal_is_named_with_its_table(columns, factor, side):
     right = er3a.to_standard(er3a.load_robot("er3_600"))
-    right = right.replace(offset=np.radians([0, -90, 37, 180, 12, 0]))
+    right = right.replace(offset=np.radians([0, -90, 37, 180, 12, 0]), speed=np.radians([400, 300, 520, 500, 530, 840]))
     slipped = right.replace(**{column: getattr(right, column) / factor for column in columns.split()})
     found = er3a.compare(slipped, right) if side == "a" else er3a.compare(right, slipped)
     assert found.verdict == "same_arm"
