@@ -1,16 +1,18 @@
 """Whether two tables describe one arm; if not, which entries differ and which mistake explains them.
 
-The result has layers. Geometry is what no choice of base, flange, zeros and directions changes; only if it differs does
-the other table describe another arm (:mod:`er3a.comparison.mechanism`). The other layers are conventions. They matter
-for commanding joints and for placing the base.
+The result has layers. Units come first: columns that agree in another unit than they were read in. All else is said of
+the tables in the right units. Geometry is what no choice of base, flange, zeros and directions changes; only if it
+differs does the other table describe another arm (:mod:`er3a.comparison.mechanism`). The other layers are conventions.
+They matter for commanding joints and for placing the base.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Mapping, Set
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Set
+from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -26,7 +28,7 @@ from er3a.kinematics.forward import forward, forward_of_rows
 from er3a.numerics.arrays import Reals
 from er3a.robots.robot import CombinedLimit, Robot, Source
 
-VerdictWord = Literal["equal", "same_arm", "other_arm", "other_joint_count"]
+VerdictWord = Literal["equal", "in_doubt", "same_arm", "other_arm", "other_joint_count"]
 CauseCode = Literal[
     "a_and_d_swapped",
     "other_convention",
@@ -47,9 +49,26 @@ SAME_RATIO = 0.005  # relative difference of speeds, and of lengths in two units
 HALF_TURN = np.pi - 1e-4  # rad, from which on a rotation's skew part has no digits left for its axis
 NO_OFFSET = 1e-6  # m, of a row from an axis; sine of its tilt; entry of a coupling; largest distance worth a search
 ROUNDED = 4  # decimals of mm and deg in a corrected table
-UNITS = {25.4: "inch", 1 / 25.4: "inch", 1000.0: "metre", 0.001: "metre", 10.0: "centimetre", 0.1: "centimetre"}
-
-ANGLE_UNITS = {"radian": math.degrees(1.0), "degree": math.radians(1.0)}
+UNITS = {
+    own / read: f"{read_as} → {name}"
+    for (name, own), (read_as, read) in itertools.permutations(
+        {"mm": 1.0, "cm": 10.0, "inch": 25.4, "m": 1000.0}.items(), 2
+    )
+}
+"""What takes lengths from the unit they were read in to their own."""
+ANGLE_UNITS = {
+    math.degrees(1.0): "deg → rad",
+    math.radians(1.0): "180/π deg → deg",
+    math.degrees(math.degrees(1.0)): "deg → π/180 rad",
+}
+USUAL_SUMS = {2: (0.25, 4.0), 1: (0.1, 2.5)}  # m, of the lengths a and d of an arm's table, and of one of both
+LEAST_SUM = 0.02  # m, of one of both, where two units are as near as cm and mm
+NEAR_UNITS = math.log(20.0)
+STRANGER = math.log(1.5)  # how much farther outside of these a table has to be than another to be the one in error
+USUAL_ANGLES = {"alpha": (6.3, 361.0), "offset": (6.3, 361.0), "lower": (6.3, 1000.0), "speed": (20.0, 1500.0)}
+"""Between which (deg, deg/s) the widest of an arm's angles is: no radians, and not converted once too often."""
+TINY = 0.01  # m, of all lengths of two arms that are both in another unit
+FINEST = 5e-3  # by which part of all its lengths such an arm may differ
 SHIFTED = ("a", "alpha", "d"), ("a", "alpha"), ("d",), ("a",), ("alpha",)
 
 
@@ -71,13 +90,22 @@ class Difference:
 
 @dataclass(frozen=True)
 class Cause:
-    """What made the entries differ: ``side`` is whose table has it, ``amount`` by how many rows or times."""
+    """What made the entries differ: ``side`` is whose table has it (None: either's), ``amount`` by how many rows or
+    times."""
 
     code: CauseCode
-    side: Literal["a", "b"]
+    side: Literal["a", "b"] | None
     entries: tuple[str, ...] = ()
     amount: float | None = None
     unit: str = ""
+
+
+@dataclass(frozen=True)
+class UnitLayer:
+    """``causes``: columns in another unit than they were read in, and what takes their values to it."""
+
+    same: bool
+    causes: tuple[Cause, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -168,8 +196,10 @@ class Comparison(ByValue):
 
     Attributes
     ----------
-    verdict : equal; same_arm (geometry agrees, something else differs); other_arm; other_joint_count
-    geometry, zero, directions, base, flange, coupling, limits, speeds : the layers; None if joints can't be paired
+    verdict : equal; same_arm (geometry agrees, something else differs); other_arm; other_joint_count; in_doubt (equal
+        numbers, of files whose units are in doubt: er3a.compare, which is given SI, never says it)
+    units, geometry, zero, directions, base, flange, coupling, limits, speeds : the layers; None if joints can't be
+        paired
     as_printed_mm : largest distance between the two flanges over the joint ranges, for equal joint values
     aligned_mm : the same, after base, flange, zeros and directions of B are aligned with A's
     as_printed_deg, aligned_deg : the same of the angle between the flanges' orientations
@@ -180,6 +210,7 @@ class Comparison(ByValue):
     """
 
     verdict: VerdictWord
+    units: UnitLayer | None = None
     geometry: GeometryLayer | None = None
     zero: ZeroLayer | None = None
     directions: DirectionLayer | None = None
@@ -205,7 +236,7 @@ class Comparison(ByValue):
 def compare(
     robot_a: Robot, robot_b: Robot, *, tolerance_mm: float = TOLERANCE_MM, tolerance_deg: float = TOLERANCE_DEG
 ) -> Comparison:
-    """Compare two arms: geometry, zero, directions, base, flange, couplings, then limits and speeds.
+    """Compare two arms: units, geometry, zero, directions, base, flange, couplings, then limits and speeds.
 
     Parameters
     ----------
@@ -231,7 +262,14 @@ def _compared(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances, 
     if counts[0] != counts[1] or robot_a.rows != robot_b.rows:
         return Comparison("other_joint_count", joints=counts, not_examined=beside)
     if (kinds := robot_a.sliding != robot_b.sliding).any():
-        return Comparison("other_arm", _other_kinds(robot_a, kinds), joints=counts, not_examined=beside)
+        differs = _other_kinds(robot_a, kinds)
+        return Comparison("other_arm", geometry=differs, joints=counts, not_examined=beside)
+    printed = robot_a, robot_b
+    size = max(float(np.abs(robot.a).sum() + np.abs(robot.d).sum()) for robot in printed)
+    if 0 < size < TINY:
+        tolerances = replace(tolerances, length=min(tolerances.length, FINEST * size))
+    slips = _unit_slips(robot_a, robot_b, tolerances, explain)
+    robot_a, robot_b = in_units(robot_a, slips, "a"), in_units(robot_b, slips, "b")
     a, b = mechanism.mechanism_of(robot_a), mechanism.mechanism_of(robot_b)
     found = mechanism.match(a, b, tolerances)
     same = not found.differences and found.unexplained == 0
@@ -256,15 +294,26 @@ def _compared(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances, 
     directions = DirectionLayer(not reversed_rows, reversed_rows, () if moved.any() else mistakes)
     base, flange = (_placement(T, tolerances) for T in (found.base, found.flange))
     joint_zeros = _joint_zeros(robot_a, found)
-    limits = _limits(robot_a, robot_b, reverses, joint_zeros, tolerances)
-    speeds = _speeds(robot_a, robot_b)
+    ranges: dict[Uncompared, RangeLayer] = {}
+    layers_of: dict[Uncompared, Callable[[Robot, Robot], RangeLayer]] = {
+        "limits": lambda one, other: _limits(one, other, reverses, joint_zeros, tolerances),
+        "speeds": _speeds,
+    }
+    for name, layer_of in layers_of.items():
+        ranges[name] = layer_of(robot_a, robot_b)
+        for slip in _range_slips(robot_a, robot_b, RANGES[name]) if ranges[name].same is False else ():
+            arms = in_units(robot_a, [slip], "a"), in_units(robot_b, [slip], "b")
+            if layer_of(*arms).same is not False:
+                (robot_a, robot_b), slips, ranges[name] = arms, (*slips, slip), layer_of(*arms)
+                break
+    limits, speeds = ranges["limits"], ranges["speeds"]
+    units = UnitLayer(not slips, slips)
     agree = zero.same and directions.same and base.same and flange.same and coupled.same
-    agree = agree and limits.same is not False and speeds.same is not False
+    agree = agree and units.same and limits.same is not False and speeds.same is not False
     verdict: VerdictWord = "equal" if same and agree else "same_arm" if same else "other_arm"
-    off = _distances(robot_a, robot_b, found)
+    off = _distances(printed, (robot_a, robot_b), found)
     corrected = _corrected(robot_a, robot_b, found, tolerances, limits, signs=reverses, joint_zeros=joint_zeros)
-    layers = geometry, zero, directions, base, flange, coupled, limits, speeds
-    ranges: dict[Uncompared, RangeLayer] = {"limits": limits, "speeds": speeds}
+    layers = units, geometry, zero, directions, base, flange, coupled, limits, speeds
     missing = tuple(name for name, layer in ranges.items() if layer.same is None)
     return Comparison(verdict, *layers, *off, counts, corrected, (*missing, *beside))
 
@@ -477,21 +526,23 @@ def _speeds(robot_a: Robot, robot_b: Robot) -> RangeLayer:
 # How far the flange is off --------------------------------------------------------------------------------------------
 
 
-def _distances(robot_a: Robot, robot_b: Robot, found: mechanism.Match) -> tuple[float, float, float, float]:
+def _distances(
+    as_printed: tuple[Robot, Robot], in_right_units: tuple[Robot, Robot], found: mechanism.Match
+) -> tuple[float, float, float, float]:
     """Largest distances (mm), then angles (deg), of the flanges that were found, each as printed and aligned."""
-    a, b = robot_a.without_tool(), robot_b.without_tool()
+    (first, second), (a, b) = ([robot.without_tool() for robot in pair] for pair in (as_printed, in_right_units))
     signs, zeros = np.where(found.reverses, -1.0, 1.0), found.zeros * a.direction
     behind = np.linalg.inv(found.flange)
 
     def printed(q: Reals) -> tuple[Reals, Reals]:
-        return forward(a, q), forward(b, q)
+        return forward(first, q), forward(second, q)
 
     def aligned(q: Reals) -> tuple[Reals, Reals]:
         u = row_values(a, q)
         return forward_of_rows(a, u), found.base @ forward_of_rows(b, signs * (u - zeros)) @ behind
 
-    mm = [1000 * _largest(_shift, flanges, robot_a) for flanges in (printed, aligned)]
-    deg = [math.degrees(_largest(_turn, flanges, robot_a)) for flanges in (printed, aligned)]
+    mm = [1000 * _largest(_shift, flanges, a) for flanges in (printed, aligned)]
+    deg = [math.degrees(_largest(_turn, flanges, a)) for flanges in (printed, aligned)]
     return mm[0], mm[1], deg[0], deg[1]
 
 
@@ -523,6 +574,128 @@ def _largest(
     return float(values.max())
 
 
+# Units ----------------------------------------------------------------------------------------------------------------
+
+RANGES: dict[Uncompared, tuple[str, ...]] = {"limits": ("lower", "upper"), "speeds": ("speed",)}
+
+
+def in_units(robot: Robot, slips: Iterable[Cause], side: Literal["a", "b"]) -> Robot:
+    """A robot with the columns that were read in another unit taken to their own; ``side``: which of both it is."""
+    columns: dict[str, Reals] = {}
+    for slip in slips:
+        for column in slip.entries if (slip.side or "a") == side else ():
+            values = getattr(robot, column)
+            of_unit = (
+                robot.slides == (slip.code == "unit") if column in (*RANGES["limits"], *RANGES["speeds"]) else True
+            )
+            columns[column] = np.where(of_unit, values * slip.amount, values)
+    return robot.replace(**columns) if columns else robot
+
+
+def _unit_slips(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances, explain: bool) -> tuple[Cause, ...]:
+    """The columns a, d, alpha and offset that, in another unit, make two tables agree; of several sets the one that
+    leaves the fewest conventions different, then the smallest. If geometry agrees with none, and it is to be explained,
+    one that leaves less than half of the entries different."""
+    twists, offsets = (_angle_slips(robot_a, robot_b, columns) for columns in (("alpha",), ("offset",)))
+    options = list(itertools.product(_length_slips(robot_a, robot_b), twists))
+
+    def arms(slips: tuple[Cause, ...]) -> tuple[Robot, Robot]:
+        return in_units(robot_a, slips, "a"), in_units(robot_b, slips, "b")
+
+    def same(slips: tuple[Cause, ...]) -> bool:
+        a, b = (mechanism.mechanism_of(robot, ends=False) for robot in arms(slips))
+        return mechanism.is_same_mechanism(a, b, tolerances)
+
+    @cache
+    def rank(slips: tuple[Cause, ...]) -> tuple[float, int, int]:
+        found = mechanism.match(*map(mechanism.mechanism_of, arms(slips)), tolerances)
+        return found.rank[0], found.layers, sum(len(each.entries) for each in slips)
+
+    sets = [(*lengths, *angles) for lengths, angles in options]
+    fits = [slips for slips in sets if same(slips)] if len(sets) * len(offsets) > 1 else [()]
+    if not fits and explain and len(sets) > 1:
+        nearest = min(sets, key=rank)
+        fits = [nearest] if 2 * rank(nearest)[0] < rank(())[0] else []
+    every = [(*slips, *more) for slips in fits for more in offsets]
+    return _merged(min(every, key=rank) if len(every) > 1 else every[0] if every else ())
+
+
+def _merged(slips: tuple[Cause, ...]) -> tuple[Cause, ...]:
+    """Columns of one table in one unit as one cause."""
+    found: dict[tuple[object, ...], Cause] = {}
+    for each in slips:
+        key = each.code, each.side, each.amount
+        found[key] = replace(each, entries=(*found[key].entries, *each.entries)) if key in found else each
+    return tuple(found.values())
+
+
+def _length_slips(robot_a: Robot, robot_b: Robot) -> list[tuple[Cause, ...]]:
+    """Ways in which a and d of two tables can be in different units: none, both, or one of them."""
+    pair = [mechanism.mechanism_of(each, ends=False) for each in (robot_a, robot_b)]
+    factors: set[float] = set()
+    used = [column for column in ("a", "d") if getattr(robot_a, column).any() and getattr(robot_b, column).any()]
+    for column, (one, other) in itertools.product(used, (pair, (robot_a, robot_b))):
+        sums = [float(np.abs(getattr(each, column)).sum()) for each in (one, other)]
+        if min(sums) > 0:
+            factors |= _likely_factor(sums[1] / sums[0])
+    alone = [_length_cause(robot_a, robot_b, (column,), factor) for column in used for factor in sorted(factors)]
+    both = [_length_cause(robot_a, robot_b, tuple(used), factor) for factor in sorted(factors)] if len(used) > 1 else []
+    mixed = [
+        pair
+        for pair in itertools.combinations(alone, 2)
+        if pair[0].entries != pair[1].entries and (pair[0].side, pair[0].amount) != (pair[1].side, pair[1].amount)
+    ]
+    return [(), *((each,) for each in both), *((each,) for each in alone), *mixed]
+
+
+def _likely_factor(ratio: float) -> set[float]:
+    """The factor between two units that is nearest a ratio, within 2, if 1 is not nearer."""
+    near = min((1.0, *UNITS), key=lambda factor: abs(math.log(ratio / factor)))
+    return {near} - {1.0} if abs(math.log(ratio / near)) < math.log(2) else set()
+
+
+def _length_cause(robot_a: Robot, robot_b: Robot, columns: tuple[str, ...], factor: float) -> Cause:
+    """That columns of A, times a factor, are those of B: a slip of the table whose lengths no arm has. Of two that arms
+    have it can be either's."""
+
+    least, most = USUAL_SUMS[len(columns)]
+    if len(columns) == 1 and abs(math.log(factor)) < NEAR_UNITS:
+        least = LEAST_SUM
+
+    def strange(robot: Robot) -> float:
+        size = sum(float(np.abs(getattr(robot, column)).sum()) for column in columns)
+        return max(math.log(least / size), math.log(size / most), 0.0)
+
+    stranger = strange(robot_b) - strange(robot_a)
+    if stranger > STRANGER:
+        factor = min(UNITS, key=lambda each: abs(math.log(each * factor)))
+        return Cause("unit", "b", columns, factor, UNITS[factor])
+    return Cause("unit", "a" if stranger < -STRANGER else None, columns, factor, UNITS[factor])
+
+
+def _angle_slips(robot_a: Robot, robot_b: Robot, columns: tuple[str, ...]) -> list[tuple[Cause, ...]]:
+    """Ways in which angles of two tables can be in another unit: none, and for either the one that makes them usual."""
+    found: list[tuple[Cause, ...]] = [()]
+    sides: dict[Literal["a", "b"], Robot] = {"a": robot_a, "b": robot_b}
+    for side, robot in sides.items():
+        turning = ~robot.slides if columns in RANGES.values() else slice(None)
+        values = np.abs(np.concatenate([getattr(robot, column)[turning] for column in columns]))
+        widest, (least, most) = math.degrees(values[np.isfinite(values)].max(initial=0.0)), USUAL_ANGLES[columns[0]]
+        for factor, unit in () if least < widest < most else ANGLE_UNITS.items():
+            if least < widest * factor < most:
+                found.append((Cause("angle_unit", side, columns, factor, unit),))
+    return found
+
+
+def _range_slips(robot_a: Robot, robot_b: Robot, columns: tuple[str, ...]) -> Iterator[Cause]:
+    """Ways in which limits or speeds of one of two tables can be in another unit."""
+    for slips in _angle_slips(robot_a, robot_b, columns):
+        yield from slips
+    sums = [sum(float(np.abs(getattr(each, key)[each.slides]).sum()) for key in columns) for each in (robot_a, robot_b)]
+    for factor in _likely_factor(sums[1] / sums[0]) if min(sums) > 0 else ():
+        yield Cause("unit", None, columns, factor, UNITS[factor])
+
+
 # Causes ---------------------------------------------------------------------------------------------------------------
 
 
@@ -533,9 +706,9 @@ def _causes(
     several = len(found.differences) > 1 or found.unexplained > 0
     for side, table, other in (("a", robot_a, robot_b), ("b", robot_b, robot_a)) if several else ():
         there = mechanism.mechanism_of(other, ends=False)
-        for code, amount, unit, columns in _repaired(table, other):
+        for code, amount, shifted, columns in _repaired(table, other):
             if mechanism.is_same_mechanism(mechanism.mechanism_of(table, ends=False, **columns), there, tolerances):
-                yield Cause(code, side, (), amount, unit)  # type: ignore[arg-type]
+                yield Cause(code, side, (), amount, shifted)  # type: ignore[arg-type]
                 return
     for each in found.differences:
         negated = each.column == "alpha" and abs(wrap_to_pi(np.array(each.one + each.other))) < tolerances.angle
@@ -547,27 +720,14 @@ def _causes(
 
 
 def _repaired(robot: Robot, other: Robot) -> Iterator[tuple[CauseCode, float | None, str, Columns]]:
-    """The columns of a table with one mistake undone throughout; how many rows or times, of which columns or unit."""
+    """The columns of a table with one mistake undone throughout; how many rows or times, of which columns."""
     a, d, alpha = robot.a, robot.d, robot.alpha
     yield "a_and_d_swapped", None, "", {"a": d, "d": a}
     yield "other_convention", None, "", {"convention": "modified" if robot.convention == "standard" else "standard"}
     yield "all_alphas_negated", None, "", {"alpha": -alpha}
     arms = [mechanism.mechanism_of(each, ends=False) for each in (robot, other)]
-    of_a, of_d = ([float(np.abs(getattr(each, column)).sum()) for each in arms] for column in "ad")
-    for sizes, columns in (
-        ([x + y for x, y in zip(of_a, of_d)], {"a": a, "d": d}),
-        (of_a, {"a": a}),
-        (of_d, {"d": d}),
-    ):
-        ratio = sizes[1] / sizes[0] if min(sizes) > 0 else 1.0
-        near = min(UNITS, key=lambda factor: abs(math.log(ratio / factor)))
-        if abs(math.log(ratio / near)) < math.log(2):
-            only = "" if len(columns) > 1 else f"{next(iter(columns))}, "
-            yield "unit", near, only + UNITS[near], {key: near * values for key, values in columns.items()}
     for ratio in _ratios(*arms):
         yield "scale", ratio, "", {"a": a * ratio, "d": d * ratio}
-    for unit, scale in ANGLE_UNITS.items():
-        yield "angle_unit", scale, unit, {"alpha": alpha * scale}
     for rows, names in itertools.product((1, -1), SHIFTED):
         yield "rows_shifted", float(rows), ", ".join(names), {key: np.roll(getattr(robot, key), rows) for key in names}
 
@@ -590,7 +750,6 @@ def _causes_of_zeros(
     moved = int((np.abs(zeros) > tolerances.angle).sum())
     if moved and not found.reverses.any():
         mistakes: list[tuple[CauseCode, float | None, str, Reals]] = []
-        mistakes += [("angle_unit", scale, f"offset, {unit}", offset * scale) for unit, scale in ANGLE_UNITS.items()]
         if moved > 1:  # one zero that is half a turn or a quarter off can be chosen so
             mistakes += [("offsets_negated", None, "", -offset)]
             mistakes += [("rows_shifted", float(rows), "offset", np.roll(offset, rows)) for rows in (1, -1)]

@@ -47,6 +47,7 @@ def read_arm(
     base: str | None = None,
     tip: str | None = None,
     xacro: Sequence[str] = (),
+    as_printed: bool = False,
 ) -> ReadArm:
     """Read an arm's table, limits and speeds.
 
@@ -54,8 +55,8 @@ def read_arm(
     ----------
     source : a robot's name, or a path that ends in .csv, .yaml, .urdf or .xacro
     convention : of a D-H table; a column ``convention`` in the table takes precedence
-    length_unit, angle_unit : of a D-H table whose column names say mm and deg although its values are in another unit;
-        None to detect that from the values
+    length_unit, angle_unit : of a D-H table whose column names say mm and deg although its values are in another unit
+    as_printed : keep numbers of a D-H table that look like another unit, as :func:`er3a.files.dh_table.read_dh_table`
     base, tip, xacro : for a URDF, as in :func:`er3a.import_urdf` and ``er3a.formats.urdf_tree``
 
     Raises
@@ -66,7 +67,7 @@ def read_arm(
     path = Path(source)
     if path.suffix == ".csv":
         content, notes = read_dh_table(
-            path, robot_name(path), convention, length_unit=length_unit, angle_unit=angle_unit, as_printed=True
+            path, robot_name(path), convention, length_unit=length_unit, angle_unit=angle_unit, as_printed=as_printed
         )
         robot = robot_of(content)
         return ReadArm(robot, True, notes, beside_the_table(robot))
@@ -83,7 +84,7 @@ def read_arm(
     )
 
 
-def read_arms(folder: Path, **options: str | None) -> tuple[dict[str, ReadArm], tuple[str, ...]]:
+def read_arms(folder: Path, **options: str | bool | None) -> tuple[dict[str, ReadArm], tuple[str, ...]]:
     """All arms in a folder, by file name, and the files that were not read, with the reason.
 
     Raises

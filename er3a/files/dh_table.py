@@ -9,7 +9,8 @@ modified, the same in all rows) takes precedence over the reader's argument. Col
 instead, and are then named ``d_m``, ``a_in``, ``alpha_rad``, ``speed_rad_s``. Headings and cells may also be as
 books, articles and spreadsheets print them: headings as symbols with or without units and subscripts (``α(i-1)``,
 ``a [mm]``, ``d_i``, ``关节角θ(°)``), cells with degree signs, fractions of pi, and variables (``q2-90``, ``θ5*``,
-``d3*``, ``*``).
+``d3*``, ``*``). A row in which nothing moves is a fixed transform: its ``type`` is "fixed" (or "tool", after the
+flange), or it has no variable although others have one, or a name without a number (``Flange``).
 """
 
 from __future__ import annotations
@@ -21,24 +22,28 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+
 from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn, Lines, check_widths, read_csv, read_lines
-from er3a.files.robot_file import SHORTEST_PLAIN_LENGTH_MM, RobotFile, far_normals
-from er3a.files.units import MAX_DEG, look_like_radians
+from er3a.files.robot_file import AS_PRINTED, SHORTEST_PLAIN_LENGTH_MM, RobotFile, far_normals
+from er3a.files.units import MAX_DEG, doubt, look_like_radians
 from er3a.files.yaml_file import parse
+from er3a.geometry.transforms import rot_x, rot_y, rot_z, rpy_of, translation
+from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import RADIANS_BELOW_DEG, limit_in_degrees
 from er3a.robots.robot import CONVENTIONS, MAX_JOINTS, Convention, Grade
 
 _NUMBER, _OF_KIND = CsvColumn(float), CsvColumn(float, optional=True)
-NEEDED = {"joint": CsvColumn(int), "a_mm": _NUMBER, "alpha_deg": _NUMBER, "d_mm": _NUMBER}
+NEEDED = {"joint": CsvColumn(int, optional=True), "a_mm": _NUMBER, "alpha_deg": _NUMBER, "d_mm": _NUMBER}
 OPTIONAL = {
     "convention": CsvColumn(str, choices=CONVENTIONS),
-    "type": CsvColumn(str, choices=("revolute", "prismatic")),
+    "type": CsvColumn(str, choices=("revolute", "prismatic", "fixed", "tool")),
     "theta_deg": _OF_KIND,
     "beta_deg": CsvColumn(float),
     "calibrated": CsvColumn(str, choices=("true", "false")),
     "offset_deg": _OF_KIND,
-    "direction": CsvColumn(int),
+    "direction": CsvColumn(int, optional=True),
     "lower_deg": _OF_KIND,
     "upper_deg": _OF_KIND,
     "lower_mm": _OF_KIND,
@@ -47,9 +52,9 @@ OPTIONAL = {
     "speed_mm_s": _OF_KIND,
 }
 ASSUMED_LIMIT_DEG = 180.0
-LengthUnit = Literal["mm", "m", "in"]
+LengthUnit = Literal["mm", "cm", "m", "in"]
 AngleUnit = Literal["deg", "rad"]
-MILLIMETRES: dict[LengthUnit, float] = {"mm": 1.0, "m": 1000.0, "in": 25.4}
+MILLIMETRES: dict[LengthUnit, float] = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
 DEGREES: dict[AngleUnit, float] = {"deg": 1.0, "rad": math.degrees(1.0)}
 OTHER_UNITS: dict[str, tuple[str, float]] = {unit: ("mm", scale) for unit, scale in MILLIMETRES.items() if unit != "mm"}
 OTHER_UNITS |= {"rad": ("deg", DEGREES["rad"])}
@@ -76,7 +81,9 @@ def read_dh_table(
     name : of the robot
     length_unit, angle_unit : units of a table whose column names say mm and deg although its values are in other units;
         None means mm and deg, unless the values can't be
-    as_printed : convert values that look like another unit, with a note; otherwise they are refused
+    as_printed : keep values in the unit that their column says although they look like another; each gives a
+        :class:`er3a.errors.DoubtfulUnit`. Otherwise they are refused. Columns that say no unit are taken for what their
+        values look like, with a doubt too
 
     Returns
     -------
@@ -102,16 +109,20 @@ def read_dh_table(
             if row[column] is not None
         }
     convention = printed.convention or convention
-    notes = [*printed.notes, *_in_own_units(path, rows, length_unit, angle_unit, as_printed, {*converted})]
+    notes = [*printed.notes]
+    notes += _in_own_units(path, rows, length_unit, angle_unit, as_printed, {*converted}, printed.without_unit)
     lengths = [(abs(row[key]), row, key) for row in rows for key in ("a_mm", "d_mm") if row[key]]
     short = [(row, key) for length, row, key in lengths if length < SHORTEST_PLAIN_LENGTH_MM]
     unsaid = [each for each in short if each[1] not in converted]
-    if unsaid and not (as_printed or length_unit or _calibrated(rows, convention)):
+    if unsaid and not (length_unit or _calibrated(rows, convention)):
         row, key = unsaid[0]
-        problem = f"{row[key]:g} mm looks like metres"
-        remedy = f"Write {1000 * row[key]:g}, or name the column {key[0]}_m; if so short a length is meant, give"
-        remedy += " --length-unit mm, or add a column calibrated with true in each row"
-        raise InputError(path, f"row {row['row']}, column {key}", problem, remedy)
+        if not as_printed:
+            problem = f"{row[key]:g} mm looks like metres"
+            remedy = f"Write {1000 * row[key]:g}, or name the column {key[0]}_m; if so short a length is meant, give"
+            remedy += " --length-unit mm, or add a column calibrated with true in each row"
+            raise InputError(path, f"row {row['row']}, column {key}", problem, remedy)
+        if all(abs(each[key]) < SHORTEST_PLAIN_LENGTH_MM for each in rows):
+            doubt(None, f"column {key}", f"{row[key]:g} mm", "metres", file=path)
     given = set(names)
     if len(stated := {row["convention"] for row in rows} if "convention" in given else {convention}) > 1:
         raise InputError(path, "column convention", "two conventions in one table", "Write the same in all rows")
@@ -120,6 +131,8 @@ def read_dh_table(
         if len(pair := given & {f"lower_{unit}", f"upper_{unit}"}) == 1:
             missing = ({f"lower_{unit}", f"upper_{unit}"} - pair).pop()
             raise InputError(path, f"column {missing}", "missing beside the other limit", "Give both limits, or none")
+    notes += _fixed_said(rows)
+    rows, placed = _without_fixed_rows(rows, convention)
     if [row["joint"] for row in rows] != list(range(1, len(rows) + 1)) or not 1 <= len(rows) <= MAX_JOINTS:
         problem = f"the joints are {', '.join(str(row['joint']) for row in rows) or 'none'}"
         remedy = f"er3a models 1 to {MAX_JOINTS} joints: write one row for each, from 1 on in order"
@@ -131,9 +144,92 @@ def read_dh_table(
     if _far_normals(rows, convention):
         notes.append("d of more than 5 m that cancel: read as a calibrated table, with Hayati's beta in place of them")
     content = _content(rows, given, name, convention, path.name)
+    content |= {group: _placement(T, path.name) for group, T in placed.items() if not np.array_equal(T, np.eye(4))}
+    if angle_unit is not None:
+        content["units_checked"] = True
     if short or 0 < max((length for length, *_ in lengths), default=0.0) < SHORTEST_ARM_MM:
         content["dh"]["calibrated"] = True  # lengths of a millimetre or less are meant
-    return parse(RobotFile, content, path), tuple(notes)
+    return parse(RobotFile, content, path, AS_PRINTED if as_printed else None), tuple(notes)
+
+
+# Rows in which nothing moves ------------------------------------------------------------------------------------------
+
+FIXED = "fixed", "tool"
+PARALLEL = 1e-9  # sine of an angle between axes below which a common normal has no digits left
+DIGITS = 9  # of mm and deg, that products of matrices leave
+
+
+def _fixed_said(rows: list[dict[str, Any]]) -> Iterator[str]:
+    if fixed := [str(row["row"]) for row in rows if row.get("type") in FIXED]:
+        yield f"row {', '.join(fixed)}: nothing moves there; read as a fixed transform"
+
+
+def _without_fixed_rows(rows: list[dict[str, Any]], convention: str) -> tuple[list[dict[str, Any]], dict[str, Reals]]:
+    """The rows of joints, and what fixed rows before and after them make of base, flange and tool, (4, 4), mm.
+
+    A fixed row between two joints is exactly part of the link there. Any rigid transform between two axes is
+    ``Rz Tz Tx(a) Rx(alpha) Rz Tz`` along their common normal (Denavit, Hartenberg 1955); the turns and shifts at its
+    ends commute with the joints' motions, so they join theta and d of the neighbouring rows.
+    """
+    base, between, tool = np.eye(4), np.eye(4), np.eye(4)
+    joints: list[dict[str, Any]] = []
+    waiting = carried = False
+    for row in rows:
+        carried |= row.get("type") == "tool"
+        if row.get("type") not in FIXED:
+            if waiting:
+                _join(joints[-1], between @ tool, row, convention)
+            joints.append(row)
+            between, tool, waiting, carried = np.eye(4), np.eye(4), False, False
+        elif not joints:
+            base = base @ _fixed(row, convention)
+        elif carried:
+            tool, waiting = tool @ _fixed(row, convention), True
+        else:
+            between, waiting = between @ _fixed(row, convention), True
+    return joints, {"base": base, "flange": between, "tool": tool}
+
+
+def _across(row: dict[str, Any]) -> Reals:
+    turn: Reals = rot_x(math.radians(row["alpha_deg"])) @ rot_y(math.radians(row.get("beta_deg") or 0.0))
+    return translation(row["a_mm"], 0, 0) @ turn
+
+
+def _fixed(row: dict[str, Any], convention: str) -> Reals:
+    """A row's transform (4, 4), mm, with the variable at 0."""
+    theta = (row.get("offset_deg") or 0.0) + (row.get("theta_deg") or 0.0)
+    along: Reals = rot_z(math.radians(theta)) @ translation(0, 0, row["d_mm"])
+    return along @ _across(row) if convention == "standard" else _across(row) @ along
+
+
+def _join(before: dict[str, Any], fixed: Reals, after: dict[str, Any], convention: str) -> None:
+    """Make a fixed transform (4, 4), mm, part of the link between two rows."""
+    link = before if convention == "standard" else after
+    T = _across(link) @ fixed if convention == "standard" else fixed @ _across(link)
+    (x, y, z), (u, v, w) = T[:3, 3], T[:3, 2]
+    sine = math.hypot(u, v)
+    if sine > PARALLEL:
+        turn = math.atan2(u, -v)
+        a, across = x * math.cos(turn) + y * math.sin(turn), y * math.cos(turn) - x * math.sin(turn)
+        far = -across / sine
+    else:
+        turn, far = (math.atan2(y, x) if math.hypot(x, y) > 10.0**-DIGITS else 0.0), 0.0
+        a = math.hypot(x, y)
+    alpha = math.atan2(sine if sine > PARALLEL else 0.0, w)
+    rest = rot_x(-alpha) @ rot_z(-turn) @ T
+    link |= {"a_mm": round(a, DIGITS), "alpha_deg": round(math.degrees(alpha), DIGITS)}
+    if link.get("beta_deg"):
+        link["beta_deg"] = 0.0
+    ends = (before, turn, z - w * far), (after, math.atan2(rest[1, 0], rest[0, 0]), far)
+    for row, angle, shift in ends:
+        theta = "theta_deg" if _unit(row) == "mm" else "offset_deg"
+        row[theta] = round((row.get(theta) or 0.0) + math.degrees(angle), DIGITS)
+        row["d_mm"] = round(row["d_mm"] + shift, DIGITS)
+
+
+def _placement(T: Reals, source: str) -> dict[str, Any]:
+    xyz, rpy = ((np.round(each, DIGITS) + 0.0).tolist() for each in (T[:3, 3], np.degrees(rpy_of(T))))
+    return {"source": f"Table {source}, a row without a joint", "grade": "claim", "xyz_mm": xyz, "rpy_deg": rpy}
 
 
 def _assumed(given: set[str], kinds: set[str], convention: Convention) -> Iterator[str]:
@@ -158,7 +254,7 @@ def _unit_of(column: str) -> str:
 def _usual_unit(column: str) -> tuple[str, float | None]:
     """A column's name in mm or degrees, and what takes its values to those; None if its name has them already."""
     unit, scale = OTHER_UNITS.get(_unit_of(column), ("", None))
-    return (column if scale is None else re.sub(r"_(m|in|rad)(_s)?$", rf"_{unit}\2", column)), scale
+    return (column if scale is None else re.sub(r"_(cm|m|in|rad)(_s)?$", rf"_{unit}\2", column)), scale
 
 
 def _in_own_units(
@@ -168,44 +264,46 @@ def _in_own_units(
     angle_unit: AngleUnit | None,
     as_printed: bool,
     own: set[str],
+    without_unit: frozenset[str],
 ) -> Iterator[str]:
-    """Take all values to mm and degrees. Lengths that are another unit's are refused, or with ``as_printed`` taken for
-    what they are, with a note; so are twists that can only be radians, which are otherwise left as they are, with a
-    note. Degrees that were converted twice are taken once. ``own``: columns that said their unit."""
+    """Take all values to mm and degrees, and doubt or refuse those that are another unit's.
+
+    Lengths are refused, with ``as_printed`` doubted, and taken for what they are only if no heading says their unit.
+    Twists that can only be radians stay degrees, with a note, unless ``as_printed`` and no heading says their unit.
+    ``own``: columns that said their unit; ``without_unit``: those whose headings say none.
+    """
     lengths = [abs(row[key]) for row in rows for key in ("a_mm", "d_mm") if row[key] and key not in own]
     unit = length_unit or "mm"
-    if length_unit is None and lengths and not any(_unit(row) == "mm" for row in rows):
-        unit = _likely_unit(lengths)
-        if unit != "mm":
-            word = {"m": "metres", "in": "inches"}[unit]
-            if not as_printed:
-                problem = f"the lengths, {max(lengths):g} mm at most, are those of an arm in {word}"
-                remedy = f"Name the columns a_{unit} and d_{unit}, or give --length-unit {unit}"
-                remedy += " (or mm)" if max(lengths) > SHORTEST_PLAIN_LENGTH_MM else ""
-                raise InputError(path, "columns a_mm, d_mm", problem, remedy)
+    likely = "mm" if any(_unit(row) == "mm" for row in rows) or not lengths else _likely_unit(lengths)
+    if length_unit is None and likely != "mm":
+        word = {"m": "metres", "in": "inches"}[likely]
+        if not as_printed:
+            problem = f"the lengths, {max(lengths):g} mm at most, are those of an arm in {word}"
+            remedy = f"Name the columns a_{likely} and d_{likely}, or give --length-unit {likely}"
+            remedy += " (or mm)" if max(lengths) > SHORTEST_PLAIN_LENGTH_MM else ""
+            raise InputError(path, "columns a_mm, d_mm", problem, remedy)
+        doubt(None, "columns a, d", f"{max(lengths):g} mm at most", word, file=path)
+        if {"a_mm", "d_mm"} - own <= without_unit:
+            unit = likely
             yield f"the lengths, {max(lengths):g} at most, were read as {word}; --length-unit mm if they are mm"
-    turned = {column for column, value in rows[0].items() if _unit_of(column) == "deg"} - own
+    turned = {column for column in rows[0] if _unit_of(column) == "deg"} - own if rows else set()
     if angle_unit is None:
+        if as_printed and (wide := [row[c] for row in rows for c in turned if row[c] and abs(row[c]) > MAX_DEG]):
+            doubt(None, "angles", f"{wide[0]:g} deg", "degrees that were converted twice", file=path)
         turned = {column for column in turned if _in_radians(rows, column)} if _twists_in_radians(rows, own) else set()
-        if turned and not as_printed:
+        if turned and as_printed and "alpha_deg" in without_unit:
+            doubt(None, ", ".join(sorted(turned)), f"{rows[0]['alpha_deg']:g} deg", "radians", file=path)
+            yield f"{', '.join(sorted(turned))} were read as radians; --angle-unit deg if they are degrees"
+        elif turned:
             yield f"{', '.join(sorted(turned))} look like radians: give --angle-unit rad if they are"
             turned = set()
-        elif turned:
-            yield f"{', '.join(sorted(turned))} were read as radians; --angle-unit deg if they are degrees"
     elif angle_unit == "deg":
         turned = set()
-    in_degrees = "alpha_deg" not in own | turned
-    twice = [row for row in rows if in_degrees and abs(row["alpha_deg"]) > MAX_DEG]
     for row in rows:
         for column, value in row.items():
             if column not in own and isinstance(value, float):
                 scale = DEGREES["rad"] if column in turned else _scale_of(column, unit)
                 row[column] = _converted(column, value, scale)
-    for row in twice:
-        alpha, once = row["alpha_deg"], math.radians(row["alpha_deg"])
-        row["alpha_deg"] = once
-        problem = f"{alpha:g} deg is more than ten turns: read as {once:.6g} deg that were converted twice"
-        yield f"row {row['row']}, column alpha_deg: {problem}"
 
 
 def _converted(column: str, value: float, scale: float) -> float:
@@ -255,6 +353,7 @@ def _check_kind(path: Path, row: dict[str, Any], given: set[str]) -> None:
     """Reject cells that are empty, or filled in for the other kind of joint."""
     unit = _unit(row)
     own = {f"lower_{unit}", f"upper_{unit}", f"speed_{unit}_s", "theta_deg" if unit == "mm" else "offset_deg"}
+    own |= {"joint", "direction"}
     for column in sorted(given & {key for key, kind in OPTIONAL.items() if kind.optional}):
         where = f"row {row['row']}, column {column}"
         if column in own and row[column] is None:
@@ -333,7 +432,7 @@ _LENGTHS = {
     "偏距": "d",
 }
 _LENGTHS |= {"连杆偏距": "d", "连杆偏移": "d", "offset": "offset"}
-_OURS = re.compile(r"(joint)|(a|alpha|d|offset)_(mm|m|in|deg|rad)")
+_OURS = re.compile(r"(joint)|(a|alpha|d|offset)_(mm|cm|m|in|deg|rad)")
 _ANGLES = {
     "α": "alpha",
     "alpha": "alpha",
@@ -350,17 +449,20 @@ _BEFORE = re.compile(r"i-1|ᵢ₋₁|j-1")
 _PLAIN = str.maketrans({"−": "-", "–": "-", "ϑ": "θ", "⍺": "α", "∗": "*", "＊": "*", "（": "(", "）": ")"})
 _PLAIN |= str.maketrans(dict(zip("₀₁₂₃₄₅₆₇₈₉", "0123456789")))
 _VARIABLE = re.compile(r"(?<![\w.])([+-]?)(?:(?:q|θ|theta|d)_?\d*\*?|\*|var(?:iable|\.)?|变量)(?:\(t\))?(?=[-+(]|$)")
+_NUMBERED = re.compile(r"\d")
+_TOOL = re.compile(r"tool|tcp|grip|hand|effector|^\s*g\s*$|工具|夹")  # a row's name, of what the flange carries
 _PI = re.compile(r"([+-]?)(\d+(?:\.\d*)?)?\*?(?:π|pi)(?:/(\d+(?:\.\d*)?))?")
 
 
 @dataclass(frozen=True)
 class PrintedTable:
-    """Lines as a file's lines, under er3a's headings; what the headings say of the
-    convention; what was read into them, in words."""
+    """Lines as a file's lines, under er3a's headings; what the headings say of the convention; what was read into
+    them, in words; columns of which neither heading nor cells say the unit."""
 
     lines: Lines
     convention: Convention | None
     notes: tuple[str, ...]
+    without_unit: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -416,22 +518,20 @@ class _Table:
         self.units = {k: own.unit or self._said(k) for k, own in headings.items() if own.quantity != "joint"}
 
     def converted(self) -> PrintedTable:
-        sliding = self._sliding()
-        columns: dict[str, list[str]] = {}
+        kinds = self._kinds()
+        columns: dict[str, list[str]] = {"joint": self._joints(kinds)}
         offsets: list[str] = []
         for k, name in enumerate(self.header):
             cells = [cells[k] for _, cells in self.rows]
             own = self.headings.get(k)
             if own is None:
                 columns[name] = cells
-            elif own.quantity == "joint":
-                columns["joint"] = [re.sub(r"^\D*(\d+)\D*$", r"\1", cell.translate(_PLAIN)) for cell in cells]
             elif own.quantity == "theta":
-                offsets = self._theta(k, sliding, columns)
-            else:
-                self._plain(k, own, sliding, columns)
-        if any(sliding) and "type" not in self.header:
-            columns["type"] = ["prismatic" if slides else "revolute" for slides in sliding]
+                offsets = self._theta(k, kinds, columns)
+            elif own.quantity != "joint":
+                self._plain(k, own, kinds, columns)
+        if set(kinds) - {"revolute"} and "type" not in self.header:
+            columns["type"] = kinds
         before = {own.before for own in self.headings.values() if own.quantity in ("a", "alpha")}
         convention: Convention | None = "modified" if before == {True} and "convention" not in self.header else None
         notes = ["a and alpha of the link before the joint (i-1): read as modified D-H (Craig)"] if convention else []
@@ -439,7 +539,39 @@ class _Table:
             notes.append(f"theta was read as the joint's angle with an offset: {', '.join(offsets)}")
         numbers = [number for number, _ in self.rows]
         made = [(number, list(cells)) for number, cells in zip(numbers, zip(*columns.values()))]
-        return PrintedTable([(0, list(columns)), *made], convention, tuple(notes))
+        silent = {own.quantity for k, own in self.headings.items() if k in self.units and not self.units[k]}
+        unsaid = frozenset(name for name in columns if name.rpartition("_")[0] in silent)
+        return PrintedTable([(0, list(columns)), *made], convention, tuple(notes), unsaid)
+
+    def _joints(self, kinds: list[str]) -> list[str]:
+        """The number of each row's joint, "" where nothing moves.
+
+        The variables' numbers, from 0 or 1 on, are held against the order of the rows. Where some rows are fixed, the
+        table's numbers may be those of its rows; they become those of its joints.
+        """
+        moving = [row for row, kind in enumerate(kinds) if kind not in FIXED]
+        variables = [self._variable_number(row, kinds[row]) for row in moving]
+        start = 0 if variables[:1] == [0] else 1
+        for joint, (row, number) in enumerate(zip(moving, variables), start):
+            if number not in (None, joint):
+                problem = f"the variable is number {number} where that of joint {joint} belongs"
+                raise InputError(self.path, f"row {self.rows[row][0]}", problem, "Order the rows, or correct it")
+        order = [str(joint) for joint in range(1, len(moving) + 1)]
+        labels = order
+        if (k := self.column.get("joint")) is not None:
+            labels = [_label(self.rows[row][1][k]) for row in moving]
+            numbers = [int(label) - row for label, row in zip(labels, moving) if label.isdecimal()]
+            if len(moving) < len(kinds) and len(numbers) == len(moving) and len(set(numbers)) == 1:
+                labels = order
+        found = dict(zip(moving, labels))
+        return [found.get(row, "") for row in range(len(kinds))]
+
+    def _variable_number(self, row: int, kind: str) -> int | None:
+        """The number in a row's variable; None if it has none."""
+        k = self.column.get("d" if kind == "prismatic" else "theta")
+        found = None if k is None else _variable(self.rows[row][1][k])
+        digits = re.search(r"\d+", found[0]) if found else None
+        return int(digits[0]) if digits else None
 
     def _said(self, k: int) -> str:
         """The unit that a column's cells say; "" if none."""
@@ -455,35 +587,47 @@ class _Table:
         numbers = [abs(float(cell)) for cell in cells if re.fullmatch(r"[+-]?\d+(\.\d*)?", cell)]
         return "rad" if "rad" in self.units.values() and max(numbers, default=0) < RADIANS_BELOW_DEG else "deg"
 
-    def _sliding(self) -> list[bool]:
-        """Whether each row's d is a variable, and its theta none."""
-        k = self.column.get("d")
+    def _kinds(self) -> list[str]:
+        """The type of each row: its d slides if that is a variable, and theta none; nothing moves in a row that has no
+        variable although others have one, or no number although others have one."""
         if "type" in self.header:
-            return [cells[self.header.index("type")].strip() == "prismatic" for _, cells in self.rows]
-        variable = [k is not None and _variable(cells[k]) is not None for _, cells in self.rows]
-        theta = self.column.get("theta")
-        return [
-            free and (theta is None or _variable(cells[theta]) is None) for free, (_, cells) in zip(variable, self.rows)
-        ]
+            return [cells[self.header.index("type")].strip() for _, cells in self.rows]
+        turns, slides = ([self._varies(name, cells) for _, cells in self.rows] for name in ("theta", "d"))
+        k = self.column.get("joint")
+        names = ["" if k is None else cells[k] for _, cells in self.rows]
+        numbered = any(map(_NUMBERED.search, names))
+        found = []
+        for turned, slid, name in zip(turns, slides, names):
+            still = any([*turns, *slides]) or (numbered and name.strip() and not _NUMBERED.search(name))
+            fixed = "tool" if _TOOL.search(name.lower()) else "fixed"
+            found.append("revolute" if turned else "prismatic" if slid else fixed if still else "revolute")
+        return found
 
-    def _plain(self, k: int, own: _Heading, sliding: list[bool], columns: dict[str, list[str]]) -> None:
+    def _varies(self, name: str, cells: list[str]) -> bool:
+        k = self.column.get(name)
+        return k is not None and _variable(cells[k]) is not None
+
+    def _plain(self, k: int, own: _Heading, kinds: list[str], columns: dict[str, list[str]]) -> None:
         """A column of a, alpha or d; a sliding joint's d keeps the constant beside its variable."""
         texts = []
-        for (number, cells), slides in zip(self.rows, sliding):
+        for (number, cells), kind in zip(self.rows, kinds):
             text = cells[k]
-            if own.quantity == "d" and slides:
+            if own.quantity == "d" and kind == "prismatic":
                 text = self._beside(number, k, text)[1]
             texts.append(text)
         self._add(k, own.quantity, texts, columns)
 
-    def _theta(self, k: int, sliding: list[bool], columns: dict[str, list[str]]) -> list[str]:
+    def _theta(self, k: int, kinds: list[str], columns: dict[str, list[str]]) -> list[str]:
         """Directions and offsets of joints that turn, and theta of those that slide."""
+        sliding = [kind == "prismatic" for kind in kinds]
         parts = [
             (0, cells[k]) if slides else self._beside(number, k, cells[k])
             for (number, cells), slides in zip(self.rows, sliding)
         ]
         turning = ["" if slides else text for slides, (_, text) in zip(sliding, parts)]
-        offsets = [f"joint {row + 1} {text}" for row, text in enumerate(turning) if text.strip("0.°+- ")]
+        offsets = [
+            f"joint {joint} {text}" for joint, text in zip(columns["joint"], turning) if joint and text.strip("0.°+- ")
+        ]
         if "offset" not in self.column:
             self._add(k, "offset", turning, columns)
         elif offsets:
@@ -519,6 +663,10 @@ class _Table:
             problem = "fractions of pi in a column of degrees"
             raise InputError(self.path, f"column {self.header[k]}", problem, "Write all its angles in one unit")
         columns[f"{name}_{unit}"] = [_of_pi(found) if found else cell for found, cell in zip(in_pi, plain)]
+
+
+def _label(cell: str) -> str:
+    return re.sub(r"^\D*(\d+)\D*$", r"\1", cell.translate(_PLAIN)).strip()
 
 
 def _compact(cell: str) -> str:

@@ -10,7 +10,7 @@ from pathlib import PurePosixPath
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import AfterValidator, Field, field_validator, model_validator
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
 from er3a.files.units import (
     MAX_DEG,
@@ -38,6 +38,8 @@ HEAVIEST_PAYLOAD_KG = 2_500.0
 """The strongest arms carry 2.3 t."""
 METRES_BELOW_MM, MIN_CENTRE_MM = 0.5, 0.02  # between them a link's centre of mass may be written in metres ...
 METRES_ABOVE_KG, FAR_WIDER = 0.5, 100.0  # ... of a link heavier than this, with a gyration radius so many times larger
+AS_PRINTED = {"as_printed": True}
+"""The context in which a table's values may be another unit's."""
 RADIANS_BELOW = 2.01 * math.pi  # the widest limit of an arm, if it is written in radians
 MAX_PACKED = 400_000  # letters of a link's corners or triangles
 
@@ -711,7 +713,20 @@ class RobotFile(InputFile):
         return self
 
     @model_validator(mode="after")
-    def _units_plausible(self):
+    def _units_plausible(self, info: ValidationInfo):
+        if info.context != AS_PRINTED:
+            self._check_sizes()
+        angles = [row.alpha_deg for row in self.dh.rows] + [row.offset_deg or 0.0 for row in self.zero.rows]
+        turned = [angle for angle in angles if angle]
+        if look_like_radians(turned * 2 if len(turned) == 1 else turned):
+            small = ", ".join(f"{angle:g}" for angle in angles if 0 < abs(angle) < RADIANS_BELOW_DEG)
+            doubt(self, "dh.rows, zero.rows", f"{small} deg", "radians")
+        for key in ("base", "flange", "tool"):
+            check_placement(key, getattr(self, key), self.dh.calibrated and key == "base")
+        return self
+
+    def _check_sizes(self) -> None:
+        """Reject lengths and angles that can only be another unit's."""
         for i, row in enumerate(self.dh.rows):
             for key in ("a_mm", "d_mm"):
                 _check_length(f"dh.rows[{i}].{key}", getattr(row, key), self.dh.calibrated)
@@ -722,13 +737,6 @@ class RobotFile(InputFile):
                 raise ValueError(f"{problem} | Set dh.calibrated: true, or remove it")
             _check_angle(f"zero.rows[{i}].offset_deg", self.zero.rows[i].offset_deg or 0.0)
         self._check_far_normals()
-        angles = [row.alpha_deg for row in self.dh.rows] + [row.offset_deg or 0.0 for row in self.zero.rows]
-        turned = [angle for angle in angles if angle]
-        if look_like_radians(turned * 2 if len(turned) == 1 else turned):
-            small = ", ".join(f"{angle:g}" for angle in angles if 0 < abs(angle) < RADIANS_BELOW_DEG)
-            doubt(self, "dh.rows, zero.rows", f"{small} deg", "radians")
-        for key in ("base", "flange", "tool"):
-            check_placement(key, getattr(self, key), self.dh.calibrated and key == "base")
         longest, least = max(max(abs(row.a_mm), abs(row.d_mm)) for row in self.dh.rows), MIN_LONGEST_MM
         if self.dh.calibrated:  # lengths that were derived may all be short
             placed = [abs(value) for each in (self.base, self.flange, self.tool) if each for value in each.xyz_mm]
@@ -737,7 +745,6 @@ class RobotFile(InputFile):
             raise ValueError(
                 f"dh.rows: the longest length is {longest:g} mm, which can only be metres | Multiply by 1000"
             )
-        return self
 
     def _check_far_normals(self) -> None:
         """Reject d of hundreds of metres that do not cancel, and bodies in frames as far away."""

@@ -166,8 +166,10 @@ def read_yaml(path: str | Path) -> dict[str, Any]:
     return data
 
 
-def parse(model: type[Model], data: dict[str, Any], path: str | Path | None) -> Model:
-    """Validate ``data`` as ``model``; the first fault is raised as :class:`InputError`.
+def parse(
+    model: type[Model], data: dict[str, Any], path: str | Path | None, context: dict[str, Any] | None = None
+) -> Model:
+    """Validate ``data`` as ``model``, in pydantic's ``context``; the first fault is raised as :class:`InputError`.
 
     Values that look like a mistake give an :class:`InputWarning` that names the file, and numbers of doubtful unit one
     that names their place in it, unless the file says that its units are checked.
@@ -175,7 +177,7 @@ def parse(model: type[Model], data: dict[str, Any], path: str | Path | None) -> 
     try:
         with warnings.catch_warnings(record=True) as seen:
             warnings.simplefilter("always")
-            valid = model.model_validate(data)
+            valid = model.model_validate(data, context=context)
         for told in _told(seen, valid, path):
             warnings.warn(told, stacklevel=3)
         return valid

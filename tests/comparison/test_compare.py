@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +13,7 @@ from typer.testing import CliRunner
 
 import er3a
 from er3a.comparison.compare import best_of
+from er3a.errors import InputError
 from er3a.files.arm_file import read_arm
 from er3a.files.robot_writer import write_robot
 from er3a.formats.urdf_tree import read_chain
@@ -121,10 +123,7 @@ def test_the_articles_table_is_another_arm():
     [
         (lambda arm: arm.replace(a=arm.d, d=arm.a), "a_and_d_swapped"),
         (lambda arm: arm.replace(convention="modified"), "other_convention"),
-        (lambda arm: arm.replace(a=arm.a / 25.4, d=arm.d / 25.4), "unit"),
         (lambda arm: arm.replace(a=arm.a * 1.3, d=arm.d * 1.3), "scale"),
-        (lambda arm: arm.replace(a=arm.a / 10), "unit"),
-        (lambda arm: arm.replace(alpha=np.radians(arm.alpha)), "angle_unit"),
         (lambda arm: arm.replace(d=np.roll(arm.d, 1)), "rows_shifted"),
         (
             lambda arm: arm.replace(**{each: np.roll(getattr(arm, each), 1) for each in ("a", "alpha", "d")}),
@@ -223,15 +222,40 @@ def test_arms_that_only_stand_or_count_otherwise_have_no_length_of_the_wrong_sig
         assert (found.verdict, found.zero.causes, found.directions.causes) == ("same_arm", (), ())
 
 
-def test_offsets_in_radians_are_named():
-    offset = np.radians([0, -90, 37, 180, 12, 0])
-    right = er3a.load_robot("er3_600").replace(offset=offset)
-    found = er3a.compare(right.replace(offset=np.radians(offset)), right)
-    assert found.geometry.same
-    assert [(each.code, each.unit) for each in found.zero.causes] == [("angle_unit", "offset, radian")]
-    only = right.replace(offset=offset * (np.arange(6) == 1))  # as of most arms, whose zeros differ by one quarter turn
-    found = er3a.compare(only.replace(offset=np.radians(only.offset)), only)
-    assert [(each.code, each.unit) for each in found.zero.causes] == [("angle_unit", "offset, radian")]
+@pytest.mark.parametrize(
+    ("columns", "factor"),
+    [
+        ("a d", 10.0),
+        ("a d", 1000.0),
+        ("a", 25.4),
+        ("d", 1000.0),
+        ("alpha", np.degrees(1.0)),
+        ("alpha offset", np.radians(1.0)),
+        ("offset", np.degrees(1.0)),
+        ("lower upper", np.degrees(1.0)),
+        ("speed", np.degrees(1.0)),
+    ],
+)
+@pytest.mark.parametrize("side", ["a", "b"])
+def test_a_unit_that_makes_two_tables_equal_is_named_with_its_table(columns, factor, side):
+    right = er3a.to_standard(er3a.load_robot("er3_600"))
+    right = right.replace(offset=np.radians([0, -90, 37, 180, 12, 0]), speed=np.radians([400, 300, 520, 500, 530, 840]))
+    slipped = right.replace(**{column: getattr(right, column) / factor for column in columns.split()})
+    found = er3a.compare(slipped, right) if side == "a" else er3a.compare(right, slipped)
+    assert found.verdict == "same_arm"
+    assert [(each.side, " ".join(each.entries)) for each in found.units.causes] == [(side, columns)]
+    assert found.units.causes[0].amount == pytest.approx(factor)
+    layers = (found.geometry, found.zero, found.directions, found.base, found.flange, found.limits, found.speeds)
+    assert all(layer.same for layer in layers)
+    assert er3a.compare(found.corrected, right).verdict == "equal"
+
+
+def test_a_unit_is_named_beside_an_entry_that_is_wrong_too():
+    right = er3a.to_standard(er3a.load_robot("er3_600"))
+    slipped = right.replace(a=(right.a + np.array([0, 0, 0.02, 0, 0, 0])) / 25.4, d=right.d / 25.4)
+    found = er3a.compare(slipped, right)
+    assert (found.verdict, found.units.causes[0].amount) == ("other_arm", 25.4)
+    assert [each.entry for each in found.geometry.differences] == ["a3"]
 
 
 def test_couplings_and_counts_and_kinds():
@@ -439,14 +463,50 @@ def with_columns(folder, *, scale: float = 1.0, twice: bool = False):
     return path
 
 
-@pytest.mark.parametrize(("given", "note"), [({"scale": 1e-3}, "read as metres"), ({"twice": True}, "converted twice")])
-def test_other_units_are_taken_for_what_they_are(given, note, tmp_path):
-    right = read_arm(str(with_columns(tmp_path))).robot
-    slipped = read_arm(str(with_columns(tmp_path, **given)))
-    assert any(note in text for text in slipped.notes)
-    assert er3a.compare(slipped.robot, right).geometry.same
+def compared(*words) -> tuple[int, str]:
+    """Exit code and output of a comparison on the command line."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", er3a.InputWarning)
+        done = CliRunner().invoke(app, ["compare", *map(str, words)])
+    return done.exit_code, done.stdout
 
 
+@pytest.mark.parametrize("given", [{"scale": 1e-3}, {"scale": 1 / 25.4}, {"scale": 0.1}, {"twice": True}])
+def test_a_table_in_other_units_than_it_says_is_not_usable_as_printed(given, tmp_path):
+    right = with_columns(tmp_path).rename(tmp_path / "right.csv")
+    slipped, page = with_columns(tmp_path, **given), tmp_path / "page.html"
+    code, said = compared(slipped, right, "--html", page)
+    first = said.splitlines()[0].partition(";")[0]
+    assert (code, "in another unit" in first, "in the first table" in first) == (1, True, True)
+    verdict = page.read_text(encoding="utf-8").partition('<section class="verdict')[2].partition("</section>")[0]
+    assert "in another unit" in verdict
+    assert not verdict.startswith(" pass")
+    assert compared(right, right)[0] == 0
+
+
+@pytest.mark.filterwarnings("ignore::er3a.errors.DoubtfulUnit")
+@pytest.mark.parametrize(("given", "remedy"), [({"scale": 1e-3}, ("--length-unit", "mm")), ({"twice": True}, ())])
+def test_no_table_passes_on_a_guess_of_its_units(given, remedy, tmp_path):
+    path = with_columns(tmp_path, **given)
+    assert compared(path, path)[0] == 1
+    assert json.loads(compared(path, path, "--json")[1])["verdict"] == "in_doubt"
+    with pytest.raises(InputError, match=r"metres|ten turns"):
+        read_arm(str(path))
+    if remedy:
+        assert compared(path, path, *remedy)[0] == 0
+
+
+@pytest.mark.filterwarnings("ignore::er3a.errors.DoubtfulUnit")
+def test_units_that_no_heading_says_are_settled_by_an_arm_that_agrees(tmp_path):
+    right = with_columns(tmp_path).rename(tmp_path / "right.csv")
+    bare = with_columns(tmp_path, scale=1e-3)
+    header, *rows = bare.read_text(encoding="utf-8").splitlines()
+    bare.write_text("\n".join([re.sub("_(mm|deg)", "", header), *rows]), encoding="utf-8")
+    assert compared(bare, right)[0] == 0
+    assert compared(bare, bare)[0] == 1
+
+
+@pytest.mark.filterwarnings("ignore::er3a.errors.DoubtfulUnit")
 @pytest.mark.parametrize("decimals", [6, 3])
 def test_inches_are_recognised_where_they_are_round_millimetres(decimals, tmp_path):
     path = tmp_path / "inches.csv"
@@ -454,26 +514,31 @@ def test_inches_are_recognised_where_they_are_round_millimetres(decimals, tmp_pa
     lengths = tuple((round(a, decimals), round(d, decimals)) for a, d in lengths)
     rows = [f"{k},{a},{alpha},{d}" for k, ((a, d), alpha) in enumerate(zip(lengths, (-90, 0, -90, 90, -90, 0)), 1)]
     path.write_text("\n".join(["joint,a_mm,alpha_deg,d_mm", *rows]), encoding="utf-8")
-    found = read_arm(str(path))
+    with pytest.raises(InputError, match="--length-unit in "):
+        read_arm(str(path))
+    path.write_text("\n".join(["joint,a,alpha,d", *rows]), encoding="utf-8")
+    found = read_arm(str(path), as_printed=True)
     assert found.robot.a[1] == pytest.approx(0.27, abs=25.4 * 10.0**-decimals / 1000)
     assert any("read as inches" in text for text in found.notes)
     assert read_arm(str(path), length_unit="mm").robot.a[1] == pytest.approx(lengths[1][0] / 1000)
 
 
+@pytest.mark.filterwarnings("ignore::er3a.errors.DoubtfulUnit")
 @pytest.mark.parametrize("decimals", [2, 4])
-def test_twists_in_radians_are_taken_for_what_they_are(decimals, tmp_path):
-    right = read_arm(str(with_columns(tmp_path))).robot
-    lines = [line.split(",") for line in (tmp_path / "table.csv").read_text(encoding="utf-8").splitlines()]
+def test_twists_in_radians_are_named_or_read_where_no_heading_says_degrees(decimals, tmp_path):
+    right = with_columns(tmp_path).rename(tmp_path / "right.csv")
+    lines = [line.split(",") for line in right.read_text(encoding="utf-8").splitlines()]
     for cells in lines[1:]:
         cells[3] = f"{np.radians(float(cells[3])):.{decimals}f}"
     path = tmp_path / "radians.csv"
     path.write_text("\n".join(",".join(cells) for cells in lines), encoding="utf-8")
-    found = read_arm(str(path))
-    assert any("--angle-unit deg" in text for text in found.notes)
-    assert er3a.compare(found.robot, right).geometry.same
-    with pytest.warns(er3a.InputWarning, match="may be radians"):
-        printed = er3a.compare(read_arm(str(path), angle_unit="deg").robot, right)
-    assert [(each.code, each.unit) for each in printed.geometry.causes] == [("angle_unit", "radian")]
+    code, said = compared(path, right)
+    assert code == 1
+    assert said.startswith("alpha: the angles are in another unit")
+    assert compared(path, right, "--angle-unit", "rad")[0] == 1  # of both
+    path.write_text("\n".join([",".join(lines[0]).replace("alpha_deg", "alpha"), *map(",".join, lines[1:])]))
+    assert any("--angle-unit deg" in text for text in read_arm(str(path), as_printed=True).notes)
+    assert compared(path, right)[0] == 0
 
 
 @pytest.mark.parametrize("twist", ["1.571,-3", "0.5,1.2", "1.047,-0.785"])
@@ -485,11 +550,12 @@ def test_twists_that_are_small_are_degrees(twist, tmp_path):
     assert np.degrees(read_arm(str(path)).robot.alpha[0]) == pytest.approx(float(first))
 
 
+@pytest.mark.filterwarnings("ignore::er3a.errors.DoubtfulUnit")
 def test_short_lengths_beside_long_ones_are_meant(tmp_path):
     path = tmp_path / "short.csv"
     rows = ("1,0,90,284.8", "2,0,90,1", "3,-0.35,-90,410", "4,0,0,50")
     path.write_text("\n".join(["joint,a_mm,alpha_deg,d_mm", *rows]), encoding="utf-8")
-    arm = read_arm(str(path)).robot
+    arm = read_arm(str(path), as_printed=True).robot
     assert arm.d[1] == pytest.approx(0.001)
     assert er3a.compare(arm, arm).verdict == "equal"
 

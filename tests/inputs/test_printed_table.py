@@ -111,14 +111,66 @@ def test_offsets_in_two_columns_are_refused(tmp_path):
         read_dh_table(tmp_path / "arm.csv", "arm")
 
 
+@pytest.mark.filterwarnings("ignore::er3a.errors.DoubtfulUnit")
 @pytest.mark.parametrize(("longest", "unit"), [(350, "mm"), (0.35, "m")])
 def test_one_short_length_makes_no_table_of_metres(tmp_path, longest, unit):
-    """The longest length says what unit all are in."""
+    """The longest length says what unit all are in, where no heading does."""
     rows = "".join(f"{joint},{a:g},90,0\n" for joint, a in enumerate((longest, longest / 50, longest / 2), 1))
-    (tmp_path / "arm.csv").write_text(f"joint,a_mm,alpha_deg,d_mm\n{rows}", encoding="utf-8")
+    (tmp_path / "arm.csv").write_text(f"joint,a,alpha_deg,d\n{rows}", encoding="utf-8")
     content, notes = read_dh_table(tmp_path / "arm.csv", "arm", as_printed=True)
     assert robot_of(content).a == pytest.approx([0.35, 0.007, 0.175])
     assert any("metres" in note for note in notes) == (unit == "m")
+
+
+@pytest.mark.parametrize("convention", ["standard", "modified"])
+@pytest.mark.parametrize("seed", range(6))
+def test_rows_in_which_nothing_moves_are_fixed_transforms_wherever_they_stand(tmp_path, convention, seed):
+    """Against a product of plain matrices of all rows, with fixed rows before, between and after the joints."""
+    random = np.random.default_rng(seed)
+    kinds = [*"0q", *("0" if seed % 2 else "q"), *"q0d", *"q00q", "0", "tool"]
+    rows, lines = [], ["link,theta (deg),d (mm),a (mm),alpha (deg)"]
+    joint = 0
+    for place, kind in enumerate(kinds):
+        a, d = (float(random.choice([0, random.integers(20, 400)])) for _ in range(2))
+        alpha, theta = (float(random.choice([0, 90, -90, 180, 37])) for _ in range(2))
+        joint += kind in "qd"
+        rows.append((kind, a, alpha, d, theta))
+        turn = f"q{joint}{theta:+g}" if kind == "q" else f"{theta:g}"
+        slide = f"d{joint}+{d:g}" if kind == "d" else f"{d:g}"
+        lines.append(f"{'tool' if kind == 'tool' else place + 1},{turn},{slide},{a:g},{alpha:g}")
+    (tmp_path / "arm.csv").write_text("\n".join(lines), encoding="utf-8")
+    robot = robot_of(read_dh_table(tmp_path / "arm.csv", "arm", convention)[0])
+    assert robot.joints == joint
+    assert robot.tool[:3, 3].any() == bool(rows[-1][1] or rows[-1][3])
+    q = np.where(robot.slides, 0.123, random.uniform(-3, 3, joint))
+    T, moved = np.eye(4), iter(q.tolist())
+    for kind, a, alpha, d, theta in rows:
+        step = next(moved) if kind in "qd" else 0.0
+        turn, slide = (step, 0.0) if kind == "q" else (0.0, step)
+        T = T @ dh_matrix(convention, a / 1000, np.radians(alpha), d / 1000 + slide, np.radians(theta) + turn)
+    np.testing.assert_allclose(er3a.forward(robot, q), T, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("rows", "told"),
+    [
+        (("1,0,90,100,q1", "2,300,0,0,q3", "3,0,0,50,q2"), "number 3 where that of joint 2"),
+        (("1,0,90,100,q1", "2,300,0,0,q1"), "number 1 where that of joint 2"),
+        (("1,0,90,100,q1", "3,300,0,0,q2"), "the joints are 1, 3"),
+        (("1,0,90,100,q1", "2,300,0,0,0", "9,0,0,50,q2"), "the joints are 1, 9"),
+        (("1,0,90,100,0",), None),
+        (("1,0,90,100,q0", "2,300,0,0,q1"), None),
+        (("J1,0,90,100,0", "J2,300,0,0,0", "Flange,0,0,50,0"), None),
+    ],
+)
+def test_the_numbers_of_variables_and_joints_agree_with_the_order_of_the_rows(tmp_path, rows, told):
+    (tmp_path / "arm.csv").write_text("\n".join(["joint,a (mm),alpha (deg),d (mm),theta (deg)", *rows]))
+    if told:
+        with pytest.raises(InputError, match=told):
+            read_dh_table(tmp_path / "arm.csv", "arm")
+    else:
+        content, _ = read_dh_table(tmp_path / "arm.csv", "arm")
+        assert len(content.dh.rows) == sum(not row.startswith("Flange") for row in rows)
 
 
 @pytest.mark.parametrize("said", [True, False])

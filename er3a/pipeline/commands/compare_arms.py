@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, is_dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, is_dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from er3a.comparison.mechanism import TOLERANCE_DEG, TOLERANCE_MM
-from er3a.errors import Er3aError
+from er3a.errors import DoubtfulUnit, Er3aError
 from er3a.files.dh_table import AngleUnit, LengthUnit
 from er3a.pipeline.commands.options import ROBOT_FILES, AsJson, Xacro, app, print_json, print_note
 from er3a.robots.robot import Convention
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 MAX_TOLERANCE = 1000.0  # mm, and deg
 MATCHES_SHOWN = 5  # of a folder
 TOOLS_EQUAL = 1e-9  # m, and of axes
+OF_A_TABLE = ("column", "angles", "alpha", "offset", "dh.rows")  # keys of numbers that a comparison looks at
 _ARM = "a D-H table (.csv), a robot's name or file, a URDF or xacro"
 
 
@@ -32,11 +34,11 @@ def compare(
     convention: Annotated[Convention, typer.Option(help="D-H convention of tables")] = "standard",
     length_unit: Annotated[
         LengthUnit | None,
-        typer.Option(help="unit of lengths in D-H tables (default: mm, unless the values can't be mm)"),
+        typer.Option(help="unit of lengths in D-H tables (default: that of their columns)"),
     ] = None,
     angle_unit: Annotated[
         AngleUnit | None,
-        typer.Option(help="unit of angles in D-H tables (default: deg, unless the twists can't be deg)"),
+        typer.Option(help="unit of angles in D-H tables (default: that of their columns)"),
     ] = None,
     base: Annotated[str | None, typer.Option(help="the link of the URDF at which the arm begins")] = None,
     tip: Annotated[str | None, typer.Option(help="the link of the URDF at which the arm ends")] = None,
@@ -59,7 +61,7 @@ def compare(
     if output is not None and output.suffix not in (".yaml", ".yml"):
         raise Er3aError(f"--output is '{output}'; robot files end in .yaml")
     options: dict[str, Any] = {"convention": convention, "length_unit": length_unit, "angle_unit": angle_unit}
-    options |= {"base": base, "tip": tip}
+    options |= {"base": base, "tip": tip, "as_printed": True}
     folder, left_out = Path(b), tuple[str, ...]()
     with noted_doubts() as doubtful:
         first = read_arm(a, xacro=xacro or (), **options)
@@ -82,7 +84,12 @@ def compare(
     name, found = ranked[0]
     notes = _notes((a, first), (name, others[name]))
     compared = {Path(a).name, Path(name).name}
-    doubts = [str(each) for each in doubtful if not (folder.is_dir() and Path(each.file or "").name not in compared)]
+    doubts = [each for each in doubtful if not (folder.is_dir() and Path(each.file or "").name not in compared)]
+    doubts = _unsettled(doubts, found, Path(a) == (folder / name if folder.is_dir() else folder))
+    told = [str(each) for each in doubts]
+    if found.verdict == "equal" and doubts:
+        found = replace(found, verdict="in_doubt")
+        ranked[0] = name, found
     for note in notes:
         print_note(note)
     if output is not None and found.corrected is not None:
@@ -93,11 +100,11 @@ def compare(
         from er3a.pipeline.viewing.comparison import write_comparison
 
         where = str(folder / name) if folder.is_dir() else name
-        write_comparison((a, arm), (where, others[name].robot), found, html, (tolerance_mm, tolerance_deg), doubts)
+        write_comparison((a, arm), (where, others[name].robot), found, html, (tolerance_mm, tolerance_deg), told)
     if as_json:
-        print_json(_record(ranked, folder.is_dir()) | {"notes": notes, "doubtful_units": doubts})
+        print_json(_record(ranked, folder.is_dir()) | {"notes": notes, "doubtful_units": told})
     else:
-        _print(ranked, folder.is_dir(), doubts)
+        _print(ranked, folder.is_dir(), told)
         for written in (output if found.corrected is not None else None, html):
             if written is not None:
                 print(f"{written}: written")
@@ -105,10 +112,16 @@ def compare(
         raise typer.Exit(1)
 
 
+def _unsettled(doubts: Sequence[DoubtfulUnit], found: Comparison, one_file: bool) -> list[DoubtfulUnit]:
+    """Doubts that the comparison leaves: another arm that agrees, and is not in doubt, settles those of a table."""
+    of_table = [each for each in doubts if each.key.startswith(OF_A_TABLE)]
+    agree = found.geometry is not None and found.geometry.same and not one_file
+    settled = agree and len({str(each.file) for each in of_table}) < 2
+    return [each for each in doubts if not (settled and each in of_table)]
+
+
 def _beside(found: Comparison, first: ReadArm, other: ReadArm) -> Comparison:
     """A comparison of two tables, with what both files give beside them."""
-    from dataclasses import replace
-
     from er3a.comparison.compare import given_by_both
 
     ranges = (each for each in found.not_examined if each in ("limits", "speeds"))
@@ -136,7 +149,7 @@ def _print(ranked: list[tuple[str, Comparison]], folder: bool, doubts: list[str]
             print(f"{other}: {headline(each)}")
         print()
     print(headline(ranked[0][1]))
-    for layer, state, detail in (*layer_rows(ranked[0][1]), *doubt_rows(doubts)):
+    for layer, state, detail in (*doubt_rows(doubts), *layer_rows(ranked[0][1])):
         print(f"  {layer:<11} {state:<8} {detail}".rstrip())
 
 

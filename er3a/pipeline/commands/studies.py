@@ -76,12 +76,12 @@ def check(
     ],
     as_json: options.AsJson = False,
 ):
-    """Check input files: print the kind of each file, or its error."""
+    """Check input files: print the kind of each file, or its error. Exit code 1 if a unit is in doubt."""
     from er3a.files.robot_library import load_robot
     from er3a.files.units import noted_doubts
     from er3a.pipeline.check import PROGRAM, check_file, stage_forms
 
-    found: list[dict[str, object]] = []
+    found, worst = list[dict[str, object]](), 0
     for file in files:
         try:
             with noted_doubts() as doubts:
@@ -90,22 +90,24 @@ def check(
             options.print_error(error)
             parts = {key: getattr(error, key, None) for key in ("field", "problem", "remedy")}
             found.append({"file": str(file), "in_order": False, **parts})
+            worst = 2
             continue
         forms = stage_forms(load_robot(file)) if kind == "a robot" else {}
         more: dict[str, object] = {"stages": forms} if forms else {}
         more |= {"doubtful_units": [str(each) for each in doubts]} if doubts else {}
         more |= {"not_examined": [WHAT_IT_DOES]} if kind == PROGRAM else {}
-        found.append({"file": str(file), "in_order": True, "kind": kind} | more)
+        found.append({"file": str(file), "in_order": not doubts, "kind": kind} | more)
+        worst = max(worst, int(bool(doubts)))
         if not as_json:
-            but = f" but for {len(doubts)} doubtful unit{'s' if len(doubts) > 1 else ''}" if doubts else ""
+            state = f"{len(doubts)} doubtful unit{'s' if len(doubts) > 1 else ''}" if doubts else "in order"
             only = f"; not examined: {WHAT_IT_DOES}" if kind == PROGRAM else ""
-            print(f"{file}: {kind}, in order{but}{only}")
+            print(f"{file}: {kind}, {state}{only}")
             for stage, form in forms.items():
                 print(f"  {stage}: {form}")
     if as_json:
         options.print_json(found)
-    if not all(each["in_order"] for each in found):
-        raise typer.Exit(2)
+    if worst:
+        raise typer.Exit(worst)
 
 
 @options.app.command(rich_help_panel=options.FIRST, context_settings={"ignore_unknown_options": True})

@@ -19,6 +19,7 @@ from er3a.pipeline.messages.pages import GROUP_NAMES
 from er3a.pipeline.messages.say import joined, say, word
 
 LAYERS = {
+    "units": N_("units"),
     "geometry": N_("geometry"),
     "zero": N_("zero"),
     "directions": N_("directions"),
@@ -30,6 +31,7 @@ LAYERS = {
 }
 HEADLINES = {
     "equal": N_("equal: the same arm, usable as printed"),
+    "in_doubt": N_("equal numbers, in units that are in doubt"),
     "same_arm": N_("same arm, defined otherwise"),
     "other_arm": N_("another arm"),
     "other_joint_count": N_("another number of joints"),
@@ -53,8 +55,8 @@ STATES = {True: N_("agrees"), False: N_("differs"), None: N_("not given")}
 
 
 def headline(found: Comparison) -> str:
-    """The verdict in one sentence."""
-    text = word("comparison", HEADLINES, found.verdict)
+    """The verdict in one sentence, with units that differ first."""
+    text = joined([*map(say, found.units.causes if found.units else ()), word("comparison", HEADLINES, found.verdict)])
     if found.as_printed_mm is None or found.aligned_mm is None:
         a, b = found.joints
         return tr("{verdict}: {a} and {b}", verdict=text, a=a, b=b) if found.verdict == "other_joint_count" else text
@@ -83,7 +85,7 @@ def layer_rows(found: Comparison) -> list[tuple[str, str, str]]:
     rows = []
     for name, shown in LAYERS.items():
         layer = getattr(found, name)
-        if layer is None or (name == "coupling" and layer.same):
+        if layer is None or (name in ("units", "coupling") and layer.same):
             continue
         rows.append((tr(shown), tr(STATES[layer.same]), _detail(name, found)))
     beside = [each for each in found.not_examined if each not in LAYERS]
@@ -112,6 +114,8 @@ def _detail(name: str, found: Comparison) -> str:
         return joined([shown, *(say(each) for each in layer.causes)])
     if name == "limits" and layer.same is False:
         return tr("{limits} (the second's limits by the first's zeros and directions)", limits=say(layer))
+    if name == "units":
+        return joined([say(each) for each in layer.causes])
     if name == "coupling":
         return tr("rows {rows}", rows=", ".join(map(str, layer.rows)))
     return "" if layer.same is not False else say(layer)
@@ -145,8 +149,8 @@ def _(found: Cause) -> str:
     text = word("comparison", CAUSES, found.code)
     amount = "" if found.amount is None else f" ({found.unit} {found.amount:.6g})".replace("( ", "(")
     where = f"{', '.join(found.entries)}: " if found.entries else ""
-    side = tr("in the first table") if found.side == "a" else tr("in the second table")
-    return f"{where}{text}{amount}, {side}"
+    sides = {"a": tr("in the first table"), "b": tr("in the second table"), None: tr("in one of the tables")}
+    return f"{where}{text}{amount}, {sides[found.side]}"
 
 
 @say.register

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from er3a.comparison.compare import Comparison
+from er3a.comparison.compare import Comparison, in_units
 from er3a.files.kept_files import sha256
 from er3a.files.robot_writer import robot_file, robot_text
 from er3a.kinematics.chain import constant_links, joint_starts
@@ -37,6 +37,7 @@ def write_comparison(
     """Render a comparison as a page; ``one`` and ``other``: as they were named on the command line, and read;
     ``doubts``: about units in them."""
     corrected = found.corrected
+    slips = found.units.causes if found.units else ()
     text = "" if corrected is None else robot_text(robot_file(corrected))
     lengths, angles = (f"{value:g}" for value in tolerances)
     words = ["--tolerance-mm", lengths, "--tolerance-deg", angles, "--html", str(output)]
@@ -49,12 +50,12 @@ def write_comparison(
         names=(one[0], other[0]),
         verdict=found.verdict,
         headline=headline(found),
-        layers=[*layer_rows(found), *doubt_rows(doubts)],
+        layers=[*doubt_rows(doubts), *layer_rows(found)],
         columns=_columns(),
         rows=[] if corrected is None else _rows(one[1], corrected),
         corrected=text,
         corrected_address=page.text_address(text),
-        arms=None if corrected is None else _arms(one[1], other[1], found),
+        arms=None if corrected is None else _arms(in_units(one[1], slips, "a"), in_units(other[1], slips, "b"), found),
         compare_script=Path(__file__).with_name("comparison.js").read_text(encoding="utf-8"),
     )
 
