@@ -234,7 +234,7 @@ def diagnose(robot: Robot, references: ReferenceSet | Sequence[Reference] | str 
 
 
 def _of_arm(given: ReferenceSet | Sequence[Reference] | str | Path, robot: Robot) -> ReferenceSet:
-    """References with what the last digits of joint values leave open on an arm; single ones as a set without a name."""
+    """References with what joint values' last digits leave open on an arm; single ones as a set without a name."""
     if isinstance(given, str | Path):
         return load_references(given, robot)
     found = given if isinstance(given, ReferenceSet) else ReferenceSet("", tuple(given), {})
