@@ -64,7 +64,9 @@ from er3a.calibration.outcomes import (
     SocketsBeside,
 )
 from er3a.calibration.parameters import (
+    DEPENDENT,
     LEVELS,
+    TOOL_COLUMNS,
     Parameter,
     corrected,
     coupled,
@@ -99,6 +101,7 @@ TOGETHER = 0.5
 MAX_OUTLIER_SHARE = 0.1
 FAR_WIDEST = {"mm": 1.0, "deg": 2.0}
 """Times ``WIDEST``: a correction beyond is none of this arm. A joint may lose its zero; a length is wrong by less."""
+ROUGHLY = 10.0
 FAR_REST = 0.004
 """Of an arm's whole length: a root mean square that no tracker leaves of an arm whose table is right."""
 AS_GOOD = 1.1  # times what the table leaves
@@ -157,7 +160,7 @@ def choose_level(robot: Robot, observations: Observations) -> Level:
     if not len(observations):
         raise CalibrationError(NoPositions(), "there are no positions of single points to calibrate from")
     placed = placements_of(observations.free)
-    robot = corrected(robot, placed, places_at(robot, placed, observations))
+    robot, dependent = _with_rough_tool(robot, observations)
     scale = scale_of(robot, observations) if isinstance(observations, PointObservations) else None
     left = left_of_touched(robot, observations)
     spare = len(observations) - getattr(observations, "dropped", 0)
@@ -167,8 +170,8 @@ def choose_level(robot: Robot, observations: Observations) -> Level:
     for first in (placed, ()) if placed else ((),):
         for name in LEVELS[::-1]:
             parameters = (*first, *without_scale(parameters_of(robot, name), scale))
-            here = subspace(robot, parameters, observations, left)
-            best = subspace(robot, parameters, rich, left) if len(rich) else here
+            here = subspace(robot, parameters, observations, left, dependent)
+            best = subspace(robot, parameters, rich, left, dependent) if len(rich) else here
             every = every or [parameters[k] for k in best.kept]
             settled = len(best.kept) <= len(here.kept)
             if not (settled and here.kept) or spare <= len(here.kept):
@@ -182,6 +185,18 @@ def choose_level(robot: Robot, observations: Observations) -> Level:
     lack = "numbers" if isinstance(more[-1], MoreTouches) else "positions"
     problem = f"{len(observations)} coordinates determine too little; {lack} to be added: {more[-1].missing} at least"
     raise CalibrationError(more[-1], problem)
+
+
+def _with_rough_tool(robot: Robot, observations: Observations) -> tuple[Robot, float]:
+    """The robot with its tool where the measurements put it, if that is far from where its file does; and the share of
+    its length that an entry's effect then has to have beside others: near an axis, what a rough place shows of the
+    entries about it is no effect of theirs."""
+    placed = placements_of(observations.free)
+    amounts = places_at(robot, placed, observations)
+    shift = np.where([each.column in TOOL_COLUMNS for each in placed], amounts, 0.0)
+    if np.linalg.norm(shift) <= PLAUSIBLE:
+        return robot, DEPENDENT
+    return corrected(robot, placed, shift), ROUGHLY * DEPENDENT
 
 
 def _what_more(

@@ -98,11 +98,16 @@ def jacobian(
 
 
 def subspace(
-    robot: Robot, parameters: Sequence[Parameter], observations: Observations, left: float | None = None
+    robot: Robot,
+    parameters: Sequence[Parameter],
+    observations: Observations,
+    left: float | None = None,
+    dependent: float = DEPENDENT,
 ) -> Subspace:
     """The identifiable part of the parameters: columns of the weighted Jacobian are taken in order of preference, and
-    one that lies in the span of those before it (to 0.1 % of its length) is held. So is one that does no more to points
-    which touch something than to turn or shrink what the table leaves of them: all of these could be brought to one.
+    one that lies in the span of those before it (to ``dependent`` of its length) is held. So is one that does no more
+    to points which touch something than to turn or shrink what the table leaves of them: all of these could be brought
+    to one.
 
     Parameters
     ----------
@@ -120,7 +125,7 @@ def subspace(
     for k, norm in enumerate(norms):
         rest = J[:, k] - basis @ (basis.T @ J[:, k])
         rest -= basis @ (basis.T @ rest)
-        if norm > min_norm and np.linalg.norm(rest) > max(DEPENDENT * norm, turned):
+        if norm > min_norm and np.linalg.norm(rest) > max(dependent * norm, turned):
             kept.append(k)
             basis = np.column_stack([basis, rest / np.linalg.norm(rest)])
             continue
