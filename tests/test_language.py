@@ -86,3 +86,8 @@ def test_numbers_in_sentences_have_a_minus_sign_and_names_keep_their_hyphens():
     text = language.filled("{name} at {at:.1f} deg, {rows:d} of {count}", "{name} at {at:.1f} deg, {rows:d} of {count}",
                            {"name": "er3-600", "at": -206.58, "rows": -3, "count": -4})  # fmt: skip
     assert text == "er3-600 at −206.6 deg, −3 of −4"
+
+
+def test_different_numbers_are_shown_as_different():
+    assert language.distinct([1.04, 2.0, 1.0]) == ["1.04", "2.00", "1.00"]
+    assert language.distinct([-480.1, -480.1, 3.0]) == ["−480.1", "−480.1", "3.0"]

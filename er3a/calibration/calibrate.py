@@ -30,20 +30,23 @@ from er3a.calibration.cross_validation import (
     tilts_explain,
 )
 from er3a.calibration.fit import (
-    MIN_ALIGNED,
+    FAR_OUT,
+    MEDIAN_TO_DEVIATION,
+    OUTLIER_ROUNDS,
     PLAUSIBLE,
     ROUNDING,
     SCALE,
     BarLength,
     Fit,
     Subspace,
-    aligned,
     bar_lengths,
     covariance_by_poses,
     fit,
     held_with,
     jacobian,
     left_of_touched,
+    places_at,
+    rough_places,
     scale_of,
     subspace,
     without_scale,
@@ -61,8 +64,9 @@ from er3a.calibration.outcomes import (
     SocketsBeside,
 )
 from er3a.calibration.parameters import (
+    DEPENDENT,
     LEVELS,
-    MM,
+    TOOL_COLUMNS,
     Parameter,
     corrected,
     coupled,
@@ -92,15 +96,12 @@ SHOWN_POSES = 3
 CLOSE = 0.9
 MAX_SCATTER = 3.0
 SMALLEST = np.finfo(float).tiny  # instead of 0, to divide by
-FAR_OUT = 6.0
-"""Standard deviations beyond which a point is set aside: noise goes there once in 500 million."""
 TOGETHER = 0.5
 """Ratio to the farthest point's distance: points at least this far out are set aside in one go."""
 MAX_OUTLIER_SHARE = 0.1
-OUTLIER_ROUNDS = 3
-MEDIAN_TO_DEVIATION = 1.4826
 FAR_WIDEST = {"mm": 1.0, "deg": 2.0}
 """Times ``WIDEST``: a correction beyond is none of this arm. A joint may lose its zero; a length is wrong by less."""
+ROUGHLY = 10.0
 FAR_REST = 0.004
 """Of an arm's whole length: a root mean square that no tracker leaves of an arm whose table is right."""
 AS_GOOD = 1.1  # times what the table leaves
@@ -159,6 +160,7 @@ def choose_level(robot: Robot, observations: Observations) -> Level:
     if not len(observations):
         raise CalibrationError(NoPositions(), "there are no positions of single points to calibrate from")
     placed = placements_of(observations.free)
+    robot, dependent = _with_rough_tool(robot, observations)
     scale = scale_of(robot, observations) if isinstance(observations, PointObservations) else None
     left = left_of_touched(robot, observations)
     spare = len(observations) - getattr(observations, "dropped", 0)
@@ -168,8 +170,8 @@ def choose_level(robot: Robot, observations: Observations) -> Level:
     for first in (placed, ()) if placed else ((),):
         for name in LEVELS[::-1]:
             parameters = (*first, *without_scale(parameters_of(robot, name), scale))
-            here = subspace(robot, parameters, observations, left)
-            best = subspace(robot, parameters, rich, left) if len(rich) else here
+            here = subspace(robot, parameters, observations, left, dependent)
+            best = subspace(robot, parameters, rich, left, dependent) if len(rich) else here
             every = every or [parameters[k] for k in best.kept]
             settled = len(best.kept) <= len(here.kept)
             if not (settled and here.kept) or spare <= len(here.kept):
@@ -183,6 +185,18 @@ def choose_level(robot: Robot, observations: Observations) -> Level:
     lack = "numbers" if isinstance(more[-1], MoreTouches) else "positions"
     problem = f"{len(observations)} coordinates determine too little; {lack} to be added: {more[-1].missing} at least"
     raise CalibrationError(more[-1], problem)
+
+
+def _with_rough_tool(robot: Robot, observations: Observations) -> tuple[Robot, float]:
+    """The robot with its tool where the measurements put it, if that is far from where its file does; and the share of
+    its length that an entry's effect then has to have beside others: near an axis, what a rough place shows of the
+    entries about it is no effect of theirs."""
+    placed = placements_of(observations.free)
+    amounts = places_at(robot, placed, observations)
+    shift = np.where([each.column in TOOL_COLUMNS for each in placed], amounts, 0.0)
+    if np.linalg.norm(shift) <= PLAUSIBLE:
+        return robot, DEPENDENT
+    return corrected(robot, placed, shift), ROUGHLY * DEPENDENT
 
 
 def _what_more(
@@ -818,7 +832,7 @@ def _without_outliers(robot: Robot, every: PointObservations) -> Flags:
         except CalibrationError:
             if observations is not every:
                 return all_used
-            used = _near_table(robot, every)
+            used = rough_places(robot, every)[1]
             if used.all() or (~used).mean() > MAX_OUTLIER_SHARE:
                 raise
             observations = every.take(used)
@@ -834,23 +848,6 @@ def _without_outliers(robot: Robot, every: PointObservations) -> Flags:
         if (~used).mean() > MAX_OUTLIER_SHARE:
             return all_used
         observations = observations.take(~far)
-
-
-def _near_table(robot: Robot, every: PointObservations) -> Flags:
-    """Points (P,) without those that are far out if only the base is moved, by the median of all: some are off by so
-    much that no fit of all ends. Points without all coordinates count as near."""
-    near = every.seen.all(axis=1) & (every.touched < 0)
-    whole, used = every.take(near), np.ones(near.sum(), dtype=bool)
-    points, measured = whole.positions(robot), whole.values_mm.reshape(-1, 3) / MM
-    for _ in range(OUTLIER_ROUNDS):
-        if used.sum() < MIN_ALIGNED:
-            return np.ones(len(near), dtype=bool)
-        S = aligned(points[used], measured[used])[0]
-        off = np.linalg.norm(points @ S[:3, :3].T + S[:3, 3] - measured, axis=1)
-        used = off <= FAR_OUT * MEDIAN_TO_DEVIATION * np.median(off)
-    found = np.ones(len(near), dtype=bool)
-    found[near] = used
-    return found
 
 
 def _out_of(observations: PointObservations, off_mm: Reals, usual_mm: Reals) -> Reals:

@@ -25,10 +25,10 @@ from er3a.calibration.outcomes import (
     MovesNothing,
     NoCorrectionFits,
     NotToldApart,
+    PlacementName,
     SetsScale,
 )
 from er3a.calibration.parameters import (
-    BASE_COLUMNS,
     DEPENDENT,
     MM,
     Parameter,
@@ -39,7 +39,7 @@ from er3a.calibration.parameters import (
 )
 from er3a.calibration.terms import TAKEN, JointErrors, JointTerm, term_jacobian
 from er3a.geometry.transforms import rpy_of
-from er3a.numerics.arrays import Integers, Reals
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.references.reference import INTERVAL_95
 from er3a.robots.robot import Robot
 
@@ -57,7 +57,12 @@ MIN_OWN = 1e-9
 CLEAR = 10.0
 """Times what the table leaves of touched points that has to set a length, root mean square: the ways of joints that
 slide, how far a bar's points are off a common cone. Taken for part of it, what is left errs by the square, 1 %."""
-MIN_ALIGNED, FAR = 3, 10.0
+MIN_ALIGNED, TURNS = 3, 5
+FAR = 2.0  # times as near, where base and tool start elsewhere than in the robot's file
+OUTLIER_ROUNDS = 3
+FAR_OUT = 6.0
+"""Standard deviations beyond which a point is set aside: noise goes there once in 500 million."""
+MEDIAN_TO_DEVIATION = 1.4826
 SMALL_SHARE = 0.01  # of a variance: what adds less does not widen its interval
 LEVER = 0.3  # m, at which a length turns points as an angle does
 TURNS_ALL = Parameter("offset", 1)
@@ -93,11 +98,16 @@ def jacobian(
 
 
 def subspace(
-    robot: Robot, parameters: Sequence[Parameter], observations: Observations, left: float | None = None
+    robot: Robot,
+    parameters: Sequence[Parameter],
+    observations: Observations,
+    left: float | None = None,
+    dependent: float = DEPENDENT,
 ) -> Subspace:
     """The identifiable part of the parameters: columns of the weighted Jacobian are taken in order of preference, and
-    one that lies in the span of those before it (to 0.1 % of its length) is held. So is one that does no more to points
-    which touch something than to turn or shrink what the table leaves of them: all of these could be brought to one.
+    one that lies in the span of those before it (to ``dependent`` of its length) is held. So is one that does no more
+    to points which touch something than to turn or shrink what the table leaves of them: all of these could be brought
+    to one.
 
     Parameters
     ----------
@@ -115,7 +125,7 @@ def subspace(
     for k, norm in enumerate(norms):
         rest = J[:, k] - basis @ (basis.T @ J[:, k])
         rest -= basis @ (basis.T @ rest)
-        if norm > min_norm and np.linalg.norm(rest) > max(DEPENDENT * norm, turned):
+        if norm > min_norm and np.linalg.norm(rest) > max(dependent * norm, turned):
             kept.append(k)
             basis = np.column_stack([basis, rest / np.linalg.norm(rest)])
             continue
@@ -336,22 +346,74 @@ def aligned(points: Reals, measured: Reals) -> tuple[Reals, float, float]:
     return S, float(both / own), float(1 - both**2 / (own * theirs))
 
 
-def _base_at(robot: Robot, kept: Sequence[Parameter], observations: Observations) -> Reals:
-    """Amounts (k,) to start from: of points measured in a frame far from the base, its place and turn that bring the
-    table's points nearest to them."""
-    amounts = np.zeros(len(kept))
-    where = [kept.index(each) for each in placements_of(("base",)) if each in kept]
-    if len(where) < len(BASE_COLUMNS) or not isinstance(observations, PointObservations):
-        return amounts
-    whole = observations.take(observations.seen.all(axis=1) & (observations.touched < 0))
-    base, (points, measured) = np.linalg.inv(robot.base), (whole.positions(robot), whole.values_mm.reshape(-1, 3) / MM)
-    points, measured = (xyz @ base[:3, :3].T + base[:3, 3] for xyz in (points, measured))
-    if len(points) < MIN_ALIGNED:
-        return amounts
-    S = aligned(points, measured)[0]
-    if FAR * np.linalg.norm(points @ S[:3, :3].T + S[:3, 3] - measured) < np.linalg.norm(points - measured):
-        amounts[where] = [*S[:3, 3], *rpy_of(S)]
-    return amounts
+def rough_places(robot: Robot, observations: PointObservations) -> tuple[Reals, Flags]:
+    """Amounts of what is free of base and tool, by the table as it is and points that were measured whole: the
+    tracker's frame may be anywhere, and the tool's place a guess.
+
+    With points x and flanges turned by R, as the table has them, a base S and a tool moved by t put the measured ones
+    at ``m = S (x + R t)``. So ``inv(S) m - R t = x``: linear in the 12 numbers of inv(S) and in t, if its rotation may
+    be any matrix. From the rotation nearest to that, t for a base and the base for a t are found by turns.
+
+    Returns
+    -------
+    amounts : as of :func:`placements_of`, 0 where too few points say something
+    used : (P,), points without those that are far out, by the median of all
+    """
+    whole = np.flatnonzero(observations.seen.all(axis=1) & (observations.touched < 0))
+    used, own = np.ones(len(observations.seen), dtype=bool), np.ones(len(whole), dtype=bool)
+    S, t, inverse = np.eye(4), np.zeros(3), np.linalg.inv(robot.base)
+    x, m, R = observations.positions(robot)[whole], np.zeros((len(whole), 3)), observations.turns(robot)[whole]
+    values = np.zeros(observations.seen.shape)
+    values[observations.seen] = observations.values_mm / MM
+    x, m = (xyz @ inverse[:3, :3].T + inverse[:3, 3] for xyz in (x, values[whole]))
+    R = inverse[:3, :3] @ R
+    for _ in range(OUTLIER_ROUNDS):
+        if own.sum() < MIN_ALIGNED:
+            break
+        S, t = _base_and_tool(x[own], R[own], m[own], observations.free)
+        off = np.linalg.norm((x + R @ t) @ S[:3, :3].T + S[:3, 3] - m, axis=1)
+        own = off <= FAR_OUT * MEDIAN_TO_DEVIATION * np.median(off)
+    used[whole] = own
+    parts = {"base": [*S[:3, 3], *rpy_of(S)], "tool": t.tolist()}
+    return np.array([amount for name in observations.free for amount in parts[name]]), used
+
+
+def _base_and_tool(x: Reals, R: Reals, m: Reals, free: Sequence[PlacementName]) -> tuple[Reals, Reals]:
+    """S (4, 4) and t (3,) of :func:`rough_places`, each left where it is if it is not free."""
+    if "base" not in free:
+        t = np.linalg.lstsq(R.reshape(-1, 3), (m - x).ravel(), rcond=None)[0] if "tool" in free else np.zeros(3)
+        return np.eye(4), t
+    S = aligned(x, m)[0]
+    if "tool" not in free:
+        return S, np.zeros(3)
+    eye = np.broadcast_to(np.eye(3), R.shape)
+    rows = np.concatenate([np.einsum("pij,pk->pijk", eye, m).reshape(-1, 3, 9), -eye, -R], axis=2).reshape(-1, 15)
+    U, _, V = np.linalg.svd(np.linalg.lstsq(rows, x.ravel(), rcond=None)[0][:9].reshape(3, 3).T)
+    found = []
+    for turn in (S[:3, :3], U @ np.diag([1.0, 1.0, np.linalg.det(U @ V)]) @ V):
+        S = np.eye(4)
+        S[:3, :3] = turn
+        for _ in range(TURNS):
+            back = (m @ S[:3, :3] - x).ravel()
+            t = np.linalg.lstsq(np.concatenate([R, eye], axis=2).reshape(-1, 6), back, rcond=None)[0][:3]
+            S = aligned(x + R @ t, m)[0]
+        found.append((float(np.linalg.norm((x + R @ t) @ S[:3, :3].T + S[:3, 3] - m)), S, t))
+    return min(found, key=lambda each: each[0])[1:]
+
+
+def places_at(robot: Robot, kept: Sequence[Parameter], observations: Observations) -> Reals:
+    """Amounts (k,) to start from: 0, unless other places of base and tool bring the table's points much nearer to the
+    measured ones."""
+    amounts, none = np.zeros(len(kept)), np.zeros(len(kept))
+    if not isinstance(observations, PointObservations):
+        return none
+    rough, used = rough_places(robot, observations)
+    by_name = dict(zip(placements_of(observations.free), rough.tolist()))
+    placing = [k for k, each in enumerate(kept) if each in by_name]
+    amounts[placing] = [by_name[kept[k]] for k in placing]
+    seen = observations.take(used)
+    off = np.linalg.norm(seen.predict(robot, kept, np.array([none, amounts])) - seen.values_mm, axis=1)
+    return amounts if FAR * off[1] < off[0] else none
 
 
 def fit(
@@ -391,8 +453,7 @@ def _fit(
 ) -> Fit:
     """``holding``: by how much corrections are held at 0, per rad or m."""
     kept, terms, deviation = tuple(kept), tuple(terms), observations.deviation_mm
-    start = _base_at(robot, kept, observations)
-    far = bool(start.any())  # a large turn is no small one behind another
+    start = places_at(robot, kept, observations)
     prior = np.full(sum(term.count for term in terms), 1 / TAKEN)
 
     def with_errors(coefficients: Reals) -> Observations:
@@ -410,8 +471,7 @@ def _fit(
 
     def slopes(here: Robot, amounts: Reals, coefficients: Reals) -> Reals:
         seen = with_errors(coefficients)
-        slope = jacobian(robot, kept, seen, amounts) if far else jacobian(here, kept, seen)
-        J = slope / deviation[:, None]
+        J = jacobian(robot, kept, seen, amounts) / deviation[:, None]
         if not (terms and isinstance(observations, PointObservations) and isinstance(seen, PointObservations)):
             return J
         by_terms = term_jacobian(here, robot, terms, observations, seen) / deviation[:, None]

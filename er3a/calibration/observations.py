@@ -420,6 +420,11 @@ class PointObservations:
         found: Reals = np.einsum("pij,pj->pi", T[:, :3, :3], self.points(robot)) + T[:, :3, 3]
         return found
 
+    def turns(self, robot: Robot) -> Reals:
+        """How a robot's table turns the tool, (P, 3, 3); 0 where the flange's point was measured."""
+        T = frames_of(tables_of(robot), robot, self.row_values)[0][:, -1]
+        return np.where(self.on_tool[:, None, None], T[:, :3, :3], 0.0)
+
     def points(self, robot: Robot) -> Reals:
         """Where the measured points are in the flange's frame (P, 3), m."""
         return np.where(self.on_tool[:, None], robot.tool[:3, 3], 0.0)

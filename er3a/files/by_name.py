@@ -30,6 +30,7 @@ from er3a.identifiability.entry_evidence import Evidence, Tolerance
 from er3a.identifiability.evidence import evidence_of
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
+from er3a.references.predict import with_rounding
 from er3a.references.quantities import Pose
 from er3a.references.reference import Document, Documents, Reference, ReferenceSet
 from er3a.robots.joint_limits import meant
@@ -229,9 +230,15 @@ def diagnose(robot: Robot, references: ReferenceSet | Sequence[Reference] | str 
     InputError
         if the reference set doesn't exist or can't be read
     """
-    return diagnosis.diagnose(
-        robot, load_references(references, robot) if isinstance(references, str | Path) else references
-    )
+    return diagnosis.diagnose(robot, _of_arm(references, robot).references)
+
+
+def _of_arm(given: ReferenceSet | Sequence[Reference] | str | Path, robot: Robot) -> ReferenceSet:
+    """References with what joint values' last digits leave open on an arm; single ones as a set without a name."""
+    if isinstance(given, str | Path):
+        return load_references(given, robot)
+    found = given if isinstance(given, ReferenceSet) else ReferenceSet("", tuple(given), {})
+    return replace(found, references=with_rounding(robot, found.references))
 
 
 References = ReferenceSet | Sequence[Reference] | Sequence[ReferenceSet] | Sequence[str] | str | Path
@@ -258,9 +265,9 @@ def evidence(robot: Robot, references: References | None = None, tolerance: Tole
     stated: list[Reference] = []
     documents: dict[str, Document] = {}
     for part in parts:
-        own = load_references(part, robot) if isinstance(part, str | Path) else part
-        stated += own.references if isinstance(own, ReferenceSet) else [own]
-        documents |= own.documents.by_name if isinstance(own, ReferenceSet) else {}
+        own = _of_arm([part] if isinstance(part, Reference) else part, robot)
+        stated += own.references
+        documents |= own.documents.by_name
     if references is None:
         check_robot_origins(robot, documents)
     return evidence_of(robot, stated, Documents(documents), tolerance)
@@ -293,6 +300,8 @@ def calibrate(
     if isinstance(measurements, str | Path):
         path, measurements = measurements, load_measurements(measurements, robot)
         check_poses(measurements, robot, path)
+    elif isinstance(measurements, ReferenceSet):
+        measurements = _of_arm(measurements, robot)
     found = calibration.calibrate(robot, measurements, fixed)
     text = f"Calibrated with {found.coordinates} measured coordinates, starting from the table of {robot.name}"
     source = Source(text, "inferred")

@@ -20,7 +20,16 @@ from er3a.files.robot_file import NAME_PATTERN
 from er3a.files.units import MIN_SPAN_MM, WIDEST_IN_RADIANS, doubt
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import NEAR_STEP, STEP_IN_RADIANS
-from er3a.references.quantities import ZERO_POSE, NotOfArm, Pose, Quantity, Rotation3, not_of_arm
+from er3a.references.predict import with_rounding
+from er3a.references.quantities import (
+    ZERO_POSE,
+    NotOfArm,
+    Pose,
+    Quantity,
+    Rotation3,
+    not_of_arm,
+    rotation_vectors_deg,
+)
 from er3a.references.reference import NO_DOCUMENT, Document, Documents, Reference, ReferenceSet, Row, conflicts
 from er3a.references.rows import ENVELOPE_CORNERS, ENVELOPE_EXTENTS, KINDS, check_complete, reference_set
 from er3a.references.seen import COARSE_DEG, SEEN
@@ -458,7 +467,8 @@ def load_references(name_or_folder: str | Path, robot: Robot | None = None) -> R
     Parameters
     ----------
     robot : rows that do not apply to it are left out with a warning (:class:`er3a.InputWarning`): joints that it does
-        not have, a wrist centre, or limits in the other unit
+        not have, a wrist centre, or limits in the other unit. What the last digits of joint values leave open on it
+        is added to the uncertainties
 
     Raises
     ------
@@ -485,7 +495,8 @@ def load_references(name_or_folder: str | Path, robot: Robot | None = None) -> R
         told = f"{folder / row.kind}.csv: row {row.line} is set aside: {_WHY[why].format(robot=robot)}"
         warnings.warn(told, InputWarning, stacklevel=2)
     usable = {kind: tuple(row for row in rows if row not in aside) for kind, rows in tables.items()}
-    return replace(reference_set(folder.name, usable, documents), set_aside=tuple(aside.items()))
+    found = reference_set(folder.name, usable, documents)
+    return replace(found, references=with_rounding(robot, found.references), set_aside=tuple(aside.items()))
 
 
 def reference_folder(name: str) -> Path:
@@ -512,6 +523,7 @@ def check_reference_file(path: str | Path) -> tuple[Row, ...]:
     table = read_csv(path, FORMATS[kind].all_columns)
     if not table:
         raise InputError(path, None, "the table has a header but no rows", "Add a row, or remove the file")
+    _fill_rounding(table)
     for fields in table:
         _fill_uncertainty(FORMATS[kind], fields)
         _check_row(path, FORMATS[kind], fields)
@@ -563,21 +575,40 @@ def _fill_uncertainty(format: Format, fields: Fields) -> None:
         fields[name] = float(value) if isinstance(value, Written) else value
 
 
+def _fill_rounding(table: list[Fields]) -> None:
+    """Half the last digit of a row's joint values, which is that of all rows of its source; none of a commanded pose,
+    whose joint values are whole or half degrees that are written as such, and exact."""
+    most: dict[str, int] = {}
+    typed = [[fields[name] for name in (*_POSE, *_FURTHER) if fields.get(name) is not None] for fields in table]
+    for fields, values in zip(table, typed):
+        decimals = max((value.decimals for value in values), default=0)
+        most[fields["source"]] = max(most.get(fields["source"], 0), decimals)
+    for fields, values in zip(table, typed):
+        commanded = all(value.decimals <= 1 and 2 * value == round(2 * value) for value in values)
+        half = 0.5 * 10.0 ** -most[fields["source"]]
+        halves = (0.0 if fields.get(name) is None else half for name in (*_POSE, *_FURTHER))
+        fields["rounding"] = () if commanded else tuple(halves)
+
+
 def _states_none(fields: Fields) -> bool:
     """Whether a row could give an orientation and does not."""
     return ORIENTATION_COLUMNS[0] in fields and not _written_as(fields)
 
 
 def _fill_orientation_uncertainty(fields: Fields) -> None:
-    """The angle that half the last digit of an orientation turns the flange by; 0 of a row without one."""
+    """The most that half the last digit of each number of an orientation turns the flange by about x, y or z together;
+    0 of a row without one."""
     written = _written_as(fields)
     if not written:
         fields["uncertainty_deg"] = 0.0
-    elif fields["uncertainty_deg"] is None:
-        columns = written[0]
-        half = 0.5 * 10.0 ** -max(fields[name].decimals for name in columns if fields[name] is not None)
-        angles = {_QUATERNION: math.degrees(2 * half), _MATRIX: math.degrees(half)}
-        fields["uncertainty_deg"] = angles.get(columns, half)
+    elif fields["uncertainty_deg"] is None and not any(_position_faults(fields)):
+        values = np.array([fields[name] for name in written[0]])
+        half = 0.5 * 10.0 ** -max(fields[name].decimals for name in written[0])
+        if written[0] in (_QUATERNION, _MATRIX):
+            half = min(half, NOT_RIGID)  # 0 and 1 alone are no rounded numbers, which would not be rigid to this
+        R = rotation_of(written[0], values)
+        turned = [rotation_of(written[0], values + step) @ R.T for step in half * np.eye(len(values))]
+        fields["uncertainty_deg"] = float(np.abs(rotation_vectors_deg(np.array(turned))).sum(axis=0).max())
 
 
 def _check_row(path: Path, format: Format, fields: Fields) -> None:

@@ -12,7 +12,8 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 import scipy
@@ -23,8 +24,18 @@ from er3a.kinematics.forward import frames
 from er3a.kinematics.table_batch import Tables, frames_of
 from er3a.numerics.arrays import Reals
 from er3a.numerics.quasi_random import quasi_random_points
-from er3a.references.quantities import MM, ZERO_POSE, AxisLines, Extreme, ModelState, Pose, Quantity
-from er3a.references.reference import Reference, quantities_of
+from er3a.references.quantities import (
+    MM,
+    ZERO_POSE,
+    AxisLines,
+    Extreme,
+    ModelState,
+    Pose,
+    Quantity,
+    QuantityAtPose,
+    not_of_arm,
+)
+from er3a.references.reference import INTERVAL_95, Reference, quantities_of
 from er3a.robots.joint_limits import meant, within
 from er3a.robots.robot import Robot
 
@@ -143,6 +154,35 @@ def predict(robot: Robot, references: Sequence[Reference], starts: int = REACH_S
     """
     quantities = quantities_of(references)
     return read(quantities, state_of(robot, quantities, starts))
+
+
+def with_rounding(robot: Robot, references: Iterable[Reference]) -> tuple[Reference, ...]:
+    """References whose uncertainty includes what the rounding of their joint values leaves open on an arm.
+
+    A value rounded to its last digit may be off by half of it. Each joint's share is the larger change that this makes
+    of what the arm's table predicts; half-widths add up, standard deviations (of a uniform distribution: the half-width
+    over root 3, GUM 4.3.7) add as squares. A table with a fault is as good for this: what it has wrong, it has wrong in
+    the tolerance by the same share.
+    """
+    return tuple(_widened(robot, reference) if reference.rounding else reference for reference in references)
+
+
+def _widened(robot: Robot, reference: Reference) -> Reference:
+    quantity = reference.quantity
+    if not isinstance(quantity, QuantityAtPose) or not_of_arm(quantity, robot):
+        return replace(reference, rounding=())
+    pose = (*quantity.pose, *[0.0] * robot.joints)[: robot.joints]
+    steps = np.diag((*reference.rounding, *[0.0] * robot.joints)[: robot.joints])
+    asked = [
+        quantity,
+        *(replace(quantity, pose=tuple(row)) for row in np.vstack([pose + steps, pose - steps]).tolist()),
+    ]
+    value, *changed = read(asked, state_of(robot, asked))
+    shares = np.abs(np.array(changed) - value).reshape(2, -1).max(axis=0)
+    if reference.deviation is None:
+        return replace(reference, uncertainty=reference.uncertainty + float(shares.sum()), rounding=())
+    deviation = float(np.hypot(reference.deviation, np.linalg.norm(shares) / np.sqrt(3)))
+    return replace(reference, uncertainty=INTERVAL_95 * deviation, deviation=deviation, rounding=())
 
 
 def read(quantities: Sequence[Quantity], state: ModelState) -> Reals:

@@ -19,7 +19,7 @@ import numpy as np
 
 from er3a.by_value import Displayed, ReadOnly, Sheet
 from er3a.numerics.arrays import Reals
-from er3a.references.quantities import NotOfArm, Quantity, Unit
+from er3a.references.quantities import NotOfArm, Pose, Quantity, Unit
 from er3a.references.subjects import ReferenceSubject
 from er3a.robots.robot import AUTHORITATIVE_GRADES, Grade
 
@@ -124,6 +124,8 @@ class Reference:
     uncertainty : half-width of the interval that the source leaves open, same unit
     origin : the document that it rests on; empty if none is named
     deviation : standard deviation, if that is what the source states; ``uncertainty`` is half of the 95 % interval then
+    rounding : half of the last digit of each joint value of its pose, deg or mm; empty if these are exact, or once
+        :func:`er3a.references.predict.with_rounding` has added what they leave open to the uncertainty
     """
 
     subject: ReferenceSubject
@@ -135,6 +137,7 @@ class Reference:
     grade: Grade
     origin: str = ""
     deviation: float | None = None
+    rounding: Pose = ()
 
     @property
     def document(self) -> str:
@@ -160,7 +163,8 @@ Scalar = tuple[ReferenceSubject, str, Quantity, float | None, float]
 class Row(ABC):
     """What every row of a reference table has: its line in the file, its source, grade and document.
 
-    ``gaussian``: its uncertainties are standard deviations, and not half-widths.
+    ``gaussian``: its uncertainties are standard deviations, and not half-widths. ``rounding``: half of the last digit
+    of each joint value, deg or mm; empty if these are exact.
 
     A kind of reference is a row class: ``kind`` is the name of its tables, ``groups`` those of its references, and
     ``scalars`` splits a row into them. :data:`er3a.references.rows.KINDS` lists all kinds.
@@ -173,6 +177,7 @@ class Row(ABC):
     grade: Grade
     origin: str = field(default="", kw_only=True)
     gaussian: bool = field(default=False, kw_only=True)
+    rounding: Pose = field(default=(), kw_only=True)
 
     @abstractmethod
     def scalars(self) -> Iterator[Scalar]:
@@ -184,9 +189,9 @@ class Row(ABC):
 
     def reference(self, scalar: Scalar) -> Reference:
         """A number with the row's source and grade."""
+        reference = Reference(*scalar, self.source, self.grade, self.origin, rounding=self.rounding)
         if not self.gaussian:
-            return Reference(*scalar, self.source, self.grade, self.origin)
-        reference = Reference(*scalar, self.source, self.grade, self.origin)
+            return reference
         return replace(reference, uncertainty=INTERVAL_95 * reference.uncertainty, deviation=reference.uncertainty)
 
 
@@ -265,10 +270,11 @@ def lengths_of(values: Reals, vectors: Sequence[tuple[int, ...]]) -> Reals:
 
 
 def conflicts(references: Sequence[Reference]) -> list[tuple[int, int]]:
-    """Pairs (i, j), i < j, of references about the same quantity that no value can meet both of."""
+    """Pairs (i, j), i < j, of references about the same quantity that no value can meet both of; none of those whose
+    poses are rounded, as long as what that leaves open is unknown."""
     about: dict[Quantity, list[tuple[int, float]]] = {}
     for i, reference in enumerate(references):
-        if reference.expected is not None:
+        if reference.expected is not None and not reference.rounding:
             about.setdefault(reference.quantity, []).append((i, reference.expected))
     pairs = []
     for (i, stated), (j, other_stated) in (pair for same in about.values() for pair in combinations(same, 2)):

@@ -7,10 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import er3a
 from er3a.errors import InputError
 from er3a.files.reference_sets import FORMATS, check_reference_file, load_references
 from er3a.files.robot_library import load_robot
+from er3a.kinematics.forward import forward, jacobian
 from er3a.references.predict import predict
+from er3a.references.reference import expected_of
 from er3a.references.subjects import JointLimit, PoseExcess
 from er3a.robots.robot import GRADES
 
@@ -240,3 +243,22 @@ def test_without_uncertainty_half_the_last_digit_counts(tmp_path, name, text, un
     (row,) = check_reference_file(written(tmp_path, name, text))
     (reference, *_) = row.references()
     assert reference.uncertainty == pytest.approx(uncertainty)
+
+
+def test_last_digits_of_joint_values_count_through_the_jacobian(tmp_path):
+    robot, random, half = load_robot("er3_600").without_tool(), np.random.default_rng(20261127), np.radians(0.005)
+    q = np.radians([*random.uniform(-60, 60, (20, 6)), (0, 0, -45, 22.5, 45, 0)])
+    typed = [",".join(f"{value:.2f}" for value in row) for row in np.degrees(q[:-1])] + ["0,0.0,-45,22.5,45,0"]
+    points = 1000 * forward(robot, q)[:, :3, 3]
+    lines = [f"p{k},flange,{row},{','.join(f'{v:.2f}' for v in points[k])},,m,cad" for k, row in enumerate(typed)]
+    written(tmp_path, "positions.csv", POSITIONS + "\n".join(lines) + "\n")
+    stated = [each for each in load_references(tmp_path, robot).checkable if each.unit == "mm"]
+    expected, uncertainty = expected_of(stated)
+    by_joints = 1000 * half * np.abs(jacobian(robot, q)[:, :3]).sum(axis=-1)
+    by_joints[-1] = 0.0  # commanded
+    assert uncertainty == pytest.approx(0.005 + by_joints.ravel(), rel=1e-3)
+    off = np.abs(predict(robot, stated) - expected)
+    assert (off > 0.01).any()
+    assert (off <= uncertainty).all()
+    assert er3a.diagnose(robot, load_references(tmp_path)) == []
+    assert len(er3a.diagnose(robot.replace(d=robot.d + np.eye(6)[3] / 2000), load_references(tmp_path))) > 0

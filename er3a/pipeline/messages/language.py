@@ -18,6 +18,7 @@ from typing import Any, Literal, get_args
 
 LanguageCode = Literal["en", "zh"]
 LANGUAGES = get_args(LanguageCode)  # English and those that have a catalogue
+MOST_DECIMALS = 9  # of numbers that have to be shown as different
 KEYED = "key"  # the context of texts whose key, not whose English, is their entry in a catalogue
 TITLE = "title"  # the context of titles and notes that er3a writes into files
 CATALOGUES = Path(__file__).with_name("locale")
@@ -115,6 +116,14 @@ def alike(values: Iterable[float], most: int = 3) -> list[str]:
     exact = [f"{value:.{most}f}" for value in values]
     decimals = max((len(text.rstrip("0").partition(".")[2]) for text in exact), default=0)
     return [as_text(float(text) + 0.0, f".{decimals}f") for text in exact]
+
+
+def distinct(values: Iterable[float], decimals: int = 1) -> list[str]:
+    """Numbers with equally many decimals: as few, from ``decimals`` on, as show different ones as different."""
+    given = list(values)
+    while decimals < MOST_DECIMALS and len({f"{value:.{decimals}f}" for value in given}) < len(set(given)):
+        decimals += 1
+    return [as_text(value, f".{decimals}f") for value in given]
 
 
 def with_unit(value: str, unit: str, gap: str = " ") -> str:

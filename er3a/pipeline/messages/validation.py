@@ -12,7 +12,7 @@ from er3a.diagnosis.faults import CountedFromGround, ReversedDirection, WrongOff
 from er3a.identifiability.entries import GROUP_OF
 from er3a.identifiability.evidence import PART_OF_GROUP, PartName
 from er3a.identifiability.reactions import CheckCounts
-from er3a.pipeline.messages.language import N_, as_text, own_title, tr, with_unit
+from er3a.pipeline.messages.language import N_, as_text, distinct, own_title, tr, with_unit
 from er3a.pipeline.messages.left_out import names_in_words
 from er3a.pipeline.messages.references import GROUP_WORDS, MISSING_WORDS, quoted
 from er3a.pipeline.messages.say import Plural, bracketed, by, joined, say, say_as, sentence, texts, word
@@ -362,7 +362,7 @@ def _(found: NothingToCompare) -> str:
 
 @say.register
 def _(found: ModelUnsound) -> str:
-    value = _value(found.measured, found.unit)
+    value = with_unit(as_text(found.measured, ".1f"), found.unit) if found.unit else as_text(found.measured, "g")
     return say_as(found, value=value)
 
 
@@ -404,7 +404,7 @@ def _(found: Contradiction) -> str:
 
 def stated_text(found: Contradiction) -> str:
     """The values that references state about one number."""
-    return _chained("or", [_value(value, found.unit) for value in found.stated])
+    return _chained("or", [with_unit(value, found.unit) for value in distinct(found.stated)])
 
 
 def missed_text(found: Contradicted | AnotherArm) -> str:
@@ -413,14 +413,15 @@ def missed_text(found: Contradicted | AnotherArm) -> str:
 
 
 def _missed(found: Contradicted | AnotherArm, form: str) -> str:
+    measured, expected = (with_unit(value, found.unit) for value in distinct([found.measured, found.expected]))
     return sentence(
         f"validation.missed#{form}",
         grades=_grades(found.grades),
         own_set=found.reference_set,
         checks=counted_checks(found.counts),
         quantity=quoted(found.check),
-        measured=_value(found.measured, found.unit),
-        expected=_value(found.expected, found.unit),
+        measured=measured,
+        expected=expected,
     )
 
 
@@ -433,10 +434,6 @@ def _chained(link: str, words: Sequence[str]) -> str:
     if len(words) == 1:
         return words[0]
     return sentence(f"chain#{link}", value=words[0], values=_chained(link, words[1:]))
-
-
-def _value(value: float, unit: str) -> str:
-    return with_unit(as_text(value, ".1f"), unit) if unit else as_text(value, "g")
 
 
 @say.register
