@@ -1,7 +1,7 @@
 """The budget of code: tokens of each room, against the table ``tool.er3a.budget`` of ``pyproject.toml``.
 
-``make lint`` runs this. A room over its budget fails; budgets only fall. Tokens are counted without comments and docstrings,
-without line structure: explaining a thing is free, writing it twice is not. Scripts and catalogues are counted in lines.
+``make lint`` runs this. A room over its budget fails; budgets only fall. Tokens are counted without comments and
+docstrings: explaining a thing is free, writing it twice is not. Scripts and catalogues are counted in lines.
 """
 
 from __future__ import annotations

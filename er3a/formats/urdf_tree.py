@@ -41,6 +41,7 @@ from er3a.collision.meshes import ConvexPieces, hull_of, link_pieces
 from er3a.collision.shapes import CORNERS
 from er3a.errors import Er3aError, InputError
 from er3a.formats.mesh_file import read_link_mesh, read_link_vertices, read_text
+from er3a.formats.xacro_expansion import FOLDERS_UP, packages_near
 from er3a.geometry.transforms import rpy_of, transform, translation
 from er3a.kinematics.forward import frames
 from er3a.numerics.arrays import Integers, Reals
@@ -909,7 +910,7 @@ def _in_package(path: Path, name: str) -> Iterator[Path]:
         return
     above = path.resolve().parents
     yield from (folder / package / rest for folder in above)
-    if package in (near := _packages_near(path)):
+    if package in (near := packages_near(path)):
         yield near[package] / rest
     yield from (folder / rest for folder in above[:FOLDERS_UP])
 

@@ -63,14 +63,14 @@ def _expanded(path: Path, values: dict[str, str]) -> str:
     xacro.safe_eval, substitution_args._eval = checked, refused
     del xacro._global_symbols["python"]["vars"]
     packages.reset()
-    packages.update_package_cache(_packages_near(path))
+    packages.update_package_cache(packages_near(path))
     text: str = XacroDoc.from_file(path, subargs=values, resolve_packages=False).to_urdf_string()
     if len(text) > MOST_TEXT:
         raise ValueError(f"the URDF would have more than {MOST_TEXT:,} letters")
     return text
 
 
-def _packages_near(path: Path) -> dict[str, Path]:
+def packages_near(path: Path) -> dict[str, Path]:
     """Packages by name: folders above the file, nearest last, and beside those; ``package.xml`` renames one."""
     found: dict[str, Path] = {}
     for above in reversed(path.resolve().parents[:FOLDERS_UP]):
