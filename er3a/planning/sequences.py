@@ -210,12 +210,13 @@ def straight(start: Reals, end: Reals) -> Reals:
     return found
 
 
-def joining(before: tuple[Reals, Reals, Reals], after: tuple[Reals, Reals, Reals], span: float) -> Reals:
+def joining(before: tuple[Reals, Reals, Reals], after: tuple[Reals, Reals, Reals], span: float | Reals) -> Reals:
     """Coefficients (6, k) of the piece that takes over value and derivatives (k,) ``before`` and ends with ``after``.
 
     Parameters
     ----------
-    span : how much of the parameter, by which the derivatives are meant, the piece takes
+    span : how much of the parameter, by which the derivatives are meant, the piece takes; (m, 1) of m pieces, whose
+        values are (m, k) and coefficients (6, m, k)
     """
     x0, v0, a0 = before[0], before[1] * span, before[2] * span**2
     x1, v1, a1 = after[0], after[1] * span, after[2] * span**2

@@ -110,8 +110,9 @@ def stated_motion(times: Reals, points: Reals, rates: StatedRates) -> StatedMoti
 
 def _at_both_ends(rates: Reals) -> Flags:
     """Whether (k - 1, 1) the points before and after each way state rates (k, n)."""
-    stated: Flags = np.isfinite(rates).all(axis=1, keepdims=True)
-    return stated[:-1] & stated[1:]
+    stated = np.isfinite(rates[:-1]) & np.isfinite(rates[1:])
+    both: Flags = np.all(stated, axis=1, keepdims=True)
+    return both
 
 
 def _steps(times: Reals, starts: Reals, ends: Reals) -> Iterator[RateMisfit]:
