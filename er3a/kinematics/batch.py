@@ -97,8 +97,8 @@ def inverse_batch(
     failing = _confirm(robot, T, left, q, inside)
     valid[left] &= np.isfinite(q[left, :, 0])
     branch = np.broadcast_to(np.arange(SLOTS), valid.shape)
-    found = Solutions(robot, q, valid, inside, branch, turn_range=_turn_range(robot, q) if turns else None)
-    return replace(found, method=in_doubt(found.method), certain=~failing) if failing.any() else found
+    solutions = Solutions(robot, q, valid, inside, branch, turn_range=_turn_range(robot, q) if turns else None)
+    return replace(solutions, method=in_doubt(solutions.method), certain=~failing) if failing.any() else solutions
 
 
 def _confirm(robot: Robot, T: Reals, poses: Integers, q: Reals, inside: Flags) -> Flags:
@@ -163,8 +163,7 @@ def _by_class(
     branch = np.broadcast_to(np.arange(q.shape[1]), valid.shape)
     turn_range = _turn_range(robot, q) if turns else None
     freed = None if task_mask(robot).all() else misses(robot, T[:, None], q)[2]
-    found = Solutions(robot, q, valid, inside, branch, method, turn_range=turn_range, certain=certain)
-    return found if freed is None else replace(found, freed_turn=freed)
+    return Solutions(robot, q, valid, inside, branch, method, turn_range=turn_range, certain=certain, freed_turn=freed)
 
 
 def _found_by_starts(robot: Robot, T: Reals, q_ref: Reals) -> Reals:
