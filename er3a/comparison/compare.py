@@ -608,7 +608,8 @@ def _unit_slips(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances
 
     @cache
     def rank(slips: tuple[Cause, ...]) -> tuple[float, int, int]:
-        found = mechanism.match(*map(mechanism.mechanism_of, arms(slips)), tolerances)
+        one, other = map(mechanism.mechanism_of, arms(slips))
+        found = mechanism.match(one, other, tolerances)
         return found.rank[0], found.layers, sum(len(each.entries) for each in slips)
 
     sets = [(*lengths, *angles) for lengths, angles in options]
