@@ -151,8 +151,10 @@ def test_base_tool_table_and_deviation_are_found_and_no_term_that_is_not_there(n
     assert found.residuals.is_noise
 
 
-def test_a_tracker_s_frame_may_stand_and_be_turned_anywhere(random):
+@pytest.mark.parametrize("tool_off", [0.0, 0.136, 0.833])
+def test_a_tracker_s_frame_and_the_tool_may_be_anywhere(tool_off, random):
     bench = Bench("six", random)
+    bench.robot = bench.robot.replace(tool=translation(*tool_off * np.array([0.6, 0.48, -0.64])) @ TOOL)
     bench.truth = bench.truth.replace(base=translation(3, -1.5, 0.9) @ rot_x(2.0) @ rot_y(1.1) @ bench.truth.base)
     found = er3a.calibrate(bench.robot, bench.measured(36, 0.1))
     assert found.level == "all_entries"
