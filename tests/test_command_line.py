@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+import time
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 from types import SimpleNamespace
@@ -16,8 +17,10 @@ import pytest
 import er3a
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
+from er3a.pipeline import program_reports, run_study, verdicts
 from er3a.pipeline.progress import TimeBudget, shown_work
 from er3a.pipeline.study import load_study
+from er3a.pipeline.verdicts import StageVerdict
 from testing import processes
 from testing.small_study import STUDY
 
@@ -63,6 +66,36 @@ def test_completion_knows_commands_stages_and_robots(typed, offered):
         check=False,
     )
     assert offered in done.stdout.split()
+
+
+def test_a_file_that_would_be_read_as_an_option_is_refused(call, tmp_path):
+    (tmp_path / "--scene=evil.src").write_text("", encoding="utf-8")
+    done = call("check-program", "--scene=evil.src", "--robot", "er3_600", folder=tmp_path)
+    assert done.returncode == 2
+    assert "--scene=evil.src is a file" in done.stderr
+    done = call("check", "--", "--scene=evil.src", folder=tmp_path)
+    assert done.stderr.startswith("error: --scene=evil.src: ")
+
+
+def test_a_run_says_what_was_edited_meanwhile(call, monkeypatch):
+    verdict = StageVerdict("arm", "workspace", "pass", "code", "text", outdated=("data/robots/arm.yaml",))
+    monkeypatch.setattr(run_study, "run_study", lambda *_: True)
+    monkeypatch.setattr(verdicts, "read_verdicts", lambda *_: [verdict])
+    done = call("run")
+    assert (done.returncode, done.stderr) == (1, "note: arm, workspace (pass): text\n")
+    assert call("run", "workspace").returncode == 0
+
+
+def test_reading_a_program_ends_in_its_time_and_a_line_of_it_is_not_repeated_whole(call, tmp_path, monkeypatch):
+    long = tmp_path / "long.src"
+    long.write_text(f"DEF p( )\nPTP {{A1 {'1' * 900_000}}}\n{'X' * 900_000}\nEND\n", encoding="utf-8")
+    started = time.monotonic()
+    done = call("check-program", long, "--robot", "er3_600", "--verdicts", "--seconds", 60)
+    assert time.monotonic() - started < 60
+    assert max(map(len, (done.stdout + done.stderr).splitlines())) < 1_000
+    monkeypatch.setattr(program_reports, "read_program", lambda _: time.sleep(60))
+    done = call("check-program", long, "--robot", "er3_600", "--seconds", 1)
+    assert (done.returncode, done.stdout.count("is not read after 1 s")) == (2, 1)
 
 
 def test_check_for_programs(call, tmp_path):

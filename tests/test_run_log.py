@@ -7,6 +7,7 @@ import logging
 import os
 import re
 from html import escape
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -58,6 +59,25 @@ def test_pages_and_snakemakes_own_words_stay_out_errors_do_not(log, capsys):
         "a rule is missing",
         "✗ arm: report workspace: ended with an error; see logs/arm/workspace.report.log",
     ]
+
+
+@pytest.mark.parametrize(
+    ("ended", "reason"),
+    [
+        ("returned non-zero exit status 137.", "error: arm: compute workspace: killed (signal 9; out of memory?)"),
+        ("died with <Signals.SIGBUS: 7>.", "error: arm: compute workspace: killed (signal 7)"),
+        ("returned non-zero exit status 2.", "its own words"),
+    ],
+)
+def test_a_killed_job_s_log_says_so_in_place_of_it(log, capsys, ended, reason):
+    told = Path("logs/arm/workspace.compute.log")
+    told.parent.mkdir(parents=True)
+    told.write_text("its own words\n", encoding="utf-8")
+    log(LogEvent.JOB_INFO, jobid=1, rule_name="compute_workspace", wildcards={"robot": "arm"})
+    log(LogEvent.ERROR, f"CalledProcessError:\nCommand 'a; er3a compute 2> {told}' {ended}", level=logging.ERROR)
+    log(LogEvent.JOB_ERROR, jobid=1, rule_name="compute_workspace", rule_msg=None, log=[str(told)])
+    assert len(capsys.readouterr().err.splitlines()) == 1
+    assert told.read_text(encoding="utf-8").splitlines()[-1] == reason
 
 
 def test_what_snakemake_does_not_know_is_one_line(log, capsys):

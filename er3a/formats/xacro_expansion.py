@@ -52,7 +52,7 @@ def _expanded(path: Path, values: dict[str, str]) -> str:
 
     def checked(expression: str, *names: Any) -> Any:
         for node in ast.walk(ast.parse(expression.strip(), mode="eval")):
-            name = str(getattr(node, "attr", None) or getattr(node, "id", ""))
+            name: str = getattr(node, "attr", "") or getattr(node, "id", "")
             if INNER.match(name) and (isinstance(node, ast.Attribute) or name.startswith("__")):
                 raise ValueError(f"the name {name} is refused in expressions")
         return evaluate(expression, *names)

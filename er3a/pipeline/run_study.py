@@ -140,7 +140,7 @@ class RunLog(LogHandlerBase):
             self._finish(record.__dict__["job_id"])
         elif event == LogEvent.JOB_ERROR:
             job = record.__dict__
-            name, logs = job.get("rule_msg") or job.get("rule_name"), [str(log) for log in job.get("log") or ()]
+            name, logs = self._job_name(job), [str(log) for log in job.get("log") or ()]
             self._print(f"✗ {name}: ended with an error; see {', '.join(logs)}")
             if (number := self._killed.get(*logs[:1], 0)) and (log := Path(logs[0])).is_file():
                 why = "; out of memory?" if number == signal.SIGKILL else ""
@@ -153,6 +153,12 @@ class RunLog(LogHandlerBase):
                 self._print(_error_line(record.getMessage()))
         elif event is None and _concerns_a_person(record):
             self._print(record.getMessage())
+
+    def _job_name(self, job: Mapping[str, Any]) -> str:
+        """A job's message; without one its robot, its rule and, unless the rule names it, its stage."""
+        rule, of, _ = self._jobs.get(job.get("jobid", -1), (str(job.get("rule_name")), {}, 0.0))
+        words = [rule.replace("_", " "), of.get("stage", "")]
+        return str(job.get("rule_msg") or ": ".join(filter(None, (of.get("robot"), " ".join(filter(None, words))))))
 
     def close(self) -> None:
         """Take the bar away, and let an index that is being written be finished."""

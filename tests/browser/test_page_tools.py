@@ -70,6 +70,18 @@ def test_csv_holds_the_table_with_plain_numbers(page):
     assert rows[1:] == [["b, long", "-1234.5"], ["a", "20"], ['"c"', "–"], ["d", "3"], ["e", "5.0e-3"]]
 
 
+def test_csv_holds_no_formulas(page):
+    cells = ["=1+1", "+cmd", "@SUM(A1)", "-cmd", "−5", "a=b", '=HYPERLINK("x","y")']
+    table = "<table class='formulas'>" + "".join(f"<tr><td>{cell}</td></tr>" for cell in cells) + "</table>"
+    text = page.execute_script(
+        "document.querySelector('main').insertAdjacentHTML('beforeend', arguments[0]);"
+        "return csvOf(document.querySelector('table.formulas'))",
+        table,
+    )
+    formulas = ["'=1+1", "'+cmd", "'@SUM(A1)", "'-cmd", "-5", "a=b", '\'=HYPERLINK("x","y")']
+    assert [row[0] for row in csv.reader(io.StringIO(text))] == formulas
+
+
 def test_csv_of_a_table_of_entries_has_numbers_apart_from_their_marks(page):
     table = """<table class="entries"><tr><th>joint</th><th class="n">a (mm)</th></tr>
     <tr><th>1</th><td class="n"><a href="#a1">−1 050</a> <b>one source</b></td></tr>

@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from er3a.errors import InputError
+from er3a.files.hand_eye_file import grey_image
 from er3a.pipeline.working_folder import CODE_OF_LIBRARIES
 from testing.processes import run
 from tests.conftest import ROOT
@@ -173,3 +175,11 @@ def test_a_run_from_nothing_to_its_pages_runs_nothing_of_the_folder(stranger):
     assert (folder / "reports/index.html").is_file()
     call("er3a", "teach", "er3_600", "--study", "config/study.yaml")
     call("er3a", "verdicts", "--study", "config/study.yaml")
+
+
+def test_no_program_is_called_for_a_picture(stranger, monkeypatch):
+    folder, _ = stranger
+    monkeypatch.setenv("PATH", str(folder), prepend=os.pathsep)
+    (folder / "board.png").write_text("%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 9 9\n%%EndComments\nshowpage\n")
+    with pytest.raises(InputError, match="not a readable image"):
+        grey_image(folder / "board.png")

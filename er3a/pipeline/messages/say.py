@@ -54,7 +54,7 @@ class By:
     texts: Mapping[str, str]
 
 
-EXCERPT = 200  # letters of a user's text
+LONGEST, EXCERPT = 2_000, 200  # letters
 Text = str | Plural
 _texts: dict[str, Text] = {}
 _fields: dict[str, str] = {}  # of keys whose form is decided by a field of the finding
@@ -108,14 +108,14 @@ def say(finding: Any) -> str:
     return say_as(finding, str(getattr(finding, field)).lower() if field else "")
 
 
-def excerpt(part: Any) -> Any:
-    """A text out of a user's file, as long as a message may repeat it; other parts as they are."""
-    return f"{part[:EXCERPT]} …" if isinstance(part, str) and len(part) > EXCERPT else part
+def excerpt(text: str) -> str:
+    """The beginning of a text that is longer than any sentence of ours, such as a line of a program of 900 kB."""
+    return text if len(text) <= LONGEST else f"{text[:EXCERPT]} …"
 
 
 def say_as(finding: Finding, variant: str = "", /, **parts: Any) -> str:
     """A finding as one of its texts, with parts besides its own fields or in place of them."""
-    fields = {name: excerpt(getattr(finding, name)) for name in finding.__dataclass_fields__}
+    fields = {name: getattr(finding, name) for name in finding.__dataclass_fields__}
     return sentence(f"{finding.code}#{variant}" if variant else finding.code, **fields | parts)
 
 
@@ -139,7 +139,7 @@ def _as_text(part: Any, spec: str) -> str:
         return joined([_as_text(each, "") for each in part], spec or "; ")
     if hasattr(part, "code"):
         return say(part)
-    return language.as_text(part, spec)
+    return language.as_text(excerpt(part) if isinstance(part, str) else part, spec)
 
 
 def word(code: str, words: Mapping[KeyT, str], key: KeyT) -> str:
