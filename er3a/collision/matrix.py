@@ -42,7 +42,8 @@ from typing import Literal
 import numpy as np
 import scipy
 
-from er3a.collision.distances import FREE, MEETS, ROOM, Layout, measure, pair_distance, place, search_boxes
+from er3a.collision.convex import ROOM
+from er3a.collision.distances import FREE, MEETS, Layout, measure, pair_distance, place, search_boxes, unplaced
 from er3a.collision.pairs import BASE, PENETRATION_TOLERANCE, TRIED
 from er3a.collision.scene import Box, Scene
 from er3a.collision.shapes import PARALLEL, Body, arm_bodies, arm_shapes, layout_of, link_frames, solid_bodies
@@ -157,6 +158,7 @@ def _split(body: Body, centre: Reals, radius: float) -> tuple[Reals, Reals]:
 PairState = Literal["never", "joined", "overlaps", "guessed", "meets", "undecided", "allowed", "watched"]
 
 BOXES = 50_000
+BOXES_OF_SURFACES = 2_000
 BOXES_MORE = 500  # for the other bodies of two links that are known to meet
 GOAL = 0.5  # of the smallest distance sampled, to be proven at first
 COAXIAL = 1e-9  # m
@@ -336,6 +338,8 @@ def _judged(
     for names, bodies in by_names.items():
         if frozenset(names) in decided:
             found[names] = [JudgedPair("watched", tuple(bodies))]
+        elif any(body.tree or len(body.points) > 2 for pair in bodies for body in pair):
+            found[names] = _judged_given(robot, bodies)
         else:
             judged = judged_pairs(robot, bodies, BOXES)
             if regions:
@@ -404,14 +408,13 @@ def judged_pairs(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: int) -
     flat = [body for pair in pairs for body in pair]
     layout = layout_of(robot, flat, [(2 * k, 2 * k + 1) for k in range(len(pairs))])
     q, distance, overlap = _sampled(robot, layout)
-    box = np.stack([robot.lower, robot.upper])
     always: Flags = np.asarray(overlap.all(axis=0))
     meets: Flags = np.asarray(overlap.any(axis=0)) & ~always
     if meets.any():
         boxes = min(boxes, BOXES_MORE)
     found = []
     for k, pair in enumerate(pairs):
-        at, sampled = np.empty(robot.joints), distance[:, k]
+        sampled = distance[:, k]
         if always[k]:
             found.append(_overlapping(robot, pair, q, sampled, boxes))
             continue
@@ -432,17 +435,48 @@ def judged_pairs(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: int) -
                 witness = q[np.where(overlap[:, k], sampled, np.inf).argmin()]
                 found.append(JudgedPair("meets", (pair,), witness))
             continue
-        outcome, looked, bound = search_boxes(layout, k, box, (False, GOAL * float(sampled.min())), boxes // 2, at)
-        if outcome not in (FREE, MEETS):
-            outcome, more, bound = search_boxes(layout, k, box, (False, 0.0), boxes, at)
-            looked += more
-        if outcome == MEETS:
-            found.append(JudgedPair("meets", (pair,), at, boxes=looked))
-        elif outcome == FREE:
-            found.append(JudgedPair("never", lower_bound=bound, boxes=looked))
-        else:
-            found.append(JudgedPair("undecided", (pair,), boxes=looked))
+        found.append(_searched(robot, layout, k, pair, sampled, boxes))
     return _beside(robot, pairs, found, q[distance.argmax(axis=0)], boxes)
+
+
+def _searched(
+    robot: Robot, layout: Layout, k: int, pair: tuple[Body, Body], sampled: Reals, boxes: int
+) -> JudgedPair:
+    """A pair of bodies that overlaps in none of the joint vectors drawn; of these, its distances (N,), m."""
+    box, at = np.stack([robot.lower, robot.upper]), np.empty(robot.joints)
+    outcome, looked, bound = search_boxes(layout, k, box, (False, GOAL * float(sampled.min())), boxes // 2, at)
+    if outcome not in (FREE, MEETS):
+        outcome, more, bound = search_boxes(layout, k, box, (False, 0.0), boxes, at)
+        looked += more
+    if outcome == MEETS:
+        return JudgedPair("meets", (pair,), at, boxes=looked)
+    if outcome == FREE:
+        return JudgedPair("never", lower_bound=bound, boxes=looked)
+    return JudgedPair("undecided", (pair,), boxes=looked)
+
+
+def _judged_given(robot: Robot, pairs: Sequence[tuple[Body, Body]]) -> list[JudgedPair]:
+    """Judge all bodies of two links, some of them hulls or surfaces, as MoveIt's setup assistant does.
+
+    Neighbours are not looked at, nor links across another that overlap in all joint vectors drawn.
+    """
+    if _neighbours(robot, pairs[0]):
+        return [JudgedPair("joined", whole=True)]
+    flat = [body for pair in pairs for body in pair]
+    layout = layout_of(robot, flat, [(2 * k, 2 * k + 1) for k in range(len(pairs))])
+    q, distance, overlap = _sampled(robot, layout)
+    if overlap.any(axis=1).all():
+        across = pairs[0][1].link - pairs[0][0].link == 2
+        return [JudgedPair("joined", whole=True) if across else JudgedPair("overlaps", witness=q[0])]
+    found = []
+    for k, pair in enumerate(pairs):
+        sampled = distance[:, k]
+        if overlap[:, k].any():
+            found.append(JudgedPair("meets", (pair,), q[np.where(overlap[:, k], sampled, np.inf).argmin()]))
+        else:
+            boxes = BOXES_OF_SURFACES if any(body.tree for body in pair) else BOXES
+            found.append(_searched(robot, layout, k, pair, sampled, boxes))
+    return found
 
 
 def _overlapping(robot: Robot, pair: tuple[Body, Body], q: Reals, distance: Reals, boxes: int) -> JudgedPair:
@@ -520,9 +554,7 @@ def _overlap(robot: Robot, pairs: Sequence[tuple[Body, Body]]) -> Flags:
 
 def _neighbours(robot: Robot, pair: tuple[Body, Body]) -> bool:
     """Whether no link with a shape is between the two bodies' links."""
-    shapes = arm_shapes(robot)
-    links = {capsule.link for capsule in shapes.capsules} | {piece.link for piece in shapes.pieces}
-    return links.isdisjoint(range(pair[0].link + 1, pair[1].link))
+    return arm_shapes(robot).links.isdisjoint(range(pair[0].link + 1, pair[1].link))
 
 
 def _held(robot: Robot, pair: tuple[Body, Body], boxes: int) -> Held | None:
@@ -652,13 +684,12 @@ def _centres(robot: Robot, pair: tuple[Body, Body], q: Reals, hub: Reals | None)
     Of hulls where the joint holds them, if that is known; else, and of lines, where they are nearest.
     """
     layout = layout_of(robot, pair, [(0, 1)])
-    T, world, middle = np.empty(layout.links.shape), np.empty(layout.points.shape), np.empty((2, 3))
+    T, world, middle = unplaced(layout)
     place(layout, q, T, world, middle)
-    frames = [T[body.link] for body in pair]
-    near, shape = np.zeros((2, 3)), (layout.start, layout.kind, layout.radius, layout.disc)
+    frames, near = [T[body.link] for body in pair], np.zeros((2, 3))
     if hub is not None and any(len(body.points) > 2 for body in pair):
         near[:] = frames[1][:3, :3] @ hub + frames[1][:3, 3]
-    elif pair_distance(world, shape, 0, 1, np.empty((ROOM, 3)), near)[1]:  # cores overlap: about where both are
+    elif pair_distance(layout, T, world, 0, 1, np.empty((ROOM, 3)), near, np.inf)[1]:  # cores overlap: about where both are
         near[:] = middle.mean(axis=0)
     return [frame[:3, :3].T @ (point - frame[:3, 3]) for frame, point in zip(frames, near)]
 
@@ -707,14 +738,13 @@ def base_contacts(robot: Robot, scene: Scene | None) -> tuple[BaseContact, ...]:
     if not pairs:
         return ()
     layout = layout_of(robot, bodies, pairs)
-    w = np.empty(layout.points.shape)
-    place(layout, np.zeros(robot.joints), np.empty(layout.links.shape), w, np.empty(layout.centre.shape))
-    shape = (layout.start, layout.kind, layout.radius, layout.disc)
+    T, w, middles = unplaced(layout)
+    place(layout, np.zeros(robot.joints), T, w, middles)
     found: dict[str, BaseContact] = {}
     for a, b in pairs:
         room, near = np.empty((ROOM, 3)), np.empty((2, 3))
-        distance, touches = pair_distance(w, shape, a, b, room, near)
-        middle, deep = pair_distance(w, shape, len(base) + a, b, room, near)
+        distance, touches = pair_distance(layout, T, w, a, b, room, near, np.inf)
+        middle, deep = pair_distance(layout, T, w, len(base) + a, b, room, near, np.inf)
         margin = bodies[b].radius if len(bodies[b].points) > 1 else 0.0  # a ball's radius is none
         inside = bool(deep) or middle + bodies[a].radius + margin < -INSIDE
         contact = BaseContact(bodies[b].name, 0.0 - float(distance), inside)
@@ -731,8 +761,9 @@ def solids_met(robot: Robot, box: Box, scene: Scene) -> tuple[str, ...]:
     inner = replace(box, size=np.maximum(np.asarray(box.size) - 2 * PENETRATION_TOLERANCE, PENETRATION_TOLERANCE))
     bodies = [*solid_bodies(inner), *(body for solid in scene.solids for body in solid_bodies(solid))]
     layout = layout_of(robot, bodies, [(0, k) for k in range(1, len(bodies))])
-    shape, room, near = (layout.start, layout.kind, layout.radius, layout.disc), np.empty((ROOM, 3)), np.empty((2, 3))
-    found = [pair_distance(layout.points, shape, 0, k, room, near) for k in range(1, len(bodies))]
+    (T, w, middles), room, near = unplaced(layout), np.empty((ROOM, 3)), np.empty((2, 3))
+    place(layout, np.zeros(robot.joints), T, w, middles)
+    found = [pair_distance(layout, T, w, 0, k, room, near, np.inf) for k in range(1, len(bodies))]
     met = (body.name for body, (distance, deep) in zip(bodies[1:], found) if deep or distance < 0)
     return tuple(dict.fromkeys(met))
 
@@ -741,4 +772,4 @@ def _middle(body: Body) -> Body:
     """Of a capsule half its line; a hull at half its size, about the mean of its six ends."""
     at_end = [np.isclose(body.points, end(body.points, axis=0)) for end in (np.min, np.max)]
     ends = [body.points[each].mean(axis=0) for each in np.concatenate(at_end, axis=1).T]
-    return replace(body, points=(body.points + np.mean(ends, axis=0)) / 2)
+    return replace(body, points=(body.points + np.mean(ends, axis=0)) / 2, tree=None)

@@ -30,7 +30,7 @@ from er3a.kinematics.chain import constant_links, joint_starts
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import RADIANS_BELOW_DEG, in_si, is_part_of_pi
 from er3a.robots.masses import Drives, LinkMass, MassBody, Masses, WristLoad, moved, no_body
-from er3a.robots.robot import MAX_JOINTS, Grade, PairRule, Robot, Visual
+from er3a.robots.robot import MAX_JOINTS, Grade, PairRule, Robot, LinkMesh
 
 NAME_PATTERN = r"^[a-z0-9][a-z0-9_-]{0,63}$"
 HEAVIEST_LINK_KG = 20_000.0
@@ -537,7 +537,7 @@ class LinkVisual(StrictModel):
         self.visual()
         return self
 
-    def visual(self) -> Visual:
+    def visual(self) -> LinkMesh:
         """In metres; ``ValueError`` for anything but triangles."""
         try:
             points, faces = (
@@ -548,10 +548,10 @@ class LinkVisual(StrictModel):
                 raise ValueError
         except ValueError:
             raise ValueError("holds no triangles | Import the URDF again, or remove the link from visuals") from None
-        return Visual(self.link, points / 1000.0, faces.astype(np.int64))
+        return LinkMesh(self.link, points / 1000.0, faces.astype(np.int64))
 
 
-def link_visual(visual: Visual) -> dict[str, int | str]:
+def link_visual(visual: LinkMesh) -> dict[str, int | str]:
     """The fields of a :class:`LinkVisual`."""
     packed = ((1000 * visual.points).astype("<f4"), visual.faces.astype("<u2"))
     points, faces = (base64.b64encode(array.tobytes()).decode() for array in packed)
