@@ -21,7 +21,7 @@ from itertools import product
 import numpy as np
 import scipy
 
-from er3a.numerics.arrays import Integers, Reals, copy_values
+from er3a.numerics.arrays import Reals, copy_values
 from er3a.numerics.jit import inner_kernel, kernel
 
 EXACT = 1e-11  # m, at which the iteration stops

@@ -115,11 +115,8 @@ def pair_distance(
     return core - sizes, core == 0.0
 
 
-
 @inner_kernel
-def _apart_along(
-    layout: Layout, w: Reals, a: int, b: int, room: Reals, axis: Reals
-) -> bool:
+def _apart_along(layout: Layout, w: Reals, a: int, b: int, room: Reals, axis: Reals) -> bool:
     """Whether a direction (3,) shows that a body lies wholly beyond another, neither of them a half-space."""
     start, radius, disc = layout.start, layout.radius, layout.disc
     for r in range(3):

@@ -319,7 +319,13 @@ class Body:
 @lru_cache(maxsize=64)
 def _surface(mesh: LinkMesh) -> Body:
     """A link's surface as a body."""
-    return Body(link_label(mesh.link), mesh.link, outer_corners(mesh.points[np.unique(mesh.faces)]), 0.0, tree=tree_of(mesh.points, mesh.faces))
+    return Body(
+        link_label(mesh.link),
+        mesh.link,
+        outer_corners(mesh.points[np.unique(mesh.faces)]),
+        0.0,
+        tree=tree_of(mesh.points, mesh.faces),
+    )
 
 
 def arm_bodies(robot: Robot) -> tuple[Body, ...]:

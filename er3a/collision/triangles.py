@@ -179,9 +179,7 @@ def _turned(T: Reals, S: Reals, R: Reals, t: Reals) -> None:
 
 
 @inner_kernel
-def _boxes_apart(
-    first: Reals, n: int, second: Reals, m: int, R: Reals, t: Reals, axis: Reals, limit: float
-) -> float:
+def _boxes_apart(first: Reals, n: int, second: Reals, m: int, R: Reals, t: Reals, axis: Reals, limit: float) -> float:
     """A lower bound of the squared distance of a box of ``first`` (M, 2, 3) and one of ``second``, seen from the first
     by R (3, 3) and t (3,); one that reaches ``limit`` will do.
 
@@ -456,5 +454,3 @@ def depths_inside(trees: Trees, body: int, points: Reals, found: Reals) -> None:
         found[n] = 0.0
         if holds_point(trees, T, trees.root[body], points[n]):
             found[n] = -surface_distance(alone, 0, T, 1, T, (points, n, n + 1, 0.0), room, near, np.inf)
-
-

@@ -38,12 +38,13 @@ from er3a.collision.meshes import simplified
 from er3a.collision.shapes import arm_shapes
 from er3a.errors import Er3aError, InputError
 from er3a.formats import urdf_tree
+from er3a.formats.mesh_file import link_mesh
 from er3a.geometry.transforms import rot_y, rot_z, rpy_of
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import forward, frames
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.quasi_random import quasi_random_points
-from er3a.robots.robot import MAX_JOINTS, ConvexPiece, Envelope, Robot, Source, LinkMesh, robot_name
+from er3a.robots.robot import MAX_JOINTS, ConvexPiece, Envelope, LinkMesh, Robot, Source, robot_name
 
 PARALLEL = 1e-12
 NEARLY_PARALLEL = math.radians(1.0)  # as far as arms are made wrong; on links of 0.1 m a normal is 6 m away, or more
@@ -527,23 +528,16 @@ def link_shapes(
             lost += [] if found or name in lost else [name]
         shapes += urdf_tree.with_capsules(made)
     shapes.sort(key=lambda each: each.link)
-    surfaces: dict[int, list[tuple[Reals, Integers]]] = {}
+    surfaces: dict[int, list[Reals]] = {}
     for shape in shapes:
         if isinstance(shape, LinkMesh):
-            surfaces.setdefault(shape.link, []).append((shape.points, shape.faces))
+            surfaces.setdefault(shape.link, []).append(shape.points[shape.faces])
     fields = {
         "envelopes": tuple(shape for shape in shapes if isinstance(shape, Envelope)),
         "hulls": tuple(shape for shape in shapes if isinstance(shape, ConvexPiece)),
-        "meshes": tuple(LinkMesh(number, *_as_one(parts)) for number, parts in surfaces.items()),
+        "meshes": tuple(link_mesh(number, np.concatenate(parts)) for number, parts in surfaces.items()),
     }
     return fields, tuple(notes), tuple(lost)
-
-
-def _as_one(meshes: Sequence[tuple[Reals, Integers]]) -> tuple[Reals, Integers]:
-    """Several meshes, each points (k, 3) and triangles (f, 3), as one."""
-    starts = np.cumsum([0, *(len(points) for points, _ in meshes)])
-    faces = np.concatenate([faces + start for (_, faces), start in zip(meshes, starts)])
-    return np.concatenate([points for points, _ in meshes]), faces
 
 
 def link_visuals(
@@ -568,7 +562,10 @@ def link_visuals(
             parts.setdefault(number, []).append((points @ T[:3, :3].T + T[:3, 3], faces))
     found = []
     for number, meshes in sorted(parts.items()):
-        points, faces = simplified(*_as_one(meshes), DRAWN_TRIANGLES // len(parts))
+        starts = np.cumsum([0, *(len(points) for points, _ in meshes)])
+        faces = np.concatenate([faces + start for (_, faces), start in zip(meshes, starts)])
+        points = np.concatenate([points for points, _ in meshes])
+        points, faces = simplified(points, faces, DRAWN_TRIANGLES // len(parts))
         used, corners = np.unique(faces, return_inverse=True)
         found.append(LinkMesh(number, points[used], corners.reshape(-1, 3)))
     notes = (f"pictures show no visual geometry of {', '.join(missing)}: {why}" for why in missing.values())

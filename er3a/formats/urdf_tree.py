@@ -22,7 +22,7 @@ import re
 import tempfile
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -758,9 +758,7 @@ def with_capsules(shapes: Sequence[Shape | CylinderOfLink]) -> list[Shape]:
     return [shape for shape in found if id(shape) not in at_ends]
 
 
-def _balls(
-    shapes: Sequence[Shape | CylinderOfLink], end: Sequence[float], radius: float
-) -> list[Envelope]:
+def _balls(shapes: Sequence[Shape | CylinderOfLink], end: Sequence[float], radius: float) -> list[Envelope]:
     wanted = (*end, radius)
     balls = [each for each in shapes if isinstance(each, Envelope)]
     return [ball for ball in balls if np.abs(np.subtract((*ball.start, ball.radius), wanted)).max() <= SAME_M]

@@ -70,7 +70,7 @@ from er3a.pipeline.stages.workspace.model import CapabilityMissing
 from er3a.pipeline.study import Study, load_study
 from er3a.pipeline.viewing.conditions import program_head
 from er3a.references.rows import GROUPS
-from er3a.robots.robot import ConvexPiece, Envelope, PairRule, Robot, LinkMesh
+from er3a.robots.robot import ConvexPiece, Envelope, LinkMesh, PairRule, Robot
 
 ROBOT = "er3a_c60"
 
