@@ -757,7 +757,7 @@ from pathlib import Path
 import numpy as np
 
 import er3a
-from er3a.collision.distances import distances_from_hull
+from er3a.collision.convex import distances_from_hull
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import hull_faces, solid_bodies, solid_pieces
 from er3a.files.robot_library import load_robot

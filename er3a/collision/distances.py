@@ -272,9 +272,8 @@ def which_overlap(layout: Layout, q: Reals, found: Flags) -> None:
     reach, first, second, link = layout.reach, layout.first, layout.second, layout.link
     one, axes, hit, count = found.shape[1] == 1, np.zeros((len(first), 3)), 0, len(first)
     placed = np.full(len(link), -1)  # the arm for which a body's points are
-    for b in range(len(link)):
-        _place_middle(layout, T, b, middle)
-        _place_points(layout, T, b, w)
+    if q.shape[0]:
+        place(layout, q[0], T, w, middle)
     for n in range(q.shape[0]):
         _place_frames(layout, q[n], T)
         for b in range(len(link)):

@@ -42,7 +42,17 @@ from typing import Literal
 import numpy as np
 
 from er3a.collision.convex import ROOM
-from er3a.collision.distances import FREE, MEETS, Layout, measure, pair_distance, place, search_boxes, unplaced
+from er3a.collision.distances import (
+    FREE,
+    MEETS,
+    Layout,
+    measure,
+    pair_distance,
+    place,
+    search_boxes,
+    unplaced,
+    which_overlap,
+)
 from er3a.collision.pairs import BASE, PENETRATION_TOLERANCE, TRIED, link_label
 from er3a.collision.scene import Box, Scene
 from er3a.collision.shapes import PARALLEL, Body, arm_bodies, arm_shapes, layout_of, link_frames, solid_bodies
@@ -375,14 +385,14 @@ def judged_pairs(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: int) -
                 witness = q[np.where(overlap[:, k], sampled, np.inf).argmin()]
                 found.append(JudgedPair("meets", (pair,), witness))
             continue
-        found.append(_searched(robot, layout, k, pair, sampled, boxes))
+        found.append(_searched(robot, layout, k, pair, float(sampled.min()), boxes))
     return found
 
 
-def _searched(robot: Robot, layout: Layout, k: int, pair: tuple[Body, Body], sampled: Reals, boxes: int) -> JudgedPair:
-    """A pair of bodies that overlaps in none of the joint vectors drawn; of these, its distances (N,), m."""
+def _searched(robot: Robot, layout: Layout, k: int, pair: tuple[Body, Body], least: float, boxes: int) -> JudgedPair:
+    """A pair of bodies that overlaps in none of the joint vectors drawn; of these, its least distance, m."""
     box, at = np.stack([robot.lower, robot.upper]), np.empty(robot.joints)
-    outcome, looked, bound = search_boxes(layout, k, box, (False, GOAL * float(sampled.min())), boxes // 2, at)
+    outcome, looked, bound = search_boxes(layout, k, box, (False, GOAL * least), boxes // 2, at)
     if outcome not in (FREE, MEETS):
         outcome, more, bound = search_boxes(layout, k, box, (False, 0.0), boxes, at)
         looked += more
@@ -401,20 +411,19 @@ def _judged_given(robot: Robot, pairs: Sequence[tuple[Body, Body]]) -> list[Judg
     inner, outer = pairs[0]
     if outer.name == link_label(outer.link) and _neighbours(robot, pairs[0]):
         return [JudgedPair("joined", whole=True)]
-    flat = [body for pair in pairs for body in pair]
-    layout = layout_of(robot, flat, [(2 * k, 2 * k + 1) for k in range(len(pairs))])
-    q, distance, overlap = _sampled(robot, layout)
+    q, overlap = quasi_random_points(robot.lower, robot.upper, TRIED), _overlap(robot, pairs)
     if overlap.any(axis=1).all():
         across = outer.link - inner.link <= 2
         return [JudgedPair("joined", whole=True) if across else JudgedPair("overlaps", witness=q[0])]
     found = []
     for k, pair in enumerate(pairs):
-        sampled = distance[:, k]
+        layout = layout_of(robot, pair, [(0, 1)])
         if overlap[:, k].any():
-            found.append(JudgedPair("meets", (pair,), q[np.where(overlap[:, k], sampled, np.inf).argmin()]))
+            found.append(JudgedPair("meets", (pair,), q[overlap[:, k].argmax()]))
+        elif any(body.tree for body in pair):
+            found.append(_searched(robot, layout, 0, pair, 0.0, BOXES_OF_SURFACES))
         else:
-            boxes = BOXES_OF_SURFACES if any(body.tree for body in pair) else BOXES
-            found.append(_searched(robot, layout, k, pair, sampled, boxes))
+            found.append(_searched(robot, layout, 0, pair, float(_sampled(robot, layout)[1].min()), BOXES))
     return found
 
 
@@ -436,7 +445,10 @@ def _overlapping(robot: Robot, pair: tuple[Body, Body], q: Reals, distance: Real
 def _overlap(robot: Robot, pairs: Sequence[tuple[Body, Body]]) -> Flags:
     """Who overlaps, (TRIED, K), in the joint vectors drawn."""
     flat = [body for pair in pairs for body in pair]
-    return _sampled(robot, layout_of(robot, flat, [(2 * k, 2 * k + 1) for k in range(len(pairs))]))[2]
+    found = np.empty((TRIED, len(pairs)), bool)
+    layout = layout_of(robot, flat, [(2 * k, 2 * k + 1) for k in range(len(pairs))])
+    which_overlap(layout, quasi_random_points(robot.lower, robot.upper, TRIED), found)
+    return found
 
 
 def _neighbours(robot: Robot, pair: tuple[Body, Body]) -> bool:

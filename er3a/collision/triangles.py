@@ -25,6 +25,7 @@ import scipy
 
 from er3a.by_value import ByValue
 from er3a.collision.convex import ROOM, TOUCHING, cores_distance
+from er3a.geometry.vectors import fibonacci_sphere
 from er3a.numerics.arrays import Integers, Reals
 from er3a.numerics.jit import inner_kernel, kernel
 
@@ -128,9 +129,7 @@ def outer_corners(points: Reals, most: int = 64) -> Reals:
     try:
         corners = points[scipy.spatial.ConvexHull(points).vertices]
         if len(corners) <= most:
-            return corners
-        from er3a.geometry.vectors import fibonacci_sphere
-
+            return np.asarray(corners)
         kept = corners[np.unique((fibonacci_sphere(most) @ corners.T).argmax(axis=1))]
         hull = scipy.spatial.ConvexHull(kept)
     except scipy.spatial.QhullError:
@@ -194,7 +193,7 @@ def _boxes_apart(first: Reals, n: int, second: Reals, m: int, R: Reals, t: Reals
     gap = axis[0, 0] * dx + axis[0, 1] * dy + axis[0, 2] * dz
     gap -= abs(axis[0, 0]) * u + abs(axis[0, 1]) * v + abs(axis[0, 2]) * w
     gap -= abs(axis[1, 0]) * i + abs(axis[1, 1]) * j + abs(axis[1, 2]) * k
-    found = max(gap, 0.0) ** 2
+    found = float(max(gap, 0.0) ** 2)
     if found >= limit:
         return found
     a, b, c = abs(R[0, 0]), abs(R[0, 1]), abs(R[0, 2])
@@ -203,7 +202,7 @@ def _boxes_apart(first: Reals, n: int, second: Reals, m: int, R: Reals, t: Reals
     apart = max(abs(dx) - u - a * i - b * j - c * k, 0.0) ** 2
     apart += max(abs(dy) - v - d * i - e * j - f * k, 0.0) ** 2
     apart += max(abs(dz) - w - g * i - h * j - o * k, 0.0) ** 2
-    found = max(found, apart)
+    found = float(max(found, apart))
     if found >= limit:
         return found
     apart = max(abs(R[0, 0] * dx + R[1, 0] * dy + R[2, 0] * dz) - i - a * u - d * v - g * w, 0.0) ** 2

@@ -218,7 +218,7 @@ def estimated_links(robot: Robot, density: float) -> tuple[LinkMass, ...]:
 
 
 def _link_parts(robot: Robot) -> dict[int, Sequence[Envelope] | Sequence[Reals]]:
-    """What fills each link: its convex pieces (k, 3), m, that have a volume, the hull of a surface; of a link without any its capsules."""
+    """What fills each link: its convex pieces (k, 3), m, that have a volume, hulls of surfaces; else capsules."""
     shapes, pieces, capsules = arm_shapes(robot), dict[int, list[Reals]](), dict[int, list[Envelope]]()
     for piece in shapes.pieces:
         points = np.array(piece.points)

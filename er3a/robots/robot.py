@@ -228,7 +228,8 @@ class Robot(ByValue, Displayed):
             raise RobotError(self.name, f"direction of joint {wrong[0] + 1} is {value:g}; expected 1 or -1")
         if (endless := np.flatnonzero(self.continuous & self.slides)).size:
             raise RobotError(self.name, f"joint {endless[0] + 1} slides and is continuous; give it limits")
-        for link in {shape.link for shape in (*self.envelopes, *self.hulls, *self.meshes)}:
+        shapes: tuple[Envelope | ConvexPiece | LinkMesh, ...] = (*self.envelopes, *self.hulls, *self.meshes)
+        for link in {shape.link for shape in shapes}:
             if link > rows:
                 raise RobotError(self.name, f"a shape belongs to link {link}; the arm has links 0 to {rows}")
         for limit in self.combined:

@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from er3a.collision.bodies import Bodies
-from er3a.collision.distances import RIM
+from er3a.collision.convex import RIM
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward, frames, jacobian
