@@ -5,16 +5,15 @@ proven harmless:
 
 - *never*: the two are apart in all joint vectors within the limits, proven by bounds of the distance over boxes of
   joint values, which are halved until each is decided;
-- *joined*: they overlap in all joint vectors drawn (``TRIED``) because a joint joins them. Either no link with a shape
-  is between the two (of neighbours, being less than ``TOUCH`` apart counts as overlap if it is proven). Or there are
-  two joints between them (more if their axes meet), and a ball in the outer link about a point of its joint's axis, or
-  in its middle, is proven to touch the inner link in all joint vectors, as in a wrist. Only the region around that
-  joint is left out, within the girth of both bodies: for hulls, measured from the point that is proven to belong to
-  both; for lines, from where they are nearest in the pose in which they are farthest apart. The rest is classified
-  again, so that an arm that folds onto itself is seen. A default shape that slides in a thicker one is joined to it in
-  likewise: only the part of the guide along the sliding axis is left out, and nothing of the sliding shape. In
-  links with several bodies, those beside two joined bodies are joined too, if the rest without that joint's region
-  comes apart. So are all bodies of two links that always overlap only as a whole;
+- *joined*: they overlap in all joint vectors drawn (``TRIED``) because a joint joins them. Of given hulls and surfaces,
+  links with no shaped link between them count as joined, and ones across another that always overlap; they are not
+  looked at. Of capsules, either no link with a shape is between the two (of neighbours, being less than ``TOUCH`` apart
+  counts as overlap if it is proven), or there are two joints between them (more if their axes meet), and a ball in the
+  outer link about a point of its joint's axis, or in its middle, is proven to touch the inner link in all joint
+  vectors, as in a wrist. Only the region around that joint is left out, within the girth of both, from where they are
+  nearest in the pose in which they are farthest apart. The rest is classified again, so that an arm that folds onto
+  itself is seen. A default shape that slides in a thicker one is joined to it likewise: only the part of the guide
+  along the sliding axis is left out, and nothing of the sliding shape;
 - *overlaps*: they overlap in all joint vectors drawn, the boxes show none in which they don't, and no joint explains
   it. No arm is built like that, so the shapes are wrong: the overlap is left out, and every result that does not
   examine it has to say so;
