@@ -227,7 +227,8 @@ def measure(layout: Layout, q: Reals, found: Reals, smallest: Reals, pair: Integ
 
     ``found`` (N, K) gets them all; if it has no columns, only ``smallest`` (N,) and its number ``pair`` (N,) are worked
     out, without pairs that can't be the nearest: hulls first, then surfaces, the nearest hulls around them first.
-    Joined pairs count as nearest only where they overlap. ``deep`` (N,) says whether cores overlapped.
+    Joined pairs count as nearest only where they overlap. ``deep`` (N,) says whether cores overlapped, or a surface
+    and another body, of which the depth is not known then.
     """
     room, near = np.empty((ROOM, 3)), np.empty((2, 3))
     T, w, middle = unplaced(layout)
@@ -242,10 +243,11 @@ def measure(layout: Layout, q: Reals, found: Reals, smallest: Reals, pair: Integ
             if not every and _apart(middle, reach, a, b) >= best:
                 continue
             distance, overlap = pair_distance(layout, T, w, a, b, room, near, np.inf if every else 0.0)
-            inside = inside or overlap
+            surface = root[a] >= 0 or root[b] >= 0
+            inside = inside or overlap or (surface and distance < 0)
             if every:
                 found[n, k] = distance
-            elif distance >= 0 and not overlap and (root[a] >= 0 or root[b] >= 0):
+            elif surface and not inside:
                 least[k] = np.inf if joined[k] else distance
             if least[k] == np.inf and distance < best and not (joined[k] and distance >= 0 and not overlap):
                 best, at = distance, k

@@ -8,11 +8,11 @@ URDFs that are written as xacro are expanded by xacrodoc (the extra ``xacro``); 
 Masses and drives are ``<inertial>`` of links, ``<dynamics>`` and efforts of joints. Links connected by fixed joints
 count as one. An effort of 0 means unknown, as in most files.
 
-Collision geometry becomes capsules and convex hulls: boxes become hulls, cylinders prisms around them, spheres capsules
-without length; a cylinder with a sphere of its radius at each end becomes a capsule. A mesh becomes its convex hull or,
-on request, several convex pieces. The export writes a mesh for each hull, and a cylinder and two spheres for a capsule.
-The amount by which a hull has to be enlarged is written as ``<collision margin="...">`` (m), which other readers
-ignore.
+Collision geometry becomes capsules, convex hulls and surfaces: boxes become hulls, cylinders prisms around them,
+spheres capsules without length; a cylinder with a sphere of its radius at each end becomes a capsule. A mesh stays a surface of
+triangles; one that is closed and convex, or has a margin, becomes its hull. The export writes a mesh for each hull and
+surface, and a cylinder and two spheres for a capsule. The amount by which a hull has to be enlarged is written as
+``<collision margin="...">`` (m), which other readers ignore.
 """
 
 from __future__ import annotations
@@ -769,7 +769,7 @@ def write_shapes(robot: Robot, names: Sequence[str], root: ElementTree.Element, 
 
     Parameters
     ----------
-    meshes : folder beside the URDF that gets an OBJ for each convex piece; None leaves the pieces out
+    meshes : folder beside the URDF that gets an OBJ for each convex piece and surface; None leaves them out
     """
     elements = {link.get("name"): link for link in root.findall("link")}
     for capsule in robot.envelopes:
@@ -784,12 +784,16 @@ def write_shapes(robot: Robot, names: Sequence[str], root: ElementTree.Element, 
             _geometry(link, "collision", T, "cylinder", radius=repr(capsule.radius), length=repr(length))
     if meshes is None:
         return
-    if robot.hulls or robot.visuals:
+    if robot.hulls or robot.meshes or robot.visuals:
         meshes.mkdir(parents=True, exist_ok=True)
     for visual in robot.visuals:
         file = meshes / f"{names[visual.link]}_visual.obj"
         file.write_text(_obj(_in_link(robot, visual.link, visual.points), visual.faces), encoding="utf-8")
         _geometry(elements[names[visual.link]], "visual", np.eye(4), "mesh", filename=f"{meshes.name}/{file.name}")
+    for mesh in robot.meshes:
+        file = meshes / f"{names[mesh.link]}_surface.obj"
+        file.write_text(_obj(_in_link(robot, mesh.link, mesh.points), mesh.faces), encoding="utf-8")
+        _geometry(elements[names[mesh.link]], "collision", np.eye(4), "mesh", filename=f"{meshes.name}/{file.name}")
     for number, piece in enumerate(robot.hulls, start=1):
         file = meshes / f"{names[piece.link]}_{number}.obj"
         points = _in_link(robot, piece.link, piece.points)
