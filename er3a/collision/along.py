@@ -165,7 +165,7 @@ class _Motion:
         found = self.known.setdefault(t, np.full(len(self.bodies.pairs), np.nan))
         missing = pairs[np.isnan(found[pairs])]
         if missing.size:
-            found[missing] = self.bodies.distances(self.bodies.ends(q), missing)
+            found[missing] = self.bodies.distances(q, missing)
         return found
 
 
@@ -279,7 +279,7 @@ def _contacts(motion: _Motion, times: Reals, q: Reals, near: float) -> list[Cont
     overlap = np.array([bool(np.nanmin(motion.known[times[i]]) <= 0) for i in known])
 
     def apart(at: float, pairs: Integers = every) -> float:
-        return float(motion.bodies.distances(motion.bodies.ends(motion.joints(np.array([at]))[0]), pairs).min())
+        return float(motion.bodies.distances(motion.joints(np.array([at]))[0], pairs).min())
 
     found = []
     for a, b in runs(overlap):
@@ -288,7 +288,7 @@ def _contacts(motion: _Motion, times: Reals, q: Reals, near: float) -> list[Cont
         end = scipy.optimize.brentq(apart, last, times[known[b]], xtol=near) if b < len(known) else last
         inside = known[max(a - 1, 0) : b + 1]
         at = times[inside]
-        rows = np.array([motion.bodies.distances(motion.bodies.ends(q[i]), every) for i in inside])
+        rows = np.array([motion.bodies.distances(q[i], every) for i in inside])
         touches: dict[Pair, Touch] = {}
         for k in np.flatnonzero(rows[(at >= first) & (at <= last)].min(axis=0) <= 0).tolist():
             touch = _touch(motion, k, at, rows[:, k], partial(apart, pairs=np.array([k])), near)

@@ -9,14 +9,13 @@ from itertools import compress, product
 
 import numpy as np
 
+from er3a.collision.convex import cylinder_points, overlap_depth
 from er3a.collision.distances import (
     CYLINDER,
     FREE,
     HALF_SPACE,
     Layout,
-    cylinder_points,
     measure,
-    overlap_depth,
     search_boxes,
     some_distances,
     which_overlap,
@@ -24,7 +23,7 @@ from er3a.collision.distances import (
 from er3a.collision.matrix import BOXES, MatrixRow, collision_matrix, matrix_of
 from er3a.collision.pairs import BASE, CarriedAndLink, CarriedAndSolid, LinkAndSolid, LinkPair, Pair, link_label
 from er3a.collision.scene import Scene
-from er3a.collision.shapes import Body, arm_bodies, carried_bodies, layout_of, link_frames, solid_bodies
+from er3a.collision.shapes import Body, arm_bodies, carried_bodies, depth_inside, layout_of, link_frames, solid_bodies
 from er3a.errors import Er3aError
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.joint_limits import but_for_turns
@@ -97,8 +96,6 @@ class Bodies:
         most = max((len(body.points) for body in self.capsules), default=1)
         rows = [np.resize(np.arange(len(body.points)), most) for body in self.capsules]
         self._padded = np.array([body.points[row] for body, row in zip(self.capsules, rows)]).reshape(-1, most, 3)
-        places = [np.arange(len(body.points)) + most * i for i, body in enumerate(self.capsules)]
-        self._kept = np.concatenate(places) if places else np.empty(0, int)
 
     @property
     def unmeasured(self) -> tuple[str, ...]:
@@ -122,22 +119,20 @@ class Bodies:
         placed: Reals = np.einsum("...nij,nkj->...nki", T[..., :3, :3], self._padded) + T[..., None, :3, 3]
         return placed
 
-    def distances(self, ends: Reals, pairs: Integers) -> Reals:
-        """Distances (len(pairs),) in m of some pairs, negative by the depth of overlap, for points of one arm."""
-        return self.nearest(ends, pairs)[0]
+    def distances(self, q: Reals, pairs: Integers) -> Reals:
+        """Distances (len(pairs),) in m of some pairs, negative by the depth of overlap, of one arm (n,)."""
+        return self.nearest(q, pairs)[0]
 
     def counted(self, distances: Reals) -> Reals:
         """Distances (..., P) as they are counted: infinite for joined pairs that don't overlap."""
         return np.where(self.joined & (distances > 0), np.inf, distances)
 
-    def nearest(self, ends: Reals, pairs: Integers) -> tuple[Reals, Reals]:
+    def nearest(self, q: Reals, pairs: Integers) -> tuple[Reals, Reals]:
         """Distances as :meth:`distances`, and the points (len(pairs), 2, 3), m, where the bodies' cores are nearest."""
-        world = self.layout.points.copy()
-        world[: len(self._kept)] = ends.reshape(-1, 3)[self._kept]
         found, deep, near = np.empty(len(pairs)), np.zeros(len(pairs), bool), np.empty((len(pairs), 2, 3))
-        some_distances(self.layout, world, np.asarray(pairs, np.int64), found, deep, near)
+        some_distances(self.layout, np.ascontiguousarray(q, float), np.asarray(pairs, np.int64), found, deep, near)
         for row in np.flatnonzero(deep):
-            found[row] -= self._depth(world, int(pairs[row]))
+            found[row] -= self._depth(q, int(pairs[row]))
         return found, near
 
     def min_distance(self, q: Reals) -> tuple[Reals, Integers]:
@@ -145,11 +140,11 @@ class Bodies:
         q = np.ascontiguousarray(q, float)
         smallest, pair, deep = np.empty(len(q)), np.empty(len(q), np.int64), np.zeros(len(q), bool)
         measure(self.layout, q, np.empty((0, 0)), smallest, pair, deep)
-        every = np.arange(len(self.pairs))
-        for row in np.flatnonzero(deep):
-            distances = self.counted(self.distances(self.ends(q[row]), every))
-            pair[row] = int(distances.argmin())
-            smallest[row] = distances[pair[row]]
+        rows = np.flatnonzero(deep)
+        for row, overlap in zip(rows, self.overlaps(q[rows])):
+            pairs = np.flatnonzero(overlap)
+            distances = self.distances(q[row], pairs)
+            pair[row], smallest[row] = pairs[distances.argmin()], distances.min()
         return smallest, pair
 
     def min_distance_of_turns(self, q: Reals) -> tuple[Reals, Integers]:
@@ -180,7 +175,7 @@ class Bodies:
 
     def surface_points(self, q: Reals, pair: int) -> Reals:
         """The points (2, 3), m, on the surfaces of a pair's bodies that are nearest, for an arm (n,)."""
-        near = self.nearest(self.ends(q), np.array([pair]))[1][0]
+        near = self.nearest(q, np.array([pair]))[1][0]
         along = near[1] - near[0]
         length = float(np.linalg.norm(along))
         unit = along / length if length > 0 else np.zeros(3)
@@ -193,12 +188,19 @@ class Bodies:
         box = np.stack([self.robot.lower, self.robot.upper])
         return search_boxes(self.layout, pair, box, (True, 0.0), BOXES, np.empty(box.shape[1]))[0] == FREE
 
-    def _depth(self, world: Reals, pair: int) -> float:
-        cores = []
-        for b in (self.layout.first[pair], self.layout.second[pair]):
-            points, body = world[self.layout.start[b] : self.layout.start[b + 1]], self._all[b]
-            cores.append(cylinder_points(points, body.disc) if body.kind == CYLINDER else points)
-        return overlap_depth(*cores)
+    def _depth(self, q: Reals, pair: int) -> float:
+        """How deep two bodies whose cores overlap do, m; of surfaces at least that."""
+        bodies = [self._all[b] for b in (self.layout.first[pair], self.layout.second[pair])]
+        T = np.concatenate([link_frames(self.robot, q), np.eye(4)[None]])
+        if any(body.tree for body in bodies):
+            return max(depth_inside(a, b, np.linalg.inv(T[a.link]) @ T[b.link]) for a, b in (bodies, bodies[::-1]))
+        return overlap_depth(*(_core_points(body, T[body.link]) for body in bodies))
+
+
+def _core_points(body: Body, T: Reals) -> Reals:
+    """Points (n, 3), m, whose hull is a body's core, placed by T (4, 4)."""
+    points: Reals = body.points @ T[:3, :3].T + T[:3, 3]
+    return cylinder_points(points, body.disc) if body.kind == CYLINDER else points
 
 
 def named_pair(first: Body, second: Body) -> Pair:

@@ -1,4 +1,4 @@
-"""Distances and depths of convex bodies, compiled: of two bodies, for batches of joint vectors, for boxes of them.
+"""Distances of bodies, compiled: of two bodies, for batches of joint vectors, for boxes of them.
 
 A point of a body moves, while each row k of the table moves by up to ``h_k`` from where it is, by no more than the sum
 over the rows, from the body inwards, of ``h_k`` if it slides, or of ``2 sin(h_k / 2)`` times its distance from the
@@ -6,318 +6,33 @@ axis, which the rows farther out have changed by no more than what they have add
 what the joints that the coupling lays on it do together. A body moves, as a set, by no more than its points do. A pair
 whose distance exceeds that is apart in the whole box of joint vectors.
 
-A body is a core grown by a radius. The core is the hull of points, a cylinder (two points, the ends of its axis, with
-the radius of its disc) or a half-space (a normal, and how far along it the solid ends). The distance of two bodies is
-that of their cores less both radii. Two lines are measured in closed form [1]_, all else by the Gilbert-Johnson-Keerthi
-iteration [2]_, whose closest points of a simplex are found region by region [1]_. How deep two cores overlap is the
-smallest shift that parts them: their Minkowski difference holds the origin while they overlap, and its nearest face is
-the shortest separating translation [3]_.
-
-References
-----------
-.. [1] C. Ericson, *Real-Time Collision Detection*, 2005, sections 5.1.5, 5.1.6 and 5.1.9.
-.. [2] E. G. Gilbert, D. W. Johnson, S. S. Keerthi, "A fast procedure for computing the distance between complex
-   objects in three-dimensional space", IEEE J. Robotics and Automation 4, 1988.
-.. [3] G. van den Bergen, *Collision Detection in Interactive 3D Environments*, 2003, sections 2.3 and 4.3.8.
+A convex body is a core (:mod:`er3a.collision.convex`) or a half-space (a normal, and how far along it the solid ends),
+grown by a radius; the distance of two is that of their cores less both radii. Any other body is a surface of triangles
+(:mod:`er3a.collision.triangles`). Its points are the corners of a hull around it, which is measured first: triangles
+are looked at only where the hulls are too near to each other to settle what is asked.
 """
 
 from __future__ import annotations
 
-from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-import scipy
 
+from er3a.collision.convex import (
+    AXIS,
+    EXACT,
+    ROOM,
+    above_plane,
+    cores_distance,
+    lines_distance,
+    support,
+)
+from er3a.collision.triangles import Trees, surface_above_plane, surface_distance
 from er3a.kinematics.forward import rows_of, slide_row, step_row, turn_row, write_rows
-from er3a.numerics.arrays import Flags, Integers, Reals, copy_values
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import inner_kernel, kernel
 
 HULL, CYLINDER, HALF_SPACE = 0, 1, 2
-EXACT = 1e-11  # m, at which the iteration stops
-TOUCHING = 1e-9  # m; cores that are nearer overlap
-ROUNDS = 64
-# rows of scratch memory after the simplex and its points on either core
-_V, _WEIGHT, _NEAR, ROOM = 12, 13, 17, 19
-
-
-@inner_kernel
-def _point_on_line(w: Reals, p: int, a: int, b: int) -> float:
-    """Parameter in [0, 1] of the point of the line from row a to row b that is nearest to row p."""
-    length = along = 0.0
-    for r in range(3):
-        length += (w[b, r] - w[a, r]) ** 2
-        along += (w[p, r] - w[a, r]) * (w[b, r] - w[a, r])
-    return min(1.0, max(0.0, along / length)) if length > 0 else 0.0
-
-
-@kernel
-def _between(w: Reals, a0: int, a1: int, b0: int, b1: int, s: float, t: float) -> float:
-    """Square of the distance of two points on lines."""
-    square = 0.0
-    for r in range(3):
-        square += (w[a0, r] + s * (w[a1, r] - w[a0, r]) - w[b0, r] - t * (w[b1, r] - w[b0, r])) ** 2
-    return square
-
-
-@kernel
-def _lines(w: Reals, a0: int, a1: int, b0: int, b1: int, near: Reals) -> float:
-    """Distance of the lines from row a0 to a1 and from b0 to b1 of ``w``; ``near`` (2, 3) gets their closest points."""
-    aa = ab = bb = ac = bc = 0.0
-    for r in range(3):
-        u, v, d = w[a1, r] - w[a0, r], w[b1, r] - w[b0, r], w[b0, r] - w[a0, r]
-        aa, ab, bb = aa + u * u, ab + u * v, bb + v * v
-        ac, bc = ac + u * d, bc + v * d
-    best, best_s, best_t = np.inf, 0.0, 0.0
-    cross = aa * bb - ab * ab
-    if cross > 1e-14 * aa * bb:
-        s, t = (ac * bb - bc * ab) / cross, (ac * ab - bc * aa) / cross
-        if 0 <= s <= 1 and 0 <= t <= 1:
-            best, best_s, best_t = _between(w, a0, a1, b0, b1, s, t), s, t
-    if best == np.inf:  # then an end is nearest
-        for end in range(2):
-            s, t = float(end), _point_on_line(w, a1 if end else a0, b0, b1)
-            square = _between(w, a0, a1, b0, b1, s, t)
-            if square < best:
-                best, best_s, best_t = square, s, t
-            s, t = _point_on_line(w, b1 if end else b0, a0, a1), float(end)
-            square = _between(w, a0, a1, b0, b1, s, t)
-            if square < best:
-                best, best_s, best_t = square, s, t
-    for r in range(3):
-        near[0, r] = w[a0, r] + best_s * (w[a1, r] - w[a0, r])
-        near[1, r] = w[b0, r] + best_t * (w[b1, r] - w[b0, r])
-    return float(np.sqrt(best))
-
-
-@inner_kernel
-def _support(w: Reals, first: int, last: int, disc: float, room: Reals, sign: float, row: int) -> None:
-    """The support point of a core along ``sign`` times the row V of ``room``, into a row of it."""
-    x, y, z = sign * room[_V, 0], sign * room[_V, 1], sign * room[_V, 2]
-    best, at = -np.inf, first
-    for p in range(first, last):
-        value = w[p, 0] * x + w[p, 1] * y + w[p, 2] * z
-        if value > best:
-            best, at = value, p
-    room[row, 0], room[row, 1], room[row, 2] = w[at, 0], w[at, 1], w[at, 2]
-    if disc > 0:
-        i, j, k = w[first + 1, 0] - w[first, 0], w[first + 1, 1] - w[first, 1], w[first + 1, 2] - w[first, 2]
-        along = (i * x + j * y + k * z) / (i * i + j * j + k * k)
-        i, j, k = x - along * i, y - along * j, z - along * k
-        across = i * i + j * j + k * k
-        if across > 1e-24 * (x * x + y * y + z * z):
-            scale = disc / np.sqrt(across)
-            room[row, 0] += scale * i
-            room[row, 1] += scale * j
-            room[row, 2] += scale * k
-
-
-@inner_kernel
-def _triangle(room: Reals, i: int, j: int, k: int) -> tuple[float, float, float]:
-    """Weights of the point of a triangle that is nearest to the origin (Ericson, 5.1.5)."""
-    d1 = d2 = d3 = d4 = d5 = d6 = 0.0
-    for r in range(3):
-        a, b, c = room[i, r], room[j, r], room[k, r]
-        u, v = b - a, c - a
-        d1, d2 = d1 - u * a, d2 - v * a
-        d3, d4 = d3 - u * b, d4 - v * b
-        d5, d6 = d5 - u * c, d6 - v * c
-    if d1 <= 0 and d2 <= 0:
-        return 1.0, 0.0, 0.0
-    if d3 >= 0 and d4 <= d3:
-        return 0.0, 1.0, 0.0
-    vc = d1 * d4 - d3 * d2
-    if vc <= 0 and d1 >= 0 and d3 <= 0:
-        t = d1 / (d1 - d3)
-        return 1.0 - t, t, 0.0
-    if d6 >= 0 and d5 <= d6:
-        return 0.0, 0.0, 1.0
-    vb = d5 * d2 - d1 * d6
-    if vb <= 0 and d2 >= 0 and d6 <= 0:
-        t = d2 / (d2 - d6)
-        return 1.0 - t, 0.0, t
-    va = d3 * d6 - d5 * d4
-    if va <= 0 and d4 - d3 >= 0 and d5 - d6 >= 0:
-        t = (d4 - d3) / ((d4 - d3) + (d5 - d6))
-        return 0.0, 1.0 - t, t
-    total = va + vb + vc
-    return va / total, vb / total, vc / total
-
-
-@inner_kernel
-def _faces_origin(room: Reals, i: int, j: int, k: int, out: int) -> bool:
-    """Whether a face of a tetrahedron has the origin on its outer side, or the tetrahedron is flat."""
-    ux, uy, uz = room[j, 0] - room[i, 0], room[j, 1] - room[i, 1], room[j, 2] - room[i, 2]
-    vx, vy, vz = room[k, 0] - room[i, 0], room[k, 1] - room[i, 1], room[k, 2] - room[i, 2]
-    x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-    here = -(x * room[i, 0] + y * room[i, 1] + z * room[i, 2])
-    there = x * (room[out, 0] - room[i, 0]) + y * (room[out, 1] - room[i, 1]) + z * (room[out, 2] - room[i, 2])
-    return bool(here * there <= 0 or abs(there) <= 1e-18)
-
-
-@inner_kernel
-def _nearest_of_simplex(room: Reals, count: int) -> bool:
-    """Weights (first column of the rows from _WEIGHT on) of the simplex's point that is nearest to the origin.
-
-    The simplex is the first ``count`` rows; whether the origin lies inside is returned.
-    """
-    for i in range(4):
-        room[_WEIGHT + i, 0] = 0.0
-    if count == 1:
-        room[_WEIGHT, 0] = 1.0
-        return False
-    if count == 2:
-        length = along = 0.0
-        for r in range(3):
-            length += (room[1, r] - room[0, r]) ** 2
-            along -= room[0, r] * (room[1, r] - room[0, r])
-        t = min(1.0, max(0.0, along / length)) if length > 0 else 0.0
-        room[_WEIGHT, 0], room[_WEIGHT + 1, 0] = 1.0 - t, t
-        return False
-    if count == 3:
-        room[_WEIGHT, 0], room[_WEIGHT + 1, 0], room[_WEIGHT + 2, 0] = _triangle(room, 0, 1, 2)
-        return False
-    best, inside = np.inf, True
-    for out in range(4):
-        i, j, k = (1 if out == 0 else 0), (2 if out <= 1 else 1), (3 if out <= 2 else 2)
-        if not _faces_origin(room, i, j, k, out):
-            continue
-        inside = False
-        a, b, c = _triangle(room, i, j, k)
-        square = 0.0
-        for r in range(3):
-            square += (a * room[i, r] + b * room[j, r] + c * room[k, r]) ** 2
-        if square < best:
-            best = square
-            room[_WEIGHT + out, 0] = 0.0
-            room[_WEIGHT + i, 0], room[_WEIGHT + j, 0], room[_WEIGHT + k, 0] = a, b, c
-    return inside
-
-
-@inner_kernel
-def _cores(
-    w: Reals, bounds: tuple[int, int, int, int], disc_a: float, disc_b: float, room: Reals, near: Reals
-) -> float:
-    """Distance of two cores, rows of ``w`` within ``bounds``, by Gilbert, Johnson and Keerthi; 0 where they overlap."""
-    first_a, last_a, first_b, last_b = bounds
-    count, last, size = 0, np.inf, 0.0
-    for r in range(3):
-        room[_V, r] = w[first_a, r] - w[first_b, r]
-        size += room[_V, r] ** 2
-    if size == 0:
-        room[_V, 0], size = 1.0, 1.0
-    size = np.sqrt(size)
-    for _ in range(ROUNDS):
-        _support(w, first_a, last_a, disc_a, room, -1.0, 4 + count)
-        _support(w, first_b, last_b, disc_b, room, 1.0, 8 + count)
-        along = 0.0
-        for r in range(3):
-            room[count, r] = room[4 + count, r] - room[8 + count, r]
-            along += room[_V, r] * room[count, r]
-        if count and size - along / size <= EXACT:
-            break
-        count += 1
-        if _nearest_of_simplex(room, count):
-            return 0.0
-        kept, square = 0, 0.0
-        for r in range(3):
-            near[0, r] = near[1, r] = 0.0
-        for i in range(count):
-            weight = room[_WEIGHT + i, 0]
-            if weight > 0:
-                for r in range(3):
-                    near[0, r] += weight * room[4 + i, r]
-                    near[1, r] += weight * room[8 + i, r]
-                    for part in range(0, 12, 4):
-                        room[part + kept, r] = room[part + i, r]
-                kept += 1
-        for r in range(3):
-            room[_V, r] = near[0, r] - near[1, r]
-            square += room[_V, r] ** 2
-        if square >= last:  # a flat simplex, by rounding: what was found before is nearer
-            for r in range(3):
-                near[0, r], near[1, r] = room[_NEAR, r], room[_NEAR + 1, r]
-            break
-        for r in range(3):
-            room[_NEAR, r], room[_NEAR + 1, r] = near[0, r], near[1, r]
-        count, size, last = kept, np.sqrt(square), square
-        if size <= TOUCHING:
-            return 0.0
-        if count == 4:
-            break
-    return float(size)
-
-
-@inner_kernel
-def _above_plane(w: Reals, first: int, last: int, disc: float, plane: int, near: Reals) -> float:
-    """How far a core stays above a half-space, whose rows begin with ``plane``; negative by the depth."""
-    x, y, z = w[plane, 0], w[plane, 1], w[plane, 2]
-    smallest, at = np.inf, first
-    for p in range(first, last):
-        height = w[p, 0] * x + w[p, 1] * y + w[p, 2] * z
-        if height < smallest:
-            smallest, at = height, p
-    near[0, 0], near[0, 1], near[0, 2] = w[at, 0], w[at, 1], w[at, 2]
-    if disc > 0:
-        i, j, k = w[first + 1, 0] - w[first, 0], w[first + 1, 1] - w[first, 1], w[first + 1, 2] - w[first, 2]
-        along = (i * x + j * y + k * z) / (i * i + j * j + k * k)
-        i, j, k = x - along * i, y - along * j, z - along * k
-        size = np.sqrt(i * i + j * j + k * k)
-        if size > 1e-12:
-            near[0, 0] -= disc / size * i
-            near[0, 1] -= disc / size * j
-            near[0, 2] -= disc / size * k
-            smallest -= disc * size
-    smallest -= w[plane + 1, 0]
-    near[1, 0], near[1, 1], near[1, 2] = near[0, 0] - smallest * x, near[0, 1] - smallest * y, near[0, 2] - smallest * z
-    return float(smallest)
-
-
-@kernel
-def pair_distance(
-    w: Reals, shape: tuple[Integers, Integers, Reals, Reals], a: int, b: int, room: Reals, near: Reals
-) -> tuple[float, bool]:
-    """Distance of two bodies, and whether their cores overlap; then the depth is at least the one returned.
-
-    ``w`` (P, 3) are placed points, ``shape`` is start, kind, radius and disc, ``room`` (ROOM, 3) scratch; ``near``
-    (2, 3) gets the closest points of the cores. The second body may be a half-space.
-    """
-    start, kind, radius, disc = shape
-    sizes = radius[a] + radius[b]
-    i, i_end, j, j_end = start[a], start[a + 1], start[b], start[b + 1]
-    if kind[b] == HALF_SPACE:
-        return _above_plane(w, i, i_end, disc[a], j, near) - sizes, False
-    if i_end - i <= 2 and j_end - j <= 2 and kind[a] == HULL and kind[b] == HULL:
-        return _lines(w, i, i_end - 1, j, j_end - 1, near) - sizes, False
-    core = _cores(w, (i, i_end, j, j_end), disc[a], disc[b], room, near)
-    return core - sizes, core == 0.0
-
-
-@inner_kernel
-def apart_along(
-    w: Reals, shape: tuple[Integers, Integers, Reals, Reals], a: int, b: int, room: Reals, axis: Reals
-) -> bool:
-    """Whether a direction (3,) shows that a body lies wholly beyond another, neither of them a half-space."""
-    start, _, radius, disc = shape
-    for r in range(3):
-        room[_V, r] = axis[r]
-    _support(w, start[a], start[a + 1], disc[a], room, -1.0, 0)
-    _support(w, start[b], start[b + 1], disc[b], room, 1.0, 1)
-    gap = -radius[a] - radius[b]
-    for r in range(3):
-        gap += axis[r] * (room[0, r] - room[1, r])
-    return bool(gap > EXACT)
-
-
-@kernel
-def distances_from_hull(points: Reals, hull: Reals, found: Reals) -> None:
-    """Distances (N,) of points (N, 3) from the hull of points (m, 3); 0 inside."""
-    w, room, near = np.empty((len(hull) + 1, 3)), np.empty((ROOM, 3)), np.empty((2, 3))
-    for i in range(len(hull)):
-        copy_values(hull[i], w[1 + i])
-    for n in range(len(points)):
-        copy_values(points[n], w[0])
-        found[n] = _cores(w, (0, 1, 1, len(w)), 0.0, 0.0, room, near)
 
 
 WORLD = -1  # link of the bodies around the arm
@@ -334,8 +49,10 @@ class Layout(NamedTuple):
     direction : (m,); starts : (m,), see ``kinematics.chain.joint_starts``; sliding : (m,)
     coupling : (m, n), what joints move the rows by; no rows where each joint moves its own
     base : (4, 4); links : (m + 1, 4, 4), see ``kinematics.chain.constant_links``
-    link : (B,), ``WORLD`` for solids; start : (B + 1,), of each body's points; points : (P, 3), m, in the link's frame
+    link : (B,), ``WORLD`` for solids; start : (B + 1,), of each body's points; points : (P, 3), m, in the link's frame,
+        of a surface those of a hull around it
     kind : (B,); radius, disc : (B,), m; centre : (B, 3), reach : (B,), of a ball around the body, m
+    trees : the surfaces of bodies that are none of these
     first, second : (K,), numbers of bodies, the second's link being the outer one or, of a solid, the arm's the first
     joined : (K,), whether a joint joins them, so that only overlap means anything, not how far apart they are
     inner : (K,), the row (from 0) from which on rows change how the two lie
@@ -355,10 +72,61 @@ class Layout(NamedTuple):
     disc: Reals
     centre: Reals
     reach: Reals
+    trees: Trees
     first: Integers
     second: Integers
     joined: Flags
     inner: Integers
+
+
+@kernel
+def pair_distance(
+    layout: Layout, T: Reals, w: Reals, a: int, b: int, room: Reals, near: Reals, far: float
+) -> tuple[float, bool]:
+    """Distance of two bodies, and whether their cores overlap; then the depth is at least the one returned.
+
+    Of surfaces, from ``far`` (m) on, any number from ``far`` to the distance. ``T`` (m + 2, 4, 4) and ``w`` (P, 3) are
+    as :func:`place` leaves them, ``room`` (ROOM, 3) scratch; ``near`` (2, 3) gets the closest points of the cores. The
+    second body may be a half-space.
+    """
+    start, kind, disc, link, trees = layout.start, layout.kind, layout.disc, layout.link, layout.trees
+    sizes, convex = layout.radius[a] + layout.radius[b], trees.root[a] < 0 and trees.root[b] < 0
+    i, i_end, j, j_end = start[a], start[a + 1], start[b], start[b + 1]
+    if kind[b] == HALF_SPACE:
+        if convex:
+            return above_plane(w, i, i_end, disc[a], j, near) - sizes, False
+        normal = (w[j, 0], w[j, 1], w[j, 2])
+        return surface_above_plane(trees, T[link[a]], trees.root[a], normal, w[j + 1, 0], near), False
+    if i_end - i <= 2 and j_end - j <= 2 and kind[a] == HULL and kind[b] == HULL:
+        return lines_distance(w, i, i_end - 1, j, j_end - 1, near) - sizes, False
+    core = cores_distance(w, (i, i_end, j, j_end), disc[a], disc[b], room, near)
+    if convex or core - sizes > max(far, 0.0):
+        return core - sizes, core == 0.0
+    if trees.root[a] < 0:
+        other = (w, i, i_end, disc[a])
+        for turn in range(2):
+            for r in range(3):
+                near[0, r], near[1, r] = near[1, r], near[0, r]
+            if turn == 0:
+                core = surface_distance(trees, b, T[link[b]], a, T[link[a]], other, room, near, far + sizes)
+    else:
+        other = (w, j, j_end, disc[b])
+        core = surface_distance(trees, a, T[link[a]], b, T[link[b]], other, room, near, far + sizes)
+    return core - sizes, core == 0.0
+
+
+@inner_kernel
+def _apart_along(layout: Layout, w: Reals, a: int, b: int, room: Reals, axis: Reals) -> bool:
+    """Whether a direction (3,) shows that a body lies wholly beyond another, neither of them a half-space."""
+    start, radius, disc = layout.start, layout.radius, layout.disc
+    for r in range(3):
+        room[AXIS, r] = axis[r]
+    support(w, start[a], start[a + 1], disc[a], room, -1.0, 0)
+    support(w, start[b], start[b + 1], disc[b], room, 1.0, 1)
+    gap = -radius[a] - radius[b]
+    for r in range(3):
+        gap += axis[r] * (room[0, r] - room[1, r])
+    return bool(gap > EXACT)
 
 
 @inner_kernel
@@ -384,8 +152,16 @@ def _row_reach(coupling: Reals, half: Reals, k: int) -> float:
 
 
 @kernel
+def unplaced(layout: Layout) -> tuple[Reals, Reals, Reals]:
+    """Room for what :func:`place` finds."""
+    rows = layout.links.shape[0] + 1
+    return np.empty((rows, 4, 4)), np.empty(layout.points.shape), np.empty(layout.centre.shape)
+
+
+@kernel
 def place(layout: Layout, q: Reals, T: Reals, world: Reals, middle: Reals) -> None:
-    """Frames ``T`` (m + 1, 4, 4) of base and links at joint values (n,), points (P, 3) and middles (B, 3) in space."""
+    """Frames ``T`` (m + 2, 4, 4) of base and links at joint values (n,), the last that of the world; points (P, 3) and
+    middles (B, 3) in space."""
     _place_frames(layout, q, T)
     for b in range(layout.link.shape[0]):
         _place_middle(layout, T, b, middle)
@@ -407,30 +183,23 @@ def _place_frames(layout: Layout, q: Reals, T: Reals) -> None:
             x, y, z = turn_row(x, c, s), turn_row(y, c, s), turn_row(z, c, s)
         write_rows(x, y, z, T[k + 1])
         x, y, z = step_row(x, links[k + 1]), step_row(y, links[k + 1]), step_row(z, links[k + 1])
+    write_rows((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), T[direction.shape[0] + 1])
 
 
 @inner_kernel
 def _place_middle(layout: Layout, T: Reals, b: int, middle: Reals) -> None:
     centre, f = layout.centre, layout.link[b]
     for r in range(3):
-        if f < 0:
-            middle[b, r] = centre[b, r]
-        else:
-            middle[b, r] = (
-                T[f, r, 0] * centre[b, 0] + T[f, r, 1] * centre[b, 1] + T[f, r, 2] * centre[b, 2] + T[f, r, 3]
-            )
+        middle[b, r] = T[f, r, 0] * centre[b, 0] + T[f, r, 1] * centre[b, 1] + T[f, r, 2] * centre[b, 2] + T[f, r, 3]
 
 
 @inner_kernel
 def _place_points(layout: Layout, T: Reals, b: int, world: Reals) -> None:
     points, f = layout.points, layout.link[b]
     for r in range(3):
+        u, v, w, t = T[f, r, 0], T[f, r, 1], T[f, r, 2], T[f, r, 3]
         for p in range(layout.start[b], layout.start[b + 1]):
-            if f < 0:
-                world[p, r] = points[p, r]
-            else:
-                u, v, w, t = T[f, r, 0], T[f, r, 1], T[f, r, 2], T[f, r, 3]
-                world[p, r] = u * points[p, 0] + v * points[p, 1] + w * points[p, 2] + t
+            world[p, r] = u * points[p, 0] + v * points[p, 1] + w * points[p, 2] + t
 
 
 @kernel
@@ -443,12 +212,13 @@ def _apart(middle: Reals, reach: Reals, a: int, b: int) -> float:
 
 
 @kernel
-def some_distances(layout: Layout, w: Reals, pairs: Integers, found: Reals, deep: Flags, near: Reals) -> None:
-    """Distances (m,) of some pairs of bodies whose points (P, 3) are placed; ``near`` is (m, 2, 3)."""
-    room, shape = np.empty((ROOM, 3)), (layout.start, layout.kind, layout.radius, layout.disc)
+def some_distances(layout: Layout, q: Reals, pairs: Integers, found: Reals, deep: Flags, near: Reals) -> None:
+    """Distances (m,) of some pairs of bodies at joint values (n,); ``near`` is (m, 2, 3)."""
+    room, (T, w, middle) = np.empty((ROOM, 3)), unplaced(layout)
+    place(layout, q, T, w, middle)
     for row in range(len(pairs)):
         a, b = layout.first[pairs[row]], layout.second[pairs[row]]
-        found[row], deep[row] = pair_distance(w, shape, a, b, room, near[row])
+        found[row], deep[row] = pair_distance(layout, T, w, a, b, room, near[row], np.inf)
 
 
 @kernel
@@ -456,24 +226,38 @@ def measure(layout: Layout, q: Reals, found: Reals, smallest: Reals, pair: Integ
     """Distances of all pairs in arms (N, n); of overlapping cores the smallest known depth.
 
     ``found`` (N, K) gets them all; if it has no columns, only ``smallest`` (N,) and its number ``pair`` (N,) are worked
-    out, without pairs that can't be the nearest. Joined pairs count as nearest only where they overlap. ``deep``
-    (N,) says whether cores overlapped.
+    out, without pairs that can't be the nearest: hulls first, then surfaces, the nearest hulls around them first.
+    Joined pairs count as nearest only where they overlap. ``deep`` (N,) says whether cores overlapped, or a surface
+    and another body, of which the depth is not known then.
     """
     room, near = np.empty((ROOM, 3)), np.empty((2, 3))
-    T, w = np.empty(layout.links.shape), np.empty(layout.points.shape)
-    middle, reach, first, second = np.empty(layout.centre.shape), layout.reach, layout.first, layout.second
-    shape, joined = (layout.start, layout.kind, layout.radius, layout.disc), layout.joined
+    T, w, middle = unplaced(layout)
+    reach, first, second, joined = layout.reach, layout.first, layout.second, layout.joined
+    every, root, least = found.shape[1] > 0, layout.trees.root, np.empty(len(first))
     for n in range(q.shape[0]):
         place(layout, q[n], T, w, middle)
         best, at, inside = np.inf, -1, False
         for k in range(len(first)):
-            if found.shape[1] == 0 and _apart(middle, reach, first[k], second[k]) >= best:
+            a, b = first[k], second[k]
+            least[k] = np.inf
+            if not every and _apart(middle, reach, a, b) >= best:
                 continue
-            distance, overlap = pair_distance(w, shape, first[k], second[k], room, near)
-            inside = inside or overlap
-            if found.shape[1]:
+            distance, overlap = pair_distance(layout, T, w, a, b, room, near, np.inf if every else 0.0)
+            surface = root[a] >= 0 or root[b] >= 0
+            inside = inside or overlap or (surface and distance < 0)
+            if every:
                 found[n, k] = distance
-            if distance < best and not (joined[k] and distance >= 0 and not overlap):
+            elif surface and not inside:
+                least[k] = np.inf if joined[k] else distance
+            if least[k] == np.inf and distance < best and not (joined[k] and distance >= 0 and not overlap):
+                best, at = distance, k
+        while not inside and len(least):
+            k = least.argmin()
+            if least[k] >= best:
+                break
+            distance = pair_distance(layout, T, w, first[k], second[k], room, near, best)[0]
+            least[k] = np.inf
+            if distance < best:
                 best, at = distance, k
         smallest[n], pair[n], deep[n] = best, at, inside
 
@@ -486,14 +270,12 @@ def which_overlap(layout: Layout, q: Reals, found: Flags) -> None:
     that kept a pair apart. Points of a body are placed only where the balls don't settle it.
     """
     room, near = np.empty((ROOM, 3)), np.empty((2, 3))
-    T, w = np.empty(layout.links.shape), np.empty(layout.points.shape)
-    middle, reach, first, second = np.empty(layout.centre.shape), layout.reach, layout.first, layout.second
-    shape, link = (layout.start, layout.kind, layout.radius, layout.disc), layout.link
+    T, w, middle = unplaced(layout)
+    reach, first, second, link = layout.reach, layout.first, layout.second, layout.link
     one, axes, hit, count = found.shape[1] == 1, np.zeros((len(first), 3)), 0, len(first)
     placed = np.full(len(link), -1)  # the arm for which a body's points are
-    for b in range(len(link)):
-        _place_middle(layout, T, b, middle)
-        _place_points(layout, T, b, w)
+    if q.shape[0]:
+        place(layout, q[0], T, w, middle)
     for n in range(q.shape[0]):
         _place_frames(layout, q[n], T)
         for b in range(len(link)):
@@ -511,9 +293,9 @@ def which_overlap(layout: Layout, q: Reals, found: Flags) -> None:
                 if placed[body] != n and link[body] >= 0:
                     _place_points(layout, T, body, w)
                     placed[body] = n
-            if solid and apart_along(w, shape, a, b, room, axes[k]):
+            if solid and _apart_along(layout, w, a, b, room, axes[k]):
                 continue
-            distance, inside = pair_distance(w, shape, a, b, room, near)
+            distance, inside = pair_distance(layout, T, w, a, b, room, near, 0.0)
             overlap = inside or distance < 0  # hulls without margin that overlap are 0 apart
             found[n, 0 if one else k] |= overlap
             if one and overlap:
@@ -578,14 +360,13 @@ def _box_state(
     """
     T, w, middle = placed
     reach, first, second = layout.reach, layout.first, layout.second
-    shape = (layout.start, layout.kind, layout.radius, layout.disc)
     place(layout, q, T, w, middle)
     state, widest = FREE, 0.0
     for k in range(len(first)):
         moved = _pair_motion(layout, T, w, k, half)
         if _apart(middle, reach, first[k], second[k]) > moved:
             continue
-        distance, inside = pair_distance(w, shape, first[k], second[k], room, near)
+        distance, inside = pair_distance(layout, T, w, first[k], second[k], room, near, moved)
         if inside or distance < 0:
             return MEETS, moved
         if distance <= moved:
@@ -603,7 +384,7 @@ def free_between(layout: Layout, start: Reals, end: Reals, depth: float, most: i
     may hold no overlap deeper than ``depth`` (m)
     """
     room, near = np.empty((ROOM, 3)), np.empty((2, 3))
-    placed = (np.empty(layout.links.shape), np.empty(layout.points.shape), np.empty(layout.centre.shape))
+    placed = unplaced(layout)
     stack = np.empty((DEEPEST, 2))
     stack[0, 0], stack[0, 1] = 0.0, 1.0
     height, looked, result = 1, 0, FREE
@@ -651,9 +432,9 @@ def search_boxes(
     """
     room, near = np.empty((ROOM, 3)), np.empty((2, 3))
     n = box.shape[1]
-    T, w, middle = np.empty(layout.links.shape), np.empty(layout.points.shape), np.empty(layout.centre.shape)
+    T, w, middle = unplaced(layout)
     overlapping, goal = aim
-    shape, a, b = (layout.start, layout.kind, layout.radius, layout.disc), layout.first[k], layout.second[k]
+    a, b = layout.first[k], layout.second[k]
     last, sign = layout.link[a if layout.link[b] == WORLD else b], -1.0 if overlapping else 1.0
     cuts = (layout.inner[k], last) if layout.coupling.shape[0] == 0 else (0, n)
     stack, value = np.empty((DEEPEST, 2, n)), np.empty(2)
@@ -669,13 +450,13 @@ def search_boxes(
             half[j] = (high[j] - low[j]) / 2
         place(layout, (low + high) / 2, T, w, middle)
         looked += 1
-        distance, inside = pair_distance(w, shape, a, b, room, near)
+        moved = _pair_motion(layout, T, w, k, half)
+        distance, inside = pair_distance(layout, T, w, a, b, room, near, moved + goal)
         distance *= sign
         if distance < 0 or (inside and not overlapping):
             for j in range(n):
                 at[j] = (low[j] + high[j]) / 2
             return MEETS, looked, distance
-        moved = _pair_motion(layout, T, w, k, half)
         if distance - moved > goal:
             smallest = min(smallest, distance - moved)
             continue
@@ -693,7 +474,7 @@ def search_boxes(
             _set_box(stack[height], low, high)
             stack[height, 1 - side, cut] = (low[cut] + high[cut]) / 2
             place(layout, (stack[height, 0] + stack[height, 1]) / 2, T, w, middle)
-            value[side] = sign * pair_distance(w, shape, a, b, room, near)[0]
+            value[side] = sign * pair_distance(layout, T, w, a, b, room, near, 0.0)[0]
         for side in range(2):
             first = (value[0] < value[1]) == (side == 0)
             row = height + 1 if first else height
@@ -701,54 +482,3 @@ def search_boxes(
             stack[row, 1 - side, cut] = (low[cut] + high[cut]) / 2
         height += 2
     return outcome, looked, smallest
-
-
-RIM = 96  # points that represent a cylinder's rim, on a circle that lies around it
-STARTS = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)])
-EXACT_SHARE = 1e-12  # parts of the cores' size
-MAX_POINTS = 1000
-
-
-def overlap_depth(first: Reals, second: Reals) -> float:
-    """Depth (m) by which the hulls of two sets of points (n, 3), (m, 3) overlap; 0 for sets that lie in one plane.
-
-    A hull of some of the difference's corners grows by the farthest corner beyond its face nearest to the origin,
-    until there is none beyond; few of the n m points are ever looked at.
-    """
-    corners = _farthest(first, second, STARTS)
-    try:
-        hull = scipy.spatial.ConvexHull(corners, incremental=True)
-        for _ in range(MAX_POINTS):
-            nearest = hull.equations[hull.equations[:, 3].argmax()]
-            beyond = _farthest(first, second, nearest[None, :3])
-            reach = float(beyond[0] @ nearest[:3])
-            if reach <= 0 or reach <= EXACT_SHARE * np.abs(corners).max() - nearest[3]:
-                return max(0.0, float(-nearest[3]))
-            hull.add_points(beyond)
-    except scipy.spatial.QhullError:
-        pass
-    return _depth_of_all(first, second)
-
-
-def _farthest(first: Reals, second: Reals, directions: Reals) -> Reals:
-    """The support points (k, 3) of the difference in the directions (k, 3)."""
-    return np.asarray(first[(directions @ first.T).argmax(axis=1)] - second[(directions @ second.T).argmin(axis=1)])
-
-
-def _depth_of_all(first: Reals, second: Reals) -> float:
-    """The depth by the hull of all points of the difference."""
-    difference = (first[:, None] - second[None]).reshape(-1, 3)
-    try:
-        offsets = scipy.spatial.ConvexHull(difference).equations[:, 3]
-    except scipy.spatial.QhullError:
-        return 0.0
-    return max(0.0, float(-offsets.max()))
-
-
-def cylinder_points(ends: Reals, disc: float, rim: int = RIM) -> Reals:
-    """Points (2 * rim, 3) whose hull holds a cylinder with ends (2, 3) and a radius, 0.05 % of it too wide for 96."""
-    axis = ends[1] - ends[0]
-    across = np.linalg.svd(axis[None])[2][1:]
-    angle = 2 * np.pi * np.arange(rim) / rim
-    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1) @ across * disc / np.cos(np.pi / rim)
-    return np.concatenate([ends[0] + circle, ends[1] + circle])

@@ -5,16 +5,15 @@ proven harmless:
 
 - *never*: the two are apart in all joint vectors within the limits, proven by bounds of the distance over boxes of
   joint values, which are halved until each is decided;
-- *joined*: they overlap in all joint vectors drawn (``TRIED``) because a joint joins them. Either no link with a shape
-  is between the two (of neighbours, being less than ``TOUCH`` apart counts as overlap if it is proven). Or there are
-  two joints between them (more if their axes meet), and a ball in the outer link about a point of its joint's axis, or
-  in its middle, is proven to touch the inner link in all joint vectors, as in a wrist. Only the region around that
-  joint is left out, within the girth of both bodies: for hulls, measured from the point that is proven to belong to
-  both; for lines, from where they are nearest in the pose in which they are farthest apart. The rest is classified
-  again, so that an arm that folds onto itself is seen. A default shape that slides in a thicker one is joined to it in
-  likewise: only the part of the guide along the sliding axis is left out, and nothing of the sliding shape. In
-  links with several bodies, those beside two joined bodies are joined too, if the rest without that joint's region
-  comes apart. So are all bodies of two links that always overlap only as a whole;
+- *joined*: they overlap in all joint vectors drawn (``TRIED``) because a joint joins them. Of given hulls and surfaces,
+  links with no shaped link between them count as joined, and ones across another that always overlap; they are not
+  looked at. Of capsules, either no link with a shape is between the two (of neighbours, being less than ``TOUCH`` apart
+  counts as overlap if it is proven), or there are two joints between them (more if their axes meet), and a ball in the
+  outer link about a point of its joint's axis, or in its middle, is proven to touch the inner link in all joint
+  vectors, as in a wrist. Only the region around that joint is left out, within the girth of both, from where they are
+  nearest in the pose in which they are farthest apart. The rest is classified again, so that an arm that folds onto
+  itself is seen. A default shape that slides in a thicker one is joined to it likewise: only the part of the guide
+  along the sliding axis is left out, and nothing of the sliding shape;
 - *overlaps*: they overlap in all joint vectors drawn, the boxes show none in which they don't, and no joint explains
   it. No arm is built like that, so the shapes are wrong: the overlap is left out, and every result that does not
   examine it has to say so;
@@ -40,10 +39,20 @@ from itertools import combinations, compress, product
 from typing import Literal
 
 import numpy as np
-import scipy
 
-from er3a.collision.distances import FREE, MEETS, ROOM, Layout, measure, pair_distance, place, search_boxes
-from er3a.collision.pairs import BASE, PENETRATION_TOLERANCE, TRIED
+from er3a.collision.convex import ROOM
+from er3a.collision.distances import (
+    FREE,
+    MEETS,
+    Layout,
+    measure,
+    pair_distance,
+    place,
+    search_boxes,
+    unplaced,
+    which_overlap,
+)
+from er3a.collision.pairs import BASE, PENETRATION_TOLERANCE, TRIED, link_label
 from er3a.collision.scene import Box, Scene
 from er3a.collision.shapes import PARALLEL, Body, arm_bodies, arm_shapes, layout_of, link_frames, solid_bodies
 from er3a.kinematics.chain import TO_NEXT_AXIS, link_parts
@@ -55,46 +64,25 @@ from er3a.robots.robot import PairRule, Robot, derived
 SHORTEST = 1e-6  # m
 
 
-def girth(body: Body, centre: Reals, within: float = np.inf) -> float:
-    """How far a body extends from the line that leads from ``centre`` (3,) through its middle, m.
-
-    Of a hull only what is nearer than ``within`` (m) in the direction of its middle counts.
-    """
-    along = body.points.mean(axis=0) - centre
+def girth(body: Body, centre: Reals) -> float:
+    """How far a line extends from that which leads from ``centre`` (3,) through its middle, with its radius, m."""
+    along, away = body.points.mean(axis=0) - centre, body.points - centre
     length = float(np.linalg.norm(along))
-    hull = len(body.points) > 2
-    away = (_split(body, centre, within)[0] if hull and np.isfinite(within) else body.points) - centre
-    if not len(away):
-        return body.radius + body.disc
     if length > SHORTEST:
         away = away - np.outer(away @ along, along) / length**2
-    return float(np.linalg.norm(away, axis=1).max()) + body.radius + body.disc
+    return float(np.linalg.norm(away, axis=1).max()) + body.radius
 
 
 def ball_inside(body: Body, point: Reals) -> Body | None:
-    """The largest ball about a point (3,), m, that is inside a body; None where the point is not inside its surface."""
-    if len(body.points) > 2:
-        try:
-            faces = scipy.spatial.ConvexHull(body.points).equations
-        except scipy.spatial.QhullError:  # flat
-            return None
-        depth = -float((faces @ np.append(point, 1.0)).max())
-        depth = depth + body.radius if depth >= 0 else 0.0
-    else:
-        start, along = body.points[0], body.points[-1] - body.points[0]
-        share = np.clip((point - start) @ along / max(float(along @ along), SHORTEST**2), 0.0, 1.0)
-        depth = body.radius - float(np.linalg.norm(point - start - share * along))
+    """The largest ball about a point (3,), m, that is inside a capsule; None where the point is not inside it."""
+    start, along = body.points[0], body.points[-1] - body.points[0]
+    share = np.clip((point - start) @ along / max(float(along @ along), SHORTEST**2), 0.0, 1.0)
+    depth = body.radius - float(np.linalg.norm(point - start - share * along))
     return replace(body, points=point[None], radius=depth) if depth > 0 else None
 
 
 def trimmed(body: Body, centre: Reals, radius: float) -> list[Body]:
-    """What is left of a body without the region around a joint.
-
-    Of a line the part outside the ball about ``centre`` (3,) with ``radius`` (m), of a hull the part that is farther
-    than that in the direction of its middle.
-    """
-    if len(body.points) > 2:
-        return _clipped(body, centre, radius)
+    """What is left of a line outside the ball about ``centre`` (3,) with ``radius`` (m), the region around a joint."""
     start, end = body.points[0], body.points[-1]
     along, away = end - start, start - centre
     length = float(along @ along)
@@ -128,35 +116,10 @@ def _outside(body: Body, away: Reals, along: Reals, radius: float) -> list[Body]
     ]
 
 
-def _clipped(body: Body, centre: Reals, radius: float) -> list[Body]:
-    near, points = _split(body, centre, radius)
-    if not len(points):
-        return []
-    if not len(near):
-        return [body]
-    try:
-        points = points[scipy.spatial.ConvexHull(points).vertices]
-    except scipy.spatial.QhullError:  # a sliver
-        return []
-    return [replace(body, points=points)]
-
-
-def _split(body: Body, centre: Reals, radius: float) -> tuple[Reals, Reals]:
-    """Corners (n, 3) of a hull's parts nearer and farther than ``radius`` in the direction of its middle."""
-    outward = body.points.mean(axis=0) - centre
-    outward /= max(float(np.linalg.norm(outward)), SHORTEST)
-    height = (body.points - centre) @ outward - radius
-    kept, cut = body.points[height >= 0], body.points[height < 0]
-    if not (len(kept) and len(cut)):
-        return cut, kept
-    share = (height[height >= 0][:, None] / (height[height >= 0][:, None] - height[height < 0]))[..., None]
-    crossings = (kept[:, None] + share * (cut[None] - kept[:, None])).reshape(-1, 3)
-    return np.concatenate([cut, crossings]), np.concatenate([kept, crossings])
-
-
 PairState = Literal["never", "joined", "overlaps", "guessed", "meets", "undecided", "allowed", "watched"]
 
 BOXES = 50_000
+BOXES_OF_SURFACES = 2_000
 BOXES_MORE = 500  # for the other bodies of two links that are known to meet
 GOAL = 0.5  # of the smallest distance sampled, to be proven at first
 COAXIAL = 1e-9  # m
@@ -165,7 +128,6 @@ MEETING = 0.05  # of the arm's length: axes that pass a point within that meet t
 HUBS = 9  # points looked at on an axis
 AROUND_GUIDE = 1.05  # of the radii of a guide and of what slides in it
 POOR_GUESS = 0.1  # of the joint vectors drawn
-SETTLED = 0.99  # of the girth before
 GROWTH, GROWTHS = 1.25, 12  # of the region around a joint, until the rest comes apart
 
 
@@ -181,7 +143,6 @@ class JudgedPair:
     left_out : m, radius of the region around the joint that is left out, 0 where there is none
     boxes : how many boxes of joint vectors were examined
     whole : whether nothing of one of them is left without the region around the joint
-    hub : (3,), m, in the outer link's frame, where a joint is proven to hold the two; None where none is
     region : the pair that a joint joins, and the centres (3,), m, of what is left out, each in its own link's frame
     """
 
@@ -191,18 +152,8 @@ class JudgedPair:
     lower_bound: float = np.nan
     left_out: float = 0.0
     boxes: int = 0
-    hub: Reals | None = None
     whole: bool = False
     region: tuple[tuple[Body, Body], list[Reals]] | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Held:
-    """That two bodies always overlap: ``hub`` (3,), m, in the outer link's frame, where their joint holds them; None
-    where that is unknown. ``boxes``: of joint vectors examined for it."""
-
-    hub: Reals | None
-    boxes: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -336,11 +287,13 @@ def _judged(
     for names, bodies in by_names.items():
         if frozenset(names) in decided:
             found[names] = [JudgedPair("watched", tuple(bodies))]
+        elif any(body.tree or len(body.points) > 2 for pair in bodies for body in pair):
+            found[names] = _judged_given(robot, bodies)
         else:
             judged = judged_pairs(robot, bodies, BOXES)
             if regions:
                 judged = [_beyond_joint(robot, *each, regions.get(names, ())) for each in zip(bodies, judged)]
-            found[names] = _together(robot, judged, BOXES)
+            found[names] = judged
     return found
 
 
@@ -352,7 +305,7 @@ def _beyond_joint(robot: Robot, pair: tuple[Body, Body], found: JudgedPair, join
     """
     for each in joined:
         if each.region and each.region[0][0] is pair[0] and found.state in ("meets", "undecided", "overlaps"):
-            rest = _cut(robot, pair, (each.region[1], each.left_out), Held(each.hub, found.boxes), BOXES) or found
+            rest = _cut(robot, pair, (each.region[1], each.left_out), (found.boxes, BOXES))
             return rest if found.state == "overlaps" else replace(rest, region=None)
     return found
 
@@ -404,14 +357,13 @@ def judged_pairs(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: int) -
     flat = [body for pair in pairs for body in pair]
     layout = layout_of(robot, flat, [(2 * k, 2 * k + 1) for k in range(len(pairs))])
     q, distance, overlap = _sampled(robot, layout)
-    box = np.stack([robot.lower, robot.upper])
     always: Flags = np.asarray(overlap.all(axis=0))
     meets: Flags = np.asarray(overlap.any(axis=0)) & ~always
     if meets.any():
         boxes = min(boxes, BOXES_MORE)
     found = []
     for k, pair in enumerate(pairs):
-        at, sampled = np.empty(robot.joints), distance[:, k]
+        sampled = distance[:, k]
         if always[k]:
             found.append(_overlapping(robot, pair, q, sampled, boxes))
             continue
@@ -426,107 +378,85 @@ def judged_pairs(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: int) -
         if meets[k]:
             grown = (pair[0], replace(pair[1], radius=pair[1].radius + TOUCH))
             held = _held(robot, grown, boxes) if _neighbours(robot, pair) and sampled.max() < TOUCH else None
-            if held:
-                found.append(_joined(robot, pair, q[sampled.argmax()], held, boxes))
+            if held is not None:
+                found.append(_joined(robot, pair, q[sampled.argmax()], (held, boxes)))
             else:
                 witness = q[np.where(overlap[:, k], sampled, np.inf).argmin()]
                 found.append(JudgedPair("meets", (pair,), witness))
             continue
-        outcome, looked, bound = search_boxes(layout, k, box, (False, GOAL * float(sampled.min())), boxes // 2, at)
-        if outcome not in (FREE, MEETS):
-            outcome, more, bound = search_boxes(layout, k, box, (False, 0.0), boxes, at)
-            looked += more
-        if outcome == MEETS:
-            found.append(JudgedPair("meets", (pair,), at, boxes=looked))
-        elif outcome == FREE:
-            found.append(JudgedPair("never", lower_bound=bound, boxes=looked))
+        found.append(_searched(robot, layout, k, pair, float(sampled.min()), boxes))
+    return found
+
+
+def _searched(robot: Robot, layout: Layout, k: int, pair: tuple[Body, Body], least: float, boxes: int) -> JudgedPair:
+    """A pair of bodies that overlaps in none of the joint vectors drawn; of these, its least distance, m."""
+    box, at = np.stack([robot.lower, robot.upper]), np.empty(robot.joints)
+    outcome, looked, bound = search_boxes(layout, k, box, (False, GOAL * least), boxes // 2, at)
+    if outcome not in (FREE, MEETS):
+        outcome, more, bound = search_boxes(layout, k, box, (False, 0.0), boxes, at)
+        looked += more
+    if outcome == MEETS:
+        return JudgedPair("meets", (pair,), at, boxes=looked)
+    if outcome == FREE:
+        return JudgedPair("never", lower_bound=bound, boxes=looked)
+    return JudgedPair("undecided", (pair,), boxes=looked)
+
+
+def _judged_given(robot: Robot, pairs: Sequence[tuple[Body, Body]]) -> list[JudgedPair]:
+    """Judge all bodies of two links, some of them hulls or surfaces, as MoveIt's setup assistant does.
+
+    Neighbours are not looked at, nor links across another that overlap in all joint vectors drawn.
+    """
+    inner, outer = pairs[0]
+    if outer.name == link_label(outer.link) and _neighbours(robot, pairs[0]):
+        return [JudgedPair("joined", whole=True)]
+    q, overlap = quasi_random_points(robot.lower, robot.upper, TRIED), _overlap(robot, pairs)
+    if overlap.any(axis=1).all():
+        across = outer.link - inner.link <= 2
+        return [JudgedPair("joined", whole=True) if across else JudgedPair("overlaps", witness=q[0])]
+    found = []
+    for k, pair in enumerate(pairs):
+        layout = layout_of(robot, pair, [(0, 1)])
+        if overlap[:, k].any():
+            found.append(JudgedPair("meets", (pair,), q[overlap[:, k].argmax()]))
+        elif any(body.tree for body in pair):
+            found.append(_searched(robot, layout, 0, pair, 0.0, BOXES_OF_SURFACES))
         else:
-            found.append(JudgedPair("undecided", (pair,), boxes=looked))
-    return _beside(robot, pairs, found, q[distance.argmax(axis=0)], boxes)
+            found.append(_searched(robot, layout, 0, pair, float(_sampled(robot, layout)[1].min()), BOXES))
+    return found
 
 
 def _overlapping(robot: Robot, pair: tuple[Body, Body], q: Reals, distance: Reals, boxes: int) -> JudgedPair:
     """A pair that overlaps in all joint vectors drawn (N, n); of these, ``distance`` (N,), negative or 0."""
-    held, neighbours = _held(robot, pair, boxes), _neighbours(robot, pair)
-    looked = held.boxes if held else 0
-    if not held or all(len(body.points) <= 2 for body in pair):
-        layout, box, at = layout_of(robot, pair, [(0, 1)]), np.stack([robot.lower, robot.upper]), np.empty(robot.joints)
-        outcome, looked, _ = search_boxes(layout, 0, box, (True, 0.0), boxes // 2, at)
-        if outcome not in (FREE, MEETS):
-            outcome, more, _ = search_boxes(layout, 0, box, (True, 0.0), boxes, at)
-            looked += more
-        if outcome == MEETS:
-            return JudgedPair("meets", (pair,), q[distance.argmin()], boxes=looked)
+    held, neighbours = _held(robot, pair, boxes) is not None, _neighbours(robot, pair)
+    layout, box, at = layout_of(robot, pair, [(0, 1)]), np.stack([robot.lower, robot.upper]), np.empty(robot.joints)
+    outcome, looked, _ = search_boxes(layout, 0, box, (True, 0.0), boxes // 2, at)
+    if outcome not in (FREE, MEETS):
+        outcome, more, _ = search_boxes(layout, 0, box, (True, 0.0), boxes, at)
+        looked += more
+    if outcome == MEETS:
+        return JudgedPair("meets", (pair,), q[distance.argmin()], boxes=looked)
     if neighbours or held:
-        return _joined(robot, pair, q[distance.argmax()], Held(held.hub if held else None, looked), boxes)
+        return _joined(robot, pair, q[distance.argmax()], (looked, boxes))
     return JudgedPair("overlaps", witness=q[0], boxes=looked)
-
-
-def _beside(
-    robot: Robot, pairs: Sequence[tuple[Body, Body]], found: list[JudgedPair], apart: Reals, boxes: int
-) -> list[JudgedPair]:
-    """Judgements of all bodies of two links; of those that no joint explains, the ones beside bodies that one holds.
-
-    Housings are often drawn as several bodies, which overlap in the joint's region too. Nothing beyond the region of
-    those that are held is left out for them. ``apart``: (K, n), joint vectors with the largest distance of each pair.
-    """
-    held = [each for each in found if each.state == "joined" and each.hub is not None]
-    for k, pair in enumerate(pairs):
-        for other in held:
-            if found[k].state == "overlaps":
-                joined = _joined(robot, pair, apart[k], Held(other.hub, found[k].boxes), boxes, other.left_out)
-                found[k] = joined if joined.state == "joined" else found[k]
-    return found
-
-
-def _together(robot: Robot, found: list[JudgedPair], boxes: int) -> list[JudgedPair]:
-    """Judgements of all bodies of two links, where no two bodies overlap always but the links do.
-
-    Pieces of a mesh, grown by their margins, fill the gap at a joint so. The region around the joint that holds two of
-    the bodies is left out of them all; where none does, the shapes are wrong.
-    """
-    watched = [pair for each in found for pair in each.bodies]
-    if len(watched) < 2 or any(each.state == "overlaps" for each in found) or not _always_meet(robot, watched):
-        return found
-    harmless, looked = [each for each in found if each.state == "never"], sum(each.boxes for each in found)
-    q = quasi_random_points(robot.lower, robot.upper, TRIED)[0]
-    joint = max((each for each in found if each.hub is not None), key=lambda each: each.left_out, default=None)
-    radius = joint.left_out if joint else np.inf
-    for _ in range(GROWTHS if joint else 0):
-        rest = []
-        for pair in watched:
-            first, second = map(trimmed, pair, _centres(robot, pair, q, joint.hub if joint else None), (radius, radius))
-            rest += list(product(first, second))
-        if not rest or not _always_meet(robot, rest):
-            judged = judged_pairs(robot, rest, boxes) if rest else []
-            bodies = tuple(pair for each in judged for pair in each.bodies)
-            witness = next((each.witness for each in judged if each.witness is not None), None)
-            looked += sum(each.boxes for each in judged)
-            return [*harmless, JudgedPair("joined", bodies, witness, left_out=radius, boxes=looked, whole=not rest)]
-        radius *= GROWTH
-    return [*harmless, JudgedPair("overlaps", witness=q, boxes=looked)]
-
-
-def _always_meet(robot: Robot, pairs: Sequence[tuple[Body, Body]]) -> bool:
-    """Whether in each joint vector drawn some pair overlaps."""
-    return bool(_overlap(robot, pairs).any(axis=1).all())
 
 
 def _overlap(robot: Robot, pairs: Sequence[tuple[Body, Body]]) -> Flags:
     """Who overlaps, (TRIED, K), in the joint vectors drawn."""
     flat = [body for pair in pairs for body in pair]
-    return _sampled(robot, layout_of(robot, flat, [(2 * k, 2 * k + 1) for k in range(len(pairs))]))[2]
+    found = np.empty((TRIED, len(pairs)), bool)
+    layout = layout_of(robot, flat, [(2 * k, 2 * k + 1) for k in range(len(pairs))])
+    which_overlap(layout, quasi_random_points(robot.lower, robot.upper, TRIED), found)
+    return found
 
 
 def _neighbours(robot: Robot, pair: tuple[Body, Body]) -> bool:
     """Whether no link with a shape is between the two bodies' links."""
-    shapes = arm_shapes(robot)
-    links = {capsule.link for capsule in shapes.capsules} | {piece.link for piece in shapes.pieces}
-    return links.isdisjoint(range(pair[0].link + 1, pair[1].link))
+    return arm_shapes(robot).links.isdisjoint(range(pair[0].link + 1, pair[1].link))
 
 
-def _held(robot: Robot, pair: tuple[Body, Body], boxes: int) -> Held | None:
-    """Whether a joint holds two bodies together, proven, and where; None if it is not.
+def _held(robot: Robot, pair: tuple[Body, Body], boxes: int) -> int | None:
+    """How many boxes of joint vectors prove that a joint holds two bodies together; None if it is not proven.
 
     A ball inside the outer body, about a point of its joint's axis or in its middle, overlaps the inner body in all
     joint vectors; it moves only as its centre does.
@@ -551,7 +481,7 @@ def _held(robot: Robot, pair: tuple[Body, Body], boxes: int) -> Held | None:
         return None
     box = np.stack([robot.lower, robot.upper])
     outcome, looked, _ = search_boxes(layout, best, box, (True, 0.0), boxes, np.empty(robot.joints))
-    return Held(balls[best].points[0], looked) if outcome == FREE else None
+    return looked if outcome == FREE else None
 
 
 def _guide(robot: Robot, pair: tuple[Body, Body]) -> tuple[Reals, Reals, float] | None:
@@ -583,49 +513,32 @@ def _guide(robot: Robot, pair: tuple[Body, Body]) -> tuple[Reals, Reals, float] 
     return *slide, AROUND_GUIDE * (inner.radius + thick)
 
 
-def _joined(
-    robot: Robot, pair: tuple[Body, Body], apart: Reals, held: Held, boxes: int, most: float = np.inf
-) -> JudgedPair:
+def _joined(robot: Robot, pair: tuple[Body, Body], apart: Reals, boxes: tuple[int, int]) -> JudgedPair:
     """A pair that overlaps in every pose: without the region around the joint, judged again.
 
-    It just overlaps if that region would have to be larger than ``most`` (m) by more than one step of its growth.
+    ``boxes``: how many were examined, and how many may be.
     """
-    centres = _centres(robot, pair, apart, held.hub)
-    last, radius = np.inf, sum(girth(body, centre) for body, centre in zip(pair, centres))
-    while radius < SETTLED * last:  # girths of less and less of the bodies, until they hold for what is cut off
-        radius, last = sum(girth(body, centre, radius) for body, centre in zip(pair, centres)), radius
-    found = _cut(robot, pair, (centres, radius), held, boxes, most=most)
-    return found or JudgedPair("overlaps", witness=apart, boxes=held.boxes)
+    centres = _centres(robot, pair, apart)
+    return _cut(robot, pair, (centres, sum(girth(body, centre) for body, centre in zip(pair, centres))), boxes)
 
 
 def _cut(
-    robot: Robot,
-    pair: tuple[Body, Body],
-    region: tuple[list[Reals], float],
-    held: Held,
-    boxes: int,
-    *,
-    most: float = np.inf,
-) -> JudgedPair | None:
-    """Two bodies without the region around their joint (centres, radius in m), which grows until the rest comes apart.
-
-    None if it would have to be larger than ``most`` (m) by more than one step.
-    """
-    centres, radius = region
+    robot: Robot, pair: tuple[Body, Body], region: tuple[list[Reals], float], boxes: tuple[int, int]
+) -> JudgedPair:
+    """Two bodies without the region around their joint (centres, radius in m), which grows until the rest comes apart;
+    ``boxes`` as of :func:`_joined`."""
+    (centres, radius), (looked, most) = region, boxes
     for _ in range(GROWTHS):
-        if radius > most * GROWTH:
-            return None
         parts = [trimmed(body, centre, radius) for body, centre in zip(pair, centres)]
         rest = [(first, second) for first in parts[0] for second in parts[1]]
-        found = _without_joining(robot, rest, boxes)
+        found = _without_joining(robot, rest, most)
         if found is not None:
             watched = tuple(pair for each in found for pair in each.bodies)
             witness = next((each.witness for each in found if each.witness is not None), None)
-            looked = held.boxes + sum(each.boxes for each in found)
-            cut = pair, centres
-            return JudgedPair("joined", watched, witness, np.nan, radius, looked, held.hub, not rest, cut)
+            looked += sum(each.boxes for each in found)
+            return JudgedPair("joined", watched, witness, np.nan, radius, looked, not rest, (pair, centres))
         radius *= GROWTH
-    return JudgedPair("joined", left_out=radius, boxes=held.boxes, hub=held.hub, whole=True, region=(pair, centres))
+    return JudgedPair("joined", left_out=radius, boxes=looked, whole=True, region=(pair, centres))
 
 
 def _without_joining(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: int) -> list[JudgedPair] | None:
@@ -646,20 +559,13 @@ def _sampled(robot: Robot, layout: Layout) -> tuple[Reals, Reals, Flags]:
     return q, found, found <= 0
 
 
-def _centres(robot: Robot, pair: tuple[Body, Body], q: Reals, hub: Reals | None) -> list[Reals]:
-    """About where two bodies are joined, in an arm pose (n,), each (3,) in its own link's frame, m.
-
-    Of hulls where the joint holds them, if that is known; else, and of lines, where they are nearest.
-    """
-    layout = layout_of(robot, pair, [(0, 1)])
-    T, world, middle = np.empty(layout.links.shape), np.empty(layout.points.shape), np.empty((2, 3))
+def _centres(robot: Robot, pair: tuple[Body, Body], q: Reals) -> list[Reals]:
+    """Where two lines are nearest in an arm pose (n,), each (3,) in its own link's frame, m."""
+    layout, near = layout_of(robot, pair, [(0, 1)]), np.empty((2, 3))
+    T, world, middle = unplaced(layout)
     place(layout, q, T, world, middle)
-    frames = [T[body.link] for body in pair]
-    near, shape = np.zeros((2, 3)), (layout.start, layout.kind, layout.radius, layout.disc)
-    if hub is not None and any(len(body.points) > 2 for body in pair):
-        near[:] = frames[1][:3, :3] @ hub + frames[1][:3, 3]
-    elif pair_distance(world, shape, 0, 1, np.empty((ROOM, 3)), near)[1]:  # cores overlap: about where both are
-        near[:] = middle.mean(axis=0)
+    pair_distance(layout, T, world, 0, 1, np.empty((ROOM, 3)), near, np.inf)
+    frames = (T[body.link] for body in pair)
     return [frame[:3, :3].T @ (point - frame[:3, 3]) for frame, point in zip(frames, near)]
 
 
@@ -707,14 +613,13 @@ def base_contacts(robot: Robot, scene: Scene | None) -> tuple[BaseContact, ...]:
     if not pairs:
         return ()
     layout = layout_of(robot, bodies, pairs)
-    w = np.empty(layout.points.shape)
-    place(layout, np.zeros(robot.joints), np.empty(layout.links.shape), w, np.empty(layout.centre.shape))
-    shape = (layout.start, layout.kind, layout.radius, layout.disc)
+    T, w, middles = unplaced(layout)
+    place(layout, np.zeros(robot.joints), T, w, middles)
     found: dict[str, BaseContact] = {}
     for a, b in pairs:
         room, near = np.empty((ROOM, 3)), np.empty((2, 3))
-        distance, touches = pair_distance(w, shape, a, b, room, near)
-        middle, deep = pair_distance(w, shape, len(base) + a, b, room, near)
+        distance, touches = pair_distance(layout, T, w, a, b, room, near, np.inf)
+        middle, deep = pair_distance(layout, T, w, len(base) + a, b, room, near, np.inf)
         margin = bodies[b].radius if len(bodies[b].points) > 1 else 0.0  # a ball's radius is none
         inside = bool(deep) or middle + bodies[a].radius + margin < -INSIDE
         contact = BaseContact(bodies[b].name, 0.0 - float(distance), inside)
@@ -731,8 +636,9 @@ def solids_met(robot: Robot, box: Box, scene: Scene) -> tuple[str, ...]:
     inner = replace(box, size=np.maximum(np.asarray(box.size) - 2 * PENETRATION_TOLERANCE, PENETRATION_TOLERANCE))
     bodies = [*solid_bodies(inner), *(body for solid in scene.solids for body in solid_bodies(solid))]
     layout = layout_of(robot, bodies, [(0, k) for k in range(1, len(bodies))])
-    shape, room, near = (layout.start, layout.kind, layout.radius, layout.disc), np.empty((ROOM, 3)), np.empty((2, 3))
-    found = [pair_distance(layout.points, shape, 0, k, room, near) for k in range(1, len(bodies))]
+    (T, w, middles), room, near = unplaced(layout), np.empty((ROOM, 3)), np.empty((2, 3))
+    place(layout, np.zeros(robot.joints), T, w, middles)
+    found = [pair_distance(layout, T, w, 0, k, room, near, np.inf) for k in range(1, len(bodies))]
     met = (body.name for body, (distance, deep) in zip(bodies[1:], found) if deep or distance < 0)
     return tuple(dict.fromkeys(met))
 
@@ -741,4 +647,4 @@ def _middle(body: Body) -> Body:
     """Of a capsule half its line; a hull at half its size, about the mean of its six ends."""
     at_end = [np.isclose(body.points, end(body.points, axis=0)) for end in (np.min, np.max)]
     ends = [body.points[each].mean(axis=0) for each in np.concatenate(at_end, axis=1).T]
-    return replace(body, points=(body.points + np.mean(ends, axis=0)) / 2)
+    return replace(body, points=(body.points + np.mean(ends, axis=0)) / 2, tree=None)

@@ -16,26 +16,13 @@ import numpy as np
 import scipy
 
 from er3a.by_value import ByValue
-from er3a.collision.distances import distances_from_hull
+from er3a.collision.convex import distances_from_hull
 from er3a.errors import Er3aError
 from er3a.geometry.open3d_loader import load_open3d
 from er3a.geometry.vectors import fibonacci_sphere
 from er3a.numerics.arrays import Integers, Reals
 
 CONVEX = 1e-6  # share of the volume by which a convex mesh may differ from its hull
-NEARLY_CONVEX = 0.1  # and by which a link's may, whose hull is then the better shape: pieces need a margin
-LINK_TRIANGLES = 5000  # of the mesh that is split for a link
-LINK_SEARCH: dict[str, Any] = {
-    "threshold": 0.1,
-    "max_convex_hull": 8,
-    "resolution": 500,
-    "mcts_iterations": 20,
-    "mcts_nodes": 8,
-    "mcts_max_depth": 2,
-    "preprocess_mode": "on",
-    "preprocess_resolution": 40,
-}
-"""coacd's settings for a link: seconds of work, and few pieces, because all pairs of them are judged."""
 MAX_CORNERS = 64  # of a piece
 AGREE = 2e-5  # m, tolerance of the bound of what extends beyond
 CUTS = 12
@@ -73,30 +60,10 @@ def convex_pieces(vertices: Reals, faces: Integers, threshold: float, seed: int)
     Er3aError
         if the mesh is not convex and coacd, which splits it, is not installed
     """
-    if _beyond_hull(vertices, faces) <= CONVEX:
+    if is_convex(vertices, faces):
         return hull_of(vertices)
     pieces = _split(vertices, faces, seed, threshold=threshold)
     return ConvexPieces(pieces, uncovered(vertices, faces, pieces), _excess(vertices, faces, pieces, seed))
-
-
-def link_pieces(vertices: Reals, faces: Integers, closed: bool, seed: int) -> ConvexPieces:
-    """At most 8 convex pieces that hold the surface of a link's mesh, which need not be closed.
-
-    The hull where that is hardly larger than a closed mesh. The excess is not measured: NaN for pieces.
-
-    Parameters
-    ----------
-    vertices, faces : as of :func:`convex_pieces`
-
-    Raises
-    ------
-    Er3aError
-        as :func:`convex_pieces`
-    """
-    if closed and _beyond_hull(vertices, faces) <= NEARLY_CONVEX:
-        return hull_of(vertices)
-    pieces = _split(*simplified(vertices, faces, LINK_TRIANGLES), seed, **LINK_SEARCH)
-    return ConvexPieces(pieces, uncovered(vertices, faces, pieces), np.nan)
 
 
 def simplified(vertices: Reals, faces: Integers, most: int) -> tuple[Reals, Integers]:
@@ -118,11 +85,14 @@ def simplified(vertices: Reals, faces: Integers, most: int) -> tuple[Reals, Inte
     return np.asarray(simple.vertices), np.asarray(simple.triangles)
 
 
-def _beyond_hull(vertices: Reals, faces: Integers) -> float:
-    """The share of its hull that a closed mesh leaves empty."""
-    hull, corners = scipy.spatial.ConvexHull(vertices), vertices[faces]
+def is_convex(vertices: Reals, faces: Integers) -> bool:
+    """Whether a closed mesh fills its hull."""
+    try:
+        hull, corners = scipy.spatial.ConvexHull(vertices), vertices[faces] - vertices[0]
+    except scipy.spatial.QhullError:  # flat
+        return False
     volume = float(np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum()) / 6
-    return float(hull.volume - volume) / float(hull.volume)
+    return bool(abs(hull.volume - volume) <= CONVEX * hull.volume)
 
 
 def _split(vertices: Reals, faces: Integers, seed: int, **settings: Any) -> tuple[Reals, ...]:
@@ -137,7 +107,7 @@ def _split(vertices: Reals, faces: Integers, seed: int, **settings: Any) -> tupl
     middle, size = vertices.mean(axis=0), float(np.ptp(vertices, axis=0).max())
     mesh = coacd.Mesh((vertices - middle) / size, faces)
     parts = coacd.run_coacd(mesh, seed=seed, decimate=True, max_ch_vertex=MAX_CORNERS, **settings)
-    return tuple(_corners(np.asarray(points) * size + middle) for points, _ in parts)
+    return tuple(hull_corners(np.asarray(points) * size + middle) for points, _ in parts)
 
 
 def hull_of(points: Reals) -> ConvexPieces:
@@ -145,10 +115,10 @@ def hull_of(points: Reals) -> ConvexPieces:
 
     What the corners left out stand out by is the margin; the excess is not that of a mesh, but 0: corners are points.
     """
-    corners = _corners(points)
+    corners = hull_corners(points)
     if len(corners) <= MAX_CORNERS:
         return ConvexPieces((corners,), 0.0, 0.0)
-    kept = _corners(corners[np.unique((fibonacci_sphere(MAX_CORNERS) @ corners.T).argmax(axis=1))])
+    kept = hull_corners(corners[np.unique((fibonacci_sphere(MAX_CORNERS) @ corners.T).argmax(axis=1))])
     away = np.empty(len(corners))
     distances_from_hull(corners, kept, away)
     return ConvexPieces((kept,), float(away.max()) + ROUNDING, 0.0)
@@ -198,7 +168,7 @@ def _excess(vertices: Reals, faces: Integers, pieces: Sequence[Reals], seed: int
     return max(0.0, float(outside.max()))
 
 
-def _corners(points: Reals) -> Reals:
+def hull_corners(points: Reals) -> Reals:
     try:
         corners: Reals = points[scipy.spatial.ConvexHull(points).vertices]
     except scipy.spatial.QhullError:  # flat

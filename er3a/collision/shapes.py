@@ -20,19 +20,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import assert_never
 
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from er3a.collision.distances import CYLINDER, HALF_SPACE, HULL, WORLD, Layout, cylinder_points, distances_from_hull
+from er3a.collision.convex import cylinder_points, distances_from_hull
+from er3a.collision.distances import CYLINDER, HALF_SPACE, HULL, WORLD, Layout
 from er3a.collision.pairs import BASE, ShapesAssumed, link_label
 from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Solid, Sphere
+from er3a.collision.triangles import TriangleTree, depths_inside, outer_corners, tree_of, trees_of
 from er3a.geometry.vectors import fibonacci_sphere
 from er3a.kinematics.chain import ALONG_Z, TO_NEXT_AXIS, constant_links, joint_starts, link_parts
 from er3a.kinematics.forward import frames
 from er3a.numerics.arrays import Integers, Reals
-from er3a.robots.robot import ConvexPiece, Envelope, Grade, Robot, derived
+from er3a.robots.robot import ConvexPiece, Envelope, Grade, LinkMesh, Robot, derived
 
 RADIUS_RATIOS = (0.055, 0.055, 0.05, 0.045, 0.04, 0.035, 0.03)
 SHORTEST = 1e-6
@@ -50,7 +53,7 @@ class ArmShapes:
 
     Attributes
     ----------
-    capsules, pieces : shapes of the links, in any order
+    capsules, pieces, meshes : shapes of the links, in any order
     given : whether the robot's file gives them; else they are guessed from its table
     grade : how far they can be relied on: as the file grades them, ``inferred`` if it doesn't or if they are guessed
     bare : numbers of links from 0 on that a file which gives shapes gives none; () for guessed shapes, which leave out
@@ -63,6 +66,7 @@ class ArmShapes:
 
     capsules: tuple[Envelope, ...]
     pieces: tuple[ConvexPiece, ...]
+    meshes: tuple[LinkMesh, ...]
     given: bool
     grade: Grade
     bare: tuple[int, ...]
@@ -74,19 +78,23 @@ class ArmShapes:
         """Whether no document that a verdict may rest on gives them, or not for all of a link."""
         return self.grade in ASSUMED_GRADES or bool(self.partial)
 
+    @property
+    def links(self) -> set[int]:
+        """The links that have a shape."""
+        return {shape.link for shape in (*self.capsules, *self.pieces, *self.meshes)}
+
 
 @derived
 def arm_shapes(robot: Robot) -> ArmShapes:
     """The shapes of an arm (see the module's text)."""
-    capsules, pieces, given = robot.envelopes, robot.hulls, bool(robot.envelopes or robot.hulls)
-    if not given:
-        capsules = default_envelopes(robot)
+    given = bool(robot.envelopes or robot.hulls or robot.meshes)
+    capsules = robot.envelopes if given else default_envelopes(robot)
     source = robot.sources.get("envelopes")
-    shaped = {capsule.link for capsule in capsules} | {piece.link for piece in pieces}
-    bare = tuple(link for link in range(robot.rows + 1) if given and link not in shaped)
     grade = source.grade if given and source else "inferred"
-    shapes = ArmShapes(capsules, pieces, given, grade, bare)
-    lengths = ((link, *covered_lengths(robot, shapes, link)) for link in sorted(shaped) if given)
+    shapes = ArmShapes(capsules, robot.hulls, robot.meshes, given, grade, ())
+    bare = tuple(link for link in range(robot.rows + 1) if given and link not in shapes.links)
+    shapes = replace(shapes, bare=bare)
+    lengths = ((link, *covered_lengths(robot, shapes, link)) for link in sorted(shapes.links) if given)
     return replace(
         shapes,
         uncovered=tuple(k for k in range(robot.rows + 1) if _uncovered(robot, shapes, k)),
@@ -207,6 +215,7 @@ def _beyond(robot: Robot, shapes: ArmShapes, points: Reals, link: int, beside: s
 def _hulls(shapes: ArmShapes, links: set[int]) -> list[tuple[int, Reals, float]]:
     """Link, corners (k, 3), m, in its frame, and radius (m) of the shapes of some links."""
     hulls = [(c.link, np.array([c.start, c.end]), c.radius) for c in shapes.capsules if c.link in links]
+    hulls += [(m.link, _surface(m).points, 0.0) for m in shapes.meshes if m.link in links]
     return hulls + [(h.link, np.array(h.points), h.margin) for h in shapes.pieces if h.link in links]
 
 
@@ -277,6 +286,7 @@ def _pieces(robot: Robot, link: int, size: float, lines: list[tuple[Reals, Reals
 
 
 ON_AXIS = 1e-9  # m
+LOOKED_AT = 100  # corners of a surface
 ROUND = 72  # corners by which a circle is drawn
 BALL = 200  # and a ball
 SIDES = 24
@@ -285,14 +295,16 @@ CORNERS = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A convex body.
+    """A convex body, or a surface of triangles.
 
     Attributes
     ----------
     name : ``base``, ``link_3``, or that of the solid or of what is carried
     link : 0 for the base, k for the link that row k moves, ``WORLD`` for bodies around the arm
-    points : (k, 3), m, in the link's frame; a half-space has its normal and, in the second row, its offset first
+    points : (k, 3), m, in the link's frame; a half-space has its normal and, in the second row, its offset first; of a
+        surface the corners of a hull around it
     kind, radius, disc : see :mod:`er3a.collision.distances`
+    tree : of a surface its triangles; None for convex bodies
     """
 
     name: str
@@ -301,16 +313,29 @@ class Body:
     radius: float
     kind: int = HULL
     disc: float = 0.0
+    tree: TriangleTree | None = None
+
+
+@lru_cache(maxsize=64)
+def _surface(mesh: LinkMesh) -> Body:
+    """A link's surface as a body."""
+    return Body(
+        link_label(mesh.link),
+        mesh.link,
+        outer_corners(mesh.points[np.unique(mesh.faces)]),
+        0.0,
+        tree=tree_of(mesh.points, mesh.faces),
+    )
 
 
 def arm_bodies(robot: Robot) -> tuple[Body, ...]:
-    """Capsules and convex pieces of the arm, link by link."""
+    """Capsules, convex pieces and surfaces of the arm, link by link."""
     shapes = arm_shapes(robot)
     capsules = [
         Body(link_label(c.link), c.link, np.unique([c.start, c.end], axis=0), c.radius) for c in shapes.capsules
     ]
     pieces = [Body(link_label(h.link), h.link, np.array(h.points), h.margin) for h in shapes.pieces]
-    return tuple(sorted([*capsules, *pieces], key=lambda body: body.link))
+    return tuple(sorted([*capsules, *pieces, *map(_surface, shapes.meshes)], key=lambda body: body.link))
 
 
 def carried_bodies(robot: Robot, scene: Scene | None) -> tuple[Body, ...]:
@@ -353,6 +378,21 @@ def depths_in(solid: Solid, points: Reals) -> Reals:
     pieces of a mesh does not count."""
     depths: Reals = np.max([_depths_in(body, points) for body in solid_bodies(solid)], axis=0)
     return depths
+
+
+def depth_inside(body: Body, other: Body, T: Reals) -> float:
+    """How deep another body, placed by T (4, 4) in the frame of a body, has points inside its core, m, not below 0.
+
+    Of a surface up to ``LOOKED_AT`` corners are looked at, so that it is at least that deep.
+    """
+    points = other.points if other.tree is None else other.tree.corner.reshape(-1, 3)
+    points = points[:: -(-len(points) // LOOKED_AT)] @ T[:3, :3].T + T[:3, 3]
+    found = np.zeros(len(points))
+    if body.tree is not None:
+        depths_inside(trees_of([body.tree]), 0, points, found)
+    elif len(body.points) > 2 or body.kind == CYLINDER:
+        found = _depths_in(body, points)
+    return max(0.0, float(found.max()))
 
 
 def _depths_in(body: Body, points: Reals) -> Reals:
@@ -433,6 +473,7 @@ def layout_of(
         disc=np.array([body.disc for body in bodies], float),
         centre=centre,
         reach=reach,
+        trees=trees_of([body.tree for body in bodies]),
         first=np.array([i for i, _ in pairs], np.int64),
         second=np.array([j for _, j in pairs], np.int64),
         joined=np.array(joined or [False] * len(pairs), bool),

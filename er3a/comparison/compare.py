@@ -323,7 +323,7 @@ def beside_the_table(robot: Robot) -> frozenset[Uncompared]:
     masses = robot.masses
     given: dict[Uncompared, bool] = {
         "tool": not np.array_equal(robot.tool, np.eye(4)),
-        "envelopes": bool(robot.envelopes or robot.hulls),
+        "envelopes": bool(robot.envelopes or robot.hulls or robot.meshes),
         "pair_rules": bool(robot.pair_rules),
         "inertia": bool(masses.links),
         "drives": masses.drives is not None,

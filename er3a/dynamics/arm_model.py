@@ -218,12 +218,14 @@ def estimated_links(robot: Robot, density: float) -> tuple[LinkMass, ...]:
 
 
 def _link_parts(robot: Robot) -> dict[int, Sequence[Envelope] | Sequence[Reals]]:
-    """What fills each link: its convex pieces (k, 3), m, that have a volume; of a link without any its capsules."""
+    """What fills each link: its convex pieces (k, 3), m, that have a volume, hulls of surfaces; else capsules."""
     shapes, pieces, capsules = arm_shapes(robot), dict[int, list[Reals]](), dict[int, list[Envelope]]()
     for piece in shapes.pieces:
         points = np.array(piece.points)
         if len(points) > 3 and np.linalg.matrix_rank(points - points[0]) == 3:
             pieces.setdefault(piece.link, []).append(points)
+    for mesh in shapes.meshes:
+        pieces.setdefault(mesh.link, []).append(mesh.points)
     for capsule in shapes.capsules:
         capsules.setdefault(capsule.link, []).append(capsule)
     return {**capsules, **pieces}

@@ -10,7 +10,7 @@ from pathlib import PurePosixPath
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
+from pydantic import AfterValidator, Field, PrivateAttr, ValidationInfo, field_validator, model_validator
 
 from er3a.files.units import (
     MAX_DEG,
@@ -30,7 +30,7 @@ from er3a.kinematics.chain import constant_links, joint_starts
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import RADIANS_BELOW_DEG, in_si, is_part_of_pi
 from er3a.robots.masses import Drives, LinkMass, MassBody, Masses, WristLoad, moved, no_body
-from er3a.robots.robot import MAX_JOINTS, Grade, PairRule, Robot, Visual
+from er3a.robots.robot import MAX_JOINTS, Grade, LinkMesh, PairRule, Robot
 
 NAME_PATTERN = r"^[a-z0-9][a-z0-9_-]{0,63}$"
 HEAVIEST_LINK_KG = 20_000.0
@@ -506,17 +506,27 @@ class LinkHull(StrictModel):
         return points
 
 
+class LinkSurface(StrictModel):
+    """The triangles of link ``link``, in the frame that moves with its joint: ``stl``, a binary STL in mm below the
+    robot file's folder, and its checksum, as ``er3a import-urdf`` writes them."""
+
+    link: Annotated[int, Field(ge=0)]
+    stl: PiecesPath
+    sha256: Text
+
+
 class Envelopes(Sourced):
-    """Shapes of links and tool, for collision checks: capsules and convex pieces."""
+    """Shapes of links and tool, for collision checks: capsules, convex pieces and surfaces of triangles."""
 
     capsules: Annotated[list[Capsule], Field(max_length=1000)] = []
     meshes: Annotated[list[LinkPieces], Field(max_length=100)] = []
     hulls: Annotated[list[LinkHull], Field(max_length=1000)] = []
+    surfaces: Annotated[list[LinkSurface], Field(max_length=100)] = []
 
     @model_validator(mode="after")
     def _holds_a_shape(self):
-        if not (self.capsules or self.meshes or self.hulls):
-            raise ValueError("no shapes | Write capsules, meshes or hulls, or leave envelopes out")
+        if not (self.capsules or self.meshes or self.hulls or self.surfaces):
+            raise ValueError("no shapes | Write capsules, meshes, hulls or surfaces, or leave envelopes out")
         for i, mesh in enumerate(self.meshes):
             check_placement(f"meshes[{i}]", mesh)
         return self
@@ -539,7 +549,7 @@ class LinkVisual(StrictModel):
         self.visual()
         return self
 
-    def visual(self) -> Visual:
+    def visual(self) -> LinkMesh:
         """In metres; ``ValueError`` for anything but triangles."""
         try:
             points, faces = (
@@ -550,14 +560,17 @@ class LinkVisual(StrictModel):
                 raise ValueError
         except ValueError:
             raise ValueError("holds no triangles | Import the URDF again, or remove the link from visuals") from None
-        return Visual(self.link, points / 1000.0, faces.astype(np.int64))
+        return LinkMesh(self.link, points / 1000.0, faces.astype(np.int64))
 
 
-def link_visual(visual: Visual) -> dict[str, int | str]:
+def link_visual(visual: LinkMesh) -> dict[str, int | str]:
     """The fields of a :class:`LinkVisual`."""
     packed = ((1000 * visual.points).astype("<f4"), visual.faces.astype("<u2"))
     points, faces = (base64.b64encode(array.tobytes()).decode() for array in packed)
     return {"link": visual.link, "points_mm": points, "faces": faces}
+
+
+SHAPES = ("capsules", "meshes", "hulls", "surfaces")
 
 
 class DecidedPair(StrictModel):
@@ -619,6 +632,17 @@ class RobotFile(InputFile):
     drives: DriveGroup | None = None
     wrist_load: WristLoadGroup | None = None
     weight: Weight | None = None
+    _surfaces: tuple[LinkMesh, ...] = PrivateAttr(())
+
+    @property
+    def surfaces(self) -> tuple[LinkMesh, ...]:
+        """The triangles that ``envelopes.surfaces`` names."""
+        return self._surfaces
+
+    def with_surfaces(self, surfaces: tuple[LinkMesh, ...]) -> RobotFile:
+        """Keep the triangles that ``envelopes.surfaces`` names."""
+        self._surfaces = surfaces
+        return self
 
     @model_validator(mode="after")
     def _rows_in_order(self):
@@ -700,7 +724,7 @@ class RobotFile(InputFile):
     @model_validator(mode="after")
     def _check_links(self):
         count = len(self.dh.rows)
-        given = {f"envelopes.{key}": getattr(self.envelopes, key, []) for key in ("capsules", "meshes", "hulls")}
+        given = {f"envelopes.{key}": getattr(self.envelopes, key, []) for key in SHAPES}
         for key, shapes in {**given, "visuals": self.visuals}.items():
             for i, shape in enumerate(shapes):
                 if shape.link > count:

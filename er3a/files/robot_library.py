@@ -17,6 +17,7 @@ from er3a.files.kept_files import ROOT, names, own_or_shipped
 from er3a.files.pieces_file import load_pieces
 from er3a.files.units import doubt_millimetres
 from er3a.files.yaml_file import StrictModel, load
+from er3a.formats.mesh_file import read_stl
 from er3a.geometry.transforms import rot_x, rot_y, translation
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.numerics.arrays import Reals
@@ -67,7 +68,8 @@ def read_robot(path: Path) -> robot_file.RobotFile:
     content = load(robot_file.RobotFile, path)
     if content.name != path.stem:
         raise InputError(path, "name", f"'{content.name}' is not the file's name", f"Write {path.stem}")
-    return content
+    given = content.envelopes.surfaces if content.envelopes else []
+    return content.with_surfaces(tuple(read_stl(path.parent / each.stl, each.link, each.sha256) for each in given))
 
 
 def robot_path(name_or_path: str | Path) -> Path:
@@ -117,6 +119,7 @@ def robot_of(content: robot_file.RobotFile) -> Robot:
         references=tuple(content.references),
         envelopes=_envelopes(content.envelopes),
         hulls=_hulls(content.envelopes),
+        meshes=content.surfaces,
         visuals=tuple(each.visual() for each in content.visuals),
         pair_rules=content.collision.rules() if content.collision else (),
         sources={group: Source(value.source, value.grade, value.origin or "") for group, value in present.items()},

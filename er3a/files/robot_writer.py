@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,11 +27,12 @@ from er3a.files.robot_file import (
 )
 from er3a.files.robot_library import VALUES_OF_ROW
 from er3a.files.yaml_file import parse
+from er3a.formats.mesh_file import stl_of
 from er3a.geometry.transforms import rpy_of
 from er3a.numerics.si_units import from_si, split_unit
 from er3a.robots.joint_limits import shown
 from er3a.robots.masses import MassBody
-from er3a.robots.robot import CombinedLimit, Robot, Source
+from er3a.robots.robot import CombinedLimit, LinkMesh, Robot, Source
 
 
 def mass_groups(robot: Robot) -> dict[str, dict[str, Any]]:
@@ -132,7 +135,7 @@ def robot_file(robot: Robot, path: Path | None = None) -> RobotFile:
         content["speeds"] = sourced("speeds") | {"rows": speeds}
     if robot.coupling is not None:
         content["coupling"] = sourced("coupling") | {"rows": _coupling_rows(robot.coupling)}
-    if robot.envelopes or robot.hulls:
+    if robot.envelopes or robot.hulls or robot.meshes:
         content["envelopes"] = sourced("envelopes") | _shapes(robot)
     if robot.visuals:
         content["visuals"] = [link_visual(each) for each in robot.visuals]
@@ -146,7 +149,7 @@ def robot_file(robot: Robot, path: Path | None = None) -> RobotFile:
             placement = {"xyz_mm": map(_tidy, T[:3, 3] * 1000), "rpy_deg": map(_tidy, np.degrees(rpy_of(T)))}
             content[key] = sourced(key) | {name: list(values) for name, values in placement.items()}
     with warnings.catch_warnings(action="ignore", category=InputWarning):  # for those who write numbers by hand
-        return parse(RobotFile, content, path)
+        return parse(RobotFile, content, path).with_surfaces(robot.meshes)
 
 
 def _short(lengths_mm: np.ndarray) -> bool:
@@ -207,7 +210,17 @@ def _shapes(robot: Robot) -> dict[str, Any]:
             {"link": h.link, "margin_mm": _tidy(h.margin * 1000), "points_mm": [point(p) for p in h.points]}
             for h in robot.hulls
         ],
+        "surfaces": [
+            {"link": mesh.link, "stl": place.as_posix(), "sha256": hashlib.sha256(content).hexdigest()}
+            for mesh, (place, content) in zip(robot.meshes, surface_files(robot.meshes).items())
+        ],
     }
+
+
+def surface_files(meshes: Sequence[LinkMesh]) -> dict[Path, bytes]:
+    """The STL file of each surface by its place below the robot file's folder, named by what it holds."""
+    contents = [(mesh.link, stl_of(mesh)) for mesh in meshes]
+    return {Path("meshes", f"link_{k}_{hashlib.sha256(each).hexdigest()[:16]}.stl"): each for k, each in contents}
 
 
 def _decided(robot: Robot, rule: str) -> list[dict[str, Any]]:
@@ -220,6 +233,8 @@ def _decided(robot: Robot, rule: str) -> list[dict[str, Any]]:
 def write_robot(robot: Robot, path: Path) -> None:
     """Write a robot file that :func:`er3a.load_robot` reads back to the same numbers, to 1e-12 m and rad."""
     text = robot_text(robot_file(robot, path))
+    for place, content in surface_files(robot.meshes).items():
+        write_atomically(path.parent / place, partial(Path.write_bytes, data=content))
     write_atomically(path, lambda file: file.write_text(text, encoding="utf-8"))
 
 

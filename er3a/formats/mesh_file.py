@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import stat
 import struct
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ import numpy as np
 
 from er3a.errors import InputError
 from er3a.numerics.arrays import Integers, Reals
+from er3a.robots.robot import LinkMesh
 
 Unit = Literal["m", "mm"]
 FORMATS = (".stl", ".obj", ".dae", ".glb")
@@ -46,18 +48,7 @@ def read_mesh(path: str | Path, unit: Unit) -> ClosedMesh:
 
 def read_link_mesh(path: Path, scale: Reals) -> tuple[Reals, Integers, bool]:
     """Vertices (V, 3), m, and faces (F, 3) of a mesh of a URDF's link, each axis times ``scale`` (3,), and whether it
-    is closed; lengths and errors as of :func:`read_link_vertices`."""
-    loaded = _loaded(path)
-    loaded.merge_vertices()
-    loaded.vertices = loaded.vertices * _link_scale(path, loaded, scale)
-    closed = bool(loaded.is_watertight)
-    if closed:
-        loaded.fix_normals()
-    return np.asarray(loaded.vertices, float), np.asarray(loaded.faces, np.int64), closed
-
-
-def read_link_vertices(path: Path, scale: Reals) -> Reals:
-    """Corners (V, 3), m, of a mesh of a URDF's link, which need not be closed, each axis times ``scale`` (3,).
+    is closed.
 
     Lengths of the file are in metres, those of a DAE in the unit that it states, as RViz and Gazebo take them.
 
@@ -67,7 +58,46 @@ def read_link_vertices(path: Path, scale: Reals) -> Reals:
         for a file that is not a mesh, is too large, or has a size that no link has
     """
     loaded = _loaded(path)
-    return np.asarray(loaded.vertices, float) * _link_scale(path, loaded, scale)
+    loaded.merge_vertices()
+    loaded.vertices = loaded.vertices * _link_scale(path, loaded, scale)
+    closed = bool(loaded.is_watertight)
+    if closed:
+        loaded.fix_normals()
+    return np.asarray(loaded.vertices, float), np.asarray(loaded.faces, np.int64), closed
+
+
+STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
+
+
+def link_mesh(link: int, corners: Reals) -> LinkMesh:
+    """A link's surface of triangles with corners (F, 3, 3), m, to the digits that :func:`stl_of` keeps."""
+    rounded = (1000 * np.asarray(corners).reshape(-1, 3)).astype(np.float32).astype(float) / 1000
+    points, same = np.unique(rounded, axis=0, return_inverse=True)
+    return LinkMesh(link, points, same.reshape(-1, 3).astype(np.int64))
+
+
+def stl_of(mesh: LinkMesh) -> bytes:
+    """A surface as a binary STL in mm."""
+    triangles = np.zeros(len(mesh.faces), STL_TRIANGLE)
+    triangles["corners"] = 1000 * mesh.points[mesh.faces]
+    return bytes(80) + struct.pack("<I", len(triangles)) + triangles.tobytes()
+
+
+def read_stl(path: Path, link: int, checksum: str) -> LinkMesh:
+    """A surface that :func:`stl_of` wrote.
+
+    Raises
+    ------
+    InputError
+        if it is missing, or changed since it was written
+    """
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise InputError(path, None, f"can't be read ({error.strerror})", "Copy it beside the robot file") from None
+    if len(content) < 84 or hashlib.sha256(content).hexdigest() != checksum:
+        raise InputError(path, None, "was changed after er3a wrote it", "Import the URDF again: er3a import-urdf")
+    return link_mesh(link, np.frombuffer(content, STL_TRIANGLE, offset=84)["corners"].astype(float) / 1000)
 
 
 def _closed(path: Path, loaded: Any, scale: float) -> ClosedMesh:

@@ -27,7 +27,7 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import scipy
@@ -38,13 +38,14 @@ from er3a.collision.meshes import simplified
 from er3a.collision.shapes import arm_shapes
 from er3a.errors import Er3aError, InputError
 from er3a.formats import urdf_tree
+from er3a.formats.mesh_file import link_mesh
 from er3a.geometry.transforms import rot_y, rot_z, rpy_of
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import forward, frames
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.quasi_random import quasi_random_points
 from er3a.numerics.si_units import decimals
-from er3a.robots.robot import MAX_JOINTS, ConvexPiece, Envelope, Robot, Source, Visual, robot_name
+from er3a.robots.robot import MAX_JOINTS, ConvexPiece, Envelope, LinkMesh, Robot, Source, robot_name
 
 PARALLEL = 1e-12
 NEARLY_PARALLEL = math.radians(1.0)  # as far as arms are made wrong; on links of 0.1 m a normal is 6 m away, or more
@@ -237,7 +238,6 @@ def import_urdf(
     base: str | None = None,
     tip: str | None = None,
     snap: bool = False,
-    split: bool | urdf_tree.Split = False,
 ) -> UrdfImport:
     """Import a URDF: D-H table, directions, offsets, limits and speeds from its axes; shapes, visual meshes and masses.
 
@@ -253,8 +253,6 @@ def import_urdf(
     path : a URDF, or expanded xacro
     base, tip : links at which the arm begins and ends; None if the file has only one arm
     snap : round angles within 1e-4 rad of a multiple of 90 deg to that multiple, with a note for each
-    split : split meshes that fill less than nine tenths of their hulls into at most 8 convex pieces, which takes
-        seconds each; if a function, it is called with the file of each mesh before. Otherwise convex hulls are used
 
     Raises
     ------
@@ -269,12 +267,12 @@ def import_urdf(
     given = _chain_forward(found.joints, q @ coupling.T + shift)
     misfit = np.linalg.norm((forward(robot, q) - given)[:, :3, 3], axis=1).max()
     root, placed = urdf_tree.urdf_root(path), link_places(found, shift)
-    envelopes, hulls, shaped, lost = link_shapes(path, root, robot, placed, _asked(split))
+    shapes, shaped, lost = link_shapes(path, root, robot, placed)
     visuals, unseen = link_visuals(path, root, robot, placed)
     names = tuple(joint.name for joint in sources)
     masses, weighed, changed = urdf_tree.masses_from_urdf(root, robot, placed, [joint.name for joint in moving], names)
     stated = {
-        "envelopes": bool(envelopes or hulls),
+        "envelopes": any(shapes.values()),
         "inertia": bool(masses.links),
         "drives": masses.drives is not None,
     }
@@ -286,9 +284,7 @@ def import_urdf(
         which = f"{len(changed)} links" if len(changed) > 1 else f"link {changed[0]}"
         text = f"As {path.name} states it, but for the inertia of {which}, for which the nearest possible one was taken"
         more["inertia"] = Source(text, "export")
-    robot = robot.replace(
-        envelopes=envelopes, hulls=hulls, visuals=visuals, masses=masses, sources={**robot.sources, **more}
-    )
+    robot = robot.replace(**shapes, visuals=visuals, masses=masses, sources={**robot.sources, **more})
     first, last = found.joints[0].parent, found.joints[-1].child
     return UrdfImport(robot, (*found.notes, *notes, *shaped, *unseen, *weighed), float(misfit), names, first, last)
 
@@ -468,12 +464,6 @@ def _robot_of_chain(
     return robot, sources, coupling, shift, [*notes, *more]
 
 
-def _asked(split: bool | urdf_tree.Split) -> urdf_tree.Split | None:
-    if callable(split):
-        return split
-    return (lambda _: None) if split else None
-
-
 def link_places(found: urdf_tree.UrdfChain, shift: Reals) -> urdf_tree.LinkPlaces:
     """Where links stand that move with the chain, all joints of the robot at 0.
 
@@ -509,41 +499,46 @@ def link_places(found: urdf_tree.UrdfChain, shift: Reals) -> urdf_tree.LinkPlace
 
 
 def link_shapes(
-    path: Path, root: ElementTree.Element, robot: Robot, placed: urdf_tree.LinkPlaces, split: urdf_tree.Split | None
-) -> tuple[tuple[Envelope, ...], tuple[ConvexPiece, ...], tuple[str, ...], tuple[str, ...]]:
-    """The collision geometry of a URDF, in the frames of the links of the robot made from it, notes in words, and the
-    links of which a shape could not be read."""
+    path: Path, root: ElementTree.Element, robot: Robot, placed: urdf_tree.LinkPlaces
+) -> tuple[dict[str, Any], tuple[str, ...], tuple[str, ...]]:
+    """The collision geometry of a URDF, in the frames of the links of the robot made from it, as fields of
+    :class:`Robot`, notes in words, and the links of which a shape could not be read."""
     zero = np.concatenate([robot.base[None], frames(robot, np.zeros(robot.joints))])
-    envelopes, hulls, notes, lost = list[Envelope](), list[ConvexPiece](), list[str](), list[str]()
+    shapes, notes, lost = list[urdf_tree.Shape](), list[str](), list[str]()
     for link in root.findall("link"):
-        shapes, place = link.findall("collision"), placed(link.get("name", "?"))
+        collisions, place = link.findall("collision"), placed(link.get("name", "?"))
         if place is None:
-            if shapes:
+            if collisions:
                 notes.append(f"link {link.get('name')} does not move with the arm's chain; its shape is left out")
             continue
         T, number = place
-        made = list[Envelope | ConvexPiece | urdf_tree.CylinderOfLink]()
-        for collision in shapes:
+        made = list[urdf_tree.Shape | urdf_tree.CylinderOfLink]()
+        for collision in collisions:
             frame, name = np.linalg.inv(zero[number]) @ T, link.get("name", "?")
-            found: list[Envelope | ConvexPiece | urdf_tree.CylinderOfLink] = []
+            found = list[urdf_tree.Shape | urdf_tree.CylinderOfLink]()
             try:
-                found = urdf_tree.collision_shapes(path, name, collision, (frame, number), notes, split)
+                found = urdf_tree.collision_shapes(path, name, collision, (frame, number), notes)
             except InputError as error:
                 notes.append(f"link {name} has a shape that is left out ({error})")
             made += found
             lost += [] if found or name in lost else [name]
-        for shape in urdf_tree.with_capsules(made):
-            if isinstance(shape, Envelope):
-                envelopes.append(shape)
-            else:
-                hulls.append(shape)
-    capsules, pieces = sorted(envelopes, key=lambda each: each.link), sorted(hulls, key=lambda each: each.link)
-    return tuple(capsules), tuple(pieces), tuple(notes), tuple(lost)
+        shapes += urdf_tree.with_capsules(made)
+    shapes.sort(key=lambda each: each.link)
+    surfaces: dict[int, list[Reals]] = {}
+    for shape in shapes:
+        if isinstance(shape, LinkMesh):
+            surfaces.setdefault(shape.link, []).append(shape.points[shape.faces])
+    fields = {
+        "envelopes": tuple(shape for shape in shapes if isinstance(shape, Envelope)),
+        "hulls": tuple(shape for shape in shapes if isinstance(shape, ConvexPiece)),
+        "meshes": tuple(link_mesh(number, np.concatenate(parts)) for number, parts in surfaces.items()),
+    }
+    return fields, tuple(notes), tuple(lost)
 
 
 def link_visuals(
     path: Path, root: ElementTree.Element, robot: Robot, placed: urdf_tree.LinkPlaces
-) -> tuple[tuple[Visual, ...], tuple[str, ...]]:
+) -> tuple[tuple[LinkMesh, ...], tuple[str, ...]]:
     """The visual geometry of a URDF, one surface for each link, simplified to ``DRAWN_TRIANGLES`` in all, and notes."""
     zero = np.concatenate([robot.base[None], frames(robot, np.zeros(robot.joints))])
     parts: dict[int, list[tuple[Reals, Integers]]] = {}
@@ -568,7 +563,7 @@ def link_visuals(
         points = np.concatenate([points for points, _ in meshes])
         points, faces = simplified(points, faces, DRAWN_TRIANGLES // len(parts))
         used, corners = np.unique(faces, return_inverse=True)
-        found.append(Visual(number, points[used], corners.reshape(-1, 3)))
+        found.append(LinkMesh(number, points[used], corners.reshape(-1, 3)))
     notes = (f"pictures show no visual geometry of {', '.join(missing)}: {why}" for why in missing.values())
     return tuple(found), tuple(notes)[:1]
 

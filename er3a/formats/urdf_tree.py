@@ -8,11 +8,11 @@ URDFs that are written as xacro are expanded by xacrodoc (the extra ``xacro``); 
 Masses and drives are ``<inertial>`` of links, ``<dynamics>`` and efforts of joints. Links connected by fixed joints
 count as one. An effort of 0 means unknown, as in most files.
 
-Collision geometry becomes capsules and convex hulls: boxes become hulls, cylinders prisms around them, spheres capsules
-without length; a cylinder with a sphere of its radius at each end becomes a capsule. A mesh becomes its convex hull or,
-on request, several convex pieces. The export writes a mesh for each hull, and a cylinder and two spheres for a capsule.
-The amount by which a hull has to be enlarged is written as ``<collision margin="...">`` (m), which other readers
-ignore.
+Collision geometry becomes capsules, convex hulls and surfaces: boxes become hulls, cylinders prisms around them,
+spheres capsules without length; a cylinder with a sphere of its radius at each end becomes a capsule. A mesh stays a surface of
+triangles; one that is closed and convex, or has a margin, becomes its hull. The export writes a mesh for each hull and
+surface, and a cylinder and two spheres for a capsule. The amount by which a hull has to be enlarged is written as
+``<collision margin="...">`` (m), which other readers ignore.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ import sys
 import tempfile
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
@@ -36,18 +36,18 @@ from typing import Protocol
 import numpy as np
 import scipy
 
-from er3a.collision.distances import cylinder_points
-from er3a.collision.meshes import ConvexPieces, hull_of, link_pieces
+from er3a.collision.convex import cylinder_points
+from er3a.collision.meshes import hull_corners, is_convex
 from er3a.collision.shapes import CORNERS
 from er3a.errors import Er3aError, InputError
-from er3a.formats.mesh_file import read_link_mesh, read_link_vertices, read_text
+from er3a.formats.mesh_file import read_link_mesh, read_text
 from er3a.formats.xacro_expansion import FOLDERS_UP, packages_near
 from er3a.geometry.transforms import rpy_of, transform, translation
 from er3a.kinematics.forward import frames
 from er3a.numerics.arrays import Integers, Reals
 from er3a.numerics.si_units import limit_in_degrees
 from er3a.robots.masses import Drives, LinkMass, MassBody, Masses, NoBody, moved, nearest_body, no_body, together
-from er3a.robots.robot import ConvexPiece, Envelope, Robot
+from er3a.robots.robot import ConvexPiece, Envelope, LinkMesh, Robot
 
 MOVING = ("revolute", "continuous", "prismatic")
 FREE = ("floating", "planar")
@@ -656,9 +656,7 @@ def _triple(origin: ElementTree.Element | None, key: str) -> Reals:
 PRISM_SIDES = 24
 SMALLEST_SPHERE_M = 0.002
 SAME_M = 1e-6  # to which a sphere's centre and radius are those of a cylinder's end
-SEED = 0
-
-Split = Callable[[Path], object]
+Shape = Envelope | ConvexPiece | LinkMesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -675,8 +673,7 @@ def collision_shapes(
     collision: ElementTree.Element,
     place: tuple[Reals, int],
     notes: list[str],
-    split: Split | None,
-) -> list[Envelope | ConvexPiece | CylinderOfLink]:
+) -> list[Shape | CylinderOfLink]:
     """Shapes of one ``<collision>``.
 
     Parameters
@@ -684,7 +681,6 @@ def collision_shapes(
     name : of its link in the URDF
     place : (4, 4), from the URDF link's frame to that of our link, and the number of that link
     notes : gets what was assumed or left out
-    split : gets each mesh before it is split into convex pieces; None takes hulls
 
     Raises
     ------
@@ -700,11 +696,11 @@ def collision_shapes(
     core = None
     match shape.tag if shape is not None else "":
         case "box":
-            pieces = ConvexPieces((CORNERS * _sizes(path, where, shape),), 0.0, 0.0)
+            corners = CORNERS * _sizes(path, where, shape)
         case "cylinder":
             radius, length = _sizes(path, where, shape).tolist()
             ends = np.array([[0, 0, -length / 2], [0, 0, length / 2]])
-            pieces = ConvexPieces((cylinder_points(ends, radius, PRISM_SIDES),), 0.0, 0.0)
+            corners = cylinder_points(ends, radius, PRISM_SIDES)
             core = ends @ T[:3, :3].T + T[:3, 3]
         case "sphere":
             x, y, z = T[:3, 3].tolist()
@@ -715,21 +711,23 @@ def collision_shapes(
                 )
             return [Envelope(link, (x, y, z), (x, y, z), max(radius, SMALLEST_SPHERE_M))]
         case "mesh":
-            found = _mesh(path, where, shape, notes, split)
-            if found is None:
+            mesh = _mesh(path, where, shape, notes)
+            if mesh is None:
                 return []
-            pieces = found
+            corners, faces, closed = mesh
+            if not ("margin" in collision.attrib or (closed and is_convex(corners, faces))):
+                return [LinkMesh(link, corners @ T[:3, :3].T + T[:3, 3], faces)]
+            corners = hull_corners(corners)
         case tag:
             notes.append(f"{where}: <{tag}> is not a shape that er3a reads; it is left out")
             return []
-    placed = (piece @ T[:3, :3].T + T[:3, 3] for piece in pieces.pieces)
+    corners = corners @ T[:3, :3].T + T[:3, 3]
     stated = float(_numbers(path, where, collision, "margin", None)[0]) if "margin" in collision.attrib else 0.0
-    margin = pieces.uncovered + max(stated, 0.0)
-    made = [ConvexPiece(link, tuple((x, y, z) for x, y, z in piece.tolist()), margin) for piece in placed]
+    made = ConvexPiece(link, tuple((x, y, z) for x, y, z in corners.tolist()), max(stated, 0.0))
     if core is None:
-        return [*made]
+        return [made]
     start, end = ((x, y, z) for x, y, z in core.tolist())
-    return [CylinderOfLink(made[0], Envelope(link, start, end, radius))]
+    return [CylinderOfLink(made, Envelope(link, start, end, radius))]
 
 
 def visual_surface(path: Path, name: str, visual: ElementTree.Element) -> tuple[Reals, Integers]:
@@ -761,9 +759,9 @@ def visual_surface(path: Path, name: str, visual: ElementTree.Element) -> tuple[
     return np.asarray(made.vertices, float), np.asarray(made.faces, np.int64)
 
 
-def with_capsules(shapes: Sequence[Envelope | ConvexPiece | CylinderOfLink]) -> list[Envelope | ConvexPiece]:
+def with_capsules(shapes: Sequence[Shape | CylinderOfLink]) -> list[Shape]:
     """The shapes of one link, each cylinder as a prism, or as its capsule if a sphere of its radius is at each end."""
-    found, at_ends = list[Envelope | ConvexPiece](), set[int]()
+    found, at_ends = list[Shape](), set[int]()
     for shape in shapes:
         if isinstance(shape, CylinderOfLink):
             capsule = shape.capsule
@@ -775,9 +773,7 @@ def with_capsules(shapes: Sequence[Envelope | ConvexPiece | CylinderOfLink]) -> 
     return [shape for shape in found if id(shape) not in at_ends]
 
 
-def _balls(
-    shapes: Sequence[Envelope | ConvexPiece | CylinderOfLink], end: Sequence[float], radius: float
-) -> list[Envelope]:
+def _balls(shapes: Sequence[Shape | CylinderOfLink], end: Sequence[float], radius: float) -> list[Envelope]:
     wanted = (*end, radius)
     balls = [each for each in shapes if isinstance(each, Envelope)]
     return [ball for ball in balls if np.abs(np.subtract((*ball.start, ball.radius), wanted)).max() <= SAME_M]
@@ -788,7 +784,7 @@ def write_shapes(robot: Robot, names: Sequence[str], root: ElementTree.Element, 
 
     Parameters
     ----------
-    meshes : folder beside the URDF that gets an OBJ for each convex piece; None leaves the pieces out
+    meshes : folder beside the URDF that gets an OBJ for each convex piece and surface; None leaves them out
     """
     elements = {link.get("name"): link for link in root.findall("link")}
     for capsule in robot.envelopes:
@@ -803,12 +799,16 @@ def write_shapes(robot: Robot, names: Sequence[str], root: ElementTree.Element, 
             _geometry(link, "collision", T, "cylinder", radius=repr(capsule.radius), length=repr(length))
     if meshes is None:
         return
-    if robot.hulls or robot.visuals:
+    if robot.hulls or robot.meshes or robot.visuals:
         meshes.mkdir(parents=True, exist_ok=True)
     for visual in robot.visuals:
         file = meshes / f"{names[visual.link]}_visual.obj"
         file.write_text(_obj(_in_link(robot, visual.link, visual.points), visual.faces), encoding="utf-8")
         _geometry(elements[names[visual.link]], "visual", np.eye(4), "mesh", filename=f"{meshes.name}/{file.name}")
+    for mesh in robot.meshes:
+        file = meshes / f"{names[mesh.link]}_surface.obj"
+        file.write_text(_obj(_in_link(robot, mesh.link, mesh.points), mesh.faces), encoding="utf-8")
+        _geometry(elements[names[mesh.link]], "collision", np.eye(4), "mesh", filename=f"{meshes.name}/{file.name}")
     for number, piece in enumerate(robot.hulls, start=1):
         file = meshes / f"{names[piece.link]}_{number}.obj"
         points = _in_link(robot, piece.link, piece.points)
@@ -864,35 +864,19 @@ def _sizes(path: Path, where: str, shape: ElementTree.Element | None) -> Reals:
 
 
 def _mesh(
-    path: Path, where: str, shape: ElementTree.Element | None, notes: list[str], split: Split | None
-) -> ConvexPieces | None:
+    path: Path, where: str, shape: ElementTree.Element | None, notes: list[str]
+) -> tuple[Reals, Integers, bool] | None:
+    """The triangles of a mesh as the file gives them, see :func:`read_link_mesh`; None where there are none."""
     name = shape.get("filename", "") if shape is not None else ""
     file = mesh_of(path, name)
     if file is None:
         notes.append(f"{where}: the mesh {name} was not found; the link has no shape of it")
         return None
-    scale = _numbers(path, where, shape, "scale", (1.0, 1.0, 1.0))
-    if split is not None:
-        split(file)
-        try:
-            found = link_pieces(*read_link_mesh(file, scale), SEED)
-            notes.append(_quality(f"{where}: {file.name}", found))
-            return found
-        except Er3aError as error:
-            notes.append(f"{where}: the hull of {file.name} is taken ({error})")
     try:
-        return hull_of(read_link_vertices(file, scale))
+        return read_link_mesh(file, _numbers(path, where, shape, "scale", (1.0, 1.0, 1.0)))
     except Er3aError as error:
         notes.append(f"{where}: {error}; the link has no shape of it")
         return None
-
-
-def _quality(mesh: str, found: ConvexPieces) -> str:
-    """How well convex pieces represent a mesh."""
-    if len(found.pieces) == 1:
-        return f"{mesh} fills its hull but for a tenth at most; the hull is taken"
-    away = 1000 * found.uncovered
-    return f"{mesh} is split into {len(found.pieces)} convex pieces, taken larger by {away:.1f} mm so that they hold it"
 
 
 def mesh_of(path: Path, name: str) -> Path | None:

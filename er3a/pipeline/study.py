@@ -244,7 +244,7 @@ class StudyBase(InputFile):
         """The files that a stage, or the teach panel, reads for a robot."""
         more = REGISTRY[stage].inputs(self, name) if stage in REGISTRY else self.scenes(name, "trajectory")
         robot = self.robot_file(name)
-        return [robot, *pieces_named_in(robot), *more]
+        return [robot, *shapes_named_in(robot), *more]
 
     def inputs_digest(self, name: str, stage: str) -> str:
         """One checksum of the files that a stage reads for a robot, by their names and contents."""
@@ -306,7 +306,7 @@ class StudyBase(InputFile):
     def scenes(self, name: str, stage: str) -> list[Path]:
         """The file of :meth:`scene`, and those of convex pieces that it names; empty in open space."""
         scene = self.scene_file(name, stage)
-        return [scene, *pieces_named_in(scene)] if scene else []
+        return [scene, *shapes_named_in(scene)] if scene else []
 
     def scene(self, name: str, stage: str) -> Scene | None:
         """The solids that a robot may not touch in a stage; None in open space."""
@@ -319,17 +319,19 @@ class StudyBase(InputFile):
         return Path(scene) if scene else None
 
 
-def pieces_named_in(path: Path) -> list[Path]:
-    """Files of convex pieces that a robot or scene file names; the file itself is checked elsewhere."""
+def shapes_named_in(path: Path) -> list[Path]:
+    """Files of shapes that a robot or scene file names; the file itself is checked elsewhere."""
 
-    def named(part: Any) -> Iterator[str]:
+    def named(part: Any) -> Iterator[Path]:
         if isinstance(part, dict) and isinstance(part.get("pieces"), str):
-            yield part["pieces"]
+            yield Path(part["pieces"])
+        if isinstance(part, dict) and isinstance(part.get("stl"), str):
+            yield path.parent / part["stl"]
         for inner in part.values() if isinstance(part, dict) else part if isinstance(part, list) else ():
             yield from named(inner)
 
     try:
-        return [Path(file) for file in dict.fromkeys(named(read_yaml(path)))]
+        return list(dict.fromkeys(named(read_yaml(path))))
     except InputError:
         return []
 

@@ -500,7 +500,7 @@ def zone_clearance(
         bent, lasting = (bend, bend) if patch is None else patch.bend(at, triangle)
         proven = bool(np.isfinite(bent).all())
         off = per_joint @ bent if proven else np.full(len(every), np.inf)
-        distances = bodies.counted(bodies.distances(bodies.ends(middle), every))
+        distances = bodies.counted(bodies.distances(middle, every))
         measured += 1
         worst = int(np.argmin(distances))
         nearest = min(nearest, float(distances[worst]))
@@ -972,7 +972,7 @@ class StepChecker:
         clearance = None
         if self.obstacles is not None:
             bodies, margin = self.obstacles.of(arm), self.obstacles.assumed_margin
-            distances = bodies.counted(bodies.distances(bodies.ends(q), np.arange(len(bodies.pairs))))
+            distances = bodies.counted(bodies.distances(q, np.arange(len(bodies.pairs))))
             nearest = int(distances.argmin()) if len(distances) else -1
             clearance = float(distances[nearest]) if nearest >= 0 and np.isfinite(distances[nearest]) else None
             touching = np.flatnonzero(distances < 0)

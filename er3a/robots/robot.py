@@ -103,11 +103,8 @@ def _keep_shape(shape: Envelope | ConvexPiece, size: Literal["radius", "margin"]
 
 
 @dataclass(frozen=True, eq=False)
-class Visual(ByValue):
-    """How a link looks: points (k, 3), m, in the frame as of :class:`Envelope`, and triangles (f, 3) of them.
-
-    For pictures, and to check whether a link extends beyond its shapes.
-    """
+class LinkMesh(ByValue):
+    """A surface of a link: points (k, 3), m, in the frame as of :class:`Envelope`, and triangles (f, 3) of them."""
 
     link: int
     points: Reals
@@ -157,8 +154,10 @@ class Robot(ByValue, Displayed):
         References, and joint values without a tool, refer to it. The identity if the table ends at the flange
     zero_pose : description of the arm at q = 0
     references : names of the reference sets (folders of data/manual_refs) for its validation
-    envelopes, hulls : capsules around the links, and convex pieces; both empty if the file gives none
-    visuals : visual meshes of the links, if given; not used in comparisons of robots
+    envelopes, hulls, meshes : shapes of the links for collisions: capsules, convex pieces, and surfaces of triangles;
+        all empty if the file gives none
+    visuals : how the links look, if given, for pictures, and to check whether a link extends beyond its shapes; not
+        used in comparisons of robots
     pair_rules : pairs of links that the robot file allows, or requires to be checked
     masses : of links, and the limits of drives and wrist, as far as known
     derived : what :func:`er3a.robots.robot.derived` keeps of this robot
@@ -197,7 +196,8 @@ class Robot(ByValue, Displayed):
     continuous: Flags = field(default_factory=lambda: np.empty(0, dtype=bool))
     combined: tuple[CombinedLimit, ...] = ()
     hulls: tuple[ConvexPiece, ...] = ()
-    visuals: tuple[Visual, ...] = field(default=(), compare=False)
+    meshes: tuple[LinkMesh, ...] = ()
+    visuals: tuple[LinkMesh, ...] = field(default=(), compare=False)
     pair_rules: tuple[PairRule, ...] = ()
     masses: Masses = field(default_factory=Masses)
     sources: Mapping[str, Source] = field(default_factory=dict)
@@ -228,7 +228,8 @@ class Robot(ByValue, Displayed):
             raise RobotError(self.name, f"direction of joint {wrong[0] + 1} is {value:g}; expected 1 or -1")
         if (endless := np.flatnonzero(self.continuous & self.slides)).size:
             raise RobotError(self.name, f"joint {endless[0] + 1} slides and is continuous; give it limits")
-        for link in {capsule.link for capsule in self.envelopes} | {piece.link for piece in self.hulls}:
+        shapes: tuple[Envelope | ConvexPiece | LinkMesh, ...] = (*self.envelopes, *self.hulls, *self.meshes)
+        for link in {shape.link for shape in shapes}:
             if link > rows:
                 raise RobotError(self.name, f"a shape belongs to link {link}; the arm has links 0 to {rows}")
         for limit in self.combined:

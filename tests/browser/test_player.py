@@ -17,7 +17,7 @@ from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion
 from er3a.pipeline.player.player import drawing_head, moment, player, stretch
 from er3a.pipeline.results import Provenance
 from er3a.pipeline.viewing.page import render
-from er3a.robots.robot import Visual
+from er3a.robots.robot import LinkMesh
 from testing import chromium
 from testing.small_study import ROOT
 
@@ -323,7 +323,9 @@ def test_what_is_played_is_framed(page):
 def test_an_arm_with_meshes_is_drawn_as_them_as_the_shapes_checked_or_as_both(browser, tmp_path):
     corners = np.array([[x, y, z] for x in (0, 0.1) for y in (0, 0.1) for z in (0, 0.4)])
     robot = load_robot("er3a_c60")
-    written(tmp_path, player(robot.replace(visuals=(Visual(2, corners, ConvexHull(corners).simplices),)), [bow(robot)]))
+    written(
+        tmp_path, player(robot.replace(visuals=(LinkMesh(2, corners, ConvexHull(corners).simplices),)), [bow(robot)])
+    )
     browser.get((tmp_path / "page.html").as_uri())
     WebDriverWait(browser, 10).until(lambda _: clock(browser))
     pictures = set()

@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from er3a.collision.bodies import Bodies
-from er3a.collision.distances import RIM
+from er3a.collision.convex import RIM
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward, frames, jacobian
@@ -209,8 +209,6 @@ def test_the_least_distance_is_python_s(page, name, scene, random):
     assert (distance - least).min() > -1e-6
     assert (distance - least).max() < rim + 1e-6
     for k in np.flatnonzero(least > 1e-3):
-        assert bodies.distances(bodies.ends(q[k]), np.array([found[k]["number"]]))[0] == pytest.approx(
-            least[k], abs=1e-8
-        )
+        assert bodies.distances(q[k], np.array([found[k]["number"]]))[0] == pytest.approx(least[k], abs=1e-8)
         ends = np.array([found[k]["from"], found[k]["to"]])
         assert np.linalg.norm(ends[1] - ends[0]) == pytest.approx(least[k], abs=1e-8)

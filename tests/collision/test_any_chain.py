@@ -131,7 +131,7 @@ def test_distances_are_those_of_coal(robot, seed):
     every = np.flatnonzero(~bodies.joined)
     for row in q:
         expected = coal_least(robot, bodies, scene, row)
-        found = float(bodies.distances(bodies.ends(row), every).min())
+        found = float(bodies.distances(row, every).min())
         assert (found < 0) == (expected < 0) or abs(found - expected) < 1e-5
         assert found < 0 or abs(found - expected) < 1e-5
         assert bodies.joined.any() or bool(bodies.free(row[None])[0]) == (found >= 0)
@@ -174,7 +174,7 @@ def test_moves_that_are_proven_free_touch_nothing_in_between(robot, seed):
     for start, end in zip(middle - reach, middle + reach):
         q = start + np.linspace(0, 1, POINTS)[:, None] * (end - start)
         every = np.arange(len(bodies.pairs))
-        least = min(float(bodies.distances(bodies.ends(row), every).min()) for row in q[::8])
+        least = min(float(bodies.distances(row, every).min()) for row in q[::8])
         state = free_between(bodies.layout, start, end, DEPTH, 3000)[0]
         assert state != FREE or (bodies.free(q).all() and least >= 0)
 
@@ -186,7 +186,7 @@ def test_moves_that_are_proven_free_touch_nothing_in_between(robot, seed):
 
         t = np.linspace(0, 1, 5)
         along = clearance_along(bodies, joints, rates, t, t, DEPTH)
-        deepest = float(bodies.counted(np.array([bodies.distances(bodies.ends(row), every) for row in q[::8]])).min())
+        deepest = float(bodies.counted(np.array([bodies.distances(row, every) for row in q[::8]])).min())
         if deepest < -DEPTH:
             assert along.contacts
         elif np.isfinite(deepest):

@@ -446,18 +446,6 @@ def test_a_urdf_without_shapes_is_said_to_have_guessed_ones(tmp_path):
         assert any("capsules are guessed" in note for note in arm_of(file, None, None).notes) == told
 
 
-@pytest.mark.long
-def test_meshes_are_split_where_that_is_asked_for(xacro):
-    whole, parts = (arm_of(xacro, None, None, xacro=("mesh:=ring.stl",), split=split).robot for split in (False, True))
-    hull, pieces = (
-        [piece for piece in one if piece not in other]
-        for one, other in ((whole.hulls, parts.hulls), (parts.hulls, whole.hulls))
-    )
-    assert len(hull) == 1
-    assert len(pieces) > 3
-    assert not any(np.linalg.norm(np.mean(piece.points, axis=0)[:2]) < 0.03 for piece in pieces)
-
-
 @pytest.mark.parametrize(
     ("words", "told"),
     [
@@ -467,7 +455,6 @@ def test_meshes_are_split_where_that_is_asked_for(xacro):
         (("--robot", "er3_600", "--name", "Arm"), "can't be a robot's name"),
         (("--robot", "er3_600", "--convention", "modified"), "say how a table is meant"),
         (("--urdf", "nowhere.urdf"), "there is no such file"),
-        (("--robot", "er3_600", "--split"), "say how a URDF is read"),
         (("--dh", "x.csv", "--xacro", "a:=b"), "say how a URDF is read"),
     ],
 )

@@ -540,7 +540,7 @@ def test_pairs_of_bodies_are_named_in_the_order_in_which_they_touch(tmp_path):
     (motion,) = found.motions.values()
     bodies = Bodies(ROBOT.replace(tool=motion.placed.arm.tool), TABLE)
     t = np.linspace(0, motion.way.law.duration, 4001)
-    distances = np.array([bodies.distances(bodies.ends(q), np.arange(len(bodies.pairs))) for q in motion.way.joints(t)])
+    distances = np.array([bodies.distances(q, np.arange(len(bodies.pairs))) for q in motion.way.joints(t)])
     first = {}
     for k, pair in enumerate(bodies.pairs):
         if (distances[:, k] <= 0).any():

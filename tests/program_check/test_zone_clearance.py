@@ -57,7 +57,7 @@ def test_two_links_come_nearer_by_no_more_than_the_joints_between_them_allow():
     first = joints(rng, 200)
     second = first + rng.uniform(-0.3, 0.3, first.shape)
     every = np.arange(len(BODIES.pairs))
-    distances = [np.array([BODIES.distances(BODIES.ends(q), every) for q in both]) for both in (first, second)]
+    distances = [np.array([BODIES.distances(q, every) for q in both]) for both in (first, second)]
     bound = (pair_levers(BODIES, first) @ np.abs(second - first).T).T
     apart = (distances[0] > 0) & (distances[1] > 0)
     assert (np.abs(distances[1] - distances[0])[apart] <= bound[apart] + 1e-9).all()
@@ -72,7 +72,7 @@ def test_no_overlap_of_a_triangle_goes_unnoticed(seed, margin):
         found = zone_clearance(BODIES, corners, 0.001, margin=margin)
         told.add(type(found))
         shares = rng.dirichlet(np.ones(3), 300)
-        least = min(BODIES.counted(BODIES.distances(BODIES.ends(q), every)).min() for q in shares @ corners)
+        least = min(BODIES.counted(BODIES.distances(q, every)).min() for q in shares @ corners)
         if found is None:
             assert least >= margin - 0.001
         elif isinstance(found, ZoneCollides):
@@ -129,7 +129,7 @@ def test_no_overlap_of_a_way_between_two_lines_goes_unnoticed(seed, turn):
                 assert len(solved), "a way that is proven is reached"
             if len(solved):
                 near = solved[np.abs(solved - q).max(axis=1).argmin()]
-                least = min(least, BODIES.counted(BODIES.distances(BODIES.ends(near), every)).min())
+                least = min(least, BODIES.counted(BODIES.distances(near, every)).min())
         if found is None:
             assert least >= -0.001
         elif isinstance(found, ZoneNotSettled):

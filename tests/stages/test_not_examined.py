@@ -70,7 +70,7 @@ from er3a.pipeline.stages.workspace.model import CapabilityMissing
 from er3a.pipeline.study import Study, load_study
 from er3a.pipeline.viewing.conditions import program_head
 from er3a.references.rows import GROUPS
-from er3a.robots.robot import ConvexPiece, Envelope, PairRule, Robot, Visual
+from er3a.robots.robot import ConvexPiece, Envelope, LinkMesh, PairRule, Robot
 
 ROBOT = "er3a_c60"
 
@@ -980,7 +980,7 @@ def test_how_near_joined_pairs_come_in_the_poses_told_of_is_measured():
     bodies = bodies_of(robot, None)
     q = np.radians([[0, 0, 0, 0, -20, 0], [0, 0, -40, 0, -20, 0], [0, 0, -100, 0, -20, 0], [np.nan] * 6])
     joined = np.flatnonzero(bodies.joined)
-    apart = np.array([bodies.distances(bodies.ends(each), joined) for each in q[:3]])
+    apart = np.array([bodies.distances(each, joined) for each in q[:3]])
     assert (apart.min(axis=1) < 0).tolist() == [False, False, True]
     (left,) = (
         each
@@ -1016,7 +1016,7 @@ def test_links_that_no_clearance_counts_until_they_overlap_are_named():
         "Clearance does not count these until they overlap: base and link 2, link 2 and link 4, link 4 and link 6."
     )
     q = np.radians(np.linspace([0, 0, -40, 0, -20, 0], [0, 0, -64, 0, -20, 0], 200))
-    apart = np.array([bodies.distances(bodies.ends(each), np.arange(len(bodies.pairs))) for each in q])
+    apart = np.array([bodies.distances(each, np.arange(len(bodies.pairs))) for each in q])
     of_them = apart[:, [pair.label in bodies.unmeasured for pair in bodies.pairs]].min(axis=1)
     just_clear = of_them > 0
     assert just_clear.any()
@@ -1167,7 +1167,7 @@ def test_what_a_path_leaves_open_is_named(tmp_path, arm, given, status, named):
 )
 def test_a_link_that_looks_larger_than_its_shapes_is_named(link, farthest, reaches_out):
     """Link 5 has none, and lies in the end of link 4, 44 mm thick about its axis; link 2 is 54 mm thick."""
-    tip = Visual(link, np.array([[0, 0, farthest], [0.01, 0, 0], [0, 0.01, 0]]), np.array([[0, 1, 2]]))
+    tip = LinkMesh(link, np.array([[0, 0, farthest], [0.01, 0, 0], [0, 0.01, 0]]), np.array([[0, 1, 2]]))
     robot = load_robot(ROBOT)
     seen = robot.replace(visuals=(tip,))
     assert (link in arm_shapes(seen).uncovered) == reaches_out

@@ -160,7 +160,7 @@ def test_a_path_that_ends_where_its_advice_says_keeps_the_margin(tmp_path, name)
     for tau in np.linspace(0.0, stop, 20):  # each joint brakes by itself
         during = np.minimum(tau, np.abs(rates) / brakes)
         q = path.clear_until.q_deg + rates * during - np.sign(rates) * brakes * during**2 / 2
-        assert 1000 * bodies.distances(bodies.ends(np.radians(q)), pairs).min() >= path.clear_until.margin_mm - 0.1
+        assert 1000 * bodies.distances(np.radians(q), pairs).min() >= path.clear_until.margin_mm - 0.1
     xyz, rpy = re.search(r"x, y, z = (.*?) mm and roll, pitch, yaw = (.*?) deg", advice(path)).groups()
     end = {"xyz_mm": [float(x) for x in xyz.split(", ")], "rpy_deg": [float(x) for x in rpy.split(", ")]}
     shapes = results.summary.verdict.shapes

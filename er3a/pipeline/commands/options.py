@@ -93,9 +93,6 @@ AnyRobot = Annotated[str, typer.Argument(metavar="ROBOT", help="a robot's name o
 StudyFile = Annotated[Path, typer.Option("--study", envvar="ER3A_STUDY", help="the study file")]
 Results = Annotated[Path, typer.Option(help="folder of the results")]
 Reports = Annotated[Path, typer.Option(help="folder of the reports")]
-Split = Annotated[
-    bool, typer.Option(help="split the URDF's collision meshes into convex pieces (default: convex hulls)")
-]
 Xacro = Annotated[list[str] | None, typer.Option(metavar="NAME:=VALUE", help="a xacro argument; can be repeated")]
 AsJson = Annotated[bool, typer.Option("--json", help="print JSON")]
 

@@ -48,7 +48,6 @@ def import_urdf(
         Path | None, typer.Option(help="also write the URDF's data as a reference set into this new folder")
     ] = None,
     snap: Annotated[bool, typer.Option(help="round angles within 1e-4 rad of a right angle, with a note")] = False,
-    split: options.Split = False,
     xacro: options.Xacro = None,
     as_json: options.AsJson = False,
 ):
@@ -59,9 +58,8 @@ def import_urdf(
     from er3a.formats.urdf_tree import plain_urdf
     from er3a.robots.robot import robot_name
 
-    with shown_work(f"{file}: reading the arm") as at, plain_urdf(file, xacro or ()) as plain:
-        shown = split and (lambda mesh: at(f"{mesh}: splitting into convex pieces"))
-        imported = read_urdf(plain, base=base, tip=tip, snap=snap, split=shown)
+    with shown_work(f"{file}: reading the arm"), plain_urdf(file, xacro or ()) as plain:
+        imported = read_urdf(plain, base=base, tip=tip, snap=snap)
         if references:
             write_urdf_references(plain, references, base=base, tip=tip)
     name = robot_name(output)
@@ -131,7 +129,7 @@ def import_calibration(
 
     nominal = load_robot(robot)
     found = load_factory_calibration(file, nominal)
-    if nominal.envelopes or nominal.hulls or nominal.references or nominal.masses != found.masses:
+    if nominal.envelopes or nominal.hulls or nominal.meshes or nominal.references or nominal.masses != found.masses:
         options.print_note(f"{output}: without shapes, masses and references of {robot}: they belong to its own table")
     write_robot(found.replace(name=output.stem, title=f"{found.title}, as calibrated by its factory"), output)
     print(f"{output}: written")

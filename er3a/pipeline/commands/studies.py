@@ -32,7 +32,6 @@ def new(
     xacro: options.Xacro = None,
     base: Annotated[str | None, typer.Option(help="the link of the URDF at which the arm begins")] = None,
     tip: Annotated[str | None, typer.Option(help="the link of the URDF at which the arm ends")] = None,
-    split: options.Split = False,
     dh: Annotated[Path | None, typer.Option(help="the arm, as a CSV table: joint, a_mm, alpha_deg, d_mm ...")] = None,
     robot: Annotated[str | None, typer.Option(help="the arm, as the name or file of an er3a robot")] = None,
     name: Annotated[str | None, typer.Option(help="the robot's name in the study (default: the file's name)")] = None,
@@ -51,9 +50,8 @@ def new(
 
     ends, arguments = (base, tip), tuple(xacro or ())
     with shown_work(f"{folder}: reading the arm") as at:
-        shown = split and (lambda mesh: at(f"{mesh}: splitting into convex pieces"))
         form: Any = {"convention": convention, "length_unit": length_unit, "angle_unit": angle_unit}
-        arm = arm_of(urdf, dh, robot, name=name, ends=ends, xacro=arguments, split=shown, **form)
+        arm = arm_of(urdf, dh, robot, name=name, ends=ends, xacro=arguments, **form)
         at(f"{folder}: searching for targets and paths that the arm can do")
         written = write_study(arm, folder)
     for note in (*arm.notes, *written.missing):

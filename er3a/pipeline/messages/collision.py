@@ -69,9 +69,8 @@ TEXTS = texts(
         "collision.shapes_overlap": (
             "The shapes of {pairs} overlap in every joint vector tried ({count}), which no joint between them "
             "explains: an error of the shapes, not of the arm. Correct their size, unit or placement in the robot's "
-            "file, or allow the pair there with a reason. Where a hull fills a bent or hollow link, importing the URDF "
-            "with --split takes convex pieces. Of the rest of the shapes, {percent:.1f} % of the joint space is "
-            "collision-free."
+            "file, or allow the pair there with a reason. Of the rest of the shapes, {percent:.1f} % of the joint "
+            "space is collision-free."
         ),
         "collision.base_in_solid": (
             "The base is inside {own_name} at every joint vector: correct the scene or the position of the base."

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain, combinations, islice, product
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import jinja2
 import numpy as np
@@ -31,13 +31,13 @@ from er3a.files.path_file import PathFile, ProgramPath
 from er3a.files.reference_sets import FORMATS, reference_folder
 from er3a.files.robot_file import NAME_PATTERN, RobotFile
 from er3a.files.robot_library import read_robot, robot_of, robot_path
-from er3a.files.robot_writer import robot_file, robot_text, yaml_text
+from er3a.files.robot_writer import robot_file, robot_text, surface_files, yaml_text
 from er3a.files.scene_file import SceneFile
 from er3a.files.target_file import TargetEntry
 from er3a.files.yaml_file import parse, read_yaml
 from er3a.formats.mesh_file import read_text
 from er3a.formats.urdf import import_urdf
-from er3a.formats.urdf_tree import Split, plain_urdf
+from er3a.formats.urdf_tree import plain_urdf
 from er3a.geometry.transforms import rpy_of
 from er3a.kinematics.by_class import arm_solver
 from er3a.kinematics.classes.chain_solvers import Unsolved
@@ -129,7 +129,8 @@ def _foot_of(robot: Robot) -> float:
     """Height (m) on which the arm stands: of the base's frame, or where the base goes deeper."""
     shapes = arm_shapes(robot)
     lines = [point for each in shapes.capsules if each.link == 0 for point in (each.start, each.end)]
-    points = [(0.0, 0.0, 0.0), *lines, *(point for each in shapes.pieces if each.link == 0 for point in each.points)]
+    solids = (*shapes.pieces, *shapes.meshes)
+    points = [(0.0, 0.0, 0.0), *lines, *(point for each in solids if each.link == 0 for point in each.points)]
     heights: Reals = np.array(points) @ robot.base[2, :3] + robot.base[2, 3]
     return float(heights.min())
 
@@ -435,14 +436,12 @@ class Arm:
     ----------
     text : of the robot file
     notes : what was assumed about it, in words
-    meshes : what links have as shapes of their meshes, if any
     references : texts of the files of its reference sets, by their place in the study
     """
 
     robot: Robot
     text: str
     notes: tuple[str, ...] = ()
-    meshes: Literal["hulls", "pieces"] | None = None
     references: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -457,7 +456,6 @@ def arm_of(
     angle_unit: AngleUnit | None = None,
     ends: tuple[str | None, str | None] = (None, None),
     xacro: Sequence[str] = (),
-    split: bool | Split = False,
 ) -> Arm:
     """The arm that exactly one of a URDF, a D-H table and a robot's name or file describes.
 
@@ -467,8 +465,6 @@ def arm_of(
     convention, length_unit, angle_unit : of the D-H table, where its columns don't say; "standard" if None
     ends : the URDF's links at which the arm begins and ends, where the file leaves a choice
     xacro : arguments ``NAME:=VALUE`` of a URDF that is xacro
-    split : whether collision meshes of a URDF are split into convex pieces (a function gets each before that); else
-        their hulls are taken
 
     Raises
     ------
@@ -484,11 +480,11 @@ def arm_of(
         raise Er3aError(f"--name '{name}' can't be a robot's name: {allowed}")
     if dh is None and (convention, length_unit, angle_unit) != (None, None, None):
         raise Er3aError("--convention, --length-unit and --angle-unit say how a table is meant; give them with --dh")
-    if urdf is None and (ends != (None, None) or xacro or split):
-        raise Er3aError("--base, --tip, --xacro and --split say how a URDF is read; give them with --urdf")
+    if urdf is None and (ends != (None, None) or xacro):
+        raise Er3aError("--base, --tip and --xacro say how a URDF is read; give them with --urdf")
     if urdf is not None:
         with plain_urdf(urdf, xacro) as file:
-            return _from_urdf(file, name or robot_name(file), ends, split)
+            return _from_urdf(file, name or robot_name(file), ends)
     if dh is not None:
         units: Any = {"length_unit": length_unit, "angle_unit": angle_unit}
         content, notes = read_dh_table(dh, name or robot_name(dh), convention or "standard", **units)
@@ -496,16 +492,15 @@ def arm_of(
     return _known(str(robot), name)
 
 
-def _from_urdf(path: Path, name: str, ends: tuple[str | None, str | None], split: bool | Split) -> Arm:
-    imported = import_urdf(path, base=ends[0], tip=ends[1], snap=True, split=split)
+def _from_urdf(path: Path, name: str, ends: tuple[str | None, str | None]) -> Arm:
+    imported = import_urdf(path, base=ends[0], tip=ends[1], snap=True)
     robot = imported.robot.replace(name=name)
     content = robot_file(robot, path)
     misfit = f"the table's flange differs from the URDF's by at most {imported.misfit_m * 1000:.2g} mm on random poses"
     notes = [*imported.notes, misfit]
-    if not (robot.hulls or robot.envelopes):
+    if not arm_shapes(robot).given:
         notes.append("the URDF gives no collision shapes; capsules are guessed from the table's axes")
-    meshes: Literal["hulls", "pieces"] = "pieces" if split else "hulls"
-    return Arm(robot_of(content), _text(content), tuple(notes), meshes if robot.hulls else None)
+    return Arm(robot_of(content), _text(content), tuple(notes))
 
 
 def _known(robot: str, name: str | None) -> Arm:
@@ -613,6 +608,8 @@ def write_study(arm: Arm, folder: Path) -> WrittenStudy:
     texts |= {place: (ROOT / place).read_text(encoding="utf-8") for place in aids}
     for place, text in texts.items():
         write_atomically(folder / place, partial(Path.write_text, data=text, encoding="utf-8"))
+    for place, content in surface_files(arm.robot.meshes).items():
+        write_atomically(folder / "data" / "robots" / place, partial(Path.write_bytes, data=content))
     return WrittenStudy(
         tuple(folder / place for place in texts if place not in aids), found.shortcomings, found.missing
     )
@@ -654,18 +651,7 @@ def _unexamined(arm: Arm, search: TaskSearch) -> list[str]:
 
 def _remedy(arm: Arm) -> str:
     """What to do about shapes that overlap always."""
-    text = f"Correct the shapes, or allow the contact, in data/robots/{arm.robot.name}.yaml."
-    if arm.meshes == "hulls":
-        text += (
-            " The links have the hulls of their meshes as shapes, which fill what is bent or hollow: --split takes "
-            "convex pieces instead (minutes for fine meshes)."
-        )
-    if arm.meshes == "pieces":
-        text += (
-            " The links' meshes are split into convex pieces, taken larger by margins (see the notes) that may fill "
-            "the gap at a joint: without --split the hulls are taken, and what overlaps around a joint is left out."
-        )
-    return text
+    return f"Correct the shapes, or allow the contact, in data/robots/{arm.robot.name}.yaml."
 
 
 def _without_path(kind: str, search: TaskSearch) -> str:

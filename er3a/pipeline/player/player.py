@@ -14,6 +14,7 @@ import numpy as np
 import scipy
 from markupsafe import Markup
 
+from er3a.collision.meshes import simplified
 from er3a.collision.scene import Box, Cylinder, Plane, Scene, Solid, Sphere
 from er3a.collision.shapes import arm_shapes, hull_faces, solid_pieces
 from er3a.geometry.vectors import fibonacci_sphere
@@ -183,7 +184,7 @@ def drawn_size(robot: Robot) -> float:
 
 
 def drawn_shapes(robot: Robot) -> dict[str, list[dict[str, Any]]]:
-    """What an arm's links are drawn by: ``visuals``, how they look, and ``pieces``, the convex pieces of their meshes.
+    """What an arm's links are drawn by: ``visuals``, how they look, and ``pieces``, the convex pieces and surfaces.
 
     Beside visuals, the shapes that collisions are measured with are all among the pieces, capsules too.
     """
@@ -193,7 +194,8 @@ def drawn_shapes(robot: Robot) -> dict[str, list[dict[str, Any]]]:
         ball = each.radius * fibonacci_sphere(BALL)
         shapes.append((each.link, np.concatenate([ball + each.start, ball + each.end])))
     corners = max(MIN_CORNERS, MAX_FACES // (2 * len(shapes) or 1))
-    pieces = []
+    meshes = robot.meshes
+    pieces = [_drawn(each.link, *simplified(each.points, each.faces, MAX_FACES // len(meshes))) for each in meshes]
     for link, points in shapes:
         if len(points) > corners:
             points = points[np.unique((fibonacci_sphere(corners) @ points.T).argmax(axis=1))]

@@ -14,7 +14,8 @@ const byId = (id) => document.getElementById(id);
  * The nearest pair at frames `T` (of `frames`), or null where nothing can meet: `{pair, distance, from, to, deep}`, m,
  * with points on the bodies' surfaces. A pair that a joint joins counts only where it overlaps. `bodies` are those of
  * `bodyDistance`, each with its `link` (0 the base, k what row k moves, -1 the world), points in the link's frame;
- * `pairs` are `{bodies: [first, second], joined, text}`.
+ * `pairs` are `{bodies: [first, second], joined, hulls, text}`; with `hulls`, the points of a body are those of a hull
+ * around it, whose distance is at most the body's.
  */
 export function nearestPair({ bodies, pairs }, base, T) {
   const frame = (link) => (link ? T[link - 1] : base);
@@ -34,6 +35,7 @@ export function nearestPair({ bodies, pairs }, base, T) {
     if (best && apart >= best.distance) continue;
     const found = bodyDistance(bodies[i], placed(i), bodies[j], placed(j));
     if (pair.joined && found.distance >= 0) continue;
+    if (pair.hulls) found.distance = Math.max(found.distance, 0); // of surfaces the hulls around them: at least that
     if (!best || found.distance < best.distance) best = { pair, ...found };
   }
   if (!best) return null;
@@ -52,12 +54,12 @@ export class Clearance {
   /** What overlaps at frames `T`, in words; empty where nothing does. */
   overlap(T) {
     const found = nearestPair(this.clearance, this.table.base, T);
-    return found && found.distance <= 0 ? this.#described(found) : "";
+    return found && found.distance <= 0 && !found.pair.hulls ? this.#described(found) : "";
   }
 
   #described({ distance, deep, pair }) {
-    const words = this.clearance.assumed ? this.words.assumed : this.words;
-    const text = distance <= 0 ? (deep ? words.overlap_deep : words.overlap) : words.clearance_is;
+    const words = pair.hulls ? this.words.hulls : this.clearance.assumed ? this.words.assumed : this.words;
+    const text = distance <= 0 ? (deep && !pair.hulls ? words.overlap_deep : words.overlap) : words.clearance_is;
     const said = fill(text, { distance: inMillimetres(Math.abs(distance)), pair: pair.text });
     return distance > 0 && this.clearance.unmeasured ? `${said} ${this.clearance.unmeasured}` : said;
   }
@@ -73,7 +75,7 @@ export class Clearance {
       return null;
     }
     const { distance, deep, pair } = found;
-    const touching = distance <= 0;
+    const touching = distance <= 0 && !pair.hulls;
     element.dataset.state = touching ? "at" : distance < this.clearance.near ? "near" : "clear";
     write(element, this.#described(found));
     return { from: found.from, to: found.to, text: deep ? "" : inMillimetres(distance), touching: touching ? pair.names : [] };

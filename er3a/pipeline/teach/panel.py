@@ -263,6 +263,10 @@ WORDS: dict[str, Any] = {
         "overlap": N_("Collision of assumed shapes: {pair} overlap by {distance}."),
         "overlap_deep": N_("Collision of assumed shapes: {pair} overlap by {distance} or more."),
     },
+    "hulls": {
+        "clearance_is": N_("Clearance at least {distance}, by hulls around the surfaces: {pair}."),
+        "overlap": N_("Hulls around {pair} overlap: whether their surfaces do is not measured here."),
+    },
     "nothing_meets": N_("No bodies here can collide."),
 }
 
@@ -401,7 +405,13 @@ def clearance_data(robot: Robot, scene: Scene | None) -> dict[str, Any]:
             for b in range(len(layout.link))
         ],
         "pairs": [
-            {"bodies": [int(first), int(second)], "joined": bool(joined), "text": say(pair), "names": pair.names}
+            {
+                "bodies": [int(first), int(second)],
+                "joined": bool(joined),
+                "hulls": bool(max(layout.trees.root[[first, second]]) >= 0),
+                "text": say(pair),
+                "names": pair.names,
+            }
             for first, second, joined, pair in zip(layout.first, layout.second, layout.joined, found.pairs)
         ],
     }

@@ -22,7 +22,7 @@ from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.viewing.palette import BODY, JOINT_NAMES, LINK, legible, link_colour, rgb
 from er3a.pipeline.viewing.palette import JOINTS as JOINT_COLOURS
 from er3a.robots.joint_limits import size_of
-from er3a.robots.robot import Robot, Visual
+from er3a.robots.robot import LinkMesh, Robot
 
 TIMELINE = "t"
 ARM = "/arm/**"
@@ -134,7 +134,7 @@ def _moving_entities(robot: Robot, entity: str) -> list[str]:
     return [*(f"{entity}/link_{k + 1}" for k in range(robot.rows)), f"{entity}/tool"]
 
 
-def _log_visuals(stream: rr.RecordingStream, robot: Robot, visuals: Sequence[Visual], entity: str) -> None:
+def _log_visuals(stream: rr.RecordingStream, robot: Robot, visuals: Sequence[LinkMesh], entity: str) -> None:
     """How links look, and beside that, hidden until asked for, the shapes that collisions are measured with."""
     for each in visuals:
         surface = _mesh(each.points, each.faces, (*rgb(link_colour(each.link)), 255))
@@ -191,6 +191,9 @@ def capsules(
 
 def body_shape(body: Body, colour: tuple[int, ...], solid: bool = False) -> Shape:
     """A body of an arm, as a child of its link; ``colour`` with alpha."""
+    if body.tree is not None:
+        corners = body.tree.corner.reshape(-1, 3)
+        return _mesh(corners, np.arange(len(corners)).reshape(-1, 3), colour)
     if len(body.points) == 1:
         return rr.Ellipsoids3D(centers=body.points, radii=[body.radius], colors=[colour])
     if len(body.points) == 2:

@@ -273,7 +273,7 @@ def clear_until(
 
     def apart(t: Reals) -> Reals:
         """Distances (k, joined), m, at times (k,)."""
-        return np.array([bodies.distances(bodies.ends(q), joined) for q in motion.joints(t)])
+        return np.array([bodies.distances(q, joined) for q in motion.joints(t)])
 
     kept = np.minimum(margin, apart(np.zeros(1))[0] / 2) if joined.size else np.empty(0)
 

@@ -1,0 +1,455 @@
+"""Surfaces of triangles: trees of boxes around them, distances, and what lies inside closed ones, compiled.
+
+A tree halves the triangles of a surface along the longest side of their middles' box, until each box holds one
+triangle. Two surfaces are measured by descending both trees at once, the nearer boxes first; boxes that are farther
+apart than what was found are left out. The distance of two boxes is bounded from below by the box of one that holds
+the other, in either's axes [1]_. Two triangles are measured as convex cores, and so is a triangle with a convex body.
+
+A surface may consist of many shells. A point is inside if a ray from it crosses one of the closed shells an odd number
+of times. What does not cross a surface, but has a point of one of its shells inside, is inside as a whole.
+
+References
+----------
+.. [1] S. Gottschalk, M. C. Lin, D. Manocha, "OBBTree: a hierarchical structure for rapid interference detection",
+   SIGGRAPH (1996).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import scipy
+
+from er3a.by_value import ByValue
+from er3a.collision.convex import ROOM, TOUCHING, cores_distance
+from er3a.geometry.vectors import fibonacci_sphere
+from er3a.numerics.arrays import Integers, Reals
+from er3a.numerics.jit import inner_kernel, kernel
+
+WAITING = 128  # pairs of boxes that wait at one time; two trees of a million triangles are 40 levels deep
+SLANT_Y, SLANT_Z = 0.01374529, 0.02913857  # of the ray from a point, against x: along no edge that a drawing has
+
+
+@dataclass(frozen=True, eq=False)
+class TriangleTree(ByValue):
+    """A surface of F triangles with its tree of M boxes, in the frame of its link.
+
+    Attributes
+    ----------
+    box : (M, 2, 3), m, middle and half the edges of each box; the first holds all
+    child : (M, 2), the two boxes in a box; of the box of one triangle -1 and the triangle's number
+    corner : (F, 3, 3), m
+    shell : (F,), a number of the closed shell that a triangle belongs to, 0 for one that is not closed
+    probe : (S, 3), m, a point of each shell
+    """
+
+    box: Reals
+    child: Integers
+    corner: Reals
+    shell: Integers
+    probe: Reals
+
+
+class Trees(NamedTuple):
+    """The trees of the surfaces among B bodies, as kernels take them: as :class:`TriangleTree`, one after the other.
+
+    ``root`` (B,): the first box of each body's tree, -1 for convex bodies; ``first``, ``last`` (B,): its probes.
+    """
+
+    root: Integers
+    box: Reals
+    child: Integers
+    corner: Reals
+    shell: Integers
+    probe: Reals
+    first: Integers
+    last: Integers
+
+
+def tree_of(points: Reals, faces: Integers) -> TriangleTree:
+    """The tree of a surface of triangles (F, 3) between points (k, 3), m; corners in the same place are one."""
+    points, same = np.unique(points, axis=0, return_inverse=True)
+    faces = same.reshape(-1)[faces]
+    corner = np.ascontiguousarray(points[faces])
+    number, shell = _shells(faces, len(points))
+    probe = corner[np.unique(number, return_index=True)[1], 0]
+    low, high = corner.min(axis=1), corner.max(axis=1)
+    order, middle = np.arange(len(faces)), corner.mean(axis=1)
+    starts, ends = np.array([0]), np.array([len(faces)])
+    boxes, children = list[Reals](), list[Integers]()
+    count = 1
+    while len(starts):
+        lower, upper = (bound.reduceat(rows[order], starts) for bound, rows in ((np.minimum, low), (np.maximum, high)))
+        boxes.append(np.stack([(lower + upper) / 2, (upper - lower) / 2], axis=1))
+        sizes, open_ = ends - starts, ends - starts > 1
+        child = np.stack([np.full(len(starts), -1), order[starts]], axis=1)
+        child[open_] = count + np.arange(2 * int(open_.sum())).reshape(-1, 2)
+        children.append(child)
+        count += 2 * int(open_.sum())
+        order = order[np.repeat(open_, sizes)]  # only what is halved further
+        sizes = sizes[open_]
+        begin = np.cumsum(sizes) - sizes
+        if len(begin):
+            segment = np.repeat(np.arange(len(sizes)), sizes)
+            spread = np.maximum.reduceat(middle[order], begin) - np.minimum.reduceat(middle[order], begin)
+            order = order[np.lexsort((middle[order, spread.argmax(axis=1)[segment]], segment))]
+        cut = begin + sizes // 2
+        starts = np.stack([begin, cut], axis=1).ravel()
+        ends = np.stack([cut, begin + sizes], axis=1).ravel()
+    return TriangleTree(np.concatenate(boxes), np.concatenate(children), corner, shell, probe)
+
+
+def _shells(faces: Integers, points: int) -> tuple[Integers, Integers]:
+    """Of each triangle (F,) the number of its shell, and a key of that shell, 0 where it is not closed.
+
+    In a closed shell each edge has an even number of triangles.
+    """
+    edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    links = scipy.sparse.coo_matrix((np.ones(len(edges)), edges.T), shape=(points, points))
+    number = scipy.sparse.csgraph.connected_components(links, directed=False)[1][faces[:, 0]]
+    number = np.unique(number, return_inverse=True)[1].astype(np.int64)
+    _, where, count = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
+    odd = (count % 2 == 1)[where.reshape(-1, 3)].any(axis=1)
+    closed = np.ones(int(number.max()) + 1, bool)
+    closed[number[odd]] = False
+    keys = np.random.default_rng(0).integers(1, 2**62, len(closed))  # of which no few cancel
+    return number, np.where(closed[number], keys[number], 0)
+
+
+def outer_corners(points: Reals, most: int = 64) -> Reals:
+    """At most so many points (k, 3), m, whose hull holds all points (n, 3): a box's eight for flat ones.
+
+    The outermost corners of the hull, moved away from their middle until all others are inside.
+    """
+    low, high = points.min(axis=0), points.max(axis=0)
+    box = np.array([[(low, high)[k >> axis & 1][axis] for axis in range(3)] for k in range(8)])
+    try:
+        corners = points[scipy.spatial.ConvexHull(points).vertices]
+        if len(corners) <= most:
+            return np.asarray(corners)
+        kept = corners[np.unique((fibonacci_sphere(most) @ corners.T).argmax(axis=1))]
+        hull = scipy.spatial.ConvexHull(kept)
+    except scipy.spatial.QhullError:
+        return box
+    middle, faces = kept.mean(axis=0), hull.equations
+    depth = -(faces[:, :3] @ middle + faces[:, 3])
+    beyond = ((faces[:, :3] @ (corners - middle).T) / depth[:, None]).max()
+    grown: Reals = middle + (1 + 1e-9) * beyond * (kept[hull.vertices] - middle)
+    return grown
+
+
+def trees_of(trees: Sequence[TriangleTree | None]) -> Trees:
+    """The trees of bodies, None for convex ones; a tree that several bodies share is laid down once."""
+    own = {id(tree): tree for tree in trees if tree is not None}
+    kept = list(own.values())
+    sizes = [np.cumsum([0, *(len(getattr(tree, key)) for tree in kept)]) for key in ("box", "corner", "probe")]
+    place = {key: k for k, key in enumerate(own)}
+    child = []
+    for k, tree in enumerate(kept):
+        leaf = tree.child[:, :1] < 0
+        child.append(np.where(leaf, tree.child + np.array([0, sizes[1][k]]), tree.child + sizes[0][k]))
+    number = [place.get(id(tree), -1) for tree in trees]
+    root, first, last = (
+        np.array([bounds[k + more] if k >= 0 else -1 for k in number], np.int64)
+        for bounds, more in ((sizes[0], 0), (sizes[2], 0), (sizes[2], 1))
+    )
+    none = {"box": (0, 2, 3), "corner": (0, 3, 3), "probe": (0, 3), "shell": (0,)}
+    joined = {
+        key: np.concatenate([getattr(tree, key) for tree in kept]) if kept else np.empty(shape, float)
+        for key, shape in none.items()
+    }
+    joined["shell"] = joined["shell"].astype(np.int64)
+    joined["child"] = np.concatenate(child) if kept else np.empty((0, 2), np.int64)
+    return Trees(root=root, first=first, last=last, **joined)
+
+
+@inner_kernel
+def _turned(T: Reals, S: Reals, R: Reals, t: Reals) -> None:
+    """The frame S (4, 4) as seen from the frame T (4, 4): R (3, 3) and t (3,)."""
+    for r in range(3):
+        t[r] = 0.0
+        for k in range(3):
+            t[r] += T[k, r] * (S[k, 3] - T[k, 3])
+        for c in range(3):
+            R[r, c] = T[0, r] * S[0, c] + T[1, r] * S[1, c] + T[2, r] * S[2, c]
+
+
+@inner_kernel
+def _boxes_apart(first: Reals, n: int, second: Reals, m: int, R: Reals, t: Reals, axis: Reals, limit: float) -> float:
+    """A lower bound of the squared distance of a box of ``first`` (M, 2, 3) and one of ``second``, seen from the first
+    by R (3, 3) and t (3,); one that reaches ``limit`` will do.
+
+    ``axis`` (2, 3), the direction that kept others apart, in either's axes, is tried besides.
+    """
+    x, y, z = second[m, 0, 0], second[m, 0, 1], second[m, 0, 2]
+    i, j, k = second[m, 1, 0], second[m, 1, 1], second[m, 1, 2]
+    u, v, w = first[n, 1, 0], first[n, 1, 1], first[n, 1, 2]
+    dx = R[0, 0] * x + R[0, 1] * y + R[0, 2] * z + t[0] - first[n, 0, 0]
+    dy = R[1, 0] * x + R[1, 1] * y + R[1, 2] * z + t[1] - first[n, 0, 1]
+    dz = R[2, 0] * x + R[2, 1] * y + R[2, 2] * z + t[2] - first[n, 0, 2]
+    gap = axis[0, 0] * dx + axis[0, 1] * dy + axis[0, 2] * dz
+    gap -= abs(axis[0, 0]) * u + abs(axis[0, 1]) * v + abs(axis[0, 2]) * w
+    gap -= abs(axis[1, 0]) * i + abs(axis[1, 1]) * j + abs(axis[1, 2]) * k
+    found = float(max(gap, 0.0) ** 2)
+    if found >= limit:
+        return found
+    a, b, c = abs(R[0, 0]), abs(R[0, 1]), abs(R[0, 2])
+    d, e, f = abs(R[1, 0]), abs(R[1, 1]), abs(R[1, 2])
+    g, h, o = abs(R[2, 0]), abs(R[2, 1]), abs(R[2, 2])
+    apart = max(abs(dx) - u - a * i - b * j - c * k, 0.0) ** 2
+    apart += max(abs(dy) - v - d * i - e * j - f * k, 0.0) ** 2
+    apart += max(abs(dz) - w - g * i - h * j - o * k, 0.0) ** 2
+    found = float(max(found, apart))
+    if found >= limit:
+        return found
+    apart = max(abs(R[0, 0] * dx + R[1, 0] * dy + R[2, 0] * dz) - i - a * u - d * v - g * w, 0.0) ** 2
+    apart += max(abs(R[0, 1] * dx + R[1, 1] * dy + R[2, 1] * dz) - j - b * u - e * v - h * w, 0.0) ** 2
+    apart += max(abs(R[0, 2] * dx + R[1, 2] * dy + R[2, 2] * dz) - k - c * u - f * v - o * w, 0.0) ** 2
+    return float(max(found, apart))
+
+
+@inner_kernel
+def _keep_axis(near: Reals, R: Reals, axis: Reals) -> None:
+    """The direction from one nearest point to the other (2, 3), in the axes of both bodies."""
+    size = 0.0
+    for r in range(3):
+        axis[0, r] = near[1, r] - near[0, r]
+        size += axis[0, r] ** 2
+    for r in range(3):
+        axis[0, r] *= 1 / np.sqrt(size) if size > 0 else 0.0
+    for c in range(3):
+        axis[1, c] = R[0, c] * axis[0, 0] + R[1, c] * axis[0, 1] + R[2, c] * axis[0, 2]
+
+
+@inner_kernel
+def _apart_along(points: Reals, count: int, axis: Reals) -> float:
+    """How far the points from row 3 on, ``count`` of them, are beyond the first three along an axis."""
+    last, first = -np.inf, np.inf
+    for p in range(3 + count):
+        along = points[p, 0] * axis[0, 0] + points[p, 1] * axis[0, 1] + points[p, 2] * axis[0, 2]
+        if p < 3:
+            last = max(last, along)
+        else:
+            first = min(first, along)
+    return float(first - last)
+
+
+@inner_kernel
+def _inside(trees: Trees, root: int, x: float, y: float, z: float) -> bool:
+    """Whether a point, in a surface's frame, lies in one of its closed shells."""
+    box, child = trees.box, trees.child
+    if abs(x - box[root, 0, 0]) > box[root, 1, 0] or abs(y - box[root, 0, 1]) > box[root, 1, 1]:
+        return False
+    if abs(z - box[root, 0, 2]) > box[root, 1, 2]:
+        return False
+    stack = np.empty(WAITING, np.int64)
+    stack[0], height, odd = root, 1, np.int64(0)
+    while height:
+        height -= 1
+        n = stack[height]
+        if box[n, 0, 0] + box[n, 1, 0] < x:
+            continue
+        across = box[n, 0, 0] - x
+        if abs(box[n, 0, 1] - y - SLANT_Y * across) > box[n, 1, 1] + SLANT_Y * box[n, 1, 0]:
+            continue
+        if abs(box[n, 0, 2] - z - SLANT_Z * across) > box[n, 1, 2] + SLANT_Z * box[n, 1, 0]:
+            continue
+        if child[n, 0] >= 0:
+            stack[height], stack[height + 1] = child[n, 0], child[n, 1]
+            height += 2
+        elif trees.shell[child[n, 1]] and _ray_meets(trees.corner[child[n, 1]], x, y, z):
+            odd ^= trees.shell[child[n, 1]]
+    return bool(odd != 0)
+
+
+@inner_kernel
+def _ray_meets(corner: Reals, x: float, y: float, z: float) -> bool:
+    """Whether the slanted ray from a point meets a triangle (3, 3): its crossings of the edges, seen along the ray."""
+    odd, depth, weight = False, 0.0, 0.0
+    for k in range(3):
+        a, b = k, (k + 1) % 3
+        ya = corner[a, 1] - y - SLANT_Y * (corner[a, 0] - x)
+        za = corner[a, 2] - z - SLANT_Z * (corner[a, 0] - x)
+        yb = corner[b, 1] - y - SLANT_Y * (corner[b, 0] - x)
+        zb = corner[b, 2] - z - SLANT_Z * (corner[b, 0] - x)
+        twice = ya * zb - yb * za
+        if (za > 0) != (zb > 0) and (twice > 0) == (zb > za):
+            odd = not odd
+        weight += twice
+        depth += twice * (corner[(k + 2) % 3, 0] - x)
+    return bool(odd and weight != 0 and depth / weight > 0)
+
+
+@inner_kernel
+def holds_point(trees: Trees, T: Reals, root: int, point: Reals) -> bool:
+    """Whether a surface placed by T (4, 4) holds a point (3,) in one of its closed shells."""
+    u, v, w = point[0] - T[0, 3], point[1] - T[1, 3], point[2] - T[2, 3]
+    x = T[0, 0] * u + T[1, 0] * v + T[2, 0] * w
+    y = T[0, 1] * u + T[1, 1] * v + T[2, 1] * w
+    z = T[0, 2] * u + T[1, 2] * v + T[2, 2] * w
+    return _inside(trees, root, x, y, z)
+
+
+@inner_kernel
+def _holds_probe(trees: Trees, T: Reals, S: Reals, a: int, b: int, probe: Reals) -> bool:
+    """Whether a shell of body b, placed by S (4, 4), has its probe in body a, placed by T (4, 4)."""
+    for p in range(trees.first[b], trees.last[b]):
+        for r in range(3):
+            probe[r] = S[r, 3]
+            for k in range(3):
+                probe[r] += S[r, k] * trees.probe[p, k]
+        if holds_point(trees, T, trees.root[a], probe):
+            return True
+    return False
+
+
+@inner_kernel
+def surface_distance(
+    trees: Trees,
+    a: int,
+    T: Reals,
+    b: int,
+    S: Reals,
+    core: tuple[Reals, int, int, float],
+    room: Reals,
+    near: Reals,
+    far: float,
+) -> float:
+    """Distance of a surface, body a placed by T (4, 4), from body b; below 0 where one is inside the other, 0 where
+    they cross. From ``far`` on any number from ``far`` to the distance.
+
+    Body b is a surface placed by S (4, 4) or, if it has no tree, a convex core: rows from first to last of points
+    (P, 3) in space, and the radius of its disc. ``near`` (2, 3) holds the closest points of hulls around the two, and
+    gets their own.
+    """
+    w, first, last, disc = core
+    convex = trees.root[b] < 0
+    count = last - first if convex else 3
+    points, R, t, boxes, nb = np.empty((3 + count, 3)), np.zeros((3, 3)), np.zeros(3), trees.box, trees.root[b]
+    if convex:
+        boxes, nb = np.empty((1, 2, 3)), 0
+        for r in range(3):
+            R[r, r], low, high = 1.0, np.inf, -np.inf
+            for p in range(count):
+                value = 0.0
+                for k in range(3):
+                    value += T[k, r] * (w[first + p, k] - T[k, 3])
+                points[3 + p, r] = value
+                low, high = min(low, value), max(high, value)
+            boxes[0, 0, r], boxes[0, 1, r] = (low + high) / 2, (high - low) / 2 + disc
+    else:
+        _turned(T, S, R, t)
+    axis, close = np.empty((2, 3)), np.empty((2, 3))
+    for k in range(2):
+        for r in range(3):
+            close[k, r] = T[0, r] * near[k, 0] + T[1, r] * near[k, 1] + T[2, r] * near[k, 2]
+    _keep_axis(close, R, axis)
+    stack, bound = np.empty((WAITING, 2), np.int64), np.empty(WAITING)
+    stack[0, 0], stack[0, 1], bound[0] = trees.root[a], nb, 0.0
+    height, best = 1, max(far, 2 * TOUCHING)
+    while height:
+        height -= 1
+        n, m = stack[height, 0], stack[height, 1]
+        if bound[height] >= best * best:
+            continue
+        deep_a, deep_b = trees.child[n, 0] >= 0, not convex and trees.child[m, 0] >= 0
+        if not deep_a and not deep_b:
+            for k in range(3):
+                for r in range(3):
+                    points[k, r] = trees.corner[trees.child[n, 1], k, r]
+                    if not convex:
+                        c = trees.corner[trees.child[m, 1], k]
+                        points[3 + k, r] = R[r, 0] * c[0] + R[r, 1] * c[1] + R[r, 2] * c[2] + t[r]
+            if _apart_along(points, count, axis) - (disc if convex else 0.0) >= best:
+                continue
+            distance = cores_distance(points, (0, 3, 3, 3 + count), 0.0, disc if convex else 0.0, room, close)
+            if distance < best:
+                best = distance
+                _keep_axis(close, R, axis)
+                for k in range(2):
+                    for r in range(3):
+                        near[k, r] = T[r, 0] * close[k, 0] + T[r, 1] * close[k, 1] + T[r, 2] * close[k, 2] + T[r, 3]
+            if best <= TOUCHING:
+                return 0.0
+            continue
+        of_a = deep_a
+        if deep_a and deep_b:  # the larger one is opened
+            of_a = boxes[m, 1, 0] + boxes[m, 1, 1] + boxes[m, 1, 2] < (
+                trees.box[n, 1, 0] + trees.box[n, 1, 1] + trees.box[n, 1, 2]
+            )
+        kept = height
+        for side in range(2):
+            one = trees.child[n, side] if of_a else n
+            other = m if of_a else trees.child[m, side]
+            apart = _boxes_apart(trees.box, one, boxes, other, R, t, axis, best * best)
+            if apart < best * best:
+                stack[height, 0], stack[height, 1], bound[height] = one, other, apart
+                height += 1
+        if height == kept + 2 and bound[kept] < bound[kept + 1]:  # the nearer one is looked at first
+            for k in range(2):
+                stack[kept, k], stack[kept + 1, k] = stack[kept + 1, k], stack[kept, k]
+            bound[kept], bound[kept + 1] = bound[kept + 1], bound[kept]
+    if convex:
+        return -best if holds_point(trees, T, trees.root[a], w[first]) else best
+    within = _holds_probe(trees, T, S, a, b, t) or _holds_probe(trees, S, T, b, a, t)
+    return -best if within else best
+
+
+@inner_kernel
+def surface_above_plane(
+    trees: Trees, T: Reals, root: int, normal: tuple[float, float, float], offset: float, near: Reals
+) -> float:
+    """How far a surface placed by T (4, 4) stays above a half-space; negative by the depth."""
+    x, y, z = normal
+    u = x * T[0, 0] + y * T[1, 0] + z * T[2, 0]
+    v = x * T[0, 1] + y * T[1, 1] + z * T[2, 1]
+    w = x * T[0, 2] + y * T[1, 2] + z * T[2, 2]
+    shift = x * T[0, 3] + y * T[1, 3] + z * T[2, 3] - offset
+    stack, best = np.empty(WAITING, np.int64), np.inf
+    stack[0], height, at = root, 1, np.zeros(3)
+    while height:
+        height -= 1
+        n, box = stack[height], trees.box[stack[height]]
+        low = u * box[0, 0] + v * box[0, 1] + w * box[0, 2]
+        low -= abs(u) * box[1, 0] + abs(v) * box[1, 1] + abs(w) * box[1, 2]
+        if low >= best:
+            continue
+        if trees.child[n, 0] >= 0:
+            stack[height], stack[height + 1] = trees.child[n, 0], trees.child[n, 1]
+            height += 2
+            continue
+        for k in range(3):
+            corner = trees.corner[trees.child[n, 1], k]
+            value = u * corner[0] + v * corner[1] + w * corner[2]
+            if value < best:
+                best = value
+                for r in range(3):
+                    at[r] = corner[r]
+    above = best + shift
+    for r in range(3):
+        near[0, r] = T[r, 0] * at[0] + T[r, 1] * at[1] + T[r, 2] * at[2] + T[r, 3]
+        near[1, r] = near[0, r] - above * normal[r]
+    return float(above)
+
+
+@kernel
+def depths_inside(trees: Trees, body: int, points: Reals, found: Reals) -> None:
+    """How deep points (N, 3), in the frame of a body's surface, lie in its closed shells, (N,), m; 0 for others."""
+    T, room, near = np.eye(4), np.empty((ROOM, 3)), np.empty((2, 3))
+    alone = Trees(
+        np.array([trees.root[body], -1]),
+        trees.box,
+        trees.child,
+        trees.corner,
+        trees.shell,
+        trees.probe,
+        trees.first,
+        trees.last,
+    )
+    for n in range(len(points)):
+        found[n] = 0.0
+        if holds_point(trees, T, trees.root[body], points[n]):
+            found[n] = -surface_distance(alone, 0, T, 1, T, (points, n, n + 1, 0.0), room, near, np.inf)
