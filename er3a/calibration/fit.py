@@ -380,12 +380,15 @@ def rough_places(robot: Robot, observations: PointObservations) -> tuple[Reals, 
 
 def _base_and_tool(x: Reals, R: Reals, m: Reals, free: Sequence[PlacementName]) -> tuple[Reals, Reals]:
     """S (4, 4) and t (3,) of :func:`rough_places`, each left where it is if it is not free."""
+    S: Reals = np.eye(4)
+    t: Reals = np.zeros(3)
     if "base" not in free:
-        t = np.linalg.lstsq(R.reshape(-1, 3), (m - x).ravel(), rcond=None)[0] if "tool" in free else np.zeros(3)
-        return np.eye(4), t
+        if "tool" in free:
+            t = np.linalg.lstsq(R.reshape(-1, 3), (m - x).ravel(), rcond=None)[0]
+        return S, t
     S = aligned(x, m)[0]
     if "tool" not in free:
-        return S, np.zeros(3)
+        return S, t
     eye = np.broadcast_to(np.eye(3), R.shape)
     rows = np.concatenate([np.einsum("pij,pk->pijk", eye, m).reshape(-1, 3, 9), -eye, -R], axis=2).reshape(-1, 15)
     U, _, V = np.linalg.svd(np.linalg.lstsq(rows, x.ravel(), rcond=None)[0][:9].reshape(3, 3).T)
