@@ -142,7 +142,7 @@ class RunLog(LogHandlerBase):
             job = record.__dict__
             name, logs = self._job_name(job), [str(log) for log in job.get("log") or ()]
             self._print(f"✗ {name}: ended with an error; see {', '.join(logs)}")
-            if (number := self._killed.get(*logs[:1], 0)) and (log := Path(logs[0])).is_file():
+            if logs and (number := self._killed.get(logs[0], 0)) and (log := Path(logs[0])).is_file():
                 why = "; out of memory?" if number == signal.SIGKILL else ""
                 with log.open("a", encoding="utf-8") as told:  # where reasons are looked for when the run has ended
                     told.write(f"\nerror: {name}: killed (signal {number}{why})\n")
