@@ -100,9 +100,9 @@ def check_program(
     with shown_work("reading") as at, first_compiled:
         checked = []
         for file in files:
-            start, end = budget.next_piece()
-            own = replace(options, keep_on=_until(start, end, file, at))
-            checked.append(checked_file(file, arm, own, doubts, max(end - start, LEAST_S)))
+            begun, end = budget.next_piece()
+            own = replace(options, keep_on=_until(begun, end, file, at))
+            checked.append(checked_file(file, arm, own, doubts, max(end - begun, LEAST_S)))
     if sarif is not None:
         _write(sarif, json.dumps(sarif_of(checked), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
     if as_json:
