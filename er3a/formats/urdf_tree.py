@@ -9,10 +9,10 @@ Masses and drives are ``<inertial>`` of links, ``<dynamics>`` and efforts of joi
 count as one. An effort of 0 means unknown, as in most files.
 
 Collision geometry becomes capsules, convex hulls and surfaces: boxes become hulls, cylinders prisms around them,
-spheres capsules without length; a cylinder with a sphere of its radius at each end becomes a capsule. A mesh stays a surface of
-triangles; one that is closed and convex, or has a margin, becomes its hull. The export writes a mesh for each hull and
-surface, and a cylinder and two spheres for a capsule. The amount by which a hull has to be enlarged is written as
-``<collision margin="...">`` (m), which other readers ignore.
+spheres capsules without length; a cylinder with a sphere of its radius at each end becomes a capsule. A mesh stays a
+surface of triangles; one that is closed and convex, or has a margin, becomes its hull. The export writes a mesh for
+each hull and surface, and a cylinder and two spheres for a capsule. The amount by which a hull has to be enlarged is
+written as ``<collision margin="...">`` (m), which other readers ignore.
 """
 
 from __future__ import annotations
