@@ -252,7 +252,7 @@ def measure(layout: Layout, q: Reals, found: Reals, smallest: Reals, pair: Integ
             if least[k] == np.inf and distance < best and not (joined[k] and distance >= 0 and not overlap):
                 best, at = distance, k
         while not inside and len(least):
-            k = least.argmin()
+            k = int(least.argmin())
             if least[k] >= best:
                 break
             distance = pair_distance(layout, T, w, first[k], second[k], room, near, best)[0]

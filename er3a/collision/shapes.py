@@ -81,7 +81,8 @@ class ArmShapes:
     @property
     def links(self) -> set[int]:
         """The links that have a shape."""
-        return {shape.link for shape in (*self.capsules, *self.pieces, *self.meshes)}
+        shapes: tuple[Envelope | ConvexPiece | LinkMesh, ...] = (*self.capsules, *self.pieces, *self.meshes)
+        return {shape.link for shape in shapes}
 
 
 @derived

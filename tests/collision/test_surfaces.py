@@ -63,14 +63,6 @@ def test_distances_and_collisions_are_those_of_the_triangles(arm: Robot) -> None
     assert np.maximum(least, 0) == pytest.approx(np.maximum(clear, 0), abs=1e-9)
 
 
-def test_hulls_that_overlap_are_no_collision(arm: Robot) -> None:
-    hulls = arm.replace(
-        meshes=tuple(link_mesh(m.link, trimesh.convex.convex_hull(m.points).triangles) for m in arm.meshes)
-    )
-    q = np.random.default_rng(6).uniform(arm.lower, arm.upper, (300, arm.joints))
-    assert Bodies(arm, None).free(q).mean() > Bodies(hulls, None).free(q).mean() + 0.05
-
-
 def test_what_is_inside_a_closed_surface_overlaps(arm: Robot) -> None:
     ball = trimesh.creation.icosphere(3, 0.2)
     hollow = arm.replace(meshes=tuple(link_mesh(k, ball.triangles) for k in (0, 6)))
