@@ -384,7 +384,7 @@ def _base_and_tool(x: Reals, R: Reals, m: Reals, free: Sequence[PlacementName]) 
     t: Reals = np.zeros(3)
     if "base" not in free:
         if "tool" in free:
-            t = np.linalg.lstsq(R.reshape(-1, 3), (m - x).ravel(), rcond=None)[0]
+            t = np.linalg.lstsq(R.reshape(-1, 3), (m - x).ravel(), rcond=None)[0].astype(float)
         return S, t
     S = aligned(x, m)[0]
     if "tool" not in free:
@@ -398,7 +398,8 @@ def _base_and_tool(x: Reals, R: Reals, m: Reals, free: Sequence[PlacementName]) 
         S[:3, :3] = turn
         for _ in range(TURNS):
             back = (m @ S[:3, :3] - x).ravel()
-            t = np.linalg.lstsq(np.concatenate([R, eye], axis=2).reshape(-1, 6), back, rcond=None)[0][:3]
+            both = np.concatenate([R, eye], axis=2).reshape(-1, 6)
+            t = np.linalg.lstsq(both, back, rcond=None)[0][:3].astype(float)
             S = aligned(x + R @ t, m)[0]
         found.append((float(np.linalg.norm((x + R @ t) @ S[:3, :3].T + S[:3, 3] - m)), S, t))
     return min(found, key=lambda each: each[0])[1:]
