@@ -52,7 +52,7 @@ from er3a.pipeline.stages.trajectory.judgement import Surroundings, judge, measu
 from er3a.pipeline.stages.trajectory.motion import limits_of, motion_of, proof_requirements
 from er3a.planning.commands import CommandSource
 from er3a.robots.joint_limits import limit_margin, shown, within
-from er3a.robots.robot import Convention, Robot, robot_name
+from er3a.robots.robot import Convention, ConvexPiece, LinkMesh, Robot, robot_name
 from er3a.selection.nearest import nearest
 from er3a.selection.select import refusals_of
 
@@ -129,7 +129,7 @@ def _foot_of(robot: Robot) -> float:
     """Height (m) on which the arm stands: of the base's frame, or where the base goes deeper."""
     shapes = arm_shapes(robot)
     lines = [point for each in shapes.capsules if each.link == 0 for point in (each.start, each.end)]
-    solids = (*shapes.pieces, *shapes.meshes)
+    solids: tuple[ConvexPiece | LinkMesh, ...] = (*shapes.pieces, *shapes.meshes)
     points = [(0.0, 0.0, 0.0), *lines, *(point for each in solids if each.link == 0 for point in each.points)]
     heights: Reals = np.array(points) @ robot.base[2, :3] + robot.base[2, 3]
     return float(heights.min())
@@ -608,8 +608,8 @@ def write_study(arm: Arm, folder: Path) -> WrittenStudy:
     texts |= {place: (ROOT / place).read_text(encoding="utf-8") for place in aids}
     for place, text in texts.items():
         write_atomically(folder / place, partial(Path.write_text, data=text, encoding="utf-8"))
-    for place, content in surface_files(arm.robot.meshes).items():
-        write_atomically(folder / "data" / "robots" / place, partial(Path.write_bytes, data=content))
+    for surface, content in surface_files(arm.robot.meshes).items():
+        write_atomically(folder / "data" / "robots" / surface, partial(Path.write_bytes, data=content))
     return WrittenStudy(
         tuple(folder / place for place in texts if place not in aids), found.shortcomings, found.missing
     )
