@@ -81,7 +81,6 @@ def before(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
 # Of an edited file, whether it changes the digests of the made stage's compute and report.
 EDITS = {
     "pipeline/stages/made/compute.py": (True, False),
-    "kinematics/forward.py": (True, False),
     "numerics/jit.py": (True, True),
     "robots/robot.py": (True, True),
     "kinematics/chain.py": (True, True),

@@ -65,7 +65,13 @@ USUAL_SUMS = {2: (0.25, 4.0), 1: (0.1, 2.5)}  # m, of the lengths a and d of an 
 LEAST_SUM = 0.02  # m, of one of both, where two units are as near as cm and mm
 NEAR_UNITS = math.log(20.0)
 STRANGER = math.log(1.5)  # how much farther outside of these a table has to be than another to be the one in error
-USUAL_ANGLES = {"alpha": (6.3, 361.0), "offset": (6.3, 361.0), "lower": (6.3, 1000.0), "speed": (20.0, 1500.0)}
+USUAL_ANGLES = {
+    "alpha": (6.3, 361.0),
+    "offset": (6.3, 361.0),
+    "lower": (12.6, 1000.0),
+    "upper": (12.6, 1000.0),
+    "speed": (20.0, 1500.0),
+}
 """Between which (deg, deg/s) the widest of an arm's angles is: no radians, and not converted once too often."""
 TINY = 0.01  # m, of all lengths of two arms that are both in another unit
 FINEST = 5e-3  # by which part of all its lengths such an arm may differ
@@ -690,8 +696,9 @@ def _angle_slips(robot_a: Robot, robot_b: Robot, columns: tuple[str, ...]) -> li
 
 def _range_slips(robot_a: Robot, robot_b: Robot, columns: tuple[str, ...]) -> Iterator[Cause]:
     """Ways in which limits or speeds of one of two tables can be in another unit."""
-    for slips in _angle_slips(robot_a, robot_b, columns):
-        yield from slips
+    for own in (columns, *((column,) for column in columns if len(columns) > 1)):
+        for slips in _angle_slips(robot_a, robot_b, own):
+            yield from slips
     sums = [sum(float(np.abs(getattr(each, key)[each.slides]).sum()) for key in columns) for each in (robot_a, robot_b)]
     for factor in _likely_factor(sums[1] / sums[0]) if min(sums) > 0 else ():
         yield Cause("unit", None, columns, factor, UNITS[factor])

@@ -63,6 +63,7 @@ LONGEST_ARM_IN = 200.0  # inches; a length of five metres
 ROUND_MM = (0.1, 2e-3, 2), (0.01, 5e-4, 3), (0.5, 0.0135, 3)
 """What lengths in mm are multiples of, how nearly if they were in another unit, and how many it takes to say so."""
 ASSUMED_SLIDE_MM = 1000.0
+MOST_LINES = 1 + 10 * MAX_JOINTS  # a header, and more rows than joints, fixed ones and notes take
 
 
 def read_dh_table(
@@ -96,7 +97,11 @@ def read_dh_table(
         naming row and column, or the field of the robot file that the values do not fit
     """
     path = Path(path)
-    printed = as_columns(path, read_lines(path))
+    lines = read_lines(path)
+    if len(lines) > MOST_LINES:
+        problem = f"{len(lines) - 1:,} rows are no arm's table"
+        raise InputError(path, None, problem, f"er3a models 1 to {MAX_JOINTS} joints: write one row for each")
+    printed = as_columns(path, lines)
     names = {_usual_unit(column)[0]: column for column in (printed.lines[0][1] if printed.lines else ())}
     known = NEEDED | {column: kind for column, kind in OPTIONAL.items() if column in names}
     rows = read_csv(path, {names.get(column, column): kind for column, kind in known.items()}, printed.lines)
@@ -110,19 +115,10 @@ def read_dh_table(
         }
     convention = printed.convention or convention
     notes = [*printed.notes]
-    notes += _in_own_units(path, rows, length_unit, angle_unit, as_printed, {*converted}, printed.without_unit)
-    lengths = [(abs(row[key]), row, key) for row in rows for key in ("a_mm", "d_mm") if row[key]]
-    short = [(row, key) for length, row, key in lengths if length < SHORTEST_PLAIN_LENGTH_MM]
-    unsaid = [each for each in short if each[1] not in converted]
-    if unsaid and not (length_unit or _calibrated(rows, convention)):
-        row, key = unsaid[0]
-        if not as_printed:
-            problem = f"{row[key]:g} mm looks like metres"
-            remedy = f"Write {1000 * row[key]:g}, or name the column {key[0]}_m; if so short a length is meant, give"
-            remedy += " --length-unit mm, or add a column calibrated with true in each row"
-            raise InputError(path, f"row {row['row']}, column {key}", problem, remedy)
-        if all(abs(each[key]) < SHORTEST_PLAIN_LENGTH_MM for each in rows):
-            doubt(None, f"column {key}", f"{row[key]:g} mm", "metres", file=path)
+    notes += _in_own_units(
+        path, rows, length_unit, angle_unit, as_printed, own={*converted}, without_unit=printed.without_unit
+    )
+    short = _short_lengths(path, rows, {*converted}, as_printed, bool(length_unit or _calibrated(rows, convention)))
     given = set(names)
     if len(stated := {row["convention"] for row in rows} if "convention" in given else {convention}) > 1:
         raise InputError(path, "column convention", "two conventions in one table", "Write the same in all rows")
@@ -147,9 +143,27 @@ def read_dh_table(
     content |= {group: _placement(T, path.name) for group, T in placed.items() if not np.array_equal(T, np.eye(4))}
     if angle_unit is not None:
         content["units_checked"] = True
-    if short or 0 < max((length for length, *_ in lengths), default=0.0) < SHORTEST_ARM_MM:
+    longest = max((abs(row[key]) for row in rows for key in ("a_mm", "d_mm")), default=0.0)
+    if short or 0 < longest < SHORTEST_ARM_MM:
         content["dh"]["calibrated"] = True  # lengths of a millimetre or less are meant
     return parse(RobotFile, content, path, AS_PRINTED if as_printed else None), tuple(notes)
+
+
+def _short_lengths(path: Path, rows: list[dict[str, Any]], own: set[str], as_printed: bool, meant: bool) -> bool:
+    """Whether the table has lengths below two millimetres. Unless they are meant, or in columns that said their unit
+    (``own``), they are refused, or, with ``as_printed``, doubted if no length is longer."""
+    short = [(row, key) for row in rows for key in ("a_mm", "d_mm") if 0 < abs(row[key]) < SHORTEST_PLAIN_LENGTH_MM]
+    unsaid = [each for each in short if each[1] not in own]
+    if unsaid and not meant:
+        row, key = unsaid[0]
+        if not as_printed:
+            problem = f"{row[key]:g} mm looks like metres"
+            remedy = f"Write {1000 * row[key]:g}, or name the column {key[0]}_m; if so short a length is meant, give"
+            remedy += " --length-unit mm, or add a column calibrated with true in each row"
+            raise InputError(path, f"row {row['row']}, column {key}", problem, remedy)
+        if all(abs(each[key]) < SHORTEST_PLAIN_LENGTH_MM for each in rows):
+            doubt(None, f"column {key}", f"{row[key]:g} mm", "metres", file=path)
+    return bool(short)
 
 
 # Rows in which nothing moves ------------------------------------------------------------------------------------------
@@ -263,6 +277,7 @@ def _in_own_units(
     length_unit: LengthUnit | None,
     angle_unit: AngleUnit | None,
     as_printed: bool,
+    *,
     own: set[str],
     without_unit: frozenset[str],
 ) -> Iterator[str]:
@@ -448,7 +463,7 @@ _UNITS |= {"°": "deg", "deg": "deg", "degree": "deg", "degrees": "deg", "度": 
 _BEFORE = re.compile(r"i-1|ᵢ₋₁|j-1")
 _PLAIN = str.maketrans({"−": "-", "–": "-", "ϑ": "θ", "⍺": "α", "∗": "*", "＊": "*", "（": "(", "）": ")"})
 _PLAIN |= str.maketrans(dict(zip("₀₁₂₃₄₅₆₇₈₉", "0123456789")))
-_VARIABLE = re.compile(r"(?<![\w.])([+-]?)(?:(?:q|θ|theta|d)_?\d*\*?|\*|var(?:iable|\.)?|变量)(?:\(t\))?(?=[-+(]|$)")
+_VARIABLE = re.compile(r"(?<![\w.])([+-]?)(?:(?:q|θ|theta|th|d)_?\d*\*?|\*|var(?:iable|\.)?|变量)(?:\(t\))?(?=[-+(]|$)")
 _NUMBERED = re.compile(r"\d")
 _TOOL = re.compile(r"tool|tcp|grip|hand|effector|^\s*g\s*$|工具|夹")  # a row's name, of what the flange carries
 _PI = re.compile(r"([+-]?)(\d+(?:\.\d*)?)?\*?(?:π|pi)(?:/(\d+(?:\.\d*)?))?")
@@ -596,9 +611,10 @@ class _Table:
         k = self.column.get("joint")
         names = ["" if k is None else cells[k] for _, cells in self.rows]
         numbered = any(map(_NUMBERED.search, names))
+        any_varies = any(turns) or any(slides)
         found = []
         for turned, slid, name in zip(turns, slides, names):
-            still = any([*turns, *slides]) or (numbered and name.strip() and not _NUMBERED.search(name))
+            still = any_varies or (numbered and name.strip() and not _NUMBERED.search(name))
             fixed = "tool" if _TOOL.search(name.lower()) else "fixed"
             found.append("revolute" if turned else "prismatic" if slid else fixed if still else "revolute")
         return found

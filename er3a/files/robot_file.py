@@ -40,7 +40,7 @@ METRES_BELOW_MM, MIN_CENTRE_MM = 0.5, 0.02  # between them a link's centre of ma
 METRES_ABOVE_KG, FAR_WIDER = 0.5, 100.0  # ... of a link heavier than this, with a gyration radius so many times larger
 AS_PRINTED = {"as_printed": True}
 """The context in which a table's values may be another unit's."""
-RADIANS_BELOW = 2.01 * math.pi  # the widest limit of an arm, if it is written in radians
+RADIANS_BELOW = 4.01 * math.pi  # an arm's widest limit, two turns, or its fastest joint, if written in radians
 MAX_PACKED = 400_000  # letters of a link's corners or triangles
 
 IMPOSSIBLE = {
@@ -782,13 +782,17 @@ class RobotFile(InputFile):
 
     @model_validator(mode="after")
     def _limits_plausible(self):
-        spans = [
-            max(abs(row.lower_deg or 0), abs(row.upper_deg or 0))
-            for row in self.limits.rows
-            if row.lower_deg is not None
-        ]
-        if len(spans) > 1 and 0 < max(spans) <= RADIANS_BELOW:
-            doubt(self, "limits.rows", f"{max(spans):g} deg", "radians", more=", of which none is wider")
+        """Doubt limits and speeds that are as small as those of an arm in radians, whichever column has them."""
+        speeds = self.speeds.rows if self.speeds else ()
+        columns = {
+            "limits.rows: lower_deg": [row.lower_deg for row in self.limits.rows],
+            "limits.rows: upper_deg": [row.upper_deg for row in self.limits.rows],
+            "speeds.rows: speed_deg_s": [row.speed_deg_s for row in speeds],
+        }
+        for key, values in columns.items():
+            given = [abs(value) for value in values if value is not None]
+            if len(given) > 1 and 0 < max(given) <= RADIANS_BELOW:
+                doubt(self, key, f"{max(given):g} deg", "radians", more=", of which none is wider")
         return self
 
 

@@ -60,8 +60,14 @@ def _expanded(path: Path, values: dict[str, str]) -> str:
     def refused(expression: str, context: object) -> str:
         raise ValueError("$(eval) is refused: write ${...}")
 
-    xacro.safe_eval, substitution_args._eval = checked, refused
+    def yaml_alone(file: str) -> object:
+        if Path(xacro.abs_filename_spec(file)).resolve().suffix.lower() not in (".yaml", ".yml"):
+            raise ValueError("load_yaml reads .yaml files alone")
+        return load(file)
+
+    load, xacro.safe_eval, substitution_args._eval = xacro.load_yaml, checked, refused
     del xacro._global_symbols["python"]["vars"]
+    xacro._global_symbols["load_yaml"] = xacro._global_symbols["xacro"]["load_yaml"] = yaml_alone
     packages.reset()
     packages.update_package_cache(packages_near(path))
     text: str = XacroDoc.from_file(path, subargs=values, resolve_packages=False).to_urdf_string()

@@ -27,7 +27,9 @@ from er3a.planning.profiles import Rates, check_times
 from er3a.planning.sequences import POWERS, Curve, joining
 
 FIT = 3.0  # times the mean rates beside a point, and the part of them, that the rate at the point may be
-NOISE = 0.1  # of the largest mean rate of a trajectory: by so much samples of accelerations that step miss their means
+NOISE = 0.1  # of the largest mean rate, of a joint for velocities: samples of accelerations that step miss theirs by it
+RESTING = 1e-3  # of the largest mean rate of all joints: a joint that is slower hardly moves, by rounding too
+TINY = 1e-12  # rad/s or m/s
 SAME_RATE = 1e-6  # of the largest rate: steps that rounding makes
 
 
@@ -131,8 +133,10 @@ def _contradicted(order: Literal[1, 2], times: Reals, means: Reals, stated: Real
     """
     low, high = np.minimum(means[:-1], means[1:]), np.maximum(means[:-1], means[1:])
     least, most = np.where(low > 0, low / FIT, FIT * low), np.where(high > 0, FIT * high, high / FIT)
-    off = np.nan_to_num(np.maximum(least - stated[1:-1], stated[1:-1] - most))
-    if not off.size or not off.max() > NOISE * np.abs(np.nan_to_num(means)).max():
+    size = np.abs(np.nan_to_num(means)).max(axis=0, initial=0.0)
+    noise = np.maximum(NOISE * size, RESTING * size.max()) if order == 1 else NOISE * size.max()
+    off = np.nan_to_num(np.maximum(least - stated[1:-1], stated[1:-1] - most)) / np.maximum(noise, TINY)
+    if not off.size or off.max() <= 1:
         return
     k, j = np.unravel_index(int(off.argmax()), off.shape)
     rate = float(stated[k + 1, j])

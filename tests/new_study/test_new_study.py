@@ -274,7 +274,7 @@ def test_a_table_with_all_columns(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new_text", "told"),
     [
-        ("a_mm", "a_cm", "column a_cm"),
+        ("a_mm", "a_km", "column a_km"),
         ("2,-425,0,0\n", "", "the joints are 1, 3, 4, 5"),
         ("-425", "-0.425", "looks like metres"),
         ("-425", "nan", "row 3, column a_mm"),

@@ -278,7 +278,7 @@ def test_an_axis_of_any_length_is_a_direction(tmp_path, random):
 
 def test_a_flat_mesh_is_a_shape(tmp_path):
     (tmp_path / "flat.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 2 0\nf 1 2 3\n")
-    (piece,) = import_urdf(written(tmp_path, urdf(extra=shaped('<mesh filename="flat.obj"/>')))).robot.hulls
+    (piece,) = import_urdf(written(tmp_path, urdf(extra=shaped('<mesh filename="flat.obj"/>')))).robot.meshes
     assert len(piece.points) == 3
     sides = np.linalg.norm(np.diff(np.array(piece.points)[[0, 1, 2, 0]], axis=0), axis=1)
     np.testing.assert_allclose(np.sort(sides), [1, 2, np.sqrt(5)])
