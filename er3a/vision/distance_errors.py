@@ -30,8 +30,9 @@ from er3a.vision.likelihood import (
 )
 
 AS_GOOD = float(scipy.special.chdtri(1, 1 - CONFIDENCE))  # by which chance alone makes two causes differ
+SURE_RATIO = 16.0  # chance reaches it in one of 10 000 sets
 LEAST_SAMPLES = 6  # of which the noise can be told from such an error
-SURE_SCALE = 3.0  # half widths of its interval, from 0; a vaguer factor comes of samples that don't fit at all
+SURE_SCALE = 5.0  # half widths of its interval, from 0; a vaguer factor comes of samples that don't fit at all
 MIN_SCALE_ERROR = 2e-3
 MIN_SHIFT = 5e-3  # of the focal length; smaller ones look like the camera turned, and errors of tables reach them
 
@@ -63,15 +64,20 @@ class DistanceFit:
 
 def wrong_distances(samples: CalibrationSet, refined: Refined) -> tuple[DistanceFit, ...]:
     """The errors that explain the residuals best, of those that chance does not explain."""
-    found = []
-    for name in MATRICES if len(samples) >= LEAST_SAMPLES else ():
+    if len(samples) < LEAST_SAMPLES:
+        return ()
+    seen, W = PoseObservations.of(samples), np.tile(np.diag(1 / START_DEVIATIONS[GROUPS]), (len(samples), 1, 1))
+    plain, found = refine(seen, refined.X, refined.Y, W=W), []
+    free = plain.whitened.size - UNKNOWNS - 1
+    for name in MATRICES:
         fit = fitted_distances(name, samples, refined)
-        value, half_width = float(fit.values[0]), _half_width(name, samples, refined, fit)
-        if _is_sure(value, half_width, name):
+        value, (own, shared) = float(fit.values[0]), _half_widths(name, samples, refined, fit)
+        half_width = float(np.hypot(own, shared))
+        ratio = (plain.squares - fit.squares) / (fit.squares / free)  # F with 1 and ``free`` degrees of freedom
+        if ratio > SURE_RATIO and abs(value) > max(own, 2 * shared) and _is_large(value, half_width, name):
             found.append(DistanceFit(_finding(name, value, half_width), fit))
     least = min((each.refined.squares for each in found), default=0.0)
-    as_good = least * (1 + AS_GOOD / (refined.whitened.size - UNKNOWNS - 1))
-    return tuple(each for each in found if each.refined.squares <= as_good)
+    return tuple(each for each in found if each.refined.squares <= least * (1 + AS_GOOD / free))
 
 
 def _finding(name: DistanceError, value: float, half_width: float) -> vision_findings.WrongDistances:
@@ -83,9 +89,9 @@ def _finding(name: DistanceError, value: float, half_width: float) -> vision_fin
     return vision_findings.PrincipalPoint(axis, 100 * value, 100 * half_width)
 
 
-def _is_sure(value: float, half_width: float, name: DistanceError) -> bool:
+def _is_large(value: float, half_width: float, name: DistanceError) -> bool:
     factor, least = (1 + value, MIN_SCALE_ERROR) if name in ("board", "focal_length") else (1.0, MIN_SHIFT)
-    return abs(value) > max(2 * half_width, least) and factor > SURE_SCALE * half_width
+    return abs(value) > least and factor > SURE_SCALE * half_width
 
 
 def board_scale(samples: CalibrationSet, refined: Refined) -> tuple[float, float]:
@@ -94,17 +100,17 @@ def board_scale(samples: CalibrationSet, refined: Refined) -> tuple[float, float
     Errors that all samples share count too: a focal length estimated from the same images scales all distances.
     """
     fit = fitted_distances("board", samples, refined)
-    return 1 + float(fit.values[0]), _half_width("board", samples, refined, fit)
+    return 1 + float(fit.values[0]), float(np.hypot(*_half_widths("board", samples, refined, fit)))
 
 
-def _half_width(name: DistanceError, samples: CalibrationSet, refined: Refined, fit: Refined) -> float:
-    """Half the 95 % interval of a value, with errors of intrinsics that were estimated from the same images."""
+def _half_widths(name: DistanceError, samples: CalibrationSet, refined: Refined, fit: Refined) -> tuple[float, float]:
+    """Half the 95 % intervals of a value: by its samples, and by intrinsics estimated from the same images."""
     own = float(fit.half_width[UNKNOWNS])
     if samples.shared is None:
-        return own
+        return own, 0.0
     shifted = (replace(samples, target=moved(samples.target, error)) for error in np.moveaxis(samples.shared, 2, 0))
     shifts = [fitted_distances(name, each, refined).values[0] - fit.values[0] for each in shifted]
-    return float(np.hypot(own, scipy.special.ndtri((1 + CONFIDENCE) / 2) * np.linalg.norm(shifts)))
+    return own, float(scipy.special.ndtri((1 + CONFIDENCE) / 2) * np.linalg.norm(shifts))
 
 
 def fitted_distances(name: DistanceError, samples: CalibrationSet, refined: Refined) -> Refined:

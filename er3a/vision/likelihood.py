@@ -10,8 +10,7 @@ those of Levenberg and Marquardt [1]_.
 sight better than along it, and its turn about its own normal better than its tilt. Errors of position and of rotation
 are independent at the board's middle, not at its origin, which is a corner: there a tilt moves the board, too. So four
 variances (across and along the sight, tilt, turn) at a point of the board are estimated from the residuals, each
-divided by its redundancy [2]_, and the point with them. Errors across and of rotation grow with the distance, those
-along with its square.
+divided by its redundancy [2]_, and the point with them.
 
 **Intervals** rest on the samples' own residuals, not on the covariance that weights them: each sample's six are one
 draw, independent of the other samples', with the correction of leverage and the degrees of freedom of [3]_. So they
@@ -54,7 +53,6 @@ WEIGHT_ROUNDS = 3
 PRIOR_RESIDUALS = 24.0  # over samples: draw the two variances of position, and of rotation, together in small sets
 MIDDLE = 0.07  # m, standard deviation of the board's middle from its origin, before residuals tell it
 NOISE_NUMBERS = 6  # four variances and the middle
-WIDEST_RATIO = 4.0  # of a distance to the median, that noise is taken to grow with
 
 Model = Callable[[Reals, Reals, Reals], tuple[Reals, Reals]]
 """From X, Y (4, 4) and k more unknowns (k,) to residuals (N, 6) and their derivatives (N, 6, 12 + k)."""
@@ -272,8 +270,8 @@ def _fit(model: Model, W: Reals, start: tuple[Reals, Reals, Reals]) -> _Fit:
 
 @dataclass(frozen=True, eq=False)
 class _Noise:
-    """The noise of boards that are seen at B (N, 4, 4): standard deviations (4,) at the median distance by
-    :data:`GROUPS`, independent at a point of the board (3,), m."""
+    """The noise of boards that are seen at B (N, 4, 4): standard deviations (4,) by :data:`GROUPS`,
+    independent at a point of the board (3,), m."""
 
     B: Reals
     places: int
@@ -282,15 +280,12 @@ class _Noise:
 
     @cached_property
     def axes(self) -> Reals:
-        """(N, 6, 6): from the camera's axes to those across and along the sight, and for turns to the board's, over
-        how much the noise grows with the distance."""
-        distance = np.maximum(np.linalg.norm(self.B[:, :3, 3], axis=1), MIN_DEVIATION)
-        far = np.clip(distance / np.median(distance), 1 / WIDEST_RATIO, WIDEST_RATIO)[:, None]
+        """(N, 6, 6): from the camera's axes to those across and along the sight, and for turns to the board's."""
+        distance = np.maximum(np.linalg.norm(self.B[:, :3, 3], axis=1), MIN_DEVIATION)[:, None]
         axes = np.zeros((len(self.B), 6, 6))
-        axes[:, :3, :3] = [frame_along(p) for p in self.B[:, :3, 3] / distance[:, None]]
+        axes[:, :3, :3] = [frame_along(p) for p in self.B[:, :3, 3] / distance]
         axes[:, 3:, 3:] = self.B[:, :3, :3].mT
-        grown: Reals = axes / np.concatenate([far, far, far**2, far, far, far], axis=1)[..., None]
-        return grown
+        return axes
 
     @property
     def whitening(self) -> Reals:

@@ -50,8 +50,21 @@ from er3a.vision.vision_findings import (
     UnexplainedResiduals,
     grave_warnings,
 )
-from testing.hand_eye_coverage import pose_coverage
-from testing.hand_eye_sets import X_TRUE, Y_TRUE, covariance, flange_poses, noisy, off, pose, seen
+from testing.hand_eye_coverage import board_coverage, pose_coverage
+from testing.hand_eye_sets import (
+    PIXELS,
+    X_TRUE,
+    Y_TRUE,
+    by_solve_pnp,
+    covariance,
+    flange_of,
+    flange_poses,
+    noisy,
+    off,
+    pose,
+    seen,
+    views,
+)
 
 SETUPS = ("eye_in_hand", "eye_to_hand")
 
@@ -174,6 +187,14 @@ def test_intervals_hold_the_truth_as_often_as_they_say(setup, stated):
     assert 0.92 < held.mean() < 0.98
 
 
+@pytest.mark.long
+@pytest.mark.parametrize(("setup", "cell"), [("eye_in_hand", "12 samples"), ("eye_to_hand", "the arm errs too")])
+def test_intervals_hold_the_truth_of_boards_that_opencv_locates(setup, cell):
+    """Positions and rotations, of camera and board; 60 runs leave 3 % either way."""
+    held = board_coverage(setup, cell, 60, 20261127).reshape(-1, 4, 3).mean(axis=(0, 2))
+    assert (np.abs(held - 0.95) < 0.06).all()
+
+
 @pytest.mark.parametrize("setup", SETUPS)
 def test_a_board_turned_by_half_is_named_and_left_out(setup):
     samples = a_set(setup, 3)
@@ -231,7 +252,7 @@ def test_copies_of_samples_narrow_no_interval():
 
 def test_a_fit_that_does_not_converge_can_not_be_used():
     """Three samples: the two variances run away from each other, and intervals change threefold from round to round."""
-    for seed, converged in ((4, True), (5, False)):
+    for seed, converged in ((4, True), (2, False)):
         found = calibrate_hand_eye(a_set("eye_in_hand", seed, 3))
         assert ("not_converged" in {each.code for each in grave_warnings(found.warnings)}) == (not converged)
 
@@ -295,43 +316,30 @@ def test_a_board_of_another_size_is_named_with_the_factor():
     assert scale[0].factor == pytest.approx(1.05, abs=scale[0].half_width)
 
 
-SQUARES = np.stack([*np.meshgrid(0.02 * np.arange(9), 0.02 * np.arange(6)), np.zeros((6, 9))], axis=2).reshape(-1, 3)
-PIXELS = np.array([[900.0, 0, 640], [0, 900, 360], [0, 0, 1]])
-
-
-def by_solve_pnp(setup: str, seed: int, given: np.ndarray) -> CalibrationSet:
+def a_pnp_set(setup: str, seed: int, given: np.ndarray) -> CalibrationSet:
     """Poses that OpenCV computes by intrinsics ``given`` from corners that a camera with others sees, 0.1 px off."""
-    random, kept, poses = np.random.default_rng(seed), [], []
-    for turn in random.uniform(-30, 30, (30, 3)):
-        T = pose(turn, random.uniform([-0.28, -0.17, 0.4], [0.12, 0.07, 0.7]))
-        seen_at = (SQUARES @ T[:3, :3].T + T[:3, 3]) @ PIXELS.T
-        corners = seen_at[:, :2] / seen_at[:, 2:] + random.normal(0, 0.1, (len(SQUARES), 2))
-        _, rotation, position = cv2.solvePnP(SQUARES, corners, given, None)
-        found = np.eye(4)
-        found[:3, :3], found[:3, 3] = cv2.Rodrigues(rotation)[0], position[:, 0]
-        F = Y_TRUE @ np.linalg.inv(X_TRUE @ T)
-        kept.append(F if setup == "eye_in_hand" else np.linalg.inv(F))
-        poses.append(found)
-    return CalibrationSet(setup, np.array(kept), np.array(poses))
+    random = np.random.default_rng(seed)
+    T = views(random, 30, (0.4, 0.7), 25.0)
+    return CalibrationSet(setup, flange_of(setup, T), by_solve_pnp(T, random, 0.1, given))
 
 
 @pytest.mark.parametrize("setup", SETUPS)
 def test_poses_computed_with_a_wrong_focal_length_or_principal_point_are_named(setup):
     """No sample shows it alone; the camera is off by several mm."""
     for factor in (0.95, 1.02, 1.05):
-        found = calibrate_hand_eye(by_solve_pnp(setup, 5, PIXELS * [[factor], [factor], [1]]))
+        found = calibrate_hand_eye(a_pnp_set(setup, 5, PIXELS * [[factor], [factor], [1]]))
         assert np.linalg.norm(off(found.X, X_TRUE)[:3]) > 0.003
         (named,) = grave_warnings(found.warnings)
         assert isinstance(named, FocalLength)
-        assert named.factor == pytest.approx(1 / factor, abs=0.01)
+        assert named.factor == pytest.approx(1 / factor, abs=named.half_width)
     for axis, pixels in (("x", 25), ("y", -25)):
         given = PIXELS.copy()
         given["xy".index(axis), 2] += pixels
-        (named,) = grave_warnings(calibrate_hand_eye(by_solve_pnp(setup, 6, given)).warnings)
+        (named,) = grave_warnings(calibrate_hand_eye(a_pnp_set(setup, 6, given)).warnings)
         assert isinstance(named, PrincipalPoint)
         assert (named.axis, named.percent) == (axis, pytest.approx(100 * pixels / 900, abs=0.8))
     for seed in range(7, 10):
-        assert not grave_warnings(calibrate_hand_eye(by_solve_pnp(setup, seed, PIXELS)).warnings)
+        assert not grave_warnings(calibrate_hand_eye(a_pnp_set(setup, seed, PIXELS)).warnings)
 
 
 @pytest.mark.long
@@ -680,7 +688,7 @@ MENDED = {
         lambda samples, found: stretched(samples, "xy".index(found.axis), 2, found.percent / 100),
     ),
     "few_samples": (lambda: a_set("eye_in_hand", 3, 5), lambda samples, _: with_poses_added(samples)),
-    "not_converged": (lambda: a_set("eye_in_hand", 5, 3), lambda samples, _: with_poses_added(samples)),
+    "not_converged": (lambda: a_set("eye_in_hand", 2, 3), lambda samples, _: with_poses_added(samples)),
     "moved_between": (
         lambda: of_two_setups("eye_in_hand", 24, 14, pose([0, 0, 0], [0.005, 0.002, 0])),
         lambda samples, found: samples.take(np.arange(samples.names.index(found.sample))),
