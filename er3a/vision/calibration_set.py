@@ -9,6 +9,7 @@ refined.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -16,9 +17,10 @@ import scipy
 
 from er3a.by_value import ByValue, Displayed, Sheet
 from er3a.errors import Er3aError, ShapeError
-from er3a.geometry.transforms import check_poses, inverted, posed
+from er3a.geometry.transforms import check_poses, inverted, posed, step_between
 from er3a.numerics.arrays import Flags, Integers, Reals
 
+PLACE_M, PLACE_RAD = 1e-3, np.radians(0.2)  # within which the flange stands at one place
 Setup = Literal["eye_in_hand", "eye_to_hand"]
 OpenFrame = Literal["flange_poses", "base_poses"]
 """What recorded poses may not be: the flange's, and in the robot's own base."""
@@ -82,6 +84,16 @@ class CalibrationSet(ByValue, Displayed):
         rows = zip(self.names, *(1000 * self.flange[:, :3, 3].T), *(1000 * self.target[:, :3, 3].T))
         columns = ("sample", *(f"{part}_{c}_mm" for part in ("flange", "board") for c in "xyz"))
         return Sheet.of_table(f"{len(self)} samples, {self.setup.replace('_', ' ')}", columns, rows, len(self))
+
+    @cached_property
+    def places(self) -> Integers:
+        """At which place the flange was (N,), numbered from 0: errors of the arm, and most of the board's, are one at
+        each, so that samples at one place count as one."""
+        step = step_between(self.flange[:, None], self.flange[None])
+        distance, turn = np.linalg.norm(step[..., :3], axis=2), np.linalg.norm(step[..., 3:], axis=2)
+        near = (distance < PLACE_M) & (turn < PLACE_RAD)
+        numbers: Integers = scipy.sparse.csgraph.connected_components(near, directed=False)[1]
+        return numbers
 
     @property
     def hand(self) -> Reals:

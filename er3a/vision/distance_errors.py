@@ -8,7 +8,7 @@ detectors get mostly from how its outline is foreshortened.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -18,11 +18,21 @@ from er3a.geometry.transforms import moved
 from er3a.numerics.arrays import Reals
 from er3a.vision import vision_findings
 from er3a.vision.calibration_set import CalibrationSet
-from er3a.vision.likelihood import UNKNOWNS, Refined, residuals
+from er3a.vision.likelihood import (
+    CONFIDENCE,
+    GROUPS,
+    START_DEVIATIONS,
+    UNKNOWNS,
+    PoseObservations,
+    Refined,
+    refine,
+    residuals,
+)
 
-CONFIDENCE = 0.95
-EXTRA_ROUNDS = 20
-SURE_SCALE = 3.0  # half widths of its interval, from 0; a vaguer factor comes of samples that don't fit at all
+AS_GOOD = float(scipy.special.chdtri(1, 1 - CONFIDENCE))  # by which chance alone makes two causes differ
+SURE_RATIO = 16.0  # chance reaches it in one of 10 000 sets
+LEAST_SAMPLES = 6  # of which the noise can be told from such an error
+SURE_SCALE = 5.0  # half widths of its interval, from 0; a vaguer factor comes of samples that don't fit at all
 MIN_SCALE_ERROR = 2e-3
 MIN_SHIFT = 5e-3  # of the focal length; smaller ones look like the camera turned, and errors of tables reach them
 
@@ -44,19 +54,33 @@ MATRICES: dict[DistanceError, Reals] = {
 """D of each."""
 
 
-def wrong_distances(samples: CalibrationSet, refined: Refined) -> vision_findings.WrongDistances | None:
-    """The error that explains most of the residuals, of those that chance does not; None if there is none."""
-    best: tuple[float, DistanceError, float, float] | None = None
+@dataclass(frozen=True, eq=False)
+class DistanceFit:
+    """An error of distances, and the samples' fit with it."""
+
+    finding: vision_findings.WrongDistances
+    refined: Refined
+
+
+def wrong_distances(samples: CalibrationSet, refined: Refined) -> tuple[DistanceFit, ...]:
+    """The errors that explain the residuals best, of those that chance does not explain."""
+    if len(samples) < LEAST_SAMPLES:
+        return ()
+    seen, W = PoseObservations.of(samples), np.tile(np.diag(1 / START_DEVIATIONS[GROUPS]), (len(samples), 1, 1))
+    plain, found = refine(seen, refined.X, refined.Y, W=W), []
+    free = plain.whitened.size - UNKNOWNS - 1
     for name in MATRICES:
-        value, half_width, left = _fitted(name, samples.target, samples, refined)
-        if _is_sure(value, half_width, name) and (best is None or left < best[0]):
-            best = left, name, value, half_width
-    if best is None:
-        return None
-    _, name, value, half_width = best
-    half_width = _with_shared(name, samples, refined, (value, half_width))
-    if not _is_sure(value, half_width, name):
-        return None
+        fit = fitted_distances(name, samples, refined)
+        value, (own, shared) = float(fit.values[0]), _half_widths(name, samples, refined, fit)
+        half_width = float(np.hypot(own, shared))
+        ratio = (plain.squares - fit.squares) / (fit.squares / free)  # F with 1 and ``free`` degrees of freedom
+        if ratio > SURE_RATIO and abs(value) > max(own, 2 * shared) and _is_large(value, half_width, name):
+            found.append(DistanceFit(_finding(name, value, half_width), fit))
+    least = min((each.refined.squares for each in found), default=0.0)
+    return tuple(each for each in found if each.refined.squares <= least * (1 + AS_GOOD / free))
+
+
+def _finding(name: DistanceError, value: float, half_width: float) -> vision_findings.WrongDistances:
     if name == "board":
         return vision_findings.BoardScale(1 + value, half_width)
     if name == "focal_length":
@@ -65,9 +89,9 @@ def wrong_distances(samples: CalibrationSet, refined: Refined) -> vision_finding
     return vision_findings.PrincipalPoint(axis, 100 * value, 100 * half_width)
 
 
-def _is_sure(value: float, half_width: float, name: DistanceError) -> bool:
+def _is_large(value: float, half_width: float, name: DistanceError) -> bool:
     factor, least = (1 + value, MIN_SCALE_ERROR) if name in ("board", "focal_length") else (1.0, MIN_SHIFT)
-    return abs(value) > max(2 * half_width, least) and factor > SURE_SCALE * half_width
+    return abs(value) > least and factor > SURE_SCALE * half_width
 
 
 def board_scale(samples: CalibrationSet, refined: Refined) -> tuple[float, float]:
@@ -75,53 +99,33 @@ def board_scale(samples: CalibrationSet, refined: Refined) -> tuple[float, float
 
     Errors that all samples share count too: a focal length estimated from the same images scales all distances.
     """
-    value, half_width, _ = _fitted("board", samples.target, samples, refined)
-    return 1 + value, _with_shared("board", samples, refined, (value, half_width))
+    fit = fitted_distances("board", samples, refined)
+    return 1 + float(fit.values[0]), float(np.hypot(*_half_widths("board", samples, refined, fit)))
 
 
-def _with_shared(name: DistanceError, samples: CalibrationSet, refined: Refined, found: tuple[float, float]) -> float:
-    """Half the 95 % interval of a value, with errors of intrinsics that were estimated from the same images."""
-    value, half_width = found
+def _half_widths(name: DistanceError, samples: CalibrationSet, refined: Refined, fit: Refined) -> tuple[float, float]:
+    """Half the 95 % intervals of a value: by its samples, and by intrinsics estimated from the same images."""
+    own = float(fit.half_width[UNKNOWNS])
     if samples.shared is None:
-        return half_width
-    shifted = (moved(samples.target, error) for error in np.moveaxis(samples.shared, 2, 0))
-    shifts = [_fitted(name, target, samples, refined)[0] - value for target in shifted]
-    return float(np.hypot(half_width, scipy.special.ndtri((1 + CONFIDENCE) / 2) * np.linalg.norm(shifts)))
+        return own, 0.0
+    shifted = (replace(samples, target=moved(samples.target, error)) for error in np.moveaxis(samples.shared, 2, 0))
+    shifts = [fitted_distances(name, each, refined).values[0] - fit.values[0] for each in shifted]
+    return own, float(scipy.special.ndtri((1 + CONFIDENCE) / 2) * np.linalg.norm(shifts))
 
 
-def _fitted(
-    name: DistanceError, target: Reals, samples: CalibrationSet, refined: Refined
-) -> tuple[float, float, float]:
-    """The value for board poses (N, 4, 4), half its 95 % interval by their residuals, and the sum of squares left."""
-    seen = np.concatenate([target[:, :3, 3] @ MATRICES[name].T, np.zeros((len(target), 3))], axis=1)
+def fitted_distances(name: DistanceError, samples: CalibrationSet, refined: Refined) -> Refined:
+    """The fit with an error of distances.
 
-    def shifted(X: Reals, Y: Reals, value: float) -> tuple[Reals, Reals, Reals]:
-        B = target.copy()
-        B[:, :3, 3] += value * seen[:, :3]
-        return *residuals(samples.hand, B, X, Y), seen
-
-    value, half_width, raw = fit_extra_parameter(shifted, (refined.X, refined.Y), refined.deviations)
-    return value, half_width, float(((raw / np.repeat(refined.deviations, 3)) ** 2).sum())
-
-
-def fit_extra_parameter(
-    at: Callable[[Reals, Reals, float], tuple[Reals, Reals, Reals]], poses: tuple[Reals, Reals], deviations: Reals
-) -> tuple[float, float, Reals]:
-    """One more unknown beside the twelve: its value, half its 95 % interval, and the residuals (N, 6) with it.
-
-    ``at(X, Y, value)`` gives residuals (N, 6), their derivatives by the twelve (N, 6, 12), and by the value (N, 6).
+    All samples weigh alike: such an error makes the noise seem larger where it acts, and would be missed there.
     """
-    (X, Y), value = poses, 0.0
-    weight = 1 / np.repeat(deviations, 3)
-    for _ in range(EXTRA_ROUNDS):
-        raw, J, own = at(X, Y, value)
-        J = (np.concatenate([J, own[..., None]], axis=2) * weight[:, None]).reshape(-1, UNKNOWNS + 1)
-        r = (raw * weight).ravel()
-        inverse = np.linalg.pinv(J.T @ J)
-        step = -inverse @ (J.T @ r)
-        X, Y, value = moved(X, step[:6]), moved(Y, step[6:12]), float(value + step[12])
-        if np.abs(step).max() < 1e-10:
-            break
-    free = max(len(r) - UNKNOWNS - 1, 1)
-    half_width = scipy.special.stdtrit(free, (1 + CONFIDENCE) / 2) * np.sqrt(r @ r / free * inverse[12, 12])
-    return value, float(half_width), raw
+    seen = samples.target[:, :3, 3] @ MATRICES[name].T
+    W = np.tile(np.diag(1 / START_DEVIATIONS[GROUPS]), (len(samples), 1, 1))
+
+    def shifted(X: Reals, Y: Reals, values: Reals) -> tuple[Reals, Reals]:
+        B = samples.target.copy()
+        B[:, :3, 3] += values[0] * seen
+        raw, J = residuals(samples.hand, B, X, Y)
+        own = np.concatenate([seen, np.zeros_like(seen)], axis=1)
+        return raw, np.concatenate([J, own[..., None]], axis=2)
+
+    return refine(PoseObservations.of(samples), refined.X, refined.Y, shifted, 1, W)

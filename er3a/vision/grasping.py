@@ -41,6 +41,7 @@ FOLLOWED = 6  # candidates that are followed along the lines
 WIDEST_STEP = 0.35  # rad between waypoints of an approach; more is a jump
 LEG_POINTS = 41
 PLANNING_TOLERANCE = 1e-3  # m
+TIE = 6  # decimals: turns of a symmetrical object tie, and rounding of another processor must not choose
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,7 +270,7 @@ def plan_grasp(
     plans = [_followed(task, each, target) for each in followed]
     good = [plan for plan in plans if isinstance(plan, ChosenGrasp)]
     counts, likeliest = (len(poses), len(candidates), len(followed)), 0.0
-    for best in sorted(good, key=lambda plan: -plan.margin):
+    for best in sorted(good, key=lambda plan: -round(plan.margin, TIE)):
         probability = success_probability(best, target, T_base_object, covariance_at(best.q), task.needs)
         if probability >= task.needs.probability:
             deviation = float(np.sqrt(probability * (1 - probability) / len(draws(np.eye(6)))))
@@ -321,7 +322,8 @@ def _judged(task: GraspTask, candidates: list[_Candidate], poses: int) -> tuple[
                 wanted = 1000 * needs.clearance
                 return [], GraspCollides(len(regular), pair, float(1000 * clear.distance[best]), wanted)
         regular, margins = regular[free], margins[free]
-    order = np.lexsort([np.abs(q[regular] - task.home).max(axis=1), -np.minimum(margins, 3.0).round(6)])
+    far = np.abs(q[regular] - task.home).max(axis=1)
+    order = np.lexsort([far.round(TIE), -np.minimum(margins, 3.0).round(TIE)])
     return [candidates[regular[k]] for k in order], None
 
 

@@ -41,18 +41,17 @@ from er3a.geometry.transforms import (
 from er3a.numerics.arrays import Flags, Reals
 from er3a.vision import calibration_set, vision_findings
 from er3a.vision.classic_methods import METHOD_NAMES, MethodName, mean_pose, solved_by
-from er3a.vision.distance_errors import CONFIDENCE, wrong_distances
-from er3a.vision.likelihood import UNKNOWNS, PoseObservations, Refined, refine, residuals, whitening
+from er3a.vision.distance_errors import DistanceFit, wrong_distances
+from er3a.vision.likelihood import UNKNOWNS, PoseObservations, Refined, half_width, refine, residuals
 from er3a.vision.setup_changes import moved_between
 
-DEVIATIONS = 6.0  # of the angle between two samples; beyond, a pair is in conflict
+DEVIATIONS = 20.0  # of the angle between two samples; beyond, a pair is in conflict. Tilts seen head-on are as vague
 MAX_DEVIATION = np.radians(2.0)  # of a camera that is of any use
 ROUNDING = 1e-6  # rad
 SAME_POSITION_M, SAME_ROTATION_RAD = 5e-5, 2e-4
 MOSTLY_APART = 0.8  # of samples that stand apart, so that their residuals are judged as independent
-PLACE_M, PLACE_RAD = 1e-3, np.radians(0.2)  # within which the flange stands at one place
 COPY_DECIMALS = 9  # of m and of rotation matrices
-FALSE_ALARMS = 0.01  # of sound sets in which a sample is called far from the fit
+FALSE_ALARMS = 1e-3  # of sound sets in which a sample is called far from the fit
 BOARD_TURNS: dict[vision_findings.SuspectKind, tuple[str, tuple[float, ...]]] = {  # axis of the board, and deg
     "half_turn_x": ("x", (180.0,)),
     "half_turn_y": ("y", (180.0,)),
@@ -188,14 +187,6 @@ def _near(flange: Reals, i: int, distance: float, turn: float) -> Flags:
     step = step_between(np.broadcast_to(flange[i], (i, 4, 4)), flange[:i])
     near: Flags = (np.linalg.norm(step[:, :3], axis=1) < distance) & (np.linalg.norm(step[:, 3:], axis=1) < turn)
     return near
-
-
-def _places(flange: Reals) -> int:
-    """At how many places the flange stood: errors of the arm, and most of the board's, are one at each."""
-    near = np.zeros((len(flange), len(flange)), bool)
-    for i in range(1, len(flange)):
-        near[i, :i] = _near(flange, i, PLACE_M, PLACE_RAD)
-    return int(scipy.sparse.csgraph.connected_components(near, directed=False)[0])
 
 
 def repeated_poses(samples: calibration_set.CalibrationSet) -> tuple[vision_findings.RepeatedPose, ...]:
@@ -372,6 +363,7 @@ LITTLE_TURN, LITTLE_SPREAD = np.radians(15), np.radians(10)
 EXCLUDED = 1e-3
 CONTRADICTED = 1e-3  # probability of touched points as far off, below which they contradict the calibration
 MAX_FACTS = 10
+STARTS: tuple[MethodName, ...] = ("park", "shah")
 DIRECTIONS = ((False, False), (True, True), (True, False), (False, True))
 
 
@@ -510,27 +502,29 @@ def calibrate_hand_eye(samples: calibration_set.CalibrationSet) -> HandEye:
     kept = samples.take(used)
     warnings: list[vision_findings.CalibrationWarning] = [angles.warning] if angles.warning else []
     directions = directions_tried(kept, refined)
-    warnings += _warnings(kept, refined, greatest, apart, directions)
-    share = _places(kept.flange) / len(kept)  # samples at one place count as one
+    distances = wrong_distances(kept, refined)
+    warnings += _warnings(kept, refined, greatest, apart, directions, distances)
+    share = len(set(kept.places.tolist())) / len(kept)
     named = {each.code for each in vision_findings.grave_warnings(warnings)} - {"unexplained_residuals", "more_scatter"}
     if not named and share > MOSTLY_APART and (step := moved_between(samples.take(once), used[once], refined)):
         warnings = [replace(w, tried=()) if isinstance(w, vision_findings.MoreScatter) else w for w in warnings]
         warnings.append(step)
-    covariance = refined.covariance / share + _shared_covariance(kept, refined)
-    half_width = scipy.special.stdtrit(refined.freedom * share, (1 + CONFIDENCE) / 2) * np.sqrt(np.diag(covariance))
+    covariance = refined.covariance + _shared_covariance(kept, refined)
+    half = half_width(covariance, refined.freedom)
+    wider = _wider(half, refined, distances) / half
     found = HandEye(
         samples=samples,
         used=used,
         X=refined.X,
         Y=refined.Y,
-        covariance=covariance,
-        half_width=half_width,
+        covariance=covariance * np.outer(wider, wider),
+        half_width=half * wider,
         residual=residuals(samples.hand, samples.target, refined.X, refined.Y)[0],
         scatter=float(refined.scatter),
         deviations=refined.deviations,
         greatest_turn=greatest,
         axes_apart=apart,
-        methods=tuple(_answer(name, kept, refined, half_width) for name in METHOD_NAMES),
+        methods=tuple(_answer(name, kept, refined, half * wider) for name in METHOD_NAMES),
         directions=directions,
         suspects=(*suspects, *repeated_poses(samples)),
         warnings=tuple(warnings),
@@ -550,7 +544,7 @@ def best_closed_form(F: Reals, B: Reals, deviations: Reals) -> tuple[Reals, Real
         if no method has one
     """
     best: tuple[float, Reals, Reals] | None = None
-    for name in METHOD_NAMES:
+    for name in STARTS:
         try:
             X, Y = solved_by(name, F, B)
         except np.linalg.LinAlgError:
@@ -578,13 +572,19 @@ def _shared_covariance(samples: calibration_set.CalibrationSet, refined: Refined
     """What errors that all samples share add to the covariance of the two poses, (12, 12)."""
     if samples.shared is None:
         return np.zeros((UNKNOWNS, UNKNOWNS))
-    seen = PoseObservations.of(samples)
-    sigma = np.broadcast_to(np.repeat(refined.deviations, 3), (len(samples), 6))
-    W = whitening(seen, sigma, refined.X, refined.Y)
-    J = W @ residuals(samples.hand, samples.target, refined.X, refined.Y)[1]
-    moves = np.linalg.solve(np.einsum("nki,nkj->ij", J, J), np.einsum("nki,nkj->ij", J, W @ samples.shared))
+    J = refined.W @ residuals(samples.hand, samples.target, refined.X, refined.Y)[1]
+    moves = np.linalg.solve(np.einsum("nki,nkj->ij", J, J), np.einsum("nki,nkj->ij", J, refined.W @ samples.shared))
     added: Reals = moves @ moves.T
     return added
+
+
+def _wider(half: Reals, refined: Refined, distances: tuple[DistanceFit, ...]) -> Reals:
+    """Half widths (12,) that also hold what the poses are with each error of distances that explains the samples."""
+    for each in distances:
+        fit = each.refined
+        shift = np.concatenate([step_between(refined.X, fit.X), step_between(refined.Y, fit.Y)])
+        half = np.maximum(half, np.abs(shift) + fit.half_width[:UNKNOWNS])
+    return half
 
 
 def _check_determined(samples: calibration_set.CalibrationSet) -> tuple[float, float]:
@@ -616,13 +616,14 @@ def _warnings(
     greatest: float,
     apart: float,
     directions: tuple[vision_findings.DirectionTried, ...],
+    distances: tuple[DistanceFit, ...],
 ) -> list[vision_findings.CalibrationWarning]:
     found: list[vision_findings.CalibrationWarning] = []
-    if not refined.converged.all():
+    if not refined.converged:
         found.append(vision_findings.NotConverged(len(samples)))
     if greatest < LITTLE_TURN or apart < LITTLE_SPREAD:
         found.append(vision_findings.LittleMotion(float(np.degrees(greatest)), float(np.degrees(apart))))
-    if (places := _places(samples.flange)) <= FEW_SAMPLES:
+    if (places := len(set(samples.places.tolist()))) <= FEW_SAMPLES:
         found.append(vision_findings.FewSamples(places))
     free = 6 * len(samples) - 12
     largest = float(np.sqrt(scipy.special.chdtri(free, EXCLUDED) / free))
@@ -633,8 +634,7 @@ def _warnings(
     if directions[0].status == "excluded":
         best = next(each for each in directions if each.status == "best")
         return [*found, vision_findings.OtherDirection(best.flange_inverted, best.target_inverted)]
-    if wrong := wrong_distances(samples, refined):
-        found.append(wrong)
+    found += [each.finding for each in distances]
     size, turn = _misfit(refined.residual)
     if [each.code for each in vision_findings.grave_warnings(found)] == ["more_scatter"]:
         tried = vision_findings.READINGS if size >= 1 else vision_findings.READINGS_IN_SMALL

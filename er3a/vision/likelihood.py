@@ -1,4 +1,4 @@
-"""Maximum-likelihood refinement of hand-eye and board pose, over batches of sets.
+"""Maximum-likelihood refinement of hand-eye and board pose, with intervals that hold whatever the samples' noise is.
 
 A sample predicts T_camera_board = X^-1 F^-1 Y. Its six residuals are the position seen less the one predicted, and the
 rotation vector from predicted to seen, both by the camera's axes. They scatter by the camera's covariance and, carried
@@ -6,80 +6,132 @@ into the camera to first order, the flange's. Hand-eye X and board Y change by t
 rotations (rad) about the axes of their parent frames; derivatives with respect to these are in closed form. Steps are
 those of Levenberg and Marquardt [1]_.
 
-Where no covariance is stated, two variances, of position and of rotation in all samples alike, are estimated from
-the residuals, each divided by its redundancy [2]_. Where they are stated, their common scale is.
+**Noise.** Where no covariance is stated, it is estimated. A flat board's corners give its position across the line of
+sight better than along it, and its turn about its own normal better than its tilt. Errors of position and of rotation
+are independent at the board's middle, not at its origin, which is a corner: there a tilt moves the board, too. So four
+variances (across and along the sight, tilt, turn) at a point of the board are estimated from the residuals, each
+divided by its redundancy [2]_, and the point with them.
+
+**Intervals** rest on the samples' own residuals, not on the covariance that weights them: each sample's six are one
+draw, independent of the other samples', with the correction of leverage and the degrees of freedom of [3]_. So they
+hold for errors of the arm, too, and for noise that is otherwise than stated.
 
 References
 ----------
 .. [1] D. W. Marquardt, "An algorithm for least-squares estimation of nonlinear parameters", SIAM J. 11(2), 1963.
 .. [2] W. Foerstner, "Ein Verfahren zur Schaetzung von Varianz- und Kovarianzkomponenten", Allgemeine
    Vermessungs-Nachrichten 86, 1979.
+.. [3] R. M. Bell, D. F. McCaffrey, "Bias reduction in standard errors for linear regression with multi-stage
+   samples", Survey Methodology 28(2), 2002.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 
 import numpy as np
+import scipy
 
-from er3a.geometry.transforms import inverse_right_jacobian, log_rotation, moved, skew, transposed
-from er3a.numerics.arrays import Reals
+from er3a.geometry.transforms import frame_along, inverse_right_jacobian, log_rotation, moved, skew, transposed
+from er3a.numerics.arrays import Integers, Reals
 from er3a.vision.calibration_set import CalibrationSet, Setup
 
 UNKNOWNS = 12
+CONFIDENCE = 0.95
 MAX_STEPS = 60
 STEP_ENDS = 1e-11  # m and rad
-VARIANCE_ROUNDS = 12
-WEIGHT_ROUNDS = 3
+ROUNDS = 20
 SETTLED = 1e-2  # share by which deviations may still change in the last round
-START_DEVIATIONS = (1e-3, 5e-3)  # m, rad
 MIN_DEVIATION = 1e-12
+MIN_FREE = 1e-6  # of a sample's residuals that the fit pulls to zero whatever they are
+GROUPS = np.array([0, 0, 1, 2, 2, 3])  # across and along the sight, tilt, turn about the board's normal
+POOLED = np.kron(np.eye(2), np.ones((2, 2)))  # of position, and of rotation
+START_DEVIATIONS = np.array([1e-3, 1e-3, 5e-3, 5e-3])  # m, rad
+WEIGHT_ROUNDS = 3
+PRIOR_RESIDUALS = 24.0  # over samples: draw the two variances of position, and of rotation, together in small sets
+MIDDLE = 0.07  # m, standard deviation of the board's middle from its origin, before residuals tell it
+NOISE_NUMBERS = 6  # four variances and the middle
+
+Model = Callable[[Reals, Reals, Reals], tuple[Reals, Reals]]
+"""From X, Y (4, 4) and k more unknowns (k,) to residuals (N, 6) and their derivatives (N, 6, 12 + k)."""
 
 
 @dataclass(frozen=True, eq=False)
 class PoseObservations:
-    """Samples (..., N, 4, 4) of any number of sets; see :class:`er3a.vision.calibration_set.CalibrationSet`."""
+    """Samples (N, 4, 4) of a set; see :class:`er3a.vision.calibration_set.CalibrationSet`.
+
+    ``places`` (N,), numbers of the places that share their errors; None: each sample has its own.
+    """
 
     setup: Setup
     F: Reals
     B: Reals
     camera_covariance: Reals | None = None
     flange_covariance: Reals | None = None
+    places: Integers | None = None
+
+    @property
+    def numbers(self) -> Integers:
+        """Of the place of each sample, (N,)."""
+        return np.arange(len(self.F)) if self.places is None else self.places
 
     @classmethod
     def of(cls, samples: CalibrationSet) -> PoseObservations:
         """Those of a set, with what it states of their scatter."""
-        covariances = samples.camera_covariance, samples.flange_covariance
-        return cls(samples.setup, samples.hand, samples.target, *covariances)
+        stated = samples.camera_covariance, samples.flange_covariance
+        return cls(samples.setup, samples.hand, samples.target, *stated, samples.places)
 
 
 @dataclass(frozen=True, eq=False)
 class Refined:
-    """The likeliest hand-eye and board poses, one for each set.
+    """The likeliest hand-eye and board poses, with k more unknowns if a model has some.
 
     Attributes
     ----------
-    X, Y : (..., 4, 4)
-    covariance : (..., 12, 12) of X's six numbers and Y's, m and rad
-    whitened : (..., N, 6), residuals in standard deviations, as stated or estimated
-    residual : (..., N, 6), m and rad, by the camera's axes
-    leverage : (..., N, 6), how far each residual is pulled to zero by its own sample, 0 to 1
-    freedom : (..., 12), degrees of freedom of the scale that each number's interval rests on
-    scatter : (...,), root mean square of the whitened residuals, by degrees of freedom
-    deviations : (..., 2), m and rad: of the camera's position and rotation, root mean square by axis
-    converged : (...,), whether the steps ended, and the deviations with them
+    X, Y : (4, 4); values : (k,), the other unknowns
+    covariance : (12 + k, 12 + k) of X's six numbers, Y's, m and rad, and the others
+    freedom : (12 + k,), degrees of freedom of each number's interval
+    W : (N, 6, 6), which give the residuals unit covariance, as stated or estimated
+    whitened : (N, 6), residuals in standard deviations
+    residual : (N, 6), m and rad, by the camera's axes
+    leverage : (N, 6), how far each whitened residual is pulled to zero by its own sample, 0 to 1
+    scatter : root mean square of the whitened residuals, by degrees of freedom
+    deviations : (2,), m and rad: of the board's position and rotation, root mean square by axis
+    converged : whether the steps ended, and the deviations with them
     """
 
     X: Reals
     Y: Reals
+    values: Reals
     covariance: Reals
+    freedom: Reals
+    W: Reals
     whitened: Reals
     residual: Reals
     leverage: Reals
-    freedom: Reals
-    scatter: Reals
+    scatter: float
     deviations: Reals
-    converged: Reals
+    converged: bool
+
+    @property
+    def squares(self) -> float:
+        """Sum of the squares of the whitened residuals."""
+        return float((self.whitened**2).sum())
+
+    @property
+    def half_width(self) -> Reals:
+        """Half the 95 % intervals (12 + k,)."""
+        half: Reals = half_width(self.covariance, self.freedom)
+        return half
+
+
+def half_width(covariance: Reals, freedom: Reals) -> Reals:
+    """Half the 95 % intervals (p,) by Student, of a covariance (p, p) with degrees of freedom (p,), one at least."""
+    quantile = scipy.special.stdtrit(np.maximum(freedom, 1.0), (1 + CONFIDENCE) / 2)
+    half: Reals = quantile * np.sqrt(np.diag(covariance))
+    return half
 
 
 def residuals(F: Reals, B: Reals, X: Reals, Y: Reals) -> tuple[Reals, Reals]:
@@ -116,94 +168,189 @@ def flange_to_camera(setup: Setup, F: Reals, X: Reals, Y: Reals) -> Reals:
     return G
 
 
-def whitening(seen: PoseObservations, sigma: Reals, X: Reals, Y: Reals) -> Reals:
-    """Matrices (..., N, 6, 6) that give residuals unit covariance."""
-    if seen.camera_covariance is None:
-        S = sigma[..., :, None] ** 2 * np.eye(6)
-    else:
-        S = np.broadcast_to(seen.camera_covariance, (*sigma.shape, 6))
-    if (own := _flange_covariance(seen)) is not None:
+def stated_whitening(seen: PoseObservations, X: Reals, Y: Reals) -> Reals:
+    """Matrices (N, 6, 6) that give residuals unit covariance, by what is stated of camera and flange."""
+    assert seen.camera_covariance is not None
+    S = seen.camera_covariance
+    if seen.flange_covariance is not None:
         G = flange_to_camera(seen.setup, seen.F, X, Y)
-        S = S + G @ own @ transposed(G)
+        S = S + G @ seen.flange_covariance @ G.mT
     W: Reals = np.linalg.inv(np.linalg.cholesky(S))
     return W
 
 
-def refine(seen: PoseObservations, X: Reals, Y: Reals) -> Refined:
-    """The likeliest poses from starts X, Y (..., 4, 4).
+def refine(
+    seen: PoseObservations, X: Reals, Y: Reals, model: Model | None = None, more: int = 0, W: Reals | None = None
+) -> Refined:
+    """The likeliest poses from starts X, Y (4, 4).
+
+    Parameters
+    ----------
+    model : what predicts the samples, with ``more`` unknowns that start at zero; None: the two poses alone
+    W : (N, 6, 6), weights to keep; None: as the samples state them, or estimated
 
     Raises
     ------
     LinAlgError
-        where the samples leave some of the twelve numbers open
+        where the samples leave some of the unknowns open
     """
-    known = seen.camera_covariance
-    batch = (*seen.F.shape[:-2], 6)
-    deviations = np.broadcast_to(np.array(START_DEVIATIONS), (*X.shape[:-2], 2)).copy()
-    converged = np.ones(X.shape[:-2], dtype=bool)
-    for _ in range(VARIANCE_ROUNDS if known is None else (1 if _flange_covariance(seen) is None else WEIGHT_ROUNDS)):
-        sigma = np.broadcast_to(np.repeat(deviations, 3, axis=-1)[..., None, :], batch)
-        W = whitening(seen, sigma, X, Y)
-        X, Y, converged = _steps(seen, W, X, Y)
-        raw, derivative = residuals(seen.F, seen.B, X, Y)
-        white, J = (W @ raw[..., None])[..., 0], W @ derivative
-        H = np.einsum("...nki,...nkj->...ij", J, J)
-        inverse = np.linalg.inv(H)
-        leverage = np.einsum("...nki,...ij,...nkj->...nk", J, inverse, J)
-        redundancy = (1 - leverage).sum(axis=-2)
-        redundancy = np.stack([redundancy[..., :3].sum(axis=-1), redundancy[..., 3:].sum(axis=-1)], axis=-1)
-        if known is None:
-            squares = np.stack([(white[..., part] ** 2).sum(axis=(-2, -1)) for part in (slice(3), slice(3, 6))], -1)
-            ratio = np.sqrt(squares / redundancy)
-            before, deviations = deviations, np.maximum(deviations * ratio, MIN_DEVIATION)
-            change = np.abs(deviations / before - 1)
-            if change.max() < 1e-6:
-                break
-            converged = converged & (change < SETTLED).all(axis=-1)
-    freedom_all = 6.0 * seen.F.shape[-3] - UNKNOWNS
-    scatter = np.sqrt((white**2).sum(axis=(-2, -1)) / freedom_all)
-    if known is None:
-        parts = np.array([0, 0, 0, 1, 1, 1] * 2)
-        freedom, scale = redundancy[..., parts], np.ones_like(scatter)
-    else:
-        freedom, scale = np.full((*X.shape[:-2], UNKNOWNS), freedom_all), scatter
-        variances = np.diagonal(known, axis1=-2, axis2=-1)
-        deviations = np.sqrt(np.stack([variances[..., :3].mean((-2, -1)), variances[..., 3:].mean((-2, -1))], -1))
-    covariance = inverse * scale[..., None, None] ** 2
-    return Refined(X, Y, covariance, white, raw, leverage, freedom, scatter, deviations, converged)
-
-
-def _flange_covariance(seen: PoseObservations) -> Reals | None:
-    """The flange's covariance, if it has one that is not zero."""
-    own = seen.flange_covariance
-    return own if own is not None and np.any(own) else None
-
-
-def _steps(seen: PoseObservations, W: Reals, X: Reals, Y: Reals) -> tuple[Reals, Reals, Reals]:
-    """Levenberg and Marquardt's steps, each set with a damping of its own."""
-    damping = np.full(X.shape[:-2], 1e-6)
-    done = np.zeros(X.shape[:-2], dtype=bool)
-    cost, H, g = _normal(seen, W, X, Y)
-    for _ in range(MAX_STEPS):
-        size = np.diagonal(H, axis1=-2, axis2=-1)
-        damped = H + (damping[..., None] * size)[..., None] * np.eye(UNKNOWNS)
-        step: Reals = np.asarray(np.linalg.solve(damped, -g[..., None])[..., 0], float)
-        X_new, Y_new = moved(X, step[..., :6]), moved(Y, step[..., 6:])
-        cost_new, H_new, g_new = _normal(seen, W, X_new, Y_new)
-        better = (cost_new <= cost) & ~done
-        done |= np.abs(step).max(axis=-1) < STEP_ENDS
-        done |= np.abs(cost - cost_new) <= 1e-14 * cost
-        damping = np.clip(np.where(better, damping / 10, damping * 10), 1e-12, 1e12)
-        pick = better[..., None, None]
-        X, Y, H = np.where(pick, X_new, X), np.where(pick, Y_new, Y), np.where(pick, H_new, H)
-        g, cost = np.where(better[..., None], g_new, g), np.where(better, cost_new, cost)
-        if done.all():
+    at = model or (lambda X, Y, _: residuals(seen.F, seen.B, X, Y))
+    start = X, Y, np.zeros(more)
+    if W is not None:
+        return _refined(seen, _fit(at, W, start), 0)
+    if seen.camera_covariance is not None:
+        fit = _fit(at, stated_whitening(seen, X, Y), start)
+        for _ in range(0 if seen.flange_covariance is None else WEIGHT_ROUNDS):
+            fit = _fit(at, stated_whitening(seen, fit.X, fit.Y), fit.unknowns)
+        return _refined(seen, fit, 0)
+    noise, change = _Noise(seen.B, len(set(seen.numbers.tolist()))), np.inf
+    fit = _fit(at, noise.whitening, start)
+    for _ in range(ROUNDS):
+        again = noise.again(fit)
+        change = float(np.abs(again.deviations / noise.deviations - 1).max())
+        noise = again
+        fit = _fit(at, noise.whitening, fit.unknowns)
+        if change < SETTLED / 100:
             break
-    return X, Y, done
+    return _refined(seen, replace(fit, ended=fit.ended and change < SETTLED), NOISE_NUMBERS)
 
 
-def _normal(seen: PoseObservations, W: Reals, X: Reals, Y: Reals) -> tuple[Reals, Reals, Reals]:
-    raw, derivative = residuals(seen.F, seen.B, X, Y)
-    white, J = (W @ raw[..., None])[..., 0], W @ derivative
-    H, g = np.einsum("...nki,...nkj->...ij", J, J), np.einsum("...nki,...nk->...i", J, white)
-    return (white**2).sum(axis=(-2, -1)), H, g
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """Unknowns, and at them whitened residuals (N, 6), derivatives (N, 6, p), and the inverse (p, p) of J^T J."""
+
+    X: Reals
+    Y: Reals
+    values: Reals
+    W: Reals
+    raw: Reals
+    white: Reals
+    J: Reals
+    ended: bool = False
+
+    @property
+    def unknowns(self) -> tuple[Reals, Reals, Reals]:
+        return self.X, self.Y, self.values
+
+    @cached_property
+    def inverse(self) -> Reals:
+        size = np.linalg.norm(self.J, axis=(0, 1))
+        J = self.J / size
+        found: Reals = np.linalg.inv(np.einsum("nki,nkj->ij", J, J)) / np.outer(size, size)
+        return found
+
+    @cached_property
+    def leverage(self) -> Reals:
+        """Of each whitened residual, (N, 6)."""
+        found: Reals = np.einsum("nki,ij,nkj->nk", self.J, self.inverse, self.J)
+        return found
+
+
+def _at(model: Model, W: Reals, X: Reals, Y: Reals, values: Reals) -> _Fit:
+    raw, J = model(X, Y, values)
+    return _Fit(X, Y, values, W, raw, (W @ raw[..., None])[..., 0], W @ J)
+
+
+def _fit(model: Model, W: Reals, start: tuple[Reals, Reals, Reals]) -> _Fit:
+    """The least squares with weights W, by Levenberg and Marquardt's steps."""
+    fit, damping = _at(model, W, *start), 1e-6
+    for _ in range(MAX_STEPS):
+        H, g = np.einsum("nki,nkj->ij", fit.J, fit.J), np.einsum("nki,nk->i", fit.J, fit.white)
+        size = np.sqrt(np.diag(H))
+        step = -np.linalg.solve(H / np.outer(size, size) + damping * np.eye(len(H)), g / size) / size
+        X, Y = moved(fit.X, step[:6]), moved(fit.Y, step[6:UNKNOWNS])
+        new = _at(model, W, X, Y, fit.values + step[UNKNOWNS:])
+        before, after = (fit.white**2).sum(), (new.white**2).sum()
+        fit = new if after <= before else fit
+        damping = np.clip(damping * (0.1 if after <= before else 10), 1e-12, 1e12)
+        if np.abs(step).max() < STEP_ENDS or abs(before - after) <= 1e-14 * before:
+            return replace(fit, ended=True)
+    return fit
+
+
+@dataclass(frozen=True, eq=False)
+class _Noise:
+    """The noise of boards that are seen at B (N, 4, 4): standard deviations (4,) by :data:`GROUPS`,
+    independent at a point of the board (3,), m."""
+
+    B: Reals
+    places: int
+    deviations: Reals = field(default_factory=START_DEVIATIONS.copy)
+    middle: Reals = field(default_factory=partial(np.zeros, 3))
+
+    @cached_property
+    def axes(self) -> Reals:
+        """(N, 6, 6): from the camera's axes to those across and along the sight, and for turns to the board's."""
+        distance = np.maximum(np.linalg.norm(self.B[:, :3, 3], axis=1), MIN_DEVIATION)[:, None]
+        axes = np.zeros((len(self.B), 6, 6))
+        axes[:, :3, :3] = [frame_along(p) for p in self.B[:, :3, 3] / distance]
+        axes[:, 3:, 3:] = self.B[:, :3, :3].mT
+        return axes
+
+    @property
+    def whitening(self) -> Reals:
+        """(N, 6, 6), of residuals at the board's origin."""
+        to_middle = np.tile(np.eye(6), (len(self.B), 1, 1))
+        to_middle[:, :3, 3:] = -skew(self.B[:, :3, :3] @ self.middle)
+        W: Reals = self.axes / self.deviations[GROUPS, None] @ to_middle
+        return W
+
+    def again(self, fit: _Fit) -> _Noise:
+        """Estimated from the residuals of a fit."""
+        by_group = np.eye(4)[GROUPS]
+        squares = (fit.white**2).sum(axis=0) @ by_group * self.deviations**2
+        free = np.maximum((1 - fit.leverage).sum(axis=0) @ by_group, MIN_FREE)
+        pooled = (squares @ POOLED) / (free @ POOLED)
+        prior = PRIOR_RESIDUALS * len(self.B) / self.places**2
+        variances = (squares + prior * pooled) / (free + prior)
+        deviations = np.maximum(np.sqrt(variances), MIN_DEVIATION)
+        # The part of the position's residuals that the rotation's explain, as turns about the middle.
+        weights = self.axes[:, :3, :3] / deviations[GROUPS[:3], None]
+        lever = (weights @ skew(fit.raw[:, 3:]) @ self.B[:, :3, :3])[..., :2].reshape(-1, 2)
+        shift = (weights @ fit.raw[:, :3, None]).ravel()
+        middle = -np.linalg.solve(lever.T @ lever + np.eye(2) / MIDDLE**2, lever.T @ shift)
+        return _Noise(self.B, self.places, deviations, np.append(middle, 0.0))
+
+
+def _refined(seen: PoseObservations, fit: _Fit, noise_numbers: int) -> Refined:
+    """A fit with its intervals; ``noise_numbers``: how many numbers of the noise were estimated with it."""
+    at = np.eye(seen.numbers.max() + 1)[seen.numbers]
+    variances, freedom = _clustered(fit, at)
+    free = max(6 * at.shape[1] - len(fit.inverse), 1)
+    variances = np.maximum(variances, MIN_DEVIATION * np.diag(fit.inverse)) * free / max(free - noise_numbers, 1)
+    scale = np.sqrt(variances / np.diag(fit.inverse))
+    spread = np.linalg.inv(fit.W)
+    S = spread @ spread.mT if seen.camera_covariance is None else seen.camera_covariance
+    return Refined(
+        X=fit.X,
+        Y=fit.Y,
+        values=fit.values,
+        covariance=fit.inverse * np.outer(scale, scale),
+        freedom=freedom,
+        W=fit.W,
+        whitened=fit.white,
+        residual=fit.raw,
+        leverage=fit.leverage,
+        scatter=float(np.sqrt((fit.white**2).sum() / (fit.white.size - len(fit.inverse)))),
+        deviations=np.sqrt(np.diagonal(S, axis1=1, axis2=2).reshape(-1, 2, 3).mean(axis=(0, 2))),
+        converged=fit.ended,
+    )
+
+
+def _clustered(fit: _Fit, at: Reals) -> tuple[Reals, Reals]:
+    """Variances (p,) of the unknowns from the scatter of whole places, and their degrees of freedom (p,), after [3]_.
+
+    With H_n = J_n (J^T J)^-1 J_n^T, an unknown's error is the sum of g_n e_n over samples, where
+    g_n = (J^T J)^-1 J_n^T (1 - H_n)^-1/2 and e_n are the sample's residuals. ``at`` (N, C): the place of each sample; m
+    copies of a sample pull m times as much.
+    """
+    pulls = (at @ at.sum(axis=0))[:, None, None] * (fit.J @ fit.inverse @ fit.J.mT)
+    left, axes = np.linalg.eigh(np.eye(6) - pulls)
+    adjusted = axes / np.sqrt(np.maximum(left, MIN_FREE))[:, None] @ axes.mT
+    g = np.einsum("pq,nkq,nkl->pnl", fit.inverse, fit.J, adjusted)
+    variances = ((np.einsum("pnl,nl->pn", g, fit.white) @ at) ** 2).sum(axis=1)
+    own, pull = (g**2).sum(axis=2) @ at, np.einsum("pnl,nlq,nc->pcq", g, fit.J, at, optimize=True)
+    shared = np.einsum("pnq,qr,pnr->pn", pull, fit.inverse, pull)
+    both = np.einsum("pnq,pnr->pqr", pull, pull) @ fit.inverse
+    squares = (own * (own - 2 * shared)).sum(axis=1) + np.einsum("pqr,prq->p", both, both)
+    return variances, (own - shared).sum(axis=1) ** 2 / squares

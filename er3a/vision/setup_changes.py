@@ -15,10 +15,10 @@ from er3a.geometry.transforms import inverted, step_between
 from er3a.numerics.arrays import Flags, Reals
 from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.classic_methods import mean_pose
-from er3a.vision.likelihood import UNKNOWNS, PoseObservations, Refined, residuals, whitening
+from er3a.vision.likelihood import UNKNOWNS, Refined, residuals
 from er3a.vision.vision_findings import MovedBetween
 
-CHANCE = 1e-4  # of sound sets in which a step is found
+CHANCE = 1e-6  # of sound sets in which a step is found
 MIN_BLOCK = 2  # samples on either side of a step
 EXPLAINED = 3.0  # standard deviations
 SOLVABLE = 1e8  # condition of a step's equations, beyond which the samples on one side of it don't determine it
@@ -36,10 +36,7 @@ def _of_used(samples: CalibrationSet, refined: Refined) -> MovedBetween | None:
     free = 6 * count - UNKNOWNS - 6
     if count < 2 * MIN_BLOCK or free < 6:
         return None
-    sigma = np.broadcast_to(np.repeat(refined.deviations, 3), (count, 6))
-    W = whitening(PoseObservations.of(samples), sigma, refined.X, refined.Y)
-    raw, derivative = residuals(samples.hand, samples.target, refined.X, refined.Y)
-    r, J = (W @ raw[..., None])[..., 0], W @ derivative
+    r, J = refined.whitened, refined.W @ residuals(samples.hand, samples.target, refined.X, refined.Y)[1]
     inverse = np.linalg.inv(np.einsum("nki,nkj->ij", J, J))
     squares, best = float((r**2).sum()), (1.0, 0, "", np.zeros(6))
     for what, part in PARTS.items():

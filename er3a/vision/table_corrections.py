@@ -22,7 +22,7 @@ from er3a.calibration.fit import NO_EFFECT, SCALE
 from er3a.calibration.outcomes import Held, LevelName, MovesNothing, NotToldApart
 from er3a.calibration.parameters import DEPENDENT, Parameter, parallel_pairs, parameters_of
 from er3a.calibration.parameters import moved as moved_tables
-from er3a.geometry.transforms import inverse_right_jacobian, inverted, moved, step_between
+from er3a.geometry.transforms import inverse_right_jacobian, inverted, step_between
 from er3a.kinematics.chain import row_values
 from er3a.kinematics.forward import forward
 from er3a.kinematics.table_batch import Tables, frames_of, join, robot_of, tables_of
@@ -31,7 +31,6 @@ from er3a.robots.joint_limits import joint_names
 from er3a.robots.robot import Robot
 from er3a.vision import likelihood
 from er3a.vision.calibration_set import CalibrationSet
-from er3a.vision.distance_errors import CONFIDENCE, fit_extra_parameter
 from er3a.vision.hand_eye import HandEye, calibrate_hand_eye
 from er3a.vision.vision_findings import (
     CalibrationWarning,
@@ -108,19 +107,19 @@ class _Problem:
     def hand(self, flange: Reals) -> Reals:
         return flange if self.samples.setup == "eye_in_hand" else inverted(flange)
 
-    def linear(self, table: Tables, parameters: list[Parameter], X: Reals, Y: Reals) -> tuple[Reals, Reals, Reals]:
-        """F (N, 4, 4), residuals (N, 6), and their derivatives by poses and entries (N, 6, 12 + p)."""
+    def linear(self, table: Tables, parameters: list[Parameter], X: Reals, Y: Reals) -> tuple[Reals, Reals]:
+        """Residuals (N, 6), and their derivatives by poses and entries (N, 6, 12 + p)."""
         F = self.hand(self.flange(table)[0])
         raw, J = likelihood.residuals(F, self.samples.target, X, Y)
         count = len(parameters)
         if not count:
-            return F, raw, J
+            return raw, J
         both = STEP * np.concatenate([np.eye(count), -np.eye(count)])
         flange = self.flange(moved_tables(join([table] * (2 * count)), parameters, both))
         shift = step_between(flange[count:], flange[:count]) / (2 * STEP)
         by_entry = -np.einsum("nij,pnj->nip", likelihood.flange_to_camera(self.samples.setup, F, X, Y), shift)
         by_entry[:, 3:] = inverse_right_jacobian(raw[:, 3:]) @ by_entry[:, 3:]
-        return F, raw, np.concatenate([J, by_entry], axis=2)
+        return raw, np.concatenate([J, by_entry], axis=2)
 
 
 def correct_table(found: HandEye, robot: Robot, level: LevelName = "all_entries") -> TableCorrections | NoCorrections:
@@ -136,14 +135,18 @@ def correct_table(found: HandEye, robot: Robot, level: LevelName = "all_entries"
         return NoCorrections("joints")
     problem = _Problem(robot, samples, row_values(robot, samples.q))
     every = list(parameters_of(robot, level))
-    seen = _seen(samples, samples.hand, samples.camera_covariance)
-    sigma = np.broadcast_to(np.repeat(found.deviations, 3), (len(samples), 6))
-    _, _, J = problem.linear(tables_of(robot), every, found.X, found.Y)
-    kept, held = _identified(likelihood.whitening(seen, sigma, found.X, found.Y) @ J, every, samples.setup, robot)
+    seen = likelihood.PoseObservations.of(samples)
+    before = likelihood.refine(seen, found.X, found.Y)
+    J = problem.linear(tables_of(robot), every, before.X, before.Y)[1]
+    kept, held = _identified(before.W @ J, every, samples.setup, robot)
     if 6 * len(samples) - likelihood.UNKNOWNS - len(kept) < MIN_FREEDOM:
         return NoCorrections("few")
-    fit = _fit(problem, kept, found)
-    return NoCorrections("steps") if fit is None else _result(problem, (level, kept, held), found, fit)
+
+    def model(X: Reals, Y: Reals, amounts: Reals) -> tuple[Reals, Reals]:
+        return problem.linear(moved_tables(tables_of(robot), kept, amounts[None]), kept, X, Y)
+
+    fit = likelihood.refine(seen, before.X, before.Y, model, len(kept), before.W)
+    return _result(problem, (level, kept, held), before, fit) if fit.converged else NoCorrections("steps")
 
 
 ZERO_CHANCE = 1e-4  # of sound sets in which a zero is called wrong
@@ -166,21 +169,23 @@ def zeros_tried(found: HandEye, robot: Robot) -> tuple[HandEye, tuple[str, ...],
     if q is None:
         return found, names, 0.0
     samples = found.samples.take(found.used)
-    squares = float(((found.residual[found.used] / np.repeat(found.deviations, 3)) ** 2).sum())
+    before = likelihood.refine(likelihood.PoseObservations.of(samples), found.X, found.Y)
     free = 6 * len(samples) - likelihood.UNKNOWNS - 1
     best, unseen = (1.0, 0, 0.0, 0.0, np.inf), []
-    smallest, sure = 0.0, (1 + CONFIDENCE) / 2
+    smallest, sure = 0.0, (1 + likelihood.CONFIDENCE) / 2
     widths = float(scipy.special.stdtrit(free, 1 - ZERO_CHANCE / len(names) / 2) / scipy.special.stdtrit(free, sure))
     for k, name in enumerate(names):
         turn = _Turned(robot, samples, k)
         if robot.slides[k] or not turn.seen(found.X, found.Y):
             unseen.append(name)
             continue
-        value, half_width, raw = fit_extra_parameter(turn.at, (found.X, found.Y), found.deviations)
+        seen = likelihood.PoseObservations.of(samples)
+        fit = likelihood.refine(seen, before.X, before.Y, turn.at, 1, before.W)
+        value, half_width = float(fit.values[0]), float(fit.half_width[likelihood.UNKNOWNS])
         smallest = max(smallest, round(float(np.degrees(max(MIN_ZERO, widths * half_width))), 2))
-        left = float(((raw / np.repeat(found.deviations, 3)) ** 2).sum())
-        chance = float(scipy.special.fdtrc(1, free, max(squares - left, 0.0) / (left / free))) * len(names)
-        rms = float(1000 * np.sqrt((raw[:, :3] ** 2).mean()))
+        gain = max(before.squares - fit.squares, 0.0) / (fit.squares / free)
+        chance = float(scipy.special.fdtrc(1, free, gain)) * len(names)
+        rms = float(1000 * np.sqrt((fit.residual[:, :3] ** 2).mean()))
         best = min(best, (chance, k, value, half_width, rms))
     chance, k, value, half_width, rms = best
     tried = found if len(unseen) == len(names) else replace(found, warnings=tuple(map(_zeros_too, found.warnings)))
@@ -223,26 +228,23 @@ class _Turned:
         """T_base_flange (N, 4, 4) with this many rad more."""
         return forward(self.robot.without_tool(), self.samples.q + value * np.eye(self.robot.joints)[self.k])
 
-    def at(self, X: Reals, Y: Reals, value: float) -> tuple[Reals, Reals, Reals]:
-        """The argument ``at`` of :func:`er3a.vision.distance_errors.fit_extra_parameter`."""
-        flange, setup = self.flange(value), self.samples.setup
+    def at(self, X: Reals, Y: Reals, values: Reals) -> tuple[Reals, Reals]:
+        """Residuals and their derivatives, as :data:`er3a.vision.likelihood.Model`."""
+        value, setup = float(values[0]), self.samples.setup
+        flange = self.flange(value)
         F = flange if setup == "eye_in_hand" else inverted(flange)
         raw, J = likelihood.residuals(F, self.samples.target, X, Y)
         shift = step_between(self.flange(value - ZERO_STEP), self.flange(value + ZERO_STEP)) / (2 * ZERO_STEP)
         own = -np.einsum("nij,nj->ni", likelihood.flange_to_camera(setup, F, X, Y), shift)
         own[:, 3:] = np.einsum("nij,nj->ni", inverse_right_jacobian(raw[:, 3:]), own[:, 3:])
-        return raw, J, own
+        return raw, np.concatenate([J, own[..., None]], axis=2)
 
     def seen(self, X: Reals, Y: Reals) -> bool:
         """Whether the zero moves the samples otherwise than the two poses do."""
-        _, J, own = self.at(X, Y, 0.0)
-        J, column = J.reshape(-1, J.shape[-1]), own.ravel()
+        J = self.at(X, Y, np.zeros(1))[1].reshape(-1, likelihood.UNKNOWNS + 1)
+        J, column = J[:, :-1], J[:, -1]
         left = column - J @ np.linalg.lstsq(J, column, rcond=None)[0]
         return bool(np.linalg.norm(left) > DEPENDENT * np.linalg.norm(column))
-
-
-def _seen(samples: CalibrationSet, F: Reals, covariance: Reals | None) -> likelihood.PoseObservations:
-    return likelihood.PoseObservations(samples.setup, F, samples.target, covariance, samples.flange_covariance)
 
 
 def _identified(J: Reals, every: list[Parameter], setup: str, robot: Robot) -> tuple[list[Parameter], tuple[Held, ...]]:
@@ -269,98 +271,22 @@ def _identified(J: Reals, every: list[Parameter], setup: str, robot: Robot) -> t
     return [every[k - likelihood.UNKNOWNS] for k in columns[likelihood.UNKNOWNS :]], tuple(held)
 
 
-@dataclass(frozen=True, eq=False)
-class _JointFit:
-    """Poses, amounts (k,), S (N, 6, 6) of the residuals, their sum of squares, covariance and freedom (12 + k,)."""
-
-    X: Reals
-    Y: Reals
-    amounts: Reals
-    S: Reals
-    squares: float
-    covariance: Reals
-    freedom: Reals
-    scatter: float
-
-
-def _fit(problem: _Problem, kept: list[Parameter], found: HandEye) -> _JointFit | None:
-    samples, given = problem.samples, tables_of(problem.robot)
-    stated = samples.camera_covariance is not None
-    X, Y, amounts, deviations = found.X, found.Y, np.zeros(len(kept)), found.deviations
-    count = likelihood.UNKNOWNS + len(kept)
-    for _ in range(1 if stated else likelihood.VARIANCE_ROUNDS):
-        F = problem.hand(problem.flange(moved_tables(given, kept, amounts[None]))[0])
-        sigma = np.broadcast_to(np.repeat(deviations, 3), (len(samples), 6))
-        W = likelihood.whitening(_seen(samples, F, samples.camera_covariance), sigma, X, Y)
-        steps = _steps(problem, kept, W, (X, Y, amounts))
-        if steps is None:
-            return None
-        X, Y, amounts, white, J = steps
-        inverse = np.linalg.pinv(np.einsum("nki,nkj->ij", J, J), hermitian=True)
-        redundancy = 1 - np.einsum("nki,ij,nkj->nk", J, inverse, J)
-        parts = np.array([redundancy[:, :3].sum(), redundancy[:, 3:].sum()])
-        if not stated:
-            ratio = np.sqrt([(white[:, :3] ** 2).sum(), (white[:, 3:] ** 2).sum()] / parts)
-            deviations = np.asarray(deviations * ratio, float)
-            if np.abs(ratio - 1).max() < 1e-6:
-                break
-    free = 6.0 * len(samples) - count
-    squares = float((white**2).sum())
-    scatter = float(np.sqrt(squares / free))
-    freedom = np.full(count, free if stated else parts.min())
-    if not stated:
-        freedom[: likelihood.UNKNOWNS] = parts[np.array([0, 0, 0, 1, 1, 1] * 2)]
-    W_inverse = np.linalg.inv(W)
-    S: Reals = np.asarray(W_inverse @ np.swapaxes(W_inverse, 1, 2), float)
-    return _JointFit(X, Y, amounts, S, squares, inverse * (scatter**2 if stated else 1.0), freedom, scatter)
-
-
-def _steps(
-    problem: _Problem, kept: list[Parameter], W: Reals, start: tuple[Reals, Reals, Reals]
-) -> tuple[Reals, Reals, Reals, Reals, Reals] | None:
-    """Poses, amounts, whitened residuals (N, 6) and derivatives at the least squares; None if the steps don't end."""
-    given = tables_of(problem.robot)
-    X, Y, amounts = start
-
-    def at(X: Reals, Y: Reals, amounts: Reals) -> tuple[Reals, Reals]:
-        _, raw, J = problem.linear(moved_tables(given, kept, amounts[None]), kept, X, Y)
-        return (W @ raw[..., None])[..., 0], W @ J
-
-    white, J = at(X, Y, amounts)
-    for _ in range(STEPS):
-        flat = J.reshape(-1, J.shape[-1])
-        scale = np.linalg.norm(flat, axis=0)
-        step = -np.linalg.lstsq(flat / scale, white.ravel(), rcond=None)[0] / scale
-        for _ in range(HALVINGS):
-            new = moved(X, step[:6]), moved(Y, step[6 : likelihood.UNKNOWNS]), amounts + step[likelihood.UNKNOWNS :]
-            white_new, J_new = at(*new)
-            if (white_new**2).sum() <= (white**2).sum() * (1 + 1e-9):
-                break
-            step = step / 2
-        (X, Y, amounts), white, J = new, white_new, J_new
-        if np.abs(step).max() < STEP_ENDS:
-            return X, Y, amounts, white, J
-    return None
-
-
 def _result(
-    problem: _Problem, asked: tuple[LevelName, list[Parameter], tuple[Held, ...]], found: HandEye, fit: _JointFit
+    problem: _Problem,
+    asked: tuple[LevelName, list[Parameter], tuple[Held, ...]],
+    before: likelihood.Refined,
+    fit: likelihood.Refined,
 ) -> TableCorrections:
-    (level, kept, held), robot, samples = asked, problem.robot, problem.samples
-    error = np.sqrt(np.diag(fit.covariance))
-    half = scipy.special.stdtrit(fit.freedom, (1 + CONFIDENCE) / 2) * error
+    (level, kept, held), robot = asked, problem.robot
+    error, half = np.sqrt(np.diag(fit.covariance)), fit.half_width
     correlation = (fit.covariance / np.outer(error, error))[likelihood.UNKNOWNS :, likelihood.UNKNOWNS :]
     rows, columns = np.nonzero(np.triu(np.abs(correlation) > CLOSE, 1))
-    before = likelihood.refine(
-        likelihood.PoseObservations(samples.setup, samples.hand, samples.target, fit.S), found.X, found.Y
-    )
-    squares_before = float((before.whitened**2).sum())
-    free = 6 * len(samples) - likelihood.UNKNOWNS - len(kept)
-    ratio = (squares_before - fit.squares) / max(len(kept), 1) / (fit.squares / free)
-    step = step_between(found.X, fit.X)
+    free = fit.whitened.size - likelihood.UNKNOWNS - len(kept)
+    ratio = (before.squares - fit.squares) / max(len(kept), 1) / (fit.squares / free)
+    step = step_between(before.X, fit.X)
     units = np.array([each.in_unit for each in kept])
     return TableCorrections(
-        robot=robot_of(moved_tables(tables_of(robot), kept, fit.amounts[None]), 0, robot),
+        robot=robot_of(moved_tables(tables_of(robot), kept, fit.values[None]), 0, robot),
         level=level,
         estimates=tuple(
             Estimate(
@@ -369,7 +295,7 @@ def _result(
                 float(amount * each.in_unit),
                 float(own * each.in_unit),
             )
-            for each, amount, own in zip(kept, fit.amounts, error[likelihood.UNKNOWNS :])
+            for each, amount, own in zip(kept, fit.values, error[likelihood.UNKNOWNS :])
         ),
         entry_half_width=half[likelihood.UNKNOWNS :] * units,
         held=held,
@@ -379,6 +305,6 @@ def _result(
         half_width=half[: likelihood.UNKNOWNS],
         moved=np.array([np.linalg.norm(step[:3]), np.linalg.norm(step[3:])]),
         scatter=fit.scatter,
-        scatter_before=float(np.sqrt(squares_before / (6 * len(samples) - likelihood.UNKNOWNS))),
+        scatter_before=before.scatter,
         probability=float(scipy.special.fdtrc(len(kept), free, max(ratio, 0.0))) if kept else 1.0,
     )
