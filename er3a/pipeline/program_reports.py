@@ -88,7 +88,7 @@ class CheckedFile:
         """The worst of its findings; a program that can't be read fails."""
         if self.check is None:
             return "fail"
-        return worst_of([self.check.level, *(["caution"] if self.missed else [])])
+        return worst_of((self.check.level, "caution" if self.missed else "pass"))
 
     def lacks(self, required: Iterable[str]) -> list[str]:
         """Checks of those required that were not made."""

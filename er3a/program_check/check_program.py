@@ -284,7 +284,11 @@ def _located(
         ]
     unknown = ((step, step.instruction.text) for step in execution.steps if isinstance(step.instruction, Unknown))
     said = [(step.place, step.calls, found_in.NotFollowed(text, "instruction")) for step, text in unknown]
-    said += [(each.place, (), found_in.NotFollowed("", each.kind)) for each in execution.endings if _is_cut(each)]
+    said += [
+        (each.place, (), found_in.NotFollowed("", each.kind))
+        for each in execution.endings
+        if each.kind != "end" and each.kind != "joins"
+    ]
     said += [(place, (), found_in.NotFollowed(text, "unreached")) for place, text in _unreached(execution)]
     found += [LocatedFinding("caution", finding, place, calls) for place, calls, finding in said]
     if obstacles is not None and obstacles.bodies.in_error:
@@ -305,10 +309,6 @@ def _located(
     return tuple(
         sorted(grouped, key=lambda each: (order[str(each.place.file)], each.place.line, -found_in.RANKS[each.level]))
     )
-
-
-def _is_cut(ending: Ending) -> bool:
-    return ending.kind not in ("end", "joins")
 
 
 def _at_worst(same: list[LocatedFinding]) -> LocatedFinding:
@@ -439,7 +439,7 @@ def _verdicts(
                 lines.get(place, place.line),
                 " ".join(text.split()),
                 here[0].motion.kind if here else "",
-                found_in.worst_of([*levels[place], *([] if followed else ["caution"])]),
+                found_in.worst_of((*levels[place], "pass" if followed else "caution")),
                 followed,
                 len(here),
                 max(durations, default=None),

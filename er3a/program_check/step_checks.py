@@ -16,6 +16,7 @@ from collections.abc import Callable, Hashable, Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from er3a.by_value import ByValue
 from er3a.collision.bodies import Bodies
@@ -57,7 +58,7 @@ Missing = found_in.NotFollowed
 
 
 @dataclass(eq=False)
-class CheckedMotion:
+class CheckedMotion(ByValue):
     """A motion from one start.
 
     Attributes
@@ -243,8 +244,8 @@ class Judge:
                 checked.add(found_in.ConfigurationNotMet(_configuration(target)))
             rows = rows[met] if met.any() else rows
         away = np.abs(rows - reference).max(axis=1)
-        open_ = near is None or (checked.motion.kind == "joint" and target.branch is None and target.configuration)
-        if open_ and (different := len(np.unique(np.round(rows, SAME_DIGITS), axis=0))) > 1:
+        said = checked.motion.kind == "joint" and target.branch is None and bool(target.configuration)
+        if (near is None or said) and (different := len(np.unique(np.round(rows, SAME_DIGITS), axis=0))) > 1:
             checked.add(found_in.ConfigurationGuessed(different))
             return None
         return np.asarray(rows[int(away.argmin())], np.float64)
@@ -367,7 +368,7 @@ class Obstacles(ByValue):
         found: Reals = np.concatenate(chords) + bulge
         return found
 
-    def _judge(self, checked: CheckedMotion, q: Reals, share: Reals, d: Reals, pair: Reals) -> None:
+    def _judge(self, checked: CheckedMotion, q: Reals, share: Reals, d: Reals, pair: NDArray[np.int64]) -> None:
         """What is found at the points of one motion, in the order of time."""
         assert checked.path is not None
         nearest = int(np.argmin(d))
@@ -380,7 +381,7 @@ class Obstacles(ByValue):
             )
             checked.add_on_way({near: float(share[nearest])})
 
-    def _touching(self, path: MotionPath, q: Reals, share: Reals, rows: Reals) -> Shares:
+    def _touching(self, path: MotionPath, q: Reals, share: Reals, rows: NDArray[np.intp]) -> Shares:
         kept = rows[np.unique(np.linspace(0, len(rows) - 1, MOST_TOUCHING).astype(int))]
         every = np.arange(len(self.bodies.pairs))
         touches: dict[Pair, found_in.BodiesTouch] = {}

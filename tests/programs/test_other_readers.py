@@ -185,7 +185,7 @@ end
     assert lines[3].kind == "arc"
     assert lines[3].tool.pose[2, 3] == pytest.approx(0.1)
     assert any(isinstance(each, Decision) and "count" in each.condition for each in found)
-    assert Unknown("speedl([0,0,0.1,0,0,0], 0.5, 1)") in found
+    assert Unknown("speedl([0,0,0.1,0,0,0], 0.5, 1)", may_move=False) in found
 
 
 def test_statements_outside_of_a_routine_are_the_program(tmp_path):

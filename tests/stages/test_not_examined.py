@@ -314,7 +314,10 @@ def test_loops_cut_off_by_their_limits_do_not_pass(study, tmp_path):
         ("PTP {near}\nPTP XSEEN\nPTP {far}", "3, 4"),
         ("IF $IN[1] THEN\nPTP {near}\nELSE\nPTP {far}\nPTP {near}\nENDIF", "3"),
         ("PTP {near}\nDRIVE_ANYWHERE( )", "3"),
-        ("INTERRUPT DECL 3 WHEN $IN[1]==TRUE DO AWAY( )\nINTERRUPT ON 3\nPTP {near}\nEND\nDEF AWAY( )\nPTP {far}", "7"),
+        (
+            "INTERRUPT DECL 3 WHEN $IN[1]==TRUE DO AWAY( )\nINTERRUPT ON 3\nPTP {near}\nEND\nDEF AWAY( )\nPTP {far}",
+            "2, 7",
+        ),
     ],
 )
 def test_paths_of_a_program_name_its_lines_that_they_leave_out(study, tmp_path, body, lines):

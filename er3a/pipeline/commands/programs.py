@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -28,6 +29,18 @@ FramesFile = Annotated[
 ]
 SceneFile = Annotated[Path | None, typer.Option(callback=given_files, help="a scene file: the obstacles")]
 
+Assumed = Annotated[
+    list[str] | None,
+    typer.Option(help="what is not in the files: calls that move nothing (rq_*), or values (NAME=1)"),
+]
+BaselineFile = Annotated[
+    Path | None, typer.Option(callback=given_files, help="a SARIF file: its findings are accepted")
+]
+
+Seconds = Annotated[
+    float, typer.Option(help="time in which clearance is proven between points of motions, without compiling", min=1)
+]
+
 
 @app.command(rich_help_panel=PROGRAMS)
 def check_program(
@@ -43,23 +56,15 @@ def check_program(
     start: StartOption = None,
     frames: FramesFile = None,
     scene: SceneFile = None,
-    assume: Annotated[
-        list[str] | None,
-        typer.Option(help="what is not in the files: calls that move nothing (rq_*), or values (NAME=1)"),
-    ] = None,
+    assume: Assumed = None,
     require: Annotated[str, typer.Option(help="checks without which nothing passes: scene,tool")] = "",
     every: Annotated[bool, typer.Option("--all", "-v", help="print each finding by itself, notes too")] = False,
     verdicts: Annotated[
         bool, typer.Option("--verdicts", help="print a line for each motion, also for those that pass")
     ] = False,
     sarif: Annotated[Path | None, typer.Option(help="write the findings as SARIF 2.1.0 to this file")] = None,
-    baseline: Annotated[
-        Path | None, typer.Option(callback=given_files, help="a SARIF file: its findings are accepted")
-    ] = None,
-    seconds: Annotated[
-        float,
-        typer.Option(help="time in which clearance is proven between points of motions, without compiling", min=1),
-    ] = 30.0,
+    baseline: BaselineFile = None,
+    seconds: Seconds = 30.0,
     fail_on: Annotated[FailOn, typer.Option(help="exit code 1 for findings of this level or worse")] = FailOn.fail,
     as_json: AsJson = False,
 ):
@@ -100,7 +105,7 @@ def check_program(
         for file in files:
             at(f"{file}: checking")
             end = budget.next_piece()[1]
-            found = checked_file(file, arm, replace(options, keep_on=lambda end=end: work_clock() < end), doubts)
+            found = checked_file(file, arm, replace(options, keep_on=_until(end, work_clock)), doubts)
             checked.append(without(found, silenced))
     if sarif is not None:
         _write(sarif, json.dumps(sarif_of(checked), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
@@ -118,6 +123,10 @@ def check_program(
         raise typer.Exit(2)
     if any(RANKS[each.level] >= RANKS[fail_on.value] or each.lacks(required) for each in checked):
         raise typer.Exit(1)
+
+
+def _until(end: float, clock: Callable[[], float]) -> Callable[[], bool]:
+    return lambda: clock() < end
 
 
 def _assumed(given: list[str]) -> tuple[tuple[str, ...], dict[str, bool | float]]:

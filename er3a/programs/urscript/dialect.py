@@ -30,6 +30,7 @@ STOPS = ("stopj", "stopl")
 READING = ("get_actual_", "get_target_", "get_forward_kin")  # beginnings of functions that read where the arm is
 MODE = "%mode"  # what changes the way of each motion until it is ended; empty if nothing does
 JOGS = frozenset(("servoc", "servoj", "speedj", "speedl"))  # move the arm, to where is not followed
+SAME_TURN = 1e-9  # of an element of a rotation matrix
 MODES = {
     "force_mode": "end_force_mode",
     "path_offset_enable": "path_offset_disable",
@@ -101,6 +102,7 @@ SIGNATURES: dict[str, tuple[str, ...]] = {
     "get_inverse_kin": ("x", "qnear", "maxPositionError", "maxOrientationError", "tcp"),
     "pose_trans": ("p_from", "p_from_to"),
     "pose_add": ("p_1", "p_2"),
+    "pose_sub": ("p_to", "p_from"),
     "pose_inv": ("p_from",),
     "inv": ("m",),
     "interpolate_pose": ("p_from", "p_to", "alpha"),
@@ -523,6 +525,12 @@ def _of_poses(name: str, given: dict[str, syntax.Value]) -> syntax.Value | None:
             found[:3, 3] += b[:3, 3]
             found[:3, :3] = a[:3, :3] @ b[:3, :3]
             return _record(found)
+        case "pose_sub":
+            found = a.copy()
+            found[:3, 3] -= b[:3, 3]
+            found[:3, :3] = a[:3, :3] @ b[:3, :3].T
+            same = np.abs(found[:3, :3] - b[:3, :3].T @ a[:3, :3]).max() < SAME_TURN
+            return _record(found) if same else None
         case "interpolate_pose":
             share = syntax.number(given.get("alpha"))
             if share is None or not math.isfinite(share):
