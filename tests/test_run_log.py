@@ -84,7 +84,11 @@ def test_what_snakemake_does_not_know_is_one_line(log, capsys):
     text = "MissingRuleException:\nNo rule to produce my.yaml (if you use input functions make sure ...)."
     log(LogEvent.ERROR, text, level=logging.ERROR)
     log(LogEvent.ERROR, "WorkflowError:\nno such profile", level=logging.ERROR)
-    log(LogEvent.ERROR, "CalledProcessError: Command 'er3a 2> x.log' died with <Signals.SIGINT: 2>.", level=logging.ERROR)
+    log(
+        LogEvent.ERROR,
+        "CalledProcessError: Command 'er3a 2> x.log' died with <Signals.SIGINT: 2>.",
+        level=logging.ERROR,
+    )
     unknown, other = capsys.readouterr().err.splitlines()
     assert unknown.startswith("error: my.yaml: no stage (validation, ")
     assert unknown.endswith("a study is given by --study")

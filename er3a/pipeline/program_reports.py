@@ -8,17 +8,18 @@ References
 from __future__ import annotations
 
 import hashlib
+import json
 import math
 import os
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
 import numpy as np
 
-from er3a.collision.along import bodies_of
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import PENETRATION_TOLERANCE
 from er3a.collision.scene import Scene
@@ -28,17 +29,12 @@ from er3a.files.path_file import load_paths
 from er3a.files.units import noted_doubts
 from er3a.kinematics.singularity import USUAL_NEAR
 from er3a.pipeline.messages.language import as_text
-from er3a.pipeline.messages.left_out import left_out_names, left_out_text
-from er3a.pipeline.messages.programs import remedy_at, say
+from er3a.pipeline.messages.left_out import left_out_text
+from er3a.pipeline.messages.programs import remedy, say
 from er3a.pipeline.messages.say import excerpt
 from er3a.pipeline.progress import TimeOverError, time_limit
 from er3a.pipeline.results import LeftOut, NoPass, plain
-from er3a.pipeline.stages.left_out import (
-    guessed_pairs,
-    left_out_of_rates,
-    left_out_of_units,
-    missed_of_program,
-)
+from er3a.pipeline.stages.left_out import left_out_of_units, missed_of_program
 from er3a.pipeline.stages.trajectory.judgement import Surroundings, collisions, judge, measured, min_clearance
 from er3a.pipeline.stages.trajectory.motion import CHOSEN, listed_motions
 from er3a.pipeline.stages.trajectory.written_programs import LONGEST_NAME, near_assumed_shapes, written
@@ -46,6 +42,9 @@ from er3a.planning.names import PATH_VERDICTS, PathVerdict
 from er3a.planning.tool_proof import ProofRequirements
 from er3a.planning.way_around import PlanningTask
 from er3a.program_check.check_program import (
+    CHECKS,
+    NOT_FOLLOWED,
+    Check,
     CheckOptions,
     LocatedFinding,
     MotionVerdict,
@@ -53,10 +52,10 @@ from er3a.program_check.check_program import (
     assumed_limits,
     check_program,
 )
-from er3a.program_check.program_check_findings import Level
+from er3a.program_check.program_check_findings import RANKS, Level, NotFollowed, worst_of
 from er3a.programs.instructions import Place
 from er3a.programs.languages import WITHOUT_JOINTS, not_written, read_program
-from er3a.programs.program_findings import WriteFinding
+from er3a.programs.program_findings import DataFileMissing, WriteFinding
 from er3a.programs.program_names import LanguageName
 from er3a.programs.writing import program_name
 from er3a.robots.robot import Robot
@@ -67,33 +66,42 @@ SARIF_SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 WORDS: dict[Level, str] = {"fail": "error", "caution": "warning", "note": "note", "pass": "pass"}
 UNREADABLE = "unreadable"
 DAY_S = 86_400.0
+MOST_ROWS = 10  # that are printed of a program's findings unless all are asked for
+MOST_TEXTS = 4  # of what is not followed for one reason
+NEEDED: Mapping[Check, str] = {
+    "scene": "scene (none given: --scene)",
+    "tool": "tool (no shape: carried in --scene, or the robot's file)",
+}
 
 
 @dataclass(frozen=True, eq=False)
 class CheckedFile:
     """A program file with its check, or with the error that it could not be read for.
 
-    ``missed``: what was not examined and may turn each motion's verdict, which therefore is no pass. ``assumed``: on
-    what the rest is judged that no document gives.
+    ``missed``: what of its inputs is in doubt, as the unit of a number.
     """
 
     file: Path
     check: ProgramCheck | None
     error: InputError | None = None
     missed: tuple[LeftOut, ...] = ()
-    assumed: tuple[LeftOut, ...] = ()
 
     @property
     def level(self) -> Level:
         """The worst of its findings; a program that can't be read fails."""
-        return "fail" if self.check is None else self.check.level
+        if self.check is None:
+            return "fail"
+        return worst_of((self.check.level, "caution" if self.missed else "pass"))
+
+    def lacks(self, required: Iterable[str]) -> list[str]:
+        """Checks of those required that were not made."""
+        return [] if self.check is None else [each for each in required if each not in self.check.checked]
 
 
 def checked_file(
     file: Path, robot: Robot, options: CheckOptions, doubts: Sequence[DoubtfulUnit] = (), seconds: float = DAY_S
 ) -> CheckedFile:
-    """Read a program, in limited time, and check it; no motion of it passes where obstacles or shapes are missing, or
-    with ``doubts`` about the units of what it is checked by."""
+    """Read a program, in limited time, and check it; ``doubts``: about the units of what it is checked by."""
     try:
         with noted_doubts() as own, time_limit(seconds):
             program = read_program(file)
@@ -103,26 +111,86 @@ def checked_file(
         return CheckedFile(file, None, InputError(file, None, f"is not read after {seconds:.0f} s", remedy))
     except InputError as error:
         return CheckedFile(file, None, error)
-    missed = (*missed_of_program(robot, options.scene, check.arms), *left_out_of_units([*doubts, *own]))
-    check = check.short_of(bool(missed))
-    known = np.isfinite(robot.speed), not assumed_limits(robot, options).acceleration_assumed
-    assumed = left_out_of_rates(*known, jerk=True)
-    arms = (robot, *(arm for _, arm in check.arms)) if options.measures else ()
-    if guessed := guessed_pairs(bodies_of(arm, options.scene) for arm in arms):
-        assumed = (*assumed, LeftOut("guessed_pairs", guessed))
-    return CheckedFile(file, check, missed=missed, assumed=assumed)
+    missed = missed_of_program(robot, options.scene)
+    found = tuple(each for each in missed if each.subject in ("uncovered_links", "own_limits"))
+    return CheckedFile(file, check, missed=(*found, *left_out_of_units([*doubts, *own])))
 
 
-def lines_of(checked: CheckedFile, verdicts: bool = False) -> list[str]:
-    """``file:line: level: message [code]``, one line to a finding, and on request one to each motion."""
+def accepted(baseline: Path) -> frozenset[str]:
+    """Fingerprints of findings in a SARIF log that were accepted.
+
+    Raises
+    ------
+    InputError
+        for a file that is no SARIF log
+    """
+    try:
+        log = json.loads(baseline.read_text(encoding="utf-8"))
+        results = [each for run in log["runs"] for each in run["results"]]
+        return frozenset(each["partialFingerprints"][FINGERPRINT] for each in results)
+    except (OSError, ValueError, KeyError, TypeError):
+        raise InputError(baseline, None, "is no SARIF log", "Give what --sarif has written") from None
+
+
+def without(checked: CheckedFile, silenced: frozenset[str]) -> CheckedFile:
+    """A check without the findings that were accepted, by their fingerprints."""
+    if checked.check is None or not silenced:
+        return checked
+    prints = (each["partialFingerprints"][FINGERPRINT] for each in sarif_of([checked])["runs"][0]["results"])
+    kept = tuple(each for each, mark in zip(checked.check.findings, prints) if mark not in silenced)
+    level = worst_of(each.level for each in kept)
+    return replace(checked, check=replace(checked.check, findings=kept, level=level))
+
+
+def lines_of(checked: CheckedFile, every: bool = False, verdicts: bool = False) -> list[str]:
+    """``file:line: level: message (lines) [code]``, one line to a cause: what an input answers first, then errors.
+
+    Parameters
+    ----------
+    every : whether notes are among them, and each finding has a line of its own
+    verdicts : whether each motion has a line, too
+    """
     if checked.check is None:
         return [_error_line(checked)]
-    lines = [(each.place, _finding_line(each)) for each in checked.check.findings]
-    if verdicts:
-        of_what = " of assumed shapes" if checked.check.shapes else ""
-        lines += [(each.place, _verdict_line(each, of_what)) for each in checked.check.verdicts]
-        lines.sort(key=lambda pair: (shown(pair[0].file), pair[0].line))
-    return [text for _, text in lines]
+    findings = checked.check.findings
+    rows = [[each] for each in findings] if every else _causes(findings)
+    lines = [_cause_line(row) for row in rows]
+    if not every and len(lines) > MOST_ROWS:
+        rest = len(lines) - MOST_ROWS + 1
+        lines = [*lines[: MOST_ROWS - 1], f"{shown(checked.file)}: {rest} more causes: --all prints them"]
+    return lines + ([_verdict_line(each) for each in checked.check.verdicts] if verdicts else [])
+
+
+def _is_question(each: LocatedFinding) -> bool:
+    """Whether an input answers a finding."""
+    return each.level == "caution" and isinstance(each.finding, (*NOT_FOLLOWED, DataFileMissing))
+
+
+def _causes(findings: Iterable[LocatedFinding]) -> list[list[LocatedFinding]]:
+    """Findings above notes by their cause, the most important first."""
+    rows: dict[tuple[Any, ...], list[LocatedFinding]] = defaultdict(list)
+    for each in findings:
+        if each.level != "note":
+            parts = [getattr(each.finding, name, "") for name in ("reason", "joint", "type", "kind", "name")]
+            rows[each.place.file, each.level, each.finding.code, *map(str, parts)].append(each)
+    return sorted(rows.values(), key=lambda row: (not _is_question(row[0]), -RANKS[row[0].level]))
+
+
+def _cause_line(row: list[LocatedFinding]) -> str:
+    first = row[0]
+    said = [say(each.finding) for each in row]
+    text = said[0]
+    if isinstance(first.finding, NotFollowed) and len(row) > 1:
+        names = list(dict.fromkeys(each.finding.text for each in row if isinstance(each.finding, NotFollowed)))
+        more = "" if len(names) <= MOST_TEXTS else f" and {len(names) - MOST_TEXTS} more"
+        text = say(NotFollowed(", ".join(names[:MOST_TEXTS]) + more, first.finding.reason))
+    elif len(set(said)) > 1:
+        text += f", and {len(set(said)) - 1} like it"
+    lines = _line_ranges(each.place.line for each in row)
+    where = f" (lines {lines})" if len({each.place.line for each in row}) > 1 else ""
+    times = f" ({first.times} times)" if len(row) == 1 and first.times > 1 else ""
+    to_do = f". {remedy(first.finding)}" if first.level != "note" and remedy(first.finding) else ""
+    return f"{_where(first.place)}: {WORDS[first.level]}: {text}{where}{times}{to_do} [{first.finding.code}]"
 
 
 def _error_line(checked: CheckedFile) -> str:
@@ -141,21 +209,15 @@ def _file_of(checked: CheckedFile, error: InputError) -> Path:
 
 def _line_in(error: InputError) -> int:
     words = (error.field or "").replace(",", " ").split()
-    found = next((words[i + 1] for i, word in enumerate(words[:-1]) if word == "line"), "")
-    return int(found) if found.isdigit() else 0
+    return int(words[1]) if words[:1] == ["line"] and len(words) > 1 and words[1].isdigit() else 0
 
 
-def _finding_line(each: LocatedFinding) -> str:
-    times = f" ({each.times} times)" if each.times > 1 else ""
-    return f"{_where(each.place)}: {WORDS[each.level]}: {say(each.finding)}{times} [{each.finding.code}]"
-
-
-def _verdict_line(verdict: MotionVerdict, of_what: str) -> str:
+def _verdict_line(verdict: MotionVerdict) -> str:
     parts = [excerpt(verdict.text)]
     if verdict.duration_s is not None:
         parts.append(f"{verdict.duration_s:.2f} s")
     if verdict.least_clearance_mm is not None:
-        parts.append(f"clearance {as_text(verdict.least_clearance_mm, '.1f')} mm{of_what}")
+        parts.append(f"clearance {as_text(verdict.least_clearance_mm, '.1f')} mm")
     return f"{_where(verdict.place)}: {WORDS[verdict.level]}: {'; '.join(parts)} [motion]"
 
 
@@ -172,15 +234,31 @@ def shown(file: Path | None) -> str:
     return str(file) if near.startswith("..") else near
 
 
-def summary_line(checked: Sequence[CheckedFile]) -> str:
-    """How many motions there are by verdict, and how long the programs take."""
-    verdicts = [verdict for each in checked if each.check for verdict in each.check.verdicts]
-    count = {level: sum(verdict.level == level for verdict in verdicts) for level in WORDS}
-    parts = [f"{len(verdicts)} motion instructions: {count['pass']} pass"]
-    parts += [f"{count['note']} checked in part (see the notes)"] if count["note"] else []
-    parts += [f"{count['caution']} caution", f"{count['fail']} fail"]
-    unread = sum(each.check is None for each in checked)
-    return ", ".join(parts) + (f"; {unread} of {len(checked)} files could not be read" if unread else "")
+def scope_line(checked: CheckedFile) -> str:
+    """How many motions pass, for what they were checked, and what was not followed and not checked."""
+    check = checked.check
+    if check is None:
+        return ""
+    passed = sum(each.level in ("pass", "note") for each in check.verdicts)
+    of_what = ", ".join(_named(each, check) for each in check.checked)
+    passing = "would pass" if checked.missed else "pass"
+    parts = [f"{passed} of {len(check.verdicts)} motions {passing} {of_what}"]
+    failed = [each.line for each in check.verdicts if each.level == "fail"]
+    lost = [each.line for each in check.verdicts if not each.followed and each.level != "fail"]
+    rest = len(check.verdicts) - passed - len(failed) - len(lost)
+    parts += [f"{len(failed)} fail (lines {_line_ranges(failed)})"] if failed else []
+    parts += [f"{len(lost)} not followed (lines {_line_ranges(lost)})"] if lost else []
+    parts += [f"{rest} with caution"] if rest else []
+    missing = [NEEDED[each] for each in (*CHECKS, *NEEDED) if each not in check.checked and each in NEEDED]
+    parts += [f"not checked: {', '.join(dict.fromkeys(missing))}"] if missing else []
+    return f"{shown(checked.file)}: {'; '.join(parts)}"
+
+
+def _named(check: Check, of: ProgramCheck) -> str:
+    if check == "self-collision" and of.shapes is not None:
+        return f"{check} (of assumed shapes)"
+    unknown = check == "rates" and any(np.isnan(arm.speed).any() for _, arm in of.arms)
+    return f"{check} (of assumed speeds)" if unknown else check
 
 
 def cycle_line(checked: CheckedFile) -> str:
@@ -205,36 +283,6 @@ def shapes_line(robot: Robot) -> str:
 def missed_line(missed: tuple[LeftOut, ...]) -> str:
     """What was not examined of all motions; empty where nothing is missing."""
     return say(NoPass(missed)) if missed else ""
-
-
-def assumed_line(checked: Sequence[CheckedFile]) -> str:
-    """What no document gives and was assumed or guessed: joint speeds, accelerations, shapes; empty if nothing."""
-    found = dict.fromkeys(each for one in checked for each in one.assumed)
-    parts = [left_out_text(each) + (f" ({left_out_names(each)})" if each.names else "") for each in found]
-    return f"not examined: {'; '.join(parts)}" if parts else ""
-
-
-def not_examined_line(checked: CheckedFile) -> str:
-    """Which lines were not examined, or not each time that they are carried out; empty if all were."""
-    if checked.check is None or not checked.check.not_examined:
-        return ""
-    words = {
-        "motion": "motions of lines",
-        "way": "the ways to the targets of lines",
-        "course": "the course from lines",
-        "instruction": "what is done in lines",
-    }
-    lines: dict[tuple[Path | None, str], list[int]] = {}
-    for each in checked.check.not_examined:
-        if each.place.line:
-            lines.setdefault((each.place.file, words[each.what] + " "), []).append(each.place.line)
-        else:
-            lines[each.place.file, "the course of the whole"] = []
-    parts = [
-        f"{what}{_line_ranges(found)}" + (f" of {shown(file)}" if file != checked.file else "")
-        for (file, what), found in lines.items()
-    ]
-    return f"{shown(checked.file)}: not examined, or not each time: {'; '.join(parts)}"
 
 
 def _line_ranges(lines: Iterable[int]) -> str:
@@ -264,17 +312,12 @@ def json_of(checked: Iterable[CheckedFile]) -> list[dict[str, Any]]:
             {
                 "file": _uri(each.file),
                 "language": check.execution.program.language,
-                "level": check.level,
+                "level": each.level,
                 "complete": check.execution.complete,
-                "not_examined": [
-                    *(
-                        {**_place_record(Place(each.file)), "what": one.subject, "names": one.names}
-                        for one in each.missed
-                    ),
-                    *({**_place_record(one.place), "what": one.what, "names": []} for one in check.not_examined),
-                ],
+                "checked": list(check.checked),
+                "not_checked": each.lacks(dict.fromkeys((*CHECKS, *NEEDED))),
+                "not_examined": [{"what": one.subject, "names": one.names} for one in each.missed],
                 "shapes_assumed": check.shapes is not None,
-                "assumed": [{"what": one.subject, "names": one.names} for one in each.assumed],
                 "cycle": plain(check.cycle),
                 "findings": [_finding_record(one) for one in check.findings],
                 "motions": [_verdict_record(one) for one in check.verdicts],
@@ -294,10 +337,7 @@ def _finding_record(each: LocatedFinding) -> dict[str, Any]:
         "level": each.level,
         "code": each.finding.code,
         "message": say(each.finding),
-        "remedy": remedy_at(each),
-        "joint_moves_deg": each.joint_moves,
-        "off_mm": each.off_mm,
-        "off_deg": each.off_deg,
+        "remedy": remedy(each.finding),
         "moment_s": each.moment,
         "times": each.times,
         "called_from": [_place_record(place) for place in each.calls],
@@ -320,6 +360,9 @@ def _verdict_record(verdict: MotionVerdict) -> dict[str, Any]:
     record.pop("place")
     line = record.pop("line")
     return {**_place_record(verdict.place), "called_at": line if line != verdict.place.line else None, **record}
+
+
+FINGERPRINT = "primaryLocationLineHash"
 
 
 def sarif_of(checked: Sequence[CheckedFile]) -> dict[str, Any]:
@@ -356,15 +399,14 @@ def sarif_of(checked: Sequence[CheckedFile]) -> dict[str, Any]:
 
 
 def _notifications(checked: Sequence[CheckedFile]) -> list[dict[str, Any]]:
-    """What was not examined, and on what shapes collisions rest, as the log's notifications."""
+    """What was not checked, and on what shapes collisions rest, as the log's notifications."""
     found = []
     for each in checked:
-        found += [("not_examined", missed_line((one,)), Place(each.file)) for one in each.missed]
-        found += [(one.subject, left_out_text(one), Place(each.file)) for one in each.assumed]
-        for one in each.check.not_examined if each.check else ():
-            found.append(("not_examined", f"not examined, or not each time: {one.what}", one.place))
+        top = Place(each.file)
+        found += [("not_examined", left_out_text(one), top) for one in each.missed]
+        found += [("not_checked", NEEDED[one], top) for one in NEEDED if each.lacks([one])]
         if each.check and each.check.shapes:
-            found.append((each.check.shapes.code, say(each.check.shapes), Place(each.file)))
+            found.append((each.check.shapes.code, say(each.check.shapes), top))
     return [
         {"level": "warning", "descriptor": {"id": code}, "message": {"text": text}, "locations": [_location(place)]}
         for code, text, place in found
@@ -392,7 +434,7 @@ def _result(
         "level": {"fail": "error", "caution": "warning"}.get(level, "note"),
         "message": {"text": text},
         "locations": [_location(place)],
-        "partialFingerprints": {"primaryLocationLineHash": f"{print_of}:{number}"},
+        "partialFingerprints": {FINGERPRINT: f"{print_of}:{number}"},
     }
     if calls:
         found["relatedLocations"] = [{**_location(call), "message": {"text": "called from here"}} for call in calls]

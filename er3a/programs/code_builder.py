@@ -10,12 +10,12 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Literal
 
 from er3a.errors import InputError
 from er3a.programs import syntax
+from er3a.programs.evaluation import variable_of
 from er3a.programs.instructions import Aside, Place, Remark, Unknown
-from er3a.programs.program_findings import NameTwice, NotSimulated, NotUnderstood, ProgramFinding
+from er3a.programs.program_findings import NameTwice, NotUnderstood, ProgramFinding
 
 MAX_NESTED = 200
 ASSIGNED = re.compile(r"(?:(?:global|local)\s+)?([A-Za-z_$][\w$]*+)[^=\"'(]*+=(?!=)")
@@ -47,8 +47,7 @@ class CodeBuilder:
         self.code: list[syntax.Operation] = []
         self.blocks: list[Block] = []
         self.settings: tuple[tuple[str, syntax.Expression], ...] = ()  # of each motion of a block
-        self.handler: list[syntax.Operation] = []  # as of the routine
-        self.on_error: syntax.OnError | None = None  # likewise
+        self.volatile: set[str] = set()  # variables that something else may set at any time
         self._labels: dict[str, int] = {}
         self._gotos: list[tuple[int, str]] = []
         self._hidden = 0
@@ -65,13 +64,13 @@ class CodeBuilder:
         """An instruction that moves nothing."""
         self.add(syntax.Fixed(place, Aside(text)))
 
-    def beside(self, place: Place, what: syntax.Invocation, text: str, kind: Literal["thread", "interrupt"]) -> None:
-        """A routine that runs beside the program from here on."""
-        self.add(syntax.Beside(place, what, text, kind))
+    def concurrent(self, place: Place, what: syntax.Invocation, text: str) -> None:
+        """A routine that runs concurrently with the program from here on."""
+        self.add(syntax.ConcurrentStart(place, what, text))
 
-    def unknown(self, place: Place, text: str, may_move: bool = True) -> None:
+    def unknown(self, place: Place, text: str, may_move: bool = True, shapes: bool = False) -> None:
         """An instruction that is not understood."""
-        self.add(syntax.Fixed(place, Unknown(text, may_move)))
+        self.add(syntax.Fixed(place, Unknown(text, may_move, shapes)))
 
     def unread(self, place: Place, text: str, may_move: bool = True, folds: bool = False) -> None:
         """A statement that is not understood; what it assigns something to has no known value from here.
@@ -227,30 +226,7 @@ class CodeBuilder:
                 raise fault(place, f"there is no label '{name}'", "Name a label of this routine")
             self.code[at] = syntax.GoTo(place, self._labels[name], endless=self._labels[name] <= at)
         code = (*self.code, syntax.Return(end))
-        parts = self.name, self.parameters, code, self.place, self.thread
-        return syntax.Routine(*parts, tuple(self.handler), self.on_error)
-
-    def comes_to_end(self, first: int) -> bool:
-        """Whether the code from an operation on may be carried out to its end so far, but for a stop right there."""
-        seen: set[tuple[int, bool]] = set()
-        waiting = [(first, False)]
-        while waiting:
-            at, stopped = waiting.pop()
-            if at == len(self.code) and not stopped:
-                return True
-            if at == len(self.code) or (at, stopped) in seen:
-                continue
-            seen.add((at, stopped))
-            operation = self.code[at]
-            if isinstance(operation, syntax.GoTo):
-                waiting.append((operation.to if operation.to >= 0 else len(self.code), stopped))
-            elif isinstance(operation, syntax.Branch):
-                waiting += [(at + 1, False), (operation.otherwise, False)]
-            elif not isinstance(operation, (syntax.Return, syntax.Halt)):
-                stops = isinstance(operation, syntax.Waiting) and operation.kind == "operator"
-                hidden = isinstance(operation, syntax.Assign) and not operation.text
-                waiting.append((at + 1, stops or (stopped and hidden)))
-        return False
+        return syntax.Routine(self.name, self.parameters, code, self.place, self.thread)
 
     def _open(self, kind: str, place: Place, word: str = "") -> None:
         if len(self.blocks) >= MAX_NESTED:
@@ -297,7 +273,6 @@ def fault(place: Place, problem: str, remedy: str) -> InputError:
     return InputError(place.file, place.where, problem, remedy)
 
 
-DECIDED_BY_ONE = ("AND", "OR", "&&", "||")
 Each = Callable[[syntax.Expression], syntax.Expression]
 Changed = Callable[[syntax.Invocation], Iterable[syntax.Expression | None]]
 """What a function outside the program changes of its arguments, or may change."""
@@ -306,14 +281,11 @@ Changed = Callable[[syntax.Invocation], Iterable[syntax.Expression | None]]
 def linked(
     routines: Iterable[syntax.Routine],
     changed: Changed = lambda call: (),
-    perhaps: Changed = lambda call: (),
-    of_arguments: Container[str] = (),
 ) -> tuple[dict[str, syntax.Routine], tuple[ProgramFinding, ...]]:
     """The routines by name, with calls of each other taken out of expressions; and the findings about the text.
 
     Of two routines with one name the later one counts; the other is kept under a name that nothing calls. What a
-    function outside the program changes of its arguments (``changed``), or may change (``perhaps``), is unclear from
-    its call on; or the function's own value, of those in ``of_arguments``, which follows from its arguments alone.
+    function outside the program changes of its arguments, or may change, is unclear from its call on.
     """
     found: list[ProgramFinding] = []
     by_name: dict[str, syntax.Routine] = {}
@@ -324,17 +296,8 @@ def linked(
             hidden = f"{routine.name}@{len(by_name)}"
             by_name[hidden] = replace(former, name=hidden)
         by_name[routine.name] = routine
-    found += [finding for routine in by_name.values() for finding in not_understood(routine.code)]
-    found += [finding for routine in by_name.values() for finding in _perhaps_called(routine, by_name)]
-    found += [finding for routine in by_name.values() for finding in _read_before(routine, by_name)]
-    return {
-        name: replace(
-            routine,
-            code=_linked(routine.code, by_name, changed, perhaps, of_arguments),
-            handler=_linked(routine.handler, by_name, changed, perhaps, of_arguments),
-        )
-        for name, routine in by_name.items()
-    }, tuple(found)
+    linked = {name: replace(each, code=_linked(each.code, by_name, changed)) for name, each in by_name.items()}
+    return linked, tuple(found)
 
 
 def lacks_data(routines: Iterable[syntax.Routine], data: Iterable[syntax.Assign], known: Container[str]) -> bool:
@@ -357,13 +320,6 @@ def lacks_data(routines: Iterable[syntax.Routine], data: Iterable[syntax.Assign]
                 expressions = tuple(each for each in operation.arguments[:1] if each is not None)
             used.update(name for each in expressions for name in variables(each))
     return any(name[0] not in "$%" and name not in known for name in used - given)
-
-
-def variable_of(target: syntax.Expression) -> str:
-    """The variable that an assignment changes."""
-    while isinstance(target, (syntax.Member, syntax.Element)):
-        target = target.of
-    return target.name if isinstance(target, syntax.Variable) else ""
 
 
 def own_names(routine: syntax.Routine) -> set[str]:
@@ -409,15 +365,11 @@ def _opaque(expression: syntax.Expression) -> Iterable[str]:
 
 
 def _linked(
-    given: tuple[syntax.Operation, ...],
-    known: Mapping[str, syntax.Routine],
-    changed: Changed,
-    perhaps: Changed,
-    of_arguments: Container[str],
+    given: tuple[syntax.Operation, ...], known: Mapping[str, syntax.Routine], changed: Changed
 ) -> tuple[syntax.Operation, ...]:
     parts = (each for operation in given if not _plain(operation) for each in syntax.expressions_of(operation))
     outer = [each for part in parts for each in _invoked(part)]
-    if not any(each.function in known or any(changed(each)) or any(perhaps(each)) for each in outer):
+    if not any(each.function in known or any(changed(each)) for each in outer):
         return given
     code: list[syntax.Operation] = []
     starts: list[int] = []
@@ -437,31 +389,14 @@ def _linked(
             last = mapped(operation, calls.out)
         outside = [each for part in syntax.expressions_of(last) if not _plain(last) for each in _invoked(part)]
         unclear = [
-            syntax.Assign(operation.place, given, _given_by(each, given, of_arguments, text, doubt), text)
+            syntax.Assign(operation.place, given, syntax.Opaque(f"{each.function}(...)"), "")
             for each in outside
-            for which, doubt in ((changed, False), (perhaps, True))
-            for given, text in ((given, _call_text(operation, each)) for given in which(each))
+            for given in changed(each)
             if isinstance(given, (syntax.Variable, syntax.Member, syntax.Element))
         ]
         code += [*calls.found, *unclear, last]
     starts.append(len(code))
     return tuple(_moved(operation, starts) for operation in code)
-
-
-def _given_by(
-    call: syntax.Invocation, given: syntax.Expression, of_arguments: Container[str], text: str, doubt: bool
-) -> syntax.Expression:
-    """What a call outside the program gives to one of its arguments, which it does not read if ``of_arguments``."""
-    if call.function not in of_arguments:
-        return syntax.Opaque(text, doubt)
-    return replace(call, arguments=tuple(each for each in call.arguments if each is not given))
-
-
-def _call_text(operation: syntax.Operation, call: syntax.Invocation) -> str:
-    """What a call is named by: the line that it is."""
-    if isinstance(operation, syntax.Doing) and operation.what is call:
-        return operation.text
-    return f"{call.function}(...)"
 
 
 def _moved(operation: syntax.Operation, starts: list[int]) -> syntax.Operation:
@@ -484,68 +419,6 @@ def _calls(expression: syntax.Expression, known: Mapping[str, syntax.Routine]) -
     if isinstance(expression, syntax.Invocation) and expression.function in known:
         return True
     return any(_calls(each, known) for each in syntax.inner(expression))
-
-
-def _perhaps_called(routine: syntax.Routine, known: Mapping[str, syntax.Routine]) -> Iterator[NotSimulated]:
-    """Calls behind ``and`` and ``or`` of routines that do more than to work out a value: whether a controller calls
-    them where what stands before decides is not known, and here they are always called."""
-    for operation in routine.code:
-        perhaps = (side for part in syntax.expressions_of(operation) for side in _second_sides(part))
-        called = {each.function for side in perhaps for each in _invoked(side)} & known.keys()
-        if any(_acts(known[name], known, {name}) for name in called):
-            yield NotSimulated(getattr(operation, "text", "") or ", ".join(sorted(called)), operation.place)
-
-
-def _read_before(routine: syntax.Routine, known: Mapping[str, syntax.Routine]) -> Iterator[NotSimulated]:
-    """Operations that read a variable before they call a routine that changes it: here routines are called first."""
-    for operation in routine.code:
-        parts = syntax.expressions_of(operation)
-        if not any(_calls(part, known) for part in parts):
-            continue
-        if isinstance(operation, syntax.Assign):
-            parts = (*syntax.inner(operation.target), *parts[1:])
-        met: set[str] = set()
-        if any(met & _sets(called, known, set()) for part in parts for called in _in_turn(part, known, met)):
-            yield NotSimulated(getattr(operation, "text", "") or "...", operation.place)
-
-
-def _in_turn(expression: syntax.Expression, known: Mapping[str, syntax.Routine], met: set[str]) -> Iterator[str]:
-    """The routines that an expression calls, from left to right; ``met`` grows by the variables before each."""
-    for each in syntax.inner(expression):
-        yield from _in_turn(each, known, met)
-    if isinstance(expression, syntax.Variable):
-        met.add(expression.name)
-    elif isinstance(expression, syntax.Invocation) and expression.function in known:
-        yield expression.function
-
-
-def _sets(name: str, known: Mapping[str, syntax.Routine], seen: set[str]) -> set[str]:
-    """Variables, not its own, that a routine and those that it calls set; ``seen`` grows by those that were asked."""
-    seen.add(name)
-    own = own_names(known[name])
-    assigned = (each for each in known[name].code if isinstance(each, syntax.Assign) and not each.local)
-    found = {variable_of(each.target) for each in assigned} - own
-    parts = (part for operation in known[name].code for part in syntax.expressions_of(operation))
-    for called in {each.function for part in parts for each in _invoked(part)} & known.keys():
-        found |= set() if called in seen else _sets(called, known, seen)
-    return found
-
-
-def _second_sides(expression: syntax.Expression) -> Iterator[syntax.Expression]:
-    if isinstance(expression, syntax.Binary) and expression.operator.upper() in DECIDED_BY_ONE:
-        yield expression.right
-    for each in syntax.inner(expression):
-        yield from _second_sides(each)
-
-
-def _acts(routine: syntax.Routine, known: Mapping[str, syntax.Routine], seen: set[str]) -> bool:
-    """Whether a routine does more than to work out a value; ``seen`` grows by those that were asked."""
-    if any(isinstance(each, (syntax.Move, syntax.Fixed, syntax.Doing, syntax.Beside)) for each in routine.code):
-        return True
-    parts = (part for operation in routine.code for part in syntax.expressions_of(operation))
-    new = {each.function for part in parts for each in _invoked(part)} & known.keys() - seen
-    seen |= new
-    return any(_acts(known[name], known, seen) for name in new)
 
 
 class _Calls:
@@ -605,7 +478,7 @@ def mapped(operation: syntax.Operation, each: Each) -> syntax.Operation:
             return replace(operation, of=None if of is None else each(of))
         case syntax.Doing(what=what):
             return replace(operation, what=each(what))
-        case syntax.Beside(what=what):
+        case syntax.ConcurrentStart(what=what):
             mapped_what = within(what, each)
             assert isinstance(mapped_what, syntax.Invocation)
             return replace(operation, what=mapped_what)

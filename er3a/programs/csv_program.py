@@ -26,7 +26,7 @@ from er3a.numerics.si_units import may_be_radians
 from er3a.programs.code_builder import CodeBuilder
 from er3a.programs.instructions import ArmMotion, JointTarget, Place, Rate
 from er3a.programs.lexing import ProgramText
-from er3a.programs.program_findings import NothingMoves, NotUnderstood, ProgramFinding, RowsFromRest
+from er3a.programs.program_findings import NothingMoves, NotUnderstood, ProgramFinding
 from er3a.programs.program_language import Language
 from er3a.programs.rpl.dialect import RplDialect
 from er3a.programs.syntax import Fixed, Program
@@ -117,10 +117,8 @@ def read_csv_program(source: ProgramText) -> Program:
         _doubt_radians(source, np.array([values[: len(names)] for values in table])[:, ~slides], kept[1:])
     other = [name for name in head if name not in (*names, TIME, *stated, UNITS_CHECKED)]
     unread = [NotUnderstood(f"the column {name[:40]}", Place(source.path, kept[0][0])) for name in other]
-    streamed = timed is not None and len(table) > 2
     findings: tuple[ProgramFinding, ...] = (
-        *(*source.findings, *unread),
-        *((RowsFromRest(Place(source.path, kept[0][0])),) if streamed else ()),
+        *unread,
         *(() if table else (NothingMoves(),)),
     )
     routine = builder.routine(Place(source.path, len(source.lines)))

@@ -10,8 +10,8 @@ import math
 import operator
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from ctypes import c_float
 from dataclasses import dataclass, field, replace
+from functools import cache
 from typing import TypeGuard
 
 import numpy as np
@@ -139,9 +139,6 @@ def same(a: NamedFrame, b: NamedFrame) -> bool:
 WITH_FIELDS = {"$APO": ("CDIS", "CPTP", "CORI", "CVEL")} | dict.fromkeys(("$VEL", "$ACC"), ("CP", "ORI1", "ORI2"))
 """KRL variables whose fields are looked up by their full names, however they were set."""
 
-HELD_BESIDE = "%beside"
-"""Under this a routine's own memory keeps which of its variables others change, too, as it has handed them over."""
-
 SIZES = "%sizes"
 """With what the name ends under which the last index in each dimension of a declared list of KRL is kept."""
 
@@ -150,79 +147,6 @@ STRUCTURE = "%STRUC "
 
 LONGEST_TEXT = 10_000
 LARGEST_WHOLE = 2**62
-SINGLE = 2.0**-24
-"""By which share of a number single precision may miss it."""
-
-
-class Rounded(float):
-    """A number as double precision has it; a controller that computes in single precision, or measures it, has it
-    within ``error``."""
-
-    __slots__ = ("error",)
-
-    error: float
-
-    def __new__(cls, value: float, error: float) -> Rounded:
-        """The number, and how far off the controller's may be."""
-        found = super().__new__(cls, value)
-        found.error = error
-        return found
-
-
-def missed_by(value: syntax.Value) -> float:
-    """How far single precision may be from a number; 0 of what it holds exactly."""
-    if isinstance(value, Rounded):
-        return value.error
-    if not isinstance(value, float) or not math.isfinite(value) or c_float(value).value == value:
-        return 0.0
-    return abs(value) * SINGLE
-
-
-def computed_in_single(sign: str, left: syntax.Value, right: syntax.Value, found: float) -> float:
-    """A sum, product or the like of two numbers, with what single precision may make of it."""
-    errors = missed_by(left), missed_by(right)
-    if not any(errors) and not missed_by(found):
-        return found
-    a, b = abs(syntax.number(left) or 0.0), abs(syntax.number(right) or 0.0)
-    match sign:
-        case "*":
-            passed = a * errors[1] + b * errors[0] + errors[0] * errors[1]
-        case "/" if b > errors[1]:
-            passed = (errors[0] + abs(found) * errors[1]) / (b - errors[1])
-        case "+" | "-":
-            passed = sum(errors)
-        case _:
-            passed = _passed_on(ARITHMETIC.get(sign, operator.pow), (left, right), found)
-    return Rounded(found, passed + abs(found) * SINGLE)
-
-
-def function_in_single(function: Callable[..., float], arguments: Sequence[syntax.Value]) -> float:
-    """The value of a mathematical function of numbers, with what single precision may make of it and of these.
-
-    Raises
-    ------
-    ValueError, OverflowError, ZeroDivisionError
-        as the function does; ValueError also of a whole number that rounding may make another
-    """
-    found = function(*(syntax.number(each) or 0.0 for each in arguments))
-    passed = _passed_on(function, arguments, found)
-    if isinstance(found, int) and passed >= 0.5:
-        raise ValueError("rounding decides")
-    found = float(found)
-    return Rounded(found, passed + 4 * SINGLE * max(abs(found), 1.0)) if passed or missed_by(found) else found
-
-
-def _passed_on(function: Callable[..., float], arguments: Sequence[syntax.Value], found: float) -> float:
-    """How far off the value of a function may be for what single precision may make of its arguments."""
-    plain, passed = [syntax.number(each) or 0.0 for each in arguments], 0.0
-    for i, off in enumerate(map(missed_by, arguments)):
-        for beside in (plain[i] - off, plain[i] + off) if off else ():
-            try:
-                passed = max(passed, abs(function(*plain[:i], beside, *plain[i + 1 :]) - found))
-            except (ValueError, OverflowError, ZeroDivisionError):  # beside its domain, or its pole
-                passed = math.inf
-    return passed
-
 
 COMPARISONS: Mapping[str, Callable[[float, float], bool]] = {
     "<": operator.lt,
@@ -231,7 +155,6 @@ COMPARISONS: Mapping[str, Callable[[float, float], bool]] = {
     ">=": operator.ge,
 }
 EQUAL, UNEQUAL = ("==", "="), ("<>", "!=")
-COMPARED = frozenset((*COMPARISONS, *EQUAL, *UNEQUAL))
 ARITHMETIC: Mapping[str, Callable[[float, float], float]] = {
     "+": operator.add,
     "-": operator.sub,
@@ -265,25 +188,17 @@ class Dialect(ABC):
     Attributes
     ----------
     modal : variables that motions use implicitly
-    frames : of these, tool and base, which a routine that is not understood may set
+    frames : of these, tool and base, which a routine that is not followed may set
     local_by_default : whether a routine's assignment to a name that nothing else knows makes a local variable
-    setters : functions outside the program that do not move the arm but set what motions use
     whole_division : whether whole numbers are divided to a whole number; None where this is not documented
-    single_precision : whether numbers that are not whole have 32 bits
-    most_whole : the largest whole number that a variable holds exactly
     first_index : index of a list's first element
-    keeps_data : whether declared data keep what a run of the program sets, to its next start
     """
 
     modal: frozenset[str] = frozenset()
     frames: tuple[str, ...] = ()
     local_by_default: bool = False
-    setters: frozenset[str] = frozenset()
     whole_division: bool | None = False
-    single_precision: bool = False
-    most_whole: int = LARGEST_WHOLE
     first_index: int = 1
-    keeps_data: bool = True
 
     def __init__(self, program: syntax.Program) -> None:  # noqa: B027 - most languages need nothing of it
         """Some languages read the program's declarations."""
@@ -301,16 +216,8 @@ class Dialect(ABC):
         return False
 
     def is_followed(self, name: str, value: syntax.Value) -> bool:
-        """Whether the effect of setting a variable to a value on motions is simulated."""
+        """Whether the effect of setting a variable to a value on motions is followed."""
         return True
-
-    def doubted(self, name: str) -> str:
-        """The variable after whose next assignment motions no longer depend on one that is not simulated."""
-        return name
-
-    def starts_anew(self, data: syntax.Assign) -> bool:
-        """Whether a variable of the data has its first value again where a program without end is begun anew."""
-        return False
 
     def typed(self, kind: str, value: syntax.Value) -> syntax.Value:
         """What a variable of a declared kind, empty for none, holds after a value is assigned to it."""
@@ -327,10 +234,6 @@ class Dialect(ABC):
     def constant(self, memory: ProgramMemory, name: str) -> syntax.Value | None:
         """The value of a predefined name, such as a frame or the arm's position; None if there is none."""
         return None
-
-    def sets(self, call: syntax.Invocation) -> frozenset[str]:
-        """What motions depend on without naming it, and a function outside the program is known to set."""
-        return frozenset()
 
     def frame_of(self, value: syntax.Value | None) -> Reals | None:
         """The transform (4, 4), m, of a value that is a tool or a base; None for others."""
@@ -369,113 +272,55 @@ class ProgramMemory:
     shared, local : values by name
     types : declared types by name
     kept : what a language caches until the next assignment
-    beside : variables that a concurrent thread changes, so that their values are unclear
-    given_away : of these, those that something unknown may change, with its text
-    aliased : variables that may be changed now under another name, or by a handler, so that their values are unclear
+    volatile : variables that something else may change at any time, so that their values are not known
     here : where the arm is
-    doubts : instructions that are not understood, by the variables of motions that they may have set
     cell : what is known of the cell
-    watched : variables of which it is kept, in ``met``, what is read before the program has ``written`` it
-    unset : tool and base that a pose was read with, and that the program has not set; whoever asks empties it
     """
 
-    def __init__(self, functions: Dialect, cell: Cell):
-        self.functions, self.cell = functions, cell
+    def __init__(self, functions: Dialect, cell: Cell, volatile: frozenset[str] = frozenset()):
+        self.functions, self.cell, self.volatile = functions, cell, volatile
         self.here = Position(cell.start)
-        self.doubts: dict[str, str] = {}
         self.shared: dict[str, syntax.Value] = {}
         self.local: dict[str, syntax.Value] = {}
         self.types: dict[str, str] = {}
         self.kept: dict[object, object] = {}
-        self.beside: frozenset[str] = frozenset()
-        self.given_away: Mapping[str, str] = {}
-        self.aliased: frozenset[str] = frozenset()
-        self.watched: frozenset[str] = frozenset()
-        self.met: set[str] = set()  # of all copies
-        self.written: set[str] = set()
-        self.unset: set[str] = set()
-        self.parted: set[str] = set()  # of all copies: variables of which parts are kept under their full names
 
     def copy(self) -> ProgramMemory:
         """An independent copy."""
-        other = ProgramMemory(self.functions, self.cell)
-        other.here = self.here
-        other.shared, other.local, other.types = dict(self.shared), dict(self.local), self.types
-        other.beside, other.aliased, other.doubts = self.beside, self.aliased, dict(self.doubts)
-        other.given_away = self.given_away
-        other.watched, other.met, other.written = self.watched, self.met, set(self.written)
-        other.parted = self.parted
+        other = ProgramMemory(self.functions, self.cell, self.volatile)
+        other.here, other.types = self.here, self.types
+        other.shared, other.local = dict(self.shared), dict(self.local)
         return other
 
     def lost(self, text: str) -> None:
-        """Something that is not understood may have moved the arm and set its tool and base."""
+        """Something that is not followed may have moved the arm and set its tool and base."""
         self.here = Position()
-        self.doubts.update(dict.fromkeys(self.functions.frames, text))
-
-    def seen(self, here: Position, tool: NamedFrame, base: NamedFrame) -> Reals | None:
-        """T_base_tool (4, 4) of a position, as the program reads it; None if it can't be known."""
-        found = here.seen(tool, base, self.cell.flange)
-        if found is not None:
-            self.note_unset(tool, base)
-        return found
-
-    def note_unset(self, tool: NamedFrame, base: NamedFrame) -> None:
-        """Keep which of these the program has not set."""
-        if not tool.own:
-            self.unset.add("tool")
-        if not base.own:
-            self.unset.add("base")
+        for frame in self.functions.frames:
+            self.write(frame, syntax.Unclear(text))
+            self.shared.pop(f"{frame}%name", None)
 
     def read(self, name: str) -> syntax.Value | None:
         """The value of a full name, or None."""
-        if self.aliased and root(name) in self.aliased:
-            return syntax.Unclear(f"{name}, which may be changed elsewhere")
+        if self.volatile and root(name) in self.volatile:
+            return syntax.Unclear(name)
         if name in self.local:
             return self.local[name]
         if self.local and root(name) in self.local:  # a part that was never set, not that of a shared variable
             return None
-        if self.beside and root(name) in self.beside:
-            return self.by_others(name)
-        if self.watched and root(name) in self.watched and name not in self.written:
-            self.met.add(name)
         value = self.shared.get(name)
         return self.functions.constant(self, name) if value is None else value
-
-    def fixed_unknown(self, name: str) -> syntax.Unclear | None:
-        """What was assigned to a variable, if only the cell knows it, and nothing but an assignment changes it: a
-        variable of a routine, or of a program whose data end with it. None of others."""
-        if name in self.aliased or name in self.beside or name[:1] in "$%":
-            return None
-        handed = self.local.get(HELD_BESIDE, ())
-        if name in self.local:
-            value = None if isinstance(handed, tuple) and name in handed else self.local[name]
-        else:
-            value = None if self.functions.keeps_data else self.shared.get(name)
-        return value if type(value) is syntax.Unclear else None
-
-    def by_others(self, name: str) -> syntax.Unclear:
-        """What a variable holds that others may change at any time."""
-        text = self.given_away.get(root(name))
-        return syntax.Unclear(name) if text is None else syntax.PerhapsChanged(text)
 
     def write(self, name: str, value: syntax.Value, local: bool = False) -> None:
         """Set the value of a full name."""
         self.kept.clear()
-        if "." in name or "[" in name:
-            self.parted.add(root(name))
-        if self.doubts:
-            self.doubts.pop(name, None)
         if name in WITH_FIELDS:
             unknown = tuple((field, syntax.Unclear(f"{name}.{field}")) for field in WITH_FIELDS[name])
             parts = value.items if isinstance(value, syntax.Record) else unknown
             self.shared.update({f"{name}.{field}": part for field, part in parts})
         if local or (self.local and root(name) in self.local):
-            handed = self.local.get(HELD_BESIDE, ())
-            self.local[name] = self.by_others(name) if isinstance(handed, tuple) and root(name) in handed else value
+            self.local[name] = value
         else:
             self.shared[name] = value
-            if self.watched and root(name) in self.watched:
-                self.written.add(name)
 
     def declare(self, name: str, kind: str, local: bool, sizes: tuple[int, ...] = ()) -> None:
         """The type of a variable, and sizes of a list; a parameter of a routine takes them where that declares it."""
@@ -498,25 +343,12 @@ class ProgramMemory:
                 self.assign(target.of, changed)
                 return
         key = self.key(target)
-        if key is not None:
-            if "[" in key:
-                self._forget_overlapping(key)
-            elif key in self.parted and isinstance(value, syntax.Unclear):
-                self.forget(key)
-            self.write(key, self.typed(key, value, local), local)
-        else:  # an element changes, but which one is not known: none of its list is known from here
-            while isinstance(target, (syntax.Member, syntax.Element)):
-                target = target.of
-            if isinstance(target, syntax.Variable):
-                self.forget(target.name)
-
-    def _forget_overlapping(self, key: str) -> None:
-        """What a whole list and its elements say of each other, before the list ``A[]`` or an element is set."""
-        whole = f"{root(key)}[]"
-        if key.startswith(whole) or key.strip("[],") == root(key):
-            self.forget(root(key))
-        elif whole in self.local or whole in self.shared:
-            self.write(whole, syntax.Unclear(f"{whole}, whose element was set"))
+        if key is None or (key.endswith("[]") and not isinstance(target, syntax.Variable)):
+            self.forget(variable_of(target))  # an element, but which one is not known
+            return
+        if isinstance(target, syntax.Variable) and isinstance(value, syntax.Unclear):
+            self.forget(key)
+        self.write(key, self.typed(key, value, local), local)
 
     def elements(self, target: syntax.Expression, name: str) -> dict[str, syntax.Value]:
         """Elements of a whole list ``A[]`` that are kept by their full names, as those of a list ``name``."""
@@ -524,11 +356,11 @@ class ProgramMemory:
         if not start:
             return {}
         kept = self.local if root(start) in self.local else {**self.shared, **self.cell.frames}
-        found = [each for each in kept if each.startswith(start)]
+        found = {
+            f"{name}[{each[len(start) :]}": known(self.read(each), each) for each in kept if each.startswith(start)
+        }
         sizes = self._sizes(root(start))
-        return {f"{name}[{each[len(start) :]}": known(self.read(each), each) for each in found} | (
-            {name + SIZES: sizes} if sizes else {}
-        )
+        return found | ({name + SIZES: sizes} if sizes else {})
 
     def take_back(self, target: syntax.Expression, name: str, local: Mapping[str, syntax.Value]) -> None:
         """Set a variable to what a routine's own ``name`` holds at its end; all elements of a whole list ``A[]``."""
@@ -544,30 +376,27 @@ class ProgramMemory:
         self.kept.clear()
         for values, more in ((self.local, ()), (self.shared, self.cell.frames)):
             for name in [each for each in (*values, *more) if root(each) == variable]:
-                values[name] = syntax.Forgotten(f"{name}, changed")
+                values[name] = syntax.Unclear(name)
         if not any(root(name) == variable for name in (*self.local, *self.shared)):
-            self.shared[variable] = syntax.Forgotten(f"{variable}, changed")
+            self.shared[variable] = syntax.Unclear(variable)
 
     def _set_field(self, target: syntax.Member, value: syntax.Value) -> bool:
         """Assign a field of a stored record; False if the field is stored under its full name."""
-        of, name = self.value(target.of), self.key(target.of)
+        of, name = self.value(target.of), self.key(target)
         if isinstance(of, syntax.Record):
             self.assign(target.of, of.having(target.name, value))
             return True
         if isinstance(target.of, syntax.Member) and isinstance(self.value(target.of.of), syntax.Record):
             self.assign(target.of, syntax.Unclear(f"{target.of.name}, partly changed"))  # the record has no such part
             return True
-        part: syntax.Expression = target
-        while isinstance(part, (syntax.Member, syntax.Element)):
-            if isinstance(part, syntax.Member) and isinstance(self.replaced(part.of), tuple):  # which names no parts
-                self.assign(part.of, syntax.Unclear(f"{self.shown(part.of)}, partly changed"))
-                return True
-            part = part.of
-        kept = None if name is None else self.read(name)
-        if kept is None or not isinstance(of, syntax.Unclear):
+        kept = None if name is None else self.read(self.key(target.of) or "")
+        if isinstance(of, tuple):  # a list has no fields
+            self.assign(target.of, syntax.Unclear(f"{self.shown(target.of)}, partly changed"))
+            return True
+        if kept is None:
             return False
-        if isinstance(kept, syntax.Unset):
-            self.assign(target.of, syntax.Record("", ((target.name, value),)))
+        first = syntax.Record("", ((target.name, value),))
+        self.assign(target.of, first if isinstance(kept, syntax.Unset) else syntax.Unclear(f"{self.shown(target.of)}"))
         return True
 
     def key(self, target: syntax.Expression) -> str | None:
@@ -589,17 +418,15 @@ class ProgramMemory:
     def outside(self, target: syntax.Expression) -> str:
         """The element in a target that its list's declaration has not, as text; empty for none.
 
-        One whose frame is given to the check counts as declared. Of system variables only an index that is typed does.
+        One whose frame is given to the check counts as declared.
         """
         while isinstance(target, (syntax.Member, syntax.Element)):
             if isinstance(target, syntax.Element) and isinstance(target.of, syntax.Variable):
                 name, sizes = target.of.name, self._sizes(target.of.name)
                 found = [syntax.number(self.value(each)) for each in target.indices]
                 pairs = zip(found, sizes) if len(found) == len(sizes) else ()
-                typed = [syntax.number(each.value) for each in target.indices if isinstance(each, syntax.Constant)]
-                system = name.startswith("$") and any(each is not None and each < 1 for each in typed)
                 beyond = any(each is not None and not 1 <= each <= size for each, size in pairs)
-                if (system or beyond) and (shown := self.shown(target)) not in self.cell.frames:
+                if beyond and (shown := self.shown(target)) not in self.cell.frames:
                     return f"{shown} of {name}[{','.join(map(str, sizes))}]"
             target = target.of
         return ""
@@ -618,13 +445,6 @@ class ProgramMemory:
             indices = tuple(syntax.Constant(self.value(each)) for each in target.indices)
             return replace(target, of=self.settled(target.of), indices=indices)
         return target
-
-    def replaced(self, target: syntax.Expression) -> syntax.Value:
-        """The value that an assignment to a variable replaces, which the program does not read."""
-        watched, self.watched = self.watched, frozenset()
-        found = self.value(target)
-        self.watched = watched
-        return found
 
     def value(self, expression: syntax.Expression) -> syntax.Value:
         """The value of an expression."""
@@ -645,8 +465,8 @@ class ProgramMemory:
                 return syntax.Record(kind, tuple((name, self.value(each)) for name, each in items))
             case syntax.Listed(kind=kind, items=listed):
                 return self.functions.listed(kind, tuple(map(self.value, listed)))
-            case syntax.Opaque(text=text, doubt=doubt):
-                return syntax.PerhapsChanged(text) if doubt else syntax.Unclear(text)
+            case syntax.Opaque(text=text):
+                return syntax.Unclear(text)
 
     def _part(self, expression: syntax.Member | syntax.Element) -> syntax.Value:
         of = self.value(expression.of)
@@ -664,8 +484,6 @@ class ProgramMemory:
         else:
             key = self.key(expression)
             found = None if key is None else self.read(key)
-            if found is None and isinstance(of, syntax.NotEvaluated):
-                return of
             if found is None and isinstance(of, syntax.Unclear):
                 return syntax.Unclear(key or self.outside(expression) or of.text)
         return syntax.Unclear(self.shown(expression)) if found is None else found
@@ -715,133 +533,84 @@ class ProgramMemory:
             items = ((key, self._of_kind(str(shape.get(key) or ""), each)) for key, each in value.items)
             return syntax.Record(value.kind, tuple(items))
         if not isinstance(value, bool) and isinstance(value, (int, float)):
-            if kind in ("REAL", "LREAL") and not isinstance(value, float):
+            if kind in ("REAL", "LREAL"):
                 return float(value)
-            if kind in ("INT", "DINT", "SINT", "LINT") and isinstance(value, float) and abs(value) < LARGEST_WHOLE:
-                if self.functions.whole_division is None and value % 1:
+            if kind in ("INT", "DINT", "SINT", "LINT") and isinstance(value, float):
+                if (value % 1 and self.functions.whole_division is None) or abs(value) > LARGEST_WHOLE:
                     return syntax.Unclear(f"{value:g}, whose conversion to a whole number is not documented")
-                if self.functions.single_precision and abs(abs(value) % 1 - 0.5) <= missed_by(value) > 0:
-                    return syntax.Unclear(f"{value:.9g}, whose rounding to a whole number is open on the controller")
                 return int(math.copysign(math.floor(abs(value) + 0.5), value))  # KRL: from x.5 on it is x + 1
         return value
 
     def _binary(self, expression: syntax.Binary) -> syntax.Value:
         sign, left = expression.operator, self.value(expression.left)
         logic = SAME.get(sign)
-        if logic == "AND" and left is False:
-            return False
-        if logic == "OR" and left is True:
-            return True
+        if (logic == "AND" and left is False) or (logic == "OR" and left is True):
+            return left
         right = self.value(expression.right)
-        if logic is not None:
-            decisive = logic == "OR"
-            if right is decisive:
-                return decisive
-            if isinstance(left, bool) and isinstance(right, bool):
-                return not decisive
+        if logic is not None and isinstance(right, bool):
+            if right is (logic == "OR"):
+                return right
+            if isinstance(left, bool):
+                return left
         if sign == ":":
             return self.functions.product(left, right)
+        if sign in EQUAL or sign in UNEQUAL:
+            same = _equal(left, right)
+            return same if isinstance(same, syntax.Unclear) else same == (sign in EQUAL)
         for side in (left, right):
             if isinstance(side, syntax.Unclear):
                 return side
-        if sign in EQUAL or sign in UNEQUAL:
-            same = self._equal(left, right)
-            return same if isinstance(same, syntax.Unclear) else same == (sign in EQUAL)
-        if self._too_near(sign, left, right):
-            return _decided_by_rounding(sign, left, right)
-        if sign in BITWISE:
-            return (
-                BITWISE[sign](left, right)
-                if _is_whole(left) and _is_whole(right)
-                else syntax.Unclear(f"... {sign} ...")
-            )
+        if sign in BITWISE and _is_whole(left) and _is_whole(right):
+            return BITWISE[sign](left, right)
         if sign in EXCLUSIVE and isinstance(left, bool) and isinstance(right, bool):
             return left != right
-        return self._computed(sign, left, right)
-
-    def _equal(self, left: syntax.Value, right: syntax.Value) -> bool | syntax.Unclear:
-        """Whether two values are equal; unclear if that rests on a part which is unclear or near enough to be equal."""
-        for side in (left, right):
-            if isinstance(side, syntax.Unclear):
-                return side
-            if isinstance(side, syntax.Solved):  # which only the arm's table gives
-                return syntax.Unclear(syntax.shown(side))
-        if self._too_near("==", left, right):
-            return _decided_by_rounding("==", left, right)
-        one, other = _parts(left), _parts(right)
-        if one is None or other is None or len(one) != len(other):
-            alike = _sort(left) is _sort(right)  # others languages refuse, or convert
-            return left == right if alike else syntax.Unclear(f"{syntax.shown(left)} == {syntax.shown(right)}")
-        found = [self._equal(*pair) for pair in zip(one, other)]
-        return False if False in found else next((each for each in found if isinstance(each, syntax.Unclear)), True)
-
-    def _too_near(self, sign: str, left: syntax.Value, right: syntax.Value) -> bool:
-        """Whether two numbers that are compared differ by no more than what rounding, or measuring, may miss."""
-        rounded = isinstance(left, Rounded) or isinstance(right, Rounded)
-        if sign not in COMPARED or not (self.functions.single_precision or rounded):
-            return False
-        a, b = syntax.number(left), syntax.number(right)
-        if a is None or b is None or not (isinstance(left, float) or isinstance(right, float)):
-            return False
-        if a == b and not rounded:  # the same, rounded alike
-            return False
-        return abs(a - b) <= missed_by(left) + missed_by(right)
-
-    def _quotient(self, a: float, b: float, whole: bool) -> syntax.Value:
-        if not whole or self.functions.whole_division is False:
-            return a / b
-        if self.functions.whole_division is None and a % b:
-            return syntax.Unclear(f"{a:.0f}/{b:.0f}: whether such a quotient is a whole number is not documented")
-        return int(a / b)
-
-    def _computed(self, sign: str, left: syntax.Value, right: syntax.Value) -> syntax.Value:
         if sign == "+" and isinstance(left, str) and isinstance(right, str) and len(left + right) < LONGEST_TEXT:
             return left + right
+        return self._computed(sign, left, right)
+
+    def _computed(self, sign: str, left: syntax.Value, right: syntax.Value) -> syntax.Value:
+        """A comparison, sum, product or the like of two numbers."""
         a, b = syntax.number(left), syntax.number(right)
         if a is None or b is None:
-            both = left + right if isinstance(left, tuple) and isinstance(right, tuple) else ()
-            summed = sign in ("+", "-") and bool(both) and syntax.numbers(both) is not None  # by some controllers
-            return syntax.NotEvaluated(f"... {sign} ...") if summed else syntax.Unclear(f"... {sign} ...")
+            return syntax.Unclear(f"... {sign} ...")
         if sign in COMPARISONS:
             return COMPARISONS[sign](a, b)
         whole = isinstance(left, int) and isinstance(right, int)
-        found = self._combined(sign, a, b, whole)
-        if whole and isinstance(found, (int, float)) and abs(found) > self.functions.most_whole:
-            return syntax.Unclear(f"{a:.0f} {sign} {b:.0f}, beyond what a whole number holds")
-        if self.functions.single_precision and isinstance(found, float):
-            in_single = computed_in_single(sign, left, right, found)
-            jumps = sign in ("%", "MOD") and missed_by(in_single) > abs(b) / 2
-            return _decided_by_rounding(sign, left, right) if jumps else in_single
-        return found
-
-    def _combined(self, sign: str, a: float, b: float, whole: bool) -> syntax.Value:
         try:
-            if sign == "/":
-                return self._quotient(a, b, whole)
-            if sign in ("^", "**"):
-                power = a**b
-                return syntax.Unclear("a root of a negative number") if isinstance(power, complex) else power
-            if sign not in ARITHMETIC:
-                return syntax.Unclear(f"... {sign} ...")
-            if sign in ("%", "MOD", "DIV") and min(a, b) < 0 and a % b:
-                return syntax.Unclear(f"{a:g} {sign} {b:g}, whose sign is not documented")
-            if sign in ("MOD", "DIV") and (a % 1 or b % 1):
-                return syntax.Unclear(f"{a:g} {sign} {b:g}, of what is not whole")
-            found = ARITHMETIC[sign](a, b)
+            found = self._combined(sign, a, b, whole)
         except (ZeroDivisionError, OverflowError, ValueError):
             return syntax.Unclear("a division by zero or an overflow")
-        return int(found) if whole and abs(found) < 2**53 else found
+        return int(found) if whole and isinstance(found, float) and not found % 1 and sign != "/" else found
+
+    def _combined(self, sign: str, a: float, b: float, whole: bool) -> syntax.Value:
+        if sign == "/":
+            if not whole or self.functions.whole_division is False:
+                return a / b
+            if self.functions.whole_division is None and a % b:
+                return syntax.Unclear(f"{a:.0f}/{b:.0f}: whether such a quotient is a whole number is not documented")
+            return int(a / b)
+        if sign in ("^", "**"):
+            power = a**b
+            return syntax.Unclear("a root of a negative number") if isinstance(power, complex) else power
+        if sign in ("%", "MOD", "DIV") and ((min(a, b) < 0 and a % b) or (sign != "%" and (a % 1 or b % 1))):
+            return syntax.Unclear(f"{a:g} {sign} {b:g}, whose value is not documented")
+        return ARITHMETIC[sign](a, b) if sign in ARITHMETIC else syntax.Unclear(f"... {sign} ...")
 
 
 NOT_NUMBERS = ("NAN", "INF", "INFINITY")
 
 
+def evaluated(function: Callable[..., float], values: Sequence[syntax.Value | None]) -> syntax.Value | None:
+    """A mathematical function of numbers; None of other values, and where it has none."""
+    plain = syntax.numbers(tuple(values))
+    try:
+        return None if plain is None else function(*plain)
+    except (ValueError, OverflowError, ZeroDivisionError, TypeError):
+        return None
+
+
 def unresolved(value: syntax.Unclear, text: str = "") -> UnresolvedTarget:
     """A target that is made of an unclear value; ``text``: what it is called where that has no text of its own."""
-    if isinstance(value, syntax.PerhapsChanged):
-        return UnresolvedTarget(value.text, "perhaps_changed")
-    if isinstance(value, syntax.NotEvaluated):
-        return UnresolvedTarget(value.text, "not_evaluated")
     is_number = value.text.upper().lstrip("+-") in NOT_NUMBERS
     return UnresolvedTarget(value.text or text, "not_finite" if is_number else "undefined")
 
@@ -851,11 +620,27 @@ def known(found: syntax.Value | None, name: str) -> syntax.Value:
     return syntax.Unclear(name) if found is None or isinstance(found, syntax.Unset) else found
 
 
+@cache
 def root(name: str) -> str:
     """The variable of a full name: ``XP`` of ``XP[3]`` and ``XP.X``."""
     dot, bracket = name.find("."), name.find("[")
     ends = [at for at in (dot, bracket) if at > 0]
     return name[: min(ends)] if ends else name
+
+
+def _equal(left: syntax.Value, right: syntax.Value) -> bool | syntax.Unclear:
+    """Whether two values are equal; unclear if that rests on a part which is unclear."""
+    for side in (left, right):
+        if isinstance(side, syntax.Unclear):
+            return side
+        if isinstance(side, syntax.Solved):  # which only the arm's table gives
+            return syntax.Unclear(syntax.shown(side))
+    one, other = _parts(left), _parts(right)
+    if one is None or other is None or len(one) != len(other):
+        alike = _sort(left) is _sort(right)  # others languages refuse, or convert
+        return left == right if alike else syntax.Unclear(f"{syntax.shown(left)} == {syntax.shown(right)}")
+    found = [_equal(*pair) for pair in zip(one, other)]
+    return False if False in found else next((each for each in found if isinstance(each, syntax.Unclear)), True)
 
 
 def _sort(value: syntax.Value) -> type:
@@ -868,11 +653,6 @@ def _parts(value: syntax.Value) -> tuple[syntax.Value, ...] | None:
     if isinstance(value, syntax.Record):
         return value.values()
     return value if isinstance(value, tuple) else None
-
-
-def _decided_by_rounding(sign: str, left: syntax.Value, right: syntax.Value) -> syntax.Unclear:
-    numbers = [f"{syntax.number(each):.9g}" for each in (left, right)]
-    return syntax.Unclear(f"{numbers[0]} {sign} {numbers[1]}, which rounding decides on the controller")
 
 
 def _whole(name: str | None) -> str:
@@ -891,10 +671,13 @@ def _unary(sign: str, value: syntax.Value) -> syntax.Value:
         return ~value if _is_whole(value) else syntax.Unclear(f"{sign} ...")
     if sign in ("NOT", "not", "!"):
         return not value if isinstance(value, bool) else syntax.Unclear(f"{sign} ...")
-    plain = syntax.number(value)
-    if plain is None:
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
         return syntax.Unclear(f"{sign} ...")
-    assert isinstance(value, (int, float))
-    if isinstance(value, Rounded):
-        return Rounded(-value, value.error) if sign == "-" else value
     return -value if sign == "-" else value
+
+
+def variable_of(target: syntax.Expression) -> str:
+    """The variable that an assignment changes."""
+    while isinstance(target, (syntax.Member, syntax.Element)):
+        target = target.of
+    return target.name if isinstance(target, syntax.Variable) else ""

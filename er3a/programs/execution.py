@@ -2,42 +2,49 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal, Protocol
 
 from er3a.by_value import ByValue
+from er3a.numerics.arrays import Reals
 from er3a.programs.instructions import ArmMotion, Decision, Instruction, Listing, Place, alike
-from er3a.programs.syntax import Program
+from er3a.programs.syntax import Program, Value
 
-EndKind = Literal[
-    "end", "repeats", "joins", "drifts", "operations", "branches", "rounds", "stopped", "recursion", "guessed"
-]
+EndKind = Literal["end", "joins", "rounds", "operations", "ways", "depth"]
 
-Phase = Literal["following", "checking"]
-KeepOn = Callable[[Phase, int, int], bool]
-"""Asked again and again while a program is followed and while its motions are checked: the phase, how many steps are
-done, and of how many (0 where that is not known). It ends there if the answer is False."""
+
+class Moved(Protocol):
+    """A motion that was solved; ``end``: joints (n,), rad or m, where it leaves the arm; None if not known."""
+
+    @property
+    def end(self) -> Reals | None: ...
+
+
+Mover = Callable[[ArmMotion, "Reals | None"], Moved]
+"""Solves a motion from joints (n,), rad or m, None where they are not known."""
 
 
 @dataclass(frozen=True)
 class RunLimits:
-    """How far a program is followed.
+    """How far a program is followed, and what is assumed of it.
 
     Attributes
     ----------
     operations : in all
-    ways : sides of branches on what only the cell knows, without those that come into a state that was followed
+    ways : at a time, by the sides of branches on what only the cell knows
     rounds : of a loop without end whose state does not repeat
     depth : of calls within calls
-    second_round : whether a program that may be begun again when it is over is, up to where it does what it did
+    assumed : patterns of names of routines (``rq_*``) that neither move the arm nor set what motions use
+    assumed_values : of variables that the program does not give
     """
 
-    operations: int = 2_000_000
-    ways: int = 2_000
-    rounds: int = 1_000
+    operations: int = 300_000
+    ways: int = 64
+    rounds: int = 100
     depth: int = 40
-    second_round: bool = False
+    assumed: tuple[str, ...] = ()
+    assumed_values: Mapping[str, Value] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,14 +56,16 @@ class Step:
     place : its place in the text
     calls : where the routines around it were called, the outermost first
     before : number of the step before it; -1 for the first
-    again : whether it is met only as the program is begun again when it is over
+    entry : the routine with which its way begins
+    moved : how it was solved, of a motion
     """
 
     instruction: Instruction
     place: Place
     calls: tuple[Place, ...]
     before: int
-    again: bool = False
+    entry: str
+    moved: Any = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,25 +74,19 @@ class Ending:
 
     Attributes
     ----------
-    kind : it is over; it ``repeats`` what it did, for ever; it ``joins`` another way, being in its state; it
-        ``drifts``, being a loop for ever whose state does not repeat; or a limit of the run was met (``operations``,
-        ``branches``: the other side of this one was not followed, ``rounds``: nor was it of a loop's, of which only the
-        cell knows how often it goes round), or of calls within calls; or it was ``stopped``; or a routine that runs
-        already would be called, if the name was ``guessed`` rightly
+    kind : it is over; it ``joins`` what was followed before, being in a state that was met; or it was not followed on:
+        after so many rounds of a loop without end (``rounds``) or operations, on a side of a branch of too many
+        (``ways``), in too many calls within each other (``depth``)
     step : number of its last step; -1 if it has none
-    repeats_from : number of the step that follows the last, where it repeats or joins; None if no step does
-    limit : that was met, as a number: of operations, sides of branches, rounds or calls; 0 if none was
-    beside : whether the way is that of a thread or interrupt, which runs beside the program
-    again : whether the way is that of the program's second round
+    repeats_from : number of the step that follows the last, where it joins; None if no step does
+    entry : the routine with which it begins
     """
 
     kind: EndKind
     step: int
     place: Place
     repeats_from: int | None = None
-    limit: int = 0
-    beside: bool = False
-    again: bool = False
+    entry: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,24 +99,6 @@ class FrameTwice:
     turned_deg: float
 
 
-@dataclass(frozen=True, slots=True)
-class FramesUnset:
-    """A pose that the program reads with a tool or base that it has not set, and that motions depend on.
-
-    Attributes
-    ----------
-    kinds : ``tool`` and ``base``, which of them it has not set
-    before : number of the step that is carried out next
-    decides : whether the way that the program takes may depend on it
-    """
-
-    kinds: frozenset[str]
-    place: Place
-    calls: tuple[Place, ...]
-    before: int
-    decides: bool
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Execution(ByValue):
     """A program that was run.
@@ -122,30 +107,22 @@ class Execution(ByValue):
     ----------
     steps : of all ways; each names the one before it
     endings : one for each way
-    unmet : instructions that are no motions, may move the arm for all that is known, and were not carried out
+    open : places that may be come to on ways, or in states, that were not followed
     entered : names of the routines that a way came to
     frames_twice : frames that the program and the cell give differently; the program's were taken
-    kept : variables of its data that decide motions and that it leaves changed to its next start, with where
-    elsewhere : variables of its data that decide motions and that other programs set, with where
-    errors : handlers after which the program goes on that had an error
-    unset : poses that it reads with a tool or base that it has not set
     """
 
     program: Program
     steps: tuple[Step, ...]
     endings: tuple[Ending, ...]
-    unmet: tuple[Place, ...] = ()
+    open: frozenset[Place] = frozenset()
     entered: frozenset[str] = frozenset()
     frames_twice: tuple[FrameTwice, ...] = ()
-    kept: tuple[tuple[str, Place], ...] = ()
-    elsewhere: tuple[tuple[str, Place], ...] = ()
-    errors: tuple[Place, ...] = ()
-    unset: tuple[FramesUnset, ...] = ()
 
     @property
     def complete(self) -> bool:
         """Whether every way was followed to its end, or until it repeats."""
-        return all(each.kind in ("end", "repeats", "joins") for each in self.endings)
+        return all(each.kind in ("end", "joins") for each in self.endings)
 
     @property
     def motions(self) -> tuple[int, ...]:
@@ -167,17 +144,17 @@ class Execution(ByValue):
         return tuple(reversed(found))
 
     def main(self) -> Ending:
-        """The program's own way with the most motions, in its first round; the first of them if there are several."""
+        """The way from the program's beginning with the most motions; the first of them if there are several."""
         moves = [0] * (len(self.steps) + 1)
         for i, step in enumerate(self.steps):
             moves[i] = moves[step.before] + isinstance(step.instruction, ArmMotion)
-        first = [each for each in self.endings if not each.again]
-        return max(first, key=lambda ending: (moves[ending.step] > 0 and not ending.beside, moves[ending.step]))
+        own = [each for each in self.endings if each.entry == self.program.entry and moves[each.step]]
+        return max(own or self.endings, key=lambda ending: moves[ending.step])
 
     def round_from(self, ending: Ending) -> int | None:
         """Number of the step from which a way repeats itself for ever; None if it does not."""
         again = ending.repeats_from
-        return again if ending.kind in ("repeats", "joins") and again in self.way(ending) else None
+        return again if again is not None and again in self.way(ending) else None
 
     def listing(self, ending: Ending | None = None) -> Listing:
         """A way as a sequence without branches, to be written; by default :meth:`main`."""

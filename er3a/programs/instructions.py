@@ -23,7 +23,6 @@ Angles are in (-180, 180]. Where the middle angle is +-90 deg the last one (the 
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from pathlib import Path
@@ -42,8 +41,6 @@ ZoneKind = Literal["fine", "distance", "angle", "share", "velocity", "named"]
 MotionKind = Literal["joint", "line", "arc", "spline"]
 Unresolved = Literal[
     "undefined",
-    "perhaps_changed",
-    "not_evaluated",
     "not_finite",
     "too_far",
     "position_unknown",
@@ -147,11 +144,6 @@ class NamedFrame(ByValue):
     load: MassBody | None = None
     own: bool = True
 
-    @property
-    def one_of_several(self) -> bool:
-        """Whether the name has an index that is not a number, so that it stands for several frames."""
-        return bool(re.search(r"\w\s*[\[{][^\]}]*[^\s\d,\]}]", self.name))
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointTarget(ByValue):
@@ -240,13 +232,8 @@ class ArmMotion(ByValue):
     turning : the same in KRL, of the turn of the tool's x axis and of that about it; None where the program gives none
     with_path : whether an arc turns the tool with the path (:func:`turn_beside_path`), not about one axis of the base
     load : what hangs on the flange, in its frame; None where the program says nothing
-    left_out : coordinates that a variable leaves out of its position, and that were taken from where the arm is
-    turn_in_doubt : rad, by which a relative position turns otherwise where its angles are added to those before
-    turns : a setting that asks for another turn of the tool than is followed; empty for none
-    doubt : an instruction before that is not understood, and may have set another tool, base or path; empty if there is
-        none, and for targets that are no poses
-    entry : how much of it a corner before it may take, where the zone there is a share of the motion before alone
-        (KRL's C_PTP); None where that zone holds for both
+    not_followed : what of it is not followed, as the program has it: a setting that asks for another turn of the tool,
+        coordinates that a position leaves out; empty for nothing
     """
 
     kind: MotionKind
@@ -263,30 +250,16 @@ class ArmMotion(ByValue):
     turn_speed: float | None = None
     turning: tuple[Turning | None, Turning | None] = (None, None)
     load: Load | None = None
-    left_out: str = ""
-    turn_in_doubt: float = 0.0
-    turns: str = ""
-    doubt: str = ""
+    not_followed: str = ""
     with_path: bool = False
-    entry: Zone | None = field(default=None, compare=False)  # which other motions decide
 
 
 @dataclass(frozen=True, slots=True)
 class Pause:
-    """The program waits: for so many seconds, for a condition, or for the operator (both None).
-
-    Attributes
-    ----------
-    stops : whether the arm is known to stand at its target then, even after a motion with a zone
-    by_others : whether nothing that was read ends the wait
-    looped : whether a loop waits; the condition is the line at its head
-    """
+    """The program waits: for so many seconds, for a condition, or for the operator (both None)."""
 
     seconds: float | None = None
     condition: str | None = None
-    stops: bool = False
-    by_others: bool = False
-    looped: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -320,27 +293,13 @@ class Aside:
 
 @dataclass(frozen=True, slots=True)
 class Unknown:
-    """What is not understood; ``may_move`` if it can move the arm for all that is known; ``stops``: the controller."""
+    """What is not understood; ``may_move`` if it can move the arm for all that is known, ``shapes`` if motions may go
+    otherwise from here on, ``stops`` if the controller stops here."""
 
     text: str
     may_move: bool = True
+    shapes: bool = False
     stops: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class MovesBeside:
-    """A routine that moves the arm beside the program: a thread from here on, or an interrupt at any time.
-
-    Attributes
-    ----------
-    kind : ``entered`` where an interrupt's own way begins, with the arm anywhere
-    sets : what motions depend on and it sets, if it moves nothing itself
-    """
-
-    routine: str
-    kind: Literal["thread", "interrupt", "entered"]
-    text: str
-    sets: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -351,7 +310,7 @@ class Decision:
     taken: bool
 
 
-Instruction = ArmMotion | Pause | Output | Remark | Disabled | Aside | Unknown | MovesBeside | Decision
+Instruction = ArmMotion | Pause | Output | Remark | Disabled | Aside | Unknown | Decision
 
 
 @dataclass(frozen=True, slots=True)

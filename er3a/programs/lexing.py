@@ -15,8 +15,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from er3a.errors import InputError
-from er3a.programs.instructions import Place
-from er3a.programs.program_findings import NotUnderstood, OtherEncoding
 from er3a.programs.syntax import Binary, Constant, Element, Expression, Invocation, Member, Unary, Variable
 
 DEEPEST = 40
@@ -230,19 +228,11 @@ class ProgramText:
     path: Path
     text: str
     encoding: str
-    returns: tuple[int, ...] = ()  # lines that begin after a carriage return alone, in a text whose others do not
 
     @property
     def lines(self) -> tuple[str, ...]:
         """The lines without their ends."""
         return tuple(self.text.split("\n"))
-
-    @property
-    def findings(self) -> tuple[OtherEncoding | NotUnderstood, ...]:
-        """What is to be said about the encoding, and about ends of lines that a controller may not take for such."""
-        said = () if self.encoding == "utf-8" else (OtherEncoding(self.encoding),)
-        lines = self.lines if self.returns else ()
-        return (*said, *(NotUnderstood(lines[i - 1].strip(), Place(self.path, i)) for i in self.returns))
 
 
 def read_program_text(path: Path) -> ProgramText:
@@ -269,8 +259,6 @@ def read_program_text(path: Path) -> ProgramText:
         raise InputError(path, None, "is a ZIP archive", "Unpack it, and name a program in its folder")
     text, encoding = decoded(raw, path)
     text = text.replace("\r\n", "\n")
-    alone = re.finditer("\r", text) if "\n" in text else ()
-    returns = tuple(text.count("\n", 0, each.start()) + text.count("\r", 0, each.start()) + 2 for each in alone)
     text = text.replace("\r", "\n")
     control = re.search(r"[\x00-\x08\x0e-\x19\x1b-\x1f]", text)
     if control is not None:
@@ -278,7 +266,7 @@ def read_program_text(path: Path) -> ProgramText:
         raise InputError(
             path, f"line {line}", "holds control characters, so it is not text", "Export the program as text"
         )
-    return ProgramText(path, text.rstrip("\x1a"), encoding, returns)
+    return ProgramText(path, text.rstrip("\x1a"), encoding)
 
 
 def data_file_of(path: Path, suffix: str) -> Path | None:

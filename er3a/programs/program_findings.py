@@ -20,23 +20,6 @@ class NameTwice(Finding, code="program_name_twice"):
     place: Place
 
 
-class ModuleTwice(Finding, code="program_module_twice"):
-    """A module, or the controller's data, of which there is another one that differs, at ``place``; ``taken``: the one
-    that was read."""
-
-    name: str
-    taken: str
-    place: Place
-
-
-class BegunWithin(Finding, code="program_begun_within"):
-    """The file is a part of a program that begins in another ``file``; it was followed from ``routine`` alone."""
-
-    routine: str
-    file: str
-    place: Place
-
-
 class NotUnderstood(Finding, code="program_not_understood"):
     """A piece of text that is kept, but not understood."""
 
@@ -44,56 +27,11 @@ class NotUnderstood(Finding, code="program_not_understood"):
     place: Place
 
 
-class NotSimulated(Finding, code="program_not_simulated"):
-    """An instruction that is understood, but what it does to motions is not followed."""
-
-    text: str
-    place: Place
-
-
-class FormInferred(Finding, code="program_form_inferred"):
-    """An element whose form is not known from any file of the controller; it was read as like ones are built."""
-
-    element: str
-    place: Place
-
-
-class JointSpeedInferred(Finding, code="program_joint_speed_inferred"):
-    """A joint motion at a speed of the tool, for which no source says how long it takes; the first of a program."""
-
-    word: str
-    place: Place
-
-
-class OtherEncoding(Finding, code="program_other_encoding"):
-    """The text is not UTF-8; it was read as ``encoding``."""
-
-    encoding: str
-
-
-class RowsFromRest(Finding, code="program_rows_from_rest"):
-    """The rows of a table over time were taken as moves from rest to rest, each in its time."""
-
-    place: Place
-
-
 class NothingMoves(Finding, code="program_nothing_moves"):
     """No instruction of the program moves the arm."""
 
 
-ProgramFinding = (
-    DataFileMissing
-    | NameTwice
-    | ModuleTwice
-    | BegunWithin
-    | NotUnderstood
-    | NotSimulated
-    | FormInferred
-    | JointSpeedInferred
-    | OtherEncoding
-    | RowsFromRest
-    | NothingMoves
-)
+ProgramFinding = DataFileMissing | NameTwice | NotUnderstood | NothingMoves
 
 
 class ArcsSplit(Finding, code="written_arcs_split"):

@@ -30,21 +30,6 @@ class Unset(Unclear):
 
 
 @dataclass(frozen=True, slots=True)
-class PerhapsChanged(Unclear):
-    """What a variable holds after something that is not understood, which may have changed it: ``text``."""
-
-
-@dataclass(frozen=True, slots=True)
-class Forgotten(Unclear):
-    """What a variable holds that was changed where the program was not followed, or that others may change."""
-
-
-@dataclass(frozen=True, slots=True)
-class NotEvaluated(Unclear):
-    """What the program alone determines, by a function or an operator that is not evaluated here: ``text``."""
-
-
-@dataclass(frozen=True, slots=True)
 class Record:
     """Named values, in the language's own units: a position, a frame, a pose of URScript.
 
@@ -145,9 +130,6 @@ START = "%start"
 RETURNED = "%returned"
 """Variable of a routine whose declared type is that of its value."""
 
-CYCLIC = "%CYCLIC"
-"""What a :class:`Beside` asks for that sets its first argument again and again."""
-
 
 @dataclass(frozen=True, slots=True)
 class Constant:
@@ -223,10 +205,9 @@ class Listed:
 
 @dataclass(frozen=True, slots=True)
 class Opaque:
-    """An expression that is not understood; with ``doubt`` it may be what a variable held before."""
+    """An expression that is not understood."""
 
     text: str
-    doubt: bool = False
 
 
 Expression = Constant | Variable | Member | Element | Invocation | Unary | Binary | Aggregate | Listed | Opaque
@@ -278,13 +259,12 @@ class Call:
 
 
 @dataclass(frozen=True, slots=True)
-class Beside:
-    """From here on a routine runs beside the program: at once (a thread), or whenever its condition holds."""
+class ConcurrentStart:
+    """From here on a routine runs concurrently: at once (a thread), or whenever its condition holds (an interrupt)."""
 
     place: Place
     what: Invocation
     text: str
-    kind: Literal["thread", "interrupt"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -297,10 +277,9 @@ class Return:
 
 @dataclass(frozen=True, slots=True)
 class Halt:
-    """The program is over, wherever it is; or begins ``again``, with the arm and its data as they are."""
+    """The program is over, wherever it is."""
 
     place: Place
-    again: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -324,17 +303,12 @@ class Move:
 
 @dataclass(frozen=True, slots=True)
 class Waiting:
-    """A wait of so many ``seconds``, or for a condition, or for the operator; ``stops`` as of ``Pause``.
-
-    ``ends`` where it is over even if the condition is false.
-    """
+    """A wait of so many ``seconds``, or for a condition, or for the operator."""
 
     place: Place
     kind: Literal["seconds", "condition", "operator"]
     of: Expression | None
     text: str
-    stops: bool = False
-    ends: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -354,7 +328,7 @@ class Fixed:
     instruction: Instruction
 
 
-Operation = Assign | GoTo | Branch | Call | Beside | Return | Halt | Move | Waiting | Doing | Fixed
+Operation = Assign | GoTo | Branch | Call | ConcurrentStart | Return | Halt | Move | Waiting | Doing | Fixed
 
 
 @dataclass(frozen=True, slots=True)
@@ -375,32 +349,12 @@ class RoutineParameter:
 
 
 @dataclass(frozen=True, slots=True)
-class OnError:
-    """What may follow an error in a routine, by its handler.
-
-    Attributes
-    ----------
-    place : of the handler
-    goes_on : whether the program may go on with what is after the error, with the caller, or from its beginning
-    again : whether what failed may be carried out again
-    passed_on : whether the caller's handler may get the error
-    """
-
-    place: Place
-    goes_on: bool
-    again: bool
-    passed_on: bool
-
-
-@dataclass(frozen=True, slots=True)
 class Routine:
     """Code with a name; a run ends after its last operation.
 
     Attributes
     ----------
-    thread : whether it runs beside the program, so that a run of the program does not carry it out
-    handler : what handlers of its errors do, at any time, without jumps
-    on_error : None where no handler takes its errors
+    thread : whether it runs concurrently, so that a run of the program does not carry it out
     """
 
     name: str
@@ -408,13 +362,6 @@ class Routine:
     code: tuple[Operation, ...]
     place: Place
     thread: bool = False
-    handler: tuple[Operation, ...] = ()
-    on_error: OnError | None = None
-
-    @property
-    def operations(self) -> tuple[Operation, ...]:
-        """What it does, and what its handlers do."""
-        return (*self.code, *self.handler)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -427,9 +374,7 @@ class Program(ByValue):
     data : declarations (of a .dat or .var file, or of global variables), carried out first
     findings : about the text
     slides : whether each joint of a table slides, its targets in m; empty of other programs
-    beside : variables that other tasks, which run beside the program, change
-    elsewhere : variables of its data that other programs set, which it does not call, with where
-    cyclic : whether a controller may begin it again when it is over
+    volatile : variables that other tasks change
     """
 
     language: LanguageName
@@ -441,9 +386,7 @@ class Program(ByValue):
     findings: tuple[ProgramFinding, ...] = ()
     lines: tuple[str, ...] = field(default=(), repr=False)
     slides: tuple[bool, ...] = ()
-    beside: frozenset[str] = frozenset()
-    elsewhere: tuple[tuple[str, Place], ...] = ()
-    cyclic: bool = False
+    volatile: frozenset[str] = frozenset()
 
     def operations(self) -> Iterator[Operation]:
         """All that the text holds, whether it is ever reached or not."""
@@ -487,7 +430,7 @@ def expressions_of(operation: Operation) -> tuple[Expression, ...]:
             found = (of,)
         case Doing(what=what):
             found = (what,)
-        case Beside(what=what):
+        case ConcurrentStart(what=what):
             found = inner(what)
         case _:
             found = ()

@@ -550,10 +550,10 @@ class Writer(ABC):
                 self._remark(text)
             case instructions.Disabled(text=text):
                 self.comment(f"disabled: {text}")
-            case instructions.Aside(text=text) | instructions.Unknown(text=text) | instructions.MovesBeside(text=text):
+            case instructions.Aside(text=text) | instructions.Unknown(text=text):
                 self._foreign(text, self.own)
-            case instructions.Pause(condition=condition, looped=looped):
-                if condition is None or (self.own and not looped):
+            case instructions.Pause(condition=condition):
+                if condition is None or self.own:
                     self.pause(instruction)
                 else:
                     self._foreign(f"wait for {condition}", False)

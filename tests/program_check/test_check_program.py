@@ -32,14 +32,14 @@ HOME = np.radians([0.0, -10.0, -10.0, 0.0, -70.0, 0.0])
 LONG = ("drifting_loop", "singular_line")
 FOUND = {
     "collision_with_table": {"motion_collides"},
-    "drifting_loop": {"not_followed_to_end", "way_out_of_reach"},
-    "joint_jump": {"joint_jumps", "configuration_changes"},
+    "drifting_loop": {"not_followed", "way_out_of_reach"},
+    "joint_jump": {"joint_jumps"},
     "no_motion": {"program_nothing_moves"},
     "out_of_reach": {"way_out_of_reach"},
     "outside_limits": {"above_limit"},
-    "singular_line": {"passes_singularity", "faster_than_assumed"},
-    "too_fast": {"faster_than_assumed"},
-    "unknown_tool": {"frame_not_given"},
+    "singular_line": {"passes_singularity", "too_fast_if_assumed"},
+    "too_fast": {"too_fast_if_assumed"},
+    "unknown_tool": {"not_followed"},
     "zone_larger_than_segment": {"zone_too_large"},
 }
 TABLE = Scene("table", (Plane("table", np.array([0.0, 0.0, 1.0]), 0.0),))
@@ -164,22 +164,13 @@ def test_what_a_line_meets_has_the_time_of_its_place(name, code):
     assert check.execution.steps[found.step].place.line == found.place.line
 
 
-def test_a_move_through_the_straight_wrist_changes_its_configuration_there():
-    check = check_program(read_program(FAULTS / "joint_jump.src"), ROBOT, CheckOptions(start=HOME))
-    found = next(each for each in check.findings if each.finding.code == "configuration_changes")
-    motion = check.motions[found.step]
-    j5 = np.interp(found.moment, motion.way.t, motion.way.q[:, 4])
-    assert abs(j5) < 1e-6 < abs(motion.start[4])
-    assert next(each for each in check.findings if each.finding.code == "joint_jumps").moment is None
-
-
 def test_a_line_keeps_the_tool_on_its_way(tmp_path):
     T = forward(ROBOT, HOME)
     end = T.copy()
     end[:3, 3] += [0.05, 0.1, -0.05]
     check = checked(f"LIN {{X {1000 * end[0, 3]:.6f}, Y {1000 * end[1, 3]:.6f}, Z {1000 * end[2, 3]:.6f}}}", tmp_path)
     (motion,) = check.motions.values()
-    points = forward(ROBOT, motion.way.q)[:, :3, 3]
+    points = forward(ROBOT, motion.path.q)[:, :3, 3]
     along = (points - T[:3, 3]) @ (end[:3, 3] - T[:3, 3]) / np.sum((end[:3, 3] - T[:3, 3]) ** 2)
     assert np.abs(T[:3, 3] + along[:, None] * (end[:3, 3] - T[:3, 3]) - points).max() < 1e-8
     assert along[0] == pytest.approx(0, abs=1e-8)
@@ -193,20 +184,6 @@ def test_the_branch_of_joint_angles_is_that_of_the_inverse():
         nearest = int(np.abs(found.q - q).max(axis=1).argmin())
         assert branch_of(ROBOT, q) == found.branch[nearest]
     assert len(set(branch_labels(ROBOT))) == 8
-
-
-@pytest.mark.long
-def test_turn_chooses_among_the_solutions_of_a_pose(tmp_path):
-    T = forward(ROBOT, np.radians([10.0, -20.0, -15.0, 20.0, -60.0, 30.0]))
-    inside = [q for q in inverse(ROBOT, T).q if ((q >= ROBOT.lower) & (q <= ROBOT.upper)).all()]
-    turns = {sum(1 << i for i in range(6) if q[i] < 0) for q in inside}
-    assert len(turns) > 1
-    for turn in range(64):
-        check = checked(f"PTP {frame(T)}".replace("}", f", S 0, T {turn}}}"), tmp_path)
-        (motion,) = check.motions.values()
-        assert ("turn_not_met" in codes(check)) == (turn not in turns)
-        if turn in turns:
-            assert sum(1 << i for i in range(6) if motion.end[i] < 0) == turn
 
 
 def test_whole_turns_and_configuration_changes_are_said(tmp_path):
@@ -266,88 +243,16 @@ def test_a_loop_tells_each_pair_that_touches_in_any_round_as_deep_as_in_all(tmp_
     down = next(each for each in check.findings if each.finding.code == "motion_collides")
     (near,) = down.finding.touches
     assert near.depth_mm == pytest.approx(25, abs=0.5)
-    assert near.at_mm == pytest.approx(80, abs=0.5)
+    assert near.at_mm == pytest.approx(80, abs=1)
     there = f"F.Y={y}+130*I\nLIN F\nF.Z={z}-90-50*I\nLIN F\nF.Z={z}\nLIN F"
     check = checked(f"{dips}{there}\nENDFOR", tmp_path, scene=scene)
     down = next(each for each in check.findings if each.finding.code == "motion_collides")
     assert [touch.pair.label.split("/")[-1] for touch in down.finding.touches] == ["near", "aside"]
 
 
-def test_frames_make_targets_of_a_named_tool_and_base_known(tmp_path):
-    body = "$TOOL=TOOL_DATA[3]\n$BASE=BASE_DATA[2]\nLIN {X 300, Y 50, Z 200, A 0, B 0, C 180}"
-    assert {each.finding.code for each in checked(body, tmp_path).findings if each.level == "fail"} == {
-        "frame_not_given"
-    }
-    tool, base = np.eye(4), np.eye(4)
-    tool[2, 3], base[2, 3] = 0.05, 0.1
-    (motion,) = checked(body, tmp_path, frames={"TOOL_DATA[3]": tool, "BASE_DATA[2]": base}).motions.values()
-    flange = forward(ROBOT, motion.end)
-    np.testing.assert_allclose(flange[:3, 3], [0.3, 0.05, 0.3 + 0.05], atol=1e-6)
-
-
-def test_what_no_way_comes_to_and_what_may_move_is_said(tmp_path):
-    check = checked("PTP {A1 10}\nMYMOVE(3)\nRETURN\nPTP {A1 20}", tmp_path)
-    assert {"never_reached", "may_move"} <= codes(check)
-    assert [verdict.times for verdict in check.verdicts] == [1, 0]
-
-
-def test_a_loop_whose_wrist_winds_up_is_said(tmp_path):
-    T = forward(ROBOT, HOME)
-    turns = []
-    for third in (1, 2, 3):
-        turned = T.copy()
-        turned[:3, :3] = T[:3, :3] @ Rotation.from_rotvec([0, 0, third * 2 * np.pi / 3]).as_matrix()
-        turns.append(f"LIN {frame(turned)}")
-    check = checked("LOOP\n" + "\n".join(turns) + "\nENDLOOP", tmp_path)
-    found = next(each.finding for each in check.findings if each.finding.code == "loop_comes_back_otherwise")
-    assert (found.joint, round(abs(found.difference_deg))) == (6, 360)
-
-
 def test_a_start_of_another_length_is_refused(tmp_path):
     with pytest.raises(ShapeError):
         checked("PTP {A1 10}", tmp_path, start=np.zeros(5))
-
-
-def test_motions_beyond_the_most_are_no_pass(tmp_path):
-    body = "\n".join(f"PTP {{A1 {angle}}}" for angle in range(1, 8))
-    check = checked(body, tmp_path, most_motions=4)
-    assert [verdict.level for verdict in check.verdicts] == ["pass"] * 4 + ["caution"] * 3
-    assert "rest_not_checked" in codes(check)
-    assert "rest_not_checked" not in codes(checked(body, tmp_path, most_motions=7))
-
-
-def test_targets_beyond_the_most_motions_are_checked_for_reach_and_limits(tmp_path):
-    near = [f"LIN {{X {300 + i},Y 0,Z 450,A 0,B 0,C 180}}" for i in range(6)]
-    first = f"PTP {axes(HOME)}"
-    faults = ["LIN {X 3000}", "LIN {X 3000,Y 0,Z 450,A 0,B 0,C 180}", "PTP {A1 500}", "PTP XNOWHERE"]
-    body = "\n".join([first, *near, *faults, near[0]])
-    check = checked(body, tmp_path, most_motions=4)
-    said = next(each for each in check.findings if each.finding.code == "rest_not_checked")
-    assert (said.place.line, said.finding.checked, said.finding.targets) == (11, 4, 8)
-    behind = {(each.place.line, each.finding.code) for each in check.findings if each.place.line > 13}
-    assert {(14, "target_out_of_reach"), (15, "target_out_of_reach")} <= behind
-    assert {(16, "above_limit"), (17, "target_not_given")} <= behind
-    assert not any(line == 18 for line, _ in behind)
-    whole = checked(body, tmp_path)
-    wrong = {"target_out_of_reach", "way_out_of_reach", "above_limit", "target_not_given"}
-    lines = {each.place.line for each in whole.findings if each.finding.code in wrong}
-    assert lines == {line for line, code in behind if code in wrong}
-
-
-def test_a_pose_beyond_the_most_motions_whose_solutions_all_leave_limits_is_a_fault(tmp_path):
-    narrow = ROBOT.replace(lower=HOME - 0.3, upper=HOME + 0.3)
-    poses = [frame(forward(ROBOT, HOME + np.array([turn, 0, 0, 0, 0, 0]))) for turn in (0.1, 0.5)]
-    checked("\n".join(f"PTP {target}" for target in (axes(HOME), *poses)), tmp_path)
-    check = check_program(read_program(tmp_path / "a.src"), narrow, CheckOptions(start=HOME, most_motions=1))
-    found = {(each.place.line, each.finding.code) for each in check.findings if "limit" in each.finding.code}
-    assert found == {(9, "above_limit")}
-
-
-def test_motions_that_are_repeated_count_once(tmp_path):
-    body = f"FOR i=1 TO 30\nPTP {axes(HOME)}\nPTP {{A1 10}}\nENDFOR"
-    check = checked(body, tmp_path, most_motions=4)
-    assert "rest_not_checked" not in codes(check)
-    assert len(check.motions) == 60
 
 
 @pytest.mark.long
@@ -366,53 +271,11 @@ def test_a_long_program_has_a_verdict_for_each_line(suffix, count, tmp_path):
         joints = [f"POINTJ({a:.4f},-10,-10,0,-70,0)" for a in x - 400]
         text = "\n".join(["", *(f"MJOINT({point}, v50perc, fine, tool0);" for point in joints)])
     (tmp_path / f"a{suffix}").write_text(text)
-    check = check_program(read_program(tmp_path / f"a{suffix}"), ROBOT, CheckOptions(start=HOME, most_motions=50))
+    check = check_program(read_program(tmp_path / f"a{suffix}"), ROBOT, CheckOptions(start=HOME))
     assert len(check.verdicts) == count
     assert {"target_out_of_reach", "above_limit"} & {
         each.finding.code for each in check.findings if each.place.line > 0.99 * count
     }
-
-
-@pytest.mark.parametrize("angle", [40.0, 120.0, 360.0, 500.0, -90.0])
-@pytest.mark.parametrize("turn", [0.0, 10.0])
-def test_an_arc_with_an_angle_of_its_own_is_followed_to_where_it_ends(angle, turn, tmp_path):
-    text = f"""DEF p( )
-PTP {{A1 0,A2 -10,A3 -10,A4 0,A5 -70,A6 0}}
-LIN {{X 400,Y 0,Z 350,A 0,B 0,C 180}}
-CIRC {{X 430,Y 30,Z 350,A 0,B 0,C 180}},{{X 460,Y 0,Z 350,A {turn},B 0,C 180}},CA {angle}
-LIN_REL {{Z 10}}
-END
-"""
-    path = tmp_path / "p.src"
-    path.write_text(text)
-    check = check_program(read_program(path), ROBOT, CheckOptions(start=np.zeros(6), measures=False))
-    found = [each for each in check.findings if each.finding.code == "arc_goes_on"]
-    assert [each.level for each in found] == ["caution" if turn else "note"]
-    way = next(each.way for each in check.motions.values() if each.kind == "arc")
-    assert np.isfinite(way.q).all()
-    assert way.length == pytest.approx(0.03 * np.radians(abs(angle)))
-    shares = np.linspace(0, 1, 50)
-    phi = np.radians(180 - angle * shares)  # from the start over the point: clockwise seen from above
-    wanted = np.stack([0.43 + 0.03 * np.cos(phi), 0.03 * np.sin(phi), np.full(50, 0.35)], axis=1)
-    np.testing.assert_allclose(forward(ROBOT, way.joints_at(shares))[:, :3, 3], wanted, atol=1e-9)
-    radians = np.radians(180 - angle * np.array([0.0, 0.25, 0.5]))  # half the arc bulges over its chord by
-    start, middle, end = 0.03 * np.stack([np.cos(radians), np.sin(radians)], axis=1)
-    assert way.sagitta(0.5) == (pytest.approx(np.linalg.norm(middle - (start + end) / 2)), 0.0)
-    after = list(check.motions.values())[-1]
-    np.testing.assert_allclose(forward(ROBOT, after.end)[:3, 3], wanted[-1] + [0, 0, 0.01], atol=1e-7)
-
-
-def test_an_arc_whose_angle_is_not_known_is_not_checked(tmp_path):
-    path = tmp_path / "p.src"
-    path.write_text("DEF p( )\nCIRC {X 430,Y 30,Z 350,A 0,B 0,C 180},{X 460,Y 0,Z 350,A 0,B 0,C 180},CA w\nEND\n")
-    check = check_program(read_program(path), ROBOT, CheckOptions(start=np.zeros(6), measures=False))
-    assert {"arc_goes_on"} <= codes(check)
-    assert check.level == "caution"
-
-
-def test_a_target_in_millimetres_for_metres_says_so(tmp_path):
-    found = check_text(tmp_path, f"movej({HOME_TEXT})\nmovel(p[400,0,300,3.1,0,0])\n").findings
-    assert [each.finding.reason for each in found if each.finding.code == "target_not_given"] == ["too_far"]
 
 
 def stretches(folder, *lines):
@@ -458,8 +321,54 @@ def test_lines_of_a_stretch_keep_the_times_of_the_program(tmp_path, speed, secon
     (made,), found = stretches(
         tmp_path, *(f"movel({pose}, a=1, v={v}, r={r})" for pose, v, r in zip(poses, speeds, (0, 0.02, 0)))
     )
-    first = list(found.motions.values())[1].way.law.duration
+    first = list(found.motions.values())[1].path.law.duration
     assert made.duration == pytest.approx(first + seconds + (0.1 if speed == 0.1 else 0))
     t = np.linspace(first + 1.2, made.duration, 2001)
     progress = made.tool.progress(t)[1] * made.tool.length
     assert progress.max() == pytest.approx(speed, rel=0.05)  # the rounding is shorter than the corner
+
+
+@pytest.mark.long
+def test_turn_chooses_among_the_solutions_of_a_pose(tmp_path):
+    T = forward(ROBOT, np.radians([10.0, -20.0, -15.0, 20.0, -60.0, 30.0]))
+    inside = [q for q in inverse(ROBOT, T).q if ((q >= ROBOT.lower) & (q <= ROBOT.upper)).all()]
+    turns = {sum(1 << i for i in range(6) if q[i] < 0) for q in inside}
+    assert len(turns) > 1
+    for turn in range(64):
+        check = checked(f"PTP {frame(T)}".replace("}", f", S 0, T {turn}}}"), tmp_path)
+        (motion,) = check.motions.values()
+        assert ("configuration_not_met" in codes(check)) == (turn not in turns)
+        if turn in turns:
+            assert sum(1 << i for i in range(6) if motion.end[i] < 0) == turn
+
+
+def test_frames_make_targets_of_a_named_tool_and_base_known(tmp_path):
+    body = "$TOOL=TOOL_DATA[3]\n$BASE=BASE_DATA[2]\nLIN {X 300, Y 50, Z 200, A 0, B 0, C 180}"
+    unknown = checked(body, tmp_path)
+    assert {each.finding.reason for each in unknown.findings if each.finding.code == "not_followed"} == {"tool"}
+    assert [each.followed for each in unknown.verdicts] == [False]
+    tool, base = np.eye(4), np.eye(4)
+    tool[2, 3], base[2, 3] = 0.05, 0.1
+    (motion,) = checked(body, tmp_path, frames={"TOOL_DATA[3]": tool, "BASE_DATA[2]": base}).motions.values()
+    flange = forward(ROBOT, motion.end)
+    np.testing.assert_allclose(flange[:3, 3], [0.3, 0.05, 0.3 + 0.05], atol=1e-6)
+
+
+def test_targets_are_checked_though_there_is_no_time_for_proofs(tmp_path):
+    near = [f"LIN {{X {300 + i},Y 0,Z 450,A 0,B 0,C 180}}" for i in range(6)]
+    faults = ["LIN {X 3000,Y 0,Z 450,A 0,B 0,C 180}", "PTP {A1 500,A2 -10,A3 -10,A4 0,A5 -70,A6 0}", "PTP XNOWHERE"]
+    body = "\n".join([f"PTP {axes(HOME)}", *near, *faults, near[0]])
+    check = checked(body, tmp_path, keep_on=lambda: False)
+    found = {(each.place.line, each.finding.code) for each in check.findings}
+    assert {(14, "way_out_of_reach"), (15, "above_limit"), (16, "not_followed")} <= found
+
+
+def test_a_round_of_a_loop_that_turns_the_wrist_on_leaves_its_limits(tmp_path):
+    T = forward(ROBOT, HOME)
+    turns = []
+    for third in (1, 2, 3):
+        turned = T.copy()
+        turned[:3, :3] = T[:3, :3] @ Rotation.from_rotvec([0, 0, third * 2 * np.pi / 3]).as_matrix()
+        turns.append(f"LIN {frame(turned)}")
+    check = checked("LOOP\n" + "\n".join(turns) + "\nENDLOOP", tmp_path)
+    assert {"above_limit", "below_limit"} & codes(check)

@@ -7,7 +7,7 @@ import pytest
 
 from er3a.files.robot_library import load_robot
 from er3a.program_check.check_program import CheckOptions, ProgramCheck, check_program
-from er3a.program_check.program_check_findings import LoadAbovePayload, LoadNotExamined
+from er3a.program_check.program_check_findings import LoadAbovePayload
 from er3a.programs.instructions import ArmMotion, JointTarget, Listing, Load, NamedFrame, UnclearLoad
 from er3a.programs.languages import read_program, write_program
 from er3a.programs.machine import execute
@@ -72,7 +72,7 @@ def test_parts_of_a_krl_load_whose_whole_is_not_known_are_not_dropped(tmp_path):
     assert alone == UnclearLoad("$LOAD.M", 50.0)
     assert moved == UnclearLoad("$LOAD.M, $LOAD.CM.Z", 50.0)
     assert none is None
-    assert unknown == UnclearLoad("$LOAD.M", None)
+    assert unknown == UnclearLoad("$LOAD", None)
 
 
 def test_a_mass_alone_is_compared_with_the_payload(tmp_path):
@@ -80,10 +80,9 @@ def test_a_mass_alone_is_compared_with_the_payload(tmp_path):
     found = checked(
         tmp_path, f"def p():\n  set_payload(50)\n{move}  set_payload(read_input_float_register(0))\n{move}end\n"
     )
-    said = [each for each in found.findings if isinstance(each.finding, (LoadNotExamined, LoadAbovePayload))]
+    said = [each for each in found.findings if isinstance(each.finding, LoadAbovePayload)]
     assert [(each.level, each.finding.code) for each in said] == [
         ("fail", "load_above_payload"),
-        ("caution", "load_not_examined"),
     ]
 
 
@@ -182,9 +181,8 @@ def test_a_load_is_named_once_and_one_above_the_payload_fails(tmp_path):
         f"  set_payload(2, [0, 0, 0.05])\n{move}end\n"
     )
     found = checked(tmp_path, text)
-    said = [each for each in found.findings if isinstance(each.finding, (LoadNotExamined, LoadAbovePayload))]
+    said = [each for each in found.findings if isinstance(each.finding, LoadAbovePayload)]
     assert [(each.place.line, each.level, each.finding) for each in said] == [
-        (3, "note", LoadNotExamined(2.0)),
         (6, "fail", LoadAbovePayload(3.5, 3.0)),
     ]
 

@@ -185,7 +185,7 @@ end
     assert lines[3].kind == "arc"
     assert lines[3].tool.pose[2, 3] == pytest.approx(0.1)
     assert any(isinstance(each, Decision) and "count" in each.condition for each in found)
-    assert Unknown("speedl([0,0,0.1,0,0,0], 0.5, 1)") in found
+    assert Unknown("speedl([0,0,0.1,0,0,0], 0.5, 1)", may_move=False) in found
 
 
 def test_statements_outside_of_a_routine_are_the_program(tmp_path):
@@ -211,7 +211,6 @@ def test_a_table_over_time_is_written_and_read(tmp_path):
     poses = np.array([line.split(",")[7:10] for line in text.splitlines()[2:]], float)
     np.testing.assert_allclose(poses, forward(ROBOT, joints)[:, :3, 3] * 1000, atol=0.51e-6)
     assert said(execution)[1].speed.value == pytest.approx(3 / 19, abs=1e-6)
-    assert [each.code for each in execution.program.findings] == ["program_rows_from_rest"]
 
 
 @pytest.mark.parametrize("mark", [";", "\t"])

@@ -18,7 +18,6 @@ from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.programs.instructions import (
     ArmMotion,
     JointTarget,
-    MovesBeside,
     Output,
     Pause,
     PoseTarget,
@@ -29,7 +28,7 @@ from er3a.programs.instructions import (
 )
 from er3a.programs.languages import files_of, read_program, write_program
 from er3a.programs.machine import execute
-from er3a.programs.program_findings import NotSimulated, NotUnderstood, ToolNotGiven
+from er3a.programs.program_findings import ToolNotGiven
 from er3a.programs.rapid.data_types import branch_of
 from er3a.programs.rapid.reader import MOTIONS
 from er3a.programs.writing import WriteOptions, solutions_meant
@@ -189,11 +188,8 @@ VALUES = {  # what stands behind n:=, and the number
     "rounded": ("Round(2.345\\Dec:=2)", 2.35),
     "rounded_from_zero": ("Round(-2.5)", -3),
     "distance": ("Distance([0,3,0],[4,0,0])", 5),
-    "dot": ("DotProd([1,2,3],[4,5,6])", 32),
-    "length": ("VectMagn([2,3,6])", 7),
     "euler_z": ("EulerZYX(\\Z,turned.rot)", 90),
     "dimension": ("Dim(grid,2)", 3),
-    "string": ('StrLen("weld"+NumToStr(2.5,1))', 7),
     "element": ("list{2}", 20),
     "hexadecimal": ("0x1F", 31),
     "octal": ("0o17", 15),
@@ -231,12 +227,6 @@ COURSES = {  # instructions, x of the targets in their order, relative to p
     "inout": ("twice n; #n; MORE PROC twice(INOUT num x) x:=2*x; ENDPROC", [6]),
     "by_value": ("twice n; #n; MORE PROC twice(num x) x:=2*x; ENDPROC", [3]),
     "func": ("MoveL above(n),@; MORE FUNC robtarget above(num x) RETURN Offs(p,x+1,0,0); ENDFUNC", [4]),
-    "late": (
-        '%"go"%; n:=2; text:="lap_"+NumToStr(n,0); %text%; MORE PROC go() #1; ENDPROC '
-        "PROC lap_1() ENDPROC PROC LAP_2() #2; ENDPROC",
-        [1, 2],
-    ),
-    "callbyvar": ('CallByVar "lap_",1; MORE PROC lap_1() #7; ENDPROC', [7]),
     "own_counters": (
         "FOR i FROM 1 TO 2 DO inside; #i; ENDFOR MORE PROC inside() FOR i FROM 8 TO 9 DO n:=i; ENDFOR ENDPROC",
         [1, 2],
@@ -298,9 +288,6 @@ RAMPS = {  # instructions, acceleration of a line behind them
     "none": ("", None),
     "share": ("AccSet 50,100;", Rate(0.5, "share")),
     "at_least_20_percent": ("AccSet 10,100;", Rate(0.2, "share")),
-    "along_the_path": ("PathAccLim TRUE\\AccMax:=4,FALSE;", Rate(4.0, "m/s2")),
-    "slowing_down": ("PathAccLim TRUE\\AccMax:=4,TRUE\\DecelMax:=3;", Rate(3.0, "m/s2")),
-    "of_the_world": ("PathAccLim TRUE\\AccMax:=4,FALSE; WorldAccLim\\On:=2;", Rate(2.0, "m/s2")),
     "off_again": ("AccSet 50,100; WorldAccLim\\On:=2; WorldAccLim\\Off;", Rate(0.5, "share")),
 }
 
@@ -378,31 +365,6 @@ def test_joint_targets_and_arcs(tmp_path):
     assert outer.target.external == (("eax_a", 150.0),)
     here = move(tmp_path, "MoveAbsJ home,@; MoveAbsJ CJointT(),@;")
     np.testing.assert_allclose(np.degrees(here.target.joints), [10, -20, 30, -40, 50, -60])
-
-
-def test_calc_functions_use_the_arm(tmp_path):
-    body = "t:=CalcRobT(home,gripper\\WObj:=table); MoveJ t,v100,fine,gripper\\WObj:=table;"
-    found = move(tmp_path, body, robot=ROBOT)
-    q = np.radians([10, -20, 30, -40, 50, -60])
-    flange = forward(ROBOT.without_tool().replace(base=np.eye(4)), q)
-    wanted = np.linalg.inv(found.base.pose) @ flange @ found.tool.pose
-    np.testing.assert_allclose(found.target.pose, wanted, atol=1e-9)
-    body += "MoveAbsJ CalcJointT(t,gripper\\WObj:=table),@;"
-    joints = move(tmp_path, body, robot=ROBOT)
-    np.testing.assert_allclose(joints.base.pose @ joints.target.pose, flange, atol=1e-9)
-    for change in (
-        "j.robax.rax_1:=j.robax.rax_1+5;",
-        "j.extax.eax_a:=100;",
-    ):  # of joints that only the arm's table gives
-        changed = move(
-            tmp_path, f"{body.split('MoveAbsJ')[0]}j:=CalcJointT(t,gripper\\WObj:=table);{change}MoveAbsJ j,@;"
-        )
-        assert changed.target.reason in ("undefined", "not_understood")
-    beside, aside = "fixed:=[FALSE,[[0,0,120],[1,0,0,0]]", "fixed:=[TRUE,[[50,0,120],[0,1,0,0]]"
-    held = move(
-        tmp_path, body.replace("table),@", "table),v100,fine,fixed"), data=DATA.replace(beside, aside), robot=ROBOT
-    )
-    np.testing.assert_allclose(held.base.pose @ held.target.pose, flange @ held.tool.pose, atol=1e-9)
 
 
 QUARTERS = [  # confdata, joints in deg, whether they have it
@@ -528,66 +490,6 @@ def test_types_that_two_modules_declare_local_are_two(tmp_path):
     np.testing.assert_allclose([each.target.pose[:2, 3] * 1000 for each in found], [[103, 204], [105, 206]])
 
 
-REFUSED = {  # instructions, the one that a controller refuses; none if it takes them all
-    "undeclared": ("zz:=5; zz:=zz+1; MoveL Offs(p,zz,0,0),@;", ["zz:=5"]),
-    "undeclared_element": ("zz{2}:=5; MoveL p,@;", ["zz{2}:=5"]),
-    "undeclared_with_another": ("Incr zz; MoveL p,@;", ["Incr zz"]),
-    "declared_in_another_routine": ("zz:=5; MoveL p,@; MORE PROC other() VAR num zz; zz:=1; ENDPROC", ["zz:=5"]),
-    "counter": ("FOR i FROM 1 TO 3 DO i:=i+1; MoveL p,@; ENDFOR", ["i:=i+1"]),
-    "counter_with_another": ("FOR i FROM 1 TO 3 DO Incr i; MoveL p,@; ENDFOR", ["Incr i"]),
-    "negative_wait": ("WaitTime -1; MoveL p,@;", ["WaitTime -1"]),
-    "registers": ("reg1:=5; Incr reg5; MoveL p,@;", []),
-    "counters": ("FOR i FROM 1 TO 3 DO FOR k FROM i TO 3 STEP 1 DO n:=i; MoveL p,@; ENDFOR ENDFOR", []),
-    "a_counter_that_hides_data": ("FOR n FROM 1 TO 3 DO MoveL p,@; ENDFOR n:=1;", []),
-    "parameters": ("other n; MoveL p,@; MORE PROC other(INOUT num a \\num b) a:=1; b:=2; ENDPROC", []),
-    "another_module_is_missing": ("zz:=5; MoveL far_away,@;", []),
-    "no_wait": ("WaitTime 0; MoveL p,@;", []),
-}
-
-
-@pytest.mark.parametrize("case", REFUSED)
-def test_what_a_controller_refuses_is_named_and_nothing_else(case, tmp_path):
-    body, refused = REFUSED[case]
-    assert [each.text for each in read_program(saved(tmp_path, body)).findings] == refused
-
-
-SET_CONSTANTS = {  # instructions in the third line after main's head, the constant
-    "of_the_module": ("size:=3;", "SIZE"),
-    "a_part": ("p.trans.x:=10;", "P"),
-    "an_element": ("pts{1}:=down;", "PTS"),
-    "increased": ("Incr size;", "SIZE"),
-    "cleared": ("Clear size;", "SIZE"),
-    "of_the_routine": ("n:=1;", "N"),
-    "behind_a_condition": ("IF flag size:=3;", "SIZE"),
-    "in_a_handler": ("MoveL p,@; ERROR size:=3; RETRY;", "SIZE"),
-}
-
-
-@pytest.mark.parametrize("case", SET_CONSTANTS)
-def test_a_constant_that_is_assigned_to_is_an_error_with_its_line_and_name(case, tmp_path):
-    line, name = SET_CONSTANTS[case]
-    local = "CONST num n:=1;" if name == "N" else "VAR num other;"
-    path = saved(tmp_path, f"    {local}\n    MoveL p,@;\n    {line}")
-    first = path.read_text(encoding="utf-8").split("\n").index("  PROC main()") + 1
-    with pytest.raises(InputError) as caught:
-        read_program(path)
-    assert f"line {first + 3}: {name} is a constant" in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    "body",
-    [
-        "VAR num size; size:=3; MoveL p,@;",
-        "FOR size FROM 1 TO 3 DO MoveL p,@; ENDFOR",
-        "other 4; MoveL p,@; MORE PROC other(num size) size:=3; ENDPROC",
-        'ReadRawBytes raw,size; SetDataVal "size",n; MoveL p,@;',
-        "n:=1; other; MoveL p,@; MORE PROC other() CONST num n:=4; ENDPROC",
-    ],
-)
-def test_what_only_has_the_name_of_a_constant_may_be_set(body, tmp_path):
-    assert motions(execute(read_program(saved(tmp_path, body))))
-
-
 def test_what_an_instruction_reads_has_no_known_value(tmp_path):
     for body in (
         "TPReadNum n,text;",
@@ -606,18 +508,6 @@ def test_both_sides_of_a_signal_are_followed(tmp_path):
     found = [step.instruction for step in waits.steps]
     assert [each.seconds for each in found if isinstance(each, Pause)] == [None, 0.5, None, None]
     assert [each.value for each in found if isinstance(each, Output)] == ["SetDO do1,1"]
-
-
-def test_traps_and_error_handlers_that_move_are_followed_beside(tmp_path):
-    trap = "CONNECT number WITH stopped; MoveL p,@; MORE TRAP stopped MoveL down,@; ENDTRAP"
-    execution = run(tmp_path, trap)
-    assert any(isinstance(step.instruction, MovesBeside) for step in execution.steps)
-    assert len(motions(execution)) == 2
-    handler = "MoveL p,@; ERROR IF ERRNO=5 THEN MoveL down,@; RETRY; ENDIF MORE"
-    execution = run(tmp_path, handler)
-    assert len(motions(execution)) == 2
-    quiet = run(tmp_path, 'MoveL p,@; ERROR TPWrite "again"; RETRY; MORE')
-    assert [type(step.instruction) for step in quiet.steps] == [ArmMotion]
 
 
 UNKNOWN = {
@@ -647,22 +537,6 @@ def test_the_motions_that_are_read_are_listed():
     text = (Path(__file__).parents[2] / "docs/programs.md").read_text(encoding="utf-8")
     listed = re.search(r"\*\*Motions\*\* that are read: (.*?)\n\n", text, re.DOTALL)[1]
     assert {name.upper() for name in re.findall(r"`(\w+)`", listed)} == MOTIONS
-
-
-UNFOLLOWED = (
-    *("SingArea\\Wrist;", "ActUnit CNV1;", "SyncMoveOn sync1,tasks;", "SoftAct 1,20;", "EOffsSet [1,0,0,0,0,0];"),
-    *("MoveExtJ home,vrot10,fine;", "CirPathMode\\CirPointOri;", "SpeedRefresh 50;", "IndReset Station,1;"),
-)
-
-
-@pytest.mark.parametrize("text", UNFOLLOWED)
-def test_what_is_not_simulated_is_named(text, tmp_path):
-    program = read_program(saved(tmp_path, f"{text} MoveAbsJ home,@;"))
-    assert [each.text for each in program.findings if isinstance(each, NotSimulated)] == [text.removesuffix(";")]
-    check = check_program(program, ROBOT, CheckOptions(start=np.zeros(6)))
-    named = next(each for each in check.findings if each.finding.code == "program_not_simulated")
-    assert (named.level, named.place.line > 0) == ("caution", True)
-    assert not any(isinstance(each, NotUnderstood) for each in program.findings)
 
 
 BROKEN = {
@@ -712,15 +586,6 @@ def test_tools_come_back_with_their_names_and_masses(tmp_path):
     assert [each.name for each in named if isinstance(each, ToolNotGiven)] == ["the load of gripper"]
 
 
-def test_an_encoded_module_beside_is_named_and_refuses_nothing(tmp_path):
-    (tmp_path / "sealed.sys").write_bytes(b"%%%\n VERSION:1\n%%%\n\x01\x02\x03MODULE sealed\n")
-    move = "MoveAbsJ [[0,-10,-10,0,-70,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v50,fine,tool0;\n"
-    (tmp_path / "a.mod").write_text(f"MODULE a\nPROC main()\n{move}sealed_move;\n{move}ENDPROC\nENDMODULE\n")
-    found = check_program(read_program(tmp_path / "a.mod"), ROBOT, CheckOptions(measures=False)).findings
-    told = {each.finding.code: (each.place.line, each.finding.text) for each in found if hasattr(each.finding, "text")}
-    assert told == {"program_not_understood": (0, "sealed.sys"), "may_move": (4, "sealed_move")}
-
-
 @pytest.mark.parametrize("rotation", ["[2,0,0,0]", "[0.5,0,0,0]", "[1,1,0,0]"])
 def test_a_quaternion_whose_length_is_not_1_is_no_orientation(rotation, tmp_path):
     path = tmp_path / "m.mod"
@@ -742,17 +607,6 @@ def test_an_instruction_that_may_change_an_element_whose_number_is_unknown_makes
     ENDWHILE"""
     (target,) = {each.target for each in motions(run(tmp_path, body))}
     assert isinstance(target, UnresolvedTarget)
-
-
-def test_a_displacement_that_is_not_known_is_the_frame_that_the_cell_gives(tmp_path):
-    file = saved(tmp_path, "n:=GInput(gi1); PDispSet [[n,0,0],[1,0,0,0]]; MoveL p,v100,fine,tool0;", DATA)
-    shift = np.eye(4)
-    shift[:3, 3] = 0.5, 0.0, 0.0
-    found = {}
-    for name, frames in (("unknown", {}), ("given", {"PDispOn": shift})):
-        check = check_program(read_program(file), ROBOT, CheckOptions(np.zeros(6), frames=frames, measures=False))
-        found[name] = [each.finding.name for each in check.findings if each.finding.code == "frame_not_given"]
-    assert found == {"unknown": ["PDispOn"], "given": []}
 
 
 def test_a_module_of_data_alone_beside_one_that_begins_again_has_no_motions(tmp_path):

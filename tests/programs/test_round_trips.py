@@ -186,7 +186,7 @@ def test_a_loop_for_ever_is_written_read_and_written_again(language, tmp_path):
     listing = Listing("palletise", (Remark("begin"), *motions[:2], Pause(0.5), *motions[2:]), repeats_from=2)
     written = write_program(listing, language, WriteOptions(ROBOT))
     execution = read_back(tmp_path, written)
-    assert [each.kind for each in execution.endings] == ["repeats"]
+    assert [each.kind for each in execution.endings] == ["joins"]
     back = execution.listing()
     assert back.repeats_from == 2 + len(written.findings)  # remarks of the head
     assert len(back.motions) == 4
@@ -409,14 +409,3 @@ def test_a_table_that_leaves_the_reach_is_left_out_from_there_and_said():
     written = write_program(listing, "rpl", WriteOptions(ROBOT))
     assert TargetsLeftOut(1) in written.findings
     assert written.files[".pgm"].count("MLIN(POINTJ") == 28
-
-
-def test_a_loop_that_waits_for_another_task_is_left_out_with_a_word(tmp_path):
-    """Its head alone would begin a loop that has no end."""
-    program = tmp_path / "a.script"
-    wait = "while go == False:\n    sync()\n  end"
-    program.write_text(f"def a():\n  global go = False\n  {wait}\n  movej([0, -0.2, -0.2, 0, -1.2, 0])\nend\n")
-    written = write_program(execute(read_program(program), ROBOT).listing(), "urscript", WriteOptions(ROBOT))
-    assert NotTranslated(1) in written.findings
-    (tmp_path / "b.script").write_text(written.files[".script"])
-    assert len(execute(read_program(tmp_path / "b.script"), ROBOT).listing().motions) == 1

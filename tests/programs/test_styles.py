@@ -56,7 +56,7 @@ def test_inline_forms_take_tool_base_speed_and_zone_from_their_data():
     assert (arc.kind, arc.speed.value, arc.zone.value) == ("arc", 0.02, 0.05)
     assert [by_line[number].kind for number in (57, 60)] == ["line", "joint"]
     assert by_line[44] == Output("$OUT[5]", "TRUE")
-    assert by_line[63] == Pause(0.5, stops=True)
+    assert by_line[63] == Pause(0.5)
     assert isinstance(by_line[68], Aside)
     assert {each.name for each in files_of(STYLES / "WELD1.src")} == {"WELD1.src", "WELD1.dat", "$config.dat"}
 
@@ -82,10 +82,9 @@ def test_an_export_of_polyscope():
 
 def test_an_if_of_xpl_follows_its_condition_and_a_block_that_is_not_understood_is_followed_and_left_out(tmp_path):
     text = (STYLES / "JOB1.XPL").read_text(encoding="utf-8")
-    for tag, lines, code in (("if", {25, 39, 45}, "program_form_inferred"), ("select", {25, 39, 40, 45}, None)):
+    for tag, lines in (("if", {25, 39, 45}), ("select", {25, 39, 40, 45})):
         path = tmp_path / "JOB1.XPL"
         path.write_text(text.replace("<if>", f"<{tag}>").replace("</if>", f"</{tag}>"), encoding="utf-8")
         execution = execute(read_program(path), ROBOT)
         assert {step.place.line for step in execution.steps if isinstance(step.instruction, ArmMotion)} == lines
-        assert {each.code for each in execution.program.findings} - {code} == {"program_not_understood"}
         assert any(isinstance(step.instruction, Disabled) for step in execution.steps)

@@ -45,7 +45,7 @@ from er3a.pipeline.stages.validation import model as validated
 from er3a.pipeline.stages.workspace.model import CapabilityMissing, PlacementSummary, PlacementTooLong, TaskSummary
 from er3a.pipeline.study import Study, load_study
 from er3a.planning.names import StrategyName
-from er3a.program_check.program_check_findings import ExternalAxesLeftOut, LoadAbovePayload, LoadNotExamined
+from er3a.program_check.program_check_findings import LoadAbovePayload, NotFollowed
 from er3a.references.rows import GROUPS
 from er3a.robots.masses import Drives, Masses
 from er3a.robots.robot import Envelope, Robot, Source
@@ -94,9 +94,8 @@ def a_program(*findings, lines=()) -> SimpleNamespace:
         (a_program(), (), ()),
         (a_program(lines=(5, 7)), (), (LeftOut("program_lines", ("job: 5, 7",)),)),
         (a_program(), ("job",), (LeftOut("program_starts", ("job",)),)),
-        (a_program(ExternalAxesLeftOut(("E1",))), (), (LeftOut("outer_axes", ("job",)),)),
+        (a_program(NotFollowed("E1", "external_axes")), (), (LeftOut("outer_axes", ("job",)),)),
         (a_program(LoadAbovePayload(4.5, 3.0)), (), (LeftOut("program_loads", ("job: 4.5 kg",)),)),
-        (a_program(LoadNotExamined(None, "tool1")), (), (LeftOut("program_loads", ("job: tool1",)),)),
     ],
 )
 def test_programs(program, starts, more):

@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import numpy as np
 import typer
@@ -18,13 +18,7 @@ from er3a.programs.program_names import LanguageName
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
-if TYPE_CHECKING:
-    from er3a.programs.execution import KeepOn, Phase
-
 LEAST_S = 1.0  # to read a file for which no time is left
-SHARE_OF_FOLLOWING = 0.5  # of the time; the rest is for checking what was followed
-
-
 RobotOption = Annotated[str, typer.Option("--robot", help="a robot's name or file")]
 StartOption = Annotated[
     str | None,
@@ -35,6 +29,19 @@ FramesFile = Annotated[
     typer.Option(callback=given_files, help="a file of kind programs: the frames of TOOL_DATA[3] and other names"),
 ]
 SceneFile = Annotated[Path | None, typer.Option(callback=given_files, help="a scene file: the obstacles")]
+
+Assumed = Annotated[
+    list[str] | None,
+    typer.Option(help="what is not in the files: calls that move nothing (rq_*), or values (NAME=1)"),
+]
+BaselineFile = Annotated[
+    Path | None, typer.Option(callback=given_files, help="a SARIF file: its findings are accepted")
+]
+
+Seconds = Annotated[
+    float,
+    typer.Option(help="time to read files and to prove clearance between points of motions, without compiling", min=1),
+]
 
 
 @app.command(rich_help_panel=PROGRAMS)
@@ -51,75 +58,93 @@ def check_program(
     start: StartOption = None,
     frames: FramesFile = None,
     scene: SceneFile = None,
+    assume: Assumed = None,
+    require: Annotated[str, typer.Option(help="checks without which nothing passes: scene,tool")] = "",
+    every: Annotated[bool, typer.Option("--all", "-v", help="print each finding by itself, notes too")] = False,
     verdicts: Annotated[
         bool, typer.Option("--verdicts", help="print a line for each motion, also for those that pass")
     ] = False,
     sarif: Annotated[Path | None, typer.Option(help="write the findings as SARIF 2.1.0 to this file")] = None,
-    most_motions: Annotated[
-        int, typer.Option(help="how many motions are checked in full; of later ones only the targets", min=1)
-    ] = 1_000,
-    seconds: Annotated[
-        float, typer.Option(help="time limit for all files, without compiling; what was not examined is listed", min=1)
-    ] = 30.0,
+    baseline: BaselineFile = None,
+    seconds: Seconds = 30.0,
     fail_on: Annotated[FailOn, typer.Option(help="exit code 1 for findings of this level or worse")] = FailOn.fail,
     as_json: AsJson = False,
 ):
     """Check each motion of robot programs. Findings are lines: file:line: level: message \\[code]."""
-    from er3a.collision.distances import search_boxes
     from er3a.files.program_file import load_programs
     from er3a.files.robot_library import load_robot
     from er3a.files.scene_file import load_scene
     from er3a.files.units import noted_doubts
-    from er3a.numerics.jit import compiling_beside
     from er3a.pipeline.program_reports import (
-        assumed_line,
+        accepted,
         checked_file,
         cycle_line,
         json_of,
         lines_of,
         missed_line,
-        not_examined_line,
         sarif_of,
+        scope_line,
         shapes_line,
-        summary_line,
+        without,
     )
-    from er3a.pipeline.progress import TimeBudget, shown_work
+    from er3a.pipeline.progress import TimeBudget, shown_work, work_clock
     from er3a.program_check.check_program import CheckOptions
     from er3a.program_check.program_check_findings import RANKS
+    from er3a.programs.execution import RunLimits
 
     with noted_doubts() as doubts:
         arm = load_robot(robot)
+        names, values = _assumed(assume or [])
         options = CheckOptions(
             start=_joints(start, arm),
             frames=load_programs(frames).transforms() if frames else {},
             scene=load_scene(scene) if scene else None,
-            most_motions=most_motions,
+            limits=RunLimits(assumed=names, assumed_values=values),
         )
-    first_compiled = compiling_beside(search_boxes, checked_file, files[0], arm, replace(options, measures=False))
-    budget = TimeBudget(seconds, len(files))
-    with shown_work("reading") as at, first_compiled:
-        checked = []
+    silenced = accepted(baseline) if baseline else frozenset()
+    budget, checked = TimeBudget(seconds, len(files)), []
+    with shown_work("reading") as at:
         for file in files:
+            at(f"{file}: checking")
             begun, end = budget.next_piece()
-            own = replace(options, keep_on=_until(begun, end, file, at))
-            checked.append(checked_file(file, arm, own, doubts, max(end - begun, LEAST_S)))
+            own = replace(options, keep_on=_until(end, work_clock))
+            found = checked_file(file, arm, own, doubts, max(end - begun, LEAST_S))
+            checked.append(without(found, silenced))
     if sarif is not None:
         _write(sarif, json.dumps(sarif_of(checked), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+    required = [each for each in require.split(",") if each]
     if as_json:
         print_json(json_of(checked))
     else:
         for each in checked:
-            for line in lines_of(each, verdicts):
+            for line in filter(None, (scope_line(each), *lines_of(each, every, verdicts))):
                 print(line)
-        of_files = [line(each) for each in checked for line in (cycle_line, not_examined_line)]
         missed = tuple(dict.fromkeys(left for each in checked for left in each.missed))
-        of_arm = (shapes_line(arm), assumed_line(checked))
-        for line in filter(None, (*of_files, *of_arm, missed_line(missed), summary_line(checked))):
+        for line in filter(None, (*map(cycle_line, checked), shapes_line(arm), missed_line(missed))):
             print_note(line)
     if any(each.check is None for each in checked):
         raise typer.Exit(2)
-    if any(RANKS[each.level] >= RANKS[fail_on.value] for each in checked):
+    if any(RANKS[each.level] >= RANKS[fail_on.value] or each.lacks(required) for each in checked):
         raise typer.Exit(1)
+
+
+def _until(end: float, clock: Callable[[], float]) -> Callable[[], bool]:
+    return lambda: clock() < end
+
+
+def _assumed(given: list[str]) -> tuple[tuple[str, ...], dict[str, bool | float]]:
+    """Names of calls that move nothing, and values of variables, of what is assumed."""
+    values: dict[str, bool | float] = {}
+    for text in given:
+        name, mark, value = text.partition("=")
+        if mark and value.lower() in ("true", "false"):
+            values[name] = value.lower() == "true"
+        elif mark:
+            try:
+                values[name] = int(value) if value.lstrip("-").isdigit() else float(value)
+            except ValueError:
+                raise Er3aError(f"--assume is '{text}'; expected NAME=NUMBER, NAME=TRUE or a call's name") from None
+    return tuple(text for text in given if "=" not in text), values
 
 
 program_app = typer.Typer(help="Write robot programs from paths.", no_args_is_help=True)
@@ -184,20 +209,6 @@ def _write(file: Path, text: str) -> None:
     from er3a.files.kept_files import write_atomically
 
     write_atomically(file, lambda path: path.write_text(text, encoding="utf-8"))
-
-
-def _until(start: float, end: float, file: Path, at: Callable[[str], None]) -> KeepOn:
-    """Whether a file's part of the time is not over; ``at`` shows how far its check is."""
-    from er3a.pipeline.progress import work_clock
-
-    ends = {"following": start + SHARE_OF_FOLLOWING * (end - start), "checking": end}
-
-    def keep_on(phase: Phase, done: int, of: int) -> bool:
-        of_all = f" of {of:,}" if of else ""
-        at(f"{file}: {phase}, step {done:,}{of_all}")
-        return work_clock() < ends[phase]
-
-    return keep_on
 
 
 def _joints(text: str | None, robot: Robot) -> Reals | None:

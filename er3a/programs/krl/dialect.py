@@ -9,20 +9,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from er3a.geometry.transforms import rotation_angle
 from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, syntax
-from er3a.programs.code_builder import variable_of
 from er3a.programs.evaluation import (
     IN_DEGREES,
     SIZES,
     Dialect,
     ProgramMemory,
-    Rounded,
-    function_in_single,
+    evaluated,
     known,
     root,
     unresolved,
+    variable_of,
 )
 from er3a.robots.masses import MassBody, moved
 
@@ -34,11 +32,9 @@ EXTERNAL_KEYS = ("E1", "E2", "E3", "E4", "E5", "E6")
 COORDINATES = frozenset((*FRAME_KEYS, *AXIS_KEYS, *EXTERNAL_KEYS))
 POSITION_FIELDS = COORDINATES | {"S", "T"}
 POSITION_KINDS = ("FRAME", "POS", "E6POS", *AXIS_KINDS)
-SAME_TURN = 1e-3  # rad
 MOST_SPEED = 3.0  # m/s
 """What controllers take along a path at most: ``$VEL_MA.CP`` of their machine data."""
 SIGN_ZERO = 1e-7  # rad; nearer to 0 a joint's sign says nothing
-OFF_MM, OFF_DEG = 0.1, 0.01
 Frames = tuple[instructions.NamedFrame, instructions.NamedFrame]
 UNREAD = syntax.Unclear("")
 """The value of a motion's arguments that are more or fewer than it has."""
@@ -125,17 +121,6 @@ def relative(memory: ProgramMemory, value: syntax.Value, frames: Frames, said: t
     return instructions.PoseTarget(found, external=_external(value))
 
 
-def _turn_in_doubt(before: Reals | None, change: syntax.Value, goal: instructions.Target) -> float:
-    """How far (rad) a relative position's orientation is from that with its angles added to those before."""
-    if before is None or not isinstance(change, syntax.Record) or not isinstance(goal, instructions.PoseTarget):
-        return 0.0
-    added = [syntax.number(change.get(key)) or 0.0 for key in FRAME_KEYS[3:]]
-    numbers = np.add(instructions.numbers_of(before, "kuka"), (0.0, 0.0, 0.0, *added))
-    other = instructions.pose_of(tuple(numbers.tolist()), "kuka")
-    apart = float(rotation_angle(goal.pose[:3, :3], other[:3, :3]))
-    return apart if apart > SAME_TURN else 0.0
-
-
 def _components(
     value: syntax.Record, keys: tuple[str, ...], text: str
 ) -> list[float | None] | instructions.UnresolvedTarget:
@@ -203,15 +188,6 @@ def _pose(memory: ProgramMemory, value: syntax.Record, frames: Frames, text: str
     return instructions.PoseTarget(
         instructions.pose_of(plain, "kuka"), configuration, external=_external(value), branch=branch
     )
-
-
-def _read(position: syntax.Record) -> syntax.Record:
-    """A position as a controller reads it from its arm, which is within ``OFF_MM`` and ``OFF_DEG`` of it."""
-    items = (
-        (key, Rounded(float(syntax.number(each) or 0.0), OFF_MM if key in "XYZ" else OFF_DEG))
-        for key, each in position.items
-    )
-    return syntax.Record(position.kind, tuple(items))
 
 
 def _posture(position: syntax.Record, joints: Reals | None, name: str) -> syntax.Record:
@@ -326,8 +302,6 @@ def _initial(memory: ProgramMemory) -> None:
     memory.write("$ORI_TYPE", "#VAR")
     memory.write("$CIRC_TYPE", memory.read("DEF_CIRC_TYP") or "#BASE")
     memory.write("$IPO_MODE", "#BASE")
-    for switch, _ in (*CORRECTIONS["$TOOL"], *CORRECTIONS["$BASE"]):
-        memory.write(switch, False)
     _number(memory, "$BASE", "BASE_DATA", 0)
     _tool_number(memory, 1)
 
@@ -419,24 +393,8 @@ def _number(memory: ProgramMemory, variable: str, array: str, given: syntax.Valu
         memory.write(variable, syntax.Unclear(f"{array}[?]"))
         return
     name = f"{array}[{plain:g}]" if plain > 0 else "$NULLFRAME"
-    memory.write(variable, _corrected(memory, variable, memory.read(name) or syntax.Unclear(name)))
-    machine = memory.read(f"MACHINE_FRAME_DAT[{plain:g}]") if variable == "$BASE" else None
-    if isinstance(machine, syntax.Record) and syntax.number(machine.get("MACH_DEF_INDEX")):
-        memory.write(variable, syntax.Unclear(f"{name} on another machine"))
+    memory.write(variable, memory.read(name) or syntax.Unclear(name))
     memory.write(variable + "%name", name)
-
-
-def _corrected(memory: ProgramMemory, variable: str, frame: syntax.Value) -> syntax.Value:
-    """A tool or base with the corrections before and after it that controllers' own bas.src adds while these are on."""
-    for (switch, name), before in zip(CORRECTIONS[variable], (True, False)):
-        on = memory.read(switch)
-        if on is None or on is False:
-            continue
-        other = memory.read(name) or syntax.Unclear(name)
-        frame = memory.functions.product(*((other, frame) if before else (frame, other)))
-        if on is not True:
-            frame = syntax.Unclear(f"{syntax.shown(frame)}, if {switch}")
-    return frame
 
 
 def _tool_number(memory: ProgramMemory, given: syntax.Value) -> None:
@@ -536,17 +494,6 @@ SIZES_BY_AXES = frozenset(f"{name}{SIZES}" for name in ("$VEL_AXIS", "$ACC_AXIS"
 """Sizes of the system's lists with an element for each axis of the arm; external axes have lists of their own."""
 MODAL_DATA = ("PDAT_ACT", "LDAT_ACT", "FDAT_ACT", "%spline")
 TURN_RATES = ("$VEL.ORI1", "$VEL.ORI2", "$ACC.ORI1", "$ACC.ORI2")
-CORRECTIONS = {
-    "$TOOL": (("TOOL_CORR_W_ON", "TOOL_CORR_W"), ("TOOL_CORR_ON", "TOOL_CORR")),
-    "$BASE": (("BASE_CORR_ON", "BASE_CORR"), ("M_BAS_COR_ON", "M_BASE_CORR")),
-}
-"""Switches and frames that controllers' own bas.src puts before and after the frame that it takes by its number."""
-READ_BY_NUMBER = (
-    *("TOOL_DATA", "BASE_DATA", "LOAD_DATA", "DEF_VEL_CP", "DEF_ACC_CP", "DEF_CIRC_TYP", "MACHINE_FRAME_DAT"),
-    *("DEF_VEL_ORI1", "DEF_VEL_ORI2", "DEF_ACC_ORI1", "DEF_ACC_ORI2"),
-    *(name for pairs in CORRECTIONS.values() for pair in pairs for name in pair),
-)
-"""What ``BAS`` and settings after WITH read without naming it."""
 HARMLESS_TEXT = """
 BASISTECH_PLC_INIT BASISTECH_PLC_LOOP CAST_FROM CAST_TO CCLOSE CHECKHOME CIOCTL CLEAR_KRLMSG COPEN CREAD CWRITE
 DELETE_BACKWARD_BUFFER EB EB_ABS EK EKI_CHECK EKI_CHECKBUFFER EKI_CLEAR EKI_CLEARBUFFER EKI_CLOSE EKI_GETBOOL
@@ -574,6 +521,7 @@ SORI_TYPE SCIRC_TYP SCIRC_TYPE SCIRC_M USE_CM_PRO_VALUES USE_CM_PRO_VALUES_ONLY
 OF_SETTINGS = frozenset(OF_SETTINGS_TEXT.split())
 """Functions after WITH, which :func:`keep_setting` reads."""
 HARMLESS_VARIABLES_TEXT = """
+$ACT_BASE $ACT_TOOL $CIRC_TYPE $FILTER $LOAD_A1 $LOAD_A2 $LOAD_A3
 $ACCU_STATE $ACC_EXTAX $ACT_GROUP $ADVANCE $ANOUT $AXWORKSPACE $BWDSTART $CMD $COLLMON_TOL_PRO $CP_STATMON
 $CP_VEL_TYPE $CYCFLAG $CYCLE $DATE $ECO_LEVEL $EDIT_MODE $ERR $EXT $FLAG $GEAR_JERK $H_POS $I_O_ACT $JERK $LOOP_CONT
 $LOOP_MSG $MSG_T $OUT $OUT_NODRIVE $OV_APPL $OV_PRO $OV_ROB $PERI_RDY $PRO_ACT $PRO_MODE $PRO_STATE $RED_VEL
@@ -581,34 +529,17 @@ $SOFT_PLCBOOL $SOFT_PLCINT $SOFT_PLCREAL $STOPNOAPROX $TIMER $TIMER_FLAG $TIMER_
 $TRACE $VEL_EXTAX $WBOXDISABLE $WORKSPACE
 """
 HARMLESS_VARIABLES = frozenset((*MODAL, *HARMLESS_VARIABLES_TEXT.split()))
-"""System variables that are followed, or set nothing but speeds, stops, watches, signals and marks; another may make
-axes soft, shift paths (``$CORR_T``, ``$TECH``) or choose other postures (``$SINGUL_POS``)."""
-LOADS_OF_ARM = ("$LOAD_A1", "$LOAD_A2", "$LOAD_A3")
-OF_DYNAMICS = (*LOADS_OF_ARM, "$FILTER")
-"""System variables that are not followed, and change neither tool nor base nor path: loads on the arm, ramps."""
-DEFAULTS = "$DEF_"
-"""How the machine data's own values begin, which the controller has unless a program sets others."""
+"""System variables that are followed, or set nothing but speeds, stops, watches, signals, loads and marks; another may
+make axes soft, shift paths (``$CORR_T``, ``$TECH``) or choose other postures (``$SINGUL_POS``)."""
 RUNNING = ("$CYCFLAG", "$DATE", "$OV_PRO", "$SOFT_PLCBOOL", "$SOFT_PLCINT", "$SOFT_PLCREAL", "$TIMER", "$TIMER_FLAG")
 """System variables that change after they are set: watches, expressions that are evaluated again and again, what the
 PLC of the controller writes."""
 ORIENTATION_TYPES = {"$ORI_TYPE": ("#VAR", "#CONSTANT"), "$CIRC_TYPE": ("#BASE",)}
 """How the tool may turn on lines and arcs so that they are followed as they are meant."""
-CONTROLLER: dict[str, syntax.Value] = {
-    "$KINCLASS": "#STANDARD",
-    "$EX_AX_NUM": 0,
-    "$ERR.NUMBER": 0,
-    "$ADAP_ACC": "#STEP1",
-    "$TCP_IPO": True,
-    "$COLLISAVOID": False,
-}
-"""What a controller of an arm without other axes has in variables that its own modules ask, if no error has come up."""
 HERE = ("$POS_ACT", "$POS_FOR", "$POS_ACT_MES")
 HERE_JOINTS = ("$AXIS_ACT", "$AXIS_FOR", "$AXIS_ACT_MEAS")
 WHERE_INTERRUPTED = ("$POS_INT", "$AXIS_INT")
 """Where the arm was when an interrupt came, which is known nowhere."""
-
-
-BESIDE = 3  # operations
 
 
 class Settings(NamedTuple):
@@ -619,76 +550,15 @@ class Settings(NamedTuple):
     speed: instructions.Rate | None
     acceleration: instructions.Rate | None
     zone: instructions.Zone
-    entry: instructions.Zone
     load: instructions.Load | None
-
-
-def _set_alone(code: tuple[syntax.Operation, ...], number: str, frame: str) -> bool:
-    """Whether somewhere a number is set, and no frame right after it, nor the frame of that number before."""
-    sets = [(variable_of(each.target), each.value) if isinstance(each, syntax.Assign) else ("", None) for each in code]
-    frames = [value for name, value in sets if name == frame]
-    return any(
-        name == number
-        and frame not in (other for other, _ in sets[i : i + BESIDE + 1])
-        and not any(other == frame and _of_number(value, given) for other, value in sets[max(i - BESIDE, 0) : i])
-        and not any(_takes(value, f"{frame[1:]}_DATA", given) for value in frames)
-        for i, (name, given) in enumerate(sets)
-    )
-
-
-def _takes(value: syntax.Expression | None, array: str, number: syntax.Expression | None) -> bool:
-    """Whether an expression has the element of an array that a number tells."""
-    match value:
-        case syntax.Element(of=syntax.Variable(name=name), indices=(index,)) if name == array and index == number:
-            return True
-    return any(_takes(each, array, number) for each in syntax.inner(value))
-
-
-def _of_number(frame: syntax.Expression | None, number: syntax.Expression | None) -> bool:
-    """Whether a frame can be that of a number: not ``TOOL_DATA[1]`` for 2, nor $NULLFRAME for a number above 0."""
-    match frame, number:
-        case syntax.Variable(name="$NULLFRAME"), syntax.Constant(value=int(given)):
-            return given <= 0
-        case syntax.Element(of=syntax.Variable(name="TOOL_DATA" | "BASE_DATA"), indices=(index,)), _:
-            return index == number or (isinstance(index, syntax.Variable) and index.name in ("$ACT_TOOL", "$ACT_BASE"))
-    return True
-
-
-def _is_declared(data: syntax.Assign) -> bool:
-    """Whether a variable like ``$RECIPE`` is declared in $config.dat: no system's, but the cell's own."""
-    file = data.place.file
-    return bool(data.type_name) and file is not None and file.name.startswith("$")
-
-
-def _as_delivered(name: str, value: syntax.Value) -> bool:
-    """Whether loads on the arm and ramps are those of the machine data, or a load is none; its mass decides that."""
-    if isinstance(value, syntax.Unclear):
-        return value.text.startswith(DEFAULTS)
-    mass = syntax.number(value.get("M") if isinstance(value, syntax.Record) else value)
-    of, _, part = name.partition(".")
-    return of in LOADS_OF_ARM and (part not in ("", "M") or (mass is not None and mass <= 0))
 
 
 class KrlDialect(Dialect):
     """KRL, as a run needs it."""
 
     frames = ("$TOOL", "$BASE")
-    setters = frozenset(("BAS", "PULSE", "%SPLINE", "%ENDSPLINE"))
     whole_division = True
-    single_precision = True
-    most_whole = 2**31 - 1
-
-    def __init__(self, program: syntax.Program) -> None:
-        """Numbers of tool and base count as followed where the frame is set beside each."""
-        changed = {variable_of(each.target) for each in program.operations() if isinstance(each, syntax.Assign)}
-        self.modal = frozenset((*MODAL, *MODAL_DATA, *changed.intersection(READ_BY_NUMBER)))
-        self.declared = frozenset(variable_of(each.target) for each in program.data if _is_declared(each))
-        self.numbers_only = {
-            f"$ACT_{name}"
-            for name in ("TOOL", "BASE")
-            for routine in program.routines.values()
-            if routine.name not in OF_SETTINGS and _set_alone(routine.code, f"$ACT_{name}", f"${name}")
-        }
+    modal = frozenset((*MODAL, *MODAL_DATA))
 
     def is_signal(self, name: str) -> bool:
         """Outputs."""
@@ -700,24 +570,7 @@ class KrlDialect(Dialect):
 
     def is_followed(self, name: str, value: syntax.Value) -> bool:
         """Whether motions are followed as a variable asks that is set to a value."""
-        if name in ORIENTATION_TYPES:
-            return value in ORIENTATION_TYPES[name]
-        of, plain = root(name), syntax.number(value)
-        if name in CONTROLLER and of not in HARMLESS_VARIABLES:
-            return value == CONTROLLER[name]
-        if name in ("$ACT_TOOL", "$ACT_BASE"):
-            return name not in self.numbers_only
-        if of in OF_DYNAMICS:
-            return _as_delivered(name, value)
-        if of in ("$ACT_EX_AX", "$JOINT_OFFSET"):  # no external axis, no offset
-            return plain is not None and plain <= 0 and (plain == 0 or of == "$ACT_EX_AX")
-        return not name.startswith("$") or of in HARMLESS_VARIABLES or of in self.declared
-
-    def doubted(self, name: str) -> str:
-        """A number of a frame: until that frame is set; empty for what changes no motion's frame or path."""
-        if root(name) in OF_DYNAMICS or name in ORIENTATION_TYPES:
-            return ""
-        return {"$ACT_TOOL": "$TOOL", "$ACT_BASE": "$BASE", "$ACT_EX_AX": "$BASE"}.get(name, name)
+        return not name.startswith("$") or root(name) in HARMLESS_VARIABLES
 
     def frame_of(self, value: syntax.Value | None) -> Reals | None:
         """A frame's."""
@@ -759,17 +612,15 @@ class KrlDialect(Dialect):
         if name == "$NUM_AX":
             return memory.cell.joints
         if name in SIZES_BY_AXES:
-            return (max(len(AXIS_KEYS), memory.cell.joints),)
-        if name in CONTROLLER:
-            return CONTROLLER[name]
+            return (max(6, memory.cell.joints),)
         if (mapped := memory.cell.frames.get(name)) is not None:
             return frame_record(mapped)
         if name in HERE:
-            seen = memory.seen(memory.here, tool_of(memory), base_of(memory))
-            return None if seen is None else _posture(_read(frame_record(seen, "E6POS")), memory.here.joints, name)
+            seen = memory.here.seen(tool_of(memory), base_of(memory), memory.cell.flange)
+            return None if seen is None else _posture(frame_record(seen, "E6POS"), memory.here.joints, name)
         if name in HERE_JOINTS and memory.here.joints is not None:
             degrees = [math.degrees(each) for each in memory.here.joints]
-            return _read(syntax.Record("E6AXIS", tuple((f"A{i + 1}", each) for i, each in enumerate(degrees))))
+            return syntax.Record("E6AXIS", tuple((f"A{i + 1}", each) for i, each in enumerate(degrees)))
         return None
 
     def function(self, memory: ProgramMemory, name: str, given: syntax.Invocation) -> syntax.Value:
@@ -782,15 +633,12 @@ class KrlDialect(Dialect):
                 inverse[:3, :3] = pose[:3, :3].T
                 inverse[:3, 3] = -pose[:3, :3].T @ pose[:3, 3]
                 return frame_record(inverse)
-        numbers = [each for each in values if each is not None and syntax.number(each) is not None]
-        try:
-            if name == "ATAN2" and len(numbers) == len(values) == 2:
-                return function_in_single(lambda y, x: math.degrees(math.atan2(y, x)), numbers)
-            if name in IN_DEGREES and len(numbers) == len(values) == 1:
-                return function_in_single(IN_DEGREES[name], numbers)
-        except (ValueError, OverflowError):
-            pass
-        return syntax.Unclear(f"{name}(...)")
+        found: syntax.Value | None = None
+        if name == "ATAN2":
+            found = evaluated(lambda y, x: math.degrees(math.atan2(y, x)), values)
+        elif name in IN_DEGREES:
+            found = evaluated(IN_DEGREES[name], values)
+        return syntax.Unclear(f"{name}(...)") if found is None else found
 
     def product(self, left: syntax.Value, right: syntax.Value) -> syntax.Value:
         """The geometric operator: ``right`` in the frame ``left``."""
@@ -808,8 +656,7 @@ class KrlDialect(Dialect):
         """PTP, LIN, CIRC and their relatives and splines."""
         if not move.settings:
             return self._motion(memory, move, None)
-        kept, doubts = dict(memory.shared), dict(memory.doubts)
-        angle, doubt = None, ""
+        kept, angle, other = dict(memory.shared), None, ""
         for name, expression in move.settings:
             if name == "CA":
                 degrees = syntax.number(memory.value(expression))
@@ -817,17 +664,17 @@ class KrlDialect(Dialect):
                 continue
             keep_setting(memory, name, expression)
             value = known(memory.read(name), name)
-            if name not in ORIENTATION_TYPES and not self.is_followed(name, value):
-                doubt = f"{name}={syntax.shown(value)}"
-        found = replace(self._motion(memory, move, angle), doubt=doubt)
-        memory.shared, memory.doubts = kept, doubts
+            if not self.is_followed(name, value):
+                other = f"{name}={syntax.shown(value)}"
+        found = self._motion(memory, move, angle)
+        memory.shared = kept
         memory.kept.clear()
-        return found
+        return replace(found, not_followed=found.not_followed or other)
 
     def _motion(self, memory: ProgramMemory, move: syntax.Move, angle: float | None) -> instructions.ArmMotion:
         plain = move.form.removesuffix("_REL")
         kind = KINDS[plain.removeprefix("S") if plain != "SPL" else plain]
-        tool, base, speed, acceleration, zone, entry, load = _settings(memory, kind, move)
+        tool, base, speed, acceleration, zone, load = _settings(memory, kind, move)
         values = [self._argument(memory, each) for each in move.arguments]
         if len(values) != (2 if kind == "arc" else 1):
             values = [UNREAD, UNREAD]
@@ -839,10 +686,9 @@ class KrlDialect(Dialect):
             made = [self._unturned(memory, each, (tool, base)) for each in made]
         if kind != "joint":  # which ignores S and T
             made = [replace(each, branch=None) if isinstance(each, instructions.PoseTarget) else each for each in made]
-        in_doubt = 0.0
-        if plain != move.form and not in_tool:
-            before = memory.here.seen(tool, base, memory.cell.flange)
-            in_doubt = max(_turn_in_doubt(before, value, goal) for value, goal in zip(values, made))
+        said = [*left_out, self._turns(memory, kind)]
+        if plain != move.form and not in_tool:  # no public text says how angles are added to those before
+            said += [text for value in values if (text := _turned_by(value))]
         via = made[0] if kind == "arc" else None
         block = memory.shared.get("%spline")
         return instructions.ArmMotion(
@@ -857,12 +703,9 @@ class KrlDialect(Dialect):
             tool,
             base,
             block if isinstance(block, int) and block else None,
-            left_out="; ".join(filter(None, left_out)),
-            turn_in_doubt=in_doubt,
+            not_followed="; ".join(filter(None, said)),
             turning=(None, None) if kind == "joint" else (_turning(memory, "ORI1"), _turning(memory, "ORI2")),
-            turns=self._turns(memory, kind),
             load=load,
-            entry=entry,
         )
 
     def _turns(self, memory: ProgramMemory, kind: instructions.MotionKind) -> str:
@@ -871,7 +714,7 @@ class KrlDialect(Dialect):
             return ""
         given = ((name, memory.read(name)) for name in ORIENTATION_TYPES if kind == "arc" or name != "$CIRC_TYPE")
         other = (
-            f"{name}={syntax.shown(value)}" for name, value in given if value and not self.is_followed(name, value)
+            f"{name}={syntax.shown(value)}" for name, value in given if value and value not in ORIENTATION_TYPES[name]
         )
         return ", ".join(other)
 
@@ -904,14 +747,7 @@ class KrlDialect(Dialect):
             memory.write("%spline", doing.place.line if call.function == "%SPLINE" else 0)
             return None
         if call.function == "BAS":
-            if not set_by_bas(memory, call):
-                return instructions.Unknown(doing.text)
-            turns = ((memory.read(name), followed) for name, followed in ORIENTATION_TYPES.items())
-            return (
-                None
-                if all(value is None or value in followed for value, followed in turns)
-                else instructions.Unknown(doing.text, may_move=False)
-            )
+            return None if set_by_bas(memory, call) else instructions.Unknown(doing.text)
         if call.function == "PULSE" and call.arguments and call.arguments[0] is not None:
             name = memory.key(call.arguments[0]) or "$OUT"
             memory.forget("$OUT")  # which is what it was again, but nobody knows when
@@ -922,7 +758,16 @@ class KrlDialect(Dialect):
         """Messages, files, signals."""
         if call.function == "CWRITE" and syntax.Variable("$CMD") in call.arguments:  # commands, as to run a program
             return False
-        return call.function in HARMLESS | EVALUATED | OF_SETTINGS or call.function == syntax.CYCLIC
+        return call.function in HARMLESS | EVALUATED | OF_SETTINGS
+
+
+def _turned_by(value: syntax.Value) -> str:
+    """The angles of a relative position, as text; empty where it does not turn."""
+    items = value.items if isinstance(value, syntax.Record) else ()
+    turned = (
+        f"{key} {syntax.shown(part)}" for key, part in items if key in FRAME_KEYS[3:] and syntax.number(part) != 0
+    )
+    return ", ".join(turned)
 
 
 def _left_out(memory: ProgramMemory, argument: syntax.Expression | None, value: syntax.Value) -> str:
@@ -961,7 +806,6 @@ def _settings(memory: ProgramMemory, kind: instructions.MotionKind, move: syntax
             _speed(memory, kind),
             _acceleration(memory, kind),
             _zone(memory, kind, move.words),
-            _zone(memory, kind, ("C_PTP",) if kind == "joint" else ("C_DIS",)),
             _load(memory),
         )
         memory.kept[key] = found

@@ -7,12 +7,10 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-
-import numpy as np
 
 from er3a.errors import InputError
 from er3a.programs import syntax
@@ -24,24 +22,14 @@ from er3a.programs.code_builder import (
     mapped,
     not_understood,
     own_names,
-    variable_of,
     within,
 )
-from er3a.programs.evaluation import STRUCTURE
-from er3a.programs.instructions import Aside, Place, Remark, Unknown
-from er3a.programs.krl.controller_files import CALL, GLOBAL_NAME, PUBLIC, ControllerFiles, is_basics
-from er3a.programs.krl.dialect import (
-    HERE,
-    HERE_JOINTS,
-    MODAL,
-    MODAL_DATA,
-    POSITION_KINDS,
-    READ_BY_NUMBER,
-    changed_arguments,
-    record_pose,
-)
+from er3a.programs.evaluation import STRUCTURE, variable_of
+from er3a.programs.instructions import Place
+from er3a.programs.krl.controller_files import CALL, ControllerFiles
+from er3a.programs.krl.dialect import HARMLESS, OF_SETTINGS, POSITION_KINDS, changed_arguments
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, data_file_of, read_program_text
-from er3a.programs.program_findings import DataFileMissing, NameTwice, NotSimulated, NotUnderstood, ProgramFinding
+from er3a.programs.program_findings import DataFileMissing, NameTwice, ProgramFinding
 
 KRL = Lexicon(
     re.compile(
@@ -152,7 +140,7 @@ def statement(
         builder.add(syntax.Assign(place, syntax.Variable(plain[2].upper()), found, text, plain[1].upper()))
         return
     reading = _Statement(builder, place, text, signals, inside_data)
-    first, ahead = len(builder.code), _runs_ahead(builder)
+    first = len(builder.code)
     try:
         reading.read()
     except MisreadError as error:
@@ -162,22 +150,19 @@ def statement(
         builder.unread(place, text, not inside_data, folds=True)
     except RecursionError:
         raise InputError(place.file, place.where, "nested too deeply", "Split this line") from None
-    if ahead or reading.denoted:
-        meant = partial(_meant, signals=reading.denoted, ahead=text if ahead else "")
+    if reading.denoted:
+        meant = partial(_meant, signals=reading.denoted)
         builder.code[first:] = [mapped(each, meant) for each in builder.code[first:]]
 
 
-def _meant(expression: syntax.Expression, signals: Mapping[str, syntax.Expression], ahead: str) -> syntax.Expression:
-    """An expression with the outputs that routines get by the names of signals; where the arm is, is not known of a
-    line that runs ``ahead`` of it, if that is not empty."""
-    if isinstance(expression, syntax.Variable) and ahead and expression.name in (*HERE, *HERE_JOINTS):
-        return syntax.Constant(syntax.Unclear(f"{ahead} after CONTINUE"))
+def _meant(expression: syntax.Expression, signals: Mapping[str, syntax.Expression]) -> syntax.Expression:
+    """An expression with the outputs that routines get by the names of signals."""
     if isinstance(expression, syntax.Invocation):
         given = (
             signals.get(each.name, each) if isinstance(each, syntax.Variable) else each for each in expression.arguments
         )
         expression = replace(expression, arguments=tuple(given))
-    return within(expression, partial(_meant, signals=signals, ahead=ahead))
+    return within(expression, partial(_meant, signals=signals))
 
 
 class _Statement:
@@ -335,16 +320,6 @@ def _sizes(given: Iterable[syntax.Expression | None]) -> tuple[int, ...]:
     return whole if len(whole) == len(found) else ()
 
 
-def _is_outside(target: syntax.Expression, sizes: Mapping[str, tuple[int, ...]]) -> bool:
-    """Whether a target is an element that its list's declaration has not."""
-    while isinstance(target, syntax.Member):
-        target = target.of
-    if not isinstance(target, syntax.Element):
-        return False
-    found, declared = _sizes(target.indices), sizes.get(variable_of(target), ())
-    return len(found) == len(declared) and not all(1 <= each <= size for each, size in zip(found, declared))
-
-
 def _acts(operation: syntax.Operation) -> bool:
     """Whether an operation is more than a declaration."""
     return not isinstance(operation, syntax.Fixed) and not (isinstance(operation, syntax.Assign) and operation.local)
@@ -396,23 +371,15 @@ def _case(reading: _Statement) -> None:
 
 
 def _wait(reading: _Statement) -> None:
-    """The arm stops before a wait, unless a ``CONTINUE`` before it lets the program run ahead of the arm."""
-    words, stops = reading.words, not _runs_ahead(reading.builder)
+    words = reading.words
     if words.accept("SEC"):
         seconds = words.expression()
         words.finish()
-        reading.builder.add(syntax.Waiting(reading.place, "seconds", seconds, reading.text, stops))
+        reading.builder.add(syntax.Waiting(reading.place, "seconds", seconds, reading.text))
         return
     words.expect("FOR")
     text = re.sub(r"(?i)^WAIT\s+FOR\s*", "", reading.text)
-    reading.builder.add(syntax.Waiting(reading.place, "condition", reading.condition(), text, stops))
-
-
-def _runs_ahead(builder: CodeBuilder) -> bool:
-    """Whether the last statement, but for comments, is ``CONTINUE``."""
-    said = (each.instruction if isinstance(each, syntax.Fixed) else None for each in reversed(builder.code))
-    last = next((each for each in said if not isinstance(each, Remark)), None)
-    return isinstance(last, Aside) and last.text.upper() == "CONTINUE"
+    reading.builder.add(syntax.Waiting(reading.place, "condition", reading.condition(), text))
 
 
 def _anin(reading: _Statement) -> None:
@@ -423,7 +390,7 @@ def _anin(reading: _Statement) -> None:
     _functions_in(reading, reading.text)
     target = reading.words.reference()
     reading.words.expect("=")
-    reading.builder.beside(reading.place, syntax.Invocation(syntax.CYCLIC, (target,)), reading.text, "interrupt")
+    reading.builder.unknown(reading.place, reading.text, may_move=False)
     reading.builder.unclear(reading.place, variable_of(target))
 
 
@@ -444,16 +411,13 @@ def _return(reading: _Statement) -> None:
 def _interrupt(reading: _Statement) -> None:
     """``INTERRUPT DECL priority WHEN condition DO routine()``; ``INTERRUPT ON`` and the like change only when."""
     if reading.words.accept("DECL"):
-        _do(reading, at_any_time=True)
+        _do(reading)
     else:
         reading.builder.aside(reading.place, reading.text)
 
 
-def _do(reading: _Statement, at_any_time: bool = False) -> None:
-    """A routine after DO, which runs whenever a condition holds; or an assignment, so that the value is nowhere known.
-
-    An interrupt (``at_any_time``) may assign again and again: it is named.
-    """
+def _do(reading: _Statement) -> None:
+    """A routine after DO, which runs whenever a condition holds; or an assignment: the variable has no known value."""
     asked = re.search(r"(?i)\bDO\b(.*?)(\bPRIO\s*=.*)?$", reading.text)
     if asked is None:
         raise MisreadError("expected DO")
@@ -462,19 +426,12 @@ def _do(reading: _Statement, at_any_time: bool = False) -> None:
     what = words.expression()
     if isinstance(what, syntax.Invocation):
         words.finish()
-        reading.builder.beside(reading.place, what, reading.text, "interrupt")
-        if what.function == "PULSE":
-            reading.builder.unclear(reading.place, "$OUT")
+        reading.builder.concurrent(reading.place, what, reading.text)
     elif words.accept("="):
-        target = reading.known(what)
-        if at_any_time:
-            reading.builder.unknown(reading.place, reading.text, may_move=False)
-        if variable_of(target).startswith("$"):
-            reading.builder.aside(reading.place, reading.text)
-        else:  # later than lines after it, as the program runs ahead of the arm
-            changed = syntax.Invocation(syntax.CYCLIC, (target,))
-            reading.builder.beside(reading.place, changed, reading.text, "interrupt")
-        reading.builder.unclear(reading.place, variable_of(target))
+        name = variable_of(reading.known(what))
+        reading.builder.aside(reading.place, reading.text)
+        reading.builder.unclear(reading.place, name)
+        reading.builder.volatile.add(name)
     else:
         raise MisreadError("DO calls no routine and sets nothing")
 
@@ -509,13 +466,6 @@ def _structure(reading: _Statement) -> None:
     reading.builder.add(syntax.Assign(reading.place, syntax.Variable(f"{STRUCTURE}{name}"), shape, reading.text))
 
 
-def _on_error_proceed(reading: _Statement) -> None:
-    """The next line may fail, and the program goes on; in the controller's bas.src it asks what is there, and it is."""
-    number: syntax.Value = 0 if is_basics(reading.place.file or Path()) else syntax.Unclear("$ERR.NUMBER")
-    target, value = syntax.Variable("$ERR.NUMBER"), syntax.Constant(number)
-    reading.builder.add(syntax.Assign(reading.place, target, value, reading.text))
-
-
 def _goto(reading: _Statement) -> None:
     reading.builder.goto(reading.place, reading.words.name())
 
@@ -543,14 +493,13 @@ HANDLERS: dict[str, Handler] = {
     "EXIT": _simple(lambda builder, place: builder.leave_loop(place)),
     "GOTO": _goto,
     "RETURN": _return,
-    "HALT": lambda reading: reading.builder.add(syntax.Waiting(reading.place, "operator", None, "HALT", stops=True)),
+    "HALT": lambda reading: reading.builder.add(syntax.Waiting(reading.place, "operator", None, "HALT")),
     "WAIT": _wait,
     "ANIN": _anin,
     "TIME_BLOCK": _time_block,
     "INTERRUPT": _interrupt,
     "STRUC": _structure,
     "TRIGGER": _do,
-    "ON_ERROR_PROCEED": _on_error_proceed,
     "RESUME": lambda reading: reading.builder.unknown(reading.place, reading.text),  # the arm stops where it is
     "SPLINE": lambda reading: _spline(reading),
     "PTP_SPLINE": lambda reading: _spline(reading),
@@ -573,27 +522,22 @@ def _spline(reading: _Statement) -> None:
     reading.builder.add(syntax.Doing(reading.place, call, reading.text))
 
 
+GLOBAL_NAME = re.compile(r"(?i)\bGLOBAL\b")
+PUBLIC = re.compile(r"(?im)^[ \t]*DEFDAT[ \t]+\S+[ \t]+PUBLIC\b")
 GLOBAL_ROUTINE = re.compile(r"(?im)^\s*GLOBAL\s+DEF(?:FCT\s+\w+(?:\s*\[[^\]]*\])?)?\s+(\w+)")
-GLOBAL_SIGNAL = re.compile(r"(?i)\s*(?:DECL\s+)?GLOBAL\s+SIGNAL\b")
-NAME = re.compile(r"[A-Za-z_$][\w$]*")
-SETTING = re.compile(r"\(|(?<![=<>])=(?!=)")
 
 
-def apart(
-    source: ProgramText, routines: Iterable[syntax.Routine], data: Iterable[syntax.Assign]
-) -> tuple[list[syntax.Routine], list[syntax.Assign]]:
-    """A module's routines and data under names that no other module has, its global ones apart.
+def own_of_module(source: ProgramText, routines: Iterable[syntax.Routine], data: Iterable[syntax.Assign]) -> set[str]:
+    """Names of a module's routines and data that other modules do not see.
 
     In KRL a routine is seen by other modules if it is named as its file or declared ``GLOBAL``, a name of a .dat file
     if it is declared ``GLOBAL``.
     """
-    routines, data, module = list(routines), list(data), source.path.stem.upper()
-    seen = {module, *(name.upper() for name in GLOBAL_ROUTINE.findall(source.text))}
+    data = list(data)
+    seen = {source.path.stem.upper(), *(name.upper() for name in GLOBAL_ROUTINE.findall(source.text))}
     own = {variable_of(each.target) for each in data} - _global_names(data_file_of(source.path, ".dat"), data)
     own |= {routine.name for routine in routines} - seen
-    names = {name: f"{module}/{name}" for name in own if not name.startswith(("$", "%"))}
-
-    return [_with_names(each, names) for each in routines], [_as(each, names) for each in data]
+    return {name for name in own if not name.startswith(("$", "%"))}
 
 
 def _global_names(file: Path | None, data: Iterable[syntax.Assign]) -> set[str]:
@@ -602,18 +546,6 @@ def _global_names(file: Path | None, data: Iterable[syntax.Assign]) -> set[str]:
     if file is None or not PUBLIC.search(read_program_text(file).text):
         return set()
     return {variable_of(each.target) for each in data if GLOBAL_NAME.search(each.text)}
-
-
-def _seen_here_alone(
-    source: ProgramText, routines: Iterable[syntax.Routine], data: Iterable[syntax.Assign]
-) -> dict[str, str]:
-    """Names of a program's own routines and data, which other modules do not see, with what those mean by them."""
-    file, module = data_file_of(source.path, ".dat"), source.path.stem.upper()
-    seen = {module, *(name.upper() for name in GLOBAL_ROUTINE.findall(source.text))}
-    own = [each for each in data if each.place.file == file]
-    names = {variable_of(each.target) for each in own} - _global_names(file, own)
-    names |= {routine.name for routine in routines} - seen
-    return {name: f"/{name}" for name in names if not name.startswith(("$", "%"))}
 
 
 def _with_names(routine: syntax.Routine, names: Mapping[str, str]) -> syntax.Routine:
@@ -641,7 +573,7 @@ def _renamed(operation: syntax.Operation, names: Mapping[str, str]) -> syntax.Op
         return expression
 
     operation = mapped(operation, each)
-    if isinstance(operation, syntax.Beside):
+    if isinstance(operation, syntax.ConcurrentStart):
         function = operation.what.function
         return replace(operation, what=replace(operation.what, function=names.get(function, function)))
     return replace(operation, target=each(operation.target)) if isinstance(operation, syntax.Assign) else operation
@@ -654,6 +586,8 @@ DEF_APO_CPTP POWER APPL_RUN
 """
 CONFIG_NAMES = frozenset(CONFIG_NAMES_TEXT.split())
 """Names that controllers keep in $config.dat, not in a program's own .dat."""
+KNOWN = frozenset(("BAS", *HARMLESS, *OF_SETTINGS))
+"""Routines of controllers whose modules are not read."""
 HEAD = re.compile(r"(?i)\s*(?:GLOBAL\s+)?(DEF|DEFFCT)\s+(.*)")
 
 
@@ -665,39 +599,31 @@ def read_krl(source: ProgramText) -> syntax.Program:
     InputError
         for texts and blocks without an end, and for a file that defines no routine
     """
-    reader, files = _KrlReader(source), ControllerFiles(source.path)
-    findings: list[ProgramFinding] = [*source.findings]
+    reader, files = _KrlReader(source), ControllerFiles(source.path, KNOWN)
+    findings: list[ProgramFinding] = []
     if files.config is not None:
         findings += reader.read_data(read_program_text(files.config))
-    for file in files.public_data:
-        reader.read_signals(file)
-    of_controller = dict(reader.signals)
-    findings += reader.read_published(files.published)
+    of_controller = list(reader.data)
     data_file = data_file_of(source.path, ".dat")
     if data_file is not None:
         findings += reader.read_data(read_program_text(data_file))
     routines = reader.read_routines()
-    findings += [*_robot_root(files.machine_data), *files.twice()]
-    findings += _interrupts_of_others(source, [text for each in files.modules if (text := files.source(each))])
-    called: list[syntax.Routine] = []
-    hidden = _seen_here_alone(source, routines, reader.data)
-    shown = _global_names(data_file, (each for each in reader.data if each.place.file == data_file))
-    seen_by_all = [each for each in reader.data if each.place.file != data_file or variable_of(each.target) in shown]
-    reader.data = [each if each.place.file == data_file else _as(each, hidden) for each in reader.data]
-    for file in files.modules:
-        more_routines, more_data, more = _module(read_program_text(file), of_controller)
-        seen_by_all += [each for each in more_data if GLOBAL_NAME.search(each.text)]
-        called += [_with_names(each, hidden) for each in more_routines]
-        reader.data += [_as(each, hidden) for each in more_data]
-        findings += more
-    findings += _structures_twice(reader.data)
-    shared = _known_to_all(files, seen_by_all)
-    others = _SetByOthers(files, shared, of_controller)
-    unread = (each for each in files.unread if shared or each.suffix.lower() == ".sub")  # which sets outputs too
-    findings += [NotUnderstood(file.name, Place(file, 1)) for file in unread]
     if data_file is None and lacks_data(routines, reader.data, CONFIG_NAMES | reader.signals.keys()):
         findings.append(DataFileMissing(source.path.with_suffix(".dat").name))
-    by_name, unlinked = linked([*called, *routines], perhaps=changed_arguments)
+    hidden = {name: f"/{name}" for name in own_of_module(source, routines, reader.data[len(of_controller) :])}
+    called: list[syntax.Routine] = []
+    for file in files.modules:
+        module = _KrlReader(read_program_text(file))
+        points = data_file_of(file, ".dat")
+        if points is not None:
+            findings += module.read_data(read_program_text(points))
+        inside = module.read_routines()
+        own = own_of_module(module.source, inside, module.data)
+        names = hidden | {name: f"{file.stem.upper()}/{name}" for name in own}
+        called += [_with_names(each, names) for each in inside]
+        reader.data += [_as(each, names) for each in module.data]
+        reader.volatile |= {names.get(name, name) for name in module.volatile}
+    by_name, unlinked = linked([*called, *routines], changed_arguments)
     return syntax.Program(
         "krl",
         source.path.stem,
@@ -707,63 +633,8 @@ def read_krl(source: ProgramText) -> syntax.Program:
         tuple(reader.data),
         (*findings, *unlinked),
         source.lines,
-        beside=others.beside(),
-        elsewhere=tuple(others.elsewhere(_uncalled([*called, *routines], routines[0].name, hidden)).items()),
+        volatile=frozenset(reader.volatile),
     )
-
-
-def _structures_twice(data: Iterable[syntax.Assign]) -> Iterable[NameTwice]:
-    """Types of one name that modules declare otherwise, of which the last is taken for all."""
-    shapes: dict[str, syntax.Expression | None] = {}
-    for each in data:
-        name = variable_of(each.target)
-        if name.startswith(STRUCTURE) and shapes.setdefault(name, each.value) != each.value:
-            yield NameTwice(name.removeprefix(STRUCTURE), each.place)
-
-
-def _uncalled(routines: Iterable[syntax.Routine], entry: str, hidden: Mapping[str, str]) -> list[syntax.Routine]:
-    """Routines that other modules may call, and what these call, but for those that ``entry`` and what it calls do.
-
-    No other module sees those that are ``hidden``, and a called module's own, which are named ``MODULE/NAME``.
-    """
-    by_name = {each.name: each for each in routines}
-    own = _reached(by_name, [entry])
-    others = _reached(by_name, [name for name in by_name if name not in hidden and "/" not in name])
-    return [by_name[name] for name in others if name not in own]
-
-
-def _reached(by_name: Mapping[str, syntax.Routine], names: list[str]) -> dict[str, None]:
-    """Routines with what they call or start, in the order in which they are met."""
-    found: dict[str, None] = {}
-    waiting = names
-    while waiting:
-        name = waiting.pop()
-        if name in by_name and name not in found:
-            found[name] = None
-            waiting += [each.function for operation in by_name[name].code for each in _invocations(operation)]
-    return found
-
-
-def _known_to_all(files: ControllerFiles, seen: Iterable[syntax.Assign]) -> frozenset[str]:
-    """Variables of data that all modules see, as those of $config.dat, of those that the program uses."""
-    texts = (files.text(each) for each in (files.path, *files.modules))
-    used = {name.upper() for text in texts for name in NAME.findall(text)} | {*READ_BY_NUMBER, *MODAL_DATA}
-    return frozenset(used.intersection(variable_of(each.target) for each in seen))
-
-
-Signals = Mapping[str, syntax.Expression]
-Read = tuple[list[syntax.Routine], list[syntax.Assign], list[ProgramFinding]]
-
-
-def _module(source: ProgramText, of_controller: Signals) -> Read:
-    """Routines, data and findings of another module; ``of_controller``: the signals that all modules know."""
-    reader = _KrlReader(source)
-    reader.signals.update(of_controller)
-    findings: list[ProgramFinding] = [*source.findings]
-    data_file = data_file_of(source.path, ".dat")
-    if data_file is not None:
-        findings += reader.read_data(read_program_text(data_file))
-    return (*apart(source, reader.read_routines(), reader.data), findings)
 
 
 class _KrlReader:
@@ -771,50 +642,21 @@ class _KrlReader:
         self.source = source
         self.data: list[syntax.Assign] = []
         self.signals: dict[str, syntax.Expression] = {}
+        self.volatile: set[str] = set()
 
     def read_data(self, source: ProgramText) -> list[ProgramFinding]:
         """Declarations of a .dat file."""
         builder = CodeBuilder("", (), Place(source.path, 1))
         self._read_lines(source, builder, inside_data=True)
-        found: list[ProgramFinding] = [*source.findings, *not_understood(builder.code)]
-        seen: dict[str, bool] = {}
-        sizes: dict[str, tuple[int, ...]] = {}
+        found: list[ProgramFinding] = [*not_understood(builder.code)]
+        seen: set[str] = set()
         for each in builder.code:
             if isinstance(each, syntax.Assign):
-                sizes |= {variable_of(each.target): each.sizes} if each.sizes else {}
-                found += [NotUnderstood(each.text, each.place)] if _is_outside(each.target, sizes) else []
                 if isinstance(each.target, syntax.Variable) and each.type_name:
-                    if seen.get(each.target.name):
+                    if each.target.name in seen:
                         found.append(NameTwice(each.target.name, each.place))
-                    seen[each.target.name] = True
+                    seen.add(each.target.name)
                 self.data.append(each)
-        return found
-
-    def read_signals(self, file: Path) -> None:
-        """The signals that a ``.dat`` file declares for all modules."""
-        source = read_program_text(file)
-        for number, line in enumerate(source.lines, 1):
-            if GLOBAL_SIGNAL.match(line):
-                place = Place(file, number)
-                statement(
-                    CodeBuilder("", (), place), place, split_comment(line, place)[0], self.signals, inside_data=True
-                )
-
-    def read_published(self, files: Iterable[Path]) -> list[ProgramFinding]:
-        """What ``.dat`` files of modules that a program does not call declare for all modules."""
-        known, found = {variable_of(each.target) for each in self.data}, list[ProgramFinding]()
-        for file in files:
-            other = _KrlReader(read_program_text(file))
-            try:
-                other.read_data(other.source)
-            except InputError:
-                continue  # what it declares has no known value
-            shown = _global_names(file, other.data)
-            for each in other.data:
-                if (name := variable_of(each.target)) in shown:
-                    found += [NameTwice(name, each.place)] if each.type_name and name in known else []
-                    self.data.append(each)
-            known |= {variable_of(each.target) for each in self.data}
         return found
 
     def read_routines(self) -> list[syntax.Routine]:
@@ -836,6 +678,7 @@ class _KrlReader:
                     raise fault(place, f"'{text[:40]}' is outside of any routine", "Begin with DEF NAME ( )")
             elif text.upper() == end:
                 routines.append(builder.routine(place))
+                self.volatile |= builder.volatile
                 builder = None
             else:
                 self._line(builder, place, text, comment)
@@ -904,159 +747,6 @@ def split_comment(line: str, place: Place) -> tuple[str, str]:
     return (line.strip(), "") if at < 0 else (line[:at].strip(), line[at + 1 :].strip())
 
 
-class _SetByOthers:
-    """What submit programs and modules that the program does not call may set of what all modules know: by an
-    assignment, or by handing it over by reference.
-
-    Parameters
-    ----------
-    shared : the names that count, without outputs
-    of_controller : the signals that all modules know
-    """
-
-    def __init__(self, files: ControllerFiles, shared: frozenset[str], of_controller: Signals):
-        self.files, self.shared, self.of_controller = files, shared, of_controller
-        self.routines: dict[str, syntax.Routine] = {}
-        self.modules: dict[Path, tuple[syntax.Routine, ...] | None] = {}
-        self.changes: dict[str, dict[str, Place]] = {}
-
-    def beside(self) -> frozenset[str]:
-        """What submit programs set, with the routines that they call."""
-        found: set[str] = set()
-        seen: set[str] = set()
-        for file in self.files.submits:
-            found.update(self._named_in(file))
-            waiting = list(self._read(file) or ())
-            while waiting:
-                routine = waiting.pop()
-                if routine.name not in seen:
-                    seen.add(routine.name)
-                    found.update(self._set_by(routine))
-                    invoked = (each.function for op in routine.code for each in _invocations(op))
-                    waiting += [each for each in map(self._routine, invoked) if each is not None]
-        return frozenset(found - {*MODAL})
-
-    def elsewhere(self, uncalled: Iterable[syntax.Routine]) -> dict[str, Place]:
-        """What modules set that the program does not call, with where; also ``uncalled`` routines of those it calls."""
-        found: dict[str, Place] = {}
-        for routine in (each for each in uncalled if each.place.file is None or not is_basics(each.place.file)):
-            found |= {name: place for name, place in self._set_by(routine).items() if name in self.shared}
-        for file in self.files.others:
-            if self.shared & set(map(str.upper, NAME.findall(self.files.text(file)))):
-                for each in (self._named_in(file), *map(self._set_by, self._read(file) or ())):
-                    found |= {name: place for name, place in each.items() if name in self.shared and name not in found}
-        return found
-
-    def _set_by(self, routine: syntax.Routine) -> dict[str, Place]:
-        own = own_names(routine)
-        found = self._changed(routine).items()
-        return {name: at for name, at in found if name not in own and (name in self.shared or name.startswith("$"))}
-
-    def _changed(self, routine: syntax.Routine) -> dict[str, Place]:
-        """Variables and parameters that a routine may change, with where."""
-        if routine.name in self.changes:
-            return self.changes[routine.name]
-        found = self.changes[routine.name] = {each.name: routine.place for each in routine.parameters if each.out}
-        changed = {variable_of(target): op.place for op in reversed(routine.code) for target in self._targets(op)}
-        unread = [op for op in routine.code if isinstance(op, syntax.Fixed) and isinstance(op.instruction, Unknown)]
-        for op in unread:
-            if isinstance(op.instruction, Unknown) and op.instruction.may_move:
-                changed |= {name.upper(): op.place for name in NAME.findall(op.instruction.text)}
-        found.clear()  # of which all that it may give back counted while it was asked
-        found |= changed
-        return found
-
-    def _targets(self, operation: syntax.Operation) -> Iterable[syntax.Expression]:
-        if isinstance(operation, syntax.Assign) and operation.value is not None:
-            yield operation.target
-        for call in _invocations(operation):
-            routine = self._routine(call.function)
-            given = (syntax.Variable("$OUT"),) if call.function == "PULSE" else changed_arguments(call)
-            if call.function == "CWRITE":  # a command may set what its text names
-                texts = (str(each.value) for each in call.arguments if isinstance(each, syntax.Constant))
-                given = tuple(syntax.Variable(name.upper()) for text in texts for name in NAME.findall(text))
-            if routine is not None:
-                changed = self._changed(routine)
-                pairs = zip(routine.parameters, call.arguments)
-                given = tuple(each for parameter, each in pairs if parameter.out and parameter.name in changed)
-            yield from (each for each in given if each is not None)
-
-    def _routine(self, name: str) -> syntax.Routine | None:
-        """A routine by its name, as all modules see it or as its own does."""
-        for file in self.files.routines.get(name, ())[:1]:
-            self._read(file)
-        return self.routines.get(name)
-
-    def _read(self, file: Path) -> tuple[syntax.Routine, ...] | None:
-        """The routines of a module; None if it can't be read."""
-        if file not in self.modules:
-            source = self.files.source(file)
-            try:
-                read = None if source is None else _module(source, self.of_controller)
-            except InputError:
-                read = None
-            self.modules[file] = None if read is None else tuple(read[0])
-            self.routines |= {each.name: each for each in self.modules[file] or () if each.name not in self.routines}
-        return self.modules[file]
-
-    def _named_in(self, file: Path) -> dict[str, Place]:
-        """What a module that can't be read may set: what it names in assignments and calls."""
-        if self._read(file) is not None:
-            return {}
-        lines = enumerate(self.files.text(file).upper().split("\n"), 1)
-        named = ((name, number) for number, line in lines if SETTING.search(line) for name in NAME.findall(line))
-        return {name: Place(file, number) for name, number in named if name in self.shared or name.startswith("$")}
-
-
-def _invocations(operation: syntax.Operation) -> Iterable[syntax.Invocation]:
-    """The calls in an operation, also of what it starts beside the program."""
-    waiting = list(syntax.expressions_of(operation))
-    if isinstance(operation, syntax.Beside):
-        yield operation.what
-    while waiting:
-        each = waiting.pop()
-        if isinstance(each, syntax.Invocation):
-            yield each
-        waiting += syntax.inner(each)
-
-
-INTERRUPT_ON = re.compile(r"(?i)\s*INTERRUPT\s+(?:ON|ENABLE)\b\s*([^;]*)")
-INTERRUPT_DECL = re.compile(r"(?i)\s*(?:GLOBAL\s+)?INTERRUPT\s+DECL\s+(\S+)")
-
-
-def _interrupts_of_others(source: ProgramText, called: Sequence[ProgramText]) -> Iterable[NotSimulated]:
-    """Lines of the program that switch interrupts on which no file that is read declares: a caller's, or a submit's."""
-    lines = [line for text in (source, *called) for line in text.lines]
-    declared = {match[1].upper() for line in lines if (match := INTERRUPT_DECL.match(line)) is not None}
-    for number, line in enumerate(source.lines, 1):
-        if (match := INTERRUPT_ON.match(line)) is not None:
-            asked = match[1].strip().upper()
-            if asked not in declared and not (declared and not asked.isdigit()):
-                yield NotSimulated(line.strip(), Place(source.path, number))
-
-
-ROBROOT = re.compile(r"(?i)\s*(?:(?:DECL|GLOBAL|CONST|FRAME)\s+)*\$ROBROOT(\.\w+)?\s*=\s*([^;]*)")
-NO_OFFSET = re.compile(r"[-+]?0*\.?0*(?:[eE][-+]?\d+)?\s*")
-
-
-def _robot_root(file: Path | None) -> Iterable[ProgramFinding]:
-    """That the machine data put the robot elsewhere than at the origin of the world, in which bases are given."""
-    source = None if file is None else read_program_text(file)
-    for number, line in enumerate(source.lines, 1) if source else ():
-        if (match := ROBROOT.match(line)) is not None and not _is_origin(match[2], whole=not match[1]):
-            yield NotSimulated(match[0].strip(), Place(file, number))
-
-
-def _is_origin(text: str, whole: bool) -> bool:
-    """Whether a frame, or a coordinate of one, is 0."""
-    if not whole:
-        return NO_OFFSET.fullmatch(text) is not None
-    frame = re.fullmatch(r"(?i)\{\s*(?:FRAME\s*:)?([^}]*)\}\s*", text)
-    root = None if frame is None else plain_record("FRAME", frame[1])
-    pose = None if root is None else record_pose(root.value)
-    return pose is not None and bool(np.allclose(pose, np.eye(4)))
-
-
 def companions(path: Path) -> tuple[Path, ...]:
     """What belongs to a .src file."""
-    return ControllerFiles(path).companions
+    return ControllerFiles(path, KNOWN).companions

@@ -15,16 +15,7 @@ from scipy.spatial.transform import Rotation
 from er3a.geometry.transforms import rpy_of, transform
 from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, syntax
-from er3a.programs.evaluation import (
-    Dialect,
-    Position,
-    ProgramMemory,
-    Rounded,
-    computed_in_single,
-    function_in_single,
-    missed_by,
-    unresolved,
-)
+from er3a.programs.evaluation import Dialect, Position, ProgramMemory, evaluated, unresolved
 from er3a.programs.rapid import data_types, known_names, reader
 from er3a.robots.masses import moved, together
 
@@ -33,17 +24,13 @@ JOINT_FORMS = ("MOVEJ", "TRIGGJ")
 ARC_FORMS = ("MOVEC", "TRIGGC", "SEARCHC")
 SLOWEST_RAMP = 20.0  # percent; 1 AccSet: smaller values count as 20
 FULL_SPEED = 5000.0  # mm/s, of VelSet where a program sets none
-SETS = {**known_names.SETTINGS, "GRIPLOAD": "%GRIPLOAD", "SETSYSDATA": reader.PASSING}
 SWITCHES: Mapping[str, frozenset[str]] = {
     **dict.fromkeys(("CROBT", "CPOS"), frozenset(("TOOL", "WOBJ"))),
-    "CALCROBT": frozenset(("WOBJ",)),
-    "CALCJOINTT": frozenset(("WOBJ", "ERRORNUMBER")),
     **dict.fromkeys(("TRUNC", "ROUND"), frozenset(("DEC",))),
     "RELTOOL": frozenset(("RX", "RY", "RZ")),
     "EULERZYX": frozenset("XYZ"),
 }
 """What they take by name; a call with another, such as ``CRobT(\\TaskName:="T_ROB2")``, has no known value."""
-MOST_WHOLE = 2**23  # that a num holds exactly
 IN_DEGREES: Mapping[str, Callable[..., float]] = {
     "ABS": abs,
     "SQRT": math.sqrt,
@@ -59,8 +46,6 @@ IN_DEGREES: Mapping[str, Callable[..., float]] = {
     "NUMTODNUM": lambda x: x,
     "DNUMTONUM": lambda x: x,
 }
-JOINTS_OF = "%JOINTS_OF"
-"""Kind of the joints of a target, which only the arm's table gives."""
 UNCLEAR = syntax.Unclear("")
 AS_IT_STANDS = syntax.Unclear("the configuration in which the arm stands")
 
@@ -69,8 +54,6 @@ class RapidDialect(Dialect):
     """RAPID, as a run needs it."""
 
     modal = frozenset((*known_names.SETTINGS.values(), "%GRIPLOAD"))
-    setters = frozenset((*known_names.SETTINGS, *known_names.OUTPUTS, "EOFFSOFF", "GRIPLOAD", "SETSYSDATA"))
-    single_precision = True
 
     def constant(self, memory: ProgramMemory, name: str) -> syntax.Value | None:
         """Speeds, zones, tool and work object that every controller has, those that a module hides in itself too."""
@@ -83,10 +66,6 @@ class RapidDialect(Dialect):
             return frame_of_tool(value)[0]
         return frame_of_object(value)[0] if kind == "WOBJDATA" else None
 
-    def starts_anew(self, data: syntax.Assign) -> bool:
-        """Whether it is a VAR, which has its first value again where the program pointer is set to main."""
-        return data.text.upper().startswith("VAR")
-
     def function(self, memory: ProgramMemory, name: str, given: syntax.Invocation) -> syntax.Value:
         """Mathematics, positions, where the arm is; what is unknown, or called otherwise, is unclear."""
         values = tuple(UNCLEAR if each is None else memory.value(each) for each in given.arguments)
@@ -97,21 +76,15 @@ class RapidDialect(Dialect):
             return data_types.typed(values[0], _as_shape(values[1]))
         if name == reader.ARITHMETIC:
             return arithmetic(str(values[0]), values[1], values[2])
-        if name == reader.UPPER:
-            return values[0].upper() if isinstance(values[0], str) else values[0]
         if name == reader.STEP:
             first, last = syntax.number(values[0]), syntax.number(values[1])
             return syntax.Unclear("a step") if first is None or last is None else 1 if first <= last else -1
-        if name in known_names.NOT_EVALUATED:
-            read = [each for place, each in enumerate(values) if place != known_names.CHANGING_FUNCTIONS.get(name)]
-            first_unclear = next((each for each in (*read, *named.values()) if isinstance(each, syntax.Unclear)), None)
-            return first_unclear or syntax.NotEvaluated(unclear.text)
         if known_names.PARAMETERS.get(name) != len(values) or named.keys() - SWITCHES.get(name, frozenset()):
             return unclear
-        if name in ("CROBT", "CJOINTT", "CPOS", "CTOOL", "CWOBJ", "CALCROBT", "CALCJOINTT"):
-            found = _of_position(memory, name, values, named, given)
+        if name in ("CROBT", "CJOINTT", "CPOS"):
+            found = _of_position(memory, name, named, dict(given.keywords))
         elif name in IN_DEGREES:
-            found = _number_of(name, values)
+            found = evaluated(IN_DEGREES[name], values)
         else:
             found = _of_data(name, values, named)
         if found is None:
@@ -144,7 +117,7 @@ class RapidDialect(Dialect):
         fixed = instructions.UnresolvedTarget(move.text, "external_tool") if stationary or held else None
         checked = memory.read("%CONFJ" if kind == "joint" else "%CONFL") is not False
         made = [
-            fixed or self._target(memory, value, frames, (move.text, kind, "ABSJ" in form), checked)
+            fixed or self._target(memory, value, (move.text, kind, "ABSJ" in form), checked)
             for value in values[:targets]
         ]
         speed, turn = _speed(memory, values[targets], options, kind)
@@ -155,6 +128,8 @@ class RapidDialect(Dialect):
         if isinstance(via, instructions.PoseTarget):
             via = replace(via, branch=None)
         about_one_axis = memory.read("%ARCS") if arc else None
+        others = sorted({*options} - reader.MOTION_OPTIONS)
+        others += ["CirPathMode"] if isinstance(about_one_axis, syntax.Unclear) else []
         return instructions.ArmMotion(
             kind,
             made[-1],
@@ -162,12 +137,12 @@ class RapidDialect(Dialect):
             via,
             None,
             speed,
-            _acceleration(memory, kind),
+            _acceleration(memory),
             zone,
             *frames,
             turn_speed=turn,
             load=_load(memory, tool, values[tool_at], options.get("TLOAD")),
-            doubt="CirPathMode" if isinstance(about_one_axis, syntax.Unclear) else "",
+            not_followed=", ".join(others),
             with_path=arc and about_one_axis is not True,
         )
 
@@ -175,7 +150,6 @@ class RapidDialect(Dialect):
         self,
         memory: ProgramMemory,
         value: syntax.Value,
-        frames: tuple[instructions.NamedFrame, instructions.NamedFrame],
         said: tuple[str, instructions.MotionKind, bool],
         checked: bool,
     ) -> instructions.Target:
@@ -183,8 +157,6 @@ class RapidDialect(Dialect):
         text, kind, absolute = said
         if isinstance(value, syntax.Unclear):
             return unresolved(value, text)
-        if isinstance(value, syntax.Record) and value.kind == JOINTS_OF and absolute:
-            return _joints_of(value, frames, text)
         value = data_types.typed(value, data_types.JOINTTARGET if absolute else data_types.ROBTARGET)
         external = data_types.external_axes(data_types.part(value, "EXTAX"))
         if absolute:
@@ -214,9 +186,6 @@ class RapidDialect(Dialect):
                 if data_types.load_of(data_types.typed(gripped, data_types.LOADDATA))
                 else instructions.Aside(doing.text)
             )
-        if call.function == "SETSYSDATA":
-            _set_active(memory, call)
-            return instructions.Aside(doing.text)
         if call.function == "CIRPATHMODE":
             options = {key for key, _ in call.keywords}
             memory.write("%ARCS", options == {"OBJECTFRAME"})
@@ -230,17 +199,10 @@ class RapidDialect(Dialect):
             return instructions.Aside(doing.text)
         return instructions.Unknown(doing.text)
 
-    def sets(self, call: syntax.Invocation) -> frozenset[str]:
-        """What one of the settings sets; the tool and object of ``CRobT`` are as unknown as where the arm is."""
-        setting = SETS.get(call.function)
-        return frozenset() if setting is None else frozenset((setting,))
-
     def harmless(self, call: syntax.Invocation) -> bool:
         """Functions and instructions whose exact name is known, and that set nothing."""
         name = call.function
-        if name in known_names.SETTINGS or name in (reader.LATE, "GRIPLOAD", "SETSYSDATA"):
-            return False
-        return known_names.is_known(name)
+        return name not in known_names.SETTINGS and name != "GRIPLOAD" and known_names.is_known(name)
 
 
 def _beside_motion(form: str) -> int:
@@ -302,25 +264,6 @@ def _joint_target(
     if any(each and abs(each) < data_types.NO_AXIS / 10 for each in degrees[count:]):
         return instructions.UnresolvedTarget(text, "too_many_joints")
     return instructions.JointTarget(np.radians(degrees[:count]), external)
-
-
-def _joints_of(
-    value: syntax.Record, frames: tuple[instructions.NamedFrame, instructions.NamedFrame], text: str
-) -> instructions.Target:
-    """The joints of a target for a tool and a work object, as a pose of those of the motion."""
-    if len(value.items) > len(("TARGET", "TOOL", "WOBJ")):  # the program has changed an axis of it
-        return instructions.UnresolvedTarget(text, "not_understood")
-    target = data_types.part(value, "TARGET")
-    pose = data_types.pose_matrix(target)
-    tool, _ = frame_of_tool(data_types.part(value, "TOOL"))
-    base, _ = frame_of_object(data_types.part(value, "WOBJ") or data_types.predefined("WOBJ0"))
-    now, here = frames[0].pose, frames[1].pose
-    if pose is None or tool is None or base is None or now is None or here is None:
-        return instructions.UnresolvedTarget(text, "not_understood")
-    conf = data_types.plain(data_types.part(target, "ROBCONF"), 4)
-    found = np.linalg.inv(here) @ base @ pose @ np.linalg.inv(tool) @ now
-    said = _said(data_types.part(target, "ROBCONF"))
-    return instructions.PoseTarget(found, said, branch=data_types.branch_of(conf, 6))
 
 
 def frame_of_tool(value: syntax.Value | None) -> tuple[Reals | None, bool]:
@@ -459,11 +402,7 @@ def _velocity(memory: ProgramMemory) -> tuple[float, float]:
     return (1.0, FULL_SPEED) if found is None else (found[0] / 100, found[1])
 
 
-def _acceleration(memory: ProgramMemory, kind: instructions.MotionKind) -> instructions.Rate | None:
-    limits = [syntax.number(memory.read(name)) for name in ("%PATHACCLIM", "%WORLDACCLIM")]
-    given = [each for each in limits if each is not None]
-    if given and kind != "joint":
-        return instructions.Rate(min(given), "m/s2")
+def _acceleration(memory: ProgramMemory) -> instructions.Rate | None:
     percent = syntax.number(memory.read("%ACC"))
     return None if percent is None else instructions.Rate(percent / 100, "share")
 
@@ -509,15 +448,6 @@ def _set(memory: ProgramMemory, call: syntax.Invocation) -> bool:
             found = syntax.numbers(tuple(values)) if len(values) == 2 else None
             memory.write("%SPEED", syntax.Unclear("VelSet") if found is None else found)
             return found is not None
-        case "PATHACCLIM" | "WORLDACCLIM":
-            on = dict(zip(("ACCMAX", "DECELMAX"), values))
-            limits = [
-                syntax.number(options.get(key)) for key in ("ACCMAX", "DECELMAX", "ON") if on.get(key) is not False
-            ]
-            given = [each for each in limits if each is not None]
-            known = all(isinstance(each, bool) for each in on.values())
-            memory.write(f"%{call.function}", min(given) if given and known else syntax.Unclear("off"))
-            return known
         case "PDISPOFF":
             memory.write("%PDISP", data_types.pose_record(np.eye(4)))
             return True
@@ -527,22 +457,6 @@ def _set(memory: ProgramMemory, call: syntax.Invocation) -> bool:
             return pose is not None
         case _:
             return _displace(memory, call, values, options)
-
-
-def _set_active(memory: ProgramMemory, call: syntax.Invocation) -> None:
-    """1 SetSysData: the tool, object or load that is active, for which CRobT and CPos then say where the arm is."""
-    given = call.arguments[0] if len(call.arguments) == 1 and not call.keywords else None
-    value = UNCLEAR if given is None else memory.value(given)
-    kind, here = value.kind if isinstance(value, syntax.Record) else "", memory.here
-    if kind == "LOADDATA":
-        return
-    tool, base = here.tool, here.base
-    if kind == "TOOLDATA":
-        tool = _tool(memory, given, value)[0]
-    elif kind == "WOBJDATA":
-        base = _displaced(memory, _base(memory, given, value)[0])
-    pose = here.seen(tool, base, memory.cell.flange) if kind else None
-    memory.here = Position(here.joints, pose, tool, base) if pose is not None else Position()
 
 
 def _displace(
@@ -587,8 +501,7 @@ def arithmetic(sign: str, left: syntax.Value, right: syntax.Value) -> syntax.Val
         if sign != "*" and a and b and max(abs(a), abs(b)) >= data_types.NO_AXIS / 10:  # an axis where it is
             return unclear
         found = a + b if sign == "+" else a - b if sign == "-" else a * b
-        whole = isinstance(left, int) and isinstance(right, int) and abs(found) <= MOST_WHOLE
-        return int(found) if whole else computed_in_single(sign, left, right, found)
+        return int(found) if isinstance(left, int) and isinstance(right, int) else found
     xyz, other = data_types.plain(left, 3), data_types.plain(right, 3)
     if xyz is not None and other is not None:
         p, q = np.array(xyz), np.array(other)
@@ -601,80 +514,33 @@ def arithmetic(sign: str, left: syntax.Value, right: syntax.Value) -> syntax.Val
     return data_types.orient_record(turn @ then) if sign == "*" and turn is not None and then is not None else unclear
 
 
-def _number_of(name: str, values: tuple[syntax.Value, ...]) -> syntax.Value | None:
-    plain_values = syntax.numbers(values)
-    if plain_values is None:
-        return None
-    try:
-        found = function_in_single(IN_DEGREES[name], values)
-    except (ValueError, OverflowError, ZeroDivisionError):
-        return None
-    whole = name in ("ABS", "NUMTODNUM", "DNUMTONUM") and all(isinstance(each, int) for each in values)
-    return int(found) if whole else found
-
-
 def _here(memory: ProgramMemory) -> Position:
     """Where the arm is; unknown after a motion that the program does not wait for (7-zonedata-1)."""
     return memory.here if memory.read(reader.PASSING) in (None, False) else Position()
 
 
 def _of_position(
-    memory: ProgramMemory,
-    name: str,
-    values: tuple[syntax.Value, ...],
-    named: Mapping[str, syntax.Value],
-    given: syntax.Invocation,
+    memory: ProgramMemory, name: str, named: Mapping[str, syntax.Value], words: Mapping[str, syntax.Expression]
 ) -> syntax.Value | None:
-    """Where the arm is, and what its table gives.
+    """Where the arm is.
 
     2 CRobT, 2 CPos: in the work object, for the tool; where none is given, those of the last motion.
     """
-    words = dict(given.keywords)
     here = _here(memory)
     if name == "CJOINTT":
         if here.joints is None:
             return None
         degrees: list[syntax.Value] = [*map(float, np.degrees(here.joints)), *[0.0] * (6 - len(here.joints))]
         return data_types.typed((tuple(degrees), (data_types.NO_AXIS,) * 6), data_types.JOINTTARGET)
-    if name in ("CTOOL", "CWOBJ"):
-        return None
     tool = _tool(memory, words.get("TOOL"), named["TOOL"])[0] if "TOOL" in named else here.tool
     base = _base(memory, words.get("WOBJ"), named.get("WOBJ"))[0] if "WOBJ" in named else here.base
-    if name in ("CROBT", "CPOS"):
-        seen = here.seen(tool, _displaced(memory, base) if "WOBJ" in named else base, memory.cell.flange)
-        if seen is None:
-            return None
-        conf: syntax.Value = (0, 0, 0, 0)
-        if here.joints is not None and len(here.joints) == 6:
-            conf = (*data_types.quarters_of(here.joints), -1)
-        elif isinstance(here.pose, np.ndarray):
-            conf = (AS_IT_STANDS,) * 4
-        return data_types.pos_record(seen[:3, 3]) if name == "CPOS" else _robtarget(seen, conf)
-    data = data_types.typed(values[0], data_types.JOINTTARGET if name == "CALCROBT" else data_types.ROBTARGET)
-    given_tool, _ = _tool(memory, given.arguments[1], values[1])
-    base, _ = _base(memory, words.get("WOBJ"), named.get("WOBJ"))
-    if name == "CALCJOINTT":
-        wobj = named.get("WOBJ") or data_types.predefined("WOBJ0")
-        pose, moved_by = data_types.pose_matrix(data), memory.read("%PDISP")
-        shift = np.eye(4) if moved_by is None else data_types.pose_matrix(moved_by)
-        if not isinstance(data, syntax.Record) or pose is None or shift is None or wobj is None:
-            return None
-        data = data_types.moved_target(data, shift @ pose)
-        return syntax.Record(JOINTS_OF, (("TARGET", data), ("TOOL", values[1]), ("WOBJ", wobj)))
-    base = _displaced(memory, base)
-    degrees_given = data_types.plain(data_types.part(data, "ROBAX"), 6)
-    flange = memory.cell.flange
-    if (
-        degrees_given is None
-        or flange is None
-        or given_tool.pose is None
-        or base.pose is None
-        or memory.cell.joints != 6
-    ):
-        return None
-    joints = np.radians(degrees_given)
-    pose = np.linalg.inv(base.pose) @ flange(joints) @ given_tool.pose
-    return _robtarget(pose, (*data_types.quarters_of(joints), -1))
+    seen = here.seen(tool, _displaced(memory, base) if "WOBJ" in named else base, memory.cell.flange)
+    if seen is None or name == "CPOS":
+        return None if seen is None else data_types.pos_record(seen[:3, 3])
+    conf: syntax.Value = (AS_IT_STANDS,) * 4
+    if here.joints is not None and len(here.joints) == 6:
+        conf = (*data_types.quarters_of(here.joints), -1)
+    return _robtarget(seen, conf)
 
 
 def _robtarget(T: Reals, conf: syntax.Value) -> syntax.Record:
@@ -713,48 +579,19 @@ def _of_data(name: str, values: tuple[syntax.Value, ...], named: Mapping[str, sy
             return None if turn is None else data_types.orient_record(turn)
         case "DEFFRAME":
             return _frame_of_points(values, named)
-        case "DISTANCE" | "DOTPROD":
+        case "DISTANCE":
             a3, b3 = data_types.plain(values[0], 3), data_types.plain(values[1], 3)
             if a3 is None or b3 is None:
                 return None
-            return float(np.linalg.norm(np.subtract(a3, b3)) if name == "DISTANCE" else np.dot(a3, b3))
-        case "VECTMAGN":
-            xyz = data_types.plain(values[0], 3)
-            return None if xyz is None else float(np.linalg.norm(xyz))
+            return float(np.linalg.norm(np.subtract(a3, b3)))
         case "TRUNC" | "ROUND" if plain_values is not None:
             digits = 0.0 if named.get("DEC", reader.ABSENT) == reader.ABSENT else syntax.number(named["DEC"])
-            return None if digits is None else _rounded(name, values[0], digits)
+            return None if digits is None else _rounded(name, plain_values[0], digits)
         case "DIM":
             return _dimension(values)
         case "PRESENT":
             return None if isinstance(values[0], syntax.Unclear) else values[0] != reader.ABSENT
-        case "STRLEN" if isinstance(values[0], str):
-            return len(values[0])
-        case "STRPART" if isinstance(values[0], str):
-            start, length = syntax.number(values[1]), syntax.number(values[2])
-            if start is None or length is None or not 1 <= start <= start + length <= len(values[0]) + 1:
-                return None
-            return values[0][int(start) - 1 : int(start) - 1 + int(length)]
-        case "NUMTOSTR" if plain_values is not None:
-            return f"{plain_values[0]:.{int(plain_values[1])}f}" if 0 <= plain_values[1] <= 15 else None
-        case "VALTOSTR" if isinstance(values[0], (int, float)) and not isinstance(values[0], bool):
-            return f"{values[0]:g}"
-    return _of_bytes(name, plain_values) if name.startswith("BIT") and plain_values is not None else None
-
-
-def _of_bytes(name: str, values: tuple[float, ...]) -> syntax.Value | None:
-    """2 BitAnd and its like: of whole numbers from 0 to 255; bits count from 1, and those shifted out are lost."""
-    whole = [int(each) for each in values]
-    if any(each % 1 or not 0 <= each <= 255 for each in values):
-        return None
-    first, second = whole[0], whole[-1]
-    if name in ("BITAND", "BITOR", "BITXOR"):
-        return {"BITAND": first & second, "BITOR": first | second, "BITXOR": first ^ second}[name]
-    if name == "BITNEG":
-        return 255 - first
-    if name == "BITCHECK":
-        return bool(first >> (second - 1) & 1) if 1 <= second <= 8 else None
-    return (first << second & 255 if name == "BITLSH" else first >> second) if second <= 8 else None
+    return None
 
 
 def _shifted(name: str, values: tuple[syntax.Value, ...], named: Mapping[str, syntax.Value]) -> syntax.Value | None:
@@ -796,15 +633,11 @@ def _frame_of_points(values: tuple[syntax.Value, ...], named: Mapping[str, synta
     return data_types.pose_record(T)
 
 
-def _rounded(name: str, given: syntax.Value, digits: float) -> syntax.Value:
-    scale, value = 10.0 ** int(digits), syntax.number(given) or 0.0
-    beside = abs(value) * scale + (0.5 if name == "ROUND" else 0.0)
-    is_open = abs(beside - round(beside)) <= missed_by(given) * scale > 0
-    if is_open and not digits:
-        return syntax.Unclear(f"{name.lower()}({value:.9g}), which rounding decides on the controller")
+def _rounded(name: str, value: float, digits: float) -> syntax.Value:
+    scale = 10.0 ** int(digits)
     found = math.trunc(value * scale) if name == "TRUNC" else math.floor(abs(value) * scale + 0.5)
     signed = found if name == "TRUNC" else math.copysign(found, value)
-    return int(signed) if not digits else Rounded(signed / scale, is_open / scale)
+    return int(signed) if not digits else signed / scale
 
 
 def _dimension(values: tuple[syntax.Value, ...]) -> syntax.Value | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Container, Mapping
 
 from er3a.programs import syntax
-from er3a.programs.code_builder import variable_of
+from er3a.programs.evaluation import variable_of
 
 LATE = "%LATE"
 """A call by a text that names no procedure of the program."""
@@ -52,12 +52,8 @@ FOLLOWED: Mapping[str, tuple[set[str], ...]] = {
 }
 """Options with which some of these are followed. CirPathMode: an arc turns the tool with the path, as where nothing is
 said, or about one axis."""
-INTERRUPTING = frozenset(("IWATCH", "ITIMER", "IPERS", "IERROR", "IRMQMESSAGE", "TRIGGINT"))
-"""Instructions that, like ISignalDI, order an interrupt, whose number comes last: it runs the trap of its CONNECT."""
-TRIGGERS = frozenset(("TRIGGIO", "TRIGGEQUIP", "TRIGGINT", "TRIGGSPEED", "TRIGGCHECKIO", "TRIGGRAMPAO"))
-"""Instructions that say what happens on the way of a TriggL and its like."""
 SETTINGS = {
-    **{name: f"%{name}" for name in ("CONFJ", "CONFL", "PATHACCLIM", "WORLDACCLIM")},
+    **{name: f"%{name}" for name in ("CONFJ", "CONFL")},
     **{"ACCSET": "%ACC", "VELSET": "%SPEED", "CIRPATHMODE": "%ARCS"},
     **dict.fromkeys(("PDISPSET", "PDISPON", "PDISPOFF"), "%PDISP"),
 }
@@ -77,7 +73,9 @@ OUTPUTS = frozenset(
     )
 )
 HARMLESS_TEXT = """
-ACTEVENTBUFFER ALIASIO BITCLEAR BITSET BOOKERRNO CANCELLOAD CLEARIOBUFF CLEARRAWBYTES CLKRESET CLKSTART CLKSTOP CLOSE
+PATHACCLIM WORLDACCLIM
+ACTEVENTBUFFER ALIASIO BITCLEAR BITSET BOOKERRNO CANCELLOAD CLEARIOBUFF CLEARRAWBYTES CLKRESET CLKSTART
+CLKSTOP CLOSE
 CORNERPATHWARNING EGMGETID EGMRESET
 CLOSEDIR COPYFILE COPYRAWBYTES DEACTEVENTBUFFER ERRLOG ERRRAISE ERRWRITE EXITCYCLE FRICIDINIT GETDATAVAL GETSYSDATA
 GETTRAPDATA IDELETE IDISABLE IENABLE IERROR INVERTDO IODISABLE IOENABLE IPERS IRMQMESSAGE ISIGNALAI
@@ -93,16 +91,18 @@ WRITE WRITEANYBIN WRITEBIN WRITEBLOCK WRITECFGDATA WRITERAWBYTES WRITESTRBIN STO
 """
 HARMLESS = frozenset(HARMLESS_TEXT.split())
 """Instructions that move nothing and set nothing that motions depend on (1, by their names)."""
-ASIDE_NAMED = NOT_SIMULATED - {"CORRWRITE", "SYNCTOSENSOR"} | {"EOFFSOFF"}
-"""Instructions that are named as not simulated: the arm itself goes where its targets say."""
+SHIFTING = frozenset(
+    (
+        *("CORRCON", "CORRWRITE", "SYNCTOSENSOR", "INDAMOVE", "INDCMOVE", "INDDMOVE", "INDRMOVE", "SOFTACT"),
+        *("SINGAREA", "SYNCMOVEON", "WAITWOBJ"),
+    )
+)
+"""Instructions of these after which the arm may go otherwise than its targets say."""
 PARAMETERS: Mapping[str, int] = {
     **{"OFFS": 4, "RELTOOL": 4, "POSEMULT": 2, "POSEINV": 1, "POSEVECT": 2, "ORIENTZYX": 3, "EULERZYX": 1},
-    **{"NORIENT": 1, "DEFFRAME": 3, "DISTANCE": 2, "DOTPROD": 2, "VECTMAGN": 1, "CROBT": 0, "CJOINTT": 0, "CPOS": 0},
-    **{"CTOOL": 0, "CWOBJ": 0, "CALCROBT": 2, "CALCJOINTT": 2, "ABS": 1, "SQRT": 1, "SIN": 1, "COS": 1, "TAN": 1},
-    **{"ASIN": 1, "ACOS": 1, "ATAN": 1, "ATAN2": 2, "POW": 2, "EXP": 1, "TRUNC": 1, "ROUND": 1, "DIM": 2},
-    **{"STRLEN": 1, "STRPART": 3, "STRMAP": 3, "NUMTOSTR": 2, "VALTOSTR": 1, "PRESENT": 1, "BITAND": 2, "BITOR": 2},
-    **{"BITXOR": 2, "BITNEG": 1, "BITLSH": 2, "BITRSH": 2, "BITCHECK": 2},
-    **{"MIRPOS": 2, "NUMTODNUM": 1, "DNUMTONUM": 1},
+    **{"NORIENT": 1, "DEFFRAME": 3, "DISTANCE": 2, "CROBT": 0, "CJOINTT": 0, "CPOS": 0},
+    **{"ABS": 1, "SQRT": 1, "SIN": 1, "COS": 1, "TAN": 1, "ASIN": 1, "ACOS": 1, "ATAN": 1, "ATAN2": 2, "POW": 2},
+    **{"EXP": 1, "TRUNC": 1, "ROUND": 1, "DIM": 2, "PRESENT": 1, "NUMTODNUM": 1, "DNUMTONUM": 1},
 }
 """Functions that are evaluated, with the number of their arguments."""
 ASKED_TEXT = """
@@ -116,46 +116,33 @@ GETAXISDISTANCE GETMAXNUMBEROFCYCLICBOOL GETNEXTSYM GETSYSINFO GETMODALPAYLOADMO
 """
 ASKED = frozenset(ASKED_TEXT.split())
 """Functions whose value only the running cell knows."""
-NOT_EVALUATED = frozenset(
-    (
-        *(
-            "STRDIGCALC",
-            "STRDIGCMP",
-            "STRFIND",
-            "STRFORMAT",
-            "STRMATCH",
-            "STRMEMB",
-            "STRORDER",
-            "STRTOBYTE",
-            "STRTOVAL",
-        ),
-        *("BYTETOSTR", "DECTOHEX", "HEXTODEC"),
-    )
-)
+OTHER_TEXT = """
+BITAND BITCHECK BITLSH BITNEG BITOR BITRSH BITXOR BYTETOSTR CALCJOINTT CALCROBT CTOOL CWOBJ DECTOHEX DOTPROD HEXTODEC
+MIRPOS NUMTOSTR STRDIGCALC STRDIGCMP STRFIND STRFORMAT STRLEN STRMAP STRMATCH STRMEMB STRORDER STRPART STRTOBYTE
+STRTOVAL VALTOSTR VECTMAGN
+"""
+NOT_EVALUATED = frozenset(OTHER_TEXT.split())
 """Functions whose value follows from their arguments alone, and that are not evaluated."""
 
 
 def is_known(name: str) -> bool:
     """Whether it is known of an instruction or function, which the program does not hold, what it does."""
-    if name[:1] == "%" or name in SETTINGS or name in OUTPUTS or name in ("GRIPLOAD", "SETSYSDATA"):
+    if (name[:1] == "%" and name != LATE) or name in SETTINGS or name in OUTPUTS or name in ("GRIPLOAD", "SETSYSDATA"):
         return True
     evaluated = name in PARAMETERS or name in NOT_EVALUATED
-    return evaluated or name in HARMLESS or name in ASKED or name in ASIDE_NAMED or name in WAITS
+    return (
+        evaluated or name in HARMLESS or name in ASKED or name in NOT_SIMULATED or name in WAITS or name == "EOFFSOFF"
+    )
 
 
-def changed_arguments(call: syntax.Invocation) -> list[syntax.Expression | None]:
-    """What a function of the controller changes of its arguments."""
-    at = CHANGING_FUNCTIONS.get(call.function)
-    by_name: list[syntax.Expression | None] = [each for key, each in call.keywords if key in CHANGING_OPTIONS]
-    return by_name if at is None else [*call.arguments[at : at + 1], *by_name]
+def changed_arguments(call: syntax.Invocation, fixed: Container[str]) -> list[syntax.Expression]:
+    """What a function that the program does not hold changes of its arguments, or may change if it is not known.
 
-
-def perhaps_changed(call: syntax.Invocation, fixed: Container[str]) -> list[syntax.Expression]:
-    """What a routine that is not in the program may change of its arguments, which it may have by reference.
-
-    ``fixed``: names of constants, and of data that hardly any routine changes, such as tools.
+    ``fixed``: names of constants.
     """
-    if is_known(call.function) and call.function != LATE:
-        return []
-    given = (each for each in (*call.arguments, *(each for _, each in call.keywords)) if each is not None)
+    known = is_known(call.function)
+    at = CHANGING_FUNCTIONS.get(call.function) if known else None
+    by_name = [each for key, each in call.keywords if not known or key in CHANGING_OPTIONS]
+    placed = call.arguments if not known else () if at is None else call.arguments[at : at + 1]
+    given = [each for each in (*placed, *by_name) if each is not None]
     return [each for each in given if (name := variable_of(each)) and name not in fixed]

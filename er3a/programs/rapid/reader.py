@@ -9,28 +9,19 @@ from __future__ import annotations
 
 import bisect
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from er3a.errors import InputError
 from er3a.programs import syntax
-from er3a.programs.code_builder import (
-    CodeBuilder,
-    fault,
-    linked,
-    mapped,
-    not_understood,
-    own_names,
-    variable_of,
-    variables,
-    within,
-)
+from er3a.programs.code_builder import CodeBuilder, fault, linked, mapped, variables, within
+from er3a.programs.evaluation import variable_of
 from er3a.programs.instructions import Place
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, read_program_text
-from er3a.programs.program_findings import BegunWithin, NameTwice, NotSimulated, NotUnderstood, ProgramFinding
+from er3a.programs.program_findings import NameTwice, NotUnderstood, ProgramFinding
 from er3a.programs.rapid import known_names
-from er3a.programs.rapid.data_types import SHAPES, Shape, predefined, starting
+from er3a.programs.rapid.data_types import SHAPES, Shape, starting
 
 PATTERN = re.compile(
     rf"""(?P<comment>![^\n]*)|(?P<text>"(?:[^"\n]|"")*")|(?P<number>0[xX][\da-fA-F]+|0[oO][0-7]+|0[bB][01]+|{NUMBER})|(?P<name>[^\W\d]\w*)"""
@@ -59,10 +50,6 @@ ENDS = frozenset(
 """Words that no instruction goes on beyond."""
 DECLARED = ("VAR", "PERS", "CONST")
 HANDLERS = ("ERROR", "UNDO", "BACKWARD")
-GOING_ON = frozenset(("TRYNEXT", "RETURN", "EXITCYCLE"))
-"""Words by which an error handler lets the program go on; so may its end, of which no text was found."""
-AGAIN = frozenset(("RETRY", "STARTMOVERETRY"))
-"""Words by which it has carried out again what failed."""
 MOTIONS = frozenset(
     (
         *("MOVEJ", "MOVEL", "MOVEC", "MOVEABSJ", "MOVEJDO", "MOVELDO", "MOVECDO", "MOVEJAO", "MOVELAO", "MOVECAO"),
@@ -77,13 +64,7 @@ TRIGGDATA1 TRIGGDATA2 TRIGGDATA3 V WOBJ Z
 """
 MOTION_OPTIONS = frozenset(OPTIONS_TEXT.split())
 """Optional arguments of motions that are followed, or leave them as they are; ``\\Corr`` shifts the path."""
-CALLING = ("MOVEJSYNC", "MOVELSYNC", "MOVECSYNC")
-"""Motions that call a procedure, named by a text, where they end."""
-UPPER, ARITHMETIC, TYPED, STEP, LATE = "%UPPER", "%ARITHMETIC", "%TYPED", "%STEP", known_names.LATE
-RAISING = ("SOCKET", "OPEN", "READ", "WRITE", "LOAD", "UNLOAD", "STARTLOAD", "RMQ", "COPYFILE", "REMOVE", "MAKEDIR")
-"""How instructions begin that often end with an error; any other may too, if less often."""
-FAILED = "%FAILED"
-"""Whether an instruction ends with an error, which only the cell knows."""
+ARITHMETIC, TYPED, STEP, LATE = "%ARITHMETIC", "%TYPED", "%STEP", known_names.LATE
 PASSING = "%PASSING"
 """Whether the arm may not be at the last target yet, as after a motion with a zone: the program goes on before."""
 ARRIVING = frozenset(("INPOS", "ZEROSPEED"))
@@ -91,9 +72,6 @@ ARRIVING = frozenset(("INPOS", "ZEROSPEED"))
 LEAVING = ("STOPMOVE", "STARTMOVE", "STARTMOVERETRY", "RESTOPATH", "CLEARPATH")
 """Instructions that stop a motion on its way, or begin one again that the program does not wait for."""
 ABSENT = "%absent"
-REGISTERS = ("REG1", "REG2", "REG3", "REG4", "REG5")
-"""Numbers that a controller's own module declares."""
-MAX_LATE = 200
 MAX_ELEMENTS = 1000
 
 
@@ -245,18 +223,16 @@ def read_rapid(source: ProgramText) -> syntax.Program:
         for texts and blocks without an end, and for a constant that is assigned to
     """
     cursors = [Cursor(text) for text in (*map(read_program_text, modules_of(source.path)), source)]
-    procedures = {name: count for cursor in cursors for name, count in _procedures(cursor.tokens).items()}
     types: dict[str, Shape] = dict(SHAPES)
-    encoded = [each.name for each in _beside(source.path) if _is_encoded(each)]  # which may hold what is used here
-    findings: list[ProgramFinding] = [NotUnderstood(name, Place(source.path)) for name in encoded]
+    findings: list[ProgramFinding] = []
     hidden = {name: f"/{name}" for name in _private(cursors[-1].tokens)}  # what other modules mean by these
     readers = []
     for cursor in cursors:
         module, own_module = cursor.source.path.stem.upper(), cursor.source is source
         private = {} if own_module else hidden | {name: f"{module}/{name}" for name in _private(cursor.tokens)}
-        readers.append(_ModuleReader(cursor, Scope(types, private), procedures))
+        readers.append(_ModuleReader(cursor, Scope(types, private)))
     _read_in_turn(readers)
-    findings += [each for reader in readers for each in (*reader.cursor.source.findings, *reader.findings)]
+    findings += [each for reader in readers for each in reader.findings]
     own = [each for each in readers[-1].routines if each.name not in readers[-1].traps]
     data = [each for reader in readers for each in reader.data]
     names = [each.target.name for each in data if isinstance(each.target, syntax.Variable)]
@@ -266,78 +242,22 @@ def read_rapid(source: ProgramText) -> syntax.Program:
         )
         findings.append(NameTwice(name, last.place))
     routines = [each for reader in readers for each in reader.routines]
-    _refuse_set_constants(routines, data)
-    fixed = _fixed(routines, data)
-    by_name, unlinked = linked(
-        routines,
-        known_names.changed_arguments,
-        lambda call: known_names.perhaps_changed(call, fixed),
-        known_names.NOT_EVALUATED,
-    )
-    connected = {name for reader in readers for name in reader.connected}
-    findings += [each for reader in readers for name, each in reader.ordered if name not in connected]
-    findings += _base_frames(source.path)
-    findings += _event_routines(source.path, {each.text for cursor in cursors for each in cursor.tokens})
-    entry = _entry(own, by_name)
-    if entry == "MAIN" and not encoded:  # all of a program
-        findings += _undeclared(routines, {*names, *REGISTERS})
-    main = None if entry == "MAIN" or entry not in by_name else _main_of(source.path)
-    if main is not None:
-        findings.append(BegunWithin(entry.lower(), main.name, by_name[entry].place))
+    fixed = _constants(each for each in (*data, *_operations(routines)) if isinstance(each, syntax.Assign))
+    by_name, unlinked = linked(routines, lambda call: known_names.changed_arguments(call, fixed))
     return syntax.Program(
         "rapid",
         source.path.stem,
         source.path,
         by_name,
-        entry,
+        _entry(own, by_name),
         _in_order(data),
         (*findings, *unlinked),
         source.lines,
-        beside=frozenset(
-            reader.scope.meant(name)
-            for reader in readers
-            for name in _set_by_tasks(source.path) & _shared(reader.cursor.source.text)
-        ),
-        cyclic=entry == "MAIN",
     )
 
 
-def _undeclared(routines: Iterable[syntax.Routine], declared: set[str]) -> Iterable[NotUnderstood]:
-    """Assignments to what nothing declares: mistyped names, unless motions and values are made of others, of a module
-    that was not found, which may declare these too."""
-    found: dict[str, NotUnderstood] = {}
-    given: set[str] = set()
-    for routine in routines:
-        known = declared | own_names(routine)
-        for each in routine.code:
-            if isinstance(each, syntax.Move | syntax.Assign):
-                given |= {name for of in syntax.expressions_of(each) for name in variables(of)} - known
-            if isinstance(each, syntax.Assign) and not _is_unclear(each.value):
-                name = variable_of(each.target)
-                if name not in known and "%" not in name:
-                    found.setdefault(name, NotUnderstood(each.text, each.place))
-    others = (name for name in given - found.keys() if "%" not in name)
-    is_missing = any(predefined(name.removeprefix("/")) is None for name in others)
-    return () if is_missing else found.values()
-
-
-def _refuse_set_constants(routines: Iterable[syntax.Routine], data: Iterable[syntax.Assign]) -> None:
-    """Refuse a program that assigns something to a constant, as a controller refuses to load it.
-
-    Raises
-    ------
-    InputError
-        with the line and the constant's name
-    """
-    shared = _constants(data)
-    for routine in routines:
-        code = [each for each in (*routine.code, *routine.handler) if isinstance(each, syntax.Assign)]
-        fixed = _constants(each for each in code if each.local) | (shared - own_names(routine))
-        for each in code:
-            name = variable_of(each.target)
-            if name in fixed and each.text and not each.type_name and not _is_unclear(each.value):
-                problem = f"{name.rpartition('/')[2]} is a constant (CONST), which no instruction can change"
-                raise fault(each.place, problem, "Declare it with VAR or PERS, or remove this line")
+def _operations(routines: Iterable[syntax.Routine]) -> Iterable[syntax.Operation]:
+    return (each for routine in routines for each in routine.code)
 
 
 def _constants(declarations: Iterable[syntax.Assign]) -> set[str]:
@@ -348,10 +268,6 @@ def _constants(declarations: Iterable[syntax.Assign]) -> set[str]:
     return {name for name, is_constant in declared if is_constant} - {
         name for name, is_constant in declared if not is_constant
     }
-
-
-def _is_unclear(value: syntax.Expression | None) -> bool:
-    return isinstance(value, syntax.Constant) and isinstance(value.value, syntax.Unclear)
 
 
 def _read_in_turn(readers: Iterable[_ModuleReader]) -> None:
@@ -391,22 +307,6 @@ def _may_be_position(expression: syntax.Expression) -> bool:
     return isinstance(expression, (syntax.Variable, syntax.Member, syntax.Element))
 
 
-OF_MOTIONS = frozenset(("TOOLDATA", "WOBJDATA", "LOADDATA", "SPEEDDATA", "ZONEDATA"))
-
-
-def _fixed(routines: Sequence[syntax.Routine], data: Sequence[syntax.Assign]) -> set[str]:
-    """Names of constants, and of data of motions, which hardly any routine changes that is given them; none that is
-    something else in another routine."""
-    operations = [*data, *(each for routine in routines for each in routine.code)]
-    declared = [each for each in operations if isinstance(each, syntax.Assign) and each.type_name]
-    fixed = [each.text.upper().startswith("CONST") or each.type_name in OF_MOTIONS for each in declared]
-    names = [variable_of(each.target) for each in declared]
-    return {name for name, is_fixed in zip(names, fixed) if is_fixed} - {
-        *(name for name, is_fixed in zip(names, fixed) if not is_fixed),
-        *(each.name for routine in routines for each in routine.parameters),
-    }
-
-
 def _entry(own: list[syntax.Routine], routines: Mapping[str, syntax.Routine]) -> str:
     if "MAIN" in routines:
         return "MAIN"
@@ -431,21 +331,6 @@ def _tokens(source: ProgramText) -> list[Token]:
         if raw == '"':
             raise fault(Place(source.path, line), "a text has no end", 'Close it with "')
         found.append(Token(kind, raw.upper() if kind == "name" else raw, raw, match.start(), match.end(), line))
-    return found
-
-
-def _procedures(tokens: list[Token]) -> dict[str, int]:
-    """Procedures with the number of their arguments that must be given."""
-    found: dict[str, int] = {}
-    for i, token in enumerate(tokens[:-2]):
-        if token.kind == "name" and token.text == "PROC":
-            count, at = 0, i + 3
-            if at < len(tokens) and tokens[at].text != ")":
-                count = 1 if tokens[at].text != "\\" else 0
-                while at < len(tokens) and tokens[at].text != ")":
-                    count += tokens[at].text == "," and tokens[min(at + 1, len(tokens) - 1)].text not in "\\*"
-                    at += 1
-            found[tokens[i + 1].text] = count
     return found
 
 
@@ -531,15 +416,12 @@ class Cursor:
 class _ModuleReader:
     """Declarations and routines of one module."""
 
-    def __init__(self, cursor: Cursor, scope: Scope, procedures: Mapping[str, int]):
-        self.cursor, self.scope, self.procedures = cursor, scope, procedures
+    def __init__(self, cursor: Cursor, scope: Scope):
+        self.cursor, self.scope = cursor, scope
         self.routines: list[syntax.Routine] = []
         self.traps: set[str] = set()
         self.data: list[syntax.Assign] = []
         self.findings: list[ProgramFinding] = []
-        self.connected: set[str] = set()  # interrupts that a trap belongs to, and triggers that are set up
-        self.ordered: list[tuple[str, NotSimulated]] = []  # those that are asked for, with the line
-        self.goes_on = any(each.text == "TRYNEXT" for each in cursor.tokens)
         self.types_at: list[int] = []
         self.data_at: list[int] = []
         self.routines_at: list[int] = []
@@ -733,14 +615,9 @@ class _BodyReader:
 
     def __init__(self, module: _ModuleReader, builder: CodeBuilder, scope: Scope):
         self.module, self.cursor, self.builder, self.scope = module, module.cursor, builder, scope
-        self.end = ""
-        self.leaves = False  # whether an error may end the routine here
 
     def read(self, end: str) -> None:
-        """Instructions up to the word that ends the routine, which is not passed, with its handlers."""
-        self.end = end
-        self.leaves = end == "ENDPROC" and self._error_leaves()
-        handler = self._handler_moves(end)
+        """Instructions up to the word that ends the routine, which is not passed, with its handlers behind its end."""
         while (token := self.cursor.next(comments=True)) is not None:
             if token.kind == "comment":
                 self._remark(token)
@@ -748,33 +625,13 @@ class _BodyReader:
                 self.module.declaration(self.builder, self.scope, local=True)
             else:
                 break
-        known = sorted(self.scope.own)
-        name = f"{self.builder.name}/ERROR"
-        if handler:  # what it does may come about at any time
-            call = syntax.Invocation(name, tuple(map(syntax.Variable, known)))
-            self.builder.beside(self.builder.place, call, f"{handler} ({self.builder.name})", "interrupt")
         self.instructions(end)
-        if self.cursor.word() not in HANDLERS:
-            return
-        place = self.cursor.place()
-        builder = CodeBuilder(name, tuple(map(syntax.RoutineParameter, known)), place)
-        inside = _BodyReader(self.module, builder, self.scope)
-        while (word := self.cursor.word()) in HANDLERS:
-            at, first, begin = self.cursor.place(), len(builder.code), self.cursor.at
+        while self.cursor.word() in HANDLERS:
+            self.builder.add(syntax.Return(self.builder.place))
             self.cursor.at += 1
             if (token := self.cursor.next()) is not None and token.text == "(":
                 self.cursor.head(")")
-            inside.instructions(end)
-            if word == "ERROR":
-                said = {each.text for each in self.cursor.tokens[begin : self.cursor.at] if each.kind == "name"}
-                goes_on = not GOING_ON.isdisjoint(said) or builder.comes_to_end(first)
-                self.builder.on_error = syntax.OnError(at, goes_on, not AGAIN.isdisjoint(said), "RAISE" in said)
-            builder.add(syntax.Return(place))
-        self.builder.handler += builder.code
-        if handler:
-            self.module.routines.append(builder.routine(self.cursor.place()))
-        else:
-            self.module.findings += not_understood(builder.code)
+            self.instructions(end)
 
     def instructions(self, *ends: str) -> None:
         """Instructions up to one of these words, or a handler's, which is not passed."""
@@ -811,14 +668,9 @@ class _BodyReader:
         except MisreadError:
             self.builder.unknown(place, text)
             if ":=" in words.texts and words.kinds[0] == "name" and words.texts[1] in (":=", ".", "{"):
-                self._unclear(place, words.texts[0], text)
+                self._unclear(place, self.scope.settled(syntax.Variable(words.texts[0])), text)
         except RecursionError:
             raise InputError(place.file, place.where, "nested too deeply", "Split this line") from None
-
-    def _unclear(self, place: Place, name: str, text: str) -> None:
-        """A variable of which nothing is known from here."""
-        value = syntax.Constant(syntax.Unclear(name))
-        self.builder.add(syntax.Assign(place, self.scope.settled(syntax.Variable(name)), value, text))
 
     def condition(self, tokens: list[Token]) -> syntax.Expression:
         """A condition; one that is not understood is kept."""
@@ -843,33 +695,6 @@ class _BodyReader:
             tuple((name, settled(each)) for name, each in named),
         )
 
-    def late(self, place: Place, called: syntax.Expression, given: Given, text: str) -> None:
-        """A call of the procedure that a text names when the program runs; the candidates are tried one by one."""
-        prefix, whole = _prefix(called)
-        prefix = prefix.upper()
-        if whole:
-            self.builder.add(syntax.Doing(place, syntax.Invocation(self.scope.meant(prefix), *given), text))
-            return
-        fitting = [
-            name
-            for name, count in self.module.procedures.items()
-            if name.startswith(prefix) and count == len(given[0]) and name != "MAIN"
-        ]
-        none_fits = syntax.Doing(place, syntax.Invocation(LATE, *given), text)
-        if not fitting or len(fitting) > MAX_LATE:
-            self.builder.add(none_fits)
-            return
-        for i, name in enumerate(fitting):
-            test = syntax.Binary("=", syntax.Invocation(UPPER, (called,)), syntax.Constant(name))
-            if i == 0:
-                self.builder.open_if(place, test, text)
-            else:
-                self.builder.next_arm(place, test, text)
-            self.builder.add(syntax.Doing(place, syntax.Invocation(self.scope.meant(name), *given), text))
-        self.builder.next_arm(place, None, text)
-        self.builder.add(none_fits)
-        self.builder.close("if", place)
-
     def _remark(self, token: Token) -> None:
         self.builder.remark(self._at(token), token.raw[1:].strip())
         self.cursor.at += 1
@@ -883,10 +708,12 @@ class _BodyReader:
 
     def _instruction(self, place: Place, words: RapidWords, text: str) -> None:
         builder, first = self.builder, words.next
-        if words.accept("%"):
+        if words.accept("%"):  # a call of the procedure that a text names
             called = self.value(words)
             words.expect("%")
-            self.late(place, called, self.given(words), text)
+            text_of = called.value if isinstance(called, syntax.Constant) else None
+            name = self.scope.meant(text_of.upper()) if isinstance(text_of, str) else LATE
+            builder.add(syntax.Doing(place, syntax.Invocation(name, *self.given(words)), text))
             return
         if words.kind != "name":
             raise MisreadError("an instruction begins with a name")
@@ -901,150 +728,52 @@ class _BodyReader:
         if first in PLAIN_WORDS:
             PLAIN_WORDS[first](self, place, words, text)
             return
-        given = self.given(words)
-        name = self.scope.meant(first)
-        if name in self.module.procedures:
-            builder.add(syntax.Doing(place, syntax.Invocation(name, *given), text))
-        else:
-            self._builtin(place, name, given, text)
+        self._builtin(place, self.scope.meant(first), self.given(words), text)
 
     def _builtin(self, place: Place, name: str, given: Given, text: str) -> None:
-        """An instruction of the controller."""
+        """A call of a procedure, or an instruction of the controller."""
         builder, (placed, named) = self.builder, given
         options = {key for key, _ in named}
         if name in known_names.NOT_SIMULATED and options not in known_names.FOLLOWED.get(name, ()):
-            self.module.findings.append(NotSimulated(text, place))
-        if (name.startswith("ISIGNAL") or name in known_names.INTERRUPTING) and placed:
-            self.module.ordered.append((variable_of(placed[-1] or syntax.Constant(0)), NotSimulated(text, place)))
-        if name in ("LOAD", "STARTLOAD") and not self._is_beside(placed, dict(named).get("FILE")):
-            self.module.findings.append(NotSimulated(text, place))
-        if name in known_names.TRIGGERS and placed and placed[0] is not None:
-            self.module.connected.add(variable_of(placed[0]))
+            builder.unknown(place, text, name in known_names.SHIFTING, name in known_names.SHIFTING)
+            return
         if name in MOTIONS:
-            trigger = next(iter(placed[3 if name == "TRIGGC" else 2 :]), None)
-            if name in ("TRIGGL", "TRIGGC", "TRIGGJ", "TRIGGABSJ") and trigger is not None:
-                self.module.ordered.append((variable_of(trigger), NotSimulated(text, place)))
-            if options - MOTION_OPTIONS:
-                self.module.findings.append(NotSimulated(text, place))
             builder.add(syntax.Move(place, name, placed, text, (), named))
+            called = placed[-1] if name.endswith("SYNC") and placed else None
             if name in SEARCHES:  # the arm stops where the signal comes, and the point sought is there
                 builder.unknown(place, text)
-                if len(placed) > 1 and isinstance(placed[1], (syntax.Variable, syntax.Element, syntax.Member)):
-                    builder.add(
-                        syntax.Assign(place, placed[1], syntax.Constant(syntax.Unclear(f"what {name} finds")), text)
-                    )
-            if name in CALLING and placed and placed[-1] is not None:
-                self._at_corner(place, placed, options, text)
+                self._unclear(place, placed[1] if len(placed) > 1 else None, text)
+            if isinstance(called, syntax.Constant):  # a procedure, where the motion ends
+                name = self.scope.meant(str(called.value).upper())
+                builder.add(syntax.Doing(place, syntax.Invocation(name, ()), text))
             return
         arrives = name.startswith("WAIT") and bool(options & ARRIVING)
         if name in LEAVING or arrives:
             builder.add(syntax.Assign(place, syntax.Variable(PASSING), syntax.Constant(name in LEAVING), ""))
         if name == "WAITTIME" and placed:
-            if isinstance(placed[0], syntax.Constant) and (syntax.number(placed[0].value) or 0.0) < 0.0:
-                self.module.findings.append(NotUnderstood(text, place))  # 0 is the least
-            builder.add(syntax.Waiting(place, "seconds", placed[0], text, arrives))
-            return
-        if name == "CALLBYVAR" and len(placed) == 2 and placed[0] is not None and placed[1] is not None:
-            suffix = syntax.Invocation("NUMTOSTR", (placed[1], syntax.Constant(0)))
-            self.late(place, syntax.Invocation(ARITHMETIC, (syntax.Constant("+"), placed[0], suffix)), ((), ()), text)
+            builder.add(syntax.Waiting(place, "seconds", placed[0], text))
             return
         if name in known_names.WAITS:
-            told = (
-                each for key, each in named if key not in known_names.CHANGING_OPTIONS
-            )  # the others are what it gives back
-            asked = tuple(each for each in (*placed, *told) if each is not None)
-            ends = "TIMEFLAG" in options or name == "WAITTESTANDSET"  # which waits for what is true
-            builder.add(syntax.Waiting(place, "condition", syntax.Listed("", asked), text, arrives, ends))
+            builder.add(syntax.Waiting(place, "condition", None, text))
         else:
             builder.add(syntax.Doing(place, syntax.Invocation(name, placed, named), text))
-        if "TIMEFLAG" not in options and ("MAXTIME" in options or name.startswith(RAISING)):
-            self._fails(place, text)
         changed = [each for key, each in named if key in known_names.CHANGING_OPTIONS]
         if name in known_names.CHANGING and known_names.CHANGING[name] < len(placed):
             changed.append(placed[known_names.CHANGING[name]] or syntax.Constant(0))
-        if name == "SETDATAVAL" and isinstance(placed[0] if placed else None, syntax.Constant):
-            self._unclear(place, str(getattr(placed[0], "value", "")).upper(), text)
         if name.startswith(known_names.READING) and known_names.is_known(name):
             changed += [each for each in (*placed, *(each for _, each in named)) if each is not None]
         for each in changed:
-            if isinstance(each, (syntax.Variable, syntax.Element, syntax.Member)):
-                builder.add(syntax.Assign(place, each, syntax.Constant(syntax.Unclear(f"what {name} gives")), text))
+            self._unclear(place, each, text)
 
-    def _is_beside(self, placed: tuple[syntax.Expression | None, ...], file: syntax.Expression | None) -> bool:
-        """Whether a module that the program loads lies beside it, so that it is read where it is used."""
-        given = file or (placed[0] if placed else None)
-        if not isinstance(given, syntax.Constant) or not isinstance(given.value, str):
-            return False
-        name = re.split(r"[:/\\]", given.value)[-1].upper()
-        return name in (each.name.upper() for each in _beside(self.cursor.source.path))
-
-    def _at_corner(
-        self, place: Place, placed: tuple[syntax.Expression | None, ...], options: set[str], text: str
-    ) -> None:
-        """The procedure that a motion calls: where it stops, or somewhere on the way round its corner."""
-        called, zone = placed[-1], placed[-3] if len(placed) > 2 else None
-        assert called is not None
-        prefix, whole = _prefix(called)
-        name = self.scope.meant(prefix.upper())
-        stops = "INPOS" in options or (isinstance(zone, syntax.Variable) and zone.name == "FINE")
-        if stops or not whole or name not in self.module.procedures:
-            self.late(place, called, ((), ()), text)
-        else:
-            self.builder.beside(place, syntax.Invocation(name, ()), text, "interrupt")
-
-    def _fails(self, place: Place, text: str) -> None:
-        """An error may end the routine here."""
-        if self.leaves:
-            self.builder.open_if(place, syntax.Invocation(FAILED, ()), text)
-            self.builder.add(syntax.Return(place))
-            self.builder.close("if", place)
-
-    def _handler_words(self) -> set[str]:
-        """The words of the routine's own error handler, itself among them; none if it has none."""
-        found: set[str] = set()
-        for token in self.cursor.tokens[self.cursor.at :]:
-            if token.text == self.end:
-                break
-            if token.kind == "name" and (found or token.text == "ERROR"):
-                found.add(token.text)
-        return found
-
-    def _error_leaves(self) -> bool:
-        """Whether an error ends the routine: by its handler, or by a caller's, which goes on with what is next."""
-        handler = self._handler_words()
-        if not handler or ("RAISE" in handler and "RETURN" not in handler):
-            return self.module.goes_on
-        return "RETURN" in handler or not handler & {"RETRY", "TRYNEXT", "EXIT"}
-
-    def _handler_moves(self, end: str) -> str:
-        """The first of the routine's handlers that may move the arm; empty if none may."""
-        inside = ""
-        for token in self.cursor.tokens[self.cursor.at :]:
-            if token.kind != "name":
-                continue
-            if token.text == end:
-                return ""
-            inside = token.text if token.text in HANDLERS else inside
-            if inside and (token.text in MOTIONS or token.text in self.module.procedures):
-                return inside
-        return ""
+    def _unclear(self, place: Place, target: syntax.Expression | None, text: str) -> None:
+        """A variable of which nothing is known from here."""
+        if isinstance(target, (syntax.Variable, syntax.Element, syntax.Member)):
+            self.builder.add(syntax.Assign(place, target, syntax.Opaque(text), text))
 
 
 Given = tuple[tuple[syntax.Expression | None, ...], tuple[tuple[str, syntax.Expression], ...]]
 """Arguments by place and by name."""
 Block = Callable[[_BodyReader, Place], None]
-
-
-def _prefix(expression: syntax.Expression) -> tuple[str, bool]:
-    """With what a text begins, as far as the program says, and whether that is all of it."""
-    if isinstance(expression, syntax.Constant) and isinstance(expression.value, str):
-        return expression.value, True
-    if not isinstance(expression, syntax.Invocation) or expression.function != ARITHMETIC:
-        return "", False
-    (first, whole), (second, ends) = (
-        _prefix(each) if each is not None else ("", False) for each in expression.arguments[1:]
-    )
-    return (first + second, ends) if whole else (first, False)
 
 
 def _if(body: _BodyReader, place: Place) -> None:
@@ -1124,8 +853,6 @@ def _for(body: _BodyReader, place: Place) -> None:
     body.builder.open_for(place, name, first, last, step, cursor.text(tokens))
     inside = len(code) - 1
     _inside(body, place, "for", "ENDFOR")
-    sets = (each for each in code[inside:] if isinstance(each, syntax.Assign) and variable_of(each.target) == name)
-    body.module.findings += [NotUnderstood(each.text, each.place) for each in sets if each.text]
     body.scope.own &= own
     _hide(code, before, inside, name)
 
@@ -1206,39 +933,31 @@ def _stop(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None
     """Stop, after which the arm rests at its target, and Break, which does not wait for that."""
     if words.arguments("")[0]:
         raise MisreadError("Stop has switches alone")
-    breaks = text[:5].upper() == "BREAK"
-    body.builder.add(syntax.Waiting(place, "operator", None, text, stops=not breaks))
-    body.builder.add(syntax.Assign(place, syntax.Variable(PASSING), syntax.Constant(breaks), ""))
+    body.builder.add(syntax.Waiting(place, "operator", None, text))
+    body.builder.add(syntax.Assign(place, syntax.Variable(PASSING), syntax.Constant(text[:5].upper() == "BREAK"), ""))
 
 
 def _halt(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None:
-    """EXIT and ExitCycle, after which the program begins again: from wherever the arm is, if a trap asks for it."""
+    """EXIT and ExitCycle."""
     words.finish()
-    if body.end == "ENDTRAP" and words.texts[0] == "EXITCYCLE":
-        body.builder.unknown(place, text)
-    body.builder.add(syntax.Halt(place, again=words.texts[0] == "EXITCYCLE" and body.end != "ENDTRAP"))
+    body.builder.add(syntax.Halt(place))
 
 
 def _leave(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None:
-    """RAISE, RETRY, TRYNEXT: where they lead to is known when an error comes about, so nothing follows here.
-
-    RAISE in a trap leaves the routine that it came into, wherever the arm is.
-    """
+    """RAISE, RETRY, TRYNEXT: where they lead to is known when an error comes about, so nothing follows here."""
     if words.texts[0] == "RAISE" and words.kind != "end":  # the number of an error
         words.expression()
     words.finish()
-    if body.end == "ENDTRAP" and words.texts[0] == "RAISE":
-        body.builder.unknown(place, text)
     body.builder.add(syntax.Return(place))
 
 
 def _connect(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None:
     """``CONNECT number WITH trap;``"""
-    body.module.connected.add(variable_of(body.scope.settled(words.reference())))
+    words.reference()
     words.expect("WITH")
     name = words.name()
     words.finish()
-    body.builder.beside(place, syntax.Invocation(body.scope.meant(name), ()), text, "interrupt")
+    body.builder.concurrent(place, syntax.Invocation(body.scope.meant(name), ()), text)
 
 
 def _counted(change: int | None) -> Callable[[_BodyReader, Place, RapidWords, str], None]:
@@ -1291,20 +1010,6 @@ GLOBAL = re.compile(
     r"|(?:FUNC|ALIAS)\s+\w+\s+(\w+))"
 )
 WORD = re.compile(r"[^\W\d]\w*")
-LATE_CALL = re.compile(r"(?m)(?:^|;)\s*%(?!%)(?!\s*\"\w*\"\s*%)|\bCallByVar\b", re.IGNORECASE)
-"""A call of a procedure whose name the text does not give."""
-TASK = re.compile(r"(?i)TASK\d+|T(?:ASK)?_\w+|ROB(?:OT)?_?(?:\d+|[LR]|LEFT|RIGHT)")
-"""Folder of a task in a controller's backup, or in a project: T_ROB1, T_COMM, ROB1."""
-SHARED = re.compile(r"(?i)(\b(?:LOCAL|TASK)\s+)?\bPERS\s+\w+\s+(\w+)")
-SET = re.compile(r"(?i)(?<![\w.\\])(\w+)(?:\{[^}]*\}|\.\w+)*\s*:=|\b(?:Incr|Decr|Add|Clear)\s+(\w+)")
-CHANGERS = (*(f"{name}\\w*" for name in known_names.READING), *known_names.CHANGING, *known_names.CHANGING_FUNCTIONS)
-GIVEN = re.compile(
-    rf"(?i)\b(?:{'|'.join(CHANGERS)})\b([^;]*)"
-    rf"|\\(?:{'|'.join(sorted(known_names.CHANGING_OPTIONS))})\s*:=\s*(\w+)"
-)
-"""What is given to instructions that may change it."""
-TAKING = re.compile(r"(?i)\b(?:PROC|FUNC\s+\w+)\s+(\w+)\s*\([^)]*\b(?:INOUT|VAR|PERS)\b")
-"""A routine that gets a variable by reference."""
 FOLDERS = {"PROGMOD": "SYSMOD", "SYSMOD": "PROGMOD"}
 """Folders of a task in a controller's backup."""
 MAX_MODULES = 200
@@ -1313,32 +1018,23 @@ MAX_MODULES = 200
 def modules_of(path: Path) -> tuple[Path, ...]:
     """The modules that hold what a module uses and does not define, and what these use, in the order of their names.
 
-    Where the name of a procedure is known only when the program runs, all modules are taken. They lie beside it or, in
-    a controller's backup, in the other folder of its task. A module with a routine ``main`` of its own is another
-    program; one that is not text is left out.
+    They lie beside it or, in a controller's backup, in the other folder of its task. A module with a routine ``main``
+    of its own is another program; one that is not text is left out.
     """
-    used, given, late = _names(path)
+    used, given = _names(path)
     waiting = {each: _names(each) for each in _beside(path) if not _is_encoded(each)}
     waiting = {each: names for each, names in waiting.items() if "MAIN" not in names[1]}
     found: list[Path] = []
     while len(found) < MAX_MODULES:
-        missing = used - given
-        new = [each for each, names in waiting.items() if late or names[1] & missing]
+        new = [each for each, names in waiting.items() if names[1] & (used - given)]
         if not new:
             break
         for each in new:
-            more, own, calls = waiting.pop(each)
+            more, own = waiting.pop(each)
             used |= more
             given |= own
-            late = late or calls
         found += new
     return tuple(found)
-
-
-def _main_of(path: Path) -> Path | None:
-    """The module with ``main`` of the program that a module belongs to; None if there is none beside it."""
-    texts = (each for each in _beside(path) if not _is_encoded(each) and "MAIN" in _names(each)[1])
-    return next((each for each in texts if path.resolve() in map(Path.resolve, modules_of(each))), None)
 
 
 def _beside(path: Path) -> list[Path]:
@@ -1356,136 +1052,8 @@ def _beside(path: Path) -> list[Path]:
 
 
 def companions(path: Path) -> tuple[Path, ...]:
-    """The modules on which a program depends, with those of the controller's other tasks and its configuration."""
-    configured = (_configuration(path, name) for name in ("MOC.cfg", "SYS.cfg"))
-    return (*modules_of(path), *_of_tasks(path), *filter(None, configured))
-
-
-def _of_tasks(path: Path) -> list[Path]:
-    """The modules of the other tasks in a controller's backup, or beside the folder of a task, or in the same folder:
-    one with persistent data whose own ``main`` moves nothing."""
-    return [*_tasks_beside(path), *_tasks_in_folders(path)]
-
-
-def _tasks_beside(path: Path) -> Iterable[Path]:
-    for each in _beside(path):
-        if not _is_encoded(each):
-            used, given, _ = _names(each)
-            if "MAIN" in given and used.isdisjoint(MOTIONS) and _shared(read_program_text(each).text):
-                yield each
-
-
-def _tasks_in_folders(path: Path) -> list[Path]:
-    task = next((each for each in list(path.resolve().parents)[:HIGHEST] if TASK.fullmatch(each.name)), None)
-    if task is None:
-        return []
-    others = (each for each in sorted(task.parent.iterdir()) if TASK.fullmatch(each.name) and each != task)
-    inside = (file for other in others for file in sorted(other.rglob("*")))
-    return [each for each in inside if each.suffix.lower() in SUFFIXES and each.is_file() and not _is_encoded(each)]
-
-
-HIGHEST = 4
-"""How many folders above a program may be that of the controller's backup."""
-NO_BASE_FRAME = {"pos_x": 0.0, "pos_y": 0.0, "pos_z": 0.0, "orient_u0": 1.0}
-BASE_FRAME = re.compile(r"""-base_frame_(pos_[xyz]|orient_u[0-3]|coordinated)\s+("[^"]*"|\S+)""")
-
-
-HOOK = re.compile(r"""(?i)-Routine\s+"(\w+)\"""")
-PROCEDURE = re.compile(r"(?s)\bPROC\s+(\w+)(.*?)\bENDPROC\b")
-SETTING = re.compile("PDISP|EOFFS|CONF[JL]$|VELSET|ACCSET|GRIPLOAD|SETSYSDATA|SINGAREA|CIRPATHMODE|SOFTACT|WZ")
-"""How instructions begin that set what later motions depend on."""
-
-
-def _configuration(path: Path, name: str) -> Path | None:
-    """A file of the configuration in the backup that a program belongs to."""
-    folders = (each / "SYSPAR" / name for each in list(path.resolve().parents)[:HIGHEST])
-    return next((each for each in folders if each.is_file()), None)
-
-
-def _entries(file: Path | None, section: str) -> Iterable[tuple[str, Place]]:
-    """The entries of a section of a configuration, each in one line."""
-    inside, entry, first = False, "", 0
-    for number, line in enumerate(read_program_text(file).lines if file else (), 1):
-        if re.match(r"\w+:", line) or line.startswith("#"):
-            inside = line.startswith(f"{section}:")
-        entry, first = (entry + line, first) if entry else (line, number)
-        if line.rstrip().endswith("\\"):
-            entry = entry.rstrip().removesuffix("\\") + " "
-            continue
-        if inside and entry.lstrip().startswith("-"):
-            yield " ".join(entry.split()), Place(file, first)
-        entry = ""
-
-
-def _base_frames(path: Path) -> Iterable[ProgramFinding]:
-    """That the configuration puts a robot elsewhere than at the origin of the world, in which work objects are."""
-    for entry, place in _entries(_configuration(path, "MOC.cfg"), "ROBOT"):
-        if any(map(_is_moved, BASE_FRAME.findall(entry))):
-            yield NotSimulated(" ".join(each[0] for each in BASE_FRAME.finditer(entry)), place)
-
-
-def _procedure_texts(modules: Iterable[Path]) -> dict[str, str]:
-    """What stands in the procedures of modules, by name, all in capital letters."""
-    text = "\n".join(COMMENT_OR_TEXT.sub(" ", read_program_text(each).text) for each in modules).upper()
-    return {match[1]: match[2] for match in PROCEDURE.finditer(text)}
-
-
-def _event_routines(path: Path, used: set[str]) -> Iterable[ProgramFinding]:
-    """Routines that the controller calls at events, as a start, and that may change what a program does.
-
-    Parameters
-    ----------
-    used : names in the modules of the program, in capital letters
-    """
-    hooks = [
-        (match[1].upper(), entry, place)
-        for entry, place in _entries(_configuration(path, "SYS.cfg"), "CAB_EXEC_HOOKS")
-        if (match := HOOK.search(entry)) is not None
-    ]
-    if not hooks:
-        return
-    procedures = _procedure_texts([path, *(each for each in _beside(path) if not _is_encoded(each))])
-    others = _procedure_texts(_of_tasks(path))
-    for name, entry, place in hooks:
-        inside = procedures.get(name)
-        if inside is None and name in others:
-            continue
-        words = set(WORD.findall(inside or ""))
-        changes = {each for pair in SET.findall(inside or "") for each in pair} & used
-        if inside is None or changes or words & (MOTIONS | procedures.keys()) or any(map(SETTING.match, words)):
-            yield NotSimulated(entry, place)
-
-
-def _is_moved(part: tuple[str, str]) -> bool:
-    """Whether a part of a base frame puts it elsewhere, or on something that moves."""
-    name, text = part
-    if name == "coordinated":
-        return bool(text.strip('"'))
-    try:
-        value = abs(float(text)) if name == "orient_u0" else float(text)
-    except ValueError:
-        return True
-    return abs(value - NO_BASE_FRAME.get(name, 0.0)) > 1e-9
-
-
-def _set_by_tasks(path: Path) -> set[str]:
-    """Persistent data that other tasks in a controller's backup set: data of one name are one."""
-    changed, shared = set(), set()
-    for module in _of_tasks(path):
-        text = COMMENT_OR_TEXT.sub(" ", read_program_text(module).text)
-        rest = SHARED.sub(" ", text)
-        changed |= {name.upper() for found in SET.findall(rest) for name in found}
-        changed |= {name.upper() for words in GIVEN.findall(rest) for name in WORD.findall(" ".join(words))}
-        for routine in TAKING.findall(text):
-            called = re.findall(rf"(?i)\b{routine}\b([^;]*)", rest)
-            changed |= {name.upper() for words in called for name in WORD.findall(words)}
-        shared |= _shared(text)
-    return changed & shared
-
-
-def _shared(text: str) -> set[str]:
-    """Persistent data of a module that all tasks share."""
-    return {name.upper() for own, name in SHARED.findall(text) if not own}
+    """The modules on which a program depends."""
+    return modules_of(path)
 
 
 def _is_encoded(path: Path) -> bool:
@@ -1497,8 +1065,8 @@ def _is_encoded(path: Path) -> bool:
     return False
 
 
-def _names(path: Path) -> tuple[set[str], set[str], bool]:
-    """The words of a module, the names that it gives to others, in capital letters, and whether it calls by a text."""
+def _names(path: Path) -> tuple[set[str], set[str]]:
+    """The words of a module, and the names that it gives to others, in capital letters."""
     text = COMMENT_OR_TEXT.sub(lambda match: match[2] or "", HEADER.sub("", read_program_text(path).text))
     given = {(name or routine or function).upper() for own, name, routine, function in GLOBAL.findall(text) if not own}
-    return set(map(str.upper, WORD.findall(text))), given, LATE_CALL.search(text) is not None
+    return set(map(str.upper, WORD.findall(text))), given

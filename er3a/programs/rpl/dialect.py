@@ -24,8 +24,6 @@ class RplDialect(Dialect):
     """RPL, as a run needs it."""
 
     whole_division = None
-    single_precision = True
-    most_whole = 2**31 - 1
     modal = frozenset((NO_BASE,))
 
     def is_signal(self, name: str) -> bool:

@@ -6,21 +6,15 @@ Statements that are not understood are kept; blocks, comments and texts without 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 from er3a.errors import InputError
 from er3a.programs import syntax
-from er3a.programs.code_builder import CodeBuilder, fault, lacks_data, linked, variable_of
+from er3a.programs.code_builder import CodeBuilder, fault, lacks_data, linked
 from er3a.programs.instructions import Place
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, data_file_of, read_program_text
-from er3a.programs.program_findings import (
-    DataFileMissing,
-    JointSpeedInferred,
-    NameTwice,
-    NotUnderstood,
-    ProgramFinding,
-)
+from er3a.programs.program_findings import DataFileMissing, NameTwice, NotUnderstood, ProgramFinding
 
 RPL = Lexicon(
     re.compile(
@@ -57,7 +51,6 @@ PLAIN = re.compile(
 )
 POINT = re.compile(r'\s*(POINT[JC])\s*\(([-+.,0-9eE\s]*)(?:,\s*"(\w+)"((?:\s*,\s*[-+]?\d+)*)\s*)?\)\s*$')
 WORD = re.compile(r"[^\W\d]\w*$")
-TOOL_SPEED = re.compile(r"v\d+$", re.IGNORECASE)
 
 
 class RplWords(Words):
@@ -185,33 +178,10 @@ def read_rpl(source: ProgramText) -> syntax.Program:
     if data_file_of(source.path, ".var") is None and lacks_data([routine], data, LIBRARY_NAMES):
         findings.append(DataFileMissing(source.path.with_suffix(".var").name))
     by_name, more = linked([routine])
-    findings = [*source.findings, *findings, *more, *alike([routine], data), *joint_speeds([routine])]
+    findings = [*findings, *more]
     return syntax.Program(
         "rpl", source.path.stem, source.path, by_name, MAIN, tuple(data), tuple(findings), source.lines
     )
-
-
-def alike(routines: Iterable[syntax.Routine], data: Iterable[syntax.Assign]) -> Iterator[NotUnderstood]:
-    """Variables that one routine sees, and whose names differ by capital letters alone: no source says whether they are
-    one."""
-    shared: dict[str, str] = {}
-    parts = [(tuple(data), ()), *((routine.code, routine.parameters) for routine in routines)]
-    for code, parameters in parts:
-        named = [(variable_of(each.target), each) for each in code if isinstance(each, syntax.Assign)]
-        own = {each.name.upper(): each.name for each in parameters}
-        private = {*own.values(), *(name for name, each in named if each.local)}
-        for name, each in named:
-            (own if name in private else shared).setdefault(name.upper(), name)
-            for first in {names.get(name.upper(), name) for names in (own, shared)} - {name}:
-                yield NotUnderstood(f"{first}, {name}", each.place)
-
-
-def joint_speeds(routines: Iterable[syntax.Routine]) -> list[JointSpeedInferred]:
-    """The first joint motion at a speed of the tool: no source says how long it takes then."""
-    moves = (each for routine in routines for each in routine.code if isinstance(each, syntax.Move))
-    speeds = ((each.place, each.arguments[1]) for each in moves if each.form == "MJOINT" and len(each.arguments) > 1)
-    words = ((place, each.name) for place, each in speeds if isinstance(each, syntax.Variable))
-    return [JointSpeedInferred(word, place) for place, word in words if TOOL_SPEED.match(word)][:1]
 
 
 def _variables(source: ProgramText) -> tuple[list[syntax.Assign], list[ProgramFinding]]:

@@ -16,8 +16,8 @@ from er3a.programs import syntax
 from er3a.programs.code_builder import CodeBuilder, fault, linked
 from er3a.programs.instructions import Disabled, Place
 from er3a.programs.lexing import ProgramText
-from er3a.programs.program_findings import FormInferred, NotUnderstood
-from er3a.programs.rpl.reader import WORD, alike, expression, initial, joint_speeds
+from er3a.programs.program_findings import NotUnderstood
+from er3a.programs.rpl.reader import WORD, expression, initial
 
 DEEPEST_ELEMENT = 100
 DECLARATION = re.compile(r"\s*<\?xml[^>]*\?>")
@@ -175,14 +175,7 @@ def read_xpl(source: ProgramText) -> syntax.Program:
         for each in top.unread()
         if each.attributes or any(part.text for part in (each, *each.below()))
     )
-    found = (
-        *source.findings,
-        *findings,
-        *(each for reader in readers for each in reader.inferred),
-        *unread,
-        *alike(routines, data),
-        *joint_speeds(routines),
-    )
+    found = (*findings, *unread)
     return syntax.Program(
         "xpl", source.path.stem, source.path, by_name, entry.text_of("Name"), data, found, source.lines
     )
@@ -204,7 +197,6 @@ class _Pou:
         self.source, self.pou = source, pou
         self.name = pou.text_of("Name")
         self.place = Place(source.path, pou.line, self.name)
-        self.inferred: list[FormInferred] = []
         self.whole: list[XmlNode] = []  # what is named as a whole, or left out
 
     def routine(self) -> syntax.Routine:
@@ -290,7 +282,7 @@ class _Pou:
     def _if(
         self, builder: CodeBuilder, sides: list[tuple[str, str]], place: Place, within: tuple[XmlNode, ...]
     ) -> None:
-        self.inferred.append(FormInferred("if", place))
+        builder.unknown(place, "<if>", may_move=False)  # whose form is read as like ones are built
         for number, (condition, name) in enumerate(sides):
             body = self._named(name, within)
             if body is None or body in within or len(within) > MAX_LOOPS:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -13,15 +12,7 @@ import scipy
 from er3a.geometry.transforms import rpy_of, transform
 from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, syntax
-from er3a.programs.evaluation import (
-    Dialect,
-    Position,
-    ProgramMemory,
-    Rounded,
-    function_in_single,
-    missed_by,
-    unresolved,
-)
+from er3a.programs.evaluation import Dialect, Position, ProgramMemory, evaluated
 from er3a.programs.urscript.reader import CHANGED, LIST_METHODS, THREAD
 from er3a.robots.masses import MassBody
 
@@ -37,11 +28,9 @@ ROBOT_BASE = instructions.NamedFrame("base", np.eye(4))
 PASSING = "%passing"  # whether the program goes on while the arm still moves to its last target
 STOPS = ("stopj", "stopl")
 READING = ("get_actual_", "get_target_", "get_forward_kin")  # beginnings of functions that read where the arm is
-NAME = re.compile(r"[A-Za-z_][\w.]*(\[[^]]*\])?")
-SAME_TURN = 1e-9
-MEASURED = 1e-3
-"""rad or m, by which an actual position may be off the one that was asked for."""
 MODE = "%mode"  # what changes the way of each motion until it is ended; empty if nothing does
+JOGS = frozenset(("servoc", "servoj", "speedj", "speedl"))  # move the arm, to where is not followed
+SAME_TURN = 1e-9  # of an element of a rotation matrix
 MODES = {
     "force_mode": "end_force_mode",
     "path_offset_enable": "path_offset_disable",
@@ -50,7 +39,6 @@ MODES = {
 }
 """Functions that do so, with those that end it."""
 MOUNTED = 0.02  # rad, within which two mountings are one
-HALF_A_TURN = math.pi - 1e-6
 HARMLESS_TEXT = """
 assert binary_list_to_integer conveyor_pulse_decode enable_external_ft_sensor encoder_enable_pulse_decode
 encoder_enable_set_tick_count encoder_get_tick_count encoder_set_tick_count encoder_unwind_delta_tick_count
@@ -90,13 +78,6 @@ write_port_register zero_ftsensor
 """
 HARMLESS = frozenset(HARMLESS_TEXT.split())
 """Functions of the language that move nothing and set no frame; any other name may be anybody's and do anything."""
-NOT_EVALUATED = frozenset(
-    (
-        *("binary_list_to_integer", "integer_to_binary_list", "str_at", "str_cat", "str_empty", "str_find", "str_len"),
-        *("str_sub", "to_num", "to_str"),
-    )
-)
-"""Of these, functions whose value follows from their arguments alone, and that are not evaluated."""
 OUTPUTS = {
     "set_digital_out": "digital_out",
     "set_standard_digital_out": "standard_digital_out",
@@ -180,16 +161,7 @@ class UrScriptDialect(Dialect):
 
     local_by_default = True
     frames = ("%tcp",)
-    setters = frozenset(("set_tcp", *LOADS, *STOPS))
     first_index = 0
-    keeps_data = False
-    single_precision = True
-    most_whole = 2**31 - 1
-
-    def sets(self, call: syntax.Invocation) -> frozenset[str]:
-        """The tool, the load, and what changes the way of each motion from there on."""
-        names = {"set_tcp": "%tcp"} | dict.fromkeys(LOADS, "%load") | dict.fromkeys(MODES, MODE)
-        return frozenset((names[call.function],)) if call.function in names else frozenset()
 
     def constant(self, memory: ProgramMemory, name: str) -> syntax.Value | None:
         """Numbers of the language."""
@@ -212,9 +184,6 @@ class UrScriptDialect(Dialect):
         unclear = syntax.Unclear(f"{name}({', '.join('' if each is None else syntax.shown(each) for each in values)})")
         if name == CHANGED:
             return _changed(values, unclear)
-        if name in NOT_EVALUATED and None not in values and not keywords:
-            first_unclear = next((each for each in values if isinstance(each, syntax.Unclear)), None)
-            return first_unclear or syntax.NotEvaluated(unclear.text)
         placed = _placed(SIGNATURES.get(name), values, keywords)
         if placed is None:
             return unclear
@@ -224,12 +193,7 @@ class UrScriptDialect(Dialect):
         if found is None:
             found = _of_lists(name, placed)
         if found is None and name in PLAIN:
-            given_values = [placed[key] for key in SIGNATURES[name] if key in placed]
-            try:
-                known = len(given_values) == len(SIGNATURES[name]) and syntax.numbers(tuple(given_values)) is not None
-                found = _of_numbers(PLAIN[name], given_values) if known else None
-            except (ValueError, OverflowError, ZeroDivisionError, TypeError):
-                found = None
+            found = evaluated(PLAIN[name], [placed.get(key) for key in SIGNATURES[name]])
         return unclear if found is None else found
 
     def motion(self, memory: ProgramMemory, move: syntax.Move) -> instructions.ArmMotion:
@@ -247,8 +211,6 @@ class UrScriptDialect(Dialect):
         goal = values.get(second if kind == "arc" else first, syntax.Unclear(move.text))
         made = _target(memory, goal, move.text)
         via = _target(memory, values.get(first, syntax.Unclear(move.text)), move.text) if kind == "arc" else None
-        if "mode" in values:
-            made = _in_mode(memory, values["mode"], via, made, move.text)
         a, v = DEFAULTS[move.form]
         joint = kind == "joint"
         timed = syntax.number(values.get("t")) != 0.0 and "t" in values  # 0: by speed and acceleration
@@ -280,7 +242,7 @@ class UrScriptDialect(Dialect):
             _tool(memory),
             ROBOT_BASE,
             load=_load(memory.read("%load")),
-            doubt=str(memory.read(MODE) or ""),
+            not_followed=str(memory.read(MODE) or ("mode" if syntax.number(values.get("mode", 0)) != 0 else "")),
         )
 
     def carry_out(self, memory: ProgramMemory, doing: syntax.Doing) -> instructions.Instruction | None:
@@ -300,6 +262,9 @@ class UrScriptDialect(Dialect):
                 pose if isinstance(pose, syntax.Unclear) or _pose(pose) is not None else syntax.Unclear(doing.text),
             )
             return None
+        if call.function in JOGS:
+            memory.here = Position()
+            return instructions.Unknown(doing.text, may_move=False)
         if call.function in MODES:
             memory.write(MODE, doing.text)
         elif call.function in MODES.values():
@@ -412,12 +377,10 @@ def _target(memory: ProgramMemory, value: syntax.Value, text: str) -> instructio
     match value:
         case syntax.Solved():
             return _solved_target(memory, value, text)
-        case syntax.NotEvaluated():
-            return unresolved(value)
         case syntax.Unclear(text=unclear):
             if unclear.lower() in ("nan", "inf"):
                 return instructions.UnresolvedTarget(unclear, "not_finite")
-            return instructions.UnresolvedTarget(unclear, "undefined" if NAME.fullmatch(unclear) else "not_understood")
+            return instructions.UnresolvedTarget(unclear, "undefined")
         case syntax.Record() | tuple():
             parts = value.values() if isinstance(value, syntax.Record) else value
             unclear_part = next((each for each in parts if isinstance(each, syntax.Unclear)), None)
@@ -435,44 +398,13 @@ def _target(memory: ProgramMemory, value: syntax.Value, text: str) -> instructio
     return instructions.UnresolvedTarget(text, "not_understood")
 
 
-def _in_mode(
-    memory: ProgramMemory, mode: syntax.Value, via: instructions.Target | None, goal: instructions.Target, text: str
-) -> instructions.Target:
-    """An arc's target by its mode: 0 turns the tool from its first orientation to the target's, 1 with the tangent.
-
-    An arc of less than half a turn whose tool turns with the tangent is one whose tool turns evenly to the first
-    orientation, turned by the arc's angle. Longer ones would turn the other way round, and are not understood.
-    """
-    if syntax.number(mode) == 0:
-        return goal
-    start = memory.here.seen(_tool(memory), ROBOT_BASE, memory.cell.flange)
-    if isinstance(goal, instructions.UnresolvedTarget):
-        return goal
-    if (
-        syntax.number(mode) != 1
-        or not isinstance(goal, instructions.PoseTarget)
-        or not isinstance(via, instructions.PoseTarget)
-    ):
-        return instructions.UnresolvedTarget(text, "not_understood")
-    if start is None:
-        return instructions.UnresolvedTarget(text, "position_unknown")
-    circle = instructions.centre_and_angle(start[:3, 3], via.pose[:3, 3], goal.pose[:3, 3])
-    if circle is None:
-        return goal
-    if circle[2] > HALF_A_TURN:
-        return instructions.UnresolvedTarget(text, "turns_with_arc")
-    pose = goal.pose.copy()
-    pose[:3, :3] = scipy.spatial.transform.Rotation.from_rotvec(circle[2] * circle[1]).as_matrix() @ start[:3, :3]
-    return instructions.PoseTarget(pose)
-
-
 def _solved_target(memory: ProgramMemory, solved: syntax.Solved, text: str) -> instructions.Target:
     """The joints that bring the tool of then to the pose, as a pose of the tool of now."""
     found = _target(memory, solved.pose, text)
     if not isinstance(found, instructions.PoseTarget):
         return found
     if isinstance(solved.near, syntax.Unclear):
-        return instructions.UnresolvedTarget(solved.near.text, "not_understood")
+        return instructions.UnresolvedTarget(solved.near.text, "undefined")
     now = _tool_value(memory)
     if solved.tool != now:
         then, tool = _pose(solved.tool), _pose(now)
@@ -505,25 +437,20 @@ def _of_position(memory: ProgramMemory, name: str, given: dict[str, syntax.Value
     if name in ("get_actual_joint_positions", "get_target_joint_positions"):
         if here.joints is None:
             return None
-        return tuple(_measured(each) if "actual" in name else each for each in map(float, here.joints))
+        return tuple(map(float, here.joints))
     if name in ("get_actual_tcp_pose", "get_target_tcp_pose", "get_target_waypoint", "get_actual_tool_flange_pose"):
         tool = instructions.NamedFrame("flange", np.eye(4)) if name.endswith("flange_pose") else _tool(memory)
-        seen = memory.seen(here, tool, ROBOT_BASE)
-        if seen is None or "actual" not in name:
-            return None if seen is None else _record(seen)
-        return syntax.Record(
-            "p", tuple((key, _measured(syntax.number(each) or 0.0)) for key, each in _record(seen).items)
-        )
+        seen = here.seen(tool, ROBOT_BASE, memory.cell.flange)
+        return None if seen is None else _record(seen)
     if name == "get_tcp_offset":
         tool = _tool(memory)
-        memory.note_unset(tool, ROBOT_BASE)
         return None if tool.pose is None else _record(tool.pose)
     if name == "get_forward_kin":
         tool = instructions.NamedFrame("", _pose(given["tcp"])) if "tcp" in given else _tool(memory)
         joints = _joints(given["q"]) if "q" in given else None
         if "q" in given and joints is None:
             return None
-        seen = memory.seen(here if joints is None else Position(joints), tool, ROBOT_BASE)
+        seen = (here if joints is None else Position(joints)).seen(tool, ROBOT_BASE, memory.cell.flange)
         return None if seen is None else _record(seen)
     if name == "get_inverse_kin" and isinstance(pose := given.get("x"), syntax.Record):
         near = given.get("qnear", () if memory.here.joints is None else tuple(map(float, memory.here.joints)))
@@ -532,17 +459,6 @@ def _of_position(memory: ProgramMemory, name: str, given: dict[str, syntax.Value
         if plain and (tool_value is None or _pose(tool_value) is not None):
             return syntax.Solved(pose, near, tool_value, memory.here.key())
     return None
-
-
-def _of_numbers(function: Callable[..., float], values: Sequence[syntax.Value]) -> float:
-    """A function of numbers; of whole ones that gives a whole one, that."""
-    plain = syntax.numbers(tuple(values)) or ()
-    found = function(*plain)
-    return found if isinstance(found, int) and not any(map(missed_by, values)) else function_in_single(function, values)
-
-
-def _measured(value: float) -> Rounded:
-    return Rounded(value, MEASURED)
 
 
 def _changed(values: list[syntax.Value | None], unclear: syntax.Unclear) -> syntax.Value:
@@ -578,8 +494,7 @@ def _of_lists(name: str, given: dict[str, syntax.Value]) -> syntax.Value | None:
 def _of_poses(name: str, given: dict[str, syntax.Value]) -> syntax.Value | None:
     """Functions of poses, as the manual defines them [1]_.
 
-    What it leaves open has no value: how ``pose_dist`` weighs turns against lengths, and in which frame ``pose_sub``
-    turns (R_to R_from' and R_from' R_to are both read into it), unless both give the same.
+    What it leaves open has no value: how ``pose_dist`` weighs turns against lengths, in which frame ``pose_sub`` turns.
 
     References
     ----------

@@ -11,10 +11,9 @@ from collections.abc import Iterator
 
 from er3a.errors import InputError
 from er3a.programs import syntax
-from er3a.programs.code_builder import CodeBuilder, fault, linked, variable_of
+from er3a.programs.code_builder import CodeBuilder, fault, linked
 from er3a.programs.instructions import Place
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, as_number
-from er3a.programs.program_findings import NotUnderstood
 
 UR = Lexicon(
     re.compile(
@@ -158,7 +157,7 @@ def read_urscript(source: ProgramText) -> syntax.Program:
         source.path,
         by_name,
         "",
-        findings=(*source.findings, *findings, *reader.shared_or_not()),
+        findings=findings,
         lines=source.lines,
     )
 
@@ -168,7 +167,6 @@ class _UrReader:
         self.source = source
         self.routines: list[syntax.Routine] = []
         self.outermost: list[str] = []
-        self.within: list[tuple[syntax.Routine, CodeBuilder]] = []  # nested routines, with those around them
         self.open = [CodeBuilder("", (), Place(source.path, 1))]
         self.unread: Place | None = None  # the head of the block that is not understood, while within one
         self.within_unread = 0  # blocks open within it that begin no further in than it does
@@ -199,35 +197,6 @@ class _UrReader:
             if starts:
                 top.add(syntax.Call(starts[0].place, starts[0].name, (), (), starts[0].name, syntax.START))
         return [*self.routines, top.routine(place)]
-
-    def shared_or_not(self) -> Iterator[NotUnderstood]:
-        """Assignments of nested routines to what may be their own, or a variable of the routine around them.
-
-        Variables on the first level of a program are global, and of others only those that say so [1]_. Which level is
-        the first is not known of a file whose own statements call its routines.
-
-        References
-        ----------
-        .. [1] Universal Robots, *Script manual*, section Scoping rules.
-        """
-        top = self.open[0].code
-        started = {each.routine for each in top if isinstance(each, syntax.Call) and each.result == syntax.START}
-        first = [each for routine in self.routines if routine.name in started for each in routine.code]
-        every = [*top, *(each for routine in self.routines for each in routine.code)]
-        shared = {
-            variable_of(each.target) for each in (*top, *first) if isinstance(each, syntax.Assign) and not each.local
-        }
-        shared |= {
-            variable_of(each.target) for each in every if isinstance(each, syntax.Assign) and each.type_name == "global"
-        }
-        for routine, around in self.within:
-            own = {each.name for each in routine.parameters} | {
-                variable_of(each.target) for each in routine.code if isinstance(each, syntax.Assign) and each.local
-            }
-            outer = {variable_of(each.target) for each in around.code if isinstance(each, syntax.Assign)} - own - shared
-            for each in routine.code:
-                if isinstance(each, syntax.Assign) and variable_of(each.target) in outer:
-                    yield NotUnderstood(each.text, each.place)
 
     def _statements(self) -> Iterator[tuple[Place, str, str]]:
         """Statements with their first line: lines are joined while a bracket is open, or after an operator."""
@@ -347,7 +316,6 @@ class _UrReader:
             raise fault(place, "an end without a beginning", "Remove it")
         self.routines.append(builder.routine(place))
         self.open.pop()
-        self.within += [(self.routines[-1], each) for each in self.open[1:]]
         if len(self.open) == 1:
             self.outermost.append(builder.name)
 
@@ -457,7 +425,7 @@ def _run(builder: CodeBuilder, words: UrWords, place: Place, text: str) -> None:
     words.finish()
     if not isinstance(what, syntax.Invocation):
         raise MisreadError("no thread is named")
-    builder.beside(place, what, text, "thread")
+    builder.concurrent(place, what, text)
 
 
 def _method(builder: CodeBuilder, call: syntax.Invocation, place: Place, text: str) -> bool:
@@ -484,7 +452,10 @@ def _changed_by(call: syntax.Invocation) -> tuple[syntax.Variable, ...]:
 
 def _called(operation: syntax.Operation) -> Iterator[str]:
     """Functions that an operation calls, or runs beside it."""
-    waiting = [*syntax.expressions_of(operation), *((operation.what,) if isinstance(operation, syntax.Beside) else ())]
+    waiting = [
+        *syntax.expressions_of(operation),
+        *((operation.what,) if isinstance(operation, syntax.ConcurrentStart) else ()),
+    ]
     while waiting:
         each = waiting.pop()
         if isinstance(each, syntax.Invocation):

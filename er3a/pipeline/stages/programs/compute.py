@@ -16,20 +16,14 @@ from er3a.numerics.arrays import Reals
 from er3a.pipeline.results import Figure, LeftOut, Status, Verdict
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, pass_of, unmet_expectations
-from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_of_rates, missed_of_program
+from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_of_rates
 from er3a.pipeline.stages.programs import model
 from er3a.pipeline.stages.programs.entry import ProgramsSettings
 from er3a.pipeline.stages.trajectory.motion import limits_of, near_singular
 from er3a.pipeline.study import Study
 from er3a.program_check.check_program import CheckOptions, ProgramCheck, check_program
 from er3a.program_check.motion_checks import AssumedRates
-from er3a.program_check.program_check_findings import (
-    ExternalAxesLeftOut,
-    Level,
-    LoadAbovePayload,
-    LoadNotExamined,
-    worst_of,
-)
+from er3a.program_check.program_check_findings import Level, LoadAbovePayload, NotFollowed, StartNotKnown
 from er3a.programs.execution import RunLimits
 from er3a.programs.instructions import Pause, Place
 from er3a.programs.languages import read_program
@@ -38,7 +32,6 @@ from er3a.robots.joint_limits import shown, speeds_given
 from er3a.robots.robot import Robot
 
 OUTCOMES: dict[Level, ProgramOutcome] = {"pass": "pass", "note": "pass", "caution": "caution", "fail": "fail"}
-MAX_MOTIONS = 20_000
 MAX_POINTS = 20_000  # of a program's motion that are kept
 
 
@@ -58,10 +51,9 @@ def compute(study: Study, name: str) -> model.ProgramsResults:
     motions: list[model.ProgramMotion] = []
     for entry in listed.programs:
         check = check_program(read_program(entry.file), robot, replace(options, start=entry.start(robot)))
-        check = check.short_of(bool(missed_of_program(robot, scene, check.arms)))
         motion, starts = _motion(entry.name, check, robot)
         summaries.append(_summary(entry, check, starts))
-        if any(each.what == "way" for each in check.not_examined):
+        if any(isinstance(each.finding, StartNotKnown) for each in check.findings):
             unknown_starts.append(entry.name)
         arms += check.arms if entry.expect in (None, "pass") else ()
         lines.append(_lines(entry.name, check))
@@ -112,29 +104,17 @@ def _left_out(programs: Sequence[model.ProgramSummary], unknown_starts: Sequence
         yield LeftOut("program_lines", lines)
     if unknown_starts:
         yield LeftOut("program_starts", tuple(unknown_starts))
-    outer = tuple(
-        each.name for each in programs if any(isinstance(at.finding, ExternalAxesLeftOut) for at in each.findings)
-    )
+    outer = tuple(each.name for each in programs if any(_is_of_outer_axes(at.finding) for at in each.findings))
     if outer:
         yield LeftOut("outer_axes", outer)
-    loads = tuple(dict.fromkeys(f"{each.name}: {text}" for each in programs for text in _loads(each)))
-    if loads:
-        yield LeftOut("program_loads", loads)
+    loads = [(each, at.finding) for each in programs for at in each.findings]
+    said = (f"{each.name}: {load.mass_kg:g} kg" for each, load in loads if isinstance(load, LoadAbovePayload))
+    if texts := tuple(dict.fromkeys(said)):
+        yield LeftOut("program_loads", texts)
     yield LeftOut("program_again")
     yield LeftOut("controller_language")
     yield LeftOut("controller_ramps")
     yield LeftOut("torques")
-
-
-def _loads(program: model.ProgramSummary) -> Iterator[str]:
-    """The loads that a program names, as kg or as its text has them."""
-    for at in program.findings:
-        if isinstance(at.finding, (LoadAbovePayload, LoadNotExamined)):
-            yield (
-                at.finding.text
-                if isinstance(at.finding, LoadNotExamined) and at.finding.text
-                else f"{at.finding.mass_kg:g} kg"
-            )
 
 
 def _options(study: Study, name: str, listed: ProgramsFile) -> CheckOptions:
@@ -147,7 +127,6 @@ def _options(study: Study, name: str, listed: ProgramsFile) -> CheckOptions:
         assumed=AssumedRates(
             own.tool_speed_mm_s / 1000, own.tool_acceleration_mm_s2 / 1000, own.joint_speed_percent / 100
         ),
-        most_motions=MAX_MOTIONS,
         limits=RunLimits(own.most_steps, own.most_branches, own.loop_rounds),
     )
 
@@ -163,10 +142,9 @@ def _summary(entry: ProgramEntry, check: ProgramCheck, starts: Mapping[int, floa
         file=entry.file,
         language=check.execution.program.language,
         outcome=OUTCOMES[check.level],
-        judged=OUTCOMES[worst_of(each.level for each in found)],
         expect=entry.expect,
         complete=check.execution.complete,
-        ways=sum(not each.again for each in check.execution.endings),
+        ways=sum(each.entry == check.execution.program.entry for each in check.execution.endings),
         motions=len(levels),
         passed=levels.count("pass"),
         caution=levels.count("caution"),
@@ -174,8 +152,18 @@ def _summary(entry: ProgramEntry, check: ProgramCheck, starts: Mapping[int, floa
         cycle=check.cycle,
         least_clearance_mm=min(clear, default=None),
         findings=tuple(model.finding_at(each, starts, rounds) for each in found),
-        not_examined=tuple(sorted({each.place.line for each in check.not_examined if each.what != "way"})),
+        not_examined=tuple(sorted(_not_followed(check))),
     )
+
+
+def _is_of_outer_axes(finding: object) -> bool:
+    return isinstance(finding, NotFollowed) and finding.reason == "external_axes"
+
+
+def _not_followed(check: ProgramCheck) -> set[int]:
+    """Lines of motions that were not followed each time, and of instructions that were not."""
+    lines = {each.place.line for each in check.verdicts if not each.followed}
+    return lines | {each.place.line for each in check.findings if isinstance(each.finding, NotFollowed)}
 
 
 def _rounds(check: ProgramCheck, starts: Mapping[int, float]) -> dict[int, int]:
@@ -228,14 +216,13 @@ def _motion(name: str, check: ProgramCheck, robot: Robot) -> tuple[model.Program
         motion = check.motions.get(number)
         if isinstance(step.instruction, Pause):
             now += step.instruction.seconds or 0.0
-        if motion is None or (motion.way is None and motion.end is None):
+        if motion is None or (motion.path is None and motion.end is None):
             continue
-        if motion.way is None:
+        if motion.path is None:
             assert motion.end is not None
-            t, q, arm = np.zeros(1), motion.end[None], motion.placed.arm
+            t, q, arm = np.zeros(1), motion.end[None], motion.arm
         else:
-            known = np.isfinite(motion.way.q[:, 0])
-            t, q, arm = motion.way.t[known], motion.way.q[known], motion.way.arm
+            t, q, arm = motion.path.t, motion.path.q, motion.arm
         if not len(t) or len(lines) + len(t) > MAX_POINTS:
             break
         starts[number] = now
@@ -244,7 +231,7 @@ def _motion(name: str, check: ProgramCheck, robot: Robot) -> tuple[model.Program
         points.append(forward(arm, q)[:, :3, 3])
         lines += [check.execution.own_line(step)] * len(t)
         step_levels += [levels[step.place]] * len(t)
-        now += motion.way.law.duration if motion.way else 0.0
+        now += motion.path.law.duration if motion.path else 0.0
     kept = model.ProgramMotion.of(
         program=name,
         t_s=np.concatenate(times),

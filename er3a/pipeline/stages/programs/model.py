@@ -64,8 +64,6 @@ class FindingAt:
     motion_s : s from the start of the instruction's motion, when it begins; None of what is about a motion as a whole
     program_s : the same on the clock of the table of motion; None off the way that is kept there
     round : of a line that is carried out more than once on that way, at which time that is, from 1
-    joint_moves : (n,) each, deg: joint moves, one or two, that take the tool where the motion does, and pass
-    off_mm, off_deg : by how much the tool leaves the motion's line or arc on these; None of a joint motion
     """
 
     file: str
@@ -77,9 +75,6 @@ class FindingAt:
     motion_s: float | None = None
     program_s: float | None = None
     round: int | None = None
-    joint_moves: tuple[tuple[float, ...], ...] = ()
-    off_mm: float | None = None
-    off_deg: float | None = None
 
 
 def finding_at(
@@ -104,9 +99,6 @@ def finding_at(
         own,
         None if own is None or start is None else start + own,
         None if each.step is None or own is None or start is None else rounds.get(each.step),
-        each.joint_moves,
-        each.off_mm,
-        each.off_deg,
     )
 
 
@@ -124,13 +116,11 @@ class ProgramSummary:
     Attributes
     ----------
     file : as the study names it
-    outcome : no pass where something was not examined of all its motions, as a tool without a shape; judged : without
-        that; expect : the verdict that its file expects of what is judged
+    outcome : of what was checked; expect : the outcome that its file expects
     complete : whether every way through it was followed to its end, or until it repeats
     ways : through the program, by the sides of its branches
     motions : instructions of the text; passed, caution, failed : of these
-    not_examined : lines of motions that were not checked each time, from which the course was not followed on, or of
-        instructions that are not understood or not simulated
+    not_examined : lines of motions that were not followed each time, and of instructions that were not
     """
 
     name: str
@@ -138,7 +128,6 @@ class ProgramSummary:
     file: str
     language: LanguageName
     outcome: ProgramOutcome
-    judged: ProgramOutcome
     expect: ProgramOutcome | None
     complete: bool
     ways: int
@@ -150,11 +139,6 @@ class ProgramSummary:
     least_clearance_mm: float | None
     findings: tuple[FindingAt, ...]
     not_examined: tuple[int, ...] = ()
-
-    @property
-    def outcomes(self) -> tuple[ProgramOutcome, ...]:
-        """What it came to, for what its file expects."""
-        return (self.judged if self.expect else self.outcome,)
 
 
 class ProgramsSummary(Summary):

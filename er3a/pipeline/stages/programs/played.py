@@ -11,16 +11,15 @@ import numpy as np
 from er3a.pipeline.messages.expectations import as_expected, outcome_word
 from er3a.pipeline.messages.language import own_title, tr
 from er3a.pipeline.messages.planning import times_needed
-from er3a.pipeline.messages.programs import Pace, over_limit, rates_text, remedies, say, singular_cause
+from er3a.pipeline.messages.programs import Pace, rates_text, remedies, say, singular_cause
 from er3a.pipeline.messages.say import joined, say_first
 from er3a.pipeline.player.motions import Fault, FaultMoment, PlayedEvent, PlayedMotion, Weight, address_of
 from er3a.pipeline.stages.expectations import is_met
 from er3a.pipeline.stages.programs.model import FindingAt, ProgramMotion, ProgramsResults, ProgramSummary
 from er3a.pipeline.viewing.numbers import fixed
-from er3a.planning.motion_faults import AboveLimit, AccelerationTooGreat, BelowLimit
+from er3a.planning.motion_faults import AboveLimit, BelowLimit
 from er3a.program_check.program_check_findings import (
     RANKS,
-    AcceleratesMoreThanAssumed,
     Level,
     MeetsSingularity,
     MotionCollides,
@@ -73,8 +72,7 @@ def _found_event(program: ProgramSummary, found: FindingAt, rows: ProgramMotion)
         return []
     needed: dict[int, str] = {}
     for _, pace in paces:
-        brakes = isinstance(pace, AccelerationTooGreat | AcceleratesMoreThanAssumed)
-        needed.setdefault(pace.joint, times_needed(over_limit(pace), acceleration=brakes))
+        needed.setdefault(pace.joint, times_needed(pace.ratio, acceleration=False))
     text = rates_text([pace for _, pace in paces])
     return [PlayedEvent(start, max(start, end), text, weight, joints=tuple(needed.items()))]
 
@@ -217,7 +215,7 @@ def moment_of(each: FindingAt) -> tuple[float, int]:
 def remedies_of(program: ProgramSummary, found: FindingAt) -> list[str]:
     """What to do about a finding and others at its line."""
     here = [each for each in program.findings if (each.file, each.line) == (found.file, found.line)]
-    return remedies(here, program.findings)
+    return remedies(here)
 
 
 def of_line(program: ProgramSummary, line: int) -> list[FindingAt]:

@@ -12,7 +12,7 @@ from markupsafe import Markup, escape
 from er3a.pipeline.messages.collision import solid_rows
 from er3a.pipeline.messages.expectations import as_expected
 from er3a.pipeline.messages.language import tr
-from er3a.pipeline.messages.programs import cycle_text, level_word, remedies, remedy_at, singular_cause
+from er3a.pipeline.messages.programs import cycle_text, level_word, remedies, remedy, singular_cause
 from er3a.pipeline.messages.say import bracketed, say
 from er3a.pipeline.messages.trajectory import limits_assumed
 from er3a.pipeline.player.player import drawing_head, moment, player, stretch
@@ -75,7 +75,7 @@ def _section(results: model.ProgramsResults, program: model.ProgramSummary) -> d
             found[each.line].append(each)
         else:
             line = str(each.line) if each.line else "–"
-            to_do = remedy_at(each) or "–"
+            to_do = remedy(each.finding) or "–"
             elsewhere.append([each.file, line, level_word(each.level), _remark(program.name, each), to_do])
     text = results.lines.take(results.lines.program == program.name)
     rows = results.instructions.take(results.instructions.program == program.name)
@@ -148,7 +148,7 @@ def _listing(
                 level=level,
                 word="" if level is None else level_word(level),
                 remarks=[_remark(name, each) for each in sorted(here, key=cause_first)],
-                remedies=remedies(here, program.findings),
+                remedies=remedies(here),
                 facts=_facts(rows, moves[number]),
                 stretch=leads[0],
                 moment=leads[1],
