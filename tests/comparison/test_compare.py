@@ -233,6 +233,7 @@ def test_arms_that_only_stand_or_count_otherwise_have_no_length_of_the_wrong_sig
         ("alpha offset", np.radians(1.0)),
         ("offset", np.degrees(1.0)),
         ("lower upper", np.degrees(1.0)),
+        ("upper", np.degrees(1.0)),
         ("speed", np.degrees(1.0)),
     ],
 )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import er3a
-from er3a.errors import InputError
+from er3a.errors import DoubtfulUnit, InputError
 from er3a.files.dh_table import read_dh_table
 from er3a.files.robot_library import robot_of
 from testing.arms import dh_matrix
@@ -26,7 +26,7 @@ PI_FRACTIONS = """Link,a_i (m),α_i,d_i (m),θ_i
 4,0,0.5*pi,0.38,q4+1.5
 """
 SPREADSHEET = """Gelenk;a [mm];alpha [°];d [mm];theta [°];;\r
-1;260,5;-90;675,0;q1;;\r
+1;260,5;-90;675,0;th1;;\r
 2;680,0;0;0;q2-90;;\r
 ;;;;;;\r
 """
@@ -182,3 +182,20 @@ def test_a_robot_made_of_a_table_says_what_the_table_does_not(tmp_path, said):
     content, _ = read_dh_table(tmp_path / "arm.csv", "arm")
     assert ("read as standard D-H, which it does not say" in content.dh.source) == (not said)
     assert ("gives no directions" in content.zero.source) == (not said)
+
+
+@pytest.mark.parametrize("columns", ["lower_deg,upper_deg", "speed_deg_s"])
+def test_limits_and_speeds_in_radians_are_doubted_although_a_joint_turns_more_than_once(tmp_path, columns):
+    wide = np.radians([[-165, 165], [-110, 110], [-400, 400]])
+    cells = wide if "lower" in columns else np.radians([[150], [180], [420]])
+    rows = "".join(f"{j},200,90,100,{','.join(f'{x:.5f}' for x in row)}\n" for j, row in enumerate(cells, 1))
+    (tmp_path / "arm.csv").write_text(f"joint,a_mm,alpha_deg,d_mm,{columns}\n{rows}", encoding="utf-8")
+    with pytest.warns(DoubtfulUnit, match="radians"):
+        read_dh_table(tmp_path / "arm.csv", "arm")
+
+
+def test_a_table_of_very_many_rows_is_refused_as_no_arm(tmp_path):
+    rows = "".join(f"{i},1,90,1,q{i}\n" for i in range(1, 100_001))
+    (tmp_path / "arm.csv").write_text(f"joint,a_mm,alpha_deg,d_mm,theta\n{rows}", encoding="utf-8")
+    with pytest.raises(InputError, match="100,000 rows"):
+        read_dh_table(tmp_path / "arm.csv", "arm")

@@ -81,3 +81,15 @@ def test_velocities_that_step_are_named(velocities, step):
     stated = np.array(velocities)[:, None]
     found = stated_motion(t, q, StatedRates(stated, stated * OPEN)).misfits
     assert [(each.t, each.stated, each.other) for each in found] == ([step] if step else [])
+
+
+@pytest.mark.parametrize("share", [0.28, 0.07])
+@pytest.mark.parametrize("factor", [0, -1])
+def test_rates_of_a_slower_joint_are_held_against_its_own(share, factor):
+    t = np.arange(5.0)
+    q = np.array([0, 0.5, 1.5, 2.5, 3])[:, None] * [1, share]
+    v = np.gradient(q, t, axis=0)
+    v[[0, -1]] = 0
+    assert not stated_motion(t, q, StatedRates(v, v * OPEN)).misfits
+    (misfit,) = stated_motion(t, q, StatedRates(v * [1, factor], v * OPEN)).misfits
+    assert (misfit.order, misfit.joint) == (1, 1)

@@ -26,6 +26,8 @@ OPENED = "().__class__.__base__.__subclasses__()"
         "${[0] * 10**11}",
         "${9**9**9}",
         "${'x' * 10**8}",
+        "${xacro.load_yaml('/etc/hostname')}",
+        "${load_yaml('/etc/hostname')}",
     ],
 )
 def test_an_expression_reaches_no_code_and_no_end_of_the_machine(tmp_path, monkeypatch, expression):
