@@ -77,6 +77,7 @@ class Way:
     visits: dict[Where, Visit] = field(default_factory=dict)
     rounds: dict[Where, int] = field(default_factory=dict)
     decided: set[tuple[str, int]] = field(default_factory=set)  # branches whose condition was known
+    state: Hashable = None  # while it waits
 
     @property
     def where(self) -> Where:
@@ -182,7 +183,8 @@ class Machine:
         unknown."""
         kept: dict[Hashable, Way] = {}
         for way in ways:
-            first = kept.setdefault(self._state(way), way)
+            way.state = way.state or self._state(way)
+            first = kept.setdefault(way.state, way)
             if first is not way:
                 self._end(way, "joins", follows=first.step)
         for by_position in (True, False):
@@ -193,13 +195,14 @@ class Machine:
                 first = groups.setdefault(way.memory.here.key() if by_position else None, way)
                 if first is not way:
                     _widen(first, way.memory.shared, [frame.local for frame in way.frames], way.memory.here.key())
+                    first.state = None
                     self._end(way, "joins", follows=first.step)
             kept = dict(groups)
         return list(kept.values())
 
     def _follow(self, way: Way) -> None:
         """Follow a way to its end, or to where others may join it."""
-        begun = False
+        begun, way.state = False, None
         while True:
             frame = way.frames[-1]
             name, at = frame.routine.name, frame.at
