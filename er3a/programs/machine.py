@@ -220,6 +220,8 @@ class Machine:
             begun = True
             self.entered.add(name)
             frame.at += 1
+            if beyond := _beyond_a_list(way.memory, operation):
+                self._note(way, operation.place, instructions.Unknown(beyond, may_move=False, stops=True))
             if (strange := self._strange.get((name, at))) is not None:
                 self._note(way, operation.place, instructions.Unknown(strange))
                 way.memory.lost(strange)
@@ -413,7 +415,7 @@ class Machine:
         name = key or memory.shown(each.target)
         if memory.outside(each.target):
             memory.forget(root(name))
-            return instructions.Unknown(each.text, may_move=False, stops=True)
+            return None
         if self.dialect.runs_on(name):
             value = syntax.Unclear(name)
         if self.dialect.is_signal(name):
@@ -614,6 +616,21 @@ def _is_new(memory: ProgramMemory, name: str) -> bool:
     """Whether a name has no variable yet, within a routine."""
     start = root(name)
     return start not in memory.shared and start not in memory.local and memory.local.get("%inside") is True
+
+
+def _beyond_a_list(memory: ProgramMemory, operation: syntax.Operation) -> str:
+    """The element that an operation names and its list has not, as text; empty for none."""
+    waiting = list(syntax.expressions_of(operation))
+    for name, _ in operation.settings if isinstance(operation, syntax.Move) else ():
+        of, _, index = name.rstrip("]").partition("[")
+        if index.isdecimal():  # of what holds for this motion alone
+            waiting.append(syntax.Element(syntax.Variable(of), (syntax.Constant(float(index)),)))
+    while waiting:
+        each = waiting.pop()
+        if found := memory.outside(each):
+            return found
+        waiting += syntax.inner(each)
+    return ""
 
 
 def _pause(memory: ProgramMemory, waiting: syntax.Waiting) -> instructions.Pause:

@@ -331,6 +331,8 @@ def _text_of(expression: syntax.Expression) -> str:
             return name
         case syntax.Member(of=of, name=name):
             return f"{_text_of(of)}.{name}"
+        case syntax.Element(of=of, indices=(syntax.Constant(value=index),)):
+            return f"{_text_of(of)}[{index}]"
         case syntax.Element(of=of):
             return f"{_text_of(of)}[1]"
         case _:
