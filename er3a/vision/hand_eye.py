@@ -6,10 +6,9 @@ whichever way round the transforms are written [1]_. Samples are taken out, the 
 remaining pairs agree. For each one taken out, the rotations that detectors confuse are tried. The remaining samples
 are judged by their residuals.
 
-**Conventions**: orientations that were read by another convention than they were written by are recognised because the
-samples fit only by the other. A quaternion whose real part is at the other end keeps all rotation angles: the exchange
-acts on it as a rotation and a mirror image in four dimensions. Some orders of Euler angles keep them too. Only a fit
-shows these.
+**Conventions**: poses that were read by another convention than they were written by are recognised because the samples
+fit only by the other. Rotation angles don't show most of them: an exchange of a quaternion's real part acts on it as a
+rotation and a mirror image in four dimensions.
 
 References
 ----------
@@ -18,13 +17,12 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
-from itertools import permutations, product
 
 import numpy as np
 import scipy
+from scipy.spatial.transform import Rotation
 
 from er3a.by_value import ByValue, Displayed, Sheet, shortly
 from er3a.geometry.transforms import (
@@ -40,7 +38,7 @@ from er3a.geometry.transforms import (
 )
 from er3a.numerics.arrays import Flags, Reals
 from er3a.vision import calibration_set, vision_findings
-from er3a.vision.classic_methods import METHOD_NAMES, MethodName, mean_pose, solved_by
+from er3a.vision.classic_methods import mean_pose, park, shah
 from er3a.vision.distance_errors import DistanceFit, wrong_distances
 from er3a.vision.likelihood import UNKNOWNS, PoseObservations, Refined, half_width, refine, residuals
 from er3a.vision.setup_changes import moved_between
@@ -152,7 +150,7 @@ def _rotation_candidates(T: Reals, kind: vision_findings.SuspectKind) -> list[Re
         away = np.eye(3) - 2 * np.outer(sight, sight)
         return [away @ R @ np.diag([1.0, 1.0, -1.0])]
     axis, turns = BOARD_TURNS[kind]
-    return [R @ scipy.spatial.transform.Rotation.from_euler(axis, turn, degrees=True).as_matrix() for turn in turns]
+    return [R @ Rotation.from_euler(axis, turn, degrees=True).as_matrix() for turn in turns]
 
 
 def worst_sample(
@@ -213,145 +211,77 @@ def _copies(samples: calibration_set.CalibrationSet) -> Flags:
 
 
 MUCH_DISTANCE, MUCH_ROTATION = 0.01, np.radians(3)  # m, rad
+MISREAD = 0.3  # of these, below which no wrong convention leaves residuals
 MUCH_BETTER = 5
+AS_GOOD = 1.5  # ratio of residuals, within which two conventions explain the samples equally well
 STREAMS: tuple[vision_findings.Streams, ...] = ("flange", "target", "both")
-NAMED = {"x": "roll", "y": "pitch", "z": "yaw"}
-SWAPPED = {"z": "roll", "y": "pitch", "x": "yaw"}
-COLUMNS = ("roll", "pitch", "yaw")
 
 
-def _products() -> dict[str, tuple[str, list[int]]]:
-    """Other products of three turns: what they are called, their axes, and the column of each angle."""
-    found = {}
-    for named in (NAMED, SWAPPED):
-        for axes in permutations("xyz"):
-            text = " ".join(f"R{axis}({named[axis]})" for axis in axes)
-            found[text] = "".join(axes).upper(), [COLUMNS.index(named[axis]) for axis in axes]
-    found["Rz(roll) Ry(pitch) Rz(yaw)"] = "ZYZ", [0, 1, 2]
-    del found["Rz(yaw) Ry(pitch) Rx(roll)"]  # as they are read
-    return found
+def _rotations(read: Callable[[Reals], Reals]) -> Callable[[Reals], Reals]:
+    """Poses with rotations that are read otherwise."""
+    return lambda T: posed(read(T), T[:, :3, 3])
 
 
-PRODUCTS = _products()
+def _quaternions(shift: int) -> Callable[[Reals], Reals]:
+    """Quaternions whose real part is at the other end."""
+    return _rotations(
+        lambda T: Rotation.from_quat(np.roll(quaternion_of(T), shift, axis=1), scalar_first=False).as_matrix()
+    )
 
 
-def other_reading(samples: calibration_set.CalibrationSet, residual: Reals) -> vision_findings.OtherReading | None:
-    """The convention by which the samples fit much better; None if they fit, or if none makes them.
-
-    Parameters
-    ----------
-    residual : (N, 6), m and rad, of the fit as the samples are read
-    """
-    if axes := position_axes(samples):
-        return axes
-    given, turned = _misfit(residual)
-    if given < 1:
-        return None
-    best: tuple[float, vision_findings.RotationReading] | None = None
-    for again, finding in _readings(samples, turned):
-        mismatch = np.abs(angles_between(again.flange[:, :3, :3]) - angles_between(transposed(again.target)[:, :3, :3]))
-        if np.median(mismatch) > MAX_DEVIATION:
-            continue
-        try:
-            raw = residuals(again.hand, again.target, *solved_by("park", again.hand, again.target))[0]
-        except np.linalg.LinAlgError:
-            continue
-        size, turn = _misfit(raw)
-        if size < given / MUCH_BETTER and (best is None or size < best[0]):
-            best = size, replace(finding, rms_other_deg=turn)
-    return best[1] if best else None
+def _angles(axes: str) -> Callable[[Reals], Reals]:
+    """Roll, pitch and yaw as turns about these axes, each about the one that those before have turned."""
+    return _rotations(lambda T: Rotation.from_euler(axes, rpy_of(T)).as_matrix())
 
 
-SIGNED_AXES: dict[str, Reals] = {
-    ", ".join("-" * (sign < 0) + "xyz"[axis] for sign, axis in zip(signs, order)): np.diag(signs) @ np.eye(3)[[*order]]
-    for order in permutations(range(3))
-    for signs in product((1.0, -1.0), repeat=3)
+def _axes(rows: list[list[int]]) -> Callable[[Reals], Reals]:
+    """Positions by other axes."""
+    return lambda T: posed(T[:, :3, :3], T[:, :3, 3] @ np.array(rows).T)
+
+
+CONVENTIONS: dict[vision_findings.Convention, Callable[[Reals], Reals]] = {
+    "inverted": inverted,
+    "transposed": _rotations(lambda T: transposed(T[:, :3, :3])),
+    "real_part_first": _quaternions(2),
+    "real_part_last": _quaternions(0),
+    "turning_axes": _angles("XYZ"),
+    "abc": _angles("ZYX"),
+    "zyz": _angles("ZYZ"),
+    "opengl": _axes([[1, 0, 0], [0, -1, 0], [0, 0, -1]]),
+    "to_optical": _axes([[0, -1, 0], [0, 0, -1], [1, 0, 0]]),
+    "from_optical": _axes([[0, 0, 1], [-1, 0, 0], [0, -1, 0]]),
 }
-"""What axes may be taken for x, y, z, first as they are: matrices (3, 3) by name."""
-MIN_MISREAD = 3e-3  # m; residuals below are no wrong axes
+"""How poses may have been meant, from how they are read."""
 
 
-def position_axes(samples: calibration_set.CalibrationSet) -> vision_findings.PositionAxes | None:
-    """Axes negated or swapped in the positions of a stream, by which the samples fit much better; None if by none.
-
-    Turning angles and orientations don't show that. With the rotation that the orientations alone give, positions of
-    camera and board are linear in all, so that each of the 47 readings of a stream is one least-squares fit.
-    """
-    try:
-        R = solved_by("park", samples.hand, samples.target)[0][:3, :3]
-    except np.linalg.LinAlgError:
-        return None
-    if not np.isfinite(R).all():
-        return None
-    hand, seen, read = samples.hand[:, :3, :3], samples.target[:, :3, 3], np.array([*SIGNED_AXES.values()])
-    flange = samples.flange[:, :3, 3]
-    moves = np.concatenate([hand, np.broadcast_to(-np.eye(3), hand.shape)], axis=2).reshape(-1, 6)
-
-    def misfit(seen: Reals, flange: Reals) -> Reals:
-        """Root mean squares (k,) in m of positions (k, N, 3) that are read in k ways."""
-        at = flange if samples.setup == "eye_in_hand" else -np.einsum("nij,knj->kni", hand, flange)
-        right = -(at + np.einsum("nij,jl,knl->kni", hand, R, seen)).reshape(len(at), -1).T
-        left = right - moves @ np.linalg.lstsq(moves, right)[0]
-        rms: Reals = np.sqrt((left**2).mean(axis=0))
-        return rms
-
-    whole = np.broadcast_to(flange, (len(read), *flange.shape))
-    streams: dict[vision_findings.Streams, Reals] = {
-        "target": misfit(np.einsum("kij,nj->kni", read, seen), whole),
-        "flange": misfit(np.broadcast_to(seen, whole.shape), np.einsum("kij,nj->kni", read, flange)),
-    }
-    best: vision_findings.Streams = min(streams, key=lambda stream: round(float(streams[stream].min()), 9))
-    given, k = float(streams[best][0]), int(streams[best].argmin())
-    if given < MIN_MISREAD or streams[best][k] > given / MUCH_BETTER:
-        return None
-    return vision_findings.PositionAxes(best, [*SIGNED_AXES][k], 1000 * given, 1000 * float(streams[best][k]))
-
-
-def _misfit(residual: Reals) -> tuple[float, float]:
-    """Residuals (N, 6) in what a camera of any use keeps, both parts added; and root mean square of the turns, deg."""
-    distance, turn = (float(np.sqrt((residual[:, part] ** 2).mean())) for part in (slice(3), slice(3, 6)))
-    return distance / MUCH_DISTANCE + turn / MUCH_ROTATION, float(np.degrees(turn))
-
-
-def _readings(
-    samples: calibration_set.CalibrationSet, given: float
-) -> Iterator[tuple[calibration_set.CalibrationSet, vision_findings.RotationReading]]:
+def other_conventions(
+    samples: calibration_set.CalibrationSet, residual: Reals
+) -> tuple[vision_findings.OtherConvention, ...]:
+    """The conventions by which the samples fit much better than with residuals (N, 6), all that fit equally well."""
+    given, *rms = _misfit(residual)
+    if given < MISREAD:
+        return ()
+    found = []
     for stream in STREAMS:
-        for shift in (0, 2):  # x, y, z, w taken for w, x, y, z, and the other way round
-            yield (
-                _with(samples, stream, partial(_rolled, shift=shift)),
-                vision_findings.QuaternionOrder(stream, given, given),
-            )
-        for text, (axes, columns) in PRODUCTS.items():
-            turned = partial(_product, axes=axes, columns=columns)
-            yield _with(samples, stream, turned), vision_findings.AngleOrder(stream, text, given, given)
-        yield _with(samples, stream, _transposed), vision_findings.TransposedRotations(stream, given, given)
+        for name, read in CONVENTIONS.items():
+            flange = samples.flange if stream == "target" else read(samples.flange)
+            target = samples.target if stream == "flange" else read(samples.target)
+            again = replace(samples, flange=flange, target=target)
+            try:
+                left = residuals(again.hand, again.target, *park(again.hand, again.target))[0]
+            except np.linalg.LinAlgError:
+                continue
+            size, *rms_other = _misfit(left)
+            if size < given / MUCH_BETTER:
+                found.append((size, vision_findings.OtherConvention(stream, name, *rms, *rms_other)))
+    least = min((size for size, _ in found), default=0.0)
+    return tuple(each for size, each in found if size <= AS_GOOD * least)
 
 
-def _with(
-    samples: calibration_set.CalibrationSet, stream: vision_findings.Streams, rotations: Callable[[Reals], Reals]
-) -> calibration_set.CalibrationSet:
-    """The samples with other rotations of a stream."""
-    T, B = samples.flange, samples.target
-    if stream != "target":
-        T = posed(rotations(T), T[:, :3, 3])
-    if stream != "flange":
-        B = posed(rotations(B), B[:, :3, 3])
-    return replace(samples, flange=T, target=B)
-
-
-def _transposed(T: Reals) -> Reals:
-    return transposed(T[:, :3, :3])
-
-
-def _rolled(T: Reals, shift: int) -> Reals:
-    R: Reals = scipy.spatial.transform.Rotation.from_quat(np.roll(quaternion_of(T), shift, axis=1)).as_matrix()
-    return R
-
-
-def _product(T: Reals, axes: str, columns: list[int]) -> Reals:
-    R: Reals = scipy.spatial.transform.Rotation.from_euler(axes, rpy_of(T)[:, columns]).as_matrix()
-    return R
+def _misfit(residual: Reals) -> tuple[float, float, float]:
+    """Residuals (N, 6) in what a camera of any use keeps, both parts added; and root mean squares, mm and deg."""
+    distance, turn = (float(np.sqrt((residual[:, part] ** 2).mean())) for part in (slice(3), slice(3, 6)))
+    return distance / MUCH_DISTANCE + turn / MUCH_ROTATION, 1000 * distance, float(np.degrees(turn))
 
 
 MIN_SAMPLES = 3
@@ -363,28 +293,6 @@ LITTLE_TURN, LITTLE_SPREAD = np.radians(15), np.radians(10)
 EXCLUDED = 1e-3
 CONTRADICTED = 1e-3  # probability of touched points as far off, below which they contradict the calibration
 MAX_FACTS = 10
-STARTS: tuple[MethodName, ...] = ("park", "shah")
-DIRECTIONS = ((False, False), (True, True), (True, False), (False, True))
-
-
-@dataclass(frozen=True, eq=False)
-class MethodAnswer(ByValue):
-    """What a closed form answers, beside the likeliest.
-
-    Attributes
-    ----------
-    X : (4, 4); None where the method fails
-    apart_mm, apart_deg : from the likeliest hand-eye pose
-    beyond : the largest ratio of a difference in X's six numbers to half its 95 % interval
-    """
-
-    name: MethodName
-    X: Reals | None
-    apart_mm: float
-    apart_deg: float
-    beyond: float
-    rms_mm: float
-    rms_deg: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -442,8 +350,6 @@ class HandEye(ByValue, Displayed):
     deviations: Reals
     greatest_turn: float
     axes_apart: float
-    methods: tuple[MethodAnswer, ...]
-    directions: tuple[vision_findings.DirectionTried, ...]
     suspects: tuple[vision_findings.Suspect, ...]
     warnings: tuple[vision_findings.CalibrationWarning, ...]
     without_suspects: Reals | None
@@ -501,13 +407,11 @@ def calibrate_hand_eye(samples: calibration_set.CalibrationSet) -> HandEye:
         refined = _fitted(samples.take(used))
     kept = samples.take(used)
     warnings: list[vision_findings.CalibrationWarning] = [angles.warning] if angles.warning else []
-    directions = directions_tried(kept, refined)
     distances = wrong_distances(kept, refined)
-    warnings += _warnings(kept, refined, greatest, apart, directions, distances)
+    warnings += _warnings(kept, refined, greatest, apart, distances)
     share = len(set(kept.places.tolist())) / len(kept)
     named = {each.code for each in vision_findings.grave_warnings(warnings)} - {"unexplained_residuals", "more_scatter"}
     if not named and share > MOSTLY_APART and (step := moved_between(samples.take(once), used[once], refined)):
-        warnings = [replace(w, tried=()) if isinstance(w, vision_findings.MoreScatter) else w for w in warnings]
         warnings.append(step)
     covariance = refined.covariance + _shared_covariance(kept, refined)
     half = half_width(covariance, refined.freedom)
@@ -524,8 +428,6 @@ def calibrate_hand_eye(samples: calibration_set.CalibrationSet) -> HandEye:
         deviations=refined.deviations,
         greatest_turn=greatest,
         axes_apart=apart,
-        methods=tuple(_answer(name, kept, refined, half * wider) for name in METHOD_NAMES),
-        directions=directions,
         suspects=(*suspects, *repeated_poses(samples)),
         warnings=tuple(warnings),
         without_suspects=None if used.all() else _shift_with_all(samples, refined),
@@ -544,9 +446,9 @@ def best_closed_form(F: Reals, B: Reals, deviations: Reals) -> tuple[Reals, Real
         if no method has one
     """
     best: tuple[float, Reals, Reals] | None = None
-    for name in STARTS:
+    for solve in (park, shah):
         try:
-            X, Y = solved_by(name, F, B)
+            X, Y = solve(F, B)
         except np.linalg.LinAlgError:
             continue
         if np.isfinite(X).all() and np.isfinite(Y).all():
@@ -615,7 +517,6 @@ def _warnings(
     refined: Refined,
     greatest: float,
     apart: float,
-    directions: tuple[vision_findings.DirectionTried, ...],
     distances: tuple[DistanceFit, ...],
 ) -> list[vision_findings.CalibrationWarning]:
     found: list[vision_findings.CalibrationWarning] = []
@@ -629,92 +530,16 @@ def _warnings(
     largest = float(np.sqrt(scipy.special.chdtri(free, EXCLUDED) / free))
     if samples.camera_covariance is not None and refined.scatter > largest:
         found.append(vision_findings.MoreScatter(float(refined.scatter), largest))
-    if reading := other_reading(samples, refined.residual):
-        return [*found, reading]
-    if directions[0].status == "excluded":
-        best = next(each for each in directions if each.status == "best")
-        return [*found, vision_findings.OtherDirection(best.flange_inverted, best.target_inverted)]
+    if read := other_conventions(samples, refined.residual):
+        return [*found, *read]
     found += [each.finding for each in distances]
-    size, turn = _misfit(refined.residual)
-    if [each.code for each in vision_findings.grave_warnings(found)] == ["more_scatter"]:
-        tried = vision_findings.READINGS if size >= 1 else vision_findings.READINGS_IN_SMALL
-        return [replace(each, tried=tried) if isinstance(each, vision_findings.MoreScatter) else each for each in found]
+    size, distance, turn = _misfit(refined.residual)
     if size > 1 and not vision_findings.grave_warnings(found):
-        distance = float(1000 * np.sqrt((refined.residual[:, :3] ** 2).mean()))
-        found.append(vision_findings.UnexplainedResiduals(distance, turn, vision_findings.READINGS))
+        found.append(vision_findings.UnexplainedResiduals(distance, turn))
     return found
 
 
-def _answer(
-    name: MethodName, samples: calibration_set.CalibrationSet, refined: Refined, half_width: Reals
-) -> MethodAnswer:
-    try:
-        X, Y = solved_by(name, samples.hand, samples.target)
-    except np.linalg.LinAlgError:
-        X, Y = np.full((4, 4), np.nan), np.full((4, 4), np.nan)
-    if not (np.isfinite(X).all() and np.isfinite(Y).all()):
-        return MethodAnswer(name, None, np.inf, np.inf, np.inf, np.inf, np.inf)
-    step = step_between(refined.X, X)
-    raw = residuals(samples.hand, samples.target, X, Y)[0]
-    return MethodAnswer(
-        name=name,
-        X=X,
-        apart_mm=float(1000 * np.linalg.norm(step[:3])),
-        apart_deg=float(np.degrees(np.linalg.norm(step[3:]))),
-        beyond=float((np.abs(step) / half_width[:6]).max()),
-        rms_mm=float(1000 * np.sqrt((raw[:, :3] ** 2).mean())),
-        rms_deg=float(np.degrees(np.sqrt((raw[:, 3:] ** 2).mean()))),
-    )
-
-
-def directions_tried(
-    samples: calibration_set.CalibrationSet, refined: Refined
-) -> tuple[vision_findings.DirectionTried, ...]:
-    """The four ways to take the two streams, as given first, judged by their residuals in equal standard deviations.
-
-    Both streams inverted is the problem as given with X and Y swapped, F^-1 Y B^-1 = X, so that no residual tells
-    the two apart; inverting a single stream makes another problem.
-    """
-    sigma = refined.deviations
-    free = 6 * len(samples) - 12
-    found: list[tuple[float, Reals | None]] = []
-    for flange_inverted, target_inverted in DIRECTIONS:
-        F = inverted(samples.hand) if flange_inverted else samples.hand
-        B = inverted(samples.target) if target_inverted else samples.target
-        raw = _residuals_of(F, B, sigma)
-        found.append((np.inf if raw is None else float(np.sum((raw / np.repeat(sigma, 3)) ** 2)), raw))
-    costs = np.array([cost for cost, _ in found])
-    best = int(costs.argmin())
-    twin = best ^ 1  # both streams the other way round
-    directions = []
-    for k, ((flange_inverted, target_inverted), (cost, raw)) in enumerate(zip(DIRECTIONS, found)):
-        probability = float(scipy.special.fdtrc(free, free, cost / costs[best])) if np.isfinite(cost) else 0.0
-        status: vision_findings.DirectionStatus = "excluded" if probability < EXCLUDED else "open"
-        status = {best: "best", twin: "same_problem"}.get(k, status)  # type: ignore[assignment]
-        rms = [None, None] if raw is None else [float(np.sqrt((raw[:, part] ** 2).mean())) for part in _PARTS]
-        directions.append(
-            vision_findings.DirectionTried(
-                flange_inverted,
-                target_inverted,
-                status,
-                None if rms[0] is None else 1000 * rms[0],
-                None if rms[1] is None else float(np.degrees(rms[1])),
-                probability,
-            )
-        )
-    return tuple(directions)
-
-
 _PARTS = (slice(3), slice(3, 6))
-
-
-def _residuals_of(F: Reals, B: Reals, sigma: Reals) -> Reals | None:
-    covariance = np.broadcast_to(np.diag(np.repeat(sigma, 3) ** 2), (len(F), 6, 6))
-    try:
-        found = refine(PoseObservations("eye_in_hand", F, B, covariance), *best_closed_form(F, B, sigma))
-    except (np.linalg.LinAlgError, vision_findings.HandEyeError):
-        return None
-    return found.residual
 
 
 def _shift_with_all(samples: calibration_set.CalibrationSet, refined: Refined) -> Reals:

@@ -33,11 +33,8 @@ from er3a.vision import likelihood
 from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.hand_eye import HandEye, calibrate_hand_eye
 from er3a.vision.vision_findings import (
-    CalibrationWarning,
     HandEyeError,
     JointZero,
-    MoreScatter,
-    UnexplainedResiduals,
     grave_warnings,
 )
 
@@ -188,17 +185,16 @@ def zeros_tried(found: HandEye, robot: Robot) -> tuple[HandEye, tuple[str, ...],
         rms = float(1000 * np.sqrt((fit.residual[:, :3] ** 2).mean()))
         best = min(best, (chance, k, value, half_width, rms))
     chance, k, value, half_width, rms = best
-    tried = found if len(unseen) == len(names) else replace(found, warnings=tuple(map(_zeros_too, found.warnings)))
     explained = {each.code for each in grave_warnings(found.warnings)} <= EXPLAINED_BY_A_ZERO
     if chance > ZERO_CHANCE or abs(value) < MIN_ZERO or not explained:
-        return tried, tuple(unseen), smallest
+        return found, tuple(unseen), smallest
     mended = _Turned(robot, found.samples, k).flange(value)
     try:
         again = calibrate_hand_eye(replace(found.samples, flange=mended))
     except HandEyeError:
-        return tried, tuple(unseen), smallest
+        return found, tuple(unseen), smallest
     if grave_warnings(again.warnings):
-        return tried, tuple(unseen), smallest
+        return found, tuple(unseen), smallest
     given = float(1000 * np.sqrt((found.residual[found.used, :3] ** 2).mean()))
     zero = JointZero(k + 1, float(np.degrees(value)), float(np.degrees(half_width)), given, rms)
     others = tuple(each for each in found.warnings if each.code not in EXPLAINED_BY_A_ZERO)
@@ -208,12 +204,6 @@ def zeros_tried(found: HandEye, robot: Robot) -> tuple[HandEye, tuple[str, ...],
 EXPLAINED_BY_A_ZERO = {
     *("board_scale", "focal_length", "principal_point", "unexplained_residuals", "moved_between", "more_scatter")
 }
-
-
-def _zeros_too(warning: CalibrationWarning) -> CalibrationWarning:
-    if isinstance(warning, UnexplainedResiduals | MoreScatter) and warning.tried:
-        return replace(warning, tried=(*warning.tried, "joint_zero"))
-    return warning
 
 
 @dataclass(frozen=True, eq=False)

@@ -54,62 +54,36 @@ class NoMajority(Finding):
 Streams = Literal["flange", "target", "both"]
 
 
-class QuaternionOrder(Finding):
-    """The samples fit if the quaternions of one stream, or both, are read with their real part at the other end."""
-
-    stream: Streams
-    rms_given_deg: float
-    rms_other_deg: float
-
-
-class AngleOrder(Finding):
-    """The samples fit if the angles of a stream, or both, are read as ``product``: Rx(roll) Ry(pitch) Rz(yaw), ..."""
-
-    stream: Streams
-    product: str
-    rms_given_deg: float
-    rms_other_deg: float
-
-
-class TransposedRotations(Finding):
-    """The samples fit if the rotations of a stream, or both, are transposed while the positions stay."""
-
-    stream: Streams
-    rms_given_deg: float
-    rms_other_deg: float
-
-
-class PositionAxes(Finding):
-    """The samples fit if the positions of a stream are read as ``axes``: -x, z, y is x negated, y and z swapped."""
-
-    stream: Streams
-    axes: str
-    rms_given_mm: float
-    rms_other_mm: float
-
-
-ReadingKind = Literal[
-    "quaternion_order", "angle_order", "transposed_rotations", "position_axes", "other_direction", "joint_zero"
+Convention = Literal[
+    "inverted",
+    "transposed",
+    "real_part_first",
+    "real_part_last",
+    "turning_axes",
+    "abc",
+    "zyz",
+    "opengl",
+    "to_optical",
+    "from_optical",
 ]
-READINGS: tuple[ReadingKind, ...] = tuple(kind for kind in get_args(ReadingKind) if kind != "joint_zero")
-"""What is tried of all samples; zeros only where joint values are recorded."""
-READINGS_IN_SMALL: tuple[ReadingKind, ...] = ("position_axes", "other_direction")
-"""What is tried too where residuals are smaller than wrong rotations make them."""
+
+
+class OtherConvention(Finding):
+    """The samples fit if a stream, or both, are read by another convention; residuals as given, and so."""
+
+    stream: Streams
+    convention: Convention
+    rms_given_mm: float
+    rms_given_deg: float
+    rms_other_mm: float
+    rms_other_deg: float
 
 
 class UnexplainedResiduals(Finding):
-    """The residuals are larger than those of a camera of any use, and none of the causes ``tried`` explains them."""
+    """The residuals are larger than those of a camera of any use, and no convention explains them."""
 
     rms_mm: float
     rms_deg: float
-    tried: tuple[ReadingKind, ...]
-
-
-class OtherDirection(Finding):
-    """The samples exclude the direction in which they are given; with these streams inverted they fit."""
-
-    flange_inverted: bool
-    target_inverted: bool
 
 
 class BoardScale(Finding):
@@ -153,14 +127,10 @@ class FewSamples(Finding):
 
 
 class MoreScatter(Finding):
-    """The residuals are larger than the stated standard deviations allow.
-
-    ``tried``: causes of which none explains them; empty where a cause is named, and where no calibration is refused.
-    """
+    """The residuals are larger than the stated standard deviations allow."""
 
     scatter: float
     largest: float
-    tried: tuple[ReadingKind, ...] = ()
 
 
 class MovedBetween(Finding):
@@ -192,16 +162,10 @@ class JointZero(Finding):
     rms_other_mm: float
 
 
-RotationReading = QuaternionOrder | AngleOrder | TransposedRotations
-OtherReading = RotationReading | PositionAxes
 CalibrationWarning = (
     NoMajority
-    | QuaternionOrder
-    | AngleOrder
-    | TransposedRotations
-    | PositionAxes
+    | OtherConvention
     | UnexplainedResiduals
-    | OtherDirection
     | BoardScale
     | FocalLength
     | PrincipalPoint
@@ -224,14 +188,13 @@ class TouchContradicts(Finding):
 
 MUCH_SCATTER = 3.0
 _GRAVE = (
-    *(NoMajority, UnexplainedResiduals, MovedBetween, NotConverged, JointZero),
+    *(NoMajority, OtherConvention, UnexplainedResiduals, MovedBetween, NotConverged, JointZero),
     *get_args(WrongDistances),
-    *get_args(OtherReading),
 )
 
 
 def grave_warnings(warnings: Iterable[CalibrationWarning]) -> tuple[CalibrationWarning, ...]:
-    """Those with which no calibration can be used; samples that exclude their direction are judged by that."""
+    """Those with which no calibration can be used."""
     return tuple(
         each
         for each in warnings
@@ -281,23 +244,3 @@ class HandEyeError(Er3aError):
 
 
 GraspOutcome = Literal["grasped", "not graspable"]
-DirectionStatus = Literal["best", "same_problem", "excluded", "open"]
-
-
-class DirectionTried(Finding):
-    """The samples with one stream or both inverted.
-
-    Attributes
-    ----------
-    status : ``best`` of those tried; ``same_problem`` as the best, with the two unknowns swapped; ``excluded`` by the
-        residuals (probability below 0.001); ``open``: they can't decide
-    rms_mm, rms_deg : of the residuals, by coordinate; None where nothing fits
-    probability : that residuals of a right direction are this much larger than the best's
-    """
-
-    flange_inverted: bool
-    target_inverted: bool
-    status: DirectionStatus
-    rms_mm: float | None
-    rms_deg: float | None
-    probability: float

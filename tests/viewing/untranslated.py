@@ -21,7 +21,6 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 
 from er3a.pipeline.messages import language
 from er3a.pipeline.messages.say import english
-from er3a.pipeline.messages.vision import METHODS
 from er3a.programs.languages import LANGUAGES, SUFFIXES
 
 KEPT = re.compile(r"(\{[^}]*\}|%\(\w+\)s|<[^>]*>|&\w+;)")
@@ -29,7 +28,6 @@ WIDE = {ord(letter): ord(letter) + 0xFEE0 for letter in "abcdefghijklmnopqrstuvw
 WORD = re.compile(r"[A-Za-z]{3,}")
 # Units, and names that are the same in every language.
 SAME_EVERYWHERE = {"deg", "rad", "er3a", "sha", "rrd", "rpm", "ppb", *LANGUAGES}
-SAME_EVERYWHERE |= {name.lower() for name in METHODS.values()}  # of closed forms, by who found them
 PROGRAM_SUFFIXES = ("dat", "var", "XPL", *(suffix[1:] for suffix in SUFFIXES))
 NAMES = re.compile(
     r"\b(?:alpha|beta|offset|direction|lower|upper|speed) ?\d(?:, \d)*\b"  # entries of a table

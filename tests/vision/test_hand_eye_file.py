@@ -256,7 +256,7 @@ def test_the_command_ends_with_an_error_where_a_calibration_cant_be_used(tmp_pat
     wrong = write(tmp_path, table | columns(target, "target", "quaternion"))
     found = CliRunner().invoke(app, ["hand-eye", str(wrong)])
     assert found.exit_code == 1
-    assert "positions of the board have axes negated or swapped: read as (x, -y, -z)" in " ".join(found.output.split())
+    assert "its positions are (x, −y, −z)" in " ".join(found.output.split())
 
 
 def test_touched_points_that_contradict_a_calibration_end_the_command_with_code_1(tmp_path, poses):

@@ -376,7 +376,7 @@ def hand_eye(
             )
         )
     touched_elsewhere = found.touch is not None and found.touch.contradiction is not None
-    if grave_warnings(found.warnings) or found.directions[0].status == "excluded" or touched_elsewhere:
+    if grave_warnings(found.warnings) or touched_elsewhere:
         raise typer.Exit(1)
 
 

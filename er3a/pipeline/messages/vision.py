@@ -15,7 +15,6 @@ from er3a.pipeline.messages.expectations import demonstrated
 from er3a.pipeline.messages.language import N_, as_text
 from er3a.pipeline.messages.say import Plural, by, joined, listed, say, say_as, sentence, texts, word
 from er3a.pipeline.stages.vision.model import (
-    DirectionContradicted,
     GraspCounts,
 )
 from er3a.vision.boards import AmbiguousTilt, BoardlessImage
@@ -30,17 +29,11 @@ from er3a.vision.grasping import (
 from er3a.vision.hand_eye import HandEye, spread_of
 from er3a.vision.table_corrections import TABLE_CONTRADICTED, NoCorrections, TableCorrections
 from er3a.vision.vision_findings import (
-    AngleOrder,
-    DirectionTried,
-    MoreScatter,
+    Convention,
+    OtherConvention,
     ParallelTurns,
-    PositionAxes,
-    QuaternionOrder,
-    ReadingKind,
     RotationMismatch,
     Suspect,
-    TransposedRotations,
-    UnexplainedResiduals,
 )
 
 PARTS = {"move": N_("move to the approach"), "approach": N_("approach"), "retreat": N_("retreat")}
@@ -53,38 +46,21 @@ MENDING = {
     "rotation": N_("no typical detector error explains it"),
 }
 STREAMS = {"flange": N_("flange"), "target": N_("board"), "both": N_("flange and board")}
-READING_WORDS: dict[ReadingKind, str] = {
-    "quaternion_order": N_("order of quaternions"),
-    "angle_order": N_("order of angles"),
-    "transposed_rotations": N_("transposed rotations"),
-    "position_axes": N_("axes of positions negated or swapped"),
-    "other_direction": N_("inverted poses"),
-    "joint_zero": N_("the zero of one joint"),
+CONVENTIONS: dict[Convention, str] = {
+    "inverted": N_("its poses are inverted"),
+    "transposed": N_("its rotations are transposed"),
+    "real_part_first": N_("its quaternions have the real part first"),
+    "real_part_last": N_("its quaternions have the real part last"),
+    "turning_axes": N_("its angles mean R = Rx(roll) Ry(pitch) Rz(yaw)"),
+    "abc": N_("its angles mean R = Rz(roll) Ry(pitch) Rx(yaw)"),
+    "zyz": N_("its angles mean R = Rz(roll) Ry(pitch) Rz(yaw)"),
+    "opengl": N_("its positions are (x, −y, −z)"),
+    "to_optical": N_("its positions are (−y, −z, x)"),
+    "from_optical": N_("its positions are (z, −x, −y)"),
 }
 POSES = {
     "eye_in_hand": (N_("camera on the flange (T_flange_camera)"), N_("board in the base (T_base_board)")),
     "eye_to_hand": (N_("camera in the base (T_base_camera)"), N_("board on the flange (T_flange_board)")),
-}
-DIRECTION_WORDS = {
-    (False, False): N_("both streams as given"),
-    (True, True): N_("both inverted"),
-    (True, False): N_("flange inverted"),
-    (False, True): N_("board inverted"),
-}
-DIRECTION_STATUS = {
-    "best": N_("supported: the smallest residuals"),
-    "same_problem": N_("the same equations with the two unknowns swapped; poses alone can't distinguish them"),
-    "excluded": N_("excluded by the residuals"),
-    "open": N_("can't be told"),
-}
-METHODS = {
-    "park": "Park",
-    "horaud": "Horaud",
-    "tsai": "Tsai",
-    "andreff": "Andreff",
-    "daniilidis": "Daniilidis",
-    "shah": "Shah",
-    "li": "Li",
 }
 NO_CORRECTIONS = {
     "joints": N_("corrections to the table need recorded joint angles and an arm with six revolute joints"),
@@ -134,13 +110,6 @@ TEXTS = texts(
             "and {needed:g} is required"
         ),
         "no_transfer": "the straight move to the approach collides, and there is no other: {why}",
-        "direction_contradicted": (
-            "The direction of the poses is contradicted: with {which} the residuals are {rms_mm:.3g} mm, as given "
-            "{rms_given_mm:.3g} mm."
-        ),
-        "vision.inverted#both": "both streams inverted",
-        "vision.inverted#flange": "the flange's poses inverted",
-        "vision.inverted#board": "the board's poses inverted",
         "grasp_counts#grasped": Plural(
             "count", "{grasped} of {count} object can be grasped", "{grasped} of {count} objects can be grasped"
         ),
@@ -206,12 +175,6 @@ TEXTS = texts(
             "the residuals are {scatter:.3g} times the stated standard deviations, where chance explains at most "
             "{largest:.2f}: the arm's table, its repeatability or the camera is worse than stated"
         ),
-        "more_scatter#tried": (
-            "the residuals are {scatter:.3g} times the stated standard deviations, where chance explains at most "
-            "{largest:.2f}, and nothing tried explains them ({causes}): check the order of the samples, the board's "
-            "size, which tool and which base the poses belong to, and of two recordings by how much their clocks "
-            "differ (widest_s), or the arm's table, its repeatability or the camera is worse than stated"
-        ),
         "moved_between": by(
             "what",
             camera="from {sample} on the camera stands {moved_mm:.2g} mm and {moved_deg:.2g} deg elsewhere: give one "
@@ -247,37 +210,19 @@ TEXTS = texts(
             "{sample}: flange and board rotate by different angles relative to the other samples, {off_deg:.1f} deg "
             "in the median; {kind}"
         ),
-        "quaternion_order": (
-            "the quaternions of the {stream} have their real part at the other end: read that way the residuals are "
-            "{rms_other_deg:.2g} deg, as given {rms_given_deg:.3g} deg"
-        ),
-        "angle_order": (
-            "the angles of the {stream} fit if read as R = {product}: the residuals are then {rms_other_deg:.2g} deg, "
-            "as given {rms_given_deg:.3g} deg; convert them to R = Rz(yaw) Ry(pitch) Rx(roll)"
-        ),
-        "transposed_rotations": (
-            "the rotations of the {stream} are transposed, its positions are right: read that way the residuals are "
-            "{rms_other_deg:.2g} deg, as given {rms_given_deg:.3g} deg; write matrices row by row"
-        ),
-        "position_axes": (
-            "the positions of the {stream} have axes negated or swapped: read as ({axes}) the residuals are "
-            "{rms_other_mm:.2g} mm, as given {rms_given_mm:.3g} mm"
+        "other_convention": (
+            "the samples fit if {stream} differs: {convention}. Residuals are then {rms_other_mm:.2g} mm and "
+            "{rms_other_deg:.2g} deg, as given {rms_given_mm:.3g} mm and {rms_given_deg:.3g} deg. Convert the poses, "
+            "or take the other setup"
         ),
         "unexplained_residuals": (
-            "the residuals are {rms_mm:.3g} mm and {rms_deg:.2g} deg, and nothing tried explains them ({causes}): "
-            "check the order of the samples, the board's size, which tool and which base the poses belong to, and of "
-            "two recordings by how much their clocks differ (widest_s)"
-        ),
-        "other_direction": (
-            "the samples exclude this direction: they fit with one stream inverted. Either the setup is the other "
-            "one, or the flange poses are those of the base in the flange's frame (T_flange_base), or the board poses "
-            "are those of the camera in the board's frame"
+            "the residuals are {rms_mm:.3g} mm and {rms_deg:.2g} deg, and no common convention explains them: check "
+            "the order of the samples, the board's size, tool and base of the poses, and clocks (widest_s)"
         ),
         "parallel_axes": (
             "all motions rotate about one direction ({x:.2f}, {y:.2f}, {z:.2f}) within {spread_deg:.2g} deg, so the "
             "translation along it is undetermined: add poses rotated about another axis by 30 deg or more"
         ),
-        "direction_tried": "{direction}: {status}",
         "vision.corrections#consistent": (
             "The samples do not contradict the table: corrections lower the residuals from {before:.3g} to "
             "{after:.3g} standard deviations, by chance with a probability of {p:.2g}"
@@ -288,15 +233,6 @@ TEXTS = texts(
         ),
     }
 )
-
-
-@say.register
-def _(found: DirectionContradicted) -> str:
-    which = {
-        (True, False): sentence("vision.inverted#flange"),
-        (False, True): sentence("vision.inverted#board"),
-    }.get((found.flange_inverted, found.target_inverted), sentence("vision.inverted#both"))
-    return say_as(found, which=which)
 
 
 @say.register
@@ -350,34 +286,14 @@ def _(found: RotationMismatch) -> str:
 
 
 @say.register
-def _(found: QuaternionOrder | AngleOrder | TransposedRotations | PositionAxes) -> str:
-    return say_as(found, stream=word("vision.stream", STREAMS, found.stream))
-
-
-@say.register
-def _(found: UnexplainedResiduals) -> str:
-    return say_as(found, causes=_causes(found.tried))
-
-
-@say.register
-def _(found: MoreScatter) -> str:
-    return say_as(found, "tried", causes=_causes(found.tried)) if found.tried else say_as(found)
-
-
-def _causes(tried: tuple[ReadingKind, ...]) -> str:
-    return joined([word("vision.reading", READING_WORDS, kind) for kind in tried], ", ")
+def _(found: OtherConvention) -> str:
+    stream = word("vision.stream", STREAMS, found.stream)
+    return say_as(found, stream=stream, convention=word("vision.convention", CONVENTIONS, found.convention))
 
 
 @say.register
 def _(found: ParallelTurns) -> str:
     return say_as(found, x=found.axis[0], y=found.axis[1], z=found.axis[2])
-
-
-@say.register
-def _(found: DirectionTried) -> str:
-    return say_as(
-        found, direction=direction_word(found), status=word("vision.direction_status", DIRECTION_STATUS, found.status)
-    )
 
 
 @say.register
@@ -404,12 +320,6 @@ def correction_lines(found: TableCorrections | NoCorrections) -> list[str]:
     verdict = correction_verdict(found.probability, found.scatter_before, found.scatter)
     mm, deg = 1000 * found.moved[0], np.degrees(found.moved[1])
     return [*lines, verdict, f"with them the camera's pose changes by {mm:.3g} mm and {deg:.2g} deg"]
-
-
-def direction_word(found: DirectionTried) -> str:
-    """Which streams are inverted, in words."""
-    text = DIRECTION_WORDS[found.flange_inverted, found.target_inverted]
-    return word("vision.direction", {"direction": text}, "direction")
 
 
 def pose_words(setup: str) -> tuple[str, str]:
@@ -443,11 +353,6 @@ def hand_eye_lines(found: HandEye, offset: TimeOffset | None, boardless: Sequenc
         for axis, value, h in zip(("roll", "pitch", "yaw"), np.degrees(rpy_of(T)), np.degrees(half[3:])):
             lines.append(f"  {axis:<6}{as_text(value, '>12.4f')} deg; about {about[axis]} ± {h:.4f} deg")
         lines.append("  quaternion (w, x, y, z) " + " ".join(as_text(part, ".6f") for part in quaternion_of(T)))
-    lines.append(f"{'method':<12}{'apart mm':>10}{'deg':>9}{'/ interval':>12}{'rms mm':>9}")
-    for each in found.methods:
-        values = f"{each.apart_mm:>10.3f}{each.apart_deg:>9.4f}{each.beyond:>12.2f}{each.rms_mm:>9.3f}"
-        lines.append(f"{METHODS[each.name]:<12}" + (values if each.X is not None else "      fails"))
-    lines += [f"direction: {say(each)}" for each in found.directions]
     if found.touch:
         far = 1000 * np.linalg.norm(found.touch.difference, axis=1).max()
         lines.append(f"touched points: {far:.2g} mm apart at most, probability {found.touch.probability:.2g}")
@@ -493,20 +398,6 @@ def hand_eye_record(
         "scatter": found.scatter,
         "camera_mm": float(1000 * found.deviations[0]),
         "camera_deg": float(np.degrees(found.deviations[1])),
-        "methods": [
-            {"name": each.name, "apart_mm": each.apart_mm, "apart_deg": each.apart_deg}
-            for each in found.methods
-            if each.X is not None
-        ],
-        "directions": [
-            {
-                "flange_inverted": each.flange_inverted,
-                "target_inverted": each.target_inverted,
-                "status": each.status,
-                "rms_mm": each.rms_mm,
-            }
-            for each in found.directions
-        ],
         "suspects": named(found.suspects),
         "left_out": named(boardless),
         "open_tilts": named(open_tilts),

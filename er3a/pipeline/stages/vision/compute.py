@@ -50,7 +50,7 @@ from er3a.vision.boards import ambiguous_tilts, projected
 from er3a.vision.calibration_set import CalibrationSet, TimeOffset
 from er3a.vision.grasp_motion import DEPTH, PARTS, GraspLeg
 from er3a.vision.grasping import ChosenGrasp, DetectedObject, GraspNeeds, GraspPlan, GraspTask, plan_grasp
-from er3a.vision.hand_eye import HandEye, MethodAnswer, TouchCheck, calibrate_hand_eye, spread_of
+from er3a.vision.hand_eye import HandEye, TouchCheck, calibrate_hand_eye, spread_of
 from er3a.vision.next_view import FieldOfView, in_sight, next_view
 from er3a.vision.point_error import ArmAccuracy, SeenPoseError, error_sizes, seen_pose, seen_pose_error
 from er3a.vision.table_corrections import (
@@ -254,7 +254,6 @@ def calibration_result(
         spread_deg=from_si("deg", turned),
         moved_mm=from_si("mm", moved),
         moved_deg=from_si("deg", tilted),
-        methods=tuple(map(_method, found.methods)),
         touch=_touch(found),
         next_view=view,
         time_offset=stated(model.OffsetResult, offset) if offset else None,
@@ -289,11 +288,6 @@ def _estimate(T: Reals, half_width: Reals) -> model.PoseEstimate:
 def _pose(T: Reals) -> dict[str, Reals]:
     """A transform (4, 4) as the fields of a result: position, roll-pitch-yaw, quaternion with its real part first."""
     return {"xyz": T[:3, 3], "rpy": rpy_of(T), "quaternion_wxyz": quaternion_of(T)}
-
-
-def _method(answer: MethodAnswer) -> model.MethodResult:
-    numbers = (answer.apart_mm, answer.apart_deg, answer.beyond, answer.rms_mm, answer.rms_deg)
-    return model.MethodResult(answer.name, *(None if answer.X is None else number for number in numbers))
 
 
 def _touch(found: HandEye) -> model.TouchResult | None:
@@ -344,12 +338,7 @@ VIEW_STREAM = 0
 LEG_ROWS = 13
 
 Found = (
-    model.CalibrationImpossible
-    | model.CalibrationDoubtful
-    | model.DirectionContradicted
-    | TouchContradicts
-    | model.GraspCounts
-    | ExpectationsUnmet
+    model.CalibrationImpossible | model.CalibrationDoubtful | TouchContradicts | model.GraspCounts | ExpectationsUnmet
 )
 
 
@@ -581,16 +570,10 @@ def _camera_at(robot: Robot, found: HandEye, picture: Reals | None) -> Reals:
 
 def _doubt(
     found: model.CalibrationResult, touch: TouchCheck | None
-) -> model.CalibrationDoubtful | model.DirectionContradicted | TouchContradicts | None:
+) -> model.CalibrationDoubtful | TouchContradicts | None:
     """Why no grasp may rest on a calibration; None if nothing contradicts it."""
     if doubts := grave_warnings(found.warnings):
         return model.CalibrationDoubtful(doubts)
-    given = found.directions[0]
-    best = next(each for each in found.directions if each.status == "best")
-    if given.status == "excluded":
-        return model.DirectionContradicted(
-            best.flange_inverted, best.target_inverted, best.rms_mm or np.nan, given.rms_mm or 0.0
-        )
     return touch.contradiction if touch else None
 
 

@@ -15,12 +15,10 @@ from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.vision.boards import AmbiguousTilt, BoardlessImage
 from er3a.vision.calibration_set import Setup
-from er3a.vision.classic_methods import MethodName
 from er3a.vision.grasping import GraspRefusal
 from er3a.vision.table_corrections import NoCorrections
 from er3a.vision.vision_findings import (
     CalibrationWarning,
-    DirectionTried,
     GraspOutcome,
     NotCalibratable,
     RepeatedPose,
@@ -39,15 +37,6 @@ class CalibrationDoubtful(Finding):
     """The samples contradict each other, or this robot's table."""
 
     warnings: tuple[CalibrationWarning, ...]
-
-
-class DirectionContradicted(Finding):
-    """The samples fit far better with one of the streams inverted."""
-
-    flange_inverted: bool
-    target_inverted: bool
-    rms_mm: float
-    rms_given_mm: float
 
 
 class NotGraspedObject(Finding):
@@ -94,23 +83,6 @@ class PoseEstimate:
     quaternion_wxyz: tuple[float, float, float, float]
     half_width_mm: Three
     half_width_deg: Three
-
-
-@dataclass(frozen=True)
-class MethodResult:
-    """A closed form's hand-eye pose against the likeliest one; None where it fails.
-
-    Attributes
-    ----------
-    beyond : the largest difference of its six numbers, in half widths of the 95 % interval
-    """
-
-    method: MethodName
-    apart_mm: float | None
-    apart_deg: float | None
-    beyond: float | None
-    rms_mm: float | None
-    rms_deg: float | None
 
 
 @dataclass(frozen=True)
@@ -227,8 +199,6 @@ class CalibrationResult:
     warnings: tuple[CalibrationWarning, ...]
     moved_mm: float | None
     moved_deg: float | None
-    methods: tuple[MethodResult, ...]
-    directions: tuple[DirectionTried, ...]
     touch: TouchResult | None
     next_view: ViewToAdd | None
     time_offset: OffsetResult | None
@@ -322,14 +292,7 @@ class VisionSummary(Summary):
 
     decisive = NEVER_A_PASS | {"carried"}
 
-    verdict: Verdict[
-        CalibrationImpossible
-        | CalibrationDoubtful
-        | DirectionContradicted
-        | TouchContradicts
-        | GraspCounts
-        | ExpectationsUnmet
-    ]
+    verdict: Verdict[CalibrationImpossible | CalibrationDoubtful | TouchContradicts | GraspCounts | ExpectationsUnmet]
     title: str
     scene: str | None
     least_success: float

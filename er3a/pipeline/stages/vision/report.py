@@ -16,10 +16,7 @@ from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
 from er3a.pipeline.messages.vision import (
-    DIRECTION_STATUS,
-    METHODS,
     correction_verdict,
-    direction_word,
     pose_words,
 )
 from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion
@@ -179,7 +176,6 @@ def _range(values: Reals, low: str, high: str) -> dict[str, str]:
     return {low: fixed(float(values.min()), 2), high: fixed(float(values.max()), 2)}
 
 
-NEARLY_HALF_TURN = 170.0  # deg; see MIN_COSINE (169 deg) in er3a/vision/classic_methods.py
 POINTER_M = 0.15
 WAYS = {"move": N_("move to the approach"), "approach": N_("approach"), "retreat": N_("retreat")}
 AXES = ("x", "y", "z")
@@ -211,9 +207,6 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
         poses=_poses(found) if found else [],
         suspects=listed((*found.suspects, *found.open_tilts, *found.boardless)) if found else [],
         warnings=listed(found.warnings) if found else [],
-        methods=_methods(found) if found else [],
-        disagreement=_disagreement(found) if found else "",
-        directions=_directions(found) if found else [],
         corrections=_corrections(found.table) if found and isinstance(found.table, model.TableResult) else [],
         held=_held(found.table) if found else [],
         corrected=_corrected(found.table) if found and isinstance(found.table, model.TableResult) else "",
@@ -294,55 +287,6 @@ def _pose_rows(pose: model.PoseEstimate) -> list[list[str]]:
         for name, value, half, axis in zip(names, pose.rpy_deg, pose.half_width_deg, AXES)
     ]
     return [*shifts, *turns]
-
-
-def _methods(found: model.CalibrationResult) -> list[list[str]]:
-    rows = [[tr("maximum likelihood"), "", "", "", fixed(_rms(found), 2)]]
-    for each in found.methods:
-        numbers = ((each.apart_mm, 2), (each.apart_deg, 3), (each.beyond, 1), (each.rms_mm, 2))
-        cells = [tr("fails") if value is None else fixed(value, decimals) for value, decimals in numbers]
-        rows.append([METHODS[each.method], *cells])
-    return rows
-
-
-def _rms(found: model.CalibrationResult) -> float:
-    return found.directions[0].rms_mm or 0.0
-
-
-def _disagreement(found: model.CalibrationResult) -> str:
-    off = [METHODS[each.method] for each in found.methods if each.beyond is not None and each.beyond > 1]
-    if not off:
-        return tr(
-            "All closed-form methods are within the 95 % intervals of the maximum-likelihood pose: the choice "
-            "hardly matters."
-        )
-    why = (
-        tr(
-            "Some motions rotate by nearly 180 deg, where the smallest error flips the sign of quaternions and "
-            "axes: this affects Tsai, Horaud and Daniilidis most."
-        )
-        if found.greatest_turn_deg > NEARLY_HALF_TURN
-        else ""
-    )
-    weights = tr(
-        "Outside the 95 % intervals: {names}. Closed-form methods weight all samples and coordinates equally, "
-        "and most solve for the rotation first, so its error enters the position; the maximum-likelihood pose "
-        "weights each coordinate by its standard deviation.",
-        names=joined(off, ", "),
-    )
-    return joined([weights, why], " ")
-
-
-def _directions(found: model.CalibrationResult) -> list[list[str]]:
-    return [
-        [
-            direction_word(each),
-            tr("fails") if each.rms_mm is None else fixed(each.rms_mm, 2),
-            tr("fails") if each.rms_deg is None else fixed(each.rms_deg, 2),
-            word("vision.direction_status", DIRECTION_STATUS, each.status),
-        ]
-        for each in found.directions
-    ]
 
 
 def _corrections(found: model.TableResult) -> list[list[str]]:
