@@ -60,7 +60,8 @@ def _speeds(motions: list[tuple[Step, ArmMotion]]) -> Iterator[tuple[Step, Suspe
 
 def _used_once(frames: list[tuple[Step, NamedFrame]]) -> Iterator[tuple[Step, str, str]]:
     """Frames that one motion alone has, between others that have one in common."""
-    keys = [each.name if each.pose is None else each.pose.round(6).tobytes() for _, each in frames]
+    frames = [(step, each) for step, each in frames if each.pose is not None]
+    keys = [b"" if each.pose is None else each.pose.round(6).tobytes() for _, each in frames]
     count = Counter(keys)
     for i, (step, frame) in enumerate(frames):
         near = {keys[k] for k in (i - 1, i + 1) if 0 <= k < len(keys)}

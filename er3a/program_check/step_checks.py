@@ -238,7 +238,7 @@ class Judge:
             return None
         inside = [equivalents_within(checked.arm, row, reference) for row in rows]
         rows = np.concatenate([each for each in inside if len(each)] or [rows])
-        if checked.motion.kind == "joint" and target.branch is not None:
+        if (checked.motion.kind == "joint" or before is None) and target.branch is not None:
             met = solutions_meant(target.branch, checked.arm, rows)
             if not met.any():
                 checked.add(found_in.ConfigurationNotMet(_configuration(target)))
