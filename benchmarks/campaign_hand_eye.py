@@ -8,7 +8,7 @@ from testing.evidence import sized
 from testing.hand_eye_coverage import BOARDS, SAMPLES, board_coverage, pose_coverage, table_coverage
 
 SETUPS = ("eye_in_hand", "eye_to_hand")
-SETS, RUNS, TABLE_RUNS, BOARD_RUNS, SEED = sized(10), sized(50), sized(100), sized(100), 20261121
+SETS, RUNS, TABLE_RUNS, BOARD_RUNS, SEED = sized(10), sized(50), sized(100), sized(40), 20261121
 
 
 def _error(runs: int) -> str:

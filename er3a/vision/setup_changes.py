@@ -18,7 +18,7 @@ from er3a.vision.classic_methods import mean_pose
 from er3a.vision.likelihood import UNKNOWNS, Refined, residuals
 from er3a.vision.vision_findings import MovedBetween
 
-CHANCE = 1e-6  # of sound sets in which a step is found
+CHANCE = 3e-5  # of sound sets in which a step is found
 MIN_BLOCK = 2  # samples on either side of a step
 EXPLAINED = 3.0  # standard deviations
 SOLVABLE = 1e8  # condition of a step's equations, beyond which the samples on one side of it don't determine it
