@@ -17,10 +17,7 @@ import fcntl
 import gc
 import hashlib
 import os
-import pickle
 import re
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -31,7 +28,6 @@ from itertools import pairwise
 from numbers import Integral
 from pathlib import Path
 from queue import Empty, SimpleQueue
-from tempfile import TemporaryFile
 from typing import Any, TypeVar, cast
 
 import numba
@@ -100,29 +96,6 @@ def _counted() -> Iterator[None]:
         _waited.depth -= 1
         if not _waited.depth:
             _waited.seconds += time.monotonic() - start
-
-
-@contextmanager
-def compiling_beside(kernel: Callable[..., Any], work: Callable[..., object], *given: object) -> Iterator[None]:
-    """Unless a kernel is compiled already, another process does ``work(*given)`` meanwhile, for all that it compiles.
-
-    It ends with the block. What it compiles, this process waits for, or loads.
-    """
-    cache, other = getattr(kernel, "_cache", None), None
-    if isinstance(cache, _KernelCache) and not any(Path(cache.cache_path).glob(f"{kernel.__name__}-*.nbi")):
-        load = "import pickle, sys; work, given = pickle.load(sys.stdin.buffer); work(*given)"
-        words = [sys.executable, "-P", "-c", load]
-        # Where no other process can be had, this one compiles all.
-        with suppress(OSError, TypeError, pickle.PicklingError), TemporaryFile() as told:
-            told.write(pickle.dumps((work, given)))
-            told.seek(0)
-            other = subprocess.Popen(words, stdin=told, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    try:
-        yield
-    finally:
-        if other is not None:
-            other.kill()
-            other.wait()
 
 
 def _compiled(function: Function, kind: type[_Kernel], **wrappers: bool) -> Function:

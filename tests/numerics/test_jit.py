@@ -5,12 +5,10 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import time
-from pathlib import Path
 
 import pytest
 
-from er3a.numerics.jit import cache_folder, compile_seconds, compiling_beside, inner_kernel, kernel
+from er3a.numerics.jit import cache_folder, compile_seconds, inner_kernel, kernel
 from testing.small_study import ROOT
 
 
@@ -37,31 +35,6 @@ def test_waiting_for_kernels_is_counted_and_their_work_is_not():
     assert waited > before
     _cubes_and_squares(2.0)
     assert compile_seconds() == waited
-
-
-@kernel
-def _halved(x: float) -> float:
-    return 0.5 * x
-
-
-def test_another_process_works_beside_until_a_kernel_is_compiled(tmp_path):
-    def forget() -> None:
-        for file in Path(_halved._cache.cache_path).glob("_halved-*.nbi"):
-            file.unlink()
-
-    forget()
-    for name in ("compiling", "compiled"):
-        with compiling_beside(_halved, Path.touch, tmp_path / name):
-            _halved(1.0)
-            deadline = time.monotonic() + (20 if name == "compiling" else 0)
-            while not (tmp_path / name).exists() and time.monotonic() < deadline:
-                time.sleep(0.01)
-    assert [path.name for path in tmp_path.iterdir()] == ["compiling"]
-    forget()
-    start = time.monotonic()
-    with compiling_beside(_halved, time.sleep, 60):
-        pass
-    assert time.monotonic() - start < 30  # it ended with the block
 
 
 def test_an_inner_kernel_is_not_called_from_python():
