@@ -273,7 +273,7 @@ def test_a_long_program_has_a_verdict_for_each_line(suffix, count, tmp_path):
     (tmp_path / f"a{suffix}").write_text(text)
     check = check_program(read_program(tmp_path / f"a{suffix}"), ROBOT, CheckOptions(start=HOME))
     assert len(check.verdicts) == count
-    assert {"target_out_of_reach", "above_limit"} & {
+    assert {"target_out_of_reach", "way_out_of_reach", "above_limit"} & {
         each.finding.code for each in check.findings if each.place.line > 0.99 * count
     }
 
