@@ -49,6 +49,7 @@ from er3a.numerics.si_units import limit_in_degrees
 from er3a.robots.masses import Drives, LinkMass, MassBody, Masses, NoBody, moved, nearest_body, no_body, together
 from er3a.robots.robot import ConvexPiece, Envelope, LinkMesh, Robot
 
+MOST_CORNERS = 100  # of a hull, which stands in the robot file; with more a convex mesh is kept as a surface beside it
 MOVING = ("revolute", "continuous", "prismatic")
 FREE = ("floating", "planar")
 SNAP_RAD = 1e-4
@@ -715,7 +716,8 @@ def collision_shapes(
             if mesh is None:
                 return []
             corners, faces, closed = mesh
-            if not ("margin" in collision.attrib or (closed and is_convex(corners, faces))):
+            few = len(corners) <= MOST_CORNERS
+            if not ("margin" in collision.attrib or (closed and few and is_convex(corners, faces))):
                 return [LinkMesh(link, corners @ T[:3, :3].T + T[:3, 3], faces)]
             corners = hull_corners(corners)
         case tag:
