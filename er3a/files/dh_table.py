@@ -123,10 +123,7 @@ def read_dh_table(
     if len(stated := {row["convention"] for row in rows} if "convention" in given else {convention}) > 1:
         raise InputError(path, "column convention", "two conventions in one table", "Write the same in all rows")
     convention = next(iter(stated), convention)
-    for unit in ("deg", "mm"):
-        if len(pair := given & {f"lower_{unit}", f"upper_{unit}"}) == 1:
-            missing = ({f"lower_{unit}", f"upper_{unit}"} - pair).pop()
-            raise InputError(path, f"column {missing}", "missing beside the other limit", "Give both limits, or none")
+    _check_pairs_of_limits(path, given)
     notes += _fixed_said(rows)
     rows, placed = _without_fixed_rows(rows, convention)
     if [row["joint"] for row in rows] != list(range(1, len(rows) + 1)) or not 1 <= len(rows) <= MAX_JOINTS:
@@ -147,6 +144,14 @@ def read_dh_table(
     if short or 0 < longest < SHORTEST_ARM_MM:
         content["dh"]["calibrated"] = True  # lengths of a millimetre or less are meant
     return parse(RobotFile, content, path, AS_PRINTED if as_printed else None), tuple(notes)
+
+
+def _check_pairs_of_limits(path: Path, given: set[str]) -> None:
+    """Reject a column of limits without that of the other ends."""
+    for unit in ("deg", "mm"):
+        if len(pair := given & {f"lower_{unit}", f"upper_{unit}"}) == 1:
+            missing = ({f"lower_{unit}", f"upper_{unit}"} - pair).pop()
+            raise InputError(path, f"column {missing}", "missing beside the other limit", "Give both limits, or none")
 
 
 def _short_lengths(path: Path, rows: list[dict[str, Any]], own: set[str], as_printed: bool, meant: bool) -> bool:

@@ -25,6 +25,11 @@ TOOLS_EQUAL = 1e-9  # m, and of axes
 OF_A_TABLE = ("column", "angles", "alpha", "offset", "dh.rows")  # keys of numbers that a comparison looks at
 _ARM = "a D-H table (.csv), a robot's name or file, a URDF or xacro"
 
+Lengths = Annotated[
+    LengthUnit | None, typer.Option(help="unit of lengths in D-H tables (default: that of their columns)")
+]
+Angles = Annotated[AngleUnit | None, typer.Option(help="unit of angles in D-H tables (default: that of their columns)")]
+
 
 @app.command(rich_help_panel=ROBOT_FILES)
 def compare(
@@ -32,14 +37,8 @@ def compare(
     b: Annotated[str, typer.Argument(metavar="B", help="the arm to compare with: as A, or a folder of such files")],
     *,
     convention: Annotated[Convention, typer.Option(help="D-H convention of tables")] = "standard",
-    length_unit: Annotated[
-        LengthUnit | None,
-        typer.Option(help="unit of lengths in D-H tables (default: that of their columns)"),
-    ] = None,
-    angle_unit: Annotated[
-        AngleUnit | None,
-        typer.Option(help="unit of angles in D-H tables (default: that of their columns)"),
-    ] = None,
+    length_unit: Lengths = None,
+    angle_unit: Angles = None,
     base: Annotated[str | None, typer.Option(help="the link of the URDF at which the arm begins")] = None,
     tip: Annotated[str | None, typer.Option(help="the link of the URDF at which the arm ends")] = None,
     xacro: Xacro = None,

@@ -38,6 +38,7 @@ BaselineFile = Annotated[
     Path | None, typer.Option(callback=given_files, help="a SARIF file: its findings are accepted")
 ]
 
+Verdicts = Annotated[bool, typer.Option("--verdicts", help="print a line for each motion, also for those that pass")]
 Seconds = Annotated[
     float,
     typer.Option(help="time to read files and to prove clearance between points of motions, without compiling", min=1),
@@ -61,9 +62,7 @@ def check_program(
     assume: Assumed = None,
     require: Annotated[str, typer.Option(help="checks without which nothing passes: scene,tool")] = "",
     every: Annotated[bool, typer.Option("--all", "-v", help="print each finding by itself, notes too")] = False,
-    verdicts: Annotated[
-        bool, typer.Option("--verdicts", help="print a line for each motion, also for those that pass")
-    ] = False,
+    verdicts: Verdicts = False,
     sarif: Annotated[Path | None, typer.Option(help="write the findings as SARIF 2.1.0 to this file")] = None,
     baseline: BaselineFile = None,
     seconds: Seconds = 30.0,
