@@ -158,7 +158,7 @@ def test_circular_imports_end(package):
 
 WORDINGS = """
 from importlib import import_module
-from er3a.pipeline.messages import language
+from er3a.pipeline import language
 from er3a.pipeline.messages.say import sentence
 from er3a.pipeline.stages.registry import STAGES
 for stage in STAGES.values():

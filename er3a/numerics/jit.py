@@ -21,7 +21,6 @@ from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
 
 import numba
-from numba import config
 from numba.core import event
 from numba.core.caching import UserProvidedCacheLocator
 
@@ -85,7 +84,7 @@ class _Waiting(event.Listener):
 
 
 _waiting = _Waiting()
-event.register("numba:compiler_lock", _waiting)
+event.register("numba:compiler_lock", _waiting)  # type: ignore[no-untyped-call]
 
 
 def compile_seconds() -> float:
@@ -112,14 +111,16 @@ def inner_kernel(function: Function) -> Function:
 
 
 def _compiled(function: Function, **wrappers: bool) -> Function:
+    config: Any = numba.config
+    compiling: Any = numba.njit
     options = {"error_model": "numpy", "nogil": True, "no_cfunc_wrapper": True, **wrappers}
     before = config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES
     config.CACHE_DIR = str(kernels_folder())
     config.CACHE_LOCATOR_CLASSES = f"{__name__}.{SharedByCopies.__name__}"
     try:
-        compiled: Function = numba.njit(function, cache=True, **options)
+        compiled: Function = compiling(function, cache=True, **options)
     except RuntimeError:  # no folder to write into: compiled again by each process
-        compiled = numba.njit(function, **options)
+        compiled = compiling(function, **options)
     finally:  # other packages keep what they compile where they always do
         config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES = before
     return compiled

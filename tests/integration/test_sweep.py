@@ -9,10 +9,10 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from er3a.pipeline.overview.index import write_index
 from er3a.pipeline.results import read_stage
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import load_study
-from er3a.pipeline.viewing.index import write_index
 from tests.conftest import ROBOTS
 from tests.viewing.untranslated import PageTexts, plain_words, texts_from_files, wide_letters
 

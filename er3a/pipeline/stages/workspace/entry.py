@@ -12,7 +12,7 @@ from er3a.files.reference_sets import reference_folder
 from er3a.files.robot_file import Text
 from er3a.files.units import MAX_DISTANCE_MM, Triple, as_millimetres
 from er3a.files.yaml_file import StrictModel
-from er3a.pipeline.messages.language import N_
+from er3a.pipeline.language import N_
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.stage import Stage, StudyFiles
 
@@ -105,5 +105,4 @@ STAGE = Stage(
     inputs=_inputs,
     rests_on=("validation",),
     shows=("inverse", "trajectory", "programs", "vision", "dynamics"),
-    sampled=True,
 )
