@@ -11,9 +11,11 @@ from functools import cache
 from pathlib import Path
 
 _PACKAGE = Path(__file__).resolve().parents[1]
-VIEWS = ("messages", "viewing", "player", "teach", "article", "overview", "commands", "new_study", "page")
-"""Folders below ``pipeline/`` of which no number depends; import-linter holds that computing imports none of them."""
-_KINDS = (".py", ".j2", ".css", ".js", ".po")
+FOLDERS = "messages", "viewing", "player", "teach", "page", "overview", "article", "commands", "new_study"
+FILES = "check", "cli", "dictionary", "program_reports", "run_study", "verdicts", "working_folder"
+VIEWS = frozenset((*FOLDERS, *(f"{name}.py" for name in FILES)))
+"""Folders and files of ``pipeline/`` on which no number rests: computing imports none of them (import-linter)."""
+_KINDS = (".py", ".j2", ".css", ".js")
 
 
 @cache
@@ -38,4 +40,4 @@ def _digest(views: bool) -> str:
 
 
 def _is_view(name: Path) -> bool:
-    return name.parts[0] == "pipeline" and not set(VIEWS).isdisjoint(name.parts[1:-1])
+    return name.parts[0] == "pipeline" and not VIEWS.isdisjoint(name.parts)

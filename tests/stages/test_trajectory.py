@@ -26,7 +26,6 @@ from er3a.kinematics.singularity import characteristic_length, conditioning
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.messages.trajectory import KEY_FIGURES, advice, cause_text, path_text, repair_text, strategy_word
 from er3a.pipeline.overview.index import write_index
-from er3a.pipeline.overview.tray import Meeting
 from er3a.pipeline.results import (
     AbsentResults,
     NotComputed,
@@ -54,6 +53,7 @@ from er3a.pipeline.stages.trajectory.motion import limits_of, near_singular, pla
 from er3a.pipeline.stages.trajectory.page.played import faults, motions
 from er3a.pipeline.stages.trajectory.page.record import record
 from er3a.pipeline.stages.trajectory.page.report import report, strategies_shown
+from er3a.pipeline.stages.workspace.page.tray import Meeting
 from er3a.pipeline.study import Study, load_study
 from er3a.pipeline.teach import panel
 from er3a.pipeline.teach.panel import write_teach_page

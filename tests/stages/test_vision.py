@@ -15,12 +15,12 @@ from PIL import Image
 from er3a.files.kept_files import ROOT
 from er3a.files.vision_file import load_vision
 from er3a.pipeline.messages.vision import say
-from er3a.pipeline.overview.tray import sound_motions
 from er3a.pipeline.results import read_results
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.vision.compute import _left_out, figures_of, verdict_of
 from er3a.pipeline.stages.vision.model import VisionResults
+from er3a.pipeline.stages.workspace.page.tray import sound_motions
 from er3a.pipeline.study import load_study
 from testing.hand_eye_sets import pose
 from testing.on_demand import OnDemand

@@ -42,7 +42,6 @@ from er3a.pipeline.messages.validation import (
     unconfirmed,
 )
 from er3a.pipeline.messages.workspace import judged_void, no_box_text, run_again_text, void_text
-from er3a.pipeline.overview.tray import MOTIONS, Placing, placing, scene_of, sound_motions
 from er3a.pipeline.player.motions import Fault, FaultMoment
 from er3a.pipeline.results import (
     THE_CODE,
@@ -75,6 +74,7 @@ from er3a.pipeline.stages.validation.model import (
 )
 from er3a.pipeline.stages.validation.page.evidence_section import evidence_section
 from er3a.pipeline.stages.workspace.model import VoidSummary, WorkspaceResults, WorkspaceSummary
+from er3a.pipeline.stages.workspace.page.tray import MOTIONS, Placing, placing, scene_of, sound_motions
 from er3a.pipeline.study import Study
 from er3a.pipeline.sweeps import ENTRIES, entry_label
 from er3a.pipeline.verdicts import NOT_EXAMINED, StageVerdict, read_verdicts, write_junit

@@ -16,7 +16,6 @@ from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.programs import cycle_text, level_word, remedies, remedy, singular_cause
 from er3a.pipeline.messages.say import bracketed, say
 from er3a.pipeline.messages.trajectory import limits_assumed
-from er3a.pipeline.overview.tray import compared_with_tray, in_tray
 from er3a.pipeline.player.player import drawing_head, moment, player, stretch
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.programs import model
@@ -31,6 +30,7 @@ from er3a.pipeline.stages.programs.page.played import (
     when,
     worst_first,
 )
+from er3a.pipeline.stages.workspace.page.tray import compared_with_tray, in_tray
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.conditions import condition_of
 from er3a.pipeline.viewing.page import render_stage

@@ -29,7 +29,6 @@ from er3a.pipeline.messages.trajectory import (
     reasons,
     strategy_word,
 )
-from er3a.pipeline.overview.tray import Meeting, compared_with_tray, linked, met_in_tray
 from er3a.pipeline.player.motions import PlayedEvent
 from er3a.pipeline.player.player import drawing_head, moment, player
 from er3a.pipeline.results import LeftOut, Stored
@@ -46,6 +45,7 @@ from er3a.pipeline.stages.trajectory.page.played import (
     worst_first,
 )
 from er3a.pipeline.stages.trajectory.written_programs import repair_name
+from er3a.pipeline.stages.workspace.page.tray import Meeting, compared_with_tray, linked, met_in_tray
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.conditions import condition_of, program_head
 from er3a.pipeline.viewing.figures import readings

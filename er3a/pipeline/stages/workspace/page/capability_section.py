@@ -33,10 +33,10 @@ from er3a.pipeline.messages.workspace import (
     run_again_text,
     stand_text,
 )
-from er3a.pipeline.overview.tray import Placing, Tray, limit_text
 from er3a.pipeline.player.motions import address_of
 from er3a.pipeline.player.turning import CIRCLE
 from er3a.pipeline.stages.workspace import model
+from er3a.pipeline.stages.workspace.page.tray import Placing, Tray, limit_text
 from er3a.pipeline.stages.workspace.page.workspace_figures import name_level, slide_names
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.figures import equal_scale, new_figure

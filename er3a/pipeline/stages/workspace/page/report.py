@@ -14,13 +14,13 @@ from er3a.pipeline.messages.dynamics import payload_text
 from er3a.pipeline.messages.numbers import at_least, at_most, fixed, number
 from er3a.pipeline.messages.say import bracketed, joined, say, sentence, word
 from er3a.pipeline.messages.workspace import VOID_KINDS, VOID_STATUS, entry_word
-from er3a.pipeline.overview.tray import Placing, placing_of
 from er3a.pipeline.player.player import drawing_head
 from er3a.pipeline.results import Stored, is_computed, read_stage
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.page import workspace_figures
 from er3a.pipeline.stages.workspace.page.capability_section import capability_context
+from er3a.pipeline.stages.workspace.page.tray import Placing, placing_of
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.page import Picture, render_stage
 from er3a.robots.robot import Robot
