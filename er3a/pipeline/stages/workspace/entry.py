@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -15,9 +14,6 @@ from er3a.files.yaml_file import StrictModel
 from er3a.pipeline.language import N_
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.stage import Stage, StudyFiles
-
-SAMPLES_PER_JOB = 1_000_000_000
-"""About ten seconds, of which starting is a tenth."""
 
 
 class WorkspaceSettings(StrictModel):
@@ -44,11 +40,6 @@ class WorkspaceSettings(StrictModel):
         if self.samples < self.blocks:
             raise ValueError(f"{self.samples} samples can't fill {self.blocks} blocks | Lower workspace.blocks")
         return self
-
-    @property
-    def parts(self) -> int:
-        """The number of jobs that the blocks are grouped into."""
-        return min(self.blocks, math.ceil(self.samples / SAMPLES_PER_JOB))
 
 
 class BoxTask(StrictModel):
