@@ -228,9 +228,7 @@ def state_word(state: PairState) -> str:
     return word("collision.state", STATES, state)
 
 
-def why(
-    state: PairState, least_mm: float, left_out_mm: float, boxes: int, witness: str, reason: str, *, assumed: bool
-) -> str:
+def why(state: PairState, least_mm: float, boxes: int, witness: str, reason: str, *, assumed: bool) -> str:
     """Why a pair is watched or not.
 
     Parameters
@@ -265,20 +263,8 @@ def why(
             )
         case "guessed":
             return tr(
-                "Joints hold them, and the table does not say how long the link between them is, or how far apart they "
-                "lie side by side, so the guessed shapes overlap in a tenth or more of the joint vectors tried, or one "
-                "lies nearly whole in the region around the joint. Not checked: give shapes in the robot's file."
+                "The shapes guessed from the table are too coarse here. Not checked: give shapes in the robot's file."
             )
-    if not left_out_mm:
-        return tr("They collide at joint values ({witness}).", witness=witness)
-    joined = tr(
-        "They touch by design: the region within {radius:.0f} mm of their joint is left out.", radius=left_out_mm
-    )
-    if witness:
-        return tr(
-            "{first} {rest}", first=joined, rest=tr("Outside that region they collide at ({witness}).", witness=witness)
-        )
-    rest = tr(
-        "Outside that region no collision was found; if one of them lies within it as a whole, nothing is checked."
-    )
-    return tr("{first} {rest}", first=joined, rest=rest)
+        case "joined":
+            return tr("A joint joins them. Not checked.")
+    return tr("They collide at joint values ({witness}).", witness=witness)
