@@ -201,7 +201,7 @@ def clearance_along(
     at = np.array(sorted(time for time, found in motion.known.items() if not np.isnan(found).any()))
     at = np.union1d(at, shown[~np.isin(shown, at)])
     unknown = np.full(len(every), np.nan)
-    rows = np.array([motion.known.get(time, unknown) for time in at])
+    rows = bodies.counted(np.array([motion.known.get(time, unknown) for time in at]))
     blind = np.asarray(np.isnan(rows).any(axis=1) | np.isinf(rows).all(axis=1))
     distance = np.where(blind, np.nan, rows.min(axis=1))
     pair = tuple(None if b else bodies.pairs[int(np.argmin(row))] for b, row in zip(blind, rows))
@@ -247,7 +247,8 @@ def _refine(motion: _Motion, times: Reals, q: Reals, travel: Reals, step: float)
     """Measure between known points until each pair is free in all of an interval, or overlaps in it, or it is short."""
     every = np.arange(len(motion.bodies.pairs))
     known = [i for i, time in enumerate(times) if time in motion.known]
-    best = min(float(motion.known[times[i]].min()) for i in known)
+    bodies = motion.bodies
+    best = min(float(bodies.counted(motion.known[times[i]]).min()) for i in known)
     waiting = [(a, b, every) for a, b in pairwise(known)]
     while waiting:
         a, b, pairs = waiting.pop()
@@ -256,7 +257,7 @@ def _refine(motion: _Motion, times: Reals, q: Reals, travel: Reals, step: float)
         if b - a < 2:
             continue
         apart = before[pairs] + after[pairs]
-        free = apart - moved >= 2 * max(best, 0.0)
+        free = apart - moved >= np.where(bodies.joined[pairs], 0.0, 2 * max(best, 0.0))
         if not (~free & (apart > -moved) & (moved > step)).any():
             continue
         pairs = pairs[~free]
@@ -264,7 +265,7 @@ def _refine(motion: _Motion, times: Reals, q: Reals, travel: Reals, step: float)
             np.clip(np.searchsorted(travel[a : b + 1].sum(axis=1), travel[[a, b]].sum() / 2) + a, a + 1, b - 1)
         )
         found = motion.measure(times[middle], q[middle], pairs)
-        nearest = float(np.nanmin(found))
+        nearest = float(np.nanmin(bodies.counted(found)))
         if nearest < best:
             best = nearest
             motion.measure(times[middle], q[middle], every)

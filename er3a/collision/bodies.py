@@ -5,7 +5,7 @@ The base is not paired with the scene: it does not move, and it is mounted on so
 
 from __future__ import annotations
 
-from itertools import product
+from itertools import compress, product
 
 import numpy as np
 
@@ -42,7 +42,8 @@ class Bodies:
     pairs : P, what meets what
     matrix : what was found of each pair of links
     in_error : pairs whose shapes overlap where no arm's can (:mod:`er3a.collision.matrix`), so that they are left out
-    guessed : pairs that are left out because capsules guessed from a table can't show how near they come
+    guessed : pairs that are left out because capsules guessed from a table are too coarse there
+    joined : (P,), whether a joint joins the two, so that only overlap of what is left of them means anything
     layout : the same as arrays, solids among the bodies
     """
 
@@ -52,18 +53,20 @@ class Bodies:
         self.robot, self.scene = robot, scene
         own, carried = arm_bodies(robot), carried_bodies(robot, scene)
         matrix = collision_matrix(robot)
-        watched = list(matrix.watched)
+        watched, joined = list(matrix.watched), list(matrix.joined)
         self.matrix: tuple[MatrixRow, ...] = matrix.rows
         rules = scene.pair_rules if scene else ()
         if carried:
             more = matrix_of(robot, list(product(own, carried)), rules)
             watched += more.watched
+            joined += more.joined
             self.matrix += more.rows
         moving = [body for body in (*own, *carried) if body.link != BASE]
         solids = [body for solid in (scene.solids if scene else ()) for body in solid_bodies(solid)]
         allowed = {frozenset((rule.first, rule.second)) for rule in rules if rule.rule == "allow"}
         around = [(b, s) for s in solids for b in moving if frozenset((b.name, s.name)) not in allowed]
-        watched = [(a, b) for a, b in watched if frozenset((a.name, b.name)) not in allowed]
+        kept = [frozenset((a.name, b.name)) not in allowed for a, b in watched]
+        watched, joined = list(compress(watched, kept)), list(compress(joined, kept)) + [False] * len(around)
         numbers = {link_label(k): k for k in range(robot.rows + 1)}
         self.in_error, self.guessed = (
             tuple[Pair, ...](
@@ -84,7 +87,8 @@ class Bodies:
         pairs = [(number[id(a)], number[id(b)]) for a, b in (*watched, *around)]
         self._all, count = tuple(bodies), len(bodies) - len(solids)
         self.capsules = self._all[:count]
-        self.layout = layout_of(robot, bodies, pairs)
+        self.layout = layout_of(robot, bodies, pairs, joined)
+        self.joined = self.layout.joined
         self.first = self.layout.first
         self.second = np.where(self.layout.second < count, self.layout.second, -1)
         self.pairs: tuple[Pair, ...] = tuple(named_pair(a, b) for a, b in (*watched, *around))
@@ -105,6 +109,10 @@ class Bodies:
     def distances(self, q: Reals, pairs: Integers) -> Reals:
         """Distances (len(pairs),) in m of some pairs, negative by the depth of overlap, of one arm (n,)."""
         return self.nearest(q, pairs)[0]
+
+    def counted(self, distances: Reals) -> Reals:
+        """Distances (..., P) as they are counted: infinite for joined pairs that don't overlap."""
+        return np.where(self.joined & (distances > 0), np.inf, distances)
 
     def nearest(self, q: Reals, pairs: Integers) -> tuple[Reals, Reals]:
         """Distances as :meth:`distances`, and the points (len(pairs), 2, 3), m, where the bodies' cores are nearest."""
@@ -143,11 +151,14 @@ class Bodies:
         return found
 
     def free(self, q: Reals, margin: float = 0.0) -> Flags:
-        """Whether nothing overlaps, (N,), in arms (N, n), and all is a margin (m) apart."""
+        """Whether nothing overlaps, (N,), in arms (N, n), and what no joint holds together is a margin (m) apart."""
         q = np.ascontiguousarray(q, float)
-        found = np.zeros((len(q), 1), bool)
-        which_overlap(self.layout if margin <= 0 else _grown(self.layout, margin), q, found)
-        return ~found[:, 0]
+        clear = np.ones(len(q), bool)
+        for layout in (self.layout,) if margin <= 0 else _apart_by(self.layout, margin):
+            found = np.zeros((int(clear.sum()), 1), bool)
+            which_overlap(layout, q[clear], found)
+            clear[clear] = ~found[:, 0]
+        return clear
 
     def surface_points(self, q: Reals, pair: int) -> Reals:
         """The points (2, 3), m, on the surfaces of a pair's bodies that are nearest, for an arm (n,)."""
@@ -187,9 +198,16 @@ def named_pair(first: Body, second: Body) -> Pair:
     return LinkPair(first.link, second.link) if is_link[1] else CarriedAndLink(second.name, first.link)
 
 
-def _grown(layout: Layout, margin: float) -> Layout:
-    """Bodies larger by half a margin (m) all around."""
-    solid, by = layout.kind != HALF_SPACE, margin / 2
+def _apart_by(layout: Layout, margin: float) -> tuple[Layout, Layout]:
+    """The pairs that no joint holds together, of bodies larger by half a margin (m) all around, and the other pairs."""
+    solid, apart, by = layout.kind != HALF_SPACE, ~layout.joined, margin / 2
     points = layout.points.copy()
     points[layout.start[:-1][~solid] + 1, 0] += by
-    return layout._replace(points=points, radius=layout.radius + by * solid, reach=layout.reach + by)
+    grown = layout._replace(points=points, radius=layout.radius + by * solid, reach=layout.reach + by)
+    return _of_pairs(grown, apart), _of_pairs(layout, layout.joined)
+
+
+def _of_pairs(layout: Layout, kept: Flags) -> Layout:
+    """A layout with some of its pairs."""
+    of_pairs = ("first", "second", "joined", "inner")
+    return layout._replace(**{name: getattr(layout, name)[kept] for name in of_pairs})

@@ -54,6 +54,7 @@ class Layout(NamedTuple):
     kind : (B,); radius, disc : (B,), m; centre : (B, 3), reach : (B,), of a ball around the body, m
     trees : the surfaces of bodies that are none of these
     first, second : (K,), numbers of bodies, the second's link being the outer one or, of a solid, the arm's the first
+    joined : (K,), whether a joint joins them, so that only overlap means anything, not how far apart they are
     inner : (K,), the row (from 0) from which on rows change how the two lie
     """
 
@@ -74,6 +75,7 @@ class Layout(NamedTuple):
     trees: Trees
     first: Integers
     second: Integers
+    joined: Flags
     inner: Integers
 
 
@@ -225,12 +227,12 @@ def measure(layout: Layout, q: Reals, found: Reals, smallest: Reals, pair: Integ
 
     ``found`` (N, K) gets them all; if it has no columns, only ``smallest`` (N,) and its number ``pair`` (N,) are worked
     out, without pairs that can't be the nearest: hulls first, then surfaces, the nearest hulls around them first.
-    ``deep`` (N,) says whether cores overlapped, or a surface
+    Joined pairs count as nearest only where they overlap. ``deep`` (N,) says whether cores overlapped, or a surface
     and another body, of which the depth is not known then.
     """
     room, near = np.empty((ROOM, 3)), np.empty((2, 3))
     T, w, middle = unplaced(layout)
-    reach, first, second = layout.reach, layout.first, layout.second
+    reach, first, second, joined = layout.reach, layout.first, layout.second, layout.joined
     every, root, least = found.shape[1] > 0, layout.trees.root, np.empty(len(first))
     for n in range(q.shape[0]):
         place(layout, q[n], T, w, middle)
@@ -246,8 +248,8 @@ def measure(layout: Layout, q: Reals, found: Reals, smallest: Reals, pair: Integ
             if every:
                 found[n, k] = distance
             elif surface and not inside:
-                least[k] = distance
-            if least[k] == np.inf and distance < best:
+                least[k] = np.inf if joined[k] else distance
+            if least[k] == np.inf and distance < best and not (joined[k] and distance >= 0 and not overlap):
                 best, at = distance, k
         while not inside and len(least):
             k = int(least.argmin())

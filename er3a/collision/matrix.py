@@ -2,12 +2,14 @@
 
 As MoveIt's setup assistant has it, but that "never" is proven:
 
-- *joined*: a joint joins the two: no link with a shape is between them, or they are at most ``ACROSS`` joints apart and
-  overlap in all joint vectors drawn (``TRIED``), as across a wrist. They are not checked;
+- *joined*: a joint joins the two: no link with a shape is between them, or they are at most ``ACROSS`` joints apart
+  and overlap in all joint vectors drawn (``TRIED``), as across a wrist. Hulls and surfaces are not checked then. Of
+  capsules the region around the joint is left out, within the girth of both, from where they are nearest in the pose
+  in which they are farthest apart. The rest is checked, so that an arm that folds onto itself is seen;
 - *overlaps*: they overlap in all joint vectors drawn and no joint explains it. No arm is built like that, so the shapes
   are wrong: they are not checked, and every result that does not examine them has to say so;
-- *guessed*: shapes guessed from a table (:mod:`er3a.collision.shapes`) that overlap in many of the joint vectors drawn
-  (``POOR_GUESS``), at most ``ACROSS`` joints apart: they are too coarse there. Not checked, and results have to say so;
+- *guessed*: shapes guessed from a table (:mod:`er3a.collision.shapes`), as near to each other, that overlap in many of
+  the joint vectors drawn (``POOR_GUESS``), without that region if a joint joins them. Not checked, and results say so;
 - *never*: the two are apart in all joint vectors within the limits, proven by bounds of the distance over boxes of
   joint values, which are halved until each is decided;
 - *meets*: a joint vector in which they overlap was found, and one in which they don't: checked;
@@ -31,7 +33,7 @@ from er3a.collision.convex import ROOM
 from er3a.collision.distances import FREE, MEETS, measure, pair_distance, place, search_boxes, unplaced, which_overlap
 from er3a.collision.pairs import BASE, PENETRATION_TOLERANCE, TRIED, link_label
 from er3a.collision.scene import Box, Scene
-from er3a.collision.shapes import Body, arm_bodies, arm_shapes, layout_of, solid_bodies
+from er3a.collision.shapes import Body, arm_bodies, arm_shapes, layout_of, link_frames, solid_bodies
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.quasi_random import quasi_random_points
 from er3a.robots.robot import PairRule, Robot, derived
@@ -44,6 +46,8 @@ BOXES = 50_000
 BOXES_OF_SURFACES = 2_000
 BOXES_MORE = 500  # for the other bodies of two links that are known to meet
 GOAL = 0.5  # of the smallest distance sampled, to be proven at first
+GROWTH, GROWTHS = 1.25, 12  # of the region around a joint, until the rest comes apart
+SHORTEST = 1e-6  # m
 
 BodyPair = tuple[Body, Body]
 
@@ -56,6 +60,7 @@ class MatrixRow:
     ----------
     witness : (n,), rad or m, a joint vector in which they overlap; None where none was found
     lower_bound : m, a lower bound of the distance of links that never meet; NaN for others
+    left_out : m, radius of the region around their joint that is left out, 0 where there is none
     boxes : how many boxes of joint vectors were examined
     reason : why a rule decides; empty where none does
     hides : whether an allowed pair would be checked otherwise
@@ -66,6 +71,7 @@ class MatrixRow:
     state: PairState
     witness: Reals | None = None
     lower_bound: float = np.nan
+    left_out: float = 0.0
     boxes: int = 0
     reason: str = ""
     hides: bool = False
@@ -73,10 +79,14 @@ class MatrixRow:
 
 @dataclass(frozen=True, eq=False)
 class CollisionMatrix:
-    """The allowed collision matrix: a row for each pair of links, and the pairs of bodies that are checked."""
+    """The allowed collision matrix: a row for each pair of links, and the pairs of bodies that are checked.
+
+    ``joined`` says of each of these whether it is what is left of two bodies that a joint joins.
+    """
 
     rows: tuple[MatrixRow, ...]
     watched: tuple[BodyPair, ...] = field(repr=False)
+    joined: tuple[bool, ...] = field(repr=False)
 
 
 @derived
@@ -96,6 +106,7 @@ def matrix_of(robot: Robot, pairs: Sequence[BodyPair], rules: Sequence[PairRule]
     decided = {frozenset((rule.first, rule.second)): rule for rule in rules}
     rows: list[MatrixRow] = []
     watched: list[BodyPair] = []
+    joined: list[bool] = []
     for names, bodies in by_names.items():
         rule = decided.get(frozenset(names))
         if rule and rule.rule == "watch":
@@ -107,25 +118,36 @@ def matrix_of(robot: Robot, pairs: Sequence[BodyPair], rules: Sequence[PairRule]
             row, kept = MatrixRow(*names, "allowed", witness, reason=rule.reason, hides=bool(kept)), []
         rows.append(row)
         watched += kept
-    return CollisionMatrix(tuple(rows), tuple(watched))
+        joined += [row.state == "joined"] * len(kept)
+    return CollisionMatrix(tuple(rows), tuple(watched), tuple(joined))
 
 
 def _judged(robot: Robot, pairs: Sequence[BodyPair]) -> tuple[MatrixRow, list[BodyPair]]:
     """What holds of the bodies of two links, and which of them are to be checked."""
     inner, outer = pairs[0]
-    names, near = (inner.name, outer.name), outer.link - inner.link <= ACROSS
-    between = range(inner.link + 1, outer.link)
-    if outer.name == link_label(outer.link) and arm_shapes(robot).links.isdisjoint(between):
+    names, own = (inner.name, outer.name), outer.name == link_label(outer.link)
+    neighbours = own and arm_shapes(robot).links.isdisjoint(range(inner.link + 1, outer.link))
+    capsules = not any(body.tree or len(body.points) > 2 for pair in pairs for body in pair)
+    if neighbours and not capsules:
         return MatrixRow(*names, "joined"), []
     q, overlap = quasi_random_points(robot.lower, robot.upper, TRIED), _overlap(robot, pairs)
-    share = float(overlap.any(axis=1).mean())
+    near, share = neighbours or outer.link - inner.link <= ACROSS, float(overlap.any(axis=1).mean())
+    if share == 1.0 and not near:
+        return MatrixRow(*names, "overlaps", q[0]), []
     if share == 1.0:
-        return MatrixRow(*names, "joined" if near else "overlaps", None if near else q[0]), []
+        return _joined(robot, pairs, overlap) if capsules else (MatrixRow(*names, "joined"), [])
     if near and share >= POOR_GUESS and not arm_shapes(robot).given:
         return MatrixRow(*names, "guessed"), []
-    boxes, witness = (BOXES_MORE, q[overlap.any(axis=1).argmax()]) if share else (BOXES, None)
+    return _checked(robot, pairs, q, overlap)
+
+
+def _checked(robot: Robot, pairs: Sequence[BodyPair], q: Reals, overlap: Flags) -> tuple[MatrixRow, list[BodyPair]]:
+    """Bodies of two links that no joint joins, which overlap (N, K) in joint vectors (N, n): all but those that are
+    proven never to meet are to be checked."""
+    met = overlap.any(axis=1)
+    boxes, witness = (BOXES_MORE, q[met.argmax()]) if met.any() else (BOXES, None)
     watched, bounds, looked, undecided = [], [np.inf], 0, False
-    for pair, meets in zip(pairs, overlap.any(axis=0).tolist()):
+    for pair, meets in zip(pairs, np.asarray(overlap.any(axis=0)).tolist()):
         if not meets:
             outcome, at, bound, more = _searched(robot, pair, boxes)
             looked += more
@@ -136,7 +158,76 @@ def _judged(robot: Robot, pairs: Sequence[BodyPair]) -> tuple[MatrixRow, list[Bo
             undecided |= outcome != MEETS
         watched.append(pair)
     state: PairState = "never" if not watched else "undecided" if witness is None and undecided else "meets"
-    return MatrixRow(*names, state, witness, np.nan if watched else min(bounds), looked), watched
+    bound = np.nan if watched else min(bounds)
+    return MatrixRow(pairs[0][0].name, pairs[0][1].name, state, witness, bound, boxes=looked), watched
+
+
+def _joined(robot: Robot, pairs: Sequence[BodyPair], overlap: Flags) -> tuple[MatrixRow, list[BodyPair]]:
+    """Capsules of two links that a joint joins, without the region around it: it grows until the rest comes apart."""
+    inner, outer = pairs[int(overlap.sum(axis=0).argmax())]
+    centres = _centres(robot, (inner, outer))
+    radius = sum(girth(body, centre) for body, centre in zip((inner, outer), centres))
+    for _ in range(GROWTHS):
+        rest = [
+            (first, second)
+            for one, other in pairs
+            for first in trimmed(one, centres[0], radius)
+            for second in trimmed(other, centres[1], radius)
+        ]
+        left = _overlap(robot, rest)
+        if not left.all(axis=0).any():
+            break
+        radius *= GROWTH
+    else:
+        rest = []
+    row = MatrixRow(inner.name, outer.name, "joined", left_out=radius)
+    if not rest:
+        return row, []
+    if left.any(axis=1).mean() >= POOR_GUESS and not arm_shapes(robot).given:
+        return MatrixRow(inner.name, outer.name, "guessed"), []
+    found, watched = _checked(robot, rest, quasi_random_points(robot.lower, robot.upper, TRIED), left)
+    return replace(row, witness=found.witness, boxes=found.boxes), watched
+
+
+def girth(body: Body, centre: Reals) -> float:
+    """How far a capsule extends from the line that leads from ``centre`` (3,) through its middle, m."""
+    along, away = body.points.mean(axis=0) - centre, body.points - centre
+    length = float(np.linalg.norm(along))
+    if length > SHORTEST:
+        away = away - np.outer(away @ along, along) / length**2
+    return float(np.linalg.norm(away, axis=1).max()) + body.radius
+
+
+def trimmed(body: Body, centre: Reals, radius: float) -> list[Body]:
+    """What is left of a capsule's line outside the ball about ``centre`` (3,) with ``radius`` (m)."""
+    start, line = body.points[0], body.points[-1] - body.points[0]
+    away, length = start - centre, float(line @ line)
+    if length <= SHORTEST**2:
+        return [body] if np.linalg.norm(away) > radius else []
+    middle, half = -float(away @ line) / length, float((away @ line) ** 2 - length * (away @ away - radius**2))
+    if half <= 0:
+        return [body]
+    half = float(np.sqrt(half)) / length
+    parts = [(0.0, min(1.0, middle - half)), (max(0.0, middle + half), 1.0)]
+    return [
+        replace(body, points=np.array([start + low * line, start + high * line]))
+        for low, high in parts
+        if high > low and (high - low) ** 2 * length > SHORTEST**2
+    ]
+
+
+def _centres(robot: Robot, pair: BodyPair) -> list[Reals]:
+    """Where two capsules are nearest to each other, each point (3,), m, in its own link's frame, in the one of the
+    joint vectors drawn in which they are farthest apart."""
+    q, found, none = quasi_random_points(robot.lower, robot.upper, TRIED), np.empty((TRIED, 1)), np.empty(TRIED)
+    layout = layout_of(robot, pair, [(0, 1)])
+    measure(layout, q, found, none, np.empty(TRIED, np.int64), np.empty(TRIED, bool))
+    apart = q[int(found[:, 0].argmax())]
+    (T, world, middles), near = unplaced(layout), np.empty((2, 3))
+    place(layout, apart, T, world, middles)
+    pair_distance(layout, T, world, 0, 1, np.empty((ROOM, 3)), near, np.inf)
+    frames = (link_frames(robot, apart)[body.link] for body in pair)
+    return [frame[:3, :3].T @ (point - frame[:3, 3]) for frame, point in zip(frames, near)]
 
 
 def _searched(robot: Robot, pair: BodyPair, boxes: int) -> tuple[int, Reals, float, int]:

@@ -446,7 +446,9 @@ def hull_faces(points: Reals) -> Integers:
     return faces
 
 
-def layout_of(robot: Robot, bodies: Sequence[Body], pairs: Sequence[tuple[int, int]]) -> Layout:
+def layout_of(
+    robot: Robot, bodies: Sequence[Body], pairs: Sequence[tuple[int, int]], joined: Sequence[bool] = ()
+) -> Layout:
     """Arrays of bodies and of pairs of them; the second of a pair is on the outer link, or in the world."""
     starts = np.concatenate([[0], np.cumsum([len(body.points) for body in bodies])]).astype(np.int64)
     centre, reach = np.zeros((len(bodies), 3)), np.zeros(len(bodies))
@@ -475,6 +477,7 @@ def layout_of(robot: Robot, bodies: Sequence[Body], pairs: Sequence[tuple[int, i
         trees=trees_of([body.tree for body in bodies]),
         first=np.array([i for i, _ in pairs], np.int64),
         second=np.array([j for _, j in pairs], np.int64),
+        joined=np.array(joined or [False] * len(pairs), bool),
         inner=np.array([_first_joint(robot, bodies[i], bodies[j]) for i, j in pairs], np.int64),
     )
 

@@ -228,7 +228,9 @@ def state_word(state: PairState) -> str:
     return word("collision.state", STATES, state)
 
 
-def why(state: PairState, least_mm: float, boxes: int, witness: str, reason: str, *, assumed: bool) -> str:
+def why(
+    state: PairState, least_mm: float, left_out_mm: float, boxes: int, witness: str, reason: str, *, assumed: bool
+) -> str:
     """Why a pair is watched or not.
 
     Parameters
@@ -262,9 +264,19 @@ def why(state: PairState, least_mm: float, boxes: int, witness: str, reason: str
                 count=TRIED,
             )
         case "guessed":
-            return tr(
-                "The shapes guessed from the table are too coarse here. Not checked: give shapes in the robot's file."
-            )
-        case "joined":
+            return tr("Shapes guessed from the table are too coarse here. Not checked: give the robot's shapes.")
+        case "joined" if not left_out_mm:
             return tr("A joint joins them. Not checked.")
-    return tr("They collide at joint values ({witness}).", witness=witness)
+    if not left_out_mm:
+        return tr("They collide at joint values ({witness}).", witness=witness)
+    joined = tr(
+        "They touch by design: the region within {radius:.0f} mm of their joint is left out.", radius=left_out_mm
+    )
+    if witness:
+        return tr(
+            "{first} {rest}", first=joined, rest=tr("Outside that region they collide at ({witness}).", witness=witness)
+        )
+    rest = tr(
+        "Outside that region no collision was found; if one of them lies within it as a whole, nothing is checked."
+    )
+    return tr("{first} {rest}", first=joined, rest=rest)

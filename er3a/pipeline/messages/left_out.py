@@ -44,7 +44,9 @@ TEXTS = texts(
             "collisions of these links with each other: the shapes guessed from the table are too coarse there"
         ),
         "left_out.allowed_pairs": ("collisions of pairs that the robot's file allows: they never meet, or always do"),
-        "left_out.joined_pairs": "collisions of these links with each other: a joint joins them",
+        "left_out.joined_pairs": (
+            "collisions of these links where a joint joins them: of meshes all, else those around the joint"
+        ),
         "left_out.scene_shapes": "whether what stands in the cell is shaped and placed as the scene's file says",
         "left_out.shallow_overlaps": "overlaps of less than {amount:g} mm between the points measured",
         "left_out.own_limits": "the joints' real limits: the robot's file assumes all or some of them",

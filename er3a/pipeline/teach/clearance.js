@@ -12,9 +12,9 @@ const byId = (id) => document.getElementById(id);
 
 /**
  * The nearest pair at frames `T` (of `frames`), or null where nothing can meet: `{pair, distance, from, to, deep}`, m,
- * with points on the bodies' surfaces. `bodies` are those of
+ * with points on the bodies' surfaces. A pair that a joint joins counts only where it overlaps. `bodies` are those of
  * `bodyDistance`, each with its `link` (0 the base, k what row k moves, -1 the world), points in the link's frame;
- * `pairs` are `{bodies: [first, second], hulls, text}`; with `hulls`, the points of a body are those of a hull
+ * `pairs` are `{bodies: [first, second], joined, hulls, text}`; with `hulls`, the points of a body are those of a hull
  * around it, whose distance is at most the body's.
  */
 export function nearestPair({ bodies, pairs }, base, T) {
@@ -34,6 +34,7 @@ export function nearestPair({ bodies, pairs }, base, T) {
     const apart = other ? norm(subtract(ball.centre, other.centre)) - ball.reach - other.reach : -Infinity;
     if (best && apart >= best.distance) continue;
     const found = bodyDistance(bodies[i], placed(i), bodies[j], placed(j));
+    if (pair.joined && found.distance >= 0) continue;
     if (pair.hulls) found.distance = Math.max(found.distance, 0); // of surfaces the hulls around them: at least that
     if (!best || found.distance < best.distance) best = { pair, ...found };
   }

@@ -406,11 +406,12 @@ def clearance_data(robot: Robot, scene: Scene | None) -> dict[str, Any]:
         "pairs": [
             {
                 "bodies": [int(first), int(second)],
+                "joined": bool(joined),
                 "hulls": bool(max(layout.trees.root[[first, second]]) >= 0),
                 "text": say(pair),
                 "names": pair.names,
             }
-            for first, second, pair in zip(layout.first, layout.second, found.pairs)
+            for first, second, joined, pair in zip(layout.first, layout.second, layout.joined, found.pairs)
         ],
     }
 

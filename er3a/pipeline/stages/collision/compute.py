@@ -242,6 +242,7 @@ def _matrix(bodies: Bodies) -> model.MatrixRows:
             row.state,
             (row.first, row.second) in watched,
             1000 * row.lower_bound,
+            1000 * row.left_out,
             row.boxes,
             unknown if row.witness is None else shown(robot, row.witness),
             row.reason,

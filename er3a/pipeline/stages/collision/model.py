@@ -186,6 +186,7 @@ class MatrixRows(Table):
     state: Texts = column("never, joined, overlaps, meets, undecided, allowed or watched")
     watched: Flags = column("whether distances of the pair are measured")
     least_mm: Reals = column("of pairs that never meet, a proven lower bound of their distance")
+    left_out_mm: Reals = column("radius of the region around the joint that is left out; 0 where none is")
     boxes: Integers = column("ranges of joint values looked at to prove it")
     witness_deg: Reals = per_joint("a joint vector in which watched parts overlap; NaN: none")
     reason: Texts = column("what the person who decided on the pair wrote")

@@ -215,6 +215,7 @@ def _matrix(robot: Robot, rows: model.MatrixRows, assumed: bool) -> list[list[st
             why(
                 rows.state[k],
                 rows.least_mm[k],
+                rows.left_out_mm[k],
                 int(rows.boxes[k]),
                 _angles(robot, rows.witness_deg[k]),
                 rows.reason[k],

@@ -261,16 +261,26 @@ def clear_until(
     nowhere. ``acceleration``: of the joints (n,), rad/s^2.
 
     The end of the margin is searched for on a grid up to the first contact, or to where the motion leaves limits or
-    reach, and proven: where the clearance along the motion up to it is less, it is moved back.
+    reach, and proven: where the clearance along the motion up to it is less, it is moved back. Of links that touch by
+    design at their joint, which have no margin to keep there, those that overlap elsewhere keep half of their first
+    distance.
     """
     if not along.contacts:
         return None
     bodies, robot, first = surroundings.bodies, surroundings.bodies.robot, along.contacts[0].start
+    met = {pair for contact in along.contacts for pair in contact.pairs}
+    joined = np.array([k for k, pair in enumerate(bodies.pairs) if bodies.joined[k] and pair in met], int)
+
+    def apart(t: Reals) -> Reals:
+        """Distances (k, joined), m, at times (k,)."""
+        return np.array([bodies.distances(q, joined) for q in motion.joints(t)])
+
+    kept = np.minimum(margin, apart(np.zeros(1))[0] / 2) if joined.size else np.empty(0)
 
     def beyond(t: Reals) -> Reals:
         """By how much (k,), m, more than the margin is kept at times (k,)."""
-        spare: Reals = bodies.min_distance(motion.joints(t))[0] - margin
-        return spare
+        spare = bodies.min_distance(motion.joints(t))[0] - margin
+        return np.minimum(spare, (apart(t) - kept).min(axis=1)) if joined.size else spare
 
     stops = [part.start for part in found.limits] + [part.start for part in found.beyond]
     end = last = min([first, *(BEFORE_STOP * stop for stop in stops)])
@@ -301,7 +311,7 @@ def clear_until(
     pose, q = motion.tool(np.array([end]))[0], motion.joints(np.array([end, first]))
     touching = bodies.surface_points(q[1], int(bodies.min_distance(q[1:])[1][0])).mean(axis=0)
     return model.ClearUntil(
-        1000 * margin,
+        1000 * float(min([margin, *kept])),
         end,
         stop,
         float(motion.way(np.array([end]))[0]),
