@@ -25,9 +25,9 @@ from er3a.numerics.jit import inner_kernel, kernel
 STEP = np.radians(2.0)  # largest joint move between two points of a curve
 MAX_POINTS = 1200
 REGULAR = 1e-6  # pivots of J J^T above this part of the largest diagonal entry
-TRUNCATED = 1e-5  # singular values below this part of the largest are no directions
+TRUNCATED = 1e-9  # singular values below this part of the largest are no directions: rounding, not a small bend
 SOLVES = 1e-11
-ON_CURVE = 1e-9
+ON_CURVE = 2e-10  # of each component, in parts of the size: sums of three stay below the 1e-9 that rows are held to
 SOLVES_AS_ROOT = 1e-12
 ABOVE_ROUNDING = 1e-15  # of the trace
 FEW_HALVINGS = 6
@@ -286,7 +286,8 @@ def trace(posed: Posed, x: Reals, v: Reals, points: Reals) -> tuple[int, int]:
 
 @kernel
 def between(posed: Posed, points: Reals, at: Reals, out: Reals) -> None:
-    """Fill ``out`` (k, n) with the curve's points at ``at`` (k,), counted in points of the polyline; NaN if lost."""
+    """Fill ``out`` (k, n) with the curve's points at ``at`` (k,), counted in points of the polyline; the nearer of two points
+    where nothing is found between them."""
     n = points.shape[1]
     e, J = np.empty(6), np.empty((6, n))
     for i in range(at.shape[0]):
@@ -294,7 +295,7 @@ def between(posed: Posed, points: Reals, at: Reals, out: Reals) -> None:
         share = at[i] - low
         out[i] = (1.0 - share) * points[low] + share * points[low + 1]
         if not onto_curve(posed, out[i], e, J) < ON_CURVE:
-            out[i] = np.nan
+            out[i] = points[low if share < 0.5 else low + 1]
 
 
 @inner_kernel
