@@ -23,7 +23,7 @@ from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.jit import inner_kernel, kernel
 
 STEP = np.radians(2.0)  # largest joint move between two points of a curve
-MAX_POINTS = 1200
+MAX_POINTS, FEW_POINTS = 1200, 30
 REGULAR = 1e-6  # pivots of J J^T above this part of the largest diagonal entry
 TRUNCATED = 1e-9  # singular values below this part of the largest are no directions: rounding, not a small bend
 SOLVES = 1e-11
@@ -416,8 +416,12 @@ class PoseChain:
         return self._in_m(out[:count])
 
     def moves(self, x: Reals) -> bool:
-        """Whether joint values (n,) that solve the pose can move with the tool at rest."""
-        return free_direction(self.posed, self._scaled(x), np.empty(len(x))) > 0
+        """Whether joint values (n,) that solve the pose can move on and on with the tool at rest."""
+        start, v = self._scaled(x), np.empty(len(x))
+        if free_direction(self.posed, start, v) == 0:
+            return False
+        points = np.empty((FEW_POINTS, len(x)))
+        return any(trace(self.posed, start, sense * v, points)[1] != LOST for sense in (1.0, -1.0))
 
     def curve(self, x: Reals) -> TracedCurve | None:
         """The curve through joint values (n,) that solve the pose; None if they can't move with the tool at rest."""
