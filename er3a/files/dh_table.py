@@ -353,7 +353,7 @@ def _twists_in_radians(rows: list[dict[str, Any]], own: set[str]) -> bool:
 
 
 def _likely_unit(lengths: list[float]) -> LengthUnit:
-    """What lengths are in: inches if they are round millimetres in inches alone, else metres or inches if all are below 10."""
+    """What lengths are in: inches if they are round millimetres in inches alone; else, below 10, metres or inches."""
 
     def is_round(scale: float) -> bool:
         off = [[abs(x * scale - round(x * scale / step) * step) for x in lengths] for step, _, _ in ROUND_MM]
@@ -363,9 +363,7 @@ def _likely_unit(lengths: list[float]) -> LengthUnit:
     in_inches = max(lengths) < LONGEST_ARM_IN and is_round(25.4) and not is_round(1.0)
     if in_inches and not (metres and is_round(1000.0)):
         return "in"
-    if metres:
-        return "m" if max(lengths) < LONGEST_LINK_M else "in"
-    return "mm"
+    return "mm" if not metres else "m" if max(lengths) < LONGEST_LINK_M else "in"
 
 
 def _unit(row: dict[str, Any]) -> str:

@@ -286,8 +286,10 @@ def trace(posed: Posed, x: Reals, v: Reals, points: Reals) -> tuple[int, int]:
 
 @kernel
 def between(posed: Posed, points: Reals, at: Reals, out: Reals) -> None:
-    """Fill ``out`` (k, n) with the curve's points at ``at`` (k,), counted in points of the polyline; the nearer of two points
-    where nothing is found between them."""
+    """Fill ``out`` (k, n) with the curve's points at ``at`` (k,), counted in points of the polyline.
+
+    Where nothing is found between two points it is the nearer one of them.
+    """
     n = points.shape[1]
     e, J = np.empty(6), np.empty((6, n))
     for i in range(at.shape[0]):
@@ -295,7 +297,7 @@ def between(posed: Posed, points: Reals, at: Reals, out: Reals) -> None:
         share = at[i] - low
         out[i] = (1.0 - share) * points[low] + share * points[low + 1]
         if not onto_curve(posed, out[i], e, J) < ON_CURVE:
-            out[i] = points[low if share < 0.5 else low + 1]
+            out[i] = points[low + int(share > 0.5)]
 
 
 @inner_kernel
@@ -421,7 +423,7 @@ class PoseChain:
         if free_direction(self.posed, start, v) == 0:
             return False
         points = np.empty((FEW_POINTS, len(x)))
-        return any(trace(self.posed, start, sense * v, points)[1] != LOST for sense in (1.0, -1.0))
+        return any(trace(self.posed, start, ahead, points)[1] != LOST for ahead in (v, -v))
 
     def curve(self, x: Reals) -> TracedCurve | None:
         """The curve through joint values (n,) that solve the pose; None if they can't move with the tool at rest."""
