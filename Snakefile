@@ -22,9 +22,9 @@ rule all:
         "reports/index.html",
         "reports/junit.xml",  # which a run that did not end well takes away
         [f"reports/{page}" for page in STUDY.article_pages().values()],
-        of_all("reports/{robot}/{stage}.rrd", "record"),
+        [views_of(robot, asked_recordings(robot)) for robot in ROBOTS],
         # Named too, so that a result that was deleted is made again although its views are still there.
-        [expand(results_of(stage), robot=robot) for robot in ROBOTS for stage in STUDY.stages(robot)],
+        [results_of(robot, stage) for robot in ROBOTS for stage in asked_stages(robot)],
     message:
         "all results, recordings and reports are there"
 
@@ -32,7 +32,7 @@ rule all:
 onerror:
     print(
         "\nWhat failed, in short:",
-        *(told("error: ") or ["no job gave a reason (a job that was killed can't); see the logs named above"]),
+        *(told("error: ") or ["no job gave a reason: the run was stopped, or see the logs named above"]),
         sep="\n",
     )
 

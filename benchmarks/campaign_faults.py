@@ -18,7 +18,6 @@ from testing.small_study import contents, environment, finished, run, run_comman
 
 ROBOT = "er3_600"
 OLDER = FORMAT_VERSION - 1
-BLOCKS = f"results/{ROBOT}/workspace/parts/1-of-1.npz"
 MEMORY = 700_000 * 1024  # bytes of address space
 
 
@@ -50,18 +49,6 @@ def halve(name: str) -> Callable[[Path, ExitStack], None]:
 
     def make(folder: Path, _: ExitStack) -> None:
         (folder / name).write_bytes((folder / name).read_bytes()[: (folder / name).stat().st_size // 2])
-
-    return make
-
-
-def sampled(damage: Callable[[Path, ExitStack], None]) -> Callable[[Path, ExitStack], None]:
-    """As if a run had been cut off after it drew its blocks; then damage their file."""
-
-    def make(folder: Path, stack: ExitStack) -> None:
-        (folder / f"results/{ROBOT}/workspace/summary.json").unlink()
-        words = ("sample", ROBOT, "--part", "1-of-1", "--output", BLOCKS)
-        er3a(folder, words).check_returncode()
-        damage(folder, stack)
 
     return make
 
@@ -104,28 +91,23 @@ def taken(folder: Path, stack: ExitStack) -> None:
 
 
 STAGE = f"results/{ROBOT}/trajectory"
-REPORT = ("report", "trajectory", ROBOT)
+VIEWS = ("views", ROBOT, "trajectory")
 COMPUTE = ("compute", "trajectory", ROBOT)
-RECORD = ("record", "trajectory", ROBOT)
-GATHER = ("compute", "workspace", ROBOT, BLOCKS)
 VIEW = f"reports/{ROBOT}/trajectory"
 FAULTS = (
     Fault("disk full: results", disk(STAGE, "size=16k"), COMPUTE, f"{STAGE}/samples.parquet", root=True),
-    Fault("disk full: recording", disk(f"reports/{ROBOT}", "size=16k"), RECORD, f"{VIEW}.rrd", root=True),
-    Fault("disk full: page", disk(f"reports/{ROBOT}", "size=16k"), REPORT, f"{VIEW}.html", root=True),
+    Fault("disk full: recording", disk(f"reports/{ROBOT}", "size=16k"), VIEWS, f"{VIEW}.rrd", root=True),
     Fault("results can't be written", disk(STAGE, "ro"), COMPUTE, f"{STAGE}/samples.parquet", root=True),
-    Fault("reports can't be written", disk(f"reports/{ROBOT}", "ro"), REPORT, f"{VIEW}.html", root=True),
+    Fault("reports can't be written", disk(f"reports/{ROBOT}", "ro"), VIEWS, f"{VIEW}.rrd", root=True),
     Fault("a file where a folder must be", in_the_way, (*COMPUTE, "--results", "elsewhere"), "elsewhere"),
-    Fault("memory limit (ulimit -v)", lambda *_: None, ("sample", ROBOT, "--part", "1-of-1", "--output", "b.npz",
-          "--study", "large.yaml"), "er3a sample er3_600", memory=MEMORY),
-    Fault("block file cut in half", sampled(halve(BLOCKS)), GATHER, f"{BLOCKS}: damaged"),
-    Fault("block file with a flipped bit", sampled(flip(BLOCKS)), GATHER, f"{BLOCKS}: damaged"),
-    Fault("table cut in half", halve(f"{STAGE}/checks.parquet"), REPORT, "checks.parquet: damaged"),
-    Fault("table with a flipped bit", flip(f"{STAGE}/checks.parquet"), REPORT, "checks.parquet: damaged"),
-    Fault("summary cut in half", halve(f"{STAGE}/summary.json"), REPORT, "summary.json: damaged"),
-    Fault("summary with a flipped bit", flip(f"{STAGE}/summary.json"), REPORT, "summary.json: damaged"),
-    Fault("checksums with a flipped bit", flip(f"{STAGE}/SHA256SUMS", 0), REPORT, f"{STAGE}/checks.parquet: damaged"),
-    Fault("results of an older version", older, REPORT, f"summary.json: format version {OLDER}"),
+    Fault("memory limit (ulimit -v)", lambda *_: None, ("compute", "workspace", ROBOT, "--study", "large.yaml"),
+          f"er3a compute workspace {ROBOT}", memory=MEMORY),
+    Fault("table cut in half", halve(f"{STAGE}/checks.parquet"), VIEWS, "checks.parquet: damaged"),
+    Fault("table with a flipped bit", flip(f"{STAGE}/checks.parquet"), VIEWS, "checks.parquet: damaged"),
+    Fault("summary cut in half", halve(f"{STAGE}/summary.json"), VIEWS, "summary.json: damaged"),
+    Fault("summary with a flipped bit", flip(f"{STAGE}/summary.json"), VIEWS, "summary.json: damaged"),
+    Fault("checksums with a flipped bit", flip(f"{STAGE}/SHA256SUMS", 0), VIEWS, f"{STAGE}/checks.parquet: damaged"),
+    Fault("results of an older version", older, VIEWS, f"summary.json: format version {OLDER}"),
     Fault("recording cut in half", halve(f"{VIEW}.rrd"), ("view", ROBOT), f"{VIEW}.rrd: damaged"),
     Fault("two runs at once", taken, (), "another run is active in this folder"),
 )  # fmt: skip

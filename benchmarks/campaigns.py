@@ -21,7 +21,7 @@ from importlib import import_module
 from testing.evidence import CAMPAIGNS, PAGES, SHARE, evidence, is_of_this_code, made_from, page_of
 
 END = "<!-- end of {name} -->"
-ALONE = ("speed", "pages", "teach", "slurm")  # they measure times on the wall, or take all cores
+ALONE = ("speed", "pages", "teach")  # they measure times on the wall
 FIRST = ("fleet", "classes", "motion", "diagnosis", "kills", "hand_eye", "faults")  # the longest
 ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"), "1")  # BLAS, of small matrices, else waits
 _WRITING = threading.Lock()  # several write parts of one page

@@ -3,24 +3,18 @@
 from __future__ import annotations
 
 import os
-import sys
 
 from er3a.pipeline.working_folder import distrust
 
 
 def main() -> None:
-    """Have a running study's server do the job, or do it here."""
+    """The command line."""
     distrust()
-    from er3a.pipeline.job_server import SETTINGS, hand_over
+    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):  # many small matrices: threads of BLAS only wait
+        os.environ.setdefault(name, "1")
+    from er3a.pipeline.cli import main as command_line
 
-    code = hand_over(sys.argv[1:])
-    if code is None:
-        for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):  # many small matrices: threads of BLAS only wait
-            os.environ.setdefault(name, SETTINGS[name])
-        from er3a.pipeline.cli import main as command_line
-
-        command_line()
-    sys.exit(code)
+    command_line()
 
 
 def draw_for_rerun() -> int:

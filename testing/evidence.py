@@ -36,7 +36,7 @@ PAGES = (
     "fleet",
     "comparison",
 )
-PARTS = {"fuzz": "reliability.md", "faults": "reliability.md", "kills": "reliability.md", "slurm": "cluster.md"}
+PARTS = {"fuzz": "reliability.md", "faults": "reliability.md", "kills": "reliability.md"}
 CAMPAIGNS = (*PAGES, *PARTS)
 COUNTING = ("er3a", "testing", "benchmarks", "data", "config", "workflow", "profiles", "Snakefile", "requirements")
 SHARE = "CAMPAIGN_SHARE"

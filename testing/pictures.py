@@ -15,7 +15,7 @@ from PIL import Image
 from selenium.webdriver.chrome.webdriver import WebDriver
 from selenium.webdriver.common.by import By
 
-from er3a.pipeline.messages.language import own_title
+from er3a.pipeline.language import own_title
 from er3a.pipeline.study import Study, load_study
 from testing import chromium
 

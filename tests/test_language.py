@@ -6,9 +6,9 @@ import gettext
 
 import pytest
 
-from er3a.pipeline.messages import language
+from er3a.pipeline import language
+from er3a.pipeline.language import tr
 from er3a.pipeline.messages import say as say_module
-from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import Plural, joined, sentence, texts, word
 
 GERMAN = {

@@ -8,7 +8,7 @@ import pytest
 
 from er3a.errors import InputError
 from er3a.files.annotations import translations_in
-from er3a.pipeline.messages import language
+from er3a.pipeline import language
 from er3a.pipeline.study import load_study
 from tests.viewing.untranslated import texts_from_files
 

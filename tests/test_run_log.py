@@ -30,7 +30,7 @@ def log(tmp_path, monkeypatch):
         record.__dict__.update(fields, **({"event": event} if event else {}))
         handler.emit(record)
 
-    send(LogEvent.RUN_INFO, stats={"compute_workspace": 1, "report": 2, "total": 3})
+    send(LogEvent.RUN_INFO, stats={"compute_workspace": 1, "views_arm": 2, "total": 3})
     return send
 
 
@@ -49,15 +49,15 @@ def test_expected_verdicts_say_so(log, capsys, monkeypatch):
 
 
 def test_pages_and_snakemakes_own_words_stay_out_errors_do_not(log, capsys):
-    log(LogEvent.JOB_INFO, jobid=2, rule_name="report", wildcards={"robot": "arm", "stage": "workspace"})
+    log(LogEvent.JOB_INFO, jobid=2, rule_name="views_arm", wildcards={})
     log(LogEvent.JOB_FINISHED, job_id=2)
     log(None, "Building DAG of jobs...")
     assert capsys.readouterr().err == ""
     log(None, "a rule is missing", level=logging.ERROR)
-    log(LogEvent.JOB_ERROR, rule_msg="arm: report workspace", log=["logs/arm/workspace.report.log"])
+    log(LogEvent.JOB_ERROR, rule_msg="arm: write pages and recordings", log=["logs/arm/views.log"])
     assert capsys.readouterr().err.splitlines() == [
         "a rule is missing",
-        "✗ arm: report workspace: ended with an error; see logs/arm/workspace.report.log",
+        "✗ arm: write pages and recordings: ended with an error; see logs/arm/views.log",
     ]
 
 

@@ -185,12 +185,6 @@ def test_stages_that_are_not_there_or_can_t_be_left_out_are_named(study, stages,
         RobotEntry(targets="a", paths="b", stages=stages)
 
 
-def test_on_a_cluster_each_stage_is_a_group_of_its_own_without_its_page():
-    profile = yaml.safe_load((ROOT / "profiles/slurm/config.yaml").read_text(encoding="utf-8"))
-    # A page shows results of other stages: with it, two groups would wait for each other for ever.
-    assert {*profile["groups"]} == {f"compute_{stage}={stage}" for stage in STAGES} | {"record={stage}"}
-
-
 @pytest.mark.parametrize(
     ("section", "change", "stages"),
     [

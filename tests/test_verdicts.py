@@ -14,6 +14,7 @@ from lxml import etree
 
 from er3a.errors import InputError, ResultError
 from er3a.files.kept_files import shown_path
+from er3a.pipeline.overview.index import write_index
 from er3a.pipeline.results import write_checksum
 from er3a.pipeline.run_study import run_study
 from er3a.pipeline.stages import run
@@ -21,7 +22,6 @@ from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.study import Study
 from er3a.pipeline.verdicts import StageVerdict, read_verdicts, write_junit
-from er3a.pipeline.viewing.index import write_index
 
 ROOT = Path(__file__).resolve().parents[1]
 

@@ -1,46 +1,33 @@
 """How this package compiles kernels, and divides the rows of a batch among threads.
 
-numba does not notice when a kernel in one file calls one in another file that changed, so a plain ``cache=True`` can
-serve stale machine code. Each kernel is therefore kept in a folder named by a digest of its file and of all files with
-kernels that this one imports. Copies of the package with equal kernels share what one of them has compiled, and an
-edit compiles again what depends on it. Nothing of numba's own settings is touched.
-
-Compiling is what a first run on a machine waits for, so three things are spared: kernels that only kernels call get no
-entry for Python (a quarter of the time), integer constants in a call make no version of their own, and processes that
-need a kernel at once compile it once: one holds its lock, the others wait and load. Kernels release the interpreter's
-lock.
+Kernels are numba's, and so is the cache of their machine code. numba does not notice when a kernel in one file calls
+one in another file that changed, and would serve stale machine code; so they are kept in a folder that is named by the
+content of all files with kernels. An edit of one of them compiles all kernels again as they are needed.
 """
 
 from __future__ import annotations
 
-import fcntl
 import gc
 import hashlib
 import os
-import re
-import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager, suppress
 from functools import cache
 from itertools import pairwise
 from numbers import Integral
 from pathlib import Path
 from queue import Empty, SimpleQueue
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar
 
 import numba
-from numba.core import types
-from numba.core.caching import CompileResultCacheImpl, FunctionCache, _CacheLocator
-from numba.core.compiler import Flags
-from numba.core.registry import CPUDispatcher
+from numba.core import event
+from numba.core.caching import UserProvidedCacheLocator
 
 from er3a.errors import Er3aError
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 _KERNEL = b"kernel\ndef "  # @kernel or @inner_kernel
-_IMPORT = re.compile(r"^from er3a\.([\w.]+) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -51,178 +38,92 @@ def cache_folder() -> Path:
     return Path(home) / "er3a"
 
 
+@cache
+def kernels_folder() -> Path:
+    """Where the kernels of this version are kept: a folder named by the content of all files that hold some."""
+    digest = hashlib.sha256()
+    for path in sorted(_PACKAGE.rglob("*.py")):
+        if _KERNEL in (content := path.read_bytes()):
+            digest.update(path.relative_to(_PACKAGE).as_posix().encode() + b"\0" + content + b"\0")
+    return cache_folder() / f"kernels-{digest.hexdigest()[:16]}"
+
+
+class SharedByCopies(UserProvidedCacheLocator):
+    """Numba's folders below a named one, by the place of a file in this package instead of the place of the package:
+    copies of a checkout share what one of them has compiled."""
+
+    @classmethod
+    def get_suitable_cache_subpath(cls, py_file: str) -> str:
+        """The folder for a file's kernels, such as ``kinematics.chain``."""
+        return ".".join(Path(py_file).resolve().relative_to(_PACKAGE.parent).with_suffix("").parts)
+
+
+class _Waiting(event.Listener):
+    """Counts the time in which numba compiles or loads kernels; nothing is collected in it.
+
+    Compiling makes millions of objects that live until it ends: going through them takes a tenth of it.
+    """
+
+    def __init__(self) -> None:
+        self.seconds, self._depth, self._start, self._collects = 0.0, 0, 0.0, False
+
+    def on_start(self, event: event.Event) -> None:
+        """One more kernel, which another one may need."""
+        if not self._depth:
+            self._start, self._collects = time.monotonic(), gc.isenabled()
+            gc.disable()
+        self._depth += 1
+
+    def on_end(self, event: event.Event) -> None:
+        """One kernel less."""
+        self._depth -= 1
+        if not self._depth:
+            self.seconds += time.monotonic() - self._start
+            if self._collects:
+                gc.enable()
+
+
+_waiting = _Waiting()
+event.register("numba:compiler_lock", _waiting)  # type: ignore[no-untyped-call]
+
+
+def compile_seconds() -> float:
+    """Wall time (s) for which this process has waited for kernels, compiled or loaded."""
+    return _waiting.seconds
+
+
 def kernel(function: Function) -> Function:
     """Compile a function on its first call and keep the machine code on disk; its signature stays visible.
 
-    No fastmath and no contraction across operations: results must not depend on the machine's vector width.
+    No fastmath and no contraction across operations: results must not depend on the machine's vector width. Kernels
+    release the interpreter's lock.
     """
-    return _compiled(function, _Kernel, no_cfunc_wrapper=True)
+    return _compiled(function)
 
 
 def inner_kernel(function: Function) -> Function:
     """A kernel that only kernels call: it is compiled without the entry that Python would call it by.
 
-    Called from Python it raises a TypeError, unless numba is switched off (``NUMBA_DISABLE_JIT``).
+    That spares a sixth of the compiling. It must not be called from Python, unless numba is switched off
+    (``NUMBA_DISABLE_JIT``).
     """
-    return _compiled(function, _InnerKernel, no_cfunc_wrapper=True, no_cpython_wrapper=True)
+    return _compiled(function, no_cpython_wrapper=True)
 
 
-def compile_seconds() -> float:
-    """Wall time (s) for which this thread has waited for kernels: compiled by itself or another process, or loaded."""
-    return _waited.seconds
-
-
-class _Waited(threading.local):
-    depth, seconds = 0, 0.0
-
-
-_waited = _Waited()
-
-
-@contextmanager
-def _counted() -> Iterator[None]:
-    """Count the time of a block, once where such blocks lie in each other; nothing is collected in it.
-
-    Compiling makes millions of objects that live until it ends: going through them took an eighth of it.
-    """
-    start, collects = time.monotonic(), gc.isenabled()
-    gc.disable()
-    _waited.depth += 1
+def _compiled(function: Function, **wrappers: bool) -> Function:
+    config: Any = numba.config
+    compiling: Any = numba.njit
+    options = {"error_model": "numpy", "nogil": True, "no_cfunc_wrapper": True, **wrappers}
+    before = config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES
+    config.CACHE_DIR = str(kernels_folder())
+    config.CACHE_LOCATOR_CLASSES = f"{__name__}.{SharedByCopies.__name__}"
     try:
-        yield
-    finally:
-        if collects:
-            gc.enable()
-        _waited.depth -= 1
-        if not _waited.depth:
-            _waited.seconds += time.monotonic() - start
-
-
-def _compiled(function: Function, kind: type[_Kernel], **wrappers: bool) -> Function:
-    if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
-        return function
-    dispatcher = kind(function, targetoptions={"nopython": True, "error_model": "numpy", "nogil": True, **wrappers})
-    with suppress(RuntimeError):  # no folder to write into: compiled again by each process
-        dispatcher._cache = _KernelCache(function)  # type: ignore[no-untyped-call]
-    return cast(Function, dispatcher)
-
-
-class _Flags(Flags):
-    """What kernels are compiled with; numba compares it 30 000 times for a hundred kernels, 22 properties each time."""
-
-    __slots__ = ()
-    _HASH = hash(Flags())  # type: ignore[no-untyped-call]  # of the names alone
-
-    def __hash__(self) -> int:
-        return self._HASH
-
-    def __eq__(self, other: object) -> bool:
-        same = isinstance(other, _Flags) and self._values == other._values
-        return same or bool(super().__eq__(other))  # type: ignore[no-untyped-call]
-
-
-class _Kernel(CPUDispatcher):
-    _cache: Any
-    _compiler: Any
-
-    def __init__(self, *args: Any, **kwargs: Any) -> None:
-        super().__init__(*args, **kwargs)
-        self._compiler._customize_flags = _Flags
-
-    def compile(self, sig: Any) -> Any:
-        with _counted(), _alone(self._cache, self.py_func.__qualname__):
-            return super().compile(sig)  # type: ignore[no-untyped-call]
-
-    def get_call_template(self, args: Any, kws: Any) -> Any:
-        """Numba compiles a call with a constant integer for that very integer; one version serves all."""
-        unliteral: Callable[[Any], Any] = types.unliteral
-        named = {name: unliteral(kind) for name, kind in kws.items()}
-        return super().get_call_template(tuple(map(unliteral, args)), named)  # type: ignore[no-untyped-call]
-
-
-class _InnerKernel(_Kernel):
-    def __call__(self, *args: Any, **kwargs: Any) -> Any:
-        raise TypeError(f"{self.py_func.__qualname__} is compiled for kernels only; make it a @kernel to call it")
-
-
-@contextmanager
-def _alone(cache: object, name: str) -> Iterator[None]:
-    """One process at a time compiles a kernel: what another has compiled meanwhile is then loaded.
-
-    A kernel's lock is held while those that it calls are compiled, theirs never while it is: no two processes can wait
-    for each other, because kernels call each other in one direction.
-    """
-    lock = None
-    if isinstance(cache, _KernelCache):
-        with suppress(OSError):  # a file system without locks
-            lock = os.open(Path(cache.cache_path) / f"{name}.lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC)
-            fcntl.flock(lock, fcntl.LOCK_EX)
-    try:
-        yield
-    finally:
-        if lock is not None:
-            os.close(lock)
-
-
-class _KernelLocator(_CacheLocator):
-    """Where a kernel is kept: a folder that names the content of all kernels it may call."""
-
-    def __init__(self, function: Callable[..., Any], file: str) -> None:
-        path = Path(file).resolve()
-        self._folder = cache_folder() / f"{path.stem}-{_kernels_digest(path)}"
-        self._line = function.__code__.co_firstlineno
-
-    def get_cache_path(self) -> str:
-        return str(self._folder)
-
-    def get_source_stamp(self) -> str:
-        return "named by the folder"
-
-    def get_disambiguator(self) -> str:
-        return str(self._line)
-
-    @classmethod
-    def from_function(cls, py_func: Callable[..., Any], py_file: str) -> _KernelLocator | None:
-        locator = cls(py_func, py_file)
-        try:
-            locator.ensure_cache_path()  # type: ignore[no-untyped-call]
-        except OSError:
-            return None
-        return locator
-
-
-class _KernelCacheImpl(CompileResultCacheImpl):
-    _locator_classes = [_KernelLocator]
-
-
-class _KernelCache(FunctionCache):
-    _impl_class = _KernelCacheImpl
-
-
-@cache
-def _kernels_digest(path: Path) -> str:
-    """A digest of a file and of all files with kernels that it imports, directly or through another such file."""
-    reached, todo = {path: path.read_bytes()}, [path]
-    while todo:
-        for other in _kernel_files(todo.pop()):
-            if other not in reached:
-                reached[other] = other.read_bytes()
-                todo.append(other)
-    digest = hashlib.sha256()
-    for file, text in sorted(reached.items()):
-        digest.update(file.name.encode() + b"\0" + text + b"\0")
-    return digest.hexdigest()[:16]
-
-
-@cache
-def _kernel_files(path: Path) -> tuple[Path, ...]:
-    """The files with kernels that a file imports."""
-    found = []
-    for module, names in _IMPORT.findall(path.read_text(encoding="utf-8")):
-        parts = [module, *(f"{module}.{name}" for name in re.findall(r"\w+", names))]
-        files = [_PACKAGE.joinpath(*part.split(".")).with_suffix(".py") for part in parts]
-        found += [file for file in files if file.is_file() and _KERNEL in file.read_bytes()]
-    return tuple(found)
+        compiled: Function = compiling(function, cache=True, **options)
+    except RuntimeError:  # no folder to write into: compiled again by each process
+        compiled = compiling(function, **options)
+    finally:  # other packages keep what they compile where they always do
+        config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES = before
+    return compiled
 
 
 PARTS_PER_THREAD = 8

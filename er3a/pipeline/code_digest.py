@@ -1,94 +1,43 @@
-"""A digest of the modules that a module uses, so that an edit reruns only what depends on it.
+"""Digests of the package's own files: Snakemake does not see that an imported package was edited.
 
-Imports are read from the source text and followed inside this package. The packages' ``__init__`` files compute
-nothing, so only the named modules count.
+There are two. Numbers rest on all code but that of views; views, which show numbers, rest on everything. So another
+wording or picture computes nothing again.
 """
 
 from __future__ import annotations
 
-import ast
 import hashlib
-import re
-from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 
-_ROOT = Path(__file__).resolve().parents[2]
-_PACKAGE = _ROOT / "er3a"
-# Every process asks for a digest, and a parser would take a second for it; a line of prose that looks like this names
-# no module. One line (a comment left off), or a bracket of lines.
-_IMPORT = re.compile(r"^[ \t]*(?:from (?P<module>[\w.]+) )?import (?P<names>\([^)]*\)|[\w., \t]+)", flags=re.MULTILINE)
-VIEWS = ("report.py", "page.py", "panel.py", "index.py")
+_PACKAGE = Path(__file__).resolve().parents[1]
+FOLDERS = "messages", "viewing", "player", "teach", "page", "overview", "article", "commands", "new_study"
+FILES = "check", "cli", "dictionary", "program_reports", "run_study", "verdicts", "working_folder"
+VIEWS = frozenset((*FOLDERS, *(f"{name}.py" for name in FILES)))
+"""Folders and files of ``pipeline/`` on which no number rests: computing imports none of them (import-linter)."""
+_KINDS = (".py", ".j2", ".css", ".js")
 
 
 @cache
-def code_digest(*modules: str) -> str:
-    """SHA-256 over the sources of modules, of all modules of er3a that they import (transitively), and of templates
-    (``*.j2``, ``*.css``, ``*.js``) beside those that are part of a view."""
-    for module in modules:
-        if _file(module) is None:
-            raise ModuleNotFoundError(f"er3a has no module '{module}'")
+def numbers_digest() -> str:
+    """SHA-256 over the names and contents of all files that numbers can depend on."""
+    return _digest(views=False)
+
+
+@cache
+def code_digest() -> str:
+    """SHA-256 over the names and contents of all files that pages and recordings can depend on."""
+    return _digest(views=True)
+
+
+def _digest(views: bool) -> str:
     digest = hashlib.sha256()
-    for path in sorted(_sources(modules)):
-        digest.update(_named_source(path))
+    for path in sorted(_PACKAGE.rglob("*")):
+        name = path.relative_to(_PACKAGE)
+        if path.suffix in _KINDS and name.parts[0] != "shipped" and (views or not _is_view(name)):
+            digest.update(name.as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()
 
 
-@cache
-def _named_source(path: Path) -> bytes:
-    return path.relative_to(_PACKAGE).as_posix().encode() + b"\0" + path.read_bytes() + b"\0"
-
-
-def _sources(modules: Iterable[str]) -> set[Path]:
-    """The files of modules, of those that they import (transitively), and templates of views."""
-    found: set[Path] = set()
-    todo = [path for module in modules if (path := _file(module))]
-    while todo:
-        path = todo.pop()
-        if path in found:
-            continue
-        found.add(path)
-        if path.name in VIEWS:
-            found |= {file for kind in ("j2", "css", "js") for file in path.parent.glob(f"*.{kind}")}
-        todo += _imported(path)
-    return found
-
-
-@cache
-def _imported(path: Path) -> tuple[Path, ...]:
-    """The files that a file imports."""
-    return tuple(file for name in imported_names(path) if (file := _file(name)))
-
-
-def imported_names(path: Path) -> tuple[str, ...]:
-    """All names that a file imports, public names of er3a by the modules that they come from."""
-    names: list[str] = []
-    for found in _IMPORT.finditer(path.read_text(encoding="utf-8")):
-        module, listed = (
-            found["module"],
-            [part.split()[0] for part in found["names"].strip("()").split(",") if part.split()],
-        )
-        if module is None:
-            names += listed
-        elif module == "er3a":
-            names += [_public().get(name, f"er3a.{name}") for name in listed]
-        else:
-            names += [module, *(f"{module}.{name}" for name in listed)]
-    return tuple(names)
-
-
-@cache
-def _public() -> dict[str, str]:
-    """The public names of er3a, and their modules, as its ``__init__`` lists them."""
-    tree = ast.parse((_PACKAGE / "__init__.py").read_bytes())
-    for node in tree.body:
-        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "_PUBLIC":
-            public: dict[str, str] = ast.literal_eval(node.value)
-            return public
-    return {}
-
-
-@cache
-def _file(module: str) -> Path | None:
-    path = _ROOT.joinpath(*module.split(".")).with_suffix(".py")
-    return path if module.partition(".")[0] == _PACKAGE.name and path.is_file() else None
+def _is_view(name: Path) -> bool:
+    return name.parts[0] == "pipeline" and not VIEWS.isdisjoint(name.parts)

@@ -28,7 +28,7 @@ from er3a.errors import DoubtfulUnit, InputError
 from er3a.files.path_file import load_paths
 from er3a.files.units import noted_doubts
 from er3a.kinematics.singularity import USUAL_NEAR
-from er3a.pipeline.messages.language import as_text
+from er3a.pipeline.language import as_text
 from er3a.pipeline.messages.left_out import left_out_text
 from er3a.pipeline.messages.programs import remedy, say
 from er3a.pipeline.messages.say import excerpt

@@ -1,29 +1,25 @@
-"""`make run` and `er3a run`: one run at a time, inputs checked first, then Snakemake.
+"""`make run` and `er3a run`: one run at a time, inputs checked first, then Snakemake; and what a person sees of it.
 
 After `kill -9` Snakemake's own lock remains. The lock of the operating system that is taken here ends with its process,
 so a run that gets it knows that no other run is active, and may clear Snakemake's lock.
 
-The progress display of a run: a line for each verdict, and the time left.
-
-A logger plugin of Snakemake, which writes its own log into ``.snakemake/log/`` besides.
+The progress display, a line for each verdict and the time left, is a logger plugin of Snakemake, which writes its own
+log into ``.snakemake/log/`` besides.
 """
 
 from __future__ import annotations
 
-import atexit
 import fcntl
 import json
 import os
 import re
 import shutil
 import signal
-import subprocess
 import sys
-import threading
 import time
 from argparse import Namespace
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import nullcontext, redirect_stderr, suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import redirect_stderr, suppress
 from dataclasses import dataclass
 from functools import partial
 from html import escape
@@ -33,17 +29,15 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-import psutil
 from snakemake_interface_logger_plugins.base import LogHandlerBase
 from snakemake_interface_logger_plugins.common import LogEvent
 from snakemake_interface_logger_plugins.registry import LoggerPluginRegistry
 from snakemake_interface_logger_plugins.settings import LogHandlerSettingsBase
 
 from er3a.errors import Er3aError, ResultError
-from er3a.files.kept_files import ROOT, half_written, read_checked, write_atomically
-from er3a.pipeline import job_server
+from er3a.files.kept_files import ROOT, half_written, write_atomically
+from er3a.pipeline import language
 from er3a.pipeline.check import check_study
-from er3a.pipeline.messages import language
 from er3a.pipeline.messages.say import sentence
 from er3a.pipeline.results import JUNIT, OVERALL, check_checksum, check_results, checksum_file
 from er3a.pipeline.stages.registry import STAGES
@@ -54,8 +48,8 @@ from er3a.pipeline.verdicts import write_junit_error
 def corrupted(study: Study, results: Path, reports: Path) -> Iterator[tuple[Path, ResultError]]:
     """Files that are there and not as they were written, or of another format version, each with what is wrong.
 
-    These are results, blocks that a run which was cut off has sampled, pages, recordings and previews. Of a stage's
-    results it is the summary that is named, without which the stage counts as not done.
+    These are results, pages, recordings and previews. Of a stage's results it is the summary that is named, without
+    which the stage counts as not done.
     """
     checks: list[tuple[Path, Callable[[Path], object]]] = [
         (reports / page, check_checksum) for page in (*OVERALL, *study.article_pages().values())
@@ -65,7 +59,6 @@ def corrupted(study: Study, results: Path, reports: Path) -> Iterator[tuple[Path
         for stage in study.stages(robot):
             checks.append((results / robot / stage / "summary.json", lambda path: check_results(path.parent)))
             checks += [(reports / robot / f"{stage}.{kind}", check_checksum) for kind in ("rrd", "webp")]
-        checks += [(part, read_checked) for part in sorted((results / robot).glob("*/parts/*.npz"))]
     for path, check in checks:
         if path.is_file():
             try:
@@ -76,9 +69,8 @@ def corrupted(study: Study, results: Path, reports: Path) -> Iterator[tuple[Path
 
 MARKS = {"pass": "✓", "caution": "!", "fail": "✗"}
 NO_VERDICT = "–"
-INDEX_EVERY_S = 25.0
-HEAVY = {"sample_workspace": 6.0, "compute_workspace": 8.0, "compute_validation": 5.0, "compute_programs": 5.0}
-"""Jobs beside the others, by rule: what they take on average, in units of a page."""
+HEAVY = {"compute_workspace": 4.0, "compute_validation": 3.0, "compute_programs": 2.0, "views": 4.0}
+"""Jobs beside the others, by the beginning of their rule: what they take on average, in units of another one."""
 
 _JOB_ENDED = re.compile(r"2> (\S+)' (?:died with <Signals\.\w+: (\d+)>|returned non-zero exit status (\d+))")
 """How a job ended, of which a line of its own tells: its log, and the signal or the exit code."""
@@ -86,16 +78,15 @@ _JOB_ENDED = re.compile(r"2> (\S+)' (?:died with <Signals\.\w+: (\d+)>|returned 
 Expected = Mapping[tuple[str, str], str]
 
 
-def logger_words(study: Path, expected: Expected) -> list[str]:
+def logger_words(expected: Expected) -> list[str]:
     """The words that make Snakemake, called in this process, report to a person in this way.
 
     Parameters
     ----------
-    study : its file
     expected : verdicts that it expects, by robot and stage
     """
     module = ModuleType("snakemake_logger_plugin_er3a")
-    module.LogHandler = type("LogHandler", (RunLog,), {"study": study, "expected": expected})  # type: ignore[attr-defined]
+    module.LogHandler = type("LogHandler", (RunLog,), {"expected": expected})  # type: ignore[attr-defined]
     module.LogHandlerSettings = RunLogSettings  # type: ignore[attr-defined]
     LoggerPluginRegistry().register_plugin(module.__name__, module)
     return ["--logger", "er3a"]
@@ -109,7 +100,6 @@ class RunLogSettings(LogHandlerSettingsBase):
 class RunLog(LogHandlerBase):
     """Writes to standard error; records come one at a time, from one thread."""
 
-    study = Path("config/config.yaml")
     expected: Expected = {}
     writes_to_stream = True
     writes_to_file = False
@@ -120,12 +110,9 @@ class RunLog(LogHandlerBase):
     def __post_init__(self) -> None:
         self._start = time.monotonic()
         self._jobs: dict[int, tuple[str, dict[str, str], float]] = {}
-        self._sampled: dict[tuple[str, str], float] = {}
         self._left: dict[str, int] = {}
         self._killed: dict[str, int] = {}
         self._done = 0.0
-        self._index: subprocess.Popen[bytes] | None = None
-        self._indexed = -INDEX_EVERY_S
         self._bar = _bar() if sys.stderr.isatty() and not self.common_settings.nocolor else None
 
     def emit(self, record: LogRecord) -> None:
@@ -161,48 +148,29 @@ class RunLog(LogHandlerBase):
         return str(job.get("rule_msg") or ": ".join(filter(None, (of.get("robot"), " ".join(filter(None, words))))))
 
     def close(self) -> None:
-        """Take the bar away, and let an index that is being written be finished."""
+        """Take the bar away."""
         if self._bar:
             self._bar.stop()
-        if self._index:
-            self._index.wait()
         super().close()
 
     def _finish(self, job: int) -> None:
         rule, wildcards, begun = self._jobs.pop(job, ("", {}, time.monotonic()))
-        seconds = time.monotonic() - begun
-        self._done += HEAVY.get(rule, 1.0)
+        self._done += _weight(rule)
         self._left[rule] = self._left.get(rule, 1) - 1
         verb, _, stage = rule.partition("_")
-        of = wildcards.get("robot", ""), stage
-        if verb == "sample":
-            self._sampled[of] = self._sampled.get(of, 0.0) + seconds
-        elif verb == "compute":
+        if verb == "compute":
+            of = wildcards.get("robot", ""), stage
             status = _verdict(*of)
             note = ", as expected" if self.expected.get(of) == status else ""
-            took = seconds + self._sampled.get(of, 0.0)
+            took = f"{time.monotonic() - begun:.0f} s"
             mark = MARKS.get(status, NO_VERDICT)
-            self._print(f"{mark} {of[0]}  {stage:<10}  {status.replace('_', ' ')}{note}  {took:.0f} s", self._rest())
-        elif rule == "report" and self._left.get("index"):
-            self._write_index()
+            self._print(f"{mark} {of[0]}  {stage:<10}  {status.replace('_', ' ')}{note}  {took}", self._rest())
         if self._bar:
             share = self._done / max(self._done + self._weight_left(), 1e-9)
             self._bar.update(self._bar.task_ids[0], completed=share, description=self._rest())
 
-    def _write_index(self) -> None:
-        """Have the index written with what is there; that of the whole run comes last, as one of its jobs."""
-        if time.monotonic() - self._indexed < INDEX_EVERY_S or (self._index and self._index.poll() is None):
-            return
-        self._indexed = time.monotonic()
-        self._index = subprocess.Popen(
-            [sys.executable, "-m", "er3a", "index", "--study", str(self.study)],
-            env=os.environ | job_server.SETTINGS,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-        )
-
     def _weight_left(self) -> float:
-        return sum(HEAVY.get(rule, 1.0) * max(n, 0) for rule, n in self._left.items())
+        return sum(_weight(rule) * max(n, 0) for rule, n in self._left.items())
 
     def _rest(self) -> str:
         """How many jobs are left and how long they will take, at the speed so far."""
@@ -218,11 +186,12 @@ class RunLog(LogHandlerBase):
             print(f"{line}  ({rest})" if rest else line, file=sys.stderr, flush=True)
 
 
+def _weight(rule: str) -> float:
+    return next((weight for name, weight in HEAVY.items() if rule.startswith(name)), 1.0)
+
+
 def _concerns_a_person(record: LogRecord) -> bool:
-    text = record.getMessage()
-    if "output files of rule index were not present" in text:  # it was written meanwhile, by this log
-        return False
-    return record.levelno >= WARNING or text.startswith("Nothing to be done")
+    return record.levelno >= WARNING or record.getMessage().startswith("Nothing to be done")
 
 
 def _error_line(text: str) -> str:
@@ -252,7 +221,6 @@ def _verdict(robot: str, stage: str) -> str:
 
 
 _STATE = Path(".snakemake")
-_PATIENCE_S = 0.7
 
 
 class RunError(Er3aError):
@@ -278,14 +246,17 @@ def run_study(study_file: Path, results: Path, reports: Path, words: Sequence[st
         the study, or a file that it leads to, can't be used
     """
     asked = parsed(words)
+    os.environ["ER3A_STAGES"] = " ".join(asked_stages(asked.targets))
     if asked.dryrun:
         return _dry_run(study_file, results, reports, words, asked)
     lock = _taken_lock()
     try:
-        done = _run(study_file, results, reports, words, asked, lock)
+        done = _run(study_file, results, reports, words, asked)
     except Er3aError as error:
         _report_error(reports, str(error))
         raise
+    finally:
+        os.close(lock)
     if not done:
         _report_error(reports, "The run did not end well: its output on standard error, and logs/, say why.")
     return done
@@ -327,7 +298,7 @@ def mark_pages(reports: Path, problem: str | None) -> None:
             os.utime(page, ns=(times.st_atime_ns, times.st_mtime_ns))
 
 
-def _run(study_file: Path, results: Path, reports: Path, words: Sequence[str], asked: Namespace, lock: int) -> bool:
+def _run(study_file: Path, results: Path, reports: Path, words: Sequence[str], asked: Namespace) -> bool:
     """Check a study and run it; whether all jobs were done."""
     study = check_study(study_file)
     mark_pages(reports, None)
@@ -340,19 +311,16 @@ def _run(study_file: Path, results: Path, reports: Path, words: Sequence[str], a
         path.unlink()
     if any((_STATE / "locks").glob("*")):
         print("note: a run that was cut off left its lock; going on where it stopped", file=sys.stderr)
-        _unlock()
-    os.set_inheritable(lock, True)  # held until the last job of this run has ended
-    _end_when_asked(results, reports)
+        shutil.rmtree(_STATE / "locks", ignore_errors=True)
     sys.stdout.flush()
     plain = ["--nocolor"] if os.environ.get("NO_COLOR") else []
     expected = {(name, stage): verdict for name in study.names for stage, verdict in study.entry(name).expect.items()}
     own_log = asked.logger or asked.verbose or asked.printshellcmds or asked.debug_dag
-    shown = [] if own_log else logger_words(study_file, expected)
+    shown = [] if own_log else logger_words(expected)
     on_this_machine = not (asked.executor or asked.profile or asked.workflow_profile)
-    with job_server.running(lock) if on_this_machine else nullcontext():
-        first = _one_at_first() if on_this_machine and not asked.resources else []
-        # Names of what to make stand first, options that take as many words as follow before one that takes one.
-        return _snakemake([*words, *first, *shown, *plain, *_of_er3a(study_file, asked)])
+    first = _one_at_first() if on_this_machine and not asked.resources else []
+    # Names of what to make stand first, options that take as many words as follow before one that takes one.
+    return _snakemake([*words, *first, *shown, *plain, *_of_er3a(study_file, asked)])
 
 
 def _of_er3a(study_file: Path, asked: Namespace) -> list[str]:
@@ -379,9 +347,20 @@ def _of_er3a(study_file: Path, asked: Namespace) -> list[str]:
     return ["--snakefile", str(ROOT / "Snakefile"), "--workflow-profile", profile, "--configfile", str(study_file)]
 
 
-def _unlock() -> None:
-    """Clear Snakemake's own lock, which a run that holds ours may."""
-    shutil.rmtree(_STATE / "locks", ignore_errors=True)
+def asked_stages(targets: Iterable[str] | None) -> list[str]:
+    """The stages that a run is asked for, and those that their pages show the verdict of; none where it may be all.
+
+    A target names a stage, or a file of a stage such as ``reports/er3_600/inverse.html``.
+    """
+    asked: list[str] = []
+    for target in targets or ():
+        parts = Path(target).parts
+        of = Path(parts[2]).stem if len(parts) > 2 and parts[0] in ("results", "reports") else target
+        stage = STAGES.get("validation" if of == "teach" else of)
+        if stage is None:
+            return []
+        asked += [stage.name, *stage.rests_on]
+    return [name for name in STAGES if name in asked]
 
 
 def _one_at_first() -> list[str]:
@@ -421,48 +400,6 @@ def _dry_run(study_file: Path, results: Path, reports: Path, words: Sequence[str
         print(f"note: {fault.file}: {fault.problem}; a run makes it again", file=sys.stderr)
     sys.stdout.flush()
     return _snakemake([*words, "--nolock", *_of_er3a(study_file, asked)])
-
-
-def _end_when_asked(results: Path, reports: Path) -> None:
-    """Have SIGTERM, and Ctrl-C, end this process and all below it at once.
-
-    After SIGTERM Snakemake would wait for the end of its jobs; after Ctrl-C it would call them jobs with an error.
-    """
-    from snakemake.scheduling.job_scheduler import JobScheduler
-
-    def end(number: int = signal.SIGTERM, *_: Any) -> None:
-        name = "Ctrl-C" if number == signal.SIGINT else "SIGTERM"
-        print(
-            f"error: ended by {name}; what is finished stays, and the same command goes on from there", file=sys.stderr
-        )
-        sys.stderr.flush()
-        silence = os.open(os.devnull, os.O_WRONLY)
-        for output in (1, 2):  # Snakemake's threads would tell of each job
-            os.dup2(silence, output)
-        _end_processes_below()
-        _report_error(reports, f"The run was ended by {name}.")
-        for path in (*half_written(results), *half_written(reports)):
-            path.unlink(missing_ok=True)
-        _unlock()
-        atexit._run_exitfuncs()  # Snakemake's temporary folder goes
-        os._exit(128 + number)  # waits for no thread
-
-    JobScheduler.exit_gracefully = staticmethod(end)  # type: ignore[method-assign, assignment]
-    if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, end)
-        if signal.getsignal(signal.SIGINT) != signal.SIG_IGN:  # as of what a shell starts in the background
-            signal.signal(signal.SIGINT, end)
-
-
-def _end_processes_below() -> None:
-    """Ask all processes below this one to end, and end those that are still there after a moment."""
-    below = psutil.Process().children(recursive=True)
-    for ask in (psutil.Process.terminate, psutil.Process.kill):
-        for process in below:
-            with suppress(psutil.NoSuchProcess):
-                ask(process)
-        _, below = psutil.wait_procs(below, timeout=_PATIENCE_S)
-        below = list({*below, *psutil.Process().children(recursive=True)})
 
 
 def _taken_lock() -> int:

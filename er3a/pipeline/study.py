@@ -20,7 +20,7 @@ from er3a.files.robot_library import LoadFields, placement_transform, read_robot
 from er3a.files.scene_file import load_scene
 from er3a.files.units import noted_doubts
 from er3a.files.yaml_file import InputFile, StrictModel, load, read_yaml
-from er3a.pipeline.messages.language import LANGUAGES, LanguageCode
+from er3a.pipeline.language import LANGUAGES, LanguageCode
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.registry import STAGES as REGISTRY
 from er3a.pipeline.sweeps import StageName, Sweep, Variant

@@ -12,7 +12,7 @@ from pydantic import AfterValidator, Field, model_validator
 from er3a.errors import InputError
 from er3a.files.robot_file import Name, Placement, RobotFile, Text, check_placement
 from er3a.files.yaml_file import StrictModel, parse
-from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.language import N_, tr
 from er3a.pipeline.stages.registry import STAGES
 from er3a.robots.robot import MAX_JOINTS
 

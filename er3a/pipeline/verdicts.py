@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Literal
 
 from er3a.files.kept_files import write_atomically
-from er3a.pipeline.messages import language
+from er3a.pipeline import language
 from er3a.pipeline.messages.left_out import left_out_names, left_out_text, say_reserved
 from er3a.pipeline.messages.say import bracketed, joined, say_all, sentence
 from er3a.pipeline.results import NotComputed, Status, changed_since, is_computed, read_status, read_verdict

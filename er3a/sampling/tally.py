@@ -68,13 +68,6 @@ class Extremes:
         """No sample yet."""
         return cls(np.full(count, -np.inf), np.full(count, NONE), np.full(count, NONE))
 
-    def merge(self, other: Extremes) -> Extremes:
-        """The further of the two in each direction, the earlier sample at a tie."""
-        earlier = (other.block < self.block) | ((other.block == self.block) & (other.sample < self.sample))
-        take = (other.support > self.support) | ((other.support == self.support) & earlier & (other.block != NONE))
-        names = "support", "block", "sample"
-        return Extremes(*(np.where(take, getattr(other, name), getattr(self, name)) for name in names))
-
 
 def cube_map() -> Reals:
     """Centres (unit vectors) and angular radii (rad) of the patches that :func:`_patch` numbers, as rows (4, P)."""
@@ -262,16 +255,6 @@ class Tally:
     first_block: NDArray[np.int32]
     side: Integers
     extremes: Extremes
-
-    def merge(self, other: Tally) -> Tally:
-        """The tally of both groups of blocks; the order of merging makes no difference."""
-        return Tally(
-            np.sort(np.concatenate([self.blocks, other.blocks])),
-            self.counts + other.counts,
-            np.minimum(self.first_block, other.first_block),
-            self.side + other.side,
-            self.extremes.merge(other.extremes),
-        )
 
     @property
     def section(self) -> Integers:

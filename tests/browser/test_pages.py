@@ -11,7 +11,7 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import Select
 
 from er3a.files.robot_library import load_robot
-from er3a.pipeline.viewing.index import FIRST
+from er3a.pipeline.overview.index import FIRST
 from testing import chromium
 from tests.browser.pages import OVER_ALL, PAGES, PAGES_OF_EACH_KIND
 from tests.conftest import ROBOTS

@@ -24,7 +24,7 @@ from er3a.files.path_file import load_paths
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward
-from er3a.pipeline.messages import language
+from er3a.pipeline import language
 from er3a.pipeline.messages.kinematics import BRANCHES
 from er3a.pipeline.messages.pages import FOUNDATIONS
 from er3a.pipeline.messages.say import say

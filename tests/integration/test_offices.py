@@ -23,7 +23,6 @@ from testing.processes import run
 from testing.small_study import ROOT
 
 ODD_STUDY = "config/one's ü.yaml"
-LONG_NAMES = ("a" * 64, "arm_" * 16, "ab" + "0" * 62, "x" * 63 + "y")
 WHEEL = "tiny-1.0-py3-none-any.whl"
 
 needs_make = pytest.mark.skipif(shutil.which("make") is None, reason="make is not installed")
@@ -50,24 +49,6 @@ def test_a_study_and_a_checkout_with_blanks_quotes_and_umlauts(fresh_project, tm
     done = run(command, cwd=folder, env=os.environ | {"PYTHONPATH": str(folder)})
     assert done.returncode == 0, done.stderr
     assert (folder / table).is_file()
-
-
-@pytest.mark.long
-def test_a_robot_s_name_may_have_64_letters_and_repeat_itself(fresh_project):
-    project = fresh_project("long")
-    study = project.folder / "config/small.yaml"
-    text = study.read_text(encoding="utf-8")
-    entry = text[text.index("  er3_600:\n") : text.index("\nvalidation:")]
-    robot = (project.folder / "data/robots/er3_600.yaml").read_text(encoding="utf-8")
-    for name in LONG_NAMES:
-        text = text.replace(
-            entry, entry + entry.replace("er3_600:\n", f"{name}:\n    file: data/robots/{name}.yaml\n", 1)
-        )
-        table = project.folder / "data/robots" / f"{name}.yaml"
-        table.write_text(robot.replace("name: er3_600", f"name: {name}"), encoding="utf-8")
-    study.write_text(text, encoding="utf-8")
-    pages = [f"reports/{name}/inverse.html" for name in LONG_NAMES]
-    assert {f"{name}: report inverse" for name in LONG_NAMES} <= project.planned(*pages)
 
 
 @contextmanager

@@ -48,16 +48,8 @@ def edited(path: Path, old: str, new: str, newer: bool = True) -> Iterator[None]
         os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
 
 
-def panels(study) -> set[str]:
-    return {f"{robot}: write the teach panel" for robot in study.robots}
-
-
-def with_inverse(study) -> list[str]:
-    return [robot for robot in study.robots if "inverse" in stages_of(robot)]
-
-
-def views(robot: str, stage: str) -> set[str]:
-    return {f"{robot}: {verb} {stage}" for verb in ("record", "report")}
+def views(robot: str) -> str:
+    return f"{robot}: write pages and recordings"
 
 
 def test_every_stage_leaves_results_a_page_and_a_recording(small_study):
@@ -75,7 +67,6 @@ def test_every_stage_leaves_results_a_page_and_a_recording(small_study):
                 assert (small_study.folder / "reports" / robot / f"{stage}.{suffix}").stat().st_size > 1000
         assert (small_study.folder / "reports" / robot / "teach.html").stat().st_size > 1000
     assert (small_study.folder / "reports/index.html").is_file()
-    assert not list((small_study.folder / "results").glob("*/workspace/parts/*"))
 
 
 @pytest.mark.long
@@ -106,67 +97,52 @@ def test_a_page_s_foot_names_inputs_with_grades_and_the_command_that_makes_it_ag
         planned = small_study.make_run("--dry-run", "--nocolor", command[1]).stdout
     finally:
         (tmp_path / "kept.html").rename(page)
-    assert re.findall(r"^Job \d+: (.+)$", planned, flags=re.MULTILINE) == ["er3_600: report validation"]
+    assert re.findall(r"^Job \d+: (.+)$", planned, flags=re.MULTILINE) == ["er3_600: write pages and recordings"]
 
 
 def test_a_stage_that_is_asked_for_by_name_computes_no_other(small_study):
-    (robot, *_) = with_inverse(small_study)
     with edited(small_study.folder / "config/small.yaml", "seed: 20261120", "seed: 20261121"):
-        planned = small_study.planned("inverse")
-    computed = {job.partition(": ")[2] for job in planned if ": compute" in job}
+        planned = small_study.make_run("--dry-run", "--nocolor", "inverse").stdout
+    jobs = set(re.findall(r"^Job \d+: (.+)$", planned, flags=re.MULTILINE))
+    computed = {job.partition(": ")[2] for job in jobs if ": compute" in job}
     assert computed == {"compute inverse", "compute validation"}
-    assert {f"{robot}: compute inverse", f"{robot}: report inverse", "write the index"} <= planned
+    assert {views("er3_600"), "write the index"} <= jobs
 
 
-def test_edits_of_views_and_of_a_budget_rerun_those_views_and_that_stage_only(small_study):
-    """A stage's template, the panels' script, words of a language that no page speaks, and the workspace's samples."""
+def test_edits_of_views_compute_nothing_and_that_of_a_budget_its_stage_only(small_study):
     package = small_study.folder / "er3a/pipeline"
-    with (
-        edited(package / "stages/inverse/report.html.j2", "{% block content %}", "{% block content %}<!-- -->"),
-        edited(package / "teach/kinematics.js", "/**", "/** Edited."),
-        edited(package / "messages/locale/zh/LC_MESSAGES/er3a.po", "所有机器人", "全部机器人"),
-        edited(small_study.folder / "config/small.yaml", "samples: 200000", "samples: 200008"),
-    ):
-        planned = small_study.planned()
-    assert {f"{robot}: compute workspace" for robot in small_study.robots} <= planned
-    reports = {f"{robot}: report inverse" for robot in with_inverse(small_study)}
-    reports |= {
-        f"{robot}: report {name}"
-        for name, stage in REGISTRY.items()
-        for robot in small_study.robots
-        if "workspace" in stage.shows and name in stages_of(robot)
-    }
-    assert {job for job in planned if "workspace" not in job} == reports | panels(small_study) | {"write the index"}
+    all_views = {*map(views, small_study.robots), "write the index"}
+    edits = [
+        (package / "stages/inverse/page/report.html.j2", "{% block content %}", "{% block content %}<!-- -->"),
+        (package / "teach/kinematics.js", "/**", "/** Edited."),
+        (package / "messages/inverse.py", '"""', '"""Edited. '),
+        (small_study.folder / "config/small.yaml", "\ntrajectory:", "\nreport: {language: zh}\ntrajectory:"),
+    ]
+    for edit in edits:
+        with edited(*edit):
+            assert small_study.planned() == all_views, edit[0]
+    with edited(package / "messages/locale/zh/LC_MESSAGES/er3a.po", "所有机器人", "全部机器人"):
+        assert small_study.planned() == set(), "words of a language that no page speaks"
+    with edited(small_study.folder / "config/small.yaml", "samples: 200000", "samples: 200008"):
+        computed = {f"{robot}: compute workspace" for robot in small_study.robots}
+        assert small_study.planned() == computed | all_views
 
 
-@pytest.mark.long
-def test_another_language_renders_pages_and_computes_nothing(small_study):
-    with edited(small_study.folder / "config/small.yaml", "\ntrajectory:", "\nreport: {language: zh}\ntrajectory:"):
-        planned = small_study.planned()
-    assert {f"{robot}: report {stage}" for robot in small_study.robots for stage in stages_of(robot)} | panels(
-        small_study
-    ) <= planned
-    assert not [job for job in planned if re.search("compute|sample|record", job)]
-
-
-def test_edits_of_a_kinematics_module_a_table_and_references_rerun_what_rests_on_them(small_study):
+def test_edits_of_code_a_table_and_references_compute_again_what_rests_on_them(small_study):
     data = small_study.folder / "data"
     with (
-        edited(small_study.folder / "er3a/kinematics/neighbours.py", '"""', '"""Edited. '),
         edited(data / "robots/er3_600.yaml", "d_mm: 367.5", "d_mm: 367.6", newer=False),  # as from a backup
         edited(data / "manual_refs/er3a_c60/axes.csv", "cad", "export", newer=False),
     ):
         planned = small_study.planned()
     assert {f"er3_600: compute {stage}" for stage in STAGES} <= planned
-    others = {job for job in planned if not job.startswith("er3_600")}
-    assert {job for job in others if "compute" in job} == {
-        "er3a_c60: compute validation",
-        "er3a_c60_article: compute validation",
-        *(f"{robot}: compute inverse" for robot in with_inverse(small_study) if robot != "er3_600"),
+    computed = {job for job in planned if "compute" in job and not job.startswith("er3_600")}
+    assert computed == {"er3a_c60: compute validation", "er3a_c60_article: compute validation"}
+    with edited(small_study.folder / "er3a/kinematics/neighbours.py", '"""', '"""Edited. '):
+        planned = small_study.planned()
+    assert {job for job in planned if "compute" in job} == {
+        f"{robot}: compute {stage}" for robot in small_study.robots for stage in stages_of(robot)
     }
-    assert views("er3a_c60", "inverse") <= others
-    recorded = {job.rpartition(" ")[2] for job in others if "record" in job}
-    assert recorded == {"validation", "inverse"}, "pages of the other stages quote validation, their results do not"
 
 
 def test_verdicts_say_what_has_changed_since(small_study, monkeypatch):
@@ -218,10 +194,8 @@ def test_what_is_missing_damaged_or_of_an_older_version_is_made_again(small_stud
         assert line.endswith("; it is made again")
     log = max((run.folder / ".snakemake/log").glob("*.snakemake.log")).read_text(encoding="utf-8")
     jobs = set(re.findall(r"^Job \d+: (.+)$", log, flags=re.MULTILINE)) - {ALL_THERE}
-    expected = {*views("er3_600", "validation"), "er3_600: report workspace", "write the index"}
-    for robot in ("er3a_c60", "er3_600"):
-        expected |= {f"{robot}: compute inverse", *views(robot, "inverse"), f"{robot}: report workspace"}
-    assert jobs == expected
+    robots = ("er3a_c60", "er3_600")
+    assert jobs == {*(f"{robot}: compute inverse" for robot in robots), *map(views, robots), "write the index"}
     assert {path: path.read_bytes() for path in results.rglob("*") if path.is_file()} == before
     assert run.planned() == set()
 

@@ -9,10 +9,10 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from er3a.pipeline.overview.index import write_index
 from er3a.pipeline.results import read_stage
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import load_study
-from er3a.pipeline.viewing.index import write_index
 from tests.conftest import ROBOTS
 from tests.viewing.untranslated import PageTexts, plain_words, texts_from_files, wide_letters
 
@@ -20,9 +20,7 @@ pytestmark = pytest.mark.long  # a study on top of another
 
 SWEEP = "sweeps:\n  a3: {robot: er3a_c60, vary: joints.3.a_mm, values: [50, 70], stages: [workspace]}\n"
 VARIANTS = [f"er3a_c60-a3-0{number}" for number in (1, 2)]
-JOBS = {f"{name}: {verb} workspace" for name in VARIANTS for verb in ("compute", "record", "report")} | {
-    f"{name}: sample the workspace, part 1-of-1" for name in VARIANTS
-}
+JOBS = {f"{name}: {job}" for name in VARIANTS for job in ("compute workspace", "write pages and recordings")}
 
 
 @pytest.fixture(scope="module")

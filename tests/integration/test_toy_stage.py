@@ -71,14 +71,15 @@ def compute(study, name):
     summary = ToySummary(Verdict("pass", Long(whole)), (Figure("sum", whole, "m"),), not_examined=missed)
     return ToyResults(summary, Lengths(a))
 ''',
-    "pipeline/stages/toy/report.py": '''"""The page."""
+    "pipeline/stages/toy/page/__init__.py": '"""Its page."""\n',
+    "pipeline/stages/toy/page/report.py": '''"""The page."""
 from er3a.pipeline.viewing.page import render_stage
 
 def report(study, stored, output):
     """Write it."""
     render_stage(study, stored, output)
 ''',
-    "pipeline/stages/toy/report.html.j2": '{% extends "base.html.j2" %}\n',
+    "pipeline/stages/toy/page/report.html.j2": '{% extends "base.html.j2" %}\n',
     "pipeline/messages/toy.py": '''"""The verdict, and words."""
 from er3a.pipeline.messages.say import texts
 
@@ -111,7 +112,8 @@ def with_toy(fresh_project, small_study):
     for robot in project.robots:
         for stage in (small_study.folder / "results" / robot).iterdir():
             shutil.copytree(stage, project.folder / "results" / robot / stage.name)
-    er3a(project, *((verb, "toy", robot) for robot in project.robots for verb in ("compute", "report")), ("index",))
+    jobs = [job for robot in project.robots for job in (("compute", "toy", robot), ("views", robot, "toy"))]
+    er3a(project, *jobs, ("index",))
     return project
 
 
@@ -161,7 +163,7 @@ def test_a_robot_for_which_it_fails_has_a_reason_and_the_index_stands(with_toy):
     (folder / "other.yaml").write_text(study, encoding="utf-8")
     where = ("--study", "other.yaml", "--results", "other/results")
     views = (*where, "--reports", "other")
-    verbs = ("compute", "toy", "er3_600", *where), ("report", "toy", "er3_600", *views), ("index", *views)
+    verbs = ("compute", "toy", "er3_600", *where), ("views", "er3_600", "toy", *views), ("index", *views)
     told = er3a(with_toy, *verbs)
     assert f"note: er3_600, toy: Not computed: {reason}\n" in told
     failed = json.loads((folder / "other/results/er3_600/toy/summary.json").read_text(encoding="utf-8"))
@@ -190,5 +192,7 @@ def test_the_index_shows_it(with_toy):
 def test_the_workflow_has_rules_for_it_and_none_for_the_recording_it_lacks(with_toy):
     told = with_toy.snakemake("--dry-run", "--forceall", "--nocolor").stdout
     planned = set(re.findall(r"^Job \d+: (.+)$", told, flags=re.MULTILINE))
-    assert {f"{robot}: {verb} toy" for robot in with_toy.robots for verb in ("compute", "report")} <= planned
-    assert not [job for job in planned if job.endswith("record toy")]
+    assert {f"{robot}: compute toy" for robot in with_toy.robots} <= planned
+    made = with_toy.snakemake("--dry-run", "--forceall", "--nocolor", "reports/er3_600/toy.html").stdout
+    assert "reports/er3_600/toy.html" in made
+    assert "toy.rrd" not in made

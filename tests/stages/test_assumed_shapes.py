@@ -17,9 +17,9 @@ from er3a.pipeline.results import Verdict, read_results
 from er3a.pipeline.stages.collision.compute import compute as collision
 from er3a.pipeline.stages.collision.model import FreeSpace
 from er3a.pipeline.stages.trajectory.model import RESULTS, MinClearance, is_safe
-from er3a.pipeline.stages.trajectory.played import faults
-from er3a.pipeline.stages.trajectory.record import runs_of_path
-from er3a.pipeline.stages.trajectory.report import report
+from er3a.pipeline.stages.trajectory.page.played import faults
+from er3a.pipeline.stages.trajectory.page.record import runs_of_path
+from er3a.pipeline.stages.trajectory.page.report import report
 from er3a.pipeline.stages.trajectory.written_programs import near_assumed_shapes
 from er3a.pipeline.study import load_study
 from er3a.program_check.check_program import CheckOptions, check_program

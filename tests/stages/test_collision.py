@@ -21,7 +21,7 @@ from er3a.pipeline.results import read_results, read_verdict
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.collision.compute import compute
 from er3a.pipeline.stages.collision.model import RESULTS
-from er3a.pipeline.stages.collision.report import target_rows
+from er3a.pipeline.stages.collision.page.report import target_rows
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study, load_study
 from er3a.pipeline.teach.panel import write_teach_page

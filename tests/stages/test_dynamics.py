@@ -36,8 +36,8 @@ from er3a.pipeline.stages.dynamics.model import (
     TorqueRows,
     Use,
 )
-from er3a.pipeline.stages.dynamics.record import record
-from er3a.pipeline.stages.dynamics.report import report
+from er3a.pipeline.stages.dynamics.page.record import record
+from er3a.pipeline.stages.dynamics.page.report import report
 from er3a.pipeline.study import Study, load_study
 from er3a.robots.masses import Load
 from testing.arms import scara

@@ -22,7 +22,7 @@ from er3a.files.robot_file import Placement
 from er3a.files.robot_library import load_robot
 from er3a.files.vision_file import load_vision
 from er3a.kinematics.solutions import MANY_TARGETS, ByClass, ClosedForm, Iteration
-from er3a.pipeline.messages.language import using
+from er3a.pipeline.language import using
 from er3a.pipeline.messages.left_out import left_out_text
 from er3a.pipeline.results import LeftOut, LeftOutSubject
 from er3a.pipeline.stages.collision.compute import compute as collision

@@ -35,7 +35,7 @@ from er3a.pipeline.stages.inverse.model import (
     TargetResult,
     shown_targets,
 )
-from er3a.pipeline.stages.inverse.report import of_a_joint, overview_row, rule_rows
+from er3a.pipeline.stages.inverse.page.report import of_a_joint, overview_row, rule_rows
 from er3a.pipeline.study import Study
 from er3a.robots.joint_limits import meant
 from er3a.selection.select import RULES

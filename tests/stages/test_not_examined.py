@@ -60,8 +60,8 @@ from er3a.pipeline.stages.trajectory.motion import (
     planning_of,
     proof_requirements,
 )
-from er3a.pipeline.stages.trajectory.played import faults
-from er3a.pipeline.stages.trajectory.report import report
+from er3a.pipeline.stages.trajectory.page.played import faults
+from er3a.pipeline.stages.trajectory.page.report import report
 from er3a.pipeline.stages.validation.compute import compute as validation
 from er3a.pipeline.stages.vision.compute import compute as vision
 from er3a.pipeline.stages.workspace.compute import compute as workspace

@@ -16,8 +16,8 @@ from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
 from er3a.files.robot_writer import write_robot
 from er3a.kinematics.forward import forward
+from er3a.pipeline.language import using
 from er3a.pipeline.messages.expectations import outcome_word
-from er3a.pipeline.messages.language import using
 from er3a.pipeline.messages.programs import remedy, say
 from er3a.pipeline.program_reports import checked_file
 from er3a.pipeline.results import Stored, read_results
@@ -25,9 +25,9 @@ from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.programs.compute import compute as compute_programs
 from er3a.pipeline.stages.programs.model import RESULTS, ProgramsResults, SomeProgramsFail
-from er3a.pipeline.stages.programs.played import faults, motions
-from er3a.pipeline.stages.programs.record import record
-from er3a.pipeline.stages.programs.report import report
+from er3a.pipeline.stages.programs.page.played import faults, motions
+from er3a.pipeline.stages.programs.page.record import record
+from er3a.pipeline.stages.programs.page.report import report
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.trajectory.compute import compute as compute_paths
 from er3a.pipeline.study import Study, load_study
@@ -358,7 +358,7 @@ def test_an_arm_that_slides_has_millimetres_in_tables_player_and_recording(tmp_p
     np.testing.assert_allclose(results.instructions.end_deg[0], targets[0], atol=1e-9)
     runs = motions(robot, results)
     monkeypatch.setattr(
-        "er3a.pipeline.stages.programs.record.record_stage", lambda *_, **given: runs.extend(given["runs"])
+        "er3a.pipeline.stages.programs.page.record.record_stage", lambda *_, **given: runs.extend(given["runs"])
     )
     record(study, SimpleNamespace(results=results, robot="arm"), tmp_path / "programs.rrd")
     assert len(runs) == 2

@@ -9,7 +9,7 @@ import pytest
 
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
-from er3a.pipeline.stages.validation.report import formulas
+from er3a.pipeline.stages.validation.page.report import formulas
 from er3a.robots.robot import Robot
 from testing.arms import make_arm
 

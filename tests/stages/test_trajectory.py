@@ -25,6 +25,7 @@ from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import characteristic_length, conditioning
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.messages.trajectory import KEY_FIGURES, advice, cause_text, path_text, repair_text, strategy_word
+from er3a.pipeline.overview.index import write_index
 from er3a.pipeline.results import (
     AbsentResults,
     NotComputed,
@@ -49,14 +50,13 @@ from er3a.pipeline.stages.trajectory.model import (
     TriedStrategy,
 )
 from er3a.pipeline.stages.trajectory.motion import limits_of, near_singular, planned_entries, planning_of
-from er3a.pipeline.stages.trajectory.played import faults, motions
-from er3a.pipeline.stages.trajectory.record import record
-from er3a.pipeline.stages.trajectory.report import report, strategies_shown
+from er3a.pipeline.stages.trajectory.page.played import faults, motions
+from er3a.pipeline.stages.trajectory.page.record import record
+from er3a.pipeline.stages.trajectory.page.report import report, strategies_shown
+from er3a.pipeline.stages.workspace.page.tray import Meeting
 from er3a.pipeline.study import Study, load_study
 from er3a.pipeline.teach import panel
 from er3a.pipeline.teach.panel import write_teach_page
-from er3a.pipeline.viewing.index import write_index
-from er3a.pipeline.viewing.tray import Meeting
 from er3a.planning import tool_proof
 from er3a.planning.avoidance.strategies import STRATEGIES
 from er3a.planning.commands import CommandSource
@@ -726,7 +726,7 @@ def test_a_path_that_starts_near_singular_lists_that_first_with_its_distance(res
 def test_a_repair_that_meets_the_tray_is_marked_wherever_it_is_offered(study, stored, tmp_path, monkeypatch):
     """In its row, in the section's answer, beside its programs and in their heads, and in the player."""
     met = {"line_limits, repaired": Meeting(0.21, "link 4")}
-    monkeypatch.setattr("er3a.pipeline.stages.trajectory.report.met_in_tray", lambda study, stored: met)
+    monkeypatch.setattr("er3a.pipeline.stages.trajectory.page.report.met_in_tray", lambda study, stored: met)
     report(study, replace(stored["er3_600"], rests_on={"validation": "pass"}), tmp_path / "page.html")
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert page.count('data-t="0.21">meets the tray at 0.21 s: link 4</a>') == 3

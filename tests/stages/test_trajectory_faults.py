@@ -26,6 +26,7 @@ from er3a.pipeline.messages.trajectory import (
     first_faults,
     switch_text,
 )
+from er3a.pipeline.overview.index import write_index
 from er3a.pipeline.program_reports import programs_of
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages import run
@@ -36,10 +37,9 @@ from er3a.pipeline.stages.trajectory.judgement import Surroundings, sound_end
 from er3a.pipeline.stages.trajectory.model import Singularity, Stretch
 from er3a.pipeline.stages.trajectory.motion import limits_of as limits_in
 from er3a.pipeline.stages.trajectory.motion import near_singular, study_motions
-from er3a.pipeline.stages.trajectory.played import advised, faults, motions, slowed
+from er3a.pipeline.stages.trajectory.page.played import advised, faults, motions, slowed
 from er3a.pipeline.study import Study, load_study
 from er3a.pipeline.verdicts import read_verdicts
-from er3a.pipeline.viewing.index import write_index
 from er3a.planning.motion_faults import AccelerationTooGreatIfAssumed, PathOutOfReach, TooFast, TooFastIfAssumed
 from er3a.planning.tool_proof import Undecided
 from testing.motion_cases import judged, limits_of

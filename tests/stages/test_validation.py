@@ -40,7 +40,6 @@ from er3a.pipeline.stages import run
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.validation import compute as compute_module
 from er3a.pipeline.stages.validation.checks import checks_of_set, table_checks, verdict_of
-from er3a.pipeline.stages.validation.evidence_section import evidence_section, table_to_use
 from er3a.pipeline.stages.validation.model import (
     RESULTS,
     AnotherArm,
@@ -55,8 +54,9 @@ from er3a.pipeline.stages.validation.model import (
     ValidationSummary,
     WholeGroup,
 )
-from er3a.pipeline.stages.validation.record import record
-from er3a.pipeline.stages.validation.report import report
+from er3a.pipeline.stages.validation.page.evidence_section import evidence_section, table_to_use
+from er3a.pipeline.stages.validation.page.record import record
+from er3a.pipeline.stages.validation.page.report import report
 from er3a.pipeline.study import RobotEntry, Study, load_study
 from er3a.pipeline.viewing.arm import TIMELINE
 from er3a.references.circle_points import circle_points, fit_circle

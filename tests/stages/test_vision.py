@@ -19,8 +19,8 @@ from er3a.pipeline.stages import run
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.vision.compute import figures_of, verdict_of
 from er3a.pipeline.stages.vision.model import VisionResults
+from er3a.pipeline.stages.workspace.page.tray import sound_motions
 from er3a.pipeline.study import load_study
-from er3a.pipeline.viewing.tray import sound_motions
 from testing.hand_eye_sets import pose
 from testing.on_demand import OnDemand
 from tests.vision.test_boards import CHARUCO, board_places, rendered

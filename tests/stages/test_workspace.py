@@ -1,4 +1,4 @@
-"""The workspace stage as a whole: its tables, its parts, and arms that are out of the ordinary."""
+"""The workspace stage as a whole: its tables, and arms that are out of the ordinary."""
 
 from __future__ import annotations
 
@@ -13,21 +13,20 @@ import yaml
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from er3a.errors import InputError, ResultError
+from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.wrist_partitioned import NoWristCentre
 from er3a.pipeline.messages.workspace import judged_void, say, void_text
+from er3a.pipeline.overview.index import border_mm
 from er3a.pipeline.results import read_stage, write_results
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.workspace.compute import compute
 from er3a.pipeline.stages.workspace.model import Bounds, VoidUnexpected, WorkspaceResults
-from er3a.pipeline.stages.workspace.report import report
-from er3a.pipeline.stages.workspace.sample import sample
+from er3a.pipeline.stages.workspace.page.report import report
 from er3a.pipeline.study import load_study
-from er3a.pipeline.viewing.index import border_mm
 from tests.stages.workspace_arms import locked_file, make_study, skew_file, tally_of
 
 pytestmark = pytest.mark.long  # whole stages, and kernels that take forty seconds to compile
@@ -35,15 +34,10 @@ pytestmark = pytest.mark.long  # whole stages, and kernels that take forty secon
 # --- the stage ---
 
 
-def files_of(folder: Path) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
-
-
-def test_results_do_not_depend_on_the_parts(tmp_path):
+def test_it_writes_its_tables_a_summary_and_checksums(tmp_path):
     study = make_study()
     run.compute("workspace", study, "er3_600", tmp_path / "none")
-    expected = files_of(tmp_path / "none")
-    assert set(expected) == {
+    assert {path.name for path in (tmp_path / "none").iterdir()} == {
         "cells.parquet",
         "section.parquet",
         "side_view.parquet",
@@ -61,11 +55,6 @@ def test_results_do_not_depend_on_the_parts(tmp_path):
         "summary.json",
         "SHA256SUMS",
     }
-    paths = [tmp_path / f"{part}.npz" for part in (1, 2, 3)]
-    for part, path in enumerate(paths, start=1):
-        sample(study, "er3_600", part, 3, path)
-    run.compute("workspace", study, "er3_600", tmp_path / "parts", paths[::-1])
-    assert files_of(tmp_path / "parts") == expected
 
 
 @pytest.fixture(scope="module")
@@ -259,62 +248,3 @@ def test_settings_that_make_no_sense_are_named(tmp_path, field, value):
     path.write_text(yaml.safe_dump(content), encoding="utf-8")
     with pytest.raises(InputError, match=rf"study\.yaml.*workspace\.{field}"):
         load_study(path)
-
-
-# --- bad parts ---
-
-
-@pytest.fixture
-def parts(tmp_path):
-    study = make_study(samples=700)
-    paths = [tmp_path / f"part_{part}.npz" for part in (1, 2)]
-    for part, path in enumerate(paths, start=1):
-        sample(study, "er3_600", part, 2, path)
-    return study, paths
-
-
-def test_a_damaged_part_is_named(parts, tmp_path):
-    study, (first, second) = parts
-    whole = second.read_bytes()
-    places = (0, 40, len(whole) // 2, len(whole) - 1)
-    flipped = [whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :] for at in places]
-    for damaged in (b"", b"no archive", whole[: len(whole) // 2], *flipped):
-        second.write_bytes(damaged)
-        with pytest.raises(ResultError, match=r"part_2\.npz: damaged"):
-            run.compute("workspace", study, "er3_600", tmp_path / "results", [first, second])
-    second.unlink()
-    with pytest.raises(ResultError, match=r"part_2\.npz: missing"):
-        run.compute("workspace", study, "er3_600", tmp_path / "results", [first, second])
-    assert not (tmp_path / "results").exists()
-
-
-def test_a_part_of_another_run_is_named(parts, tmp_path):
-    study, (first, second) = parts
-    changed = [
-        (study.model_copy(update={"seed": 5}), "seed"),
-        (make_study(samples=701), "samples 701, not 700"),
-        (make_study({"er3_600": locked_copy(tmp_path)}, samples=700), "another table of the robot"),
-    ]
-    for other, words in changed:
-        sample(other, "er3_600", 2, 2, second)
-        with pytest.raises(ResultError, match=rf"part_2\.npz: was sampled with .*{words}"):
-            compute(study, "er3_600", [first, second])
-
-
-def locked_copy(folder: Path) -> Path:
-    path = folder / "er3_600.yaml"
-    text = locked_file(folder, {3: 20}).read_text(encoding="utf-8")
-    path.write_text(text.replace("name: locked", "name: er3_600"), encoding="utf-8")
-    return path
-
-
-def test_blocks_twice_or_missing_are_named(parts):
-    study, (first, second) = parts
-    with pytest.raises(ResultError, match=r"part_1\.npz: holds block 0, which another part file holds too"):
-        compute(study, "er3_600", [first, second, first])
-    with pytest.raises(ResultError, match=r"part_1\.npz: .*block 3 is still missing"):
-        compute(study, "er3_600", [first])
-    with pytest.raises(ResultError, match="block 0 is still missing"):
-        compute(study, "er3_600", [])
-    with pytest.raises(InputError, match="there is no part 3 of 2"):
-        sample(study, "er3_600", 3, 2, second)

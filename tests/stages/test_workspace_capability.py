@@ -20,14 +20,14 @@ from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.forward import forward
 from er3a.kinematics.solutions import branch_labels
 from er3a.pipeline.messages.left_out import left_out_text
-from er3a.pipeline.stages.workspace.capability_section import capability_context
 from er3a.pipeline.stages.workspace.compute import _left_out
 from er3a.pipeline.stages.workspace.entry import CapabilitySettings
 from er3a.pipeline.stages.workspace.model import CellLookup, ToolPointsElsewhere
+from er3a.pipeline.stages.workspace.page.capability_section import capability_context
+from er3a.pipeline.stages.workspace.page.tray import placing
 from er3a.pipeline.stages.workspace.tool_capability import ToolCapability, tool_capability
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.page import Picture
-from er3a.pipeline.viewing.tray import placing
 from er3a.robots.robot import Robot
 from er3a.workspace.capability import try_poses
 from er3a.workspace.directions import cone_directions, poses, roll_of, tool_rotations

@@ -18,9 +18,9 @@ from roboticstoolbox import DHRobot, RevoluteDH, RevoluteMDH
 
 import er3a
 from er3a.files.robot_library import load_robot
+from er3a.pipeline import language
 from er3a.pipeline.article.article_numbers import EXAMPLE, ReachCheck, agreements, article_numbers
 from er3a.pipeline.article.article_page import write_article
-from er3a.pipeline.messages import language
 from er3a.pipeline.messages.article import ITEMS, SECTIONS
 from er3a.pipeline.stages import run
 from er3a.pipeline.study import load_study

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from er3a.pipeline.messages import language
+from er3a.pipeline import language
 from er3a.pipeline.stages.run import show
 from er3a.pipeline.study import load_study
 from er3a.pipeline.viewing.page import closed_up

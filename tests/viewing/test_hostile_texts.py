@@ -13,12 +13,12 @@ import pytest
 import yaml
 
 from er3a.errors import InputError
+from er3a.pipeline.overview.index import write_index
 from er3a.pipeline.results import AbsentResults, NotComputed, Summary, Verdict, read_stage, write_checksums
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.run import show
 from er3a.pipeline.study import load_study
 from er3a.pipeline.tables import table_types
-from er3a.pipeline.viewing.index import write_index
 from er3a.pipeline.viewing.page import report_absent
 from er3a.pipeline.viewing.recording import escaped
 

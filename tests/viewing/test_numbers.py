@@ -6,8 +6,8 @@ import re
 
 import pytest
 
-from er3a.pipeline.messages.language import alike
-from er3a.pipeline.viewing.numbers import (
+from er3a.pipeline.language import alike
+from er3a.pipeline.messages.numbers import (
     at_least,
     at_most,
     decimals_of_column,

@@ -12,12 +12,12 @@ import er3a
 from er3a.identifiability.entry_evidence import EntryEvidence
 from er3a.pipeline.messages.pages import Caveat
 from er3a.pipeline.messages.references import STATUS_WORDS
+from er3a.pipeline.overview.index import _tally, _TextOfPage, write_index
 from er3a.pipeline.player.motions import Fault, FaultMoment
 from er3a.pipeline.results import LeftOut, read_stage
 from er3a.pipeline.stages.registry import STAGES
-from er3a.pipeline.stages.validation.evidence_section import rounded_within, table_to_use
+from er3a.pipeline.stages.validation.page.evidence_section import rounded_within, table_to_use
 from er3a.pipeline.study import load_study
-from er3a.pipeline.viewing.index import _tally, _TextOfPage, write_index
 from er3a.pipeline.viewing.page import VERDICT_WORDS, Head, Numbering, _missed, _tray_edges, linked, page_environment
 from tests.conftest import ROOT
 

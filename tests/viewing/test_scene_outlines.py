@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Sphere
 from er3a.geometry.transforms import transform
-from er3a.pipeline.stages.workspace.capability_section import draw_scene, outlines
+from er3a.pipeline.stages.workspace.page.capability_section import draw_scene, outlines
 
 TURNED = transform(np.array([0.3, -0.2, 0.1]), np.array([0.0, np.pi / 2, 0.0]))  # z along the base frame's x
 

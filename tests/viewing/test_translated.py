@@ -12,15 +12,15 @@ from babel.messages.extract import DEFAULT_KEYWORDS, extract_from_dir
 from babel.messages.frontend import parse_mapping_cfg
 from babel.messages.pofile import read_po
 
-from er3a.pipeline.messages import language
-from er3a.pipeline.messages.language import KEYED
+from er3a.pipeline import language
+from er3a.pipeline.language import KEYED
 from er3a.pipeline.messages.say import english
+from er3a.pipeline.overview.index import write_index
 from er3a.pipeline.stages.registry import all_messages
 from er3a.pipeline.stages.run import show
 from er3a.pipeline.study import load_study
 from er3a.pipeline.teach.panel import write_teach_page
 from er3a.pipeline.viewing.figures import house_style
-from er3a.pipeline.viewing.index import write_index
 from testing.small_study import stages_of
 from tests.conftest import ROBOTS, ROOT
 from tests.viewing.untranslated import PageTexts, plain_words, texts_from_files, wide_letters

@@ -19,7 +19,7 @@ import yaml
 from babel.messages.pofile import read_po
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 
-from er3a.pipeline.messages import language
+from er3a.pipeline import language
 from er3a.pipeline.messages.say import english
 from er3a.programs.languages import LANGUAGES, SUFFIXES
 

@@ -1,82 +1,56 @@
-rule record:
-    input:
-        viewed,
-    output:
-        recording="reports/{robot}/{stage}.rrd",
-        picture="reports/{robot}/{stage}.webp",
-    log:
-        "logs/{robot}/{stage}.record.log",
-    priority: 4
-    conda:
-        "../envs/er3a.yaml"
-    params:
-        code=lambda wildcards: code_of(wildcards.stage, "record"),
-        drawing=code_digest("er3a.pipeline.viewing.viewer"),
-    message:
-        "{wildcards.robot}: record {wildcards.stage}"
-    shell:
-        "er3a record {wildcards.stage} {wildcards.robot} 2> {log}"
+# The pages and recordings of a robot are made by one job: each would take longer to start than to work.
 
 
-rule report:
-    input:
-        viewed,
-        rests_on,
-        CATALOGUES,
-        picture,
-    output:
-        report(
-            "reports/{robot}/{stage}.html",
-            caption="../report/stage.rst",
-            category="{robot}",
-            labels=lambda wildcards: {tr(pages.PAGE): tr(STAGES[wildcards.stage].title)},
-        ),
-    log:
-        "logs/{robot}/{stage}.report.log",
-    priority: 4  # pages to read while the rest is computed
-    conda:
-        "../envs/er3a.yaml"
-    params:
-        language=LANGUAGE,
-        caption=lambda wildcards: pages.of_stage(titled(wildcards.robot), STAGES[wildcards.stage].question),
-        code=lambda wildcards: code_of(wildcards.stage, "report"),
-    message:
-        "{wildcards.robot}: report {wildcards.stage}"
-    shell:
-        "er3a report {wildcards.stage} {wildcards.robot} 2> {log}"
+for robot in ROBOTS:
 
-
-rule teach:
-    input:
-        inputs("teach"),
-        "results/{robot}/validation/summary.json",
-        CATALOGUES,
-    output:
-        report(
-            "reports/{robot}/teach.html",
-            caption="../report/teach.rst",
-            category="{robot}",
-            labels={tr(pages.PAGE): tr(pages.TEACH_PANEL)},
-        ),
-    log:
-        "logs/{robot}/teach.log",
-    conda:
-        "../envs/er3a.yaml"
-    params:
-        language=LANGUAGE,
-        caption=lambda wildcards: pages.of_teach_panel(titled(wildcards.robot)),
-        settings=settings("trajectory"),
-        contents=contents("teach"),
-        code=code_digest("er3a.pipeline.teach.panel"),
-    message:
-        "{wildcards.robot}: write the teach panel"
-    shell:
-        "er3a teach {wildcards.robot} 2> {log}"
+    rule:
+        name:
+            f"views_{robot}"
+        input:
+            shown_by(robot),
+            [inputs(robot, "teach") if "teach" in asked_pages(robot) else []],
+            CATALOGUES,
+        output:
+            views_of(robot, asked_recordings(robot)),
+            *[
+                report(
+                    f"reports/{robot}/{page}.html",
+                    caption="../report/stage.rst",
+                    category=robot,
+                    labels={tr(pages.PAGE): tr(pages.TEACH_PANEL if page == "teach" else STAGES[page].title)},
+                )
+                for page in asked_pages(robot)
+            ],
+        log:
+            f"logs/{robot}/views.log",
+        priority: 4  # pages to read while the rest is computed
+        conda:
+            "../envs/er3a.yaml"
+        params:
+            robot=robot,
+            pages=asked_pages(robot),
+            language=LANGUAGE,
+            caption="\n\n".join(
+                (
+                    pages.of_teach_panel(titled(robot))
+                    if page == "teach"
+                    else pages.of_stage(titled(robot), STAGES[page].question)
+                )
+                for page in asked_pages(robot)
+            ),
+            settings=STUDY.settings(robot, "trajectory"),
+            contents=STUDY.inputs_digest(robot, "teach"),
+            code=code_digest(),
+        message:
+            f"{robot}: write pages and recordings"
+        shell:
+            "er3a views {params.robot} {params.pages} 2> {log}"
 
 
 rule index:
     input:
-        shown_in_index,
+        [path for robot in ROBOTS for stage in asked_stages(robot) for path in results_of(robot, stage)],
+        [f"reports/{robot}/{page}.html" for robot in ROBOTS for page in asked_pages(robot)],
         CATALOGUES,
     output:
         report(
@@ -100,8 +74,8 @@ rule index:
         language=LANGUAGE,
         captions=[pages.of_index(), pages.of_comparison()],
         expected={name: STUDY.entry(name).expect for name in STUDY.robots},
-        rested_on=rested_on,
-        code=code_digest("er3a.pipeline.viewing.index", *all_messages()),
+        rested_on=rested_on(),
+        code=code_digest(),
     message:
         "write the index"
     shell:
@@ -113,10 +87,10 @@ if STUDY.article:
     rule article:
         input:
             [
-                path.format(robot=robot)
+                path
                 for robot in STUDY.article.names
                 for stage in STUDY.stages(robot)
-                for path in results_of(stage)
+                for path in results_of(robot, stage)
             ],
             [os.path.relpath(STUDY.robot_file(robot)) for robot in STUDY.article.names],
             [catalogues(code) for code in language.LANGUAGES],
@@ -136,7 +110,7 @@ if STUDY.article:
             tables=STUDY.article.model_dump(),
             language=LANGUAGE,
             caption=pages.of_article(),
-            code=code_digest("er3a.pipeline.article.article_page", "er3a.pipeline.messages.article", *all_messages()),
+            code=code_digest(),
         message:
             "write the page on the article"
         shell:

@@ -16,6 +16,7 @@ from er3a.files.kept_files import write_atomically
 from er3a.geometry.transforms import translation
 from er3a.kinematics.forward import forward, jacobian, skeleton
 from er3a.kinematics.singularity import characteristic_length, conditioning
+from er3a.pipeline import language
 from er3a.pipeline.article.article_numbers import (
     CLOUD,
     COMPARED,
@@ -33,24 +34,23 @@ from er3a.pipeline.article.article_numbers import (
     summary_of,
 )
 from er3a.pipeline.code_digest import code_digest
-from er3a.pipeline.messages import language
+from er3a.pipeline.language import N_, tr
 from er3a.pipeline.messages.article import AGREEMENT, ITEMS, SECTIONS, Item
 from er3a.pipeline.messages.expectations import outcome_word
-from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.messages.numbers import at_least, at_most, fixed, number
 from er3a.pipeline.messages.say import joined, say
 from er3a.pipeline.messages.trajectory import event_word, strategy_word
 from er3a.pipeline.messages.workspace import change_text
+from er3a.pipeline.overview.index import border_mm
 from er3a.pipeline.player.motions import PlayedEvent, PlayedMotion
 from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Provenance, checksum_file, input_records, read_stage, result_records
 from er3a.pipeline.stages.dynamics.model import NoLimits
-from er3a.pipeline.stages.registry import STAGES, all_messages
+from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.vision.model import GraspCounts
 from er3a.pipeline.study import ArticleTables, Study
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.figures import house_style, new_figure
-from er3a.pipeline.viewing.index import border_mm
-from er3a.pipeline.viewing.numbers import at_least, at_most, fixed, number
 from er3a.pipeline.viewing.page import Picture, stage_head
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINT_NAMES, MODEL, MUTED, REFERENCE
 from er3a.planning.moves import JointMove
@@ -291,7 +291,7 @@ def _write(
         command=page.run_command(study, output.name),
         provenance=Provenance(
             input_records(study.robot_file(name) for name in tables.names) + result_records(results, tables.names),
-            code_digest(__name__, *all_messages()),
+            code_digest(),
             seed=study.seed,
         ),
         others=[(code, Locale(code).display_name, name) for code, name in others.items()],

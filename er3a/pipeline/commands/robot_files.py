@@ -17,7 +17,7 @@ from er3a.errors import Er3aError, InputError
 from er3a.files.robot_file import NAME_PATTERN
 from er3a.formats.mesh_file import Unit
 from er3a.pipeline.commands import options
-from er3a.pipeline.messages.language import LANGUAGES, using
+from er3a.pipeline.language import LANGUAGES, using
 from er3a.pipeline.progress import shown_work
 from er3a.pipeline.stages.registry import STAGES
 

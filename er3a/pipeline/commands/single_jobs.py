@@ -2,102 +2,96 @@
 
 from __future__ import annotations
 
-import fcntl
 import shlex
+from collections.abc import Collection
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from er3a.errors import Er3aError
+from er3a.pipeline import language
 from er3a.pipeline.commands import options
-from er3a.pipeline.messages import language
+from er3a.pipeline.results import write_checksum
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study, load_study
 
-
-@options.app.command(rich_help_panel=options.JOBS)
-def sample(
-    robot: options.RobotName,
-    part: Annotated[str, typer.Option(help="the part of the blocks, e.g. 2-of-4")],
-    output: Annotated[Path, typer.Option(help="the file to write")],
-    study: options.StudyFile = options.DEFAULT_STUDY,
-):
-    """Draw one part of the workspace stage's random samples."""
-    number, _, count = part.partition("-of-")
-    if not (number.isdigit() and count.isdigit() and 1 <= int(number) <= int(count)):
-        raise Er3aError(f"--part is '{part}'; expected for example 2-of-4")
-    from er3a.pipeline.stages.workspace.sample import sample as draw
-
-    draw(load_study(study), robot, int(number), int(count), output)
+TEACH = "teach"
 
 
 @options.app.command(rich_help_panel=options.JOBS)
 def compute(
     stage: options.StageName,
     robot: options.RobotName,
-    parts: Annotated[
-        list[Path] | None, typer.Argument(help="workspace only: files of sampled parts (default: drawn now)")
-    ] = None,
     study: options.StudyFile = options.DEFAULT_STUDY,
     results: options.Results = options.DEFAULT_RESULTS,
 ):
     """Compute a stage: tables and summary.json."""
     from er3a.pipeline.stages import run
 
-    loaded, folder = _folder(study, results, robot, stage)
-    if parts and not STAGES[stage].sampled:
-        raise Er3aError(f"the stage {stage} takes no sampled parts")
-    if absent := run.compute(stage, loaded, robot, folder, parts):
+    loaded = load_study(study)
+    if absent := run.compute(_known(stage, STAGES), loaded, robot, results / robot / stage):
         options.print_note(f"{robot}, {stage}: {absent}")
 
 
 @options.app.command(rich_help_panel=options.JOBS)
-def record(
-    stage: options.StageName,
+def views(
     robot: options.RobotName,
+    pages: Annotated[
+        list[str] | None, typer.Argument(metavar="[PAGE]...", help="stages, and teach (default: all that it has)")
+    ] = None,
     study: options.StudyFile = options.DEFAULT_STUDY,
     results: options.Results = options.DEFAULT_RESULTS,
     reports: options.Reports = options.DEFAULT_REPORTS,
 ):
-    """Write a stage's Rerun recording from its results (always in English).
+    """Write a robot's recordings (always in English) and pages from results.
 
-    The viewer also draws it as a picture for the stage's page. For variants of a sweep the picture stays empty.
+    The viewer also draws each recording as a picture for its page. For variants of a sweep the picture stays empty.
     """
-    from er3a.pipeline.results import write_checksum
-    from er3a.pipeline.stages import run
-    from er3a.pipeline.viewing.viewer import draw_preview, write_empty
-
-    loaded, folder = _folder(study, results, robot, stage)
-    recording = reports / robot / f"{stage}.rrd"
-    run.show("record", stage, loaded, robot, folder, recording)
-    write_checksum(recording)
-    picture = recording.with_suffix(".webp")
-    if robot in loaded.variants:
-        write_empty(picture)
-    elif problem := draw_preview(recording, picture):
-        options.print_note(f"previews of recordings were skipped: {problem}")
-    write_checksum(picture)
-
-
-@options.app.command(rich_help_panel=options.JOBS)
-def report(
-    stage: options.StageName,
-    robot: options.RobotName,
-    study: options.StudyFile = options.DEFAULT_STUDY,
-    results: options.Results = options.DEFAULT_RESULTS,
-    reports: options.Reports = options.DEFAULT_REPORTS,
-):
-    """Write a stage's page from its results."""
-    from er3a.pipeline.results import write_checksum
     from er3a.pipeline.stages import run
     from er3a.pipeline.viewing.figures import house_style
 
-    loaded, folder = _folder(study, results, robot, stage)
-    page = reports / robot / f"{stage}.html"
-    language.use(loaded.report.language, loaded.own_titles())
+    loaded = _study_to_show(study)
+    loaded.entry(robot)
+    named = [_known(page, (*STAGES, TEACH)) for page in pages or loaded.pages(robot)]
+    stages = [STAGES[page] for page in named if page != TEACH]
+    with language.using("en"):
+        for problem in {
+            _record(loaded, robot, stage.name, results, reports) for stage in stages if "record" in stage.views
+        }:
+            if problem:
+                options.print_note(f"previews of recordings were skipped: {problem}")
     with house_style():
-        run.show("report", stage, loaded, robot, folder, page)
+        for stage in stages:
+            page = reports / robot / f"{stage.name}.html"
+            run.show("report", stage.name, loaded, robot, results / robot / stage.name, page)
+            write_checksum(page)
+    if TEACH in named:
+        _write_teach_page(loaded, robot, results, reports)
+
+
+def _record(study: Study, robot: str, stage: str, results: Path, reports: Path) -> str:
+    """Write a stage's recording and its picture; why there is no picture, if there is to be one."""
+    from er3a.pipeline.stages import run
+    from er3a.pipeline.viewing.viewer import draw_preview, write_empty
+
+    recording = reports / robot / f"{stage}.rrd"
+    picture, problem = recording.with_suffix(".webp"), ""
+    run.show("record", stage, study, robot, results / robot / stage, recording)
+    if robot in study.variants:
+        write_empty(picture)
+    else:
+        problem = draw_preview(recording, picture) or ""
+    write_checksum(recording)
+    write_checksum(picture)
+    return problem
+
+
+def _write_teach_page(study: Study, robot: str, results: Path, reports: Path) -> None:
+    from er3a.pipeline.teach.panel import write_teach_page
+
+    page = reports / robot / "teach.html"
+    write_teach_page(study, robot, results, page)
     write_checksum(page)
 
 
@@ -118,8 +112,6 @@ def teach(
     A file (.csv with a D-H table, .yaml, .urdf) needs no study: its page is written into the current folder.
     """
     from er3a.files.arm_file import READ
-    from er3a.pipeline.results import write_checksum
-    from er3a.pipeline.teach.panel import write_teach_page
 
     if Path(robot).suffix in READ:
         _teach_file(robot, output or Path(f"{Path(robot).stem}.html"))
@@ -128,9 +120,7 @@ def teach(
         raise Er3aError(
             "--output needs a file as ROBOT; the panel of a robot of the study is written to the reports folder"
         )
-    page = reports / robot / "teach.html"
-    write_teach_page(_study_to_show(study), robot, results, page)
-    write_checksum(page)
+    _write_teach_page(_study_to_show(study), robot, results, reports)
 
 
 def _teach_file(source: str, page: Path) -> None:
@@ -144,7 +134,7 @@ def _teach_file(source: str, page: Path) -> None:
     arm = read_arm(source)
     for note in arm.notes:
         options.print_note(note)
-    provenance = Provenance((Input(source, sha256(Path(source)), {}),), code_digest(__name__))
+    provenance = Provenance((Input(source, sha256(Path(source)), {}),), code_digest())
     command = shlex.join(["er3a", "teach", source, "--output", str(page)])
     write_panel(arm.robot, page, command=command, provenance=provenance)
     print(f"{page}: written")
@@ -157,17 +147,15 @@ def index(
     reports: options.Reports = options.DEFAULT_REPORTS,
 ):
     """Write the index and the page that compares two robots."""
-    from er3a.pipeline.results import OVERALL, write_checksum
+    from er3a.pipeline.overview.index import write_index
+    from er3a.pipeline.results import OVERALL
     from er3a.pipeline.viewing.figures import house_style
-    from er3a.pipeline.viewing.index import write_index
 
     shown = _study_to_show(study)
-    reports.mkdir(parents=True, exist_ok=True)
-    with (reports / ".index.lock").open("w") as lock, house_style():
-        fcntl.flock(lock, fcntl.LOCK_EX)  # a run writes it now and then while it lasts
+    with house_style():
         write_index(shown, results, reports)
-        for page in OVERALL:
-            write_checksum(reports / page)
+    for page in OVERALL:
+        write_checksum(reports / page)
 
 
 @options.app.command(rich_help_panel=options.JOBS)
@@ -178,7 +166,6 @@ def article(
 ):
     """Write the page on the article from results; `er3a run --study config/article.yaml` also computes them."""
     from er3a.pipeline.article.article_page import write_article
-    from er3a.pipeline.results import write_checksum
 
     shown = _study_to_show(study)
     if shown.article is None:
@@ -195,9 +182,7 @@ def _study_to_show(file: Path) -> Study:
     return study
 
 
-def _folder(study_file: Path, results: Path, robot: str, stage: str) -> tuple[Study, Path]:
-    if stage not in STAGES:
-        raise Er3aError(f"there is no stage '{stage}'; known: {', '.join(STAGES)}")
-    study = load_study(study_file)
-    study.entry(robot)
-    return study, results / robot / stage
+def _known(name: str, names: Collection[str]) -> str:
+    if name not in names:
+        raise Er3aError(f"there is no stage '{name}'; known: {', '.join(names)}")
+    return name

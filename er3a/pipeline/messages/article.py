@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from er3a.pipeline.messages.language import N_
+from er3a.pipeline.language import N_
 
 
 @dataclass(frozen=True)

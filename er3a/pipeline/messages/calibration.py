@@ -15,8 +15,8 @@ from er3a.calibration.plan import Plan
 from er3a.calibration.residuals import ResidualStructure
 from er3a.calibration.terms import starting_table
 from er3a.numerics.arrays import Reals
+from er3a.pipeline.language import N_, as_text, tr
 from er3a.pipeline.messages.diagnosis import level
-from er3a.pipeline.messages.language import N_, as_text, tr
 from er3a.pipeline.messages.say import say
 from er3a.robots.robot import Robot
 

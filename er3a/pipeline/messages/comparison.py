@@ -14,7 +14,7 @@ from er3a.comparison.compare import (
     RangeLayer,
     Uncompared,
 )
-from er3a.pipeline.messages.language import N_, tr, with_unit
+from er3a.pipeline.language import N_, tr, with_unit
 from er3a.pipeline.messages.pages import GROUP_NAMES
 from er3a.pipeline.messages.say import joined, say, word
 

@@ -39,7 +39,7 @@ from er3a.diagnosis.faults import (
     WrongScale,
     WrongUnit,
 )
-from er3a.pipeline.messages.language import N_, as_text, with_unit
+from er3a.pipeline.language import N_, as_text, with_unit
 from er3a.pipeline.messages.say import Plural, by, joined, say, say_as, sentence, texts, word
 
 ENTRIES = {

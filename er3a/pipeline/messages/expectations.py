@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from er3a.pipeline.messages.language import N_
+from er3a.pipeline.language import N_
 from er3a.pipeline.messages.say import Plural, joined, listed, say, say_as, sentence, texts, word
 from er3a.pipeline.stages.expectations import (
     Demonstration,

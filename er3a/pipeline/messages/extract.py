@@ -8,7 +8,7 @@ from typing import Any
 
 from babel.messages.extract import extract_python
 
-from er3a.pipeline.messages.language import KEYED, TITLE
+from er3a.pipeline.language import KEYED, TITLE
 
 Message = tuple[int, str, Any, list[str]]
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import er3a.pipeline.messages.collision  # noqa: F401
+from er3a.pipeline.language import N_
 from er3a.pipeline.messages.expectations import demonstrated
 from er3a.pipeline.messages.kinematics import RULE_NAMES, sum_of_joints
-from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.left_out import names_in_words
 from er3a.pipeline.messages.say import Plural, by, joined, listed, say, say_as, sentence, texts
 from er3a.pipeline.stages.inverse.model import (

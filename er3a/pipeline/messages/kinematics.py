@@ -18,7 +18,7 @@ from er3a.kinematics.solutions import (
 from er3a.kinematics.wrist_partitioned import (
     NotSixTurning,
 )
-from er3a.pipeline.messages.language import N_, as_text, tr
+from er3a.pipeline.language import N_, as_text, tr
 from er3a.pipeline.messages.say import by, joined, listed, say, say_as, sentence, texts, word
 from er3a.robots.joint_limits import CombinationExceeded, LimitExceeded, LimitsExceeded, SlideExceeded
 from er3a.selection.nearest import (

@@ -7,7 +7,7 @@ from typing import TypeVar
 
 from er3a.by_value import Finding
 from er3a.collision.pairs import BASE, link_label
-from er3a.pipeline.messages.language import own_title, tr
+from er3a.pipeline.language import own_title, tr
 from er3a.pipeline.messages.pages import GROUP_NAMES
 from er3a.pipeline.messages.say import bracketed, joined, say, say_as, sentence, texts, word
 from er3a.pipeline.results import LeftOut, LeftOutSubject, NoPass

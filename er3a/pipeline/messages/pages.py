@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.language import N_, tr
 from er3a.pipeline.messages.say import joined, word
 
 # Words of the lists in which a reader of the report chooses pages; the workflow's rules use them.

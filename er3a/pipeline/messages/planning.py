@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import er3a.pipeline.messages.kinematics  # noqa: F401
-from er3a.pipeline.messages.language import N_, as_text, tr
+from er3a.pipeline.language import N_, as_text, tr
 from er3a.pipeline.messages.say import by, joined, listed, say, say_as, sentence, texts, word
 from er3a.planning.motion_faults import (
     AccelerationTooGreat,

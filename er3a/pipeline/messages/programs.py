@@ -10,9 +10,9 @@ from typing import Any
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.pairs import LinkAndSolid
 from er3a.kinematics.singularity import SingularityType
+from er3a.pipeline.language import N_, tr
 from er3a.pipeline.messages.expectations import demonstrated, outcome_word
 from er3a.pipeline.messages.kinematics import singular_pose, singularity_word
-from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.planning import UNBOUNDED, rate_needed, unit_of
 from er3a.pipeline.messages.say import Plural, by, joined, listed, say, say_as, sentence, texts, word
 from er3a.pipeline.stages.programs.model import FindingAt, ProgramCounts, ProgramSummary

@@ -5,7 +5,7 @@ from __future__ import annotations
 from er3a.identifiability.evidence import PartEvidence
 from er3a.identifiability.proposals import LookAtMotion, MeasureAngle, MeasureLength
 from er3a.identifiability.statements import InconsistentWithOwnText, NotTheRobotDescribed
-from er3a.pipeline.messages.language import N_, as_text, own_title, tr
+from er3a.pipeline.language import N_, as_text, own_title, tr
 from er3a.pipeline.messages.say import by, joined, say, say_as, sentence, texts, word
 from er3a.references import subjects
 from er3a.references.rows import GROUPS, check_complete

@@ -31,7 +31,7 @@ from functools import singledispatch
 from typing import Any, Literal, TypeVar
 
 from er3a.by_value import Finding
-from er3a.pipeline.messages import language
+from er3a.pipeline import language
 
 KeyT = TypeVar("KeyT", bound=str)
 Separator = Literal["; ", ", ", ". ", " "]

@@ -10,9 +10,9 @@ from typing import Any, Literal, NamedTuple
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.pairs import LinkAndSolid, ShapesAssumed
 from er3a.kinematics.singularity import SingularityType
+from er3a.pipeline.language import N_, as_text, with_unit
 from er3a.pipeline.messages.expectations import demonstrated, outcome_word
 from er3a.pipeline.messages.kinematics import singular_pose, singularity_word
-from er3a.pipeline.messages.language import N_, as_text, with_unit
 from er3a.pipeline.messages.left_out import names_in_words
 from er3a.pipeline.messages.planning import STRATEGIES as ADVICE
 from er3a.pipeline.messages.planning import rate_needed

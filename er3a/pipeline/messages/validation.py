@@ -12,7 +12,7 @@ from er3a.diagnosis.faults import CountedFromGround, ReversedDirection, WrongOff
 from er3a.identifiability.entries import GROUP_OF
 from er3a.identifiability.evidence import PART_OF_GROUP, PartName
 from er3a.identifiability.reactions import CheckCounts
-from er3a.pipeline.messages.language import N_, as_text, distinct, own_title, tr, with_unit
+from er3a.pipeline.language import N_, as_text, distinct, own_title, tr, with_unit
 from er3a.pipeline.messages.left_out import names_in_words
 from er3a.pipeline.messages.references import GROUP_WORDS, MISSING_WORDS, quoted
 from er3a.pipeline.messages.say import Plural, bracketed, by, joined, say, say_as, sentence, texts, word

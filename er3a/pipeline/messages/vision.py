@@ -11,8 +11,8 @@ import er3a.pipeline.messages.collision
 import er3a.pipeline.messages.diagnosis
 import er3a.pipeline.messages.planning  # noqa: F401
 from er3a.geometry.transforms import quaternion_of, rpy_of
+from er3a.pipeline.language import N_, as_text
 from er3a.pipeline.messages.expectations import demonstrated
-from er3a.pipeline.messages.language import N_, as_text
 from er3a.pipeline.messages.say import Plural, by, joined, listed, say, say_as, sentence, texts, word
 from er3a.pipeline.stages.vision.model import (
     GraspCounts,

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 import er3a.pipeline.messages.collision  # noqa: F401
+from er3a.pipeline.language import N_, as_text, own_title, tr, with_unit
 from er3a.pipeline.messages.kinematics import sum_of_joints
-from er3a.pipeline.messages.language import N_, as_text, own_title, tr, with_unit
+from er3a.pipeline.messages.numbers import at_least, at_most
 from er3a.pipeline.messages.say import Plural, joined, say, say_as, sentence, texts
 from er3a.pipeline.results import Summary
 from er3a.pipeline.stages.workspace import model
-from er3a.pipeline.viewing.numbers import at_least, at_most
 from er3a.workspace.causes import (
     Disappears,
     Geometry,

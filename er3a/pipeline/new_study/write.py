@@ -46,7 +46,7 @@ from er3a.kinematics.inverse import inverse
 from er3a.kinematics.solutions import Solutions, Target
 from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.numerics.arrays import Flags, Reals
-from er3a.pipeline.messages.language import written_title
+from er3a.pipeline.language import written_title
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.trajectory.judgement import Surroundings, judge, measured
 from er3a.pipeline.stages.trajectory.motion import limits_of, motion_of, proof_requirements

@@ -8,7 +8,7 @@ from typing import Literal
 from urllib.parse import urlencode
 
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.messages.language import tr
+from er3a.pipeline.language import tr
 from er3a.pipeline.messages.say import joined
 
 Weight = Literal["plain", "caution", "fail"]

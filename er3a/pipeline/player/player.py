@@ -19,7 +19,7 @@ from er3a.collision.scene import Box, Cylinder, Plane, Scene, Solid, Sphere
 from er3a.collision.shapes import arm_shapes, hull_faces, solid_pieces
 from er3a.geometry.vectors import fibonacci_sphere
 from er3a.numerics.arrays import Integers, Reals
-from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.language import N_, tr
 from er3a.pipeline.player.motions import PlayedMotion
 from er3a.pipeline.viewing.palette import BODY, INK, JOINTS, LINK, VERDICTS, link_colour
 from er3a.robots.joint_limits import shown, size_of, theta_limits

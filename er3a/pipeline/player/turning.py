@@ -21,7 +21,7 @@ from scipy.spatial import ConvexHull
 from er3a.collision.scene import Cylinder, Scene, Sphere
 from er3a.collision.shapes import ROUND, solid_pieces
 from er3a.numerics.arrays import Integers, Reals
-from er3a.pipeline.messages.language import N_, own_title, tr
+from er3a.pipeline.language import N_, own_title, tr
 from er3a.pipeline.viewing.palette import MUTED
 
 _HERE = Path(__file__).parent

@@ -6,7 +6,6 @@ import sys
 import traceback
 from contextlib import suppress
 from dataclasses import replace
-from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Protocol
@@ -36,10 +35,7 @@ FOR_A_PERSON = (InputError, ResultError, WriteError, MemoryError, OSError, Impor
 
 
 class Compute(Protocol):
-    """What a stage's ``compute.compute`` is: a robot's results from the study.
-
-    A stage that is sampled takes the files of its ``parts`` besides.
-    """
+    """What a stage's ``compute.compute`` is: a robot's results from the study."""
 
     def __call__(self, study: Study, name: str, /) -> Results[Any]: ...
 
@@ -50,7 +46,7 @@ class View(Protocol):
     def __call__(self, study: Study, stored: Stored[Any], output: Path, /) -> None: ...
 
 
-def compute(name: str, study: Study, robot: str, folder: Path, parts: list[Path] | None = None) -> str | None:
+def compute(name: str, study: Study, robot: str, folder: Path) -> str | None:
     """Compute a stage of a robot and write its results into ``folder``.
 
     Returns
@@ -60,7 +56,7 @@ def compute(name: str, study: Study, robot: str, folder: Path, parts: list[Path]
     stage = STAGES[name]
     read = input_records(file for file in study.inputs(robot, name) if file.is_file())
     with noted_doubts() as doubts:
-        results = _computed(stage, study, robot, {"parts": parts} if stage.sampled else {})
+        results = _computed(stage, study, robot)
     assumed = _assumed(study, robot) if stage.rests_on else ()
     doubts = [each for each in doubts if stage.weighs or not each.key.startswith(MASSES)]
     results = _in_doubt(results, (*assumed, *left_out_of_units(doubts)))
@@ -92,11 +88,11 @@ def _in_doubt(results: Results[Any], left_out: tuple[LeftOut, ...]) -> Results[A
     return replace(results, summary=replace(summary, not_examined=(*summary.not_examined, *left_out)))
 
 
-def _computed(stage: Stage, study: Study, robot: str, extra: dict[str, Any]) -> Results[Any]:
+def _computed(stage: Stage, study: Study, robot: str) -> Results[Any]:
     try:
         if finding := stage.applies(study.robot(robot)):
             return AbsentResults(Summary(Verdict("not_computed", finding), ()))
-        computing: Compute = partial(stage.module("compute").compute, **extra)
+        computing: Compute = stage.module("compute").compute
         return computing(study, robot)
     except FOR_A_PERSON:
         raise
@@ -114,11 +110,11 @@ def show(verb: str, name: str, study: Study, robot: str, folder: Path, output: P
     import_module(stage.messages)
     stored = read_stage(folder, stage)
     if isinstance(stored.results, AbsentResults):
-        if verb == "record":  # Rerun is loaded by its own jobs alone
+        if verb == "record":  # Rerun is loaded where something is recorded
             from er3a.pipeline.viewing.recording import record_absent as absent
         else:
             from er3a.pipeline.viewing.page import report_absent as absent
         view: View = absent
     else:
-        view = getattr(stage.module(verb), verb)
+        view = getattr(stage.module(f"page.{verb}"), verb)
     view(study, stored, output)

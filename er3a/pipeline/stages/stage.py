@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Protocol
 
 from er3a.by_value import Finding
-from er3a.errors import ResultError, WriteError
-from er3a.files.kept_files import read_checked, write_checked
 from er3a.files.robot_library import LoadFields
 from er3a.files.yaml_file import StrictModel
-from er3a.numerics.jit import cache_folder
-from er3a.pipeline.code_digest import code_digest
+from er3a.numerics.jit import kernels_folder
 from er3a.robots.robot import Robot
 
 
@@ -45,8 +41,8 @@ class StudyFiles(Protocol):
 class Stage:
     """An entry of the registry.
 
-    ``compute`` stands in the module of that name in the stage's folder, and so do the views it has; ``model`` holds
-    its results.
+    ``compute`` stands in the module of that name in the stage's folder, ``model`` holds its results, and the views
+    that it has stand in its folder ``page``.
 
     Attributes
     ----------
@@ -60,7 +56,6 @@ class Stage:
     views : ``record`` (a recording, with its preview) and ``report`` (a page), as far as the stage has them
     rests_on : names of the stages whose verdict its pages say first
     shows : names of the stages whose results its page shows besides its own, as far as they are there
-    sampled : whether ``compute`` gathers parts that jobs of their own have sampled
     obstacles : whether it looks for collisions; its page then says that the workspace's tray is no obstacle
     motions : in plural and marked with ``N_``, what its motions are; the index compares them with the tray
     weighs : whether it looks at the masses of the arm's links
@@ -79,7 +74,6 @@ class Stage:
     views: tuple[str, ...] = ("record", "report")
     rests_on: tuple[str, ...] = ()
     shows: tuple[str, ...] = ()
-    sampled: bool = False
     obstacles: bool = False
     motions: str = ""
     weighs: bool = False
@@ -95,32 +89,14 @@ class Stage:
         return f"er3a.pipeline.stages.{self.name}"
 
     @property
-    def tables(self) -> list[str]:
-        """The names of the stage's tables; noted beside the kernels, as Snakemake would import all models for them."""
-        digest = code_digest(f"{self.package}.model", "er3a.pipeline.tables")[:16]
-        noted = cache_folder() / "tables" / f"{self.name}-{digest}"
-        with suppress(OSError, ResultError):
-            return read_checked(noted).decode().split()
-        from er3a.pipeline.tables import table_types
-
-        names = list(table_types(self.module("model").RESULTS))
-        with suppress(WriteError):
-            write_checked(noted, " ".join(names).encode())
-        return names
-
-    @property
     def messages(self) -> str:
         """The module with the sentences of the stage's verdict and page, and the names of its key figures."""
         return f"er3a.pipeline.messages.{self.name}"
 
     @property
     def compiled(self) -> Path:
-        """The file that says that this stage's kernels have been compiled on this machine: it was computed once."""
-        return cache_folder() / "computed" / f"{self.name}-{self.digest('compute')[:16]}"
-
-    def digest(self, verb: str) -> str:
-        """The digest of what a verb's outcome depends on: its modules, and for a view the stage's sentences."""
-        return code_digest(f"{self.package}.{verb}", *([] if verb == "compute" else [self.messages]))
+        """The file that says that this stage was computed once on this machine: its kernels have been compiled."""
+        return kernels_folder() / f"{self.name}.computed"
 
 
 def program_files(path: Path) -> tuple[Path, ...]:

@@ -17,8 +17,8 @@ from er3a.kinematics.singularity import TYPES, USUAL_NEAR, NearSingular, charact
 from er3a.kinematics.solutions import branch_labels
 from er3a.kinematics.wrist_partitioned import CoupledJoints, has_branches, wrist_partition_missing
 from er3a.pipeline.code_digest import code_digest
+from er3a.pipeline.language import N_, tr
 from er3a.pipeline.messages.kinematics import branch_word
-from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.left_out import body_word
 from er3a.pipeline.messages.pages import Caveat, caveat
 from er3a.pipeline.messages.say import say
@@ -294,7 +294,7 @@ def write_teach_page(study: Study, name: str, results: Path, output: Path) -> No
         first_caveat=first_caveat,
         head=program_head(validated if known else None),
         command=run_command(study, f"{name}/teach.html"),
-        provenance=Provenance(inputs, code_digest(__name__), config=study.settings(name, "trajectory")),
+        provenance=Provenance(inputs, code_digest(), config=study.settings(name, "trajectory")),
     )
 
 

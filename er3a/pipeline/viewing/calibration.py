@@ -21,8 +21,9 @@ from er3a.comparison.compare import compare
 from er3a.files.kept_files import sha256
 from er3a.files.robot_writer import robot_file, robot_text
 from er3a.numerics.arrays import Reals
+from er3a.pipeline import language
 from er3a.pipeline.code_digest import code_digest
-from er3a.pipeline.messages import language
+from er3a.pipeline.language import N_, as_text, tr
 from er3a.pipeline.messages.calibration import (
     VERDICTS,
     bar_texts,
@@ -36,12 +37,11 @@ from er3a.pipeline.messages.calibration import (
     warning_texts,
 )
 from er3a.pipeline.messages.comparison import headline, layer_rows
-from er3a.pipeline.messages.language import N_, as_text, tr
+from er3a.pipeline.messages.numbers import fixed, number
 from er3a.pipeline.messages.say import bracketed, joined, say
 from er3a.pipeline.results import Input, Provenance
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.figures import equal_scale, house_style, new_figure
-from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import Picture, ShownFigure
 from er3a.pipeline.viewing.palette import HIGHLIGHT, JOINTS, MODEL, MUTED, REFERENCE
 from er3a.pipeline.viewing.recording import Curves, Logged, Recorded, Run, escaped, write_recording
@@ -130,7 +130,7 @@ def write_calibration(
             Path(__file__).with_name("calibration.html.j2"),
             output,
             command=shlex.join(command),
-            provenance=Provenance(tuple(Input(str(f), sha256(f), {}) for f in files), code_digest(__name__)),
+            provenance=Provenance(tuple(Input(str(f), sha256(f), {}) for f in files), code_digest()),
             arm=language.own_title(robot.title),
             verdict="fail" if not found.fits else "caution" if beside else "pass",
             conclusion=joined([say(found.conclusion), *beside], " "),

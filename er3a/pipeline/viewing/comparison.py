@@ -15,8 +15,8 @@ from er3a.files.kept_files import sha256
 from er3a.files.robot_writer import robot_file, robot_text
 from er3a.kinematics.chain import constant_links, joint_starts
 from er3a.pipeline.code_digest import code_digest
+from er3a.pipeline.language import tr
 from er3a.pipeline.messages.comparison import doubt_rows, headline, layer_rows
-from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import bracketed
 from er3a.pipeline.results import Input, Provenance
 from er3a.pipeline.viewing import page
@@ -46,7 +46,7 @@ def write_comparison(
         Path(__file__).with_name("comparison.html.j2"),
         output,
         command=shlex.join(["er3a", "compare", one[0], other[0], *words]),
-        provenance=Provenance(tuple(Input(str(file), sha256(file), {}) for file in files), code_digest(__name__)),
+        provenance=Provenance(tuple(Input(str(file), sha256(file), {}) for file in files), code_digest()),
         names=(one[0], other[0]),
         verdict=found.verdict,
         headline=headline(found),

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from er3a.pipeline.messages import language
+from er3a.pipeline import language
 from er3a.pipeline.messages.left_out import left_out_text
 from er3a.pipeline.messages.validation import condition
 from er3a.pipeline.results import NEVER_A_PASS, LeftOut, LeftOutSubject, read_stage

@@ -27,8 +27,8 @@ from matplotlib.lines import Line2D
 from matplotlib.rcsetup import cycler
 from matplotlib.ticker import FixedLocator
 
-from er3a.pipeline.messages import language
-from er3a.pipeline.messages.language import tr
+from er3a.pipeline import language
+from er3a.pipeline.language import tr
 from er3a.pipeline.messages.say import bracketed
 from er3a.pipeline.tables import Table
 from er3a.pipeline.viewing.palette import GRID, INK, MODEL, MUTED, SIX_JOINTS, VERDICTS

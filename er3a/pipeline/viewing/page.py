@@ -27,9 +27,20 @@ from matplotlib.figure import Figure
 from er3a.collision.pairs import ShapesAssumed
 from er3a.errors import ResultError
 from er3a.files.kept_files import INSTALLED, ROOT, view_command, write_atomically
-from er3a.pipeline.messages import language
-from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline import language
+from er3a.pipeline.language import N_, tr
 from er3a.pipeline.messages.left_out import left_out_names, left_out_text, say_reserved
+from er3a.pipeline.messages.numbers import (
+    at_least,
+    at_most,
+    decimals_of,
+    decimals_of_bound,
+    fixed,
+    measured,
+    number,
+    rounded_down,
+    rounded_up,
+)
 from er3a.pipeline.messages.pages import GRADE_NAMES, GROUP_NAMES, Caveat, caveat, glossary
 from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
 from er3a.pipeline.results import (
@@ -46,17 +57,6 @@ from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.stages.workspace.entry import CapabilitySettings
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import readings, svg_data_uri
-from er3a.pipeline.viewing.numbers import (
-    at_least,
-    at_most,
-    decimals_of,
-    decimals_of_bound,
-    fixed,
-    measured,
-    number,
-    rounded_down,
-    rounded_up,
-)
 from er3a.version import __version__
 
 _HERE = Path(__file__).parent
@@ -437,7 +437,7 @@ def render_stage(
         "robot_pages": study.pages(name),
         "box": _tray_edges(study, stored) if STAGES[stage].obstacles else "",
     }
-    template = _HERE.parent / "stages" / stage / "report.html.j2"
+    template = _HERE.parent / "stages" / stage / "page" / "report.html.j2"
     render(template, output, stored.results.summary, **shared | context)
 
 

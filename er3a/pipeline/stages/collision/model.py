@@ -9,7 +9,7 @@ from er3a.by_value import Finding
 from er3a.collision.matrix import PairState
 from er3a.collision.pairs import Pair
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.pipeline.messages.language import N_
+from er3a.pipeline.language import N_
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_joint, vector
 

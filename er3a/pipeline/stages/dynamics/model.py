@@ -14,7 +14,7 @@ from er3a.by_value import Finding
 from er3a.dynamics.margins import Binding, WristQuantity
 from er3a.dynamics.plausibility import MassFinding
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.messages.language import N_
+from er3a.pipeline.language import N_
 from er3a.pipeline.results import NEVER_A_PASS, Results, Summary, Verdict
 from er3a.pipeline.tables import Table, Texts, column, per_joint
 from er3a.planning.names import PathVerdict

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from er3a.files.robot_file import Text
 from er3a.files.yaml_file import StrictModel
-from er3a.pipeline.messages.language import N_
+from er3a.pipeline.language import N_
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.stage import Stage, StudyFiles
 from er3a.selection.rule_names import RuleName

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from er3a.files.program_file import load_programs
 from er3a.files.yaml_file import StrictModel
-from er3a.pipeline.messages.language import N_
+from er3a.pipeline.language import N_
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.stage import Stage, StudyFiles, program_files
 

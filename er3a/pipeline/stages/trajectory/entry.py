@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from er3a.files.yaml_file import read_yaml
-from er3a.pipeline.messages.language import N_
+from er3a.pipeline.language import N_
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.stage import Stage, StudyFiles, program_files
 

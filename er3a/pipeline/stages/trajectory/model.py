@@ -15,7 +15,7 @@ from er3a.kinematics.classes.class_solvers import BranchLabel
 from er3a.kinematics.singularity import EventType
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing
 from er3a.numerics.arrays import Flags, Reals
-from er3a.pipeline.messages.language import N_
+from er3a.pipeline.language import N_
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet
 from er3a.pipeline.stages.programs.model import FindingAt

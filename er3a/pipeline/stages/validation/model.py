@@ -19,7 +19,7 @@ from er3a.identifiability.statements import InconsistentWithOwnText, NotTheRobot
 from er3a.kinematics.round_trips import SlotRoundTrips
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.pipeline.messages.language import N_
+from er3a.pipeline.language import N_
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.study import Study
 from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_joint, vector

@@ -1,10 +1,9 @@
-"""Workspace: gather the samples' counts and compute hull, volumes and voids."""
+"""Workspace: count samples, and compute hull, volumes and voids."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
@@ -23,7 +22,7 @@ from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_without_tool
 from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.entry import CapabilitySettings, WorkspaceSettings
-from er3a.pipeline.stages.workspace.sample import draw_of, gather, sampled
+from er3a.pipeline.stages.workspace.sample import draw_of, sampled
 from er3a.pipeline.stages.workspace.tool_capability import ToolCapability, tool_capability
 from er3a.pipeline.study import Study
 from er3a.references.rows import EnvelopeRow
@@ -147,22 +146,16 @@ class _Samples:
         return np.concatenate([self.q_extreme, self.q_cloud])
 
 
-def compute(study: Study, name: str, parts: Sequence[Path] | None = None) -> model.WorkspaceResults:
+def compute(study: Study, name: str) -> model.WorkspaceResults:
     """Work out a robot's workspace.
-
-    Parameters
-    ----------
-    parts : part files that hold each block of the study once; None to sample here and now
 
     Raises
     ------
-    ResultError
-        naming the part file that is damaged, foreign or one too many
     InputError
         if the grid does not fit into memory
     """
     robot = study.robot(name)
-    samples = _samples(study, robot, parts)
+    samples = _samples(study, robot)
     grid, draw, tally, hull = samples.grid, samples.draw, samples.tally, samples.hull
     in_cloud = find_voids(tally.counts, samples.inside)
     shoulder = shoulder_of(robot, grid)
@@ -199,13 +192,10 @@ def compute(study: Study, name: str, parts: Sequence[Path] | None = None) -> mod
     )
 
 
-def _samples(study: Study, robot: Robot, parts: Sequence[Path] | None) -> _Samples:
+def _samples(study: Study, robot: Robot) -> _Samples:
     settings = study.section(WorkspaceSettings)
     grid, draw = make_grid(robot, settings.cells_across), draw_of(study)
-    if parts is None:
-        tally = sampled(study, robot, grid, range(settings.blocks))
-    else:
-        tally = gather([Path(part) for part in parts], study, robot)
+    tally = sampled(study, robot, grid, range(settings.blocks))
     q_extreme = draw.joints(robot, tally.extremes.block, tally.extremes.sample)
     hull = convex_hull(forward(robot, q_extreme)[:, :3, 3])
     q_cloud = draw.opening_joints(robot, settings.cloud_points)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -12,12 +11,9 @@ from er3a.files.reference_sets import reference_folder
 from er3a.files.robot_file import Text
 from er3a.files.units import MAX_DISTANCE_MM, Triple, as_millimetres
 from er3a.files.yaml_file import StrictModel
-from er3a.pipeline.messages.language import N_
+from er3a.pipeline.language import N_
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.stage import Stage, StudyFiles
-
-SAMPLES_PER_JOB = 1_000_000_000
-"""About ten seconds, of which starting is a tenth."""
 
 
 class WorkspaceSettings(StrictModel):
@@ -44,11 +40,6 @@ class WorkspaceSettings(StrictModel):
         if self.samples < self.blocks:
             raise ValueError(f"{self.samples} samples can't fill {self.blocks} blocks | Lower workspace.blocks")
         return self
-
-    @property
-    def parts(self) -> int:
-        """The number of jobs that the blocks are grouped into."""
-        return min(self.blocks, math.ceil(self.samples / SAMPLES_PER_JOB))
 
 
 class BoxTask(StrictModel):
@@ -105,5 +96,4 @@ STAGE = Stage(
     inputs=_inputs,
     rests_on=("validation",),
     shows=("inverse", "trajectory", "programs", "vision", "dynamics"),
-    sampled=True,
 )

@@ -14,7 +14,7 @@ from er3a.collision.pairs import Pair
 from er3a.kinematics.classes.class_solvers import BranchLabel, SlotName
 from er3a.kinematics.forward import forward, jacobian
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.pipeline.messages.language import N_
+from er3a.pipeline.language import N_
 from er3a.pipeline.results import NEVER_A_PASS, Results, Summary, Verdict
 from er3a.pipeline.tables import Table, Texts, column, lists, per_joint, vector
 from er3a.robots.robot import Robot

@@ -1,0 +1,161 @@
+"""Texts in the reader's language, through gettext catalogues.
+
+What a page says itself is written in English where it stands and goes through :func:`tr`; what was found is a finding,
+of which :mod:`er3a.pipeline.messages.say` makes a text. Catalogues hold the former by the English text, the latter by
+its key.
+"""
+
+from __future__ import annotations
+
+import gettext
+import io
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from numbers import Real
+from pathlib import Path
+from string import Formatter
+from typing import Any, Literal, get_args
+
+LanguageCode = Literal["en", "zh"]
+LANGUAGES = get_args(LanguageCode)  # English and those that have a catalogue
+MOST_DECIMALS = 9  # of numbers that have to be shown as different
+KEYED = "key"  # the context of texts whose key, not whose English, is their entry in a catalogue
+TITLE = "title"  # the context of titles and notes that er3a writes into files
+CATALOGUES = Path(__file__).with_name("messages") / "locale"
+
+_catalogue: gettext.NullTranslations = gettext.NullTranslations()
+_language = "en"
+_own: Mapping[str, str] = {}
+
+
+class _AsIs(Formatter):
+    """Fills in what is formatted already."""
+
+    def format_field(self, value: Any, format_spec: str) -> Any:
+        return value
+
+
+def N_(text: str) -> str:
+    """Mark a text for the catalogues without translating it yet: words in a table of constants."""
+    return text
+
+
+def written_title(text: str) -> str:
+    """Mark a title or note that er3a writes into a file, in English; pages show it by :func:`own_title`."""
+    return text
+
+
+# Those that are not the same in every language.
+UNITS = (N_("deg"), N_("deg (mm of a prismatic joint)"), N_("deg/s"), N_("µdeg/s"))
+
+
+def use(language: str, own: Mapping[str, str] | None = None) -> None:
+    """Set the language of texts for this process: one of ``LANGUAGES``; ``own``: people's titles in that language."""
+    global _catalogue, _language, _own
+    _language, _own = language, own or {}
+    _catalogue = gettext.NullTranslations() if language == "en" else _load(catalogue_file(language))
+
+
+@contextmanager
+def using(language: str) -> Iterator[None]:
+    """Texts in a language for a while."""
+    global _catalogue, _language, _own
+    kept = _catalogue, _language, _own
+    use(language)
+    try:
+        yield
+    finally:
+        _catalogue, _language, _own = kept
+
+
+def current() -> str:
+    """The language in use."""
+    return _language
+
+
+def catalogue_file(language: str) -> Path:
+    """The catalogue of a language other than English."""
+    return CATALOGUES / language / "LC_MESSAGES" / "er3a.po"
+
+
+def translations() -> gettext.NullTranslations:
+    """The catalogue in use, for templates."""
+    return _catalogue
+
+
+def tr(text: str, /, **parts: Any) -> str:
+    """A text in the language in use, its fields filled in as ``str.format`` does."""
+    found = _catalogue.gettext(text) if text else text
+    return filled(found, text, parts) if parts else found
+
+
+def filled(text: str, template: str, parts: Mapping[str, Any], written: Callable[[Any, str], str] | None = None) -> str:
+    """A translation of a template, its fields filled in with the formats of the template: translations have none."""
+    formats = {name: spec or "" for _, name, spec, _ in Formatter().parse(template) if name}
+    write = written or as_text
+    return _AsIs().format(text, **{name: write(parts[name], spec) for name, spec in formats.items()})
+
+
+def as_text(part: Any, spec: str = "") -> str:
+    """A part of a text; a number as :func:`as_number` writes it."""
+    text = format(part, spec)
+    return as_number(text) if isinstance(part, Real) else text
+
+
+def as_number(text: str) -> str:
+    """A number's text with thin spaces between thousands from five digits on; its minus sign is no hyphen."""
+    whole, point, rest = text.partition(".")
+    digits = whole.lstrip("+-")
+    if digits.isdecimal() and len(digits) > 4:
+        whole = whole.removesuffix(digits) + f"{int(digits):,}".replace(",", "\u202f")
+    return (whole + point + rest).replace("-", "−")
+
+
+def alike(values: Iterable[float], most: int = 3) -> list[str]:
+    """Numbers with equally many decimals: as few as show each of them to ``most``."""
+    exact = [f"{value:.{most}f}" for value in values]
+    decimals = max((len(text.rstrip("0").partition(".")[2]) for text in exact), default=0)
+    return [as_text(float(text) + 0.0, f".{decimals}f") for text in exact]
+
+
+def distinct(values: Iterable[float], decimals: int = 1) -> list[str]:
+    """Numbers with equally many decimals: as few, from ``decimals`` on, as show different ones as different."""
+    given = list(values)
+    while decimals < MOST_DECIMALS and len({f"{value:.{decimals}f}" for value in given}) < len(set(given)):
+        decimals += 1
+    return [as_text(value, f".{decimals}f") for value in given]
+
+
+def with_unit(value: str, unit: str, gap: str = " ") -> str:
+    """A value with its unit as the language in use writes it: Chinese has ° without a gap."""
+    shown = tr(unit)
+    return value + ("" if shown.startswith("°") else gap) + shown if shown else value
+
+
+def own_title(text: str) -> str:
+    """A title or note out of a file in the language in use, if the file, or our catalogue for ours, says it."""
+    return _own[text] if text in _own else _catalogue.pgettext(TITLE, text)
+
+
+def translated(context: str, text: str) -> str:
+    """A text in the language in use, looked up with its context, and without it where the catalogue has none."""
+    found = _catalogue.pgettext(context, text)
+    return found if found != text else _catalogue.gettext(text)
+
+
+def by_key(key: str, english: str, count: int | None = None) -> str:
+    """A text in the language in use, looked up by its key; in English where the catalogue has none."""
+    catalogue = _catalogue
+    found = catalogue.pgettext(KEYED, key) if count is None else catalogue.npgettext(KEYED, key, key, count)
+    return english if found == key else found
+
+
+def _load(file: Path) -> gettext.NullTranslations:
+    from babel.messages.mofile import write_mo
+    from babel.messages.pofile import read_po
+
+    compiled = io.BytesIO()
+    with file.open("rb") as source:
+        write_mo(compiled, read_po(source))
+    compiled.seek(0)
+    return gettext.GNUTranslations(compiled)

@@ -1,0 +1,1 @@
+"""Page and recording of the stage collision: results in, views out."""

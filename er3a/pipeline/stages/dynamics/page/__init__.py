@@ -1,0 +1,1 @@
+"""Page and recording of the stage dynamics: results in, views out."""

@@ -1,0 +1,337 @@
+"""The dynamics page, rendered from the stage's results."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from markupsafe import Markup
+
+from er3a.pipeline.language import tr
+from er3a.pipeline.messages.dynamics import BINDING, payload_text, quantity_word
+from er3a.pipeline.messages.expectations import outcome_word
+from er3a.pipeline.messages.numbers import at_least, at_most, decimals_of, decimals_of_column, fixed, number
+from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
+from er3a.pipeline.player.player import drawing_head, moment, player
+from er3a.pipeline.results import Stored
+from er3a.pipeline.stages.dynamics import model
+from er3a.pipeline.stages.dynamics.page.played import motions
+from er3a.pipeline.study import Study
+from er3a.pipeline.viewing.figures import axis_label, new_figure, row_of_panels
+from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
+from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINTS, MUTED
+
+DRAWN = 161
+STYLES = ("-", "--", ":", "-.", (0, (6, 2, 1, 2, 1, 2)))
+
+
+def joint_colour(joint: int) -> str:
+    """The colour of a joint (from 0)."""
+    return JOINTS[joint % len(JOINTS)]
+
+
+def within(value: float, tolerance: float, decimals: int = 2) -> str:
+    """A value with its tolerance, two digits of that and no more decimals than ``decimals``."""
+    shown = min(decimals, decimals_of(value, tolerance, "") if value else decimals)
+    return f"{fixed(value, shown)} ± {fixed(tolerance, shown)}"
+
+
+def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
+    """Torques of all joints with their intervals, the parts of the most loaded one, and powers."""
+    rows = rows.take(np.unique(np.linspace(0, len(rows) - 1, min(DRAWN, len(rows))).round().astype(int)))
+    figure, (torque, parts, power) = row_of_panels(3, 13.0, 3.4, (0.75, 0.55, 0.1, 0.15, 0.85))
+    load, unit = path.hardest, model.shared_unit(load.unit for load in path.joints)
+    worst = load.joint - 1
+    for j in range(rows.torque.shape[1]):
+        colour = joint_colour(j)
+        low, high = rows.torque[:, j] - rows.tolerance[:, j], rows.torque[:, j] + rows.tolerance[:, j]
+        torque.fill_between(rows.t_s, low, high, color=colour, alpha=0.15, linewidth=0)
+        torque.plot(rows.t_s, rows.torque[:, j], color=colour, label=f"J{j + 1}")
+        power.plot(rows.t_s, rows.power_w[:, j], color=colour, label=f"J{j + 1}")
+    torque.legend(ncols=3, fontsize=8)
+    torque.set_ylabel(axis_label(rows, "torque", unit))
+    names = dict(
+        zip(
+            model.PARTS,
+            (tr("gravity"), tr("inertia"), tr("Coriolis, centrifugal"), tr("friction"), tr("forces at the tool")),
+        )
+    )
+    for part, style in zip(model.PARTS, STYLES):
+        if part == "tool" and not rows.tool.any():
+            continue
+        parts.plot(rows.t_s, getattr(rows, part)[:, worst], color=INK, linestyle=style, label=names[part])
+    parts.legend(fontsize=8)
+    parts.set_ylabel(tr("contributions at J{joint} ({unit})", joint=worst + 1, unit=load.unit))
+    power.axhline(0.0, color=MUTED, linewidth=0.8)
+    power.set_ylabel(axis_label(rows, "power_w"))
+    for ax in (torque, parts, power):
+        ax.set_xlabel(axis_label(rows, "t_s"))
+    most = max(model.PARTS, key=lambda part: getattr(load, part))
+    caption = tr(
+        "J{joint} needs the greatest torque, {peak} {unit} at {t:.2f} s; largest contribution: "
+        "{part}. Shaded: uncertainty of the torques from the tolerances of masses and centres. Power below 0 is"
+        " fed back to the drive.",
+        joint=load.joint,
+        peak=within(load.peak, load.tolerance),
+        unit=load.unit,
+        t=load.peak_at_s,
+        part=names[most],
+    )
+    alt = tr("Three panels over time for {path}: torques, their contributions, powers.", path=path.name)
+    return Picture(figure, alt, caption, [(ax, path.name) for ax in (torque, parts, power)])
+
+
+def holding_figure(summary: model.DynamicsSummary) -> Picture:
+    """Bars of the largest holding torque at each joint."""
+    figure, ax = new_figure(1, 1, width=7.0, height=2.8)
+    joints = np.arange(len(summary.holding))
+    size = np.array([abs(held.torque) for held in summary.holding])
+    tolerance = np.array([held.tolerance for held in summary.holding])
+    ax.bar(joints, size, color=[joint_colour(int(j)) for j in joints], width=0.6)
+    ax.errorbar(joints, size, yerr=tolerance, fmt="none", ecolor=INK, capsize=4)
+    ax.set_xticks(joints, [f"J{j + 1}" for j in joints])
+    ax.set_ylabel(tr("holding torque ({unit})", unit=_units(summary)["torque"]))
+    ax.grid(visible=False, axis="x")
+    worst = model.hardest_held(summary.holding)
+    caption = tr(
+        "At rest J{joint} needs the greatest holding torque: {torque} {unit}. No pose within the "
+        "joint limits needs more than {bound} {unit} there, for the masses as given.",
+        joint=worst.joint,
+        torque=within(abs(worst.torque), worst.tolerance),
+        unit=worst.unit,
+        bound=at_most(worst.bound, decimals_of_column([worst.bound])),
+    )
+    return Picture(figure, tr("Bars: the greatest holding torque at each joint, with its tolerance."), caption)
+
+
+def diagram_figure(summary: model.DynamicsSummary, rows: model.DiagramRows) -> Picture:
+    """The load diagram, with the load in it."""
+    figure, ax = new_figure(1, 1, width=7.0, height=4.2)
+    for i, mass in enumerate(np.unique(rows.mass_kg)):
+        own = rows.take(rows.mass_kg == mass)
+        ax.plot(own.along_mm, own.across_mm, color=joint_colour(i), label=tr("{mass:.3g} kg", mass=mass))
+    masses = summary.masses
+    if masses and masses.load_kg is not None:
+        x, y, z = masses.load_centre_mm
+        ax.plot([z], [np.hypot(x, y)], "o", color=HIGHLIGHT, label=tr("the load, {mass:.3g} kg", mass=masses.load_kg))
+    ax.set_xlim(left=0)
+    ax.set_ylim(bottom=0)
+    ax.set_xlabel(axis_label(rows, "along_mm"))
+    ax.set_ylabel(axis_label(rows, "across_mm"))
+    ax.legend(loc="upper right")
+    caption = tr(
+        "A load whose centre lies below the curve of its mass is within the allowed moments and inertias of the wrist. "
+        "The curves take the load as a point; its own inertia, and forces on the tool, count in the comparison above."
+    )
+    return Picture(figure, tr("The load diagram: one curve for each mass."), caption)
+
+
+MAX_USES = 12
+NONE = "–"
+
+
+def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) -> None:
+    """Write the dynamics page of a robot."""
+    robot, results = study.robot(stored.robot), stored.results
+    summary = results.summary
+    figures = [
+        (path, torque_figure(path, results.torques.take(results.torques.path == path.name)))
+        for path in summary.paths
+        if path.complete
+    ]
+    holding = holding_figure(summary) if summary.holding else None
+    diagram = diagram_figure(summary, results.diagram) if len(results.diagram) else None
+    render_stage(
+        study,
+        stored,
+        output,
+        payload=payload_text(summary, robot)[0],  # what to ask for is the list of what is not known
+        findings=listed(summary.findings),
+        unknown=listed(summary.unknown),
+        links=_links(summary),
+        uses=[_use(use) for use in summary.uses[:MAX_USES]],
+        more_uses=max(0, len(summary.uses) - MAX_USES),
+        motors=_motors(summary.motors),
+        paths=[_path(path) for path in summary.paths if path.counts],
+        not_run=[_not_run(path) for path in summary.paths if not path.counts],
+        nodes=_nodes(summary),
+        margins=any(path.payload or path.speed_scale or path.torque_times for path in summary.paths),
+        figures=figures,
+        player=player(robot, motions(robot, results)),
+        drawing_head=drawing_head(),
+        joints=[(path.name, _joints(path)) for path in summary.paths if path.complete],
+        wrist=_wrist(summary),
+        wrist_uses=_wrist_uses(summary),
+        units=_units(summary),
+        holding=holding,
+        held=_held(summary.holding),
+        diagram=diagram,
+    )
+
+
+def _links(summary: model.DynamicsSummary) -> list[list[str]]:
+    rows = []
+    for link in summary.masses.links if summary.masses else ():
+        name = tr("base") if link.link == 0 else str(link.link)
+        origin = tr("guessed") if link.estimated else tr("file") if link.mass_kg is not None else tr("unknown")
+        mass = fixed(link.mass_kg, 3) if link.mass_kg is not None else NONE
+        rows.append([name, mass, ", ".join(fixed(value, 1) for value in link.centre_mm) or NONE, origin])
+    return rows
+
+
+def _use(use: model.Use) -> list[str]:
+    return [
+        quantity_word(use.quantity),
+        f"J{use.joint}" if use.joint else NONE,
+        use.path or tr("at rest"),
+        number(use.asked, 3),
+        at_most(use.upper, ""),
+        number(use.allowed, 3),
+        use.unit,
+        fixed(100 * use.ratio, 0),
+    ]
+
+
+def _units(summary: model.DynamicsSummary) -> dict[str, str]:
+    """Units of torques, speeds and inertias in headings, by what the arm's joints do."""
+    torque = model.shared_unit(held.unit for held in summary.holding)
+    turning, sliding = (tr("deg/s"), "kg m²"), ("mm/s", "kg")
+    of_others = {model.TORQUE: turning, model.FORCE: sliding}
+    speed, inertia = of_others.get(torque, (tr("deg/s or mm/s"), tr("kg m² or kg")))
+    return {"torque": tr(torque), "speed": speed, "inertia": inertia}
+
+
+def _label(joint: int, unit: model.Unit) -> str:
+    return f"J{joint}" if unit == model.TORQUE else tr("J{joint} (slides)", joint=joint)
+
+
+def _motors(motors: Sequence[model.MotorNeed]) -> list[list[str]]:
+    torque = decimals_of_column(value for motor in motors for value in (motor.peak, motor.holding))
+    power = decimals_of_column(motor.power_w for motor in motors)
+    inertia = decimals_of_column(motor.inertia_high for motor in motors)
+    return [_motor(motor, torque, power, inertia) for motor in motors]
+
+
+def _motor(motor: model.MotorNeed, torque: int, power: int, inertia: int) -> list[str]:
+    return [
+        _label(motor.joint, motor.unit),
+        *(fixed(value, torque) for value in (motor.peak, motor.rms, motor.holding)),
+        fixed(motor.speed, 1),
+        fixed(motor.power_w, power),
+        f"{fixed(motor.inertia_low, inertia)} – {fixed(motor.inertia_high, inertia)}",
+        *(
+            NONE if value is None else number(value, 3)
+            for value in (
+                motor.inertia_ratio,
+                motor.motor_torque,
+                motor.motor_rpm,
+                motor.rated_limit,
+                motor.peak_limit,
+            )
+        ),
+    ]
+
+
+def _not_run(path: model.PathLoad) -> list[str]:
+    why = joined(map(outcome_word, path.outcomes), ", ")
+    if not path.complete:
+        return [path.name, why, tr("not followed to its end")]
+    worst = path.hardest
+    peak = f"{within(worst.peak, worst.tolerance)} {worst.unit} (J{worst.joint})"
+    return [Markup('<a href="#{0}">{0}</a>').format(path.name), why, peak]
+
+
+def _nodes(summary: model.DynamicsSummary) -> list[list[str]]:
+    """Shortest times under torques by the number of nodes, and the time that no motion undercuts."""
+    return [
+        [path.name, number(each.nodes), fixed(each.time_s, 4), at_least(each.least_s, 4)]
+        for path in summary.paths
+        for each in (path.torque_times if path.counts else ())
+    ]
+
+
+def _path(path: model.PathLoad) -> list[str]:
+    worst = path.hardest
+    energy, back = sum(load.work_j for load in path.joints), sum(load.recovered_j for load in path.joints)
+    timed = fixed(path.torque_times[-1].time_s, 2) if path.torque_times else NONE
+    if path.no_law:
+        timed = say(path.no_law)
+    return [
+        Markup('<a href="#{0}">{0}</a>').format(path.name),
+        f"{within(worst.peak, worst.tolerance)} {worst.unit} (J{worst.joint})",
+        fixed(energy, 2),
+        fixed(back, 2),
+        _bound(path.payload),
+        _bound(path.speed_scale),
+        timed,
+        NONE if path.kinematic_s is None else fixed(path.kinematic_s, 2),
+    ]
+
+
+def _bound(bound: model.BindingLimit | None) -> str:
+    if bound is None:
+        return NONE
+    value = tr("no bound") if bound.value is None else at_least(bound.value, "")
+    if bound.by is None:
+        return value
+    return bracketed(value, joined([f"J{bound.joint}", word("dynamics.binding", BINDING, bound.by)], ", "))
+
+
+def _joints(path: model.PathLoad) -> list[list[str]]:
+    torque, power, energy = (
+        decimals_of_column(value for load in path.joints for value in of(load))
+        for of in (
+            lambda load: (load.peak, *(getattr(load, part) for part in model.PARTS)),
+            lambda load: (load.power_w, load.braking_w),
+            lambda load: (load.work_j, load.recovered_j),
+        )
+    )
+    return [
+        [
+            _label(load.joint, load.unit),
+            within(load.peak, load.tolerance, torque),
+            moment(path.name, load.peak_at_s, fixed(load.peak_at_s, 2)),
+            within(load.rms, load.rms_tolerance, torque),
+            *(fixed(getattr(load, part), torque) for part in model.PARTS),
+            _both(load.power_w, load.braking_w, power),
+            _both(load.work_j, load.recovered_j, energy),
+        ]
+        for load in path.joints
+    ]
+
+
+def _both(given: float, taken: float, decimals: int) -> Markup:
+    return Markup("{}<br>{}").format(fixed(given, decimals), fixed(taken, decimals))
+
+
+def _held(holding: Sequence[model.HoldingTorque]) -> list[list[str]]:
+    decimals = decimals_of_column(held.bound for held in holding)
+    return [
+        [
+            _label(held.joint, held.unit),
+            fixed(abs(held.torque), decimals),
+            at_most(held.bound, decimals),
+            fixed(held.tolerance, decimals),
+            panel_link(held.q, ", ".join(fixed(value, 0) for value in held.q)),
+        ]
+        for held in holding
+    ]
+
+
+def _wrist_uses(summary: model.DynamicsSummary) -> list[list[str]]:
+    at_rest = [use for use in summary.uses if use.path is None and use.quantity in ("payload", "moment", "inertia")]
+    return [[*_use(use)[:2], *_use(use)[3:]] for use in at_rest]
+
+
+def _wrist(summary: model.DynamicsSummary) -> list[list[str]]:
+    return [
+        [
+            path.name,
+            f"J{moment.joint}",
+            within(moment.moment_n_m, moment.tolerance),
+            fixed(moment.t_s, 2),
+        ]
+        for path in summary.paths
+        for moment in path.wrist
+    ]

@@ -1,0 +1,1 @@
+"""Page and recording of the stage inverse: results in, views out."""

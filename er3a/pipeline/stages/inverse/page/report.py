@@ -1,0 +1,683 @@
+"""The page of the inverse stage."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from markupsafe import Markup
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
+from matplotlib.lines import Line2D
+
+from er3a.geometry.transforms import transform
+from er3a.kinematics.forward import skeleton
+from er3a.kinematics.inverse import inverse
+from er3a.kinematics.solutions import ClosedForm, Iteration
+from er3a.pipeline.language import N_, tr, with_unit
+from er3a.pipeline.messages.expectations import outcome_word
+from er3a.pipeline.messages.inverse import (
+    FREE_AT,
+    NEAREST_RULE,
+    ORIENTATION_TITLES,
+    ORIENTATIONS,
+    SHAPES,
+    limits_in_short,
+)
+from er3a.pipeline.messages.kinematics import RULE_NAMES, RULE_TITLES, branch_word, singularity_word
+from er3a.pipeline.messages.left_out import pair_words
+from er3a.pipeline.messages.numbers import fixed, no_noise, number
+from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
+from er3a.pipeline.results import Stored, read_stage
+from er3a.pipeline.stages.inverse import model
+from er3a.pipeline.stages.registry import STAGES
+from er3a.pipeline.study import Study
+from er3a.pipeline.viewing.figures import equal_scale, new_figure, row_of_panels
+from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
+from er3a.pipeline.viewing.palette import GRID, HIGHLIGHT, INK, JOINT_NAMES, MODEL, MUTED, colour_of, shape_of
+from er3a.robots.joint_limits import LimitsExceeded, meant, shown
+from er3a.robots.robot import Robot
+from er3a.selection.select import RULES
+
+NAMED = 12  # targets that a cell names
+
+
+def symptoms(robot: Robot, summary: model.InverseSummary) -> list[list[str]]:
+    """Rows of symptom, usual cause, what was tried here and what helps, from the summary's targets alone."""
+    targets = summary.targets
+    unreachable = [target.name for target in targets if not target.solutions]
+    limited = [target.name for target in targets if target.solutions and not target.within_limits]
+    free = [target.name for target in targets if target.families]
+    iterated = [target.name for target in targets if isinstance(target.method, Iteration)]
+    return [
+        [
+            tr("No solution anywhere"),
+            tr("The target is out of reach, or given in metres or radians where mm and degrees are meant"),
+            tr("Units were checked on reading. Out of reach: {own_names}", own_names=_names(unreachable)),
+            tr("The text of the target says by how many mm, and which shift or turn of the tool is enough"),
+        ],
+        [
+            tr("Solutions, but none allowed"),
+            tr("Joint limits too tight, wrong, or with the wrong sign"),
+            tr(
+                "Every branch in every turn that the limits allow. Refused by limits alone: {own_names}",
+                own_names=_names(limited),
+            ),
+            tr(
+                "Compare the limits with the manual (validation page); turn the tool or move the part as the target "
+                "says"
+            ),
+        ],
+        [
+            tr("Solver stalls or jumps near one pose"),
+            tr("A singularity: joints can turn with the tool at rest"),
+            tr(
+                "The continuum of solutions is computed in explicit form. Found at: {own_names}", own_names=_names(free)
+            ),
+            tr("Keep the joints near the reference, pass in joint space, or bend the path around the pose"),
+        ],
+        [
+            tr("Result depends on the start guess"),
+            tr("Iteration from a poor guess ends in another branch or in none"),
+            tr(
+                "The closed form needs no guess. Solved by iteration instead, from many starts: {own_names}",
+                own_names=_names(iterated),
+            ),
+            tr("Start near the branch wanted, allow restarts, and check limits inside the iteration"),
+        ],
+        [
+            tr("Sudden wrist flip between two targets"),
+            tr("The solver takes the nearest branch target by target"),
+            _greed(robot, summary.sequence),
+            tr("Choose the branches of a sequence as a whole"),
+        ],
+    ]
+
+
+def _names(names: list[str]) -> str:
+    if len(names) > NAMED:
+        return tr(
+            "{own_names} and {count} more", own_names=joined(names[:NAMED], ", "), count=number(len(names) - NAMED)
+        )
+    return joined(names, ", ") if names else tr("no target")
+
+
+def _greed(robot: Robot, sequence: model.VisitOrder | None) -> str:
+    if sequence is None:
+        return tr("Fewer than two targets can be reached, so there is no sequence")
+    return tr(
+        "All targets in order: {cost:.3g} {unit} as a whole, greedily {more:.3g} {unit} more",
+        cost=sequence.cost,
+        more=sequence.greedy_cost - sequence.cost,
+        unit=tr(RULES[sequence.rule].unit_of(robot)),
+    )
+
+
+TITLE: dict[str, Any] = {"loc": "left", "fontsize": 11, "fontweight": "bold"}
+
+
+def overlay(robot: Robot, target: model.TargetResult, branches: model.SolutionRows) -> Picture:
+    """All arm shapes that solve a target, from the side and from above, with the joint angles of each branch.
+
+    Parameters
+    ----------
+    branches : the best row of each branch
+    """
+    panels = 3 if len(branches) else 2
+    ratios = [1, 1, 1.25][:panels]
+    width = 11.5 if panels == 3 else 8.5
+    figure, axes = row_of_panels(panels, width, 4.9, (0.75, 1.05, 0.3, 0.35, 0.75), width_ratios=ratios)
+    handles = _draw_arms(axes[0], axes[1], robot, target, branches)
+    if panels == 3:
+        handles += _draw_joints(axes[2], robot, target, branches)
+    figure.legend(handles=handles, loc="lower center", ncols=5 if panels == 3 else 2, frameon=False, fontsize=9)
+    alt = tr(
+        "{count} branches for target {own_name}, drawn over one another", count=len(branches), own_name=target.name
+    )
+    return Picture(figure, alt, _conclude(target))
+
+
+def histogram(trips: model.RoundTrips) -> Picture:
+    """Share of random poses by the number of their solutions within the limits."""
+    counts = np.array(trips.counts_within_limits)
+    share = 100 * counts / trips.poses
+    figure, axes = new_figure(width=7, height=3.2)
+    bars = axes.bar(np.arange(len(counts)), share, color=MODEL, width=0.7)
+    axes.bar_label(bars, labels=[f"{value:.0f} %" if value else "" for value in share], padding=2)
+    axes.set_xticks(np.arange(len(counts)))
+    axes.set_xlabel(tr("solutions within the limits"))
+    axes.set_ylabel(tr("share of random poses (%)"))
+    axes.grid(visible=False, axis="x")
+    axes.margins(y=0.15)
+    several = share[2:].sum()
+    most = int(counts.argmax())
+    return Picture(
+        figure,
+        tr("Bar chart of the number of solutions within the limits"),
+        tr(
+            "{several:.0f} % of random reachable poses leave a choice between at least two solutions; {most} is the "
+            "commonest number ({share:.0f} % of the poses).",
+            several=several,
+            most=most,
+            share=share[most],
+        ),
+    )
+
+
+def solutions_per_position(table: model.MapRows) -> Picture:
+    """Maps of the number of branches within the limits and clear, one for each orientation of the tool."""
+    orientations = list(dict.fromkeys(table.orientation))
+    figure, axes = new_figure(1, len(orientations), width=10.5, height=4.8, squeeze=False)
+    colours = ListedColormap(["#ffffff", *matplotlib.colormaps["viridis_r"](np.linspace(0.08, 0.95, 8))])
+    shares = []
+    for panel, orientation in zip(axes[0], orientations):
+        rows = table.take(table.orientation == orientation)
+        x, z = np.unique(rows.x_mm), np.unique(rows.z_mm)
+        counts, within = (part.reshape(len(x), len(z)).T for part in (rows.clear, rows.within_limits))
+        reached = rows.solutions.reshape(len(x), len(z)).T > 0
+        image = panel.pcolormesh(x, z, counts, cmap=colours, vmin=-0.5, vmax=8.5, rasterized=True)
+        panel.contour(x, z, reached, levels=[0.5], colors=INK, linewidths=1.0)
+        panel.contour(x, z, within > 0, levels=[0.5], colors=INK, linewidths=0.8, linestyles="dashed")
+        panel.plot([0], [0], marker="P", markersize=9, color=HIGHLIGHT, markeredgecolor="white", linestyle="none")
+        panel.set_title(word("orientation.title", ORIENTATION_TITLES, orientation), **TITLE)
+        panel.set_aspect("equal")
+        panel.set_xlabel("x (mm)")
+        panel.set_ylabel("z (mm)")
+        columns, heights = np.flatnonzero(reached.any(axis=0)), np.flatnonzero(reached.any(axis=1))
+        if columns.size:
+            edge = 2 * (x[1] - x[0])
+            panel.set_xlim(x[columns[0]] - edge, x[columns[-1]] + edge)
+            panel.set_ylim(min(z[heights[0]] - edge, -edge), z[heights[-1]] + edge)
+        panel.grid(visible=False)
+        share, clear = (100 * (part > 0).sum() / max(reached.sum(), 1) for part in (within, counts))
+        named = word("orientation", ORIENTATIONS, orientation)
+        shares.append(
+            tr("{orientation}: {share:.0f} %, clear {clear:.0f} %", orientation=named, share=share, clear=clear)
+        )
+    listed = tr("; ").join(shares)
+    bar = figure.colorbar(image, ax=axes[0].tolist(), ticks=range(9), shrink=0.85)
+    bar.set_label(tr("branches within the limits, collision-free"))
+    return Picture(
+        figure,
+        tr("Maps of the number of solutions in the vertical plane through axis 1"),
+        tr(
+            "The line encloses the {count} tool positions that the arm reaches if limits are ignored. Share of "
+            "them with at least one branch within the limits (dashed line), and with one that is also "
+            "collision-free (clear): {shares}. All branches of each position were tried; between positions "
+            "nothing is known. Pink cross: base.",
+            count=number(int((table.solutions > 0).sum())),
+            shares=listed,
+        ),
+    )
+
+
+def _conclude(target: model.TargetResult) -> str:
+    if target.chosen_deg is not None:
+        counts = {"within": target.within_limits, "all": target.solutions, "collide": target.collide}
+        if not target.collide:
+            return tr(
+                "The bold arm is the chosen solution; {within} of {all} branches are within the limits. A flip "
+                "and a no-flip branch look the same here: they differ in J4, J5 and J6.",
+                **counts,
+            )
+        return tr(
+            "The bold arm is the chosen solution; {within} of {all} branches are within the limits, of which "
+            "{collide} collide. A flip and a no-flip branch look the same here: they differ in J4, J5 and J6.",
+            **counts,
+        )
+    if target.collide:
+        return tr("Every solution that reaches the target (dashed) has a joint beyond its limit or collides.")
+    if target.solutions:
+        return tr("Every solution that reaches the target (dashed) has a joint beyond its limit: a cross on the right.")
+    return tr("The arm, drawn at the reference, can't reach the target.")
+
+
+def _draw_arms(
+    side: Axes, top: Axes, robot: Robot, target: model.TargetResult, branches: model.SolutionRows
+) -> list[Line2D]:
+    from_world = np.linalg.inv(robot.base)
+
+    def in_base(points_m: np.ndarray) -> np.ndarray:
+        return (np.asarray(points_m) @ from_world[:3, :3].T + from_world[:3, 3]) * 1000
+
+    goal = in_base(np.array(target.xyz_mm) / 1000)
+    level = goal[:2] / np.hypot(*goal[:2]) if np.hypot(*goal[:2]) > 1 else np.array([1.0, 0.0])
+
+    def draw(points: np.ndarray, **style) -> None:
+        side.plot(points[:, :2] @ level, points[:, 2], solid_joinstyle="round", marker="o", **style)
+        top.plot(points[:, 0], points[:, 1], solid_joinstyle="round", marker="o", **style)
+
+    handles = []
+    shapes = np.array([shape_of(int(branch), label) for branch, label in zip(branches.branch, branches.label)])
+    for shape in np.unique(shapes):
+        rows = branches.take(shapes == shape)
+        allowed, chosen = bool((rows.rank > 0).any()), bool((rows.rank == 1).any())
+        style: dict[str, Any] = {"color": colour_of(int(shape)), "linewidth": 2, "markersize": 4, "zorder": 4}
+        if chosen:
+            style |= {"linewidth": 5, "markersize": 7, "zorder": 6}
+        if not allowed:
+            style = {"color": MUTED, "linewidth": 1.3, "linestyle": "--", "markersize": 3, "zorder": 3}
+        draw(in_base(skeleton(robot, meant(robot, rows.q_deg[0]))), **style)
+        if allowed:
+            label = _shape_word(rows.label[0], int(rows.branch[0]))
+            label = tr("{shape} (chosen)", shape=label) if chosen else label
+            handles.append(Line2D([], [], label=label, **style))
+    if not len(branches):
+        style = {"color": MUTED, "linewidth": 3, "markersize": 5}
+        draw(in_base(skeleton(robot, meant(robot, np.array(target.q_ref_deg)))), **style)
+        handles.append(Line2D([], [], label=tr("arm at the reference"), **style))
+    elif not (branches.rank > 0).all():
+        style = {"color": MUTED, "linewidth": 1.3, "linestyle": "--", "marker": "o", "markersize": 3}
+        words = tr("outside the limits or colliding") if target.collide else tr("outside the limits")
+        handles.append(Line2D([], [], label=words, **style))
+    cross = {"marker": "P", "markersize": 11, "color": HIGHLIGHT, "markeredgecolor": "white", "linestyle": "none"}
+    handles.append(_mark(side, top, goal, level, tr("target"), **cross))
+    near = target.neighbours
+    if near and near.shifted_to_mm:
+        ring = {"marker": "o", "markersize": 9, "color": "none", "markeredgecolor": HIGHLIGHT, "linestyle": "none"}
+        point = in_base(np.array(near.shifted_to_mm) / 1000)
+        handles.append(_mark(side, top, point, level, tr("nearest position with a solution"), **ring))
+    side.set_title(tr("Side, in the target's direction"), **TITLE)
+    top.set_title(tr("From above"), **TITLE)
+    equal_scale(side, tr("distance from axis 1 (mm)"), "z (mm)")
+    equal_scale(top, "x (mm)", "y (mm)")
+    return handles
+
+
+def _mark(side: Axes, top: Axes, point: np.ndarray, level: np.ndarray, label: str, **style) -> Line2D:
+    side.plot([point[:2] @ level], [point[2]], zorder=8, **style)
+    top.plot([point[0]], [point[1]], zorder=8, **style)
+    return Line2D([], [], label=label, **style)
+
+
+def _draw_joints(axes: Axes, robot: Robot, target: model.TargetResult, branches: model.SolutionRows) -> list[Line2D]:
+    lower, upper = shown(robot, robot.lower), shown(robot, robot.upper)
+    angles = branches.q_deg
+    for joint in range(robot.joints):
+        axes.barh(joint, upper[joint] - lower[joint], 0.86, left=lower[joint], color=GRID, zorder=1)
+        reference = target.q_ref_deg[joint]
+        axes.plot([reference, reference], [joint - 0.43, joint + 0.43], color=INK, linewidth=0.9, zorder=2)
+        for place, rank in enumerate(branches.rank):
+            y = joint + 0.8 * ((place + 0.5) / max(len(branches), 1) - 0.5)
+            x = angles[place, joint]
+            outside = not lower[joint] - 1e-6 <= x <= upper[joint] + 1e-6
+            colour = colour_of(shape_of(int(branches.branch[place]), branches.label[place])) if rank else MUTED
+            style: dict[str, Any] = {"marker": "o", "markersize": 4.5, "color": colour}
+            if rank == 1:
+                style |= {"marker": "D", "markersize": 8}
+            elif outside:
+                style = {"marker": "x", "markersize": 5.5, "color": HIGHLIGHT, "markeredgewidth": 1.6}
+            elif not rank:
+                style |= {"markerfacecolor": "none"}
+            axes.plot([x], [y], linestyle="none", zorder=5 if rank == 1 else 4, **style)
+    axes.set_yticks(range(robot.joints), JOINT_NAMES[: robot.joints])
+    axes.invert_yaxis()
+    axes.grid(visible=False, axis="y")
+    axes.set_xticks(np.arange(-360, 361, 90))
+    widest = max(np.abs([lower, upper]).max(), np.abs(angles).max()) + 15
+    axes.set_xlim(-widest, widest)
+    what = tr("joint angle (deg); grey: allowed range, line: reference")
+    if robot.sliding.any():
+        what = tr("joint angle (deg), or mm where a joint slides;\ngrey: allowed range, line: reference")
+    axes.set_xlabel(what)
+    axes.set_title(tr("Joint angles, one mark per branch"), **TITLE)
+    handles = []
+    if not branches.within_limits.all():
+        mark: dict[str, Any] = {"marker": "x", "color": HIGHLIGHT, "markeredgewidth": 1.6, "linestyle": "none"}
+        handles.append(Line2D([], [], label=tr("joint beyond its limit"), **mark))
+    return handles
+
+
+def _shape_word(label: str, branch: int) -> str:
+    """An arm shape: a branch whatever its wrist."""
+    return word("shape", SHAPES, label) if label in SHAPES else branch_word(label, branch)
+
+
+NO_BREAK_SPACE = "\u00a0"
+SAME = 1e-6  # deg or mm
+
+
+MAX_SELF_MOTIONS = 6
+
+
+def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> None:
+    """Write the page from the stage's results."""
+    name, results, summary = stored.robot, stored.results, stored.results.summary
+    robot, trips, chosen = study.robot(name), summary.round_trips, model.shown_targets(summary.targets)
+    rules = list(dict.fromkeys(results.rankings.rule))
+    names = results.solutions.target
+
+    def of_target(target: model.TargetResult) -> model.SolutionRows:
+        return results.solutions.take(names == target.name)
+
+    correction, contradicted = _correction(robot, stored), stored.rests_on.get("validation") == "fail"
+    render_stage(
+        study,
+        stored,
+        output,
+        nearest_rule=tr(NEAREST_RULE),
+        overview=[overview_row(robot, target, of_target(target)) for target in chosen],
+        sections=[_section(robot, target, results, rules, correction, contradicted) for target in chosen],
+        outcomes=_outcomes(summary.targets),
+        not_advised=_not_advised(summary.targets),
+        units=_units(robot),
+        slides=bool(robot.slides.any()),
+        chosen_heading=tr("Chosen branch, and its J1 to J{count} ({units})", count=robot.joints, units=_units(robot)),
+        optimised_heading=tr("J1 to J{count}, optimised ({units})", count=robot.joints, units=_units(robot)),
+        rule_columns=[tr("Branch"), *(_rule_heading(robot, rule) for rule in rules), tr("Clearance between")],
+        trips=trips,
+        histogram=histogram(trips) if trips else None,
+        map=solutions_per_position(results.map) if len(results.map) else None,
+        symptoms=symptoms(robot, summary),
+        rules=[(_rule(rule), word("rule.title", RULE_TITLES, rule)) for rule in RULES],
+        mix=tr(", ").join(f"{_rule(rule)} {weight:g}" for rule, weight in summary.mix.items()),
+        stops=_stops(summary.sequence, {target.name for target in chosen}),
+        move=_move_rule(robot, summary.sequence),
+    )
+
+
+@dataclass(frozen=True)
+class Correction:
+    """A single fault that validation's diagnosis names, in words, and the robot without it."""
+
+    fault: str
+    robot: Robot
+
+
+def _correction(robot: Robot, stored: Stored[model.InverseResults]) -> Correction | None:
+    """What validation's diagnosis says of the table; None if it was not computed, names no single fault, or documents
+    describe another arm."""
+    if stored.validated is None:
+        return None
+    stage = STAGES["validation"]
+    import_module(stage.messages)
+    summary = read_stage(stored.validated, stage).results.summary
+    beyond = getattr(summary, "is_beyond_correction", False)
+    for found in () if beyond else getattr(summary, "diagnoses", ()):
+        if found.corrected and len(faults := found.hypotheses[0].faults) == 1:
+            return Correction(say(faults[0]), robot.replace(**vars(found.corrected)))
+    return None
+
+
+def _after_correction(target: model.TargetResult, correction: Correction | None) -> list[str]:
+    """What a correction of the table would do for a target none of whose solutions keeps the limits."""
+    if correction is None or not target.solutions or target.within_limits:
+        return []
+    T = transform(np.array(target.xyz_mm) / 1000, np.radians(target.rpy_deg))
+    found = inverse(correction.robot, T)
+    kept, branches = np.unique(found.branch[found.within_limits]), np.unique(found.branch)
+    if not len(kept):
+        return []
+    text = N_(
+        "Validation's diagnosis of the table: {fault}. So corrected, {count} of {total} branches are within the "
+        "limits: check the table before you move or turn the target."
+    )
+    return [tr(text, fault=correction.fault, count=len(kept), total=len(branches))]
+
+
+def _section(
+    robot: Robot,
+    target: model.TargetResult,
+    results: model.InverseResults,
+    rules: list[str],
+    correction: Correction | None,
+    contradicted: bool,
+) -> dict[str, Any]:
+    rows = results.solutions.take(results.solutions.target == target.name)
+    branches = best_of_branches(rows)
+    own = [tr("Evidence contradicts this table: move nothing because of what it says here.")] if target.advice else []
+    return dict(
+        target=target,
+        picture=overlay(robot, target, branches),
+        position=_listed(target.xyz_mm),
+        orientation=_listed(target.rpy_deg),
+        reference=_joints(target.q_ref_deg),
+        reason=say(target.reason),
+        advice=[*_after_correction(target, correction), *(own if contradicted else listed(target.advice))],
+        joints=[f"J{k + 1} ({'mm' if slides else '°'})>" for k, slides in enumerate(robot.slides)],
+        method="" if isinstance(target.method, ClosedForm) else say(target.method),
+        families=_self_motions(robot, target.families),
+        unsolved=joined(listed(target.unsolved)),
+        rows=_branch_rows(rows, branches),
+        rules=rule_rows(results.rankings.take(results.rankings.target == target.name), rules),
+        residual_mm=rows.position_residual_mm.max() if len(rows) else None,
+        residual_deg=rows.orientation_residual_deg.max() if len(rows) else None,
+    )
+
+
+def best_of_branches(rows: model.SolutionRows) -> model.SolutionRows:
+    """The best row of each branch of a target, by number of the branch."""
+    best = rows.take(rows.first_of_branch)
+    return best.take(np.argsort(best.branch, kind="stable"))
+
+
+def _rule(rule: str) -> str:
+    return word("rule", RULE_NAMES, rule)
+
+
+def _rule_heading(robot: Robot, rule: str) -> str:
+    unit = next((own.unit_of(robot) for name, own in RULES.items() if name == rule), "1")
+    return bracketed(_rule(rule), "" if unit == "1" else tr(unit)) + ">"
+
+
+def _measure(rule: str, value: float) -> str:
+    """What a rule ranks by, in the decimals that matter in its unit."""
+    unit = next((own.unit for name, own in RULES.items() if name == rule), "1")
+    decimals = 3 if rule == "manipulability" else 2 if unit in ("1", "s") else 1
+    return "∞" if np.isinf(value) else fixed(no_noise(value), decimals)
+
+
+def rule_rows(ranked: model.RankingRows, rules: list[str]) -> list[list[str]]:
+    """One row for each branch: the measure of each rule, with its place, and the pair that has the clearance; a dash
+    for a rule that this target lacks."""
+    rows, collides = [], tr("collides")
+    for branch in np.unique(ranked.branch):
+        own = ranked.take(ranked.branch == branch)
+        cells = {
+            rule: f"{_measure(rule, measure)}{NO_BREAK_SPACE}({place or collides})"
+            for rule, measure, place in zip(own.rule, own.measure, own.place)
+        }
+        pair = next((label for label in own.between if label), "")
+        cells_shown = (cells.get(rule, "–") for rule in rules)
+        rows.append([_on_one_line(own.label[0], int(branch)), *cells_shown, pair_words(pair) if pair else "–"])
+    return rows
+
+
+def _self_motions(robot: Robot, families: tuple[model.SelfMotion, ...]) -> list[str]:
+    """The nearest self-motions, and how many more there are."""
+    texts = [_self_motion(robot, family) for family in families[:MAX_SELF_MOTIONS]]
+    if len(families) > MAX_SELF_MOTIONS:
+        texts.append(tr("{count} more in summary.json", count=len(families) - MAX_SELF_MOTIONS))
+    return texts
+
+
+def _self_motion(robot: Robot, family: model.SelfMotion) -> str:
+    text = _curve(robot, family)
+    if family.dimension > 1:
+        return tr(
+            "{text}; this is one curve of a surface of solutions, on which the arm can move in {count} ways at once "
+            "and stay on the target",
+            text=text,
+            count=family.dimension,
+        )
+    return text
+
+
+def _curve(robot: Robot, family: model.SelfMotion) -> str:
+    of_slide = f"{NO_BREAK_SPACE}mm/°"
+    moving = [
+        f"J{j + 1} {'+' if rate > 0 else ''}{fixed(rate, 2)}{of_slide if robot.slides[j] else ''}"
+        for j, rate in enumerate(family.direction)
+        if abs(rate) > 1e-9
+    ]
+    low, high = family.range_deg
+    parts = {
+        "where": word("self_motion", FREE_AT, family.kind),
+        "joints": with_unit(f"({_listed(family.q0_deg)})", _units(robot), NO_BREAK_SPACE),
+        "rates": joined(moving, ", "),
+    }
+    if not family.within_limits:
+        return tr(
+            "{where}: from {joints}, nearest to the reference, joints move on the target in the ratio {rates}, but "
+            "every member leaves the limits",
+            **parts,
+        )
+    return tr(
+        "{where}: from {joints}, nearest to the reference, joints move on the target in the ratio {rates}, for {low} "
+        "to {high} deg",
+        low=fixed(low, 1),
+        high=fixed(high, 1),
+        **parts,
+    )
+
+
+def _move_rule(robot: Robot, sequence: model.VisitOrder | None) -> tuple[str, str]:
+    """Unit and title of the rule that moves in the sequence are ranked by."""
+    if sequence is None:
+        return "", ""
+    return tr(RULES[sequence.rule].unit_of(robot)), word("rule.title", RULE_TITLES, sequence.rule)
+
+
+def _outcomes(targets: Iterable[model.TargetResult]) -> str:
+    """How many targets came to what."""
+    counts = Counter(target.outcome for target in targets)
+    return tr(", ").join(f"{outcome_word(outcome)} {number(count)}" for outcome, count in counts.most_common())
+
+
+def _not_advised(targets: Iterable[model.TargetResult]) -> int:
+    """How many targets without solution were not looked at for what would help, where others were."""
+    without = [target.neighbours for target in targets if target.obstacle]
+    return without.count(None) if any(without) else 0
+
+
+def _stops(sequence: model.VisitOrder | None, named: set[str]) -> list[list[str]]:
+    return [
+        [
+            stop.target,
+            _short(stop.label, stop.branch),
+            _short(stop.greedy_label, stop.greedy_branch),
+            _joints(stop.q_deg),
+        ]
+        for stop in (sequence.stops if sequence else ())
+        if stop.target in named
+    ]
+
+
+def overview_row(robot: Robot, target: model.TargetResult, rows: model.SolutionRows) -> list[str]:
+    """The cells of a target with its ``rows``: name, place, branches, what is chosen, its clearance, and why."""
+    unreached = target.obstacle if not target.solutions else None
+    near = target.clearance
+    return [
+        Markup('<a href="#{0}">{0}</a>').format(target.name),
+        _listed(target.xyz_mm),
+        tr("{within} of {all}", within=target.within_limits, all=target.solutions),
+        tr("none") if target.chosen_deg is None else _chosen(robot, target, rows),
+        tr("{far} mm: {pair}", far=fixed(near.least_mm, 1), pair=say(near.between)) if near else "–",
+        say(unreached or target.reason),
+    ]
+
+
+def _chosen(robot: Robot, target: model.TargetResult, rows: model.SolutionRows) -> str:
+    """The solution taken of a target's rows: its branch and joints; at a singularity that it is, and the best solution
+    that is at none."""
+    chosen = rows.take(rows.rank == 1)
+    name = branch_word(chosen.label[0], int(chosen.branch[0]))
+    cell = Markup("{0}<br>{1}").format(name, Markup(_joints(target.chosen_deg or ())))
+    if not (kinds := _singular(chosen, 0)):
+        return cell
+    other = rows.take((rows.rank > 0) & rows.first_of_branch & ~rows.singular.any(axis=1))
+    said = tr("▲ {kinds} singularity: joint moves only", kinds=kinds)
+    if len(other):
+        k = int(np.argmin(other.rank))
+        moved = np.abs(other.q_deg[k] - np.array(target.q_ref_deg))
+        room = np.minimum(other.q_deg[k] - shown(robot, robot.lower), shown(robot, robot.upper) - other.q_deg[k])
+        said = tr(
+            "{singular}; not singular: {branch} ({move} move, {margin} from a limit)",
+            singular=said,
+            branch=branch_word(other.label[k], int(other.branch[k])),
+            move=of_a_joint(robot, moved, float(other.greatest_move_deg[k]), 0),
+            margin=of_a_joint(robot, room, float(other.limit_margin_deg[k]), 1),
+        )
+    return cell + Markup("<br><strong>{0}</strong>").format(said)
+
+
+def of_a_joint(robot: Robot, of_joints: np.ndarray, value: float, digits: int) -> str:
+    """The value of one joint, in its unit, among those ``of_joints`` (n,), deg or mm; deg, if it is that of a sum."""
+    apart = np.abs(of_joints - value)
+    slides = apart.min() < SAME and robot.slides[int(apart.argmin())]
+    return with_unit(fixed(value, digits), "mm" if slides else "deg")
+
+
+def _singular(rows: model.SolutionRows, k: int) -> str:
+    """At which singularities a solution is; empty for none."""
+    kinds = [kind for kind, on in zip(model.SINGULAR_PARTS, rows.singular[k]) if on]
+    return tr(", ").join(map(singularity_word, kinds))
+
+
+def _branch_rows(rows: model.SolutionRows, branches: model.SolutionRows) -> list[list[str]]:
+    inside = rows.branch[rows.within_limits]
+    ranks = branches.rank[branches.rank > 0]
+    cells = []
+    for k in range(len(branches)):
+        place, turns = int((ranks <= branches.rank[k]).sum()), int((inside == branches.branch[k]).sum())
+        cells.append(
+            [
+                panel_link(branches.q_deg[k], _on_one_line(branches.label[k], int(branches.branch[k]))),
+                *(fixed(angle, 1) for angle in branches.q_deg[k]),
+                fixed(branches.limit_margin_deg[k], 1),
+                fixed(branches.manipulability[k], 3),
+                fixed(branches.greatest_move_deg[k], 1),
+                _outcome(branches, k, place, turns),
+            ]
+        )
+    return cells
+
+
+def _outcome(branches: model.SolutionRows, k: int, place: int, turns: int) -> str:
+    refusal = branches.refusal[k]
+    if refusal is not None:
+        return limits_in_short(refusal) if isinstance(refusal, LimitsExceeded) else say(refusal)
+    taken = tr("chosen") if branches.rank[k] == 1 else tr("place {place}", place=place)
+    if turns > 1:
+        taken = tr("{taken}, {turns} turns", taken=taken, turns=turns)
+    if (freed := float(branches.freed_turn_deg[k])) > SAME:
+        taken = tr("{taken}; tool turned by {angle}", taken=taken, angle=with_unit(fixed(freed, 1), "deg"))
+    kinds = [kind for kind, on in zip(model.SINGULAR_PARTS, branches.singular[k]) if on]
+    if not kinds:
+        return taken
+    if kinds == ["rank"]:
+        return tr("{taken}; rank singularity", taken=taken)
+    return tr("{taken}; {kinds} singularity", taken=taken, kinds=tr(", ").join(map(singularity_word, kinds)))
+
+
+def _short(label: str, branch: int) -> str:
+    """A branch in words that need little room."""
+    return branch_word(label, branch).replace("elbow ", "")
+
+
+def _on_one_line(label: str, branch: int) -> str:
+    return _short(label, branch).replace(" ", NO_BREAK_SPACE)
+
+
+def _units(robot: Robot) -> str:
+    """The unit of joint values, or of most of them and of those that slide."""
+    sliding = [f"J{j + 1}" for j in np.flatnonzero(robot.slides)]
+    return tr("deg, {joints} in mm", joints=", ".join(sliding)) if sliding else tr("deg")
+
+
+def _joints(q_deg: Iterable[float]) -> str:
+    """Joint angles that lead to the arm in the teach panel."""
+    return panel_link(q_deg, _listed(q_deg))
+
+
+def _listed(values: Iterable[float]) -> str:
+    """Numbers, with one decimal where one of them needs it, kept on one line."""
+    texts = [fixed(value, 1) for value in values]
+    whole = all(text.endswith(".0") for text in texts)
+    return f",{NO_BREAK_SPACE}".join(text.removesuffix(".0") if whole else text for text in texts)

@@ -1,0 +1,1 @@
+"""Page and recording of the stage programs: results in, views out."""

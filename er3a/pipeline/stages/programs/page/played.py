@@ -1,0 +1,240 @@
+"""The programs for player and recording, line by line."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from operator import itemgetter
+from pathlib import Path
+
+import numpy as np
+
+from er3a.pipeline.language import own_title, tr
+from er3a.pipeline.messages.expectations import as_expected, outcome_word
+from er3a.pipeline.messages.numbers import fixed
+from er3a.pipeline.messages.planning import times_needed
+from er3a.pipeline.messages.programs import Pace, rates_text, remedies, say, singular_cause
+from er3a.pipeline.messages.say import joined, say_first
+from er3a.pipeline.player.motions import Fault, FaultMoment, PlayedEvent, PlayedMotion, Weight, address_of
+from er3a.pipeline.stages.expectations import is_met
+from er3a.pipeline.stages.programs.model import FindingAt, ProgramMotion, ProgramsResults, ProgramSummary
+from er3a.planning.motion_faults import AboveLimit, BelowLimit
+from er3a.program_check.program_check_findings import (
+    RANKS,
+    Level,
+    MeetsSingularity,
+    MotionCollides,
+    PassesSingularity,
+)
+from er3a.robots.joint_limits import meant
+from er3a.robots.robot import Robot
+
+SINGULAR = MeetsSingularity | PassesSingularity
+MOMENT = 1e-6  # s
+WEIGHTS: dict[Level, Weight] = {"pass": "plain", "note": "plain", "caution": "caution", "fail": "fail"}
+
+
+def motions(robot: Robot, results: ProgramsResults) -> list[PlayedMotion]:
+    """The programs as far as they were followed, the worst first, as the player shows them.
+
+    The motion of each line is an event with its text, its verdict and what touches; each finding is one from its
+    moment to the end of that motion, joints that are too fast together. ``q`` is (N, n), rad or m.
+    """
+    motions = []
+    for program in worst_first(results.summary.programs):
+        rows = results.motion.take(results.motion.program == program.name)
+        text = results.lines.take(results.lines.program == program.name)
+        words = dict(zip(text.line.tolist(), text.text.tolist()))
+        events = []
+        for line, level, t0, t1 in stretches(rows):
+            shown = tr("line {line}: {text}", line=line, text=words.get(line, "").strip().rstrip(";"))
+            events.append(PlayedEvent(t0, t1, shown, WEIGHTS[level], touching(program, line)))
+        for each in sorted(program.findings, key=cause_first):
+            if each.program_s is not None:
+                events += _found_event(program, each, rows)
+        q = meant(robot, rows.q_deg)
+        motions.append(PlayedMotion(program.name, "", rows.t_s, q, events, label=own_title(program.title)))
+    return motions
+
+
+def _found_event(program: ProgramSummary, found: FindingAt, rows: ProgramMotion) -> list[PlayedEvent]:
+    """A finding as long as its line lasts, a singular pose at its moment; none of a rate after its line's first."""
+    start = found.program_s or 0.0
+    finding, weight = found.finding, WEIGHTS[found.level]
+    if isinstance(finding, SINGULAR):
+        return [PlayedEvent(start, start, singular_cause(finding), weight)]
+    end = min((t1 for _, _, t0, t1 in stretches(rows) if t0 - MOMENT <= start <= t1 + MOMENT), default=start)
+    if not isinstance(finding, Pace):
+        joint = getattr(finding, "joint", None)
+        joints = ((joint, ""),) if joint and isinstance(finding, AboveLimit | BelowLimit) else ()
+        return [PlayedEvent(start, max(start, end), say(finding), weight, joints=joints)]
+    paces = _paces(program, found)
+    if (start, finding) != min(paces, key=itemgetter(0)):
+        return []
+    needed: dict[int, str] = {}
+    for _, pace in paces:
+        needed.setdefault(pace.joint, times_needed(pace.ratio, acceleration=False))
+    text = rates_text([pace for _, pace in paces])
+    return [PlayedEvent(start, max(start, end), text, weight, joints=tuple(needed.items()))]
+
+
+def _paces(program: ProgramSummary, found: FindingAt) -> list[tuple[float, Pace]]:
+    """From when on (s) joints are too fast at the line of a finding; the first of each joint is its gravest."""
+    return [
+        (each.program_s, each.finding)
+        for each in _same_line(program, found)
+        if isinstance(each.finding, Pace) and each.program_s is not None
+    ]
+
+
+def _same_line(program: ProgramSummary, found: FindingAt) -> list[FindingAt]:
+    return [each for each in program.findings if (each.file, each.line) == (found.file, found.line)]
+
+
+def cause_first(found: FindingAt) -> tuple[bool, int, bool, float]:
+    """The order of a line's findings: a singular pose, then what weighs most, of that joints that are too
+    fast last."""
+    return not isinstance(found.finding, SINGULAR), -RANKS[found.level], isinstance(found.finding, Pace), when(found)
+
+
+def worst_first(programs: Sequence[ProgramSummary]) -> list[ProgramSummary]:
+    """Those that fail first, of them those that were not expected to."""
+    return sorted(programs, key=lambda each: (-RANKS[each.outcome], is_met(each)))
+
+
+def faults(results: ProgramsResults) -> list[Fault]:
+    """The programs that may not be run as they are, the worst first: of each the first finding of the gravest level,
+    and what comes before it."""
+    found = []
+    for program in worst_first(results.summary.programs):
+        wrong = sorted((each for each in program.findings if WEIGHTS[each.level] != "plain"), key=moment_of)
+        if not wrong or program.outcome == "pass":
+            continue
+        first, worst = wrong[0], min(wrong, key=lambda each: -RANKS[each.level])
+        rows = results.motion.take(results.motion.program == program.name)
+        cause = _cause(program, first) or _cause(program, worst)
+        shown = [worst] if worst.level == first.level else [worst, first]
+        moments = tuple(_moment(program, each, rows) for each in shown)
+        found.append(
+            Fault(
+                program.name,
+                own_title(program.title),
+                WEIGHTS[program.outcome],
+                outcome_word(program.outcome),
+                is_met(program),
+                as_expected(program),
+                moments,
+                " ".join(dict.fromkeys(text for each in shown for text in remedies_of(program, each)[:1])),
+                address_of("programs", program.name, moments[0].seen_s or 0.0, program.name),
+                cause=cause or "",
+            )
+        )
+    return found
+
+
+def _cause(program: ProgramSummary, found: FindingAt) -> str | None:
+    """The singular pose that a line with joints that are too fast comes to; None where it comes to none."""
+    here = _same_line(program, found)
+    if not any(isinstance(each.finding, Pace) for each in here):
+        return None
+    said = [
+        tr("{where}: {text}", where=_where(program, each), text=singular_cause(each.finding))
+        for each in here
+        if isinstance(each.finding, SINGULAR)
+    ]
+    return next(iter(said), None)
+
+
+def _moment(program: ProgramSummary, found: FindingAt, rows: ProgramMotion) -> FaultMoment:
+    """A finding with its line, its time and its place; joints of a line that are too fast together, seen when the
+    joint is fastest."""
+    text, seen, where = say_first(found.finding), found.program_s, _where(program, found)
+    row = line_id(program.name, found.line) if found.line and found in of_line(program, found.line) else ""
+    if isinstance(found.finding, Pace) and seen is not None:
+        text = rates_text([pace for _, pace in _paces(program, found)])
+        fastest = _fastest(found.finding.joint, rows.take((rows.line == found.line) & (rows.t_s >= seen - MOMENT)))
+        if fastest is not None and fixed(fastest, 2) != fixed(seen, 2):
+            where, seen = tr("{when}, fastest at {time} s", when=where, time=fixed(fastest, 2)), fastest
+    address = "" if seen is None else address_of("programs", program.name, seen, program.name)
+    return FaultMoment(text, where, _place(found, rows), seen, row, address)
+
+
+def _fastest(joint: int, rows: ProgramMotion) -> float | None:
+    """When (s) a joint changes most between the stored poses of a line; None where there are too few."""
+    if len(rows) < 3:
+        return None
+    speed = np.abs(np.diff(rows.q_deg[:, joint - 1]) / np.maximum(np.diff(rows.t_s), MOMENT))
+    return float(rows.t_s[int(speed.argmax())])
+
+
+def _place(found: FindingAt, rows: ProgramMotion) -> str:
+    """How far into the motion of its line a finding is, and where the tool point is then; empty where not known."""
+    if found.program_s is None or found.motion_s is None or not len(rows):
+        return ""
+    t0, t1 = found.program_s - found.motion_s, found.program_s
+    moments = np.hstack([t0, rows.t_s[(t0 < rows.t_s) & (rows.t_s < t1)], t1])
+    track = np.stack([np.interp(moments, rows.t_s, values) for values in rows.xyz_mm.T], axis=1)
+    far = np.linalg.norm(np.diff(track, axis=0), axis=1).sum()
+    return tr("{far} mm into it, ({xyz})", far=fixed(far, 0), xyz=", ".join(fixed(value, 0) for value in track[-1]))
+
+
+def _where(program: ProgramSummary, found: FindingAt) -> str:
+    """The line of a finding, with its file if it is not the program's own, the time into it, and the player's."""
+    if not found.line:
+        return ""
+    line = tr("line {line}", line=found.line)
+    if found not in of_line(program, found.line):
+        return joined([found.file, line], ", ")
+    if found.program_s is None or found.motion_s is None:
+        return line
+    if found.round is not None:
+        line = tr("{line}, round {round}", line=line, round=found.round)
+    own, clock = fixed(found.motion_s, 2), fixed(found.program_s, 2)
+    return tr("{line}, {own} s into it (player: {clock} s)", line=line, own=own, clock=clock)
+
+
+def line_id(program: str, line: int) -> str:
+    """Where a line of a program stands on the page; where the program does for no line. No name holds a full stop."""
+    return f"{program}.{line}" if line else program
+
+
+def when(each: FindingAt) -> float:
+    """When a finding begins, s; after all others where that is not known."""
+    return next((time for time in (each.program_s, each.motion_s) if time is not None), np.inf)
+
+
+def weight(each: FindingAt) -> tuple[int, float]:
+    """By which findings are sorted: the worst first, of these the earliest."""
+    return -RANKS[each.level], when(each)
+
+
+def moment_of(each: FindingAt) -> tuple[float, int]:
+    """By which findings stand in the order of what is carried out: the player's time, then their line."""
+    return np.inf if each.program_s is None else each.program_s, each.line
+
+
+def remedies_of(program: ProgramSummary, found: FindingAt) -> list[str]:
+    """What to do about a finding and others at its line."""
+    here = [each for each in program.findings if (each.file, each.line) == (found.file, found.line)]
+    return remedies(here)
+
+
+def of_line(program: ProgramSummary, line: int) -> list[FindingAt]:
+    """What was found in a line of the program's own file."""
+    return [each for each in program.findings if (each.file, each.line) == (Path(program.file).name, line)]
+
+
+def touching(program: ProgramSummary, line: int) -> tuple[str, ...]:
+    """Names of the bodies that overlap on the motion of a line."""
+    collisions = [each.finding for each in of_line(program, line) if isinstance(each.finding, MotionCollides)]
+    return tuple(dict.fromkeys(name for each in collisions for touch in each.touches for name in touch.pair.names))
+
+
+def stretches(rows: ProgramMotion) -> list[tuple[int, Level, float, float]]:
+    """Line, verdict and times (s) of what is carried out in one go."""
+    if not len(rows):
+        return []
+    starts = np.flatnonzero(np.diff(rows.line, prepend=-1))
+    ends = np.append(starts[1:], len(rows)) - 1
+    return list(
+        zip(rows.line[starts].tolist(), rows.level[ends].tolist(), rows.t_s[starts].tolist(), rows.t_s[ends].tolist())
+    )

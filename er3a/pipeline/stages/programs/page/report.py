@@ -1,0 +1,171 @@
+"""The page of programs, rendered from the stage's results: each listing with its verdicts beside the arm."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup, escape
+
+from er3a.pipeline.language import tr
+from er3a.pipeline.messages.collision import solid_rows
+from er3a.pipeline.messages.expectations import as_expected
+from er3a.pipeline.messages.numbers import fixed
+from er3a.pipeline.messages.programs import cycle_text, level_word, remedies, remedy, singular_cause
+from er3a.pipeline.messages.say import bracketed, say
+from er3a.pipeline.messages.trajectory import limits_assumed
+from er3a.pipeline.player.player import drawing_head, moment, player, stretch
+from er3a.pipeline.results import Stored
+from er3a.pipeline.stages.programs import model
+from er3a.pipeline.stages.programs.page.played import (
+    SINGULAR,
+    cause_first,
+    faults,
+    line_id,
+    motions,
+    stretches,
+    weight,
+    when,
+    worst_first,
+)
+from er3a.pipeline.stages.workspace.page.tray import compared_with_tray, in_tray
+from er3a.pipeline.study import Study
+from er3a.pipeline.viewing.conditions import condition_of
+from er3a.pipeline.viewing.page import render_stage
+from er3a.program_check.program_check_findings import Level, worst_of
+from er3a.programs.languages import LANGUAGES
+
+MAX_LINES = 400  # of a listing that the page shows
+AROUND = 3  # lines around those with motions or findings, in a longer listing
+
+
+def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) -> None:
+    """Write the page of a robot's programs."""
+    robot, results = study.robot(stored.robot), stored.results
+    summary, scene = results.summary, study.scene(stored.robot, "trajectory")  # the scene of paths counts here too
+    sections = [_section(results, program) for program in worst_first(summary.programs)]
+    render_stage(
+        study,
+        stored,
+        output,
+        head_links={each.name: f"#{each.name}" for each in summary.programs},
+        sections=sections,
+        entered=None if stored.rests_on.get("validation") == "fail" else in_tray(study, stored),
+        compared_with_tray=compared_with_tray,
+        limits_assumed=limits_assumed(
+            summary.assumed_speed, any(each.subject == "own_accelerations" for each in summary.not_examined)
+        ),
+        faults={fault.name: fault for fault in faults(results)},
+        player=player(robot, motions(robot, results), scene),
+        bodies=[each.name for each in scene.solids] if scene else [],
+        solids=solid_rows(scene),
+        drawing_head=drawing_head(),
+        condition="" if stored.rests_on.get("validation") == "fail" else condition_of(stored.validated),
+    )
+
+
+def _section(results: model.ProgramsResults, program: model.ProgramSummary) -> dict[str, Any]:
+    own = Path(program.file).name
+    found: dict[int, list[model.FindingAt]] = defaultdict(list)
+    elsewhere = []
+    for each in sorted(program.findings, key=when):
+        if each.file == own and each.line:
+            found[each.line].append(each)
+        else:
+            line = str(each.line) if each.line else "–"
+            to_do = remedy(each.finding) or "–"
+            elsewhere.append([each.file, line, level_word(each.level), _remark(program.name, each), to_do])
+    text = results.lines.take(results.lines.program == program.name)
+    rows = results.instructions.take(results.instructions.program == program.name)
+    motion = results.motion.take(results.motion.program == program.name)
+    return dict(
+        program=program,
+        status=program.outcome,
+        expected=as_expected(program),
+        language=LANGUAGES[program.language].title,
+        cycle=cycle_text(program),
+        lines=_listing(program, text, rows, motion, found),
+        elsewhere=elsewhere,
+    )
+
+
+def _remark(name: str, each: model.FindingAt) -> Markup:
+    """What was found, after the moment at which it begins: a link to it where the player shows it."""
+    often = tr("{times} times that the line is carried out", times=each.times) if each.times > 1 else ""
+    said = singular_cause(each.finding) if isinstance(each.finding, SINGULAR) else say(each.finding)
+    text = escape(bracketed(said, often))
+    if each.motion_s is None:
+        return text
+    at = tr("from {time} s into this line on", time=fixed(each.motion_s, 2))
+    if each.round is not None:
+        at = tr("round {round}, {at}", round=each.round, at=at)
+    if each.program_s is not None:
+        at = bracketed(at, tr("player: {time} s", time=fixed(each.program_s, 2)))
+    shown = escape(at) if each.program_s is None else moment(name, each.program_s, at)
+    return Markup("<b>{}</b>{}{}").format(shown, tr(": "), text)
+
+
+def _listing(
+    program: model.ProgramSummary,
+    text: model.Lines,
+    rows: model.Instructions,
+    motion: model.ProgramMotion,
+    found: dict[int, list[model.FindingAt]],
+) -> list[dict[str, Any]]:
+    name = program.name
+    moves: dict[int, list[int]] = defaultdict(list)
+    played = {line: (t0, t1) for line, _, t0, t1 in reversed(stretches(motion))}  # the first time counts
+    for i, line in enumerate(rows.line.tolist()):
+        moves[line].append(i)
+    if len(text) and not text.text[-1]:  # the end of the last line
+        text = text.take(np.arange(len(text) - 1))
+    kept = set(range(1, len(text) + 1))
+    if len(text) > MAX_LINES:
+        heaviest = {line: min(map(weight, here)) for line, here in found.items()}
+        urgent = sorted({*moves, *found}, key=lambda line: heaviest.get(line, (1, line)))
+        marked = urgent[: MAX_LINES // (2 * AROUND + 1)]
+        kept = {line + k for line in marked for k in range(-AROUND, AROUND + 1)} & kept
+    lines: list[dict[str, Any]] = []
+    skipped = False
+    for number, words in zip(text.line.tolist(), text.text.tolist()):
+        if number not in kept:
+            skipped = True
+            continue
+        here = found.get(number, [])
+        levels: list[Level] = [*(each.level for each in here), *rows.level[moves[number]].tolist()]
+        level = worst_of(levels) if levels else None
+        leads = Markup(), Markup()
+        if number in played:
+            t0, t1 = played[number]
+            leads = stretch(name, t0, t1), moment(name, t1, str(number))
+        lines.append(
+            dict(
+                number=number,
+                id=line_id(name, number),
+                text=words,
+                level=level,
+                word="" if level is None else level_word(level),
+                remarks=[_remark(name, each) for each in sorted(here, key=cause_first)],
+                remedies=remedies(here),
+                facts=_facts(rows, moves[number]),
+                stretch=leads[0],
+                moment=leads[1],
+                skipped=skipped,
+            )
+        )
+        skipped = False
+    return lines
+
+
+def _facts(rows: model.Instructions, here: list[int]) -> str:
+    """Duration and clearance of the motions of a line."""
+    times = rows.duration_s[here] if here else np.empty(0)
+    clear = rows.clearance_mm[here] if here else np.empty(0)
+    parts = []
+    if np.isfinite(times).any():
+        parts.append(tr("{time} s", time=fixed(float(np.nanmax(times)), 2)))
+    if np.isfinite(clear).any():
+        parts.append(tr("{far} mm clear", far=fixed(float(np.nanmin(clear)), 0)))
+    return " · ".join(parts)

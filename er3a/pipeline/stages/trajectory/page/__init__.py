@@ -1,0 +1,1 @@
+"""Page and recording of the stage trajectory: results in, views out."""

@@ -1,0 +1,442 @@
+"""The figure of a path: curves and measures over one time, the joints' effort before and after, and the path in space.
+
+Layout is fixed, so that matplotlib draws each figure once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any, Literal
+
+import numpy as np
+from markupsafe import Markup
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator
+
+from er3a.collision.scene import Scene
+from er3a.kinematics.forward import skeleton
+from er3a.kinematics.singularity import SingularityType
+from er3a.numerics.arrays import Reals
+from er3a.pipeline.language import tr
+from er3a.pipeline.messages.kinematics import singularity_word
+from er3a.pipeline.messages.numbers import fixed
+from er3a.pipeline.messages.say import joined, say
+from er3a.pipeline.messages.trajectory import event_word
+from er3a.pipeline.player.turning import ColourScale, Layer, scene_layers, turning_figure
+from er3a.pipeline.stages.trajectory import model
+from er3a.pipeline.viewing import palette
+from er3a.pipeline.viewing.figures import axis_label, clearance_panels, svg_data_uri
+from er3a.pipeline.viewing.page import Picture
+from er3a.robots.joint_limits import meant, shown
+from er3a.robots.robot import Robot
+
+CONDITION_SCALE = LogNorm(3, 300)
+PATH_COLOURS = "viridis_r"
+AZIMUTH, ELEVATION = np.radians(-55.0), np.radians(24.0)
+MAX_SINGULAR_ARMS = 3  # at singular poses
+
+
+def draw_path(
+    ax: Axes, robot: Robot, path: model.PathSummary, rows: model.PathChecks, repaired: model.AvoidanceRows
+) -> None:
+    """Draw the path, the repaired path, and the arm at the start, the end and the singular poses."""
+    ax.set_axis_off()
+    ax.set_aspect("equal")
+    points = rows.xyz_mm
+    reached = np.flatnonzero(rows.reachable)
+    nearest = [int(np.argmin(np.abs(rows.t_s - event.t_s))) for event in path.singularities]
+    at_events = [i for i in nearest if i in reached][:MAX_SINGULAR_ARMS]
+    arms = [(i, palette.LINK, "-") for i in reached[:1]] + [(i, palette.LINK, "--") for i in reached[-1:]]
+    for i, colour, style in arms + [(i, palette.HIGHLIGHT, "-") for i in at_events]:
+        links = project(skeleton(robot, meant(robot, rows.q_deg[i])) * 1000)
+        width, alpha = (1.6, 0.5) if colour == palette.HIGHLIGHT else (3.5, 1.0)
+        ax.plot(*links.T, color=colour, linewidth=width, alpha=alpha, linestyle=style, solid_capstyle="round", zorder=2)
+    _floor(ax, points)
+    if len(repaired):
+        ax.plot(*project(repaired.xyz_mm).T, color=palette.MODEL, linewidth=1.2, linestyle="--", zorder=5)
+    _coloured(ax, project(points), rows.condition_number)
+    flat = project(points)
+    for part in path.collisions:
+        during = (rows.t_s >= part.t0_s) & (rows.t_s <= part.t1_s)
+        ax.plot(*flat[during].T, color=palette.VERDICTS["fail"], linewidth=3.5, zorder=5)
+    ax.plot(*flat[0], "o", color=palette.INK, markersize=5, zorder=6)
+    ax.plot(*flat[-1], "s", color=palette.INK, markersize=5, zorder=6)
+    for i, event in zip(nearest, path.singularities):
+        marker = "X" if event.crossing else "D"
+        ax.plot(*flat[i], marker, color=palette.HIGHLIGHT, markersize=8, markeredgecolor="white", zorder=7)
+    ax.margins(0.04)
+
+
+def project(points: Reals) -> Reals:
+    """Points (..., 3) on the plane of the picture, (..., 2)."""
+    x, y, z = np.moveaxis(points, -1, 0)
+    across = -np.sin(AZIMUTH) * x + np.cos(AZIMUTH) * y
+    away = np.cos(AZIMUTH) * x + np.sin(AZIMUTH) * y
+    return np.stack([across, np.cos(ELEVATION) * z - np.sin(ELEVATION) * away], axis=-1)
+
+
+def _floor(ax: Axes, points: Reals) -> None:
+    """Squares of 200 mm on the floor below base and path, and the directions of the axes."""
+    low = np.floor(np.minimum(points.min(axis=0), -200) / 200) * 200
+    high = np.ceil(np.maximum(points.max(axis=0), 200) / 200) * 200
+    lines = [[(x, low[1], 0), (x, high[1], 0)] for x in np.arange(low[0], high[0] + 1, 200)]
+    lines += [[(low[0], y, 0), (high[0], y, 0)] for y in np.arange(low[1], high[1] + 1, 200)]
+    ax.add_collection(
+        LineCollection(list(project(np.array(lines, float))), colors=palette.GRID, linewidths=0.7, zorder=0)
+    )
+    corner = np.array([low[0], low[1], 0.0])
+    for k, name in enumerate("xyz"):
+        tip = corner + 200.0 * np.eye(3)[k]
+        ax.plot(*project(np.stack([corner, tip])).T, color=palette.BODY, linewidth=1.6, zorder=1)
+        label = name if k else tr("x (squares: 200 mm)")
+        x, y = project(corner + 235.0 * np.eye(3)[k])
+        ax.text(x, y, label, fontsize=8, color=palette.MUTED, ha="center", va="center")
+
+
+def _coloured(ax: Axes, points: Reals, condition: Reals) -> None:
+    segments = np.stack([points[:-1], points[1:]], axis=1)
+    known = ~np.isnan(condition[:-1])
+    ax.add_collection(
+        LineCollection(list(segments[~known]), colors=palette.MUTED, linewidths=2, linestyles=":", zorder=3)
+    )
+    lines = LineCollection(list(segments[known]), cmap=PATH_COLOURS, norm=CONDITION_SCALE, linewidths=4, zorder=4)
+    lines.set_array(np.minimum(condition[:-1][known], 1e12))
+    lines.set_rasterized(True)
+    ax.add_collection(lines)
+
+
+WIDTHS = (3.2, 2.8, 2.4, 2.0, 1.6, 1.2, 1.0, 0.9, 0.8, 0.7)  # so that curves that coincide all show
+NEAR_LIMIT_DEG = 20.0  # mm of a prismatic joint
+EVENT_STYLES: dict[bool, Literal["-", ":"]] = {True: "-", False: ":"}
+TYPE_COLOURS = {"wrist": palette.JOINTS[4], "elbow": palette.JOINTS[2], "shoulder": palette.JOINTS[3]}
+LEFT, BOTTOM, TOP = 0.055, 0.07, 0.925
+COLUMNS, GAP = (0.275, 0.275, 0.265), 0.06
+FONT = 9.0
+
+
+class PathFigure:
+    """Joint curves on the left, measures in the middle, the path in space and the joints' effort on the right.
+
+    One figure serves all paths of a page: making axes and their ticks takes longer than drawing the curves.
+    """
+
+    def __init__(self) -> None:
+        self.figure = Figure(figsize=(13.2, 7.0), layout="none")  # type: ignore[arg-type]  # the stubs lack it
+        self.joints = [self._axes(0, row) for row in range(3)]
+        self.measures = [self._axes(1, row) for row in range(3)]
+        self.effort = self._axes(2, 2)
+        left = LEFT + sum(COLUMNS[:2]) + 2 * GAP - 0.02
+        self.space = self.figure.add_axes((left, 0.40, COLUMNS[2] + 0.02, TOP - 0.41))
+        for column in (self.joints, self.measures):
+            for ax in column:
+                ax.yaxis.set_label_coords(-0.15, 0.5)
+            for ax in column[:-1]:
+                ax.tick_params(labelbottom=False)
+            column[-1].set_xlabel(axis_label(model.PathChecks, "t_s"), fontsize=FONT)
+
+    def draw(
+        self,
+        robot: Robot,
+        path: model.PathSummary,
+        rows: model.PathChecks,
+        motions: model.AvoidanceRows,
+        near: model.NearThresholds,
+    ) -> str:
+        """The figure of a path as the data address of an image."""
+        for ax in self.figure.axes:
+            _clear(ax)
+        _joint_curves(self.joints, robot, path, rows)
+        _distances(self.measures[0], rows, near)
+        _condition(self.measures[1], rows)
+        _small_measures(self.measures[2], rows)
+        for ax in (*self.joints, *self.measures):
+            _mark(ax, path)
+            ax.set_xlim(rows.t_s[0], rows.t_s[-1])
+        _effort(self.effort, path, rows, motions)
+        draw_path(self.space, robot, path, rows, motions.take(motions.strategy == path.strategy))
+        handles = _legend(path)
+        legend = self.figure.legend(
+            handles=handles, loc="upper center", bbox_to_anchor=(0.5, 1.0), ncols=9, fontsize=FONT
+        )
+        image = svg_data_uri(self.figure)
+        legend.remove()
+        return image
+
+    def panels(self) -> list[list[float]]:
+        """Where the curves over time stand, for the player's cursor: left, bottom, right, top in parts of the image,
+        and the times (s) at both sides."""
+        shown = ((ax.get_position().extents, ax.get_xlim()) for ax in (*self.joints, *self.measures))
+        return [[round(float(value), 5) for value in (*extents, *ends)] for extents, ends in shown]
+
+    def _axes(self, column: int, row: int) -> Axes:
+        height = (TOP - BOTTOM) / 3
+        x = LEFT + sum(COLUMNS[:column]) + column * GAP
+        ax = self.figure.add_axes((x, BOTTOM + (2 - row) * height, COLUMNS[column], height - 0.03))
+        ax.tick_params(labelsize=FONT, length=2)
+        ax.xaxis.set_major_locator(MaxNLocator(5))
+        ax.yaxis.set_major_locator(MaxNLocator(4))
+        return ax
+
+
+def _clear(ax: Axes) -> None:
+    """Take a path's curves out of axes, and leave their ticks."""
+    for artist in (*ax.lines, *ax.collections, *ax.patches, *ax.texts):
+        artist.remove()
+    if legend := ax.get_legend():
+        legend.remove()
+    ax.relim()
+    ax.margins(0.05)
+    ax.autoscale(True)
+
+
+def _joint_curves(axes: list[Axes], robot: Robot, path: model.PathSummary, rows: model.PathChecks) -> None:
+    for ax, name in zip(axes, ("q_deg", "q_deg_s", "q_deg_s2")):
+        values = getattr(rows, name)
+        for j in range(values.shape[1]):
+            ax.plot(rows.t_s, values[:, j], color=palette.JOINTS[j], linewidth=WIDTHS[j], label=palette.JOINT_NAMES[j])
+        ax.set_ylabel(axis_label(rows, name), fontsize=FONT)
+        if name == "q_deg":
+            _limits(ax, robot, values)
+        elif not path.joint_speed_bounded:
+            _cut(ax, values)
+
+
+def _distances(ax: Axes, rows: model.PathChecks, near: model.NearThresholds) -> None:
+    """Distance from each singular set, in parts of the distance below which a pass counts as near."""
+    curves: tuple[tuple[SingularityType, Reals, float], ...] = (
+        ("wrist", rows.wrist_deg, near.wrist_deg),
+        ("elbow", rows.elbow_deg, near.elbow_deg),
+        ("shoulder", rows.shoulder_mm, near.shoulder_mm),
+    )
+    for kind, distance, threshold in curves:
+        ratio = np.maximum(np.abs(distance) / threshold, 1e-4)
+        ax.plot(rows.t_s, ratio, color=TYPE_COLOURS[kind], label=singularity_word(kind))
+    ax.axhline(1.0, color=palette.INK, linewidth=1, linestyle="--")
+    _logarithmic(ax, 0.01, 100.0)
+    ax.set_ylabel(tr("distance / threshold"), fontsize=FONT)
+    _key(ax, "lower left")
+
+
+def _condition(ax: Axes, rows: model.PathChecks) -> None:
+    values = np.where(np.isinf(rows.condition_number), np.nan, rows.condition_number)
+    ax.plot(rows.t_s, values, color=palette.MODEL)
+    _logarithmic(ax, 1.0, min(1e6, 2 * np.nanmax(np.append(values, 50.0))))
+    ax.set_ylabel(axis_label(rows, "condition_number"), fontsize=FONT)
+
+
+def _logarithmic(ax: Axes, low: float, high: float) -> None:
+    """A logarithmic axis with plain numbers at powers of ten: matplotlib's own ticks take longer than all curves."""
+    ax.set_yscale("log")
+    ax.set_ylim(low, high)
+    decades = np.arange(np.ceil(np.log10(low) - 1e-9), np.floor(np.log10(high) + 1e-9) + 1)
+    ticks = 10.0 ** (decades if len(decades) < 6 else decades[::2])
+    ax.yaxis.set_minor_locator(NullLocator())
+    ax.yaxis.set_major_locator(FixedLocator(ticks.tolist()))
+    ax.yaxis.set_major_formatter(lambda value, _: f"{value:.10g}" if value < 1e5 else f"1e{round(np.log10(value))}")
+
+
+def _small_measures(ax: Axes, rows: model.PathChecks) -> None:
+    ax.plot(rows.t_s, rows.smallest_singular_value, color=palette.REFERENCE, label=tr("smallest singular value"))
+    ax.plot(rows.t_s, rows.manipulability, color=palette.MODEL, label=tr("manipulability"))
+    most = np.nanmax([*rows.smallest_singular_value, *rows.manipulability, 0.0])
+    ax.set_ylim(0, 1.35 * most if most > 0 else 1)
+    ax.set_ylabel(tr("measure"), fontsize=FONT)
+    _key(ax, "upper left")
+
+
+def _effort(ax: Axes, path: model.PathSummary, rows: model.PathChecks, motions: model.AvoidanceRows) -> None:
+    """The joints' largest ratio of speed to limit over the share of the time: programmed, repaired, at its fastest."""
+    ax.plot(rows.t_s / rows.t_s[-1], rows.speed_ratio, color=palette.HIGHLIGHT, label=tr("as programmed"))
+    shown = [rows.speed_ratio]
+    for name, colour, label in (
+        (path.strategy, palette.MODEL, tr("repaired")),
+        (model.FASTEST, palette.MUTED, tr("at its fastest")),
+    ):
+        part = motions.take(motions.strategy == name)
+        if len(part):
+            ax.plot(part.t_s / (part.t_s[-1] or np.nan), part.speed_ratio, color=colour, label=label, linewidth=1.3)
+            shown.append(part.speed_ratio)
+    ax.axhline(1.0, color=palette.INK, linewidth=1, linestyle="--")
+    size = np.concatenate(shown)
+    most = np.nanmax(size) if np.isfinite(size).any() else 1.0
+    ax.set_ylim(0, 1.35 * max(1.0, most) if path.joint_speed_bounded else 3.0)
+    ax.set_xlim(0, 1)
+    ax.set_xlabel(tr("share of each motion's time"), fontsize=FONT)
+    ax.set_ylabel(tr("joint speed / limit"), fontsize=FONT)
+    _key(ax, "upper left")
+
+
+def _key(ax: Axes, corner: Literal["upper left", "lower left"]) -> None:
+    legend = ax.legend(loc=corner, ncols=3, fontsize=8, handlelength=1.2, columnspacing=1.0, borderpad=0.1)
+    legend.set_frame_on(True)  # a ground of its own, where a curve passes behind it
+    legend.get_frame().set(facecolor="white", edgecolor="none", alpha=0.85)
+
+
+def _limits(ax: Axes, robot: Robot, q_deg: Reals) -> None:
+    """Dashed lines at the limits that a joint comes near to."""
+    if np.isnan(q_deg).all():
+        return
+    low, high = np.nanmin(q_deg, axis=0), np.nanmax(q_deg, axis=0)
+    lower, upper = shown(robot, robot.lower), shown(robot, robot.upper)
+    for j in np.flatnonzero(~robot.continuous):
+        for limit, gap, side in ((lower[j], low[j] - lower[j], "top"), (upper[j], upper[j] - high[j], "bottom")):
+            if gap < NEAR_LIMIT_DEG:
+                ax.axhline(limit, color=palette.JOINTS[j], linestyle="--", linewidth=1)
+                text = tr("limit of {joint}", joint=palette.JOINT_NAMES[j])
+                ax.text(
+                    0.01, limit, text, transform=ax.get_yaxis_transform(), va=side, fontsize=8, color=palette.JOINTS[j]
+                )
+                ax.margins(y=0.18)
+
+
+def _cut(ax: Axes, values: Reals) -> None:
+    """Cut the axis where a curve grows without bound at the edge of reach."""
+    size = np.abs(values[np.isfinite(values)])
+    if size.size:
+        reach = 1.6 * np.percentile(size, 97)
+        ax.set_ylim(-reach, reach)
+        ground = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.5}
+        text = tr("cut: grows without bound")
+        ax.text(0.99, 0.04, text, transform=ax.transAxes, ha="right", fontsize=8, bbox=ground, zorder=6)
+
+
+def _shades(path: model.PathSummary) -> list[tuple[tuple[model.Stretch[Any], ...], str, float, str]]:
+    """Stretches that are wrong, with the colour, opacity and name of their shade."""
+    shades: list[tuple[tuple[model.Stretch[Any], ...], str, float, str]] = [
+        (path.out_of_limits, palette.VERDICTS["caution"], 0.16, tr("outside a joint limit")),
+        (path.too_fast, palette.VERDICTS["fail"], 0.14, tr("joint too fast")),
+        (path.unreachable, palette.INK, 0.14, tr("not reachable")),
+        (path.collisions, palette.VERDICTS["fail"], 0.3, tr("collision")),
+    ]
+    return [shade for shade in shades if shade[0]]
+
+
+def _mark(ax: Axes, path: model.PathSummary) -> None:
+    for stretches, colour, alpha, _ in _shades(path):
+        for part in stretches:
+            ax.axvspan(part.t0_s, part.t1_s, color=colour, alpha=alpha, linewidth=0)
+    for event in path.singularities:
+        ax.axvline(event.t_s, color=palette.HIGHLIGHT, linestyle=EVENT_STYLES[event.crossing], linewidth=1.4)
+        at = (event.t_s, 1.0)
+        ax.plot(
+            *at, "v", color=palette.HIGHLIGHT, markersize=6, transform=ax.get_xaxis_transform(), clip_on=False, zorder=5
+        )
+
+
+def _legend(path: model.PathSummary) -> list[Line2D | Patch]:
+    handles: list[Line2D | Patch] = [
+        Line2D([], [], color=palette.JOINTS[j], linewidth=WIDTHS[j], label=palette.JOINT_NAMES[j])
+        for j in range(len(path.max_joint_speed_deg_s or palette.JOINT_NAMES[:6]))
+    ]
+    for crossing, label in ((True, tr("singular")), (False, tr("near-singular"))):
+        if any(event.crossing == crossing for event in path.singularities):
+            handles.append(
+                Line2D([], [], color=palette.HIGHLIGHT, label=label, linestyle=EVENT_STYLES[crossing], marker="v")
+            )
+    handles += [Patch(color=colour, alpha=2 * alpha, label=label) for _, colour, alpha, label in _shades(path)]
+    return handles
+
+
+Measured = tuple[model.PathSummary, model.MinClearance]
+
+
+def clearance_section(results: model.TrajectoryResults, most: int) -> dict[str, Any]:
+    """The picture, if any path has a pose that can be reached, and the rows of the table; at most so many paths, those
+    with the smallest clearance, are drawn."""
+    paths = [(path, path.clearance) for path in results.summary.paths if path.clearance]
+    if not paths:
+        return {"picture": None, "rows": []}
+    colliding = [path.name for path, _ in paths if path.collisions]
+    if colliding:
+        names = joined(colliding, ", ")
+        caption = tr("Below zero bodies overlap: {paths} can't be driven as planned.", paths=names)
+    else:
+        caption = tr("No path reaches zero: the arm collides neither with its surroundings nor with itself.")
+    if any(path.unreachable for path, _ in paths):
+        caption = joined([caption, tr("Grey: not reachable.")], " ")
+    drawn = sorted(paths, key=lambda measured: measured[1].least_mm)[:most] if len(paths) > most else paths
+    if len(paths) > most:
+        caption = joined([caption, tr("Drawn: the {count} paths with the least clearance.", count=most)], " ")
+    alt = tr("Least clearance over time, one panel per path. {conclusion}", conclusion=caption)
+    rows = [
+        [
+            path.name,
+            fixed(smallest.least_mm, 1),
+            fixed(smallest.t_s, 3),
+            say(smallest.between),
+            str(smallest.poses_measured),
+        ]
+        for path, smallest in paths
+    ]
+    return {"picture": Picture(_curves(drawn, results.clearance), alt, caption), "rows": rows}
+
+
+def _curves(paths: list[Measured], rows: model.Clearances) -> Figure:
+    figure, panels = clearance_panels(rows, [path.name for path, _ in paths])
+    for (ax, _), (path, smallest) in zip(panels, paths):
+        colour = palette.VERDICTS["fail"] if smallest.least_mm <= 0 else palette.INK
+        ax.plot(smallest.t_s, smallest.least_mm, "o", color=colour, markersize=4)
+        for gap in path.unreachable:
+            ax.axvspan(gap.t0_s, gap.t1_s, color=palette.MUTED, alpha=0.25, linewidth=0)
+        ax.set_xlim(0, path.duration_s)
+    low, high = np.nanmin(rows.clearance_mm), np.nanmax(rows.clearance_mm)
+    panels[0][0].set_ylim(min(low, 0.0) - 0.05 * (high - low), high + 0.05 * (high - low))
+    return figure
+
+
+POINTS = 250
+LOG_RANGE = np.log10(3), np.log10(300)  # of the condition number
+MAX_ARMS = 3
+
+
+def in_space(
+    robot: Robot, results: model.TrajectoryResults, paths: Sequence[model.PathSummary], scene: Scene | None = None
+) -> Markup:
+    """Paths in their scene, the arm at their ends and at singular poses, in a figure that turns; a list has all."""
+    checks, motions, groups = results.checks, results.avoidance, {}
+    for path in paths:
+        repaired = motions.take((motions.path == path.name) & (motions.strategy == path.strategy))
+        own = _layers(robot, path, checks.take(checks.path == path.name), repaired)
+        groups[path.name] = [*own, *scene_layers(scene)]
+    first = next((path.name for path in paths if path.singularities and path.kind != "joint"), None)
+    values = [(3, "3"), (10, "10"), (30, "30"), (300, tr("300 or more"))]
+    ticks = [((np.log10(value) - LOG_RANGE[0]) / (LOG_RANGE[1] - LOG_RANGE[0]), text) for value, text in values]
+    return turning_figure(groups, ColourScale("viridis_r", tr("condition number"), ticks), first)
+
+
+def _layers(
+    robot: Robot, path: model.PathSummary, rows: model.PathChecks, repaired: model.AvoidanceRows
+) -> Iterator[Layer]:
+    events = [int(np.argmin(np.abs(rows.t_s - event.t_s))) for event in path.singularities]
+    kept = np.unique(np.concatenate([np.linspace(0, len(rows) - 1, POINTS).astype(int), events]).astype(int))
+    condition = np.nan_to_num(np.log10(np.minimum(rows.condition_number[kept], 1e6)), nan=LOG_RANGE[0])
+    shade = (condition - LOG_RANGE[0]) / (LOG_RANGE[1] - LOG_RANGE[0])
+    yield Layer(tr("path"), "line", rows.xyz_mm[kept], width=5.0, shade=shade)
+    reached = rows.reachable
+    if not reached.all():
+        out = np.where(reached[:, None], np.nan, rows.xyz_mm)[kept]
+        yield Layer(tr("not reachable"), "line", out, "#888888", 6.0)
+    faults: list[tuple[model.Stretch[Any], str, str]] = [(part, "fail", tr("collision")) for part in path.collisions]
+    faults += [(part, "caution", tr("outside a joint limit")) for part in path.out_of_limits]
+    for part, status, name in faults:
+        during = kept[(rows.t_s[kept] >= part.t0_s) & (rows.t_s[kept] <= part.t1_s)]
+        if len(during):
+            yield Layer(name, "line", rows.xyz_mm[during], palette.VERDICTS[status], 6.0)
+    if len(repaired):
+        yield Layer(tr("repaired"), "line", repaired.xyz_mm, palette.MODEL, 2.5)
+    q = meant(robot, rows.q_deg)
+    index = np.flatnonzero(reached)
+    last = tr("arm at the end") if reached.all() else tr("arm at the last point reached")
+    for k, name, colour in ((index[:1], tr("arm at the start"), ""), (index[-1:], last, palette.LINK)):
+        for i in k:
+            yield Layer(name, "line", 1000 * skeleton(robot, q[i]), colour, 5.0)
+    for event, i in list(zip(path.singularities, events))[:MAX_ARMS]:
+        if reached[i]:
+            singular = tr("{type}, t = {t:.3f} s", type=event_word(event), t=event.t_s)
+            name = singular if event.crossing else tr("near {singular}", singular=singular)
+            yield Layer(name, "line", 1000 * skeleton(robot, q[i]), palette.HIGHLIGHT, 3.0)

@@ -1,0 +1,416 @@
+"""The paths for player and recording: singular poses, faults and contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from er3a.collision.pairs import ShapesAssumed
+from er3a.kinematics.singularity import SingularityType
+from er3a.numerics.arrays import Reals
+from er3a.pipeline.language import own_title, tr, with_unit
+from er3a.pipeline.messages.expectations import as_expected, outcome_words
+from er3a.pipeline.messages.numbers import fixed
+from er3a.pipeline.messages.planning import rate_needed, times_needed
+from er3a.pipeline.messages.programs import remedies, remedy, say
+from er3a.pipeline.messages.say import joined, sentence
+from er3a.pipeline.messages.trajectory import (
+    IF_ASSUMED,
+    FactName,
+    FaultText,
+    Slowed,
+    advice,
+    cause_of,
+    cause_text,
+    end_facts,
+    end_text,
+    event_word,
+    fact_word,
+    first_faults,
+    near_at_start,
+    open_beside,
+    pass_about,
+    passing_text,
+    path_text,
+    repair_facts,
+    repair_lead,
+    switch_text,
+    whole_pace,
+)
+from er3a.pipeline.player.motions import Fault, FaultMoment, Mark, PlayedEvent, PlayedMotion, Weight, address_of
+from er3a.pipeline.stages.expectations import is_met
+from er3a.pipeline.stages.trajectory import model
+from er3a.planning.motion_faults import NeededAcceleration, NeededSpeed, RateCause
+from er3a.planning.names import PathVerdict
+from er3a.program_check.program_check_findings import ClearOfAssumed
+from er3a.robots.joint_limits import meant
+from er3a.robots.robot import Robot
+
+SLOWER = 0.97  # of the programmed pace, below which a motion counts as slower
+LARGEST_PART = 0.9  # of a path's time, up to which it is slower only there
+MIN_LENGTH = 1e-6  # m
+RANKS: tuple[Weight, ...] = ("fail", "caution", "plain")
+WEIGHTS: dict[PathVerdict, Weight] = {
+    "safe": "plain",
+    "near-singular": "caution",
+    "singular": "caution",
+    "too fast for the assumed limits": "caution",
+    "undecided": "caution",
+    "too fast": "fail",
+    "leaves limits": "fail",
+    "collides": "fail",
+    "unreachable": "fail",
+    "none found": "fail",
+}
+
+
+def motions(
+    robot: Robot, results: model.TrajectoryResults, more: Mapping[str, PlayedEvent] | None = None
+) -> list[PlayedMotion]:
+    """The paths as programmed, as far as the arm reaches them, each followed by the motion that repairs it.
+
+    ``more``: an event of motions, by their names.
+    """
+
+    def added(name: str) -> list[PlayedEvent]:
+        return [more[name]] if more and name in more else []
+
+    checks, avoidance, motions = results.checks, results.avoidance, []
+    for path in worst_first(results.summary.paths):
+        rows = checks.take((checks.path == path.name) & checks.reachable)
+        near = near_assumed(path, results.summary)
+        text = say(near) if near else path_text(path)
+        seen = [*events(path), *_near_events(path, near, results.clearance), *added(path.name)]
+        motions.append(PlayedMotion(path.name, text, rows.t_s, meant(robot, rows.q_deg), seen, contact(path)))
+        if path.chosen:
+            repair = avoidance.take((avoidance.path == path.name) & (avoidance.strategy == path.strategy))
+            text = repair_lead(path, slowed(path, rows, repair))
+            q, seen = meant(robot, repair.q_deg), [*_kept_passes(path, rows, repair), *added(repaired(path))]
+            motions.append(PlayedMotion(repaired(path), text, repair.t_s, q, seen))
+    return motions
+
+
+def worst_first(paths: Sequence[model.PathSummary]) -> list[model.PathSummary]:
+    """Those that fail first, of them those that were not expected to."""
+    return sorted(paths, key=lambda path: (RANKS.index(_weight_of(path)), is_met(path)))
+
+
+def _weight_of(path: model.PathSummary) -> Weight:
+    """That of its verdict, or of what was found in its program if that weighs more."""
+    weights: list[Weight] = [WEIGHTS[path.verdict]]
+    weights += ["fail" if each.level == "fail" else "caution" for each in path.of_program]
+    return min(weights, key=RANKS.index)
+
+
+def faults(results: model.TrajectoryResults) -> list[Fault]:
+    """The paths that may not be run as they are, the worst first."""
+    found = []
+    for path in worst_first(results.summary.paths):
+        near = near_assumed(path, results.summary)
+        if model.is_safe(path, results.summary.verdict.shapes):
+            continue
+        clearance = path.clearance if path.verdict == "safe" else None
+        rows = results.checks.take(results.checks.path == path.name)
+        wrong: list[FaultText | FaultMoment] = [*_in_program(path)]
+        if near and clearance:
+            wrong.append(FaultText(clearance.t_s, say(near), clearance.t_s))
+        elif path.verdict != "safe":
+            wrong = [*_near_at_start(path, rows, results.summary.near), *_faults(path), *wrong]
+        status, verdict = shown_verdict(path, near)
+        own = results.avoidance.take(results.avoidance.path == path.name)
+        to_do, facts, instead = _to_do(path, rows, own, results.summary)
+        moments = tuple(_linked(_moment(fault, rows), path.name) for fault in wrong)
+        found.append(
+            Fault(
+                path.name,
+                own_title(path.title),
+                status,
+                verdict,
+                path.verdict != "safe" and is_met(path),
+                as_expected(path),
+                moments,
+                to_do,
+                address_of("trajectory", path.name, moments[0].seen_s or 0.0, path.name),
+                instead,
+                cause_of(path),
+                tuple((fact_word(name), text) for name, text in facts if text),
+            )
+        )
+    return found
+
+
+def _faults(path: model.PathSummary) -> list[FaultText] | list[FaultMoment]:
+    """What is wrong with a path that is not safe, and when (s): first, and what weighs more later."""
+    found = [] if path.not_planned else first_faults(path)
+    if (path.verdict in ("singular", "near-singular") and len(found) <= 1) or not found:
+        times = [] if path.not_planned else path.singular_times_s or [event.t_s for event in path.singularities]
+        return [FaultText(min(times), path_text(path), min(times))] if times else [FaultMoment(path_text(path))]
+    return found
+
+
+def _in_program(path: model.PathSummary) -> list[FaultMoment]:
+    """What was found in the program that a path is of, each text once with its lines, the worst first."""
+    lines: dict[str, dict[str, None]] = {}
+    for each in sorted(path.of_program, key=lambda each: each.level != "fail"):
+        line = tr("line {line}", line=each.line) if each.line else ""
+        lines.setdefault(say(each.finding), {})[line] = None
+    return [FaultMoment(text, joined(named, ", ")) for text, named in lines.items()]
+
+
+def _near_at_start(path: model.PathSummary, rows: model.PathChecks, near: model.NearThresholds) -> list[FaultText]:
+    """That a path without a repair is near-singular from its start on, unless another fault begins at that moment."""
+    if path.chosen or path.in_joint_space or not len(rows) or not rows.near_singular[0]:
+        return []
+    if any(event.t_s <= rows.t_s[0] for event in path.singularities):
+        return []
+    parts: list[tuple[float, SingularityType, str]] = [
+        (abs(rows.wrist_deg[0]) / near.wrist_deg, "wrist", with_unit(fixed(abs(rows.wrist_deg[0]), 2), "deg")),
+        (abs(rows.elbow_deg[0]) / near.elbow_deg, "elbow", with_unit(fixed(abs(rows.elbow_deg[0]), 2), "deg")),
+        (abs(rows.shoulder_mm[0]) / near.shoulder_mm, "shoulder", f"{fixed(abs(rows.shoulder_mm[0]), 1)} mm"),
+    ]
+    share, kind, distance = min((part for part in parts if np.isfinite(part[0])), default=(np.inf, "wrist", ""))
+    start = float(rows.t_s[0])
+    return [FaultText(start, near_at_start(kind, distance), start)] if share <= 1 else []
+
+
+def _moment(fault: FaultText | FaultMoment, rows: model.PathChecks) -> FaultMoment:
+    """A fault of a path with its time, when it is worst, and its place then, between the path's rows."""
+    if isinstance(fault, FaultMoment):
+        return fault
+    when = tr("{time} s", time=fixed(fault.t_s, 3))
+    if fixed(fault.seen_s, 3) != fixed(fault.t_s, 3):
+        when = tr("{when}, at worst {time} s", when=when, time=fixed(fault.seen_s, 3))
+    if not len(rows):
+        return FaultMoment(fault.text, when, seen_s=fault.seen_s)
+    far, *xyz = (float(np.interp(fault.seen_s, rows.t_s, values)) for values in (1000 * rows.s_m, *rows.xyz_mm.T))
+    place = tr("{far} mm, ({xyz})", far=fixed(far, 0), xyz=", ".join(fixed(value, 0) for value in xyz))
+    return FaultMoment(fault.text, when, place if np.isfinite([far, *xyz]).all() else "", fault.seen_s)
+
+
+def _linked(moment: FaultMoment, path: str) -> FaultMoment:
+    """A moment with its address, where the player shows it."""
+    return (
+        moment
+        if moment.seen_s is None
+        else replace(moment, address=address_of("trajectory", path, moment.seen_s, path))
+    )
+
+
+def _assumed(part: model.Stretch[Any]) -> bool:
+    """Whether what a stretch exceeds is an assumed limit."""
+    return bool(part.cause.code.endswith(IF_ASSUMED))
+
+
+def _to_do(
+    path: model.PathSummary, rows: model.PathChecks, motions: model.AvoidanceRows, summary: model.TrajectorySummary
+) -> tuple[str, list[tuple[FactName, str]], tuple[str, str] | None]:
+    """What to do instead of running a path as it is, what else is to be known of that, and the motion that may be run
+    with its address."""
+    shapes = summary.verdict.shapes
+    if path.chosen:
+        name, repair = repaired(path), motions.take(motions.strategy == path.strategy)
+        lead = sentence("finding", finding=repair_lead(path, slowed(path, rows, repair)))
+        facts = repair_facts(path, summary.joint_limits, shapes)
+        facts += [("start", _switch(path, rows, motions)), ("pace", whole_pace(path))]
+        return lead, facts, (name, address_of("trajectory", name, 0.0, path.name))
+    if path.verdict == "safe":
+        near = near_assumed(path, summary)
+        return joined([*remedies(path.of_program), remedy(near) if near else ""], " "), [], None
+    last = path.sound_end
+    if last is None:
+        todo = advised(path, rows, motions, summary.joint_limits, shapes=shapes)
+        return sentence("finding", finding=todo) if todo else "", [], None
+    name = tr("{path}, up to {time} s", path=path.name, time=fixed(last.t_s, 3))
+    address = address_of("trajectory", path.name, last.t_s, path.name, last.t_s)
+    return end_text(path, last, shapes=shapes), end_facts(path), (name, address)
+
+
+def slowed(path: model.PathSummary, rows: model.PathChecks, repair: model.AvoidanceRows) -> Slowed | None:
+    """Where a repair that keeps the path goes slower than programmed, or the path is too fast; None of others, and
+    where that is everywhere.
+
+    ``rows``, ``repair``: of the path and of its repair, compared where the tool point has come equally far.
+    """
+    length = _kept_length(path, rows, repair)
+    if length is None:
+        return None
+    programmed = np.interp(length, rows.s_m, rows.t_s)
+    pace = np.diff(programmed) / np.diff(repair.t_s)
+    slow = np.flatnonzero(pace < SLOWER)
+    if not len(slow):
+        return None
+    start = min([programmed[slow[0]], *(part.t0_s for part in path.too_fast)])
+    end = max([programmed[slow[-1] + 1], *(part.t1_s for part in path.too_fast)])
+    if end - start > LARGEST_PART * path.duration_s:
+        return None
+    return Slowed(float(start), float(end), float(pace.min()))
+
+
+def _kept_length(path: model.PathSummary, rows: model.PathChecks, repair: model.AvoidanceRows) -> Reals | None:
+    """The arc length (N,), m, of the tool point at the rows of a repair that keeps the path; None of others, and of
+    paths on which the tool point stays where it is."""
+    if path.strategy != "slow" or len(repair) < 2 or len(rows) < 2:
+        return None
+    length: Reals = np.append(0.0, np.linalg.norm(np.diff(repair.xyz_mm, axis=0), axis=1).cumsum()) / 1000
+    return length if np.isfinite(length[-1]) and length[-1] >= MIN_LENGTH else None
+
+
+def advised(
+    path: model.PathSummary,
+    rows: model.PathChecks,
+    motions: model.AvoidanceRows,
+    limits: model.LimitsUsed,
+    *,
+    shapes: ShapesAssumed | None = None,
+) -> str | None:
+    """What to do about a path; None where nothing is to be done.
+
+    ``rows``, ``motions``, ``limits``: of the path, of its repairs, of the joints; ``shapes``: that clearance is that of
+    assumed ones.
+    """
+    repair = motions.take(motions.strategy == path.strategy) if path.chosen else motions
+    text = advice(path, limits, shapes=shapes, slowed=slowed(path, rows, repair))
+    if text is None or path.chosen:
+        return text and joined([text, _switch(path, rows, motions)], ". ")
+    if not path.in_joint_space and len(rows) and rows.near_singular[0]:
+        met = any(event.crossing and event.t_s <= rows.t_s[0] for event in path.singularities)
+        return joined([sentence("advice.near#met" if met else "advice.near"), text], ". ")
+    no_part = path.sound_end is None and WEIGHTS[path.verdict] == "fail"
+    return joined([text, sentence("advice.no_part")], ". ") if no_part else text
+
+
+def _switch(path: model.PathSummary, rows: model.PathChecks, motions: model.AvoidanceRows) -> str:
+    """Where a motion on another IK solution begins, and whether the way there was checked; empty for other motions."""
+    own = motions.take(motions.strategy == path.strategy)
+    if path.strategy != "branch" or not len(rows) or not len(own):
+        return ""
+    return switch_text((own.q_deg[0] - rows.q_deg[0]).tolist(), path.sliding)
+
+
+def repaired(path: model.PathSummary) -> str:
+    """The name of the motion that repairs a path."""
+    return tr("{path}, repaired", path=path.name)
+
+
+def shown_verdict(path: model.PathSummary, near: ClearOfAssumed | None) -> tuple[Weight, str]:
+    """A path's verdict in colour and words; ``near`` as of :func:`near_assumed`."""
+    if path.verdict == "safe" and path.of_program:
+        weight = _weight_of(path)
+        return weight, tr("fault in its program") if weight == "fail" else tr("doubt in its program")
+    if path.verdict == "safe" and near:
+        return "caution", tr("clear of assumed shapes only")
+    return WEIGHTS[path.verdict], outcome_words(path.outcomes)
+
+
+def near_assumed(path: model.PathSummary, summary: model.TrajectorySummary) -> ClearOfAssumed | None:
+    """That a path is clear of assumed shapes by less than these may be wrong by."""
+    shapes = summary.verdict.shapes
+    if shapes is None or path.name not in shapes.near or path.clearance is None:
+        return None
+    return ClearOfAssumed(path.clearance.between, path.clearance.least_mm, shapes.margin_mm)
+
+
+def events(path: model.PathSummary) -> list[PlayedEvent]:
+    """Singular poses and faults of a path."""
+    passes = [_pass(e, open_beside(path, e)) for e in path.singularities]
+    faults = [(kind, part) for kind, stretches in kinds(path) for part in stretches if not pass_about(path, part)]
+    return passes + [
+        PlayedEvent(
+            s.t0_s,
+            s.t1_s,
+            tr("{fault}: {cause}", fault=kind, cause=_few_words(path, s)),
+            _weight(path, s),
+            _touching(s.cause),
+            _joints(s.cause),
+        )
+        for kind, s in faults
+    ]
+
+
+def _pass(event: model.Singularity, span: tuple[float, float] | None) -> PlayedEvent:
+    """A singular pose or a pass by one, as long as it is not decided which."""
+    if span is None:
+        return PlayedEvent(event.t_s, event.until_s, _singular(event), "caution")
+    return PlayedEvent(*span, tr("near-singular: {type}", type=passing_text(event, span)), "caution")
+
+
+def _kept_passes(path: model.PathSummary, rows: model.PathChecks, repair: model.AvoidanceRows) -> list[PlayedEvent]:
+    """The passes by singular poses of a motion that repairs a path and keeps to it: at its times."""
+    length = _kept_length(path, rows, repair)
+    if length is None:
+        return []
+
+    def later(t: float) -> float:
+        return float(np.interp(np.interp(t, rows.t_s, rows.s_m), length, repair.t_s))
+
+    found = []
+    for event in path.singularities:
+        span = open_beside(path, event)
+        moved = replace(event, t_s=later(event.t_s), until_s=later(event.until_s))
+        found.append(_pass(moved, span and (later(span[0]), later(span[1]))))
+    return found
+
+
+def _few_words(path: model.PathSummary, part: model.Stretch[Any]) -> str:
+    """Why a stretch is an event."""
+    return rate_needed(part.cause) if isinstance(part.cause, RateCause) else cause_text(path, part)
+
+
+def _near_events(
+    path: model.PathSummary, near: ClearOfAssumed | None, clearance: model.Clearances
+) -> list[PlayedEvent]:
+    """From when to when a path is as near to assumed shapes as these may be wrong, at its nearest."""
+    if near is None or path.clearance is None:
+        return []
+    rows = clearance.take(clearance.path == path.name)
+    at = path.clearance.t_s
+    far = rows.t_s[~(rows.clearance_mm < near.margin_mm)]
+    start = min(rows.t_s[rows.t_s > max(far[far < at], default=-np.inf)], default=at)
+    end = max(rows.t_s[rows.t_s < min(far[far > at], default=np.inf)], default=at)
+    return [PlayedEvent(min(start, at), max(end, at), say(near), "caution", near.pair.names)]
+
+
+def _joints(cause: object) -> tuple[tuple[int, str], ...]:
+    """The joint that fails, if it is one, with what it would need of what it has."""
+    joint = getattr(cause, "joint", None)
+    if joint is None:
+        return ()
+    if not isinstance(cause, NeededSpeed | NeededAcceleration):
+        return ((joint, ""),)
+    return ((joint, times_needed(cause.ratio, acceleration=isinstance(cause, NeededAcceleration))),)
+
+
+def _weight(path: model.PathSummary, part: model.Stretch[Any]) -> Weight:
+    return "caution" if _assumed(part) or part in path.undecided else "fail"
+
+
+def contact(path: model.PathSummary) -> list[Mark]:
+    """Where bodies first touch, while they do."""
+    if path.clear_until is None:
+        return []
+    x, y, z = (value / 1000 for value in path.clear_until.contact_mm)
+    return [Mark(part.t0_s, part.t1_s, (x, y, z), (x, y, z), tr("first contact")) for part in path.collisions[:1]]
+
+
+def _touching(cause: object) -> tuple[str, ...]:
+    pairs = cause.pairs if isinstance(cause, model.BodiesOverlap) else ()
+    return tuple(dict.fromkeys(name for pair in pairs for name in pair.names))
+
+
+def _singular(event: model.Singularity) -> str:
+    word = event_word(event)
+    return tr("singular: {type}", type=word) if event.crossing else tr("near-singular: {type}", type=word)
+
+
+def kinds(path: model.PathSummary) -> tuple[tuple[str, tuple[model.Stretch[Any], ...]], ...]:
+    """The stretches of each kind of fault, with its name."""
+    return (
+        (tr("not reachable"), path.unreachable),
+        (tr("outside limits"), path.out_of_limits),
+        (tr("too fast"), path.too_fast),
+        (tr("undecided"), path.undecided),
+        (tr("collision"), path.collisions),
+    )

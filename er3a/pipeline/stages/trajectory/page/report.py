@@ -1,0 +1,320 @@
+"""The trajectory page, rendered from the stage's results."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from er3a.collision.pairs import Pair
+from er3a.pipeline.language import N_, tr, using, with_unit
+from er3a.pipeline.messages.collision import solid_rows
+from er3a.pipeline.messages.expectations import as_expected
+from er3a.pipeline.messages.kinematics import branch_word
+from er3a.pipeline.messages.numbers import fixed, number
+from er3a.pipeline.messages.planning import FAR
+from er3a.pipeline.messages.say import bracketed, joined, say
+from er3a.pipeline.messages.trajectory import (
+    adjoined,
+    cause_text,
+    event_distance,
+    event_word,
+    kind_word,
+    limits_assumed,
+    open_beside,
+    passing_text,
+    path_text,
+    reasons,
+    strategy_word,
+)
+from er3a.pipeline.player.motions import PlayedEvent
+from er3a.pipeline.player.player import drawing_head, moment, player
+from er3a.pipeline.results import LeftOut, Stored
+from er3a.pipeline.settings import TrajectorySettings
+from er3a.pipeline.stages.trajectory import model
+from er3a.pipeline.stages.trajectory.page.path_figures import PathFigure, clearance_section, in_space
+from er3a.pipeline.stages.trajectory.page.played import (
+    faults,
+    kinds,
+    motions,
+    near_assumed,
+    repaired,
+    shown_verdict,
+    worst_first,
+)
+from er3a.pipeline.stages.trajectory.written_programs import repair_name
+from er3a.pipeline.stages.workspace.page.tray import Meeting, compared_with_tray, linked, met_in_tray
+from er3a.pipeline.study import Study
+from er3a.pipeline.viewing.conditions import condition_of, program_head
+from er3a.pipeline.viewing.figures import readings
+from er3a.pipeline.viewing.page import packed_text, render_stage
+from er3a.programs.languages import titles_unwritten
+from er3a.programs.writing import with_head_lines
+from er3a.robots.robot import Robot
+
+DRAWN = 250  # points of a curve
+MAX_DRAWN, DRAWN_OF_MORE = 16, 8  # paths with a figure and programs to save: all of up to so many, or the worst
+
+
+def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) -> None:
+    """Write the trajectory page of a robot."""
+    robot, results = study.robot(stored.robot), stored.results
+    summary, checks, avoidance = results.summary, results.checks, results.avoidance
+    scene = study.scene(stored.robot, stored.stage)
+    figure, sections = PathFigure(), []
+    count = len(summary.paths) if len(summary.paths) <= MAX_DRAWN else DRAWN_OF_MORE
+    paths, contradicted = worst_first(summary.paths), stored.rests_on.get("validation") == "fail"
+    box_asked = "workspace" in study.stages(stored.robot) and not contradicted
+    boxes = [LeftOut("placed_box")] if box_asked else []
+    lines = program_head(stored.validated, [*summary.not_examined, *boxes])
+    met = None if contradicted else met_in_tray(study, stored)
+    for i, path in enumerate(paths):
+        rows, own = checks.take(checks.path == path.name), avoidance.take(avoidance.path == path.name)
+        files = results.programs.take((results.programs.path == path.name) & (i < count and not contradicted))
+        links = _programs(path, files, lines, met or {})
+        drawn = _figure(figure, robot, path, rows, own, summary.near) if i < count else None
+        sections.append(_section(path, rows, own, drawn, links, summary))
+    assumed = [f"J{j + 1}" for j, is_assumed in enumerate(summary.joint_limits.speed_assumed) if is_assumed]
+    render_stage(
+        study,
+        stored,
+        output,
+        head_links={path.name: f"#{path.name}" for path in summary.paths},
+        sections=sections,
+        entered=linked(met),
+        compared_with_tray=compared_with_tray,
+        faults={fault.name: fault for fault in faults(results)},
+        unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
+        clearance=clearance_section(results, count),
+        solids=solid_rows(scene),
+        assumed=assumed,
+        assumed_speeds=_assumed_speeds(summary.joint_limits, robot),
+        limits_assumed=limits_assumed(summary.joint_limits.speed_assumed, summary.joint_limits.acceleration_assumed),
+        contradicted=contradicted,
+        drawn_paths=count,
+        turning=in_space(robot, results, paths[:count], scene),
+        player=player(robot, motions(robot, results, _tray_events(met or {})), scene),
+        drawing_head=drawing_head(),
+        condition=condition_of(stored.validated),
+    )
+
+
+def _tray_events(met: Mapping[str, Meeting]) -> dict[str, PlayedEvent]:
+    return {name: PlayedEvent(each.t, each.t, each.text, "caution") for name, each in met.items()}
+
+
+def _assumed_speeds(limits: model.LimitsUsed, robot: Robot) -> str:
+    """The joint speeds that are assumed, each with its joints."""
+    joints: dict[str, list[str]] = {}
+    for j, (speed, assumed) in enumerate(zip(limits.speed_deg_s, limits.speed_assumed)):
+        if assumed:
+            shown = with_unit(number(speed, 4), "mm/s" if robot.slides[j] else "deg/s")
+            joints.setdefault(shown, []).append(f"J{j + 1}")
+    return joined([bracketed(speed, ", ".join(named)) for speed, named in joints.items()], ", ")
+
+
+def _programs(
+    path: model.PathSummary, rows: model.ProgramFiles, head: Sequence[str], met: Mapping[str, Meeting]
+) -> list[dict[str, Any]]:
+    """The files to save, each with further lines at the beginning of its head: ``head``, and in English when it meets
+    the tray; ``met``: by names of motions."""
+    speeds = [
+        ", ".join(with_unit(*speed.split(" ", 1)) for speed in text.split(", ") if speed)
+        for text in rows.assumed_speed.tolist()
+    ]
+    texts = zip(rows.file.tolist(), rows.text.tolist(), speeds)
+    found = [dict(file=file, text=text, empty=not text, assumed=speed) for file, text, speed in texts]
+    for each in found:
+        meeting = met.get(repaired(path) if _repairs(path, each) else path.name)
+        each["packed"] = packed_text(with_head_lines(each.pop("text"), [*head, *_in_head(meeting)]))
+    return found
+
+
+def _in_head(meeting: Meeting | None) -> list[str]:
+    with using("en"):
+        return (
+            [] if meeting is None else [tr("meets the tray that the workspace page places at {t:.2f} s", t=meeting.t)]
+        )
+
+
+def _section(
+    path: model.PathSummary,
+    rows: model.PathChecks,
+    motions: model.AvoidanceRows,
+    figure: dict[str, Any] | None,
+    programs: list[dict[str, Any]],
+    summary: model.TrajectorySummary,
+) -> dict[str, Any]:
+    near, assumed = near_assumed(path, summary), summary.verdict.shapes is not None
+    status, verdict = shown_verdict(path, near)
+    return dict(
+        path=path,
+        status=status.replace("plain", "pass"),
+        verdict=verdict,
+        kind=kind_word(path.kind),
+        expected=as_expected(path),
+        text=joined([path_text(path), say(near) if near else ""]),
+        distance=_clear_of(path, assumed),
+        near=near is not None,
+        branches=[branch_word(label) for label in path.branches],
+        speed=_speed(path, summary.joint_limits),
+        events=[_event_row(path, event) for event in path.singularities],
+        faults=_faults(path),
+        strategies=strategies_shown(path),
+        programs=[each for each in programs if not _repairs(path, each)],
+        repaired=[each for each in programs if _repairs(path, each)],
+        shortest="–" if path.verdict != "safe" or path.fastest_s is None else fixed(path.fastest_s, 2),
+        figure=figure,
+    )
+
+
+def _clear_of(path: model.PathSummary, assumed: bool) -> str:
+    """How near a path that passes comes to anything, by ``assumed`` shapes; empty where that is not known."""
+    if path.clearance is None or path.verdict != "safe":
+        return ""
+    far = fixed(path.clearance.least_mm, 1)
+    text = N_("{far} mm clear of assumed shapes: {pair}.") if assumed else N_("{far} mm clear: {pair}.")
+    return tr(text, far=far, pair=say(path.clearance.between))
+
+
+def _repairs(path: model.PathSummary, program: dict[str, Any]) -> bool:
+    return bool(program["file"].rpartition(".")[0] == repair_name(path.name))
+
+
+def _figure(
+    figure: PathFigure,
+    robot: Robot,
+    path: model.PathSummary,
+    rows: model.PathChecks,
+    motions: model.AvoidanceRows,
+    near: model.NearThresholds,
+) -> dict[str, Any]:
+    alt = tr(
+        "Panels over time for {path}: joint angles, velocities and accelerations; distances from the singular sets, "
+        "condition number, manipulability; the path in space; joint speeds against their limits. {finding}.",
+        path=path.name,
+        finding=path_text(path),
+    )
+    uri = figure.draw(robot, path, _drawn(path, rows), motions, near)
+    inches, caption = float(figure.figure.get_figwidth()), _conclusion(path, rows)
+    return dict(
+        uri=uri, alt=alt, caption=caption, inches=inches, panels=figure.panels(), readings=readings(figure.figure)
+    )
+
+
+def _drawn(path: model.PathSummary, rows: model.PathChecks) -> model.PathChecks:
+    """The rows that a curve needs: evenly spread ones, those at singular poses, and the maximum speeds."""
+    even = np.linspace(0, len(rows) - 1, min(DRAWN, len(rows))).round()
+    events = [int(np.argmin(np.abs(rows.t_s - event.t_s))) for event in path.singularities]
+    speed = np.nan_to_num(rows.speed_ratio)
+    fast = np.flatnonzero(speed > 0.5 * speed.max())[:: max(1, len(rows) // DRAWN // 2)]
+    return rows.take(np.unique(np.concatenate([even, events, fast]).astype(int)))
+
+
+def _faults(path: model.PathSummary) -> list[list[str]]:
+    return [
+        [
+            word,
+            moment(path.name, part.t0_s, fixed(part.t0_s, 3)),
+            moment(path.name, part.t1_s, fixed(part.t1_s, 3)),
+            fixed(part.s0_m * 1000, 1),
+            fixed(part.s1_m * 1000, 1),
+            cause_text(path, part),
+        ]
+        for word, part in sorted(
+            ((word, part) for word, stretches in kinds(path) for part in adjoined(stretches)),
+            key=lambda each: each[1].t0_s,
+        )
+    ]
+
+
+def strategies_shown(path: model.PathSummary) -> list[list[str]]:
+    """Rows of the comparison: the programme, each strategy, and the exact path at its fastest."""
+    if not path.avoidance:
+        return []
+    clearance = _clearance(path.clearance.least_mm, path.clearance.between) if path.clearance else "–"
+    ratios = _ratio(path.max_joint_speed_ratio), _ratio(path.max_joint_acceleration_ratio)
+    programmed = ["0.00", "0.00", *ratios, clearance, fixed(path.duration_s, 2), tr("the path to be repaired")]
+    rows = [[tr("as programmed"), *programmed]]
+    for tried in path.avoidance:
+        name = strategy_word(tried.name) + (" ←" if tried.name == path.strategy else "")
+        if tried.motion is None:
+            rows.append([name, *["–"] * 6, tr("not possible: {reason}", reason=reasons(tried))])
+        else:
+            rows.append([name, *_costs(tried.motion), _remark(tried, tried.motion)])
+    if path.fastest_s and not (path.out_of_limits or path.collisions or path.unreachable):
+        costs = ["0.00", "0.00", "1.00", "1.00", clearance, fixed(path.fastest_s, 2)]
+        remark = tr("for comparison: only with a speed that varies along the path as the limits allow")
+        rows.append([tr("the path at its fastest"), *costs, remark])
+    return rows
+
+
+def _costs(motion: model.StrategyMotion) -> list[str]:
+    return [
+        fixed(motion.max_deviation_mm, 2),
+        fixed(motion.max_deviation_deg, 2),
+        _ratio(motion.max_joint_speed_ratio),
+        _ratio(motion.max_joint_acceleration_ratio),
+        _clearance(motion.clearance_mm, motion.clearance_between),
+        fixed(motion.duration_s, 2),
+    ]
+
+
+def _clearance(value: float | None, pair: Pair | None) -> str:
+    return "–" if value is None or pair is None else bracketed(fixed(value, 0), say(pair))
+
+
+def _remark(tried: model.TriedStrategy, motion: model.StrategyMotion) -> str:
+    if tried.reasons:
+        return tr("not usable: {reason}", reason=reasons(tried))
+    if tried.name == "detour":
+        return tr("joint moves are unaffected by singularities")
+    return tr("keeps its distance from singular poses") if motion.keeps_clear else tr("goes through the region")
+
+
+def _ratio(value: float | None) -> str:
+    if value is None:
+        return tr("no bound")
+    return f"> {FAR:g}" if value > FAR else fixed(value, 2)
+
+
+def _conclusion(path: model.PathSummary, rows: model.PathChecks) -> str:
+    """What the curves show, in one or two sentences."""
+    condition, parts = rows.condition_number, []
+    joint = path.fastest_joint
+    if (path.max_joint_speed_ratio or 0.0) > FAR:
+        parts.append(tr("A joint would need more than {times:g} times its speed.", times=FAR))
+    elif path.max_joint_speed_deg_s and joint is not None:
+        speed = number(path.max_joint_speed_deg_s[joint], 3)
+        parts.append(tr("J{joint} is the fastest joint, with {speed} deg/s.", joint=joint + 1, speed=speed))
+    elif rows.reachable.any():
+        parts.append(tr("Towards the edge of reach the joint speeds grow without bound: the path must end before it."))
+    else:
+        parts.append(tr("No point of the path can be reached."))
+    if np.isinf(condition).any() or any(event.crossing for event in path.singularities):
+        parts.append(tr("The condition number has no bound at the marked singular poses."))
+    elif not np.isnan(condition).all():
+        most = number(float(np.nanmax(condition)), 3)
+        parts.append(tr("The condition number rises to {most} at most.", most=most))
+    return " ".join(parts)
+
+
+def _speed(path: model.PathSummary, limits: model.LimitsUsed) -> str:
+    """The speed of the joint that comes nearest to its limit."""
+    speeds = path.max_joint_speed_deg_s
+    if not speeds:
+        return "–" if not path.joint_speed_bounded and path.verdict == "unreachable" else tr("unbounded")
+    joint = max(range(len(speeds)), key=lambda j: speeds[j] / limits.speed_deg_s[j])
+    unit = " mm/s" if joint + 1 in path.sliding else ""
+    return f"{fixed(speeds[joint], 1)}{unit} (J{joint + 1})"
+
+
+def _event_row(path: model.PathSummary, event: model.Singularity) -> list[str]:
+    until = f" – {fixed(event.until_s, 3)}" if event.until_s > event.t_s else ""
+    when, span = moment(path.name, event.t_s, fixed(event.t_s, 3) + until), open_beside(path, event)
+    if event.crossing:
+        return [event_word(event), when, tr("meets it"), "0"]
+    how = tr("passes by") if span is None else passing_text(event, span)
+    return [event_word(event), when, how, event_distance(event)]

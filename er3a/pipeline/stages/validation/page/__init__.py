@@ -1,0 +1,1 @@
+"""Page and recording of the stage validation: results in, views out."""

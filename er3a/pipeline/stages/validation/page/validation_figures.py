@@ -1,0 +1,416 @@
+"""Figures of the validation page; sentences, rows and captions of diagnosis and calibration."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes as PlotAxes
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+
+from er3a.diagnosis.conclusions import MainFault, MostLikelyFault, TooSmallToTell
+from er3a.kinematics.forward import forward, frames, skeleton
+from er3a.numerics.arrays import Reals
+from er3a.pipeline.language import N_, own_title, tr
+from er3a.pipeline.messages.diagnosis import both, level
+from er3a.pipeline.messages.numbers import decimals_of_spreads, fixed
+from er3a.pipeline.messages.say import bracketed, joined, say, sentence
+from er3a.pipeline.stages.validation import model
+from er3a.pipeline.viewing.figures import axis_label, equal_scale, new_figure
+from er3a.pipeline.viewing.page import Picture
+from er3a.pipeline.viewing.palette import GRID, HIGHLIGHT, INK, LINK, MODEL, MUTED, REFERENCE
+from er3a.references.quantities import nearest_on_axis, point_of
+from er3a.robots.robot import Robot
+
+REFERENCE_COLOURS = (REFERENCE, HIGHLIGHT)
+MARKERS = (("o", 13), ("s", 18), ("D", 22))
+SEEN_END_ON = 0.9
+REGION = "#dcebf5"
+HAIR = 0.9
+
+
+SIX = 6
+
+
+def side_view(robot: Robot, stated: model.Axes, corrected: Robot | None, corrected_label: str) -> Figure:
+    """The arm in its zero pose from the side, to scale, with its joint axes over those that the references state."""
+    figure, axes = new_figure(width=7, height=7.4)
+    corners = skeleton(robot, np.zeros(robot.joints)) * 1000
+    drawn = [corners]
+    if corrected is not None:
+        dashed = skeleton(corrected, np.zeros(corrected.joints)) * 1000
+        axes.plot(dashed[:, 0], dashed[:, 2], "--", color=MUTED, linewidth=2, label=corrected_label)
+        drawn.append(dashed)
+    size = float(np.ptp(np.vstack([*drawn, stated.point_mm]), axis=0).max())
+    style = {"solid_capstyle": "round", "solid_joinstyle": "round", "zorder": 1}
+    axes.plot(corners[:, 0], corners[:, 2], color=LINK, linewidth=9, label=tr("model's links"), **style)
+    axes.axhline(0, color=MUTED, linewidth=1, zorder=0)
+    for k, (source, own) in enumerate(_by_source(stated)):
+        marker, points = MARKERS[k % len(MARKERS)]
+        colour = REFERENCE_COLOURS[k % len(REFERENCE_COLOURS)]
+        lines = list(zip(own.joint, own.direction, own.point_mm))
+        label = tr("axes: {own_source}", own_source=_short(source))
+        _axes_of(axes, lines, size * (0.16 + 0.02 * k), label, colour=colour, marker=marker, points=points, hollow=True)
+        off = own.distance_mm > 0.05 * size
+        if k == 0:
+            _label(axes, zip(own.joint[off], own.point_mm[off]), colour, (10, -17))
+    lines = _model_axes(robot)
+    _axes_of(axes, lines, size * 0.13, tr("model's axes"), colour=MODEL, marker="o", points=6, hollow=False)
+    _label(axes, [(joint, point) for joint, _, point in lines], MODEL, (9, 9))
+    equal_scale(axes, "x (mm)", "z (mm)")
+    axes.margins(0.12)
+    figure.legend(loc="outside lower left", ncols=1)
+    return figure
+
+
+def axis_deviation(stated: model.Axes) -> Figure:
+    """Per joint and source: how far the model's axis is off the stated one, in mm and in degrees."""
+    figure, panels = new_figure(1, 2, width=9, height=4)
+    sources = _by_source(stated)
+    width = 0.8 / len(sources)
+    for axes, value, bound, label in zip(
+        panels,
+        (stated.distance_mm, stated.angle_deg),
+        (stated.uncertainty_mm, stated.uncertainty_deg),
+        (axis_label(stated, "distance_mm"), axis_label(stated, "angle_deg")),
+    ):
+        for k, (source, _) in enumerate(sources):
+            own = stated.source == source
+            at = stated.joint[own] + (k - (len(sources) - 1) / 2) * width
+            axes.bar(at, value[own], width * 0.9, color=REFERENCE_COLOURS[k % len(REFERENCE_COLOURS)])
+            axes.bar(at, bound[own], width * 0.9, facecolor="none", edgecolor=INK, linewidth=0.8)
+        axes.set_ylabel(label)
+        last = int(max(6, stated.joint.max()))
+        axes.set_xticks(range(1, last + 1), [f"J{joint}" for joint in range(1, last + 1)])
+        axes.set_ylim(0, 1.15 * max(value.max(), bound.max()))
+        axes.grid(axis="x", visible=False)
+        axes.set_axisbelow(True)
+        for joint in np.unique(stated.joint):
+            own = stated.joint == joint
+            worst = value[own].max()
+            text = f"{worst:.0f}" if worst >= 10 else f"{worst:.2f}"
+            at = (joint, max(worst, bound[own].max()))
+            axes.annotate(text, at, (0, 2), textcoords="offset points", ha="center", fontsize=8)
+    for k, (source, _) in enumerate(sources):
+        panels[0].bar([0], [0], color=REFERENCE_COLOURS[k % len(REFERENCE_COLOURS)], label=_short(source))
+    panels[0].bar([0], [0], facecolor="none", edgecolor=INK, label=tr("uncertainty of the source"))
+    panels[0].set_xlim(0.4, 6.6)
+    figure.legend(loc="outside lower left", ncols=1)
+    return figure
+
+
+def workspace_drawing(section: model.Section, labels: model.KeyPoses, origin_mm: Sequence[float]) -> Figure:
+    """The side view of the wrist centre's region from the model, with the drawing's labels, numbered from 1."""
+    figure, axes = new_figure(width=9, height=8)
+    shape = (len(np.unique(section.q2_deg)), len(np.unique(section.q3_deg)))
+    x, z = section.x_mm.reshape(shape), section.z_mm.reshape(shape)
+    axes.pcolormesh(x, z, np.ones(shape), cmap=ListedColormap([REGION]), shading="gouraud", rasterized=True, zorder=1)
+    for i in np.flatnonzero(section.on_q2_line.reshape(shape).all(axis=1)):
+        axes.plot(x[i], z[i], color=MODEL, linewidth=1.4, zorder=2)
+    for j in np.flatnonzero(section.on_q3_line.reshape(shape).all(axis=0)):
+        axes.plot(x[:, j], z[:, j], color=MODEL, linewidth=1.4, zorder=2)
+    axes.axvline(0, color=GRID, linewidth=1.5, zorder=0)
+    axes.axhline(0, color=GRID, linewidth=1.5, zorder=0)
+    extent = max(np.ptp(x), np.ptp(z))
+    stated, modelled = (points[:, [0, 2]] - origin_mm for points in (labels.point_mm, labels.model_point_mm))
+    for number, at in enumerate(stated, 1):
+        outward = at / max(float(np.linalg.norm(at)), 1.0) * 0.07 * extent
+        axes.annotate(
+            str(number), at, at + outward, ha="center", va="center", fontsize=11, color=INK, zorder=5,
+            bbox={"boxstyle": "circle,pad=0.25", "facecolor": "white", "edgecolor": REFERENCE},
+            arrowprops={"arrowstyle": "-", "color": REFERENCE},
+        )  # fmt: skip
+        axes.plot(*at, "o", markersize=9, markerfacecolor="none", markeredgecolor=REFERENCE, zorder=4)
+        axes.plot(*modelled[number - 1], ".", color=MODEL, markersize=5, zorder=4)
+    margin = 0.12 * extent
+    axes.plot([x.min() - margin, x.max() + margin], [z.min() - margin, z.max() + margin], alpha=0)
+    equal_scale(axes, tr("x from axis 1 (mm)"), tr("z from axis 2 (mm)"))
+    return figure
+
+
+def _by_source(stated: model.Axes) -> list[tuple[str, model.Axes]]:
+    return [(source, stated.take(stated.source == source)) for source in dict.fromkeys(stated.source)]
+
+
+def _axes_of(
+    axes: PlotAxes, lines: list, half: float, label: str, *, colour: str, marker: str, points: float, hollow: bool
+) -> None:
+    """Axes seen end on as markers, the others as dash-dotted lines."""
+    face = "none" if hollow else colour
+    for _, direction, point in lines:
+        if abs(direction[1]) > SEEN_END_ON:
+            axes.plot(
+                point[0], point[2], marker, markersize=points, markerfacecolor=face, markeredgecolor=colour, zorder=3
+            )
+        else:
+            ends = np.array([point - direction * half, point + direction * half])
+            axes.plot(ends[:, 0], ends[:, 2], "-.", color=colour, linewidth=HAIR + hollow, zorder=2)
+    axes.plot([], [], f"{marker}-.", color=colour, markerfacecolor=face, markersize=min(points, 11), label=label)
+
+
+def _model_axes(robot: Robot) -> list[tuple[int, np.ndarray, np.ndarray]]:
+    """Joint, direction and a point (mm) of each axis in the zero pose; axis 4 at the wrist centre."""
+    T = frames(robot, np.zeros(robot.joints))
+    if robot.rows != SIX:
+        return [(k + 1, T[k, :3, 2], T[k, :3, 3] * 1000) for k in range(robot.rows)]
+    points = [*T[:3, :3, 3] * 1000, nearest_on_axis(T, 4, point_of(T, "wrist_centre")), *T[4:6, :3, 3] * 1000]
+    return [(k + 1, T[k, :3, 2], points[k]) for k in range(6)]
+
+
+def _label(axes: PlotAxes, points: Iterable[tuple[int, np.ndarray]], colour: str, shift: tuple[int, int]) -> None:
+    """Name joints at their points; joints that share a point share a label."""
+    groups = _grouped(points, lambda one, other: float(np.linalg.norm((one - other)[[0, 2]])))
+    for point, joints in groups:
+        text = ", ".join(f"J{joint}" for joint in joints)
+        axes.annotate(text, (point[0], point[2]), shift, textcoords="offset points", color=colour, zorder=6)
+
+
+def _grouped(
+    points: Iterable[tuple[int, Reals]], apart: Callable[[Reals, Reals], float]
+) -> list[tuple[Reals, list[int]]]:
+    """Points with their numbers, those at one place (to ``SAME_PLACE_MM``) together."""
+    groups: list[tuple[Reals, list[int]]] = []
+    for number, point in points:
+        there = next((numbers for other, numbers in groups if apart(point, other) < SAME_PLACE_MM), None)
+        if there is None:
+            groups.append((point, [number]))
+        else:
+            there.append(number)
+    return groups
+
+
+def _short(source: str) -> str:
+    """A source's title, which is what stands before a colon."""
+    return re.split("[:：]", own_title(source))[0]
+
+
+AZIMUTH, ELEVATION = np.radians(-58.0), np.radians(18.0)
+FRAME_COLOURS = ("#d62728", "#2ca02c", "#1f77b4")
+ARROW = 0.09
+SAME_PLACE_MM = 1.0
+LABEL_SHIFT = 9
+
+
+def link_frames(robot: Robot, other: Robot | None, other_label: str) -> Figure:
+    """The links at all joints 0 with frames 0 (base) to n (flange), x red, y green, z blue; another table dashed."""
+    figure, axes = new_figure(width=5.4, height=5.6)
+    zero = np.zeros(robot.joints)
+    corners = skeleton(robot, zero) * 1000
+    drawn = [corners]
+    if other is not None:
+        drawn.append(skeleton(other, zero) * 1000)
+        axes.plot(*_seen(drawn[1]).T, "--", color=MUTED, linewidth=1.6, label=other_label, zorder=2)
+    axes.plot(*_seen(corners).T, color=LINK, linewidth=8, solid_capstyle="round", solid_joinstyle="round", zorder=1)
+    size = float(np.ptp(np.vstack(drawn), axis=0).max())
+    T = np.concatenate([robot.base[None], _frames_of_links(robot)])
+    origins = 1000 * T[:, :3, 3]
+    for frame, origin in zip(T, origins):
+        _triad(axes, origin, frame[:3, :3], ARROW * size)
+    groups = _grouped(enumerate(origins), lambda one, other: float(np.linalg.norm(one - other)))
+    for origin, numbers in groups:
+        text = ", ".join(map(str, numbers))
+        axes.annotate(
+            text, _seen(origin[None])[0], (-LABEL_SHIFT, -LABEL_SHIFT), textcoords="offset points", color=INK,
+            ha="right", va="top", fontsize=10, weight="bold", zorder=5,
+        )  # fmt: skip
+    for colour, name in zip(FRAME_COLOURS, "xyz"):
+        axes.plot([], [], color=colour, linewidth=2.2, label=tr("{name} of a frame", name=name))
+    axes.legend(loc="upper left", fontsize=8)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.margins(0.12)
+    axes.set_axis_off()
+    return figure
+
+
+def _frames_of_links(robot: Robot) -> Reals:
+    """Frames 1 to m - 1 of the table, in which its rows are written, and the flange (m, 4, 4), at all joints 0."""
+    zero = np.zeros(robot.joints)
+    own = [forward(robot, zero, frame=k) for k in range(1, robot.rows)]
+    return np.stack([*own, forward(robot.without_tool(), zero)])
+
+
+def _seen(points: Reals) -> Reals:
+    """Points (n, 3) as they are seen from the corner, (n, 2)."""
+    x, y, z = points.T
+    across = x * np.cos(AZIMUTH + np.pi / 2) + y * np.sin(AZIMUTH + np.pi / 2)
+    toward = x * np.cos(AZIMUTH) + y * np.sin(AZIMUTH)
+    return np.column_stack([across, z * np.cos(ELEVATION) - toward * np.sin(ELEVATION)])
+
+
+def _triad(axes: PlotAxes, origin: Reals, turn: Reals, length: float) -> None:
+    for k, colour in enumerate(FRAME_COLOURS):
+        ends = _seen(np.stack([origin, origin + turn[:, k] * length]))
+        axes.annotate(
+            "", ends[1], ends[0], arrowprops={"arrowstyle": "-|>", "color": colour, "linewidth": 1.8}, zorder=4
+        )
+
+
+def typographic(text: str) -> str:
+    """A text with minus signs instead of hyphens before numbers."""
+    return re.sub(r"(?<![0-9A-Za-z])-(?=[0-9])", "−", text)
+
+
+OWN_CLAIMS = N_(
+    "Correcting that makes the table agree with its own source's statements alone, which are no evidence about a real "
+    "robot: don't use the corrected table for one."
+)
+SHOWN_HYPOTHESES = 5
+SHOWN_RESIDUALS = 12
+MIN_DRAWN = 1e-3
+
+
+def diagnosis_stories(summary: model.ValidationSummary, residuals: model.Residuals) -> list[dict[str, Any]]:
+    """Per reference set: what the diagnosis says, the next-best hypotheses, and the residuals as a figure."""
+    claims = {found.name for found in summary.sets if not found.is_authoritative}
+    return [_diagnosis_story(each, residuals, each.reference_set in claims) for each in summary.diagnoses]
+
+
+def correction_stories(summary: model.ValidationSummary, corrections: model.Corrections) -> list[dict[str, Any]]:
+    """Per reference set: what its positions say about the table's entries, with the figure."""
+    return [_calibration_story(calibration, corrections) for calibration in summary.calibrations]
+
+
+def _diagnosis_story(diagnosis: model.SetDiagnosis, residuals: model.Residuals, own_claims: bool) -> dict[str, Any]:
+    named = isinstance(diagnosis.conclusion, MostLikelyFault | MainFault | TooSmallToTell)
+    best = diagnosis.hypotheses[0] if named else None
+    return dict(
+        reference_set=diagnosis.reference_set,
+        text=joined([typographic(say(diagnosis.conclusion)), tr(OWN_CLAIMS) if own_claims and best else ""], " "),
+        against=_measured_against(diagnosis),
+        to_decide=typographic(say(best.to_decide)) if best and best.to_decide else "",
+        others_title=tr("Next best hypotheses")
+        if named
+        else tr("The best hypotheses, none of which explains the data"),
+        others=[_hypothesis_row(each) for each in diagnosis.hypotheses[1 if named else 0 : SHOWN_HYPOTHESES]],
+        hypotheses_tried=diagnosis.hypotheses_tried,
+        picture=_residual_picture(residuals.take(residuals.reference_set == diagnosis.reference_set), diagnosis),
+    )
+
+
+def _measured_against(diagnosis: model.SetDiagnosis) -> str:
+    """What residuals are measured against, and what of that is no evidence."""
+    own = [own_title(title) for title in diagnosis.against if title in diagnosis.from_table]
+    others = [own_title(title) for title in diagnosis.against if title not in diagnosis.from_table]
+    text = tr("Residuals are measured against: {documents}.", documents=joined(others)) if others else ""
+    if own:
+        template = (
+            N_("Also compared with {documents}: taken from the table, or the table from them, so no evidence for it.")
+            if others
+            else N_(
+                "Residuals are measured against {documents}: the table was taken from it or it from the table, so "
+                "they are no evidence for its numbers."
+            )
+        )
+        text = joined([text, tr(template, documents=joined(own))], " ")
+    return text
+
+
+def _calibration_story(calibration: model.SetCalibration, corrections: model.Corrections) -> dict[str, Any]:
+    found = calibration.result if isinstance(calibration.result, model.Calibrated) else None
+    text = typographic(say(found.conclusion if found else calibration.result))
+    own = corrections.take(corrections.reference_set == calibration.reference_set)
+    decimals = {unit: decimals_of_spreads(own.half_width[own.unit == unit]) for unit in np.unique(own.unit)}
+    alt = tr("Correction of each estimated entry of the table with its 95 % interval, lengths and angles apart.")
+    return dict(
+        reference_set=calibration.reference_set,
+        found=found,
+        text=text,
+        level=level(found.level) if found else "",
+        held=[typographic(say(reason)) for reason in found.held] if found else [],
+        close=[
+            sentence(
+                "close",
+                first=pair.first,
+                second=pair.second,
+                correlation=fixed(pair.correlation, 2),
+            )
+            for pair in (found.close if found else ())
+        ],
+        more=typographic(say(found.more)) if found and found.more else "",
+        picture=Picture(corrections_figure(own), alt, text) if len(own) else None,
+        rows=[
+            [entry, *(fixed(value, decimals[unit]) for value in (nominal, correction, half_width)), tr(unit)]
+            for entry, nominal, correction, half_width, unit in zip(
+                own.entry, own.nominal, own.correction, own.half_width, own.unit
+            )
+        ],
+    )
+
+
+def residual_figure(rows: model.Residuals) -> Figure:
+    """Residuals before and after the best hypothesis, with each reference's uncertainty; worst on top."""
+    figure, axes = new_figure(width=9, height=1.5 + 0.32 * len(rows))
+    at = np.arange(len(rows))[::-1]
+    before, after = np.maximum(rows.before, MIN_DRAWN), np.maximum(rows.after, MIN_DRAWN)
+    axes.hlines(at, np.minimum(before, after), np.maximum(before, after), color=MUTED, linewidth=1.2)
+    axes.plot(before, at, "o", color=REFERENCE, label=tr("table as it is"))
+    axes.plot(after, at, "D", color=MODEL, markersize=5, label=tr("with the best hypothesis corrected"))
+    axes.plot(rows.uncertainty, at, "|", color=INK, markersize=13, label=tr("uncertainty of the reference"))
+    axes.set_xscale("log")
+    axes.set_yticks(at, [bracketed(say(subject), tr(unit)) for subject, unit in zip(rows.subject, rows.unit)])
+    axes.set_ylim(-0.7, len(rows) - 0.3)
+    axes.set_xlim(MIN_DRAWN / 1.5, 2 * max(before.max(), after.max()))
+    axes.grid(axis="y", visible=False)
+    axes.set_xlabel(tr("residual (mm or deg, as named; smaller ones are drawn at {least:g})", least=MIN_DRAWN))
+    figure.legend(loc="outside upper left", ncols=3)
+    return figure
+
+
+def corrections_figure(rows: model.Corrections) -> Figure:
+    """Corrections with their 95 % intervals, lengths and angles in panels of their own."""
+    parts = [rows.take(rows.unit == unit) for unit in ("mm", "deg") if (rows.unit == unit).any()]
+    counts = [len(own) for own in parts]
+    figure, panels = new_figure(1, len(parts), width=9, height=3.4, width_ratios=counts, squeeze=False)
+    for axes, own in zip(panels[0], parts):
+        at = np.arange(len(own))
+        axes.axhline(0, color=MUTED, linewidth=1)
+        axes.errorbar(at, own.correction, own.half_width, fmt="o", color=MODEL, capsize=4, elinewidth=1.4)
+        axes.set_xticks(at, own.entry, rotation=45 if len(own) > 8 else 0)
+        axes.set_xlim(-0.6, len(own) - 0.4)
+        axes.set_ylabel(tr("correction ({unit})", unit=tr(own.unit[0])))
+        axes.grid(axis="x", visible=False)
+    return figure
+
+
+def _residual_picture(rows: model.Residuals, diagnosis: model.SetDiagnosis) -> Picture | None:
+    missed = rows.take((rows.before > rows.uncertainty) | (rows.after > rows.uncertainty))
+    if not len(missed):
+        return None
+    shown = missed.take(np.arange(len(missed)) < SHOWN_RESIDUALS)
+    still = int((missed.after > missed.uncertainty).sum())
+    if isinstance(diagnosis.conclusion, MostLikelyFault | TooSmallToTell):
+        caption = tr("With the best hypothesis corrected, every number is within its reference's uncertainty.")
+    elif diagnosis.hypotheses:
+        caption = tr("Even the best hypothesis leaves {still} of {all} references missed.", still=still, all=len(rows))
+    else:
+        caption = tr("No hypothesis fits better than the table as it is.")
+    if len(missed) > len(shown):
+        more = tr("The figure shows the {drawn} largest of {missed}.", drawn=len(shown), missed=len(missed))
+        caption = joined([caption, more], " ")
+    alt = tr("Residual of each missed reference before and after the best hypothesis, on a logarithmic axis.")
+    return Picture(residual_figure(shown), alt, caption)
+
+
+def _hypothesis_row(hypothesis: model.RankedHypothesis) -> list[str]:
+    words = both(hypothesis.faults)
+    if alike := hypothesis.indistinguishable_from:
+        words = sentence(
+            "alike",
+            faults=words,
+            more=len(alike),
+        )
+    numbers = [fixed(value, 1) for value in (hypothesis.residual_before, hypothesis.residual_after)]
+    return [typographic(words), *numbers, tr(hypothesis.unit), fixed(hypothesis.score, 1)]
+
+
+def corrected_robot(robot: Robot, diagnoses: Iterable[model.SetDiagnosis]) -> tuple[Robot | None, str]:
+    """The robot with the first named fault corrected, and its label; None if no fault is named."""
+    for diagnosis in diagnoses:
+        if diagnosis.corrected and isinstance(diagnosis.conclusion, MostLikelyFault | MainFault):
+            label = sentence("corrected", faults=typographic(both(diagnosis.conclusion.faults)))
+            return robot.replace(**asdict(diagnosis.corrected)), label
+    return None, ""

@@ -1,0 +1,1 @@
+"""Page and recording of the stage vision: results in, views out."""

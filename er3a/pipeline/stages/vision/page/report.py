@@ -1,0 +1,325 @@
+"""The page of the vision stage."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+from markupsafe import Markup
+from matplotlib.ticker import MaxNLocator
+
+from er3a.files.hand_eye_file import HandEyeFile, grey_image
+from er3a.files.vision_file import load_vision
+from er3a.files.yaml_file import load
+from er3a.numerics.arrays import Reals
+from er3a.pipeline.language import N_, own_title, tr
+from er3a.pipeline.messages.numbers import decimals_of_spreads, fixed
+from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
+from er3a.pipeline.messages.vision import pose_words
+from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion
+from er3a.pipeline.player.player import drawing_head, player
+from er3a.pipeline.results import LeftOut, Stored
+from er3a.pipeline.settings import TrajectorySettings
+from er3a.pipeline.stages.vision import model
+from er3a.pipeline.study import Study
+from er3a.pipeline.viewing.conditions import condition_of, program_head
+from er3a.pipeline.viewing.figures import equal_scale, new_figure
+from er3a.pipeline.viewing.page import (
+    Picture,
+    panel_link,
+    render_stage,
+    text_address,
+)
+from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MODEL
+from er3a.programs.languages import titles_unwritten
+from er3a.programs.writing import with_head_lines
+from er3a.robots.joint_limits import meant
+from er3a.robots.robot import Robot
+
+MIN_RANGE = 0.02  # of the largest value, by which a map's colours go beyond its values
+MAX_IMAGES = 9
+WIDEST_PX = 480
+ARROW_PX = 30.0
+
+
+def residual_picture(rows: model.SampleRows, found: model.CalibrationResult) -> Picture:
+    """Length of each sample's residual, position above, rotation below."""
+    sizes = np.linalg.norm(rows.residual_mm, axis=1), np.linalg.norm(rows.residual_deg, axis=1)
+    usual = [1.6 * found.camera_mm, 1.6 * found.camera_deg]
+    figure, axes = new_figure(2, 1, height=4.6, sharex=True)
+    for ax, size, mean, label in zip(axes, sizes, usual, (tr("position (mm)"), tr("rotation (deg)"))):
+        number = np.arange(1, len(rows) + 1)
+        ax.bar(number[rows.used], size[rows.used], color=MODEL, label=tr("used"))
+        ax.bar(number[~rows.used], size[~rows.used], color=HIGHLIGHT, label=tr("left out"))
+        ax.axhline(mean, color=INK, linewidth=1, linestyle="--", label=tr("expected mean"))
+        ax.set_yscale("log")
+        ax.set_ylabel(label)
+        ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes[1].set_xlabel(tr("sample"))
+    axes[0].legend(ncols=3, loc="upper right")
+    worst = int(np.argmax(np.where(rows.used, sizes[0], 0.0)))
+    caption = tr(
+        "Residual of each sample, on a logarithmic scale. Bars far above the dashed line are outliers; samples "
+        "left out are coloured. Of the samples used, {name} is farthest off: {mm} mm.",
+        name=rows.sample[worst],
+        mm=fixed(sizes[0][worst], 2),
+    )
+    return Picture(figure, tr("Bars of the residual of each sample, in mm and in degrees"), caption)
+
+
+def image_picture(rows: model.CornerRows, folder: Path) -> Picture:
+    """The images with the largest residuals: corners detected, and arrows to where arm and calibration put them."""
+    off = rows.by_arm_px - rows.seen_px
+    size = {
+        name: float(np.sqrt((off[rows.image == name] ** 2).sum(axis=1).mean())) for name in dict.fromkeys(rows.image)
+    }
+    shown = sorted(size, key=lambda name: -size[name])[:MAX_IMAGES]
+    columns = min(3, len(shown))
+    lines = -(-len(shown) // columns)
+    figure, axes = new_figure(lines, columns, height=2.6 * lines, squeeze=False)
+    usual = float(np.median(list(size.values())))
+    scale = max(1.0, float(f"{ARROW_PX / max(usual, 1e-3):.1g}"))
+    for ax, name in zip(axes.ravel(), shown):
+        own = rows.image == name
+        picture = grey_image(folder / name)
+        step = max(1, picture.shape[1] // WIDEST_PX)
+        height, width = picture.shape
+        frame = (-0.5, width - 0.5, height - 0.5, -0.5)
+        ax.imshow(picture[::step, ::step], cmap="gray", vmin=0, vmax=255, extent=frame, rasterized=True)
+        seen, arrow = rows.seen_px[own], scale * off[own]
+        ax.plot(*seen.T, ".", color=MODEL, markersize=3, label=tr("detected"))
+        ends = np.stack([seen, seen + arrow, np.full_like(seen, np.nan)], axis=1).reshape(-1, 2)
+        ax.plot(*ends.T, color=HIGHLIGHT, linewidth=1, label=tr("to the reprojected corner"))
+        left = "" if rows.used[own].all() else tr(", left out")
+        ax.set_title(f"{rows.sample[own][0]}: {fixed(size[name], 2)} px{left}", fontsize=8)
+        ax.set_xlim(-0.5, width - 0.5)
+        ax.set_ylim(height - 0.5, -0.5)
+        ax.set_aspect("equal")
+        ax.set_axis_off()
+    for ax in axes.ravel()[len(shown) :]:
+        ax.set_axis_off()
+    axes[0, 0].legend(loc="lower left", fontsize=6)
+    by_board = float(np.sqrt(((rows.by_board_px - rows.seen_px)[rows.used] ** 2).sum(axis=1).mean()))
+    by_arm = float(np.sqrt((off[rows.used] ** 2).sum(axis=1).mean()))
+    caption = tr(
+        "Detected corners with lines towards their position by arm and calibration, magnified {scale:g} times; "
+        "the {shown} of {count} images with the greatest residuals. In the images used, detected corners are "
+        "{board} px (root mean square) from the board's own pose in the image (the camera's noise) and {arm} px"
+        " from the pose by the arm. Lines all in one direction: wrong pose of arm or board. Lines circling a "
+        "point: board detected the wrong way round. Short lines in all directions: noise.",
+        scale=scale,
+        shown=len(shown),
+        count=len(size),
+        board=fixed(by_board, 2),
+        arm=fixed(by_arm, 2),
+    )
+    return Picture(figure, tr("Images of the board with detected and reprojected corners"), caption)
+
+
+def map_picture(rows: model.ErrorMapRows, objects: tuple[model.ObjectResult, ...]) -> Picture:
+    """Errors around the objects, from above."""
+    x, y = np.unique(rows.x_mm), np.unique(rows.y_mm)
+    seen = rows.in_view
+    both = seen & rows.reached
+    panels = (
+        (tr("calibration alone"), rows.calibration_mm, tr("95 % of errors below (mm)")),
+        (tr("repeatability and table"), rows.arm_mm, tr("95 % of errors below (mm)")),
+        (tr("everything"), rows.together_mm, tr("95 % of errors below (mm)")),
+        (tr("everything, turns"), rows.together_deg, tr("95 % of errors below (°)")),
+    )
+    figure, axes = new_figure(2, 2, height=7.4)
+    for ax, (title, column, label) in zip(axes.ravel(), panels):
+        value = np.where(seen, column, np.nan).reshape(len(y), len(x))
+        known = value[np.isfinite(value)]
+        ends = (known.min() - MIN_RANGE * known.max(), (1 + MIN_RANGE) * known.max()) if known.size else (0.0, 1.0)
+        mesh = ax.pcolormesh(
+            x, y, value, cmap="viridis_r", shading="nearest", rasterized=True, vmin=ends[0], vmax=ends[1]
+        )
+        figure.colorbar(mesh, ax=ax, label=label, shrink=0.85)
+        for each in objects:
+            ax.plot(each.xyz_mm[0], each.xyz_mm[1], "o", color="white", markeredgecolor=INK)
+            ax.annotate(
+                each.name,
+                each.xyz_mm[:2],
+                xytext=(4, 4),
+                textcoords="offset points",
+                fontsize=8,
+                bbox={"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 0.5},
+            )
+        ax.set_title(title)
+        ax.grid(False)
+        equal_scale(ax, "x (mm)", "y (mm)")
+    blank = "" if both.all() else tr("Blank cells are out of the camera's view or of the arm's reach.")
+    caption = tr(
+        "Grasp errors (first object, at each position) at the objects' mean height, from above. Within the "
+        "camera's view: calibration alone {least} to {most} mm; repeatability and table {arm_least} to "
+        "{arm_most} mm; all together, with the camera's noise in one reading, {low} to {high} mm and {turn_low}"
+        " to {turn_high}°. Where the first map is far below the third, more calibration samples help little.",
+        **_range(rows.calibration_mm[seen], "least", "most"),
+        **_range(rows.arm_mm[both], "arm_least", "arm_most"),
+        **_range(rows.together_mm[both], "low", "high"),
+        **_range(rows.together_deg[both], "turn_low", "turn_high"),
+    )
+    caption = joined([caption, blank], " ")
+    return Picture(figure, tr("Four maps of the error around the objects, from above"), caption)
+
+
+def _range(values: Reals, low: str, high: str) -> dict[str, str]:
+    """The smallest and largest, to be filled in; a dash where there are none."""
+    if not values.size:
+        return {low: "–", high: "–"}
+    return {low: fixed(float(values.min()), 2), high: fixed(float(values.max()), 2)}
+
+
+POINTER_M = 0.15
+WAYS = {"move": N_("move to the approach"), "approach": N_("approach"), "retreat": N_("retreat")}
+AXES = ("x", "y", "z")
+PARTS = {
+    "camera": N_("camera's noise in one reading"),
+    "calibration": N_("calibration"),
+    "repeatability": N_("arm's repeatability"),
+    "table": N_("arm's table"),
+    "together": N_("together"),
+}
+
+
+SIMULATED = N_("The camera is simulated: put in the position that a real one measures before you run this.")
+NO_LOAD = N_("Whether the arm may carry the object was not examined.")
+
+
+def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> None:
+    """Write the page from the stage's results."""
+    name, results, summary = stored.robot, stored.results, stored.results.summary
+    found, scene = summary.calibration, study.scene(name, stored.stage)
+    robot, contradicted = study.robot(name), stored.rests_on.get("validation") == "fail"
+    boxes = [LeftOut("placed_box")] if "workspace" in study.stages(name) else []
+    head = program_head(stored.validated, [*summary.not_examined, *boxes])
+    render_stage(
+        study,
+        stored,
+        output,
+        found=found,
+        poses=_poses(found) if found else [],
+        suspects=listed((*found.suspects, *found.open_tilts, *found.boardless)) if found else [],
+        warnings=listed(found.warnings) if found else [],
+        touched=_touched(found.touch) if found and found.touch else [],
+        residuals=residual_picture(results.samples, found) if found else None,
+        images=image_picture(results.corners, _image_folder(study, name)) if len(results.corners) else None,
+        map=map_picture(results.error_map, summary.objects) if len(results.error_map) else None,
+        overview=[_overview(each) for each in summary.objects],
+        slides=bool(robot.slides.any()),
+        grasps=[_grasp(each) for each in summary.objects if each.grasp],
+        programs=[] if contradicted else _programs(results.programs, head),
+        program_warnings=[
+            *filter(None, [condition_of(stored.validated)]),
+            *([tr(SIMULATED)] if found and found.simulated else []),
+            tr(NO_LOAD),
+        ],
+        unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
+        errors=[_errors(each) for each in summary.objects if each.error_mm],
+        error_columns=[tr("Object"), *(f"{word('vision.part_of_error', PARTS, part)}>" for part in PARTS)],
+        player=player(robot, _motions(robot, results), scene),
+        drawing_head=drawing_head(),
+        next_pose=panel_link(found.next_view.q_deg, _listed(found.next_view.q_deg))
+        if found and found.next_view
+        else "",
+    )
+
+
+def _image_folder(study: Study, name: str) -> Path:
+    """Where the table of samples stands, beside which its images are."""
+    file = Path(str(study.entry(name).vision))
+    head = file.parent / load_vision(file).calibration
+    return (head.parent / str(load(HandEyeFile, head).samples)).parent
+
+
+def _programs(rows: model.GraspPrograms, head: Sequence[str]) -> list[tuple[str, list[tuple[str, str]]]]:
+    """Of each object its programs: the file's name, and the data address of its text, which begins with ``head``."""
+    found: dict[str, list[tuple[str, str]]] = {}
+    for target, file, text in zip(rows.target.tolist(), rows.file.tolist(), rows.text.tolist()):
+        found.setdefault(target, []).append((file, text_address(with_head_lines(text, head))))
+    return list(found.items())
+
+
+def _motions(robot: Robot, results: model.VisionResults) -> list[PlayedMotion]:
+    """The way to each object grasped and away from it, with a line that points at the object."""
+    motions = []
+    for each in results.summary.objects:
+        rows = results.ways.take(results.ways.target == each.name)
+        if each.grasp is None or not len(rows):
+            continue
+        parts = [(part, rows.t_s[rows.part == part]) for part in dict.fromkeys(rows.part.tolist())]
+        events = [PlayedEvent(float(own[0]), float(own[-1]), tr(WAYS[part]), "plain") for part, own in parts]
+        x, y, z = (value / 1000 for value in each.xyz_mm)
+        mark = Mark(0.0, float(rows.t_s[-1]), (x, y, z), (x, y, z + POINTER_M), each.name)
+        text = tr("{grasp}, turned by {turn} deg", grasp=each.grasp.grasp, turn=fixed(each.grasp.turn_deg, 0))
+        motions.append(PlayedMotion(each.name, text, rows.t_s, meant(robot, rows.q_deg), events, [mark]))
+    return motions
+
+
+def _listed(values: Iterable[float], digits: int = 1) -> str:
+    return ", ".join(fixed(value, digits) for value in values)
+
+
+def _poses(found: model.CalibrationResult) -> list[tuple[str, str, list[list[str]]]]:
+    """Title, quaternion and rows of both poses with intervals."""
+    both = zip(pose_words(found.setup), (found.hand_eye, found.board))
+    return [(title, _listed(pose.quaternion_wxyz, 6), _pose_rows(pose)) for title, pose in both]
+
+
+def _pose_rows(pose: model.PoseEstimate) -> list[list[str]]:
+    mm, deg = decimals_of_spreads(pose.half_width_mm), decimals_of_spreads(pose.half_width_deg)
+    shifts = [
+        [f"{axis} (mm)", fixed(value, mm), f"± {fixed(half, mm)}"]
+        for axis, value, half in zip(AXES, pose.xyz_mm, pose.half_width_mm)
+    ]
+    names = (tr("roll"), tr("pitch"), tr("yaw"))
+    turns = [
+        [bracketed(name, "°"), fixed(value, deg), tr("± {half} about {axis}", half=fixed(half, deg), axis=axis)]
+        for name, value, half, axis in zip(names, pose.rpy_deg, pose.half_width_deg, AXES)
+    ]
+    return [*shifts, *turns]
+
+
+def _touched(found: model.TouchResult) -> list[list[str]]:
+    return [
+        [str(k + 1), *(f"{fixed(d, 2)} ± {fixed(h, 2)}" for d, h in zip(point.difference_mm, point.half_width_mm))]
+        for k, point in enumerate(found.points)
+    ]
+
+
+def _overview(each: model.ObjectResult) -> list[str]:
+    if each.grasp:
+        parts = {"grasp": each.grasp.grasp, "turn": fixed(each.grasp.turn_deg, 0)}
+        outcome = tr("{grasp}, turned by {turn} deg", **parts)
+        success = f"{100 * each.grasp.probability:.1f} ± {196 * each.grasp.deviation:.1f} %"
+    else:
+        outcome, success = say(each.refusal), tr("none")
+    counts = tr("{poses} poses, {solutions} solutions", poses=each.poses, solutions=each.solutions)
+    name = Markup("{}<br><small>{}</small>").format(each.name, own_title(each.note)) if each.note else each.name
+    return [name, _listed(each.xyz_mm), outcome, success, counts]
+
+
+def _grasp(each: model.ObjectResult) -> list[str]:
+    grasp = each.grasp
+    assert grasp is not None
+    near = tr("none") if grasp.clearance_mm is None else fixed(grasp.clearance_mm, 0)
+    return [
+        each.name,
+        _listed(grasp.tool_xyz_mm),
+        panel_link(grasp.q_before_deg, _listed(grasp.q_before_deg)),
+        panel_link(grasp.q_deg, _listed(grasp.q_deg)),
+        bracketed(near, say(grasp.nearest)) if grasp.nearest else near,
+        tr("straight") if not grasp.corners else tr("planned, {corners} corners", corners=grasp.corners),
+        fixed(grasp.duration_s, 1),
+        fixed(grasp.limit_margin_deg, 0),
+        fixed(grasp.singular_value, 2),
+    ]
+
+
+def _errors(each: model.ObjectResult) -> list[str]:
+    mm, deg = each.error_mm, each.error_deg
+    assert mm is not None
+    assert deg is not None
+    return [each.name, *(f"{fixed(getattr(mm, part), 2)} mm, {fixed(getattr(deg, part), 2)}°" for part in PARTS)]

@@ -1,0 +1,1 @@
+"""Page and recording of the stage workspace: results in, views out."""

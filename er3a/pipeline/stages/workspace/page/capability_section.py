@@ -1,0 +1,751 @@
+"""The page's words about what the tool can do."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import scipy
+from markupsafe import Markup, escape
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.lines import AxLine, Line2D
+from matplotlib.patches import Patch, Polygon, Rectangle
+
+import er3a.pipeline.messages.collision  # noqa: F401
+from er3a.collision.scene import Plane, Scene, Solid, Sphere
+from er3a.collision.shapes import solid_pieces
+from er3a.geometry.transforms import rpy_along
+from er3a.kinematics.forward import skeleton
+from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.pipeline.language import own_title, tr
+from er3a.pipeline.messages.kinematics import branch_word
+from er3a.pipeline.messages.numbers import at_least, at_most, fixed, number
+from er3a.pipeline.messages.say import bracketed, joined, say, word
+from er3a.pipeline.messages.workspace import (
+    STATUS,
+    millimetres,
+    no_box_text,
+    range_text,
+    reached_text,
+    run_again_text,
+    stand_text,
+)
+from er3a.pipeline.player.motions import address_of
+from er3a.pipeline.player.turning import CIRCLE
+from er3a.pipeline.stages.workspace import model
+from er3a.pipeline.stages.workspace.page.tray import Placing, Tray, limit_text
+from er3a.pipeline.stages.workspace.page.workspace_figures import name_level, slide_names
+from er3a.pipeline.viewing import page
+from er3a.pipeline.viewing.figures import equal_scale, new_figure
+from er3a.pipeline.viewing.page import Picture
+from er3a.pipeline.viewing.palette import GRID, HIGHLIGHT, INK, MUTED
+from er3a.robots.robot import Robot
+
+ROUNDING = 1e-6  # mm
+
+
+def tray_rows(
+    placing: Placing, results: model.WorkspaceResults, placement: model.PlacementSummary, payload: str
+) -> list[tuple[str, str]]:
+    """What to know of the tray where it is put, each under a title; ``payload``: what is known of it."""
+    tray, stand = placing.tray, placing.tray.below
+    place, served = tray.place, (stand.served_from_m if stand and stand.place else None) or 0.0
+    reached = page.whole_sentence(reached_text(placement, place, served))
+    return [
+        (tr("Place"), joined([tr("{place}.", place=tray.line), reached], " ")),
+        (tr("Margins"), _margins(tray, results, placement)),
+        (tr("Motions"), _hindered(placing)),
+        (tr("Payload there"), payload),
+        (tr("What to do first"), run_again_text(results.summary, stand=tray.floor is not None)),
+    ]
+
+
+def _margins(tray: Tray, results: model.WorkspaceResults, placement: model.PlacementSummary) -> str:
+    """What room a place has; its height is kept where others bring the arm nearer to a singular pose."""
+    place, gaps = tray.place, tray.below.gaps_m if tray.below and tray.floor is not None else None
+    height = range_text(place, gaps, placement.task.limit_margin_deg, results.places)
+    room = _room(place, "xy" if height else "xyz")
+    moved = room and tr(
+        "Reach and limits allow to move it by {room} mm, one direction at a time; motions were compared with it at "
+        "this place only.",
+        room=room,
+    )
+    ratio = fixed(100 * place.manipulability_ratio, 1)
+    texts = [
+        _nearest_limit(place),
+        _nearest_bodies(place),
+        tr("Least manipulability: {ratio} % of the arm's best.", ratio=ratio),
+        moved,
+        height,
+    ]
+    return joined(texts, " ")
+
+
+def _hindered(placing: Placing) -> Markup:
+    """Of which motions the tray is in the way, each with a link to the moment; which others meet it; then what was
+    compared."""
+    here, hindered = placing.tried[0], placing.hindered(placing.tried[0])
+    named, others = list[Markup](), list[Markup]()
+    for stage, met in here.met.items():
+        for name, each in met.items():
+            link = Markup('<a href="{}">{}</a> ({})').format(
+                address_of(stage, name, each.t, "player"), page.breakable(name), each.body
+            )
+            (named if name in hindered.get(stage, ()) else others).append(link)
+    first = page.whole_sentence(placing.hindrance(here, most=0))
+    texts = [escape(first), *_sentence(named), *_sentence(others, tr("Others that meet it")), escape(placing.compared)]
+    return Markup(" ").join(texts)
+
+
+def _sentence(links: Sequence[Markup], about: str = "") -> list[Markup]:
+    """Links as a sentence; none where there are none."""
+    lead = escape(about + tr(": ") if about else "")
+    return [lead + Markup(", ").join(links) + "."] if links else []
+
+
+def _nearest_limit(place: model.PlaceSummary) -> str:
+    if place.limit_margin_deg is None:
+        return ""
+    margin = fixed(place.limit_margin_deg, 1)
+    if place.limit_joint is None:
+        return tr("Joints come within {margin} deg of their limits.", margin=margin)
+    return tr("The joint nearest to its limit is J{joint}: {margin} deg.", joint=place.limit_joint, margin=margin)
+
+
+def _nearest_bodies(place: model.PlaceSummary) -> str:
+    if place.clearance_mm is None or place.clearance_pair is None:
+        return ""
+    pair, far = say(place.clearance_pair), fixed(place.clearance_mm, 0)
+    return tr("The smallest clearance is {far} mm, between {pair}.", pair=pair, far=far)
+
+
+def _room(place: model.PlaceSummary, axes: str = "xyz") -> str:
+    """How far the tray can be moved along axes, such as ``x ±25, y -50 to 0``, in whole mm that the room holds; empty
+    where it can't."""
+    if not any((*place.room_down_m[: len(axes)], *place.room_up_m[: len(axes)])):
+        return ""
+    parts = []
+    whole = (np.floor(1000 * np.array(room) + ROUNDING) for room in (place.room_down_m, place.room_up_m))
+    for axis, down, up in zip(axes, *whole):
+        if down == up:
+            parts.append(f"{axis} {'±' if up else ''}{fixed(up, 0)}")
+        elif down or up:
+            parts.append(tr("{axis} {least} to {most}", axis=axis, least=fixed(-down, 0), most=fixed(up, 0)))
+    return ", ".join(parts)
+
+
+def place_row(name: str, place: model.PlaceSummary, capability: model.CapabilitySummary) -> list[str]:
+    if place.branch is None and capability.arm_angles > 1:
+        branch = tr("with joints {joints} at several values", joints=numbers(capability.held_joints))
+        branch = branch if capability.held_joints else tr("at several arm angles")
+    elif place.branch is None:
+        branch = tr("changes within the tray") if capability.named_branches else tr("not known: branches have no names")
+    elif place.status == place.branch_status:
+        branch = branch_word(place.branch)
+    else:
+        branch = tr("{branch} (by samples)", branch=branch_word(place.branch))
+    return [
+        name,
+        millimetres(place.centre_m),
+        " × ".join(fixed(1000 * value, 0) for value in place.size_m),
+        word("workspace.status", STATUS, place.status),
+        branch,
+        fixed(100 * place.manipulability_ratio, 1),
+        limit_text(place),
+        bracketed(fixed(place.clearance_mm, 0), say(place.clearance_pair) if place.clearance_pair is not None else ""),
+        _room(place) or fixed(0, 0),
+    ]
+
+
+def numbers(joints: tuple[int, ...]) -> str:
+    return ", ".join(str(joint) for joint in joints)
+
+
+_EDGE_ON = 1e-6  # by which a plane's normal may leave the drawing for the plane to be a line in it
+_STYLE: dict[str, Any] = {"edgecolor": MUTED, "linewidth": 1.1, "hatch": "////", "fill": False, "zorder": 1.5}
+
+
+def draw_scene(axes: Axes, scene: Scene | None, shown: list[int]) -> None:
+    """Draw the solids of a scene in mm, which widen no limits of the drawing; a plane only where it is seen edge on.
+
+    Parameters
+    ----------
+    shown : the numbers of the two axes that the drawing shows
+    """
+    for solid in scene.solids if scene else ():
+        if isinstance(solid, Plane):
+            normal = np.asarray(solid.normal)[shown]
+            if abs(np.linalg.norm(normal) - 1.0) < _EDGE_ON:
+                along = np.array([-normal[1], normal[0]])
+                start = 1000 * solid.offset * normal
+                axes.add_artist(AxLine(tuple(start), tuple(start + along), None, color=MUTED, linewidth=1.1))
+            continue
+        for outline in outlines(solid, shown):
+            axes.add_artist(Polygon(1000 * outline, **_STYLE))
+
+
+def outlines(solid: Solid, shown: list[int]) -> list[Reals]:
+    """The outline of each convex piece of a solid, corners (k, 2) in m, seen along the axis that is not shown."""
+    if isinstance(solid, Sphere):
+        return [np.asarray(solid.T)[:3, 3][shown] + solid.radius * CIRCLE]
+    return [piece[scipy.spatial.ConvexHull(piece).vertices] for piece in (own[:, shown] for own in solid_pieces(solid))]
+
+
+SHADES = "viridis_r"
+PIXELS = 301
+_HEIGHTS = (0.25, 0.5, 0.75)
+_LABEL = 0.035  # height of a label, of the longer side of a drawing
+
+
+def upright_slices(robot: Robot, capability: model.CapabilitySummary, cells: model.CapabilityCells) -> Figure:
+    """Three slices through axis 1, or across the slide at the middle of its way: reachability, IK solutions,
+    manipulability."""
+    lookup, origin = model.CellLookup(capability, cells), across_slide(capability)
+    x, z = lookup.reach * np.linspace(0 if lookup.bars else -1, 1, PIXELS), np.linspace(*lookup.heights, PIXELS)
+    grid_x, grid_z = np.meshgrid(x, z, indexing="ij")
+    if lookup.bars:
+        row = lookup.row(grid_x, np.full(grid_x.shape, capability.bar_m / 2), grid_z)
+    else:
+        row = lookup.row(np.abs(grid_x), np.where(grid_x < 0, np.pi, 0.0), grid_z)
+    best = capability.overall.best_manipulability_m3
+    panels = (
+        (cells.reachability, 100.0, asked_ratio(capability), (0, 100)),
+        (cells.solutions, 1.0, solutions_label(capability), (0, max(1, capability.overall.most_solutions))),
+        (cells.manipulability_m3, 100 / best, tr("best manipulability (% of the arm's best)"), (0, 100))
+        if capability.sliding
+        else (cells.manipulability_m3, 1e3, tr("best manipulability (10⁻³ m³)"), (0, None)),
+    )
+    flat = float(np.ptp(z) / np.ptp(x))
+    figure, axes = new_figure(1, 3, width=12.0, height=min(5.2, 2.0 + 3.6 * flat), sharey=True)
+    for panel, (values, factor, label, limits) in zip(axes, panels):
+        shown = _looked_up(values, row) * factor
+        mesh = panel.pcolormesh(
+            (x + origin[0]) * 1000,
+            (z + origin[1]) * 1000,
+            shown.T,
+            cmap=SHADES,
+            vmin=limits[0],
+            vmax=limits[1],
+            rasterized=True,
+        )
+        figure.colorbar(mesh, ax=panel, label=label, location="top", shrink=0.9)
+        _draw_arm(panel, robot, capability.frame, origin)
+        names = (
+            slide_names(capability.frame)
+            if lookup.bars
+            else (tr("from axis 1, in the arm's zero plane (mm)"), tr("height along axis 1 (mm)"))
+        )
+        equal_scale(panel, names[0] if panel is axes[1] else "", names[1] if panel is axes[0] else "", fill=False)
+    return figure
+
+
+def level_slices(
+    capability: model.CapabilitySummary, cells: model.CapabilityCells, percent: Reals, label: str
+) -> Figure:
+    """A percentage of each cell, NaN where unknown, in three slices across axis 1, or along the slide."""
+    lookup, origin = model.CellLookup(capability, cells), across_slide(capability)
+    line = lookup.reach * np.linspace(0 if lookup.bars else -1, 1, PIXELS)
+    along = np.linspace(0, capability.bar_m, PIXELS) if lookup.bars else line
+    x, y = np.meshgrid(line, along, indexing="ij")
+    figure, axes = new_figure(1, 3, width=12.0, height=4.1, sharey=True)
+    for panel, height in zip(axes, _quantiles(cells, lookup.bars)):
+        rho, place = (x, y) if lookup.bars else (np.hypot(x, y), np.arctan2(y, x))
+        row = lookup.row(rho, place, np.full(x.shape, height))
+        values = np.ma.masked_invalid(_looked_up(percent, row))
+        mesh = panel.pcolormesh(
+            (line + origin[0]) * 1000, along * 1000, values.T, cmap=SHADES, vmin=0, vmax=100, rasterized=True
+        )
+        names = name_level(panel, capability.frame if lookup.bars else None, height, origin)
+        equal_scale(panel, names[0] if panel is axes[1] else "", names[1] if panel is axes[0] else "", fill=False)
+    figure.colorbar(mesh, ax=axes, label=label, shrink=0.8)
+    return figure
+
+
+def asked_ratio(capability: model.CapabilitySummary) -> str:
+    """Label of what of the orientations asked is reached."""
+    return {
+        "directions": tr("tool directions reached (%)"),
+        "tilts": tr("tilts of the tool reached (%)"),
+        "turns": tr("turns of the tool reached (%)"),
+        "points": tr("reached (%)"),
+    }[capability.asked]
+
+
+def solutions_label(capability: model.CapabilitySummary) -> str:
+    """Label of the solutions of what is asked."""
+    return {
+        "directions": tr("IK solutions per reached direction"),
+        "tilts": tr("IK solutions per reached tilt"),
+        "turns": tr("IK solutions per reached turn"),
+        "points": tr("IK solutions per reached point"),
+    }[capability.asked]
+
+
+def across_slide(capability: model.CapabilitySummary) -> Reals:
+    """Where bars begin in the plane across the slide, counted from the base's origin, (2,), m; 0 for rings."""
+    frame = capability.frame
+    return np.array(frame.axes)[[0, 2]] @ frame.origin_m if capability.bar_m else np.zeros(2)
+
+
+def clear_percent(cells: model.CapabilityCells) -> Reals:
+    """Of the poses tried in each cell and reached, those held with nothing touched, %; NaN where none was reached."""
+    reached = cells.reached_tries.astype(float)
+    found: Reals = np.divide(100.0 * cells.clear_tries, reached, out=np.full(len(reached), np.nan), where=reached > 0)
+    return found
+
+
+def placement_views(
+    robot: Robot,
+    capability: model.CapabilitySummary,
+    placement: model.PlacementSummary,
+    places: model.BoxPlaces,
+    scene: Scene | None = None,
+    trays: Sequence[Tray] = (),
+) -> Figure:
+    """Where the middle of the tray can stand, from above and from the side, with the best places as boxes; ``trays`` on
+    or over surfaces besides these, by the surface's name."""
+    numbered = [place for _, place in placement.named_places]
+    over = [(own_title(each.below.name), each.place) for each in trays if each.below and each.place not in numbered]
+    percent = 100 * places.manipulability_m3 / capability.overall.best_manipulability_m3
+    figure, axes = new_figure(1, 2, width=12.0, height=5.6)
+    provable = capability.core_m3 is not None
+    top = max(1.0, float(percent.max()))
+    for panel, (across, up, title) in zip(axes, (("x", "y", tr("From above")), ("x", "z", tr("From the side")))):
+        shown = ["xyz".index(across), "xyz".index(up)]
+        steps = [placement.spacing_m[axis] for axis in shown]
+        edges, value, proven = _raster(places.centre_m[:, shown], steps, percent, places.proven | (not provable))
+        extent = [1000 * edge for edge in edges]
+        unproven = np.ma.masked_where((value < 0) | proven, value)
+        panel.pcolormesh(*extent, unproven.T, cmap=ListedColormap([GRID]), rasterized=True)
+        sure = np.ma.masked_where(~proven, value)
+        mesh = panel.pcolormesh(*extent, sure.T, cmap=SHADES, vmin=0, vmax=top, rasterized=True)
+        draw_scene(panel, scene, shown)
+        _draw_boxes(panel, [*placement.named_places, *over], shown)
+        panel.plot(
+            *skeleton(robot, np.zeros(robot.joints)).T[shown] * 1000, color=INK, linewidth=2.2, marker="o", markersize=3
+        )
+        equal_scale(panel, f"{across} (mm)", f"{up} (mm)")
+        panel.set_title(title)
+        panel.grid(False)
+    figure.colorbar(mesh, ax=axes, label=tr("least manipulability in the tray (% of the arm's best)"), shrink=0.85)
+    handles = [
+        Line2D([], [], color=INK, marker="o", markersize=4, linewidth=2.2, label=tr("arm, all joints 0")),
+        Patch(facecolor="none", edgecolor=HIGHLIGHT, label=tr("best positions, numbered or named as in the tables")),
+        *([Patch(facecolor=GRID, label=tr("by samples only"))] if provable else []),
+    ]
+    if scene:
+        handles.append(Patch(fill=False, edgecolor=MUTED, hatch="////", label=tr("scene")))
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+    return figure
+
+
+def _looked_up(values: Reals | model.Singles, row: Integers) -> np.ma.MaskedArray:
+    return np.ma.masked_array(values[np.maximum(row, 0)], row < 0)
+
+
+def _quantiles(cells: model.CapabilityCells, bars: bool) -> Reals:
+    """Heights below which 25, 50 and 75 % of the reached volume lie."""
+    heights, row = np.unique(cells.z_m, return_inverse=True)
+    volume = np.bincount(row, weights=None if bars else cells.rho_m)
+    return np.interp(_HEIGHTS, volume.cumsum() / volume.sum(), heights)
+
+
+def _draw_arm(axes: Axes, robot: Robot, frame: model.SectionFrame, origin: Reals) -> None:
+    local = (skeleton(robot, np.zeros(robot.joints)) - frame.origin_m) @ np.array(frame.axes).T * 1000
+    local[:, [0, 2]] += 1000 * origin
+    axes.plot(local[:, 0], local[:, 2], color="white", linewidth=3.6, solid_capstyle="round")
+    axes.plot(local[:, 0], local[:, 2], color=INK, linewidth=2.0, marker="o", markersize=3, solid_capstyle="round")
+
+
+def _raster(
+    points: Reals, steps: list[float], percent: model.Singles, proven: Flags
+) -> tuple[list[Reals], Reals, Flags]:
+    """Edges of the raster's columns and rows (m), the largest value in each of its cells (proven ones first; -1: none
+    there), and whether one is proven."""
+    low = points.min(axis=0)
+    index = tuple(np.floor((points - low) / steps + 1e-3).astype(int).T)
+    shape = tuple(part.max() + 1 for part in index)
+    value, sure = np.full(shape, -1.0), np.zeros(shape, dtype=bool)
+    np.logical_or.at(sure, index, proven)
+    np.maximum.at(value, index, np.where(proven | ~sure[index], percent, -1.0))
+    return [start + (np.arange(n + 1) - 0.5) * step for start, step, n in zip(low, steps, shape)], value, sure
+
+
+def _draw_boxes(axes: Axes, listed: Sequence[tuple[str, model.PlaceSummary]], shown: list[int]) -> None:
+    """Outlines with their names; boxes that fall on each other share a label."""
+    labels: dict[tuple[float, float], list[str]] = {}
+    for name, place in listed:
+        centre, size = (1000 * np.array(part)[shown] for part in (place.centre_m, place.size_m))
+        low = centre - size / 2
+        axes.add_patch(Rectangle((low[0], low[1]), *size, fill=False, edgecolor=HIGHLIGHT, linewidth=1.6))
+        labels.setdefault((low[0].round(3), (low[1] + size[1]).round(3)), []).append(name)
+    shade = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1}
+    near = _LABEL * max(np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim()))
+    taken: list[tuple[float, float]] = []
+    for corner, numbers in sorted(labels.items()):
+        x, y = corner
+        while any(abs(x - other[0]) < 2 * near and abs(y - other[1]) < near for other in taken):
+            y -= near  # below the label that is there already
+        taken.append((x, y))
+        text = ", ".join(numbers)
+        axes.annotate(text, (x, y), (3, -10), textcoords="offset points", color=HIGHLIGHT, fontsize=8, bbox=shade)
+
+
+def capability_context(
+    robot: Robot,
+    results: model.WorkspaceResults,
+    scene: Scene | None = None,
+    placing: Placing | None = None,
+    payload: str = "",
+) -> dict[str, Any]:
+    """What the template include ``capability.html.j2`` needs; ``placing``: where to put the tray, if anywhere."""
+    capability, placement = results.summary.capability, results.summary.placement
+    if isinstance(capability, model.CapabilityMissing) or placement is None:
+        return {"missing": say(capability)}
+    return {
+        "missing": "",
+        "asked_text": _asked_text(capability),
+        "capability_pictures": _pictures(robot, results, capability) if len(results.capability) else [],
+        "core_text": _core_text(capability),
+        "collisions_text": tr("Reachability and dexterous workspace ignore collisions.")
+        if capability.core_m3
+        else tr("Reachability ignores collisions."),
+        "task_text": _task_text(placement.task, capability),
+        "tray_line": placing.line if placing else no_box_text(results.summary),
+        "tray_places": placing.rows if placing else [],
+        "tray_rows": tray_rows(placing, results, placement, payload)
+        if placing and isinstance(placement, model.PlacementSummary)
+        else [],
+    } | _placement_context(robot, results, capability, placement, scene, placing)
+
+
+def _placement_context(
+    robot: Robot,
+    results: model.WorkspaceResults,
+    capability: model.CapabilitySummary,
+    placement: model.Placement,
+    scene: Scene | None,
+    placing: Placing | None,
+) -> dict[str, Any]:
+    if not isinstance(placement, model.PlacementSummary):
+        return {"nowhere": say(placement)}
+    rows = [place_row(name, place, capability) for name, place in placement.named_places]
+    trays = [each.tray for each in placing.tried] if placing else []
+    return {
+        "nowhere": "",
+        "placing_scene": placement.scene,
+        "placing_margin": fixed(placement.margin_mm, 0),
+        "try_text": _try_text(robot, placement.task) if capability.asked == "directions" else "",
+        "stands": [stand_text(stand, placement) for stand in placement.stands],
+        "points_serving": placement.points_serving,
+        "place_rows": rows,
+        "place_picture": Picture(
+            placement_views(robot, capability, placement, results.places, scene, trays),
+            tr("Possible positions of the tray centre, from above and from the side, with the best ones"),
+            _places_caption(placement, capability.core_m3 is not None),
+        )
+        if len(results.places)
+        else None,
+    }
+
+
+def _pictures(robot: Robot, results: model.WorkspaceResults, capability: model.CapabilitySummary) -> list[Picture]:
+    cells = results.capability
+    upright, reached, held = (
+        (
+            tr("Slices across the slide of joint 1: reachability, IK solutions, manipulability"),
+            tr("Slices along the slide of joint 1: reachability"),
+            tr("Slices along the slide of joint 1: reached poses that can be held without collision"),
+        )
+        if capability.bar_m
+        else (
+            tr("Slices through axis 1: reachability, IK solutions, manipulability"),
+            tr("Slices across axis 1: reachability"),
+            tr("Slices across axis 1: reached poses that can be held without collision"),
+        )
+    )
+    of_held = level_slices(capability, cells, clear_percent(cells), tr("reached poses held without collision (%)"))
+    of_reached = level_slices(capability, cells, 100.0 * cells.reachability.astype(float), asked_ratio(capability))
+    return [
+        Picture(upright_slices(robot, capability, cells), upright, _slices_caption(capability)),
+        Picture(of_reached, reached, _level_caption(capability)),
+        Picture(of_held, held, _clear_caption(capability.clear, results.summary.verdict.shapes is not None)),
+    ]
+
+
+def _clear_caption(clear: model.ClearSummary, assumed: bool) -> str:
+    if clear.scene is None:
+        what = tr("An estimate by volume: {share} % of the poses reached can be held without the arm touching itself.",
+                  share=number(100 * clear.share, 2))  # fmt: skip
+    else:
+        what = tr(
+            "An estimate by volume: {share} % of the poses reached can be held without touching “{scene}” or the arm "
+            "itself.",
+            share=number(100 * clear.share, 2),
+            scene=own_title(clear.scene),
+        )
+    numbers = {
+        "tries": clear.tries,
+        "reached": number(clear.reached),
+        "clear": number(clear.clear),
+        "without": number(clear.without),
+    }
+    if assumed:
+        tried = tr(
+            "{tries} random poses were tried in each cell and sector: {reached} are reached, {clear} of them clear of "
+            "the assumed shapes; in {without} cells and sectors none was found. Outer cells hold more volume, so the "
+            "share is not the quotient of these counts. Shares of so few tries distinguish good regions from bad ones, "
+            "not single cells.",
+            **numbers,
+        )
+    else:
+        tried = tr(
+            "{tries} random poses were tried in each cell and sector: {reached} are reached, {clear} of them proven"
+            " collision-free; in {without} cells and sectors none was found. Outer cells hold more volume, so the "
+            "share is not the quotient of these counts. Shares of so few tries distinguish good regions from bad ones, "
+            "not single cells.",
+            **numbers,
+        )
+    return tr("{first} {rest}", first=what, rest=tried)
+
+
+def _level_caption(capability: model.CapabilitySummary) -> str:
+    if capability.bar_m:
+        return tr("The arm can do the same everywhere along the slide, up to its ends.")
+    if capability.sectors == 1:
+        return tr("Joint 1 makes a full turn, so what counts is the distance from axis 1 and the height alone.")
+    if capability.asked == "directions":
+        return tr(
+            "Where joint 1 is limited, the sector behind the arm loses directions first: "
+            "in front, more tool angles are left."
+        )
+    return tr("Joint 1 is limited: blank sectors are out of its reach.")
+
+
+def _slices_caption(capability: model.CapabilitySummary) -> str:
+    overall = capability.overall
+    numbers = {
+        "mean": number(100 * overall.mean_reachability, 2),
+        "best": number(100 * overall.best_reachability, 3),
+        "solutions": number(overall.mean_solutions, 2),
+        "most": overall.most_solutions,
+    }
+    first = {
+        "directions": tr(
+            "A reached cell offers {mean} % of all tool directions on average, the best one {best} %, each with "
+            "{solutions} IK solutions on average (of {most} at most).",
+            **numbers,
+        ),
+        "tilts": tr(
+            "A reached cell offers {mean} % of all tilts on average, the best one {best} %, each with {solutions} IK "
+            "solutions on average (of {most} at most).",
+            **numbers,
+        ),
+        "turns": tr(
+            "A reached cell offers {mean} % of all turns on average, the best one {best} %, each with {solutions} IK "
+            "solutions on average (of {most} at most).",
+            **numbers,
+        ),
+        "points": tr(
+            "A reached cell has {solutions} IK solutions on average (of {most} at most).",
+            **numbers,
+        ),
+    }[capability.asked]
+    if capability.asked == "points":
+        return first
+    return joined(
+        [
+            first,
+            tr("These solutions are averaged over the directions reached; of random joint values, as the page of the "
+               "stage inverse draws them, more solutions are found, because poses with many are met more often."),
+            tr("Plan work where all three are high; rims are reached only with the arm stretched, folded or "
+               "twisted."),
+        ],
+        " ",
+    )  # fmt: skip
+
+
+def _asked_text(capability: model.CapabilitySummary) -> str:
+    """What was asked of the cells, and how."""
+    count = capability.directions
+    asked = {
+        "directions": tr(
+            "At each cell's centre {directions} tool directions, spread evenly over the sphere, were tried; the share "
+            "that is reached is its reachability index (Zacharias, Borst and Hirzinger 2007).",
+            directions=count,
+        ),
+        "tilts": tr(
+            "This arm can't point its tool in every direction: all its tilting joints turn about one direction, so the "
+            "tool stays within a plane that joint 1 turns. At each cell's centre {directions} tilts, spread evenly "
+            "over the full turn in that plane, were tried; reachability is the share that is reached.",
+            directions=count,
+        ),
+        "turns": tr(
+            "This arm can't tilt its tool, but turn it about the direction of its axes. At each cell's centre "
+            "{directions} rotations, spread evenly, were tried; reachability is the share that is reached.",
+            directions=count,
+        ),
+        "points": tr(
+            "This arm has no joints to spare for the tool's orientation, which follows from the position. The "
+            "centre of each cell was tried as a point alone: it is reached or not."
+        ),
+    }[capability.asked]
+    return joined([asked, _roll_text(capability), _effort_text(capability)], " ")
+
+
+def _effort_text(capability: model.CapabilitySummary) -> str:
+    if not capability.coarse:
+        return ""
+    return tr(
+        "The inverse of this arm takes long, so cells are {cell} mm wide and directions fewer than the study says.",
+        cell=fixed(1000 * capability.cell_m, 0),
+    )
+
+
+def _roll_text(capability: model.CapabilitySummary) -> str:
+    if capability.asked != "directions":
+        return ""
+    rolls = tr("left free") if capability.roll.free else capability.roll.per_direction
+    if capability.held_joints:
+        return tr(
+            "Joints that the pose leaves open ({joints}) were tried at {values} values, and a direction counts if it "
+            "is reached at one of them: more may be reached between them. Solutions are those of one value. Rolls "
+            "about the tool's own axis: {rolls}.",
+            joints=numbers(capability.held_joints),
+            values=capability.arm_angles,
+            rolls=rolls,
+        )
+    if capability.arm_angles > 1:
+        return tr(
+            "Each pose was tried at {angles} arm angles, and a direction counts if it is reached at one of them: more "
+            "may be reached between them. Solutions are those of one arm angle. Rolls about the tool's own axis: "
+            "{rolls}.",
+            angles=capability.arm_angles,
+            rolls=rolls,
+        )
+    if capability.roll.free and not capability.roll.last_joint:
+        return tr("The roll about the tool's own axis is left out: with five joints the arm can't choose it.")
+    if capability.roll.free:
+        return tr(
+            "The roll about the tool's own axis is left free: it turns joint 6 alone, so it takes no part in whether a "
+            "direction is reached, nor in the number of solutions."
+        )
+    return tr(
+        "The tool is off the axis of joint 6, so the roll about the tool's own axis moves the wrist: {rolls} "
+        "rolls are tried, and a direction counts if one of them is reached.",
+        rolls=capability.roll.per_direction,
+    )
+
+
+def _core_text(capability: model.CapabilitySummary) -> str:
+    core = capability.core_m3
+    if core is None:
+        if capability.asked != "directions":
+            return ""
+        return tr(
+            "The dexterous workspace is bounded only for arms of six revolute joints with a spherical wrist, none of "
+            "them coupled."
+        )
+    if core.upper == 0:
+        return tr(
+            "There is no dexterous workspace: in every part of the workspace some tool direction is proven "
+            "unreachable at all points. Work that needs the tool from every side needs a turntable."
+        )
+    return tr(
+        "The dexterous workspace, where the tool can take every direction of the sphere, is at least {lower} L "
+        "and at most {upper} L; both bounds are proven for all points and directions. By the {directions} "
+        "sampled directions alone it would be {estimate} L.",
+        directions=capability.directions,
+        lower=at_least(1000 * core.lower, "L"),
+        upper=at_most(1000 * core.upper, "L"),
+        estimate=number(1000 * core.estimate, 2),
+    )
+
+
+def _task_text(task: model.TaskSummary, capability: model.CapabilitySummary) -> str:
+    box = " × ".join(number(value, 4).rstrip(".") for value in map(_whole, task.box_mm))
+    direction = ", ".join(fixed(value, 2).removesuffix(".00") for value in task.tool_direction)
+    shown = {
+        "box": box,
+        "direction": direction,
+        "cone": fixed(task.cone_deg, 1).removesuffix(".0"),
+        "margin": fixed(task.limit_margin_deg, 1).removesuffix(".0"),
+    }
+    served = {
+        "directions": tr(
+            "Task: a tray of {box} mm in which the tool reaches every point, with its axis anywhere within {cone} deg "
+            "of ({direction}) and the joints at least {margin} deg from their limits.",
+            **shown,
+        ),
+        "tilts": tr(
+            "Task: a tray of {box} mm in which the tool reaches every point at every tilt within {cone} deg of "
+            "({direction}) that the arm's plane allows, with the joints at least {margin} deg from their limits.",
+            **shown,
+        ),
+        "turns": tr(
+            "Task: a tray of {box} mm in which the tool reaches every point at some rotation about its axis; the axis "
+            "must lie within {cone} deg of ({direction}), where it always points. Revolute joints stay at least "
+            "{margin} deg from their limits.",
+            **shown,
+        ),
+        "points": tr(
+            "Task: a tray of {box} mm in which the tool reaches every point in any orientation. Revolute joints stay "
+            "at least {margin} deg from their limits.",
+            **shown,
+        ),
+    }[capability.asked]
+    lowest, clear = fixed(task.lowest_mm, 0), fixed(task.clear_of_axis_mm, 0)
+    if capability.bar_m:
+        stands = tr(
+            "The tray is level, as given or rotated by 90 deg, with its underside at {lowest} mm or higher.",
+            lowest=lowest,
+        )
+    else:
+        stands = tr(
+            "The tray is level, as given or rotated by 90 deg, with its underside at {lowest} mm or higher, at least "
+            "{clear} mm from axis 1.",
+            lowest=lowest,
+            clear=clear,
+        )
+    return joined([served, stands], " ")
+
+
+def _try_text(robot: Robot, task: model.TaskSummary) -> str:
+    """How to see the arm at a place: the roll, pitch and yaw (ZYX) that point the tool along the task's direction."""
+    roll, pitch, _ = np.degrees(rpy_along(np.array(task.tool_direction)))
+    parts = {"roll": fixed(roll, 1).removesuffix(".0"), "pitch": fixed(pitch, 1).removesuffix(".0")}
+    if np.allclose(robot.tool, np.eye(4)):
+        return tr(
+            "To see the arm at a position, type its centre, roll {roll}, pitch {pitch} and yaw 0 deg into the "
+            "teach panel. The robot has no tool here: the centre of its flange goes there. The tray is not in the "
+            "panel's scene: its clearance leaves the tray out.",
+            **parts,
+        )
+    return tr(
+        "To see the arm at a position, type its centre, roll {roll}, pitch {pitch} and yaw 0 deg into the teach"
+        " panel: the tool point goes there. The tray is not in the panel's scene: its clearance leaves the tray out.",
+        **parts,
+    )
+
+
+def _whole(value: float) -> float | int:
+    return int(value) if value == int(value) else value
+
+
+def _places_caption(placement: model.PlacementSummary, provable: bool) -> str:
+    if not provable:
+        return tr(
+            "{fitting} grid positions pass by samples; proofs exist only for arms of six revolute joints with a "
+            "spherical wrist. A colour marks where the tray's centre passes.",
+            fitting=number(placement.fitting),
+        )
+    return tr(
+        "Of {fitting} grid positions that pass by samples, {proven} are proven for every point and direction. "
+        "A colour marks where the tray's centre passes; grey spots pass by samples only. It shows the best value "
+        "along the line of sight.",
+        fitting=number(placement.fitting),
+        proven=number(placement.fitting_proven),
+    )

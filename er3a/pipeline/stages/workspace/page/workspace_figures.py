@@ -1,0 +1,447 @@
+"""The page's figures of the workspace."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection, QuadMesh
+from matplotlib.colors import ListedColormap, LogNorm
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import LogLocator, NullLocator, StrMethodFormatter
+
+from er3a.collision.scene import Scene
+from er3a.kinematics.forward import forward, skeleton
+from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.pipeline.language import N_, as_text, tr
+from er3a.pipeline.messages.numbers import fixed, number
+from er3a.pipeline.messages.say import word
+from er3a.pipeline.messages.workspace import POINTS, SWEEPS
+from er3a.pipeline.player.turning import ColourScale, Layer, scene_layers, turning_figure
+from er3a.pipeline.stages.workspace import model
+from er3a.pipeline.viewing.figures import axis_label, equal_scale, new_figure
+from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINTS, MUTED, REFERENCE
+from er3a.robots.robot import Robot
+
+DENSITY = "YlGnBu"
+LIMIT = REFERENCE
+FULL_TURN = 2 * np.pi - 1e-9
+
+
+def turns_fully(robot: Robot) -> bool:
+    """Whether joint 1 makes a full turn, so that the view from above has no dead zone; False if it slides."""
+    return not robot.slides[0] and bool(robot.continuous[0] or robot.upper[0] - robot.lower[0] >= FULL_TURN)
+
+
+class CellMap:
+    """Samples per cell over the grid, from the table of cells.
+
+    Attributes
+    ----------
+    samples : (nx, ny, nz)
+    origin, cell : m
+    """
+
+    def __init__(self, grid: model.GridSummary, cells: model.Cells):
+        self.origin, self.cell = np.array(grid.origin_m), grid.cell_m
+        self.samples = np.zeros(grid.shape, dtype=np.int64)
+        self.samples[tuple(cells.index.astype(np.int64).T)] = cells.samples
+
+    def edges(self, axis: int) -> Reals:
+        """Cell borders along an axis, mm."""
+        return (self.origin[axis] + np.arange(self.samples.shape[axis] + 1) * self.cell) * 1000
+
+
+def top_view(robot: Robot, results: model.WorkspaceResults) -> Figure:
+    """The cloud from above, with the wedge that joint 1 leaves."""
+    figure, axes = new_figure(width=8.0, height=6.6)
+    cells = CellMap(results.summary.grid, results.cells)
+    column = cells.samples.sum(axis=2) / cells.cell**2 / 1e6
+    mesh = axes.pcolormesh(
+        cells.edges(0), cells.edges(1), masked(column).T, cmap=DENSITY, norm=log_norm(column), rasterized=True
+    )
+    figure.colorbar(mesh, ax=axes, label=tr("samples per mm²"), shrink=0.7)
+    axis = robot.base[:2, 3] * 1000
+    axes.plot(*axis, "+", color=INK, markersize=10, markeredgewidth=1.6)
+    title = tr("From above: joint 1 makes a full turn")
+    if robot.slides[0]:
+        lower, upper = (fixed(limit, 0) for limit in 1000 * np.array([robot.lower[0], robot.upper[0]]))
+        title = tr("From above: joint 1 slides from {lower} to {upper} mm", lower=lower, upper=upper)
+    elif not turns_fully(robot):
+        lower, upper = (fixed(limit, 0) for limit in np.degrees([robot.lower[0], robot.upper[0]]))
+        title = tr("From above: joint 1 turns from {lower} to {upper} deg", lower=lower, upper=upper)
+        size = max(np.ptp(cells.edges(0)), np.ptp(cells.edges(1))) / 2
+        for limit in (robot.lower[0], robot.upper[0]):
+            tool = forward(robot, np.append(limit, np.zeros(robot.joints - 1)))[:2, 3] * 1000 - axis
+            length = np.linalg.norm(tool)
+            if length > 1:
+                axes.plot(*np.transpose([axis, axis + tool / length * size]), color=LIMIT, linewidth=1.8)
+        handles = [Line2D([], [], color=LIMIT, label=tr("the arm's plane at the limits of joint 1"))]
+        axes.legend(handles=handles, loc="lower left", bbox_to_anchor=(0, 1.0), borderaxespad=0.2)
+    axes.set_title(title, pad=42)
+    equal_scale(axes, "x (mm)", "y (mm)", fill=False)
+    return figure
+
+
+def convergence(results: model.WorkspaceResults) -> Figure:
+    """Touched volume over the number of samples, by cell size."""
+    figure, axes = new_figure(width=9.0, height=4.2)
+    curve, volume = results.curve, results.summary.volume_m3
+    for cell, colour in zip(np.unique(curve.cell_mm), (JOINTS[0], JOINTS[5], JOINTS[2])):
+        label = tr("cells of {cell:.0f} mm", cell=cell)
+        rows = curve.cell_mm == cell
+        axes.plot(curve.samples[rows] / 1e6, curve.touched_m3[rows], color=colour, marker=".", label=label)
+    axes.axhline(results.summary.hull.volume_m3, color=MUTED, linestyle="--", label=tr("convex hull"))
+    axes.axhspan(volume.lower, volume.upper, color=JOINTS[1], alpha=0.35, label=tr("proven bounds"))
+    middle, (low, high) = volume.estimate, volume.ci95
+    last = curve.samples.max() / 1e6
+    spread, label = [[middle - low], [high - middle]], tr("estimate, 95 % interval")
+    axes.errorbar([last * 1.3], [middle], yerr=spread, color=INK, fmt="o", capsize=4, label=label)
+    axes.set_xscale("log")
+    axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.set_xlabel(tr("samples (millions)"))
+    axes.set_ylabel(axis_label(curve, "touched_m3"))
+    axes.set_ylim(0, None)
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return figure
+
+
+def masked(values: Reals) -> np.ma.MaskedArray:
+    """The values, zeros left out."""
+    return np.ma.masked_equal(values, 0)
+
+
+def log_norm(values: Reals) -> LogNorm:
+    """Colours from the 1 % to the 99.9 % quantile of what is not zero."""
+    low, high = np.quantile(values[values > 0], [0.01, 0.999])
+    return LogNorm(low, max(high, low * 10), clip=True)
+
+
+PROOF = {
+    N_("reachable"): "#9ecae1",
+    N_("reachable except a wedge"): "#d6e6f2",
+    N_("undecided"): HIGHLIGHT,
+    N_("unreachable"): "#ffffff",
+}
+FILLED, WEDGE, UNDECIDED, EMPTY = range(4)
+BORDERS = {"tool_point": INK, "wrist_centre": REFERENCE, "flange": JOINTS[3]}
+DRAWN = JOINTS[2]
+SLICE_PIXELS, _CLOUD_CELLS = 321, 80
+PANEL_IN, AROUND_PANELS_IN = 4.9, 2.4  # a panel's width; what stands above and below, in
+WITHIN = 0.05  # of the reached heights: nearer to an end, a height is no slice's
+
+
+def sections(robot: Robot, results: model.WorkspaceResults) -> Figure:
+    """Side sections about axis 1, or across it where it slides: what the samples show, and what is proven."""
+    border, drawing, bars = results.border, results.drawing, results.summary.proof.bars
+    figure, (left, right) = new_figure(1, 2, width=11.5, height=9.0, sharey=True, sharex=True)
+    if bars:
+        counts = _draw_cloud(left, bars, results.cloud.point_m)
+        _colour_bar(figure, counts, tr("samples per cm²"))
+        arm, across, up = _across(bars, skeleton(robot, np.zeros(robot.joints))), *slide_names(bars.frame)
+        left.set_title(tr("Samples, all positions along the slide overlaid"))
+    else:
+        mesh = _draw_density(left, results.summary.section_cell_m, results.section)
+        _colour_bar(figure, mesh, tr("samples per litre"))
+        arm = _about(results.summary.axis, skeleton(robot, np.zeros(robot.joints)))
+        across, up = tr("distance from axis 1 (mm)"), tr("height along axis 1 (mm)")
+        left.set_title(tr("Samples, all azimuths overlaid"))
+    _draw_proof(right, results.proof, bars)
+    for axes in (left, right):
+        _draw_border(axes, border)
+        axes.plot(*arm.T * 1000, color=INK, linewidth=2.4, marker="o", markersize=4, solid_capstyle="round")
+        equal_scale(axes, across, up if axes is left else "", fill=False)
+        if not bars:
+            axes.set_xlim(0, None)
+    draw_labels(right, drawing, drawing.rho_m)
+    right.set_title(tr("Proof"))
+    handles: list[Artist] = [
+        Line2D([], [], color=INK, marker="o", markersize=4, linewidth=2.4, label=tr("arm, all joints 0"))
+    ]
+    handles += [
+        Line2D([], [], color=colour, label=tr("exact border, {point}", point=word("workspace.point", POINTS, point)))
+        for point, colour in BORDERS.items()
+        if (border.point == point).any()
+    ]
+    if len(drawing):
+        label = tr("manufacturer's drawing, wrist centre")
+        handles.append(Line2D([], [], color=DRAWN, marker="o", linestyle=":", label=label))
+    states = [state for kind, state in enumerate(PROOF) if not (bars and kind == WEDGE)]
+    handles += [Patch(facecolor=PROOF[state], edgecolor=MUTED, label=tr(state)) for state in states]
+    figure.legend(handles=handles, loc="outside lower center", ncols=4)
+    ratio = max(axes.dataLim.height / max(axes.dataLim.width, 1e-9) for axes in (left, right))
+    figure.set_figheight(float(np.clip(PANEL_IN * ratio + AROUND_PANELS_IN, 4.5, 9.0)))
+    return figure
+
+
+def _colour_bar(figure: Figure, shown: QuadMesh, label: str) -> None:
+    """Above both panels, so that they stay level with each other; at 1 and 3 of each decade."""
+    bar = figure.colorbar(
+        shown,
+        ax=figure.axes,
+        label=label,
+        location="top",
+        shrink=0.4,
+        anchor=(0.0, 0.0),
+        ticks=LogLocator(subs=(1, 3)),
+        format="%g",
+    )
+    bar.ax.minorticks_off()
+
+
+def _draw_density(axes: Axes, cell: float, section: model.SectionCells) -> QuadMesh:
+    rings = np.pi * cell**2 * 2 * section.rho_m * 1e3
+    return _draw_cells(axes, cell, section.rho_m, section.z_m, section.samples / rings)
+
+
+def _draw_cells(axes: Axes, cell: float, across: Reals, up: Reals, density: Reals, **style: Any) -> QuadMesh:
+    """Cells (n,), by their middles in m, shaded by what each holds."""
+    middles = np.stack([across, up], axis=1)
+    low = middles.min(axis=0) - cell / 2
+    index = np.rint((middles - low) / cell - 0.5).astype(int)
+    shown = np.zeros(tuple(index.max(axis=0) + 1))
+    shown[tuple(index.T)] = density
+    x, z = ((low[i] + np.arange(shown.shape[i] + 1) * cell) * 1000 for i in (0, 1))
+    return axes.pcolormesh(x, z, masked(shown).T, cmap=DENSITY, norm=log_norm(shown), rasterized=True, **style)
+
+
+def _across(bars: model.Bars, points: Reals) -> Reals:
+    """Points (n, 3), m, of the base frame in the plane across the slide (n, 2), counted from the base's origin."""
+    return points @ np.array(bars.frame.axes)[[0, 2]].T
+
+
+def _origin_across(bars: model.Bars | None) -> Reals:
+    """Where the section of the proof begins in the plane that is drawn, (2,), m."""
+    return _across(bars, np.array([bars.frame.origin_m]))[0] if bars else np.zeros(2)
+
+
+def slide_names(frame: model.SectionFrame) -> tuple[str, str]:
+    """Labels of the axes across the slide."""
+    x, _, z = (", ".join(fixed(part, 2).removesuffix(".00") for part in axis) for axis in frame.axes)
+    return (
+        tr("across the slide, along ({axis}) of the base (mm)", axis=x),
+        tr("across the slide, along ({axis}) of the base (mm)", axis=z),
+    )
+
+
+def _draw_cloud(axes: Axes, bars: model.Bars, points: Reals) -> QuadMesh:
+    x, z = _across(bars, points).T * 1000
+    counts, *edges = np.histogram2d(x, z, bins=_CLOUD_CELLS)
+    counts *= 100 / (np.diff(edges[0])[0] * np.diff(edges[1])[0])
+    return axes.pcolormesh(*edges, masked(counts).T, cmap=DENSITY, norm=log_norm(counts), rasterized=True)
+
+
+def _draw_proof(axes: Axes, proof: model.ProofCells, bars: model.Bars | None) -> None:
+    corners = (np.concatenate([proof.rho_m, proof.z_m], axis=1) + _origin_across(bars)[[0, 0, 1, 1]]) * 1000
+    filled, empty = proof.filled_ratio, proof.empty_ratio
+    if bars:  # their ends are empty
+        filled, empty = filled / np.maximum(1 - empty, 1e-12), (empty >= 1).astype(float)
+        filled = np.where((filled > 0.5) | (empty == 1), 1 - empty, 0.0)
+    kinds = np.select([1 - filled - empty > 0.5, empty >= 0.5, filled < 1], [UNDECIDED, EMPTY, WEDGE], FILLED)
+    for kind, colour in enumerate(PROOF.values()):
+        a, b, c, d = corners[kinds == kind].T
+        boxes = np.stack([np.stack([a, c], 1), np.stack([b, c], 1), np.stack([b, d], 1), np.stack([a, d], 1)], axis=1)
+        axes.add_collection(
+            PolyCollection(list(boxes), facecolors=colour, edgecolors=colour, linewidths=0.2, rasterized=True)
+        )
+    axes.set_ylim(corners[:, 2].min(), corners[:, 3].max())
+
+
+def arcs_of(border: model.Border, view: str, point: str) -> Iterator[tuple[int, model.Border]]:
+    """Numbers and rows of the arcs of a point's border in a view."""
+    rows = border.take((border.view == view) & (border.point == point))
+    yield from ((int(number), rows.take(rows.arc == number)) for number in np.unique(rows.arc))
+
+
+def _draw_border(axes: Axes, border: model.Border) -> None:
+    for point in sorted(BORDERS):
+        for _, arc in arcs_of(border, "section", point):
+            axes.plot(arc.rho_m * 1000, arc.z_m * 1000, color=BORDERS[point], linewidth=1.3)
+
+
+def draw_labels(axes: Axes, drawing: model.Drawing, across_m: Reals) -> None:
+    """The manufacturer's labels: extents as dotted lines, corners as dots; ``across_m`` are the level coordinates."""
+    for x, z, q2, q3 in zip(across_m * 1000, drawing.z_m * 1000, drawing.q2_deg, drawing.q3_deg):
+        if np.isnan(z):
+            axes.axvline(x, color=DRAWN, linestyle=":", linewidth=1.2)
+        elif np.isnan(x):
+            axes.axhline(z, color=DRAWN, linestyle=":", linewidth=1.2)
+        else:
+            axes.plot(x, z, "o", color=DRAWN, markersize=5)
+            axes.annotate(
+                f"J2 {as_text(q2, 'g')}, J3 {as_text(q3, 'g')} deg",
+                (x, z),
+                (6, -11),
+                textcoords="offset points",
+                fontsize=8,
+                color=DRAWN,
+            )
+
+
+def _about(axis: model.AxisSummary, points: Reals) -> Reals:
+    """Distance from axis 1 and height along it (n, 2) of points (n, 3), m."""
+    offset = points - axis.point_m
+    height = offset @ axis.direction
+    away = np.sqrt(np.maximum(0, (offset**2).sum(axis=1) - height**2))
+    return np.stack([away, height], axis=1)
+
+
+def slices(results: model.WorkspaceResults) -> Figure:
+    """Slices of the proof across axis 1, or along the slide."""
+    bars = results.summary.proof.bars
+    figure, axes = new_figure(1, 3, width=12.0, height=5.0)
+    size, origin = results.proof.rho_m[:, 1].max(), _origin_across(bars)
+    low, high = ([0.0, 0.0], [size, bars.length_m]) if bars else ([-size, -size], [size, size])
+    across, along = np.linspace(low, high, SLICE_PIXELS).T
+    x, y = np.meshgrid(across, along, indexing="ij")
+    for panel, height in zip(axes, slice_heights(results)):
+        shades = ListedColormap(list(PROOF.values()))
+        rho, azimuth = (x, 360 * y / bars.length_m) if bars else (np.hypot(x, y), np.degrees(np.arctan2(y, x)) % 360)
+        shown = _slice(results.proof, rho, azimuth, height)
+        panel.pcolormesh(
+            (across + origin[0]) * 1000, along * 1000, shown.T, cmap=shades, vmin=-0.5, vmax=3.5, rasterized=True
+        )
+        first, second = name_level(panel, bars.frame if bars else None, height, origin)
+        equal_scale(panel, first, second if panel is axes[0] else "", fill=False)
+    states = [state for kind, state in enumerate(PROOF) if kind != WEDGE]
+    handles = [Patch(facecolor=PROOF[state], edgecolor=MUTED, label=tr(state)) for state in states]
+    figure.legend(handles=handles, loc="outside lower center", ncols=3)
+    return figure
+
+
+def name_level(axes: Axes, slide: model.SectionFrame | None, height: float, origin: Reals) -> tuple[str, str]:
+    """Title a level slice by its height (m); returns the labels of its axes."""
+    if slide:
+        axes.set_title(tr("at {height} mm across it", height=fixed(1000 * (height + origin[1]), 0)))
+        return slide_names(slide)[0], tr("along the slide (mm)")
+    axes.set_title(tr("{height} mm up axis 1", height=fixed(1000 * height, 0)))
+    return tr("from axis 1, in the arm's zero plane (mm)"), tr("across it (mm)")
+
+
+def slice_heights(results: model.WorkspaceResults) -> list[float]:
+    """Three heights (m) along axis 1: of the largest enclosed void, or else the shoulder, and midway to both ends.
+
+    Quarters of the reached heights where the shoulder lies at an end of them or joint 1 slides.
+    """
+    axis, enclosed = results.summary.axis, results.summary.enclosed_voids
+    reached = results.proof.z_m[results.proof.empty_ratio < 1]
+    low, high = reached[:, 0].min(), reached[:, 1].max()
+    point = np.array(enclosed[0].centroid_m if enclosed else axis.shoulder_m)
+    middle = float((point - axis.point_m) @ axis.direction)
+    if results.summary.proof.bars or min(middle - low, high - middle) < WITHIN * (high - low):
+        return np.quantile([low, high], [0.25, 0.5, 0.75]).tolist()
+    return [(low + middle) / 2, middle, (middle + high) / 2]
+
+
+def _slice(proof: model.ProofCells, rho: Reals, azimuth: Reals, z: float) -> Integers:
+    """State of each pixel (m, deg) about axis 1, as a row of PROOF."""
+    state = np.full(rho.shape, EMPTY)
+    for row in np.flatnonzero((proof.z_m[:, 0] <= z) & (z < proof.z_m[:, 1])):
+        ring = (rho >= proof.rho_m[row, 0]) & (rho < proof.rho_m[row, 1])
+        empty, unfilled = (
+            _on_arcs(azimuth[ring], arcs[row]) for arcs in (proof.empty_arcs_deg, proof.unfilled_arcs_deg)
+        )
+        state[ring] = np.where(empty, EMPTY, np.where(unfilled, UNDECIDED, FILLED))
+    return state
+
+
+def _on_arcs(azimuth: Reals, arcs: Reals) -> Flags:
+    found = np.zeros(len(azimuth), dtype=bool)
+    for low, high in zip(arcs[::2], arcs[1::2]):
+        found |= (low <= azimuth) & (azimuth <= high)
+    return found
+
+
+SIDE_DRAWN, FLANGE, WRIST = JOINTS[2], INK, REFERENCE
+
+
+def side_view(results: model.WorkspaceResults, has_tool: bool) -> Figure:
+    """Wrist centre and flange in the arm's plane: samples, exact border with numbered arcs, the manufacturer's labels.
+
+    Parameters
+    ----------
+    has_tool : whether the tool point is another point than the flange
+    """
+    figure, (left, right) = new_figure(1, 2, width=12.0, height=6.6, sharex=True, sharey=True)
+    for axes, point, colour in ((left, "wrist_centre", WRIST), (right, "flange" if has_tool else "tool_point", FLANGE)):
+        mesh = _draw_samples(axes, results.side_view, "wrist_centre" if axes is left else "tool_point")
+        figure.colorbar(mesh, ax=axes, label=tr("samples per litre"), location="top", shrink=0.8)
+        for i, arc in arcs_of(results.border, "side", point):
+            x, z = arc.rho_m * 1000, arc.z_m * 1000
+            axes.plot(x, z, color=colour, linewidth=1.5)
+            if axes is left:
+                axes.annotate(str(i), (x[len(x) // 2], z[len(z) // 2]), **_numbered(colour))
+        equal_scale(axes, tr("x to the front (mm)"), tr("height along axis 1 (mm)") if axes is left else "", fill=False)
+    left.set_title(tr("Wrist centre"))
+    right.set_title(tr("Flange (border), tool point (samples)") if has_tool else tr("Flange"))
+    draw_labels(left, results.drawing, results.drawing.x_m)
+    handles = [
+        Line2D([], [], color=WRIST, label=tr("exact border of the wrist centre")),
+        Line2D([], [], color=FLANGE, label=tr("exact border of the flange")),
+    ]
+    if len(results.drawing):
+        handles.append(Line2D([], [], color=SIDE_DRAWN, marker="o", linestyle=":", label=tr("manufacturer's labels")))
+    figure.legend(handles=handles, loc="outside lower center", ncols=3)
+    return figure
+
+
+def arc_rows(border: model.Border) -> list[list[str]]:
+    """The wrist centre's arcs with the joint values that make them, as rows of text."""
+    return [
+        [str(i), word("workspace.sweeps", SWEEPS, arc.sweeps[0]), _swept(arc.q2_deg), _swept(arc.q3_deg)]
+        for i, arc in arcs_of(border, "side", "wrist_centre")
+    ]
+
+
+def _swept(angles: Reals) -> str:
+    first, last = angles[0], angles[-1]
+    low, high = fixed(min(first, last), 1), fixed(max(first, last), 1)
+    return low if low == high else tr("{low} to {high}", low=low, high=high)
+
+
+def _numbered(colour: str) -> dict[str, Any]:
+    box = {"boxstyle": "circle,pad=0.15", "facecolor": "white", "edgecolor": colour, "linewidth": 0.8}
+    return {"ha": "center", "va": "center", "fontsize": 8, "color": colour, "bbox": box}
+
+
+def _draw_samples(axes: Axes, views: model.SideViewCells, point: str) -> QuadMesh:
+    rows = views.take(views.point == point)
+    cell = float(rows.cell_m[0])
+    # Per volume of the half ring: else the samples near the axis would drown.
+    half_rings = np.pi * cell**2 * np.maximum(np.abs(rows.x_m), cell / 2) * 1e3
+    return _draw_cells(axes, cell, rows.x_m, rows.z_m, rows.samples / half_rings, alpha=0.8)
+
+
+CLOUD_POINTS = 12_000
+_COLOURS = {"enclosed": (HIGHLIGHT, JOINTS[6]), "open": (REFERENCE, JOINTS[8])}  # in turns, so that two stand apart
+_NAMES = {"enclosed": N_("void {number} (enclosed)"), "open": N_("void {number} (open)")}
+
+
+def in_space(robot: Robot, results: model.WorkspaceResults, scene: Scene | None) -> Markup:
+    """The cloud's far half, the voids, the scene and the arm at zero in a figure that turns."""
+    cloud, vertices, triangles = results.cloud, results.void_vertices, results.void_triangles
+    far = np.flatnonzero(cloud.point_m[:, 1] >= results.summary.axis.point_m[1])[:CLOUD_POINTS]
+    value = cloud.manipulability_m3[far]
+    most = float(np.quantile(value, 0.99)) or 1.0
+    layers = [Layer(tr("cloud, far half"), "points", 1000 * cloud.point_m[far], width=1.6, shade=value / most)]
+    drawn: Counter[str] = Counter()
+    for i, void in enumerate(results.summary.voids, start=1):
+        faces = triangles.corners[triangles.void == i]
+        if len(faces):
+            name, corners = tr(_NAMES[void.kind], number=i), 1000 * vertices.point_m[vertices.void == i]
+            colour = _COLOURS[void.kind][drawn[void.kind] % 2]
+            layers.append(Layer(name, "surface", corners, colour, faces=faces))
+            drawn[void.kind] += 1
+    layers.append(Layer(tr("arm at 0"), "line", 1000 * skeleton(robot, np.zeros(robot.joints)), width=5.0))
+    layers += scene_layers(scene)
+    scale = ColourScale("viridis", tr("manipulability (m³)"), [(0.0, "0"), (1.0, number(most, 2))])
+    return turning_figure({"": layers}, scale)
