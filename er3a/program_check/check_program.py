@@ -280,7 +280,7 @@ def _located(
     for number, motion in motions.items():
         step = execution.steps[number]
         found += [
-            LocatedFinding(found_in.level_of(each), each, step.place, step.calls, 1, number, moment)
+            LocatedFinding(motion.level_of(each), each, step.place, step.calls, 1, number, moment)
             for each, moment in motion.findings.items()
         ]
     unknown = [(step, step.instruction) for step in execution.steps if isinstance(step.instruction, Unknown)]
