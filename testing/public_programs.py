@@ -74,7 +74,8 @@ def outcome(folder: Path, file: Path, robot: str) -> Outcome:
     at: dict[object, list[LocatedFinding]] = {}
     for each in check.findings:
         at.setdefault(each.place, []).append(each)
-    given = [each for each in check.verdicts if not any(map(_elsewhere, at.get(each.place, [])))]
+    motions = [each for each in check.verdicts if not each.unreached]
+    given = [each for each in motions if not any(map(_elsewhere, at.get(each.place, [])))]
     passed = [each for each in given if each.level in ("pass", "note")]
     codes = Counter(
         f"{one.finding.code}{':' + one.finding.reason if isinstance(one.finding, NotFollowed) else ''} {one.level}"
@@ -82,9 +83,9 @@ def outcome(folder: Path, file: Path, robot: str) -> Outcome:
         for one in at.get(each.place, [])
         if one.level not in ("note", "pass")
     )
-    failed = sum(each.level == "fail" for each in check.verdicts)
+    failed = sum(each.level == "fail" for each in motions)
     rows = len(lines_of(CheckedFile(file, check)))
-    return Outcome(file, robot, len(check.verdicts), len(given), len(passed), failed, codes, seconds, rows)
+    return Outcome(file, robot, len(motions), len(given), len(passed), failed, codes, seconds, rows)
 
 
 def _elsewhere(each: LocatedFinding) -> bool:

@@ -9,7 +9,7 @@ beyond a limit is named (``Execution.open``), and is no part of what was followe
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
@@ -29,7 +29,7 @@ from er3a.robots.robot import Robot
 SAME_FRAME_MM, SAME_FRAME_DEG = 0.01, 0.001
 """Frames that differ by less are one, written with fewer digits."""
 IN_ONE_PLACE = 8  # ways, before what differs between them becomes unknown
-WAYS_COST = 10  # operations, as many as which one counts while other ways wait
+STATE_COST = 10  # operations, as many as which the comparison of a state with others counts
 OTHERWISE = "%otherwise"  # what makes motions go otherwise, and is not followed
 UNKNOWN_ROUNDS = 12  # of a loop that only something unknown ends, before what it changes becomes unknown
 
@@ -207,11 +207,12 @@ class Machine:
             frame = way.frames[-1]
             name, at = frame.routine.name, frame.at
             operation = frame.routine.code[at]
-            self.budget -= WAYS_COST if self.pending else 1
+            self.budget -= 1
             if self.budget < 0:
                 self._cut(way, "operations", operation.place)
                 return
             if at in self.labels[name]:
+                self.budget -= STATE_COST
                 if self.pending and begun:
                     self.pending.append(way)
                     return
@@ -574,14 +575,16 @@ class Machine:
 
     def _state(self, way: Way) -> Hashable:
         """A key that is equal for ways in one place that go on alike."""
-        memory, fixed = way.memory, self.fixed
-        shared = frozenset(pair for pair in memory.shared.items() if pair[0] not in fixed and self._decides(*pair))
-        local = (frozenset(pair for pair in frame.local.items() if self._decides(*pair)) for frame in way.frames)
-        return shared, tuple(local), memory.here.key()
+        memory = way.memory
+        local = (frozenset(self._deciding(frame.local)) for frame in way.frames)
+        return frozenset(self._deciding(memory.shared, self.fixed)), tuple(local), memory.here.key()
 
-    def _decides(self, name: str, value: syntax.Value) -> bool:
-        """Whether anything that is carried out may depend on a variable, other than counts that are never read."""
-        return root(name) not in self._counts or not isinstance(value, (int, float, syntax.Unclear))
+    def _deciding(
+        self, values: Mapping[str, syntax.Value], fixed: Collection[str] = ()
+    ) -> list[tuple[str, syntax.Value]]:
+        """Variables on which anything that is carried out may depend: neither fixed nor counts that are never read."""
+        counts = self._counts
+        return [pair for pair in values.items() if pair[0] not in fixed and root(pair[0]) not in counts]
 
     @cached_property
     def _counts(self) -> set[str]:
