@@ -27,6 +27,9 @@ NOT_IN_THE_FILE = frozenset(
 )
 """Why the target of a motion is not in the program's files."""
 
+ADVICE = frozenset(("zone_too_large", "suspect_number", "whole_turn", "joint_jumps", "frame_given_twice"))
+"""What is said of a motion that is within limits, reach, configuration, rates and clear of the arm itself."""
+
 
 @dataclass(frozen=True)
 class Outcome:
@@ -35,7 +38,7 @@ class Outcome:
     Attributes
     ----------
     motions : instructions that move the arm; given : of these, those whose targets are in the files
-    passed : of these, those that pass what the arm alone allows to check
+    passed : of these, those that pass what the arm alone allows to check; clean : those of which nothing is said
     findings : their codes and levels, counted by motions
     seconds : processor time of reading and checking
     rows : lines that are printed of it
@@ -46,6 +49,7 @@ class Outcome:
     motions: int = 0
     given: int = 0
     passed: int = 0
+    clean: int = 0
     failed: int = 0
     findings: Counter[str] = field(default_factory=Counter)
     seconds: float = 0.0
@@ -76,7 +80,8 @@ def outcome(folder: Path, file: Path, robot: str) -> Outcome:
         at.setdefault(each.place, []).append(each)
     motions = [each for each in check.verdicts if not each.unreached]
     given = [each for each in motions if not any(map(_elsewhere, at.get(each.place, [])))]
-    passed = [each for each in given if each.level in ("pass", "note")]
+    clean = [each for each in given if each.level in ("pass", "note")]
+    passed = [each for each in given if each in clean or _only_advised(at.get(each.place, []), each.followed)]
     codes = Counter(
         f"{one.finding.code}{':' + one.finding.reason if isinstance(one.finding, NotFollowed) else ''} {one.level}"
         for each in check.verdicts
@@ -85,7 +90,12 @@ def outcome(folder: Path, file: Path, robot: str) -> Outcome:
     )
     failed = sum(each.level == "fail" for each in motions)
     rows = len(lines_of(CheckedFile(file, check)))
-    return Outcome(file, robot, len(motions), len(given), len(passed), failed, codes, seconds, rows)
+    return Outcome(file, robot, len(motions), len(given), len(passed), len(clean), failed, codes, seconds, rows)
+
+
+def _only_advised(found: list[LocatedFinding], followed: bool) -> bool:
+    """Whether a motion meets its checks, and what is said is advice about numbers."""
+    return followed and all(each.level in ("note", "pass") or each.finding.code in ADVICE for each in found)
 
 
 def _elsewhere(each: LocatedFinding) -> bool:
@@ -101,7 +111,7 @@ def summary(found: list[Outcome]) -> str:
     most = max(each.rows for each in found)
     return (
         f"{len(found)} programs, {motions} motions, {given} with targets in the files, {passed} of these pass "
-        f"({share:.1f} %); median {median:.2f} s; at most {most} of {MOST_ROWS} lines a program"
+        f"({share:.1f} %), {sum(each.clean for each in found)} without a word; median {median:.2f} s; at most {most} of {MOST_ROWS} lines a program"
     )
 
 
@@ -113,7 +123,7 @@ if __name__ == "__main__":
         done.append(result)
         why = ", ".join(f"{code} {count}" for code, count in result.findings.most_common(6))
         print(
-            f"{result.passed}/{result.given}/{result.motions} fail {result.failed} {result.seconds:.2f} s "
+            f"{result.clean}/{result.passed}/{result.given}/{result.motions} fail {result.failed} {result.seconds:.2f} s "
             f"{result.rows} rows {'/'.join(result.file.parts[-2:])} {result.robot}: {result.error or why}",
             flush=True,
         )

@@ -35,6 +35,7 @@ from er3a.program_check.motion_checks import (
     MotionPath,
     Shares,
     arrives_otherwise,
+    far_turns,
     is_given,
     joint_path,
     limit_findings,
@@ -175,6 +176,8 @@ class Judge:
         checked.end = goal if beyond < MOST_TURNS else None
         if checked.path is not None:
             checked.add_on_way(path_findings(checked.path, self.rules, None))
+            if isinstance(target, instructions.JointTarget) or target.branch is None:  # no configuration that is meant
+                checked.add_on_way(dict.fromkeys(far_turns(checked.path), 0.0))
 
     def _along_tool_path(
         self, checked: CheckedMotion, target: instructions.JointTarget | instructions.PoseTarget

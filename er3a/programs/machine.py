@@ -537,7 +537,13 @@ class Machine:
     def _steering(self) -> set[str]:
         """Variables that motions are made of, and those that they are computed from."""
         code = [*self.program.operations()]
-        found = {name for op in code if isinstance(op, syntax.Move) for of in syntax.expressions_of(op) for name in _names(of)}
+        found = {
+            name
+            for op in code
+            if isinstance(op, syntax.Move)
+            for of in syntax.expressions_of(op)
+            for name in _names(of)
+        }
         found |= self.dialect.modal
         before = -1
         while before != len(found):
