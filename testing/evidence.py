@@ -35,6 +35,7 @@ PAGES = (
     "pages",
     "fleet",
     "comparison",
+    "programs",
 )
 PARTS = {"fuzz": "reliability.md", "faults": "reliability.md", "kills": "reliability.md", "slurm": "cluster.md"}
 CAMPAIGNS = (*PAGES, *PARTS)

@@ -306,7 +306,8 @@ def _located(
         for each in execution.frames_twice
     ]
     found += [
-        LocatedFinding("caution", each, step.place, step.calls) for step, each in suspect_numbers(execution, robot)
+        LocatedFinding(found_in.level_of(each), each, step.place, step.calls)
+        for step, each in suspect_numbers(execution, robot)
     ]
     groups: dict[tuple[Place, str, str], list[LocatedFinding]] = defaultdict(list)
     for each in found:

@@ -158,7 +158,9 @@ class Judge:
         if checked.path is not None and not is_given(motion):
             assumed, word = self.rules.assumed, "" if motion.speed is None else motion.speed.text
             values = (assumed.tool_speed, "m/s") if of_tool else (assumed.joint_share, "share")
-            checked.add(found_in.SpeedNotGiven(*values, word))  # type: ignore[arg-type]
+            number = word.rpartition("=")[2]
+            refused = number.lstrip("+-").replace(".", "", 1).isdecimal()  # known, and beyond what a controller takes
+            checked.add(found_in.SpeedNotGiven(*values, word, refused))  # type: ignore[arg-type]
         return checked
 
     def _to_joints(self, checked: CheckedMotion, target: instructions.JointTarget | instructions.PoseTarget) -> None:
