@@ -265,6 +265,8 @@ class Judge:
         said = checked.motion.kind == "joint" and target.branch is None and bool(target.configuration)
         if (near is None or said) and (different := len(np.unique(np.round(rows, SAME_DIGITS), axis=0))) > 1:
             checked.add(found_in.ConfigurationGuessed(different))
+            if near is None:  # the one farthest from the limits
+                away = -np.minimum(rows - checked.arm.lower, checked.arm.upper - rows).min(axis=1)
         return np.asarray(rows[int(away.argmin())], np.float64)
 
 
