@@ -248,9 +248,8 @@ def _corners(
     for number, step in enumerate(execution.steps):
         before = last[step.before]
         last[number] = number if number in motions else before
-        if number in motions:
-            if before >= 0:
-                pairs.setdefault((id(motions[before]), id(motions[number])), (motions[before], motions[number]))
+        if number in motions and before >= 0:
+            pairs.setdefault((id(motions[before]), id(motions[number])), (motions[before], motions[number]))
     following: dict[int, list[int]] = defaultdict(list)
     for number, step in enumerate(execution.steps):
         following[step.before].append(number)

@@ -41,7 +41,7 @@ LOOPS = ("loop", "while", "for", "repeat")
 
 
 WORDS = re.compile(r'"[^"]*"|[A-Za-z_$][\w.$%]*|\d[\w.]*|\S')
-OPERATORS = frozenset("AND OR NOT XOR EXOR DIV MOD B_AND B_OR B_EXOR B_NOT".split())
+OPERATORS = frozenset(["AND", "OR", "NOT", "XOR", "EXOR", "DIV", "MOD", "B_AND", "B_OR", "B_EXOR", "B_NOT"])
 
 
 def is_no_statement(text: str, calls_without_brackets: bool = False) -> bool:

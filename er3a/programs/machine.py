@@ -382,7 +382,7 @@ class Machine:
             motion = replace(motion, not_followed=motion.not_followed or syntax.shown(otherwise))
         moved = None if self.mover is None else self.mover(motion, memory.here.joints)
         self._note(way, place, motion, moved)
-        memory.here = memory.here.after(motion, memory.cell.flange)
+        memory.here = memory.here.after(motion)
         if moved is not None:
             known = moved.end is not None
             memory.here = replace(memory.here, joints=moved.end, pose=memory.here.pose if known else None)
