@@ -51,7 +51,7 @@ def is_no_statement(text: str, calls_without_brackets: bool = False) -> bool:
     ----------
     calls_without_brackets : whether a procedure's name stands before its arguments, as in RAPID
     """
-    words = WORDS.findall(text)[calls_without_brackets:]
+    words = WORDS.findall(text.partition("{")[0])[calls_without_brackets:]  # a list in braces names its fields
     values = [(each[0].isalnum() or each[0] in '_$"') and each.upper() not in OPERATORS for each in words]
     return any(map(all, pairwise(values)))
 
