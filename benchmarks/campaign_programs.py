@@ -1,3 +1,4 @@
+# ruff: noqa: E501
 """Robot programs: public ones with the arm alone, faults put into sound ones, and times.
 
 The public programs are no part of the project. ``PUBLIC_PROGRAMS=FOLDER make campaigns ARGS=programs`` checks those that

@@ -1,3 +1,4 @@
+# ruff: noqa: E501
 """Faults as people make them, put one at a time into programs that pass with robot, start and scene.
 
 The arm is the ER3A-C60 with its shapes, speeds and payload taken as documented, so that what is certain from the files

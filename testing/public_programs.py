@@ -1,3 +1,4 @@
+# ruff: noqa: E501
 """Programs of public repositories, checked with a fitting arm and nothing else.
 
 They stay outside the project: a folder holds ``cells.yaml``, rows of ``file`` and ``robot`` (a name of the library, or a
