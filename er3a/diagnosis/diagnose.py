@@ -9,10 +9,11 @@ from typing import cast
 import numpy as np
 
 from er3a.by_value import ByValue, Displayed, Sheet, first_rows, shortly
+from er3a.comparison.entries import Entry
 from er3a.diagnosis import conclusions
 from er3a.diagnosis.defined_otherwise import Conventions, conventions_of, counted_from_ground
 from er3a.diagnosis.faults import SIDES, Faults, entry_of
-from er3a.diagnosis.fitting import MEETS, PROBE, FreeNumber, minimise_max, moved
+from er3a.diagnosis.fitting import ANGLES, MEETS, PROBE, minimise_max, moved
 from er3a.diagnosis.ranking import SHOWN, UNITS, Case, Ranking, case_of, rank_case, usable
 from er3a.kinematics.table_batch import Tables, frames_of, robot_of, tables_of
 from er3a.numerics.arrays import Flags, Reals
@@ -95,11 +96,11 @@ ALIKE = 0.01
 
 def resolution_of(case: Case) -> conclusions.Resolution:
     """What would be noticed of a table that meets all references."""
-    entries = [number for number in case.numbers if number.column]
+    entries = [number for number in case.numbers if number.joint]
     noticed = {number: least_noticed(case, number) for number in entries}
-    lengths = [size * MM for number, size in noticed.items() if size is not None and not number.is_angle]
-    angles = [float(np.degrees(size)) for number, size in noticed.items() if size is not None and number.is_angle]
-    half_turns = [number for number in entries if number.is_angle and not _missed(case, number, np.array([np.pi]))[0]]
+    lengths = [size * MM for number, size in noticed.items() if size is not None and number.column not in ANGLES]
+    angles = [float(np.degrees(size)) for number, size in noticed.items() if size is not None and number.column in ANGLES]
+    half_turns = [number for number in entries if number.column in ANGLES and not _missed(case, number, np.array([np.pi]))[0]]
     return conclusions.Resolution(
         length_mm=max(lengths, default=None),
         angle_deg=max(angles, default=None),
@@ -111,12 +112,12 @@ def resolution_of(case: Case) -> conclusions.Resolution:
 def unseen_of(case: Case) -> tuple[str, ...]:
     """Entries that no reference reacts to at any value, and joints that could be reversed."""
     before = case.difference(case.given)[0]
-    entries = [number for number in case.numbers if number.column]
+    entries = [number for number in case.numbers if number.joint]
     if not entries:
         rows = range(1, case.given.d.shape[-1] + 1)
         names = [f"{name}{row}" for name in ("a", "alpha", "d", "offset") for row in rows]
     else:
-        sizes = {number: np.array(TRIED_RAD if number.is_angle else TRIED_M) for number in entries}
+        sizes = {number: np.array(TRIED_RAD if number.column in ANGLES else TRIED_M) for number in entries}
         missed = {number: _missed(case, number, np.concatenate([own, -own]), before) for number, own in sizes.items()}
         names = [number.name for number, own in missed.items() if not own.any()]
     return (*names, *_reversible(case, before))
@@ -133,10 +134,10 @@ def _reversible(case: Case, before: Reals | float = 0.0) -> list[str]:
     return found
 
 
-def least_noticed(case: Case, number: FreeNumber) -> float | None:
+def least_noticed(case: Case, number: Entry) -> float | None:
     """The least change (m or rad) of an entry, to 10 %, at which some reference is missed, whichever way it is changed;
     None if there is none up to 1.2 m or half a turn."""
-    sizes = ANGLES_RAD if number.is_angle else LENGTHS_M
+    sizes = ANGLES_RAD if number.column in ANGLES else LENGTHS_M
     missed = _missed(case, number, np.concatenate([sizes, -sizes])).reshape(2, -1)
     if not missed.any(axis=1).all():
         return None
@@ -181,7 +182,7 @@ def _slopes(case: Case, ranking: Ranking, row: int) -> Reals:
     return slopes
 
 
-def _missed(case: Case, number: FreeNumber, amounts: Reals, before: Reals | float = 0.0) -> Flags:
+def _missed(case: Case, number: ANGLES, amounts: Reals, before: Reals | float = 0.0) -> Flags:
     tables = case.given[np.zeros(len(amounts), dtype=int)]
     changed = moved(tables, [number], np.zeros((len(amounts), 1), dtype=int), amounts[:, None])
     missed: Flags = np.any(np.abs(case.difference(changed) - before) > case.uncertainty * MEETS, axis=1)
