@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from er3a.comparison.entries import Entry
-from er3a.diagnosis.diagnose import least_noticed
+from er3a.diagnosis.diagnose import missed
 from er3a.diagnosis.faults import (
     SIDES,
     Fault,
@@ -180,6 +180,20 @@ def _same(table: Tables, right: Tables) -> bool:
     angles = max(np.abs((gap + np.pi) % (2 * np.pi) - np.pi).max() for gap in turned)
     rest = max(np.abs(getattr(table, name) - getattr(right, name)).max() for name in ("direction", "lower", "upper"))
     return bool(lengths and max(angles, rest) < SAME_ANGLE and table.modified[0] == right.modified[0])
+
+
+LENGTHS_M = 1e-5 * 1.1 ** np.arange(124)  # up to 1.2 m
+ANGLES_RAD = np.pi / 1.1 ** np.arange(123, -1, -1)  # from 0.0015 deg to half a turn
+
+
+def least_noticed(case: Case, number: Entry) -> float | None:
+    """The least change (m or rad) of an entry, to 10 %, at which some reference is missed, whichever way it is changed;
+    None if there is none up to 1.2 m or half a turn."""
+    sizes = ANGLES_RAD if number.column in ANGLES else LENGTHS_M
+    noticed = missed(case, number, np.concatenate([sizes, -sizes])).reshape(2, -1)
+    if not noticed.any(axis=1).all():
+        return None
+    return float(sizes[noticed.argmax(axis=1).max()])
 
 
 GROSS_M, GROSS_RAD = 0.5, np.radians(170.0)

@@ -18,7 +18,7 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.calibration.fit import SCALE, bar_lengths, held_with, jacobian, scale_of, subspace, without_scale
+from er3a.calibration.fit import SCALE, held_with, jacobian, scale_of, subspace, without_scale
 from er3a.calibration.observations import (
     PLACEMENTS,
     Measurement,
@@ -28,9 +28,11 @@ from er3a.calibration.observations import (
     socket,
     spread,
 )
+from er3a.calibration.observations import plane as plane_of
 from er3a.calibration.outcomes import FixedName, Held
-from er3a.calibration.parameters import Parameter, parameters_of, placements_of, settles
-from er3a.calibration.terms import JointErrors, effects
+from er3a.calibration.parameters import parameters_of, placements_of, settles
+from er3a.calibration.terms import effects
+from er3a.comparison.entries import Entry, EntryUnit
 from er3a.collision.along import clearance
 from er3a.kinematics.chain import row_values
 from er3a.kinematics.forward import forward
@@ -76,7 +78,7 @@ class Width:
     settle it."""
 
     name: str
-    unit: Literal["mm", "deg"]
+    unit: EntryUnit
     now: float | None
     then: float | None
 
@@ -87,13 +89,12 @@ class Plan:
 
     Attributes
     ----------
-    settled : numbers that they tell to less than the table could be wrong by, ``bar_NAME`` a bar's length
+    settled : numbers that they tell to less than the table could be wrong by
     lacking : those that measurements of this kind at more poses would
     held : why no poses settle the others
     proposals : poses, the one that adds most first
     beyond : where these go beyond the measured poses
     widths : of all numbers that are settled with the proposals, for the deviation stated or else 0.1 mm
-    undetermined_bars : bars of unknown length that nothing determines: by the table their points don't lie on a sphere
     """
 
     settled: tuple[str, ...]
@@ -102,7 +103,6 @@ class Plan:
     proposals: tuple[Proposal, ...]
     beyond: tuple[OutOfMeasured, ...]
     widths: tuple[Width, ...]
-    undetermined_bars: tuple[str, ...] = ()
 
 
 ASSUMED_MM = 0.1
@@ -118,7 +118,6 @@ def plan(robot: Robot, measurements: Sequence[Measurement], count: int, fixed: S
         for poses of another arm, or outside its limits
     """
     seen = observed(measurements, robot, fixed)
-    assert isinstance(seen, PointObservations)
     if not seen.deviation_known:
         seen = seen.with_deviation(ASSUMED_MM)
     scale = scale_of(robot, seen)
@@ -131,17 +130,15 @@ def plan(robot: Robot, measurements: Sequence[Measurement], count: int, fixed: S
     proposals = tuple(each for option in chosen for each in option)
     then = _with(robot, measurements, proposals, seen)
     now, new = (_half_widths(robot, parameters, each) for each in (seen, then))
-    ever = (*(each.name for each in kept), *_bars(robot, (), every, np.zeros((0, 0))))
     units = {each.name: each.unit for each in parameters}
-    settled = tuple(name for name, width in now.items() if settles(robot, units.get(name, "mm"), width))
+    settled = tuple(name for name, width in now.items() if settles(robot, units[name], width))
     return Plan(
         settled=settled,
-        lacking=tuple(name for name in ever if name not in settled),
+        lacking=tuple(each.name for each in kept if each.name not in settled),
         held=(*able.held, *held_with(scale)),
         proposals=proposals,
         beyond=_beyond(measurements, proposals),
-        widths=tuple(Width(name, units.get(name, "mm"), now.get(name), width) for name, width in new.items()),
-        undetermined_bars=tuple(name for name, _ in seen.unknown_bars() if f"bar_{name}" not in ever),
+        widths=tuple(Width(name, units[name], now.get(name), width) for name, width in new.items()),
     )
 
 
@@ -165,7 +162,7 @@ def d_optimal(information: Reals, blocks: Sequence[Reals], count: int) -> list[i
 
 def _chosen(
     robot: Robot,
-    kept: Sequence[Parameter],
+    kept: Sequence[Entry],
     every: PointObservations,
     measured: int,
     options: Sequence[tuple[Proposal, ...]],
@@ -187,7 +184,6 @@ def _with(
     known = {each.touched for each in measurements if each.length_mm is not None}
     new = [_as_measured(each, point, each.kind == "pair" or (each.kind, each.name) in known) for each in proposals]
     found = observed([*measurements, *new], robot, [name for name in PLACEMENTS if name not in seen.free])
-    assert isinstance(found, PointObservations)
     by_point = np.full(len(found.seen), np.median(seen.deviation_mm))
     by_point[seen.pose_of] = seen.deviation_mm
     return replace(found, deviation_mm=by_point[found.pose_of])
@@ -264,7 +260,6 @@ def touches(robot: Robot, seen: PointObservations) -> PointObservations:
         for option in _touches(robot, q, seen, (thing.kind, thing.name), x=x[rows], lengths=lengths, labels=labels):
             new += [_as_measured(each, point, bool(lengths.any())) for each in option]
     found = observed(new, robot, [name for name in PLACEMENTS if name not in seen.free])
-    assert isinstance(found, PointObservations)
     return found.with_deviation(float(np.median(seen.deviation_mm)))
 
 
@@ -274,12 +269,8 @@ def _touching(
     """Joint values (N, n) near to others that touch what points x (P, 3), m, have touched, or are at a pair's length
     from ``others`` (N, 3); lengths (N,), m, and whether each does, free of collision and within limits."""
     size = np.resize(lengths, len(q))
-    centre = x.mean(axis=0)
-    normal = seen.plane(x @ seen.axes.T)[0] @ seen.axes
-    if kind == "bar":
-        centre = socket(x, lengths)
-        if not lengths.any():
-            size = np.full(len(q), np.linalg.norm(x - centre, axis=1).mean())
+    centre = socket(x, lengths) if kind == "bar" else x.mean(axis=0)
+    normal = plane_of(x)[0] if kind == "plane" else np.zeros(3)
     for _ in range(NEWTON_STEPS):
         point = _points(robot, q, seen)
         apart = point - (others if kind == "pair" else centre)
@@ -331,19 +322,10 @@ def _beyond(measurements: Sequence[Measurement], proposals: Sequence[Proposal]) 
     return tuple(found)
 
 
-def _half_widths(robot: Robot, parameters: Sequence[Parameter], seen: PointObservations) -> dict[str, float]:
+def _half_widths(robot: Robot, parameters: Sequence[Entry], seen: PointObservations) -> dict[str, float]:
     """Of the numbers that are settled the half-widths of their 95 % intervals, mm or deg."""
     kept = [parameters[k] for k in subspace(robot, parameters, seen).kept]
     J = seen.independent(robot)[0] @ (SCALE * jacobian(robot, kept, seen) / seen.deviation_mm[:, None])
     covariance = np.asarray(SCALE**2 * np.linalg.pinv(J.T @ J), np.float64)
     errors = np.sqrt(np.diag(covariance))
-    found = {each.name: INTERVAL_95 * float(error) * each.in_unit for each, error in zip(kept, errors)}
-    return found | _bars(robot, kept, seen, covariance)
-
-
-def _bars(robot: Robot, kept: Sequence[Parameter], seen: PointObservations, covariance: Reals) -> dict[str, float]:
-    """Of bars whose length is settled half of its 95 % interval, mm; ``covariance`` (k, k) of what is kept."""
-    bars = bar_lengths(
-        robot, JointErrors(robot, (), np.zeros(0)), kept, seen, covariance, np.full(len(kept), INTERVAL_95)
-    )
-    return {f"bar_{each.name}": each.half_width_mm for each in bars if each.half_width_mm is not None}
+    return {each.name: INTERVAL_95 * float(error) * each.in_unit for each, error in zip(kept, errors)}

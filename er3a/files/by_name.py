@@ -134,7 +134,7 @@ def load_joint_values(path: str | Path, robot: Robot) -> Reals:
 
 
 def _check_lengths(path: Path, rows: list[Measurement]) -> None:
-    """Check that a pair has two rows and one length, and a bar a length in all of its rows or in none."""
+    """Check that a pair has two rows and one length, and a bar a length in all of its rows."""
     groups: dict[tuple[str, str], list[Measurement]] = {}
     for row in rows:
         if row.touched and row.touched[0] in ("pair", "bar"):
@@ -151,9 +151,9 @@ def _check_lengths(path: Path, rows: list[Measurement]) -> None:
                 f"the rows of pair '{name}' need one and the same length",
                 "Write it in both rows, in length_mm",
             )
-        if kind == "bar" and None in lengths and len(lengths) > 1:
-            problem = f"the bar '{name}' has a length in some rows only"
-            raise InputError(path, where, problem, "Write it in all rows, or in none if it is unknown")
+        if kind == "bar" and None in lengths:
+            problem = f"the bar '{name}' has rows without a length"
+            raise InputError(path, where, problem, "Write it in all rows, in length_mm")
 
 
 def _units_in(path: Path) -> list[str]:
@@ -274,14 +274,13 @@ def evidence(robot: Robot, references: References | None = None, tolerance: Tole
 
 
 def calibrate(
-    robot: Robot, measurements: Sequence[Measurement] | ReferenceSet | str | Path, fixed: Sequence[FixedName] = ()
+    robot: Robot, measurements: Sequence[Measurement] | str | Path, fixed: Sequence[FixedName] = ()
 ) -> Calibration:
     """Estimate corrections to a robot's table, base and tool; see :func:`er3a.calibration.calibrate.calibrate`.
 
     Parameters
     ----------
-    measurements : a CSV file of measured positions (:func:`er3a.load_measurements`), its rows, or a reference set,
-        whose positions are used
+    measurements : a CSV file of measured positions (:func:`er3a.load_measurements`), or its rows
     fixed : ``"base"``, ``"tool"``, ``"ratios"``: not to be estimated but kept as in the robot's file; default: none
 
     Returns
@@ -300,8 +299,6 @@ def calibrate(
     if isinstance(measurements, str | Path):
         path, measurements = measurements, load_measurements(measurements, robot)
         check_poses(measurements, robot, path)
-    elif isinstance(measurements, ReferenceSet):
-        measurements = _of_arm(measurements, robot)
     found = calibration.calibrate(robot, measurements, fixed)
     text = f"Calibrated with {found.coordinates} measured coordinates, starting from the table of {robot.name}"
     source = Source(text, "inferred")

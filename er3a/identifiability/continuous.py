@@ -35,8 +35,10 @@ MAX_ROWS = 1 << 15
 SPREAD, WIDTHS = 192, (0.02, 0.1, 0.3, 1.0)
 REVERSED, TURNED = 0.2, 0.15  # shares of joints reversed and angles turned round, in every second spread start
 PUSHES = 1.1, 3.0, 8.0  # of the tolerance's step
-ROUNDS, PUSHED_FROM, SEED = 2, 2, 20261121
+FARTHER = 1.5  # times as far as known, for a table to be looked at
+ROUNDS, PUSHED_FROM, SEED = 3, 6, 20261121
 STAYING = 0.9  # of a half-width, to within which spread starts are led
+STAYS_FROM = 4  # tables elsewhere, from which one with an entry as it is is looked for
 FIRST_PUSH, FINE, MOST_PUSHES = 0.1, 0.01, 26  # of an entry's scale; of what was reached
 
 
@@ -127,6 +129,7 @@ class Extents:
     Attributes
     ----------
     met : whether a table that meets the requirements was found; table_meets : whether the table does
+    goes_far : whether tables far away meet them, too: how far these go in any entry was not searched
     """
 
     def __init__(
@@ -152,6 +155,7 @@ class Extents:
         if not self.table_meets:
             self._begin(nearer)
         self._fit_likelihood()
+        self.goes_far = False
         self._ends: dict[bytes, tuple[float, float]] = {}
 
     @property
@@ -160,14 +164,12 @@ class Extents:
         return self.region.tables(self.direction[None], self.start[None])
 
     def _begin(self, nearer: Sequence[Tables]) -> None:
-        """A table that meets the requirements, by a change of one entry, else of two, else of any, from the table and
-        from others; else of those from where steps led the nearest."""
+        """A table that meets the requirements, of those given, else by a change of one entry, else of any, with
+        joints reversed; else the one to where steps from the table lead."""
         k, own = len(self.places), self.table.direction[0]
         starts = [(own, self.start), *(self._amounts(each) for each in nearer)]
-        for count in (1, 2):
-            chosen = np.array([np.isin(np.arange(k), each) for each in combinations(range(k), count)])
-            if len(chosen) and self._chose([starts[0]] * len(chosen), ~chosen):
-                return
+        if self._chose(starts, np.ones((len(starts), k), dtype=bool)) or self._chose(starts[:1] * k, ~np.eye(k, dtype=bool)):
+            return
         turned = [np.where(np.isin(np.arange(len(own)), each), -1.0, 1.0) for n in range(4) for each in combinations(range(len(own)), n)]
         for some in ([(turn * each, begun) for each, begun in starts for turn in turned], [*zip(*_spread(self.region, own, self.start))]):
             if self._chose(some):
@@ -179,6 +181,8 @@ class Extents:
         direction = np.array([each for each, _ in starts])
         amounts, met = self.region.reached(direction, np.array([own for _, own in starts]), held)
         found = [self._rewritten(direction[i], amounts[i]) for i in np.flatnonzero(met)]
+        plain = [(each, np.where(np.isin(np.arange(len(own)), self.watched), own, 0.0)) for each, own in found]
+        found += [each for each in plain if self.region.reached(each[0][None], each[1][None], np.ones((1, len(each[1])), dtype=bool))[1][0]]
         found.sort(key=lambda each: self._distance(*each))
         for each in found:
             if (start := self.region.confirmed(*each)) is not None:
@@ -223,15 +227,13 @@ class Extents:
             return Extent(np.nan, np.nan, NOT_OFF, bool(abs(own @ self.start) > first.scale))
         low, high = self._end(own)
         reached = [float(own @ amounts) for _, amounts in self.elsewhere]
-        widest, far = self._widest(first), FAR * first.scale
-        at_least = any(each < max(low, -widest) - far or each > min(high, widest) + far for each in reached)
+        excluded = not (self.table_meets or low - REACTS <= 0 <= high + REACTS or self._could_stay(own))
         low, high = min([low, *reached]), max([high, *reached])
-        excluded = not self.table_meets and not self._could_stay(own)
         if not excluded:
             low, high = min(low, 0.0), max(high, 0.0)
         off = self._off(first, low).worse(self._off(first, high))
         ends = (value + low) * first.in_unit, (value + high) * first.in_unit
-        return Extent(*ends, off, excluded, at_least)
+        return Extent(*ends, off, excluded, at_least=self.goes_far)
 
     def free_choice(self, entry: Entry) -> Extent:
         """The interval of an entry that moves no tool if others are changed with it."""
@@ -295,7 +297,7 @@ class Extents:
         def keep(direction: Reals, amounts: Reals) -> bool:
             each = self._rewritten(direction, amounts)
             apart = (each[1] - self.start) / self.region.scale
-            ways = [(n, s) for n in range(len(apart)) for s in (1.0, -1.0) if s * apart[n] > farthest.get((n, s), FAR / 2) + FAR / 2]
+            ways = [(n, s) for n in self.watched for s in (1.0, -1.0) if s * apart[n] > FARTHER * farthest.get((n, s), FAR)]
             joints = [j for j in np.flatnonzero(each[0] != self.table.direction[0]).tolist() if j not in reversed_]
             confirmed = self.region.confirmed(*each) if ways or joints else None
             if confirmed is None:
@@ -312,17 +314,21 @@ class Extents:
 
         tried(*_spread(self.region, self.direction, self.start))
         for _ in range(ROUNDS):
-            if not tried(*self._far_pushes(_distinct(best.values())[:PUSHED_FROM])):
+            near = [n for n in self.watched if {(n, 1.0), (n, -1.0)}.isdisjoint(best)]
+            if not near or not tried(*self._far_pushes(near, _distinct(best.values())[:PUSHED_FROM])):
                 break
+        self.goes_far = bool(best)
         return _distinct([*best.values(), *reversed_.values()])
 
-    def _far_pushes(self, places: Sequence[tuple[Reals, Reals]]) -> tuple[Reals, Reals, Flags]:
-        """Directions (R, n), amounts (R, k) and what is held (R, k): each entry some way off, the others as they are
-        at the start and at places far away."""
+    def _far_pushes(
+        self, near: Sequence[int], places: Sequence[tuple[Reals, Reals]]
+    ) -> tuple[Reals, Reals, Flags]:
+        """Directions (R, n), amounts (R, k) and what is held (R, k): each entry that is near in all tables some way off,
+        the others as they are at the start and at places far away."""
         rows = [
             (direction, np.where(np.arange(len(begun)) == n, self.start[n] + push * self._step_that_matters(n), begun), n)
             for direction, begun in ((self.direction, self.start), *places)
-            for n in self.watched
+            for n in near
             for push in (*PUSHES, *(-push for push in PUSHES))
         ]
         held = np.array([n for *_, n in rows])[:, None] == np.arange(len(self.start))
@@ -336,7 +342,7 @@ class Extents:
 
     def _could_stay(self, weights: Reals) -> bool:
         """Whether some table with a combination as the table has it meets all requirements."""
-        places = [(self.table.direction[0], np.zeros(len(weights))), (self.direction, self.start), *self.elsewhere]
+        places = [(self.table.direction[0], np.zeros(len(weights))), (self.direction, self.start), *self.elsewhere[:STAYS_FROM]]
         toward = weights / (weights @ weights)
         begun = np.array([amounts - toward * (weights @ amounts) for _, amounts in places])
         direction, held = np.array([each for each, _ in places]), np.tile(weights != 0, (len(places), 1))

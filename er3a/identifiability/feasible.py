@@ -29,7 +29,7 @@ INSIDE = 1.0 - MET / 2
 MIN_M = 1.0
 PASSES, DAMPING = 30, 1e-2
 CHUNK = 96
-FOLLOWED = 3  # times that extremes are sought afresh
+FOLLOWED = 8  # times that extremes are sought afresh
 
 
 def largest_length(table: Tables) -> float:

@@ -32,7 +32,7 @@ STEP = 1e-4
 LONGEST_STEP = 0.5
 SCAN, WATCHED = 384, 48
 CORNERS_UP_TO = 6
-STARTS = 2
+CLIMBS = 3
 PEAK_STEPS = 25
 GAINS_NOTHING = 1e-10
 SHARES = np.array([1.0, 0.5, 0.2, 0.05, 0.01])
@@ -49,9 +49,11 @@ def box_points(lower: Reals, upper: Reals, count: int = SCAN) -> Reals:
     return np.concatenate(points)
 
 
-def peak(function: Function, lower: Reals, upper: Reals, points: Reals) -> tuple[Reals, float]:
+def peak(
+    function: Function, lower: Reals, upper: Reals, points: Reals, climbs: int = CLIMBS
+) -> tuple[Reals, float]:
     """Where a function is largest, and its value there; ``points`` (P, d): where to look first."""
-    starts = points[_best_apart(points, function(points), STARTS)]
+    starts = points[_best_apart(points, function(points), climbs)]
     ends = [_climb(function, start, lower, upper) for start in starts]
     return max(ends, key=lambda end: end[1])
 
@@ -139,7 +141,7 @@ class SoughtExtreme:
         def higher(q: Reals) -> Reals:
             return self.sign * self._measure(table, self._whole(q))[0]
 
-        q, value = peak(higher, lower, upper, points)
+        q, value = peak(higher, lower, upper, points, CLIMBS if self.q is None else 1)
         self.q = self._whole(q)
         return self.sign * value * quantities.MM
 

@@ -20,8 +20,9 @@ from er3a.by_value import ByValue, Finding
 from er3a.calibration.calibrate import CLOSE, Close, Estimate
 from er3a.calibration.fit import NO_EFFECT, SCALE
 from er3a.calibration.outcomes import Held, LevelName, MovesNothing, NotToldApart
-from er3a.calibration.parameters import DEPENDENT, Parameter, parallel_pairs, parameters_of
-from er3a.calibration.parameters import moved as moved_tables
+from er3a.calibration.parameters import DEPENDENT, parallel_pairs, parameters_of
+from er3a.comparison.entries import Entry
+from er3a.comparison.entries import shifted as moved_tables
 from er3a.geometry.transforms import inverse_right_jacobian, inverted, step_between
 from er3a.kinematics.chain import row_values
 from er3a.kinematics.forward import forward
@@ -104,7 +105,7 @@ class _Problem:
     def hand(self, flange: Reals) -> Reals:
         return flange if self.samples.setup == "eye_in_hand" else inverted(flange)
 
-    def linear(self, table: Tables, parameters: list[Parameter], X: Reals, Y: Reals) -> tuple[Reals, Reals]:
+    def linear(self, table: Tables, parameters: list[Entry], X: Reals, Y: Reals) -> tuple[Reals, Reals]:
         """Residuals (N, 6), and their derivatives by poses and entries (N, 6, 12 + p)."""
         F = self.hand(self.flange(table)[0])
         raw, J = likelihood.residuals(F, self.samples.target, X, Y)
@@ -237,7 +238,7 @@ class _Turned:
         return bool(np.linalg.norm(left) > DEPENDENT * np.linalg.norm(column))
 
 
-def _identified(J: Reals, every: list[Parameter], setup: str, robot: Robot) -> tuple[list[Parameter], tuple[Held, ...]]:
+def _identified(J: Reals, every: list[Entry], setup: str, robot: Robot) -> tuple[list[Entry], tuple[Held, ...]]:
     """Which entries the samples distinguish, and why the others keep their values; J is whitened, (N, 6, 12 + p)."""
     J = SCALE * J.reshape(-1, J.shape[-1])
     poses = ("T_flange_camera", "T_base_board") if setup == "eye_in_hand" else ("T_base_camera", "T_flange_board")
@@ -263,7 +264,7 @@ def _identified(J: Reals, every: list[Parameter], setup: str, robot: Robot) -> t
 
 def _result(
     problem: _Problem,
-    asked: tuple[LevelName, list[Parameter], tuple[Held, ...]],
+    asked: tuple[LevelName, list[Entry], tuple[Held, ...]],
     before: likelihood.Refined,
     fit: likelihood.Refined,
 ) -> TableCorrections:

@@ -30,7 +30,6 @@ from er3a.geometry.transforms import rot_x, rot_y, translation
 from er3a.kinematics.chain import row_values
 from er3a.pipeline.cli import app
 from er3a.pipeline.messages.calibration import (
-    bar_texts,
     calibration_record,
     held_back_line,
     held_back_warning,
@@ -531,125 +530,6 @@ def test_what_is_touched_at_unknown_places_corrects_a_table(kind, arm, random, t
             assert each.nominal + each.correction == pytest.approx(true, abs=3 * each.half_width)
 
 
-@pytest.mark.parametrize("kind", ["place", "plane", "bar"])
-def test_touches_of_a_flat_arm_settle_what_moves_points_in_its_plane_alone(kind, random):
-    """Whatever its axes' tilts are, without them all points are in one plane, and meet there."""
-    bench, rows = Bench("planar", random), []
-    bench.truth = bench.truth.replace(alpha=bench.robot.alpha, base=np.eye(4))
-    for number in range(8):
-        target = er3a.forward(bench.truth, bench.joints(1)[0])[:3, 3]
-        normal, radius = np.array([np.cos(number), np.sin(number), 0]), 0.2 if kind == "bar" else 0.0
-        q = reached(bench, target, normal if kind == "plane" else None, 20, radius) + random.normal(0, 2e-5, (20, 3))
-        length = 250.0 if kind == "bar" and number % 2 else None  # of sockets 0.15 m above or below; others are unknown
-        rows += [
-            Measurement(0, tuple(pose), "tool", (None,) * 3, **{kind: str(number)}, length_mm=length)
-            for pose in np.degrees(q).tolist()
-        ]
-    found, proposed = er3a.calibrate(bench.robot, rows), plan(bench.robot, rows, 3)
-    assert {each.name for each in found.estimates} == {"tool_x", "tool_y", "a2", "offset2"}
-    assert {"alpha2", "beta1"} <= {name for each in found.held for name in getattr(each, "entries", ())}
-    assert set(proposed.settled) == {each.name for each in found.estimates}
-    assert found.deviation_mm > 0.001
-    (length,) = (each for each in found.estimates if each.name == "a2")
-    true = 1000 * bench.truth.a[1] * bench.robot.a[0] / bench.truth.a[0]
-    assert length.nominal + length.correction == pytest.approx(true, abs=2 * length.half_width)
-    assert length.half_width < 0.1
-
-
-@pytest.mark.parametrize("seed", [1, 3])
-def test_oblique_planes_take_what_tilted_axes_of_a_flat_arm_lift(seed):
-    """By sums of angles; without noise the tilts alone would be fitted as corrections or terms."""
-    random = np.random.default_rng(seed)
-    a, wrong, tilts = np.array([0.4, 0.3, 0.2]), np.array([0, 2e-3, 0]), random.normal(0, 1e-3, (2, 2))
-    rows = []
-    for number in range(6):
-        angle, steep, far = random.uniform(0, 2 * np.pi), random.uniform(-1.5, 1.5), random.uniform(0.1, 0.3)
-        while len(rows) < 60 * (number + 1):
-            q = random.uniform(-2.6, 2.6, 3)
-            for _ in range(30):  # J1 turns until the point is in the plane
-                at = np.exp(1j * np.cumsum(q))
-                steps = (a + wrong) * at
-                outer = (steps[1] + steps[2]) / at[0], steps[2] / at[1]
-                height = sum(own @ [way.real, way.imag] for own, way in zip(tilts, outer))
-                here = steps.sum() * np.exp(-1j * angle)
-                q[0] += np.clip((here.real + steep * height - far) / (here.imag or 1.0), -0.3, 0.3)
-            if abs(here.real + steep * height - far) < 1e-9 and abs(here.imag) > 0.05 and abs(q[0]) < 3:
-                pose = np.degrees(q + random.normal(0, 1e-6, 3))
-                rows.append(Measurement(0, tuple(pose.tolist()), "flange", (None,) * 3, plane=str(number)))
-    found = er3a.calibrate(er3a.Robot.from_dh(a, [0, 0, 0], [0, 0, 0]), rows)
-    assert found.beyond is None
-    assert found.ratios == ()
-    true = {"a2": 2.0}
-    assert {each.name for each in found.estimates} == {"a2", "a3", "offset2", "offset3"}
-    for each in found.estimates:
-        assert each.correction == pytest.approx(true.get(each.name, 0.0), abs=2 * each.half_width + 0.005)
-
-
-@pytest.mark.parametrize("wrong", [-3e-3, 3e-3])
-def test_bars_in_the_plane_of_a_flat_arm_take_a_table_of_any_size(wrong, random):
-    """By sums of angles. A socket in that plane allows no circle wider than its bar, but the length that is held may
-    make the whole arm too large: terms were taken for that."""
-    a, rows = np.array([0.4, 0.3, 0.2]), []
-    true = a + np.array([wrong, 0, 0])
-    for number in range(4):
-        middle, length = random.uniform(0.35, 0.6), random.uniform(0.2, 0.3)
-        while len(rows) < 40 * (number + 1):
-            q = np.concatenate([[0], random.uniform(-2.4, 2.4, 2)])
-            far = length + random.normal(0, 1e-5)
-            tip = (true * np.exp(1j * np.cumsum(q))).sum()
-            cosine = (abs(tip) ** 2 + middle**2 - far**2) / (2 * abs(tip) * middle)
-            if abs(cosine) < 1:
-                q[0] = random.choice([-1, 1]) * np.arccos(cosine) - np.angle(tip)
-                pose = tuple(np.degrees(np.angle(np.exp(1j * q))).tolist())
-                rows.append(Measurement(0, pose, "flange", (None,) * 3, bar=str(number), length_mm=1000 * length))
-    found = er3a.calibrate(er3a.Robot.from_dh(a, [0, 0, 0], [0, 0, 0]), rows)
-    assert found.beyond is None
-    assert found.ratios == ()
-    assert [each.entry for each in found.held if each.code == "sets_scale"] == ["a1"]
-    lengths = {each.name: each for each in found.estimates if each.unit == "mm"}
-    assert set(lengths) == {"a2", "a3"}
-    for each in lengths.values():
-        size = 1000 * true[each.parameter.joint - 1] * a[0] / true[0]
-        assert each.nominal + each.correction == pytest.approx(size, abs=2 * each.half_width)
-        assert each.half_width < 0.1
-
-
-@pytest.mark.parametrize("up", [0.15, 0.0])
-def test_sockets_beside_the_plane_of_a_flat_arm_whose_axes_are_tilted_settle_nothing(up):
-    """By matrices. Terms that are not there were taken for the tilts, and entries missed by 6 half-widths; sockets that
-    are put into that plane, as the error advises, settle the lengths."""
-    random = np.random.default_rng(2)
-    a, tilts, rows = np.array([0.4, 0.3, 0.2]), [1e-3, -1e-3, 0], []
-    true = a + np.array([0, 2e-3, 0])
-
-    def link(angle, length, tilt):
-        c, s = np.cos(angle), np.sin(angle)
-        cos, sin = np.cos(tilt), np.sin(tilt)
-        return np.array([[c, -s * cos, s * sin, length * c], [s, c * cos, -c * sin, length * s], [0, sin, cos, 0]])
-
-    for number in range(4):
-        middle, length = random.uniform(0.35, 0.6), random.uniform(0.3, 0.4)
-        while len(rows) < 40 * (number + 1):
-            q, far, tip = random.uniform(-2.4, 2.4, 3), length + random.normal(0, 1e-5), np.array([0, 0, 0, 1.0])
-            for angle, own, tilt in zip((*q[:0:-1], 0.0), true[::-1], tilts[::-1]):
-                tip = np.append(link(angle, own, tilt) @ tip, 1)
-            out = np.hypot(tip[0], tip[1])
-            cosine = (out**2 + middle**2 + (tip[2] - up) ** 2 - far**2) / (2 * out * middle)
-            if abs(cosine) < 1:
-                q[0] = random.choice([-1, 1]) * np.arccos(cosine) - np.arctan2(tip[1], tip[0])
-                pose = tuple(np.degrees(np.angle(np.exp(1j * q))).tolist())
-                rows.append(Measurement(0, pose, "flange", (None,) * 3, bar=str(number), length_mm=1000 * length))
-    robot = er3a.Robot.from_dh(a, [0, 0, 0], [0, 0, 0])
-    if up:
-        with pytest.raises(CalibrationError, match="sockets beside the plane") as refused:
-            er3a.calibrate(robot, rows)
-        assert refused.value.finding.bars == ("0", "1", "2", "3")
-        return
-    found = er3a.calibrate(robot, rows)
-    assert found.beyond is None
-    assert {each.name for each in found.estimates if abs(each.correction) > 2 * each.half_width} == {"a2"}
-
-
 def test_touches_that_quite_another_arm_meets_better_settle_nothing():
     """A slide and two joints, four touches of each ball, seen with 1 mm: least squares ran off to a tool of metres, and
     the table was refused as another arm's; elsewhere it took terms, or entries with intervals of 0."""
@@ -788,32 +668,6 @@ def test_distances_alone_correct_a_table_and_its_scale(kind, random, tmp_path):
         if each.name in ("a2", "a3"):
             true_mm = 1000 * bench.truth.a[each.parameter.joint - 1]
             assert each.nominal + each.correction == pytest.approx(true_mm, abs=3 * each.half_width)
-
-
-def test_a_bar_s_unknown_length_is_fitted_with_its_socket_where_its_points_settle_it(random):
-    """Two ball bars; scale bars set the scale. Points on a circle about a socket are a sphere's of any length."""
-    bench = Bench("six", random)
-    target, normal, length = np.array([0.4, 0.1, 0.3]), np.array([0, 0, 1.0]), 0.25
-    around = reached(bench, target, None, 30, length)
-    circle = reached(bench, target, normal, 20, length)
-    free = bench.joints(120)
-    q = np.concatenate([around, circle, free])
-    kinds = [{"bar": "ball"}] * 30 + [{"bar": "ring"}] * 20 + [{"pair": f"p{k // 2}"} for k in range(120)]
-    apart = np.linalg.norm(np.diff(bench.positions(free).reshape(-1, 2, 3), axis=1), axis=2).repeat(2)
-    lengths = [None] * 50 + (apart + random.normal(0, 0.01, 60).repeat(2)).tolist()
-    rows = [
-        Measurement(k, tuple(pose), "tool", (None,) * 3, 0.01, **kind, length_mm=own)
-        for k, (pose, kind, own) in enumerate(zip(np.degrees(q).tolist(), kinds, lengths), 2)
-    ]
-    found = er3a.calibrate(bench.robot, rows)
-    ball, ring = found.bars
-    assert ball.length_mm == pytest.approx(1000 * length, abs=ball.half_width_mm)
-    assert ball.half_width_mm < 0.1
-    assert (ring.name, ring.length_mm) == ("ring", None)
-    assert f"The bar ball is {ball.length_mm:.3f} mm long" in "\n".join(bar_texts(found))
-    proposed = plan(bench.robot, rows, 10)
-    assert "bar_ball" in proposed.settled
-    assert "bar_ring" in proposed.lacking
 
 
 @pytest.mark.parametrize(

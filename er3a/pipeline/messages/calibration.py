@@ -79,7 +79,6 @@ def lines_of(found: Calibration, fitted: Sequence[Measurement] = (), others: Seq
     ]
     lines += [f"{term_name(each)}: {_coefficients(each)}, in the robot file as its coupling" for each in found.ratios]
     lines += [f"says nothing: {text}" for text in idle_texts(found)]
-    lines += bar_texts(found)
     if found.scatter > MUCH_SCATTER:
         lines.append("warning: the residuals exceed the stated standard deviations, so errors may exceed the intervals")
     if found.deviation_mm is None and found.scatter < LITTLE_SCATTER:
@@ -208,10 +207,6 @@ def plan_lines(found: Plan, robot: Robot) -> str:
     lines = [f"these measurements settle {len(found.settled)} of {able} numbers that such measurements can settle"]
     lines += [f"settled by more poses: {', '.join(found.lacking)}"] if found.lacking else []
     lines += [f"settled by no poses: {say(reason)}" for reason in found.held]
-    lines += [
-        f"bar_{name}: the table is too far off for its points to tell; calibrate first, and plan from the robot file"
-        for name in found.undetermined_bars
-    ]
     if found.beyond:
         beyond = (
             f"J{each.joint} {'beyond' if each.above else 'below'} {as_text(each.value, '.4g')} {units[each.joint - 1]}"
@@ -238,7 +233,6 @@ def plan_record(found: Plan) -> dict[str, object]:
         "settled": list(found.settled),
         "lacking": list(found.lacking),
         "held": [say(reason) for reason in found.held],
-        "undetermined_bars": list(found.undetermined_bars),
         "proposals": [vars(each) for each in found.proposals],
         "beyond": [vars(each) for each in found.beyond],
         "half_widths": [vars(each) for each in found.widths],
@@ -322,25 +316,6 @@ def held_back_lines(found: Calibration, fitted: Sequence[Measurement], others: S
         alone = held_back_line(fitted, others, found.without_terms().distances_mm(others))
         lines.append(f"as in a robot file, {alone}")
     return lines
-
-
-def bar_texts(found: Calibration) -> list[str]:
-    """How long the bars are whose lengths were unknown."""
-    return [
-        tr(
-            "The length of the bar {name} is not settled: its points lie to one side of its socket, for what the fit "
-            "leaves of them.",
-            name=each.name,
-        )
-        if each.length_mm is None or each.half_width_mm is None
-        else tr(
-            "The bar {name} is {length:.3f} mm long, ± {half_width:.3f} mm (95 %).",
-            name=each.name,
-            length=each.length_mm,
-            half_width=each.half_width_mm,
-        )
-        for each in found.bars
-    ]
 
 
 def idle_texts(found: Calibration) -> list[str]:
@@ -482,7 +457,6 @@ def calibration_record(
         "held": [say(reason) for reason in found.held],
         "more": say(found.more) if found.more else None,
         "ratios": [vars(each) for each in found.ratios],
-        "bars": [vars(each) for each in found.bars],
         "idle": [vars(each) for each in found.idle],
         "set_aside": [{"row": each.row, "distance_mm": each.distance_mm} for each in found.outliers],
         "left_out": vars(found.left_out) if found.left_out else None,

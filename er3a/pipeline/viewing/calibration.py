@@ -25,7 +25,6 @@ from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages import language
 from er3a.pipeline.messages.calibration import (
     VERDICTS,
-    bar_texts,
     file_text,
     held_back_warning,
     idle_texts,
@@ -170,7 +169,6 @@ def _texts(found: Calibration, held_back: Sequence[Measurement]) -> list[str]:
         ),
         *warning_texts(found),
         *idle_texts(found),
-        *bar_texts(found),
     ]
     if found.more:
         texts.append(say(found.more))

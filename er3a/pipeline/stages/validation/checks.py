@@ -10,7 +10,6 @@ from typing import Any, Literal
 
 import numpy as np
 
-from er3a.diagnosis.conclusions import TooSmallToTell
 from er3a.diagnosis.faults import CONVENTIONS, WrongLimit
 from er3a.files.robot_file import LONGEST_LENGTH_MM, MIN_LONGEST_MM
 from er3a.files.units import WIDEST_IN_RADIANS
@@ -471,7 +470,7 @@ def _missed(
     if own.another_arm:
         return model.AnotherArm(**common, described=own.described)
     found = named.get(quoted.reference_set)
-    faults = () if found is None or isinstance(found, TooSmallToTell) else found.faults
+    faults = found.faults if found else ()
     chosen = any(isinstance(fault, CONVENTIONS) for fault in faults)
     chosen &= all(isinstance(fault, (*CONVENTIONS, WrongLimit)) for fault in faults)
     return model.DefinedOtherwise(**common) if chosen else model.Contradicted(**common)
