@@ -225,7 +225,9 @@ class ScannedEntry:
         joint = self.joint + 1
         if self.number:
             given = float(self.number.of(tables)[0])
-            return wrong_number(self.number, given + by, given), moved(tables, [self.number], np.array([[0]]), np.array([[by]]))
+            return wrong_number(self.number, given + by, given), moved(
+                tables, [self.number], np.array([[0]]), np.array([[by]])
+            )
         column = self.side or "direction"
         fits = float(getattr(tables, column)[0, self.joint])
         given = fits + by if self.side else -fits

@@ -102,13 +102,6 @@ AS_GOOD = 1.1  # times what the table leaves
 NEAR_STEPS = 15  # a table that is not far off is fitted in about four
 FEW_SPARE = 10
 """Degrees of freedom below which what remains says how large noise is, but not where; at least as many as numbers."""
-SCALE_EXPLAINED = 1.5
-"""Half-widths by which a correction may differ from the factor's; of 20, chance takes one beyond in 1 of 15 cases."""
-SCALE_BEYOND_CHANCE = 2.0
-"""Half-widths of its own by which a factor differs from 1 at least, about four standard deviations."""
-
-OPPOSITE = -0.5
-"""Cosine of an alpha below which axes may be parallel with opposite directions, so that d along one counts negative."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -333,21 +326,6 @@ class Beyond(CorrectedModel):
     residuals: ResidualStructure | None
 
 
-@dataclass(frozen=True)
-class CommonScale:
-    """A factor by which all corrected lengths are the table's.
-
-    Attributes
-    ----------
-    half_width : of its 95 % interval
-    lengths : those that it is estimated from
-    """
-
-    factor: float
-    half_width: float
-    lengths: tuple[str, ...]
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibration(ByValue, Displayed):
     """A table's corrections.
@@ -422,12 +400,6 @@ class Calibration(ByValue, Displayed):
     def scale_is_assumed(self) -> bool:
         """Whether lengths were measured, whose scale counts as exact; else the longest of the table keeps its value."""
         return not any(isinstance(why, outcomes.SetsScale) for why in self.held)
-
-    @property
-    def common_scale(self) -> CommonScale | None:
-        """The factor that explains the corrections of all lengths of the table; None where none does, where noise does,
-        and where fewer than two lengths that aren't 0 are estimated."""
-        return _common_scale(self)
 
     @property
     def conclusion(self) -> outcomes.CalibrationConclusion:
@@ -826,7 +798,7 @@ def _out_of(observations: PointObservations, off_mm: Reals, usual_mm: Reals) -> 
 
 
 def _off_mm(robot: Robot, every: PointObservations, model: _Model, used: Flags) -> Reals:
-    """What the whole model leaves of all points, mm (n,); places, planes and sockets are where those that are used (P,)
+    """What the whole model leaves of all points, mm (n,); places and planes are where those that are used (P,)
     put them, and each of the others alone beside these."""
     here = corrected(robot, model.whole.kept, model.whole.amounts)
     errors = JointErrors(robot, model.whole.terms, model.whole.coefficients)
@@ -896,46 +868,3 @@ def _beyond(robot: Robot, observations: PointObservations, found: Fit) -> Beyond
         left_out=_left_out(observations, found),
         residuals=_structure(robot, observations, found),
     )
-
-
-def _common_scale(found: Calibration) -> CommonScale | None:
-    """One factor for all lengths, as a measuring device with a wrong scale makes them.
-
-    With c the corrections of the table's lengths, s their half-widths and v the table's values, ``c = k v`` is fitted
-    by least squares with weights 1/s^2; k has the interval that follows from the covariance of c.
-    """
-    if not found.scale_is_assumed:
-        return None
-    nominal = {k: _scaled_length(found, each) for k, each in enumerate(found.estimates)}
-    chosen = [k for k, value in nominal.items() if value is not None]
-    v = np.array([nominal[k] for k in chosen], float)
-    if np.count_nonzero(v) < 2:
-        return None
-    c = np.array([found.estimates[k].correction for k in chosen])
-    width = np.array([found.estimates[k].half_width for k in chosen])
-    if not (width > 0).all():
-        return None
-    by = v / width**2 / ((v / width) ** 2).sum()
-    k = float(by @ c)
-    half_width = float(np.sqrt((by * width) @ found.correlation[np.ix_(chosen, chosen)] @ (by * width)))
-    if (np.abs(c - k * v) > SCALE_EXPLAINED * width).any() or abs(k) < SCALE_BEYOND_CHANCE * half_width:
-        return None
-    return CommonScale(1 + k, half_width, tuple(found.estimates[i].name for i, value in zip(chosen, v) if value))
-
-
-def _scaled_length(found: Calibration, estimate: Estimate) -> float | None:
-    """What a factor acts on: a length of the table, with others that it can't be told apart from; None of base, tool,
-    angles, and lengths that an angle looks like."""
-    if not (estimate.parameter.joint and estimate.unit == "mm"):
-        return None
-    value = estimate.nominal
-    for why in found.held:
-        if isinstance(why, outcomes.NotToldApart) and estimate.name in why.entries:
-            others = [name for name in why.entries if name != estimate.name]
-            if not all(name[0] in "ad" and name[1:].isdigit() for name in others):
-                return None
-            together = sum(1000 * float(getattr(found.robot, name[0])[int(name[1:]) - 1]) for name in others)
-            if together and (np.cos(found.robot.alpha) < OPPOSITE).any():
-                return None
-            value += together
-    return value

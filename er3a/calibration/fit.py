@@ -148,8 +148,8 @@ def left_of_touched(robot: Robot, observations: PointObservations) -> float:
 
 def scale_of(robot: Robot, observations: PointObservations) -> Entry | None:
     """The longest length of the table that moves the points as nothing else does, which is taken as it is; None where
-    coordinates or lengths were measured, or joints have slid while a place or plane was touched."""
-    if observations.has_scale:
+    coordinates were measured, or joints have slid while a place or plane was touched."""
+    if not observations.all_touched:
         return None
     lengths = parameters_of(robot, "lengths")
     effect = np.linalg.norm(jacobian(robot, lengths, observations), axis=0)
@@ -212,7 +212,7 @@ class Fit:
     kept, terms : what was fitted
     amounts : (k,), added to what the robot has, in m and rad; coefficients : (c,), of the terms
     before, after : (n,), differences to the measurements in standard deviations
-    J, rest : (m, k + c) and (m,), derivatives and differences of what is independent of places, planes and sockets
+    J, rest : (m, k + c) and (m,), derivatives and differences of what is independent of places and planes
         that nobody knows, in standard deviations of it, ``deviation_mm`` (m,)
     last : (m,), the last of the n observed values that it is made of
     ran_off : whether another arm meets the observations better, so that corrections were taken to be small

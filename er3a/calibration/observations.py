@@ -12,7 +12,7 @@ import scipy.sparse
 from scipy.spatial import cKDTree
 
 from er3a.calibration.outcomes import FixedName, PlacementName
-from er3a.calibration.parameters import DEPENDENT, PARALLEL_RAD, placed
+from er3a.calibration.parameters import PARALLEL_RAD, placed
 from er3a.comparison.entries import Entry, shifted
 from er3a.errors import InputError
 from er3a.kinematics.chain import row_values
@@ -27,12 +27,9 @@ LIMIT_SLACK = 0.01  # deg, mm
 SAME_POSE = 1e-4  # rad, m: by which joints may read otherwise at one pose
 PLACEMENTS: tuple[PlacementName, ...] = ("base", "tool")
 RICH_POSES = 64
-TouchKind = Literal["place", "plane", "pair", "bar"]
-MIN_LENGTH = 1e-9
-UNKNOWN: dict[TouchKind, int] = {"place": 1, "plane": 3, "pair": 0, "bar": 3}
+TouchKind = Literal["place", "plane"]
+UNKNOWN: dict[TouchKind, int] = {"place": 1, "plane": 3}
 """How many numbers of each coordinate drop out, because nobody knows where a thing is."""
-SOCKET_STEPS = 50
-SOCKET_STEP = 1e-13  # m
 AT_ONCE = 8_000  # poses of tables whose frames are held at once
 
 
@@ -49,9 +46,6 @@ class Measurement:
     deviation_mm : standard deviation of each coordinate; None if it is unknown
     place, plane : the name of a fixed point (a ball in a socket, a tip) or of a plane that was touched there, of which
         nobody knows where it is; no coordinate is measured then
-    pair : the name that two measurements share whose points are ``length_mm`` apart (a scale bar, touched at both ends)
-    bar : the name of a ball bar, whose other end is in a fixed socket of which nobody knows where it is
-    length_mm : distance of a pair's points, or from the socket
     """
 
     row: int
@@ -61,26 +55,20 @@ class Measurement:
     deviation_mm: float | None = None
     place: str | None = None
     plane: str | None = None
-    pair: str | None = None
-    bar: str | None = None
-    length_mm: float | None = None
 
     @property
     def touched(self) -> tuple[TouchKind, str] | None:
-        """What was touched, or a distance's kind, and its name; None where coordinates were measured."""
-        named: list[tuple[TouchKind, str | None]] = [
-            ("place", self.place), ("plane", self.plane), ("pair", self.pair), ("bar", self.bar)
-        ]  # fmt: skip
-        return next(((kind, name) for kind, name in named if name), None)
+        """What was touched, and its name; None where coordinates were measured."""
+        return ("place", self.place) if self.place else ("plane", self.plane) if self.plane else None
 
 
 @dataclass(frozen=True)
 class Touched:
-    """A place, plane, pair or bar.
+    """A place or plane.
 
     Attributes
     ----------
-    poses : at which it is touched; a pair's two are one
+    poses : at which it is touched
     unknown : how many of these say nothing, because nobody knows where it is
     coordinates : how many numbers one more pose gives
     """
@@ -110,10 +98,9 @@ class PointObservations:
     deviation_known : whether the deviations were stated
     lines : (P,), of the file
     free : what is placed by the measurements, too
-    touched : (P,), number of the place, plane, pair or bar; -1 where coordinates were measured. What is observed of a
-        place's points is their offset from their mean; the rest has one coordinate: of a plane's points their distance
-        from the plane that fits them best, of a pair the distance of its points (with the first of them), of a bar's
-        points their distance from the socket that fits them best. Place, plane and socket drop out
+    touched : (P,), number of the place or plane; -1 where coordinates were measured. What is observed of a place's
+        points is their offset from their mean; of a plane's points their distance from the plane that fits them best,
+        as one coordinate. Place and plane drop out
     kinds, names : of each number
     """
 
@@ -133,7 +120,7 @@ class PointObservations:
         return len(self.values_mm)
 
     def groups(self) -> list[tuple[TouchKind, Integers]]:
-        """Of each place, plane, pair and bar its kind and points."""
+        """Of each place and plane its kind and points."""
         numbers = np.unique(self.touched[self.touched >= 0])
         return [(self.kinds[number], np.flatnonzero(self.touched == number)) for number in numbers]
 
@@ -144,11 +131,11 @@ class PointObservations:
 
     @property
     def dropped(self) -> int:
-        """How many numbers of places, planes and bars drop out, at most as many as there are of them."""
+        """How many numbers of places and planes drop out, at most as many as there are of them."""
         return sum(each.coordinates * min(each.poses, each.unknown) for each in self.things())
 
     def things(self) -> list[Touched]:
-        """What is touched, and how often; the poses of a pair are one."""
+        """What is touched, and how often."""
         return [
             Touched(
                 kind,
@@ -160,18 +147,6 @@ class PointObservations:
             for kind, rows in self.groups()
         ]
 
-    @property
-    def has_scale(self) -> bool:
-        """Whether coordinates or lengths were measured, which set the scale of the arm."""
-        return bool((self.touched < 0).any()) or any(kind in ("pair", "bar") for kind, _ in self.groups())
-
-    def lengths_mm(self, rows: Integers) -> Reals:
-        """Measured lengths of a pair or bar; 0 of other things."""
-        lengths = np.zeros(self.seen.shape)
-        lengths[self.seen] = self.values_mm
-        found: Reals = lengths[rows, 0]
-        return found
-
     def relative(self, xyz: Reals) -> Reals:
         """What is observed of points (P, 3), m: see ``touched``."""
         found = xyz.copy() if self.kinds else xyz
@@ -179,12 +154,8 @@ class PointObservations:
             own = xyz[rows]
             if kind == "place":
                 found[rows] = own - own.mean(axis=0)
-            elif kind == "plane":
-                found[rows, 0] = (own - own.mean(axis=0)) @ plane(own)[0]
-            elif kind == "pair":
-                found[rows, 0] = np.linalg.norm(own[0] - own[-1])
             else:
-                found[rows, 0] = np.linalg.norm(own - socket(own, self.lengths_mm(rows) / MM), axis=1)
+                found[rows, 0] = (own - own.mean(axis=0)) @ plane(own)[0]
         return found
 
     def relative_shift(self, shift: Reals, around: Reals) -> Reals:
@@ -192,24 +163,18 @@ class PointObservations:
         found = shift.copy()
         for kind, rows in self.groups():
             along, basis = self._dropping(kind, rows, around)
-            own = found[rows] - found[rows[::-1]] if kind == "pair" else found[rows]
-            own = own if kind == "place" else np.einsum("pi,pi->p", along, own)[:, None]
+            own = found[rows] if kind == "place" else np.einsum("pi,pi->p", along, found[rows])[:, None]
             found[rows, : own.shape[1]] = own - basis @ np.linalg.lstsq(basis, own, rcond=None)[0]
         return found
 
     def _dropping(self, kind: TouchKind, rows: Integers, around: Reals) -> tuple[Reals, Reals]:
-        """For points ``around``: the directions (k, 3) in which those of a plane, pair or bar are observed, and what
-        drops out, (k, r), the same for each coordinate of a place."""
+        """For points ``around``: the directions (k, 3) in which those of a plane are observed, and what drops out,
+        (k, r), the same for each coordinate of a place."""
         here, every = around[rows], np.ones((len(rows), 1))
         if kind == "place":
             return here, every
-        if kind == "plane":
-            normal, inside = plane(here)
-            return every * normal, np.hstack([every, inside])
-        if kind == "pair":
-            return directions(here - here[::-1])[0], every[:, :0]
-        along = directions(here - socket(here, self.lengths_mm(rows) / MM))[0]
-        return along, along
+        normal, inside = plane(here)
+        return every * normal, np.hstack([every, inside])
 
     def independent(self, robot: Robot) -> tuple[scipy.sparse.csr_array, Integers]:
         """What is observed without what drops out, in standard deviations, near to a robot's table.
@@ -321,14 +286,9 @@ class PointObservations:
         return first
 
     def merged(self) -> PointObservations:
-        """Readings of one point, or of one place, plane, bar or pair, at one pose as one, their mean: what a model
+        """Readings of one point, or of one place or plane, at one pose as one, their mean: what a model
         misses there is the same each time, so that repeated readings don't tell it from what it has to find."""
-        pose, partner = self.same_pose, np.full(len(self.touched), -1)
-        thing = self.touched.copy()
-        for kind, rows in self.groups():
-            if kind == "pair":
-                partner[rows], thing[rows] = pose[rows[::-1]], [-2, -3]
-        keys = np.column_stack([pose, partner, thing, self.on_tool])
+        keys = np.column_stack([self.same_pose, self.touched, self.on_tool])
         first, number = np.unique(keys, axis=0, return_index=True, return_inverse=True)[1:]
         order = np.argsort(first)
         number = np.argsort(order)[number.ravel()]
@@ -399,12 +359,6 @@ def _innovations(basis: Reals) -> Reals:
     return found
 
 
-def directions(apart: Reals) -> tuple[Reals, Reals]:
-    """Unit vectors (P, 3) of vectors, and their lengths (P,)."""
-    size = np.maximum(np.linalg.norm(apart, axis=1), MIN_LENGTH)
-    return apart / size[:, None], size
-
-
 def plane(xyz: Reals) -> tuple[Reals, Reals]:
     """Normal (3,) of the plane that fits points (P, 3) best, and where they are in it, (P, 2)."""
     here = xyz - xyz.mean(axis=0)
@@ -412,32 +366,7 @@ def plane(xyz: Reals) -> tuple[Reals, Reals]:
     return axes[2] * np.sign(axes[2][np.abs(axes[2]).argmax()]), here @ axes[:2].T
 
 
-def socket(xyz: Reals, lengths: Reals) -> Reals:
-    """The point (3,), m, from which points (P, 3) are nearest to lengths (P,): a sphere by linear least squares, then
-    Gauss-Newton steps. Beside points in one plane it is on the side to which the largest component of the normal
-    points."""
-    middle = xyz.mean(axis=0)
-    here = xyz - middle
-    squares = (here**2).sum(axis=1) - lengths**2
-    sphere = np.linalg.lstsq(np.column_stack([2 * here, np.ones(len(here))]), squares, DEPENDENT)[0]
-    centre: Reals = sphere[:3]
-    sizes, axes = np.linalg.svd(here, full_matrices=False)[1:]
-    if len(sizes) == 3 and sizes[2] < DEPENDENT * sizes[0]:
-        height = np.sqrt(max(-sphere[3] - centre @ centre, 0.0))
-        centre = centre + height * axes[2] * np.sign(axes[2][np.abs(axes[2]).argmax()])
-    for _ in range(SOCKET_STEPS):
-        along, size = directions(here - centre)
-        step = np.linalg.lstsq(along, size - lengths, DEPENDENT)[0]
-        centre = centre + step
-        if np.abs(step).max() < SOCKET_STEP:
-            break
-    found: Reals = middle + centre
-    return found
-
-
-def observed(
-    measurements: Sequence[Measurement], robot: Robot, fixed: Sequence[FixedName] = ()
-) -> PointObservations:
+def observed(measurements: Sequence[Measurement], robot: Robot, fixed: Sequence[FixedName] = ()) -> PointObservations:
     """Measurements coordinate by coordinate.
 
     Parameters
@@ -455,16 +384,9 @@ def observed(
     names = [each.touched for each in measurements]
     numbers = {name: k for k, name in enumerate(dict.fromkeys(name for name in names if name))}
     touched = np.array([numbers[name] if name else -1 for name in names], dtype=np.int64)
-    begun: set[str] = set()
     for k, each in enumerate(measurements):
         if each.touched:
-            lone = each.touched[0] == "place"
-            xyz[k] = (
-                (0.0, *([0.0 if lone else np.nan] * 2)) if each.length_mm is None else (each.length_mm, np.nan, np.nan)
-            )
-        if each.pair:
-            xyz[k, 0] = np.nan if each.pair in begun else xyz[k, 0]
-            begun.add(each.pair)
+            xyz[k] = 0.0 if each.place else (0.0, np.nan, np.nan)
     seen = np.isfinite(xyz)
     on_tool = np.array([each.point == "tool" for each in measurements], dtype=bool)
     known = all(each.deviation_mm is not None for each in measurements)
@@ -486,7 +408,9 @@ def observed(
         names=tuple(name for _, name in numbers),
     )
     if found.all_touched and _is_flat(robot, found):
-        problem = "the joints that move take all points in one plane, where touches and distances don't show tilted axes"
+        problem = (
+            "the joints that move take all points in one plane, where touches and distances don't show tilted axes"
+        )
         raise InputError(None, "measurements", problem, "Move more joints, or measure coordinates")
     return found
 

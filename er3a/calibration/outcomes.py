@@ -72,7 +72,7 @@ class MorePositions(Finding):
 
 
 class MoreTouches(Finding):
-    """Places, planes, pairs or bars are touched at too few poses.
+    """Places or planes are touched at too few poses.
 
     Attributes
     ----------

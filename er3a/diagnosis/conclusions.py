@@ -107,11 +107,4 @@ class NoFewFaultsExplain(Finding, code="unexplained"):
     least: float
 
 
-Conclusion = (
-    NothingToRestOn
-    | NothingToExplain
-    | MostLikelyFault
-    | MainFault
-    | NoFaultStandsOut
-    | NoFewFaultsExplain
-)
+Conclusion = NothingToRestOn | NothingToExplain | MostLikelyFault | MainFault | NoFaultStandsOut | NoFewFaultsExplain

@@ -45,7 +45,7 @@ from er3a.diagnosis.fitting import MEETS, lowered
 from er3a.geometry.transforms import rot_x, rot_y, rot_z, translation
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.forward import forward, frames
-from er3a.kinematics.table_batch import Tables, frames_of, join, robot_of, tables_of
+from er3a.kinematics.table_batch import robot_of, tables_of
 from er3a.numerics.arrays import Integers, Reals
 from er3a.references.predict import joints_of, predict_tables
 from er3a.references.quantities import (
@@ -56,7 +56,6 @@ from er3a.references.quantities import (
     AxisCoordinate,
     FlangeTurn,
     PointCoordinate,
-    Pose,
 )
 from er3a.references.reference import Reference, expected_of, quantities_of
 from er3a.robots.robot import Robot
@@ -76,12 +75,6 @@ ROUNDS = 8
 AS_GOOD = 1.05  # times the misfit: a simpler arm that misses by no more is taken
 ROUND_DEG, ROUND_MM = 1e-6, 1e-6
 PARALLEL = 1 - 1e-6
-SCAN = math.pi / 4
-SCANNED_AT = 8  # poses at most: 28 distances, for up to 5 zeros and the flange's shift
-KEPT_OF_SCAN, FITTED = 24, 576
-"""Starts that are kept of each way of the joints' directions, and fitted of all. With 4 kept, 2 of 15 random cases were
-lost, with 1 five; with 64 fitted one."""
-MAX_SCANNED = 7  # joints
 SIGNS: tuple[Literal[1, -1], ...] = (-1, 1)
 
 
@@ -97,7 +90,7 @@ class Conventions:
 
 def conventions_of(robot: Robot, references: Sequence[Reference]) -> Conventions | None:
     """How references define zeros, directions, base and flange of a table otherwise; None if that is not the reason
-    why they are missed, or if they state neither all joint axes nor many poses.
+    why they are missed, or if they don't state all joint axes.
 
     Parameters
     ----------
@@ -107,11 +100,8 @@ def conventions_of(robot: Robot, references: Sequence[Reference]) -> Conventions
         return None
     stated = [r for r in references if r.quantity.depends_on_table]
     lines = _lines(stated, robot.joints)
-    if lines is not None:
-        found = (_conventions(robot, stated, lines, finer) for finer in FINER)
-        best = next((each for each in found if each is not None), None)
-    else:
-        best = _from_poses(robot, stated)
+    found = (_conventions(robot, stated, lines, finer) for finer in FINER) if lines else ()
+    best = next((each for each in found if each is not None), None)
     chosen = best and _with_limits(robot, best, references)
     return chosen if chosen and chosen.faults else None
 
@@ -160,7 +150,7 @@ def _from_ground(robot: Robot, joint: int, along: tuple[int, ...], sign: Literal
 def _conventions(robot: Robot, stated: Sequence[Reference], lines: Lines, finer: float) -> Conventions | None:
     """What :func:`conventions_of` finds where entries differ that are off by more than the lines' tolerances, or by a
     finer part of them."""
-    directions, points, signed, widest = lines
+    _, _, signed, widest = lines
     tolerances = Tolerances(finer * widest.length, finer * widest.angle)
     found, start, wrong = _matched(robot, stated, lines, tolerances)
     if any(each.column not in LINKS for each in found.differences):
@@ -183,7 +173,7 @@ def described_by(robot: Robot, references: Sequence[Reference]) -> Robot | None:
 def _matched(
     robot: Robot, stated: Sequence[Reference], lines: Lines, tolerances: Tolerances
 ) -> tuple[Match, Robot, list[Entry]]:
-    """The match with the arm that lines describe, the table with it, and the columns and rows of entries that differ."""
+    """The match with the arm that lines describe, the table with it, and the entries that differ."""
     other = mechanism_from_axes(lines[0], lines[1], _zero_flange(stated), lines[-1].angle)
     found = match(mechanism_of(robot.without_tool()), other, tolerances)
     later = int(robot.convention == "modified")  # rows of a and alpha are those of the next joint
@@ -225,93 +215,6 @@ def _fitted_to(
         *_differences(robot, best, tolerances),
     )
     return Conventions(faults, best, left)
-
-
-def _from_poses(robot: Robot, stated: Sequence[Reference]) -> Conventions | None:
-    """What :func:`_conventions` finds, without joint axes, of a table whose geometry is right: distances between
-    flanges, and turns between them where orientations are stated, depend on neither base nor (turns) flange. Directions
-    and zeros that give them are scanned in steps of ``SCAN``, and the best fitted."""
-    points, turns = _stated_flanges(stated)
-    poses, inner = list(points), list(range(1, robot.joints - 1))
-    known = 3 * (len(points) + sum(pose in turns for pose in poses)) - 12 - len(inner)
-    if robot.joints > MAX_SCANNED or known < 2 * robot.joints:
-        return None
-    xyz, R = (
-        np.array([points[pose] for pose in poses]),
-        np.array([turns.get(pose, np.full((3, 3), np.nan)) for pose in poses]),
-    )
-    q, table = joints_of(robot, poses), tables_of(robot)
-    steps = np.arange(0, 2 * np.pi, SCAN if robot.joints < MAX_SCANNED else 2 * SCAN)
-    turned = np.array(list(itertools.product(steps, repeat=len(inner))))
-    many = table[np.zeros(len(turned), dtype=int)].with_column("offset", inner, table.offset[:, inner] + turned)
-
-    def gaps(tables: Tables, shift: Reals, count: int) -> Reals:
-        """Differences (H, numbers), in about m, to distances and turns between the first poses; shift (H, 3) of the
-        flange in its own frame."""
-        T = frames_of(tables, robot, q[:count])[:, :, -1]
-        turn = T[..., :3, :3]
-        at = T[..., :3, 3] + np.einsum("hpij,hj->hpi", turn, shift)
-        one, other = np.triu_indices(count, 1)
-        far = np.sqrt(((at[:, one] - at[:, other]) ** 2).sum(axis=2)) - np.linalg.norm(xyz[one] - xyz[other], axis=1)
-        if not turns:
-            return np.asarray(far)
-        flat, stated_flat = turn.reshape(*turn.shape[:2], 9), R.reshape(-1, 9)
-        turned = (flat @ flat.transpose(0, 2, 1) - stated_flat[:count] @ stated_flat[:count].T)[:, one, other]
-        return np.concatenate([far, LEVER * np.nan_to_num(turned)], axis=1)
-
-    scanned = []
-    for signs in itertools.product((1.0, -1.0), repeat=robot.joints):
-        tables = many.with_column("direction", slice(None), table.direction * np.array(signs))
-        size = np.linalg.norm(gaps(tables, np.zeros((len(tables), 3)), min(SCANNED_AT, len(poses))), axis=1)
-        best = np.argsort(size)[:KEPT_OF_SCAN]
-        scanned.append((size[best], tables[best]))
-    order = np.argsort(np.concatenate([size for size, _ in scanned]))[:FITTED]
-    tables = join([tables for _, tables in scanned])[order]
-    numbers = [Entry("offset", joint + 1) for joint in inner]
-
-    def model(amounts: Reals, rows: Integers) -> Reals:
-        return gaps(shifted(tables[rows], numbers, amounts[:, :-3]), amounts[:, -3:], len(poses))
-
-    amounts, _ = lowered(model, np.zeros((len(tables), len(inner) + 3)), passes=2 * ROUNDS)
-    tables, shift = shifted(tables, numbers, amounts[:, :-3]), amounts[:, -3:]
-    length = SPREAD * max(float(expected_of([r])[1][0]) for r in stated if isinstance(r.quantity, PointCoordinate)) / MM
-    tolerances = Tolerances(length, length / LEVER)
-    T = frames_of(tables, robot, q)[:, :, -1]
-    at = T[..., :3, 3] + np.einsum("hpij,hj->hpi", T[..., :3, :3], shift)
-    bases = [_placed_on(own, xyz) for own in at]  # distances are the same of an arm and of its mirror image
-    left = [np.linalg.norm(own @ B[:3, :3].T + B[:3, 3] - xyz, axis=1).max() for own, B in zip(at, bases)]
-    moved = np.abs(wrap_to_pi(tables.offset - table.offset)) > tolerances.angle
-    changed = (tables.direction != table.direction).sum(axis=1) + moved.sum(axis=1)
-    found = []
-    for row in np.lexsort((changed, np.array(left) > 2 * length))[:KEPT_OF_SCAN].tolist():
-        arm = robot_of(tables, row, robot)
-        start = arm.replace(base=bases[row] @ arm.base, flange=arm.flange @ translation(*shift[row]))
-        found.append(_fitted_to(robot, [start], (), stated, tolerances))
-    return min((each for each in found if each is not None), key=lambda each: len(each.faults), default=None)
-
-
-def _stated_flanges(stated: Sequence[Reference]) -> tuple[dict[Pose, Reals], dict[Pose, Reals]]:
-    """Positions (3,), m, of the flange by pose, where all coordinates are stated, and rotation matrices."""
-    parts, turns = dict[Pose, dict[str, float]](), dict[Pose, Reals]()
-    for reference in stated:
-        quantity = reference.quantity
-        if isinstance(quantity, PointCoordinate) and quantity.point == "flange":
-            value = float(expected_of([reference])[0][0]) / MM
-            parts.setdefault(quantity.pose, {}).setdefault(quantity.coordinate, value)
-        elif isinstance(quantity, FlangeTurn):
-            turns.setdefault(quantity.pose, np.array(quantity.stated))
-    whole = {pose: np.array([own[c] for c in COORDINATES]) for pose, own in parts.items() if len(own) == 3}
-    return whole, turns
-
-
-def _placed_on(points: Reals, stated: Reals) -> Reals:
-    """The frame (4, 4) that brings points (P, 3) nearest to stated ones [Kabsch, Acta Cryst. A 32 (1976)]."""
-    middle, target = points.mean(axis=0), stated.mean(axis=0)
-    U, _, V = np.linalg.svd((stated - target).T @ (points - middle))
-    T = np.eye(4)
-    T[:3, :3] = U @ np.diag([1.0, 1.0, np.linalg.det(U @ V)]) @ V
-    T[:3, 3] = target - T[:3, :3] @ middle
-    return T
 
 
 def _with_limits(given: Robot, found: Conventions, references: Sequence[Reference]) -> Conventions:

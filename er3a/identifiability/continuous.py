@@ -168,10 +168,19 @@ class Extents:
         joints reversed; else the one to where steps from the table lead."""
         k, own = len(self.places), self.table.direction[0]
         starts = [(own, self.start), *(self._amounts(each) for each in nearer)]
-        if self._chose(starts, np.ones((len(starts), k), dtype=bool)) or self._chose(starts[:1] * k, ~np.eye(k, dtype=bool)):
+        if self._chose(starts, np.ones((len(starts), k), dtype=bool)) or self._chose(
+            starts[:1] * k, ~np.eye(k, dtype=bool)
+        ):
             return
-        turned = [np.where(np.isin(np.arange(len(own)), each), -1.0, 1.0) for n in range(4) for each in combinations(range(len(own)), n)]
-        for some in ([(turn * each, begun) for each, begun in starts for turn in turned], [*zip(*_spread(self.region, own, self.start))]):
+        turned = [
+            np.where(np.isin(np.arange(len(own)), each), -1.0, 1.0)
+            for n in range(4)
+            for each in combinations(range(len(own)), n)
+        ]
+        for some in (
+            [(turn * each, begun) for each, begun in starts for turn in turned],
+            [*zip(*_spread(self.region, own, self.start))],
+        ):
             if self._chose(some):
                 return
         self.start = self.region.reached(own[None], self.start[None])[0][0]
@@ -182,7 +191,11 @@ class Extents:
         amounts, met = self.region.reached(direction, np.array([own for _, own in starts]), held)
         found = [self._rewritten(direction[i], amounts[i]) for i in np.flatnonzero(met)]
         plain = [(each, np.where(np.isin(np.arange(len(own)), self.watched), own, 0.0)) for each, own in found]
-        found += [each for each in plain if self.region.reached(each[0][None], each[1][None], np.ones((1, len(each[1])), dtype=bool))[1][0]]
+        found += [
+            each
+            for each in plain
+            if self.region.reached(each[0][None], each[1][None], np.ones((1, len(each[1])), dtype=bool))[1][0]
+        ]
         found.sort(key=lambda each: self._distance(*each))
         for each in found:
             if (start := self.region.confirmed(*each)) is not None:
@@ -201,7 +214,9 @@ class Extents:
 
     def _rewritten(self, direction: Reals, amounts: Reals) -> tuple[Reals, Reals]:
         """The same robot in the rows that are nearest to the table."""
-        return self._amounts(nearest_rows(self.region.tables(direction[None], amounts[None]), self.region, self.watched))
+        return self._amounts(
+            nearest_rows(self.region.tables(direction[None], amounts[None]), self.region, self.watched)
+        )
 
     def _fit_likelihood(self) -> None:
         likely = self.region.asked.likely
@@ -297,7 +312,9 @@ class Extents:
         def keep(direction: Reals, amounts: Reals) -> bool:
             each = self._rewritten(direction, amounts)
             apart = (each[1] - self.start) / self.region.scale
-            ways = [(n, s) for n in self.watched for s in (1.0, -1.0) if s * apart[n] > FARTHER * farthest.get((n, s), FAR)]
+            ways = [
+                (n, s) for n in self.watched for s in (1.0, -1.0) if s * apart[n] > FARTHER * farthest.get((n, s), FAR)
+            ]
             joints = [j for j in np.flatnonzero(each[0] != self.table.direction[0]).tolist() if j not in reversed_]
             confirmed = self.region.confirmed(*each) if ways or joints else None
             if confirmed is None:
@@ -320,13 +337,15 @@ class Extents:
         self.goes_far = bool(best)
         return _distinct([*best.values(), *reversed_.values()])
 
-    def _far_pushes(
-        self, near: Sequence[int], places: Sequence[tuple[Reals, Reals]]
-    ) -> tuple[Reals, Reals, Flags]:
-        """Directions (R, n), amounts (R, k) and what is held (R, k): each entry that is near in all tables some way off,
+    def _far_pushes(self, near: Sequence[int], places: Sequence[tuple[Reals, Reals]]) -> tuple[Reals, Reals, Flags]:
+        """Directions (R, n), amounts (R, k) and what is held (R, k): each entry that is near in all some way off,
         the others as they are at the start and at places far away."""
         rows = [
-            (direction, np.where(np.arange(len(begun)) == n, self.start[n] + push * self._step_that_matters(n), begun), n)
+            (
+                direction,
+                np.where(np.arange(len(begun)) == n, self.start[n] + push * self._step_that_matters(n), begun),
+                n,
+            )
             for direction, begun in ((self.direction, self.start), *places)
             for n in near
             for push in (*PUSHES, *(-push for push in PUSHES))
@@ -342,7 +361,11 @@ class Extents:
 
     def _could_stay(self, weights: Reals) -> bool:
         """Whether some table with a combination as the table has it meets all requirements."""
-        places = [(self.table.direction[0], np.zeros(len(weights))), (self.direction, self.start), *self.elsewhere[:STAYS_FROM]]
+        places = [
+            (self.table.direction[0], np.zeros(len(weights))),
+            (self.direction, self.start),
+            *self.elsewhere[:STAYS_FROM],
+        ]
         toward = weights / (weights @ weights)
         begun = np.array([amounts - toward * (weights @ amounts) for _, amounts in places])
         direction, held = np.array([each for each, _ in places]), np.tile(weights != 0, (len(places), 1))

@@ -160,7 +160,14 @@ class _View:
             described = described_by(judge.robot, [judge.references[i] for i in self.own])
             nearer = [*judge.met_by, *([] if described is None else [tables_of(described)])]
         found = Extents(
-            self.asked, judge.table, judge.free, relevant, judge.gauge, judge.tool, nearer=nearer, tolerance=judge.tolerance
+            self.asked,
+            judge.table,
+            judge.free,
+            relevant,
+            judge.gauge,
+            judge.tool,
+            nearer=nearer,
+            tolerance=judge.tolerance,
         )
         judge.met_by += [found.met_by] if found.met and not found.table_meets else []
         return found
@@ -427,9 +434,7 @@ class _Judge:
     def _reading(self, alternative: Alternative) -> OtherReading:
         if alternative not in self._readings:
             violated = self._asked_by_all.excluding(alternative.table, self.table)
-            self._readings[alternative] = OtherReading(
-                alternative.entries, alternative.off, self._documents(violated)
-            )
+            self._readings[alternative] = OtherReading(alternative.entries, alternative.off, self._documents(violated))
         return self._readings[alternative]
 
     @cached_property
@@ -449,7 +454,7 @@ class _Judge:
         return OtherReading(tuple((e.name, self.values[e.name] + step * by) for e, by in own), NOT_OFF)
 
 
-def _sum_of(factors: Sequence[tuple[TableNumber, float]]) -> str:
+def _sum_of(factors: Sequence[tuple[Entry, float]]) -> str:
     text = ""
     for entry, factor in factors:
         sign = ("-" if factor < 0 else "") if not text else (" - " if factor < 0 else " + ")

@@ -111,7 +111,9 @@ def _proposal(evidence: Evidence, each: EntryEvidence, entry: Entry, tool: ToolR
     if entry.column == "speed":
         return TimeJoint(name, j, round(SPEED_SHARE * entry.value(evidence.robot), 3))
     if entry.column in LENGTHS:
-        return MeasureLength(name, cast(Any, entry.column), j, min(LENGTH_MM, SHARE_OF_TOLERANCE * evidence.tolerance.mm))
+        return MeasureLength(
+            name, cast(Any, entry.column), j, min(LENGTH_MM, SHARE_OF_TOLERANCE * evidence.tolerance.mm)
+        )
     if entry.column in ANGLES:
         return MeasureAngle(name, cast(Any, entry.column), j, _fine_enough(evidence, entry, tool))
     return None

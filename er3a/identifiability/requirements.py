@@ -49,9 +49,7 @@ def box_points(lower: Reals, upper: Reals, count: int = SCAN) -> Reals:
     return np.concatenate(points)
 
 
-def peak(
-    function: Function, lower: Reals, upper: Reals, points: Reals, climbs: int = CLIMBS
-) -> tuple[Reals, float]:
+def peak(function: Function, lower: Reals, upper: Reals, points: Reals, climbs: int = CLIMBS) -> tuple[Reals, float]:
     """Where a function is largest, and its value there; ``points`` (P, d): where to look first."""
     starts = points[_best_apart(points, function(points), climbs)]
     ends = [_climb(function, start, lower, upper) for start in starts]

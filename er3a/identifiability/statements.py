@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.by_value import Finding
+from er3a.comparison.entries import Entry, shifted
 from er3a.diagnosis.conclusions import Conclusion, NoFaultStandsOut, NoFewFaultsExplain
 from er3a.diagnosis.ranking import rank
 from er3a.geometry.transforms import rotation_angle
-from er3a.comparison.entries import Entry, shifted
 from er3a.identifiability.entries import continuous_of, document_of, entries_of
 from er3a.identifiability.feasible import MET
 from er3a.identifiability.requirements import Asked, box_points, peak, requirements_of

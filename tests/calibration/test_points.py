@@ -602,12 +602,12 @@ def test_points_without_noise_are_met_without_outliers_terms_or_warnings(name, r
         assert np.isfinite(found.correlation).all()
 
 
-@pytest.mark.parametrize("kind", ["place", "plane", "bar"])
+@pytest.mark.parametrize("kind", ["place", "plane"])
 def test_small_shifts_change_what_is_observed_by_its_derivative(kind, random):
-    """Of points at a place, in a plane, and on a ball about a socket at a length that is not known."""
+    """Of points at a place, and in a plane."""
     away = random.normal(size=(20, 3))
     away /= np.linalg.norm(away, axis=1, keepdims=True)
-    on = {"place": 0 * away, "plane": away * [1, 1, 0], "bar": 0.3 * away}[kind] + [0.4, 0.1, 0.2]
+    on = {"place": 0 * away, "plane": away * [1, 1, 0]}[kind] + [0.4, 0.1, 0.2]
     whole = np.ones((20, 3), bool)
     whole[:, 1:] = kind == "place"
     seen = PointObservations(
@@ -625,69 +625,6 @@ def test_small_shifts_change_what_is_observed_by_its_derivative(kind, random):
     shift, step = random.normal(size=(20, 3)), 1e-6
     slope = (seen.relative(on + step * shift) - seen.relative(on - step * shift)) / (2 * step)
     np.testing.assert_allclose(slope[whole], seen.relative_shift(shift, on)[whole], atol=1e-4)
-
-
-DISTANCES = {
-    "pair": [f"pair{k}" for k in range(120) for _ in (0, 1)],
-    "bar": [f"socket{k}" for k in range(3) for _ in range(60)],
-}
-
-
-@pytest.mark.parametrize("kind", DISTANCES)
-def test_distances_alone_correct_a_table_and_its_scale(kind, random, tmp_path):
-    bench, names = Bench("six", random), DISTANCES[kind]
-    q = bench.joints(len(names))
-    x = bench.positions(q)
-    other = (
-        x[np.arange(len(names)) ^ 1]
-        if kind == "pair"
-        else np.repeat([[600, 200, 0], [-300, 500, 99], [9, -600, 300]], 60, 0)
-    )
-    lengths = np.linalg.norm(x - other, axis=1)
-    lengths += (
-        np.repeat(random.normal(0, 0.02, len(names) // 2), 2) if kind == "pair" else random.normal(0, 0.02, len(x))
-    )
-    lines = [f"q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,point,x_mm,y_mm,z_mm,{kind},length_mm"]
-    lines += [
-        ",".join(map(repr, row)) + f",tool,,,,{name},{length!r}"
-        for row, name, length in zip(np.degrees(q).tolist(), names, lengths.tolist())
-    ]
-    path = tmp_path / "distances.csv"
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    found = er3a.calibrate(bench.robot, path)
-    assert found.deviation_mm == pytest.approx(0.02, rel=0.25)
-    assert "sets_scale" not in {each.code for each in found.held}
-    assert not any(each.name.startswith("base") for each in found.estimates)
-    new = bench.joints(100)
-    true, model, nominal = (
-        np.linalg.norm(np.diff(at, axis=0), axis=1)
-        for at in (bench.positions(new), *(er3a.forward(r, new)[:, :3, 3] * 1000 for r in (found.robot, bench.robot)))
-    )
-    assert abs(model - true).mean() < 0.02 < 1 < abs(nominal - true).mean()
-    for each in found.estimates:
-        if each.name in ("a2", "a3"):
-            true_mm = 1000 * bench.truth.a[each.parameter.joint - 1]
-            assert each.nominal + each.correction == pytest.approx(true_mm, abs=3 * each.half_width)
-
-
-@pytest.mark.parametrize(
-    ("rows", "problem"),
-    [
-        ("10,tool,,,,p,,300", "row 2, column pair: the pair 'p' has 1 rows"),
-        (
-            "10,tool,,,,p,,300\n20,tool,,,,p,,301",
-            "row 3, column pair: the rows of pair 'p' need one and the same length",
-        ),
-        ("10,tool,,,,,b,300\n20,tool,,,,,b,", "row 3, column bar: the bar 'b' has a length in some rows only"),
-        ("10,tool,1,2,300,,,300", "row 2, column length_mm: a length of neither a pair nor a bar"),
-        ("10,tool,,,,,b,-300", "row 2, column length_mm: -300 is not positive"),
-    ],
-)
-def test_distances_that_make_no_sense_are_one_clear_error(rows, problem, tmp_path):
-    path = tmp_path / "distances.csv"
-    path.write_text(f"q1_deg,point,x_mm,y_mm,z_mm,pair,bar,length_mm\n{rows}\n", encoding="utf-8")
-    with pytest.raises(InputError, match=problem):
-        load_measurements(path)
 
 
 def test_a_touch_beside_coordinates_is_one_clear_error(tmp_path):
@@ -758,15 +695,11 @@ def test_two_poses_at_a_place_count_once(random):
     assert found.left_out.mean_mm == pytest.approx(2 * np.sqrt(2 / np.pi) * deviation, rel=0.15)
 
 
-@pytest.mark.parametrize(
-    ("kind", "count", "least"), [("place", 1, 3), ("plane", 2, 7), ("bar", 4, 8), ("pair", 2, 5), ("plane", 60, None)]
-)
+@pytest.mark.parametrize(("kind", "count", "least"), [("place", 1, 3), ("plane", 2, 7), ("plane", 60, None)])
 def test_too_few_touches_say_how_many_it_takes(kind, count, least, random):
     """A thing that is touched too seldom beside others is named, and changes nothing."""
     rows = [
-        Measurement(
-            k, tuple(pose), "tool", (None,) * 3, **{kind: "own"}, length_mm=300.0 if kind in ("pair", "bar") else None
-        )
+        Measurement(k, tuple(pose), "tool", (None,) * 3, **{kind: "own"})
         for k, pose in enumerate(random.uniform(-30, 30, (count, 6)).tolist())
     ]
     robot = load_robot("er3_600")

@@ -32,7 +32,7 @@ TERMS = {
     "ripple": N_("{turns} times a turn"),
     "coupling": N_("coupled to J{by}"),
 }
-KINDS = {"place": N_("place"), "plane": N_("plane"), "pair": N_("pair"), "bar": N_("bar")}
+KINDS = {"place": N_("place"), "plane": N_("plane")}
 VERDICTS = {
     "taken": N_("taken"),
     "not_lower": N_("left: poses left out are not met better"),
@@ -51,7 +51,6 @@ def lines_of(found: Calibration, fitted: Sequence[Measurement] = (), others: Seq
     lines = [
         *([] if found.fits else [say(found.conclusion)]),
         *held_back_warning(found, fitted, others),
-        *scale_texts(found),
         *_summary(found),
         *warning_texts(found),
         f"{found.coordinates} coordinates at {found.poses} poses; estimated: {level(found.level)}",
@@ -98,23 +97,6 @@ def lines_of(found: Calibration, fitted: Sequence[Measurement] = (), others: Seq
         lines.append(f"to estimate more: {say(found.more)}")
     lines += [f"not examined: {text}" for text in not_examined_texts(found, others) if fitted]
     return "\n".join(lines)
-
-
-def scale_texts(found: Calibration) -> list[str]:
-    """That one factor explains the corrections of all lengths, which a measuring device with a wrong scale makes."""
-    scale = found.common_scale
-    if scale is None:
-        return []
-    return [
-        tr(
-            "One factor explains the corrections of all lengths: {factor:.5f} ± {half_width:.5f} (95 %, from "
-            "{lengths}). A wrong scale of the measuring device does the same, and these measurements can't tell which "
-            "is wrong. Check the device by a known length, and its units and temperature.",
-            factor=scale.factor,
-            half_width=scale.half_width,
-            lengths=", ".join(scale.lengths),
-        )
-    ]
 
 
 def not_examined_texts(found: Calibration, others: Sequence[Measurement] = ()) -> list[str]:
@@ -217,8 +199,7 @@ def plan_lines(found: Plan, robot: Robot) -> str:
     for number, each in enumerate(found.proposals, 1):
         pose = ", ".join(as_text(value, ".2f") for value in each.pose)
         what = f"  {each.kind} {each.name}" if each.kind else ""
-        length = f", {each.length_mm:.2f} mm" if each.kind == "pair" else ""
-        lines.append(f"{number:>4}  ({pose}){what}{length}")
+        lines.append(f"{number:>4}  ({pose}){what}")
     lines.append("half of the 95 % interval, with the measurements and with these poses as well:")
     for width in found.widths:
         now = "not settled" if width.now is None else f"{width.now:.4f}"
@@ -467,7 +448,6 @@ def calibration_record(
         "held_back": _held_back(found, others) if others else None,
         "held_back_warning": " ".join(held_back_warning(found, fitted, others)) or None,
         "held_back_contradicts": held_back_contradicts(found, fitted, others),
-        "scale_warning": " ".join(scale_texts(found)) or None,
         "not_examined": not_examined_texts(found, others) if fitted else [],
     }
 

@@ -36,7 +36,7 @@ from er3a.diagnosis.faults import (
     WrongUnit,
 )
 from er3a.pipeline.messages.language import N_, as_text, with_unit
-from er3a.pipeline.messages.say import Plural, by, joined, say, say_as, sentence, texts, word
+from er3a.pipeline.messages.say import Plural, joined, say, say_as, sentence, texts, word
 
 ENTRIES = {
     "a": N_("column a"),

@@ -30,7 +30,6 @@ from er3a.pipeline.messages.calibration import (
     idle_texts,
     not_examined_texts,
     residual_texts,
-    scale_texts,
     term_kind,
     warning_texts,
 )
@@ -122,7 +121,7 @@ def write_calibration(
     text = robot_text(robot_file(corrected))
     comparison = compare(robot, found.robot, tolerance_mm=1e-3, tolerance_deg=1e-3)
     residuals = found.beyond.residuals if found.beyond else found.residuals
-    beside = [*held_back_warning(found, measurements, held_back), *scale_texts(found)]
+    beside = held_back_warning(found, measurements, held_back)
     table = str(files[0]) if len(files) > 1 else robot.name
     with house_style():
         page.render(

@@ -15,12 +15,12 @@ from matplotlib.figure import Figure
 from er3a.diagnosis.conclusions import MainFault, MostLikelyFault
 from er3a.kinematics.forward import forward, frames, skeleton
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.messages.diagnosis import both, level
+from er3a.pipeline.messages.diagnosis import both
 from er3a.pipeline.messages.language import N_, own_title, tr
 from er3a.pipeline.messages.say import bracketed, joined, say, sentence
 from er3a.pipeline.stages.validation import model
 from er3a.pipeline.viewing.figures import axis_label, equal_scale, new_figure
-from er3a.pipeline.viewing.numbers import decimals_of_spreads, fixed
+from er3a.pipeline.viewing.numbers import fixed
 from er3a.pipeline.viewing.page import Picture
 from er3a.pipeline.viewing.palette import GRID, HIGHLIGHT, INK, LINK, MODEL, MUTED, REFERENCE
 from er3a.references.quantities import nearest_on_axis, point_of
