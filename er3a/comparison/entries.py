@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -81,7 +81,7 @@ def shifted(tables: Tables, entries: Sequence[Entry], amounts: Reals) -> Tables:
     amounts : (H, k), m and rad; relative for the scale, which has to come before lengths
     """
     found = tables if len(tables) == len(amounts) else tables[np.zeros(len(amounts), dtype=np.int64)]
-    columns: dict[str, Reals] = {}
+    columns: dict[str, Any] = {}
     for entry, amount in zip(entries, amounts.T):
         for name in LENGTHS if entry.column == "scale" else (entry.column,) * bool(entry.joint):
             if name not in columns:

@@ -231,7 +231,7 @@ class _AlternativeSearch:
         violation = self.asked.violation(self.asked.plain_off(tables))
         met = violation <= self.bound[: violation.shape[1]]
         by_itself = np.array([isinstance(each.quantity, TableEntry) for each in self.asked.plain], dtype=bool)
-        return met[:, ~by_itself].all(axis=1), ~met[:, by_itself].all(axis=1)
+        return np.asarray(met[:, ~by_itself].all(axis=1)), np.asarray(~met[:, by_itself].all(axis=1))
 
     def _keep(self, chosen: tuple[int, ...], table: Tables, barred: bool) -> None:
         if _holds(chosen, self.allowed, proper=True):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
@@ -13,7 +12,7 @@ from er3a.comparison.entries import Entry, shifted, wrapped_between
 from er3a.diagnosis.defined_otherwise import described_by
 from er3a.identifiability.alternatives import Alternative, alternatives_to, flips_of, gauge_flips, with_readings
 from er3a.identifiability.continuous import Extent, Extents, turned_once
-from er3a.identifiability.entries import GROUP_OF, column_of, continuous_of, document_of, entries_of, gauge_of
+from er3a.identifiability.entries import column_of, continuous_of, document_of, entries_of, gauge_of
 from er3a.identifiability.entry_evidence import EntryEvidence, Evidence, OtherReading, OtherTable, Status, Tolerance
 from er3a.identifiability.feasible import MET
 from er3a.identifiability.reactions import reactions
@@ -471,7 +470,7 @@ def _worst(found: Sequence[ToolOff]) -> ToolOff:
 
 
 PartName = Literal["geometry", "zero_and_directions", "limits", "speeds"]
-PartStatus = Literal["settled", "settled_up_to_signs", "consistent", "weak", "open", "contradicted", "absent"]
+PartStatus = Literal["settled", "settled_up_to_signs", "consistent", "weak", "open", "contradicted"]
 PART_OF_GROUP: dict[str, PartName] = {
     "dh": "geometry",
     "zero": "zero_and_directions",
@@ -479,45 +478,7 @@ PART_OF_GROUP: dict[str, PartName] = {
     "speeds": "speeds",
 }
 GRAVEST: tuple[PartStatus, ...] = ("contradicted", "open", "weak", "consistent", "settled_up_to_signs", "settled")
-SETTLED: tuple[Status, ...] = (*OUTRIGHT_OR_NOT, "gauge", "given")
 MAX_COMBINED = 256
-
-
-@dataclass(frozen=True)
-class PartEvidence:
-    """A part of the verdict.
-
-    Attributes
-    ----------
-    status : the gravest of its entries'; absent where the robot's file gives none of them
-    unsettled : its entries that aren't settled
-    off : how far the tool could be off for any one of them, or for all discrete ones together
-    code : the part's name
-    """
-
-    status: PartStatus
-    unsettled: tuple[EntryEvidence, ...]
-    off: ToolOff
-    code: PartName
-
-
-def parts_of(evidence: Evidence) -> tuple[PartEvidence, ...]:
-    """The parts of the verdict."""
-    columns = {entry.name: PART_OF_GROUP[GROUP_OF[entry.column]] for entry in entries_of(evidence.robot)}
-    found = []
-    for part in PART_OF_GROUP.values():
-        own = [each for each in (*evidence.entries, *evidence.combinations) if _part(each, columns) == part]
-        unsettled = tuple(each for each in own if each.status not in SETTLED)
-        held = {each.status for each in own}
-        best: PartStatus = "settled" if own else "absent"
-        status: PartStatus = next((each for each in GRAVEST if each in held), best)
-        off = NOT_OFF
-        for each in unsettled:
-            off = off.worse(each.off)
-        if part == "zero_and_directions" and unsettled:
-            off = off.worse(together(evidence, [each.entry for each in unsettled]))
-        found.append(PartEvidence(status, unsettled, off, part))
-    return tuple(found)
 
 
 def together(evidence: Evidence, names: list[str]) -> ToolOff:
@@ -532,7 +493,3 @@ def together(evidence: Evidence, names: list[str]) -> ToolOff:
     for own in combined[1:]:
         off = off.worse(tool.off(with_readings(tool.table, evidence.robot, own)))
     return off
-
-
-def _part(each: EntryEvidence, columns: dict[str, PartName]) -> PartName | None:
-    return columns.get(each.entry) or columns.get(each.entry.split()[0].lstrip("-"))

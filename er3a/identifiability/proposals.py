@@ -107,7 +107,7 @@ def _proposal(evidence: Evidence, each: EntryEvidence, entry: Entry, tool: ToolR
     if entry.column == "direction":
         return _look(evidence, entry)
     if entry.column in SIDES:
-        return ReadLimit(name, j, cast(Side, entry.column), LIMIT_DEG)
+        return ReadLimit(name, j, cast(Any, entry.column), LIMIT_DEG)
     if entry.column == "speed":
         return TimeJoint(name, j, round(SPEED_SHARE * entry.value(evidence.robot), 3))
     if entry.column in LENGTHS:

@@ -137,7 +137,7 @@ class SoughtExtreme:
             points = np.concatenate([np.clip(self.q[self.joints], lower, upper)[None], points])
 
         def higher(q: Reals) -> Reals:
-            return self.sign * self._measure(table, self._whole(q))[0]
+            return np.asarray(self.sign * self._measure(table, self._whole(q))[0])
 
         q, value = peak(higher, lower, upper, points, CLIMBS if self.q is None else 1)
         self.q = self._whole(q)
