@@ -13,6 +13,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import Literal
 
 import numpy as np
 import scipy
@@ -80,7 +81,7 @@ from er3a.calibration.terms import (
     effects,
     places_of,
 )
-from er3a.comparison.entries import TOOL_COLUMNS, Entry, EntryUnit
+from er3a.comparison.entries import TOOL_COLUMNS, Entry
 from er3a.numerics.arrays import Flags, Reals
 from er3a.references.quantities import Pose
 from er3a.references.reference import INTERVAL_95
@@ -259,9 +260,9 @@ class Estimate:
         return self.parameter.name
 
     @property
-    def unit(self) -> EntryUnit:
+    def unit(self) -> Literal["mm", "deg"]:
         """Of the numbers."""
-        return self.parameter.unit
+        return "mm" if self.parameter.unit == "mm" else "deg"
 
     @property
     def half_width(self) -> float:
