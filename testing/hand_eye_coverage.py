@@ -1,8 +1,6 @@
-"""How often the 95 % intervals of a hand-eye calibration contain the truth, alone and with corrections to the table."""
+"""How often the 95 % intervals of a hand-eye calibration contain the truth."""
 
 from __future__ import annotations
-
-from types import SimpleNamespace
 
 import numpy as np
 
@@ -13,7 +11,6 @@ from er3a.robots.robot import Robot
 from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.hand_eye import calibrate_hand_eye
 from er3a.vision.likelihood import PoseObservations, refine
-from er3a.vision.table_corrections import TableCorrections, correct_table
 from testing.hand_eye_sets import (
     X_TRUE,
     Y_TRUE,
@@ -92,23 +89,3 @@ def a_set(setup: str, seed: int, errors: dict[str, float], count: int = 30, stat
     B = noisy(seen(setup, forward(with_errors(errors).without_tool(), q)), random, POSITION, ROTATION)
     known = covariance(count, POSITION, ROTATION) if stated else None
     return CalibrationSet(setup, forward(ROBOT.without_tool(), q), B, camera_covariance=known, q=q)
-
-
-def table_coverage(setup: str, stated: bool, runs: int, seed: int) -> np.ndarray:
-    """Whether each interval (runs, k) holds the truth, where entries are estimated with the poses from 25 samples."""
-    inside = []
-    for run in range(runs):
-        samples = a_set(setup, seed + run, {}, 25, stated)
-        start = SimpleNamespace(
-            samples=samples,
-            used=np.ones(len(samples), bool),
-            X=X_TRUE,
-            Y=Y_TRUE,
-            deviations=np.array([POSITION, ROTATION]),
-        )
-        found = correct_table(start, ROBOT)
-        assert isinstance(found, TableCorrections)
-        entries = [abs(each.correction) <= half for each, half in zip(found.estimates, found.entry_half_width)]
-        errors = np.concatenate([off(found.X, X_TRUE), off(found.Y, Y_TRUE)])
-        inside.append([*entries, *(np.abs(errors) <= found.half_width)])
-    return np.array(inside)

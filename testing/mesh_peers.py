@@ -99,8 +99,6 @@ class HeldAgainstMeshes:
     joined_apart : greatest distance (m) of meshes whose shapes a joint joins; -inf where they touch in all poses
     errors_apart, errors_crossing : pairs of which it is said that the shapes are in error: whose meshes are apart in
         some pose, so that it is indeed the shapes; and whose meshes touch or cross in all, so that the file has it so
-    folded, folded_apart : in how many poses what is left of two joined links overlaps, and the greatest distance (m) of
-        their meshes in them; -inf where there are none
     slack : by how much (m) shapes were nearer than meshes, as the median over watched pairs and poses
     free : share of the poses that is free of self-collision
     """
@@ -110,8 +108,6 @@ class HeldAgainstMeshes:
     joined_apart: float = -np.inf
     errors_apart: list[str] = field(default_factory=list)
     errors_crossing: list[str] = field(default_factory=list)
-    folded: int = 0
-    folded_apart: float = -np.inf
     slack: float = np.nan
     free: float = np.nan
 
@@ -122,7 +118,7 @@ def held_against_meshes(path: Path, imported: UrdfImport, poses: int, seed: int)
     q = np.random.default_rng(seed).uniform(robot.lower, robot.upper, (poses, robot.joints))
     bodies, numbers = Bodies(robot, None), {link_label(k): k for k in range(robot.rows + 1)}
     clear, free = bodies.min_distance(q)[0], bodies.free(q)
-    shapes, overlaps = _shape_distances(robot, q), bodies.overlaps(q)
+    shapes = _shape_distances(robot, q)
     watched = Counter((pair.first, pair.second) for pair, joined in zip(bodies.pairs, bodies.joined) if not joined)
     nearest, slack = np.full(poses, np.inf), []
     meshes = {(numbers[row.first], numbers[row.second]): np.empty(poses) for row in bodies.matrix}
@@ -144,10 +140,6 @@ def held_against_meshes(path: Path, imported: UrdfImport, poses: int, seed: int)
             found.wrong.append(f"{name}: said to overlap always, shapes {1000 * least.max():.2f} mm apart")
         if row.state == "joined" and own.max() > 0:
             found.joined_apart = max(found.joined_apart, float(own.max()))
-        folds = [k for k, one in enumerate(bodies.pairs) if bodies.joined[k] and (one.first, one.second) == pair]
-        if (folded := overlaps[:, folds].any(axis=1)).any():
-            found.folded += int(folded.sum())
-            found.folded_apart = max(found.folded_apart, float(own[folded].max()))
         if row.state == "overlaps":
             (found.errors_apart if own.max() > 0 else found.errors_crossing).append(name)
         if watched[pair] == count:

@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 from PIL import Image
 from pydantic import Field, model_validator
 
-from er3a.calibration.outcomes import LevelName
 from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn, read_csv, read_header
 from er3a.files.robot_file import Text
@@ -234,8 +233,7 @@ class HandEyeFile(InputFile):
     ``camera_standard_deviation`` is that of T_camera_board in the camera's axes; it is estimated if not given.
     ``board_mm``: the board's edges along its x and y, for views. ``touched``: a table of points as the camera located
     them (``seen_x_mm``; with the camera on the flange: points on the board) and as the robot touched them
-    (``touched_x_mm``). ``table_corrections``: entries of the arm's table to estimate with the poses; needs samples with
-    joint angles.
+    (``touched_x_mm``).
     """
 
     kind: Literal["hand_eye"]
@@ -252,7 +250,6 @@ class HandEyeFile(InputFile):
     board_mm: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = None
     touched: Text | None = None
     touch_standard_deviation_mm: Positive = 0.1
-    table_corrections: LevelName | None = None
 
     @model_validator(mode="after")
     def _one_source_of_samples(self) -> Self:

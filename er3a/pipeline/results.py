@@ -205,7 +205,6 @@ LeftOutSubject = Literal[
     "allowed_contacts",
     "bare_tool",
     "arm_errors",
-    "contradicted_table",
     "objects_out_of_view",
     "hidden_voids",
     "orientations",
@@ -243,7 +242,7 @@ NEVER_A_PASS: frozenset[LeftOutSubject] = frozenset(
             "other_gravity",
         ),
         *("arm_errors", "objects_out_of_view", "hidden_voids", "orientations", "base_inside", "places_in_solids"),
-        *("units", "own_limits", "contradicted_table", "flange_poses", "base_poses", "open_intrinsics"),
+        *("units", "own_limits", "flange_poses", "base_poses", "open_intrinsics"),
     )
 )
 """What no verdict passes without; the rest bounds what a verdict is about, and stands in the table alone."""

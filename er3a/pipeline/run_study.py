@@ -351,8 +351,8 @@ def _run(study_file: Path, results: Path, reports: Path, words: Sequence[str], a
     on_this_machine = not (asked.executor or asked.profile or asked.workflow_profile)
     with job_server.running(lock) if on_this_machine else nullcontext():
         first = _one_at_first() if on_this_machine and not asked.resources else []
-        # Options that take as many words as follow stand before one that takes one.
-        return _snakemake([*first, *shown, *plain, *words, *_of_er3a(study_file, asked)])
+        # Names of what to make stand first, options that take as many words as follow before one that takes one.
+        return _snakemake([*words, *first, *shown, *plain, *_of_er3a(study_file, asked)])
 
 
 def _of_er3a(study_file: Path, asked: Namespace) -> list[str]:

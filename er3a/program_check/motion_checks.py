@@ -306,7 +306,7 @@ def path_findings(path: MotionPath, rules: CheckRules, target: Reals | None) -> 
     """
     found: Shares = {}
     if path.stop is not None and target is not None:
-        found[_stopped(path, target)] = path.stop
+        found[_stopped(path, target)] = float(path.share[-1])  # where the arm still is
     found |= _limits(path)
     if path.stop is None and len(path.share) > 1:  # towards the end of reach rates grow without bound
         found |= _too_fast(path, rules.limits)

@@ -361,6 +361,11 @@ class HandEye(ByValue, Displayed):
         """Names of samples left out as equal to an earlier one in both poses."""
         return tuple(name for name, copy in zip(self.samples.names, _copies(self.samples)) if copy)
 
+    @property
+    def rejected(self) -> tuple[str, ...]:
+        """Names of the samples that contradict the others, so that the calibration does not use them."""
+        return tuple(each.sample for each in self.suspects if not isinstance(each, vision_findings.RepeatedPose))
+
     def sheet(self) -> Sheet:
         """The twelve numbers with half their 95 % intervals."""
         in_hand = self.samples.setup == "eye_in_hand"

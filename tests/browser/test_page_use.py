@@ -178,7 +178,7 @@ def test_a_link_into_a_fold_opens_it(browser, small_study):
     [
         ("trajectory", "line_wrist_near", ["wrist singularity", "762 of 360 deg/s", "Slow down from"]),
         ("trajectory", "line_limits", ["link 2 and link 4 overlap", "below its lower limit", "end it there"]),
-        ("programs", "singular_line", ["J4 and J6 in line", "upper limit of 180 deg", "go by a joint move"]),
+        ("programs", "singular_line", ["J4 and J6 in line", "upper limit of 180 deg", "Give J4 180 deg at most"]),
         ("programs", "collision_with_table", ["link 6 and table", "move the target away"]),
     ],
 )

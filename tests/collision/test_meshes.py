@@ -206,7 +206,8 @@ def test_collision_geometry_of_a_urdf_is_taken_over(tmp_path):
         text = text.replace(f'<link name="{name}" />', f'<link name="{name}"><collision>{inside}</collision></link>')
     (tmp_path / "arm.urdf").write_text(text, encoding="utf-8")
     found = import_urdf(tmp_path / "arm.urdf")
-    assert sorted(hull.link for hull in found.robot.hulls) == [2, 4, 6]
+    assert sorted(hull.link for hull in found.robot.hulls) == [2, 4]
+    assert [mesh.link for mesh in found.robot.meshes] == [6]
     (ball,) = found.robot.envelopes
     assert (ball.link, ball.radius) == (6, 0.03)
     assert any("was not found" in note for note in found.notes)

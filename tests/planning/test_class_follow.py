@@ -13,6 +13,7 @@ from er3a.kinematics.forward import forward
 from er3a.planning.class_follow import PathEndsError, follow_by_class
 from er3a.planning.moves import line
 from er3a.robots.robot import CombinedLimit, Robot
+from testing.arms import placement
 
 INNER, OUTER = 0.325, 0.275
 H = np.pi / 2
@@ -33,7 +34,9 @@ SCARA = arm(
     [-2.27, -2.44, 0.0, -6.0],
     [2.27, 2.44, 0.2, 6.0],
 )
-FIVE = arm(([0, -0.425, -0.392, 0, 0], [H, 0, 0, H, -H], [0.089, 0, 0, 0.109, 0.095]))
+FIVE = arm(([0, -0.425, -0.392, 0, 0], [H, 0, 0, H, -H], [0.089, 0, 0, 0.109, 0.095])).replace(
+    tool=placement([0, 0, 0], [0, 0, 0.3])  # says where it points
+)
 SIX = arm(([0, 0, 0, 0, 0, 0], [-H, H, 0, -H, H, 0], [0.4, 0.15, 0, 0, 0, 0.26]), [False, False, True, *[False] * 3])
 THREE = arm(([0, 0.3, 0.25], [H, 0, 0], [0.3, 0, 0]))
 

@@ -5,10 +5,8 @@ Each stage's list begins with the least that it ever lists. One change of what i
 
 from __future__ import annotations
 
-import ast
 import json
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import get_args
@@ -513,10 +511,6 @@ def test_tool_and_base_of_the_study():
 
 # --- vision ---
 
-OF_GRASPS = LeftOut("detections"), LeftOut("gripped_parts")
-CALIBRATED = {"table": None, "simulated": False, "boardless": (), "rejected": (), "time_offset": None, "copies": ()}
-CALIBRATED |= {"touch": "some points"}
-
 
 @pytest.mark.parametrize(
     ("images", "simulated", "setup", "touched", "expected"),
@@ -549,88 +543,35 @@ def test_touched_points_confirm_what_the_gripper_needs_and_no_more():
         ({"simulated": True}, (LeftOut("real_camera"),)),
         ({"boardless": (BoardlessImage("a", "a.png", 3),)}, (LeftOut("boardless_images", ("a",)),)),
         ({"rejected": ("a", "b")}, (LeftOut("left_out_samples", ("a", "b")),)),
-        ({"time_offset": of(unused=0)}, ()),
-        ({"time_offset": of(unused=30)}, (LeftOut("stream_poses", amount=30),)),
+        ({"unused": 30}, (LeftOut("stream_poses", amount=30),)),
         ({"copies": ("a",)}, (LeftOut("copied_samples", ("a",)),)),
         ({"zeros": ("J1", "J6")}, (LeftOut("joint_zeros", ("J1", "J6")),)),
         ({"least_zero": 0.5}, (LeftOut("small_joint_zeros", amount=0.5),)),
         ({"touch": None}, (LeftOut("touched_points"),)),
-        ({"frames": ("flange_poses", "base_poses")}, (LeftOut("flange_poses"), LeftOut("base_poses"))),
+    ],
+)
+def test_a_calibration(given, more):
+    own = {"simulated": False, "boardless": (), "unused": 0, "zeros": (), "least_zero": 0.0}
+    own |= {"rejected": (), "copies": (), "touch": of(largest=0.0)} | given
+    found = of(rejected=own["rejected"], copies=own["copies"], touch=own["touch"]), own["zeros"], own["least_zero"]
+    images = of(boardless=own["boardless"], views=of(shared="estimated"))
+    listed = STAGES["vision"].module("compute").left_out_of_calibration
+    assert listed(None, of(simulated=own["simulated"]), of(unused=own["unused"]), images, found) == more
+
+
+@pytest.mark.parametrize(
+    ("given", "more"),
+    [
+        ({}, ()),
         ({"view": {"farthest_mm": 900.0}}, (LeftOut("objects_out_of_view", ("can",)),)),
         ({"arm": {"repeatability_mm": 0.0}}, (LeftOut("arm_errors"),)),
     ],
 )
-def test_a_calibration_and_grasps(given, more):
+def test_a_cell_with_a_camera(given, more):
     file = load_vision(Path(f"data/vision/{ROBOT}.yaml"), load_robot(ROBOT))
     parts = {part: getattr(file, part).model_copy(update=given.get(part, {})) for part in ("view", "arm")}
     seen = file.model_copy(update=parts | {"objects": file.objects[:1]})
-    own = {"zeros": (), "least_zero": 0.0, "frames": ()}
-    found = of(**CALIBRATED | {name: value for name, value in given.items() if name in CALIBRATED})
-    own |= {name: value for name, value in given.items() if name in own}
-    assert not differs(left_out("vision", found, seen, **own), OF_GRASPS, more)
-
-
-# --- all of them ---
-
-TABLES = ("LEFT_OUT_BY_SETTINGS", "LEAVE_NOTHING_OUT")
-LISTS = ("found", "more", "few", "many", "left", "left_out", "swollen", "subjects")
-
-
-@cache
-def named_in_tests() -> frozenset[str]:
-    """Strings of all tests that ask whether something is left out: in the form in which lists are read or made.
-
-    Keys of files and settings are often the same words, and the two tables that only tell what a setting leaves out
-    test nothing.
-    """
-    found: set[str] = set()
-    for file in sorted(Path("tests").rglob("*.py")):
-        tree = ast.parse(text := file.read_text(encoding="utf-8"))
-        if not any(word in text for word in ("LeftOut", "left_out", "not_examined")):
-            continue
-        parts = [
-            each for each in tree.body if not (isinstance(each, ast.Assign) and ast.unparse(each.targets[0]) in TABLES)
-        ]
-        found.update(name for part in parts for node in ast.walk(part) for name in asked_for(node))
-    return frozenset(found)
-
-
-def asked_for(node: ast.AST) -> list[str]:
-    """Strings that a part of a test asks for as subjects."""
-    match node:
-        case ast.Call(func=ast.Name("LeftOut"), args=[first, *_]):
-            return strings(first)
-        case ast.Subscript(value=ast.Name(name), slice=key) if name in LISTS:
-            return strings(key)
-        case ast.Subscript(value=ast.Call(func=ast.Name("subjects" | "of_collisions")), slice=key):
-            return strings(key)
-        case ast.Compare(left=first, ops=[ast.In() | ast.NotIn() | ast.LtE()], comparators=[other]) if of_lists(other):
-            return strings(first)
-        case ast.Compare(left=ast.Attribute(attr="subject"), comparators=others):
-            return strings(*others)
-    return []
-
-
-def of_lists(node: ast.AST) -> bool:
-    """Whether something is a list of what is left out, or of its subjects."""
-    match node:
-        case ast.Name(name):
-            return name in LISTS
-        case ast.Call(func=ast.Attribute(value=ast.Name(name), attr="keys")):
-            return name in LISTS
-        case ast.Call(func=ast.Name(name)):
-            return name in ("subjects", "of_collisions")
-    return isinstance(node, ast.SetComp | ast.ListComp) and ".subject" in ast.unparse(node)
-
-
-def strings(*nodes: ast.AST) -> list[str]:
-    """Strings in these parts, alone or in a display."""
-    return [each.value for node in nodes for each in ast.walk(node) if isinstance(each, ast.Constant)]
-
-
-def test_every_subject_is_asked_for_by_a_test():
-    """A new one needs a test that it is listed where something was left out, and not elsewhere."""
-    assert set(get_args(LeftOutSubject)) - named_in_tests() == set()
+    assert tuple(STAGES["vision"].module("compute")._left_out_of_file(seen)) == more
 
 
 def test_every_subject_has_words_in_chinese():

@@ -830,7 +830,7 @@ def by_poses(folder: Path, name: str, robot: Robot, **more) -> None:
     lines = [[head[0], *names, *head[7:]], *([row[0], *map(str, pose), *row[7:]] for row, pose in zip(rows, poses))]
     (folder / f"{name}.csv").write_text("\n".join(",".join(line) for line in lines), encoding="utf-8")
     content = yaml.safe_load((folder / f"{name}.yaml").read_text(encoding="utf-8")) | more
-    content = {key: value for key, value in content.items() if value is not None and key != "table_corrections"}
+    content = {key: value for key, value in content.items() if value is not None}
     (folder / f"{name}.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
 
 

@@ -119,7 +119,7 @@ def test_page_and_recording_are_written(study, stored, tmp_path):
     met = motion.take((motion.program == "collision_with_table") & (motion.line == 10))
     assert f'data-play="collision_with_table" data-from="{met.t_s[0]}" data-t="{met.t_s[-1]}"' in html
     assert html.count('<div class="listing"') == len(stored["er3a_c60"].results.summary.programs)
-    assert "the tool TOOL_DATA[7] is not given" in html
+    assert "not followed: TOOL_DATA[7] (this tool is not given)" in html
     program = next(each for each in stored["er3a_c60"].results.summary.programs if each.name == "outside_limits")
     found = next(each for each in program.findings if each.finding.code == "above_limit")
     said = f"from {found.motion_s:.2f} s into this line on"
@@ -144,7 +144,7 @@ def test_page_and_recording_are_written(study, stored, tmp_path):
         program = next(own for own in stored["er3a_c60"].results.summary.programs if own.name == name)
         gravest = [own for own in program.findings if own.level == program.outcome]
         grave = min((own.program_s, own.finding.code) for own in gravest if own.program_s) if float(t) else (0.0, "")
-        if grave[1].startswith(("faster", "accelerates")):  # seen where the joint is fastest
+        if grave[1].startswith("too_fast"):  # seen where the joint is fastest
             assert grave[0] - 1e-9 <= float(t)
         else:
             assert float(t) == round(grave[0], 9)  # the earliest that weighs most
@@ -161,7 +161,7 @@ def test_page_and_recording_are_written(study, stored, tmp_path):
     nowhere = replace(summary, programs=(replace(program, findings=told),))
     (fault,) = faults(replace(stored["er3a_c60"].results, summary=nowhere))
     assert not re.search(r"[;.:。；] *[:：]", fault.what), fault.what
-    assert "go by a joint move to the joint angles (" in html
+    assert re.search("[Ll]ower the speed of this line to ", html)
     assert (tmp_path / "programs.rrd").stat().st_size > 100_000
 
 
@@ -180,10 +180,7 @@ def test_a_line_past_a_singular_pose_is_told_by_it_then_by_what_weighs_most_then
     assert fault.cause.endswith(": J4 and J6 in line")
     limit, rates = fault.moments
     assert limit.what.startswith("J4 goes above its upper limit of 180 deg")
-    assert rates.what == (
-        "J4, J5, J6 exceed the assumed limits: J4 needs about 3800 of 360 deg/s, "
-        "J4 needs about 160\u202f000 of 1440 deg/s²"
-    )
+    assert rates.what == "J4, J6 exceed the assumed limits: J4 needs about 3800 of 360 deg/s"
     assert f"t={round(found['above_limit'].program_s, 9)}#singular_line" in fault.address
     report(study, stored["er3a_c60"], tmp_path / "programs.html")
     html = (tmp_path / "programs.html").read_text(encoding="utf-8")
@@ -192,7 +189,7 @@ def test_a_line_past_a_singular_pose_is_told_by_it_then_by_what_weighs_most_then
     assert order == sorted(order)
     shown = next(each for each in motions(load_robot("er3a_c60"), results) if each.name == "singular_line")
     now = [each for each in shown.events if each.t <= found["above_limit"].program_s <= each.until]
-    assert {joint for each in now for joint, _ in each.joints} == {4, 5, 6}
+    assert {joint for each in now for joint, _ in each.joints} == {4, 6}
     assert not [each for each in program.findings if re.search(r"\d\u202f\d*[1-9]\d* deg", say(each.finding))]
 
 
@@ -207,7 +204,7 @@ def test_a_fault_in_a_loop_names_its_round_and_each_fault_leads_to_its_moment(st
     rounds = {each.finding.code: each.round for each in program.findings if each.round is not None}
     assert rounds["way_out_of_reach"] == 2 + round((600 - 380) / 10)
     assert worst.when.startswith(f"line 10, round {rounds['way_out_of_reach']}, 0.01 s into it (player: ")
-    assert first.when.startswith("line 10, round 14, ")
+    assert first.when.startswith(f"line 10, round {rounds['way_out_of_reach'] - 1}, ")  # nearly stretched
     for name in ("drifting_loop", "singular_line", "outside_limits"):
         for each in found[name].moments:
             assert each.address == f"programs.html?play={name}&t={round(each.seen_s, 9)}#{name}"

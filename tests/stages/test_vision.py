@@ -13,12 +13,11 @@ import yaml
 from PIL import Image
 
 from er3a.files.kept_files import ROOT
-from er3a.files.vision_file import load_vision
 from er3a.pipeline.messages.vision import say
 from er3a.pipeline.results import read_results
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.registry import STAGES
-from er3a.pipeline.stages.vision.compute import _left_out, figures_of, verdict_of
+from er3a.pipeline.stages.vision.compute import figures_of, verdict_of
 from er3a.pipeline.stages.vision.model import VisionResults
 from er3a.pipeline.study import load_study
 from er3a.pipeline.viewing.tray import sound_motions
@@ -101,18 +100,6 @@ def test_an_object_without_a_grasp_is_not_grasped_whatever_refuses_it(folders):
     for objects, status, grasped in (((can, lost), "caution", 1), ((lost,), "fail", 0)):
         verdict = verdict_of(replace(summary.calibration, warnings=()), objects, ())
         assert (verdict.status, verdict.finding.grasped) == (status, grasped)
-
-
-@pytest.mark.long
-def test_a_table_that_its_own_samples_contradict_is_no_pass(folders):
-    summary = read_results(folders["er3a_c60"], VisionResults).results.summary
-    table, file = summary.calibration.table, load_vision(ROOT / "data/vision/er3a_c60.yaml")
-    for probability, named in ((0.5, []), (0.001, [tuple(each.entry for each in table.entries)])):
-        found = replace(summary.calibration, table=replace(table, probability=probability))
-        left = tuple(_left_out(found, file, (), 0.0))
-        assert [each.names for each in left if each.subject == "contradicted_table"] == named
-        missed = replace(summary, not_examined=left).verdict.missed
-        assert ("contradicted_table" in {each.subject for each in missed}) == bool(named)
 
 
 @pytest.mark.long

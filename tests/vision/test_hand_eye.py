@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import t as student
 
 from er3a.geometry.transforms import moved, transform
+from er3a.pipeline.results import LeftOut
 from er3a.pipeline.stages.vision.compute import _open_frames
 from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.classic_methods import park, shah
@@ -391,7 +392,7 @@ def test_recorded_poses_are_doubted_where_nothing_is_compared_with_them(setup):
         samples = a_set(setup, 9, of_joints=joints, touched=np.zeros((3, 2, 3)) if touched else None)
         assert samples.open_frames(simulated) == frames
         head = SimpleNamespace(setup=setup, simulated=simulated)
-        assert _open_frames(samples, head) == tuple(each for each in frames if each == own)
+        assert _open_frames(samples, head) == tuple(LeftOut(each) for each in frames if each == own)
 
 
 def test_residuals_that_nothing_explains_are_an_error():

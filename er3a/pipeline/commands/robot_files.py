@@ -316,56 +316,39 @@ def hand_eye(
     from er3a.files.yaml_file import load
     from er3a.pipeline.messages.left_out import left_out_names, left_out_text
     from er3a.pipeline.messages.say import bracketed, say
-    from er3a.pipeline.messages.vision import correction_lines, hand_eye_lines, hand_eye_record
+    from er3a.pipeline.messages.vision import hand_eye_lines, hand_eye_record
     from er3a.pipeline.results import LeftOut
-    from er3a.pipeline.stages.left_out import left_out_of_intrinsics
+    from er3a.pipeline.stages.vision.compute import left_out_of_calibration
     from er3a.vision.boards import ambiguous_tilts
     from er3a.vision.hand_eye import calibrate_hand_eye
-    from er3a.vision.table_corrections import TABLE_CONTRADICTED, TableCorrections, correct_table, zeros_tried
+    from er3a.vision.joint_zeros import zeros_tried
     from er3a.vision.vision_findings import HandEyeError, grave_warnings
 
     # What is printed is for the controller, and so in the robot's own base, wherever its file places that.
     arm = load_robot(robot).replace(base=np.eye(4)) if robot else None
     head = load(HandEyeFile, file)
-    asked = head.table_corrections
     with shown_work(f"{file}: reading the samples") as at:
         samples, offset, images = read_calibration(file, arm)
         open_tilts = ambiguous_tilts(images.views, samples.names) if images else ()
         at(f"{file}: estimating the camera's pose")
         try:
             found = calibrate_hand_eye(samples)
-            found, unseen, least_zero = zeros_tried(found, arm) if arm else (found, (), 0.0)
+            found, unseen, least_zero = zeros_tried(found, arm) if arm else (found, None, 0.0)
         except HandEyeError as error:
             raise Er3aError(f"{file}: {say(error.finding)}") from None
-        at(f"{file}: estimating corrections of the table")
-        table = correct_table(found, arm, asked) if arm and asked else None
     boardless = images.boardless if images else ()
-    wrong = isinstance(table, TableCorrections) and table.probability < TABLE_CONTRADICTED
-    open_frames = samples.open_frames(head.simulated)
-    missed = {
-        LeftOut("real_camera"): head.simulated,
-        LeftOut("stream_poses", amount=offset.unused if offset else 0): bool(offset and offset.unused),
-        LeftOut("copied_samples", found.copies): bool(found.copies),
-        LeftOut("joint_zeros", unseen): bool(unseen) or arm is None,
-        LeftOut("small_joint_zeros", amount=least_zero): bool(least_zero),
-        LeftOut("touched_points"): found.touch is None,
-        LeftOut("flange_poses"): "flange_poses" in open_frames,
-        LeftOut("base_poses"): "base_poses" in open_frames,
-        **{LeftOut(each): True for each in left_out_of_intrinsics(samples, images, head.simulated, bool(found.touch))},
-        LeftOut("contradicted_table"): wrong,
-    }
-    not_examined = [bracketed(left_out_text(each), left_out_names(each)) for each, is_so in missed.items() if is_so]
+    missed = [
+        *left_out_of_calibration(samples, head, offset, images, (found, unseen, least_zero)),
+        *map(LeftOut, samples.open_frames(head.simulated)),
+    ]
+    not_examined = [bracketed(left_out_text(each), left_out_names(each)) for each in missed]
     if as_json:
-        record = hand_eye_record(found, offset, table, boardless, open_tilts)
+        record = hand_eye_record(found, offset, boardless, open_tilts)
         options.print_json(record | {"not_examined": not_examined})
     else:
         sample_lines = [f"sample {say(each)}" for each in (*open_tilts, *boardless)]
         sample_lines += [f"not examined: {each}" for each in not_examined]
-        print(
-            "\n".join(
-                [hand_eye_lines(found, offset, boardless), *sample_lines, *(correction_lines(table) if table else [])]
-            )
-        )
+        print("\n".join([hand_eye_lines(found, offset, boardless), *sample_lines]))
     touched_elsewhere = found.touch is not None and found.touch.contradiction is not None
     if grave_warnings(found.warnings) or touched_elsewhere:
         raise typer.Exit(1)

@@ -44,9 +44,6 @@ TEXTS = texts(
         ),
         "left_out.allowed_contacts": "collisions that the scene's or the robot's file allows",
         "left_out.arm_errors": "what the arm's own errors add to a grasp's: the file does not state all of them",
-        "left_out.contradicted_table": (
-            "what is wrong with the arm's table: the samples contradict it, and grasps are computed by it as it is"
-        ),
         "left_out.objects_out_of_view": "whether the camera can have seen objects that lie out of its stated view",
         "left_out.unexamined_pairs": "collisions of pairs whose shapes can't be right",
         "left_out.guessed_pairs": (

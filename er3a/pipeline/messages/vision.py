@@ -27,7 +27,6 @@ from er3a.vision.grasping import (
     PathCollides,
 )
 from er3a.vision.hand_eye import HandEye, spread_of
-from er3a.vision.table_corrections import TABLE_CONTRADICTED, NoCorrections, TableCorrections
 from er3a.vision.vision_findings import (
     Convention,
     OtherConvention,
@@ -61,11 +60,6 @@ CONVENTIONS: dict[Convention, str] = {
 POSES = {
     "eye_in_hand": (N_("camera on the flange (T_flange_camera)"), N_("board in the base (T_base_board)")),
     "eye_to_hand": (N_("camera in the base (T_base_camera)"), N_("board on the flange (T_flange_board)")),
-}
-NO_CORRECTIONS = {
-    "joints": N_("corrections to the table need recorded joint angles and an arm with six revolute joints"),
-    "few": N_("too few samples for corrections to the table"),
-    "steps": N_("no corrections to the table fit: it has a gross fault or belongs to another arm"),
 }
 KEY_FIGURES = {
     "samples_used": N_("samples used"),
@@ -223,14 +217,6 @@ TEXTS = texts(
             "all motions rotate about one direction ({x:.2f}, {y:.2f}, {z:.2f}) within {spread_deg:.2g} deg, so the "
             "translation along it is undetermined: add poses rotated about another axis by 30 deg or more"
         ),
-        "vision.corrections#consistent": (
-            "The samples do not contradict the table: corrections lower the residuals from {before:.3g} to "
-            "{after:.3g} standard deviations, by chance with a probability of {p:.2g}"
-        ),
-        "vision.corrections#contradicted": (
-            "The samples contradict the table: corrections lower the residuals from {before:.3g} to {after:.3g} "
-            "standard deviations, by chance with a probability of {p:.1g}"
-        ),
     }
 )
 
@@ -296,32 +282,6 @@ def _(found: ParallelTurns) -> str:
     return say_as(found, x=found.axis[0], y=found.axis[1], z=found.axis[2])
 
 
-@say.register
-def _(found: NoCorrections) -> str:
-    return word("vision.no_corrections", NO_CORRECTIONS, found.why)
-
-
-def correction_verdict(probability: float, before: float, after: float) -> str:
-    """Whether the samples speak against the table as it is."""
-    if probability < TABLE_CONTRADICTED:
-        return sentence("vision.corrections#contradicted", before=before, after=after, p=probability)
-    return sentence("vision.corrections#consistent", before=before, after=after, p=probability)
-
-
-def correction_lines(found: TableCorrections | NoCorrections) -> list[str]:
-    """Corrections to a table as lines for a terminal."""
-    if isinstance(found, NoCorrections):
-        return [say(found)]
-    lines = ["corrections to the arm's table, with 95 % intervals:"]
-    for each, half in zip(found.estimates, found.entry_half_width):
-        values = f"{as_text(each.nominal, '>10.3f')} {as_text(each.correction, '>+9.4f')} ± {half:.4f} {each.unit}"
-        lines.append(f"  {each.name:<9}{values}")
-    lines += [f"  {say(each)}" for each in found.held]
-    verdict = correction_verdict(found.probability, found.scatter_before, found.scatter)
-    mm, deg = 1000 * found.moved[0], np.degrees(found.moved[1])
-    return [*lines, verdict, f"with them the camera's pose changes by {mm:.3g} mm and {deg:.2g} deg"]
-
-
 def pose_words(setup: str) -> tuple[str, str]:
     """What the two unknown poses of a setup are, in words."""
     first, second = POSES[setup]
@@ -368,7 +328,6 @@ def hand_eye_lines(found: HandEye, offset: TimeOffset | None, boardless: Sequenc
 def hand_eye_record(
     found: HandEye,
     offset: TimeOffset | None,
-    table: TableCorrections | NoCorrections | None = None,
     boardless: Sequence[BoardlessImage] = (),
     open_tilts: Sequence[AmbiguousTilt] = (),
 ) -> dict[str, object]:
@@ -405,19 +364,4 @@ def hand_eye_record(
         "time_offset_s": offset.offset if offset else None,
         "touch_probability": found.touch.probability if found.touch else None,
         "touch_contradicts": found.touch is not None and found.touch.contradiction is not None,
-        "table_corrections": _corrections_record(table) if table else None,
-    }
-
-
-def _corrections_record(found: TableCorrections | NoCorrections) -> dict[str, object]:
-    if isinstance(found, NoCorrections):
-        return {"code": found.code, "text": say(found)}
-    return {
-        "entries": [
-            {"entry": each.name, "unit": each.unit, "correction": each.correction, "half_width": half}
-            for each, half in zip(found.estimates, found.entry_half_width.tolist())
-        ],
-        "held": [say(each) for each in found.held],
-        "probability": found.probability,
-        "scatter": found.scatter,
     }

@@ -51,15 +51,9 @@ from er3a.vision.calibration_set import CalibrationSet, TimeOffset
 from er3a.vision.grasp_motion import DEPTH, PARTS, GraspLeg
 from er3a.vision.grasping import ChosenGrasp, DetectedObject, GraspNeeds, GraspPlan, GraspTask, plan_grasp
 from er3a.vision.hand_eye import HandEye, TouchCheck, calibrate_hand_eye, spread_of
+from er3a.vision.joint_zeros import zeros_tried
 from er3a.vision.next_view import FieldOfView, in_sight, next_view
 from er3a.vision.point_error import ArmAccuracy, SeenPoseError, error_sizes, seen_pose, seen_pose_error
-from er3a.vision.table_corrections import (
-    TABLE_CONTRADICTED,
-    NoCorrections,
-    TableCorrections,
-    correct_table,
-    zeros_tried,
-)
 from er3a.vision.vision_findings import HandEyeError, TouchContradicts, grave_warnings
 
 MARGIN = 0.25  # of the objects' extent
@@ -229,7 +223,6 @@ def calibration_result(
     found: HandEye,
     view: model.ViewToAdd | None,
     offset: TimeOffset | None,
-    table: TableCorrections | NoCorrections | None,
     images: SeenImages | None,
 ) -> model.CalibrationResult:
     """All that the summary says of a calibration."""
@@ -257,26 +250,11 @@ def calibration_result(
         touch=_touch(found),
         next_view=view,
         time_offset=stated(model.OffsetResult, offset) if offset else None,
-        table=_table_result(table) if isinstance(table, TableCorrections) else table,
         open_tilts=ambiguous_tilts(images.views, found.samples.names) if images else (),
         boardless=boardless,
         copies=found.copies,
         intrinsics_estimated=images is not None and images.views.shared is not None,
         intrinsics_given=images is not None and images.views.shared is None,
-    )
-
-
-def _table_result(found: TableCorrections) -> model.TableResult:
-    rows = zip(found.estimates, found.entry_half_width.tolist())
-    return stated(
-        model.TableResult,
-        found,
-        entries=tuple(
-            model.EntryCorrection(each.name, each.unit, each.nominal, each.correction, half) for each, half in rows
-        ),
-        moved_mm=from_si("mm", found.moved[0]),
-        moved_deg=from_si("deg", found.moved[1]),
-        hand_eye=_estimate(found.X, found.half_width[:6]),
     )
 
 
@@ -356,23 +334,27 @@ def compute(study: Study, name: str) -> model.VisionResults:
     title = scene.title if scene else None
     settings, motions = study.section(VisionSettings), study.section(TrajectorySettings)
     try:
-        found, unseen_zeros, least_zero = zeros_tried(calibrate_hand_eye(samples), robot)
+        with_zeros = zeros_tried(calibrate_hand_eye(samples), robot)
     except HandEyeError as error:
         verdict: Verdict[Found] = Verdict("fail", model.CalibrationImpossible(error.finding))
-        left = _left_out_without_calibration(samples, head, task_file, offset, images)
-        left_out = (*left, *_left_out_of_motions(robot, bodies_of(robot, scene), scene, motions))
+        left_out = (
+            _no_grasps(task_file),
+            *_left_out_of_file(task_file),
+            *left_out_of_calibration(samples, head, offset, images),
+            *_open_frames(samples, head),
+            *GRASPS_REST_ON,
+            *_left_out_of_motions(robot, bodies_of(robot, scene), scene, motions),
+        )
         summary = model.VisionSummary(verdict, (), task_file.title, title, settings.least_success, None, ())
         return _without_calibration(replace(summary, not_examined=left_out))
+    found = with_zeros[0]
     picture = None if head.setup == "eye_to_hand" else meant(robot, np.array(task_file.picture_deg))
     camera = _camera_at(robot, found, picture)
     places = {each.name: camera @ each.pose() for each in task_file.objects}
     seed = study.seed + VIEW_STREAM
     to_add = _view_to_add(robot, found, task_file, head.board_mm, scene=scene, seed=seed)
-    table = correct_table(found, robot, head.table_corrections) if head.table_corrections else None
-    calibration = calibration_result(head, found, to_add, offset, table, images)
+    calibration = calibration_result(head, found, to_add, offset, images)
     doubt, frames = _doubt(calibration, found.touch), _open_frames(samples, head)
-    touched = touched_within(found.touch, task_file.gripper.tolerance_mm)
-    intrinsics = left_out_of_intrinsics(samples, images, head.simulated, touched)
     planned = []
     if not doubt:
         limits = (limits_of(robot, motions), study.seed)
@@ -393,7 +375,10 @@ def compute(study: Study, name: str) -> model.VisionResults:
         objects=objects,
         not_examined=(
             *((_no_grasps(task_file),) if doubt else ()),
-            *_left_out(calibration, task_file, unseen_zeros, least_zero, (*intrinsics, *frames)),
+            *_left_out_of_file(task_file),
+            *left_out_of_calibration(samples, head, offset, images, with_zeros, task_file.gripper.tolerance_mm),
+            *frames,
+            *GRASPS_REST_ON,
             *_left_out_of_motions(robot, bodies, scene, motions, ways.q_deg),
             *left_out_in_solids(scene, _places(robot, task_file, found, picture)),
         ),
@@ -479,29 +464,42 @@ def _no_grasps(file: VisionFile) -> LeftOut:
     return LeftOut("grasps", tuple(each.name for each in file.objects))
 
 
-def _left_out_without_calibration(
+def left_out_of_calibration(
     samples: CalibrationSet,
     head: HandEyeFile,
-    file: VisionFile,
     offset: TimeOffset | None,
     images: SeenImages | None,
-) -> Iterator[LeftOut]:
-    """What nobody looked at where the samples determine no calibration: no object, and nothing that checks it."""
-    yield _no_grasps(file)
-    yield from _left_out_of_file(file)
-    if head.simulated:
-        yield LeftOut("real_camera")
-    if images and images.boardless:
-        yield LeftOut("boardless_images", tuple(each.sample for each in images.boardless))
-    if offset and offset.unused:
-        yield LeftOut("stream_poses", amount=offset.unused)
-    yield LeftOut("joint_zeros")
-    if samples.touched is None:
-        yield LeftOut("touched_points")
-    open_of_poses = (*left_out_of_intrinsics(samples, images, head.simulated, False), *_open_frames(samples, head))
-    yield from (LeftOut(subject) for subject in open_of_poses)
-    yield LeftOut("detections")
-    yield LeftOut("gripped_parts")
+    found: tuple[HandEye, tuple[str, ...] | None, float] | None = None,
+    tolerance_mm: Sequence[float] = (),
+) -> tuple[LeftOut, ...]:
+    """What a calibration does not rest on, and what nothing checks it against.
+
+    ``found`` : as :func:`zeros_tried` returns it, without joints where no arm is known; None: no calibration.
+    ``tolerance_mm`` : what touched points have to agree within, to stand for the intrinsics; empty for any distance.
+    """
+    hand_eye, zeros, least_zero = found or (None, None, 0.0)
+    touch = hand_eye.touch if hand_eye else None
+    boardless = tuple(each.sample for each in images.boardless) if images else ()
+    rejected = hand_eye.rejected if hand_eye else ()
+    copies = hand_eye.copies if hand_eye else ()
+    unused = offset.unused if offset else 0
+    touched = touch is not None and (not tolerance_mm or touched_within(touch, tolerance_mm))
+    left: dict[LeftOut, object] = {
+        LeftOut("real_camera"): head.simulated,
+        LeftOut("boardless_images", boardless): boardless,
+        LeftOut("left_out_samples", rejected): rejected,
+        LeftOut("stream_poses", amount=unused): unused,
+        LeftOut("copied_samples", copies): copies,
+        LeftOut("joint_zeros", zeros or ()): zeros != (),
+        LeftOut("small_joint_zeros", amount=least_zero): least_zero,
+        LeftOut("touched_points"): touch is None if hand_eye else samples.touched is None,
+        **{LeftOut(each): True for each in left_out_of_intrinsics(samples, images, head.simulated, touched)},
+    }
+    return tuple(each for each, is_so in left.items() if is_so)
+
+
+GRASPS_REST_ON = (LeftOut("detections"), LeftOut("gripped_parts"))
+"""What grasps take as it is given."""
 
 
 def touched_within(touch: TouchCheck | None, tolerance_mm: Sequence[float]) -> bool:
@@ -510,49 +508,14 @@ def touched_within(touch: TouchCheck | None, tolerance_mm: Sequence[float]) -> b
     return touch is not None and 1000 * touch.largest <= min(tolerance_mm)
 
 
-def _open_frames(samples: CalibrationSet, head: HandEyeFile) -> tuple[LeftOutSubject, ...]:
+def _open_frames(samples: CalibrationSet, head: HandEyeFile) -> tuple[LeftOut, ...]:
     """Of the frames that nothing is compared with, the one that the camera is in: grasps rest on no other.
 
     A tool's pose in place of the flange's moves a camera on the flange by as much, and what it sees of the base not at
     all, so touched points agree. A fixed camera stays where it is, in the frame that poses and touched points are in.
     """
     camera_in: LeftOutSubject = "flange_poses" if head.setup == "eye_in_hand" else "base_poses"
-    return tuple(each for each in samples.open_frames(head.simulated) if each == camera_in)
-
-
-def _left_out(
-    found: model.CalibrationResult,
-    file: VisionFile,
-    zeros: tuple[str, ...],
-    least_zero: float,
-    frames: tuple[LeftOutSubject, ...] = (),
-) -> Iterator[LeftOut]:
-    """What the calibration does not rest on, what nothing checks it against, and what grasps leave open.
-
-    ``frames``: as :func:`_open_frames` gives them, and what is open of the intrinsics.
-    """
-    yield from _left_out_of_file(file)
-    if isinstance(found.table, model.TableResult) and found.table.probability < TABLE_CONTRADICTED:
-        yield LeftOut("contradicted_table", tuple(each.entry for each in found.table.entries))
-    if found.simulated:
-        yield LeftOut("real_camera")
-    if found.boardless:
-        yield LeftOut("boardless_images", tuple(each.sample for each in found.boardless))
-    if found.rejected:
-        yield LeftOut("left_out_samples", found.rejected)
-    if found.time_offset and found.time_offset.unused:
-        yield LeftOut("stream_poses", amount=found.time_offset.unused)
-    if found.copies:
-        yield LeftOut("copied_samples", found.copies)
-    if zeros:
-        yield LeftOut("joint_zeros", zeros)
-    if least_zero:
-        yield LeftOut("small_joint_zeros", amount=least_zero)
-    if found.touch is None:
-        yield LeftOut("touched_points")
-    yield from (LeftOut(subject) for subject in frames)
-    yield LeftOut("detections")
-    yield LeftOut("gripped_parts")
+    return tuple(LeftOut(each) for each in samples.open_frames(head.simulated) if each == camera_in)
 
 
 def _shapes(robot: Robot, objects: tuple[model.ObjectResult, ...], margin: float) -> ShapesAssumed | None:

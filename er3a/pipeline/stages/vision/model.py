@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 from er3a.by_value import Finding
-from er3a.calibration.calibrate import Close
-from er3a.calibration.outcomes import Held, LevelName
 from er3a.collision.pairs import Pair
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.results import NEVER_A_PASS, Results, Summary, Verdict
@@ -16,7 +13,6 @@ from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.vision.boards import AmbiguousTilt, BoardlessImage
 from er3a.vision.calibration_set import Setup
 from er3a.vision.grasping import GraspRefusal
-from er3a.vision.table_corrections import NoCorrections
 from er3a.vision.vision_findings import (
     CalibrationWarning,
     GraspOutcome,
@@ -124,42 +120,6 @@ class OffsetResult:
 
 
 @dataclass(frozen=True)
-class EntryCorrection:
-    """An entry of the arm's table (such as d4), in mm or deg, with half the 95 % interval of its correction."""
-
-    entry: str
-    unit: Literal["mm", "deg"]
-    nominal: float
-    correction: float
-    half_width: float
-
-
-@dataclass(frozen=True)
-class TableResult:
-    """Corrections to the arm's table, estimated with the poses.
-
-    Attributes
-    ----------
-    held : why the other entries keep their values; close : pairs whose errors are correlated by more than 0.9
-    scatter, scatter_before : root mean square of the residuals with and without them, in standard deviations
-    probability : that residuals fall as much by chance, if no entry is wrong
-    moved_mm, moved_deg : how far the hand-eye pose is from the one without corrections
-    hand_eye : with them
-    """
-
-    level: LevelName
-    entries: tuple[EntryCorrection, ...]
-    held: tuple[Held, ...]
-    close: tuple[Close, ...]
-    scatter: float
-    scatter_before: float
-    probability: float
-    moved_mm: float
-    moved_deg: float
-    hand_eye: PoseEstimate
-
-
-@dataclass(frozen=True)
 class CalibrationResult:
     """The calibration.
 
@@ -172,7 +132,6 @@ class CalibrationResult:
     camera_mm, camera_deg : the camera's standard deviation by axis, root mean square of the three
     spread_mm, spread_deg : root mean square distance of the board's places, by sample, from their mean
     moved_mm, moved_deg : how far the hand-eye pose would be off with the samples that were left out; None without any
-    table : corrections to the arm's table, where the set asks for them
     copies : samples left out as exact copies of earlier ones
     open_tilts : images that leave open which way the board is tilted; boardless : images left out, without a board
     intrinsics_estimated : from the same images; the intervals include their errors
@@ -202,7 +161,6 @@ class CalibrationResult:
     touch: TouchResult | None
     next_view: ViewToAdd | None
     time_offset: OffsetResult | None
-    table: TableResult | NoCorrections | None
     open_tilts: tuple[AmbiguousTilt, ...] = ()
     boardless: tuple[BoardlessImage, ...] = ()
     copies: tuple[str, ...] = ()

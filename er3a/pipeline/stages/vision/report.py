@@ -13,12 +13,9 @@ from er3a.files.hand_eye_file import HandEyeFile, grey_image
 from er3a.files.vision_file import load_vision
 from er3a.files.yaml_file import load
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.messages.language import N_, own_title, tr, with_unit
+from er3a.pipeline.messages.language import N_, own_title, tr
 from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
-from er3a.pipeline.messages.vision import (
-    correction_verdict,
-    pose_words,
-)
+from er3a.pipeline.messages.vision import pose_words
 from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion
 from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import LeftOut, Stored
@@ -39,7 +36,6 @@ from er3a.programs.languages import titles_unwritten
 from er3a.programs.writing import with_head_lines
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
-from er3a.vision.table_corrections import NoCorrections
 
 MIN_RANGE = 0.02  # of the largest value, by which a map's colours go beyond its values
 MAX_IMAGES = 9
@@ -207,9 +203,6 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
         poses=_poses(found) if found else [],
         suspects=listed((*found.suspects, *found.open_tilts, *found.boardless)) if found else [],
         warnings=listed(found.warnings) if found else [],
-        corrections=_corrections(found.table) if found and isinstance(found.table, model.TableResult) else [],
-        held=_held(found.table) if found else [],
-        corrected=_corrected(found.table) if found and isinstance(found.table, model.TableResult) else "",
         touched=_touched(found.touch) if found and found.touch else [],
         residuals=residual_picture(results.samples, found) if found else None,
         images=image_picture(results.corners, _image_folder(study, name)) if len(results.corners) else None,
@@ -287,32 +280,6 @@ def _pose_rows(pose: model.PoseEstimate) -> list[list[str]]:
         for name, value, half, axis in zip(names, pose.rpy_deg, pose.half_width_deg, AXES)
     ]
     return [*shifts, *turns]
-
-
-def _corrections(found: model.TableResult) -> list[list[str]]:
-    units = {each.unit for each in found.entries}
-    decimals = {unit: decimals_of_spreads(e.half_width for e in found.entries if e.unit == unit) for unit in units}
-    return [
-        [
-            each.entry,
-            with_unit(fixed(each.nominal, decimals[each.unit]), each.unit),
-            fixed(each.correction, decimals[each.unit]),
-            f"± {fixed(each.half_width, decimals[each.unit])}",
-            tr("differs") if abs(each.correction) > each.half_width else "",
-        ]
-        for each in found.entries
-    ]
-
-
-def _held(found: model.TableResult | NoCorrections | None) -> list[str]:
-    """Why entries keep their values, or why none is corrected."""
-    if found is None:
-        return []
-    return [say(found)] if isinstance(found, NoCorrections) else listed(found.held)
-
-
-def _corrected(found: model.TableResult) -> str:
-    return correction_verdict(found.probability, found.scatter_before, found.scatter)
 
 
 def _touched(found: model.TouchResult) -> list[list[str]]:
