@@ -8,8 +8,8 @@ import pytest
 
 pytestmark = pytest.mark.long
 
-BODIES = "scene_shapes carried joined_pairs unmeasured_pairs"
-REAL_ARM = f"{BODIES} base_contacts bare_links joined_whole"
+BODIES = "scene_shapes carried joined_pairs"
+REAL_ARM = f"{BODIES} base_contacts bare_links"
 RATES = "own_accelerations jerk"
 REFERENCES = "references table_entries more_faults round_trips reach_starts the_arm_itself"
 DRIVES = (
@@ -45,7 +45,7 @@ LISTED = {
     ("er3_600", "vision"): f"{CAMERA} own_values",
     ("er3a_c60_article", "validation"): f"{REFERENCES} calibration near_singular_poses",
     ("er3a_c60_article", "workspace"): (
-        f"scene_shapes carried guessed_pairs {PLACES} undecided_core sampled_places allowed_pairs"
+        f"scene_shapes carried joined_pairs {PLACES} undecided_core sampled_places allowed_pairs"
     ),
 }
 

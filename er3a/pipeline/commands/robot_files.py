@@ -91,7 +91,7 @@ def export_urdf(
     """Write a robot as URDF."""
     from er3a.files.kept_files import write_atomically
     from er3a.files.robot_library import load_robot
-    from er3a.formats.urdf import assumed_pairs, export_srdf, pairs_checked_in_part, pairs_not_checked
+    from er3a.formats.urdf import assumed_pairs, export_srdf, pairs_not_checked
     from er3a.formats.urdf import export_urdf as urdf_text
 
     arm = load_robot(robot)
@@ -102,11 +102,6 @@ def export_urdf(
             options.print_note(f"{srdf}: {rests}")
         for pair in pairs_not_checked(arm):
             options.print_note(f"{srdf}: {pair} overlap where no arm can; their shapes are in error, not checked")
-        for pair in pairs_checked_in_part(arm):
-            told = (
-                "are disabled, as they touch at their joint; er3a checks the rest of them, but who reads the SRDF won't"
-            )
-            options.print_note(f"{srdf}: {pair} {told}")
     if arm.combined:
         options.print_note(f"{output}: limits on sums of joints are left out, as a URDF has no place for them")
     for file, text in texts.items():
