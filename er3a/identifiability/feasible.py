@@ -92,7 +92,8 @@ class Region:
     def confirmed(self, direction: Reals, amounts: Reals, held: Flags | None = None) -> Reals | None:
         """Amounts (k,) near others that meet what is asked, with extremes sought afresh; None if none were found."""
         for _ in range(FOLLOWED if self.asked.extreme else 0):
-            if float(self.asked.excess(self.asked.off(self.tables(direction[None], amounts[None])))) <= NEAR:
+            table = self.tables(direction[None], amounts[None])
+            if all(float(self.asked.excess(self.asked.off(table, afresh))) <= NEAR for afresh in (False, True)):
                 return amounts
             found, met = self.reached(direction[None], amounts[None], None if held is None else held[None], near=True)
             if not met[0]:

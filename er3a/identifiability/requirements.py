@@ -32,7 +32,7 @@ STEP = 1e-4
 LONGEST_STEP = 0.5
 SCAN, WATCHED = 384, 48
 CORNERS_UP_TO = 6
-CLIMBS = 3
+CLIMBS = 6
 PEAK_STEPS = 25
 GAINS_NOTHING = 1e-10
 SHARES = np.array([1.0, 0.5, 0.2, 0.05, 0.01])
@@ -262,8 +262,11 @@ class Asked:
         extremes = [(sought.along(tables) - each.expected) / each.half_width for each, sought in self.extreme]
         return np.column_stack([self.plain_off(tables), *extremes])
 
-    def off(self, table: Tables) -> Reals:
-        """Components (m,) of a table (a batch of one); extremes are sought all over the joint ranges."""
+    def off(self, table: Tables, afresh: bool = True) -> Reals:
+        """Components (m,) of a table (a batch of one); extremes are sought all over the joint ranges, or, if not
+        ``afresh``, from where they were attained last and a few places more."""
+        for _, sought in self.extreme:
+            sought.q = None if afresh else sought.q
         extremes = [(sought.at(table) - each.expected) / each.half_width for each, sought in self.extreme]
         return np.append(self.plain_off(table)[0], extremes)
 
