@@ -177,7 +177,6 @@ LeftOutSubject = Literal[
     "table_entries",
     "diagnosis",
     "more_faults",
-    "calibration",
     "round_trips",
     "near_singular_poses",
     "all_solutions",

@@ -488,22 +488,16 @@ def evidence_of(*statuses: str) -> SimpleNamespace:
         ({"evidence": evidence_of("settled", "gauge", "given")}, (), ()),
         ({"evidence": None}, (LeftOut("table_entries"),), ()),
         ({"diagnoses": None}, (LeftOut("diagnosis"),), OF_TABLE[:1]),
-        (
-            {"calibrations": [of(reference_set="a", result=object.__new__(validated.Calibrated))]},
-            (),
-            (),
-        ),
-        ({"calibrations": [of(reference_set="a", result="too few")]}, (LeftOut("calibration", ("a",)),), ()),
         ({"checks": [open_check("round_trips")]}, (LeftOut("all_solutions"),), OF_TABLE[1:2]),
         ({"trips": of(near_singular=12)}, (LeftOut("near_singular_poses", amount=12),), ()),
     ],
 )
 def test_a_table(given, more, less):
-    own = {"without": None, "checks": [], "diagnoses": (), "calibrations": (), "trips": of(near_singular=0)}
+    own = {"without": None, "checks": [], "diagnoses": (), "trips": of(near_singular=0)}
     own |= {"evidence": evidence_of("settled")} | given
     checks = [judged(group) for group in GROUPS if group != own["without"]] + own["checks"]
     settings = of(round_trips=400, reach_starts=3)
-    rest = [own[name] for name in ("diagnoses", "calibrations", "trips", "evidence")]
+    rest = [own[name] for name in ("diagnoses", "trips", "evidence")]
     assert not differs(left_out("validation", settings, checks, *rest), OF_TABLE, more, less)
 
 

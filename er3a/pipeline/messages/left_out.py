@@ -179,7 +179,6 @@ TEXTS = texts(
         "left_out.table_entries": "entries of the table that independent references don't settle, signs included",
         "left_out.diagnosis": "which entry is wrong: diagnosis is for arms whose joints all turn",
         "left_out.more_faults": "tables with more wrong entries than one or two",
-        "left_out.calibration": "corrections of the table: the positions of these reference sets are not enough",
         "left_out.round_trips": "poses other than {amount:,.0f} random ones that were solved back",
         "left_out.near_singular_poses": "joint values at {amount:,.0f} random poses near singularities",
         "left_out.all_solutions": "whether the solutions found are all: no method here finds those of this arm",
