@@ -48,7 +48,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from er3a.geometry.vectors import TURN
+from er3a.geometry.vectors import TURN, Vector, add, cross, dot, scaled, subtract
 from er3a.kinematics.chain import constant_links, moving_tip
 from er3a.kinematics.forward import forward, jacobian
 from er3a.numerics.arrays import Flags, Integers, Reals, copy_values
@@ -375,11 +375,75 @@ def _azimuths(arm: GeneralArm, cell: Cell, memory: Memory) -> tuple[bool, float,
 
 
 @inner_kernel
+def _covers_axis(arm: GeneralArm, cell: Cell, memory: Memory) -> bool:
+    """Whether the joints after joint 1 take the point all over the box about axis 1 that holds a ring.
+
+    The box is a cube. From ``memory.v`` on the point is brought to its middle, on the axis. About there each joint
+    changes by up to ``change``, so that the first-order map is a cube twice as large. By Miranda's theorem every point
+    of the cube is reached if what the second derivatives add leaves the faces of the larger one beyond it.
+    """
+    n, m = arm.drive.shape
+    z, change, columns = 0.5 * (cell[2] + cell[3]), memory.weights, memory.columns
+    half = cell[1] + 64.0 * ROUND_OFF * (1.0 + cell[1] + abs(z))
+    if half < 0.5 * (cell[3] - cell[2]):
+        return False
+    for _ in range(_STEPS):
+        _slopes(arm, memory)
+        miss = subtract((0.0, 0.0, z), place(arm, memory.theta, memory.radii, columns, memory.frame))
+        # Rows of J W J^T, with the joints' weights W.
+        rows = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        for j in range(m):
+            along = _column(arm, columns, j)
+            part = scaled(along, memory.weights[j])
+            rows = (
+                add(rows[0], scaled(part, along[0])),
+                add(rows[1], scaled(part, along[1])),
+                add(rows[2], scaled(part, along[2])),
+            )
+        inverse = cross(rows[1], rows[2]), cross(rows[2], rows[0]), cross(rows[0], rows[1])
+        det = dot(rows[0], inverse[0])
+        if det <= _TINY * (rows[0][0] + rows[1][1] + rows[2][2]) ** 3:
+            return False
+        far = np.sqrt(dot(miss, miss))
+        if far <= 0.05 * half:
+            break
+        for j in range(m):
+            along, w = _column(arm, columns, j), memory.weights[j] / det
+            moved = dot(along, inverse[0]) * miss[0] + dot(along, inverse[1]) * miss[1]
+            moved = memory.v[j] + min(max(w * (moved + dot(along, inverse[2]) * miss[2]), -0.4), 0.4)
+            memory.v[j] = min(max(moved, arm.v_lower[j]), arm.v_upper[j])
+    for j in range(m):
+        along, w = _column(arm, columns, j), 2.0 * half * memory.weights[j] / det
+        change[j] = w * (abs(dot(along, inverse[0])) + abs(dot(along, inverse[1])) + abs(dot(along, inverse[2])))
+        if change[j] > min(memory.v[j] - arm.v_lower[j], arm.v_upper[j] - memory.v[j]):
+            return False
+    memory.moves[:] = 0.0
+    for k in range(1, n):
+        for j in range(m):
+            memory.moves[k] += abs(arm.drive[k, j]) * change[j]
+    return bool(far + 0.5 * curvature(arm, memory.moves, memory.radii) < half)
+
+
+@inner_kernel
+def _column(arm: GeneralArm, columns: Reals, j: int) -> Vector:
+    """Derivative (m) of the point by a joint value, joint 1 at rest."""
+    total = (0.0, 0.0, 0.0)
+    for k in range(1, columns.shape[0]):
+        total = add(total, scaled((columns[k, 0], columns[k, 1], columns[k, 2]), arm.drive[k, j]))
+    return total
+
+
+@inner_kernel
 def _try(
     arm: GeneralArm, cell: Cell, hold: float, known: Postures, memory: Memory, arcs: Reals, count: int, witness: Reals
 ) -> int:
     """Fill a ring from ``memory.v``; returns the count of what is left open."""
     rho, z = 0.5 * (cell[0] + cell[1]), 0.5 * (cell[2] + cell[3])
+    beside_axis = arm.bar == 0.0 and len(arm.combined) == 0 and cell[0] < cell[1] - cell[0]
+    if beside_axis and _covers_axis(arm, cell, memory):
+        copy_values(memory.v, witness)
+        keep(arm, known, memory.v, rho, z, 0.0)
+        return 0
     if not _approach(arm, rho, z, 0.05 * min(cell[1] - cell[0], cell[3] - cell[2]), hold, memory):
         return count
     _values(arm, memory.v, memory.theta)

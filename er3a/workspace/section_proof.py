@@ -843,7 +843,9 @@ def refined(
             split[:] = False
         room = max(0, most_cells - looked) // 4
         if split.sum() > room:
-            split[np.argsort(-undecided * split, kind="stable")[room:]] = False
+            # Little volume lies about the axis, but what is open there joins voids to the outside.
+            first = np.where(cells[:, 0] == 0, np.inf, undecided)
+            split[np.argsort(-np.where(split, first, 0.0), kind="stable")[room:]] = False
         settled += (reached * volumes)[:, ~split].sum(axis=1)
         done.append(judged.rows(~split))
         cells, parents, level = _quarters(cells[split]), judged.rows(np.repeat(np.flatnonzero(split), 4)), level + 1
