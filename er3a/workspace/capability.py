@@ -32,9 +32,9 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
 from er3a.workspace.cell_frame import cell_frame, places_served, without_first_limits
+from er3a.workspace.cells import ring_volumes
 from er3a.workspace.directions import across, left_to_roll, poses
 from er3a.workspace.orientations import AskedOrientations
-from er3a.workspace.section_proof import ring_volumes
 from er3a.workspace.tool_inverse import all_solutions, generic_manipulability, slot_count
 
 _POSES = 50_000

@@ -680,7 +680,7 @@ def test_a_proof_that_leaves_much_undecided_names_hidden_voids_of_any_arm(study,
 def test_a_proof_cut_short_takes_no_hole_for_the_shoulders(study):
     """The article's table leaves a hole where none belongs, which few cells can't tell from the shoulder's."""
     small = {"samples": 3000, "blocks": 1, "cells_across": 8, "volume_points": 100}
-    little = {"directions": 12, "proof_poses": 1, "scene": None, "placement": BoxTask(cone_deg=5)}
+    little = {"directions": 12, "scene": None, "placement": BoxTask(cone_deg=5)}
     article = study.model_copy(update={"robots": {"er3a_c60_article": study.robots["er3a_c60_article"]}})
     verdicts = {}
     for cells in (100, 2000):
@@ -1185,7 +1185,7 @@ def test_a_link_that_looks_larger_than_its_shapes_is_named(link, farthest, reach
 @pytest.mark.long
 def test_workspace_names_what_samples_and_budgets_leave_open(study):
     small = {"samples": 3000, "blocks": 1, "cells_across": 8, "proof_cells": 50, "volume_points": 100}
-    little = {"directions": 12, "proof_poses": 1, "scene": None, "placement": BoxTask(cone_deg=5)}
+    little = {"directions": 12, "scene": None, "placement": BoxTask(cone_deg=5)}
     results = workspace(changed(study, workspace=small, capability=little), ROBOT)
     found, summary = subjects(results), results.summary
     assert found["joint_vectors"].amount == 3000
@@ -1226,7 +1226,6 @@ LEFT_OUT_BY_SETTINGS = {
     "capability": {
         "directions": "tool_directions",
         "rolls": "tool_directions",
-        "proof_poses": "undecided_core",
         "scene": "obstacles",
         "placement": "between_places",
     },

@@ -42,7 +42,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def settings(**changes) -> CapabilitySettings:
-    return CapabilitySettings.model_validate({"directions": 40, "proof_poses": 20_000, **changes})
+    return CapabilitySettings.model_validate({"directions": 40, **changes})
 
 
 @pytest.fixture(scope="module")

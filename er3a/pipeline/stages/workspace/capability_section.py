@@ -9,7 +9,6 @@ import numpy as np
 import scipy
 from markupsafe import Markup, escape
 from matplotlib.axes import Axes
-from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import AxLine, Line2D
 from matplotlib.patches import Patch, Polygon, Rectangle
@@ -19,12 +18,11 @@ from er3a.collision.scene import Plane, Scene, Solid, Sphere
 from er3a.collision.shapes import solid_pieces
 from er3a.geometry.transforms import rpy_along
 from er3a.kinematics.forward import skeleton
-from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import own_title, tr
-from er3a.pipeline.messages.say import bracketed, joined, say, word
+from er3a.pipeline.messages.say import bracketed, joined, say
 from er3a.pipeline.messages.workspace import (
-    STATUS,
     millimetres,
     no_box_text,
     range_text,
@@ -38,9 +36,9 @@ from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.workspace_figures import name_level, slide_names
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
-from er3a.pipeline.viewing.numbers import at_least, at_most, fixed, number
+from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import Picture
-from er3a.pipeline.viewing.palette import GRID, HIGHLIGHT, INK, MUTED
+from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MUTED
 from er3a.pipeline.viewing.tray import Placing, Tray, limit_text
 from er3a.robots.robot import Robot
 
@@ -143,15 +141,12 @@ def place_row(name: str, place: model.PlaceSummary, capability: model.Capability
         branch = branch if capability.held_joints else tr("at several arm angles")
     elif place.branch is None:
         branch = tr("changes within the tray") if capability.named_branches else tr("not known: branches have no names")
-    elif place.status == place.branch_status:
-        branch = branch_word(place.branch)
     else:
-        branch = tr("{branch} (by samples)", branch=branch_word(place.branch))
+        branch = branch_word(place.branch)
     return [
         name,
         millimetres(place.centre_m),
         " × ".join(fixed(1000 * value, 0) for value in place.size_m),
-        word("workspace.status", STATUS, place.status),
         branch,
         fixed(100 * place.manipulability_ratio, 1),
         limit_text(place),
@@ -311,17 +306,14 @@ def placement_views(
     over = [(own_title(each.below.name), each.place) for each in trays if each.below and each.place not in numbered]
     percent = 100 * places.manipulability_m3 / capability.overall.best_manipulability_m3
     figure, axes = new_figure(1, 2, width=12.0, height=5.6)
-    provable = capability.core_m3 is not None
     top = max(1.0, float(percent.max()))
     for panel, (across, up, title) in zip(axes, (("x", "y", tr("From above")), ("x", "z", tr("From the side")))):
         shown = ["xyz".index(across), "xyz".index(up)]
         steps = [placement.spacing_m[axis] for axis in shown]
-        edges, value, proven = _raster(places.centre_m[:, shown], steps, percent, places.proven | (not provable))
+        edges, value = _raster(places.centre_m[:, shown], steps, percent)
         extent = [1000 * edge for edge in edges]
-        unproven = np.ma.masked_where((value < 0) | proven, value)
-        panel.pcolormesh(*extent, unproven.T, cmap=ListedColormap([GRID]), rasterized=True)
-        sure = np.ma.masked_where(~proven, value)
-        mesh = panel.pcolormesh(*extent, sure.T, cmap=SHADES, vmin=0, vmax=top, rasterized=True)
+        shown_value = np.ma.masked_less(value, 0)
+        mesh = panel.pcolormesh(*extent, shown_value.T, cmap=SHADES, vmin=0, vmax=top, rasterized=True)
         draw_scene(panel, scene, shown)
         _draw_boxes(panel, [*placement.named_places, *over], shown)
         panel.plot(
@@ -334,7 +326,6 @@ def placement_views(
     handles = [
         Line2D([], [], color=INK, marker="o", markersize=4, linewidth=2.2, label=tr("arm, all joints 0")),
         Patch(facecolor="none", edgecolor=HIGHLIGHT, label=tr("best positions, numbered or named as in the tables")),
-        *([Patch(facecolor=GRID, label=tr("by samples only"))] if provable else []),
     ]
     if scene:
         handles.append(Patch(fill=False, edgecolor=MUTED, hatch="////", label=tr("scene")))
@@ -360,18 +351,14 @@ def _draw_arm(axes: Axes, robot: Robot, frame: model.SectionFrame, origin: Reals
     axes.plot(local[:, 0], local[:, 2], color=INK, linewidth=2.0, marker="o", markersize=3, solid_capstyle="round")
 
 
-def _raster(
-    points: Reals, steps: list[float], percent: model.Singles, proven: Flags
-) -> tuple[list[Reals], Reals, Flags]:
-    """Edges of the raster's columns and rows (m), the largest value in each of its cells (proven ones first; -1: none
-    there), and whether one is proven."""
+def _raster(points: Reals, steps: list[float], percent: model.Singles) -> tuple[list[Reals], Reals]:
+    """Edges of the raster's columns and rows (m), and the largest value in each of its cells (-1: none there)."""
     low = points.min(axis=0)
     index = tuple(np.floor((points - low) / steps + 1e-3).astype(int).T)
     shape = tuple(part.max() + 1 for part in index)
-    value, sure = np.full(shape, -1.0), np.zeros(shape, dtype=bool)
-    np.logical_or.at(sure, index, proven)
-    np.maximum.at(value, index, np.where(proven | ~sure[index], percent, -1.0))
-    return [start + (np.arange(n + 1) - 0.5) * step for start, step, n in zip(low, steps, shape)], value, sure
+    value = np.full(shape, -1.0)
+    np.maximum.at(value, index, percent)
+    return [start + (np.arange(n + 1) - 0.5) * step for start, step, n in zip(low, steps, shape)], value
 
 
 def _draw_boxes(axes: Axes, listed: Sequence[tuple[str, model.PlaceSummary]], shown: list[int]) -> None:
@@ -409,10 +396,6 @@ def capability_context(
         "missing": "",
         "asked_text": _asked_text(capability),
         "capability_pictures": _pictures(robot, results, capability) if len(results.capability) else [],
-        "core_text": _core_text(capability),
-        "collisions_text": tr("Reachability and dexterous workspace ignore collisions.")
-        if capability.core_m3
-        else tr("Reachability ignores collisions."),
         "task_text": _task_text(placement.task, capability),
         "tray_line": placing.line if placing else no_box_text(results.summary),
         "tray_places": placing.rows if placing else [],
@@ -445,7 +428,11 @@ def _placement_context(
         "place_picture": Picture(
             placement_views(robot, capability, placement, results.places, scene, trays),
             tr("Possible positions of the tray centre, from above and from the side, with the best ones"),
-            _places_caption(placement, capability.core_m3 is not None),
+            tr(
+                "{fitting} grid positions pass. A colour marks where the tray's centre passes; it shows the best value "
+                "along the line of sight.",
+                fitting=number(placement.fitting),
+            ),
         )
         if len(results.places)
         else None,
@@ -640,31 +627,6 @@ def _roll_text(capability: model.CapabilitySummary) -> str:
     )
 
 
-def _core_text(capability: model.CapabilitySummary) -> str:
-    core = capability.core_m3
-    if core is None:
-        if capability.asked != "directions":
-            return ""
-        return tr(
-            "The dexterous workspace is bounded only for arms of six revolute joints with a spherical wrist, none of "
-            "them coupled."
-        )
-    if core.upper == 0:
-        return tr(
-            "There is no dexterous workspace: in every part of the workspace some tool direction is proven "
-            "unreachable at all points. Work that needs the tool from every side needs a turntable."
-        )
-    return tr(
-        "The dexterous workspace, where the tool can take every direction of the sphere, is at least {lower} L "
-        "and at most {upper} L; both bounds are proven for all points and directions. By the {directions} "
-        "sampled directions alone it would be {estimate} L.",
-        directions=capability.directions,
-        lower=at_least(1000 * core.lower, "L"),
-        upper=at_most(1000 * core.upper, "L"),
-        estimate=number(1000 * core.estimate, 2),
-    )
-
-
 def _task_text(task: model.TaskSummary, capability: model.CapabilitySummary) -> str:
     box = " × ".join(number(value, 4).rstrip(".") for value in map(_whole, task.box_mm))
     direction = ", ".join(fixed(value, 2).removesuffix(".00") for value in task.tool_direction)
@@ -733,19 +695,3 @@ def _try_text(robot: Robot, task: model.TaskSummary) -> str:
 
 def _whole(value: float) -> float | int:
     return int(value) if value == int(value) else value
-
-
-def _places_caption(placement: model.PlacementSummary, provable: bool) -> str:
-    if not provable:
-        return tr(
-            "{fitting} grid positions pass by samples; proofs exist only for arms of six revolute joints with a "
-            "spherical wrist. A colour marks where the tray's centre passes.",
-            fitting=number(placement.fitting),
-        )
-    return tr(
-        "Of {fitting} grid positions that pass by samples, {proven} are proven for every point and direction. "
-        "A colour marks where the tray's centre passes; grey spots pass by samples only. It shows the best value "
-        "along the line of sight.",
-        fitting=number(placement.fitting),
-        proven=number(placement.fitting_proven),
-    )

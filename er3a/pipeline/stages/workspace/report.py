@@ -5,14 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from markupsafe import Markup
 
 from er3a.collision.scene import Scene
 from er3a.pipeline.messages.dynamics import payload_text
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import bracketed, joined, say, sentence, word
-from er3a.pipeline.messages.workspace import VOID_KINDS, VOID_STATUS, entry_word
+from er3a.pipeline.messages.workspace import VOID_KINDS, entry_word
 from er3a.pipeline.player.player import drawing_head
 from er3a.pipeline.results import Stored, is_computed, read_stage
 from er3a.pipeline.stages.registry import STAGES
@@ -41,9 +40,6 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
         study,
         stored,
         output,
-        side=_side(robot, results),
-        arc_rows=workspace_figures.arc_rows(results.border),
-        method=say(summary.proof.method),
         rule=_rule(summary.enclosed_voids),
         pocket_mm=3000 * summary.pocket_block_m,
         turning=workspace_figures.in_space(robot, results, scene),
@@ -53,7 +49,6 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
         change_rows=_change_rows(summary),
         unexpected=isinstance(summary.verdict.finding, model.VoidUnexpected),
         wide=100 * summary.proof.width,
-        has_drawing=len(results.drawing) > 0,
         **context,
     )
 
@@ -78,44 +73,13 @@ def _context(
             workspace_figures.sections(robot, results),
             tr("Sections across the slide of joint 1: density of the samples, and proven cells")
             if summary.proof.bars
-            else tr("Side sections about axis 1: density of the samples, and proven cells with the exact border"),
-            _section_caption(summary, len(results.drawing) > 0),
-        ),
-        "top": Picture(
-            workspace_figures.top_view(robot, results),
-            tr("The cloud from above with the limits of joint 1"),
-            _top_caption(robot),
+            else tr("Side sections about axis 1: density of the samples, and proven cells"),
+            _section_caption(summary),
         ),
         "slices": Picture(
             workspace_figures.slices(results), tr("Three level slices of the proof"), _slices_caption(summary)
         ),
-        "convergence": Picture(
-            workspace_figures.convergence(results),
-            tr(
-                "Volume of the sampled cells over the number of samples for three cell sizes, with the proven "
-                "bounds and the estimate"
-            ),
-            _curve_caption(summary, results.curve),
-        ),
     }
-
-
-def _side(robot: Robot, results: model.WorkspaceResults) -> Picture | None:
-    """The side view, where the arm has a wrist centre and an exact border."""
-    if not len(results.border):
-        return None
-    exact = tr("The border's arcs are exact (numbered on the left); samples fill them and none lies beyond.")
-    if len(results.drawing):
-        labels = tr(
-            "The manufacturer's labels (green) should meet the orange border: extents touch it, corners lie on it."
-        )
-    else:
-        labels = tr("There is no drawing of this arm's envelope to compare with.")
-    return Picture(
-        workspace_figures.side_view(results, not np.array_equal(robot.tool, np.eye(4))),
-        tr("Side views of wrist centre and flange in the arm's plane, with exact borders"),
-        joined([exact, labels], " "),
-    )
 
 
 def _rule(enclosed: list[model.VoidSummary]) -> str:
@@ -135,7 +99,6 @@ def _void_row(row: int, void: model.VoidSummary) -> list[str]:
     return [
         str(row),
         bracketed(word("workspace.void_kind", VOID_KINDS, void.kind), tr("shoulder") if void.holds_shoulder else ""),
-        word("workspace.void_status", VOID_STATUS, void.status),
         _litres(low, high),
         *(
             ", ".join(fixed(1000 * value, 0) for value in corner)
@@ -163,7 +126,7 @@ def _change_rows(summary: model.WorkspaceSummary) -> list[list[str]]:
     ]
 
 
-def _section_caption(summary: model.WorkspaceSummary, drawn: bool) -> str:
+def _section_caption(summary: model.WorkspaceSummary) -> str:
     texts = [
         tr(
             "Cells are bars along the slide. What is empty on the right is proven unreachable all along it; blank "
@@ -180,13 +143,6 @@ def _section_caption(summary: model.WorkspaceSummary, drawn: bool) -> str:
         texts.append(tr("The largest enclosed void surrounds the shoulder."))
     elif enclosed:
         texts.append(tr("The largest enclosed void is away from the shoulder."))
-    if drawn:
-        texts.append(
-            tr(
-                "Green are the manufacturer's labels of the wrist centre: extents touch its border, corners are single "
-                "configurations."
-            )
-        )
     checked, inside = number(summary.proof.points_checked), summary.proof.points_in_empty_cells
     if inside:
         texts.append(
@@ -201,17 +157,6 @@ def _section_caption(summary: model.WorkspaceSummary, drawn: bool) -> str:
     return joined(texts, " ")
 
 
-def _top_caption(robot: Robot) -> str:
-    if robot.slides[0]:
-        return tr("Joint 1 slides: the view from above shows how far the samples reach along it and beside it.")
-    if workspace_figures.turns_fully(robot):
-        return tr("Density depends only on the distance from axis 1, because joint 1 makes a full turn.")
-    return tr(
-        "In the dead zone behind the robot, between the limits of joint 1, the tool point gets only by leaning "
-        "the arm back or turning the wrist aside, and less far."
-    )
-
-
 def _slices_caption(summary: model.WorkspaceSummary) -> str:
     enclosed = len(summary.enclosed_voids)
     pockets = len(summary.voids) - enclosed
@@ -221,24 +166,3 @@ def _slices_caption(summary: model.WorkspaceSummary) -> str:
         voids=sentence("workspace.voids", count=enclosed) if enclosed else tr("no enclosed void"),
         pockets=sentence("workspace.pockets", count=pockets),
     )
-
-
-def _curve_caption(summary: model.WorkspaceSummary, curve: model.GrowthCurve) -> str:
-    volume = summary.volume_m3
-    finest = curve.touched_m3[curve.cell_mm == curve.cell_mm.min()][-1]
-    if finest > volume.upper:
-        touched = tr(
-            "The volume of the sampled cells depends on cell size and number of samples and overestimates the "
-            "volume: border cells count whole."
-        )
-    else:
-        touched = tr(
-            "The volume of the sampled cells depends on cell size and number of samples and is no estimate of "
-            "the volume."
-        )
-    band = tr(
-        "Use the band: the reached volume lies between {low} and {high} m³.",
-        low=at_least(volume.lower, "m³"),
-        high=at_most(volume.upper, "m³"),
-    )
-    return joined([touched, band], " ")
