@@ -15,31 +15,22 @@ from functools import partial
 from typing import Literal, NamedTuple
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from er3a.by_value import Finding
-from er3a.kinematics.forward import forward
-from er3a.numerics.arrays import Flags, Reals
-from er3a.robots.joint_limits import within
+from er3a.numerics.arrays import Reals
 from er3a.robots.robot import CombinedLimit, Robot
 from er3a.workspace.arcs import FULL_TURN
-from er3a.workspace.cells import in_space
+from er3a.workspace.cells import in_section, in_space
 from er3a.workspace.general_arm import general_arm
-from er3a.workspace.general_proof import prove_general
-from er3a.workspace.proven import SETTLED, TARGET, Cavity, SectionMap, cavities, reach_points
+from er3a.workspace.general_proof import prove_general, unfilled_about
+from er3a.workspace.proven import SETTLED, TARGET, Cavity, SectionMap, cavities
 
-InSection = Callable[[Reals], tuple[Reals, Reals, Reals]]
-InBase = Callable[[Reals], Reals]
-
-SEARCHED, SAMPLES, _RESTARTS = 80, 50_000, 1
+PROBES, SAMPLES = 80, 65_536
 Unit = Literal["deg", "mm"]
 STEPS: dict[Unit, tuple[float, ...]] = {"deg": (15.0, 30.0, 60.0, 90.0, 180.0), "mm": (25.0, 50.0, 100.0, 200.0, 400.0)}
 """By how much a limit is widened until the void vanishes."""
 _SI: dict[Unit, float] = {"deg": np.pi / 180, "mm": 1e-3}  # rad, m
 _GONE, _SHRUNK = 0.98, 0.10
-
-NEAR = 0.05
-"""Part of the points' extent within which a sample must lie for a cell to be searched."""
 
 Side = Literal["lower", "upper"]
 _SIDES: tuple[Side, Side] = ("lower", "upper")
@@ -104,23 +95,24 @@ class Geometry(Finding, code="void_of_geometry"):
 VoidCause = Disappears | SeveralLimits | Geometry
 
 
-def relaxations(
-    robot: Robot, cavity: Cavity, in_section: InSection, in_base: InBase
-) -> tuple[list[Relaxed], Unlimited]:
+def relaxations(robot: Robot, cavity: Cavity) -> tuple[list[Relaxed], Unlimited]:
     """Judge a void's cells with each limit widened, the strongest first; then without any.
 
-    Cells count as reached if a random sample of the widened arm lies in them, or a search brings it to their middle.
-
-    Parameters
-    ----------
-    in_section : takes points (n, 3), m, of the base frame to their radius, azimuth and height about axis 1, or places
-        across and along bars
-    in_base : takes points of the frame about axis 1 to the base frame
+    What the proof fills at the middles of cells counts as reached, so that a void may shrink by more.
     """
-    probes = _spread_probes(cavity)
+    probes, weight = _spread_probes(cavity)
+    _, R, origin = general_arm(robot)
+    middles = probes.cells.reshape(-1, 2, 2).mean(axis=2)
+    ends = in_space(middles[:, :1], probes.arcs, middles[:, 1:], probes.bar) @ R + origin
 
     def ratio_filled(widened: Robot) -> float:
-        return _ratio_searched(robot, widened, probes, (in_section, in_base))
+        arm, R, origin = general_arm(widened)
+        rho, place, z = in_section((ends - origin) @ R.T, arm.bar)
+        low, high = (place if arm.bar > 0 else probes.arcs).T  # bars of a wider slide begin elsewhere
+        arcs = unfilled_about(arm, rho[:, 0], z[:, 0], SAMPLES)
+        left = np.minimum(arcs[..., 1], high[:, None]) - np.maximum(arcs[..., 0], low[:, None])
+        filled = 1 - np.nansum(np.maximum(0, left), axis=1) / (high - low)
+        return float(weight @ filled / weight.sum())
 
     found = [_relaxed(limit, ratio_filled) for limit in _limits(robot)]
     found.sort(key=lambda one: (one.filled < _GONE, np.searchsorted(STEPS[one.unit], one.by), -one.filled, one.joints))
@@ -225,47 +217,14 @@ def _spread_probes(cavity: Cavity) -> tuple[Cavity, Reals]:
     """Arcs all over a void, and how much each stands for: all if they are few, else drawn by how much of what is proven
     empty they hold."""
     weight = cavity.volumes * cavity.empty
-    if len(weight) <= SEARCHED:
+    if len(weight) <= PROBES:
         chosen = np.flatnonzero(weight > 0)
         return cavity.part(chosen, cavity.enclosed), weight[chosen]
     order = np.random.Generator(np.random.Philox(key=len(weight))).permutation(len(weight))
     total = np.cumsum(weight[order])
-    drawn = order[np.searchsorted(total, (np.arange(SEARCHED) + 0.5) * (total[-1] / SEARCHED))]
+    drawn = order[np.searchsorted(total, (np.arange(PROBES) + 0.5) * (total[-1] / PROBES))]
     chosen, times = np.unique(drawn, return_counts=True)
     return cavity.part(chosen, cavity.enclosed), times.astype(float)
-
-
-def _ratio_searched(
-    robot: Robot, widened: Robot, spread: tuple[Cavity, Reals], section: tuple[InSection, InBase]
-) -> float:
-    """Ratio by weight of the arcs that a widened arm reaches, by samples, then by search from the nearest of these."""
-    (in_section, in_base), (probes, weight) = section, spread
-    random = np.random.Generator(np.random.Philox(key=len(probes.cells)))
-    q = random.uniform(widened.lower, widened.upper, (SAMPLES, robot.joints))
-    # The unchanged arm does not reach this place: at least one limit must be exceeded.
-    q = q[within(widened, q) & ~within(robot, q)]
-    if not len(q) or not len(probes.cells):
-        return 0.0
-    points = forward(widened, q)[:, :3, 3]
-    hit = np.zeros(len(probes.cells), dtype=bool)
-    rho, azimuth, z = in_section(points)
-    for n in range(len(hit)):
-        hit[n] = _in_arc(probes, n, (rho, azimuth, z)).any()
-    middles = probes.cells.reshape(-1, 2, 2).mean(axis=2)
-    wanted = in_base(in_space(middles[:, 0], probes.arcs.mean(axis=1), middles[:, 1], probes.bar))
-    away, nearest = cKDTree(points).query(wanted)
-    left = np.flatnonzero(~hit & (away < NEAR * np.linalg.norm(np.ptp(points, axis=0))))
-    if left.size:
-        found = reach_points(widened, wanted[left], q[nearest[left]], _RESTARTS)
-        hit[left] = within(widened, np.nan_to_num(found)) & np.isfinite(found[:, 0])
-    return float(weight[hit].sum() / weight.sum())
-
-
-def _in_arc(probes: Cavity, n: int, places: tuple[Reals, Reals, Reals]) -> Flags:
-    """Which places (radius, azimuth and height, or x, place along and z of bars) lie in an arc."""
-    (rho, azimuth, z), (a, b, c, d), (low, high) = places, probes.cells[n], probes.arcs[n]
-    azimuth = azimuth if probes.bar > 0 else azimuth % (2 * np.pi)
-    return np.asarray((rho > a) & (rho < b) & (z > c) & (z < d) & (azimuth >= low) & (azimuth <= high))
 
 
 CELLS = 6000  # of the proof of each changed arm

@@ -486,9 +486,44 @@ def fill_cells(
 
 SAMPLES, TRIES = 400_000, 24
 FINEST, MIN_CELL = 1000, 1e-4
+POINT = 1e-5
+"""Edge (m) of the cell that represents a point."""
 _BUCKETS, _MAX_POSTURES = 96, 300_000
 _PORTION = 1 << 16
 _ACROSS = 2.5  # rings along each set after joint 1, for each cell across
+
+
+def _sampled(arm: GeneralArm, samples: int, seed: int) -> tuple[Postures, Memory]:
+    """Random joint values of an arm, to begin from."""
+    known, room = postures(arm, _BUCKETS, _MAX_POSTURES), memory(arm)
+    random = np.random.Generator(np.random.Philox(key=seed))
+    for start in range(0, samples, _PORTION):
+        sample(arm, random.random((min(_PORTION, samples - start), len(arm.v_lower))), known, room)
+    return known, room
+
+
+def unfilled_about(arm: GeneralArm, rho: Reals, z: Reals, samples: int, seed: int = 0) -> Reals:
+    """What is not proven filled about points of the section.
+
+    Parameters
+    ----------
+    rho, z : (n,), m, radius and height in the frame of :func:`er3a.workspace.general_arm.general_arm`
+    samples : how many random joint values to begin from
+
+    Returns
+    -------
+    arcs : (n, MAX_ARCS, 2), rad, unused rows NaN
+    """
+    n, half = len(rho), POINT / 2
+    rho = rho if arm.bar > 0 else np.maximum(rho, POINT)
+    cells = np.stack([rho - half, rho + half, z - half, z + half], axis=1)
+    unfilled, counts = np.full((n, MAX_ARCS, 2), np.nan), np.ones(n, dtype=np.int64)
+    unfilled[:, 0] = 0.0, TURN
+    fill_cells(
+        arm, cells, unfilled, counts, np.full((n, len(arm.v_lower)), np.nan), *_sampled(arm, samples, seed), TRIES
+    )
+    unfilled[np.arange(MAX_ARCS) >= counts[:, None]] = np.nan
+    return unfilled
 
 
 def prove_general(arm: GeneralArm, target: float, most_cells: int, seed: int) -> Proof:
@@ -500,10 +535,7 @@ def prove_general(arm: GeneralArm, target: float, most_cells: int, seed: int) ->
     most_cells : how many cells may be examined; the first grid is always finished
     """
     outer = outer_rings(arm, min(FINEST, int(_ACROSS * np.sqrt(most_cells))))
-    known, room = postures(arm, _BUCKETS, _MAX_POSTURES), memory(arm)
-    random = np.random.Generator(np.random.Philox(key=seed))
-    for start in range(0, SAMPLES, _PORTION):
-        sample(arm, random.random((min(_PORTION, SAMPLES - start), len(arm.v_lower))), known, room)
+    known, room = _sampled(arm, SAMPLES, seed)
 
     def judge(cells: Reals, level: int, parents: Proof | None) -> Proof:
         n = len(cells)

@@ -27,14 +27,13 @@ from numpy.typing import NDArray
 from er3a.geometry.vectors import TURN
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import forward
-from er3a.kinematics.numerical import solve
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.robot import Robot
 from er3a.sampling.grid import tool_bound
 from er3a.workspace.arcs import MAX_ARCS
 from er3a.workspace.cells import Proof, in_section, in_space, ring_volumes
 from er3a.workspace.general_arm import general_arm, joints_of
-from er3a.workspace.general_proof import prove_general
+from er3a.workspace.general_proof import SAMPLES, prove_general, unfilled_about
 
 OUTSIDE = -1
 FILLED, EMPTY, UNDECIDED = 0, 1, 2
@@ -178,19 +177,6 @@ def wilson(hits: int, points: int) -> tuple[float, float]:
     middle = (share + z2 / (2 * points)) / (1 + z2 / points)
     half = _NORMAL_95 / (1 + z2 / points) * np.sqrt(share * (1 - share) / points + z2 / (4 * points**2))
     return (max(0.0, middle - half) if hits else 0.0), (min(1.0, middle + half) if hits < points else 1.0)
-
-
-POSITION_ONLY = np.array([1, 1, 1, 0, 0, 0])
-_RESTARTS, _TOLERANCE = 10, 1e-9
-
-
-def reach_points(robot: Robot, points: Reals, starts: Reals, restarts: int = _RESTARTS) -> Reals:
-    """Joint vectors (n, 6), rad, within the limits, that bring the tool point to ``points`` (n, 3), m; NaN where the
-    iteration finds none from ``starts`` (n, 6) and from random starts."""
-    T = np.tile(np.eye(4), (len(points), 1, 1))
-    T[:, :3, 3] = points
-    found = solve(robot, T, starts, mask=POSITION_ONLY, restarts=restarts, position_tolerance=_TOLERANCE)
-    return np.where(found.solved[:, None], found.q, np.nan)
 
 
 def lies_in_cell(robot: Robot, q: Reals, proof: Proof, R: Reals, origin: Reals) -> Flags:
@@ -394,10 +380,8 @@ def prove_robot(robot: Robot, most_cells: int, points: int, seed: int) -> Proven
     q = np.where(lies_in_cell(robot, q, proof, R, origin)[:, None], q, np.nan)
 
     def search(local: Reals) -> Flags:
-        rho, _, z = in_section(local, arm.bar)
-        cells = section.cell_of(rho, z)
-        starts = np.where(np.isfinite(q[cells]), q[cells], middle)
-        return np.isfinite(reach_points(robot, local @ R + origin, starts)[:, 0])
+        rho, azimuth, z = in_section(local, arm.bar)
+        return ~holds_azimuth(unfilled_about(arm, rho, z, SAMPLES, seed), azimuth % TURN)
 
     estimate = estimate_volume(search, proof, points, seed)
     return Proven(proof, section, R, origin, q, estimate)

@@ -328,7 +328,7 @@ def proven_voids(robot: Robot, proven: Proven, hull: Hull, shoulder: Reals) -> l
 def _void(
     kind: VoidKind, robot: Robot, proven: Proven, cavity: Cavity, shoulder: Reals, surface: tuple[Blocks, Flags]
 ) -> Void:
-    single, unlimited = relaxations(robot, cavity, proven.in_section, proven.in_base)
+    single, unlimited = relaxations(robot, cavity)
     low, high = cavity.box()
     corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
     corners = proven.in_base(corners)
