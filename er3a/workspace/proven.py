@@ -1,21 +1,13 @@
-"""Results of the proof for a robot: its cells, a joint vector that reaches each, and an estimate of the volume.
+"""Results of the proof for a robot: its cells, a joint vector that reaches each, and voids.
 
-The estimate of the reached volume: the proven volume, plus the reached share of uniform points in undecided cells.
-
-References
-----------
-.. [1] E. B. Wilson, "Probable inference, the law of succession, and statistical inference", JASA 22, 1927.
-
-Voids of a proof: unreachable regions, connected over cells and azimuths.
-
-The arcs that are not proven filled are nodes; two of them touch if their cells share a border and their azimuths
-overlap, or across azimuth 0. Proven filled cells are the only walls: a component of nodes that does not reach the outer
-border is enclosed for certain. Its volume lies between its proven empty part and all of it.
+Voids are unreachable regions, connected over cells and azimuths. The arcs that are not proven filled are nodes; two of
+them touch if their cells share a border and their azimuths overlap, or across azimuth 0. Proven filled cells are the
+only walls: a component of nodes that does not reach the outer border is enclosed for certain. Its volume lies between
+its proven empty part and all of it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -33,7 +25,7 @@ from er3a.sampling.grid import tool_bound
 from er3a.workspace.arcs import MAX_ARCS
 from er3a.workspace.cells import Proof, in_section, in_space, ring_volumes
 from er3a.workspace.general_arm import general_arm, joints_of
-from er3a.workspace.general_proof import SAMPLES, prove_general, unfilled_about
+from er3a.workspace.general_proof import prove_general
 
 OUTSIDE = -1
 FILLED, EMPTY, UNDECIDED = 0, 1, 2
@@ -98,85 +90,6 @@ class SectionMap:
 def holds_azimuth(arcs: Reals, azimuth: Reals) -> Flags:
     """Whether azimuths (n,) in rad lie in sets of arcs (n, MAX_ARCS, 2)."""
     return np.asarray(((arcs[..., 0] <= azimuth[:, None]) & (azimuth[:, None] <= arcs[..., 1])).any(axis=1))
-
-
-FEW = 200
-"""Points at least, where that many are asked for."""
-_NORMAL_95 = 1.959963984540054
-
-
-@dataclass(frozen=True)
-class VolumeEstimate:
-    """``points`` were drawn where the proof leaves open what is reached, ``reached`` of them are reached; m^3.
-
-    A point that the search does not reach may be reached all the same: it counts half, and whole for ``high``. ``low``
-    is the lower end of Wilson's 95 % interval. All lie within the proven bounds.
-    """
-
-    points: int
-    reached: int
-    value: float
-    low: float
-    high: float
-
-
-def estimate_volume(
-    search: Callable[[Reals], Flags],
-    proof: Proof,
-    points: int,
-    seed: int,
-) -> VolumeEstimate:
-    """Estimate the reached volume: what is proven, and of what the proof leaves open the share that points estimate.
-
-    Parameters
-    ----------
-    search : of points (n, 3) about axis 1 (m) says which are reached for certain
-    points : how many all cells would get; those that are left open get as many to their volume, but no fewer than
-        ``FEW``
-    """
-    lower, upper = proof.bounds
-    left = upper - lower
-    if not left > 0:
-        return VolumeEstimate(0, 0, lower, lower, upper)
-    count = min(points, max(FEW, int(np.ceil(points * left / proof.volumes.sum()))))
-    random = np.random.Generator(np.random.Philox(key=seed))
-    rho, azimuth, z = _open_points(proof, random.random((count, 4)))
-    reached = int(search(in_space(rho, azimuth, z, proof.bar)).sum())
-    value = lower + left * (reached + count) / 2 / count
-    return VolumeEstimate(count, reached, value, lower + left * wilson(reached, count)[0], upper)
-
-
-def _open_points(proof: Proof, unit: Reals) -> tuple[Reals, Reals, Reals]:
-    """Radius (m), azimuth (rad) and height (m) of points, uniform in what a proof leaves open, from uniform numbers
-    (n, 4)."""
-    weights = np.cumsum(proof.volumes * np.maximum(proof.unfilled_ratio - proof.empty_ratio, 0.0))
-    cell = np.minimum(np.searchsorted(weights, unit[:, 0] * weights[-1], side="right"), len(weights) - 1)
-    inner, outer, low, high = proof.cells[cell].T
-    along = inner + (outer - inner) * unit[:, 1]
-    rho = along if proof.bar > 0 else np.sqrt(inner**2 + (outer**2 - inner**2) * unit[:, 1])
-    # the azimuth below which that share of the open arcs lies: their length grows evenly between their ends
-    arcs = np.stack([proof.unfilled[cell], proof.empty[cell]])
-    ends = np.sort(np.nan_to_num(np.concatenate(arcs, axis=1).reshape(len(cell), -1), nan=TURN), axis=1)
-    start, stop = np.nan_to_num(arcs[..., 0]), np.nan_to_num(arcs[..., 1])
-    below = np.empty_like(ends)
-    for k in range(ends.shape[1]):
-        covered = (np.clip(ends[:, k, None], start, stop) - start).sum(axis=2)
-        below[:, k] = covered[0] - covered[1]
-    wanted = below[:, -1] * unit[:, 2]
-    after = np.clip((below <= wanted[:, None]).sum(axis=1), 1, ends.shape[1] - 1)
-    row = np.arange(len(cell))
-    before, length = below[row, after - 1], below[row, after] - below[row, after - 1]
-    share = np.divide(wanted - before, length, out=np.zeros_like(wanted), where=length > 0)
-    azimuth = ends[row, after - 1] + share * (ends[row, after] - ends[row, after - 1])
-    return rho, azimuth, low + (high - low) * unit[:, 3]
-
-
-def wilson(hits: int, points: int) -> tuple[float, float]:
-    """95 % interval of a share from ``hits`` out of ``points`` [1]_."""
-    share, z2 = hits / points, _NORMAL_95**2
-    middle = (share + z2 / (2 * points)) / (1 + z2 / points)
-    half = _NORMAL_95 / (1 + z2 / points) * np.sqrt(share * (1 - share) / points + z2 / (4 * points**2))
-    return (max(0.0, middle - half) if hits else 0.0), (min(1.0, middle + half) if hits < points else 1.0)
 
 
 def lies_in_cell(robot: Robot, q: Reals, proof: Proof, R: Reals, origin: Reals) -> Flags:
@@ -318,7 +231,6 @@ class Proven:
     proof, section : its cells, and their map
     R, origin : frame about axis 1, see :func:`er3a.workspace.general_arm.general_arm`
     witness : (cells, n), rad or m, a joint vector that reaches into each cell, NaN where none is known
-    estimate : of the volume
     """
 
     proof: Proof
@@ -326,7 +238,6 @@ class Proven:
     R: Reals
     origin: Reals
     witness: Reals
-    estimate: VolumeEstimate
 
     @property
     def settles(self) -> bool:
@@ -362,32 +273,25 @@ class Proven:
         return [states[n] for n in chosen]
 
 
-def prove_robot(robot: Robot, most_cells: int, points: int, seed: int) -> Proven:
-    """Run the proof and the estimate that rests on it; bounds by lengths alone where the arm's build gives no more.
+def prove_robot(robot: Robot, most_cells: int, seed: int) -> Proven:
+    """Run the proof; bounds by lengths alone where the arm's build gives no more.
 
     Parameters
     ----------
     most_cells : the budget, of which each cell stands for ``CELLS``
-    points : of the estimate of the volume
     """
     arm, R, origin = general_arm(robot)
     if not arm.carries_around:
-        return _bounded_by_lengths(robot, points, seed)
+        return _bounded_by_lengths(robot)
     proof = prove_general(arm, TARGET, CELLS * most_cells, seed)
     section, middle = SectionMap(proof), (robot.lower + robot.upper) / 2
     q = np.tile(middle, (len(proof.cells), 1))
     q[:, 1 : proof.witness.shape[1]] = joints_of(robot, proof.witness)[:, 1:]
     q = np.where(lies_in_cell(robot, q, proof, R, origin)[:, None], q, np.nan)
-
-    def search(local: Reals) -> Flags:
-        rho, azimuth, z = in_section(local, arm.bar)
-        return ~holds_azimuth(unfilled_about(arm, rho, z, SAMPLES, seed), azimuth % TURN)
-
-    estimate = estimate_volume(search, proof, points, seed)
-    return Proven(proof, section, R, origin, q, estimate)
+    return Proven(proof, section, R, origin, q)
 
 
-def _bounded_by_lengths(robot: Robot, points: int, seed: int) -> Proven:
+def _bounded_by_lengths(robot: Robot) -> Proven:
     """One ring that the tool point can't leave, of arms whose joint 1 goes with others or is alone."""
     bound = tool_bound(robot)
     reach, radius = (BEYOND_ROUNDING * max(length, MIN_BOUND_M) for length in (bound.reach, bound.radius))
@@ -397,5 +301,4 @@ def _bounded_by_lengths(robot: Robot, points: int, seed: int) -> Proven:
     witness = np.full((1, robot.joints), np.nan)
     proof = Proof(np.array([[0.0, reach, low, high]]), unfilled, empty, np.zeros(1, dtype=np.int64), witness)
     R = constant_links(robot)[0, :3, :3].T
-    estimate = estimate_volume(lambda local: np.zeros(len(local), dtype=bool), proof, points, seed)
-    return Proven(proof, SectionMap(proof), R, bound.axis_point, witness, estimate)
+    return Proven(proof, SectionMap(proof), R, bound.axis_point, witness)

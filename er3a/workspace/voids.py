@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import combinations
 from typing import Literal
 
 import numpy as np
 import scipy
 
-from er3a.geometry.open3d_loader import load_open3d
 from er3a.geometry.vectors import TURN
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import kernel
@@ -117,39 +115,6 @@ def _wraps(labels: Integers) -> list[tuple[int, int]]:
     return [tuple(pair) for pair in np.unique(pairs, axis=0)[::-1].tolist()]
 
 
-def without_bare_contacts(mask: Flags, wraps: bool) -> Flags:
-    """A set of blocks with more added until no two of it meet along an edge alone, where its surface were no manifold.
-
-    Parameters
-    ----------
-    wraps : whether the last block along the third axis is beside the first
-    """
-    filled = mask.copy()
-    while True:
-        ends = [filled[:, :, -1:], filled, filled[:, :, :1]] if wraps else [filled]
-        around = np.pad(np.concatenate(ends, axis=2), ((1, 1), (1, 1), (0, 0) if wraps else (1, 1)))
-        added = np.zeros_like(around)
-        for first, second in combinations(range(3), 2):
-            near = [_beside(around.shape, first, second, i, j) for i, j in ((0, 0), (1, 1), (1, 0), (0, 1))]
-            one, other, third, fourth = (around[part] for part in near)
-            added[near[2]] |= one & other & ~third & ~fourth
-            added[near[0]] |= third & fourth & ~one & ~other
-        more = added[1:-1, 1:-1, 1:-1]
-        if wraps:
-            more[:, :, -1] |= added[1:-1, 1:-1, 0]
-            more[:, :, 0] |= added[1:-1, 1:-1, -1]
-        if not (more & ~filled).any():
-            return filled
-        filled |= more
-
-
-def _beside(shape: tuple[int, ...], first: int, second: int, i: int, j: int) -> tuple[slice, ...]:
-    """All blocks but the last along two axes, moved by i and j along them."""
-    part = [slice(None)] * 3
-    part[first], part[second] = slice(i, shape[first] - 1 + i), slice(j, shape[second] - 1 + j)
-    return tuple(part)
-
-
 def mesh(blocks: Blocks, mask: Flags) -> tuple[Reals, Integers]:
     """Closed surface of a set of blocks, triangles counter-clockwise as seen from outside.
 
@@ -185,16 +150,6 @@ def mesh(blocks: Blocks, mask: Flags) -> tuple[Reals, Integers]:
     return in_space(rho, azimuth, z, blocks.bar), triangles.reshape(-1, 3)
 
 
-def closed_volume(vertices: Reals, triangles: Integers) -> float | None:
-    """Volume (m^3) within a surface by Open3D; None if it is not watertight: an edge without two faces, a face through
-    another one."""
-    geometry, utility = (getattr(load_open3d(), module) for module in ("geometry", "utility"))
-    surface = geometry.TriangleMesh(
-        utility.Vector3dVector(vertices), utility.Vector3iVector(triangles.astype(np.int32))
-    )
-    return float(surface.get_volume()) if surface.is_watertight() else None
-
-
 VoidKind = Literal["enclosed", "open"]
 
 _FLAT = 1e-9
@@ -224,15 +179,10 @@ def convex_hull(points: Reals) -> Hull:
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     if len(points) < 4 or spread[2] <= _FLAT * spread[0]:
         return Hull(points, of, np.empty((0, 3), dtype=np.int64), 0.0, 0.0)
-    geometry, utility = (getattr(load_open3d(), module) for module in ("geometry", "utility"))
-    cloud = geometry.PointCloud(utility.Vector3dVector(points))
-    mesh, indices = cloud.compute_convex_hull()
-    triangles = np.asarray(indices, dtype=np.int64)[np.asarray(mesh.triangles)]
-    kept, triangles = np.unique(triangles, return_inverse=True)
-    vertices = points[kept]
-    triangles = _ordered(vertices, triangles.reshape(-1, 3))
-    mesh = geometry.TriangleMesh(utility.Vector3dVector(vertices), utility.Vector3iVector(triangles))
-    return Hull(vertices, of[kept], triangles, float(mesh.get_volume()), float(mesh.get_surface_area()))
+    found = scipy.spatial.ConvexHull(points)
+    kept = np.sort(found.vertices)
+    triangles = _ordered(points[kept], np.searchsorted(kept, found.simplices))
+    return Hull(points[kept], of[kept], triangles, float(found.volume), float(found.area))
 
 
 def _ordered(vertices: Reals, triangles: Integers) -> Integers:
@@ -292,7 +242,6 @@ class Void:
     relaxed : what of it is reached with each limit widened
     holds_shoulder : whether it holds the point of axis 1 at the height of joint 2
     vertices, triangles : (V, 3), m, and (F, 3), its surface on blocks
-    mesh_m3 : volume within that surface; None if it is not watertight
     """
 
     kind: VoidKind
@@ -306,7 +255,6 @@ class Void:
     holds_shoulder: bool
     vertices: Reals
     triangles: Integers
-    mesh_m3: float | None = None
 
 
 def proven_voids(robot: Robot, proven: Proven, hull: Hull, shoulder: Reals) -> list[Void]:
@@ -336,7 +284,7 @@ def _void(
     near = (cavity.cells[:, [0, 2]] <= [rho + size, z + size]).all(axis=1)
     near &= (cavity.cells[:, [1, 3]] >= [rho - size, z - size]).all(axis=1)
     blocks, mask = surface
-    vertices, triangles = mesh(blocks, without_bare_contacts(mask, blocks.bar == 0))
+    vertices, triangles = mesh(blocks, mask)
     vertices = proven.in_base(vertices)
     return Void(
         kind=kind,
@@ -350,7 +298,6 @@ def _void(
         holds_shoulder=bool(near.any()),
         vertices=vertices,
         triangles=triangles,
-        mesh_m3=closed_volume(vertices, triangles),
     )
 
 

@@ -25,7 +25,6 @@ from er3a.workspace.causes import (
 KEY_FIGURES = {
     "greatest_reach": N_("greatest reach from axis 1"),
     "enclosed_voids_lower": N_("enclosed voids, at least"),
-    "volume": N_("reached volume"),
     "volume_lower": N_("reached volume, at least"),
     "volume_upper": N_("reached volume, at most"),
     "hull_volume": N_("convex hull of the samples: holds voids and dents, misses the rim"),

@@ -297,7 +297,6 @@ def _draw_volume(axes: Axes, points: list[Point]) -> None:
     low, high = ([getattr(volume, bound) for volume in volumes] for bound in ("lower", "upper"))
     axes.fill_between(x, low, high, color=MODEL, alpha=0.25, linewidth=0, label=tr("proven bounds"))
     axes.vlines(x, low, high, color=MODEL, linewidth=1)
-    axes.plot(x, [volume.estimate for volume in volumes], ".-", color=MODEL, linewidth=0.8, label=tr("estimate"))
     axes.set_ylabel(tr("reached volume (m³)"))
     axes.legend(loc="best")
 

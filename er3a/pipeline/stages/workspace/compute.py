@@ -102,7 +102,7 @@ def compute(study: Study, name: str, parts: Sequence[Path] | None = None) -> mod
     grid, hull = samples.grid, samples.hull
     shoulder = shoulder_of(robot, grid)
     settings, motion = study.section(WorkspaceSettings), study.section(TrajectorySettings)
-    proven = prove_robot(robot, settings.proof_cells, settings.volume_points, study.seed)
+    proven = prove_robot(robot, settings.proof_cells, study.seed)
     voids = proven_voids(robot, proven, hull, shoulder)
     scene = study.scene(name, "capability")
     assumed = shapes_assumed(robot, study.assumed_margin(name), {})
@@ -157,8 +157,7 @@ def _summary(
         tried = single_changes(robot, judged.finding.cause, study.seed)
         judged = replace(judged, finding=replace(judged.finding, single_changes=tried))
     examined = not isinstance(tool.capability, model.CapabilityMissing)
-    guess = proven.estimate
-    volume = model.Volume(lower, upper, guess.value, (guess.low, guess.high))
+    volume = model.Bounds(lower, upper)
     reach = search_reach(robot, grid, samples.q_kept)
     return model.WorkspaceSummary(
         verdict=judged.without(tool.unexamined).resting_on(assumed if examined else None),
@@ -166,7 +165,6 @@ def _summary(
         samples=settings.samples,
         sampling=settings.sampling,
         volume_m3=volume,
-        volume_points=guess.points,
         proof=model.ProofSummary(
             len(proven.proof.cells),
             proven.proof.width,
@@ -242,14 +240,12 @@ def _bars(proven: Proven) -> model.Bars | None:
 
 
 def _figures(
-    reach: ReachExtremes, voids: Sequence[Void], volume: model.Volume, hull: Hull, samples: int
+    reach: ReachExtremes, voids: Sequence[Void], volume: model.Bounds, hull: Hull, samples: int
 ) -> tuple[Figure, ...]:
-    low, high = volume.ci95
     enclosed = [void.lower for void in voids if void.kind == "enclosed"]
     return (
         Figure("greatest_reach", reach.furthest_from_axis * 1000, "mm"),
         Figure("enclosed_voids_lower", 1000 * sum(enclosed), "L"),
-        Figure("volume", volume.estimate, "m³", max(volume.estimate - low, high - volume.estimate)),
         Figure("volume_lower", volume.lower, "m³"),
         Figure("volume_upper", volume.upper, "m³"),
         Figure("hull_volume", hull.volume, "m³"),

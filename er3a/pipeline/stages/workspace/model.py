@@ -187,16 +187,6 @@ class Bounds:
 
 
 @dataclass(frozen=True)
-class Volume:
-    """The reached volume, m^3: proven bounds, estimate with its 95 % interval."""
-
-    lower: float
-    upper: float
-    estimate: float
-    ci95: tuple[float, float]
-
-
-@dataclass(frozen=True)
 class SectionFrame:
     """Frame about axis 1 in the base frame: x, y, z as rows, and origin."""
 
@@ -260,7 +250,7 @@ class AxisSummary:
 
 @dataclass(frozen=True)
 class VoidSummary:
-    """A void inside the hull; see :class:`er3a.workspace.voids.Void`. ``mesh_m3``: volume within its closed mesh."""
+    """A void inside the hull; see :class:`er3a.workspace.voids.Void`."""
 
     kind: VoidKind
     volume_m3: Bounds
@@ -270,7 +260,6 @@ class VoidSummary:
     cause: VoidCause
     relaxed: tuple[Relaxed | Unlimited, ...]
     holds_shoulder: bool
-    mesh_m3: float | None
 
 
 @dataclass(frozen=True)
@@ -484,8 +473,7 @@ class WorkspaceSummary(Summary):
     verdict: Verdict[WorkspaceFinding]
     samples: int
     sampling: Sampling
-    volume_m3: Volume
-    volume_points: int
+    volume_m3: Bounds
     proof: ProofSummary
     hull: HullSummary
     reach_m: ReachExtremes

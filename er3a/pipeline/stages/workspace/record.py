@@ -96,10 +96,9 @@ def _note(summary: model.WorkspaceSummary) -> str:
         "near-singular. `/workspace/cloud/near` is the rest",
     ]
     if summary.voids:
-        lines += ["", "| void | volume (L) | of its mesh (L) | centre x, y, z (mm) |", "|---|---|---|---|"]
+        lines += ["", "| void | volume (L) | centre x, y, z (mm) |", "|---|---|---|"]
     for number, void in enumerate(summary.voids[:5], start=1):
         centre = ", ".join(fixed(1000 * value, 0) for value in void.centroid_m)
         low, high = 1000 * void.volume_m3.lower, 1000 * void.volume_m3.upper
-        mesh = "not closed" if void.mesh_m3 is None else f"{1000 * void.mesh_m3:.4g}"
-        lines.append(f"| {void.kind}_{number} | {at_least(low, 'L')} to {at_most(high, 'L')} | {mesh} | {centre} |")
+        lines.append(f"| {void.kind}_{number} | {at_least(low, 'L')} to {at_most(high, 'L')} | {centre} |")
     return "\n".join(lines)
