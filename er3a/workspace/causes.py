@@ -197,13 +197,6 @@ def cause_of(single: list[Relaxed], unlimited: Unlimited) -> VoidCause:
     return Geometry(1 - unlimited.filled, most)
 
 
-def joints_after(cause: VoidCause) -> set[int]:
-    """The joints whose limits a cause names."""
-    if isinstance(cause, Disappears):
-        return {joint for limit in cause.limits for joint in limit.joints}
-    return set() if cause.most is None else set(cause.most.joints)
-
-
 def _widened(robot: Robot, joint: int, side: Side, by: float) -> Robot:
     lower, upper = robot.lower.copy(), robot.upper.copy()
     if side == "upper":

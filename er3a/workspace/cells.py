@@ -19,7 +19,7 @@ from er3a.numerics.arrays import Integers, Reals
 _OPEN = 1e-9
 MAX_LEVEL = 7
 """Cells are not split further than this: a set without volume would never be decided."""
-_ARRAYS = "cells", "unfilled", "empty", "level", "witness"
+_ARRAYS = "cells", "unfilled", "empty", "level"
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +32,6 @@ class Proof:
     unfilled, empty : (n, MAX_ARCS, 2), rad in [0, 2 pi]: arcs of azimuth that are not proven filled, and those of them
         that are proven empty; unused rows are NaN
     level : (n,), how often the cell was split off
-    witness : (n, m), joint values that reach the cell's middle, NaN where none are known
     bar : m, length of the cells where they are bars along a first prismatic joint; 0 for rings. Then rho is the place
         across the bars beside z, and azimuths are places along them, their length being a turn
     """
@@ -41,7 +40,6 @@ class Proof:
     unfilled: Reals
     empty: Reals
     level: Integers
-    witness: Reals
     bar: float = 0.0
 
     def rows(self, chosen: NDArray[Any]) -> Proof:

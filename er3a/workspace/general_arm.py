@@ -77,15 +77,6 @@ def coupled(robot: Robot) -> bool:
     return robot.coupling is not None or bool(robot.combined)
 
 
-def joints_of(robot: Robot, v: Reals) -> Reals:
-    """The manufacturer's joint values (N, m), rad or m, for values (N, m) of the arm that a robot makes; of a joint 1
-    that slides, by another scale."""
-    if coupled(robot):
-        return v
-    m = v.shape[1]
-    return np.asarray(robot.direction[:m] * (v - joint_starts(robot)[:m]))
-
-
 def general_arm(robot: Robot) -> tuple[GeneralArm, Reals, Reals]:
     """The chain of a robot, and the frame about axis 1: x, y, z in the base frame as rows (3, 3), and origin (3,).
 

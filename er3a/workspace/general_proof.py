@@ -404,14 +404,11 @@ def _column(arm: GeneralArm, columns: Reals, j: int) -> Vector:
 
 
 @inner_kernel
-def _try(
-    arm: GeneralArm, cell: Cell, hold: float, known: Postures, memory: Memory, arcs: Reals, count: int, witness: Reals
-) -> int:
+def _try(arm: GeneralArm, cell: Cell, hold: float, known: Postures, memory: Memory, arcs: Reals, count: int) -> int:
     """Fill a ring from ``memory.v``; returns the count of what is left open."""
     rho, z = 0.5 * (cell[0] + cell[1]), 0.5 * (cell[2] + cell[3])
     beside_axis = arm.bar == 0.0 and len(arm.combined) == 0 and cell[0] < cell[1] - cell[0]
     if beside_axis and _covers_axis(arm, cell, memory):
-        copy_values(memory.v, witness)
         keep(arm, known, memory.v, rho, z, 0.0)
         return 0
     if not _approach(arm, rho, z, 0.05 * min(cell[1] - cell[0], cell[3] - cell[2]), hold, memory):
@@ -419,8 +416,6 @@ def _try(
     _values(arm, memory.v, memory.theta)
     x, y, _ = point_of(arm, memory.theta, memory.radii)
     azimuth = _azimuth(arm, x, y)
-    if np.isnan(witness[0]):
-        copy_values(memory.v, witness)
     if not arm.full_turn and not meets(arcs, count, arm.lower[0] + azimuth, arm.upper[0] + azimuth):
         return count
     for scale in (1.25, 1.7, 2.5):
@@ -446,7 +441,6 @@ def fill_cells(
     cells: Reals,
     unfilled: Reals,
     counts: Integers,
-    witness: Reals,
     known: Postures,
     memory: Memory,
     tries: int,
@@ -457,7 +451,6 @@ def fill_cells(
     ----------
     cells : (N, 4), m
     unfilled, counts : (N, MAX_ARCS, 2), rad, and (N,); changed
-    witness : (N, m), joint values that reach the middle of the cell (joint 1 at theta 0), NaN before
     known : joint values to begin from; those that fill a ring are added
     tries : how many of them are tried for each ring
     """
@@ -479,7 +472,7 @@ def fill_cells(
                             tried += 1
                             copy_values(known.v[at], memory.v)
                             hold = 0.0 if arm.full_turn or tried % 2 == 0 else 1e3
-                            counts[n] = _try(arm, cell, hold, known, memory, unfilled[n], counts[n], witness[n])
+                            counts[n] = _try(arm, cell, hold, known, memory, unfilled[n], counts[n])
                         at = known.following[at]
             ring += 1
 
@@ -519,9 +512,7 @@ def unfilled_about(arm: GeneralArm, rho: Reals, z: Reals, samples: int, seed: in
     cells = np.stack([rho - half, rho + half, z - half, z + half], axis=1)
     unfilled, counts = np.full((n, MAX_ARCS, 2), np.nan), np.ones(n, dtype=np.int64)
     unfilled[:, 0] = 0.0, TURN
-    fill_cells(
-        arm, cells, unfilled, counts, np.full((n, len(arm.v_lower)), np.nan), *_sampled(arm, samples, seed), TRIES
-    )
+    fill_cells(arm, cells, unfilled, counts, *_sampled(arm, samples, seed), TRIES)
     unfilled[np.arange(MAX_ARCS) >= counts[:, None]] = np.nan
     return unfilled
 
@@ -541,7 +532,6 @@ def prove_general(arm: GeneralArm, target: float, most_cells: int, seed: int) ->
         n = len(cells)
         unfilled, empty = np.full((2, n, MAX_ARCS, 2), np.nan)
         unfilled[:, 0] = empty[:, 0] = 0.0, TURN
-        witness = np.full((n, len(arm.v_lower)), np.nan)
         counts, empties = np.ones((2, n), dtype=np.int64)
         if parents is not None:
             unfilled[:] = parents.unfilled
@@ -549,12 +539,12 @@ def prove_general(arm: GeneralArm, target: float, most_cells: int, seed: int) ->
         exclude_cells(arm, outer, cells, empty, empties)
         nowhere = (empties == 1) & (empty[:, 0, 1] - empty[:, 0, 0] >= TURN)
         some = np.flatnonzero(~nowhere)
-        parts = unfilled[some], counts[some], witness[some]
+        parts = unfilled[some], counts[some]
         fill_cells(arm, cells[some], *parts, known, room, TRIES)
-        unfilled[some], counts[some], witness[some] = parts
+        unfilled[some], counts[some] = parts
         for arcs, count in ((unfilled, counts), (empty, empties)):
             arcs[np.arange(MAX_ARCS) >= count[:, None]] = np.nan
-        return Proof(cells, unfilled, empty, np.full(n, level), witness, arm.bar)
+        return Proof(cells, unfilled, empty, np.full(n, level), arm.bar)
 
     (low, high), reach = arm.heights[0].tolist(), float(arm.radii[0])
     floor = max(MIN_CELL, max(reach, high - low) / 8)  # or there would be many cells across what is flat

@@ -1,4 +1,4 @@
-"""Results of the proof for a robot: its cells, a joint vector that reaches each, and voids.
+"""Results of the proof for a robot: its cells and the voids among them.
 
 Voids are unreachable regions, connected over cells and azimuths. The arcs that are not proven filled are nodes; two of
 them touch if their cells share a border and their azimuths overlap, or across azimuth 0. Proven filled cells are the
@@ -18,13 +18,12 @@ from numpy.typing import NDArray
 
 from er3a.geometry.vectors import TURN
 from er3a.kinematics.chain import constant_links
-from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.robot import Robot
 from er3a.sampling.grid import tool_bound
 from er3a.workspace.arcs import MAX_ARCS
 from er3a.workspace.cells import Proof, in_section, in_space, ring_volumes
-from er3a.workspace.general_arm import general_arm, joints_of
+from er3a.workspace.general_arm import general_arm
 from er3a.workspace.general_proof import prove_general
 
 OUTSIDE = -1
@@ -90,14 +89,6 @@ class SectionMap:
 def holds_azimuth(arcs: Reals, azimuth: Reals) -> Flags:
     """Whether azimuths (n,) in rad lie in sets of arcs (n, MAX_ARCS, 2)."""
     return np.asarray(((arcs[..., 0] <= azimuth[:, None]) & (azimuth[:, None] <= arcs[..., 1])).any(axis=1))
-
-
-def lies_in_cell(robot: Robot, q: Reals, proof: Proof, R: Reals, origin: Reals) -> Flags:
-    """Whether each joint vector (cells, 6) brings the tool point into its own cell; False for NaN."""
-    rho, _, z = in_section((forward(robot, np.nan_to_num(q))[:, :3, 3] - origin) @ R.T, proof.bar)
-    a, b, c, d = proof.cells.T
-    inside: Flags = np.isfinite(q[:, 0]) & (a <= rho) & (rho <= b) & (c <= z) & (z <= d)
-    return inside
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,7 +204,7 @@ def _empty_ratio(arcs: Reals, empty: Reals) -> Reals:
     return ratio
 
 
-CellState = Literal["filled", "touched", "empty", "undecided", "partly_filled"]
+CellState = Literal["filled", "empty", "undecided", "partly_filled"]
 
 TARGET = 0.002
 BEYOND_ROUNDING = 1 + 1e-9
@@ -230,14 +221,12 @@ class Proven:
     ----------
     proof, section : its cells, and their map
     R, origin : frame about axis 1, see :func:`er3a.workspace.general_arm.general_arm`
-    witness : (cells, n), rad or m, a joint vector that reaches into each cell, NaN where none is known
     """
 
     proof: Proof
     section: SectionMap
     R: Reals
     origin: Reals
-    witness: Reals
 
     @property
     def settles(self) -> bool:
@@ -265,11 +254,10 @@ class Proven:
         return np.asarray((cell == OUTSIDE) | (self.proof.empty_ratio[cell] >= 1 - 1e-12))
 
     def cell_states(self) -> list[CellState]:
-        """What each cell is; touched: not proven filled, but a joint vector reaches into it."""
+        """What each cell is."""
         unfilled, empty = self.proof.unfilled_ratio, self.proof.empty_ratio
-        touched = np.isfinite(self.witness[:, 0])
-        states: tuple[CellState, ...] = ("filled", "empty", "partly_filled", "touched", "undecided")
-        chosen = np.select([unfilled <= 0, empty >= 1 - 1e-12, unfilled < 1 - 1e-12, touched], [0, 1, 2, 3], 4)
+        states: tuple[CellState, ...] = ("filled", "empty", "partly_filled", "undecided")
+        chosen = np.select([unfilled <= 0, empty >= 1 - 1e-12, unfilled < 1 - 1e-12], [0, 1, 2], 3)
         return [states[n] for n in chosen]
 
 
@@ -284,11 +272,7 @@ def prove_robot(robot: Robot, most_cells: int, seed: int) -> Proven:
     if not arm.carries_around:
         return _bounded_by_lengths(robot)
     proof = prove_general(arm, TARGET, CELLS * most_cells, seed)
-    section, middle = SectionMap(proof), (robot.lower + robot.upper) / 2
-    q = np.tile(middle, (len(proof.cells), 1))
-    q[:, 1 : proof.witness.shape[1]] = joints_of(robot, proof.witness)[:, 1:]
-    q = np.where(lies_in_cell(robot, q, proof, R, origin)[:, None], q, np.nan)
-    return Proven(proof, section, R, origin, q)
+    return Proven(proof, SectionMap(proof), R, origin)
 
 
 def _bounded_by_lengths(robot: Robot) -> Proven:
@@ -298,7 +282,6 @@ def _bounded_by_lengths(robot: Robot) -> Proven:
     low, high = bound.height - radius, bound.height + radius
     unfilled, empty = np.full((2, 1, MAX_ARCS, 2), np.nan)
     unfilled[0, 0] = 0.0, TURN
-    witness = np.full((1, robot.joints), np.nan)
-    proof = Proof(np.array([[0.0, reach, low, high]]), unfilled, empty, np.zeros(1, dtype=np.int64), witness)
+    proof = Proof(np.array([[0.0, reach, low, high]]), unfilled, empty, np.zeros(1, dtype=np.int64))
     R = constant_links(robot)[0, :3, :3].T
-    return Proven(proof, SectionMap(proof), R, bound.axis_point, witness)
+    return Proven(proof, SectionMap(proof), R, bound.axis_point)

@@ -94,13 +94,6 @@ TEXTS = texts(
         "limit_extended#sum_upper_mm": "the upper limit of {sum} is extended to {limit} mm",
         "workspace.pockets": Plural("count", "{count} open pocket", "{count} open pockets"),
         "workspace.voids": Plural("count", "{count} enclosed void", "{count} enclosed voids"),
-        "workspace.rule": Plural(
-            "count",
-            "An enclosed void away from the shoulder often means a wrong limit or direction of joint 2 or 3. {count} "
-            "was found; widening one limit at a time points to joint 2 or 3 in {named} of {count} cases.",
-            "An enclosed void away from the shoulder often means a wrong limit or direction of joint 2 or 3. {count} "
-            "were found; widening one limit at a time points to joint 2 or 3 in {named} of {count} cases.",
-        ),
         "inverse_unknown": "no method here finds all inverse solutions of this arm",
         "joint_one_shared": (
             "joint 1 is coupled with other joints or limited together with them, so that what holds at one azimuth "

@@ -16,7 +16,6 @@ from matplotlib.patches import Patch, Polygon, Rectangle
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.scene import Plane, Scene, Solid, Sphere
 from er3a.collision.shapes import solid_pieces
-from er3a.geometry.transforms import rpy_along
 from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.messages.kinematics import branch_word
@@ -207,8 +206,13 @@ def upright_slices(robot: Robot, capability: model.CapabilitySummary, cells: mod
         row = lookup.row(np.abs(grid_x), np.where(grid_x < 0, np.pi, 0.0), grid_z)
     best = capability.overall.best_manipulability_m3
     panels = (
-        (cells.reachability, 100.0, asked_ratio(capability), (0, 100)),
-        (cells.solutions, 1.0, solutions_label(capability), (0, max(1, capability.overall.most_solutions))),
+        (cells.reachability, 100.0, tr("tool orientations reached (%)"), (0, 100)),
+        (
+            cells.solutions,
+            1.0,
+            tr("IK solutions per orientation reached"),
+            (0, max(1, capability.overall.most_solutions)),
+        ),
         (cells.manipulability_m3, 100 / best, tr("best manipulability (% of the arm's best)"), (0, 100))
         if capability.sliding
         else (cells.manipulability_m3, 1e3, tr("best manipulability (10⁻³ m³)"), (0, None)),
@@ -257,26 +261,6 @@ def level_slices(
         equal_scale(panel, names[0] if panel is axes[1] else "", names[1] if panel is axes[0] else "", fill=False)
     figure.colorbar(mesh, ax=axes, label=label, shrink=0.8)
     return figure
-
-
-def asked_ratio(capability: model.CapabilitySummary) -> str:
-    """Label of what of the orientations asked is reached."""
-    return {
-        "directions": tr("tool directions reached (%)"),
-        "tilts": tr("tilts of the tool reached (%)"),
-        "turns": tr("turns of the tool reached (%)"),
-        "points": tr("reached (%)"),
-    }[capability.asked]
-
-
-def solutions_label(capability: model.CapabilitySummary) -> str:
-    """Label of the solutions of what is asked."""
-    return {
-        "directions": tr("IK solutions per reached direction"),
-        "tilts": tr("IK solutions per reached tilt"),
-        "turns": tr("IK solutions per reached turn"),
-        "points": tr("IK solutions per reached point"),
-    }[capability.asked]
 
 
 def across_slide(capability: model.CapabilitySummary) -> Reals:
@@ -421,7 +405,6 @@ def _placement_context(
         "nowhere": "",
         "placing_scene": placement.scene,
         "placing_margin": fixed(placement.margin_mm, 0),
-        "try_text": _try_text(robot, placement.task) if capability.asked == "directions" else "",
         "stands": [stand_text(stand, placement) for stand in placement.stands],
         "points_serving": placement.points_serving,
         "place_rows": rows,
@@ -455,7 +438,9 @@ def _pictures(robot: Robot, results: model.WorkspaceResults, capability: model.C
         )
     )
     of_held = level_slices(capability, cells, clear_percent(cells), tr("reached poses held without collision (%)"))
-    of_reached = level_slices(capability, cells, 100.0 * cells.reachability.astype(float), asked_ratio(capability))
+    of_reached = level_slices(
+        capability, cells, 100.0 * cells.reachability.astype(float), tr("tool orientations reached (%)")
+    )
     return [
         Picture(upright_slices(robot, capability, cells), upright, _slices_caption(capability)),
         Picture(of_reached, reached, _level_caption(capability)),
@@ -480,22 +465,13 @@ def _clear_caption(clear: model.ClearSummary, assumed: bool) -> str:
         "clear": number(clear.clear),
         "without": number(clear.without),
     }
-    if assumed:
-        tried = tr(
-            "{tries} random poses were tried in each cell and sector: {reached} are reached, {clear} of them clear of "
-            "the assumed shapes; in {without} cells and sectors none was found. Outer cells hold more volume, so the "
-            "share is not the quotient of these counts. Shares of so few tries distinguish good regions from bad ones, "
-            "not single cells.",
-            **numbers,
-        )
-    else:
-        tried = tr(
-            "{tries} random poses were tried in each cell and sector: {reached} are reached, {clear} of them proven"
-            " collision-free; in {without} cells and sectors none was found. Outer cells hold more volume, so the "
-            "share is not the quotient of these counts. Shares of so few tries distinguish good regions from bad ones, "
-            "not single cells.",
-            **numbers,
-        )
+    tried = tr(
+        "{tries} random poses were tried in each cell and sector: {reached} are reached, {clear} of them {held}; in "
+        "{without} cells and sectors none was found. Outer cells hold more volume, so the share is not the quotient of "
+        "these counts. Shares of so few tries distinguish good regions from bad ones, not single cells.",
+        held=tr("clear of the assumed shapes") if assumed else tr("proven collision-free"),
+        **numbers,
+    )
     return tr("{first} {rest}", first=what, rest=tried)
 
 
@@ -520,39 +496,17 @@ def _slices_caption(capability: model.CapabilitySummary) -> str:
         "solutions": number(overall.mean_solutions, 2),
         "most": overall.most_solutions,
     }
-    first = {
-        "directions": tr(
-            "A reached cell offers {mean} % of all tool directions on average, the best one {best} %, each with "
-            "{solutions} IK solutions on average (of {most} at most).",
-            **numbers,
-        ),
-        "tilts": tr(
-            "A reached cell offers {mean} % of all tilts on average, the best one {best} %, each with {solutions} IK "
-            "solutions on average (of {most} at most).",
-            **numbers,
-        ),
-        "turns": tr(
-            "A reached cell offers {mean} % of all turns on average, the best one {best} %, each with {solutions} IK "
-            "solutions on average (of {most} at most).",
-            **numbers,
-        ),
-        "points": tr(
-            "A reached cell has {solutions} IK solutions on average (of {most} at most).",
-            **numbers,
-        ),
-    }[capability.asked]
-    if capability.asked == "points":
-        return first
-    return joined(
-        [
-            first,
-            tr("These solutions are averaged over the directions reached; of random joint values, as the page of the "
-               "stage inverse draws them, more solutions are found, because poses with many are met more often."),
-            tr("Plan work where all three are high; rims are reached only with the arm stretched, folded or "
-               "twisted."),
-        ],
-        " ",
-    )  # fmt: skip
+    first = tr(
+        "A reached cell offers {mean} % of the orientations asked on average, the best one {best} %, each with "
+        "{solutions} IK solutions on average (of {most} at most).",
+        **numbers,
+    )
+    averaged = tr(
+        "These solutions are averaged over the orientations reached; of random joint values, as the page of the stage "
+        "inverse draws them, more solutions are found, because poses with many are met more often."
+    )
+    plan = tr("Plan work where all three are high; rims are reached only with the arm stretched, folded or twisted.")
+    return joined([first, averaged, plan], " ")
 
 
 def _asked_text(capability: model.CapabilitySummary) -> str:
@@ -580,16 +534,7 @@ def _asked_text(capability: model.CapabilitySummary) -> str:
             "centre of each cell was tried as a point alone: it is reached or not."
         ),
     }[capability.asked]
-    return joined([asked, _roll_text(capability), _effort_text(capability)], " ")
-
-
-def _effort_text(capability: model.CapabilitySummary) -> str:
-    if not capability.coarse:
-        return ""
-    return tr(
-        "The inverse of this arm takes long, so cells are {cell} mm wide and directions fewer than the study says.",
-        cell=fixed(1000 * capability.cell_m, 0),
-    )
+    return joined([asked, _roll_text(capability)], " ")
 
 
 def _roll_text(capability: model.CapabilitySummary) -> str:
@@ -673,24 +618,6 @@ def _task_text(task: model.TaskSummary, capability: model.CapabilitySummary) -> 
             clear=clear,
         )
     return joined([served, stands], " ")
-
-
-def _try_text(robot: Robot, task: model.TaskSummary) -> str:
-    """How to see the arm at a place: the roll, pitch and yaw (ZYX) that point the tool along the task's direction."""
-    roll, pitch, _ = np.degrees(rpy_along(np.array(task.tool_direction)))
-    parts = {"roll": fixed(roll, 1).removesuffix(".0"), "pitch": fixed(pitch, 1).removesuffix(".0")}
-    if np.allclose(robot.tool, np.eye(4)):
-        return tr(
-            "To see the arm at a position, type its centre, roll {roll}, pitch {pitch} and yaw 0 deg into the "
-            "teach panel. The robot has no tool here: the centre of its flange goes there. The tray is not in the "
-            "panel's scene: its clearance leaves the tray out.",
-            **parts,
-        )
-    return tr(
-        "To see the arm at a position, type its centre, roll {roll}, pitch {pitch} and yaw 0 deg into the teach"
-        " panel: the tool point goes there. The tray is not in the panel's scene: its clearance leaves the tray out.",
-        **parts,
-    )
 
 
 def _whole(value: float) -> float | int:

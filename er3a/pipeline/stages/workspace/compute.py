@@ -172,9 +172,8 @@ def _summary(
             proven.count_in_empty(forward(robot, samples.q_kept)[:, :3, 3]),
             _bars(proven),
         ),
-        hull=model.HullSummary(hull.volume, hull.area, settings.hull_directions, len(hull.vertices)),
+        hull=model.HullSummary(hull.volume, hull.area),
         reach_m=reach,
-        grid=stated(model.GridSummary, grid),
         axis=model.AxisSummary(
             model.triple(grid.axis_point), model.triple(grid.axis), model.triple(shoulder_of(robot, grid))
         ),

@@ -108,12 +108,11 @@ class ProofCells(Table):
     z_m: Reals = vector("z_{}_m", "lowest and highest height along axis 1", parts="01")
     volume_m3: Reals = column("volume of the cell")
     level: NDArray[np.int16] = column("how often the cell was split off")
-    status: Texts = column("filled, touched, empty, partly_filled or undecided")
+    status: Texts = column("filled, empty, partly_filled or undecided")
     filled_ratio: Reals = column("ratio of the cell that is proven filled")
     empty_ratio: Reals = column("ratio of the cell that is proven empty")
     empty_arcs_deg: Texts = lists("ends of the azimuths that are proven empty")
     unfilled_arcs_deg: Texts = lists("ends of the azimuths that are not proven filled")
-    q_deg: Reals = per_joint("joint angle that reaches into the cell, NaN if none is known")
 
 
 class Border(Table):
@@ -222,21 +221,10 @@ class ProofSummary:
 
 @dataclass(frozen=True)
 class HullSummary:
-    """Convex hull of the extreme samples in so many directions."""
+    """Convex hull of the extreme samples."""
 
     volume_m3: float
     area_m2: float
-    directions: int
-    vertices: int
-
-
-@dataclass(frozen=True)
-class GridSummary:
-    """Cubic cells in the base frame, from the lowest corner."""
-
-    origin_m: Triple
-    cell_m: float
-    shape: tuple[int, int, int]
 
 
 @dataclass(frozen=True)
@@ -429,7 +417,6 @@ class PlacementSummary:
     directions: int
     points_serving: int
     fitting: int
-    fitting_with_one_branch: int
     places: tuple[PlaceSummary, ...]
     stands: tuple[StandSummary, ...] = ()
 
@@ -477,7 +464,6 @@ class WorkspaceSummary(Summary):
     proof: ProofSummary
     hull: HullSummary
     reach_m: ReachExtremes
-    grid: GridSummary
     axis: AxisSummary
     section_cell_m: float
     voids: tuple[VoidSummary, ...]
@@ -565,7 +551,6 @@ def proof(proven: Proven) -> ProofCells:
         empty_ratio=found.empty_ratio,
         empty_arcs_deg=_arcs(found.empty),
         unfilled_arcs_deg=_arcs(found.unfilled),
-        q_deg=np.degrees(proven.witness),
     )
 
 

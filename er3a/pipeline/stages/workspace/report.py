@@ -11,7 +11,7 @@ from er3a.collision.scene import Scene
 from er3a.pipeline.messages.dynamics import payload_text
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import bracketed, joined, say, sentence, word
-from er3a.pipeline.messages.workspace import VOID_KINDS, entry_word
+from er3a.pipeline.messages.workspace import VOID_KINDS
 from er3a.pipeline.player.player import drawing_head
 from er3a.pipeline.results import Stored, is_computed, read_stage
 from er3a.pipeline.stages.registry import STAGES
@@ -22,7 +22,6 @@ from er3a.pipeline.viewing.numbers import at_least, at_most, fixed, number
 from er3a.pipeline.viewing.page import Picture, render_stage
 from er3a.pipeline.viewing.tray import Placing, placing_of
 from er3a.robots.robot import Robot
-from er3a.workspace.causes import joints_after
 
 LISTED = 12
 
@@ -40,14 +39,11 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
         study,
         stored,
         output,
-        rule=_rule(summary.enclosed_voids),
         pocket_mm=3000 * summary.pocket_block_m,
         turning=workspace_figures.in_space(robot, results, scene),
         drawing_head=drawing_head(),
         void_rows=[_void_row(n, void) for n, void in enumerate(summary.voids[:LISTED], start=1)],
         voids_more=max(0, len(summary.voids) - LISTED),
-        change_rows=_change_rows(summary),
-        unexpected=isinstance(summary.verdict.finding, model.VoidUnexpected),
         wide=100 * summary.proof.width,
         **context,
     )
@@ -82,18 +78,6 @@ def _context(
     }
 
 
-def _rule(enclosed: list[model.VoidSummary]) -> str:
-    """The rule that an unexpected hole points to joints 2 and 3, applied."""
-    elsewhere = [void for void in enclosed if not void.holds_shoulder]
-    if not elsewhere:
-        return tr(
-            "An enclosed void away from the shoulder would suggest a wrong limit or direction of joint 2 or 3: no "
-            "enclosed void lies away from the shoulder, so no table entry is indicated."
-        )
-    named = sum(bool(joints_after(void.cause) & {2, 3}) for void in elsewhere)
-    return sentence("workspace.rule", count=len(elsewhere), named=named)
-
-
 def _void_row(row: int, void: model.VoidSummary) -> list[str]:
     low, high = 1000 * void.volume_m3.lower, 1000 * void.volume_m3.upper
     return [
@@ -111,19 +95,6 @@ def _void_row(row: int, void: model.VoidSummary) -> list[str]:
 def _litres(low: float, high: float) -> str:
     """Bounds of a volume in litres, rounded outwards."""
     return tr("{low} to {high}", low=at_least(low, "L"), high=at_most(high, "L"))
-
-
-def _change_rows(summary: model.WorkspaceSummary) -> list[list[str]]:
-    finding = summary.verdict.finding
-    return [
-        [
-            bracketed(entry_word(change), tr(change.unit)),
-            f"{change.given:g}".replace("-", "−"),
-            f"{change.tried:g}".replace("-", "−"),
-            _litres(*change.left_litres) if change.left_litres else tr("undecided"),
-        ]
-        for change in (finding.single_changes if isinstance(finding, model.VoidUnexpected) else ())
-    ]
 
 
 def _section_caption(summary: model.WorkspaceSummary) -> str:

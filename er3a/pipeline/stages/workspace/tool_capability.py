@@ -398,7 +398,6 @@ def _placement_summary(
         directions=len(cone_directions(task.axis, task.half_angle, task.step)),
         points_serving=int((placement.field.manipulability_any > NO).sum()),
         fitting=len(places.slot),
-        fitting_with_one_branch=int((places.slot != MIXED).sum()),
         places=(),
     )
 
