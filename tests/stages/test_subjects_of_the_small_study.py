@@ -20,7 +20,10 @@ CAMERA = (
     f"{REAL_ARM} {RATES} real_camera pose_intrinsics joint_zeros small_joint_zeros detections gripped_parts "
     "shallow_overlaps tool torques"
 )
-PLACES = "joint_vectors undecided_volume colliding_reach tool_directions lost_cells sampled_places between_places placed_box tool"
+PLACES = (
+    "joint_vectors undecided_volume colliding_reach tool_directions lost_cells sampled_places between_places placed_box"
+    " tool"
+)
 FREE_SPACE = "joint_vectors lost_cells unjoined_cells within_cells targets path_stretches tool shallow_overlaps"
 PROGRAMS = "program_again controller_language controller_ramps torques shallow_overlaps"
 PATHS = "path_stretches ways_between tool torques shallow_overlaps"
