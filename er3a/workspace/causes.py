@@ -64,15 +64,6 @@ class Relaxed:
         return self.limit + (self.by if self.side == "upper" else -self.by)
 
 
-@dataclass(frozen=True)
-class Unlimited:
-    """All limits taken away; ``filled`` is the ratio of the void that is then reached."""
-
-    filled: float
-    joint: Literal[0] = 0
-    side: Literal["both"] = "both"
-
-
 class Disappears(Finding, code="void_disappears"):
     """One limit alone makes the void, or each of two."""
 
@@ -95,8 +86,8 @@ class Geometry(Finding, code="void_of_geometry"):
 VoidCause = Disappears | SeveralLimits | Geometry
 
 
-def relaxations(robot: Robot, cavity: Cavity) -> tuple[list[Relaxed], Unlimited]:
-    """Judge a void's cells with each limit widened, the strongest first; then without any.
+def relaxations(robot: Robot, cavity: Cavity) -> tuple[list[Relaxed], float]:
+    """Judge a void's cells with each limit widened, the strongest first; then the ratio reached without any.
 
     What the proof fills at the middles of cells counts as reached, so that a void may shrink by more.
     """
@@ -116,7 +107,7 @@ def relaxations(robot: Robot, cavity: Cavity) -> tuple[list[Relaxed], Unlimited]
 
     found = [_relaxed(limit, ratio_filled) for limit in _limits(robot)]
     found.sort(key=lambda one: (one.filled < _GONE, np.searchsorted(STEPS[one.unit], one.by), -one.filled, one.joints))
-    return found, Unlimited(ratio_filled(_without_limits(robot)))
+    return found, ratio_filled(_without_limits(robot))
 
 
 class _Limit(NamedTuple):
@@ -185,16 +176,16 @@ def _without_limits(robot: Robot) -> Robot:
     return robot.replace(lower=robot.lower - by, upper=robot.upper + by, combined=())
 
 
-def cause_of(single: list[Relaxed], unlimited: Unlimited) -> VoidCause:
-    """The cause that the relaxations show."""
+def cause_of(single: list[Relaxed], unlimited: float) -> VoidCause:
+    """The cause that the relaxations show; ``unlimited``: the ratio of the void that is reached without limits."""
     gone = [limit for limit in single if limit.filled >= _GONE]
     if gone:
         return Disappears(tuple(each for each in gone if (each.unit, each.by) == (gone[0].unit, gone[0].by))[:2])
     strongest = max(single, key=lambda limit: limit.filled, default=None)
     most = strongest if strongest is not None and strongest.filled >= _SHRUNK else None
-    if unlimited.filled >= _GONE:
+    if unlimited >= _GONE:
         return SeveralLimits(most)
-    return Geometry(1 - unlimited.filled, most)
+    return Geometry(1 - unlimited, most)
 
 
 def _widened(robot: Robot, joint: int, side: Side, by: float) -> Robot:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 import scipy
@@ -204,8 +203,6 @@ def _empty_ratio(arcs: Reals, empty: Reals) -> Reals:
     return ratio
 
 
-CellState = Literal["filled", "empty", "undecided", "partly_filled"]
-
 TARGET = 0.002
 BEYOND_ROUNDING = 1 + 1e-9
 MIN_BOUND_M = 1e-4  # for a tool point that no joint moves
@@ -252,13 +249,6 @@ class Proven:
         section."""
         cell = self.section.cell_of(rho, z)
         return np.asarray((cell == OUTSIDE) | (self.proof.empty_ratio[cell] >= 1 - 1e-12))
-
-    def cell_states(self) -> list[CellState]:
-        """What each cell is."""
-        unfilled, empty = self.proof.unfilled_ratio, self.proof.empty_ratio
-        states: tuple[CellState, ...] = ("filled", "empty", "partly_filled", "undecided")
-        chosen = np.select([unfilled <= 0, empty >= 1 - 1e-12, unfilled < 1 - 1e-12], [0, 1, 2], 3)
-        return [states[n] for n in chosen]
 
 
 def prove_robot(robot: Robot, most_cells: int, seed: int) -> Proven:

@@ -10,9 +10,8 @@ import scipy
 
 from er3a.geometry.vectors import TURN
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
-from er3a.workspace.causes import Relaxed, Unlimited, VoidCause, cause_of, relaxations
+from er3a.workspace.causes import VoidCause, cause_of, relaxations
 from er3a.workspace.cells import in_space, ring_volumes
 from er3a.workspace.proven import Cavity, Proven, cavities
 
@@ -152,7 +151,7 @@ def mesh(blocks: Blocks, mask: Flags) -> tuple[Reals, Integers]:
 
 VoidKind = Literal["enclosed", "open"]
 
-_FLAT = 1e-9
+_FLAT, _AT_ONCE = 1e-9, 8192
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,12 +162,14 @@ class Hull:
     ----------
     vertices : (V, 3), m, sorted by x, y, z; of : (V,), which of the given points each one is
     triangles : (F, 3), vertex numbers, counter-clockwise from outside
+    planes : (P, 4), of the faces: outward normals, and what is added to the product with a point, m
     volume, area : m^3, m^2; 0 where the points lie in a plane (then there are no triangles)
     """
 
     vertices: Reals
     of: Integers
     triangles: Integers
+    planes: Reals
     volume: float
     area: float
 
@@ -178,11 +179,11 @@ def convex_hull(points: Reals) -> Hull:
     points, of = np.unique(points, axis=0, return_index=True)
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     if len(points) < 4 or spread[2] <= _FLAT * spread[0]:
-        return Hull(points, of, np.empty((0, 3), dtype=np.int64), 0.0, 0.0)
+        return Hull(points, of, np.empty((0, 3), dtype=np.int64), np.empty((0, 4)), 0.0, 0.0)
     found = scipy.spatial.ConvexHull(points)
     kept = np.sort(found.vertices)
     triangles = _ordered(points[kept], np.searchsorted(kept, found.simplices))
-    return Hull(points[kept], of[kept], triangles, float(found.volume), float(found.area))
+    return Hull(points[kept], of[kept], triangles, found.equations, float(found.volume), float(found.area))
 
 
 def _ordered(vertices: Reals, triangles: Integers) -> Integers:
@@ -195,34 +196,12 @@ def _ordered(vertices: Reals, triangles: Integers) -> Integers:
     return triangles[np.lexsort(triangles.T[::-1])]
 
 
-def _planes(hull: Hull) -> tuple[Reals, Reals]:
-    """The faces' planes: normals (F, 3) of unit length, outwards, and distances (F,) from the origin along them."""
-    a, b, c = (hull.vertices[hull.triangles[:, i]] for i in range(3))
-    normals = np.cross(b - a, c - a)
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return normals, np.einsum("ij,ij->i", normals, a)
-
-
 def inside_hull(hull: Hull, points: Reals) -> Flags:
     """Which of the points (n, 3) lie in the hull; none in a flat one."""
-    if not len(hull.triangles):
+    if not len(hull.planes):
         return np.zeros(len(points), dtype=bool)
-    return _within_planes(*_planes(hull), points)
-
-
-@kernel
-def _within_planes(normals: Reals, offsets: Reals, points: Reals) -> Flags:
-    """Which points lie below all planes; the plane that the last one was above is tried first."""
-    within = np.ones(len(points), dtype=np.bool_)
-    last = 0
-    for n in range(len(points)):
-        for k in range(-1, len(offsets)):
-            face = last if k < 0 else k
-            along = normals[face, 0] * points[n, 0] + normals[face, 1] * points[n, 1] + normals[face, 2] * points[n, 2]
-            if along >= offsets[face]:
-                within[n], last = False, face
-                break
-    return within
+    parts = np.array_split(points, len(points) // _AT_ONCE + 1)
+    return np.concatenate([(part @ hull.planes[:, :3].T + hull.planes[:, 3] < 0).all(axis=1) for part in parts])
 
 
 POCKET_BLOCKS, TURNS = 64, 180
@@ -239,7 +218,6 @@ class Void:
     lower, upper : bounds of its volume, m^3
     centroid : (3,), m
     low, high : (3,), m, corners of the box along x, y, z that nothing of it lies outside
-    relaxed : what of it is reached with each limit widened
     holds_shoulder : whether it holds the point of axis 1 at the height of joint 2
     vertices, triangles : (V, 3), m, and (F, 3), its surface on blocks
     """
@@ -251,7 +229,6 @@ class Void:
     low: Reals
     high: Reals
     cause: VoidCause
-    relaxed: tuple[Relaxed | Unlimited, ...]
     holds_shoulder: bool
     vertices: Reals
     triangles: Integers
@@ -276,7 +253,6 @@ def proven_voids(robot: Robot, proven: Proven, hull: Hull, shoulder: Reals) -> l
 def _void(
     kind: VoidKind, robot: Robot, proven: Proven, cavity: Cavity, shoulder: Reals, surface: tuple[Blocks, Flags]
 ) -> Void:
-    single, unlimited = relaxations(robot, cavity)
     low, high = cavity.box()
     corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
     corners = proven.in_base(corners)
@@ -293,8 +269,7 @@ def _void(
         centroid=proven.in_base(cavity.centroid()) + 0.0,
         low=corners.min(axis=0),
         high=corners.max(axis=0),
-        cause=cause_of(single, unlimited),
-        relaxed=(*single, unlimited),
+        cause=cause_of(*relaxations(robot, cavity)),
         holds_shoulder=bool(near.any()),
         vertices=vertices,
         triangles=triangles,

@@ -92,7 +92,6 @@ def void_record(at_shoulder: bool) -> Void:
         low=np.full(3, -0.05),
         high=np.full(3, 0.05),
         cause=Disappears((limit,)),
-        relaxed=(limit,),
         holds_shoulder=at_shoulder,
         vertices=np.empty((0, 3)),
         triangles=np.empty((0, 3), dtype=np.int64),

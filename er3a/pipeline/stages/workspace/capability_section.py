@@ -480,11 +480,6 @@ def _level_caption(capability: model.CapabilitySummary) -> str:
         return tr("The arm can do the same everywhere along the slide, up to its ends.")
     if capability.sectors == 1:
         return tr("Joint 1 makes a full turn, so what counts is the distance from axis 1 and the height alone.")
-    if capability.asked == "directions":
-        return tr(
-            "Where joint 1 is limited, the sector behind the arm loses directions first: "
-            "in front, more tool angles are left."
-        )
     return tr("Joint 1 is limited: blank sectors are out of its reach.")
 
 

@@ -21,7 +21,7 @@ from er3a.robots.robot import Robot
 from er3a.sampling.random_joints import Sampling
 from er3a.sampling.tally import ReachExtremes
 from er3a.workspace.capability import Capability, ClearPoses, Overall
-from er3a.workspace.causes import Relaxed, SingleChange, Unlimited, VoidCause
+from er3a.workspace.causes import SingleChange, VoidCause
 from er3a.workspace.orientations import AskedKind
 from er3a.workspace.placement import Places
 from er3a.workspace.proven import Proven
@@ -108,7 +108,6 @@ class ProofCells(Table):
     z_m: Reals = vector("z_{}_m", "lowest and highest height along axis 1", parts="01")
     volume_m3: Reals = column("volume of the cell")
     level: NDArray[np.int16] = column("how often the cell was split off")
-    status: Texts = column("filled, empty, partly_filled or undecided")
     filled_ratio: Reals = column("ratio of the cell that is proven filled")
     empty_ratio: Reals = column("ratio of the cell that is proven empty")
     empty_arcs_deg: Texts = lists("ends of the azimuths that are proven empty")
@@ -246,7 +245,6 @@ class VoidSummary:
     low_m: Triple
     high_m: Triple
     cause: VoidCause
-    relaxed: tuple[Relaxed | Unlimited, ...]
     holds_shoulder: bool
 
 
@@ -546,7 +544,6 @@ def proof(proven: Proven) -> ProofCells:
         z_m=found.cells[:, 2:],
         volume_m3=found.volumes,
         level=found.level.astype(np.int16),
-        status=proven.cell_states(),
         filled_ratio=1 - found.unfilled_ratio,
         empty_ratio=found.empty_ratio,
         empty_arcs_deg=_arcs(found.empty),
