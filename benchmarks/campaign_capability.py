@@ -8,6 +8,7 @@ from er3a import load_robot
 from er3a.kinematics.batch import inverse_batch
 from er3a.workspace.cell_frame import cell_frame
 from er3a.workspace.directions import from_polar, poses, roll_of, tool_rotations
+from er3a.workspace.orientations import asked_of
 from er3a.workspace.placement import NO, Task, find_places, narrowed
 from testing.evidence import sized
 
@@ -21,7 +22,7 @@ def services(name: str, random: np.random.Generator) -> str:
     """Row of the tray's places, with random points and directions in the best ones."""
     robot = load_robot(name)
     frame, roll, tight = cell_frame(robot), roll_of(robot, 1), narrowed(robot, TRAY.margin)
-    found = find_places(robot, TRAY, roll, (frame.heights[1] - frame.heights[0]) / ACROSS, PLACES)
+    found = find_places(robot, TRAY, asked_of(robot, 1), (frame.heights[1] - frame.heights[0]) / ACROSS, PLACES)
     places, row = found.places, random.choice(found.chosen, SERVICES)
     size = np.where(places.turned[row, None], TRAY.box[[1, 0, 2]], TRAY.box)
     points = places.centre[row] + (random.random((SERVICES, 3)) - 0.5) * size

@@ -30,6 +30,7 @@ from er3a.workspace import directions
 from er3a.workspace.arcs import FULL_TURN
 from er3a.workspace.capability import manipulability_of
 from er3a.workspace.cell_frame import cell_frame
+from er3a.workspace.orientations import AskedOrientations
 from er3a.workspace.tool_inverse import all_solutions, slot_count
 
 NO = -1.0
@@ -41,8 +42,6 @@ _POSES = 50_000
 
 Free = Callable[[Reals], Flags]
 """Which arms (N, n), rad, are free of collisions, (N,)."""
-InCone = Callable[[Reals, Reals, float, float], Reals]
-"""What is asked at points; see :meth:`er3a.workspace.orientations.AskedOrientations.in_cone`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,35 +216,24 @@ def lattice_spacing(box: Reals, coarsest: float) -> Reals:
     return np.maximum(sides / np.maximum(1, np.round(sides / coarsest)), coarsest / 2)
 
 
-def survey(
-    robot: Robot,
-    task: Task,
-    roll: directions.Roll,
-    coarsest: float,
-    free: Free | None = None,
-    *,
-    in_cone: InCone | None = None,
-) -> Field:
+def survey(robot: Robot, task: Task, asked: AskedOrientations, coarsest: float, free: Free | None = None) -> Field:
     """Ask a lattice over the arm's reach.
 
     Parameters
     ----------
     robot : with the limits that hold, see :func:`narrowed`
+    asked : the required orientations
     coarsest : m, about the spacing
     free : which arms count; all, unless given
-    in_cone : what is asked at points; directions with this roll, unless given
     """
     slots = slot_count(robot)
-    start, spacing, shape, points, asked = _lattice(robot, task, coarsest)
+    start, spacing, shape, points, here = _lattice(robot, task, coarsest)
     manipulability, manipulability_any = np.full((len(points), slots), NO), np.full(len(points), NO)
     limit_margin = np.zeros((len(points), slots))
-    if in_cone is None:
-        rotations = directions.tool_rotations(directions.cone_directions(task.axis, task.half_angle, task.step), roll)
-    else:
-        rotations = in_cone(points[asked], task.axis, task.half_angle, task.step)
+    rotations = asked.in_cone(points[here], task.axis, task.half_angle, task.step)
     if rotations.shape[-4]:
-        manipulability[asked], manipulability_any[asked], limit_margin[asked] = serve(
-            robot, points[asked], rotations, roll, free
+        manipulability[here], manipulability_any[here], limit_margin[here] = serve(
+            robot, points[here], rotations, asked.roll, free
         )
     if not slot_labels(robot):  # slots of a point's neighbours are other arms
         manipulability[:], limit_margin[:] = NO, 0.0
@@ -496,14 +484,7 @@ class BoxPlacement:
 
 
 def find_places(
-    robot: Robot,
-    task: Task,
-    roll: directions.Roll,
-    grid: float,
-    count: int,
-    *,
-    free: Free | None = None,
-    in_cone: InCone | None = None,
+    robot: Robot, task: Task, asked: AskedOrientations, grid: float, count: int, free: Free | None = None
 ) -> BoxPlacement:
     """Survey where the box can be placed, and choose the best places.
 
@@ -511,11 +492,10 @@ def find_places(
     ----------
     robot : with its own limits; grid : m, about the lattice's spacing
     count : how many places to choose
-    free : which arms count at the lattice's points
-    in_cone : what is asked at points; directions with this roll, unless given
+    free : which arms count at the lattice's points; all, unless given
     """
     robot = narrowed(robot, task.margin)
-    field = survey(robot, task, roll, grid, free, in_cone=in_cone)
+    field = survey(robot, task, asked, grid, free)
     places = fitting_places(field, task.box)
     return BoxPlacement(field, places, choose_places(robot, task, places, count))
 

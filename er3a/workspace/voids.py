@@ -163,7 +163,7 @@ class Hull:
     vertices : (V, 3), m, sorted by x, y, z; of : (V,), which of the given points each one is
     triangles : (F, 3), vertex numbers, counter-clockwise from outside
     planes : (P, 4), of the faces: outward normals, and what is added to the product with a point, m
-    volume, area : m^3, m^2; 0 where the points lie in a plane (then there are no triangles)
+    volume : m^3; 0 where the points lie in a plane (then there are no triangles)
     """
 
     vertices: Reals
@@ -171,7 +171,6 @@ class Hull:
     triangles: Integers
     planes: Reals
     volume: float
-    area: float
 
 
 def convex_hull(points: Reals) -> Hull:
@@ -179,11 +178,11 @@ def convex_hull(points: Reals) -> Hull:
     points, of = np.unique(points, axis=0, return_index=True)
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     if len(points) < 4 or spread[2] <= _FLAT * spread[0]:
-        return Hull(points, of, np.empty((0, 3), dtype=np.int64), np.empty((0, 4)), 0.0, 0.0)
+        return Hull(points, of, np.empty((0, 3), dtype=np.int64), np.empty((0, 4)), 0.0)
     found = scipy.spatial.ConvexHull(points)
     kept = np.sort(found.vertices)
     triangles = _ordered(points[kept], np.searchsorted(kept, found.simplices))
-    return Hull(points[kept], of[kept], triangles, found.equations, float(found.volume), float(found.area))
+    return Hull(points[kept], of[kept], triangles, found.equations, float(found.volume))
 
 
 def _ordered(vertices: Reals, triangles: Integers) -> Integers:

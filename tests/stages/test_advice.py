@@ -22,6 +22,7 @@ from er3a.pipeline.stages.inverse.model import TargetResult
 from er3a.robots.joint_limits import limit_margin
 from er3a.workspace.causes import cause_of, relaxations
 from er3a.workspace.directions import cone_directions, poses, roll_of, tool_rotations
+from er3a.workspace.orientations import asked_of
 from er3a.workspace.placement import Task, find_places, narrowed
 from er3a.workspace.proven import EMPTY, cavities, prove_robot
 
@@ -120,7 +121,7 @@ def test_a_box_that_is_moved_as_far_as_is_said_stays_clear_of_the_scene():
     task = Task(np.array([0.2, 0.15, 0.05]), down, np.radians(20), 0.0, 0.15, np.radians(2))
     wall = Scene("wall", (Plane("wall", np.array([-1.0, 0.0, 0.0]), -0.4),))
     roll, held, bodies = roll_of(robot, 1), narrowed(robot, task.margin), Bodies(robot, wall)
-    found = find_places(robot, task, roll, 0.05, 3, free=lambda q: bodies.free(q, margin))
+    found = find_places(robot, task, asked_of(robot, 1), 0.05, 3, free=lambda q: bodies.free(q, margin))
     rotations = tool_rotations(cone_directions(down, task.half_angle), roll)[:, 0]
     spacing, places, moved = found.field.spacing, found.places, 0
     for row in found.chosen:
@@ -135,5 +136,5 @@ def test_a_box_that_is_moved_as_far_as_is_said_stays_clear_of_the_scene():
             assert clear.any(axis=1).all(), (row, axis, way)
             moved += room > 0
     assert moved >= 4
-    beyond = find_places(robot, task, roll, 0.05, 3)
+    beyond = find_places(robot, task, asked_of(robot, 1), 0.05, 3)
     assert len(beyond.places.slot) > len(places.slot)

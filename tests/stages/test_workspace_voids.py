@@ -26,7 +26,6 @@ def test_hull_agrees_with_scipy(robot):
     points = extreme_points(robot, draw, tally.extremes)
     ours, theirs = convex_hull(points), ConvexHull(points)
     assert ours.volume == pytest.approx(theirs.volume, rel=1e-12)
-    assert ours.area == pytest.approx(theirs.area, rel=1e-12)
     assert np.array_equal(points[ours.of], ours.vertices)
     centres = grid.centres(np.argwhere(np.ones(grid.shape, dtype=bool)))
     expected = (centres @ theirs.equations[:, :3].T + theirs.equations[:, 3] <= 0).all(axis=1)
@@ -38,7 +37,7 @@ def test_hull_does_not_depend_on_the_order_of_points(random):
     one, other = convex_hull(points), convex_hull(points[random.permutation(300)])
     assert np.array_equal(one.vertices, other.vertices)
     assert np.array_equal(one.triangles, other.triangles)
-    assert (one.volume, one.area) == (other.volume, other.area)
+    assert one.volume == pytest.approx(other.volume, rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -47,7 +46,6 @@ def test_hull_does_not_depend_on_the_order_of_points(random):
 def test_a_flat_hull_has_no_volume(points):
     hull = convex_hull(points)
     assert hull.volume == 0
-    assert hull.area == 0
     assert hull.triangles.shape == (0, 3)
 
 

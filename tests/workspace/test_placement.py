@@ -15,6 +15,7 @@ from er3a.kinematics.forward import jacobian
 from er3a.kinematics.inverse import inverse
 from er3a.robots.robot import CombinedLimit, Robot
 from er3a.workspace.directions import cone_directions, from_polar, poses, roll_of, tool_rotations
+from er3a.workspace.orientations import asked_of
 from er3a.workspace.placement import (
     MIXED,
     NO,
@@ -37,9 +38,8 @@ TRAY = Task(np.array([0.2, 0.15, 0.05]), DOWN, np.radians(20), 0.0, 0.15, np.rad
 
 
 def places_of(robot: Robot, task: Task, coarsest: float = 0.06) -> Places:
-    roll, robot = roll_of(robot, 2), narrowed(robot, task.margin)
-    field = survey(robot, task, roll, coarsest)
-    return fitting_places(field, task.box)
+    robot = narrowed(robot, task.margin)
+    return fitting_places(survey(robot, task, asked_of(robot, 2), coarsest), task.box)
 
 
 def lattice_in(centre: np.ndarray, size: np.ndarray, spacing: np.ndarray) -> np.ndarray:
@@ -60,7 +60,7 @@ def random_service(task: Task, centre: np.ndarray, size: np.ndarray, roll, rando
 def test_places_agree_with_brute_force_one_pose_at_a_time():
     robot = load_robot("er3_600")
     task = Task(np.array([0.2, 0.1, 0.1]), DOWN, 0.0, 0.2, 0.15)
-    field = survey(robot, task, roll_of(robot, 1), 0.1)
+    field = survey(robot, task, asked_of(robot, 1), 0.1)
     assert field.spacing == pytest.approx([0.1, 0.1, 0.1])
     (rotation,) = tool_rotations(cone_directions(DOWN, 0.0), roll_of(robot, 1))[:, 0]
     good = np.zeros(field.manipulability_any.shape, dtype=bool)
@@ -123,7 +123,7 @@ def test_places_serve_nearly_all_random_points_and_directions(name, random):
 @pytest.mark.long
 def test_a_box_that_is_moved_as_far_as_is_said_is_served_on_the_way_and_no_step_farther(random):
     robot, roll = load_robot("er3_600"), roll_of(load_robot("er3_600"), 2)
-    found = find_places(robot, TRAY, roll, 0.05, 4)
+    found = find_places(robot, TRAY, asked_of(robot, 2), 0.05, 4)
     held, moved = narrowed(robot, TRAY.margin), 0
     for row in found.chosen:
         place = found.places.rows(np.array([row]))
@@ -179,7 +179,7 @@ def test_harder_tasks_are_never_easier():
         if harder.half_angle == TRAY.half_angle:
             assert set(fewer) <= set(most)
     larger = replace(TRAY, box=np.array([0.3, 0.15, 0.1]))
-    fields = [survey(robot, task, roll_of(robot, 1), 0.05) for task in (TRAY, larger)]
+    fields = [survey(robot, task, asked_of(robot, 1), 0.05) for task in (TRAY, larger)]
     assert fields[0].spacing == pytest.approx(fields[1].spacing)
     small, large = (fitting_places(fields[0], task.box) for task in (TRAY, larger))
     assert 0 < len(large.slot) < len(small.slot)

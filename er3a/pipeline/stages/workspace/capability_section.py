@@ -136,8 +136,7 @@ def _room(place: model.PlaceSummary, axes: str = "xyz") -> str:
 
 def place_row(name: str, place: model.PlaceSummary, capability: model.CapabilitySummary) -> list[str]:
     if place.branch is None and capability.arm_angles > 1:
-        branch = tr("with joints {joints} at several values", joints=numbers(capability.held_joints))
-        branch = branch if capability.held_joints else tr("at several arm angles")
+        branch = tr("at several values of what poses leave open")
     elif place.branch is None:
         branch = tr("changes within the tray") if capability.named_branches else tr("not known: branches have no names")
     else:
@@ -152,10 +151,6 @@ def place_row(name: str, place: model.PlaceSummary, capability: model.Capability
         bracketed(fixed(place.clearance_mm, 0), say(place.clearance_pair) if place.clearance_pair is not None else ""),
         _room(place) or fixed(0, 0),
     ]
-
-
-def numbers(joints: tuple[int, ...]) -> str:
-    return ", ".join(str(joint) for joint in joints)
 
 
 _EDGE_ON = 1e-6  # by which a plane's normal may leave the drawing for the plane to be a line in it
@@ -213,9 +208,7 @@ def upright_slices(robot: Robot, capability: model.CapabilitySummary, cells: mod
             tr("IK solutions per orientation reached"),
             (0, max(1, capability.overall.most_solutions)),
         ),
-        (cells.manipulability_m3, 100 / best, tr("best manipulability (% of the arm's best)"), (0, 100))
-        if capability.sliding
-        else (cells.manipulability_m3, 1e3, tr("best manipulability (10⁻³ m³)"), (0, None)),
+        (cells.manipulability_m3, 100 / best, tr("best manipulability (% of the arm's best)"), (0, 100)),
     )
     flat = float(np.ptp(z) / np.ptp(x))
     figure, axes = new_figure(1, 3, width=12.0, height=min(5.2, 2.0 + 3.6 * flat), sharey=True)
@@ -449,38 +442,26 @@ def _pictures(robot: Robot, results: model.WorkspaceResults, capability: model.C
 
 
 def _clear_caption(clear: model.ClearSummary, assumed: bool) -> str:
-    if clear.scene is None:
-        what = tr("An estimate by volume: {share} % of the poses reached can be held without the arm touching itself.",
-                  share=number(100 * clear.share, 2))  # fmt: skip
-    else:
-        what = tr(
-            "An estimate by volume: {share} % of the poses reached can be held without touching “{scene}” or the arm "
-            "itself.",
-            share=number(100 * clear.share, 2),
-            scene=own_title(clear.scene),
-        )
-    numbers = {
-        "tries": clear.tries,
-        "reached": number(clear.reached),
-        "clear": number(clear.clear),
-        "without": number(clear.without),
-    }
-    tried = tr(
-        "{tries} random poses were tried in each cell and sector: {reached} are reached, {clear} of them {held}; in "
-        "{without} cells and sectors none was found. Outer cells hold more volume, so the share is not the quotient of "
-        "these counts. Shares of so few tries distinguish good regions from bad ones, not single cells.",
+    touched = tr("“{scene}” or the arm itself", scene=own_title(clear.scene)) if clear.scene else tr("the arm itself")
+    return tr(
+        "An estimate by volume: {share} % of the poses reached can be held without touching {touched}. {tries} random "
+        "poses were tried in each cell and sector: {reached} are reached, {clear} of them {held}; in {without} cells "
+        "and sectors none was found. Outer cells hold more volume, so the share is not the quotient of these counts. "
+        "Shares of so few tries distinguish good regions from bad ones, not single cells.",
+        share=number(100 * clear.share, 2),
+        touched=touched,
+        tries=clear.tries,
+        reached=number(clear.reached),
+        clear=number(clear.clear),
+        without=number(clear.without),
         held=tr("clear of the assumed shapes") if assumed else tr("proven collision-free"),
-        **numbers,
     )
-    return tr("{first} {rest}", first=what, rest=tried)
 
 
 def _level_caption(capability: model.CapabilitySummary) -> str:
-    if capability.bar_m:
-        return tr("The arm can do the same everywhere along the slide, up to its ends.")
     if capability.sectors == 1:
         return tr("Joint 1 makes a full turn, so what counts is the distance from axis 1 and the height alone.")
-    return tr("Joint 1 is limited: blank sectors are out of its reach.")
+    return tr("Joint 1 is limited: blank parts are out of its reach.")
 
 
 def _slices_caption(capability: model.CapabilitySummary) -> str:
@@ -535,23 +516,13 @@ def _asked_text(capability: model.CapabilitySummary) -> str:
 def _roll_text(capability: model.CapabilitySummary) -> str:
     if capability.asked != "directions":
         return ""
-    rolls = tr("left free") if capability.roll.free else capability.roll.per_direction
-    if capability.held_joints:
-        return tr(
-            "Joints that the pose leaves open ({joints}) were tried at {values} values, and a direction counts if it "
-            "is reached at one of them: more may be reached between them. Solutions are those of one value. Rolls "
-            "about the tool's own axis: {rolls}.",
-            joints=numbers(capability.held_joints),
-            values=capability.arm_angles,
-            rolls=rolls,
-        )
     if capability.arm_angles > 1:
         return tr(
-            "Each pose was tried at {angles} arm angles, and a direction counts if it is reached at one of them: more "
-            "may be reached between them. Solutions are those of one arm angle. Rolls about the tool's own axis: "
-            "{rolls}.",
-            angles=capability.arm_angles,
-            rolls=rolls,
+            "Each pose was tried at {values} values of what it leaves open, and a direction counts if it is reached at "
+            "one of them: more may be reached between them. Solutions are those of one value. Rolls about the tool's "
+            "own axis: {rolls}.",
+            values=capability.arm_angles,
+            rolls=tr("left free") if capability.roll.free else capability.roll.per_direction,
         )
     if capability.roll.free and not capability.roll.last_joint:
         return tr("The roll about the tool's own axis is left out: with five joints the arm can't choose it.")
@@ -568,7 +539,7 @@ def _roll_text(capability: model.CapabilitySummary) -> str:
 
 
 def _task_text(task: model.TaskSummary, capability: model.CapabilitySummary) -> str:
-    box = " × ".join(number(value, 4).rstrip(".") for value in map(_whole, task.box_mm))
+    box = " × ".join(f"{value:g}" for value in task.box_mm)
     direction = ", ".join(fixed(value, 2).removesuffix(".00") for value in task.tool_direction)
     shown = {
         "box": box,
@@ -613,7 +584,3 @@ def _task_text(task: model.TaskSummary, capability: model.CapabilitySummary) -> 
             clear=clear,
         )
     return joined([served, stands], " ")
-
-
-def _whole(value: float) -> float | int:
-    return int(value) if value == int(value) else value

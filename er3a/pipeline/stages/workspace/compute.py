@@ -34,8 +34,6 @@ from er3a.workspace.causes import single_changes
 from er3a.workspace.proven import SETTLED, Proven, prove_robot
 from er3a.workspace.voids import Hull, Void, convex_hull, pocket_block, proven_voids
 
-COARSE = 0.15  # of the volume: a proof that leaves more undecided has been seen to take a hole for the shoulder's
-
 
 def judge(hull_volume: float, voids: Sequence[Void], undecided: float) -> Verdict[model.WorkspaceFinding]:
     """The stage's verdict.
@@ -172,7 +170,7 @@ def _summary(
             proven.count_in_empty(forward(robot, samples.q_kept)[:, :3, 3]),
             _bars(proven),
         ),
-        hull=model.HullSummary(hull.volume, hull.area),
+        hull=model.HullSummary(hull.volume),
         reach_m=reach,
         axis=model.AxisSummary(
             model.triple(grid.axis_point), model.triple(grid.axis), model.triple(shoulder_of(robot, grid))
@@ -197,7 +195,7 @@ def _left_out(settings: WorkspaceSettings, proven: Proven, tool: ToolCapability)
     lower, upper = proven.proof.bounds
     if upper > lower:
         yield LeftOut("undecided_volume", amount=1000 * (upper - lower))
-    if proven.proof.width > COARSE:
+    if proven.proof.width > SETTLED:
         yield LeftOut("hidden_voids", amount=100 * proven.proof.width)
     yield LeftOut("colliding_reach")
     found, placement = tool.capability, tool.placement

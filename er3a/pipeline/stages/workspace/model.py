@@ -223,7 +223,6 @@ class HullSummary:
     """Convex hull of the extreme samples."""
 
     volume_m3: float
-    area_m2: float
 
 
 @dataclass(frozen=True)
@@ -283,10 +282,8 @@ class CapabilitySummary:
     asked : what cells are asked for: directions over the sphere, tilts in the plane that the arm's joints keep the tool
         in, turns about the axes of a SCARA, or points alone; ``directions`` is how many of these
     bar_m : length of cells along y of ``frame``, where joint 1 slides (``sectors`` are parts of it); 0 for rings
-    arm_angles : at how many values of what a pose leaves open to a redundant arm each is tried (else 1);
-        ``held_joints`` are the joints (from 1) held at these, none where it is an arm angle
+    arm_angles : at how many values of what a pose leaves open to a redundant arm each is tried (else 1)
     named_branches : whether its branches have names
-    sliding : whether some joint slides; manipulability then has less than three lengths as factors
     coarse : whether cells are coarser and directions fewer than the study says, since a pose takes this arm long
     """
 
@@ -299,9 +296,7 @@ class CapabilitySummary:
     roll: RollSummary
     overall: Overall
     arm_angles: int
-    held_joints: tuple[int, ...]
     named_branches: bool
-    sliding: bool
     coarse: bool
     clear: ClearSummary
 

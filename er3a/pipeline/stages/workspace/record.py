@@ -13,13 +13,21 @@ from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.numbers import at_least, at_most, fixed
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MUTED, REFERENCE, rgb
 from er3a.pipeline.viewing.recording import Logged, record_stage
 
 POINT_SHARE = 0.16  # radius of a point of the cloud, of the mean distance between points
 DIMMEST = 0.4  # of the colour scale: darker points can't be seen on the viewer's ground
 _COLOURS = {"enclosed": HIGHLIGHT, "open": REFERENCE}
+
+
+NOTE = """# Workspace of {title}
+{findings}
+
+**Look first** at the voids inside the hull, right: enclosed ones in magenta, open pockets in orange.
+
+- left: tool positions, the half between you and the arm cut away; yellow: high manipulability, dark: near-singular.
+  `/workspace/cloud/near` is the rest"""
 
 
 def record(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -> None:
@@ -29,7 +37,7 @@ def record(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
         study,
         stored,
         output,
-        _note(results.summary),
+        NOTE,
         views={
             "Cloud, near half cut away": ["cloud/far/**"],
             "Voids inside the hull": ["hull/**", "voids/**"],
@@ -83,22 +91,3 @@ def _normals(corners: Reals, faces: Integers) -> Reals:
     for i in range(3):
         np.add.at(normals, faces[:, i], across)
     return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
-
-
-def _note(summary: model.WorkspaceSummary) -> str:
-    lines = [
-        "# Workspace of {title}",
-        "{findings}",
-        "",
-        "**Look first** at the voids inside the hull, right: enclosed ones in magenta, open pockets in orange.",
-        "",
-        "- left: tool positions, the half between you and the arm cut away; yellow: high manipulability, dark: "
-        "near-singular. `/workspace/cloud/near` is the rest",
-    ]
-    if summary.voids:
-        lines += ["", "| void | volume (L) | centre x, y, z (mm) |", "|---|---|---|"]
-    for number, void in enumerate(summary.voids[:5], start=1):
-        centre = ", ".join(fixed(1000 * value, 0) for value in void.centroid_m)
-        low, high = 1000 * void.volume_m3.lower, 1000 * void.volume_m3.upper
-        lines.append(f"| {void.kind}_{number} | {at_least(low, 'L')} to {at_most(high, 'L')} | {centre} |")
-    return "\n".join(lines)

@@ -23,8 +23,6 @@ from er3a.pipeline.viewing.page import Picture, render_stage
 from er3a.pipeline.viewing.tray import Placing, placing_of
 from er3a.robots.robot import Robot
 
-LISTED = 12
-
 
 def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -> None:
     """Render the workspace page of a robot from its results."""
@@ -42,8 +40,7 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
         pocket_mm=3000 * summary.pocket_block_m,
         turning=workspace_figures.in_space(robot, results, scene),
         drawing_head=drawing_head(),
-        void_rows=[_void_row(n, void) for n, void in enumerate(summary.voids[:LISTED], start=1)],
-        voids_more=max(0, len(summary.voids) - LISTED),
+        void_rows=[_void_row(n, void) for n, void in enumerate(summary.voids, start=1)],
         wide=100 * summary.proof.width,
         **context,
     )
@@ -98,34 +95,12 @@ def _litres(low: float, high: float) -> str:
 
 
 def _section_caption(summary: model.WorkspaceSummary) -> str:
-    texts = [
-        tr(
-            "Cells are bars along the slide. What is empty on the right is proven unreachable all along it; blank "
-            "cells on the left were merely not sampled."
-        )
-        if summary.proof.bars
-        else tr(
-            "What is empty on the right is proven unreachable from every side; blank cells on the left were merely not "
-            "sampled."
-        )
-    ]
-    enclosed = summary.enclosed_voids
-    if enclosed and enclosed[0].holds_shoulder:
-        texts.append(tr("The largest enclosed void surrounds the shoulder."))
-    elif enclosed:
-        texts.append(tr("The largest enclosed void is away from the shoulder."))
-    checked, inside = number(summary.proof.points_checked), summary.proof.points_in_empty_cells
-    if inside:
-        texts.append(
-            tr(
-                "Of {checked} recorded samples, {inside} lie in a cell proven unreachable.",
-                checked=checked,
-                inside=inside,
-            )
-        )
-    else:
-        texts.append(tr("Of {checked} recorded samples, none lies in a cell proven unreachable.", checked=checked))
-    return joined(texts, " ")
+    return tr(
+        "What is empty on the right is proven unreachable all around (along a slide: all along); blank cells on the "
+        "left were merely not sampled. Of {checked} recorded samples, {inside} lie in a cell proven unreachable.",
+        checked=number(summary.proof.points_checked),
+        inside=summary.proof.points_in_empty_cells,
+    )
 
 
 def _slices_caption(summary: model.WorkspaceSummary) -> str:

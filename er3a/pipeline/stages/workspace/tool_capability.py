@@ -17,7 +17,6 @@ import numpy as np
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import Pair
 from er3a.collision.scene import Scene
-from er3a.kinematics.by_class import parameters_of
 from er3a.kinematics.solutions import slot_labels
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import stated
@@ -218,9 +217,7 @@ def tool_capability(
         roll=model.RollSummary(asked.roll.free, len(asked.roll.angles), asked.roll.last_joint),
         overall=overall(found, cells, frame.bar),
         arm_angles=tried_values(robot),
-        held_joints=tuple(parameter.joint + 1 for parameter in parameters_of(robot) if parameter.joint >= 0),
         named_branches=bool(slot_labels(robot)),
-        sliding=bool(robot.sliding.any()),
         coarse=plan.coarse,
         clear=_clear_summary(cells, frame.bar, found.reachability, tried, scene),
     )
@@ -257,7 +254,7 @@ def _placed(
         return model.PlacementTooLong(task_summary(settings.placement)), model.BoxPlaces.empty()
     within = narrowed(robot, task.margin)
     bodies, free = Bodies(robot, scene), partial(Bodies(within, scene).free, margin=margin)
-    placement = find_places(robot, task, asked.roll, plan.lattice, LISTED, free=free, in_cone=asked.in_cone)
+    placement = find_places(robot, task, asked, plan.lattice, LISTED, free)
     placed = _placement_summary(settings.placement, task, placement, scene, margin)
 
     def listed(own: Task, found: BoxPlacement) -> tuple[model.PlaceSummary, ...]:
@@ -305,7 +302,7 @@ def _on_support(
     for k in range(max(1, round(task.box[2] / layer))):  # a box lower than half a layer is asked for whole
         left_out = np.array([0.0, 0.0, k * layer])
         part = replace(task, box=task.box - left_out, lowest=support.height + k * layer, support=support)
-        found = find_places(robot, part, plan.asked.roll, plan.lattice, 1, free=free, in_cone=plan.asked.in_cone)
+        found = find_places(robot, part, plan.asked, plan.lattice, 1, free)
         if found.chosen:
             break
     return part, found
@@ -320,7 +317,7 @@ def _whole_box(served: model.PlaceSummary, task: Task) -> model.PlaceSummary:
 def _in_reach(within: Robot, part: Task, plan: CapabilityPlan) -> bool:
     """Whether the box fits somewhere where only reach counts."""
     assert plan.lattice is not None
-    field = survey(within, part, plan.asked.roll, plan.lattice, in_cone=plan.asked.in_cone)
+    field = survey(within, part, plan.asked, plan.lattice)
     return bool(len(fitting_places(field, part.box).slot))
 
 
