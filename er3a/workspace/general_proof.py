@@ -382,6 +382,8 @@ def _covers_axis(arm: GeneralArm, cell: Cell, memory: Memory) -> bool:
             moved = dot(along, inverse[0]) * miss[0] + dot(along, inverse[1]) * miss[1]
             moved = memory.v[j] + min(max(w * (moved + dot(along, inverse[2]) * miss[2]), -0.4), 0.4)
             memory.v[j] = min(max(moved, arm.v_lower[j]), arm.v_upper[j])
+    if far > 0.05 * half:
+        return False
     for j in range(m):
         along, w = _column(arm, columns, j), 2.0 * half * memory.weights[j] / det
         change[j] = w * (abs(dot(along, inverse[0])) + abs(dot(along, inverse[1])) + abs(dot(along, inverse[2])))
@@ -391,7 +393,8 @@ def _covers_axis(arm: GeneralArm, cell: Cell, memory: Memory) -> bool:
     for k in range(1, n):
         for j in range(m):
             memory.moves[k] += abs(arm.drive[k, j]) * change[j]
-    return bool(far + 0.5 * curvature(arm, memory.moves, memory.radii) < half)
+    # The hundredth is for the rounding of the inverse.
+    return bool(far + 0.5 * curvature(arm, memory.moves, memory.radii) < 0.99 * half)
 
 
 @inner_kernel

@@ -98,10 +98,9 @@ def compute(study: Study, name: str, parts: Sequence[Path] | None = None) -> mod
     robot = study.robot(name)
     samples = _samples(study, robot, parts)
     grid, hull = samples.grid, samples.hull
-    shoulder = shoulder_of(robot, grid)
     settings, motion = study.section(WorkspaceSettings), study.section(TrajectorySettings)
     proven = prove_robot(robot, settings.proof_cells, study.seed)
-    voids = proven_voids(robot, proven, hull, shoulder)
+    voids = proven_voids(robot, proven, hull, shoulder_of(robot, grid))
     scene = study.scene(name, "capability")
     assumed = shapes_assumed(robot, study.assumed_margin(name), {})
     margin = study.assumed_margin(name) if assumed else motion.penetration_tolerance_mm / 1000
@@ -149,13 +148,12 @@ def _summary(
     assumed: ShapesAssumed | None,
 ) -> model.WorkspaceSummary:
     settings, grid, hull = study.section(WorkspaceSettings), samples.grid, samples.hull
-    lower, upper = proven.proof.bounds
     judged = judge(hull.volume, voids, proven.proof.width)
     if isinstance(judged.finding, model.VoidUnexpected) and not wrist_partition_missing(robot):
         tried = single_changes(robot, judged.finding.cause, study.seed)
         judged = replace(judged, finding=replace(judged.finding, single_changes=tried))
     examined = not isinstance(tool.capability, model.CapabilityMissing)
-    volume = model.Bounds(lower, upper)
+    volume = model.Bounds(*proven.proof.bounds)
     reach = search_reach(robot, grid, samples.q_kept)
     return model.WorkspaceSummary(
         verdict=judged.without(tool.unexamined).resting_on(assumed if examined else None),

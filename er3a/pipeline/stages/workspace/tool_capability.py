@@ -1,4 +1,4 @@
-"""Capability of the tool: cells, dexterous core and places for the box.
+"""Capability of the tool: cells and places for the box.
 
 The resolution of the capability map, chosen so that it takes no longer than the time stated here.
 
