@@ -498,7 +498,7 @@ def _sampled(arm: GeneralArm, samples: int, seed: int) -> tuple[Postures, Memory
     return known, room
 
 
-def unfilled_about(arm: GeneralArm, rho: Reals, z: Reals, samples: int, seed: int = 0) -> Reals:
+def unfilled_about(arm: GeneralArm, rho: Reals, z: Reals, samples: int) -> Reals:
     """What is not proven filled about points of the section.
 
     Parameters
@@ -515,7 +515,7 @@ def unfilled_about(arm: GeneralArm, rho: Reals, z: Reals, samples: int, seed: in
     cells = np.stack([rho - half, rho + half, z - half, z + half], axis=1)
     unfilled, counts = np.full((n, MAX_ARCS, 2), np.nan), np.ones(n, dtype=np.int64)
     unfilled[:, 0] = 0.0, TURN
-    fill_cells(arm, cells, unfilled, counts, *_sampled(arm, samples, seed), TRIES)
+    fill_cells(arm, cells, unfilled, counts, *_sampled(arm, samples, 0), TRIES)
     unfilled[np.arange(MAX_ARCS) >= counts[:, None]] = np.nan
     return unfilled
 
