@@ -25,7 +25,7 @@ from er3a.collision.scene import Box, Plane, Scene
 from er3a.diagnosis.diagnose import diagnosis_of
 from er3a.files.reference_sets import load_references
 from er3a.kinematics import forward as forward_module
-from er3a.pipeline.stages.workspace.model import GrowthCurve
+from er3a.pipeline.stages.workspace.model import Border
 from er3a.robots.masses import Drives, Masses
 from er3a.robots.robot import Robot
 from er3a.robots.usable import check_robot
@@ -477,13 +477,13 @@ def test_evidence_is_a_table_of_a_screen(arm):
 
 
 def test_a_table_s_units_and_meanings_reach_pandas(tmp_path):
-    table = GrowthCurve.of_rows([(1.0, 2, 3.0), (4.0, 5, 6.0)])
-    table.write(tmp_path / "curve.parquet")
-    frame = er3a.load_table(tmp_path / "curve.parquet")
-    assert frame.attrs["columns"]["touched_m3"] == {"unit": "m^3", "meaning": "volume of the touched cells"}
+    table = Border.of_rows([(1.0, 2.0, 3), (4.0, 5.0, 6)])
+    table.write(tmp_path / "border.parquet")
+    frame = er3a.load_table(tmp_path / "border.parquet")
+    assert frame.attrs["columns"]["rho_m"] == {"unit": "m", "meaning": "distance from axis 1"}
     assert frame.attrs == table.frame().attrs
     assert (frame == table.frame()).all(axis=None)
-    assert GrowthCurve.read((tmp_path / "curve.parquet").read_bytes()) == table
+    assert Border.read((tmp_path / "border.parquet").read_bytes()) == table
     assert "not a Parquet file" in refusal(lambda: er3a.load_table(__file__))
     assert "No such file" in refusal(lambda: er3a.load_table(tmp_path / "none.parquet"))
 

@@ -667,30 +667,29 @@ def test_validation_of_seven_joints_names_what_diagnosis_leaves_out(study):
     assert "more_faults" in found
 
 
-@pytest.mark.parametrize("arm", [None, "a section's"])
 @pytest.mark.parametrize("width", [0.1, 0.2])
-def test_a_proof_that_leaves_much_undecided_names_hidden_voids_of_any_arm(study, arm, width):
-    proven = SimpleNamespace(proof=SimpleNamespace(bounds=(0.5, 1.0), width=width), arm=arm)
+def test_a_proof_that_leaves_much_undecided_names_hidden_voids(study, width):
+    proven = SimpleNamespace(proof=SimpleNamespace(bounds=(0.5, 1.0), width=width))
     tool = SimpleNamespace(capability=CapabilityMissing("a reason"), placement=None)
-    left_out = STAGES["workspace"].module("compute")._left_out(study.workspace, proven, None, (), tool)
+    left_out = STAGES["workspace"].module("compute")._left_out(study.workspace, proven, tool)
     assert ("hidden_voids" in {each.subject for each in left_out}) == (width == 0.2)
 
 
 @pytest.mark.long
 def test_a_proof_cut_short_takes_no_hole_for_the_shoulders(study):
     """The article's table leaves a hole where none belongs, which few cells can't tell from the shoulder's."""
-    small = {"samples": 3000, "blocks": 1, "cells_across": 8, "volume_points": 100}
-    little = {"directions": 12, "proof_poses": 1, "scene": None, "placement": BoxTask(cone_deg=5)}
+    small = {"samples": 3000, "blocks": 1, "cells_across": 8}
+    little = {"directions": 12, "scene": None, "placement": BoxTask(cone_deg=5)}
     article = study.model_copy(update={"robots": {"er3a_c60_article": study.robots["er3a_c60_article"]}})
     verdicts = {}
-    for cells in (100, 2000):
+    for cells in (10, 2000):
         sections = {"workspace": small | {"proof_cells": cells}, "capability": little}
         made = {name: getattr(article, name).model_copy(update=values) for name, values in sections.items()}
         verdicts[cells] = workspace(article.model_copy(update=made), "er3a_c60_article").summary.verdict
     assert verdicts[2000].finding.code == "workspace.void_unexpected"
     assert verdicts[2000].missed == ()
-    assert verdicts[100].status == "caution"
-    assert [each.subject for each in verdicts[100].missed] == ["hidden_voids"]
+    assert verdicts[10].status == "caution"
+    assert [each.subject for each in verdicts[10].missed] == ["hidden_voids"]
 
 
 SOLIDS = {
@@ -1122,19 +1121,17 @@ def test_a_link_that_looks_larger_than_its_shapes_is_named(link, farthest, reach
 
 @pytest.mark.long
 def test_workspace_names_what_samples_and_budgets_leave_open(study):
-    small = {"samples": 3000, "blocks": 1, "cells_across": 8, "proof_cells": 50, "volume_points": 100}
-    little = {"directions": 12, "proof_poses": 1, "scene": None, "placement": BoxTask(cone_deg=5)}
+    small = {"samples": 3000, "blocks": 1, "cells_across": 8, "proof_cells": 50}
+    little = {"directions": 12, "scene": None, "placement": BoxTask(cone_deg=5)}
     results = workspace(changed(study, workspace=small, capability=little), ROBOT)
     found, summary = subjects(results), results.summary
     assert found["joint_vectors"].amount == 3000
-    volume, core = summary.volume_m3, summary.capability.core_m3
+    volume = summary.volume_m3
     assert found["undecided_volume"].amount == pytest.approx(1000 * (volume.upper - volume.lower))
-    assert found["undecided_core"].amount == pytest.approx(1000 * (core.upper - core.lower))
     assert found["tool_directions"].amount == 12
     assert {"obstacles", "colliding_reach", "carried", "tool"} <= found.keys()
     placed = summary.placement
-    if placed.fitting > placed.fitting_proven:
-        assert found["sampled_places"].amount == placed.fitting - placed.fitting_proven
+    assert found["sampled_places"].amount == placed.fitting
     assert found["between_places"].amount == pytest.approx(1000 * max(placed.spacing_m))
     assert summary.verdict.shapes is not None
     assert placed.margin_mm == summary.verdict.shapes.margin_mm == 1000 * ASSUMED_MARGIN
@@ -1164,7 +1161,6 @@ LEFT_OUT_BY_SETTINGS = {
     "capability": {
         "directions": "tool_directions",
         "rolls": "tool_directions",
-        "proof_poses": "undecided_core",
         "scene": "obstacles",
         "placement": "between_places",
     },
@@ -1197,7 +1193,7 @@ LEFT_OUT_BY_SETTINGS = {
     "programs": {"most_steps": "program_lines", "most_branches": "program_lines", "loop_rounds": "program_lines"},
 }
 LEAVE_NOTHING_OUT = {
-    "workspace": ("sampling", "blocks", "cells_across", "hull_directions", "cloud_points", "volume_points"),
+    "workspace": ("sampling", "blocks", "cells_across", "hull_directions", "cloud_points"),
     "inverse": ("map_cells",),
     "trajectory": (
         *("near_wrist_deg", "near_elbow_deg", "near_shoulder_mm"),

@@ -199,12 +199,8 @@ TEXTS = texts(
         "left_out.hidden_voids": (
             "what voids lie in the {amount:.0f} % of the volume that so few proof_cells leave undecided"
         ),
-        "left_out.area": "the area that the tool point reaches, or one of its bounds",
-        "left_out.sampled_voids": "whether {amount:.0f} voids that are known from samples only are empty",
         "left_out.tool_directions": "tool directions between the {amount:,.0f} that were asked in each cell",
         "left_out.capability": "tool directions, and where a tray can stand",
-        "left_out.core": "where the tool reaches all directions",
-        "left_out.undecided_core": "{amount:.3g} L of which it is undecided whether the tool reaches all directions",
         "left_out.places": "where the tray can stand: a pose takes too long with this arm",
         "left_out.sampled_places": (
             "points and directions between those asked, at {amount:,.0f} places for the tray that pass by samples only"
