@@ -38,7 +38,6 @@ PUSHES = 1.1, 3.0, 8.0  # of the tolerance's step
 FARTHER = 1.5  # times as far as known, for a table to be looked at
 ROUNDS, PUSHED_FROM, SEED = 3, 6, 20261121
 STAYING = 0.9  # of a half-width, to within which spread starts are led
-BEYOND = 0.02  # of an interval, by which a far table leaves it
 STAYS_FROM = 4  # tables elsewhere, from which one with an entry as it is is looked for
 FIRST_PUSH, FINE, MOST_PUSHES = 0.1, 0.01, 26  # of an entry's scale; of what was reached
 
@@ -131,6 +130,7 @@ class Extents:
     ----------
     met : whether a table that meets the requirements was found; table_meets : whether the table does
     far : tables far away that meet them, too, once these were searched for: how far such go was not
+    goes_far : whether these differ in most entries: then no search tells where any entry ends
     """
 
     def __init__(
@@ -157,6 +157,7 @@ class Extents:
             self._begin(nearer)
         self._fit_likelihood()
         self.far: list[tuple[Reals, Reals]] = []
+        self.goes_far = False
         self._ends: dict[bytes, tuple[float, float]] = {}
 
     @property
@@ -244,14 +245,12 @@ class Extents:
         low, high = self._end(own)
         reached = [float(own @ amounts) for _, amounts in self.elsewhere]
         excluded = not (self.table_meets or low - REACTS <= 0 <= high + REACTS or self._could_stay(own))
-        slack, far = BEYOND * (high - low), [float(own @ amounts) for _, amounts in self.far]
-        at_least = any(each < low - slack or each > high + slack for each in far)
         low, high = min([low, *reached]), max([high, *reached])
         if not excluded:
             low, high = min(low, 0.0), max(high, 0.0)
         off = self._off(first, low).worse(self._off(first, high))
         ends = (value + low) * first.in_unit, (value + high) * first.in_unit
-        at_least |= bool(far) and not off.within(self.tolerance.mm, self.tolerance.deg)
+        at_least = self.goes_far or (bool(self.far) and not off.within(self.tolerance.mm, self.tolerance.deg))
         return Extent(*ends, off, excluded, at_least)
 
     def free_choice(self, entry: Entry) -> Extent:
@@ -339,6 +338,7 @@ class Extents:
             if not near or not tried(*self._far_pushes(near, _distinct(best.values())[:PUSHED_FROM])):
                 break
         self.far = _distinct(best.values())
+        self.goes_far = 2 * len({n for n, _ in best}) > len(self.watched)
         return _distinct([*best.values(), *reversed_.values()])
 
     def _far_pushes(self, near: Sequence[int], places: Sequence[tuple[Reals, Reals]]) -> tuple[Reals, Reals, Flags]:
