@@ -1,4 +1,4 @@
-"""The workspace proof at full size: brackets and their cost, samples against empty cells, the stratified estimate.
+"""The workspace proof at full size: brackets and their cost, samples against empty cells.
 
 And the sampling loop's speed beside its parts and Robotics Toolbox, with its peak memory.
 """
@@ -14,6 +14,7 @@ import numpy as np
 import roboticstoolbox as rtb
 
 from er3a import forward, load_robot
+from er3a.geometry.vectors import TURN
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
 from er3a.sampling.grid import make_grid
@@ -21,17 +22,14 @@ from er3a.sampling.random_joints import Draw
 from er3a.sampling.tally import tally_blocks
 from er3a.workspace.general_arm import general_arm
 from er3a.workspace.general_proof import prove_general
-from er3a.workspace.proven import POINT, SectionMap, estimate_volume
-from er3a.workspace.section_arm import TURN, SectionArm, section_arm, section_frame
-from er3a.workspace.section_proof import judge, prove
+from er3a.workspace.proven import SectionMap
 from testing.evidence import sized
 
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
-CELLS = (6_000, 25_000, 60_000)
-SAMPLES, SEED, RUNS, POINTS = sized(100_000_000), 20261120, sized(12, 2), 2000
+SAMPLES, SEED = sized(100_000_000), 20261120
 _BLOCK = 1 << 18
 _SPEED_SAMPLES, _MEMORY_SAMPLES = sized(20_000_000), sized(1_000_000_000)
-GENERAL_CELLS = (8_000, 32_000)  # of a quarter of the default budget, and of it (`proof_cells: 8000`)
+CELLS = (8_000, 32_000)  # of a quarter of the default budget, and of it (`proof_cells: 8000`)
 
 
 @kernel
@@ -56,9 +54,10 @@ def _in_empty(points, R, origin, low, per_length, owner, arcs):
     return found
 
 
-def samples_in_empty(robot, section: SectionMap) -> int:
+def samples_in_empty(robot: Robot) -> int:
     """How many of ``SAMPLES`` random samples fall into cells (or arcs of them) that are proven empty."""
-    R, origin = section_frame(robot)
+    arm, R, origin = general_arm(robot)
+    section = SectionMap(prove_general(arm, 0.0, CELLS[-1], SEED))
     random, found = np.random.Generator(np.random.Philox(key=SEED)), 0
     q, T = np.empty((_BLOCK, 6)), np.empty((_BLOCK, 4, 4))
     for _ in range(-(-SAMPLES // _BLOCK)):
@@ -163,64 +162,37 @@ def general_arms() -> dict[str, Robot]:
     return arms
 
 
-def general_row(name: str, robot: Robot, cells: int) -> str:
-    """One arm's bracket by the general method."""
+def row(name: str, robot: Robot, cells: int) -> str:
+    """One arm's bracket."""
     arm = general_arm(robot)[0]
     start = time.process_time()
-    proof = prove_general(arm, 0.0, cells, SEED)[0]
+    proof = prove_general(arm, 0.0, cells, SEED)
     (lower, upper), busy = proof.bounds, time.process_time() - start
     return f"| {name} | {cells:,} | {lower:.4f} | {upper:.4f} | {proof.width:.2%} | {busy:.0f} |"
 
 
 def table() -> str:
     """The evidence as Markdown."""
+    own = {name: load_robot(name) for name in ROBOTS}
+    arms = own | general_arms()
     lines = [
         "# The workspace at full size",
         "",
         "On a shared machine. Seed 20261120. Written by `make campaigns ARGS=workspace`. Width is",
-        "(upper - lower) / upper of the reached volume; two threads.",
-        "",
-        "| robot | cells looked at | lower (m³) | upper (m³) | width | wall time (s) | processor time (s) |",
-        "|---|---|---|---|---|---|---|",
-    ]
-    maps = {}
-    for name in ROBOTS:
-        arm = section_arm(load_robot(name))
-        prove(arm, 0.0, 1)
-        for cells in CELLS:
-            start, busy = time.perf_counter(), time.process_time()
-            proof = prove(arm, 0.0, cells, threads=2)
-            elapsed, busy = time.perf_counter() - start, time.process_time() - busy
-            lower, upper = proof.bounds
-            lines.append(
-                f"| {name} | {cells:,} | {lower:.4f} | {upper:.4f} | {proof.width:.2%} | {elapsed:.0f} | {busy:.0f} |"
-            )
-        maps[name] = SectionMap(proof)
-    lines += [
-        "",
-        "The general method, one thread; `puma_560_wrist` has the tool point on the wrist centre (d6 = 0).",
+        "(upper - lower) / upper of the reached volume; one thread. `puma_560_wrist` has the tool point on the wrist",
+        "centre (d6 = 0).",
         "",
         "| arm | cells looked at | lower (m³) | upper (m³) | width | processor time (s) |",
         "|---|---|---|---|---|---|",
-        *(general_row(name, robot, cells) for name, robot in general_arms().items() for cells in GENERAL_CELLS),
+        *(row(name, robot, cells) for name, robot in arms.items() for cells in CELLS),
         "",
         f"Random samples ({SAMPLES:,} per robot, joints uniform within their limits) in the cells of the last row that",
-        f"are proven empty; and the root mean square error of the volume over {RUNS} runs of {POINTS:,} points,",
-        "against the middle of the bracket: uniform points in what the proof with 6,000 cells leaves open, as dense as",
-        "these in the bounding solid, and the stratified estimate there (the proof's cost is not counted).",
+        "are proven empty:",
         "",
-        "| robot | samples in empty cells | uniform (m³) | stratified (m³) | ratio |",
-        "|---|---|---|---|---|",
+        "| robot | samples in empty cells |",
+        "|---|---|",
+        *(f"| {name} | {samples_in_empty(robot)} |" for name, robot in own.items()),
     ]
-    for name in ROBOTS:
-        robot, section = load_robot(name), maps[name]
-        arm = section_arm(robot)
-        coarse = SectionMap(prove(arm, 0.0, 6000))
-        exact = sum(section.proof.bounds) / 2
-        plain_errors = [estimate_volume(arm, coarse.proof, POINTS, seed).value - exact for seed in range(RUNS)]
-        strata = [_stratified_volume(arm, coarse, POINTS, seed) - exact for seed in range(RUNS)]
-        a, b = (float(np.sqrt(np.mean(np.square(errors)))) for errors in (plain_errors, strata))
-        lines.append(f"| {name} | {samples_in_empty(robot, section)} | {a:.5f} | {b:.5f} | {a / b:.0f} |")
     lines += [
         "",
         "## Sampling",
@@ -238,29 +210,6 @@ def table() -> str:
         f"samples: {peak_memory()} MiB, libraries included.",
     ]
     return "\n".join(lines) + "\n"
-
-
-def _stratified_volume(arm: SectionArm, section: SectionMap, points: int, seed: int) -> float:
-    """Estimate (m^3) that spends its points where the proof leaves something open: the rest is known exactly.
-
-    Each point stands for its whole ring (the symmetry about axis 1): what counts is how much of it is reached.
-    """
-    proof = section.proof
-    volume = proof.volumes * (proof.unfilled_ratio - proof.empty_ratio)
-    share = np.cumsum(volume) / volume.sum()
-    random = np.random.Generator(np.random.Philox(key=seed))
-    unit = random.random((points, 2))
-    # Evenly spaced strata over the open volume, one point in each.
-    cell = np.searchsorted(share, (np.arange(points) + random.random(points)) / points).clip(max=len(share) - 1)
-    a, b, c, d = proof.cells[cell].T
-    rho, z = np.sqrt(a * a + (b * b - a * a) * unit[:, 0]), c + (d - c) * unit[:, 1]
-    half = POINT / 2
-    rho = np.maximum(rho, 2 * half)
-    looked = judge(arm, np.stack([rho - half, rho + half, z - half, z + half], axis=1))
-    open_before = (proof.unfilled_ratio - proof.empty_ratio)[cell]
-    lost = looked.unfilled_ratio / 2 + looked.empty_ratio / 2
-    reached = np.clip(1 - proof.empty_ratio[cell] - lost, 0, None) - (1 - proof.unfilled_ratio[cell])
-    return proof.bounds[0] + float(volume.sum() * np.clip(reached / open_before, 0, 1).mean())
 
 
 if __name__ == "__main__":

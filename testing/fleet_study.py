@@ -29,8 +29,8 @@ SCANNED = 33
 MET = 1e-7  # m and parts of 1: a row that is farther from its pose is invented
 SMALLER = {
     "validation": {"round_trips": 50, "reach_starts": 8},
-    "workspace": {"samples": 40000, "blocks": 4, "cells_across": 16, "proof_cells": 500, "volume_points": 5000},
-    "capability": {"directions": 40, "rolls": 2, "proof_poses": 20000},
+    "workspace": {"samples": 40000, "blocks": 4, "cells_across": 16, "proof_cells": 500},
+    "capability": {"directions": 40, "rolls": 2},
     "collision": {"samples": 2000, "cells_across": 8},
     "inverse": {"round_trips": 50, "map_cells": 12},
 }

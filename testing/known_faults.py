@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from er3a.diagnosis.diagnose import least_noticed
+from er3a.comparison.entries import Entry
+from er3a.diagnosis.diagnose import missed
 from er3a.diagnosis.faults import (
     SIDES,
     Fault,
@@ -19,8 +20,9 @@ from er3a.diagnosis.faults import (
     WrongScale,
     entry_of,
     repairs_of,
+    wrong_number,
 )
-from er3a.diagnosis.fitting import MEETS, FreeNumber, minimise_max, moved
+from er3a.diagnosis.fitting import ANGLES, MEETS, minimise_max, moved
 from er3a.diagnosis.ranking import Case, Ranking, rank, usable
 from er3a.kinematics.table_batch import COLUMNS, Tables, robot_of, tables_of
 from er3a.numerics.arrays import Reals
@@ -180,6 +182,20 @@ def _same(table: Tables, right: Tables) -> bool:
     return bool(lengths and max(angles, rest) < SAME_ANGLE and table.modified[0] == right.modified[0])
 
 
+LENGTHS_M = 1e-5 * 1.1 ** np.arange(124)  # up to 1.2 m
+ANGLES_RAD = np.pi / 1.1 ** np.arange(123, -1, -1)  # from 0.0015 deg to half a turn
+
+
+def least_noticed(case: Case, number: Entry) -> float | None:
+    """The least change (m or rad) of an entry, to 10 %, at which some reference is missed, whichever way it is changed;
+    None if there is none up to 1.2 m or half a turn."""
+    sizes = ANGLES_RAD if number.column in ANGLES else LENGTHS_M
+    noticed = missed(case, number, np.concatenate([sizes, -sizes])).reshape(2, -1)
+    if not noticed.any(axis=1).all():
+        return None
+    return float(sizes[noticed.argmax(axis=1).max()])
+
+
 GROSS_M, GROSS_RAD = 0.5, np.radians(170.0)
 
 
@@ -194,7 +210,7 @@ class ScannedEntry:
     smallest : error (m or rad) from which on references notice it; 0 for a direction
     """
 
-    number: FreeNumber | None
+    number: Entry | None
     side: Side | None
     joint: int
     smallest: float
@@ -202,14 +218,16 @@ class ScannedEntry:
     @property
     def gross(self) -> float:
         """The largest error that is tried, m or rad."""
-        return GROSS_RAD if self.number is None or self.number.is_angle else GROSS_M
+        return GROSS_RAD if self.number is None or self.number.column in ANGLES else GROSS_M
 
     def wrong(self, tables: Tables, by: float) -> tuple[Fault, Tables]:
         """One table with the entry wrong by an amount (any for a direction), and the fault."""
         joint = self.joint + 1
         if self.number:
-            given = float(self.number.value(tables)[0])
-            return self.number.fault(given + by, given), moved(tables, [self.number], np.array([[0]]), np.array([[by]]))
+            given = float(self.number.of(tables)[0])
+            return wrong_number(self.number, given + by, given), moved(
+                tables, [self.number], np.array([[0]]), np.array([[by]])
+            )
         column = self.side or "direction"
         fits = float(getattr(tables, column)[0, self.joint])
         given = fits + by if self.side else -fits
@@ -223,9 +241,9 @@ def entries_of(case: Case) -> list[ScannedEntry]:
     """The entries of a right table whose errors its references notice; all directions."""
     found = []
     for number in case.numbers:
-        smallest = least_noticed(case, number) if number.column else None
+        smallest = least_noticed(case, number) if number.joint else None
         if smallest is not None:
-            found.append(ScannedEntry(number, None, number.joint, smallest))
+            found.append(ScannedEntry(number, None, number.joint - 1, smallest))
     joints, right = range(case.given.direction.shape[-1]), case.difference(case.given)[0]
     for side in SIDES:
         for joint in joints:
@@ -281,9 +299,9 @@ def is_identifiable(robot: Robot, pair: Pair, case: Case) -> bool:
     wide, quantities = left_open(references), quantities_of(references)
     moved_by_both = sum(moved_by(robot, fault, references) for fault in pair.alone) / wide
     slopes = [
-        slope_of(case.given, number.column, number.joint, robot, quantities) / wide
+        slope_of(case.given, number.column, number.joint - 1, robot, quantities) / wide
         for number in case.numbers
-        if number.column
+        if number.joint
     ]
     column = np.array(slopes)[:, :, None]
     left = np.tile(moved_by_both, (len(slopes), 1))

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from er3a.calibration.calibrate import calibrate
 from er3a.calibration.observations import Measurement
-from er3a.calibration.parameters import Parameter, corrected
+from er3a.calibration.parameters import corrected
+from er3a.comparison.entries import Entry
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.references.quantities import MM, Pose
@@ -56,7 +57,7 @@ def covered(
     return tuple(parameter.name for parameter in kept), inside, terms
 
 
-def _identifiable(robot: Robot, poses: int, random: np.random.Generator) -> list[Parameter]:
+def _identifiable(robot: Robot, poses: int, random: np.random.Generator) -> list[Entry]:
     q = random.uniform(robot.lower, robot.upper, (poses, 6))
     found = calibrate(robot, measured(robot, q, 1.0, random))
     return [estimate.parameter for estimate in found.estimates]

@@ -25,14 +25,17 @@ from er3a.collision.scene import Box, Plane, Scene
 from er3a.diagnosis.diagnose import diagnosis_of
 from er3a.files.reference_sets import load_references
 from er3a.kinematics import forward as forward_module
-from er3a.pipeline.stages.workspace.model import GrowthCurve
+from er3a.pipeline.stages.workspace.model import Border
 from er3a.robots.masses import Drives, Masses
 from er3a.robots.robot import Robot
 from er3a.robots.usable import check_robot
+from testing.simulated_measurements import measured
 
 PACKAGE = Path(er3a.__file__).parent
 Q = np.radians([20, 10, 15, 30, 40, 50])
 MAX_LETTERS = 4000
+MEASURED = np.random.default_rng(0).uniform(-0.4, 0.4, (20, 6))
+ROWS = measured(er3a.load_robot("er3_600"), MEASURED, 0.05, np.random.default_rng(1))
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +69,7 @@ CALLS: dict[str, Callable[[Any, np.ndarray], Any]] = {
     "load_targets": lambda robot, T: er3a.load_targets("data/targets/er3_600.yaml", robot),
     "diagnose": lambda robot, T: er3a.diagnose(robot, "er3_600"),
     "evidence": lambda robot, T: er3a.evidence(robot, load_references("er3_600").references[:1]),
-    "calibrate": lambda robot, T: er3a.calibrate(robot, load_references("er3_600")),
+    "calibrate": lambda robot, T: er3a.calibrate(robot, ROWS),
     "load_calibration": lambda robot, T: er3a.load_calibration("mine.json", robot),
     "to_modified": lambda robot, T: er3a.to_modified(robot),
     "to_standard": lambda robot, T: er3a.to_standard(robot),
@@ -294,7 +297,7 @@ def shown_objects(arm: Robot, pose: np.ndarray) -> dict[str, Any]:
         "hypotheses": er3a.diagnose(er3a.load_robot("er3a_c60_article"), "er3a_c60"),
         "no hypotheses": er3a.diagnose(arm, "er3_600"),
         "diagnosis": diagnosis_of(arm, load_references("er3_600")),
-        "calibration": er3a.calibrate(arm, load_references("er3_600")),
+        "calibration": er3a.calibrate(arm, ROWS),
         "references": er3a.load_references("er3_600"),
         "scene": er3a.load_scene("data/scenes/table_and_post.yaml"),
         "calibration set": er3a.load_hand_eye("data/vision/carried_camera.yaml", arm),
@@ -474,13 +477,13 @@ def test_evidence_is_a_table_of_a_screen(arm):
 
 
 def test_a_table_s_units_and_meanings_reach_pandas(tmp_path):
-    table = GrowthCurve.of_rows([(1.0, 2, 3.0), (4.0, 5, 6.0)])
-    table.write(tmp_path / "curve.parquet")
-    frame = er3a.load_table(tmp_path / "curve.parquet")
-    assert frame.attrs["columns"]["touched_m3"] == {"unit": "m^3", "meaning": "volume of the touched cells"}
+    table = Border.of_rows([(1.0, 2.0, 3), (4.0, 5.0, 6)])
+    table.write(tmp_path / "border.parquet")
+    frame = er3a.load_table(tmp_path / "border.parquet")
+    assert frame.attrs["columns"]["rho_m"] == {"unit": "m", "meaning": "distance from axis 1"}
     assert frame.attrs == table.frame().attrs
     assert (frame == table.frame()).all(axis=None)
-    assert GrowthCurve.read((tmp_path / "curve.parquet").read_bytes()) == table
+    assert Border.read((tmp_path / "border.parquet").read_bytes()) == table
     assert "not a Parquet file" in refusal(lambda: er3a.load_table(__file__))
     assert "No such file" in refusal(lambda: er3a.load_table(tmp_path / "none.parquet"))
 

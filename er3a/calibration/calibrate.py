@@ -27,7 +27,6 @@ from er3a.calibration.cross_validation import (
     can_leave_out,
     choose_terms,
     left_out,
-    tilts_explain,
 )
 from er3a.calibration.fit import (
     FAR_OUT,
@@ -36,10 +35,8 @@ from er3a.calibration.fit import (
     PLAUSIBLE,
     ROUNDING,
     SCALE,
-    BarLength,
     Fit,
     Subspace,
-    bar_lengths,
     covariance_by_poses,
     fit,
     held_with,
@@ -51,7 +48,7 @@ from er3a.calibration.fit import (
     subspace,
     without_scale,
 )
-from er3a.calibration.observations import Measurement, Observations, PointObservations, Touched, observed, spread
+from er3a.calibration.observations import Measurement, PointObservations, Touched, observed, spread
 from er3a.calibration.outcomes import (
     CalibrationError,
     FixedName,
@@ -61,13 +58,10 @@ from er3a.calibration.outcomes import (
     NoCorrectionFits,
     NoPositions,
     PlacementName,
-    SocketsBeside,
 )
 from er3a.calibration.parameters import (
     DEPENDENT,
     LEVELS,
-    TOOL_COLUMNS,
-    Parameter,
     corrected,
     coupled,
     parameters_of,
@@ -87,9 +81,10 @@ from er3a.calibration.terms import (
     effects,
     places_of,
 )
+from er3a.comparison.entries import TOOL_COLUMNS, Entry
 from er3a.numerics.arrays import Flags, Reals
 from er3a.references.quantities import Pose
-from er3a.references.reference import INTERVAL_95, ReferenceSet
+from er3a.references.reference import INTERVAL_95
 from er3a.robots.robot import Robot
 
 SHOWN_POSES = 3
@@ -108,13 +103,6 @@ AS_GOOD = 1.1  # times what the table leaves
 NEAR_STEPS = 15  # a table that is not far off is fitted in about four
 FEW_SPARE = 10
 """Degrees of freedom below which what remains says how large noise is, but not where; at least as many as numbers."""
-SCALE_EXPLAINED = 1.5
-"""Half-widths by which a correction may differ from the factor's; of 20, chance takes one beyond in 1 of 15 cases."""
-SCALE_BEYOND_CHANCE = 2.0
-"""Half-widths of its own by which a factor differs from 1 at least, about four standard deviations."""
-
-OPPOSITE = -0.5
-"""Cosine of an alpha below which axes may be parallel with opposite directions, so that d along one counts negative."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,11 +119,11 @@ class Level:
     """
 
     name: LevelName
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[Entry, ...]
     subspace: Subspace
     more: MorePositions | MoreTouches | None
-    scale: Parameter | None = None
-    left: tuple[Parameter, ...] = ()
+    scale: Entry | None = None
+    left: tuple[Entry, ...] = ()
 
     @property
     def held(self) -> tuple[outcomes.Held, ...]:
@@ -143,12 +131,12 @@ class Level:
         return (*self.subspace.held, *held_with(self.scale))
 
     @property
-    def kept(self) -> list[Parameter]:
+    def kept(self) -> list[Entry]:
         """Those that are estimated."""
         return [self.parameters[i] for i in self.subspace.kept]
 
 
-def choose_level(robot: Robot, observations: Observations) -> Level:
+def choose_level(robot: Robot, observations: PointObservations) -> Level:
     """The fullest level that the observations determine as far as positions of these points ever can, with numbers to
     spare; at each, base and tool are tried with the table first.
 
@@ -161,12 +149,12 @@ def choose_level(robot: Robot, observations: Observations) -> Level:
         raise CalibrationError(NoPositions(), "there are no positions of single points to calibrate from")
     placed = placements_of(observations.free)
     robot, dependent = _with_rough_tool(robot, observations)
-    scale = scale_of(robot, observations) if isinstance(observations, PointObservations) else None
+    scale = scale_of(robot, observations)
     left = left_of_touched(robot, observations)
-    spare = len(observations) - getattr(observations, "dropped", 0)
+    spare = len(observations) - observations.dropped
     rich = _rich(robot, observations)
     more: list[MorePositions | MoreTouches] = []
-    every: list[Parameter] = []
+    every: list[Entry] = []
     for first in (placed, ()) if placed else ((),):
         for name in LEVELS[::-1]:
             parameters = (*first, *without_scale(parameters_of(robot, name), scale))
@@ -187,7 +175,7 @@ def choose_level(robot: Robot, observations: Observations) -> Level:
     raise CalibrationError(more[-1], problem)
 
 
-def _with_rough_tool(robot: Robot, observations: Observations) -> tuple[Robot, float]:
+def _with_rough_tool(robot: Robot, observations: PointObservations) -> tuple[Robot, float]:
     """The robot with its tool where the measurements put it, if that is far from where its file does; and the share of
     its length that an entry's effect then has to have beside others: near an axis, what a rough place shows of the
     entries about it is no effect of theirs."""
@@ -202,13 +190,13 @@ def _with_rough_tool(robot: Robot, observations: Observations) -> tuple[Robot, f
 def _what_more(
     robot: Robot,
     level: LevelName,
-    parameters: tuple[Parameter, ...],
+    parameters: tuple[Entry, ...],
     subspaces: tuple[Subspace, Subspace],
-    observations: Observations,
+    observations: PointObservations,
 ) -> MorePositions | MoreTouches:
     here, best = subspaces
     lacking = len(best.kept) - len(here.kept)
-    if isinstance(observations, PointObservations) and observations.all_touched:
+    if observations.all_touched:
         return _what_touches(len(here.kept), max(len(best.kept), len(here.kept)), observations)
     return MorePositions(
         coordinates=len(observations),
@@ -234,14 +222,12 @@ def _what_touches(settled: int, best: int, observations: PointObservations) -> M
     return MoreTouches(observations.poses, numbers, settled, best, missing, tuple(each))
 
 
-def _rich(robot: Robot, observations: Observations) -> Observations:
+def _rich(robot: Robot, observations: PointObservations) -> PointObservations:
     """The same points all over the joint range, or more touches of the same things."""
-    if not (isinstance(observations, PointObservations) and observations.all_touched):
-        return observations.rich(robot)
-    return touches(robot, observations)
+    return touches(robot, observations) if observations.all_touched else observations.rich(robot)
 
 
-def _examples(robot: Robot, kept: list[Parameter], observations: Observations) -> tuple[Pose, ...]:
+def _examples(robot: Robot, kept: list[Entry], observations: PointObservations) -> tuple[Pose, ...]:
     """Poses that add most information, chosen greedily by the gain in ln det of the information matrix."""
     poses = spread(robot)
     candidates = observations.flange_at(robot, poses)
@@ -261,7 +247,7 @@ class Estimate:
     settled : whether that is less than what the table could be wrong by, and no quite different arm fits better
     """
 
-    parameter: Parameter
+    parameter: Entry
     nominal: float
     correction: float
     standard_error: float
@@ -276,7 +262,7 @@ class Estimate:
     @property
     def unit(self) -> Literal["mm", "deg"]:
         """Of the numbers."""
-        return self.parameter.unit
+        return "mm" if self.parameter.unit == "mm" else "deg"
 
     @property
     def half_width(self) -> float:
@@ -341,21 +327,6 @@ class Beyond(CorrectedModel):
     residuals: ResidualStructure | None
 
 
-@dataclass(frozen=True)
-class CommonScale:
-    """A factor by which all corrected lengths are the table's.
-
-    Attributes
-    ----------
-    half_width : of its 95 % interval
-    lengths : those that it is estimated from
-    """
-
-    factor: float
-    half_width: float
-    lengths: tuple[str, ...]
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibration(ByValue, Displayed):
     """A table's corrections.
@@ -381,8 +352,7 @@ class Calibration(ByValue, Displayed):
     deviation_mm : standard deviation of a coordinate, estimated from what the robot file's model leaves; None if it
         was stated
     outliers : measurements that were set aside
-    bars : ball bars of unknown length, by the table alone
-    left_out : at poses left out, by what the robot's file holds; None of reference sets and of too few poses
+    left_out : at poses left out, by what the robot's file holds; None of too few poses
     residuals : what remains: noise, or structure; None as for ``left_out``
     tried : terms beyond the table, in the order in which they were taken, then those that were not; of too few
         measurements for all kinds no couplings, or those that a robot file can hold
@@ -410,7 +380,6 @@ class Calibration(ByValue, Displayed):
     deviation_mm: float | None = None
     outliers: tuple[Outlier, ...] = ()
     ratios: tuple[TermEstimate, ...] = ()
-    bars: tuple[BarLength, ...] = ()
     idle: tuple[Touched, ...] = ()
     left_out: HeldOutErrors | None = None
     residuals: ResidualStructure | None = None
@@ -432,12 +401,6 @@ class Calibration(ByValue, Displayed):
     def scale_is_assumed(self) -> bool:
         """Whether lengths were measured, whose scale counts as exact; else the longest of the table keeps its value."""
         return not any(isinstance(why, outcomes.SetsScale) for why in self.held)
-
-    @property
-    def common_scale(self) -> CommonScale | None:
-        """The factor that explains the corrections of all lengths of the table; None where none does, where noise does,
-        and where fewer than two lengths that aren't 0 are estimated."""
-        return _common_scale(self)
 
     @property
     def conclusion(self) -> outcomes.CalibrationConclusion:
@@ -516,7 +479,6 @@ def joint_shares(found: Calibration, robot: Robot, measurements: Sequence[Measur
     robot : the table that was started from
     """
     seen = observed(measurements, robot)
-    assert isinstance(seen, PointObservations)
     own, errors = (found.beyond.estimates, found.beyond.errors) if found.beyond else (found.estimates, None)
     before, effect = seen.positions(robot), effects(robot, seen.row_values, seen.points(robot))
     too_far = np.zeros_like(seen.row_values)
@@ -540,7 +502,7 @@ def joint_shares(found: Calibration, robot: Robot, measurements: Sequence[Measur
 
 def calibrate(
     robot: Robot,
-    measurements: Sequence[Measurement] | ReferenceSet,
+    measurements: Sequence[Measurement],
     fixed: Sequence[FixedName] = (),
 ) -> Calibration:
     """Estimate corrections to a robot's table, base and tool from positions of its flange or tool.
@@ -550,9 +512,8 @@ def calibrate(
     Parameters
     ----------
     robot : the table to start from
-    measurements : measured positions, or a reference set, whose key poses are used then
-    fixed : ``"base"``, ``"tool"``, ``"ratios"``: to be taken from the robot's file. Reference sets fix all; the tool is
-        fixed unless its point was measured
+    fixed : ``"base"``, ``"tool"``, ``"ratios"``: to be taken from the robot's file; the tool is fixed unless its point
+        was measured
 
     Raises
     ------
@@ -561,15 +522,10 @@ def calibrate(
     CalibrationError
         if the positions determine too little, or no corrections make the table fit
     """
-    observations = observed(measurements, robot, fixed)
-    if isinstance(observations, PointObservations):
-        return _from_points(robot, observations, "ratios" not in fixed)
-    level = choose_level(robot, observations)
-    found = fit(robot, level.kept, observations)
-    return _result(robot, level, observations, found)
+    return _from_points(robot, observed(measurements, robot, fixed), "ratios" not in fixed)
 
 
-def _result(robot: Robot, level: Level, observations: Observations, found: Fit) -> Calibration:
+def _result(robot: Robot, level: Level, observations: PointObservations, found: Fit) -> Calibration:
     """What the table, with ratios, has of a calibration."""
     beside = _beside(robot, level, observations, found)
     covariance, quantiles = _covariance(observations, found, beside)
@@ -577,12 +533,6 @@ def _result(robot: Robot, level: Level, observations: Observations, found: Fit) 
     correlation = (covariance / np.maximum(np.outer(error, error), SMALLEST))[:count, :count]
     rows, columns = np.nonzero(np.triu(np.abs(correlation) > CLOSE, 1))
     kept, deviation, here = found.kept, observations.deviation_mm, corrected(robot, found.kept, found.amounts)
-    bars: tuple[BarLength, ...] = ()
-    idle: tuple[Touched, ...] = ()
-    if isinstance(observations, PointObservations):
-        idle = tuple(each for each in observations.things() if not each.numbers)
-        errors = JointErrors(robot, found.terms, found.coefficients)
-        bars = bar_lengths(here, errors, kept, observations, covariance, quantiles)
     return Calibration(
         robot=coupled(here, {(t.joint, t.by or t.joint): float(c) for t, c in zip(found.terms, found.coefficients)}),
         level=level.name,
@@ -599,15 +549,14 @@ def _result(robot: Robot, level: Level, observations: Observations, found: Fit) 
         scatter=_scatter(found, beside),
         freedom=found.freedom,
         more=level.more,
-        bars=bars,
-        idle=idle,
+        idle=tuple(each for each in observations.things() if not each.numbers),
     )
 
 
-def _beside(robot: Robot, level: Level, observations: Observations, found: Fit) -> Reals:
+def _beside(robot: Robot, level: Level, observations: PointObservations, found: Fit) -> Reals:
     """(m, l), standard deviations: what entries that are left out do if they are off by ``TYPICAL``, a base or tool by
-    ``PLAUSIBLE``. A reference set is of the table itself, which nothing has built otherwise."""
-    if not (level.left and isinstance(observations, PointObservations)):
+    ``PLAUSIBLE``."""
+    if not level.left:
         return np.empty((len(found.rest), 0))
     here, off = corrected(robot, found.kept, found.amounts), [TYPICAL if p.joint else PLAUSIBLE for p in level.left]
     J = jacobian(here, level.left, observations) / observations.deviation_mm[:, None]
@@ -625,7 +574,7 @@ def _scatter(found: Fit, beside: Reals) -> float:
     return float(np.sqrt((left @ left) / found.freedom))
 
 
-def _covariance(observations: Observations, found: Fit, beside: Reals) -> tuple[Reals, Reals]:
+def _covariance(observations: PointObservations, found: Fit, beside: Reals) -> tuple[Reals, Reals]:
     """By the stated deviations; where none was stated, by what remains at each pose, or of all poses alike if these are
     few; and half-widths (k + c,) of 95 % intervals in standard errors. ``beside``: of entries that are left out."""
     covariance, quantiles = _covariance_by_noise(observations, found)
@@ -633,8 +582,8 @@ def _covariance(observations: Observations, found: Fit, beside: Reals) -> tuple[
     return covariance + bias @ bias.T, quantiles
 
 
-def _covariance_by_noise(observations: Observations, found: Fit) -> tuple[Reals, Reals]:
-    if not isinstance(observations, PointObservations) or observations.deviation_known:
+def _covariance_by_noise(observations: PointObservations, found: Fit) -> tuple[Reals, Reals]:
+    if observations.deviation_known:
         return found.covariance, np.full(found.J.shape[1], INTERVAL_95)
     if found.freedom < max(FEW_SPARE, found.J.shape[1]):
         quantile = float(scipy.special.stdtrit(found.freedom, 0.975))
@@ -644,13 +593,13 @@ def _covariance_by_noise(observations: Observations, found: Fit) -> tuple[Reals,
 
 
 def _estimates(
-    robot: Robot, observations: Observations, found: Fit, error: Reals, quantiles: Reals
+    robot: Robot, observations: PointObservations, found: Fit, error: Reals, quantiles: Reals
 ) -> tuple[Estimate, ...]:
     known = observations.deviation_known or found.freedom > 1
     return tuple(
         Estimate(
             parameter,
-            parameter.nominal(robot),
+            parameter.value(robot),
             float(amount * parameter.in_unit),
             float(own * parameter.in_unit),
             float(quantile),
@@ -695,8 +644,6 @@ def _model(robot: Robot, observations: PointObservations, free_ratios: bool) -> 
     unclear = level.left or (observations.all_touched and not _settled(robot, observations, table))
     ways = () if unclear else FOR_ALL_JOINTS  # terms would stand for what entries that are left out do
     choice, for_file = choose_terms(robot, here, table.kept, observations, ways), ChosenTerms((), ())
-    if not choice.terms and tilts_explain(here, table.kept, observations):
-        raise _sockets_beside(observations, table)
     all_tried = any(each.kind == "coupling" for each in choice.tried)
     if free_ratios and ways and (choice.terms or not all_tried):  # else none helps
         for_file = choose_terms(robot, here, table.kept, observations, FOR_ROBOT_FILE)
@@ -727,16 +674,6 @@ def _settled(robot: Robot, observations: PointObservations, table: Fit) -> bool:
     covariance, quantiles = _covariance_by_noise(observations, table)
     error = np.sqrt(np.diag(covariance))
     return all(each.settled for each in _estimates(robot, observations, table, error, quantiles))
-
-
-def _sockets_beside(observations: PointObservations, table: Fit) -> CalibrationError:
-    bars = tuple(each.name for each in observations.things() if each.kind == "bar")
-    rest = float(np.sqrt(np.mean((table.after * observations.deviation_mm) ** 2)))
-    problem = (
-        f"what the table leaves ({rest:.3g} mm) looks like tilted axes with sockets beside the plane in which the arm "
-        f"moves; put the sockets of {', '.join(bars)} into it, or measure coordinates"
-    )
-    return CalibrationError(SocketsBeside(bars, rest), problem)
 
 
 def _error_left_out(observations: PointObservations, found: Fit) -> float:
@@ -862,7 +799,7 @@ def _out_of(observations: PointObservations, off_mm: Reals, usual_mm: Reals) -> 
 
 
 def _off_mm(robot: Robot, every: PointObservations, model: _Model, used: Flags) -> Reals:
-    """What the whole model leaves of all points, mm (n,); places, planes and sockets are where those that are used (P,)
+    """What the whole model leaves of all points, mm (n,); places and planes are where those that are used (P,)
     put them, and each of the others alone beside these."""
     here = corrected(robot, model.whole.kept, model.whole.amounts)
     errors = JointErrors(robot, model.whole.terms, model.whole.coefficients)
@@ -932,46 +869,3 @@ def _beyond(robot: Robot, observations: PointObservations, found: Fit) -> Beyond
         left_out=_left_out(observations, found),
         residuals=_structure(robot, observations, found),
     )
-
-
-def _common_scale(found: Calibration) -> CommonScale | None:
-    """One factor for all lengths, as a measuring device with a wrong scale makes them.
-
-    With c the corrections of the table's lengths, s their half-widths and v the table's values, ``c = k v`` is fitted
-    by least squares with weights 1/s^2; k has the interval that follows from the covariance of c.
-    """
-    if not found.scale_is_assumed:
-        return None
-    nominal = {k: _scaled_length(found, each) for k, each in enumerate(found.estimates)}
-    chosen = [k for k, value in nominal.items() if value is not None]
-    v = np.array([nominal[k] for k in chosen], float)
-    if np.count_nonzero(v) < 2:
-        return None
-    c = np.array([found.estimates[k].correction for k in chosen])
-    width = np.array([found.estimates[k].half_width for k in chosen])
-    if not (width > 0).all():
-        return None
-    by = v / width**2 / ((v / width) ** 2).sum()
-    k = float(by @ c)
-    half_width = float(np.sqrt((by * width) @ found.correlation[np.ix_(chosen, chosen)] @ (by * width)))
-    if (np.abs(c - k * v) > SCALE_EXPLAINED * width).any() or abs(k) < SCALE_BEYOND_CHANCE * half_width:
-        return None
-    return CommonScale(1 + k, half_width, tuple(found.estimates[i].name for i, value in zip(chosen, v) if value))
-
-
-def _scaled_length(found: Calibration, estimate: Estimate) -> float | None:
-    """What a factor acts on: a length of the table, with others that it can't be told apart from; None of base, tool,
-    angles, and lengths that an angle looks like."""
-    if not (estimate.parameter.joint and estimate.unit == "mm"):
-        return None
-    value = estimate.nominal
-    for why in found.held:
-        if isinstance(why, outcomes.NotToldApart) and estimate.name in why.entries:
-            others = [name for name in why.entries if name != estimate.name]
-            if not all(name[0] in "ad" and name[1:].isdigit() for name in others):
-                return None
-            together = sum(1000 * float(getattr(found.robot, name[0])[int(name[1:]) - 1]) for name in others)
-            if together and (np.cos(found.robot.alpha) < OPPOSITE).any():
-                return None
-            value += together
-    return value

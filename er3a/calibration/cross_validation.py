@@ -23,7 +23,7 @@ from scipy.cluster.vq import kmeans, vq
 from er3a.calibration.fit import ROUNDING, Fit, jacobian
 from er3a.calibration.observations import PointObservations
 from er3a.calibration.outcomes import TermVerdict
-from er3a.calibration.parameters import DEPENDENT, MM, Parameter
+from er3a.calibration.parameters import DEPENDENT
 from er3a.calibration.terms import (
     FOR_ALL_JOINTS,
     RIPPLES,
@@ -37,6 +37,7 @@ from er3a.calibration.terms import (
     term_jacobian,
     wrong_way,
 )
+from er3a.comparison.entries import Entry
 from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.robot import Robot
 
@@ -46,10 +47,6 @@ SURE = 1e-5
 """How improbable a term's share has to be if there is only noise; some 80 terms are tried, again with each taken."""
 MIN_GAIN = 0.01
 """Share of the mean squared error at poses left out that a term has to take away, either way of leaving out."""
-SURE_OF_TILTS = 1e-3
-"""The same of what tilts do to a flat arm's bars, which is tried once."""
-TILTS_ABOVE_NOISE = 100.0
-"""Times the noise, as a share of a bar's reach: smaller effects of tilts are noise itself (see ``_lifted``)."""
 MIN_POSES = 40
 MIN_SPARE = 3
 """Coordinates for each number of the model with all terms that are tried, for them to be tried."""
@@ -175,13 +172,12 @@ def left_out(observations: PointObservations, found: Fit, seed: int = 0) -> Held
 def choose_terms(
     robot: Robot,
     here: Robot,
-    kept: Sequence[Parameter],
+    kept: Sequence[Entry],
     observations: PointObservations,
     ways: Sequence[Sequence[TermKind]] = FOR_ALL_JOINTS,
 ) -> ChosenTerms:
     """Terms, one after the other, as long as both errors at poses left out fall and noise can't have done it; one that
-    stood for others is dropped when these are there. Those of a flat arm have to explain more of the distances of bars
-    than tilts of its axes could.
+    stood for others is dropped when these are there.
 
     Parameters
     ----------
@@ -203,8 +199,6 @@ def choose_terms(
     if np.sqrt(np.mean(off**2)) < ROUNDING:
         return ChosenTerms((), ())
     J, rest = rows @ jacobian(here, kept, observations), rows @ off
-    J = np.hstack([J, _lifted(rows, J, off, here, observations)])
-    count = J.shape[1]
     rest = rest / np.sqrt(rest @ rest / (len(rest) - count))
     parts = [part for seed in SEEDS for part in parts_of(observations, seed)]
     search = _RippleSearch(here, observations) if ripples else None
@@ -229,43 +223,6 @@ def choose_terms(
         else:
             others = (trial.outcome(before) for trial in trials)
             return ChosenTerms(tuple(taken), (*taken.values(), *dropped.values(), *others))
-
-
-def tilts_explain(here: Robot, kept: Sequence[Parameter], observations: PointObservations) -> bool:
-    """Whether tilts of a flat arm's axes, with the sockets of bars beside its plane, explain more of what a corrected
-    robot leaves than noise can have done."""
-    rows = observations.independent(here)[0] / observations.deviation_mm
-    off = observations.values_mm - observations.predict(here, kept, np.zeros((1, len(kept))))[0]
-    J, rest = rows @ jacobian(here, kept, observations), rows @ off
-    lifted = _lifted(rows, J, off, here, observations)
-    freedom = len(rest) - len(kept) - lifted.shape[1]
-    if not lifted.size or freedom <= 0 or np.sqrt(np.mean(off**2)) < ROUNDING:
-        return False
-    left = [rest - each @ np.linalg.lstsq(each, rest, rcond=None)[0] for each in (J, np.hstack([J, lifted]))]
-    return _by_chance(left[0] @ left[0], left[1] @ left[1], lifted.shape[1], freedom) <= SURE_OF_TILTS
-
-
-def _lifted(
-    rows: scipy.sparse.csr_array, J: Reals, off_mm: Reals, here: Robot, observations: PointObservations
-) -> Reals:
-    """Orthonormal columns: how tilts change the distances of bars in another way than the columns J do.
-
-    On the circle on which an arm keeps a bar's end some tilts together change nothing, and off it as much as noise
-    does, so that they would explain any noise: such ways are left out.
-    """
-    lifted = rows @ observations.lifted_bars()
-    if not lifted.size:
-        return np.empty((len(J), 0))
-    lifted /= np.maximum(np.linalg.norm(lifted, axis=0), np.finfo(float).tiny)
-    span, points = np.linalg.qr(J)[0], observations.positions(here)
-    found, sizes, _ = np.linalg.svd(lifted - span @ (span.T @ lifted), full_matrices=False)
-    narrowest = min(points[own].std(axis=0).max() for kind, own in observations.groups() if kind == "bar")
-    rest, count, deviation = rows @ off_mm, -1, observations.deviation_mm.mean() / (MM * narrowest)
-    while True:  # what tilts explain is no noise
-        ways: Reals = found[:, : max(count, 0)]
-        noise = deviation * np.sqrt(np.mean((rest - ways @ (ways.T @ rest)) ** 2))
-        if count >= (count := int((sizes > max(DEPENDENT, TILTS_ABOVE_NOISE * noise)).sum())):
-            return ways
 
 
 def _by_chance(before: float, after: float, numbers: int, freedom: int) -> float:

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from er3a.calibration.observations import Observations, PointObservations, directions, socket
+from er3a.calibration.observations import PointObservations
 from er3a.calibration.outcomes import (
     CalibrationError,
     Held,
@@ -30,17 +30,16 @@ from er3a.calibration.outcomes import (
 )
 from er3a.calibration.parameters import (
     DEPENDENT,
-    MM,
-    Parameter,
     corrected,
     parallel_pairs,
     parameters_of,
     placements_of,
 )
 from er3a.calibration.terms import TAKEN, JointErrors, JointTerm, term_jacobian
+from er3a.comparison.entries import Entry
 from er3a.geometry.transforms import rpy_of
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.references.reference import INTERVAL_95
+from er3a.references.quantities import MM
 from er3a.robots.robot import Robot
 
 STEP = 1e-5
@@ -55,17 +54,16 @@ HALVINGS = 12
 ROUNDING = 1e-6  # mm: a fit that leaves less has met its points exactly
 MIN_OWN = 1e-9
 CLEAR = 10.0
-"""Times what the table leaves of touched points that has to set a length, root mean square: the ways of joints that
-slide, how far a bar's points are off a common cone. Taken for part of it, what is left errs by the square, 1 %."""
+"""Times what the table leaves of touched points that the ways of joints that slide have to be to set a length, root
+mean square. Taken for part of it, what is left errs by the square, 1 %."""
 MIN_ALIGNED, TURNS = 3, 5
 FAR = 2.0  # times as near, where base and tool start elsewhere than in the robot's file
 OUTLIER_ROUNDS = 3
 FAR_OUT = 6.0
 """Standard deviations beyond which a point is set aside: noise goes there once in 500 million."""
 MEDIAN_TO_DEVIATION = 1.4826
-SMALL_SHARE = 0.01  # of a variance: what adds less does not widen its interval
 LEVER = 0.3  # m, at which a length turns points as an angle does
-TURNS_ALL = Parameter("offset", 1)
+TURNS_ALL = Entry("offset", 1)
 """Turns all points alike, which is nothing to points that are seen against each other alone."""
 
 
@@ -86,7 +84,7 @@ class Subspace:
 
 
 def jacobian(
-    robot: Robot, parameters: Sequence[Parameter], observations: Observations, amounts: Reals | float = 0.0
+    robot: Robot, parameters: Sequence[Entry], observations: PointObservations, amounts: Reals | float = 0.0
 ) -> Reals:
     """Derivative (n, p) of observed values (mm) by parameters (m, rad), where amounts (p,) are added to the robot's, by
     central differences; exact to about 1e-8."""
@@ -99,8 +97,8 @@ def jacobian(
 
 def subspace(
     robot: Robot,
-    parameters: Sequence[Parameter],
-    observations: Observations,
+    parameters: Sequence[Entry],
+    observations: PointObservations,
     left: float | None = None,
     dependent: float = DEPENDENT,
 ) -> Subspace:
@@ -135,10 +133,10 @@ def subspace(
     return Subspace(tuple(kept), tuple(held), singular_values)
 
 
-def left_of_touched(robot: Robot, observations: Observations) -> float:
+def left_of_touched(robot: Robot, observations: PointObservations) -> float:
     """What a table leaves where points touch something, apart from what base and tool can take up: root mean square, in
     standard deviations; 0 where nothing is touched."""
-    if not (isinstance(observations, PointObservations) and observations.dropped):
+    if not observations.dropped:
         return 0.0
     off = (observations.predict(robot, (), np.zeros((1, 0)))[0] - observations.values_mm) / observations.deviation_mm
     touching = observations.touched[observations.pose_of] >= 0
@@ -148,27 +146,26 @@ def left_of_touched(robot: Robot, observations: Observations) -> float:
     return float(np.sqrt(np.mean(off**2)))
 
 
-def scale_of(robot: Robot, observations: PointObservations) -> Parameter | None:
+def scale_of(robot: Robot, observations: PointObservations) -> Entry | None:
     """The longest length of the table that moves the points as nothing else does, which is taken as it is; None where
-    coordinates or lengths were measured, or joints have slid while a place or plane was touched, or lengths of a flat
-    arm's bar differ."""
-    if observations.has_scale:
+    coordinates were measured, or joints have slid while a place or plane was touched."""
+    if not observations.all_touched:
         return None
     lengths = parameters_of(robot, "lengths")
     effect = np.linalg.norm(jacobian(robot, lengths, observations), axis=0)
     moving = [entry for entry, size in zip(lengths, effect) if size > NO_EFFECT * effect.max()]
     replaceable = _replaceable(robot, moving, observations)
     alone = [entry for entry in moving if entry not in replaceable] or moving
-    longest = max(alone, key=lambda entry: abs(entry.nominal(robot)), default=None)
+    longest = max(alone, key=lambda entry: abs(entry.value(robot)), default=None)
     if longest is None:
         return None
     off = observations.predict(robot, (), np.zeros((1, 0)))[0] - observations.values_mm
-    known = max(np.linalg.norm(observations.slid(robot)), np.linalg.norm(observations.varied()))
-    min_known = max(CLEAR * float(np.linalg.norm(off)), DEPENDENT * abs(longest.nominal(robot)) * len(off) ** 0.5)
+    known = np.linalg.norm(observations.slid(robot))
+    min_known = max(CLEAR * float(np.linalg.norm(off)), DEPENDENT * abs(longest.value(robot)) * len(off) ** 0.5)
     return longest if known < min_known else None
 
 
-def _replaceable(robot: Robot, lengths: Sequence[Parameter], observations: PointObservations) -> list[Parameter]:
+def _replaceable(robot: Robot, lengths: Sequence[Entry], observations: PointObservations) -> list[Entry]:
     """Lengths in whose place others move the points alike: such a one may stay as it is while all shrink to a point."""
     every = [*placements_of(observations.free), *parameters_of(robot, "all_entries")]
     J = jacobian(robot, every, observations.as_coordinates())
@@ -184,17 +181,17 @@ def _replaceable(robot: Robot, lengths: Sequence[Parameter], observations: Point
     return found
 
 
-def without_scale(parameters: Sequence[Parameter], scale: Parameter | None) -> tuple[Parameter, ...]:
+def without_scale(parameters: Sequence[Entry], scale: Entry | None) -> tuple[Entry, ...]:
     """Those that can be estimated beside a length that sets the scale, if one does."""
     return tuple(each for each in parameters if scale is None or each not in (scale, TURNS_ALL))
 
 
-def held_with(scale: Parameter | None) -> tuple[Held, ...]:
+def held_with(scale: Entry | None) -> tuple[Held, ...]:
     """Why the others can't."""
     return (MovesNothing(TURNS_ALL.name), SetsScale(scale.name)) if scale else ()
 
 
-def _confounded_with(robot: Robot, parameters: Sequence[Parameter], k: int, kept: list[int], J: Reals) -> NotToldApart:
+def _confounded_with(robot: Robot, parameters: Sequence[Entry], k: int, kept: list[int], J: Reals) -> NotToldApart:
     """Which entries act on the measured points as entry ``k`` does."""
     share = np.linalg.lstsq(J[:, kept], J[:, k], rcond=None)[0] * np.linalg.norm(J[:, kept], axis=0)
     partners = [parameters[i] for i, part in zip(kept, share) if abs(part) > DEPENDENT * np.linalg.norm(J[:, k])]
@@ -215,13 +212,13 @@ class Fit:
     kept, terms : what was fitted
     amounts : (k,), added to what the robot has, in m and rad; coefficients : (c,), of the terms
     before, after : (n,), differences to the measurements in standard deviations
-    J, rest : (m, k + c) and (m,), derivatives and differences of what is independent of places, planes and sockets
+    J, rest : (m, k + c) and (m,), derivatives and differences of what is independent of places and planes
         that nobody knows, in standard deviations of it, ``deviation_mm`` (m,)
     last : (m,), the last of the n observed values that it is made of
     ran_off : whether another arm meets the observations better, so that corrections were taken to be small
     """
 
-    kept: tuple[Parameter, ...]
+    kept: tuple[Entry, ...]
     terms: tuple[JointTerm, ...]
     amounts: Reals
     coefficients: Reals
@@ -281,54 +278,6 @@ def covariance_by_poses(found: Fit, pose_of: Integers) -> tuple[Reals, Reals]:
     freedom = (own - drawn).sum(axis=0) ** 2 / np.maximum(squares, MIN_OWN * (own**2).sum(axis=0))
     errors = np.concatenate(pushes) @ C  # squares: no rounding makes a variance negative
     return np.asarray(errors.T @ errors, np.float64), np.asarray(np.maximum(freedom, 1.0), np.float64)
-
-
-@dataclass(frozen=True)
-class BarLength:
-    """A ball bar of unknown length: what it is (mm), and half of its 95 % interval; None if its points don't settle
-    it."""
-
-    name: str
-    length_mm: float | None
-    half_width_mm: float | None
-
-
-def bar_lengths(
-    here: Robot,
-    errors: JointErrors,
-    kept: Sequence[Parameter],
-    observations: PointObservations,
-    covariance: Reals,
-    quantiles: Reals,
-) -> tuple[BarLength, ...]:
-    """The lengths of bars of unknown length, which are fitted beside the sockets.
-
-    Parameters
-    ----------
-    here : the corrected robot; errors : of its joints, with c coefficients
-    covariance : (k + c, k + c), of what was kept and of the coefficients, m and rad
-    quantiles : (k + c,), half-widths of 95 % intervals in standard errors
-    """
-    found = []
-    for name, points in observations.unknown_bars():
-        own = points.as_coordinates()
-        moved = own.shifted(errors.amounts(own.row_values, own.points(errors.robot)))
-        xyz = moved.positions(here)
-        along, size = directions(xyz - socket(xyz, np.zeros(len(xyz))))
-        basis = np.column_stack([along, np.ones(len(xyz))])
-        threshold = max(DEPENDENT, CLEAR * float(size.std() / size.mean()))
-        if np.linalg.matrix_rank(basis, tol=threshold * len(xyz) ** 0.5) < basis.shape[1]:
-            found.append(BarLength(name, None, None))
-            continue
-        weights = np.linalg.pinv(basis)[-1]  # what the length takes of each distance, beside the socket
-        slopes = np.hstack([jacobian(here, kept, moved), term_jacobian(here, errors.robot, errors.terms, own, moved)])
-        by_numbers = (weights[:, None] * along).ravel() @ slopes
-        variance = (weights * points.deviation_mm) @ (weights * points.deviation_mm)
-        variance += by_numbers @ covariance @ by_numbers
-        shares = by_numbers**2 * np.diag(covariance)
-        quantile = float(quantiles[shares > SMALL_SHARE * variance].max(initial=INTERVAL_95))
-        found.append(BarLength(name, MM * float(size.mean()), quantile * float(np.sqrt(variance))))
-    return tuple(found)
 
 
 def aligned(points: Reals, measured: Reals) -> tuple[Reals, float, float]:
@@ -405,12 +354,10 @@ def _base_and_tool(x: Reals, R: Reals, m: Reals, free: Sequence[PlacementName]) 
     return min(found, key=lambda each: each[0])[1:]
 
 
-def places_at(robot: Robot, kept: Sequence[Parameter], observations: Observations) -> Reals:
+def places_at(robot: Robot, kept: Sequence[Entry], observations: PointObservations) -> Reals:
     """Amounts (k,) to start from: 0, unless other places of base and tool bring the table's points much nearer to the
     measured ones."""
     amounts, none = np.zeros(len(kept)), np.zeros(len(kept))
-    if not isinstance(observations, PointObservations):
-        return none
     rough, used = rough_places(robot, observations)
     by_name = dict(zip(placements_of(observations.free), rough.tolist()))
     placing = [k for k, each in enumerate(kept) if each in by_name]
@@ -422,8 +369,8 @@ def places_at(robot: Robot, kept: Sequence[Parameter], observations: Observation
 
 def fit(
     robot: Robot,
-    kept: Sequence[Parameter],
-    observations: Observations,
+    kept: Sequence[Entry],
+    observations: PointObservations,
     terms: Sequence[JointTerm] = (),
     most_steps: int = MAX_STEPS,
 ) -> Fit:
@@ -438,7 +385,7 @@ def fit(
     CalibrationError
         if the steps don't end
     """
-    if not (isinstance(observations, PointObservations) and observations.all_touched):
+    if not observations.all_touched:
         return _fit(robot, kept, observations, terms, 0.0, most_steps)
     with suppress(CalibrationError):
         found = _fit(robot, kept, observations, terms, 0.0, most_steps)
@@ -449,8 +396,8 @@ def fit(
 
 def _fit(
     robot: Robot,
-    kept: Sequence[Parameter],
-    observations: Observations,
+    kept: Sequence[Entry],
+    observations: PointObservations,
     terms: Sequence[JointTerm],
     holding: float,
     most_steps: int,
@@ -460,8 +407,8 @@ def _fit(
     start = places_at(robot, kept, observations)
     prior = np.full(sum(term.count for term in terms), 1 / TAKEN)
 
-    def with_errors(coefficients: Reals) -> Observations:
-        if not (terms and isinstance(observations, PointObservations)):
+    def with_errors(coefficients: Reals) -> PointObservations:
+        if not terms:
             return observations
         errors = JointErrors(robot, terms, coefficients)
         return observations.shifted(errors.amounts(observations.row_values, observations.points(robot)))
@@ -476,7 +423,7 @@ def _fit(
     def slopes(here: Robot, amounts: Reals, coefficients: Reals) -> Reals:
         seen = with_errors(coefficients)
         J = jacobian(robot, kept, seen, amounts) / deviation[:, None]
-        if not (terms and isinstance(observations, PointObservations) and isinstance(seen, PointObservations)):
+        if not terms:
             return J
         by_terms = term_jacobian(here, robot, terms, observations, seen) / deviation[:, None]
         return np.block([[J, by_terms], [np.zeros((len(prior), len(kept))), np.diag(prior)]])
@@ -499,8 +446,7 @@ def _fit(
             step = step / 2
         unknowns, rest = trial, new
         small = SMALL_CHANGE if number < STEPS else SLOW_CHANGE
-        still = isinstance(observations, PointObservations) and gain < small * np.linalg.norm(rest)
-        if still or np.abs(step).max() < SMALL_STEP + 1e-9 * np.abs(unknowns).max():
+        if gain < small * np.linalg.norm(rest) or np.abs(step).max() < SMALL_STEP + 1e-9 * np.abs(unknowns).max():
             rows, last = with_errors(unknowns[k:]).independent(corrected(robot, kept, unknowns[:k]))
             own = np.sqrt(rows**2 @ deviation**2)
             return Fit(

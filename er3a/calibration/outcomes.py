@@ -72,7 +72,7 @@ class MorePositions(Finding):
 
 
 class MoreTouches(Finding):
-    """Places, planes, pairs or bars are touched at too few poses.
+    """Places or planes are touched at too few poses.
 
     Attributes
     ----------
@@ -97,20 +97,7 @@ class NoCorrectionFits(Finding):
     rest_mm: float
 
 
-class SocketsBeside(Finding):
-    """What a flat arm's bars measure looks like tilted axes with sockets beside the arm's plane: nothing is settled.
-
-    Attributes
-    ----------
-    bars : all that were measured
-    rest_mm : root mean square of what the corrected table leaves
-    """
-
-    bars: tuple[str, ...]
-    rest_mm: float
-
-
-NotCalibrated = NoPositions | MorePositions | MoreTouches | NoCorrectionFits | SocketsBeside
+NotCalibrated = NoPositions | MorePositions | MoreTouches | NoCorrectionFits
 
 
 class CalibrationError(Er3aError):

@@ -12,29 +12,30 @@ References
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
-from er3a.calibration.fit import SCALE, bar_lengths, held_with, jacobian, scale_of, subspace, without_scale
+from er3a.calibration.fit import SCALE, held_with, jacobian, scale_of, subspace, without_scale
 from er3a.calibration.observations import (
     PLACEMENTS,
     Measurement,
     PointObservations,
     TouchKind,
     observed,
-    socket,
     spread,
 )
+from er3a.calibration.observations import plane as plane_of
 from er3a.calibration.outcomes import FixedName, Held
-from er3a.calibration.parameters import Parameter, parameters_of, placements_of, settles
-from er3a.calibration.terms import JointErrors, effects
+from er3a.calibration.parameters import parameters_of, placements_of, settles
+from er3a.calibration.terms import effects
 from er3a.collision.along import clearance
+from er3a.comparison.entries import Entry, EntryUnit
 from er3a.kinematics.chain import row_values
 from er3a.kinematics.forward import forward
-from er3a.numerics.arrays import Flags, Reals
+from er3a.numerics.arrays import Reals
 from er3a.numerics.quasi_random import quasi_random_points
 from er3a.references.quantities import Pose
 from er3a.references.reference import INTERVAL_95
@@ -53,12 +54,11 @@ BEYOND = 10.0
 
 @dataclass(frozen=True)
 class Proposal:
-    """A pose to measure next: deg, or mm of prismatic joints; what to touch or to use there, if not coordinates."""
+    """A pose to measure next: deg, or mm of prismatic joints; what to touch there, if not coordinates."""
 
     pose: Pose
     kind: TouchKind | None = None
     name: str | None = None
-    length_mm: float | None = None
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class Width:
     settle it."""
 
     name: str
-    unit: Literal["mm", "deg"]
+    unit: EntryUnit
     now: float | None
     then: float | None
 
@@ -87,13 +87,12 @@ class Plan:
 
     Attributes
     ----------
-    settled : numbers that they tell to less than the table could be wrong by, ``bar_NAME`` a bar's length
+    settled : numbers that they tell to less than the table could be wrong by
     lacking : those that measurements of this kind at more poses would
     held : why no poses settle the others
     proposals : poses, the one that adds most first
     beyond : where these go beyond the measured poses
     widths : of all numbers that are settled with the proposals, for the deviation stated or else 0.1 mm
-    undetermined_bars : bars of unknown length that nothing determines: by the table their points don't lie on a sphere
     """
 
     settled: tuple[str, ...]
@@ -102,7 +101,6 @@ class Plan:
     proposals: tuple[Proposal, ...]
     beyond: tuple[OutOfMeasured, ...]
     widths: tuple[Width, ...]
-    undetermined_bars: tuple[str, ...] = ()
 
 
 ASSUMED_MM = 0.1
@@ -118,30 +116,26 @@ def plan(robot: Robot, measurements: Sequence[Measurement], count: int, fixed: S
         for poses of another arm, or outside its limits
     """
     seen = observed(measurements, robot, fixed)
-    assert isinstance(seen, PointObservations)
     if not seen.deviation_known:
         seen = seen.with_deviation(ASSUMED_MM)
     scale = scale_of(robot, seen)
     parameters = (*placements_of(seen.free), *without_scale(parameters_of(robot, "all_entries"), scale))
     options = _options(robot, measurements, seen)
-    every = _with(robot, measurements, [each for option in options for each in option], seen)
+    every = _with(robot, measurements, options, seen)
     able = subspace(robot, parameters, every)
     kept = [parameters[k] for k in able.kept]
-    chosen = [options[k] for k in _chosen(robot, kept, every, len(measurements), options, count)]
-    proposals = tuple(each for option in chosen for each in option)
+    proposals = tuple(options[k] for k in _chosen(robot, kept, every, len(measurements), count))
     then = _with(robot, measurements, proposals, seen)
     now, new = (_half_widths(robot, parameters, each) for each in (seen, then))
-    ever = (*(each.name for each in kept), *_bars(robot, (), every, np.zeros((0, 0))))
     units = {each.name: each.unit for each in parameters}
-    settled = tuple(name for name, width in now.items() if settles(robot, units.get(name, "mm"), width))
+    settled = tuple(name for name, width in now.items() if settles(robot, units[name], width))
     return Plan(
         settled=settled,
-        lacking=tuple(name for name in ever if name not in settled),
+        lacking=tuple(each.name for each in kept if each.name not in settled),
         held=(*able.held, *held_with(scale)),
         proposals=proposals,
         beyond=_beyond(measurements, proposals),
-        widths=tuple(Width(name, units.get(name, "mm"), now.get(name), width) for name, width in new.items()),
-        undetermined_bars=tuple(name for name, _ in seen.unknown_bars() if f"bar_{name}" not in ever),
+        widths=tuple(Width(name, units[name], now.get(name), width) for name, width in new.items()),
     )
 
 
@@ -163,19 +157,11 @@ def d_optimal(information: Reals, blocks: Sequence[Reals], count: int) -> list[i
     return chosen
 
 
-def _chosen(
-    robot: Robot,
-    kept: Sequence[Parameter],
-    every: PointObservations,
-    measured: int,
-    options: Sequence[tuple[Proposal, ...]],
-    count: int,
-) -> list[int]:
+def _chosen(robot: Robot, kept: Sequence[Entry], every: PointObservations, measured: int, count: int) -> list[int]:
     """Options by D-optimality, of observations whose first points were measured."""
     J = SCALE * jacobian(robot, kept, every) / every.deviation_mm[:, None]
     old = J[every.pose_of < measured]
-    ends = measured + np.cumsum([0, *(len(option) for option in options)])
-    blocks = [J[(every.pose_of >= start) & (every.pose_of < end)] for start, end in itertools.pairwise(ends)]
+    blocks = [J[every.pose_of == k] for k in range(measured, len(every.seen))]
     return d_optimal(old.T @ old, blocks, count)
 
 
@@ -183,120 +169,66 @@ def _with(
     robot: Robot, measurements: Sequence[Measurement], proposals: Sequence[Proposal], seen: PointObservations
 ) -> PointObservations:
     """The observations with those at proposed poses, as they would be by the table, of the median deviation."""
-    point: Literal["flange", "tool"] = "tool" if seen.on_tool.any() else "flange"
-    known = {each.touched for each in measurements if each.length_mm is not None}
-    new = [_as_measured(each, point, each.kind == "pair" or (each.kind, each.name) in known) for each in proposals]
-    found = observed([*measurements, *new], robot, [name for name in PLACEMENTS if name not in seen.free])
-    assert isinstance(found, PointObservations)
+    found = _observed(robot, measurements, proposals, seen)
     by_point = np.full(len(found.seen), np.median(seen.deviation_mm))
     by_point[seen.pose_of] = seen.deviation_mm
     return replace(found, deviation_mm=by_point[found.pose_of])
 
 
-def _as_measured(proposal: Proposal, point: Literal["flange", "tool"], with_length: bool) -> Measurement:
-    xyz = (None, None, None) if proposal.kind else (0.0, 0.0, 0.0)
-    measured = Measurement(0, proposal.pose, point, xyz, length_mm=proposal.length_mm if with_length else None)
-    return replace(measured, **{proposal.kind: proposal.name}) if proposal.kind else measured  # type: ignore[arg-type]
+def _observed(
+    robot: Robot, measurements: Sequence[Measurement], proposals: Sequence[Proposal], seen: PointObservations
+) -> PointObservations:
+    point: Literal["flange", "tool"] = "tool" if seen.on_tool.any() else "flange"
+    new = []
+    for each in proposals:
+        xyz = (None, None, None) if each.kind else (0.0, 0.0, 0.0)
+        place, plane = (each.name if each.kind == kind else None for kind in ("place", "plane"))
+        new.append(Measurement(0, each.pose, point, xyz, place=place, plane=plane))
+    return observed([*measurements, *new], robot, [name for name in PLACEMENTS if name not in seen.free])
 
 
-def _options(robot: Robot, measurements: Sequence[Measurement], seen: PointObservations) -> list[tuple[Proposal, ...]]:
+def _options(robot: Robot, measurements: Sequence[Measurement], seen: PointObservations) -> list[Proposal]:
     """Candidates within limits and free of collision, as many for each thing that is measured."""
     low, high = shown(robot, robot.lower), shown(robot, robot.upper)
     kinds = dict.fromkeys(each.touched for each in measurements)
-    if any(each and each[0] == "pair" for each in kinds):
-        kinds = dict.fromkeys(each if each and each[0] != "pair" else ("pair", "") if each else None for each in kinds)
     q = meant(robot, np.round(quasi_random_points(low, high, CANDIDATES)))
     q = q[((q >= robot.lower) & (q <= robot.upper)).all(axis=1)]
     q = q[clearance(robot, q, None).distance > 0]
-    x, labels = seen.positions(robot), _labels(seen)
-    options: list[tuple[Proposal, ...]] = []
+    x, options = seen.positions(robot), list[Proposal]()
     for number, touched in enumerate(kinds):
         own = q[number :: len(kinds)]
         if touched is None:
-            options += [(Proposal(_pose(robot, each)),) for each in own]
-            continue
-        rows = np.array(
-            [k for k, each in enumerate(measurements) if each.touched == touched or (not touched[1] and each.pair)]
-        )
-        lengths = np.array([measurements[k].length_mm or 0.0 for k in rows]) / 1000
-        options += _touches(robot, own, seen, touched, x=x[rows], lengths=lengths, labels=labels)
-    return options
-
-
-def _touches(
-    robot: Robot,
-    q: Reals,
-    seen: PointObservations,
-    touched: tuple[TouchKind, str],
-    *,
-    x: Reals,
-    lengths: Reals,
-    labels: Iterator[str],
-) -> list[tuple[Proposal, ...]]:
-    """What joint values near to q (N, n) touch of what points x (P, 3) have touched; ``labels`` of new pairs."""
-    kind, name = touched
-    first = q[: len(q) // 2] if kind == "pair" else q
-    around = _points(robot, first, seen)
-    second, size, done = _touching(robot, q[-len(first) :], seen, kind=kind, x=x, lengths=lengths, others=around)
-    found: list[tuple[Proposal, ...]] = []
-    for k in np.flatnonzero(done):
-        length = 1000 * float(size[k])
-        if kind == "pair":
-            label = next(labels)
-            found.append(tuple(Proposal(_pose(robot, each[k]), kind, label, length) for each in (first, second)))
+            options += [Proposal(_pose(robot, each)) for each in own]
         else:
-            found.append((Proposal(_pose(robot, second[k]), kind, name, length),))
-    return found
-
-
-def _labels(seen: PointObservations) -> Iterator[str]:
-    """Of pairs, such as nothing that was measured has."""
-    return (name for number in itertools.count(1) if (name := f"next {number}") not in seen.names)
+            options += _touching(robot, own, seen, touched, x[[each.touched == touched for each in measurements]])
+    return options
 
 
 def touches(robot: Robot, seen: PointObservations) -> PointObservations:
     """Touches all over the joint range of the first few things that are touched, as they would be by the table."""
-    x, q, labels = seen.positions(robot), meant(robot, np.array(spread(robot))), _labels(seen)
-    new: list[Measurement] = []
-    point: Literal["flange", "tool"] = "tool" if seen.on_tool.any() else "flange"
+    x, q, new = seen.positions(robot), meant(robot, np.array(spread(robot))), list[Proposal]()
     for thing, (_, rows) in list(zip(seen.things(), seen.groups()))[:FEW]:
-        lengths = seen.lengths_mm(rows) / 1000
-        for option in _touches(robot, q, seen, (thing.kind, thing.name), x=x[rows], lengths=lengths, labels=labels):
-            new += [_as_measured(each, point, bool(lengths.any())) for each in option]
-    found = observed(new, robot, [name for name in PLACEMENTS if name not in seen.free])
-    assert isinstance(found, PointObservations)
-    return found.with_deviation(float(np.median(seen.deviation_mm)))
+        new += _touching(robot, q, seen, (thing.kind, thing.name), x[rows])
+    return _observed(robot, (), new, seen).with_deviation(float(np.median(seen.deviation_mm)))
 
 
 def _touching(
-    robot: Robot, q: Reals, seen: PointObservations, *, kind: TouchKind, x: Reals, lengths: Reals, others: Reals
-) -> tuple[Reals, Reals, Flags]:
-    """Joint values (N, n) near to others that touch what points x (P, 3), m, have touched, or are at a pair's length
-    from ``others`` (N, 3); lengths (N,), m, and whether each does, free of collision and within limits."""
-    size = np.resize(lengths, len(q))
-    centre = x.mean(axis=0)
-    normal = seen.plane(x @ seen.axes.T)[0] @ seen.axes
-    if kind == "bar":
-        centre = socket(x, lengths)
-        if not lengths.any():
-            size = np.full(len(q), np.linalg.norm(x - centre, axis=1).mean())
+    robot: Robot, q: Reals, seen: PointObservations, touched: tuple[TouchKind, str], x: Reals
+) -> list[Proposal]:
+    """Poses near to joint values (N, n) that touch what points x (P, 3), m, have touched, free of collision and within
+    limits."""
+    kind, name = touched
+    normal = plane_of(x)[0] if kind == "plane" else np.zeros(3)
     for _ in range(NEWTON_STEPS):
-        point = _points(robot, q, seen)
-        apart = point - (others if kind == "pair" else centre)
-        J = _by_joints(robot, q, seen)
-        if kind == "place":
-            off, slope = apart, J
-        else:
-            far = np.linalg.norm(apart, axis=1)
-            along = np.tile(normal, (len(q), 1)) if kind == "plane" else apart / np.maximum(far, TOUCHES_M)[:, None]
-            off = ((apart * along).sum(axis=1) - (0.0 if kind == "plane" else size))[:, None]
-            slope = np.einsum("pi,pij->pj", along, J)[:, None]
+        off, slope = _points(robot, q, seen) - x.mean(axis=0), _by_joints(robot, q, seen)
+        if kind == "plane":
+            off, slope = (off @ normal)[:, None], np.einsum("i,pij->pj", normal, slope)[:, None]
         step = -np.einsum("pji,pi->pj", np.linalg.pinv(slope, rcond=1e-4), off)
         longest = np.abs(step).max(axis=1, keepdims=True)
         q = q + step * np.minimum(1.0, LONGEST_STEP / np.maximum(longest, TOUCHES_M))
     done = (np.abs(off).max(axis=1) < TOUCHES_M) & ((q >= robot.lower) & (q <= robot.upper)).all(axis=1)
     done[done] = clearance(robot, q[done], None).distance > 0
-    return q, size, done
+    return [Proposal(_pose(robot, each), kind, name) for each in q[done]]
 
 
 def _points(robot: Robot, q: Reals, seen: PointObservations) -> Reals:
@@ -331,19 +263,10 @@ def _beyond(measurements: Sequence[Measurement], proposals: Sequence[Proposal]) 
     return tuple(found)
 
 
-def _half_widths(robot: Robot, parameters: Sequence[Parameter], seen: PointObservations) -> dict[str, float]:
+def _half_widths(robot: Robot, parameters: Sequence[Entry], seen: PointObservations) -> dict[str, float]:
     """Of the numbers that are settled the half-widths of their 95 % intervals, mm or deg."""
     kept = [parameters[k] for k in subspace(robot, parameters, seen).kept]
     J = seen.independent(robot)[0] @ (SCALE * jacobian(robot, kept, seen) / seen.deviation_mm[:, None])
     covariance = np.asarray(SCALE**2 * np.linalg.pinv(J.T @ J), np.float64)
     errors = np.sqrt(np.diag(covariance))
-    found = {each.name: INTERVAL_95 * float(error) * each.in_unit for each, error in zip(kept, errors)}
-    return found | _bars(robot, kept, seen, covariance)
-
-
-def _bars(robot: Robot, kept: Sequence[Parameter], seen: PointObservations, covariance: Reals) -> dict[str, float]:
-    """Of bars whose length is settled half of its 95 % interval, mm; ``covariance`` (k, k) of what is kept."""
-    bars = bar_lengths(
-        robot, JointErrors(robot, (), np.zeros(0)), kept, seen, covariance, np.full(len(kept), INTERVAL_95)
-    )
-    return {f"bar_{each.name}": each.half_width_mm for each in bars if each.half_width_mm is not None}
+    return {each.name: INTERVAL_95 * float(error) * each.in_unit for each, error in zip(kept, errors)}

@@ -42,7 +42,7 @@ class Bodies:
     pairs : P, what meets what
     matrix : what was found of each pair of links
     in_error : pairs whose shapes overlap where no arm's can (:mod:`er3a.collision.matrix`), so that they are left out
-    guessed : pairs of neighbours that are left out because capsules guessed from a table can't show how near they come
+    guessed : pairs that are left out because capsules guessed from a table are too coarse there
     joined : (P,), whether a joint joins the two, so that only overlap of what is left of them means anything
     layout : the same as arrays, solids among the bodies
     """
@@ -74,8 +74,7 @@ class Bodies:
                 if row.second in numbers
                 else CarriedAndLink(row.second, numbers[row.first])
                 for row in self.matrix
-                if (row.state == state or (state == "guessed" and row.coarse))
-                and frozenset((row.first, row.second)) not in allowed
+                if row.state == state and frozenset((row.first, row.second)) not in allowed
             )
             for state in ("overlaps", "guessed")
         )
@@ -96,18 +95,6 @@ class Bodies:
         most = max((len(body.points) for body in self.capsules), default=1)
         rows = [np.resize(np.arange(len(body.points)), most) for body in self.capsules]
         self._padded = np.array([body.points[row] for body, row in zip(self.capsules, rows)]).reshape(-1, most, 3)
-
-    @property
-    def unmeasured(self) -> tuple[str, ...]:
-        """The joined pairs by name, of which no distance is counted until they overlap."""
-        return tuple(dict.fromkeys(pair.label for pair, joined in zip(self.pairs, self.joined) if joined))
-
-    def joined_apart(self, q: Reals) -> float | None:
-        """How near, m, joined pairs come in arms (N, n), some of which may be NaN, without overlapping there."""
-        q, layout = np.ascontiguousarray(q[np.isfinite(q).all(axis=1)], float), _of_pairs(self.layout, self.joined)
-        found, rest = np.empty((len(q), int(self.joined.sum()))), np.empty(len(q))
-        measure(layout, q, found, rest, np.empty(len(q), np.int64), np.empty(len(q), bool))
-        return float(found[found > 0].min()) if (found > 0).any() else None
 
     def ends(self, q: Reals) -> Reals:
         """Points (..., bodies, k, 3) in m whose hulls are the cores of bodies, at joint angles (..., n) in rad.

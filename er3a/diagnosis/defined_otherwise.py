@@ -17,6 +17,7 @@ from typing import Literal
 
 import numpy as np
 
+from er3a.comparison.entries import Entry, shifted
 from er3a.comparison.mechanism import (
     EntryDifference,
     Match,
@@ -34,18 +35,18 @@ from er3a.diagnosis.faults import (
     Faults,
     FlangeElsewhere,
     ReversedDirection,
-    WrongAlpha,
-    WrongLength,
     WrongLimit,
     WrongOffset,
     limit_stated,
+    rounded,
+    wrong_number,
 )
-from er3a.diagnosis.fitting import MEETS
+from er3a.diagnosis.fitting import MEETS, lowered
 from er3a.geometry.transforms import rot_x, rot_y, rot_z, translation
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.forward import forward, frames
-from er3a.kinematics.table_batch import Tables, frames_of, join, robot_of, tables_of
-from er3a.numerics.arrays import Reals
+from er3a.kinematics.table_batch import robot_of, tables_of
+from er3a.numerics.arrays import Integers, Reals
 from er3a.references.predict import joints_of, predict_tables
 from er3a.references.quantities import (
     COORDINATES,
@@ -55,7 +56,6 @@ from er3a.references.quantities import (
     AxisCoordinate,
     FlangeTurn,
     PointCoordinate,
-    Pose,
 )
 from er3a.references.reference import Reference, expected_of, quantities_of
 from er3a.robots.robot import Robot
@@ -65,24 +65,16 @@ Lines = tuple[Reals, Reals, list[bool], Tolerances]
 """Directions and points (n, 3), m, of all axes, which of these directions are of positive rotation, and how exactly."""
 
 MAX_WRONG = 3
+LINKS = "a", "d", "alpha"
 SLIGHT_LENGTH, SLIGHT_ANGLE = 1e-3, math.radians(0.2)
 FINER = (1.0, 0.3, 0.1)
 MIN_LENGTH, MIN_ANGLE = 1e-5, math.radians(1e-3)
 LEVER = 0.3  # m, over which an axis' direction says where it is
 SPREAD = 3.0  # times its uncertainty, that what is derived from two lines may be off
 ROUNDS = 8
-STEP = 1e-6
-MET = 0.1  # of MEETS, from which on a fit needs no more steps
-GAINS = 0.999  # of the misfit, which a step has to fall below
 AS_GOOD = 1.05  # times the misfit: a simpler arm that misses by no more is taken
 ROUND_DEG, ROUND_MM = 1e-6, 1e-6
 PARALLEL = 1 - 1e-6
-SCAN = math.pi / 4
-SCANNED_AT = 8  # poses at most: 28 distances, for up to 5 zeros and the flange's shift
-KEPT_OF_SCAN, FITTED = 24, 576
-"""Starts that are kept of each way of the joints' directions, and fitted of all. With 4 kept, 2 of 15 random cases were
-lost, with 1 five; with 64 fitted one."""
-MAX_SCANNED = 7  # joints
 SIGNS: tuple[Literal[1, -1], ...] = (-1, 1)
 
 
@@ -98,7 +90,7 @@ class Conventions:
 
 def conventions_of(robot: Robot, references: Sequence[Reference]) -> Conventions | None:
     """How references define zeros, directions, base and flange of a table otherwise; None if that is not the reason
-    why they are missed, or if they state neither all joint axes nor many poses.
+    why they are missed, or if they don't state all joint axes.
 
     Parameters
     ----------
@@ -108,11 +100,8 @@ def conventions_of(robot: Robot, references: Sequence[Reference]) -> Conventions
         return None
     stated = [r for r in references if r.quantity.depends_on_table]
     lines = _lines(stated, robot.joints)
-    if lines is not None:
-        found = (_conventions(robot, stated, lines, finer) for finer in FINER)
-        best = next((each for each in found if each is not None), None)
-    else:
-        best = _from_poses(robot, stated)
+    found = (_conventions(robot, stated, lines, finer) for finer in FINER) if lines else ()
+    best = next((each for each in found if each is not None), None)
     chosen = best and _with_limits(robot, best, references)
     return chosen if chosen and chosen.faults else None
 
@@ -161,28 +150,43 @@ def _from_ground(robot: Robot, joint: int, along: tuple[int, ...], sign: Literal
 def _conventions(robot: Robot, stated: Sequence[Reference], lines: Lines, finer: float) -> Conventions | None:
     """What :func:`conventions_of` finds where entries differ that are off by more than the lines' tolerances, or by a
     finer part of them."""
-    directions, points, signed, widest = lines
+    _, _, signed, widest = lines
     tolerances = Tolerances(finer * widest.length, finer * widest.angle)
-    other = mechanism_from_axes(directions, points, _zero_flange(stated), widest.angle)
-    found = match(mechanism_of(robot.without_tool()), other, tolerances)
-    if any(each.column not in ("a", "d", "alpha") for each in found.differences):
+    found, start, wrong = _matched(robot, stated, lines, tolerances)
+    if any(each.column not in LINKS for each in found.differences):
         return None
     if found.unexplained or sum(_gross(each) for each in found.differences) > MAX_WRONG:
         return None
-    later = int(robot.convention == "modified")  # rows of a and alpha are those of the next joint
-    wrong = [(each.column, each.link + later * (each.column != "d")) for each in found.differences]
-    start = _moved(robot, found)
-    for (column, row), each in zip(wrong, found.differences):
-        start = _with_entry(start, column, row, each.other)
     flips = itertools.product(*([1.0] if sure else [1.0, -1.0] for sure in signed))
     starts = [start.replace(direction=start.direction * np.array(flip)) for flip in flips]
     return _fitted_to(robot, starts, wrong, stated, tolerances)
 
 
+def described_by(robot: Robot, references: Sequence[Reference]) -> Robot | None:
+    """The table corrected by comparison with the arm whose axes references state, with its base moved to theirs; None
+    if they don't state all axes."""
+    stated = [r for r in references if r.quantity.depends_on_table]
+    lines = None if robot.coupling is not None or robot.rows != robot.joints else _lines(stated, robot.joints)
+    return _matched(robot, stated, lines, lines[-1])[1] if lines and not robot.sliding.any() else None
+
+
+def _matched(
+    robot: Robot, stated: Sequence[Reference], lines: Lines, tolerances: Tolerances
+) -> tuple[Match, Robot, list[Entry]]:
+    """The match with the arm that lines describe, the table with it, and the entries that differ."""
+    other = mechanism_from_axes(lines[0], lines[1], _zero_flange(stated), lines[-1].angle)
+    found = match(mechanism_of(robot.without_tool()), other, tolerances)
+    later = int(robot.convention == "modified")  # rows of a and alpha are those of the next joint
+    own = [each for each in found.differences if each.column in LINKS]
+    wrong = [Entry(each.column, each.link + later * (each.column != "d") + 1) for each in own]
+    table = shifted(tables_of(_moved(robot, found)), wrong, np.array([[each.other - each.one for each in own]]))
+    return found, robot_of(table, 0, _moved(robot, found)), wrong
+
+
 def _fitted_to(
     robot: Robot,
     starts: Sequence[Robot],
-    wrong: Sequence[tuple[str, int]],
+    wrong: Sequence[Entry],
     stated: Sequence[Reference],
     tolerances: Tolerances,
 ) -> Conventions | None:
@@ -207,108 +211,10 @@ def _fitted_to(
     if left > MEETS:
         return None
     faults = (
-        *(_wrong_entry(robot, best, column, row) for column, row in wrong),
+        *(rounded(wrong_number(each, *(float(each.of(tables_of(arm))[0]) for arm in (robot, best)))) for each in wrong),
         *_differences(robot, best, tolerances),
     )
     return Conventions(faults, best, left)
-
-
-def _from_poses(robot: Robot, stated: Sequence[Reference]) -> Conventions | None:
-    """What :func:`_conventions` finds, without joint axes, of a table whose geometry is right: distances between
-    flanges, and turns between them where orientations are stated, depend on neither base nor (turns) flange. Directions
-    and zeros that give them are scanned in steps of ``SCAN``, and the best fitted."""
-    points, turns = _stated_flanges(stated)
-    poses, inner = list(points), list(range(1, robot.joints - 1))
-    known = 3 * (len(points) + sum(pose in turns for pose in poses)) - 12 - len(inner)
-    if robot.joints > MAX_SCANNED or known < 2 * robot.joints:
-        return None
-    xyz, R = (
-        np.array([points[pose] for pose in poses]),
-        np.array([turns.get(pose, np.full((3, 3), np.nan)) for pose in poses]),
-    )
-    q, table = joints_of(robot, poses), tables_of(robot)
-    steps = np.arange(0, 2 * np.pi, SCAN if robot.joints < MAX_SCANNED else 2 * SCAN)
-    turned = np.array(list(itertools.product(steps, repeat=len(inner))))
-    many = table[np.zeros(len(turned), dtype=int)].with_column("offset", inner, table.offset[:, inner] + turned)
-
-    def gaps(tables: Tables, shift: Reals, count: int) -> Reals:
-        """Differences (H, numbers), in about m, to distances and turns between the first poses; shift (H, 3) of the
-        flange in its own frame."""
-        T = frames_of(tables, robot, q[:count])[:, :, -1]
-        turn = T[..., :3, :3]
-        at = T[..., :3, 3] + np.einsum("hpij,hj->hpi", turn, shift)
-        one, other = np.triu_indices(count, 1)
-        far = np.sqrt(((at[:, one] - at[:, other]) ** 2).sum(axis=2)) - np.linalg.norm(xyz[one] - xyz[other], axis=1)
-        if not turns:
-            return np.asarray(far)
-        flat, stated_flat = turn.reshape(*turn.shape[:2], 9), R.reshape(-1, 9)
-        turned = (flat @ flat.transpose(0, 2, 1) - stated_flat[:count] @ stated_flat[:count].T)[:, one, other]
-        return np.concatenate([far, LEVER * np.nan_to_num(turned)], axis=1)
-
-    scanned = []
-    for signs in itertools.product((1.0, -1.0), repeat=robot.joints):
-        tables = many.with_column("direction", slice(None), table.direction * np.array(signs))
-        size = np.linalg.norm(gaps(tables, np.zeros((len(tables), 3)), min(SCANNED_AT, len(poses))), axis=1)
-        best = np.argsort(size)[:KEPT_OF_SCAN]
-        scanned.append((size[best], tables[best]))
-    order = np.argsort(np.concatenate([size for size, _ in scanned]))[:FITTED]
-    tables = join([tables for _, tables in scanned])[order]
-    shift, count, free = np.zeros((len(tables), 3)), len(poses), np.eye(len(inner) + 3)
-    for _ in range(2 * ROUNDS):
-        here = gaps(tables, shift, count)
-        ahead = [
-            gaps(
-                tables.with_column("offset", inner, tables.offset[:, inner] + STEP * row[:-3]),
-                shift + STEP * row[-3:],
-                count,
-            )
-            for row in free
-        ]
-        slopes = np.stack([(each - here) / STEP for each in ahead], axis=2)
-        step = -np.einsum("hkm,hm->hk", np.linalg.pinv(slopes, rcond=1e-6), here)
-        step *= np.minimum(1.0, SCAN / np.abs(step).max(axis=1, keepdims=True))
-        tables, shift = (
-            tables.with_column("offset", inner, tables.offset[:, inner] + step[:, :-3]),
-            shift + step[:, -3:],
-        )
-    length = SPREAD * max(float(expected_of([r])[1][0]) for r in stated if isinstance(r.quantity, PointCoordinate)) / MM
-    tolerances = Tolerances(length, length / LEVER)
-    T = frames_of(tables, robot, q)[:, :, -1]
-    at = T[..., :3, 3] + np.einsum("hpij,hj->hpi", T[..., :3, :3], shift)
-    bases = [_placed_on(own, xyz) for own in at]  # distances are the same of an arm and of its mirror image
-    left = [np.linalg.norm(own @ B[:3, :3].T + B[:3, 3] - xyz, axis=1).max() for own, B in zip(at, bases)]
-    moved = np.abs(wrap_to_pi(tables.offset - table.offset)) > tolerances.angle
-    changed = (tables.direction != table.direction).sum(axis=1) + moved.sum(axis=1)
-    found = []
-    for row in np.lexsort((changed, np.array(left) > 2 * length))[:KEPT_OF_SCAN].tolist():
-        arm = robot_of(tables, row, robot)
-        start = arm.replace(base=bases[row] @ arm.base, flange=arm.flange @ translation(*shift[row]))
-        found.append(_fitted_to(robot, [start], (), stated, tolerances))
-    return min((each for each in found if each is not None), key=lambda each: len(each.faults), default=None)
-
-
-def _stated_flanges(stated: Sequence[Reference]) -> tuple[dict[Pose, Reals], dict[Pose, Reals]]:
-    """Positions (3,), m, of the flange by pose, where all coordinates are stated, and rotation matrices."""
-    parts, turns = dict[Pose, dict[str, float]](), dict[Pose, Reals]()
-    for reference in stated:
-        quantity = reference.quantity
-        if isinstance(quantity, PointCoordinate) and quantity.point == "flange":
-            value = float(expected_of([reference])[0][0]) / MM
-            parts.setdefault(quantity.pose, {}).setdefault(quantity.coordinate, value)
-        elif isinstance(quantity, FlangeTurn):
-            turns.setdefault(quantity.pose, np.array(quantity.stated))
-    whole = {pose: np.array([own[c] for c in COORDINATES]) for pose, own in parts.items() if len(own) == 3}
-    return whole, turns
-
-
-def _placed_on(points: Reals, stated: Reals) -> Reals:
-    """The frame (4, 4) that brings points (P, 3) nearest to stated ones [Kabsch, Acta Cryst. A 32 (1976)]."""
-    middle, target = points.mean(axis=0), stated.mean(axis=0)
-    U, _, V = np.linalg.svd((stated - target).T @ (points - middle))
-    T = np.eye(4)
-    T[:3, :3] = U @ np.diag([1.0, 1.0, np.linalg.det(U @ V)]) @ V
-    T[:3, 3] = target - T[:3, :3] @ middle
-    return T
 
 
 def _with_limits(given: Robot, found: Conventions, references: Sequence[Reference]) -> Conventions:
@@ -397,39 +303,23 @@ def _with_flange(robot: Robot, stated: Sequence[Reference]) -> Robot:
     return robot.replace(flange=robot.flange @ translation(*shift))
 
 
-def _with_entry(robot: Robot, column: str, row: int, value: float) -> Robot:
-    values = np.array(getattr(robot, column))
-    values[row] = value
-    return robot.replace(**{column: values})
-
-
-def _changed(robot: Robot, wrong: Sequence[tuple[str, int]], x: Reals) -> Robot:
-    """The arm with base (6), flange (6), inner zeros and wrong entries moved by x, m and rad."""
-    for (column, row), amount in zip(wrong, x[len(x) - len(wrong) :]):
-        robot = _with_entry(robot, column, row, getattr(robot, column)[row] + amount)
+def _changed(robot: Robot, numbers: Sequence[Entry], x: Reals) -> Robot:
+    """The arm with base (6), flange (6), and entries moved by x, m and rad."""
     base, flange = (
         T @ translation(*x[k : k + 3]) @ rot_z(x[k + 3]) @ rot_y(x[k + 4]) @ rot_x(x[k + 5])
         for T, k in ((robot.base, 0), (robot.flange, 6))
     )
-    offset = robot.offset.copy()
-    offset[1:-1] += x[12 : 12 + len(offset[1:-1])]
-    return robot.replace(base=base, flange=flange, offset=offset)
+    return robot_of(shifted(tables_of(robot), numbers, x[None, 12:]), 0, robot.replace(base=base, flange=flange))
 
 
-def _fitted(robot: Robot, wrong: Sequence[tuple[str, int]], off: Misfit) -> Robot:
-    """Gauss and Newton's steps from an arm that nearly meets the references."""
-    count = 12 + max(robot.joints - 2, 0) + len(wrong)
-    for _ in range(ROUNDS):
-        here = off(robot)
-        if np.abs(here).max() < MET * MEETS:
-            break
-        slopes = np.stack([(off(_changed(robot, wrong, STEP * row)) - here) / STEP for row in np.eye(count)], axis=1)
-        step = -np.asarray(np.linalg.lstsq(slopes, here, rcond=1e-9)[0], dtype=np.float64)
-        ahead = _changed(robot, wrong, step)
-        if np.linalg.norm(off(ahead)) > GAINS * np.linalg.norm(here):
-            break
-        robot = ahead
-    return robot
+def _fitted(robot: Robot, wrong: Sequence[Entry], off: Misfit) -> Robot:
+    """Base, flange, inner zeros and wrong entries fitted, from an arm that nearly meets the references."""
+    numbers = [*(Entry("offset", joint) for joint in range(2, robot.joints)), *wrong]
+
+    def model(amounts: Reals, _: Integers) -> Reals:
+        return np.array([off(_changed(robot, numbers, x)) for x in amounts])
+
+    return _changed(robot, numbers, lowered(model, np.zeros((1, 12 + len(numbers))), passes=ROUNDS)[0][0])
 
 
 def _plain(given: Robot, fitted: Robot, off: Misfit, tolerances: Tolerances) -> Robot:
@@ -448,13 +338,6 @@ def _plain(given: Robot, fitted: Robot, off: Misfit, tolerances: Tolerances) -> 
     if np.linalg.norm(shift[:3, 3]) < 2 * tolerances.length and turn_of(shift) < 2 * tolerances.angle:
         arm = kept(arm, arm.replace(base=given.base))
     return arm
-
-
-def _wrong_entry(given: Robot, found: Robot, column: str, row: int) -> Fault:
-    own, fits = (float(getattr(each, column)[row]) for each in (given, found))
-    if column == "alpha":
-        return WrongAlpha(row + 1, math.degrees(own), round(math.degrees(fits), 6))
-    return WrongLength(row + 1, "a" if column == "a" else "d", MM * own, round(MM * fits, 4))
 
 
 def _differences(given: Robot, found: Robot, tolerances: Tolerances) -> Faults:

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import cast
 
 import numpy as np
 
 from er3a.by_value import ByValue, Displayed, Sheet, first_rows, shortly
+from er3a.comparison.entries import Entry
 from er3a.diagnosis import conclusions
 from er3a.diagnosis.defined_otherwise import Conventions, conventions_of, counted_from_ground
-from er3a.diagnosis.faults import SIDES, Faults, entry_of
-from er3a.diagnosis.fitting import MEETS, PROBE, FreeNumber, minimise_max, moved
+from er3a.diagnosis.faults import Faults, entry_of
+from er3a.diagnosis.fitting import ANGLES, MEETS, moved
 from er3a.diagnosis.ranking import SHOWN, UNITS, Case, Ranking, case_of, rank_case, usable
-from er3a.kinematics.table_batch import Tables, frames_of, robot_of, tables_of
+from er3a.kinematics.table_batch import robot_of, tables_of
 from er3a.numerics.arrays import Flags, Reals
 from er3a.references.predict import predict_tables, search
-from er3a.references.quantities import MM, Extreme, Pose, Unit
+from er3a.references.quantities import Extreme, Unit
 from er3a.references.reference import (
     Reference,
     ReferenceSet,
@@ -29,100 +29,26 @@ from er3a.references.reference import (
 )
 from er3a.robots.robot import Robot
 
-STEP_DEG = 45.0
-MAX_COMPARED = 60
-APART_MM = 1.0
-APART_RAD = 1e-3
 REACH_STARTS = 40
 TRIED_RAD = tuple(np.radians([1.0, 10.0, 37.0, 90.0, 150.0, 180.0]).tolist())
 TRIED_M = 0.001, 0.01, 0.1, 0.5
 
 
-def deciding_measurement(tables: Tables, robot: Robot) -> conclusions.NextMeasurement | None:
-    """The pose, out of single joints turned and all turned together, at which the flange positions that the tables
-    predict differ most; else the limits in which they differ.
-
-    Parameters
-    ----------
-    tables : H hypotheses, which the references at hand can't distinguish; of very many the first are compared
-
-    Returns
-    -------
-    advice : None for a single table
-    """
-    if len(tables) < 2:
-        return None
-    tables = tables[:MAX_COMPARED]
-    poses = _candidates(robot)
-    flanges = frames_of(tables, robot, np.radians(poses))[:, :, -1]
-    points = flanges[..., :3, 3] * MM
-    apart = np.linalg.norm(points[:, None] - points[None, :], axis=-1)
-    pairs = np.triu_indices(len(tables), 1)
-    share = (apart[pairs] > APART_MM).mean(axis=0)
-    best = int(np.lexsort((-apart[pairs].max(axis=0), -share))[0])
-    if share[best] > 0:
-        pose = cast(Pose, tuple(poses[best].tolist()))
-        return conclusions.FlangePositionDecides(pose, float(share[best]), float(apart[pairs][:, best].max()))
-    for side in SIDES:
-        column = tables.lower if side == "lower" else tables.upper
-        joints = np.flatnonzero(np.ptp(column, axis=0) > APART_RAD)
-        if len(joints):
-            return conclusions.LimitDecides(int(joints[0]) + 1, side)
-    return (
-        conclusions.NothingDecides() if np.ptp(flanges, axis=0).max() < APART_RAD else conclusions.OrientationDecides()
-    )
-
-
-def _candidates(robot: Robot) -> Reals:
-    """Poses (P, n) in deg within the limits: one joint turned in either direction, pairs, and all."""
-    joints = len(robot.lower)
-    turned = [np.zeros(joints)]
-    for j in range(joints):
-        for sign in (1, -1):
-            turned.append(sign * STEP_DEG * (np.arange(joints) == j))
-    turned += [a + b for i, a in enumerate(turned[1:]) for b in turned[i + 2 :]]
-    turned.append(STEP_DEG * np.where(np.arange(joints) == 1, -1, 1))
-    lower, upper = np.degrees(np.minimum(robot.lower, robot.upper)), np.degrees(np.maximum(robot.lower, robot.upper))
-    return np.unique(np.round(np.clip(turned, lower, upper), 3), axis=0)
-
-
-STEP = 1.1
-LENGTHS_M = 1e-5 * STEP ** np.arange(124)  # up to 1.2 m
-ANGLES_RAD = np.pi / STEP ** np.arange(123, -1, -1)  # from 0.0015 deg to half a turn
-ALIKE = 0.01
-"""Two hypotheses that differ by less of a half-width than this, whatever value they take, are alike at any size."""
-
-
-def resolution_of(case: Case) -> conclusions.Resolution:
-    """What would be noticed of a table that meets all references."""
-    entries = [number for number in case.numbers if number.column]
-    noticed = {number: least_noticed(case, number) for number in entries}
-    lengths = [size * MM for number, size in noticed.items() if size is not None and not number.is_angle]
-    angles = [float(np.degrees(size)) for number, size in noticed.items() if size is not None and number.is_angle]
-    half_turns = [number for number in entries if number.is_angle and not _missed(case, number, np.array([np.pi]))[0]]
-    return conclusions.Resolution(
-        length_mm=max(lengths, default=None),
-        angle_deg=max(angles, default=None),
-        half_turns=tuple(number.name for number in half_turns if noticed[number] is not None),
-        unseen=(*(number.name for number, size in noticed.items() if size is None), *_reversible(case)),
-    )
-
-
 def unseen_of(case: Case) -> tuple[str, ...]:
     """Entries that no reference reacts to at any value, and joints that could be reversed."""
     before = case.difference(case.given)[0]
-    entries = [number for number in case.numbers if number.column]
+    entries = [number for number in case.numbers if number.joint]
     if not entries:
         rows = range(1, case.given.d.shape[-1] + 1)
         names = [f"{name}{row}" for name in ("a", "alpha", "d", "offset") for row in rows]
     else:
-        sizes = {number: np.array(TRIED_RAD if number.is_angle else TRIED_M) for number in entries}
-        missed = {number: _missed(case, number, np.concatenate([own, -own]), before) for number, own in sizes.items()}
-        names = [number.name for number, own in missed.items() if not own.any()]
+        sizes = {number: np.array(TRIED_RAD if number.column in ANGLES else TRIED_M) for number in entries}
+        seen = {number: missed(case, number, np.concatenate([own, -own]), before) for number, own in sizes.items()}
+        names = [number.name for number, own in seen.items() if not own.any()]
     return (*names, *_reversible(case, before))
 
 
-def _reversible(case: Case, before: Reals | float = 0.0) -> list[str]:
+def _reversible(case: Case, before: Reals) -> list[str]:
     """Joints that could be reversed without a difference to references leaving ``before`` by more than their
     uncertainty."""
     found = []
@@ -133,59 +59,12 @@ def _reversible(case: Case, before: Reals | float = 0.0) -> list[str]:
     return found
 
 
-def least_noticed(case: Case, number: FreeNumber) -> float | None:
-    """The least change (m or rad) of an entry, to 10 %, at which some reference is missed, whichever way it is changed;
-    None if there is none up to 1.2 m or half a turn."""
-    sizes = ANGLES_RAD if number.is_angle else LENGTHS_M
-    missed = _missed(case, number, np.concatenate([sizes, -sizes])).reshape(2, -1)
-    if not missed.any(axis=1).all():
-        return None
-    return float(sizes[missed.argmax(axis=1).max()])
-
-
-def distinguishability(case: Case, ranking: Ranking) -> float | None:
-    """How many times larger the disagreement would have to be for the references to tell the first set apart.
-
-    Each member but the first is refitted to what the first predicts, to first order; what then stays grows with the
-    disagreement. Members that predict the same at any size don't count.
-
-    Of a set without end the first members are compared.
-
-    Returns
-    -------
-    factor : at least 1; None if all members are alike at any size
-    """
-    group = ranking.groups[0]
-    difference = ranking.pool.difference / case.uncertainty
-    factors = []
-    for row in group[1:MAX_COMPARED]:
-        apart = difference[row] - difference[group[0]]
-        slopes = _slopes(case, ranking, row)
-        if slopes.shape[1]:
-            apart = apart + slopes @ minimise_max(slopes[None], apart[None], enough=0.0)[0]
-        stays = float(np.abs(apart).max())
-        if stays > ALIKE:
-            factors.append(max(1 / stays, 1.0))
-    return max(factors, default=None)
-
-
-def _slopes(case: Case, ranking: Ranking, row: int) -> Reals:
-    """Derivatives (n, k) of the residuals with respect to the free numbers among a hypothesis' entries."""
-    entries = {entry_of(fault) for fault in ranking.pool.faults[row]}
-    places = [place for place, number in enumerate(case.numbers) if number.name in entries]
-    if not places:
-        return np.empty((len(case.references), 0))
-    tables: Tables = ranking.pool.tables[[row] * len(places)]
-    ahead = moved(tables, case.numbers, np.array(places)[:, None], np.full((len(places), 1), PROBE))
-    slopes: Reals = ((case.difference(ahead) - ranking.pool.difference[row]) / PROBE / case.uncertainty).T
-    return slopes
-
-
-def _missed(case: Case, number: FreeNumber, amounts: Reals, before: Reals | float = 0.0) -> Flags:
+def missed(case: Case, number: Entry, amounts: Reals, before: Reals | float = 0.0) -> Flags:
+    """Whether (H,) some reference is missed with amounts (H,) added to an entry, a difference ``before`` apart."""
     tables = case.given[np.zeros(len(amounts), dtype=int)]
     changed = moved(tables, [number], np.zeros((len(amounts), 1), dtype=int), amounts[:, None])
-    missed: Flags = np.any(np.abs(case.difference(changed) - before) > case.uncertainty * MEETS, axis=1)
-    return missed
+    found: Flags = np.any(np.abs(case.difference(changed) - before) > case.uncertainty * MEETS, axis=1)
+    return found
 
 
 MOSTLY = 0.05
@@ -326,7 +205,7 @@ def diagnosis_of(robot: Robot, references: ReferenceSet | Sequence[Reference]) -
     case = case_of(robot, stated)
     ranking = rank_case(case)
     if not ranking:
-        return Diagnosis(conclusions.NothingToExplain(len(stated), resolution_of(case)), len(stated), 0, None, ())
+        return Diagnosis(conclusions.NothingToExplain(len(stated)), len(stated), 0, None, ())
     hypotheses = tuple(_described(ranking, group, robot) for group in ranking.groups)
     tried = len(ranking.pool.faults)
     explained = bool(hypotheses) and hypotheses[0].explains
@@ -381,7 +260,6 @@ def _defined_otherwise(ranking: Ranking, chosen: Conventions, left: Reals, other
         explains=half_widths <= MEETS,
         half_widths=half_widths,
         indistinguishable_from=(alike.faults, *alike.indistinguishable_from) if alike else (),
-        to_decide=None,
         score=0.0,
         corrected=chosen.corrected,
     )
@@ -404,9 +282,6 @@ def _conclusion(case: Case, ranking: Ranking, hypotheses: Sequence[Hypothesis]) 
         missed = int((relative > MEETS).sum())
         return conclusions.NoFaultStandsOut(missed, len(relative), float(relative.max()), tried)
     best = hypotheses[0]
-    if best.explains and (factor := distinguishability(case, ranking)) is not None:
-        candidates = (best.faults, *best.indistinguishable_from)
-        return conclusions.TooSmallToTell(candidates, best.residual_before, factor * best.residual_before, best.unit)
     figures = best.residual_before, best.residual_after, best.unit
     named = _concluded(best, best.indistinguishable_from)
     return named or conclusions.NoFewFaultsExplain(tried, *figures, _best_left(ranking, best.unit))
@@ -447,7 +322,6 @@ def _described(ranking: Ranking, group: tuple[int, ...], robot: Robot) -> Hypoth
         explains=bool(ranking.explains[best]),
         half_widths=float(np.abs(after / uncertainty).max()),
         indistinguishable_from=tuple(pool.faults[i] for i in group[1:]),
-        to_decide=deciding_measurement(pool.tables[np.array(group)], robot),
         score=float(ranking.score[best]),
         corrected=robot_of(pool.tables, best, robot),
     )

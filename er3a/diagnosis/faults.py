@@ -7,11 +7,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Literal
+from typing import Literal, cast
 
 import numpy as np
 
 from er3a.by_value import Finding
+from er3a.comparison.entries import LENGTHS, Entry
 from er3a.kinematics.table_batch import COLUMNS, Tables
 from er3a.numerics.arrays import Reals
 from er3a.references.quantities import Limit, LimitExcess, Side, value_at
@@ -171,6 +172,16 @@ Faults = tuple[Fault, ...]
 
 CONVENTIONS = WrongOffset, ReversedDirection, BaseElsewhere, FlangeElsewhere, CountedFromGround
 """What can be chosen without changing the arm."""
+
+
+def wrong_number(entry: Entry, given: float, fits: float) -> Fault:
+    """What was wrong with an entry that is given with one value (m or rad; 1 for the scale) where another fits."""
+    given, fits = (float(value * entry.in_unit) for value in (given, fits))
+    if entry.column == "scale":
+        return WrongScale(fits)
+    if entry.column in LENGTHS:
+        return WrongLength(entry.joint, cast(LengthColumn, entry.column), given, fits)
+    return (WrongAlpha if entry.column == "alpha" else WrongOffset)(entry.joint, given, fits)
 
 
 def rounded(fault: Fault) -> Fault:

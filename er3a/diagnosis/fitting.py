@@ -16,71 +16,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
-from typing import Literal
 
 import numpy as np
 
-from er3a.diagnosis.faults import Fault, WrongAlpha, WrongLength, WrongOffset, WrongScale
+from er3a.comparison.entries import LENGTHS, Entry, shifted
 from er3a.kinematics.table_batch import Tables
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.references.quantities import MM
 
-FreeColumn = Literal["a", "d", "alpha", "offset"]
-COLUMNS: tuple[FreeColumn, ...] = ("a", "d", "alpha", "offset")
+COLUMNS = ("a", "d", "alpha", "offset")
 ANGLES = ("alpha", "offset")
 
 
-@dataclass(frozen=True)
-class FreeNumber:
-    """An entry with a free value.
-
-    Attributes
-    ----------
-    column : None for the common scale of all lengths
-    joint : counted from 0; 0 for the scale
-    """
-
-    column: FreeColumn | None
-    joint: int
-
-    @property
-    def name(self) -> str:
-        """The entry's name, such as "d4"."""
-        return f"{self.column}{self.joint + 1}" if self.column else "scale"
-
-    @property
-    def is_angle(self) -> bool:
-        """Whether the number comes round after a turn."""
-        return self.column in ANGLES
-
-    def value(self, tables: Tables) -> Reals:
-        """The entry (H,), in m or rad; 1 for the scale."""
-        if self.column is None:
-            return np.ones(len(tables))
-        column: Reals = getattr(tables, self.column)[:, self.joint]
-        return column
-
-    def fault(self, given: float, fits: float) -> Fault:
-        """What was wrong with an entry that is given with one value (m or rad; 1 for the scale) where another fits."""
-        joint = self.joint + 1
-        if self.column is None:
-            return WrongScale(fits)
-        if self.column == "alpha":
-            return WrongAlpha(joint, _degrees(given), _degrees(fits))
-        if self.column == "offset":
-            return WrongOffset(joint, _degrees(given), _degrees(fits))
-        return WrongLength(joint, self.column, given * MM, fits * MM)
-
-
-def free_numbers(joints: int) -> tuple[FreeNumber, ...]:
+def free_numbers(joints: int) -> tuple[Entry, ...]:
     """All free numbers of a table; the scale first, so that it is applied before a length is set."""
-    entries = (FreeNumber(column, joint) for column in COLUMNS for joint in range(joints))
-    return (FreeNumber(None, 0), *entries)
+    return (Entry("scale"), *(Entry(column, joint) for column in COLUMNS for joint in range(1, joints + 1)))
 
 
-def moved(tables: Tables, numbers: Sequence[FreeNumber], which: Integers, amounts: Reals) -> Tables:
+def moved(tables: Tables, numbers: Sequence[Entry], which: Integers, amounts: Reals) -> Tables:
     """Tables with amounts added to entries.
 
     Parameters
@@ -88,28 +42,20 @@ def moved(tables: Tables, numbers: Sequence[FreeNumber], which: Integers, amount
     which : (H, k), the places among ``numbers`` of the k entries to change in each table
     amounts : (H, k), m or rad; relative for the scale
     """
-    columns = {name: getattr(tables, name).copy() for name in COLUMNS}
-    for own, by in zip(which.T, amounts.T):
-        for place in np.unique(own):
-            rows, number = own == place, numbers[place]
-            if number.column is None:
-                for name in ("a", "d"):
-                    columns[name][rows] *= (1 + by[rows])[:, None]
-            else:
-                columns[number.column][rows, number.joint] += by[rows]
-    return replace(tables, **columns)
-
-
-def _degrees(angle: float) -> float:
-    return float(np.degrees(angle))
+    every = np.zeros((len(which), len(numbers)))
+    np.put_along_axis(every, which, amounts, axis=1)
+    return shifted(tables, numbers, every)
 
 
 PROBE = 1e-6
 MEETS = 1.0 + 1e-6
 CURVED = 1.5
-DAMPING, MIN_DAMPING, MAX_DAMPING = 1e-6, 1e-9, 1e9
+DAMPING, MIN_DAMPING, MAX_DAMPING = 1e-6, 1e-9, 1e4
 EASED, STIFFENED = 0.1, 10.0
 TINY = 1e-12
+STALLED = 1e-4  # of the squares, by which a step has to lower them
+QUIET = 0.03  # weight of what is met
+FLOOR = 1e-8  # of the largest slope squared: what hardly matters is hardly moved
 LAWSON_PASSES = 80
 ROUNDS = 3
 
@@ -163,39 +109,82 @@ class Search:
     """What is fitted: start tables, the free numbers, and residuals of tables."""
 
     starts: Tables
-    numbers: Sequence[FreeNumber]
+    numbers: Sequence[Entry]
     residual: Residual
 
     def at(self, start: Integers, which: Integers, amounts: Reals) -> Fits:
         """Free numbers with given values."""
-        return Fits(start, which, amounts, self.residual(self.tables(start, which, amounts)))
+        tables = moved(self.starts[start], self.numbers, which, amounts)
+        return Fits(start, which, amounts, self.residual(tables))
 
-    def tables(self, start: Integers, which: Integers, amounts: Reals) -> Tables:
-        """The start tables with amounts added."""
-        return moved(self.starts[start], self.numbers, which, amounts)
+    def of(self, fits: Fits) -> Model:
+        """Residuals of the rows of fits with other amounts."""
+        return lambda amounts, rows: self.at(fits.start[rows], fits.which[rows], amounts).left
 
-    def slopes(self, fits: Fits) -> Reals:
-        """Derivatives (B, n, k) of the residuals with respect to the amounts."""
-        slopes = np.empty((*fits.left.shape, fits.amounts.shape[1]))
-        for k in range(fits.amounts.shape[1]):
-            ahead = fits.amounts.copy()
-            ahead[:, k] += PROBE
-            slopes[:, :, k] = (self.residual(self.tables(fits.start, fits.which, ahead)) - fits.left) / PROBE
-        return slopes
+
+Model = Callable[[Reals, Integers], Reals]
+"""Residuals (R, n) of rows (R,) with amounts (R, k)."""
+
+
+def slopes_of(model: Model, amounts: Reals, left: Reals, rows: Integers | None = None) -> Reals:
+    """Derivatives (R, n, k) of residuals (R, n) with respect to amounts (R, k)."""
+    rows, k = np.arange(len(amounts)) if rows is None else rows, amounts.shape[1]
+    ahead = (amounts[:, None] + PROBE * np.eye(k)).reshape(-1, k)
+    beside = model(ahead, np.repeat(rows, k)).reshape(len(rows), k, -1)
+    return ((beside - left[:, None]) / PROBE).swapaxes(1, 2)
+
+
+def lowered(
+    model: Model,
+    amounts: Reals,
+    held: Flags | None = None,
+    within: Callable[[Reals], Reals] = np.asarray,
+    *,
+    passes: int,
+    damping: float = DAMPING,
+    floor: float = FLOOR,
+    widest: Reals | float = np.inf,
+) -> tuple[Reals, Reals]:
+    """Damped least squares from many starts at once; none gets worse.
+
+    Parameters
+    ----------
+    amounts : (R, k), where to start; held : (R, k), those that stay
+    within : what of residuals (R, n) counts; what does not, being met, is moved as little as will do
+    floor : of the largest slope squared, as which smaller ones are damped
+    widest : (k,), by how much amounts may be away from 0
+    """
+    amounts = np.clip(amounts, -widest, widest)
+    off = model(amounts, np.arange(len(amounts)))
+    left = within(off)
+    by, going = np.full(len(amounts), damping), (left != 0).any(axis=1)
+    for _ in range(passes):
+        rows = np.flatnonzero(going)
+        if not len(rows):
+            break
+        slopes = slopes_of(model, amounts[rows], off[rows], rows) * np.where(left[rows] != 0, 1.0, QUIET)[..., None]
+        slopes = slopes if held is None else np.where(held[rows][:, None], 0.0, slopes)
+        step = _solved(slopes, left[rows], np.ones_like(left[rows]), by[rows], floor)
+        trial = np.clip(amounts[rows] - step, -widest, widest)
+        ahead = model(trial, rows)
+        new = within(ahead)
+        before, after = (left[rows] ** 2).sum(axis=1), (new**2).sum(axis=1)
+        better = after < before
+        kept = rows[better]
+        amounts[kept], off[kept], left[kept] = trial[better], ahead[better], new[better]
+        by[rows] *= np.where(better, EASED, STIFFENED)
+        by = np.maximum(by, MIN_DAMPING)
+        stalled = better & (after > (1 - STALLED) * before)
+        going[rows[stalled | (after == 0)]] = False
+        going &= by < MAX_DAMPING
+    return amounts, left
 
 
 def descend(search: Search, fits: Fits, passes: int) -> Fits:
     """Smallest sum of squares from where ``fits`` are; no row gets worse."""
-    damping = np.full(len(fits), DAMPING)
-    for _ in range(passes if len(fits) else 0):
-        slopes = search.slopes(fits)
-        step = -_solved(slopes, fits.left, np.ones_like(fits.left), damping)
-        trial = search.at(fits.start, fits.which, fits.amounts + step)
-        better = np.flatnonzero(trial.squares < fits.squares)
-        fits = fits.with_rows(better, trial[better])
-        gained = np.isin(np.arange(len(fits)), better)
-        damping = np.clip(damping * np.where(gained, EASED, STIFFENED), MIN_DAMPING, MAX_DAMPING)
-    return fits
+    if not len(fits):
+        return fits
+    return Fits(fits.start, fits.which, *lowered(search.of(fits), fits.amounts, passes=passes))
 
 
 def meet(search: Search, fits: Fits) -> Fits:
@@ -205,7 +194,7 @@ def meet(search: Search, fits: Fits) -> Fits:
         if not len(open_rows):
             break
         part = fits[open_rows]
-        step = minimise_max(search.slopes(part), part.left)
+        step = minimise_max(slopes_of(search.of(part), part.amounts, part.left), part.left)
         trial = search.at(part.start, part.which, part.amounts + step)
         better = trial.greatest < part.greatest
         if not better.any():
@@ -237,11 +226,12 @@ def minimise_max(slopes: Reals, left: Reals, enough: float = 1.0) -> Reals:
     return best
 
 
-def _solved(slopes: Reals, left: Reals, weights: Reals, damping: Reals) -> Reals:
+def _solved(slopes: Reals, left: Reals, weights: Reals, damping: Reals, floor: float = FLOOR) -> Reals:
     """Weighted damped least-squares solution (B, k); 0 where nothing depends on a number."""
     weighted = slopes * weights[:, :, None]
     normal = np.einsum("bnk,bnl->bkl", weighted, slopes)
     size = np.einsum("bkk->bk", normal).copy()
+    size = np.maximum(size, floor * size.max(axis=1, keepdims=True))
     size = np.where(size > 0, size, 1.0)
     scale = np.sqrt(size)
     unit = normal / scale[:, :, None] / scale[:, None, :]
@@ -280,7 +270,7 @@ def scanned(search: Search, combinations: Sequence[tuple[int, ...]], grid: ScanG
     for combination in combinations:
         numbers = [search.numbers[place] for place in combination]
         values = [grid_of(number, grid) for number in numbers]
-        scales = np.stack([reach if number.column in ("a", "d") else np.ones(starts) for number in numbers], axis=1)
+        scales = np.stack([reach if number.column in LENGTHS else np.ones(starts) for number in numbers], axis=1)
         points = np.array(list(product(*values)))
         amounts.append((points * scales[:, None, :]).reshape(-1, len(combination)))
         which.append(np.tile(np.array(combination), (starts * len(points), 1)))
@@ -290,17 +280,17 @@ def scanned(search: Search, combinations: Sequence[tuple[int, ...]], grid: ScanG
     rows, before, squares = list[Integers](), 0, tried.squares
     for combination, size in zip(combinations, sizes):
         count = starts * math.prod(size)
-        cyclic = [search.numbers[place].is_angle for place in combination]
+        cyclic = [search.numbers[place].column in ANGLES for place in combination]
         rows.append(before + _lowest(squares[before : before + count].reshape(starts, *size), cyclic, grid.basins))
         before += count
     return tried[np.concatenate(rows)]
 
 
-def grid_of(number: FreeNumber, grid: ScanGrid) -> Reals:
+def grid_of(number: Entry, grid: ScanGrid) -> Reals:
     """Amounts to try: rad, or in units of the arm's length."""
-    if number.is_angle:
+    if number.column in ANGLES:
         return 2 * np.pi * np.arange(grid.angles) / grid.angles
-    return np.array(grid.lengths if number.column else (0.0,))
+    return np.array(grid.lengths if number.joint else (0.0,))
 
 
 def arm_lengths(tables: Tables) -> Reals:

@@ -29,8 +29,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er3a.by_value import Displayed, Sheet
+from er3a.comparison.entries import Entry
 from er3a.diagnosis import fitting
-from er3a.diagnosis.faults import Fault, Faults, Repair, entry_of, place_of, repairs_of, rounded
+from er3a.diagnosis.faults import Fault, Faults, Repair, entry_of, place_of, repairs_of, rounded, wrong_number
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.table_batch import Tables, join, tables_of
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -99,7 +100,7 @@ class Case:
         return expected_of(self.references)[1]
 
     @cached_property
-    def numbers(self) -> tuple[fitting.FreeNumber, ...]:
+    def numbers(self) -> tuple[Entry, ...]:
         """The free numbers of the table; none if no reference is about the arm's shape."""
         return fitting.free_numbers(self.given.a.shape[-1]) if self._about_shape.any() else ()
 
@@ -232,26 +233,26 @@ def _fitted(case: Case, starts: Tables, chosen: Sequence[tuple[Repair, ...]], fi
     fits = _distinct(case, starts, fits)
     tables = fitting.moved(starts[fits.start], case.numbers, fits.which, fits.amounts)
     repaired, cost = _named(chosen)
-    given = np.stack([number.value(starts) for number in case.numbers], axis=1)
-    fitted = np.stack([number.value(tables) for number in case.numbers], axis=1)
+    given = np.stack([number.of(starts) for number in case.numbers], axis=1)
+    fitted = np.stack([number.of(tables) for number in case.numbers], axis=1)
     faults: list[Faults] = []
     for row, (start, places) in enumerate(zip(fits.start.tolist(), fits.which.tolist())):
         free = []
         for k, place in enumerate(places):
             number, amount = case.numbers[place], float(fits.amounts[row, k])
-            best = float(fitted[row, place]) if number.column else 1 + amount
-            free.append(number.fault(float(given[start, place]), best))
+            best = float(fitted[row, place]) if number.joint else 1 + amount
+            free.append(wrong_number(number, float(given[start, place]), best))
         faults.append((*repaired[start], *free))
     return case.pool(tables, faults, cost[fits.start] + FREE_NUMBER * fits.which.shape[1])
 
 
 def _distinct(case: Case, starts: Tables, fits: fitting.Fits) -> fitting.Fits:
     """Fits with angles within half a turn, without those that change nothing or say the same as a better one."""
-    is_angle = np.array([number.is_angle for number in case.numbers])[fits.which]
-    values = np.stack([number.value(starts) for number in case.numbers], axis=1)[fits.start[:, None], fits.which]
+    is_angle = np.array([number.column in fitting.ANGLES for number in case.numbers])[fits.which]
+    values = np.stack([number.of(starts) for number in case.numbers], axis=1)[fits.start[:, None], fits.which]
     amounts = np.where(is_angle, wrap_to_pi(values + fits.amounts) - values, fits.amounts)
     changes: Flags = np.all(np.abs(np.where(is_angle, wrap_to_pi(amounts), amounts)) > UNCHANGED, axis=1)
-    is_scale = np.array([number.column is None for number in case.numbers])[fits.which]
+    is_scale = np.array([not number.joint for number in case.numbers])[fits.which]
     changes &= ~(is_scale & (1 + amounts < MIN_SCALE)).any(axis=1)
     fits = fitting.Fits(fits.start, fits.which, amounts, fits.left)
     order = np.lexsort((fits.greatest, *fits.which.T[::-1], fits.start))

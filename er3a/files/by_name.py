@@ -50,9 +50,6 @@ def measurement_columns(units: Sequence[str]) -> dict[str, CsvColumn]:
         "standard_deviation_mm": CsvColumn(float, always=False),
         "place": CsvColumn(str, optional=True, always=False),
         "plane": CsvColumn(str, optional=True, always=False),
-        "pair": CsvColumn(str, optional=True, always=False),
-        "bar": CsvColumn(str, optional=True, always=False),
-        "length_mm": CsvColumn(float, optional=True, always=False),
     }
 
 
@@ -68,8 +65,7 @@ APART_DEVIATIONS = 8.0
 def load_measurements(path: str | Path, robot: Robot | None = None) -> tuple[Measurement, ...]:
     """Read measured positions: joint values ``q1_deg`` ... (``q3_mm`` of a prismatic joint), ``point`` (flange or
     tool), ``x_mm``, ``y_mm``, ``z_mm``, and, if it is known, ``standard_deviation_mm``. Instead of coordinates, a row
-    may name a ``place`` or ``plane`` (a fixed point or plane at an unknown location that was touched), a ``pair`` (two
-    rows whose points are ``length_mm`` apart) or a ``bar`` (a ball bar whose other end is in a fixed socket).
+    may name a ``place`` or ``plane`` (a fixed point or plane at an unknown location that was touched).
 
     Parameters
     ----------
@@ -90,14 +86,10 @@ def load_measurements(path: str | Path, robot: Robot | None = None) -> tuple[Mea
     for fields in table:
         xyz, deviation = tuple(fields[f"{c}_mm"] for c in "xyz"), fields["standard_deviation_mm"]
         names = {kind: fields[kind] for kind in get_args(TouchKind)}
-        given, length = [kind for kind, value in names.items() if value], fields["length_mm"]
+        given = [kind for kind, value in names.items() if value]
         if given and (len(given) > 1 or xyz != (None, None, None)):
-            problem = "a touched place or plane, a pair or a bar beside another, or beside coordinates"
+            problem = "a touched place or plane beside another, or beside coordinates"
             raise InputError(path, f"row {fields['row']}, column {given[-1]}", problem, "Give one of them")
-        if length is not None and (length <= 0 or not {"pair", "bar"} & set(given)):
-            problem = f"{length:g} is not positive" if length <= 0 else "a length of neither a pair nor a bar"
-            remedy = "Write the distance of a pair's points, or of a bar's point from its socket"
-            raise InputError(path, f"row {fields['row']}, column length_mm", problem, remedy)
         if xyz == (None, None, None) and not given:
             raise InputError(path, f"row {fields['row']}, column x_mm", "no coordinate is given", "Give at least one")
         if deviation is not None and deviation <= 0:
@@ -105,12 +97,11 @@ def load_measurements(path: str | Path, robot: Robot | None = None) -> tuple[Mea
             remedy = "Write the measuring device's standard deviation, or leave the column out to have it estimated"
             raise InputError(path, where, problem, remedy)
         pose = tuple(fields[f"q{joint}_{unit}"] for joint, unit in enumerate(units, 1))
-        rows.append(Measurement(fields["row"], pose, fields["point"], xyz, deviation, **names, length_mm=length))
+        rows.append(Measurement(fields["row"], pose, fields["point"], xyz, deviation, **names))
     _check_units(path, rows, units)
     if robot is not None:
         _check_scale(path, rows, robot)
     _check_contradictions(path, rows)
-    _check_lengths(path, rows)
     return tuple(rows)
 
 
@@ -131,29 +122,6 @@ def load_joint_values(path: str | Path, robot: Robot) -> Reals:
     _check_units(path, rows, units)
     check_poses(rows, robot, path)
     return meant(robot, np.array([row.pose for row in rows], dtype=float).reshape(-1, robot.joints))
-
-
-def _check_lengths(path: Path, rows: list[Measurement]) -> None:
-    """Check that a pair has two rows and one length, and a bar a length in all of its rows or in none."""
-    groups: dict[tuple[str, str], list[Measurement]] = {}
-    for row in rows:
-        if row.touched and row.touched[0] in ("pair", "bar"):
-            groups.setdefault(row.touched, []).append(row)
-    for (kind, name), own in groups.items():
-        lengths = {row.length_mm for row in own}
-        where = f"row {own[-1].row}, column {kind}"
-        if kind == "pair" and len(own) != 2:
-            raise InputError(path, where, f"the pair '{name}' has {len(own)} rows", "Give each pair two rows")
-        if kind == "pair" and (len(lengths) > 1 or None in lengths):
-            raise InputError(
-                path,
-                where,
-                f"the rows of pair '{name}' need one and the same length",
-                "Write it in both rows, in length_mm",
-            )
-        if kind == "bar" and None in lengths and len(lengths) > 1:
-            problem = f"the bar '{name}' has a length in some rows only"
-            raise InputError(path, where, problem, "Write it in all rows, or in none if it is unknown")
 
 
 def _units_in(path: Path) -> list[str]:
@@ -274,14 +242,13 @@ def evidence(robot: Robot, references: References | None = None, tolerance: Tole
 
 
 def calibrate(
-    robot: Robot, measurements: Sequence[Measurement] | ReferenceSet | str | Path, fixed: Sequence[FixedName] = ()
+    robot: Robot, measurements: Sequence[Measurement] | str | Path, fixed: Sequence[FixedName] = ()
 ) -> Calibration:
     """Estimate corrections to a robot's table, base and tool; see :func:`er3a.calibration.calibrate.calibrate`.
 
     Parameters
     ----------
-    measurements : a CSV file of measured positions (:func:`er3a.load_measurements`), its rows, or a reference set,
-        whose positions are used
+    measurements : a CSV file of measured positions (:func:`er3a.load_measurements`), or its rows
     fixed : ``"base"``, ``"tool"``, ``"ratios"``: not to be estimated but kept as in the robot's file; default: none
 
     Returns
@@ -300,8 +267,6 @@ def calibrate(
     if isinstance(measurements, str | Path):
         path, measurements = measurements, load_measurements(measurements, robot)
         check_poses(measurements, robot, path)
-    elif isinstance(measurements, ReferenceSet):
-        measurements = _of_arm(measurements, robot)
     found = calibration.calibrate(robot, measurements, fixed)
     text = f"Calibrated with {found.coordinates} measured coordinates, starting from the table of {robot.name}"
     source = Source(text, "inferred")

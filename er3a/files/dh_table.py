@@ -58,7 +58,8 @@ MILLIMETRES: dict[LengthUnit, float] = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in"
 DEGREES: dict[AngleUnit, float] = {"deg": 1.0, "rad": math.degrees(1.0)}
 OTHER_UNITS: dict[str, tuple[str, float]] = {unit: ("mm", scale) for unit, scale in MILLIMETRES.items() if unit != "mm"}
 OTHER_UNITS |= {"rad": ("deg", DEGREES["rad"])}
-SHORTEST_ARM_MM = 10.0  # a table whose lengths are all below is in metres
+SHORTEST_ARM_MM = 10.0  # a table whose lengths are all below is in metres or inches
+LONGEST_LINK_M = 2.5  # of robots; the same number of inches is a link of 64 mm, below those of most
 LONGEST_ARM_IN = 200.0  # inches; a length of five metres
 ROUND_MM = (0.1, 2e-3, 2), (0.01, 5e-4, 3), (0.5, 0.0135, 3)
 """What lengths in mm are multiples of, how nearly if they were in another unit, and how many it takes to say so."""
@@ -352,7 +353,7 @@ def _twists_in_radians(rows: list[dict[str, Any]], own: set[str]) -> bool:
 
 
 def _likely_unit(lengths: list[float]) -> LengthUnit:
-    """What lengths are in: inches if they are round millimetres in inches alone, else metres if all are below 10."""
+    """What lengths are in: inches if they are round millimetres in inches alone; else, below 10, metres or inches."""
 
     def is_round(scale: float) -> bool:
         off = [[abs(x * scale - round(x * scale / step) * step) for x in lengths] for step, _, _ in ROUND_MM]
@@ -362,7 +363,7 @@ def _likely_unit(lengths: list[float]) -> LengthUnit:
     in_inches = max(lengths) < LONGEST_ARM_IN and is_round(25.4) and not is_round(1.0)
     if in_inches and not (metres and is_round(1000.0)):
         return "in"
-    return "m" if metres else "mm"
+    return "mm" if not metres else "m" if max(lengths) < LONGEST_LINK_M else "in"
 
 
 def _unit(row: dict[str, Any]) -> str:

@@ -767,9 +767,8 @@ def export_srdf(robot: Robot) -> str:
 
     Pairs of links that are disabled: those that are proven apart in all joint vectors within the limits (Never),
     that a joint joins (Adjacent), that the robot's file allows to touch (User), and whose shapes overlap in every
-    joint vector (Default), which is an error of the shapes: a comment names them. What er3a still checks of links
-    that a joint joins, away from that joint, SRDF has no words for: :func:`pairs_checked_in_part` names them. A comment
-    says on what shapes the pairs rest, where no document gives them.
+    joint vector (Default), which is an error of the shapes: a comment names them. A comment says on what shapes the
+    pairs rest, where no document gives them.
     """
     root = ElementTree.Element("robot", name=robot.name)
     if rests := assumed_pairs(robot):
@@ -800,11 +799,3 @@ def pairs_not_checked(robot: Robot) -> tuple[str, ...]:
     return tuple(
         f"{row.first} and {row.second}" for row in collision_matrix(robot).rows if REASONS.get(row.state) == "Default"
     )
-
-
-def pairs_checked_in_part(robot: Robot) -> tuple[str, ...]:
-    """Pairs of links that the SRDF disables, as they touch at their joint, of which er3a checks the rest."""
-    matrix = collision_matrix(robot)
-    rests = {(first.name, second.name) for first, second in matrix.watched}
-    joined = (row for row in matrix.rows if row.state == "joined" and (row.first, row.second) in rests)
-    return tuple(f"{row.first} and {row.second}" for row in joined)

@@ -412,8 +412,8 @@ def _joint(path: Path, element: ElementTree.Element, snap: bool) -> UrdfJoint:
             lower, upper = upper, lower
     if kind == "continuous":
         kind = "revolute" if -MAX_TURNED <= lower < upper <= MAX_TURNED else kind
-        if lower < upper:
-            taken = "they are kept" if kind == "revolute" else "beyond ten turns they are none"
+        if not (math.isnan(lower) and math.isnan(upper)):
+            taken = "they are kept" if kind == "revolute" else "not kept, as they are no range of up to ten turns"
             notes.append(f"{where} is continuous with limits {lower:g} to {upper:g}: {taken}")
     lower, upper = _within_soft_limits(path, element, kind, (lower, upper), notes)
     if kind == "revolute":

@@ -6,12 +6,6 @@ as several allowed ones together move it.
 Discrete changes of a table: directions reversed, half turns, signs, the other convention.
 
 They are not near the table, so linearisation can't find them: they and their combinations are tried.
-
-A table that meets the requirements, searched far from one that does not: joints reversed, all else free.
-
-No continuous change reverses a joint, and a wrong sign misleads the search for the rest. So the search starts again
-from each pattern of directions, those with few reversed joints first. The tables that are found, and their discrete
-alternatives that also meet the requirements, are compared; the one nearest to the given table is taken.
 """
 
 from __future__ import annotations
@@ -23,12 +17,13 @@ from itertools import combinations, islice
 import numpy as np
 
 from er3a.by_value import ByValue
-from er3a.identifiability.entries import Column, TableNumber, entries_of
-from er3a.identifiability.feasible import MET, Region
+from er3a.comparison.entries import Entry
+from er3a.identifiability.entries import entries_of
+from er3a.identifiability.feasible import MET
 from er3a.identifiability.requirements import Asked
 from er3a.identifiability.statements import ToolOff, ToolRange
-from er3a.kinematics.table_batch import Tables, join, robot_of
-from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.kinematics.table_batch import Tables, join
+from er3a.numerics.arrays import Flags, Reals
 from er3a.references.quantities import Quantity, value_at
 from er3a.references.seen import TableEntry
 from er3a.robots.robot import Robot
@@ -50,7 +45,7 @@ class Flip:
     """
 
     kind: str
-    entry: TableNumber | None
+    entry: Entry | None
     about_deg: float = 0.0
 
     @property
@@ -86,19 +81,16 @@ def half_turn(angle: Reals) -> Reals:
 def flips_of(robot: Robot, quantities: Sequence[Quantity]) -> list[Flip]:
     """The changes of a robot's table, the likeliest to be mistaken first."""
     joints = range(1, len(robot.a) + 1)
-    found = [Flip("reversed", TableNumber("direction", j)) for j in joints]
+    found = [Flip("reversed", Entry("direction", j)) for j in joints]
     for j in joints:
         angles = {round(value_at(quantity.arm_pose, j), 9) for quantity in quantities} - {0.0}
-        found += [Flip("reversed", TableNumber("direction", j), angle) for angle in sorted(angles)]
+        found += [Flip("reversed", Entry("direction", j), angle) for angle in sorted(angles)]
     last_first = joints[::-1]  # what only turns the flange comes before what the flange and others compose
-    found += [Flip("half_turn", TableNumber("offset", j)) for j in last_first]
-    found += [Flip("half_turn", TableNumber("alpha", j)) for j in last_first]
+    found += [Flip("half_turn", Entry("offset", j)) for j in last_first]
+    found += [Flip("half_turn", Entry("alpha", j)) for j in last_first]
     oblique = np.abs(np.sin(2 * robot.alpha)) > np.sin(np.radians(SOME_DEG))
-    found += [Flip("sign", TableNumber("alpha", j)) for j in joints if oblique[j - 1]]
-    columns: tuple[Column, ...] = ("a", "d")
-    found += [
-        Flip("sign", TableNumber(column, j)) for column in columns for j in joints if getattr(robot, column)[j - 1]
-    ]
+    found += [Flip("sign", Entry("alpha", j)) for j in joints if oblique[j - 1]]
+    found += [Flip("sign", Entry(column, j)) for column in "ad" for j in joints if getattr(robot, column)[j - 1]]
     return [*found, Flip("convention", None)]
 
 
@@ -145,7 +137,6 @@ def _placed(batch: Tables, rows: Flags, own: Tables) -> Tables:
 
 CHUNK = 1024
 NO_WORSE = 1e-6
-SEARCHED_EXTREMES = 400
 SAME_TOOL = 4.0  # mm, and thousandths: what moves a tool by less is none of another robot
 MAX_COMPOSED = 2048
 
@@ -199,7 +190,7 @@ def with_readings(table: Tables, robot: Robot, readings: Sequence[Alternative]) 
 def alternatives_to(table: Tables, asked: Asked, tool: ToolRange) -> list[Alternative]:
     """Minimal alternatives to a table (a batch of one) that requirements allow: all that the table meets are met, and
     none is missed by more; without those that move no tool."""
-    flips = flips_of(asked.robot, [each.quantity for each in asked.requirements])
+    flips = flips_of(asked.robot, [each.quantity for each in asked.order])
     search = _AlternativeSearch(table, asked, tool, flips)
     for chosen in sets_of(flips):
         search.try_all(chosen)
@@ -218,13 +209,12 @@ class _AlternativeSearch:
 
     def __init__(self, table: Tables, asked: Asked, tool: ToolRange, flips: Sequence[Flip]):
         self.table, self.asked, self.tool, self.flips = table, asked, tool, flips
-        own = asked.violation(asked.off(table, afresh=True)) if len(asked) else np.empty(0)
+        own = asked.violation(asked.off(table)) if len(asked) else np.empty(0)
         self.own, self.bound = own, np.maximum(MET, own + NO_WORSE)
         self.composed: list[tuple[int, ...]] = [()]
         self.signatures = tool.signature(table)
         self.found: list[Alternative] = []
         self.allowed: list[tuple[int, ...]] = []
-        self.left = SEARCHED_EXTREMES
 
     def try_all(self, chosen: list[tuple[int, ...]]) -> None:
         """Try combinations of one size."""
@@ -238,13 +228,10 @@ class _AlternativeSearch:
 
     def _plain_allowed(self, tables: Tables) -> tuple[Flags, Flags]:
         """Which tables (H,) meet the requirements on the arm, and which of these miss an entry measured by itself."""
-        if not self.asked.plain:
-            return np.ones(len(tables), dtype=bool), np.zeros(len(tables), dtype=bool)
-        violation = self.asked.plain_violation(tables)
+        violation = self.asked.violation(self.asked.plain_off(tables))
         met = violation <= self.bound[: violation.shape[1]]
-        by_itself = np.array([isinstance(each.quantity, TableEntry) for each in self.asked.plain])
-        of_the_arm, of_entries = met[:, ~by_itself], met[:, by_itself]
-        return np.asarray(of_the_arm.all(axis=1)), np.asarray(~of_entries.all(axis=1))
+        by_itself = np.array([isinstance(each.quantity, TableEntry) for each in self.asked.plain], dtype=bool)
+        return np.asarray(met[:, ~by_itself].all(axis=1)), np.asarray(~met[:, by_itself].all(axis=1))
 
     def _keep(self, chosen: tuple[int, ...], table: Tables, barred: bool) -> None:
         if _holds(chosen, self.allowed, proper=True):
@@ -253,20 +240,13 @@ class _AlternativeSearch:
         if (np.abs(self.signatures - signature).max(axis=1) < SAME_TOOL).any():
             self.allowed.append(chosen)  # the same robot, or one that others compose
             return
-        violation = np.empty(0)
-        if self.asked.extreme:
-            self.left -= 1
-            violation = self.asked.violation(self.asked.off(table, afresh=True))
-            if self.left < 0 or not (violation <= self.bound)[len(self.asked.plain) :].all():
-                return
-        elif len(self.asked):
-            violation = self.asked.violation(self.asked.off(table))
-        if barred:
-            self._compose(chosen)
+        violation = self.asked.violation(self.asked.off(table)) if len(self.asked) else np.empty(0)
+        if not (violation <= self.bound)[len(self.asked.plain) :].all():
             return
-        repairs = bool((self.own > MET).any() and (violation <= MET).all())
-        self.allowed.append(chosen)
-        self.found.append(self._described(chosen, table, self.tool.off(table), repairs))
+        if not barred:
+            repairs = bool((self.own > MET).any() and (violation <= MET).all())
+            self.allowed.append(chosen)
+            self.found.append(self._described(chosen, table, self.tool.off(table), repairs))
         self._compose(chosen)
 
     def _compose(self, chosen: tuple[int, ...]) -> None:
@@ -303,67 +283,3 @@ def _holds(chosen: tuple[int, ...], smaller: Sequence[tuple[int, ...]], proper: 
     """Whether a combination contains one of the others (or is one of them, unless ``proper``)."""
     own = set(chosen)
     return any(set(each) <= own and not (proper and len(each) == len(own)) for each in smaller)
-
-
-ROUNDED = 6
-
-
-def open_table(asked: Asked, table: Tables, entries: Sequence[TableNumber], gauge: Reals) -> Tables | None:
-    """A table (a batch of one) that requirements leave open, with few joints reversed; None if none was found.
-
-    Parameters
-    ----------
-    entries : k that may change besides the directions; gauge : (g, k), combinations that are held
-    """
-    joints = range(table.direction.shape[1])
-    for count in range(1, len(joints) + 1):
-        found = []
-        for chosen in combinations(joints, count):
-            reversed_ = table.with_column("direction", list(chosen), -table.direction[:, list(chosen)])
-            region = Region(asked, reversed_, entries, gauge)
-            start = region.start(np.zeros(len(entries)), few_first=False)
-            if start.open:
-                found.append(region.at(start.amounts))
-        if found:
-            every = join(found)
-            return _nearest_open(every[[int(_by_distance(every, table)[0])]], table, asked)
-    return None
-
-
-def amounts_between(table: Tables, other: Tables, entries: Sequence[TableNumber]) -> Reals:
-    """What is to be added (k,) to entries of a table, in their scales, to get another; angles within half a turn."""
-    amounts = []
-    for entry in entries:
-        change = float((getattr(other, entry.column) - getattr(table, entry.column))[0, entry.joint - 1])
-        wrapped = (change + np.pi) % (2 * np.pi) - np.pi
-        amounts.append((change if entry.unit == "mm" else wrapped) / entry.scale)
-    return np.array(amounts)
-
-
-def _nearest_open(found: Tables, table: Tables, asked: Asked) -> Tables:
-    """Of an open table and those that discrete changes make of it and that are open too, the nearest to a table."""
-    flips = [flip for flip in flips_of(robot_of(found, 0, asked.robot), []) if flip.entry is not None]
-    every = [found]
-    for _, chosen in zip(range(MAX_TOGETHER), sets_of(flips)):
-        for start in range(0, len(chosen), CHUNK):
-            tables = changed(found, flips, chosen[start : start + CHUNK])
-            met = (
-                (asked.plain_violation(tables) <= MET).all(axis=1) if asked.plain else np.ones(len(tables), dtype=bool)
-            )
-            every.append(tables[np.flatnonzero(met)])
-    tables = join(every)
-    for i in _by_distance(tables, table).tolist():
-        if asked.violation(asked.off(tables[[i]], afresh=True)).max() <= MET:
-            return tables[[i]]
-    return found
-
-
-def _by_distance(tables: Tables, table: Tables) -> Integers:
-    """Places of tables, nearest to one first: by angles turned, a reversed joint being half a turn, then by lengths."""
-    turned = np.pi * (tables.direction != table.direction).sum(axis=1)
-    for name in ("alpha", "offset"):
-        apart = getattr(tables, name) - getattr(table, name)
-        turned += np.abs((apart + np.pi) % (2 * np.pi) - np.pi).sum(axis=1)
-    lengths = np.abs(tables.a - table.a).sum(axis=1) + np.abs(tables.d - table.d).sum(axis=1)
-    order: Integers = np.lexsort((lengths.round(ROUNDED), turned.round(3)))
-    return order

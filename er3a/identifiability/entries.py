@@ -4,21 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, cast
 
 import numpy as np
 
-from er3a.kinematics.table_batch import Tables, frames_of, tables_of
+from er3a.comparison.entries import Entry, shifted
+from er3a.kinematics.table_batch import frames_of, tables_of
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.quasi_random import quasi_random_points
-from er3a.references.quantities import MM
 from er3a.robots.robot import Robot
 
-Column = Literal["a", "alpha", "d", "beta", "offset", "direction", "lower", "upper", "speed"]
-EntryUnit = Literal["mm", "deg", "deg/s", ""]
-LENGTHS: tuple[Column, ...] = ("a", "d")
-CONTINUOUS: tuple[Column, ...] = ("a", "alpha", "d", "offset")
-GROUP_OF: dict[Column, str] = {
+CONTINUOUS = "a", "alpha", "d", "offset"
+GROUP_OF: dict[str, str] = {
     "a": "dh",
     "alpha": "dh",
     "d": "dh",
@@ -29,83 +25,34 @@ GROUP_OF: dict[Column, str] = {
     "upper": "limits",
     "speed": "speeds",
 }
-SCALE_M, SCALE_RAD = 1e-3, np.radians(0.1)
-"""Steps of lengths and angles that move a tool about as far: 1 mm, and 0.1 deg at half a metre."""
 
 
-@dataclass(frozen=True)
-class TableNumber:
-    """One number of a table; ``joint`` counts from 1."""
-
-    column: Column
-    joint: int
-
-    @property
-    def name(self) -> str:
-        """Such as ``d4`` or ``direction5``."""
-        return f"{self.column}{self.joint}"
-
-    @property
-    def unit(self) -> EntryUnit:
-        """mm, deg, deg/s, or nothing for a direction."""
-        if self.column in LENGTHS:
-            return "mm"
-        return "" if self.column == "direction" else "deg/s" if self.column == "speed" else "deg"
-
-    @property
-    def in_unit(self) -> float:
-        """Factor from SI to the unit."""
-        return MM if self.column in LENGTHS else 1.0 if self.column == "direction" else 180 / np.pi
-
-    @property
-    def scale(self) -> float:
-        """A step in SI that moves a tool by about a millimetre."""
-        return SCALE_M if self.column in LENGTHS else float(SCALE_RAD)
-
-    def value(self, robot: Robot) -> float:
-        """The robot's value, in the unit."""
-        return round(float(getattr(robot, self.column)[self.joint - 1] * self.in_unit), 9)
-
-
-def entries_of(robot: Robot) -> tuple[TableNumber, ...]:
+def entries_of(robot: Robot) -> tuple[Entry, ...]:
     """All entries of a robot's table: geometry, zero and directions, limits, and the speeds that it gives."""
     joints = range(1, len(robot.a) + 1)
-    columns = cast(tuple[Column, ...], ("direction", "lower", "upper"))
-    speeds = [TableNumber("speed", j) for j in joints if np.isfinite(robot.speed[j - 1])]
-    return (*continuous_of(robot), *(TableNumber(column, j) for column in columns for j in joints), *speeds)
+    columns = "direction", "lower", "upper"
+    speeds = [Entry("speed", j) for j in joints if np.isfinite(robot.speed[j - 1])]
+    return (*continuous_of(robot), *(Entry(column, j) for column in columns for j in joints), *speeds)
 
 
-def continuous_of(robot: Robot) -> tuple[TableNumber, ...]:
+def continuous_of(robot: Robot) -> tuple[Entry, ...]:
     """Entries that can take any value; Hayati's beta where the table has it."""
     joints = range(1, len(robot.a) + 1)
-    found = [TableNumber(column, j) for column in CONTINUOUS for j in joints]
-    return (*found, *(TableNumber("beta", j) for j in joints if robot.beta[j - 1]))
+    found = [Entry(column, j) for column in CONTINUOUS for j in joints]
+    return (*found, *(Entry("beta", j) for j in joints if robot.beta[j - 1]))
 
 
-def column_of(name: str) -> Column:
-    """The column that an entry's name (see :attr:`TableNumber.name`) is of."""
-    return cast(Column, name.rstrip("0123456789"))
+def column_of(name: str) -> str:
+    """The column that an entry's name is of."""
+    return name.rstrip("0123456789")
 
 
-def document_of(robot: Robot, entry: TableNumber) -> str:
+def document_of(robot: Robot, entry: Entry) -> str:
     """The document that an entry rests on: its own, else its group's, else the group's source, else the table."""
     if entry.name in robot.origins:
         return robot.origins[entry.name]
     source = robot.sources.get(GROUP_OF[entry.column])
     return (source.origin or source.source) if source else f"the table of {robot.name}"
-
-
-def shifted(table: Tables, entries: Sequence[TableNumber], amounts: Reals) -> Tables:
-    """A table (a batch of one) with amounts (H, k) in m and rad added to k entries: a batch of H."""
-    count = len(amounts)
-    columns: dict[str, Reals] = {}
-    for k, entry in enumerate(entries):
-        if entry.column not in columns:
-            columns[entry.column] = np.repeat(getattr(table, entry.column), count, axis=0)
-        columns[entry.column][:, entry.joint - 1] += amounts[:, k]
-    others = [name for name in Tables.__dataclass_fields__ if name not in columns]
-    kept = {name: np.repeat(getattr(table, name), count, axis=0) for name in others}
-    return Tables(**{**kept, **columns})
 
 
 POSES = 32
@@ -127,13 +74,18 @@ class Gauge:
     directions: Reals
     determined: Reals
 
+    @property
+    def chosen(self) -> list[int]:
+        """Places of entries of which one can be held for each combination: what the others are then moves the tool."""
+        return [int(np.flatnonzero(row)[0]) for row in self.directions]
+
     def support(self) -> Flags:
         """(k,), whether an entry occurs in a combination that moves nothing."""
         found: Flags = np.asarray((np.abs(self.directions) > NOTHING).any(axis=0))
         return found
 
 
-def gauge_of(robot: Robot, entries: Sequence[TableNumber]) -> Gauge:
+def gauge_of(robot: Robot, entries: Sequence[Entry]) -> Gauge:
     """Which combinations of entries leave the tool's pose as the table has it."""
     k = len(entries)
     scale = np.array([entry.scale for entry in entries])

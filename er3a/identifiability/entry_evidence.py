@@ -8,8 +8,9 @@ from itertools import groupby
 from typing import Literal
 
 from er3a.by_value import ByValue, Displayed, Sheet, shortly
+from er3a.comparison.entries import EntryUnit
 from er3a.identifiability.alternatives import Alternative
-from er3a.identifiability.entries import EntryUnit, column_of
+from er3a.identifiability.entries import column_of
 from er3a.identifiability.statements import NOT_OFF, ToolOff
 from er3a.kinematics.table_batch import Tables
 from er3a.references.reference import Reference

@@ -7,12 +7,15 @@ open entries. A length or an angle is measured directly, as finely as its tolera
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Literal, cast
+from typing import Any, Literal, cast
 
 import numpy as np
 
 from er3a.by_value import Finding
-from er3a.identifiability.entries import TableNumber, entries_of, shifted
+from er3a.comparison.entries import LENGTHS, Entry, shifted
+from er3a.diagnosis.faults import SIDES
+from er3a.diagnosis.fitting import ANGLES
+from er3a.identifiability.entries import entries_of
 from er3a.identifiability.entry_evidence import EntryEvidence, Evidence
 from er3a.identifiability.statements import ToolRange
 from er3a.kinematics.table_batch import join, tables_of
@@ -99,22 +102,24 @@ def proposals_of(evidence: Evidence) -> dict[str, Proposal]:
     return found
 
 
-def _proposal(evidence: Evidence, each: EntryEvidence, entry: TableNumber, tool: ToolRange) -> Proposal | None:
+def _proposal(evidence: Evidence, each: EntryEvidence, entry: Entry, tool: ToolRange) -> Proposal | None:
     name, j = each.entry, entry.joint
     if entry.column == "direction":
         return _look(evidence, entry)
-    if entry.column == "lower" or entry.column == "upper":
-        return ReadLimit(name, j, entry.column, LIMIT_DEG)
+    if entry.column in SIDES:
+        return ReadLimit(name, j, cast(Any, entry.column), LIMIT_DEG)
     if entry.column == "speed":
         return TimeJoint(name, j, round(SPEED_SHARE * entry.value(evidence.robot), 3))
-    if entry.column == "a" or entry.column == "d":
-        return MeasureLength(name, entry.column, j, min(LENGTH_MM, SHARE_OF_TOLERANCE * evidence.tolerance.mm))
-    if entry.column == "alpha" or entry.column == "offset":
-        return MeasureAngle(name, entry.column, j, _fine_enough(evidence, entry, tool))
+    if entry.column in LENGTHS:
+        return MeasureLength(
+            name, cast(Any, entry.column), j, min(LENGTH_MM, SHARE_OF_TOLERANCE * evidence.tolerance.mm)
+        )
+    if entry.column in ANGLES:
+        return MeasureAngle(name, cast(Any, entry.column), j, _fine_enough(evidence, entry, tool))
     return None
 
 
-def _fine_enough(evidence: Evidence, entry: TableNumber, tool: ToolRange) -> float:
+def _fine_enough(evidence: Evidence, entry: Entry, tool: ToolRange) -> float:
     """Half-width in deg with which the tool stays within the tolerance, as a round number."""
     one_degree = tool.off(shifted(tool.table, [entry], np.array([[np.radians(1.0)]])))
     most = min(ANGLE_DEG, evidence.tolerance.deg)
@@ -125,7 +130,7 @@ def _fine_enough(evidence: Evidence, entry: TableNumber, tool: ToolRange) -> flo
     return float(round(np.floor(exact / digit + 1e-9) * digit, 9))
 
 
-def _look(evidence: Evidence, entry: TableNumber) -> LookAtMotion | None:
+def _look(evidence: Evidence, entry: Entry) -> LookAtMotion | None:
     """What to look at to determine a joint's direction, independent of other open entries."""
     robot = evidence.robot
     others = [each for each in evidence.allowed if entry.name not in each.names]

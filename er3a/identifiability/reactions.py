@@ -8,10 +8,11 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.identifiability.entries import TableNumber, document_of, entries_of, shifted
-from er3a.identifiability.requirements import FollowedExtreme
+from er3a.comparison.entries import Entry, shifted
+from er3a.identifiability.entries import document_of, entries_of
+from er3a.identifiability.requirements import SoughtExtreme
 from er3a.kinematics.table_batch import Tables, join, tables_of
-from er3a.numerics.arrays import Flags, Reals
+from er3a.numerics.arrays import Flags
 from er3a.references.predict import predict_tables
 from er3a.references.quantities import Extreme, LimitExcess, Quantity, Speed, value_at
 from er3a.references.reference import Documents, Reference, quantities_of
@@ -96,7 +97,7 @@ def undeclared_bases(references: Sequence[Reference]) -> list[CheckBasis]:
     return [CheckBasis("consistency" if each.is_authoritative else "claim", (), (), ()) for each in references]
 
 
-def reactions(robot: Robot, references: Sequence[Reference], entries: Sequence[TableNumber]) -> Flags:
+def reactions(robot: Robot, references: Sequence[Reference], entries: Sequence[Entry]) -> Flags:
     """Whether the model's value (n, k) for each reference changes with each entry, the others as they are.
 
     Lengths are moved by 10 mm and angles by 5 deg to either side, because extremes and axes in line have no slope."""
@@ -106,20 +107,21 @@ def reactions(robot: Robot, references: Sequence[Reference], entries: Sequence[T
     probes, owner = _probes(table, entries)
     plain = [i for i, quantity in enumerate(quantities) if not isinstance(quantity, Extreme | Speed | LimitExcess)]
     if plain:
-        values = predict_tables(join([table, *probes]), robot, [quantities[i] for i in plain])
+        values = predict_tables(join([table, probes]), robot, [quantities[i] for i in plain])
         changed = ~(np.abs(values[1:] - values[0]) <= REACTS)
         for k, row in zip(owner, changed):
             reacts[plain, k] |= row
     for extreme in {quantity for quantity in quantities if isinstance(quantity, Extreme)}:
         rows = [i for i, other in enumerate(quantities) if other == extreme]
-        reacts[np.ix_(rows, list(_moving_extreme(robot, extreme, table, probes, owner)))] = True
+        moving = {k for k, moves in zip(owner, _moving_extreme(robot, extreme, table, probes)) if moves}
+        reacts[np.ix_(rows, list(moving))] = True
     for i, quantity in enumerate(quantities):
         for k, entry in enumerate(entries):
             reacts[i, k] |= _bounds(quantity, entry)
     return reacts
 
 
-def _bounds(quantity: Quantity, entry: TableNumber) -> bool:
+def _bounds(quantity: Quantity, entry: Entry) -> bool:
     """Whether a quantity is the speed of an entry, or a pose that one of its limits must let pass."""
     if isinstance(quantity, Speed):
         return entry.column == "speed" and entry.joint == quantity.joint
@@ -129,36 +131,30 @@ def _bounds(quantity: Quantity, entry: TableNumber) -> bool:
     return False
 
 
-def _moving_extreme(robot: Robot, quantity: Extreme, table: Tables, probes: list[Tables], owner: list[int]) -> set[int]:
-    followed = FollowedExtreme(quantity, robot)
-    own = followed.at(table)
-    moving: set[int] = set()
-    for k, probe in zip(owner, probes):
-        if k not in moving:
-            followed.known = False
-            if abs(followed.at(probe) - own) > REACTS_MM:
-                moving.add(k)
+def _moving_extreme(robot: Robot, quantity: Extreme, table: Tables, probes: Tables) -> Flags:
+    """Whether (P,) an extreme moves: its measure where the table attains it, or, of other limits, the extreme."""
+    sought = SoughtExtreme(quantity, robot)
+    own = sought.at(table)
+    moving: Flags = np.abs(sought.along(probes) - own) > REACTS_MM
+    bounded = ((probes.lower != table.lower) | (probes.upper != table.upper)).any(axis=1)
+    for i in np.flatnonzero(bounded):
+        moving[i] = abs(SoughtExtreme(quantity, robot).at(probes[[int(i)]]) - own) > REACTS_MM
     return moving
 
 
-def _probes(table: Tables, entries: Sequence[TableNumber]) -> tuple[list[Tables], list[int]]:
+def _probes(table: Tables, entries: Sequence[Entry]) -> tuple[Tables, list[int]]:
     """Tables in which one entry is another, and the place of that entry."""
     found: list[Tables] = []
     owner: list[int] = []
     for k, entry in enumerate(entries):
-        if entry.column == "speed":
-            continue
         if entry.column == "direction":
-            changed = [table.with_column("direction", [entry.joint - 1], -table.direction[:, [entry.joint - 1]])]
-        else:
+            found.append(shifted(table, [entry], np.array([[-2 * float(entry.of(table)[0])]])))
+        elif entry.column != "speed":
             size = PROBE_M if entry.unit == "mm" else PROBE_RAD
-            amounts: Reals = np.array([[size], [-size]])
-            both = shifted(table, [entry], amounts)
-            changed = [both[[0]], both[[1]]]
-        found += changed
-        owner += [k] * len(changed)
-    return found, owner
+            found.append(shifted(table, [entry], np.array([[size], [-size]])))
+        owner += [k] * (len(found[-1]) if entry.column != "speed" else 0)
+    return join(found), owner
 
 
-def _names(entries: Sequence[TableNumber]) -> tuple[str, ...]:
+def _names(entries: Sequence[Entry]) -> tuple[str, ...]:
     return tuple(entry.name for entry in entries)

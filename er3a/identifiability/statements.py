@@ -10,10 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.by_value import Finding
+from er3a.comparison.entries import Entry, shifted
 from er3a.diagnosis.conclusions import Conclusion, NoFaultStandsOut, NoFewFaultsExplain
 from er3a.diagnosis.ranking import rank
 from er3a.geometry.transforms import rotation_angle
-from er3a.identifiability.entries import TableNumber, continuous_of, document_of, entries_of, shifted
+from er3a.identifiability.entries import continuous_of, document_of, entries_of
 from er3a.identifiability.feasible import MET
 from er3a.identifiability.requirements import Asked, box_points, peak, requirements_of
 from er3a.kinematics.table_batch import Tables, frames_of, join, tables_of
@@ -110,7 +111,7 @@ def inconsistent_with_own_text(robot: Robot, references: ReferenceSet) -> Incons
     asked = Asked(robot, requirements_of(own))
     if not len(asked):
         return None
-    missed = int((asked.violation(asked.off(tables_of(robot), afresh=True)) > MET).sum())
+    missed = int((asked.violation(asked.off(tables_of(robot))) > MET).sum())
     if not missed:
         return None
     named = tuple(dict.fromkeys(title_of(reference.document, references.documents) for reference in own))
@@ -121,7 +122,7 @@ def inconsistent_with_own_text(robot: Robot, references: ReferenceSet) -> Incons
     return InconsistentWithOwnText(entry.name, entry.value(robot), round(needed, 9), entry.unit, named, missed)
 
 
-def _one_change(robot: Robot, asked: Asked) -> tuple[TableNumber | None, Tables | None]:
+def _one_change(robot: Robot, asked: Asked) -> tuple[Entry | None, Tables | None]:
     """The first single change, quarter turns of offsets first, with which all is met."""
     table = tables_of(robot)
     turning = [entry for entry in entries_of(robot) if entry.column in ("offset", "alpha", "direction")]
@@ -134,7 +135,7 @@ def _one_change(robot: Robot, asked: Asked) -> tuple[TableNumber | None, Tables 
             else [shifted(table, [entry], np.array([[quarters * np.pi / 2]])) for quarters in QUARTERS]
         )
         for each in changed:
-            if asked.violation(asked.off(each, afresh=True)).max() <= MET:
+            if asked.missed_by(each) <= MET:
                 return entry, each
     return None, None
 

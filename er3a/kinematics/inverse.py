@@ -21,7 +21,7 @@ from er3a.kinematics.confirmed import confirmed
 from er3a.kinematics.families import Family, families
 from er3a.kinematics.forward import checked_joints, forward
 from er3a.kinematics.numerical import all_found, nearest_arm, solve
-from er3a.kinematics.self_motions import SelfMotionCurve
+from er3a.kinematics.self_motions import SelfMotionCurve, to_rows
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.wrist_partitioned import (
     ClosedFormMissing,
@@ -185,6 +185,9 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, se
             if max_joint_move(np.concatenate([np.empty((0, robot.joints)), *rows]), row).min(initial=np.inf) > MISSED:
                 branches.append(by_class.slot_of(robot, T, row))
                 rows.append(_rows_of_branch(robot, row, q_ref))
+    if len(solver.parameters) == 1 and np.abs(forward(robot, q_ref) - T).max() <= SOLVES:
+        # the self-motion through the reference is traced from there: without a first step it is missing
+        certain = certain and by_class.arm_solver(robot).poses_at(T).moves(to_rows(robot, q_ref))
     unsolved: tuple[solutions.Unsolved, ...] = ()
     if not branches:
         open_pose = bool(solver.parameters)

@@ -239,16 +239,19 @@ def scope_line(checked: CheckedFile) -> str:
     check = checked.check
     if check is None:
         return ""
-    passed = sum(each.level in ("pass", "note") for each in check.verdicts)
+    motions = [each for each in check.verdicts if not each.unreached]
+    passed = sum(each.level in ("pass", "note") for each in motions)
     of_what = ", ".join(_named(each, check) for each in check.checked)
     passing = "would pass" if checked.missed else "pass"
-    parts = [f"{passed} of {len(check.verdicts)} motions {passing} {of_what}"]
-    failed = [each.line for each in check.verdicts if each.level == "fail"]
-    lost = [each.line for each in check.verdicts if not each.followed and each.level != "fail"]
-    rest = len(check.verdicts) - passed - len(failed) - len(lost)
+    parts = [f"{passed} of {len(motions)} motions {passing} {of_what}"]
+    failed = [each.line for each in motions if each.level == "fail"]
+    lost = [each.line for each in motions if not each.followed and each.level != "fail"]
+    rest = len(motions) - passed - len(failed) - len(lost)
     parts += [f"{len(failed)} fail (lines {_line_ranges(failed)})"] if failed else []
     parts += [f"{len(lost)} not followed (lines {_line_ranges(lost)})"] if lost else []
     parts += [f"{rest} with caution"] if rest else []
+    nowhere = [each.line for each in check.verdicts if each.unreached]
+    parts += [f"nothing leads to {len(nowhere)} more (lines {_line_ranges(nowhere)})"] if nowhere else []
     missing = [NEEDED[each] for each in (*CHECKS, *NEEDED) if each not in check.checked and each in NEEDED]
     parts += [f"not checked: {', '.join(dict.fromkeys(missing))}"] if missing else []
     return f"{shown(checked.file)}: {'; '.join(parts)}"

@@ -133,6 +133,11 @@ class MotionVerdict:
     duration_s: float | None
     least_clearance_mm: float | None
 
+    @property
+    def unreached(self) -> bool:
+        """Whether no way through the program comes to it."""
+        return not self.followed and self.level == "note"
+
 
 @dataclass(frozen=True)
 class CycleTime:
@@ -240,35 +245,24 @@ def _corners(
     """Motions that follow each other, each pair once."""
     last: dict[int, int] = {-1: -1}  # by step, the last motion up to it
     pairs: dict[tuple[int, int], tuple[CheckedMotion, CheckedMotion]] = {}
-    after: dict[int, list[int]] = defaultdict(list)
     for number, step in enumerate(execution.steps):
         before = last[step.before]
         last[number] = number if number in motions else before
-        if number in motions:
-            after[step.before].append(number)
-            if before >= 0:
-                pairs.setdefault((id(motions[before]), id(motions[number])), (motions[before], motions[number]))
+        if number in motions and before >= 0:
+            pairs.setdefault((id(motions[before]), id(motions[number])), (motions[before], motions[number]))
+    following: dict[int, list[int]] = defaultdict(list)
+    for number, step in enumerate(execution.steps):
+        following[step.before].append(number)
+    first: dict[int, list[int]] = {}  # by step, the first motions on the ways that go on with it
+    for number in range(len(execution.steps) - 1, -1, -1):
+        on = [number] if number in motions else [each for one in following[number] for each in first[one]]
+        first[number] = list(dict.fromkeys(on))
     for ending in execution.endings:  # which joins where the first motion behind may not be the next step
         if ending.repeats_from is not None and last[ending.step] >= 0:
-            for number in _next_motions(execution, motions, ending.repeats_from):
+            for number in first[ending.repeats_from]:
                 one, other = motions[last[ending.step]], motions[number]
                 pairs.setdefault((id(one), id(other)), (one, other))
     yield from pairs.values()
-
-
-def _next_motions(execution: Execution, motions: Mapping[int, CheckedMotion], first: int) -> list[int]:
-    """The first motions on the ways that go on with a step."""
-    following: dict[int, list[int]] = defaultdict(list)
-    for number in range(first, len(execution.steps)):
-        following[execution.steps[number].before].append(number)
-    found, waiting = [], [first]
-    while waiting:
-        number = waiting.pop()
-        if number in motions:
-            found.append(number)
-        else:
-            waiting += following[number]
-    return found
 
 
 def _located(
@@ -280,7 +274,7 @@ def _located(
     for number, motion in motions.items():
         step = execution.steps[number]
         found += [
-            LocatedFinding(found_in.level_of(each), each, step.place, step.calls, 1, number, moment)
+            LocatedFinding(motion.level_of(each), each, step.place, step.calls, 1, number, moment)
             for each, moment in motion.findings.items()
         ]
     unknown = [(step, step.instruction) for step in execution.steps if isinstance(step.instruction, Unknown)]
@@ -299,8 +293,10 @@ def _located(
         for each in execution.endings
         if each.kind != "end" and each.kind != "joins"
     ]
-    said += [(place, (), found_in.NotFollowed(text, "unreached")) for place, text in _unreached(execution)]
     found += [LocatedFinding("caution", finding, place, calls) for place, calls, finding in said]
+    found += [
+        LocatedFinding("note", found_in.NotFollowed(text, "unreached"), place) for place, text in _unreached(execution)
+    ]
     if obstacles is not None and obstacles.bodies.in_error:
         found.append(LocatedFinding("caution", PairsUnexamined(obstacles.bodies.in_error), top))
     found += [*_loads(execution, robot), *_stated_elsewhere(execution, robot), *_not_set(execution)]
@@ -309,7 +305,8 @@ def _located(
         for each in execution.frames_twice
     ]
     found += [
-        LocatedFinding("caution", each, step.place, step.calls) for step, each in suspect_numbers(execution, robot)
+        LocatedFinding(found_in.level_of(each), each, step.place, step.calls)
+        for step, each in suspect_numbers(execution, robot)
     ]
     groups: dict[tuple[Place, str, str], list[LocatedFinding]] = defaultdict(list)
     for each in found:
@@ -435,6 +432,7 @@ def _verdicts(
         levels[each.place].append(each.level)
         if isinstance(each.finding, NOT_FOLLOWED):
             lost.add(each.place)
+    nowhere = {place for place, _ in _unreached(execution)}
     found = []
     for place, text in _motion_texts(program):
         here = done[place]
@@ -449,7 +447,7 @@ def _verdicts(
                 lines.get(place, place.line),
                 " ".join(text.split()),
                 here[0].motion.kind if here else "",
-                found_in.worst_of((*levels[place], "pass" if followed else "caution")),
+                found_in.worst_of((*levels[place], "pass" if followed or place in nowhere else "caution")),
                 followed,
                 len(here),
                 max(durations, default=None),

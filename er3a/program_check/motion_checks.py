@@ -312,8 +312,6 @@ def path_findings(path: MotionPath, rules: CheckRules, target: Reals | None) -> 
         found |= _too_fast(path, rules.limits)
         if not rules.limits.acceleration_assumed:
             found |= _accelerates(path, rules.limits.acceleration)
-    if not path.of_tool:
-        found |= dict.fromkeys(_far_turns(path), 0.0)
     return found
 
 
@@ -416,7 +414,7 @@ def _accelerates(path: MotionPath, able: Reals) -> Shares:
     return found
 
 
-def _far_turns(path: MotionPath) -> list[found_in.CheckFinding]:
+def far_turns(path: MotionPath) -> list[found_in.CheckFinding]:
     """Joints that turn by more than half a turn where less would do, or far where the tool hardly moves."""
     arm, start, step = path.arm, path.q[0], path.q[-1] - path.q[0]
     found: list[found_in.CheckFinding] = []

@@ -195,17 +195,21 @@ class ClearanceNotProven(Finding):
 
 
 class SpeedNotGiven(Finding):
-    """The program does not give the speed, or by ``word``, which is not known; one was assumed (m/s, or a share)."""
+    """The program does not give the speed, or by ``word``, which is not known; one was assumed (m/s, or a share).
+
+    ``refused``: whether it is a number that no controller takes.
+    """
 
     assumed: float
     unit: Literal["m/s", "share"]
     word: str = ""
+    refused: bool = False
 
 
 class SuspectNumber(Finding):
     """A number that is likely a mistake: ``text`` is what it is, ``usual`` what it would be, or what others are."""
 
-    kind: Literal["metres", "radians", "speed", "tool", "base"]
+    kind: Literal["metres", "radians", "speed", "impossible_speed", "tool", "base"]
     text: str
     usual: str
 
@@ -291,8 +295,10 @@ def level_of(finding: CheckFinding) -> Level:
             return "note" if bounded else "fail"
         case NotFollowed(reason=reason):
             return "fail" if reason in WRONG else "caution"
-        case SpeedNotGiven(word=word):
-            return "caution" if word else "note"
+        case SpeedNotGiven(word=word, refused=refused):
+            return "fail" if refused else "caution" if word else "note"
+        case SuspectNumber(kind="impossible_speed"):
+            return "fail"
         case MotionCollides(touches=touches, assumed=assumed):
             return "fail" if not assumed and any(touch.is_certain for touch in touches) else "caution"
     return "fail" if finding.code in FAILS else "note" if finding.code in NOTES else "caution"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
+from typing import Literal
 
 import numpy as np
 
@@ -26,7 +27,7 @@ def suspect_numbers(execution: Execution, robot: Robot) -> Iterator[tuple[Step, 
     motions = [(step, step.instruction) for step in steps if isinstance(step.instruction, ArmMotion)]
     if execution.program.language in IN_MM:
         yield from _other_units(motions, robot)
-    yield from _speeds(motions)
+    yield from _speeds(motions, robot)
     for which in ("tool", "base"):
         frames = [(step, getattr(motion, which)) for step, motion in motions if isinstance(motion.target, PoseTarget)]
         yield from ((step, SuspectNumber(which, *names)) for step, *names in _used_once(frames))  # type: ignore[arg-type]
@@ -48,13 +49,19 @@ def _other_units(motions: list[tuple[Step, ArmMotion]], robot: Robot) -> Iterato
                 yield step, SuspectNumber("radians", f"({', '.join(f'{v:g}' for v in degrees)}) deg", f"({turned}) deg")
 
 
-def _speeds(motions: list[tuple[Step, ArmMotion]]) -> Iterator[tuple[Step, SuspectNumber]]:
+def _speeds(motions: list[tuple[Step, ArmMotion]], robot: Robot) -> Iterator[tuple[Step, SuspectNumber]]:
+    slides = robot.slides.any() or not np.isfinite(robot.speed).all()
+    fastest = np.inf if slides else float(robot.speed.sum()) * arm_length(robot)  # no point of the arm is faster
+    for step, motion in motions:
+        if motion.speed and motion.speed.unit == "m/s" and motion.speed.value > fastest:
+            kind: Literal["impossible_speed"] = "impossible_speed"
+            yield step, SuspectNumber(kind, f"{1000 * motion.speed.value:g} mm/s", f"{1000 * fastest:.0f} mm/s")
     given = [(step, motion.speed.value) for step, motion in motions if motion.speed and motion.speed.unit == "m/s"]
     values = [value for _, value in given if value > 0]
     if len(values) > USUAL:
         usual = float(np.median(values))
         for step, value in given:
-            if value > MANY_TIMES * usual:
+            if MANY_TIMES * usual < value <= fastest:
                 yield step, SuspectNumber("speed", f"{1000 * value:g} mm/s", f"{1000 * usual:g} mm/s")
 
 

@@ -35,6 +35,7 @@ from er3a.program_check.motion_checks import (
     MotionPath,
     Shares,
     arrives_otherwise,
+    far_turns,
     is_given,
     joint_path,
     limit_findings,
@@ -69,6 +70,7 @@ class CheckedMotion(ByValue):
     path : None where there is none: the arm stays (``stays``), or the way is not known
     findings : with the time (s) of the motion at which each begins; None of those about it as a whole
     clearance : m, smallest on the way, negative by an overlap; None where not measured
+    guessed : whether its start was taken among several solutions of an earlier target, so that nothing is certain
     """
 
     motion: instructions.ArmMotion
@@ -80,6 +82,7 @@ class CheckedMotion(ByValue):
     stays: bool = False
     findings: dict[found_in.CheckFinding, float | None] = field(default_factory=dict)
     clearance: float | None = None
+    guessed: bool = False
 
     def add(self, *findings: found_in.CheckFinding) -> None:
         """Findings about the motion as a whole."""
@@ -92,10 +95,15 @@ class CheckedMotion(ByValue):
             for each, share in found.items():
                 self.findings.setdefault(each, float(self.path.law.times(np.array(share))))
 
+    def level_of(self, finding: found_in.CheckFinding) -> found_in.Level:
+        """How severe one of its findings is: never an error where the start was guessed."""
+        level = found_in.level_of(finding)
+        return "caution" if self.guessed and level == "fail" else level
+
     @property
     def level(self) -> found_in.Level:
         """The worst of its findings."""
-        return found_in.worst_of(map(found_in.level_of, self.findings))
+        return found_in.worst_of(map(self.level_of, self.findings))
 
 
 class Judge:
@@ -105,12 +113,18 @@ class Judge:
         self.robot, self.rules = robot, rules
         self.motions: dict[Hashable, CheckedMotion] = {}
         self._arms: dict[bytes, Robot] = {robot.tool.tobytes(): robot}
+        self._guessed: set[bytes] = set()  # joints at which the arm stands if what was guessed is right
 
     def __call__(self, motion: instructions.ArmMotion, before: Reals | None) -> CheckedMotion:
         """A motion from joints (n,), None where they are not known."""
-        key = _key(motion), None if before is None else np.round(before, SAME_DIGITS).tobytes()
+        key = _key(motion), _rounded(before)
         if key not in self.motions:
-            self.motions[key] = self._checked(motion, before)
+            self.motions[key] = checked = self._checked(motion, before)
+            checked.guessed = before is not None and _rounded(before) in self._guessed
+            chosen = motion.kind != "joint" or isinstance(motion.target, instructions.PoseTarget)
+            first = any(isinstance(each, found_in.ConfigurationGuessed) for each in checked.findings)
+            if checked.end is not None and (first or (checked.guessed and chosen)):
+                self._guessed.add(_rounded(checked.end))
         return self.motions[key]
 
     def _arm(self, tool: instructions.NamedFrame) -> Robot | None:
@@ -144,7 +158,9 @@ class Judge:
         if checked.path is not None and not is_given(motion):
             assumed, word = self.rules.assumed, "" if motion.speed is None else motion.speed.text
             values = (assumed.tool_speed, "m/s") if of_tool else (assumed.joint_share, "share")
-            checked.add(found_in.SpeedNotGiven(*values, word))  # type: ignore[arg-type]
+            number = word.rpartition("=")[2]
+            refused = number.lstrip("+-").replace(".", "", 1).isdecimal()  # known, and beyond what a controller takes
+            checked.add(found_in.SpeedNotGiven(*values, word, refused))  # type: ignore[arg-type]
         return checked
 
     def _to_joints(self, checked: CheckedMotion, target: instructions.JointTarget | instructions.PoseTarget) -> None:
@@ -162,6 +178,8 @@ class Judge:
         checked.end = goal if beyond < MOST_TURNS else None
         if checked.path is not None:
             checked.add_on_way(path_findings(checked.path, self.rules, None))
+            if isinstance(target, instructions.JointTarget) or target.branch is None:  # no configuration that is meant
+                checked.add_on_way(dict.fromkeys(far_turns(checked.path), 0.0))
 
     def _along_tool_path(
         self, checked: CheckedMotion, target: instructions.JointTarget | instructions.PoseTarget
@@ -247,8 +265,13 @@ class Judge:
         said = checked.motion.kind == "joint" and target.branch is None and bool(target.configuration)
         if (near is None or said) and (different := len(np.unique(np.round(rows, SAME_DIGITS), axis=0))) > 1:
             checked.add(found_in.ConfigurationGuessed(different))
-            return None
+            if near is None:  # the one farthest from the limits
+                away = -np.minimum(rows - checked.arm.lower, checked.arm.upper - rows).min(axis=1)
         return np.asarray(rows[int(away.argmin())], np.float64)
+
+
+def _rounded(joints: Reals | None) -> bytes:
+    return b"" if joints is None else (np.round(joints, SAME_DIGITS) + 0.0).tobytes()
 
 
 def _configuration(target: instructions.Target) -> str:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 from er3a.errors import InputError
 from er3a.programs import syntax
@@ -37,6 +38,22 @@ class Block:
 
 
 LOOPS = ("loop", "while", "for", "repeat")
+
+
+WORDS = re.compile(r'"[^"]*"|[A-Za-z_$][\w.$%]*|\d[\w.]*|\S')
+OPERATORS = frozenset(["AND", "OR", "NOT", "XOR", "EXOR", "DIV", "MOD", "B_AND", "B_OR", "B_EXOR", "B_NOT"])
+
+
+def is_no_statement(text: str, calls_without_brackets: bool = False) -> bool:
+    """Whether a text is neither call nor assignment in any language: two values follow each other without an operator.
+
+    Parameters
+    ----------
+    calls_without_brackets : whether a procedure's name stands before its arguments, as in RAPID
+    """
+    words = WORDS.findall(text.partition("{")[0])[calls_without_brackets:]  # a list in braces names its fields
+    values = [(each[0].isalnum() or each[0] in '_$"') and each.upper() not in OPERATORS for each in words]
+    return any(map(all, pairwise(values)))
 
 
 class CodeBuilder:
@@ -68,9 +85,11 @@ class CodeBuilder:
         """A routine that runs concurrently with the program from here on."""
         self.add(syntax.ConcurrentStart(place, what, text))
 
-    def unknown(self, place: Place, text: str, may_move: bool = True, shapes: bool = False) -> None:
+    def unknown(
+        self, place: Place, text: str, may_move: bool = True, shapes: bool = False, stops: bool = False
+    ) -> None:
         """An instruction that is not understood."""
-        self.add(syntax.Fixed(place, Unknown(text, may_move, shapes)))
+        self.add(syntax.Fixed(place, Unknown(text, may_move, shapes, stops)))
 
     def unread(self, place: Place, text: str, may_move: bool = True, folds: bool = False) -> None:
         """A statement that is not understood; what it assigns something to has no known value from here.
@@ -79,7 +98,7 @@ class CodeBuilder:
         ----------
         folds : whether ``a`` and ``A`` are one name
         """
-        self.unknown(place, text, may_move)
+        self.unknown(place, text, may_move, stops=is_no_statement(text))
         assigned = ASSIGNED.match(text)
         if assigned is not None:
             self.unclear(place, assigned[1].upper() if folds else assigned[1])

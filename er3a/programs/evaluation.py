@@ -26,7 +26,6 @@ from er3a.programs.instructions import (
     NamedFrame,
     PoseTarget,
     UnresolvedTarget,
-    arc_end,
 )
 
 NO_FRAME = NamedFrame()
@@ -74,11 +73,11 @@ class Position:
     tool: NamedFrame = NO_FRAME
     base: NamedFrame = NO_FRAME
 
-    def after(self, motion: ArmMotion, flange: Flange | None) -> Position:
+    def after(self, motion: ArmMotion) -> Position:
         """Where the arm is after a motion."""
         target = motion.target
         if motion.angle is not None:
-            return self._after_arc(motion, motion.angle, flange)
+            return Position()  # which is not followed
         if isinstance(target, JointTarget):
             kept = np.isnan(target.joints)
             if not kept.any():
@@ -91,17 +90,6 @@ class Position:
         if isinstance(target, PoseTarget):
             return Position(target.joints, target.pose, motion.tool, motion.base)
         return Position()
-
-    def _after_arc(self, motion: ArmMotion, angle: float, flange: Flange | None) -> Position:
-        """After an arc with an angle of its own."""
-        start = self.seen(motion.tool, motion.base, flange)
-        poses = isinstance(motion.target, PoseTarget) and isinstance(motion.via, PoseTarget)
-        if start is None or not poses or not math.isfinite(angle):
-            return Position()
-        assert isinstance(motion.target, PoseTarget)
-        assert isinstance(motion.via, PoseTarget)
-        end = arc_end(start, motion.via.pose, motion.target.pose, angle)
-        return Position() if end is None else Position(None, end, motion.tool, motion.base)
 
     def seen(self, tool: NamedFrame, base: NamedFrame, flange: Flange | None) -> Reals | None:
         """T_base_tool (4, 4) for this tool and base, or None if it can't be known."""

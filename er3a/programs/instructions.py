@@ -445,26 +445,6 @@ def centre_and_angle(start: Reals, via: Reals, end: Reals) -> tuple[Reals, Reals
     return centre, normal, angle
 
 
-def arc_end(start: Reals, via: Reals, target: Reals, angle: float) -> Reals | None:
-    """Where an arc ends that has an angle of its own (rad, negative away from ``via``): KRL's CA.
-
-    The circle is that of the three poses (4, 4). The orientation at the end is taken to be the target's; KUKA's
-    $CIRC_MODE can ask for another, which is its way beyond the target and not decided here.
-
-    Returns
-    -------
-    pose : (4, 4), m; None if the points fix no circle
-    """
-    circle = centre_and_angle(start[:3, 3], via[:3, 3], target[:3, 3])
-    if circle is None:
-        return None
-    centre, normal, _ = circle
-    end = target.copy()
-    turned = scipy.spatial.transform.Rotation.from_rotvec(angle * normal)
-    end[:3, 3] = centre + turned.apply(start[:3, 3] - centre)
-    return end
-
-
 def chords(start: Reals, via: Reals, end: Reals, deviation: float, with_path: bool = False) -> Reals | None:
     """Poses (n, 4, 4) after the start, lines between which stay within ``deviation`` (m) of the arc."""
     circle = centre_and_angle(start[:3, 3], via[:3, 3], end[:3, 3])

@@ -9,7 +9,7 @@ beyond a limit is named (``Execution.open``), and is no part of what was followe
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Iterator, Mapping
+from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
@@ -29,7 +29,7 @@ from er3a.robots.robot import Robot
 SAME_FRAME_MM, SAME_FRAME_DEG = 0.01, 0.001
 """Frames that differ by less are one, written with fewer digits."""
 IN_ONE_PLACE = 8  # ways, before what differs between them becomes unknown
-WAYS_COST = 60  # operations, as many as which one counts while other ways wait
+STATE_COST = 10  # operations, as many as which the comparison of a state with others counts
 OTHERWISE = "%otherwise"  # what makes motions go otherwise, and is not followed
 UNKNOWN_ROUNDS = 12  # of a loop that only something unknown ends, before what it changes becomes unknown
 
@@ -207,46 +207,56 @@ class Machine:
             frame = way.frames[-1]
             name, at = frame.routine.name, frame.at
             operation = frame.routine.code[at]
-            self.budget -= WAYS_COST if self.pending else 1
+            self.budget -= 1
             if self.budget < 0:
                 self._cut(way, "operations", operation.place)
                 return
             if at in self.labels[name]:
+                self.budget -= STATE_COST
                 if self.pending and begun:
                     self.pending.append(way)
                     return
                 if self._repeats(way):
                     return
             begun = True
-            self.entered.add(name)
-            frame.at += 1
-            if beyond := _beyond_a_list(way.memory, operation):
-                self._note(way, operation.place, instructions.Unknown(beyond, may_move=False, stops=True))
-            if (strange := self._strange.get((name, at))) is not None:
-                self._note(way, operation.place, instructions.Unknown(strange))
-                way.memory.lost(strange)
-            match operation:
-                case syntax.GoTo(to=to):
-                    frame.at = to
-                    if to <= at and operation.endless:
-                        way.rounds[way.where] = way.rounds.get(way.where, 0) + 1
-                        if way.rounds[way.where] > self.limits.rounds:
-                            self._cut(way, "rounds", operation.place)
-                            return
-                case syntax.Branch():
-                    self._branch(way, frame, operation, at)
-                case syntax.Call():
-                    if len(way.frames) > self.limits.depth:
-                        self._cut(way, "depth", operation.place)
-                        return
-                    self._call(way, operation)
-                case syntax.Return() if len(way.frames) > 1:
-                    self._return(way, operation)
-                case syntax.Return() | syntax.Halt():
-                    self._end(way, "end")
-                    return
-                case _:
-                    self._carry_out(way, operation)
+            if not self._step(way):
+                return
+
+    def _step(self, way: Way) -> bool:
+        """Carry out a way's next operation; False where the way ends."""
+        frame = way.frames[-1]
+        name, at = frame.routine.name, frame.at
+        operation = frame.routine.code[at]
+        self.entered.add(name)
+        frame.at += 1
+        if beyond := _beyond_a_list(way.memory, operation):
+            self._note(way, operation.place, instructions.Unknown(beyond, may_move=False, stops=True))
+        if (strange := self._strange.get((name, at))) is not None:
+            self._note(way, operation.place, instructions.Unknown(strange))
+            way.memory.lost(strange)
+        match operation:
+            case syntax.GoTo(to=to):
+                frame.at = to
+                if to <= at and operation.endless:
+                    way.rounds[way.where] = way.rounds.get(way.where, 0) + 1
+                    if way.rounds[way.where] > self.limits.rounds:
+                        self._cut(way, "rounds", operation.place)
+                        return False
+            case syntax.Branch():
+                self._branch(way, frame, operation, at)
+            case syntax.Call():
+                if len(way.frames) > self.limits.depth:
+                    self._cut(way, "depth", operation.place)
+                    return False
+                self._call(way, operation)
+            case syntax.Return() if len(way.frames) > 1:
+                self._return(way, operation)
+            case syntax.Return() | syntax.Halt():
+                self._end(way, "end")
+                return False
+            case _:
+                self._carry_out(way, operation)
+        return True
 
     def _repeats(self, way: Way) -> bool:
         """Whether a way ends where it is, in a state that was met before; a loop that goes on for something unknown
@@ -254,7 +264,15 @@ class Machine:
         where, memory = way.where, way.memory
         routine, at = where[-1]
         last = way.visits.get(where)
-        if last is not None and way.decisions > last.decisions and not self._is_counted(way, routine, at):
+        counted = self._is_counted(way, routine, at)
+        if counted:  # loops in it begin anew
+            inner = len(where) - 1
+            way.visits = {
+                each: seen
+                for each, seen in way.visits.items()
+                if each == where or each[:inner] != where[:inner] or each[inner][0] != routine or each[inner][1] <= at
+            }
+        if last is not None and way.decisions > last.decisions and not counted:
             if last.rounds >= UNKNOWN_ROUNDS:
                 _widen(way, last.shared, last.local, last.here)
             rounds = last.rounds + 1
@@ -364,7 +382,7 @@ class Machine:
             motion = replace(motion, not_followed=motion.not_followed or syntax.shown(otherwise))
         moved = None if self.mover is None else self.mover(motion, memory.here.joints)
         self._note(way, place, motion, moved)
-        memory.here = memory.here.after(motion, memory.cell.flange)
+        memory.here = memory.here.after(motion)
         if moved is not None:
             known = moved.end is not None
             memory.here = replace(memory.here, joints=moved.end, pose=memory.here.pose if known else None)
@@ -466,10 +484,77 @@ class Machine:
         other.frames[-1].at = branch.otherwise
         self._note(way, branch.place, instructions.Decision(branch.text, True))
         self._note(other, branch.place, instructions.Decision(branch.text, False))
+        if self._meets(way, other, key):
+            return
+        if len(self.pending) + 1 >= self.limits.ways:
+            self.pending = [each for here in _by_place(self.pending) for each in self._joined(here)]
         if len(self.pending) + 1 < self.limits.ways:
             self.pending.append(other)
         else:
             self._cut(other, "ways", branch.place)
+
+    def _meets(self, way: Way, other: Way, branch: tuple[str, int]) -> bool:
+        """Whether two sides of a branch were carried out up to where they meet, and are one way again.
+
+        They are if neither moves the arm, turns back or leaves, and if nothing differs between them that a motion is
+        made of: what differs becomes unknown.
+        """
+        end = self._quiet.get(branch)
+        if end is None:
+            return False
+        for each in (way, other):
+            depth = len(each.frames)
+            while len(each.frames) > depth or each.frames[-1].at < end:
+                self._step(each)
+        own = (way.memory.shared, other.memory.shared), (way.memory.local, other.memory.local)
+        differing = {name for one, two in own for name in one.keys() | two.keys() if one.get(name) != two.get(name)}
+        if not self._steering.isdisjoint(map(root, differing)):
+            return False
+        _widen(way, other.memory.shared, [frame.local for frame in other.frames], other.memory.here.key())
+        self._end(other, "joins", follows=way.step)
+        return True
+
+    @cached_property
+    def _quiet(self) -> dict[tuple[str, int], int]:
+        """By the branches whose sides move nothing and only go forward, where the sides meet."""
+        plain = {name for name, each in self.program.routines.items() if _straight(each.code, 0, len(each.code))}
+        before = -1
+        while before != len(plain):  # without those that call others than such
+            before = len(plain)
+            plain -= {name for name in plain if any({*_called(op)} - plain for op in self.program.routines[name].code)}
+        found = {}
+        for name, routine in self.program.routines.items():
+            for at, branch in enumerate(routine.code):
+                if isinstance(branch, syntax.Branch) and branch.otherwise > at:
+                    last = routine.code[branch.otherwise - 1]
+                    end = max(last.to, branch.otherwise) if isinstance(last, syntax.GoTo) else branch.otherwise
+                    sides = routine.code[at + 1 : end]
+                    if _straight(routine.code, at + 1, end) and not any({*_called(op)} - plain for op in sides):
+                        found[name, at] = end
+        return found
+
+    @cached_property
+    def _steering(self) -> set[str]:
+        """Variables that motions are made of, and those that they are computed from."""
+        code = [*self.program.operations()]
+        found = {
+            name
+            for op in code
+            if isinstance(op, syntax.Move)
+            for of in syntax.expressions_of(op)
+            for name in _names(of)
+        }
+        found |= self.dialect.modal
+        before = -1
+        while before != len(found):
+            before = len(found)
+            for op in code:
+                if isinstance(op, syntax.Assign) and variable_of(op.target) in found:
+                    found.update((*_names(op.target), *_names(op.value)))
+                elif isinstance(op, syntax.Call):
+                    given = _given(self.program.routines[op.routine], op)
+                    found.update(name for parameter, of in given if parameter.name in found for name in _names(of))
+        return found
 
     def _call(self, way: Way, call: syntax.Call) -> None:
         routine, memory = self.program.routines[call.routine], way.memory
@@ -496,14 +581,16 @@ class Machine:
 
     def _state(self, way: Way) -> Hashable:
         """A key that is equal for ways in one place that go on alike."""
-        memory, fixed = way.memory, self.fixed
-        shared = frozenset(pair for pair in memory.shared.items() if pair[0] not in fixed and self._decides(*pair))
-        local = (frozenset(pair for pair in frame.local.items() if self._decides(*pair)) for frame in way.frames)
-        return shared, tuple(local), memory.here.key()
+        memory = way.memory
+        local = (frozenset(self._deciding(frame.local)) for frame in way.frames)
+        return frozenset(self._deciding(memory.shared, self.fixed)), tuple(local), memory.here.key()
 
-    def _decides(self, name: str, value: syntax.Value) -> bool:
-        """Whether anything that is carried out may depend on a variable, other than counts that are never read."""
-        return root(name) not in self._counts or not isinstance(value, (int, float, syntax.Unclear))
+    def _deciding(
+        self, values: Mapping[str, syntax.Value], fixed: Collection[str] = ()
+    ) -> list[tuple[str, syntax.Value]]:
+        """Variables on which anything that is carried out may depend: neither fixed nor counts that are never read."""
+        counts = self._counts
+        return [pair for pair in values.items() if pair[0] not in fixed and root(pair[0]) not in counts]
 
     @cached_property
     def _counts(self) -> set[str]:
@@ -536,6 +623,29 @@ def _widen(
                 own[name] = syntax.Unclear(name)
     if memory.here.key() != here:
         memory.here = Position()
+
+
+def _by_place(ways: Iterable[Way]) -> list[list[Way]]:
+    """Ways grouped by where they are."""
+    found: dict[Where, list[Way]] = {}
+    for way in ways:
+        found.setdefault(way.where, []).append(way)
+    return list(found.values())
+
+
+def _straight(code: Sequence[syntax.Operation], start: int, end: int) -> bool:
+    """Whether a part of a routine moves nothing, has no jump back or out of it, and returns at the routine's end."""
+    last = end == len(code) and start == 0
+    for at in range(start, end):
+        op = code[at]
+        if isinstance(op, syntax.Return) and last and at == end - 1:
+            continue
+        if isinstance(op, (syntax.Move, syntax.Fixed, syntax.Halt, syntax.Return, syntax.ConcurrentStart)):
+            return False
+        to = op.to if isinstance(op, syntax.GoTo) else op.otherwise if isinstance(op, syntax.Branch) else end
+        if not at < to <= end:
+            return False
+    return True
 
 
 def _labels(routine: syntax.Routine) -> frozenset[int]:

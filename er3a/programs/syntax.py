@@ -40,6 +40,13 @@ class Record:
 
     kind: str
     items: tuple[tuple[str, Value], ...]
+    _hash: list[int] = field(default_factory=list, init=False, repr=False, compare=False)
+
+    def __hash__(self) -> int:
+        """Of kind and items, computed once: states of a program are compared by all their values, again and again."""
+        if not self._hash:
+            self._hash.append(hash((self.kind, self.items)))
+        return self._hash[0]
 
     def get(self, name: str) -> Value | None:
         """The value of a name, or None."""

@@ -16,10 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from er3a.geometry.transforms import translation
 from er3a.geometry.vectors import Vector
 from er3a.kinematics.chain import constant_links, joint_starts, moving_tip
-from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
 from er3a.numerics.arrays import Flags, Reals, Singles
 from er3a.numerics.jit import inner_kernel
 from er3a.robots.robot import Robot
@@ -101,26 +99,6 @@ def _sums(robot: Robot) -> Reals:
         row[:-2] = factors * (robot.upper - robot.lower)
         row[-2:] = np.array([limit.lower, limit.upper]) - factors @ robot.lower
     return rows
-
-
-def plane_direction(robot: Robot) -> Reals:
-    """Unit vector (3,) in the base frame, at theta_1 = 0, of the x axis of the frame that turns with joint 1."""
-    links = constant_links(robot)
-    turn = _z_x_z(links[1, :3, :3])[0] if point_chain(robot).last > 0 else 0.0
-    direction: Reals = links[0, :3, :3] @ [np.cos(turn), np.sin(turn), 0.0]
-    return direction
-
-
-def at_wrist_centre(robot: Robot) -> Robot:
-    """The robot with its tool point in the wrist centre, so that joints 4 to 6 don't move it.
-
-    Raises
-    ------
-    NotWristPartitionedError
-        naming the property that the arm lacks
-    """
-    arm = wrist_partitioned_arm(robot)
-    return robot.replace(tool=robot.tool @ translation(*arm.wrist_in_tool))
 
 
 def _z_x_z(R: Reals) -> tuple[float, float, float]:

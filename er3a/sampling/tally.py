@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from er3a.geometry.vectors import Vector, fibonacci_sphere
 from er3a.kinematics.forward import forward, jacobian
-from er3a.numerics.arrays import Flags, Integers, Reals, Singles, Words
+from er3a.numerics.arrays import Integers, Reals, Singles, Words
 from er3a.numerics.jit import inner_kernel, kernel
 from er3a.robots.joint_limits import within
 from er3a.robots.robot import Robot
@@ -466,65 +466,23 @@ def _best(robot: Robot, grid: Grid, q: Reals, values: Reals, factors: tuple[floa
     return float(min(found))
 
 
-COARSER = (1, 2, 4)
-SECTION_VOID_CELLS = 16
-
-
 @dataclass(frozen=True, eq=False)
 class TouchedSection:
-    """Cells of the side section that were touched, or are cut off by touched ones (the axis counts as a wall).
+    """Cells of the side section that were touched.
 
     Attributes
     ----------
     rho, z : (n,), m, distance from axis 1 and height of each cell's centre
-    samples : (n,), how many fell into it; void : (n,), whether it is cut off
+    samples : (n,), how many fell into it
     """
 
     rho: Reals
     z: Reals
     samples: Integers
-    void: Flags
-
-
-@dataclass(frozen=True, eq=False)
-class Growth:
-    """Touched volume after each block, at one cell size.
-
-    Attributes
-    ----------
-    cell : m; samples : (blocks,), drawn so far; volume : (blocks,), m^3
-    """
-
-    cell: float
-    samples: Integers
-    volume: Reals
 
 
 def section_cells(tally: Tally, grid: Grid) -> TouchedSection:
     """The side section, all azimuths folded in."""
-    padded = np.pad(tally.section == 0, ((0, 1), (1, 1)), constant_values=True)
-    labels, _ = scipy.ndimage.label(padded)
-    sizes = np.bincount(labels.ravel())
-    is_void = (sizes >= SECTION_VOID_CELLS) & (np.arange(len(sizes)) != labels[-1, 0])
-    is_void[0] = False
-    void = is_void[labels][:-1, 1:-1]
-    shown = (tally.section > 0) | void
+    shown = tally.section > 0
     rho, z = (grid.section_origin + (np.argwhere(shown) + 0.5) * grid.section_cell).T
-    return TouchedSection(rho, z, tally.section[shown], void[shown])
-
-
-def touched_growth(draw: Draw, tally: Tally, grid: Grid) -> list[Growth]:
-    """How the touched volume grows with the samples, with the grid's cells and coarser ones."""
-    drawn = np.cumsum(draw.sizes)
-    found = []
-    for factor in COARSER:
-        first = tally.first_block
-        padding = [(0, -size % factor) for size in first.shape]
-        first = np.pad(first, padding, constant_values=UNTOUCHED)
-        nx, ny, nz = (size // factor for size in first.shape)
-        first = first.reshape(nx, factor, ny, factor, nz, factor).min(axis=(1, 3, 5))
-        cells = np.cumsum(np.bincount(first[first != UNTOUCHED], minlength=len(drawn)))
-        cell: float = grid.cell * factor
-        volume: Reals = np.asarray(cells * cell**3, np.float64)
-        found.append(Growth(cell, drawn, volume))
-    return found
+    return TouchedSection(rho, z, tally.section[shown])

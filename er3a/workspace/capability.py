@@ -25,6 +25,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from er3a.kinematics.block_inverse import BlockConstants
 from er3a.kinematics.wrist_partitioned import constants_for_blocks, wrist_partition_missing
@@ -32,9 +33,9 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
 from er3a.workspace.cell_frame import cell_frame, places_served, without_first_limits
-from er3a.workspace.directions import across, left_to_roll, poses
+from er3a.workspace.cells import ring_volumes
+from er3a.workspace.directions import left_to_roll, poses
 from er3a.workspace.orientations import AskedOrientations
-from er3a.workspace.section_proof import ring_volumes
 from er3a.workspace.tool_inverse import all_solutions, generic_manipulability, slot_count
 
 _POSES = 50_000
@@ -221,7 +222,7 @@ def try_poses(
         at = places[0][part, None] + places[1] * (random.random((len(rho), tries)) - 0.5)
         points = frame.points(rho, at, z)
         if asked.kind == "directions":
-            rotations = _orientations(random, at.shape)
+            rotations = Rotation.random(at.size, rng=random).as_matrix().reshape(*at.shape, 3, 3)
         else:
             rotations = asked.at_random(points.reshape(-1, 3), random).reshape(*at.shape, 3, 3)
         q, inside = all_solutions(robot, poses(points, rotations).reshape(-1, 4, 4))
@@ -232,14 +233,3 @@ def try_poses(
         reached[part] = inside.any(axis=1).reshape(at.shape).sum(axis=1)
         clear[part] = held.reshape(at.shape).sum(axis=1)
     return ClearPoses(tries, reached, clear)
-
-
-def _orientations(random: np.random.Generator, shape: tuple[int, ...]) -> Reals:
-    """Uniform over all orientations (..., 3, 3): a direction, and a roll about it."""
-    count = int(np.prod(shape))
-    z = random.normal(size=(count, 3))
-    z /= np.linalg.norm(z, axis=1, keepdims=True)
-    x, y = across(z)
-    roll = 2 * np.pi * random.random((count, 1))
-    c, s = np.cos(roll), np.sin(roll)
-    return np.stack([c * x + s * y, c * y - s * x, z], axis=-1).reshape(*shape, 3, 3)

@@ -15,30 +15,22 @@ from functools import partial
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from er3a.by_value import Finding
-from er3a.kinematics.forward import forward
-from er3a.numerics.arrays import Flags, Reals
-from er3a.robots.joint_limits import within
+from er3a.numerics.arrays import Reals
 from er3a.robots.robot import CombinedLimit, Robot
-from er3a.workspace.proven import Cavity, cavities, prove_robot, reach_points
-from er3a.workspace.section_arm import FULL_TURN, section_arm
-from er3a.workspace.section_proof import in_space, ring_volumes, unfilled_arcs
+from er3a.workspace.arcs import FULL_TURN
+from er3a.workspace.cells import in_section, in_space
+from er3a.workspace.general_arm import general_arm
+from er3a.workspace.general_proof import prove_general, unfilled_about
+from er3a.workspace.proven import SETTLED, TARGET, Cavity, SectionMap, cavities
 
-InSection = Callable[[Reals], tuple[Reals, Reals, Reals]]
-InBase = Callable[[Reals], Reals]
-
-PROBES, SEARCHED, SAMPLES, _RESTARTS = 300, 80, 50_000, 1
+PROBES, SAMPLES = 80, 65_536
 Unit = Literal["deg", "mm"]
 STEPS: dict[Unit, tuple[float, ...]] = {"deg": (15.0, 30.0, 60.0, 90.0, 180.0), "mm": (25.0, 50.0, 100.0, 200.0, 400.0)}
 """By how much a limit is widened until the void vanishes."""
 _SI: dict[Unit, float] = {"deg": np.pi / 180, "mm": 1e-3}  # rad, m
 _GONE, _SHRUNK = 0.98, 0.10
-
-NEAR = 0.05
-"""Part of the points' extent within which a sample must lie for a cell to be searched."""
 
 Side = Literal["lower", "upper"]
 _SIDES: tuple[Side, Side] = ("lower", "upper")
@@ -72,15 +64,6 @@ class Relaxed:
         return self.limit + (self.by if self.side == "upper" else -self.by)
 
 
-@dataclass(frozen=True)
-class Unlimited:
-    """All limits taken away; ``filled`` is the ratio of the void that is then reached."""
-
-    filled: float
-    joint: Literal[0] = 0
-    side: Literal["both"] = "both"
-
-
 class Disappears(Finding, code="void_disappears"):
     """One limit alone makes the void, or each of two."""
 
@@ -100,40 +83,31 @@ class Geometry(Finding, code="void_of_geometry"):
     most: Relaxed | None
 
 
-class OnlySampled(Finding, code="void_only_sampled"):
-    """Only samples suggest the void, so nothing is known of its cause."""
+VoidCause = Disappears | SeveralLimits | Geometry
 
 
-VoidCause = Disappears | SeveralLimits | Geometry | OnlySampled
+def relaxations(robot: Robot, cavity: Cavity) -> tuple[list[Relaxed], float]:
+    """Judge a void's cells with each limit widened, the strongest first; then the ratio reached without any.
 
-
-def relaxations(
-    robot: Robot, cavity: Cavity, section: tuple[InSection, InBase] | None = None
-) -> tuple[list[Relaxed], Unlimited]:
-    """Judge a void's cells with each limit widened, the strongest first; then without any.
-
-    Parameters
-    ----------
-    section : for an arm without a section form: what takes points (n, 3), m, of the base frame to their radius, azimuth
-        and height about axis 1, or places across and along bars, and what takes points of that frame to the base. Cells
-        then count as reached if a random sample of the widened arm lies in them, or a search brings it to their middle.
+    What the proof fills at the middles of cells counts as reached, so that a void may shrink by more.
     """
-    chosen = _probes(cavity)
-    if section is None:
-        before = _open_angle(robot, cavity, chosen)
-        joints = list(range(1, 6))
+    probes, weight = _spread_probes(cavity)
+    _, R, origin = general_arm(robot)
+    middles = probes.cells.reshape(-1, 2, 2).mean(axis=2)
+    ends = in_space(middles[:, :1], probes.arcs, middles[:, 1:], probes.bar) @ R + origin
 
-        def ratio_filled(widened: Robot) -> float:
-            return _ratio_filled(widened, cavity, chosen, before)
-    else:
-        joints, probes = list(range(1, robot.joints + 1)), _spread_probes(cavity)
+    def ratio_filled(widened: Robot) -> float:
+        arm, R, origin = general_arm(widened)
+        rho, place, z = in_section((ends - origin) @ R.T, arm.bar)
+        low, high = (place if arm.bar > 0 else probes.arcs).T  # bars of a wider slide begin elsewhere
+        arcs = unfilled_about(arm, rho[:, 0], z[:, 0], SAMPLES)
+        left = np.minimum(arcs[..., 1], high[:, None]) - np.maximum(arcs[..., 0], low[:, None])
+        filled = 1 - np.nansum(np.maximum(0, left), axis=1) / (high - low)
+        return float(weight @ filled / weight.sum())
 
-        def ratio_filled(widened: Robot) -> float:
-            return _ratio_searched(robot, widened, probes, section)
-
-    found = [_relaxed(limit, ratio_filled) for limit in _limits(robot, joints)]
+    found = [_relaxed(limit, ratio_filled) for limit in _limits(robot)]
     found.sort(key=lambda one: (one.filled < _GONE, np.searchsorted(STEPS[one.unit], one.by), -one.filled, one.joints))
-    return found, Unlimited(ratio_filled(_without_limits(robot)))
+    return found, ratio_filled(_without_limits(robot))
 
 
 class _Limit(NamedTuple):
@@ -149,11 +123,11 @@ class _Limit(NamedTuple):
     idle: float = 0.0
 
 
-def _limits(robot: Robot, joints: list[int]) -> Iterator[_Limit]:
-    """Limits of these joints (from 1), and of sums of joints."""
+def _limits(robot: Robot) -> Iterator[_Limit]:
+    """Limits of joints, and of sums of joints."""
     slides, limited = robot.slides, (robot.upper - robot.lower < FULL_TURN) & ~robot.continuous
     for side in _SIDES:
-        for joint in joints:
+        for joint in range(1, robot.joints + 1):
             if slides[joint - 1] or limited[joint - 1]:
                 value = float((robot.lower if side == "lower" else robot.upper)[joint - 1])
                 unit: Unit = "mm" if slides[joint - 1] else "deg"
@@ -202,23 +176,16 @@ def _without_limits(robot: Robot) -> Robot:
     return robot.replace(lower=robot.lower - by, upper=robot.upper + by, combined=())
 
 
-def cause_of(single: list[Relaxed], unlimited: Unlimited) -> VoidCause:
-    """The cause that the relaxations show."""
+def cause_of(single: list[Relaxed], unlimited: float) -> VoidCause:
+    """The cause that the relaxations show; ``unlimited``: the ratio of the void that is reached without limits."""
     gone = [limit for limit in single if limit.filled >= _GONE]
     if gone:
         return Disappears(tuple(each for each in gone if (each.unit, each.by) == (gone[0].unit, gone[0].by))[:2])
     strongest = max(single, key=lambda limit: limit.filled, default=None)
     most = strongest if strongest is not None and strongest.filled >= _SHRUNK else None
-    if unlimited.filled >= _GONE:
+    if unlimited >= _GONE:
         return SeveralLimits(most)
-    return Geometry(1 - unlimited.filled, most)
-
-
-def joints_after(cause: VoidCause) -> set[int]:
-    """The joints whose limits a cause names."""
-    if isinstance(cause, Disappears):
-        return {joint for limit in cause.limits for joint in limit.joints}
-    return set() if isinstance(cause, OnlySampled) or cause.most is None else set(cause.most.joints)
+    return Geometry(1 - unlimited, most)
 
 
 def _widened(robot: Robot, joint: int, side: Side, by: float) -> Robot:
@@ -230,79 +197,21 @@ def _widened(robot: Robot, joint: int, side: Side, by: float) -> Robot:
     return robot.replace(lower=lower, upper=upper)
 
 
-def _probes(cavity: Cavity) -> NDArray[np.intp]:
-    """Numbers of the arcs that hold most of what is proven empty."""
-    weight = cavity.volumes * cavity.empty
-    chosen = np.argsort(-weight, kind="stable")[:PROBES]
-    return chosen[weight[chosen] > 0]
-
-
 def _spread_probes(cavity: Cavity) -> tuple[Cavity, Reals]:
     """Arcs all over a void, and how much each stands for: all if they are few, else drawn by how much of what is proven
     empty they hold."""
     weight = cavity.volumes * cavity.empty
-    if len(weight) <= SEARCHED:
+    if len(weight) <= PROBES:
         chosen = np.flatnonzero(weight > 0)
         return cavity.part(chosen, cavity.enclosed), weight[chosen]
     order = np.random.Generator(np.random.Philox(key=len(weight))).permutation(len(weight))
     total = np.cumsum(weight[order])
-    drawn = order[np.searchsorted(total, (np.arange(SEARCHED) + 0.5) * (total[-1] / SEARCHED))]
+    drawn = order[np.searchsorted(total, (np.arange(PROBES) + 0.5) * (total[-1] / PROBES))]
     chosen, times = np.unique(drawn, return_counts=True)
     return cavity.part(chosen, cavity.enclosed), times.astype(float)
 
 
-def _open_angle(robot: Robot, cavity: Cavity, chosen: NDArray[np.intp]) -> Reals:
-    """How much (rad) of each chosen arc an arm leaves open, at the middle of its cell."""
-    middle = cavity.cells[chosen].reshape(-1, 2, 2).mean(axis=2)
-    half = np.minimum(1e-6, middle[:, 0] / 2)
-    probes = np.stack([middle[:, 0] - half, middle[:, 0] + half, middle[:, 1] - half, middle[:, 1] + half], axis=1)
-    arcs = unfilled_arcs(section_arm(robot), probes)
-    low, high = cavity.arcs[chosen].T
-    a, b = np.maximum(arcs[..., 0], low[:, None]), np.minimum(arcs[..., 1], high[:, None])
-    open_angle: Reals = np.nansum(np.maximum(0, b - a), axis=1)
-    return open_angle
-
-
-def _ratio_filled(robot: Robot, cavity: Cavity, chosen: NDArray[np.intp], before: Reals) -> float:
-    """Ratio of what was open in the chosen arcs, by volume, that another arm fills."""
-    section = ring_volumes(cavity.cells[chosen])
-    return float(1 - (section @ _open_angle(robot, cavity, chosen)) / (section @ before))
-
-
-def _ratio_searched(
-    robot: Robot, widened: Robot, spread: tuple[Cavity, Reals], section: tuple[InSection, InBase]
-) -> float:
-    """Ratio by weight of the arcs that a widened arm reaches, by samples, then by search from the nearest of these."""
-    (in_section, in_base), (probes, weight) = section, spread
-    random = np.random.Generator(np.random.Philox(key=len(probes.cells)))
-    q = random.uniform(widened.lower, widened.upper, (SAMPLES, robot.joints))
-    # The unchanged arm does not reach this place: at least one limit must be exceeded.
-    q = q[within(widened, q) & ~within(robot, q)]
-    if not len(q) or not len(probes.cells):
-        return 0.0
-    points = forward(widened, q)[:, :3, 3]
-    hit = np.zeros(len(probes.cells), dtype=bool)
-    rho, azimuth, z = in_section(points)
-    for n in range(len(hit)):
-        hit[n] = _in_arc(probes, n, (rho, azimuth, z)).any()
-    middles = probes.cells.reshape(-1, 2, 2).mean(axis=2)
-    wanted = in_base(in_space(middles[:, 0], probes.arcs.mean(axis=1), middles[:, 1], probes.bar))
-    away, nearest = cKDTree(points).query(wanted)
-    left = np.flatnonzero(~hit & (away < NEAR * np.linalg.norm(np.ptp(points, axis=0))))
-    if left.size:
-        found = reach_points(widened, wanted[left], q[nearest[left]], _RESTARTS)
-        hit[left] = within(widened, np.nan_to_num(found)) & np.isfinite(found[:, 0])
-    return float(weight[hit].sum() / weight.sum())
-
-
-def _in_arc(probes: Cavity, n: int, places: tuple[Reals, Reals, Reals]) -> Flags:
-    """Which places (radius, azimuth and height, or x, place along and z of bars) lie in an arc."""
-    (rho, azimuth, z), (a, b, c, d), (low, high) = places, probes.cells[n], probes.arcs[n]
-    azimuth = azimuth if probes.bar > 0 else azimuth % (2 * np.pi)
-    return np.asarray((rho > a) & (rho < b) & (z > c) & (z < d) & (azimuth >= low) & (azimuth <= high))
-
-
-CELLS, POINTS = 2000, 100  # of the proof of each changed arm, and of the estimate beside it, which is not looked at
+CELLS = 6000  # of the proof of each changed arm
 TURNS_DEG = (-90.0, 90.0, 180.0)
 FACTORS = (-1.0, 0.5, 2.0)
 INNER = (1, 2, 3, 4)  # joints 2 to 5; turning joint 1 or 6 moves no section through the reach
@@ -333,7 +242,7 @@ class SingleChange:
     joint : 1 to 6
     given, tried : in ``unit``
     left_litres : bounds of the changed arm's enclosed voids together, as far as a coarse proof finds them; None where
-        only the proof for any arm serves: what it leaves undecided joins voids to the outside
+        it leaves too much undecided, which joins voids to the outside
     """
 
     column: Column
@@ -358,8 +267,8 @@ def single_changes(robot: Robot, cause: VoidCause, seed: int) -> tuple[SingleCha
     """
     found = []
     for column, joint, given, tried in (*_of_table(robot), *_of_limits(robot, cause)):
-        proven = prove_robot(with_entry(robot, column, joint, tried), CELLS, POINTS, seed)
-        enclosed = cavities(proven.section)[0] if proven.arm is not None else None
+        proof = prove_general(general_arm(with_entry(robot, column, joint, tried))[0], TARGET, CELLS, seed)
+        enclosed = cavities(SectionMap(proof))[0] if proof.width <= SETTLED else None
         left = None if enclosed is None else (_litres(enclosed, "lower"), _litres(enclosed, "upper"))
         found.append(SingleChange(column, joint, UNITS[column], given, tried, left))
     return tuple(sorted(found, key=lambda each: ((each.left_litres or (0, np.inf))[1], each.entry, each.tried)))
@@ -405,6 +314,4 @@ def _of_limits(robot: Robot, cause: VoidCause) -> Iterator[Candidate]:
 def _named(cause: VoidCause) -> Sequence[Relaxed]:
     if isinstance(cause, Disappears):
         return cause.limits
-    if isinstance(cause, SeveralLimits | Geometry) and cause.most is not None:
-        return (cause.most,)
-    return ()
+    return () if cause.most is None else (cause.most,)

@@ -14,13 +14,12 @@ from er3a.geometry.vectors import TURN
 from er3a.kinematics.by_class import arm_solver
 from er3a.kinematics.classes.chain_solvers import LockedJoint
 from er3a.kinematics.classes.class_solvers import ARM_CLASSES, ChainSolver, PaddedChain
-from er3a.kinematics.wrist_partitioned import wrist_partition_missing
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.robot import Robot, derived
 from er3a.robots.whole_turns import LIMIT_TOLERANCE
 from er3a.sampling.grid import tool_bound
+from er3a.workspace.arcs import FULL_TURN
 from er3a.workspace.general_arm import general_arm
-from er3a.workspace.section_arm import FULL_TURN, section_arm, section_frame
 
 SECTORS = 64
 """Sectors of azimuth with a limited joint 1, the first about azimuth 0, or parts of bars; one bit each in a proof's
@@ -86,13 +85,9 @@ def cell_frame(robot: Robot) -> CellFrame:
     """The frame of a robot's cells."""
     turns = not robot.slides[0] and (robot.continuous[0] or robot.upper[0] - robot.lower[0] >= FULL_TURN)
     sectors = 1 if turns else SECTORS if is_quick(robot) else _FEW_SECTORS
-    if not wrist_partition_missing(robot):
-        arm, (R, origin) = section_arm(robot), section_frame(robot)
-        middle = origin + float(arm.centre[2]) * R[2]
-        return CellFrame(R, origin, arm.reach, arm.heights, 0.0, sectors, middle, arm.reach)
-    arm_in_cells, R, origin = general_arm(robot)
-    reach, (low, high) = float(arm_in_cells.radii[0]), arm_in_cells.heights[0].tolist()
-    if bar := arm_in_cells.bar:
+    arm, R, origin = general_arm(robot)
+    reach, (low, high) = float(arm.radii[0]), arm.heights[0].tolist()
+    if bar := arm.bar:
         half = np.array([reach, bar, high - low]) / 2
         middle = origin + (half + np.array([0.0, 0.0, low])) @ R
         return CellFrame(R, origin, reach, (low, high), bar, sectors, middle, float(np.linalg.norm(half)))

@@ -14,7 +14,6 @@ import numpy as np
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.wrist_partitioned import wrist_partition_missing, wrist_partitioned_arm
 from er3a.numerics.arrays import Reals
-from er3a.numerics.jit import inner_kernel
 from er3a.robots.robot import Robot
 
 _ON_AXIS = 1e-12
@@ -29,20 +28,12 @@ class Roll:
     ----------
     free : whether it is left to joint 6
     angles : rad, the rolls to try; one if it is free
-    reach : m, distance of the wrist centre (without one: of axis n) from the tool point; beside : m, from its axis
     last_joint : whether a free roll is left to the last joint, or to nothing, since the arm can't make it
     """
 
     free: bool
     angles: tuple[float, ...]
-    reach: float
-    beside: float
     last_joint: bool = True
-
-    @property
-    def half_step(self) -> float:
-        """Half the angle between two rolls, rad; 0 if the roll is free."""
-        return 0.0 if self.free else np.pi / len(self.angles)
 
 
 def roll_of(robot: Robot, rolls: int) -> Roll:
@@ -53,10 +44,9 @@ def roll_of(robot: Robot, rolls: int) -> Roll:
     else:
         arm = wrist_partitioned_arm(robot)
         axis_6, wrist = arm.tool_rotation.T @ arm.axes[5], arm.wrist_in_tool
-    reach, beside = float(np.linalg.norm(wrist)), float(np.hypot(*wrist[:2]))
-    free = max(beside, float(np.hypot(*axis_6[:2]))) < _ON_AXIS and _last_turns_alone(robot)
+    free = max(float(np.hypot(*wrist[:2])), float(np.hypot(*axis_6[:2]))) < _ON_AXIS and _last_turns_alone(robot)
     angles = (0.0,) if free else tuple((2 * np.pi * np.arange(rolls) / rolls).tolist())
-    return Roll(free, angles, reach, beside)
+    return Roll(free, angles)
 
 
 def _last_turns_alone(robot: Robot) -> bool:
@@ -128,14 +118,3 @@ def poses(points: Reals, rotations: Reals) -> Reals:
     T = np.zeros((*shape, 4, 4))
     T[..., :3, :3], T[..., :3, 3], T[..., 3, 3] = rotations, points, 1.0
     return T
-
-
-@inner_kernel
-def point_tool(T: Reals, frame: Reals, polar: float, around: float, c_roll: float, s_roll: float) -> None:
-    """Turn a pose (4, 4): its z axis at angles (rad) from and around z of a frame (columns x, y, z), rolled."""
-    cp, sp, ca, sa = np.cos(polar), np.sin(polar), np.cos(around), np.sin(around)
-    for i in range(3):
-        flat = frame[i, 0] * ca + frame[i, 1] * sa
-        X, Y = flat * cp - frame[i, 2] * sp, frame[i, 1] * ca - frame[i, 0] * sa
-        T[i, 0], T[i, 1] = X * c_roll + Y * s_roll, Y * c_roll - X * s_roll
-        T[i, 2] = flat * sp + frame[i, 2] * cp

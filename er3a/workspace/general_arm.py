@@ -11,18 +11,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from er3a.geometry.transforms import rot_z, translation
 from er3a.geometry.vectors import Vector
 from er3a.kinematics.chain import constant_links, joint_starts, moving_tip
 from er3a.numerics.arrays import Flags, Reals
-from er3a.numerics.jit import inner_kernel, kernel
+from er3a.numerics.jit import kernel
 from er3a.robots.joint_limits import theta_limits
 from er3a.robots.robot import Robot
-from er3a.workspace.directions import across
-from er3a.workspace.section_arm import FULL_TURN, ROUND_OFF
+from er3a.workspace.arcs import FULL_TURN, ROUND_OFF
 
 _SPARE = 0.01  # of what is reached, left on either side of bars
-_UPRIGHT, _ALONE = 1e-6, 1e-10
+_UPRIGHT = 1e-6
 
 
 class GeneralArm(NamedTuple):
@@ -43,8 +41,6 @@ class GeneralArm(NamedTuple):
     drive, start : (n, m) and (n,)
     v_lower, v_upper : (m,), limits of v
     combined (c, m), combined_lower, combined_upper (c,) : ``combined_lower <= combined @ v <= combined_upper``
-        Where v[0] counts in one of these, the others decide how far joint 1 goes; see :func:`own_range`
-    to_joints : (m, m + 1), the manufacturer's joint values are ``to_joints @ [*v, 1]``, v[0] being x[0]
     full_turn : whether joint 1 covers a full turn
     bar : m, length of the bars along a joint 1 that slides, 0 where it turns. Then the frame has y along the slide, the
         point stands at x from 0 to ``radii[0]`` and, with the slide at its lower limit, at y from 0 on; places along
@@ -66,25 +62,14 @@ class GeneralArm(NamedTuple):
     combined: Reals
     combined_lower: Reals
     combined_upper: Reals
-    to_joints: Reals
     full_turn: bool
     bar: float
 
     @property
     def carries_around(self) -> bool:
-        """Whether joint 1 can turn or shift the tool point with all rows after it at rest."""
-        return bool(len(self.lower) > 1 and not self.drive[0, 1:].any() and not self.drive[1:, 0].any())
-
-    def joints(self, v: Reals) -> Reals:
-        """The manufacturer's joint values (N, m) for values (N, m), joint 1 at the middle of what these allow it."""
-        v = v.copy()
-        low, high = np.full(len(v), self.lower[0]), np.full(len(v), self.upper[0])
-        for row, lowest, highest in zip(self.combined, self.combined_lower, self.combined_upper):
-            if row[0]:
-                ends = (np.array([[lowest], [highest]]) - v[:, 1:] @ row[1:]) / row[0]
-                low, high = np.maximum(low, ends.min(axis=0)), np.minimum(high, ends.max(axis=0))
-        v[:, 0] = (low + high) / 2
-        return np.asarray(v @ self.to_joints[:, :-1].T + self.to_joints[:, -1])
+        """Whether joint 1 can turn or shift the tool point with all rows after it at rest, as far as its own limits."""
+        shared = self.drive[0, 1:].any() or self.drive[1:, 0].any() or self.combined[:, 0].any()
+        return bool(len(self.lower) > 1 and not shared)
 
 
 def coupled(robot: Robot) -> bool:
@@ -92,52 +77,25 @@ def coupled(robot: Robot) -> bool:
     return robot.coupling is not None or bool(robot.combined)
 
 
-def general_arm(robot: Robot, thickness: tuple[Reals, float] | None = None) -> tuple[GeneralArm, Reals, Reals]:
+def general_arm(robot: Robot) -> tuple[GeneralArm, Reals, Reals]:
     """The chain of a robot, and the frame about axis 1: x, y, z in the base frame as rows (3, 3), and origin (3,).
 
     A joint 1 that slides along other joints makes bars; see :class:`GeneralArm`.
-
-    Parameters
-    ----------
-    thickness : direction (3,) in the frame of the last joint that moves the tool point, and a length (m), along which
-        the point is to slide besides; first joints that can't move are then part of the base
     """
     links = constant_links(robot)
     last, tip = moving_tip(links, robot.sliding)
     n = last + 1
-    sliding = robot.sliding[:n]
-    ends = theta_limits(robot)[:n]
-    if thickness is not None and not coupled(robot):
-        links, first = _without_locked(links, sliding, ends)
-        sliding, ends, n = sliding[first:], ends[first:], n - first
+    links, sliding, ends = links[:n], robot.sliding[:n], theta_limits(robot)[:n]
     wide = (ends[:, 1] - ends[:, 0] >= FULL_TURN) & ~sliding
     ends[wide, 1] = ends[wide, 0] + 2 * np.pi
     lower, upper = ends.T.copy()
     drive, start, v_lower, v_upper = np.eye(n), np.zeros(n), lower, upper
-    combined, combined_lower, combined_upper = np.empty((0, n)), np.empty(0), np.empty(0)
-    own = slice(last + 1 - n, last + 1)
-    to_joints = np.column_stack([np.diag(robot.direction[own]), -(robot.direction * joint_starts(robot))[own]])
     if coupled(robot):
-        to_joints = np.eye(robot.joints, robot.joints + 1)
         coupling = np.eye(robot.rows) if robot.coupling is None else robot.coupling
         drive = np.ascontiguousarray((robot.direction[:, None] * coupling)[:n])
         start, v_lower, v_upper = joint_starts(robot)[:n].copy(), robot.lower.copy(), robot.upper.copy()
-        combined = np.array([limit.factors for limit in robot.combined]).reshape(-1, robot.joints)
-        combined_lower, combined_upper = (
-            np.array([[limit.lower, limit.upper] for limit in robot.combined]).reshape(-1, 2).T.copy()
-        )
-    links, full_turn = links[:n], bool(wide[0])
-    if thickness is not None:
-        direction, length = thickness
-        x, y = across(direction[None])
-        along = np.eye(4)
-        along[:3, :3], along[:3, 3] = np.stack([x[0], y[0], direction], axis=1), tip
-        links, tip = np.concatenate([links, along[None]]), np.zeros(3)
-        sliding, lower, upper = np.append(sliding, True), np.append(lower, 0.0), np.append(upper, length)
-        drive, start = np.pad(drive, ((0, 1), (0, 1))), np.append(start, 0.0)
-        drive[-1, -1] = 1.0
-        v_lower, v_upper = np.append(v_lower, 0.0), np.append(v_upper, length)
-        combined, to_joints = np.pad(combined, ((0, 0), (0, 1))), np.insert(to_joints, -1, 0.0, axis=1)
+    combined = np.array([limit.factors for limit in robot.combined]).reshape(-1, drive.shape[1])
+    sums = np.array([[limit.lower, limit.upper] for limit in robot.combined]).reshape(-1, 2).T.copy()
     radii, heights = _levers(links, tip, sliding, lower, upper)
     links, tip, sliding = (np.array(each, order="C") for each in (links, tip, sliding))
     arm = GeneralArm(  # kernels are compiled anew for arrays that can't be written to: none of these is one
@@ -154,91 +112,14 @@ def general_arm(robot: Robot, thickness: tuple[Reals, float] | None = None) -> t
         v_lower=v_lower,
         v_upper=v_upper,
         combined=combined,
-        combined_lower=combined_lower,
-        combined_upper=combined_upper,
-        to_joints=to_joints,
-        full_turn=full_turn,
+        combined_lower=sums[0],
+        combined_upper=sums[1],
+        full_turn=bool(wide[0]),
         bar=0.0,
     )
-    if coupled(robot) and not (arm.carries_around and not combined[:, 0].any()):
-        arm = _freed(arm, theta_limits(robot)[0])
-    return (
-        _along_slide(arm, links[0]) if sliding[0] and len(sliding) > 1 else (arm, links[0, :3, :3].T, links[0, :3, 3])
-    )
-
-
-def _without_locked(links: Reals, sliding: Flags, ends: Reals) -> tuple[Reals, int]:
-    """Links without the first joints that can't move, and how many there are."""
-    first = 0
-    while first < len(ends) - 1 and ends[first, 0] == ends[first, 1]:
-        held = translation(0, 0, ends[first, 0]) if sliding[first] else rot_z(ends[first, 0])
-        links = np.concatenate([[links[0] @ held @ links[1]], links[2:]])
-        first += 1
-    return links, first
-
-
-def _freed(arm: GeneralArm, ends: Reals) -> GeneralArm:
-    """The arm with joint 1's x in place of its value, so that rows after it stay when it moves; unchanged where no
-    joints' values move row 1 alone.
-
-    Values along which row 1 alone moves are a line; the others' limits cut it off, each linear in what is left.
-
-    Parameters
-    ----------
-    ends : (2,), rad or m, the range of row 1
-    """
-    m = len(arm.v_lower)
-    target = np.eye(len(arm.lower))[0]
-    line = np.linalg.lstsq(arm.drive, target, rcond=None)[0]
-    if np.abs(arm.drive @ line - target).max() > _ALONE or abs(line[0]) < _ALONE or len(arm.lower) < 2:
-        return arm
-    line[np.abs(line) < _ALONE] = 0.0
-    share = np.append(0.0, arm.drive[0, 1:])
-    M = np.eye(m) - np.outer(line, share)
-    M[:, 0] = line
-    shift = -arm.start[0] * line
-    limits = np.concatenate([np.eye(m), arm.combined])
-    low, high = (
-        np.concatenate([[arm.v_lower, arm.v_upper], [arm.combined_lower, arm.combined_upper]], axis=1) - limits @ shift
-    )
-    rows = limits @ M
-    rows[np.abs(rows) < _ALONE] = 0.0
-    kept = (rows[:, 0] != 0) | (np.count_nonzero(rows, axis=1) > 1)
-    moved = np.outer(line, [arm.v_lower[0] / line[0], arm.v_upper[0] / line[0]])
-    v_lower, v_upper = arm.v_lower - moved.max(axis=1), arm.v_upper - moved.min(axis=1)
-    lower, upper, drive, start = (array.copy() for array in (arm.lower, arm.upper, arm.drive, arm.start))
-    v_lower[0], v_upper[0] = lower[0], upper[0] = ends
-    drive[0], drive[:, 0], start[0] = 0.0, 0.0, 0.0
-    drive[0, 0] = 1.0
-    return arm._replace(
-        lower=lower,
-        upper=upper,
-        drive=drive,
-        start=start,
-        v_lower=v_lower,
-        v_upper=v_upper,
-        combined=np.ascontiguousarray(rows[kept]),
-        combined_lower=np.ascontiguousarray(low[kept]),
-        combined_upper=np.ascontiguousarray(high[kept]),
-        to_joints=np.column_stack([M, shift]),
-        full_turn=False,
-    )
-
-
-@inner_kernel
-def own_range(arm: GeneralArm, v: Reals) -> tuple[float, float]:
-    """How far joint 1 goes (lowest and highest x[0]) with the others at ``v``; none if the first is the greater."""
-    low, high = arm.lower[0], arm.upper[0]
-    for r in range(arm.combined.shape[0]):
-        factor = arm.combined[r, 0]
-        if factor == 0.0:
-            continue
-        total = 0.0
-        for j in range(1, v.shape[0]):
-            total += arm.combined[r, j] * v[j]
-        a, b = (arm.combined_lower[r] - total) / factor, (arm.combined_upper[r] - total) / factor
-        low, high = max(low, min(a, b)), min(high, max(a, b))
-    return low, high
+    if sliding[0] and n > 1:
+        return _along_slide(arm, links[0])
+    return arm, links[0, :3, :3].T, links[0, :3, 3]
 
 
 def _along_slide(arm: GeneralArm, first: Reals) -> tuple[GeneralArm, Reals, Reals]:
@@ -263,19 +144,8 @@ def _along_slide(arm: GeneralArm, first: Reals) -> tuple[GeneralArm, Reals, Real
     bar = float(size[1] + slide + 2 * spare[1])
     lower, upper, radii, heights = (array.copy() for array in (arm.lower, arm.upper, arm.radii, arm.heights))
     start, lower[0], upper[0] = float(lower[0]), 0.0, 2 * np.pi * slide / bar
-    combined, to_joints = arm.combined.copy(), arm.to_joints.copy()
-    shift = start * combined[:, 0]
-    to_joints[:, -1] += start * to_joints[:, 0]
-    combined[:, 0] *= bar / (2 * np.pi)
-    to_joints[:, 0] *= bar / (2 * np.pi)
     radii[0], heights[0] = size[0] + 2 * spare[0], (low[2], high[2])
     arm = arm._replace(links=links, lower=lower, upper=upper, radii=radii, heights=heights, bar=bar)
-    arm = arm._replace(
-        combined=combined,
-        combined_lower=arm.combined_lower - shift,
-        combined_upper=arm.combined_upper - shift,
-        to_joints=to_joints,
-    )
     return arm, frame, first[:3, 3] + (corner + np.array([0.0, start, 0.0])) @ frame
 
 

@@ -84,7 +84,7 @@ class TiltPlane:
         about_1 = Rotation.from_rotvec(np.where(none, 0.0, turns).reshape(-1, 1) * self.axis).as_matrix()
         about_2 = Rotation.from_rotvec(np.where(none, 0.0, tilts - self.tilt).reshape(-1, 1) * self.normal).as_matrix()
         found = (about_1 @ about_2 @ self.tool).reshape(*turns.shape, 3, 3)
-        found[none] = tool_rotations((0.8 * self.normal + 0.6 * self.up)[None], Roll(True, (0.0,), 0.0, 0.0))[0, 0]
+        found[none] = tool_rotations((0.8 * self.normal + 0.6 * self.up)[None], Roll(True, (0.0,)))[0, 0]
         return np.asarray(found)
 
 
@@ -150,7 +150,7 @@ def asked_of(robot: Robot, rolls: int) -> AskedOrientations | None:
     joints can do at a point."""
     axes, _, T = axes_at_zero_theta(robot)
     code, tool, axis = arm_solver(robot).chain.code, T[:3, :3], axes[0]
-    none = Roll(True, (0.0,), 0.0, 0.0, last_joint=False)
+    none = Roll(True, (0.0,), last_joint=False)
     if code == "position":
         return AskedOrientations("points", none, tool, axis)
     if code == "scara":

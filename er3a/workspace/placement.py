@@ -1,24 +1,21 @@
-"""Where a box can be placed so that the tool reaches every point of it along every required direction, and the proof.
+"""Where a box can be placed so that the tool reaches every point of it along every required direction.
 
 At each point of a lattice, all directions of a cone are tested, branch by branch. A box fits where all lattice points
-in it are good, which sliding minima find for all places at once. The lattice only proposes places.
+in it are good, which sliding minima find for all places at once. Between these samples nothing is proven.
 
-Criterion: places where one branch serves the whole box come first, and of these the proven ones. Two measures rank the
-rest: the smallest manipulability over the box and the cone, which keeps away from singularities, and the smallest
-distance from the joint limits. Each is taken as a ratio to the best of all places, and the smaller ratio counts. A
-minimum of that distance is also required: the task narrows the limits.
+Criterion: places where one branch serves the whole box come first. Two measures rank the rest: the smallest
+manipulability over the box and the cone, which keeps away from singularities, and the smallest distance from the joint
+limits. Each is taken as a ratio to the best of all places, and the smaller ratio counts. A minimum of that distance is
+also required: the task narrows the limits.
 
 A supported box has its underside on a :class:`Support`, over which all of it lies.
-
-For the proof the box times the cone is split into bricks with patches of directions until one branch and roll is good
-for each whole piece (:mod:`er3a.workspace.interval_inverse`), or the middle of a piece turns out to be out of reach.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
-from typing import Any, Literal
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 import scipy
@@ -26,19 +23,15 @@ import scipy.optimize
 from numpy.typing import NDArray
 
 from er3a.collision.scene import Box, Cylinder, Plane, Scene
-from er3a.kinematics.block_inverse import BlockConstants
-from er3a.kinematics.closed_form import SLOTS
 from er3a.kinematics.solutions import slot_labels
-from er3a.kinematics.wrist_partitioned import constants_for_blocks
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.numerics.jit import inner_kernel, kernel
 from er3a.robots.robot import CombinedLimit, Robot
 from er3a.workspace import directions
+from er3a.workspace.arcs import FULL_TURN
 from er3a.workspace.capability import manipulability_of
 from er3a.workspace.cell_frame import cell_frame
-from er3a.workspace.interval_inverse import GOOD, NEVER, States, branches, holds, misses, theta_ranges
-from er3a.workspace.section_arm import FULL_TURN
-from er3a.workspace.tool_inverse import all_solutions, proofs_hold, slot_count
+from er3a.workspace.orientations import AskedOrientations
+from er3a.workspace.tool_inverse import all_solutions, slot_count
 
 NO = -1.0
 NOTHING = 1e-12
@@ -49,8 +42,6 @@ _POSES = 50_000
 
 Free = Callable[[Reals], Flags]
 """Which arms (N, n), rad, are free of collisions, (N,)."""
-InCone = Callable[[Reals, Reals, float, float], Reals]
-"""What is asked at points; see :meth:`er3a.workspace.orientations.AskedOrientations.in_cone`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,7 +197,6 @@ class Places:
     centre : (n, 3), m; turned : (n,), whether the box is turned by 90 deg about z
     slot : (n,), the branch that serves it all, or MIXED
     manipulability : (n,), m^3, the criterion; limit_margin : (n,), rad (NaN with MIXED)
-    proven : (n,), whether all bricks of the lattice in it are proven, by any mix of branches
     """
 
     centre: Reals
@@ -214,7 +204,6 @@ class Places:
     slot: Integers
     manipulability: Reals
     limit_margin: Reals
-    proven: Flags
 
     def rows(self, chosen: NDArray[Any]) -> Places:
         """Some of the places."""
@@ -227,35 +216,24 @@ def lattice_spacing(box: Reals, coarsest: float) -> Reals:
     return np.maximum(sides / np.maximum(1, np.round(sides / coarsest)), coarsest / 2)
 
 
-def survey(
-    robot: Robot,
-    task: Task,
-    roll: directions.Roll,
-    coarsest: float,
-    free: Free | None = None,
-    *,
-    in_cone: InCone | None = None,
-) -> Field:
+def survey(robot: Robot, task: Task, asked: AskedOrientations, coarsest: float, free: Free | None = None) -> Field:
     """Ask a lattice over the arm's reach.
 
     Parameters
     ----------
     robot : with the limits that hold, see :func:`narrowed`
+    asked : the required orientations
     coarsest : m, about the spacing
     free : which arms count; all, unless given
-    in_cone : what is asked at points; directions with this roll, unless given
     """
     slots = slot_count(robot)
-    start, spacing, shape, points, asked = _lattice(robot, task, coarsest)
+    start, spacing, shape, points, here = _lattice(robot, task, coarsest)
     manipulability, manipulability_any = np.full((len(points), slots), NO), np.full(len(points), NO)
     limit_margin = np.zeros((len(points), slots))
-    if in_cone is None:
-        rotations = directions.tool_rotations(directions.cone_directions(task.axis, task.half_angle, task.step), roll)
-    else:
-        rotations = in_cone(points[asked], task.axis, task.half_angle, task.step)
+    rotations = asked.in_cone(points[here], task.axis, task.half_angle, task.step)
     if rotations.shape[-4]:
-        manipulability[asked], manipulability_any[asked], limit_margin[asked] = serve(
-            robot, points[asked], rotations, roll, free
+        manipulability[here], manipulability_any[here], limit_margin[here] = serve(
+            robot, points[here], rotations, asked.roll, free
         )
     if not slot_labels(robot):  # slots of a point's neighbours are other arms
         manipulability[:], limit_margin[:] = NO, 0.0
@@ -409,18 +387,18 @@ def serving_arms(robot: Robot, points: Reals, rotations: Reals, roll: directions
     return np.concatenate(arms)
 
 
-def fitting_places(field: Field, bricks: Flags, box: Reals) -> Places:
+def fitting_places(field: Field, box: Reals) -> Places:
     """All boxes on the lattice whose points are good; the box is taken up to one spacing larger.
 
     Parameters
     ----------
-    bricks : (nx - 1, ny - 1, nz - 1), which bricks of the lattice are proven; box : (3,), m
+    box : (3,), m
     """
-    found = [_places(field, bricks, box, False)]
+    found = [_places(field, box, False)]
     if abs(box[0] - box[1]) > 1e-9:
-        found.append(_places(field, bricks, box[[1, 0, 2]], True))
+        found.append(_places(field, box[[1, 0, 2]], True))
     places = Places(*(np.concatenate([getattr(part, column.name) for part in found]) for column in fields(Places)))
-    merit = (-np.round(_weighed(places), 6), ~places.proven, places.slot == MIXED)
+    merit = (-np.round(_weighed(places), 6), places.slot == MIXED)
     order = np.lexsort((*np.round(places.centre.T, 6), -np.round(places.centre[:, 0], 6), *merit))
     return places.rows(order)
 
@@ -434,7 +412,7 @@ def _weighed(places: Places) -> Reals:
     return weighed
 
 
-def _places(field: Field, bricks: Flags, box: Reals, turned: bool) -> Places:
+def _places(field: Field, box: Reals, turned: bool) -> Places:
     points = _lattice_points(field, box)
     any_branch = _sliding_min(field.manipulability_any, points)
     where = np.nonzero(any_branch > NO)
@@ -454,7 +432,6 @@ def _places(field: Field, bricks: Flags, box: Reals, turned: bool) -> Places:
         slot=np.where(one, slot, MIXED),
         manipulability=np.where(one, by_slot[rows, slot], any_branch[where]),
         limit_margin=np.where(one, limit_margin[rows, slot], np.nan),
-        proven=_sliding_min(bricks.astype(float), points - 1)[where] > 0,
     )
 
 
@@ -473,54 +450,21 @@ def _sliding_min(values: Reals, points: Integers) -> Reals:
     return values
 
 
-Answer = Literal["proven", "refuted", "undecided"]
-PROVEN: Answer = "proven"
-REFUTED: Answer = "refuted"
-_ANSWERS: tuple[Answer, ...] = ("undecided", PROVEN, REFUTED)
-Constants = tuple[BlockConstants, Reals, Reals, float, Reals, float, float]
-SAME_DIRECTION = 1e-9
-"""Directions are the same if their product lacks less of 1."""
-_STACK = 512
-_MAX_TRIES = 200
-_POSES_PER_BRICK = 512
-_SMALLEST = (0.2, 0.05, 0.0125, 0.003, 0.0)  # half-widths, rad or length per lever, of pieces to split
-
-
-@dataclass(frozen=True, eq=False)
-class Chosen:
-    """The best places that don't overlap.
-
-    Attributes
-    ----------
-    row : their rows of the places; slot : the branch that serves each, or MIXED
-    proven : whether each is proven, or else rests on samples; branch_proven : whether that one branch serves it all is
-    refuted : how many better-ranked places the proof refused; poses : how many neighbourhoods it examined
-    """
-
-    row: list[int]
-    slot: list[int]
-    proven: list[bool]
-    branch_proven: list[bool]
-    refuted: int
-    poses: int
-
-
 @dataclass(frozen=True, eq=False)
 class BoxPlacement:
-    """Where a box can be placed: the lattice, the places on it, and the best of them."""
+    """Where a box can be placed: the lattice, the places on it, and the rows of the best that don't overlap."""
 
     field: Field
     places: Places
-    chosen: Chosen
+    chosen: list[int]
 
     def room(self, row: int) -> Reals:
         """How far (3, 2), m, the box can be moved from a place along x, y and z, down and up.
 
-        In steps of the lattice, through places of the same turn that are proven if this one is: a box between two of
-        them lies in both together.
+        In steps of the lattice, through places of the same turn: a box between two of them lies in both together.
         """
         places = self.places
-        same = (places.turned == places.turned[row]) & (places.proven | ~places.proven[row])
+        same = places.turned == places.turned[row]
         steps = np.round((places.centre[same] - places.centre[row]) / self.field.spacing).astype(int)
         there = {tuple(step) for step in steps.tolist()}
         count = np.zeros((3, 2))
@@ -540,233 +484,43 @@ class BoxPlacement:
 
 
 def find_places(
-    robot: Robot,
-    task: Task,
-    roll: directions.Roll,
-    grid: float,
-    count: int,
-    most_poses: int,
-    *,
-    free: Free | None = None,
-    in_cone: InCone | None = None,
+    robot: Robot, task: Task, asked: AskedOrientations, grid: float, count: int, free: Free | None = None
 ) -> BoxPlacement:
-    """Survey where the box can be placed, and try to prove the best places.
+    """Survey where the box can be placed, and choose the best places.
 
     Parameters
     ----------
     robot : with its own limits; grid : m, about the lattice's spacing
-    count : how many places to choose; most_poses : how many neighbourhoods of poses their proofs may look at
-    free : which arms count at the lattice's points; the proofs, of reach alone, look at none
-    in_cone : what is asked at points; directions with this roll, unless given
-
-    Nothing is proven of arms without a spherical wrist.
+    count : how many places to choose
+    free : which arms count at the lattice's points; all, unless given
     """
     robot = narrowed(robot, task.margin)
-    field = survey(robot, task, roll, grid, free, in_cone=in_cone)
-    places = fitting_places(field, proven_bricks(robot, task, field, roll), task.box)
-    chosen = choose_places(robot, task, places, roll, count, most_poses)
-    proven = places.proven.copy()
-    proven[[row for row, is_proven in zip(chosen.row, chosen.proven) if is_proven]] = True
-    return BoxPlacement(field, replace(places, proven=proven), chosen)
+    field = survey(robot, task, asked, grid, free)
+    places = fitting_places(field, task.box)
+    return BoxPlacement(field, places, choose_places(robot, task, places, count))
 
 
-def choose_places(
-    robot: Robot, task: Task, places: Places, roll: directions.Roll, count: int, most_poses: int
-) -> Chosen:
-    """Take up to ``count`` places in their order, each put to the proof.
-
-    None overlaps one before it, or is one before it turned about axis 1.
-
-    A place whose one branch is refuted is tried with any mix of branches.
-
-    Raises
-    ------
-    NotWristPartitionedError
-    """
+def choose_places(robot: Robot, task: Task, places: Places, count: int) -> list[int]:
+    """Rows of up to ``count`` places in their order, none of which overlaps one before it, or is one before it turned
+    about axis 1."""
     rows: list[int] = []
-    slots: list[int] = []
-    proven: list[bool] = []
-    branch_proven: list[bool] = []
-    refuted = used = 0
     sizes = np.where(places.turned[:, None], task.box[[1, 0, 2]], task.box)
-    free = np.ones(len(places.slot), dtype=bool)
-
-    def proved(row: int, slot: int, most: int) -> tuple[Answer, int]:
-        if not proofs_hold(robot):
-            return "undecided", 0
-        return prove_place(robot, task, places.centre[row], bool(places.turned[row]), slot, roll, most_poses=most)
-
-    while len(rows) < count and refuted < _MAX_TRIES and free.any():
-        row = int(np.argmax(free))
-        budget = (most_poses - used) // (count - len(rows))
-        slot = int(places.slot[row])
-        answer, spent = proved(row, slot, budget)
-        used += spent
-        if answer == REFUTED and slot != MIXED:
-            slot = MIXED
-            answer, spent = proved(row, slot, budget)
-            used += spent
-        if answer == REFUTED:
-            free[row], refuted = False, refuted + 1
-            continue
+    left = np.ones(len(places.slot), dtype=bool)
+    while len(rows) < count and left.any():
+        row = int(np.argmax(left))
         rows.append(row)
-        slots.append(slot)
-        proven.append(answer == PROVEN or bool(places.proven[row]))
-        branch_proven.append(answer == PROVEN and slot != MIXED)
         apart = np.abs(places.centre - places.centre[row]) >= (sizes + sizes[row]) / 2 - 1e-9
-        free &= apart.any(axis=1) & ~_turned_about_axis_1(robot, task, places.centre, row)
-    return Chosen(rows, slots, proven, branch_proven, refuted, used)
+        left &= apart.any(axis=1) & ~_turned_about_axis_1(robot, task, places.centre, row)
+    return rows
 
 
 def _turned_about_axis_1(robot: Robot, task: Task, centre: Reals, row: int) -> Flags:
     """Which places (n, 3) are that of ``row`` but for a turn about axis 1, where the task looks the same after one."""
     frame = cell_frame(robot)
-    if frame.bar or abs(task.axis @ frame.R[2]) < 1 - SAME_DIRECTION:
+    if frame.bar or abs(task.axis @ frame.R[2]) < 1 - 1e-9:
         return np.zeros(len(centre), dtype=bool)
     local = (centre - frame.origin) @ frame.R.T
     rho = np.hypot(local[:, 0], local[:, 1])
     near = np.abs(rho - rho[row]) < task.box[:2].min() - 1e-9
     same: Flags = near & (np.abs(local[:, 2] - local[row, 2]) < task.box[2] - 1e-9)
     return same
-
-
-def prove_place(
-    robot: Robot, task: Task, centre: Reals, turned: bool, slot: int, roll: directions.Roll, *, most_poses: int
-) -> tuple[Answer, int]:
-    """Decide one place.
-
-    Parameters
-    ----------
-    centre : (3,), m, of the box; turned : whether it is turned by 90 deg about z
-    slot : the branch that must serve it all, or MIXED for any
-    most_poses : how many neighbourhoods of poses to look at
-
-    Returns
-    -------
-    answer : refuted: no branch reaches some point and direction, with any of the rolls
-    used : how many neighbourhoods were examined
-
-    Raises
-    ------
-    NotWristPartitionedError
-    """
-    half = (task.box[[1, 0, 2]] if turned else task.box) / 2
-    constants, middle = _constants(robot, task, roll), np.ascontiguousarray(centre, float)
-    answer = used = 0
-    # Coarse pieces first, everywhere: what refutes a place is found before effort goes into its rims.
-    for smallest in _SMALLEST:
-        answer, spent = _prove(constants, middle, half, slot, most_poses - used, smallest)
-        used += int(spent)
-        if answer or used >= most_poses:
-            break
-    return _ANSWERS[answer], used
-
-
-def proven_bricks(robot: Robot, task: Task, field: Field, roll: directions.Roll) -> Flags:
-    """Which bricks between eight lattice points are served at every point, by any mix of branches: (nx-1, ny-1, nz-1).
-
-    None of an arm without a spherical wrist.
-    """
-    serving = field.manipulability_any > NO
-    for axis in range(3):
-        serving = np.minimum(np.delete(serving, -1, axis), np.delete(serving, 0, axis))
-    bricks = np.argwhere(serving)
-    good = np.zeros(len(bricks), dtype=bool)
-    centres = np.ascontiguousarray(field.origin + (bricks + 0.5) * field.spacing)
-    if proofs_hold(robot):
-        _prove_all(_constants(robot, task, roll), centres, field.spacing / 2, MIXED, _POSES_PER_BRICK, good)
-    proven = np.zeros(serving.shape, dtype=bool)
-    proven[tuple(bricks.T)] = good
-    return proven
-
-
-def _constants(robot: Robot, task: Task, roll: directions.Roll) -> Constants:
-    """What the kernels take of an arm and a task."""
-    asked = directions.left_to_roll(robot, roll)
-    arm, ranges = constants_for_blocks(asked), theta_ranges(asked)
-    x, y = directions.across(task.axis[None])
-    frame = np.stack([x[0], y[0], task.axis], axis=1)
-    scale = 2.0 / float(arm.upper_arm + arm.forearm)
-    return arm, ranges, frame, task.half_angle, np.array(roll.angles), roll.reach, scale
-
-
-@kernel
-def _prove_all(constants: Constants, centres: Reals, half: Reals, slot: int, most_poses: int, good: Flags) -> None:
-    for n in range(centres.shape[0]):
-        good[n] = _prove(constants, centres[n], half, slot, most_poses, 0.0)[0] == 1
-
-
-@kernel
-def _prove(
-    constants: Constants, centre: Reals, half: Reals, slot: int, most_poses: int, smallest: float
-) -> tuple[int, int]:
-    arm, ranges, frame, half_angle, angles, reach, scale = constants
-    T, state, theta_1 = np.eye(4), np.empty(SLOTS, dtype=np.int8), np.empty((SLOTS, 2))
-    stack, size = np.empty((_STACK, 10)), np.empty(5)
-    for k in range(3):
-        stack[0, 2 * k], stack[0, 2 * k + 1] = centre[k] - half[k], centre[k] + half[k]
-    stack[0, 6], stack[0, 7], stack[0, 8], stack[0, 9] = 0.0, half_angle, 0.0, 2.0 * np.pi
-    top, used, answer = 1, 0, 1
-    while top > 0:
-        top -= 1
-        piece = stack[top]
-        p_0, p_1 = piece[6], piece[7]
-        wide = 1.0 if p_0 < 0.5 * np.pi < p_1 else max(np.sin(p_0), np.sin(p_1))
-        square = 0.0
-        for k in range(3):
-            size[k] = 0.5 * (piece[2 * k + 1] - piece[2 * k])
-            square += size[k] * size[k]
-            size[k] *= scale
-            T[k, 3] = 0.5 * (piece[2 * k + 1] + piece[2 * k])
-        size[3], size[4] = 0.5 * (p_1 - p_0), 0.5 * (piece[9] - piece[8]) * wide
-        rho, delta = np.sqrt(square), np.hypot(size[3], size[4])
-        good, lost = False, True
-        for j in range(angles.shape[0]):
-            directions.point_tool(
-                T, frame, 0.5 * (p_0 + p_1), 0.5 * (piece[8] + piece[9]), np.cos(angles[j]), np.sin(angles[j])
-            )
-            used += 2
-            branches(arm, ranges, T, rho, delta, reach, state, theta_1)
-            if _some(ranges, state, theta_1, slot):
-                good = True
-                break
-            branches(arm, ranges, T, 0.0, 0.0, reach, state, theta_1)
-            lost = lost and _none(ranges, state, theta_1, slot)
-        if good:
-            continue
-        if lost:
-            return 2, used
-        if used >= most_poses or top + 2 > _STACK:
-            return 0, used
-        widest = 0
-        for k in range(5):
-            if size[k] > size[widest]:
-                widest = k
-        if size[widest] < smallest:
-            answer = 0
-            continue
-        middle = 0.5 * (piece[2 * widest] + piece[2 * widest + 1])
-        for k in range(10):
-            stack[top + 1, k] = piece[k]
-        stack[top + 1, 2 * widest] = middle
-        stack[top, 2 * widest + 1] = middle
-        top += 2
-    return answer, used
-
-
-@kernel
-def _some(ranges: Reals, state: States, theta_1: Reals, slot: int) -> bool:
-    """Whether some branch, or the required one, is good with joint 1 too."""
-    for k in range(SLOTS):
-        if (slot == MIXED or k == slot) and state[k] == GOOD and holds(ranges, 0, theta_1[k, 0], theta_1[k, 1]):
-            return True
-    return False
-
-
-@inner_kernel
-def _none(ranges: Reals, state: States, theta_1: Reals, slot: int) -> bool:
-    """Whether no branch, or not the required one, is possible."""
-    for k in range(SLOTS):
-        if (slot == MIXED or k == slot) and state[k] != NEVER and not misses(ranges, 0, theta_1[k, 0], theta_1[k, 1]):
-            return False
-    return True

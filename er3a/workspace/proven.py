@@ -1,47 +1,29 @@
-"""Results of the proof for a robot: its cells, a joint vector that reaches each, and an estimate of the volume.
+"""Results of the proof for a robot: its cells and the voids among them.
 
-The estimate of the reached volume: the proven volume, plus the reached share of uniform points in undecided cells.
-
-References
-----------
-.. [1] E. B. Wilson, "Probable inference, the law of succession, and statistical inference", JASA 22, 1927.
-
-Voids of a proof: unreachable regions, connected over cells and azimuths.
-
-The arcs that are not proven filled are nodes; two of them touch if their cells share a border and their azimuths
-overlap, or across azimuth 0. Proven filled cells are the only walls: a component of nodes that does not reach the outer
-border is enclosed for certain. Its volume lies between its proven empty part and all of it.
+Voids are unreachable regions, connected over cells and azimuths. The arcs that are not proven filled are nodes; two of
+them touch if their cells share a border and their azimuths overlap, or across azimuth 0. Proven filled cells are the
+only walls: a component of nodes that does not reach the outer border is enclosed for certain. Its volume lies between
+its proven empty part and all of it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from er3a.by_value import Finding
 from er3a.geometry.vectors import TURN
 from er3a.kinematics.chain import constant_links
-from er3a.kinematics.forward import forward
-from er3a.kinematics.numerical import solve
-from er3a.kinematics.wrist_partitioned import (
-    ClosedFormMissing,
-    CoupledJoints,
-    wrist_partition_missing,
-    wrist_partitioned_arm,
-)
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.robot import Robot
 from er3a.sampling.grid import tool_bound
-from er3a.workspace.general_arm import coupled, general_arm
+from er3a.workspace.arcs import MAX_ARCS
+from er3a.workspace.cells import Proof, in_section, in_space, ring_volumes
+from er3a.workspace.general_arm import general_arm
 from er3a.workspace.general_proof import prove_general
-from er3a.workspace.section_arm import MAX_ARCS, SectionArm, section_arm, section_frame
-from er3a.workspace.section_proof import MAX_LEVEL, Proof, in_section, in_space, judge, prove, ring_volumes, sharpen
 
 OUTSIDE = -1
 FILLED, EMPTY, UNDECIDED = 0, 1, 2
@@ -108,156 +90,6 @@ def holds_azimuth(arcs: Reals, azimuth: Reals) -> Flags:
     return np.asarray(((arcs[..., 0] <= azimuth[:, None]) & (azimuth[:, None] <= arcs[..., 1])).any(axis=1))
 
 
-POINT = 1e-7
-"""Edge (m) of the cell that represents a point in a search."""
-FEW = 200
-"""Points at least, where that many are asked for."""
-_NORMAL_95 = 1.959963984540054
-
-
-@dataclass(frozen=True)
-class VolumeEstimate:
-    """``points`` were drawn where the proof leaves open what is reached, ``reached`` of them are reached, ``undecided``
-    could not be decided; m^3.
-
-    ``low`` and ``high`` are the 95 % interval: Wilson's for the reached points alone, and with all undecided ones. All
-    lie within the proven bounds.
-    """
-
-    points: int
-    reached: int
-    undecided: int
-    value: float
-    low: float
-    high: float
-
-
-def estimate_volume(
-    search: SectionArm | Callable[[Reals], Flags],
-    proof: Proof,
-    points: int,
-    seed: int,
-) -> VolumeEstimate:
-    """Estimate the reached volume: what is proven, and of what the proof leaves open the share that points estimate.
-
-    Parameters
-    ----------
-    search : what decides a point: an arm in its section form, or a function of points (n, 3) about axis 1 (m) that
-        says which are reached for certain
-    points : how many all cells would get; those that are left open get as many to their volume, but no fewer than
-        ``FEW``
-    """
-    lower, upper = proof.bounds
-    left = upper - lower
-    if not left > 0:
-        return VolumeEstimate(0, 0, 0, lower, lower, upper)
-    count = min(points, max(FEW, int(np.ceil(points * left / proof.volumes.sum()))))
-    random = np.random.Generator(np.random.Philox(key=seed))
-    rho, azimuth, z = _open_points(proof, random.random((count, 4)))
-    status = np.full(count, UNDECIDED)
-    if isinstance(search, SectionArm):
-        _decide(search, rho, azimuth, z, status)
-    else:
-        status[search(in_space(rho, azimuth, z, proof.bar))] = FILLED
-    reached, undecided = int((status == FILLED).sum()), int((status == UNDECIDED).sum())
-    shares = wilson(reached, count)[0], (reached + undecided / 2) / count, wilson(reached + undecided, count)[1]
-    low, value, high = (lower + left * float(share) for share in shares)
-    return VolumeEstimate(count, reached, undecided, value, low, high)
-
-
-def _open_points(proof: Proof, unit: Reals) -> tuple[Reals, Reals, Reals]:
-    """Radius (m), azimuth (rad) and height (m) of points, uniform in what a proof leaves open, from uniform numbers
-    (n, 4)."""
-    weights = np.cumsum(proof.volumes * np.maximum(proof.unfilled_ratio - proof.empty_ratio, 0.0))
-    cell = np.minimum(np.searchsorted(weights, unit[:, 0] * weights[-1], side="right"), len(weights) - 1)
-    inner, outer, low, high = proof.cells[cell].T
-    along = inner + (outer - inner) * unit[:, 1]
-    rho = along if proof.bar > 0 else np.sqrt(inner**2 + (outer**2 - inner**2) * unit[:, 1])
-    # the azimuth below which that share of the open arcs lies: their length grows evenly between their ends
-    arcs = np.stack([proof.unfilled[cell], proof.empty[cell]])
-    ends = np.sort(np.nan_to_num(np.concatenate(arcs, axis=1).reshape(len(cell), -1), nan=TURN), axis=1)
-    start, stop = np.nan_to_num(arcs[..., 0]), np.nan_to_num(arcs[..., 1])
-    below = np.empty_like(ends)
-    for k in range(ends.shape[1]):
-        covered = (np.clip(ends[:, k, None], start, stop) - start).sum(axis=2)
-        below[:, k] = covered[0] - covered[1]
-    wanted = below[:, -1] * unit[:, 2]
-    after = np.clip((below <= wanted[:, None]).sum(axis=1), 1, ends.shape[1] - 1)
-    row = np.arange(len(cell))
-    before, length = below[row, after - 1], below[row, after] - below[row, after - 1]
-    share = np.divide(wanted - before, length, out=np.zeros_like(wanted), where=length > 0)
-    azimuth = ends[row, after - 1] + share * (ends[row, after] - ends[row, after - 1])
-    return rho, azimuth, low + (high - low) * unit[:, 3]
-
-
-def _decide(arm: SectionArm, rho: Reals, azimuth: Reals, z: Reals, status: Integers) -> None:
-    """Judge open points as cells of next to no size."""
-    for n in range(2):
-        left = np.flatnonzero((status != FILLED) & (status != EMPTY))
-        if not len(left):
-            return
-        half = POINT * 10.0 ** (-n) / 2
-        r, h = np.maximum(rho[left], 2 * half), z[left]
-        looked = judge(arm, np.stack([r - half, r + half, h - half, h + half], axis=1))
-        unfilled, empty = (holds_azimuth(arcs, azimuth[left]) for arcs in (looked.unfilled, looked.empty))
-        status[left] = np.where(empty, EMPTY, np.where(unfilled, status[left], FILLED))
-
-
-def wilson(hits: int, points: int) -> tuple[float, float]:
-    """95 % interval of a share from ``hits`` out of ``points`` [1]_."""
-    share, z2 = hits / points, _NORMAL_95**2
-    middle = (share + z2 / (2 * points)) / (1 + z2 / points)
-    half = _NORMAL_95 / (1 + z2 / points) * np.sqrt(share * (1 - share) / points + z2 / (4 * points**2))
-    return (max(0.0, middle - half) if hits else 0.0), (min(1.0, middle + half) if hits < points else 1.0)
-
-
-POSITION_ONLY = np.array([1, 1, 1, 0, 0, 0])
-_RESTARTS, _TOLERANCE = 10, 1e-9
-
-
-def reach_points(robot: Robot, points: Reals, starts: Reals, restarts: int = _RESTARTS) -> Reals:
-    """Joint vectors (n, 6), rad, within the limits, that bring the tool point to ``points`` (n, 3), m; NaN where the
-    iteration finds none from ``starts`` (n, 6) and from random starts."""
-    T = np.tile(np.eye(4), (len(points), 1, 1))
-    T[:, :3, 3] = points
-    found = solve(robot, T, starts, mask=POSITION_ONLY, restarts=restarts, position_tolerance=_TOLERANCE)
-    return np.where(found.solved[:, None], found.q, np.nan)
-
-
-def witness_joints(robot: Robot, arm: SectionArm, proof: Proof) -> Reals:
-    """Joint vectors (cells, 6), rad, that reach into the cells; NaN where none is known.
-
-    The proof's configurations give joints 2 and 3 and the angle phi between arm and cell, from which the rest is found
-    by iteration towards the middle of the cell. Each one is checked: it lies within the limits and in its cell.
-    """
-    q = np.full((len(proof.cells), 6), np.nan)
-    known = np.flatnonzero(proof.witness[:, 3] > 0)
-    if not len(known):
-        return q
-    theta_2, tau, phi, _ = proof.witness[known].T
-    theta = np.zeros((len(known), 6))
-    middle = (robot.lower + robot.upper) / 2
-    theta[:] = robot.direction * middle + robot.offset
-    theta[:, 1], theta[:, 2] = theta_2, wrist_partitioned_arm(robot).elbow_sign * tau
-    turns = 2 * np.pi
-    starts = robot.direction * (theta - robot.offset)
-    starts = np.clip(starts + turns * np.round((middle - starts) / turns), robot.lower, robot.upper)
-    R, origin = section_frame(robot)
-    rho, z = proof.cells[known].reshape(-1, 2, 2).mean(axis=2).T
-    azimuth = theta[:, 0] + phi
-    points = np.stack([rho * np.cos(azimuth), rho * np.sin(azimuth), z], axis=1) @ R + origin
-    q[known] = reach_points(robot, points, starts)
-    return np.where(lies_in_cell(robot, q, proof, R, origin)[:, None], q, np.nan)
-
-
-def lies_in_cell(robot: Robot, q: Reals, proof: Proof, R: Reals, origin: Reals) -> Flags:
-    """Whether each joint vector (cells, 6) brings the tool point into its own cell; False for NaN."""
-    rho, _, z = in_section((forward(robot, np.nan_to_num(q))[:, :3, 3] - origin) @ R.T, proof.bar)
-    a, b, c, d = proof.cells.T
-    inside: Flags = np.isfinite(q[:, 0]) & (a <= rho) & (rho <= b) & (c <= z) & (z <= d)
-    return inside
-
-
 @dataclass(frozen=True, eq=False)
 class Cavity:
     """A connected set of arcs.
@@ -267,7 +99,7 @@ class Cavity:
     enclosed : whether filled cells cut it off from the outside
     cells : (n, 4), m, sections; arcs : (n, 2), rad, one arc of azimuth each
     empty : (n,), share of each arc that is proven empty
-    bar : m, length of the cells, 0 for rings; see :class:`er3a.workspace.section_proof.Proof`
+    bar : m, length of the cells, 0 for rings; see :class:`er3a.workspace.cells.Proof`
     lower, upper : bounds of its volume, m^3
     """
 
@@ -346,17 +178,6 @@ def cavities(section: SectionMap) -> tuple[list[Cavity], Cavity]:
     return sorted(enclosed, key=lambda cavity: -cavity.lower), everything.part(is_open, False)
 
 
-def rim(section: SectionMap, enclosed: list[Cavity]) -> Flags:
-    """Which cells (n,) of the proof are undecided and belong to enclosed cavities."""
-    chosen = np.zeros(len(section.proof.cells), dtype=bool)
-    splittable = section.proof.level < MAX_LEVEL
-    for cavity in enclosed:
-        middle = cavity.cells.reshape(-1, 2, 2).mean(axis=2)
-        open_arcs = cavity.empty < 1 - 1e-9
-        chosen[section.cell_of(*middle[open_arcs].T)] = True
-    return chosen & splittable
-
-
 def _overlaps(neighbours: NDArray[np.int32], arcs: Reals, number: Integers) -> Integers:
     """Pairs (2, m) of arcs of neighbouring cells whose azimuths overlap."""
     a, b = neighbours.T
@@ -382,43 +203,11 @@ def _empty_ratio(arcs: Reals, empty: Reals) -> Reals:
     return ratio
 
 
-CellState = Literal["filled", "touched", "empty", "undecided", "partly_filled"]
-
 TARGET = 0.002
 BEYOND_ROUNDING = 1 + 1e-9
 MIN_BOUND_M = 1e-4  # for a tool point that no joint moves
-VOID_RATIO = 0.25
-NEAR_WRIST = 0.07
-WIDE, WIDEST = 6.3, 0.5
-"""Width of the bracket times the root of the budget (and width) from which the general method is tried, too."""
-_SETTLED = 0.1  # of the volume
-GENERAL_CELLS = 4
-"""For each cell of the budget, where the general method is used: its cells."""
-
-
-class SphericalWrist(Finding):
-    """The cells were decided by the method for spherical wrists."""
-
-
-class ToolNearWrist(Finding):
-    """The tool point is so near to the wrist centre, for the arm's reach, that its sphere proves little."""
-
-    distance_mm: float
-
-
-class BoundsFarApart(Finding):
-    """The method for spherical wrists leaves so much between its bounds, for narrow limits say, and this one less."""
-
-    percent: float
-
-
-class GeneralMethod(Finding):
-    """The cells were decided by the method for any arm, because of what this one lacks."""
-
-    lacks: ClosedFormMissing | ToolNearWrist | BoundsFarApart
-
-
-ProofMethod = SphericalWrist | GeneralMethod
+SETTLED = 0.1  # of the volume
+CELLS = 4  # looked at for each one of the budget: they are cheap
 
 
 @dataclass(frozen=True, eq=False)
@@ -427,26 +216,19 @@ class Proven:
 
     Attributes
     ----------
-    arm : in its section form; None if it is not wrist-partitioned
     proof, section : its cells, and their map
-    R, origin : frame about axis 1, see :func:`er3a.workspace.section_arm.section_frame`
-    witness : (cells, 6), rad, a joint vector that reaches into each cell, NaN where none is known
-    estimate : of the volume; method : how cells were decided
+    R, origin : frame about axis 1, see :func:`er3a.workspace.general_arm.general_arm`
     """
 
-    arm: SectionArm | None
     proof: Proof
     section: SectionMap
     R: Reals
     origin: Reals
-    witness: Reals
-    estimate: VolumeEstimate
-    method: ProofMethod
 
     @property
     def settles(self) -> bool:
         """Whether so little is left undecided that the voids found are those there are."""
-        return self.arm is not None or self.proof.width <= _SETTLED
+        return self.proof.width <= SETTLED
 
     def in_base(self, points: Reals) -> Reals:
         """Points (..., 3) from the frame about axis 1 to the base frame."""
@@ -468,87 +250,28 @@ class Proven:
         cell = self.section.cell_of(rho, z)
         return np.asarray((cell == OUTSIDE) | (self.proof.empty_ratio[cell] >= 1 - 1e-12))
 
-    def cell_states(self) -> list[CellState]:
-        """What each cell is; touched: not proven filled, but a joint vector reaches into it."""
-        unfilled, empty = self.proof.unfilled_ratio, self.proof.empty_ratio
-        touched = np.isfinite(self.witness[:, 0])
-        states: tuple[CellState, ...] = ("filled", "empty", "partly_filled", "touched", "undecided")
-        chosen = np.select([unfilled <= 0, empty >= 1 - 1e-12, unfilled < 1 - 1e-12, touched], [0, 1, 2, 3], 4)
-        return [states[n] for n in chosen]
+
+def prove_robot(robot: Robot, most_cells: int, seed: int) -> Proven:
+    """Run the proof; bounds by lengths alone where the arm's build gives no more.
+
+    Parameters
+    ----------
+    most_cells : the budget, of which each cell stands for ``CELLS``
+    """
+    arm, R, origin = general_arm(robot)
+    if not arm.carries_around:
+        return _bounded_by_lengths(robot)
+    proof = prove_general(arm, TARGET, CELLS * most_cells, seed)
+    return Proven(proof, SectionMap(proof), R, origin)
 
 
-def prove_robot(robot: Robot, most_cells: int, points: int, seed: int) -> Proven:
-    """Run the proof and the estimate that rests on it; bounds by lengths alone where the arm's build gives no more."""
-    if lacks := lacking_for_proof(robot):
-        return _prove_general(robot, most_cells, points, seed, lacks)
-    arm = section_arm(robot)
-    if arm.d < NEAR_WRIST * arm.reach:
-        return _prove_general(robot, most_cells, points, seed, ToolNearWrist(1000 * arm.d))
-    section = SectionMap(prove(arm, TARGET, int((1 - VOID_RATIO) * most_cells)))
-    section = _about_voids(arm, section, int(VOID_RATIO * most_cells))
-    if (width := section.proof.width) > min(WIDE / np.sqrt(most_cells), WIDEST):
-        general = _prove_general(robot, most_cells, points, seed, BoundsFarApart(100 * width))
-        if general.proof.width < width:
-            return general
-    estimate = estimate_volume(arm, section.proof, points, seed)
-    witness = witness_joints(robot, arm, section.proof)
-    return Proven(arm, section.proof, section, *section_frame(robot), witness, estimate, SphericalWrist())
-
-
-def lacking_for_proof(robot: Robot) -> ClosedFormMissing | None:
-    """Why the method for spherical wrists does not apply, which takes each joint's range by itself; None if it does."""
-    return CoupledJoints() if coupled(robot) else wrist_partition_missing(robot)
-
-
-def _bounded_by_lengths(robot: Robot, points: int, seed: int, method: GeneralMethod) -> Proven:
-    """One ring that the tool point can't leave, of arms whose joint 1 slides or goes with others."""
+def _bounded_by_lengths(robot: Robot) -> Proven:
+    """One ring that the tool point can't leave, of arms whose joint 1 goes with others or is alone."""
     bound = tool_bound(robot)
     reach, radius = (BEYOND_ROUNDING * max(length, MIN_BOUND_M) for length in (bound.reach, bound.radius))
     low, high = bound.height - radius, bound.height + radius
     unfilled, empty = np.full((2, 1, MAX_ARCS, 2), np.nan)
     unfilled[0, 0] = 0.0, TURN
-    cells, none = np.array([[0.0, reach, low, high]]), np.zeros((1, 4))
-    proof = Proof(cells, unfilled, empty, np.zeros(1, dtype=np.int64), none, 0)
-    section = SectionMap(proof)
-    estimate = estimate_volume(_nothing_found, proof, points, seed)
+    proof = Proof(np.array([[0.0, reach, low, high]]), unfilled, empty, np.zeros(1, dtype=np.int64))
     R = constant_links(robot)[0, :3, :3].T
-    witness = np.full((1, robot.joints), np.nan)
-    return Proven(None, proof, section, R, bound.axis_point, witness, estimate, method)
-
-
-def _nothing_found(local: Reals) -> Flags:
-    """A search that leaves every point undecided."""
-    return np.zeros(len(local), dtype=bool)
-
-
-def _prove_general(
-    robot: Robot, most_cells: int, points: int, seed: int, lacks: ClosedFormMissing | ToolNearWrist | BoundsFarApart
-) -> Proven:
-    arm, R, origin = general_arm(robot)
-    if not arm.carries_around:
-        return _bounded_by_lengths(robot, points, seed, GeneralMethod(lacks))
-    proof, v = prove_general(arm, TARGET, GENERAL_CELLS * most_cells, seed)
-    section = SectionMap(proof)
-    q = np.tile((robot.lower + robot.upper) / 2, (len(v), 1))
-    first = 0 if arm.combined[:, :1].any() else 1
-    q[:, first : v.shape[1]] = arm.joints(v)[:, first:]
-    q = np.where(lies_in_cell(robot, q, proof, R, origin)[:, None], q, np.nan)
-
-    def search(local: Reals) -> Flags:
-        rho, _, z = in_section(local, arm.bar)
-        cells = section.cell_of(rho, z)
-        starts = np.where(np.isfinite(q[cells]), q[cells], (robot.lower + robot.upper) / 2)
-        return np.isfinite(reach_points(robot, local @ R + origin, starts)[:, 0])
-
-    estimate = estimate_volume(search, proof, points, seed)
-    return Proven(None, proof, section, R, origin, q, estimate, GeneralMethod(lacks))
-
-
-def _about_voids(arm: SectionArm, section: SectionMap, most_cells: int) -> SectionMap:
-    """Spend cells on the rims of enclosed voids, round by round."""
-    while True:
-        chosen = rim(section, cavities(section)[0])
-        most_cells -= 4 * int(chosen.sum())
-        if most_cells < 0 or not chosen.any():
-            return section
-        section = SectionMap(sharpen(arm, section.proof, chosen))
+    return Proven(proof, SectionMap(proof), R, bound.axis_point)

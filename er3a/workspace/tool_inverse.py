@@ -26,13 +26,11 @@ from er3a.kinematics.classes.chain_solvers import LockedJoint, Unsolved
 from er3a.kinematics.classes.class_solvers import ARM_CLASSES, ChainSolver, PaddedChain
 from er3a.kinematics.classes.six_revolute import CERTAIN
 from er3a.kinematics.forward import forward, jacobian
-from er3a.kinematics.wrist_partitioned import wrist_partition_missing
 from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.joint_limits import row_limits
 from er3a.robots.robot import Robot, derived
 from er3a.robots.whole_turns import whole_turns
 from er3a.workspace.cell_frame import is_quick, joint_1_alone
-from er3a.workspace.general_arm import coupled
 from er3a.workspace.orientations import asked_of
 
 ARM_ANGLES = 8
@@ -69,11 +67,6 @@ def lacking_for_maps(robot: Robot) -> MapsMissing | None:
     if not joint_1_alone(robot):
         return JointOneShared()
     return OrientationsUnknown(robot.joints) if asked_of(robot, 1) is None else None
-
-
-def proofs_hold(robot: Robot) -> bool:
-    """Whether the proofs for spherical wrists, which take each joint's range by itself, are of this robot."""
-    return not wrist_partition_missing(robot) and not coupled(robot)
 
 
 @derived

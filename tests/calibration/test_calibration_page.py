@@ -74,9 +74,3 @@ def test_each_word_of_the_page_can_be_translated(written, tmp_path):
     entries = {f"{each.name}" for each in found.estimates}
     own = {robot.title, robot.name, "compare", "compared.html", *entries}
     assert plain_words([*page, *shown], own) == []
-
-
-def test_a_reference_set_has_no_page(tmp_path):
-    done = CliRunner().invoke(app, ["calibrate", "er3_600", "er3_600", "--html", str(tmp_path / "page.html")])
-    assert done.exit_code != 0
-    assert "give a CSV" in str(done.exception)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -56,61 +55,23 @@ def test_proposed_poses_settle_what_a_calibration_settles_with_them(random):
         assert each.half_width == pytest.approx(widths[each.name], rel=0.2)
 
 
-@pytest.mark.parametrize("kind", ["place", "plane", "bar", "pair"])
+@pytest.mark.parametrize("kind", ["place", "plane"])
 def test_what_is_touched_is_touched_by_proposed_poses(kind, random):
     bench = Bench("six", random)
     robot = bench.robot
     bench.truth = robot
     target, normal = np.array([0.4, 0.1, 0.3]), np.array([0, 0, 1.0])
-    q = bench.joints(12) if kind in ("pair", "bar") else reached(bench, target, normal if kind == "plane" else None, 12)
-    at = er3a.forward(robot, q)[:, :3, 3]
-    rows = []
-    for k, pose in enumerate(np.degrees(q).tolist()):
-        own = 1000 * float(np.linalg.norm(at[k] - (at[k ^ 1] if kind == "pair" else target)))
-        name = f"p{k // 2}" if kind == "pair" else "own"
-        rows.append(
-            Measurement(
-                k + 2,
-                tuple(pose),
-                "tool",
-                (None,) * 3,
-                None,
-                **{kind: name},
-                length_mm=own if kind in ("pair", "bar") else None,
-            )
-        )
+    poses = np.degrees(reached(bench, target, normal if kind == "plane" else None, 12)).tolist()
+    rows = [Measurement(k, tuple(pose), "tool", (None,) * 3, **{kind: "own"}) for k, pose in enumerate(poses, 2)]
     found = plan(robot, rows, 5)
     new = er3a.forward(robot, meant(robot, np.array([each.pose for each in found.proposals])))[:, :3, 3]
-    assert len(new) == (10 if kind == "pair" else 5)
-    scales = [each.entry for each in found.held if each.code == "sets_scale"]
-    assert len(scales) == (kind in ("place", "plane"))
-    assert not {*scales, "offset1"} & {*found.settled, *found.lacking}
+    assert len(new) == 5
+    (scale,) = (each.entry for each in found.held if each.code == "sets_scale")
+    assert not {scale, "offset1"} & {*found.settled, *found.lacking}
     if kind == "place":
         assert new == pytest.approx(np.tile(target, (5, 1)), abs=1e-4)
-    elif kind == "plane":
-        assert new[:, 2] == pytest.approx(0.3, abs=1e-4)
     else:
-        far = np.linalg.norm(new - (new[np.arange(10) ^ 1] if kind == "pair" else target), axis=1)
-        assert 1000 * far == pytest.approx([each.length_mm for each in found.proposals], abs=0.1)
-
-
-def test_half_widths_are_those_of_the_calibration_and_pairs_have_new_names(random):
-    """A three-joint arm, seen by a ball bar with two standard deviations, whose socket drops out."""
-    robot = er3a.Robot.from_dh([0, 0.3, 0.25], np.radians([90, 0, 0]), [0.4, 0, 0], lower=[-2.5] * 3, upper=[2.5] * 3)
-    poses = random.uniform(-140, 140, (40, 3))
-    apart = er3a.forward(robot, np.radians(poses))[:, :3, 3] - [0.2, 0.1, 0.3]
-    rows = [
-        Measurement(k + 2, tuple(pose), "flange", (None,) * 3, (0.05, 0.5)[k % 2], bar="own", length_mm=length)
-        for k, (pose, length) in enumerate(zip(poses.tolist(), 1000 * np.linalg.norm(apart, axis=1)))
-    ]
-    widths = {each.name: each.now for each in plan(robot, rows, 1).widths}
-    for each in er3a.calibrate(robot, rows).estimates:
-        assert each.half_width == pytest.approx(widths[each.name], rel=1e-4)
-    lengths = (1000 * np.linalg.norm(apart - apart[np.arange(40) ^ 1], axis=1)).tolist()
-    pairs = [replace(row, bar=None, pair=f"next {k | 1}", length_mm=lengths[k]) for k, row in enumerate(rows)]
-    names = [each.name for each in plan(robot, pairs, 4).proposals]
-    assert len({*names}) == 4
-    assert not {*names} & {row.pair for row in pairs}
+        assert new[:, 2] == pytest.approx(0.3, abs=1e-4)
 
 
 def test_the_command_plans_before_it_fits(tmp_path):

@@ -55,36 +55,6 @@ def test_a_flange_defined_elsewhere_is_no_wrong_last_row(shift_mm):
     assert fault.shift_mm == pytest.approx([-c for c in shift_mm], abs=0.1)
 
 
-def poses_of(arm: er3a.Robot, count: int) -> list[Reference]:
-    """What a pendant shows: flange positions at random joint values, and nothing of the axes."""
-    stated, random = list[Reference](), np.random.default_rng(7)
-    for k in range(count):
-        pose = tuple(np.degrees(random.uniform(arm.lower, arm.upper)).round(2).tolist())
-        x = er3a.forward(arm.without_tool(), np.radians(pose))[:3, 3] * MM
-        for c, value in zip("xyz", x):
-            about = PointAtPose(f"p{k}", "flange", c), "key_poses", PointCoordinate(pose, "flange", c)
-            stated.append(Reference(*about, round(float(value), 3), 0.05, "pendant", "official", "pendant"))
-    return stated
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("name", ["er3a_c60", "lbr_iiwa_14"])
-def test_conventions_are_named_by_poses_alone(name):
-    right = er3a.load_robot(name)
-    offset, direction, a = right.offset.copy(), right.direction.copy(), right.a.copy()
-    offset[1:4] += np.radians([37, -90, 90])
-    direction[2] *= -1
-    a[1:3] += 0.03, 0.02
-    wrong, stated = right.replace(offset=offset, direction=direction), poses_of(right, 12)
-    best = er3a.diagnose(wrong, stated)[0]
-    assert best.explains
-    assert all(isinstance(fault, CONVENTIONS) for fault in best.faults)
-    q = np.random.default_rng(1).uniform(right.lower, right.upper, (50, right.joints))
-    off = er3a.forward(best.corrected, q)[:, :3, 3] - er3a.forward(right.without_tool(), q)[:, :3, 3]
-    assert np.abs(off).max() * MM < 1.0
-    assert not er3a.diagnose(wrong.replace(a=a), stated)[0].explains
-
-
 def test_poses_that_are_shown_outside_of_limits_are_a_matter_of_limits():
     right = er3a.load_robot("er3_600")
     upper = right.upper.copy()

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import er3a
-from er3a.diagnosis.conclusions import MainFault, MostLikelyFault, NothingToExplain, TooSmallToTell
+from er3a.diagnosis.conclusions import MainFault, MostLikelyFault, NothingToExplain
 from er3a.diagnosis.diagnose import Hypothesis, diagnosis_of
 from er3a.diagnosis.faults import (
     ReversedDirection,
@@ -196,29 +196,10 @@ def test_pairs_are_solved_for(arm, wrong):
     assert set(wrong) in entries_of(first)
 
 
-def test_a_right_table_is_left_alone_and_what_would_be_noticed_is(arm):
+def test_a_right_table_is_left_alone(arm):
     stated = stated_of(arm)
     conclusion = diagnosis_of(arm, stated).conclusion
     assert isinstance(conclusion, NothingToExplain)
-    found = conclusion.resolution
-    assert set(found.unseen) == {"alpha6", "offset6", "direction6"}
-    for j in range(1, 7):
-        for sign in (1, -1):
-            longer = changed(arm, f"a{j}", sign * 1.001 * found.length_mm / 1000)
-            assert Oracle(stated).greatest(longer) > 1
-    assert Oracle(stated).greatest(changed(arm, "offset6", 1.0)) <= 1
-
-
-def test_a_disagreement_too_small_to_tell_says_from_what_size_on_it_can_be(arm):
-    stated = stated_of(arm)
-    small = diagnosis_of(changed(arm, "a3", 0.0003), stated).conclusion
-    assert isinstance(small, TooSmallToTell)
-    assert ("a3",) in [tuple(map(entry_of, faults)) for faults in small.candidates]
-    larger = 0.0003 * 1.5 * small.distinguishability / small.residual
-    told = diagnosis_of(changed(arm, "a3", larger), stated).conclusion
-    assert isinstance(told, MostLikelyFault)
-    assert entry_of(told.faults[0]) == "a3"
-    assert told.alternatives == ()
 
 
 def test_a_limit_that_only_a_pose_contradicts(arm):
@@ -283,7 +264,7 @@ def test_few_references_leave_a_set_without_end_that_is_still_said_whole(arm):
     found = diagnosis_of(faulty, [replace(each, expected=each.expected + 60 * i) for i, each in enumerate(stated)])
     first = found.hypotheses[0]
     assert first.explains
-    assert isinstance(found.conclusion, MostLikelyFault | TooSmallToTell)
+    assert isinstance(found.conclusion, MostLikelyFault)
     members = [first.faults, *first.indistinguishable_from]
     assert len(members) > 5
     assert len(members) == len({tuple(map(rounded, faults)) for faults in members})

@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 
 import er3a
+from er3a.comparison.entries import Entry
 from er3a.errors import InputError
 from er3a.files.reference_sets import load_references
 from er3a.files.robot_library import load_robot
 from er3a.identifiability.alternatives import Flip
 from er3a.identifiability.continuous import Extent
-from er3a.identifiability.entries import TableNumber, continuous_of, entries_of
+from er3a.identifiability.entries import continuous_of, entries_of
 from er3a.identifiability.entry_evidence import Evidence, Tolerance
-from er3a.identifiability.evidence import NOT_OFF, evidence_of, parts_of
-from er3a.identifiability.feasible import Region
+from er3a.identifiability.evidence import NOT_OFF, evidence_of
 from er3a.identifiability.proposals import (
     LookAtMotion,
     MeasureAngle,
@@ -28,6 +28,7 @@ from er3a.identifiability.proposals import (
     proposals_of,
 )
 from er3a.kinematics.table_batch import robot_of, tables_of
+from er3a.pipeline.stages.validation.checks import parts_found
 from er3a.references.quantities import CarriedCoordinate, PointCoordinate
 from er3a.references.reference import Document, Documents, Reference
 from er3a.references.subjects import PointAtPose
@@ -82,7 +83,7 @@ def test_signs_that_no_document_fixes_are_open():
 @pytest.mark.parametrize("joint", [2, 3, 5])
 def test_a_joint_reversed_about_an_angle_stands_there_as_before_and_mirrored_beside_it(name, joint):
     robot, about, moved = load_robot(name), 30.0, 0.2
-    flip = Flip("reversed", TableNumber("direction", joint), about)
+    flip = Flip("reversed", Entry("direction", joint), about)
     other = robot_of(flip.apply(tables_of(robot)), 0, robot)
     q = np.tile(np.radians([10.0, 20.0, -15.0, 40.0, 25.0, 5.0]), (3, 1))
     q[:, joint - 1] = np.radians(about) + np.array([0.0, moved, -moved])
@@ -252,16 +253,16 @@ def test_all_that_is_proposed_entered_in_files_settles_every_entry(tmp_path):
     left = {each.entry: each.status for each in (*found.entries, *found.combinations)}
     assert {entry: status for entry, status in left.items() if status not in ("settled", "gauge", "given")} == {}
     assert found.table_meets
-    assert {part.status for part in parts_of(found)} == {"settled"}
+    assert {part.status for part in parts_found(found)} == {"settled"}
 
 
 @pytest.mark.long
 def test_parts_say_how_far_the_tool_could_be_off():
-    parts = {part.code: part for part in parts_of(evidence("er3_600"))}
+    parts = {part.part: part for part in parts_found(evidence("er3_600"))}
     assert parts["zero_and_directions"].status == "open"
     assert parts["zero_and_directions"].off.mm > 1300  # with joint 1 reversed, at 90 deg, stretched out
     assert {parts["limits"].status, parts["speeds"].status} <= {"weak", "consistent"}
-    assert {part.code: part.status for part in parts_of(evidence("er3a_c60"))}["speeds"] == "absent"
+    assert "speeds" not in {part.part for part in parts_found(evidence("er3a_c60"))}
 
 
 @pytest.mark.long
@@ -422,15 +423,6 @@ def test_a_contradiction_outvotes_a_measurement_only_where_the_table_meets_it(ma
     stated += [replace(seen, expected=seen.expected + manual, origin="manual")]
     found = evidence_of(robot, stated, Documents(), only=["d1"])["d1"]
     assert (found.status != "consistent") == counts
-
-
-def test_a_search_that_is_cut_off_settles_nothing(random, monkeypatch):
-    robot, followed = puma(), Region.followed
-    stated = tracked(robot, poses(random, 12), 0.1)
-    monkeypatch.setattr(Region, "followed", lambda self, start, toward, steps=1: followed(self, start, toward, 1))
-    found = evidence_of(robot, stated, Documents(), only=["a2"])["a2"]
-    assert (found.status, found.at_least) == ("weak", True)
-    assert found.off.within(Tolerance().mm, Tolerance().deg)
 
 
 def test_a_table_that_names_an_unknown_document_is_refused():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
@@ -54,6 +55,38 @@ def test_straight_and_folded_arms_meet_the_pose_and_have_the_own_joints(forearm,
         assert misses(robot, single.q, T).max() < 1e-12
     for motion in single.families:
         assert misses(robot, motion.members(np.linspace(*motion.range, 9)), T).max() < 1e-9
+
+
+def nearest_member(motions: Sequence, q: np.ndarray) -> float:
+    """How far, rad, joint values (n,) are from the nearest member of self-motions, turns aside."""
+    nearest = np.inf
+    for motion in motions:
+        t = np.linspace(*motion.range, 400)
+        for _ in range(6):
+            away = np.abs(wrap_to_pi(motion.members(t) - q)).max(axis=1)
+            at = int(away.argmin())
+            nearest = min(nearest, away[at])
+            t = np.linspace(t[max(at - 1, 0)], t[min(at + 1, len(t) - 1)], 30)
+    return nearest
+
+
+def test_the_self_motion_through_the_given_joints_is_found_beside_singular_poses(random):
+    """Bends of shoulder, elbow and wrist from 1e-8 to 1e-2 rad, two by two or all: curves that nearly cross there."""
+    reported = [-0.3417005342503683, 1e-5, 1.2263000935014405, -1.7252251095202824, -1.9644417498133784, -1e-5, -0.58]
+    for case in range(10):
+        robot = seven((0.40, 0.42)[case % 2], random)
+        limits = np.array([2.97, 2.09, 2.97, 3.15, 2.97, 2.09, 3.05])
+        robot = robot.replace(lower=-limits, upper=limits) if case % 4 >= 2 else robot
+        q = random.uniform(-2.0, 2.0, 7)
+        for joint in ([1, 5], [3], [1], [1, 3, 5], [3, 5])[case % 5]:
+            straight = np.pi if joint == 3 and case % 2 else 0.0
+            q[joint] = straight - 10 ** random.uniform(-8, -2)
+        q = np.array(reported) if case == 0 else q
+        T = tools_by_hand(robot, q[None])[0]
+        found = inverse(robot, T, q)
+        assert nearest_member(found.families, q) < 1e-6 or not found.method.certain
+        for motion in found.families:
+            assert misses(robot, motion.members(np.linspace(*motion.range, 41)), T).max() < 1e-9
 
 
 @pytest.mark.parametrize(("off", "kept"), [(1e-6, 8), (0.3, 0)])

@@ -131,7 +131,6 @@ POSES = {  # instructions, mm, quaternion (w first)
         (0.5, -0.5, 0.5, 0.5),
     ),
     "product_of_turns": ("t:=p; t.rot:=turned.rot*turned.rot; MoveL t,@;", (100, 200, 300), (0, 0, 0, 1)),
-    "posevect": ("t:=p; t.trans:=PoseVect(frame,[5,0,0]); MoveL t,@;", (10, 5, 0), (1, 0, 0, 0)),
     "posemult": (
         "frame:=PoseMult(frame,frame); t:=p; t.trans:=frame.trans; t.rot:=frame.rot; MoveL t,@;",
         (10, 10, 0),
@@ -141,11 +140,6 @@ POSES = {  # instructions, mm, quaternion (w first)
         "frame:=PoseInv(frame); t:=p; t.trans:=frame.trans; t.rot:=frame.rot; MoveL t,@;",
         (0, 10, 0),
         (HALF, 0, 0, -HALF),
-    ),
-    "defframe": (
-        "frame:=DefFrame(p,Offs(p,0,10,0),Offs(p,-10,0,0)); t.trans:=frame.trans; t.rot:=frame.rot; MoveL t,@;",
-        (100, 200, 300),
-        (HALF, 0, 0, HALF),
     ),
     "crobt": (
         "MoveL p,@; t:=CRobT(\\Tool:=tool0\\WObj:=wobj0); MoveL Offs(t,0,0,5),@;",
@@ -189,7 +183,6 @@ VALUES = {  # what stands behind n:=, and the number
     "rounded_from_zero": ("Round(-2.5)", -3),
     "distance": ("Distance([0,3,0],[4,0,0])", 5),
     "euler_z": ("EulerZYX(\\Z,turned.rot)", 90),
-    "dimension": ("Dim(grid,2)", 3),
     "element": ("list{2}", 20),
     "hexadecimal": ("0x1F", 31),
     "octal": ("0o17", 15),
@@ -315,7 +308,7 @@ STANDING = {  # what comes before a position is read, and whether the arm stands
 
 
 @pytest.mark.parametrize("case", STANDING)
-@pytest.mark.parametrize("read", ["t:=CRobT();", "t:=p; t.trans:=CPos();", "PDispOn p,tool0; t:=p;"])
+@pytest.mark.parametrize("read", ["t:=CRobT();", "t:=p; t.trans:=CPos();"])
 def test_a_position_is_read_only_where_the_arm_stands(case, read, tmp_path):
     before, stands = STANDING[case]
     found = move(tmp_path, f"{before} {'' if stands is None else read} MoveL t,@;")
@@ -348,8 +341,6 @@ def test_frames_of_tools_and_work_objects(tmp_path):
 def test_a_program_displacement_moves_the_work_object(tmp_path):
     found = move(tmp_path, "PDispSet [[1,2,3],[1,0,0,0]]; MoveL p,@\\WObj:=table;")
     np.testing.assert_allclose(found.base.pose[:3, 3], [0.998, 0.051, 0.003], atol=1e-9)
-    exe = move(tmp_path, "PDispOn\\ExeP:=pts{2},pts{1},tool0; MoveL p,@;")
-    np.testing.assert_allclose(exe.base.pose[:3, 3], [0.003, 0.003, 0.003], atol=1e-12)
     off = move(tmp_path, "PDispSet [[1,2,3],[1,0,0,0]]; PDispOff; MoveL p,@;")
     np.testing.assert_allclose(off.base.pose, np.eye(4), atol=1e-12)
     assert off.base.name == "wobj0"

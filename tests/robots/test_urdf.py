@@ -243,6 +243,8 @@ def test_limits_that_a_continuous_joint_states_are_kept(tmp_path, limit, ends):
     assert got.robot.continuous[5] == (ends is None)
     assert (got.robot.lower[5], got.robot.upper[5]) == pytest.approx(ends or (-np.pi, np.pi), rel=1e-15)
     assert [note for note in got.notes if "joint j6 " in note and "0 was taken" in note] == []
+    told = [note for note in got.notes if "joint j6 is continuous with limits" in note]
+    assert [note.split(": ")[1][:8] for note in told] == ([] if not limit else ["they are" if ends else "not kept"])
 
 
 @pytest.mark.parametrize("urdf_file", ["arm.urdf", "name/urdf/arm.urdf", "robots/arm.urdf", "robots/urdf/arm.urdf"])

@@ -22,10 +22,9 @@ from er3a.pipeline.stages.inverse.model import TargetResult
 from er3a.robots.joint_limits import limit_margin
 from er3a.workspace.causes import cause_of, relaxations
 from er3a.workspace.directions import cone_directions, poses, roll_of, tool_rotations
+from er3a.workspace.orientations import asked_of
 from er3a.workspace.placement import Task, find_places, narrowed
-from er3a.workspace.proven import EMPTY, SectionMap, cavities
-from er3a.workspace.section_arm import section_arm
-from er3a.workspace.section_proof import prove
+from er3a.workspace.proven import EMPTY, cavities, prove_robot
 
 ROBOT = load_robot("er3a_c60")
 FLOOR = Scene("floor", (Plane("floor", np.array([0.0, 0.0, 1.0]), 0.05),))
@@ -102,13 +101,13 @@ def test_the_obstacle_is_to_be_moved_only_where_the_arm_alone_keeps_its_margins(
 def test_a_void_disappears_when_a_limit_is_extended_as_the_page_says():
     """Limits are those of the printed sentence; the changed arm is proven anew."""
     robot, carried_out = load_robot("er3a_c60_article"), 0
-    for void in cavities(SectionMap(prove(section_arm(robot), 0.0, 3000)))[0]:
+    for void in cavities(prove_robot(robot, 3000, 1).section)[0]:
         text = say_of_workspace(cause_of(*relaxations(robot, void))).replace("−", "-")
         middle = void.cells.reshape(-1, 2, 2).mean(axis=2)
         for joint, side, value in re.findall(r"joint (\d)'s (lower|upper) limit is extended to ([+-][\d.]+) deg", text):
             limits = getattr(robot, side).copy()
             limits[int(joint) - 1] = np.radians(float(value))
-            changed = SectionMap(prove(section_arm(robot.replace(**{side: limits})), 0.0, 3000))
+            changed = prove_robot(robot.replace(**{side: limits}), 3000, 1).section
             empty = changed.status(middle[:, 0], void.arcs.mean(axis=1), middle[:, 1]) == EMPTY
             assert np.average(empty, weights=void.volumes * void.empty) < 0.02, text
             carried_out += 1
@@ -122,10 +121,10 @@ def test_a_box_that_is_moved_as_far_as_is_said_stays_clear_of_the_scene():
     task = Task(np.array([0.2, 0.15, 0.05]), down, np.radians(20), 0.0, 0.15, np.radians(2))
     wall = Scene("wall", (Plane("wall", np.array([-1.0, 0.0, 0.0]), -0.4),))
     roll, held, bodies = roll_of(robot, 1), narrowed(robot, task.margin), Bodies(robot, wall)
-    found = find_places(robot, task, roll, 0.05, 3, 0, free=lambda q: bodies.free(q, margin))
+    found = find_places(robot, task, asked_of(robot, 1), 0.05, 3, free=lambda q: bodies.free(q, margin))
     rotations = tool_rotations(cone_directions(down, task.half_angle), roll)[:, 0]
     spacing, places, moved = found.field.spacing, found.places, 0
-    for row in found.chosen.row:
+    for row in found.chosen:
         size = task.box[[1, 0, 2]] if places.turned[row] else task.box
         count = np.ceil(size / spacing - 1e-6).astype(int) + 1
         lattice = (np.indices(count).reshape(3, -1).T - (count - 1) / 2) * spacing
@@ -137,5 +136,5 @@ def test_a_box_that_is_moved_as_far_as_is_said_stays_clear_of_the_scene():
             assert clear.any(axis=1).all(), (row, axis, way)
             moved += room > 0
     assert moved >= 4
-    beyond = find_places(robot, task, roll, 0.05, 3, 0)
+    beyond = find_places(robot, task, asked_of(robot, 1), 0.05, 3)
     assert len(beyond.places.slot) > len(places.slot)

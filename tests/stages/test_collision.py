@@ -243,7 +243,7 @@ def with_a_base_too_large(folder: Path) -> Study:
     study["collision"] |= {"scene": None, "samples": 1000, "cells_across": 8, "rounds": 0}
     study["inverse"] |= {"scene": None, "round_trips": 10, "map_cells": 8}
     study["workspace"] |= {"samples": 20_000, "blocks": 1, "proof_cells": 2000}
-    study["capability"] |= {"directions": 20, "proof_poses": 1000}
+    study["capability"] |= {"directions": 20}
     return Study.model_validate(study)
 
 

@@ -376,17 +376,15 @@ TASK = TaskSummary((300.0, 200.0, 50.0), (0.0, 0.0, -1.0), 15.0, 2.0, 0.0, 100.0
 OF_REACH = LeftOut("joint_vectors", amount=700), LeftOut("colliding_reach")
 OF_TOOL = *OF_REACH, LeftOut("tool_directions", amount=40)
 BETWEEN, PLACED = LeftOut("between_places", amount=50.0), LeftOut("placed_box")
+SAMPLED = LeftOut("sampled_places", amount=3)
 
 
 def what_tools_do(**changes) -> SimpleNamespace:
-    core = of(lower=0.1, upper=0.1)
-    return of(**{"asked": "directions", "directions": 40, "core_m3": core, "clear": of(without=0)} | changes)
+    return of(**{"asked": "directions", "directions": 40, "clear": of(without=0)} | changes)
 
 
-def placed(places=("a place",), fitting_proven=3) -> PlacementSummary:
-    return PlacementSummary(
-        *(None, 10.0, TASK, (0.05, 0.03, 0.05), 9, 20, 3, 3, fitting_proven, 0, 100, places),
-    )
+def placed(places=("a place",)) -> PlacementSummary:
+    return PlacementSummary(None, 10.0, TASK, (0.05, 0.03, 0.05), 9, 20, 3, places)
 
 
 @pytest.mark.parametrize(
@@ -395,38 +393,25 @@ def placed(places=("a place",), fitting_proven=3) -> PlacementSummary:
         ({}, (), ()),
         ({"bounds": (0.75, 1.0)}, (LeftOut("undecided_volume", amount=250.0),), ()),
         ({"width": 0.2}, (LeftOut("hidden_voids", amount=20.0),), ()),
-        ({"surface": of(lower=1.0, upper=2.0), "bounds": (0, 1), "width": 0.2}, (), ()),
-        ({"surface": of(lower=1.0, upper=None)}, (LeftOut("area"),), ()),
-        ({"surface": of(lower=None, upper=2.0)}, (LeftOut("area"),), ()),
-        ({"voids": ("proven_empty",)}, (), ()),
-        ({"voids": ("sampled", "proven_empty", "undersampled")}, (LeftOut("sampled_voids", amount=2),), ()),
         ({"capability": CapabilityMissing("a reason")}, (LeftOut("capability"),), OF_TOOL[2:]),
         ({"capability": what_tools_do(clear=of(without=9))}, (LeftOut("lost_cells", amount=9),), ()),
-        ({"capability": what_tools_do(core_m3=None)}, (LeftOut("core"),), ()),
-        (
-            {"capability": what_tools_do(core_m3=of(lower=0.25, upper=0.5))},
-            (LeftOut("undecided_core", amount=250.0),),
-            (),
-        ),
         ({"placement": PlacementTooLong(TASK)}, (LeftOut("places"),), ()),
-        ({"placement": placed()}, (BETWEEN, PLACED), ()),
-        ({"placement": placed(fitting_proven=1)}, (BETWEEN, PLACED, LeftOut("sampled_places", amount=2)), ()),
-        ({"placement": placed(())}, (BETWEEN, LeftOut("tray_nowhere", ("300 × 200 × 50 mm",))), ()),
+        ({"placement": placed()}, (SAMPLED, BETWEEN, PLACED), ()),
+        ({"placement": placed(())}, (SAMPLED, BETWEEN, LeftOut("tray_nowhere", ("300 × 200 × 50 mm",))), ()),
         (
             {"placement": placed(), "capability": what_tools_do(asked="turns")},
-            (BETWEEN, PLACED, LeftOut("box_directions")),
+            (SAMPLED, BETWEEN, PLACED, LeftOut("box_directions")),
             (),
         ),
         ({"capability": what_tools_do(asked="turns")}, (), ()),
     ],
 )
 def test_reach_and_what_the_tool_can_do(given, more, less):
-    own = {"bounds": (1.0, 1.0), "width": 0.1, "surface": None, "voids": ()}
+    own = {"bounds": (1.0, 1.0), "width": 0.1}
     own |= {"capability": what_tools_do(), "placement": None} | given
     proven = of(proof=of(bounds=own["bounds"], width=own["width"]))
     tool = of(capability=own["capability"], placement=own["placement"])
-    voids = [of(status=status) for status in own["voids"]]
-    found = left_out("workspace", of(samples=700), proven, own["surface"], voids, tool)
+    found = left_out("workspace", of(samples=700), proven, tool)
     assert not differs(found, OF_TOOL, more, less)
 
 
@@ -488,22 +473,16 @@ def evidence_of(*statuses: str) -> SimpleNamespace:
         ({"evidence": evidence_of("settled", "gauge", "given")}, (), ()),
         ({"evidence": None}, (LeftOut("table_entries"),), ()),
         ({"diagnoses": None}, (LeftOut("diagnosis"),), OF_TABLE[:1]),
-        (
-            {"calibrations": [of(reference_set="a", result=object.__new__(validated.Calibrated))]},
-            (),
-            (),
-        ),
-        ({"calibrations": [of(reference_set="a", result="too few")]}, (LeftOut("calibration", ("a",)),), ()),
         ({"checks": [open_check("round_trips")]}, (LeftOut("all_solutions"),), OF_TABLE[1:2]),
         ({"trips": of(near_singular=12)}, (LeftOut("near_singular_poses", amount=12),), ()),
     ],
 )
 def test_a_table(given, more, less):
-    own = {"without": None, "checks": [], "diagnoses": (), "calibrations": (), "trips": of(near_singular=0)}
+    own = {"without": None, "checks": [], "diagnoses": (), "trips": of(near_singular=0)}
     own |= {"evidence": evidence_of("settled")} | given
     checks = [judged(group) for group in GROUPS if group != own["without"]] + own["checks"]
     settings = of(round_trips=400, reach_starts=3)
-    rest = [own[name] for name in ("diagnoses", "calibrations", "trips", "evidence")]
+    rest = [own[name] for name in ("diagnoses", "trips", "evidence")]
     assert not differs(left_out("validation", settings, checks, *rest), OF_TABLE, more, less)
 
 

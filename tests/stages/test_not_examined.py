@@ -30,7 +30,7 @@ from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import MIN_SINGULAR_VALUE
 from er3a.numerics.quasi_random import quasi_random_points
-from er3a.pipeline.messages.left_out import left_out_names, left_out_text, unmeasured_text
+from er3a.pipeline.messages.left_out import left_out_names, left_out_text
 from er3a.pipeline.messages.say import say, say_all
 from er3a.pipeline.new_study.write import arm_of, write_study
 from er3a.pipeline.results import (
@@ -667,30 +667,29 @@ def test_validation_of_seven_joints_names_what_diagnosis_leaves_out(study):
     assert "more_faults" in found
 
 
-@pytest.mark.parametrize("arm", [None, "a section's"])
 @pytest.mark.parametrize("width", [0.1, 0.2])
-def test_a_proof_that_leaves_much_undecided_names_hidden_voids_of_any_arm(study, arm, width):
-    proven = SimpleNamespace(proof=SimpleNamespace(bounds=(0.5, 1.0), width=width), arm=arm)
+def test_a_proof_that_leaves_much_undecided_names_hidden_voids(study, width):
+    proven = SimpleNamespace(proof=SimpleNamespace(bounds=(0.5, 1.0), width=width))
     tool = SimpleNamespace(capability=CapabilityMissing("a reason"), placement=None)
-    left_out = STAGES["workspace"].module("compute")._left_out(study.workspace, proven, None, (), tool)
+    left_out = STAGES["workspace"].module("compute")._left_out(study.workspace, proven, tool)
     assert ("hidden_voids" in {each.subject for each in left_out}) == (width == 0.2)
 
 
 @pytest.mark.long
 def test_a_proof_cut_short_takes_no_hole_for_the_shoulders(study):
     """The article's table leaves a hole where none belongs, which few cells can't tell from the shoulder's."""
-    small = {"samples": 3000, "blocks": 1, "cells_across": 8, "volume_points": 100}
-    little = {"directions": 12, "proof_poses": 1, "scene": None, "placement": BoxTask(cone_deg=5)}
+    small = {"samples": 3000, "blocks": 1, "cells_across": 8}
+    little = {"directions": 12, "scene": None, "placement": BoxTask(cone_deg=5)}
     article = study.model_copy(update={"robots": {"er3a_c60_article": study.robots["er3a_c60_article"]}})
     verdicts = {}
-    for cells in (100, 2000):
+    for cells in (10, 2000):
         sections = {"workspace": small | {"proof_cells": cells}, "capability": little}
         made = {name: getattr(article, name).model_copy(update=values) for name, values in sections.items()}
         verdicts[cells] = workspace(article.model_copy(update=made), "er3a_c60_article").summary.verdict
     assert verdicts[2000].finding.code == "workspace.void_unexpected"
     assert verdicts[2000].missed == ()
-    assert verdicts[100].status == "caution"
-    assert [each.subject for each in verdicts[100].missed] == ["hidden_voids"]
+    assert verdicts[10].status == "caution"
+    assert [each.subject for each in verdicts[10].missed] == ["hidden_voids"]
 
 
 SOLIDS = {
@@ -973,55 +972,15 @@ def test_an_allowed_pair_that_overlaps_in_few_poses_hides_something():
     assert found["allowed_contacts"] == ("link_1/link_2",)
 
 
-def test_how_near_joined_pairs_come_in_the_poses_told_of_is_measured():
-    """The rest of links 2 and 4, which nothing counts, at four poses, in one of which they overlap."""
-    robot = load_robot("er3_600")
-    bodies = bodies_of(robot, None)
-    q = np.radians([[0, 0, 0, 0, -20, 0], [0, 0, -40, 0, -20, 0], [0, 0, -100, 0, -20, 0], [np.nan] * 6])
-    joined = np.flatnonzero(bodies.joined)
-    apart = np.array([bodies.distances(each, joined) for each in q[:3]])
-    assert (apart.min(axis=1) < 0).tolist() == [False, False, True]
-    (left,) = (
-        each
-        for each in left_out_of_collisions(robot, bodies, None, q_deg=np.degrees(q))
-        if each.subject == "unmeasured_pairs"
-    )
-    assert left.amount == pytest.approx(1000 * apart[apart > 0].min())
-    said = unmeasured_text(left.names, left.amount, ("link_1/link_2",))
-    assert f"they come within {left.amount:.1f} mm" in said
-    assert said.endswith("Clearance does not count these, which the robot's file allows: link 1 and link 2.")
-    assert f"({left.amount:.1f} mm there)" in left_out_text(left)
-    assert bodies.joined_apart(q[3:]) is None
-
-
 def test_bodies_that_a_joint_holds_are_named_where_others_of_their_links_meet():
     arm = Robot.from_dh([0.3], [0.0], [0.0])
     shapes = (Envelope(0, (0, 0, -0.1), (0, 0, 0), 0.05), Envelope(0, (0.25, 0, 0), (0.25, 0, 0), 0.02))
     arm = arm.replace(envelopes=(*shapes, Envelope(1, (0, 0, 0), (0.3, 0, 0), 0.05)))
     (row,) = collision_matrix(arm).rows
-    assert (row.state, row.left_out > 0) == ("meets", True)
+    assert (row.state, row.left_out > 0) == ("joined", True)
+    assert bodies_of(arm, None).pairs  # the rest is checked
     found = {each.subject: each.names for each in left_out_of_collisions(arm, bodies_of(arm, None), None)}
     assert found["joined_pairs"] == ("base/link_1",)
-
-
-def test_links_that_no_clearance_counts_until_they_overlap_are_named():
-    """By arms that are near to an overlap of them: what is counted as nearest is farther away than they are."""
-    robot = load_robot("er3_600")
-    bodies = Bodies(robot, None)
-    assert bodies.unmeasured == ("base/link_2", "link_2/link_4", "link_4/link_6")
-    left = {each.subject: each.names for each in left_out_of_collisions(robot, bodies, None)}
-    assert left["unmeasured_pairs"] == bodies.unmeasured
-    assert unmeasured_text(bodies.unmeasured) == (
-        "Clearance does not count these until they overlap: base and link 2, link 2 and link 4, link 4 and link 6."
-    )
-    q = np.radians(np.linspace([0, 0, -40, 0, -20, 0], [0, 0, -64, 0, -20, 0], 200))
-    apart = np.array([bodies.distances(each, np.arange(len(bodies.pairs))) for each in q])
-    of_them = apart[:, [pair.label in bodies.unmeasured for pair in bodies.pairs]].min(axis=1)
-    just_clear = of_them > 0
-    assert just_clear.any()
-    assert not just_clear.all()
-    assert (bodies.min_distance(q[just_clear])[0] > of_them[just_clear]).all()
-    assert unmeasured_text(()) == ""
 
 
 def test_orientations_that_an_arm_of_few_joints_leaves_off_are_named():
@@ -1098,28 +1057,6 @@ def test_a_base_of_a_capsule_stands_on_a_table_or_lies_in_it(top, inside):
     assert (contact.solid, contact.inside) == ("box", inside)
 
 
-def test_pairs_that_are_left_out_whole_are_not_named_as_joined():
-    """Of links without length the guess leaves no room, and the two beside them overlap in many poses."""
-    arm = Robot.from_dh(
-        [0.0, 0.25, 0.0, 0.0, 0.0, 0.0], [1.57, 0.0, 1.57, -1.57, 1.57, 0.0], [0.2, 0, 0, 0.02, 0, 0.05]
-    )
-    bodies = bodies_of(arm, None)
-    guessed = {f"{row.first}/{row.second}" for row in bodies.matrix if row.state == "guessed" and row.left_out}
-    found = {each.subject: each.names for each in left_out_of_collisions(arm, bodies, None)}
-    assert guessed
-    assert guessed.isdisjoint({*found.get("joined_pairs", ()), *found.get("joined_whole", ())})
-    assert guessed <= {*found["guessed_pairs"]}
-
-
-def test_pairs_of_which_nothing_is_left_beyond_their_joint_are_not_said_to_be_examined():
-    bodies = bodies_of(load_robot("er3_600"), None)
-    measured = {pair.label for pair in bodies.pairs}
-    found = {each.subject: each.names for each in left_out_of_collisions(bodies.robot, bodies, None)}
-    assert found["joined_whole"] == ("link_2/link_3", "link_3/link_4")
-    assert measured.isdisjoint(found["joined_whole"])
-    assert measured >= {*found["joined_pairs"]}
-
-
 @pytest.mark.parametrize(("given", "named"), [(None, ("zero", "tool")), ({"tool": {}}, ("zero",))])
 def test_values_of_the_robots_file_that_are_assumed_are_named(tmp_path, monkeypatch, given, named):
     content = yaml.safe_load(Path(f"data/robots/{ROBOT}.yaml").read_text(encoding="utf-8"))
@@ -1184,19 +1121,17 @@ def test_a_link_that_looks_larger_than_its_shapes_is_named(link, farthest, reach
 
 @pytest.mark.long
 def test_workspace_names_what_samples_and_budgets_leave_open(study):
-    small = {"samples": 3000, "blocks": 1, "cells_across": 8, "proof_cells": 50, "volume_points": 100}
-    little = {"directions": 12, "proof_poses": 1, "scene": None, "placement": BoxTask(cone_deg=5)}
+    small = {"samples": 3000, "blocks": 1, "cells_across": 8, "proof_cells": 50}
+    little = {"directions": 12, "scene": None, "placement": BoxTask(cone_deg=5)}
     results = workspace(changed(study, workspace=small, capability=little), ROBOT)
     found, summary = subjects(results), results.summary
     assert found["joint_vectors"].amount == 3000
-    volume, core = summary.volume_m3, summary.capability.core_m3
+    volume = summary.volume_m3
     assert found["undecided_volume"].amount == pytest.approx(1000 * (volume.upper - volume.lower))
-    assert found["undecided_core"].amount == pytest.approx(1000 * (core.upper - core.lower))
     assert found["tool_directions"].amount == 12
     assert {"obstacles", "colliding_reach", "carried", "tool"} <= found.keys()
     placed = summary.placement
-    if placed.fitting > placed.fitting_proven:
-        assert found["sampled_places"].amount == placed.fitting - placed.fitting_proven
+    assert found["sampled_places"].amount == placed.fitting
     assert found["between_places"].amount == pytest.approx(1000 * max(placed.spacing_m))
     assert summary.verdict.shapes is not None
     assert placed.margin_mm == summary.verdict.shapes.margin_mm == 1000 * ASSUMED_MARGIN
@@ -1226,7 +1161,6 @@ LEFT_OUT_BY_SETTINGS = {
     "capability": {
         "directions": "tool_directions",
         "rolls": "tool_directions",
-        "proof_poses": "undecided_core",
         "scene": "obstacles",
         "placement": "between_places",
     },
@@ -1259,7 +1193,7 @@ LEFT_OUT_BY_SETTINGS = {
     "programs": {"most_steps": "program_lines", "most_branches": "program_lines", "loop_rounds": "program_lines"},
 }
 LEAVE_NOTHING_OUT = {
-    "workspace": ("sampling", "blocks", "cells_across", "hull_directions", "cloud_points", "volume_points"),
+    "workspace": ("sampling", "blocks", "cells_across", "hull_directions", "cloud_points"),
     "inverse": ("map_cells",),
     "trajectory": (
         *("near_wrist_deg", "near_elbow_deg", "near_shoulder_mm"),

@@ -8,8 +8,8 @@ import pytest
 
 pytestmark = pytest.mark.long
 
-BODIES = "scene_shapes carried joined_pairs unmeasured_pairs"
-REAL_ARM = f"{BODIES} base_contacts bare_links joined_whole"
+BODIES = "scene_shapes carried joined_pairs"
+REAL_ARM = f"{BODIES} base_contacts bare_links"
 RATES = "own_accelerations jerk"
 REFERENCES = "references table_entries more_faults round_trips reach_starts the_arm_itself"
 DRIVES = (
@@ -20,7 +20,10 @@ CAMERA = (
     f"{REAL_ARM} {RATES} real_camera pose_intrinsics joint_zeros small_joint_zeros detections gripped_parts "
     "shallow_overlaps tool torques"
 )
-PLACES = "joint_vectors undecided_volume colliding_reach tool_directions lost_cells between_places placed_box tool"
+PLACES = (
+    "joint_vectors undecided_volume colliding_reach tool_directions lost_cells sampled_places between_places placed_box"
+    " tool"
+)
 FREE_SPACE = "joint_vectors lost_cells unjoined_cells within_cells targets path_stretches tool shallow_overlaps"
 PROGRAMS = "program_again controller_language controller_ramps torques shallow_overlaps"
 PATHS = "path_stretches ways_between tool torques shallow_overlaps"
@@ -28,7 +31,7 @@ SOLUTIONS = "round_trips ways_between tool"
 
 LISTED = {
     ("er3a_c60", "validation"): REFERENCES,
-    ("er3a_c60", "workspace"): f"{REAL_ARM} {PLACES} sampled_places",
+    ("er3a_c60", "workspace"): f"{REAL_ARM} {PLACES}",
     ("er3a_c60", "inverse"): f"{REAL_ARM} {SOLUTIONS}",
     ("er3a_c60", "collision"): f"{REAL_ARM} {FREE_SPACE}",
     ("er3a_c60", "trajectory"): f"{REAL_ARM} {RATES} {PATHS} own_speeds",
@@ -36,7 +39,7 @@ LISTED = {
     ("er3a_c60", "dynamics"): f"{DRIVES} paths_not_run",
     ("er3a_c60", "vision"): f"{CAMERA} own_speeds left_out_samples",
     ("er3_600", "validation"): f"{REFERENCES} conflicting_references",
-    ("er3_600", "workspace"): f"{REAL_ARM} {PLACES} undecided_core own_values",
+    ("er3_600", "workspace"): f"{REAL_ARM} {PLACES} own_values",
     ("er3_600", "inverse"): f"{REAL_ARM} {SOLUTIONS} own_values",
     ("er3_600", "collision"): f"{REAL_ARM} {FREE_SPACE} own_values",
     ("er3_600", "trajectory"): f"{REAL_ARM} {RATES} {PATHS} own_values",
@@ -44,9 +47,7 @@ LISTED = {
     ("er3_600", "dynamics"): f"{DRIVES} own_values",
     ("er3_600", "vision"): f"{CAMERA} own_values",
     ("er3a_c60_article", "validation"): f"{REFERENCES} calibration near_singular_poses",
-    ("er3a_c60_article", "workspace"): (
-        f"scene_shapes carried guessed_pairs {PLACES} undecided_core sampled_places allowed_pairs"
-    ),
+    ("er3a_c60_article", "workspace"): f"scene_shapes carried joined_pairs {PLACES} allowed_pairs",
 }
 
 

@@ -17,7 +17,6 @@ from scipy.spatial.transform import Rotation
 
 import er3a
 import er3a.pipeline.messages.validation
-from er3a.calibration.outcomes import Misfit, MorePositions, NoCorrectionFound
 from er3a.diagnosis.conclusions import MostLikelyFault, NoFewFaultsExplain, NothingToExplain
 from er3a.diagnosis.faults import BaseElsewhere, WrongOffset
 from er3a.files.reference_sets import load_references
@@ -690,21 +689,6 @@ def test_any_number_of_conventions_is_no_other_arm(study, tmp_path):
     assert {fault.joint for fault in found.diagnosis.faults if isinstance(fault, WrongOffset)} >= {2, 3}
     assert "the same arm, defined otherwise" in say(found)
     assert "This is the robot, but its zeros" in page_of(other, stored, tmp_path)
-
-
-@pytest.mark.long
-def test_positions_ask_for_no_correction_of_the_right_tables(stored, summaries):
-    for name, level in (("er3a_c60", "lengths_and_offsets"), ("er3_600", "lengths")):
-        (found,) = summaries[name].calibrations
-        assert isinstance(found.result.conclusion, NoCorrectionFound)
-        assert found.result.level == level
-        corrections = stored[name].results.corrections
-        assert len(corrections)
-        assert (np.abs(corrections.correction) < corrections.half_width).all()
-    own, real = summaries["er3a_c60_article"].calibrations
-    assert isinstance(own.result, MorePositions)
-    assert own.result.missing > 0
-    assert isinstance(real.result.conclusion, Misfit)
 
 
 @pytest.mark.long

@@ -9,16 +9,14 @@ from hypothesis import strategies as st
 from scipy import stats
 from scipy.stats import qmc
 
-from er3a.errors import InputError, NotWristPartitionedError
+from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
 from er3a.geometry.transforms import transform
 from er3a.geometry.vectors import fibonacci_sphere
 from er3a.kinematics.forward import forward
-from er3a.kinematics.wrist_partitioned import NoWristCentre, wrist_partitioned_arm
 from er3a.pipeline.progress import shown_progress
 from er3a.sampling import grid as grid_module
 from er3a.sampling.grid import make_grid, tool_bound
-from er3a.sampling.point_chain import at_wrist_centre, point_chain
 from er3a.sampling.random_joints import Draw, direction_numbers, philox4x32
 from er3a.sampling.tally import tally_blocks
 from tests.stages.workspace_arms import SEED, extreme_points, tally_of
@@ -111,19 +109,6 @@ def test_the_loop_counts_what_forward_gives(robot, sampling):
     reached = (points @ fibonacci_sphere(200).T).max(axis=0)
     found = np.einsum("di,di->d", extreme_points(robot, draw, tally.extremes), fibonacci_sphere(200))
     assert np.abs(found - reached).max() < 1e-5
-
-
-def test_the_wrist_centre_can_be_sampled(robot):
-    bare = at_wrist_centre(robot)
-    assert point_chain(bare).last == 2
-    q = Draw(SEED, 500, 1).joints(robot, np.zeros(500), np.arange(500))
-    T, arm = forward(robot, q), wrist_partitioned_arm(robot)
-    wrist = T[:, :3, 3] + T[:, :3, :3] @ arm.wrist_in_tool
-    assert np.abs(forward(bare, q)[:, :3, 3] - wrist).max() < 1e-12
-    skew = robot.replace(a=robot.a + np.array([0, 0, 0, 0, 0.04, 0]))
-    with pytest.raises(NotWristPartitionedError) as error:
-        at_wrist_centre(skew)
-    assert isinstance(error.value.property_missing, NoWristCentre)
 
 
 def test_progress_is_shown_as_lines_in_a_log(robot, capsys, monkeypatch):

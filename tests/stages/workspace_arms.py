@@ -22,7 +22,7 @@ def make_study(files: dict[str, Path] | None = None, **workspace) -> Study:
     entry = {"targets": "targets.yaml", "paths": "paths.yaml"}
     robots = {name: {**entry, "file": str(file)} for name, file in (files or {}).items()} or {"er3_600": entry}
     small = {"samples": 60_001, "blocks": 7, "cells_across": 16, "hull_directions": 1000, "cloud_points": 500}
-    small |= {"proof_cells": 400, "volume_points": 2000}
+    small["proof_cells"] = 400
     return Study.model_validate(
         {
             "kind": "study",

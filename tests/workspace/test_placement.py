@@ -15,11 +15,10 @@ from er3a.kinematics.forward import jacobian
 from er3a.kinematics.inverse import inverse
 from er3a.robots.robot import CombinedLimit, Robot
 from er3a.workspace.directions import cone_directions, from_polar, poses, roll_of, tool_rotations
+from er3a.workspace.orientations import asked_of
 from er3a.workspace.placement import (
     MIXED,
     NO,
-    PROVEN,
-    REFUTED,
     Places,
     Task,
     choose_places,
@@ -28,23 +27,19 @@ from er3a.workspace.placement import (
     fitting_places,
     lattice_spacing,
     narrowed,
-    prove_place,
-    proven_bricks,
     serve,
     supports_of,
     survey,
 )
 from testing.arms import placement
-from tests.workspace.shell_arm import NARROW, TOOL_ASIDE, shell_arm
 
 DOWN = np.array([0.0, 0.0, -1.0])
 TRAY = Task(np.array([0.2, 0.15, 0.05]), DOWN, np.radians(20), 0.0, 0.15, np.radians(2))
 
 
 def places_of(robot: Robot, task: Task, coarsest: float = 0.06) -> Places:
-    roll, robot = roll_of(robot, 2), narrowed(robot, task.margin)
-    field = survey(robot, task, roll, coarsest)
-    return fitting_places(field, proven_bricks(robot, task, field, roll), task.box)
+    robot = narrowed(robot, task.margin)
+    return fitting_places(survey(robot, task, asked_of(robot, 2), coarsest), task.box)
 
 
 def lattice_in(centre: np.ndarray, size: np.ndarray, spacing: np.ndarray) -> np.ndarray:
@@ -65,7 +60,7 @@ def random_service(task: Task, centre: np.ndarray, size: np.ndarray, roll, rando
 def test_places_agree_with_brute_force_one_pose_at_a_time():
     robot = load_robot("er3_600")
     task = Task(np.array([0.2, 0.1, 0.1]), DOWN, 0.0, 0.2, 0.15)
-    field = survey(robot, task, roll_of(robot, 1), 0.1)
+    field = survey(robot, task, asked_of(robot, 1), 0.1)
     assert field.spacing == pytest.approx([0.1, 0.1, 0.1])
     (rotation,) = tool_rotations(cone_directions(DOWN, 0.0), roll_of(robot, 1))[:, 0]
     good = np.zeros(field.manipulability_any.shape, dtype=bool)
@@ -83,7 +78,7 @@ def test_places_agree_with_brute_force_one_pose_at_a_time():
             if window.shape == (a, b, c) and window.all():
                 middle = field.origin + (np.array([i, j, k]) + (np.array([a, b, c]) - 1) / 2) * field.spacing
                 expected.add((turned, *np.round(middle, 6).tolist()))
-    places = fitting_places(field, np.zeros(np.array(good.shape) - 1, dtype=bool), task.box)
+    places = fitting_places(field, task.box)
     found = {(bool(t), *np.round(c, 6).tolist()) for t, c in zip(places.turned, places.centre)}
     assert len(expected) > 50
     assert found == expected
@@ -111,46 +106,40 @@ def test_the_margin_of_a_point_counts_limits_of_sums(random):
 
 
 @pytest.mark.parametrize("name", ["er3a_c60", "er3_600"])
-def test_proven_places_serve_random_points_and_directions(name, random):
+def test_places_serve_nearly_all_random_points_and_directions(name, random):
+    """Only the lattice is tested: what lies between may fail, at borders of what is reached."""
     robot = load_robot(name)
     places, roll, tight = places_of(robot, TRAY), roll_of(robot, 1), narrowed(robot, TRAY.margin)
-    chosen = choose_places(tight, TRAY, places, roll, 3, 300_000)
-    assert len(chosen.row) == 3
-    assert chosen.branch_proven[0]
-    for row, slot, proven, one in zip(chosen.row, chosen.slot, chosen.proven, chosen.branch_proven):
+    chosen = choose_places(tight, TRAY, places, 3)
+    assert len(chosen) == 3
+    for row in (*chosen, *random.choice(len(places.slot), 20)):
         size = TRAY.box[[1, 0, 2]] if places.turned[row] else TRAY.box
-        T = random_service(TRAY, places.centre[row], size, roll, random, 3000)
-        found = inverse_batch(robot.replace(lower=tight.lower, upper=tight.upper), T[:, 0])
-        assert found.within_limits.any(axis=1).all() or not proven
-        assert not one or found.within_limits[:, slot].all()
-    proven = np.flatnonzero(places.proven)
-    assert len(proven) > 0.5 * len(places.slot)
-    for row in random.choice(proven, 20):
-        size = TRAY.box[[1, 0, 2]] if places.turned[row] else TRAY.box
-        T = random_service(TRAY, places.centre[row], size, roll, random, 100)
-        assert inverse_batch(tight, T[:, 0]).within_limits.any(axis=1).all()
+        T = random_service(TRAY, places.centre[row], size, roll, random, 300)
+        within = inverse_batch(robot.replace(lower=tight.lower, upper=tight.upper), T[:, 0]).within_limits
+        assert within.any(axis=1).mean() > (0.99 if row in chosen else 0.9)
+        assert row not in chosen or places.slot[row] == MIXED or within[:, places.slot[row]].mean() > 0.99
 
 
 @pytest.mark.long
 def test_a_box_that_is_moved_as_far_as_is_said_is_served_on_the_way_and_no_step_farther(random):
     robot, roll = load_robot("er3_600"), roll_of(load_robot("er3_600"), 2)
-    found = find_places(robot, TRAY, roll, 0.05, 4, 200_000)
+    found = find_places(robot, TRAY, asked_of(robot, 2), 0.05, 4)
     held, moved = narrowed(robot, TRAY.margin), 0
-    for row in found.chosen.row:
+    for row in found.chosen:
         place = found.places.rows(np.array([row]))
         size = TRAY.box[[1, 0, 2]] if place.turned[0] else TRAY.box
-        alike = (found.places.turned == place.turned[0]) & (found.places.proven | ~place.proven[0])
+        alike = found.places.turned == place.turned[0]
         centres = {tuple(np.round(each, 6)) for each in found.places.centre[alike]}
         for (axis, way), room in np.ndenumerate(found.room(row)):
             beyond = place.centre[0].copy()
             beyond[axis] += (2 * way - 1) * (room + found.field.spacing[axis])
             assert tuple(np.round(beyond, 6)) not in centres
-            if room and place.proven[0]:
+            if room:
                 centre = place.centre[0].copy()
                 centre[axis] += (2 * way - 1) * random.uniform(0, room)
                 tried = random_service(TRAY, centre, size, roll, random, 100)
                 served = inverse_batch(held, tried.reshape(-1, 4, 4)).within_limits.any(axis=1)
-                assert served.reshape(len(tried), -1).any(axis=1).all()
+                assert served.reshape(len(tried), -1).any(axis=1).mean() > 0.9
                 moved += 1
     assert moved >= 4
 
@@ -163,10 +152,7 @@ def test_the_criterion_is_the_least_over_box_and_cone(random):
     shares = np.minimum(
         one.manipulability / places.manipulability.max(), one.limit_margin / np.nanmax(places.limit_margin)
     )
-    assert (np.diff(one.proven.astype(int)) <= 0).all()
-    assert 0 < one.proven.sum() < len(one.proven)
-    for proven in (True, False):
-        assert (np.diff(shares[one.proven == proven]) < 2e-6).all()
+    assert (np.diff(shares) < 2e-6).all()
     size = TRAY.box[[1, 0, 2]] if places.turned[0] else TRAY.box
     spacing = lattice_spacing(TRAY.box, 0.06)
     points = lattice_in(places.centre[0], np.ceil(size / spacing - 1e-6) * spacing, spacing)
@@ -193,20 +179,17 @@ def test_harder_tasks_are_never_easier():
         if harder.half_angle == TRAY.half_angle:
             assert set(fewer) <= set(most)
     larger = replace(TRAY, box=np.array([0.3, 0.15, 0.1]))
-    fields = [survey(robot, task, roll_of(robot, 1), 0.05) for task in (TRAY, larger)]
+    fields = [survey(robot, task, asked_of(robot, 1), 0.05) for task in (TRAY, larger)]
     assert fields[0].spacing == pytest.approx(fields[1].spacing)
-    bricks = np.zeros(np.array(fields[0].manipulability_any.shape) - 1, dtype=bool)
-    small, large = (fitting_places(fields[0], bricks, task.box) for task in (TRAY, larger))
+    small, large = (fitting_places(fields[0], task.box) for task in (TRAY, larger))
     assert 0 < len(large.slot) < len(small.slot)
     assert large.manipulability.max() <= small.manipulability.max()
 
 
 def test_no_place_that_is_chosen_is_another_turned_about_axis_1():
     """A box under a tool that points down is the same task wherever joint 1 stands."""
-    robot, roll = narrowed(load_robot("er3_600"), TRAY.margin), roll_of(load_robot("er3_600"), 1)
     places = places_of(load_robot("er3_600"), TRAY)
-    chosen = choose_places(robot, TRAY, places, roll, 3, 20_000)
-    centres = places.centre[chosen.row]
+    centres = places.centre[choose_places(load_robot("er3_600"), TRAY, places, 3)]
     assert len(centres) > 1
     for i, one in enumerate(centres):
         for other in centres[:i]:
@@ -227,13 +210,13 @@ def test_boxes_that_overlap_by_less_than_half_are_not_chosen_both():
         np.full(count, MIXED),
         np.linspace(1.0, 0.5, count),
         np.full(count, np.nan),
-        np.zeros(count, dtype=bool),
     )
-    chosen = choose_places(robot, task, places, roll_of(robot, 1), count, 0)
-    assert chosen.refuted == 0
-    assert chosen.row == [0, 6]  # the one on top; turned boxes reach 50 mm along both axes
+    assert choose_places(robot, task, places, count) == [
+        0,
+        6,
+    ]  # the one on top; turned boxes reach 50 mm along both axes
     farther = replace(places, centre=places.centre + 0.0051 * (steps > 0.04))
-    assert choose_places(robot, task, farther, roll_of(robot, 1), count, 0).row == [0, 4, 5, 6]
+    assert choose_places(robot, task, farther, count) == [0, 4, 5, 6]
 
 
 def test_a_turned_base_turns_the_places():
@@ -248,73 +231,12 @@ def test_a_turned_base_turns_the_places():
     assert key == expected
 
 
-@pytest.mark.parametrize(
-    ("height", "answer"), [(0.3 + 0.55, PROVEN), (0.3 + 0.85, REFUTED), (0.3 + 0.30, REFUTED), (0.3 - 0.55, PROVEN)]
-)
-def test_an_arm_without_limits_serves_what_lies_in_its_shell(height, answer):
-    """All directions at every point: the ball of 0.1 m about each must lie between 0.2 and 1.0 m from the shoulder."""
-    robot = shell_arm()
-    task = Task(np.array([0.3, 0.2, 0.1]), np.array([0.0, 0.6, 0.8]), np.pi, -9, 0)
-    centre = np.array([0.05, -0.02, height])
-    assert prove_place(robot, task, centre, False, MIXED, roll_of(robot, 1), most_poses=400_000)[0] == answer
-
-
-def nearest_and_farthest(centre: np.ndarray, half: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Distances, m, of the points of boxes (..., 3) under a tool that points down from the shell arm's shoulder."""
-    away = np.abs(centre + np.array([0.0, 0.0, 0.1 - 0.3]))  # the wrist centre stands 0.1 m above the tool
-    return np.linalg.norm(np.maximum(away - half, 0), axis=-1), np.linalg.norm(away + half, axis=-1)
-
-
-@pytest.mark.parametrize("turned", [False, True])
-def test_a_place_is_proven_up_to_where_its_farthest_corner_leaves_the_shell(turned):
-    task = Task(np.array([0.3, 0.2, 0.1]), DOWN, 0.0, -9, 0)
-    half = np.array([0.1, 0.15, 0.05] if turned else [0.15, 0.1, 0.05])
-    height = 0.3 - 0.1 - 0.05 + np.sqrt(1 - (half[0] + 0.3) ** 2 - (half[1] + 0.1) ** 2)
-    for step, answer in ((-1e-3, PROVEN), (0.01, REFUTED)):
-        centre = np.array([0.3, -0.1, height + step])
-        assert (nearest_and_farthest(centre, half)[1] < 1) == (answer == PROVEN)
-        found, _ = prove_place(shell_arm(), task, centre, turned, MIXED, roll_of(shell_arm(), 1), most_poses=100_000)
-        assert found == answer
-
-
-def test_the_bricks_that_are_proven_are_those_that_lie_in_the_shell():
-    robot, roll = shell_arm(), roll_of(shell_arm(), 1)
-    task = Task(np.array([0.3, 0.2, 0.1]), DOWN, 0.0, -0.86, 0)
-    field = survey(robot, task, roll, 0.1)
-    proven = proven_bricks(robot, task, field, roll)
-    corner = field.origin + np.moveaxis(np.indices(proven.shape), 0, -1) * field.spacing
-    nearest, farthest = nearest_and_farthest(corner + field.spacing / 2, field.spacing / 2)
-    above = corner[..., 2] > task.lowest - 1e-9
-    assert not (proven & ~(above & (nearest > 0.2) & (farthest < 1))).any()
-    assert proven[above & (nearest > 0.21) & (farthest < 0.99)].all()
-    assert proven.sum() > 1000
-
-
-@pytest.mark.long
-def test_a_tool_aside_is_proven_by_rolls(random):
-    robot = shell_arm(*NARROW, tool=TOOL_ASIDE)
-    roll = roll_of(robot, 6)
-    assert not roll.free
-    task = Task(np.array([0.08, 0.06, 0.04]), DOWN, np.radians(5), 0.0, 0.15)
-    field = survey(robot, task, roll, 0.1)
-    places = fitting_places(field, proven_bricks(robot, task, field, roll), task.box)
-    chosen = choose_places(robot, task, places, roll, 1, 300_000)
-    assert chosen.proven == [True]
-    row = chosen.row[0]
-    size = task.box[[1, 0, 2]] if places.turned[row] else task.box
-    # What a patch's middle reaches by one roll, its members reach by a roll turned with them: ask many rolls.
-    many = roll_of(robot, 120)
-    T = random_service(task, places.centre[row], size, many, random, 300)
-    within = inverse_batch(robot, T.reshape(-1, 4, 4)).within_limits.reshape(300, 120, 8)
-    assert within.any(axis=(1, 2)).all()
-
-
 def test_a_box_too_large_stands_nowhere():
     task = replace(TRAY, box=np.array([1.5, 1.5, 0.5]))
     places = places_of(load_robot("er3_600"), task, 0.2)
     assert len(places.slot) == 0
     robot = load_robot("er3_600")
-    assert choose_places(robot, task, places, roll_of(robot, 1), 5, 1000).row == []
+    assert choose_places(robot, task, places, 5) == []
 
 
 def test_what_is_level_is_a_support_and_a_box_fits_on_it_where_all_of_it_lies_over_it(random):

@@ -1,4 +1,4 @@
-"""Volumes and areas of arms whose first joint slides or goes with others, and of surfaces, against computations that
+"""Volumes of arms whose first joint slides or goes with others, against computations that
 share no code with the proof: formulas, forward kinematics by hand, and SciPy's bounded least squares."""
 
 from __future__ import annotations
@@ -8,9 +8,8 @@ import pytest
 from scipy.optimize import least_squares
 
 from er3a.robots.robot import CombinedLimit, Robot
-from er3a.workspace.general_proof import surface_of
 from er3a.workspace.proven import EMPTY, FILLED, Proven, prove_robot
-from testing.arms import DEG, dh_matrix, gantry, made_of, palletiser, placement, tools_by_hand
+from testing.arms import DEG, dh_matrix, gantry, made_of, placement, tools_by_hand
 
 TILTED = placement([0.3, -0.2, 0.5], [0.4, -0.7, 1.1])
 ARM = [
@@ -56,7 +55,8 @@ def slide_in_a_sum() -> Robot:
     return made_of([("P", 0, 90, 0, -300, 900), *ARM], combined=(limit,), base=TILTED)
 
 
-MADE = [on_a_track, skew_gantry, lift, sum_with_joint_1, follows_joint_1, slide_in_a_sum]
+WITH_JOINT_1 = [sum_with_joint_1, follows_joint_1, slide_in_a_sum]
+MADE = [on_a_track, skew_gantry, lift, *WITH_JOINT_1]
 
 
 def point_by_hand(robot: Robot, q: np.ndarray) -> np.ndarray:
@@ -98,7 +98,7 @@ def states(proven: Proven, points: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("make", MADE, ids=lambda make: make.__name__)
 def test_empty_cells_hold_no_point_and_filled_ones_are_reached(make, random):
     robot = make()
-    proven = prove_robot(robot, 1500, 500, 1)
+    proven = prove_robot(robot, 1500, 1)
     span = robot.upper - robot.lower
     q = robot.lower + span * np.clip(random.uniform(-0.2, 1.2, (8000, robot.joints)), 0, 1)  # many at limits
     q = np.array([row for row in q if not beyond_sums(robot, row).any()])
@@ -108,13 +108,13 @@ def test_empty_cells_hold_no_point_and_filled_ones_are_reached(make, random):
 
     box = random.uniform(points.min(axis=0), points.max(axis=0), (4000, 3))
     filled = box[states(proven, box) == FILLED][:3]
-    assert len(filled) == 3
+    assert len(filled) == (0 if make in WITH_JOINT_1 else 3)  # these are bounded by lengths alone
     assert all(is_reached(robot, point, random) for point in filled)
 
 
 @pytest.mark.long
 def test_the_volume_of_a_gantry_lies_in_its_bracket():
-    proven = prove_robot(gantry(), 500, 500, 1)
+    proven = prove_robot(gantry(), 500, 1)
     lower, upper = proven.proof.bounds
     assert lower < 1.2 * 0.8 * 0.5 < upper
     assert lower > 0.8 * upper
@@ -126,54 +126,13 @@ def test_an_ur5_on_a_track_is_bounded_to_a_tenth():
         *(("R", 0, 90, 89.2, -360, 360), ("R", -425, 0, 0, -360, 360), ("R", -392.25, 0, 0, -360, 360)),
         *(("R", 0, 90, 109.15, -360, 360), ("R", 0, -90, 94.65, -360, 360), ("R", 0, 0, 82.3, -360, 360)),
     ]
-    assert prove_robot(made_of([("P", 0, 90, 0, 0, 2000), *rows]), 8000, 500, 1).proof.width < 0.1
+    assert prove_robot(made_of([("P", 0, 90, 0, 0, 2000), *rows]), 8000, 1).proof.width < 0.1
 
 
 @pytest.mark.long
 def test_a_sphere_that_slides_has_the_volume_of_a_formula():
     """A ball's shell is swept along the track: no void is left in a shell that is moved by more than its hole."""
     rows = [("P", 0, 0, 0, 0, 800), ("R", 0, 90, 0, -180, 180), ("R", 0, -90, 0, -180, 180), ("P", 0, 0, 0, 100, 400)]
-    lower, upper = prove_robot(made_of(rows), 2000, 500, 1).proof.bounds
+    lower, upper = prove_robot(made_of(rows), 2000, 1).proof.bounds
     assert lower < 4 / 3 * np.pi * 0.4**3 + np.pi * 0.4**2 * 0.8 < upper
     assert lower > 0.8 * upper
-
-
-def planar(*rows: tuple) -> Robot:
-    return made_of(list(rows), base=TILTED)
-
-
-def ring(lower: float, upper: float, turn: float) -> float:
-    return turn / 2 * (upper**2 - lower**2)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("robot", "kind", "area"),
-    [
-        (planar(("R", 50, 90, 0, 20, 20), ("R", 300, 0, 0, -180, 180), ("R", 100, 0, 0, -150, 150)), "plane",
-         ring(np.sqrt(0.1 + 0.06 * np.cos(150 * DEG)), 0.4, 2 * np.pi)),
-        (planar(("R", 0, 90, 0, -150, 150), ("P", 0, 0, 0, 200, 400)), "plane", ring(0.2, 0.4, 300 * DEG)),
-        (planar(("R", 400, 0, 100, -180, 180), ("R", 300, 0, 50, -150, 150)), "plane",
-         ring(np.sqrt(0.25 + 0.24 * np.cos(150 * DEG)), 0.7, 2 * np.pi)),
-        (planar(("P", 0, -90, 0, 0, 900), ("P", 0, 0, 0, 0, 600)), "plane", 0.54),
-        (planar(("R", 0, -90, 300, -180, 180), ("R", 0, 90, 0, -60, 60), ("R", 0, 0, 500, -180, 180)), "sphere",
-         2 * np.pi * 0.25 * (1 - np.cos(60 * DEG))),
-    ],
-    ids=["locked_joint_1", "arm_that_lengthens", "two_links", "two_slides", "spherical"],
-)  # fmt: skip
-def test_areas_lie_in_their_brackets(robot, kind, area):
-    found = surface_of(robot, 3000, 1)
-    assert found.kind == kind
-    assert found.lower < area < found.upper
-    assert found.lower > 0.85 * found.upper
-
-
-def test_what_two_joints_sweep_of_a_torus_is_its_area():
-    found = surface_of(planar(("R", 300, 90, 200, -170, 170), ("R", 100, 0, 0, -180, 180)), 1000, 1)
-    assert (found.kind, found.lower) == ("other", None)
-    assert found.upper == pytest.approx(340 * DEG * 2 * np.pi * 0.3 * 0.1, rel=1e-6)
-
-
-@pytest.mark.parametrize("robot", [palletiser(), planar(("R", 400, 0, 0, -90, 90))], ids=["space", "line"])
-def test_arms_that_move_on_no_surface_have_none(robot):
-    assert surface_of(robot, 1000, 1) is None

@@ -23,11 +23,11 @@ from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.jit import inner_kernel, kernel
 
 STEP = np.radians(2.0)  # largest joint move between two points of a curve
-MAX_POINTS = 1200
+MAX_POINTS, FEW_POINTS = 1200, 30
 REGULAR = 1e-6  # pivots of J J^T above this part of the largest diagonal entry
-TRUNCATED = 1e-5  # singular values below this part of the largest are no directions
+TRUNCATED = 1e-9  # singular values below this part of the largest are no directions: rounding, not a small bend
 SOLVES = 1e-11
-ON_CURVE = 1e-9
+ON_CURVE = 2e-10  # of each component, in parts of the size: sums of three stay below the 1e-9 that rows are held to
 SOLVES_AS_ROOT = 1e-12
 ABOVE_ROUNDING = 1e-15  # of the trace
 FEW_HALVINGS = 6
@@ -286,7 +286,10 @@ def trace(posed: Posed, x: Reals, v: Reals, points: Reals) -> tuple[int, int]:
 
 @kernel
 def between(posed: Posed, points: Reals, at: Reals, out: Reals) -> None:
-    """Fill ``out`` (k, n) with the curve's points at ``at`` (k,), counted in points of the polyline; NaN if lost."""
+    """Fill ``out`` (k, n) with the curve's points at ``at`` (k,), counted in points of the polyline.
+
+    Where nothing is found between two points it is the nearer one of them.
+    """
     n = points.shape[1]
     e, J = np.empty(6), np.empty((6, n))
     for i in range(at.shape[0]):
@@ -294,7 +297,7 @@ def between(posed: Posed, points: Reals, at: Reals, out: Reals) -> None:
         share = at[i] - low
         out[i] = (1.0 - share) * points[low] + share * points[low + 1]
         if not onto_curve(posed, out[i], e, J) < ON_CURVE:
-            out[i] = np.nan
+            out[i] = points[low + int(share > 0.5)]
 
 
 @inner_kernel
@@ -415,8 +418,12 @@ class PoseChain:
         return self._in_m(out[:count])
 
     def moves(self, x: Reals) -> bool:
-        """Whether joint values (n,) that solve the pose can move with the tool at rest."""
-        return free_direction(self.posed, self._scaled(x), np.empty(len(x))) > 0
+        """Whether joint values (n,) that solve the pose can move on and on with the tool at rest."""
+        start, v = self._scaled(x), np.empty(len(x))
+        if free_direction(self.posed, start, v) == 0:
+            return False
+        points = np.empty((FEW_POINTS, len(x)))
+        return any(trace(self.posed, start, ahead, points)[1] != LOST for ahead in (v, -v))
 
     def curve(self, x: Reals) -> TracedCurve | None:
         """The curve through joint values (n,) that solve the pose; None if they can't move with the tool at rest."""

@@ -127,9 +127,9 @@ def _reach(
     panels[0].set_ylabel("z (mm)")
     return Picture(
         figure,
-        tr("Sections through what the tool reaches of three tables, with random samples, exact border and void"),
+        tr("Sections through what the tool reaches of three tables, with random samples, border and void"),
         tr(
-            "What the tool reaches, folded about axis 1: samples as the article draws them, the exact border, and the "
+            "What the tool reaches, folded about axis 1: samples as the article draws them, the border, and the "
             "middle of the largest enclosed void (star). The printed table's void is at z = {z} mm, above the base.",
             z=fixed(numbers.printed.void_mm[2], 0) if numbers.printed.void_mm else "–",
         ),

@@ -91,7 +91,7 @@ def export_urdf(
     """Write a robot as URDF."""
     from er3a.files.kept_files import write_atomically
     from er3a.files.robot_library import load_robot
-    from er3a.formats.urdf import assumed_pairs, export_srdf, pairs_checked_in_part, pairs_not_checked
+    from er3a.formats.urdf import assumed_pairs, export_srdf, pairs_not_checked
     from er3a.formats.urdf import export_urdf as urdf_text
 
     arm = load_robot(robot)
@@ -102,11 +102,6 @@ def export_urdf(
             options.print_note(f"{srdf}: {rests}")
         for pair in pairs_not_checked(arm):
             options.print_note(f"{srdf}: {pair} overlap where no arm can; their shapes are in error, not checked")
-        for pair in pairs_checked_in_part(arm):
-            told = (
-                "are disabled, as they touch at their joint; er3a checks the rest of them, but who reads the SRDF won't"
-            )
-            options.print_note(f"{srdf}: {pair} {told}")
     if arm.combined:
         options.print_note(f"{output}: limits on sums of joints are left out, as a URDF has no place for them")
     for file, text in texts.items():
@@ -167,14 +162,10 @@ def _print_plan(arm: Robot, rows: Sequence[Measurement], count: int, fixed: Sequ
     options.print_json(plan_record(proposed)) if as_json else print(plan_lines(proposed, arm))
 
 
-def _check_options(file: Path | None, output: Path | None, html: Path | None, rrd: Path | None, words: str) -> None:
-    """Before the long work begins: a language, positions where they are to be shown, a name for a robot."""
+def _check_options(output: Path | None, words: str) -> None:
+    """Before the long work begins: a language, a name for a robot."""
     if words not in LANGUAGES:
         raise Er3aError(f"--language is '{words}'; known: {', '.join(LANGUAGES)}")
-    if file is None and (html or rrd):
-        raise Er3aError(
-            f"--{'html' if html else 'rrd'} shows measured positions; give a CSV of them, not a reference set"
-        )
     if output and not re.fullmatch(NAME_PATTERN, output.stem):
         problem = f"'{output.stem}' can't be a robot's name"
         raise InputError(output, "--output", problem, "Use a to z, 0 to 9, - and _, 64 at most, as in mine.yaml")
@@ -200,7 +191,7 @@ def _write_calibrated(corrected: Robot, record: dict[str, object], output: Path)
 @options.app.command(rich_help_panel=options.ROBOT_FILES)
 def calibrate(
     robot: Annotated[str, typer.Argument(metavar="ROBOT", help="a robot's name or file: the table to start from")],
-    measurements: Annotated[str, typer.Argument(help="a CSV of measured positions, or a reference set's name")],
+    measurements: Annotated[Path, typer.Argument(help="a CSV of measured positions")],
     *,
     output: Annotated[
         Path | None, typer.Option(help="the robot file to write, and NAME_model.json with all terms (default: none)")
@@ -228,26 +219,21 @@ def calibrate(
     from er3a.calibration.outcomes import CalibrationError
     from er3a.files.by_name import calibrate as calibrate_robot
     from er3a.files.by_name import load_measurements
-    from er3a.files.reference_sets import load_references
     from er3a.files.robot_library import load_robot
     from er3a.pipeline.messages.calibration import calibration_record, held_back_lines, kept_lines, lines_of
     from er3a.pipeline.messages.say import say
 
-    file = Path(measurements) if measurements.lower().endswith(".csv") else None
-    _check_options(file, output, html, rrd, words)
+    _check_options(output, words)
     arm = load_robot(robot)
-    rows = load_measurements(file, arm) if file else ()
+    rows = load_measurements(measurements, arm)
     if plan:
-        if file is None:
-            raise Er3aError("--plan takes measured positions; give a CSV of them, not a reference set")
-        check_poses(rows, arm, file)
+        check_poses(rows, arm, measurements)
         _print_plan(arm, rows, plan, [each.value for each in fixed or ()], as_json)
         return
     others = load_measurements(held_back, arm) if held_back else ()
     try:
         with shown_work(f"{robot}: estimating corrections"):
-            source = file or load_references(measurements, arm)
-            found = calibrate_robot(arm, source, [each.value for each in fixed or ()])
+            found = calibrate_robot(arm, measurements, [each.value for each in fixed or ()])
     except CalibrationError as error:
         raise Er3aError(say(error.finding)) from None
     corrected = _renamed(found, output.stem if output else f"{arm.name}_calibrated")
@@ -257,7 +243,7 @@ def calibrate(
     if html or rrd:
         from er3a.pipeline.viewing.calibration import measured_errors, record_calibration, write_calibration
     if html:
-        command, files = ["er3a", *sys.argv[1:]], [given for given in (Path(robot), file) if given and given.is_file()]
+        command, files = ["er3a", *sys.argv[1:]], [given for given in (Path(robot), measurements) if given.is_file()]
         shown = partial(write_calibration, command=command, files=files, corrected=corrected, recording=rrd)
         with using(words):
             shown(arm, rows, found, html, held_back=others)

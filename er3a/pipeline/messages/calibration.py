@@ -32,7 +32,7 @@ TERMS = {
     "ripple": N_("{turns} times a turn"),
     "coupling": N_("coupled to J{by}"),
 }
-KINDS = {"place": N_("place"), "plane": N_("plane"), "pair": N_("pair"), "bar": N_("bar")}
+KINDS = {"place": N_("place"), "plane": N_("plane")}
 VERDICTS = {
     "taken": N_("taken"),
     "not_lower": N_("left: poses left out are not met better"),
@@ -51,7 +51,6 @@ def lines_of(found: Calibration, fitted: Sequence[Measurement] = (), others: Seq
     lines = [
         *([] if found.fits else [say(found.conclusion)]),
         *held_back_warning(found, fitted, others),
-        *scale_texts(found),
         *_summary(found),
         *warning_texts(found),
         f"{found.coordinates} coordinates at {found.poses} poses; estimated: {level(found.level)}",
@@ -79,7 +78,6 @@ def lines_of(found: Calibration, fitted: Sequence[Measurement] = (), others: Seq
     ]
     lines += [f"{term_name(each)}: {_coefficients(each)}, in the robot file as its coupling" for each in found.ratios]
     lines += [f"says nothing: {text}" for text in idle_texts(found)]
-    lines += bar_texts(found)
     if found.scatter > MUCH_SCATTER:
         lines.append("warning: the residuals exceed the stated standard deviations, so errors may exceed the intervals")
     if found.deviation_mm is None and found.scatter < LITTLE_SCATTER:
@@ -99,23 +97,6 @@ def lines_of(found: Calibration, fitted: Sequence[Measurement] = (), others: Seq
         lines.append(f"to estimate more: {say(found.more)}")
     lines += [f"not examined: {text}" for text in not_examined_texts(found, others) if fitted]
     return "\n".join(lines)
-
-
-def scale_texts(found: Calibration) -> list[str]:
-    """That one factor explains the corrections of all lengths, which a measuring device with a wrong scale makes."""
-    scale = found.common_scale
-    if scale is None:
-        return []
-    return [
-        tr(
-            "One factor explains the corrections of all lengths: {factor:.5f} ± {half_width:.5f} (95 %, from "
-            "{lengths}). A wrong scale of the measuring device does the same, and these measurements can't tell which "
-            "is wrong. Check the device by a known length, and its units and temperature.",
-            factor=scale.factor,
-            half_width=scale.half_width,
-            lengths=", ".join(scale.lengths),
-        )
-    ]
 
 
 def not_examined_texts(found: Calibration, others: Sequence[Measurement] = ()) -> list[str]:
@@ -208,10 +189,6 @@ def plan_lines(found: Plan, robot: Robot) -> str:
     lines = [f"these measurements settle {len(found.settled)} of {able} numbers that such measurements can settle"]
     lines += [f"settled by more poses: {', '.join(found.lacking)}"] if found.lacking else []
     lines += [f"settled by no poses: {say(reason)}" for reason in found.held]
-    lines += [
-        f"bar_{name}: the table is too far off for its points to tell; calibrate first, and plan from the robot file"
-        for name in found.undetermined_bars
-    ]
     if found.beyond:
         beyond = (
             f"J{each.joint} {'beyond' if each.above else 'below'} {as_text(each.value, '.4g')} {units[each.joint - 1]}"
@@ -222,8 +199,7 @@ def plan_lines(found: Plan, robot: Robot) -> str:
     for number, each in enumerate(found.proposals, 1):
         pose = ", ".join(as_text(value, ".2f") for value in each.pose)
         what = f"  {each.kind} {each.name}" if each.kind else ""
-        length = f", {each.length_mm:.2f} mm" if each.kind == "pair" else ""
-        lines.append(f"{number:>4}  ({pose}){what}{length}")
+        lines.append(f"{number:>4}  ({pose}){what}")
     lines.append("half of the 95 % interval, with the measurements and with these poses as well:")
     for width in found.widths:
         now = "not settled" if width.now is None else f"{width.now:.4f}"
@@ -238,7 +214,6 @@ def plan_record(found: Plan) -> dict[str, object]:
         "settled": list(found.settled),
         "lacking": list(found.lacking),
         "held": [say(reason) for reason in found.held],
-        "undetermined_bars": list(found.undetermined_bars),
         "proposals": [vars(each) for each in found.proposals],
         "beyond": [vars(each) for each in found.beyond],
         "half_widths": [vars(each) for each in found.widths],
@@ -322,25 +297,6 @@ def held_back_lines(found: Calibration, fitted: Sequence[Measurement], others: S
         alone = held_back_line(fitted, others, found.without_terms().distances_mm(others))
         lines.append(f"as in a robot file, {alone}")
     return lines
-
-
-def bar_texts(found: Calibration) -> list[str]:
-    """How long the bars are whose lengths were unknown."""
-    return [
-        tr(
-            "The length of the bar {name} is not settled: its points lie to one side of its socket, for what the fit "
-            "leaves of them.",
-            name=each.name,
-        )
-        if each.length_mm is None or each.half_width_mm is None
-        else tr(
-            "The bar {name} is {length:.3f} mm long, ± {half_width:.3f} mm (95 %).",
-            name=each.name,
-            length=each.length_mm,
-            half_width=each.half_width_mm,
-        )
-        for each in found.bars
-    ]
 
 
 def idle_texts(found: Calibration) -> list[str]:
@@ -482,7 +438,6 @@ def calibration_record(
         "held": [say(reason) for reason in found.held],
         "more": say(found.more) if found.more else None,
         "ratios": [vars(each) for each in found.ratios],
-        "bars": [vars(each) for each in found.bars],
         "idle": [vars(each) for each in found.idle],
         "set_aside": [{"row": each.row, "distance_mm": each.distance_mm} for each in found.outliers],
         "left_out": vars(found.left_out) if found.left_out else None,
@@ -493,7 +448,6 @@ def calibration_record(
         "held_back": _held_back(found, others) if others else None,
         "held_back_warning": " ".join(held_back_warning(found, fitted, others)) or None,
         "held_back_contradicts": held_back_contradicts(found, fitted, others),
-        "scale_warning": " ".join(scale_texts(found)) or None,
         "not_examined": not_examined_texts(found, others) if fitted else [],
     }
 

@@ -264,11 +264,9 @@ def why(
                 count=TRIED,
             )
         case "guessed":
-            return tr(
-                "Joints hold them, and the table does not say how long the link between them is, or how far apart they "
-                "lie side by side, so the guessed shapes overlap in a tenth or more of the joint vectors tried, or one "
-                "lies nearly whole in the region around the joint. Not checked: give shapes in the robot's file."
-            )
+            return tr("Shapes guessed from the table are too coarse here. Not checked: give the robot's shapes.")
+        case "joined" if not left_out_mm:
+            return tr("A joint joins them. Not checked.")
     if not left_out_mm:
         return tr("They collide at joint values ({witness}).", witness=witness)
     joined = tr(

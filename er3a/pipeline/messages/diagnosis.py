@@ -13,13 +13,9 @@ from er3a.calibration.outcomes import (
     NotToldApart,
 )
 from er3a.diagnosis.conclusions import (
-    FlangePositionDecides,
     MainFault,
     MostLikelyFault,
     NoFewFaultsExplain,
-    NothingToExplain,
-    Resolution,
-    TooSmallToTell,
 )
 from er3a.diagnosis.faults import (
     BaseElsewhere,
@@ -40,7 +36,7 @@ from er3a.diagnosis.faults import (
     WrongUnit,
 )
 from er3a.pipeline.language import N_, as_text, with_unit
-from er3a.pipeline.messages.say import Plural, by, joined, say, say_as, sentence, texts, word
+from er3a.pipeline.messages.say import Plural, joined, say, say_as, sentence, texts, word
 
 ENTRIES = {
     "a": N_("column a"),
@@ -90,11 +86,8 @@ TEXTS = texts(
     {
         "corrected": "corrected: {faults}",
         "alike": "{faults} (or {more} more that these references can't tell from it)",
-        "close": "{first} and {second} ({correlation})",
         "swapped_rows": "rows {first} and {second} are swapped",
         "swapped_limits": "limits of joints {first} and {second} are swapped",
-        "nothing_decides": "nothing can: they describe the same arm",
-        "orientation_decides": "the flange's position does not, but its orientation does, or a point off axis 6",
         "no_reference": "There are no data for a diagnosis.",
         "no_fault_stands_out": Plural(
             "missed",
@@ -106,11 +99,6 @@ TEXTS = texts(
         ),
         "wrong_limit#lower": "lower limit is {given:g} deg, {fits} deg fits",
         "wrong_limit#upper": "upper limit is {given:g} deg, {fits} deg fits",
-        "limit_decides": by(
-            "side",
-            lower="the lower limit of joint {joint} would distinguish them",
-            upper="the upper limit of joint {joint} would distinguish them",
-        ),
         "faults": "{fault} and {second_fault}",
         "wrong_alpha_sign": "alpha has the wrong sign ({given_deg:g} deg given, {fits_deg:g} deg fits)",
         "wrong_alpha#missing": "alpha {fits} deg missing",
@@ -134,27 +122,13 @@ TEXTS = texts(
             "the flange is defined elsewhere: ({x:g}, {y:g}, {z:g}) mm from there, turned by {turn_deg:g} deg"
         ),
         "counted_from_ground": "counted from the ground: the table's J{joint} is the references' {sum}",
-        "flange_position_decides#share": (
-            "the flange's position at joints ({pose}) deg would distinguish {share:.0%} of the pairs, by up to {most}"
-        ),
-        "flange_position_decides#all": (
-            "the flange's position at joints ({pose}) deg would distinguish all, by up to {most}"
-        ),
         "met": Plural(
             "references",
             "Nothing to explain: the one reference about poses, axes and limits is met.",
             "Nothing to explain: all {count} references about poses, axes and limits are met. (Not among them: reach, "
             "speeds, and references that contradict each other.)",
         ),
-        "resolution#length": "A single wrong length is detected from {length_mm:.2g} mm on.",
-        "resolution#angle": "A single wrong angle is detected from {angle_deg:.2g} deg on.",
-        "resolution#half_turns": "An error of 180 deg in {entries} would not be detected.",
-        "resolution#unseen": "No error in {entries} would be detected.",
         "named": "Most likely fault: {hypothesis}.",
-        "too_small_to_tell": (
-            "The disagreement ({residual} {unit}) is too small to tell which of {count} faults causes it: "
-            "{candidates}. From about {distinct} {unit} on these references distinguish them, where they can at all."
-        ),
         "mostly": "The best hypothesis tried: {hypothesis}, which still exceeds the references' uncertainty.",
         "unexplained": (
             "None of the {tried} hypotheses tried, of one fault or two, explains the data: of {before} {unit} each "
@@ -173,11 +147,6 @@ TEXTS = texts(
             "no corrections make the table fit: after {steps} steps the positions are still {rest_mm:.3g} mm off. The "
             "table has a gross fault or belongs to another arm, or lines hold the joints of other points; "
             "er3a.diagnose finds single faults"
-        ),
-        "sockets_beside": (
-            "the corrected table leaves {rest_mm:.3g} mm, which look like tilted axes with sockets beside the plane in "
-            "which the arm moves: no entry is settled. Put the sockets of {bars:, } into that plane, or measure "
-            "coordinates"
         ),
         "corrections_found": "The positions indicate corrections of {entries:, }: their 95 % intervals exclude 0.",
         "no_correction_found": Plural(
@@ -335,50 +304,8 @@ def _(found: CountedFromGround) -> str:
 
 
 @say.register
-def _(found: FlangePositionDecides) -> str:
-    pose = ", ".join(as_text(angle, "g") for angle in found.pose_deg)
-    most = f"{found.most_mm:.0f} mm" if found.most_mm >= 10 else f"{found.most_mm:.1f} mm"
-    if found.share == 1:
-        return say_as(found, "all", pose=pose, most=most)
-    return say_as(found, "share", pose=pose, most=most)
-
-
-@say.register
-def _(found: NothingToExplain) -> str:
-    met = say_as(found)
-    return joined([met, say(found.resolution) if found.resolution else ""], " ")
-
-
-@say.register
-def _(found: Resolution) -> str:
-    texts = []
-    if found.length_mm is not None:
-        texts.append(say_as(found, "length"))
-    if found.angle_deg is not None:
-        texts.append(say_as(found, "angle"))
-    if found.half_turns:
-        entries = joined(found.half_turns, ", ")
-        texts.append(say_as(found, "half_turns", entries=entries))
-    if found.unseen:
-        entries = joined(found.unseen, ", ")
-        texts.append(say_as(found, "unseen", entries=entries))
-    return joined(texts, " ")
-
-
-@say.register
 def _(found: MostLikelyFault | MainFault) -> str:
     return say_as(found, hypothesis=_residual_falls(found))
-
-
-@say.register
-def _(found: TooSmallToTell) -> str:
-    return say_as(
-        found,
-        residual=shown(found.residual),
-        count=len(found.candidates),
-        candidates=_candidates(found.candidates),
-        distinct=shown(found.distinguishability),
-    )
 
 
 @say.register

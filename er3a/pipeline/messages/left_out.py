@@ -16,12 +16,6 @@ TEXTS = texts(
     {
         "link#base": "base",
         "link#number": "link {number}",
-        "clearance.unmeasured": "Clearance does not count these until they overlap: {pairs}.",
-        "clearance.unmeasured#apart": (
-            "Clearance does not count these until they overlap: {pairs}. In the poses here they come within "
-            "{apart:.1f} mm beside the joint that they meet at."
-        ),
-        "clearance.allowed": "Clearance does not count these, which the robot's file allows: {pairs}.",
         "left_out.obstacles": (
             "obstacles: none are given, so the arm was checked only against itself and what it carries"
         ),
@@ -47,21 +41,11 @@ TEXTS = texts(
         "left_out.objects_out_of_view": "whether the camera can have seen objects that lie out of its stated view",
         "left_out.unexamined_pairs": "collisions of pairs whose shapes can't be right",
         "left_out.guessed_pairs": (
-            "collisions of these links, and of a tool on the second, with each other: they are neighbours, and shapes "
-            "guessed from the table can't show how near they come; only the joints' limits keep the links apart"
+            "collisions of these links with each other: the shapes guessed from the table are too coarse there"
         ),
         "left_out.allowed_pairs": ("collisions of pairs that the robot's file allows: they never meet, or always do"),
         "left_out.joined_pairs": (
-            "overlaps of these links where they meet at a joint, and how near they come; the rest of them is examined"
-        ),
-        "left_out.joined_whole": (
-            "collisions of these links: they meet at a joint, and one of them lies as a whole in the region around it "
-            "that is left out"
-        ),
-        "left_out.unmeasured_pairs": "how near these links, which meet at a joint, come elsewhere before they overlap",
-        "left_out.unmeasured_pairs#apart": (
-            "how near these links, which meet at a joint, come elsewhere before they overlap, but for the poses that "
-            "clearances are told of ({amount:.1f} mm there)"
+            "collisions of these links where a joint joins them: of meshes all, else those around the joint"
         ),
         "left_out.scene_shapes": "whether what stands in the cell is shaped and placed as the scene's file says",
         "left_out.shallow_overlaps": "overlaps of less than {amount:g} mm between the points measured",
@@ -195,7 +179,6 @@ TEXTS = texts(
         "left_out.table_entries": "entries of the table that independent references don't settle, signs included",
         "left_out.diagnosis": "which entry is wrong: diagnosis is for arms whose joints all turn",
         "left_out.more_faults": "tables with more wrong entries than one or two",
-        "left_out.calibration": "corrections of the table: the positions of these reference sets are not enough",
         "left_out.round_trips": "poses other than {amount:,.0f} random ones that were solved back",
         "left_out.near_singular_poses": "joint values at {amount:,.0f} random poses near singularities",
         "left_out.all_solutions": "whether the solutions found are all: no method here finds those of this arm",
@@ -216,12 +199,8 @@ TEXTS = texts(
         "left_out.hidden_voids": (
             "what voids lie in the {amount:.0f} % of the volume that so few proof_cells leave undecided"
         ),
-        "left_out.area": "the area that the tool point reaches, or one of its bounds",
-        "left_out.sampled_voids": "whether {amount:.0f} voids that are known from samples only are empty",
         "left_out.tool_directions": "tool directions between the {amount:,.0f} that were asked in each cell",
         "left_out.capability": "tool directions, and where a tray can stand",
-        "left_out.core": "where the tool reaches all directions",
-        "left_out.undecided_core": "{amount:.3g} L of which it is undecided whether the tool reaches all directions",
         "left_out.places": "where the tray can stand: a pose takes too long with this arm",
         "left_out.sampled_places": (
             "points and directions between those asked, at {amount:,.0f} places for the tray that pass by samples only"
@@ -284,8 +263,7 @@ def left_out_names(found: LeftOut, most: int | None = None) -> str:
 
 def left_out_text(found: LeftOut) -> str:
     """What was not examined, in the language in use."""
-    apart = "#apart" if found.subject == "unmeasured_pairs" and found.amount is not None else ""
-    return sentence(f"left_out.{found.subject}{apart}", amount=found.amount)
+    return sentence(f"left_out.{found.subject}", amount=found.amount)
 
 
 @say.register
@@ -305,12 +283,3 @@ def body_word(name: str) -> str:
 def pair_words(label: str) -> str:
     """Two bodies by their label in columns of text."""
     return tr(" and ").join(map(body_word, label.split("/")))
-
-
-def unmeasured_text(pairs: Iterable[str], apart_mm: float | None = None, allowed: Iterable[str] = ()) -> str:
-    """Which pairs, by their labels, no clearance counts until they overlap, and how near they come, if that is known;
-    and those that are ``allowed``. Empty where there are none."""
-    named, let = (joined(map(pair_words, each), ", ") for each in (pairs, allowed))
-    form = "clearance.unmeasured" if apart_mm is None else "clearance.unmeasured#apart"
-    found = sentence(form, pairs=named, apart=apart_mm) if named else ""
-    return joined([found, sentence("clearance.allowed", pairs=let) if let else ""], " ")

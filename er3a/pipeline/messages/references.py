@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from er3a.identifiability.evidence import PartEvidence
 from er3a.identifiability.proposals import LookAtMotion, MeasureAngle, MeasureLength
 from er3a.identifiability.statements import InconsistentWithOwnText, NotTheRobotDescribed
 from er3a.pipeline.language import N_, as_text, own_title, tr
@@ -133,8 +132,6 @@ TEXTS = texts(
         "measure_length#a": (
             "measure the distance {own_entry} between the z axes of frames {before} and {joint}, to ±{half_width:g} mm"
         ),
-        "part_off": "{part}: {status} (the tool could be off by {mm:.0f} mm, {deg:.0f} deg)",
-        "part": "{part}: {status}",
         "look_at_motion_from": (
             "in a cleared cell, at reduced speed (T1), jog +J{joint} a few degrees from ({own_pose}) deg and see "
             "whether {motion}, for somebody who stands behind the arm and looks along +x (left is +y)"
@@ -217,14 +214,6 @@ def _with_coordinate(vector: str, coordinate: str | None) -> str:
     if coordinate is None:
         return vector
     return sentence("coordinate_of", vector=vector, coordinate=LABELS.get(coordinate, coordinate))
-
-
-@say.register
-def _(found: PartEvidence) -> str:
-    part, status = word("part", PART_WORDS, found.code), word("status", STATUS_WORDS, found.status)
-    if not found.off.mm and not found.off.deg:
-        return sentence("part", part=part, status=status)
-    return sentence("part_off", part=part, status=status, mm=found.off.mm, deg=found.off.deg)
 
 
 @say.register

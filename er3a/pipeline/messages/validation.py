@@ -7,7 +7,6 @@ from collections.abc import Sequence
 
 import er3a.pipeline.messages.diagnosis
 import er3a.pipeline.messages.kinematics  # noqa: F401
-from er3a.diagnosis.conclusions import TooSmallToTell
 from er3a.diagnosis.faults import CountedFromGround, ReversedDirection, WrongOffset
 from er3a.identifiability.entries import GROUP_OF
 from er3a.identifiability.evidence import PART_OF_GROUP, PartName
@@ -375,7 +374,7 @@ def _(found: Contradicted) -> str:
 
 @say.register
 def _(found: DefinedOtherwise) -> str:
-    faults = () if found.diagnosis is None or isinstance(found.diagnosis, TooSmallToTell) else found.diagnosis.faults
+    faults = found.diagnosis.faults if found.diagnosis else ()
     joints = any(isinstance(fault, WrongOffset | ReversedDirection | CountedFromGround) for fault in faults)
     head = say_as(found, grades=_grades(found.grades), own_set=found.reference_set, checks=counted_checks(found.counts))
     meaning = say_as(found, "joints" if joints else "places")

@@ -16,7 +16,6 @@ from er3a.pipeline.stages.workspace import model
 from er3a.workspace.causes import (
     Disappears,
     Geometry,
-    OnlySampled,
     Relaxed,
     SeveralLimits,
     SingleChange,
@@ -26,20 +25,13 @@ from er3a.workspace.causes import (
 KEY_FIGURES = {
     "greatest_reach": N_("greatest reach from axis 1"),
     "enclosed_voids_lower": N_("enclosed voids, at least"),
-    "volume": N_("reached volume"),
     "volume_lower": N_("reached volume, at least"),
     "volume_upper": N_("reached volume, at most"),
-    "area_lower": N_("reached area, at least"),
-    "area_upper": N_("reached area, at most"),
     "hull_volume": N_("convex hull of the samples: holds voids and dents, misses the rim"),
     "least_reach": N_("least distance from axis 1"),
     "samples": N_("samples"),
 }
-VOID_STATUS = {"proven_empty": N_("proven empty"), "undersampled": N_("undersampled")}
 VOID_KINDS = {"enclosed": N_("enclosed"), "open": N_("open pocket")}
-STATUS = {"proven": N_("proven"), "sampled": N_("sampled")}
-SWEEPS = {"joint_2": N_("joint 2"), "joint_3": N_("joint 3"), "wrist": N_("wrist")}
-POINTS = {"tool_point": N_("tool point"), "wrist_centre": N_("wrist centre"), "flange": N_("flange")}
 
 
 ENTRIES = {
@@ -52,39 +44,21 @@ ENTRIES = {
 }
 TEXTS = texts(
     {
-        "workspace.flat": "The tool point moves on a line or not at all, so there is no volume.",
-        "workspace.undersampled": (
-            "Too few samples for cells this small: about {unseen_percent:.0f} % of the reachable cells hold no sample "
-            "yet, so voids can't be judged."
+        "workspace.flat": "The tool point moves on a surface, on a line or not at all, so there is no volume.",
+        "workspace.unsettled": (
+            "The proof leaves {undecided_percent:.2g} % of the volume undecided, so voids can't be judged."
         ),
-        "workspace.on_surface#sphere": (
-            "The tool point moves on a sphere and reaches at least {lower} m² and at most {upper} m² of it."
-        ),
-        "workspace.on_surface#unknown": "The tool point moves on a surface; its area was not computed.",
-        "workspace.on_surface#curved": (
-            "The tool point moves on a curved surface of at most {upper} m²: the area that two joints sweep; "
-            "parts swept twice count twice."
-        ),
-        "workspace.on_surface#plane": (
-            "The tool point moves on a plane and reaches at least {lower} m² and at most {upper} m² of it."
+        "workspace.no_void": (
+            "The proof finds no enclosed void; {undecided_percent:.2g} % of the volume is left undecided."
         ),
         "workspace.void_unexpected": (
             "An enclosed void of at least {litres} L lies at ({x}, {y}, {z}) mm, away from the shoulder, proven empty."
-        ),
-        "workspace.void_uncertain": (
-            "An enclosed void of {litres} L may lie at ({x}, {y}, {z}) mm, away from the shoulder; there is no "
-            "proof, and the samples can't tell."
         ),
         "workspace.void_at_shoulder": (
             "An enclosed void of at least {litres} L, centred at ({x}, {y}, {z}) mm, surrounds the shoulder: the "
             "arm can't fold far enough to reach it. No other enclosed void was found that would hint at a wrong "
             "limit; this confirms none."
         ),
-        "workspace.no_void#sampled": "The samples leave no enclosed void inside the hull; no proof.",
-        "workspace.no_void#undecided": (
-            "The proof finds no enclosed void; {undecided_percent:.2g} % of the volume is left undecided."
-        ),
-        "workspace.no_void#none": "The workspace holds no enclosed void.",
         "void_advice#cause": (
             "It has this cause: {cause}: check the limits, the zero and the direction of joints 2 and 3; never widen a "
             "limit of the arm for it."
@@ -104,11 +78,6 @@ TEXTS = texts(
         "single_change#deg": "{entry} = {tried} deg",
         "single_change#mm": "{entry} = {tried} mm",
         "single_change#sign": "{entry} = {tried}",
-        "void_only_sampled": "unknown: known from samples only",
-        "spherical_wrist": "spherical wrist",
-        "general_method": "general method, because {lacks}",
-        "tool_near_wrist": "its tool point is only {distance_mm:.3g} mm from the wrist centre",
-        "bounds_far_apart": "the method for spherical wrists leaves {percent:.3g} % between its bounds",
         "void_disappears#one": "disappears if {extended}",
         "void_disappears#two": "disappears if {first} or if {second}",
         "void_of_several_limits#only": "made by several limits together",
@@ -125,13 +94,6 @@ TEXTS = texts(
         "limit_extended#sum_upper_mm": "the upper limit of {sum} is extended to {limit} mm",
         "workspace.pockets": Plural("count", "{count} open pocket", "{count} open pockets"),
         "workspace.voids": Plural("count", "{count} enclosed void", "{count} enclosed voids"),
-        "workspace.rule": Plural(
-            "count",
-            "An enclosed void away from the shoulder often means a wrong limit or direction of joint 2 or 3. {count} "
-            "was found; widening one limit at a time points to joint 2 or 3 in {named} of {count} cases.",
-            "An enclosed void away from the shoulder often means a wrong limit or direction of joint 2 or 3. {count} "
-            "were found; widening one limit at a time points to joint 2 or 3 in {named} of {count} cases.",
-        ),
         "inverse_unknown": "no method here finds all inverse solutions of this arm",
         "joint_one_shared": (
             "joint 1 is coupled with other joints or limited together with them, so that what holds at one azimuth "
@@ -194,10 +156,6 @@ TEXTS = texts(
         ),
         "box.spare.manipulability": "manipulability {percent:.2g} % of that at {gap} mm",
         "box.spare.limits": "{least:.1f} deg from a joint limit instead of {here:.1f} deg",
-        "box.proven#all": "the tool point, {tilt}, reaches all of it (proven); {unchecked}",
-        "box.proven#upper": (
-            "the tool point, {tilt}, reaches all of it except the lowest {served_from} mm (proven); {unchecked}"
-        ),
         "box.sampled#all": "the tool point, {tilt}, reaches all points sampled in it; {unchecked}",
         "box.sampled#upper": (
             "the tool point, {tilt}, reaches all points sampled in it except the lowest {served_from} mm; {unchecked}"
@@ -211,20 +169,6 @@ TEXTS = texts(
         ),
     }
 )
-
-
-@say.register
-def _(found: model.OnSurface) -> str:
-    surface = found.surface
-    if surface.upper is None:
-        return say_as(found, "unknown")
-    upper = at_most(surface.upper, "m²")
-    if surface.lower is None:
-        return say_as(found, "curved", upper=upper)
-    lower = at_least(surface.lower, "m²")
-    if surface.kind == "plane":
-        return say_as(found, "plane", lower=lower, upper=upper)
-    return say_as(found, "sphere", lower=lower, upper=upper)
 
 
 @say.register
@@ -265,17 +209,8 @@ def entry_word(change: SingleChange) -> str:
 
 
 @say.register
-def _(found: model.VoidUncertain | model.VoidAtShoulder) -> str:
+def _(found: model.VoidAtShoulder) -> str:
     return say_as(found, **_place(found))
-
-
-@say.register
-def _(found: model.NoVoid) -> str:
-    if found.undecided_percent is not None:
-        return say_as(found, "undecided")
-    if found.proven:
-        return say_as(found, "none")
-    return say_as(found, "sampled")
 
 
 def _advice(cause: VoidCause) -> str:
@@ -285,7 +220,7 @@ def _advice(cause: VoidCause) -> str:
     return sentence("void_advice#cause", cause=say(cause))
 
 
-def _place(found: model.VoidUnexpected | model.VoidUncertain | model.VoidAtShoulder) -> dict[str, str]:
+def _place(found: model.VoidUnexpected | model.VoidAtShoulder) -> dict[str, str]:
     shown = {"x": found.x_mm, "y": found.y_mm, "z": found.z_mm}
     return {"litres": at_least(found.litres, "L")} | {
         key: str(round(value)).replace("-", "−") for key, value in shown.items()
@@ -380,7 +315,7 @@ def reached_text(placement: model.PlacementSummary, place: model.PlaceSummary, s
     tilt = sentence("box.tilt#down" if down else "box.tilt#along", cone=cone, axis=", ".join(f"{x:g}" for x in axis))
     form = "upper" if served_from_m > SERVED_ALL_M else "all"
     served, unchecked = millimetres([served_from_m]), sentence("box.unchecked")
-    return sentence(f"box.{place.status}#{form}", tilt=tilt, unchecked=unchecked, served_from=served)
+    return sentence(f"box.sampled#{form}", tilt=tilt, unchecked=unchecked, served_from=served)
 
 
 def run_again_text(summary: Summary, *, stand: bool) -> str:
@@ -425,8 +360,6 @@ def void_text(summary: Summary, *, confirmed: bool = True) -> tuple[str, str]:
     finding = summary.verdict.finding
     if isinstance(finding, model.NoVoid):
         return joined([sentence("void.none"), say(finding)], " "), ""
-    if isinstance(finding, model.VoidUncertain):
-        return say(finding), ""
     if not isinstance(summary, model.WorkspaceSummary) or not isinstance(
         finding, model.VoidAtShoulder | model.VoidUnexpected
     ):
@@ -454,7 +387,7 @@ def void_text(summary: Summary, *, confirmed: bool = True) -> tuple[str, str]:
 def judged_void(summary: model.WorkspaceSummary) -> model.VoidSummary:
     """The enclosed void that the verdict tells of."""
     voids = summary.enclosed_voids
-    unexpected = (void for void in voids if void.status == "proven_empty" and not void.holds_shoulder)
+    unexpected = (void for void in voids if not void.holds_shoulder)
     return next(unexpected, voids[0])
 
 
@@ -462,7 +395,7 @@ def _limits(cause: VoidCause) -> str:
     """The limits that make a void, or have a part in it; empty where none has."""
     if isinstance(cause, Disappears):
         limits = cause.limits
-    elif isinstance(cause, OnlySampled) or cause.most is None:
+    elif cause.most is None:
         return ""
     else:
         limits = (cause.most,)

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -196,11 +195,10 @@ def _changed_names(changed: Sequence[str]) -> str:
 
 
 def border_mm(workspace: WorkspaceResults | AbsentResults | None) -> list[list[list[float]]]:
-    """The arcs of the tool point's border in the section through axis 1: lists of (radius, height) in mm."""
+    """The outline of what may be reached in the section through axis 1: lists of (radius, height) in mm."""
     if not isinstance(workspace, WorkspaceResults):
         return []
-    border: pd.DataFrame = workspace.border.frame()
-    arcs = border[(border["point"] == BORDER_POINT) & (border["view"] == "section")].groupby("arc", sort=False)
+    arcs = workspace.border.frame().groupby("arc", sort=False)
     return [(arc[["rho_m", "z_m"]].to_numpy() * 1000).round(2).tolist() for _, arc in arcs]
 
 
@@ -299,7 +297,6 @@ def _draw_volume(axes: Axes, points: list[Point]) -> None:
     low, high = ([getattr(volume, bound) for volume in volumes] for bound in ("lower", "upper"))
     axes.fill_between(x, low, high, color=MODEL, alpha=0.25, linewidth=0, label=tr("proven bounds"))
     axes.vlines(x, low, high, color=MODEL, linewidth=1)
-    axes.plot(x, [volume.estimate for volume in volumes], ".-", color=MODEL, linewidth=0.8, label=tr("estimate"))
     axes.set_ylabel(tr("reached volume (m³)"))
     axes.legend(loc="best")
 
@@ -419,7 +416,7 @@ class Thumbnail:
 
 
 def thumbnail(robot: Robot, workspace: WorkspaceResults | AbsentResults | None) -> Thumbnail:
-    """Draw a robot: with the exact border where there is one, else the outline of the sampled hull, if any."""
+    """Draw a robot, with the outline of the sampled hull."""
     arm = skeleton(robot, np.zeros(robot.joints))[:, ::2] * 1000
     reach = [line * 1000 for line in _reach(workspace)] if isinstance(workspace, WorkspaceResults) else []
     corners = np.concatenate([arm, *reach])
@@ -429,12 +426,6 @@ def thumbnail(robot: Robot, workspace: WorkspaceResults | AbsentResults | None) 
 
 
 def _reach(workspace: WorkspaceResults) -> list[Reals]:
-    border = workspace.border
-    border = border.take((border.view == "side") & (border.point == "tool_point"))
-    if len(border):
-        arcs = [border.take(border.arc == arc) for arc in np.unique(border.arc)]
-        kept = [np.unique(np.linspace(0, len(arc) - 1, CORNERS).round().astype(int)) for arc in arcs]
-        return [np.column_stack([arc.rho_m, arc.z_m])[rows] for arc, rows in zip(arcs, kept)]
     flat = workspace.hull_vertices.point_m[:, ::2]
     if len(flat) < 3 or np.ptp(flat, axis=0).min() == 0:
         return []

@@ -6,7 +6,6 @@ from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from er3a.collision.along import bodies_of
 from er3a.collision.bodies import Bodies
@@ -21,7 +20,6 @@ from er3a.geometry.transforms import rotation_angle
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.results import NEVER_A_PASS, LeftOut, LeftOutSubject
-from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 from er3a.vision.calibration_set import CalibrationSet
 
@@ -32,7 +30,6 @@ def left_out_of_collisions(
     scene: Scene | None,
     tolerance_mm: float | None = None,
     arms: Iterable[tuple[str, Robot]] = (),
-    q_deg: ArrayLike | None = None,
 ) -> tuple[LeftOut, ...]:
     """What a check for collisions does not see.
 
@@ -41,16 +38,10 @@ def left_out_of_collisions(
     robot : that of the bodies, which may be an equal one that looks otherwise
     tolerance_mm : of overlaps that may go unnoticed between points of a motion; None where only points are checked
     arms : the robot with each tool that programs set, by the tool's name
-    q_deg : (N, n), joints that clearances are told of, NaN where they are not known; mm of those that slide
     """
 
-    def pairs(state: PairState, whole: bool = False) -> tuple[str, ...]:
-        others = ("meets", "undecided", "watched") if state == "joined" else ()  # some of their bodies are joined
-        return tuple(
-            f"{row.first}/{row.second}"
-            for row in bodies.matrix
-            if (row.state == state or (row.left_out and row.state in others)) and row.whole is whole
-        )
+    def pairs(state: PairState) -> tuple[str, ...]:
+        return tuple(f"{row.first}/{row.second}" for row in bodies.matrix if row.state == state)
 
     arms = tuple(arms)
     carries, tip = bool(scene and scene.carried), "tool" if robot.tool[:3, 3].any() else "flange"
@@ -72,16 +63,11 @@ def left_out_of_collisions(
         ("guessed_pairs", guessed_pairs([bodies, *(bodies_of(arm, scene) for _, arm in arms)])),
         ("allowed_pairs", tuple(name for name in allowed if name not in hidden)),
         ("joined_pairs", pairs("joined")),
-        ("joined_whole", pairs("joined", whole=True)),
     ]
     listed = [LeftOut(subject, names) for subject, names in found if names]
     if shapes.partial:
         shares = tuple(f"{link_label(link)}: {100 * share:.0f} %" for link, share in shapes.partial)
         listed.insert(0, LeftOut("partial_links", shares, 100 * COVERED))
-    if bodies.unmeasured:
-        q = None if q_deg is None else meant(robot, np.reshape(np.asarray(q_deg, float), (-1, robot.joints)))
-        apart = None if q is None else bodies.joined_apart(q)
-        listed.append(LeftOut("unmeasured_pairs", bodies.unmeasured, None if apart is None else 1000 * apart))
     obstacles = [LeftOut("scene_shapes" if solids else "obstacles")]
     carried = [LeftOut("carried_shapes" if carries else "carried")]
     shallow = [] if tolerance_mm is None else [LeftOut("shallow_overlaps", amount=tolerance_mm)]

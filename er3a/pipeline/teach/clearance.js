@@ -60,8 +60,7 @@ export class Clearance {
   #described({ distance, deep, pair }) {
     const words = pair.hulls ? this.words.hulls : this.clearance.assumed ? this.words.assumed : this.words;
     const text = distance <= 0 ? (deep && !pair.hulls ? words.overlap_deep : words.overlap) : words.clearance_is;
-    const said = fill(text, { distance: inMillimetres(Math.abs(distance)), pair: pair.text });
-    return distance > 0 && this.clearance.unmeasured ? `${said} ${this.clearance.unmeasured}` : said;
+    return fill(text, { distance: inMillimetres(Math.abs(distance)), pair: pair.text });
   }
 
   /** Writes the least distance at frames `T` into the page; returns what is to be drawn of it, null for nothing. */

@@ -19,7 +19,7 @@ from er3a.kinematics.wrist_partitioned import CoupledJoints, has_branches, wrist
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.language import N_, tr
 from er3a.pipeline.messages.kinematics import branch_word
-from er3a.pipeline.messages.left_out import body_word, unmeasured_text
+from er3a.pipeline.messages.left_out import body_word
 from er3a.pipeline.messages.pages import Caveat, caveat
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.player.player import LOOKS, drawn_shapes, drawn_size, floor_of, import_map, scene_data, table_data
@@ -390,7 +390,6 @@ def clearance_data(robot: Robot, scene: Scene | None) -> dict[str, Any]:
         "near": NEAR_TOUCH,
         "unexamined": say(PairsUnexamined(left_out)) if left_out else None,
         "assumed": say(shapes) if shapes else "",
-        "unmeasured": unmeasured_text(found.unmeasured),
         "allowed": [
             f"{body_word(row.first)} / {body_word(row.second)}" for row in found.matrix if row.state == "allowed"
         ],

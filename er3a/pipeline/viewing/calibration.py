@@ -26,13 +26,11 @@ from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.language import N_, as_text, tr
 from er3a.pipeline.messages.calibration import (
     VERDICTS,
-    bar_texts,
     file_text,
     held_back_warning,
     idle_texts,
     not_examined_texts,
     residual_texts,
-    scale_texts,
     term_kind,
     warning_texts,
 )
@@ -123,7 +121,7 @@ def write_calibration(
     text = robot_text(robot_file(corrected))
     comparison = compare(robot, found.robot, tolerance_mm=1e-3, tolerance_deg=1e-3)
     residuals = found.beyond.residuals if found.beyond else found.residuals
-    beside = [*held_back_warning(found, measurements, held_back), *scale_texts(found)]
+    beside = held_back_warning(found, measurements, held_back)
     table = str(files[0]) if len(files) > 1 else robot.name
     with house_style():
         page.render(
@@ -170,7 +168,6 @@ def _texts(found: Calibration, held_back: Sequence[Measurement]) -> list[str]:
         ),
         *warning_texts(found),
         *idle_texts(found),
-        *bar_texts(found),
     ]
     if found.more:
         texts.append(say(found.more))

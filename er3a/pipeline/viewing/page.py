@@ -29,7 +29,7 @@ from er3a.errors import ResultError
 from er3a.files.kept_files import INSTALLED, ROOT, view_command, write_atomically
 from er3a.pipeline import language
 from er3a.pipeline.language import N_, tr
-from er3a.pipeline.messages.left_out import left_out_names, left_out_text, say_reserved, unmeasured_text
+from er3a.pipeline.messages.left_out import left_out_names, left_out_text, say_reserved
 from er3a.pipeline.messages.numbers import (
     at_least,
     at_most,
@@ -260,14 +260,6 @@ class Head:
     def banner(self) -> str:
         """On what assumed shapes all rests, as the text ends; empty where no shapes are assumed."""
         return say(self.shapes) if self.shapes else ""
-
-    @property
-    def unmeasured(self) -> str:
-        """Which pairs no clearance counts, or not until they overlap; empty where there are none."""
-        left = {each.subject: each for each in self.summary.not_examined}
-        joined_pairs, allowed = left.get("unmeasured_pairs"), left.get("allowed_pairs")
-        names, apart = (joined_pairs.names, joined_pairs.amount) if joined_pairs else ((), None)
-        return unmeasured_text(names, apart, allowed.names if allowed else ())
 
     @property
     def own_text(self) -> str:

@@ -384,26 +384,6 @@ def _wait(reading: _Statement) -> None:
     reading.builder.add(syntax.Waiting(reading.place, "condition", reading.condition(), text))
 
 
-def _anin(reading: _Statement) -> None:
-    """``ANIN ON X=20*S1+0`` sets the variable again and again: its value is nowhere known."""
-    if not reading.words.accept("ON"):
-        reading.builder.aside(reading.place, reading.text)
-        return
-    _functions_in(reading, reading.text)
-    target = reading.words.reference()
-    reading.words.expect("=")
-    reading.builder.unknown(reading.place, reading.text, may_move=False)
-    reading.builder.unclear(reading.place, variable_of(target))
-
-
-def _time_block(reading: _Statement) -> None:
-    """``TIME_BLOCK END=0.05``: the time of a spline's part, in place of the programmed speeds."""
-    if reading.words.accept("END"):
-        reading.builder.unknown(reading.place, reading.text, may_move=False)
-    else:
-        reading.builder.aside(reading.place, reading.text)
-
-
 def _return(reading: _Statement) -> None:
     value = None if reading.words.kind == "end" else reading.words.expression()
     reading.words.finish()
@@ -497,8 +477,8 @@ HANDLERS: dict[str, Handler] = {
     "RETURN": _return,
     "HALT": lambda reading: reading.builder.add(syntax.Waiting(reading.place, "operator", None, "HALT")),
     "WAIT": _wait,
-    "ANIN": _anin,
-    "TIME_BLOCK": _time_block,
+    "ANIN": lambda reading: reading.builder.unread(reading.place, reading.text, may_move=False, folds=True),
+    "TIME_BLOCK": lambda reading: reading.builder.unknown(reading.place, reading.text, may_move=False),
     "INTERRUPT": _interrupt,
     "STRUC": _structure,
     "TRIGGER": _do,

@@ -456,33 +456,8 @@ def _set(memory: ProgramMemory, call: syntax.Invocation) -> bool:
             memory.write("%PDISP", syntax.Unclear("PDispSet") if pose is None else data_types.pose_record(pose))
             return pose is not None
         case _:
-            return _displace(memory, call, values, options)
-
-
-def _displace(
-    memory: ProgramMemory, call: syntax.Invocation, values: list[syntax.Value], options: Mapping[str, syntax.Value]
-) -> bool:
-    """1 PDispOn: by how much the arm, or ExeP, is off the programmed point; turned too with ``\\Rot``."""
-    memory.write("%PDISP", syntax.Unclear("PDispOn"))
-    if len(values) != 2:
-        return False
-    tool, _ = _tool(memory, call.arguments[1], values[1])
-    base, _ = _base(memory, dict(call.keywords).get("WOBJ"), options.get("WOBJ"))
-    programmed = data_types.pose_matrix(data_types.typed(values[0], data_types.ROBTARGET))
-    given = options.get("EXEP")
-    actual = (
-        data_types.pose_matrix(data_types.typed(given, data_types.ROBTARGET))
-        if given is not None
-        else _here(memory).seen(tool, base, memory.cell.flange)
-    )
-    if programmed is None or actual is None:
-        return False
-    moved = actual @ np.linalg.inv(programmed)
-    if "ROT" not in options:
-        moved = np.eye(4)
-        moved[:3, 3] = actual[:3, 3] - programmed[:3, 3]
-    memory.write("%PDISP", data_types.pose_record(moved))
-    return True
+            memory.write("%PDISP", syntax.Unclear("PDispOn"))
+            return False
 
 
 def arithmetic(sign: str, left: syntax.Value, right: syntax.Value) -> syntax.Value:
@@ -563,22 +538,12 @@ def _of_data(name: str, values: tuple[syntax.Value, ...], named: Mapping[str, sy
         case "POSEINV":
             pose = data_types.pose_matrix(values[0])
             return None if pose is None else data_types.pose_record(np.asarray(np.linalg.inv(pose), np.float64))
-        case "POSEVECT":
-            pose, xyz = data_types.pose_matrix(values[0]), data_types.plain(values[1], 3)
-            if pose is None or xyz is None:
-                return None
-            return data_types.pos_record(pose[:3, :3] @ np.array(xyz) / 1000 + pose[:3, 3])
         case "ORIENTZYX" if plain_values is not None:  # about z, then the new y, then the new x
             return data_types.orient_record(transform(np.zeros(3), np.radians(plain_values[::-1]))[:3, :3])
         case "EULERZYX":
             turn = data_types.rotation_of(values[0])
             axis = next((i for i, letter in enumerate("XYZ") if letter in named), None)
             return None if turn is None or axis is None else float(np.degrees(rpy_of(turn)[axis]))
-        case "NORIENT":
-            turn = data_types.rotation_of(values[0])
-            return None if turn is None else data_types.orient_record(turn)
-        case "DEFFRAME":
-            return _frame_of_points(values, named)
         case "DISTANCE":
             a3, b3 = data_types.plain(values[0], 3), data_types.plain(values[1], 3)
             if a3 is None or b3 is None:
@@ -587,8 +552,6 @@ def _of_data(name: str, values: tuple[syntax.Value, ...], named: Mapping[str, sy
         case "TRUNC" | "ROUND" if plain_values is not None:
             digits = 0.0 if named.get("DEC", reader.ABSENT) == reader.ABSENT else syntax.number(named["DEC"])
             return None if digits is None else _rounded(name, plain_values[0], digits)
-        case "DIM":
-            return _dimension(values)
         case "PRESENT":
             return None if isinstance(values[0], syntax.Unclear) else values[0] != reader.ABSENT
     return None
@@ -615,36 +578,8 @@ def _shifted(name: str, values: tuple[syntax.Value, ...], named: Mapping[str, sy
     return data_types.moved_target(target, pose @ step)
 
 
-def _frame_of_points(values: tuple[syntax.Value, ...], named: Mapping[str, syntax.Value]) -> syntax.Value | None:
-    """2 DefFrame: origin at the first point, x towards the second, the third with a positive y."""
-    points = [
-        data_types.plain(data_types.part(data_types.typed(each, data_types.ROBTARGET), "TRANS"), 3) for each in values
-    ]
-    if named or None in points:
-        return None
-    first, second, third = (np.array(each) / 1000 for each in points if each is not None)
-    x, towards = second - first, third - first
-    z = np.cross(x, towards)
-    if min(np.linalg.norm(x), np.linalg.norm(z)) < 1e-9:
-        return None
-    T = np.eye(4)
-    T[:3, 0], T[:3, 2], T[:3, 3] = x / np.linalg.norm(x), z / np.linalg.norm(z), first
-    T[:3, 1] = np.cross(T[:3, 2], T[:3, 0])
-    return data_types.pose_record(T)
-
-
 def _rounded(name: str, value: float, digits: float) -> syntax.Value:
     scale = 10.0 ** int(digits)
     found = math.trunc(value * scale) if name == "TRUNC" else math.floor(abs(value) * scale + 0.5)
     signed = found if name == "TRUNC" else math.copysign(found, value)
     return int(signed) if not digits else signed / scale
-
-
-def _dimension(values: tuple[syntax.Value, ...]) -> syntax.Value | None:
-    """2 Dim: how many elements an array has in a dimension."""
-    found, level = values[0], syntax.number(values[1])
-    if level is None:
-        return None
-    for _ in range(int(level) - 1):
-        found = found[0] if isinstance(found, tuple) and found else ()
-    return len(found) if isinstance(found, tuple) and found else None

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from er3a.errors import InputError
 from er3a.programs import syntax
-from er3a.programs.code_builder import CodeBuilder, fault, linked, mapped, variables, within
+from er3a.programs.code_builder import CodeBuilder, fault, is_no_statement, linked, mapped, variables, within
 from er3a.programs.evaluation import variable_of
 from er3a.programs.instructions import Place
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, read_program_text
@@ -666,7 +666,7 @@ class _BodyReader:
         try:
             self._instruction(place, words, text)
         except MisreadError:
-            self.builder.unknown(place, text)
+            self.builder.unknown(place, text, stops=is_no_statement(text, calls_without_brackets=True))
             if ":=" in words.texts and words.kinds[0] == "name" and words.texts[1] in (":=", ".", "{"):
                 self._unclear(place, self.scope.settled(syntax.Variable(words.texts[0])), text)
         except RecursionError:

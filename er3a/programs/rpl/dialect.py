@@ -114,6 +114,10 @@ def _zone(word: str) -> instructions.Zone:
 def _point(name: str, values: list[syntax.Value | None]) -> syntax.Value:
     """A point of its parts; an unclear one makes it unclear only when it is gone to."""
     fields = FIELDS[name]
+    if not 6 <= len(values) <= len(fields) and not any(
+        each is None or isinstance(each, syntax.Unclear) for each in values
+    ):
+        return syntax.Record(name, ())  # which is no point
     if not 6 <= len(values) <= len(fields) or None in values:
         return syntax.Unclear(f"{name}({', '.join('' if each is None else syntax.shown(each) for each in values)})")
     given = [each for each in values if each is not None]

@@ -130,7 +130,6 @@ def _no_xml(path: Path, error: expat.ExpatError) -> InputError:
 TOP = "Xpl-source"
 HEAD = ("Info", "Title", "Description", "Version", "Author")
 MAX_LOOPS = 50
-OTHER_SIDES = ("elsif", "elseif", "else")
 MOTION_PARTS = ("target", "speed", "zone", "tool", "refsys")
 
 
@@ -226,7 +225,7 @@ class _Pou:
         for tag in ("Name", "Type"):
             pou.child(tag)
         for body in pou.all("Body"):
-            for element, sides in _with_sides(body.children):
+            for element in body.children:
                 counts[element.tag] = counts.get(element.tag, 0) + 1
                 place = Place(self.source.path, element.line, f"{path}/{element.tag}[{counts[element.tag]}]")
                 element.passed, switch = True, element.attributes.get("disable", "false").lower()
@@ -238,10 +237,9 @@ class _Pou:
                     self._leave_out(element, (*within, pou))
                 elif element.tag in ("while", "for"):
                     self._loop(builder, element, place, (*within, pou))
-                elif sides:
-                    self._if(builder, sides, place, (*within, pou))
-                elif element.child("pouref") is not None:
-                    self._unknown_block(builder, element, place, (*within, pou))
+                elif element.child("pouref") is not None:  # as an if, of which no file was at hand
+                    builder.unknown(place, text_of(element))
+                    self._leave_out(element, (*within, pou))
                 else:
                     known = _element(builder, element, place)
                     if known and any(element.unread()):
@@ -279,35 +277,6 @@ class _Pou:
         self._body(builder, body, f"{place.element}/{name}", within)
         builder.close(element.tag, place)
 
-    def _if(
-        self, builder: CodeBuilder, sides: list[tuple[str, str]], place: Place, within: tuple[XmlNode, ...]
-    ) -> None:
-        builder.unknown(place, "<if>", may_move=False)  # whose form is read as like ones are built
-        for number, (condition, name) in enumerate(sides):
-            body = self._named(name, within)
-            if body is None or body in within or len(within) > MAX_LOOPS:
-                raise fault(place, f"there is no <Pou> '{name}' for a side of the if", "Add it, or correct <pouref>")
-            source = f"IF {condition} THEN"
-            if number == 0:
-                builder.open_if(place, expression(condition), source)
-            else:
-                builder.next_arm(place, expression(condition) if condition else None, source)
-            self._body(builder, body, f"{place.element}/{name}", within)
-        builder.close("if", place)
-
-    def _unknown_block(self, builder: CodeBuilder, element: XmlNode, place: Place, within: tuple[XmlNode, ...]) -> None:
-        """An element that is not understood and has bodies: each may be carried out, or not."""
-        source = text_of(element)
-        builder.unknown(place, source, may_move=any(each.children for each in element.children))
-        self.whole.append(element)
-        for name in (each.text for each in element.all("pouref")):
-            body = self._named(name, within)
-            if body is None or body in within or len(within) > MAX_LOOPS:
-                raise fault(place, f"there is no <Pou> '{name}' for a body here", "Add it, or correct <pouref>")
-            builder.open_if(place, syntax.Opaque(source), source)
-            self._body(builder, body, f"{place.element}/{name}", within)
-            builder.close("if", place)
-
     def _named(self, name: str, within: tuple[XmlNode, ...]) -> XmlNode | None:
         """The body of a loop: the nearest around that has this name."""
         places = (*(each for pou in reversed(within) for each in pou.children), *self.pou.below())
@@ -315,40 +284,6 @@ class _Pou:
         if found is not None:
             found.passed = True
         return found
-
-
-def _with_sides(elements: list[XmlNode]) -> Iterator[tuple[XmlNode, list[tuple[str, str]]]]:
-    """Elements of a body; an ``if`` with its sides, which the ``elsif`` and ``else`` after it are among."""
-    at = 0
-    while at < len(elements):
-        first, end = elements[at], at + 1
-        while end < len(elements) and elements[end].tag in OTHER_SIDES:
-            end += 1
-        sides = _sides(first, elements[at + 1 : end]) if first.tag == "if" else []
-        at = end if sides else at + 1
-        yield first, sides
-
-
-def _sides(element: XmlNode, more: list[XmlNode]) -> list[tuple[str, str]]:
-    """Conditions and bodies of an ``if``, as ``while`` has them, ``else`` without condition; empty if it has others.
-
-    No file of the controller with an ``if`` was at hand: a second body is taken for what else is done.
-    """
-    found: list[tuple[str, str]] = []
-    others = [*(each for each in element.children if each.tag in OTHER_SIDES), *more]
-    for part in (element, *others):
-        conditions = [each.text for tag in ("cond", "condition") for each in part.all(tag)]
-        bodies = [each.text for each in part.all("pouref")]
-        known = all(each.tag in ("cond", "condition", "pouref", *OTHER_SIDES) for each in part.children)
-        if part.tag == "else":
-            conditions = ["", *conditions]
-        part.passed = True
-        known &= part is element or not part.attributes
-        if not known or len(conditions) != 1 or not 1 <= len(bodies) <= 1 + (part is element and not others):
-            return []
-        found.append((conditions[0], bodies[0]))
-        found += [("", each) for each in bodies[1:]]
-    return found if all(condition for condition, _ in found[:-1]) else []
 
 
 def _element(builder: CodeBuilder, element: XmlNode, place: Place) -> bool:

@@ -176,7 +176,7 @@ def compute(study: Study, name: str) -> model.CollisionResults:
             mounting=mounting,
             closest=closest,
             not_examined=(
-                *_of_collisions(bodies, scene, settings, _judged(closest, paths, motions)),
+                *_of_collisions(bodies, scene, settings),
                 LeftOut("joint_vectors", amount=settings.samples),
                 *_left_out_of_places(places_found),
                 *_left_out(study, name, targets, motions),
@@ -193,20 +193,10 @@ def compute(study: Study, name: str) -> model.CollisionResults:
     )
 
 
-def _of_collisions(
-    bodies: Bodies, scene: Scene | None, settings: CollisionSettings, q_deg: list[tuple[float, ...]]
-) -> Iterator[LeftOut]:
+def _of_collisions(bodies: Bodies, scene: Scene | None, settings: CollisionSettings) -> Iterator[LeftOut]:
     """What is not seen of collisions, but that the base lies in a solid: the stage fails for that."""
-    found = left_out_of_collisions(bodies.robot, bodies, scene, settings.penetration_tolerance_mm, q_deg=q_deg)
+    found = left_out_of_collisions(bodies.robot, bodies, scene, settings.penetration_tolerance_mm)
     yield from (each for each in found if each.subject != "base_inside")
-
-
-def _judged(
-    closest: tuple[model.Closest, ...], paths: model.PathClearances, motions: list[ListedMotion]
-) -> list[tuple[float, ...]]:
-    """Joints of targets' chosen solutions, and of the paths that are meant to be safe, deg or mm."""
-    safe = np.isin(paths.path, [each.name for each in motions if each.meant_safe])
-    return [*(each.q_deg for each in closest if each.kind == "target"), *map(tuple, paths.q_deg[safe].tolist())]
 
 
 def _nearest_target(closest: list[model.Closest]) -> model.NearestTarget | None:

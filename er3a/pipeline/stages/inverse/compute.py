@@ -417,7 +417,7 @@ def compute(study: Study, name: str) -> model.InverseResults:
         not_examined=(
             *_left_out(robot, results, many, settings.mix, trips),
             *left_out_of_orientations(robot, ((each.name, T_of[each.name], q) for each, q in zip(asked, chosen))),
-            *left_out_of_collisions(robot, bodies_of(robot, scene), scene, q_deg=shown(robot, chosen)),
+            *left_out_of_collisions(robot, bodies_of(robot, scene), scene),
             *left_out_in_solids(scene, ((each.name, T_of[each.name][:3, 3], 0.0) for each in asked)),
             *left_out_without_tool(robot),
         ),

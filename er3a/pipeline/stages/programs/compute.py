@@ -79,7 +79,6 @@ def compute(study: Study, name: str) -> model.ProgramsResults:
                     scene,
                     1000 * options.penetration_tolerance,
                     arms,
-                    _judged(summaries, motions),
                 ),
                 *left_out_of_rates(speeds_given(robot), not limits.acceleration_assumed, jerk=False),
                 *_left_out(summaries, unknown_starts),
@@ -89,12 +88,6 @@ def compute(study: Study, name: str) -> model.ProgramsResults:
         instructions=model.Instructions.stacked(instructions).of_joints(robot.slides),
         motion=model.ProgramMotion.stacked(motions).of_joints(robot.slides),
     )
-
-
-def _judged(programs: Sequence[model.ProgramSummary], motions: Sequence[model.ProgramMotion]) -> list[list[float]]:
-    """Joints of the programs that are meant to pass, deg or mm."""
-    kept = (each.q_deg for program, each in zip(programs, motions) if program.expect in (None, "pass"))
-    return [row for q_deg in kept for row in q_deg.tolist()]
 
 
 def _left_out(programs: Sequence[model.ProgramSummary], unknown_starts: Sequence[str]) -> Iterator[LeftOut]:

@@ -12,7 +12,6 @@ import numpy as np
 from er3a.collision.along import ClearanceAlong, clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import PairOverlaps, PairTooNear, ShapesAssumed
-from er3a.collision.scene import Scene
 from er3a.collision.shapes import arm_shapes, shapes_assumed
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
@@ -431,7 +430,7 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
         paths=tuple(paths),
         not_followed=tuple(skipped),
         not_examined=(
-            *_of_collisions(surroundings.bodies, scene, settings, paths, checks),
+            *left_out_of_collisions(robot, surroundings.bodies, scene, settings.penetration_tolerance_mm),
             *left_out_of_rates(speeds_given(robot), not used.acceleration_assumed, limits.jerk is not None),
             *_left_out(paths, skipped, only),
             *by_subject(rest),
@@ -456,19 +455,6 @@ def _not_followed(robot: Robot, listed: ListedMotion) -> model.PathNotFollowed:
     return model.PathNotFollowed(
         listed.name, listed.title, lacking, listed.outcome_unfollowed, listed.expected, stops, why
     )
-
-
-def _of_collisions(
-    bodies: Bodies,
-    scene: Scene | None,
-    settings: TrajectorySettings,
-    paths: list[model.PathSummary],
-    checks: model.PathChecks,
-) -> tuple[LeftOut, ...]:
-    """What is not seen of collisions; clearances are told of the paths that are meant to be safe."""
-    safe = np.isin(checks.path, [each.name for each in paths if each.meant_safe])
-    deep = settings.penetration_tolerance_mm
-    return left_out_of_collisions(bodies.robot, bodies, scene, deep, q_deg=checks.q_deg[safe])
 
 
 def _asked_of_tool(name: str, motion: Motion) -> Iterator[tuple[str, Reals, Reals]]:

@@ -10,13 +10,12 @@ from typing import Any, Literal
 
 import numpy as np
 
-from er3a.diagnosis.conclusions import TooSmallToTell
 from er3a.diagnosis.faults import CONVENTIONS, WrongLimit
 from er3a.files.robot_file import LONGEST_LENGTH_MM, MIN_LONGEST_MM
 from er3a.files.units import WIDEST_IN_RADIANS
-from er3a.identifiability.entries import GROUP_OF
+from er3a.identifiability.entries import GROUP_OF, column_of
 from er3a.identifiability.entry_evidence import EntryEvidence, Evidence, Status
-from er3a.identifiability.evidence import PART_OF_GROUP, PartName, PartStatus, parts_of, together
+from er3a.identifiability.evidence import GRAVEST, PART_OF_GROUP, PartName, together
 from er3a.identifiability.proposals import Proposal
 from er3a.identifiability.reactions import CheckBasis, CheckCounts, count_checks
 from er3a.identifiability.statements import (
@@ -266,18 +265,15 @@ OF_THE_TOOL: tuple[PartName, ...] = ("geometry", "zero_and_directions")
 
 def parts_found(evidence: Evidence) -> tuple[model.PartFound, ...]:
     """The parts of a table that its file gives."""
-    statuses = {part.code: part.status for part in parts_of(evidence)}
     by_part: dict[PartName, list[EntryEvidence]] = {part: [] for part in PART_OF_GROUP.values()}
-    parts_by_column = {column: PART_OF_GROUP[group] for column, group in GROUP_OF.items()}
     for each in (*evidence.entries, *evidence.combinations):
-        column = each.entry.split()[0].lstrip("-").rstrip("0123456789")
-        for known, part in parts_by_column.items():
-            if known == column:
-                by_part[part].append(each)
-    return tuple(_part(evidence, part, statuses[part], own) for part, own in by_part.items() if own)
+        group = GROUP_OF.get(column_of(each.entry.split()[0].lstrip("-")))
+        if group is not None:
+            by_part[PART_OF_GROUP[group]].append(each)
+    return tuple(_part(evidence, part, own) for part, own in by_part.items() if own)
 
 
-def _part(evidence: Evidence, part: PartName, status: PartStatus, own: Sequence[EntryEvidence]) -> model.PartFound:
+def _part(evidence: Evidence, part: PartName, own: Sequence[EntryEvidence]) -> model.PartFound:
     def named(wanted: Status) -> tuple[str, ...]:
         return tuple(each.entry for each in own if each.status == wanted)
 
@@ -286,7 +282,7 @@ def _part(evidence: Evidence, part: PartName, status: PartStatus, own: Sequence[
         off = off.worse(together(evidence, list(named("open"))))
     return model.PartFound(
         part=part,
-        status=status,
+        status=next((each for each in GRAVEST if named(each)), "settled"),
         entries=sum(each.status != "gauge" for each in own),
         settled=len(named("settled")),
         up_to_signs=len(named("settled_up_to_signs")),
@@ -471,7 +467,7 @@ def _missed(
     if own.another_arm:
         return model.AnotherArm(**common, described=own.described)
     found = named.get(quoted.reference_set)
-    faults = () if found is None or isinstance(found, TooSmallToTell) else found.faults
+    faults = found.faults if found else ()
     chosen = any(isinstance(fault, CONVENTIONS) for fault in faults)
     chosen &= all(isinstance(fault, (*CONVENTIONS, WrongLimit)) for fault in faults)
     return model.DefinedOtherwise(**common) if chosen else model.Contradicted(**common)

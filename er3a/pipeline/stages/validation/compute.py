@@ -9,8 +9,6 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from er3a.calibration.calibrate import calibrate
-from er3a.calibration.outcomes import CalibrationError
 from er3a.diagnosis.diagnose import Diagnosis, diagnosis_of, residuals
 from er3a.diagnosis.ranking import Ranking, usable
 from er3a.files.reference_sets import check_robot_origins, load_references
@@ -48,34 +46,6 @@ from er3a.references.rows import GROUPS, AxisRow, EnvelopeRow, PositionRow
 from er3a.references.subjects import DrawingCorner, DrawingExtent, Reach
 from er3a.robots.joint_limits import meant, size_of
 from er3a.robots.robot import Grade, Robot
-
-
-def calibrate_from_sets(
-    robot: Robot, sets: list[ReferenceSet]
-) -> tuple[tuple[model.SetCalibration, ...], model.Corrections]:
-    """Estimate corrections to the table from each reference set's positions."""
-    found, rows = [], []
-    for references in sets:
-        try:
-            calibration = calibrate(robot, references)
-        except CalibrationError as error:
-            found.append(model.SetCalibration(references.name, error.finding))
-            continue
-        found.append(model.SetCalibration(references.name, stated(model.Calibrated, calibration)))
-        if calibration.fits:
-            rows += [
-                (
-                    references.name,
-                    each.name,
-                    each.unit,
-                    each.nominal,
-                    each.correction,
-                    each.standard_error,
-                    each.half_width,
-                )
-                for each in calibration.estimates
-            ]
-    return tuple(found), model.Corrections.of_rows(rows)
 
 
 def diagnose_sets(robot: Robot, sets: list[ReferenceSet]) -> tuple[tuple[model.SetDiagnosis, ...], model.Residuals]:
@@ -298,7 +268,6 @@ def compute(study: Study, name: str) -> model.ValidationResults:
 
     axes, poses = axes_table(circles, sets), key_poses_table(robot, sets, extremes)
     diagnoses, residuals = diagnose_sets(robot, sets if turning else [])
-    calibrations, corrections = calibrate_from_sets(robot, sets)
     found = {each.reference_set: each for each in diagnoses}
     summaries = set_summaries(robot, sets, checks, poses, found)
     reaches = {"wrist_centre_reach": WRIST_REACH, "flange_reach": FLANGE_REACH}
@@ -312,7 +281,6 @@ def compute(study: Study, name: str) -> model.ValidationResults:
         conflicts=tuple(conflicts),
         sets=summaries,
         diagnoses=diagnoses,
-        calibrations=calibrations,
         circle_points=_rounded(circles),
         table=model.TableFacts(robot.convention, wrist_partition_missing(robot)),
         round_trips=trips,
@@ -320,7 +288,7 @@ def compute(study: Study, name: str) -> model.ValidationResults:
         counts=counts,
         evidence=evidence,
         not_examined=(
-            *_left_out(settings, checks, diagnoses if turning else None, calibrations, trips, evidence),
+            *_left_out(settings, checks, diagnoses if turning else None, trips, evidence),
             *_left_out_of_places(study.robot(name), robot),
         ),
     )
@@ -331,7 +299,6 @@ def compute(study: Study, name: str) -> model.ValidationResults:
         key_poses=poses,
         section=section_table(robot, extremes) if turning and robot.rows == SIX else model.Section.empty(),
         residuals=residuals,
-        corrections=corrections,
     )
 
 
@@ -339,7 +306,6 @@ def _left_out(
     settings: ValidationSettings,
     checks: list[model.Check],
     diagnoses: tuple[model.SetDiagnosis, ...] | None,
-    calibrations: tuple[model.SetCalibration, ...],
     trips: model.RoundTripErrors | None,
     evidence: model.TableEvidence | None,
 ) -> Iterator[LeftOut]:
@@ -370,10 +336,6 @@ def _left_out(
         yield LeftOut("diagnosis")
     else:
         yield LeftOut("more_faults")
-    if uncalibrated := tuple(
-        each.reference_set for each in calibrations if not isinstance(each.result, model.Calibrated)
-    ):
-        yield LeftOut("calibration", uncalibrated)
     unsolved = [check for check in checks if isinstance(check, model.Unjudged) and check.group == ROUND_TRIPS]
     if unsolved:
         yield LeftOut("all_solutions")

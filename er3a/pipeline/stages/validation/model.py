@@ -7,9 +7,7 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal, Self, get_args
 
 from er3a.by_value import Finding
-from er3a.calibration.calibrate import Close
-from er3a.calibration.outcomes import CalibrationConclusion, Held, LevelName, MorePositions, NotCalibrated
-from er3a.diagnosis.conclusions import Conclusion, MainFault, MostLikelyFault, RankedHypothesis, TooSmallToTell
+from er3a.diagnosis.conclusions import Conclusion, MainFault, MostLikelyFault, RankedHypothesis
 from er3a.files.robot_library import robot_of
 from er3a.identifiability.entry_evidence import EntryEvidence, Tolerance
 from er3a.identifiability.evidence import PartName, PartStatus
@@ -133,7 +131,7 @@ Note = (
 )
 
 
-LikelyFault = MostLikelyFault | MainFault | TooSmallToTell
+LikelyFault = MostLikelyFault | MainFault
 
 
 class Contradiction(Finding):
@@ -439,44 +437,6 @@ class Residuals(Table):
 
 
 @dataclass(frozen=True)
-class Calibrated:
-    """What the positions of a reference set say about the table's entries; see
-    :class:`er3a.calibration.calibrate.Calibration`."""
-
-    conclusion: CalibrationConclusion
-    level: LevelName
-    coordinates: int
-    poses: int
-    held: tuple[Held, ...]
-    close: tuple[Close, ...]
-    singular_values: tuple[float, ...]
-    rms_before_mm: float
-    rms_after_mm: float
-    scatter: float
-    more: MorePositions | None
-
-
-@dataclass(frozen=True)
-class SetCalibration:
-    """The calibration from a reference set: its result, or why there is none."""
-
-    reference_set: str
-    result: Calibrated | NotCalibrated
-
-
-class Corrections(Table):
-    """Estimated corrections to the table's entries, of the sets whose positions they meet."""
-
-    reference_set: Texts = column("name of the reference set")
-    entry: Texts = column("entry of the table, such as d4")
-    unit: Texts = column("unit of the numbers, mm or deg")
-    nominal: Reals = column("value in the table")
-    correction: Reals = column("to be added to it")
-    standard_error: Reals = column("of the correction")
-    half_width: Reals = column("half-width of the 95 % interval")
-
-
-@dataclass(frozen=True)
 class SetSummary:
     """What was found against one reference set.
 
@@ -586,7 +546,6 @@ class ValidationSummary(Summary):
     conflicts: tuple[Conflict, ...]
     sets: tuple[SetSummary, ...]
     diagnoses: tuple[SetDiagnosis, ...]
-    calibrations: tuple[SetCalibration, ...]
     circle_points: Circles
     table: TableFacts
     round_trips: RoundTripErrors | None
@@ -681,7 +640,6 @@ class ValidationResults(Results[ValidationSummary]):
     key_poses: KeyPoses
     section: Section
     residuals: Residuals
-    corrections: Corrections
 
 
 RESULTS = ValidationResults

@@ -379,7 +379,7 @@ def compute(study: Study, name: str) -> model.VisionResults:
             *left_out_of_calibration(samples, head, offset, images, with_zeros, task_file.gripper.tolerance_mm),
             *frames,
             *GRASPS_REST_ON,
-            *_left_out_of_motions(robot, bodies, scene, motions, ways.q_deg),
+            *_left_out_of_motions(robot, bodies, scene, motions),
             *left_out_in_solids(scene, _places(robot, task_file, found, picture)),
         ),
     )
@@ -450,10 +450,10 @@ def _left_out_of_file(file: VisionFile) -> Iterator[LeftOut]:
 
 
 def _left_out_of_motions(
-    robot: Robot, bodies: Bodies, scene: Scene | None, settings: TrajectorySettings, q_deg: Reals | None = None
+    robot: Robot, bodies: Bodies, scene: Scene | None, settings: TrajectorySettings
 ) -> Iterator[LeftOut]:
-    """What of collisions, speeds and torques nobody looks at; ``q_deg``: the ways (N, n) that were looked at."""
-    yield from left_out_of_collisions(robot, bodies, scene, 1000 * DEPTH, q_deg=q_deg)
+    """What of collisions, speeds and torques nobody looks at."""
+    yield from left_out_of_collisions(robot, bodies, scene, 1000 * DEPTH)
     yield from left_out_of_rates(speeds_given(robot), *_rates_given(settings))
     yield from left_out_without_tool(robot)
     yield LeftOut("torques")

@@ -7,7 +7,6 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
-from er3a.files.reference_sets import reference_folder
 from er3a.files.robot_file import Text
 from er3a.files.units import MAX_DISTANCE_MM, Triple, as_millimetres
 from er3a.files.yaml_file import StrictModel
@@ -22,8 +21,7 @@ class WorkspaceSettings(StrictModel):
     ``samples`` are drawn in ``blocks`` seeded blocks, uniform in the joints or (``sampling: sobol``) more evenly than
     chance as points of a Sobol' sequence; ``cells_across`` cells span the bounding box's longest side,
     the hull is taken over the extreme samples in ``hull_directions`` directions, the recording shows ``cloud_points``.
-    The proof looks at ``proof_cells`` cells of the section; the volume is estimated from points in what it leaves open,
-    as dense as ``volume_points`` over all cells.
+    The proof looks at four cells of the section for each of ``proof_cells``.
     """
 
     samples: Annotated[int, Field(ge=1, le=100_000_000_000)]
@@ -32,7 +30,6 @@ class WorkspaceSettings(StrictModel):
     hull_directions: Annotated[int, Field(ge=1000, le=100_000)]
     cloud_points: Annotated[int, Field(ge=1, le=300_000)]
     proof_cells: Annotated[int, Field(ge=1, le=10_000_000)] = 8000
-    volume_points: Annotated[int, Field(ge=100, le=10_000_000)] = 100_000
     sampling: Literal["uniform", "sobol"] = "uniform"
 
     @model_validator(mode="after")
@@ -72,20 +69,17 @@ class CapabilitySettings(StrictModel):
     """What the tool can do in each cell of the workspace.
 
     ``directions`` are spread over the sphere, with ``rolls`` about each where the roll matters (a tool beside axis 6,
-    which takes as many times longer). The proofs of the dexterous core and of the listed places may look at
-    ``proof_poses`` neighbourhoods of poses each. ``scene`` holds what the arm may not touch where it serves the tray.
+    which takes as many times longer). ``scene`` holds what the arm may not touch where it serves the tray.
     """
 
     directions: Annotated[int, Field(ge=12, le=10_000)] = 300
     rolls: Annotated[int, Field(ge=1, le=360)] = 8
-    proof_poses: Annotated[int, Field(ge=1, le=1_000_000_000)] = 100_000
     scene: Text | None = None
     placement: BoxTask = BoxTask()
 
 
 def _inputs(study: StudyFiles, robot: str) -> list[Path]:
-    drawings = [reference_folder(name) / "envelope.csv" for name in study.references(robot)]
-    return [*(file for file in drawings if file.is_file()), *study.scenes(robot, "capability")]
+    return study.scenes(robot, "capability")
 
 
 STAGE = Stage(

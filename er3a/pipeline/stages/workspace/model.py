@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
+import contourpy
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,38 +15,28 @@ from er3a.collision.pairs import Pair
 from er3a.kinematics.classes.class_solvers import BranchLabel, SlotName
 from er3a.kinematics.forward import forward, jacobian
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.pipeline.language import N_
 from er3a.pipeline.results import NEVER_A_PASS, Results, Summary, Verdict
 from er3a.pipeline.tables import Table, Texts, column, lists, per_joint, vector
 from er3a.robots.robot import Robot
 from er3a.sampling.random_joints import Sampling
-from er3a.sampling.tally import UNTOUCHED, ReachExtremes, Tally
+from er3a.sampling.tally import ReachExtremes
 from er3a.workspace.capability import Capability, ClearPoses, Overall
-from er3a.workspace.causes import Relaxed, SingleChange, Unlimited, VoidCause
-from er3a.workspace.dexterous import Core
-from er3a.workspace.general_proof import Surface
+from er3a.workspace.causes import SingleChange, VoidCause
 from er3a.workspace.orientations import AskedKind
 from er3a.workspace.placement import Places
-from er3a.workspace.proven import ProofMethod, Proven
-from er3a.workspace.side_view import BorderLine
+from er3a.workspace.proven import Proven
 from er3a.workspace.tool_inverse import MapsMissing
 from er3a.workspace.voids import Void, VoidKind
 
 
 class Flat(Finding, code="workspace.flat"):
-    """The tool point moves on a line or not at all."""
+    """The tool point moves on a surface, on a line or not at all."""
 
 
-class OnSurface(Finding, code="workspace.on_surface"):
-    """The tool point moves on a surface; its area as :class:`er3a.workspace.general_proof.Surface` has it."""
+class Unsettled(Finding, code="workspace.unsettled"):
+    """The proof leaves too much undecided to judge voids."""
 
-    surface: Surface
-
-
-class Undersampled(Finding, code="workspace.undersampled"):
-    """Too few samples for the cells, without a proof."""
-
-    unseen_percent: float
+    undecided_percent: float
 
 
 @dataclass(frozen=True)
@@ -65,62 +56,28 @@ class VoidUnexpected(VoidFound, Finding, code="workspace.void_unexpected"):
     single_changes: tuple[SingleChange, ...] = ()
 
 
-class VoidUncertain(VoidFound, Finding, code="workspace.void_uncertain"):
-    """An enclosed void away from the shoulder that only samples suggest."""
-
-
 class VoidAtShoulder(VoidFound, Finding, code="workspace.void_at_shoulder"):
     """An enclosed void about the shoulder, as every arm leaves that can't fold onto itself."""
 
 
 class NoVoid(Finding, code="workspace.no_void"):
-    """No enclosed void, by the proof or by samples alone; ``undecided_percent`` is what the general proof leaves
-    undecided of the volume."""
+    """No enclosed void; ``undecided_percent`` is what the proof leaves undecided of the volume."""
 
-    proven: bool
-    undecided_percent: float | None = None
+    undecided_percent: float
 
 
-WorkspaceFinding = Flat | OnSurface | Undersampled | VoidUnexpected | VoidUncertain | VoidAtShoulder | NoVoid
+WorkspaceFinding = Flat | Unsettled | VoidUnexpected | VoidAtShoulder | NoVoid
 
 
 Singles = NDArray[np.float32]
 
 
-class Cells(Table):
-    """Touched cells of the grid, and untouched ones inside the hull."""
-
-    index: NDArray[np.int16] = vector("i{}", "index of the cell along x, y, z of the grid")
-    samples: Integers = column("samples in the cell")
-    first_block: NDArray[np.int32] = column("earliest block that touched the cell, -1 if none did")
-    void: NDArray[np.int32] = column("number of the sampled void from 1, -1 in the hull but in no void, 0 touched")
-
-
 class SectionCells(Table):
-    """Cells of the side section about axis 1 that were touched or are cut off by touched ones."""
+    """Touched cells of the side section about axis 1."""
 
     rho_m: Reals = column("distance of the cell's centre from axis 1")
     z_m: Reals = column("height of the cell's centre along axis 1")
     samples: Integers = column("samples in the cell, all azimuths")
-    void: Flags = column("whether touched cells cut it off")
-
-
-class SideViewCells(Table):
-    """Touched cells of the side views in the arm's plane."""
-
-    x_m: Reals = column("middle of the cell to the front")
-    z_m: Reals = column("height of the cell's centre along axis 1")
-    cell_m: Reals = column("edge of the cell")
-    samples: Integers = column("samples in the cell")
-    point: Texts = column("tool_point or wrist_centre")
-
-
-class GrowthCurve(Table):
-    """Touched volume after each block of samples, at several cell sizes."""
-
-    cell_mm: Reals = column("edge of the cells")
-    samples: Integers = column("samples drawn so far")
-    touched_m3: Reals = column("volume of the touched cells", heading=N_("volume"))
 
 
 class Cloud(Table):
@@ -151,36 +108,18 @@ class ProofCells(Table):
     z_m: Reals = vector("z_{}_m", "lowest and highest height along axis 1", parts="01")
     volume_m3: Reals = column("volume of the cell")
     level: NDArray[np.int16] = column("how often the cell was split off")
-    status: Texts = column("filled, touched, empty, partly_filled or undecided")
     filled_ratio: Reals = column("ratio of the cell that is proven filled")
     empty_ratio: Reals = column("ratio of the cell that is proven empty")
     empty_arcs_deg: Texts = lists("ends of the azimuths that are proven empty")
     unfilled_arcs_deg: Texts = lists("ends of the azimuths that are not proven filled")
-    q_deg: Reals = per_joint("joint angle that reaches into the cell, NaN if none is known")
 
 
 class Border(Table):
-    """Exact borders as arcs, with the joint values that make them."""
+    """Outline of what the proof leaves reachable in the section, within about a cell; none for bars."""
 
-    rho_m: Reals = column("distance from axis 1; in a side view: x to the front")
+    rho_m: Reals = column("distance from axis 1")
     z_m: Reals = column("height along axis 1")
-    q2_deg: Reals = column("joint 2")
-    q3_deg: Reals = column("joint 3")
-    tilt_deg: Reals = column("angle of the tool point's direction to axis 4")
-    arc: Integers = column("number of the arc among those of its point and view")
-    point: Texts = column("tool_point, wrist_centre or flange")
-    sweeps: Texts = column("what moves along the arc: joint_2, joint_3 or wrist")
-    view: Texts = column("section (folded about axis 1) or side")
-
-
-class Drawing(Table):
-    """Labels of the manufacturer's drawing of the wrist centre's envelope: extents (one coordinate) and corners."""
-
-    rho_m: Reals = column("distance from axis 1, NaN for heights")
-    x_m: Reals = column("the same, positive in front of axis 1")
-    z_m: Reals = column("height along axis 1, NaN for distances")
-    q2_deg: Reals = column("joint 2 at a corner, else NaN")
-    q3_deg: Reals = column("joint 3 at a corner, else NaN")
+    arc: Integers = column("number of the closed line")
 
 
 class VoidVertices(Table):
@@ -226,7 +165,6 @@ class BoxPlaces(Table):
     slot: NDArray[np.int8] = column("number of the branch that serves it all, -1 if none does")
     manipulability_m3: Singles = column("smallest |det J| over the tray and its directions")
     limit_margin_deg: Singles = column("smallest distance of joints from the task's limits")
-    proven: Flags = column("whether every point and direction is proven")
 
 
 Triple = tuple[float, float, float]
@@ -244,26 +182,6 @@ class Bounds:
 
     lower: float
     upper: float
-
-
-@dataclass(frozen=True)
-class Volume:
-    """The reached volume, m^3: proven bounds, estimate with its 95 % interval."""
-
-    lower: float
-    upper: float
-    estimate: float
-    ci95: tuple[float, float]
-
-
-@dataclass(frozen=True)
-class VolumePoints:
-    """Points that the estimate drew where the proof leaves open what is reached, how many of them are reached, and how
-    many could not be decided."""
-
-    drawn: int
-    reached: int
-    undecided: int
 
 
 @dataclass(frozen=True)
@@ -293,7 +211,6 @@ class ProofSummary:
     """The proof: ``width`` of its bounds is (upper - lower) / upper; points of samples in empty cells would refute
     it. ``bars`` is None where its cells are rings about axis 1."""
 
-    method: ProofMethod
     cells: int
     width: float
     points_checked: int
@@ -303,21 +220,9 @@ class ProofSummary:
 
 @dataclass(frozen=True)
 class HullSummary:
-    """Convex hull of the extreme samples in so many directions."""
+    """Convex hull of the extreme samples."""
 
     volume_m3: float
-    area_m2: float
-    directions: int
-    vertices: int
-
-
-@dataclass(frozen=True)
-class GridSummary:
-    """Cubic cells in the base frame, from the lowest corner."""
-
-    origin_m: Triple
-    cell_m: float
-    shape: tuple[int, int, int]
 
 
 @dataclass(frozen=True)
@@ -330,29 +235,16 @@ class AxisSummary:
 
 
 @dataclass(frozen=True)
-class CellCounts:
-    """Numbers of cells of the grid, and an estimate of those that more samples would still touch."""
-
-    touched: int
-    inside_hull: int
-    touched_inside_hull: int
-    unseen_estimate: float
-
-
-@dataclass(frozen=True)
 class VoidSummary:
-    """A void inside the hull; see :class:`er3a.workspace.voids.Void`. ``mesh_m3``: volume within its closed mesh."""
+    """A void inside the hull; see :class:`er3a.workspace.voids.Void`."""
 
     kind: VoidKind
-    status: Literal["proven_empty", "undersampled"]
     volume_m3: Bounds
     centroid_m: Triple
     low_m: Triple
     high_m: Triple
     cause: VoidCause
-    relaxed: tuple[Relaxed | Unlimited, ...]
     holds_shoulder: bool
-    mesh_m3: float | None
 
 
 @dataclass(frozen=True)
@@ -390,11 +282,8 @@ class CapabilitySummary:
     asked : what cells are asked for: directions over the sphere, tilts in the plane that the arm's joints keep the tool
         in, turns about the axes of a SCARA, or points alone; ``directions`` is how many of these
     bar_m : length of cells along y of ``frame``, where joint 1 slides (``sectors`` are parts of it); 0 for rings
-    core_m3 : None for arms without a spherical wrist
-    arm_angles : at how many values of what a pose leaves open to a redundant arm each is tried (else 1);
-        ``held_joints`` are the joints (from 1) held at these, none where it is an arm angle
+    arm_angles : at how many values of what a pose leaves open to a redundant arm each is tried (else 1)
     named_branches : whether its branches have names
-    sliding : whether some joint slides; manipulability then has less than three lengths as factors
     coarse : whether cells are coarser and directions fewer than the study says, since a pose takes this arm long
     """
 
@@ -406,11 +295,8 @@ class CapabilitySummary:
     sectors: int
     roll: RollSummary
     overall: Overall
-    core_m3: Core | None
     arm_angles: int
-    held_joints: tuple[int, ...]
     named_branches: bool
-    sliding: bool
     coarse: bool
     clear: ClearSummary
 
@@ -465,9 +351,7 @@ class PlaceSummary:
     centre_m: Triple
     size_m: Triple
     turned: bool
-    status: Literal["proven", "sampled"]
     branch: BranchLabel | SlotName | None
-    branch_status: Literal["proven", "sampled"]
     manipulability_m3: float
     manipulability_ratio: float
     limit_margin_deg: float | None
@@ -526,10 +410,6 @@ class PlacementSummary:
     directions: int
     points_serving: int
     fitting: int
-    fitting_with_one_branch: int
-    fitting_proven: int
-    refuted: int
-    poses: int
     places: tuple[PlaceSummary, ...]
     stands: tuple[StandSummary, ...] = ()
 
@@ -554,13 +434,9 @@ class PlacementSummary:
 
     @property
     def stand(self) -> StandSummary | None:
-        """The surface to put the tray on: one on which more of it is reached before others, then a proven one."""
+        """The surface to put the tray on: one on which more of it is reached before others."""
         fitting = [stand for stand in self.stands if stand.place and stand.served_from_m is not None]
-        return min(
-            fitting,
-            key=lambda stand: (stand.served_from_m, stand.place is None or stand.place.status != "proven"),
-            default=None,
-        )
+        return min(fitting, key=lambda stand: stand.served_from_m or 0.0, default=None)
 
 
 Placement = PlacementSummary | ToolPointsElsewhere | PlacementTooLong
@@ -569,8 +445,7 @@ Placement = PlacementSummary | ToolPointsElsewhere | PlacementTooLong
 class WorkspaceSummary(Summary):
     """The stage's summary; ``pocket_block_m`` is the edge of the blocks that open pockets were looked for on.
 
-    ``surface`` is what the tool point moves on where it reaches no volume. What the verdict says is of the arm's
-    lengths and limits, whatever stands around it.
+    What the verdict says is of the arm's lengths and limits, whatever stands around it.
     """
 
     decisive = NEVER_A_PASS - {"obstacles"}
@@ -578,17 +453,12 @@ class WorkspaceSummary(Summary):
     verdict: Verdict[WorkspaceFinding]
     samples: int
     sampling: Sampling
-    volume_m3: Volume
-    surface: Surface | None
-    volume_points: VolumePoints
-    touched_m3: float
+    volume_m3: Bounds
     proof: ProofSummary
     hull: HullSummary
     reach_m: ReachExtremes
-    grid: GridSummary
     axis: AxisSummary
     section_cell_m: float
-    cells: CellCounts
     voids: tuple[VoidSummary, ...]
     pocket_block_m: float
     capability: CapabilitySummary | CapabilityMissing
@@ -603,16 +473,12 @@ class WorkspaceSummary(Summary):
 class WorkspaceResults(Results[WorkspaceSummary]):
     """The stage's results; each table is written under its attribute's name."""
 
-    cells: Cells
     section: SectionCells
-    side_view: SideViewCells
-    curve: GrowthCurve
     cloud: Cloud
     hull_vertices: HullVertices
     hull_triangles: HullTriangles
     proof: ProofCells
     border: Border
-    drawing: Drawing
     void_vertices: VoidVertices
     void_triangles: VoidTriangles
     capability: CapabilityCells
@@ -620,6 +486,7 @@ class WorkspaceResults(Results[WorkspaceSummary]):
 
 
 RESULTS = WorkspaceResults
+OUTLINED = 400  # points across an outline
 
 
 class CellLookup:
@@ -655,18 +522,6 @@ class CellLookup:
         return np.where(inside, self.rows[tuple(np.where(inside, part, 0) for part in index)], -1)
 
 
-def cells(tally: Tally, void_number: NDArray[np.int64]) -> Cells:
-    """Touched cells, and untouched ones in the hull with the number of their void."""
-    shown = (tally.counts > 0) | (void_number != 0)
-    first = tally.first_block[shown]
-    return Cells(
-        index=np.argwhere(shown).astype(np.int16),
-        samples=tally.counts[shown],
-        first_block=np.where(first == UNTOUCHED, -1, first),
-        void=void_number[shown].astype(np.int32),
-    )
-
-
 def cloud(robot: Robot, q: Reals) -> Cloud:
     """Tool points of samples (n, joints), rad or m, and their manipulability: of arms with other than six joints the
     product of the singular values."""
@@ -684,19 +539,25 @@ def proof(proven: Proven) -> ProofCells:
         z_m=found.cells[:, 2:],
         volume_m3=found.volumes,
         level=found.level.astype(np.int16),
-        status=proven.cell_states(),
         filled_ratio=1 - found.unfilled_ratio,
         empty_ratio=found.empty_ratio,
         empty_arcs_deg=_arcs(found.empty),
         unfilled_arcs_deg=_arcs(found.unfilled),
-        q_deg=np.degrees(proven.witness),
     )
 
 
-def border(line: BorderLine) -> Border:
-    """The points of a border line."""
-    (rho, z), (q2, q3) = line.points.T, line.q.T
-    return Border.of(line, rho_m=rho, z_m=z, q2=q2, q3=q3, arc=line.number)
+def border(proven: Proven) -> Border:
+    """Outline of what a proof leaves reachable at some azimuth."""
+    found, lines = proven.section, list[Any]()
+    if proven.proof.bar == 0:
+        high = proven.proof.cells[:, [1, 3]].max(axis=0)
+        rho, z = (np.linspace(low, end, OUTLINED) for low, end in zip(found.low, high))
+        at_rho, at_z = np.meshgrid(rho, z)
+        reached = ~proven.nowhere(at_rho.ravel(), at_z.ravel()).reshape(at_rho.shape)
+        lines += contourpy.contour_generator(rho, z, reached.astype(float)).lines(0.5)
+    return Border.stacked(
+        Border.of(rho_m=line[:, 0], z_m=line[:, 1], arc=number) for number, line in enumerate(lines, start=1)
+    )
 
 
 def void_surfaces(voids: Sequence[Void]) -> tuple[VoidVertices, VoidTriangles]:

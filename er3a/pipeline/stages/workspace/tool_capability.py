@@ -1,4 +1,4 @@
-"""Capability of the tool: cells, dexterous core and places for the box.
+"""Capability of the tool: cells and places for the box.
 
 The resolution of the capability map, chosen so that it takes no longer than the time stated here.
 
@@ -11,14 +11,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Literal
 
 import numpy as np
 
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import Pair
 from er3a.collision.scene import Scene
-from er3a.kinematics.by_class import parameters_of
 from er3a.kinematics.solutions import slot_labels
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import stated
@@ -27,8 +25,8 @@ from er3a.pipeline.stages.workspace.entry import BoxTask, CapabilitySettings
 from er3a.robots.robot import Robot
 from er3a.workspace.capability import ClearPoses, map_capability, overall, rings, try_poses
 from er3a.workspace.cell_frame import cell_frame, is_quick
-from er3a.workspace.dexterous import dexterous_core
-from er3a.workspace.directions import RING, Roll, cone_directions
+from er3a.workspace.cells import ring_volumes
+from er3a.workspace.directions import RING, cone_directions
 from er3a.workspace.orientations import AskedOrientations, asked_of
 from er3a.workspace.placement import (
     MIXED,
@@ -51,13 +49,10 @@ from er3a.workspace.placement import (
     survey,
 )
 from er3a.workspace.proven import Proven
-from er3a.workspace.section_proof import ring_volumes
 from er3a.workspace.tool_inverse import (
     OrientationsUnknown,
     lacking_for_maps,
     pose_cost,
-    proofs_hold,
-    slot_count,
     tried_values,
 )
 
@@ -157,7 +152,7 @@ def _cells(robot: Robot, cell: float, proven: Proven | None) -> Reals:
     coarse all are."""
     frame = cell_frame(robot)
     cells = rings(frame.reach, frame.heights, cell)
-    if proven is None or proven.arm is not None or proven.proof.bar != frame.bar:
+    if proven is None or proven.proof.bar != frame.bar:
         return cells
     kept = cells[~proven.nowhere(cells[:, :2].mean(axis=1), cells[:, 2:].mean(axis=1))]
     return kept if len(kept) else cells
@@ -212,9 +207,6 @@ def tool_capability(
     found = map_capability(robot, middles, plan.count, asked)
     bodies, random = Bodies(robot, scene), np.random.default_rng([seed, CLEAR_STREAM])
     tried = _tried(robot, plan, middles, found.reachability, bodies, random)
-    core = None
-    if proofs_hold(robot):
-        core = dexterous_core(robot, cells, plan.count, asked.roll, settings.proof_poses)
     summary = model.CapabilitySummary(
         asked=asked.kind,
         directions=plan.count,
@@ -224,11 +216,8 @@ def tool_capability(
         sectors=frame.sectors,
         roll=model.RollSummary(asked.roll.free, len(asked.roll.angles), asked.roll.last_joint),
         overall=overall(found, cells, frame.bar),
-        core_m3=core,
         arm_angles=tried_values(robot),
-        held_joints=tuple(parameter.joint + 1 for parameter in parameters_of(robot) if parameter.joint >= 0),
         named_branches=bool(slot_labels(robot)),
-        sliding=bool(robot.sliding.any()),
         coarse=plan.coarse,
         clear=_clear_summary(cells, frame.bar, found.reachability, tried, scene),
     )
@@ -265,9 +254,7 @@ def _placed(
         return model.PlacementTooLong(task_summary(settings.placement)), model.BoxPlaces.empty()
     within = narrowed(robot, task.margin)
     bodies, free = Bodies(robot, scene), partial(Bodies(within, scene).free, margin=margin)
-    placement = find_places(
-        robot, task, asked.roll, plan.lattice, LISTED, settings.proof_poses, free=free, in_cone=asked.in_cone
-    )
+    placement = find_places(robot, task, asked, plan.lattice, LISTED, free)
     placed = _placement_summary(settings.placement, task, placement, scene, margin)
 
     def listed(own: Task, found: BoxPlacement) -> tuple[model.PlaceSummary, ...]:
@@ -279,16 +266,15 @@ def _placed(
     for support in supports:
         place, above, served_from, why = None, None, None, _why_not(support, task)
         if why is None:
-            part, found = _on_support(robot, support, task, plan, settings, free)
-            if found.chosen.row:
+            part, found = _on_support(robot, support, task, plan, free)
+            if found.chosen:
                 (served,) = listed(part, found)
                 served_from = float(part.lowest - support.height)
                 place = _whole_box(served, task)
             else:
                 why = "in_the_way" if _in_reach(within, part, plan) else "out_of_reach"
         if place is None:
-            most = settings.proof_poses
-            over = _best_over(within, support, supports, task, asked.roll, most_poses=most, placement=placement)
+            over = _best_over(within, support, supports, task, placement)
             (above,) = listed(task, over) or (None,)
         stands.append(model.StandSummary(support.name, support.height, place, served_from, why, above))
     return (
@@ -305,7 +291,7 @@ def _why_not(support: Support, task: Task) -> model.WhyNoStand | None:
 
 
 def _on_support(
-    robot: Robot, support: Support, task: Task, plan: CapabilityPlan, settings: CapabilitySettings, free: Free
+    robot: Robot, support: Support, task: Task, plan: CapabilityPlan, free: Free
 ) -> tuple[Task, BoxPlacement]:
     """The best place on a support: for all of the box, or without as little of its lowest part as can't be reached.
 
@@ -316,10 +302,8 @@ def _on_support(
     for k in range(max(1, round(task.box[2] / layer))):  # a box lower than half a layer is asked for whole
         left_out = np.array([0.0, 0.0, k * layer])
         part = replace(task, box=task.box - left_out, lowest=support.height + k * layer, support=support)
-        found = find_places(
-            robot, part, plan.asked.roll, plan.lattice, 1, settings.proof_poses, free=free, in_cone=plan.asked.in_cone
-        )
-        if found.chosen.row:
+        found = find_places(robot, part, plan.asked, plan.lattice, 1, free)
+        if found.chosen:
             break
     return part, found
 
@@ -333,8 +317,8 @@ def _whole_box(served: model.PlaceSummary, task: Task) -> model.PlaceSummary:
 def _in_reach(within: Robot, part: Task, plan: CapabilityPlan) -> bool:
     """Whether the box fits somewhere where only reach counts."""
     assert plan.lattice is not None
-    field = survey(within, part, plan.asked.roll, plan.lattice, in_cone=plan.asked.in_cone)
-    return bool(len(fitting_places(field, np.zeros(np.array(field.manipulability_any.shape) - 1, bool), part.box).slot))
+    field = survey(within, part, plan.asked, plan.lattice)
+    return bool(len(fitting_places(field, part.box).slot))
 
 
 def _best_over(
@@ -342,9 +326,6 @@ def _best_over(
     support: Support,
     supports: Sequence[Support],
     task: Task,
-    roll: Roll,
-    *,
-    most_poses: int,
     placement: BoxPlacement,
 ) -> BoxPlacement:
     """The best of all places of which all of the box is over a support, and nothing over a higher one below it."""
@@ -357,8 +338,7 @@ def _best_over(
         if other.height > support.height:
             over &= ~(other.holds(corners).any(axis=1) & (underside >= other.height))
     rows = np.flatnonzero(over)
-    chosen = choose_places(within, task, places.rows(over), roll, 1, most_poses)
-    return replace(placement, chosen=replace(chosen, row=[int(rows[row]) for row in chosen.row]))
+    return replace(placement, chosen=[int(rows[row]) for row in choose_places(within, task, places.rows(over), 1)])
 
 
 def _tried(
@@ -415,39 +395,29 @@ def _placement_summary(
         directions=len(cone_directions(task.axis, task.half_angle, task.step)),
         points_serving=int((placement.field.manipulability_any > NO).sum()),
         fitting=len(places.slot),
-        fitting_with_one_branch=int((places.slot != MIXED).sum()),
-        fitting_proven=int(places.proven.sum()),
-        refuted=placement.chosen.refuted,
-        poses=placement.chosen.poses,
         places=(),
     )
 
 
 def _listed(robot: Robot, task: Task, placement: BoxPlacement, best: float) -> list[model.PlaceSummary]:
-    places, chosen = placement.places, placement.chosen
-    named = slot_labels(robot) if tried_values(robot) == 1 else ()
-    labels = named or (None,) * slot_count(robot)
-    rooms = [placement.room(row) for row in chosen.row]
-    return [
-        model.PlaceSummary(
-            centre_m=model.triple(places.centre[row]),
-            size_m=model.triple(task.box[[1, 0, 2]] if places.turned[row] else task.box),
-            turned=bool(places.turned[row]),
-            status=_status(proven),
-            branch=None if slot == MIXED else labels[slot],
-            branch_status=_status(branch_proven),
-            manipulability_m3=float(places.manipulability[row]),
-            manipulability_ratio=float(places.manipulability[row]) / best if best > 0 else 0.0,
-            limit_margin_deg=float(np.degrees(places.limit_margin[row] + task.margin))
-            if slot != MIXED and np.isfinite(places.limit_margin[row])
-            else None,
-            room_down_m=model.triple(room[:, 0]),
-            room_up_m=model.triple(room[:, 1]),
+    places, found = placement.places, []
+    labels = slot_labels(robot) if tried_values(robot) == 1 else ()
+    for row in placement.chosen:
+        slot, room, margin = int(places.slot[row]), placement.room(row), places.limit_margin[row] + task.margin
+        found.append(
+            model.PlaceSummary(
+                centre_m=model.triple(places.centre[row]),
+                size_m=model.triple(task.box[[1, 0, 2]] if places.turned[row] else task.box),
+                turned=bool(places.turned[row]),
+                branch=labels[slot] if labels and slot != MIXED else None,
+                manipulability_m3=float(places.manipulability[row]),
+                manipulability_ratio=float(places.manipulability[row]) / best if best > 0 else 0.0,
+                limit_margin_deg=float(np.degrees(margin)) if np.isfinite(margin) else None,
+                room_down_m=model.triple(room[:, 0]),
+                room_up_m=model.triple(room[:, 1]),
+            )
         )
-        for row, slot, proven, branch_proven, room in zip(
-            chosen.row, chosen.slot, chosen.proven, chosen.branch_proven, rooms
-        )
-    ]
+    return found
 
 
 def _arms_at(within: Robot, free: Free, task: Task, asked: AskedOrientations, placement: BoxPlacement) -> list[Reals]:
@@ -458,11 +428,11 @@ def _arms_at(within: Robot, free: Free, task: Task, asked: AskedOrientations, pl
     within : the robot with the limits that the places were found with; free : which arms count
     """
     arms = []
-    for row, slot in zip(placement.chosen.row, placement.chosen.slot):
+    for row in placement.chosen:
         box = task.box[[1, 0, 2]] if placement.places.turned[row] else task.box
         points = box_points(placement.field, box, placement.places.centre[row])
         rotations = asked.in_cone(points, task.axis, task.half_angle, task.step)
-        arms.append(serving_arms(within, points, rotations, asked.roll, slot, free))
+        arms.append(serving_arms(within, points, rotations, asked.roll, int(placement.places.slot[row]), free))
     return arms
 
 
@@ -480,7 +450,3 @@ def _with_nearest(place: model.PlaceSummary, bodies: Bodies, q: Reals) -> model.
     robot = bodies.robot
     room = np.where(limited_joints(robot), np.minimum(q - robot.lower, robot.upper - q), np.inf).min(axis=0)
     return replace(place, limit_joint=int(room.argmin()) + 1)
-
-
-def _status(proven: bool) -> Literal["proven", "sampled"]:
-    return "proven" if proven else "sampled"

@@ -277,7 +277,6 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
         diagnoses=validation_figures.diagnosis_stories(summary, results.residuals),
         corrected=text,
         corrected_address=text_address(text),
-        corrections=validation_figures.correction_stories(summary, results.corrections),
         groups=group_rows(judged),
         failed=[check_row(check) for check in failed[:SHOWN_FAILURES]],
         more_failed=[check_row(check) for check in failed[SHOWN_FAILURES:]],

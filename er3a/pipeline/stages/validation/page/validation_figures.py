@@ -1,4 +1,4 @@
-"""Figures of the validation page; sentences, rows and captions of diagnosis and calibration."""
+"""Figures of the validation page; sentences, rows and captions of the diagnosis."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from matplotlib.axes import Axes as PlotAxes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
-from er3a.diagnosis.conclusions import MainFault, MostLikelyFault, TooSmallToTell
+from er3a.diagnosis.conclusions import MainFault, MostLikelyFault
 from er3a.kinematics.forward import forward, frames, skeleton
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import N_, own_title, tr
-from er3a.pipeline.messages.diagnosis import both, level
-from er3a.pipeline.messages.numbers import decimals_of_spreads, fixed
+from er3a.pipeline.messages.diagnosis import both
+from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import bracketed, joined, say, sentence
 from er3a.pipeline.stages.validation import model
 from er3a.pipeline.viewing.figures import axis_label, equal_scale, new_figure
@@ -269,19 +269,13 @@ def diagnosis_stories(summary: model.ValidationSummary, residuals: model.Residua
     return [_diagnosis_story(each, residuals, each.reference_set in claims) for each in summary.diagnoses]
 
 
-def correction_stories(summary: model.ValidationSummary, corrections: model.Corrections) -> list[dict[str, Any]]:
-    """Per reference set: what its positions say about the table's entries, with the figure."""
-    return [_calibration_story(calibration, corrections) for calibration in summary.calibrations]
-
-
 def _diagnosis_story(diagnosis: model.SetDiagnosis, residuals: model.Residuals, own_claims: bool) -> dict[str, Any]:
-    named = isinstance(diagnosis.conclusion, MostLikelyFault | MainFault | TooSmallToTell)
+    named = isinstance(diagnosis.conclusion, MostLikelyFault | MainFault)
     best = diagnosis.hypotheses[0] if named else None
     return dict(
         reference_set=diagnosis.reference_set,
         text=joined([typographic(say(diagnosis.conclusion)), tr(OWN_CLAIMS) if own_claims and best else ""], " "),
         against=_measured_against(diagnosis),
-        to_decide=typographic(say(best.to_decide)) if best and best.to_decide else "",
         others_title=tr("Next best hypotheses")
         if named
         else tr("The best hypotheses, none of which explains the data"),
@@ -309,38 +303,6 @@ def _measured_against(diagnosis: model.SetDiagnosis) -> str:
     return text
 
 
-def _calibration_story(calibration: model.SetCalibration, corrections: model.Corrections) -> dict[str, Any]:
-    found = calibration.result if isinstance(calibration.result, model.Calibrated) else None
-    text = typographic(say(found.conclusion if found else calibration.result))
-    own = corrections.take(corrections.reference_set == calibration.reference_set)
-    decimals = {unit: decimals_of_spreads(own.half_width[own.unit == unit]) for unit in np.unique(own.unit)}
-    alt = tr("Correction of each estimated entry of the table with its 95 % interval, lengths and angles apart.")
-    return dict(
-        reference_set=calibration.reference_set,
-        found=found,
-        text=text,
-        level=level(found.level) if found else "",
-        held=[typographic(say(reason)) for reason in found.held] if found else [],
-        close=[
-            sentence(
-                "close",
-                first=pair.first,
-                second=pair.second,
-                correlation=fixed(pair.correlation, 2),
-            )
-            for pair in (found.close if found else ())
-        ],
-        more=typographic(say(found.more)) if found and found.more else "",
-        picture=Picture(corrections_figure(own), alt, text) if len(own) else None,
-        rows=[
-            [entry, *(fixed(value, decimals[unit]) for value in (nominal, correction, half_width)), tr(unit)]
-            for entry, nominal, correction, half_width, unit in zip(
-                own.entry, own.nominal, own.correction, own.half_width, own.unit
-            )
-        ],
-    )
-
-
 def residual_figure(rows: model.Residuals) -> Figure:
     """Residuals before and after the best hypothesis, with each reference's uncertainty; worst on top."""
     figure, axes = new_figure(width=9, height=1.5 + 0.32 * len(rows))
@@ -360,29 +322,13 @@ def residual_figure(rows: model.Residuals) -> Figure:
     return figure
 
 
-def corrections_figure(rows: model.Corrections) -> Figure:
-    """Corrections with their 95 % intervals, lengths and angles in panels of their own."""
-    parts = [rows.take(rows.unit == unit) for unit in ("mm", "deg") if (rows.unit == unit).any()]
-    counts = [len(own) for own in parts]
-    figure, panels = new_figure(1, len(parts), width=9, height=3.4, width_ratios=counts, squeeze=False)
-    for axes, own in zip(panels[0], parts):
-        at = np.arange(len(own))
-        axes.axhline(0, color=MUTED, linewidth=1)
-        axes.errorbar(at, own.correction, own.half_width, fmt="o", color=MODEL, capsize=4, elinewidth=1.4)
-        axes.set_xticks(at, own.entry, rotation=45 if len(own) > 8 else 0)
-        axes.set_xlim(-0.6, len(own) - 0.4)
-        axes.set_ylabel(tr("correction ({unit})", unit=tr(own.unit[0])))
-        axes.grid(axis="x", visible=False)
-    return figure
-
-
 def _residual_picture(rows: model.Residuals, diagnosis: model.SetDiagnosis) -> Picture | None:
     missed = rows.take((rows.before > rows.uncertainty) | (rows.after > rows.uncertainty))
     if not len(missed):
         return None
     shown = missed.take(np.arange(len(missed)) < SHOWN_RESIDUALS)
     still = int((missed.after > missed.uncertainty).sum())
-    if isinstance(diagnosis.conclusion, MostLikelyFault | TooSmallToTell):
+    if isinstance(diagnosis.conclusion, MostLikelyFault):
         caption = tr("With the best hypothesis corrected, every number is within its reference's uncertainty.")
     elif diagnosis.hypotheses:
         caption = tr("Even the best hypothesis leaves {still} of {all} references missed.", still=still, all=len(rows))

@@ -9,7 +9,6 @@ import numpy as np
 import scipy
 from markupsafe import Markup, escape
 from matplotlib.axes import Axes
-from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import AxLine, Line2D
 from matplotlib.patches import Patch, Polygon, Rectangle
@@ -17,15 +16,13 @@ from matplotlib.patches import Patch, Polygon, Rectangle
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.scene import Plane, Scene, Solid, Sphere
 from er3a.collision.shapes import solid_pieces
-from er3a.geometry.transforms import rpy_along
 from er3a.kinematics.forward import skeleton
-from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.language import own_title, tr
 from er3a.pipeline.messages.kinematics import branch_word
-from er3a.pipeline.messages.numbers import at_least, at_most, fixed, number
-from er3a.pipeline.messages.say import bracketed, joined, say, word
+from er3a.pipeline.messages.numbers import fixed, number
+from er3a.pipeline.messages.say import bracketed, joined, say
 from er3a.pipeline.messages.workspace import (
-    STATUS,
     millimetres,
     no_box_text,
     range_text,
@@ -41,7 +38,7 @@ from er3a.pipeline.stages.workspace.page.workspace_figures import name_level, sl
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.page import Picture
-from er3a.pipeline.viewing.palette import GRID, HIGHLIGHT, INK, MUTED
+from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MUTED
 from er3a.robots.robot import Robot
 
 ROUNDING = 1e-6  # mm
@@ -139,29 +136,21 @@ def _room(place: model.PlaceSummary, axes: str = "xyz") -> str:
 
 def place_row(name: str, place: model.PlaceSummary, capability: model.CapabilitySummary) -> list[str]:
     if place.branch is None and capability.arm_angles > 1:
-        branch = tr("with joints {joints} at several values", joints=numbers(capability.held_joints))
-        branch = branch if capability.held_joints else tr("at several arm angles")
+        branch = tr("at several values of what poses leave open")
     elif place.branch is None:
         branch = tr("changes within the tray") if capability.named_branches else tr("not known: branches have no names")
-    elif place.status == place.branch_status:
-        branch = branch_word(place.branch)
     else:
-        branch = tr("{branch} (by samples)", branch=branch_word(place.branch))
+        branch = branch_word(place.branch)
     return [
         name,
         millimetres(place.centre_m),
         " × ".join(fixed(1000 * value, 0) for value in place.size_m),
-        word("workspace.status", STATUS, place.status),
         branch,
         fixed(100 * place.manipulability_ratio, 1),
         limit_text(place),
         bracketed(fixed(place.clearance_mm, 0), say(place.clearance_pair) if place.clearance_pair is not None else ""),
         _room(place) or fixed(0, 0),
     ]
-
-
-def numbers(joints: tuple[int, ...]) -> str:
-    return ", ".join(str(joint) for joint in joints)
 
 
 _EDGE_ON = 1e-6  # by which a plane's normal may leave the drawing for the plane to be a line in it
@@ -212,11 +201,14 @@ def upright_slices(robot: Robot, capability: model.CapabilitySummary, cells: mod
         row = lookup.row(np.abs(grid_x), np.where(grid_x < 0, np.pi, 0.0), grid_z)
     best = capability.overall.best_manipulability_m3
     panels = (
-        (cells.reachability, 100.0, asked_ratio(capability), (0, 100)),
-        (cells.solutions, 1.0, solutions_label(capability), (0, max(1, capability.overall.most_solutions))),
-        (cells.manipulability_m3, 100 / best, tr("best manipulability (% of the arm's best)"), (0, 100))
-        if capability.sliding
-        else (cells.manipulability_m3, 1e3, tr("best manipulability (10⁻³ m³)"), (0, None)),
+        (cells.reachability, 100.0, tr("tool orientations reached (%)"), (0, 100)),
+        (
+            cells.solutions,
+            1.0,
+            tr("IK solutions per orientation reached"),
+            (0, max(1, capability.overall.most_solutions)),
+        ),
+        (cells.manipulability_m3, 100 / best, tr("best manipulability (% of the arm's best)"), (0, 100)),
     )
     flat = float(np.ptp(z) / np.ptp(x))
     figure, axes = new_figure(1, 3, width=12.0, height=min(5.2, 2.0 + 3.6 * flat), sharey=True)
@@ -264,26 +256,6 @@ def level_slices(
     return figure
 
 
-def asked_ratio(capability: model.CapabilitySummary) -> str:
-    """Label of what of the orientations asked is reached."""
-    return {
-        "directions": tr("tool directions reached (%)"),
-        "tilts": tr("tilts of the tool reached (%)"),
-        "turns": tr("turns of the tool reached (%)"),
-        "points": tr("reached (%)"),
-    }[capability.asked]
-
-
-def solutions_label(capability: model.CapabilitySummary) -> str:
-    """Label of the solutions of what is asked."""
-    return {
-        "directions": tr("IK solutions per reached direction"),
-        "tilts": tr("IK solutions per reached tilt"),
-        "turns": tr("IK solutions per reached turn"),
-        "points": tr("IK solutions per reached point"),
-    }[capability.asked]
-
-
 def across_slide(capability: model.CapabilitySummary) -> Reals:
     """Where bars begin in the plane across the slide, counted from the base's origin, (2,), m; 0 for rings."""
     frame = capability.frame
@@ -311,17 +283,14 @@ def placement_views(
     over = [(own_title(each.below.name), each.place) for each in trays if each.below and each.place not in numbered]
     percent = 100 * places.manipulability_m3 / capability.overall.best_manipulability_m3
     figure, axes = new_figure(1, 2, width=12.0, height=5.6)
-    provable = capability.core_m3 is not None
     top = max(1.0, float(percent.max()))
     for panel, (across, up, title) in zip(axes, (("x", "y", tr("From above")), ("x", "z", tr("From the side")))):
         shown = ["xyz".index(across), "xyz".index(up)]
         steps = [placement.spacing_m[axis] for axis in shown]
-        edges, value, proven = _raster(places.centre_m[:, shown], steps, percent, places.proven | (not provable))
+        edges, value = _raster(places.centre_m[:, shown], steps, percent)
         extent = [1000 * edge for edge in edges]
-        unproven = np.ma.masked_where((value < 0) | proven, value)
-        panel.pcolormesh(*extent, unproven.T, cmap=ListedColormap([GRID]), rasterized=True)
-        sure = np.ma.masked_where(~proven, value)
-        mesh = panel.pcolormesh(*extent, sure.T, cmap=SHADES, vmin=0, vmax=top, rasterized=True)
+        shown_value = np.ma.masked_less(value, 0)
+        mesh = panel.pcolormesh(*extent, shown_value.T, cmap=SHADES, vmin=0, vmax=top, rasterized=True)
         draw_scene(panel, scene, shown)
         _draw_boxes(panel, [*placement.named_places, *over], shown)
         panel.plot(
@@ -334,7 +303,6 @@ def placement_views(
     handles = [
         Line2D([], [], color=INK, marker="o", markersize=4, linewidth=2.2, label=tr("arm, all joints 0")),
         Patch(facecolor="none", edgecolor=HIGHLIGHT, label=tr("best positions, numbered or named as in the tables")),
-        *([Patch(facecolor=GRID, label=tr("by samples only"))] if provable else []),
     ]
     if scene:
         handles.append(Patch(fill=False, edgecolor=MUTED, hatch="////", label=tr("scene")))
@@ -360,18 +328,14 @@ def _draw_arm(axes: Axes, robot: Robot, frame: model.SectionFrame, origin: Reals
     axes.plot(local[:, 0], local[:, 2], color=INK, linewidth=2.0, marker="o", markersize=3, solid_capstyle="round")
 
 
-def _raster(
-    points: Reals, steps: list[float], percent: model.Singles, proven: Flags
-) -> tuple[list[Reals], Reals, Flags]:
-    """Edges of the raster's columns and rows (m), the largest value in each of its cells (proven ones first; -1: none
-    there), and whether one is proven."""
+def _raster(points: Reals, steps: list[float], percent: model.Singles) -> tuple[list[Reals], Reals]:
+    """Edges of the raster's columns and rows (m), and the largest value in each of its cells (-1: none there)."""
     low = points.min(axis=0)
     index = tuple(np.floor((points - low) / steps + 1e-3).astype(int).T)
     shape = tuple(part.max() + 1 for part in index)
-    value, sure = np.full(shape, -1.0), np.zeros(shape, dtype=bool)
-    np.logical_or.at(sure, index, proven)
-    np.maximum.at(value, index, np.where(proven | ~sure[index], percent, -1.0))
-    return [start + (np.arange(n + 1) - 0.5) * step for start, step, n in zip(low, steps, shape)], value, sure
+    value = np.full(shape, -1.0)
+    np.maximum.at(value, index, percent)
+    return [start + (np.arange(n + 1) - 0.5) * step for start, step, n in zip(low, steps, shape)], value
 
 
 def _draw_boxes(axes: Axes, listed: Sequence[tuple[str, model.PlaceSummary]], shown: list[int]) -> None:
@@ -409,10 +373,6 @@ def capability_context(
         "missing": "",
         "asked_text": _asked_text(capability),
         "capability_pictures": _pictures(robot, results, capability) if len(results.capability) else [],
-        "core_text": _core_text(capability),
-        "collisions_text": tr("Reachability and dexterous workspace ignore collisions.")
-        if capability.core_m3
-        else tr("Reachability ignores collisions."),
         "task_text": _task_text(placement.task, capability),
         "tray_line": placing.line if placing else no_box_text(results.summary),
         "tray_places": placing.rows if placing else [],
@@ -438,14 +398,17 @@ def _placement_context(
         "nowhere": "",
         "placing_scene": placement.scene,
         "placing_margin": fixed(placement.margin_mm, 0),
-        "try_text": _try_text(robot, placement.task) if capability.asked == "directions" else "",
         "stands": [stand_text(stand, placement) for stand in placement.stands],
         "points_serving": placement.points_serving,
         "place_rows": rows,
         "place_picture": Picture(
             placement_views(robot, capability, placement, results.places, scene, trays),
             tr("Possible positions of the tray centre, from above and from the side, with the best ones"),
-            _places_caption(placement, capability.core_m3 is not None),
+            tr(
+                "{fitting} grid positions pass. A colour marks where the tray's centre passes; it shows the best value "
+                "along the line of sight.",
+                fitting=number(placement.fitting),
+            ),
         )
         if len(results.places)
         else None,
@@ -468,7 +431,9 @@ def _pictures(robot: Robot, results: model.WorkspaceResults, capability: model.C
         )
     )
     of_held = level_slices(capability, cells, clear_percent(cells), tr("reached poses held without collision (%)"))
-    of_reached = level_slices(capability, cells, 100.0 * cells.reachability.astype(float), asked_ratio(capability))
+    of_reached = level_slices(
+        capability, cells, 100.0 * cells.reachability.astype(float), tr("tool orientations reached (%)")
+    )
     return [
         Picture(upright_slices(robot, capability, cells), upright, _slices_caption(capability)),
         Picture(of_reached, reached, _level_caption(capability)),
@@ -477,52 +442,26 @@ def _pictures(robot: Robot, results: model.WorkspaceResults, capability: model.C
 
 
 def _clear_caption(clear: model.ClearSummary, assumed: bool) -> str:
-    if clear.scene is None:
-        what = tr("An estimate by volume: {share} % of the poses reached can be held without the arm touching itself.",
-                  share=number(100 * clear.share, 2))  # fmt: skip
-    else:
-        what = tr(
-            "An estimate by volume: {share} % of the poses reached can be held without touching “{scene}” or the arm "
-            "itself.",
-            share=number(100 * clear.share, 2),
-            scene=own_title(clear.scene),
-        )
-    numbers = {
-        "tries": clear.tries,
-        "reached": number(clear.reached),
-        "clear": number(clear.clear),
-        "without": number(clear.without),
-    }
-    if assumed:
-        tried = tr(
-            "{tries} random poses were tried in each cell and sector: {reached} are reached, {clear} of them clear of "
-            "the assumed shapes; in {without} cells and sectors none was found. Outer cells hold more volume, so the "
-            "share is not the quotient of these counts. Shares of so few tries distinguish good regions from bad ones, "
-            "not single cells.",
-            **numbers,
-        )
-    else:
-        tried = tr(
-            "{tries} random poses were tried in each cell and sector: {reached} are reached, {clear} of them proven"
-            " collision-free; in {without} cells and sectors none was found. Outer cells hold more volume, so the "
-            "share is not the quotient of these counts. Shares of so few tries distinguish good regions from bad ones, "
-            "not single cells.",
-            **numbers,
-        )
-    return tr("{first} {rest}", first=what, rest=tried)
+    touched = tr("“{scene}” or the arm itself", scene=own_title(clear.scene)) if clear.scene else tr("the arm itself")
+    return tr(
+        "An estimate by volume: {share} % of the poses reached can be held without touching {touched}. {tries} random "
+        "poses were tried in each cell and sector: {reached} are reached, {clear} of them {held}; in {without} cells "
+        "and sectors none was found. Outer cells hold more volume, so the share is not the quotient of these counts. "
+        "Shares of so few tries distinguish good regions from bad ones, not single cells.",
+        share=number(100 * clear.share, 2),
+        touched=touched,
+        tries=clear.tries,
+        reached=number(clear.reached),
+        clear=number(clear.clear),
+        without=number(clear.without),
+        held=tr("clear of the assumed shapes") if assumed else tr("proven collision-free"),
+    )
 
 
 def _level_caption(capability: model.CapabilitySummary) -> str:
-    if capability.bar_m:
-        return tr("The arm can do the same everywhere along the slide, up to its ends.")
     if capability.sectors == 1:
         return tr("Joint 1 makes a full turn, so what counts is the distance from axis 1 and the height alone.")
-    if capability.asked == "directions":
-        return tr(
-            "Where joint 1 is limited, the sector behind the arm loses directions first: "
-            "in front, more tool angles are left."
-        )
-    return tr("Joint 1 is limited: blank sectors are out of its reach.")
+    return tr("Joint 1 is limited: blank parts are out of its reach.")
 
 
 def _slices_caption(capability: model.CapabilitySummary) -> str:
@@ -533,39 +472,17 @@ def _slices_caption(capability: model.CapabilitySummary) -> str:
         "solutions": number(overall.mean_solutions, 2),
         "most": overall.most_solutions,
     }
-    first = {
-        "directions": tr(
-            "A reached cell offers {mean} % of all tool directions on average, the best one {best} %, each with "
-            "{solutions} IK solutions on average (of {most} at most).",
-            **numbers,
-        ),
-        "tilts": tr(
-            "A reached cell offers {mean} % of all tilts on average, the best one {best} %, each with {solutions} IK "
-            "solutions on average (of {most} at most).",
-            **numbers,
-        ),
-        "turns": tr(
-            "A reached cell offers {mean} % of all turns on average, the best one {best} %, each with {solutions} IK "
-            "solutions on average (of {most} at most).",
-            **numbers,
-        ),
-        "points": tr(
-            "A reached cell has {solutions} IK solutions on average (of {most} at most).",
-            **numbers,
-        ),
-    }[capability.asked]
-    if capability.asked == "points":
-        return first
-    return joined(
-        [
-            first,
-            tr("These solutions are averaged over the directions reached; of random joint values, as the page of the "
-               "stage inverse draws them, more solutions are found, because poses with many are met more often."),
-            tr("Plan work where all three are high; rims are reached only with the arm stretched, folded or "
-               "twisted."),
-        ],
-        " ",
-    )  # fmt: skip
+    first = tr(
+        "A reached cell offers {mean} % of the orientations asked on average, the best one {best} %, each with "
+        "{solutions} IK solutions on average (of {most} at most).",
+        **numbers,
+    )
+    averaged = tr(
+        "These solutions are averaged over the orientations reached; of random joint values, as the page of the stage "
+        "inverse draws them, more solutions are found, because poses with many are met more often."
+    )
+    plan = tr("Plan work where all three are high; rims are reached only with the arm stretched, folded or twisted.")
+    return joined([first, averaged, plan], " ")
 
 
 def _asked_text(capability: model.CapabilitySummary) -> str:
@@ -593,38 +510,19 @@ def _asked_text(capability: model.CapabilitySummary) -> str:
             "centre of each cell was tried as a point alone: it is reached or not."
         ),
     }[capability.asked]
-    return joined([asked, _roll_text(capability), _effort_text(capability)], " ")
-
-
-def _effort_text(capability: model.CapabilitySummary) -> str:
-    if not capability.coarse:
-        return ""
-    return tr(
-        "The inverse of this arm takes long, so cells are {cell} mm wide and directions fewer than the study says.",
-        cell=fixed(1000 * capability.cell_m, 0),
-    )
+    return joined([asked, _roll_text(capability)], " ")
 
 
 def _roll_text(capability: model.CapabilitySummary) -> str:
     if capability.asked != "directions":
         return ""
-    rolls = tr("left free") if capability.roll.free else capability.roll.per_direction
-    if capability.held_joints:
-        return tr(
-            "Joints that the pose leaves open ({joints}) were tried at {values} values, and a direction counts if it "
-            "is reached at one of them: more may be reached between them. Solutions are those of one value. Rolls "
-            "about the tool's own axis: {rolls}.",
-            joints=numbers(capability.held_joints),
-            values=capability.arm_angles,
-            rolls=rolls,
-        )
     if capability.arm_angles > 1:
         return tr(
-            "Each pose was tried at {angles} arm angles, and a direction counts if it is reached at one of them: more "
-            "may be reached between them. Solutions are those of one arm angle. Rolls about the tool's own axis: "
-            "{rolls}.",
-            angles=capability.arm_angles,
-            rolls=rolls,
+            "Each pose was tried at {values} values of what it leaves open, and a direction counts if it is reached at "
+            "one of them: more may be reached between them. Solutions are those of one value. Rolls about the tool's "
+            "own axis: {rolls}.",
+            values=capability.arm_angles,
+            rolls=tr("left free") if capability.roll.free else capability.roll.per_direction,
         )
     if capability.roll.free and not capability.roll.last_joint:
         return tr("The roll about the tool's own axis is left out: with five joints the arm can't choose it.")
@@ -640,33 +538,8 @@ def _roll_text(capability: model.CapabilitySummary) -> str:
     )
 
 
-def _core_text(capability: model.CapabilitySummary) -> str:
-    core = capability.core_m3
-    if core is None:
-        if capability.asked != "directions":
-            return ""
-        return tr(
-            "The dexterous workspace is bounded only for arms of six revolute joints with a spherical wrist, none of "
-            "them coupled."
-        )
-    if core.upper == 0:
-        return tr(
-            "There is no dexterous workspace: in every part of the workspace some tool direction is proven "
-            "unreachable at all points. Work that needs the tool from every side needs a turntable."
-        )
-    return tr(
-        "The dexterous workspace, where the tool can take every direction of the sphere, is at least {lower} L "
-        "and at most {upper} L; both bounds are proven for all points and directions. By the {directions} "
-        "sampled directions alone it would be {estimate} L.",
-        directions=capability.directions,
-        lower=at_least(1000 * core.lower, "L"),
-        upper=at_most(1000 * core.upper, "L"),
-        estimate=number(1000 * core.estimate, 2),
-    )
-
-
 def _task_text(task: model.TaskSummary, capability: model.CapabilitySummary) -> str:
-    box = " × ".join(number(value, 4).rstrip(".") for value in map(_whole, task.box_mm))
+    box = " × ".join(f"{value:g}" for value in task.box_mm)
     direction = ", ".join(fixed(value, 2).removesuffix(".00") for value in task.tool_direction)
     shown = {
         "box": box,
@@ -711,41 +584,3 @@ def _task_text(task: model.TaskSummary, capability: model.CapabilitySummary) -> 
             clear=clear,
         )
     return joined([served, stands], " ")
-
-
-def _try_text(robot: Robot, task: model.TaskSummary) -> str:
-    """How to see the arm at a place: the roll, pitch and yaw (ZYX) that point the tool along the task's direction."""
-    roll, pitch, _ = np.degrees(rpy_along(np.array(task.tool_direction)))
-    parts = {"roll": fixed(roll, 1).removesuffix(".0"), "pitch": fixed(pitch, 1).removesuffix(".0")}
-    if np.allclose(robot.tool, np.eye(4)):
-        return tr(
-            "To see the arm at a position, type its centre, roll {roll}, pitch {pitch} and yaw 0 deg into the "
-            "teach panel. The robot has no tool here: the centre of its flange goes there. The tray is not in the "
-            "panel's scene: its clearance leaves the tray out.",
-            **parts,
-        )
-    return tr(
-        "To see the arm at a position, type its centre, roll {roll}, pitch {pitch} and yaw 0 deg into the teach"
-        " panel: the tool point goes there. The tray is not in the panel's scene: its clearance leaves the tray out.",
-        **parts,
-    )
-
-
-def _whole(value: float) -> float | int:
-    return int(value) if value == int(value) else value
-
-
-def _places_caption(placement: model.PlacementSummary, provable: bool) -> str:
-    if not provable:
-        return tr(
-            "{fitting} grid positions pass by samples; proofs exist only for arms of six revolute joints with a "
-            "spherical wrist. A colour marks where the tray's centre passes.",
-            fitting=number(placement.fitting),
-        )
-    return tr(
-        "Of {fitting} grid positions that pass by samples, {proven} are proven for every point and direction. "
-        "A colour marks where the tray's centre passes; grey spots pass by samples only. It shows the best value "
-        "along the line of sight.",
-        fitting=number(placement.fitting),
-        proven=number(placement.fitting_proven),
-    )

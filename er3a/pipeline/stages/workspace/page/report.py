@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from markupsafe import Markup
 
 from er3a.collision.scene import Scene
@@ -13,7 +12,7 @@ from er3a.pipeline.language import tr
 from er3a.pipeline.messages.dynamics import payload_text
 from er3a.pipeline.messages.numbers import at_least, at_most, fixed, number
 from er3a.pipeline.messages.say import bracketed, joined, say, sentence, word
-from er3a.pipeline.messages.workspace import VOID_KINDS, VOID_STATUS, entry_word
+from er3a.pipeline.messages.workspace import VOID_KINDS
 from er3a.pipeline.player.player import drawing_head
 from er3a.pipeline.results import Stored, is_computed, read_stage
 from er3a.pipeline.stages.registry import STAGES
@@ -24,9 +23,6 @@ from er3a.pipeline.stages.workspace.page.tray import Placing, placing_of
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.page import Picture, render_stage
 from er3a.robots.robot import Robot
-from er3a.workspace.causes import joints_after
-
-LISTED = 12
 
 
 def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -> None:
@@ -42,19 +38,11 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
         study,
         stored,
         output,
-        side=_side(robot, results),
-        arc_rows=workspace_figures.arc_rows(results.border),
-        method=say(summary.proof.method),
-        rule=_rule(summary.enclosed_voids),
         pocket_mm=3000 * summary.pocket_block_m,
         turning=workspace_figures.in_space(robot, results, scene),
         drawing_head=drawing_head(),
-        void_rows=[_void_row(n, void) for n, void in enumerate(summary.voids[:LISTED], start=1)],
-        voids_more=max(0, len(summary.voids) - LISTED),
-        change_rows=_change_rows(summary),
-        unexpected=isinstance(summary.verdict.finding, model.VoidUnexpected),
+        void_rows=[_void_row(n, void) for n, void in enumerate(summary.voids, start=1)],
         wide=100 * summary.proof.width,
-        has_drawing=len(results.drawing) > 0,
         **context,
     )
 
@@ -79,56 +67,13 @@ def _context(
             workspace_figures.sections(robot, results),
             tr("Sections across the slide of joint 1: density of the samples, and proven cells")
             if summary.proof.bars
-            else tr("Side sections about axis 1: density of the samples, and proven cells with the exact border"),
-            _section_caption(summary, len(results.drawing) > 0),
-        ),
-        "top": Picture(
-            workspace_figures.top_view(robot, results),
-            tr("The cloud from above with the limits of joint 1"),
-            _top_caption(robot),
+            else tr("Side sections about axis 1: density of the samples, and proven cells"),
+            _section_caption(summary),
         ),
         "slices": Picture(
             workspace_figures.slices(results), tr("Three level slices of the proof"), _slices_caption(summary)
         ),
-        "convergence": Picture(
-            workspace_figures.convergence(results),
-            tr(
-                "Volume of the sampled cells over the number of samples for three cell sizes, with the proven "
-                "bounds and the estimate"
-            ),
-            _curve_caption(summary, results.curve),
-        ),
     }
-
-
-def _side(robot: Robot, results: model.WorkspaceResults) -> Picture | None:
-    """The side view, where the arm has a wrist centre and an exact border."""
-    if not len(results.border):
-        return None
-    exact = tr("The border's arcs are exact (numbered on the left); samples fill them and none lies beyond.")
-    if len(results.drawing):
-        labels = tr(
-            "The manufacturer's labels (green) should meet the orange border: extents touch it, corners lie on it."
-        )
-    else:
-        labels = tr("There is no drawing of this arm's envelope to compare with.")
-    return Picture(
-        workspace_figures.side_view(results, not np.array_equal(robot.tool, np.eye(4))),
-        tr("Side views of wrist centre and flange in the arm's plane, with exact borders"),
-        joined([exact, labels], " "),
-    )
-
-
-def _rule(enclosed: list[model.VoidSummary]) -> str:
-    """The rule that an unexpected hole points to joints 2 and 3, applied."""
-    elsewhere = [void for void in enclosed if not void.holds_shoulder]
-    if not elsewhere:
-        return tr(
-            "An enclosed void away from the shoulder would suggest a wrong limit or direction of joint 2 or 3: no "
-            "enclosed void lies away from the shoulder, so no table entry is indicated."
-        )
-    named = sum(bool(joints_after(void.cause) & {2, 3}) for void in elsewhere)
-    return sentence("workspace.rule", count=len(elsewhere), named=named)
 
 
 def _void_row(row: int, void: model.VoidSummary) -> list[str]:
@@ -136,7 +81,6 @@ def _void_row(row: int, void: model.VoidSummary) -> list[str]:
     return [
         str(row),
         bracketed(word("workspace.void_kind", VOID_KINDS, void.kind), tr("shoulder") if void.holds_shoulder else ""),
-        word("workspace.void_status", VOID_STATUS, void.status),
         _litres(low, high),
         *(
             ", ".join(fixed(1000 * value, 0) for value in corner)
@@ -151,65 +95,12 @@ def _litres(low: float, high: float) -> str:
     return tr("{low} to {high}", low=at_least(low, "L"), high=at_most(high, "L"))
 
 
-def _change_rows(summary: model.WorkspaceSummary) -> list[list[str]]:
-    finding = summary.verdict.finding
-    return [
-        [
-            bracketed(entry_word(change), tr(change.unit)),
-            f"{change.given:g}".replace("-", "−"),
-            f"{change.tried:g}".replace("-", "−"),
-            _litres(*change.left_litres) if change.left_litres else tr("undecided"),
-        ]
-        for change in (finding.single_changes if isinstance(finding, model.VoidUnexpected) else ())
-    ]
-
-
-def _section_caption(summary: model.WorkspaceSummary, drawn: bool) -> str:
-    texts = [
-        tr(
-            "Cells are bars along the slide. What is empty on the right is proven unreachable all along it; blank "
-            "cells on the left were merely not sampled."
-        )
-        if summary.proof.bars
-        else tr(
-            "What is empty on the right is proven unreachable from every side; blank cells on the left were merely not "
-            "sampled."
-        )
-    ]
-    enclosed = summary.enclosed_voids
-    if enclosed and enclosed[0].holds_shoulder:
-        texts.append(tr("The largest enclosed void surrounds the shoulder."))
-    elif enclosed:
-        texts.append(tr("The largest enclosed void is away from the shoulder."))
-    if drawn:
-        texts.append(
-            tr(
-                "Green are the manufacturer's labels of the wrist centre: extents touch its border, corners are single "
-                "configurations."
-            )
-        )
-    checked, inside = number(summary.proof.points_checked), summary.proof.points_in_empty_cells
-    if inside:
-        texts.append(
-            tr(
-                "Of {checked} recorded samples, {inside} lie in a cell proven unreachable.",
-                checked=checked,
-                inside=inside,
-            )
-        )
-    else:
-        texts.append(tr("Of {checked} recorded samples, none lies in a cell proven unreachable.", checked=checked))
-    return joined(texts, " ")
-
-
-def _top_caption(robot: Robot) -> str:
-    if robot.slides[0]:
-        return tr("Joint 1 slides: the view from above shows how far the samples reach along it and beside it.")
-    if workspace_figures.turns_fully(robot):
-        return tr("Density depends only on the distance from axis 1, because joint 1 makes a full turn.")
+def _section_caption(summary: model.WorkspaceSummary) -> str:
     return tr(
-        "In the dead zone behind the robot, between the limits of joint 1, the tool point gets only by leaning "
-        "the arm back or turning the wrist aside, and less far."
+        "What is empty on the right is proven unreachable all around (along a slide: all along); blank cells on the "
+        "left were merely not sampled. Of {checked} recorded samples, {inside} lie in a cell proven unreachable.",
+        checked=number(summary.proof.points_checked),
+        inside=summary.proof.points_in_empty_cells,
     )
 
 
@@ -222,24 +113,3 @@ def _slices_caption(summary: model.WorkspaceSummary) -> str:
         voids=sentence("workspace.voids", count=enclosed) if enclosed else tr("no enclosed void"),
         pockets=sentence("workspace.pockets", count=pockets),
     )
-
-
-def _curve_caption(summary: model.WorkspaceSummary, curve: model.GrowthCurve) -> str:
-    volume = summary.volume_m3
-    finest = curve.touched_m3[curve.cell_mm == curve.cell_mm.min()][-1]
-    if finest > volume.upper:
-        touched = tr(
-            "The volume of the sampled cells depends on cell size and number of samples and overestimates the "
-            "volume: border cells count whole."
-        )
-    else:
-        touched = tr(
-            "The volume of the sampled cells depends on cell size and number of samples and is no estimate of "
-            "the volume."
-        )
-    band = tr(
-        "Use the band: the reached volume lies between {low} and {high} m³.",
-        low=at_least(volume.lower, "m³"),
-        high=at_most(volume.upper, "m³"),
-    )
-    return joined([touched, band], " ")

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 from markupsafe import Markup
@@ -15,104 +13,20 @@ from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import LogLocator, NullLocator, StrMethodFormatter
+from matplotlib.ticker import LogLocator
 
 from er3a.collision.scene import Scene
-from er3a.kinematics.forward import forward, skeleton
+from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.pipeline.language import N_, as_text, tr
+from er3a.pipeline.language import N_, tr
 from er3a.pipeline.messages.numbers import fixed, number
-from er3a.pipeline.messages.say import word
-from er3a.pipeline.messages.workspace import POINTS, SWEEPS
 from er3a.pipeline.player.turning import ColourScale, Layer, scene_layers, turning_figure
 from er3a.pipeline.stages.workspace import model
-from er3a.pipeline.viewing.figures import axis_label, equal_scale, new_figure
+from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINTS, MUTED, REFERENCE
 from er3a.robots.robot import Robot
 
 DENSITY = "YlGnBu"
-LIMIT = REFERENCE
-FULL_TURN = 2 * np.pi - 1e-9
-
-
-def turns_fully(robot: Robot) -> bool:
-    """Whether joint 1 makes a full turn, so that the view from above has no dead zone; False if it slides."""
-    return not robot.slides[0] and bool(robot.continuous[0] or robot.upper[0] - robot.lower[0] >= FULL_TURN)
-
-
-class CellMap:
-    """Samples per cell over the grid, from the table of cells.
-
-    Attributes
-    ----------
-    samples : (nx, ny, nz)
-    origin, cell : m
-    """
-
-    def __init__(self, grid: model.GridSummary, cells: model.Cells):
-        self.origin, self.cell = np.array(grid.origin_m), grid.cell_m
-        self.samples = np.zeros(grid.shape, dtype=np.int64)
-        self.samples[tuple(cells.index.astype(np.int64).T)] = cells.samples
-
-    def edges(self, axis: int) -> Reals:
-        """Cell borders along an axis, mm."""
-        return (self.origin[axis] + np.arange(self.samples.shape[axis] + 1) * self.cell) * 1000
-
-
-def top_view(robot: Robot, results: model.WorkspaceResults) -> Figure:
-    """The cloud from above, with the wedge that joint 1 leaves."""
-    figure, axes = new_figure(width=8.0, height=6.6)
-    cells = CellMap(results.summary.grid, results.cells)
-    column = cells.samples.sum(axis=2) / cells.cell**2 / 1e6
-    mesh = axes.pcolormesh(
-        cells.edges(0), cells.edges(1), masked(column).T, cmap=DENSITY, norm=log_norm(column), rasterized=True
-    )
-    figure.colorbar(mesh, ax=axes, label=tr("samples per mm²"), shrink=0.7)
-    axis = robot.base[:2, 3] * 1000
-    axes.plot(*axis, "+", color=INK, markersize=10, markeredgewidth=1.6)
-    title = tr("From above: joint 1 makes a full turn")
-    if robot.slides[0]:
-        lower, upper = (fixed(limit, 0) for limit in 1000 * np.array([robot.lower[0], robot.upper[0]]))
-        title = tr("From above: joint 1 slides from {lower} to {upper} mm", lower=lower, upper=upper)
-    elif not turns_fully(robot):
-        lower, upper = (fixed(limit, 0) for limit in np.degrees([robot.lower[0], robot.upper[0]]))
-        title = tr("From above: joint 1 turns from {lower} to {upper} deg", lower=lower, upper=upper)
-        size = max(np.ptp(cells.edges(0)), np.ptp(cells.edges(1))) / 2
-        for limit in (robot.lower[0], robot.upper[0]):
-            tool = forward(robot, np.append(limit, np.zeros(robot.joints - 1)))[:2, 3] * 1000 - axis
-            length = np.linalg.norm(tool)
-            if length > 1:
-                axes.plot(*np.transpose([axis, axis + tool / length * size]), color=LIMIT, linewidth=1.8)
-        handles = [Line2D([], [], color=LIMIT, label=tr("the arm's plane at the limits of joint 1"))]
-        axes.legend(handles=handles, loc="lower left", bbox_to_anchor=(0, 1.0), borderaxespad=0.2)
-    axes.set_title(title, pad=42)
-    equal_scale(axes, "x (mm)", "y (mm)", fill=False)
-    return figure
-
-
-def convergence(results: model.WorkspaceResults) -> Figure:
-    """Touched volume over the number of samples, by cell size."""
-    figure, axes = new_figure(width=9.0, height=4.2)
-    curve, volume = results.curve, results.summary.volume_m3
-    for cell, colour in zip(np.unique(curve.cell_mm), (JOINTS[0], JOINTS[5], JOINTS[2])):
-        label = tr("cells of {cell:.0f} mm", cell=cell)
-        rows = curve.cell_mm == cell
-        axes.plot(curve.samples[rows] / 1e6, curve.touched_m3[rows], color=colour, marker=".", label=label)
-    axes.axhline(results.summary.hull.volume_m3, color=MUTED, linestyle="--", label=tr("convex hull"))
-    axes.axhspan(volume.lower, volume.upper, color=JOINTS[1], alpha=0.35, label=tr("proven bounds"))
-    middle, (low, high) = volume.estimate, volume.ci95
-    last = curve.samples.max() / 1e6
-    spread, label = [[middle - low], [high - middle]], tr("estimate, 95 % interval")
-    axes.errorbar([last * 1.3], [middle], yerr=spread, color=INK, fmt="o", capsize=4, label=label)
-    axes.set_xscale("log")
-    axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-    axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
-    axes.xaxis.set_minor_locator(NullLocator())
-    axes.set_xlabel(tr("samples (millions)"))
-    axes.set_ylabel(axis_label(curve, "touched_m3"))
-    axes.set_ylim(0, None)
-    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
-    return figure
 
 
 def masked(values: Reals) -> np.ma.MaskedArray:
@@ -133,8 +47,6 @@ PROOF = {
     N_("unreachable"): "#ffffff",
 }
 FILLED, WEDGE, UNDECIDED, EMPTY = range(4)
-BORDERS = {"tool_point": INK, "wrist_centre": REFERENCE, "flange": JOINTS[3]}
-DRAWN = JOINTS[2]
 SLICE_PIXELS, _CLOUD_CELLS = 321, 80
 PANEL_IN, AROUND_PANELS_IN = 4.9, 2.4  # a panel's width; what stands above and below, in
 WITHIN = 0.05  # of the reached heights: nearer to an end, a height is no slice's
@@ -142,7 +54,7 @@ WITHIN = 0.05  # of the reached heights: nearer to an end, a height is no slice'
 
 def sections(robot: Robot, results: model.WorkspaceResults) -> Figure:
     """Side sections about axis 1, or across it where it slides: what the samples show, and what is proven."""
-    border, drawing, bars = results.border, results.drawing, results.summary.proof.bars
+    border, bars = results.border, results.summary.proof.bars
     figure, (left, right) = new_figure(1, 2, width=11.5, height=9.0, sharey=True, sharex=True)
     if bars:
         counts = _draw_cloud(left, bars, results.cloud.point_m)
@@ -162,19 +74,12 @@ def sections(robot: Robot, results: model.WorkspaceResults) -> Figure:
         equal_scale(axes, across, up if axes is left else "", fill=False)
         if not bars:
             axes.set_xlim(0, None)
-    draw_labels(right, drawing, drawing.rho_m)
     right.set_title(tr("Proof"))
     handles: list[Artist] = [
         Line2D([], [], color=INK, marker="o", markersize=4, linewidth=2.4, label=tr("arm, all joints 0"))
     ]
-    handles += [
-        Line2D([], [], color=colour, label=tr("exact border, {point}", point=word("workspace.point", POINTS, point)))
-        for point, colour in BORDERS.items()
-        if (border.point == point).any()
-    ]
-    if len(drawing):
-        label = tr("manufacturer's drawing, wrist centre")
-        handles.append(Line2D([], [], color=DRAWN, marker="o", linestyle=":", label=label))
+    if len(border):
+        handles.append(Line2D([], [], color=INK, label=tr("outline of what may be reached")))
     states = [state for kind, state in enumerate(PROOF) if not (bars and kind == WEDGE)]
     handles += [Patch(facecolor=PROOF[state], edgecolor=MUTED, label=tr(state)) for state in states]
     figure.legend(handles=handles, loc="outside lower center", ncols=4)
@@ -199,19 +104,14 @@ def _colour_bar(figure: Figure, shown: QuadMesh, label: str) -> None:
 
 
 def _draw_density(axes: Axes, cell: float, section: model.SectionCells) -> QuadMesh:
-    rings = np.pi * cell**2 * 2 * section.rho_m * 1e3
-    return _draw_cells(axes, cell, section.rho_m, section.z_m, section.samples / rings)
-
-
-def _draw_cells(axes: Axes, cell: float, across: Reals, up: Reals, density: Reals, **style: Any) -> QuadMesh:
-    """Cells (n,), by their middles in m, shaded by what each holds."""
-    middles = np.stack([across, up], axis=1)
+    density = section.samples / (np.pi * cell**2 * 2 * section.rho_m * 1e3)
+    middles = np.stack([section.rho_m, section.z_m], axis=1)
     low = middles.min(axis=0) - cell / 2
     index = np.rint((middles - low) / cell - 0.5).astype(int)
     shown = np.zeros(tuple(index.max(axis=0) + 1))
     shown[tuple(index.T)] = density
     x, z = ((low[i] + np.arange(shown.shape[i] + 1) * cell) * 1000 for i in (0, 1))
-    return axes.pcolormesh(x, z, masked(shown).T, cmap=DENSITY, norm=log_norm(shown), rasterized=True, **style)
+    return axes.pcolormesh(x, z, masked(shown).T, cmap=DENSITY, norm=log_norm(shown), rasterized=True)
 
 
 def _across(bars: model.Bars, points: Reals) -> Reals:
@@ -256,35 +156,10 @@ def _draw_proof(axes: Axes, proof: model.ProofCells, bars: model.Bars | None) ->
     axes.set_ylim(corners[:, 2].min(), corners[:, 3].max())
 
 
-def arcs_of(border: model.Border, view: str, point: str) -> Iterator[tuple[int, model.Border]]:
-    """Numbers and rows of the arcs of a point's border in a view."""
-    rows = border.take((border.view == view) & (border.point == point))
-    yield from ((int(number), rows.take(rows.arc == number)) for number in np.unique(rows.arc))
-
-
 def _draw_border(axes: Axes, border: model.Border) -> None:
-    for point in sorted(BORDERS):
-        for _, arc in arcs_of(border, "section", point):
-            axes.plot(arc.rho_m * 1000, arc.z_m * 1000, color=BORDERS[point], linewidth=1.3)
-
-
-def draw_labels(axes: Axes, drawing: model.Drawing, across_m: Reals) -> None:
-    """The manufacturer's labels: extents as dotted lines, corners as dots; ``across_m`` are the level coordinates."""
-    for x, z, q2, q3 in zip(across_m * 1000, drawing.z_m * 1000, drawing.q2_deg, drawing.q3_deg):
-        if np.isnan(z):
-            axes.axvline(x, color=DRAWN, linestyle=":", linewidth=1.2)
-        elif np.isnan(x):
-            axes.axhline(z, color=DRAWN, linestyle=":", linewidth=1.2)
-        else:
-            axes.plot(x, z, "o", color=DRAWN, markersize=5)
-            axes.annotate(
-                f"J2 {as_text(q2, 'g')}, J3 {as_text(q3, 'g')} deg",
-                (x, z),
-                (6, -11),
-                textcoords="offset points",
-                fontsize=8,
-                color=DRAWN,
-            )
+    for each in np.unique(border.arc):
+        line = border.take(border.arc == each)
+        axes.plot(line.rho_m * 1000, line.z_m * 1000, color=INK, linewidth=1.3)
 
 
 def _about(axis: model.AxisSummary, points: Reals) -> Reals:
@@ -359,66 +234,6 @@ def _on_arcs(azimuth: Reals, arcs: Reals) -> Flags:
     for low, high in zip(arcs[::2], arcs[1::2]):
         found |= (low <= azimuth) & (azimuth <= high)
     return found
-
-
-SIDE_DRAWN, FLANGE, WRIST = JOINTS[2], INK, REFERENCE
-
-
-def side_view(results: model.WorkspaceResults, has_tool: bool) -> Figure:
-    """Wrist centre and flange in the arm's plane: samples, exact border with numbered arcs, the manufacturer's labels.
-
-    Parameters
-    ----------
-    has_tool : whether the tool point is another point than the flange
-    """
-    figure, (left, right) = new_figure(1, 2, width=12.0, height=6.6, sharex=True, sharey=True)
-    for axes, point, colour in ((left, "wrist_centre", WRIST), (right, "flange" if has_tool else "tool_point", FLANGE)):
-        mesh = _draw_samples(axes, results.side_view, "wrist_centre" if axes is left else "tool_point")
-        figure.colorbar(mesh, ax=axes, label=tr("samples per litre"), location="top", shrink=0.8)
-        for i, arc in arcs_of(results.border, "side", point):
-            x, z = arc.rho_m * 1000, arc.z_m * 1000
-            axes.plot(x, z, color=colour, linewidth=1.5)
-            if axes is left:
-                axes.annotate(str(i), (x[len(x) // 2], z[len(z) // 2]), **_numbered(colour))
-        equal_scale(axes, tr("x to the front (mm)"), tr("height along axis 1 (mm)") if axes is left else "", fill=False)
-    left.set_title(tr("Wrist centre"))
-    right.set_title(tr("Flange (border), tool point (samples)") if has_tool else tr("Flange"))
-    draw_labels(left, results.drawing, results.drawing.x_m)
-    handles = [
-        Line2D([], [], color=WRIST, label=tr("exact border of the wrist centre")),
-        Line2D([], [], color=FLANGE, label=tr("exact border of the flange")),
-    ]
-    if len(results.drawing):
-        handles.append(Line2D([], [], color=SIDE_DRAWN, marker="o", linestyle=":", label=tr("manufacturer's labels")))
-    figure.legend(handles=handles, loc="outside lower center", ncols=3)
-    return figure
-
-
-def arc_rows(border: model.Border) -> list[list[str]]:
-    """The wrist centre's arcs with the joint values that make them, as rows of text."""
-    return [
-        [str(i), word("workspace.sweeps", SWEEPS, arc.sweeps[0]), _swept(arc.q2_deg), _swept(arc.q3_deg)]
-        for i, arc in arcs_of(border, "side", "wrist_centre")
-    ]
-
-
-def _swept(angles: Reals) -> str:
-    first, last = angles[0], angles[-1]
-    low, high = fixed(min(first, last), 1), fixed(max(first, last), 1)
-    return low if low == high else tr("{low} to {high}", low=low, high=high)
-
-
-def _numbered(colour: str) -> dict[str, Any]:
-    box = {"boxstyle": "circle,pad=0.15", "facecolor": "white", "edgecolor": colour, "linewidth": 0.8}
-    return {"ha": "center", "va": "center", "fontsize": 8, "color": colour, "bbox": box}
-
-
-def _draw_samples(axes: Axes, views: model.SideViewCells, point: str) -> QuadMesh:
-    rows = views.take(views.point == point)
-    cell = float(rows.cell_m[0])
-    # Per volume of the half ring: else the samples near the axis would drown.
-    half_rings = np.pi * cell**2 * np.maximum(np.abs(rows.x_m), cell / 2) * 1e3
-    return _draw_cells(axes, cell, rows.x_m, rows.z_m, rows.samples / half_rings, alpha=0.8)
 
 
 CLOUD_POINTS = 12_000

@@ -1,0 +1,99 @@
+"""One entry of a table, and tables with amounts added to entries: what comparison, diagnosis, calibration and evidence
+name and change."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from er3a.kinematics.table_batch import Tables
+from er3a.numerics.arrays import Reals
+from er3a.references.quantities import MM
+from er3a.robots.robot import Robot
+
+EntryUnit = Literal["mm", "deg", "deg/s", ""]
+LENGTHS = ("a", "d")
+BASE_COLUMNS = ("base_x", "base_y", "base_z", "base_rx", "base_ry", "base_rz")
+TOOL_COLUMNS = ("tool_x", "tool_y", "tool_z")
+IN_MM = (*LENGTHS, *BASE_COLUMNS[:3], *TOOL_COLUMNS)
+SCALE_M, SCALE_RAD = 1e-3, float(np.radians(0.1))
+"""Steps of lengths and angles that move a tool about as far: 1 mm, and 0.1 deg at half a metre."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One number of a table, of its base or its tool.
+
+    Attributes
+    ----------
+    column : of the table, or one of ``BASE_COLUMNS`` and ``TOOL_COLUMNS``, or ``scale``, a common factor of all lengths
+    joint : the row, from 1; 0 for base, tool and scale
+    """
+
+    column: str
+    joint: int = 0
+
+    @property
+    def name(self) -> str:
+        """Such as ``d4``, ``direction5`` or ``base_x``."""
+        return f"{self.column}{self.joint}" if self.joint else self.column
+
+    @property
+    def unit(self) -> EntryUnit:
+        """mm, deg, deg/s, or nothing for a direction and the scale."""
+        if self.column in IN_MM:
+            return "mm"
+        return "" if self.column in ("direction", "scale") else "deg/s" if self.column == "speed" else "deg"
+
+    @property
+    def in_unit(self) -> float:
+        """Factor from SI to the unit."""
+        return {"mm": MM, "": 1.0}.get(self.unit, 180 / np.pi)
+
+    @property
+    def scale(self) -> float:
+        """A step in SI that moves a tool by about a millimetre."""
+        return SCALE_M if self.unit == "mm" else SCALE_RAD
+
+    def value(self, robot: Robot) -> float:
+        """The robot's value, in the unit; 0 for the base, whose corrections come behind what the file says."""
+        if self.joint:
+            return round(float(getattr(robot, self.column)[self.joint - 1] * self.in_unit), 9)
+        return float(robot.tool[TOOL_COLUMNS.index(self.column), 3] * MM) if self.column in TOOL_COLUMNS else 0.0
+
+    def of(self, tables: Tables) -> Reals:
+        """The entry (H,) of tables, in m or rad; 1 for the scale."""
+        if self.column == "scale":
+            return np.ones(len(tables))
+        column: Reals = getattr(tables, self.column)[:, self.joint - 1]
+        return column
+
+
+def shifted(tables: Tables, entries: Sequence[Entry], amounts: Reals) -> Tables:
+    """Tables with amounts added to k entries; those of base and tool change no table.
+
+    Parameters
+    ----------
+    tables : one, or one for each of H rows of amounts
+    amounts : (H, k), m and rad; relative for the scale, which has to come before lengths
+    """
+    found = tables if len(tables) == len(amounts) else tables[np.zeros(len(amounts), dtype=np.int64)]
+    columns: dict[str, Any] = {}
+    for entry, amount in zip(entries, amounts.T):
+        for name in LENGTHS if entry.column == "scale" else (entry.column,) * bool(entry.joint):
+            if name not in columns:
+                columns[name] = getattr(found, name).copy()
+            if entry.joint:
+                columns[name][:, entry.joint - 1] += amount
+            else:
+                columns[name] *= 1 + amount[:, None]
+    return replace(found, **columns)
+
+
+def wrapped_between(tables: Tables, other: Tables, entry: Entry) -> Reals:
+    """By how much (H,) an entry of tables is more than another's, m or rad; angles within half a turn."""
+    off = entry.of(tables) - entry.of(other)
+    return off if entry.unit == "mm" else (off + np.pi) % (2 * np.pi) - np.pi

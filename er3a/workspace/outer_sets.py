@@ -1,0 +1,351 @@
+"""What any serial arm may reach at most: sets about each joint's axis, carried from the tip to axis 1.
+
+The points that the joints from k on can bring the tool to are held as rings about axis k: rectangles of radius and
+height, and for each the azimuths that are proven empty. A rectangle is taken about axis k at a range of azimuths, and
+carried over the constant link: its radius, height and azimuth about axis k + 1 lie within first-order terms of those of
+its middle, with the sag of the arc. Where no ring of joint k + 1 meets them, joint k at 0 can't bring the tool there;
+what is left is turned by the range of joint k, or shifted by it. So all joints' ranges are taken as they are, each
+ring costs a search over one angle only, and the error is about one ring's size for each joint: small for those near the
+tool.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from er3a.geometry.vectors import TURN
+from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.numerics.jit import inner_kernel, kernel
+from er3a.workspace.arcs import FULL_TURN, ROUND_OFF, Cell, remove
+from er3a.workspace.general_arm import GeneralArm
+
+Spread = tuple[float, float, float, float, float, float]
+_PIECES, _LEVELS = 64, 6
+_ARCS = 6
+
+
+class Rings(NamedTuple):
+    """Equal rings about an axis, and what of them is proven empty.
+
+    Attributes
+    ----------
+    size : (2,), m, edges of the rectangles in radius and height; low : m, height of the lowest
+    empty, counts : (n_rho, n_z, arcs, 2), rad in [0, 2 pi], and how many of them count (n_rho, n_z)
+    reached : (n_rho + 1, n_z + 1), number of rings that are not wholly empty, summed from the first row and column on
+    full : whether all rings are either wholly empty or not empty at all
+    """
+
+    size: Reals
+    low: float
+    empty: Reals
+    counts: Integers
+    reached: Integers
+    full: bool
+
+
+def outer_rings(arm: GeneralArm, across: int) -> Rings:
+    """What the joints after joint 1 may reach, about axis 2; of an arm of one joint its tip.
+
+    Parameters
+    ----------
+    across : rings along the longer side of each set
+    """
+    last = len(arm.lower) - 1
+    tip = arm.tip
+    rings = _grid(arm, last, across)
+    azimuth = float(np.arctan2(tip[1], tip[0]))
+    alone = float(np.hypot(tip[0], tip[1])) < 1e-9
+    _mark_tip(arm, last, float(np.hypot(tip[0], tip[1])), azimuth, alone, rings)
+    rings = _summed(rings)
+    for k in range(last - 1, 0, -1):
+        finer = _grid(arm, k, across)
+        if arm.sliding[k]:
+            start, stop = arm.heights[k] - [arm.lower[k], arm.upper[k]]
+            still = _summed(_carried(arm, k, _at_heights(arm, k, across, start, stop), rings))
+            _shift(still, arm.lower[k], arm.upper[k], finer)
+        else:
+            finer = _carried(arm, k, finer, rings)
+        rings = _summed(finer)
+    return rings
+
+
+def _grid(arm: GeneralArm, k: int, across: int) -> Rings:
+    return _at_heights(arm, k, across, *arm.heights[k])
+
+
+def _at_heights(arm: GeneralArm, k: int, across: int, low: float, high: float) -> Rings:
+    """Rings that cover all points at these heights about axis k, all of them empty."""
+    radius, height = arm.radii[k] + 1e-9, high - low + 2e-9
+    edge = max(radius, height) / across
+    count_rho, count_z = (max(1, int(np.ceil(length / edge))) for length in (radius, height))
+    size = np.array([radius / count_rho, height / count_z])
+    empty = np.zeros((count_rho, count_z, _ARCS, 2))
+    empty[:, :, 0, 1] = TURN
+    full = bool(not arm.sliding[k] and arm.upper[k] - arm.lower[k] >= FULL_TURN)
+    count = np.ones((count_rho, count_z), dtype=np.int64)
+    return Rings(size, float(low) - 1e-9, empty, count, np.zeros((1, 1), dtype=np.int64), full)
+
+
+def _summed(rings: Rings) -> Rings:
+    whole = (rings.counts == 1) & (rings.empty[:, :, 0, 1] - rings.empty[:, :, 0, 0] >= TURN)
+    reached = np.zeros((whole.shape[0] + 1, whole.shape[1] + 1), dtype=np.int64)
+    reached[1:, 1:] = (~whole).cumsum(axis=0).cumsum(axis=1)
+    return rings._replace(reached=reached)
+
+
+def _carried(arm: GeneralArm, k: int, rings: Rings, outer: Rings) -> Rings:
+    low, high = (0.0, 0.0) if arm.sliding[k] else (arm.lower[k], arm.upper[k])
+    _carry(np.ascontiguousarray(arm.links[k + 1]), low, high, outer, rings)
+    return rings
+
+
+@kernel
+def _mark_tip(arm: GeneralArm, k: int, rho: float, azimuth: float, alone: bool, rings: Rings) -> None:
+    z_0 = arm.tip[2] + (arm.lower[k] if arm.sliding[k] else 0.0)
+    z_1 = arm.tip[2] + (arm.upper[k] if arm.sliding[k] else 0.0)
+    a = azimuth + (0.0 if arm.sliding[k] else arm.lower[k]) - 1e-6
+    b = azimuth + (0.0 if arm.sliding[k] else arm.upper[k]) + 1e-6
+    spread = max(0.0, rho - 1e-9), rho + 1e-9, z_0 - 1e-9, z_1 + 1e-9, 0.0, 0.0
+    i_0, i_1, j_0, j_1 = _range_of(spread, rings)
+    for i in range(i_0, i_1 + 1):
+        for j in range(j_0, j_1 + 1):
+            if alone:
+                rings.counts[i, j] = 0
+            else:
+                rings.counts[i, j] = remove(rings.empty[i, j], rings.counts[i, j], a, b, True)
+
+
+@inner_kernel
+def _range_of(spread: Spread, rings: Rings) -> tuple[int, int, int, int]:
+    """First and last ring in radius and height; none if the first is after the last."""
+    n_rho, n_z = rings.counts.shape
+    i_0, i_1 = int(spread[0] / rings.size[0] - 1e-9), int(spread[1] / rings.size[0] + 1e-9)
+    j_0 = int(np.floor((spread[2] - rings.low) / rings.size[1] - 1e-9))
+    j_1 = int(np.floor((spread[3] - rings.low) / rings.size[1] + 1e-9))
+    return i_0, min(i_1, n_rho - 1), max(j_0, 0), min(j_1, n_z - 1)
+
+
+@inner_kernel
+def _within(arcs: Reals, count: int, low: float, high: float) -> bool:
+    """Whether azimuths from ``low`` to ``high`` (any turn) all lie within one arc (two across azimuth 0)."""
+    if high - low >= TURN:
+        return count == 1 and arcs[0, 1] - arcs[0, 0] >= TURN
+    shift = np.floor(low / TURN) * TURN
+    low, high = low - shift, high - shift
+    if high > TURN:
+        return _within(arcs, count, low, TURN) and _within(arcs, count, 0.0, high - TURN)
+    within = False
+    for n in range(count):
+        within = within or (arcs[n, 0] <= low and high <= arcs[n, 1])
+    return within
+
+
+@kernel
+def _spread(L: Reals, cell: Cell, angle: float, width: float, bar: float) -> Spread:
+    """Where a cell about axis k (of a bar so long (m), unless that is 0), at angles within ``width`` of one, lies about
+    axis k + 1.
+
+    Returns
+    -------
+    rho_low, rho_high, z_low, z_high : m; phi, d_phi : rad
+    """
+    rho, z = 0.5 * (cell[0] + cell[1]), 0.5 * (cell[2] + cell[3])
+    c, s, along_bar = np.cos(angle), np.sin(angle), 0.0
+    if bar > 0.0:
+        c, s, along_bar = 1.0, 0.0, bar * angle / TURN
+    x, y, height = rho * c - L[0, 3], rho * s + along_bar - L[1, 3], z - L[2, 3]
+    px = L[0, 0] * x + L[1, 0] * y + L[2, 0] * height
+    py = L[0, 1] * x + L[1, 1] * y + L[2, 1] * height
+    pz = L[0, 2] * x + L[1, 2] * y + L[2, 2] * height
+    sag = cell[1] * (1.0 - np.cos(width)) if width < np.pi else 2.0 * cell[1]
+    d_rho, d_z = 0.5 * (cell[1] - cell[0]), 0.5 * (cell[3] - cell[2])
+    d_turn = cell[1] * (np.sin(width) if width < 0.5 * np.pi else 1.0)
+    if bar > 0.0:
+        sag, d_turn = 0.0, bar * width / TURN
+    inwards = d_rho + sag
+    rho_there = np.sqrt(px * px + py * py)
+    ux, uy = (px / rho_there, py / rho_there) if rho_there > 0.0 else (1.0, 0.0)
+    # Radial, tangential and upward directions of the cell, in the frame after the link.
+    rx, ry, rz = L[0, 0] * c + L[1, 0] * s, L[0, 1] * c + L[1, 1] * s, L[0, 2] * c + L[1, 2] * s
+    tx, ty, tz = L[1, 0] * c - L[0, 0] * s, L[1, 1] * c - L[0, 1] * s, L[1, 2] * c - L[0, 2] * s
+    vx, vy, vz = L[2, 0], L[2, 1], L[2, 2]
+    along = abs(ux * rx + uy * ry) * inwards + abs(ux * tx + uy * ty) * d_turn + abs(ux * vx + uy * vy) * d_z
+    aside = abs(ux * ry - uy * rx) * inwards + abs(ux * ty - uy * tx) * d_turn + abs(ux * vy - uy * vx) * d_z
+    up = abs(rz) * inwards + abs(tz) * d_turn + abs(vz) * d_z
+    safe = 64.0 * ROUND_OFF * (1.0 + cell[1] + bar + abs(z) + abs(L[0, 3]) + abs(L[1, 3]) + abs(L[2, 3]))
+    along, aside, up = along + safe, aside + safe, up + safe
+    nearest = max(0.0, rho_there - along)
+    d_phi = np.arctan2(aside, rho_there - along) + 1e-9 if rho_there > along else np.pi
+    farthest = np.sqrt((rho_there + along) ** 2 + aside * aside)
+    return nearest, farthest, pz - up, pz + up, np.arctan2(py, px), d_phi
+
+
+@kernel
+def _meets(L: Reals, cell: Cell, angle: float, width: float, outer: Rings, bar: float) -> bool:
+    """Whether a cell at a range of angles about axis k may meet what is not empty about axis k + 1."""
+    spread = _spread(L, cell, angle, width, bar)
+    i_0, i_1, j_0, j_1 = _range_of(spread, outer)
+    if i_0 > i_1 or j_0 > j_1:
+        return False
+    sums = outer.reached
+    total = sums[i_1 + 1, j_1 + 1] - sums[i_0, j_1 + 1] - sums[i_1 + 1, j_0] + sums[i_0, j_0]
+    if total == 0:
+        return False
+    if outer.full or spread[5] >= np.pi:
+        return True
+    low, high = spread[4] - spread[5], spread[4] + spread[5]
+    for i in range(i_0, i_1 + 1):
+        for j in range(j_0, j_1 + 1):
+            if not _within(outer.empty[i, j], outer.counts[i, j], low, high):
+                return True
+    return False
+
+
+@inner_kernel
+def _meets_anywhere(L: Reals, cell: Cell, outer: Rings, levels: int) -> bool:
+    """Whether a cell may meet what is not empty at any angle."""
+    stack = np.empty((levels + 2, 2))
+    for piece in range(_PIECES):
+        stack[0, 0], stack[0, 1] = TURN * (piece + 0.5) / _PIECES, 0.5 * TURN / _PIECES + 1e-12
+        waiting, finest = 1, 0.5 * TURN / _PIECES / 2.0**levels * 1.5
+        while waiting > 0:
+            waiting -= 1
+            angle, width = stack[waiting, 0], stack[waiting, 1]
+            if not _meets(L, cell, angle, width, outer, 0.0):
+                continue
+            if width <= finest:
+                return True
+            half = 0.5 * width + 1e-13
+            stack[waiting, 0], stack[waiting, 1] = angle - 0.5 * width, half
+            stack[waiting + 1, 0], stack[waiting + 1, 1] = angle + 0.5 * width, half
+            waiting += 2
+    return False
+
+
+@inner_kernel
+def exclude(
+    L: Reals, cell: Cell, ends: tuple[float, float, float], outer: Rings, arcs: Reals, count: int, flags: Flags
+) -> int:
+    """Take the azimuths that a joint's range brings a ring or bar to out of its arcs; what is left is empty.
+
+    Parameters
+    ----------
+    L : (4, 4), the link after the joint
+    ends : the joint's range, rad, and the length of bars, m (0 for rings)
+    outer : the largest reach of the joints after it
+    arcs, count : the arcs that are empty so far; changed
+    flags : (2, longest) bool, working memory
+
+    Returns
+    -------
+    count : of the arcs
+    """
+    low, high, bar = ends
+    edge = max(min(cell[1] - cell[0], cell[3] - cell[2]), 0.5 * min(outer.size[0], outer.size[1]))
+    levels, pieces, around = 0, _PIECES, bar if bar > 0.0 else cell[1] * TURN
+    while levels < _LEVELS and around / pieces > edge:
+        levels, pieces = levels + 1, 2 * pieces
+    if high - low >= FULL_TURN:
+        return 0 if _meets_anywhere(L, cell, outer, levels) else count
+    now, finer = flags[0], flags[1]
+    pieces, found = _PIECES, False
+    for i in range(pieces):
+        now[i] = _meets(L, cell, TURN * (i + 0.5) / pieces, 0.5 * TURN / pieces + 1e-12, outer, bar)
+        found = found or now[i]
+    if not found:
+        return count
+    for _ in range(levels):
+        # Only ends of what is left are looked at again: its inside is taken to be reached.
+        for i in range(pieces):
+            finer[2 * i], finer[2 * i + 1] = now[i], now[i]
+        pieces *= 2
+        for sense in (1, -1):
+            for start in range(pieces):
+                i = start if sense > 0 else pieces - 1 - start
+                # Follow each end inwards until a piece stays.
+                if finer[i] or not finer[(i + sense) % pieces]:
+                    continue
+                m = (i + sense) % pieces
+                half = 0.5 * TURN / pieces + 1e-12
+                while finer[m] and not _meets(L, cell, TURN * (m + 0.5) / pieces, half, outer, bar):
+                    finer[m] = False
+                    m = (m + sense) % pieces
+        now, finer = finer, now
+    i = 0
+    while i < pieces:
+        if not now[i]:
+            i += 1
+            continue
+        first = i
+        while i < pieces and now[i]:
+            i += 1
+        a, b = TURN * first / pieces - 1e-9, TURN * i / pieces + 1e-9
+        count = remove(arcs, count, a + low, b + high, True)
+    return count
+
+
+@kernel
+def _carry(L: Reals, low: float, high: float, outer: Rings, rings: Rings) -> None:
+    """Fill in what one more joint in front may reach."""
+    n_rho, n_z = rings.counts.shape
+    flags = np.zeros((2, _PIECES << _LEVELS), dtype=np.bool_)
+    for i in range(n_rho):
+        for j in range(n_z):
+            cell = (
+                i * rings.size[0],
+                (i + 1) * rings.size[0],
+                rings.low + j * rings.size[1],
+                rings.low + (j + 1) * rings.size[1],
+            )
+            rings.counts[i, j] = exclude(L, cell, (low, high, 0.0), outer, rings.empty[i, j], 1, flags)
+
+
+@kernel
+def _shift(still: Rings, low: float, high: float, rings: Rings) -> None:
+    """Fill in what a prismatic joint may reach: the rings of the still joint within its range."""
+    n_rho, n_z = rings.counts.shape
+    for i in range(n_rho):
+        for j in range(n_z):
+            z_0 = rings.low + j * rings.size[1] - high
+            z_1 = rings.low + (j + 1) * rings.size[1] - low
+            spread = i * rings.size[0], (i + 1) * rings.size[0], z_0 - 1e-9, z_1 + 1e-9, 0.0, 0.0
+            i_0, i_1, j_0, j_1 = _range_of(spread, still)
+            count = rings.counts[i, j]
+            for k in range(i_0, i_1 + 1):
+                for m in range(j_0, j_1 + 1):
+                    count = _remove_rest(still.empty[k, m], still.counts[k, m], rings.empty[i, j], count)
+            rings.counts[i, j] = count
+
+
+@inner_kernel
+def _remove_rest(empty: Reals, empty_count: int, arcs: Reals, count: int) -> int:
+    """Take what is outside of ``empty`` out of the arcs."""
+    at = 0.0
+    while at < TURN and count > 0:
+        # The empty arc that begins next.
+        start, stop = TURN, TURN
+        for n in range(empty_count):
+            if empty[n, 1] > at and empty[n, 0] < start:
+                start, stop = empty[n, 0], empty[n, 1]
+        if start > at:
+            count = remove(arcs, count, at, start, True)
+        at = max(stop, start)
+    return count
+
+
+@kernel
+def exclude_cells(arm: GeneralArm, outer: Rings, cells: Reals, empty: Reals, counts: Integers) -> None:
+    """Azimuths of rings about axis 1, or places along bars, that are proven empty.
+
+    Parameters
+    ----------
+    cells : (N, 4), m
+    empty : (N, MAX_ARCS, 2), rad, and counts (N,): arcs of the whole turn at first; set
+    """
+    flags = np.zeros((2, _PIECES << _LEVELS), dtype=np.bool_)
+    for n in range(cells.shape[0]):
+        cell = cells[n, 0], cells[n, 1], cells[n, 2], cells[n, 3]
+        ends = arm.lower[0], arm.upper[0], arm.bar
+        counts[n] = exclude(arm.links[1], cell, ends, outer, empty[n], counts[n], flags)
