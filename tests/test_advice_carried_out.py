@@ -34,7 +34,6 @@ CARRIED_OUT = {
     **dict.fromkeys(REMEDIES, OF_PROGRAMS),
     **{f"singular.{kind}": OF_PROGRAMS for kind in ("wrist", "elbow", "shoulder")},
     **{f"not_followed.{reason}": OF_PROGRAMS for reason in NOT_FOLLOWED},
-    "sockets_beside": "test_sockets_beside_the_plane_of_a_flat_arm_whose_axes_are_tilted_settle_nothing",
     "remedy.zone_too_large": OF_PROGRAMS,
     "remedy.limit#above": OF_PROGRAMS,
     "remedy.limit#below": OF_PROGRAMS,

@@ -72,7 +72,6 @@ def test_shape_of_a_summary(tmp_path, study):
                     "data/robots/er3_600.yaml",
                     {"official": ["dh", "limits", "speeds", "wrist_load", "weight"], "inferred": ["zero", "envelopes"]},
                 ),
-                ("data/manual_refs/er3_600/envelope.csv", {"official": 9}),
                 ("data/scenes/table_and_post.yaml", {}),
             )
         ],

@@ -139,7 +139,6 @@ def test_jobs_that_fail_leave_an_error_which_the_next_run_takes_away(study, tmp_
 
     monkeypatch.setattr("er3a.pipeline.run_study.check_study", lambda file: study)
     monkeypatch.setattr("er3a.pipeline.run_study._snakemake", snakemake)
-    monkeypatch.setattr("er3a.pipeline.run_study._end_when_asked", lambda *folders: None)
     monkeypatch.setattr("er3a.pipeline.run_study._taken_lock", lambda: os.open(os.devnull, os.O_RDWR))
     started = Path("study.yaml"), Path("results"), Path("reports"), ["--verbose", "--executor", "local"]
     assert not run_study(*started)

@@ -21,7 +21,7 @@ DECIMALS = 9
 Value = Annotated[float, Field(ge=-1e6, le=1e6)]
 
 
-class Entry(NamedTuple):
+class VariedEntry(NamedTuple):
     """An entry that can be varied: of a joint, or of the tool (``joint`` None); its place, name and unit.
 
     ``group`` and ``column`` are those of a joint's row in a robot's file, or the key and index of a tool's placement.
@@ -52,10 +52,10 @@ _OF_THE_TOOL = {
     "yaw_deg": ("rpy_deg", 2, N_("yaw"), "deg"),
 }
 ENTRIES = {
-    f"joints.{joint}.{column}": Entry(joint, group, column, label, unit)
+    f"joints.{joint}.{column}": VariedEntry(joint, group, column, label, unit)
     for joint in range(1, MAX_JOINTS + 1)
     for column, (group, label, unit) in _OF_A_JOINT.items()
-} | {f"tool.{key}": Entry(None, *where) for key, where in _OF_THE_TOOL.items()}
+} | {f"tool.{key}": VariedEntry(None, *where) for key, where in _OF_THE_TOOL.items()}
 
 
 def _known_entry(path: str) -> str:
@@ -82,7 +82,7 @@ class Variant:
     value: float
 
     @property
-    def entry(self) -> Entry:
+    def entry(self) -> VariedEntry:
         """The entry that is varied."""
         return ENTRIES[self.vary]
 
@@ -196,7 +196,7 @@ class Sweep(StrictModel):
             yield Variant(f"{self.robot}-{name}-{number:02d}", self.robot, name, self.vary, value)
 
 
-def entry_label(entry: Entry) -> str:
+def entry_label(entry: VariedEntry) -> str:
     """An entry in words, in the language in use."""
     label = tr(entry.label)
     return tr("tool {axis}", axis=label) if entry.joint is None else f"J{entry.joint} {label}"

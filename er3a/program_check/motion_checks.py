@@ -318,7 +318,7 @@ def path_findings(path: MotionPath, rules: CheckRules, target: Reals | None) -> 
 def _stopped(path: MotionPath, target: Reals) -> found_in.CheckFinding:
     """Why a line or arc can't be followed on."""
     assert path.stop is not None
-    arm, last, at_mm = path.arm, path.q[-1], path.along_mm(path.stop)
+    arm, last, at_mm = path.arm, path.q[-1], path.along_mm(float(path.share[-1]))
     here = forward(arm, last)
     ahead = here + (target - here) * min(1.0, 0.02 + path.stop)  # a pose beyond; its rotation is made one again
     for pose in (target, _proper(ahead)):

@@ -22,7 +22,6 @@ from er3a.pipeline.messages.pages import caveat
 from er3a.pipeline.messages.validation import how_far_off, settled_parts, unconfirmed
 from er3a.pipeline.messages.vision import say
 from er3a.pipeline.messages.workspace import range_text
-from er3a.pipeline.overview import tray
 from er3a.pipeline.overview.index import condition, proposed
 from er3a.pipeline.results import FORMAT_VERSION, LeftOut, plain, read_foundation, write_checksums
 from er3a.pipeline.stages.dynamics.model import NoLimits
@@ -34,7 +33,7 @@ from er3a.pipeline.stages.validation.model import LeftOpen, PartFound
 from er3a.pipeline.stages.vision.model import PathRows, VisionResults
 from er3a.pipeline.stages.workspace.entry import BoxTask
 from er3a.pipeline.stages.workspace.model import PlacementSummary, PlaceSummary, StandSummary
-from er3a.pipeline.stages.workspace.page import capability_section
+from er3a.pipeline.stages.workspace.page import capability_section, tray
 from er3a.pipeline.stages.workspace.page.capability_section import tray_rows
 from er3a.pipeline.stages.workspace.page.tray import Meeting, first_inside, placing
 from er3a.pipeline.stages.workspace.tool_capability import task_summary

@@ -383,29 +383,35 @@ def compute(study: Study, name: str) -> model.VisionResults:
             *left_out_in_solids(scene, _places(robot, task_file, found, picture)),
         ),
     )
-    map_task = MapTask(
-        robot=robot,
-        home=meant(robot, np.array(task_file.home_deg)),
-        accuracy=task_file.arm.accuracy(),
-        T_base_camera=camera,
-        picture=picture,
-        view=task_file.view.view(head.board_mm or NO_BOARD),
-        places=np.array(list(places.values())),
-        T_object_tool=task_file.objects[0].grasps[0].grasp().T_object_tool,
-        camera_covariance=np.mean([each.standard_deviation.covariance() for each in task_file.objects], axis=0),
-        cells=settings.map_cells,
-    )
+    home = meant(robot, np.array(task_file.home_deg))
     speed, languages, is_open = limits_of(robot, motions).speed, motions.programs, bool(frames)
     written = partial(grasp_programs, speed=speed, languages=languages, simulated=head.simulated, frames_open=is_open)
     return model.VisionResults(
         summary,
         sample_rows(found, robot),
-        error_map(found, map_task),
+        error_map(found, _map_task(robot, task_file, head, camera, picture, settings.map_cells)),
         ways,
         model.GraspPrograms.stacked(
-            written(robot, entry.name, map_task.home, plan.chosen) for entry, plan, _ in planned if plan.chosen
+            written(robot, entry.name, home, plan.chosen) for entry, plan, _ in planned if plan.chosen
         ),
         corner_rows(found, images),
+    )
+
+
+def _map_task(
+    robot: Robot, file: VisionFile, head: HandEyeFile, camera: Reals, picture: Reals | None, cells: int
+) -> MapTask:
+    return MapTask(
+        robot=robot,
+        home=meant(robot, np.array(file.home_deg)),
+        accuracy=file.arm.accuracy(),
+        T_base_camera=camera,
+        picture=picture,
+        view=file.view.view(head.board_mm or NO_BOARD),
+        places=np.array([camera @ each.pose() for each in file.objects]),
+        T_object_tool=file.objects[0].grasps[0].grasp().T_object_tool,
+        camera_covariance=np.mean([each.standard_deviation.covariance() for each in file.objects], axis=0),
+        cells=cells,
     )
 
 
