@@ -12,10 +12,9 @@ from er3a.geometry.transforms import check_poses
 from er3a.kinematics.block_inverse import BLOCK, count_turns, solve_blocks
 from er3a.kinematics.by_class import arm_solver, checked_parameters, misses, slots_of_class, task_mask
 from er3a.kinematics.classes.chain_solvers import Unsolved
-from er3a.kinematics.classes.class_solvers import ARM_CLASSES
 from er3a.kinematics.classes.six_revolute import CERTAIN
 from er3a.kinematics.closed_form import REACHED, SLOTS
-from er3a.kinematics.confirmed import confirmed
+from er3a.kinematics.confirmed import confirmed, to_be_confirmed
 from er3a.kinematics.forward import checked_joints, forward
 from er3a.kinematics.inverse import SAME_MEMBER, SOLVES, is_complete, missed_row, missing_class, starts_of
 from er3a.kinematics.numerical import all_found
@@ -94,19 +93,21 @@ def inverse_batch(
         valid[left] = fault == REACHED
         _put_own(robot, T[left], own, left, q, valid)
         inside[left] = within(robot, q[left])
-    failing = _confirm(robot, T, left, q, inside)
-    valid[left] &= np.isfinite(q[left, :, 0])
+    failing = _confirm(robot, T, q, inside, threads)
+    valid[failing] &= np.isfinite(q[failing, :, 0])
     branch = np.broadcast_to(np.arange(SLOTS), valid.shape)
     solutions = Solutions(robot, q, valid, inside, branch, turn_range=_turn_range(robot, q) if turns else None)
     return replace(solutions, method=in_doubt(solutions.method), certain=~failing) if failing.any() else solutions
 
 
-def _confirm(robot: Robot, T: Reals, poses: Integers, q: Reals, inside: Flags) -> Flags:
-    """Let only such rows of ``q`` (N, S, n), at the poses with these numbers (k,), out as forward kinematics confirms.
+def _confirm(robot: Robot, T: Reals, q: Reals, inside: Flags, threads: int) -> Flags:
+    """Let only such rows of ``q`` (N, S, n) out as forward kinematics confirms.
 
     Returns whether each pose (N,) had others.
     """
-    failing = np.zeros(len(T), dtype=bool)
+    failing, poses = np.zeros(len(T), dtype=bool), to_be_confirmed(robot, T, q, threads)
+    if not poses.size:
+        return failing
     rows, lost = confirmed(robot, np.repeat(T[poses], q.shape[1], axis=0), q[poses].reshape(-1, robot.joints))
     if lost.any():
         failing[poses] = lost.reshape(-1, q.shape[1]).any(axis=1)
@@ -144,7 +145,7 @@ def _by_class(
         own = np.broadcast_to(reference, (count, robot.joints))
         q = _found_by_starts(robot, T, own)
         inside = within(robot, q)
-        _confirm(robot, T, np.arange(count), q, inside)
+        _confirm(robot, T, q, inside, threads)
         method = Iteration(starts_of(robot), missing_class(robot))
     else:
         values = checked_parameters(robot, redundancy, reference, count)
@@ -155,9 +156,7 @@ def _by_class(
             near = missed_row(robot, T[n], reference[0 if len(reference) == 1 else n])
             if near.solved:
                 q[n, 0], inside[n, 0] = near.q, within(robot, near.q)
-        closed = ARM_CLASSES[solver.code].closed_form
-        looked_at = np.flatnonzero(found.certainty != CERTAIN) if closed else np.arange(count)
-        certain = is_complete(robot, found.certainty) & ~_confirm(robot, T, looked_at, q, inside)
+        certain = is_complete(robot, found.certainty) & ~_confirm(robot, T, q, inside, threads)
         method = ByClass(solver.code, bool(certain.all()), bool(slot_labels(robot)))
     valid = np.isfinite(q[..., 0])
     branch = np.broadcast_to(np.arange(q.shape[1]), valid.shape)
