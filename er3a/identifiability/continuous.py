@@ -315,6 +315,8 @@ class Extents:
         def keep(direction: Reals, amounts: Reals) -> bool:
             each = self._rewritten(direction, amounts)
             apart = (each[1] - self.start) / self.region.scale
+            if not self.region.meets(*each):  # an entry that is measured by itself tells an arm's rows apart
+                each = direction, amounts
             ways = [
                 (n, s) for n in self.watched for s in (1.0, -1.0) if s * apart[n] > FARTHER * farthest.get((n, s), FAR)
             ]

@@ -89,6 +89,11 @@ class Region:
         chi2 = (off[:, self.asked.likely] ** 2).sum(axis=1)
         return found, (self.asked.excess(off) <= MET) & (chi2 <= self.chi2 + PROFILE**2 * (1 + MET) + MET)
 
+    def meets(self, direction: Reals, amounts: Reals) -> bool:
+        """Whether a table, by its directions (n,) and amounts (k,), meets what is asked but for extremes."""
+        off = self.asked.plain_off(self.tables(direction[None], amounts[None]))
+        return bool(self.asked.excess(off)[0] <= NEAR)
+
     def confirmed(self, direction: Reals, amounts: Reals, held: Flags | None = None) -> Reals | None:
         """Amounts (k,) near others that meet what is asked, with extremes sought afresh; None if none were found."""
         for _ in range(FOLLOWED if self.asked.extreme else 0):

@@ -26,6 +26,7 @@ from er3a.pipeline.stages.workspace.compute import compute
 from er3a.pipeline.stages.workspace.model import Bounds, VoidUnexpected, WorkspaceResults
 from er3a.pipeline.stages.workspace.page.report import report
 from er3a.pipeline.study import load_study
+from er3a.pipeline.tables import table_types
 from tests.stages.workspace_arms import locked_file, make_study, skew_file, tally_of
 
 pytestmark = pytest.mark.long  # whole stages, and kernels that take forty seconds to compile
@@ -88,7 +89,7 @@ def test_what_is_read_is_what_was_computed(found, tmp_path):
     assert 4 <= len(summary["figures"]) <= 8
     read = read_stage(tmp_path, STAGES["workspace"]).results
     assert read.summary == found.summary
-    for name in STAGES["workspace"].tables:
+    for name in table_types(WorkspaceResults):
         getattr(read, name).write(tmp_path / "again.parquet")
         assert (tmp_path / "again.parquet").read_bytes() == (tmp_path / f"{name}.parquet").read_bytes(), name
 
