@@ -37,6 +37,7 @@ REVERSED, TURNED = 0.2, 0.15  # shares of joints reversed and angles turned roun
 PUSHES = 1.1, 3.0, 8.0  # of the tolerance's step
 FARTHER = 1.5  # times as far as known, for a table to be looked at
 ROUNDS, PUSHED_FROM, SEED = 3, 6, 20261121
+UNTOLD = 1e-2  # rad from half a turn
 STAYING = 0.9  # of a half-width, to within which spread starts are led
 STAYS_FROM = 4  # tables elsewhere, from which one with an entry as it is is looked for
 FIRST_PUSH, FINE, MOST_PUSHES = 0.1, 0.01, 26  # of an entry's scale; of what was reached
@@ -201,9 +202,18 @@ class Extents:
         found.sort(key=lambda each: self._distance(*each))
         for each in found:
             if (start := self.region.confirmed(*each)) is not None:
-                self.direction, self.start, self.met = each[0], start, True
+                self.direction, self.start, self.met = each[0], self._without_untold_turns(each[0], start), True
                 return True
         return False
+
+    def _without_untold_turns(self, direction: Reals, amounts: Reals) -> Reals:
+        """Amounts (k,) without half turns of angles that requirements, led to again, don't tell from none."""
+        for n in np.flatnonzero(np.abs(np.abs(amounts) - np.pi) < UNTOLD).tolist():
+            own = np.arange(len(amounts)) == n
+            found, met = self.region.reached(direction[None], np.where(own, 0.0, amounts)[None], own[None])
+            confirmed = self.region.confirmed(direction, found[0], own) if met[0] else None
+            amounts = amounts if confirmed is None else confirmed
+        return amounts
 
     def _distance(self, direction: Reals, amounts: Reals) -> float:
         """Of a table from the given one: angles turned, a reversed joint being half a turn; lengths by a metre."""
