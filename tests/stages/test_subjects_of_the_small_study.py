@@ -46,7 +46,7 @@ LISTED = {
     ("er3_600", "programs"): f"{REAL_ARM} {RATES} {PROGRAMS} own_values",
     ("er3_600", "dynamics"): f"{DRIVES} own_values",
     ("er3_600", "vision"): f"{CAMERA} own_values",
-    ("er3a_c60_article", "validation"): f"{REFERENCES} calibration near_singular_poses",
+    ("er3a_c60_article", "validation"): f"{REFERENCES} near_singular_poses",
     ("er3a_c60_article", "workspace"): f"scene_shapes carried joined_pairs {PLACES} allowed_pairs",
 }
 
