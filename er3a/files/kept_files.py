@@ -49,7 +49,6 @@ def view_command(robot: str | None = None) -> str:
     return f"make view ROBOT={robot}" if robot else "make view"
 
 
-_DIGEST_BYTES = hashlib.sha256().digest_size
 _TEMPORARY = re.compile(r"\..+\.[0-9]+(\.\w+)?")  # as `write_atomically` names them
 
 
@@ -73,20 +72,6 @@ def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
             temporary.unlink(missing_ok=True)
     except OSError as error:
         raise WriteError(path, error) from None
-
-
-def write_checked(path: Path, content: bytes) -> None:
-    """Write bytes after their checksum."""
-    write_atomically(path, lambda file: file.write_bytes(hashlib.sha256(content).digest() + content))
-
-
-def read_checked(path: Path) -> bytes:
-    """Read what :func:`write_checked` wrote, or raise :class:`ResultError` if it is missing or damaged."""
-    content = read_bytes(path)
-    checksum, content = content[:_DIGEST_BYTES], content[_DIGEST_BYTES:]
-    if hashlib.sha256(content).digest() != checksum:
-        raise ResultError(path, "damaged (its checksum does not agree)")
-    return content
 
 
 def half_written(folder: Path) -> list[Path]:

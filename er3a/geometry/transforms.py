@@ -80,14 +80,6 @@ def rpy_of(T: Reals) -> Reals:
     return np.stack([roll, pitch, yaw], axis=-1)
 
 
-def rpy_along(direction: Reals) -> Reals:
-    """Roll, pitch and yaw (3,), rad, as :func:`rpy_of` has them, of a frame whose z axis points along a unit vector
-    (3,); the yaw is 0, and downwards the pitch is small."""
-    x, y, z = direction
-    over = -1.0 if z < 0 else 1.0
-    return np.array([np.arctan2(0.0, over) - over * np.arcsin(y), np.arctan2(over * x, over * z), 0.0])
-
-
 def rotation_angle(R_a: Reals, R_b: Reals) -> Reals:
     """Angle (...,) in rad, 0 to pi, of the rotation from R_a to R_b, each (..., 3, 3).
 

@@ -42,11 +42,6 @@ class Grid:
     section_cell: float
     section_shape: tuple[int, int]
 
-    @property
-    def cell_volume(self) -> float:
-        """Volume of a cell, m^3."""
-        return self.cell**3
-
     def centres(self, indices: ArrayLike) -> Reals:
         """Centres (N, 3) in m of the cells with indices (N, 3)."""
         return self.origin + (np.asarray(indices) + 0.5) * self.cell

@@ -16,7 +16,6 @@ from er3a.geometry.transforms import (
     rot_x,
     rot_z,
     rotation_angle,
-    rpy_along,
     rpy_of,
     transform,
     translation,
@@ -129,13 +128,6 @@ def test_wrong_shapes_are_refused(shape):
 def test_good_poses_are_returned(shape):
     T = np.broadcast_to(transform([1, 2, 3], [0.5, 0.4, 0.3]), shape)
     np.testing.assert_array_equal(check_poses(T), T)
-
-
-@pytest.mark.parametrize("direction", [(0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (0.0, 0.6, 0.8), (0.6, -0.48, -0.64)])
-def test_rpy_along_points_z_along_the_direction(direction):
-    roll, pitch, yaw = rpy_along(np.array(direction))
-    np.testing.assert_allclose(Rotation.from_euler("ZYX", [yaw, pitch, roll]).as_matrix()[:, 2], direction, atol=1e-12)
-    assert yaw == 0
 
 
 def test_angles_are_wrapped_to_half_a_turn_either_way_and_half_a_turn_is_positive():
