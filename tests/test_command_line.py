@@ -53,7 +53,7 @@ def test_all_commands_have_help(call):
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("typed", "offered"),
-    [("er3a ch", "check"), ("er3a compute val", "validation"), ("er3a report inverse er3_", "er3_600")],
+    [("er3a ch", "check"), ("er3a compute val", "validation"), ("er3a views er3_", "er3_600")],
 )
 def test_completion_knows_commands_stages_and_robots(typed, offered):
     words = {"COMP_WORDS": typed, "COMP_CWORD": str(len(typed.split()) - 1)}

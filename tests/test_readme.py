@@ -14,12 +14,11 @@ def figures(small_study, stage: str) -> dict:
     return {figure.name: figure for figure in summary.figures}
 
 
-def test_the_readme_tells_the_reach_within_what_is_proven_and_sampled(small_study):
+def test_the_readme_tells_the_reach_within_what_is_proven(small_study):
     found = figures(small_study, "workspace")
     told = answer("What does the arm reach")
-    volume, around, least, most, void = map(float, re.findall(r"\d+\.\d+", told))
-    assert found["volume_lower"].value <= least < volume < most <= found["volume_upper"].value
-    assert abs(volume - found["volume"].value) < 1.5 * (around + found["volume"].uncertainty)
+    least, most, void = map(float, re.findall(r"\d+\.\d+", told))
+    assert found["volume_lower"].value <= least < most <= found["volume_upper"].value
     assert found["enclosed_voids_lower"].value <= void  # more cells prove more of it empty
 
 

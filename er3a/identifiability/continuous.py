@@ -203,8 +203,15 @@ class Extents:
         for each in found:
             if (start := self.region.confirmed(*each)) is not None:
                 self.direction, self.start, self.met = each[0], self._without_untold_turns(each[0], start), True
+                self._centre()
                 return True
         return False
+
+    def _centre(self) -> None:
+        """Go on from the edge of what is met, where steps end, to the table that fits requirements best."""
+        found, met = self.region.reached(self.direction[None], self.start[None], inner=0.0)
+        best = self.region.confirmed(self.direction, found[0]) if met[0] else None
+        self.start = self.start if best is None else best
 
     def _without_untold_turns(self, direction: Reals, amounts: Reals) -> Reals:
         """Amounts (k,) without half turns of angles that requirements, led to again, don't tell from none."""
