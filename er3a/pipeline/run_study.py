@@ -19,7 +19,7 @@ import sys
 import time
 from argparse import Namespace
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import redirect_stderr, suppress
+from contextlib import ExitStack, redirect_stderr, suppress
 from dataclasses import dataclass
 from functools import partial
 from html import escape
@@ -246,17 +246,17 @@ def run_study(study_file: Path, results: Path, reports: Path, words: Sequence[st
         the study, or a file that it leads to, can't be used
     """
     asked = parsed(words)
-    os.environ["ER3A_STAGES"] = " ".join(asked_stages(asked.targets))
-    if asked.dryrun:
-        return _dry_run(study_file, results, reports, words, asked)
-    lock = _taken_lock()
-    try:
-        done = _run(study_file, results, reports, words, asked)
-    except Er3aError as error:
-        _report_error(reports, str(error))
-        raise
-    finally:
-        os.close(lock)
+    with ExitStack() as until_done:
+        os.environ["ER3A_STAGES"] = " ".join(asked_stages(asked.targets))
+        until_done.callback(os.environ.pop, "ER3A_STAGES")
+        if asked.dryrun:
+            return _dry_run(study_file, results, reports, words, asked)
+        until_done.callback(os.close, _taken_lock())
+        try:
+            done = _run(study_file, results, reports, words, asked)
+        except Er3aError as error:
+            _report_error(reports, str(error))
+            raise
     if not done:
         _report_error(reports, "The run did not end well: its output on standard error, and logs/, say why.")
     return done
