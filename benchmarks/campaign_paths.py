@@ -21,6 +21,7 @@ from er3a.planning.follow import follow
 from er3a.planning.motion_faults import singular_events
 from er3a.planning.moves import line
 from er3a.planning.timing import joint_limits
+from er3a.planning.tool_curve import curve_of
 from testing.evidence import sized
 from testing.exact_paths import worst_location
 from testing.random_paths import KINDS, NEAR, Found
@@ -61,7 +62,7 @@ def avoidance_rows(robot, random) -> list[str]:
         inside = np.isfinite(followed.q).all() and (followed.q < robot.upper).all() and (followed.q > robot.lower).all()
         if not inside or followed.jumps or (NEAR.margin(robot, followed.q[[0, -1]]) < 1).any():
             continue
-        events = singular_events(robot, followed.t, followed.q, followed.joints, NEAR)
+        events = singular_events(robot, curve_of(followed)[0], NEAR)
         if not events:
             continue
         count += 1
@@ -98,7 +99,7 @@ def speed_rows(robot) -> list[str]:
         followed = follow(robot, way, t)
         conditioning(robot, followed.q, length)
         determinant_factors(robot, followed.q)
-        singular_events(robot, followed.t, followed.q, followed.joints, NEAR)
+        singular_events(robot, curve_of(followed)[0], NEAR)
         return followed
 
     followed = ours()

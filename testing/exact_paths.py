@@ -17,6 +17,7 @@ from er3a.kinematics.solutions import branch_labels
 from er3a.planning.follow import follow
 from er3a.planning.motion_faults import singular_events
 from er3a.planning.moves import line
+from er3a.planning.tool_curve import curve_of
 
 REAL = np.longdouble
 NEAR = NearSingular(float(np.radians(30)), float(np.radians(30)), 0.2)
@@ -109,7 +110,7 @@ def worst_location(robot, random, lines: int) -> dict[str, tuple[int, float]]:
             if np.isnan(followed.q).any() or len(set(followed.slot)) > 1:
                 continue
             up = "elbow_up" in labels[slot]
-            for event in singular_events(robot, followed.t, followed.q, followed.joints, NEAR):
+            for event in singular_events(robot, curve_of(followed)[0], NEAR):
                 if 0.01 < event.t < 0.99:
                     at = float(way.progress(np.array(event.t))[0])
                     exact = nearest(partial(_one, robot, way, up, event.type), at)

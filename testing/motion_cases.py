@@ -19,10 +19,8 @@ from er3a.kinematics.singularity import TYPES, NearSingular
 from er3a.pipeline.stages.trajectory.judgement import Judgement, judge
 from er3a.pipeline.stages.trajectory.motion import Motion, motion_of
 from er3a.planning.commands import CommandSource
-from er3a.planning.motion_faults import Interval, RateCause, RateCheck, RateLimit
 from er3a.planning.names import PathVerdict
 from er3a.planning.timing import JointLimits, joint_limits
-from er3a.planning.tool_proof import ProofRequirements
 from testing.dense_contacts import Contacts
 from testing.motion_oracle import GRAZING, GRAZING_JERK, TOUCH, Truth, arm_of, factors, joint_path, truth
 
@@ -34,14 +32,6 @@ JERK_TIME_S = 0.1  # in which a joint may reach its full acceleration, of paths 
 GRAVITY: tuple[PathVerdict, ...] = ("safe", "near-singular", "undecided", "too fast for the assumed limits", "singular")
 BESIDE = 3  # points of the oracle by which its times may be off
 CHECKS = 4
-
-
-def rate_intervals(polynomials, limit: RateLimit) -> list[Interval[RateCause]]:
-    """Where joints exceed a limit of speed, acceleration or jerk."""
-    check = RateCheck(limit)
-    for part in polynomials.parts():
-        check.add(part)
-    return check.intervals()
 
 
 @dataclass
@@ -153,7 +143,7 @@ def judged(robot, written, samples, limits: JointLimits) -> tuple[Motion, Judgem
     """What the stage says of a path, at so many samples."""
     whole = {"name": "x", "title": "x", "samples": samples, **written}
     entry = parse(PathFile, {"kind": "paths", "paths": [whole]}, None).paths[0]
-    motion = motion_of(robot, entry, CHECKS, CommandSource(None, ""), {}, ProofRequirements(limits.rates, NEAR))
+    motion = motion_of(robot, entry, CHECKS, CommandSource(None, ""), {})
     return motion, judge(robot, motion, NEAR, limits)
 
 

@@ -12,6 +12,7 @@ from er3a.kinematics.singularity import TYPES, NearSingular, determinant_factors
 from er3a.planning.follow import follow
 from er3a.planning.motion_faults import SingularEvent, runs, singular_events
 from er3a.planning.moves import JointMove, line
+from er3a.planning.tool_curve import curve_of
 
 NEAR = NearSingular(float(np.radians(5)), float(np.radians(5)), 0.03)
 COARSE = 101
@@ -29,9 +30,7 @@ class Path:
 
 def random_joint_move(robot, random) -> Path:
     move = JointMove(*random.uniform(robot.lower, robot.upper, (2, 6)), 1.0)
-    t = np.linspace(0, 1, COARSE)
-    q = move.joints(t)[0]
-    return Path(lambda at: move.joints(at)[0], singular_events(robot, t, q, lambda at: move.joints(at)[0], NEAR), ())
+    return Path(lambda at: move.joints(at)[0], singular_events(robot, move.polynomials(), NEAR), ())
 
 
 def random_line(robot, random) -> Path:
@@ -49,7 +48,7 @@ def random_plane_line(robot, random) -> Path:
 
 def _followed(robot, start, end) -> Path:
     followed = follow(robot, line(*forward(robot, np.stack([start, end])), 1.0), np.linspace(0, 1, COARSE), start)
-    events = singular_events(robot, followed.t, followed.q, followed.joints, NEAR)
+    events = singular_events(robot, curve_of(followed)[0], NEAR)
     return Path(
         followed.joints,
         events,

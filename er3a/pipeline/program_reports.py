@@ -39,7 +39,6 @@ from er3a.pipeline.stages.trajectory.judgement import Surroundings, collisions, 
 from er3a.pipeline.stages.trajectory.motion import CHOSEN, listed_motions
 from er3a.pipeline.stages.trajectory.written_programs import LONGEST_NAME, near_assumed_shapes, written
 from er3a.planning.names import PATH_VERDICTS, PathVerdict
-from er3a.planning.tool_proof import ProofRequirements
 from er3a.planning.way_around import PlanningTask
 from er3a.program_check.check_program import (
     CHECKS,
@@ -507,7 +506,7 @@ def programs_of(
     missing = next((name for name in only or () if name not in {entry.name for entry in listed}), None)
     if missing is not None:
         raise InputError(file, "paths", f"there is no path '{missing}'", f"Known: {', '.join(e.name for e in listed)}")
-    for each in listed_motions(file, task, ProofRequirements(task.limits.rates, USUAL_NEAR), CHECKS_PER_SAMPLE):
+    for each in listed_motions(file, task, USUAL_NEAR, CHECKS_PER_SAMPLE):
         if only and each.listed not in only:
             continue
         if each.refused:

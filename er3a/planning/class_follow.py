@@ -14,21 +14,19 @@ The arm angle of a seven-joint arm along a tool path: the one that keeps the mos
 
 The arm angle is a polynomial of degree 2 in the share of the path, given by its values at the start, halfway and at
 the end. The margins of all eight solutions on a grid of path positions and arm angles show which of many such
-polynomials is best; it is improved by smaller and smaller changes. If none keeps the limits, polynomials of higher
-degree are fitted to a path through the grid: the smoothest of those that keep half of the largest possible margin. The
-choice proves nothing: the joint motion is checked exactly, like every other motion, and another law might follow a path
+polynomials is best; it is improved by smaller and smaller changes. The choice proves
+nothing: the joint motion is checked exactly, like every other motion, and another law might follow a path
 that this one can't.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Literal
 
 import numpy as np
-from numpy.polynomial import chebyshev
 
 from er3a.errors import Er3aError, NotWristPartitionedError
 from er3a.geometry.vectors import TURN
@@ -51,13 +49,11 @@ CHANGES = 25  # from the start to halfway and to the end, up to half a turn
 LEAP = 0.6  # rad, m, that a joint may move between two of the poses; a turn more, or a singularity, would be more
 SLOPE_PRICE = 1e-3  # rad of margin that a change by 1 rad has to gain
 ROUNDS, FIRST_STEP = 7, np.radians(7.5)
-DEGREES, STEPS = (4, 6, 8, 10, 12), np.arange(-3, 4)  # of bent laws; steps of the grid between two poses
 
 
 @dataclass(frozen=True, eq=False)
 class ArmAngleLaw:
-    """An arm angle along a path: values (3,), rad, at the start, halfway and at the end, or Chebyshev series (k,) of a
-    ``bent`` one over the path.
+    """An arm angle along a path: values (3,), rad, at the start, halfway and at the end.
 
     ``slot`` is the solution that keeps the smallest distance ``margin`` (rad, m) from the joint limits.
     """
@@ -65,12 +61,9 @@ class ArmAngleLaw:
     values: Reals
     slot: int
     margin: float
-    bent: bool = False
 
     def at(self, share: Reals) -> Reals:
         """Arm angles (N, 1) at shares (N,) of the path."""
-        if self.bent:
-            return np.asarray(chebyshev.chebval(2 * share - 1, self.values), dtype=float)[:, None]
         return _quadratic(self.values, share)[:, None]
 
 
@@ -98,71 +91,6 @@ def laws_with_most_margin(
         if np.isfinite(law.margin):
             found.append(law)
     return sorted(found, key=lambda law: -law.margin)
-
-
-def bent_laws(
-    robot: Robot, T: Reals, share: Reals, start: tuple[float, Reals] | None, slots: Integers
-) -> list[ArmAngleLaw]:
-    """Laws of higher degree that keep the limits at the poses, most margin first; the rest as
-    :func:`laws_with_most_margin`."""
-    search = _LawSearch(robot, T, share, slots, None if start is None else start[1])
-    first = -np.pi if start is None else start[0]
-    q = search.rows(first + TURN * np.arange(ANGLES) / ANGLES)
-    margins = _margins_alone(robot, q)
-    if start is not None:
-        margins[0, 1:] = -np.inf
-    weights = np.where(np.arange(len(share)) == 0, 1e3, 1.0)  # the start may be given
-    found = []
-    for s, slot in enumerate(slots.tolist()):
-        steps = _smooth_angles(robot, margins[:, :, s], q[:, :, s])
-        if steps is None:
-            continue
-        angles = first + TURN / ANGLES * steps
-        for degree in DEGREES:
-            values = np.asarray(chebyshev.chebfit(2 * share - 1, angles, degree, w=weights), dtype=float)
-            values[0] += angles[0] - chebyshev.chebval(-1.0, values)
-            law = ArmAngleLaw(values, slot, 0.0, bent=True)
-            smallest = search.margin(law.at(share)[:, 0], s)
-            if smallest > 0:
-                found.append(replace(law, margin=smallest))
-    return sorted(found, key=lambda law: -law.margin)
-
-
-def _margins_alone(robot: Robot, q: Reals) -> Reals:
-    """Distances of rows (..., n) from the joint limits, each in its best turn; -inf without a row."""
-    middle = np.where(robot.continuous, 0.0, 0.5 * (robot.lower + robot.upper))
-    turned = nearest_equivalent(robot, np.nan_to_num(q), middle)
-    return np.where(np.isnan(q[..., 0]), -np.inf, limit_margin(robot, turned))
-
-
-def _smooth_angles(robot: Robot, margins: Reals, q: Reals) -> Reals | None:
-    """Steps of the grid (K,) from its first angle, not taken modulo a turn, along the path with the smallest sum of
-    squared steps that keeps half of the margin that one can keep; None if none keeps the limits.
-
-    Parameters
-    ----------
-    margins : (K, angles); q : (K, angles, n), rad, m
-    """
-    at = np.arange(margins.shape[1])
-    before = (at[None] - STEPS[:, None]) % len(at)  # (steps, angles)
-    moved = [shortest_move(robot, q[k][None] - q[k - 1][before]) for k in range(1, len(q))]
-    free = [np.abs(each).max(axis=-1) <= LEAP for each in moved]  # not where there is no row
-    widest = margins[0]
-    for k, passable in enumerate(free, 1):
-        widest = np.minimum(margins[k], np.where(passable, widest[before], -np.inf).max(axis=0))
-    if not widest.max() > 0:
-        return None
-    allowed = margins >= widest.max() / 2
-    price, taken = np.where(allowed[0], 0.0, np.inf), []
-    for k, passable in enumerate(free, 1):
-        prices = np.where(passable, price[before] + STEPS[:, None] ** 2, np.inf)
-        taken.append(prices.argmin(axis=0))
-        price = np.where(allowed[k], prices.min(axis=0), np.inf)
-    place, steps = int(price.argmin()), []
-    for choice in reversed(taken):
-        steps.append(int(STEPS[choice[place]]))
-        place = (place - steps[-1]) % len(at)
-    return place + np.concatenate([[0.0], np.cumsum(steps[::-1])])
 
 
 @dataclass(frozen=True, eq=False)
@@ -339,7 +267,7 @@ def _at_arm_angles(robot: Robot, path: ToolPath, q_start: Reals | None) -> Piece
         slots = np.flatnonzero((np.abs(_turned_to(robot, own, q_start) - q_start) <= ON_PATH).all(axis=1))
     if not slots.size:
         raise PathEndsError(robot.name, "out_of_reach", 0.0)
-    laws = laws_with_most_margin(robot, poses, share, begin, slots) or bent_laws(robot, poses, share, begin, slots)
+    laws = laws_with_most_margin(robot, poses, share, begin, slots)
     if not laws:
         raise PathEndsError(robot.name, "out_of_reach", _first_unreached(robot, path, times))
     near = np.zeros(robot.joints) if q_start is None else q_start
@@ -350,12 +278,7 @@ def _at_arm_angles(robot: Robot, path: ToolPath, q_start: Reals | None) -> Piece
 
         return _turned_to(robot, rows_at(np.zeros(1))[0, law.slot], near), rows_at
 
-    def tried() -> Iterator[ArmAngleLaw]:
-        yield from laws
-        if not laws[0].bent:
-            yield from bent_laws(robot, poses, share, begin, slots)
-
-    return _first_within_limits(robot, path, map(joints_by, tried()), turns_open=q_start is None)
+    return _first_within_limits(robot, path, map(joints_by, laws), turns_open=q_start is None)
 
 
 def _turned_to(robot: Robot, q: Reals, near: Reals) -> Reals:
@@ -427,7 +350,7 @@ def _followed(robot: Robot, path: ToolPath, start: Reals, rows_at: Callable[[Rea
     while True:
         parts = [np.linspace(a, b, pieces + 1)[:-1] for a, b in pairwise(corners.tolist())]
         times = np.append(np.concatenate(parts), corners[-1])
-        nodes, between = chebyshev_times(times, DEGREE)
+        nodes, between = chebyshev_times(times[:-1], times[1:], DEGREE)
         t, back = np.unique(np.concatenate([nodes.ravel(), between.ravel()]), return_inverse=True)
         q = np.empty((len(t), robot.joints))
         ended, reached = _tracked(np.ascontiguousarray(rows_at(t)), (turns.steps, turns.counts), start, q)

@@ -237,7 +237,6 @@ def _kept(values: Reals, unknown: Flags) -> Reals:
 REGULAR = 1e-6  # smallest singular value (scaled) down to which the Jacobian is solved
 BESIDE = (1e-4, 1e-3)  # shares of the path to step aside from a singular point
 AGREE = 1e-2  # relative, between the two sides of a singular point
-JACOBIAN_STEP = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -393,12 +392,26 @@ class Followed(ByValue, Displayed):
         J = jacobian(self.robot, q[rows]) * scale
         twist, slope = (part[..., None] * scale for part in self.line.twists(progress[rows]))
         first = np.linalg.solve(J, twist)
-        step = JACOBIAN_STEP / np.maximum(1.0, np.abs(first).max(axis=1, keepdims=True))
-        ahead = jacobian(self.robot, q[rows] + (step * first)[..., 0])
-        behind = jacobian(self.robot, q[rows] - (step * first)[..., 0])
-        dJ = (ahead - behind) * scale / (2 * step)
-        dq[rows], ddq[rows] = first[..., 0], np.linalg.solve(J, slope - dJ @ first)[..., 0]
+        slope -= _jacobian_rate(self.robot, J, first[..., 0]) @ first
+        dq[rows], ddq[rows] = first[..., 0], np.linalg.solve(J, slope)[..., 0]
         return dq, ddq
+
+
+def _jacobian_rate(robot: Robot, J: Reals, dq: Reals) -> Reals:
+    """Derivative (k, 6, n) of Jacobians (k, 6, n) in the base frame while revolute joints move at rates ``dq`` (k, n).
+
+    A row i that turns by w_i has the linear column v_i; turning row j changes w_i by w_j x w_i if j comes first, and
+    v_i by w_j x v_i if j is not after i, else by w_i x v_j. Both v may be divided by any length.
+    """
+    coupling = np.eye(J.shape[2]) if robot.coupling is None else robot.coupling
+    columns = np.swapaxes(J @ np.linalg.inv(coupling), 1, 2)
+    moving = columns * (dq @ coupling.T)[..., None]
+    v, w = columns[..., :3], columns[..., 3:]
+    turned = np.cumsum(moving[..., 3:], axis=1)
+    beyond = moving[..., :3].sum(axis=1, keepdims=True) - np.cumsum(moving[..., :3], axis=1)
+    rates = np.concatenate([np.cross(turned, v) + np.cross(w, beyond), np.cross(turned, w)], axis=2)
+    found: Reals = np.swapaxes(rates, 1, 2) @ coupling
+    return found
 
 
 JUMP_COST = 1e7

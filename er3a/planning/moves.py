@@ -72,12 +72,6 @@ class ToolPath(Protocol):
     def edges(self) -> Reals:
         """Shares of the path (m,), from 0 to 1, between which the twist and its derivative are continuous."""
 
-    def twist_bounds(self, start: Reals, end: Reals) -> Reals:
-        """Bounds (k, 4, 2) of the sizes of twist and of its first three derivatives by progress.
-
-        Linear (m), then angular (rad), between shares (k,) and (k,), no edge in between.
-        """
-
     def half_turns(self) -> tuple[tuple[int, Reals], ...]:
         """Turns by exactly 180 deg: number of the segment (from 1), and the axis (3,) in the base frame taken."""
 
@@ -161,17 +155,6 @@ class Segment(ByValue, ABC):
     def edges(self) -> Reals:
         """See :class:`ToolPath`."""
         return np.array([0.0, 1.0])
-
-    @property
-    def bend(self) -> float:
-        """Angle by which the tool point's path turns, rad."""
-        return 0.0
-
-    def twist_bounds(self, start: Reals, end: Reals) -> Reals:
-        """See :class:`ToolPath`."""
-        linear = self.length * self.bend ** np.arange(4.0)
-        bounds = np.stack([linear, [self.turned, 0.0, 0.0, 0.0]], axis=-1)
-        return np.broadcast_to(bounds, (len(start), 4, 2))
 
     def at(self, t: Reals) -> Reals:
         """T_base_tool (..., 4, 4) at times (...,) in s; :class:`er3a.Er3aError` beyond start and end."""

@@ -21,7 +21,7 @@ PATH_VERDICTS: tuple[PathVerdict, ...] = get_args(PathVerdict)
 NOT_TO_BE_RUN = PATH_VERDICTS[: PATH_VERDICTS.index("undecided")]
 """Of paths that no arm should run as they are; others pass near singular poses, or leave something open."""
 
-StrategyName = Literal["slow", "branch", "via_shift", "via_tilt", "damped", "detour", "stop", "planned"]
+StrategyName = Literal["slow", "branch", "via_shift", "via_tilt", "detour", "stop", "planned"]
 
 ACCELERATION_TIME = 0.25
 """s in which joints are taken to reach their full speed, where nobody says otherwise."""

@@ -12,8 +12,7 @@ References
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -29,8 +28,8 @@ NEARLY_REAL = 1e-3  # imaginary part of a double root that rounding has split; m
 TRIMMED = 1e-15  # of the largest coefficient
 SAME_TIME = 1e-13  # share of the duration
 LOCATED = 1e-14  # share of the duration
-PIECES_AT_ONCE = 4096
-TIMES_AT_ONCE = 20_000
+PIECES_AT_ONCE = 4096  # whose rates are computed together
+INSET = 1e-6  # share of half a piece: so near to its ends it is not compared, because accelerations may step there
 Stretch = tuple[float, float, float, float]
 
 
@@ -101,8 +100,8 @@ class Pieces:
         return found
 
     def peak(self) -> tuple[float, float]:
-        """The largest value, and a time at which it is met."""
-        ends = np.stack([chebyshev.chebval(x, self.series.T) for x in (-1.0, 1.0)])
+        """The largest value, and a time at which it is met; minus infinity if no piece is known."""
+        ends = np.nan_to_num(np.stack([chebyshev.chebval(x, self.series.T) for x in (-1.0, 1.0)]), nan=-np.inf)
         side, piece = np.unravel_index(int(ends.argmax()), ends.shape)
         most, at = float(ends.max()), float(self.times[piece + side])
         for i in np.flatnonzero(self.range[1] > most).tolist():
@@ -111,21 +110,12 @@ class Pieces:
                 most, at = float(values.max()), float(t[values.argmax()])
         return most, at
 
-    def maximum(self, before: float = -np.inf) -> float:
-        """The largest value, or ``before`` if that is greater."""
-        most = max(before, *(float(chebyshev.chebval(x, self.series.T).max()) for x in (-1.0, 1.0)))
-        bounds = self.range[1]
-        above = np.flatnonzero(bounds > most)
-        for i in above[np.argsort(-bounds[above])].tolist():
-            if bounds[i] <= most:
-                break
-            most = max(most, float(self.nodes(i)[1].max()))
-        return most
-
 
 @dataclass(frozen=True, eq=False)
 class PiecewiseMotion(ByValue):
     """A motion of n joints.
+
+    A piece may be a gap: its rates are NaN where they are not known, its angles too where the arm does not go through.
 
     Attributes
     ----------
@@ -149,42 +139,24 @@ class PiecewiseMotion(ByValue):
         return _slope(self.times, self.acceleration)
 
     @cached_property
-    def snap(self) -> Reals:
-        """(m, d + 1, n), rad/s^4, the jerk's slope."""
-        return _slope(self.times, self.jerk)
-
-    @cached_property
     def steps(self) -> Reals:
         """(m + 1, n), rad/s^2, by which the acceleration steps between pieces, and from and to rest."""
-        first, last = self.acceleration_at_ends
+        signs = np.where(np.arange(self.acceleration.shape[1]) % 2, -1.0, 1.0)[:, None]
+        first, last = (self.acceleration * signs).sum(axis=1), self.acceleration.sum(axis=1)
         rest = np.zeros((1, first.shape[1]))
         steps: Reals = np.abs(np.concatenate([first, rest]) - np.concatenate([rest, last]))
         return steps
-
-    @property
-    def acceleration_at_ends(self) -> tuple[Reals, Reals]:
-        """(m, n) and (m, n), rad/s^2, at the beginning and the end of each piece."""
-        signs = np.where(np.arange(self.acceleration.shape[1]) % 2, -1.0, 1.0)[:, None]
-        return np.einsum("mdn,dz->mn", self.acceleration, signs), self.acceleration.sum(axis=1)
 
     def rates(self, t: Reals) -> Rates:
         """Angles, velocities and accelerations at times (...,), each (..., n); :class:`er3a.Er3aError` beyond start and
         end."""
         t = np.asarray(t, float)
         check_times(t, self.times[0], self.times[-1])
-        if t.size <= TIMES_AT_ONCE:
-            return self._rates_of_few(t)
-        flat = t.reshape(-1)
-        parts = [self._rates_of_few(flat[k : k + TIMES_AT_ONCE]) for k in range(0, len(flat), TIMES_AT_ONCE)]
-        q, velocity, acceleration = (np.concatenate(part).reshape(*t.shape, -1) for part in zip(*parts))
-        return q, velocity, acceleration
-
-    def _rates_of_few(self, t: Reals) -> Rates:
         i = np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self.times) - 2)
         span = self.times[i + 1] - self.times[i]
         x = np.divide(2 * (t - self.times[i]), span, out=np.zeros_like(t), where=span > 0) - 1
         q, velocity, acceleration = (
-            _evaluated(series[i], x) for series in (self.angle, self.velocity, self.acceleration)
+            evaluated(series, i, x) for series in (self.angle, self.velocity, self.acceleration)
         )
         return q, velocity, acceleration
 
@@ -199,109 +171,76 @@ class PiecewiseMotion(ByValue):
     def max_abs(self, series: Reals) -> Reals:
         """Largest size (n,) of angle, velocity, acceleration or jerk of each joint."""
         joints = range(series.shape[2])
-        return np.array([max(self.of_joint(series, j, sign).maximum() for sign in (1.0, -1.0)) for j in joints])
-
-    def parts(self) -> Iterator[PiecewiseMotion]:
-        """The motion in one part."""
-        yield self
+        return np.array([max(self.of_joint(series, j, sign).peak()[0] for sign in (1.0, -1.0)) for j in joints])
 
     def rate_bounds(self, start: Reals, end: Reals) -> tuple[Reals, Reals]:
-        """Bounds (k, n) of the sizes of velocity and acceleration between times (k,) and (k,)."""
-        return _bounds_between(self.times, self.bounds, start, end)
+        """Bounds (k, n) of the sizes of velocity and acceleration between times (k,) and (k,), s; infinite in gaps."""
+        first = np.clip(np.searchsorted(self.times, start, side="right") - 1, 0, len(self.times) - 2)
+        last = np.clip(np.searchsorted(self.times, end, side="left") - 1, first, len(self.times) - 2)
+        velocity, acceleration = (_max_between(most, first, last) for most in self._bounds)
+        return velocity, acceleration
 
     @cached_property
-    def bounds(self) -> tuple[Reals, Reals]:
+    def _bounds(self) -> tuple[Reals, Reals]:
         """Bounds (m, n) of the sizes of velocity and acceleration on each piece."""
-        return _sizes(self.velocity), _sizes(self.acceleration)
+        velocity, acceleration = (
+            np.nan_to_num(np.abs(series).sum(axis=1), nan=np.inf) for series in (self.velocity, self.acceleration)
+        )
+        return velocity, acceleration
 
     def scaled(self, factor: float) -> PiecewiseMotion:
         """The same path in ``factor`` times the time."""
         return PiecewiseMotion(self.times * factor, self.angle, self.velocity / factor, self.acceleration / factor**2)
 
 
-class MotionInParts:
-    """A motion of so many polynomials that they are made part by part, on demand.
-
-    Attributes
-    ----------
-    times : (m + 1,), s, rising from 0
-    """
-
-    def __init__(self, rates: Callable[[Reals], Rates], breaks: Reals, degree: int):
-        """See :func:`polynomial_motion`."""
-        breaks = np.asarray(breaks, float)
-        kept = np.concatenate([[True], np.diff(breaks) > SAME_TIME * (breaks[-1] - breaks[0])])
-        self.times = breaks[kept]
-        self.times[-1] = breaks[-1]
-        self._rates, self._degree = rates, degree
-        self._bounds: tuple[Reals, Reals] | None = None
-
-    @property
-    def duration(self) -> float:
-        """s"""
-        return float(self.times[-1])
-
-    def parts(self) -> Iterator[PiecewiseMotion]:
-        """The motion in parts of so many pieces that they are no burden to the memory."""
-        x = np.cos(np.pi * (np.arange(self._degree + 1) + 0.5) / (self._degree + 1))
-        sizes = []
-        for k in range(0, len(self.times) - 1, PIECES_AT_ONCE):
-            times = self.times[k : k + PIECES_AT_ONCE + 1]
-            t = times[:-1, None] + np.diff(times)[:, None] * (x + 1) / 2
-            part = PiecewiseMotion(times, *(_trimmed(_interpolated(values)) for values in self._rates(t)))
-            sizes.append(part.bounds)
-            yield part
-        velocity, acceleration = (np.concatenate(each) for each in zip(*sizes))
-        self._bounds = velocity, acceleration
-
-    def joints(self, t: Reals) -> Reals:
-        """Angles (..., n) at times (...,)."""
-        t = np.asarray(t, float)
-        flat = t.reshape(-1)
-        parts = [self._rates(flat[k : k + TIMES_AT_ONCE])[0] for k in range(0, max(len(flat), 1), TIMES_AT_ONCE)]
-        return np.concatenate(parts).reshape(*t.shape, -1)
-
-    def rate_bounds(self, start: Reals, end: Reals) -> tuple[Reals, Reals]:
-        """See :meth:`PiecewiseMotion.rate_bounds`; the bounds of the pieces are kept when the parts are first made."""
-        if self._bounds is None:
-            deque(self.parts(), maxlen=0)
-        assert self._bounds is not None
-        return _bounds_between(self.times, self._bounds, start, end)
-
-
-Polynomials = PiecewiseMotion | MotionInParts
-
-
 def polynomial_motion(rates: Callable[[Reals], Rates], breaks: Reals, degree: int) -> PiecewiseMotion:
-    """A motion whose angles are polynomials of at most so high a degree between break points (m + 1,) in s."""
-    whole = MotionInParts(rates, breaks, degree)
-    parts = list(whole.parts())
-    angle, velocity, acceleration = (
-        _joined([getattr(part, name) for part in parts]) for name in ("angle", "velocity", "acceleration")
-    )
-    return PiecewiseMotion(whole.times, angle, velocity, acceleration)
+    """A motion whose angles are polynomials of at most so high a degree between break points.
+
+    Parameters
+    ----------
+    rates : angles, velocities and accelerations (..., n) at times (...,) in s
+    breaks : (m + 1,), s, rising; those that repeat the one before, to rounding, are left out
+    degree : of the angles
+    """
+    breaks = np.asarray(breaks, float)
+    times = breaks[np.concatenate([[True], np.diff(breaks) > SAME_TIME * (breaks[-1] - breaks[0])])]
+    times[-1] = breaks[-1]
+    inner = chebyshev_times(times[:-1], times[1:], degree)[0]
+    parts = [rates(inner[k : k + PIECES_AT_ONCE]) for k in range(0, len(inner), PIECES_AT_ONCE)]
+    angle, velocity, acceleration = (_trimmed(interpolated(np.concatenate(values))) for values in zip(*parts))
+    return PiecewiseMotion(times, angle, velocity, acceleration)
 
 
-def _joined(series: list[Reals]) -> Reals:
-    """One array of series (m, d + 1, n) of different degrees."""
-    if len(series) == 1:
-        return series[0]
-    width = max(each.shape[1] for each in series)
-    return np.concatenate([np.pad(each, ((0, 0), (0, width - each.shape[1]), (0, 0))) for each in series])
+def chebyshev_times(start: Reals, end: Reals, degree: int) -> tuple[Reals, Reals]:
+    """Where a polynomial through a function is made, and where it is compared with it.
 
+    Parameters
+    ----------
+    start, end : (m,), s, of pieces
 
-def chebyshev_times(times: Reals, degree: int) -> tuple[Reals, Reals]:
-    """Of pieces with ends (m + 1,): their ``degree + 1`` Chebyshev points (m, d + 1), and points between and at the
-    ends (m, d + 2), where a polynomial through the former has its largest interpolation error."""
-    k, spans = np.arange(degree + 2), np.diff(times)[:, None]
+    Returns
+    -------
+    nodes : (m, degree + 1), s, their Chebyshev points
+    between : (m, degree + 2), s, where the interpolation error is largest: between the nodes, and next to the ends, at
+        which the function may step
+    """
+    k, spans = np.arange(degree + 2), (end - start)[:, None]
     nodes, between = (np.cos(np.pi * part / (degree + 1)) for part in (k[:-1] + 0.5, k))
-    first, second = (times[:-1, None] + spans * (x + 1) / 2 for x in (nodes, between))
+    first, second = (start[:, None] + spans * (x + 1) / 2 for x in (nodes, between * (1 - INSET)))
     return first, second
+
+
+def evaluated_between(series: Reals) -> Reals:
+    """Series (m, d + 1, n) at the points between the nodes, (m, d + 2, n), of :func:`chebyshev_times`."""
+    degree = series.shape[1] - 1
+    x = np.cos(np.pi * np.arange(degree + 2) / (degree + 1)) * (1 - INSET)
+    values: Reals = np.einsum("xk,mkn->mxn", chebyshev.chebvander(x, degree), series)
+    return values
 
 
 def motion_through(angles: Reals, times: Reals) -> PiecewiseMotion:
     """The motion through angles (m, d + 1, n) at the Chebyshev points of pieces with ends (m + 1,) in s."""
-    angle = _trimmed(_interpolated(angles))
+    angle = _trimmed(interpolated(angles))
     velocity = _slope(times, angle)
     return PiecewiseMotion(times, angle, velocity, _slope(times, velocity))
 
@@ -320,7 +259,7 @@ def turning_points(series: Reals) -> Reals:
     return real[(real > -1) & (real < 1)]
 
 
-def max_between(values: Reals, first: Integers, last: Integers) -> Reals:
+def _max_between(values: Reals, first: Integers, last: Integers) -> Reals:
     """Largest of rows first..last (both included) of values (m, n), for ranges (k,); (k, n)."""
     found = np.maximum(values[first], values[last])
     for k in np.flatnonzero(last > first + 1):
@@ -328,14 +267,7 @@ def max_between(values: Reals, first: Integers, last: Integers) -> Reals:
     return found
 
 
-def _bounds_between(times: Reals, bounds: tuple[Reals, Reals], start: Reals, end: Reals) -> tuple[Reals, Reals]:
-    first = np.clip(np.searchsorted(times, start, side="right") - 1, 0, len(times) - 2)
-    last = np.clip(np.searchsorted(times, end, side="left") - 1, first, len(times) - 2)
-    velocity, acceleration = (max_between(most, first, last) for most in bounds)
-    return velocity, acceleration
-
-
-def _interpolated(values: Reals) -> Reals:
+def interpolated(values: Reals) -> Reals:
     """Chebyshev coefficients (m, d + 1, n) through values (m, d + 1, n) at the Chebyshev points."""
     count = values.shape[1]
     angles = np.pi * (np.arange(count) + 0.5) / count
@@ -352,14 +284,6 @@ def _trimmed(series: Reals) -> Reals:
     return series[:, : (int(kept[-1]) if kept.size else 0) + 1]
 
 
-def _sizes(series: Reals) -> Reals:
-    """Sums (m, n) of the coefficients' sizes of series (m, d + 1, n)."""
-    found = np.zeros(series[:, 0].shape)
-    for k in range(series.shape[1]):
-        found += np.abs(series[:, k])
-    return found
-
-
 def _slope(times: Reals, series: Reals) -> Reals:
     if series.shape[1] < 2:
         return np.zeros_like(series)
@@ -367,11 +291,11 @@ def _slope(times: Reals, series: Reals) -> Reals:
     return found
 
 
-def _evaluated(series: Reals, x: Reals) -> Reals:
-    """Series (..., d + 1, n) at x (...,), by Clenshaw's recurrence."""
+def evaluated(series: Reals, i: Integers, x: Reals) -> Reals:
+    """Series (m, d + 1, n) of pieces i (...,) at x (...,), by Clenshaw's recurrence; (..., n)."""
     x = x[..., None]
-    b1 = b2 = np.zeros(series.shape[:-2] + series.shape[-1:])
-    for k in range(series.shape[-2] - 1, 0, -1):
-        b1, b2 = series[..., k, :] + 2 * x * b1 - b2, b1
-    value: Reals = series[..., 0, :] + x * b1 - b2
+    b1 = b2 = np.zeros(series.shape[2])
+    for k in range(series.shape[1] - 1, 0, -1):
+        b1, b2 = series[i, k] + 2 * x * b1 - b2, b1
+    value: Reals = series[i, 0] + x * b1 - b2
     return value

@@ -21,7 +21,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence as Many
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -30,7 +29,7 @@ from er3a.errors import PathError, PoseError
 from er3a.geometry.transforms import check_poses, exp_rotation, posed
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.planning.moves import Segment, rotation_between
-from er3a.planning.piecewise import MotionInParts, PiecewiseMotion, polynomial_motion
+from er3a.planning.piecewise import PiecewiseMotion, polynomial_motion
 from er3a.planning.profiles import FromRestToRest, LegTimes, Rates, TimeLaw, Times, Timetable, times_at
 
 ON_A_LINE = 1e-6  # rad; three points this near to a straight line fix no circle
@@ -59,11 +58,6 @@ class Arc(Segment):
     def length(self) -> float:
         """See :class:`er3a.planning.moves.ToolPath`."""
         return self.radius * self.angle
-
-    @property
-    def bend(self) -> float:
-        """See :class:`er3a.planning.moves.Segment`."""
-        return self.angle
 
     def points(self, progress: Reals) -> Reals:
         """See :class:`er3a.planning.moves.Segment`."""
@@ -96,11 +90,6 @@ class ArcWithPath(Arc):
         """See :class:`er3a.planning.moves.ToolPath`."""
         return float(np.linalg.norm(self._turning))
 
-    @property
-    def turning_bend(self) -> float:
-        """Size (rad) of the derivative of the angular velocity by progress."""
-        return float(self.angle * np.linalg.norm(np.cross(self.normal, self.rotation)))
-
     def poses(self, progress: Reals) -> Reals:
         """See :class:`er3a.planning.moves.ToolPath`."""
         beside = super().poses(progress)
@@ -113,13 +102,6 @@ class ArcWithPath(Arc):
         first[..., 3:] = self._carried(np.asarray(progress, float)) @ self._turning
         second[..., 3:] = self.angle * np.cross(self.normal, first[..., 3:])
         return first, second
-
-    def twist_bounds(self, start: Reals, end: Reals) -> Reals:
-        """See :class:`er3a.planning.moves.ToolPath`."""
-        bounds = super().twist_bounds(start, end).copy()
-        bounds[..., 0, 1] = self.turned
-        bounds[..., 1:, 1] = self.turning_bend * self.angle ** np.arange(3.0)
-        return bounds
 
     @property
     def _turning(self) -> Reals:
@@ -277,8 +259,6 @@ def _coefficients(x: Reals) -> tuple[Reals, Reals, Reals, Reals]:
 
 TURN_LENGTH = 0.1  # m per rad, of a turn on the spot, when time is shared out
 ZERO_LENGTH = 1e-12  # m; shorter segments are left out
-SIX_POINTS = 2.0  # Lebesgue constant of the six points of extreme value, 1.99: polynomials up to degree 5 exceed
-# their largest size at these points by no more
 RUNS_ON = 1e-9  # relative difference of twists below which a corner is none
 
 
@@ -318,33 +298,6 @@ class SegmentPath(ByValue):
     def edges(self) -> Reals:
         """See :class:`er3a.planning.moves.ToolPath`."""
         return self.curve.edges
-
-    def twist_bounds(self, start: Reals, end: Reals) -> Reals:
-        """See :class:`er3a.planning.moves.ToolPath`.
-
-        The angular velocity of a rotation vector w is J(w) w', and J is the mean over u in 0..1 of the rotations by
-        u w, so that its change with w is at most 1/2, the next 1/3, and the one after 1/4.
-        """
-        slopes = self._slopes[self.curve.piece((start + end) / 2)[0]]
-        a, b, c, d = slopes[..., 1].T
-        spin = [a, b + a**2 / 2, c + 1.5 * a * b + a**3 / 3, d + 2 * a * c + 1.5 * b**2 + 2 * a**2 * b + a**4 / 4]
-        return np.stack([slopes[..., 0], np.stack(spin, axis=-1)], axis=-1)
-
-    @cached_property
-    def _slopes(self) -> Reals:
-        """(n, 4, 2) bounds on each piece of the derivatives 1 to 4 by progress of position and rotation vector."""
-        spans, found = np.diff(self.curve.edges), np.empty((len(self.origins), 4, 2))
-        series = self.curve.coefficients
-        for order in range(4):
-            series = series[:, 1:] * np.arange(1, series.shape[1])[:, None]
-            x = (1 - np.cos(np.pi * np.arange(POWERS) / (POWERS - 1))) / 2
-            values = np.einsum("mpk,xp->mxk", series, x[:, None] ** np.arange(series.shape[1]))
-            size = np.linalg.norm(values.reshape(*values.shape[:2], 2, 3), axis=-1).max(axis=1)
-            found[:, order] = SIX_POINTS * size / spans[:, None] ** (order + 1)
-        for k, arc in ((k, arc) for k, arc in enumerate(self.arcs) if arc is not None):
-            rate = (self.arc_shares[k, 1] - self.arc_shares[k, 0]) / spans[k]
-            found[k, :, 0] = [arc.length * rate * (arc.angle * rate) ** order for order in range(4)]
-        return found
 
     def progress(self, t: Reals) -> Rates:
         """See :class:`er3a.planning.moves.ToolPath`."""
@@ -424,16 +377,8 @@ class JointSequence:
 
     def polynomials(self) -> PiecewiseMotion:
         """The sequence as polynomials in time: of each piece of the curve within each piece of the law."""
-        return polynomial_motion(self.joints, *self._pieces())
-
-    def in_parts(self) -> MotionInParts:
-        """:meth:`polynomials`, made part by part: those of a long sequence would fill the memory."""
-        return MotionInParts(self.joints, *self._pieces())
-
-    def _pieces(self) -> tuple[Reals, int]:
-        """When the polynomials begin and end, s, and their largest degree."""
         breaks = np.unique(np.concatenate([self.law.breaks, times_at(self.law, self.curve.edges[1:-1])]))
-        return breaks, self.law.degree * (POWERS - 1)
+        return polynomial_motion(self.joints, breaks, self.law.degree * (POWERS - 1))
 
 
 @dataclass(frozen=True, eq=False)

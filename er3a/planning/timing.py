@@ -274,12 +274,6 @@ def standing(q: Reals, duration: float) -> Timed:
     return Timed(PiecewiseMotion(np.array([0.0, duration]), q[None, None], still, still))
 
 
-def through(t: Reals, q: Reals) -> Timed:
-    """The smooth motion from rest to rest through angles (N, n) in rad at times (N,) in s: a cubic spline."""
-    spline = scipy.interpolate.CubicSpline(t, q, bc_type="clamped")
-    return Timed(polynomial_motion(lambda at: (spline(at), spline(at, 1), spline(at, 2)), t, 3))
-
-
 def joined(parts: list[Timed]) -> Timed:
     """Motions one after another, each starting at rest where the one before ended at rest."""
     curves = [part.curve for part in parts if part.duration > 0] or [parts[-1].curve]

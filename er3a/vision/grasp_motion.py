@@ -3,7 +3,7 @@
 The arm halts at the end of each leg, so that the way is the same whatever ramps a controller has. Between the place
 where it waits and the approach the legs are straight moves of all joints: a single one if that keeps clear, else those
 of a way that the planner found (:mod:`er3a.planning.way_around`). Approach and retreat are straight lines of the tool,
-followed and settled by bounds (:mod:`er3a.planning.tool_proof`). Arms without closed form go along them in short
+followed on polynomials (:mod:`er3a.planning.tool_curve`). Arms without closed form go along them in short
 straight moves of the joints. Clearance is proven along each leg as it is run (:mod:`er3a.collision.along`).
 """
 
@@ -19,14 +19,13 @@ import numpy as np
 from er3a.collision.along import RateBounds, clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import Pair
-from er3a.kinematics.singularity import NearSingular
 from er3a.kinematics.wrist_partitioned import parallel_axes_arm, wrist_partition_missing
 from er3a.numerics.arrays import Reals
 from er3a.planning.follow import follow
-from er3a.planning.motion_faults import OVER, jerk_exceeded
+from er3a.planning.motion_faults import limit_intervals, rate_intervals
 from er3a.planning.moves import JointMove, line
 from er3a.planning.timing import JointLimits
-from er3a.planning.tool_proof import ProofRequirements, follow_and_prove
+from er3a.planning.tool_curve import follow_as_curve, open_stretches
 from er3a.planning.way_around import EndOutsideLimits, NoneFound, NoWayAround, PlanningTask, WayAround, way_around
 from er3a.robots.joint_limits import limits_exceeded, within
 from er3a.robots.robot import Robot
@@ -38,7 +37,6 @@ PEAKS = (15 / 8, 10 / np.sqrt(3), 60.0)  # of a quintic from rest to rest: speed
 SPARE = 1.02  # of the duration, so that bounds settle what samples allow
 MIN_DURATION = 0.05  # s
 CHECKS = 41
-NO_NEAR = NearSingular(0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,14 +128,12 @@ def tool_leg(
         return None
     duration *= max(1.0, SPARE * slower)
     path = line(*ends, duration)
-    required = ProofRequirements(limits.rates, NO_NEAR)
-    followed, proof = follow_and_prove(robot, path, np.linspace(0, duration, CHECKS), required, waypoints[0])
-    over = (np.abs(proof.rates) > np.stack([limits.speed, limits.acceleration]) * (1 + OVER)).any()
-    over |= limits.jerk is not None and bool(jerk_exceeded(proof.times, proof.jerk, proof.steps, limits.rates[2]))
-    if followed.jumps or proof.undecided or over or not proof.proven.all() or not within(robot, proof.q).all():
+    followed, curve = follow_as_curve(robot, path, np.linspace(0, duration, CHECKS), waypoints[0])
+    over = any(rate_intervals(curve, limit) for limit in limits.rates) or limit_intervals(robot, curve)
+    if followed.jumps or over or open_stretches(curve):
         return None
     q_end = followed.joints(np.array([duration]))[0]
-    return (GraspLeg(part, duration, followed.joints, proof.rate_bounds, q_end, ends[1]),)
+    return (GraspLeg(part, duration, followed.joints, curve.rate_bounds, q_end, ends[1]),)
 
 
 def min_clearance(bodies: Bodies, legs: tuple[GraspLeg, ...]) -> tuple[float, Pair] | None:

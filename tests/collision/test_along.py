@@ -13,12 +13,10 @@ from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import SceneFile
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
-from er3a.kinematics.singularity import NearSingular
 from er3a.planning.moves import JointMove, line
-from er3a.planning.tool_proof import ProofRequirements, follow_and_prove
+from er3a.planning.tool_curve import follow_as_curve
 
 DEPTH = 1e-3
-WANTED = ProofRequirements((), NearSingular(0.1, 0.1, 0.03))
 ENDS = np.array([0.0, 1.0])
 
 
@@ -141,8 +139,8 @@ def test_arm_that_folds_into_itself_is_found():
     robot = load_robot("er3a_c60")
     path = line(transform([0.3, 0, 0.25], [np.pi, 0, 0]), transform([0.12, 0, 0.25], [np.pi, 0, 0]), 4.0)
     t = np.linspace(0, 4, 50)
-    followed, proof = follow_and_prove(robot, path, t, WANTED)
-    found = clearance_along(Bodies(robot, None), followed.joints, proof.rate_bounds, followed.t, t, DEPTH)
+    followed, curve = follow_as_curve(robot, path, t)
+    found = clearance_along(Bodies(robot, None), followed.joints, curve.rate_bounds, followed.t, t, DEPTH)
     (contact,) = found.contacts
     assert all(isinstance(pair, LinkPair) for pair in contact.pairs)
     edge = clearance(robot, followed.joints(np.array([contact.start])), None).distance
@@ -155,8 +153,8 @@ def test_stretch_out_of_reach_has_no_clearance():
     end = start.copy()
     end[0, 3] += 1.0
     t = np.linspace(0, 1, 30)
-    followed, proof = follow_and_prove(robot, line(start, end, 1.0), t, WANTED)
-    found = clearance_along(Bodies(robot, None), followed.joints, proof.rate_bounds, followed.t, t, DEPTH)
+    followed, curve = follow_as_curve(robot, line(start, end, 1.0), t)
+    found = clearance_along(Bodies(robot, None), followed.joints, curve.rate_bounds, followed.t, t, DEPTH)
     reached = np.isfinite(followed.joints(found.t)[:, 0])
     np.testing.assert_array_equal(np.isfinite(found.distance), reached)
     assert 0 < reached.sum() < len(reached)

@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from er3a.files.robot_library import load_robot
 from er3a.geometry.transforms import transform
-from er3a.kinematics.forward import forward, jacobian
-from er3a.kinematics.singularity import NearSingular, characteristic_length, determinant_factors, factor_of
+from er3a.kinematics.forward import forward
+from er3a.kinematics.singularity import NearSingular, determinant_factors, factor_of
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.pipeline.messages import planning as messages
 from er3a.planning.avoidance import avoidance, strategies
@@ -23,6 +23,7 @@ from er3a.planning.motion_faults import singular_events
 from er3a.planning.moves import line
 from er3a.planning.names import StrategyName
 from er3a.planning.timing import joint_limits
+from er3a.planning.tool_curve import curve_of
 from er3a.robots.joint_limits import within
 
 NEAR = NearSingular(float(np.radians(5)), float(np.radians(5)), 0.03)
@@ -40,7 +41,7 @@ def segment_of(name: str, robot=None, duration: float = 4.0):
     start, end, rpy = LINES[name]
     way = line(transform(start, rpy), transform(end, rpy), duration)
     followed = follow(robot, way, np.linspace(0, duration, 400))
-    events = singular_events(robot, followed.t, followed.q, followed.joints, NEAR)
+    events = singular_events(robot, curve_of(followed)[0], NEAR)
     limits = joint_limits(robot, np.radians([180, 180, 180, 360, 360, 360]), 0.25)
     return singular_segment(followed, NEAR, limits, events)
 
@@ -147,52 +148,6 @@ def test_bend_is_smooth_and_vanishes_at_its_ends():
     assert np.abs(np.diff(size, 3)).max() < 1e-10
 
 
-def test_damped_least_squares_are_those_of_the_formula(results):
-    """Against the formula in plain numpy, from the tool's velocity and error."""
-    case = segment_of("wrist_near")
-    t = np.linspace(0, 4, strategies.STEPS + 1)
-    way, length = case.followed.line, characteristic_length(case.robot)
-    T = way.poses(way.progress(t)[0])
-    motion = strategies.followed_damped(case, t, T, 0.1)
-    q, dt = case.q[0].copy(), t[1] - t[0]
-    scale = np.array([1 / length] * 3 + [1] * 3)
-    for n in range(500):
-        tool = forward(case.robot, q)
-        turn = [Rotation.from_matrix(b[:3, :3] @ a[:3, :3].T).as_rotvec() for a, b in ((T[n], T[n + 1]), (tool, T[n]))]
-        step = np.concatenate([T[n + 1][:3, 3] - T[n][:3, 3], turn[0]])
-        step += strategies.FEEDBACK * dt * np.concatenate([T[n][:3, 3] - tool[:3, 3], turn[1]])
-        J = jacobian(case.robot, q) * scale[:, None]
-        least = np.linalg.svd(J, compute_uv=False)[-1]
-        squared = 0.1**2 * max(0.0, 1 - (least / strategies.THRESHOLD) ** 2)
-        q = q + J.T @ np.linalg.solve(J @ J.T + squared * np.eye(6), scale * step)
-    np.testing.assert_allclose(motion.q[500], q, atol=1e-5)
-
-
-def test_damped_price_is_the_distance_of_the_tool_it_leads_to(results):
-    case, price = segment_of("wrist_near"), results["wrist_near"]["damped"].cost
-    start, end = (case.followed.line.poses(np.array(share))[:3, 3] for share in (0.0, 1.0))
-    tool = forward(case.robot, price.motion.q)[:, :3, 3] - start
-    along = (end - start) / np.linalg.norm(end - start)
-    across = np.linalg.norm(tool - np.outer(tool @ along, along), axis=1)
-    assert price.distance.max() > 1e-3
-    assert price.distance.max() >= across.max() - 1e-9
-
-
-def test_damping_may_ask_more_of_the_joints_than_the_path_does():
-    """Strategies are timed to need no more than the path; damped joints keep its time law, within what they can do."""
-    robot = load_robot("er3a_c60_article")
-    way = line(forward(robot, np.zeros(6)), transform([0.6, 0.3, 0.5], [0, np.pi, 0]), 5.0)  # begins at the singularity
-    followed = follow(robot, way, np.linspace(0, 5, 400))
-    limits = joint_limits(robot, np.radians([180, 180, 180, 360, 360, 360]), 0.25)
-    own = float((np.abs(followed.rates(followed.t)[1]) / limits.speed).max())
-    assert own < 0.5
-    case = singular_segment(followed, NEAR, replace(limits, speed=own * limits.speed), fixed_start=True, allowed=limits)
-    result = compare_strategies(case, "damped")[0]
-    assert not result.reasons
-    assert result.cost.max_joint_speed_ratio < 1.01 * own
-    assert result.cost.distance.max() < 1e-4
-
-
 def test_another_branch_is_clear_from_the_start():
     robot = load_robot("er3_600")
     start, end = transform([0.4, -0.15, 0.69], FORWARD), transform([0.4, 0.15, 0.69], FORWARD)
@@ -229,9 +184,9 @@ def test_of_ways_that_leave_the_path_alike_the_one_that_keeps_clear_is_best(resu
     slow = results["wrist_near"]["slow"]
     clear = replace(slow, name="branch", cost=replace(slow.cost, keeps_clear=True))
     gentle = replace(
-        slow, name="damped", cost=replace(slow.cost, max_joint_speed_ratio=0, max_joint_acceleration_ratio=0)
+        slow, name="detour", cost=replace(slow.cost, max_joint_speed_ratio=0, max_joint_acceleration_ratio=0)
     )
-    assert best([slow, gentle], False).name == "damped"
+    assert best([slow, gentle], False).name == "detour"
     assert best([slow, gentle, clear], False).name == "branch"
     hasty = replace(slow, cost=replace(slow.cost, motion=results["wrist_near"]["stop"].cost.motion))
     assert hasty.cost.motion.duration < slow.cost.motion.duration

@@ -6,7 +6,6 @@ from itertools import product
 
 import numpy as np
 import pytest
-import scipy
 
 from er3a.errors import NotWristPartitionedError
 from er3a.kinematics.forward import forward
@@ -163,35 +162,6 @@ def test_seven_joints_follow_a_line_and_keep_margin(with_start):
     assert len(others) > 5
     if not with_start:
         assert others.max() < margin(joints) + np.radians(2)
-
-
-BENT = [  # joints at the start, deg; where the line ends: m, and quaternion (scalar last)
-    (
-        [56.50088, 27.572204, -132.409365, -53.17578, -49.824829, -47.533873, -143.151579],
-        [-0.03013018, 0.14514226, 0.81730791],
-        [0.61711688, 0.28459459, 0.66935148, 0.30023537],
-    ),
-    (
-        [-167.592461, -110.81878, -167.847425, 11.40017, 25.495732, 14.636251, 133.345366],
-        [0.5110493, 0.0126202, -0.26525855],
-        [0.70989857, -0.26776153, 0.64593236, -0.08437519],
-    ),
-]
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(("start", "point", "turn"), BENT)
-def test_arm_angle_bends_more_often_where_a_parabola_leaves_the_limits(start, point, turn):
-    q, end = np.radians(start), np.eye(4)
-    end[:3, 3], end[:3, :3] = point, scipy.spatial.transform.Rotation.from_quat(turn).as_matrix()
-    path = line(forward(IIWA, q), end, 4.0)
-    motion = follow_by_class(IIWA, path, q)
-    t = np.linspace(0, 4, 20_001)
-    joints = motion.joints(t)
-    np.testing.assert_allclose(joints[0], q, atol=1e-9)
-    assert np.abs(forward(IIWA, joints) - path.poses(path.progress(t)[0])).max() < 1e-9
-    assert np.abs(np.diff(joints, axis=0)).max() < 2e-3
-    assert margin(joints) > 0
 
 
 @pytest.mark.parametrize("with_start", [True, False])

@@ -13,10 +13,11 @@ from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.singularity import TYPES, NearSingular, determinant_factors, factor_of
 from er3a.kinematics.solutions import WristTooFar
 from er3a.planning.follow import follow
-from er3a.planning.motion_faults import BelowLimit, out_of_limits, rates_exceeded, singular_events, unreachable
+from er3a.planning.motion_faults import BelowLimit, limit_intervals, rate_intervals, singular_events, unreachable
 from er3a.planning.moves import JointMove, line
 from er3a.planning.sequences import arc, segment_path
 from er3a.planning.timing import joint_limits
+from er3a.planning.tool_curve import curve_of
 from er3a.robots.joint_limits import nearest_equivalent, within
 from er3a.robots.robot import CombinedLimit
 from testing.arms import OTHERS_LONG
@@ -33,7 +34,7 @@ def shifted(T, xyz, rotvec=(0, 0, 0)):
 
 
 def events_of(robot, followed):
-    return singular_events(robot, followed.t, followed.q, followed.joints, NEAR)
+    return singular_events(robot, curve_of(followed)[0], NEAR)
 
 
 def test_poses_are_met_and_joints_run_on(robot, random):
@@ -129,8 +130,8 @@ def test_no_crossing_is_missed_that_finer_sampling_finds(robot, random):
     for _ in range(40):
         a, b = random.uniform(robot.lower, robot.upper, (2, 6))
         move = JointMove(a, b, 1.0)
-        coarse, fine = np.linspace(0, 1, 101), np.linspace(0, 1, 10001)
-        events = singular_events(robot, coarse, move.joints(coarse)[0], lambda t, move=move: move.joints(t)[0], NEAR)
+        fine = np.linspace(0, 1, 10001)
+        events = singular_events(robot, move.polynomials(), NEAR)
         factors = determinant_factors(robot, move.joints(fine)[0])
         for kind in TYPES:
             values = factor_of(factors, kind)
@@ -186,7 +187,7 @@ def test_limits_are_left_where_the_angle_crosses_them():
     robot = load_robot("er3a_c60")
     way = line(transform([0.3, 0, 0.25], [np.pi, 0, 0]), transform([0.12, 0, 0.25], [np.pi, 0, 0]), 4.0)
     followed = follow(robot, way, np.linspace(0, 4, 50))
-    (interval,) = out_of_limits(robot, followed.t, followed.q, followed.joints)
+    (interval,) = limit_intervals(robot, curve_of(followed)[0])
     assert interval.cause == BelowLimit(3, pytest.approx(-91.3, abs=0.05), pytest.approx(-75))
     assert interval.end == 4.0
     np.testing.assert_allclose(followed.joints(interval.start)[2], robot.lower[2], atol=1e-8)
@@ -236,7 +237,7 @@ def test_speed_limits_are_named():
     way = line(transform([0.02, -0.2, 0.85], [0, 0, 0]), transform([0.02, 0.2, 0.85], [0, 0, 0]), 4.0)
     followed = follow(robot, way, np.linspace(0, 4, 400))
     limit = joint_limits(robot, np.ones(6), 1.0).rates[0]
-    found = rates_exceeded(followed.t, followed.rates(followed.t)[1], limit, lambda t: followed.rates(t)[1])
+    found = rate_intervals(curve_of(followed)[0], limit)
     assert [part.cause.joint for part in found] == [1]
     at = np.array([found[0].start, found[0].end])
     np.testing.assert_allclose(np.abs(followed.rates(at)[1][:, 0]), limit.allowed[0], rtol=1e-6)

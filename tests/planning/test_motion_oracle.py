@@ -11,6 +11,7 @@ from er3a.files.robot_library import load_robot
 from er3a.geometry.transforms import rpy_of
 from er3a.kinematics.forward import forward
 from er3a.planning import motion_faults
+from er3a.planning.tool_curve import open_stretches
 from testing.motion_cases import (
     JOINT_KINDS,
     TOOL_KINDS,
@@ -62,7 +63,7 @@ def test_what_is_open_beside_an_event_is_undecided_where_nobody_finds_the_event(
     limits = limits_of(robot, {"limits_jerk": False, "known_acceleration": False})
     motion, seen = judged(robot, written, 50, limits)
     assert seen.verdict == "singular"
-    assert motion.proof.beside
+    assert open_stretches(motion.curve)
     monkeypatch.setattr(motion_faults, "singular_events", lambda *_: [])
     blind = judged(robot, written, 50, limits)[1]
     assert blind.verdict != "safe"

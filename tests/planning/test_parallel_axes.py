@@ -13,6 +13,7 @@ from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.planning.follow import follow
 from er3a.planning.motion_faults import singular_events
 from er3a.planning.moves import line
+from er3a.planning.tool_curve import curve_of
 from testing.arms import DEG, joints_at_random, make_arm, pose_errors
 
 GRID = np.linspace(0, 1, 80)
@@ -75,7 +76,7 @@ def test_a_line_through_the_singular_wrist_goes_on_and_is_told(samples):
     assert met.all()
     position, rotation = pose_errors(forward(UR5, followed.q), way.poses(followed.progress))
     assert max(position.max(), rotation.max()) < 1e-8
-    events = singular_events(UR5, followed.t, followed.q, followed.joints, NearSingular(0.02, 0.02, 0.005))
+    events = singular_events(UR5, curve_of(followed)[0], NearSingular(0.02, 0.02, 0.005))
     assert any(event.type == "wrist" for event in events)
 
 

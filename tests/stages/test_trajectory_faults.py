@@ -41,7 +41,7 @@ from er3a.pipeline.stages.trajectory.page.played import advised, faults, motions
 from er3a.pipeline.study import Study, load_study
 from er3a.pipeline.verdicts import read_verdicts
 from er3a.planning.motion_faults import AccelerationTooGreatIfAssumed, PathOutOfReach, TooFast, TooFastIfAssumed
-from er3a.planning.tool_proof import Undecided
+from er3a.planning.tool_curve import Undecided
 from testing.motion_cases import judged, limits_of
 
 ROBOT = "er3a_c60"
@@ -511,7 +511,7 @@ def test_the_player_marks_what_fails_and_says_so_of_paths_near_assumed_shapes_to
 
 
 def test_stretches_of_one_cause_that_adjoin_are_told_once():
-    open_, other = Undecided("singular"), Undecided("speed")
+    open_, other = Undecided(), TooFast(1, 20.0, 10.0)
     parts = [stretch(open_, 1.97, 2.03), stretch(open_, 1.945, 1.967), stretch(other, 1.95, 1.96)]
     found = adjoined([*parts, stretch(open_, 2.9, 3.0)])
     assert [(each.cause, each.t0_s, each.t1_s) for each in found] == [

@@ -81,8 +81,7 @@ GLOSSARY = {
     N_("admissible"): N_("within the joint limits and free of collisions"),
     N_("singular segment"): N_("the part of a path where joint speeds grow without bound or beyond the joints' limits"),
     N_("avoidance strategy"): N_(
-        "what can be done about a path's singular segment: slow down, another branch, a via point, damped least "
-        "squares, a joint detour, stop"
+        "what can be done about a path's singular segment: slow down, another branch, a via point, a joint detour, stop"
     ),
     N_("most likely fault"): N_("the table entry whose correction explains the differences best"),
     N_("authoritative"): N_("of a source: official, CAD or exported; a verdict rests on such sources alone"),

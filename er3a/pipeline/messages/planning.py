@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import er3a.pipeline.messages.kinematics  # noqa: F401
 from er3a.pipeline.language import N_, as_text, tr
-from er3a.pipeline.messages.say import by, joined, listed, say, say_as, sentence, texts, word
+from er3a.pipeline.messages.say import by, joined, listed, say, say_as, sentence, texts
 from er3a.planning.motion_faults import (
     AccelerationTooGreat,
     AccelerationTooGreatIfAssumed,
@@ -16,14 +16,12 @@ from er3a.planning.motion_faults import (
     TooFastIfAssumed,
 )
 from er3a.planning.names import StrategyName
-from er3a.planning.tool_proof import Quantity, Undecided
 
 STRATEGIES: dict[StrategyName, str] = {
     "slow": N_("Keep the path and slow down"),
     "branch": N_("Switch to another IK solution first"),
     "via_shift": N_("Route the path through a shifted via point"),
     "via_tilt": N_("Route the path through a tilted via point"),
-    "damped": N_("Use damped least squares, which leaves the path"),
     "detour": N_("Cross the region by a joint move"),
     "stop": N_("Stop before the region with an alarm"),
     "planned": N_("Use another motion instead, planned in joint space"),
@@ -62,7 +60,6 @@ TEXTS = texts(
         "no_shift_keeps_distance": "no shift of the tool point up to {up_to_mm:.0f} mm keeps the distance",
         "no_tilt_keeps_distance": "no tilt of the tool up to {up_to_deg:.0f} deg keeps the distance",
         "bent_path_singular": "the bent path runs into another singular region",
-        "no_damping_suffices": "no damping keeps the joint speeds within their limits at this speed",
         "path_not_finished": "only {done:.0%} of the path is completed",
         "ends_off_path": "it ends {distance_mm:.3g} mm and {angle_deg:.3g} deg from the path's end",
         "speed_exceeded": "a joint needs {ratio:.2f} times its greatest speed",
@@ -89,7 +86,7 @@ TEXTS = texts(
         "rate_limits#assumed": "the assumed limits",
         "times_needed#speed": "{times} × its speed",
         "times_needed#acceleration": "{times} × its acc.",
-        "undecided": "the bounds can't decide {what}",
+        "undecided": "the poses solved don't show what happens between them",
     }
 )
 
@@ -154,21 +151,6 @@ def times_needed(ratio: float, *, acceleration: bool) -> str:
     """How many times its limit a joint needs, in a few letters."""
     times = f"> {UNBOUNDED:g}" if ratio > UNBOUNDED else f"{float(f'{ratio:.2g}'):g}"
     return sentence("times_needed#acceleration" if acceleration else "times_needed#speed", times=times)
-
-
-OPEN: dict[Quantity, str] = {
-    "singular": N_("whether a singular pose is met"),
-    "limits": N_("whether the joints keep their limits"),
-    "speed": N_("whether the joints keep their speeds"),
-    "acceleration": N_("whether the joints keep their accelerations"),
-    "jerk": N_("whether the joints keep their jerk"),
-    "near": N_("how near a singular pose is"),
-}
-
-
-@say.register
-def _(found: Undecided) -> str:
-    return say_as(found, what=word("undecided", OPEN, found.quantity))
 
 
 @say.register

@@ -20,7 +20,6 @@ from er3a.pipeline.messages.say import Plural, joined, listed, say, say_first, s
 from er3a.pipeline.stages.trajectory import model
 from er3a.planning.motion_faults import JerkTooGreat, RateCause
 from er3a.planning.names import PathVerdict, StrategyName
-from er3a.planning.tool_proof import Undecided
 
 KEY_FIGURES = {
     "safe": N_("Paths that pass in the model, of those meant to"),
@@ -47,7 +46,6 @@ STRATEGIES: dict[StrategyName, str] = {
     "branch": N_("another IK solution first"),
     "via_shift": N_("via point, tool point shifted"),
     "via_tilt": N_("via point, tool tilted"),
-    "damped": N_("damped least squares"),
     "detour": N_("joint move across the region"),
     "stop": N_("stop before it, with an alarm"),
     "planned": N_("planned motion of the joints"),
@@ -67,7 +65,6 @@ FACTS: dict[FactName, str] = {
 """What is said of a motion to be run instead, beside what it is."""
 OPEN_VERDICTS: tuple[PathVerdict, ...] = ("undecided", "too fast for the assumed limits")
 """Of paths that may be safe all the same, if nothing that is undecided is against it."""
-OPEN_SINGULAR = Undecided("singular")
 MAX_PAIRS = 3
 NO_DEVIATION = 0.005  # mm or deg
 NO_TIME = 0.005  # s
@@ -115,11 +112,6 @@ TEXTS = texts(
         "path.when": "from t = {start:.4g} to {end:.4g} s",
         "pair_touches": "{pair} overlap from t = {t0_s:.4g} s, up to {depth_mm:.1f} mm at t = {t_s:.4g} s",
         "bodies_overlap.more": "{touches}; and more later",
-        "path.either_way": "{open}; the path is not safe in either case",
-        "path.passes_open": (
-            "sampled, it passes the {type} singularity at {distance}; between t = {start:.4g} and {end:.4g} s the "
-            "bounds can't decide everywhere whether it is met"
-        ),
         "path.near_start": "near-singular at the start: {distance} from the {type} singularity",
         "path.singular": "{type} singularity",
         "path.rates": Plural(
@@ -399,47 +391,9 @@ def _(found: model.BodiesOverlap) -> str:
     return touches
 
 
-def cause_text(path: model.PathSummary, part: model.Stretch) -> str:  # type: ignore[type-arg]
-    """Why a stretch of a path is listed; what is undecided is no open question where something else decides."""
-    if passed := pass_about(path, part):
-        return passing_text(*passed)
-    cause = _with_worst(part, say(part.cause))
-    if not isinstance(part.cause, Undecided) or path.verdict in OPEN_VERDICTS:
-        return cause
-    return sentence("path.either_way", open=cause)
-
-
-def pass_about(
-    path: model.PathSummary,
-    part: model.Stretch,  # type: ignore[type-arg]
-) -> tuple[model.Singularity, tuple[float, float]] | None:
-    """The pass of a singular set that a stretch belongs to, on which it is not decided whether that is met, and from
-    when to when (s) that is so; None of other stretches."""
-    if part.cause == OPEN_SINGULAR:
-        for event in path.singularities:
-            if (span := open_beside(path, event)) and span[0] <= part.t0_s and part.t1_s <= span[1]:
-                return event, span
-    return None
-
-
-def open_beside(path: model.PathSummary, event: model.Singularity) -> tuple[float, float] | None:
-    """From when to when (s), about a pass of a singular set, it is not decided whether the set is met; None where it
-    is."""
-    own = [part for part in path.undecided if part.cause == OPEN_SINGULAR]
-    start = end = event.t_s
-    for part in sorted(own, key=lambda part: -part.t1_s):
-        if part.t0_s <= event.until_s and part.t1_s >= start - ADJOINING:
-            start = min(start, part.t0_s)
-    for part in sorted(own, key=lambda part: part.t0_s):
-        if part.t1_s >= event.t_s and part.t0_s <= end + ADJOINING:
-            end = max(end, part.t1_s)
-    return None if event.crossing or start == end else (start, end)
-
-
-def passing_text(event: model.Singularity, span: tuple[float, float]) -> str:
-    """How near a path passes a singular set by its samples, and from when to when it may meet it all the same."""
-    parts = {"type": event_word(event), "distance": event_distance(event)}
-    return sentence("path.passes_open", start=span[0], end=span[1], **parts)
+def cause_text(part: model.Stretch) -> str:  # type: ignore[type-arg]
+    """Why a stretch of a path is listed."""
+    return _with_worst(part, say(part.cause))
 
 
 def near_at_start(kind: SingularityType, distance: str) -> str:
@@ -476,7 +430,7 @@ def first_faults(path: model.PathSummary) -> list[FaultText]:
     found += [FaultText(jump.t_s, say(jump), jump.t_s) for jump in path.jumps[:1]]
     open_ = min(path.undecided, key=lambda part: part.t0_s, default=None)
     if open_ and open_.t0_s < min(found, default=(math.inf,))[0]:
-        found.append(FaultText(open_.t0_s, cause_text(path, open_), open_.t0_s))
+        found.append(FaultText(open_.t0_s, cause_text(open_), open_.t0_s))
     chosen = {*found[: max(1, sum(map(bool, grave)))], *sorted(found)[:1]}
     return sorted(chosen, key=lambda each: (each.follows, each))
 

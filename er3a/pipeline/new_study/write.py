@@ -49,7 +49,7 @@ from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.language import written_title
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.trajectory.judgement import Surroundings, judge, measured
-from er3a.pipeline.stages.trajectory.motion import limits_of, motion_of, proof_requirements
+from er3a.pipeline.stages.trajectory.motion import limits_of, motion_of, near_singular
 from er3a.planning.commands import CommandSource
 from er3a.robots.joint_limits import limit_margin, shown, within
 from er3a.robots.robot import Convention, ConvexPiece, LinkMesh, Robot, robot_name
@@ -216,8 +216,8 @@ class TaskSearch:
 
     def __init__(self, robot: Robot, reach: SampledReach, scene: Scene, settings: TrajectorySettings) -> None:
         self.robot, self.reach, self.settings = robot, reach, settings
-        self.limits, self.required = limits_of(robot, settings), proof_requirements(robot, settings)
-        self.near, self.bodies = self.required.near, Bodies(robot, scene)
+        self.limits, self.near = limits_of(robot, settings), near_singular(settings)
+        self.bodies = Bodies(robot, scene)
         self.tried, self.rejected = 0, dict[str, Counter[str]]()
         q = reach.q[:DRAWN]
         inside, nonsingular, free = self._away_from_limits(q), self._away_from_singularities(q), self.bodies.free(q)
@@ -225,9 +225,9 @@ class TaskSearch:
         touching = Counter({pair.label: 0 for pair in self.bodies.pairs})
         for pair, count in zip(self.bodies.pairs, self.bodies.overlaps(q).sum(axis=0).tolist()):
             touching[pair.label] = max(touching[pair.label], count)
-        near_limit, near_singular, colliding = (int(np.count_nonzero(~each)) for each in (inside, nonsingular, free))
+        near_limit, too_singular, colliding = (int(np.count_nonzero(~each)) for each in (inside, nonsingular, free))
         often = tuple((label, count) for label, count in touching.most_common(NAMED_PAIRS) if count)
-        self.counts = DrawnCounts(len(q), len(self.fit), near_limit, near_singular, colliding, often)
+        self.counts = DrawnCounts(len(q), len(self.fit), near_limit, too_singular, colliding, often)
 
     def spots(self) -> list[Spot]:
         """Poses far from one another: at most ``MAX_TARGETS``, fewer where the arm reaches no more of those tried."""
@@ -395,9 +395,7 @@ class TaskSearch:
         entry = parse(PathFile, {"kind": "paths", "paths": [written]}, None).paths[0]
         assert not isinstance(entry, ProgramPath)
         try:
-            motion = motion_of(
-                self.robot, entry, self.settings.checks_per_sample, CommandSource(None, ""), {}, self.required
-            )
+            motion = motion_of(self.robot, entry, self.settings.checks_per_sample, CommandSource(None, ""), {})
         except Er3aError:
             return "can't be followed"
         judgement = judge(self.robot, motion, self.near, self.limits)

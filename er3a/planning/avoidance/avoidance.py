@@ -74,13 +74,9 @@ class BentPathSingular(Finding):
     """The bent path runs into another singular region."""
 
 
-class NoDampingSuffices(Finding):
-    """No damping keeps the joint speeds within their limits at the programmed pace."""
-
-
 PathUnfit = NothingToAvoid | NoSingularRegion | BeginsOutOfReach | EndsOutOfReach | PartlyOutOfReach
 RegionUnfit = BeginsInRegion | EndsInRegion | BranchEnds | NoOtherBranch
-NoWay = NoShiftKeepsDistance | NoTiltKeepsDistance | BentPathSingular | NoDampingSuffices | NoTimeLaw
+NoWay = NoShiftKeepsDistance | NoTiltKeepsDistance | BentPathSingular | NoTimeLaw
 NotPossible = PathUnfit | RegionUnfit | NoWay
 
 

@@ -1,18 +1,5 @@
 """All strategies of singularity avoidance: the cost of each, and the recommended one.
 
-Damped least squares: joint speeds stay bounded near a singularity, at the price of leaving the path.
-
-The joints follow the tool's programmed velocity plus a part of the error made so far, through the damped inverse of the
-Jacobian [1]_. The damping sets in where the smallest singular value falls below ``THRESHOLD`` and grows towards the
-singularity [2]_.
-
-References
-----------
-.. [1] Y. Nakamura, H. Hanafusa, "Inverse kinematic solutions with singularity robustness for robot manipulator
-   control", J. Dynamic Systems, Measurement, and Control 108(3), 1986.
-.. [2] B. Siciliano et al., *Robotics: Modelling, Planning and Control*, section 3.5.2; the damping's course:
-   S. Chiaverini et al., IEEE Trans. Control Systems Technology 2(2), 1994, equation 13.
-
 Bend the path past the singular region through a via point, by the smallest amount that keeps the distance.
 
 Near a singularity, a pose differs from it by a vector of one or two components: the deviation of axis 6 from axis 4
@@ -33,19 +20,17 @@ import scipy
 
 from er3a.errors import PoseError
 from er3a.geometry.transforms import frame_along, moved
-from er3a.kinematics.chain import constant_links
 from er3a.kinematics.closed_form import SLOTS
-from er3a.kinematics.forward import forward, frames, rows_of, step_row, turn_row
+from er3a.kinematics.forward import forward, frames
 from er3a.kinematics.singularity import TYPES, SingularityType, characteristic_length, determinant_factors, factor_of
 from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
 from er3a.numerics.arrays import Reals
-from er3a.numerics.jit import inner_kernel, kernel
 from er3a.planning.avoidance import avoidance
 from er3a.planning.follow import Followed, follow
 from er3a.planning.moves import ToolPath
 from er3a.planning.names import StrategyName
 from er3a.planning.profiles import quintic
-from er3a.planning.timing import Timed, TimingError, joined, straight, through
+from er3a.planning.timing import Timed, TimingError, joined, straight
 from er3a.planning.way_around import NoWayAround
 from er3a.robots.joint_limits import LimitsExceeded, limits_exceeded, within
 
@@ -283,106 +268,6 @@ def _none_far_enough(segment: avoidance.SingularSegment, kind: Kind) -> avoidanc
     return avoidance.NoTiltKeepsDistance(float(np.degrees(MAX_BEND["tilt"])))
 
 
-STEPS = 1000
-THRESHOLD = 0.1  # of the smallest singular value, linear rows divided by the characteristic length
-FEEDBACK = 10.0  # 1/s
-DAMPINGS = np.geomspace(2e-3, 0.5, 9)
-
-Row = tuple[float, float, float, float]
-
-
-def damped(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidance.NotPossible:
-    """Follow the path on its own time law, with the smallest damping that keeps the joints within their limits.
-
-    Where no damping bounds the accelerations too, it is the smallest that bounds the speeds.
-    """
-    if np.isnan(segment.q[0, 0]):
-        return avoidance.BeginsOutOfReach()
-    line = segment.followed.line
-    t = np.linspace(0.0, line.duration, STEPS + 1)
-    T = line.poses(line.progress(t)[0])
-    runs = [followed_damped(segment, t, T, damping) for damping in DAMPINGS]
-    ratios = np.array([motion.ratios(segment.allowed or segment.limits) for motion in runs])
-    held = np.flatnonzero((ratios <= 1.0).all(axis=1))
-    if not held.size:
-        held = np.flatnonzero(ratios[:, 0] <= 1.0)
-    if not held.size:
-        return avoidance.NoDampingSuffices()
-    best = runs[int(held[0])]
-    return avoidance.Avoidance(joined([*segment.begin(), best]))
-
-
-def followed_damped(segment: avoidance.SingularSegment, t: Reals, T: Reals, damping: float) -> Timed:
-    """Joints that follow poses T (N, 4, 4) at times t (N,), s, from the segment's start, by damped least squares."""
-    robot = segment.robot
-    q = np.empty((len(t), 6))
-    q[0] = segment.q[0]
-    length = characteristic_length(robot)
-    _damped_steps(robot.direction, robot.offset, constant_links(robot), T, t[1] - t[0], length, damping, q)
-    return through(t, q)
-
-
-@kernel
-def _damped_steps(
-    direction: Reals, offset: Reals, links: Reals, T: Reals, dt: float, length: float, damping: float, q: Reals
-) -> None:
-    """Fill ``q`` (N, 6) from its first row on: the joints that run after the poses ``T`` (N, 4, 4)."""
-    J, wanted = np.empty((6, 6)), np.empty(6)
-    for n in range(q.shape[0] - 1):
-        tool = _scaled_jacobian(q[n], direction, offset, links, length, J)
-        _pull(tool, T[n], T[n + 1], FEEDBACK * dt, length, wanted)
-        u, values, vt = np.linalg.svd(J)
-        smallest = values[5]
-        squared = 0.0
-        if smallest < THRESHOLD:
-            squared = damping**2 * (1.0 - (smallest / THRESHOLD) ** 2)
-        for j in range(6):
-            q[n + 1, j] = q[n, j]
-        for k in range(6):
-            along = 0.0
-            for r in range(6):
-                along += u[r, k] * wanted[r]
-            along *= values[k] / (values[k] ** 2 + squared + 1e-16)
-            for j in range(6):
-                q[n + 1, j] += vt[k, j] * along
-
-
-@inner_kernel
-def _pull(tool: tuple[Row, Row, Row], now: Reals, then: Reals, gain: float, length: float, wanted: Reals) -> None:
-    """The commanded step (6,): from one target to the next, and ``gain`` times from the tool to the target now."""
-    for r in range(3):
-        wanted[r] = (then[r, 3] - now[r, 3] + gain * (now[r, 3] - tool[r][3])) / length
-        wanted[3 + r] = 0.0
-    for c in range(3):
-        for r in range(3):
-            a, b = (r + 1) % 3, (r + 2) % 3
-            wanted[3 + r] += 0.5 * (now[a, c] * then[b, c] - now[b, c] * then[a, c])
-            wanted[3 + r] += 0.5 * gain * (tool[a][c] * now[b, c] - tool[b][c] * now[a, c])
-
-
-@inner_kernel
-def _scaled_jacobian(
-    q: Reals, direction: Reals, offset: Reals, links: Reals, length: float, J: Reals
-) -> tuple[Row, Row, Row]:
-    """Fill ``J`` (6, 6), linear rows divided by ``length``; the tool's frame as three rows."""
-    x, y, z = rows_of(links[0])
-    points = np.empty((6, 3))
-    for k in range(6):
-        sign = direction[k]
-        points[k, 0], points[k, 1], points[k, 2] = x[3], y[3], z[3]
-        J[3, k], J[4, k], J[5, k] = sign * x[2], sign * y[2], sign * z[2]
-        angle, link = sign * q[k] + offset[k], links[k + 1]
-        c, s = np.cos(angle), np.sin(angle)
-        x, y, z = turn_row(x, c, s), turn_row(y, c, s), turn_row(z, c, s)
-        x, y, z = step_row(x, link), step_row(y, link), step_row(z, link)
-    for k in range(6):
-        a, b, c = x[3] - points[k, 0], y[3] - points[k, 1], z[3] - points[k, 2]
-        J[0, k] = (J[4, k] * c - J[5, k] * b) / length
-        J[1, k] = (J[5, k] * a - J[3, k] * c) / length
-        J[2, k] = (J[3, k] * b - J[4, k] * a) / length
-    return x, y, z
-
-
 def detour(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidance.NotPossible:
     """Follow the path up to the last good pose, move the joints to the next good one, and go on, at every region.
 
@@ -529,7 +414,6 @@ STRATEGIES: dict[StrategyName, avoidance.Strategy] = {
     "branch": branch,
     "via_shift": shifted_via,
     "via_tilt": tilted_via,
-    "damped": damped,
     "detour": detour,
     "stop": stop,
 }

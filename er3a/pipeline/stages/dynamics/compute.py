@@ -326,9 +326,9 @@ BEFORE_END = 1e-6  # of a piece, as accelerations step from piece to piece
 
 def within_short_pieces(motion: Motion, step: float) -> Reals:
     """Times in s: begin, middle and end of those pieces of a motion of the joints that steps (s) would pass over."""
-    if motion.polynomials is None:
+    if motion.followed is not None:
         return np.empty(0)
-    starts, spans = motion.polynomials.times[:-1], np.diff(motion.polynomials.times)
+    starts, spans = motion.curve.times[:-1], np.diff(motion.curve.times)
     short = spans < PER_PIECE * step
     found: Reals = starts[short, None] + spans[short, None] * [0.0, 0.5, 1 - BEFORE_END]
     return found.ravel()

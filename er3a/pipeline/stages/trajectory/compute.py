@@ -38,8 +38,8 @@ from er3a.pipeline.stages.trajectory.motion import (
     corner_misses,
     limits_of,
     listed_motions,
+    near_singular,
     planning_of,
-    proof_requirements,
     times_in,
 )
 from er3a.pipeline.stages.trajectory.written_programs import near_assumed_shapes, program_files
@@ -373,9 +373,9 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
     """Compute the trajectory stage of a robot."""
     robot, settings = study.robot(name), study.section(TrajectorySettings)
     file = Path(study.entry(name).paths)
-    required, limits = proof_requirements(robot, settings), limits_of(robot, settings)
+    near, limits = near_singular(settings), limits_of(robot, settings)
     used = _limits_used(robot, limits, settings)
-    near, scene = required.near, study.scene(name, "trajectory")
+    scene = study.scene(name, "trajectory")
     surroundings = judgement.Surroundings(Bodies(robot, scene), settings.penetration_tolerance_mm / 1000)
     only = None if settings.avoidance == "compare" else settings.avoidance
     planning = planning_of(robot, settings, surroundings.bodies, study.seed)
@@ -390,7 +390,7 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
     skipped: list[model.PathNotFollowed] = []
     rest: list[LeftOut] = []
     turned: list[tuple[str, Reals, Reals]] = []
-    for each in listed_motions(file, planning, required, settings.checks_per_sample):
+    for each in listed_motions(file, planning, near, settings.checks_per_sample):
         motion = each.motion
         rest += each.left_out if each.meant_safe else ()
         if motion is None:

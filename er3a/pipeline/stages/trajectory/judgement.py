@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
-from typing import Literal
 
 import numpy as np
 import scipy
@@ -13,15 +11,13 @@ from er3a.collision.along import ClearanceAlong, clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.geometry.transforms import rpy_of
 from er3a.kinematics.singularity import NearSingular
-from er3a.kinematics.wrist_partitioned import wrist_partition_missing
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.stages.trajectory.motion import Motion
 from er3a.planning import motion_faults
 from er3a.planning.names import PATH_VERDICTS, PathVerdict
-from er3a.planning.piecewise import Polynomials
 from er3a.planning.timing import JointLimits
-from er3a.planning.tool_proof import Undecided
+from er3a.planning.tool_curve import Undecided, open_stretches
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 
@@ -75,16 +71,13 @@ class Judgement(Faults):
 
 
 def judge(robot: Robot, motion: Motion, near: NearSingular, limits: JointLimits) -> Judgement:
-    """Check a motion: exactly if it is one of the joints, by bounds between the poses solved if it is one of the tool.
+    """Check a motion, whatever made it: its polynomials, exactly.
 
     Parameters
     ----------
     near : distances below which a pass counts as near-singular
     """
-    if motion.polynomials is not None:
-        found = _joint_faults(robot, motion.polynomials, motion.checks, near, limits)
-    else:
-        found = _tool_faults(robot, motion, near, limits)
+    found = faults_of(robot, motion, near, limits)
     times = np.unique(np.concatenate([motion.checks, [event.t for event in found.events]]))
     q, velocity, acceleration = motion.rates(times)
     beyond = motion_faults.unreachable(robot, motion.followed) if motion.followed else []
@@ -120,68 +113,19 @@ def _verdict(found: Faults, beyond: bool, jumps: bool, of_tool: bool) -> PathVer
     return next((verdict for verdict, there in faults.items() if there), "safe")
 
 
-def _joint_faults(robot: Robot, motion: Polynomials, checks: Reals, near: NearSingular, limits: JointLimits) -> Faults:
-    """Faults found in one run through the motion, whose parts are made while they are wanted."""
-    singular = motion_faults.SingularCheck(robot, near) if wrist_partition_missing(robot) is None else None
-    within, max_rates = motion_faults.LimitCheck(robot), motion_faults.MaxRates(robot.joints)
-    rates = [motion_faults.RateCheck(limit) for limit in limits.rates]
-    for part in motion.parts():
-        within.add(part)
-        max_rates.add(part)
-        for rate in rates:
-            rate.add(part)
-        if singular is not None:
-            singular.add(part)
-    if singular is not None:
-        events = singular.events()
-    else:  # sampled: a move of the joints takes no harm from singular poses
-        t = np.union1d(checks, motion.times)
-        events = motion_faults.singular_events(robot, t, motion.joints(t), motion.joints, near)
+def faults_of(robot: Robot, motion: Motion, near: NearSingular, limits: JointLimits) -> Faults:
+    """The faults of the motion's polynomials. Gaps are undecided, but where the path ends, or is singular, they are
+    what that leaves."""
+    curve, followed = motion.curve, motion.followed
+    events = motion_faults.singular_events(robot, curve, near)
+    ends = followed and (followed.jumps or np.isnan(followed.q).any() or any(event.crossing for event in events))
     return Faults(
         events=events,
-        limits=within.intervals(),
-        fast=[part for check in rates for part in check.intervals()],
-        undecided=[],
-        max_rates=max_rates.rates,
+        limits=motion_faults.limit_intervals(robot, curve),
+        fast=[part for limit in limits.rates for part in motion_faults.rate_intervals(curve, limit)],
+        undecided=[] if ends else open_stretches(curve),
+        max_rates=(curve.max_abs(curve.velocity), curve.max_abs(curve.acceleration)),
     )
-
-
-def _tool_faults(robot: Robot, motion: Motion, near: NearSingular, limits: JointLimits) -> Faults:
-    """Faults at the poses solved for the proof, between which it leaves no room for others."""
-    proof = motion.proof
-    assert proof is not None
-    t, kept = np.unique(np.concatenate([motion.t, proof.t]), return_index=True)
-    q = np.concatenate([motion.q, proof.q])[kept]
-    events = motion_faults.singular_events(robot, t, q, motion.joints, near)
-    more = np.unique(np.concatenate([motion.t, [event.t for event in events]]))
-    more = more[~np.isin(more, proof.middles)]
-    rates = np.concatenate([np.stack(motion.rates(more)[1:], axis=1), proof.rates])
-    at = np.concatenate([more, proof.middles])
-    order = np.argsort(at)
-    at, rates = at[order], rates[order]
-    fast: list[motion_faults.Interval[motion_faults.RateCause]] = []
-    for limit in limits.rates:
-        if limit.order == 3:
-            fast += motion_faults.jerk_exceeded(proof.times, proof.jerk, proof.steps, limit)
-            continue
-        fast += motion_faults.rates_exceeded(at, rates[:, limit.order - 1], limit, partial(_rate, motion, limit.order))
-    known = rates[np.isfinite(rates).all(axis=(1, 2))]
-    max_rates = np.abs(known).max(axis=0) if len(known) else None
-    followed = motion.followed
-    assert followed is not None
-    ends = followed.jumps or np.isnan(followed.q).any() or any(event.crossing for event in events)
-    return Faults(
-        events=events,
-        limits=motion_faults.out_of_limits(robot, t, q, motion.joints),
-        fast=fast,
-        undecided=[*proof.undecided, *(() if ends else proof.beside)],
-        max_rates=None if max_rates is None else (max_rates[0], max_rates[1]),
-    )
-
-
-def _rate(motion: Motion, order: Literal[1, 2], t: Reals) -> Reals:
-    """Speeds or accelerations (n, joints) at times (n,)."""
-    return motion.rates(t)[order]
 
 
 def _velocity_check(motion: Motion) -> float:

@@ -29,7 +29,7 @@ from er3a.planning.motion_faults import (
     TooFastIfAssumed,
 )
 from er3a.planning.names import PathVerdict, StrategyName
-from er3a.planning.tool_proof import Undecided
+from er3a.planning.tool_curve import Undecided
 from er3a.planning.way_around import NoWayAround
 
 PathKind = Literal["joint", "joint_sequence", "line", "arc", "sequence", "table", "plan"]

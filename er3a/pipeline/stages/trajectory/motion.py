@@ -30,11 +30,11 @@ from er3a.planning.commands import Built, Command, CommandSource, PlanCommand, b
 from er3a.planning.follow import Followed
 from er3a.planning.moves import JointMove
 from er3a.planning.names import PathVerdict
-from er3a.planning.piecewise import Polynomials
+from er3a.planning.piecewise import PiecewiseMotion
 from er3a.planning.sequences import TURN_LENGTH, JointSequence, SegmentPath
 from er3a.planning.stated_rates import StatedMotion
 from er3a.planning.timing import JointLimits, joint_limits, standing, straight
-from er3a.planning.tool_proof import ProofRequirements, ToolProof, follow_and_prove
+from er3a.planning.tool_curve import follow_as_curve
 from er3a.planning.way_around import NoWayAround, PlannedMove, PlanningTask, WayAround, way_between
 from er3a.program_check.check_program import CheckOptions, LocatedFinding, ProgramPart, check_program, parts_of
 from er3a.programs.languages import read_program
@@ -138,15 +138,13 @@ def rows_missed(robot: Robot, built: Built) -> str:
     return missed_points(robot, built) if built.unasked else ""
 
 
-def misfits(robot: Robot, built: Built) -> tuple[str, ...]:
-    """Rates of a trajectory that do not go together: joint, time, the one and the other."""
-    found = built.joints.misfits if isinstance(built.joints, StatedMotion) else ()
-    named = []
-    for each in found:
-        scale, unit = (1000.0, "mm") if robot.slides[each.joint] else (float(np.degrees(1.0)), "deg")
-        rates = f"{scale * each.stated:.3g} / {scale * each.other:.3g} {unit}/s{'²' * (each.order == 2)}"
-        named.append(f"J{each.joint + 1} {each.t:g} s {rates}")
-    return tuple(named)
+def speed_steps(robot: Robot, built: Built) -> tuple[str, ...]:
+    """Where the velocities that a trajectory states make one step: joint, time, before and after; else nothing."""
+    step = built.joints.step if isinstance(built.joints, StatedMotion) else None
+    if step is None:
+        return ()
+    scale, unit = (1000.0, "mm") if robot.slides[step.joint] else (float(np.degrees(1.0)), "deg")
+    return (f"J{step.joint + 1} {step.t:g} s {scale * step.before:.3g} / {scale * step.after:.3g} {unit}/s",)
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,8 +161,7 @@ class Motion:
     tool : T_base_tool (n, 4, 4) that the path asks for at times (n,)
     way : length of the tool point's way (n,) in m at times (n,)
     followed : how a path of the tool is followed; None for one in joint space
-    polynomials : a move of the joints, exactly; None for a path of the tool
-    proof : what is known of a path of the tool between the poses that are solved
+    curve : the motion as polynomials, from which a path of the tool may have gaps
     not_planned : why nothing was planned where a motion was to be; the motion is then the straight joint move
     """
 
@@ -179,16 +176,13 @@ class Motion:
     tool: Callable[[Reals], Reals]
     way: Callable[[Reals], Reals]
     followed: Followed | None
-    polynomials: Polynomials | None
-    proof: ToolProof | None
+    curve: PiecewiseMotion
     not_planned: NoWayAround | None = None
 
     @property
     def rate_bounds(self) -> RateBounds:
         """Bounds of speeds and accelerations between times, as :func:`er3a.collision.along.clearance_along` takes."""
-        known = self.polynomials or self.proof
-        assert known is not None
-        return known.rate_bounds
+        return self.curve.rate_bounds
 
 
 def motion_of(
@@ -197,13 +191,12 @@ def motion_of(
     checks_per_sample: int,
     source: CommandSource,
     ends: Mapping[str, Reals],
-    required: ProofRequirements,
     *,
     task: PlanningTask | None = None,
 ) -> Motion:
     """Plan a path, and follow it if it is one of the tool; ``ends`` as for :func:`er3a.planning.commands.build`.
 
-    ``required`` is what is to be settled between the poses that are solved; ``task`` is for motions to be planned.
+    ``task`` is for motions to be planned.
 
     Raises
     ------
@@ -227,7 +220,7 @@ def motion_of(
         return _joint_motion(robot, entry, replace(built, joints=move), move, samples, checks)
     try:
         even = np.linspace(0.0, built.duration, FOLLOWED_AT)
-        followed, proof = follow_and_prove(robot, path, even, required, built.q_start, built.start_slot)
+        followed, curve = follow_as_curve(robot, path, even, built.q_start, built.start_slot)
     except PoseError:
         branch = getattr(entry, "start_branch", None)
         problem = f"'{branch}' has no solution at the start pose"
@@ -248,8 +241,7 @@ def motion_of(
         tool=lambda t: path.poses(path.progress(t)[0]),
         way=lambda t: path.arc_length(path.progress(t)[0]),
         followed=followed,
-        polynomials=None,
-        proof=proof,
+        curve=curve,
     )
 
 
@@ -317,8 +309,7 @@ def _joint_motion(
         tool=lambda t: forward(robot, move.joints(t)[0]),
         way=way,
         followed=None,
-        polynomials=move.in_parts() if isinstance(move, JointSequence | StatedMotion) else move.polynomials(),
-        proof=None,
+        curve=move.polynomials(),
     )
 
 
@@ -326,11 +317,6 @@ def near_singular(settings: TrajectorySettings) -> NearSingular:
     """Where a pose counts as near-singular, for all stages and the teach panel."""
     wrist, elbow = np.radians([settings.near_wrist_deg, settings.near_elbow_deg])
     return NearSingular(float(wrist), float(elbow), settings.near_shoulder_mm / 1000)
-
-
-def proof_requirements(robot: Robot, settings: TrajectorySettings) -> ProofRequirements:
-    """What is to be settled of paths of the tool."""
-    return ProofRequirements(limits_of(robot, settings).rates, near_singular(settings))
 
 
 def planning_of(robot: Robot, settings: TrajectorySettings, bodies: Bodies | None, seed: int) -> PlanningTask:
@@ -416,18 +402,18 @@ def study_motions(study: Study, name: str, checks_per_sample: int) -> Iterator[L
     robot, settings = study.robot(name), study.section(TrajectorySettings)
     bodies = Bodies(robot, study.scene(name, "trajectory"))
     task = planning_of(robot, settings, bodies, study.seed)
-    return listed_motions(Path(study.entry(name).paths), task, proof_requirements(robot, settings), checks_per_sample)
+    return listed_motions(Path(study.entry(name).paths), task, near_singular(settings), checks_per_sample)
 
 
 def listed_motions(
-    file: Path, task: PlanningTask, required: ProofRequirements, checks_per_sample: int
+    file: Path, task: PlanningTask, near: NearSingular, checks_per_sample: int
 ) -> Iterator[ListedMotion]:
     """Plan the paths of a file.
 
     Parameters
     ----------
     task : the arm, what it must not meet and its limits, for motions that are to be planned
-    required : what is to be settled of paths of the tool
+    near : distances below which a program's check calls a pose near-singular
     checks_per_sample : points checked between two samples to begin with
 
     Raises
@@ -440,7 +426,7 @@ def listed_motions(
     for i, listed in enumerate(load_paths(file).paths):
         source = CommandSource(file, f"paths[{i}]")
         try:
-            entries = [*planned_entries(task, listed, source, required.near)]
+            entries = [*planned_entries(task, listed, source, near)]
         except InputError as error:
             ends[listed.name] = nowhere
             lost.add(listed.name)
@@ -449,7 +435,7 @@ def listed_motions(
         for entry in entries:
             motion, ended, refused = None, None, None
             try:
-                motion = motion_of(task.robot, entry, checks_per_sample, source, ends, required, task=task)
+                motion = motion_of(task.robot, entry, checks_per_sample, source, ends, task=task)
             except NotWristPartitionedError:
                 pass
             except PathEndsError as error:
@@ -463,7 +449,7 @@ def listed_motions(
             part = entry if isinstance(entry, PartOfProgram) else None
             parts: tuple[tuple[LeftOutSubject, Sequence[object]], ...] = (
                 ("program_rest", part.rest if part else ()),
-                ("given_rates", misfits(task.robot, motion.built) if motion else ()),
+                ("given_rates", speed_steps(task.robot, motion.built) if motion else ()),
                 ("missed_rows", tuple(filter(None, [motion and rows_missed(task.robot, motion.built)]))),
                 ("half_turns", motion.built.turns_open if motion and not part else ()),
             )

@@ -82,8 +82,7 @@ def written(
         timing = Times(motion.samples, np.arange(len(motion.samples)))
         command = JointTableCommand(motion.joints(motion.samples), timing)
     elif isinstance(motion.built.joints, JointMove | StatedMotion):  # rates at its points may bend its way
-        assert motion.polynomials is not None
-        times = np.union1d(motion.samples, motion.polynomials.times)
+        times = np.union1d(motion.samples, motion.curve.times)
         kept = needed_points(motion.joints(times), STRAIGHT)
         if len(kept) > 2:
             command = JointTableCommand(motion.joints(times[kept]), Times(times[kept], np.arange(len(kept))))

@@ -31,9 +31,6 @@ from er3a.pipeline.messages.trajectory import (
     fact_word,
     first_faults,
     near_at_start,
-    open_beside,
-    pass_about,
-    passing_text,
     path_text,
     repair_facts,
     repair_lead,
@@ -315,13 +312,12 @@ def near_assumed(path: model.PathSummary, summary: model.TrajectorySummary) -> C
 
 def events(path: model.PathSummary) -> list[PlayedEvent]:
     """Singular poses and faults of a path."""
-    passes = [_pass(e, open_beside(path, e)) for e in path.singularities]
-    faults = [(kind, part) for kind, stretches in kinds(path) for part in stretches if not pass_about(path, part)]
-    return passes + [
+    faults = [(kind, part) for kind, stretches in kinds(path) for part in stretches]
+    return [*map(_pass, path.singularities)] + [
         PlayedEvent(
             s.t0_s,
             s.t1_s,
-            tr("{fault}: {cause}", fault=kind, cause=_few_words(path, s)),
+            tr("{fault}: {cause}", fault=kind, cause=_few_words(s)),
             _weight(path, s),
             _touching(s.cause),
             _joints(s.cause),
@@ -330,11 +326,9 @@ def events(path: model.PathSummary) -> list[PlayedEvent]:
     ]
 
 
-def _pass(event: model.Singularity, span: tuple[float, float] | None) -> PlayedEvent:
-    """A singular pose or a pass by one, as long as it is not decided which."""
-    if span is None:
-        return PlayedEvent(event.t_s, event.until_s, _singular(event), "caution")
-    return PlayedEvent(*span, tr("near-singular: {type}", type=passing_text(event, span)), "caution")
+def _pass(event: model.Singularity) -> PlayedEvent:
+    """A singular pose, or a pass by one."""
+    return PlayedEvent(event.t_s, event.until_s, _singular(event), "caution")
 
 
 def _kept_passes(path: model.PathSummary, rows: model.PathChecks, repair: model.AvoidanceRows) -> list[PlayedEvent]:
@@ -346,17 +340,12 @@ def _kept_passes(path: model.PathSummary, rows: model.PathChecks, repair: model.
     def later(t: float) -> float:
         return float(np.interp(np.interp(t, rows.t_s, rows.s_m), length, repair.t_s))
 
-    found = []
-    for event in path.singularities:
-        span = open_beside(path, event)
-        moved = replace(event, t_s=later(event.t_s), until_s=later(event.until_s))
-        found.append(_pass(moved, span and (later(span[0]), later(span[1]))))
-    return found
+    return [_pass(replace(each, t_s=later(each.t_s), until_s=later(each.until_s))) for each in path.singularities]
 
 
-def _few_words(path: model.PathSummary, part: model.Stretch[Any]) -> str:
+def _few_words(part: model.Stretch[Any]) -> str:
     """Why a stretch is an event."""
-    return rate_needed(part.cause) if isinstance(part.cause, RateCause) else cause_text(path, part)
+    return rate_needed(part.cause) if isinstance(part.cause, RateCause) else cause_text(part)
 
 
 def _near_events(

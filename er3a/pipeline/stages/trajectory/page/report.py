@@ -23,8 +23,6 @@ from er3a.pipeline.messages.trajectory import (
     event_word,
     kind_word,
     limits_assumed,
-    open_beside,
-    passing_text,
     path_text,
     reasons,
     strategy_word,
@@ -221,7 +219,7 @@ def _faults(path: model.PathSummary) -> list[list[str]]:
             moment(path.name, part.t1_s, fixed(part.t1_s, 3)),
             fixed(part.s0_m * 1000, 1),
             fixed(part.s1_m * 1000, 1),
-            cause_text(path, part),
+            cause_text(part),
         ]
         for word, part in sorted(
             ((word, part) for word, stretches in kinds(path) for part in adjoined(stretches)),
@@ -313,8 +311,7 @@ def _speed(path: model.PathSummary, limits: model.LimitsUsed) -> str:
 
 def _event_row(path: model.PathSummary, event: model.Singularity) -> list[str]:
     until = f" – {fixed(event.until_s, 3)}" if event.until_s > event.t_s else ""
-    when, span = moment(path.name, event.t_s, fixed(event.t_s, 3) + until), open_beside(path, event)
+    when = moment(path.name, event.t_s, fixed(event.t_s, 3) + until)
     if event.crossing:
         return [event_word(event), when, tr("meets it"), "0"]
-    how = tr("passes by") if span is None else passing_text(event, span)
-    return [event_word(event), when, how, event_distance(event)]
+    return [event_word(event), when, tr("passes by"), event_distance(event)]
