@@ -32,7 +32,7 @@ SMALLER = {
     "workspace": {"samples": 40000, "blocks": 4, "cells_across": 16, "proof_cells": 500},
     "capability": {"directions": 40, "rolls": 2},
     "collision": {"samples": 2000, "cells_across": 8},
-    "inverse": {"round_trips": 50, "map_cells": 12},
+    "inverse": {"round_trips": 50},
 }
 
 

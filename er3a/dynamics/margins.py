@@ -339,47 +339,6 @@ def last_axis(robot: Robot) -> tuple[Reals, Reals]:
     return back[:3, 3], back[:3, 2]
 
 
-@dataclass(frozen=True, eq=False)
-class LoadDiagram:
-    """How far from the last axis a load's centre may be, as manuals draw it: one curve for each mass.
-
-    Attributes
-    ----------
-    mass : (c,), kg
-    along : (s,), m, distance of the centre from the flange along the last axis
-    across : (c, s), m, largest distance from it; NaN where none is allowed. The load counts as a point
-    """
-
-    mass: Reals
-    along: Reals
-    across: Reals
-
-
-def load_diagram(
-    robot: Robot, wrist: WristLoad, mass: Reals, along: Reals, gravity: float = GRAVITY
-) -> LoadDiagram | None:
-    """The load diagram; None for wrists whose axes don't meet in a point, or that nothing is known of.
-
-    A joint before the last one counts with the distance from the wrist's centre, which a load gets from its
-    axis if the joints beyond turn far enough.
-    """
-    wrist_offset = wrist_to_flange(robot)
-    if wrist_offset is None or not (wrist.moment or wrist.inertia):
-        return None
-    last, before = [np.full((len(mass), 1), np.inf) for _ in range(2)]
-    with np.errstate(divide="ignore"):  # a load without weight bends no wrist, however long its lever
-        levers_of = [(joint, allowed / (mass[:, None] * gravity)) for joint, allowed in wrist.moment]
-    levers_of += [(joint, np.sqrt(allowed / mass[:, None])) for joint, allowed in wrist.inertia]
-    for joint, lever in levers_of:
-        last, before = (np.minimum(last, lever), before) if joint == robot.rows else (last, np.minimum(before, lever))
-    with np.errstate(invalid="ignore"):
-        across = np.minimum(np.sqrt(before**2 - (wrist_offset + along) ** 2), last)
-    across = np.where(np.isfinite(across), across, np.nan)
-    if np.isfinite(wrist.payload):
-        across[mass > wrist.payload * (1 + 1e-9)] = np.nan
-    return LoadDiagram(mass, along, across)
-
-
 def wrist_to_flange(robot: Robot) -> float | None:
     """Distance (m) along the last axis from where the last three axes meet to the flange; None if they don't meet."""
     if robot.rows < 3 or robot.sliding[-3:].any():

@@ -173,16 +173,11 @@ def _closest_passes(grid: Branches) -> Reals:
     return np.unique(np.concatenate(found))
 
 
-def parabolas(x: Reals, y: Reals, i: Integers) -> tuple[Reals, Reals]:
-    """Slope at the point i, and curvature, of the parabolas through the points i - 1, i, i + 1."""
-    left, right = x[i] - x[i - 1], x[i + 1] - x[i]
-    rise, fall = (y[i + 1] - y[i]) / right, (y[i] - y[i - 1]) / left
-    return (fall * right + rise * left) / (left + right), (rise - fall) / (left + right)
-
-
 def vertex(x: Reals, y: Reals, i: Integers) -> Reals:
     """Lowest points of the parabolas through the points i - 1, i, i + 1, each kept between its outer points."""
-    slope, curvature = parabolas(x, y, i)
+    left, right = x[i] - x[i - 1], x[i + 1] - x[i]
+    rise, fall = (y[i + 1] - y[i]) / right, (y[i] - y[i - 1]) / left
+    slope, curvature = (fall * right + rise * left) / (left + right), (rise - fall) / (left + right)
     curved = curvature > 0
     lowest = x[i[curved]] - slope[curved] / (2 * curvature[curved])
     return np.clip(lowest, x[i[curved] - 1], x[i[curved] + 1])

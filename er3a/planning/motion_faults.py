@@ -323,9 +323,11 @@ def singular_events(robot: Robot, motion: PiecewiseMotion, near: singularity.Nea
     times, values = _distances(robot, motion)
     found: list[SingularEvent] = []
     for kind, series in zip(singularity.TYPES, values):
-        angular = kind != "shoulder"
-        for event in _events(Pieces(times, series), kind, np.sin(near.of(kind)) if angular else near.of(kind)):
-            found.append(replace(event, distance=float(np.arcsin(min(event.distance, 1.0)))) if angular else event)
+        if kind == "shoulder":
+            found += _events(Pieces(times, series), kind, near.shoulder_m)
+            continue
+        for event in _events(Pieces(times, series), kind, np.sin(near.of(kind))):
+            found.append(replace(event, distance=float(np.arcsin(min(event.distance, 1.0)))))
     return sorted(found, key=lambda event: (event.t, singularity.TYPES.index(event.type)))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Literal, get_args
 
 PathVerdict = Literal[
@@ -18,8 +19,16 @@ PathVerdict = Literal[
 ]
 PATH_VERDICTS: tuple[PathVerdict, ...] = get_args(PathVerdict)
 """Most serious first."""
+FAULTS = PATH_VERDICTS[: PATH_VERDICTS.index("singular")]
+"""Of paths that fail whatever is assumed."""
 NOT_TO_BE_RUN = PATH_VERDICTS[: PATH_VERDICTS.index("undecided")]
 """Of paths that no arm should run as they are; others pass near singular poses, or leave something open."""
+
+
+def gravest(found: Iterable[PathVerdict]) -> PathVerdict:
+    """The most serious of what a path came to; safe if that is nothing."""
+    return min(found, key=PATH_VERDICTS.index, default="safe")
+
 
 StrategyName = Literal["slow", "branch", "via_shift", "via_tilt", "detour", "stop", "planned"]
 

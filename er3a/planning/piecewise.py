@@ -28,6 +28,7 @@ NEARLY_REAL = 1e-3  # imaginary part of a double root that rounding has split; m
 TRIMMED = 1e-15  # of the largest coefficient
 SAME_TIME = 1e-13  # share of the duration
 LOCATED = 1e-14  # share of the duration
+GAP = 5e-6  # share of the duration
 PIECES_AT_ONCE = 4096  # whose rates are computed together
 INSET = 1e-6  # share of half a piece: so near to its ends it is not compared, because accelerations may step there
 Stretch = tuple[float, float, float, float]
@@ -75,14 +76,13 @@ class Pieces:
             scipy.optimize.brentq(value, start, end, xtol=max(LOCATED * (b - a), 1e-300), rtol=4 * np.finfo(float).eps)
         )
 
-    def above(self, level: float, found: list[Stretch] | None = None) -> list[Stretch]:
+    def above(self, level: float) -> list[Stretch]:
         """Stretches on which the function is greater than a level: start, end, its largest value there, and when.
 
-        Parameters
-        ----------
-        found : those of the pieces before, which are continued
+        Those that only a gap of the shortest pieces parts are one.
         """
-        found = [] if found is None else found
+        found: list[Stretch] = []
+        gap = GAP * (self.times[-1] - self.times[0])
         for i in np.flatnonzero(self.range[1] > level).tolist():
             t, values = self.nodes(i)
             for k in range(len(t) - 1):
@@ -92,7 +92,7 @@ class Pieces:
                 end = float(t[k + 1]) if values[k + 1] > level else self.root(i, t[k], t[k + 1], level)
                 top = k + int(values[k + 1] > values[k])
                 most, at = float(values[top]), float(t[top])
-                if found and found[-1][1] >= start:
+                if found and found[-1][1] >= start - gap:
                     start, _, *before = found.pop()
                     if before[0] >= most:
                         most, at = before

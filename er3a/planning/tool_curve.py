@@ -28,11 +28,11 @@ from er3a.planning.piecewise import PiecewiseMotion, chebyshev_times, evaluated_
 from er3a.planning.profiles import times_at
 from er3a.robots.robot import Robot
 
-DEGREE = 12
+DEGREE = 16
 FIRST_PIECES = 32
 SHORTEST = 1e-6, 1e-9  # share of the duration and of the path, of pieces that miss rates, and that miss angles or reach
 SAME_TIME = 1e-9  # share of the duration
-CLOSE = np.array([1e-8, 1e-8, 1e-7])[:, None]  # rad, rad/s, rad/s^2; relative where a rate is greater than 1
+CLOSE = np.array([1e-9, 1e-8, 1e-7])[:, None]  # rad, rad/s, rad/s^2; relative where a rate is greater than 1
 MAX_PIECES = 20_000  # that are tried
 MAX_ROUNDS = 3
 
@@ -81,15 +81,15 @@ def follow_as_curve(
 
 def open_stretches(curve: PiecewiseMotion) -> list[Interval[Undecided]]:
     """The gaps of a curve: where the closed form could not be met, or does not reach."""
-    gaps = runs(np.isnan(curve.velocity[:, 0, 0]))
-    return [Interval(float(curve.times[a]), float(curve.times[b]), Undecided()) for a, b in gaps]
+    times = curve.times.tolist()
+    return [Interval(times[a], times[b], Undecided()) for a, b in runs(np.isnan(curve.velocity[:, 0, 0]))]
 
 
 def curve_of(followed: Followed) -> tuple[PiecewiseMotion, Reals]:
     """The motion along a followed path, and times out of reach between two of its own that are not."""
     law, duration = followed.line.law, followed.line.duration
-    breaks = np.linspace(0.0, duration, FIRST_PIECES + 1), law.breaks, times_at(law, followed.line.edges)
-    edges = np.unique(np.concatenate(breaks))
+    even = np.linspace(0.0, duration, FIRST_PIECES + 1)
+    edges = np.unique(np.concatenate([even, law.breaks, times_at(law, followed.line.edges)]))
     edges = edges[np.concatenate([[True], np.diff(edges) > SAME_TIME * duration])]
     edges[-1] = duration
     start, end, count = edges[:-1], edges[1:], 0
@@ -102,12 +102,13 @@ def curve_of(followed: Followed) -> tuple[PiecewiseMotion, Reals]:
         done.append(_Tried(*(part[~again] for part in vars(tried).values())))
         middle = (start + end)[again] / 2
         start, end = np.concatenate([start[again], middle]), np.concatenate([middle, end[again]])
-    order = np.argsort(np.concatenate([part.start for part in done]))
-    series, met = (np.concatenate([getattr(part, name) for part in done])[order] for name in ("series", "met"))
+    starts, series, met = (
+        np.concatenate([getattr(part, name) for part in done]) for name in ("start", "series", "met")
+    )
+    order = np.argsort(starts)
     series[~met, :, 1:] = np.nan
-    times = np.append(np.concatenate([part.start for part in done])[order], duration)
-    angle, velocity, acceleration = np.moveaxis(series, 2, 0)
-    return PiecewiseMotion(times, angle, velocity, acceleration), np.concatenate([np.empty(0), *lost])
+    motion = PiecewiseMotion(np.append(starts[order], duration), *np.moveaxis(series[order], 2, 0))
+    return motion, np.concatenate([np.empty(0), *lost])
 
 
 def _tried(followed: Followed, start: Reals, end: Reals, lost: list[Reals]) -> _Tried:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -15,15 +14,13 @@ from er3a.dynamics.arm_model import arm_model
 from er3a.dynamics.margins import (
     DriveLimits,
     levers,
-    load_diagram,
     max_payload,
     max_speed_scale,
     worst_levers,
     wrist_to_flange,
     wrist_use,
 )
-from er3a.dynamics.torque_timing import fastest_under_torques
-from er3a.dynamics.torques import demand, known, torque_parts, worst_holding
+from er3a.dynamics.torques import demand, torque_parts, worst_holding
 from er3a.robots.joint_limits import within
 from er3a.robots.masses import Drives, LinkMass, Load, MassBody, Masses, WristLoad
 from er3a.robots.robot import CombinedLimit, Robot
@@ -303,93 +300,6 @@ def test_levers_are_distances_of_the_load_from_the_axes(arm):
     np.testing.assert_allclose(seen, np.linalg.norm(J[:, :3], axis=1), atol=1e-12)
 
 
-def test_the_load_diagram_is_where_the_comparison_reaches_its_limit(arm):
-    wrist = WristLoad(3.0, ((4, 5.0), (5, 5.0), (6, 2.0)), ((5, 0.15), (6, 0.02)))
-    mass, along = np.array([1.0, 2.0, 3.0, 4.0]), np.array([0.0, 0.05, 0.1])
-    diagram = load_diagram(arm, wrist, mass, along)
-    assert np.isnan(diagram.across[3]).all()  # more than the payload
-    for i in range(3):
-        for j, z in enumerate(along):
-            radius = diagram.across[i, j]
-            if np.isnan(radius):
-                use = wrist_use(arm, wrist, Load(mass[i], (0.0, 0.0, z)))
-                assert max(each.ratio for each in use if each.quantity != "payload") > 1
-                continue
-            use = wrist_use(arm, wrist, Load(mass[i], (radius, 0.0, z)))
-            assert max(each.ratio for each in use if each.quantity != "payload") == pytest.approx(1.0, abs=1e-5)
-    assert (np.diff(diagram.across[0]) <= 0).all()
-    assert load_diagram(make_arm(a=[0.1, 0.4, 0.05, 0, 0.1, 0]), wrist, mass, along) is None
-    assert load_diagram(arm, WristLoad(3.0), mass, along) is None
-
-
-@pytest.mark.parametrize("viscous", [0.0, 0.3])
-def test_times_under_torques_keep_the_limits_and_use_them(arm, viscous):
-    drives = replace(arm.masses.drives, viscous=np.full(6, viscous))
-    model = arm_model(arm.replace(masses=replace(arm.masses, drives=drives)))
-    found = fastest_under_torques(model, path(), np.full(6, 4.0), PEAK)
-    timed = found.timed
-    by_torque = np.abs(found.torques) / PEAK
-    by_speed = np.abs(timed.velocity) / 4.0
-    assert by_torque.max() <= 1 + 1e-3
-    assert by_speed.max() <= 1 + 1e-6
-    np.testing.assert_allclose(timed.q[[0, -1]], path()[[0, -1]], atol=1e-12)
-    if not viscous:
-        used = np.maximum(by_torque.max(axis=1), by_speed.max(axis=1))
-        assert np.mean(used > 0.99) > 0.9
-    # Velocities are those of the joints over time.
-    speed = np.diff(timed.q, axis=0) / np.diff(timed.t)[:, None]
-    between = (timed.velocity[1:] + timed.velocity[:-1]) / 2
-    assert np.abs(speed - between)[5:-5].max() < 0.02
-
-
-def toppras_own(arm: Robot, nodes: np.ndarray) -> float:
-    """The shortest time without viscous friction, by toppra's spline, times and torque constraint."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        from toppra import SplineInterpolator
-        from toppra.algorithm import TOPPRA
-        from toppra.constraint import JointTorqueConstraint, JointVelocityConstraint
-    drives = replace(arm.masses.drives, viscous=np.zeros(6))
-    arm = arm.replace(masses=replace(arm.masses, drives=drives))
-    bare = arm.replace(masses=replace(arm.masses, drives=replace(drives, coulomb=np.zeros(6))))
-    torque = JointTorqueConstraint(
-        lambda *row: er3a.torques(bare, *row), np.stack([-PEAK, PEAK], axis=1), known(drives.coulomb)
-    )
-    torque.set_discretization_type(1)
-    speed = JointVelocityConstraint(np.array([[-4.0, 4.0]] * 6))
-    way = np.linspace(0, 1, len(nodes))
-    solver = TOPPRA([torque, speed], SplineInterpolator(way, nodes), gridpoints=way, solver_wrapper="seidel")
-    return float(solver.compute_trajectory(0, 0).duration)
-
-
-def test_times_under_torques_are_those_of_toppras_own_constraint(arm):
-    own = arm.replace(masses=replace(arm.masses, drives=replace(arm.masses.drives, viscous=np.zeros(6))))
-    found = fastest_under_torques(arm_model(own), path(), np.full(6, 4.0), PEAK)
-    assert found.timed.duration == pytest.approx(toppras_own(arm, path()), rel=2e-3)
-    assert found.lower_bound == found.timed.duration
-
-
-@pytest.mark.parametrize("viscous", [0.0, 1.0])
-def test_the_shortest_time_falls_to_the_optimum_as_nodes_are_added(arm, viscous):
-    """A path on which the joint that is hardest pressed changes again and again, against toppra's own spline."""
-    through = np.random.default_rng(2).uniform(-1, 1, (6, 6))
-    curve = scipy.interpolate.CubicSpline(np.linspace(0, 1, 6), through)
-    drives = replace(arm.masses.drives, viscous=np.full(6, viscous))
-    own = arm.replace(masses=replace(arm.masses, drives=drives))
-    runs = [
-        fastest_under_torques(arm_model(own), curve(np.linspace(0, 1, count)), np.full(6, 4.0), PEAK)
-        for count in (101, 201, 401, 801)
-    ]
-    times = np.array([each.timed.duration for each in runs])
-    least = np.array([each.lower_bound for each in runs])
-    assert (np.diff(times) < 0).all()
-    assert (-np.diff(times)[1:] < -np.diff(times)[:-1] / 2).all()
-    assert (least <= times).all()
-    assert (times <= least * 1.002).all()
-    if not viscous:
-        assert times[-1] == pytest.approx(toppras_own(arm, curve(np.linspace(0, 1, 801))), rel=5e-4)
-
-
 def test_demands_of_a_drive_in_closed_form():
     t = np.linspace(0, 2 * np.pi, 20_001)
     found = demand(t, np.cos(t)[:, None], 3 * np.cos(t)[:, None] + 4 * np.sin(t)[:, None])
@@ -398,36 +308,6 @@ def test_demands_of_a_drive_in_closed_form():
     assert found.work[0] - found.recovered[0] == pytest.approx(3 * np.pi, rel=1e-6)
     assert found.power[0] == pytest.approx(4.0, rel=1e-6)  # 3 cos^2 + 4 sin cos is at most (3 + 5) / 2
     assert found.braking[0] == pytest.approx(1.0, rel=1e-6)
-
-
-@pytest.mark.parametrize("viscous", [0.0, 0.3, 3.0])
-def test_times_under_torques_are_those_of_full_thrust_and_full_braking(viscous):
-    """One joint with a vertical axis: the fastest motion accelerates fully, then brakes fully; closed forms."""
-    peak, dry, inertia, angle = 5.0, 0.5, 0.3, 2.0
-    drives = replace(Drives.unknown(1), armature=np.array([0.1]), coulomb=np.array([dry]), viscous=np.array([viscous]))
-    body = MassBody(2.0, (0.3, 0, 0), (0.01, 0.01, 0.02, 0, 0, 0))
-    one = Robot(
-        name="one", title="one", convention="standard", a=[0.5], alpha=[0.0], d=[0.0], direction=[1.0], offset=[0.0],
-        lower=[-3.0], upper=[3.0], masses=Masses((LinkMass(1, body),), drives),
-    )  # fmt: skip
-    found = fastest_under_torques(
-        arm_model(one), np.linspace(0, angle, 401)[:, None], np.array([1e2]), np.array([peak])
-    )
-    up, down = (peak - dry) / inertia, (peak + dry) / inertia
-
-    def halves(top: float) -> tuple[float, float]:
-        """Way and time to a top speed and back to rest, of ``v' = up - k v`` and ``v' = -down - k v``."""
-        k = viscous / inertia
-        if not k:
-            return top**2 / 2 * (1 / up + 1 / down), top * (1 / up + 1 / down)
-        first, last = -np.log1p(-k * top / up) / k, np.log1p(k * top / down) / k
-        return (up * first - top) / k + (top - down * last) / k, first + last
-
-    highest = up * inertia / viscous * (1 - 1e-12) if viscous else 100.0
-    shortest = halves(scipy.optimize.brentq(lambda top: halves(top)[0] - angle, 1e-6, highest))[1]
-    assert np.abs(found.torques).max() <= peak * (1 + 1e-3)
-    assert shortest * (1 - 1e-6) <= found.timed.duration <= shortest * 1.01
-    assert found.lower_bound <= found.timed.duration <= found.lower_bound * 1.005
 
 
 @pytest.mark.long

@@ -15,13 +15,11 @@ from er3a.collision.along import clearance
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward
-from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import read_results, read_verdict
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.collision.compute import compute
 from er3a.pipeline.stages.collision.model import RESULTS
-from er3a.pipeline.stages.collision.page.report import target_rows
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study, load_study
 from er3a.pipeline.teach.panel import write_teach_page
@@ -147,21 +145,6 @@ def test_a_target_that_collides_in_every_solution_is_no_pass_unless_its_file_exp
     assert len(verdict.finding.demonstrations) == int(bool(expect))
 
 
-def test_of_branches_that_are_alike_the_chosen_one_is_named(results):
-    """Branches are counted, not their turns, as the inverse page counts them."""
-    chosen = {each.name: each.q_deg for each in results.summary.closest if each.kind == "target"}
-    rows = {row[0]: row for row in target_rows(results.targets, chosen)}
-    for name, q_deg in chosen.items():
-        own = results.targets.take(results.targets.target == name)
-        taken = int(np.abs(own.q_deg - q_deg).max(axis=1).argmin())
-        best = own.clearance_mm.max()
-        alike = len(set(own.branch[own.clearance_mm >= best - 0.05].tolist()))
-        assert rows[name][1] == str(len(set(own.branch.tolist())))
-        assert (f"({alike} branches are alike)" in rows[name][4]) == (alike > 1)
-        if own.clearance_mm[taken] >= best - 0.05:
-            assert rows[name][4].startswith(branch_word(own.label[taken], int(own.branch[taken])))
-
-
 def scene_file(folder: Path, **shapes) -> Path:
     path = folder / "scene.json.yaml"
     path.write_text(json.dumps({"kind": "scene", "title": "made", **shapes}), encoding="utf-8")
@@ -241,7 +224,7 @@ def with_a_base_too_large(folder: Path) -> Study:
     study = load_study("config/small.yaml").model_dump()
     study["robots"] = {"arm": study["robots"][name] | {part: str(folder / f"{part}.yaml") for part in contents}}
     study["collision"] |= {"scene": None, "samples": 1000, "cells_across": 8, "rounds": 0}
-    study["inverse"] |= {"scene": None, "round_trips": 10, "map_cells": 8}
+    study["inverse"] |= {"scene": None, "round_trips": 10}
     study["workspace"] |= {"samples": 20_000, "blocks": 1, "proof_cells": 2000}
     study["capability"] |= {"directions": 20}
     return Study.model_validate(study)

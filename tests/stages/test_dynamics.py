@@ -156,7 +156,6 @@ def test_without_limits_torques_are_told_and_nothing_is_judged(bare):
     assert {each.what for each in summary.unknown} >= {"masses", "peak", "rated", "friction", "wrist_moment", "load"}
     assert summary.uses == ()
     assert all(path.payload is path.speed_scale is None for path in summary.paths)
-    assert not any(path.torque_times for path in summary.paths)
     assert summary.power_imbalance < 1e-6
     assert [path.name for path in summary.paths if not path.complete] == ["line_out"]
 
@@ -185,9 +184,6 @@ def test_within_the_limits_it_fits(full):
     path = next(path for path in summary.paths if path.name == "joint_move")
     assert path.payload.value > 0.5
     assert path.speed_scale.value > 1
-    times = [each.time_s for each in path.torque_times]
-    assert 0 < times[-1] < times[0] < path.duration_s
-    assert all(0.998 * each.time_s < each.least_s <= each.time_s for each in path.torque_times)
     motor = summary.motors[1]
     peaks = {path.name: load.peak for path in summary.paths for load in path.joints if load.joint == 2}
     assert motor.peak == max(peaks["joint_move"], peaks["line_clean"]) < peaks["line_shoulder"]
@@ -330,11 +326,6 @@ def test_the_wrist_is_compared_at_rest_and_along_the_paths(full):
     lever = np.hypot(0.02, 0.09 + 0.0785)
     assert at_rest == pytest.approx({4: 1.5 * 9.81 * lever, 5: 1.5 * 9.81 * lever, 6: 1.5 * 9.81 * 0.02}, rel=1e-6)
     assert {use.path for use in uses} == {None, "joint_move", "line_clean"}
-    diagram = full[1].results.diagram
-    assert set(np.unique(diagram.mass_kg)) == {1.0, 1.5, 2.0, 3.0}
-    own = diagram.take((diagram.mass_kg == 3.0) & np.isfinite(diagram.across_mm))
-    lever_mm = min(1000 * 6.0 / (3 * 9.81), 1000 * np.sqrt(0.2 / 3))
-    np.testing.assert_allclose(np.hypot(own.across_mm, own.along_mm + 78.5)[-1], lever_mm, rtol=1e-9)
 
 
 @pytest.mark.long
@@ -586,10 +577,10 @@ def test_moments_about_a_joint_that_slides_are_refused():
         check_masses(None, None, wrist_group, [False, False, True, False])
 
 
-def test_the_load_that_a_program_names_counts_for_its_stretches(tmp_path):
+def test_the_load_that_a_program_names_is_no_part_of_the_torques(tmp_path):
     move = "movej([{}, -0.17, -0.17, 0, -1.22, 0])\n"
-    text = f"def p():\n{move.format(0.2)}set_payload(2, [0.02, 0, 0.09])\n{move.format(0)}set_payload(get_flag(1))\n"
-    (tmp_path / "moves.script").write_text(f"{text}{move.format(0.2)}end\n")
+    text = f"def p():\n{move.format(0.2)}set_payload(2, [0.02, 0, 0.09])\n{move.format(0)}end\n"
+    (tmp_path / "moves.script").write_text(text)
     entry = {"kind": "program", "name": "moves", "title": "Moves", "program": str(tmp_path / "moves.script")}
     entry |= {"start_deg": [0, -10, -10, 0, -70, 0], "samples": 11}
     study = a_study(tmp_path, limited(1.0), entry={"payload": CLAIM | {"body": LOAD}})
@@ -597,20 +588,10 @@ def test_the_load_that_a_program_names_counts_for_its_stretches(tmp_path):
     (tmp_path / "paths.yaml").write_text(yaml.safe_dump(paths | {"paths": [entry]}))
     found = computed(tmp_path, study)
     summary, torques = found.results.summary, found.results.torques
-    assert [each.program_load_kg for each in summary.paths] == [None, 2.0, None]
-    assert [each.program_load_open for each in summary.paths] == ["", "", "set_payload(get_flag(1))"]
-    arm, own = study.robot("er3a_c60"), Load(1.5, (0.02, 0.0, 0.09), tuple(LOAD["inertia_kg_m2"]))
-    for name, load in (("moves_1", own), ("moves_2", Load(2.0, (0.02, 0.0, 0.09))), ("moves_3", own)):
-        rows = torques.take(torques.path == name)
-        np.testing.assert_allclose(rows.gravity, er3a.gravity(arm, np.radians(rows.q), load=load), atol=1e-9)
-    payloads = {use.path: use.asked for use in summary.uses if use.quantity == "payload"}
-    assert payloads == {None: 1.5, "moves_2": 2.0}
-    for held in summary.holding:  # with the heavier of the two
-        torque = er3a.gravity(arm, np.radians([held.q]), load=Load(2.0, (0.02, 0.0, 0.09)))[0, held.joint - 1]
-        assert held.torque == pytest.approx(torque, abs=1e-6)
+    own = Load(1.5, (0.02, 0.0, 0.09), tuple(LOAD["inertia_kg_m2"]))
+    rows = torques.take(torques.path == "moves_2")
+    gravity = er3a.gravity(study.robot("er3a_c60"), np.radians(rows.q), load=own)
+    np.testing.assert_allclose(rows.gravity, gravity, atol=1e-9)
     left = {each.subject: each.names for each in summary.not_examined}
-    assert left["program_loads"] == ("moves_3: set_payload(get_flag(1))",)
+    assert left["program_loads"] == ("moves_2",)
     assert "program_loads" in [each.subject for each in summary.verdict.missed]
-    assert left["load"] == ("load_inertia",)  # of 2 kg that the program gives no inertia
-    report(study, found, tmp_path / "page.html")
-    assert "With 2 kg on the flange, which the program names" in (tmp_path / "page.html").read_text(encoding="utf-8")

@@ -232,7 +232,7 @@ def test_what_is_expected_to_fail_alone_is_no_pass(study, tmp_path, stage):
         shutil.copy(file, tmp_path)
     (tmp_path / "input.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
     quick = {
-        "inverse": {"round_trips": 3, "map_cells": 4},
+        "inverse": {"round_trips": 3},
         "trajectory": {"avoidance": "slow", "programs": []},
         "vision": {"map_cells": 4},
     }
@@ -610,7 +610,7 @@ def test_a_target_near_assumed_shapes_is_a_caution(study, tmp_path):
     scene = yaml.safe_load(Path("data/scenes/table_and_post.yaml").read_text(encoding="utf-8"))
     scene |= {"boxes": [{"name": "table", "size_mm": [500, 800, 40], "xyz_mm": [500, 0, 410]}]}
     (tmp_path / "scene.yaml").write_text(yaml.safe_dump(scene))
-    entry, few = {"targets": str(tmp_path / "targets.yaml")}, {"round_trips": 3, "map_cells": 8}
+    entry, few = {"targets": str(tmp_path / "targets.yaml")}, {"round_trips": 3}
     for scene_file, near in ((str(tmp_path / "scene.yaml"), ("a",)), ("data/scenes/table_and_post.yaml", ())):
         verdict = inverse(changed(study, entry, inverse=few | {"scene": scene_file}), ROBOT).summary.verdict
         assert verdict.shapes.near == near
@@ -621,7 +621,7 @@ def test_targets_name_what_rests_on_samples_rules_and_obstacles(study, tmp_path)
     """The one target lies inside a table that no scene holds."""
     targets = {"kind": "targets", "targets": [{"name": "a", "q_deg": [0, -10, -10, 0, -70, 0]}]}
     (tmp_path / "targets.yaml").write_text(yaml.safe_dump(targets))
-    few = {"round_trips": 3, "map_cells": 8, "mix": {"time": 1}, "scene": None}
+    few = {"round_trips": 3, "mix": {"time": 1}, "scene": None}
     results = inverse(changed(study, {"targets": str(tmp_path / "targets.yaml")}, inverse=few), ROBOT)
     found = subjects(results)
     assert found["round_trips"].amount == 3
@@ -733,7 +733,7 @@ def test_a_target_in_a_solid_is_no_pass(study, tmp_path):
     (tmp_path / "targets.yaml").write_text("kind: targets\ntargets:\n- {name: a, q_deg: [0, -10, -10, 0, -70, 0]}\n")
     T = forward(load_robot(tmp_path / f"{ROBOT}.yaml"), np.radians([0, -10, -10, 0, -70, 0]))
     entry = {"targets": str(tmp_path / "targets.yaml"), "file": str(tmp_path / f"{ROBOT}.yaml")}
-    few = {"round_trips": 3, "map_cells": 8, "scene": str(tmp_path / "scene.yaml")}
+    few = {"round_trips": 3, "scene": str(tmp_path / "scene.yaml")}
     for moved, named in ((0, ("a: part",)), (60, ())):
         ball = {"name": "part", "radius_mm": 8, "xyz_mm": (1000 * T[:3, 3] + [moved, 0, 0]).tolist()}
         held = {"boxes": [{"name": "gripper", "size_mm": [30, 30, 185], "xyz_mm": [0, 0, -107.5]}]}
@@ -1194,7 +1194,6 @@ LEFT_OUT_BY_SETTINGS = {
 }
 LEAVE_NOTHING_OUT = {
     "workspace": ("sampling", "blocks", "cells_across", "hull_directions", "cloud_points"),
-    "inverse": ("map_cells",),
     "trajectory": (
         *("near_wrist_deg", "near_elbow_deg", "near_shoulder_mm"),
         *("assumed_margin_mm", "programs", "write_unsafe"),

@@ -50,8 +50,6 @@ SHAPES = {
     "back_elbow_down_no_flip": N_("back, elbow down"),
     "back_elbow_down_flip": N_("back, elbow down"),
 }
-ORIENTATIONS = {"tool_down": N_("tool straight down"), "tool_level": N_("tool level, outward")}
-ORIENTATION_TITLES = {"tool_down": N_("Tool straight down"), "tool_level": N_("Tool level, outward")}
 
 
 TEXTS = texts(

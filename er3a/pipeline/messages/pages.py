@@ -114,7 +114,6 @@ GLOSSARY = {
     N_("RMS torque"): N_("root-mean-square over a motion, which heats the motor; compared with the rated torque"),
     N_("armature"): N_("the rotor's inertia at the joint: times the gear ratio squared"),
     N_("utilisation"): N_("a value divided by its limit, in percent"),
-    N_("load diagram"): N_("how far from flange and last axis a load's centre may be, a curve for each mass"),
     N_("quasi-random"): N_("spread more evenly than chance, as Sobol' points are"),
 }
 

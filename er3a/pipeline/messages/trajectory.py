@@ -29,7 +29,6 @@ KEY_FIGURES = {
     "max_joint_speed": N_("Joint speed nearest its limit, on paths meant to be safe"),
     "assumed_speed_ratio": N_("Ratio to that joint's assumed limit"),
     "speed_ratio": N_("Ratio to that joint's limit"),
-    "velocity_check": N_("Velocity check, greatest error"),
     "characteristic_length": N_("Characteristic length of the Jacobian"),
 }
 KINDS: dict[model.PathKind, str] = {

@@ -203,7 +203,6 @@ NUMERICS = {  # key figures that answer no question of a verdict
     "power_balance",
     "round_trip_joint_error",
     "samples",
-    "velocity_check",
     "worst_orientation_residual",
     "worst_position_residual",
 }

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import get_args
 
@@ -14,7 +14,6 @@ from er3a.collision.shapes import shapes_assumed
 from er3a.dynamics import margins
 from er3a.dynamics.arm_model import ArmModel, arm_model, drives_of, estimated_links
 from er3a.dynamics.plausibility import MassFinding, MissingLink, has_mass, mass_findings
-from er3a.dynamics.torque_timing import fastest_under_torques
 from er3a.dynamics.torques import Demand, TorqueParts, demand, known, power_imbalance, torque_parts, worst_holding
 from er3a.files.robot_library import LoadFields, load_of
 from er3a.kinematics.singularity import NearSingular
@@ -34,10 +33,9 @@ from er3a.pipeline.stages.trajectory.motion import (
 )
 from er3a.pipeline.study import Study
 from er3a.planning.names import NOT_TO_BE_RUN, PathVerdict
-from er3a.planning.timing import JointLimits, NoTimeLaw, TimingError, fastest, nodes_along
-from er3a.programs.instructions import UnclearLoad
+from er3a.planning.timing import JointLimits
 from er3a.robots.joint_limits import shown
-from er3a.robots.masses import LinkMass, Load, MassBody, Masses, no_body, together
+from er3a.robots.masses import LinkMass, Load, MassBody, Masses, together
 from er3a.robots.robot import Grade, Robot, Source
 
 DynamicsVerdict = Verdict[model.NoData | model.NoLimits | model.AllWithin | model.Marginal | model.Overload]
@@ -98,21 +96,19 @@ def _is_guess(source: Source | LoadFields | None) -> bool:
     return source is not None and source.grade == "inferred"
 
 
-def open_of_load(study: Study, name: str, of_programs: Iterable[Load] = ()) -> tuple[model.Need, ...]:
-    """What the study does not say of tool and payload, or guesses, and programs that name loads not of theirs; a mass
-    of 0 stands for none."""
+def open_of_load(study: Study, name: str) -> tuple[model.Need, ...]:
+    """What the study does not say of tool and payload, or guesses; a mass of 0 stands for none."""
     entry, loads = study.entry(name), study.loads(name)
     if not loads:
         return ("load",)
     scene = study.scene(name, "trajectory")  # what has a shape on the flange, or a tip beside it, has a mass
     has_tool = bool(scene and scene.carried) or not np.array_equal(study.robot(name).tool, np.eye(4))
     bodies = [each.body for each in loads if each.body and each.body.mass_kg]
-    inertias = [*(body.inertia_kg_m2 for body in bodies), *(load.inertia for load in of_programs)]
     asked: dict[model.LoadPart, bool] = {
         "tool": has_tool and not entry.tool_load,
         "carried": not entry.payload,
         "load_centre": any("centre_mm" not in body.model_fields_set for body in bodies),
-        "load_inertia": not all(map(any, inertias)),
+        "load_inertia": not all(any(body.inertia_kg_m2) for body in bodies),
         "load_guess": any(map(_is_guess, loads)),
     }
     return tuple(part for part, is_open in asked.items() if is_open)
@@ -228,7 +224,6 @@ class PathTorques:
     asked : whether the path is to be run, not to show a fault
     demand, imbalance : None where the arm can't follow it
     inertia : (n, 2), smallest and largest that each joint moves, without rotor
-    load : that the program names which the path is from
     """
 
     summary: model.PathLoad
@@ -237,7 +232,6 @@ class PathTorques:
     demand: Demand | None
     inertia: Reals
     imbalance: float | None
-    load: Load | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -272,10 +266,9 @@ def path_torques(
     t = np.linspace(0.0, motion.built.duration, samples)
     q, qd, qdd = motion.rates(t)
     if not np.isfinite([q, qd, qdd]).all():
-        nothing = (float(t[-1]), (), (), None, None, (), None, None)
+        nothing = (float(t[-1]), (), (), None, None)
         absent = model.PathLoad(entry.name, entry.title, outcomes, False, False, *nothing)
         return PathTorques(absent, asked, model.TorqueRows.empty(), None, np.full((n, 2), np.nan), None)
-    timed, kinematic, no_law = _timings(arm, motion.joints, t, q)
     evenly, checked = t, np.union1d(t, motion.t)
     t = np.union1d(checked, within_short_pieces(motion, float(np.diff(checked).max(initial=0.0))))
     rates = np.stack(motion.rates(t), axis=1)
@@ -298,11 +291,6 @@ def path_torques(
         wrist=_wrist_moments(arm, t, q, qd, qdd, wrist),
         payload=_bound(payload, t),
         speed_scale=_bound(scale, t),
-        torque_times=timed,
-        kinematic_s=kinematic,
-        no_law=no_law,
-        program_load_kg=named.mass if isinstance(named := program_load(motion), MassBody) else None,
-        program_load_open=named if isinstance(named, str) else "",
     )
     rows = model.TorqueRows.of(
         path=entry.name,
@@ -316,8 +304,7 @@ def path_torques(
     inertia = np.stack([own.min(axis=0), own.max(axis=0)], axis=1)
     seen = TorqueParts(**{name: getattr(parts, name)[few] for name in model.PARTS})
     imbalance = power_imbalance(arm.model, seen, q[few], qd[few], qdd[few])
-    own_load = arm.load if summary.program_load_kg is not None else None
-    return PathTorques(summary, asked, rows, needed, inertia, imbalance, own_load)
+    return PathTorques(summary, asked, rows, needed, inertia, imbalance)
 
 
 PER_PIECE = 4  # times computed within a piece of a motion
@@ -374,28 +361,6 @@ def _margins(
     )
 
 
-HALVINGS = 2
-
-
-def _timings(
-    arm: LoadedArm, joints: Callable[[Reals], Reals], t: Reals, q: Reals
-) -> tuple[tuple[model.ShortestTime, ...], float | None, NoTimeLaw | None]:
-    """Shortest times under torques, each with the steps before halved, and the one under assumed accelerations."""
-    peak, found = drives_of(arm.robot).peak, []
-    if not np.isfinite(peak).any():
-        return (), None, None
-    t, nodes = nodes_along(joints, t[::20], q[::20], arm.limits)
-    try:
-        kinematic = fastest(nodes, arm.limits).duration
-        for _ in range(HALVINGS + 1):
-            shortest = fastest_under_torques(arm.model, joints(t), arm.limits.speed, peak)
-            found.append(model.ShortestTime(len(t), shortest.timed.duration, shortest.lower_bound))
-            t = np.sort(np.concatenate([t, (t[1:] + t[:-1]) / 2]))
-        return tuple(found), kinematic, None
-    except TimingError as error:
-        return (), None, error.finding
-
-
 def _wrist_moments(
     arm: LoadedArm, t: Reals, q: Reals, qd: Reals, qdd: Reals, wrist: tuple[int, ...]
 ) -> tuple[model.WristMoment, ...]:
@@ -418,27 +383,20 @@ def _bound(margin: margins.Margin | None, t: Reals) -> model.BindingLimit | None
     return model.BindingLimit(value, margin.by, joint, None if margin.sample is None else float(t[margin.sample]))
 
 
-DIAGRAM_POINTS = 501
-MAX_DISTANCE_M = 1.0
-PARTS_OF_PAYLOAD = (1 / 3, 2 / 3, 1.0)
 UNITS = {"payload": "kg", "moment": "N m", "inertia": "kg m²"}
 
 
 def wrist_uses(
     robot: Robot, load: Load | None, grade: Grade, gravity: float, paths: Sequence[PathTorques]
 ) -> tuple[model.Use, ...]:
-    """All that the wrist's data limit, for the study's load and those that programs name; upper ends by the loads'
-    tolerances."""
+    """All that the wrist's data limit, for the study's load; upper ends by the load's tolerances."""
     wrist = robot.masses.wrist
     if wrist is None:
         return ()
-    named = [(each.summary.name, each.load) for each in paths if each.summary.counts and each.load]
-    loads: list[tuple[str | None, Load, Grade]] = [(None, load, grade)] if load else []
-    loads += [(path, each, "claim") for path, each in named]
+    at_rest = margins.wrist_use(robot, wrist, load, gravity, margins.tolerances_of(load, grade)) if load else ()
     uses = [
-        model.Use(use.quantity, use.joint, path, use.asked, use.most, use.allowed, UNITS[use.quantity])
-        for path, each, known in loads
-        for use in margins.wrist_use(robot, wrist, each, gravity, margins.tolerances_of(each, known))
+        model.Use(use.quantity, use.joint, None, use.asked, use.most, use.allowed, UNITS[use.quantity])
+        for use in at_rest
     ]
     allowed = dict(wrist.moment)
     for path in (each.summary for each in paths):
@@ -448,29 +406,6 @@ def wrist_uses(
                 upper, limit = asked + moment.tolerance, allowed[moment.joint]
                 uses.append(model.Use("moment", moment.joint, path.name, asked, upper, limit, "N m"))
     return tuple(uses)
-
-
-def diagram_rows(robot: Robot, load: Load | None, gravity: float) -> model.DiagramRows:
-    """Curves for the rated payload and parts of it, and for the load's own mass; none where no limit is known."""
-    wrist = robot.masses.wrist
-    if wrist is None:
-        return model.DiagramRows.empty()
-    masses = {round(part * wrist.payload, 3) for part in PARTS_OF_PAYLOAD if np.isfinite(wrist.payload)}
-    masses |= {load.mass} if load and load.mass > 0 else set()
-    if not masses:
-        return model.DiagramRows.empty()
-    along = np.linspace(0.0, MAX_DISTANCE_M, DIAGRAM_POINTS)
-    diagram = margins.load_diagram(robot, wrist, np.array(sorted(masses)), along, gravity)
-    if diagram is None:
-        return model.DiagramRows.empty()
-    reached = np.isfinite(diagram.across).any(axis=0)
-    last = min(int(np.flatnonzero(reached).max(initial=0)) + 2, DIAGRAM_POINTS)
-    count = len(diagram.mass)
-    return model.DiagramRows(
-        mass_kg=np.repeat(diagram.mass, last),
-        along_mm=1000 * np.tile(diagram.along[:last], count),
-        across_mm=1000 * diagram.across[:, :last].ravel(),
-    )
 
 
 WRIST_JOINTS = 3
@@ -488,7 +423,7 @@ def compute(study: Study, name: str) -> model.DynamicsResults:
     moving = any(each.link > 0 for each in robot.masses.links)
     arm = _loaded_arm(study, robot, load, (grade, load_grade), settings)
     paths, skipped, rest = _paths(study, name, arm, settings) if moving else ([], (), ())
-    holding = _hardest([arm, *_with_named_loads(arm, paths)]) if moving else ()
+    holding = _holding(arm) if moving else ()
     motors = _motors(robot, paths, holding) if any(path.summary.counts for path in paths) else ()
     summaries = tuple(path.summary for path in paths)
     uses = (
@@ -497,8 +432,7 @@ def compute(study: Study, name: str) -> model.DynamicsResults:
     )
     uses = tuple(sorted(uses, key=lambda use: -use.ratio))
     findings = mass_findings(robot) if moving else ()
-    of_programs = [path.load for path in paths if path.load and path.summary.counts]
-    unknown = unknowns(robot, open_of_load(study, name, of_programs))
+    unknown = unknowns(robot, open_of_load(study, name))
     masses = _masses_used(given, robot, load, (grade, load_grade if load else None), settings)
     imbalances = [path.imbalance for path in paths if path.imbalance is not None]
     summary = model.DynamicsSummary(
@@ -526,7 +460,7 @@ def compute(study: Study, name: str) -> model.DynamicsResults:
     )
     followed = [path.rows for path in paths if path.demand]
     rows = model.TorqueRows.stacked(followed).of_joints(robot.slides)
-    return model.DynamicsResults(summary, rows, diagram_rows(robot, load, settings.gravity_m_s2))
+    return model.DynamicsResults(summary, rows)
 
 
 def with_estimates(robot: Robot, density: float | None) -> Robot:
@@ -605,8 +539,6 @@ def _left_out(
     ]
     if parts:
         found.append(LeftOut("load", tuple(parts)))
-    if open_loads := [f"{path.name}: {path.program_load_open}" for path in paths if path.program_load_open]:
-        found.append(LeftOut("program_loads", tuple(open_loads)))
     if not_run := (*skipped, *(path.name for path in paths if not path.counts)):
         found.append(LeftOut("paths_not_run", not_run))
     return (*found, LeftOut("torque_peaks", amount=samples), LeftOut("program_torques"), LeftOut("drive_behaviour"))
@@ -639,41 +571,10 @@ def _paths(
         if each.motion is None:
             skipped.append(each.name)
         else:
-            loaded = with_load(arm, program_load(each.motion))
-            found.append(path_torques(loaded, each.motion, judge_of.judged(each.motion), settings.samples, wrist))
+            found.append(path_torques(arm, each.motion, judge_of.judged(each.motion), settings.samples, wrist))
+            if isinstance(each.motion.entry, PartOfProgram) and each.motion.entry.part.load is not None:
+                rest.append(LeftOut("program_loads", (each.name,)))
     return found, tuple(skipped), by_subject(rest)
-
-
-def program_load(motion: Motion) -> MassBody | str | None:
-    """What the program that a path is from says hangs on the flange; None for other paths."""
-    load = motion.entry.part.load if isinstance(motion.entry, PartOfProgram) else None
-    if isinstance(load, UnclearLoad):
-        return load.text
-    return f"{load.mass:g} kg" if load is not None and no_body(load) is not None else load
-
-
-def with_load(arm: LoadedArm, load: MassBody | str | None) -> LoadedArm:
-    """The arm with the load that a program names instead of the study's, where it gives its numbers.
-
-    What the surroundings do to the tool stays the study's.
-    """
-    if not isinstance(load, MassBody):
-        return arm
-    outer = arm.load or Load(0.0)
-    known = Load(load.mass, load.centre, load.inertia, force=outer.force, moment=outer.moment)
-    return replace(arm, load=known, load_grade="claim")
-
-
-def _with_named_loads(arm: LoadedArm, paths: list[PathTorques]) -> Iterator[LoadedArm]:
-    """The arm with each load that a program names on a path that may be run."""
-    for load in {path.load: None for path in paths if path.load and path.summary.counts}:
-        yield replace(arm, load=load, load_grade="claim")
-
-
-def _hardest(arms: Sequence[LoadedArm]) -> tuple[model.HoldingTorque, ...]:
-    """Of each joint what it holds with the load that asks most of it."""
-    held = zip(*map(_holding, arms))
-    return tuple(max(each, key=lambda one: one.bound + one.tolerance) for each in held)
 
 
 def _holding(arm: LoadedArm) -> tuple[model.HoldingTorque, ...]:

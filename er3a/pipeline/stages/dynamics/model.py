@@ -18,7 +18,6 @@ from er3a.pipeline.language import N_
 from er3a.pipeline.results import NEVER_A_PASS, Results, Summary, Verdict
 from er3a.pipeline.tables import Table, Texts, column, per_joint
 from er3a.planning.names import PathVerdict
-from er3a.planning.timing import NoTimeLaw
 from er3a.robots.robot import Grade
 
 Unit = Literal["N m", "N"]
@@ -254,18 +253,6 @@ class WristMoment:
 
 
 @dataclass(frozen=True)
-class ShortestTime:
-    """The shortest time under peak torques and joint speeds by TOPP-RA at so many nodes.
-
-    ``least_s``: no motion at these nodes takes less; less than ``time_s`` only where viscous friction is known.
-    """
-
-    nodes: int
-    time_s: float
-    least_s: float
-
-
-@dataclass(frozen=True)
 class PathLoad:
     """A path's loads.
 
@@ -275,10 +262,6 @@ class PathLoad:
     counts : whether it may be run; motors, limits and key figures rest on such paths alone
     complete : whether the arm can follow it all along; nothing else is known of one that it can't
     payload, speed_scale : None where no torque limit is known
-    torque_times : at more and more nodes; empty without peak torques, or by ``no_law``
-    kinematic_s : shortest time under joint speeds and assumed accelerations
-    program_load_kg : what hangs on the flange, where the path is of a program that says so; None: the study's load
-    program_load_open : the program's text for a load whose numbers it does not give; the study's load counts
     """
 
     name: str
@@ -291,11 +274,6 @@ class PathLoad:
     wrist: tuple[WristMoment, ...]
     payload: BindingLimit | None
     speed_scale: BindingLimit | None
-    torque_times: tuple[ShortestTime, ...]
-    kinematic_s: float | None
-    no_law: NoTimeLaw | None
-    program_load_kg: float | None = None
-    program_load_open: str = ""
 
     @property
     def hardest(self) -> JointLoad:
@@ -376,21 +354,10 @@ class TorqueRows(Table):
     power_w: Reals = per_joint("power of the drive", heading=N_("drive power"))
 
 
-class DiagramRows(Table):
-    """The load diagram: how far from the last axis a point load's centre may be; NaN where it may nowhere."""
-
-    mass_kg: Reals = column("mass of the load")
-    along_mm: Reals = column(
-        "distance of its centre from the flange along the last axis", heading=N_("from the flange along the last axis")
-    )
-    across_mm: Reals = column("greatest distance of its centre from the last axis", heading=N_("from the last axis"))
-
-
 class DynamicsResults(Results[DynamicsSummary]):
     """Summary and tables of the stage."""
 
     torques: TorqueRows
-    diagram: DiagramRows
 
 
 RESULTS = DynamicsResults

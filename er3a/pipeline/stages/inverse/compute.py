@@ -9,15 +9,12 @@ import numpy as np
 import scipy
 
 from er3a.collision.along import bodies_of
-from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import PairOverlaps
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import shapes_assumed
 from er3a.files.target_file import load_targets
-from er3a.geometry.transforms import rpy_of, transform
-from er3a.kinematics.batch import inverse_batch
+from er3a.geometry.transforms import rpy_of
 from er3a.kinematics.by_class import arm_solver, misses
-from er3a.kinematics.chain import axes_at_zero_theta
 from er3a.kinematics.classes.chain_solvers import Unsolved
 from er3a.kinematics.closed_form import ORIENTATION
 from er3a.kinematics.cuspidal import cuspidal_move
@@ -28,7 +25,7 @@ from er3a.kinematics.round_trips import MAX_BY_CLASS, SAME_JOINTS_RAD, BatchRoun
 from er3a.kinematics.self_motions import SelfMotionCurve
 from er3a.kinematics.singularity import TYPES, characteristic_length, conditioning, determinant_factors
 from er3a.kinematics.solutions import MANY_TARGETS, ByClass, Iteration, Method, Solutions, Target, TargetOutcome
-from er3a.kinematics.wrist_partitioned import has_branches, solve_slots, wrist_partition_missing, wrist_partitioned_arm
+from er3a.kinematics.wrist_partitioned import has_branches, solve_slots
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.si_units import stated
 from er3a.pipeline.progress import shown_progress
@@ -327,45 +324,6 @@ def sequence(
     return model.VisitOrder(rule, found.cost, found.greedy_cost, stops, differs)
 
 
-RPY_DEG: dict[model.ToolOrientation, tuple[float, float, float]] = {
-    "tool_down": (180.0, 0.0, 0.0),
-    "tool_level": (0.0, 90.0, 0.0),
-}
-
-
-def solution_map(robot: Robot, cells: int, scene: Scene | None) -> model.MapRows:
-    """Number of branches, of those within the limits, and of those clear too, on a grid of ``cells`` by ``cells``."""
-    points, T_base_tool = axes_at_zero_theta(robot)[1:]
-    if wrist_partition_missing(robot) is None:
-        arm = wrist_partitioned_arm(robot)
-        reach = arm.wrist_reach + np.linalg.norm(points[1] - points[0]) + np.linalg.norm(arm.wrist_in_tool)
-    else:
-        reach = np.linalg.norm(np.diff(np.vstack([points, T_base_tool[:3, 3]]), axis=0), axis=1).sum()
-    middle = (points[1] - robot.base[:3, 3]) @ robot.base[:3, 2]
-    ticks = (np.arange(cells) + 0.5) / cells * 2 - 1
-    x, z = (part.ravel() for part in np.meshgrid(ticks * reach, middle + ticks * reach, indexing="ij"))
-    position = np.stack([x, np.zeros_like(x), z], axis=1)
-    tables, bodies = [], Bodies(robot, scene)
-    for orientation, rpy_deg in RPY_DEG.items():
-        T = robot.base @ transform(position, np.broadcast_to(np.radians(rpy_deg), position.shape))
-        found = inverse_batch(robot, T)
-        clear = found.within_limits.copy()
-        # Arms of one branch after another: neighbours are alike, which makes asking faster.
-        slot, pose = np.nonzero(clear.T)
-        clear[pose, slot] = bodies.free(found.q[pose, slot])
-        tables.append(
-            model.MapRows.of(
-                orientation=orientation,
-                x_mm=x * 1000,
-                z_mm=z * 1000,
-                solutions=found.solved.sum(axis=1),
-                within_limits=found.within_limits.sum(axis=1),
-                clear=clear.sum(axis=1),
-            )
-        )
-    return model.MapRows.stacked(tables)
-
-
 STAGE_NAME = "inverse"
 REPRODUCED_M = 1e-9  # by which a solution may miss its target: far above the rounding of a solution in closed form
 REPRODUCED_RAD = 1e-9
@@ -422,10 +380,7 @@ def compute(study: Study, name: str) -> model.InverseResults:
             *left_out_without_tool(robot),
         ),
     )
-    number_of_solutions = (
-        solution_map(robot, settings.map_cells, scene) if has_branches(robot) else model.MapRows.empty()
-    )
-    return model.InverseResults(summary, solutions, model.RankingRows.stacked(ranked), number_of_solutions)
+    return model.InverseResults(summary, solutions, model.RankingRows.stacked(ranked))
 
 
 def _with_clearance(

@@ -16,14 +16,13 @@ from er3a.selection.rule_names import RuleName
 
 
 class InverseSettings(StrictModel):
-    """``round_trips``: random poses solved back. ``map_cells``: cells across the maps of the number of solutions.
+    """``round_trips``: random poses solved back.
 
     ``scene`` holds the obstacles that clearance is measured from and that solutions may not touch; ``mix`` weighs
     rules against each other as one more rule (names: er3a/selection/select.py).
     """
 
     round_trips: Annotated[int, Field(ge=1, le=10_000_000)] = 2000
-    map_cells: Annotated[int, Field(ge=8, le=512)] = 80
     scene: Text | None = None
     mix: Annotated[dict[RuleName, Annotated[float, Field(ge=0, le=1000)]], Field(min_length=1)] = {"nearest": 1}
 

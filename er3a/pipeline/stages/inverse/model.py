@@ -152,7 +152,6 @@ class NoneSolved(TargetCounts, Finding, code="inverse.none_solved"):
     """No target has an admissible solution."""
 
 
-ToolOrientation = Literal["tool_down", "tool_level"]
 SINGULAR_PARTS = ("wrist", "elbow", "shoulder", "rank")
 
 
@@ -340,25 +339,11 @@ class RankingRows(Table):
     between: Texts = column("of the rule clearance, what is nearest to what")
 
 
-class MapRows(Table):
-    """Number of solutions of tool poses on a grid in the vertical plane through axis 1 (y = 0 of the base)."""
-
-    orientation: Texts = column("how the tool is held")
-    x_mm: Reals = column("tool position in the base's frame")
-    z_mm: Reals = column("tool position in the base's frame")
-    solutions: Integers = column("branches")
-    within_limits: Integers = column("branches within the limits")
-    clear: Integers = column(
-        "of these, those that touch neither the scene nor the arm itself; between poses nothing is known"
-    )
-
-
 class InverseResults(Results[InverseSummary]):
-    """The stage's results; the map is empty for arms without a closed form."""
+    """The stage's results."""
 
     solutions: SolutionRows
     rankings: RankingRows
-    map: MapRows
 
 
 RESULTS = InverseResults

@@ -47,14 +47,13 @@ from er3a.pipeline.study import Study
 from er3a.planning.avoidance.avoidance import SingularSegment, singular_segment
 from er3a.planning.avoidance.strategies import StrategyCost, StrategyResult, best, compare_strategies, deviation
 from er3a.planning.motion_faults import Interval, SingularEvent
-from er3a.planning.names import PathVerdict, StrategyName
+from er3a.planning.names import FAULTS, PathVerdict, StrategyName
 from er3a.planning.timing import JointLimits, Timed, TimingError, fastest, nodes_along
 from er3a.planning.way_around import PlanningTask, WayAround, way_between
 from er3a.robots.joint_limits import shown, speeds_given, within
 from er3a.robots.robot import Robot
 
 MIN_RATIO = 1e-3  # of the limits, below which a path counts as standing still
-FAULTS: tuple[PathVerdict, ...] = ("unreachable", "none found", "leaves limits", "collides", "too fast")
 ROUNDED = 0.0005  # m, by which a pose may be off that is written with one decimal of mm and two of deg
 ROWS = 250  # of each motion in the table
 CLEARANCE_TIMES = 41
@@ -330,7 +329,6 @@ def path_summary(
         max_joint_speed_ratio=_ratio(speed, limits.speed),
         max_joint_acceleration_ratio=_ratio(acceleration, limits.acceleration),
         joint_speed_bounded=found.speed_bounded,
-        velocity_check_deg_s=float(np.degrees(found.velocity_check)),
         collisions=_stretches(motion, contacts),
         clearance=judgement.min_clearance(along),
         not_planned=motion.not_planned,
@@ -571,8 +569,6 @@ def _figures(
 ) -> tuple[Figure, ...]:
     asked = [path for path in paths if path.meant_safe]  # demonstrations are counted apart
     events = [event for path in asked for event in path.singularities]
-    bounded = [path for path in paths if path.max_joint_speed_deg_s]
-    agreement = max((path.velocity_check_deg_s * 1e6 for path in bounded), default=None)
     speeds = [
         (speed, limit, "mm/s" if joint in path.sliding else "deg/s")
         for path in asked
@@ -591,7 +587,6 @@ def _figures(
             speed / limit if speed is not None and limit is not None else None,
             "",
         ),
-        Figure("velocity_check", agreement, "µdeg/s"),
         Figure("characteristic_length", length * 1000, "mm"),
     )
 

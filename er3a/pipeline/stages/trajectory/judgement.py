@@ -15,7 +15,7 @@ from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.stages.trajectory.motion import Motion
 from er3a.planning import motion_faults
-from er3a.planning.names import PATH_VERDICTS, PathVerdict
+from er3a.planning.names import PathVerdict, gravest
 from er3a.planning.timing import JointLimits
 from er3a.planning.tool_curve import Undecided, open_stretches
 from er3a.robots.joint_limits import shown
@@ -23,7 +23,6 @@ from er3a.robots.robot import Robot
 
 STEPS_TO_CONTACT, ATTEMPTS = 1000, 5
 BEFORE_STOP = 0.99  # of the time until limits or reach are left, where the motion is not solved any more
-SPEED_STEP = 1e-5  # share of the duration
 LIMIT_MARGIN = 2.0  # deg (mm of a prismatic joint), between an advised end and a joint limit that the path leaves later
 REACH_MARGIN = 0.02  # m of the path before it leaves the reach
 SPEED_MARGIN = 0.9  # of a joint's speed limit; these four are chosen, no standard states them
@@ -57,7 +56,6 @@ class Judgement(Faults):
     beyond : where no branch reaches the pose
     times, q, velocity, acceleration : (N,) s and (N, n) in rad, rad/s, rad/s^2 at all points of the table
     speed_bounded : False where the exact path needs a joint speed without bound
-    velocity_check : rad/s, largest difference between velocities through the Jacobian and by differences of angles
     """
 
     verdict: PathVerdict
@@ -67,7 +65,6 @@ class Judgement(Faults):
     velocity: Reals
     acceleration: Reals
     speed_bounded: bool
-    velocity_check: float
 
 
 def judge(robot: Robot, motion: Motion, near: NearSingular, limits: JointLimits) -> Judgement:
@@ -95,7 +92,6 @@ def judge(robot: Robot, motion: Motion, near: NearSingular, limits: JointLimits)
         velocity=velocity,
         acceleration=acceleration,
         speed_bounded=bool(bounded),
-        velocity_check=_velocity_check(motion),
     )
 
 
@@ -110,7 +106,7 @@ def _verdict(found: Faults, beyond: bool, jumps: bool, of_tool: bool) -> PathVer
         "undecided": found.undecided,
         "near-singular": of_tool and found.events,
     }
-    return next((verdict for verdict, there in faults.items() if there), "safe")
+    return gravest(verdict for verdict, there in faults.items() if there)
 
 
 def faults_of(robot: Robot, motion: Motion, near: NearSingular, limits: JointLimits) -> Faults:
@@ -126,16 +122,6 @@ def faults_of(robot: Robot, motion: Motion, near: NearSingular, limits: JointLim
         undecided=[] if ends else open_stretches(curve),
         max_rates=(curve.max_abs(curve.velocity), curve.max_abs(curve.acceleration)),
     )
-
-
-def _velocity_check(motion: Motion) -> float:
-    step = SPEED_STEP * motion.built.duration
-    inner = motion.samples[1:-1]
-    if not inner.size:
-        return 0.0
-    slope = (motion.joints(inner + step) - motion.joints(inner - step)) / (2 * step)
-    difference = np.abs(slope - motion.rates(inner)[1])
-    return float(np.nanmax(difference)) if np.isfinite(difference).any() else 0.0
 
 
 @dataclass(frozen=True)
@@ -169,8 +155,7 @@ def collisions(along: ClearanceAlong) -> list[motion_faults.Interval[model.Bodie
 
 def verdict_of(found: Judgement, along: ClearanceAlong) -> PathVerdict:
     """The gravest verdict on a motion, collisions included."""
-    verdicts: list[PathVerdict] = [found.verdict, "collides"] if along.contacts else [found.verdict]
-    return min(verdicts, key=PATH_VERDICTS.index)
+    return gravest([found.verdict, "collides"] if along.contacts else [found.verdict])
 
 
 def outcomes_of(found: Judgement, along: ClearanceAlong, duration: float) -> tuple[PathVerdict, ...]:

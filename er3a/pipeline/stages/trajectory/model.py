@@ -291,7 +291,6 @@ class PathSummary:
     corner_deviation_mm, corner_deviation_deg : by how much rounded corners miss their points at most
     max_joint_speed_deg_s, max_joint_speed_ratio, max_joint_acceleration_ratio : None where speeds have no bound; speeds
         of prismatic joints (``sliding``, from 1) in mm/s
-    velocity_check_deg_s : largest difference of joint velocities by the Jacobian and by differences of angles
     clearance : None where none could be measured
     not_planned : why no motion was planned, of one that is to be
     clear_until : how far it could be used; None where it does not collide, or keeps the margin nowhere
@@ -328,7 +327,6 @@ class PathSummary:
     max_joint_speed_ratio: float | None
     max_joint_acceleration_ratio: float | None
     joint_speed_bounded: bool
-    velocity_check_deg_s: float
     collisions: tuple[Stretch[BodiesOverlap], ...]
     clearance: MinClearance | None
     not_planned: NoWayAround | None

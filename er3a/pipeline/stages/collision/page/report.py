@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -12,23 +11,20 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
 from er3a.collision.pairs import TRIED
-from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import tr
 from er3a.pipeline.messages.collision import state_word, why
-from er3a.pipeline.messages.kinematics import branch_word
-from er3a.pipeline.messages.left_out import body_word, pair_words
+from er3a.pipeline.messages.left_out import body_word
 from er3a.pipeline.messages.numbers import fixed
-from er3a.pipeline.messages.say import joined, say
+from er3a.pipeline.messages.say import say
 from er3a.pipeline.player.player import drawing_head, moment, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.collision import model
 from er3a.pipeline.stages.collision.page.played import motions
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.figures import clearance_panels, equal_scale, new_figure
+from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.page import Picture, render_stage
-from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, LINK, MODEL, MUTED, REFERENCE, VERDICTS
-from er3a.robots.joint_limits import meant
+from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MODEL, REFERENCE, VERDICTS
 from er3a.robots.robot import Robot
 
 MAX_PAIRS = 12
@@ -84,24 +80,13 @@ def workspace(results: model.CollisionResults) -> Picture:
         "tries": found.tries_in_lost,
         "lost": fixed(found.lost_m3 * 1000, 0),
     }
-    if results.summary.verdict.shapes:
-        caption = tr(
-            "Each square is a column of {cell:.0f} mm cells: the redder, the more of its reached cells are lost. Of "
-            "{reached} cells reached, {clear} have a configuration that is clear of the assumed shapes, {joined} of "
-            "these connected to home by a motion that is. In the others none was found in {tries} tries in all, so "
-            "their volume of {lost} L overestimates the loss. Ringed: columns with collision-free cells that are not "
-            "connected to home.",
-            **numbers,
-        )
-    else:
-        caption = tr(
-            "Each square is a column of {cell:.0f} mm cells: the redder, the more of its reached cells are lost. Of"
-            " {reached} cells reached, {clear} have a collision-free configuration (proven), {joined} of these "
-            "connected to home by a proven motion. In the others none was found in {tries} tries in all, so their "
-            "volume of {lost} L overestimates the loss. Ringed: columns with collision-free cells that are not "
-            "connected to home.",
-            **numbers,
-        )
+    caption = tr(
+        "Each square is a column of {cell:.0f} mm cells: the redder, the more of its reached cells are lost. Of "
+        "{reached} cells reached, {clear} have a collision-free configuration, {joined} of these connected to home by "
+        "a motion that is. In the others none was found in {tries} tries in all, so their volume of {lost} L "
+        "overestimates the loss. Ringed: columns with collision-free cells that are not connected to home.",
+        **numbers,
+    )
     return Picture(figure, tr("Two views of the cells reached. {conclusion}", conclusion=caption), caption)
 
 
@@ -131,51 +116,8 @@ def _mixed(share: float) -> tuple[float, ...]:
     return tuple(1 - (0.35 + 0.65 * share) * (1 - (1 - share) * ends[0] - share * ends[1]))
 
 
-def clearance_over_time(results: model.CollisionResults) -> Picture | None:
-    """Smallest distance over time, path by path."""
-    rows = results.paths
-    names = [str(name) for name in dict.fromkeys(rows.path) if np.isfinite(rows.clearance_mm[rows.path == name]).any()]
-    if not names:
-        return None
-    figure, panels = clearance_panels(rows, names)
-    met = [found.name for found in results.summary.closest if found.kind == "path" and found.clearance_mm < 0]
-    caption = (
-        tr("Below zero bodies overlap: {paths}.", paths=joined(met, ", "))
-        if met
-        else tr("No path reaches zero: the arm collides neither with its surroundings nor with itself.")
-    )
-    alt = tr("Clearance over time, one panel per path. {conclusion}", conclusion=caption)
-    return Picture(figure, alt, caption, panels)
-
-
-def closest_pair(robot: Robot, found: model.Closest) -> Picture:
-    """The arm where it is nearest to anything, from the side and from above, with the two points."""
-    points = skeleton(robot, meant(robot, np.array(found.q_deg))) * 1000
-    pair = np.array([found.from_mm, found.to_mm])
-    figure, views = _two_views(4.6)
-    for ax, plane in views:
-        ax.plot(*points[:, plane].T, color=LINK, linewidth=7, solid_capstyle="round", zorder=1)
-        ax.plot(*points[:, plane].T, color=MUTED, linewidth=1, zorder=2)
-        ax.plot(*pair[:, plane].T, "o-", color=HIGHLIGHT, markersize=5, zorder=3)
-    caption = tr(
-        "{name}: {pair}, {clearance} mm apart; the line joins the two nearest points of their surfaces.",
-        name=found.name,
-        pair=say(found.between),
-        clearance=fixed(found.clearance_mm, 1),
-    )
-    if found.clearance_mm < 0:
-        caption = tr(
-            "{name}: {pair} overlap by {depth} mm; the line joins the points of deepest penetration.",
-            name=found.name,
-            pair=say(found.between),
-            depth=fixed(-found.clearance_mm, 1),
-        )
-    return Picture(figure, caption, caption)
-
-
 NO_BREAK_SPACE = "\u00a0"
 MAX_ROWS = 100  # of a table of targets and paths
-ALIKE_MM = 0.05  # clearances that differ by no more are shown as the same
 
 
 def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -> None:
@@ -184,7 +126,6 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
     robot = study.robot(name)
     scene = study.scene(name, stored.stage)
     closest = sorted(summary.closest, key=lambda found: found.clearance_mm)
-    nearest = closest[0] if closest else None
     render_stage(
         study,
         stored,
@@ -192,15 +133,11 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
         matrix=_matrix(robot, results.matrix, results.summary.verdict.shapes is not None),
         tried=TRIED,
         by_pair=by_pair(results.pairs),
-        pairs=_pairs(results.pairs),
         workspace=workspace(results),
-        targets=target_rows(results.targets, {each.name: each.q_deg for each in closest if each.kind == "target"}),
-        clearance=clearance_over_time(results),
         player=player(robot, motions(robot, results), scene),
         drawing_head=drawing_head(),
         closest=[_closest(found) for found in closest[:MAX_ROWS]],
-        rows_left_out=max(len(closest), len(set(results.targets.target))) - MAX_ROWS,
-        nearest=closest_pair(robot, nearest) if nearest else None,
+        rows_left_out=len(closest) - MAX_ROWS,
         mounting=[_mounted(contact.solid, contact.depth_mm, contact.inside) for contact in summary.mounting],
     )
 
@@ -231,48 +168,6 @@ def _angles(robot: Robot, values: Reals) -> str:
     if not np.isfinite(values).all():
         return ""
     return ", ".join(fixed(value, 0) + (" mm" if slides else "°") for value, slides in zip(values, robot.slides))
-
-
-def _pairs(rows: model.PairShares) -> list[list[str]]:
-    return [
-        [say(pair), fixed(100 * ratio, 2), tr("{low} to {high}", low=fixed(100 * low, 2), high=fixed(100 * high, 2))]
-        for pair, ratio, low, high in zip(rows.between, rows.ratio, rows.low, rows.high)
-    ]
-
-
-def target_rows(rows: model.TargetClearances, chosen: Mapping[str, tuple[float, ...]]) -> list[list[str]]:
-    """One row for each target: branches within limits, clear ones, the best clearance and its branch.
-
-    Of many targets those whose best clearance is smallest. Of branches that are alike the ``chosen`` one is named, by
-    joint values.
-    """
-    names, first, group = np.unique(rows.target.astype(str), return_index=True, return_inverse=True)
-    most = np.full(len(names), -np.inf)
-    np.maximum.at(most, group, rows.clearance_mm)
-    kept = np.argsort(most, kind="stable")[:MAX_ROWS]
-    found = []
-    for name in names[kept[np.argsort(first[kept])]]:
-        own = rows.take(rows.target == name)
-        alike = np.flatnonzero(own.clearance_mm >= own.clearance_mm.max() - ALIKE_MM)
-        away = np.abs(own.q_deg[alike] - chosen[name]).max(axis=1) if name in chosen else np.zeros(len(alike))
-        best = int(alike[away.argmin()])
-        branches, equal = len(set(own.branch.tolist())), len(set(own.branch[alike].tolist()))
-        branch = branch_word(own.label[best], int(own.branch[best]))
-        found.append(
-            [
-                str(name),
-                str(branches),
-                str(len(set(own.branch[own.clearance_mm >= 0].tolist()))),
-                fixed(own.clearance_mm[best], 1),
-                branch if equal == 1 else tr("{branch} ({count} branches are alike)", branch=branch, count=equal),
-                _between(own.between[best]),
-            ]
-        )
-    return found
-
-
-def _between(label: str) -> str:
-    return pair_words(label) if label else tr("nothing")
 
 
 def _closest(found: model.Closest) -> list[str]:

@@ -12,15 +12,15 @@ from er3a.pipeline.language import tr
 from er3a.pipeline.messages.dynamics import BINDING, payload_text, quantity_word
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.numbers import at_least, at_most, decimals_of, decimals_of_column, fixed, number
-from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
-from er3a.pipeline.player.player import drawing_head, moment, player
+from er3a.pipeline.messages.say import bracketed, joined, listed, word
+from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.dynamics import model
 from er3a.pipeline.stages.dynamics.page.played import motions
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import axis_label, new_figure, row_of_panels
 from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
-from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINTS, MUTED
+from er3a.pipeline.viewing.palette import INK, JOINTS, MUTED
 
 DRAWN = 161
 STYLES = ("-", "--", ":", "-.", (0, (6, 2, 1, 2, 1, 2)))
@@ -105,28 +105,6 @@ def holding_figure(summary: model.DynamicsSummary) -> Picture:
     return Picture(figure, tr("Bars: the greatest holding torque at each joint, with its tolerance."), caption)
 
 
-def diagram_figure(summary: model.DynamicsSummary, rows: model.DiagramRows) -> Picture:
-    """The load diagram, with the load in it."""
-    figure, ax = new_figure(1, 1, width=7.0, height=4.2)
-    for i, mass in enumerate(np.unique(rows.mass_kg)):
-        own = rows.take(rows.mass_kg == mass)
-        ax.plot(own.along_mm, own.across_mm, color=joint_colour(i), label=tr("{mass:.3g} kg", mass=mass))
-    masses = summary.masses
-    if masses and masses.load_kg is not None:
-        x, y, z = masses.load_centre_mm
-        ax.plot([z], [np.hypot(x, y)], "o", color=HIGHLIGHT, label=tr("the load, {mass:.3g} kg", mass=masses.load_kg))
-    ax.set_xlim(left=0)
-    ax.set_ylim(bottom=0)
-    ax.set_xlabel(axis_label(rows, "along_mm"))
-    ax.set_ylabel(axis_label(rows, "across_mm"))
-    ax.legend(loc="upper right")
-    caption = tr(
-        "A load whose centre lies below the curve of its mass is within the allowed moments and inertias of the wrist. "
-        "The curves take the load as a point; its own inertia, and forces on the tool, count in the comparison above."
-    )
-    return Picture(figure, tr("The load diagram: one curve for each mass."), caption)
-
-
 MAX_USES = 12
 NONE = "–"
 
@@ -141,7 +119,6 @@ def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) ->
         if path.complete
     ]
     holding = holding_figure(summary) if summary.holding else None
-    diagram = diagram_figure(summary, results.diagram) if len(results.diagram) else None
     render_stage(
         study,
         stored,
@@ -155,18 +132,15 @@ def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) ->
         motors=_motors(summary.motors),
         paths=[_path(path) for path in summary.paths if path.counts],
         not_run=[_not_run(path) for path in summary.paths if not path.counts],
-        nodes=_nodes(summary),
-        margins=any(path.payload or path.speed_scale or path.torque_times for path in summary.paths),
+        margins=any(path.payload or path.speed_scale for path in summary.paths),
         figures=figures,
         player=player(robot, motions(robot, results)),
         drawing_head=drawing_head(),
-        joints=[(path.name, _joints(path)) for path in summary.paths if path.complete],
         wrist=_wrist(summary),
         wrist_uses=_wrist_uses(summary),
         units=_units(summary),
         holding=holding,
         held=_held(summary.holding),
-        diagram=diagram,
     )
 
 
@@ -242,21 +216,9 @@ def _not_run(path: model.PathLoad) -> list[str]:
     return [Markup('<a href="#{0}">{0}</a>').format(path.name), why, peak]
 
 
-def _nodes(summary: model.DynamicsSummary) -> list[list[str]]:
-    """Shortest times under torques by the number of nodes, and the time that no motion undercuts."""
-    return [
-        [path.name, number(each.nodes), fixed(each.time_s, 4), at_least(each.least_s, 4)]
-        for path in summary.paths
-        for each in (path.torque_times if path.counts else ())
-    ]
-
-
 def _path(path: model.PathLoad) -> list[str]:
     worst = path.hardest
     energy, back = sum(load.work_j for load in path.joints), sum(load.recovered_j for load in path.joints)
-    timed = fixed(path.torque_times[-1].time_s, 2) if path.torque_times else NONE
-    if path.no_law:
-        timed = say(path.no_law)
     return [
         Markup('<a href="#{0}">{0}</a>').format(path.name),
         f"{within(worst.peak, worst.tolerance)} {worst.unit} (J{worst.joint})",
@@ -264,8 +226,6 @@ def _path(path: model.PathLoad) -> list[str]:
         fixed(back, 2),
         _bound(path.payload),
         _bound(path.speed_scale),
-        timed,
-        NONE if path.kinematic_s is None else fixed(path.kinematic_s, 2),
     ]
 
 
@@ -276,33 +236,6 @@ def _bound(bound: model.BindingLimit | None) -> str:
     if bound.by is None:
         return value
     return bracketed(value, joined([f"J{bound.joint}", word("dynamics.binding", BINDING, bound.by)], ", "))
-
-
-def _joints(path: model.PathLoad) -> list[list[str]]:
-    torque, power, energy = (
-        decimals_of_column(value for load in path.joints for value in of(load))
-        for of in (
-            lambda load: (load.peak, *(getattr(load, part) for part in model.PARTS)),
-            lambda load: (load.power_w, load.braking_w),
-            lambda load: (load.work_j, load.recovered_j),
-        )
-    )
-    return [
-        [
-            _label(load.joint, load.unit),
-            within(load.peak, load.tolerance, torque),
-            moment(path.name, load.peak_at_s, fixed(load.peak_at_s, 2)),
-            within(load.rms, load.rms_tolerance, torque),
-            *(fixed(getattr(load, part), torque) for part in model.PARTS),
-            _both(load.power_w, load.braking_w, power),
-            _both(load.work_j, load.recovered_j, energy),
-        ]
-        for load in path.joints
-    ]
-
-
-def _both(given: float, taken: float, decimals: int) -> Markup:
-    return Markup("{}<br>{}").format(fixed(given, decimals), fixed(taken, decimals))
 
 
 def _held(holding: Sequence[model.HoldingTorque]) -> list[list[str]]:

@@ -4,29 +4,21 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import numpy as np
 from markupsafe import Markup
 from matplotlib.axes import Axes
-from matplotlib.colors import ListedColormap
 from matplotlib.lines import Line2D
 
-from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import skeleton
-from er3a.kinematics.inverse import inverse
-from er3a.kinematics.solutions import ClosedForm, Iteration
-from er3a.pipeline.language import N_, tr, with_unit
+from er3a.kinematics.solutions import ClosedForm
+from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.inverse import (
     FREE_AT,
     NEAREST_RULE,
-    ORIENTATION_TITLES,
-    ORIENTATIONS,
     SHAPES,
     limits_in_short,
 )
@@ -34,89 +26,17 @@ from er3a.pipeline.messages.kinematics import RULE_NAMES, RULE_TITLES, branch_wo
 from er3a.pipeline.messages.left_out import pair_words
 from er3a.pipeline.messages.numbers import fixed, no_noise, number
 from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
-from er3a.pipeline.results import Stored, read_stage
+from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.inverse import model
-from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.figures import equal_scale, new_figure, row_of_panels
+from er3a.pipeline.viewing.figures import equal_scale, row_of_panels
 from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
-from er3a.pipeline.viewing.palette import GRID, HIGHLIGHT, INK, JOINT_NAMES, MODEL, MUTED, colour_of, shape_of
+from er3a.pipeline.viewing.palette import GRID, HIGHLIGHT, INK, JOINT_NAMES, MUTED, colour_of, shape_of
 from er3a.robots.joint_limits import LimitsExceeded, meant, shown
 from er3a.robots.robot import Robot
 from er3a.selection.select import RULES
 
 NAMED = 12  # targets that a cell names
-
-
-def symptoms(robot: Robot, summary: model.InverseSummary) -> list[list[str]]:
-    """Rows of symptom, usual cause, what was tried here and what helps, from the summary's targets alone."""
-    targets = summary.targets
-    unreachable = [target.name for target in targets if not target.solutions]
-    limited = [target.name for target in targets if target.solutions and not target.within_limits]
-    free = [target.name for target in targets if target.families]
-    iterated = [target.name for target in targets if isinstance(target.method, Iteration)]
-    return [
-        [
-            tr("No solution anywhere"),
-            tr("The target is out of reach, or given in metres or radians where mm and degrees are meant"),
-            tr("Units were checked on reading. Out of reach: {own_names}", own_names=_names(unreachable)),
-            tr("The text of the target says by how many mm, and which shift or turn of the tool is enough"),
-        ],
-        [
-            tr("Solutions, but none allowed"),
-            tr("Joint limits too tight, wrong, or with the wrong sign"),
-            tr(
-                "Every branch in every turn that the limits allow. Refused by limits alone: {own_names}",
-                own_names=_names(limited),
-            ),
-            tr(
-                "Compare the limits with the manual (validation page); turn the tool or move the part as the target "
-                "says"
-            ),
-        ],
-        [
-            tr("Solver stalls or jumps near one pose"),
-            tr("A singularity: joints can turn with the tool at rest"),
-            tr(
-                "The continuum of solutions is computed in explicit form. Found at: {own_names}", own_names=_names(free)
-            ),
-            tr("Keep the joints near the reference, pass in joint space, or bend the path around the pose"),
-        ],
-        [
-            tr("Result depends on the start guess"),
-            tr("Iteration from a poor guess ends in another branch or in none"),
-            tr(
-                "The closed form needs no guess. Solved by iteration instead, from many starts: {own_names}",
-                own_names=_names(iterated),
-            ),
-            tr("Start near the branch wanted, allow restarts, and check limits inside the iteration"),
-        ],
-        [
-            tr("Sudden wrist flip between two targets"),
-            tr("The solver takes the nearest branch target by target"),
-            _greed(robot, summary.sequence),
-            tr("Choose the branches of a sequence as a whole"),
-        ],
-    ]
-
-
-def _names(names: list[str]) -> str:
-    if len(names) > NAMED:
-        return tr(
-            "{own_names} and {count} more", own_names=joined(names[:NAMED], ", "), count=number(len(names) - NAMED)
-        )
-    return joined(names, ", ") if names else tr("no target")
-
-
-def _greed(robot: Robot, sequence: model.VisitOrder | None) -> str:
-    if sequence is None:
-        return tr("Fewer than two targets can be reached, so there is no sequence")
-    return tr(
-        "All targets in order: {cost:.3g} {unit} as a whole, greedily {more:.3g} {unit} more",
-        cost=sequence.cost,
-        more=sequence.greedy_cost - sequence.cost,
-        unit=tr(RULES[sequence.rule].unit_of(robot)),
-    )
 
 
 TITLE: dict[str, Any] = {"loc": "left", "fontsize": 11, "fontweight": "bold"}
@@ -141,80 +61,6 @@ def overlay(robot: Robot, target: model.TargetResult, branches: model.SolutionRo
         "{count} branches for target {own_name}, drawn over one another", count=len(branches), own_name=target.name
     )
     return Picture(figure, alt, _conclude(target))
-
-
-def histogram(trips: model.RoundTrips) -> Picture:
-    """Share of random poses by the number of their solutions within the limits."""
-    counts = np.array(trips.counts_within_limits)
-    share = 100 * counts / trips.poses
-    figure, axes = new_figure(width=7, height=3.2)
-    bars = axes.bar(np.arange(len(counts)), share, color=MODEL, width=0.7)
-    axes.bar_label(bars, labels=[f"{value:.0f} %" if value else "" for value in share], padding=2)
-    axes.set_xticks(np.arange(len(counts)))
-    axes.set_xlabel(tr("solutions within the limits"))
-    axes.set_ylabel(tr("share of random poses (%)"))
-    axes.grid(visible=False, axis="x")
-    axes.margins(y=0.15)
-    several = share[2:].sum()
-    most = int(counts.argmax())
-    return Picture(
-        figure,
-        tr("Bar chart of the number of solutions within the limits"),
-        tr(
-            "{several:.0f} % of random reachable poses leave a choice between at least two solutions; {most} is the "
-            "commonest number ({share:.0f} % of the poses).",
-            several=several,
-            most=most,
-            share=share[most],
-        ),
-    )
-
-
-def solutions_per_position(table: model.MapRows) -> Picture:
-    """Maps of the number of branches within the limits and clear, one for each orientation of the tool."""
-    orientations = list(dict.fromkeys(table.orientation))
-    figure, axes = new_figure(1, len(orientations), width=10.5, height=4.8, squeeze=False)
-    colours = ListedColormap(["#ffffff", *matplotlib.colormaps["viridis_r"](np.linspace(0.08, 0.95, 8))])
-    shares = []
-    for panel, orientation in zip(axes[0], orientations):
-        rows = table.take(table.orientation == orientation)
-        x, z = np.unique(rows.x_mm), np.unique(rows.z_mm)
-        counts, within = (part.reshape(len(x), len(z)).T for part in (rows.clear, rows.within_limits))
-        reached = rows.solutions.reshape(len(x), len(z)).T > 0
-        image = panel.pcolormesh(x, z, counts, cmap=colours, vmin=-0.5, vmax=8.5, rasterized=True)
-        panel.contour(x, z, reached, levels=[0.5], colors=INK, linewidths=1.0)
-        panel.contour(x, z, within > 0, levels=[0.5], colors=INK, linewidths=0.8, linestyles="dashed")
-        panel.plot([0], [0], marker="P", markersize=9, color=HIGHLIGHT, markeredgecolor="white", linestyle="none")
-        panel.set_title(word("orientation.title", ORIENTATION_TITLES, orientation), **TITLE)
-        panel.set_aspect("equal")
-        panel.set_xlabel("x (mm)")
-        panel.set_ylabel("z (mm)")
-        columns, heights = np.flatnonzero(reached.any(axis=0)), np.flatnonzero(reached.any(axis=1))
-        if columns.size:
-            edge = 2 * (x[1] - x[0])
-            panel.set_xlim(x[columns[0]] - edge, x[columns[-1]] + edge)
-            panel.set_ylim(min(z[heights[0]] - edge, -edge), z[heights[-1]] + edge)
-        panel.grid(visible=False)
-        share, clear = (100 * (part > 0).sum() / max(reached.sum(), 1) for part in (within, counts))
-        named = word("orientation", ORIENTATIONS, orientation)
-        shares.append(
-            tr("{orientation}: {share:.0f} %, clear {clear:.0f} %", orientation=named, share=share, clear=clear)
-        )
-    listed = tr("; ").join(shares)
-    bar = figure.colorbar(image, ax=axes[0].tolist(), ticks=range(9), shrink=0.85)
-    bar.set_label(tr("branches within the limits, collision-free"))
-    return Picture(
-        figure,
-        tr("Maps of the number of solutions in the vertical plane through axis 1"),
-        tr(
-            "The line encloses the {count} tool positions that the arm reaches if limits are ignored. Share of "
-            "them with at least one branch within the limits (dashed line), and with one that is also "
-            "collision-free (clear): {shares}. All branches of each position were tried; between positions "
-            "nothing is known. Pink cross: base.",
-            count=number(int((table.solutions > 0).sum())),
-            shares=listed,
-        ),
-    )
 
 
 def _conclude(target: model.TargetResult) -> str:
@@ -356,14 +202,14 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
     def of_target(target: model.TargetResult) -> model.SolutionRows:
         return results.solutions.take(names == target.name)
 
-    correction, contradicted = _correction(robot, stored), stored.rests_on.get("validation") == "fail"
+    contradicted = stored.rests_on.get("validation") == "fail"
     render_stage(
         study,
         stored,
         output,
         nearest_rule=tr(NEAREST_RULE),
         overview=[overview_row(robot, target, of_target(target)) for target in chosen],
-        sections=[_section(robot, target, results, rules, correction, contradicted) for target in chosen],
+        sections=[_section(robot, target, results, rules, contradicted) for target in chosen],
         outcomes=_outcomes(summary.targets),
         not_advised=_not_advised(summary.targets),
         units=_units(robot),
@@ -372,9 +218,6 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
         optimised_heading=tr("J1 to J{count}, optimised ({units})", count=robot.joints, units=_units(robot)),
         rule_columns=[tr("Branch"), *(_rule_heading(robot, rule) for rule in rules), tr("Clearance between")],
         trips=trips,
-        histogram=histogram(trips) if trips else None,
-        map=solutions_per_position(results.map) if len(results.map) else None,
-        symptoms=symptoms(robot, summary),
         rules=[(_rule(rule), word("rule.title", RULE_TITLES, rule)) for rule in RULES],
         mix=tr(", ").join(f"{_rule(rule)} {weight:g}" for rule, weight in summary.mix.items()),
         stops=_stops(summary.sequence, {target.name for target in chosen}),
@@ -382,51 +225,11 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
     )
 
 
-@dataclass(frozen=True)
-class Correction:
-    """A single fault that validation's diagnosis names, in words, and the robot without it."""
-
-    fault: str
-    robot: Robot
-
-
-def _correction(robot: Robot, stored: Stored[model.InverseResults]) -> Correction | None:
-    """What validation's diagnosis says of the table; None if it was not computed, names no single fault, or documents
-    describe another arm."""
-    if stored.validated is None:
-        return None
-    stage = STAGES["validation"]
-    import_module(stage.messages)
-    summary = read_stage(stored.validated, stage).results.summary
-    beyond = getattr(summary, "is_beyond_correction", False)
-    for found in () if beyond else getattr(summary, "diagnoses", ()):
-        if found.corrected and len(faults := found.hypotheses[0].faults) == 1:
-            return Correction(say(faults[0]), robot.replace(**vars(found.corrected)))
-    return None
-
-
-def _after_correction(target: model.TargetResult, correction: Correction | None) -> list[str]:
-    """What a correction of the table would do for a target none of whose solutions keeps the limits."""
-    if correction is None or not target.solutions or target.within_limits:
-        return []
-    T = transform(np.array(target.xyz_mm) / 1000, np.radians(target.rpy_deg))
-    found = inverse(correction.robot, T)
-    kept, branches = np.unique(found.branch[found.within_limits]), np.unique(found.branch)
-    if not len(kept):
-        return []
-    text = N_(
-        "Validation's diagnosis of the table: {fault}. So corrected, {count} of {total} branches are within the "
-        "limits: check the table before you move or turn the target."
-    )
-    return [tr(text, fault=correction.fault, count=len(kept), total=len(branches))]
-
-
 def _section(
     robot: Robot,
     target: model.TargetResult,
     results: model.InverseResults,
     rules: list[str],
-    correction: Correction | None,
     contradicted: bool,
 ) -> dict[str, Any]:
     rows = results.solutions.take(results.solutions.target == target.name)
@@ -439,7 +242,7 @@ def _section(
         orientation=_listed(target.rpy_deg),
         reference=_joints(target.q_ref_deg),
         reason=say(target.reason),
-        advice=[*_after_correction(target, correction), *(own if contradicted else listed(target.advice))],
+        advice=own if contradicted else listed(target.advice),
         joints=[f"J{k + 1} ({'mm' if slides else '°'})>" for k, slides in enumerate(robot.slides)],
         method="" if isinstance(target.method, ClosedForm) else say(target.method),
         families=_self_motions(robot, target.families),

@@ -1,38 +1,30 @@
-"""The figure of a path: curves and measures over one time, the joints' effort before and after, and the path in space.
+"""The figure of a path: curves and measures over one time, and the joints' effort before and after.
 
 Layout is fixed, so that matplotlib draws each figure once.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from typing import Any, Literal
 
 import numpy as np
-from markupsafe import Markup
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator
 
-from er3a.collision.scene import Scene
-from er3a.kinematics.forward import skeleton
 from er3a.kinematics.singularity import SingularityType
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import tr
 from er3a.pipeline.messages.kinematics import singularity_word
-from er3a.pipeline.messages.numbers import fixed
-from er3a.pipeline.messages.say import joined, say
-from er3a.pipeline.messages.trajectory import event_word
-from er3a.pipeline.player.turning import ColourScale, Layer, scene_layers, turning_figure
+from er3a.pipeline.messages.say import joined
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.viewing import palette
 from er3a.pipeline.viewing.figures import axis_label, clearance_panels, svg_data_uri
 from er3a.pipeline.viewing.page import Picture
-from er3a.robots.joint_limits import meant, shown
+from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 
 CONDITION_SCALE = LogNorm(3, 300)
@@ -41,86 +33,17 @@ AZIMUTH, ELEVATION = np.radians(-55.0), np.radians(24.0)
 MAX_SINGULAR_ARMS = 3  # at singular poses
 
 
-def draw_path(
-    ax: Axes, robot: Robot, path: model.PathSummary, rows: model.PathChecks, repaired: model.AvoidanceRows
-) -> None:
-    """Draw the path, the repaired path, and the arm at the start, the end and the singular poses."""
-    ax.set_axis_off()
-    ax.set_aspect("equal")
-    points = rows.xyz_mm
-    reached = np.flatnonzero(rows.reachable)
-    nearest = [int(np.argmin(np.abs(rows.t_s - event.t_s))) for event in path.singularities]
-    at_events = [i for i in nearest if i in reached][:MAX_SINGULAR_ARMS]
-    arms = [(i, palette.LINK, "-") for i in reached[:1]] + [(i, palette.LINK, "--") for i in reached[-1:]]
-    for i, colour, style in arms + [(i, palette.HIGHLIGHT, "-") for i in at_events]:
-        links = project(skeleton(robot, meant(robot, rows.q_deg[i])) * 1000)
-        width, alpha = (1.6, 0.5) if colour == palette.HIGHLIGHT else (3.5, 1.0)
-        ax.plot(*links.T, color=colour, linewidth=width, alpha=alpha, linestyle=style, solid_capstyle="round", zorder=2)
-    _floor(ax, points)
-    if len(repaired):
-        ax.plot(*project(repaired.xyz_mm).T, color=palette.MODEL, linewidth=1.2, linestyle="--", zorder=5)
-    _coloured(ax, project(points), rows.condition_number)
-    flat = project(points)
-    for part in path.collisions:
-        during = (rows.t_s >= part.t0_s) & (rows.t_s <= part.t1_s)
-        ax.plot(*flat[during].T, color=palette.VERDICTS["fail"], linewidth=3.5, zorder=5)
-    ax.plot(*flat[0], "o", color=palette.INK, markersize=5, zorder=6)
-    ax.plot(*flat[-1], "s", color=palette.INK, markersize=5, zorder=6)
-    for i, event in zip(nearest, path.singularities):
-        marker = "X" if event.crossing else "D"
-        ax.plot(*flat[i], marker, color=palette.HIGHLIGHT, markersize=8, markeredgecolor="white", zorder=7)
-    ax.margins(0.04)
-
-
-def project(points: Reals) -> Reals:
-    """Points (..., 3) on the plane of the picture, (..., 2)."""
-    x, y, z = np.moveaxis(points, -1, 0)
-    across = -np.sin(AZIMUTH) * x + np.cos(AZIMUTH) * y
-    away = np.cos(AZIMUTH) * x + np.sin(AZIMUTH) * y
-    return np.stack([across, np.cos(ELEVATION) * z - np.sin(ELEVATION) * away], axis=-1)
-
-
-def _floor(ax: Axes, points: Reals) -> None:
-    """Squares of 200 mm on the floor below base and path, and the directions of the axes."""
-    low = np.floor(np.minimum(points.min(axis=0), -200) / 200) * 200
-    high = np.ceil(np.maximum(points.max(axis=0), 200) / 200) * 200
-    lines = [[(x, low[1], 0), (x, high[1], 0)] for x in np.arange(low[0], high[0] + 1, 200)]
-    lines += [[(low[0], y, 0), (high[0], y, 0)] for y in np.arange(low[1], high[1] + 1, 200)]
-    ax.add_collection(
-        LineCollection(list(project(np.array(lines, float))), colors=palette.GRID, linewidths=0.7, zorder=0)
-    )
-    corner = np.array([low[0], low[1], 0.0])
-    for k, name in enumerate("xyz"):
-        tip = corner + 200.0 * np.eye(3)[k]
-        ax.plot(*project(np.stack([corner, tip])).T, color=palette.BODY, linewidth=1.6, zorder=1)
-        label = name if k else tr("x (squares: 200 mm)")
-        x, y = project(corner + 235.0 * np.eye(3)[k])
-        ax.text(x, y, label, fontsize=8, color=palette.MUTED, ha="center", va="center")
-
-
-def _coloured(ax: Axes, points: Reals, condition: Reals) -> None:
-    segments = np.stack([points[:-1], points[1:]], axis=1)
-    known = ~np.isnan(condition[:-1])
-    ax.add_collection(
-        LineCollection(list(segments[~known]), colors=palette.MUTED, linewidths=2, linestyles=":", zorder=3)
-    )
-    lines = LineCollection(list(segments[known]), cmap=PATH_COLOURS, norm=CONDITION_SCALE, linewidths=4, zorder=4)
-    lines.set_array(np.minimum(condition[:-1][known], 1e12))
-    lines.set_rasterized(True)
-    ax.add_collection(lines)
-
-
 WIDTHS = (3.2, 2.8, 2.4, 2.0, 1.6, 1.2, 1.0, 0.9, 0.8, 0.7)  # so that curves that coincide all show
 NEAR_LIMIT_DEG = 20.0  # mm of a prismatic joint
 EVENT_STYLES: dict[bool, Literal["-", ":"]] = {True: "-", False: ":"}
 TYPE_COLOURS = {"wrist": palette.JOINTS[4], "elbow": palette.JOINTS[2], "shoulder": palette.JOINTS[3]}
-LEFT, BOTTOM, TOP = 0.055, 0.07, 0.925
-COLUMNS, GAP = (0.275, 0.275, 0.265), 0.06
+LEFT, BOTTOM, TOP = 0.07, 0.07, 0.925
+WIDTH, GAP = 0.41, 0.09  # of a column, and between the two
 FONT = 9.0
 
 
 class PathFigure:
-    """Joint curves on the left, measures in the middle, the path in space and the joints' effort on the right.
+    """Joint curves on the left, measures and the joints' effort on the right.
 
     One figure serves all paths of a page: making axes and their ticks takes longer than drawing the curves.
     """
@@ -128,13 +51,11 @@ class PathFigure:
     def __init__(self) -> None:
         self.figure = Figure(figsize=(13.2, 7.0), layout="none")  # type: ignore[arg-type]  # the stubs lack it
         self.joints = [self._axes(0, row) for row in range(3)]
-        self.measures = [self._axes(1, row) for row in range(3)]
-        self.effort = self._axes(2, 2)
-        left = LEFT + sum(COLUMNS[:2]) + 2 * GAP - 0.02
-        self.space = self.figure.add_axes((left, 0.40, COLUMNS[2] + 0.02, TOP - 0.41))
+        self.measures = [self._axes(1, row) for row in range(2)]
+        self.effort = self._axes(1, 2)
         for column in (self.joints, self.measures):
             for ax in column:
-                ax.yaxis.set_label_coords(-0.15, 0.5)
+                ax.yaxis.set_label_coords(-0.1, 0.5)
             for ax in column[:-1]:
                 ax.tick_params(labelbottom=False)
             column[-1].set_xlabel(axis_label(model.PathChecks, "t_s"), fontsize=FONT)
@@ -153,12 +74,10 @@ class PathFigure:
         _joint_curves(self.joints, robot, path, rows)
         _distances(self.measures[0], rows, near)
         _condition(self.measures[1], rows)
-        _small_measures(self.measures[2], rows)
         for ax in (*self.joints, *self.measures):
             _mark(ax, path)
             ax.set_xlim(rows.t_s[0], rows.t_s[-1])
         _effort(self.effort, path, rows, motions)
-        draw_path(self.space, robot, path, rows, motions.take(motions.strategy == path.strategy))
         handles = _legend(path)
         legend = self.figure.legend(
             handles=handles, loc="upper center", bbox_to_anchor=(0.5, 1.0), ncols=9, fontsize=FONT
@@ -175,8 +94,8 @@ class PathFigure:
 
     def _axes(self, column: int, row: int) -> Axes:
         height = (TOP - BOTTOM) / 3
-        x = LEFT + sum(COLUMNS[:column]) + column * GAP
-        ax = self.figure.add_axes((x, BOTTOM + (2 - row) * height, COLUMNS[column], height - 0.03))
+        bottom = BOTTOM + (2 - row) * height + (0.03 if (column, row) == (1, 1) else 0.0)
+        ax = self.figure.add_axes((LEFT + column * (WIDTH + GAP), bottom, WIDTH, height - 0.03))
         ax.tick_params(labelsize=FONT, length=2)
         ax.xaxis.set_major_locator(MaxNLocator(5))
         ax.yaxis.set_major_locator(MaxNLocator(4))
@@ -238,15 +157,6 @@ def _logarithmic(ax: Axes, low: float, high: float) -> None:
     ax.yaxis.set_minor_locator(NullLocator())
     ax.yaxis.set_major_locator(FixedLocator(ticks.tolist()))
     ax.yaxis.set_major_formatter(lambda value, _: f"{value:.10g}" if value < 1e5 else f"1e{round(np.log10(value))}")
-
-
-def _small_measures(ax: Axes, rows: model.PathChecks) -> None:
-    ax.plot(rows.t_s, rows.smallest_singular_value, color=palette.REFERENCE, label=tr("smallest singular value"))
-    ax.plot(rows.t_s, rows.manipulability, color=palette.MODEL, label=tr("manipulability"))
-    most = np.nanmax([*rows.smallest_singular_value, *rows.manipulability, 0.0])
-    ax.set_ylim(0, 1.35 * most if most > 0 else 1)
-    ax.set_ylabel(tr("measure"), fontsize=FONT)
-    _key(ax, "upper left")
 
 
 def _effort(ax: Axes, path: model.PathSummary, rows: model.PathChecks, motions: model.AvoidanceRows) -> None:
@@ -345,12 +255,11 @@ def _legend(path: model.PathSummary) -> list[Line2D | Patch]:
 Measured = tuple[model.PathSummary, model.MinClearance]
 
 
-def clearance_section(results: model.TrajectoryResults, most: int) -> dict[str, Any]:
-    """The picture, if any path has a pose that can be reached, and the rows of the table; at most so many paths, those
-    with the smallest clearance, are drawn."""
+def clearance_picture(results: model.TrajectoryResults, most: int) -> Picture | None:
+    """Clearance over time of at most so many paths, those with the smallest; None if no path can be reached."""
     paths = [(path, path.clearance) for path in results.summary.paths if path.clearance]
     if not paths:
-        return {"picture": None, "rows": []}
+        return None
     colliding = [path.name for path, _ in paths if path.collisions]
     if colliding:
         names = joined(colliding, ", ")
@@ -363,17 +272,7 @@ def clearance_section(results: model.TrajectoryResults, most: int) -> dict[str, 
     if len(paths) > most:
         caption = joined([caption, tr("Drawn: the {count} paths with the least clearance.", count=most)], " ")
     alt = tr("Least clearance over time, one panel per path. {conclusion}", conclusion=caption)
-    rows = [
-        [
-            path.name,
-            fixed(smallest.least_mm, 1),
-            fixed(smallest.t_s, 3),
-            say(smallest.between),
-            str(smallest.poses_measured),
-        ]
-        for path, smallest in paths
-    ]
-    return {"picture": Picture(_curves(drawn, results.clearance), alt, caption), "rows": rows}
+    return Picture(_curves(drawn, results.clearance), alt, caption)
 
 
 def _curves(paths: list[Measured], rows: model.Clearances) -> Figure:
@@ -387,56 +286,3 @@ def _curves(paths: list[Measured], rows: model.Clearances) -> Figure:
     low, high = np.nanmin(rows.clearance_mm), np.nanmax(rows.clearance_mm)
     panels[0][0].set_ylim(min(low, 0.0) - 0.05 * (high - low), high + 0.05 * (high - low))
     return figure
-
-
-POINTS = 250
-LOG_RANGE = np.log10(3), np.log10(300)  # of the condition number
-MAX_ARMS = 3
-
-
-def in_space(
-    robot: Robot, results: model.TrajectoryResults, paths: Sequence[model.PathSummary], scene: Scene | None = None
-) -> Markup:
-    """Paths in their scene, the arm at their ends and at singular poses, in a figure that turns; a list has all."""
-    checks, motions, groups = results.checks, results.avoidance, {}
-    for path in paths:
-        repaired = motions.take((motions.path == path.name) & (motions.strategy == path.strategy))
-        own = _layers(robot, path, checks.take(checks.path == path.name), repaired)
-        groups[path.name] = [*own, *scene_layers(scene)]
-    first = next((path.name for path in paths if path.singularities and path.kind != "joint"), None)
-    values = [(3, "3"), (10, "10"), (30, "30"), (300, tr("300 or more"))]
-    ticks = [((np.log10(value) - LOG_RANGE[0]) / (LOG_RANGE[1] - LOG_RANGE[0]), text) for value, text in values]
-    return turning_figure(groups, ColourScale("viridis_r", tr("condition number"), ticks), first)
-
-
-def _layers(
-    robot: Robot, path: model.PathSummary, rows: model.PathChecks, repaired: model.AvoidanceRows
-) -> Iterator[Layer]:
-    events = [int(np.argmin(np.abs(rows.t_s - event.t_s))) for event in path.singularities]
-    kept = np.unique(np.concatenate([np.linspace(0, len(rows) - 1, POINTS).astype(int), events]).astype(int))
-    condition = np.nan_to_num(np.log10(np.minimum(rows.condition_number[kept], 1e6)), nan=LOG_RANGE[0])
-    shade = (condition - LOG_RANGE[0]) / (LOG_RANGE[1] - LOG_RANGE[0])
-    yield Layer(tr("path"), "line", rows.xyz_mm[kept], width=5.0, shade=shade)
-    reached = rows.reachable
-    if not reached.all():
-        out = np.where(reached[:, None], np.nan, rows.xyz_mm)[kept]
-        yield Layer(tr("not reachable"), "line", out, "#888888", 6.0)
-    faults: list[tuple[model.Stretch[Any], str, str]] = [(part, "fail", tr("collision")) for part in path.collisions]
-    faults += [(part, "caution", tr("outside a joint limit")) for part in path.out_of_limits]
-    for part, status, name in faults:
-        during = kept[(rows.t_s[kept] >= part.t0_s) & (rows.t_s[kept] <= part.t1_s)]
-        if len(during):
-            yield Layer(name, "line", rows.xyz_mm[during], palette.VERDICTS[status], 6.0)
-    if len(repaired):
-        yield Layer(tr("repaired"), "line", repaired.xyz_mm, palette.MODEL, 2.5)
-    q = meant(robot, rows.q_deg)
-    index = np.flatnonzero(reached)
-    last = tr("arm at the end") if reached.all() else tr("arm at the last point reached")
-    for k, name, colour in ((index[:1], tr("arm at the start"), ""), (index[-1:], last, palette.LINK)):
-        for i in k:
-            yield Layer(name, "line", 1000 * skeleton(robot, q[i]), colour, 5.0)
-    for event, i in list(zip(path.singularities, events))[:MAX_ARMS]:
-        if reached[i]:
-            singular = tr("{type}, t = {t:.3f} s", type=event_word(event), t=event.t_s)
-            name = singular if event.crossing else tr("near {singular}", singular=singular)
-            yield Layer(name, "line", 1000 * skeleton(robot, q[i]), palette.HIGHLIGHT, 3.0)

@@ -41,7 +41,7 @@ from er3a.pipeline.player.motions import Fault, FaultMoment, Mark, PlayedEvent, 
 from er3a.pipeline.stages.expectations import is_met
 from er3a.pipeline.stages.trajectory import model
 from er3a.planning.motion_faults import NeededAcceleration, NeededSpeed, RateCause
-from er3a.planning.names import PathVerdict
+from er3a.planning.names import FAULTS, PathVerdict
 from er3a.program_check.program_check_findings import ClearOfAssumed
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
@@ -50,18 +50,11 @@ SLOWER = 0.97  # of the programmed pace, below which a motion counts as slower
 LARGEST_PART = 0.9  # of a path's time, up to which it is slower only there
 MIN_LENGTH = 1e-6  # m
 RANKS: tuple[Weight, ...] = ("fail", "caution", "plain")
-WEIGHTS: dict[PathVerdict, Weight] = {
-    "safe": "plain",
-    "near-singular": "caution",
-    "singular": "caution",
-    "too fast for the assumed limits": "caution",
-    "undecided": "caution",
-    "too fast": "fail",
-    "leaves limits": "fail",
-    "collides": "fail",
-    "unreachable": "fail",
-    "none found": "fail",
-}
+
+
+def weight_of(verdict: PathVerdict) -> Weight:
+    """How much a verdict weighs."""
+    return "fail" if verdict in FAULTS else "plain" if verdict == "safe" else "caution"
 
 
 def motions(
@@ -97,7 +90,7 @@ def worst_first(paths: Sequence[model.PathSummary]) -> list[model.PathSummary]:
 
 def _weight_of(path: model.PathSummary) -> Weight:
     """That of its verdict, or of what was found in its program if that weighs more."""
-    weights: list[Weight] = [WEIGHTS[path.verdict]]
+    weights: list[Weight] = [weight_of(path.verdict)]
     weights += ["fail" if each.level == "fail" else "caution" for each in path.of_program]
     return min(weights, key=RANKS.index)
 
@@ -275,7 +268,7 @@ def advised(
     if not path.in_joint_space and len(rows) and rows.near_singular[0]:
         met = any(event.crossing and event.t_s <= rows.t_s[0] for event in path.singularities)
         return joined([sentence("advice.near#met" if met else "advice.near"), text], ". ")
-    no_part = path.sound_end is None and WEIGHTS[path.verdict] == "fail"
+    no_part = path.sound_end is None and weight_of(path.verdict) == "fail"
     return joined([text, sentence("advice.no_part")], ". ") if no_part else text
 
 
@@ -299,7 +292,7 @@ def shown_verdict(path: model.PathSummary, near: ClearOfAssumed | None) -> tuple
         return weight, tr("fault in its program") if weight == "fail" else tr("doubt in its program")
     if path.verdict == "safe" and near:
         return "caution", tr("clear of assumed shapes only")
-    return WEIGHTS[path.verdict], outcome_words(path.outcomes)
+    return weight_of(path.verdict), outcome_words(path.outcomes)
 
 
 def near_assumed(path: model.PathSummary, summary: model.TrajectorySummary) -> ClearOfAssumed | None:

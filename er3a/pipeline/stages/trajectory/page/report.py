@@ -32,7 +32,7 @@ from er3a.pipeline.player.player import drawing_head, moment, player
 from er3a.pipeline.results import LeftOut, Stored
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.trajectory import model
-from er3a.pipeline.stages.trajectory.page.path_figures import PathFigure, clearance_section, in_space
+from er3a.pipeline.stages.trajectory.page.path_figures import PathFigure, clearance_picture
 from er3a.pipeline.stages.trajectory.page.played import (
     faults,
     kinds,
@@ -85,14 +85,13 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         compared_with_tray=compared_with_tray,
         faults={fault.name: fault for fault in faults(results)},
         unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
-        clearance=clearance_section(results, count),
+        clearance=clearance_picture(results, count),
         solids=solid_rows(scene),
         assumed=assumed,
         assumed_speeds=_assumed_speeds(summary.joint_limits, robot),
         limits_assumed=limits_assumed(summary.joint_limits.speed_assumed, summary.joint_limits.acceleration_assumed),
         contradicted=contradicted,
         drawn_paths=count,
-        turning=in_space(robot, results, paths[:count], scene),
         player=player(robot, motions(robot, results, _tray_events(met or {})), scene),
         drawing_head=drawing_head(),
         condition=condition_of(stored.validated),
@@ -191,7 +190,7 @@ def _figure(
 ) -> dict[str, Any]:
     alt = tr(
         "Panels over time for {path}: joint angles, velocities and accelerations; distances from the singular sets, "
-        "condition number, manipulability; the path in space; joint speeds against their limits. {finding}.",
+        "condition number; joint speeds against their limits. {finding}.",
         path=path.name,
         finding=path_text(path),
     )
