@@ -339,9 +339,8 @@ def test_what_is_not_known_of_drives(lacks, named, joints):
     ("given", "more"),
     [
         ({}, ()),
-        ({"paths": (of(name="a", counts=True, program_load_open=""),)}, ()),
-        ({"paths": (of(name="a", counts=False, program_load_open=""),)}, (LeftOut("paths_not_run", ("a",)),)),
-        ({"paths": (of(name="a", counts=True, program_load_open="t"),)}, (LeftOut("program_loads", ("a: t",)),)),
+        ({"paths": (of(name="a", counts=True),)}, ()),
+        ({"paths": (of(name="a", counts=False),)}, (LeftOut("paths_not_run", ("a",)),)),
         ({"skipped": ("b",)}, (LeftOut("paths_not_run", ("b",)),)),
         ({"unknown": (of(what="masses", numbers=(3,)),)}, (LeftOut("link_masses", ("3",)),)),
         ({"unknown": (of(what="payload", numbers=()),)}, (LeftOut("wrist_limits"),)),
