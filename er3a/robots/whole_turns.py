@@ -119,8 +119,7 @@ def uncoupling_of_linkage(robot: Robot) -> Reals | None:
 
     Notes
     -----
-    Rows are chosen such that a whole turn of a row is whole turns of joints, so the joints are the same arm for any
-    turn.
+    Rows are chosen such that whole turns of rows change joints by whole turns only.
     """
     coupling = robot.coupling
     if coupling is None or robot.rows <= robot.joints or not (whole_turns(robot).alone | robot.slides).all():
