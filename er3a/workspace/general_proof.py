@@ -41,7 +41,7 @@ from er3a.workspace.outer_sets import exclude_cells, outer_rings
 
 _ROOM, _STEPS, _PER_EDGE, _CORNERS = 0.2, 8, 5, 4
 _TINY = 1e-12
-_PER_BUCKET = 48
+_PER_BUCKET = 48  # joint values kept for a bucket: twice as many as are tried for a ring
 
 
 class Postures(NamedTuple):
@@ -85,7 +85,17 @@ class Memory(NamedTuple):
 
 
 def postures(arm: GeneralArm, across: int, most: int) -> Postures:
-    """An empty list with capacity for this many joint values."""
+    """An empty list of joint values, in buckets of the section.
+
+    Parameters
+    ----------
+    across : buckets along radius and along height
+    most : how many joint values there is place for
+
+    Returns
+    -------
+    known : nothing in it yet
+    """
     low, high = arm.heights[0]
     size = np.array([arm.radii[0], high - low]) * (1 + 1e-9) / across + 1e-9
     following, used = np.full(most, -1, dtype=np.int64), np.zeros(1, dtype=np.int64)
@@ -95,7 +105,16 @@ def postures(arm: GeneralArm, across: int, most: int) -> Postures:
 
 
 def memory(arm: GeneralArm) -> Memory:
-    """Working memory for an arm."""
+    """Working memory for an arm, for the kernels of this module.
+
+    Parameters
+    ----------
+    arm : of n rows and m joint values
+
+    Returns
+    -------
+    memory : not initialised
+    """
     n, m = arm.drive.shape
     corners = _PER_EDGE * _CORNERS
     return Memory(
@@ -153,7 +172,15 @@ def _allowed(arm: GeneralArm, v: Reals) -> bool:
 
 @kernel
 def keep(arm: GeneralArm, known: Postures, v: Reals, rho: float, z: float, azimuth: float) -> None:
-    """Add joint values to the list, unless their bucket is full."""
+    """Add joint values to the list, unless their bucket is full. Kernel.
+
+    Parameters
+    ----------
+    known : the list, changed in place
+    v : (m,), rad or m, with joint 1 at theta 0
+    rho, z : m, where they bring the tool point
+    azimuth : rad
+    """
     i, j = int((rho - known.low[0]) / known.size[0]), int((z - known.low[1]) / known.size[1])
     i, j = min(max(i, 0), known.first.shape[0] - 1), min(max(j, 0), known.first.shape[1] - 1)
     at = known.used[0]
@@ -168,7 +195,14 @@ def keep(arm: GeneralArm, known: Postures, v: Reals, rho: float, z: float, azimu
 
 @kernel
 def sample(arm: GeneralArm, unit: Reals, known: Postures, memory: Memory) -> None:
-    """Add random joint values; unit (N, m) holds uniform numbers in (0, 1)."""
+    """Add random joint values to the list, without those that break limits of sums. Kernel.
+
+    Parameters
+    ----------
+    unit : (N, m), uniform numbers in (0, 1), stretched to the limits
+    known : the list, changed in place
+    memory : working memory
+    """
     for row in range(unit.shape[0]):
         for j in range(unit.shape[1]):
             memory.v[j] = arm.v_lower[j] + unit[row, j] * (arm.v_upper[j] - arm.v_lower[j])
@@ -448,13 +482,14 @@ def fill_cells(
     memory: Memory,
     tries: int,
 ) -> None:
-    """Take what is proven filled of rings about axis 1 out of their open arcs.
+    """Take what is proven filled of rings about axis 1 out of their open arcs. Kernel.
 
     Parameters
     ----------
     cells : (N, 4), m
-    unfilled, counts : (N, MAX_ARCS, 2), rad, and (N,); changed
+    unfilled, counts : (N, MAX_ARCS, 2), rad, and (N,); changed in place
     known : joint values to begin from; those that fill a ring are added
+    memory : working memory
     tries : how many of them are tried for each ring
     """
     for n in range(cells.shape[0]):
@@ -474,6 +509,7 @@ def fill_cells(
                         if arm.full_turn or meets(unfilled[n], counts[n], a, b):
                             tried += 1
                             copy_values(known.v[at], memory.v)
+                            # Every other try holds the point firmly in the arm's plane: fewer azimuths are lost.
                             hold = 0.0 if arm.full_turn or tried % 2 == 0 else 1e3
                             counts[n] = _try(arm, cell, hold, known, memory, unfilled[n], counts[n])
                         at = known.following[at]
@@ -521,12 +557,17 @@ def unfilled_about(arm: GeneralArm, rho: Reals, z: Reals, samples: int) -> Reals
 
 
 def prove_general(arm: GeneralArm, target: float, most_cells: int, seed: int) -> Proof:
-    """Decide the section of an arm about axis 1.
+    """Decide the section of an arm about axis 1: which rings it fills, which it leaves empty.
 
     Parameters
     ----------
-    target : required width of the bracket
+    target : required width of the bracket, (upper - lower) / upper
     most_cells : how many cells may be examined; the first grid is always finished
+    seed : of the random joint values
+
+    Returns
+    -------
+    proof : cells that tile all that the arm can reach, with their arcs
     """
     outer = outer_rings(arm, min(FINEST, int(_ACROSS * np.sqrt(most_cells))))
     known, room = _sampled(arm, SAMPLES, seed)
@@ -540,6 +581,7 @@ def prove_general(arm: GeneralArm, target: float, most_cells: int, seed: int) ->
             unfilled[:] = parents.unfilled
             counts = np.isfinite(unfilled[..., 0]).sum(axis=1)
         exclude_cells(arm, outer, cells, empty, empties)
+        # Cells that are empty all around need no attempt to fill them.
         nowhere = (empties == 1) & (empty[:, 0, 1] - empty[:, 0, 0] >= TURN)
         some = np.flatnonzero(~nowhere)
         parts = unfilled[some], counts[some]

@@ -46,11 +46,16 @@ class Rings(NamedTuple):
 
 
 def outer_rings(arm: GeneralArm, across: int) -> Rings:
-    """What the joints after joint 1 may reach, about axis 2; of an arm of one joint its tip.
+    """What the joints after joint 1 may reach at most, as rings about axis 2; of an arm of one joint its tip.
 
     Parameters
     ----------
+    arm : in the frame about axis 1
     across : rings along the longer side of each set
+
+    Returns
+    -------
+    rings : about axis 2, with the azimuths that are proven empty
     """
     last = len(arm.lower) - 1
     tip = arm.tip
@@ -228,14 +233,15 @@ def _meets_anywhere(L: Reals, cell: Cell, outer: Rings, levels: int) -> bool:
 def exclude(
     L: Reals, cell: Cell, ends: tuple[float, float, float], outer: Rings, arcs: Reals, count: int, flags: Flags
 ) -> int:
-    """Take the azimuths that a joint's range brings a ring or bar to out of its arcs; what is left is empty.
+    """Take the azimuths that a joint's range brings a ring or bar to out of its arcs; what is left is empty. Kernel.
 
     Parameters
     ----------
     L : (4, 4), the link after the joint
+    cell : the ring or bar, m
     ends : the joint's range, rad, and the length of bars, m (0 for rings)
     outer : the largest reach of the joints after it
-    arcs, count : the arcs that are empty so far; changed
+    arcs, count : the arcs that are empty so far; changed in place
     flags : (2, longest) bool, working memory
 
     Returns
@@ -337,12 +343,14 @@ def _remove_rest(empty: Reals, empty_count: int, arcs: Reals, count: int) -> int
 
 @kernel
 def exclude_cells(arm: GeneralArm, outer: Rings, cells: Reals, empty: Reals, counts: Integers) -> None:
-    """Azimuths of rings about axis 1, or places along bars, that are proven empty.
+    """Find azimuths of rings about axis 1, or places along bars, that are proven empty. Kernel.
 
     Parameters
     ----------
+    arm : gives joint 1's range and link
+    outer : of :func:`outer_rings`
     cells : (N, 4), m
-    empty : (N, MAX_ARCS, 2), rad, and counts (N,): arcs of the whole turn at first; set
+    empty : (N, MAX_ARCS, 2), rad, and counts (N,): arcs of the whole turn at first; changed in place
     """
     flags = np.zeros((2, _PIECES << _LEVELS), dtype=np.bool_)
     for n in range(cells.shape[0]):
