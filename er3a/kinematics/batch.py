@@ -28,7 +28,7 @@ from er3a.robots.robot import Robot
 from er3a.robots.whole_turns import whole_turns
 
 SMALLEST_PART = 8 * BLOCK
-SLOTS_BY_STARTS = 16
+SLOTS_BY_STARTS = 16  # rows of a pose that iteration solves: as many as six joints can have
 NEARLY_OWN = 1e-5  # rad
 
 
@@ -59,6 +59,10 @@ def inverse_batch(
     turns : also return the number of whole turns that each joint can have within its limits
     threads : number of threads
     redundancy : (k,) or (N, k), for arms with more than six joints, as :func:`er3a.kinematics.inverse.inverse` takes it
+
+    Returns
+    -------
+    solutions : rows (N, S) of joint values (rad or m), S slots of the class; NaN in empty slots
 
     Raises
     ------
@@ -93,6 +97,7 @@ def inverse_batch(
         valid[left] = fault == REACHED
         _put_own(robot, T[left], own, left, q, valid)
         inside[left] = within(robot, q[left])
+    # The one exit: no row leaves that forward kinematics denies.
     failing = _confirm(robot, T, q, inside, threads)
     valid[failing] &= np.isfinite(q[failing, :, 0])
     branch = np.broadcast_to(np.arange(SLOTS), valid.shape)

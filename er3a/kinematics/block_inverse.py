@@ -74,7 +74,20 @@ class BlockConstants(NamedTuple):
 def block_constants(
     axes: Reals, points: Reals, wrist: Reals, tool_rotation: Reals, wrist_in_tool: Reals, elbow_sign: float
 ) -> BlockConstants:
-    """Constants of an arm given as its axis lines with all theta at 0 (see ``WristPartitionedArm``), base frame."""
+    """Constants of an arm with a spherical wrist, for :func:`solve_blocks`.
+
+    Parameters
+    ----------
+    axes, points : (6, 3), unit vectors and m, axis lines with all theta at 0, base frame
+    wrist : (3,), m, where axes 4, 5 and 6 meet, base frame
+    tool_rotation : (3, 3), of the tool frame
+    wrist_in_tool : (3,), m, the wrist centre in the tool frame
+    elbow_sign : +1 if axis 3 points along axis 2, -1 if against it
+
+    Returns
+    -------
+    constants : m and rad, in the frames of the module's text
+    """
     w1, w2, w4, w5, w6 = (axes[k] for k in (0, 1, 3, 4, 5))
     cos_12, sin_12 = w1 @ w2, np.linalg.norm(np.cross(w1, w2))
     x1 = np.cross(w2, w1) / sin_12
@@ -164,12 +177,14 @@ _VALID, _WITHIN, _PAIR_ROWS = 12, 13, 15  # two slots of a wrist: six angles eac
 def solve_blocks(
     arm: BlockConstants, joints: Joints, T: Reals, q_ref: Reals, out: tuple[Reals, Flags, Flags, Flags, Flags]
 ) -> None:
-    """Solve poses ``T`` (N, 4, 4).
+    """Solve poses of an arm with a spherical wrist, block by block. Kernel.
 
     Parameters
     ----------
     joints : direction, offset, lower and upper limits (6,)
-    out : fills ``q`` (N, 8, 6), by the turns within the limits that are nearest to ``q_ref`` (N or 1, 6), rad,
+    T : (N, 4, 4), m
+    q_ref : (N or 1, 6), rad
+    out : fills ``q`` (N, 8, 6), by the turns within the limits that are nearest to ``q_ref``, rad,
         NaN where a slot has no solution, and per slot ``valid`` and ``within`` the limits (N, 8). ``rigid`` (N,) says
         which poses are rigid transforms, ``marked`` (N,) which are left to the careful solver.
     """
@@ -179,6 +194,7 @@ def solve_blocks(
     for start in range(0, T.shape[0], BLOCK):
         size = min(BLOCK, T.shape[0] - start)
         for i in range(BLOCK):
+            # The last block is filled up with its last pose, so that all loops have one length.
             n = start + min(i, size - 1)
             for r in range(3):
                 for c in range(4):
@@ -256,7 +272,14 @@ def _manufacturers_angles(joints: Joints, reference: Reals, pair: Reals) -> None
 
 @kernel
 def count_turns(q: Reals, lower: Reals, upper: Reals, turns: NDArray[np.int8]) -> None:
-    """Smallest and largest number of turns (n, 6, 2) to add to angles (n, 6) within the limits; 0 and -1 for NaN."""
+    """Count the whole turns that can be added to angles within the limits. Kernel.
+
+    Parameters
+    ----------
+    q : (n, 6), rad, NaN for no solution
+    lower, upper : (6,), rad
+    turns : (n, 6, 2), filled with the smallest and largest number; 0 and -1 for NaN
+    """
     for n in range(q.shape[0]):
         for j in range(6):
             low = np.ceil((lower[j] - LIMIT_TOLERANCE - q[n, j]) * PER_TURN)
@@ -267,7 +290,17 @@ def count_turns(q: Reals, lower: Reals, upper: Reals, turns: NDArray[np.int8]) -
 
 @inner_kernel
 def in_frame_1(rows: tuple[Vector, Vector, Vector], x: float, y: float, z: float) -> Vector:
-    """A vector turned by a rotation given as three rows."""
+    """A vector turned by a rotation that is given as three rows. Kernel.
+
+    Parameters
+    ----------
+    rows : directions of frame 1 in the base frame
+    x, y, z : components in the base frame
+
+    Returns
+    -------
+    components : three numbers, in frame 1
+    """
     a, b, c = rows
     return a[0] * x + a[1] * y + a[2] * z, b[0] * x + b[1] * y + b[2] * z, c[0] * x + c[1] * y + c[2] * z
 
@@ -387,7 +420,18 @@ def _wrist(arm: BlockConstants, w: Reals, side: Reals, sign: float, pair: Reals)
 def seen_by_wrist(
     arm: BlockConstants, x: float, y: float, z: float, cos_1: float, sin_1: float, c: float, s: float
 ) -> Vector:
-    """A vector of frame 1 as the wrist sees it: turned back by the first three joints, z along axis 4."""
+    """A vector of frame 1 as the wrist sees it: turned back by the first three joints, z along axis 4. Kernel.
+
+    Parameters
+    ----------
+    x, y, z : components in frame 1
+    cos_1, sin_1 : of joint 1's geometric angle
+    c, s : cosine and sine of the direction of axis 4 in the plane across axis 2
+
+    Returns
+    -------
+    components : three numbers, in the wrist's frame
+    """
     x, y = x * cos_1 + y * sin_1, y * cos_1 - x * sin_1
     y, z = arm.cos_12 * y - arm.sin_12 * z, arm.sin_12 * y + arm.cos_12 * z
     x, y = x * c + y * s, y * c - x * s

@@ -55,9 +55,9 @@ Joints = tuple[Reals, Reals]
 Slots = tuple[Reals, NDArray[np.int8], Reals]
 
 SLOTS = 8
-BOUNDARY_M = 1e-9
+BOUNDARY_M = 1e-9  # so little out of reach is rounding: the arm is stretched, folded or at its offset
 BOUNDARY_RAD = 1e-9
-FREE = 1e-13
+FREE = 1e-13  # m or rad: nearer to its axis the direction of the wrist centre is rounding, and the joint is free
 FOLD_OFFSET = 0.9e-9  # rad; twice this tells rows apart, once this leaves no limit
 AT_FOLD = 1e-15  # m or rad
 
@@ -122,7 +122,18 @@ def _off_folds(angle: float, to_low: float, to_high: float, low_offset: float, h
 def solve(
     arm: ArmConstants, joints: Joints, T: Reals, q_ref: Reals, keep_folds: bool, keep_free: bool, out: Slots
 ) -> None:
-    """Fill ``q`` (N, 8, 6), ``fault`` and ``gap`` (N, 8) for poses ``T`` (N, 4, 4); see ``solve_slots``."""
+    """Solve poses in closed form, all eight branches [1]_ [2]_. Kernel.
+
+    Parameters
+    ----------
+    arm : constants of its axis lines
+    joints : direction and offset (6,)
+    T : (N, 4, 4), m
+    q_ref : (N, 6), rad, supplies joints that are free
+    keep_folds, keep_free : see the module's text
+    out : fills ``q`` (N, 8, 6), rad, ``fault`` and ``gap`` (N, 8), as :func:`.wrist_partitioned.solve_slots` returns
+        them
+    """
     (direction, offset), (q, fault, gap) = joints, out
     for n in range(T.shape[0]):
         tool_point = (T[n, 0, 3], T[n, 1, 3], T[n, 2, 3])
@@ -132,6 +143,7 @@ def solve(
         along = dot(arm.axis_1, v)
         A, B = dot(arm.axis_2, v) - along * arm.cos_12, -dot(arm.axis_2, cross(arm.axis_1, v))
         C, H = arm.shoulder_offset - along * arm.cos_12, np.hypot(A, B)
+        # The equation of joint 1 has no root if the offset along axis 2 exceeds the wrist's distance from axis 1.
         missing = np.abs(C) - H
         if missing > BOUNDARY_M * arm.sin_12:
             fault[n, :] = OFF_AXIS
@@ -144,6 +156,7 @@ def solve(
             theta_1 = phi + (delta if shoulder == 0 else -delta)
             if H < FREE:
                 theta_1 = direction[0] * q_ref[n, 0] + offset[0] + (np.pi if keep_free and shoulder == 1 else 0.0)
+            # Turned back by joint 1, into the plane across axis 2.
             c, s = np.cos(theta_1), -np.sin(theta_1)
             x = subtract(add(rotated(v, arm.axis_1, c, s), arm.point_1), arm.point_2)
             x = subtract(x, scaled(arm.axis_2, dot(arm.axis_2, x)))

@@ -34,7 +34,7 @@ from er3a.robots.joint_limits import equivalents_within, within
 from er3a.robots.robot import Robot
 from er3a.robots.whole_turns import shortest_move
 
-SAME_JOINTS = 1e-9
+SAME_JOINTS = 1e-9  # rad: rows so near to each other are one
 SAME_MEMBER = 1e-6
 MISSED = 1e-4  # rad or m from all rows
 SOLVES = 1e-12  # m and parts of 1
@@ -68,6 +68,10 @@ def inverse(
         None means those of ``q_ref``
     self_motion_rows : for an arm with one redundancy parameter, add for each self-motion the member nearest to
         ``q_ref`` and the one with the largest limit margin as rows; always done if no row has the parameter's value
+
+    Returns
+    -------
+    solutions : rows (k, n), rad or m, all turns within the limits; of a branch outside them one row with the reason
 
     Raises
     ------
@@ -206,15 +210,33 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, se
 
 
 def is_complete(robot: Robot, certainty: Integers) -> Flags:
-    """Whether the class found all solutions of poses (N,), of which it is so certain (N,)."""
+    """Whether the class found all solutions of poses.
+
+    Parameters
+    ----------
+    certainty : (N,), of the class, see :class:`.by_class.ClassRows`
+
+    Returns
+    -------
+    complete : (N,) bool; always True for classes that don't eliminate
+    """
     solver = by_class.arm_solver(robot).chain
     closed = not ARM_CLASSES[solver.code].eliminates and not isinstance(solver, LinkedRows)
     return np.asarray((certainty == CERTAIN) | closed)
 
 
 def missed_row(robot: Robot, T: Reals, q_ref: Reals) -> solutions.Solutions:
-    """What a search from the reference (n,) finds at a pose that the arm's class has no row for, within the limits if
-    it can."""
+    """What a search from the reference finds at a pose that the arm's class has no row for.
+
+    Parameters
+    ----------
+    T : (4, 4), m
+    q_ref : (n,), rad or m
+
+    Returns
+    -------
+    found : one row, solved or not, within the limits if it can be
+    """
     open_pose, mask = bool(by_class.parameters_of(robot)), task_mask(robot)
     robot, T = by_class.with_task_frame(robot), T @ by_class.arm_solver(robot).task_frame
     near = nearest_arm(robot, T, q_ref, mask, open_pose)
@@ -243,12 +265,30 @@ def _by_iteration(robot: Robot, T: Reals, q_ref: Reals) -> _Found:
 
 
 def starts_of(robot: Robot) -> int:
-    """How many random starts look for the solutions of an arm that no class solves."""
+    """How many random starts look for the solutions of an arm that no class solves.
+
+    Parameters
+    ----------
+    robot : any
+
+    Returns
+    -------
+    count : few if joints depend on each other, since there any start leads elsewhere
+    """
     return STARTS_OF_DEPENDENT if by_class.arm_solver(robot).chain.code == "dependent" else STARTS
 
 
 def missing_class(robot: Robot) -> ClosedFormMissing | solutions.DependentJoints | None:
-    """Why the arm is solved by iteration."""
+    """Why the arm is solved by iteration.
+
+    Parameters
+    ----------
+    robot : that no class solves
+
+    Returns
+    -------
+    why : dependent joints, or what a spherical wrist lacks
+    """
     return (
         solutions.DependentJoints()
         if by_class.arm_solver(robot).chain.code == "dependent"
@@ -257,7 +297,21 @@ def missing_class(robot: Robot) -> ClosedFormMissing | solutions.DependentJoints
 
 
 def checked_reference(robot: Robot, q_ref: Reals | None) -> Reals:
-    """Reference joint values (n,), zeros for None; :class:`ShapeError` or :class:`PoseError` if they are none."""
+    """Reference joint values of one pose.
+
+    Parameters
+    ----------
+    q_ref : (n,), rad or m; None for zeros
+
+    Returns
+    -------
+    q_ref : (n,), rad or m
+
+    Raises
+    ------
+    ShapeError, PoseError
+        if they have not one finite number for each joint
+    """
     q_ref = np.zeros(robot.joints) if q_ref is None else checked_joints(robot, q_ref, "q_ref")
     if q_ref.ndim != 1:
         raise ShapeError("q_ref", q_ref.shape, f"({robot.joints},)")

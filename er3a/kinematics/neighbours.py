@@ -55,7 +55,17 @@ class Neighbours:
 
 
 def solvable(robot: Robot, T: Reals, usable: Usable | None = None) -> Flags:
-    """Whether poses (N, 4, 4) have a solution within the limits that is usable, (N,)."""
+    """Whether poses have a solution within the limits that is usable.
+
+    Parameters
+    ----------
+    T : (N, 4, 4), m
+    usable : which arms (k, n) count; None: all
+
+    Returns
+    -------
+    solved : (N,) bool
+    """
     found = inverse_batch(robot, T)
     kept = found.within_limits.copy()
     if usable is not None:
@@ -65,12 +75,18 @@ def solvable(robot: Robot, T: Reals, usable: Usable | None = None) -> Flags:
 
 
 def neighbours(robot: Robot, T: Reals, random: np.random.Generator, usable: Usable | None = None) -> Neighbours:
-    """Search around a pose (4, 4) of the tool.
+    """Search poses near a refused one that have a solution within the limits.
 
     Parameters
     ----------
+    T : (4, 4), m
+    random : draws the orientations for the ratio
     usable : which arms count. If given, the poses are fit for advice: beyond the smallest usable turn or shift by one
         of ``SPARE_TURNS`` or ``SPARE_SHIFTS``, and usable after rounding for display
+
+    Returns
+    -------
+    found : rad and m; the turn and the shift are upper bounds of the smallest ones
     """
     turned = np.tile(T, (RANDOM_ORIENTATIONS, 1, 1))
     turned[:, :3, :3] = scipy.spatial.transform.Rotation.random(RANDOM_ORIENTATIONS, rng=random).as_matrix()

@@ -31,12 +31,30 @@ class SymbolicTransform:
     entries: tuple[tuple[Mapping[Product, float], ...], ...]
 
     def at(self, moved: Reals) -> Reals:
-        """The transform (4, 4), in m, at what moves of each row (m,): its theta, in rad, or its d, in m."""
+        """The transform at values of what moves.
+
+        Parameters
+        ----------
+        moved : (m,), of each row theta, rad, or d, m
+
+        Returns
+        -------
+        T : (4, 4), m
+        """
         return np.array([[_value(entry, moved) for entry in row] for row in self.entries])
 
 
 def link_transforms(robot: Robot) -> tuple[SymbolicTransform, ...]:
-    """Each row of the table as a transform: ``Rz Tz Tx Rx`` (standard) or ``Rx Tx Rz Tz`` (modified)."""
+    """Each row of the table as a symbolic transform.
+
+    Parameters
+    ----------
+    robot : m rows
+
+    Returns
+    -------
+    transforms : m, ``Rz Tz Tx Rx`` (standard) or ``Rx Tx Rz Tz`` (modified), m
+    """
     parts, found = link_parts(robot), []
     for k in range(robot.rows):
         moved = _product(_motion(robot, k), _constant(_without_d(robot, k) @ parts[k + 1, ALONG_Z]))
@@ -49,7 +67,16 @@ def link_transforms(robot: Robot) -> tuple[SymbolicTransform, ...]:
 
 
 def arm_transform(robot: Robot) -> SymbolicTransform:
-    """From the tool to the base frame, base and tool included."""
+    """The symbolic transform from the tool to the base frame, base and tool included.
+
+    Parameters
+    ----------
+    robot : m rows
+
+    Returns
+    -------
+    transform : its entries are sums of products of sines and cosines of sums of angles, and of d
+    """
     links = constant_links(robot)
     whole = _constant(links[0])
     group: tuple[int, ...] = ()  # rows that turn about parallel axes, whose rotation still follows whole on the right
