@@ -38,7 +38,7 @@ BLOCK = 64
 NEAR = 1e-6  # rad or parts of the arm's size from where branches meet: left to the careful solver
 PARALLEL = 1e-9  # rad
 MEETS_M = 1e-9
-SOLVES = 1e-10
+SOLVES = 1e-10  # residual, rad and parts of the size, up to which a polished row is kept
 
 _W, _Z6, _X6, _MARK = (
     0,
@@ -92,9 +92,15 @@ class ThreeParallel:
 
 
 def three_parallel(links: Reals) -> ThreeParallel | None:
-    """The solver for links (7, 4, 4), or None if the chain is of another kind.
+    """Recognise six revolute joints with axes 2, 3 and 4 parallel and 5 and 6 meeting.
 
-    Tolerances: axes parallel to 1e-9 rad, meeting to 1e-9 m.
+    Parameters
+    ----------
+    links : (7, 4, 4), m
+
+    Returns
+    -------
+    solver : None if the chain is of another kind; axes are parallel to 1e-9 rad and meet to 1e-9 m
     """
     axes, points = axes_of(links)
     w = axes[1]
@@ -174,8 +180,16 @@ def _constants(links: Reals, axes: Reals, points: Reals, wrist: Reals) -> Parall
 
 @kernel
 def solve_parallel_blocks(k: ParallelConstants, T: Reals, slack: float, q: Reals, marked: Flags) -> None:
-    """Fill ``q`` (N, 8, 6) and ``marked`` (N,) for poses T (N, 4, 4); roots that miss by less than ``slack`` (m) are
-    taken as met."""
+    """Solve poses in closed form, block by block [1]_. Kernel.
+
+    Parameters
+    ----------
+    k : constants of the arm
+    T : (N, 4, 4), m
+    slack : m, roots that miss by less are taken as met
+    q : (N, 8, 6), filled, rad, NaN where a slot has no solution
+    marked : (N,), filled with where branches meet, for the careful solver
+    """
     pose, side, out = np.empty(_POSE_ROWS * BLOCK), np.empty(12 * BLOCK), np.empty(13 * BLOCK)
     for start in range(0, T.shape[0], BLOCK):
         size = min(BLOCK, T.shape[0] - start)
@@ -312,8 +326,16 @@ def _wrist_and_elbow(k: ParallelConstants, pose: Reals, side: Reals, sign: float
 
 @kernel
 def polish_rows(links: Reals, size: float, T: Reals, q: Reals, apart: bool) -> None:
-    """Newton's steps on rows (N, 8, 6) near singular poses; rows that do not solve the pose and, with ``apart``, the
-    second of two that meet, become NaN."""
+    """Move rows near singular poses to solutions, by Newton's steps. Kernel.
+
+    Parameters
+    ----------
+    links : (7, 4, 4), m
+    size : m, of the chain
+    T : (N, 4, 4), m
+    q : (N, 8, 6), rad, changed in place; rows that do not solve the pose become NaN
+    apart : whether the second of two rows that meet becomes NaN, too
+    """
     scaled, pose, w, J = links.copy(), np.empty((4, 4)), np.empty((8, 4, 4)), np.empty((6, 7))
     dq, columns, sliding = np.empty(12), np.zeros(6, np.int64), np.zeros(6, np.bool_)
     scaled[:, :3, 3] /= size

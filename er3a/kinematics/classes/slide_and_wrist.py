@@ -69,7 +69,17 @@ class SlideAndWrist:
 
 
 def slide_and_wrist(links: Reals, sliding: Flags) -> SlideAndWrist | None:
-    """The solver for links (7, 4, 4), or None if the chain is of another kind."""
+    """Recognise six joints with a spherical wrist and one slide among the first three.
+
+    Parameters
+    ----------
+    links : (7, 4, 4), m
+    sliding : (6,), prismatic joints
+
+    Returns
+    -------
+    solver : None if the chain is of another kind
+    """
     slides = np.flatnonzero(sliding)
     if len(slides) != 1 or slides[0] > 2:
         return None
@@ -109,8 +119,17 @@ def slide_and_wrist(links: Reals, sliding: Flags) -> SlideAndWrist | None:
 
 
 def solve_slide_and_wrist(arm: SlideAndWrist, otherwise: Callable[[Reals], RowsFound], T: Reals) -> RowsFound:
-    """All solutions for poses T (N, 4, 4), m, those in doubt by ``otherwise``; q (N, 16, 6) in rad and m, NaN behind
-    the last."""
+    """All solutions for poses, by a quartic of the slide [1]_; those in doubt by another solver.
+
+    Parameters
+    ----------
+    otherwise : solves poses (k, 4, 4), m, in general
+    T : (N, 4, 4), m
+
+    Returns
+    -------
+    found : (N, 16, 6), rad and m, NaN after the last
+    """
     T = np.ascontiguousarray(T, dtype=float)
     scaled = T.copy()
     scaled[:, :3, 3] /= arm.size

@@ -80,8 +80,17 @@ class TwoSlides:
 
 
 def two_slides(links: Reals, sliding: Flags) -> TwoSlides | None:
-    """The solver for links (7, 4, 4) two of whose joints are prismatic; None if no reading of the loop determines its
-    solutions."""
+    """The solver of six joints, two of which are prismatic; readings are tried out on poses of random joints.
+
+    Parameters
+    ----------
+    links : (7, 4, 4), m
+    sliding : (6,), prismatic joints
+
+    Returns
+    -------
+    solver : None if no reading of the loop determines its solutions
+    """
     size = size_of(links)
     scaled = np.array(links, float)
     scaled[:, :3, 3] /= size
@@ -126,7 +135,16 @@ def _arrangements(links: Reals, sliding: Flags) -> list[tuple[Integers, float, R
 
 
 def solve_two_slides(arm: TwoSlides, T: Reals) -> RowsFound:
-    """All solutions for poses T (N, 4, 4), m; q (N, 16, 6) in rad and m, NaN after the last."""
+    """All solutions for poses, by the determinant that takes both slides out [1]_.
+
+    Parameters
+    ----------
+    T : (N, 4, 4), m
+
+    Returns
+    -------
+    found : (N, 16, 6), rad and m, NaN after the last
+    """
     return all_rows(arm, _by_readings, T)
 
 
