@@ -162,10 +162,6 @@ def to_joints(robot: Robot, x: Reals) -> Reals:
 def parameters_of(robot: Robot) -> tuple[Redundancy, ...]:
     """What a pose leaves open: the redundancy parameters of the arm's class.
 
-    Parameters
-    ----------
-    robot : any
-
     Returns
     -------
     parameters : empty for arms of up to six joints
@@ -566,10 +562,6 @@ def slot_of(robot: Robot, T: Reals, q: Reals) -> int:
 def task_mask(robot: Robot) -> Reals:
     """Which components of a pose the arm's solutions meet.
 
-    Parameters
-    ----------
-    robot : any
-
     Returns
     -------
     mask : (6,), 1 or 0 for x, y, z and the rotations about x, y, z of the frame of :func:`with_task_frame`
@@ -588,10 +580,6 @@ def task_mask(robot: Robot) -> Reals:
 @derived
 def with_task_frame(robot: Robot) -> Robot:
     """The robot with its tool turned to the frame in which :func:`task_mask` counts.
-
-    Parameters
-    ----------
-    robot : any
 
     Returns
     -------

@@ -267,10 +267,6 @@ def _by_iteration(robot: Robot, T: Reals, q_ref: Reals) -> _Found:
 def starts_of(robot: Robot) -> int:
     """How many random starts look for the solutions of an arm that no class solves.
 
-    Parameters
-    ----------
-    robot : any
-
     Returns
     -------
     count : few if joints depend on each other, since there any start leads elsewhere

@@ -107,10 +107,6 @@ def batch_round_trips(robot: Robot, random: np.random.Generator, poses: int) -> 
 def has_class(robot: Robot) -> bool:
     """Whether a class's solver, not random starts, solves the arm.
 
-    Parameters
-    ----------
-    robot : any
-
     Returns
     -------
     has : False for dependent joints, and for chains of no class

@@ -96,10 +96,6 @@ class DeterminantFactors:
 def characteristic_length(robot: Robot) -> float:
     """Length that makes linear and angular rows comparable: the wrist centre's reach from axis 2.
 
-    Parameters
-    ----------
-    robot : any
-
     Returns
     -------
     length : m; for arms without a wrist centre half the length along all links
@@ -295,8 +291,8 @@ def change_per_joint(robot: Robot) -> Reals:
 
     Notes
     -----
-    A joint turns the axes after it, and moves their points and the tool point by at most its lever, so each column
-    changes by at most ``sqrt(1 + (2 R / length)^2)`` where R is the longest stretched distance along the arm.
+    A joint turns the axes after it, and moves their points and the tool point by at most its lever. So each column
+    changes by at most ``sqrt(1 + (2 R / length)^2)``. R is the longest stretched distance along the arm.
     """
     points, T = axes_at_zero_theta(robot)[1:]
     slide = np.zeros(len(points))

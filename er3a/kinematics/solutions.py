@@ -77,10 +77,6 @@ def branch_labels(robot: Robot) -> tuple[BranchLabel, ...]:
 def slot_labels(robot: Robot) -> tuple[BranchLabel | SlotName, ...]:
     """The codes of the slots of the arm's class.
 
-    Parameters
-    ----------
-    robot : any
-
     Returns
     -------
     labels : empty where no signs separate the solutions, which are numbered then

@@ -115,10 +115,6 @@ class WristPartitionedArm:
 def wrist_partitioned_arm(robot: Robot) -> WristPartitionedArm:
     """The arm's axis lines and wrist centre, as recognised from its table.
 
-    Parameters
-    ----------
-    robot : any
-
     Returns
     -------
     arm : base frame, m
@@ -136,10 +132,6 @@ def wrist_partitioned_arm(robot: Robot) -> WristPartitionedArm:
 
 def wrist_partition_missing(robot: Robot) -> ClosedFormMissing | None:
     """Which property the arm lacks for the closed form of a spherical wrist.
-
-    Parameters
-    ----------
-    robot : any
 
     Returns
     -------
@@ -286,10 +278,6 @@ def constants_for_blocks(robot: Robot) -> BlockConstants:
 def parallel_axes_arm(robot: Robot) -> ThreeParallel | None:
     """The solver of an arm with axes 2, 3 and 4 parallel and 5 and 6 meeting (UR and its like).
 
-    Parameters
-    ----------
-    robot : any
-
     Returns
     -------
     solver : None for other arms, and for those with a spherical wrist
@@ -302,10 +290,6 @@ def parallel_axes_arm(robot: Robot) -> ThreeParallel | None:
 
 def has_branches(robot: Robot) -> bool:
     """Whether the arm has the eight branches of :mod:`er3a.kinematics.solutions`, which three signs name.
-
-    Parameters
-    ----------
-    robot : any
 
     Returns
     -------

@@ -76,8 +76,8 @@ def arctan2(y: float, x: float) -> float:
 
     Notes
     -----
-    The point is mirrored into the octant below the diagonal, and into the angles below 22.5 deg if it is above them
-    (``arctan r = pi/4 + arctan((r - 1) / (r + 1))``); then fdlibm's polynomial [1]_.
+    The point is mirrored into the octant below the diagonal. Above 22.5 deg it is turned by 45 deg: ``arctan r = pi/4 +
+    arctan((r - 1) / (r + 1))``. Then comes fdlibm's polynomial [1]_.
     """
     ax, ay = abs(x), abs(y)
     steep = ay > ax

@@ -661,8 +661,8 @@ class SectionExtent(Extreme):
 def undecided_from(quantity: Quantity, expected: float, size: float) -> float:
     """The uncertainty from which on a value taken at random, of those that are plausible, would pass as often as not.
 
-    Plausible are points within ``size`` (mm) of the base along each axis, any angle (those between two lines
-    from 0 to 180, or 90 where a direction has no sign), and speeds up to twice the stated.
+    Plausible are points within ``size`` of the base along each axis, and speeds up to twice the stated. Angles may have
+    any value: between two lines 0 to 180 deg, or to 90 where a direction has no sign.
 
     Parameters
     ----------

@@ -67,7 +67,7 @@ def point_chain(robot: Robot) -> PointChain:
 
     Parameters
     ----------
-    robot : any arm; limits give what the random numbers are spread over
+    robot : limits give what the random numbers are spread over
 
     Returns
     -------
@@ -76,7 +76,7 @@ def point_chain(robot: Robot) -> PointChain:
     Notes
     -----
     Each link's rotation is written as ``Rz Rx Rz``. The turns about z are added to the constant angles of the joints on
-    both sides, with the step turned accordingly, so that a link costs a turn about x only.
+    both sides. So a link costs a turn about x only.
     """
     links = constant_links(robot)
     last, point = moving_tip(links, robot.sliding)

@@ -75,10 +75,6 @@ class GeneralArm(NamedTuple):
 def coupled(robot: Robot) -> bool:
     """Whether joints depend on one another, or sums of them have limits.
 
-    Parameters
-    ----------
-    robot : any
-
     Returns
     -------
     coupled : if so, the values v of :class:`GeneralArm` are joint values instead of row values

@@ -351,7 +351,6 @@ def prove_robot(robot: Robot, most_cells: int, seed: int) -> Proven:
 
     Parameters
     ----------
-    robot : any
     most_cells : the budget, of which each cell counts for ``CELLS``
     seed : of the random joint values
 

@@ -63,10 +63,6 @@ MapsMissing = InverseUnknown | JointOneShared | OrientationsUnknown
 def lacking_for_maps(robot: Robot) -> MapsMissing | None:
     """Why there are no maps of what a robot's tool can do.
 
-    Parameters
-    ----------
-    robot : any
-
     Returns
     -------
     why : None if there are

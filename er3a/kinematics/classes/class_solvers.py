@@ -186,7 +186,7 @@ class ChainSolver(Protocol):
 
         Returns
         -------
-        seeds : (any, n) each, rad or m
+        seeds : arrays (j, n), rad or m
         """
 
     def names(self, x: Reals) -> tuple[SlotName, ...]:
@@ -229,7 +229,7 @@ class WithoutParameters:
 
         Returns
         -------
-        seeds : (k, n) each, rad or m
+        seeds : arrays (j, n), rad or m
         """
         return []
 
@@ -340,7 +340,7 @@ class ParallelAxes(WithoutParameters):
 
         Returns
         -------
-        seeds : (2, 6) each, rad
+        seeds : arrays (2, 6), rad
         """
         return [
             family.members(np.array([0.5 * (low + high), 0.25 * low + 0.75 * high]), elbow)
