@@ -442,7 +442,7 @@ def seen_by_wrist(
 def _outer_angles(
     arm: BlockConstants, zx: float, zy: float, beside_6: Vector, px: float, py: float, cos_5: float, sin_5: float
 ) -> tuple[float, float]:
-    """phi_4 turns (px, py) to axis 6 as seen along axis 4; phi_6 is what is left for the vector beside axis 6."""
+    """phi_4 turns (px, py) to axis 6 as seen along axis 4; phi_6 is what is left for the vector across axis 6."""
     c, s = zx * px + zy * py, zy * px - zx * py
     per = 1.0 / np.sqrt(c * c + s * s)
     phi_4 = arctan2(s, c)

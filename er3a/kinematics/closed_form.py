@@ -58,7 +58,7 @@ SLOTS = 8
 BOUNDARY_M = 1e-9  # so little out of reach is rounding: the arm is stretched, folded or at its offset
 BOUNDARY_RAD = 1e-9
 FREE = 1e-13  # m or rad: nearer to its axis the direction of the wrist centre is rounding, and the joint is free
-FOLD_OFFSET = 0.9e-9  # rad; twice this tells rows apart, once this leaves no limit
+FOLD_OFFSET = 0.9e-9  # rad; twice this makes two rows, once this leaves no limit
 AT_FOLD = 1e-15  # m or rad
 
 REACHED, TOO_FAR, TOO_NEAR, OFF_AXIS, ORIENTATION = 0, 1, 2, 3, 4
@@ -110,7 +110,7 @@ def _wrap(angle: float) -> float:
 
 @inner_kernel
 def _off_folds(angle: float, to_low: float, to_high: float, low_offset: float, high_offset: float) -> float:
-    """An angle in 0..pi, put beside that end whose distance from the fold (m or rad) is nothing but rounding."""
+    """An angle in 0..pi, put next to that end whose distance from the fold (m or rad) is nothing but rounding."""
     if to_low < AT_FOLD and low_offset > 0.0:
         return low_offset
     if to_high < AT_FOLD and high_offset > 0.0:
@@ -202,7 +202,7 @@ def solve(
 def _solve_wrist(
     arm: ArmConstants, axis_6: Vector, beside_6: Vector, free_4: float, keep_folds: bool, keep_free: bool, theta: Reals
 ) -> float:
-    """Set the last three columns of ``theta`` (2, 6) from where axis 6 and the vector beside it must turn to.
+    """Set the last three columns of ``theta`` (2, 6) from where axis 6 and the vector across it must turn to.
 
     Returns by how much (rad) the wrist would have to tilt further than it can; beyond the boundary ``theta`` is NaN.
     """

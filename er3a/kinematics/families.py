@@ -186,10 +186,10 @@ def _in_line(robot: Robot, T: Reals, q: Reals) -> Reals | None:
 
 GRID = np.radians(2.0)
 SPLIT, ROUNDS = 16, 10  # an interval is cut into so many parts, so often
-SAME_FAMILY = 1e-6  # rad; next to two singularities families that solve a pose to 1e-9 are no farther apart
-SAME_CURVE = SAME_FAMILY * np.array([1, 1, 0.2, 1, 1, 1])  # no farther apart does rounding put the roots of one elbow
+SAME_FAMILY = 1e-6  # rad; next to two singularities families that solve a pose to 1e-9 differ by no more
+SAME_CURVE = SAME_FAMILY * np.array([1, 1, 0.2, 1, 1, 1])  # rounding makes the roots of one elbow differ by no more
 FREE_MOTION = 1e-7  # singular value below which joints move with the tool at rest
-CURVES: tuple[tuple[SingularityType, int, int], ...] = (("shoulder", 4, 0), ("elbow", 2, 1))  # slots apart, joint
+CURVES: tuple[tuple[SingularityType, int, int], ...] = (("shoulder", 4, 0), ("elbow", 2, 1))  # step in slots, joint
 FREE_JOINT: dict[SingularityType, int] = {"shoulder": 0, "elbow": 1}
 
 

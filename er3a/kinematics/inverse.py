@@ -110,7 +110,7 @@ def _by_closed_form(robot: Robot, T: Reals, q_ref: Reals) -> _Found:
             slots.append(slot)
     rows = [_rows_of_branch(robot, q[slot], q_ref) for slot in slots]
     for family in continua:
-        if family.within_limits and max_joint_move(np.concatenate(rows), family.q0).min() > SAME_MEMBER:
+        if family.within_limits and _distance(rows, family.q0) > SAME_MEMBER:
             slots.append(family.branches[0])
             rows.append(family.q0[None])
     return _Found(*_stacked(slots, rows, 6), solutions.ClosedForm(), _unsolved(robot, fault, gap), continua)
@@ -166,27 +166,25 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, se
         return _by_iteration(robot, T, q_ref)
     values = by_class.checked_parameters(robot, redundancy, q_ref[None], 1)
     found = by_class.slots_of_class(robot, T[None], q_ref[None], values)
-    slots, motions = found.q, found.settled[0].motions if found.settled else ()
-    filled = np.flatnonzero(np.isfinite(slots[0, :, 0]))
+    slots, motions = found.q[0], found.settled[0].motions if found.settled else ()
+    filled = np.flatnonzero(np.isfinite(slots[:, 0]))
     traced: Sequence[SelfMotionCurve] = motions
     if len(solver.parameters) == 1:
         traced = by_class.LazySelfMotions(robot, T, q_ref, values)
         motions = tuple(traced) if self_motion_rows or not filled.size else ()
     if solver.parameters:  # keep one where two branches meet; other arms' poses of that kind are settled
-        apart = np.abs(shortest_move(robot, slots[0, filled, None] - slots[0, filled])).max(axis=2, initial=0.0)
+        apart = np.abs(shortest_move(robot, slots[filled, None] - slots[filled])).max(axis=2, initial=0.0)
         filled = filled[~np.triu(apart < SAME_JOINTS, 1).any(axis=0)]
     branches: list[int] = filled.tolist()
-    rows = [_rows_of_branch(robot, slots[0, slot], q_ref) for slot in branches]
+    rows = [_rows_of_branch(robot, slots[slot], q_ref) for slot in branches]
     for motion in motions:
-        for member in (motion.q0, motion.max_margin_member) if solver.parameters else (motion.q0,):
-            listed = np.concatenate([np.empty((0, robot.joints)), *rows])
-            if motion.within_limits and max_joint_move(listed, member).min(initial=np.inf) > SAME_MEMBER:
-                branches.append(by_class.slot_of(robot, T, member))
-                rows.append(member[None])
+        if motion.within_limits:
+            members = (motion.q0, motion.max_margin_member) if solver.parameters else (motion.q0,)
+            _list_members(robot, T, members, branches, rows)
     certain = bool(is_complete(robot, found.certainty)[0])
     if not certain and isinstance(solver, LinkedRows):  # the rows found may be members that the linkage can't make
         for row in all_found(robot, T, STARTS):
-            if max_joint_move(np.concatenate([np.empty((0, robot.joints)), *rows]), row).min(initial=np.inf) > MISSED:
+            if _distance(rows, row) > MISSED:
                 branches.append(by_class.slot_of(robot, T, row))
                 rows.append(_rows_of_branch(robot, row, q_ref))
     if len(solver.parameters) == 1 and np.abs(forward(robot, q_ref) - T).max() <= SOLVES:
@@ -194,19 +192,30 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, se
         certain = certain and by_class.arm_solver(robot).poses_at(T).moves(to_rows(robot, q_ref))
     unsolved: tuple[solutions.Unsolved, ...] = ()
     if not branches:
-        open_pose = bool(solver.parameters)
         near = missed_row(robot, T, q_ref)
-        if bool(near.solved) and not (open_pose and redundancy is not None):
-            branches, rows = _near_solved(
-                robot, T, near.q, q_ref
-            )  # the class missed it, or the reference's parameters do
+        # The class missed it, or the reference's parameters do.
+        if near.solved and not (solver.parameters and redundancy is not None):
+            branches, rows = _near_solved(robot, T, near.q, q_ref)
             certain = False
         else:
             position, rotation = (float(np.asarray(error)) for error in (near.position_error, near.rotation_error))
             miss = solutions.NearestMiss(position * 1000, float(np.degrees(rotation)))
             unsolved = (solutions.PoseUnsolved(0, solutions.NoSolutionOfClass(miss)),)
-    method = solutions.ByClass(solver.code, bool(certain), bool(solutions.slot_labels(robot)))
+    method = solutions.ByClass(solver.code, certain, bool(solutions.slot_labels(robot)))
     return _Found(*_stacked(branches, rows, robot.joints), method, unsolved, traced)
+
+
+def _distance(rows: list[Reals], q: Reals) -> float:
+    """How far joint values (n,) are from the nearest of all rows, each (k, n); infinite if there are none."""
+    return min((max_joint_move(each, q).min() for each in rows), default=np.inf)
+
+
+def _list_members(robot: Robot, T: Reals, members: Sequence[Reals], branches: list[int], rows: list[Reals]) -> None:
+    """Add members (n,) of a self-motion to the rows, with their branches, unless rows are the same but for rounding."""
+    for member in members:
+        if _distance(rows, member) > SAME_MEMBER:
+            branches.append(by_class.slot_of(robot, T, member))
+            rows.append(member[None])
 
 
 def is_complete(robot: Robot, certainty: Integers) -> Flags:

@@ -38,7 +38,7 @@ class BatchRoundTrips:
     poses : number of random joint vectors
     solutions : number of solutions, all poses together
     worst_position : m; worst_orientation : rad, of any solution put back through forward kinematics
-    own_found : number of poses whose own joint angles are among the solutions (to 1e-6 rad, turns apart)
+    own_found : number of poses whose own joint angles are among the solutions (to 1e-6 rad, but for turns)
     worst_own : rad, largest joint difference between any pose's own angles and the nearest solution
     counts_within_limits : (S + 1,) int, number of poses with 0 .. S solutions within the limits, S slots of the class
     """

@@ -129,7 +129,7 @@ class WristLoad(ByValue):
 
 @dataclass(frozen=True, eq=False)
 class Masses(ByValue):
-    """Everything of a robot that dynamics rests on, besides its table.
+    """Everything of a robot that dynamics rests on, in addition to its table.
 
     Attributes
     ----------

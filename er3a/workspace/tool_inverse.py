@@ -36,7 +36,7 @@ from er3a.workspace.orientations import asked_of
 ARM_ANGLES = 8  # values of what a pose leaves open; of two such parameters the root of it each
 QUICK_S, COMPLETED_S, CERTAIN_S, DOUBT_S, INNER_S, GEARED_S = 4e-6, 16e-6, 3e-4, 8e-3, 1e-3, 5e-6
 """About what a pose takes: of classes in closed form, of fewer joints completed, by elimination where its readings are
-clear and where they leave doubt, besides where a joint within the arm is held, and of each slot for its turns where
+clear and where they leave doubt, also where a joint within the arm is held, and of each slot for its turns where
 gears or ball screws connect motors and joints."""
 BESIDE = np.array([1.1e-4, -0.7e-4, 0.9e-4])  # rad, about the tool's axes
 _PROBED = 24  # random poses that tell how often elimination leaves a doubt

@@ -402,7 +402,7 @@ def solve_arm_angle_blocks(k: ArmAngleConstants, T: Reals, psi: Reals, q: Reals,
 
 @inner_kernel
 def _turned_about_line(k: ArmAngleConstants, T: Reals, psi: Reals, start: int, size: int, w: Reals) -> None:
-    """Rows 0-8 of ``w``: n, e and n x e in the frame before axis 1; 9-14 axis 7 and the vector beside it along those;
+    """Rows 0-8 of ``w``: n, e and n x e in the frame before axis 1; 9-14 axis 7 and the vector across it along those;
     37 the distance of S and W, 38 whether the pose is singular."""
     t, u, across = k.wrist_in_tool, k.shoulder, k.across
     shortest = ONE_POINT * (k.upper_arm + k.lower_arm)
@@ -451,7 +451,7 @@ def _turned_about_line(k: ArmAngleConstants, T: Reals, psi: Reals, start: int, s
 @inner_kernel
 def _elbow(k: ArmAngleConstants, w: Reals, sign: float) -> None:
     """Joint 4 by one root (row 36, NaN if S and W are too far or near), then axis 3 before axis 1 (rows 24-29, with the
-    vector beside it) and axis 7 before axis 5 (rows 30-35)."""
+    vector across it) and axis 7 before axis 5 (rows 30-35)."""
     reach, smallest = k.upper_arm + k.lower_arm, k.upper_arm - k.lower_arm
     for i in range(BLOCK):
         distance = w[37 * BLOCK + i]

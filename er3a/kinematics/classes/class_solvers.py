@@ -43,7 +43,7 @@ ArmClassCode = Literal[
 
 @dataclass(frozen=True)
 class ArmClassTraits:
-    """What is known of a class beside its solver.
+    """What is known of a class, in addition to its solver.
 
     Attributes
     ----------
@@ -118,7 +118,7 @@ SlotName = Literal[
 SLOT_NAMES: tuple[SlotName, ...] = get_args(SlotName)
 LEFT_OVER = 1e-6  # rad by which a pose may miss those that fewer than six joints can take
 RANK_LOST = 1e-6  # smallest singular value below which a joint may be free
-DOUBLE_ROOT = 1e-6  # rad or m: rows so near are one, taken apart by rounding
+DOUBLE_ROOT = 1e-6  # rad or m: rows so near are one, split by rounding
 NEAR_SINGULAR = 1e-7  # rad or parts of the reach: a closed form's row so near to its singular sets is looked at again
 
 
@@ -278,7 +278,7 @@ class SphericalWristSolver(WithoutParameters):
         return q, np.where(singular, CONTINUUM, CERTAIN)
 
     def _beside_axis_1(self, T: Reals) -> Reals:
-        """How far the wrist centre lies beside axis 1 (N,), in parts of the reach; next to it that joint is free."""
+        """Distance (N,) of the wrist centre from axis 1, in parts of the reach; next to it that joint is free."""
         k = self.constants
         W = T[:, :3, 3] + T[:, :3, :3] @ np.array(k.wrist_in_tool) - np.array(k.point_1)
         return np.asarray(np.linalg.norm(np.cross(W, np.array(k.axis_1)), axis=1) / k.reach)
@@ -664,7 +664,7 @@ def _shortest(x: Reals) -> Reals:
 
 
 def _branches_meet(q: Reals, pairs: tuple[tuple[int, int], ...]) -> Flags:
-    """Whether two rows that differ in one root (slots apart, joint that shows it) lie within a small angle, (N,)."""
+    """Whether two rows that differ in one root (step in slots, joint that shows it) are within a small angle, (N,)."""
     meet = np.zeros(len(q), dtype=bool)
     for step, joint in pairs:
         for slot in range(8):

@@ -45,7 +45,7 @@ _W, _Z6, _X6, _MARK = (
     3,
     6,
     9,
-)  # rows of a block: wrist, axis 6, a vector beside it, whether left to the careful solver
+)  # rows of a block: wrist, axis 6, a vector across it, whether left to the careful solver
 _POSE_ROWS = 10
 
 
@@ -209,7 +209,7 @@ def solve_parallel_blocks(k: ParallelConstants, T: Reals, slack: float, q: Reals
 
 @inner_kernel
 def _into_frame(k: ParallelConstants, T: Reals, start: int, size: int, pose: Reals) -> None:
-    """W, axis 6 and the vector beside it in the arm's frame."""
+    """W, axis 6 and the vector across it in the arm's frame."""
     for i in range(BLOCK):
         n = start + min(i, size - 1)
         for row in range(3):
@@ -229,7 +229,7 @@ def _into_frame(k: ParallelConstants, T: Reals, start: int, size: int, pose: Rea
 
 @kernel
 def _first_joint(k: ParallelConstants, pose: Reals, side: Reals, sign: float, slack: float) -> None:
-    """Joint 1 by one root; then W in the plane, axis 6 and the vector beside it as seen from link 1, into ``side``."""
+    """Joint 1 by one root; then W in the plane, axis 6 and the vector across it as seen from link 1, into ``side``."""
     for i in range(BLOCK):
         x, y, z = pose[i], pose[BLOCK + i], pose[2 * BLOCK + i]
         across = np.sqrt(x * x + y * y)

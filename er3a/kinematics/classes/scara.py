@@ -1,7 +1,7 @@
 """Four joints with one common direction, three revolute and one prismatic in any order (SCARA): two solutions.
 
 They move a body in a plane across that direction, along it and about it; a pose is met in x, y, z and yaw, and how far
-its axis is tilted from theirs is returned beside the solutions.
+its axis is tilted from theirs is returned with the solutions.
 
 Three prismatic and three revolute joints, in any order: two solutions.
 

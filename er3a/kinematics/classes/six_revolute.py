@@ -36,8 +36,8 @@ LOUD = 1e-7
 FAMILY_PEAK = 1e-25
 MAX_READINGS = 4
 TRIALS = 24
-BESIDE, NOTHING_NEW = 24, 6  # poses beside one in doubt, and after how many that bring nothing new it is left
-ASIDE = (1e-3, 1e-2, 3e-2)  # how far beside, in turn: rad and parts of the size
+BESIDE, NOTHING_NEW = 24, 6  # poses next to one in doubt, and after how many that bring nothing new it is left
+ASIDE = (1e-3, 1e-2, 3e-2)  # how far from it, in turn: rad and parts of the size
 
 CERTAIN, UNCERTAIN, CONTINUUM = 0, 1, 2
 STUCK = 1e-9  # last pivot below which a row may move with the tool at rest
@@ -204,7 +204,7 @@ def all_rows(
 
 
 def _beside(certainty: Integers, T: Reals, count: Integers, size: float) -> Iterator[tuple[Integers, Reals]]:
-    """Numbers (k,) of poses in doubt, and poses (k, 4, 4) beside them, until nothing new is counted."""
+    """Numbers (k,) of poses in doubt, and poses (k, 4, 4) next to them, until nothing new is counted."""
     random, in_doubt = np.random.default_rng(3), np.flatnonzero(certainty == UNCERTAIN)
     idle = np.zeros(len(in_doubt), dtype=np.int64)
     for k in range(BESIDE):

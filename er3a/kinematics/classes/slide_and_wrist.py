@@ -31,7 +31,7 @@ from er3a.numerics.arrays import Flags, Reals
 MEETS = 1e-9  # of the size, by which axes miss the wrist centre; sine between neighbouring axes of the wrist
 PARALLEL = 1e-11  # of the lines' coefficients, by which they are parallel for all d
 PLACES = DEGREE = 4  # of joints 1 to 3 for one wrist centre
-NEARLY_REAL, NEARLY_MEETS = 1e-3, 1e-4  # of the size: roots and lines beside the circle that Newton's method begins at
+NEARLY_REAL, NEARLY_MEETS = 1e-3, 1e-4  # of the size: roots and lines next to the circle that Newton's method begins at
 NEAR = 1e-2  # of the size: a root that nothing so near to it solves leaves a doubt
 ROUNDS = 10
 EXACT, SOLVES = 1e-15, 1e-12  # errors of the equations

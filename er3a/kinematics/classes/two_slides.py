@@ -4,7 +4,7 @@ The four revolute joints must close the orientation alone, ``Rz(x_1) A_1 Rz(x_2)
 the loop of a spherical four-bar. For each x_1 two angles x_2 do so, and the other two follow from both. The position is
 linear in the slides, so they go out with one determinant [1]_: that of both sliding directions and of where the loop
 ends with both slides at 0. Its product over both angles x_2, times a power of what the roots of x_2 divide by, is a
-trigonometric polynomial in x_1; samples give it, with terms beside that would vanish without rounding, and the
+trigonometric polynomial in x_1; samples give it, with further terms that would vanish without rounding, and the
 eigenvalues of its companion matrix are its zeros. Newton's method on the chain decides what is a solution.
 
 The loop can be read from each of the four joints on in either sense; special geometry spoils some readings, and what
