@@ -23,8 +23,8 @@ GUESSED = 10.0
 """How much wider bounds are of a guessed shape; a centre may then be outside by the arm's size."""
 WIDEST_RATIO, NARROWEST_RATIO = 3.0, 0.1
 """Radius of gyration against that of the filled capsules."""
-WEIGHT_RATIO = 0.15
-PARALLEL_RATIO = 2.0
+WEIGHT_RATIO = 0.15  # of the stated weight, by which the sum of the links may differ
+PARALLEL_RATIO = 2.0  # of the inertia that the shape would have: more is too much
 
 
 class ImpossibleInertia(Finding):

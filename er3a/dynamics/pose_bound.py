@@ -262,7 +262,7 @@ def torque_caps(robot: Robot, row: int, outer: Hanging, gravity: float) -> Reals
 
 CLOSE = 1e-3
 """Bounds nearer than that to what is found, in parts of it, are near enough; levers, of few joints, get nearer."""
-CLOSE_LEVER = 1e-5
+CLOSE_LEVER = 1e-5  # the same of levers and moments
 MAX_CORNERS = 12_000_000  # looked at for one bound: some seconds
 MAX_BOXES = 60_000  # held at a time, so that a bound that does not close can't fill memory
 BATCH_CORNERS = 300_000  # at a time, in arrays of some megabytes
@@ -485,11 +485,11 @@ def _may_be_within(robot: Robot, low: Reals, high: Reals) -> Flags:
 
 
 POSES = 1000  # evenly spread, of which the best few are improved
-CLIMBS = 4
-GRID = 21
-REFINEMENTS = 3
-MAX_ROUNDS = 12
-NO_BETTER = 1e-9
+CLIMBS = 4  # poses of each objective that are improved
+GRID = 21  # values of a joint over its range
+REFINEMENTS = 3  # of the grid about the best value
+MAX_ROUNDS = 12  # over all joints
+NO_BETTER = 1e-9  # of the value: a round that gains less is the last
 
 
 @dataclass(frozen=True, eq=False)

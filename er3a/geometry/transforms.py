@@ -16,8 +16,8 @@ from er3a.errors import PoseError, ShapeError
 from er3a.numerics.arrays import Reals, as_floats, for_kernel
 from er3a.numerics.jit import kernel
 
-ORTHONORMAL_TOLERANCE = 1e-6
-BOTTOM_ROW_TOLERANCE = 1e-12
+ORTHONORMAL_TOLERANCE = 1e-6  # of the product of two rows: poses written with seven decimals pass
+BOTTOM_ROW_TOLERANCE = 1e-12  # products of transforms leave the bottom row exact but for rounding
 MAX_DISTANCE_M = 100.0  # from the origin: no arm reaches so far, so a longer position was meant in mm
 
 

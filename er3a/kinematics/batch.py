@@ -27,7 +27,7 @@ from er3a.robots.joint_limits import nearest_equivalent, turn_bounds, within
 from er3a.robots.robot import Robot
 from er3a.robots.whole_turns import whole_turns
 
-SMALLEST_PART = 8 * BLOCK
+SMALLEST_PART = 8 * BLOCK  # poses that are worth a thread's start
 SLOTS_BY_STARTS = 16  # rows of a pose that iteration solves: as many as six joints can have
 NEARLY_OWN = 1e-5  # rad
 

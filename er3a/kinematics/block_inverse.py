@@ -160,7 +160,7 @@ def _clean(value: float) -> float:
     return 0.0 if abs(value) < 1e-15 else float(value)
 
 
-BLOCK = 64
+BLOCK = 64  # poses; a row of 64 numbers fills whole vectors, and all rows stay in the first cache
 NEAR = 1e-6  # m, rad or their product, from where joints become free
 PER_TURN = 1 / TURN
 

@@ -45,12 +45,12 @@ CONFIRMS = 1e-9  # m and rad by which a row may miss what is asked: far above th
 OWN_SOLVES, MISSED = 1e-12, 1e-4  # m and parts of 1; rad or m from all rows
 MAYBE_SAME = 1e-2  # rad
 IN_LINE = 1e-9  # rad by which an axis that is taken as the tool's z may be askew
-SPREAD = 1e-13
-MAX_CURVES, MAX_ON_SURFACE = 24, 2
+SPREAD = 1e-13  # residual, in parts of the size, that rounding leaves at a root
+MAX_CURVES, MAX_ON_SURFACE = 24, 2  # self-motions of a pose that are traced, and those of them on surfaces
 MOVES_BELOW = 3e-8  # smallest singular value above which rows of three parallel axes, known to rounding, can't move
-STARTS, FEW_STARTS = 240, 32
+STARTS, FEW_STARTS = 240, 32  # random starts in the search for self-motions; few for arms of fewer than six joints
 TRACED: dict[ArmClassCode, int] = {"free_roll": OPEN_ROLL, "position": POSITION}
-SMALLEST_PART = 64
+SMALLEST_PART = 64  # poses that are worth a thread's start
 SCANNED = 16  # values of a redundancy parameter from which self-motions are collected
 
 

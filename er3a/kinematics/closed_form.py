@@ -56,7 +56,7 @@ Slots = tuple[Reals, NDArray[np.int8], Reals]
 
 SLOTS = 8
 BOUNDARY_M = 1e-9  # so little out of reach is rounding: the arm is stretched, folded or at its offset
-BOUNDARY_RAD = 1e-9
+BOUNDARY_RAD = 1e-9  # the same of the wrist's tilt
 FREE = 1e-13  # m or rad: nearer to its axis the direction of the wrist centre is rounding, and the joint is free
 FOLD_OFFSET = 0.9e-9  # rad; twice this makes two rows, once this leaves no limit
 AT_FOLD = 1e-15  # m or rad

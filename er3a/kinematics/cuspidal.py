@@ -23,7 +23,7 @@ from er3a.kinematics.singularity import rank_losses, scaled_jacobian
 from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot, derived
 
-POSES, SAMPLES, SEED = 60, 41, 20261121
+POSES, SAMPLES, SEED = 60, 41, 20261121  # random poses that are tried, and points of a move
 CLEAR = 5e-3  # smallest singular value that the whole move must keep
 
 

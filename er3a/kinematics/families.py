@@ -35,9 +35,9 @@ from er3a.robots.robot import Robot
 from er3a.robots.whole_turns import LIMIT_TOLERANCE, whole_turns
 
 SOLVES_M = SOLVES_RAD = 0.9e-9  # a family is given where it solves the pose to 1e-9, rounding included
-ALMOST_IN_LINE = 1e-3
-NO_DIRECTION = 1e-13
-MOVING = [0, 1, 2, 5]
+ALMOST_IN_LINE = 1e-3  # sine between axes 4 and 6 beyond which no small motion aligns them
+NO_DIRECTION = 1e-13  # sine between two axes below which their common normal is rounding
+MOVING = [0, 1, 2, 5]  # joints that make up for joint 5; joint 4 would only turn with joint 6
 MAX_STEPS, ROUNDING, SETTLED, INDEPENDENT = 8, 1e-14, 0.01, 1e-9
 
 
@@ -184,7 +184,7 @@ def _in_line(robot: Robot, T: Reals, q: Reals) -> Reals | None:
     return best
 
 
-GRID = np.radians(2.0)
+GRID = np.radians(2.0)  # of the free joint, on which its limits are first looked at
 SPLIT, ROUNDS = 16, 10  # an interval is cut into so many parts, so often
 SAME_FAMILY = 1e-6  # rad; next to two singularities families that solve a pose to 1e-9 differ by no more
 SAME_CURVE = SAME_FAMILY * np.array([1, 1, 0.2, 1, 1, 1])  # rounding makes the roots of one elbow differ by no more

@@ -19,7 +19,7 @@ from er3a.robots.robot import Robot
 Row = tuple[float, float, float, float]
 Axes = tuple[int, int, float, float]  # the columns in scratch memory that hold y and z, and their signs there
 
-BLOCK = 64
+BLOCK = 64  # poses; a row of 64 numbers fills whole vectors
 _COS, _SIN = 12, 13  # rows of scratch memory after the 3 x 4 entries of a block of poses
 
 

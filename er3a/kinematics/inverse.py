@@ -35,7 +35,7 @@ from er3a.robots.robot import Robot
 from er3a.robots.whole_turns import shortest_move
 
 SAME_JOINTS = 1e-9  # rad: rows so near to each other are one
-SAME_MEMBER = 1e-6
+SAME_MEMBER = 1e-6  # rad or m: a member of a self-motion so near to a row is listed already
 MISSED = 1e-4  # rad or m from all rows
 SOLVES = 1e-12  # m and parts of 1
 STARTS, STARTS_OF_DEPENDENT = 400, 24  # where joints depend on each other a start that leads anywhere leads elsewhere

@@ -106,11 +106,11 @@ def solve_by_cholesky(A: Reals, step: Reals) -> None:
 
 
 DAMPING = 0.1  # times the squared error
-MAX_ITERATIONS = 40
+MAX_ITERATIONS = 40  # of one start
 LONGEST_STEP = 1.0  # rad
 STALLED = 0.9  # the squared error must fall by this factor ...
 PATIENCE = 3  # ... within so many iterations
-MIN_DAMPING = 1e-15
+MIN_DAMPING = 1e-15  # keeps the normal matrix positive at the solution
 
 # Rows of scratch memory, one number of each lane in a row: the arm's frame (3 x 4), the target (3 x 4), then vectors.
 _FRAME, _TARGET, _Q, _E, _W, _SQUARED, _POSITION, _ROTATION = 0, 12, 24, 30, 36, 39, 40, 41
@@ -538,14 +538,14 @@ def _rotation_vector(D: Reals) -> tuple[Reals, Reals]:
     return w, np.eye(3) - 0.5 * K + squared * (K @ K)
 
 
-RESTARTS = 500
-MISS_RESTARTS = 20
-DIAGNOSIS_RESTARTS = 100
+RESTARTS = 500  # random starts of a caller who names no other number
+MISS_RESTARTS = 20  # where the nearest arm is asked for, without a reason
+DIAGNOSIS_RESTARTS = 100  # to find out whether other starts or wider limits would help
 TOLERANCE = 1e-10  # m or rad
 NEARLY = 1e-6  # m (in parts of the arm's length) or rad: so near, only a singularity keeps the iteration from its end
 RANK = 1e-3  # smallest singular value below which the end of an iteration counts as singular
-SAME_ARM = 1e-6
-SMALLEST_PART = 64
+SAME_ARM = 1e-6  # rad or m: ends of two starts so near are one solution
+SMALLEST_PART = 64  # poses that are worth a thread's start
 
 
 def solve(

@@ -21,11 +21,11 @@ from er3a.numerics.arrays import Flags, Integers
 from er3a.robots.robot import Robot
 from er3a.robots.whole_turns import shortest_move
 
-SAME_JOINTS_RAD = 1e-6
+SAME_JOINTS_RAD = 1e-6  # a solution so near to the joints drawn is them
 NEAR_WRIST_DEG = NEAR_ELBOW_DEG = 0.5
-NEAR_SHOULDER_MM = 1.0
+NEAR_SHOULDER_MM = 1.0  # nearer to singularities joints are known less exactly, whatever the solver
 NEAR = NearSingular(np.radians(NEAR_WRIST_DEG), np.radians(NEAR_ELBOW_DEG), NEAR_SHOULDER_MM / 1000)
-BLOCK = 20_000
+BLOCK = 20_000  # poses at a time
 MAX_BY_CLASS = 500  # poses solved in validation for arms without a spherical wrist
 
 

@@ -15,8 +15,8 @@ from er3a.robots.joint_limits import joint_columns, limit_margin, nearest_equiva
 from er3a.robots.robot import Robot
 
 LAPS = 6  # a curve that turns a joint is followed over so many of its laps at most
-SPLIT, SPLITS = 16, 11
-NARROWINGS = 10
+SPLIT, SPLITS = 16, 11  # an interval is cut into so many parts, so often: to 16^-11 of it
+NARROWINGS = 10  # each to a sixth of the interval
 SAME_TURN, COVERS = 1e-6, 1e-6  # rad: what rounding makes of equal turns, and of ends of one part
 
 

@@ -236,7 +236,7 @@ def _angle_short_of_line(a: Vector, b: Vector, axis: Vector) -> float:
 
 DEPENDENT = 1e-6  # smallest singular value of columns that count as dependent, relative to that of the event
 SHORTEST, EDGE = 1e-9, 1e-4  # shares of the motion
-MAX_SAMPLES = 200_000
+MAX_SAMPLES = 200_000  # of a motion; beyond that it is judged as it is sampled
 TRAVEL = 1.5  # joints' travel inside an interval, over what its ends show, where no speeds are given
 
 

@@ -17,7 +17,7 @@ from er3a.kinematics.chain import ALONG_Z, TO_NEXT_AXIS, constant_links, link_pa
 from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
 
-ROUNDING = 1e-12
+ROUNDING = 1e-12  # a factor below this is the rounding of a right angle
 Factor = tuple[str, tuple[int, ...]]  # "c" or "s" of the sum of these rows' angles, or "d" of a row; rows from 1
 Product = tuple[Factor, ...]
 Polynomial = dict[Product, float]

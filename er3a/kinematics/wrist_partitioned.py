@@ -23,7 +23,7 @@ from er3a.kinematics.classes.parallel_axes import ThreeParallel, three_parallel
 from er3a.numerics.arrays import Reals, for_kernel
 from er3a.robots.robot import Robot, derived
 
-PARALLEL = 1e-9
+PARALLEL = 1e-9  # rad
 
 
 class NotSixTurning(Finding, code="not_six_turning_joints"):

@@ -20,10 +20,10 @@ from er3a.numerics.arrays import Reals
 from er3a.references.quantities import MM, AxisLines
 from er3a.robots.robot import Robot
 
-OFF_EVERY_AXIS_MM = 100.0
+OFF_EVERY_AXIS_MM = 100.0  # a smaller circle determines its axis less well
 TRIED_OFFSETS_MM = (200.0, 400.0, 800.0, 1600.0)
 STATIONS = 25  # positions of each joint; the fits are exact for any number of at least 3, as nothing is noisy
-MIN_TURN, MAX_TURN = np.pi / 2, 2 * np.pi
+MIN_TURN, MAX_TURN = np.pi / 2, 2 * np.pi  # rad: a shorter arc determines its centre less well
 MIN_SLIDE = 0.1  # m
 
 

@@ -136,7 +136,7 @@ def _without_idle_joints(q: Reals, lower: Reals, upper: Reals, cost: Callable[[R
     return q
 
 
-REACH_STARTS = 32
+REACH_STARTS = 32  # local searches for each extreme
 CHUNK = 2048  # tables at a time, so that the frames of many hypotheses fit into memory
 TABLE_COLUMNS = ("a", "alpha", "d", "offset")
 

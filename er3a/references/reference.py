@@ -158,7 +158,7 @@ class Documents:
         return ()
 
 
-INTERVAL_95 = 1.959963984540054
+INTERVAL_95 = 1.959963984540054  # standard deviations to either side of 95 % of a normal distribution
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ FINITE = (
 # Two turns, 12.6 rad: nobody misses a limit by so much in rad, and ordinary angles in degrees do.
 SEVERAL_TURNS = 4 * np.pi
 MAX_TURNS = 2 * SEVERAL_TURNS  # rad, beyond which an arm's joint that turns by so much is given in degrees
-_FEW = 1000
+_FEW = 1000  # values, for which one product is the quickest test
 
 
 def check_robot(robot: Any, crossed_limits: bool = False) -> None:

@@ -123,7 +123,7 @@ Counter = tuple[np.uint64, np.uint64, np.uint64, np.uint64]
 
 CHUNK = 512
 """Samples that are worked on at a time, in rows of an array that stays in the processor's cache."""
-OF_A_DRAW = 6
+OF_A_DRAW = 6  # numbers of 21 bits in 128 bits
 UNIT_ROWS = 2 * OF_A_DRAW
 """Rows of random numbers that a chunk has place for."""
 ROUNDS = 10

@@ -43,7 +43,7 @@ NearLists = tuple[Reals, Integers, Integers, Reals]
 Cells = tuple[Reals, float, tuple[int, int, int]]
 Furthest = tuple[Reals, Reals, Integers, Integers]  # directions (D, 3) and what Extremes holds
 
-_PATCHES = 16
+_PATCHES = 16  # along the edge of a cube's face
 # Points are of single precision, so thresholds are lowered by a part in 1e5.
 # A list holds directions that matter up to 6 % beyond the least threshold, 128 at most.
 _SAFETY = 1 - 1e-5
@@ -267,10 +267,10 @@ _Voxels = tuple[Reals, float, tuple[int, int, int], Tallies]
 _Section = tuple[np.float32, np.float32, np.int32, np.int32, Tallies]
 _Watch = tuple[Furthest, tuple[Reals, Reals, NearLists, Singles], Integers]
 
-UNTOUCHED = np.iinfo(np.int32).max
+UNTOUCHED = np.iinfo(np.int32).max  # later than any block
 PORTION = 1 << 22
 """Samples between two looks at the clock."""
-_RARER = 16
+_RARER = 16  # factor on the number of samples from one refresh to the next
 _ONE, _NONE = np.int32(1), np.float32(0)
 
 
@@ -443,8 +443,8 @@ def _flush(
         fresh_side[n] = 0
 
 
-NANOMETRES = 9
-_STARTS = 8
+NANOMETRES = 9  # decimals of m
+_STARTS = 8  # local searches for each extreme
 
 
 @dataclass(frozen=True)

@@ -234,8 +234,8 @@ def _spread_probes(cavity: Cavity) -> tuple[Cavity, Reals]:
 
 
 CELLS = 6000  # of the proof of each changed arm
-TURNS_DEG = (-90.0, 90.0, 180.0)
-FACTORS = (-1.0, 0.5, 2.0)
+TURNS_DEG = (-90.0, 90.0, 180.0)  # by which an offset may be wrong
+FACTORS = (-1.0, 0.5, 2.0)  # by which a length may be wrong
 INNER = (1, 2, 3, 4)  # joints 2 to 5; turning joint 1 or 6 moves no section through the reach
 # Lengths that shape the section of an arm with a spherical wrist, by their places.
 SHAPING: dict[Literal["a", "d"], tuple[int, ...]] = {"a": (0, 1, 2), "d": (3, 5)}

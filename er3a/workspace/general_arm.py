@@ -20,7 +20,7 @@ from er3a.robots.robot import Robot
 from er3a.workspace.arcs import FULL_TURN, ROUND_OFF
 
 _SPARE = 0.01  # of what is reached, left on either side of bars
-_UPRIGHT = 1e-6
+_UPRIGHT = 1e-6  # sine between the slide and the vertical, below which another direction is z
 
 
 class GeneralArm(NamedTuple):

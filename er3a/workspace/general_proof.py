@@ -40,7 +40,7 @@ from er3a.workspace.general_arm import GeneralArm, curvature, place, point_of
 from er3a.workspace.outer_sets import exclude_cells, outer_rings
 
 _ROOM, _STEPS, _PER_EDGE, _CORNERS = 0.2, 8, 5, 4
-_TINY = 1e-12
+_TINY = 1e-12  # determinant, in parts of the entries, below which two directions are one
 _PER_BUCKET = 48  # joint values kept for a bucket: twice as many as are tried for a ring
 
 
@@ -516,12 +516,12 @@ def fill_cells(
             ring += 1
 
 
-SAMPLES, TRIES = 400_000, 24
-FINEST, MIN_CELL = 1000, 1e-4
+SAMPLES, TRIES = 400_000, 24  # joint values to begin from, and how many are tried for a ring
+FINEST, MIN_CELL = 1000, 1e-4  # rings across at most; m, smallest side of the section
 POINT = 1e-5
 """Edge (m) of the cell that represents a point."""
-_BUCKETS, _MAX_POSTURES = 96, 300_000
-_PORTION = 1 << 16
+_BUCKETS, _MAX_POSTURES = 96, 300_000  # of the section across; joint values kept in all of them
+_PORTION = 1 << 16  # random joint values drawn at a time
 _ACROSS = 2.5  # rings along each set after joint 1, for each cell across
 
 

@@ -23,9 +23,9 @@ from er3a.workspace.cell_frame import cell_frame
 from er3a.workspace.directions import Roll, cone_directions, roll_of, tool_rotations
 
 AskedKind = Literal["directions", "tilts", "turns", "points"]
-_PARALLEL = 1e-9
-_MIN_PLANAR = 3
-_TASK_TURNS = 36
+_PARALLEL = 1e-9  # sine: rounding of tables that are exact
+_MIN_PLANAR = 3  # joints that place the tool in a plane and tilt it there
+_TASK_TURNS = 36  # about a SCARA's axes, one for each 10 deg
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,8 +22,8 @@ from er3a.workspace.arcs import FULL_TURN, ROUND_OFF, Cell, remove
 from er3a.workspace.general_arm import GeneralArm
 
 Spread = tuple[float, float, float, float, float, float]
-_PIECES, _LEVELS = 64, 6
-_ARCS = 6
+_PIECES, _LEVELS = 64, 6  # of a turn that is searched, and how often a piece is halved at most
+_ARCS = 6  # of azimuth that are kept for a ring
 
 
 class Rings(NamedTuple):

@@ -35,7 +35,7 @@ from er3a.workspace.tool_inverse import all_solutions, slot_count
 
 NO = -1.0  # below any manipulability: not served
 NOTHING = 1e-12  # in place of a best measure of 0, which can't be divided by
-_LEVEL = 1e-9
+_LEVEL = 1e-9  # of a unit vector or m: rounding
 MIXED = -1
 """The branch of a box that no single branch serves."""
 _POSES = 50_000  # solved at a time, so that their solutions stay within some hundred megabytes

@@ -266,7 +266,7 @@ def _empty_ratio(arcs: Reals, empty: Reals) -> Reals:
 
 
 TARGET = 0.002  # required width of the bracket, in parts of the volume
-BEYOND_ROUNDING = 1 + 1e-9
+BEYOND_ROUNDING = 1 + 1e-9  # factor on lengths, so that a bound stays one
 MIN_BOUND_M = 1e-4  # for a tool point that no joint moves
 SETTLED = 0.1  # of the volume
 CELLS = 4  # looked at for each one of the budget: they are cheap

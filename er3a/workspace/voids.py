@@ -15,7 +15,7 @@ from er3a.workspace.causes import VoidCause, cause_of, relaxations
 from er3a.workspace.cells import in_space, ring_volumes
 from er3a.workspace.proven import Cavity, Proven, cavities
 
-_CUBE = np.ones((3, 3, 3), dtype=bool)
+_CUBE = np.ones((3, 3, 3), dtype=bool)  # what a pocket must hold somewhere, in blocks
 MIN_BLOCKS = 8  # of a pocket: fewer are too small to say anything of
 
 
@@ -177,7 +177,7 @@ def mesh(blocks: Blocks, mask: Flags) -> tuple[Reals, Integers]:
 
 VoidKind = Literal["enclosed", "open"]
 
-_FLAT, _AT_ONCE = 1e-9, 8192
+_FLAT, _AT_ONCE = 1e-9, 8192  # thickness, in parts of the length, of a flat hull; points looked at together
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,9 +247,9 @@ def inside_hull(hull: Hull, points: Reals) -> Flags:
     return np.concatenate([(part @ hull.planes[:, :3].T + hull.planes[:, 3] < 0).all(axis=1) for part in parts])
 
 
-POCKET_BLOCKS, TURNS = 64, 180
-MESH_BLOCKS, MESH_TURNS = 24, 72
-_SPECK_M3 = 1e-9
+POCKET_BLOCKS, TURNS = 64, 180  # across the section and around, on which pockets are searched
+MESH_BLOCKS, MESH_TURNS = 24, 72  # across a void and around, for its picture
+_SPECK_M3 = 1e-9  # 1 mm^3: smaller voids are not listed
 
 
 @dataclass(frozen=True, eq=False)

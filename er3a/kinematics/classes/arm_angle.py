@@ -192,9 +192,9 @@ def three_angles(
 
 
 SLOTS = 8
-BLOCK = 64
-MEETS_M = 1e-9
-NEAR = 1e-9
+BLOCK = 64  # poses; a row of 64 numbers fills whole vectors
+MEETS_M = 1e-9  # by which axes may miss a common point
+NEAR = 1e-9  # m, or about the square of half an angle: branches so near are taken to meet
 ALONG = 1e-6  # sine of the angle between S W and axis 1, below which rounding would move the arm angle by 1e-10 rad
 ONE_POINT = 1e-15  # parts of the reach: nearer S and W are known to be one point only
 OUT_OF_REACH = 1e-6  # of the squared reach, beyond what a search takes for solved

@@ -119,16 +119,16 @@ def slid_parts(v: Reals, parts: Reals) -> None:
     parts[2, 12] = v[14]
 
 
-DEGREE = 8
+DEGREE = 8  # of the determinant as a trigonometric polynomial: sixteen zeros at most
 TERMS = 2 * DEGREE + 1
 SAMPLES = 20  # 17 coefficients, and three more that would vanish without rounding
-ARCS = 8
+ARCS = 8  # of the circle, each with the tangent of half the angle from its own middle
 ORDER = 2 * DEGREE
-MAX_PARTS = 150
+MAX_PARTS = 150  # intervals looked at on an arc, before the reading is given up
 CLOSE = 1e-13  # rad: a step to a zero this short has reached it
-LOCAL_ORDER = 12
-LOCAL_NOISE = 1e-11
-LOCAL_GROWTH = 1e3
+LOCAL_ORDER = 12  # of the polynomial through values on a short interval
+LOCAL_NOISE = 1e-11  # of the largest value: above what the change to Bernstein's basis makes of rounding
+LOCAL_GROWTH = 1e3  # about how much that change enlarges the noise of values (at worst 3.7e3)
 LEFT_OVER = 1 / (2**LOCAL_ORDER * factorial(LOCAL_ORDER + 1))  # of interpolation at Chebyshev's nodes
 FIRST_ANGLE = 0.1234  # rad: no usual joint angle is at a sample or at the border of arcs
 _HALF = np.tan(np.pi / ARCS / 2)
@@ -387,8 +387,8 @@ def zeros_between(values: Reals, noise: float, peak: float, low: float, high: fl
 
 EQUATIONS, MONOMIALS = 6, 9
 SHIFT_4, SHIFT_5 = 0.7312, -1.1753  # angles from which halves are taken, so that no usual angle is at infinity
-ROUNDING = 2e-15
-_ALONG = (2, 5, 8, 11, 12, 13)
+ROUNDING = 2e-15  # of an elimination's pivots, about nine times the unit of rounding
+_ALONG = (2, 5, 8, 11, 12, 13)  # of the fifteen numbers those that a turn about z leaves as they are
 
 
 class Reading(NamedTuple):

@@ -30,12 +30,12 @@ from er3a.kinematics.classes.hidden_joint import (
 from er3a.numerics.arrays import Flags, Integers, Reals, for_kernel
 from er3a.numerics.jit import inner_kernel, kernel
 
-MAX_ZEROS = 48
-MAX_DARK = 64
+MAX_ZEROS = 48  # rows for zeros and for intervals that may hold one; a pose has 16 zeros at most
+MAX_DARK = 64  # dark intervals of a pose; with more the reading is given up
 WIDEST = 0.2  # rad, that a dark interval is sampled in one piece
 NARROWEST = 1e-6  # rad: a dark interval this narrow is given as one possible zero
 DEEPEST = 4.0  # times that a dark interval is sampled anew within one
-NEAR_NULL = 1e-4
+NEAR_NULL = 1e-4  # of the first pivot: below, a second null vector may belong to another solution
 
 
 class LoopMemory(NamedTuple):

@@ -34,10 +34,10 @@ from er3a.numerics.fast_math import arctan2
 from er3a.numerics.jit import inner_kernel, kernel
 
 SLOTS = 8
-BLOCK = 64
+BLOCK = 64  # poses; a row of 64 numbers fills whole vectors
 NEAR = 1e-6  # rad or parts of the arm's size from where branches meet: left to the careful solver
 PARALLEL = 1e-9  # rad
-MEETS_M = 1e-9
+MEETS_M = 1e-9  # by which axes may miss a common point, and lengths that count as none
 SOLVES = 1e-10  # residual, rad and parts of the size, up to which a polished row is kept
 
 _W, _Z6, _X6, _MARK = (

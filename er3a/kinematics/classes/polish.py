@@ -17,7 +17,7 @@ SOLVES = 1e-12  # residual, rad and parts of the chain's size
 MIN_PIVOT = 1e-9  # in parts of the first: a direction with less is not determined by the pose
 LARGEST_STEP = 0.7  # rad or parts of the size, within which the linear model is of use
 NEAR_FOLD = 2e-2  # last pivot's ratio, below which another root may meet this one
-PROBE = 1e-2
+PROBE = 1e-2  # rad or parts of the size, step to either side that shows the fold's curvature
 
 
 @inner_kernel

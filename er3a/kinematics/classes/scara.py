@@ -24,8 +24,8 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import kernel
 
 SLOTS = 2
-PARALLEL = 1e-9
-MIN_LINK_M = 1e-9
+PARALLEL = 1e-9  # rad
+MIN_LINK_M = 1e-9  # a shorter link makes two axes one
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +117,7 @@ def solve_scara(arm: Scara, T: Reals) -> tuple[Reals, Reals]:
 
 
 APART = 1e-9  # sine between neighbouring turning axes
-NEAR = 1e-9
+NEAR = 1e-9  # squared half tilt at which both roots are taken to meet
 SPANS = 1e-9  # determinant of three sliding directions that span space
 FLAT = 1e-8  # smallest singular value of sliding directions, in parts of the largest, by which they span a direction
 REACHED = 1e-9  # m, by which slides that don't span space may miss a position

@@ -23,14 +23,14 @@ from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.jit import inner_kernel, kernel
 
 STEP = np.radians(2.0)  # largest joint move between two points of a curve
-MAX_POINTS, FEW_POINTS = 1200, 30
+MAX_POINTS, FEW_POINTS = 1200, 30  # of a traced curve (some 40 rad), and to see that it goes on
 REGULAR = 1e-6  # pivots of J J^T above this part of the largest diagonal entry
 TRUNCATED = 1e-9  # singular values below this part of the largest are no directions: rounding, not a small bend
 SOLVES = 1e-11  # error (rad, parts of the size) at which Newton's steps may stop as soon as they gain nothing
 ON_CURVE = 2e-10  # of each component, in parts of the size: sums of three stay below the 1e-9 that rows are held to
-SOLVES_AS_ROOT = 1e-12
+SOLVES_AS_ROOT = 1e-12  # error, rad or parts of the size, that a root may have
 ABOVE_ROUNDING = 1e-15  # of the trace
-FEW_HALVINGS = 6
+FEW_HALVINGS = 6  # of a step that does not come back to the curve, to 1/32 of it
 SHORTEST = np.radians(6.0)  # what ends on both sides nearer than so is a root of high order
 PROBE = 2e-3  # rad or parts of the size: a step along the null space, which must stay on the pose
 LOST, CLOSED, OPEN = 0, 1, 2

@@ -32,10 +32,10 @@ SAME = 1e-6  # rad: nearer rows are one
 SPREAD = 1e-11  # rad
 MAYBE_SAME = 1e-2  # rad: rows nearer than this are one if what lies midway solves the pose too
 DARK = 200.0  # noise is taken as so many times what it was measured to be
-LOUD = 1e-7
-FAMILY_PEAK = 1e-25
-MAX_READINGS = 4
-TRIALS = 24
+LOUD = 1e-7  # of the largest sample: with more noise than this a reading is not certain
+FAMILY_PEAK = 1e-25  # largest sample below which the determinant vanishes: the arm can move
+MAX_READINGS = 4  # that were conclusive, for a pose in doubt
+TRIALS = 24  # random poses on which readings are compared
 BESIDE, NOTHING_NEW = 24, 6  # poses next to one in doubt, and after how many that bring nothing new it is left
 ASIDE = (1e-3, 1e-2, 3e-2)  # how far from it, in turn: rad and parts of the size
 

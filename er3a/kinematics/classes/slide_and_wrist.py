@@ -33,7 +33,7 @@ PARALLEL = 1e-11  # of the lines' coefficients, by which they are parallel for a
 PLACES = DEGREE = 4  # of joints 1 to 3 for one wrist centre
 NEARLY_REAL, NEARLY_MEETS = 1e-3, 1e-4  # of the size: roots and lines next to the circle that Newton's method begins at
 NEAR = 1e-2  # of the size: a root that nothing so near to it solves leaves a doubt
-ROUNDS = 10
+ROUNDS = 10  # of Newton's method, always all of them
 EXACT, SOLVES = 1e-15, 1e-12  # errors of the equations
 SAME, APART = 1e-9, 1e-5  # of the size: nearer places are one; nearer than the second they may be two that meet
 REGULAR = 1e-6  # determinant of the three equations, distance from an axis: a doubt below

@@ -39,11 +39,11 @@ from er3a.kinematics.classes.six_revolute import (
 from er3a.numerics.arrays import Complexes, Flags, Integers, Reals
 from er3a.numerics.jit import inner_kernel, kernel
 
-TRIALS = 24
+TRIALS = 24  # random poses on which readings are compared
 MAX_READINGS = 3  # that are conclusive, for a pose in doubt
 NOISE = 1e-9  # of the largest sample: more, and a reading is inconclusive
 MIN_SAMPLE = 1e-20  # largest sample below which a reading vanishes for all poses
-MAX_DEGREE = 8
+MAX_DEGREE = 8  # of the trigonometric polynomial in joint 1
 FAINT = 1e-13  # of the largest coefficient: so small ones are rounding
 ACROSS = 1e-6  # sine between the axes of the two joints that follow
 ON_CIRCLE, NEAR_CIRCLE = 1e-6, 3e-2  # a zero's distance from the unit circle: real; perhaps one of several that meet
