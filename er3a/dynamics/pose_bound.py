@@ -407,6 +407,7 @@ def _branch_and_bound(
     batch, left, dropped = max(1, BATCH_CORNERS // each), MAX_CORNERS // each, 0.0
     while True:
         open_ = bound > best * (1 + close)
+        # Boxes that can't raise the value by more than ``close`` are settled, but their bounds count.
         dropped = max(dropped, float(bound[~open_].max(initial=0.0)))
         low, high, bound, joint = low[open_], high[open_], bound[open_], joint[open_]
         if not len(bound) or left <= 0 or len(bound) > MAX_BOXES or best > useless:
@@ -425,6 +426,7 @@ def _branch_and_bound(
             best, q = float(values.max()), middle[values.argmax()]
         low = np.concatenate([low[kept], halves[0]])
         high = np.concatenate([high[kept], halves[1]])
+        # The whole's bound holds for its halves too, and may be lower: their hulls need not lie within its own.
         bound = np.concatenate([bound[kept], np.minimum(bounds, np.repeat(bound[taken], 2)[inside])])
         joint = np.concatenate([joint[kept], joints])
     most = max(best, dropped, float(bound.max(initial=0.0)))

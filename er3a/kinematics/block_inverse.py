@@ -261,6 +261,7 @@ def _manufacturers_angles(joints: Joints, reference: Reals, pair: Reals) -> None
                 low = np.ceil((smallest - LIMIT_TOLERANCE - near) * PER_TURN)
                 high = np.floor((most + LIMIT_TOLERANCE - near) * PER_TURN)
                 fits = low <= high
+                # No turn if that keeps the limits, else the fewest that do; if none do, the nearer side of the range.
                 turns = low if low > 0.0 else high if high < 0.0 else 0.0
                 below = near + TURN * (low - 1.0)
                 above = near + TURN * low
@@ -326,6 +327,7 @@ def _shoulder(arm: BlockConstants, w: Reals, near: Reals, far: Reals) -> None:
         x, y, z = t00 * a + t01 * b + t02 * c, t10 * a + t11 * b + t12 * c, t20 * a + t21 * b + t22 * c
         w[_X6 * BLOCK + i], w[(_X6 + 1) * BLOCK + i], w[(_X6 + 2) * BLOCK + i] = in_frame_1(arm.to_frame_1, x, y, z)
 
+        # Turned by theta_1, the wrist centre must have the distance k across the arm's plane: two points of a circle.
         k = (arm.sideways - arm.cos_12 * vz) / arm.sin_12
         square = vx * vx + vy * vy
         radius = np.sqrt(square)
@@ -372,6 +374,7 @@ def _wrist(arm: BlockConstants, w: Reals, side: Reals, sign: float, pair: Reals)
         x, y = side[_ACROSS * BLOCK + i], w[_PLANE * BLOCK + i]
         cos_bend, sin_bend = side[_COS_BEND * BLOCK + i], sign * side[_SIN_BEND * BLOCK + i]
         along, beside = arm.upper_arm + arm.forearm * cos_bend, arm.forearm * sin_bend
+        # Direction of the upper arm: that of the wrist centre, less the triangle's angle at axis 2.
         c, s_ = x * along + y * beside, y * along - x * beside
         per = 1.0 / np.sqrt(c * c + s_ * s_)
         theta_2 = arctan2(s_, c) - arm.turn_2

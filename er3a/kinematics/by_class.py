@@ -451,6 +451,7 @@ def _with_own(robot: Robot, T: Reals, q_ref: Reals, numbers: Integers, found: tu
         slot = int(away.argmin())
         if away[slot] > MAYBE_SAME and np.isinf(away).any():
             slot = int(np.isinf(away).argmax())
+        # A solution far from all rows: the class has missed one, so it can't be sure of the others.
         if away.min() > MISSED and certainty[n] == CERTAIN:
             certainty[n] = UNCERTAIN
         q[n, slot], inside[n, slot] = row, fits

@@ -212,6 +212,7 @@ def _solve_wrist(
     if beyond > BOUNDARY_RAD:
         theta[:, :] = np.nan
         return beyond
+    # Half-angle formula of the spherical triangle with sides b, c and gamma.
     upper_part = np.sin((gamma + b - c) / 2) * np.sin((gamma - b + c) / 2)
     lower_part = np.sin((b + c + gamma) / 2) * np.sin((b + c - gamma) / 2)
     bend = 2.0 * np.arctan2(np.sqrt(max(upper_part, 0.0)), np.sqrt(max(lower_part, 0.0)))
@@ -226,6 +227,7 @@ def _solve_wrist(
         theta_4 = signed_angle(tilted, axis_6, arm.axis_4)
         if aligned:
             theta_4 = free_4 + (np.pi if keep_free and k == 1 else 0.0)
+        # Joint 6 makes up for what is left once joints 4 and 5 are turned back.
         rest = rotated(beside_6, arm.axis_4, np.cos(theta_4), -np.sin(theta_4))
         rest = rotated(rest, arm.axis_5, c_5, -s_5)
         theta[k, 3], theta[k, 4], theta[k, 5] = theta_4, theta_5, signed_angle(arm.beside_6, rest, arm.axis_6)

@@ -338,6 +338,7 @@ def _wrist_families(robot: Robot, T: Reals, q: Reals, q_ref: Reals, branches: tu
     rates, endless = limits.lines @ direction, bool(robot.continuous[[3, 5]].any())
     moved = rates != 0
     most = int(np.ceil((robot.upper - robot.lower)[[3, 5]].sum() / TURN)) + 2
+    # Whole turns of joint 6 against joint 4 are other lines of the same poses.
     for k in range(-most, most + 1):
         start = rest + TURN * k * np.eye(6)[5]
         smallest, greatest = limits.lower - limits.lines @ start, limits.upper - limits.lines @ start

@@ -386,6 +386,7 @@ def _stretches(robot: Robot, t: Reals, q: Reals, joints: Callable[[Reals], Reals
     changes = np.flatnonzero(sign[:-1] * sign[1:] < 0)
     low = smallest <= threshold
     for i in changes:
+        # A change of sign is a crossing, however large the value at both samples is.
         low[i if smallest[i] < smallest[i + 1] else i + 1] = True
     found = []
     for first, last in runs(low):

@@ -226,6 +226,7 @@ def _spread_probes(cavity: Cavity) -> tuple[Cavity, Reals]:
     if len(weight) <= PROBES:
         chosen = np.flatnonzero(weight > 0)
         return cavity.part(chosen, cavity.enclosed), weight[chosen]
+    # Systematic sampling in a random order: each arc is drawn in proportion to its weight.
     order = np.random.Generator(np.random.Philox(key=len(weight))).permutation(len(weight))
     total = np.cumsum(weight[order])
     drawn = order[np.searchsorted(total, (np.arange(PROBES) + 0.5) * (total[-1] / PROBES))]

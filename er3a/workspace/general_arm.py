@@ -181,6 +181,7 @@ def _levers(links: Reals, tip: Reals, sliding: Flags, lower: Reals, upper: Reals
     for k in range(last, -1, -1):
         if sliding[k]:
             low, high, ball = low + lower[k], high + upper[k], ball + max(abs(lower[k]), abs(upper[k]))
+        # Two bounds at a time: what one gives away over a link, the other may keep.
         radius, low, high = min(radius, ball), max(low, -ball), min(high, ball)
         radii[k], heights[k] = radius, (low, high)
         R, t = links[k, :3, :3], links[k, :3, 3]

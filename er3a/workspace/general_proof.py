@@ -327,14 +327,17 @@ def _winds(arm: GeneralArm, cell: Cell, scale: float, memory: Memory) -> bool:
         e = (c + 1) % corners
         for k in range(n):
             memory.moves[k] = abs(memory.thetas[e, k] - memory.thetas[c, k])
+        # Between two samples the image leaves its chord by an eighth of the second derivative at most.
         off = 0.125 * curvature(arm, memory.moves, memory.levers[c])
         if arm.bar == 0.0:
+            # A straight chord in space is bent in the section, where radius is a distance from the axis.
             flat = np.hypot(memory.flat[e, 0] - memory.flat[c, 0], memory.flat[e, 1] - memory.flat[c, 1])
             nearest = rho + min(memory.points[c, 0], memory.points[e, 0]) - 0.5 * flat
             off += min(flat, flat * flat / (8.0 * nearest)) if nearest > 0.0 else flat
         x_0, y_0, x_1, y_1 = memory.points[c, 0], memory.points[c, 1], memory.points[e, 0], memory.points[e, 1]
         if not _misses(x_0, y_0, x_1, y_1, w + off, h + off):
             return False
+        # Crossings of the positive half axis, counted by their sense.
         side = x_0 * y_1 - x_1 * y_0
         if y_0 <= 0.0 < y_1 and side > 0.0:
             winding += 1
@@ -455,6 +458,7 @@ def _try(arm: GeneralArm, cell: Cell, hold: float, known: Postures, memory: Memo
     azimuth = _azimuth(arm, x, y)
     if not arm.full_turn and not meets(arcs, count, arm.lower[0] + azimuth, arm.upper[0] + azimuth):
         return count
+    # The smallest line around the rectangle loses least at the border; a larger one tolerates more curvature.
     for scale in (1.25, 1.7, 2.5):
         if not _winds(arm, cell, scale, memory):
             continue
@@ -465,6 +469,7 @@ def _try(arm: GeneralArm, cell: Cell, hold: float, known: Postures, memory: Memo
         if not found:
             continue
         before = measure(arcs, count)
+        # Joint 1 carries a filled ring from its lower to its upper limit; only azimuths that all points reach count.
         count = remove(arcs, count, arm.lower[0] + high, arm.upper[0] + low, False)
         if measure(arcs, count) < before:
             keep(arm, known, memory.v, rho, z, azimuth)

@@ -164,6 +164,7 @@ def _spread(L: Reals, cell: Cell, angle: float, width: float, bar: float) -> Spr
     px = L[0, 0] * x + L[1, 0] * y + L[2, 0] * height
     py = L[0, 1] * x + L[1, 1] * y + L[2, 1] * height
     pz = L[0, 2] * x + L[1, 2] * y + L[2, 2] * height
+    # How far an arc of that width falls back from its tangent, and how far it runs along it.
     sag = cell[1] * (1.0 - np.cos(width)) if width < np.pi else 2.0 * cell[1]
     d_rho, d_z = 0.5 * (cell[1] - cell[0]), 0.5 * (cell[3] - cell[2])
     d_turn = cell[1] * (np.sin(width) if width < 0.5 * np.pi else 1.0)
@@ -195,6 +196,7 @@ def _meets(L: Reals, cell: Cell, angle: float, width: float, outer: Rings, bar: 
     if i_0 > i_1 or j_0 > j_1:
         return False
     sums = outer.reached
+    # Summed areas: whether any ring of the range is not wholly empty, by four look-ups.
     total = sums[i_1 + 1, j_1 + 1] - sums[i_0, j_1 + 1] - sums[i_1 + 1, j_0] + sums[i_0, j_0]
     if total == 0:
         return False

@@ -606,6 +606,7 @@ def _without_first_joint(left: Reals, slides: Flags, m: Scratch) -> None:
         norm = np.sqrt(squares)
         if norm == 0.0:
             continue
+        # Householder's reflection, away from the entry's own sign so that no digits cancel.
         if A[k, k] > 0.0:
             norm = -norm
         v = np.zeros(6)
@@ -648,6 +649,7 @@ def _without_second_joint(left: Reals, m: Scratch) -> None:
         if norm == 0.0:
             continue
         head = abs(B[k, k])
+        # The same reflection in complex numbers: the sign becomes a phase.
         phase = B[k, k] / head if head > 0.0 else 1.0 + 0.0j
         for r in range(k, 4):
             normal[k, r] = B[r, k]
@@ -661,6 +663,7 @@ def _without_second_joint(left: Reals, m: Scratch) -> None:
                 inner += np.conj(normal[k, r]) * B[r, j]
             for r in range(k, 4):
                 B[r, j] -= inner * normal[k, r]
+    # What the reflections leave in the last row: the direction orthogonal to all three columns.
     v[3] = 1.0
     for k in range(2, -1, -1):
         inner = 0.0 + 0.0j

@@ -355,6 +355,7 @@ def _by_reading(
                     away -= 2 * np.pi * np.round(away / (2 * np.pi))
                     solved = solved or abs(away) < 1e-2
                     rows = add_row(links, pose, m, m.candidate, pivot, q, rows)
+                    # Near a fold a second root is so close that its zero may have merged with this one's.
                     if pivot < 1e-3 and twin_start(
                         links, m.sliding, pose, m.candidate, m.start, m.frames, m.J, m.columns
                     ):

@@ -199,6 +199,7 @@ def _zeros(terms: Reals, degree: int) -> Reals:
     ascending = np.zeros((len(terms), count + 1), dtype=complex)
     ascending[:, degree] = terms[:, 0]
     for k in range(1, degree + 1):
+        # As a polynomial in z = exp(i x), of twice the degree; real zeros are on the unit circle.
         ascending[:, degree + k] = 0.5 * (terms[:, 2 * k - 1] - 1j * terms[:, 2 * k])
         ascending[:, degree - k] = np.conj(ascending[:, degree + k])
     largest = np.abs(ascending).max(axis=1, initial=0.0)
@@ -326,6 +327,7 @@ def _sampled(reading: SlideReading, loops: Reals, angles: Reals, samples: Reals)
                 continue
             root = np.sqrt(complex(square - c * c, 0.0))
             turns[0, 0], turns[0, 1] = c1, s1
+            # Both roots of x_2 together have no square root of x_1 left; the power takes away what they divide by.
             product = complex(square**reading.power, 0.0)
             for side in range(2):
                 sign = 1.0 - 2.0 * side
@@ -357,6 +359,7 @@ def _rows(
         reach = max(1.0, max(abs(poses[n, 0, 3]), max(abs(poses[n, 1, 3]), abs(poses[n, 2, 3]))))
         verdict, expected, before = CERTAIN, 0, count[n]
         for z in range(zeros.shape[1]):
+            # Zeros off the unit circle are complex angles; those near to it may be real ones that rounding has moved.
             off = abs(zeros[i, z, 1])
             if not off < NEAR_CIRCLE:
                 continue
@@ -394,6 +397,7 @@ def _rows(
             expected += off < ON_CIRCLE
             if off < CLUSTER and not solved:
                 verdict = max(verdict, UNCERTAIN)
+        # Complex solutions come in pairs, and each zero on the circle has a solution of its own.
         if count[n] % 2 == 1 or (before == 0 and count[n] < expected):
             verdict = max(verdict, UNCERTAIN)
         verdicts[i] = verdict
