@@ -170,6 +170,7 @@ class ArmModel:
         return held
 
     def _x(self, q: Reals) -> Reals:
+        """Motion (N, m) of Pinocchio's joints."""
         x: Reals = self.robot.direction * row_values(self.robot, q) + joint_starts(self.robot)
         return x
 
@@ -333,6 +334,7 @@ def _link_parts(robot: Robot) -> dict[int, Sequence[Envelope] | Sequence[Reals]]
 
 
 def _body(part: Envelope | Reals, density: float) -> MassBody:
+    """A part filled at a density, kg/m^3."""
     return capsule_body(part, density) if isinstance(part, Envelope) else filled(part, density)
 
 

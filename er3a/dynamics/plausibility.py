@@ -155,6 +155,7 @@ def has_mass(body: MassBody | None) -> bool:
 
 
 def _against_shape(link: int, body: MassBody, shape: LinkShape, size: float) -> list[MassFinding]:
+    """What density, centre and inertia of a body say against the link's shape; ``size`` of the arm, m."""
     water, slack = shape.water, GUESSED if shape.guessed else 1.0
     found: list[MassFinding] = []
     density = WATER * body.mass / water.mass
@@ -182,6 +183,7 @@ def _against_shape(link: int, body: MassBody, shape: LinkShape, size: float) -> 
 
 
 def _against_weight(robot: Robot, incomplete: bool) -> list[MassFinding]:
+    """Whether the sum of the links' masses contradicts the stated weight."""
     weight, total = robot.masses.weight, sum(each.body.mass for each in robot.masses.links)
     if not (np.isfinite(weight) and robot.masses.links):
         return []

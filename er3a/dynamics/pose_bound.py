@@ -144,6 +144,7 @@ def _wrench(robot: Robot, load: Load) -> tuple[Reals, Reals]:
 
 
 def _alone(vector: Reals) -> Reals:
+    """A vector (3,) as the only one, (1, 1, 3)."""
     found: Reals = vector[None, None]
     return found
 
@@ -214,6 +215,7 @@ def _rotated(vectors: Reals, corner: Reals) -> Reals:
 
 
 def _joined(vectors: Reals) -> Reals:
+    """Vectors (B, c, K, 3) as (B, c K, 3)."""
     found: Reals = vectors.reshape(len(vectors), vectors.shape[1] * vectors.shape[2], 3)
     return found
 
@@ -374,6 +376,7 @@ def bounded_moment(robot: Robot, load: Load, gravity: float, row: int, start: Re
 
 
 def _ahead(at: list[Reals], row: int) -> int:
+    """How many combinations of corners the rows up to one have."""
     return int(np.prod([each.shape[1] for each in at[: row + 1]]))
 
 
@@ -399,6 +402,7 @@ def _bounded_norm(
 def _branch_and_bound(
     robot: Robot, at_corners: AtCorners, size: Size, start: Bounded, close: float, useless: float = np.inf
 ) -> Bounded:
+    """Halve the boxes with the highest bounds until these are close to what is found, or the budget is spent."""
     low, high = robot.lower[None], robot.upper[None]
     used, _ = _used_rows(robot, at_corners, low, high)
     bound, joint = _bounds(robot, at_corners, used, low, high)
@@ -434,6 +438,7 @@ def _branch_and_bound(
 
 
 def _at(robot: Robot, used: Flags, low: Reals, high: Reals) -> list[Reals]:
+    """Corners of each row over boxes; of rows that are not used one is enough."""
     found = corners(robot, low, high)
     return [found[:, row] if used[row] else found[:, row, APEX:] for row in range(robot.rows)]
 
@@ -471,6 +476,7 @@ def _used_rows(robot: Robot, at_corners: AtCorners, low: Reals, high: Reals) -> 
 
 
 def _halved(low: Reals, high: Reals, joint: Integers) -> tuple[Reals, Reals]:
+    """Boxes (2 B, n) from halving each at one joint."""
     rows, middle = np.arange(len(low)), (low + high) / 2
     lows, highs = np.repeat(low, 2, axis=0), np.repeat(high, 2, axis=0)
     highs[2 * rows, joint] = lows[2 * rows + 1, joint] = middle[rows, joint]

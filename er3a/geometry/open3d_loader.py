@@ -33,6 +33,7 @@ def load_open3d() -> ModuleType:
 
 @contextmanager
 def _without_dash() -> Iterator[None]:
+    """While this lasts, importing Dash gives an empty module."""
     if "dash" in sys.modules:
         yield
         return

@@ -142,6 +142,7 @@ def _put_own(robot: Robot, T: Reals, own: Reals, left: Integers, q: Reals, valid
 def _by_class(
     robot: Robot, T: Reals, reference: Reals, turns: bool, threads: int, redundancy: Reals | None
 ) -> Solutions:
+    """All slots by the arm's class, or, for chains of no class, what random starts find."""
     check_poses(T)
     count, solver = len(T), arm_solver(robot).chain
     certain: Flags | None = None
@@ -196,6 +197,7 @@ def _checked_reference(robot: Robot, q_ref: Reals | None, count: int) -> Reals:
 
 
 def _turn_range(robot: Robot, q: Reals) -> NDArray[np.int8]:
+    """Smallest and largest number of whole turns (N, S, n, 2) within the limits; 0 and -1 in empty slots."""
     turns = np.empty((*q.shape, 2), dtype=np.int8)
     if robot.joints == 6 and whole_turns(robot).alone.all():
         count_turns(q.reshape(-1, 6), robot.lower, robot.upper, turns.reshape(-1, 6, 2))

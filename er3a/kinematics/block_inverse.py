@@ -146,11 +146,13 @@ def block_constants(
 
 
 def _vector(values: Reals) -> Vector:
+    """Three numbers, without the rounding noise of right angles."""
     x, y, z = map(_clean, values)
     return x, y, z
 
 
 def _point(values: Reals) -> tuple[float, float]:
+    """Two numbers, without the rounding noise of right angles."""
     x, y = map(_clean, values)
     return x, y
 

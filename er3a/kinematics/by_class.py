@@ -335,6 +335,7 @@ class LazySelfMotions(Sequence[SelfMotionCurve]):
 
 
 def _starts(robot: Robot, count: int) -> Reals:
+    """Random row values (count, m), rad and parts of the size; the same at each call."""
     solver = arm_solver(robot)
     random = np.random.default_rng([20261121, count])
     return random.uniform(-1, 1, (count, len(solver.sliding))) * np.where(solver.sliding, 1.5, np.pi)

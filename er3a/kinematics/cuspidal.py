@@ -71,6 +71,7 @@ def cuspidal_move(robot: Robot) -> CuspidalMove | None:
 
 
 def _keeps_rank(robot: Robot, start: Reals, step: Reals) -> bool:
+    """Whether the smallest singular value stays above ``CLEAR`` along a move, with a bound between samples."""
     t = np.linspace(0, 1, SAMPLES)
 
     def joints(at: Reals) -> Reals:

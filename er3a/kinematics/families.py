@@ -312,6 +312,7 @@ def families(robot: Robot, T: Reals, q: Reals, q_ref: Reals) -> tuple[Family, ..
 
 
 def _add(found: list[Family], new: list[Family]) -> None:
+    """Add families that are new; of one that is known the branches are joined."""
     for family in new:
         for k, known in enumerate(found):
             most = SAME_FAMILY if family.kind == "wrist" else SAME_CURVE
@@ -363,6 +364,7 @@ def _wrist_families(robot: Robot, T: Reals, q: Reals, q_ref: Reals, branches: tu
 
 
 def _nearest_on_line(q: Reals, direction: Reals, q_ref: Reals) -> float:
+    """The parameter of the point of a line nearest to a reference."""
     return float((q_ref - q) @ direction / (direction @ direction))
 
 

@@ -269,6 +269,7 @@ def _slide_rows(q: Reals, sign: float, start: int, k: int, rows: Reals, axes: Ax
 
 @kernel
 def _forward(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links: Reals, out: Reals) -> None:
+    """Fill ``out`` (N, 4, 4) with tool poses, block by block."""
     rows = np.zeros((_SIN + 1) * BLOCK)
     for start in range(0, q.shape[0], BLOCK):
         axes = _fill_start(rows, links[0])
@@ -329,6 +330,7 @@ def _turn_and_step(rows: Reals, link: Reals, axes: Axes, dense: bool) -> Axes:
 
 @kernel
 def _frames(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links: Reals, out: Reals) -> None:
+    """Fill ``out`` (N, m + 1, 4, 4) with the frames that move with each row, and the tool's."""
     joints = q.shape[1]
     for n in range(q.shape[0]):
         x, y, z = rows_of(links[0])
@@ -346,6 +348,7 @@ def _frames(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links: 
 
 @kernel
 def _jacobian(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links: Reals, out: Reals) -> None:
+    """Fill ``out`` (N, 6, m) with Jacobians by rows, block by block."""
     joints = q.shape[1]
     rows, columns = np.zeros((_SIN + 1) * BLOCK), np.empty((joints, 6 * BLOCK))
     for start in range(0, q.shape[0], BLOCK):
@@ -372,6 +375,7 @@ def _jacobian(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links
 
 @inner_kernel
 def _fill_start(rows: Reals, link: Reals) -> Axes:
+    """Set all poses of a block to the first link; returns which columns hold y and z, and their signs."""
     for r in range(3):
         for c in range(4):
             rows[(4 * r + c) * BLOCK : (4 * r + c + 1) * BLOCK] = link[r, c]

@@ -100,6 +100,7 @@ class _Found(NamedTuple):
 
 
 def _by_closed_form(robot: Robot, T: Reals, q_ref: Reals) -> _Found:
+    """Rows of an arm with a spherical wrist: each branch once per turn, and the nearest member of each self-motion."""
     q, fault, gap = (batch[0] for batch in solve_slots(robot, T[None], q_ref[None], keep_folds=True, keep_free=True))
     continua = families(robot, T, q, q_ref)
     q = _free_joints_near(robot, T, q, q_ref, continua)
@@ -161,6 +162,7 @@ def _stacked(branches: list[int], rows: list[Reals], joints: int) -> tuple[Reals
 
 
 def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, self_motion_rows: bool) -> _Found:
+    """Rows by the solver of the arm's class, with members of self-motions, and what a search adds in doubt."""
     solver = by_class.arm_solver(robot).chain
     if isinstance(solver, UnsolvedChain):
         return _by_iteration(robot, T, q_ref)
@@ -267,6 +269,7 @@ def _near_solved(robot: Robot, T: Reals, q: Reals, q_ref: Reals) -> tuple[list[i
 
 
 def _by_iteration(robot: Robot, T: Reals, q_ref: Reals) -> _Found:
+    """Rows that random starts find, for chains of no class."""
     arms = all_found(robot, T, starts_of(robot))
     rows = _stacked(list(range(len(arms))), [_rows_of_branch(robot, q, q_ref) for q in arms], robot.joints)
     unsolved = () if len(arms) else solve(robot, T, respect_limits=False).unsolved
@@ -346,11 +349,13 @@ def _free_joints_near(robot: Robot, T: Reals, q: Reals, q_ref: Reals, continua: 
 
 
 def _rows_of_branch(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
+    """One branch in all turns within the limits (k, n), the nearest to the reference first."""
     rows = equivalents_within(robot, q, q_ref)
     return rows[np.argsort(max_joint_move(rows, q_ref), kind="stable")]
 
 
 def _unsolved(robot: Robot, fault: NDArray[np.int8], gap: Reals) -> tuple[solutions.SideUnsolved, ...]:
+    """Why a shoulder side has no branch: by that of its four slots which misses least."""
     found = []
     for shoulder in (0, 1):
         part = slice(4 * shoulder, 4 * shoulder + 4)
@@ -366,6 +371,7 @@ def _unsolved(robot: Robot, fault: NDArray[np.int8], gap: Reals) -> tuple[soluti
 
 
 def _out_of_reach(robot: Robot, fault: int, gap: float) -> solutions.OutOfReach:
+    """The reason behind a slot's fault, with its gap in mm or deg."""
     arm = wrist_partitioned_arm(robot)
     if fault == ORIENTATION:
         return solutions.WristTiltsTooLittle(float(np.degrees(gap)))

@@ -215,6 +215,7 @@ def uniform(seed: np.uint64, pose: int, start: int, joint: int) -> float:
 
 @inner_kernel
 def _take(w: Reals, i: int, T: Reals, n: int) -> None:
+    """Load a pose into a lane as its target."""
     for r in range(3):
         for c in range(4):
             w[(_TARGET + 4 * r + c) * LANES + i] = T[n, r, c]
@@ -222,6 +223,7 @@ def _take(w: Reals, i: int, T: Reals, n: int) -> None:
 
 @kernel
 def _begin(w: Reals, i: int, q0: Reals, n: int, start: int, limits: Limits, draws: Draws) -> None:
+    """Set a lane's joints to a start: the guess, or a random one within the limits."""
     (lower, upper, respect), (_, seed, first) = limits, draws
     for j in range(6):
         angle = q0[n, j] if start == 0 else lower[j] + uniform(seed, first + n, start, j) * (upper[j] - lower[j])
@@ -269,6 +271,7 @@ def _joint(sign: float, zero: float, link: Reals, k: int, w: Reals, column: Real
 
 @inner_kernel
 def _pose_error(mask: Reals, length: float, w: Reals) -> None:
+    """Masked error of each lane in the target's tool frame: position over length, rotation vector (rad), and sizes."""
     m0, m1, m2, m3, m4, m5 = mask[0], mask[1], mask[2], mask[3], mask[4], mask[5]
     for i in range(LANES):
         a0, a1, a2, px = w[i], w[LANES + i], w[2 * LANES + i], w[3 * LANES + i]
@@ -672,6 +675,8 @@ def all_found(robot: Robot, T: Reals, starts: int) -> Reals:
 
 @dataclass(frozen=True, eq=False)
 class _Search:
+    """A search for poses of one robot: what must be met, to which tolerances (m, rad), from which random numbers."""
+
     robot: Robot
     mask: Reals
     tolerances: Reals
@@ -802,6 +807,7 @@ class _Search:
 
 
 def _checked_mask(mask: Reals | None) -> Reals:
+    """The mask as six of 0.0 or 1.0; anything else is refused."""
     values = np.ones(6) if mask is None else as_floats(mask, "mask")
     if values.shape != (6,):
         raise ShapeError("mask", values.shape, "(6,)")

@@ -141,6 +141,7 @@ def slot_round_trips(robot: Robot, poses: int, seed: int) -> SlotRoundTrips:
 
 
 def _block(robot: Robot, random: np.random.Generator, count: int) -> tuple[float, ...]:
+    """Near-singular poses, worst errors (deg, mm, deg) and unsolved poses of a block."""
     q = robot.lower + random.random((count, 6)) * (robot.upper - robot.lower)
     T = forward(robot, q)
     found = solve_slots(robot, T, np.zeros_like(q))[0]

@@ -179,6 +179,8 @@ def _part(
     best: tuple[int, Reals],
     max_margin_member: tuple[int, Reals],
 ) -> SelfMotionCurve:
+    """One part of a curve: its nearest member, its tangent, its range and its member with the largest margin."""
+
     def at(t: Reals) -> Reals:
         return _joints(robot, chain.members(curve, _place_of(lengths, np.atleast_1d(t), curve.closed)))
 

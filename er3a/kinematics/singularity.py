@@ -341,6 +341,7 @@ def rank_losses(
 
 
 def _smallest_and_sign(robot: Robot, q: Reals) -> tuple[Reals, Reals]:
+    """Smallest singular value (N,) of the scaled Jacobian, and its determinant's sign (N,), 1 unless six joints."""
     J = scaled_jacobian(robot, q)
     smallest = np.asarray(np.linalg.svd(J, compute_uv=False)[..., -1], dtype=float)
     sign = np.asarray(np.sign(np.linalg.det(J))) if robot.joints == 6 else np.ones(len(q))
@@ -382,6 +383,7 @@ def _refined(
 
 
 def _stretches(robot: Robot, t: Reals, q: Reals, joints: Callable[[Reals], Reals], threshold: float) -> list[RankLoss]:
+    """Stretches of samples below the threshold or next to a change of sign, with their minimum and dependent axes."""
     smallest, sign = _smallest_and_sign(robot, q)
     changes = np.flatnonzero(sign[:-1] * sign[1:] < 0)
     low = smallest <= threshold

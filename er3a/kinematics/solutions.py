@@ -358,9 +358,11 @@ class Solutions(ByValue, Displayed):
         return self._sheet_of_pose() if self.q.ndim == 2 else self._sheet_of_batch()
 
     def _counted(self) -> str:
+        """How many rows are solutions, and how many of these are within the limits, in words."""
         return f"{np.count_nonzero(self.solved)} solutions, {np.count_nonzero(self.within_limits)} within the limits"
 
     def _sheet_of_pose(self) -> Sheet:
+        """Each solution of one pose."""
         turned = () if self.freed_turn is None else (np.degrees(self.freed_turn),)
         rows = (
             (row, label, *more, bool(inside), why)
@@ -384,12 +386,14 @@ class Solutions(ByValue, Displayed):
         )
 
     def _sheet_of_batch(self) -> Sheet:
+        """How many solutions each pose has."""
         solved, inside = (each.sum(axis=-1) for each in (self.solved, self.within_limits))
         columns, rows = ("pose", "solutions", "within the limits"), zip(range(len(self.q)), solved, inside)
         heading = f"Solutions of {len(self.q)} poses of {self.robot.name}: {self._counted()}"
         return Sheet.of_table(heading, columns, rows, len(self.q))
 
     def _sheet_of_search(self) -> Sheet:
+        """The arm that iteration found for each pose."""
         q, solved = self.q.reshape(-1, self.robot.joints), self.solved.reshape(-1)
         first = shown(self.robot, q[:MAX_ROWS])
         errors = [np.asarray(error).reshape(-1) for error in (self.position_error, self.rotation_error)]

@@ -96,6 +96,7 @@ def arm_transform(robot: Robot) -> SymbolicTransform:
 
 
 def _motion(robot: Robot, k: int) -> Entries:
+    """What row k does: a rotation about z, or a shift along it by the table's d."""
     if not robot.sliding[k]:
         return _rotation((k + 1,))
     entries = _constant(np.eye(4))
@@ -109,6 +110,7 @@ def _without_d(robot: Robot, k: int) -> Reals:
 
 
 def _rotation(joints: tuple[int, ...]) -> Entries:
+    """A rotation about z by the sum of some rows' angles."""
     entries = _constant(np.eye(4))
     if not joints:
         return entries
@@ -119,6 +121,7 @@ def _rotation(joints: tuple[int, ...]) -> Entries:
 
 
 def _constant(matrix: Reals) -> Entries:
+    """A matrix of numbers as polynomials, rounding left out."""
     return [[{(): float(value)} if abs(value) > ROUNDING else {} for value in row] for row in matrix]
 
 
@@ -128,10 +131,12 @@ def _shifted(entries: Entries) -> Entries:
 
 
 def _product(left: Entries, right: Entries) -> Entries:
+    """The product of two matrices of polynomials."""
     return [[_sum_of_products(left[r], [row[c] for row in right]) for c in range(4)] for r in range(4)]
 
 
 def _sum_of_products(row: list[Polynomial], column: list[Polynomial]) -> Polynomial:
+    """A row times a column, factors of each product in one order."""
     total: Polynomial = {}
     for a, b in zip(row, column):
         for one, x in a.items():
@@ -142,10 +147,12 @@ def _sum_of_products(row: list[Polynomial], column: list[Polynomial]) -> Polynom
 
 
 def _frozen(entries: Entries) -> SymbolicTransform:
+    """Entries that can't be changed."""
     return SymbolicTransform(tuple(tuple(row) for row in entries))
 
 
 def _value(entry: Mapping[Product, float], moved: Reals) -> float:
+    """A polynomial's value at angles (rad) and shifts (m) of the rows."""
     total = 0.0
     for product, coefficient in entry.items():
         for function, rows in product:

@@ -143,6 +143,7 @@ def wrist_partition_missing(robot: Robot) -> ClosedFormMissing | None:
 
 @derived
 def _recognised(robot: Robot) -> WristPartitionedArm | ClosedFormMissing:
+    """The arm, or what it lacks."""
     if robot.rows != 6 or robot.joints != 6 or robot.sliding.any():
         return NotSixTurning(robot.joints, int(robot.sliding.sum()))
     if robot.coupling is not None and not _couples_the_arm_alone(robot.coupling):
@@ -197,6 +198,7 @@ def _couples_the_arm_alone(coupling: Reals) -> bool:
 
 @derived
 def _constants(robot: Robot) -> closed_form.ArmConstants:
+    """The arm's constants, kept with the robot."""
     return constants_of(wrist_partitioned_arm(robot))
 
 
@@ -253,6 +255,7 @@ def constants_of(arm: WristPartitionedArm) -> closed_form.ArmConstants:
 
 
 def _vector(array: Reals) -> Vector:
+    """Three floats."""
     x, y, z = array.tolist()
     return x, y, z
 
@@ -301,6 +304,7 @@ def has_branches(robot: Robot) -> bool:
 def _slots_of_parallel_axes(
     robot: Robot, arm: ThreeParallel, T: Reals, q_ref: Reals
 ) -> tuple[Reals, NDArray[np.int8], Reals]:
+    """:func:`solve_slots` for axes 2, 3 and 4 parallel."""
     x, gap = solve_near_reference(arm, T, robot.direction * q_ref + robot.offset)
     q = wrap_to_pi(robot.direction * (x - robot.offset))
     fault = np.where(np.isnan(q[..., 0]), closed_form.TOO_FAR, closed_form.REACHED).astype(np.int8)

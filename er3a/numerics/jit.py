@@ -154,6 +154,7 @@ def inner_kernel(function: Function) -> Function:
 
 
 def _compiled(function: Function, **wrappers: bool) -> Function:
+    """A function compiled by numba, its machine code kept in the folder of this version."""
     config: Any = numba.config
     compiling: Any = numba.njit
     options = {"error_model": "numpy", "nogil": True, "no_cfunc_wrapper": True, **wrappers}

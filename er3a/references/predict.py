@@ -127,6 +127,7 @@ def _within_sums(
 
 
 def _without_idle_joints(q: Reals, lower: Reals, upper: Reals, cost: Callable[[Reals], Reals]) -> Reals:
+    """The extreme with joints at 0, or the limit nearest to it, that have no influence."""
     rest = np.clip(0.0, lower, upper)
     for joint in range(len(q)):
         trial = q.copy()
@@ -182,6 +183,7 @@ def with_rounding(robot: Robot, references: Iterable[Reference]) -> tuple[Refere
 
 
 def _widened(robot: Robot, reference: Reference) -> Reference:
+    """A reference with what the rounding of its pose leaves open added to its uncertainty."""
     quantity = reference.quantity
     if not isinstance(quantity, QuantityAtPose) or not_of_arm(quantity, robot):
         return replace(reference, rounding=())
@@ -355,4 +357,5 @@ def _poses_of(quantities: Sequence[Quantity]) -> tuple[Pose, ...]:
 
 
 def _places(poses: Sequence[Pose]) -> dict[Pose, int]:
+    """Place of each pose."""
     return {pose: place for place, pose in enumerate(poses)}

@@ -886,6 +886,7 @@ def _cross(a: Reals, b: Reals) -> Reals:
 
 
 def _dot(a: Reals, b: Reals) -> Reals:
+    """Scalar products of vectors (..., 3)."""
     product: Reals = np.einsum("...i,...i->...", a, b)
     return product
 

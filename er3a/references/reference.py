@@ -145,6 +145,7 @@ class Documents:
         return ()
 
     def _way_back(self, start: str) -> tuple[str, ...]:
+        """Documents from one back to itself, each made from the next; empty if there is no such way."""
         ways: list[tuple[str, ...]] = [(start,)]
         seen: set[str] = set()
         while ways:

@@ -102,6 +102,7 @@ class SeenMotion(quantities.QuantityAtPose):
         return float(quantities.angle_between(self._seen_toward(), other._seen_toward(), True))
 
     def _seen_toward(self) -> Reals:
+        """The direction that was seen, (3,), base frame."""
         return np.array(TOWARD[self.seen.rpartition("_")[2]])
 
     def _directions(self, state: quantities.ModelState) -> tuple[Reals, Reals]:

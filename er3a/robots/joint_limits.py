@@ -232,6 +232,7 @@ def nearest_equivalent(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
 
 
 def _nearest_rows(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
+    """:func:`er3a.robots.whole_turns.nearest_rows` for arrays (..., n) that broadcast."""
     shape = np.broadcast_shapes(q.shape, q_ref.shape)
     rows, refs = (np.ascontiguousarray(np.broadcast_to(each, shape).reshape(-1, shape[-1])) for each in (q, q_ref))
     return nearest_rows(robot, rows, refs)[0].reshape(shape)

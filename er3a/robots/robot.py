@@ -245,6 +245,7 @@ class Robot(ByValue, Displayed):
         return found
 
     def _keep(self, key: str, array: Reals | Flags, expected: tuple[int, ...]) -> None:
+        """Keep an array as read-only, or refuse one of another shape."""
         if array.shape != expected:
             raise ShapeError(key, array.shape, str(expected))
         array.setflags(write=False)
@@ -409,6 +410,7 @@ def _warn_of_units(robot: Robot) -> None:
 
 
 def _warn(robot: Robot, problem: str, remedy: str) -> None:
+    """Warn in the name of the caller of :meth:`Robot.from_dh`."""
     warnings.warn(f"{robot.name}: {problem}; {remedy}", InputWarning, stacklevel=4)
 
 
@@ -428,6 +430,7 @@ def robot_name(path: Path) -> str:
 
 
 def _placement(T: Reals) -> str:
+    """Position in mm and roll, pitch, yaw in deg, as text."""
     xyz, rpy = (shortly(tuple(values.tolist())) for values in (1000 * T[:3, 3], np.degrees(rpy_of(T))))
     return f"xyz_mm {xyz}; rpy_deg {rpy}"
 
@@ -516,4 +519,5 @@ _SHIFTED = "a", "alpha", "beta"
 
 
 def _not_first(robot: Robot) -> Reals:
+    """A factor for each row: 0 for the first, 1 for the others."""
     return np.where(np.arange(robot.rows) == 0, 0.0, 1.0)

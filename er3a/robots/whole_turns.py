@@ -256,6 +256,7 @@ def turns_inward(robot: Robot, low: Reals, high: Reals) -> Reals:
 
 @derived
 def _lattice(robot: Robot) -> Lattice:
+    """The robot's turns as the kernels take them."""
     turns = whole_turns(robot)
     return np.ascontiguousarray(turns.lines @ turns.steps), turns.counts, turns.lines
 

@@ -190,6 +190,7 @@ def _shape(half: Reals, cells_across: int) -> Integers:
 
 
 def _check_memory(half: Reals, cells_across: int) -> None:
+    """Refuse a grid that would not fit into memory, with the finest that would."""
     budget = memory_budget()
     needed = int(_shape(half, cells_across).prod()) * BYTES_PER_CELL
     if needed <= budget:

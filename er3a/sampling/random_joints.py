@@ -218,6 +218,7 @@ class Draw:
 
 @inner_kernel
 def _round(c0: np.uint64, c1: np.uint64, c2: np.uint64, c3: np.uint64, k0: np.uint64, k1: np.uint64, r: int) -> Counter:
+    """One round of Philox4x32."""
     k0, k1 = (k0 + np.uint64(r) * _W0) & _LOW, (k1 + np.uint64(r) * _W1) & _LOW
     p0, p1 = _M0 * c0, _M1 * c2
     return (p1 >> _32) ^ c1 ^ k0, p1 & _LOW, (p0 >> _32) ^ c3 ^ k1, p0 & _LOW
@@ -292,6 +293,7 @@ def fill_uniform(seed: np.uint64, block: np.uint64, first: np.uint64, draw: int,
 def _again(
     seed: np.uint64, blocks: Integers, samples: Integers, first: Integers, directions: Words, out: Reals
 ) -> None:
+    """Fill ``out`` (N, n) with the random numbers of single samples, in (0, 1)."""
     joints = out.shape[1]
     rows = np.empty(UNIT_ROWS * CHUNK, dtype=np.float32)
     for n in range(blocks.shape[0]):

@@ -94,6 +94,7 @@ def cube_map() -> Reals:
         major, sign = face // 2, 1 - 2 * (face % 2)
 
         def unit(u: Reals, v: Reals, major: int = major, sign: int = sign) -> Reals:
+            """Directions (..., 3) of the face's places u, v, each from -1 to 1."""
             out = np.empty((*np.broadcast(u, v).shape, 3))
             out[..., major], out[..., (major + 1) % 3], out[..., (major + 2) % 3] = sign, u, v
             direction: Reals = out / np.linalg.norm(out, axis=-1, keepdims=True)
@@ -110,6 +111,7 @@ def cube_map() -> Reals:
 
 @kernel
 def _patch(x: float, y: float, z: float) -> int:
+    """Number of the cube map's patch in a direction."""
     ax, ay, az = abs(x), abs(y), abs(z)
     if ax >= ay and ax >= az:
         face, m, u, v = (0 if x >= 0 else 1), ax, y, z
@@ -356,6 +358,7 @@ def tally_blocks(
 def _side_cells(
     rows: Singles, lowest: np.float32, per_length: np.float32, n_rho: np.int32, n_z: np.int32, cells: NDArray[np.int32]
 ) -> None:
+    """Number of the side view's cell of each point of a chunk."""
     p = rows[X:]
     for i in range(CHUNK):
         x, y, z = p[i], p[CHUNK + i], p[2 * CHUNK + i]
@@ -393,6 +396,7 @@ def _voxel_of(
 def _sample(
     draw: _Block, start: int, stop: int, chain: PointChain, voxels: _Voxels, section: _Section, watch: _Watch
 ) -> None:
+    """Draw samples ``start`` to ``stop`` of a block, count them in both grids, and keep the furthest."""
     seed, block, first, joints, sobol = draw
     origin, cell, shape, counts = voxels
     lowest, per_length, n_rho, n_z, side = section

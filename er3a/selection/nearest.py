@@ -201,6 +201,7 @@ def _first(rows: list[int], distance: Reals, branch: Integers) -> int:
 def _why_first(
     robot: Robot, solutions: Solutions, q_ref: Reals, order: list[int], moves: Reals, distance: Reals
 ) -> WhyFirst:
+    """What the first of the order has over the second."""
     chosen = order[0]
     joint = int(moves[chosen].argmax())
     most = moves[chosen, joint]
@@ -221,6 +222,7 @@ def _why_first(
 
 
 def _difference(solutions: Solutions, chosen: int, other: int) -> NextBest:
+    """How another solution differs from the one chosen: its branch, its turns, or its free joint."""
     if solutions.branch[other] != solutions.branch[chosen]:
         return OtherBranch(int(solutions.branch[other]), solutions.label[other])
     turns = solutions.turn[other] - solutions.turn[chosen]

@@ -108,16 +108,19 @@ def joint_weights(robot: Robot) -> Reals:
 
 
 def _max_joint_move(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Reals:
+    """Largest joint move (...), deg, or mm of a prismatic joint."""
     greatest: Reals = comparable(robot, np.abs(q - q_ref)).max(axis=-1, initial=0.0)
     return np.degrees(greatest)
 
 
 def _weighted_move(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Reals:
+    """Root of the summed squares of weighted joint moves (...), deg."""
     distance: Reals = np.linalg.norm(joint_weights(robot) * (q - q_ref), axis=-1)
     return np.degrees(distance)
 
 
 def _time(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Reals:
+    """Longest time (...), s, of a joint's move at full speed."""
     if not np.isfinite(robot.speed).all():
         raise Er3aError(f"{robot.name}: the rule 'time' needs joint speeds, and the robot's file gives none")
     longest: Reals = (np.abs(q - q_ref) / robot.speed).max(axis=-1, initial=0.0)
@@ -125,14 +128,17 @@ def _time(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Reals:
 
 
 def _manipulability(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Reals:
+    """Manipulability (...) of the scaled Jacobian, without unit."""
     return conditioning(robot, q, characteristic_length(robot)).manipulability
 
 
 def _limit_distance(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Reals:
+    """Smallest distance (...) from a limit, deg, or mm of a prismatic joint."""
     return np.degrees(limit_margin(robot, q))
 
 
 def _clearance(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Reals:
+    """Smallest distance (...) between bodies, mm."""
     return clearance(robot, q, scene).distance * 1000
 
 
@@ -537,6 +543,7 @@ def rest_to_rest(angle: Reals, speed: Reals, acceleration: Reals) -> Reals:
 
 
 def _usable(robot: Robot, solutions: Solutions, scene: Scene | None, number: int) -> Integers:
+    """Rows within the limits and free of collisions; a pose without any is refused."""
     rows = np.flatnonzero(solutions.within_limits)
     if rows.size:
         rows = rows[bodies_of(robot, scene).min_distance_of_turns(solutions.q[rows])[0] >= 0]

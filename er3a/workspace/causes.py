@@ -176,6 +176,7 @@ def _relaxed(limit: _Limit, filled: Callable[[Robot], float]) -> Relaxed:
 
 
 def _with_wider_sum(robot: Robot, number: int, side: Side, by: float) -> Robot:
+    """The robot with a limit of a sum widened by an angle or a length, rad or m."""
     limit, others = robot.combined[number], list(robot.combined)
     lower, upper = limit.lower - by * (side == "lower"), limit.upper + by * (side == "upper")
     others[number] = CombinedLimit(limit.factors, lower, upper)
@@ -211,6 +212,7 @@ def cause_of(single: list[Relaxed], unlimited: float) -> VoidCause:
 
 
 def _widened(robot: Robot, joint: int, side: Side, by: float) -> Robot:
+    """The robot with one joint's limit widened by an angle or a length, rad or m."""
     lower, upper = robot.lower.copy(), robot.upper.copy()
     if side == "upper":
         upper[joint - 1] += by
@@ -303,6 +305,7 @@ def single_changes(robot: Robot, cause: VoidCause, seed: int) -> tuple[SingleCha
 
 
 def _litres(voids: Sequence[Cavity], bound: Literal["lower", "upper"]) -> float:
+    """Volume of voids together, by their lower or upper bounds, in litres."""
     return round(1000 * sum((void.lower if bound == "lower" else void.upper) for void in voids), 3)
 
 
@@ -351,6 +354,7 @@ def _of_limits(robot: Robot, cause: VoidCause) -> Iterator[Candidate]:
 
 
 def _named(cause: VoidCause) -> Sequence[Relaxed]:
+    """The limits that a cause names."""
     if isinstance(cause, Disappears):
         return cause.limits
     return () if cause.most is None else (cause.most,)

@@ -219,5 +219,6 @@ def places_served(robot: Robot, q_1: Reals) -> tuple[Reals, Reals]:
 
 
 def _sense(robot: Robot) -> float:
+    """The sense in which joint 1 moves along its axis or slide, +1 or -1."""
     sense = robot.direction[0] * (1.0 if robot.coupling is None else robot.coupling[0, 0])
     return float(np.sign(sense))

@@ -88,6 +88,7 @@ Judge = Callable[[Reals, int, Proof | None], Proof]
 
 
 def _arc_ratio(arcs: Reals) -> Reals:
+    """Sum (n,) of arcs (n, MAX_ARCS, 2) in parts of a turn."""
     ratio: Reals = np.nansum(arcs[..., 1] - arcs[..., 0], axis=1) / TURN
     return ratio
 
@@ -198,6 +199,7 @@ def _first_cells(reach: float, heights: tuple[float, float], across: int) -> Rea
 
 
 def _quarters(cells: Reals) -> Reals:
+    """Each cell (n, 4) as four (4 n, 4), one after another."""
     rho, z = cells[:, :2].mean(axis=1), cells[:, 2:].mean(axis=1)
     rows = [
         np.stack([a, b, c, d], axis=1)

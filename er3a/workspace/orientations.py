@@ -196,6 +196,7 @@ class AskedOrientations:
         return np.broadcast_to(np.eye(3), (len(points), 3, 3))
 
     def _about_axis(self, turns: Reals) -> Reals:
+        """The tool turned about the axis by angles (n,), rad: (n, 3, 3)."""
         return np.asarray(Rotation.from_rotvec(turns[:, None] * self.axis).as_matrix() @ self.tool)
 
 

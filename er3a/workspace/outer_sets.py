@@ -77,6 +77,7 @@ def outer_rings(arm: GeneralArm, across: int) -> Rings:
 
 
 def _grid(arm: GeneralArm, k: int, across: int) -> Rings:
+    """Rings that cover all that the joints from k on reach, all of them empty."""
     return _at_heights(arm, k, across, *arm.heights[k])
 
 
@@ -94,6 +95,7 @@ def _at_heights(arm: GeneralArm, k: int, across: int, low: float, high: float) -
 
 
 def _summed(rings: Rings) -> Rings:
+    """The rings with sums over the first rows and columns of those that are not wholly empty."""
     whole = (rings.counts == 1) & (rings.empty[:, :, 0, 1] - rings.empty[:, :, 0, 0] >= TURN)
     reached = np.zeros((whole.shape[0] + 1, whole.shape[1] + 1), dtype=np.int64)
     reached[1:, 1:] = (~whole).cumsum(axis=0).cumsum(axis=1)
@@ -101,6 +103,7 @@ def _summed(rings: Rings) -> Rings:
 
 
 def _carried(arm: GeneralArm, k: int, rings: Rings, outer: Rings) -> Rings:
+    """Fill rings about axis k with what the joints after it reach, turned by its range."""
     low, high = (0.0, 0.0) if arm.sliding[k] else (arm.lower[k], arm.upper[k])
     _carry(np.ascontiguousarray(arm.links[k + 1]), low, high, outer, rings)
     return rings
@@ -108,6 +111,7 @@ def _carried(arm: GeneralArm, k: int, rings: Rings, outer: Rings) -> Rings:
 
 @kernel
 def _mark_tip(arm: GeneralArm, k: int, rho: float, azimuth: float, alone: bool, rings: Rings) -> None:
+    """Mark the rings that the tool point is in as the last joint moves, for the azimuths that it turns through."""
     z_0 = arm.tip[2] + (arm.lower[k] if arm.sliding[k] else 0.0)
     z_1 = arm.tip[2] + (arm.upper[k] if arm.sliding[k] else 0.0)
     a = azimuth + (0.0 if arm.sliding[k] else arm.lower[k]) - 1e-6

@@ -186,6 +186,7 @@ def _limit_margin(robot: Robot, q: Reals) -> Reals:
 
 
 def _turning_sums(robot: Robot) -> tuple[CombinedLimit, ...]:
+    """Limits of sums of which no joint slides."""
     return tuple(limit for limit in robot.combined if not robot.slides[np.flatnonzero(limit.factors)].any())
 
 
@@ -207,6 +208,7 @@ def narrowed(robot: Robot, margin: float) -> Robot:
 
 
 def _drawn_in(limit: CombinedLimit, margin: float) -> CombinedLimit:
+    """A limit of a sum, drawn in by an angle, rad, to its middle at most."""
     inward = min(margin, (limit.upper - limit.lower) / 2)
     return CombinedLimit(limit.factors, limit.lower + inward, limit.upper - inward)
 
@@ -516,6 +518,7 @@ def _weighed(places: Places) -> Reals:
 
 
 def _places(field: Field, box: Reals, turned: bool) -> Places:
+    """Places of the box in one turn, by the best single branch, else by the best of all."""
     points = _lattice_points(field, box)
     any_branch = _sliding_min(field.manipulability_any, points)
     where = np.nonzero(any_branch > NO)

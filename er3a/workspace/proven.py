@@ -259,6 +259,7 @@ def _across_zero(cell: Integers, arcs: Reals) -> Integers:
 
 
 def _empty_ratio(arcs: Reals, empty: Reals) -> Reals:
+    """Share (k,) of each arc (k, 2) that is in the proven empty ones (k, MAX_ARCS, 2)."""
     low = np.maximum(arcs[:, None, 0], empty[..., 0])
     high = np.minimum(arcs[:, None, 1], empty[..., 1])
     ratio: Reals = np.nansum(np.maximum(0, high - low), axis=1) / (arcs[:, 1] - arcs[:, 0])

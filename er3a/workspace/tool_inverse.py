@@ -186,6 +186,7 @@ def all_solutions(robot: Robot, T: Reals) -> tuple[Reals, Flags]:
 
 
 def _solutions(robot: Robot, T: Reals, redundancy: Reals | None) -> tuple[Reals, Flags]:
+    """:func:`all_solutions` at one value of what a pose leaves open."""
     if is_quick(robot):
         found = inverse_batch(robot, T, redundancy=redundancy)
         return found.q, found.within_limits

@@ -307,6 +307,7 @@ def proven_voids(robot: Robot, proven: Proven, hull: Hull, shoulder: Reals) -> l
 def _void(
     kind: VoidKind, robot: Robot, proven: Proven, cavity: Cavity, shoulder: Reals, surface: tuple[Blocks, Flags]
 ) -> Void:
+    """A void with its place, cause and surface, in the base frame."""
     low, high = cavity.box()
     corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
     corners = proven.in_base(corners)
@@ -366,6 +367,7 @@ def pocket_block(proven: Proven) -> float:
 
 
 def _pocket_blocks(proven: Proven, outside: Cavity) -> Blocks:
+    """What is open to the outside, in blocks of :func:`pocket_block`."""
     cells, size = proven.proof.cells, pocket_block(proven)
     low, high = cells[:, [0, 2]].min(axis=0), cells[:, [1, 3]].max(axis=0)
     return blocks_of(outside, size, low, low + np.ceil((high - low) / size - 1e-6) * size, TURNS)

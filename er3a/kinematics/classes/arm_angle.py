@@ -502,6 +502,7 @@ def _elbow(k: ArmAngleConstants, w: Reals, sign: float) -> None:
 
 @inner_kernel
 def _three(k: SphericalConstants, w: Reals, row: int, sign: float, out: Reals) -> None:
+    """Three joints of a block by one root into ``out``, rad in (-pi, pi], NaN without a root; marks singular poses."""
     for i in range(BLOCK):
         z, x = row * BLOCK + i, (row + 3) * BLOCK + i
         a, b, c, valid, smallest = three_angles(

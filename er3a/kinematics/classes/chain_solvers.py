@@ -172,6 +172,7 @@ def chain_solver(links: Reals, sliding: Flags, pointing: Reals | None = None) ->
 
 
 def _with_spherical_wrist(links: Reals, sliding: Flags) -> class_solvers.ChainSolver | None:
+    """The closed form for axes 2 and 3 parallel and a spherical wrist."""
     if len(sliding) != 6 or sliding.any():
         return None
     wrist = recognised(*axes_of(links), poses_of(links, np.zeros(6)))
@@ -183,11 +184,13 @@ def _with_spherical_wrist(links: Reals, sliding: Flags) -> class_solvers.ChainSo
 
 
 def _with_parallel_axes(links: Reals, sliding: Flags) -> class_solvers.ChainSolver | None:
+    """The closed form for axes 2, 3 and 4 parallel, 5 and 6 meeting."""
     parallel = three_parallel(links) if len(sliding) == 6 and not sliding.any() else None
     return None if parallel is None else class_solvers.ParallelAxes(parallel)
 
 
 def _with_three_slides(links: Reals, sliding: Flags) -> class_solvers.ChainSolver | None:
+    """The closed form for three slides and three joints that turn, if these have six degrees of freedom."""
     if len(sliding) != 6 or sliding.sum() != 3 or not full_rank(links, sliding):
         return None
     three = gantry(links, sliding)
@@ -195,6 +198,7 @@ def _with_three_slides(links: Reals, sliding: Flags) -> class_solvers.ChainSolve
 
 
 def _with_arm_angle(links: Reals, sliding: Flags) -> class_solvers.ChainSolver | None:
+    """The closed form for seven joints with a spherical shoulder and wrist."""
     if len(sliding) != 7 or sliding.any():
         return None
     arm = arm_angle_arm(links)
@@ -202,6 +206,7 @@ def _with_arm_angle(links: Reals, sliding: Flags) -> class_solvers.ChainSolver |
 
 
 def _as_scara(links: Reals, sliding: Flags) -> class_solvers.ChainSolver | None:
+    """The closed form for four joints of one direction, one of them a slide."""
     planar = scara(links, sliding) if len(sliding) == 4 else None
     return None if planar is None else class_solvers.ScaraSolver(planar)
 
@@ -218,6 +223,7 @@ that does is taken; what none recognises is solved by elimination, with joints h
 
 
 def _by_elimination(links: Reals, sliding: Flags) -> class_solvers.ChainSolver:
+    """The solver of any other six joints, by how many of them slide."""
     if not full_rank(links, sliding):
         return Unsolved(6, "dependent")
     if sliding.sum() == 2:
@@ -263,6 +269,7 @@ def full_rank(links: Reals, sliding: Flags, at_rest: tuple[int, ...] = ()) -> bo
 
 
 def _jacobian(links: Reals, sliding: Flags, x: Reals) -> Reals:
+    """Jacobian (6, n) of scaled links at random joint values, for its rank."""
     n = len(sliding)
     frames = [poses_of(links[: k + 1], x[:k], sliding[:k]) for k in range(n)]
     tip = poses_of(links, x, sliding)[:3, 3]

@@ -660,6 +660,7 @@ def _three_signs(w1: Reals, w2: Reals, zero_side: float) -> tuple[SlotName, ...]
 
 
 def _shortest(x: Reals) -> Reals:
+    """Angles in [-pi, pi], whole turns taken off."""
     return np.asarray(x - TURN * np.round(x / TURN))
 
 

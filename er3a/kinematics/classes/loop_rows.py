@@ -238,6 +238,7 @@ def _angles_of(y: Reals, slides: Flags) -> tuple[float, float]:
 
 @inner_kernel
 def _angle_of(cc: float, cs: float, ss: float) -> float:
+    """The angle whose half has the squares and product of cosine and sine nearest to these three."""
     sign = 1.0 if cc + ss >= 0.0 else -1.0
     angle: float = np.arctan2(2.0 * cs * sign, (cc - ss) * sign)
     return angle
@@ -369,6 +370,7 @@ def _first_shift(square: float, linear: float, alone: float, b0: float, b1: floa
 
 @inner_kernel
 def _second_and_last(e: Scratch, across: Reals, slides: Flags, x: Reals) -> None:
+    """Joint 2 by the rows across it, then joint 6 as what closes the loop, into ``x`` (6,)."""
     c, s = (x[0] * x[0], x[0]) if slides[0] else (np.cos(x[0]), np.sin(x[0]))
     re, im = 0.0, 0.0
     for b in range(4):

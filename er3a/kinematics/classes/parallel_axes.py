@@ -126,6 +126,7 @@ def _meeting(a: Reals, p: Reals, b: Reals, r: Reals) -> Reals | None:
 
 
 def _constants(links: Reals, axes: Reals, points: Reals, wrist: Reals) -> ParallelConstants:
+    """Constants of the arm from its axes with all joints at 0 (base frame, m) and W, where axes 5 and 6 meet."""
     w = axes[1]
     z = axes[0]
     x = w - (w @ z) * z

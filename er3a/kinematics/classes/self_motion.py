@@ -485,9 +485,11 @@ class PoseChain:
         return self.posed[1]
 
     def _scaled(self, x: Reals) -> Reals:
+        """Joint values in rad and m as rad and parts of the size."""
         return np.ascontiguousarray(np.where(self.sliding, np.asarray(x, float) / self.size, x))
 
     def _in_m(self, x: Reals) -> Reals:
+        """Joint values in rad and parts of the size as rad and m."""
         return np.where(self.sliding, x * self.size, x)
 
     def error(self, x: Reals) -> float:
@@ -577,6 +579,7 @@ class PoseChain:
         return TracedCurve(self._in_m(path), end == CLOSED, self._dimension(path))
 
     def _dimension(self, path: Reals) -> int:
+        """Median dimension of the null space at seven points of a path."""
         n = len(self.sliding)
         e, J, out = np.empty(6), np.empty((6, n)), np.empty(n)
         found = []

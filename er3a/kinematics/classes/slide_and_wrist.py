@@ -292,6 +292,7 @@ def _at(polynomial: Reals, d: Reals) -> Reals:
 
 
 def _slope(polynomial: Reals, d: Reals) -> Reals:
+    """Derivatives (N, k) of polynomials (N, 3) at d (N, k)."""
     _, c1, c2 = polynomial.T[:, :, None]
     return np.asarray(c1 + 2 * d * c2)
 
