@@ -220,7 +220,7 @@ def fibonacci_sphere(count: int, turned_back: bool = False) -> Reals:
 
     Returns
     -------
-    directions : (count, 3), from the north pole (z = 1) to the south
+    directions : (count, 3), in the order of falling z
 
     References
     ----------
