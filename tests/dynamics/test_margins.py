@@ -17,7 +17,6 @@ from er3a.dynamics.margins import (
     max_payload,
     max_speed_scale,
     worst_levers,
-    wrist_to_flange,
     wrist_use,
 )
 from er3a.dynamics.torques import demand, torque_parts, worst_holding
@@ -292,7 +291,6 @@ def test_levers_are_distances_of_the_load_from_the_axes(arm):
     # Of a wrist whose axes meet: the distance from their point for joints 4 and 5, that from its own axis for 6.
     whole = np.hypot(np.hypot(0.03, 0.02), 0.1 + 0.0785)
     np.testing.assert_allclose(far[1:], [whole, whole, np.hypot(0.03, 0.02)], atol=1e-6)
-    assert wrist_to_flange(arm) == pytest.approx(0.0785)
     # Against the cross product of joint 5's column of the Jacobian: a point moves by its distance for each radian.
     tool = np.eye(4)
     tool[:3, 3] = point
