@@ -666,16 +666,6 @@ def test_the_shortest_time_of_a_path_that_is_too_fast_is_told_with_what_it_means
     assert "it takes at least 9.00 s" in path_text(replace(path, fastest_s=9.0))
 
 
-def test_a_path_that_starts_near_singular_lists_that_first_with_its_distance(results):
-    found = results["er3_600"]
-    rows = found.checks.take(found.checks.path == "line_out")
-    (fault,) = (each for each in faults(found) if each.name == "line_out")
-    first = fault.moments[0]
-    assert first.what == f"near-singular at the start: {abs(rows.q_deg[0, 4]):.2f} deg from the wrist singularity"
-    assert (first.when, first.seen_s) == ("0.000 s", 0.0)
-    assert "near-singular" in fault.to_do or any("near-singular" in text for _, text in fault.facts)
-
-
 def test_a_repair_that_meets_the_tray_is_marked_wherever_it_is_offered(study, stored, tmp_path, monkeypatch):
     """In its row, in the section's answer, beside its programs and in their heads, and in the player."""
     met = {"line_limits, repaired": Meeting(0.21, "link 4")}

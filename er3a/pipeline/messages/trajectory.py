@@ -9,7 +9,6 @@ from typing import Any, Literal, NamedTuple
 
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.pairs import LinkAndSolid, ShapesAssumed
-from er3a.kinematics.singularity import SingularityType
 from er3a.pipeline.language import N_, as_text, with_unit
 from er3a.pipeline.messages.expectations import demonstrated, outcome_word
 from er3a.pipeline.messages.kinematics import singular_pose, singularity_word
@@ -111,7 +110,6 @@ TEXTS = texts(
         "path.when": "from t = {start:.4g} to {end:.4g} s",
         "pair_touches": "{pair} overlap from t = {t0_s:.4g} s, up to {depth_mm:.1f} mm at t = {t_s:.4g} s",
         "bodies_overlap.more": "{touches}; and more later",
-        "path.near_start": "near-singular at the start: {distance} from the {type} singularity",
         "path.singular": "{type} singularity",
         "path.rates": Plural(
             "joints",
@@ -393,11 +391,6 @@ def _(found: model.BodiesOverlap) -> str:
 def cause_text(part: model.Stretch) -> str:  # type: ignore[type-arg]
     """Why a stretch of a path is listed."""
     return _with_worst(part, say(part.cause))
-
-
-def near_at_start(kind: SingularityType, distance: str) -> str:
-    """That a path starts so near a singular set; ``distance`` with its unit."""
-    return sentence("path.near_start", type=singularity_word(kind), distance=distance)
 
 
 class FaultText(NamedTuple):

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from er3a.collision.pairs import ShapesAssumed
-from er3a.kinematics.singularity import SingularityType
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.language import own_title, tr, with_unit
+from er3a.pipeline.language import own_title, tr
 from er3a.pipeline.messages.expectations import as_expected, outcome_words
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.planning import rate_needed, times_needed
@@ -30,7 +29,6 @@ from er3a.pipeline.messages.trajectory import (
     event_word,
     fact_word,
     first_faults,
-    near_at_start,
     path_text,
     repair_facts,
     repair_lead,
@@ -78,8 +76,8 @@ def motions(
         if path.chosen:
             repair = avoidance.take((avoidance.path == path.name) & (avoidance.strategy == path.strategy))
             text = repair_lead(path, slowed(path, rows, repair))
-            q, seen = meant(robot, repair.q_deg), [*_kept_passes(path, rows, repair), *added(repaired(path))]
-            motions.append(PlayedMotion(repaired(path), text, repair.t_s, q, seen))
+            q = meant(robot, repair.q_deg)
+            motions.append(PlayedMotion(repaired(path), text, repair.t_s, q, added(repaired(path))))
     return motions
 
 
@@ -108,7 +106,7 @@ def faults(results: model.TrajectoryResults) -> list[Fault]:
         if near and clearance:
             wrong.append(FaultText(clearance.t_s, say(near), clearance.t_s))
         elif path.verdict != "safe":
-            wrong = [*_near_at_start(path, rows, results.summary.near), *_faults(path), *wrong]
+            wrong = [*_faults(path), *wrong]
         status, verdict = shown_verdict(path, near)
         own = results.avoidance.take(results.avoidance.path == path.name)
         to_do, facts, instead = _to_do(path, rows, own, results.summary)
@@ -148,22 +146,6 @@ def _in_program(path: model.PathSummary) -> list[FaultMoment]:
         line = tr("line {line}", line=each.line) if each.line else ""
         lines.setdefault(say(each.finding), {})[line] = None
     return [FaultMoment(text, joined(named, ", ")) for text, named in lines.items()]
-
-
-def _near_at_start(path: model.PathSummary, rows: model.PathChecks, near: model.NearThresholds) -> list[FaultText]:
-    """That a path without a repair is near-singular from its start on, unless another fault begins at that moment."""
-    if path.chosen or path.in_joint_space or not len(rows) or not rows.near_singular[0]:
-        return []
-    if any(event.t_s <= rows.t_s[0] for event in path.singularities):
-        return []
-    parts: list[tuple[float, SingularityType, str]] = [
-        (abs(rows.wrist_deg[0]) / near.wrist_deg, "wrist", with_unit(fixed(abs(rows.wrist_deg[0]), 2), "deg")),
-        (abs(rows.elbow_deg[0]) / near.elbow_deg, "elbow", with_unit(fixed(abs(rows.elbow_deg[0]), 2), "deg")),
-        (abs(rows.shoulder_mm[0]) / near.shoulder_mm, "shoulder", f"{fixed(abs(rows.shoulder_mm[0]), 1)} mm"),
-    ]
-    share, kind, distance = min((part for part in parts if np.isfinite(part[0])), default=(np.inf, "wrist", ""))
-    start = float(rows.t_s[0])
-    return [FaultText(start, near_at_start(kind, distance), start)] if share <= 1 else []
 
 
 def _moment(fault: FaultText | FaultMoment, rows: model.PathChecks) -> FaultMoment:
@@ -322,18 +304,6 @@ def events(path: model.PathSummary) -> list[PlayedEvent]:
 def _pass(event: model.Singularity) -> PlayedEvent:
     """A singular pose, or a pass by one."""
     return PlayedEvent(event.t_s, event.until_s, _singular(event), "caution")
-
-
-def _kept_passes(path: model.PathSummary, rows: model.PathChecks, repair: model.AvoidanceRows) -> list[PlayedEvent]:
-    """The passes by singular poses of a motion that repairs a path and keeps to it: at its times."""
-    length = _kept_length(path, rows, repair)
-    if length is None:
-        return []
-
-    def later(t: float) -> float:
-        return float(np.interp(np.interp(t, rows.t_s, rows.s_m), length, repair.t_s))
-
-    return [_pass(replace(each, t_s=later(each.t_s), until_s=later(each.until_s))) for each in path.singularities]
 
 
 def _few_words(part: model.Stretch[Any]) -> str:
