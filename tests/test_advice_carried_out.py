@@ -78,7 +78,7 @@ CARRIED_OUT = {
     "ambiguous_tilt": "test_a_board_seen_head_on_leaves_its_tilt_open_until_it_is_nearer_or_tilted",
     "other_convention": OF_SETS,
     "wrong_limit#lower": "test_single_faults_are_named",
-    **{f"far_from_table#{mistake}": SWAPPED for mistake in ("swapped", "opposite")},
+    **{f"far_from_table#{mistake}": SWAPPED for mistake in ("swapped", "fault")},
 }
 NOT_CARRIED_OUT = {  # a person looks at the controller, the cell or the file, or takes another picture
     *("clearance_not_proven", "program_not_understood", "singular.elbow", "singular.shoulder", "not_followed.too_far"),
