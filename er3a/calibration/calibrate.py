@@ -57,7 +57,6 @@ from er3a.calibration.outcomes import (
     MoreTouches,
     NoCorrectionFits,
     NoPositions,
-    PlacementName,
 )
 from er3a.calibration.parameters import (
     DEPENDENT,
@@ -70,7 +69,6 @@ from er3a.calibration.parameters import (
     whole_length_mm,
 )
 from er3a.calibration.plan import d_optimal, touches
-from er3a.calibration.residuals import ResidualStructure, structure_of
 from er3a.calibration.terms import (
     FOR_ALL_JOINTS,
     FOR_ROBOT_FILE,
@@ -78,7 +76,6 @@ from er3a.calibration.terms import (
     CorrectedModel,
     JointErrors,
     TermKind,
-    effects,
     places_of,
 )
 from er3a.comparison.entries import TOOL_COLUMNS, Entry
@@ -319,7 +316,6 @@ class Beyond(CorrectedModel):
     rms_mm : of what remains
     deviation_mm : standard deviation of a coordinate, estimated from what this model leaves; None if it was stated
     left_out : at poses left out; None of too few poses
-    residuals : what remains: noise, or structure
     """
 
     terms: tuple[TermEstimate, ...]
@@ -327,7 +323,6 @@ class Beyond(CorrectedModel):
     rms_mm: float
     deviation_mm: float | None
     left_out: HeldOutErrors | None
-    residuals: ResidualStructure | None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -356,7 +351,6 @@ class Calibration(ByValue, Displayed):
         was stated
     outliers : measurements that were set aside
     left_out : at poses left out, by what the robot's file holds; None of too few poses
-    residuals : what remains: noise, or structure; None as for ``left_out``
     tried : terms beyond the table, in the order in which they were taken, then those that were not; of too few
         measurements for all kinds no couplings, or those that a robot file can hold
     tried_for_file : those that a robot file can hold, beside no others, where others were tried and taken, or
@@ -385,7 +379,6 @@ class Calibration(ByValue, Displayed):
     ratios: tuple[TermEstimate, ...] = ()
     idle: tuple[Touched, ...] = ()
     left_out: HeldOutErrors | None = None
-    residuals: ResidualStructure | None = None
     tried: tuple[TriedTerm, ...] = ()
     tried_for_file: tuple[TriedTerm, ...] = ()
     beyond: Beyond | None = None
@@ -453,54 +446,6 @@ class Calibration(ByValue, Displayed):
             left,
             (shortly(self.conclusion), *(f"held: {shortly(why)}" for why in self.held)),
         )
-
-
-@dataclass(frozen=True)
-class JointShare:
-    """Effect of the corrections of a joint, of base or of tool on the measured points.
-
-    Attributes
-    ----------
-    joint : from 1; 0 for base and tool
-    placement : which of these
-    entries : those that were corrected
-    table_mm, terms_mm : root mean square of the way by which they move the points, alone
-    """
-
-    joint: int
-    placement: PlacementName | None
-    entries: tuple[str, ...]
-    table_mm: float
-    terms_mm: float
-
-
-def joint_shares(found: Calibration, robot: Robot, measurements: Sequence[Measurement]) -> tuple[JointShare, ...]:
-    """How far the corrections of base, each joint and tool move the measured points; shares of several may cancel.
-
-    Parameters
-    ----------
-    robot : the table that was started from
-    """
-    seen = observed(measurements, robot)
-    own, errors = (found.beyond.estimates, found.beyond.errors) if found.beyond else (found.estimates, None)
-    before, effect = seen.positions(robot), effects(robot, seen.row_values, seen.points(robot))
-    too_far = np.zeros_like(seen.row_values)
-    if errors:
-        too_far = errors.amounts(seen.row_values, seen.points(errors.robot))
-    shares = []
-    owners: list[tuple[int, PlacementName | None]] = [(row, None) for row in range(1, robot.rows + 1)]
-    for joint, placement in ((0, "base"), *owners, (0, "tool")):
-        mine = [each for each in own if each.parameter.joint == joint]
-        if placement:
-            mine = [each for each in mine if each.parameter.column.startswith(placement)]
-        amounts = np.array([each.correction / each.parameter.in_unit for each in mine])
-        moved = corrected(robot, [each.parameter for each in mine], amounts)
-        by_terms = effect[:, joint - 1] * too_far[:, [joint - 1]] if joint else np.zeros_like(before)
-        ways = (
-            1000 * float(np.sqrt((way**2).sum(axis=1).mean())) for way in (seen.positions(moved) - before, by_terms)
-        )
-        shares.append(JointShare(joint, placement, tuple(each.name for each in mine), *ways))
-    return tuple(shares)
 
 
 def calibrate(
@@ -705,7 +650,6 @@ def _from_points(robot: Robot, every: PointObservations, free_ratios: bool) -> C
         deviation_mm=_deviation(observations, model.table),
         outliers=tuple(Outlier(int(every.lines[k]), float(distances[k])) for k in np.flatnonzero(~used)),
         left_out=_left_out(observations, model.table),
-        residuals=_structure(robot, observations, model.table),
         tried=model.choice.tried or model.for_file.tried,
         tried_for_file=model.for_file.tried if model.choice.tried else (),
         beyond=_beyond(robot, model.for_whole, model.whole) if model.choice.terms else None,
@@ -881,19 +825,6 @@ def _left_out(observations: PointObservations, found: Fit) -> HeldOutErrors | No
     return left_out(observations, found) if can_leave_out(observations.pose_of[found.last], found.J.shape[1]) else None
 
 
-def _structure(robot: Robot, observations: PointObservations, found: Fit) -> ResidualStructure | None:
-    """Of what is independent, which is as many as poses minus those that place and planes take to be known."""
-    residuals, known = np.zeros(observations.seen.shape), np.zeros(observations.seen.shape, dtype=bool)
-    where = np.flatnonzero(observations.seen)[found.last]
-    residuals.flat[where], known.flat[where] = found.rest * found.deviation_mm, True
-    effect = 1000 * effects(robot, observations.row_values, observations.points(robot))
-    effect *= ((observations.touched < 0)[:, None] & observations.seen)[:, None]
-    used, columns = known.any(axis=1), known.any(axis=0)
-    off = np.sqrt(np.bincount(observations.pose_of, weights=(found.after * observations.deviation_mm) ** 2))
-    worst = int(observations.lines[off.argmax()]), float(off.max())
-    return structure_of(residuals[used][:, columns], observations.row_values[used], effect[used][..., columns], worst)
-
-
 def _term_estimates(found: Fit, error: Reals) -> tuple[TermEstimate, ...]:
     own_error = error[len(found.kept) :]
     return tuple(
@@ -920,5 +851,4 @@ def _beyond(robot: Robot, observations: PointObservations, found: Fit) -> Beyond
         rms_mm=float(np.sqrt(np.mean((found.after * observations.deviation_mm) ** 2))),
         deviation_mm=_deviation(observations, found),
         left_out=_left_out(observations, found),
-        residuals=_structure(robot, observations, found),
     )

@@ -2,7 +2,6 @@
 
 ``calibration_set`` is what was recorded (by ``boards`` from images). ``hand_eye`` calibrates: starts by
 ``classic_methods``, refined by ``likelihood``; what contradicts samples is in
-``vision_findings``, whether they are of two setups in ``setup_changes``, and whether the board or the camera's
-intrinsics are others in ``distance_errors``. ``point_error`` says how far it is off, ``grasping`` with
-``grasp_motion`` plans.
+``vision_findings``, and what explains that in ``typical_causes``. ``point_error`` says
+how far it is off, ``grasping`` with ``grasp_motion`` plans.
 """

@@ -18,6 +18,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -37,11 +38,11 @@ from er3a.geometry.transforms import (
     transposed,
 )
 from er3a.numerics.arrays import Flags, Reals
+from er3a.robots.robot import Robot
 from er3a.vision import calibration_set, vision_findings
 from er3a.vision.classic_methods import mean_pose, park, shah
-from er3a.vision.distance_errors import DistanceFit, wrong_distances
 from er3a.vision.likelihood import UNKNOWNS, PoseObservations, Refined, half_width, refine, residuals
-from er3a.vision.setup_changes import moved_between
+from er3a.vision.typical_causes import DistanceFit, moved_between, wrong_distances, wrong_zero
 
 DEVIATIONS = 20.0  # of the angle between two samples; beyond, a pair is in conflict. Tilts seen head-on are as vague
 MAX_DEVIATION = np.radians(2.0)  # of a camera that is of any use
@@ -416,8 +417,10 @@ def calibrate_hand_eye(samples: calibration_set.CalibrationSet) -> HandEye:
     warnings += _warnings(kept, refined, greatest, apart, distances)
     share = len(set(kept.places.tolist())) / len(kept)
     named = {each.code for each in vision_findings.grave_warnings(warnings)} - {"unexplained_residuals", "more_scatter"}
-    if not named and share > MOSTLY_APART and (step := moved_between(samples.take(once), used[once], refined)):
-        warnings.append(step)
+    if not named and share > MOSTLY_APART:
+        every = samples.take(once)
+        step = moved_between(every, refined if used[once].all() else _fitted(every))
+        warnings += [step] if step else []
     covariance = refined.covariance + _shared_covariance(kept, refined)
     half = half_width(covariance, refined.freedom)
     wider = _wider(half, refined, distances) / half
@@ -440,6 +443,29 @@ def calibrate_hand_eye(samples: calibration_set.CalibrationSet) -> HandEye:
         mismatch=angles.mismatch,
     )
     return found if samples.touched is None else replace(found, touch=_touch(found, samples.touched))
+
+
+def zeros_tried(found: HandEye, robot: Robot) -> tuple[HandEye, tuple[str, ...], float]:
+    """A calibration whose warnings name the joint with a wrong zero, if one explains all that contradicts it.
+
+    Returns
+    -------
+    found, unseen, smallest : see :class:`er3a.vision.typical_causes.ZerosTried`
+    """
+    used = found.samples.take(found.used)
+    tried = wrong_zero(found.samples, used, refine(PoseObservations.of(used), found.X, found.Y), robot)
+    explained = {each.code for each in vision_findings.grave_warnings(found.warnings)} <= EXPLAINED_BY_A_ZERO
+    if tried.zero and tried.mended and explained:
+        with suppress(vision_findings.HandEyeError):
+            if not vision_findings.grave_warnings(calibrate_hand_eye(tried.mended).warnings):
+                others = tuple(each for each in found.warnings if each.code not in EXPLAINED_BY_A_ZERO)
+                found = replace(found, warnings=(tried.zero, *others))
+    return found, tried.unseen, tried.smallest
+
+
+EXPLAINED_BY_A_ZERO = {
+    *("board_scale", "focal_length", "principal_point", "unexplained_residuals", "moved_between", "more_scatter")
+}
 
 
 def best_closed_form(F: Reals, B: Reals, deviations: Reals) -> tuple[Reals, Reals]:

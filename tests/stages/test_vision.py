@@ -137,9 +137,8 @@ def test_tables_say_what_the_summary_says(folders):
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", ["er3a_c60", ARTICLE, "er3_600"])
-def test_page_and_recording_are_written(study, folders, tmp_path, name):
-    for verb in ("record", "report"):
-        run.show(verb, "vision", study, name, folders[name], tmp_path / verb)
+def test_the_page_is_written(study, folders, tmp_path, name):
+    run.show("report", "vision", study, name, folders[name], tmp_path / "report")
     page = (tmp_path / "report").read_text(encoding="utf-8")
     assert "T_flange_board" in page or "T_base_board" in page
     packed = re.findall(r'href="data:text/plain;base64,([^"]+)" download="grasp_\w+\.(?:src|script|pgm|XPL|csv)"', page)
@@ -147,7 +146,6 @@ def test_page_and_recording_are_written(study, folders, tmp_path, name):
     assert len(heads) >= 5 * (name == "er3a_c60")
     assert all("the camera is simulated" in head and "may carry the object was not examined" in head for head in heads)
     assert all("er3a: Run no path or program on the arm until" in head for head in heads)
-    assert (tmp_path / "record").stat().st_size > 10_000
 
 
 @pytest.mark.long

@@ -18,10 +18,9 @@ from er3a.pipeline.results import LeftOut
 from er3a.pipeline.stages.vision.compute import _open_frames
 from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.classic_methods import park, shah
-from er3a.vision.distance_errors import wrong_distances
 from er3a.vision.hand_eye import CONVENTIONS, calibrate_hand_eye, other_conventions
 from er3a.vision.likelihood import PoseObservations, flange_to_camera, refine, residuals
-from er3a.vision.setup_changes import moved_between
+from er3a.vision.typical_causes import moved_between, wrong_distances
 from er3a.vision.vision_findings import (
     AllSamplesEqual,
     BoardScale,
@@ -557,7 +556,7 @@ def test_a_set_of_two_setups_is_named_with_the_sample_between(setup, last, what,
 
 def test_sound_sets_are_not_of_two_setups():
     for samples in (a_set(setup, seed, 15) for setup in SETUPS for seed in range(40, 50)):
-        assert moved_between(samples, np.ones(15, bool), refine(PoseObservations.of(samples), X_TRUE, Y_TRUE)) is None
+        assert moved_between(samples, refine(PoseObservations.of(samples), X_TRUE, Y_TRUE)) is None
 
 
 @pytest.mark.parametrize(("setup", "apart"), [("eye_in_hand", 1e-4), ("eye_to_hand", 2e-5)])

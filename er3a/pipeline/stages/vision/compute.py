@@ -50,8 +50,7 @@ from er3a.vision.calibration_set import CalibrationSet, TimeOffset
 from er3a.vision.field_of_view import in_sight
 from er3a.vision.grasp_motion import DEPTH, PARTS, GraspLeg
 from er3a.vision.grasping import ChosenGrasp, DetectedObject, GraspNeeds, GraspPlan, GraspTask, plan_grasp
-from er3a.vision.hand_eye import HandEye, TouchCheck, calibrate_hand_eye, spread_of
-from er3a.vision.joint_zeros import zeros_tried
+from er3a.vision.hand_eye import HandEye, TouchCheck, calibrate_hand_eye, spread_of, zeros_tried
 from er3a.vision.point_error import ArmAccuracy, SeenPoseError, error_sizes, seen_pose, seen_pose_error
 from er3a.vision.vision_findings import HandEyeError, TouchContradicts, grave_warnings
 
