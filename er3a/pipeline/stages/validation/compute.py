@@ -90,9 +90,6 @@ def _residuals(reference_set: str, ranking: Ranking, left: Reals | None) -> mode
     )
 
 
-SECTION_STEPS = 60
-EXTREMITIES: tuple[quantities.Extremity, ...] = ("greatest", "least")
-
 Vector = NDArray[np.float64]
 Extremes = Mapping[quantities.Extreme, tuple[float, Vector]]
 
@@ -139,26 +136,6 @@ def key_poses_table(robot: Robot, sets: list[ReferenceSet], extremes: Extremes) 
             rows.append((*head, stated, modelled, float(np.linalg.norm(modelled - stated))))
     table = model.KeyPoses.of_rows(rows)
     return table.take(np.argsort((table.q_deg != 0).any(axis=1), kind="stable"))
-
-
-def section_table(robot: Robot, extremes: Extremes) -> model.Section:
-    """The wrist centre in the side view over a grid of joints 2 and 3 within their limits, and which points lie where
-    the region can end: at a limit, or with the elbow straight or folded."""
-    elbow = [extremes[quantities.AxisDistance("wrist_centre", extreme, 2)][1][2] for extreme in EXTREMITIES]
-    q2 = np.linspace(robot.lower[1], robot.upper[1], SECTION_STEPS + 1)
-    q3 = np.unique(np.concatenate([np.linspace(robot.lower[2], robot.upper[2], SECTION_STEPS + 1), elbow]))
-    grid2, grid3 = np.meshgrid(q2, q3, indexing="ij")
-    q = np.zeros((*grid2.shape, 6))
-    q[..., 1], q[..., 2] = grid2, grid3
-    points = quantities.section_of(frames(robot, q))
-    return model.Section(
-        q2_deg=np.degrees(grid2).ravel(),
-        q3_deg=np.degrees(grid3).ravel(),
-        x_mm=points[..., 0].ravel(),
-        z_mm=points[..., 1].ravel(),
-        on_q2_line=((grid2 == q2[0]) | (grid2 == q2[-1])).ravel(),
-        on_q3_line=np.isin(grid3, [q3[0], q3[-1], *elbow]).ravel(),
-    )
 
 
 def _positions(references: ReferenceSet) -> Iterator[_Look]:
@@ -284,7 +261,6 @@ def compute(study: Study, name: str) -> model.ValidationResults:
         circle_points=_rounded(circles),
         table=model.TableFacts(robot.convention, wrist_partition_missing(robot)),
         round_trips=trips,
-        section_origin_mm=_section_origin_mm(robot),
         counts=counts,
         evidence=evidence,
         not_examined=(
@@ -297,7 +273,6 @@ def compute(study: Study, name: str) -> model.ValidationResults:
         checks=model.Checks.of_records(checks),
         axes=axes,
         key_poses=poses,
-        section=section_table(robot, extremes) if turning and robot.rows == SIX else model.Section.empty(),
         residuals=residuals,
     )
 
@@ -401,9 +376,3 @@ def _without_reference(
 def _rounded(circles: CirclePoints) -> model.Circles:
     radius, roundness = circles.radius_mm.round(SHOWN_DECIMALS), circles.roundness_mm.round(SHOWN_DECIMALS)
     return stated(model.Circles, circles, radius_mm=radius, roundness_mm=roundness)
-
-
-def _section_origin_mm(robot: Robot) -> tuple[float, float]:
-    """Where axis 1 (x) and axis 2 (z) are in the base frame, which is the workspace drawing's origin."""
-    zero = state_of(robot, ()).at(quantities.ZERO_POSE)
-    return float(zero[0, 0, 3] * quantities.MM), float(zero[1, 2, 3] * quantities.MM)

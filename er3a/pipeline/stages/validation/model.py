@@ -536,7 +536,6 @@ class ValidationSummary(Summary):
 
     Attributes
     ----------
-    section_origin_mm : where the workspace drawing has its origin, x of axis 1 and z of axis 2 in the base frame
     counts : checks against references by what they rest on
     evidence : None where no reference speaks about the table
     """
@@ -549,7 +548,6 @@ class ValidationSummary(Summary):
     circle_points: Circles
     table: TableFacts
     round_trips: RoundTripErrors | None
-    section_origin_mm: tuple[float, float]
     counts: CheckCounts
     evidence: TableEvidence | None
 
@@ -621,24 +619,12 @@ class KeyPoses(Table):
     deviation_mm: Reals = column("distance of the two points")
 
 
-class Section(Table):
-    """The wrist centre in the side view (joint 1 at 0) over a grid of joints 2 and 3 within their limits."""
-
-    q2_deg: Reals = column("joint 2")
-    q3_deg: Reals = column("joint 3")
-    x_mm: Reals = column("distance from axis 1 along x")
-    z_mm: Reals = column("height over axis 2")
-    on_q2_line: Flags = column("on a line of constant q2 where the region can end")
-    on_q3_line: Flags = column("on a line of constant q3 where the region can end")
-
-
 class ValidationResults(Results[ValidationSummary]):
     """The stage's results."""
 
     checks: Checks
     axes: Axes
     key_poses: KeyPoses
-    section: Section
     residuals: Residuals
 
 

@@ -254,7 +254,6 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
     judged = [check for check in checks if not isinstance(check, model.Unjudged)]
     failed = [check for check in judged if check.status == "fail"]
     failed.sort(key=lambda check: check.tolerances_off, reverse=True)
-    labels = results.key_poses.take(results.key_poses.group == "envelope")
     drawn = _drawn_axes(results.axes)
     source = robot.sources.get("dh")
     contradicted = summary.verdict.status == "fail"
@@ -289,8 +288,6 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
         blanks=[blank_row(check) for check in checks if isinstance(check, model.Unjudged)],
         side=_side_picture(robot, drawn, summary),
         deviation=_deviation_picture(drawn) if len(drawn) else None,
-        drawing=_drawing_picture(results.section, labels, summary) if len(labels) else None,
-        labels=_label_rows(labels, judged),
         table_source=source and (own_title(source.source), word("grade", GRADES, source.grade)),
         convention=word("convention", CONVENTIONS, robot.convention),
         grade_names={grade: word("grade", GRADE_NAMES, grade) for grade in GRADE_NAMES},
@@ -435,31 +432,3 @@ def _deviation_picture(axes: model.Axes) -> Picture:
 
 def _joints(axes: model.Axes) -> str:
     return joined((f"J{joint}" for joint in np.unique(axes.joint)), ", ")
-
-
-def _label_rows(labels: model.KeyPoses, checks: Iterable[Judged]) -> list[list[str]]:
-    """The drawing's labels with the numbers that they have in the figure."""
-    numbers = {pose: place for place, pose in reversed(list(enumerate(labels.pose, 1)))}
-    rows = []
-    for check in checks:
-        if check.group == "envelope":
-            values = [fixed(check.expected, 1), fixed(check.measured, 2), fixed(check.difference, 2)]
-            place = numbers[check.subject.whole]
-            rows.append((place, [str(place), say(check.subject), *values, _tolerance(check)]))
-    return [row for _, row in sorted(rows, key=lambda row: row[0])]
-
-
-def _drawing_picture(section: model.Section, labels: model.KeyPoses, summary: model.ValidationSummary) -> Picture:
-    missed = [check for check in summary.checks if check.group == "envelope" and check.status == "fail"]
-    worst = fixed(labels.deviation_mm.max(), 2)
-    caption = (
-        tr(
-            "The manufacturer's labels lie on the region's edge, off by {worst} mm at most: lengths, limits of J2 and "
-            "J3 and the signs of both joints agree with the drawing.",
-            worst=worst,
-        )
-        if not missed
-        else sentence("labels_missed", count=len(missed), worst=worst)
-    )
-    alt = tr("Region that the wrist centre sweeps with joints 2 and 3, and the drawing's labels, numbered.")
-    return Picture(validation_figures.workspace_drawing(section, labels, summary.section_origin_mm), alt, caption)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes as PlotAxes
-from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
 from er3a.diagnosis.conclusions import MainFault, MostLikelyFault
@@ -22,14 +21,13 @@ from er3a.pipeline.messages.say import bracketed, joined, say, sentence
 from er3a.pipeline.stages.validation import model
 from er3a.pipeline.viewing.figures import axis_label, equal_scale, new_figure
 from er3a.pipeline.viewing.page import Picture
-from er3a.pipeline.viewing.palette import GRID, HIGHLIGHT, INK, LINK, MODEL, MUTED, REFERENCE
+from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, LINK, MODEL, MUTED, REFERENCE
 from er3a.references.quantities import nearest_on_axis, point_of
 from er3a.robots.robot import Robot
 
 REFERENCE_COLOURS = (REFERENCE, HIGHLIGHT)
 MARKERS = (("o", 13), ("s", 18), ("D", 22))
 SEEN_END_ON = 0.9
-REGION = "#dcebf5"
 HAIR = 0.9
 
 
@@ -100,35 +98,6 @@ def axis_deviation(stated: model.Axes) -> Figure:
     panels[0].bar([0], [0], facecolor="none", edgecolor=INK, label=tr("uncertainty of the source"))
     panels[0].set_xlim(0.4, 6.6)
     figure.legend(loc="outside lower left", ncols=1)
-    return figure
-
-
-def workspace_drawing(section: model.Section, labels: model.KeyPoses, origin_mm: Sequence[float]) -> Figure:
-    """The side view of the wrist centre's region from the model, with the drawing's labels, numbered from 1."""
-    figure, axes = new_figure(width=9, height=8)
-    shape = (len(np.unique(section.q2_deg)), len(np.unique(section.q3_deg)))
-    x, z = section.x_mm.reshape(shape), section.z_mm.reshape(shape)
-    axes.pcolormesh(x, z, np.ones(shape), cmap=ListedColormap([REGION]), shading="gouraud", rasterized=True, zorder=1)
-    for i in np.flatnonzero(section.on_q2_line.reshape(shape).all(axis=1)):
-        axes.plot(x[i], z[i], color=MODEL, linewidth=1.4, zorder=2)
-    for j in np.flatnonzero(section.on_q3_line.reshape(shape).all(axis=0)):
-        axes.plot(x[:, j], z[:, j], color=MODEL, linewidth=1.4, zorder=2)
-    axes.axvline(0, color=GRID, linewidth=1.5, zorder=0)
-    axes.axhline(0, color=GRID, linewidth=1.5, zorder=0)
-    extent = max(np.ptp(x), np.ptp(z))
-    stated, modelled = (points[:, [0, 2]] - origin_mm for points in (labels.point_mm, labels.model_point_mm))
-    for number, at in enumerate(stated, 1):
-        outward = at / max(float(np.linalg.norm(at)), 1.0) * 0.07 * extent
-        axes.annotate(
-            str(number), at, at + outward, ha="center", va="center", fontsize=11, color=INK, zorder=5,
-            bbox={"boxstyle": "circle,pad=0.25", "facecolor": "white", "edgecolor": REFERENCE},
-            arrowprops={"arrowstyle": "-", "color": REFERENCE},
-        )  # fmt: skip
-        axes.plot(*at, "o", markersize=9, markerfacecolor="none", markeredgecolor=REFERENCE, zorder=4)
-        axes.plot(*modelled[number - 1], ".", color=MODEL, markersize=5, zorder=4)
-    margin = 0.12 * extent
-    axes.plot([x.min() - margin, x.max() + margin], [z.min() - margin, z.max() + margin], alpha=0)
-    equal_scale(axes, tr("x from axis 1 (mm)"), tr("z from axis 2 (mm)"))
     return figure
 
 
