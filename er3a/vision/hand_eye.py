@@ -512,7 +512,7 @@ def _shared_covariance(samples: calibration_set.CalibrationSet, refined: Refined
 
 
 def _wider(half: Reals, refined: Refined, distances: tuple[DistanceFit, ...]) -> Reals:
-    """Half widths (12,) that also hold what the poses are with each error of distances that explains the samples."""
+    """Half widths (12,) that also hold what the poses are with each error of distances that samples don't exclude."""
     for each in distances:
         fit = each.refined
         shift = np.concatenate([step_between(refined.X, fit.X), step_between(refined.Y, fit.Y)])
@@ -563,7 +563,7 @@ def _warnings(
         found.append(vision_findings.MoreScatter(float(refined.scatter), largest))
     if read := other_conventions(samples, refined.residual):
         return [*found, *read]
-    found += [each.finding for each in distances]
+    found += [each.finding for each in distances if each.sure]
     size, distance, turn = _misfit(refined.residual)
     if size > 1 and not vision_findings.grave_warnings(found):
         found.append(vision_findings.UnexplainedResiduals(distance, turn))

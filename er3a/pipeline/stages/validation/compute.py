@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,11 +39,11 @@ from er3a.pipeline.study import Study
 from er3a.references import quantities
 from er3a.references.circle_points import CirclePoints, circle_points
 from er3a.references.predict import read, search, state_of
-from er3a.references.reference import Documents, ReferenceSet, expected_of, quantities_of, vectors_of
-from er3a.references.rows import GROUPS, AxisRow, EnvelopeRow, PositionRow
-from er3a.references.subjects import DrawingCorner, DrawingExtent, Reach
+from er3a.references.reference import Documents, ReferenceSet, quantities_of, vectors_of
+from er3a.references.rows import GROUPS, AxisRow, PositionRow
+from er3a.references.subjects import Reach
 from er3a.robots.joint_limits import meant, size_of
-from er3a.robots.robot import Grade, Robot
+from er3a.robots.robot import Robot
 
 
 def diagnose_sets(robot: Robot, sets: list[ReferenceSet]) -> tuple[tuple[model.SetDiagnosis, ...], model.Residuals]:
@@ -110,91 +108,19 @@ def axes_table(circles: CirclePoints, sets: list[ReferenceSet]) -> model.Axes:
     return model.Axes.of_rows(rows)
 
 
-@dataclass(frozen=True)
-class _Look:
-    """A pose at which a source looks at the arm; ``stated`` gives the point from the model's and the frames."""
-
-    source: str
-    grade: Grade
-    group: str
-    name: model.KeyPose
-    point: quantities.Point
-    pose: quantities.Pose
-    stated: Callable[[Vector, Vector], Vector]
-
-
-def key_poses_table(robot: Robot, sets: list[ReferenceSet], extremes: Extremes) -> model.KeyPoses:
-    """The poses at which references look at the arm, with their point and the model's; the zero pose comes first."""
+def key_poses_table(robot: Robot, sets: list[ReferenceSet]) -> model.KeyPoses:
+    """The poses at which references state a point, with the model's; the zero pose comes first."""
     rows = []
     for references in sets:
-        for look in (*_positions(references), *_corners(references), *_extremes(references, extremes)):
-            pose = (*look.pose, *quantities.ZERO_POSE)[: robot.joints]
-            T = frames(robot, meant(robot, np.array(pose)))
-            modelled = quantities.point_of(T, look.point)
-            stated = look.stated(modelled, T)
-            head = (references.name, look.source, look.grade, look.group, look.name, look.point, pose)
+        for row in references.of(PositionRow):
+            given = np.array([np.nan if value is None else value for value in row.xyz_mm])
+            pose = (*row.pose, *quantities.ZERO_POSE)[: robot.joints]
+            modelled = quantities.point_of(frames(robot, meant(robot, np.array(pose))), row.point)
+            stated = given if np.isnan(given).all() else np.where(np.isnan(given), modelled, given)
+            head = (references.name, row.source, row.grade, row.group, model.NamedPose(row.name), row.point, pose)
             rows.append((*head, stated, modelled, float(np.linalg.norm(modelled - stated))))
     table = model.KeyPoses.of_rows(rows)
     return table.take(np.argsort((table.q_deg != 0).any(axis=1), kind="stable"))
-
-
-def _positions(references: ReferenceSet) -> Iterator[_Look]:
-    for row in references.of(PositionRow):
-        given = np.array([np.nan if value is None else value for value in row.xyz_mm])
-
-        def stated(modelled: Vector, T: Vector, given: Vector = given) -> Vector:
-            return given if np.isnan(given).all() else np.where(np.isnan(given), modelled, given)
-
-        yield _Look(row.source, row.grade, row.group, model.NamedPose(row.name), row.point, row.pose, stated)
-
-
-def _corners(references: ReferenceSet) -> Iterator[_Look]:
-    corners: dict[tuple[str, tuple[float, float]], list[EnvelopeRow]] = {}
-    for row in references.of(EnvelopeRow):
-        if row.corner_deg is not None:
-            corners.setdefault((row.source, row.corner_deg), []).append(row)
-    for (source, (q2, q3)), rows in corners.items():
-        labels = {row.quantity[-1]: (row.value_mm, row.quantity == "abs_x") for row in rows}
-
-        def stated(modelled: Vector, T: Vector, labels: dict[str, tuple[float, bool]] = labels) -> Vector:
-            origin = np.array([T[0, 0, 3], 0.0, T[1, 2, 3]]) * quantities.MM
-            point = modelled.copy()
-            for coordinate, (value, unsigned) in labels.items():
-                k = "xyz".index(coordinate)
-                sign = np.sign(modelled[k] - origin[k]) if unsigned else 1.0
-                point[k] = origin[k] + sign * value
-            return point
-
-        pose = (0.0, q2, q3, 0.0, 0.0, 0.0)
-        yield _Look(source, rows[0].grade, "envelope", DrawingCorner(q2, q3, None), "wrist_centre", pose, stated)
-
-
-def _extremes(references: ReferenceSet, extremes: Extremes) -> Iterator[_Look]:
-    for reference, expected in zip(references.checkable, expected_of(references.checkable)[0]):
-        subject, quantity = reference.subject, reference.quantity
-        if isinstance(subject, Reach | DrawingExtent) and isinstance(
-            quantity, quantities.AxisDistance | quantities.SectionExtent
-        ):
-            value, q = extremes[quantity]
-            stated = partial(_extreme_as_stated, quantity, float(expected), value)
-            pose = tuple(np.degrees(q).tolist())
-            yield _Look(reference.source, reference.grade, reference.group, subject, quantity.point, pose, stated)
-
-
-def _extreme_as_stated(
-    quantity: quantities.AxisDistance | quantities.SectionExtent,
-    expected: float,
-    value: float,
-    modelled: Vector,
-    T: Vector,
-) -> Vector:
-    """The model's point shifted to where its extreme would be the stated one."""
-    if isinstance(quantity, quantities.SectionExtent):
-        shift = np.zeros(3)
-        shift["xyz".index(quantity.coordinate)] = 1.0
-        return modelled + shift * (expected - value)
-    foot = quantities.nearest_on_axis(T, quantity.axis, modelled)
-    return foot + (modelled - foot) * (expected / value) if value > 0 else modelled
 
 
 SIX = 6
@@ -243,7 +169,7 @@ def compute(study: Study, name: str) -> model.ValidationResults:
     trip_checks, trips = round_trip_checks(robot, settings.round_trips, study.seed)
     checks += trip_checks
 
-    axes, poses = axes_table(circles, sets), key_poses_table(robot, sets, extremes)
+    axes, poses = axes_table(circles, sets), key_poses_table(robot, sets)
     diagnoses, residuals = diagnose_sets(robot, sets if turning else [])
     found = {each.reference_set: each for each in diagnoses}
     summaries = set_summaries(robot, sets, checks, poses, found)

@@ -22,7 +22,7 @@ from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.study import Study
 from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_joint, vector
 from er3a.references.quantities import NotOfArm
-from er3a.references.subjects import DrawingCorner, DrawingExtent, Reach, ReferenceSubject, Subject
+from er3a.references.subjects import ReferenceSubject, Subject
 from er3a.robots.robot import AUTHORITATIVE_GRADES, Grade, Robot
 
 ModelGroup = Literal["table_sanity", "round_trips"]
@@ -60,9 +60,6 @@ class NamedPose(Finding):
     """A pose by the name that its source gives it."""
 
     name: str
-
-
-KeyPose = NamedPose | DrawingCorner | DrawingExtent | Reach
 
 
 class NotInRobotFile(Finding):
@@ -604,14 +601,13 @@ class Axes(Table):
 
 
 class KeyPoses(Table):
-    """Poses at which references look at the arm, the zero pose first, with the stated point and the model's (base
-    frame)."""
+    """Poses at which references state a point, the zero pose first, with that point and the model's (base frame)."""
 
     reference_set: Texts = column("reference set")
     source: Texts = column("source of the point")
     grade: Texts = column("grade of the source")
     group: Texts = column("group of the references")
-    pose: Findings = findings("the pose", KeyPose)
+    pose: Findings = findings("the pose", NamedPose)
     point: Texts = column("flange or wrist_centre")
     q_deg: Reals = per_joint("joint angle")
     point_mm: Reals = vector("{}_mm", "stated point, with the model's coordinate where none is stated")
