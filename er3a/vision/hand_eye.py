@@ -47,7 +47,6 @@ from er3a.vision.typical_causes import DistanceFit, moved_between, wrong_distanc
 DEVIATIONS = 20.0  # of the angle between two samples; beyond, a pair is in conflict. Tilts seen head-on are as vague
 MAX_DEVIATION = np.radians(2.0)  # of a camera that is of any use
 ROUNDING = 1e-6  # rad
-SAME_POSITION_M, SAME_ROTATION_RAD = 5e-5, 2e-4
 MOSTLY_APART = 0.8  # of samples that stand apart, so that their residuals are judged as independent
 COPY_DECIMALS = 9  # of m and of rotation matrices
 FALSE_ALARMS = 1e-3  # of sound sets in which a sample is called far from the fit
@@ -179,28 +178,6 @@ def worst_sample(
     return worst, vision_findings.FarFromFit(
         samples.names[worst], float(off_mm), float(off_deg), float(probability[worst])
     )
-
-
-def _near(flange: Reals, i: int, distance: float, turn: float) -> Flags:
-    """Which of the samples before one stand within a distance, m, and a turn, rad, of it: (i,)."""
-    step = step_between(np.broadcast_to(flange[i], (i, 4, 4)), flange[:i])
-    near: Flags = (np.linalg.norm(step[:, :3], axis=1) < distance) & (np.linalg.norm(step[:, 3:], axis=1) < turn)
-    return near
-
-
-def repeated_poses(samples: calibration_set.CalibrationSet) -> tuple[vision_findings.RepeatedPose, ...]:
-    """Samples taken where the flange had been before."""
-    found = []
-    for i in range(1, len(samples)):
-        near = _near(samples.flange, i, SAME_POSITION_M, SAME_ROTATION_RAD)
-        if near.any():
-            first = int(near.argmax())
-            seen = step_between(samples.target[first], samples.target[i])
-            apart_mm, apart_deg = 1000 * np.linalg.norm(seen[:3]), np.degrees(np.linalg.norm(seen[3:]))
-            found.append(
-                vision_findings.RepeatedPose(samples.names[i], samples.names[first], float(apart_mm), float(apart_deg))
-            )
-    return tuple(found)
 
 
 def _copies(samples: calibration_set.CalibrationSet) -> Flags:
@@ -365,7 +342,7 @@ class HandEye(ByValue, Displayed):
     @property
     def rejected(self) -> tuple[str, ...]:
         """Names of the samples that contradict the others, so that the calibration does not use them."""
-        return tuple(each.sample for each in self.suspects if not isinstance(each, vision_findings.RepeatedPose))
+        return tuple(each.sample for each in self.suspects)
 
     def sheet(self) -> Sheet:
         """The twelve numbers with half their 95 % intervals."""
@@ -436,7 +413,7 @@ def calibrate_hand_eye(samples: calibration_set.CalibrationSet) -> HandEye:
         deviations=refined.deviations,
         greatest_turn=greatest,
         axes_apart=apart,
-        suspects=(*suspects, *repeated_poses(samples)),
+        suspects=tuple(suspects),
         warnings=tuple(warnings),
         without_suspects=None if used.all() else _shift_with_all(samples, refined),
         touch=None,

@@ -44,6 +44,7 @@ from er3a.vision.likelihood import (
 
 STEP = 1e-5  # of numbers, for derivatives
 AS_GOOD = float(scipy.special.chdtri(1, 1 - CONFIDENCE))  # by which chance alone makes two causes differ
+OPEN_RATIO = float(scipy.special.chdtri(1, 0.01))  # chance reaches it in one of 100 sets
 SURE_RATIO = 16.0  # chance reaches it in one of 10 000 sets
 LEAST_SAMPLES = 6  # of which the noise can be told from such an error
 SURE_SCALE = 5.0  # half widths of its interval, from 0; a vaguer factor comes of samples that don't fit at all
@@ -59,7 +60,7 @@ DistanceError = Literal["board", "focal_length", "principal_point_x", "principal
 
 
 @dataclass(frozen=True, eq=False)
-class Cause:
+class TypicalCause:
     """A change of all samples.
 
     Attributes
@@ -143,7 +144,7 @@ class DistanceFit:
 
 
 def wrong_distances(samples: CalibrationSet, refined: Refined) -> tuple[DistanceFit, ...]:
-    """Errors of distances that lower the residuals as those of 5 of 100 sound sets do, or more.
+    """Errors of distances that lower the residuals as those of 1 of 100 sound sets do, or more.
 
     All of them widen the intervals of the poses, because the samples do not exclude them. Of those that chance does not
     explain the ones that explain the samples best are sure.
@@ -162,7 +163,7 @@ def wrong_distances(samples: CalibrationSet, refined: Refined) -> tuple[Distance
         half_width = float(np.hypot(own, shared))
         ratio = (plain.squares - fit.squares) / (fit.squares / free)  # F with 1 and ``free`` degrees of freedom
         sure = ratio > SURE_RATIO and abs(value) > max(own, 2 * shared) and _is_large(value, half_width, name)
-        if ratio > AS_GOOD:
+        if ratio > OPEN_RATIO:
             found.append(DistanceFit(_finding(name, value, half_width), fit, sure))
     most = min((each.refined.squares for each in found if each.sure), default=0.0) * (1 + AS_GOOD / free)
     return tuple(replace(each, sure=each.sure and each.refined.squares <= most) for each in found)
@@ -201,7 +202,7 @@ def fitted_distances(name: DistanceError, samples: CalibrationSet, refined: Refi
         B[:, :3, 3] += values[0] * samples.target[:, :3, 3] @ MATRICES[name].T
         return samples.hand, B
 
-    return Cause(1, applied).fitted(samples, refined, _alike(samples))
+    return TypicalCause(1, applied).fitted(samples, refined, _alike(samples))
 
 
 def _alike(samples: CalibrationSet) -> Reals:
@@ -238,7 +239,7 @@ def moved_between(samples: CalibrationSet, refined: Refined) -> vision_findings.
     return vision_findings.MovedBetween(samples.names[at], what, float(distance), float(turn), chance)  # type: ignore[arg-type]
 
 
-def _step_at(samples: CalibrationSet, what: str, at: int) -> Cause:
+def _step_at(samples: CalibrationSet, what: str, at: int) -> TypicalCause:
     """A motion, about the origin of its parent frame, of camera or board before the sample ``at``."""
 
     def applied(values: Reals) -> tuple[Reals, Reals]:
@@ -246,7 +247,7 @@ def _step_at(samples: CalibrationSet, what: str, at: int) -> Cause:
         F[at:] = F[at:] @ step if what == "camera" else inverted(step) @ F[at:]
         return F, samples.target
 
-    return Cause(6, applied)
+    return TypicalCause(6, applied)
 
 
 # Zeros ----------------------------------------------------------------------------------------------------------------
@@ -285,7 +286,7 @@ def wrong_zero(samples: CalibrationSet, used: CalibrationSet, refined: Refined, 
     sure = (ZERO_CHANCE / len(names) / 2, (1 - CONFIDENCE) / 2)
     widths = float(np.divide(*(scipy.special.stdtrit(free, 1 - each) for each in sure)))
     for k, name in enumerate(names):
-        cause = Cause(1, partial(_turned, robot, used, k))
+        cause = TypicalCause(1, partial(_turned, robot, used, k))
         if robot.slides[k] or cause.drop(refined) is None:
             unseen.append(name)
             continue

@@ -332,6 +332,17 @@ def test_one_coordinate_to_spare_settles_nothing(random):
     assert "Nothing is settled: there is only one coordinate more" in lines_of(found)
 
 
+def test_too_few_positions_ask_for_poses_that_settle_more(random):
+    robot = load_robot("er3_600")
+    q = poses_in(robot, random, 5)
+    more = er3a.calibrate(robot, measured(robot, q, 0.05, random)).more
+    asked = np.radians(more.examples_deg)
+    others = poses_in(robot, random, max(more.missing - len(asked), 0))
+    found = er3a.calibrate(robot, measured(robot, np.concatenate([q, asked, others]), 0.05, random))
+    assert found.level == more.level
+    assert len(found.estimates) == more.determinable
+
+
 def test_too_few_positions_are_no_gross_fault(random, monkeypatch):
     robot = load_robot("er3a_c60")
     rows = measured(robot, poses_in(robot, random, 6), 0.05, random)

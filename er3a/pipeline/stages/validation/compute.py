@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from er3a.diagnosis.diagnose import Diagnosis, diagnosis_of, residuals
-from er3a.diagnosis.ranking import Ranking, usable
+from er3a.diagnosis.diagnose import Diagnosis, diagnosis_of
+from er3a.diagnosis.ranking import usable
 from er3a.files.reference_sets import check_robot_origins, load_references
 from er3a.identifiability.evidence import evidence_of
 from er3a.identifiability.proposals import proposals_of
@@ -18,13 +17,11 @@ from er3a.kinematics.forward import frames
 from er3a.kinematics.round_trips import MAX_BY_CLASS
 from er3a.kinematics.table_batch import robot_of
 from er3a.kinematics.wrist_partitioned import wrist_partition_missing
-from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import stated
 from er3a.pipeline.results import LeftOut
 from er3a.pipeline.stages.validation import model
 from er3a.pipeline.stages.validation.checks import GROUP as ROUND_TRIPS
 from er3a.pipeline.stages.validation.checks import (
-    SHOWN_DECIMALS,
     checks_of_set,
     counts_of,
     key_figures,
@@ -39,19 +36,16 @@ from er3a.pipeline.study import Study
 from er3a.references import quantities
 from er3a.references.circle_points import CirclePoints, circle_points
 from er3a.references.predict import read, search, state_of
-from er3a.references.reference import Documents, ReferenceSet, quantities_of, vectors_of
+from er3a.references.reference import Documents, ReferenceSet, quantities_of
 from er3a.references.rows import GROUPS, AxisRow, PositionRow
 from er3a.references.subjects import Reach
 from er3a.robots.joint_limits import meant, size_of
 from er3a.robots.robot import Robot
 
 
-def diagnose_sets(robot: Robot, sets: list[ReferenceSet]) -> tuple[tuple[model.SetDiagnosis, ...], model.Residuals]:
+def diagnose_sets(robot: Robot, sets: list[ReferenceSet]) -> tuple[model.SetDiagnosis, ...]:
     """Diagnose a table against each reference set."""
-    found = [(references.name, diagnosis_of(robot, references)) for references in sets]
-    tables = [_residuals(name, diagnosis.ranking, diagnosis.left) for name, diagnosis in found if diagnosis.ranking]
-    records = [_set_diagnosis(robot, references, diagnosis) for references, (_, diagnosis) in zip(sets, found)]
-    return tuple(records), model.Residuals.stacked(tables)
+    return tuple(_set_diagnosis(robot, references, diagnosis_of(robot, references)) for references in sets)
 
 
 def _set_diagnosis(robot: Robot, references: ReferenceSet, diagnosis: Diagnosis) -> model.SetDiagnosis:
@@ -67,29 +61,6 @@ def _set_diagnosis(robot: Robot, references: ReferenceSet, diagnosis: Diagnosis)
         hypotheses=tuple(stated(model.RankedHypothesis, each) for each in diagnosis.hypotheses),
         corrected=stated(model.CorrectedTable, diagnosis.hypotheses[0].corrected) if diagnosis.names_fault else None,
     )
-
-
-def _residuals(reference_set: str, ranking: Ranking, left: Reals | None) -> model.Residuals:
-    before, bound, units = residuals(ranking, ranking.before)
-    after, _, _ = residuals(ranking, ranking.before if left is None else left)
-    vectors = [[ranking.references[place] for place in places] for places in vectors_of(ranking.references)]
-    return model.Residuals.of_rows(
-        (
-            reference_set,
-            vectors[i][0].source,
-            vectors[i][0].group,
-            vectors[i][0].subject if len(vectors[i]) == 1 else vectors[i][0].subject.whole,
-            units[i],
-            before[i],
-            after[i],
-            bound[i],
-        )
-        for i in np.argsort(-np.maximum(before, after) / bound, kind="stable")
-    )
-
-
-Vector = NDArray[np.float64]
-Extremes = Mapping[quantities.Extreme, tuple[float, Vector]]
 
 
 def axes_table(circles: CirclePoints, sets: list[ReferenceSet]) -> model.Axes:
@@ -170,7 +141,7 @@ def compute(study: Study, name: str) -> model.ValidationResults:
     checks += trip_checks
 
     axes, poses = axes_table(circles, sets), key_poses_table(robot, sets)
-    diagnoses, residuals = diagnose_sets(robot, sets if turning else [])
+    diagnoses = diagnose_sets(robot, sets if turning else [])
     found = {each.reference_set: each for each in diagnoses}
     summaries = set_summaries(robot, sets, checks, poses, found)
     reaches = {"wrist_centre_reach": WRIST_REACH, "flange_reach": FLANGE_REACH}
@@ -184,7 +155,6 @@ def compute(study: Study, name: str) -> model.ValidationResults:
         conflicts=tuple(conflicts),
         sets=summaries,
         diagnoses=diagnoses,
-        circle_points=_rounded(circles),
         table=model.TableFacts(robot.convention, wrist_partition_missing(robot)),
         round_trips=trips,
         counts=counts,
@@ -199,7 +169,6 @@ def compute(study: Study, name: str) -> model.ValidationResults:
         checks=model.Checks.of_records(checks),
         axes=axes,
         key_poses=poses,
-        residuals=residuals,
     )
 
 
@@ -297,8 +266,3 @@ def _without_reference(
         for subject, distance in subjects.items()
         if subject not in stated
     ]
-
-
-def _rounded(circles: CirclePoints) -> model.Circles:
-    radius, roundness = circles.radius_mm.round(SHOWN_DECIMALS), circles.roundness_mm.round(SHOWN_DECIMALS)
-    return stated(model.Circles, circles, radius_mm=radius, roundness_mm=roundness)

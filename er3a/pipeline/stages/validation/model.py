@@ -420,19 +420,6 @@ class SetDiagnosis:
     corrected: CorrectedTable | None
 
 
-class Residuals(Table):
-    """Residuals before and after the best hypothesis, worst first, for sets with something to explain."""
-
-    reference_set: Texts = column("name of the reference set")
-    source: Texts = column("source of the reference")
-    group: Texts = column("group of the reference")
-    subject: Findings = findings("what the reference is about; coordinates of one point together", ReferenceSubject)
-    unit: Texts = column("unit of the three numbers")
-    before: Reals = column("difference between model and reference")
-    after: Reals = column("the same with the best hypothesis corrected")
-    uncertainty: Reals = column("half-width of the interval that the source leaves open")
-
-
 @dataclass(frozen=True)
 class SetSummary:
     """What was found against one reference set.
@@ -463,15 +450,6 @@ class SetSummary:
     def failed(self) -> int:
         """Checks that the verdict rests on and that fail."""
         return self.counts.independent.failed + self.counts.consistency.failed
-
-
-@dataclass(frozen=True)
-class Circles:
-    """The point that the flange carries for circle point analysis (in its frame), and its tracks, joint by joint."""
-
-    offset_mm: tuple[float, ...]
-    radius_mm: tuple[float, ...]
-    roundness_mm: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -542,7 +520,6 @@ class ValidationSummary(Summary):
     conflicts: tuple[Conflict, ...]
     sets: tuple[SetSummary, ...]
     diagnoses: tuple[SetDiagnosis, ...]
-    circle_points: Circles
     table: TableFacts
     round_trips: RoundTripErrors | None
     counts: CheckCounts
@@ -621,7 +598,6 @@ class ValidationResults(Results[ValidationSummary]):
     checks: Checks
     axes: Axes
     key_poses: KeyPoses
-    residuals: Residuals
 
 
 RESULTS = ValidationResults

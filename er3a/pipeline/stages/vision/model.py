@@ -17,7 +17,6 @@ from er3a.vision.vision_findings import (
     CalibrationWarning,
     GraspOutcome,
     NotCalibratable,
-    RepeatedPose,
     Suspect,
     TouchContradicts,
 )
@@ -157,7 +156,7 @@ class CalibrationResult:
     @property
     def rejected(self) -> tuple[str, ...]:
         """The samples that contradict the others, so that the calibration does not use them."""
-        return tuple(each.sample for each in self.suspects if not isinstance(each, RepeatedPose))
+        return tuple(each.sample for each in self.suspects)
 
 
 @dataclass(frozen=True)

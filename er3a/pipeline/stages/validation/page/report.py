@@ -240,7 +240,6 @@ def _math(content: Markup) -> Markup:
 
 
 SHOWN_FAILURES = 12
-REVERSED_DEG = 135
 SEGMENTS = {
     "upper_arm": N_("the upper arm stands {measured}° from the vertical where {expected}° is stated"),
     "forearm": N_("the forearm stands {measured}° from the vertical where {expected}° is stated"),
@@ -273,7 +272,7 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
         frames=_frames_picture(robot, summary),
         formulas=formulas(robot),
         sets=[_set_story(found, judged, results.key_poses) for found in summary.sets],
-        diagnoses=validation_figures.diagnosis_stories(summary, results.residuals),
+        diagnoses=validation_figures.diagnosis_stories(summary),
         corrected=text,
         corrected_address=text_address(text),
         groups=group_rows(judged),
@@ -287,7 +286,6 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
         conflicts=[(say(conflict.subject), conflict) for conflict in summary.conflicts],
         blanks=[blank_row(check) for check in checks if isinstance(check, model.Unjudged)],
         side=_side_picture(robot, drawn, summary),
-        deviation=_deviation_picture(drawn) if len(drawn) else None,
         table_source=source and (own_title(source.source), word("grade", GRADES, source.grade)),
         convention=word("convention", CONVENTIONS, robot.convention),
         grade_names={grade: word("grade", GRADE_NAMES, grade) for grade in GRADE_NAMES},
@@ -415,20 +413,3 @@ def _side_picture(robot: Robot, drawn: model.Axes, summary: model.ValidationSumm
             caption = joined([caption, correction], " ")
     alt = tr("Side view of the zero pose: links and joint axes of the model, and the axes that references state.")
     return Picture(validation_figures.side_view(robot, drawn, corrected, label), alt, caption)
-
-
-def _deviation_picture(axes: model.Axes) -> Picture:
-    off = axes.take(axes.is_off)
-    if len(off):
-        caption = tr("Outside the source's uncertainty: {joints}.", joints=_joints(off))
-        turned = off.take(off.angle_deg > REVERSED_DEG)
-        if len(turned):
-            caption = joined([caption, tr("Turning the other way: {joints}.", joints=_joints(turned))], " ")
-    else:
-        caption = tr("No axis is outside its source's uncertainty (outlined boxes).")
-    alt = tr("Bars per joint and source: distance and angle between the model's axis and the stated one.")
-    return Picture(validation_figures.axis_deviation(axes), alt, caption)
-
-
-def _joints(axes: model.Axes) -> str:
-    return joined((f"J{joint}" for joint in np.unique(axes.joint)), ", ")
