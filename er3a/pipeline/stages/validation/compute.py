@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -107,6 +107,30 @@ ALWAYS_SEARCHED = (
 )
 
 
+def _checked(
+    robot: Robot, sets: list[ReferenceSet], values: Mapping[quantities.Quantity, float], circles: CirclePoints
+) -> tuple[list[model.Check], list[model.Conflict]]:
+    """Checks of the table alone and against each set, and what the sets contradict each other about.
+
+    ``values`` : extremes over the joint limits, mm.
+    """
+    checks, conflicts = table_checks(robot), list[model.Conflict]()
+    for references in sets:
+        asked = quantities_of(references.checkable)
+        state = state_of(robot, asked, extremes=values, axes=circles.axes)
+        bases = (
+            bases_of(robot, references.checkable, references.documents)
+            if is_turning(robot)
+            else undeclared_bases(references.checkable)
+        )
+        judged, contradictions = checks_of_set(
+            references, read(asked, state), bases, robot.slides, 1000 * size_of(robot)
+        )
+        checks += judged
+        conflicts += contradictions
+    return checks, conflicts
+
+
 def compute(study: Study, name: str) -> model.ValidationResults:
     """Check a robot's model, and say what is most likely wrong with it."""
     robot = model.model_of(study, name)
@@ -118,24 +142,11 @@ def compute(study: Study, name: str) -> model.ValidationResults:
     stated = [quantity for references in sets for quantity in quantities_of(references.checkable)]
     sought = [quantity for quantity in stated if isinstance(quantity, quantities.Extreme)]
     wanted = dict.fromkeys([*always_searched(robot), *sought])
-    extremes = {quantity: search(robot, quantity, settings.reach_starts) for quantity in wanted}
-    values: dict[quantities.Quantity, float] = {quantity: value for quantity, (value, _) in extremes.items()}
-
+    values: dict[quantities.Quantity, float] = {
+        quantity: search(robot, quantity, settings.reach_starts)[0] for quantity in wanted
+    }
     circles = circle_points(robot)
-    checks, conflicts = table_checks(robot), list[model.Conflict]()
-    for references in sets:
-        asked = quantities_of(references.checkable)
-        state = state_of(robot, asked, extremes=values, axes=circles.axes)
-        bases = (
-            bases_of(robot, references.checkable, references.documents)
-            if turning
-            else undeclared_bases(references.checkable)
-        )
-        judged, contradictions = checks_of_set(
-            references, read(asked, state), bases, robot.slides, 1000 * size_of(robot)
-        )
-        checks += judged
-        conflicts += contradictions
+    checks, conflicts = _checked(robot, sets, values, circles)
     checks += _without_reference(robot, values, checks)
     trip_checks, trips = round_trip_checks(robot, settings.round_trips, study.seed)
     checks += trip_checks
@@ -147,7 +158,6 @@ def compute(study: Study, name: str) -> model.ValidationResults:
     reaches = {"wrist_centre_reach": WRIST_REACH, "flange_reach": FLANGE_REACH}
     reach = {name: values[quantity] for name, quantity in reaches.items() if quantity in values}
     evidence = evidence_of_table(robot, sets) if turning else None
-    counts = counts_of(checks)
     summary = model.ValidationSummary(
         verdict=verdict_of(checks, conflicts, summaries, found, evidence),
         figures=key_figures(checks, axes, summaries, reach, trips),
@@ -157,7 +167,7 @@ def compute(study: Study, name: str) -> model.ValidationResults:
         diagnoses=diagnoses,
         table=model.TableFacts(robot.convention, wrist_partition_missing(robot)),
         round_trips=trips,
-        counts=counts,
+        counts=counts_of(checks),
         evidence=evidence,
         not_examined=(
             *_left_out(settings, checks, diagnoses if turning else None, trips, evidence),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -253,36 +252,30 @@ def compute(study: Study, name: str) -> model.VisionResults:
     samples, offset, images = read_calibration(head_path, robot)
     title = scene.title if scene else None
     settings, motions = study.section(VisionSettings), study.section(TrajectorySettings)
+    bodies, frames = bodies_of(robot, scene), _open_frames(samples, head)
+    of_motions = (*frames, *GRASPS_REST_ON, *_left_out_of_motions(robot, bodies, scene, motions))
     try:
         with_zeros = zeros_tried(calibrate_hand_eye(samples), robot)
     except HandEyeError as error:
-        verdict: Verdict[Found] = Verdict("fail", model.CalibrationImpossible(error.finding))
         left_out = (
             _no_grasps(task_file),
             *_left_out_of_file(task_file),
             *left_out_of_calibration(samples, head, offset, images),
-            *_open_frames(samples, head),
-            *GRASPS_REST_ON,
-            *_left_out_of_motions(robot, bodies_of(robot, scene), scene, motions),
+            *of_motions,
         )
-        summary = model.VisionSummary(verdict, (), task_file.title, title, settings.least_success, None, ())
-        return _without_calibration(replace(summary, not_examined=left_out))
+        return _without_calibration(error, task_file, title, settings, left_out)
     found = with_zeros[0]
     picture = None if head.setup == "eye_to_hand" else meant(robot, np.array(task_file.picture_deg))
     camera = _camera_at(robot, found, picture)
     places = {each.name: camera @ each.pose() for each in task_file.objects}
     calibration = calibration_result(head, found, offset, images)
-    doubt, frames = _doubt(calibration, found.touch), _open_frames(samples, head)
-    planned = []
-    if not doubt:
-        limits = (limits_of(robot, motions), study.seed)
-        planned = _planned(robot, task_file, found, scene, (settings, picture), limits)
+    doubt = _doubt(calibration, found.touch)
+    limits = (limits_of(robot, motions), study.seed)
+    planned = [] if doubt else _planned(robot, task_file, found, scene, (settings, picture), limits)
     objects = tuple(_object(robot, entry, places[entry.name], plan, error) for entry, plan, error in planned)
     shapes = _shapes(robot, objects, study.assumed_margin(name))
     near = shapes.near if shapes else ()
     judged = Verdict[Found]("fail", doubt) if doubt else verdict_of(calibration, objects, near)
-    bodies = bodies_of(robot, scene)
-    ways = _all_ways(robot, planned)
     summary = model.VisionSummary(
         verdict=judged.without(bodies.in_error).resting_on(shapes),
         figures=figures_of(calibration, objects, near),
@@ -295,22 +288,15 @@ def compute(study: Study, name: str) -> model.VisionResults:
             *((_no_grasps(task_file),) if doubt else ()),
             *_left_out_of_file(task_file),
             *left_out_of_calibration(samples, head, offset, images, with_zeros, task_file.gripper.tolerance_mm),
-            *frames,
-            *GRASPS_REST_ON,
-            *_left_out_of_motions(robot, bodies, scene, motions),
+            *of_motions,
             *left_out_in_solids(scene, _places(robot, task_file, found, picture)),
         ),
     )
-    home = meant(robot, np.array(task_file.home_deg))
-    speed, languages, is_open = limits_of(robot, motions).speed, motions.programs, bool(frames)
-    written = partial(grasp_programs, speed=speed, languages=languages, simulated=head.simulated, frames_open=is_open)
     return model.VisionResults(
         summary,
         sample_rows(found, robot),
-        ways,
-        model.GraspPrograms.stacked(
-            written(robot, entry.name, home, plan.chosen) for entry, plan, _ in planned if plan.chosen
-        ),
+        _all_ways(robot, planned),
+        _all_programs(robot, task_file, planned, motions, (head.simulated, bool(frames))),
         corner_rows(found, images),
     )
 
@@ -333,8 +319,31 @@ def _rates_given(motions: TrajectorySettings) -> tuple[bool, bool]:
     return motions.acceleration_deg_s2 is not None, motions.jerk_deg_s3 is not None
 
 
-def _without_calibration(summary: model.VisionSummary) -> model.VisionResults:
-    """What is written where the samples allow no calibration: no rows."""
+def _all_programs(
+    robot: Robot, file: VisionFile, planned: Planned, motions: TrajectorySettings, open_points: tuple[bool, bool]
+) -> model.GraspPrograms:
+    """The programs of all grasps; ``open_points``: whether the camera is simulated, and its frames are open."""
+    home, (simulated, frames_open) = meant(robot, np.array(file.home_deg)), open_points
+    write = partial(
+        grasp_programs,
+        speed=limits_of(robot, motions).speed,
+        languages=motions.programs,
+        simulated=simulated,
+        frames_open=frames_open,
+    )
+    return model.GraspPrograms.stacked(
+        write(robot, entry.name, home, plan.chosen) for entry, plan, _ in planned if plan.chosen
+    )
+
+
+def _without_calibration(
+    error: HandEyeError, file: VisionFile, scene: str | None, settings: VisionSettings, left_out: tuple[LeftOut, ...]
+) -> model.VisionResults:
+    """What is written where the samples allow no calibration: why, and no rows."""
+    verdict: Verdict[Found] = Verdict("fail", model.CalibrationImpossible(error.finding))
+    summary = model.VisionSummary(
+        verdict, (), file.title, scene, settings.least_success, None, (), not_examined=left_out
+    )
     return model.VisionResults(
         summary,
         model.SampleRows.empty(),
