@@ -122,30 +122,6 @@ def table() -> str:
             f"| {TITLES[name]} | {len(names)} | {inside.mean():.1%} | {share[low]:.1%} ({names[low]}) "
             f"| {share[high]:.1%} ({names[high]}) |"
         )
-    lines += [
-        "",
-        "## What remains",
-        "",
-        "Correlation of residuals at neighbouring poses and from row to row of the file, with their probabilities for",
-        "noise (500 orders tried, so 0.002 is the least), the joint whose angle explains most, and the one whose last",
-        "move's direction does (play, friction), with the angle or way by which it stops short.",
-        "",
-        "| arm | model | neighbours | row to row | joint | share | came from | share | 1/1000 | noise |",
-        "|---|---|---|---|---|---|---|---|---|---|",
-    ]
-    for name in ARMS:
-        beyond = found[name].beyond
-        for title, left in (
-            ("robot file", found[name].residuals),
-            ("with terms", beyond.residuals if beyond else None),
-        ):
-            if left:
-                lines.append(
-                    f"| {TITLES[name]} | {title} | {left.neighbours:.2f} ({left.neighbours_probability:.3f}) "
-                    f"| {left.order:.2f} ({left.order_probability:.3f}) | J{left.joint} | {left.share:.1%} "
-                    f"| J{left.play_joint} | {left.play_share:.1%} | {left.play:.3f} "
-                    f"| {'yes' if left.is_noise else 'no'} |"
-                )
     return "\n".join(lines) + "\n"
 
 

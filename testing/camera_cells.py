@@ -18,7 +18,7 @@ from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
 from er3a.geometry.transforms import inverted, moved, posed
 from er3a.kinematics.forward import forward
-from er3a.vision.next_view import FieldOfView, board_visible
+from er3a.vision.field_of_view import FieldOfView, in_sight
 
 SEED = 20261120
 FOLDER = ROOT / "data" / "vision"
@@ -29,6 +29,7 @@ OBJECT_MM, OBJECT_DEG = (0.4, 0.4, 0.8), (0.5, 0.5, 0.3)
 TURNED = 11  # number of the sample whose board is detected turned by 180 deg
 TOUCHES = 4
 TOUCH_MM = 0.1
+MAX_TILT = np.radians(55)  # of the board against the line of sight: detectors lose it beyond
 
 
 def looking(at: tuple[float, float, float], to: tuple[float, float, float]) -> np.ndarray:
@@ -55,15 +56,26 @@ FIXED = Cell(
     "eye_to_hand",
     looking((1.15, 0.05, 0.85), (0.35, 0.0, 0.25)),
     posed(Rotation.from_euler("xyz", [184, -3, 40], degrees=True).as_matrix(), np.array([-0.05, -0.06, 0.012])),
-    FieldOfView((np.radians(35), np.radians(28)), 0.3, 1.6, (BOARD_MM[0] / 1000, BOARD_MM[1] / 1000)),
+    FieldOfView((np.radians(35), np.radians(28)), 0.3, 1.6),
 )
 CARRIED = Cell(
     "er3_600",
     "eye_in_hand",
     posed(Rotation.from_euler("xyz", [2, -4, 88], degrees=True).as_matrix(), np.array([0.06, 0.01, 0.03])),
     posed(Rotation.from_euler("xyz", [180, 0, 25], degrees=True).as_matrix(), np.array([0.38, 0.02, 0.1])),
-    FieldOfView((np.radians(35), np.radians(28)), 0.15, 1.0, (BOARD_MM[0] / 1000, BOARD_MM[1] / 1000)),
+    FieldOfView((np.radians(35), np.radians(28)), 0.15, 1.0),
 )
+
+
+def board_visible(view: FieldOfView, T_camera_board: np.ndarray) -> np.ndarray:
+    """Whether all corners (...,) of the board are in the picture, and its printed side is turned to the camera."""
+    x, y = np.array(BOARD_MM) / 1000
+    corners = np.array([[0, 0, 0, 1], [x, 0, 0, 1], [0, y, 0, 1], [x, y, 0, 1]], dtype=float)
+    seen = np.einsum("...ij,cj->...ci", T_camera_board, corners)[..., :3]
+    sight = seen.mean(axis=-2)
+    sight = sight / np.linalg.norm(sight, axis=-1, keepdims=True)
+    tilted = (sight * T_camera_board[..., :3, 2]).sum(axis=-1)
+    return in_sight(view, seen).all(axis=-1) & (tilted > np.cos(MAX_TILT))
 
 
 def seen_from(cell: Cell, q: np.ndarray) -> np.ndarray:

@@ -72,13 +72,13 @@ CARRIED_OUT = {
     **{f"measure_length#{column}": MEASURED for column in ("a", "d")},
     "look_at_motion": "test_what_a_proposal_lets_see_is_what_the_arm_does_and_the_reversed_arm_does_not",
     "look_at_motion_from": "test_what_a_proposal_lets_see_is_what_the_arm_does_and_the_reversed_arm_does_not",
-    "more_positions#request": "test_proposed_poses_settle_what_a_calibration_settles_with_them",
+    "more_positions#request": "test_too_few_positions_ask_for_poses_that_settle_more",
     "collision.shapes_overlap": "test_shapes_in_error_are_an_error_of_the_shapes",
     "collision.base_in_solid": "test_a_scene_corrected_as_advised_leaves_the_base_free",
     "ambiguous_tilt": "test_a_board_seen_head_on_leaves_its_tilt_open_until_it_is_nearer_or_tilted",
     "other_convention": OF_SETS,
     "wrong_limit#lower": "test_single_faults_are_named",
-    **{f"far_from_table#{mistake}": SWAPPED for mistake in ("swapped", "opposite")},
+    **{f"far_from_table#{mistake}": SWAPPED for mistake in ("swapped", "fault")},
 }
 NOT_CARRIED_OUT = {  # a person looks at the controller, the cell or the file, or takes another picture
     *("clearance_not_proven", "program_not_understood", "singular.elbow", "singular.shoulder", "not_followed.too_far"),

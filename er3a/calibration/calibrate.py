@@ -9,7 +9,7 @@ ratios of joints, and what couples them, as its coupling; the table that goes th
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -57,7 +57,6 @@ from er3a.calibration.outcomes import (
     MoreTouches,
     NoCorrectionFits,
     NoPositions,
-    PlacementName,
 )
 from er3a.calibration.parameters import (
     DEPENDENT,
@@ -70,7 +69,6 @@ from er3a.calibration.parameters import (
     whole_length_mm,
 )
 from er3a.calibration.plan import d_optimal, touches
-from er3a.calibration.residuals import ResidualStructure, structure_of
 from er3a.calibration.terms import (
     FOR_ALL_JOINTS,
     FOR_ROBOT_FILE,
@@ -78,10 +76,11 @@ from er3a.calibration.terms import (
     CorrectedModel,
     JointErrors,
     TermKind,
-    effects,
     places_of,
 )
 from er3a.comparison.entries import TOOL_COLUMNS, Entry
+from er3a.diagnosis.faults import Faults, SwappedLimits, WrongLimits, repairs_of
+from er3a.kinematics.table_batch import robot_of, tables_of
 from er3a.numerics.arrays import Flags, Reals
 from er3a.references.quantities import Pose
 from er3a.references.reference import INTERVAL_95
@@ -100,6 +99,7 @@ ROUGHLY = 10.0
 FAR_REST = 0.004
 """Of an arm's whole length: a root mean square that no tracker leaves of an arm whose table is right."""
 AS_GOOD = 1.1  # times what the table leaves
+LIKELIEST = 8  # mistakes that are tried
 NEAR_STEPS = 15  # a table that is not far off is fitted in about four
 FEW_SPARE = 10
 """Degrees of freedom below which what remains says how large noise is, but not where; at least as many as numbers."""
@@ -316,7 +316,6 @@ class Beyond(CorrectedModel):
     rms_mm : of what remains
     deviation_mm : standard deviation of a coordinate, estimated from what this model leaves; None if it was stated
     left_out : at poses left out; None of too few poses
-    residuals : what remains: noise, or structure
     """
 
     terms: tuple[TermEstimate, ...]
@@ -324,7 +323,6 @@ class Beyond(CorrectedModel):
     rms_mm: float
     deviation_mm: float | None
     left_out: HeldOutErrors | None
-    residuals: ResidualStructure | None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -353,7 +351,6 @@ class Calibration(ByValue, Displayed):
         was stated
     outliers : measurements that were set aside
     left_out : at poses left out, by what the robot's file holds; None of too few poses
-    residuals : what remains: noise, or structure; None as for ``left_out``
     tried : terms beyond the table, in the order in which they were taken, then those that were not; of too few
         measurements for all kinds no couplings, or those that a robot file can hold
     tried_for_file : those that a robot file can hold, beside no others, where others were tried and taken, or
@@ -382,7 +379,6 @@ class Calibration(ByValue, Displayed):
     ratios: tuple[TermEstimate, ...] = ()
     idle: tuple[Touched, ...] = ()
     left_out: HeldOutErrors | None = None
-    residuals: ResidualStructure | None = None
     tried: tuple[TriedTerm, ...] = ()
     tried_for_file: tuple[TriedTerm, ...] = ()
     beyond: Beyond | None = None
@@ -450,54 +446,6 @@ class Calibration(ByValue, Displayed):
             left,
             (shortly(self.conclusion), *(f"held: {shortly(why)}" for why in self.held)),
         )
-
-
-@dataclass(frozen=True)
-class JointShare:
-    """Effect of the corrections of a joint, of base or of tool on the measured points.
-
-    Attributes
-    ----------
-    joint : from 1; 0 for base and tool
-    placement : which of these
-    entries : those that were corrected
-    table_mm, terms_mm : root mean square of the way by which they move the points, alone
-    """
-
-    joint: int
-    placement: PlacementName | None
-    entries: tuple[str, ...]
-    table_mm: float
-    terms_mm: float
-
-
-def joint_shares(found: Calibration, robot: Robot, measurements: Sequence[Measurement]) -> tuple[JointShare, ...]:
-    """How far the corrections of base, each joint and tool move the measured points; shares of several may cancel.
-
-    Parameters
-    ----------
-    robot : the table that was started from
-    """
-    seen = observed(measurements, robot)
-    own, errors = (found.beyond.estimates, found.beyond.errors) if found.beyond else (found.estimates, None)
-    before, effect = seen.positions(robot), effects(robot, seen.row_values, seen.points(robot))
-    too_far = np.zeros_like(seen.row_values)
-    if errors:
-        too_far = errors.amounts(seen.row_values, seen.points(errors.robot))
-    shares = []
-    owners: list[tuple[int, PlacementName | None]] = [(row, None) for row in range(1, robot.rows + 1)]
-    for joint, placement in ((0, "base"), *owners, (0, "tool")):
-        mine = [each for each in own if each.parameter.joint == joint]
-        if placement:
-            mine = [each for each in mine if each.parameter.column.startswith(placement)]
-        amounts = np.array([each.correction / each.parameter.in_unit for each in mine])
-        moved = corrected(robot, [each.parameter for each in mine], amounts)
-        by_terms = effect[:, joint - 1] * too_far[:, [joint - 1]] if joint else np.zeros_like(before)
-        ways = (
-            1000 * float(np.sqrt((way**2).sum(axis=1).mean())) for way in (seen.positions(moved) - before, by_terms)
-        )
-        shares.append(JointShare(joint, placement, tuple(each.name for each in mine), *ways))
-    return tuple(shares)
 
 
 def calibrate(
@@ -682,8 +630,11 @@ def _error_left_out(observations: PointObservations, found: Fit) -> float:
 
 
 def _from_points(robot: Robot, every: PointObservations, free_ratios: bool) -> Calibration:
-    used = _without_outliers(robot, every)
-    model = _model(robot, every.take(used).merged(), free_ratios)
+    try:
+        used = _without_outliers(robot, every)
+        model = _model(robot, every.take(used).merged(), free_ratios)
+    except CalibrationError as error:
+        raise _explained(robot, every, error) from None
     for _ in range(OUTLIER_ROUNDS):
         off = _off_mm(robot, every, model, used)
         again = _out_of(every, off, off[used[every.pose_of]]) <= 1.0
@@ -699,7 +650,6 @@ def _from_points(robot: Robot, every: PointObservations, free_ratios: bool) -> C
         deviation_mm=_deviation(observations, model.table),
         outliers=tuple(Outlier(int(every.lines[k]), float(distances[k])) for k in np.flatnonzero(~used)),
         left_out=_left_out(observations, model.table),
-        residuals=_structure(robot, observations, model.table),
         tried=model.choice.tried or model.for_file.tried,
         tried_for_file=model.for_file.tried if model.choice.tried else (),
         beyond=_beyond(robot, model.for_whole, model.whole) if model.choice.terms else None,
@@ -718,44 +668,91 @@ def _far_off(robot: Robot, estimates: Sequence[Estimate]) -> tuple[str, ...]:
 
 
 def _wrong(robot: Robot, observations: PointObservations, found: Calibration) -> outcomes.FarFromTable | None:
-    """Why measurements and table can't belong together: what fits with two joints' columns swapped, or one joint's sign
-    turned, is named; corrections or residuals far beyond those of arms and trackers are an error of some other kind."""
+    """Why measurements and table can't belong together: what fits with one mistake undone is named; corrections or
+    residuals far beyond those of arms and trackers are an error of some other kind."""
     far = _far_off(robot, found.estimates)
     too_much = not observations.deviation_known and found.rms_after_mm > FAR_REST * whole_length_mm(robot)
     if not (far or too_much or found.scatter > MAX_SCATTER):
         return None
-    mistakes: list[tuple[float, tuple[int, int] | None, int | None]] = []
-    kept = [each.parameter for each in found.estimates]
-    for swapped, opposite, columns in _mistakes(robot):
-        with suppress(CalibrationError):
-            turned = replace(observations, row_values=observations.row_values @ columns.T)
-            other = fit(robot, kept, turned, most_steps=NEAR_STEPS)
-            rms = float(np.sqrt(np.mean((other.after * observations.deviation_mm) ** 2)))
-            plain = np.full(len(kept), 0.0)
-            if rms <= AS_GOOD * found.rms_after_mm and not _far_off(
-                robot, _estimates(robot, observations, other, plain, plain)
-            ):
-                mistakes.append((rms, swapped, opposite))
-    best = min(mistakes, key=lambda each: each[0], default=None)
-    if best or far or too_much:
-        return outcomes.FarFromTable(far, found.rms_after_mm, *(best[1:] if best else ()))
+    swapped, faults = _mistakes_named(
+        robot, [each.parameter for each in found.estimates], observations, AS_GOOD * found.rms_after_mm
+    )
+    if swapped or faults or far or too_much:
+        return outcomes.FarFromTable(far, found.rms_after_mm, swapped, faults)
     return None
 
 
-def _mistakes(robot: Robot) -> Iterator[tuple[tuple[int, int] | None, int | None, Reals]]:
-    """Two joints that may be swapped, or one whose sign may be wrong, and what that makes of rows' values (m, m)."""
-    count, slides = robot.joints, robot.slides
-    if robot.rows != count:
-        return
-    coupling = np.eye(count) if robot.coupling is None else robot.coupling
-    for first, second in combinations(range(count), 2):
-        if slides[first] == slides[second]:
-            order = np.arange(count)
+def _mistakes_named(
+    robot: Robot, kept: Sequence[Entry], observations: PointObservations, most_mm: float
+) -> tuple[tuple[int, int] | None, Faults]:
+    """The mistakes with one of which undone the measurements leave least: joints whose columns are swapped, or faults
+    of the table, all that do equally well.
+
+    The candidates are the diagnosis's. Those whose points, once base and tool are placed, are nearest to the measured
+    ones are fitted, with small corrections alone.
+
+    Parameters
+    ----------
+    kept : the entries that are estimated
+    most_mm : root mean square that may remain
+    """
+    fitted: list[tuple[float, tuple[int, int] | None, Faults]] = []
+    for swapped, faults, arm, seen in _likeliest_mistakes(robot, kept, observations):
+        with suppress(CalibrationError):
+            other = fit(arm, kept, seen, most_steps=NEAR_STEPS)
+            rms, plain = _rms(other.after * observations.deviation_mm), np.zeros(len(kept))
+            if rms <= min(most_mm, FAR_REST * whole_length_mm(robot)) and not _far_off(
+                arm, _estimates(arm, observations, other, plain, plain)
+            ):
+                fitted.append((rms, swapped, faults))
+    best = min(fitted, key=lambda each: each[0], default=None)
+    if best is None or best[1]:
+        return (best[1] if best else None), ()
+    return None, tuple(fault for rms, _, faults in fitted if rms <= AS_GOOD * best[0] for fault in faults)
+
+
+def _likeliest_mistakes(
+    robot: Robot, kept: Sequence[Entry], observations: PointObservations
+) -> list[tuple[tuple[int, int] | None, Faults, Robot, PointObservations]]:
+    """Mistakes that bring the table's points nearest to the measured ones: joints swapped, or the fault of the table;
+    the arm without it, and what was observed of it."""
+    if robot.rows != robot.joints:
+        return []
+    candidates: list[tuple[tuple[int, int] | None, Faults, Robot, PointObservations]] = []
+    coupling = np.eye(robot.joints) if robot.coupling is None else robot.coupling
+    for first, second in combinations(range(robot.joints), 2):
+        if robot.slides[first] == robot.slides[second]:
+            order = np.arange(robot.joints)
             order[[first, second]] = second, first
-            yield (first + 1, second + 1), None, coupling @ np.eye(count)[order] @ np.linalg.inv(coupling)
-    for joint in range(count):
-        signs = np.where(np.arange(count) == joint, -1.0, 1.0)
-        yield None, joint + 1, coupling @ np.diag(signs) @ np.linalg.inv(coupling)
+            columns = coupling @ np.eye(robot.joints)[order] @ np.linalg.inv(coupling)
+            seen = replace(observations, row_values=observations.row_values @ columns.T)
+            candidates.append(((first + 1, second + 1), (), robot, seen))
+    for repair in repairs_of(tables_of(robot)):
+        table = repair.apply(tables_of(robot))
+        if not isinstance(repair.fault, WrongLimits | SwappedLimits):
+            candidates.append((None, (repair.fault,), robot_of(table, 0, robot), observations))
+
+    def left(arm: Robot, seen: PointObservations) -> float:
+        amounts = places_at(arm, kept, seen)
+        return _rms(seen.predict(arm, kept, amounts[None])[0] - seen.values_mm)
+
+    return sorted(candidates, key=lambda each: left(*each[2:]))[:LIKELIEST]
+
+
+def _rms(values: Reals) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _explained(robot: Robot, every: PointObservations, error: CalibrationError) -> CalibrationError:
+    """An error that no corrections fit, with the mistake that explains it, if one does."""
+    finding = error.finding
+    if not isinstance(finding, NoCorrectionFits):
+        return error
+    kept = choose_level(robot, every.merged()).kept
+    swapped, faults = _mistakes_named(robot, kept, every, finding.rest_mm)
+    if not (swapped or faults):
+        return error
+    return CalibrationError(outcomes.FarFromTable((), finding.rest_mm, swapped, faults), str(error))
 
 
 def _without_outliers(robot: Robot, every: PointObservations) -> Flags:
@@ -828,19 +825,6 @@ def _left_out(observations: PointObservations, found: Fit) -> HeldOutErrors | No
     return left_out(observations, found) if can_leave_out(observations.pose_of[found.last], found.J.shape[1]) else None
 
 
-def _structure(robot: Robot, observations: PointObservations, found: Fit) -> ResidualStructure | None:
-    """Of what is independent, which is as many as poses minus those that place and planes take to be known."""
-    residuals, known = np.zeros(observations.seen.shape), np.zeros(observations.seen.shape, dtype=bool)
-    where = np.flatnonzero(observations.seen)[found.last]
-    residuals.flat[where], known.flat[where] = found.rest * found.deviation_mm, True
-    effect = 1000 * effects(robot, observations.row_values, observations.points(robot))
-    effect *= ((observations.touched < 0)[:, None] & observations.seen)[:, None]
-    used, columns = known.any(axis=1), known.any(axis=0)
-    off = np.sqrt(np.bincount(observations.pose_of, weights=(found.after * observations.deviation_mm) ** 2))
-    worst = int(observations.lines[off.argmax()]), float(off.max())
-    return structure_of(residuals[used][:, columns], observations.row_values[used], effect[used][..., columns], worst)
-
-
 def _term_estimates(found: Fit, error: Reals) -> tuple[TermEstimate, ...]:
     own_error = error[len(found.kept) :]
     return tuple(
@@ -867,5 +851,4 @@ def _beyond(robot: Robot, observations: PointObservations, found: Fit) -> Beyond
         rms_mm=float(np.sqrt(np.mean((found.after * observations.deviation_mm) ** 2))),
         deviation_mm=_deviation(observations, found),
         left_out=_left_out(observations, found),
-        residuals=_structure(robot, observations, found),
     )

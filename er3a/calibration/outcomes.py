@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from er3a.by_value import Finding
+from er3a.diagnosis.faults import Faults
 from er3a.errors import Er3aError
 from er3a.references.quantities import Pose
 
@@ -97,7 +98,24 @@ class NoCorrectionFits(Finding):
     rest_mm: float
 
 
-NotCalibrated = NoPositions | MorePositions | MoreTouches | NoCorrectionFits
+class FarFromTable(Finding):
+    """Corrections, or what they leave, are far beyond what building and measuring an arm leave.
+
+    Attributes
+    ----------
+    entries : of the table, whose corrections are far too large
+    rest_mm : root mean square of what remains
+    swapped : joints whose columns are swapped, if that explains it
+    faults : of the table, one of which explains it; all that do equally well
+    """
+
+    entries: tuple[str, ...]
+    rest_mm: float
+    swapped: tuple[int, int] | None = None
+    faults: Faults = ()
+
+
+NotCalibrated = NoPositions | MorePositions | MoreTouches | NoCorrectionFits | FarFromTable
 
 
 class CalibrationError(Er3aError):
@@ -127,23 +145,6 @@ class NoCorrectionFound(Finding):
 
     intervals: int
     open: tuple[str, ...] = ()
-
-
-class FarFromTable(Finding):
-    """Corrections, or what they leave, are far beyond what building and measuring an arm leave.
-
-    Attributes
-    ----------
-    entries : of the table, whose corrections are far too large
-    rest_mm : root mean square of what remains
-    swapped : joints whose columns are swapped, if that explains it
-    opposite : the joint that turns or slides the other way, if that explains it
-    """
-
-    entries: tuple[str, ...]
-    rest_mm: float
-    swapped: tuple[int, int] | None = None
-    opposite: int | None = None
 
 
 CalibrationConclusion = FarFromTable | Misfit | CorrectionsFound | NoCorrectionFound

@@ -41,7 +41,9 @@ CauseCode = Literal[
     "scale",
     "rows_shifted",
 ]
-Uncompared = Literal["limits", "speeds", "tool", "envelopes", "pair_rules", "inertia", "drives", "wrist_load", "weight"]
+Uncompared = Literal[
+    "limits", "speeds", "limits_on_sums", "tool", "envelopes", "pair_rules", "inertia", "drives", "wrist_load", "weight"
+]
 Columns = dict[str, Reals | str]
 SAMPLES = 192
 SWEEPS = 2
@@ -166,18 +168,13 @@ class PlacementLayer:
 
 @dataclass(frozen=True)
 class RangeDifference:
-    """A limit or speed of a joint: ``a``, and ``b`` in A's zero and direction; None for a joint without limits.
-
-    ``factors`` : of a limit on a sum of joints, one for each joint, the first that is not 0 being 1 and that of
-    ``joint``; None for the arm that has no such limit
-    """
+    """A limit or speed of a joint: ``a``, and ``b`` in A's zero and direction; None for a joint without limits."""
 
     joint: int
     entry: Literal["lower", "upper", "speed"]
     a: float | None
     b: float | None
     unit: str
-    factors: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -320,7 +317,8 @@ def _compared(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances, 
     off = _distances(printed, (robot_a, robot_b), found)
     corrected = _corrected(robot_a, robot_b, found, tolerances, limits, signs=reverses, joint_zeros=joint_zeros)
     layers = units, geometry, zero, directions, base, flange, coupled, limits, speeds
-    missing = tuple(name for name, layer in ranges.items() if layer.same is None)
+    missing = [name for name, layer in ranges.items() if layer.same is None]
+    missing += ["limits_on_sums"] if robot_a.combined or robot_b.combined else []
     return Comparison(verdict, *layers, *off, counts, corrected, (*missing, *beside))
 
 
@@ -459,44 +457,7 @@ def _limits(robot_a: Robot, robot_b: Robot, signs: Reals, zeros: Reals, toleranc
                 unit = "mm" if slides else "deg"
                 one, there = (None if free else scale * end for free, end in zip(ends, (own, other)))
                 found.append(RangeDifference(j + 1, entry, one, there, unit))  # type: ignore[arg-type]
-    of_b = robot_b.replace(lower=lower, upper=upper, combined=_sums_of_b(robot_b, signs, zeros))
-    found += _sums_differ(robot_a, of_b, tolerances)
     return RangeLayer(not found, tuple(found))
-
-
-UNLIMITED = -np.inf, np.inf
-
-
-def _sums_differ(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances) -> Iterator[RangeDifference]:
-    """Limits on sums of joints that differ, both arms having A's zeros and directions."""
-    own, other = _binding_sums(robot_a), _binding_sums(robot_b)
-    for factors in sorted({*own, *other}):
-        joints = np.flatnonzero(factors)
-        sliding = bool(robot_a.slides[joints].all())
-        scale, unit = (1000.0, "mm") if sliding else (math.degrees(1.0), "deg")
-        tolerance = tolerances.length if sliding else tolerances.angle
-        for a, b, entry in zip(own.get(factors, UNLIMITED), other.get(factors, UNLIMITED), ("lower", "upper")):
-            if a != b and not abs(a - b) <= tolerance:
-                one, there = (scale * end if math.isfinite(end) else None for end in (a, b))
-                yield RangeDifference(int(joints[0]) + 1, entry, one, there, unit, factors)  # type: ignore[arg-type]
-
-
-def _binding_sums(robot: Robot) -> dict[tuple[float, ...], tuple[float, float]]:
-    """Limits on sums by their factors, of which the first is made 1; infinite where the joints' own limits do more."""
-    found: dict[tuple[float, ...], tuple[float, float]] = {}
-    for limit in robot.combined:
-        factors = np.array(limit.factors)
-        if not factors.any():
-            continue
-        first = factors[np.flatnonzero(factors)[0]]
-        factors, (lower, upper) = factors / first, sorted((limit.lower / first, limit.upper / first))
-        reached = np.stack([factors * robot.lower, factors * robot.upper])
-        reached[:, robot.continuous & (factors != 0)] = np.array([[-np.inf], [np.inf]])
-        low, high = reached.min(axis=0).sum(), reached.max(axis=0).sum()
-        key = tuple((np.round(factors, ROUNDED) + 0.0).tolist())
-        least, most = found.get(key, UNLIMITED)
-        found[key] = max(least, lower if lower > low else -np.inf), min(most, upper if upper < high else np.inf)
-    return found
 
 
 def _sums_of_b(robot: Robot, signs: Reals, zeros: Reals) -> tuple[CombinedLimit, ...]:

@@ -130,17 +130,13 @@ class Diagnosis(ByValue, Displayed):
     Attributes
     ----------
     references : how many it rests on; tried : how many hypotheses were evaluated
-    ranking : None where there is nothing to explain
     hypotheses : best first
-    left : (references,), differences that the best one leaves, in their units; None where there is none
     """
 
     conclusion: conclusions.Conclusion
     references: int
     tried: int
-    ranking: Ranking | None
     hypotheses: tuple[Hypothesis, ...]
-    left: Reals | None = None
 
     @property
     def names_fault(self) -> bool:
@@ -201,11 +197,11 @@ def diagnosis_of(robot: Robot, references: ReferenceSet | Sequence[Reference]) -
     """Hypotheses, and what they amount to."""
     stated = usable(references)
     if not stated:
-        return Diagnosis(conclusions.NothingToRestOn(), 0, 0, None, ())
+        return Diagnosis(conclusions.NothingToRestOn(), 0, 0, ())
     case = case_of(robot, stated)
     ranking = rank_case(case)
     if not ranking:
-        return Diagnosis(conclusions.NothingToExplain(len(stated)), len(stated), 0, None, ())
+        return Diagnosis(conclusions.NothingToExplain(len(stated)), len(stated), 0, ())
     hypotheses = tuple(_described(ranking, group, robot) for group in ranking.groups)
     tried = len(ranking.pool.faults)
     explained = bool(hypotheses) and hypotheses[0].explains
@@ -224,10 +220,9 @@ def diagnosis_of(robot: Robot, references: ReferenceSet | Sequence[Reference]) -
             first = replace(first, indistinguishable_from=(*alike, *first.indistinguishable_from))
             conclusion = _concluded(first, first.indistinguishable_from if from_ground else ())
             if conclusion is not None:
-                return Diagnosis(conclusion, len(stated), tried, ranking, (first, *hypotheses[: SHOWN - 1]), left)
+                return Diagnosis(conclusion, len(stated), tried, (first, *hypotheses[: SHOWN - 1]))
     conclusion = _conclusion(case, ranking, hypotheses)
-    left = ranking.pool.difference[ranking.groups[0][0]] if ranking.groups else None
-    return Diagnosis(conclusion, len(stated), tried, ranking, hypotheses, left)
+    return Diagnosis(conclusion, len(stated), tried, hypotheses)
 
 
 def _may_be_chosen(robot: Robot, hypotheses: Sequence[Hypothesis]) -> bool:

@@ -231,7 +231,7 @@ class HandEyeFile(InputFile):
     """A calibration set. ``simulated: true``: it was not recorded by a camera; verdicts say so.
 
     ``camera_standard_deviation`` is that of T_camera_board in the camera's axes; it is estimated if not given.
-    ``board_mm``: the board's edges along its x and y, for views. ``touched``: a table of points as the camera located
+    ``board_mm``: the board's edges along its x and y, as a note. ``touched``: a table of points as the camera located
     them (``seen_x_mm``; with the camera on the flange: points on the board) and as the robot touched them
     (``touched_x_mm``).
     """

@@ -18,8 +18,8 @@ from er3a.files.yaml_file import InputFile, StrictModel, check_own_names, load
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import in_si
 from er3a.robots.robot import Robot
+from er3a.vision.field_of_view import FieldOfView
 from er3a.vision.grasping import DetectedObject, Grasp
-from er3a.vision.next_view import FieldOfView
 from er3a.vision.point_error import ArmAccuracy
 from er3a.vision.vision_findings import GraspOutcome
 
@@ -44,11 +44,10 @@ class ViewEntry(StrictModel):
             raise ValueError("nearest_mm: is not nearer than farthest_mm | Exchange them")
         return self
 
-    def view(self, board_mm: list[float]) -> FieldOfView:
-        """With a board's edges; in the units of the library."""
+    def view(self) -> FieldOfView:
+        """In the units of the library."""
         half = np.radians([self.horizontal_deg, self.vertical_deg]) / 2
-        x, y = board_mm
-        return FieldOfView((half[0], half[1]), self.nearest_mm / 1000, self.farthest_mm / 1000, (x / 1000, y / 1000))
+        return FieldOfView((half[0], half[1]), self.nearest_mm / 1000, self.farthest_mm / 1000)
 
 
 class ArmAccuracyEntry(StrictModel):

@@ -32,6 +32,7 @@ MAX_TOGETHER = 4
 PATTERNS_UP_TO = 6
 MAX_FLIPS = 3  # in a combination that is the same robot
 SOME_DEG = 1e-6
+FITTED_RAD = 1e-5  # to within which a fitted angle that is written as 0 is 0
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,7 @@ class Flip:
 def half_turn(angle: Reals) -> Reals:
     """Half a turn further, kept within (-pi, pi] as people write angles."""
     turned = angle + np.pi
-    return np.where(turned > np.pi + 1e-9, turned - 2 * np.pi, turned)
+    return np.where(turned > np.pi + FITTED_RAD, turned - 2 * np.pi, turned)
 
 
 def flips_of(robot: Robot, quantities: Sequence[Quantity]) -> list[Flip]:

@@ -18,6 +18,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -37,16 +38,15 @@ from er3a.geometry.transforms import (
     transposed,
 )
 from er3a.numerics.arrays import Flags, Reals
+from er3a.robots.robot import Robot
 from er3a.vision import calibration_set, vision_findings
 from er3a.vision.classic_methods import mean_pose, park, shah
-from er3a.vision.distance_errors import DistanceFit, wrong_distances
 from er3a.vision.likelihood import UNKNOWNS, PoseObservations, Refined, half_width, refine, residuals
-from er3a.vision.setup_changes import moved_between
+from er3a.vision.typical_causes import DistanceFit, moved_between, wrong_distances, wrong_zero
 
 DEVIATIONS = 20.0  # of the angle between two samples; beyond, a pair is in conflict. Tilts seen head-on are as vague
 MAX_DEVIATION = np.radians(2.0)  # of a camera that is of any use
 ROUNDING = 1e-6  # rad
-SAME_POSITION_M, SAME_ROTATION_RAD = 5e-5, 2e-4
 MOSTLY_APART = 0.8  # of samples that stand apart, so that their residuals are judged as independent
 COPY_DECIMALS = 9  # of m and of rotation matrices
 FALSE_ALARMS = 1e-3  # of sound sets in which a sample is called far from the fit
@@ -178,28 +178,6 @@ def worst_sample(
     return worst, vision_findings.FarFromFit(
         samples.names[worst], float(off_mm), float(off_deg), float(probability[worst])
     )
-
-
-def _near(flange: Reals, i: int, distance: float, turn: float) -> Flags:
-    """Which of the samples before one stand within a distance, m, and a turn, rad, of it: (i,)."""
-    step = step_between(np.broadcast_to(flange[i], (i, 4, 4)), flange[:i])
-    near: Flags = (np.linalg.norm(step[:, :3], axis=1) < distance) & (np.linalg.norm(step[:, 3:], axis=1) < turn)
-    return near
-
-
-def repeated_poses(samples: calibration_set.CalibrationSet) -> tuple[vision_findings.RepeatedPose, ...]:
-    """Samples taken where the flange had been before."""
-    found = []
-    for i in range(1, len(samples)):
-        near = _near(samples.flange, i, SAME_POSITION_M, SAME_ROTATION_RAD)
-        if near.any():
-            first = int(near.argmax())
-            seen = step_between(samples.target[first], samples.target[i])
-            apart_mm, apart_deg = 1000 * np.linalg.norm(seen[:3]), np.degrees(np.linalg.norm(seen[3:]))
-            found.append(
-                vision_findings.RepeatedPose(samples.names[i], samples.names[first], float(apart_mm), float(apart_deg))
-            )
-    return tuple(found)
 
 
 def _copies(samples: calibration_set.CalibrationSet) -> Flags:
@@ -364,7 +342,7 @@ class HandEye(ByValue, Displayed):
     @property
     def rejected(self) -> tuple[str, ...]:
         """Names of the samples that contradict the others, so that the calibration does not use them."""
-        return tuple(each.sample for each in self.suspects if not isinstance(each, vision_findings.RepeatedPose))
+        return tuple(each.sample for each in self.suspects)
 
     def sheet(self) -> Sheet:
         """The twelve numbers with half their 95 % intervals."""
@@ -416,8 +394,10 @@ def calibrate_hand_eye(samples: calibration_set.CalibrationSet) -> HandEye:
     warnings += _warnings(kept, refined, greatest, apart, distances)
     share = len(set(kept.places.tolist())) / len(kept)
     named = {each.code for each in vision_findings.grave_warnings(warnings)} - {"unexplained_residuals", "more_scatter"}
-    if not named and share > MOSTLY_APART and (step := moved_between(samples.take(once), used[once], refined)):
-        warnings.append(step)
+    if not named and share > MOSTLY_APART:
+        every = samples.take(once)
+        step = moved_between(every, refined if used[once].all() else _fitted(every))
+        warnings += [step] if step else []
     covariance = refined.covariance + _shared_covariance(kept, refined)
     half = half_width(covariance, refined.freedom)
     wider = _wider(half, refined, distances) / half
@@ -433,13 +413,36 @@ def calibrate_hand_eye(samples: calibration_set.CalibrationSet) -> HandEye:
         deviations=refined.deviations,
         greatest_turn=greatest,
         axes_apart=apart,
-        suspects=(*suspects, *repeated_poses(samples)),
+        suspects=tuple(suspects),
         warnings=tuple(warnings),
         without_suspects=None if used.all() else _shift_with_all(samples, refined),
         touch=None,
         mismatch=angles.mismatch,
     )
     return found if samples.touched is None else replace(found, touch=_touch(found, samples.touched))
+
+
+def zeros_tried(found: HandEye, robot: Robot) -> tuple[HandEye, tuple[str, ...], float]:
+    """A calibration whose warnings name the joint with a wrong zero, if one explains all that contradicts it.
+
+    Returns
+    -------
+    found, unseen, smallest : see :class:`er3a.vision.typical_causes.ZerosTried`
+    """
+    used = found.samples.take(found.used)
+    tried = wrong_zero(found.samples, used, refine(PoseObservations.of(used), found.X, found.Y), robot)
+    explained = {each.code for each in vision_findings.grave_warnings(found.warnings)} <= EXPLAINED_BY_A_ZERO
+    if tried.zero and tried.mended and explained:
+        with suppress(vision_findings.HandEyeError):
+            if not vision_findings.grave_warnings(calibrate_hand_eye(tried.mended).warnings):
+                others = tuple(each for each in found.warnings if each.code not in EXPLAINED_BY_A_ZERO)
+                found = replace(found, warnings=(tried.zero, *others))
+    return found, tried.unseen, tried.smallest
+
+
+EXPLAINED_BY_A_ZERO = {
+    *("board_scale", "focal_length", "principal_point", "unexplained_residuals", "moved_between", "more_scatter")
+}
 
 
 def best_closed_form(F: Reals, B: Reals, deviations: Reals) -> tuple[Reals, Reals]:
@@ -486,7 +489,7 @@ def _shared_covariance(samples: calibration_set.CalibrationSet, refined: Refined
 
 
 def _wider(half: Reals, refined: Refined, distances: tuple[DistanceFit, ...]) -> Reals:
-    """Half widths (12,) that also hold what the poses are with each error of distances that explains the samples."""
+    """Half widths (12,) that also hold what the poses are with each error of distances that samples don't exclude."""
     for each in distances:
         fit = each.refined
         shift = np.concatenate([step_between(refined.X, fit.X), step_between(refined.Y, fit.Y)])
@@ -537,7 +540,7 @@ def _warnings(
         found.append(vision_findings.MoreScatter(float(refined.scatter), largest))
     if read := other_conventions(samples, refined.residual):
         return [*found, *read]
-    found += [each.finding for each in distances]
+    found += [each.finding for each in distances if each.sure]
     size, distance, turn = _misfit(refined.residual)
     if size > 1 and not vision_findings.grave_warnings(found):
         found.append(vision_findings.UnexplainedResiduals(distance, turn))

@@ -30,17 +30,8 @@ class FarFromFit(Finding):
     probability: float
 
 
-class RepeatedPose(Finding):
-    """The flange is where it was in another sample; ``apart``: what the two saw of the board differs by."""
-
-    sample: str
-    first: str
-    apart_mm: float
-    apart_deg: float
-
-
-Suspect = RotationMismatch | FarFromFit | RepeatedPose
-"""Of single samples; all but a repeated pose reject the sample."""
+Suspect = RotationMismatch | FarFromFit
+"""Of single samples; both reject the sample."""
 
 
 class NoMajority(Finding):

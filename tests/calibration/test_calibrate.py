@@ -26,7 +26,7 @@ from er3a.calibration.outcomes import (
     NotToldApart,
 )
 from er3a.calibration.parameters import parallel_pairs, parameters_of, placements_of
-from er3a.calibration.plan import plan
+from er3a.diagnosis.faults import ReversedDirection, WrongAlphaSign
 from er3a.errors import InputError
 from er3a.files.by_name import COLUMNS, load_measurements
 from er3a.files.robot_library import load_robot
@@ -117,12 +117,11 @@ def test_what_intervals_leave_wider_than_a_table_may_be_off_is_not_settled(rando
     robot = load_robot("er3a_c60")
     rows = measured(robot, poses_in(robot, random, 30), 0.05, random)
     rows = [replace(row, deviation_mm=deviation) for row in rows]
-    found, planned = er3a.calibrate(robot, rows), plan(robot, rows, 1)
+    found = er3a.calibrate(robot, rows)
     estimated = len(found.estimates)
     settled = estimated - len(found.open)
     assert least <= settled / estimated <= most
     assert f"settle {settled} of {estimated + len(found.held)} numbers" in lines_of(found)
-    assert least <= len(planned.settled) / (len(planned.settled) + len(planned.lacking)) <= most
     if not settled:
         assert found.conclusion == NoCorrectionFound(estimated, found.open)
         assert "settle nothing of base_x" in say(found.conclusion)
@@ -333,6 +332,17 @@ def test_one_coordinate_to_spare_settles_nothing(random):
     assert "Nothing is settled: there is only one coordinate more" in lines_of(found)
 
 
+def test_too_few_positions_ask_for_poses_that_settle_more(random):
+    robot = load_robot("er3_600")
+    q = poses_in(robot, random, 5)
+    more = er3a.calibrate(robot, measured(robot, q, 0.05, random)).more
+    asked = np.radians(more.examples_deg)
+    others = poses_in(robot, random, max(more.missing - len(asked), 0))
+    found = er3a.calibrate(robot, measured(robot, np.concatenate([q, asked, others]), 0.05, random))
+    assert found.level == more.level
+    assert len(found.estimates) == more.determinable
+
+
 def test_too_few_positions_are_no_gross_fault(random, monkeypatch):
     robot = load_robot("er3a_c60")
     rows = measured(robot, poses_in(robot, random, 6), 0.05, random)
@@ -362,11 +372,27 @@ def test_swapped_columns_and_a_joints_sign_are_named(convert, known, random):
     found = er3a.calibrate(robot, rows)
     swapped = not np.array_equal(np.abs(wrong), np.abs(q))
     assert isinstance(found.conclusion, FarFromTable)
-    assert (found.wrong.swapped, found.wrong.opposite) == ((5, 6), None) if swapped else (None, 5)
-    assert lines_of(found).startswith("Measurements and table belong together if J5 ")
+    assert found.wrong.swapped == ((5, 6) if swapped else None)
+    assert (ReversedDirection(5) in found.wrong.faults) is not swapped
+    assert lines_of(found).startswith("Measurements and table belong together ")
     assert not found.fits
     advised = [replace(row, pose=tuple(own)) for row, own in zip(rows, np.degrees(convert(wrong)).tolist())]
     assert er3a.calibrate(robot, advised).fits
+
+
+@pytest.mark.parametrize(("name", "joint"), [("er3_600", 3), ("er3_600", 5), ("er3a_c60", 4)])
+def test_a_wrong_sign_of_alpha_is_named(name, joint, random):
+    robot = load_robot(name)
+    rows = measured(robot, random.uniform(0.8 * robot.lower, 0.8 * robot.upper, (40, 6)), 0.05, random)
+    rows = [replace(row, deviation_mm=None) for row in rows]
+    wrong = robot.replace(alpha=robot.alpha * np.where(np.arange(6) == joint - 1, -1, 1))
+    try:
+        finding = er3a.calibrate(wrong, rows).conclusion
+    except CalibrationError as error:
+        finding = error.finding
+    given = float(np.degrees(wrong.alpha[joint - 1]))
+    assert WrongAlphaSign(joint, given, -given) in finding.faults
+    assert f"joint {joint}: alpha" in say(finding)
 
 
 def test_a_joints_zero_that_is_far_off_is_named(random):

@@ -234,7 +234,6 @@ def test_what_is_expected_to_fail_alone_is_no_pass(study, tmp_path, stage):
     quick = {
         "inverse": {"round_trips": 3},
         "trajectory": {"avoidance": "slow", "programs": []},
-        "vision": {"map_cells": 4},
     }
     results = (
         STAGES[stage].module("compute").compute(changed(study, {key: str(tmp_path / "input.yaml")}, **quick), ROBOT)
@@ -774,7 +773,7 @@ def test_an_object_in_a_solid_is_no_grasp_that_passes(study, tmp_path):
         balls = [{"name": "ball", "radius_mm": 10, "xyz_mm": list(place)}] if place else []
         scene["spheres"] = [*scene["spheres"], *balls]
         (tmp_path / "scene.yaml").write_text(yaml.safe_dump(scene), encoding="utf-8")
-        summary = vision(changed(study, own, vision={"map_cells": 4}), ROBOT).summary
+        summary = vision(changed(study, own), ROBOT).summary
         (can,) = summary.objects
         place = can.xyz_mm
         assert can.outcome == "grasped"
@@ -790,7 +789,6 @@ def test_a_grasp_passes_by_no_object_out_of_view_and_no_arm_without_errors(study
         shutil.copy(file, tmp_path)
     content = yaml.safe_load(Path(f"data/vision/{ROBOT}.yaml").read_text(encoding="utf-8"))
     content["objects"] = content["objects"][:1]
-    few = {"map_cells": 4}
     scene = Path("data/scenes/table_and_post.yaml").read_text(encoding="utf-8")
     gripper = "carried: {boxes: [{name: gripper, size_mm: [40, 40, 90], xyz_mm: [0, 0, 50]}]}\n"
     (tmp_path / "scene.yaml").write_text(scene + gripper, encoding="utf-8")
@@ -803,13 +801,13 @@ def test_a_grasp_passes_by_no_object_out_of_view_and_no_arm_without_errors(study
         ("arm_errors", (), {"arm": content["arm"] | {"table_angle_standard_deviation_deg": 0.0}}),
     ):
         (tmp_path / "vision.yaml").write_text(yaml.safe_dump(content | more), encoding="utf-8")
-        verdict = vision(changed(study, own, vision=few), ROBOT).summary.verdict
+        verdict = vision(changed(study, own), ROBOT).summary.verdict
         assert verdict.status == ("caution" if subject else "pass"), more
         assert [(each.subject, each.names) for each in verdict.missed] == ([(subject, names)] if subject else [])
     rows = (tmp_path / "fixed_camera.csv").read_text(encoding="utf-8").splitlines()
     again = "again" + rows[-1][rows[-1].index(",") :]
     (tmp_path / "fixed_camera.csv").write_text("\n".join([*rows, again, ""]), encoding="utf-8")
-    summary = vision(changed(study, {"vision": str(tmp_path / "vision.yaml")}, vision=few), ROBOT).summary
+    summary = vision(changed(study, {"vision": str(tmp_path / "vision.yaml")}), ROBOT).summary
     assert "carried" in [each.subject for each in summary.verdict.missed]
     left = {each.subject: each.names for each in summary.not_examined}
     assert left["left_out_samples"] == ("pose_12",)
@@ -850,8 +848,7 @@ def test_recorded_poses_that_no_joint_values_confirm_are_no_pass(study, tmp_path
     content["objects"] = content["objects"][:1]
     (tmp_path / "vision.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
     entry = study.robots[name].model_copy(update={"vision": str(tmp_path / "vision.yaml"), "stages": None})
-    section = study.vision.model_copy(update={"map_cells": 4})
-    results = vision(study.model_copy(update={"robots": {name: entry}, "vision": section}), name)
+    results = vision(study.model_copy(update={"robots": {name: entry}}), name)
     verdict = results.summary.verdict
     assert verdict.status == "caution"  # no gripper has a shape
     missed = [each.subject for each in verdict.missed if each.subject != "carried"]
@@ -1201,7 +1198,7 @@ LEAVE_NOTHING_OUT = {
     "dynamics": ("payload_centre_mm", "payload_gyration_mm"),
     "vision": (
         *("least_clearance_mm", "least_limit_margin_deg", "least_singular_value", "least_success"),
-        *("map_cells", "line_speed_mm_s"),
+        "line_speed_mm_s",
     ),
     "programs": ("tool_speed_mm_s", "tool_acceleration_mm_s2", "joint_speed_percent"),
 }

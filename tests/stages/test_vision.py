@@ -129,11 +129,6 @@ def test_tables_say_what_the_summary_says(folders):
     results = read_results(folders["er3_600"], VisionResults).results
     found = results.summary.calibration
     assert results.samples.used.sum() == found.used
-    cells = results.error_map
-    own = cells.reached
-    assert own.any()
-    assert (cells.together_mm[own] >= np.maximum(cells.calibration_mm, cells.arm_mm)[own]).all()
-    assert np.isnan(cells.together_mm[~own]).all()
     for each in results.summary.objects:
         last = results.ways.take((results.ways.target == each.name) & (results.ways.part == "approach")).q_deg[-1]
         np.testing.assert_allclose(last, each.grasp.q_deg)
@@ -142,9 +137,8 @@ def test_tables_say_what_the_summary_says(folders):
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", ["er3a_c60", ARTICLE, "er3_600"])
-def test_page_and_recording_are_written(study, folders, tmp_path, name):
-    for verb in ("record", "report"):
-        run.show(verb, "vision", study, name, folders[name], tmp_path / verb)
+def test_the_page_is_written(study, folders, tmp_path, name):
+    run.show("report", "vision", study, name, folders[name], tmp_path / "report")
     page = (tmp_path / "report").read_text(encoding="utf-8")
     assert "T_flange_board" in page or "T_base_board" in page
     packed = re.findall(r'href="data:text/plain;base64,([^"]+)" download="grasp_\w+\.(?:src|script|pgm|XPL|csv)"', page)
@@ -152,7 +146,6 @@ def test_page_and_recording_are_written(study, folders, tmp_path, name):
     assert len(heads) >= 5 * (name == "er3a_c60")
     assert all("the camera is simulated" in head and "may carry the object was not examined" in head for head in heads)
     assert all("er3a: Run no path or program on the arm until" in head for head in heads)
-    assert (tmp_path / "record").stat().st_size > 10_000
 
 
 @pytest.mark.long
@@ -222,8 +215,7 @@ def test_samples_without_a_calibration_leave_every_object_unexamined(study, tmp_
         rows = [f"p{n}" + rows[0][rows[0].index(",") :] for n in range(6)]
     (tmp_path / "fixed_camera.csv").write_text("\n".join([head, *rows, ""]), encoding="utf-8")
     entry = study.entry("er3a_c60").model_copy(update={"vision": str(tmp_path / "vision.yaml")})
-    section = study.vision.model_copy(update={"map_cells": 4})
-    given = study.model_copy(update={"robots": {"er3a_c60": entry}, "vision": section})
+    given = study.model_copy(update={"robots": {"er3a_c60": entry}})
     summary = STAGE.module("compute").compute(given, "er3a_c60").summary
     assert summary.verdict.status == "fail"
     assert (summary.calibration is not None) == turning

@@ -29,9 +29,9 @@ from er3a.vision.boards import (
     views_of_corners,
 )
 from er3a.vision.calibration_set import CalibrationSet
-from er3a.vision.distance_errors import board_scale
 from er3a.vision.hand_eye import calibrate_hand_eye
 from er3a.vision.likelihood import PoseObservations, refine
+from er3a.vision.typical_causes import fitted_distances, half_widths
 from testing.hand_eye_sets import off, pose
 from tests.vision.test_hand_eye_file import HEAD, columns, write
 
@@ -205,8 +205,9 @@ def test_a_focal_length_that_its_images_leave_open_is_no_wrong_board():
             "eye_to_hand", flange, views.target, camera_covariance=views.covariance, shared=views.shared
         )
         refined = refine(PoseObservations.of(samples), X, Y)
-        factor, half_width = board_scale(samples, refined)
-        alone = board_scale(replace(samples, shared=None), refined)[1]
+        fit = fitted_distances("board", samples, refined)
+        factor, (alone, shared) = 1 + fit.values[0], half_widths("board", samples, refined, fit)
+        half_width = np.hypot(alone, shared)
         scales.append([abs(factor - 1) / half_width, abs(factor - 1) / alone])
     beyond, beyond_alone = (np.array(scales) > 1).sum(axis=0)
     assert beyond <= 2

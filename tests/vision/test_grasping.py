@@ -39,10 +39,9 @@ from er3a.vision.grasping import (
     plan_grasp,
 )
 from er3a.vision.hand_eye import calibrate_hand_eye
-from er3a.vision.next_view import board_visible, next_view
 from er3a.vision.point_error import ArmAccuracy, error_sizes, seen_pose, seen_pose_error, table_covariance
 from testing.arms import scara
-from testing.camera_cells import CARRIED, FIXED, FOLDER, SCENE, seen_from
+from testing.camera_cells import CARRIED, FIXED, FOLDER, SCENE
 from testing.hand_eye_sets import pose
 
 SPEED = 0.1
@@ -184,17 +183,6 @@ def test_errors_of_every_row_of_the_table_count(arm):
             step = step_between(forward(robot, q), forward(robot.replace(**{name: entries}), q)) / 1e-6
             rows.append(1e-6 * np.outer(step, step))
     np.testing.assert_allclose(table_covariance(robot, q, accuracy), sum(rows), rtol=1e-6, atol=1e-14)
-
-
-def test_the_next_view_sees_the_board_is_free_and_keeps_its_promise(cell):
-    made, robot, found = cell
-    scene = load_scene(SCENE)
-    view = next_view(robot, found, made.view, np.array([0.0, 0.0, 0.9]), scene, 3)
-    assert view is not None
-    assert within(robot, view.q)
-    assert board_visible(made.view, seen_from(made, view.q))
-    assert clearance(robot, view.q[None], scene).distance[0] > 0
-    assert view.error_after < view.error_before
 
 
 @pytest.mark.long

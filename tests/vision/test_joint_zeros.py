@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from er3a.kinematics.forward import forward
-from er3a.vision.hand_eye import calibrate_hand_eye
-from er3a.vision.joint_zeros import zeros_tried
+from er3a.vision.hand_eye import calibrate_hand_eye, zeros_tried
 from er3a.vision.vision_findings import grave_warnings
 from testing.hand_eye_coverage import ROBOT, a_set
 

@@ -123,7 +123,7 @@ def _beside(found: Comparison, first: ReadArm, other: ReadArm) -> Comparison:
     """A comparison of two tables, with what both files give beside them."""
     from er3a.comparison.compare import given_by_both
 
-    ranges = (each for each in found.not_examined if each in ("limits", "speeds"))
+    ranges = (each for each in found.not_examined if each in ("limits", "speeds", "limits_on_sums"))
     return replace(found, not_examined=(*ranges, *given_by_both(first.beside, other.beside)))
 
 

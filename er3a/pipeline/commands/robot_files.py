@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 import sys
-from collections.abc import Sequence
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -23,8 +22,6 @@ from er3a.pipeline.stages.registry import STAGES
 
 if TYPE_CHECKING:
     from er3a.calibration.calibrate import Calibration
-    from er3a.calibration.observations import Measurement
-    from er3a.calibration.outcomes import FixedName
     from er3a.files.pieces_file import PiecesFile
     from er3a.robots.robot import Robot
 
@@ -154,14 +151,6 @@ def mesh(
     print(f"the pieces stick out of the mesh by {found.excess_mm:.3g} mm, as measured")
 
 
-def _print_plan(arm: Robot, rows: Sequence[Measurement], count: int, fixed: Sequence[FixedName], as_json: bool) -> None:
-    from er3a.calibration.plan import plan
-    from er3a.pipeline.messages.calibration import plan_lines, plan_record
-
-    proposed = plan(arm, rows, count, fixed)
-    options.print_json(plan_record(proposed)) if as_json else print(plan_lines(proposed, arm))
-
-
 def _check_options(output: Path | None, words: str) -> None:
     """Before the long work begins: a language, a name for a robot."""
     if words not in LANGUAGES:
@@ -200,7 +189,6 @@ def calibrate(
         list[FixedPlacement] | None, typer.Option(help="values of the robot file to keep; can be repeated")
     ] = None,
     held_back: Annotated[Path | None, typer.Option(help="a CSV of positions to test the result, not to fit")] = None,
-    plan: Annotated[int, typer.Option(min=0, max=100, help="only list what is settled and propose N poses")] = 0,
     html: Annotated[Path | None, typer.Option(help="also write a page")] = None,
     rrd: Annotated[Path | None, typer.Option(help="also write a recording for the Rerun viewer")] = None,
     words: Annotated[str, typer.Option("--language", help=f"language of the page: {' | '.join(LANGUAGES)}")] = "en",
@@ -215,7 +203,6 @@ def calibrate(
     Exit code 1 if measurements and table don't fit (what remains or is corrected is far beyond errors of arms and of
     measuring), or positions held back contradict the result. It is written all the same.
     """
-    from er3a.calibration.observations import check_poses
     from er3a.calibration.outcomes import CalibrationError
     from er3a.files.by_name import calibrate as calibrate_robot
     from er3a.files.by_name import load_measurements
@@ -226,10 +213,6 @@ def calibrate(
     _check_options(output, words)
     arm = load_robot(robot)
     rows = load_measurements(measurements, arm)
-    if plan:
-        check_poses(rows, arm, measurements)
-        _print_plan(arm, rows, plan, [each.value for each in fixed or ()], as_json)
-        return
     others = load_measurements(held_back, arm) if held_back else ()
     try:
         with shown_work(f"{robot}: estimating corrections"):
@@ -315,8 +298,7 @@ def hand_eye(
     from er3a.pipeline.results import LeftOut
     from er3a.pipeline.stages.vision.compute import left_out_of_calibration
     from er3a.vision.boards import ambiguous_tilts
-    from er3a.vision.hand_eye import calibrate_hand_eye
-    from er3a.vision.joint_zeros import zeros_tried
+    from er3a.vision.hand_eye import calibrate_hand_eye, zeros_tried
     from er3a.vision.vision_findings import HandEyeError, grave_warnings
 
     # What is printed is for the controller, and so in the robot's own base, wherever its file places that.

@@ -11,8 +11,6 @@ import numpy as np
 from er3a.calibration.calibrate import Beyond, Calibration, Estimate, TermEstimate
 from er3a.calibration.cross_validation import HeldOutErrors, TriedTerm
 from er3a.calibration.observations import Measurement
-from er3a.calibration.plan import Plan
-from er3a.calibration.residuals import ResidualStructure
 from er3a.calibration.terms import starting_table
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import N_, as_text, tr
@@ -87,8 +85,6 @@ def lines_of(found: Calibration, fitted: Sequence[Measurement] = (), others: Seq
         )
     if found.left_out:
         lines.append(f"as in a robot file, {_left_out_line(found.left_out)}")
-    if found.residuals:
-        lines.append(f"as in a robot file, {_residual_line(found.residuals)}")
     lines += _tried_lines("tried", found.tried)
     lines += _tried_lines("tried for the robot file", found.tried_for_file)
     if found.beyond:
@@ -180,44 +176,6 @@ def kept_lines(
             f"{output}: its coupling counts; for a program that reads a table alone, calibrate with --fixed ratios"
         )
     return lines
-
-
-def plan_lines(found: Plan, robot: Robot) -> str:
-    """What measurements settle, and what to measure next."""
-    units = ["mm" if slides else "deg" for slides in robot.slides]
-    able = len(found.settled) + len(found.lacking)
-    lines = [f"these measurements settle {len(found.settled)} of {able} numbers that such measurements can settle"]
-    lines += [f"settled by more poses: {', '.join(found.lacking)}"] if found.lacking else []
-    lines += [f"settled by no poses: {say(reason)}" for reason in found.held]
-    if found.beyond:
-        beyond = (
-            f"J{each.joint} {'beyond' if each.above else 'below'} {as_text(each.value, '.4g')} {units[each.joint - 1]}"
-            for each in found.beyond
-        )
-        lines.append(f"add poses with {', '.join(beyond)}")
-    lines.append("poses that add most, the first one first, by the table:")
-    for number, each in enumerate(found.proposals, 1):
-        pose = ", ".join(as_text(value, ".2f") for value in each.pose)
-        what = f"  {each.kind} {each.name}" if each.kind else ""
-        lines.append(f"{number:>4}  ({pose}){what}")
-    lines.append("half of the 95 % interval, with the measurements and with these poses as well:")
-    for width in found.widths:
-        now = "not settled" if width.now is None else f"{width.now:.4f}"
-        then = "not settled" if width.then is None else f"{width.then:.4f}"
-        lines.append(f"{width.name:<9}{now:>12}{then:>12} {width.unit}")
-    return "\n".join(lines)
-
-
-def plan_record(found: Plan) -> dict[str, object]:
-    """A plan as plain data, for another program."""
-    return {
-        "settled": list(found.settled),
-        "lacking": list(found.lacking),
-        "held": [say(reason) for reason in found.held],
-        "proposals": [vars(each) for each in found.proposals],
-        "beyond": [vars(each) for each in found.beyond],
-        "half_widths": [vars(each) for each in found.widths],
-    }
 
 
 def held_back_line(fitted: Sequence[Measurement], others: Sequence[Measurement], distances: Reals) -> str:
@@ -350,40 +308,6 @@ def _left_out_line(found: HeldOutErrors) -> str:
     )
 
 
-def _residual_line(found: ResidualStructure) -> str:
-    return "; ".join(residual_texts(found))
-
-
-def residual_texts(found: ResidualStructure) -> list[str]:
-    """Whether what remains is noise, its structure if it isn't, and where it is largest."""
-    greatest = tr("greatest: {worst_mm:.3g} mm in row {row}", worst_mm=found.worst_mm, row=found.worst_row)
-    if found.is_noise:
-        return [tr("what remains is noise by all four tests"), greatest]
-    correlated = tr(
-        "what remains is more than noise: correlation {neighbours:.2f} between neighbouring poses (p "
-        "{by_neighbours:.2g}), {order:.2f} from row to row (p {by_order:.2g})",
-        neighbours=found.neighbours,
-        by_neighbours=found.neighbours_probability,
-        order=found.order,
-        by_order=found.order_probability,
-    )
-    by_value = tr(
-        "J{joint} explains most by its value, {share:.1%} (p {p:.2g})",
-        joint=found.joint,
-        share=found.share,
-        p=found.joint_probability,
-    )
-    play = tr(
-        "J{joint} explains most by the side from which it came, {share:.1%} (p {p:.2g}): it misses by {play:.3f}/1000 "
-        "rad or m either way",
-        joint=found.play_joint,
-        share=found.play_share,
-        p=found.play_probability,
-        play=abs(found.play),
-    )
-    return [correlated, by_value, play, greatest]
-
-
 def _tried_lines(title: str, tried: Sequence[TriedTerm]) -> list[str]:
     shown = [each for each in tried if each.verdict != "noise"]
     lines = []
@@ -401,8 +325,6 @@ def _beyond_lines(found: Beyond) -> list[str]:
     lines += [f"  {term_name(each)}: {_coefficients(each)}" for each in found.terms]
     if found.left_out:
         lines.append(f"with terms, {_left_out_line(found.left_out)}")
-    if found.residuals:
-        lines.append(f"with terms, {_residual_line(found.residuals)}")
     return lines
 
 
@@ -441,7 +363,6 @@ def calibration_record(
         "idle": [vars(each) for each in found.idle],
         "set_aside": [{"row": each.row, "distance_mm": each.distance_mm} for each in found.outliers],
         "left_out": vars(found.left_out) if found.left_out else None,
-        "residuals": _residuals(found.residuals),
         "tried": [vars(each) for each in found.tried],
         "tried_for_file": [vars(each) for each in found.tried_for_file],
         "beyond": _beyond(found.beyond) if found.beyond else None,
@@ -480,10 +401,6 @@ def _entries(estimates: Sequence[Estimate]) -> list[dict[str, object]]:
     ]
 
 
-def _residuals(found: ResidualStructure | None) -> dict[str, object] | None:
-    return {**vars(found), "is_noise": found.is_noise} if found else None
-
-
 def _beyond(found: Beyond) -> dict[str, object]:
     return {
         "terms": [vars(each) for each in found.terms],
@@ -491,5 +408,4 @@ def _beyond(found: Beyond) -> dict[str, object]:
         "rms_mm": found.rms_mm,
         "standard_deviation_mm": found.deviation_mm,
         "left_out": vars(found.left_out) if found.left_out else None,
-        "residuals": _residuals(found.residuals),
     }

@@ -50,7 +50,7 @@ CAUSES = {
     "scale": N_("all lengths are scaled"),
     "rows_shifted": N_("values stand a row too high or too low"),
 }
-PAIR_RULES = N_("rules for pairs of links")
+BESIDE = {"pair_rules": N_("rules for pairs of links"), "limits_on_sums": N_("limits on sums of joints")}
 STATES = {True: N_("agrees"), False: N_("differs"), None: N_("not given")}
 
 
@@ -93,7 +93,7 @@ def layer_rows(found: Comparison) -> list[tuple[str, str, str]]:
 
 
 def _uncompared(name: Uncompared) -> str:
-    return tr(LAYERS.get(name) or (PAIR_RULES if name == "pair_rules" else GROUP_NAMES[name]))
+    return tr(LAYERS.get(name) or BESIDE.get(name) or GROUP_NAMES[name])
 
 
 def doubt_rows(doubts: Iterable[str]) -> list[tuple[str, str, str]]:
@@ -180,12 +180,4 @@ def _(found: RangeLayer) -> str:
 @say.register
 def _(found: RangeDifference) -> str:
     a, b = (tr("none") if value is None else f"{value:.6g}" for value in (found.a, found.b))
-    named = f"J{found.joint}" if not found.factors else _sum(found.factors)
-    return f"{named} {found.entry} {a} → {b} {found.unit}"
-
-
-def _sum(factors: tuple[float, ...]) -> str:
-    """J2 + J3 of factors 0, 1, 1."""
-    terms = [(factor, f"J{joint}") for joint, factor in enumerate(factors, 1) if factor]
-    sized = [(factor, name if abs(factor) == 1 else f"{abs(factor):.6g} {name}") for factor, name in terms]
-    return "".join(f" {'-' if factor < 0 else '+'} {text}" for factor, text in sized).removeprefix(" + ")
+    return f"J{found.joint} {found.entry} {a} → {b} {found.unit}"

@@ -199,9 +199,8 @@ TEXTS = texts(
         "far_from_table#swapped": (
             "Measurements and table belong together if J{first} and J{second} are swapped. Swap their columns."
         ),
-        "far_from_table#opposite": (
-            "Measurements and table belong together if J{joint} moves the other way. Change the sign of its column, or "
-            "its direction in the robot's file."
+        "far_from_table#fault": (
+            "Measurements and table belong together after one correction of the robot's file: {faults}."
         ),
         "list": "{others} and {last}",
     }
@@ -383,8 +382,8 @@ def _(found: Misfit) -> str:
 def _(found: FarFromTable) -> str:
     if found.swapped:
         return say_as(found, "swapped", first=found.swapped[0], second=found.swapped[1])
-    if found.opposite:
-        return say_as(found, "opposite", joint=found.opposite)
+    if found.faults:
+        return say_as(found, "fault")
     return say_as(found) if found.entries else say_as(found, "rest")
 
 

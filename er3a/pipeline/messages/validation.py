@@ -83,9 +83,6 @@ GROUPS = GROUP_WORDS | {"table_sanity": N_("table sanity"), "round_trips": N_("r
 
 TEXTS = texts(
     {
-        "labels_missed": Plural(
-            "count", "{count} label is missed, by up to {worst} mm.", "{count} labels are missed, by up to {worst} mm."
-        ),
         "graded": "{own_source} ({grade})",
         "claims#all": "All {claims} statements in {reference_set} that no document backs (“claims”) hold.",
         "claims#some": Plural(

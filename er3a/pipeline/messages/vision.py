@@ -134,10 +134,6 @@ TEXTS = texts(
             "{sample}: {off_mm:.3g} mm and {off_deg:.2g} deg from what the other samples predict (probability "
             "{probability:.1g})"
         ),
-        "repeated_pose": (
-            "{sample}: the arm has the same pose as in {first}, and the two board poses differ by {apart_mm:.2g} mm "
-            "and {apart_deg:.2g} deg; a sample at another pose would add more"
-        ),
         "ambiguous_tilt": (
             "{sample}: the flat board is seen almost head-on, or too small: the mirrored tilt fits with only "
             "{ratio:.2g} times the error. Take the image from nearer, or tilt the board by 30 deg"

@@ -14,7 +14,7 @@ import rerun as rr
 from matplotlib import colormaps
 from matplotlib.ticker import MaxNLocator
 
-from er3a.calibration.calibrate import Calibration, JointShare, TermEstimate, joint_shares
+from er3a.calibration.calibrate import Calibration, TermEstimate
 from er3a.calibration.cross_validation import HeldOutErrors, TriedTerm
 from er3a.calibration.observations import Measurement, PointObservations, observed
 from er3a.comparison.compare import compare
@@ -30,7 +30,6 @@ from er3a.pipeline.messages.calibration import (
     held_back_warning,
     idle_texts,
     not_examined_texts,
-    residual_texts,
     term_kind,
     warning_texts,
 )
@@ -120,7 +119,6 @@ def write_calibration(
     errors = measured_errors(robot, measurements, found)
     text = robot_text(robot_file(corrected))
     comparison = compare(robot, found.robot, tolerance_mm=1e-3, tolerance_deg=1e-3)
-    residuals = found.beyond.residuals if found.beyond else found.residuals
     beside = held_back_warning(found, measurements, held_back)
     table = str(files[0]) if len(files) > 1 else robot.name
     with house_style():
@@ -136,10 +134,6 @@ def write_calibration(
             figures=_figures(found, errors),
             errors=_errors(found, errors, held_back),
             recording=recording,
-            structure=[page.whole_sentence(each) for each in residual_texts(residuals)]
-            if residuals
-            else [tr("There are too few poses to tell noise from structure.")],
-            shares=[_share(each, found) for each in joint_shares(found, robot, measurements)],
             entries=_entries(found),
             held=[say(why) for why in found.held],
             outliers=[(str(each.row), number(each.distance_mm, 3)) for each in found.outliers],
@@ -206,17 +200,6 @@ def _errors(found: Calibration, errors: MeasuredErrors, held_back: Sequence[Meas
         title = tr("held back: {count} positions, {model}", count=len(off), model=tr(MODELS[model]))
         rows.append([title, "–", number(float(off.mean()), 3), number(float(off.max()), 3), "–", "–"])
     return rows
-
-
-def _share(share: JointShare, found: Calibration) -> list[str]:
-    who = tr(share.placement) if share.placement else f"J{share.joint}"
-    residuals = found.beyond.residuals if found.beyond else found.residuals
-    left = ["–", "–"]
-    if residuals and share.joint:
-        k = share.joint - 1
-        left = [as_text(residuals.shares[k], ".1%"), number(residuals.probabilities[k], 2)]
-    terms = number(share.terms_mm, 3) if share.terms_mm else "–"
-    return [who, ", ".join(share.entries) or "–", number(share.table_mm, 3), terms, *left]
 
 
 def _entries(found: Calibration) -> list[list[str]]:
@@ -370,8 +353,6 @@ def _note(found: Calibration, errors: MeasuredErrors) -> str:
     for model in errors.differences_mm:
         distance = errors.distances_mm(model)
         lines.append(f"{NAMES[model]}: {distance.mean():.3g} mm on average, {distance.max():.3g} mm at most")
-    residuals = found.beyond.residuals if found.beyond else found.residuals
-    lines += residual_texts(residuals) if residuals else []
     lines.append(
         "Yellow points have the greatest error, and the arrows, exaggerated, lead to where the model puts them."
     )

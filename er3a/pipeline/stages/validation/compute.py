@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from er3a.diagnosis.diagnose import Diagnosis, diagnosis_of, residuals
-from er3a.diagnosis.ranking import Ranking, usable
+from er3a.diagnosis.diagnose import Diagnosis, diagnosis_of
+from er3a.diagnosis.ranking import usable
 from er3a.files.reference_sets import check_robot_origins, load_references
 from er3a.identifiability.evidence import evidence_of
 from er3a.identifiability.proposals import proposals_of
@@ -20,13 +17,11 @@ from er3a.kinematics.forward import frames
 from er3a.kinematics.round_trips import MAX_BY_CLASS
 from er3a.kinematics.table_batch import robot_of
 from er3a.kinematics.wrist_partitioned import wrist_partition_missing
-from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import stated
 from er3a.pipeline.results import LeftOut
 from er3a.pipeline.stages.validation import model
 from er3a.pipeline.stages.validation.checks import GROUP as ROUND_TRIPS
 from er3a.pipeline.stages.validation.checks import (
-    SHOWN_DECIMALS,
     checks_of_set,
     counts_of,
     key_figures,
@@ -41,19 +36,16 @@ from er3a.pipeline.study import Study
 from er3a.references import quantities
 from er3a.references.circle_points import CirclePoints, circle_points
 from er3a.references.predict import read, search, state_of
-from er3a.references.reference import Documents, ReferenceSet, expected_of, quantities_of, vectors_of
-from er3a.references.rows import GROUPS, AxisRow, EnvelopeRow, PositionRow
-from er3a.references.subjects import DrawingCorner, DrawingExtent, Reach
+from er3a.references.reference import Documents, ReferenceSet, quantities_of
+from er3a.references.rows import GROUPS, AxisRow, PositionRow
+from er3a.references.subjects import Reach
 from er3a.robots.joint_limits import meant, size_of
-from er3a.robots.robot import Grade, Robot
+from er3a.robots.robot import Robot
 
 
-def diagnose_sets(robot: Robot, sets: list[ReferenceSet]) -> tuple[tuple[model.SetDiagnosis, ...], model.Residuals]:
+def diagnose_sets(robot: Robot, sets: list[ReferenceSet]) -> tuple[model.SetDiagnosis, ...]:
     """Diagnose a table against each reference set."""
-    found = [(references.name, diagnosis_of(robot, references)) for references in sets]
-    tables = [_residuals(name, diagnosis.ranking, diagnosis.left) for name, diagnosis in found if diagnosis.ranking]
-    records = [_set_diagnosis(robot, references, diagnosis) for references, (_, diagnosis) in zip(sets, found)]
-    return tuple(records), model.Residuals.stacked(tables)
+    return tuple(_set_diagnosis(robot, references, diagnosis_of(robot, references)) for references in sets)
 
 
 def _set_diagnosis(robot: Robot, references: ReferenceSet, diagnosis: Diagnosis) -> model.SetDiagnosis:
@@ -69,32 +61,6 @@ def _set_diagnosis(robot: Robot, references: ReferenceSet, diagnosis: Diagnosis)
         hypotheses=tuple(stated(model.RankedHypothesis, each) for each in diagnosis.hypotheses),
         corrected=stated(model.CorrectedTable, diagnosis.hypotheses[0].corrected) if diagnosis.names_fault else None,
     )
-
-
-def _residuals(reference_set: str, ranking: Ranking, left: Reals | None) -> model.Residuals:
-    before, bound, units = residuals(ranking, ranking.before)
-    after, _, _ = residuals(ranking, ranking.before if left is None else left)
-    vectors = [[ranking.references[place] for place in places] for places in vectors_of(ranking.references)]
-    return model.Residuals.of_rows(
-        (
-            reference_set,
-            vectors[i][0].source,
-            vectors[i][0].group,
-            vectors[i][0].subject if len(vectors[i]) == 1 else vectors[i][0].subject.whole,
-            units[i],
-            before[i],
-            after[i],
-            bound[i],
-        )
-        for i in np.argsort(-np.maximum(before, after) / bound, kind="stable")
-    )
-
-
-SECTION_STEPS = 60
-EXTREMITIES: tuple[quantities.Extremity, ...] = ("greatest", "least")
-
-Vector = NDArray[np.float64]
-Extremes = Mapping[quantities.Extreme, tuple[float, Vector]]
 
 
 def axes_table(circles: CirclePoints, sets: list[ReferenceSet]) -> model.Axes:
@@ -113,111 +79,19 @@ def axes_table(circles: CirclePoints, sets: list[ReferenceSet]) -> model.Axes:
     return model.Axes.of_rows(rows)
 
 
-@dataclass(frozen=True)
-class _Look:
-    """A pose at which a source looks at the arm; ``stated`` gives the point from the model's and the frames."""
-
-    source: str
-    grade: Grade
-    group: str
-    name: model.KeyPose
-    point: quantities.Point
-    pose: quantities.Pose
-    stated: Callable[[Vector, Vector], Vector]
-
-
-def key_poses_table(robot: Robot, sets: list[ReferenceSet], extremes: Extremes) -> model.KeyPoses:
-    """The poses at which references look at the arm, with their point and the model's; the zero pose comes first."""
+def key_poses_table(robot: Robot, sets: list[ReferenceSet]) -> model.KeyPoses:
+    """The poses at which references state a point, with the model's; the zero pose comes first."""
     rows = []
     for references in sets:
-        for look in (*_positions(references), *_corners(references), *_extremes(references, extremes)):
-            pose = (*look.pose, *quantities.ZERO_POSE)[: robot.joints]
-            T = frames(robot, meant(robot, np.array(pose)))
-            modelled = quantities.point_of(T, look.point)
-            stated = look.stated(modelled, T)
-            head = (references.name, look.source, look.grade, look.group, look.name, look.point, pose)
+        for row in references.of(PositionRow):
+            given = np.array([np.nan if value is None else value for value in row.xyz_mm])
+            pose = (*row.pose, *quantities.ZERO_POSE)[: robot.joints]
+            modelled = quantities.point_of(frames(robot, meant(robot, np.array(pose))), row.point)
+            stated = given if np.isnan(given).all() else np.where(np.isnan(given), modelled, given)
+            head = (references.name, row.source, row.grade, row.group, model.NamedPose(row.name), row.point, pose)
             rows.append((*head, stated, modelled, float(np.linalg.norm(modelled - stated))))
     table = model.KeyPoses.of_rows(rows)
     return table.take(np.argsort((table.q_deg != 0).any(axis=1), kind="stable"))
-
-
-def section_table(robot: Robot, extremes: Extremes) -> model.Section:
-    """The wrist centre in the side view over a grid of joints 2 and 3 within their limits, and which points lie where
-    the region can end: at a limit, or with the elbow straight or folded."""
-    elbow = [extremes[quantities.AxisDistance("wrist_centre", extreme, 2)][1][2] for extreme in EXTREMITIES]
-    q2 = np.linspace(robot.lower[1], robot.upper[1], SECTION_STEPS + 1)
-    q3 = np.unique(np.concatenate([np.linspace(robot.lower[2], robot.upper[2], SECTION_STEPS + 1), elbow]))
-    grid2, grid3 = np.meshgrid(q2, q3, indexing="ij")
-    q = np.zeros((*grid2.shape, 6))
-    q[..., 1], q[..., 2] = grid2, grid3
-    points = quantities.section_of(frames(robot, q))
-    return model.Section(
-        q2_deg=np.degrees(grid2).ravel(),
-        q3_deg=np.degrees(grid3).ravel(),
-        x_mm=points[..., 0].ravel(),
-        z_mm=points[..., 1].ravel(),
-        on_q2_line=((grid2 == q2[0]) | (grid2 == q2[-1])).ravel(),
-        on_q3_line=np.isin(grid3, [q3[0], q3[-1], *elbow]).ravel(),
-    )
-
-
-def _positions(references: ReferenceSet) -> Iterator[_Look]:
-    for row in references.of(PositionRow):
-        given = np.array([np.nan if value is None else value for value in row.xyz_mm])
-
-        def stated(modelled: Vector, T: Vector, given: Vector = given) -> Vector:
-            return given if np.isnan(given).all() else np.where(np.isnan(given), modelled, given)
-
-        yield _Look(row.source, row.grade, row.group, model.NamedPose(row.name), row.point, row.pose, stated)
-
-
-def _corners(references: ReferenceSet) -> Iterator[_Look]:
-    corners: dict[tuple[str, tuple[float, float]], list[EnvelopeRow]] = {}
-    for row in references.of(EnvelopeRow):
-        if row.corner_deg is not None:
-            corners.setdefault((row.source, row.corner_deg), []).append(row)
-    for (source, (q2, q3)), rows in corners.items():
-        labels = {row.quantity[-1]: (row.value_mm, row.quantity == "abs_x") for row in rows}
-
-        def stated(modelled: Vector, T: Vector, labels: dict[str, tuple[float, bool]] = labels) -> Vector:
-            origin = np.array([T[0, 0, 3], 0.0, T[1, 2, 3]]) * quantities.MM
-            point = modelled.copy()
-            for coordinate, (value, unsigned) in labels.items():
-                k = "xyz".index(coordinate)
-                sign = np.sign(modelled[k] - origin[k]) if unsigned else 1.0
-                point[k] = origin[k] + sign * value
-            return point
-
-        pose = (0.0, q2, q3, 0.0, 0.0, 0.0)
-        yield _Look(source, rows[0].grade, "envelope", DrawingCorner(q2, q3, None), "wrist_centre", pose, stated)
-
-
-def _extremes(references: ReferenceSet, extremes: Extremes) -> Iterator[_Look]:
-    for reference, expected in zip(references.checkable, expected_of(references.checkable)[0]):
-        subject, quantity = reference.subject, reference.quantity
-        if isinstance(subject, Reach | DrawingExtent) and isinstance(
-            quantity, quantities.AxisDistance | quantities.SectionExtent
-        ):
-            value, q = extremes[quantity]
-            stated = partial(_extreme_as_stated, quantity, float(expected), value)
-            pose = tuple(np.degrees(q).tolist())
-            yield _Look(reference.source, reference.grade, reference.group, subject, quantity.point, pose, stated)
-
-
-def _extreme_as_stated(
-    quantity: quantities.AxisDistance | quantities.SectionExtent,
-    expected: float,
-    value: float,
-    modelled: Vector,
-    T: Vector,
-) -> Vector:
-    """The model's point shifted to where its extreme would be the stated one."""
-    if isinstance(quantity, quantities.SectionExtent):
-        shift = np.zeros(3)
-        shift["xyz".index(quantity.coordinate)] = 1.0
-        return modelled + shift * (expected - value)
-    foot = quantities.nearest_on_axis(T, quantity.axis, modelled)
-    return foot + (modelled - foot) * (expected / value) if value > 0 else modelled
 
 
 SIX = 6
@@ -233,6 +107,30 @@ ALWAYS_SEARCHED = (
 )
 
 
+def _checked(
+    robot: Robot, sets: list[ReferenceSet], values: Mapping[quantities.Quantity, float], circles: CirclePoints
+) -> tuple[list[model.Check], list[model.Conflict]]:
+    """Checks of the table alone and against each set, and what the sets contradict each other about.
+
+    ``values`` : extremes over the joint limits, mm.
+    """
+    checks, conflicts = table_checks(robot), list[model.Conflict]()
+    for references in sets:
+        asked = quantities_of(references.checkable)
+        state = state_of(robot, asked, extremes=values, axes=circles.axes)
+        bases = (
+            bases_of(robot, references.checkable, references.documents)
+            if is_turning(robot)
+            else undeclared_bases(references.checkable)
+        )
+        judged, contradictions = checks_of_set(
+            references, read(asked, state), bases, robot.slides, 1000 * size_of(robot)
+        )
+        checks += judged
+        conflicts += contradictions
+    return checks, conflicts
+
+
 def compute(study: Study, name: str) -> model.ValidationResults:
     """Check a robot's model, and say what is most likely wrong with it."""
     robot = model.model_of(study, name)
@@ -244,36 +142,22 @@ def compute(study: Study, name: str) -> model.ValidationResults:
     stated = [quantity for references in sets for quantity in quantities_of(references.checkable)]
     sought = [quantity for quantity in stated if isinstance(quantity, quantities.Extreme)]
     wanted = dict.fromkeys([*always_searched(robot), *sought])
-    extremes = {quantity: search(robot, quantity, settings.reach_starts) for quantity in wanted}
-    values: dict[quantities.Quantity, float] = {quantity: value for quantity, (value, _) in extremes.items()}
-
+    values: dict[quantities.Quantity, float] = {
+        quantity: search(robot, quantity, settings.reach_starts)[0] for quantity in wanted
+    }
     circles = circle_points(robot)
-    checks, conflicts = table_checks(robot), list[model.Conflict]()
-    for references in sets:
-        asked = quantities_of(references.checkable)
-        state = state_of(robot, asked, extremes=values, axes=circles.axes)
-        bases = (
-            bases_of(robot, references.checkable, references.documents)
-            if turning
-            else undeclared_bases(references.checkable)
-        )
-        judged, contradictions = checks_of_set(
-            references, read(asked, state), bases, robot.slides, 1000 * size_of(robot)
-        )
-        checks += judged
-        conflicts += contradictions
+    checks, conflicts = _checked(robot, sets, values, circles)
     checks += _without_reference(robot, values, checks)
     trip_checks, trips = round_trip_checks(robot, settings.round_trips, study.seed)
     checks += trip_checks
 
-    axes, poses = axes_table(circles, sets), key_poses_table(robot, sets, extremes)
-    diagnoses, residuals = diagnose_sets(robot, sets if turning else [])
+    axes, poses = axes_table(circles, sets), key_poses_table(robot, sets)
+    diagnoses = diagnose_sets(robot, sets if turning else [])
     found = {each.reference_set: each for each in diagnoses}
     summaries = set_summaries(robot, sets, checks, poses, found)
     reaches = {"wrist_centre_reach": WRIST_REACH, "flange_reach": FLANGE_REACH}
     reach = {name: values[quantity] for name, quantity in reaches.items() if quantity in values}
     evidence = evidence_of_table(robot, sets) if turning else None
-    counts = counts_of(checks)
     summary = model.ValidationSummary(
         verdict=verdict_of(checks, conflicts, summaries, found, evidence),
         figures=key_figures(checks, axes, summaries, reach, trips),
@@ -281,11 +165,9 @@ def compute(study: Study, name: str) -> model.ValidationResults:
         conflicts=tuple(conflicts),
         sets=summaries,
         diagnoses=diagnoses,
-        circle_points=_rounded(circles),
         table=model.TableFacts(robot.convention, wrist_partition_missing(robot)),
         round_trips=trips,
-        section_origin_mm=_section_origin_mm(robot),
-        counts=counts,
+        counts=counts_of(checks),
         evidence=evidence,
         not_examined=(
             *_left_out(settings, checks, diagnoses if turning else None, trips, evidence),
@@ -297,8 +179,6 @@ def compute(study: Study, name: str) -> model.ValidationResults:
         checks=model.Checks.of_records(checks),
         axes=axes,
         key_poses=poses,
-        section=section_table(robot, extremes) if turning and robot.rows == SIX else model.Section.empty(),
-        residuals=residuals,
     )
 
 
@@ -396,14 +276,3 @@ def _without_reference(
         for subject, distance in subjects.items()
         if subject not in stated
     ]
-
-
-def _rounded(circles: CirclePoints) -> model.Circles:
-    radius, roundness = circles.radius_mm.round(SHOWN_DECIMALS), circles.roundness_mm.round(SHOWN_DECIMALS)
-    return stated(model.Circles, circles, radius_mm=radius, roundness_mm=roundness)
-
-
-def _section_origin_mm(robot: Robot) -> tuple[float, float]:
-    """Where axis 1 (x) and axis 2 (z) are in the base frame, which is the workspace drawing's origin."""
-    zero = state_of(robot, ()).at(quantities.ZERO_POSE)
-    return float(zero[0, 0, 3] * quantities.MM), float(zero[1, 2, 3] * quantities.MM)

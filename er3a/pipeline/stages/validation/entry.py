@@ -30,4 +30,5 @@ STAGE = Stage(
     question=N_("Does the table match the manufacturer's data?"),
     settings={"validation": ValidationSettings},
     inputs=_inputs,
+    views=("report",),
 )

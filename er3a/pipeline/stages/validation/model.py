@@ -22,7 +22,7 @@ from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.study import Study
 from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_joint, vector
 from er3a.references.quantities import NotOfArm
-from er3a.references.subjects import DrawingCorner, DrawingExtent, Reach, ReferenceSubject, Subject
+from er3a.references.subjects import ReferenceSubject, Subject
 from er3a.robots.robot import AUTHORITATIVE_GRADES, Grade, Robot
 
 ModelGroup = Literal["table_sanity", "round_trips"]
@@ -60,9 +60,6 @@ class NamedPose(Finding):
     """A pose by the name that its source gives it."""
 
     name: str
-
-
-KeyPose = NamedPose | DrawingCorner | DrawingExtent | Reach
 
 
 class NotInRobotFile(Finding):
@@ -423,19 +420,6 @@ class SetDiagnosis:
     corrected: CorrectedTable | None
 
 
-class Residuals(Table):
-    """Residuals before and after the best hypothesis, worst first, for sets with something to explain."""
-
-    reference_set: Texts = column("name of the reference set")
-    source: Texts = column("source of the reference")
-    group: Texts = column("group of the reference")
-    subject: Findings = findings("what the reference is about; coordinates of one point together", ReferenceSubject)
-    unit: Texts = column("unit of the three numbers")
-    before: Reals = column("difference between model and reference")
-    after: Reals = column("the same with the best hypothesis corrected")
-    uncertainty: Reals = column("half-width of the interval that the source leaves open")
-
-
 @dataclass(frozen=True)
 class SetSummary:
     """What was found against one reference set.
@@ -466,15 +450,6 @@ class SetSummary:
     def failed(self) -> int:
         """Checks that the verdict rests on and that fail."""
         return self.counts.independent.failed + self.counts.consistency.failed
-
-
-@dataclass(frozen=True)
-class Circles:
-    """The point that the flange carries for circle point analysis (in its frame), and its tracks, joint by joint."""
-
-    offset_mm: tuple[float, ...]
-    radius_mm: tuple[float, ...]
-    roundness_mm: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -536,7 +511,6 @@ class ValidationSummary(Summary):
 
     Attributes
     ----------
-    section_origin_mm : where the workspace drawing has its origin, x of axis 1 and z of axis 2 in the base frame
     counts : checks against references by what they rest on
     evidence : None where no reference speaks about the table
     """
@@ -546,10 +520,8 @@ class ValidationSummary(Summary):
     conflicts: tuple[Conflict, ...]
     sets: tuple[SetSummary, ...]
     diagnoses: tuple[SetDiagnosis, ...]
-    circle_points: Circles
     table: TableFacts
     round_trips: RoundTripErrors | None
-    section_origin_mm: tuple[float, float]
     counts: CheckCounts
     evidence: TableEvidence | None
 
@@ -606,30 +578,18 @@ class Axes(Table):
 
 
 class KeyPoses(Table):
-    """Poses at which references look at the arm, the zero pose first, with the stated point and the model's (base
-    frame)."""
+    """Poses at which references state a point, the zero pose first, with that point and the model's (base frame)."""
 
     reference_set: Texts = column("reference set")
     source: Texts = column("source of the point")
     grade: Texts = column("grade of the source")
     group: Texts = column("group of the references")
-    pose: Findings = findings("the pose", KeyPose)
+    pose: Findings = findings("the pose", NamedPose)
     point: Texts = column("flange or wrist_centre")
     q_deg: Reals = per_joint("joint angle")
     point_mm: Reals = vector("{}_mm", "stated point, with the model's coordinate where none is stated")
     model_point_mm: Reals = vector("model_{}_mm", "the model's point")
     deviation_mm: Reals = column("distance of the two points")
-
-
-class Section(Table):
-    """The wrist centre in the side view (joint 1 at 0) over a grid of joints 2 and 3 within their limits."""
-
-    q2_deg: Reals = column("joint 2")
-    q3_deg: Reals = column("joint 3")
-    x_mm: Reals = column("distance from axis 1 along x")
-    z_mm: Reals = column("height over axis 2")
-    on_q2_line: Flags = column("on a line of constant q2 where the region can end")
-    on_q3_line: Flags = column("on a line of constant q3 where the region can end")
 
 
 class ValidationResults(Results[ValidationSummary]):
@@ -638,8 +598,6 @@ class ValidationResults(Results[ValidationSummary]):
     checks: Checks
     axes: Axes
     key_poses: KeyPoses
-    section: Section
-    residuals: Residuals
 
 
 RESULTS = ValidationResults

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -19,9 +18,8 @@ from er3a.files.hand_eye_file import HandEyeFile, SeenImages, read_calibration
 from er3a.files.vision_file import ObjectEntry, VisionFile, load_vision
 from er3a.files.yaml_file import load
 from er3a.geometry.transforms import inverted, quaternion_of, rpy_of
-from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.forward import forward
-from er3a.numerics.arrays import Flags, Reals
+from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import from_si, stated
 from er3a.pipeline.results import Figure, LeftOut, LeftOutSubject, Verdict
 from er3a.pipeline.settings import TrajectorySettings
@@ -48,77 +46,12 @@ from er3a.robots.joint_limits import joint_columns, meant, shown, speeds_given
 from er3a.robots.robot import Robot
 from er3a.vision.boards import ambiguous_tilts, projected
 from er3a.vision.calibration_set import CalibrationSet, TimeOffset
+from er3a.vision.field_of_view import in_sight
 from er3a.vision.grasp_motion import DEPTH, PARTS, GraspLeg
 from er3a.vision.grasping import ChosenGrasp, DetectedObject, GraspNeeds, GraspPlan, GraspTask, plan_grasp
-from er3a.vision.hand_eye import HandEye, TouchCheck, calibrate_hand_eye, spread_of
-from er3a.vision.joint_zeros import zeros_tried
-from er3a.vision.next_view import FieldOfView, in_sight, next_view
+from er3a.vision.hand_eye import HandEye, TouchCheck, calibrate_hand_eye, spread_of, zeros_tried
 from er3a.vision.point_error import ArmAccuracy, SeenPoseError, error_sizes, seen_pose, seen_pose_error
 from er3a.vision.vision_findings import HandEyeError, TouchContradicts, grave_warnings
-
-MARGIN = 0.25  # of the objects' extent
-MIN_HALF = 0.2  # m, to each side of the objects' middle
-NO_BOARD = [1.0, 1.0]
-
-
-@dataclass(frozen=True, eq=False)
-class MapTask:
-    """What the map is of.
-
-    Attributes
-    ----------
-    T_base_camera : (4, 4), where the objects were seen from; picture : (n,), rad, of an arm that carries the camera
-    places : (k, 4, 4), T_base_object; T_object_tool : (4, 4), the grasp that is held everywhere, as of the first object
-    camera_covariance : (6, 6), m and rad, of one reading
-    """
-
-    robot: Robot
-    home: Reals
-    accuracy: ArmAccuracy
-    T_base_camera: Reals
-    picture: Reals | None
-    view: FieldOfView
-    places: Reals
-    T_object_tool: Reals
-    camera_covariance: Reals
-    cells: int
-
-
-def error_map(found: HandEye, task: MapTask) -> model.ErrorMapRows:
-    """Errors on a square around the objects, of the first object's grasp held at each cell."""
-    middle = task.places[:, :3, 3].mean(axis=0)
-    half = max(MIN_HALF, (1 + MARGIN) * float(np.abs(task.places[:, :2, 3] - middle[:2]).max()))
-    steps = np.linspace(-half, half, task.cells)
-    x, y = (part.ravel() for part in np.meshgrid(middle[0] + steps, middle[1] + steps))
-    points = np.tile(task.places[0], (len(x), 1, 1))
-    points[:, :3, 3] = np.column_stack([x, y, np.full(len(x), middle[2])])
-    seen = inverted(task.T_base_camera) @ points
-    q, reached = _held(task, points @ task.T_object_tool)
-    covariance = np.broadcast_to(task.camera_covariance, (len(x), 6, 6))
-    parts = seen_pose_error(found, seen, covariance, task.accuracy, (task.robot, q, task.picture))
-    together = np.where(reached, np.stack(error_sizes(parts.whole)), np.nan)
-    return model.ErrorMapRows(
-        x_mm=1000 * x,
-        y_mm=1000 * y,
-        in_view=in_sight(task.view, seen[:, :3, 3]),
-        reached=reached,
-        calibration_mm=1000 * error_sizes(parts.calibration)[0],
-        arm_mm=np.where(reached, 1000 * error_sizes(parts.repeatability + parts.table)[0], np.nan),
-        together_mm=1000 * together[0],
-        together_deg=np.degrees(together[1]),
-    )
-
-
-def _held(task: MapTask, tools: Reals) -> tuple[Reals, Flags]:
-    """Joint angles (N, n) within the limits, nearest to where the arm waits, and whether there are any (N,)."""
-    solved = inverse_batch(task.robot, tools, task.home)
-    good = solved.solved & solved.within_limits
-    far = np.where(good, np.abs(np.nan_to_num(solved.q) - task.home).max(axis=-1), np.inf)
-    best = far.argmin(axis=1)
-    reached: Flags = np.asarray(good.any(axis=1))
-    q = np.where(reached[:, None], solved.q[np.arange(len(tools)), best], task.home)
-    return q, reached
-
 
 LONGEST_NAME = 24
 GRIPPER_S = 1.0
@@ -207,21 +140,9 @@ def _closes(before: GraspLeg, after: GraspLeg) -> bool:
     return before.part == "approach" and after.part == "retreat"
 
 
-def _view_to_add(
-    robot: Robot, found: HandEye, file: VisionFile, board_mm: list[float] | None, *, scene: Scene | None, seed: int
-) -> model.ViewToAdd | None:
-    """The pose to record next; None where the board's size is not known or no pose is found."""
-    if not board_mm:
-        return None
-    middle = np.mean([each.pose()[:3, 3] for each in file.objects], axis=0)
-    view = next_view(robot, found, file.view.view(board_mm), middle, scene, seed)
-    return stated(model.ViewToAdd, view, q_deg=shown(robot, view.q)) if view else None
-
-
 def calibration_result(
     head: HandEyeFile,
     found: HandEye,
-    view: model.ViewToAdd | None,
     offset: TimeOffset | None,
     images: SeenImages | None,
 ) -> model.CalibrationResult:
@@ -248,7 +169,6 @@ def calibration_result(
         moved_mm=from_si("mm", moved),
         moved_deg=from_si("deg", tilted),
         touch=_touch(found),
-        next_view=view,
         time_offset=stated(model.OffsetResult, offset) if offset else None,
         open_tilts=ambiguous_tilts(images.views, found.samples.names) if images else (),
         boardless=boardless,
@@ -312,7 +232,6 @@ def corner_rows(found: HandEye, images: SeenImages | None) -> model.CornerRows:
 
 
 STAGE_NAME = "vision"
-VIEW_STREAM = 0
 LEG_ROWS = 13
 
 Found = (
@@ -333,38 +252,30 @@ def compute(study: Study, name: str) -> model.VisionResults:
     samples, offset, images = read_calibration(head_path, robot)
     title = scene.title if scene else None
     settings, motions = study.section(VisionSettings), study.section(TrajectorySettings)
+    bodies, frames = bodies_of(robot, scene), _open_frames(samples, head)
+    of_motions = (*frames, *GRASPS_REST_ON, *_left_out_of_motions(robot, bodies, scene, motions))
     try:
         with_zeros = zeros_tried(calibrate_hand_eye(samples), robot)
     except HandEyeError as error:
-        verdict: Verdict[Found] = Verdict("fail", model.CalibrationImpossible(error.finding))
         left_out = (
             _no_grasps(task_file),
             *_left_out_of_file(task_file),
             *left_out_of_calibration(samples, head, offset, images),
-            *_open_frames(samples, head),
-            *GRASPS_REST_ON,
-            *_left_out_of_motions(robot, bodies_of(robot, scene), scene, motions),
+            *of_motions,
         )
-        summary = model.VisionSummary(verdict, (), task_file.title, title, settings.least_success, None, ())
-        return _without_calibration(replace(summary, not_examined=left_out))
+        return _without_calibration(error, task_file, title, settings, left_out)
     found = with_zeros[0]
     picture = None if head.setup == "eye_to_hand" else meant(robot, np.array(task_file.picture_deg))
     camera = _camera_at(robot, found, picture)
     places = {each.name: camera @ each.pose() for each in task_file.objects}
-    seed = study.seed + VIEW_STREAM
-    to_add = _view_to_add(robot, found, task_file, head.board_mm, scene=scene, seed=seed)
-    calibration = calibration_result(head, found, to_add, offset, images)
-    doubt, frames = _doubt(calibration, found.touch), _open_frames(samples, head)
-    planned = []
-    if not doubt:
-        limits = (limits_of(robot, motions), study.seed)
-        planned = _planned(robot, task_file, found, scene, (settings, picture), limits)
+    calibration = calibration_result(head, found, offset, images)
+    doubt = _doubt(calibration, found.touch)
+    limits = (limits_of(robot, motions), study.seed)
+    planned = [] if doubt else _planned(robot, task_file, found, scene, (settings, picture), limits)
     objects = tuple(_object(robot, entry, places[entry.name], plan, error) for entry, plan, error in planned)
     shapes = _shapes(robot, objects, study.assumed_margin(name))
     near = shapes.near if shapes else ()
     judged = Verdict[Found]("fail", doubt) if doubt else verdict_of(calibration, objects, near)
-    bodies = bodies_of(robot, scene)
-    ways = _all_ways(robot, planned)
     summary = model.VisionSummary(
         verdict=judged.without(bodies.in_error).resting_on(shapes),
         figures=figures_of(calibration, objects, near),
@@ -377,41 +288,16 @@ def compute(study: Study, name: str) -> model.VisionResults:
             *((_no_grasps(task_file),) if doubt else ()),
             *_left_out_of_file(task_file),
             *left_out_of_calibration(samples, head, offset, images, with_zeros, task_file.gripper.tolerance_mm),
-            *frames,
-            *GRASPS_REST_ON,
-            *_left_out_of_motions(robot, bodies, scene, motions),
+            *of_motions,
             *left_out_in_solids(scene, _places(robot, task_file, found, picture)),
         ),
     )
-    home = meant(robot, np.array(task_file.home_deg))
-    speed, languages, is_open = limits_of(robot, motions).speed, motions.programs, bool(frames)
-    written = partial(grasp_programs, speed=speed, languages=languages, simulated=head.simulated, frames_open=is_open)
     return model.VisionResults(
         summary,
         sample_rows(found, robot),
-        error_map(found, _map_task(robot, task_file, head, camera, picture, settings.map_cells)),
-        ways,
-        model.GraspPrograms.stacked(
-            written(robot, entry.name, home, plan.chosen) for entry, plan, _ in planned if plan.chosen
-        ),
+        _all_ways(robot, planned),
+        _all_programs(robot, task_file, planned, motions, (head.simulated, bool(frames))),
         corner_rows(found, images),
-    )
-
-
-def _map_task(
-    robot: Robot, file: VisionFile, head: HandEyeFile, camera: Reals, picture: Reals | None, cells: int
-) -> MapTask:
-    return MapTask(
-        robot=robot,
-        home=meant(robot, np.array(file.home_deg)),
-        accuracy=file.arm.accuracy(),
-        T_base_camera=camera,
-        picture=picture,
-        view=file.view.view(head.board_mm or NO_BOARD),
-        places=np.array([camera @ each.pose() for each in file.objects]),
-        T_object_tool=file.objects[0].grasps[0].grasp().T_object_tool,
-        camera_covariance=np.mean([each.standard_deviation.covariance() for each in file.objects], axis=0),
-        cells=cells,
     )
 
 
@@ -433,12 +319,34 @@ def _rates_given(motions: TrajectorySettings) -> tuple[bool, bool]:
     return motions.acceleration_deg_s2 is not None, motions.jerk_deg_s3 is not None
 
 
-def _without_calibration(summary: model.VisionSummary) -> model.VisionResults:
-    """What is written where the samples allow no calibration: no rows."""
+def _all_programs(
+    robot: Robot, file: VisionFile, planned: Planned, motions: TrajectorySettings, open_points: tuple[bool, bool]
+) -> model.GraspPrograms:
+    """The programs of all grasps; ``open_points``: whether the camera is simulated, and its frames are open."""
+    home, (simulated, frames_open) = meant(robot, np.array(file.home_deg)), open_points
+    write = partial(
+        grasp_programs,
+        speed=limits_of(robot, motions).speed,
+        languages=motions.programs,
+        simulated=simulated,
+        frames_open=frames_open,
+    )
+    return model.GraspPrograms.stacked(
+        write(robot, entry.name, home, plan.chosen) for entry, plan, _ in planned if plan.chosen
+    )
+
+
+def _without_calibration(
+    error: HandEyeError, file: VisionFile, scene: str | None, settings: VisionSettings, left_out: tuple[LeftOut, ...]
+) -> model.VisionResults:
+    """What is written where the samples allow no calibration: why, and no rows."""
+    verdict: Verdict[Found] = Verdict("fail", model.CalibrationImpossible(error.finding))
+    summary = model.VisionSummary(
+        verdict, (), file.title, scene, settings.least_success, None, (), not_examined=left_out
+    )
     return model.VisionResults(
         summary,
         model.SampleRows.empty(),
-        model.ErrorMapRows.empty(),
         model.PathRows.empty(),
         model.GraspPrograms.empty(),
         model.CornerRows.empty(),
@@ -448,7 +356,7 @@ def _without_calibration(summary: model.VisionSummary) -> model.VisionResults:
 def _left_out_of_file(file: VisionFile) -> Iterator[LeftOut]:
     """What the file of the cell leaves open whatever the samples say: objects out of view, errors of the arm."""
     places = np.array([each.pose()[:3, 3] for each in file.objects])
-    seen = in_sight(file.view.view(NO_BOARD), places)
+    seen = in_sight(file.view.view(), places)
     if hidden := tuple(each.name for each, visible in zip(file.objects, seen) if not visible):
         yield LeftOut("objects_out_of_view", hidden)
     if not file.arm.states_all:

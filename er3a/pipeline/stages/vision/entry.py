@@ -43,7 +43,7 @@ class VisionSettings(StrictModel):
 
     ``least_limit_margin_deg`` : of joints from their limits, mm of a prismatic joint.
     ``least_singular_value`` : of the Jacobian with lengths divided by the wrist's reach. ``least_success`` : the
-    probability of success below which an object is not graspable. ``map_cells`` : cells across the map of errors.
+    probability of success below which an object is not graspable.
     ``line_speed_mm_s`` : the tool's maximum speed on approach and retreat. Limits of the joints' rates, and the
     languages in which grasps are written as programs, are those of ``trajectory``.
     """
@@ -53,7 +53,6 @@ class VisionSettings(StrictModel):
     least_limit_margin_deg: Annotated[float, Field(ge=0, le=90)] = 2.0
     least_singular_value: Annotated[float, Field(ge=0, le=1)] = 0.02
     least_success: Annotated[float, Field(ge=0, le=1)] = 0.95
-    map_cells: Annotated[int, Field(ge=4, le=200)] = 30
     line_speed_mm_s: Annotated[float, Field(gt=0, le=10_000)] = 100.0
 
 
@@ -69,6 +68,7 @@ STAGE = Stage(
     settings={"vision": VisionSettings, "trajectory": TrajectorySettings},
     inputs=_inputs,
     is_configured=lambda study, robot: study.entry(robot).vision is not None,
+    views=("report",),
     rests_on=("validation",),
     obstacles=True,
     motions=N_("grasps"),

@@ -17,7 +17,6 @@ from er3a.vision.vision_findings import (
     CalibrationWarning,
     GraspOutcome,
     NotCalibratable,
-    RepeatedPose,
     Suspect,
     TouchContradicts,
 )
@@ -98,18 +97,6 @@ class TouchResult:
 
 
 @dataclass(frozen=True)
-class ViewToAdd:
-    """The pose to record next; errors that 95 % of calibrations stay below, where the objects are."""
-
-    q_deg: tuple[float, ...]
-    clearance_mm: float | None
-    error_before_mm: float
-    error_after_mm: float
-    tried: int
-    in_view: int
-
-
-@dataclass(frozen=True)
 class OffsetResult:
     """The camera's clock plus this is the arm's, with half its 95 % interval; ``unused``: poses without a sample."""
 
@@ -159,7 +146,6 @@ class CalibrationResult:
     moved_mm: float | None
     moved_deg: float | None
     touch: TouchResult | None
-    next_view: ViewToAdd | None
     time_offset: OffsetResult | None
     open_tilts: tuple[AmbiguousTilt, ...] = ()
     boardless: tuple[BoardlessImage, ...] = ()
@@ -170,7 +156,7 @@ class CalibrationResult:
     @property
     def rejected(self) -> tuple[str, ...]:
         """The samples that contradict the others, so that the calibration does not use them."""
-        return tuple(each.sample for each in self.suspects if not isinstance(each, RepeatedPose))
+        return tuple(each.sample for each in self.suspects)
 
 
 @dataclass(frozen=True)
@@ -285,22 +271,6 @@ class CornerRows(Table):
     by_arm_px: Reals = vector("by_arm_{}_px", "where the arm and the calibration put it", parts="xy")
 
 
-class ErrorMapRows(Table):
-    """Errors of the first object's grasp, held at each cell of a square at the objects' mean height.
-
-    What 95 % of errors stay below; NaN where the arm doesn't reach.
-    """
-
-    x_mm: Reals = column("position in the base's frame")
-    y_mm: Reals = column("position in the base's frame")
-    in_view: Flags = column("whether the camera sees it")
-    reached: Flags = column("whether the arm reaches it with that grasp, within its limits")
-    calibration_mm: Reals = column("distance, from the calibration alone")
-    arm_mm: Reals = column("distance, from the arm's repeatability and table alone")
-    together_mm: Reals = column("distance, from camera's noise, calibration, repeatability and table")
-    together_deg: Reals = column("turn, from all of them")
-
-
 class PathRows(Table):
     """Joint angles along the way to each object grasped, and away from it."""
 
@@ -324,7 +294,6 @@ class VisionResults(Results[VisionSummary]):
     """The stage's results; without a calibration the tables are empty."""
 
     samples: SampleRows
-    error_map: ErrorMapRows
     ways: PathRows
     programs: GraspPrograms
     corners: CornerRows

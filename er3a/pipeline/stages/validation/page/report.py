@@ -240,7 +240,6 @@ def _math(content: Markup) -> Markup:
 
 
 SHOWN_FAILURES = 12
-REVERSED_DEG = 135
 SEGMENTS = {
     "upper_arm": N_("the upper arm stands {measured}° from the vertical where {expected}° is stated"),
     "forearm": N_("the forearm stands {measured}° from the vertical where {expected}° is stated"),
@@ -254,7 +253,6 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
     judged = [check for check in checks if not isinstance(check, model.Unjudged)]
     failed = [check for check in judged if check.status == "fail"]
     failed.sort(key=lambda check: check.tolerances_off, reverse=True)
-    labels = results.key_poses.take(results.key_poses.group == "envelope")
     drawn = _drawn_axes(results.axes)
     source = robot.sources.get("dh")
     contradicted = summary.verdict.status == "fail"
@@ -274,7 +272,7 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
         frames=_frames_picture(robot, summary),
         formulas=formulas(robot),
         sets=[_set_story(found, judged, results.key_poses) for found in summary.sets],
-        diagnoses=validation_figures.diagnosis_stories(summary, results.residuals),
+        diagnoses=validation_figures.diagnosis_stories(summary),
         corrected=text,
         corrected_address=text_address(text),
         groups=group_rows(judged),
@@ -288,9 +286,6 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
         conflicts=[(say(conflict.subject), conflict) for conflict in summary.conflicts],
         blanks=[blank_row(check) for check in checks if isinstance(check, model.Unjudged)],
         side=_side_picture(robot, drawn, summary),
-        deviation=_deviation_picture(drawn) if len(drawn) else None,
-        drawing=_drawing_picture(results.section, labels, summary) if len(labels) else None,
-        labels=_label_rows(labels, judged),
         table_source=source and (own_title(source.source), word("grade", GRADES, source.grade)),
         convention=word("convention", CONVENTIONS, robot.convention),
         grade_names={grade: word("grade", GRADE_NAMES, grade) for grade in GRADE_NAMES},
@@ -418,48 +413,3 @@ def _side_picture(robot: Robot, drawn: model.Axes, summary: model.ValidationSumm
             caption = joined([caption, correction], " ")
     alt = tr("Side view of the zero pose: links and joint axes of the model, and the axes that references state.")
     return Picture(validation_figures.side_view(robot, drawn, corrected, label), alt, caption)
-
-
-def _deviation_picture(axes: model.Axes) -> Picture:
-    off = axes.take(axes.is_off)
-    if len(off):
-        caption = tr("Outside the source's uncertainty: {joints}.", joints=_joints(off))
-        turned = off.take(off.angle_deg > REVERSED_DEG)
-        if len(turned):
-            caption = joined([caption, tr("Turning the other way: {joints}.", joints=_joints(turned))], " ")
-    else:
-        caption = tr("No axis is outside its source's uncertainty (outlined boxes).")
-    alt = tr("Bars per joint and source: distance and angle between the model's axis and the stated one.")
-    return Picture(validation_figures.axis_deviation(axes), alt, caption)
-
-
-def _joints(axes: model.Axes) -> str:
-    return joined((f"J{joint}" for joint in np.unique(axes.joint)), ", ")
-
-
-def _label_rows(labels: model.KeyPoses, checks: Iterable[Judged]) -> list[list[str]]:
-    """The drawing's labels with the numbers that they have in the figure."""
-    numbers = {pose: place for place, pose in reversed(list(enumerate(labels.pose, 1)))}
-    rows = []
-    for check in checks:
-        if check.group == "envelope":
-            values = [fixed(check.expected, 1), fixed(check.measured, 2), fixed(check.difference, 2)]
-            place = numbers[check.subject.whole]
-            rows.append((place, [str(place), say(check.subject), *values, _tolerance(check)]))
-    return [row for _, row in sorted(rows, key=lambda row: row[0])]
-
-
-def _drawing_picture(section: model.Section, labels: model.KeyPoses, summary: model.ValidationSummary) -> Picture:
-    missed = [check for check in summary.checks if check.group == "envelope" and check.status == "fail"]
-    worst = fixed(labels.deviation_mm.max(), 2)
-    caption = (
-        tr(
-            "The manufacturer's labels lie on the region's edge, off by {worst} mm at most: lengths, limits of J2 and "
-            "J3 and the signs of both joints agree with the drawing.",
-            worst=worst,
-        )
-        if not missed
-        else sentence("labels_missed", count=len(missed), worst=worst)
-    )
-    alt = tr("Region that the wrist centre sweeps with joints 2 and 3, and the drawing's labels, numbered.")
-    return Picture(validation_figures.workspace_drawing(section, labels, summary.section_origin_mm), alt, caption)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes as PlotAxes
-from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
 from er3a.diagnosis.conclusions import MainFault, MostLikelyFault
@@ -18,18 +17,16 @@ from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import N_, own_title, tr
 from er3a.pipeline.messages.diagnosis import both
 from er3a.pipeline.messages.numbers import fixed
-from er3a.pipeline.messages.say import bracketed, joined, say, sentence
+from er3a.pipeline.messages.say import joined, say, sentence
 from er3a.pipeline.stages.validation import model
-from er3a.pipeline.viewing.figures import axis_label, equal_scale, new_figure
-from er3a.pipeline.viewing.page import Picture
-from er3a.pipeline.viewing.palette import GRID, HIGHLIGHT, INK, LINK, MODEL, MUTED, REFERENCE
+from er3a.pipeline.viewing.figures import equal_scale, new_figure
+from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, LINK, MODEL, MUTED, REFERENCE
 from er3a.references.quantities import nearest_on_axis, point_of
 from er3a.robots.robot import Robot
 
 REFERENCE_COLOURS = (REFERENCE, HIGHLIGHT)
 MARKERS = (("o", 13), ("s", 18), ("D", 22))
 SEEN_END_ON = 0.9
-REGION = "#dcebf5"
 HAIR = 0.9
 
 
@@ -64,71 +61,6 @@ def side_view(robot: Robot, stated: model.Axes, corrected: Robot | None, correct
     equal_scale(axes, "x (mm)", "z (mm)")
     axes.margins(0.12)
     figure.legend(loc="outside lower left", ncols=1)
-    return figure
-
-
-def axis_deviation(stated: model.Axes) -> Figure:
-    """Per joint and source: how far the model's axis is off the stated one, in mm and in degrees."""
-    figure, panels = new_figure(1, 2, width=9, height=4)
-    sources = _by_source(stated)
-    width = 0.8 / len(sources)
-    for axes, value, bound, label in zip(
-        panels,
-        (stated.distance_mm, stated.angle_deg),
-        (stated.uncertainty_mm, stated.uncertainty_deg),
-        (axis_label(stated, "distance_mm"), axis_label(stated, "angle_deg")),
-    ):
-        for k, (source, _) in enumerate(sources):
-            own = stated.source == source
-            at = stated.joint[own] + (k - (len(sources) - 1) / 2) * width
-            axes.bar(at, value[own], width * 0.9, color=REFERENCE_COLOURS[k % len(REFERENCE_COLOURS)])
-            axes.bar(at, bound[own], width * 0.9, facecolor="none", edgecolor=INK, linewidth=0.8)
-        axes.set_ylabel(label)
-        last = int(max(6, stated.joint.max()))
-        axes.set_xticks(range(1, last + 1), [f"J{joint}" for joint in range(1, last + 1)])
-        axes.set_ylim(0, 1.15 * max(value.max(), bound.max()))
-        axes.grid(axis="x", visible=False)
-        axes.set_axisbelow(True)
-        for joint in np.unique(stated.joint):
-            own = stated.joint == joint
-            worst = value[own].max()
-            text = f"{worst:.0f}" if worst >= 10 else f"{worst:.2f}"
-            at = (joint, max(worst, bound[own].max()))
-            axes.annotate(text, at, (0, 2), textcoords="offset points", ha="center", fontsize=8)
-    for k, (source, _) in enumerate(sources):
-        panels[0].bar([0], [0], color=REFERENCE_COLOURS[k % len(REFERENCE_COLOURS)], label=_short(source))
-    panels[0].bar([0], [0], facecolor="none", edgecolor=INK, label=tr("uncertainty of the source"))
-    panels[0].set_xlim(0.4, 6.6)
-    figure.legend(loc="outside lower left", ncols=1)
-    return figure
-
-
-def workspace_drawing(section: model.Section, labels: model.KeyPoses, origin_mm: Sequence[float]) -> Figure:
-    """The side view of the wrist centre's region from the model, with the drawing's labels, numbered from 1."""
-    figure, axes = new_figure(width=9, height=8)
-    shape = (len(np.unique(section.q2_deg)), len(np.unique(section.q3_deg)))
-    x, z = section.x_mm.reshape(shape), section.z_mm.reshape(shape)
-    axes.pcolormesh(x, z, np.ones(shape), cmap=ListedColormap([REGION]), shading="gouraud", rasterized=True, zorder=1)
-    for i in np.flatnonzero(section.on_q2_line.reshape(shape).all(axis=1)):
-        axes.plot(x[i], z[i], color=MODEL, linewidth=1.4, zorder=2)
-    for j in np.flatnonzero(section.on_q3_line.reshape(shape).all(axis=0)):
-        axes.plot(x[:, j], z[:, j], color=MODEL, linewidth=1.4, zorder=2)
-    axes.axvline(0, color=GRID, linewidth=1.5, zorder=0)
-    axes.axhline(0, color=GRID, linewidth=1.5, zorder=0)
-    extent = max(np.ptp(x), np.ptp(z))
-    stated, modelled = (points[:, [0, 2]] - origin_mm for points in (labels.point_mm, labels.model_point_mm))
-    for number, at in enumerate(stated, 1):
-        outward = at / max(float(np.linalg.norm(at)), 1.0) * 0.07 * extent
-        axes.annotate(
-            str(number), at, at + outward, ha="center", va="center", fontsize=11, color=INK, zorder=5,
-            bbox={"boxstyle": "circle,pad=0.25", "facecolor": "white", "edgecolor": REFERENCE},
-            arrowprops={"arrowstyle": "-", "color": REFERENCE},
-        )  # fmt: skip
-        axes.plot(*at, "o", markersize=9, markerfacecolor="none", markeredgecolor=REFERENCE, zorder=4)
-        axes.plot(*modelled[number - 1], ".", color=MODEL, markersize=5, zorder=4)
-    margin = 0.12 * extent
-    axes.plot([x.min() - margin, x.max() + margin], [z.min() - margin, z.max() + margin], alpha=0)
-    equal_scale(axes, tr("x from axis 1 (mm)"), tr("z from axis 2 (mm)"))
     return figure
 
 
@@ -259,17 +191,15 @@ OWN_CLAIMS = N_(
     "robot: don't use the corrected table for one."
 )
 SHOWN_HYPOTHESES = 5
-SHOWN_RESIDUALS = 12
-MIN_DRAWN = 1e-3
 
 
-def diagnosis_stories(summary: model.ValidationSummary, residuals: model.Residuals) -> list[dict[str, Any]]:
-    """Per reference set: what the diagnosis says, the next-best hypotheses, and the residuals as a figure."""
+def diagnosis_stories(summary: model.ValidationSummary) -> list[dict[str, Any]]:
+    """Per reference set: what the diagnosis says, and the next-best hypotheses."""
     claims = {found.name for found in summary.sets if not found.is_authoritative}
-    return [_diagnosis_story(each, residuals, each.reference_set in claims) for each in summary.diagnoses]
+    return [_diagnosis_story(each, each.reference_set in claims) for each in summary.diagnoses]
 
 
-def _diagnosis_story(diagnosis: model.SetDiagnosis, residuals: model.Residuals, own_claims: bool) -> dict[str, Any]:
+def _diagnosis_story(diagnosis: model.SetDiagnosis, own_claims: bool) -> dict[str, Any]:
     named = isinstance(diagnosis.conclusion, MostLikelyFault | MainFault)
     best = diagnosis.hypotheses[0] if named else None
     return dict(
@@ -281,7 +211,6 @@ def _diagnosis_story(diagnosis: model.SetDiagnosis, residuals: model.Residuals, 
         else tr("The best hypotheses, none of which explains the data"),
         others=[_hypothesis_row(each) for each in diagnosis.hypotheses[1 if named else 0 : SHOWN_HYPOTHESES]],
         hypotheses_tried=diagnosis.hypotheses_tried,
-        picture=_residual_picture(residuals.take(residuals.reference_set == diagnosis.reference_set), diagnosis),
     )
 
 
@@ -301,44 +230,6 @@ def _measured_against(diagnosis: model.SetDiagnosis) -> str:
         )
         text = joined([text, tr(template, documents=joined(own))], " ")
     return text
-
-
-def residual_figure(rows: model.Residuals) -> Figure:
-    """Residuals before and after the best hypothesis, with each reference's uncertainty; worst on top."""
-    figure, axes = new_figure(width=9, height=1.5 + 0.32 * len(rows))
-    at = np.arange(len(rows))[::-1]
-    before, after = np.maximum(rows.before, MIN_DRAWN), np.maximum(rows.after, MIN_DRAWN)
-    axes.hlines(at, np.minimum(before, after), np.maximum(before, after), color=MUTED, linewidth=1.2)
-    axes.plot(before, at, "o", color=REFERENCE, label=tr("table as it is"))
-    axes.plot(after, at, "D", color=MODEL, markersize=5, label=tr("with the best hypothesis corrected"))
-    axes.plot(rows.uncertainty, at, "|", color=INK, markersize=13, label=tr("uncertainty of the reference"))
-    axes.set_xscale("log")
-    axes.set_yticks(at, [bracketed(say(subject), tr(unit)) for subject, unit in zip(rows.subject, rows.unit)])
-    axes.set_ylim(-0.7, len(rows) - 0.3)
-    axes.set_xlim(MIN_DRAWN / 1.5, 2 * max(before.max(), after.max()))
-    axes.grid(axis="y", visible=False)
-    axes.set_xlabel(tr("residual (mm or deg, as named; smaller ones are drawn at {least:g})", least=MIN_DRAWN))
-    figure.legend(loc="outside upper left", ncols=3)
-    return figure
-
-
-def _residual_picture(rows: model.Residuals, diagnosis: model.SetDiagnosis) -> Picture | None:
-    missed = rows.take((rows.before > rows.uncertainty) | (rows.after > rows.uncertainty))
-    if not len(missed):
-        return None
-    shown = missed.take(np.arange(len(missed)) < SHOWN_RESIDUALS)
-    still = int((missed.after > missed.uncertainty).sum())
-    if isinstance(diagnosis.conclusion, MostLikelyFault):
-        caption = tr("With the best hypothesis corrected, every number is within its reference's uncertainty.")
-    elif diagnosis.hypotheses:
-        caption = tr("Even the best hypothesis leaves {still} of {all} references missed.", still=still, all=len(rows))
-    else:
-        caption = tr("No hypothesis fits better than the table as it is.")
-    if len(missed) > len(shown):
-        more = tr("The figure shows the {drawn} largest of {missed}.", drawn=len(shown), missed=len(missed))
-        caption = joined([caption, more], " ")
-    alt = tr("Residual of each missed reference before and after the best hypothesis, on a logarithmic axis.")
-    return Picture(residual_figure(shown), alt, caption)
 
 
 def _hypothesis_row(hypothesis: model.RankedHypothesis) -> list[str]:

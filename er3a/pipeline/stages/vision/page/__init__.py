@@ -1,1 +1,1 @@
-"""Page and recording of the stage vision: results in, views out."""
+"""Page of the stage vision: results in, view out."""

@@ -12,10 +12,9 @@ from matplotlib.ticker import MaxNLocator
 from er3a.files.hand_eye_file import HandEyeFile, grey_image
 from er3a.files.vision_file import load_vision
 from er3a.files.yaml_file import load
-from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import N_, own_title, tr
 from er3a.pipeline.messages.numbers import decimals_of_spreads, fixed
-from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
+from er3a.pipeline.messages.say import bracketed, listed, say, word
 from er3a.pipeline.messages.vision import pose_words
 from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion
 from er3a.pipeline.player.player import drawing_head, player
@@ -24,7 +23,7 @@ from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.vision import model
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.conditions import condition_of, program_head
-from er3a.pipeline.viewing.figures import equal_scale, new_figure
+from er3a.pipeline.viewing.figures import new_figure
 from er3a.pipeline.viewing.page import (
     Picture,
     panel_link,
@@ -37,7 +36,6 @@ from er3a.programs.writing import with_head_lines
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
-MIN_RANGE = 0.02  # of the largest value, by which a map's colours go beyond its values
 MAX_IMAGES = 9
 WIDEST_PX = 480
 ARROW_PX = 30.0
@@ -117,61 +115,6 @@ def image_picture(rows: model.CornerRows, folder: Path) -> Picture:
     return Picture(figure, tr("Images of the board with detected and reprojected corners"), caption)
 
 
-def map_picture(rows: model.ErrorMapRows, objects: tuple[model.ObjectResult, ...]) -> Picture:
-    """Errors around the objects, from above."""
-    x, y = np.unique(rows.x_mm), np.unique(rows.y_mm)
-    seen = rows.in_view
-    both = seen & rows.reached
-    panels = (
-        (tr("calibration alone"), rows.calibration_mm, tr("95 % of errors below (mm)")),
-        (tr("repeatability and table"), rows.arm_mm, tr("95 % of errors below (mm)")),
-        (tr("everything"), rows.together_mm, tr("95 % of errors below (mm)")),
-        (tr("everything, turns"), rows.together_deg, tr("95 % of errors below (°)")),
-    )
-    figure, axes = new_figure(2, 2, height=7.4)
-    for ax, (title, column, label) in zip(axes.ravel(), panels):
-        value = np.where(seen, column, np.nan).reshape(len(y), len(x))
-        known = value[np.isfinite(value)]
-        ends = (known.min() - MIN_RANGE * known.max(), (1 + MIN_RANGE) * known.max()) if known.size else (0.0, 1.0)
-        mesh = ax.pcolormesh(
-            x, y, value, cmap="viridis_r", shading="nearest", rasterized=True, vmin=ends[0], vmax=ends[1]
-        )
-        figure.colorbar(mesh, ax=ax, label=label, shrink=0.85)
-        for each in objects:
-            ax.plot(each.xyz_mm[0], each.xyz_mm[1], "o", color="white", markeredgecolor=INK)
-            ax.annotate(
-                each.name,
-                each.xyz_mm[:2],
-                xytext=(4, 4),
-                textcoords="offset points",
-                fontsize=8,
-                bbox={"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 0.5},
-            )
-        ax.set_title(title)
-        ax.grid(False)
-        equal_scale(ax, "x (mm)", "y (mm)")
-    blank = "" if both.all() else tr("Blank cells are out of the camera's view or of the arm's reach.")
-    caption = tr(
-        "Grasp errors (first object, at each position) at the objects' mean height, from above. Within the "
-        "camera's view: calibration alone {least} to {most} mm; repeatability and table {arm_least} to "
-        "{arm_most} mm; all together, with the camera's noise in one reading, {low} to {high} mm and {turn_low}"
-        " to {turn_high}°. Where the first map is far below the third, more calibration samples help little.",
-        **_range(rows.calibration_mm[seen], "least", "most"),
-        **_range(rows.arm_mm[both], "arm_least", "arm_most"),
-        **_range(rows.together_mm[both], "low", "high"),
-        **_range(rows.together_deg[both], "turn_low", "turn_high"),
-    )
-    caption = joined([caption, blank], " ")
-    return Picture(figure, tr("Four maps of the error around the objects, from above"), caption)
-
-
-def _range(values: Reals, low: str, high: str) -> dict[str, str]:
-    """The smallest and largest, to be filled in; a dash where there are none."""
-    if not values.size:
-        return {low: "–", high: "–"}
-    return {low: fixed(float(values.min()), 2), high: fixed(float(values.max()), 2)}
-
-
 POINTER_M = 0.15
 WAYS = {"move": N_("move to the approach"), "approach": N_("approach"), "retreat": N_("retreat")}
 AXES = ("x", "y", "z")
@@ -206,7 +149,6 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
         touched=_touched(found.touch) if found and found.touch else [],
         residuals=residual_picture(results.samples, found) if found else None,
         images=image_picture(results.corners, _image_folder(study, name)) if len(results.corners) else None,
-        map=map_picture(results.error_map, summary.objects) if len(results.error_map) else None,
         overview=[_overview(each) for each in summary.objects],
         slides=bool(robot.slides.any()),
         grasps=[_grasp(each) for each in summary.objects if each.grasp],
@@ -221,9 +163,6 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
         error_columns=[tr("Object"), *(f"{word('vision.part_of_error', PARTS, part)}>" for part in PARTS)],
         player=player(robot, _motions(robot, results), scene),
         drawing_head=drawing_head(),
-        next_pose=panel_link(found.next_view.q_deg, _listed(found.next_view.q_deg))
-        if found and found.next_view
-        else "",
     )
 
 
