@@ -147,7 +147,7 @@ def _print(ranked: list[tuple[str, Comparison]], folder: bool, doubts: list[str]
         for other, each in ranked[:MATCHES_SHOWN]:
             print(f"{other}: {headline(each)}")
         print()
-    print("; ".join([*doubts, headline(ranked[0][1])]))
+    print(headline(ranked[0][1], doubts))
     for layer, state, detail in (*doubt_rows(doubts), *layer_rows(ranked[0][1])):
         print(f"  {layer:<11} {state:<8} {detail}".rstrip())
 
