@@ -170,7 +170,7 @@ def article(
     shown = _study_to_show(study)
     if shown.article is None:
         raise Er3aError(f"{study}: article: missing. Name the tables to compare: printed, corrected and real")
-    write_article(shown, results, reports)
+    write_article(shown, shown.article, results, reports)
     for page in shown.article_pages().values():
         write_checksum(reports / page)
 
