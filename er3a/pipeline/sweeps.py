@@ -127,15 +127,6 @@ class Variant:
             raise self._refusal(*str(error).split(" | ")) from None
         return Placement(**placement)
 
-    def replaced(self, content: RobotFile, tool: Placement | None) -> float | None:
-        """The value that the base robot itself has, given its file and its tool; None if it has none."""
-        entry = self.entry
-        if isinstance(entry.column, int):
-            return getattr(tool or Placement(), entry.group)[entry.column]
-        group = getattr(content, entry.group)
-        rows = group.rows if group else ()
-        return getattr(rows[entry.joint - 1], entry.column) if entry.joint and entry.joint <= len(rows) else None
-
     def _refusal(self, problem: str, remedy: str) -> InputError:
         return InputError(None, f"sweeps.{self.sweep}", f"{self.vary} = {self.value:.9g}: {problem}", remedy)
 

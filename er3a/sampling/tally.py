@@ -12,7 +12,7 @@ with each direction."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -270,7 +270,6 @@ def tally_blocks(
     draw: Draw,
     blocks: Iterable[int],
     hull: int,
-    progress: Callable[[int], object] | None = None,
 ) -> Tally:
     """Draw the given blocks within the joint limits and count where the tool point falls.
 
@@ -278,7 +277,6 @@ def tally_blocks(
     ----------
     blocks : ascending
     hull : how many directions to keep the extremes of, none if 0
-    progress : called with the number of samples done since it was called last
     """
     blocks = np.array(list(blocks), dtype=np.int64)
     counts, fresh = np.zeros(grid.shape, dtype=np.int64), np.zeros(int(np.prod(grid.shape)), dtype=np.uint32)
@@ -302,8 +300,6 @@ def tally_blocks(
             drawn = (np.uint64(draw.seed), block, first, robot.joints, sobol)
             _sample(drawn, start, stop, chain, voxels, section, watch)
             _flush(fresh, block, counts.ravel(), first_block.ravel(), fresh_side, side.ravel())
-            if progress:
-                progress(stop - start)
     return Tally(blocks, counts, first_block, side, extremes)
 
 

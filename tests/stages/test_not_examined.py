@@ -32,7 +32,8 @@ from er3a.kinematics.singularity import MIN_SINGULAR_VALUE
 from er3a.numerics.quasi_random import quasi_random_points
 from er3a.pipeline.messages.left_out import left_out_names, left_out_text
 from er3a.pipeline.messages.say import say, say_all
-from er3a.pipeline.new_study.write import arm_of, write_study
+from er3a.pipeline.new_study.arms import arm_of
+from er3a.pipeline.new_study.write import write_study
 from er3a.pipeline.results import (
     NEVER_A_PASS,
     LeftOut,

@@ -146,7 +146,7 @@ def index(
     results: options.Results = options.DEFAULT_RESULTS,
     reports: options.Reports = options.DEFAULT_REPORTS,
 ):
-    """Write the index and the page that compares two robots."""
+    """Write the index."""
     from er3a.pipeline.overview.index import write_index
     from er3a.pipeline.results import OVERALL
     from er3a.pipeline.viewing.figures import house_style
