@@ -42,6 +42,7 @@ from er3a.pipeline.results import (
     AbsentResults,
     NoPass,
     Provenance,
+    Stored,
     is_computed,
     read_stage,
     result_records,
@@ -114,10 +115,11 @@ class Thumbnail:
     arm: str
 
 
-def thumbnail(robot: Robot, workspace: WorkspaceResults | AbsentResults | None) -> Thumbnail:
+def thumbnail(robot: Robot, workspace: Stored[Any] | None) -> Thumbnail:
     """Draw a robot, with the outline of the sampled hull."""
     arm = skeleton(robot, np.zeros(robot.joints))[:, ::2] * 1000
-    reach = [line * 1000 for line in _reach(workspace)] if isinstance(workspace, WorkspaceResults) else []
+    results = workspace.results if workspace else None
+    reach = [line * 1000 for line in _reach(results)] if isinstance(results, WorkspaceResults) else []
     corners = np.concatenate([arm, *reach])
     low, high = corners.min(axis=0) - MARGIN_MM, corners.max(axis=0) + MARGIN_MM
     box = (low[0], -high[1], *(high - low))
@@ -158,9 +160,10 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
     """
     verdicts = read_verdicts(study, results)
     outdated = {(each.robot, each.stage): each.outdated for each in verdicts if each.outdated}
-    workspaces = {name: _workspace(results / name / "workspace") for name in study.robots}
+    stored = {name: _computed(study, name, results / name) for name in study.robots}
     robots = [
-        _entry(study, name, results / name, outdated) | {"thumbnail": thumbnail(study.robot(name), workspaces[name])}
+        _entry(study, name, alternative_table(study, name, results), stored, outdated)
+        | {"thumbnail": thumbnail(study.robot(name), stored[name].get("workspace"))}
         for name in study.robots
     ]
     contradicted = {each["robot"].name for each in robots if each["table"] == "fail"}
@@ -254,24 +257,26 @@ def _places(
             yield address, title, [(head, list(texts)) for head, texts in parser.texts.items()]
 
 
-def _workspace(folder: Path) -> WorkspaceResults | AbsentResults | None:
-    """What the workspace stage found; None if it has not been computed yet."""
-    return read_stage(folder, STAGES["workspace"]).results if is_computed(folder) else None
+def _computed(study: Study, name: str, folder: Path) -> dict[str, Stored[Any]]:
+    """The results of a robot's stages that are there, by stage."""
+    return {
+        stage: read_stage(folder / stage, STAGES[stage]) for stage in study.stages(name) if is_computed(folder / stage)
+    }
 
 
-def _evidence(results: Path) -> TableEvidence | None:
+def _evidence(stored: Mapping[str, Stored[Any]]) -> TableEvidence | None:
     """What evidence says of a robot's table; None before the validation stage has been computed."""
-    folder = results / "validation"
-    stored = read_stage(folder, STAGES["validation"]).results if is_computed(folder) else None
-    return stored.summary.evidence if isinstance(stored, ValidationResults) else None
+    results = stored["validation"].results if "validation" in stored else None
+    return results.summary.evidence if isinstance(results, ValidationResults) else None
 
 
-def _entry(study: Study, name: str, results: Path, outdated: Outdated) -> dict[str, Any]:
-    """What the index shows of a robot."""
+def _entry(
+    study: Study, name: str, instead: str | None, of_robots: Mapping[str, Mapping[str, Stored[Any]]], outdated: Outdated
+) -> dict[str, Any]:
+    """What the index shows of a robot; ``instead``: the robot whose table is to be used in place of its own."""
     changed = {stage: files for (robot_name, stage), files in outdated.items() if robot_name == name}
     robot, expected = study.robot(name), study.entry(name).expect
-    stages = [stage for stage in study.stages(name) if stage in STAGES]
-    stored = {stage: read_stage(results / stage, STAGES[stage]) for stage in stages if is_computed(results / stage)}
+    stages, stored = study.stages(name), of_robots[name]
     heads = {stage: head_of(each) for stage, each in stored.items()}
     failed = {
         stage: tr(STAGES[stage].title)
@@ -280,9 +285,9 @@ def _entry(study: Study, name: str, results: Path, outdated: Outdated) -> dict[s
     }
     table = heads["validation"].status if "validation" in heads else NOT_EXAMINED
     finding = heads["validation"].finding if "validation" in heads else None
-    same_arm, instead = isinstance(finding, DefinedOtherwise), alternative_table(study, name, results.parent)
-    unproven, settled = _settled(finding, _evidence(results))
-    entries = evidence_section(robot, _evidence(results), _evidence(results.parent / instead) if instead else None)
+    same_arm, evidence = isinstance(finding, DefinedOtherwise), _evidence(stored)
+    unproven, settled = _settled(finding, evidence)
+    entries = evidence_section(robot, evidence, _evidence(of_robots[instead]) if instead else None)
     computed = {stage: each for stage, each in stored.items() if heads[stage].status != "not_computed"}
     runs = [_run(stage, name, computed[stage].results) for stage in MAY_RUN if stage in computed]
     grasped = sound_motions(computed["vision"].results) if "vision" in computed else []
