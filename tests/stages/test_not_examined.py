@@ -501,9 +501,6 @@ def in_doubt(kind: str, content: dict, confirmed: bool) -> dict:
     elif kind == "payload":
         load = {"source": "x", "grade": "cad", "body": {"mass_kg": 2.3, "centre_mm": metres}}
         content["robots"][ROBOT]["payload"] = load
-    elif kind == "mesh":
-        mesh = {"file": "part.stl", "density_kg_m3": 1000, "xyz_mm": metres}
-        content["robots"][ROBOT]["tool_load"] = {"source": "x", "grade": "cad", "mesh": mesh}
     elif kind == "vision":
         content["home_deg"] = [0, 0.349, -0.349, 0, -1.5708, 0]
     elif kind == "grasp":
@@ -531,7 +528,6 @@ def in_doubt(kind: str, content: dict, confirmed: bool) -> dict:
         ("base", "trajectory", f"study.yaml: robots.{ROBOT}.base.xyz_mm: [0.0, 0.0, 0.3] mm"),
         ("payload", "dynamics", f"study.yaml: robots.{ROBOT}.payload.body.centre_mm: [0.0, 0.0, 0.3] mm"),
         ("payload", "trajectory", ""),
-        ("mesh", "dynamics", f"study.yaml: robots.{ROBOT}.tool_load.mesh.xyz_mm: [0.0, 0.0, 0.3] mm"),
         ("vision", "vision", "vision.yaml: home_deg: [0, 0.349, -0.349, 0, -1.5708, 0] deg"),
         ("grasp", "vision", "vision.yaml: objects[0].grasps[0].xyz_mm: [0.0, 0.0, 0.12] mm"),
         ("detector", "vision", "vision.yaml: objects[0].standard_deviation.position_mm: [0.0004, 0.0004, 0.0008] mm"),

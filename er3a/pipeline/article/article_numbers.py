@@ -32,7 +32,6 @@ EXAMPLE = np.array([0, np.pi / 4, -np.pi / 6, 0, np.pi / 3, 0])  # section 4.1
 TARGET_MM, TARGET_RPY_DEG = (500.0, 200.0, 700.0), (0.0, 90.0, 0.0)  # section 4.2
 SAME_RPY_DEG = (30.0, 90.0, 30.0)  # the target's orientation too, because its pitch is 90 deg
 WINDOW_Z_MM = (0.0, 1500.0)  # section 3.2
-CLOUD = 10_000  # section 5.1
 STATEMENTS = "er3a_c60_article"  # the reference set with the article's sentences and table
 MOVE, LINE = "article_joint", "article_line"  # paths of the study
 COMPARED = 1000  # random poses that two measures rank
@@ -275,7 +274,7 @@ def _base_turned(robot: Robot) -> Reals:
     return 1000 * forward(robot, q)[:, :3, 3]
 
 
-def random_joints(robot: Robot, seed: int, count: int) -> Reals:
+def _random_joints(robot: Robot, seed: int, count: int) -> Reals:
     """Joint values (count, n), evenly drawn within the limits, as the article draws its cloud."""
     return np.random.default_rng(seed).uniform(robot.lower, robot.upper, (count, robot.joints))
 
@@ -294,6 +293,6 @@ def _of_the_wrist(robot: Robot) -> dict[str, Any]:
 
 def _ranked_apart_percent(robot: Robot, seed: int) -> float:
     """Of pairs of random poses, those that manipulability and condition number rank differently (Kendall's tau)."""
-    measures = conditioning(robot, random_joints(robot, seed, COMPARED), characteristic_length(robot))
+    measures = conditioning(robot, _random_joints(robot, seed, COMPARED), characteristic_length(robot))
     tau = kendalltau(measures.manipulability, -measures.condition_number).statistic
     return float(50 * (1 - tau))

@@ -14,10 +14,9 @@ from markupsafe import Markup, escape
 
 from er3a.files.kept_files import write_atomically
 from er3a.geometry.transforms import translation
-from er3a.kinematics.forward import forward, skeleton
+from er3a.kinematics.forward import skeleton
 from er3a.pipeline import language
 from er3a.pipeline.article.article_numbers import (
-    CLOUD,
     LINE,
     MOVE,
     WINDOW_Z_MM,
@@ -27,7 +26,6 @@ from er3a.pipeline.article.article_numbers import (
     agreements,
     article_numbers,
     path_rows,
-    random_joints,
     summary_of,
 )
 from er3a.pipeline.code_digest import code_digest
@@ -37,22 +35,20 @@ from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.numbers import NOTHING, at_least, at_most, fixed, number
 from er3a.pipeline.messages.say import joined
 from er3a.pipeline.messages.trajectory import event_word, strategy_word
-from er3a.pipeline.overview.index import border_mm
 from er3a.pipeline.player.motions import PlayedEvent, PlayedMotion
 from er3a.pipeline.player.player import drawing_head, player
-from er3a.pipeline.results import Provenance, checksum_file, input_records, read_stage, result_records
+from er3a.pipeline.results import Provenance, checksum_file, input_records, result_records
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import ArticleTables, Study
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.figures import house_style, new_figure
 from er3a.pipeline.viewing.page import Picture, stage_head
-from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, MUTED, REFERENCE
+from er3a.pipeline.viewing.palette import MODEL, MUTED, REFERENCE
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
 ROLES = (N_("the article's table"), N_("the same with offset 2 = −90°"), N_("the real ER3A-C60"))
 COLOURS = (REFERENCE, MODEL, MUTED)  # printed, corrected, real
-DOTS = 3000
 APART_M = 1.8  # between two arms that stand side by side
 STAGES_OF_THE_REAL_ARM = ("collision", "programs", "vision", "dynamics")  # codes of items, and stages
 PAGES = {"3.2": "teach", "4.2": "inverse", "5.1": "workspace", "5.2": "trajectory"}
@@ -104,7 +100,6 @@ def _write(study: Study, tables: ArticleTables, results: Path, numbers: ArticleN
         roles=[tr(word) for word in ROLES],
         robots=[(name, study.pages(name)) for name in tables.names],
         zero=_zero_pose(robots, numbers),
-        reach=_reach(results, tables.names, robots, study.seed),
         player=_player(robots, results, tables),
         drawing_head=drawing_head(),
     )
@@ -227,28 +222,6 @@ def _zero_pose(robots: list[Robot], numbers: ArticleNumbers) -> Picture:
             "{corrected} mm.",
             printed=fixed(numbers.printed.tool_mm[2], 2),
             corrected=fixed(numbers.corrected.tool_mm[2], 2),
-        ),
-    )
-
-
-def _reach(results: Path, tables: tuple[str, ...], robots: list[Robot], seed: int) -> Picture:
-    figure, panels = new_figure(1, 3, width=12.0, height=5.2, sharex=True, sharey=True)
-    for axes, table, robot, role, colour in zip(panels, tables, robots, ROLES, COLOURS):
-        points = 1000 * forward(robot, random_joints(robot, seed, CLOUD))[:DOTS, :3, 3]
-        axes.plot(np.hypot(points[:, 0], points[:, 1]), points[:, 2], ",", color=MUTED)
-        for arc in border_mm(read_stage(results / table / "workspace", STAGES["workspace"]).results):
-            axes.plot(*np.array(arc).T, color=colour, linewidth=1)
-        for void in summary_of(results, table, "workspace").enclosed_voids:
-            x, y, z = (1000 * value for value in void.centroid_m)
-            axes.plot(np.hypot(x, y), z, "*", color=HIGHLIGHT, markersize=11)
-        axes.set(title=tr(role), xlabel=tr("distance from axis 1 (mm)"), aspect="equal")
-    panels[0].set_ylabel("z (mm)")
-    return Picture(
-        figure,
-        tr("Sections through what the tool reaches of three tables, with random samples, border and voids"),
-        tr(
-            "What the tool reaches, folded about axis 1: samples as the article draws them, the border, and the "
-            "middle of enclosed voids (stars)."
         ),
     )
 

@@ -307,7 +307,7 @@ ITEMS = (
         "er3a.forward(robot, q)",
         N_("Point cloud"),
         N_("10 000 random joint vectors within the limits are drawn as a cloud."),
-        N_("The figure of the reach shows the cloud. The workspace stage proves a volume of {p_volume} m³."),
+        N_("The workspace page draws the cloud, and proves a volume of {p_volume} m³."),
     ),
     Item(
         "void",

@@ -93,15 +93,6 @@ def _changed_names(changed: Sequence[str]) -> str:
     return joined([*named, *more], ", ")
 
 
-def border_mm(workspace: WorkspaceResults | AbsentResults | None) -> list[list[list[float]]]:
-    """The outline of what may be reached in the section through axis 1: lists of (radius, height) in mm."""
-    if not isinstance(workspace, WorkspaceResults):
-        return []
-    border = workspace.border
-    points = (1000 * np.column_stack([border.rho_m, border.z_m])).round(2)
-    return [points[border.arc == arc].tolist() for arc in dict.fromkeys(border.arc.tolist())]
-
-
 CORNERS = 24  # of an arc, at most
 MARGIN_MM = 40.0
 
