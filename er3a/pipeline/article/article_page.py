@@ -51,7 +51,7 @@ ROLES = (N_("the article's table"), N_("the same with offset 2 = −90°"), N_("
 COLOURS = (REFERENCE, MODEL, MUTED)  # printed, corrected, real
 APART_M = 1.8  # between two arms that stand side by side
 STAGES_OF_THE_REAL_ARM = ("collision", "programs", "vision", "dynamics")  # codes of items, and stages
-PAGES = {"3.2": "teach", "4.2": "inverse", "5.1": "workspace", "5.2": "trajectory"}
+PAGES = {"3.2": "teach", "4.1": "teach", "4.2": "inverse", "5.1": "workspace", "5.2": "trajectory", "6.2": "workspace"}
 """The page of the printed table that shows more, by section of the article; for all others its validation page."""
 BADGES = {"agrees": "pass", "differs": "fail", "in_part": "caution", "not_examined": "no_reference", "done": "done"}
 
