@@ -50,7 +50,7 @@ def compare(
 ):
     """Do A and B describe the same arm? Lists the entries that differ. Exit code 1 if any do."""
     from er3a.comparison.compare import best_of
-    from er3a.files.arm_file import read_arm, read_arms
+    from er3a.files.arm_file import read_arm
     from er3a.files.units import noted_doubts
     from er3a.robots.robot import to_modified, to_standard
 
@@ -61,15 +61,10 @@ def compare(
         raise Er3aError(f"--output is '{output}'; robot files end in .yaml")
     options: dict[str, Any] = {"convention": convention, "length_unit": length_unit, "angle_unit": angle_unit}
     options |= {"base": base, "tip": tip, "as_printed": True}
-    folder, left_out = Path(b), tuple[str, ...]()
+    folder = Path(b)
     with noted_doubts() as doubtful:
         first = read_arm(a, xacro=xacro or (), **options)
-        if folder.is_dir():
-            others, left_out = read_arms(folder, **options)
-        else:
-            others = {b: read_arm(b, xacro=xacro or (), **options)}
-    for problem in left_out:
-        print_note(problem)
+        others = _others(b, xacro or (), options)
     arm = first.robot
     if not first.printed and len(others) == 1 and (second := next(iter(others.values()))).printed:
         arm = (to_modified if second.robot.convention == "modified" else to_standard)(arm)
@@ -109,6 +104,18 @@ def compare(
                 print(f"{written}: written")
     if found.verdict != "equal":
         raise typer.Exit(1)
+
+
+def _others(source: str, xacro: Sequence[str], options: dict[str, Any]) -> dict[str, ReadArm]:
+    """The arm to compare with by its name, or all of a folder by their files, with notes on those that are unreadable."""
+    from er3a.files.arm_file import read_arm, read_arms
+
+    if not Path(source).is_dir():
+        return {source: read_arm(source, xacro=xacro, **options)}
+    found, left_out = read_arms(Path(source), **options)
+    for problem in left_out:
+        print_note(problem)
+    return found
 
 
 def _unsettled(doubts: Sequence[DoubtfulUnit], found: Comparison, one_file: bool) -> list[DoubtfulUnit]:

@@ -280,10 +280,7 @@ def _entry(
     unproven, settled = _settled(finding, evidence)
     entries = evidence_section(robot, evidence, _evidence(of_robots[instead]) if instead else None)
     computed = {stage: each for stage, each in stored.items() if heads[stage].status != "not_computed"}
-    runs = [_run(stage, name, computed[stage].results) for stage in MAY_RUN if stage in computed]
-    grasped = sound_motions(computed["vision"].results) if "vision" in computed else []
-    sound = {run["stage"]: run["sound"] for run in runs} | {"vision": grasped}
-    placed = placing(computed, robot, {stage: scene_of(study, name, stage) for stage in MOTIONS}, sound)
+    runs, grasped, placed = _motions(study, robot, name, computed)
     return {
         "robot": robot,
         "table": table,
@@ -334,6 +331,17 @@ def _entry(
         "not_examined": [tr(STAGES[stage].title) for stage in stages if stage not in heads],
         "not_asked": [tr(stage.title) for name, stage in STAGES.items() if name not in stages],
     }
+
+
+def _motions(
+    study: Study, robot: Robot, name: str, computed: Mapping[str, Stored[Any]]
+) -> tuple[list[dict[str, Any]], Sequence[str], Placing | None]:
+    """The paths and programs of a robot, the objects that its tool can grasp, and where to put the tray."""
+    runs = [_run(stage, name, computed[stage].results) for stage in MAY_RUN if stage in computed]
+    grasped = sound_motions(computed["vision"].results) if "vision" in computed else []
+    sound = {run["stage"]: run["sound"] for run in runs} | {"vision": grasped}
+    scenes = {stage: scene_of(study, name, stage) for stage in MOTIONS}
+    return runs, grasped, placing(computed, robot, scenes, sound)
 
 
 def _conflict(finding: object) -> str:
