@@ -107,7 +107,7 @@ def compare(
 
 
 def _others(source: str, xacro: Sequence[str], options: dict[str, Any]) -> dict[str, ReadArm]:
-    """The arm to compare with by its name, or all of a folder by their files, with notes on those that are unreadable."""
+    """The arm to compare with, or all of a folder by their files, with notes on those that are unreadable."""
     from er3a.files.arm_file import read_arm, read_arms
 
     if not Path(source).is_dir():
