@@ -47,7 +47,7 @@ def table() -> str:
         raise SystemExit(f"error: {reason}")
     study = load_study("config/config.yaml")
     shown = {robot: (*study.stages(robot), "teach") for robot in study.robots}
-    pages = ["index.html", "compare.html", *(f"{robot}/{page}.html" for robot in shown for page in shown[robot])]
+    pages = ["index.html", *(f"{robot}/{page}.html" for robot in shown for page in shown[robot])]
     if missing := [page for page in pages if not (REPORTS / page).is_file()]:
         raise SystemExit(f"error: reports/{missing[0]} is missing; `make run` writes it")
     load = os.getloadavg()[0]

@@ -30,7 +30,7 @@ copyright = "The er3a authors. MIT licence"
 release = version = er3a.__version__
 
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.viewcode", "sphinx_copybutton"]
-exclude_patterns = ["_build", "results/*.json"]
+exclude_patterns = ["_build"]
 html_theme = "furo"
 html_title = f"er3a {er3a.__version__}"
 html_static_path = ["static"]

@@ -1,4 +1,4 @@
-"""The commands: `er3a`, `python -m er3a`, and `rerun-importer-er3a`, which Rerun's viewer calls."""
+"""The command line: `er3a`, and `python -m er3a`."""
 
 from __future__ import annotations
 
@@ -15,14 +15,6 @@ def main() -> None:
     from er3a.pipeline.cli import main as command_line
 
     command_line()
-
-
-def draw_for_rerun() -> int:
-    """Draw a file for Rerun's viewer; the exit code that it knows."""
-    distrust()
-    from er3a.pipeline.viewing.importer import main as draw
-
-    return draw()
 
 
 if __name__ == "__main__":

@@ -16,7 +16,8 @@ from er3a.files.kept_files import ROOT
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import scaled_jacobian
-from er3a.pipeline.new_study.write import arm_of, write_study
+from er3a.pipeline.new_study.arms import arm_of
+from er3a.pipeline.new_study.write import write_study
 from er3a.pipeline.results import NotComputed
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.registry import STAGES

@@ -91,35 +91,6 @@ def test_a_study_s_joint_values_are_held_against_its_robot(tmp_path, monkeypatch
         check_study(tmp_path / "study.yaml")
 
 
-TIP = {"start": {"xyz_mm": [300, 0, 300], "rpy_deg": [180, 0, 0]}, "duration_s": 2, "title": "A", "samples": 9}
-END = {"xyz_mm": [300, 100, 300], "rpy_deg": [180, 0, 0]}
-ONWARD = {"xyz_mm": [300, 200, 300], "rpy_deg": [180, 0, 0]}
-FIRST = TIP | {"name": "first", "kind": "line", "end": END}
-SECOND = {key: value for key, value in FIRST.items() if key != "start"} | {"name": "second", "after": "first"}
-
-
-@pytest.mark.parametrize(
-    ("paths", "told"),
-    [
-        ([FIRST | {"start_branch": "upside down"}], r"paths\[0\]\.start_branch: this robot has no branch"),
-        ([FIRST | {"kind": "arc", "end": ONWARD, "via_mm": [300, 100, 300]}], r"paths\[0\]\.via_mm"),
-        ([FIRST, SECOND | {"kind": "arc", "end": ONWARD, "via_mm": [300, 150, 300]}], r"paths\[1\]\.via_mm"),
-        ([FIRST, SECOND | {"kind": "arc", "end": ONWARD, "via_mm": [350, 150, 300]}], None),
-    ],
-)
-def test_a_path_that_no_run_would_follow_is_refused_before_it(tmp_path, monkeypatch, paths, told):
-    monkeypatch.chdir(ROOT)
-    study = yaml.safe_load(Path("config/small.yaml").read_text(encoding="utf-8"))
-    study["robots"] = {"er3a_c60": study["robots"]["er3a_c60"] | {"paths": str(tmp_path / "paths.yaml")}}
-    (tmp_path / "paths.yaml").write_text(json.dumps({"kind": "paths", "paths": paths}), encoding="utf-8")
-    (tmp_path / "study.yaml").write_text(yaml.safe_dump(study), encoding="utf-8")
-    if told is None:
-        assert check_study(tmp_path / "study.yaml")
-        return
-    with pytest.raises(InputError, match=told):
-        check_study(tmp_path / "study.yaml")
-
-
 @pytest.mark.parametrize(
     ("name", "text", "told"),
     [

@@ -21,7 +21,7 @@ from er3a.formats.mesh_file import read_stl
 from er3a.geometry.transforms import rot_x, rot_y, translation
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.numerics.arrays import Reals
-from er3a.robots.masses import Load, MassBody, moved, no_body, six_moments, together
+from er3a.robots.masses import Load, together
 from er3a.robots.robot import (
     CombinedLimit,
     Convention,
@@ -224,88 +224,32 @@ THREE_ZEROS = [0.0, 0.0, 0.0]
 Newton = Annotated[list[Annotated[float, Field(ge=-1e6, le=1e6)]], Field(min_length=3, max_length=3)]
 
 
-class MeshMass(robot_file.Placement):
-    """A body from a closed mesh, placed in the flange's frame; ``unit_mm`` is the length of one unit of the file in
-    mm."""
-
-    file: Annotated[str, Field(min_length=1, max_length=1000)]
-    density_kg_m3: Annotated[float, Field(ge=1, le=25_000)]
-    unit_mm: Annotated[float, Field(ge=1e-3, le=1e4)] = 1.0
-
-
 class LoadFields(StrictModel):
-    """A load on the flange, in the flange's frame, with source and grade: ``body`` or ``mesh``.
+    """A load on the flange, in the flange's frame, with source and grade.
 
     ``force_n`` and ``moment_n_m``: wrench of the surroundings on the tool, at the tool point, in the tool's axes.
     """
 
     source: Annotated[str, Field(min_length=1, max_length=2000)]
     grade: Grade
-    body: robot_file.BodyFields | None = None
-    mesh: MeshMass | None = None
+    body: robot_file.BodyFields
     force_n: Newton = THREE_ZEROS
     moment_n_m: Newton = THREE_ZEROS
 
     @model_validator(mode="after")
-    def _one_of_both(self):
-        if (self.body is None) == (self.mesh is None):
-            raise ValueError("body: a load needs a body or a mesh, and not both | Give one of the two")
-        if self.body and self.body.mass_kg > robot_file.HEAVIEST_PAYLOAD_KG:
+    def _a_load_of_a_robot(self):
+        if self.body.mass_kg > robot_file.HEAVIEST_PAYLOAD_KG:
             kg = self.body.mass_kg
             raise ValueError(f"body.mass_kg: {kg:g} kg is more than any robot carries | Write {kg / 1000:g} if it is g")
-        if self.body:
-            doubt_millimetres(self.body.centre_mm, self.body, "centre_mm")
-        robot_file.check_placement("mesh", self.mesh)
+        doubt_millimetres(self.body.centre_mm, self.body, "centre_mm")
         return self
-
-    @property
-    def files(self) -> list[Path]:
-        """The mesh, if there is one."""
-        return [Path(self.mesh.file)] if self.mesh else []
 
 
 def load_of(loads: list[LoadFields]) -> Load | None:
-    """Tool and payload as one load; None without any.
-
-    Raises
-    ------
-    InputError
-        for a mesh that can't be read, or that is not closed
-    """
+    """Tool and payload as one load; None without any."""
     if not loads:
         return None
-    body = together([_body(each) for each in loads])
+    body = together([each.body.body for each in loads])
     force, moment = (np.sum([getattr(each, key) for each in loads], axis=0) for key in ("force_n", "moment_n_m"))
     (fx, fy, fz), (mx, my, mz) = force.tolist(), moment.tolist()
     return Load(**vars(body), force=(fx, fy, fz), moment=(mx, my, mz))
-
-
-def _body(load: LoadFields) -> MassBody:
-    return load.body.body if load.body else mesh_body(load.mesh)  # type: ignore[arg-type]  # one of both is there
-
-
-def mesh_body(given: MeshMass) -> MassBody:
-    """Mass, centre and inertia of a closed mesh filled evenly; :class:`InputError` if it is none."""
-    import trimesh  # slow to import, and few studies need it
-
-    try:
-        mesh = trimesh.load_mesh(given.file)
-    except Exception as error:  # whatever a reader of a format raises
-        raise InputError(
-            given.file, None, f"can't be read as a mesh ({error})", "Give an STL, OBJ or PLY file"
-        ) from None
-    if not (mesh.is_watertight and mesh.is_winding_consistent and abs(mesh.volume) > 0):
-        raise InputError(
-            given.file, None, "is not a closed mesh, so it has no volume", "Close its holes, or state a body"
-        )
-    if mesh.volume < 0:
-        mesh.invert()
-    mesh.apply_scale(given.unit_mm / 1000)
-    mesh.density = given.density_kg_m3
-    x, y, z = mesh.center_mass.tolist()
-    body = MassBody(float(mesh.mass), (x, y, z), six_moments(mesh.moment_inertia))
-    if problem := no_body(body):
-        raise InputError(given.file, None, robot_file.IMPOSSIBLE[problem], "Check the mesh")
-    if body.mass > robot_file.HEAVIEST_PAYLOAD_KG:
-        raise InputError(given.file, None, f"makes {body.mass:g} kg", "Check unit_mm: 1 for mm, 1000 for m")
-    return moved(body, given.transform())

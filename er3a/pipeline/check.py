@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import chdir
-from dataclasses import replace
 from pathlib import Path
 
 from pydantic import BaseModel
@@ -38,26 +37,9 @@ from er3a.files.scene_file import SceneFile, load_scene
 from er3a.files.target_file import POSITION, TargetFile, load_targets, read_targets
 from er3a.files.vision_file import VisionFile, load_vision
 from er3a.files.yaml_file import load, read_yaml
-from er3a.kinematics.by_class import arm_solver
-from er3a.kinematics.wrist_partitioned import wrist_partition_missing
-from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study, load_study
-from er3a.planning.class_follow import follows_tool_paths
-from er3a.planning.commands import (
-    Command,
-    CommandSource,
-    JointMoveCommand,
-    JointSequenceCommand,
-    JointTableCommand,
-    PlanCommand,
-    Start,
-    ToolCommand,
-    ToolMoveCommand,
-    ToolSequenceCommand,
-    ToolTableCommand,
-    build,
-)
+from er3a.planning.commands import CommandSource
 from er3a.programs.languages import SUFFIXES, read_program
 from er3a.robots.robot import Robot
 
@@ -84,45 +66,17 @@ def check_references(robot: Robot) -> None:
 
 
 def _check_paths(path: Path, robot: Robot | None = None) -> None:
-    ends: dict[str, Reals] = {}
     for i, planned in enumerate(load_paths(path).paths):
         if isinstance(planned, ProgramPath):
             read_program(planned.program)
         elif robot is not None:
             source = CommandSource(path, f"paths[{i}]")
             try:
-                _check_command(robot, planned.name, planned.command(source, robot), ends)
+                planned.command(source, robot)
             except InputError as error:
                 raise error if error.file else source.error(error.field or "", error.problem, error.remedy) from None
         elif isinstance(planned, TablePath):
             planned.table(CommandSource(path, f"paths[{i}]"))
-
-
-def _check_command(robot: Robot, name: str, command: Command, ends: dict[str, Reals]) -> None:
-    """Refuse what a run refuses before it follows a path, and add its end to ``ends``: joint values, or a tool pose.
-
-    What follows a program is left to the run.
-    """
-    start = getattr(command, "start", None)
-    if isinstance(start, Start) and start.after is not None:
-        known = ends.get(start.after)
-        if known is None:
-            return
-        if known.ndim > 1 and isinstance(command, ToolMoveCommand | ToolSequenceCommand):
-            command = replace(command, start=replace(start, after=None, pose=known))
-    if isinstance(command, ToolCommand | JointSequenceCommand | JointTableCommand):
-        build(robot, command, ends)
-    match command:
-        case JointMoveCommand() | PlanCommand():
-            ends[name] = command.end
-        case JointSequenceCommand() | JointTableCommand():
-            ends[name] = command.points[-1]
-        case ToolMoveCommand():
-            ends[name] = command.segment.end
-        case ToolSequenceCommand():
-            ends[name] = command.segments[-1].end
-        case ToolTableCommand():
-            ends[name] = command.poses[-1]
 
 
 def _check_programs(path: Path) -> None:
@@ -170,27 +124,6 @@ _WORDS = {
     "vision": "objects before a camera",
 }
 PROGRAM = "a robot program"
-SIX = 6
-
-
-def stage_forms(robot: Robot) -> dict[str, str]:
-    """Which stages a robot will have, and in what form, in words."""
-    spherical = wrist_partition_missing(robot) is None
-    plain = robot.coupling is None and not robot.combined
-    solver = arm_solver(robot).chain.code.replace("_", " ")
-    turning = not robot.sliding.any() and robot.coupling is None
-    six = turning and robot.rows == SIX
-    proven = "proof and capability" if spherical and plain else "proof by the general method" if six and plain else ""
-    iterated = solver in ("dependent", "unsolved")
-    return {
-        "validation": "references, diagnosis and evidence" if turning else "references and self-checks, no diagnosis",
-        "workspace": f"samples, {proven or 'volume bounded by lengths alone'}",
-        "inverse": "by iteration, which may miss solutions" if iterated else f"all solutions, class {solver}",
-        "trajectory": "moves of the joints and of the tool"
-        if follows_tool_paths(robot)
-        else "moves of the joints alone",
-        "teach panel": "all solutions" if spherical and robot.coupling is None else "solutions found by iteration",
-    }
 
 
 def check_file(path: Path) -> str:

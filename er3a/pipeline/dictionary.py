@@ -1,65 +1,21 @@
-"""Documents about results: a JSON Schema of each stage's summary, and a dictionary of all tables."""
+"""The dictionary of all tables of results."""
 
 from __future__ import annotations
 
 import inspect
 from importlib import import_module
-from typing import Any
 
-from pydantic import TypeAdapter
-
-from er3a.pipeline.results import CHECKSUMS, FORMAT_VERSION, Provenance, summary_type
+from er3a.pipeline.results import CHECKSUMS, FORMAT_VERSION
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.tables import Column, Table, table_types
 
 HEAD = f"""# Data dictionary
 
-What a run leaves in `results/<robot>/<stage>/`: `summary.json` (its schema stands beside this page), the tables below
+What a run leaves in `results/<robot>/<stage>/`: `summary.json`, the tables below
 as Parquet, and `{CHECKSUMS}`. Units and meanings stand in the files too, as metadata of each column. Format version
 {FORMAT_VERSION}. This page is written by `make schema`; a test fails if it is out of date.
 """
-
-
-def summary_schema(stage: Stage) -> dict[str, Any]:
-    """The JSON Schema of a stage's ``summary.json``."""
-    schema = TypeAdapter(summary_type(stage.module("model").RESULTS)).json_schema()
-    origin = TypeAdapter(Provenance).json_schema()
-    definitions = schema["$defs"] | origin.pop("$defs", {})
-    reference = schema["properties"]["verdict"]["$ref"].rpartition("/")[2]
-    definitions[reference] = _verdict_schema(definitions[reference], definitions)
-    properties = {
-        "format_version": {"const": FORMAT_VERSION},
-        "robot": {"type": "string"},
-        "stage": {"const": stage.name},
-        **schema["properties"],
-        "provenance": origin,
-    }
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": f"summary.json of the stage {stage.name}",
-        "type": "object",
-        "required": list(properties),
-        "properties": properties,
-        "$defs": dict(sorted(definitions.items())),
-    }
-
-
-def _verdict_schema(stored: dict[str, Any], definitions: dict[str, Any]) -> dict[str, Any]:
-    """A verdict in the file: status, code and params."""
-    finding = stored["properties"]["finding"]
-    references = [part["$ref"] for part in finding.get("anyOf", [finding])]
-    cases = []
-    for reference in references:
-        found = definitions[reference.rpartition("/")[2]]
-        cases.append({"properties": {"code": found["properties"]["code"], "params": {"$ref": reference}}})
-    properties = {"status": stored["properties"]["status"]}
-    return {
-        "type": "object",
-        "required": ["status", "code", "params"],
-        "properties": properties,
-        "oneOf": cases,
-    }
 
 
 def data_dictionary() -> str:

@@ -597,7 +597,7 @@ def _parsed(path: Path, stored: dict[str, Any], kind: type[Results[Any]]) -> tup
 
 
 JUNIT = "junit.xml"
-OVERALL = ("index.html", "compare.html", JUNIT)
+OVERALL = ("index.html", JUNIT)
 
 
 def write_checksum(path: Path) -> None:

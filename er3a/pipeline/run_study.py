@@ -3,8 +3,8 @@
 After `kill -9` Snakemake's own lock remains. The lock of the operating system that is taken here ends with its process,
 so a run that gets it knows that no other run is active, and may clear Snakemake's lock.
 
-The progress display, a line for each verdict and the time left, is a logger plugin of Snakemake, which writes its own
-log into ``.snakemake/log/`` besides.
+The progress display, a line for each verdict with how many jobs are left, is a logger plugin of Snakemake, which writes
+its own log into ``.snakemake/log/`` besides.
 """
 
 from __future__ import annotations
@@ -21,8 +21,6 @@ from argparse import Namespace
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, redirect_stderr, suppress
 from dataclasses import dataclass
-from functools import partial
-from html import escape
 from io import StringIO
 from logging import WARNING, LogRecord
 from pathlib import Path
@@ -35,10 +33,8 @@ from snakemake_interface_logger_plugins.registry import LoggerPluginRegistry
 from snakemake_interface_logger_plugins.settings import LogHandlerSettingsBase
 
 from er3a.errors import Er3aError, ResultError
-from er3a.files.kept_files import ROOT, half_written, write_atomically
-from er3a.pipeline import language
+from er3a.files.kept_files import ROOT, half_written
 from er3a.pipeline.check import check_study
-from er3a.pipeline.messages.say import sentence
 from er3a.pipeline.results import JUNIT, OVERALL, check_checksum, check_results, checksum_file
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
@@ -69,9 +65,6 @@ def corrupted(study: Study, results: Path, reports: Path) -> Iterator[tuple[Path
 
 MARKS = {"pass": "✓", "caution": "!", "fail": "✗"}
 NO_VERDICT = "–"
-HEAVY = {"compute_workspace": 4.0, "compute_validation": 3.0, "compute_programs": 2.0, "views": 4.0}
-"""Jobs beside the others, by the beginning of their rule: what they take on average, in units of another one."""
-
 _JOB_ENDED = re.compile(r"2> (\S+)' (?:died with <Signals\.\w+: (\d+)>|returned non-zero exit status (\d+))")
 """How a job ended, of which a line of its own tells: its log, and the signal or the exit code."""
 
@@ -108,18 +101,15 @@ class RunLog(LogHandlerBase):
     needs_rulegraph = False
 
     def __post_init__(self) -> None:
-        self._start = time.monotonic()
         self._jobs: dict[int, tuple[str, dict[str, str], float]] = {}
-        self._left: dict[str, int] = {}
+        self._left = 0
         self._killed: dict[str, int] = {}
-        self._done = 0.0
-        self._bar = _bar() if sys.stderr.isatty() and not self.common_settings.nocolor else None
 
     def emit(self, record: LogRecord) -> None:
         """Show what a record says to a person, if anything."""
         event = getattr(record, "event", None)
         if event == LogEvent.RUN_INFO:
-            self._left = {rule: n for rule, n in record.stats.items() if rule != "total"}  # type: ignore[attr-defined]
+            self._left = record.__dict__["stats"]["total"]
         elif event == LogEvent.JOB_INFO:
             job = record.__dict__
             self._jobs[job["jobid"]] = (job["rule_name"], dict(job["wildcards"] or {}), time.monotonic())
@@ -147,47 +137,20 @@ class RunLog(LogHandlerBase):
         words = [rule.replace("_", " "), of.get("stage", "")]
         return str(job.get("rule_msg") or ": ".join(filter(None, (of.get("robot"), " ".join(filter(None, words))))))
 
-    def close(self) -> None:
-        """Take the bar away."""
-        if self._bar:
-            self._bar.stop()
-        super().close()
-
     def _finish(self, job: int) -> None:
         rule, wildcards, begun = self._jobs.pop(job, ("", {}, time.monotonic()))
-        self._done += _weight(rule)
-        self._left[rule] = self._left.get(rule, 1) - 1
+        self._left -= 1
         verb, _, stage = rule.partition("_")
         if verb == "compute":
             of = wildcards.get("robot", ""), stage
             status = _verdict(*of)
             note = ", as expected" if self.expected.get(of) == status else ""
-            took = f"{time.monotonic() - begun:.0f} s"
+            took = f"{time.monotonic() - begun:.0f} s  ({self._left} jobs left)"
             mark = MARKS.get(status, NO_VERDICT)
-            self._print(f"{mark} {of[0]}  {stage:<10}  {status.replace('_', ' ')}{note}  {took}", self._rest())
-        if self._bar:
-            share = self._done / max(self._done + self._weight_left(), 1e-9)
-            self._bar.update(self._bar.task_ids[0], completed=share, description=self._rest())
+            self._print(f"{mark} {of[0]}  {stage:<10}  {status.replace('_', ' ')}{note}  {took}")
 
-    def _weight_left(self) -> float:
-        return sum(_weight(rule) * max(n, 0) for rule, n in self._left.items())
-
-    def _rest(self) -> str:
-        """How many jobs are left and how long they will take, at the speed so far."""
-        jobs = sum(max(n, 0) for n in self._left.values())
-        seconds = (time.monotonic() - self._start) * self._weight_left() / max(self._done, 1e-9)
-        return f"{jobs} jobs left, about {seconds:.0f} s" if jobs else "all jobs done"
-
-    def _print(self, line: str, rest: str = "") -> None:
-        """A line; how much is left behind it where no bar says so."""
-        if self._bar:
-            self._bar.console.print(line, markup=False, highlight=False)
-        else:
-            print(f"{line}  ({rest})" if rest else line, file=sys.stderr, flush=True)
-
-
-def _weight(rule: str) -> float:
-    return next((weight for name, weight in HEAVY.items() if rule.startswith(name)), 1.0)
+    def _print(self, line: str) -> None:
+        print(line, file=sys.stderr, flush=True)
 
 
 def _concerns_a_person(record: LogRecord) -> bool:
@@ -200,16 +163,6 @@ def _error_line(text: str) -> str:
         known = ", ".join(STAGES)
         return f"error: {unknown[1]}: no stage ({known}) and no file that this study makes; a study is given by --study"
     return f"error: {' '.join(text.split())}"
-
-
-def _bar() -> Any:
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress
-
-    bar = Progress(BarColumn(), "{task.description}", console=Console(stderr=True), transient=True)
-    bar.add_task("", total=1.0)
-    bar.start()
-    return bar
 
 
 def _verdict(robot: str, stage: str) -> str:
@@ -263,45 +216,20 @@ def run_study(study_file: Path, results: Path, reports: Path, words: Sequence[st
 
 
 def _report_error(reports: Path, problem: str) -> None:
-    """Have people and continuous integration find an error, not the verdicts of an earlier run, if they find any.
+    """Have continuous integration find an error, not the verdicts of an earlier run, if it finds any.
 
-    The report gets no checksum, so that the next run makes it again; it takes the error off the pages.
+    The report gets no checksum, so that the next run makes it again.
     """
     report = reports / JUNIT
-    with suppress(Er3aError, OSError):
-        mark_pages(reports, problem)
     if report.is_file():
         with suppress(Er3aError, OSError):  # what went wrong first is what a person is told
             checksum_file(report).unlink(missing_ok=True)
             write_junit_error(problem, report)
 
 
-_LAST_RUN = re.compile(rb"<!-- last run -->.*?<!-- /last run -->", re.DOTALL)
-_BODY = re.compile(rb"<html lang=\"(\w+).*?<body[^>]*>", re.DOTALL)
-
-
-def mark_pages(reports: Path, problem: str | None) -> None:
-    """Say on each page that is there how the last run ended badly; without a problem, take that off again.
-
-    The pages' times and checksums stay: no page is made again for it.
-    """
-    for page in reports.rglob("*.html"):
-        before, times = page.read_bytes(), page.stat()
-        after = _LAST_RUN.sub(b"", before)
-        if problem is not None and (found := _BODY.search(after)):
-            with language.using(next((each for each in language.LANGUAGES if each == found[1].decode()), "en")):
-                text = escape(sentence("page.last_run", problem=problem)).encode()
-            notice = b'<!-- last run --><p class="decision fail" role="alert">' + text + b"</p><!-- /last run -->"
-            after = after[: found.end()] + notice + after[found.end() :]
-        if after != before:
-            write_atomically(page, partial(Path.write_bytes, data=after))
-            os.utime(page, ns=(times.st_atime_ns, times.st_mtime_ns))
-
-
 def _run(study_file: Path, results: Path, reports: Path, words: Sequence[str], asked: Namespace) -> bool:
     """Check a study and run it; whether all jobs were done."""
     study = check_study(study_file)
-    mark_pages(reports, None)
     if not checksum_file(reports / JUNIT).is_file():
         (reports / JUNIT).unlink(missing_ok=True)
     for path in (*half_written(results), *half_written(reports)):

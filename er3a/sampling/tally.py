@@ -12,7 +12,7 @@ with each direction."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -310,7 +310,6 @@ def tally_blocks(
     draw: Draw,
     blocks: Iterable[int],
     hull: int,
-    progress: Callable[[int], object] | None = None,
 ) -> Tally:
     """Draw blocks of samples within the joint limits, and count where the tool point falls.
 
@@ -321,7 +320,6 @@ def tally_blocks(
     draw : seed, number and kind of the samples
     blocks : ascending
     hull : how many directions to keep the extremes of, none if 0
-    progress : called with the number of samples done since it was called last
 
     Returns
     -------
@@ -349,8 +347,6 @@ def tally_blocks(
             drawn = (np.uint64(draw.seed), block, first, robot.joints, sobol)
             _sample(drawn, start, stop, chain, voxels, section, watch)
             _flush(fresh, block, counts.ravel(), first_block.ravel(), fresh_side, side.ravel())
-            if progress:
-                progress(stop - start)
     return Tally(blocks, counts, first_block, side, extremes)
 
 

@@ -3,7 +3,7 @@
 from testing.small_study import stages_of
 from tests.conftest import ROBOTS
 
-OVER_ALL = ["index.html", "compare.html"]
+OVER_ALL = ["index.html"]
 STAGE_PAGES = [f"{robot}/{stage}.html" for robot in ROBOTS for stage in stages_of(robot)]
 PAGES = OVER_ALL + STAGE_PAGES + [f"{robot}/teach.html" for robot in ROBOTS]
 

@@ -7,10 +7,7 @@ import re
 
 import pytest
 from axe_core_python.selenium import Axe
-from selenium.webdriver.common.by import By
-from selenium.webdriver.support.ui import Select
 
-from er3a.files.robot_library import load_robot
 from er3a.pipeline.overview.index import FIRST
 from testing import chromium
 from tests.browser.pages import OVER_ALL, PAGES, PAGES_OF_EACH_KIND
@@ -93,48 +90,3 @@ def test_index_prints_on_one_sheet(browser, small_study):
     browser.get((small_study.folder / "reports/index.html").as_uri())
     pdf = base64.b64decode(browser.execute_cdp_cmd("Page.printToPDF", {"preferCSSPageSize": True})["data"])
     assert len(re.findall(rb"/Type ?/Page\b", pdf)) == 1
-
-
-@pytest.mark.long
-def test_comparison_shows_the_pair_that_is_picked(browser, small_study):
-    browser.get((small_study.folder / "reports/compare.html").as_uri())
-
-    def cells(what: str) -> list[str]:
-        script = (
-            "return [...document.querySelectorAll('#comparison tbody tr')].map(r => [...r.cells].map(c => c.innerText))"
-        )
-        return next(row[3:] for row in browser.execute_script(script) if row[1] == what)
-
-    def shown() -> list[str]:
-        groups = browser.find_elements(By.CSS_SELECTOR, "#borders g[data-robot]")
-        return [
-            group.get_attribute("data-robot")
-            for group in groups
-            if group.value_of_css_property("visibility") == "visible"
-        ]
-
-    assert cells("J2 a") == ["270", "650", "380"]
-    assert shown() == ["er3a_c60", "er3a_c60_article"]
-    key = browser.find_elements(By.CSS_SELECTOR, ".borders-key span")
-    assert [each.text for each in key] == [load_robot(name).title for name in shown()]
-    widths = [
-        browser.execute_script("return getComputedStyle(arguments[0], '::before').borderTopWidth", each) for each in key
-    ]
-    drawn = [
-        browser.find_element(By.CSS_SELECTOR, f"#borders g.{side}").value_of_css_property("stroke-width")
-        for side in ("a", "b")
-    ]
-    assert widths == drawn == ["5px", "2px"]  # a pair that coincides shows both
-    Select(browser.find_element(By.ID, "robot-b")).select_by_value("er3_600")
-    robots = [load_robot(name) for name in ("er3a_c60", "er3_600")]
-    assert [float(text) for text in cells("J1 d")[:2]] == [round(robot.d[0] * 1000, 6) for robot in robots]
-    assert shown() == ["er3a_c60", "er3_600"]
-    browser.find_element(By.ID, "only-differences").click()
-    address = browser.current_url
-    assert address.endswith("#a=er3a_c60&b=er3_600&differs")
-    browser.get("about:blank")
-    browser.get(address)
-    assert shown() == ["er3a_c60", "er3_600"]
-    rows = [row for row in browser.find_elements(By.CSS_SELECTOR, "#comparison tbody tr") if row.is_displayed()]
-    assert rows
-    assert all(row.find_elements(By.TAG_NAME, "td")[5].text for row in rows)

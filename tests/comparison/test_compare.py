@@ -473,6 +473,23 @@ def test_a_table_in_other_units_than_it_says_is_not_usable_as_printed(given, tmp
     assert compared(right, right)[0] == 0
 
 
+def test_a_page_says_the_unit_in_doubt_before_another_arm_as_the_command_line_does(tmp_path):
+    """Half the angles in radians, another upper arm: no change of units explains it, so the unit stays a doubt."""
+    right = with_columns(tmp_path).rename(tmp_path / "right.csv")
+    lines = right.read_text(encoding="utf-8").splitlines()
+    mixed, page = tmp_path / "mixed.csv", tmp_path / "page.html"
+    cells = [line.split(",") for line in lines[1:]]
+    for row in cells:
+        row[3] = f"{np.radians(float(row[3])):.4f}"
+    cells[1][2], cells[3][3] = "-625.0", "90"
+    mixed.write_text("\n".join([lines[0], *map(",".join, cells)]), encoding="utf-8")
+    code, said = compared(mixed, right, "--html", page)
+    first = said.splitlines()[0]
+    assert (code, "may be radians; another arm" in first) == (1, True)
+    verdict = page.read_text(encoding="utf-8").partition('<section class="verdict')[2].partition("<p>")[2]
+    assert verdict.startswith(first)
+
+
 @pytest.mark.filterwarnings("ignore::er3a.errors.DoubtfulUnit")
 @pytest.mark.parametrize(("given", "remedy"), [({"scale": 1e-3}, ("--length-unit", "mm")), ({"twice": True}, ())])
 def test_no_table_passes_on_a_guess_of_its_units(given, remedy, tmp_path):

@@ -139,7 +139,7 @@ def test_a_study_from_nothing_to_its_reports(er3a, new_cell):
     assert done.returncode == 0, done.stderr
     pages = {path.relative_to(cell / "reports").as_posix() for path in (cell / "reports").rglob("*.html")}
     stages = ("validation", "workspace", "collision", "inverse", "trajectory", "dynamics")
-    assert pages == {"index.html", "compare.html", *(f"odd_arm/{page}.html" for page in (*stages, "teach"))}
+    assert pages == {"index.html", *(f"odd_arm/{page}.html" for page in (*stages, "teach"))}
     verdicts = {each["stage"]: each["status"] for each in json.loads(er3a(cell, "verdicts", "--json").stdout)}
     assert verdicts["inverse"] == verdicts["trajectory"] == "pass"
     assert verdicts["validation"] == "no_reference"

@@ -32,7 +32,8 @@ from er3a.kinematics.singularity import MIN_SINGULAR_VALUE
 from er3a.numerics.quasi_random import quasi_random_points
 from er3a.pipeline.messages.left_out import left_out_names, left_out_text
 from er3a.pipeline.messages.say import say, say_all
-from er3a.pipeline.new_study.write import arm_of, write_study
+from er3a.pipeline.new_study.arms import arm_of
+from er3a.pipeline.new_study.write import write_study
 from er3a.pipeline.results import (
     NEVER_A_PASS,
     LeftOut,
@@ -499,9 +500,6 @@ def in_doubt(kind: str, content: dict, confirmed: bool) -> dict:
     elif kind == "payload":
         load = {"source": "x", "grade": "cad", "body": {"mass_kg": 2.3, "centre_mm": metres}}
         content["robots"][ROBOT]["payload"] = load
-    elif kind == "mesh":
-        mesh = {"file": "part.stl", "density_kg_m3": 1000, "xyz_mm": metres}
-        content["robots"][ROBOT]["tool_load"] = {"source": "x", "grade": "cad", "mesh": mesh}
     elif kind == "vision":
         content["home_deg"] = [0, 0.349, -0.349, 0, -1.5708, 0]
     elif kind == "grasp":
@@ -529,7 +527,6 @@ def in_doubt(kind: str, content: dict, confirmed: bool) -> dict:
         ("base", "trajectory", f"study.yaml: robots.{ROBOT}.base.xyz_mm: [0.0, 0.0, 0.3] mm"),
         ("payload", "dynamics", f"study.yaml: robots.{ROBOT}.payload.body.centre_mm: [0.0, 0.0, 0.3] mm"),
         ("payload", "trajectory", ""),
-        ("mesh", "dynamics", f"study.yaml: robots.{ROBOT}.tool_load.mesh.xyz_mm: [0.0, 0.0, 0.3] mm"),
         ("vision", "vision", "vision.yaml: home_deg: [0, 0.349, -0.349, 0, -1.5708, 0] deg"),
         ("grasp", "vision", "vision.yaml: objects[0].grasps[0].xyz_mm: [0.0, 0.0, 0.12] mm"),
         ("detector", "vision", "vision.yaml: objects[0].standard_deviation.position_mm: [0.0004, 0.0004, 0.0008] mm"),

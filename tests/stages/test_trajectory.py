@@ -417,8 +417,6 @@ def test_the_index_says_first_what_validation_came_to(study, folders, stored, tm
         path = next(path for path in stored["er3_600"].results.summary.paths if path.name == each.name)
         assert 0 <= float(t) <= path.duration_s
         assert place == each.name
-    compared = (tmp_path / "compare.html").read_text(encoding="utf-8")
-    assert compared.index("This D-H table was not validated") < compared.index('id="borders"')
 
 
 @pytest.mark.parametrize(

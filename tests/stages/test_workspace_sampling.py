@@ -14,11 +14,9 @@ from er3a.files.robot_library import load_robot
 from er3a.geometry.transforms import transform
 from er3a.geometry.vectors import fibonacci_sphere
 from er3a.kinematics.forward import forward
-from er3a.pipeline.progress import shown_progress
 from er3a.sampling import grid as grid_module
 from er3a.sampling.grid import make_grid, tool_bound
 from er3a.sampling.random_joints import Draw, direction_numbers, philox4x32
-from er3a.sampling.tally import tally_blocks
 from tests.stages.workspace_arms import SEED, extreme_points, tally_of
 
 # --- random numbers ---
@@ -109,16 +107,6 @@ def test_the_loop_counts_what_forward_gives(robot, sampling):
     reached = (points @ fibonacci_sphere(200).T).max(axis=0)
     found = np.einsum("di,di->d", extreme_points(robot, draw, tally.extremes), fibonacci_sphere(200))
     assert np.abs(found - reached).max() < 1e-5
-
-
-def test_progress_is_shown_as_lines_in_a_log(robot, capsys, monkeypatch):
-    monkeypatch.setattr("er3a.pipeline.progress.EVERY_S", 0.0)
-    draw = Draw(SEED, 30_000, 3)
-    with shown_progress(30_000, "robot: samples") as advance:
-        tally_blocks(robot, make_grid(robot, 8), draw, range(3), 0, advance)
-    lines = capsys.readouterr().err.splitlines()
-    assert len(lines) == 3
-    assert "robot: samples: 20,000 of 30,000 (67%)" in lines[1]
 
 
 lengths = st.lists(st.floats(-1, 1), min_size=6, max_size=6)

@@ -59,12 +59,6 @@ rule index:
             category=tr(pages.ALL_ROBOTS),
             labels={tr(pages.PAGE): tr(pages.INDEX)},
         ),
-        report(
-            "reports/compare.html",
-            caption="../report/compare.rst",
-            category=tr(pages.ALL_ROBOTS),
-            labels={tr(pages.PAGE): tr(pages.COMPARISON)},
-        ),
         "reports/junit.xml",
     log:
         "logs/index.log",
@@ -72,7 +66,7 @@ rule index:
         "../envs/er3a.yaml"
     params:
         language=LANGUAGE,
-        captions=[pages.of_index(), pages.of_comparison()],
+        caption=pages.of_index(),
         expected={name: STUDY.entry(name).expect for name in STUDY.robots},
         rested_on=rested_on(),
         code=code_digest(),

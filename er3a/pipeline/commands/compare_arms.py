@@ -50,7 +50,7 @@ def compare(
 ):
     """Do A and B describe the same arm? Lists the entries that differ. Exit code 1 if any do."""
     from er3a.comparison.compare import best_of
-    from er3a.files.arm_file import read_arm, read_arms
+    from er3a.files.arm_file import read_arm
     from er3a.files.units import noted_doubts
     from er3a.robots.robot import to_modified, to_standard
 
@@ -61,15 +61,10 @@ def compare(
         raise Er3aError(f"--output is '{output}'; robot files end in .yaml")
     options: dict[str, Any] = {"convention": convention, "length_unit": length_unit, "angle_unit": angle_unit}
     options |= {"base": base, "tip": tip, "as_printed": True}
-    folder, left_out = Path(b), tuple[str, ...]()
+    folder = Path(b)
     with noted_doubts() as doubtful:
         first = read_arm(a, xacro=xacro or (), **options)
-        if folder.is_dir():
-            others, left_out = read_arms(folder, **options)
-        else:
-            others = {b: read_arm(b, xacro=xacro or (), **options)}
-    for problem in left_out:
-        print_note(problem)
+        others = _others(b, xacro or (), options)
     arm = first.robot
     if not first.printed and len(others) == 1 and (second := next(iter(others.values()))).printed:
         arm = (to_modified if second.robot.convention == "modified" else to_standard)(arm)
@@ -111,6 +106,18 @@ def compare(
         raise typer.Exit(1)
 
 
+def _others(source: str, xacro: Sequence[str], options: dict[str, Any]) -> dict[str, ReadArm]:
+    """The arm to compare with, or all of a folder by their files, with notes on those that are unreadable."""
+    from er3a.files.arm_file import read_arm, read_arms
+
+    if not Path(source).is_dir():
+        return {source: read_arm(source, xacro=xacro, **options)}
+    found, left_out = read_arms(Path(source), **options)
+    for problem in left_out:
+        print_note(problem)
+    return found
+
+
 def _unsettled(doubts: Sequence[DoubtfulUnit], found: Comparison, one_file: bool) -> list[DoubtfulUnit]:
     """Doubts that the comparison leaves: another arm that agrees, and is not in doubt, settles those of a table."""
     of_table = [each for each in doubts if each.key.startswith(OF_A_TABLE)]
@@ -147,7 +154,7 @@ def _print(ranked: list[tuple[str, Comparison]], folder: bool, doubts: list[str]
         for other, each in ranked[:MATCHES_SHOWN]:
             print(f"{other}: {headline(each)}")
         print()
-    print("; ".join([*doubts, headline(ranked[0][1])]))
+    print(headline(ranked[0][1], doubts))
     for layer, state, detail in (*doubt_rows(doubts), *layer_rows(ranked[0][1])):
         print(f"  {layer:<11} {state:<8} {detail}".rstrip())
 

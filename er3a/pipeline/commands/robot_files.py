@@ -18,7 +18,6 @@ from er3a.formats.mesh_file import Unit
 from er3a.pipeline.commands import options
 from er3a.pipeline.language import LANGUAGES, using
 from er3a.pipeline.progress import shown_work
-from er3a.pipeline.stages.registry import STAGES
 
 if TYPE_CHECKING:
     from er3a.calibration.calibrate import Calibration
@@ -81,29 +80,18 @@ def import_urdf(
 def export_urdf(
     robot: options.AnyRobot,
     output: Annotated[Path, typer.Option(help="the URDF to write")],
-    srdf: Annotated[
-        Path | None, typer.Option(help="also write an SRDF for MoveIt: the pairs of links not to check")
-    ] = None,
 ):
     """Write a robot as URDF."""
     from er3a.files.kept_files import write_atomically
     from er3a.files.robot_library import load_robot
-    from er3a.formats.urdf import assumed_pairs, export_srdf, pairs_not_checked
     from er3a.formats.urdf import export_urdf as urdf_text
 
     arm = load_robot(robot)
-    texts = {output: urdf_text(arm, output.with_name(f"{output.stem}_meshes"))}
-    if srdf is not None:
-        texts[srdf] = export_srdf(arm)
-        if rests := assumed_pairs(arm):
-            options.print_note(f"{srdf}: {rests}")
-        for pair in pairs_not_checked(arm):
-            options.print_note(f"{srdf}: {pair} overlap where no arm can; their shapes are in error, not checked")
+    text = urdf_text(arm, output.with_name(f"{output.stem}_meshes"))
     if arm.combined:
         options.print_note(f"{output}: limits on sums of joints are left out, as a URDF has no place for them")
-    for file, text in texts.items():
-        write_atomically(file, partial(Path.write_text, data=text, encoding="utf-8"))
-        print(f"{file}: written")
+    write_atomically(output, partial(Path.write_text, data=text, encoding="utf-8"))
+    print(f"{output}: written")
 
 
 @options.app.command(rich_help_panel=options.ROBOT_FILES)
@@ -190,7 +178,6 @@ def calibrate(
     ] = None,
     held_back: Annotated[Path | None, typer.Option(help="a CSV of positions to test the result, not to fit")] = None,
     html: Annotated[Path | None, typer.Option(help="also write a page")] = None,
-    rrd: Annotated[Path | None, typer.Option(help="also write a recording for the Rerun viewer")] = None,
     words: Annotated[str, typer.Option("--language", help=f"language of the page: {' | '.join(LANGUAGES)}")] = "en",
     as_json: options.AsJson = False,
 ):
@@ -223,20 +210,18 @@ def calibrate(
     settled = len(found.open) < len(found.estimates)
     record = {"output": str(output) if output and settled else None, **calibration_record(found, arm, rows, others)}
     model = _write_calibrated(corrected, record, output) if output and settled else None
-    if html or rrd:
-        from er3a.pipeline.viewing.calibration import measured_errors, record_calibration, write_calibration
     if html:
+        from er3a.pipeline.viewing.calibration import write_calibration
+
         command, files = ["er3a", *sys.argv[1:]], [given for given in (Path(robot), measurements) if given.is_file()]
-        shown = partial(write_calibration, command=command, files=files, corrected=corrected, recording=rrd)
+        shown = partial(write_calibration, command=command, files=files, corrected=corrected)
         with using(words):
             shown(arm, rows, found, html, held_back=others)
-    if rrd:
-        record_calibration(found, measured_errors(arm, rows, found), rrd)
     if as_json:
         options.print_json(record)
     else:
         lines = [lines_of(found, rows, others), *(held_back_lines(found, rows, others) if others else [])]
-        print("\n".join([*lines, *(f"{written}: written" for written in (html, rrd) if written)]))
+        print("\n".join([*lines, *([f"{html}: written"] if html else [])]))
     if output and not settled:
         raise Er3aError(
             f"{output}: not written, as these measurements settle none of the table's numbers; measure more"
@@ -246,31 +231,6 @@ def calibrate(
         print("\n".join(kept_lines(found, robot, output, model, contradicted=contradicted)))
     if contradicted or not found.fits:
         raise typer.Exit(1)
-
-
-@options.app.command(rich_help_panel=options.ROBOT_FILES)
-def predict(
-    model: Annotated[Path, typer.Argument(help="NAME_model.json, which er3a calibrate --output NAME.yaml writes")],
-    joints: Annotated[Path, typer.Argument(help="a CSV with the columns q1_deg ... (q3_mm of a joint that slides)")],
-    robot: Annotated[str, typer.Option(help="the robot that the calibration started from: a name or file")],
-):
-    """Print where a calibrated arm's tool is at commanded joint values, by the whole model with all its terms: a CSV
-    with position and roll, pitch and yaw."""
-    import numpy as np
-
-    from er3a.files.by_name import load_calibration, load_joint_values
-    from er3a.files.robot_library import load_robot
-    from er3a.geometry.transforms import rpy_of
-    from er3a.robots.joint_limits import shown
-
-    arm = load_robot(robot)
-    q = load_joint_values(joints, arm)
-    T = load_calibration(model, arm).forward(q)
-    names = [f"q{joint}_{'mm' if slides else 'deg'}" for joint, slides in enumerate(arm.slides, 1)]
-    print(",".join([*names, "x_mm", "y_mm", "z_mm", "roll_deg", "pitch_deg", "yaw_deg"]))
-    for values, pose in zip(shown(arm, q), T):
-        numbers = [*values, *1000 * pose[:3, 3], *np.degrees(rpy_of(pose))]
-        print(",".join(f"{number:.6f}" for number in numbers))
 
 
 @options.app.command(rich_help_panel=options.ROBOT_FILES)
@@ -336,12 +296,11 @@ def schema(
     folder: Annotated[Path, typer.Option(help="folder for the schemas of input files")] = Path("config"),
     docs: Annotated[Path, typer.Option(help="folder for the documents about results")] = Path("docs/results"),
 ):
-    """Write the JSON schemas of input files and results, and the data dictionary."""
+    """Write the JSON schemas of input files, and the data dictionary."""
     from er3a.pipeline.check import SCHEMAS
-    from er3a.pipeline.dictionary import data_dictionary, summary_schema
+    from er3a.pipeline.dictionary import data_dictionary
 
     schemas = {folder / f"{kind}.schema.json": model.model_json_schema() for kind, model in SCHEMAS.items()}
-    schemas |= {docs / f"{name}.schema.json": summary_schema(stage) for name, stage in STAGES.items()}
     for file, content in schemas.items():
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")

@@ -46,7 +46,7 @@ def views(
 ):
     """Write a robot's recordings (always in English) and pages from results.
 
-    The viewer also draws each recording as a picture for its page. For variants of a sweep the picture stays empty.
+    The viewer also draws each recording as a picture for its page.
     """
     from er3a.pipeline.stages import run
     from er3a.pipeline.viewing.figures import house_style
@@ -73,15 +73,12 @@ def views(
 def _record(study: Study, robot: str, stage: str, results: Path, reports: Path) -> str:
     """Write a stage's recording and its picture; why there is no picture, if there is to be one."""
     from er3a.pipeline.stages import run
-    from er3a.pipeline.viewing.viewer import draw_preview, write_empty
+    from er3a.pipeline.viewing.viewer import draw_preview
 
     recording = reports / robot / f"{stage}.rrd"
-    picture, problem = recording.with_suffix(".webp"), ""
+    picture = recording.with_suffix(".webp")
     run.show("record", stage, study, robot, results / robot / stage, recording)
-    if robot in study.variants:
-        write_empty(picture)
-    else:
-        problem = draw_preview(recording, picture) or ""
+    problem = draw_preview(recording, picture) or ""
     write_checksum(recording)
     write_checksum(picture)
     return problem
@@ -146,7 +143,7 @@ def index(
     results: options.Results = options.DEFAULT_RESULTS,
     reports: options.Reports = options.DEFAULT_REPORTS,
 ):
-    """Write the index and the page that compares two robots."""
+    """Write the index."""
     from er3a.pipeline.overview.index import write_index
     from er3a.pipeline.results import OVERALL
     from er3a.pipeline.viewing.figures import house_style
@@ -170,7 +167,7 @@ def article(
     shown = _study_to_show(study)
     if shown.article is None:
         raise Er3aError(f"{study}: article: missing. Name the tables to compare: printed, corrected and real")
-    write_article(shown, results, reports)
+    write_article(shown, shown.article, results, reports)
     for page in shown.article_pages().values():
         write_checksum(reports / page)
 

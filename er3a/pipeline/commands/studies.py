@@ -46,7 +46,8 @@ def new(
     ] = None,
 ):
     """Write a study for an arm: robot file, scene, targets and paths that the arm can do, README."""
-    from er3a.pipeline.new_study.write import arm_of, write_study
+    from er3a.pipeline.new_study.arms import arm_of
+    from er3a.pipeline.new_study.write import write_study
 
     ends, arguments = (base, tip), tuple(xacro or ())
     with shown_work(f"{folder}: reading the arm") as at:
@@ -54,7 +55,7 @@ def new(
         arm = arm_of(urdf, dh, robot, name=name, ends=ends, xacro=arguments, **form)
         at(f"{folder}: searching for targets and paths that the arm can do")
         written = write_study(arm, folder)
-    for note in (*arm.notes, *written.missing):
+    for note in arm.notes:
         options.print_note(note)
     for file in written.files:
         print(f"{file}: written")
@@ -75,9 +76,8 @@ def check(
     as_json: options.AsJson = False,
 ):
     """Check input files: print the kind of each file, or its error. Exit code 1 if a unit is in doubt."""
-    from er3a.files.robot_library import load_robot
     from er3a.files.units import noted_doubts
-    from er3a.pipeline.check import PROGRAM, check_file, stage_forms
+    from er3a.pipeline.check import PROGRAM, check_file
 
     found, worst = list[dict[str, object]](), 0
     for file in files:
@@ -90,9 +90,7 @@ def check(
             found.append({"file": str(file), "in_order": False, **parts})
             worst = 2
             continue
-        forms = stage_forms(load_robot(file)) if kind == "a robot" else {}
-        more: dict[str, object] = {"stages": forms} if forms else {}
-        more |= {"doubtful_units": [str(each) for each in doubts]} if doubts else {}
+        more: dict[str, object] = {"doubtful_units": [str(each) for each in doubts]} if doubts else {}
         more |= {"not_examined": [WHAT_IT_DOES]} if kind == PROGRAM else {}
         found.append({"file": str(file), "in_order": not doubts, "kind": kind} | more)
         worst = max(worst, int(bool(doubts)))
@@ -100,8 +98,6 @@ def check(
             state = f"{len(doubts)} doubtful unit{'s' if len(doubts) > 1 else ''}" if doubts else "in order"
             only = f"; not examined: {WHAT_IT_DOES}" if kind == PROGRAM else ""
             print(f"{file}: {kind}, {state}{only}")
-            for stage, form in forms.items():
-                print(f"  {stage}: {form}")
     if as_json:
         options.print_json(found)
     if worst:

@@ -36,11 +36,7 @@ ITEMS = (
         "er3a.gravity(robot, q, er3a.Load(6))",
         N_("Payload"),
         N_("The arm is introduced as a desktop arm for 6 kg."),
-        N_(
-            "No document that er3a has states a payload of the ER3A-C60; nothing else on this page rests on 6 kg. With "
-            "6 kg at its flange the real arm's joint 2 would have to hold up to {holding_loaded_nm:.0f} N m at rest, "
-            "anywhere within its limits; without load {holding_nm:.0f} N m. The dynamics page is of motions."
-        ),
+        N_("No document that er3a has states a payload of the ER3A-C60; nothing else on this page rests on 6 kg."),
         N_(
             "No source was found for it, and none for what the drives can hold. The manual of the arm's successor, the "
             "ER3-600, says 3 kg."
@@ -71,7 +67,7 @@ ITEMS = (
         ),
         N_(
             "These are the definitions of modified D-H (Craig). They give the same arm only if a and α move one "
-            "row down, as frame i then lies on axis i: {shifted_apart_mm} mm apart."
+            "row down, as frame i then lies on axis i."
         ),
     ),
     Item(
@@ -120,9 +116,8 @@ ITEMS = (
             "in 6.2)."
         ),
         N_(
-            "er3a's files are in mm and degrees, Python is in m and rad. Degrees given as radians put the "
-            "example's tool {degrees_off_mm:.0f} mm off; `er3a.forward` warns of them. All lengths of the table "
-            "add up to {length_m:.2f} m: read as metres it would be 1 000 times that."
+            "er3a's files are in mm and degrees, Python is in m and rad; `er3a.forward` warns of degrees given as"
+            " radians."
         ),
     ),
     Item(
@@ -156,10 +151,10 @@ ITEMS = (
         N_("Plot at the zero pose"),
         N_("The arm is plotted at zero in a window from z = 0 to 1.5 m."),
         N_(
-            "As printed the tool stands at z = {p_tool_z:.0f} mm: {hidden_percent:.0f} % of the arm's length is "
-            "outside that window (figure {figure_zero}). With offset 2 = −90° it is at {c_tool_z:.0f} mm."
+            "As printed the tool stands at z = {p_tool_z:.0f} mm, with offset 2 = −90° at {c_tool_z:.0f} mm; the "
+            "figure of the zero pose shows the window."
         ),
-        N_("The window hides most of the forearm, and the tool: the table is not the arm described."),
+        N_("The window hides the tool: the table is not the arm described."),
     ),
     Item(
         "teach",
@@ -179,11 +174,9 @@ ITEMS = (
             "violently, or a slider to move the tool hardly at all (again in 6.2)."
         ),
         N_(
-            "One degree of joint 4 turns the tool by {wrist_turn_deg:.3f}°, there as everywhere. The tool point it "
-            "moves hardly at all: by {wrist_shift_0:.2f}, {wrist_shift_1:.2f} and {wrist_shift_2:.2f} mm at joint 5 = "
-            "0°, 5° and 30°. If joint 4 turns by 1° at joint 5 = 0 and joint 6 turns back by 1°, the tool turns by "
-            "{wrist_against_deg:.3f}°. What grows is the joint speed that a turn of the tool needs: {gain_0:.1f}, "
-            "{gain_1:.1f} and {gain_2:.0f} times the tool's own at joint 5 = 5°, 1° and 0.1° (figure {figure_wrist})."
+            "One degree of joint 4 turns the tool by {wrist_turn_deg:.3f}°, there as everywhere. What grows is "
+            "the joint speed that a turn of the tool needs: {wrist_gain:.1f} times the tool's own at joint 5 = "
+            "1°."
         ),
         N_(
             "The second is right of the tool's position, the first of no pose. At the singularity the tool loses a "
@@ -197,9 +190,8 @@ ITEMS = (
         N_("Forward kinematics"),
         N_("The pose of q = [0, π/4, −π/6, 0, π/3, 0] is computed."),
         N_(
-            "As printed: ({p_example_x:.2f}, {p_example_y:.2f}, {p_example_z:.2f}) mm. With offset 2 = −90°: "
-            "({c_example_x:.2f}, {c_example_y:.2f}, {c_example_z:.2f}) mm. The article gives no numbers to "
-            "compare."
+            "As printed: ({p_example}) mm. With offset 2 = −90°: ({c_example}) mm. The article gives no numbers "
+            "to compare."
         ),
     ),
     Item(
@@ -209,9 +201,8 @@ ITEMS = (
         N_("Roll, pitch, yaw, Euler angles, quaternion"),
         N_("Orientation is read as roll-pitch-yaw (ZYX), as ZYZ Euler angles or as a quaternion."),
         N_(
-            "The example as printed: roll, pitch, yaw {p_example_roll:.2f}°, {p_example_pitch:.2f}°, "
-            "{p_example_yaw:.2f}°; ZYZ {zyz_0:.2f}°, {zyz_1:.2f}°, {zyz_2:.2f}°; quaternion w, x, y, z "
-            "{quaternion_0:.4f}, {quaternion_1:.4f}, {quaternion_2:.4f}, {quaternion_3:.4f}."
+            "Roll, pitch, yaw of the example as printed: {p_example_rpy}°. `er3a.zyz` and `er3a.quaternion` give "
+            "the others."
         ),
     ),
     Item(
@@ -220,10 +211,7 @@ ITEMS = (
         "er3a teach er3a_c60_article",
         N_("The same in the teach panel"),
         N_("The computed position must agree with what the teach panel shows."),
-        N_(
-            "The link leads to the example in the panel of this table, which computes by itself: it shows "
-            "({p_example_x:.2f}, {p_example_y:.2f}, {p_example_z:.2f}) mm as well."
-        ),
+        N_("The panel of this table computes by itself; at these joint values it shows ({p_example}) mm as well."),
     ),
     Item(
         "target",
@@ -233,7 +221,7 @@ ITEMS = (
         N_("The target is (0.5, 0.2, 0.7) m with roll, pitch, yaw 0°, 90°, 0°."),
         N_(
             "At a pitch of 90° roll and yaw are one turn: 0°, 90°, 0° and 30°, 90°, 30° are the same pose, "
-            "{same_pose_apart_deg}° apart."
+            "{same_pose_deg}° apart."
         ),
         N_(
             "The example lies on the singularity of roll-pitch-yaw, which the article does not mention. It harms "
@@ -319,11 +307,7 @@ ITEMS = (
         "er3a.forward(robot, q)",
         N_("Point cloud"),
         N_("10 000 random joint vectors within the limits are drawn as a cloud."),
-        N_(
-            "So drawn here as printed: from z = {cloud_lowest_mm:.0f} mm on, out to {cloud_farthest_mm:.0f} mm "
-            "from axis 1. The workspace stage proves a volume between {p_volume_low} and {p_volume_high} "
-            "m³."
-        ),
+        N_("The workspace page draws the cloud, and proves a volume of {p_volume} m³."),
     ),
     Item(
         "void",
@@ -332,9 +316,8 @@ ITEMS = (
         N_("The void"),
         N_("The workspace is a hollow shell; a region near and below the base can't be reached."),
         N_(
-            "As printed the largest void is of {p_void_low} to {p_void_high} L with its centre at z = "
-            "{p_void_z:.0f} mm; others: {p_other_voids}. With offset 2 = −90° {c_void_low} to {c_void_high} L "
-            "are left, at z = {c_void_z:.0f} mm (figure {figure_reach})."
+            "As printed the largest void is of {p_void} L with its centre at z = {p_void_z} mm. With offset 2 = "
+            "−90° {c_void} L are left, at z = {c_void_z} mm."
         ),
         N_(
             "The printed table's large void lies above the base, not below it. With the offset that the article's text "
@@ -348,8 +331,8 @@ ITEMS = (
         N_("Joint move"),
         N_("A quintic in joint space takes 5 s with 50 samples; angle, velocity and acceleration are plotted."),
         N_(
-            "Greatest velocity {move_speed_deg_s:.2f}°/s, greatest acceleration "
-            "{move_acceleration_deg_s2:.2f}°/s² (figure {figure_move}). The curve is the same for any table."
+            "Greatest velocity {move_speed_deg_s:.2f}°/s. The curve is the same for any table; the trajectory "
+            "page draws it."
         ),
     ),
     Item(
@@ -370,10 +353,8 @@ ITEMS = (
         N_("Straight line"),
         N_("50 poses on a straight line are solved one after the other with ikcon, each from the last."),
         N_(
-            "er3a follows the whole line of both tables, in ctraj's own time law: a trapezoid of speed, each ramp a "
-            "third of the time. Verdicts: {p_line} as printed, {c_line} with offset 2 = −90°. As printed the tool "
-            "turns by {line_turn_deg:.0f}° on the way: both directions are equally short, which the article does not "
-            "mention; er3a takes the counterclockwise one, seen from above."
+            "er3a follows the whole line of both tables, in ctraj's own time law: a trapezoid of speed, each ramp"
+            " a third of the time. Verdicts: {p_line} as printed, {c_line} with offset 2 = −90°."
         ),
     ),
     Item(
@@ -383,10 +364,8 @@ ITEMS = (
         N_("Where the line is singular"),
         N_("A straight line may cross singular regions; the example is played without a remark."),
         N_(
-            "As printed the line is singular at t = {p_crossings} s: it starts with axes 4 and 6 in line and "
-            "crosses again (on a quintic in place of ctraj's trapezoid: {quintic_crossings} s). With offset 2 = −90°: "
-            "t = {c_crossings} s. No joint speed jumps: it is {crossing_speed_deg_s:.0f}°/s at the last crossing, and "
-            "at most {p_line_speed_deg_s:.0f}°/s, of joint {peak_joint} at t = {peak_s:.1f} s (figure {figure_line})."
+            "As printed the line is singular at t = {p_crossings} s, with offset 2 = −90° at t = {c_crossings} s."
+            " No joint speed jumps: it is at most {p_line_speed}°/s."
         ),
         N_(
             "The article's own line is singular at its start and once more, which it does not mention. This does no "
@@ -401,7 +380,7 @@ ITEMS = (
         N_("The condition number is named as an example of manipulability (again in 6.2)."),
         N_(
             "Of two random poses the measures disagree in {ranked_apart_percent:.0f} % of the cases on which is "
-            "nearer to a singularity (figure {figure_measures})."
+            "nearer to a singularity."
         ),
         N_(
             "Manipulability is the product of the singular values, the condition number the ratio of the largest "
@@ -416,10 +395,7 @@ ITEMS = (
         N_("Stop, go round in joint space, warn the operator, or bend the line by a via point (6.2)."),
         N_(
             "All are tried and compared on the trajectory page. On the article's line as printed these work: "
-            "{ways_usable}; these do not, mostly because it begins at the singularity: {ways_unusable}. Recommended: "
-            "{way_chosen}; it leaves the line by {repair_mm:.0f} mm and {repair_deg:.1f}° and takes "
-            "{repair_longer_s:.2f} s longer. To go through the singularity, if slowly, is the last resort: the tool's "
-            "least error makes it a near miss."
+            "{ways_usable}. Recommended: {way_chosen}."
         ),
     ),
     Item(
@@ -431,10 +407,9 @@ ITEMS = (
         N_(
             "No official manual was found. Against CAD models and a URDF export {p_checks_met} of {p_checks} "
             "independent checks pass as printed, {c_checks_met} of {c_checks} with offset 2 = −90°, and "
-            "{r_checks_met} of {r_checks} of the real arm's own table. As printed the tool is {off_zero_mm:.0f} mm "
-            "from the real arm's with all joints at 0, positions that documents give are up to "
-            "{off_documented_mm:.0f} mm off, and at the worst joint angles the tool is {off_anywhere_mm:.0f} mm off, "
-            "{off_aligned_mm:.0f} mm once base, flange, zeros and directions are aligned."
+            "{r_checks_met} of {r_checks} of the real arm's own table. At the worst joint angles the printed "
+            "table's tool is {off_anywhere_mm:.0f} mm off, {off_aligned_mm:.0f} mm once base, flange, zeros and "
+            "directions are aligned."
         ),
         N_(
             "The lengths are another robot's: with offset 2 = −90° the table agrees with the article and is still"
@@ -448,9 +423,9 @@ ITEMS = (
         N_("Workspace drawing"),
         N_("Compare the cloud with the manual's drawing."),
         N_(
-            "No drawing of this arm was found. A number of it is known from CAD models and a URDF: the wrist centre "
-            "gets {reach_known_mm:.1f} mm from axis 1, as printed {reach_printed_mm:.1f} mm. For the ER3-600, whose "
-            "manual has a drawing, `make run` compares all of it: reports/er3_600/validation.html."
+            "No drawing of this arm was found. The real arm's tool gets {r_reach_mm:.0f} mm from axis 1, as "
+            "printed {p_reach_mm:.0f} mm. For the ER3-600, whose manual has a drawing, `make run` compares all of"
+            " it: reports/er3_600/validation.html."
         ),
         N_("The reach of the printed table is not that of the arm that it is said to be."),
     ),
@@ -469,9 +444,8 @@ ITEMS = (
         N_("A hole in the cloud"),
         N_("A hole in the middle means wrong limits, or a direction turned round, of joints 2 and 3."),
         N_(
-            "The hole is there as printed (at least {p_void_low} L). {changes_gone} of {changes_tried} single changes "
-            "of offsets, directions, lengths and limits would take it away: {changes_named}. Of these the "
-            "article's zero pose is met by: {changes_meeting}. Of {changes_undecided} changes it is not decided."
+            "The hole is there as printed ({p_void} L). Offset 2 = −90°, which the article's zero pose asks for, "
+            "leaves {c_void} L of it. The workspace page names the single changes that take it away."
         ),
         N_(
             "Offsets belong on the list, and the hole alone does not tell which entry is wrong: a wider limit "
@@ -492,10 +466,7 @@ ITEMS = (
         'er3a.clearance(robot, q_t, er3a.load_scene("data/scenes/wall_and_low_floor.yaml")).distance',
         N_("Collisions"),
         N_("Links as cylinders and boxes, checked along the path."),
-        N_(
-            "Along the article's joint move and line the printed table stays {p_move_clearance_mm:.0f} and "
-            "{p_line_clearance_mm:.0f} mm clear. {p_rests_on} The real arm, anywhere: {stage_collision}"
-        ),
+        N_("The trajectory pages give the clearance along the article's paths."),
     ),
     Item(
         "programs",
@@ -516,11 +487,7 @@ ITEMS = (
         'er3a.calibrate_hand_eye(er3a.load_hand_eye("data/vision/fixed_camera.yaml", robot))',
         N_("Camera"),
         N_("A calibrated camera gives a part's pose in the base frame, and inverse kinematics the joints to grasp it."),
-        N_(
-            "{grasped} of {objects} objects that a camera in front of the real arm sees can be grasped; at the worst "
-            "grasp 95 % of errors stay below {grasp_error_mm:.1f} mm. Objects placed where no grasp is possible, and "
-            "found so: {misplaced}. Samples left out of the camera's calibration: {poses_left_out}. {grasp_rests_on}"
-        ),
+        N_("A simulated camera in front of the real arm stands in for one."),
         N_("No real camera took part: what it sees is simulated."),
     ),
     Item(
@@ -530,9 +497,8 @@ ITEMS = (
         N_("Dynamics"),
         N_("With masses, centres and inertias, torques or forward dynamics can be computed, to choose motors."),
         N_(
-            "The greatest torque on the real arm's paths is {torque_nm:.0f} ± {torque_tolerance_nm:.0f} N m, of joint "
-            "{torque_joint}; links without a mass in its file: {massless}. Forward dynamics is "
-            "`er3a.dynamics.torques.accelerations`, for arms each of whose joints moves some mass."
+            "Torques of the real arm are computed from masses in its file. Forward dynamics is "
+            "`er3a.dynamics.torques.accelerations`."
         ),
         N_(
             "No drive's limits are known, so no motor can be chosen or judged, and the masses are neither measured "

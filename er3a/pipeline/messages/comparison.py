@@ -54,8 +54,18 @@ BESIDE = {"pair_rules": N_("rules for pairs of links"), "limits_on_sums": N_("li
 STATES = {True: N_("agrees"), False: N_("differs"), None: N_("not given")}
 
 
-def headline(found: Comparison) -> str:
-    """The verdict in one sentence, with units that differ first."""
+def headline(found: Comparison, doubts: Iterable[str] = ()) -> str:
+    """The verdict in one sentence, units first.
+
+    Parameters
+    ----------
+    found : the comparison; units that it found to differ stand before its verdict
+    doubts : about units of what was read, which stand before all else: what follows rests on these units
+    """
+    return joined([*doubts, _verdict(found)])
+
+
+def _verdict(found: Comparison) -> str:
     text = joined([*map(say, found.units.causes if found.units else ()), word("comparison", HEADLINES, found.verdict)])
     if found.as_printed_mm is None or found.aligned_mm is None:
         a, b = found.joints

@@ -10,7 +10,7 @@ from er3a.pipeline.messages.say import joined, word
 
 # Words of the lists in which a reader of the report chooses pages; the workflow's rules use them.
 PAGE, INDEX, ALL_ROBOTS = N_("page"), N_("index"), N_("All robots")
-TEACH_PANEL, COMPARISON = N_("teach panel"), N_("two robots side by side")
+TEACH_PANEL = N_("teach panel")
 ARTICLE = N_("the article, item by item")
 FOUNDATIONS: Mapping[str, str] = {
     "fail": N_(
@@ -157,11 +157,6 @@ def of_teach_panel(robot: str) -> str:
 def of_index() -> str:
     """The index."""
     return tr("What to do with each robot's model, and the verdicts and key figures behind that.")
-
-
-def of_comparison() -> str:
-    """The comparison of two robots."""
-    return tr("Two robots side by side: parameters, key figures, and the borders of what they reach in one drawing.")
 
 
 def of_article() -> str:

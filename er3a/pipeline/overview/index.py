@@ -1,7 +1,4 @@
-"""The pages over all robots: the index (robots x stages, verdicts and key figures) and the comparison of two.
-
-Variants of a sweep are listed only in the section of their sweep.
-"""
+"""The page over all robots: the index (robots x stages, verdicts and key figures)."""
 
 from __future__ import annotations
 
@@ -14,9 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from markupsafe import Markup
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull
 
 from er3a.files.kept_files import shown_path
@@ -27,8 +21,8 @@ from er3a.pipeline.language import N_, own_title, tr
 from er3a.pipeline.messages.collision import near_shapes
 from er3a.pipeline.messages.dynamics import payload_text
 from er3a.pipeline.messages.left_out import left_out_text, say_reserved
-from er3a.pipeline.messages.numbers import at_least, at_most, fixed, number
-from er3a.pipeline.messages.pages import caveat, decision, next_step
+from er3a.pipeline.messages.numbers import at_least, at_most, fixed
+from er3a.pipeline.messages.pages import decision, next_step
 from er3a.pipeline.messages.say import bracketed, joined, say, sentence
 from er3a.pipeline.messages.validation import (
     CONVENTIONS,
@@ -46,13 +40,10 @@ from er3a.pipeline.results import (
     THE_CODE,
     THE_SETTINGS,
     AbsentResults,
-    Input,
     NoPass,
     Provenance,
     Stored,
-    input_records,
     is_computed,
-    read_foundation,
     read_stage,
     result_records,
 )
@@ -72,16 +63,12 @@ from er3a.pipeline.stages.validation.model import (
     ValidationResults,
 )
 from er3a.pipeline.stages.validation.page.evidence_section import evidence_section
-from er3a.pipeline.stages.workspace.model import VoidSummary, WorkspaceResults, WorkspaceSummary
+from er3a.pipeline.stages.workspace.model import WorkspaceResults, WorkspaceSummary
 from er3a.pipeline.stages.workspace.page.tray import MOTIONS, Placing, placing, scene_of, sound_motions
 from er3a.pipeline.study import Study
-from er3a.pipeline.sweeps import ENTRIES, entry_label
 from er3a.pipeline.verdicts import NOT_EXAMINED, StageVerdict, read_verdicts, write_junit
 from er3a.pipeline.viewing import page
-from er3a.pipeline.viewing.figures import new_figure
-from er3a.pipeline.viewing.page import PAGES, Head, Picture, alternative_table, head_of, stage_head, status_word
-from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, MUTED, REFERENCE, VERDICTS
-from er3a.robots.joint_limits import shown
+from er3a.pipeline.viewing.page import PAGES, Head, alternative_table, head_of
 from er3a.robots.robot import Robot
 
 BORDER_POINT = "tool_point"
@@ -89,94 +76,6 @@ MAX_CHANGED = 6  # files that have changed since, and are named
 Workspaces = Mapping[str, WorkspaceResults | AbsentResults | None]
 Outdated = Mapping[tuple[str, str], tuple[str, ...]]
 """What has changed since stages were computed, by robot and stage."""
-
-
-def write_compare(study: Study, results: Path, workspaces: Workspaces, outdated: Outdated, output: Path) -> None:
-    """Render ``compare.html`` from the tables and summaries of all robots, and their workspaces."""
-    robots = {name: study.robot(name) for name in study.robots}
-    values = {
-        name: parameters(robot) | key_figures(results / name, study.stages(name)) for name, robot in robots.items()
-    }
-    borders = {name: border_mm(workspaces[name]) for name in robots}
-    rows = list(dict.fromkeys(key for own in values.values() for key in own))
-    groups = list(dict.fromkeys(group for group, _, _ in rows))
-    rows.sort(key=lambda row: groups.index(row[0]))
-    data = {
-        name: {
-            "title": own_title(robot.title),
-            "values": [values[name].get(row) for row in rows],
-            "border": borders[name],
-        }
-        for name, robot in robots.items()
-    }
-    validated = {name: results / name / "validation" for name in robots}
-    corners = np.array([point for border in borders.values() for line in border for point in line] or [[0, 0]])
-    page.render(
-        Path(__file__).with_name("compare.html.j2"),
-        output,
-        command=page.run_command(study, "compare.html"),
-        provenance=Provenance(_inputs(study, results), code_digest(), seed=study.seed),
-        rows=rows,
-        data=data,
-        caveats={
-            name: caveat(read_foundation(folder) if is_computed(folder) else "not_computed")
-            for name, folder in validated.items()
-        },
-        outdated={name: changed_text(outdated, {name}) for name in robots},
-        low=corners.min(axis=0).tolist(),
-        high=corners.max(axis=0).tolist(),
-        compare_script=Path(__file__).with_name("compare.js").read_text(encoding="utf-8"),
-    )
-
-
-def _inputs(study: Study, results: Path) -> tuple[Input, ...]:
-    return input_records(study.robot_file(name) for name in study.robots) + result_records(results, study.robots)
-
-
-def parameters(robot: Robot) -> dict[tuple[str, str, str], float | str | None]:
-    """Values of a robot's table by (group, name, unit); None where unknown."""
-    of_joints = ["mm" if slides else tr("deg") for slides in robot.slides]
-    own = shown(robot, np.stack([robot.lower, robot.upper, robot.speed]))
-    columns = (
-        (tr("D-H table"), "a", ["mm"] * robot.rows, robot.a * 1000),
-        (tr("D-H table"), "α", [tr("deg")] * robot.rows, np.degrees(robot.alpha)),
-        (tr("D-H table"), "d", ["mm"] * robot.rows, robot.d * 1000),
-        (tr("zero"), tr("offset"), [tr("deg")] * robot.rows, np.degrees(robot.offset)),
-        (tr("zero"), tr("direction"), [""] * robot.rows, [_sense(value) for value in robot.direction.tolist()]),
-        (tr("limits"), tr("lower limit"), of_joints, own[0]),
-        (tr("limits"), tr("upper limit"), of_joints, own[1]),
-        (tr("speeds"), tr("greatest speed"), ["mm/s" if slides else tr("deg/s") for slides in robot.slides], own[2]),
-    )
-    found: dict[tuple[str, str, str], float | str | None] = {
-        (tr("D-H table"), tr("convention"), ""): tr(CONVENTIONS[robot.convention])
-    }
-    for group, name, units, values in columns:
-        for joint, (unit, value) in enumerate(zip(units, values), start=1):
-            found[group, f"J{joint} {name}", unit] = value if isinstance(value, str) else _finite(value)
-    return found
-
-
-def _sense(direction: float) -> str:
-    return tr("+1: positive as the D-H row") if direction > 0 else tr("−1: positive against the D-H row")
-
-
-def _finite(value: float) -> float | None:
-    return round(float(value), 9) if np.isfinite(value) else None
-
-
-def key_figures(folder: Path, stages: Sequence[str]) -> dict[tuple[str, str, str], float | str | None]:
-    """Verdicts and key figures of a robot's stages by (stage, name, unit)."""
-    found: dict[tuple[str, str, str], float | str | None] = {}
-    for stage in (STAGES[name] for name in stages if name in STAGES and is_computed(folder / name)):
-        head, title = stage_head(folder / stage.name, stage), tr(stage.title)
-        found[title, tr("verdict"), ""] = page.status_word(head.status)
-        for figure in head.figures:
-            value, unit = figure.value, figure.unit
-            if figure.part and value is not None:  # the whole differs from robot to robot
-                found[title, figure.label, ""] = f"{figure.text} {unit}"
-            else:
-                found[title, figure.label, unit] = figure.rounded
-    return found
 
 
 def changed_text(outdated: Outdated, robots: Set[str]) -> str:
@@ -194,214 +93,6 @@ def _changed_names(changed: Sequence[str]) -> str:
     return joined([*named, *more], ", ")
 
 
-def border_mm(workspace: WorkspaceResults | AbsentResults | None) -> list[list[list[float]]]:
-    """The outline of what may be reached in the section through axis 1: lists of (radius, height) in mm."""
-    if not isinstance(workspace, WorkspaceResults):
-        return []
-    arcs = workspace.border.frame().groupby("arc", sort=False)
-    return [(arc[["rho_m", "z_m"]].to_numpy() * 1000).round(2).tolist() for _, arc in arcs]
-
-
-MARKERS = {"pass": "o", "caution": "^", "fail": "X", "conflict": "D", "no_reference": "s", "not_computed": "x"}
-SHORT_TABLE = 12
-
-
-@dataclass(frozen=True)
-class Point:
-    """A variant in a sweep: its value and its stages' results, by stage."""
-
-    name: str
-    value: float
-    stages: dict[str, Stored[Any]]
-
-    @property
-    def workspace(self) -> WorkspaceSummary:
-        """What the workspace stage found."""
-        return self.stages["workspace"].results.summary
-
-    @property
-    def enclosed(self) -> list[VoidSummary]:
-        """The enclosed voids that the workspace stage lists."""
-        return self.workspace.enclosed_voids
-
-    def litres(self, bound: str) -> float:
-        """The ``lower`` or ``upper`` bound of the enclosed voids' volume together, L."""
-        return 1000 * sum(getattr(void.volume_m3, bound) for void in self.enclosed)
-
-
-def sweep_sections(study: Study, results: Path, outdated: Outdated) -> list[dict[str, Any]]:
-    """What the template shows of each sweep of the study whose variants have all been computed."""
-    return [_section(study, name, results, outdated) for name in study.sweeps if _is_whole(study, name, results)]
-
-
-def _is_whole(study: Study, name: str, results: Path) -> bool:
-    variants = [variant.name for variant in study.variants.values() if variant.sweep == name]
-    return all(is_computed(results / variant / stage) for variant in variants for stage in study.stages(variant))
-
-
-def _section(study: Study, name: str, results: Path, outdated: Outdated) -> dict[str, Any]:
-    sweep = study.sweeps[name]
-    variants = [variant for variant in study.variants.values() if variant.sweep == name]
-    points = [
-        Point(v.name, v.value, {stage: read_stage(results / v.name / stage, STAGES[stage]) for stage in sweep.stages})
-        for v in variants
-    ]
-    content, entry = study.table(sweep.robot), study.entry(sweep.robot)
-    own = variants[0].replaced(content, entry.tool or content.tool)
-    what, unit = entry_label(ENTRIES[sweep.vary]), ENTRIES[sweep.vary].unit
-    ends = {"low": _plain(min(sweep.resolved)), "high": _plain(max(sweep.resolved))}
-    title = tr(
-        "{robot}: {what} from {low} to {high} {unit}", robot=own_title(content.title), what=what, unit=unit, **ends
-    )
-    columns, rows = _table(points, what, unit, sweep.stages)
-    return {
-        "name": name,
-        "title": title,
-        "count": len(points),
-        "outdated": changed_text(outdated, {variant.name for variant in variants}),
-        "picture": Picture(
-            _figure(points, bracketed(what, tr(unit)), own, sweep.stages),
-            tr("Results of {count} variants against {what}", count=len(points), what=what),
-            _caption(points, own, unit, "workspace" in sweep.stages),
-        ),
-        "columns": columns,
-        "rows": rows,
-        "open": len(points) <= SHORT_TABLE,
-    }
-
-
-def _computed(points: list[Point]) -> list[Point]:
-    """The variants whose workspace was computed."""
-    return [point for point in points if point.stages["workspace"].status != "not_computed"]
-
-
-def _figure(points: list[Point], label: str, own: float | None, stages: list[str]) -> Figure:
-    drawers = {_draw_volume: 2.4, _draw_litres: 1.5, _draw_numbers: 1.3} if "workspace" in stages else {}
-    heights = [*drawers.values(), 0.35 + 0.25 * len(stages)]
-    figure, axes = new_figure(
-        len(heights), 1, height=1.0 + sum(heights), sharex=True, squeeze=False, height_ratios=heights
-    )
-    for drawer, panel in zip(drawers, axes[:, 0]):
-        drawer(panel, _computed(points))
-    _draw_verdicts(axes[-1, 0], points, stages)
-    for panel in axes[:, 0]:
-        if own is not None:
-            panel.axvline(own, color=MUTED, linestyle=":", zorder=0)
-    axes[-1, 0].set_xlabel(label)
-    return figure
-
-
-def _draw_volume(axes: Axes, points: list[Point]) -> None:
-    volumes = [point.workspace.volume_m3 for point in _in_order(points)]
-    x = [point.value for point in _in_order(points)]
-    low, high = ([getattr(volume, bound) for volume in volumes] for bound in ("lower", "upper"))
-    axes.fill_between(x, low, high, color=MODEL, alpha=0.25, linewidth=0, label=tr("proven bounds"))
-    axes.vlines(x, low, high, color=MODEL, linewidth=1)
-    axes.set_ylabel(tr("reached volume (m³)"))
-    axes.legend(loc="best")
-
-
-def _draw_litres(axes: Axes, points: list[Point]) -> None:
-    low, high = ([point.litres(bound) for point in points] for bound in ("lower", "upper"))
-    x = [point.value for point in points]
-    axes.vlines(x, low, high, color=REFERENCE, linewidth=3)
-    axes.plot(x, low, "_", color=REFERENCE)
-    axes.set_ylim(bottom=0)
-    axes.set_ylabel(tr("enclosed voids (L)"))
-
-
-def _draw_numbers(axes: Axes, points: list[Point]) -> None:
-    x = [point.value for point in points]
-    numbers = [len(point.enclosed) for point in points]
-    pockets = [len(point.workspace.voids) - count for point, count in zip(points, numbers)]
-    axes.plot(x, pockets, "o", color=MUTED, markerfacecolor="none", label=tr("open pockets"))
-    axes.plot(x, numbers, ".", color=HIGHLIGHT, label=tr("enclosed"))
-    axes.yaxis.get_major_locator().set_params(integer=True)  # type: ignore[call-arg]
-    axes.set_ylim(bottom=-0.5, top=max([*pockets, *numbers, 1]) + 0.5)
-    axes.set_ylabel(tr("voids"))
-    axes.legend(loc="best")
-
-
-def _draw_verdicts(axes: Axes, points: list[Point], stages: list[str]) -> None:
-    rows = list(reversed(stages))
-    seen = set()
-    for point in points:
-        for row, stage in enumerate(rows):
-            status = point.stages[stage].status
-            label = None if status in seen else status_word(status)
-            seen.add(status)
-            axes.plot(point.value, row, MARKERS[status], color=VERDICTS[status], linestyle="none", label=label)
-    axes.set_yticks(range(len(rows)), [tr(PAGES[stage]) for stage in rows])
-    axes.set_ylim(-0.6, len(rows) - 0.4)
-    axes.grid(False, axis="y")
-    axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=len(seen), borderpad=0)
-
-
-def _caption(points: list[Point], own: float | None, unit: str, workspace: bool) -> str:
-    said = []
-    if workspace and _computed(points):
-        ordered = _in_order(_computed(points))
-        text = N_(
-            "Proven reached volume: {low_1} to {high_1} m³ at {value_1}, {low_2} to {high_2} m³ at {value_2} {unit}."
-        )
-        parts = {"unit": unit}
-        for end, point in enumerate((ordered[0], ordered[-1]), start=1):
-            volume = point.workspace.volume_m3
-            parts |= {f"low_{end}": at_least(volume.lower, "m³"), f"high_{end}": at_most(volume.upper, "m³")}
-            parts[f"value_{end}"] = _plain(point.value)
-        said.append(tr(text, **parts))
-    if own is not None:
-        said.append(tr("Dotted: the robot's own value, {value} {unit}.", value=_plain(own), unit=unit))
-    return " ".join(said)
-
-
-def _plain(value: float) -> str:
-    """A varied value with the digits that it is written with."""
-    return f"{value:.9g}".replace("-", "−")
-
-
-def _in_order(points: list[Point]) -> list[Point]:
-    return sorted(points, key=lambda point: point.value)
-
-
-def _table(points: list[Point], what: str, unit: str, stages: list[str]) -> tuple[list[str], list[list[Any]]]:
-    columns = [tr("variant"), bracketed(what, tr(unit)) + ">", *(tr(PAGES[stage]) for stage in stages)]
-    rows = [[point.name, _plain(point.value), *(_verdict(point, stage) for stage in stages)] for point in points]
-    if "workspace" in stages:
-        numbers = (
-            tr("reached volume, at least (m³)"),
-            tr("at most (m³)"),
-            tr("enclosed voids"),
-            tr("their volume, at least (L)"),
-            tr("open pockets"),
-            tr("greatest reach from axis 1 (mm)"),
-        )
-        columns += [f"{label}>" for label in numbers]
-        rows = [[*row, *_workspace_cells(point)] for row, point in zip(rows, points)]
-    return columns, rows
-
-
-def _workspace_cells(point: Point) -> list[str]:
-    if not _computed([point]):
-        return ["–"] * 6
-    summary = point.workspace
-    return [
-        at_least(summary.volume_m3.lower, "m³"),
-        at_most(summary.volume_m3.upper, "m³"),
-        str(len(point.enclosed)),
-        at_least(point.litres("lower"), "L"),
-        str(len(summary.voids) - len(point.enclosed)),
-        number(1000 * summary.reach_m.furthest_from_axis),
-    ]
-
-
-def _verdict(point: Point, stage: str) -> Markup:
-    status = point.stages[stage].status
-    return Markup('<a href="{}/{}.html"><span class="badge {}">{}</span></a>').format(
-        point.name, stage, status, status_word(status)
-    )
-
-
 CORNERS = 24  # of an arc, at most
 MARGIN_MM = 40.0
 
@@ -415,10 +106,11 @@ class Thumbnail:
     arm: str
 
 
-def thumbnail(robot: Robot, workspace: WorkspaceResults | AbsentResults | None) -> Thumbnail:
+def thumbnail(robot: Robot, workspace: Stored[Any] | None) -> Thumbnail:
     """Draw a robot, with the outline of the sampled hull."""
     arm = skeleton(robot, np.zeros(robot.joints))[:, ::2] * 1000
-    reach = [line * 1000 for line in _reach(workspace)] if isinstance(workspace, WorkspaceResults) else []
+    results = workspace.results if workspace else None
+    reach = [line * 1000 for line in _reach(results)] if isinstance(results, WorkspaceResults) else []
     corners = np.concatenate([arm, *reach])
     low, high = corners.min(axis=0) - MARGIN_MM, corners.max(axis=0) + MARGIN_MM
     box = (low[0], -high[1], *(high - low))
@@ -453,19 +145,18 @@ FIRST = ("fail", "conflict", "caution", "no_reference", "not_computed", "pass") 
 
 
 def write_index(study: Study, results: Path, folder: Path) -> None:
-    """Render ``index.html``, ``compare.html`` and ``junit.xml`` from the results of all robots and stages.
+    """Render ``index.html`` and ``junit.xml`` from the results of all robots and stages.
 
     Stages that have not been computed yet are named as such, and those whose inputs have changed since.
-    The comparison offers the robots that are written in the study, not the variants that sweeps make of them.
     """
     verdicts = read_verdicts(study, results)
     outdated = {(each.robot, each.stage): each.outdated for each in verdicts if each.outdated}
-    workspaces = {name: _workspace(results / name / "workspace") for name in study.robots}
+    stored = {name: _computed(study, name, results / name) for name in study.robots}
     robots = [
-        _entry(study, name, results / name, outdated) | {"thumbnail": thumbnail(study.robot(name), workspaces[name])}
+        _entry(study, name, alternative_table(study, name, results), stored, outdated)
+        | {"thumbnail": thumbnail(study.robot(name), stored[name].get("workspace"))}
         for name in study.robots
     ]
-    write_compare(study, results, workspaces, outdated, folder / "compare.html")
     contradicted = {each["robot"].name for each in robots if each["table"] == "fail"}
     page.render(
         Path(__file__).with_name("index.html.j2"),
@@ -478,7 +169,6 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         run_words=MAY_RUN,
         conventions=CONVENTIONS,
         most_faults=MAX_FAULTS,
-        sweeps=sweep_sections(study, results, outdated),
         command=page.run_command(study, "index.html"),
         provenance=Provenance(
             inputs=result_records(results, study.names),
@@ -549,7 +239,6 @@ def _places(
         f"{name}/{stage}.html": tr("{robot}: {page}", robot=titles[name], page=tr(PAGES[stage]))
         for name, stage in pages
     }
-    named["compare.html"] = tr("Two robots")
     if study.article:
         named["article.html"] = tr("The article, item by item")
     for address, title in named.items():
@@ -559,24 +248,26 @@ def _places(
             yield address, title, [(head, list(texts)) for head, texts in parser.texts.items()]
 
 
-def _workspace(folder: Path) -> WorkspaceResults | AbsentResults | None:
-    """What the workspace stage found; None if it has not been computed yet."""
-    return read_stage(folder, STAGES["workspace"]).results if is_computed(folder) else None
+def _computed(study: Study, name: str, folder: Path) -> dict[str, Stored[Any]]:
+    """The results of a robot's stages that are there, by stage."""
+    return {
+        stage: read_stage(folder / stage, STAGES[stage]) for stage in study.stages(name) if is_computed(folder / stage)
+    }
 
 
-def _evidence(results: Path) -> TableEvidence | None:
+def _evidence(stored: Mapping[str, Stored[Any]]) -> TableEvidence | None:
     """What evidence says of a robot's table; None before the validation stage has been computed."""
-    folder = results / "validation"
-    stored = read_stage(folder, STAGES["validation"]).results if is_computed(folder) else None
-    return stored.summary.evidence if isinstance(stored, ValidationResults) else None
+    results = stored["validation"].results if "validation" in stored else None
+    return results.summary.evidence if isinstance(results, ValidationResults) else None
 
 
-def _entry(study: Study, name: str, results: Path, outdated: Outdated) -> dict[str, Any]:
-    """What the index shows of a robot."""
+def _entry(
+    study: Study, name: str, instead: str | None, of_robots: Mapping[str, Mapping[str, Stored[Any]]], outdated: Outdated
+) -> dict[str, Any]:
+    """What the index shows of a robot; ``instead``: the robot whose table is to be used in place of its own."""
     changed = {stage: files for (robot_name, stage), files in outdated.items() if robot_name == name}
     robot, expected = study.robot(name), study.entry(name).expect
-    stages = [stage for stage in study.stages(name) if stage in STAGES]
-    stored = {stage: read_stage(results / stage, STAGES[stage]) for stage in stages if is_computed(results / stage)}
+    stages, stored = study.stages(name), of_robots[name]
     heads = {stage: head_of(each) for stage, each in stored.items()}
     failed = {
         stage: tr(STAGES[stage].title)
@@ -585,14 +276,11 @@ def _entry(study: Study, name: str, results: Path, outdated: Outdated) -> dict[s
     }
     table = heads["validation"].status if "validation" in heads else NOT_EXAMINED
     finding = heads["validation"].finding if "validation" in heads else None
-    same_arm, instead = isinstance(finding, DefinedOtherwise), alternative_table(study, name, results.parent)
-    unproven, settled = _settled(finding, _evidence(results))
-    entries = evidence_section(robot, _evidence(results), _evidence(results.parent / instead) if instead else None)
+    same_arm, evidence = isinstance(finding, DefinedOtherwise), _evidence(stored)
+    unproven, settled = _settled(finding, evidence)
+    entries = evidence_section(robot, evidence, _evidence(of_robots[instead]) if instead else None)
     computed = {stage: each for stage, each in stored.items() if heads[stage].status != "not_computed"}
-    runs = [_run(stage, name, computed[stage].results) for stage in MAY_RUN if stage in computed]
-    grasped = sound_motions(computed["vision"].results) if "vision" in computed else []
-    sound = {run["stage"]: run["sound"] for run in runs} | {"vision": grasped}
-    placed = placing(computed, robot, {stage: scene_of(study, name, stage) for stage in MOTIONS}, sound)
+    runs, grasped, placed = _motions(study, robot, name, computed)
     return {
         "robot": robot,
         "table": table,
@@ -643,6 +331,17 @@ def _entry(study: Study, name: str, results: Path, outdated: Outdated) -> dict[s
         "not_examined": [tr(STAGES[stage].title) for stage in stages if stage not in heads],
         "not_asked": [tr(stage.title) for name, stage in STAGES.items() if name not in stages],
     }
+
+
+def _motions(
+    study: Study, robot: Robot, name: str, computed: Mapping[str, Stored[Any]]
+) -> tuple[list[dict[str, Any]], Sequence[str], Placing | None]:
+    """The paths and programs of a robot, the objects that its tool can grasp, and where to put the tray."""
+    runs = [_run(stage, name, computed[stage].results) for stage in MAY_RUN if stage in computed]
+    grasped = sound_motions(computed["vision"].results) if "vision" in computed else []
+    sound = {run["stage"]: run["sound"] for run in runs} | {"vision": grasped}
+    scenes = {stage: scene_of(study, name, stage) for stage in MOTIONS}
+    return runs, grasped, placing(computed, robot, scenes, sound)
 
 
 def _conflict(finding: object) -> str:

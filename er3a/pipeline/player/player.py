@@ -26,6 +26,7 @@ from er3a.robots.joint_limits import shown, size_of, theta_limits
 from er3a.robots.robot import Robot
 
 _HERE = Path(__file__).parent
+TEMPLATES = jinja2.Environment(loader=jinja2.FileSystemLoader(_HERE), autoescape=True, trim_blocks=True)
 TEACH = _HERE.with_name("teach")
 MAX_FRAMES, FRAMES_IN_ALL, MIN_FRAMES = 240, 6000, 40  # of a motion, of all, and of one among many
 MAX_FACES, MIN_CORNERS = 2000, 12  # of an arm, and of a convex piece
@@ -97,9 +98,8 @@ def player(
     if not shown:
         return Markup()
     words = {key: tr(word) for key, word in WORDS.items()} | {"between": tr("; ")}
-    environment = jinja2.Environment(loader=jinja2.FileSystemLoader(_HERE), autoescape=True, trim_blocks=True)
     return Markup(
-        environment.get_template("player.html.j2").render(
+        TEMPLATES.get_template("player.html.j2").render(
             words=words,
             looks={key: tr(word) for key, word in LOOKS.items()} if robot.visuals else {},
             motions=shown,

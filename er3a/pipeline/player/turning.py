@@ -25,6 +25,7 @@ from er3a.pipeline.language import N_, own_title, tr
 from er3a.pipeline.viewing.palette import MUTED
 
 _HERE = Path(__file__).parent
+TEMPLATES = jinja2.Environment(loader=jinja2.FileSystemLoader(_HERE), autoescape=True, trim_blocks=True)
 STEPS = 65_535  # that the box around everything is divided into
 SHADES = 64
 DARKEST = 0.33  # of a scale of colours, which is still seen on a dark page
@@ -138,9 +139,8 @@ def turning_figure(
             {"name": name, "layers": [_layer(layer, low, high) for layer in layers]} for name, layers in groups.items()
         ],
     }
-    environment = jinja2.Environment(loader=jinja2.FileSystemLoader(_HERE), autoescape=True, trim_blocks=True)
     return Markup(
-        environment.get_template("turning.html.j2").render(
+        TEMPLATES.get_template("turning.html.j2").render(
             words={key: tr(text) for key, text in WORDS.items()},
             groups=list(groups),
             scale=scale,

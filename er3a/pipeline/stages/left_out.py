@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,14 +15,16 @@ from er3a.collision.pairs import PENETRATION_TOLERANCE, link_label
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import COVERED, arm_shapes, depths_in, has_bare_tool
 from er3a.errors import DoubtfulUnit
-from er3a.files.hand_eye_file import SeenImages
 from er3a.files.kept_files import shown_path
 from er3a.geometry.transforms import rotation_angle
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.results import NEVER_A_PASS, LeftOut, LeftOutSubject
 from er3a.robots.robot import Robot
-from er3a.vision.calibration_set import CalibrationSet
+
+if TYPE_CHECKING:
+    from er3a.files.hand_eye_file import SeenImages
+    from er3a.vision.calibration_set import CalibrationSet
 
 
 def left_out_of_collisions(

@@ -1,5 +1,5 @@
-"""The page and the recording of ``er3a calibrate``: errors before and after over the workspace, each joint's share,
-entries, terms, the corrected file beside the table before; the corrected arm at the measured poses.
+"""The page of ``er3a calibrate``: errors before and after over the workspace, each joint's share, entries, terms, the
+corrected file beside the table before.
 """
 
 from __future__ import annotations
@@ -10,8 +10,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import rerun as rr
-from matplotlib import colormaps
 from matplotlib.ticker import MaxNLocator
 
 from er3a.calibration.calibrate import Calibration, TermEstimate
@@ -40,9 +38,7 @@ from er3a.pipeline.results import Input, Provenance
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.figures import equal_scale, house_style, new_figure
 from er3a.pipeline.viewing.page import Picture, ShownFigure
-from er3a.pipeline.viewing.palette import HIGHLIGHT, JOINTS, MODEL, MUTED, REFERENCE
-from er3a.pipeline.viewing.recording import Curves, Logged, Recorded, Run, escaped, write_recording
-from er3a.robots.joint_limits import meant, size_of
+from er3a.pipeline.viewing.palette import JOINTS, MUTED
 from er3a.robots.robot import Robot
 
 BINS = 12
@@ -102,7 +98,6 @@ def write_calibration(
     command: Sequence[str],
     files: Sequence[Path],
     corrected: Robot,
-    recording: Path | None = None,
     held_back: Sequence[Measurement] = (),
 ) -> None:
     """Render a calibration as a page.
@@ -113,7 +108,6 @@ def write_calibration(
     command : that made it
     files : what it was made from: the robot's file, if it is no name, and the measurements
     corrected : what the robot file holds, with the file's name
-    recording : its recording, if there is one
     held_back : positions that the fit has not seen
     """
     errors = measured_errors(robot, measurements, found)
@@ -133,7 +127,6 @@ def write_calibration(
             texts=_texts(found, held_back),
             figures=_figures(found, errors),
             errors=_errors(found, errors, held_back),
-            recording=recording,
             entries=_entries(found),
             held=[say(why) for why in found.held],
             outliers=[(str(each.row), number(each.distance_mm, 3)) for each in found.outliers],
@@ -294,72 +287,3 @@ def _binned(ax, values: Reals, left: Reals) -> None:
             error = np.array([2 * d.std(ddof=1) / np.sqrt(len(d)) for _, d in kept])
             ax.plot(at, mean, color=JOINTS[c], label=name)
             ax.fill_between(at, mean - error, mean + error, color=JOINTS[c], alpha=0.2, linewidth=0)
-
-
-STAGE_NAME = "calibration"
-SECONDS_A_POSE = 0.25
-MAX_SHOWN_POSES = 400
-ARROW = 0.1  # of the arm's size: the longest error's arrow
-COLOURS = {"before": REFERENCE, "table": MODEL, "model": HIGHLIGHT}
-NAMES = {"before": "before", "table": "robot file", "model": "with terms"}
-
-
-def record_calibration(found: Calibration, errors: MeasuredErrors, output: Path) -> None:
-    """Write the recording of a calibration: one pose after the other as in the file (400 of them at most), all points
-    coloured by their errors, and the errors as curves."""
-    robot, models = found.robot, list(errors.differences_mm)
-    rows = np.unique(np.linspace(0, len(errors.q) - 1, min(len(errors.q), MAX_SHOWN_POSES)).round().astype(int))
-    times, texts = SECONDS_A_POSE * np.arange(len(rows), dtype=float), [_now(errors, int(k)) for k in rows]
-    distances = np.stack([errors.distances_mm(model)[rows] for model in models], axis=1)
-    run = Run(
-        name="measured poses",
-        text=texts[0],
-        t=times,
-        q=meant(robot, errors.q[rows]),
-        curves={"errors": distances},
-        texts=list(zip(times.tolist(), texts)),
-    )
-    names, colours = [NAMES[model] for model in models], [COLOURS[model] for model in models]
-    shown = Recorded(
-        robot=robot,
-        name=robot.name,
-        stage=STAGE_NAME,
-        note=_note(found, errors),
-        runs=[run],
-        curves=[Curves("errors", "Error (mm)", names, colours)],
-        views={"Before": ["before/**"], "After": ["after/**"]},
-        shapes=_error_arrows("before", errors, "before", size_of(robot))
-        | _error_arrows("after", errors, errors.after, size_of(robot)),
-        points=[errors.xyz_mm / 1000],
-        now="This pose",
-    )
-    write_recording(shown, output)
-
-
-def _error_arrows(entity: str, errors: MeasuredErrors, model: str, size: float) -> dict[str, Logged]:
-    """Points coloured from none to the largest error, and arrows from the measured to the modelled point."""
-    distance, points = errors.distances_mm(model), errors.xyz_mm / 1000
-    greatest = float(distance.max()) or 1.0
-    colours = (255 * colormaps["viridis"](distance / greatest)[:, :3]).astype(np.uint8)
-    arrows = np.nan_to_num(errors.differences_mm[model]) * ARROW * size / greatest
-    return {
-        f"{entity}/points": rr.Points3D(points, radii=0.004 * size, colors=colours),
-        f"{entity}/errors": rr.Arrows3D(origins=points - arrows, vectors=arrows, radii=0.0012 * size, colors=colours),
-    }
-
-
-def _note(found: Calibration, errors: MeasuredErrors) -> str:
-    lines = [say(found.conclusion)]
-    for model in errors.differences_mm:
-        distance = errors.distances_mm(model)
-        lines.append(f"{NAMES[model]}: {distance.mean():.3g} mm on average, {distance.max():.3g} mm at most")
-    lines.append(
-        "Yellow points have the greatest error, and the arrows, exaggerated, lead to where the model puts them."
-    )
-    return "\n".join(f"- {escaped(line)}" for line in lines)
-
-
-def _now(errors: MeasuredErrors, k: int) -> str:
-    values = ", ".join(f"{value:.1f}" for value in errors.q[k])
-    sizes = ", ".join(f"{NAMES[model]} {errors.distances_mm(model)[k]:.3g} mm" for model in errors.differences_mm)
-    return f"Row {errors.lines[k]}: ({values})\n\n{sizes}"

@@ -49,7 +49,7 @@ def write_comparison(
         provenance=Provenance(tuple(Input(str(file), sha256(file), {}) for file in files), code_digest()),
         names=(one[0], other[0]),
         verdict=found.verdict,
-        headline=headline(found),
+        headline=headline(found, doubts),
         layers=[*doubt_rows(doubts), *layer_rows(found)],
         columns=_columns(),
         rows=[] if corrected is None else _rows(one[1], corrected),

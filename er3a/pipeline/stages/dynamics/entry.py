@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 from pydantic import Field
@@ -11,7 +10,7 @@ from er3a.files.units import CentreMm
 from er3a.files.yaml_file import StrictModel
 from er3a.pipeline.language import N_
 from er3a.pipeline.settings import TrajectorySettings
-from er3a.pipeline.stages.stage import Stage, StudyFiles
+from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.stages.trajectory.entry import STAGE as TRAJECTORY
 
 
@@ -30,17 +29,12 @@ class DynamicsSettings(StrictModel):
     capsule_density_kg_m3: Annotated[float, Field(ge=10, le=20_000)] | None = None
 
 
-def _inputs(study: StudyFiles, robot: str) -> list[Path]:
-    meshes = [file for load in study.loads(robot) for file in load.files]
-    return [*TRAJECTORY.inputs(study, robot), *meshes]
-
-
 STAGE = Stage(
     name="dynamics",
     title=N_("dynamics"),
     question=N_("How much torque do the motors need, and can they supply it?"),
     settings={"dynamics": DynamicsSettings, "trajectory": TrajectorySettings},
-    inputs=_inputs,
+    inputs=TRAJECTORY.inputs,
     extra_inputs=lambda study, robot: {"loads": [load.model_dump() for load in study.loads(robot)]},
     rests_on=("validation",),
     weighs=True,

@@ -28,7 +28,7 @@ from er3a.kinematics.solutions import MANY_TARGETS, ByClass, Iteration, Method, 
 from er3a.kinematics.wrist_partitioned import has_branches, solve_slots
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.si_units import stated
-from er3a.pipeline.progress import shown_progress
+from er3a.pipeline.progress import shown_work
 from er3a.pipeline.results import Figure, LeftOut, Verdict
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, pass_of, unmet_expectations
@@ -341,13 +341,12 @@ def compute(study: Study, name: str) -> model.InverseResults:
     assumed = shapes_assumed(robot, margin, {})
     clearance = margin if assumed else motion.penetration_tolerance_mm / 1000
     many, advised, solved = len(targets) > MANY_TARGETS, 0, list[SolvedTarget]()
-    with shown_progress(len(targets), f"{name}: targets solved") as advance:
+    with shown_work(f"{name}: solving {len(targets)} targets"):
         for number, target in enumerate(targets):
             random = np.random.default_rng([study.seed, ADVICE_STREAM, number])
             advise = not many or advised < MAX_ADVISED
             solved.append(solve_target(robot, target, random, scene, many=many, advise=advise, clearance=clearance))
             advised += solved[-1].result.neighbours is not None
-            advance(1)
     ranked = [rankings(robot, target, one, scene, settings.mix) for target, one in zip(targets, solved)]
     solutions = model.SolutionRows.stacked(one.rows for one in solved).of_joints(robot.slides)
     results = _with_clearance(robot, scene, [one.result for one in solved])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from er3a.pipeline.progress import shown_progress
+from er3a.pipeline.progress import shown_work
 from er3a.pipeline.stages.workspace.entry import WorkspaceSettings
 from er3a.pipeline.study import Study
 from er3a.robots.robot import Robot
@@ -21,5 +21,5 @@ def sampled(study: Study, robot: Robot, grid: Grid, blocks: range) -> Tally:
     """The tally of some blocks of the study, with progress on standard error."""
     draw = draw_of(study)
     total = int(draw.sizes[blocks.start : blocks.stop].sum())
-    with shown_progress(total, f"{robot.name}: samples") as advance:
-        return tally_blocks(robot, grid, draw, blocks, study.section(WorkspaceSettings).hull_directions, advance)
+    with shown_work(f"{robot.name}: drawing {total:,} samples"):
+        return tally_blocks(robot, grid, draw, blocks, study.section(WorkspaceSettings).hull_directions)
