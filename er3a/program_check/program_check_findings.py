@@ -25,12 +25,11 @@ NotFollowedReason = Literal[
     "setting",
     "tool",
     "base",
-    "spline",
+    "turns_with_path",
     "external_axes",
     "arc_angle",
     "half_turn",
     "redundant",
-    "rounds",
     "operations",
     "ways",
     "depth",
@@ -214,21 +213,6 @@ class SuspectNumber(Finding):
     usual: str
 
 
-class FrameGivenTwice(Finding):
-    """The program itself gives a frame that the check was given otherwise; the program's was taken."""
-
-    name: str
-    moved_mm: float
-    turned_deg: float
-
-
-class ToolStatedElsewhere(Finding):
-    """A table's pose of the tool is not where its joints put it; in the row where it is farthest away."""
-
-    moved_mm: float
-    turned_deg: float
-
-
 class FramesFromRobotFile(Finding):
     """The program sets no tool, no base, or neither, before a pose; those of the robot file were taken."""
 
@@ -271,8 +255,6 @@ CheckFinding = (
     | ClearanceNotProven
     | SpeedNotGiven
     | SuspectNumber
-    | FrameGivenTwice
-    | ToolStatedElsewhere
     | FramesFromRobotFile
     | LoadAbovePayload
 )

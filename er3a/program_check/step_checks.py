@@ -243,7 +243,8 @@ class Judge:
                 return None
             return target.joints if before is None else np.where(open_, before, target.joints)
         assert checked.base is not None
-        pose, near = checked.base @ target.pose, before if target.near is None else target.near
+        pose = checked.base @ target.pose
+        near = before if target.near is None else target.near
         reference = np.zeros(checked.arm.joints) if near is None else near
         try:
             found = inverse_batch(checked.arm, pose[None], reference)
@@ -285,8 +286,6 @@ def _say_of(checked: CheckedMotion) -> None:
     outer = {name: None for each in (motion.target, motion.via) for name, _ in getattr(each, "external", ())}
     if outer:
         checked.add(Missing(", ".join(outer), "external_axes"))
-    if motion.kind == "spline" or (motion.kind == "joint" and motion.spline_block is not None):
-        checked.add(Missing(motion.form, "spline"))
     if motion.not_followed:
         checked.add(Missing(motion.not_followed, "setting"))
 
@@ -296,8 +295,8 @@ def _key(motion: instructions.ArmMotion) -> Hashable:
     frames = tuple(
         (each.name, None if each.pose is None else each.pose.tobytes()) for each in (motion.tool, motion.base)
     )
-    rates = motion.speed, motion.turn_speed, motion.turning, motion.acceleration, motion.zone
-    said = motion.kind, motion.form, motion.spline_block is None, motion.angle, motion.not_followed, motion.with_path
+    rates = motion.speed, motion.turn_speed, motion.acceleration, motion.zone
+    said = motion.kind, motion.form, motion.angle, motion.not_followed, motion.with_path
     return said, _target_key(motion.target), _target_key(motion.via), rates, frames, motion.load
 
 

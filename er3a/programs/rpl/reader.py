@@ -11,10 +11,9 @@ from pathlib import Path
 
 from er3a.errors import InputError
 from er3a.programs import syntax
-from er3a.programs.code_builder import CodeBuilder, fault, lacks_data, linked
+from er3a.programs.code_builder import CodeBuilder, fault, linked
 from er3a.programs.instructions import Place
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, data_file_of, read_program_text
-from er3a.programs.program_findings import DataFileMissing, NameTwice, NotUnderstood, ProgramFinding
 
 RPL = Lexicon(
     re.compile(
@@ -46,10 +45,6 @@ FIELDS = {
     "EPOINTJ": JOINTS + OUTER,
     "EPOINTC": POSITION + OUTER + CONFIGURATION,
 }
-PLAIN = re.compile(
-    r"(MJOINT|MLIN)\s*\(\s*(POINT[JC]\s*\([^()]*\))\s*,\s*(\w+)\s*,\s*(\w+)\s*,\s*(\w+)\s*(?:,\s*(\w+)\s*)?\)$"
-)
-POINT = re.compile(r'\s*(POINT[JC])\s*\(([-+.,0-9eE\s]*)(?:,\s*"(\w+)"((?:\s*,\s*[-+]?\d+)*)\s*)?\)\s*$')
 WORD = re.compile(r"[^\W\d]\w*$")
 
 
@@ -72,8 +67,6 @@ def expression(text: str) -> syntax.Expression:
     """An expression by itself; one that is not understood is kept."""
     if WORD.match(text) and text.upper() not in RPL.constants and text not in RPL.right:
         return syntax.Variable(text)
-    if (point := plain_point(text)) is not None:
-        return point
     words = RplWords(text)
     try:
         found = words.expression()
@@ -90,8 +83,6 @@ def initial(text: str, kind: str) -> syntax.Expression:
 
 def plain_statement(builder: CodeBuilder, place: Place, text: str) -> None:
     """A statement that begins and ends no block; :class:`MisreadError` if it can't be read."""
-    if (plain := PLAIN.match(text)) is not None and _plain_motion(builder, place, plain):
-        return
     words = RplWords(text)
     left = words.expression()
     if words.accept(":="):
@@ -120,34 +111,6 @@ def call(builder: CodeBuilder, place: Place, left: syntax.Invocation, text: str)
         builder.add(syntax.Doing(place, left, text))
 
 
-def plain_point(text: str) -> syntax.Constant | None:
-    """A point of numbers alone, without a look at its words."""
-    match = POINT.match(text)
-    if match is None:
-        return None
-    kind, parts, configuration, turns = match.groups()
-    try:
-        values: list[syntax.Value] = [float(part) for part in parts.split(",")]
-    except ValueError:
-        return None
-    if len(values) != 6 or (configuration is not None and kind == "POINTJ"):
-        return None
-    if configuration is not None:
-        values += [configuration, *(int(turn) for turn in turns.split(",")[1:])]
-    fields = FIELDS[kind]
-    return None if len(values) > len(fields) else syntax.Constant(syntax.Record(kind, tuple(zip(fields, values))))
-
-
-def _plain_motion(builder: CodeBuilder, place: Place, plain: re.Match[str]) -> bool:
-    """A motion to a point of numbers alone."""
-    target = plain_point(plain[2])
-    if target is None:
-        return False
-    names = [syntax.Variable(name) for name in plain.groups()[2:] if name]
-    builder.add(syntax.Move(place, plain[1], (target, *names), plain.group()))
-    return True
-
-
 BREAKS = re.compile(r"\(\*(?!\s*,)|//|[\"';\n]|\b(?:THEN|DO|ELSE|REPEAT|OF)\b")
 CASE_LABEL = re.compile(r"\s*(-?\w+(?:\s*,\s*-?\w+)*)\s*:(?!=)")
 VARIABLE = re.compile(
@@ -173,41 +136,20 @@ def read_rpl(source: ProgramText) -> syntax.Program:
             builder.remark(place, text)
         else:
             _statement(builder, place, text)
-    data, findings = _variables(source)
-    routine = builder.routine(place)
-    if data_file_of(source.path, ".var") is None and lacks_data([routine], data, LIBRARY_NAMES):
-        findings.append(DataFileMissing(source.path.with_suffix(".var").name))
-    by_name, more = linked([routine])
-    findings = [*findings, *more]
-    return syntax.Program(
-        "rpl", source.path.stem, source.path, by_name, MAIN, tuple(data), tuple(findings), source.lines
-    )
+    by_name, data = linked([builder.routine(place)]), tuple(_variables(source))
+    return syntax.Program("rpl", source.path.stem, source.path, by_name, MAIN, data, lines=source.lines)
 
 
-def _variables(source: ProgramText) -> tuple[list[syntax.Assign], list[ProgramFinding]]:
+def _variables(source: ProgramText) -> Iterator[syntax.Assign]:
     """Declarations of the .var file."""
     path = data_file_of(source.path, ".var")
-    if path is None:
-        return [], []
-    data: list[syntax.Assign] = []
-    found: list[ProgramFinding] = []
-    seen: set[str] = set()
-    for number, line in enumerate(read_program_text(path).lines, 1):
-        place = Place(path, number)
-        match = VARIABLE.match(line)
-        if match is None:
-            if line.strip() and not line.strip().startswith(("(*", "//")):
-                found.append(NotUnderstood(line.strip(), place))
-            continue
-        scope, kind, name, _, first = match.groups()
-        if name in seen:
-            found.append(NameTwice(name, place))
-        seen.add(name)
-        value = initial(first, kind.upper()) if first else None
-        if scope.upper() == "INPUT":  # which the caller gives
-            value = syntax.Constant(syntax.Unclear(name))
-        data.append(syntax.Assign(place, syntax.Variable(name), value, line.strip(), kind.upper()))
-    return data, found
+    for number, line in enumerate(read_program_text(path).lines if path else (), 1):
+        if (match := VARIABLE.match(line)) is not None:
+            scope, kind, name, _, first = match.groups()
+            value = initial(first, kind.upper()) if first else None
+            if scope.upper() == "INPUT":  # which the caller gives
+                value = syntax.Constant(syntax.Unclear(name))
+            yield syntax.Assign(Place(path, number), syntax.Variable(name), value, line.strip(), kind.upper())
 
 
 def _statements(source: ProgramText) -> Iterator[tuple[Place, str, bool]]:

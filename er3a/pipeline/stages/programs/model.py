@@ -15,7 +15,7 @@ from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.program_check.check_program import CycleTime, LocatedFinding
 from er3a.program_check.program_check_findings import CheckFinding, Level
 from er3a.programs.instructions import Place
-from er3a.programs.program_findings import NameTwice, NotUnderstood
+from er3a.programs.program_findings import NotUnderstood
 from er3a.programs.program_names import LanguageName, ProgramOutcome
 
 
@@ -104,7 +104,7 @@ def finding_at(
 
 def _without_path(finding: CheckFinding) -> CheckFinding:
     """A finding whose own place names no folder of this machine."""
-    if isinstance(finding, (NameTwice, NotUnderstood)):
+    if isinstance(finding, NotUnderstood):
         return replace(finding, place=Place(None, finding.place.line, finding.place.element))
     return finding
 
@@ -164,7 +164,7 @@ class Instructions(Table):
     program: Texts = column("name of the program")
     line: Integers = column("number of the line, from 1")
     element: Texts = column("XML element, empty in text")
-    kind: Texts = column("joint, line, arc or spline; empty if never reached")
+    kind: Texts = column("joint, line or arc; empty if never reached")
     level: Texts = column("verdict: pass, note, caution or fail")
     times: Integers = column("how often it was carried out")
     duration_s: Reals = column("longest estimated duration; NaN where unknown")
