@@ -276,23 +276,17 @@ def _located(
             LocatedFinding(motion.level_of(each), each, step.place, step.calls, 1, number, moment)
             for each, moment in motion.findings.items()
         ]
-    unknown = [(step, step.instruction) for step in execution.steps if isinstance(step.instruction, Unknown)]
+    for step in execution.steps:
+        if isinstance(what := step.instruction, Unknown):
+            text = (
+                NotUnderstood(what.text, step.place) if what.stops else found_in.NotFollowed(what.text, "instruction")
+            )
+            found.append(LocatedFinding("fail" if what.stops else "caution", text, step.place, step.calls))
     found += [
-        LocatedFinding("fail", NotUnderstood(what.text, step.place), step.place, step.calls)
-        for step, what in unknown
-        if what.stops
-    ]
-    said = [
-        (step.place, step.calls, found_in.NotFollowed(what.text, "instruction"))
-        for step, what in unknown
-        if not what.stops
-    ]
-    said += [
-        (each.place, (), found_in.NotFollowed("", each.kind))
+        LocatedFinding("caution", found_in.NotFollowed("", each.kind), each.place)
         for each in execution.endings
         if each.kind != "end" and each.kind != "joins"
     ]
-    found += [LocatedFinding("caution", finding, place, calls) for place, calls, finding in said]
     found += [
         LocatedFinding("note", found_in.NotFollowed(text, "unreached"), place) for place, text in _unreached(execution)
     ]

@@ -208,7 +208,7 @@ class SpeedNotGiven(Finding):
 class SuspectNumber(Finding):
     """A number that is likely a mistake: ``text`` is what it is, ``usual`` what it would be, or what others are."""
 
-    kind: Literal["metres", "radians", "speed", "impossible_speed", "tool", "base"]
+    kind: Literal["metres", "radians", "speed", "impossible_speed", "share", "tool", "base"]
     text: str
     usual: str
 

@@ -193,7 +193,7 @@ class Dialect(ABC):
         return False
 
     def reads_back(self, name: str) -> bool:
-        """Whether reading an output, or a variable, gives the value that the program set last."""
+        """Whether reading a variable gives the value that the program set last."""
         return True
 
     def is_followed(self, name: str) -> bool:

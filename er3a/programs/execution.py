@@ -97,7 +97,7 @@ class Execution(ByValue):
     ----------
     steps : of all ways; each names the one before it
     endings : one for each way
-    open : places that may be come to on ways that were not followed: all, where there is one
+    open : places that may be come to on ways that were not followed
     entered : names of the routines that a way came to
     """
 

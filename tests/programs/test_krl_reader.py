@@ -348,6 +348,18 @@ def test_what_is_passed_by_reference_does_not_keep_its_old_value(body, more, tmp
     assert moves(found)
 
 
+def test_percents_beyond_100_are_taken_as_100_and_kept_to_be_named(tmp_path):
+    (found,) = moves(run(tmp_path, "BAS(#VEL_PTP,400)\nPTP {A1 10,A2 0,A3 0,A4 0,A5 0,A6 0}"))
+    assert (found.speed.value, found.speed.unit, found.speed.text) == (1.0, "share", "400 %")
+
+
+def test_what_a_trigger_sets_but_outputs_is_not_followed(tmp_path):
+    body = "TRIGGER WHEN PATH=0 DELAY=0 DO {}\nPTP {{A1 10,A2 0,A3 0,A4 0,A5 0,A6 0}}"
+    for what, known in (("$OUT[1]=TRUE", True), ("$VEL_AXIS[7]=50", False), ("N=1", False)):
+        steps = run(tmp_path, body.format(what)).steps
+        assert not any(isinstance(each.instruction, Unknown) for each in steps) == known
+
+
 @pytest.mark.parametrize("inside", ["X[K]=50", "GETTHEM(X[])"])
 def test_a_list_of_which_an_unknown_element_is_set_has_none_that_is_known(inside, tmp_path):
     more = f"DEF S(X[]:OUT)\nINT X[],K\n{inside}\nEND"

@@ -177,6 +177,7 @@ TEXTS = texts(
             metres="{text} may have been meant in metres: {usual}",
             radians="{text} may have been meant in radians: {usual}",
             impossible_speed="{text} is faster than any point of the arm can be ({usual})",
+            share="{text} of the joints' speed is more than there is, so that {usual} is taken",
             speed="{text} is more than ten times the program's usual {usual}",
             tool="the tool {text} is used here alone; the motions around have {usual}",
             base="the base {text} is used here alone; the motions around have {usual}",

@@ -220,7 +220,10 @@ def _initial(memory: ProgramMemory, _: syntax.Value) -> None:
 
 
 def _joint_speed(memory: ProgramMemory, percent: syntax.Value) -> None:
-    _all_axes(memory, "$VEL_AXIS", percent)
+    """Of all axes, in percent; bas.src takes 100 for what is more, which is kept to be named."""
+    plain = syntax.number(percent)
+    beyond = plain is not None and plain > 100
+    _all_axes(memory, "$VEL_AXIS", syntax.Record("beyond", (("given", percent),)) if beyond else percent)
 
 
 def _line_speed(memory: ProgramMemory, speed: syntax.Value) -> None:
@@ -351,10 +354,7 @@ BAS: dict[str, Setting] = {
     "#PTP_PARAMS": lambda memory, given: _with_frames(memory, _joint_data, given),
     "#CP_DAT": lambda memory, _: _line_data(memory, None),
     "#CP_PARAMS": lambda memory, given: _with_frames(memory, _line_data, given),
-    "#OUT_SYNC": lambda memory, _: memory.forget("$OUT"),
-    "#OUT_ASYNC": lambda memory, _: memory.forget("$OUT"),
-    "#GROUP": lambda memory, _: None,
-    "#ACC_GLUE": lambda memory, _: None,
+    **dict.fromkeys(("#OUT_SYNC", "#OUT_ASYNC", "#GROUP", "#ACC_GLUE"), lambda memory, _: None),
 }
 """What commands of BAS do, by the value after them."""
 
@@ -680,6 +680,8 @@ def _turn_speed(memory: ProgramMemory) -> float | None:
 def _axis_share(memory: ProgramMemory, name: str) -> instructions.Rate | None:
     """What is set for the axes in percent: one that is not known, else one beyond 100, else the slowest."""
     values = [memory.read(f"{name}[{axis}]") for axis in range(1, 7)]
+    if isinstance(values[0], syntax.Record):
+        return instructions.Rate(1.0, "share", f"{syntax.shown(values[0].values()[0])} %")
     given = [rate for value in values if (rate := syntax.rate_of(value, "share", 100.0)) is not None]
     if any(rate.text for rate in given):
         return next(rate for rate in given if rate.text)

@@ -83,6 +83,8 @@ def typed(value: Value, kind: str) -> Value:
     values = value.values() if isinstance(value, Record) else value
     if shape is None or not isinstance(values, tuple) or len(values) != len(shape):
         return value
+    if isinstance(value, Record) and value.kind != kind:
+        return value
     return Record(kind, tuple((name, typed(each, part)) for (name, part), each in zip(shape.items(), values)))
 
 

@@ -100,6 +100,9 @@ class RapidDialect(Dialect):
         made = [_target(memory, value, (move.text, kind, absolute), checked) for value in values[:targets]]
         if stationary or held:
             made = [instructions.UnresolvedTarget(move.text, "external_tool")] * targets
+        kinds = [each.kind for each in (values[tool_at], options.get("WOBJ")) if isinstance(each, syntax.Record)]
+        if kinds and (kinds[0] == "WOBJDATA" or kinds[-1] == "TOOLDATA" != kinds[0]):  # each other's
+            made = [instructions.UnresolvedTarget(move.text, "not_understood")] * targets
         via = made[0] if kind == "arc" else None
         if isinstance(via, instructions.PoseTarget):
             via = replace(via, branch=None)

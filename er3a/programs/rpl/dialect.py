@@ -29,10 +29,6 @@ class RplDialect(Dialect):
         """Outputs, and what goes to the field bus."""
         return name.startswith(("io.", "fidbus."))
 
-    def reads_back(self, name: str) -> bool:
-        """Outputs; the other side of the bus, or of an input, has a say in what stands there."""
-        return not self.is_signal(name) or name.startswith(("io.DOut", "io.AOut"))
-
     def function(self, memory: ProgramMemory, name: str, given: syntax.Invocation) -> syntax.Value:
         """Points, OFFSET, roots; no source says in which unit the angles of the others are."""
         values = [None if each is None else memory.value(each) for each in given.arguments]
