@@ -8,13 +8,14 @@ Calls of a program's own routines, wherever they stand in expressions, become op
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Container, Iterable
+from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 from er3a.errors import InputError
 from er3a.programs import syntax
 from er3a.programs.instructions import Aside, Place, Remark, Unknown
+from er3a.programs.lexing import MisreadError, Words
 
 MAX_NESTED = 200
 ASSIGNED = re.compile(r"(?:(?:global|local)\s+)?([A-Za-z_$][\w$]*+)[^=\"'(]*+=(?!=)")
@@ -273,6 +274,104 @@ class CodeBuilder:
                 self.code[at] = replace(operation, otherwise=len(self.code))
             elif isinstance(operation, syntax.GoTo):
                 self.code[at] = replace(operation, to=len(self.code))
+
+
+Blocks = Mapping[str, tuple[str, str]]
+"""What a language's words do to blocks: an action of :func:`block`, and what it needs: the word that ends a head, the
+block that is closed, or the words within a FOR."""
+
+
+def block(builder: CodeBuilder, words: Words, place: Place, text: str, blocks: Blocks) -> bool:
+    """Begin, go on with, leave or end a block or a routine; False, with nothing done, if a statement does none of it.
+
+    Raises
+    ------
+    MisreadError
+        for a statement that can't be read
+    InputError
+        for one without which the next lines would mean something else
+    """
+    word = words.next.upper()
+    action, needs = blocks.get(word, ("", ""))
+    if not action:
+        return False
+    words.take()
+    match action:
+        case "if":
+            builder.open_if(place, words.condition(needs), text)
+        case "elif":
+            builder.next_arm(place, words.condition(needs), text)
+        case "while":
+            builder.open_while(place, words.condition(needs), text)
+        case "until":
+            builder.close("repeat", place, words.condition(needs), text)
+        case "switch":
+            builder.open_switch(place, words.condition(needs), text)
+        case "for" | "case":
+            try:
+                _counted(builder, words, place, text, needs) if action == "for" else _case(builder, words, place, text)
+            except MisreadError as error:
+                remedy = "Write a counter with its first and last value, or values after CASE"
+                raise fault(place, f"this {word} can't be read ({error})", remedy) from None
+        case "return":
+            value = None if words.kind == "end" else words.expression()
+            words.finish()
+            builder.add(syntax.Return(place, value))
+        case "label":
+            builder.label(words.name())
+        case "goto":
+            builder.goto(place, words.name())
+        case _:
+            words.accept(needs)
+            words.finish()
+            _simple(builder, place, action)
+    return True
+
+
+def _simple(builder: CodeBuilder, place: Place, action: str) -> None:
+    """A word that stands alone."""
+    match action:
+        case "else" if not builder.inside("switch"):
+            builder.next_arm(place, None, "")
+        case "else" | "default":
+            builder.case(place, None, "")
+        case "loop":
+            builder.open_loop(place)
+        case "repeat":
+            builder.open_repeat(place)
+        case "leave":
+            builder.leave_loop(place)
+        case "next":
+            builder.next_round(place)
+        case "end":
+            builder.add(syntax.Return(place, ends=True))
+        case kind if kind.startswith("close "):
+            builder.close(kind.removeprefix("close "), place)
+
+
+def _counted(builder: CodeBuilder, words: Words, place: Place, text: str, needs: str) -> None:
+    """``FOR name = first TO last STEP step``, by the words that a language has there."""
+    given, to, by, *end = needs.split()
+    name = words.name()
+    words.expect(given)
+    first = words.expression()
+    words.expect(to)
+    last = words.expression()
+    step = words.expression() if words.accept(by) else None
+    words.accept("".join(end))
+    words.finish()
+    if isinstance(step, syntax.Constant) and step.value == 0:
+        raise MisreadError(f"{by} 0")
+    builder.open_for(place, name, first, last, step, text)
+
+
+def _case(builder: CodeBuilder, words: Words, place: Place, text: str) -> None:
+    values = [words.expression()]
+    while words.accept(","):
+        values.append(words.expression())
+    words.accept(":")
+    words.finish()
+    builder.case(place, values, text)
 
 
 def fault(place: Place, problem: str, remedy: str) -> InputError:

@@ -7,7 +7,7 @@ import re
 from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import scipy
@@ -528,43 +528,44 @@ COUNTED: dict[str, Callable[[int], program_findings.WriteFinding]] = {
 }
 
 
+HEADS = {
+    "written_arcs_split": "{arcs} arc(s) as {lines} lines that stay within {mm:g} mm",
+    "written_zones_dropped": "{zones} zone(s) without equal in this language: the arm stops there",
+    "written_speeds_estimated": "{motions} duration(s) as speeds: the controller's ramps decide the time",
+    "written_speeds_cut": "{motions} speed(s) above 100 %, which was taken",
+    "written_speeds_raised": (
+        "{motions} speed(s) below the least that has a name, which was taken: FASTER than what was checked"
+    ),
+    "written_speeds_of_assumed": (
+        "{motions} speed(s) with an assumed {assumed} as 100 %, which may be far from the controller's 100 %"
+    ),
+    "written_half_turns_split": (
+        "{lines} line(s) or arc(s) that turn the tool by 180 deg in two halves, to fix the sense"
+    ),
+    "written_targets_left_out": "{motions} motion(s) left out: their targets are not known",
+    "written_tool_not_given": "set this tool or base on the controller: {name}",
+    "written_values_rounded": "{values} speed(s) or zone(s) rounded down to the next that has a name",
+    "written_unsafe": "NOT SAFE: the path {path} {verdict}; written because it was asked for",
+    "written_near_assumed": (
+        "NOT SETTLED: the path {path} is clear by {clearance_mm:.1f} mm of assumed shapes only, which may be wrong by "
+        "{margin_mm:g} mm"
+    ),
+    "written_beside_points": (
+        "NOT SETTLED: the checked path {path} rounds its corners by up to {missed} beside its points; a controller may "
+        "go to the points"
+    ),
+    "written_one_side": "{branches} branch(es) of which one side alone is written: what the others do is left out",
+    "written_external_axes_dropped": "{motions} motion(s) without their external axes",
+    "written_not_translated": "{instructions} instruction(s) of the other language as comments",
+}
+"""What the head of a file says of findings: files are read by controllers, so this is plain ASCII."""
+
+
 def head_line(finding: program_findings.WriteFinding) -> str:
-    """A finding as a line of a file's head; these files are read by controllers, so it is plain ASCII."""
-    match finding:
-        case program_findings.ArcsSplit(arcs=arcs, lines=lines, deviation_m=deviation):
-            return f"{arcs} arc(s) as {lines} lines that stay within {deviation * 1000:g} mm"
-        case program_findings.ZonesDropped(zones=count):
-            return f"{count} zone(s) without equal in this language: the arm stops there"
-        case program_findings.SpeedsEstimated(motions=count):
-            return f"{count} duration(s) as speeds: the controller's ramps decide the time"
-        case program_findings.SpeedsCut(motions=count):
-            return f"{count} speed(s) above 100 %, which was taken"
-        case program_findings.SpeedsRaised(motions=count):
-            return f"{count} speed(s) below the least that has a name, which was taken: FASTER than what was checked"
-        case program_findings.SpeedsOfAssumed(motions=count, assumed=assumed):
-            return f"{count} speed(s) with an assumed {assumed} as 100 %, which may be far from the controller's 100 %"
-        case program_findings.HalfTurnsSplit(lines=count):
-            return f"{count} line(s) or arc(s) that turn the tool by 180 deg in two halves, to fix the sense"
-        case program_findings.TargetsLeftOut(motions=count):
-            return f"{count} motion(s) left out: their targets are not known"
-        case program_findings.ToolNotGiven(name=name):
-            return f"set this tool or base on the controller: {ascii_text(name)}"
-        case program_findings.ValuesRounded(values=count):
-            return f"{count} speed(s) or zone(s) rounded down to the next that has a name"
-        case program_findings.WrittenUnsafe(path=path, verdict=verdict):
-            return f"NOT SAFE: the path {ascii_text(path)} {ascii_text(verdict)}; written because it was asked for"
-        case program_findings.WrittenNearAssumed(path=path, clearance_mm=clearance, margin_mm=margin):
-            near = f"clear by {clearance:.1f} mm of assumed shapes only, which may be wrong by {margin:g} mm"
-            return f"NOT SETTLED: the path {ascii_text(path)} is {near}"
-        case program_findings.WrittenBesidePoints(path=path, missed=missed):
-            corners = f"rounds its corners by up to {missed} beside its points"
-            return f"NOT SETTLED: the checked path {ascii_text(path)} {corners}; a controller may go to the points"
-        case program_findings.OneSideWritten(branches=count):
-            return f"{count} branch(es) of which one side alone is written: what the others do is left out"
-        case program_findings.ExternalAxesDropped(motions=count):
-            return f"{count} motion(s) without their external axes"
-        case program_findings.NotTranslated(instructions=count):
-            return f"{count} instruction(s) of the other language as comments"
+    """A finding as a line of a file's head."""
+    values = {each.name: getattr(finding, each.name) for each in fields(finding)}
+    values["mm"] = 1000 * values.get("deviation_m", 0.0)
+    return ascii_text(HEADS[finding.code].format(**values))
 
 
 HEAD_LINE = re.compile(rf"(?m)^(<rem>\n<text>|[ ]*(?:;|#|!|\(\*) ){HEAD}.*?(</text>\n</rem>| \*\)|)$")

@@ -118,11 +118,6 @@ POSES = {  # instructions, mm, quaternion (w first)
         (10, 10, 0),
         (0, 0, 0, 1),
     ),
-    "poseinv": (
-        "frame:=PoseInv(frame); t:=p; t.trans:=frame.trans; t.rot:=frame.rot; MoveL t,@;",
-        (0, 10, 0),
-        (HALF, 0, 0, -HALF),
-    ),
     "crobt": (
         "MoveL p,@; t:=CRobT(\\Tool:=tool0\\WObj:=wobj0); MoveL Offs(t,0,0,5),@;",
         (100, 200, 305),
@@ -162,7 +157,6 @@ VALUES = {  # what stands behind n:=, and the number
     "power": ("Pow(2,10)", 1024),
     "truncated": ("Trunc(-2.7)", -2),
     "rounded_from_zero": ("Round(-2.5)", -3),
-    "distance": ("Distance([0,3,0],[4,0,0])", 5),
     "euler_z": ("EulerZYX(\\Z,turned.rot)", 90),
     "element": ("list{2}", 20),
     "exponent": ("1E1+.5", 10.5),

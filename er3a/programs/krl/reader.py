@@ -11,7 +11,7 @@ from pathlib import Path
 
 from er3a.errors import InputError
 from er3a.programs import syntax
-from er3a.programs.code_builder import CodeBuilder, fault, linked
+from er3a.programs.code_builder import CodeBuilder, block, fault, linked
 from er3a.programs.evaluation import variable_of
 from er3a.programs.instructions import Place
 from er3a.programs.krl.controller_files import ControllerFiles
@@ -102,10 +102,7 @@ class _Statement:
         self.words = KrlWords(text, module.names)
         try:
             self._read()
-        except MisreadError as error:
-            if self.words.texts[0] in ("FOR", "CASE"):  # without which the next lines would mean something else
-                problem = f"this {self.words.texts[0]} can't be read ({error})"
-                raise fault(place, problem, "Write FOR i=1 TO 9, or CASE 1, 2") from None
+        except MisreadError:
             builder.unread(place, text, not inside_data, folds=True)
         except RecursionError:
             raise InputError(place.file, place.where, "nested too deeply", "Split this line") from None
@@ -118,6 +115,8 @@ class _Statement:
         if first in MOTIONS:
             words.take()
             self._motion(first)
+        elif not given and block(self.builder, words, self.place, self.text, BLOCKS):
+            pass
         elif first in HANDLERS and not given:
             words.take()
             HANDLERS[first](self)
@@ -131,19 +130,6 @@ class _Statement:
             self.builder.label(first)
         else:
             self._assignment()
-
-    def condition(self, end: str = "") -> syntax.Expression:
-        """A condition up to a word or the end; one that is not understood is kept."""
-        start = self.words.at
-        try:
-            found = self.words.expression()
-            if end:
-                self.words.expect(end)
-            self.words.finish()
-        except MisreadError:
-            texts = self.words.texts[start:-1]
-            return syntax.Opaque(" ".join(text for text in texts if text.upper() != end))
-        return found
 
     def _declares(self) -> bool:
         """Whether two names stand there; among instructions, unless the first is a type, they are no declaration."""
@@ -241,28 +227,6 @@ def _acts(operation: syntax.Operation) -> bool:
     return not isinstance(operation, syntax.Fixed) and not (isinstance(operation, syntax.Assign) and operation.local)
 
 
-def _for(reading: _Statement) -> None:
-    words = reading.words
-    name = words.name()
-    words.expect("=")
-    first = words.expression()
-    words.expect("TO")
-    last = words.expression()
-    step = words.expression() if words.accept("STEP") else None
-    words.finish()
-    if isinstance(step, syntax.Constant) and step.value == 0:
-        raise MisreadError("STEP 0")
-    reading.builder.open_for(reading.place, name, first, last, step, reading.text)
-
-
-def _case(reading: _Statement) -> None:
-    values = [reading.words.expression()]
-    while reading.words.accept(","):
-        values.append(reading.words.expression())
-    reading.words.finish()
-    reading.builder.case(reading.place, values, reading.text)
-
-
 def _wait(reading: _Statement) -> None:
     words = reading.words
     if words.accept("SEC"):
@@ -272,13 +236,7 @@ def _wait(reading: _Statement) -> None:
         return
     words.expect("FOR")
     text = re.sub(r"(?i)^WAIT\s+FOR\s*", "", reading.text)
-    reading.builder.add(syntax.Waiting(reading.place, "condition", reading.condition(), text))
-
-
-def _return(reading: _Statement) -> None:
-    value = None if reading.words.kind == "end" else reading.words.expression()
-    reading.words.finish()
-    reading.builder.add(syntax.Return(reading.place, value))
+    reading.builder.add(syntax.Waiting(reading.place, "condition", reading.words.condition(), text))
 
 
 def _interrupt(reading: _Statement) -> None:
@@ -304,43 +262,29 @@ def _do(reading: _Statement) -> None:
         reading.builder.unclear(reading.place, what, reading.text)
 
 
-def _goto(reading: _Statement) -> None:
-    reading.builder.goto(reading.place, reading.words.name())
-
-
-def _simple(action: Callable[[CodeBuilder, Place], None]) -> Handler:
-    return lambda reading: action(reading.builder, reading.place)
-
-
 def _not_followed(reading: _Statement) -> None:
     reading.builder.unknown(reading.place, reading.text)
 
 
+BLOCKS = {
+    "IF": ("if", "THEN"),
+    "WHILE": ("while", ""),
+    "FOR": ("for", "= TO STEP"),
+    "UNTIL": ("until", ""),
+    "SWITCH": ("switch", ""),
+    "CASE": ("case", ""),
+    "RETURN": ("return", ""),
+    "GOTO": ("goto", ""),
+    "EXIT": ("leave", ""),
+    **{word: (word.lower(), "") for word in ("ELSE", "LOOP", "REPEAT", "DEFAULT")},
+    **{f"END{word}": (f"close {word.lower()}", "") for word in ("IF", "WHILE", "FOR", "LOOP", "SWITCH")},
+}
 HANDLERS: dict[str, Handler] = {
-    "IF": lambda reading: reading.builder.open_if(reading.place, reading.condition("THEN"), reading.text),
-    "ELSE": _simple(lambda builder, place: builder.next_arm(place, None, "")),
-    "ENDIF": _simple(lambda builder, place: builder.close("if", place)),
-    "WHILE": lambda reading: reading.builder.open_while(reading.place, reading.condition(), reading.text),
-    "ENDWHILE": _simple(lambda builder, place: builder.close("while", place)),
-    "LOOP": _simple(lambda builder, place: builder.open_loop(place)),
-    "ENDLOOP": _simple(lambda builder, place: builder.close("loop", place)),
-    "FOR": _for,
-    "ENDFOR": _simple(lambda builder, place: builder.close("for", place)),
-    "REPEAT": _simple(lambda builder, place: builder.open_repeat(place)),
-    "UNTIL": lambda reading: reading.builder.close("repeat", reading.place, reading.condition(), reading.text),
-    "SWITCH": lambda reading: reading.builder.open_switch(reading.place, reading.condition(), reading.text),
-    "CASE": _case,
-    "DEFAULT": _simple(lambda builder, place: builder.case(place, None, "")),
-    "ENDSWITCH": _simple(lambda builder, place: builder.close("switch", place)),
-    "EXIT": _simple(lambda builder, place: builder.leave_loop(place)),
-    "GOTO": _goto,
-    "RETURN": _return,
     "HALT": lambda reading: reading.builder.add(syntax.Waiting(reading.place, "operator", None, "HALT")),
     "WAIT": _wait,
     "INTERRUPT": _interrupt,
     "TRIGGER": _do,
-    "RESUME": _not_followed,  # the arm stops where it is
-    **dict.fromkeys(("SPL", "SPL_REL", "SPLINE", "PTP_SPLINE", "ENDSPLINE"), _not_followed),
+    **dict.fromkeys(("RESUME", "SPL", "SPL_REL", "SPLINE", "PTP_SPLINE", "ENDSPLINE"), _not_followed),
 }
 
 GLOBAL_NAME = re.compile(r"(?i)\bGLOBAL\b")

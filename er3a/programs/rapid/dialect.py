@@ -327,17 +327,12 @@ def _of_data(name: str, values: tuple[syntax.Value, ...], named: Mapping[str, sy
             return _shifted(name, values, named)
         case "POSEMULT", 2 if len(poses) == 2:
             return data_types.pose_record(poses[0] @ poses[1])
-        case "POSEINV", 1 if poses:
-            return data_types.pose_record(np.asarray(np.linalg.inv(poses[0]), np.float64))
         case "ORIENTZYX", 3 if plain is not None:  # about z, then the new y, then the new x
             return data_types.orient_record(transform(np.zeros(3), np.radians(plain[::-1]))[:3, :3])
         case "EULERZYX", 1:
             turn = data_types.rotation_of(values[0])
             axis = next((i for i, letter in enumerate("XYZ") if letter in named), None)
             return None if turn is None or axis is None else float(np.degrees(rpy_of(turn)[axis]))
-        case "DISTANCE", 2:
-            a, b = (data_types.plain(each, 3) for each in values)
-            return None if a is None or b is None else float(np.linalg.norm(np.subtract(a, b)))
     return None
 
 

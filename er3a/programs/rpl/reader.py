@@ -11,7 +11,7 @@ from pathlib import Path
 
 from er3a.errors import InputError
 from er3a.programs import syntax
-from er3a.programs.code_builder import CodeBuilder, fault, linked
+from er3a.programs.code_builder import CodeBuilder, block, fault, linked
 from er3a.programs.instructions import Place
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, data_file_of, read_program_text
 
@@ -196,9 +196,8 @@ def _statement(builder: CodeBuilder, place: Place, text: str) -> None:
         text = text[label.end() :].strip()
     if not text:
         return
-    first = re.split(r"\W", text, maxsplit=1)[0].upper()
     try:
-        if not _block(builder, place, text, first):
+        if not block(builder, RplWords(text), place, text, BLOCKS):
             plain_statement(builder, place, text)
     except MisreadError:
         builder.unread(place, text)
@@ -206,69 +205,20 @@ def _statement(builder: CodeBuilder, place: Place, text: str) -> None:
         raise InputError(place.file, place.where, "nested too deeply", "Split this statement") from None
 
 
-def _block(builder: CodeBuilder, place: Place, text: str, first: str) -> bool:
-    """Begin or end a block, or leave one; False if the statement does neither."""
-    inner = text[len(first) :].strip()
-    match first:
-        case "IF":
-            builder.open_if(place, expression(_until(inner, "THEN", place)), text)
-        case "ELSIF":
-            builder.next_arm(place, expression(_until(inner, "THEN", place)), text)
-        case "ELSE":
-            if builder.inside("switch"):
-                builder.case(place, None, text)
-            else:
-                builder.next_arm(place, None, text)
-        case "WHILE":
-            builder.open_while(place, expression(_until(inner, "DO", place)), text)
-        case "FOR":
-            _for(builder, place, _until(inner, "DO", place), text)
-        case "REPEAT":
-            builder.open_repeat(place)
-        case "UNTIL":
-            condition = re.sub(r"\s*\bEND_REPEAT$", "", inner)
-            builder.close("repeat", place, expression(condition), text)
-        case "CASE":
-            builder.open_switch(place, expression(_until(inner, "OF", place)), text)
-        case "END_IF" | "END_WHILE" | "END_FOR" | "END_CASE":
-            kind = {"END_CASE": "switch"}.get(first, first[4:].lower())
-            builder.close(kind, place)
-        case "END_REPEAT":
-            pass
-        case "EXIT":
-            builder.leave_loop(place)
-        case "CONTINUE":
-            builder.next_round(place)
-        case "RETURN":
-            builder.add(syntax.Return(place, expression(inner) if inner else None))
-        case "GOTO":
-            builder.goto(place, inner)
-        case "LABEL":
-            builder.label(inner)
-        case _:
-            return False
-    return True
-
-
-def _until(text: str, end: str, place: Place) -> str:
-    if not text.upper().endswith(end):
-        raise fault(place, f"'{text[:60]}' lacks {end}", f"Write {end} after it")
-    return text[: -len(end)].strip()
-
-
-def _for(builder: CodeBuilder, place: Place, head: str, text: str) -> None:
-    words = RplWords(head)
-    try:
-        name = words.name()
-        words.expect(":=")
-        first = words.expression()
-        words.expect("TO")
-        last = words.expression()
-        step = words.expression() if words.accept("BY") else None
-        words.finish()
-    except MisreadError as error:
-        raise fault(place, f"this FOR can't be read ({error})", "Write FOR i := 1 TO 9 DO") from None
-    builder.open_for(place, name, first, last, step, text)
+BLOCKS = {
+    "IF": ("if", "THEN"),
+    "ELSIF": ("elif", "THEN"),
+    "WHILE": ("while", "DO"),
+    "FOR": ("for", ":= TO BY DO"),
+    "UNTIL": ("until", "END_REPEAT"),
+    "CASE": ("switch", "OF"),
+    "EXIT": ("leave", ""),
+    "CONTINUE": ("next", ""),
+    "END_REPEAT": ("nothing", ""),
+    "END_CASE": ("close switch", ""),
+    **{word: (word.lower(), "") for word in ("ELSE", "REPEAT", "RETURN", "GOTO", "LABEL")},
+    **{f"END_{word}": (f"close {word.lower()}", "") for word in ("IF", "WHILE", "FOR")},
+}
 
 
 def companions(path: Path) -> tuple[Path, ...]:

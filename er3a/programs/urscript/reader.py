@@ -11,9 +11,9 @@ from collections.abc import Iterator
 
 from er3a.errors import InputError
 from er3a.programs import syntax
-from er3a.programs.code_builder import CodeBuilder, fault, linked
+from er3a.programs.code_builder import CodeBuilder, block, fault, linked
 from er3a.programs.instructions import Place
-from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, as_number
+from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, MoreError, ProgramText, Words, as_number
 
 UR = Lexicon(
     re.compile(
@@ -46,14 +46,6 @@ STATEMENT = re.compile(
     r"(?:[A-Za-z_][\w.]*\s*(?:\(|(?:\[[^]]*\]\s*)?=(?!=))|(?:end|break|continue|return|halt|if|while|global|local)\b)"
 )
 """With what a statement begins for sure."""
-
-
-class MoreError(MisreadError):
-    """Another statement follows on the line."""
-
-    def __init__(self, at: int):
-        super().__init__("another statement follows")
-        self.at = at
 
 
 class UrWords(Words):
@@ -219,23 +211,13 @@ class _UrReader:
         follows = words.texts[min(words.at + 1, len(words.texts) - 1)]
         if first in ("def", "thread", "sec"):
             self._begin(words, place)
-        elif first in ("if", "while", "elif", "else"):
-            words.take()
-            _block(builder, first, words, place, text)
         elif first == "end" and follows in ("", ":", ";"):
             words.take()
             words.accept(":")
             words.finish()
             self._close(builder, place)
-        elif first == "return":
-            words.take()
-            value = None if words.kind == "end" else words.expression()
-            words.finish()
-            builder.add(syntax.Return(place, value))
-        elif first in ("break", "continue") and not follows:
-            (builder.leave_loop if first == "break" else builder.next_round)(place)
-        elif first == "halt":
-            builder.add(syntax.Return(place, ends=True))
+        elif follows != "=" and block(builder, words, place, text.rstrip(":"), BLOCKS):
+            pass
         elif first == "run" and follows not in ("=", "("):
             builder.unknown(place, text, may_move=False)
         elif first in ("join", "kill", "enter_critical", "exit_critical", "pass") and follows not in ("=", "("):
@@ -309,28 +291,12 @@ def _outside_texts(line: str, place: Place) -> tuple[str, str, str]:
     return line, "", "".join(bare)
 
 
-def _block(builder: CodeBuilder, first: str, words: UrWords, place: Place, text: str) -> None:
-    if first == "else":
-        words.accept(":")
-        words.finish()
-        builder.next_arm(place, None, text)
-        return
-    closed = False
-    try:
-        condition = words.expression()
-        closed = words.accept(":")
-        words.finish()
-    except MisreadError as error:
-        if closed and isinstance(error, MoreError):
-            raise
-        condition = syntax.Opaque(text.partition(" ")[2].rstrip(":"))
-    source = text.rstrip(":")
-    if first == "if":
-        builder.open_if(place, condition, source)
-    elif first == "while":
-        builder.open_while(place, condition, source)
-    else:
-        builder.next_arm(place, condition, source)
+BLOCKS = {
+    **{word.upper(): (word, ":") for word in ("if", "elif", "else", "while", "return")},
+    "BREAK": ("leave", ""),
+    "CONTINUE": ("next", ""),
+    "HALT": ("end", ""),
+}
 
 
 def _plain(builder: CodeBuilder, words: UrWords, place: Place, text: str) -> None:

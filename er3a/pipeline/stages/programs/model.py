@@ -63,7 +63,6 @@ class FindingAt:
     file : the name of the file that holds the line
     motion_s : s from the start of the instruction's motion, when it begins; None of what is about a motion as a whole
     program_s : the same on the clock of the table of motion; None off the way that is kept there
-    round : of a line that is carried out more than once on that way, at which time that is, from 1
     """
 
     file: str
@@ -74,18 +73,14 @@ class FindingAt:
     finding: CheckFinding
     motion_s: float | None = None
     program_s: float | None = None
-    round: int | None = None
 
 
-def finding_at(
-    each: LocatedFinding, starts: Mapping[int, float] = NO_STEPS, rounds: Mapping[int, int] = NO_STEPS
-) -> FindingAt:
+def finding_at(each: LocatedFinding, starts: Mapping[int, float] = NO_STEPS) -> FindingAt:
     """A finding of a program's check, as results hold it.
 
     Parameters
     ----------
     starts : when (s) steps of the way that is kept begin
-    rounds : of each step of that way at which time its line is carried out there, from 1; none of lines that are once
     """
     own = None if each.moment is None else float(each.moment)
     start = None if each.step is None else starts.get(each.step)
@@ -98,7 +93,6 @@ def finding_at(
         _without_path(each.finding),
         own,
         None if own is None or start is None else start + own,
-        None if each.step is None or own is None or start is None else rounds.get(each.step),
     )
 
 
