@@ -32,6 +32,8 @@ MATHEMATICS: Mapping[str, Callable[..., float]] = {
     "TRUNC": math.trunc,
     "ROUND": lambda x: math.copysign(math.floor(abs(x) + 0.5), x),
 }
+OTHERS = ("WOBJDATA", "TOOLDATA")
+"""What is no tool, and what is no work object."""
 UNCLEAR = syntax.Unclear("")
 AS_IT_STANDS = syntax.Unclear("the configuration in which the arm stands")
 KINDS: dict[str, instructions.MotionKind] = {"J": "joint", "L": "line", "C": "arc", "A": "joint"}
@@ -100,8 +102,8 @@ class RapidDialect(Dialect):
         made = [_target(memory, value, (move.text, kind, absolute), checked) for value in values[:targets]]
         if stationary or held:
             made = [instructions.UnresolvedTarget(move.text, "external_tool")] * targets
-        kinds = [each.kind for each in (values[tool_at], options.get("WOBJ")) if isinstance(each, syntax.Record)]
-        if kinds and (kinds[0] == "WOBJDATA" or kinds[-1] == "TOOLDATA" != kinds[0]):  # each other's
+        taken = values[tool_at], options.get("WOBJ")
+        if any(isinstance(each, syntax.Record) and each.kind == other for each, other in zip(taken, OTHERS)):
             made = [instructions.UnresolvedTarget(move.text, "not_understood")] * targets
         via = made[0] if kind == "arc" else None
         if isinstance(via, instructions.PoseTarget):
