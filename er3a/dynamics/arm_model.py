@@ -34,7 +34,11 @@ from er3a.robots.robot import Envelope, Robot, derived
 
 
 def pinocchio() -> Any:
-    """The library.
+    """The library Pinocchio, imported on first use.
+
+    Returns
+    -------
+    module : ``pinocchio``
 
     Raises
     ------
@@ -77,7 +81,16 @@ class ArmModel:
     bodies: tuple[tuple[int | None, MassBody], ...]
 
     def rigid_torques(self, q: Reals, qd: Reals, qdd: Reals) -> Reals:
-        """Torques (N, n) of gravity and of the masses' motion (RNEA); no rotors, no friction, no forces at the tool."""
+        """Torques of gravity and of the masses' motion, by the recursive Newton-Euler algorithm [1]_.
+
+        Parameters
+        ----------
+        q, qd, qdd : (N, n), rad or m, and per s and s^2
+
+        Returns
+        -------
+        tau : (N, n), N m, or N for prismatic joints; no rotors, no friction, no forces at the tool
+        """
         if not len(q):
             return np.empty_like(q)
         pin = pinocchio()
@@ -88,7 +101,16 @@ class ArmModel:
         return tau
 
     def mass_matrix(self, q: Reals) -> Reals:
-        """Mass matrices (N, n, n) by CRBA, without rotors."""
+        """Mass matrices, by the composite rigid body algorithm [1]_, without rotors.
+
+        Parameters
+        ----------
+        q : (N, n), rad or m
+
+        Returns
+        -------
+        M : (N, n, n), kg m^2 (kg m and kg with prismatic joints), symmetric
+        """
         pin, data = pinocchio(), self.model.createData()
         upper = [np.triu(pin.crba(self.model, data, x)) for x in self._x(q)]
         M = np.array(upper).reshape(-1, self.robot.rows, self.robot.rows)
@@ -97,12 +119,30 @@ class ArmModel:
         return found
 
     def potential_energy(self, q: Reals) -> Reals:
-        """Potential energy (N,) in J, by Pinocchio's forward kinematics; the base's counts nothing."""
+        """Potential energy of the moving links and the load in gravity.
+
+        Parameters
+        ----------
+        q : (N, n), rad or m
+
+        Returns
+        -------
+        energy : (N,), J, 0 at the height of the world's origin; the base's mass counts nothing
+        """
         pin, data = pinocchio(), self.model.createData()
         return np.array([pin.computePotentialEnergy(self.model, data, x) for x in self._x(q)])
 
     def regressor(self, q: Reals, qd: Reals, qdd: Reals) -> Reals:
-        """Y (N, n, links, 10) with torques ``sum(Y * parameters)``; ``links`` are those that joints move, m of them."""
+        """The regressor of the torques, which are linear in the masses: ``tau = Y p`` [2]_.
+
+        Parameters
+        ----------
+        q, qd, qdd : (N, n), rad or m, and per s and s^2
+
+        Returns
+        -------
+        Y : (N, n, m, 10), with torques ``sum(Y * parameters)`` over the m links that joints move, see ``PARAMETERS``
+        """
         pin, data = pinocchio(), self.model.createData()
         rows = zip(self._x(q), qd @ self.to_rows.T, qdd @ self.to_rows.T)
         Y = np.array([pin.computeJointTorqueRegressor(self.model, data, *row) for row in rows])
@@ -111,7 +151,16 @@ class ArmModel:
         return found
 
     def tool_torques(self, q: Reals) -> Reals:
-        """Torques (N, n) that hold against what the surroundings do to the tool: ``-J.T @ wrench``."""
+        """Torques that hold against what the surroundings do to the tool: ``-J.T @ wrench``.
+
+        Parameters
+        ----------
+        q : (N, n), rad or m
+
+        Returns
+        -------
+        tau : (N, n), N m, or N for prismatic joints; 0 without force and moment
+        """
         load = self.load
         if load is None or not (any(load.force) or any(load.moment)):
             return np.zeros_like(q)
@@ -121,6 +170,7 @@ class ArmModel:
         return held
 
     def _x(self, q: Reals) -> Reals:
+        """Motion (N, m) of Pinocchio's joints."""
         x: Reals = self.robot.direction * row_values(self.robot, q) + joint_starts(self.robot)
         return x
 
@@ -131,7 +181,12 @@ def arm_model(robot: Robot, load: Load | None = None, gravity: float = GRAVITY) 
 
     Parameters
     ----------
+    load : on the flange; None for none
     gravity : m/s^2, along -z of the world, in which ``robot.base`` places the arm (wall, ceiling)
+
+    Returns
+    -------
+    model : kept with the robot, so that a second call costs nothing
 
     Raises
     ------
@@ -162,17 +217,35 @@ def arm_model(robot: Robot, load: Load | None = None, gravity: float = GRAVITY) 
 
 
 def flange_in_last_link(robot: Robot) -> Reals:
-    """The flange (4, 4) in the frame that moves with the last joint."""
+    """The flange in the frame that moves with the last joint, in which the last link's body is given.
+
+    Parameters
+    ----------
+    robot : its tool does not count
+
+    Returns
+    -------
+    T : (4, 4), m
+    """
     last: Reals = constant_links(robot.without_tool())[-1]
     return last
 
 
 def drives_of(robot: Robot) -> Drives:
-    """The robot's drives; all unknown where its file gives none."""
+    """The robot's drives.
+
+    Parameters
+    ----------
+    robot : n joints
+
+    Returns
+    -------
+    drives : all unknown (NaN) where the robot's file gives none
+    """
     return robot.masses.drives or Drives.unknown(robot.joints)
 
 
-WATER = 1000.0
+WATER = 1000.0  # kg/m^3
 STEPS = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 3), axis=-1).reshape(-1, 3)
 AROUND = STEPS[np.abs(STEPS).sum(axis=1) > 0] / np.linalg.norm(STEPS[np.abs(STEPS).sum(axis=1) > 0], axis=1)[:, None]
 """26 directions: a ball by their points is too small by 8 % of its radius at most."""
@@ -194,12 +267,30 @@ class LinkShape:
     guessed: bool
 
     def outside(self, point: Reals) -> float:
-        """How far (m) a point (3,) is outside the hull at least, where no centre of mass can be; below 0 inside."""
+        """How far a point is outside the hull of the shape, where no centre of mass can be.
+
+        Parameters
+        ----------
+        point : (3,), m, in the frame that moves with the link's joint
+
+        Returns
+        -------
+        distance : m, a lower bound outside (the largest distance from a face's plane); negative inside
+        """
         return float((scipy.spatial.ConvexHull(self.points).equations @ np.append(point, 1.0)).max())
 
 
 def link_shapes(robot: Robot) -> dict[int, LinkShape]:
-    """Shapes of links from 0 that have any."""
+    """Shapes of the links that have any, to check masses against.
+
+    Parameters
+    ----------
+    robot : its meshes, convex pieces or capsules; else capsules guessed from the table
+
+    Returns
+    -------
+    shapes : by link, from 0 for the base
+    """
     guessed = not arm_shapes(robot).given
     found = {}
     for link, parts in _link_parts(robot).items():
@@ -209,8 +300,19 @@ def link_shapes(robot: Robot) -> dict[int, LinkShape]:
 
 
 def estimated_links(robot: Robot, density: float) -> tuple[LinkMass, ...]:
-    """A body for each link that has shapes, filled evenly at ``density`` (kg/m^3); overlaps count twice.
+    """A body for each link that has shapes, filled evenly with a material.
 
+    Parameters
+    ----------
+    robot : its shapes as for :func:`link_shapes`
+    density : kg/m^3
+
+    Returns
+    -------
+    links : by ascending link; overlaps of a link's shapes count twice
+
+    Notes
+    -----
     Whoever uses them grades them ``inferred``.
     """
     parts = sorted(_link_parts(robot).items())
@@ -232,6 +334,7 @@ def _link_parts(robot: Robot) -> dict[int, Sequence[Envelope] | Sequence[Reals]]
 
 
 def _body(part: Envelope | Reals, density: float) -> MassBody:
+    """A part filled at a density, kg/m^3."""
     return capsule_body(part, density) if isinstance(part, Envelope) else filled(part, density)
 
 
@@ -243,7 +346,16 @@ def _outline(part: Envelope | Reals) -> Reals:
 
 
 def filled(points: Reals, density: float = WATER) -> MassBody:
-    """The hull of points (k, 3), m, filled at ``density`` (kg/m^3), as tetrahedra about its middle [4]_.
+    """The hull of points, filled with a material, as tetrahedra about its middle [4]_.
+
+    Parameters
+    ----------
+    points : (k, 3), m, not all in one plane
+    density : kg/m^3
+
+    Returns
+    -------
+    body : in the frame of the points, inertia about its own centre
 
     References
     ----------
@@ -255,16 +367,28 @@ def filled(points: Reals, density: float = WATER) -> MassBody:
     sums = corners.sum(axis=1)
     second = np.einsum("t,ti,tj->ij", mass, sums, sums) + np.einsum("t,tki,tkj->ij", mass, corners, corners)
     whole, centre = float(mass.sum()), mass @ sums / 4 / mass.sum()
+    # Second moments about the middle, then about the centre of mass.
     second = second / 20 - whole * np.outer(centre, centre)
     x, y, z = (middle + centre).tolist()
     return MassBody(whole, (x, y, z), six_moments(np.trace(second) * np.eye(3) - second))
 
 
 def capsule_body(capsule: Envelope, density: float) -> MassBody:
-    """A solid capsule: a cylinder and two half balls."""
+    """A solid capsule: a cylinder and two half balls.
+
+    Parameters
+    ----------
+    capsule : ends and radius, m, in any frame
+    density : kg/m^3
+
+    Returns
+    -------
+    body : in the capsule's frame, inertia about its own centre
+    """
     start, end, r = np.array(capsule.start), np.array(capsule.end), capsule.radius
     length = float(np.linalg.norm(end - start))
     cylinder, ball = density * np.pi * r**2 * length, density * 4 / 3 * np.pi * r**3
+    # A half ball's centre is 3/8 of the radius beyond the cylinder's end; hence 0.375 by the parallel axis theorem.
     across = cylinder * (length**2 / 12 + r**2 / 4) + ball * (0.4 * r**2 + length**2 / 4 + 0.375 * length * r)
     round_ = cylinder * r**2 / 2 + 0.4 * ball * r**2
     body = MassBody(cylinder + ball, (0.0, 0.0, 0.0), (across, across, round_, 0.0, 0.0, 0.0))

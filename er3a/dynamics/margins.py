@@ -73,19 +73,25 @@ class Margin:
 
 
 def max_payload(t: Reals, without: Reals, per_kg: Reals, limits: DriveLimits) -> Margin | None:
-    """The maximum payload in kg that keeps peak and RMS torques within limits; None where no limit is known.
+    """The maximum payload that keeps peak and RMS torques of a motion within limits.
 
     Parameters
     ----------
     t : (N,), s
-    without : (N, n), torques without payload
-    per_kg : (N, n), what each kg adds
+    without : (N, n), torques without payload, N m or N
+    per_kg : (N, n), what each kg adds, N m/kg or N/kg
+    limits : of the drives
+
+    Returns
+    -------
+    margin : kg, 0 where the limits are left without any; None where no limit of torque is known
     """
     if not limits.any_torque:
         return None
     room = limits.peak - np.sign(per_kg) * without
     with np.errstate(divide="ignore", invalid="ignore"):
         by_peak = np.where(per_kg != 0, np.maximum(room / np.abs(per_kg), 0.0), np.inf)
+    # Above the peak already: a payload that pulls the other way would help, but the motion fails without one.
     by_peak = np.where(np.abs(without) > limits.peak, 0.0, by_peak)
     squares = [time_mean(t, part) for part in (per_kg**2, 2 * per_kg * without, without**2)]
     return _least({"peak": by_peak, "rms": _by_rms(squares, limits.rated)[None]})
@@ -97,12 +103,14 @@ def max_speed_scale(t: Reals, parts: tuple[Reals, Reals, Reals], velocity: Reals
     Parameters
     ----------
     t : (N,), s
-    parts : at_rest, linear, square, each (N, n): torques ``at_rest + s linear + s^2 square``
-    velocity : (N, n), at s = 1
+    parts : at_rest, linear, square, each (N, n), N m or N: torques ``at_rest + s linear + s^2 square``
+    velocity : (N, n), rad/s or m/s, at s = 1
+    limits : of the drives
 
     Returns
     -------
-    margin : s, 0 where the arm can't even stand, infinite for a motion that nothing bounds; None without torque limits
+    margin : s, 0 where the arm can't even hold itself at rest, infinite for a motion that nothing bounds; None without
+        torque limits
     """
     if not limits.any_torque:
         return None
@@ -177,14 +185,32 @@ ASSUMED: dict[Grade, MassTolerance] = {
 
 
 def parameters(body: MassBody) -> Reals:
-    """(10,): m, m c, and the inertia about the frame's origin as xx, xy, yy, xz, yz, zz."""
+    """The ten numbers of a body in the regressor.
+
+    Parameters
+    ----------
+    body : in the frame that moves with its joint
+
+    Returns
+    -------
+    p : (10,): m (kg), m c (kg m), and the inertia about the frame's origin as xx, xy, yy, xz, yz, zz (kg m^2)
+    """
     c = np.array(body.centre)
     tensor = body.inertia_matrix + body.mass * about(c)
     return np.array([body.mass, *(body.mass * c), *(tensor[entry] for entry in UPPER)])
 
 
 def centre_directions(body: MassBody) -> Reals:
-    """(3, 10): how the parameters change per m that the centre moves along each axis."""
+    """How a body's ten numbers change as its centre moves, mass and inertia about the centre kept.
+
+    Parameters
+    ----------
+    body : in the frame that moves with its joint
+
+    Returns
+    -------
+    directions : (3, 10), change of :func:`parameters` per m along x, y, z
+    """
     c, found = np.array(body.centre), np.zeros((3, PARAMETERS))
     for axis in range(3):
         e = AXES[axis]
@@ -194,17 +220,32 @@ def centre_directions(body: MassBody) -> Reals:
 
 
 def torque_tolerance(model: ArmModel, q: Reals, qd: Reals, qdd: Reals, links: Grade, load: Grade = "official") -> Reals:
-    """Half-widths (N, n) of the torques' intervals, for motions (N, n) each.
+    """Half-widths of the torques' intervals, from the tolerances of all masses and centres of mass.
 
     Parameters
     ----------
+    q, qd, qdd : (N, n), rad or m, and per s and s^2
     links, load : grades of the links' masses and of the load, for bodies without tolerances of their own
+
+    Returns
+    -------
+    half : (N, n), N m or N; worst cases add
     """
     return sum(_halves(model, (q, qd, qdd), links, load), np.zeros_like(q))
 
 
 def load_tolerance(model: ArmModel, q: Reals, qd: Reals, qdd: Reals, load: Grade) -> Reals:
-    """Half-widths (N, n) of what the load alone adds to the torques; 0 without one."""
+    """Half-widths of the torques' intervals that the load alone adds.
+
+    Parameters
+    ----------
+    q, qd, qdd : (N, n), rad or m, and per s and s^2
+    load : grade of the load, if it has no tolerances of its own
+
+    Returns
+    -------
+    half : (N, n), N m or N; 0 without a load
+    """
     return _halves(model, (q, qd, qdd), load, load)[-1] if model.load else np.zeros_like(q)
 
 
@@ -229,13 +270,23 @@ def _halves(model: ArmModel, motion: tuple[Reals, Reals, Reals], links: Grade, l
 
 
 def tolerances_of(body: MassBody, grade: Grade) -> tuple[float, float]:
-    """By how much a body's mass (kg) and centre (m) may be off: its own tolerances, or those of the grade."""
+    """By how much a body's mass and centre may be off.
+
+    Parameters
+    ----------
+    body : with tolerances of its own, or without
+    grade : of its source, for those that it lacks
+
+    Returns
+    -------
+    mass, centre : half-widths, kg and m
+    """
     assumed = ASSUMED[grade]
     mass = assumed.mass_ratio * body.mass if body.mass_tolerance is None else body.mass_tolerance
     return mass, assumed.centre if body.centre_tolerance is None else body.centre_tolerance
 
 
-MEET = 1e-6  # m
+MEET = 1e-6  # m; three axes meet in a point if each passes it as near as this
 WristQuantity = Literal["payload", "moment", "inertia"]
 
 
@@ -259,7 +310,17 @@ class WristUse:
 
 
 def levers(robot: Robot, q: Reals, point: Reals) -> Reals:
-    """Distances (N, m) in m of a point (3,) of the flange from each axis, at joint values (N, n)."""
+    """Distances of a point of the flange from each row's axis.
+
+    Parameters
+    ----------
+    q : (N, n), rad or m
+    point : (3,), m, flange frame
+
+    Returns
+    -------
+    distances : (N, m), m
+    """
     T = frames(robot.without_tool(), q)
     p = T[:, -1, :3, :3] @ point + T[:, -1, :3, 3]
     arm = p[:, None] - T[:, :-1, :3, 3]
@@ -268,15 +329,35 @@ def levers(robot: Robot, q: Reals, point: Reals) -> Reals:
 
 
 def worst_levers(robot: Robot, point: Reals, rows: Sequence[int]) -> tuple[Reals, Reals]:
-    """Largest distances (r,) in m of a point (3,) of the flange from some rows' axes (from 0): found, and bounds."""
+    """Largest distances of a point of the flange from some rows' axes, over all poses within the limits.
+
+    Parameters
+    ----------
+    point : (3,), m, flange frame
+    rows : r rows, from 0
+
+    Returns
+    -------
+    found, bound : (r,), m, the largest found, and what no pose exceeds
+    """
     climbed = max_over_poses(robot, lambda q: levers(robot, q, point)[:, list(rows)])
     found = [bounded_lever(robot, point, row, q) for row, q in zip(rows, climbed.q)]
     return np.array([each.found for each in found]), np.array([each.bound for each in found])
 
 
 def load_moments(robot: Robot, load: Load, gravity: float, q: Reals) -> Reals:
-    """Moments (N, m), N m, of a load at rest about each axis, at joint values (N, n), however gravity is directed; with
-    what the surroundings do to the tool."""
+    """Moments of a load at rest about each row's axis, as if gravity were directed in the worst way.
+
+    Parameters
+    ----------
+    load : its force and moment, of the surroundings on the tool, count too
+    gravity : m/s^2
+    q : (N, n), rad or m
+
+    Returns
+    -------
+    moments : (N, m), N m, at least 0
+    """
     T = frames(robot, q)
     R, arm = T[:, -1, :3, :3], T[:, -1, None, :3, 3] - T[:, :-1, :3, 3]
     force, moment = R @ np.array(load.force), R @ np.array(load.moment)
@@ -287,7 +368,18 @@ def load_moments(robot: Robot, load: Load, gravity: float, q: Reals) -> Reals:
 
 
 def worst_moments(robot: Robot, load: Load, gravity: float, rows: Sequence[int]) -> tuple[Reals, Reals]:
-    """Largest moments (r,) of a load, as :func:`load_moments`, about some rows' axes (from 0): found, and bounds."""
+    """Largest moments of a load about some rows' axes, as :func:`load_moments`, over all poses within the limits.
+
+    Parameters
+    ----------
+    load : with force and moment at the tool
+    gravity : m/s^2
+    rows : r rows, from 0
+
+    Returns
+    -------
+    found, bound : (r,), N m, the largest found, and what no pose exceeds
+    """
     climbed = max_over_poses(robot, lambda q: load_moments(robot, load, gravity, q)[:, list(rows)])
     found = [bounded_moment(robot, load, gravity, row, q) for row, q in zip(rows, climbed.q)]
     return np.array([each.found for each in found]), np.array([each.bound for each in found])
@@ -296,11 +388,18 @@ def worst_moments(robot: Robot, load: Load, gravity: float, rows: Sequence[int])
 def wrist_use(
     robot: Robot, wrist: WristLoad, load: Load, gravity: float = GRAVITY, off: tuple[float, float] = (0.0, 0.0)
 ) -> tuple[WristUse, ...]:
-    """What a load requires of the wrist at rest, in the table's order; only quantities that the wrist's data limit.
+    """What a load requires of the wrist at rest, compared with what the manufacturer allows [3]_.
 
-    Moments take in the forces of the surroundings on the tool.
+    Parameters
+    ----------
+    wrist : only quantities that it limits are looked at
+    load : moments take in the forces of the surroundings on the tool
+    gravity : m/s^2
+    off : by how much the load's mass (kg) and centre (m) may be off, which ``most`` of the uses takes in
 
-    ``off``: by how much the load's mass (kg) and centre (m) may be off, which ``most`` of the uses takes in.
+    Returns
+    -------
+    uses : payload (kg), then moments (N m), then inertias (kg m^2), in the order of the wrist's data
     """
     heaviest, ratio = load.mass + off[0], 1 + off[0] / load.mass if load.mass else 1.0
     joints = sorted({joint for joint, _ in (*wrist.moment, *wrist.inertia)})
@@ -334,7 +433,17 @@ def _own(robot: Robot, load: Load, joint: int) -> float:
 
 
 def last_axis(robot: Robot) -> tuple[Reals, Reals]:
-    """A point (3,) in m and the direction (3,) of the last axis, in the flange's frame."""
+    """The axis of the last joint, as the flange sees it.
+
+    Parameters
+    ----------
+    robot : its tool does not count
+
+    Returns
+    -------
+    point : (3,), m, on the axis, flange frame
+    direction : (3,), unit vector, flange frame
+    """
     back = np.linalg.inv(constant_links(robot.without_tool())[-1])
     return back[:3, 3], back[:3, 2]
 
@@ -358,8 +467,21 @@ class LoadDiagram:
 def load_diagram(
     robot: Robot, wrist: WristLoad, mass: Reals, along: Reals, gravity: float = GRAVITY
 ) -> LoadDiagram | None:
-    """The load diagram; None for wrists whose axes don't meet in a point, or that nothing is known of.
+    """The load diagram of a wrist, as manuals draw it.
 
+    Parameters
+    ----------
+    wrist : allowed moments and inertias
+    mass : (c,), kg, one curve each
+    along : (s,), m, distances from the flange along the last axis
+    gravity : m/s^2
+
+    Returns
+    -------
+    diagram : m; None for wrists whose axes don't meet in a point, or that nothing is known of
+
+    Notes
+    -----
     A joint before the last one counts with the distance from the wrist's centre, which a load gets from its
     axis if the joints beyond turn far enough.
     """
@@ -381,11 +503,21 @@ def load_diagram(
 
 
 def wrist_to_flange(robot: Robot) -> float | None:
-    """Distance (m) along the last axis from where the last three axes meet to the flange; None if they don't meet."""
+    """Distance along the last axis from where the last three axes meet to the flange.
+
+    Parameters
+    ----------
+    robot : its tool does not count
+
+    Returns
+    -------
+    distance : m; None if the axes don't meet, all are parallel, or one of the joints slides
+    """
     if robot.rows < 3 or robot.sliding[-3:].any():
         return None
     T = frames(robot.without_tool(), np.zeros(robot.joints))
     flange_point, axes, points = T[-1, :3, 3], T[-4:-1, :3, 2], T[-4:-1, :3, 3]
+    # The point nearest to the three lines, by least squares; the system is singular if all are parallel.
     squares = np.eye(3) - axes[:, :, None] * axes[:, None, :]
     if np.linalg.matrix_rank(squares.sum(axis=0), tol=1e-6) < 3:
         return None

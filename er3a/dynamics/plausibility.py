@@ -23,8 +23,8 @@ GUESSED = 10.0
 """How much wider bounds are of a guessed shape; a centre may then be outside by the arm's size."""
 WIDEST_RATIO, NARROWEST_RATIO = 3.0, 0.1
 """Radius of gyration against that of the filled capsules."""
-WEIGHT_RATIO = 0.15
-PARALLEL_RATIO = 2.0
+WEIGHT_RATIO = 0.15  # of the stated weight, by which the sum of the links may differ
+PARALLEL_RATIO = 2.0  # of the inertia that the shape would have: more is too much
 
 
 class ImpossibleInertia(Finding):
@@ -107,7 +107,16 @@ MassFinding = (
 
 
 def mass_findings(robot: Robot) -> tuple[MassFinding, ...]:
-    """Implausible values among a robot's masses: link by link, then their sum."""
+    """Implausible values among a robot's masses, link by link, then their sum.
+
+    Parameters
+    ----------
+    robot : bodies of links in SI, shapes, rotors and the weight that the manufacturer states
+
+    Returns
+    -------
+    findings : at most a few for each link; empty if nothing is implausible
+    """
     shapes = link_shapes(robot)
     beyond = float(np.abs(robot.a).sum() + np.abs(robot.d).sum())
     armature = drives_of(robot).armature
@@ -117,6 +126,7 @@ def mass_findings(robot: Robot) -> tuple[MassFinding, ...]:
         body = robot.masses.body(link)
         if body is None or not has_mass(body):
             rotor = moved_by_one and link > 0 and armature[link - 1] > 0
+            # A massless link with mass beyond it is no singular joint: what it carries has inertia about its axis.
             carries = any(has_mass(robot.masses.body(k)) for k in range(link + 1, robot.rows + 1))
             found += [MissingLink(link, not rotor and not carries)] if link else []
         elif problem := no_body(body):
@@ -131,11 +141,21 @@ def mass_findings(robot: Robot) -> tuple[MassFinding, ...]:
 
 
 def has_mass(body: MassBody | None) -> bool:
-    """Whether a body adds anything to torques."""
+    """Whether a body adds anything to torques.
+
+    Parameters
+    ----------
+    body : of a link, or None
+
+    Returns
+    -------
+    adds : it has a mass above 0 kg or an inertia
+    """
     return body is not None and (body.mass > 0 or any(body.inertia))
 
 
 def _against_shape(link: int, body: MassBody, shape: LinkShape, size: float) -> list[MassFinding]:
+    """What density, centre and inertia of a body say against the link's shape; ``size`` of the arm, m."""
     water, slack = shape.water, GUESSED if shape.guessed else 1.0
     found: list[MassFinding] = []
     density = WATER * body.mass / water.mass
@@ -163,6 +183,7 @@ def _against_shape(link: int, body: MassBody, shape: LinkShape, size: float) -> 
 
 
 def _against_weight(robot: Robot, incomplete: bool) -> list[MassFinding]:
+    """Whether the sum of the links' masses contradicts the stated weight."""
     weight, total = robot.masses.weight, sum(each.body.mass for each in robot.masses.links)
     if not (np.isfinite(weight) and robot.masses.links):
         return []

@@ -59,7 +59,22 @@ class Hanging:
 
 
 def corners(robot: Robot, low: Reals, high: Reals) -> Reals:
-    """Corners (B, m, 3, 2) of each row's hull over boxes (B, n) of joint values: cosine and sine, or shift and 0."""
+    """Corners of each row's hull over boxes of joint values: triangles around arcs of cosine and sine, or intervals.
+
+    Parameters
+    ----------
+    low, high : (B, n), rad or m
+
+    Returns
+    -------
+    corners : (B, m, 3, 2), cosine and sine of revolute rows; shift (m) and 0 of prismatic ones
+
+    Notes
+    -----
+    An arc of half-width h is within its two ends and the point at 1/cos(h) where their tangents meet. Wider than
+    ``WIDEST_ARC`` to either side, it is within the equilateral triangle around the circle, whose corners are at
+    distance 2.
+    """
     coupling = np.eye(robot.rows) if robot.coupling is None else robot.coupling
     to_rows = robot.direction[:, None] * coupling
     middle = (low + high) / 2 @ to_rows.T + joint_starts(robot)
@@ -77,7 +92,16 @@ def corners(robot: Robot, low: Reals, high: Reals) -> Reals:
 
 
 def hanging_of(model: ArmModel) -> list[Hanging]:
-    """What each link (of rows 0 to m - 1) adds of its own; load and forces at the tool count to the last one."""
+    """What each link adds of its own to what hangs beyond its joint.
+
+    Parameters
+    ----------
+    model : load and forces at the tool count to the last row
+
+    Returns
+    -------
+    own : m entries, for rows 0 to m - 1, each with B = K = 1
+    """
     robot = model.robot
     moment, force = _wrench(robot, model.load or Load(0.0))
     found = []
@@ -96,7 +120,16 @@ def hanging_of(model: ArmModel) -> list[Hanging]:
 
 
 def load_alone(robot: Robot, load: Load) -> list[Hanging]:
-    """A load, and what the surroundings do to the tool, on the last row of an arm without masses."""
+    """A load, and what the surroundings do to the tool, on the last row of an arm without masses.
+
+    Parameters
+    ----------
+    load : in the flange's frame, forces in the tool's
+
+    Returns
+    -------
+    own : m entries, empty but for the last, each with B = K = 1
+    """
     centre = (flange_in_last_link(robot) @ np.append(load.centre, 1.0))[:3]
     none = [_alone(np.zeros(3))] * 3
     hanging = (_alone(each) for each in (load.mass * centre, *_wrench(robot, load)))
@@ -111,6 +144,7 @@ def _wrench(robot: Robot, load: Load) -> tuple[Reals, Reals]:
 
 
 def _alone(vector: Reals) -> Reals:
+    """A vector (3,) as the only one, (1, 1, 3)."""
     found: Reals = vector[None, None]
     return found
 
@@ -120,7 +154,13 @@ def carried(robot: Robot, own: list[Hanging], at: list[Reals], row: int) -> Hang
 
     Parameters
     ----------
+    own : m entries, of :func:`hanging_of` or :func:`load_alone`
     at : m arrays (B, c, 2), corners of each row; those of rows beyond come in order, the last row's fastest
+    row : from 0
+
+    Returns
+    -------
+    hanging : kg, kg m, N m, N, over K combinations of corners
     """
     links, found = constant_links(robot), own[-1]
     for outer_row in range(robot.rows - 1, row, -1):
@@ -145,7 +185,18 @@ def carried(robot: Robot, own: list[Hanging], at: list[Reals], row: int) -> Hang
 
 
 def gravity_before(robot: Robot, gravity: float, at: list[Reals], row: int) -> Reals:
-    """Gravity (B, K, 3) in the frame that moves with a row's joint, over the corners of the rows up to it."""
+    """Gravity in the frame that moves with a row's joint, over the corners of the rows up to it.
+
+    Parameters
+    ----------
+    gravity : m/s^2, along -z of the world
+    at : m arrays (B, c, 2), corners of each row
+    row : from 0
+
+    Returns
+    -------
+    pull : (B, K, 3), m/s^2, over K combinations of corners, the row's own fastest
+    """
     found, links = np.array([[[0.0, 0.0, -gravity]]]), constant_links(robot)
     for before in range(row + 1):
         found = (found @ links[before][:3, :3])[:, :, None]
@@ -164,12 +215,24 @@ def _rotated(vectors: Reals, corner: Reals) -> Reals:
 
 
 def _joined(vectors: Reals) -> Reals:
+    """Vectors (B, c, K, 3) as (B, c K, 3)."""
     found: Reals = vectors.reshape(len(vectors), vectors.shape[1] * vectors.shape[2], 3)
     return found
 
 
 def row_torques(robot: Robot, row: int, outer: Hanging, pull: Reals) -> Reals:
-    """Holding torques or forces (B, K) of a row: over the corners of all rows, the last row's fastest."""
+    """Holding torques or forces of a row, over the corners of all rows.
+
+    Parameters
+    ----------
+    row : from 0
+    outer : what hangs beyond its joint, of :func:`carried`
+    pull : (B, K, 3), m/s^2, of :func:`gravity_before`
+
+    Returns
+    -------
+    torques : (B, K), N m, or N of a prismatic row, the last row's corners fastest
+    """
     x, y, z = (pull[:, :, None, axis] for axis in range(3))
     if robot.sliding[row]:
         found = -outer.mass * z - outer.force[:, None, :, 2]
@@ -180,7 +243,18 @@ def row_torques(robot: Robot, row: int, outer: Hanging, pull: Reals) -> Reals:
 
 
 def torque_caps(robot: Robot, row: int, outer: Hanging, gravity: float) -> Reals:
-    """What a row's torque or force (B, K) can't exceed wherever gravity points, over the corners of the rows beyond."""
+    """What a row's torque or force can't exceed wherever gravity points, over the corners of the rows beyond.
+
+    Parameters
+    ----------
+    row : from 0
+    outer : what hangs beyond its joint, of :func:`carried`
+    gravity : m/s^2
+
+    Returns
+    -------
+    caps : (B, K), N m, or N of a prismatic row
+    """
     if robot.sliding[row]:
         caps: Reals = outer.mass * gravity + np.abs(outer.force[..., 2])
     else:
@@ -190,12 +264,12 @@ def torque_caps(robot: Robot, row: int, outer: Hanging, gravity: float) -> Reals
 
 CLOSE = 1e-3
 """Bounds nearer than that to what is found, in parts of it, are near enough; levers, of few joints, get nearer."""
-CLOSE_LEVER = 1e-5
-MAX_CORNERS = 12_000_000
-MAX_BOXES = 60_000
-BATCH_CORNERS = 300_000
-ROUNDING = 1e-9
-IDLE = 1e-12
+CLOSE_LEVER = 1e-5  # the same of levers and moments
+MAX_CORNERS = 12_000_000  # looked at for one bound: some seconds
+MAX_BOXES = 60_000  # held at a time, so that a bound that does not close can't fill memory
+BATCH_CORNERS = 300_000  # at a time, in arrays of some megabytes
+ROUNDING = 1e-9  # in parts of a bound: more than sums of some hundred terms can be off
+IDLE = 1e-12  # in parts of the largest value: a row that changes less has no influence
 
 AtCorners = Callable[[list[Reals]], tuple[Reals, Reals]]
 """Of m arrays (B, c, 2) of rows' corners: values (B, K) over all of them, and what they can't exceed anyway (B,)."""
@@ -213,8 +287,21 @@ class Bounded:
 
 
 def bounded_torque(model: ArmModel, joint: int, size: Size, start: Bounded) -> Bounded:
-    """The largest holding torque of a joint (from 0) by its absolute value, at least that of ``start``.
+    """The largest holding torque of a joint by its absolute value, found and bounded, by branch and bound [1]_.
 
+    Parameters
+    ----------
+    model : with load and gravity
+    joint : from 0
+    size : the absolute torque (N,) of the joint, N m or N, at poses (N, n)
+    start : a pose and what is found there already
+
+    Returns
+    -------
+    bounded : N m or N, its ``found`` at least that of ``start``
+
+    Notes
+    -----
     Wherever gravity could point in a joint's frame is a bound that only the joints beyond are in, and often reached.
     """
     robot, own = model.robot, hanging_of(model)
@@ -248,14 +335,36 @@ def bounded_torque(model: ArmModel, joint: int, size: Size, start: Bounded) -> B
 
 
 def bounded_lever(robot: Robot, point: Reals, row: int, start: Reals) -> Bounded:
-    """The largest distance (m) of a point (3,) of the flange from a row's axis (from 0); ``start`` is a pose (n,)."""
+    """The largest distance of a point of the flange from a row's axis over all poses, found and bounded.
+
+    Parameters
+    ----------
+    point : (3,), m, flange frame
+    row : from 0
+    start : (n,), rad or m, a pose to search from
+
+    Returns
+    -------
+    bounded : m
+    """
     x, y, z = point.tolist()
     return bounded_moment(robot, Load(1.0, (x, y, z)), 1.0, row, start)
 
 
 def bounded_moment(robot: Robot, load: Load, gravity: float, row: int, start: Reals) -> Bounded:
-    """The largest moment (N m) of a load about a row's axis (from 0) at rest, however gravity (m/s^2) is directed, with
-    what the surroundings do to the tool; ``start`` is a pose (n,)."""
+    """The largest moment of a load at rest about a row's axis over all poses, found and bounded.
+
+    Parameters
+    ----------
+    load : with what the surroundings do to the tool
+    gravity : m/s^2, directed in the worst way
+    row : from 0
+    start : (n,), rad or m, a pose to search from
+
+    Returns
+    -------
+    bounded : N m
+    """
     own = load_alone(robot, load)
 
     def moments(at: list[Reals]) -> Reals:
@@ -267,6 +376,7 @@ def bounded_moment(robot: Robot, load: Load, gravity: float, row: int, start: Re
 
 
 def _ahead(at: list[Reals], row: int) -> int:
+    """How many combinations of corners the rows up to one have."""
     return int(np.prod([each.shape[1] for each in at[: row + 1]]))
 
 
@@ -292,6 +402,7 @@ def _bounded_norm(
 def _branch_and_bound(
     robot: Robot, at_corners: AtCorners, size: Size, start: Bounded, close: float, useless: float = np.inf
 ) -> Bounded:
+    """Halve the boxes with the highest bounds until these are close to what is found, or the budget is spent."""
     low, high = robot.lower[None], robot.upper[None]
     used, _ = _used_rows(robot, at_corners, low, high)
     bound, joint = _bounds(robot, at_corners, used, low, high)
@@ -300,6 +411,7 @@ def _branch_and_bound(
     batch, left, dropped = max(1, BATCH_CORNERS // each), MAX_CORNERS // each, 0.0
     while True:
         open_ = bound > best * (1 + close)
+        # Boxes that can't raise the value by more than ``close`` are settled, but their bounds count.
         dropped = max(dropped, float(bound[~open_].max(initial=0.0)))
         low, high, bound, joint = low[open_], high[open_], bound[open_], joint[open_]
         if not len(bound) or left <= 0 or len(bound) > MAX_BOXES or best > useless:
@@ -318,6 +430,7 @@ def _branch_and_bound(
             best, q = float(values.max()), middle[values.argmax()]
         low = np.concatenate([low[kept], halves[0]])
         high = np.concatenate([high[kept], halves[1]])
+        # The whole's bound holds for its halves too, and may be lower: their hulls need not lie within its own.
         bound = np.concatenate([bound[kept], np.minimum(bounds, np.repeat(bound[taken], 2)[inside])])
         joint = np.concatenate([joint[kept], joints])
     most = max(best, dropped, float(bound.max(initial=0.0)))
@@ -325,6 +438,7 @@ def _branch_and_bound(
 
 
 def _at(robot: Robot, used: Flags, low: Reals, high: Reals) -> list[Reals]:
+    """Corners of each row over boxes; of rows that are not used one is enough."""
     found = corners(robot, low, high)
     return [found[:, row] if used[row] else found[:, row, APEX:] for row in range(robot.rows)]
 
@@ -362,6 +476,7 @@ def _used_rows(robot: Robot, at_corners: AtCorners, low: Reals, high: Reals) -> 
 
 
 def _halved(low: Reals, high: Reals, joint: Integers) -> tuple[Reals, Reals]:
+    """Boxes (2 B, n) from halving each at one joint."""
     rows, middle = np.arange(len(low)), (low + high) / 2
     lows, highs = np.repeat(low, 2, axis=0), np.repeat(high, 2, axis=0)
     highs[2 * rows, joint] = lows[2 * rows + 1, joint] = middle[rows, joint]
@@ -377,12 +492,12 @@ def _may_be_within(robot: Robot, low: Reals, high: Reals) -> Flags:
     return found
 
 
-POSES = 1000
-CLIMBS = 4
-GRID = 21
-REFINEMENTS = 3
-MAX_ROUNDS = 12
-NO_BETTER = 1e-9
+POSES = 1000  # evenly spread, of which the best few are improved
+CLIMBS = 4  # poses of each objective that are improved
+GRID = 21  # values of a joint over its range
+REFINEMENTS = 3  # of the grid about the best value
+MAX_ROUNDS = 12  # over all joints
+NO_BETTER = 1e-9  # of the value: a round that gains less is the last
 
 
 @dataclass(frozen=True, eq=False)
@@ -394,11 +509,15 @@ class Maxima:
 
 
 def max_over_poses(robot: Robot, objective: Callable[[Reals], Reals]) -> Maxima:
-    """The largest of each objective.
+    """The largest values of objectives over all poses within the limits, by search.
 
     Parameters
     ----------
-    objective : values (N, k) at poses (N, n)
+    objective : values (N, k) at poses (N, n), rad or m
+
+    Returns
+    -------
+    maxima : found, not proven; the starts are not random, so equal inputs give equal numbers
     """
     q = quasi_random_points(robot.lower, robot.upper, POSES)
     q = q[within(robot, q)]

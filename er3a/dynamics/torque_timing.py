@@ -31,9 +31,9 @@ from er3a.numerics.arrays import Reals
 from er3a.planning import timing
 from er3a.planning.piecewise import polynomial_motion
 
-MAX_ROUNDS = 30
-GAIN = 1e-4
-SLOWEST = 1e-3
+MAX_ROUNDS = 30  # each takes one run of TOPP-RA; a few suffice unless viscous friction dominates
+GAIN = 1e-4  # of the time: below this a further round gains nothing
+SLOWEST = 1e-3  # share of limits that tangents and room are kept above, to divide by nothing that vanishes
 SLACK = 1e-3  # by which a speed that no motion exceeds is kept above the one found, because TOPP-RA's is rounded
 
 
@@ -52,12 +52,18 @@ class TimedTorques:
 
 
 def fastest_under_torques(model: ArmModel, q: Reals, speed: Reals, torque_limit: Reals) -> TimedTorques:
-    """Run along nodes (N, n) from rest to rest, as fast as torques and joint speeds allow.
+    """Run along nodes from rest to rest, as fast as torques and joint speeds allow [1]_.
 
     Parameters
     ----------
+    model : with load and gravity
+    q : (N, n), rad or m, joined by a cubic spline
     speed : (n,), maximum joint speeds, rad/s or m/s
     torque_limit : (n,), maximum torques, N m or N; NaN where unknown, which bounds nothing
+
+    Returns
+    -------
+    timed : the motion, its torques (N m or N), and a time (s) that no motion on these nodes undercuts
 
     Raises
     ------
@@ -107,7 +113,20 @@ class TorquesAlong:
     def along(
         cls, model: ArmModel, s: Reals, spline: scipy.interpolate.CubicSpline, speed: Reals, torque_limit: Reals
     ) -> TorquesAlong:
-        """The torques along a path."""
+        """The torques along a path, at its nodes.
+
+        Parameters
+        ----------
+        model : with load and gravity
+        s : (N,), arc length with each joint measured in its maximum speed, s
+        spline : joint values (n,), rad or m, over s
+        speed : (n,), rad/s or m/s
+        torque_limit : (n,), N m or N; NaN where unknown
+
+        Returns
+        -------
+        along : rows of the k joints whose limit is known
+        """
         bound, drives = np.isfinite(torque_limit), drives_of(model.robot)
         a, b, c = _torque_rows(model, s, spline, torque_limit)
         slope = spline(s, 1)
@@ -120,7 +139,13 @@ class TorquesAlong:
         return cls(s, spline, speed, *rows, torque_limit[bound], speed_bound, slow)
 
     def shortest_time(self) -> tuple[float, Reals]:
-        """A time (s) that no motion undercuts, and s' at the nodes (N,) that none exceeds."""
+        """A time that no motion undercuts, by relaxed rows, repeated until it gains nothing.
+
+        Returns
+        -------
+        lower_bound : s
+        ceiling : (N,), s' at the nodes that no motion exceeds
+        """
         ceiling, lower_bound = self.speed_bound, 0.0
         for _ in range(MAX_ROUNDS):
             path_speed, t = self._solved(self._relaxed(ceiling), ceiling)
@@ -131,7 +156,17 @@ class TorquesAlong:
         return lower_bound, ceiling
 
     def fastest(self, ceiling: Reals) -> tuple[Reals, Reals]:
-        """Speeds s' and times (s) at the nodes (N,) of a motion that keeps the limits; ``ceiling`` of all motions."""
+        """A motion that keeps the limits, by tightened rows, repeated until it gains nothing.
+
+        Parameters
+        ----------
+        ceiling : (N,), s' at the nodes that no motion exceeds
+
+        Returns
+        -------
+        path_speed : (N,), s' at the nodes
+        t : (N,), s, times at the nodes
+        """
         around, best = self.slow, np.inf
         for _ in range(MAX_ROUNDS):
             path_speed, t = self._solved(self._kept(around, ceiling), ceiling)
@@ -177,9 +212,11 @@ class TorquesAlong:
 
         class Torques(constraint.LinearConstraint):  # type: ignore[misc, name-defined]
             def get_dof(self) -> int:
+                """Joints whose torque is limited. toppra calls it."""
                 return count
 
             def compute_constraint_params(self, path: Any, gridpoints: Any) -> Any:
+                """The rows at the nodes, and s'^2 at most the ceiling's, in toppra's order. toppra calls it."""
                 collocated = constraint.linear_constraint.canlinear_colloc_to_interpolate
                 squares = np.stack([np.zeros(len(s)), ceiling**2], axis=1)
                 return collocated(*rows, None, squares, gridpoints, identical=False)

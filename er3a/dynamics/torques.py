@@ -76,8 +76,22 @@ def torques(robot: Robot, q: Reals, qd: Reals, qdd: Reals, load: Load | None = N
 
 
 def mass_matrix(robot: Robot, q: Reals, load: Load | None = None) -> Reals:
-    """Mass matrices (..., n, n) in kg m^2 (kg, kg m for prismatic joints), rotors included; errors as
-    :func:`torques`."""
+    """Mass matrices at joint values, rotors included.
+
+    Parameters
+    ----------
+    q : (..., n), rad or m
+    load : on the flange; None for none
+
+    Returns
+    -------
+    M : (..., n, n), kg m^2 (kg, kg m for prismatic joints)
+
+    Raises
+    ------
+    ShapeError, PoseError, RobotError
+        as :func:`torques`
+    """
     (q,), shape = _flat(robot, {"q": q})
     M = arm_model(robot, load).mass_matrix(q) + np.diag(known(drives_of(robot).armature))
     matrices: Reals = M.reshape(*shape, robot.joints)
@@ -85,13 +99,42 @@ def mass_matrix(robot: Robot, q: Reals, load: Load | None = None) -> Reals:
 
 
 def gravity(robot: Robot, q: Reals, load: Load | None = None) -> Reals:
-    """Torques (..., n) in N m (N) that hold the arm at rest, forces at the tool included; errors as :func:`torques`."""
+    """Torques that hold the arm at rest, forces at the tool included, friction not.
+
+    Parameters
+    ----------
+    q : (..., n), rad or m
+    load : on the flange; None for none
+
+    Returns
+    -------
+    tau : (..., n), N m, or N for prismatic joints
+
+    Raises
+    ------
+    ShapeError, PoseError, RobotError
+        as :func:`torques`
+    """
     (q,), shape = _flat(robot, {"q": q})
     return holding_torques(arm_model(robot, load), q).reshape(shape)
 
 
 def torque_parts(model: ArmModel, q: Reals, qd: Reals, qdd: Reals) -> TorqueParts:
-    """Torques by cause for joint values, velocities and accelerations (N, n)."""
+    """Torques of a motion by their cause.
+
+    Parameters
+    ----------
+    model : with load and gravity
+    q, qd, qdd : (N, n), rad or m, and per s and s^2
+
+    Returns
+    -------
+    parts : (N, n) each, N m or N
+
+    Notes
+    -----
+    Three runs of RNEA: at rest, without acceleration, and whole. Their differences are the parts.
+    """
     rest, drives = np.zeros_like(q), drives_of(model.robot)
     held = model.rigid_torques(q, rest, rest)
     moving = model.rigid_torques(q, qd, rest)
@@ -106,15 +149,36 @@ def torque_parts(model: ArmModel, q: Reals, qd: Reals, qdd: Reals) -> TorquePart
 
 
 def holding_torques(model: ArmModel, q: Reals) -> Reals:
-    """Torques (N, n) at rest, without friction."""
+    """Torques at rest, without friction.
+
+    Parameters
+    ----------
+    model : with load and gravity
+    q : (N, n), rad or m
+
+    Returns
+    -------
+    tau : (N, n), N m or N, forces at the tool included
+    """
     rest = np.zeros_like(q)
     held: Reals = model.rigid_torques(q, rest, rest) + model.tool_torques(q)
     return held
 
 
 def friction_torques(drives: Drives, qd: Reals) -> Reals:
-    """Torques (N, n) against Coulomb's and viscous friction; unknown ones count nothing.
+    """Torques against Coulomb's and viscous friction; unknown ones count nothing.
 
+    Parameters
+    ----------
+    drives : of n joints
+    qd : (N, n), rad/s or m/s
+
+    Returns
+    -------
+    tau : (N, n), N m or N
+
+    Notes
+    -----
     A joint slower than :data:`AT_REST` is at rest, because rounding has no direction.
     """
     against: Reals = known(drives.viscous) * qd + known(drives.coulomb) * direction_of(qd)
@@ -122,13 +186,31 @@ def friction_torques(drives: Drives, qd: Reals) -> Reals:
 
 
 def direction_of(qd: Reals) -> Reals:
-    """-1, 0 or 1 of velocities, 0 for joints at rest."""
+    """The sign of velocities, 0 for joints at rest.
+
+    Parameters
+    ----------
+    qd : (..., n), rad/s or m/s
+
+    Returns
+    -------
+    direction : (..., n), -1, 0 or 1
+    """
     moving: Reals = np.where(np.abs(qd) > AT_REST, np.sign(qd), 0.0)
     return moving
 
 
 def known(values: Reals) -> Reals:
-    """The values, with 0 for unknown ones."""
+    """Values with 0 in place of unknown ones (NaN).
+
+    Parameters
+    ----------
+    values : any shape
+
+    Returns
+    -------
+    values : same shape, a copy
+    """
     return np.nan_to_num(values, nan=0.0)
 
 
@@ -172,7 +254,18 @@ class Demand:
 
 
 def demand(t: Reals, qd: Reals, tau: Reals) -> Demand:
-    """What a motion requires: torques and velocities (N, n) at times (N,) in s."""
+    """What a motion requires of each joint's drive.
+
+    Parameters
+    ----------
+    t : (N,), s
+    qd : (N, n), rad/s or m/s
+    tau : (N, n), N m or N
+
+    Returns
+    -------
+    demand : (n,) each, N m, W, J, rad/s (N, m/s for prismatic joints)
+    """
     power, duration = tau * qd, float(t[-1] - t[0])
 
     def whole(values: Reals) -> Reals:
@@ -191,7 +284,17 @@ def demand(t: Reals, qd: Reals, tau: Reals) -> Demand:
 
 
 def time_mean(t: Reals, values: Reals) -> Reals:
-    """Means (n,) over times (N,) in s of values (N, n), by the trapezoidal rule; the plain mean if no time passes."""
+    """Means over time, by the trapezoidal rule.
+
+    Parameters
+    ----------
+    t : (N,), s, ascending
+    values : (N, n)
+
+    Returns
+    -------
+    mean : (n,), in the unit of the values; the plain mean if no time passes
+    """
     if t[-1] > t[0]:
         mean: Reals = scipy.integrate.trapezoid(values, t, axis=0) / (t[-1] - t[0])
         return mean
@@ -200,8 +303,19 @@ def time_mean(t: Reals, values: Reals) -> Reals:
 
 
 def power_imbalance(model: ArmModel, parts: TorqueParts, q: Reals, qd: Reals, qdd: Reals) -> float:
-    """Largest difference of the power into the masses and the change of their energy, of the largest power.
+    """Check of the dynamics: the power into the masses against the change of their energy.
 
+    Parameters
+    ----------
+    parts : torques (N, n) of the motion, whose power is what the difference is compared with
+    q, qd, qdd : (N, n), rad or m, and per s and s^2
+
+    Returns
+    -------
+    imbalance : largest difference, in parts of the largest power; rounding and the difference quotient leave little
+
+    Notes
+    -----
     The energy is ``qd.T M qd / 2 + V`` by CRBA and the masses' heights, its change a difference along the motion's
     own Taylor series over 40 us; the power is by RNEA.
     """
@@ -232,7 +346,16 @@ class WorstHolding:
 
 
 def worst_holding(model: ArmModel) -> WorstHolding:
-    """The largest by its absolute value at each joint."""
+    """The largest holding torque of each joint by its absolute value, over all poses within the limits.
+
+    Parameters
+    ----------
+    model : with load and gravity
+
+    Returns
+    -------
+    worst : N m or N, with the poses and bounds that no pose exceeds
+    """
 
     def size(q: Reals) -> Reals:
         return np.abs(holding_torques(model, q))

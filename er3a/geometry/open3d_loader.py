@@ -3,8 +3,8 @@
 Open3D's Linux wheels need ``libusb-1.0.so.0``, which many systems lack. The ``libusb-package`` wheel carries it; loaded
 with global symbols before the import, it serves Open3D without a system package.
 
-Open3D loads the web server Dash besides, three quarters of its import, for one function that shows geometry in a
-browser. Nothing here calls it, so an empty module stands in for Dash meanwhile.
+Open3D also loads the web server Dash, three quarters of its import, for one function that shows geometry in a
+browser. Nothing here calls it, so an empty module replaces Dash meanwhile.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ def load_open3d() -> ModuleType:
 
 @contextmanager
 def _without_dash() -> Iterator[None]:
+    """While this lasts, importing Dash gives an empty module."""
     if "dash" in sys.modules:
         yield
         return

@@ -16,44 +16,94 @@ from er3a.errors import PoseError, ShapeError
 from er3a.numerics.arrays import Reals, as_floats, for_kernel
 from er3a.numerics.jit import kernel
 
-ORTHONORMAL_TOLERANCE = 1e-6
-BOTTOM_ROW_TOLERANCE = 1e-12
-MAX_DISTANCE_M = 100.0  # from the origin: farther off, a position was meant in mm
+ORTHONORMAL_TOLERANCE = 1e-6  # of the product of two rows: poses written with seven decimals pass
+BOTTOM_ROW_TOLERANCE = 1e-12  # products of transforms leave the bottom row exact but for rounding
+MAX_DISTANCE_M = 100.0  # from the origin: no arm reaches so far, so a longer position was meant in mm
 
 
 def cos_sin(angle: float | Reals) -> tuple[Reals, Reals]:
-    """Cosine and sine, exactly 0 where the angle is a right angle to rounding (``cos(pi/2)`` is 6e-17 otherwise)."""
+    """Cosine and sine of angles, exactly 0 at right angles (``cos(pi/2)`` is 6e-17 otherwise).
+
+    Parameters
+    ----------
+    angle : (...), rad
+
+    Returns
+    -------
+    c, s : (...), cosine and sine; values below 1e-15 are set to 0, so table entries of 90 deg leave no dust
+    """
     c, s = np.cos(angle), np.sin(angle)
     return np.where(np.abs(c) < 1e-15, 0.0, c), np.where(np.abs(s) < 1e-15, 0.0, s)
 
 
 def rot_x(angle: float) -> Reals:
-    """Rotation about x by ``angle`` (rad) as a transform [1]_, shape (4, 4)."""
+    """Rotation about x by an angle, as a homogeneous transform [1]_.
+
+    Parameters
+    ----------
+    angle : rad, right-handed about +x
+
+    Returns
+    -------
+    T : (4, 4)
+    """
     c, s = cos_sin(angle)
     return np.array([[1, 0, 0, 0], [0, c, -s, 0], [0, s, c, 0], [0, 0, 0, 1]], dtype=float)
 
 
 def rot_y(angle: float) -> Reals:
-    """Rotation about y by ``angle`` (rad) as a transform, shape (4, 4)."""
+    """Rotation about y by an angle, as a homogeneous transform.
+
+    Parameters
+    ----------
+    angle : rad, right-handed about +y
+
+    Returns
+    -------
+    T : (4, 4)
+    """
     c, s = cos_sin(angle)
     return np.array([[c, 0, s, 0], [0, 1, 0, 0], [-s, 0, c, 0], [0, 0, 0, 1]], dtype=float)
 
 
 def rot_z(angle: float) -> Reals:
-    """Rotation about z by ``angle`` (rad) as a transform, shape (4, 4)."""
+    """Rotation about z by an angle, as a homogeneous transform.
+
+    Parameters
+    ----------
+    angle : rad, right-handed about +z
+
+    Returns
+    -------
+    T : (4, 4)
+    """
     c, s = cos_sin(angle)
     return np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]], dtype=float)
 
 
 def translation(x: float, y: float, z: float) -> Reals:
-    """Translation (m) as a transform, shape (4, 4)."""
+    """Translation as a homogeneous transform.
+
+    Parameters
+    ----------
+    x, y, z : m
+
+    Returns
+    -------
+    T : (4, 4), with the identity as rotation
+    """
     T = np.eye(4)
     T[:3, 3] = x, y, z
     return T
 
 
 def transform(xyz: Reals, rpy: Reals) -> Reals:
-    """Transforms from positions (..., 3) in m and roll-pitch-yaw (..., 3) in rad: R = Rz(yaw) Ry(pitch) Rx(roll) [2]_.
+    """Transforms from positions and roll-pitch-yaw angles: ``R = Rz(yaw) Ry(pitch) Rx(roll)`` [2]_.
+
+    Parameters
+    ----------
+    xyz : (..., 3), m
+    rpy : (..., 3), rad, in the order roll, pitch, yaw
 
     Returns
     -------
@@ -71,9 +121,23 @@ def transform(xyz: Reals, rpy: Reals) -> Reals:
 
 
 def rpy_of(T: Reals) -> Reals:
-    """Roll-pitch-yaw ZYX (..., 3) in rad of transforms (..., 4, 4); at pitch +-90 deg the roll is set to 0."""
+    """Roll-pitch-yaw angles of transforms: the inverse of :func:`transform` for the rotation.
+
+    Parameters
+    ----------
+    T : (..., 4, 4), or rotations (..., 3, 3)
+
+    Returns
+    -------
+    rpy : (..., 3), rad, roll and yaw in [-pi, pi], pitch in [-pi/2, pi/2]
+
+    Notes
+    -----
+    At pitch +-90 deg only the sum or the difference of roll and yaw is defined (gimbal lock). Roll is 0 there.
+    """
     R = np.asarray(T, float)[..., :3, :3]
     pitch = np.arctan2(-R[..., 2, 0], np.hypot(R[..., 0, 0], R[..., 1, 0]))
+    # Gimbal lock: below 1e-9 the entries that give roll and yaw are rounding errors.
     locked = np.hypot(R[..., 0, 0], R[..., 1, 0]) < 1e-9
     roll = np.where(locked, 0.0, np.arctan2(R[..., 2, 1], R[..., 2, 2]))
     yaw = np.where(locked, np.arctan2(-R[..., 0, 1], R[..., 1, 1]), np.arctan2(R[..., 1, 0], R[..., 0, 0]))
@@ -81,9 +145,19 @@ def rpy_of(T: Reals) -> Reals:
 
 
 def rotation_angle(R_a: Reals, R_b: Reals) -> Reals:
-    """Angle (...,) in rad, 0 to pi, of the rotation from R_a to R_b, each (..., 3, 3).
+    """Angle of the rotation from R_a to R_b.
 
-    From sine and cosine both, so that neither small turns nor half turns lose digits.
+    Parameters
+    ----------
+    R_a, R_b : (..., 3, 3)
+
+    Returns
+    -------
+    angle : (...), rad, 0 to pi
+
+    Notes
+    -----
+    It comes from sine and cosine both, so that neither small turns nor half turns lose digits.
     """
     R = np.swapaxes(R_a, -1, -2) @ R_b
     skew = np.stack([R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], axis=-1)
@@ -95,19 +169,46 @@ SMALL_TURN = 1e-4  # rad; below, series replace quotients of vanishing numbers
 
 
 def exp_rotation(v: Reals) -> Reals:
-    """Rotation matrices (..., 3, 3) of rotation vectors (..., 3) in rad."""
+    """Rotation matrices of rotation vectors, ``R = exp([v]x)``: a turn by ``|v|`` about the axis ``v / |v|``.
+
+    Parameters
+    ----------
+    v : (..., 3), rad
+
+    Returns
+    -------
+    R : (..., 3, 3)
+    """
     R: Reals = scipy.spatial.transform.Rotation.from_rotvec(v.reshape(-1, 3)).as_matrix().reshape(*v.shape, 3)
     return R
 
 
 def log_rotation(R: Reals) -> Reals:
-    """Rotation vectors (..., 3) in rad, no longer than pi, of rotation matrices (..., 3, 3)."""
+    """Rotation vectors of rotation matrices: the inverse of :func:`exp_rotation`.
+
+    Parameters
+    ----------
+    R : (..., 3, 3)
+
+    Returns
+    -------
+    v : (..., 3), rad, of length pi at most
+    """
     v: Reals = scipy.spatial.transform.Rotation.from_matrix(R.reshape(-1, 3, 3)).as_rotvec().reshape(R.shape[:-1])
     return v
 
 
 def skew(v: Reals) -> Reals:
-    """Matrices (..., 3, 3) with ``skew(v) @ w = cross(v, w)`` for vectors (..., 3)."""
+    """Cross-product matrices: ``skew(v) @ w = cross(v, w)``.
+
+    Parameters
+    ----------
+    v : (..., 3)
+
+    Returns
+    -------
+    S : (..., 3, 3), antisymmetric, in the unit of v
+    """
     out = np.zeros((*v.shape, 3))
     out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
     out[..., 1, 0], out[..., 2, 0], out[..., 2, 1] = v[..., 2], -v[..., 1], v[..., 0]
@@ -115,7 +216,20 @@ def skew(v: Reals) -> Reals:
 
 
 def inverse_right_jacobian(v: Reals) -> Reals:
-    """J (..., 3, 3) with ``log(exp(v) exp(d)) = v + J d`` for small d [3]_ (equation 144), v (..., 3) in rad."""
+    """Inverse of the right Jacobian of SO(3): J with ``log(exp(v) exp(d)) = v + J d`` for small d.
+
+    Parameters
+    ----------
+    v : (..., 3), rad, rotation vector, shorter than a whole turn
+
+    Returns
+    -------
+    J : (..., 3, 3)
+
+    Notes
+    -----
+    Equation 144 of [3]_. Below ``SMALL_TURN`` the factor of the quadratic term is its limit 1/12.
+    """
     angle = np.linalg.norm(v, axis=-1)[..., None, None]
     safe = np.where(angle < SMALL_TURN, 1.0, angle)
     factor = np.where(angle < SMALL_TURN, 1 / 12, 1 / safe**2 - 1 / (2 * safe * np.tan(safe / 2)))
@@ -125,19 +239,47 @@ def inverse_right_jacobian(v: Reals) -> Reals:
 
 
 def frame_along(axis: Reals) -> Reals:
-    """A right-handed frame whose last row is a unit axis (3,); rows are its directions."""
+    """A right-handed frame with a given axis as its third direction.
+
+    Parameters
+    ----------
+    axis : (3,), unit vector
+
+    Returns
+    -------
+    R : (3, 3), rows are unit vectors x, y, and the axis itself, so ``R @ p`` gives components along them
+    """
+    # Crossed with the coordinate axis least parallel to it, so the product never vanishes.
     x = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     x /= np.linalg.norm(x)
     return np.array([x, np.cross(axis, x), axis])
 
 
 def transposed(R: Reals) -> Reals:
-    """The last two axes swapped."""
+    """Transposes of a stack of matrices: the last two axes swapped. Of rotations this is the inverse.
+
+    Parameters
+    ----------
+    R : (..., r, c)
+
+    Returns
+    -------
+    transpose : (..., c, r), a view
+    """
     return np.swapaxes(R, -1, -2)
 
 
 def inverted(T: Reals) -> Reals:
-    """Inverses (..., 4, 4) of rigid transforms."""
+    """Inverses of rigid transforms, by the transpose of the rotation instead of elimination.
+
+    Parameters
+    ----------
+    T : (..., 4, 4), positions in m
+
+    Returns
+    -------
+    inverse : (..., 4, 4)
+    """
     out = np.zeros_like(T)
     out[..., :3, :3] = transposed(T[..., :3, :3])
     out[..., :3, 3] = -np.einsum("...ji,...j->...i", T[..., :3, :3], T[..., :3, 3])
@@ -146,25 +288,63 @@ def inverted(T: Reals) -> Reals:
 
 
 def posed(R: Reals, t: Reals) -> Reals:
-    """Transforms (..., 4, 4) of rotations (..., 3, 3) and positions (..., 3) in m."""
+    """Transforms put together from rotations and positions.
+
+    Parameters
+    ----------
+    R : (..., 3, 3)
+    t : (..., 3), m
+
+    Returns
+    -------
+    T : (..., 4, 4)
+    """
     T = np.zeros((*R.shape[:-2], 4, 4))
     T[..., :3, :3], T[..., :3, 3], T[..., 3, 3] = R, t, 1.0
     return T
 
 
 def moved(T: Reals, step: Reals) -> Reals:
-    """Transforms (..., 4, 4) after small steps (..., 6): m along, rad about, the axes of the parent frame."""
+    """Transforms after small steps; translation and rotation are applied independently.
+
+    Parameters
+    ----------
+    T : (..., 4, 4)
+    step : (..., 6), first m along, then a rotation vector in rad about, the axes of the parent frame
+
+    Returns
+    -------
+    T : (..., 4, 4), turned about its own origin and shifted
+    """
     return posed(exp_rotation(step[..., 3:]) @ T[..., :3, :3], T[..., :3, 3] + step[..., :3])
 
 
 def step_between(T_from: Reals, T_to: Reals) -> Reals:
-    """The steps (..., 6) by which :func:`moved` takes one transform (..., 4, 4) to the other."""
+    """Steps by which :func:`moved` takes one transform to the other.
+
+    Parameters
+    ----------
+    T_from, T_to : (..., 4, 4)
+
+    Returns
+    -------
+    step : (..., 6), m and rad, in the axes of the parent frame; the rotation is pi at most
+    """
     turn = log_rotation(T_to[..., :3, :3] @ transposed(T_from[..., :3, :3]))
     return np.concatenate([T_to[..., :3, 3] - T_from[..., :3, 3], turn], axis=-1)
 
 
 def quaternion_of(T: Reals) -> Reals:
-    """Unit quaternions (..., 4), real part first and not negative, of transforms (..., 4, 4)."""
+    """Unit quaternions of transforms.
+
+    Parameters
+    ----------
+    T : (..., 4, 4), or rotations (..., 3, 3)
+
+    Returns
+    -------
+    q : (..., 4), in the order w, x, y, z with w >= 0 (q and -q are the same rotation)
+    """
     R = T[..., :3, :3]
     q: Reals = scipy.spatial.transform.Rotation.from_matrix(R.reshape(-1, 3, 3)).as_quat(
         canonical=True, scalar_first=True
@@ -173,7 +353,16 @@ def quaternion_of(T: Reals) -> Reals:
 
 
 def check_poses(T: Reals, argument: str = "T") -> Reals:
-    """Return T as float array (..., 4, 4), or raise if any matrix is no rigid transform, or farther off than 100 m.
+    """Refuse matrices that are no rigid transforms, or whose position is more than 100 m off.
+
+    Parameters
+    ----------
+    T : (..., 4, 4), m
+    argument : name of the argument in the caller, for the message
+
+    Returns
+    -------
+    T : (..., 4, 4), as float array
 
     Raises
     ------
@@ -183,6 +372,7 @@ def check_poses(T: Reals, argument: str = "T") -> Reals:
     T = as_floats(T, argument)
     if T.ndim < 2 or T.shape[-2:] != (4, 4):
         raise ShapeError(argument, T.shape, "(..., 4, 4)")
+    # One compiled pass for the usual case that all are fine; the slow loop only finds the words.
     if _all_rigid(for_kernel(T).reshape(-1, 4, 4)):
         return T
     for index in np.ndindex(T.shape[:-2]):
@@ -219,6 +409,7 @@ def _fault_of(T: Reals) -> str:
 def _all_rigid(T: Reals) -> bool:
     """Whether all matrices (N, 4, 4) are rigid transforms, not too far off."""
     for n in range(T.shape[0]):
+        # Scaled so that the bottom row's own tolerance corresponds to that of the rotation.
         last = abs(T[n, 3, 0]) + abs(T[n, 3, 1]) + abs(T[n, 3, 2]) + abs(T[n, 3, 3] - 1.0)
         worst, near = last * ORTHONORMAL_TOLERANCE / BOTTOM_ROW_TOLERANCE, True
         for r in range(3):

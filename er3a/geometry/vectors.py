@@ -17,37 +17,93 @@ Vector = tuple[float, float, float]
 
 @kernel
 def dot(a: Vector, b: Vector) -> float:
-    """Scalar product."""
+    """Scalar product of two vectors.
+
+    Parameters
+    ----------
+    a, b : three numbers each
+
+    Returns
+    -------
+    product : in the product of their units
+    """
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @kernel
 def cross(a: Vector, b: Vector) -> Vector:
-    """Vector product."""
+    """Vector product ``a x b``, right-handed.
+
+    Parameters
+    ----------
+    a, b : three numbers each
+
+    Returns
+    -------
+    product : three numbers, in the product of their units
+    """
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @kernel
 def add(a: Vector, b: Vector) -> Vector:
-    """Sum."""
+    """Sum of two vectors of the same unit and frame.
+
+    Parameters
+    ----------
+    a, b : three numbers each
+
+    Returns
+    -------
+    sum : three numbers
+    """
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
 @kernel
 def subtract(a: Vector, b: Vector) -> Vector:
-    """Difference."""
+    """Difference ``a - b``: from the point b to the point a.
+
+    Parameters
+    ----------
+    a, b : three numbers each, same unit and frame
+
+    Returns
+    -------
+    difference : three numbers
+    """
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 @kernel
 def scaled(a: Vector, factor: float) -> Vector:
-    """Product with a number."""
+    """A vector times a number.
+
+    Parameters
+    ----------
+    a : three numbers
+    factor : negative values turn the vector round
+
+    Returns
+    -------
+    product : three numbers
+    """
     return a[0] * factor, a[1] * factor, a[2] * factor
 
 
 @inner_kernel
 def in_frame_of(T: Reals, v: Vector) -> Vector:
-    """Components, in the frame that a transform T leads to, of a vector given in the frame it leads from."""
+    """Rotate a vector by the rotation part of a transform; its position is ignored.
+
+    Parameters
+    ----------
+    T : (4, 4) or (3, 4), takes coordinates of one frame to another
+    v : components in the frame that T leads from
+
+    Returns
+    -------
+    components : three numbers, in the frame that T leads to
+    """
     return (
         T[0, 0] * v[0] + T[0, 1] * v[1] + T[0, 2] * v[2],
         T[1, 0] * v[0] + T[1, 1] * v[1] + T[1, 2] * v[2],
@@ -57,7 +113,18 @@ def in_frame_of(T: Reals, v: Vector) -> Vector:
 
 @inner_kernel
 def rotated(v: Vector, axis: Vector, c: float, s: float) -> Vector:
-    """v turned about a unit axis by the angle with cosine c and sine s: Rodrigues' formula [1]_."""
+    """A vector turned about a unit axis through the origin: Rodrigues' formula [1]_.
+
+    Parameters
+    ----------
+    v : vector to turn
+    axis : unit vector
+    c, s : cosine and sine of the angle, right-handed about the axis
+
+    Returns
+    -------
+    turned : three numbers, in the unit of v
+    """
     u = cross(axis, v)
     along = dot(axis, v) * (1.0 - c)
     return (
@@ -69,8 +136,19 @@ def rotated(v: Vector, axis: Vector, c: float, s: float) -> Vector:
 
 @kernel
 def signed_angle(start: Vector, end: Vector, axis: Vector) -> float:
-    """Angle (rad) that turns ``start`` to ``end`` about the unit axis, both projected across it.
+    """Angle that turns ``start`` to ``end`` about an axis, both projected onto the plane across it.
 
+    Parameters
+    ----------
+    start, end : vectors of any length, in one frame
+    axis : unit vector
+
+    Returns
+    -------
+    angle : rad, in [-pi, pi], right-handed about the axis
+
+    Notes
+    -----
     Projecting first, by vector products, keeps all digits where both vectors nearly lie on the axis (wrist aligned).
     """
     start, end = cross(axis, start), cross(axis, end)
@@ -80,7 +158,16 @@ def signed_angle(start: Vector, end: Vector, axis: Vector) -> float:
 
 @kernel
 def unsigned_angle(a: Vector, b: Vector) -> float:
-    """Angle (rad) between two vectors, 0 to pi."""
+    """Angle between two vectors of any length.
+
+    Parameters
+    ----------
+    a, b : vectors in one frame
+
+    Returns
+    -------
+    angle : rad, 0 to pi; from sine and cosine both, so that small angles keep their digits
+    """
     c = cross(a, b)
     angle: float = np.arctan2(np.sqrt(dot(c, c)), dot(a, b))
     return angle
@@ -90,22 +177,50 @@ TURN = 2 * np.pi
 
 
 def max_joint_move(q: Reals, q_ref: Reals) -> Reals:
-    """The largest turn (...,), rad, of a joint from joint angles ``q_ref`` to ``q`` (..., 6).
+    """The largest joint move between joint values: the maximum norm of their difference.
 
-    By this joint angles are one solution, and turns of a branch stand in order. Solutions are ranked by
-    :func:`er3a.robots.joint_limits.comparable`.
+    Parameters
+    ----------
+    q, q_ref : (..., n), rad (m of prismatic joints)
+
+    Returns
+    -------
+    move : (...), the largest absolute difference of a row; 0 without joints
+
+    Notes
+    -----
+    By this joint values are recognised as one solution, and the turns of a branch are put in order. Solutions are
+    ranked by :func:`er3a.robots.joint_limits.comparable` instead, where prismatic joints have a weight of their own.
     """
     move: Reals = np.abs(q - q_ref).max(axis=-1, initial=0.0)
     return move
 
 
 def wrap_to_pi(angle: Reals) -> Reals:
-    """The same angles (rad, any shape) in (-pi, pi]."""
+    """The same angles in (-pi, pi].
+
+    Parameters
+    ----------
+    angle : (...), rad
+
+    Returns
+    -------
+    wrapped : (...), rad, less whole turns
+    """
     return angle - TURN * np.ceil((angle - np.pi) / TURN)
 
 
 def fibonacci_sphere(count: int, turned_back: bool = False) -> Reals:
-    """Nearly even unit vectors (count, 3), each for the same area [2]_; ``turned_back``: mirrored at y = 0.
+    """Nearly even unit vectors on the sphere, each for the same area (Fibonacci lattice) [2]_.
+
+    Parameters
+    ----------
+    count : how many
+    turned_back : the same lattice, mirrored at y = 0
+
+    Returns
+    -------
+    directions : (count, 3), in the order of falling z
 
     References
     ----------

@@ -27,8 +27,8 @@ from er3a.robots.joint_limits import nearest_equivalent, turn_bounds, within
 from er3a.robots.robot import Robot
 from er3a.robots.whole_turns import whole_turns
 
-SMALLEST_PART = 8 * BLOCK
-SLOTS_BY_STARTS = 16
+SMALLEST_PART = 8 * BLOCK  # poses that are worth a thread's start
+SLOTS_BY_STARTS = 16  # rows of a pose that iteration solves: as many as six joints can have
 NEARLY_OWN = 1e-5  # rad
 
 
@@ -59,6 +59,10 @@ def inverse_batch(
     turns : also return the number of whole turns that each joint can have within its limits
     threads : number of threads
     redundancy : (k,) or (N, k), for arms with more than six joints, as :func:`er3a.kinematics.inverse.inverse` takes it
+
+    Returns
+    -------
+    solutions : rows (N, S) of joint values (rad or m), S slots of the class; NaN in empty slots
 
     Raises
     ------
@@ -93,6 +97,7 @@ def inverse_batch(
         valid[left] = fault == REACHED
         _put_own(robot, T[left], own, left, q, valid)
         inside[left] = within(robot, q[left])
+    # The one exit: no row leaves that forward kinematics denies.
     failing = _confirm(robot, T, q, inside, threads)
     valid[failing] &= np.isfinite(q[failing, :, 0])
     branch = np.broadcast_to(np.arange(SLOTS), valid.shape)
@@ -137,6 +142,7 @@ def _put_own(robot: Robot, T: Reals, own: Reals, left: Integers, q: Reals, valid
 def _by_class(
     robot: Robot, T: Reals, reference: Reals, turns: bool, threads: int, redundancy: Reals | None
 ) -> Solutions:
+    """All slots by the arm's class, or, for chains of no class, what random starts find."""
     check_poses(T)
     count, solver = len(T), arm_solver(robot).chain
     certain: Flags | None = None
@@ -191,6 +197,7 @@ def _checked_reference(robot: Robot, q_ref: Reals | None, count: int) -> Reals:
 
 
 def _turn_range(robot: Robot, q: Reals) -> NDArray[np.int8]:
+    """Smallest and largest number of whole turns (N, S, n, 2) within the limits; 0 and -1 in empty slots."""
     turns = np.empty((*q.shape, 2), dtype=np.int8)
     if robot.joints == 6 and whole_turns(robot).alone.all():
         count_turns(q.reshape(-1, 6), robot.lower, robot.upper, turns.reshape(-1, 6, 2))

@@ -74,7 +74,20 @@ class BlockConstants(NamedTuple):
 def block_constants(
     axes: Reals, points: Reals, wrist: Reals, tool_rotation: Reals, wrist_in_tool: Reals, elbow_sign: float
 ) -> BlockConstants:
-    """Constants of an arm given as its axis lines with all theta at 0 (see ``WristPartitionedArm``), base frame."""
+    """Constants of an arm with a spherical wrist, for :func:`solve_blocks`.
+
+    Parameters
+    ----------
+    axes, points : (6, 3), unit vectors and m, axis lines with all theta at 0, base frame
+    wrist : (3,), m, where axes 4, 5 and 6 meet, base frame
+    tool_rotation : (3, 3), of the tool frame
+    wrist_in_tool : (3,), m, the wrist centre in the tool frame
+    elbow_sign : +1 if axis 3 points along axis 2, -1 if against it
+
+    Returns
+    -------
+    constants : m and rad, in the frames of the module's text
+    """
     w1, w2, w4, w5, w6 = (axes[k] for k in (0, 1, 3, 4, 5))
     cos_12, sin_12 = w1 @ w2, np.linalg.norm(np.cross(w1, w2))
     x1 = np.cross(w2, w1) / sin_12
@@ -133,11 +146,13 @@ def block_constants(
 
 
 def _vector(values: Reals) -> Vector:
+    """Three numbers, without the rounding noise of right angles."""
     x, y, z = map(_clean, values)
     return x, y, z
 
 
 def _point(values: Reals) -> tuple[float, float]:
+    """Two numbers, without the rounding noise of right angles."""
     x, y = map(_clean, values)
     return x, y
 
@@ -147,7 +162,7 @@ def _clean(value: float) -> float:
     return 0.0 if abs(value) < 1e-15 else float(value)
 
 
-BLOCK = 64
+BLOCK = 64  # poses; a row of 64 numbers fills whole vectors, and all rows stay in the first cache
 NEAR = 1e-6  # m, rad or their product, from where joints become free
 PER_TURN = 1 / TURN
 
@@ -164,12 +179,14 @@ _VALID, _WITHIN, _PAIR_ROWS = 12, 13, 15  # two slots of a wrist: six angles eac
 def solve_blocks(
     arm: BlockConstants, joints: Joints, T: Reals, q_ref: Reals, out: tuple[Reals, Flags, Flags, Flags, Flags]
 ) -> None:
-    """Solve poses ``T`` (N, 4, 4).
+    """Solve poses of an arm with a spherical wrist, block by block. Kernel.
 
     Parameters
     ----------
     joints : direction, offset, lower and upper limits (6,)
-    out : fills ``q`` (N, 8, 6), by the turns within the limits that are nearest to ``q_ref`` (N or 1, 6), rad,
+    T : (N, 4, 4), m
+    q_ref : (N or 1, 6), rad
+    out : fills ``q`` (N, 8, 6), by the turns within the limits that are nearest to ``q_ref``, rad,
         NaN where a slot has no solution, and per slot ``valid`` and ``within`` the limits (N, 8). ``rigid`` (N,) says
         which poses are rigid transforms, ``marked`` (N,) which are left to the careful solver.
     """
@@ -179,6 +196,7 @@ def solve_blocks(
     for start in range(0, T.shape[0], BLOCK):
         size = min(BLOCK, T.shape[0] - start)
         for i in range(BLOCK):
+            # The last block is filled up with its last pose, so that all loops have one length.
             n = start + min(i, size - 1)
             for r in range(3):
                 for c in range(4):
@@ -245,6 +263,7 @@ def _manufacturers_angles(joints: Joints, reference: Reals, pair: Reals) -> None
                 low = np.ceil((smallest - LIMIT_TOLERANCE - near) * PER_TURN)
                 high = np.floor((most + LIMIT_TOLERANCE - near) * PER_TURN)
                 fits = low <= high
+                # No turn if that keeps the limits, else the fewest that do; if none do, the nearer side of the range.
                 turns = low if low > 0.0 else high if high < 0.0 else 0.0
                 below = near + TURN * (low - 1.0)
                 above = near + TURN * low
@@ -256,7 +275,14 @@ def _manufacturers_angles(joints: Joints, reference: Reals, pair: Reals) -> None
 
 @kernel
 def count_turns(q: Reals, lower: Reals, upper: Reals, turns: NDArray[np.int8]) -> None:
-    """Smallest and largest number of turns (n, 6, 2) to add to angles (n, 6) within the limits; 0 and -1 for NaN."""
+    """Count the whole turns that can be added to angles within the limits. Kernel.
+
+    Parameters
+    ----------
+    q : (n, 6), rad, NaN for no solution
+    lower, upper : (6,), rad
+    turns : (n, 6, 2), filled with the smallest and largest number; 0 and -1 for NaN
+    """
     for n in range(q.shape[0]):
         for j in range(6):
             low = np.ceil((lower[j] - LIMIT_TOLERANCE - q[n, j]) * PER_TURN)
@@ -267,7 +293,17 @@ def count_turns(q: Reals, lower: Reals, upper: Reals, turns: NDArray[np.int8]) -
 
 @inner_kernel
 def in_frame_1(rows: tuple[Vector, Vector, Vector], x: float, y: float, z: float) -> Vector:
-    """A vector turned by a rotation given as three rows."""
+    """A vector turned by a rotation that is given as three rows. Kernel.
+
+    Parameters
+    ----------
+    rows : directions of frame 1 in the base frame
+    x, y, z : components in the base frame
+
+    Returns
+    -------
+    components : three numbers, in frame 1
+    """
     a, b, c = rows
     return a[0] * x + a[1] * y + a[2] * z, b[0] * x + b[1] * y + b[2] * z, c[0] * x + c[1] * y + c[2] * z
 
@@ -293,6 +329,7 @@ def _shoulder(arm: BlockConstants, w: Reals, near: Reals, far: Reals) -> None:
         x, y, z = t00 * a + t01 * b + t02 * c, t10 * a + t11 * b + t12 * c, t20 * a + t21 * b + t22 * c
         w[_X6 * BLOCK + i], w[(_X6 + 1) * BLOCK + i], w[(_X6 + 2) * BLOCK + i] = in_frame_1(arm.to_frame_1, x, y, z)
 
+        # Turned by theta_1, the wrist centre must have the distance k across the arm's plane: two points of a circle.
         k = (arm.sideways - arm.cos_12 * vz) / arm.sin_12
         square = vx * vx + vy * vy
         radius = np.sqrt(square)
@@ -339,6 +376,7 @@ def _wrist(arm: BlockConstants, w: Reals, side: Reals, sign: float, pair: Reals)
         x, y = side[_ACROSS * BLOCK + i], w[_PLANE * BLOCK + i]
         cos_bend, sin_bend = side[_COS_BEND * BLOCK + i], sign * side[_SIN_BEND * BLOCK + i]
         along, beside = arm.upper_arm + arm.forearm * cos_bend, arm.forearm * sin_bend
+        # Direction of the upper arm: that of the wrist centre, less the triangle's angle at axis 2.
         c, s_ = x * along + y * beside, y * along - x * beside
         per = 1.0 / np.sqrt(c * c + s_ * s_)
         theta_2 = arctan2(s_, c) - arm.turn_2
@@ -387,7 +425,18 @@ def _wrist(arm: BlockConstants, w: Reals, side: Reals, sign: float, pair: Reals)
 def seen_by_wrist(
     arm: BlockConstants, x: float, y: float, z: float, cos_1: float, sin_1: float, c: float, s: float
 ) -> Vector:
-    """A vector of frame 1 as the wrist sees it: turned back by the first three joints, z along axis 4."""
+    """A vector of frame 1 as the wrist sees it: turned back by the first three joints, z along axis 4. Kernel.
+
+    Parameters
+    ----------
+    x, y, z : components in frame 1
+    cos_1, sin_1 : of joint 1's geometric angle
+    c, s : cosine and sine of the direction of axis 4 in the plane across axis 2
+
+    Returns
+    -------
+    components : three numbers, in the wrist's frame
+    """
     x, y = x * cos_1 + y * sin_1, y * cos_1 - x * sin_1
     y, z = arm.cos_12 * y - arm.sin_12 * z, arm.sin_12 * y + arm.cos_12 * z
     x, y = x * c + y * s, y * c - x * s
@@ -398,7 +447,7 @@ def seen_by_wrist(
 def _outer_angles(
     arm: BlockConstants, zx: float, zy: float, beside_6: Vector, px: float, py: float, cos_5: float, sin_5: float
 ) -> tuple[float, float]:
-    """phi_4 turns (px, py) to axis 6 as seen along axis 4; phi_6 is what is left for the vector beside axis 6."""
+    """phi_4 turns (px, py) to axis 6 as seen along axis 4; phi_6 is what is left for the vector across axis 6."""
     c, s = zx * px + zy * py, zy * px - zx * py
     per = 1.0 / np.sqrt(c * c + s * s)
     phi_4 = arctan2(s, c)

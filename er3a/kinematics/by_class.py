@@ -45,12 +45,12 @@ CONFIRMS = 1e-9  # m and rad by which a row may miss what is asked: far above th
 OWN_SOLVES, MISSED = 1e-12, 1e-4  # m and parts of 1; rad or m from all rows
 MAYBE_SAME = 1e-2  # rad
 IN_LINE = 1e-9  # rad by which an axis that is taken as the tool's z may be askew
-SPREAD = 1e-13
-MAX_CURVES, MAX_ON_SURFACE = 24, 2
+SPREAD = 1e-13  # residual, in parts of the size, that rounding leaves at a root
+MAX_CURVES, MAX_ON_SURFACE = 24, 2  # self-motions of a pose that are traced, and those of them on surfaces
 MOVES_BELOW = 3e-8  # smallest singular value above which rows of three parallel axes, known to rounding, can't move
-STARTS, FEW_STARTS = 240, 32
+STARTS, FEW_STARTS = 240, 32  # random starts in the search for self-motions; few for arms of fewer than six joints
 TRACED: dict[ArmClassCode, int] = {"free_roll": OPEN_ROLL, "position": POSITION}
-SMALLEST_PART = 64
+SMALLEST_PART = 64  # poses that are worth a thread's start
 SCANNED = 16  # values of a redundancy parameter from which self-motions are collected
 
 
@@ -70,7 +70,16 @@ class ArmSolver:
     uncouple: Reals | None = None
 
     def poses_at(self, T: Reals) -> PoseChain:
-        """The chain with one pose (4, 4) and what its class meets of it."""
+        """The chain closed by one pose, with what its class meets of the pose.
+
+        Parameters
+        ----------
+        T : (4, 4), m
+
+        Returns
+        -------
+        chain : for errors, roots and self-motions at this pose
+        """
         links = np.concatenate([self.links[:-1], self.links[-1:] @ self.task_frame])
         return PoseChain.of(links, self.sliding, T @ self.task_frame, self.size, TRACED.get(self.chain.code, POSE))
 
@@ -99,7 +108,16 @@ class Settled:
 
 @derived
 def arm_solver(robot: Robot) -> ArmSolver:
-    """The solver for the robot's class."""
+    """The solver for the class of the robot's geometry.
+
+    Parameters
+    ----------
+    robot : any; limits don't matter
+
+    Returns
+    -------
+    solver : its chain is ``Unsolved`` where no class applies
+    """
     links = constant_links(robot)
     sliding = np.ascontiguousarray(robot.sliding)
     uncouple = uncoupling(robot)
@@ -107,6 +125,7 @@ def arm_solver(robot: Robot) -> ArmSolver:
         uncouple = uncoupling_of_linkage(robot)
         chain = Unsolved(robot.joints) if uncouple is None else _linked(robot, chain_solver(links, sliding), uncouple)
         return ArmSolver(chain, links, sliding, size_of(links), np.eye(4), uncouple)
+    # Row 2 of the last link's rotation: the direction of axis n in coordinates of the tool.
     last = links[-1, 2, :3]  # the last joint's axis in the tool's frame
     pointing = last if np.array_equal(robot.tool[:3, :3], np.eye(3)) else np.array([0.0, 0.0, 1.0])
     chain, frame = chain_solver(links, sliding, pointing), np.eye(4)
@@ -125,21 +144,49 @@ def _linked(robot: Robot, chain: ChainSolver, uncouple: Reals) -> ChainSolver:
 
 
 def to_joints(robot: Robot, x: Reals) -> Reals:
-    """The manufacturer's values (..., n) for the rows' motion; angles in (-pi, pi], those of the rows if coupled."""
+    """The manufacturer's joint values for the motion of the table's rows.
+
+    Parameters
+    ----------
+    x : (..., m), rad or m, offsets included
+
+    Returns
+    -------
+    q : (..., n), rad or m; angles in (-pi, pi], those of the rows if coupled
+    """
     uncouple = arm_solver(robot).uncouple
     u = robot.direction * (x - joint_starts(robot))
     return unwound(robot, u if uncouple is None else u @ uncouple.T)
 
 
 def parameters_of(robot: Robot) -> tuple[Redundancy, ...]:
-    """What a pose leaves open: empty for arms of up to six joints."""
+    """What a pose leaves open: the redundancy parameters of the arm's class.
+
+    Returns
+    -------
+    parameters : empty for arms of up to six joints
+    """
     return arm_solver(robot).chain.parameters
 
 
 def checked_parameters(robot: Robot, redundancy: Reals | None, q_ref: Reals, count: int) -> Reals:
-    """Values (N, k) of the redundancy parameters: as given, or those of the reference (1 or N, n).
+    """Values of the redundancy parameters as the solver takes them.
 
-    A locked joint is given as the manufacturer's value (of coupled joints what its row moves by), an arm angle in rad.
+    Parameters
+    ----------
+    redundancy : (k,) or (N, k), as the user gives them: a locked joint as the manufacturer's value (of coupled joints
+        what its row moves by), an arm angle in rad; None: those of the reference
+    q_ref : (1 or N, n), rad or m
+    count : number of poses, N
+
+    Returns
+    -------
+    values : (N, k), rad or m, joints as row values with direction and offset
+
+    Raises
+    ------
+    ShapeError, PoseError
+        if ``redundancy`` has another shape, or holds what is no number
     """
     parameters = parameters_of(robot)
     if redundancy is None:
@@ -157,18 +204,35 @@ def checked_parameters(robot: Robot, redundancy: Reals | None, q_ref: Reals, cou
 
 
 def class_rows(robot: Robot, T: Reals, values: Reals) -> ClassRows:
-    """All rows for poses (N, 4, 4), m, at values (N, k) of the redundancy parameters."""
+    """All rows that the class finds for poses.
+
+    Parameters
+    ----------
+    T : (N, 4, 4), m
+    values : (N, k), of the redundancy parameters, see :func:`checked_parameters`
+
+    Returns
+    -------
+    rows : (N, slots, n) and how sure the solver is (N,)
+    """
     x, certainty = arm_solver(robot).chain.rows(T, values)
     return ClassRows(to_joints(robot, x), certainty)
 
 
 def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, values: Reals, certainty: int) -> Settled:
-    """Solutions of one pose (4, 4), divided into isolated ones and self-motions.
+    """Solutions of one pose, divided into isolated ones and self-motions.
 
     Parameters
     ----------
-    rows : (k, n), what the class found, without NaN; q_ref : (n,), rad or m
-    values : (1, k), of the redundancy parameters; certainty : of the class at this pose
+    T : (4, 4), m
+    rows : (k, n), rad or m, what the class found, without NaN
+    q_ref : (n,), rad or m
+    values : (1, k), of the redundancy parameters
+    certainty : of the class at this pose
+
+    Returns
+    -------
+    settled : isolated rows, and self-motions (those within the limits first, then the nearest to the reference)
     """
     solver = arm_solver(robot)
     if isinstance(solver.chain, Unsolved | LinkedRows) or (solver.chain.code == "scara" and not len(rows)):
@@ -194,6 +258,7 @@ def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, values: Reals, cer
             if not chain.moves(x):
                 alone.append(x)
             continue
+        # Rows of this class are known to rounding, so a Jacobian clearly of full rank needs no tracing.
         stuck = solver.chain.code == "three_parallel" and chain.smallest(x) > MOVES_BELOW
         curve = None if stuck else chain.curve(x)
         if curve is not None:
@@ -213,7 +278,18 @@ def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, values: Reals, cer
 
 
 def all_motions(robot: Robot, T: Reals, q_ref: Reals, values: Reals) -> Settled:
-    """Self-motions of a pose (4, 4) of an arm with one redundancy parameter, from rows at values all over its range."""
+    """Self-motions of a pose of an arm with one redundancy parameter, from rows at values all over its range.
+
+    Parameters
+    ----------
+    T : (4, 4), m
+    q_ref : (n,), rad or m
+    values : (1, 1), rad or m, a further value to look at
+
+    Returns
+    -------
+    settled : as of :func:`settle`; nothing if the pose is out of reach
+    """
     solver = arm_solver(robot)
     if isinstance(solver.chain, ArmAngle) and is_out_of_reach(solver.chain.arm, T):
         return Settled(np.empty((0, robot.joints)))
@@ -259,6 +335,7 @@ class LazySelfMotions(Sequence[SelfMotionCurve]):
 
 
 def _starts(robot: Robot, count: int) -> Reals:
+    """Random row values (count, m), rad and parts of the size; the same at each call."""
     solver = arm_solver(robot)
     random = np.random.default_rng([20261121, count])
     return random.uniform(-1, 1, (count, len(solver.sliding))) * np.where(solver.sliding, 1.5, np.pi)
@@ -305,10 +382,22 @@ class ClassSlots:
 def slots_of_class(
     robot: Robot, T: Reals, q_ref: Reals, values: Reals, threads: int = 1, *, settling: bool = True
 ) -> ClassSlots:
-    """All slots for poses (N, 4, 4), with references (1 or N, n) and values (N, k) of the redundancy parameters.
+    """All slots for poses, by the class, with doubtful poses settled one by one.
 
     Poses at which a joint may be free, or that left a doubt, are settled one by one, if the arm has no more than six
     joints. Without ``settling`` they keep what the class found: solutions all, but of a self-motion any members.
+
+    Parameters
+    ----------
+    T : (N, 4, 4), m
+    q_ref : (1 or N, n), rad or m
+    values : (N, k), of the redundancy parameters
+    threads : for the class; what is settled runs in one
+    settling : see above
+
+    Returns
+    -------
+    slots : (N, S, n), rad or m, by the turns nearest to the reference
     """
     solver = arm_solver(robot)
     count, slots = len(T), solver.chain.slots
@@ -363,6 +452,7 @@ def _with_own(robot: Robot, T: Reals, q_ref: Reals, numbers: Integers, found: tu
         slot = int(away.argmin())
         if away[slot] > MAYBE_SAME and np.isinf(away).any():
             slot = int(np.isinf(away).argmax())
+        # A solution far from all rows: the class has missed one, so it can't be sure of the others.
         if away.min() > MISSED and certainty[n] == CERTAIN:
             certainty[n] = UNCERTAIN
         q[n, slot], inside[n, slot] = row, fits
@@ -392,8 +482,16 @@ Pendant = tuple[Reals, Reals, Flags, Reals, Reals]
 
 @kernel
 def to_pendant(pendant: Pendant, x: Reals, q_ref: Reals, q: Reals, inside: Flags) -> None:
-    """Fill ``q`` (N, S, n) with the manufacturer's values of rows x (N, S, n), in the turns that
-    :func:`er3a.robots.joint_limits.nearest_equivalent` takes, and ``inside`` (N, S)."""
+    """Take rows of the solver to the manufacturer's values, for arms without coupling. Kernel.
+
+    Parameters
+    ----------
+    pendant : direction, start, sliding, lower and upper limits (n,)
+    x : (N, S, n), rad or m, row values
+    q_ref : (1 or N, n), rad or m
+    q : (N, S, n), filled, in the turns that :func:`er3a.robots.joint_limits.nearest_equivalent` takes
+    inside : (N, S), filled with whether the limits are kept
+    """
     direction, start, sliding, lower, upper = pendant
     slots, n, per_turn = x.shape[1], x.shape[2], 1.0 / TURN
     # all slots in one row and no branches, so that the processor takes several joints at once
@@ -444,7 +542,17 @@ def _in_slots(robot: Robot, rows: Reals, settled: Settled) -> Reals:
 
 
 def slot_of(robot: Robot, T: Reals, q: Reals) -> int:
-    """The slot of joint values (n,) that solve a pose (4, 4); 0 if they are none of its class's rows."""
+    """The slot of joint values that solve a pose.
+
+    Parameters
+    ----------
+    T : (4, 4), m
+    q : (n,), rad or m
+
+    Returns
+    -------
+    slot : 0 if they are none of the class's rows
+    """
     values = checked_parameters(robot, None, q[None], 1)
     rows = class_rows(robot, T[None], values).q[0]
     away = shortest_move(robot, rows - q)
@@ -454,9 +562,14 @@ def slot_of(robot: Robot, T: Reals, q: Reals) -> int:
 
 @derived
 def task_mask(robot: Robot) -> Reals:
-    """Which of x, y, z and the rotations about x, y, z of the frame of :func:`with_task_frame` the arm's solutions
-    meet, six of 1 or 0.
+    """Which components of a pose the arm's solutions meet.
 
+    Returns
+    -------
+    mask : (6,), 1 or 0 for x, y, z and the rotations about x, y, z of the frame of :func:`with_task_frame`
+
+    Notes
+    -----
     All, but for arms with fewer than six joints: five leave the turn about the tool's axis (if they can't do it
     themselves), a SCARA the tool's tilt, three joints the orientation. The tool's axis is its z where the robot's tool
     is turned from the flange, which says where it points; else the direction of the last joint's axis.
@@ -468,18 +581,33 @@ def task_mask(robot: Robot) -> Reals:
 
 @derived
 def with_task_frame(robot: Robot) -> Robot:
-    """The robot with its tool turned to the frame in which :func:`task_mask` counts; most often itself."""
+    """The robot with its tool turned to the frame in which :func:`task_mask` counts.
+
+    Returns
+    -------
+    robot : most often the same object
+    """
     frame = arm_solver(robot).task_frame
     return robot if np.array_equal(frame, np.eye(4)) else robot.replace(tool=robot.tool @ frame)
 
 
 def misses(robot: Robot, T: Reals, q: Reals) -> tuple[Reals, Reals, Reals]:
-    """By how much rows (..., n) miss poses (..., 4, 4), by forward kinematics; NaN for rows that hold NaN.
+    """By how much rows miss poses, by forward kinematics.
+
+    Parameters
+    ----------
+    T : (..., 4, 4), m
+    q : (..., n), rad or m
 
     Returns
     -------
-    position : (...,), m; rotation : (...,), rad, both in what the arm's task asks
-    freed : (...,), rad, the tool's turn from the pose in what the task leaves open; 0 where it leaves nothing
+    position : (...), m
+    rotation : (...), rad, like the position in what the arm's task asks
+    freed : (...), rad, the tool's turn from the pose in what the task leaves open; 0 where it leaves nothing
+
+    Notes
+    -----
+    NaN for rows that hold NaN.
     """
     back = forward(robot, q)
     position = np.linalg.norm(back[..., :3, 3] - T[..., :3, 3], axis=-1)
@@ -493,12 +621,23 @@ def misses(robot: Robot, T: Reals, q: Reals) -> tuple[Reals, Reals, Reals]:
     R, freed = F.T @ transposed(T[..., :3, :3]) @ back[..., :3, :3] @ F, rotation
     if asked == (1, 1, 0):
         return position, np.arctan2(np.hypot(R[..., 0, 2], R[..., 1, 2]), R[..., 2, 2]), freed
+    # The turn about z that brings R nearest to the identity, for any tilt.
     about_z = np.arctan2(R[..., 1, 0] - R[..., 0, 1], R[..., 0, 0] + R[..., 1, 1])
     return position, np.abs(about_z) * asked[2], freed
 
 
 def confirms(robot: Robot, T: Reals, q: Reals) -> Flags:
-    """Whether forward kinematics confirms rows (..., n) of poses (..., 4, 4) to ``CONFIRMS``; False for NaN."""
+    """Whether forward kinematics confirms rows of poses, to ``CONFIRMS`` in m and rad.
+
+    Parameters
+    ----------
+    T : (..., 4, 4), m
+    q : (..., n), rad or m
+
+    Returns
+    -------
+    confirmed : (...) bool, False for NaN
+    """
     quick = np.abs(forward(robot, q) - T).max(axis=(-2, -1)) <= CONFIRMS / 3  # bounds both, in a fifth of the time
     if quick.all():
         return np.asarray(quick)

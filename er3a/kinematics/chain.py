@@ -33,7 +33,7 @@ ON_AXIS = 1e-12  # m; a point this near to an axis is not moved by its joint
 
 @derived
 def constant_links(robot: Robot, frame: int | None = None) -> Reals:
-    """Constant transforms between the joint rotations, base included.
+    """Constant transforms between the joint motions, base included.
 
     Parameters
     ----------
@@ -42,7 +42,12 @@ def constant_links(robot: Robot, frame: int | None = None) -> Reals:
 
     Returns
     -------
-    links : (k + 1, 4, 4), read-only, k the number of rows in that chain (m for None)
+    links : (k + 1, 4, 4), m, read-only, k the number of rows in that chain (m for None)
+
+    Raises
+    ------
+    Er3aError
+        for a frame that the table does not have
     """
     if frame is not None and not (isinstance(frame, int | np.integer) and 0 <= frame <= robot.rows):
         raise Er3aError(f"frame is {frame!r}; expected None or a whole number from 0 to {robot.rows}")
@@ -63,12 +68,30 @@ def constant_links(robot: Robot, frame: int | None = None) -> Reals:
 
 
 def joint_starts(robot: Robot) -> Reals:
-    """What each row's motion x begins with at u = 0: (m,), the offset of revolute ones, 0 of prismatic ones."""
+    """What each row's motion x begins with at u = 0.
+
+    Parameters
+    ----------
+    robot : m rows
+
+    Returns
+    -------
+    start : (m,), the offset (rad) of revolute rows, 0 (m) of prismatic ones
+    """
     return np.where(robot.sliding, 0.0, robot.offset)
 
 
 def row_values(robot: Robot, q: Reals) -> Reals:
-    """What the rows of the table move by, u (..., m) in rad or m, for joints q (..., n): ``coupling @ q``."""
+    """What the rows of the table move by: ``u = coupling @ q``.
+
+    Parameters
+    ----------
+    q : (..., n), rad or m
+
+    Returns
+    -------
+    u : (..., m), rad or m; q itself without a coupling
+    """
     if robot.coupling is None:
         return q
     u: Reals = np.ascontiguousarray(q @ robot.coupling.T)
@@ -76,9 +99,17 @@ def row_values(robot: Robot, q: Reals) -> Reals:
 
 
 def moving_tip(links: Reals, sliding: Flags | None = None) -> tuple[int, Reals]:
-    """The outermost joint (from 0) that moves the tool point, and the point (3,), m, in that joint's moving frame.
+    """The outermost joint that moves the tool point, and the point in that joint's moving frame.
 
-    ``sliding`` (m,) marks prismatic joints, which move every point; None: all are revolute.
+    Parameters
+    ----------
+    links : (m + 1, 4, 4), m
+    sliding : (m,), prismatic joints, which move every point; None: all are revolute
+
+    Returns
+    -------
+    last : joint from 0
+    tip : (3,), m
     """
     last, tip = len(links) - 2, links[-1, :3, 3]
     while last > 0 and np.hypot(tip[0], tip[1]) <= ON_AXIS and not (sliding is not None and sliding[last]):
@@ -112,11 +143,15 @@ def link_parts(robot: Robot) -> Reals:
 def axes_at_zero_theta(robot: Robot) -> tuple[Reals, Reals, Reals]:
     """Joint axes with all x at 0 (theta of revolute joints; not the manufacturer's zero pose), in the base frame.
 
+    Parameters
+    ----------
+    robot : m rows
+
     Returns
     -------
     directions : (m, 3), unit vectors
     points : (m, 3), m, a point on each axis
-    T_base_tool : (4, 4)
+    T_base_tool : (4, 4), m
     """
     T = np.eye(4)
     directions, points = np.empty((robot.rows, 3)), np.empty((robot.rows, 3))
@@ -132,13 +167,33 @@ def axes_at_zero_theta(robot: Robot) -> tuple[Reals, Reals, Reals]:
 
 @derived
 def arm_length(robot: Robot) -> float:
-    """Half the distance along all links (m), which makes position and rotation errors comparable."""
+    """Half the distance along all links, which makes position and rotation errors comparable.
+
+    Parameters
+    ----------
+    robot : base and tool don't count
+
+    Returns
+    -------
+    length : m; 1 if all axes pass through one point
+    """
     points = axes_at_zero_theta(robot)[1]
     return 0.5 * float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()) or 1.0
 
 
 def poses_of(links: Reals, q: Reals, prismatic: Flags | None = None) -> Reals:
-    """Poses (..., 4, 4) of the last link for joint values (..., n)."""
+    """Poses at the end of a chain of links.
+
+    Parameters
+    ----------
+    links : (n + 1, 4, 4), m
+    q : (..., n), rad or m, motions about or along z
+    prismatic : (n,); None: all joints are revolute
+
+    Returns
+    -------
+    T : (..., 4, 4), m
+    """
     q = np.asarray(q, float)
     sliding = np.zeros(len(links) - 1, dtype=bool) if prismatic is None else prismatic
     T = np.broadcast_to(links[0], (*q.shape[:-1], 4, 4))
@@ -155,13 +210,33 @@ def poses_of(links: Reals, q: Reals, prismatic: Flags | None = None) -> Reals:
 
 
 def axes_of(links: Reals) -> tuple[Reals, Reals]:
-    """Directions (n, 3) and points (n, 3) of the joint axes with all joints at 0."""
+    """Joint axes of a chain with all joints at 0.
+
+    Parameters
+    ----------
+    links : (n + 1, 4, 4), m
+
+    Returns
+    -------
+    directions, points : (n, 3), unit vectors, and m
+    """
     frames = np.array(list(accumulate(links[:-1], np.matmul)))
     return frames[:, :3, 2], frames[:, :3, 3]
 
 
 def meeting_point(axes: Reals, points: Reals) -> tuple[Reals, float]:
-    """Least-squares point nearest to all lines, and its largest distance from a line (m)."""
+    """The point nearest to all lines, by least squares.
+
+    Parameters
+    ----------
+    axes : (k, 3), unit vectors
+    points : (k, 3), m, one on each line
+
+    Returns
+    -------
+    point : (3,), m
+    miss : m, its largest distance from a line
+    """
     across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
     found = np.linalg.lstsq(across.reshape(-1, 3), (across @ points[:, :, None]).reshape(-1), rcond=None)[0]
     meeting = found.astype(float)
@@ -170,12 +245,30 @@ def meeting_point(axes: Reals, points: Reals) -> tuple[Reals, float]:
 
 
 def size_of(links: Reals) -> float:
-    """A length of the chain (m): the summed distances between neighbouring frames, halved; 1 if there is none."""
+    """A length of the chain, to scale it with: half the summed distances between neighbouring frames.
+
+    Parameters
+    ----------
+    links : (n + 1, 4, 4), m
+
+    Returns
+    -------
+    size : m; 1 if there is no distance
+    """
     return 0.5 * float(np.linalg.norm(links[1:, :3, 3], axis=1).sum()) or 1.0
 
 
 def inverse_rigid(K: Reals) -> Reals:
-    """Inverse of rigid transforms (..., 4, 4)."""
+    """Inverses of rigid transforms.
+
+    Parameters
+    ----------
+    K : (..., 4, 4)
+
+    Returns
+    -------
+    inverse : (..., 4, 4)
+    """
     out = np.zeros_like(K)
     R = np.swapaxes(K[..., :3, :3], -1, -2)
     out[..., :3, :3] = R
@@ -186,7 +279,13 @@ def inverse_rigid(K: Reals) -> Reals:
 
 @inner_kernel
 def multiply_rigid(A: Reals, B: Reals, out: Reals) -> None:
-    """``out`` = A B of rigid transforms; ``out`` must be neither of them."""
+    """Multiply rigid transforms. Kernel.
+
+    Parameters
+    ----------
+    A, B : (4, 4)
+    out : (4, 4), filled with A B; it must be neither of them
+    """
     for i in range(3):
         for j in range(4):
             out[i, j] = A[i, 0] * B[0, j] + A[i, 1] * B[1, j] + A[i, 2] * B[2, j]
@@ -196,7 +295,13 @@ def multiply_rigid(A: Reals, B: Reals, out: Reals) -> None:
 
 @inner_kernel
 def invert_rigid(A: Reals, out: Reals) -> None:
-    """``out`` = inverse of a rigid transform."""
+    """Invert a rigid transform. Kernel.
+
+    Parameters
+    ----------
+    A : (4, 4)
+    out : (4, 4), filled; it must not be A
+    """
     for i in range(3):
         for j in range(3):
             out[i, j] = A[j, i]
@@ -206,7 +311,13 @@ def invert_rigid(A: Reals, out: Reals) -> None:
 
 @inner_kernel
 def post_rotate_z(A: Reals, c: float, s: float) -> None:
-    """A becomes A Rz for the angle with cosine c and sine s."""
+    """Multiply a transform from the right by a rotation about z. Kernel.
+
+    Parameters
+    ----------
+    A : (4, 4), changed in place
+    c, s : cosine and sine of the angle
+    """
     for i in range(3):
         x, y = A[i, 0], A[i, 1]
         A[i, 0], A[i, 1] = c * x + s * y, c * y - s * x

@@ -55,10 +55,10 @@ Joints = tuple[Reals, Reals]
 Slots = tuple[Reals, NDArray[np.int8], Reals]
 
 SLOTS = 8
-BOUNDARY_M = 1e-9
-BOUNDARY_RAD = 1e-9
-FREE = 1e-13
-FOLD_OFFSET = 0.9e-9  # rad; twice this tells rows apart, once this leaves no limit
+BOUNDARY_M = 1e-9  # so little out of reach is rounding: the arm is stretched, folded or at its offset
+BOUNDARY_RAD = 1e-9  # the same of the wrist's tilt
+FREE = 1e-13  # m or rad: nearer to its axis the direction of the wrist centre is rounding, and the joint is free
+FOLD_OFFSET = 0.9e-9  # rad; twice this makes two rows, once this leaves no limit
 AT_FOLD = 1e-15  # m or rad
 
 REACHED, TOO_FAR, TOO_NEAR, OFF_AXIS, ORIENTATION = 0, 1, 2, 3, 4
@@ -110,7 +110,7 @@ def _wrap(angle: float) -> float:
 
 @inner_kernel
 def _off_folds(angle: float, to_low: float, to_high: float, low_offset: float, high_offset: float) -> float:
-    """An angle in 0..pi, put beside that end whose distance from the fold (m or rad) is nothing but rounding."""
+    """An angle in 0..pi, put next to that end whose distance from the fold (m or rad) is nothing but rounding."""
     if to_low < AT_FOLD and low_offset > 0.0:
         return low_offset
     if to_high < AT_FOLD and high_offset > 0.0:
@@ -122,7 +122,18 @@ def _off_folds(angle: float, to_low: float, to_high: float, low_offset: float, h
 def solve(
     arm: ArmConstants, joints: Joints, T: Reals, q_ref: Reals, keep_folds: bool, keep_free: bool, out: Slots
 ) -> None:
-    """Fill ``q`` (N, 8, 6), ``fault`` and ``gap`` (N, 8) for poses ``T`` (N, 4, 4); see ``solve_slots``."""
+    """Solve poses in closed form, all eight branches [1]_ [2]_. Kernel.
+
+    Parameters
+    ----------
+    arm : constants of its axis lines
+    joints : direction and offset (6,)
+    T : (N, 4, 4), m
+    q_ref : (N, 6), rad, supplies joints that are free
+    keep_folds, keep_free : see the module's text
+    out : fills ``q`` (N, 8, 6), rad, ``fault`` and ``gap`` (N, 8), as :func:`.wrist_partitioned.solve_slots` returns
+        them
+    """
     (direction, offset), (q, fault, gap) = joints, out
     for n in range(T.shape[0]):
         tool_point = (T[n, 0, 3], T[n, 1, 3], T[n, 2, 3])
@@ -132,6 +143,7 @@ def solve(
         along = dot(arm.axis_1, v)
         A, B = dot(arm.axis_2, v) - along * arm.cos_12, -dot(arm.axis_2, cross(arm.axis_1, v))
         C, H = arm.shoulder_offset - along * arm.cos_12, np.hypot(A, B)
+        # The equation of joint 1 has no root if the offset along axis 2 exceeds the wrist's distance from axis 1.
         missing = np.abs(C) - H
         if missing > BOUNDARY_M * arm.sin_12:
             fault[n, :] = OFF_AXIS
@@ -144,6 +156,7 @@ def solve(
             theta_1 = phi + (delta if shoulder == 0 else -delta)
             if H < FREE:
                 theta_1 = direction[0] * q_ref[n, 0] + offset[0] + (np.pi if keep_free and shoulder == 1 else 0.0)
+            # Turned back by joint 1, into the plane across axis 2.
             c, s = np.cos(theta_1), -np.sin(theta_1)
             x = subtract(add(rotated(v, arm.axis_1, c, s), arm.point_1), arm.point_2)
             x = subtract(x, scaled(arm.axis_2, dot(arm.axis_2, x)))
@@ -189,7 +202,7 @@ def solve(
 def _solve_wrist(
     arm: ArmConstants, axis_6: Vector, beside_6: Vector, free_4: float, keep_folds: bool, keep_free: bool, theta: Reals
 ) -> float:
-    """Set the last three columns of ``theta`` (2, 6) from where axis 6 and the vector beside it must turn to.
+    """Set the last three columns of ``theta`` (2, 6) from where axis 6 and the vector across it must turn to.
 
     Returns by how much (rad) the wrist would have to tilt further than it can; beyond the boundary ``theta`` is NaN.
     """
@@ -199,6 +212,7 @@ def _solve_wrist(
     if beyond > BOUNDARY_RAD:
         theta[:, :] = np.nan
         return beyond
+    # Half-angle formula of the spherical triangle with sides b, c and gamma.
     upper_part = np.sin((gamma + b - c) / 2) * np.sin((gamma - b + c) / 2)
     lower_part = np.sin((b + c + gamma) / 2) * np.sin((b + c - gamma) / 2)
     bend = 2.0 * np.arctan2(np.sqrt(max(upper_part, 0.0)), np.sqrt(max(lower_part, 0.0)))
@@ -213,6 +227,7 @@ def _solve_wrist(
         theta_4 = signed_angle(tilted, axis_6, arm.axis_4)
         if aligned:
             theta_4 = free_4 + (np.pi if keep_free and k == 1 else 0.0)
+        # Joint 6 makes up for what is left once joints 4 and 5 are turned back.
         rest = rotated(beside_6, arm.axis_4, np.cos(theta_4), -np.sin(theta_4))
         rest = rotated(rest, arm.axis_5, c_5, -s_5)
         theta[k, 3], theta[k, 4], theta[k, 5] = theta_4, theta_5, signed_angle(arm.beside_6, rest, arm.axis_6)

@@ -17,8 +17,18 @@ MOVED = 1e-2  # rad or m by which polishing may move a row, which else becomes a
 
 
 def confirmed(robot: Robot, T: Reals, q: Reals) -> tuple[Reals, Flags]:
-    """Rows (k, n), of which some may hold NaN, of poses (k, 4, 4): confirmed ones as they are, others polished, or NaN
-    where that does not help. And which rows these others are (k,)."""
+    """Let through only rows that forward kinematics confirms; polish the others, or drop them.
+
+    Parameters
+    ----------
+    T : (k, 4, 4), m
+    q : (k, n), rad or m, some of which may be NaN
+
+    Returns
+    -------
+    q : (k, n), confirmed rows as they are, others polished, or NaN where that does not help
+    failing : (k,) bool, which these others are
+    """
     failing = np.isfinite(q[:, 0]) & ~confirms(robot, T, q)
     if not failing.any():
         return q, failing
@@ -35,8 +45,18 @@ AT_A_TIME = 512  # poses, whose rows' forward kinematics stay in the processor's
 
 
 def to_be_confirmed(robot: Robot, T: Reals, q: Reals, threads: int) -> Integers:
-    """Numbers of the poses (N, 4, 4) with a row in (N, S, n), but for NaN, whose forward kinematics are not obviously
-    the pose: no entry off by a third of what confirms a row."""
+    """Find poses with a row whose forward kinematics are not obviously the pose.
+
+    Parameters
+    ----------
+    T : (N, 4, 4), m
+    q : (N, S, n), rad or m, NaN in empty slots
+    threads : how many to use
+
+    Returns
+    -------
+    numbers : of these poses: some entry of the matrix is off by more than a third of what confirms a row
+    """
     far, slots = np.zeros(len(T), bool), q.shape[1]
 
     def look(part: slice) -> None:

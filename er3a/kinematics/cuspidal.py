@@ -23,7 +23,7 @@ from er3a.kinematics.singularity import rank_losses, scaled_jacobian
 from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot, derived
 
-POSES, SAMPLES, SEED = 60, 41, 20261121
+POSES, SAMPLES, SEED = 60, 41, 20261121  # random poses that are tried, and points of a move
 CLEAR = 5e-3  # smallest singular value that the whole move must keep
 
 
@@ -38,9 +38,19 @@ class CuspidalMove:
 
 @derived
 def cuspidal_move(robot: Robot) -> CuspidalMove | None:
-    """A straight joint move without singularity between two solutions of a pose; None if none of those tried is.
+    """A joint move without singularity between two solutions of one pose, which shows that an arm is cuspidal [1]_.
 
-    Poses of 60 random joint vectors are tried, of arms with six joints that all turn; others give None.
+    Parameters
+    ----------
+    robot : with six joints that all turn; others give None
+
+    Returns
+    -------
+    move : rad, straight in joint space; None if none of those tried is one, which proves nothing
+
+    Notes
+    -----
+    Poses of 60 random joint vectors are tried.
     """
     if robot.joints != 6 or robot.sliding.any():
         return None
@@ -49,6 +59,7 @@ def cuspidal_move(robot: Robot) -> CuspidalMove | None:
     share = np.linspace(0, 1, SAMPLES)[:, None]
     for rows, solved in zip(found.q, found.solved):
         rows = rows[solved]
+        # Solutions with different signs are separated by a singularity on any way.
         signs = np.sign(np.linalg.det(scaled_jacobian(robot, rows)))
         for i in range(len(rows)):
             for j in np.flatnonzero(signs[i + 1 :] == signs[i]) + i + 1:
@@ -60,6 +71,7 @@ def cuspidal_move(robot: Robot) -> CuspidalMove | None:
 
 
 def _keeps_rank(robot: Robot, start: Reals, step: Reals) -> bool:
+    """Whether the smallest singular value stays above ``CLEAR`` along a move, with a bound between samples."""
     t = np.linspace(0, 1, SAMPLES)
 
     def joints(at: Reals) -> Reals:

@@ -35,9 +35,9 @@ from er3a.robots.robot import Robot
 from er3a.robots.whole_turns import LIMIT_TOLERANCE, whole_turns
 
 SOLVES_M = SOLVES_RAD = 0.9e-9  # a family is given where it solves the pose to 1e-9, rounding included
-ALMOST_IN_LINE = 1e-3
-NO_DIRECTION = 1e-13
-MOVING = [0, 1, 2, 5]
+ALMOST_IN_LINE = 1e-3  # sine between axes 4 and 6 beyond which no small motion aligns them
+NO_DIRECTION = 1e-13  # sine between two axes below which their common normal is rounding
+MOVING = [0, 1, 2, 5]  # joints that make up for joint 5; joint 4 would only turn with joint 6
 MAX_STEPS, ROUNDING, SETTLED, INDEPENDENT = 8, 1e-14, 0.01, 1e-9
 
 
@@ -46,7 +46,8 @@ def aligned_arms(robot: Robot, T: Reals, q: Reals) -> Iterator[tuple[tuple[int, 
 
     Parameters
     ----------
-    T : (4, 4); q : (8, 6), rad, its closed-form solutions, NaN where a slot has none
+    T : (4, 4), m
+    q : (8, 6), rad, its closed-form solutions, NaN where a slot has none
 
     Yields
     ------
@@ -66,7 +67,16 @@ def aligned_arms(robot: Robot, T: Reals, q: Reals) -> Iterator[tuple[tuple[int, 
 
 
 def bend_of_wrist(robot: Robot, q: Reals) -> Reals:
-    """By how much (rad, signed) joint 5 of arms (..., 6) is away from where axes 4 and 6 are in line."""
+    """By how much joint 5 is away from where axes 4 and 6 are in line.
+
+    Parameters
+    ----------
+    q : (..., 6), rad
+
+    Returns
+    -------
+    bend : (...), rad, signed, -pi/2 to pi/2, in the sense of the table's theta
+    """
     arm = wrist_partitioned_arm(robot)
     w = [tuple(axis) for axis in arm.axes.tolist()]
     bend: Reals = robot.direction[4] * q[..., 4] + robot.offset[4] + signed_angle(w[3], w[5], w[4])
@@ -74,7 +84,17 @@ def bend_of_wrist(robot: Robot, q: Reals) -> Reals:
 
 
 def wrist_line(robot: Robot, q: Reals) -> tuple[Reals, Reals]:
-    """Joint angles with axes 4 and 6 put exactly in line, and the direction of the line of solutions."""
+    """The line of solutions through an arm with its wrist aligned.
+
+    Parameters
+    ----------
+    q : (6,), rad, nearly aligned
+
+    Returns
+    -------
+    q : (6,), rad, with axes 4 and 6 exactly in line
+    direction : (6,), rad per rad of joint 4, whose turn joint 6 undoes
+    """
     q = q.copy()
     q[4] -= robot.direction[4] * bend_of_wrist(robot, q)
     T = frames(robot, q)
@@ -83,7 +103,18 @@ def wrist_line(robot: Robot, q: Reals) -> tuple[Reals, Reals]:
 
 
 def wrist_centre_on_axis(robot: Robot, T: Reals, q: Reals, joint: int) -> Reals:
-    """The pose shifted so that the wrist centre lies on the axis of joint 1 or 2 of the arm at q."""
+    """The pose shifted so that the wrist centre lies on the axis of joint 1 or 2.
+
+    Parameters
+    ----------
+    T : (4, 4), m
+    q : (6,), rad, an arm that nearly does so
+    joint : 0 or 1
+
+    Returns
+    -------
+    T : (4, 4), m, a copy
+    """
     arm = wrist_partitioned_arm(robot)
     axis = frames(robot, q)[joint]
     away = T[:3, :3] @ arm.wrist_in_tool + T[:3, 3] - axis[:3, 3]
@@ -93,7 +124,16 @@ def wrist_centre_on_axis(robot: Robot, T: Reals, q: Reals, joint: int) -> Reals:
 
 
 def arm_folds_fully(robot: Robot) -> bool:
-    """Whether upper arm and forearm are equally long, so that the wrist centre can lie on axis 2."""
+    """Whether upper arm and forearm are equally long, so that the wrist centre can lie on axis 2.
+
+    Parameters
+    ----------
+    robot : with a spherical wrist
+
+    Returns
+    -------
+    folds : to 1e-9 m
+    """
     arm = wrist_partitioned_arm(robot)
     return abs(arm.upper_arm_length - arm.forearm_length) < BOUNDARY_M
 
@@ -144,12 +184,12 @@ def _in_line(robot: Robot, T: Reals, q: Reals) -> Reals | None:
     return best
 
 
-GRID = np.radians(2.0)
+GRID = np.radians(2.0)  # of the free joint, on which its limits are first looked at
 SPLIT, ROUNDS = 16, 10  # an interval is cut into so many parts, so often
-SAME_FAMILY = 1e-6  # rad; next to two singularities families that solve a pose to 1e-9 are no farther apart
-SAME_CURVE = SAME_FAMILY * np.array([1, 1, 0.2, 1, 1, 1])  # no farther apart does rounding put the roots of one elbow
+SAME_FAMILY = 1e-6  # rad; next to two singularities families that solve a pose to 1e-9 differ by no more
+SAME_CURVE = SAME_FAMILY * np.array([1, 1, 0.2, 1, 1, 1])  # rounding makes the roots of one elbow differ by no more
 FREE_MOTION = 1e-7  # singular value below which joints move with the tool at rest
-CURVES: tuple[tuple[SingularityType, int, int], ...] = (("shoulder", 4, 0), ("elbow", 2, 1))  # slots apart, joint
+CURVES: tuple[tuple[SingularityType, int, int], ...] = (("shoulder", 4, 0), ("elbow", 2, 1))  # step in slots, joint
 FREE_JOINT: dict[SingularityType, int] = {"shoulder": 0, "elbow": 1}
 
 
@@ -193,9 +233,15 @@ class Family(ByValue, Displayed):
         return int(np.median((values < FREE_MOTION).sum(axis=1)))
 
     def holds(self, q: Reals) -> bool:
-        """Whether joint values (6,) are a member of a curve within its range, turns of other joints aside.
+        """Whether joint values are a member of a curve within its range, turns of other joints aside.
 
-        False for the lines of a wrist.
+        Parameters
+        ----------
+        q : (6,), rad
+
+        Returns
+        -------
+        member : False for the lines of a wrist
         """
         if self.kind == "wrist":
             return False
@@ -205,7 +251,16 @@ class Family(ByValue, Displayed):
         return bool((np.abs(wrap_to_pi(self.members(t) - q)) < SAME_CURVE).all())
 
     def members(self, t: Reals) -> Reals:
-        """Joint angles (..., 6) in rad at parameters (...,)."""
+        """Members of the family.
+
+        Parameters
+        ----------
+        t : (...), rad
+
+        Returns
+        -------
+        q : (..., 6), rad
+        """
         t = np.asarray(t, float)
         if self.kind == "wrist":
             return self.q0 + t[..., None] * self.direction
@@ -216,7 +271,12 @@ class Family(ByValue, Displayed):
         return q.reshape(*t.shape, 6)
 
     def sheet(self) -> Sheet:
-        """A line: kind, range and the nearest member."""
+        """A line for printing: kind, range (deg) and the nearest member (deg).
+
+        Returns
+        -------
+        sheet : without rows
+        """
         low, high = np.degrees(self.range).tolist()
         within = "within the limits" if self.within_limits else "outside the limits"
         q0 = shortly(tuple(np.degrees(self.q0).tolist()))
@@ -227,11 +287,17 @@ class Family(ByValue, Displayed):
 
 
 def families(robot: Robot, T: Reals, q: Reals, q_ref: Reals) -> tuple[Family, ...]:
-    """All continua that solve a pose to 1e-9 m and rad, nearest to the reference first within each kind.
+    """All continua that solve a pose to 1e-9 m and rad.
 
     Parameters
     ----------
-    T : (4, 4); q : (8, 6), rad, its closed-form solutions, NaN where a slot has none; q_ref : (6,), rad
+    T : (4, 4), m
+    q : (8, 6), rad, its closed-form solutions, NaN where a slot has none
+    q_ref : (6,), rad
+
+    Returns
+    -------
+    families : nearest to the reference first within each kind
     """
     found: list[Family] = []
     for pair, on_line in aligned_arms(robot, T, q):
@@ -246,6 +312,7 @@ def families(robot: Robot, T: Reals, q: Reals, q_ref: Reals) -> tuple[Family, ..
 
 
 def _add(found: list[Family], new: list[Family]) -> None:
+    """Add families that are new; of one that is known the branches are joined."""
     for family in new:
         for k, known in enumerate(found):
             most = SAME_FAMILY if family.kind == "wrist" else SAME_CURVE
@@ -272,6 +339,7 @@ def _wrist_families(robot: Robot, T: Reals, q: Reals, q_ref: Reals, branches: tu
     rates, endless = limits.lines @ direction, bool(robot.continuous[[3, 5]].any())
     moved = rates != 0
     most = int(np.ceil((robot.upper - robot.lower)[[3, 5]].sum() / TURN)) + 2
+    # Whole turns of joint 6 against joint 4 are other lines of the same poses.
     for k in range(-most, most + 1):
         start = rest + TURN * k * np.eye(6)[5]
         smallest, greatest = limits.lower - limits.lines @ start, limits.upper - limits.lines @ start
@@ -296,6 +364,7 @@ def _wrist_families(robot: Robot, T: Reals, q: Reals, q_ref: Reals, branches: tu
 
 
 def _nearest_on_line(q: Reals, direction: Reals, q_ref: Reals) -> float:
+    """The parameter of the point of a line nearest to a reference."""
     return float((q_ref - q) @ direction / (direction @ direction))
 
 
@@ -349,7 +418,17 @@ def _curve_families(
 
 
 def nearest_wrists(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
-    """Rows (n, 6) with an aligned wrist moved along their line to the member nearest to the reference."""
+    """Rows with an aligned wrist, moved along their line to the member nearest to a reference.
+
+    Parameters
+    ----------
+    q : (n, 6), rad, changed in place
+    q_ref : (6,), rad
+
+    Returns
+    -------
+    q : (n, 6), rad, the same array
+    """
     for row in np.flatnonzero(np.abs(bend_of_wrist(robot, q)) < SOLVES_RAD):
         on_line, direction = wrist_line(robot, q[row])
         axis_4, axis_6 = frames(robot, on_line)[[3, 5], :3, 2]

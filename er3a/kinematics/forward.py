@@ -19,7 +19,7 @@ from er3a.robots.robot import Robot
 Row = tuple[float, float, float, float]
 Axes = tuple[int, int, float, float]  # the columns in scratch memory that hold y and z, and their signs there
 
-BLOCK = 64
+BLOCK = 64  # poses; a row of 64 numbers fills whole vectors
 _COS, _SIN = 12, 13  # rows of scratch memory after the 3 x 4 entries of a block of poses
 
 
@@ -57,14 +57,23 @@ def forward(robot: Robot, q: Reals, frame: int | None = None, out: Reals | None 
 
 
 def forward_of_rows(robot: Robot, u: Reals) -> Reals:
-    """Poses (N, 4, 4) of the tool point for the motion of the table's rows, u (N, m), before any coupling."""
+    """Poses of the tool point for the motion of the table's rows, before any coupling.
+
+    Parameters
+    ----------
+    u : (N, m), rad or m
+
+    Returns
+    -------
+    T : (N, 4, 4), T_base_tool, m
+    """
     out = np.empty((len(u), 4, 4))
     _forward(for_kernel(u), robot.direction, joint_starts(robot), robot.sliding, constant_links(robot), out)
     return out
 
 
 def frames(robot: Robot, q: Reals) -> Reals:
-    """Frames that move with each joint, and the tool frame.
+    """Frames that move with each joint, and the tool frame, in the base frame.
 
     Parameters
     ----------
@@ -72,7 +81,13 @@ def frames(robot: Robot, q: Reals) -> Reals:
 
     Returns
     -------
-    T : (..., m + 1, 4, 4); entry k < m has its z axis on the axis of row k + 1 and moves with it; entry m is the tool
+    T : (..., m + 1, 4, 4), m; entry k < m has its z axis on the axis of row k + 1 and moves with it; entry m is the
+        tool
+
+    Raises
+    ------
+    ShapeError, PoseError
+        if q has the wrong shape, or is no array of numbers
     """
     q = checked_joints(robot, q)
     out = np.empty((*q.shape[:-1], robot.rows + 1, 4, 4))
@@ -90,6 +105,11 @@ def jacobian(robot: Robot, q: Reals) -> Reals:
     Returns
     -------
     J : (..., 6, n); rows 0-2 linear velocity (m/rad, or m/m for prismatic joints), rows 3-5 angular velocity
+
+    Raises
+    ------
+    ShapeError, PoseError
+        if q has the wrong shape, or is no array of numbers
     """
     q = checked_joints(robot, q)
     out = np.empty((*q.shape[:-1], 6, robot.rows))
@@ -101,7 +121,24 @@ def jacobian(robot: Robot, q: Reals) -> Reals:
 
 
 def checked_joints(robot: Robot, q: Reals, argument: str = "q") -> Reals:
-    """Return q as contiguous float array (..., n), or raise :class:`ShapeError` or :class:`PoseError`."""
+    """Joint values as a contiguous array of floats.
+
+    Parameters
+    ----------
+    q : anything array-like
+    argument : name of the argument in the caller, for the message
+
+    Returns
+    -------
+    q : (..., n), rad or m; NaN passes
+
+    Raises
+    ------
+    ShapeError
+        if the last axis has not one number for each joint
+    PoseError
+        if some values are no real numbers
+    """
     q = np.ascontiguousarray(as_floats(q, argument))
     if q.ndim == 0 or q.shape[-1] != robot.joints:
         raise ShapeError(argument, q.shape, f"(..., {robot.joints})")
@@ -116,19 +153,49 @@ def _motion(robot: Robot, q: Reals) -> tuple[Reals, Reals, Reals, Flags]:
 
 @inner_kernel
 def turn_row(row: Row, c: float, s: float) -> Row:
-    """Row (4 floats) of T, after T is multiplied from the right by Rz, given its cosine and sine."""
+    """A row of T Rz. Kernel.
+
+    Parameters
+    ----------
+    row : a row of T, 4 floats
+    c, s : cosine and sine of the rotation about z
+
+    Returns
+    -------
+    row : 4 floats
+    """
     return row[0] * c + row[1] * s, row[1] * c - row[0] * s, row[2], row[3]
 
 
 @inner_kernel
 def slide_row(row: Row, along: float) -> Row:
-    """Row (4 floats) of T, after T is multiplied from the right by a shift along z."""
+    """A row of T, shifted along its own z axis. Kernel.
+
+    Parameters
+    ----------
+    row : a row of T, 4 floats
+    along : m
+
+    Returns
+    -------
+    row : 4 floats
+    """
     return row[0], row[1], row[2], row[3] + along * row[2]
 
 
 @inner_kernel
 def step_row(row: Row, link: Reals) -> Row:
-    """Row (4 floats) of T, after T is multiplied from the right by the constant transform ``link``."""
+    """A row of T times a constant link. Kernel.
+
+    Parameters
+    ----------
+    row : a row of T, 4 floats
+    link : (4, 4)
+
+    Returns
+    -------
+    row : 4 floats
+    """
     return (
         row[0] * link[0, 0] + row[1] * link[1, 0] + row[2] * link[2, 0],
         row[0] * link[0, 1] + row[1] * link[1, 1] + row[2] * link[2, 1],
@@ -139,7 +206,16 @@ def step_row(row: Row, link: Reals) -> Row:
 
 @kernel
 def rows_of(T: Reals) -> tuple[Row, Row, Row]:
-    """The three upper rows of a transform, each as 4 floats."""
+    """The three upper rows of a transform. Kernel.
+
+    Parameters
+    ----------
+    T : (4, 4)
+
+    Returns
+    -------
+    x, y, z : 4 floats each
+    """
     return (
         (T[0, 0], T[0, 1], T[0, 2], T[0, 3]),
         (T[1, 0], T[1, 1], T[1, 2], T[1, 3]),
@@ -149,6 +225,13 @@ def rows_of(T: Reals) -> tuple[Row, Row, Row]:
 
 @inner_kernel
 def write_rows(x: Row, y: Row, z: Row, out: Reals) -> None:
+    """Fill a transform from its three upper rows. Kernel.
+
+    Parameters
+    ----------
+    x, y, z : 4 floats each
+    out : (4, 4), filled; the bottom row becomes 0 0 0 1
+    """
     for j in range(4):
         out[0, j], out[1, j], out[2, j] = x[j], y[j], z[j]
     out[3, 0], out[3, 1], out[3, 2], out[3, 3] = 0.0, 0.0, 0.0, 1.0
@@ -186,6 +269,7 @@ def _slide_rows(q: Reals, sign: float, start: int, k: int, rows: Reals, axes: Ax
 
 @kernel
 def _forward(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links: Reals, out: Reals) -> None:
+    """Fill ``out`` (N, 4, 4) with tool poses, block by block."""
     rows = np.zeros((_SIN + 1) * BLOCK)
     for start in range(0, q.shape[0], BLOCK):
         axes = _fill_start(rows, links[0])
@@ -246,6 +330,7 @@ def _turn_and_step(rows: Reals, link: Reals, axes: Axes, dense: bool) -> Axes:
 
 @kernel
 def _frames(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links: Reals, out: Reals) -> None:
+    """Fill ``out`` (N, m + 1, 4, 4) with the frames that move with each row, and the tool's."""
     joints = q.shape[1]
     for n in range(q.shape[0]):
         x, y, z = rows_of(links[0])
@@ -263,6 +348,7 @@ def _frames(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links: 
 
 @kernel
 def _jacobian(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links: Reals, out: Reals) -> None:
+    """Fill ``out`` (N, 6, m) with Jacobians by rows, block by block."""
     joints = q.shape[1]
     rows, columns = np.zeros((_SIN + 1) * BLOCK), np.empty((joints, 6 * BLOCK))
     for start in range(0, q.shape[0], BLOCK):
@@ -289,6 +375,7 @@ def _jacobian(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links
 
 @inner_kernel
 def _fill_start(rows: Reals, link: Reals) -> Axes:
+    """Set all poses of a block to the first link; returns which columns hold y and z, and their signs."""
     for r in range(3):
         for c in range(4):
             rows[(4 * r + c) * BLOCK : (4 * r + c + 1) * BLOCK] = link[r, c]
@@ -332,7 +419,7 @@ def skeleton(robot: Robot, q: np.ndarray) -> np.ndarray:
 
     Returns
     -------
-    points : (n, 3), m, base frame, without repeated points
+    points : (k, 3), m, base frame, without repeated points
     """
     T, parts = frames(robot, q), link_parts(robot)
     points = [robot.base[:3, 3]]

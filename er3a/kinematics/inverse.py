@@ -34,8 +34,8 @@ from er3a.robots.joint_limits import equivalents_within, within
 from er3a.robots.robot import Robot
 from er3a.robots.whole_turns import shortest_move
 
-SAME_JOINTS = 1e-9
-SAME_MEMBER = 1e-6
+SAME_JOINTS = 1e-9  # rad: rows so near to each other are one
+SAME_MEMBER = 1e-6  # rad or m: a member of a self-motion so near to a row is listed already
 MISSED = 1e-4  # rad or m from all rows
 SOLVES = 1e-12  # m and parts of 1
 STARTS, STARTS_OF_DEPENDENT = 400, 24  # where joints depend on each other a start that leads anywhere leads elsewhere
@@ -69,6 +69,10 @@ def inverse(
     self_motion_rows : for an arm with one redundancy parameter, add for each self-motion the member nearest to
         ``q_ref`` and the one with the largest limit margin as rows; always done if no row has the parameter's value
 
+    Returns
+    -------
+    solutions : rows (k, n), rad or m, all turns within the limits; of a branch outside them one row with the reason
+
     Raises
     ------
     ShapeError, PoseError
@@ -96,6 +100,7 @@ class _Found(NamedTuple):
 
 
 def _by_closed_form(robot: Robot, T: Reals, q_ref: Reals) -> _Found:
+    """Rows of an arm with a spherical wrist: each branch once per turn, and the nearest member of each self-motion."""
     q, fault, gap = (batch[0] for batch in solve_slots(robot, T[None], q_ref[None], keep_folds=True, keep_free=True))
     continua = families(robot, T, q, q_ref)
     q = _free_joints_near(robot, T, q, q_ref, continua)
@@ -106,7 +111,7 @@ def _by_closed_form(robot: Robot, T: Reals, q_ref: Reals) -> _Found:
             slots.append(slot)
     rows = [_rows_of_branch(robot, q[slot], q_ref) for slot in slots]
     for family in continua:
-        if family.within_limits and max_joint_move(np.concatenate(rows), family.q0).min() > SAME_MEMBER:
+        if family.within_limits and _distance(rows, family.q0) > SAME_MEMBER:
             slots.append(family.branches[0])
             rows.append(family.q0[None])
     return _Found(*_stacked(slots, rows, 6), solutions.ClosedForm(), _unsolved(robot, fault, gap), continua)
@@ -157,32 +162,31 @@ def _stacked(branches: list[int], rows: list[Reals], joints: int) -> tuple[Reals
 
 
 def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, self_motion_rows: bool) -> _Found:
+    """Rows by the solver of the arm's class, with members of self-motions, and what a search adds in doubt."""
     solver = by_class.arm_solver(robot).chain
     if isinstance(solver, UnsolvedChain):
         return _by_iteration(robot, T, q_ref)
     values = by_class.checked_parameters(robot, redundancy, q_ref[None], 1)
     found = by_class.slots_of_class(robot, T[None], q_ref[None], values)
-    slots, motions = found.q, found.settled[0].motions if found.settled else ()
-    filled = np.flatnonzero(np.isfinite(slots[0, :, 0]))
+    slots, motions = found.q[0], found.settled[0].motions if found.settled else ()
+    filled = np.flatnonzero(np.isfinite(slots[:, 0]))
     traced: Sequence[SelfMotionCurve] = motions
     if len(solver.parameters) == 1:
         traced = by_class.LazySelfMotions(robot, T, q_ref, values)
         motions = tuple(traced) if self_motion_rows or not filled.size else ()
     if solver.parameters:  # keep one where two branches meet; other arms' poses of that kind are settled
-        apart = np.abs(shortest_move(robot, slots[0, filled, None] - slots[0, filled])).max(axis=2, initial=0.0)
+        apart = np.abs(shortest_move(robot, slots[filled, None] - slots[filled])).max(axis=2, initial=0.0)
         filled = filled[~np.triu(apart < SAME_JOINTS, 1).any(axis=0)]
     branches: list[int] = filled.tolist()
-    rows = [_rows_of_branch(robot, slots[0, slot], q_ref) for slot in branches]
+    rows = [_rows_of_branch(robot, slots[slot], q_ref) for slot in branches]
     for motion in motions:
-        for member in (motion.q0, motion.max_margin_member) if solver.parameters else (motion.q0,):
-            listed = np.concatenate([np.empty((0, robot.joints)), *rows])
-            if motion.within_limits and max_joint_move(listed, member).min(initial=np.inf) > SAME_MEMBER:
-                branches.append(by_class.slot_of(robot, T, member))
-                rows.append(member[None])
+        if motion.within_limits:
+            members = (motion.q0, motion.max_margin_member) if solver.parameters else (motion.q0,)
+            _list_members(robot, T, members, branches, rows)
     certain = bool(is_complete(robot, found.certainty)[0])
     if not certain and isinstance(solver, LinkedRows):  # the rows found may be members that the linkage can't make
         for row in all_found(robot, T, STARTS):
-            if max_joint_move(np.concatenate([np.empty((0, robot.joints)), *rows]), row).min(initial=np.inf) > MISSED:
+            if _distance(rows, row) > MISSED:
                 branches.append(by_class.slot_of(robot, T, row))
                 rows.append(_rows_of_branch(robot, row, q_ref))
     if len(solver.parameters) == 1 and np.abs(forward(robot, q_ref) - T).max() <= SOLVES:
@@ -190,31 +194,60 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, se
         certain = certain and by_class.arm_solver(robot).poses_at(T).moves(to_rows(robot, q_ref))
     unsolved: tuple[solutions.Unsolved, ...] = ()
     if not branches:
-        open_pose = bool(solver.parameters)
         near = missed_row(robot, T, q_ref)
-        if bool(near.solved) and not (open_pose and redundancy is not None):
-            branches, rows = _near_solved(
-                robot, T, near.q, q_ref
-            )  # the class missed it, or the reference's parameters do
+        # The class missed it, or the reference's parameters do.
+        if near.solved and not (solver.parameters and redundancy is not None):
+            branches, rows = _near_solved(robot, T, near.q, q_ref)
             certain = False
         else:
             position, rotation = (float(np.asarray(error)) for error in (near.position_error, near.rotation_error))
             miss = solutions.NearestMiss(position * 1000, float(np.degrees(rotation)))
             unsolved = (solutions.PoseUnsolved(0, solutions.NoSolutionOfClass(miss)),)
-    method = solutions.ByClass(solver.code, bool(certain), bool(solutions.slot_labels(robot)))
+    method = solutions.ByClass(solver.code, certain, bool(solutions.slot_labels(robot)))
     return _Found(*_stacked(branches, rows, robot.joints), method, unsolved, traced)
 
 
+def _distance(rows: list[Reals], q: Reals) -> float:
+    """How far joint values (n,) are from the nearest of all rows, each (k, n); infinite if there are none."""
+    return min((max_joint_move(each, q).min() for each in rows), default=np.inf)
+
+
+def _list_members(robot: Robot, T: Reals, members: Sequence[Reals], branches: list[int], rows: list[Reals]) -> None:
+    """Add members (n,) of a self-motion to the rows, with their branches, unless rows are the same but for rounding."""
+    for member in members:
+        if _distance(rows, member) > SAME_MEMBER:
+            branches.append(by_class.slot_of(robot, T, member))
+            rows.append(member[None])
+
+
 def is_complete(robot: Robot, certainty: Integers) -> Flags:
-    """Whether the class found all solutions of poses (N,), of which it is so certain (N,)."""
+    """Whether the class found all solutions of poses.
+
+    Parameters
+    ----------
+    certainty : (N,), of the class, see :class:`.by_class.ClassRows`
+
+    Returns
+    -------
+    complete : (N,) bool; always True for classes that don't eliminate
+    """
     solver = by_class.arm_solver(robot).chain
     closed = not ARM_CLASSES[solver.code].eliminates and not isinstance(solver, LinkedRows)
     return np.asarray((certainty == CERTAIN) | closed)
 
 
 def missed_row(robot: Robot, T: Reals, q_ref: Reals) -> solutions.Solutions:
-    """What a search from the reference (n,) finds at a pose that the arm's class has no row for, within the limits if
-    it can."""
+    """What a search from the reference finds at a pose that the arm's class has no row for.
+
+    Parameters
+    ----------
+    T : (4, 4), m
+    q_ref : (n,), rad or m
+
+    Returns
+    -------
+    found : one row, solved or not, within the limits if it can be
+    """
     open_pose, mask = bool(by_class.parameters_of(robot)), task_mask(robot)
     robot, T = by_class.with_task_frame(robot), T @ by_class.arm_solver(robot).task_frame
     near = nearest_arm(robot, T, q_ref, mask, open_pose)
@@ -236,6 +269,7 @@ def _near_solved(robot: Robot, T: Reals, q: Reals, q_ref: Reals) -> tuple[list[i
 
 
 def _by_iteration(robot: Robot, T: Reals, q_ref: Reals) -> _Found:
+    """Rows that random starts find, for chains of no class."""
     arms = all_found(robot, T, starts_of(robot))
     rows = _stacked(list(range(len(arms))), [_rows_of_branch(robot, q, q_ref) for q in arms], robot.joints)
     unsolved = () if len(arms) else solve(robot, T, respect_limits=False).unsolved
@@ -243,12 +277,26 @@ def _by_iteration(robot: Robot, T: Reals, q_ref: Reals) -> _Found:
 
 
 def starts_of(robot: Robot) -> int:
-    """How many random starts look for the solutions of an arm that no class solves."""
+    """How many random starts look for the solutions of an arm that no class solves.
+
+    Returns
+    -------
+    count : few if joints depend on each other, since there any start leads elsewhere
+    """
     return STARTS_OF_DEPENDENT if by_class.arm_solver(robot).chain.code == "dependent" else STARTS
 
 
 def missing_class(robot: Robot) -> ClosedFormMissing | solutions.DependentJoints | None:
-    """Why the arm is solved by iteration."""
+    """Why the arm is solved by iteration.
+
+    Parameters
+    ----------
+    robot : that no class solves
+
+    Returns
+    -------
+    why : dependent joints, or what a spherical wrist lacks
+    """
     return (
         solutions.DependentJoints()
         if by_class.arm_solver(robot).chain.code == "dependent"
@@ -257,7 +305,21 @@ def missing_class(robot: Robot) -> ClosedFormMissing | solutions.DependentJoints
 
 
 def checked_reference(robot: Robot, q_ref: Reals | None) -> Reals:
-    """Reference joint values (n,), zeros for None; :class:`ShapeError` or :class:`PoseError` if they are none."""
+    """Reference joint values of one pose.
+
+    Parameters
+    ----------
+    q_ref : (n,), rad or m; None for zeros
+
+    Returns
+    -------
+    q_ref : (n,), rad or m
+
+    Raises
+    ------
+    ShapeError, PoseError
+        if they have not one finite number for each joint
+    """
     q_ref = np.zeros(robot.joints) if q_ref is None else checked_joints(robot, q_ref, "q_ref")
     if q_ref.ndim != 1:
         raise ShapeError("q_ref", q_ref.shape, f"({robot.joints},)")
@@ -287,11 +349,13 @@ def _free_joints_near(robot: Robot, T: Reals, q: Reals, q_ref: Reals, continua: 
 
 
 def _rows_of_branch(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
+    """One branch in all turns within the limits (k, n), the nearest to the reference first."""
     rows = equivalents_within(robot, q, q_ref)
     return rows[np.argsort(max_joint_move(rows, q_ref), kind="stable")]
 
 
 def _unsolved(robot: Robot, fault: NDArray[np.int8], gap: Reals) -> tuple[solutions.SideUnsolved, ...]:
+    """Why a shoulder side has no branch: by that of its four slots which misses least."""
     found = []
     for shoulder in (0, 1):
         part = slice(4 * shoulder, 4 * shoulder + 4)
@@ -307,6 +371,7 @@ def _unsolved(robot: Robot, fault: NDArray[np.int8], gap: Reals) -> tuple[soluti
 
 
 def _out_of_reach(robot: Robot, fault: int, gap: float) -> solutions.OutOfReach:
+    """The reason behind a slot's fault, with its gap in mm or deg."""
     arm = wrist_partitioned_arm(robot)
     if fault == ORIENTATION:
         return solutions.WristTiltsTooLittle(float(np.degrees(gap)))

@@ -14,18 +14,18 @@ from er3a.kinematics.batch import inverse_batch
 from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.robot import Robot
 
-DIRECTIONS = 400
-TURN_STEPS = 90
-HALVINGS = 12
-RANDOM_ORIENTATIONS = 4000
-COARSE_GRID, FINE_GRID, REFINEMENTS = 25, 9, 5
+DIRECTIONS = 400  # axes about which the tool is turned: one for each 10 deg
+TURN_STEPS = 90  # of half a turn: 2 deg
+HALVINGS = 12  # of such a step: to 0.0005 deg
+RANDOM_ORIENTATIONS = 4000  # a ratio of these is known to 1 %
+COARSE_GRID, FINE_GRID, REFINEMENTS = 25, 9, 5  # points across, at first and when refined, and how often
 
 
 SPARE_TURNS, SPARE_SHIFTS = np.radians([1.0, 2.0, 5.0, 10.0]), np.array([5.0, 10.0, 20.0, 50.0]) / 1000
 """Margins beyond the smallest turn (rad) or shift (m) for an advised one; the first usable margin is taken."""
 SHOWN_ANGLE, SHOWN_LENGTH = np.radians(0.01), 1e-4
 """Rounding of advised poses."""
-CHUNK = 512
+CHUNK = 512  # points solved at a time, until one is usable
 
 Usable = Callable[[Reals], Flags]
 """Which arms (N, n), rad, within the limits count, (N,)."""
@@ -55,7 +55,17 @@ class Neighbours:
 
 
 def solvable(robot: Robot, T: Reals, usable: Usable | None = None) -> Flags:
-    """Whether poses (N, 4, 4) have a solution within the limits that is usable, (N,)."""
+    """Whether poses have a solution within the limits that is usable.
+
+    Parameters
+    ----------
+    T : (N, 4, 4), m
+    usable : which arms (k, n) count; None: all
+
+    Returns
+    -------
+    solved : (N,) bool
+    """
     found = inverse_batch(robot, T)
     kept = found.within_limits.copy()
     if usable is not None:
@@ -65,12 +75,18 @@ def solvable(robot: Robot, T: Reals, usable: Usable | None = None) -> Flags:
 
 
 def neighbours(robot: Robot, T: Reals, random: np.random.Generator, usable: Usable | None = None) -> Neighbours:
-    """Search around a pose (4, 4) of the tool.
+    """Search poses near a refused one that have a solution within the limits.
 
     Parameters
     ----------
+    T : (4, 4), m
+    random : draws the orientations for the ratio
     usable : which arms count. If given, the poses are fit for advice: beyond the smallest usable turn or shift by one
         of ``SPARE_TURNS`` or ``SPARE_SHIFTS``, and usable after rounding for display
+
+    Returns
+    -------
+    found : rad and m; the turn and the shift are upper bounds of the smallest ones
     """
     turned = np.tile(T, (RANDOM_ORIENTATIONS, 1, 1))
     turned[:, :3, :3] = scipy.spatial.transform.Rotation.random(RANDOM_ORIENTATIONS, rng=random).as_matrix()

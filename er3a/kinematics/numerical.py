@@ -52,13 +52,19 @@ from er3a.robots.joint_limits import limits_exceeded, nearest_equivalent, unwoun
 from er3a.robots.robot import Robot
 from er3a.robots.whole_turns import shortest_move
 
-LANES = 32
-MIN_PIVOT = 1e-15
+LANES = 32  # four or more vectors of any processor, while the scratch memory stays in its cache
+MIN_PIVOT = 1e-15  # keeps the root of a pivot that rounding has made negative
 
 
 @inner_kernel
 def solve_by_cholesky(A: Reals, step: Reals) -> None:
-    """Replace ``step`` (6 rows of lanes) by the solutions x of A x = step; of A (36 rows) the lower half is read."""
+    """Solve six equations in each lane by Cholesky's factors [1]_. Kernel.
+
+    Parameters
+    ----------
+    A : 36 rows of lanes, symmetric positive matrices, of which the lower half is read
+    step : 6 rows of lanes, right sides, replaced by the solutions
+    """
     for i in range(LANES):
         r_0 = 1.0 / np.sqrt(max(A[i], MIN_PIVOT))
         l_10 = A[6 * LANES + i] * r_0
@@ -99,12 +105,12 @@ def solve_by_cholesky(A: Reals, step: Reals) -> None:
         step[3 * LANES + i], step[4 * LANES + i], step[5 * LANES + i] = x_3, x_4, x_5
 
 
-DAMPING = 0.1
-MAX_ITERATIONS = 40
+DAMPING = 0.1  # times the squared error
+MAX_ITERATIONS = 40  # of one start
 LONGEST_STEP = 1.0  # rad
 STALLED = 0.9  # the squared error must fall by this factor ...
 PATIENCE = 3  # ... within so many iterations
-MIN_DAMPING = 1e-15
+MIN_DAMPING = 1e-15  # keeps the normal matrix positive at the solution
 
 # Rows of scratch memory, one number of each lane in a row: the arm's frame (3 x 4), the target (3 x 4), then vectors.
 _FRAME, _TARGET, _Q, _E, _W, _SQUARED, _POSITION, _ROTATION = 0, 12, 24, 30, 36, 39, 40, 41
@@ -120,10 +126,20 @@ Draws = tuple[int, np.uint64, int]  # restarts, seed, number of the first pose
 def solve_numerically(
     arm: Arm, limits: Limits, T: Reals, q0: Reals, goal: Goal, draws: Draws, out: tuple[Reals, Reals, Integers]
 ) -> None:
-    """Fill ``q`` (N, 6), ``error`` (N, 2) in m and rad, ``starts`` (N,), for poses ``T`` (N, 4, 4); see ``solve``.
+    """Solve poses of an arm of six revolute joints by iteration, ``LANES`` at a time. Kernel.
 
     Random starts depend on the pose's number. Where no start reaches the tolerances, ``q`` is the nearest arm found and
     ``starts`` is 0.
+
+    Parameters
+    ----------
+    arm : direction and offset (6,), links (7, 4, 4)
+    limits : lower and upper (6,), rad, and whether to keep to them
+    T : (N, 4, 4), m
+    q0 : (N, 6), rad, first start
+    goal : mask (6,), tolerances (m, rad), length (m)
+    draws : restarts, seed, number of the first pose
+    out : fills ``q`` (N, 6), rad, ``error`` (N, 2) in m and rad, ``starts`` (N,)
     """
     (lower, upper, respect), (mask, tolerances, length), (restarts, _, _) = limits, goal, draws
     q, error, starts = out
@@ -179,7 +195,17 @@ def solve_numerically(
 
 @kernel
 def uniform(seed: np.uint64, pose: int, start: int, joint: int) -> float:
-    """A number in 0..1 from a counter, by SplitMix64."""
+    """A random number from a counter, by SplitMix64 [4]_. Kernel.
+
+    Parameters
+    ----------
+    seed : of the search
+    pose, start, joint : the counter
+
+    Returns
+    -------
+    number : in [0, 1), a multiple of 2^-53
+    """
     z = np.uint64(seed) + np.uint64(0x9E3779B97F4A7C15) * np.uint64(((pose * 65536 + start) * 8 + joint) + 1)
     z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
@@ -189,6 +215,7 @@ def uniform(seed: np.uint64, pose: int, start: int, joint: int) -> float:
 
 @inner_kernel
 def _take(w: Reals, i: int, T: Reals, n: int) -> None:
+    """Load a pose into a lane as its target."""
     for r in range(3):
         for c in range(4):
             w[(_TARGET + 4 * r + c) * LANES + i] = T[n, r, c]
@@ -196,6 +223,7 @@ def _take(w: Reals, i: int, T: Reals, n: int) -> None:
 
 @kernel
 def _begin(w: Reals, i: int, q0: Reals, n: int, start: int, limits: Limits, draws: Draws) -> None:
+    """Set a lane's joints to a start: the guess, or a random one within the limits."""
     (lower, upper, respect), (_, seed, first) = limits, draws
     for j in range(6):
         angle = q0[n, j] if start == 0 else lower[j] + uniform(seed, first + n, start, j) * (upper[j] - lower[j])
@@ -243,6 +271,7 @@ def _joint(sign: float, zero: float, link: Reals, k: int, w: Reals, column: Real
 
 @inner_kernel
 def _pose_error(mask: Reals, length: float, w: Reals) -> None:
+    """Masked error of each lane in the target's tool frame: position over length, rotation vector (rad), and sizes."""
     m0, m1, m2, m3, m4, m5 = mask[0], mask[1], mask[2], mask[3], mask[4], mask[5]
     for i in range(LANES):
         a0, a1, a2, px = w[i], w[LANES + i], w[2 * LANES + i], w[3 * LANES + i]
@@ -370,7 +399,18 @@ AnyArm = tuple[Reals, Reals, Reals, Flags, Reals, Reals]
 def solve_any(
     arm: AnyArm, limits: Limits, T: Reals, q0: Reals, goal: Goal, draws: Draws, out: tuple[Reals, Reals, Integers]
 ) -> None:
-    """Fill ``q`` (N, n), ``error`` (N, 2) in m and rad, ``starts`` (N,), for poses ``T`` (N, 4, 4); see ``solve``."""
+    """Solve poses of any arm by iteration, one after another. Kernel.
+
+    Parameters
+    ----------
+    arm : see ``AnyArm``
+    limits : lower and upper (n,), rad or m, and whether to keep to them
+    T : (N, 4, 4), m
+    q0 : (N, n), rad or m, first start
+    goal : mask (6,), tolerances (m, rad), length (m)
+    draws : restarts, seed, number of the first pose
+    out : fills ``q`` (N, n), ``error`` (N, 2) in m and rad, ``starts`` (N,), 0 where none succeeded
+    """
     (lower, upper, respect), (_, tolerances, length), (restarts, seed, first) = limits, goal, draws
     q, error, starts = out
     n = lower.shape[0]
@@ -501,14 +541,14 @@ def _rotation_vector(D: Reals) -> tuple[Reals, Reals]:
     return w, np.eye(3) - 0.5 * K + squared * (K @ K)
 
 
-RESTARTS = 500
-MISS_RESTARTS = 20
-DIAGNOSIS_RESTARTS = 100
+RESTARTS = 500  # random starts of a caller who names no other number
+MISS_RESTARTS = 20  # where the nearest arm is asked for, without a reason
+DIAGNOSIS_RESTARTS = 100  # to find out whether other starts or wider limits would help
 TOLERANCE = 1e-10  # m or rad
 NEARLY = 1e-6  # m (in parts of the arm's length) or rad: so near, only a singularity keeps the iteration from its end
 RANK = 1e-3  # smallest singular value below which the end of an iteration counts as singular
-SAME_ARM = 1e-6
-SMALLEST_PART = 64
+SAME_ARM = 1e-6  # rad or m: ends of two starts so near are one solution
+SMALLEST_PART = 64  # poses that are worth a thread's start
 
 
 def solve(
@@ -524,7 +564,7 @@ def solve(
     seed: int = 0,
     threads: int = 1,
 ) -> Solutions:
-    """Solve poses by iteration from a start guess, then from random ones.
+    """Solve poses by iteration from a start guess, then from random ones (Levenberg-Marquardt [3]_).
 
     Parameters
     ----------
@@ -534,8 +574,14 @@ def solve(
         means all. ``[1, 1, 1, 1, 1, 0]`` leaves the rotation about the tool's axis free.
     respect_limits : keep the joint limits inside the iteration; otherwise angles are returned in (-pi, pi]
     restarts : number of random starts after ``q0`` (0 to 65535)
-    position_tolerance : m; rotation_tolerance : rad
+    position_tolerance : m
+    rotation_tolerance : rad
     seed : of the random starts; equal seeds give equal results for any number of threads
+    threads : number of threads
+
+    Returns
+    -------
+    solutions : one row for each pose: the solution, or the nearest arm found with the reason why there is none
 
     Raises
     ------
@@ -562,20 +608,57 @@ def solve(
 
 
 def nearest_arm(robot: Robot, T: Reals, q0: Reals, mask: Reals, respect_limits: bool) -> Solutions:
-    """What :func:`solve` gives for one pose (4, 4), without the reason where it finds none: that takes ten times as
-    long as the search."""
+    """What :func:`solve` gives for one pose, without the reason where it finds none.
+
+    Parameters
+    ----------
+    T : (4, 4), m
+    q0 : (n,), rad or m, where to start
+    mask : (6,), as for :func:`solve`
+    respect_limits : keep the joint limits inside the iteration
+
+    Returns
+    -------
+    solutions : one row
+
+    Notes
+    -----
+    The reason takes ten times as long as the search.
+    """
     search = _Search(robot, mask, np.full(2, TOLERANCE), seed=0)
     return search.solutions(np.ascontiguousarray(T), q0, respect_limits, MISS_RESTARTS, threads=1, explained=False)
 
 
 def polished(robot: Robot, T: Reals, q: Reals, mask: Reals) -> Reals:
-    """Joint values (k, n) to which the iteration, blind to limits, leads from those given (k, n) at poses (k, 4, 4)."""
+    """Joint values to which the iteration, blind to limits, leads from given ones.
+
+    Parameters
+    ----------
+    T : (k, 4, 4), m
+    q : (k, n), rad or m
+    mask : (6,), as for :func:`solve`
+
+    Returns
+    -------
+    q : (k, n), rad or m, whether they solve or not; tolerance 1e-12 m and rad
+    """
     return _Search(robot, mask, np.full(2, 1e-12), seed=0).run(T, q, False, 0, 1)[0]
 
 
 def all_found(robot: Robot, T: Reals, starts: int) -> Reals:
-    """Different joint solutions (k, n), angles in (-pi, pi], found from that many random starts for one pose (4, 4).
+    """Different joint solutions that random starts find for one pose.
 
+    Parameters
+    ----------
+    T : (4, 4), m
+    starts : how many
+
+    Returns
+    -------
+    q : (k, n), rad or m, angles in (-pi, pi]
+
+    Notes
+    -----
     There may be more: a search from random starts can't prove that it has found all.
     """
     search = _Search(robot, np.ones(6), np.array([1e-12, 1e-12]), seed=1)
@@ -592,6 +675,8 @@ def all_found(robot: Robot, T: Reals, starts: int) -> Reals:
 
 @dataclass(frozen=True, eq=False)
 class _Search:
+    """A search for poses of one robot: what must be met, to which tolerances (m, rad), from which random numbers."""
+
     robot: Robot
     mask: Reals
     tolerances: Reals
@@ -600,7 +685,21 @@ class _Search:
     def solutions(
         self, T: Reals, q0: Reals, respect: bool, restarts: int, threads: int, *, explained: bool
     ) -> Solutions:
-        """Of poses (..., 4, 4) from starts (n,) or (..., n)."""
+        """Search for poses, with the reason where none is found.
+
+        Parameters
+        ----------
+        T : (..., 4, 4), m
+        q0 : (n,) or (..., n), rad or m
+        respect : keep the joint limits
+        restarts : random starts after q0
+        threads : number of threads
+        explained : whether to find out why a pose was not solved
+
+        Returns
+        -------
+        solutions : one row for each pose
+        """
         robot, shape = self.robot, T.shape[:-2]
         poses = T.reshape(-1, 4, 4)
         starts_at = np.broadcast_to(q0, (*shape, robot.joints)).reshape(-1, robot.joints)
@@ -624,7 +723,20 @@ class _Search:
         )
 
     def run(self, T: Reals, q0: Reals, respect: bool, restarts: int, threads: int) -> tuple[Reals, Reals, Integers]:
-        """Joint values (N, n), errors (N, 2) in m and rad, and starts (N,) for poses (N, 4, 4)."""
+        """Run the kernel that fits the arm, in threads.
+
+        Parameters
+        ----------
+        T : (N, 4, 4), m
+        q0 : (N, n), rad or m
+        respect, restarts, threads : as for :meth:`solutions`
+
+        Returns
+        -------
+        q : (N, n), rad or m
+        error : (N, 2), m and rad
+        starts : (N,), 0 where none succeeded
+        """
         robot, count = self.robot, len(T)
         q, error, starts = np.empty((count, robot.joints)), np.empty((count, 2)), np.empty(count, dtype=np.int64)
         low, high = (for_kernel(each) for each in ((robot.lower, robot.upper) if respect else self.without_limits()))
@@ -650,14 +762,31 @@ class _Search:
         return (q if respect else unwound(robot, q)), error, starts
 
     def without_limits(self) -> tuple[Reals, Reals]:
-        """From where to where joints (n,) start that need not keep to limits: a turn; slides twice as far as theirs."""
+        """Where joints start that need not keep to limits.
+
+        Returns
+        -------
+        low, high : (n,), a turn about 0, rad; of slides a range twice as wide as theirs, m
+        """
         robot = self.robot
         middle, half = (robot.lower + robot.upper) / 2, robot.upper - robot.lower
         low, high = np.where(robot.slides, middle - half, -np.pi), np.where(robot.slides, middle + half, np.pi)
         return low, high
 
     def explain(self, T: Reals, q: Reals, error: Reals, respect: bool, restarts: int) -> NotFound:
-        """Why one pose was not solved: its nearest arm and a search without what may have hindered it."""
+        """Why one pose was not solved: its nearest arm and a search without what may have hindered it.
+
+        Parameters
+        ----------
+        T : (4, 4), m
+        q : (n,), rad or m, the nearest arm found
+        error : (2,), m and rad
+        respect, restarts : of the search that failed
+
+        Returns
+        -------
+        why : another start, the limits, a singular end, or no reach
+        """
         miss = NearestMiss(float(error[0] * 1000), float(np.degrees(error[1])))
         if restarts < DIAGNOSIS_RESTARTS:
             _, _, starts = self.run(T[None], q[None], respect, DIAGNOSIS_RESTARTS, 1)
@@ -678,6 +807,7 @@ class _Search:
 
 
 def _checked_mask(mask: Reals | None) -> Reals:
+    """The mask as six of 0.0 or 1.0; anything else is refused."""
     values = np.ones(6) if mask is None else as_floats(mask, "mask")
     if values.shape != (6,):
         raise ShapeError("mask", values.shape, "(6,)")

@@ -21,11 +21,11 @@ from er3a.numerics.arrays import Flags, Integers
 from er3a.robots.robot import Robot
 from er3a.robots.whole_turns import shortest_move
 
-SAME_JOINTS_RAD = 1e-6
+SAME_JOINTS_RAD = 1e-6  # a solution so near to the joints drawn is them
 NEAR_WRIST_DEG = NEAR_ELBOW_DEG = 0.5
-NEAR_SHOULDER_MM = 1.0
+NEAR_SHOULDER_MM = 1.0  # nearer to singularities joints are known less exactly, whatever the solver
 NEAR = NearSingular(np.radians(NEAR_WRIST_DEG), np.radians(NEAR_ELBOW_DEG), NEAR_SHOULDER_MM / 1000)
-BLOCK = 20_000
+BLOCK = 20_000  # poses at a time
 MAX_BY_CLASS = 500  # poses solved in validation for arms without a spherical wrist
 
 
@@ -38,7 +38,7 @@ class BatchRoundTrips:
     poses : number of random joint vectors
     solutions : number of solutions, all poses together
     worst_position : m; worst_orientation : rad, of any solution put back through forward kinematics
-    own_found : number of poses whose own joint angles are among the solutions (to 1e-6 rad, turns apart)
+    own_found : number of poses whose own joint angles are among the solutions (to 1e-6 rad, but for turns)
     worst_own : rad, largest joint difference between any pose's own angles and the nearest solution
     counts_within_limits : (S + 1,) int, number of poses with 0 .. S solutions within the limits, S slots of the class
     """
@@ -73,9 +73,17 @@ class SlotRoundTrips:
 
 
 def batch_round_trips(robot: Robot, random: np.random.Generator, poses: int) -> BatchRoundTrips:
-    """Send that many joint vectors, uniform within the limits, to poses and back.
+    """Send random joint vectors, uniform within the limits, to poses and back through the batch inverse.
 
-    Arms with more than six joints are solved at the redundancy parameter of the joints drawn.
+    Parameters
+    ----------
+    robot : arms with more than six joints are solved at the redundancy parameter of the joints drawn
+    random : the generator
+    poses : how many
+
+    Returns
+    -------
+    trips : m and rad
     """
     own = random.uniform(robot.lower, robot.upper, size=(poses, robot.joints))
     T = forward(robot, own)
@@ -97,16 +105,27 @@ def batch_round_trips(robot: Robot, random: np.random.Generator, poses: int) -> 
 
 
 def has_class(robot: Robot) -> bool:
-    """Whether a class's solver, not random starts, solves the arm."""
+    """Whether a class's solver, not random starts, solves the arm.
+
+    Returns
+    -------
+    has : False for dependent joints, and for chains of no class
+    """
     return arm_solver(robot).chain.code not in ("dependent", "unsolved")
 
 
 def slot_round_trips(robot: Robot, poses: int, seed: int) -> SlotRoundTrips:
-    """Draw joints uniformly within the limits, take them to a pose, solve it, and compare.
+    """Draw joints uniformly within the limits, take them to a pose, solve it in closed form, and compare.
 
     Parameters
     ----------
     robot : an arm with a closed-form inverse
+    poses : how many
+    seed : of the draws
+
+    Returns
+    -------
+    trips : worst errors, mm and deg
     """
     random = np.random.default_rng(seed)
     blocks = [_block(robot, random, min(BLOCK, poses - done)) for done in range(0, poses, BLOCK)]
@@ -122,6 +141,7 @@ def slot_round_trips(robot: Robot, poses: int, seed: int) -> SlotRoundTrips:
 
 
 def _block(robot: Robot, random: np.random.Generator, count: int) -> tuple[float, ...]:
+    """Near-singular poses, worst errors (deg, mm, deg) and unsolved poses of a block."""
     q = robot.lower + random.random((count, 6)) * (robot.upper - robot.lower)
     T = forward(robot, q)
     found = solve_slots(robot, T, np.zeros_like(q))[0]

@@ -15,9 +15,9 @@ from er3a.robots.joint_limits import joint_columns, limit_margin, nearest_equiva
 from er3a.robots.robot import Robot
 
 LAPS = 6  # a curve that turns a joint is followed over so many of its laps at most
-SPLIT, SPLITS = 16, 11
-NARROWINGS = 10
-SAME_TURN, COVERS = 1e-6, 1e-6
+SPLIT, SPLITS = 16, 11  # an interval is cut into so many parts, so often: to 16^-11 of it
+NARROWINGS = 10  # each to a sixth of the interval
+SAME_TURN, COVERS = 1e-6, 1e-6  # rad: what rounding makes of equal turns, and of ends of one part
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -56,14 +56,28 @@ class SelfMotionCurve(ByValue, Displayed):
     shift: Reals = field(default_factory=lambda: np.zeros(0))
 
     def members(self, t: Reals) -> Reals:
-        """Joint values (..., n) at parameters (...,)."""
+        """Members of the self-motion.
+
+        Parameters
+        ----------
+        t : (...), rad, summed length of joint moves from q0 on; a slide counts in parts of the arm's size
+
+        Returns
+        -------
+        q : (..., n), rad or m
+        """
         t = np.asarray(t, float)
         at = _place_of(self.lengths, self.start + t.reshape(-1), self.curve.closed)
         q = _joints(self.robot, self.chain.members(self.curve, at)) + self.shift
         return np.asarray(q.reshape(*t.shape, self.robot.joints))
 
     def sheet(self) -> Sheet:
-        """A line: range and the nearest member."""
+        """A line for printing: range (deg) and the nearest member (deg or mm).
+
+        Returns
+        -------
+        sheet : without rows
+        """
         low, high = np.degrees(self.range).tolist()
         within = "within the limits" if self.within_limits else "outside the limits"
         values = zip(joint_columns(self.robot), shown(self.robot, self.q0).tolist())
@@ -86,7 +100,20 @@ def _place_of(lengths: Reals, t: Reals, closed: bool) -> Reals:
 
 
 def self_motion_of(robot: Robot, T: Reals, chain: PoseChain, curve: TracedCurve, q_ref: Reals) -> list[SelfMotionCurve]:
-    """One for each part of a curve that lies within the joint limits; one for the whole of it if none does."""
+    """Parts of a traced curve that lie within the joint limits.
+
+    Parameters
+    ----------
+    T : (4, 4), m, the pose
+    chain : with that pose
+    curve : traced on it
+    q_ref : (n,), rad or m
+
+    Returns
+    -------
+    motions : one for each part, nearest to the reference first; one for the whole of it if no part lies within the
+        limits
+    """
     q = _joints(robot, curve.points)
     steps = np.diff(np.where(robot.slides, q / chain.size, q), axis=0)
     lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(steps, axis=1))])
@@ -152,6 +179,8 @@ def _part(
     best: tuple[int, Reals],
     max_margin_member: tuple[int, Reals],
 ) -> SelfMotionCurve:
+    """One part of a curve: its nearest member, its tangent, its range and its member with the largest margin."""
+
     def at(t: Reals) -> Reals:
         return _joints(robot, chain.members(curve, _place_of(lengths, np.atleast_1d(t), curve.closed)))
 
@@ -185,7 +214,16 @@ def _part(
 
 
 def to_rows(robot: Robot, q: Reals) -> Reals:
-    """What the table's rows turn or shift by, offsets included, for joints (..., n)."""
+    """What the table's rows turn or shift by, offsets included: the solver's x.
+
+    Parameters
+    ----------
+    q : (..., n), rad or m
+
+    Returns
+    -------
+    x : (..., m), rad or m
+    """
     return np.asarray(robot.direction * row_values(robot, q) + joint_starts(robot))
 
 

@@ -46,7 +46,7 @@ from er3a.robots.robot import Robot, derived
 SingularityType = Literal["wrist", "elbow", "shoulder"]
 EventType = SingularityType | Literal["dependent_axes"]
 TYPES: tuple[SingularityType, ...] = ("wrist", "elbow", "shoulder")
-ROUNDING = 6 * np.finfo(float).eps
+ROUNDING = 6 * np.finfo(float).eps  # of the largest singular value: what smaller ones may be by rounding alone
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -65,7 +65,12 @@ class Conditioning(Displayed):
     smallest_singular_value: Reals
 
     def sheet(self) -> Sheet:
-        """One row for each arm."""
+        """The three measures at each joint vector, for printing.
+
+        Returns
+        -------
+        sheet : one row for each
+        """
         measures = [np.ravel(getattr(self, each.name)) for each in fields(self)]
         columns, count = tuple(each.name.replace("_", " ") for each in fields(self)), len(measures[0])
         return Sheet.of_table(f"Conditioning at {count} joint vector(s)", columns, zip(*measures), count)
@@ -89,23 +94,30 @@ class DeterminantFactors:
 
 @derived
 def characteristic_length(robot: Robot) -> float:
-    """Length (m) that makes linear and angular rows comparable: the wrist centre's reach from axis 2.
+    """Length that makes linear and angular rows comparable: the wrist centre's reach from axis 2.
 
-    For arms without a wrist centre it is half the length along all links.
+    Returns
+    -------
+    length : m; for arms without a wrist centre half the length along all links
     """
     return arm_length(robot) if wrist_partition_missing(robot) else wrist_partitioned_arm(robot).wrist_reach
 
 
 def conditioning(robot: Robot, q: Reals, length: float | None = None) -> Conditioning:
-    """Manipulability, condition number and smallest singular value at joint values (..., n) in rad or m.
+    """Manipulability [2]_, condition number and smallest singular value of the Jacobian at joint values.
 
     For an arm with fewer than six joints these are the singular values of its n columns. Columns of prismatic joints
     are multiplied by the length, so that they are comparable with those of revolute joints.
 
     Parameters
     ----------
+    q : (..., n), rad or m
     length : characteristic length, m, by which the linear rows of the Jacobian are divided; None means
         :func:`characteristic_length`
+
+    Returns
+    -------
+    measures : (...) each, without unit
     """
     length = characteristic_length(robot) if length is None else length
     J = jacobian(robot, q)
@@ -120,7 +132,16 @@ def conditioning(robot: Robot, q: Reals, length: float | None = None) -> Conditi
 
 
 def wrist_and_forearm(robot: Robot) -> tuple[Reals, bool]:
-    """The wrist centre (3,) in the tool frame, m, and whether the forearm ends on axis 4 instead of there.
+    """Where the wrist centre is, and where the forearm ends.
+
+    Parameters
+    ----------
+    robot : with a spherical wrist, or with parallel axes 2, 3 and 4
+
+    Returns
+    -------
+    wrist : (3,), m, in the tool frame
+    to_axis_4 : whether the forearm ends on axis 4 instead of at the wrist centre
 
     Raises
     ------
@@ -133,12 +154,22 @@ def wrist_and_forearm(robot: Robot) -> tuple[Reals, bool]:
 
 
 def determinant_factors(robot: Robot, q: Reals) -> DeterminantFactors:
-    """Signed distances from the wrist, elbow and shoulder singularities at joint angles (..., 6) in rad.
+    """Signed distances from the wrist, elbow and shoulder singularities [1]_.
+
+    Parameters
+    ----------
+    q : (..., 6), rad
+
+    Returns
+    -------
+    factors : (...) each, rad, rad and m
 
     Raises
     ------
     NotWristPartitionedError
         if the arm's determinant does not factor this way
+    ShapeError, PoseError
+        if q has the wrong shape, or is no array of numbers
     """
     wrist_in_tool, to_axis_4 = wrist_and_forearm(robot)
     q = checked_joints(robot, q)
@@ -149,7 +180,16 @@ def determinant_factors(robot: Robot, q: Reals) -> DeterminantFactors:
 
 
 def factors_where_defined(robot: Robot, q: Reals) -> DeterminantFactors:
-    """The same; NaN for arms whose determinant does not factor this way (see :mod:`er3a.kinematics.singularity`)."""
+    """As :func:`determinant_factors`, for any arm.
+
+    Parameters
+    ----------
+    q : (..., n), rad or m
+
+    Returns
+    -------
+    factors : (...) each; NaN for arms whose determinant does not factor this way
+    """
     if has_branches(robot):
         return determinant_factors(robot, q)
     nothing = np.full(np.shape(q)[:-1], np.nan)
@@ -196,7 +236,7 @@ def _angle_short_of_line(a: Vector, b: Vector, axis: Vector) -> float:
 
 DEPENDENT = 1e-6  # smallest singular value of columns that count as dependent, relative to that of the event
 SHORTEST, EDGE = 1e-9, 1e-4  # shares of the motion
-MAX_SAMPLES = 200_000
+MAX_SAMPLES = 200_000  # of a motion; beyond that it is judged as it is sampled
 TRAVEL = 1.5  # joints' travel inside an interval, over what its ends show, where no speeds are given
 
 
@@ -221,7 +261,16 @@ class RankLoss:
 
 
 def scaled_jacobian(robot: Robot, q: Reals) -> Reals:
-    """Jacobian (..., 6, n) with linear rows in parts of the arm's length, and prismatic joints too."""
+    """Jacobian with linear rows in parts of the arm's length, and prismatic joints too.
+
+    Parameters
+    ----------
+    q : (..., n), rad or m
+
+    Returns
+    -------
+    J : (..., 6, n), without unit
+    """
     length = arm_length(robot)
     J = jacobian(robot, q)
     J[..., :3, :] /= length
@@ -230,10 +279,20 @@ def scaled_jacobian(robot: Robot, q: Reals) -> Reals:
 
 @derived
 def change_per_joint(robot: Robot) -> Reals:
-    """B (n,): bound of the scaled Jacobian's change in Frobenius norm per rad (or arm's length) of a joint.
+    """Bound of the change of the scaled Jacobian, in Frobenius' norm, as a joint moves.
 
-    A joint turns the axes after it, and moves their points and the tool point by at most its lever, so each column
-    changes by at most ``sqrt(1 + (2 R / length)^2)`` where R is the longest stretched distance along the arm.
+    Parameters
+    ----------
+    robot : limits matter only of prismatic joints
+
+    Returns
+    -------
+    B : (n,), per rad (or arm's length) of each joint
+
+    Notes
+    -----
+    A joint turns the axes after it, and moves their points and the tool point by at most its lever. So each column
+    changes by at most ``sqrt(1 + (2 R / length)^2)``. R is the longest stretched distance along the arm.
     """
     points, T = axes_at_zero_theta(robot)[1:]
     slide = np.zeros(len(points))
@@ -260,11 +319,16 @@ def rank_losses(
 
     Parameters
     ----------
-    t : (N,), s, rising; q : (N, n), rad or m, NaN where unreachable
+    t : (N,), s, rising
+    q : (N, n), rad or m, NaN where unreachable
     joints : joint values (k, n) at times (k,) within reach
     threshold : of the smallest singular value of :func:`scaled_jacobian`
     speed : (n,), maximum joint speeds of the motion, rad/s or m/s, with which nothing between samples is missed; None:
         as the samples show, times 1.5
+
+    Returns
+    -------
+    losses : by time (s)
     """
     found: list[RankLoss] = []
     for first, last in runs(np.isfinite(q[:, 0])):
@@ -277,6 +341,7 @@ def rank_losses(
 
 
 def _smallest_and_sign(robot: Robot, q: Reals) -> tuple[Reals, Reals]:
+    """Smallest singular value (N,) of the scaled Jacobian, and its determinant's sign (N,), 1 unless six joints."""
     J = scaled_jacobian(robot, q)
     smallest = np.asarray(np.linalg.svd(J, compute_uv=False)[..., -1], dtype=float)
     sign = np.asarray(np.sign(np.linalg.det(J))) if robot.joints == 6 else np.ones(len(q))
@@ -318,10 +383,12 @@ def _refined(
 
 
 def _stretches(robot: Robot, t: Reals, q: Reals, joints: Callable[[Reals], Reals], threshold: float) -> list[RankLoss]:
+    """Stretches of samples below the threshold or next to a change of sign, with their minimum and dependent axes."""
     smallest, sign = _smallest_and_sign(robot, q)
     changes = np.flatnonzero(sign[:-1] * sign[1:] < 0)
     low = smallest <= threshold
     for i in changes:
+        # A change of sign is a crossing, however large the value at both samples is.
         low[i if smallest[i] < smallest[i + 1] else i + 1] = True
     found = []
     for first, last in runs(low):
@@ -332,6 +399,7 @@ def _stretches(robot: Robot, t: Reals, q: Reals, joints: Callable[[Reals], Reals
         if end > begin:
 
             def size(time: float) -> float:
+                """Smallest singular value at a time, s."""
                 return float(_smallest_and_sign(robot, joints(np.array([time])))[0][0])
 
             near = scipy.optimize.minimize_scalar(
@@ -346,10 +414,20 @@ def _stretches(robot: Robot, t: Reals, q: Reals, joints: Callable[[Reals], Reals
 
 
 def dependent_axes(robot: Robot, q: Reals) -> tuple[int, ...]:
-    """Numbers (from 1) of the fewest axes whose columns are nearly dependent at joint values (n,).
+    """The fewest axes whose columns of the Jacobian are nearly dependent.
 
+    Parameters
+    ----------
+    q : (n,), rad or m
+
+    Returns
+    -------
+    axes : numbers from 1; empty for arms with a single joint
+
+    Notes
+    -----
     Of all sets of as many axes the one with the smallest singular value is named; a larger set only if its value is
-    clearly smaller. Empty for arms with a single joint.
+    clearly smaller.
     """
     J = scaled_jacobian(robot, q)
     J = J / np.maximum(np.linalg.norm(J, axis=0), 1e-300)
@@ -367,7 +445,7 @@ def dependent_axes(robot: Robot, q: Reals) -> tuple[int, ...]:
     return best[1]
 
 
-MIN_SINGULAR_VALUE = 0.02
+MIN_SINGULAR_VALUE = 0.02  # as about 5 deg from an aligned wrist, where a wrist counts as near-singular
 
 
 @dataclass(frozen=True)
@@ -383,26 +461,72 @@ class NearSingular:
     smallest: float = MIN_SINGULAR_VALUE
 
     def of(self, kind: SingularityType) -> float:
-        """The threshold of one type, rad or m."""
+        """The threshold of one type.
+
+        Parameters
+        ----------
+        kind : wrist, elbow or shoulder
+
+        Returns
+        -------
+        threshold : rad, of the shoulder m
+        """
         return {"wrist": self.wrist_rad, "elbow": self.elbow_rad, "shoulder": self.shoulder_m}[kind]
 
     def is_near(self, kind: SingularityType, distance: Reals) -> Flags:
-        """Whether distances (...,), rad or m, from the singular set of one type are below its threshold; NaN is not."""
+        """Whether distances from the singular set of one type are below its threshold.
+
+        Parameters
+        ----------
+        kind : wrist, elbow or shoulder
+        distance : (...), rad or m, at least 0
+
+        Returns
+        -------
+        near : (...) bool, False for NaN
+        """
         near: Flags = distance < self.of(kind)
         return near
 
     def ratios(self, factors: DeterminantFactors) -> Reals:
-        """Distances from the three singular sets over their thresholds, (3, ...) in the order of TYPES."""
+        """Distances from the three singular sets in parts of their thresholds.
+
+        Parameters
+        ----------
+        factors : (...) each
+
+        Returns
+        -------
+        ratios : (3, ...), in the order of ``TYPES``; below 1 is near
+        """
         return np.stack([np.abs(factor_of(factors, kind)) / self.of(kind) for kind in TYPES])
 
     def contains(self, robot: Robot, q: Reals) -> Flags:
-        """Whether any arm is near-singular at joint values (N, J) in rad or m; False where they are NaN."""
+        """Whether arms are near-singular.
+
+        Parameters
+        ----------
+        q : (N, n), rad or m
+
+        Returns
+        -------
+        near : (N,) bool, False where joint values are NaN
+        """
         near = np.array(np.isfinite(q).all(axis=1))
         near[near] = self.margin(robot, q[near]) < 1.0
         return near
 
     def margin(self, robot: Robot, q: Reals) -> Reals:
-        """Minimum of the ratios (N,) at joint angles (N, 6) in rad; -1 where they are NaN, for unreachable poses."""
+        """Distance from the nearest singular set in parts of its threshold.
+
+        Parameters
+        ----------
+        q : (N, n), rad or m
+
+        Returns
+        -------
+        margin : (N,), below 1 is near; -1 where joint values are NaN, for unreachable poses
+        """
         if not has_branches(robot):
             smallest = np.linalg.svd(scaled_jacobian(robot, q), compute_uv=False)[..., -1]
             return np.asarray(np.nan_to_num(smallest / self.smallest, nan=-1.0))
@@ -415,5 +539,15 @@ USUAL_NEAR = NearSingular(float(np.radians(5)), float(np.radians(5)), 0.03)
 
 
 def factor_of(factors: DeterminantFactors, kind: SingularityType) -> Any:
-    """The determinant's factor of one type, (...,) in rad or m."""
+    """The determinant's factor of one type.
+
+    Parameters
+    ----------
+    factors : of :func:`determinant_factors`
+    kind : wrist, elbow or shoulder
+
+    Returns
+    -------
+    factor : (...), rad, of the shoulder m
+    """
     return getattr(factors, kind)

@@ -50,9 +50,14 @@ def branch_labels(robot: Robot) -> tuple[BranchLabel, ...]:
     out level on that side, the elbow is above the line from shoulder to wrist. *flip*: the wrist root with the
     negative angle.
 
+    Returns
+    -------
+    labels : eight, in the order of the slots
+
     Raises
     ------
     NotWristPartitionedError
+        for other arms
     """
     if parallel_axes_arm(robot) is not None:
         names = arm_solver(robot).chain.names(to_rows(robot, np.zeros(6)))
@@ -70,7 +75,12 @@ def branch_labels(robot: Robot) -> tuple[BranchLabel, ...]:
 
 @derived
 def slot_labels(robot: Robot) -> tuple[BranchLabel | SlotName, ...]:
-    """The codes of the slots of the arm's class; empty where no signs separate its solutions, which are numbered."""
+    """The codes of the slots of the arm's class.
+
+    Returns
+    -------
+    labels : empty where no signs separate the solutions, which are numbered then
+    """
     if not wrist_partition_missing(robot):
         return branch_labels(robot)
     return arm_solver(robot).chain.names(to_rows(robot, np.zeros(robot.joints)))
@@ -78,7 +88,16 @@ def slot_labels(robot: Robot) -> tuple[BranchLabel | SlotName, ...]:
 
 @derived
 def side_of(robot: Robot, slot: int) -> Side:
-    """Whether a slot's wrist is in front of axis 1 or reached over the head (see :func:`branch_labels`)."""
+    """Whether a slot's wrist is in front of axis 1 or reached over the head (see :func:`branch_labels`).
+
+    Parameters
+    ----------
+    slot : 0 to 7
+
+    Returns
+    -------
+    side : "front" or "back"
+    """
     at_zero = determinant_factors(robot, np.zeros(6)).shoulder
     zero_side = 1.0 if abs(at_zero) < BOUNDARY_M else np.sign(at_zero)
     return "front" if _outward(slot) == zero_side else "back"
@@ -132,7 +151,16 @@ Method = ClosedForm | ByClass | Iteration
 
 
 def in_doubt(method: Method) -> Method:
-    """The method, no longer certain that its solutions are all."""
+    """The method of solving, no longer certain that its solutions are all.
+
+    Parameters
+    ----------
+    method : as found
+
+    Returns
+    -------
+    method : a closed form becomes its class, not certain; iteration stays, as it never is
+    """
     if isinstance(method, ClosedForm):
         return ByClass(method.arm_class, certain=False, named=True)
     return replace(method, certain=False) if isinstance(method, ByClass) else method
@@ -293,27 +321,48 @@ class Solutions(ByValue, Displayed):
         return found
 
     def take(self, rows: NDArray[Any]) -> Solutions:
-        """Some of the solutions of one pose."""
+        """Some of the solutions of one pose.
+
+        Parameters
+        ----------
+        rows : mask or numbers
+
+        Returns
+        -------
+        solutions : in the order chosen
+        """
         names = "q", "solved", "within_limits", "branch", *(("freed_turn",) if self.freed_turn is not None else ())
         return replace(self, **{name: getattr(self, name)[rows] for name in names})
 
     def without_turns(self) -> Solutions:
-        """Of one pose: of rows that are others but for whole turns the first, the one nearest to the reference."""
+        """Solutions of one pose that differ by more than whole turns.
+
+        Returns
+        -------
+        solutions : of rows that are others but for whole turns the first, the one nearest to the reference
+        """
         first = np.unique(np.column_stack([self.branch, but_for_turns(self.robot, self.q)]), axis=0, return_index=True)[
             1
         ]
         return self.take(np.sort(first))
 
     def sheet(self) -> Sheet:
-        """One pose: each solution. Many: how many solutions each pose has, or the arm that iteration found for it."""
+        """The solutions for printing.
+
+        Returns
+        -------
+        sheet : one pose: each solution. Many: how many solutions each pose has, or the arm that iteration found for it
+        """
         if self.position_error is not None:
             return self._sheet_of_search()
         return self._sheet_of_pose() if self.q.ndim == 2 else self._sheet_of_batch()
 
     def _counted(self) -> str:
+        """How many rows are solutions, and how many of these are within the limits, in words."""
         return f"{np.count_nonzero(self.solved)} solutions, {np.count_nonzero(self.within_limits)} within the limits"
 
     def _sheet_of_pose(self) -> Sheet:
+        """Each solution of one pose."""
         turned = () if self.freed_turn is None else (np.degrees(self.freed_turn),)
         rows = (
             (row, label, *more, bool(inside), why)
@@ -337,12 +386,14 @@ class Solutions(ByValue, Displayed):
         )
 
     def _sheet_of_batch(self) -> Sheet:
+        """How many solutions each pose has."""
         solved, inside = (each.sum(axis=-1) for each in (self.solved, self.within_limits))
         columns, rows = ("pose", "solutions", "within the limits"), zip(range(len(self.q)), solved, inside)
         heading = f"Solutions of {len(self.q)} poses of {self.robot.name}: {self._counted()}"
         return Sheet.of_table(heading, columns, rows, len(self.q))
 
     def _sheet_of_search(self) -> Sheet:
+        """The arm that iteration found for each pose."""
         q, solved = self.q.reshape(-1, self.robot.joints), self.solved.reshape(-1)
         first = shown(self.robot, q[:MAX_ROWS])
         errors = [np.asarray(error).reshape(-1) for error in (self.position_error, self.rotation_error)]
@@ -393,6 +444,11 @@ class Target(ByValue, Displayed):
         return np.radians(self.q_ref_deg) if self.joints_before is None else self.joints_before
 
     def sheet(self) -> Sheet:
-        """A line: name, position and roll, pitch, yaw."""
+        """A line for printing: name, position (mm) and roll, pitch, yaw (deg).
+
+        Returns
+        -------
+        sheet : without rows
+        """
         xyz, rpy = (shortly(tuple(values.tolist())) for values in (1000 * self.T[:3, 3], np.degrees(rpy_of(self.T))))
         return Sheet(f"Target {self.name}: xyz_mm {xyz}; rpy_deg {rpy}")

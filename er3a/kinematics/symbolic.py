@@ -17,7 +17,7 @@ from er3a.kinematics.chain import ALONG_Z, TO_NEXT_AXIS, constant_links, link_pa
 from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
 
-ROUNDING = 1e-12
+ROUNDING = 1e-12  # a factor below this is the rounding of a right angle
 Factor = tuple[str, tuple[int, ...]]  # "c" or "s" of the sum of these rows' angles, or "d" of a row; rows from 1
 Product = tuple[Factor, ...]
 Polynomial = dict[Product, float]
@@ -31,12 +31,30 @@ class SymbolicTransform:
     entries: tuple[tuple[Mapping[Product, float], ...], ...]
 
     def at(self, moved: Reals) -> Reals:
-        """The transform (4, 4), in m, at what moves of each row (m,): its theta, in rad, or its d, in m."""
+        """The transform at values of what moves.
+
+        Parameters
+        ----------
+        moved : (m,), of each row theta, rad, or d, m
+
+        Returns
+        -------
+        T : (4, 4), m
+        """
         return np.array([[_value(entry, moved) for entry in row] for row in self.entries])
 
 
 def link_transforms(robot: Robot) -> tuple[SymbolicTransform, ...]:
-    """Each row of the table as a transform: ``Rz Tz Tx Rx`` (standard) or ``Rx Tx Rz Tz`` (modified)."""
+    """Each row of the table as a symbolic transform.
+
+    Parameters
+    ----------
+    robot : m rows
+
+    Returns
+    -------
+    transforms : m, ``Rz Tz Tx Rx`` (standard) or ``Rx Tx Rz Tz`` (modified), m
+    """
     parts, found = link_parts(robot), []
     for k in range(robot.rows):
         moved = _product(_motion(robot, k), _constant(_without_d(robot, k) @ parts[k + 1, ALONG_Z]))
@@ -49,7 +67,16 @@ def link_transforms(robot: Robot) -> tuple[SymbolicTransform, ...]:
 
 
 def arm_transform(robot: Robot) -> SymbolicTransform:
-    """From the tool to the base frame, base and tool included."""
+    """The symbolic transform from the tool to the base frame, base and tool included.
+
+    Parameters
+    ----------
+    robot : m rows
+
+    Returns
+    -------
+    transform : its entries are sums of products of sines and cosines of sums of angles, and of d
+    """
     links = constant_links(robot)
     whole = _constant(links[0])
     group: tuple[int, ...] = ()  # rows that turn about parallel axes, whose rotation still follows whole on the right
@@ -69,6 +96,7 @@ def arm_transform(robot: Robot) -> SymbolicTransform:
 
 
 def _motion(robot: Robot, k: int) -> Entries:
+    """What row k does: a rotation about z, or a shift along it by the table's d."""
     if not robot.sliding[k]:
         return _rotation((k + 1,))
     entries = _constant(np.eye(4))
@@ -82,6 +110,7 @@ def _without_d(robot: Robot, k: int) -> Reals:
 
 
 def _rotation(joints: tuple[int, ...]) -> Entries:
+    """A rotation about z by the sum of some rows' angles."""
     entries = _constant(np.eye(4))
     if not joints:
         return entries
@@ -92,6 +121,7 @@ def _rotation(joints: tuple[int, ...]) -> Entries:
 
 
 def _constant(matrix: Reals) -> Entries:
+    """A matrix of numbers as polynomials, rounding left out."""
     return [[{(): float(value)} if abs(value) > ROUNDING else {} for value in row] for row in matrix]
 
 
@@ -101,10 +131,12 @@ def _shifted(entries: Entries) -> Entries:
 
 
 def _product(left: Entries, right: Entries) -> Entries:
+    """The product of two matrices of polynomials."""
     return [[_sum_of_products(left[r], [row[c] for row in right]) for c in range(4)] for r in range(4)]
 
 
 def _sum_of_products(row: list[Polynomial], column: list[Polynomial]) -> Polynomial:
+    """A row times a column, factors of each product in one order."""
     total: Polynomial = {}
     for a, b in zip(row, column):
         for one, x in a.items():
@@ -115,10 +147,12 @@ def _sum_of_products(row: list[Polynomial], column: list[Polynomial]) -> Polynom
 
 
 def _frozen(entries: Entries) -> SymbolicTransform:
+    """Entries that can't be changed."""
     return SymbolicTransform(tuple(tuple(row) for row in entries))
 
 
 def _value(entry: Mapping[Product, float], moved: Reals) -> float:
+    """A polynomial's value at angles (rad) and shifts (m) of the rows."""
     total = 0.0
     for product, coefficient in entry.items():
         for function, rows in product:

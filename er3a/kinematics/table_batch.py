@@ -43,7 +43,18 @@ class Tables(ByValue):
         return Tables(*(getattr(self, field.name)[rows] for field in fields(self)))
 
     def with_column(self, name: str, joints: slice | list[int] | Integers, values: Reals) -> Tables:
-        """A copy with the given joints' entries (H, len(joints)) of one column replaced."""
+        """A copy with some entries of one column replaced.
+
+        Parameters
+        ----------
+        name : of the column
+        joints : k rows of the tables, from 0
+        values : (H, k), m, rad or +-1
+
+        Returns
+        -------
+        tables : H tables
+        """
         column = getattr(self, name).copy()
         column[:, joints] = values
         return replace(self, **{name: column})
@@ -53,25 +64,63 @@ COLUMNS = tuple(field.name for field in fields(Tables) if field.name != "modifie
 
 
 def tables_of(robot: Robot) -> Tables:
-    """The robot's own table, as a batch of one."""
+    """The robot's own table, as a batch of one.
+
+    Parameters
+    ----------
+    robot : m rows
+
+    Returns
+    -------
+    tables : H = 1
+    """
     return Tables(np.array([robot.convention == "modified"]), *(getattr(robot, name)[None] for name in COLUMNS))
 
 
 def robot_of(tables: Tables, row: int, robot: Robot) -> Robot:
-    """One table of the batch as a robot that is otherwise like ``robot``."""
+    """One table of the batch as a robot.
+
+    Parameters
+    ----------
+    row : number of the table
+    robot : what it is like otherwise
+
+    Returns
+    -------
+    robot : a copy
+    """
     columns = {name: getattr(tables, name)[row] for name in COLUMNS}
     return robot.replace(convention="modified" if tables.modified[row] else "standard", **columns)
 
 
 def join(batches: Sequence[Tables]) -> Tables:
-    """All tables of several batches, in order."""
+    """All tables of several batches, in order.
+
+    Parameters
+    ----------
+    batches : of arms with the same number of rows
+
+    Returns
+    -------
+    tables : as many as in all batches together
+    """
     return Tables(*(np.concatenate([getattr(batch, field.name) for batch in batches]) for field in fields(Tables)))
 
 
 def frames_of(tables: Tables, robot: Robot, q: Reals) -> Reals:
-    """Frames (H, P, m + 1, 4, 4) of each table at row values (P, m) in rad or m, as
-    :func:`er3a.kinematics.forward.frames` has them for one robot without tool; the last is the flange. Base and flange
-    are those of ``robot``."""
+    """Frames of each table at row values.
+
+    Parameters
+    ----------
+    tables : H tables
+    robot : for base and flange
+    q : (P, m), rad or m, row values
+
+    Returns
+    -------
+    T : (H, P, m + 1, 4, 4), m, as :func:`er3a.kinematics.forward.frames` has them for one robot without tool; the last
+        is the flange
+    """
     out = np.empty((len(tables), len(q), tables.d.shape[1] + 1, 4, 4))
     fill_frames(for_kernel(robot.base), *kernel_columns(tables), np.require(q, requirements=["C", "W"]), out)
     if not robot.flange_is_last_frame:
@@ -80,8 +129,17 @@ def frames_of(tables: Tables, robot: Robot, q: Reals) -> Reals:
 
 
 def kernel_columns(tables: Tables) -> tuple[Reals, Reals, Reals, Reals, Reals, Reals, Flags]:
-    """Kernel arguments of tables: a, alpha, beta and d (H, m + 1) of the link after each joint, the base's first, then
-    direction, offset and sliding (H, m)."""
+    """Tables of either convention as arguments of :func:`fill_frames`.
+
+    Parameters
+    ----------
+    tables : H tables
+
+    Returns
+    -------
+    a, alpha, beta, d : (H, m + 1), of the link after each joint, the base's first, m and rad
+    direction, offset, sliding : (H, m)
+    """
     count, joints = tables.d.shape
     a, alpha, beta, d = np.zeros((4, count, joints + 1))
     d[:, 1:] = tables.d
@@ -109,7 +167,15 @@ def fill_frames(
     q: Reals,
     out: Reals,
 ) -> None:
-    """Fill ``out`` (H, P, m + 1, 4, 4) with frames of tables (see ``kernel_columns``) at row values (P, m)."""
+    """Fill frames of tables at row values. Kernel.
+
+    Parameters
+    ----------
+    base : (4, 4), m
+    a, alpha, beta, d, direction, offset, sliding : of :func:`kernel_columns`
+    q : (P, m), rad or m, row values
+    out : (H, P, m + 1, 4, 4), filled, base frame
+    """
     joints = q.shape[1]
     links = np.zeros((joints + 1, 4, 4))
     for h in range(out.shape[0]):

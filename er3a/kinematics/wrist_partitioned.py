@@ -23,7 +23,7 @@ from er3a.kinematics.classes.parallel_axes import ThreeParallel, three_parallel
 from er3a.numerics.arrays import Reals, for_kernel
 from er3a.robots.robot import Robot, derived
 
-PARALLEL = 1e-9
+PARALLEL = 1e-9  # rad
 
 
 class NotSixTurning(Finding, code="not_six_turning_joints"):
@@ -113,7 +113,11 @@ class WristPartitionedArm:
 
 
 def wrist_partitioned_arm(robot: Robot) -> WristPartitionedArm:
-    """The arm as recognised from its table.
+    """The arm's axis lines and wrist centre, as recognised from its table.
+
+    Returns
+    -------
+    arm : base frame, m
 
     Raises
     ------
@@ -127,13 +131,19 @@ def wrist_partitioned_arm(robot: Robot) -> WristPartitionedArm:
 
 
 def wrist_partition_missing(robot: Robot) -> ClosedFormMissing | None:
-    """Which property the arm lacks for the closed form of a spherical wrist; None if it has them all."""
+    """Which property the arm lacks for the closed form of a spherical wrist.
+
+    Returns
+    -------
+    missing : None if it has them all
+    """
     found = _recognised(robot)
     return None if isinstance(found, WristPartitionedArm) else found
 
 
 @derived
 def _recognised(robot: Robot) -> WristPartitionedArm | ClosedFormMissing:
+    """The arm, or what it lacks."""
     if robot.rows != 6 or robot.joints != 6 or robot.sliding.any():
         return NotSixTurning(robot.joints, int(robot.sliding.sum()))
     if robot.coupling is not None and not _couples_the_arm_alone(robot.coupling):
@@ -142,7 +152,17 @@ def _recognised(robot: Robot) -> WristPartitionedArm | ClosedFormMissing:
 
 
 def recognised(axes: Reals, points: Reals, T_base_tool: Reals) -> WristPartitionedArm | ClosedFormMissing:
-    """The arm, or what it lacks, of six axes (directions (6, 3) and points (6, 3), m) and the tool's pose (4, 4)."""
+    """Recognise an arm with a spherical wrist from its axis lines.
+
+    Parameters
+    ----------
+    axes, points : (6, 3), unit vectors and m, with all theta at 0, base frame
+    T_base_tool : (4, 4), m
+
+    Returns
+    -------
+    arm : or what it lacks; axes are parallel to 1e-9 rad and meet to 1e-9 m
+    """
     if np.linalg.norm(np.cross(axes[1], axes[2])) > PARALLEL:
         return ElbowAxesNotParallel()
     for i, j in ((0, 1), (3, 4), (4, 5)):
@@ -178,11 +198,21 @@ def _couples_the_arm_alone(coupling: Reals) -> bool:
 
 @derived
 def _constants(robot: Robot) -> closed_form.ArmConstants:
+    """The arm's constants, kept with the robot."""
     return constants_of(wrist_partitioned_arm(robot))
 
 
 def constants_of(arm: WristPartitionedArm) -> closed_form.ArmConstants:
-    """The arm as the kernel takes it."""
+    """The arm's constants as the closed form takes them.
+
+    Parameters
+    ----------
+    arm : recognised
+
+    Returns
+    -------
+    constants : m and rad, base frame unless marked
+    """
     w = [_vector(axis) for axis in arm.axes]
     beside_6 = frame_along(arm.axes[5])[0]
     upper_arm, forearm = _vector(arm.upper_arm), _vector(arm.forearm)
@@ -225,17 +255,23 @@ def constants_of(arm: WristPartitionedArm) -> closed_form.ArmConstants:
 
 
 def _vector(array: Reals) -> Vector:
+    """Three floats."""
     x, y, z = array.tolist()
     return x, y, z
 
 
 @derived
 def constants_for_blocks(robot: Robot) -> BlockConstants:
-    """The arm as the kernel for many poses takes it.
+    """The arm's constants as the kernel for many poses takes them.
+
+    Returns
+    -------
+    constants : m and rad
 
     Raises
     ------
     NotWristPartitionedError
+        for other arms
     """
     arm = wrist_partitioned_arm(robot)
     return block_constants(arm.axes, arm.points, arm.wrist, arm.tool_rotation, arm.wrist_in_tool, arm.elbow_sign)
@@ -243,7 +279,12 @@ def constants_for_blocks(robot: Robot) -> BlockConstants:
 
 @derived
 def parallel_axes_arm(robot: Robot) -> ThreeParallel | None:
-    """The solver of an arm with axes 2, 3 and 4 parallel and 5 and 6 meeting (UR and its like); None for others."""
+    """The solver of an arm with axes 2, 3 and 4 parallel and 5 and 6 meeting (UR and its like).
+
+    Returns
+    -------
+    solver : None for other arms, and for those with a spherical wrist
+    """
     six = robot.rows == robot.joints == 6 and robot.coupling is None and not robot.sliding.any()
     if not six or wrist_partition_missing(robot) is None:
         return None
@@ -251,13 +292,19 @@ def parallel_axes_arm(robot: Robot) -> ThreeParallel | None:
 
 
 def has_branches(robot: Robot) -> bool:
-    """Whether the arm has the eight branches of :mod:`er3a.kinematics.solutions`, which three signs name."""
+    """Whether the arm has the eight branches of :mod:`er3a.kinematics.solutions`, which three signs name.
+
+    Returns
+    -------
+    has : a spherical wrist, or parallel axes 2, 3 and 4
+    """
     return wrist_partition_missing(robot) is None or parallel_axes_arm(robot) is not None
 
 
 def _slots_of_parallel_axes(
     robot: Robot, arm: ThreeParallel, T: Reals, q_ref: Reals
 ) -> tuple[Reals, NDArray[np.int8], Reals]:
+    """:func:`solve_slots` for axes 2, 3 and 4 parallel."""
     x, gap = solve_near_reference(arm, T, robot.direction * q_ref + robot.offset)
     q = wrap_to_pi(robot.direction * (x - robot.offset))
     fault = np.where(np.isnan(q[..., 0]), closed_form.TOO_FAR, closed_form.REACHED).astype(np.int8)
@@ -271,7 +318,7 @@ def solve_slots(
 
     Parameters
     ----------
-    T : (N, 4, 4), T_base_tool, valid rigid transforms
+    T : (N, 4, 4), T_base_tool, m, valid rigid transforms
     q_ref : (N, 6), rad; supplies the joint that is free where a continuum solves the pose
     keep_folds, keep_free : keep branches that meet at a fold, or where a joint is free, as two different rows (see
         :mod:`closed_form`); else both are one

@@ -21,7 +21,20 @@ Number = TypeVar("Number", bound=np.generic)
 
 
 def for_kernel(array: NDArray[Number]) -> NDArray[Number]:
-    """A contiguous view that can't be written to: kernels are compiled anew for each layout and for arrays that can."""
+    """A contiguous view that can't be written to, as all kernels here take their arrays.
+
+    Parameters
+    ----------
+    array : any shape and type; it is copied only if it is not contiguous
+
+    Returns
+    -------
+    view : same shape and type, read-only
+
+    Notes
+    -----
+    numba compiles a kernel anew for each layout, and for arrays that can be written to. One form for all saves this.
+    """
     view = np.ascontiguousarray(array).view()
     view.setflags(write=False)
     return view
@@ -29,13 +42,38 @@ def for_kernel(array: NDArray[Number]) -> NDArray[Number]:
 
 @inner_kernel
 def copy_values(source: Reals, target: Reals) -> None:
-    """Copy a row (n,) into another; numba compiles 2.5 s for the error that a slice of another length would raise."""
+    """Fill a row with the values of another, element by element. Kernel.
+
+    Parameters
+    ----------
+    source : (n,) at least
+    target : (n,), filled
+
+    Notes
+    -----
+    A slice would be shorter, but numba compiles 2.5 s for the error that one of another length would raise.
+    """
     for i in range(target.shape[0]):
         target[i] = source[i]
 
 
 def as_floats(values: Reals, argument: str) -> Reals:
-    """Values as a float array; :class:`PoseError` if some are no real numbers, or rows differ in length."""
+    """Values as an array of floats; a float array is returned without a copy.
+
+    Parameters
+    ----------
+    values : anything array-like
+    argument : name of the argument in the caller, for the message
+
+    Returns
+    -------
+    array : float64, same shape
+
+    Raises
+    ------
+    PoseError
+        if some values are no real numbers, or rows differ in length
+    """
     try:
         array = np.asarray(values)
         if np.iscomplexobj(array):
@@ -46,6 +84,15 @@ def as_floats(values: Reals, argument: str) -> Reals:
 
 
 def runs(flags: Flags) -> list[tuple[int, int]]:
-    """Index ranges (first, after the last) of the stretches of True."""
+    """Stretches of True in a row of flags.
+
+    Parameters
+    ----------
+    flags : (N,)
+
+    Returns
+    -------
+    runs : index ranges (first, after the last) in order; adjacent ones are separated by at least one False
+    """
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

@@ -25,7 +25,22 @@ _TAN_PI_8 = 0.41421356237309503
 
 @kernel
 def cos_sin(angle: float) -> tuple[float, float]:
-    """Cosine and sine of an angle of at most ``LARGEST_ANGLE``."""
+    """Cosine and sine of an angle, without a branch. Kernel.
+
+    Parameters
+    ----------
+    angle : rad, at most ``LARGEST_ANGLE`` in size
+
+    Returns
+    -------
+    cosine, sine : to less than 1 unit in the last place
+
+    Notes
+    -----
+    Multiples of pi/2, in two parts, are taken off, to within [-pi/4, pi/4]. Then come fdlibm's polynomials [1]_; the
+    number of the quarter turn says which is which, and the signs.
+    """
+    # Number of the quarter turn nearest to the angle, and what is left of the angle.
     k = np.floor(angle * _PER_HALF_PI + 0.5)
     x = (angle - k * _HALF_PI_HIGH) - k * _HALF_PI_LOW
     z = x * x
@@ -49,7 +64,21 @@ def cos_sin(angle: float) -> tuple[float, float]:
 
 @kernel
 def arctan2(y: float, x: float) -> float:
-    """Angle (rad) of the point (x, y), in (-pi, pi]; NaN at the origin."""
+    """Angle of the point (x, y), without a branch. Kernel.
+
+    Parameters
+    ----------
+    y, x : coordinates of one unit; their lengths don't matter
+
+    Returns
+    -------
+    angle : rad, in (-pi, pi]; NaN at the origin
+
+    Notes
+    -----
+    The point is mirrored into the octant below the diagonal. Above 22.5 deg it is turned by 45 deg: ``arctan r = pi/4 +
+    arctan((r - 1) / (r + 1))``. Then comes fdlibm's polynomial [1]_.
+    """
     ax, ay = abs(x), abs(y)
     steep = ay > ax
     low, high = ax if steep else ay, ay if steep else ax

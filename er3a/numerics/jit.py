@@ -33,14 +33,24 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def cache_folder() -> Path:
-    """Where compiled kernels are kept on this machine."""
+    """Folder in which compiled kernels are kept on this machine.
+
+    Returns
+    -------
+    path : ``er3a`` below ``NUMBA_CACHE_DIR``, else ``XDG_CACHE_HOME``, else ``~/.cache``; it need not exist
+    """
     home = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Path(home) / "er3a"
 
 
 @cache
 def kernels_folder() -> Path:
-    """Where the kernels of this version are kept: a folder named by the content of all files that hold some."""
+    """Folder of the kernels of this version, named by the content of all files that hold some.
+
+    Returns
+    -------
+    path : below :func:`cache_folder`; an edit of any kernel gives another one, so stale code is never loaded
+    """
     digest = hashlib.sha256()
     for path in sorted(_PACKAGE.rglob("*.py")):
         if _KERNEL in (content := path.read_bytes()):
@@ -54,7 +64,16 @@ class SharedByCopies(UserProvidedCacheLocator):
 
     @classmethod
     def get_suitable_cache_subpath(cls, py_file: str) -> str:
-        """The folder for a file's kernels, such as ``kinematics.chain``."""
+        """Folder for the kernels of a file, below the folder of this version. numba calls it.
+
+        Parameters
+        ----------
+        py_file : path of a source file in this package
+
+        Returns
+        -------
+        name : the module's full name, such as ``er3a.kinematics.chain``
+        """
         return ".".join(Path(py_file).resolve().relative_to(_PACKAGE.parent).with_suffix("").parts)
 
 
@@ -68,14 +87,14 @@ class _Waiting(event.Listener):
         self.seconds, self._depth, self._start, self._collects = 0.0, 0, 0.0, False
 
     def on_start(self, event: event.Event) -> None:
-        """One more kernel, which another one may need."""
+        """Called by numba as it starts to compile or load one more kernel, which another one may need."""
         if not self._depth:
             self._start, self._collects = time.monotonic(), gc.isenabled()
             gc.disable()
         self._depth += 1
 
     def on_end(self, event: event.Event) -> None:
-        """One kernel less."""
+        """Called by numba as one kernel is ready; after the outermost one, collecting garbage goes on."""
         self._depth -= 1
         if not self._depth:
             self.seconds += time.monotonic() - self._start
@@ -88,29 +107,54 @@ event.register("numba:compiler_lock", _waiting)  # type: ignore[no-untyped-call]
 
 
 def compile_seconds() -> float:
-    """Wall time (s) for which this process has waited for kernels, compiled or loaded."""
+    """Time that this process has waited for kernels so far, compiled or loaded.
+
+    Returns
+    -------
+    seconds : s, wall time; nested compilations count once
+    """
     return _waiting.seconds
 
 
 def kernel(function: Function) -> Function:
     """Compile a function on its first call and keep the machine code on disk; its signature stays visible.
 
+    Parameters
+    ----------
+    function : of numbers and arrays, in the subset of Python that numba compiles
+
+    Returns
+    -------
+    function : called as before
+
+    Notes
+    -----
     No fastmath and no contraction across operations: results must not depend on the machine's vector width. Kernels
-    release the interpreter's lock.
+    release the interpreter's lock, so threads can run them side by side.
     """
     return _compiled(function)
 
 
 def inner_kernel(function: Function) -> Function:
-    """A kernel that only kernels call: it is compiled without the entry that Python would call it by.
+    """Compile a function that only kernels call, without the entry that Python would call it by.
 
-    That spares a sixth of the compiling. It must not be called from Python, unless numba is switched off
-    (``NUMBA_DISABLE_JIT``).
+    Parameters
+    ----------
+    function : as for :func:`kernel`
+
+    Returns
+    -------
+    function : must not be called from Python, unless numba is switched off (``NUMBA_DISABLE_JIT``)
+
+    Notes
+    -----
+    Leaving the entry out spares a sixth of the compiling.
     """
     return _compiled(function, no_cpython_wrapper=True)
 
 
 def _compiled(function: Function, **wrappers: bool) -> Function:
+    """A function compiled by numba, its machine code kept in the folder of this version."""
     config: Any = numba.config
     compiling: Any = numba.njit
     options = {"error_model": "numpy", "nogil": True, "no_cfunc_wrapper": True, **wrappers}
@@ -126,18 +170,29 @@ def _compiled(function: Function, **wrappers: bool) -> Function:
     return compiled
 
 
+# Enough parts that a thread on a busy processor is outrun by the others, few enough that handing out costs nothing.
 PARTS_PER_THREAD = 8
 
 
 def parallel_for(count: int, threads: int, smallest: int, work: Callable[[slice], None]) -> None:
-    """Call ``work`` on parts of ``count`` rows, each at least ``smallest``, in so many threads, the caller's included.
+    """Divide the rows of a batch among threads.
 
-    Threads take the next part as they are ready, so that one on a busy processor holds up nothing.
+    Parameters
+    ----------
+    count : rows in all
+    threads : how many, the caller's thread included
+    smallest : rows that a part has at least; a batch with fewer than two such parts runs in the caller alone
+    work : called with slices of the rows, in any order and from any thread
 
     Raises
     ------
     Er3aError
         if ``threads`` is no whole number of at least 1
+
+    Notes
+    -----
+    Threads take the next part as they are ready, so that one on a busy processor holds up nothing. An error in ``work``
+    is raised here.
     """
     if not (isinstance(threads, Integral) and threads >= 1):
         raise Er3aError(f"threads is {threads!r}; expected a whole number of at least 1")

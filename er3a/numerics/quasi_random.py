@@ -13,11 +13,25 @@ import numpy as np
 
 from er3a.numerics.arrays import Reals
 
-ROUNDS = 64
+ROUNDS = 64  # each at least halves the error of the root, so that it is exact to the last bit
 
 
 def quasi_random_points(lower: Reals, upper: Reals, count: int) -> Reals:
-    """Points (count, d) in the box between ``lower`` and ``upper`` (d,)."""
+    """Points spread evenly over a box: the first terms of the additive recurrence R_d [1]_.
+
+    Parameters
+    ----------
+    lower, upper : (d,), corners of the box, in any unit
+    count : how many points
+
+    Returns
+    -------
+    points : (count, d); a larger count begins with the same points
+
+    Notes
+    -----
+    The recurrence starts from the middle of the box, which is not among the points.
+    """
     d = len(lower)
     g = 1.5
     for _ in range(ROUNDS):

@@ -37,6 +37,7 @@ TEXTS = {
 """How tables write each ending."""
 _NAME = re.compile(rf"(.+?)_({'|'.join(sorted(TEXTS, key=len, reverse=True))})")
 
+# A little over a turn in rad: limits and offsets that are all smaller than this are rare in degrees.
 RADIANS_BELOW_DEG = 6.3
 STEP_IN_RADIANS, NEAR_STEP = math.pi / 12, 2e-3  # 15 deg, written with four digits
 ROUND_DEG, ROUNDED_BY = (0.1, 1.0), 0.05  # half a last digit is at most so much of the distance of round numbers
@@ -46,29 +47,69 @@ KindT = TypeVar("KindT")
 
 
 def may_be_radians(degrees: Sequence[float]) -> bool:
-    """Whether angles in degrees look like radians: all within +-6.3, and two no whole numbers or one a part of pi."""
+    """Whether angles in a field for degrees look like radians.
+
+    Parameters
+    ----------
+    degrees : the numbers as the file has them
+
+    Returns
+    -------
+    likely : all are within +-6.3, and two of them are no whole numbers or one is a part of pi
+    """
     broken = sum(value != round(value) for value in degrees)
     small = max(map(abs, degrees), default=0.0) < RADIANS_BELOW_DEG
     return small and (broken >= 2 or any(map(is_part_of_pi, degrees)))
 
 
 def is_part_of_pi(value: float) -> bool:
-    """Whether a number is a multiple of pi/2 or pi/12, as it is written with three digits or more."""
+    """Whether a number looks like an angle in rad that was rounded to three digits or more.
+
+    Parameters
+    ----------
+    value : a number as a file has it
+
+    Returns
+    -------
+    likely : it is near a multiple, other than 0, of pi/12 (to 0.2 % of the step) or pi/2 (to 2 mrad)
+    """
     steps, quarters = value / STEP_IN_RADIANS, value / (math.pi / 2)
     near_step = round(steps) and abs(steps - round(steps)) < NEAR_STEP
     return bool(near_step or (round(quarters) and abs(quarters - round(quarters)) * math.pi / 2 < NEAR_QUARTER))
 
 
 def decimals(word: str) -> int:
-    """How many decimals a number is written with."""
+    """How many decimals a number is written with; negative where an exponent leaves whole tens.
+
+    Parameters
+    ----------
+    word : the number as text, such as ``1.5708`` (4), ``1e-3`` (3) or ``2e3`` (-3)
+
+    Returns
+    -------
+    count : decimals
+    """
     mantissa, _, exponent = word.lower().partition("e")
     return len(mantissa.partition(".")[2]) - int(exponent or 0)
 
 
 def limit_in_degrees(limit: float, inward: Literal[1, -1]) -> float:
-    """A joint limit, rad, in degrees: as the file has it, or the round number of degrees of which it is a rounding, if
-    that lies ``inward`` of it. So 3.1416 is an upper limit (-1) of 180 deg, not of 180.0004.
+    """A joint limit in degrees, without the error of rounding that its number of radians has.
 
+    It is the round number of degrees of which the limit is a rounding, if that lies ``inward`` of it. So 3.1416 is an
+    upper limit (-1) of 180 deg, not of 180.0004.
+
+    Parameters
+    ----------
+    limit : rad, as the file has it
+    inward : the sign of the way into the range: 1 for a lower, -1 for an upper limit
+
+    Returns
+    -------
+    degrees : deg; the exact conversion where no round number is so near
+
+    Notes
+    -----
     Round are tenths of a degree or, of limits with three decimals, degrees: by chance few limits come so near to one.
     """
     degrees, half = math.degrees(limit), math.degrees(0.5 * 10.0 ** -decimals(repr(float(limit))))
@@ -80,35 +121,79 @@ def limit_in_degrees(limit: float, inward: Literal[1, -1]) -> float:
 
 
 def split_unit(name: str) -> tuple[str, str]:
-    """A quantity's name without its unit, and the ending that is the unit; "" where it has none."""
+    """Divide the name of a quantity into what it is and its unit.
+
+    Parameters
+    ----------
+    name : such as ``clearance_mm``
+
+    Returns
+    -------
+    stem, ending : ``clearance`` and ``mm``; the ending is "" where the name has none of those in ``TEXTS``
+    """
     found = _NAME.fullmatch(name)
     return (found[1], found[2]) if found else (name, "")
 
 
 def unit_text(name: str) -> str:
-    """The unit that a name ends in, as tables write it; "" where it has none."""
+    """The unit of a quantity by its name, as tables write it.
+
+    Parameters
+    ----------
+    name : such as ``speed_deg_s``
+
+    Returns
+    -------
+    unit : such as ``deg/s``; "" where the name ends in no unit
+    """
     return TEXTS.get(split_unit(name)[1], "")
 
 
 def from_si(unit: str, value: Any) -> Any:
-    """A number or an array in SI as one in the unit of an ending; None stays None."""
+    """A quantity in SI as one in the unit of an ending.
+
+    Parameters
+    ----------
+    unit : ending of a name, a key of ``TEXTS``; others than mm and deg (and their rates) are SI already
+    value : number, array or None, in m or rad and their rates
+
+    Returns
+    -------
+    value : in mm or deg and their rates; None stays None
+    """
     if value is None or not unit.startswith(("mm", "deg")):
         return value
     return np.degrees(value) if unit.startswith("deg") else 1000 * np.asarray(value)
 
 
 def to_si(unit: str, value: Any) -> Any:
-    """The inverse of :func:`from_si`."""
+    """A quantity in the unit of an ending as one in SI: the inverse of :func:`from_si`.
+
+    Parameters
+    ----------
+    unit : ending of a name, a key of ``TEXTS``
+    value : number, array or None, in that unit
+
+    Returns
+    -------
+    value : in m or rad and their rates; None stays None
+    """
     if value is None or not unit.startswith(("mm", "deg")):
         return value
     return np.radians(value) if unit.startswith("deg") else np.asarray(value) / 1000
 
 
 def stated(kind: type[KindT], found: object = None, /, **given: Any) -> KindT:
-    """A dataclass of results, filled with what the library found.
+    """A dataclass of results in the units of its fields' names, filled with what the library found in SI.
 
     A field takes what is given under its own name; else what is given, or found, under its name without the unit,
     converted from SI; else what is found under its own name. Arrays become tuples, and NumPy's numbers Python's.
+
+    Parameters
+    ----------
+    kind : the dataclass to make
+    found : object whose attributes are in SI, such as ``clearance`` in m for a field ``clearance_mm``
+    given : values by field, or by the field's name without its unit and in SI
 
     Raises
     ------
@@ -121,7 +206,25 @@ def stated(kind: type[KindT], found: object = None, /, **given: Any) -> KindT:
 
 
 def filled(kind: Any, found: object, given: Mapping[str, Any]) -> dict[str, Any]:
-    """The values of a dataclass by field, as :func:`stated` says, before they become plain."""
+    """The values of a dataclass by field, as :func:`stated` says, before they become plain.
+
+    Parameters
+    ----------
+    kind : the dataclass
+    found : object with attributes in SI
+    given : values by field, or by the field's name without its unit and in SI
+
+    Returns
+    -------
+    values : by field; fields that nothing fills and that have a default are left out
+
+    Raises
+    ------
+    AttributeError
+        for a field without default that nothing fills
+    TypeError
+        for something given that fills no field
+    """
     values = {}
     names = {each.name for each in fields(kind)}
     if unused := given.keys() - names - {split_unit(name)[0] for name in names}:
@@ -142,7 +245,15 @@ def filled(kind: Any, found: object, given: Mapping[str, Any]) -> dict[str, Any]
 def in_si(kind: type[KindT], entry: object, /, **given: Any) -> KindT:
     """A dataclass of the library from a file's values in the file's units: the inverse of :func:`stated`.
 
-    Given values replace those of the entry. Fields that neither fills keep their defaults.
+    Parameters
+    ----------
+    kind : the dataclass to make, its fields in SI and without units in their names
+    entry : object with attributes such as ``lower_deg``
+    given : values in SI that replace those of the entry
+
+    Returns
+    -------
+    made : of ``kind``; fields that neither fills keep their defaults
     """
     said = {split_unit(name): value for name, value in vars(entry).items()}
     found = {stem: plain(to_si(unit, value)) for (stem, unit), value in said.items()} | given
@@ -150,7 +261,16 @@ def in_si(kind: type[KindT], entry: object, /, **given: Any) -> KindT:
 
 
 def plain(value: Any) -> Any:
-    """An array or a list as nested tuples, a number of NumPy's as one of Python's, and anything else as it is."""
+    """Values of plain Python, such as JSON and frozen dataclasses can hold.
+
+    Parameters
+    ----------
+    value : anything
+
+    Returns
+    -------
+    value : an array or a list as nested tuples, a number of NumPy's as one of Python's, and anything else as it is
+    """
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     return tuple(map(plain, value)) if isinstance(value, list) else value

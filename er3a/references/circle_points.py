@@ -20,10 +20,10 @@ from er3a.numerics.arrays import Reals
 from er3a.references.quantities import MM, AxisLines
 from er3a.robots.robot import Robot
 
-OFF_EVERY_AXIS_MM = 100.0
+OFF_EVERY_AXIS_MM = 100.0  # a smaller circle determines its axis less well
 TRIED_OFFSETS_MM = (200.0, 400.0, 800.0, 1600.0)
-STATIONS = 25
-MIN_TURN, MAX_TURN = np.pi / 2, 2 * np.pi
+STATIONS = 25  # positions of each joint; the fits are exact for any number of at least 3, as nothing is noisy
+MIN_TURN, MAX_TURN = np.pi / 2, 2 * np.pi  # rad: a shorter arc determines its centre less well
 MIN_SLIDE = 0.1  # m
 
 
@@ -46,7 +46,18 @@ class CirclePoints:
 
 
 def circle_points(robot: Robot) -> CirclePoints:
-    """Turn each joint through its limits (a quarter turn at least, a full one at most), the others at 0."""
+    """Find the axes of a robot from the tracks of a carried point, one joint at a time [1]_.
+
+    Each joint turns through its limits (a quarter turn at least, a full one at most), the others are at 0.
+
+    Parameters
+    ----------
+    robot : its tool does not count
+
+    Returns
+    -------
+    points : axes (unit vectors, mm) in the base frame, with radius and roundness (mm) of each circle
+    """
     offset = carried_point(robot)
     tracks = [_track(robot, joint, offset) for joint in range(robot.joints)]
     fits = [fit_line(track) if slides else fit_circle(track) for track, slides in zip(tracks, robot.slides)]
@@ -55,7 +66,21 @@ def circle_points(robot: Robot) -> CirclePoints:
 
 
 def carried_point(robot: Robot) -> Reals:
-    """A point (3,) in mm in the flange's frame that is at least 100 mm off every axis in the zero pose."""
+    """A point on the flange that runs on a wide circle, whichever joint turns.
+
+    Parameters
+    ----------
+    robot : in its zero pose
+
+    Returns
+    -------
+    offset_mm : (3,), mm, in the flange's frame, at least 100 mm off every axis in the zero pose
+
+    Notes
+    -----
+    Of 26 directions and the lengths ``TRIED_OFFSETS_MM``, the shortest length that suffices is taken, and of its
+    directions the one farthest from the nearest axis.
+    """
     T = frames(robot.without_tool(), np.zeros(robot.joints))
     toward = np.array([each for each in product((-1.0, 0.0, 1.0), repeat=3) if any(each)])
     toward /= np.linalg.norm(toward, axis=1, keepdims=True)
@@ -70,16 +95,16 @@ def carried_point(robot: Robot) -> Reals:
 
 
 def fit_circle(track: Reals) -> tuple[Reals, Reals, float, float]:
-    """Plane by singular values, then centre and radius in it by linear least squares (Kasa 1976).
+    """Fit a circle to a track: plane by singular values, then centre and radius by linear least squares (Kasa 1976).
 
     Parameters
     ----------
-    track : (N, 3), points in order
+    track : (N, 3), points in order, in any unit of length
 
     Returns
     -------
     normal : (3,), unit vector about which the points run right-handed
-    centre : (3,)
+    centre : (3,), in the track's unit
     radius, roundness : radius, and the largest distance of a point from the circle
     """
     middle = track.mean(axis=0)
@@ -91,6 +116,7 @@ def fit_circle(track: Reals) -> tuple[Reals, Reals, float, float]:
     centre = middle + np.array([cx, cy]) @ basis[:2]
     radius = float(np.sqrt(rest + cx**2 + cy**2))
     spokes = track - centre
+    # Singular vectors have no sign: the sum of the areas swept from the centre gives it.
     if np.einsum("ij,j->i", np.cross(spokes[:-1], spokes[1:]), normal).sum() < 0:
         normal = -normal
     height = spokes @ normal
@@ -99,7 +125,19 @@ def fit_circle(track: Reals) -> tuple[Reals, Reals, float, float]:
 
 
 def fit_line(track: Reals) -> tuple[Reals, Reals, float, float]:
-    """Direction of a track (N, 3) of a prismatic joint, its middle, 0, and the largest distance from the line."""
+    """Fit a line to the track of a prismatic joint, by singular values.
+
+    Parameters
+    ----------
+    track : (N, 3), points in order, in any unit of length
+
+    Returns
+    -------
+    direction : (3,), unit vector from the first point to the last
+    middle : (3,), mean of the points
+    radius : 0, as a line has none
+    straightness : largest distance of a point from the line, in the track's unit
+    """
     middle = track.mean(axis=0)
     direction = np.linalg.svd(track - middle)[2][0]
     direction = -direction if (track[-1] - track[0]) @ direction < 0 else direction

@@ -39,12 +39,12 @@ from er3a.references.reference import INTERVAL_95, Reference, quantities_of
 from er3a.robots.joint_limits import meant, within
 from er3a.robots.robot import Robot
 
-SCAN = 4096
-STEP = 1e-6
+SCAN = 4096  # points of the first look at the box of joint values; one batch of forward kinematics
+STEP = 1e-6  # rad or m, of central differences: their error is least near the cube root of rounding
 
 
 def search(robot: Robot, quantity: Extreme, starts: int) -> tuple[float, Reals]:
-    """Find an extreme.
+    """Find an extreme of a measure over all joint values within the limits [1]_.
 
     The robot's tool does not count. Joint 1 stays at 0 if it turns: none of the measures changes with it, or the side
     view is drawn there. Limits of sums of joints are kept. A joint without influence on the result is given as 0 (or
@@ -52,6 +52,7 @@ def search(robot: Robot, quantity: Extreme, starts: int) -> tuple[float, Reals]:
 
     Parameters
     ----------
+    quantity : what is to be greatest or least
     starts : number of local searches
 
     Returns
@@ -126,6 +127,7 @@ def _within_sums(
 
 
 def _without_idle_joints(q: Reals, lower: Reals, upper: Reals, cost: Callable[[Reals], Reals]) -> Reals:
+    """The extreme with joints at 0, or the limit nearest to it, that have no influence."""
     rest = np.clip(0.0, lower, upper)
     for joint in range(len(q)):
         trial = q.copy()
@@ -135,8 +137,8 @@ def _without_idle_joints(q: Reals, lower: Reals, upper: Reals, cost: Callable[[R
     return q
 
 
-REACH_STARTS = 32
-CHUNK = 2048
+REACH_STARTS = 32  # local searches for each extreme
+CHUNK = 2048  # tables at a time, so that the frames of many hypotheses fit into memory
 TABLE_COLUMNS = ("a", "alpha", "d", "offset")
 
 
@@ -145,6 +147,8 @@ def predict(robot: Robot, references: Sequence[Reference], starts: int = REACH_S
 
     Parameters
     ----------
+    robot : the model; its tool does not count
+    references : of quantities that the arm has
     starts : local searches for each reference about an extreme
 
     Returns
@@ -159,6 +163,17 @@ def predict(robot: Robot, references: Sequence[Reference], starts: int = REACH_S
 def with_rounding(robot: Robot, references: Iterable[Reference]) -> tuple[Reference, ...]:
     """References whose uncertainty includes what the rounding of their joint values leaves open on an arm.
 
+    Parameters
+    ----------
+    robot : the arm whose table says how much a joint value matters
+    references : those without ``rounding`` stay as they are
+
+    Returns
+    -------
+    references : in the same order, all with ``rounding`` empty
+
+    Notes
+    -----
     A value rounded to its last digit may be off by half of it. Each joint's share is the larger change that this makes
     of what the arm's table predicts; half-widths add up, standard deviations (of a uniform distribution: the half-width
     over root 3, GUM 4.3.7) add as squares. A table with a fault is as good for this: what it has wrong, it has wrong in
@@ -168,6 +183,7 @@ def with_rounding(robot: Robot, references: Iterable[Reference]) -> tuple[Refere
 
 
 def _widened(robot: Robot, reference: Reference) -> Reference:
+    """A reference with what the rounding of its pose leaves open added to its uncertainty."""
     quantity = reference.quantity
     if not isinstance(quantity, QuantityAtPose) or not_of_arm(quantity, robot):
         return replace(reference, rounding=())
@@ -186,7 +202,17 @@ def _widened(robot: Robot, reference: Reference) -> Reference:
 
 
 def read(quantities: Sequence[Quantity], state: ModelState) -> Reals:
-    """Values (..., n) of quantities in a state that may hold a batch of models."""
+    """Values of quantities in the state of a model, or of a batch of models.
+
+    Parameters
+    ----------
+    quantities : n of them
+    state : that holds the poses of all of them
+
+    Returns
+    -------
+    values : (..., n), each in its quantity's unit (mm, deg, deg/s or mm/s)
+    """
     if not quantities:
         return np.empty((*state.lower.shape[:-1], 0))
     return np.stack([quantity.value(state) for quantity in quantities], axis=-1)
@@ -199,7 +225,20 @@ def state_of(
     extremes: Mapping[Quantity, float] | None = None,
     axes: AxisLines | None = None,
 ) -> ModelState:
-    """One model's state, with the extremes searched for unless given. The robot's tool does not count."""
+    """The state of one model, from which quantities are read.
+
+    Parameters
+    ----------
+    robot : its tool does not count
+    quantities : the poses at which they look at the arm are computed
+    starts : local searches for each extreme
+    extremes : values (mm) of extremes; None: they are searched for
+    axes : axis lines that were measured on the model; None: those of its frames
+
+    Returns
+    -------
+    state : without batch dimensions
+    """
     robot = robot.without_tool()
     poses = _poses_of(quantities)
     if extremes is None:
@@ -227,7 +266,9 @@ def predict_tables(tables: Tables, robot: Robot, quantities: Sequence[Quantity])
 
     Parameters
     ----------
+    tables : H tables of one arm
     robot : for the base, and the speeds
+    quantities : n of them
 
     Returns
     -------
@@ -241,7 +282,18 @@ def predict_tables(tables: Tables, robot: Robot, quantities: Sequence[Quantity])
 
 
 def state_of_tables(tables: Tables, robot: Robot, quantities: Sequence[Quantity]) -> ModelState:
-    """The state of many tables, for quantities none of which is an extreme over the limits."""
+    """The state of many tables, for quantities none of which is an extreme over the limits.
+
+    Parameters
+    ----------
+    tables : H tables of one arm
+    robot : for the base, the speeds, the coupling and the types of the joints
+    quantities : the poses at which they look at the arm are computed
+
+    Returns
+    -------
+    state : with the batch dimension (H,)
+    """
     return TablesState(robot, quantities).of(tables)
 
 
@@ -254,7 +306,16 @@ class TablesState:
         self._rows = row_values(robot, joints_of(robot, poses))
 
     def of(self, tables: Tables) -> ModelState:
-        """The state of many tables."""
+        """The state of many tables of the arm.
+
+        Parameters
+        ----------
+        tables : H tables, limits and directions included
+
+        Returns
+        -------
+        state : with the batch dimension (H,)
+        """
         return ModelState(
             frames=frames_of(tables, self.robot, self._rows),
             index=self.index,
@@ -272,7 +333,17 @@ class TablesState:
 
 
 def joints_of(robot: Robot, poses: Sequence[Pose]) -> Reals:
-    """Poses as they are written as joint values (P, n) in rad or m; joints that a pose does not name are at 0."""
+    """Poses as they are written, as joint values.
+
+    Parameters
+    ----------
+    robot : n joints
+    poses : P poses, deg, or mm of joints that slide
+
+    Returns
+    -------
+    q : (P, n), rad or m; joints that a pose does not name are at 0
+    """
     q = np.zeros((len(poses), robot.joints))
     for row, pose in zip(q, poses):
         count = min(robot.joints, len(pose))
@@ -286,4 +357,5 @@ def _poses_of(quantities: Sequence[Quantity]) -> tuple[Pose, ...]:
 
 
 def _places(poses: Sequence[Pose]) -> dict[Pose, int]:
+    """Place of each pose."""
     return {pose: place for place, pose in enumerate(poses)}

@@ -34,8 +34,8 @@ Side = Literal["lower", "upper"]
 Extremity = Literal["greatest", "least"]
 ZERO_POSE: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 MM = 1000.0
-SIX = 6
-NEARLY_OPPOSITE = 1e-5
+SIX = 6  # rows of an arm with a wrist centre
+NEARLY_OPPOSITE = 1e-5  # twice the sine: 5e-6 rad from half a turn, the skew part has ten digits left
 SECTION_AXES: tuple[SectionAxis, ...] = ("x", "z")
 COORDINATES: tuple[Coordinate, ...] = ("x", "y", "z")
 FRAME_OF_POINT: Mapping[Point, int] = {"wrist_centre": 4, "flange": -1}
@@ -71,11 +71,30 @@ class ModelState:
     coupling: Reals | None = None
 
     def at(self, pose: Pose) -> Reals:
-        """Frames (..., 7, 4, 4) at a pose."""
+        """Frames at a pose.
+
+        Parameters
+        ----------
+        pose : as it is written, deg or mm; one of ``index``
+
+        Returns
+        -------
+        T : (..., m + 1, 4, 4), base frame, m; the last is the flange
+        """
         return self.frames[..., self.index[pose], :, :, :]
 
     def axis(self, joint: int) -> tuple[Reals, Reals]:
-        """Direction of positive rotation and a point (mm), (..., 3) each, of a joint's axis in the zero pose."""
+        """A joint's axis line in the zero pose.
+
+        Parameters
+        ----------
+        joint : from 1
+
+        Returns
+        -------
+        direction : (..., 3), unit vector of positive rotation, base frame
+        point : (..., 3), mm, on the axis
+        """
         if self.axes:
             return self.axes.direction[joint - 1], self.axes.point_mm[joint - 1]
         T = self.at(ZERO_POSE)[..., joint - 1, :, :]
@@ -104,10 +123,29 @@ class Quantity(ABC):
 
     @abstractmethod
     def value(self, state: ModelState) -> Reals:
-        """The model's value, shape (...,), in this quantity's unit."""
+        """The model's value of this quantity.
+
+        Parameters
+        ----------
+        state : of one model, or of a batch
+
+        Returns
+        -------
+        value : (...), in this quantity's unit
+        """
 
     def off(self, state: ModelState, expected: float) -> Reals:
-        """Components (..., k) whose length is how far the model is from ``expected``; smooth where that is 0."""
+        """How far the model is from a stated value, as components that are smooth where that is 0.
+
+        Parameters
+        ----------
+        state : of one model, or of a batch
+        expected : the stated value, in this quantity's unit
+
+        Returns
+        -------
+        off : (..., k), the length of which is the deviation; least squares need such components instead of an angle
+        """
         return np.asarray(self.value(state) - expected)[..., None]
 
     @property
@@ -116,7 +154,17 @@ class Quantity(ABC):
         return self
 
     def apart(self, expected: float, other: Quantity, other_expected: float) -> float:
-        """How far two statements about this quantity are apart."""
+        """How far two statements about this quantity are from each other.
+
+        Parameters
+        ----------
+        expected : this statement's value
+        other, other_expected : an equal quantity (which may be measured otherwise) and its value
+
+        Returns
+        -------
+        distance : in this quantity's unit, at least 0
+        """
         return abs(expected - other_expected)
 
 
@@ -130,9 +178,30 @@ class AxisAngle(Quantity):
     unit: ClassVar[Unit] = "deg"
 
     def value(self, state: ModelState) -> Reals:
+        """Angle between the joint's axis in the zero pose and the stated direction.
+
+        Parameters
+        ----------
+        state : of one model, or of a batch
+
+        Returns
+        -------
+        angle : (...), deg, 0 to 180 if signed, else 0 to 90
+        """
         return angle_between(state.axis(self.joint)[0], np.array(self.toward), self.signed)
 
     def off(self, state: ModelState, expected: float) -> Reals:
+        """Components across the stated direction whose length is the angle; of another expected angle the difference.
+
+        Parameters
+        ----------
+        state : of one model, or of a batch
+        expected : deg, nearly always 0
+
+        Returns
+        -------
+        off : (..., 2), deg, for an expected angle of 0; else (..., 1)
+        """
         axis, toward = state.axis(self.joint)[0], np.array(self.toward)
         if expected:
             return super().off(state, expected)
@@ -141,6 +210,17 @@ class AxisAngle(Quantity):
         )
 
     def apart(self, expected: float, other: Quantity, other_expected: float) -> float:
+        """Angle between the two stated directions.
+
+        Parameters
+        ----------
+        expected, other_expected : not looked at: both are angles from the direction that is stated
+        other : the same axis, with another direction
+
+        Returns
+        -------
+        angle : deg, 0 to 180 if both are signed, else 0 to 90
+        """
         same = cast(AxisAngle, other)
         return float(angle_between(np.array(self.toward), np.array(same.toward), self.signed and same.signed))
 
@@ -154,12 +234,23 @@ class AxisCoordinate(Quantity):
     point_mm: Vector = field(compare=False)
 
     def value(self, state: ModelState) -> Reals:
+        """Coordinate of the axis' point nearest to the stated one, in the zero pose.
+
+        Parameters
+        ----------
+        state : of one model, or of a batch
+
+        Returns
+        -------
+        coordinate : (...), mm, base frame
+        """
         return nearest_on_line(*state.axis(self.joint), np.array(self.point_mm))[
             ..., COORDINATES.index(self.coordinate)
         ]
 
     @property
     def vector(self) -> Hashable:
+        """The point on the joint's axis, of which this is one coordinate."""
         return AxisCoordinate, self.joint
 
 
@@ -171,11 +262,22 @@ class QuantityAtPose(Quantity):
 
     @property
     def arm_pose(self) -> Pose:
+        """The pose at which it looks at the arm, as it is written: deg, or mm of joints that slide."""
         return self.pose
 
 
 def value_at(pose: Pose, joint: int) -> float:
-    """What a pose has of a joint, counted from 1, deg or mm; 0 of one that it does not name."""
+    """What a pose says of a joint.
+
+    Parameters
+    ----------
+    pose : as it is written
+    joint : from 1
+
+    Returns
+    -------
+    value : deg or mm; 0 of a joint that the pose does not name
+    """
     return pose[joint - 1] if joint <= len(pose) else 0.0
 
 
@@ -187,10 +289,21 @@ class PointCoordinate(QuantityAtPose):
     coordinate: Coordinate
 
     def value(self, state: ModelState) -> Reals:
+        """Coordinate of the flange or the wrist centre at the pose.
+
+        Parameters
+        ----------
+        state : of one model, or of a batch
+
+        Returns
+        -------
+        coordinate : (...), mm, base frame
+        """
         return point_of(state.at(self.pose), self.point)[..., COORDINATES.index(self.coordinate)]
 
     @property
     def vector(self) -> Hashable:
+        """The point's position at the pose, of which this is one coordinate."""
         return self.pose, self.point
 
 
@@ -206,14 +319,36 @@ class FlangeTurn(QuantityAtPose):
     unit: ClassVar[Unit] = "deg"
 
     def value(self, state: ModelState) -> Reals:
+        """Coordinate of the rotation vector from the stated orientation to the model's, at the pose.
+
+        Parameters
+        ----------
+        state : of one model, or of a batch
+
+        Returns
+        -------
+        coordinate : (...), deg, base frame
+        """
         R = state.at(self.pose)[..., FRAME_OF_POINT["flange"], :3, :3]
         return rotation_vectors_deg(R @ np.array(self.stated).T)[..., COORDINATES.index(self.coordinate)]
 
     @property
     def vector(self) -> Hashable:
+        """The rotation vector at the pose, of which this is one coordinate."""
         return FlangeTurn, self.pose
 
     def apart(self, expected: float, other: Quantity, other_expected: float) -> float:
+        """This coordinate of the rotation from one stated orientation to the other.
+
+        Parameters
+        ----------
+        expected, other_expected : not looked at: both are turns from the orientation that is stated
+        other : the same coordinate, with another orientation
+
+        Returns
+        -------
+        turn : deg, at least 0
+        """
         turn = np.array(self.stated) @ np.array(cast(FlangeTurn, other).stated).T
         return abs(float(rotation_vectors_deg(turn)[COORDINATES.index(self.coordinate)]))
 
@@ -226,6 +361,16 @@ class CarriedCoordinate(QuantityAtPose):
     coordinate: Coordinate
 
     def value(self, state: ModelState) -> Reals:
+        """Coordinate of the carried point at the pose.
+
+        Parameters
+        ----------
+        state : of one model, or of a batch
+
+        Returns
+        -------
+        coordinate : (...), mm, base frame
+        """
         T = state.at(self.pose)[..., FRAME_OF_POINT["flange"], :3, :]
         k = COORDINATES.index(self.coordinate)
         carried: Reals = T[..., k, 3] * MM + T[..., k, :3] @ np.array(self.offset_mm)
@@ -233,6 +378,7 @@ class CarriedCoordinate(QuantityAtPose):
 
     @property
     def vector(self) -> Hashable:
+        """The carried point's position at the pose, of which this is one coordinate."""
         return self.pose, self.offset_mm
 
 
@@ -244,11 +390,22 @@ class SectionCoordinate(QuantityAtPose):
     unsigned: bool
 
     def value(self, state: ModelState) -> Reals:
+        """Coordinate of the wrist centre in the side view at the pose.
+
+        Parameters
+        ----------
+        state : of one model, or of a batch
+
+        Returns
+        -------
+        coordinate : (...), mm, x from axis 1 or z from axis 2; its size if unsigned
+        """
         value = section_of(state.at(self.pose))[..., 0 if self.coordinate == "x" else 1]
         return np.abs(value) if self.unsigned else value
 
     @property
     def vector(self) -> Hashable:
+        """The wrist centre in the side view at the pose, of which this is one coordinate."""
         return SectionCoordinate, self.pose
 
 
@@ -263,15 +420,46 @@ class SegmentAngle(Quantity):
     unit: ClassVar[Unit] = "deg"
 
     def value(self, state: ModelState) -> Reals:
+        """Angle of the segment from the vertical in the zero pose.
+
+        Parameters
+        ----------
+        state : of one model, or of a batch
+
+        Returns
+        -------
+        angle : (...), deg, 0 (upright) to 180
+        """
         return angle_between(self.direction(state), _UPRIGHT, True)
 
     def off(self, state: ModelState, expected: float) -> Reals:
+        """Components across the vertical whose length is the angle, if 0 is expected; else the difference of angles.
+
+        Parameters
+        ----------
+        state : of one model, or of a batch
+        expected : deg from the vertical
+
+        Returns
+        -------
+        off : (..., 2), deg, for an expected angle of 0; else (..., 1)
+        """
         return super().off(state, expected) if expected else FROM_UPRIGHT.from_these(self.direction(state))
 
     def direction(self, state: ModelState) -> Reals:
-        """Where it points, (..., 3); of any length."""
+        """Where the segment points in the zero pose.
+
+        Parameters
+        ----------
+        state : of one model, or of a batch
+
+        Returns
+        -------
+        direction : (..., 3), base frame, of any length: the upper arm in m, the forearm a unit vector
+        """
         T = state.at(ZERO_POSE)
         if self.segment == "upper_arm":
+            # Across axis 2: where along the parallel axes the frames' origins lie says nothing about the segment.
             axis, vector = T[..., 1, :3, 2], T[..., 2, :3, 3] - T[..., 1, :3, 3]
             vector = vector - axis * _dot(axis, vector)[..., None]
         else:
@@ -290,6 +478,16 @@ class Limit(Quantity):
     unit: ClassVar[Unit] = "deg"
 
     def value(self, state: ModelState) -> Reals:
+        """The joint's limit of the robot's file.
+
+        Parameters
+        ----------
+        state : of one model, or of a batch
+
+        Returns
+        -------
+        limit : (...), deg
+        """
         limits = state.lower if self.side == "lower" else state.upper
         return np.degrees(limits[..., self.joint - 1])
 
@@ -301,6 +499,17 @@ class SlideLimit(Limit):
     unit: ClassVar[Unit] = "mm"
 
     def value(self, state: ModelState) -> Reals:
+        """The prismatic joint's limit of the robot's file.
+
+        Parameters
+        ----------
+        state : of one model, or of a batch
+
+        Returns
+        -------
+        limit : (...), mm
+        """
+        # The limit is in m; the class above has made degrees of it as if it were in rad.
         return np.radians(super().value(state)) * MM
 
 
@@ -313,6 +522,16 @@ class Speed(Quantity):
     unit: ClassVar[Unit] = "deg/s"
 
     def value(self, state: ModelState) -> Reals:
+        """The joint's maximum speed of the robot's file.
+
+        Parameters
+        ----------
+        state : of one model, or of a batch
+
+        Returns
+        -------
+        speed : (...), deg/s, NaN where it is unknown
+        """
         return np.degrees(state.speed[..., self.joint - 1])
 
 
@@ -323,6 +542,16 @@ class SlideSpeed(Speed):
     unit: ClassVar[Unit] = "mm/s"
 
     def value(self, state: ModelState) -> Reals:
+        """The prismatic joint's maximum speed of the robot's file.
+
+        Parameters
+        ----------
+        state : of one model, or of a batch
+
+        Returns
+        -------
+        speed : (...), mm/s, NaN where it is unknown
+        """
         return np.asarray(state.speed[..., self.joint - 1] * MM)
 
 
@@ -334,6 +563,16 @@ class LimitExcess(QuantityAtPose):
     unit: ClassVar[Unit] = "deg"
 
     def value(self, state: ModelState) -> Reals:
+        """Largest excess of the pose over the limits of a joint; limits of sums are not looked at.
+
+        Parameters
+        ----------
+        state : of one model, or of a batch
+
+        Returns
+        -------
+        excess : (...), deg, or mm of a joint that slides; 0 inside
+        """
         joints = state.lower.shape[-1]
         slides = np.zeros(joints, dtype=bool) if state.slides is None else state.slides
         written = np.array([value_at(self.pose, joint) for joint in range(1, joints + 1)])
@@ -352,9 +591,28 @@ class Extreme(Quantity):
 
     @abstractmethod
     def measure(self, T: Reals) -> Reals:
-        """The measure (...,) in m of frames (..., 7, 4, 4)."""
+        """What is to be greatest or least over the joint values.
+
+        Parameters
+        ----------
+        T : (..., m + 1, 4, 4), base frame, m, as :func:`er3a.kinematics.forward.frames` gives them
+
+        Returns
+        -------
+        measure : (...), m
+        """
 
     def value(self, state: ModelState) -> Reals:
+        """The extreme that was searched for.
+
+        Parameters
+        ----------
+        state : of one model, whose ``extremes`` hold it
+
+        Returns
+        -------
+        value : (), mm
+        """
         return np.asarray(state.extremes[self])
 
 
@@ -365,6 +623,16 @@ class AxisDistance(Extreme):
     axis: int
 
     def measure(self, T: Reals) -> Reals:
+        """Distance of the point from the axis of joint 1 or 2.
+
+        Parameters
+        ----------
+        T : (..., m + 1, 4, 4), base frame, m
+
+        Returns
+        -------
+        distance : (...), m
+        """
         k = self.axis - 1
         across = _cross(T[..., k, :3, 2], T[..., FRAME_OF_POINT[self.point], :3, 3] - T[..., k, :3, 3])
         return np.sqrt(_dot(across, across))
@@ -377,14 +645,34 @@ class SectionExtent(Extreme):
     coordinate: SectionAxis
 
     def measure(self, T: Reals) -> Reals:
+        """Coordinate of the point in the side view.
+
+        Parameters
+        ----------
+        T : (..., m + 1, 4, 4), base frame, m, with joint 1 at 0
+
+        Returns
+        -------
+        coordinate : (...), m
+        """
         return section_coordinate(T, self.point, self.coordinate)
 
 
 def undecided_from(quantity: Quantity, expected: float, size: float) -> float:
     """The uncertainty from which on a value taken at random, of those that are plausible, would pass as often as not.
 
-    Plausible are points within ``size`` (mm) of the base along each axis, any angle (those between two lines
-    from 0 to 180, or 90 where a direction has no sign), and speeds up to twice the stated.
+    Plausible are points within ``size`` of the base along each axis, and speeds up to twice the stated. Angles may have
+    any value: between two lines 0 to 180 deg, or to 90 where a direction has no sign.
+
+    Parameters
+    ----------
+    quantity : what a reference is about
+    expected : its value, in the quantity's unit
+    size : mm, of the arm
+
+    Returns
+    -------
+    uncertainty : half-width, in the quantity's unit; a reference with a larger one decides nothing
     """
     if isinstance(quantity, Speed):
         return abs(expected) / 2
@@ -401,8 +689,18 @@ NotOfArm = Literal["no_such_joint", "no_wrist_centre", "joint_slides", "joint_tu
 
 
 def not_of_arm(quantity: Quantity, robot: Robot) -> NotOfArm | None:
-    """Why an arm has no such quantity; None if it has. Only arms with six rows have a wrist centre. ``joint_slides``: a
-    limit or speed is stated as of one that turns."""
+    """Why an arm has no such quantity.
+
+    Parameters
+    ----------
+    quantity : of a reference
+    robot : the arm
+
+    Returns
+    -------
+    why : None if it has. Only arms with six rows have a wrist centre. ``joint_slides``: a limit or speed is stated as
+        of one that turns
+    """
     joint = getattr(quantity, "joint", getattr(quantity, "axis", 1))
     if joint > robot.joints or any(quantity.arm_pose[robot.joints :]):
         return "no_such_joint"
@@ -415,40 +713,116 @@ def not_of_arm(quantity: Quantity, robot: Robot) -> NotOfArm | None:
 
 
 def section_coordinate(T: Reals, point: Point, coordinate: SectionAxis) -> Reals:
-    """A point's coordinate (...,) in m in the side view, of frames (..., 7, 4, 4)."""
+    """A point's coordinate in the side view.
+
+    Parameters
+    ----------
+    T : (..., m + 1, 4, 4), base frame, m
+    point : the flange or the wrist centre
+    coordinate : x, measured from axis 1, or z, measured from axis 2
+
+    Returns
+    -------
+    coordinate : (...), m
+    """
     p = T[..., FRAME_OF_POINT[point], :3, 3]
     return p[..., 0] - T[..., 0, 0, 3] if coordinate == "x" else p[..., 2] - T[..., 1, 2, 3]
 
 
 def point_of(T: Reals, point: Point) -> Reals:
-    """Position (..., 3) in mm of the flange or the wrist centre, of frames (..., 7, 4, 4)."""
+    """Position of the flange or the wrist centre.
+
+    Parameters
+    ----------
+    T : (..., m + 1, 4, 4), base frame, m
+    point : which of the two
+
+    Returns
+    -------
+    position : (..., 3), mm, base frame
+    """
     return T[..., FRAME_OF_POINT[point], :3, 3] * MM
 
 
 def section_of(T: Reals) -> Reals:
-    """The wrist centre in the side view (..., 2) in mm: x from axis 1, z from axis 2."""
+    """The wrist centre in the side view.
+
+    Parameters
+    ----------
+    T : (..., m + 1, 4, 4), base frame, m
+
+    Returns
+    -------
+    section : (..., 2), mm, x from axis 1 and z from axis 2
+    """
     parts = [section_coordinate(T, "wrist_centre", coordinate) for coordinate in SECTION_AXES]
     return np.stack(parts, axis=-1) * MM
 
 
 def nearest_on_axis(T: Reals, joint: int, point_mm: Reals) -> Reals:
-    """Point (..., 3) in mm of a joint's axis nearest to a given point, of frames (..., 7, 4, 4)."""
+    """Point of a joint's axis nearest to a given point.
+
+    Parameters
+    ----------
+    T : (..., m + 1, 4, 4), base frame, m
+    joint : from 1
+    point_mm : (3,), mm, base frame
+
+    Returns
+    -------
+    nearest : (..., 3), mm, base frame
+    """
     return nearest_on_line(T[..., joint - 1, :3, 2], T[..., joint - 1, :3, 3] * MM, point_mm)
 
 
 def nearest_on_line(direction: Reals, on_line: Reals, point: Reals) -> Reals:
-    """Point (..., 3) of lines through ``on_line`` (..., 3) along unit vectors, nearest to a given point."""
+    """Points of lines nearest to a given point.
+
+    Parameters
+    ----------
+    direction : (..., 3), unit vectors
+    on_line : (..., 3), a point on each line
+    point : (..., 3), in the same unit and frame
+
+    Returns
+    -------
+    nearest : (..., 3), in the same unit and frame
+    """
     return on_line + direction * _dot(direction, point - on_line)[..., None]
 
 
 def angle_between(a: Reals, b: Reals, signed: bool) -> Reals:
-    """Angle in deg; of lines (at most 90) if not signed."""
+    """Angle between directions, or between lines.
+
+    Parameters
+    ----------
+    a, b : (..., 3), of any length
+    signed : whether a direction differs from its opposite
+
+    Returns
+    -------
+    angle : (...), deg, 0 to 180 if signed, else 0 to 90
+    """
     cross, dot = _cross(a, b), _dot(a, b)
     return np.degrees(np.arctan2(np.sqrt(_dot(cross, cross)), dot if signed else np.abs(dot)))
 
 
 def rotation_vectors_deg(R: Reals) -> Reals:
-    """Rotation vectors (..., 3) in deg, at most 180 long, of rotation matrices (..., 3, 3)."""
+    """Rotation vectors of rotation matrices, in degrees.
+
+    Parameters
+    ----------
+    R : (..., 3, 3)
+
+    Returns
+    -------
+    vectors : (..., 3), deg, at most 180 long
+
+    Notes
+    -----
+    The axis is the skew part of R, whose length is twice the sine. Near half a turn that vanishes, and SciPy takes
+    over.
+    """
     skew = np.stack([R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], axis=-1)
     cosine = R[..., 0, 0] + R[..., 1, 1] + R[..., 2, 2] - 1.0  # this and the sine twice
     sine = np.sqrt(_dot(skew, skew))
@@ -471,7 +845,16 @@ class TurnedApart:
         self._length = np.sqrt(_dot(self._second, self._second))
 
     def from_these(self, a: Reals) -> Reals:
-        """Vectors (..., 2) across b whose length is the angle in deg from b to a; smooth but for opposite ones."""
+        """Vectors across b whose length is the angle from b to a; smooth but for opposite directions.
+
+        Parameters
+        ----------
+        a : (..., 3), of any length
+
+        Returns
+        -------
+        off : (..., 2), deg, along two directions at right angles to b
+        """
         cross = _cross(self._b, a)
         sine, cosine = np.sqrt(_dot(cross, cross)), _dot(a, self._b)
         angle = np.degrees(np.arctan2(sine, cosine))
@@ -482,7 +865,17 @@ class TurnedApart:
 
 
 def turned_apart(a: Reals, b: Reals) -> Reals:
-    """How far directions a are turned from b, (..., 2): see :class:`TurnedApart`."""
+    """How far directions are turned from given ones, as components for least squares.
+
+    Parameters
+    ----------
+    a : (..., 3), of any length
+    b : (..., 3), unit vectors or of any length
+
+    Returns
+    -------
+    off : (..., 2), deg, the length of which is the angle; see :class:`TurnedApart`
+    """
     return TurnedApart(b).from_these(a)
 
 
@@ -493,6 +886,7 @@ def _cross(a: Reals, b: Reals) -> Reals:
 
 
 def _dot(a: Reals, b: Reals) -> Reals:
+    """Scalar products of vectors (..., 3)."""
     product: Reals = np.einsum("...i,...i->...", a, b)
     return product
 

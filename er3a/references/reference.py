@@ -55,14 +55,32 @@ class Documents:
 
     @classmethod
     def of(cls, documents: Iterable[Document]) -> Documents:
-        """A collection of documents."""
+        """A collection of documents.
+
+        Parameters
+        ----------
+        documents : with different names
+
+        Returns
+        -------
+        collection : by name
+        """
         return cls({document.name: document for document in documents})
 
     def __iter__(self) -> Iterator[Document]:
         return iter(self.by_name.values())
 
     def lineage(self, name: str) -> frozenset[str]:
-        """A document and all that it was made from, directly or through others."""
+        """A document and all that it was made from, directly or through others.
+
+        Parameters
+        ----------
+        name : of a document; an unknown one was made from no other
+
+        Returns
+        -------
+        names : the document's own included
+        """
         found: set[str] = set()
         left = [name]
         while left:
@@ -73,21 +91,53 @@ class Documents:
         return frozenset(found)
 
     def independent(self, one: str, other: str) -> bool:
-        """Whether two documents rest on nothing in common."""
+        """Whether two documents rest on nothing in common.
+
+        Parameters
+        ----------
+        one, other : names; ``NO_DOCUMENT`` is independent of all
+
+        Returns
+        -------
+        independent : False for a document and itself
+        """
         if NO_DOCUMENT in (one, other):
             return True
         return not self.lineage(one) & self.lineage(other)
 
     def publisher(self, name: str) -> str | None:
-        """Who made a document, None if that isn't known."""
+        """Who made a document.
+
+        Parameters
+        ----------
+        name : of a document
+
+        Returns
+        -------
+        publisher : None if that isn't known
+        """
         return self.by_name[name].publisher if name in self.by_name else None
 
     def same_publisher(self, one: str, other: str) -> bool:
-        """Whether two different documents are known to have one publisher."""
+        """Whether two different documents are known to have one publisher.
+
+        Parameters
+        ----------
+        one, other : names
+
+        Returns
+        -------
+        same : False if a publisher is unknown, and for a document and itself
+        """
         return one != other and self.publisher(one) is not None and self.publisher(one) == self.publisher(other)
 
     def circle(self) -> tuple[str, ...]:
-        """Documents each of which was made from the next and the last from the first; empty if there are none."""
+        """A circle among the documents, each of which was made from the next and the last from the first.
+
+        Returns
+        -------
+        names : of one circle; empty if there is none
+        """
         for name in self.by_name:
             path = self._way_back(name)
             if path:
@@ -95,6 +145,7 @@ class Documents:
         return ()
 
     def _way_back(self, start: str) -> tuple[str, ...]:
+        """Documents from one back to itself, each made from the next; empty if there is no such way."""
         ways: list[tuple[str, ...]] = [(start,)]
         seen: set[str] = set()
         while ways:
@@ -108,7 +159,7 @@ class Documents:
         return ()
 
 
-INTERVAL_95 = 1.959963984540054
+INTERVAL_95 = 1.959963984540054  # standard deviations to either side of 95 % of a normal distribution
 
 
 @dataclass(frozen=True)
@@ -181,14 +232,34 @@ class Row(ABC):
 
     @abstractmethod
     def scalars(self) -> Iterator[Scalar]:
-        """What the row states, number by number."""
+        """What the row states, number by number.
+
+        Yields
+        ------
+        scalar : subject, group, quantity, expected value (None where the source gives none) and uncertainty, in the
+            quantity's unit
+        """
 
     def references(self) -> list[Reference]:
-        """The references that the row states."""
+        """The references that the row states, with its source and grade.
+
+        Returns
+        -------
+        references : in the order of :meth:`scalars`
+        """
         return [self.reference(scalar) for scalar in self.scalars()]
 
     def reference(self, scalar: Scalar) -> Reference:
-        """A number with the row's source and grade."""
+        """A number of the row as a reference, with the row's source, grade and document.
+
+        Parameters
+        ----------
+        scalar : of :meth:`scalars`
+
+        Returns
+        -------
+        reference : if the row is ``gaussian``, the uncertainty is 1.96 standard deviations
+        """
         reference = Reference(*scalar, self.source, self.grade, self.origin, rounding=self.rounding)
         if not self.gaussian:
             return reference
@@ -223,11 +294,25 @@ class ReferenceSet(Displayed):
         return tuple(reference for reference in self.references if reference.expected is not None)
 
     def of(self, kind: type[RowT]) -> tuple[RowT, ...]:
-        """The rows of a kind."""
+        """The rows of a kind.
+
+        Parameters
+        ----------
+        kind : a row class
+
+        Returns
+        -------
+        rows : in the order of the file; empty if the set has no such table
+        """
         return tuple(row for row in self.rows.get(kind.kind, ()) if isinstance(row, kind))
 
     def sheet(self) -> Sheet:
-        """How many numbers each group has, and by which grades."""
+        """How many numbers each group has, and by which grades, for printing.
+
+        Returns
+        -------
+        sheet : a row for each group, in alphabetical order
+        """
         groups = sorted({each.group for each in self.references})
         rows = (
             (group, len(own), tuple(sorted({each.grade for each in own})))
@@ -239,22 +324,44 @@ class ReferenceSet(Displayed):
 
 
 def quantities_of(references: Iterable[Reference]) -> tuple[Quantity, ...]:
-    """What references are about."""
+    """What references are about.
+
+    Parameters
+    ----------
+    references : n of them
+
+    Returns
+    -------
+    quantities : n, in the same order
+    """
     return tuple(reference.quantity for reference in references)
 
 
 def expected_of(references: Sequence[Reference]) -> tuple[Reals, Reals]:
-    """Expected values and uncertainties, (n,) each, of references that state a value."""
+    """Expected values and uncertainties of references.
+
+    Parameters
+    ----------
+    references : n of them that state a value
+
+    Returns
+    -------
+    expected, uncertainty : (n,) each, in the quantities' units
+    """
     expected: list[Any] = [reference.expected for reference in references]
     return np.array(expected), np.array([reference.uncertainty for reference in references])
 
 
 def vectors_of(references: Sequence[Reference]) -> list[tuple[int, ...]]:
-    """Coordinates of one vector from one source belong together: their differences add up to a distance.
+    """Group the coordinates of one vector from one source: their differences add up to a distance.
+
+    Parameters
+    ----------
+    references : n of them
 
     Returns
     -------
-    vectors : for each the places of its references
+    vectors : for each the places (from 0) of its references; a number that is no coordinate is alone
     """
     found: dict[Any, list[int]] = {}
     for place, reference in enumerate(references):
@@ -263,15 +370,34 @@ def vectors_of(references: Sequence[Reference]) -> list[tuple[int, ...]]:
 
 
 def lengths_of(values: Reals, vectors: Sequence[tuple[int, ...]]) -> Reals:
-    """Length of each vector (..., m) of coordinates (..., n) that :func:`vectors_of` has put together."""
+    """Lengths of vectors from their coordinates.
+
+    Parameters
+    ----------
+    values : (..., n), coordinates, in the unit of each
+    vectors : m groups of places, of :func:`vectors_of`
+
+    Returns
+    -------
+    lengths : (..., m), in the unit of the coordinates
+    """
     squares = [(values[..., list(places)] ** 2).sum(axis=-1) for places in vectors]
     lengths: Reals = np.sqrt(np.stack(squares, axis=-1))
     return lengths
 
 
 def conflicts(references: Sequence[Reference]) -> list[tuple[int, int]]:
-    """Pairs (i, j), i < j, of references about the same quantity that no value can meet both of; none of those whose
-    poses are rounded, as long as what that leaves open is unknown."""
+    """Pairs of references about the same quantity that no value can meet both of.
+
+    Parameters
+    ----------
+    references : without those that state no value, and those whose poses are rounded as long as what that leaves open
+        is unknown
+
+    Returns
+    -------
+    pairs : (i, j) with i < j, ordered by j: the two statements differ by more than the sum of their uncertainties
+    """
     about: dict[Quantity, list[tuple[int, float]]] = {}
     for i, reference in enumerate(references):
         if reference.expected is not None and not reference.rounding:

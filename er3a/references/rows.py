@@ -15,8 +15,8 @@ from er3a.references import quantities, subjects
 from er3a.references.reference import Documents, Reference, ReferenceSet, Row, Scalar
 from er3a.references.seen import Seen, SeenMotion, TableEntry
 
-ALONG = 0.9999
-POSE_SLACK_DEG = 1e-3
+ALONG = 0.9999  # cosine: a coordinate this nearly along the axis is no property of the line
+POSE_SLACK_DEG = 1e-3  # a pose drawn at its limit may be beyond it by the rounding of both
 
 
 GROUPS = {"zero_pose": 2, "axes": 3, "key_poses": 5, "reach": 1, "envelope": 4, "limits": 6, "speeds": 7}
@@ -43,6 +43,12 @@ class AxisRow(Row):
     uncertainty_deg: float
 
     def scalars(self) -> Iterator[Scalar]:
+        """The axis' direction, and the coordinates of its point, but for one along the axis.
+
+        Yields
+        ------
+        scalar : 0 deg from the direction, then mm
+        """
         angle = quantities.AxisAngle(self.joint, self.direction, self.signed)
         yield subjects.AxisDirection(self.joint, self.signed), "axes", angle, 0.0, self.uncertainty_deg
         for coordinate, along, expected in zip(quantities.COORDINATES, self.direction, self.point_mm or ()):
@@ -72,6 +78,12 @@ class PositionRow(Row):
         return "zero_pose" if self.pose == quantities.ZERO_POSE else "key_poses"
 
     def scalars(self) -> Iterator[Scalar]:
+        """The coordinates given, and three of the flange's turn from its stated orientation; else the pose alone.
+
+        Yields
+        ------
+        scalar : mm, then deg (0 expected)
+        """
         for coordinate, expected in zip(quantities.COORDINATES, self.xyz_mm):
             if expected is not None:
                 subject = subjects.PointAtPose(self.name, self.point, coordinate)
@@ -85,7 +97,12 @@ class PositionRow(Row):
             yield self.within_limits()
 
     def within_limits(self) -> Scalar:
-        """That the pose lies within the joint limits."""
+        """That the pose lies within the joint limits.
+
+        Returns
+        -------
+        scalar : an excess of 0 deg, with a slack of ``POSE_SLACK_DEG``
+        """
         return subjects.PoseExcess(self.name), self.group, quantities.LimitExcess(self.pose), 0.0, POSE_SLACK_DEG
 
 
@@ -100,6 +117,12 @@ class DirectionRow(Row):
     uncertainty_deg: float
 
     def scalars(self) -> Iterator[Scalar]:
+        """The segment's angle from the vertical.
+
+        Yields
+        ------
+        scalar : deg
+        """
         quantity = quantities.SegmentAngle(self.segment)
         subject = subjects.SegmentInclination(self.segment)
         yield subject, "zero_pose", quantity, self.angle_from_vertical_deg, self.uncertainty_deg
@@ -129,6 +152,12 @@ class EnvelopeRow(Row):
     uncertainty_mm: float
 
     def scalars(self) -> Iterator[Scalar]:
+        """The label of a corner, or of an extent of the drawing.
+
+        Yields
+        ------
+        scalar : mm
+        """
         if self.corner_deg is None:
             extreme, axis = ENVELOPE_EXTENTS[self.quantity]
             extent = quantities.SectionExtent("wrist_centre", extreme, axis)
@@ -155,6 +184,12 @@ class ReachRow(Row):
     uncertainty_mm: float
 
     def scalars(self) -> Iterator[Scalar]:
+        """The distance from the axis.
+
+        Yields
+        ------
+        scalar : mm
+        """
         subject = subjects.Reach(self.extreme, self.point, self.from_axis)
         quantity = quantities.AxisDistance(self.point, self.extreme, self.from_axis)
         yield subject, "reach", quantity, self.value_mm, self.uncertainty_mm
@@ -173,6 +208,12 @@ class LimitRow(Row):
     slides: bool = False
 
     def scalars(self) -> Iterator[Scalar]:
+        """The lower and the upper limit.
+
+        Yields
+        ------
+        scalar : deg, or mm of a joint that slides; without value where the source gives none
+        """
         sides: tuple[tuple[quantities.Side, float | None], ...] = (("lower", self.lower), ("upper", self.upper))
         for side, expected in sides:
             quantity = (quantities.SlideLimit if self.slides else quantities.Limit)(self.joint, side)
@@ -191,6 +232,12 @@ class SpeedRow(Row):
     slides: bool = False
 
     def scalars(self) -> Iterator[Scalar]:
+        """The maximum speed.
+
+        Yields
+        ------
+        scalar : deg/s, or mm/s of a joint that slides; without value where the source gives none
+        """
         quantity = (quantities.SlideSpeed if self.slides else quantities.Speed)(self.joint)
         yield subjects.JointSpeed(self.joint), "speeds", quantity, self.speed, self.uncertainty
 
@@ -208,6 +255,12 @@ class ObservationRow(Row):
     uncertainty_deg: float
 
     def scalars(self) -> Iterator[Scalar]:
+        """That the motion is in the direction that was seen.
+
+        Yields
+        ------
+        scalar : 0 deg
+        """
         quantity = SeenMotion(self.pose, self.joint, self.point, self.seen)
         yield (
             subjects.MotionOfJoint(self.joint, self.point, self.seen),
@@ -230,6 +283,12 @@ class LengthRow(Row):
     uncertainty_mm: float
 
     def scalars(self) -> Iterator[Scalar]:
+        """The length.
+
+        Yields
+        ------
+        scalar : mm
+        """
         quantity = TableEntry(self.length, self.joint)
         yield subjects.EntryOfTable(self.length, self.joint), "axes", quantity, self.value_mm, self.uncertainty_mm
 
@@ -246,6 +305,12 @@ class AngleRow(Row):
     uncertainty_deg: float
 
     def scalars(self) -> Iterator[Scalar]:
+        """The angle.
+
+        Yields
+        ------
+        scalar : deg
+        """
         quantity = TableEntry(self.angle, self.joint)
         yield subjects.EntryOfTable(self.angle, self.joint), "axes", quantity, self.value_deg, self.uncertainty_deg
 
@@ -268,14 +333,35 @@ KINDS: dict[str, type[Row]] = {
 
 
 def check_complete(what: str, wanted: Iterable[str], present: Iterable[str]) -> None:
-    """Reject a registry that lacks a name, or has one that is registered nowhere else."""
+    """Reject a registry that lacks a name, or has one that is registered nowhere else.
+
+    Parameters
+    ----------
+    what : the registry, for the message
+    wanted, present : names that must be the same
+
+    Raises
+    ------
+    LookupError
+        naming those that are in one of them only
+    """
     if differing := set(wanted) ^ set(present):
         raise LookupError(f"{what}: {', '.join(sorted(differing))} listed in one place and missing in the other")
 
 
 def reference_set(name: str, rows: Mapping[str, tuple[Row, ...]], documents: Documents | None = None) -> ReferenceSet:
-    """All that rows state, and that each pose at which a source shows the arm lies within its limits: one reference for
-    each pose and source."""
+    """All that rows state, and that each pose at which a source shows the arm lies within its limits.
+
+    Parameters
+    ----------
+    name : of the set
+    rows : by kind
+    documents : that the rows' origins name; None for none
+
+    Returns
+    -------
+    references : those of the rows, then one about limits for each pose (other than zero) and source
+    """
     stated = [reference for table in rows.values() for row in table for reference in row.references()]
     said = {(reference.source, reference.quantity) for reference in stated}
     reached: dict[object, Reference] = {}

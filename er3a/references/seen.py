@@ -34,8 +34,8 @@ Manner = Literal["moves", "tilts", "turns"]
 MANNERS: dict[str, Manner] = {"tilts": "tilts", "clockwise": "turns"}
 COARSE_DEG = 60.0
 """Half-width of what the eye can be trusted with: a motion up and to the side may be seen as either."""
-STILL = 1e-9
-PARALLEL = np.sin(np.radians(1.0))
+STILL = 1e-9  # m/rad or 1: a motion below this is rounding, and has no direction
+PARALLEL = np.sin(np.radians(1.0))  # axes within a degree have no common normal that can be measured
 
 
 @dataclass(frozen=True)
@@ -49,13 +49,35 @@ class SeenMotion(quantities.QuantityAtPose):
     unit: ClassVar[quantities.Unit] = "deg"
 
     def value(self, state: quantities.ModelState) -> Reals:
+        """Angle between the motion and the direction in which it was seen.
+
+        Parameters
+        ----------
+        state : of one model, or of a batch
+
+        Returns
+        -------
+        angle : (...), deg, 0 to 180; 90 if nothing moves
+        """
         return quantities.angle_between(*self._directions(state), True)
 
     def off(self, state: quantities.ModelState, expected: float) -> Reals:
+        """Components across the seen direction whose length is the angle, if 0 is expected.
+
+        Parameters
+        ----------
+        state : of one model, or of a batch
+        expected : deg, nearly always 0
+
+        Returns
+        -------
+        off : (..., 2), deg, for an expected angle of 0; else (..., 1)
+        """
         return quantities.turned_apart(*self._directions(state)) if expected == 0 else super().off(state, expected)
 
     @property
     def vector(self) -> Hashable:
+        """The motion of the point, or of the tool, of which this is one observation."""
         return self.pose, self.joint, self.point, self.manner
 
     @property
@@ -64,11 +86,23 @@ class SeenMotion(quantities.QuantityAtPose):
         return MANNERS.get(self.seen.partition("_")[0], "moves") if "_" in self.seen else "moves"
 
     def apart(self, expected: float, other: quantities.Quantity, other_expected: float) -> float:
+        """Angle between the directions in which two observations saw the motion.
+
+        Parameters
+        ----------
+        expected, other_expected : not looked at: both are angles from the direction that was seen
+        other : the same joint and pose; an observation in another manner contradicts nothing
+
+        Returns
+        -------
+        angle : deg, 0 to 180
+        """
         if not isinstance(other, SeenMotion) or other.manner != self.manner:
             return 0.0
         return float(quantities.angle_between(self._seen_toward(), other._seen_toward(), True))
 
     def _seen_toward(self) -> Reals:
+        """The direction that was seen, (3,), base frame."""
         return np.array(TOWARD[self.seen.rpartition("_")[2]])
 
     def _directions(self, state: quantities.ModelState) -> tuple[Reals, Reals]:
@@ -108,6 +142,16 @@ class TableEntry(quantities.Quantity):
         return "mm" if self.column in ("a", "d") else "deg"
 
     def value(self, state: quantities.ModelState) -> Reals:
+        """The table's entry; d summed over neighbouring parallel axes.
+
+        Parameters
+        ----------
+        state : of one model, or of a batch, with its ``columns``
+
+        Returns
+        -------
+        entry : (...), mm (a, d) or deg (alpha, offset)
+        """
         column = state.columns[self.column]
         if self.column == "d":
             return self._along_parallel(column, state.columns["twist"]) * quantities.MM
@@ -127,9 +171,31 @@ class TableEntry(quantities.Quantity):
         return total
 
     def off(self, state: quantities.ModelState, expected: float) -> Reals:
+        """Difference from the stated entry; of angles the shorter way round.
+
+        Parameters
+        ----------
+        state : of one model, or of a batch
+        expected : mm or deg
+
+        Returns
+        -------
+        off : (..., 1), mm, or deg from -180 to 180
+        """
         off = self.value(state) - expected
         return (off if self.unit == "mm" else off - 360.0 * np.round(off / 360.0))[..., None]
 
     def apart(self, expected: float, other: quantities.Quantity, other_expected: float) -> float:
+        """Difference of two stated entries; of angles the shorter way round.
+
+        Parameters
+        ----------
+        expected, other_expected : mm or deg
+        other : the same entry
+
+        Returns
+        -------
+        distance : mm, or deg from 0 to 180
+        """
         off = expected - other_expected
         return abs(off) if self.unit == "mm" else abs(off - 360.0 * round(off / 360.0))

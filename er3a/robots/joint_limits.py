@@ -1,4 +1,4 @@
-"""Joint limits and whole turns: a joint with a wide range reaches the same arm pose at angles a full turn apart."""
+"""Joint limits and whole turns: a joint with a wide range reaches the same arm pose at several angles."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from er3a.robots.robot import Robot
 from er3a.robots.whole_turns import LIMIT_TOLERANCE, nearest_rows, rows_within, shortest_move, turns_in, whole_turns
 
 SAME_DIGITS = 9  # of rad, m: joint values that are alike to these are one
-MAX_ROWS = 10_000
+MAX_ROWS = 10_000  # turns of one pose: more make no list that anyone reads, and fill memory
 
 
 class LimitExceeded(Finding):
@@ -59,13 +59,35 @@ class LimitsExceeded(Finding):
 
 
 def speeds_given(robot: Robot) -> Flags:
-    """Joints (n,) whose maximum speed the robot's file gives, by a source that is no guess."""
+    """Joints whose maximum speed is known from a source that is no guess.
+
+    Parameters
+    ----------
+    robot : the speeds are those of ``speed``, their grade that of the source "speeds"
+
+    Returns
+    -------
+    given : (n,) bool; all False if the speeds are graded "inferred"
+    """
     found, source = np.isfinite(robot.speed), robot.sources.get("speeds")
     return found & (source is None or source.grade != "inferred")
 
 
 def within(robot: Robot, q: Reals) -> Flags:
-    """Whether joint values (..., n) in rad or m lie within all limits, to 1e-9 rad or m; shape (...,)."""
+    """Whether joint values lie within all limits, of joints and of sums of joints.
+
+    Parameters
+    ----------
+    q : (..., n), rad or m
+
+    Returns
+    -------
+    fits : (...) bool; ``LIMIT_TOLERANCE`` (1e-9 rad or m) beyond a limit still counts as inside
+
+    Notes
+    -----
+    Continuous joints have no limits. NaN of a joint with limits is outside.
+    """
     outside = np.maximum(q - robot.upper, robot.lower - q)
     if robot.continuous.any():
         outside = np.where(robot.continuous, -np.inf, outside)
@@ -77,7 +99,20 @@ def within(robot: Robot, q: Reals) -> Flags:
 
 
 def row_limits(robot: Robot) -> Reals:
-    """Ends (m, 2), rad (m of rows that slide), of what each row moves by, each row by itself, the lower first."""
+    """Ranges of what the rows of the table move by, ``u = coupling @ q``, each row by itself.
+
+    Parameters
+    ----------
+    robot : n joints, m rows
+
+    Returns
+    -------
+    ends : (m, 2), rad (m of rows that slide), the lower end first
+
+    Notes
+    -----
+    Interval arithmetic: exact for a single row. Not all combinations of rows within their ends can be reached.
+    """
     ends = np.stack([robot.lower, robot.upper], axis=1)
     if robot.coupling is None:
         return ends
@@ -86,9 +121,19 @@ def row_limits(robot: Robot) -> Reals:
 
 
 def theta_limits(robot: Robot) -> Reals:
-    """Ends (m, 2), rad (m of rows that slide), of the range of each row's theta or shift, the lower first.
+    """Ranges of the D-H variables: theta of revolute rows, the shift along z of prismatic ones.
 
-    With a coupling they are those of the sums of each row, each by itself.
+    Parameters
+    ----------
+    robot : n joints, m rows
+
+    Returns
+    -------
+    ends : (m, 2), rad (m of rows that slide, without the constant d), the lower end first
+
+    Notes
+    -----
+    With a coupling they are those of the sums of each row, each by itself (:func:`row_limits`).
     """
     ends = robot.direction[:, None] * row_limits(robot) + np.where(robot.sliding, 0.0, robot.offset)[:, None]
     ends.sort(axis=1)
@@ -96,24 +141,47 @@ def theta_limits(robot: Robot) -> Reals:
 
 
 def comparable(robot: Robot, moves: Reals) -> Reals:
-    """Moves of joints, or their distances from limits (..., n), rad or m, as rad: a millimetre of a prismatic joint
-    counts as a degree.
+    """Moves of joints as one unit, so that joints of both types can be compared: a millimetre counts as a degree.
 
-    By this joints of both types are compared wherever solutions are ranked or margins are asked for; in degrees it has
-    the unit :func:`unit_compared`.
+    Parameters
+    ----------
+    moves : (..., n), rad or m: moves of joints, or their distances from limits
+
+    Returns
+    -------
+    moves : (..., n), rad; in degrees, the unit is the one of :func:`unit_compared`
+
+    Notes
+    -----
+    Solutions are ranked, and margins from limits given, by this measure. The exchange rate is a convention.
     """
     return np.where(robot.slides, np.radians(1000.0) * moves, moves) if robot.sliding.any() else moves
 
 
 def unit_compared(robot: Robot) -> str:
-    """The unit of what :func:`comparable` returns, in degrees."""
+    """The unit of what :func:`comparable` returns, after conversion to degrees.
+
+    Parameters
+    ----------
+    robot : only whether it has prismatic joints matters
+
+    Returns
+    -------
+    unit : ``deg``, or ``deg (mm of a prismatic joint)``
+    """
     return "deg (mm of a prismatic joint)" if robot.sliding.any() else "deg"
 
 
 def limit_margin(robot: Robot, q: Reals) -> Reals:
-    """Smallest distance (...,) of joints (..., n) from their limits, rad as by :func:`comparable`; negative outside.
+    """Smallest distance of joint values from the limits, of joints and of sums of joints.
 
-    Infinite where all joints are continuous. Limits of sums of joints count too.
+    Parameters
+    ----------
+    q : (..., n), rad or m
+
+    Returns
+    -------
+    margin : (...), rad as by :func:`comparable`; negative outside, infinite where nothing has limits
     """
     each = comparable(robot, np.minimum(q - robot.lower, robot.upper - q))
     if robot.continuous.any():
@@ -127,8 +195,19 @@ def limit_margin(robot: Robot, q: Reals) -> Reals:
 
 
 def nearest_equivalent(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
-    """The same arm poses (..., n) by the turns nearest to q_ref within the limits, else by those nearest to them.
+    """The same arm poses by the turns nearest to a reference within the limits, else by those nearest to the limits.
 
+    Parameters
+    ----------
+    q : (..., n), rad or m
+    q_ref : (..., n), rad or m, or a shape that broadcasts with q
+
+    Returns
+    -------
+    equivalent : (..., n), q with whole turns added
+
+    Notes
+    -----
     Joints that no turn brings back, such as slides, stay where they are. Behind a gear or a ball screw turns are those
     of rows (:mod:`er3a.robots.whole_turns`), which can move several joints, slides among them.
     """
@@ -138,12 +217,14 @@ def nearest_equivalent(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
     whole, near = turns.alone, q + turns_in(robot, q_ref - q)
     low, high = turn_bounds(robot, near)
     inside = near + TURN * np.clip(0, low, np.maximum(low, high))
+    # No turn fits (low > high): then the nearest turns below and above the range, whichever leaves it by less.
     below, above = near + TURN * (low - 1), near + TURN * low
     outside = np.where(robot.lower - below < above - robot.upper, below, above)
     found = np.where(low <= high, inside, outside)
     found = found if whole.all() else np.where(whole, found, q)
     if not robot.combined:
         return found
+    # Each joint by itself may break the limit of a sum; these rows are searched with all limits together.
     left = ~within(robot, found)
     again = found.copy()
     again[left] = _nearest_rows(robot, found[left], np.broadcast_to(q_ref, found.shape)[left])
@@ -151,14 +232,23 @@ def nearest_equivalent(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
 
 
 def _nearest_rows(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
+    """:func:`er3a.robots.whole_turns.nearest_rows` for arrays (..., n) that broadcast."""
     shape = np.broadcast_shapes(q.shape, q_ref.shape)
     rows, refs = (np.ascontiguousarray(np.broadcast_to(each, shape).reshape(-1, shape[-1])) for each in (q, q_ref))
     return nearest_rows(robot, rows, refs)[0].reshape(shape)
 
 
 def equivalents_within(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
-    """The same arm pose as joints (n,), in all turns (k, n) that keep all limits; if there are none, the one of
-    :func:`nearest_equivalent`. Of continuous joints only turns near to q_ref (n,) count.
+    """The same arm pose by all turns that keep all limits, or, if there are none, by :func:`nearest_equivalent`.
+
+    Parameters
+    ----------
+    q : (n,), rad or m
+    q_ref : (n,), rad or m; of continuous joints only turns near to it count
+
+    Returns
+    -------
+    rows : (k, n), rad or m, k of at least 1
 
     Raises
     ------
@@ -172,21 +262,49 @@ def equivalents_within(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
 
 
 def unwound(robot: Robot, q: Reals) -> Reals:
-    """Joint values (..., n) with their whole turns taken off: angles in (-pi, pi], behind a gear those of rows."""
+    """Joint values with their whole turns taken off.
+
+    Parameters
+    ----------
+    q : (..., n), rad or m
+
+    Returns
+    -------
+    q : (..., n), angles in (-pi, pi]; behind a gear the turns of rows are taken off instead
+    """
     turns = whole_turns(robot)
     return np.where(turns.alone, wrap_to_pi(q), q) if turns.each else shortest_move(robot, q)
 
 
 def but_for_turns(robot: Robot, q: Reals) -> Reals:
-    """Joint values (..., n) with their whole turns taken off, to ``SAME_DIGITS``."""
+    """Joint values without whole turns, rounded, so that equal arm poses of a branch compare as equal.
+
+    Parameters
+    ----------
+    q : (..., n), rad or m
+
+    Returns
+    -------
+    key : (..., n), rad or m, to ``SAME_DIGITS`` decimals
+    """
     return np.asarray(np.round(unwound(robot, q), SAME_DIGITS))
 
 
 def turn_bounds(robot: Robot, q: Reals) -> tuple[Reals, Reals]:
-    """Smallest and largest number of turns to add so that each value lies within its limits (smallest > largest: none).
+    """Smallest and largest number of whole turns that keep each joint within its own limits.
 
-    Of a continuous joint the turn it has is given; of one that a turn of its own would move elsewhere 0, or none if it
-    is outside.
+    Parameters
+    ----------
+    q : (..., n), rad or m
+
+    Returns
+    -------
+    low, high : (..., n), whole numbers to add; low > high where no turn fits
+
+    Notes
+    -----
+    For a continuous joint both are 0. They are also 0 for a joint that a turn of its own would move elsewhere, such as
+    a slide; if it is outside, high is -1. Limits of sums are not looked at.
     """
     low = np.ceil((robot.lower - LIMIT_TOLERANCE - q) / TURN)
     high = np.floor((robot.upper + LIMIT_TOLERANCE - q) / TURN)
@@ -200,7 +318,16 @@ def turn_bounds(robot: Robot, q: Reals) -> tuple[Reals, Reals]:
 
 
 def limits_exceeded(robot: Robot, q: Reals) -> LimitsExceeded | None:
-    """Which limits the joint values (n,) in rad or m leave; None if none."""
+    """Which limits joint values leave, with the excess, for messages.
+
+    Parameters
+    ----------
+    q : (n,), rad or m
+
+    Returns
+    -------
+    finding : joints (from 1) and sums with value, excess and limit in deg or mm; None if all limits are kept
+    """
     found: list[Exceeded] = []
     slides = robot.slides
     for j, value in enumerate(q):
@@ -215,6 +342,7 @@ def limits_exceeded(robot: Robot, q: Reals) -> LimitsExceeded | None:
         factors = np.array(combined.factors)
         joints = np.flatnonzero(factors)
         sliding = bool(slides[joints].all())
+        # A sum is shown in mm only if all its joints slide; see CombinedLimit.
         scale = 1000.0 if sliding else float(np.degrees(1.0))
         for side, excess, limit in _beyond(float(factors @ q), combined.lower, combined.upper):
             numbers = (joints + 1).tolist(), factors[joints].tolist()
@@ -233,19 +361,47 @@ def _beyond(value: float, lower: float, upper: float) -> list[tuple[Literal["abo
 
 
 def shown(robot: Robot, q: Reals) -> Reals:
-    """Joint values, rates or their derivatives (..., n) in rad or m, as degrees or mm."""
+    """Joint values, rates or their derivatives in the units of people.
+
+    Parameters
+    ----------
+    q : (..., n), rad or m, and per s, s^2 ...
+
+    Returns
+    -------
+    values : (..., n), deg, or mm of prismatic joints
+    """
     values: Reals = np.where(robot.slides, 1000.0 * q, np.degrees(q)) if robot.sliding.any() else np.degrees(q)
     return values
 
 
 def joint_shown(robot: Robot, joint: int, value: float) -> tuple[float, bool]:
-    """A value of one joint (from 0) in rad or m, as degrees or mm, and whether it slides."""
+    """A value of one joint in the unit of people.
+
+    Parameters
+    ----------
+    joint : number from 0
+    value : rad or m
+
+    Returns
+    -------
+    value, slides : deg, or mm if the joint is prismatic; whether it is
+    """
     slides = bool(robot.slides[joint])
     return 1000.0 * value if slides else float(np.degrees(value)), slides
 
 
 def meant(robot: Robot, values: Reals) -> Reals:
-    """Values (..., n) in degrees or mm, as rad or m."""
+    """Joint values from the units of people: the inverse of :func:`shown`.
+
+    Parameters
+    ----------
+    values : (..., n), deg, or mm of prismatic joints
+
+    Returns
+    -------
+    q : (..., n), rad or m
+    """
     values = np.asarray(values, float)
     q: Reals = (
         np.where(robot.slides, values / 1000.0, np.radians(values)) if robot.sliding.any() else np.radians(values)
@@ -254,15 +410,42 @@ def meant(robot: Robot, values: Reals) -> Reals:
 
 
 def joint_names(robot: Robot) -> tuple[str, ...]:
-    """Names of the joints in q: ``J1 ... Jn``."""
+    """Names of the joints of q.
+
+    Parameters
+    ----------
+    robot : only the number of its joints matters
+
+    Returns
+    -------
+    names : ``J1`` to ``Jn``
+    """
     return tuple(f"J{k + 1}" for k in range(robot.joints))
 
 
 def joint_columns(robot: Robot) -> tuple[str, ...]:
-    """Names of the joints with the unit they are shown in: ``q1_deg``, of those that slide ``q3_mm``."""
+    """Names of the joints as columns of a table, with the unit of :func:`shown`.
+
+    Parameters
+    ----------
+    robot : number and type of its joints matter
+
+    Returns
+    -------
+    names : such as ``q1_deg``, for prismatic joints ``q3_mm``
+    """
     return tuple(f"q{k + 1}_{'mm' if slides else 'deg'}" for k, slides in enumerate(robot.slides))
 
 
 def size_of(robot: Robot) -> float:
-    """A length (m) to scale drawings with: the sum of all link lengths."""
+    """A length to scale drawings with: the sum of the sizes of all a and d.
+
+    Parameters
+    ----------
+    robot : base, flange and tool don't count
+
+    Returns
+    -------
+    length : m
+    """
     return float(np.abs(robot.a).sum() + np.abs(robot.d).sum())

@@ -99,7 +99,16 @@ class Drives(ByValue):
 
     @classmethod
     def unknown(cls, joints: int) -> Drives:
-        """Drives of which nothing is known."""
+        """Drives of which nothing is known.
+
+        Parameters
+        ----------
+        joints : how many, n
+
+        Returns
+        -------
+        drives : every attribute is (n,) of NaN
+        """
         return cls(*(np.full(joints, np.nan) for _ in fields(cls)))
 
 
@@ -120,7 +129,7 @@ class WristLoad(ByValue):
 
 @dataclass(frozen=True, eq=False)
 class Masses(ByValue):
-    """Everything of a robot that dynamics rests on, beside its table.
+    """Everything of a robot that dynamics rests on, in addition to its table.
 
     Attributes
     ----------
@@ -136,14 +145,34 @@ class Masses(ByValue):
     weight: float = np.nan
 
     def body(self, link: int) -> MassBody | None:
-        """The body of a link; None where it is unknown."""
+        """The mass body of a link.
+
+        Parameters
+        ----------
+        link : 0 for the base, 1 to m for the link that a row moves
+
+        Returns
+        -------
+        body : kg, m and kg m^2, in the frame as of :class:`LinkMass`; None where it is unknown
+        """
         return next((each.body for each in self.links if each.link == link), None)
 
 
 def no_body(body: MassBody) -> NoBody | None:
-    """Why no rigid body can have these numbers; None if one can [1]_.
+    """Why no rigid body can have a mass and an inertia [1]_.
 
-    The triangle inequality: no principal moment exceeds the sum of the other two.
+    Parameters
+    ----------
+    body : as a file gives it
+
+    Returns
+    -------
+    reason : None if a rigid body can have these numbers
+
+    Notes
+    -----
+    The principal moments must not be negative and must satisfy the triangle inequality: none exceeds the sum of the
+    other two. ``TRIANGLE_TOLERANCE`` allows for rounded digits.
 
     References
     ----------
@@ -163,6 +192,16 @@ def no_body(body: MassBody) -> NoBody | None:
 def nearest_body(body: MassBody) -> MassBody:
     """The body with the same mass and centre whose inertia is the nearest that a rigid body can have.
 
+    Parameters
+    ----------
+    body : its inertia may violate the triangle inequality
+
+    Returns
+    -------
+    body : with the same principal axes
+
+    Notes
+    -----
     The second moments of its mass, ``trace(I) / 2 - I``, lose their negative principal values, which is the nearest
     positive semidefinite matrix by Frobenius' norm [2]_; principal axes stay.
 
@@ -177,7 +216,17 @@ def nearest_body(body: MassBody) -> MassBody:
 
 
 def moved(body: MassBody, T: Reals) -> MassBody:
-    """A body as seen in another frame, where T (4, 4) takes coordinates of its own frame to those."""
+    """A mass body with its numbers given in another frame; the body itself stays where it is.
+
+    Parameters
+    ----------
+    body : centre and inertia along the axes of its own frame
+    T : (4, 4), takes coordinates of the body's frame to those of the other
+
+    Returns
+    -------
+    body : centre ``R c + t`` (m), inertia ``R I R^T`` about that centre (kg m^2); the tolerances stay
+    """
     R = T[:3, :3]
     x, y, z = (R @ np.array(body.centre) + T[:3, 3]).tolist()
     moments = six_moments(R @ body.inertia_matrix @ R.T)
@@ -185,7 +234,17 @@ def moved(body: MassBody, T: Reals) -> MassBody:
 
 
 def together(bodies: list[MassBody]) -> MassBody:
-    """Several bodies of one frame as one, by the parallel axis theorem; tolerances of masses add."""
+    """Several mass bodies of one frame as one, by the parallel axis theorem.
+
+    Parameters
+    ----------
+    bodies : all with centres and inertias in the same frame
+
+    Returns
+    -------
+    body : total mass, common centre, inertia about it. Tolerances of masses add, that of the centre is the largest;
+        each is None if one of the bodies has none
+    """
     mass = sum(body.mass for body in bodies)
     centres = np.array([body.centre for body in bodies]).reshape(-1, 3)
     weights = np.array([body.mass for body in bodies])
@@ -204,12 +263,30 @@ def together(bodies: list[MassBody]) -> MassBody:
 
 
 def six_moments(tensor: Reals) -> SixMoments:
-    """ixx, iyy, izz, ixy, ixz, iyz of an inertia (3, 3)."""
+    """The six independent entries of an inertia tensor, in the order of a URDF's diagonal and products.
+
+    Parameters
+    ----------
+    tensor : (3, 3), kg m^2, symmetric
+
+    Returns
+    -------
+    moments : ixx, iyy, izz, ixy, ixz, iyz, kg m^2; the products are the matrix's entries, without a change of sign
+    """
     xx, yy, zz, xy, xz, yz = tensor[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]].tolist()
     return xx, yy, zz, xy, xz, yz
 
 
 def about(offset: Reals) -> Reals:
-    """Inertia (3, 3) of a point of 1 kg at ``offset`` (3,), m: what the parallel axis theorem adds."""
+    """Inertia of a point of 1 kg about the origin: what the parallel axis theorem adds per kg.
+
+    Parameters
+    ----------
+    offset : (3,), m, the point
+
+    Returns
+    -------
+    inertia : (3, 3), m^2 (kg m^2 per kg)
+    """
     shift: Reals = offset @ offset * np.eye(3) - np.outer(offset, offset)
     return shift

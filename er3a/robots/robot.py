@@ -24,7 +24,7 @@ from er3a.geometry.transforms import rot_x, rot_y, rpy_of, translation
 from er3a.numerics.arrays import Flags, Integers, Reals, as_floats
 from er3a.robots.masses import Masses
 
-MAX_JOINTS = 10
+MAX_JOINTS = 10  # sampling has direction numbers of Sobol' for ten dimensions
 Convention = Literal["standard", "modified"]
 CONVENTIONS: tuple[Convention, ...] = get_args(Convention)
 Grade = Literal["official", "measured", "cad", "export", "claim", "inferred"]
@@ -245,6 +245,7 @@ class Robot(ByValue, Displayed):
         return found
 
     def _keep(self, key: str, array: Reals | Flags, expected: tuple[int, ...]) -> None:
+        """Keep an array as read-only, or refuse one of another shape."""
         if array.shape != expected:
             raise ShapeError(key, array.shape, str(expected))
         array.setflags(write=False)
@@ -319,7 +320,12 @@ class Robot(ByValue, Displayed):
         return np.where(own, self.sliding[: self.joints], moved)
 
     def without_tool(self) -> Robot:
-        """The robot with its flange as tool, as references describe it."""
+        """The robot with its flange as tool, as references describe it.
+
+        Returns
+        -------
+        robot : a copy whose ``tool`` is the identity
+        """
         return self.replace(tool=np.eye(4))
 
     @property
@@ -333,13 +339,32 @@ class Robot(ByValue, Displayed):
         return self.tool if self.flange_is_last_frame else self.flange @ self.tool
 
     def replace(self, **changes: Any) -> Robot:
-        """A copy with other values for some attributes; a title that was the name follows it."""
+        """A copy with other values for some attributes.
+
+        Parameters
+        ----------
+        changes : attributes by name, in SI; a title that was the name follows a new name
+
+        Returns
+        -------
+        robot : a new object, checked like any other
+
+        Raises
+        ------
+        ShapeError, PoseError, RobotError
+            as for the class
+        """
         if "name" in changes and self.title == self.name:
             changes = {"title": changes["name"]} | changes
         return replace(self, **changes)
 
     def sheet(self) -> Sheet:
-        """The table in mm and degrees, and where tool and base are."""
+        """The table in mm and degrees, and where base, flange and tool are, for printing.
+
+        Returns
+        -------
+        sheet : a row for each row of the table; limits and speeds only if each row has its own joint
+        """
         turning = not self.sliding.any()
         columns = {
             "row" if self.coupling is not None else "joint": np.arange(1, self.rows + 1),
@@ -385,16 +410,27 @@ def _warn_of_units(robot: Robot) -> None:
 
 
 def _warn(robot: Robot, problem: str, remedy: str) -> None:
+    """Warn in the name of the caller of :meth:`Robot.from_dh`."""
     warnings.warn(f"{robot.name}: {problem}; {remedy}", InputWarning, stacklevel=4)
 
 
 def robot_name(path: Path) -> str:
-    """A name for the robot in a file, from the file's: small letters, digits and underscores, 64 at most."""
+    """A name for the robot in a file, made from the file's name.
+
+    Parameters
+    ----------
+    path : only its stem matters
+
+    Returns
+    -------
+    name : small letters, digits and underscores, 64 at most; ``imported`` if nothing is left
+    """
     name = "".join(c if c.isalnum() and c.isascii() else "_" for c in path.stem.lower()).strip("_")[:64]
     return name or "imported"
 
 
 def _placement(T: Reals) -> str:
+    """Position in mm and roll, pitch, yaw in deg, as text."""
     xyz, rpy = (shortly(tuple(values.tolist())) for values in (1000 * T[:3, 3], np.degrees(rpy_of(T))))
     return f"xyz_mm {xyz}; rpy_deg {rpy}"
 
@@ -404,7 +440,20 @@ Value = TypeVar("Value")
 
 
 def derived(function: Callable[Concatenate[Robot, Rest], Value]) -> Callable[Concatenate[Robot, Rest], Value]:
-    """Keep what a function gives for a robot (and further hashable arguments) as long as the robot is there."""
+    """Keep what a function gives for a robot as long as the robot object is there.
+
+    Parameters
+    ----------
+    function : of a robot and further hashable arguments, without side effects
+
+    Returns
+    -------
+    once : the same function; the values are kept in :attr:`Robot.derived`, by function and arguments
+
+    Notes
+    -----
+    A robot is frozen, so values can't go out of date. They must not be changed by callers.
+    """
 
     def once(robot: Robot, /, *rest: Rest.args, **named: Rest.kwargs) -> Value:
         key = (function, *rest, *named.items())
@@ -419,7 +468,20 @@ def derived(function: Callable[Concatenate[Robot, Rest], Value]) -> Callable[Con
 
 
 def to_modified(robot: Robot) -> Robot:
-    """The robot with a modified (Craig) table; the robot itself if it has one. Flange and tool poses stay the same."""
+    """The robot with a modified (Craig) table, by shifting a, alpha and beta by one row.
+
+    Parameters
+    ----------
+    robot : of either convention
+
+    Returns
+    -------
+    robot : flange and tool poses are the same at all joint values; the same object if its table is modified already
+
+    Notes
+    -----
+    The last row's a, alpha and beta become part of ``flange``; see the module's text.
+    """
     if robot.convention == "modified":
         return robot
     return robot.replace(
@@ -430,7 +492,20 @@ def to_modified(robot: Robot) -> Robot:
 
 
 def to_standard(robot: Robot) -> Robot:
-    """The robot with a standard table; the robot itself if it has one. Flange and tool poses stay the same."""
+    """The robot with a standard table, by shifting a, alpha and beta by one row.
+
+    Parameters
+    ----------
+    robot : of either convention
+
+    Returns
+    -------
+    robot : flange and tool poses are the same at all joint values; the same object if its table is standard already
+
+    Notes
+    -----
+    The first row's a, alpha and beta become part of ``base``; see the module's text.
+    """
     if robot.convention == "standard":
         return robot
     return robot.replace(
@@ -444,4 +519,5 @@ _SHIFTED = "a", "alpha", "beta"
 
 
 def _not_first(robot: Robot) -> Reals:
+    """A factor for each row: 0 for the first, 1 for the others."""
     return np.where(np.arange(robot.rows) == 0, 0.0, 1.0)

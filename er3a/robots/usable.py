@@ -25,9 +25,10 @@ FINITE = (
     ("lower", "rad"),
     ("upper", "rad"),
 )
+# Two turns, 12.6 rad: nobody misses a limit by so much in rad, and ordinary angles in degrees do.
 SEVERAL_TURNS = 4 * np.pi
 MAX_TURNS = 2 * SEVERAL_TURNS  # rad, beyond which an arm's joint that turns by so much is given in degrees
-_FEW = 1000
+_FEW = 1000  # values, for which one product is the quickest test
 
 
 def check_robot(robot: Any, crossed_limits: bool = False) -> None:
@@ -35,6 +36,7 @@ def check_robot(robot: Any, crossed_limits: bool = False) -> None:
 
     Parameters
     ----------
+    robot : anything
     crossed_limits : allow lower limits above upper ones, for those who look for such faults
 
     Raises
@@ -52,7 +54,16 @@ def check_robot(robot: Any, crossed_limits: bool = False) -> None:
 
 @derived
 def no_arm(robot: Robot) -> str:
-    """What keeps a robot's numbers from being an arm's; empty if nothing does."""
+    """What keeps a robot's numbers from being an arm's.
+
+    Parameters
+    ----------
+    robot : its table, limits, speeds, coupling, base, flange and tool are looked at
+
+    Returns
+    -------
+    problem : a sentence with entry, joint (from 1) and value; empty if there is none
+    """
     if not isinstance(robot.name, str):
         return f"the name is {robot.name!r}; expected a text"
     for name, unit in FINITE:
@@ -79,7 +90,16 @@ def no_arm(robot: Robot) -> str:
 
 @derived
 def limits_crossed(robot: Robot) -> str:
-    """Which joint has its lower limit above its upper one; empty if none has."""
+    """Which joint has its lower limit above its upper one.
+
+    Parameters
+    ----------
+    robot : limits of sums of joints are not looked at
+
+    Returns
+    -------
+    problem : a sentence with the joint (from 1) and both limits in deg or mm; empty if there is none
+    """
     crossed = np.flatnonzero(robot.lower > robot.upper)
     if not crossed.size:
         return ""
@@ -89,16 +109,27 @@ def limits_crossed(robot: Robot) -> str:
 
 
 def check_joint_values(robot: Robot, values: Any, argument: str) -> None:
-    """Refuse NaN and infinity among joint values (..., n), and warn of those that can only be degrees.
+    """Refuse NaN and infinity among joint values, and warn of those that can only be degrees.
 
-    A row can only be degrees if one of its joints that turn and have limits is several turns beyond them in rad, and
-    all of these are within them in degrees. Of continuous and of prismatic joints nothing is said. What has no
-    number for each joint is left to the function that takes it.
+    Parameters
+    ----------
+    values : (..., n), rad or m; what has no number for each joint is left to the function that takes it
+    argument : name of the argument in the caller, for the message
 
     Raises
     ------
     PoseError
         naming the first row that isn't finite
+
+    Warns
+    -----
+    InputWarning
+        if a row can only be degrees: one of its joints that turn and have limits is several turns beyond them in rad,
+        and all of these are within them in degrees
+
+    Notes
+    -----
+    Of continuous and of prismatic joints nothing is said.
     """
     try:
         q = as_floats(values, argument)
@@ -123,8 +154,19 @@ def check_joint_values(robot: Robot, values: Any, argument: str) -> None:
 
 
 def warn_of_degrees(values: Reals, argument: str, stacklevel: int = 2) -> None:
-    """Warn of joint values (n,) that can only be degrees where no robot says its limits: more than four turns in rad,
-    and no more than two in degrees."""
+    """Warn of joint values that can only be degrees where no robot says its limits.
+
+    Parameters
+    ----------
+    values : (n,), meant as rad
+    argument : name of the argument in the caller, for the message
+    stacklevel : of the warning, 1 being the caller of this function
+
+    Warns
+    -----
+    InputWarning
+        if the largest value is more than four turns in rad, and no more than two in degrees
+    """
     far = float(np.abs(values).max(initial=0.0))
     if MAX_TURNS < far <= np.degrees(SEVERAL_TURNS):
         warnings.warn(

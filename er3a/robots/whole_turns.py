@@ -25,7 +25,7 @@ from er3a.numerics.jit import inner_kernel, kernel
 from er3a.robots.robot import Robot, derived
 
 LIMIT_TOLERANCE = 1e-9  # rad, m
-WHOLE = 1e-12  # parts of a turn
+WHOLE = 1e-12  # parts of a turn, by which a number of turns may miss a whole one: rounding of inverted couplings
 INVERTIBLE = 1e-9  # smallest determinant of a coupling that is inverted
 WIDENED = (1.0, 2.0, 4.0, 8.0, 16.0)  # how far continuous joints are looked for, in halves of what turns move them by
 
@@ -54,9 +54,23 @@ class WholeTurns:
 
 @derived
 def whole_turns(robot: Robot) -> WholeTurns:
-    """The robot's lattice of turns. Where a coupling moves more rows than there are joints, it is made of those joints
-    alone that a whole turn brings back."""
+    """The robot's lattice of turns: changes of the joints that leave the arm's pose as it is.
+
+    Parameters
+    ----------
+    robot : n joints, m rows
+
+    Returns
+    -------
+    turns : steps in rad or m, and the limits of joints and sums
+
+    Notes
+    -----
+    Where a coupling moves more rows than there are joints, the lattice is made of those joints alone that a whole turn
+    brings back.
+    """
     coupling = np.eye(robot.rows) if robot.coupling is None else robot.coupling
+    # A whole turn of a joint changes nothing if it turns each row by whole turns, and moves no row that slides.
     parts = np.where(robot.sliding[:, None], coupling, coupling - np.round(coupling))
     alone = ~robot.slides & (np.abs(parts) <= WHOLE).all(axis=0)
     steps, counts = TURN * np.eye(robot.joints)[:, alone], np.eye(robot.joints)[alone] / TURN
@@ -76,7 +90,16 @@ def whole_turns(robot: Robot) -> WholeTurns:
 
 @derived
 def uncoupling(robot: Robot) -> Reals | None:
-    """(n, n), what undoes the coupling; None where there is none, or none that undoes it."""
+    """The inverse of the coupling, from rows to joints: ``q = uncoupling @ u``.
+
+    Parameters
+    ----------
+    robot : n joints, m rows
+
+    Returns
+    -------
+    inverse : (n, n); None without a coupling, with more rows than joints, or if the determinant is below ``INVERTIBLE``
+    """
     if robot.coupling is None or robot.rows != robot.joints or abs(np.linalg.det(robot.coupling)) < INVERTIBLE:
         return None
     return np.asarray(np.linalg.inv(robot.coupling), dtype=float)
@@ -84,8 +107,20 @@ def uncoupling(robot: Robot) -> Reals | None:
 
 @derived
 def uncoupling_of_linkage(robot: Robot) -> Reals | None:
-    """(n, m), joints for what m > n rows move by, from n of the rows: such that a whole turn of a row is whole turns of
-    joints. None where no n rows are so."""
+    """Joints from the rows of a linkage, which has more rows than joints: ``q = uncoupling @ u``.
+
+    Parameters
+    ----------
+    robot : n joints, m > n rows
+
+    Returns
+    -------
+    inverse : (n, m), with zeros for m - n rows that it does not need; None if no choice of rows qualifies
+
+    Notes
+    -----
+    Rows are chosen such that whole turns of rows change joints by whole turns only.
+    """
     coupling = robot.coupling
     if coupling is None or robot.rows <= robot.joints or not (whole_turns(robot).alone | robot.slides).all():
         return None
@@ -102,7 +137,16 @@ def uncoupling_of_linkage(robot: Robot) -> Reals | None:
 
 
 def turns_in(robot: Robot, move: Reals) -> Reals:
-    """The whole turns of rows, as moves (..., n) of joints, that are nearest to moves (..., n), row by row."""
+    """The whole turns of rows that are nearest to moves of joints, row by row.
+
+    Parameters
+    ----------
+    move : (..., n), rad or m
+
+    Returns
+    -------
+    turns : (..., n), rad or m, what these turns move the joints by
+    """
     turns = whole_turns(robot)
     if turns.each:
         return np.asarray(np.where(turns.alone, TURN, 0.0) * np.round(move / TURN))
@@ -110,14 +154,31 @@ def turns_in(robot: Robot, move: Reals) -> Reals:
 
 
 def shortest_move(robot: Robot, move: Reals) -> Reals:
-    """Moves of joints (..., n), less the whole turns of rows in them, each row in its shorter direction."""
+    """Moves of joints, each row in its shorter direction.
+
+    Parameters
+    ----------
+    move : (..., n), rad or m
+
+    Returns
+    -------
+    move : (..., n), rad or m, less the whole turns of rows in it; rows turn by half a turn at most
+    """
     return move - turns_in(robot, move)
 
 
 def rows_within(robot: Robot, q: Reals, q_ref: Reals, most: int) -> Reals:
-    """The same arm (k, n) as joints (n,) by all turns that keep all limits; at most ``most`` + 1 are searched for.
+    """The same arm pose by all turns that keep all limits, of joints and of sums.
 
-    Of continuous joints those that lie as near to q_ref (n,) as half of what a turn of each row moves them by.
+    Parameters
+    ----------
+    q : (n,), rad or m
+    q_ref : (n,), rad or m; a continuous joint counts only within half of what a turn of each row moves it by
+    most : at most one more than this is searched for
+
+    Returns
+    -------
+    rows : (k, n), rad or m, k of ``most`` + 1 at most
     """
     lower, upper = _windows(robot, q_ref[None], 1.0)
     found = np.empty((most + 1, robot.joints))
@@ -128,17 +189,27 @@ def rows_within(robot: Robot, q: Reals, q_ref: Reals, most: int) -> Reals:
 def nearest_rows(
     robot: Robot, q: Reals, q_ref: Reals, around: tuple[Reals, Reals] | None = None
 ) -> tuple[Reals, Flags]:
-    """The same arms (N, n) as joints (N, n) by the turns that keep all limits and are nearest to q_ref (N, n): by the
-    smallest maximum move, then the smallest sum of moves; and whether there are such turns (N,).
+    """The same arm poses by the turns that keep all limits and are nearest to references.
 
-    Where there are none, joints are left as they are if steps are whole turns of one joint each; else, of those that
-    leave no joint's limit by more than half of what a turn of each row moves it, come the turns that leave limits
-    least, then the nearest.
+    Nearest is the smallest maximum move, then the smallest sum of moves.
 
     Parameters
     ----------
+    q : (N, n), rad or m; rows of NaN stay
+    q_ref : (N, n), rad or m
     around : how far below (negative) and above q joints and sums (N, n + s) go, rad or m, all of which keeps limits;
         None for 0
+
+    Returns
+    -------
+    found : (N, n), rad or m
+    fits : (N,) bool, whether turns keep all limits
+
+    Notes
+    -----
+    Where no turns keep them, joints are left as they are if steps are whole turns of one joint each. Else, of those
+    that leave no joint's limit by more than half of what a turn of each row moves it, come the turns that leave limits
+    least, then the nearest.
     """
     turns = whole_turns(robot)
     found, fits = q.copy(), np.zeros(len(q), dtype=bool)
@@ -158,12 +229,19 @@ def nearest_rows(
 
 
 def turns_inward(robot: Robot, low: Reals, high: Reals) -> Reals:
-    """The turns, as moves (N, n) of joints, by which motions keep all limits, of joints and of sums, and are nearest to
-    the middle of each joint's; if none do, those nearest to the middle. Continuous joints stay if they can.
+    """The turns by which motions keep all limits and are nearest to the middle of each joint's range.
 
     Parameters
     ----------
     low, high : (N, n + s), rad or m, smallest and largest values of joints and sums along each motion
+
+    Returns
+    -------
+    turns : (N, n), rad or m, what to add to the motion; if none keep the limits, those nearest to the middle
+
+    Notes
+    -----
+    Continuous joints stay if they can.
     """
     turns = whole_turns(robot)
     middle = (low + high)[:, : robot.joints] / 2
@@ -178,6 +256,7 @@ def turns_inward(robot: Robot, low: Reals, high: Reals) -> Reals:
 
 @derived
 def _lattice(robot: Robot) -> Lattice:
+    """The robot's turns as the kernels take them."""
     turns = whole_turns(robot)
     return np.ascontiguousarray(turns.lines @ turns.steps), turns.counts, turns.lines
 
@@ -195,7 +274,13 @@ def _windows(robot: Robot, q_ref: Reals, widened: float) -> tuple[Reals, Reals]:
 
 @inner_kernel
 def take_turns_off(step: Reals, turns: tuple[Reals, Reals]) -> None:
-    """Make a move of joints (n,) the one by the shortest way; ``turns`` are steps (n, r) and counts (r, n)."""
+    """Make a move of joints the one by the shortest way. Kernel.
+
+    Parameters
+    ----------
+    step : (n,), rad or m, changed in place
+    turns : steps (n, r) and counts (r, n) of :class:`WholeTurns`
+    """
     steps, counts = turns
     for i in range(counts.shape[0]):
         count = 0.0

@@ -18,7 +18,7 @@ from er3a.robots.robot import Robot
 
 BYTES_PER_CELL = 64
 """Peak over sampling and gathering: counts, first blocks, masks, labels and their copies."""
-SECTION_REFINEMENT = 4
+SECTION_REFINEMENT = 4  # the section has two dimensions, so finer cells still hold enough samples
 _MARGIN = 2e-5  # the sampling loop works in single precision
 
 
@@ -43,7 +43,16 @@ class Grid:
     section_shape: tuple[int, int]
 
     def centres(self, indices: ArrayLike) -> Reals:
-        """Centres (N, 3) in m of the cells with indices (N, 3)."""
+        """Centres of cells of the voxel grid.
+
+        Parameters
+        ----------
+        indices : (N, 3), cells along x, y, z, from 0
+
+        Returns
+        -------
+        centres : (N, 3), m, in the base frame
+        """
         return self.origin + (np.asarray(indices) + 0.5) * self.cell
 
 
@@ -70,8 +79,18 @@ class Bound:
 
 
 def tool_bound(robot: Robot) -> Bound:
-    """Bound the tool point by lengths alone.
+    """A solid that the tool point never leaves, from lengths alone: a ball that joint 1 sweeps around its axis.
 
+    Parameters
+    ----------
+    robot : limits matter only of prismatic joints
+
+    Returns
+    -------
+    bound : m, in the base frame
+
+    Notes
+    -----
     The tool point is a chain of constant steps joined by rotations about z. The part of a step along its joint's z axis
     does not turn with that joint, so it may be added to the step before; this is done where it shortens the sum of
     lengths (forearm and elbow offset become one lever). Joint 2 onwards then give a ball by the triangle inequality. A
@@ -86,6 +105,7 @@ def tool_bound(robot: Robot) -> Bound:
             half += float(high - low) / 2
     steps = links[:, :3, 3].copy()
     for k in range(robot.rows, 1, -1):
+        # From the tip inwards, so that a step that was moved can move on.
         moved = steps[k - 1] + links[k - 1, :3, 2] * steps[k, 2]
         kept_length = np.linalg.norm(steps[k - 1]) + np.linalg.norm(steps[k])
         if np.linalg.norm(moved) + np.linalg.norm(steps[k, :2]) < kept_length:
@@ -100,7 +120,16 @@ def tool_bound(robot: Robot) -> Bound:
 
 
 def make_grid(robot: Robot, cells_across: int) -> Grid:
-    """A grid with ``cells_across`` cells along the longest side of the tool point's bounding box.
+    """The voxel grid and the section's cells for a robot.
+
+    Parameters
+    ----------
+    robot : its tool point stays within the grid at all joint values
+    cells_across : cells along the longest side of the tool point's bounding box
+
+    Returns
+    -------
+    grid : cubic cells in the base frame, and ``SECTION_REFINEMENT`` times finer ones in the section
 
     Raises
     ------
@@ -128,13 +157,28 @@ def make_grid(robot: Robot, cells_across: int) -> Grid:
 
 
 def shoulder_of(robot: Robot, grid: Grid) -> Reals:
-    """The point of axis 1 at the height of joint 2: (3,), m."""
+    """The point of axis 1 at the height of joint 2, with all joints at 0.
+
+    Parameters
+    ----------
+    robot : with at least one joint
+    grid : of the same robot, for the line of axis 1
+
+    Returns
+    -------
+    point : (3,), m, in the base frame
+    """
     joint_2 = forward(robot, np.zeros(robot.joints), frame=1)[:3, 3]
     return grid.axis_point + ((joint_2 - grid.axis_point) @ grid.axis) * grid.axis
 
 
 def memory_budget() -> int:
-    """Bytes that a grid may take: half of the machine's memory."""
+    """Memory that a grid may take: half of what the machine has.
+
+    Returns
+    -------
+    budget : bytes; the other half is left to the rest of the process and to other jobs
+    """
     return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 2
 
 
@@ -146,6 +190,7 @@ def _shape(half: Reals, cells_across: int) -> Integers:
 
 
 def _check_memory(half: Reals, cells_across: int) -> None:
+    """Refuse a grid that would not fit into memory, with the finest that would."""
     budget = memory_budget()
     needed = int(_shape(half, cells_across).prod()) * BYTES_PER_CELL
     if needed <= budget:

@@ -23,7 +23,7 @@ from er3a.numerics.jit import inner_kernel
 from er3a.robots.robot import Robot
 from er3a.sampling.random_joints import CHUNK, UNIT_ROWS
 
-_SMALL = 1e-12
+_SMALL = 1e-12  # sine of a tilt below which two axes are parallel, and only a sum of turns about z is defined
 _HALF, _ONE, _NONE = np.float32(0.5), np.float32(1), np.float32(0)
 _S0, _S1, _S2, _S3 = (np.float32(c) for c in (2.2214414622, -0.9135303109, 0.1126848445, -0.0065084218))
 _C0, _C1, _C2, _C3, _C4 = (
@@ -63,12 +63,27 @@ class PointChain(NamedTuple):
 
 
 def point_chain(robot: Robot) -> PointChain:
-    """The chain to the tool point."""
+    """The chain of turns and steps that takes random numbers in (0, 1) to the tool point.
+
+    Parameters
+    ----------
+    robot : limits give what the random numbers are spread over
+
+    Returns
+    -------
+    chain : lengths in m, angles in turns, in single precision
+
+    Notes
+    -----
+    Each link's rotation is written as ``Rz Rx Rz``. The turns about z are added to the constant angles of the joints on
+    both sides. So a link costs a turn about x only.
+    """
     links = constant_links(robot)
     last, point = moving_tip(links, robot.sliding)
     lower, reach = robot.lower, robot.upper - robot.lower
     mix = np.empty((0, 0))
     if robot.coupling is not None:
+        # With a coupling the random numbers are mixed to values of rows in rad or m; then a row's span is 1.
         lower, mix, reach = robot.coupling @ lower, robot.coupling * reach, np.ones(robot.rows)
     first, span = robot.direction * lower + joint_starts(robot), robot.direction * reach
     slide = np.where(robot.sliding[:, None], np.stack([first, span], axis=1), 0.0)
@@ -112,7 +127,16 @@ def _z_x_z(R: Reals) -> tuple[float, float, float]:
 
 @inner_kernel
 def cos_sin_turns(turns: np.float32) -> tuple[np.float32, np.float32]:
-    """Cosine and sine of an angle in turns, all in single precision."""
+    """Cosine and sine of an angle in turns, all in single precision. Kernel.
+
+    Parameters
+    ----------
+    turns : 1 for a whole turn; any size, but digits are lost with whole turns
+
+    Returns
+    -------
+    cosine, sine : of single precision
+    """
     # The quarter angle lies in [-pi/4, pi/4]; both polynomials (interpolated at Chebyshev nodes) carry a factor
     # sqrt(2).
     w = turns - np.floor(turns + _HALF)
@@ -126,7 +150,15 @@ def cos_sin_turns(turns: np.float32) -> tuple[np.float32, np.float32]:
 
 @inner_kernel
 def turn_joint(rows: Singles, k: int, first: np.float32, span: np.float32, link: Singles) -> None:
-    """Turn a chunk of points by joint k and take the link to the frame before it."""
+    """Turn a chunk of points by a joint, and take them over the link to the frame before it. Kernel.
+
+    Parameters
+    ----------
+    rows : random numbers of the chunk, and its points from ``X`` on (m), which are changed in place
+    k : joint, from 0
+    first, span : turns, the angle at the random number 0, and what 1 adds
+    link : (5,), cosine and sine of the turn about x, and the step, m
+    """
     cos_x, sin_x, step_x, step_y, step_z = link[0], link[1], link[2], link[3], link[4]
     unit, p = rows[k * CHUNK : (k + 1) * CHUNK], rows[X:]
     for i in range(CHUNK):
@@ -140,7 +172,17 @@ def turn_joint(rows: Singles, k: int, first: np.float32, span: np.float32, link:
 
 @inner_kernel
 def points_about_axis_1(chain: PointChain, rows: Singles) -> None:
-    """Set the points of a chunk, from its random numbers, in the frame that turns with joint 1 (z along axis 1)."""
+    """Fill in the points of a chunk of samples, in the frame that turns with joint 1 (z along axis 1). Kernel.
+
+    Parameters
+    ----------
+    chain : see :func:`point_chain`
+    rows : ``CHUNK`` random numbers in (0, 1) for each joint; x, y and z (m) are filled from ``X``, ``Y`` and ``Z`` on
+
+    Notes
+    -----
+    With a coupling, the random numbers are replaced by the values of the table's rows.
+    """
     last, point, first, span, links, _, sliding, slide, mix, _ = chain
     if mix.shape[0] > 0:
         _mix_rows(mix, rows)
@@ -177,7 +219,14 @@ def _mix_rows(mix: Singles, rows: Singles) -> None:
 
 @inner_kernel
 def within_sums(sums: Singles, rows: Singles, inside: Flags) -> None:
-    """Set which samples of a chunk of random numbers keep the limits of sums of joints."""
+    """Find which samples of a chunk keep the limits of sums of joints. Kernel.
+
+    Parameters
+    ----------
+    sums : (c, n + 2), of :class:`PointChain`
+    rows : random numbers of the chunk, in (0, 1), not yet mixed by a coupling
+    inside : (CHUNK,), filled
+    """
     joints = sums.shape[1] - 2
     for i in range(CHUNK):
         inside[i] = True
@@ -190,7 +239,18 @@ def within_sums(sums: Singles, rows: Singles, inside: Flags) -> None:
 
 @inner_kernel
 def point_in_base(chain: PointChain, rows: Singles, i: int) -> Vector:
-    """Point i of a chunk, given in the frame of joint 1, in the base frame."""
+    """A point of a chunk in the base frame: joint 1 turns it, then comes the constant base. Kernel.
+
+    Parameters
+    ----------
+    chain : see :func:`point_chain`
+    rows : as :func:`points_about_axis_1` leaves them
+    i : number within the chunk
+
+    Returns
+    -------
+    point : three numbers, m
+    """
     c, s = cos_sin_turns(chain[2][0] + rows[i] * chain[3][0])
     base = chain[5]
     x, y, z = c * rows[X + i] - s * rows[Y + i], s * rows[X + i] + c * rows[Y + i], rows[Z + i]

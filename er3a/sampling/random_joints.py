@@ -49,7 +49,16 @@ _ONE = np.uint64(1)
 
 
 def direction_numbers(dimensions: int) -> Words:
-    """Direction numbers (dimensions, BITS), uint64: that of bit 0 of a point's number first."""
+    """Direction numbers of the Sobol' sequence by Joe and Kuo [2]_.
+
+    Parameters
+    ----------
+    dimensions : 1 to 10
+
+    Returns
+    -------
+    numbers : (dimensions, BITS), uint64, binary fractions of BITS digits; that of bit 0 of a point's number first
+    """
     out = [[1 << (BITS - 1 - bit) for bit in range(BITS)]]
     for degree, coefficients, start in _JOE_KUO[: dimensions - 1]:
         row = [m << (BITS - 1 - bit) for bit, m in enumerate(start)]
@@ -64,7 +73,17 @@ def direction_numbers(dimensions: int) -> Words:
 
 
 def shifted_directions(seed: int, dimensions: int) -> Words:
-    """Direction numbers and, as last column, the shift of each dimension: (dimensions, BITS + 1)."""
+    """Direction numbers of a Sobol' sequence with a random digital shift [3]_.
+
+    Parameters
+    ----------
+    seed : key of the generator of the shift, which is drawn by NumPy's Philox
+    dimensions : 1 to 10
+
+    Returns
+    -------
+    directions : (dimensions, BITS + 1), uint64, the shift as last column
+    """
     random = np.random.Generator(np.random.Philox(key=seed))
     shift = random.integers(0, 1 << BITS, size=(dimensions, 1), dtype=np.uint64)
     return np.concatenate([direction_numbers(dimensions), shift], axis=1)
@@ -72,7 +91,16 @@ def shifted_directions(seed: int, dimensions: int) -> Words:
 
 @inner_kernel
 def fill_sobol(directions: Words, first: int, count: int, chunk: int, rows: Singles) -> None:
-    """Set a row (``chunk`` long) for each dimension to the points numbered from ``first`` on, in (0, 1)."""
+    """Fill in the coordinates of successive Sobol' points. Kernel.
+
+    Parameters
+    ----------
+    directions : (dimensions, BITS + 1), of :func:`shifted_directions`
+    first : number of the first point within the sequence
+    count : how many points, ``chunk`` at most
+    chunk : place for each dimension in ``rows``
+    rows : one stretch of ``chunk`` numbers for each dimension, filled with numbers in (0, 1)
+    """
     for k in range(directions.shape[0]):
         # Neighbours in number differ by the directions of the trailing ones (Gray code): one step, one exclusive or.
         value, number = directions[k, BITS], np.uint64(first)
@@ -95,7 +123,7 @@ Counter = tuple[np.uint64, np.uint64, np.uint64, np.uint64]
 
 CHUNK = 512
 """Samples that are worked on at a time, in rows of an array that stays in the processor's cache."""
-OF_A_DRAW = 6
+OF_A_DRAW = 6  # numbers of 21 bits in 128 bits
 UNIT_ROWS = 2 * OF_A_DRAW
 """Rows of random numbers that a chunk has place for."""
 ROUNDS = 10
@@ -129,17 +157,42 @@ class Draw:
         return self.samples // self.blocks + (np.arange(self.blocks) < self.samples % self.blocks)
 
     def first(self, blocks: Integers) -> Integers:
-        """Number within the run of the first sample of each block."""
+        """Numbers within the run of the first sample of blocks.
+
+        Parameters
+        ----------
+        blocks : (B,), blocks from 0
+
+        Returns
+        -------
+        numbers : (B,), from 0
+        """
         return blocks * (self.samples // self.blocks) + np.minimum(blocks, self.samples % self.blocks)
 
     def directions(self, joints: int) -> Words:
-        """Direction numbers and shift of the Sobol' sequence of so many joints; without rows for uniform samples."""
+        """What the Sobol' sequence of this run is computed from.
+
+        Parameters
+        ----------
+        joints : how many dimensions, n
+
+        Returns
+        -------
+        directions : (n, BITS + 1), see :func:`shifted_directions`; (0, 0) for uniform samples
+        """
         return shifted_directions(self.seed, joints) if self.sampling == "sobol" else np.empty((0, 0), dtype=np.uint64)
 
     def opening_joints(self, robot: Robot, count: int) -> Reals:
-        """Draw the first samples of each block again: (N, n), about as many of each, ``count`` at most.
+        """Draw the first samples of each block again, about as many of each.
 
-        Those outside limits of sums of joints, which are not counted, are left out.
+        Parameters
+        ----------
+        robot : gives limits
+        count : how many at most
+
+        Returns
+        -------
+        q : (N, n), rad or m; those outside limits of sums of joints, which are not counted, are left out
         """
         wanted = Draw(self.seed, min(count, self.samples), self.blocks).sizes
         blocks = np.repeat(np.arange(self.blocks), wanted)
@@ -165,6 +218,7 @@ class Draw:
 
 @inner_kernel
 def _round(c0: np.uint64, c1: np.uint64, c2: np.uint64, c3: np.uint64, k0: np.uint64, k1: np.uint64, r: int) -> Counter:
+    """One round of Philox4x32."""
     k0, k1 = (k0 + np.uint64(r) * _W0) & _LOW, (k1 + np.uint64(r) * _W1) & _LOW
     p0, p1 = _M0 * c0, _M1 * c2
     return (p1 >> _32) ^ c1 ^ k0, p1 & _LOW, (p0 >> _32) ^ c3 ^ k1, p0 & _LOW
@@ -172,7 +226,17 @@ def _round(c0: np.uint64, c1: np.uint64, c2: np.uint64, c3: np.uint64, k0: np.ui
 
 @kernel
 def philox4x32(c0: np.uint64, c1: np.uint64, c2: np.uint64, c3: np.uint64, k0: np.uint64, k1: np.uint64) -> Counter:
-    """Four random 32-bit words from four counter words and two key words, all held in uint64."""
+    """Four random words from a counter and a key: Philox4x32-10 [1]_. Kernel.
+
+    Parameters
+    ----------
+    c0, c1, c2, c3 : the counter, 32 bits each, held in uint64
+    k0, k1 : the key, 32 bits each, held in uint64
+
+    Returns
+    -------
+    words : four numbers of 32 bits, held in uint64
+    """
     for r in range(ROUNDS):
         c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0, k1, r)
     return c0, c1, c2, c3
@@ -192,7 +256,16 @@ def _fifth(a: np.uint64, b: np.uint64) -> np.uint64:
 
 @inner_kernel
 def fill_uniform(seed: np.uint64, block: np.uint64, first: np.uint64, draw: int, rows: Singles) -> None:
-    """Set six rows of ``CHUNK`` numbers to those of the samples from ``first`` on, in (0, 1): the draw 0 or 1."""
+    """Fill in the random numbers of a chunk of samples. Kernel.
+
+    Parameters
+    ----------
+    seed : of the study, the key
+    block : number of the block
+    first : number within the block of the chunk's first sample
+    draw : 0 for the first six joints, 1 for further ones
+    rows : six stretches of ``CHUNK`` numbers, filled with numbers in (0, 1), multiples of 2^-21 plus half a step
+    """
     k0, k1 = seed & _LOW, seed >> _32
     for i in range(CHUNK):
         sample = first + np.uint64(i)
@@ -220,6 +293,7 @@ def fill_uniform(seed: np.uint64, block: np.uint64, first: np.uint64, draw: int,
 def _again(
     seed: np.uint64, blocks: Integers, samples: Integers, first: Integers, directions: Words, out: Reals
 ) -> None:
+    """Fill ``out`` (N, n) with the random numbers of single samples, in (0, 1)."""
     joints = out.shape[1]
     rows = np.empty(UNIT_ROWS * CHUNK, dtype=np.float32)
     for n in range(blocks.shape[0]):

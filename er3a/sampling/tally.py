@@ -43,7 +43,9 @@ NearLists = tuple[Reals, Integers, Integers, Reals]
 Cells = tuple[Reals, float, tuple[int, int, int]]
 Furthest = tuple[Reals, Reals, Integers, Integers]  # directions (D, 3) and what Extremes holds
 
-_PATCHES = 16
+_PATCHES = 16  # along the edge of a cube's face
+# Points are of single precision, so thresholds are lowered by a part in 1e5.
+# A list holds directions that matter up to 6 % beyond the least threshold, 128 at most.
 _SAFETY = 1 - 1e-5
 _LISTED, _LONGEST = 0.06, 128
 NONE = -1
@@ -65,12 +67,26 @@ class Extremes:
 
     @classmethod
     def empty(cls, count: int) -> Extremes:
-        """No sample yet."""
+        """Extremes of no sample yet.
+
+        Parameters
+        ----------
+        count : directions, D
+
+        Returns
+        -------
+        extremes : support of -inf, blocks and samples of ``NONE``
+        """
         return cls(np.full(count, -np.inf), np.full(count, NONE), np.full(count, NONE))
 
 
 def cube_map() -> Reals:
-    """Centres (unit vectors) and angular radii (rad) of the patches that :func:`_patch` numbers, as rows (4, P)."""
+    """Patches of the sphere of directions: the squares of a grid on the faces of a cube.
+
+    Returns
+    -------
+    patches : (4, P), centres (three rows, unit vectors) and angular radii (rad), in the order of :func:`_patch`
+    """
     edge = np.linspace(-1, 1, _PATCHES + 1)
     middle = (edge[1:] + edge[:-1]) / 2
     centres, radii = [], []
@@ -78,6 +94,7 @@ def cube_map() -> Reals:
         major, sign = face // 2, 1 - 2 * (face % 2)
 
         def unit(u: Reals, v: Reals, major: int = major, sign: int = sign) -> Reals:
+            """Directions (..., 3) of the face's places u, v, each from -1 to 1."""
             out = np.empty((*np.broadcast(u, v).shape, 3))
             out[..., major], out[..., (major + 1) % 3], out[..., (major + 2) % 3] = sign, u, v
             direction: Reals = out / np.linalg.norm(out, axis=-1, keepdims=True)
@@ -94,6 +111,7 @@ def cube_map() -> Reals:
 
 @kernel
 def _patch(x: float, y: float, z: float) -> int:
+    """Number of the cube map's patch in a direction."""
     ax, ay, az = abs(x), abs(y), abs(z)
     if ax >= ay and ax >= az:
         face, m, u, v = (0 if x >= 0 else 1), ax, y, z
@@ -167,14 +185,17 @@ def _set_lists(directions: Reals, seen: Reals, patches: Reals, least: Reals, lis
 def refresh(
     directions: Reals, support: Reals, inner: Reals, patches: Reals, lists: NearLists, grid: Cells, idle: Singles
 ) -> None:
-    """Set the lists of the patches, and where samples of each cell are idle, from the support so far.
+    """Set the lists of the patches, and where samples of each cell are idle, from the support so far. Kernel.
 
     Parameters
     ----------
-    inner : (3,), m, the inner point; patches : (5, P), centres, cosines and sines of the radii of the cube map
-    lists : see :func:`near_lists`, set
+    directions : (D, 3), unit vectors
+    support : (D,), m, largest coordinate along each direction so far
+    inner : (3,), m, the inner point
+    patches : (5, P), centres, cosines and sines of the radii of the cube map
+    lists : see :func:`near_lists`, filled
     grid : origin (3,), cell (m), shape
-    idle : (cells,), set to the squared distance (m^2) from the inner point below which a sample improves nothing
+    idle : (cells,), filled with the squared distance (m^2) from the inner point below which a sample improves nothing
     """
     origin, cell, (nx, ny, nz) = grid
     seen = np.empty(directions.shape[0])
@@ -200,8 +221,18 @@ def refresh(
 
 
 def near_lists(patches: int) -> NearLists:
-    """Per patch: squared distance (m^2) up to which its list is complete, length of the list, directions, and the
-    squared distances from which on each may be improved. Before the first refresh no list is complete.
+    """Lists of the directions that samples of each patch may improve, still empty.
+
+    Parameters
+    ----------
+    patches : how many, P
+
+    Returns
+    -------
+    complete : (P,), m^2, squared distance up to which the list is complete; 0 before the first refresh
+    count : (P,), length of the list
+    near : (P, L), directions by number, the one that matters first in front
+    limits : (P, L), m^2, squared distances from which on each may be improved
     """
     shape = (patches, _LONGEST)
     return np.zeros(patches), np.zeros(patches, np.int64), np.zeros(shape, np.int64), np.zeros(shape)
@@ -209,7 +240,16 @@ def near_lists(patches: int) -> NearLists:
 
 @inner_kernel
 def take_point(point: Vector, block: int, sample: int, inner: Reals, lists: NearLists, furthest: Furthest) -> None:
-    """Take one point (x, y, z) into the extremes; samples of a block come in their order."""
+    """Take one point into the extremes; samples of a block come in their order. Kernel.
+
+    Parameters
+    ----------
+    point : m, in the base frame
+    block, sample : its number
+    inner : (3,), m, the inner point
+    lists : of :func:`near_lists`, as refreshed
+    furthest : directions (D, 3) and support (m), block and sample (D,), which are changed in place
+    """
     (complete, count, near, limits), (directions, support, blocks, samples) = lists, furthest
     x, y, z = point[0] - inner[0], point[1] - inner[1], point[2] - inner[2]
     squared, patch = x * x + y * y + z * z, _patch(x, y, z)
@@ -229,10 +269,10 @@ _Voxels = tuple[Reals, float, tuple[int, int, int], Tallies]
 _Section = tuple[np.float32, np.float32, np.int32, np.int32, Tallies]
 _Watch = tuple[Furthest, tuple[Reals, Reals, NearLists, Singles], Integers]
 
-UNTOUCHED = np.iinfo(np.int32).max
+UNTOUCHED = np.iinfo(np.int32).max  # later than any block
 PORTION = 1 << 22
 """Samples between two looks at the clock."""
-_RARER = 16
+_RARER = 16  # factor on the number of samples from one refresh to the next
 _ONE, _NONE = np.int32(1), np.float32(0)
 
 
@@ -272,13 +312,20 @@ def tally_blocks(
     hull: int,
     progress: Callable[[int], object] | None = None,
 ) -> Tally:
-    """Draw the given blocks within the joint limits and count where the tool point falls.
+    """Draw blocks of samples within the joint limits, and count where the tool point falls.
 
     Parameters
     ----------
+    robot : gives limits and the tool point
+    grid : of this robot
+    draw : seed, number and kind of the samples
     blocks : ascending
     hull : how many directions to keep the extremes of, none if 0
     progress : called with the number of samples done since it was called last
+
+    Returns
+    -------
+    tally : counts of cells in the base frame and in the side section, and the extremes (m)
     """
     blocks = np.array(list(blocks), dtype=np.int64)
     counts, fresh = np.zeros(grid.shape, dtype=np.int64), np.zeros(int(np.prod(grid.shape)), dtype=np.uint32)
@@ -311,6 +358,7 @@ def tally_blocks(
 def _side_cells(
     rows: Singles, lowest: np.float32, per_length: np.float32, n_rho: np.int32, n_z: np.int32, cells: NDArray[np.int32]
 ) -> None:
+    """Number of the side view's cell of each point of a chunk."""
     p = rows[X:]
     for i in range(CHUNK):
         x, y, z = p[i], p[CHUNK + i], p[2 * CHUNK + i]
@@ -348,6 +396,7 @@ def _voxel_of(
 def _sample(
     draw: _Block, start: int, stop: int, chain: PointChain, voxels: _Voxels, section: _Section, watch: _Watch
 ) -> None:
+    """Draw samples ``start`` to ``stop`` of a block, count them in both grids, and keep the furthest."""
     seed, block, first, joints, sobol = draw
     origin, cell, shape, counts = voxels
     lowest, per_length, n_rho, n_z, side = section
@@ -398,8 +447,8 @@ def _flush(
         fresh_side[n] = 0
 
 
-NANOMETRES = 9
-_STARTS = 8
+NANOMETRES = 9  # decimals of m
+_STARTS = 8  # local searches for each extreme
 
 
 @dataclass(frozen=True)
@@ -413,11 +462,17 @@ class ReachExtremes:
 
 
 def search_reach(robot: Robot, grid: Grid, q: Reals) -> ReachExtremes:
-    """Extremes of the tool point.
+    """Extreme distances of the tool point from axis 1, and heights along it, by local search.
 
     Parameters
     ----------
+    robot : limits are kept
+    grid : of this robot, for the line of axis 1
     q : (N, n), rad or m, samples to start from
+
+    Returns
+    -------
+    extremes : m, rounded to the nanometre; found, not proven
     """
     offset = forward(robot, q)[:, :3, 3] - grid.axis_point
     height = offset @ grid.axis
@@ -482,7 +537,17 @@ class TouchedSection:
 
 
 def section_cells(tally: Tally, grid: Grid) -> TouchedSection:
-    """The side section, all azimuths folded in."""
+    """Cells of the side section that samples touched, all azimuths folded in.
+
+    Parameters
+    ----------
+    tally : of any number of blocks
+    grid : that the tally was made with
+
+    Returns
+    -------
+    touched : centres (m) and samples of these cells
+    """
     shown = tally.section > 0
     rho, z = (grid.section_origin + (np.argwhere(shown) + 0.5) * grid.section_cell).T
     return TouchedSection(rho, z, tally.section[shown])

@@ -20,7 +20,7 @@ from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.joint_limits import LimitsExceeded, comparable, joint_shown, limit_margin
 from er3a.robots.robot import Robot
 
-SAME_MOVE = 1e-9
+SAME_MOVE = 1e-9  # rad; moves closer than this differ by rounding only
 
 Refusal = LimitsExceeded | PairOverlaps
 
@@ -159,12 +159,17 @@ class Choice:
 def nearest(
     robot: Robot, solutions: Solutions, q_ref: Reals, refused: Sequence[Refusal | None] | None = None
 ) -> Choice:
-    """Order the admissible solutions of one pose as the module says.
+    """Order the admissible solutions of one pose by their distance from a reference, as the module says.
 
     Parameters
     ----------
+    solutions : all solutions of the pose, turns included, (N, n)
     q_ref : (n,), rad or m, the joint values that the arm comes from
     refused : why each row is not admissible, None for those that are; left out, the limits alone refuse
+
+    Returns
+    -------
+    choice : admissible rows, nearest first, and the reason for the first (or for none)
     """
     moves = comparable(robot, np.abs(solutions.q - q_ref))
     greatest: Reals = moves.max(axis=-1, initial=0.0)
@@ -172,6 +177,7 @@ def nearest(
     allowed = solutions.within_limits if refused is None else [why is None for why in refused]
     rows = np.flatnonzero(allowed)
     left, ordered = rows[np.argsort(greatest[rows], kind="stable")].tolist(), list[int]()
+    # Not one sort: rows within SAME_MOVE of the best are alike, and alike is not transitive.
     while left:
         alike = 1
         while alike < len(left) and greatest[left[alike]] <= greatest[left[0]] + SAME_MOVE:
@@ -195,6 +201,7 @@ def _first(rows: list[int], distance: Reals, branch: Integers) -> int:
 def _why_first(
     robot: Robot, solutions: Solutions, q_ref: Reals, order: list[int], moves: Reals, distance: Reals
 ) -> WhyFirst:
+    """What the first of the order has over the second."""
     chosen = order[0]
     joint = int(moves[chosen].argmax())
     most = moves[chosen, joint]
@@ -215,6 +222,7 @@ def _why_first(
 
 
 def _difference(solutions: Solutions, chosen: int, other: int) -> NextBest:
+    """How another solution differs from the one chosen: its branch, its turns, or its free joint."""
     if solutions.branch[other] != solutions.branch[chosen]:
         return OtherBranch(int(solutions.branch[other]), solutions.label[other])
     turns = solutions.turn[other] - solutions.turn[chosen]
@@ -223,7 +231,17 @@ def _difference(solutions: Solutions, chosen: int, other: int) -> NextBest:
 
 
 def why_none(robot: Robot, solutions: Solutions, refused: Sequence[Refusal | None]) -> WhyNone:
-    """Why no solution is taken, where each is refused: by its limits, or by an overlap that ``refused`` tells."""
+    """Why no solution of a pose is taken, where each is refused.
+
+    Parameters
+    ----------
+    solutions : of the pose, perhaps none
+    refused : the reason for each row; overlaps count before limits
+
+    Returns
+    -------
+    why : no solution at all; or the overlap of the solution with the largest margin; or the smallest excess of limits
+    """
     if not len(solutions.q):
         return NoSolution(solutions.unsolved)
     overlaps = {row: why for row, why in enumerate(refused) if isinstance(why, PairOverlaps)}

@@ -54,11 +54,29 @@ class Rule:
     measure: Callable[[Robot, Reals, Reals, Scene | None], Reals]
 
     def unit_of(self, robot: Robot) -> str:
-        """The unit of the measure of an arm's solutions."""
+        """The unit of the measure of an arm's solutions.
+
+        Parameters
+        ----------
+        robot : matters for rules that compare joints: deg, with mm for prismatic ones
+
+        Returns
+        -------
+        unit : such as ``deg``, ``s``, ``mm`` or ``1``
+        """
         return unit_compared(robot) if self.unit is None else self.unit
 
     def cost(self, measured: Reals) -> Reals:
-        """The measure, or its negative, so that less is better."""
+        """The measure, or its negative where the greatest is best, so that less is better.
+
+        Parameters
+        ----------
+        measured : (...), in the rule's unit
+
+        Returns
+        -------
+        cost : (...), in the rule's unit
+        """
         return measured if self.best == "least" else -measured
 
 
@@ -66,8 +84,18 @@ MIN_WEIGHT = 0.1  # of a joint that moves nothing, against 1 of the one that mov
 
 
 def joint_weights(robot: Robot) -> Reals:
-    """Weights (n,) of joint moves: the largest lever (m) at which each joint swings the tool, the longest being 1.
+    """Weights of joint moves: the largest lever at which each joint swings the tool, the longest being 1.
 
+    Parameters
+    ----------
+    robot : its links, flange and tool give the levers
+
+    Returns
+    -------
+    weights : (n,), from ``MIN_WEIGHT`` to 1
+
+    Notes
+    -----
     A joint near the base moves more of the arm; a joint with no lever still counts ``MIN_WEIGHT``. A prismatic joint
     moves the tool by as much as itself, as one with a lever of 1 m does along its arc.
     """
@@ -80,16 +108,19 @@ def joint_weights(robot: Robot) -> Reals:
 
 
 def _max_joint_move(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Reals:
+    """Largest joint move (...), deg, or mm of a prismatic joint."""
     greatest: Reals = comparable(robot, np.abs(q - q_ref)).max(axis=-1, initial=0.0)
     return np.degrees(greatest)
 
 
 def _weighted_move(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Reals:
+    """Root of the summed squares of weighted joint moves (...), deg."""
     distance: Reals = np.linalg.norm(joint_weights(robot) * (q - q_ref), axis=-1)
     return np.degrees(distance)
 
 
 def _time(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Reals:
+    """Longest time (...), s, of a joint's move at full speed."""
     if not np.isfinite(robot.speed).all():
         raise Er3aError(f"{robot.name}: the rule 'time' needs joint speeds, and the robot's file gives none")
     longest: Reals = (np.abs(q - q_ref) / robot.speed).max(axis=-1, initial=0.0)
@@ -97,14 +128,17 @@ def _time(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Reals:
 
 
 def _manipulability(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Reals:
+    """Manipulability (...) of the scaled Jacobian, without unit."""
     return conditioning(robot, q, characteristic_length(robot)).manipulability
 
 
 def _limit_distance(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Reals:
+    """Smallest distance (...) from a limit, deg, or mm of a prismatic joint."""
     return np.degrees(limit_margin(robot, q))
 
 
 def _clearance(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Reals:
+    """Smallest distance (...) between bodies, mm."""
     return clearance(robot, q, scene).distance * 1000
 
 
@@ -119,20 +153,41 @@ RULES: dict[RuleName, Rule] = {
 
 
 def available_rules(robot: Robot) -> tuple[RuleName, ...]:
-    """Names of the rules whose data the robot has."""
+    """Names of the rules whose data the robot has.
+
+    Parameters
+    ----------
+    robot : only "time" needs data, the speed of each joint
+
+    Returns
+    -------
+    names : keys of ``RULES``, in their order
+    """
     return tuple(name for name in RULES if name != "time" or np.isfinite(robot.speed).all())
 
 
 def mixed_cost(weights: Mapping[RuleName, float], costs: Mapping[RuleName, Reals], allowed: Flags) -> Reals:
-    """The weighted sum (n,) of costs (n,) per rule, each stretched to 0..1 over the allowed rows with a finite one.
+    """The weighted sum of the costs of several rules, each stretched to 0..1.
 
-    An infinite cost is stretched to 1, a negative infinite one to 0.
+    Parameters
+    ----------
+    weights : by rule, at least 0
+    costs : by rule (N,), in its unit, less is better
+    allowed : (N,), rows whose finite costs define 0 (the best) and 1 (the worst)
+
+    Returns
+    -------
+    cost : (N,), without unit; rows that are not allowed may lie outside 0..1
+
+    Notes
+    -----
+    An infinite cost is stretched to 1, a negative infinite one to 0. A rule by which all rows are equal adds 0.
     """
     total = np.zeros(len(allowed))
     for name, weight in weights.items():
         cost, finite = costs[name], np.isfinite(costs[name])
         ends = cost[allowed & finite] if allowed.any() else np.array([0.0, 1.0])
-        if not ends.size:  # such as where nothing can meet: the rule tells no rows apart
+        if not ends.size:  # such as where nothing can meet: by this rule all rows are equal
             continue
         above = np.where(finite, cost, ends.min()) - ends.min()
         total += np.where(finite, weight * above / (np.ptp(ends) or 1.0), weight * (cost > 0))
@@ -141,6 +196,14 @@ def mixed_cost(weights: Mapping[RuleName, float], costs: Mapping[RuleName, Reals
 
 def checked_weights(rule: str | Mapping[str, float]) -> dict[RuleName, float]:
     """A rule, or a mix of rules, as weights.
+
+    Parameters
+    ----------
+    rule : a name in ``RULES``, or weights by name
+
+    Returns
+    -------
+    weights : by rule; 1 for a single name
 
     Raises
     ------
@@ -217,7 +280,12 @@ class SolutionRanking(ByValue, Displayed):
         return int(self.order[0]) if len(self.order) else None
 
     def sheet(self) -> Sheet:
-        """The rows in order with what they are ranked by, then those that are refused."""
+        """The rows in order with what they are ranked by, then those that are refused, for printing.
+
+        Returns
+        -------
+        sheet : place (from 1), row, cost, a column for each rule in its unit, and the refusal
+        """
         refused = [row for row, why in enumerate(self.reason) if not isinstance(why, Placed)]
         rows = (
             (place, row, self.cost[row], *(values[row] for values in self.measured.values()), why)
@@ -236,16 +304,23 @@ class SolutionRanking(ByValue, Displayed):
 def select(
     robot: Robot, solutions: Solutions, rule: str | Mapping[str, float], q_ref: Reals, scene: Scene | None = None
 ) -> SolutionRanking:
-    """Rank the solutions of one pose.
+    """Rank the solutions of one pose by a rule, or by a mix of rules.
 
     Parameters
     ----------
+    solutions : all solutions of the pose, (N, n), as ``inverse`` returns them
     rule : a name in ``RULES``, or weights of several, such as ``{"time": 1, "clearance": 2}``
     q_ref : (n,), rad or m, the current joint values
     scene : obstacles; rows that touch them are refused. Rows in which the arm touches itself are refused in any case
 
+    Returns
+    -------
+    ranking : admissible rows, best first, with each row's measures or the reason for its refusal
+
     Raises
     ------
+    ShapeError
+        if the solutions are not those of one pose, or q_ref has not n values
     Er3aError
         for an unknown rule, an invalid weight, or a rule whose data are missing
     """
@@ -275,12 +350,32 @@ def select(
 
 
 def refusals(robot: Robot, solutions: Solutions, scene: Scene | None) -> tuple[Refusal | None, ...]:
-    """Why each row is refused: limits that it leaves, or what overlaps; None for the others."""
+    """Why each solution of a pose is refused: limits that it leaves, or bodies that overlap.
+
+    Parameters
+    ----------
+    solutions : (N, n), of one pose
+    scene : obstacles; None for the arm and its own shapes only
+
+    Returns
+    -------
+    refused : N reasons, None for rows that may be taken
+    """
     return refusals_of(bodies_of(robot, scene), solutions)
 
 
 def refusals_of(bodies: Bodies, solutions: Solutions) -> tuple[Refusal | None, ...]:
-    """Why each row is refused: limits that it leaves, or which of the bodies overlap; None for the others."""
+    """Why each solution of a pose is refused, with the bodies already made; see :func:`refusals`.
+
+    Parameters
+    ----------
+    bodies : the arm's shapes with those of the scene
+    solutions : (N, n), of one pose
+
+    Returns
+    -------
+    refused : N reasons, None for rows that may be taken; an overlap is the deepest pair's, in mm
+    """
     refused: list[Refusal | None] = list(solutions.reason)
     inside = np.flatnonzero(solutions.within_limits)
     distance, pair = bodies.min_distance_of_turns(solutions.q[inside])
@@ -326,7 +421,12 @@ class SequenceChoice(ByValue, Displayed):
     greedy_cost: float
 
     def sheet(self) -> Sheet:
-        """The row taken of each pose, with its joint angles."""
+        """The row taken of each pose, with its joint values in deg or mm, for printing.
+
+        Returns
+        -------
+        sheet : a row for each pose, and the total cost compared with taking the cheapest next move each time
+        """
         values = zip(range(len(self.q)), self.rows, shown(self.robot, self.q), strict=True)
         rows = ((pose, row, *joints) for pose, row, joints in values)
         heading = f"Sequence of {len(self.q)} poses: cost {self.cost:.6g}; nearest each time: {self.greedy_cost:.6g}"
@@ -342,14 +442,19 @@ def select_sequence(
     scene: Scene | None = None,
     acceleration: Reals | None = None,
 ) -> SequenceChoice:
-    """Choose one solution of each pose that minimises the total cost of the moves.
+    """Choose one solution of each pose that minimises the total cost of the moves [1]_.
 
     Parameters
     ----------
     poses : the solutions of each pose, in order; rows outside the limits or in collision are not used
     q_ref : (n,), rad or m, joint values at the start
     rule : the cost of a move: "nearest" (largest joint move), "weighted" or "time"
+    scene : obstacles; None for the arm and its own shapes only
     acceleration : (n,), rad/s^2; then "time" moves run from rest to rest, otherwise at full speed throughout
+
+    Returns
+    -------
+    choice : the row taken of each pose, its joint values, and the cost; costs are in deg, or s for "time"
 
     Raises
     ------
@@ -374,8 +479,20 @@ def select_sequence(
 def best_of_sets(
     robot: Robot, sets: Sequence[Reals], q_ref: Reals, rule: MoveRule, acceleration: Reals | None = None
 ) -> SequenceChoice:
-    """As :func:`select_sequence`, of sets (k, n) of joint values of which all may be taken."""
+    """As :func:`select_sequence`, of sets of joint values of which all may be taken.
+
+    Parameters
+    ----------
+    sets : for each pose (k, n), rad or m, k of at least 1
+    q_ref : (n,), rad or m, joint values at the start
+    rule, acceleration : as for :func:`select_sequence`
+
+    Returns
+    -------
+    choice : its rows are indices within the sets
+    """
     total = _move_costs(robot, q_ref[None], sets[0], rule, acceleration)[0]
+    # Bellman's recursion forwards: ``total`` is the least cost to reach each member of the current set.
     came_from = []
     for before, after in pairwise(sets):
         through = total[:, None] + _move_costs(robot, before, after, rule, acceleration)
@@ -402,14 +519,31 @@ def best_of_sets(
 
 
 def rest_to_rest(angle: Reals, speed: Reals, acceleration: Reals) -> Reals:
-    """Smallest time (..., n) in s in which joints turn by angles (..., n) from rest to rest, on triangle or
-    trapezoid."""
+    """Smallest time of joint moves from rest to rest, with a triangle or trapezoid of speed.
+
+    Parameters
+    ----------
+    angle : (..., n), rad or m, at least 0
+    speed : (n,), rad/s or m/s, above 0
+    acceleration : (n,), rad/s^2 or m/s^2, above 0
+
+    Returns
+    -------
+    time : (..., n), s
+
+    Notes
+    -----
+    A move shorter than ``speed^2 / acceleration`` never reaches full speed: ``2 sqrt(angle / acceleration)``. Any other
+    takes ``angle / speed + speed / acceleration``. See B. Siciliano et al., *Robotics: Modelling, Planning and
+    Control*, section 4.2.1.
+    """
     short = angle < speed**2 / acceleration
     time: Reals = np.where(short, 2 * np.sqrt(angle / acceleration), angle / speed + speed / acceleration)
     return time
 
 
 def _usable(robot: Robot, solutions: Solutions, scene: Scene | None, number: int) -> Integers:
+    """Rows within the limits and free of collisions; a pose without any is refused."""
     rows = np.flatnonzero(solutions.within_limits)
     if rows.size:
         rows = rows[bodies_of(robot, scene).min_distance_of_turns(solutions.q[rows])[0] >= 0]

@@ -17,7 +17,7 @@ ROUND_OFF = 1e-12
 FULL_TURN = TURN - ROUND_OFF
 Cell = tuple[float, float, float, float]
 """A rectangle of the section, m: rho_0, rho_1, z_0, z_1."""
-MAX_ARCS = 12
+MAX_ARCS = 12  # disjoint intervals that a set has place for; where more would be needed, a set errs to the safe side
 
 
 @kernel
@@ -51,9 +51,18 @@ def _cut(arcs: Reals, count: int, low: float, high: float, more: bool) -> int:
 
 @kernel
 def remove(arcs: Reals, count: int, low: float, high: float, more: bool) -> int:
-    """Take the arc from ``low`` up to ``high`` (any turn) out of the set; returns the new count.
+    """Take an arc out of a set of azimuths. Kernel.
 
-    Where the list is full, ``more`` says whether to take out too much or too little.
+    Parameters
+    ----------
+    arcs : (MAX_ARCS, 2), rad in [0, 2 pi], changed in place
+    count : how many of them count
+    low, high : rad, of any turn; nothing happens if high is not above low
+    more : where the list is full, whether to take out too much (True) or too little
+
+    Returns
+    -------
+    count : of the arcs that are left
     """
     if high <= low:
         return count
@@ -69,7 +78,17 @@ def remove(arcs: Reals, count: int, low: float, high: float, more: bool) -> int:
 
 @kernel
 def meets(arcs: Reals, count: int, low: float, high: float) -> bool:
-    """Whether the arc from ``low`` to ``high`` (any turn) meets the set."""
+    """Whether an arc meets a set of azimuths. Kernel.
+
+    Parameters
+    ----------
+    arcs, count : the set, rad in [0, 2 pi]
+    low, high : rad, of any turn
+
+    Returns
+    -------
+    meets : touching counts
+    """
     if high - low >= TURN:
         return count > 0
     shift = np.floor(low / TURN) * TURN
@@ -84,7 +103,16 @@ def meets(arcs: Reals, count: int, low: float, high: float) -> bool:
 
 @kernel
 def measure(arcs: Reals, count: int) -> float:
-    """Sum of the arcs' lengths, rad."""
+    """Sum of the lengths of a set's arcs. Kernel.
+
+    Parameters
+    ----------
+    arcs, count : the set, rad in [0, 2 pi]
+
+    Returns
+    -------
+    total : rad, 2 pi at most
+    """
     total = 0.0
     for n in range(count):
         total += arcs[n, 1] - arcs[n, 0]

@@ -38,7 +38,7 @@ from er3a.workspace.directions import left_to_roll, poses
 from er3a.workspace.orientations import AskedOrientations
 from er3a.workspace.tool_inverse import all_solutions, generic_manipulability, slot_count
 
-_POSES = 50_000
+_POSES = 50_000  # solved at a time, so that their solutions stay within some hundred megabytes
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +71,18 @@ class Overall:
 
 
 def rings(reach: float, heights: tuple[float, float], cell: float) -> Reals:
-    """Square cells (n, 4) of the section, m, that cover everything within reach: rho_0, rho_1, z_0, z_1."""
+    """Square cells of the section that cover everything within reach.
+
+    Parameters
+    ----------
+    reach : m, largest distance from axis 1
+    heights : m, lowest and highest z; the cells are centred about their middle
+    cell : m, edge
+
+    Returns
+    -------
+    cells : (n, 4), m: rho_0, rho_1, z_0, z_1
+    """
     count = int(np.ceil(reach / cell)), int(np.ceil((heights[1] - heights[0]) / cell))
     rho, z = np.arange(count[0]) * cell, (heights[0] + heights[1] - count[1] * cell) / 2 + np.arange(count[1]) * cell
     rho, z = (grid.ravel() for grid in np.meshgrid(rho, z, indexing="ij"))
@@ -79,7 +90,18 @@ def rings(reach: float, heights: tuple[float, float], cell: float) -> Reals:
 
 
 def overall(capability: Capability, cells: Reals, bar: float = 0.0) -> Overall:
-    """Figures over all reached cells (n, 4), see :func:`rings`, of rings or of bars that are so long (m)."""
+    """Figures over all reached cells: means by volume, and the best of any cell.
+
+    Parameters
+    ----------
+    capability : of n cells
+    cells : (n, 4), m, see :func:`rings`
+    bar : m, length of bars; 0 for rings
+
+    Returns
+    -------
+    figures : all 0 if no cell is reached
+    """
     volume = np.broadcast_to(ring_volumes(cells, bar)[:, None], capability.reachability.shape)
     weight = np.where(capability.reachability > 0, volume, 0.0)
     total = float(weight.sum())
@@ -95,12 +117,18 @@ def overall(capability: Capability, cells: Reals, bar: float = 0.0) -> Overall:
 
 
 def map_capability(robot: Robot, middles: Reals, count: int, asked: AskedOrientations) -> Capability:
-    """Ask cells for their orientations.
+    """Find for each cell which of the required orientations are reached, by how many branches, and how well [1]_.
 
     Parameters
     ----------
+    robot : with its own limits
     middles : (n, 2), m, radius and height of the cells' middles (see :class:`.cell_frame.CellFrame`)
-    count : of directions over the sphere, of turns or of tilts; asked : the required orientations
+    count : of directions over the sphere, of turns or of tilts
+    asked : the required orientations
+
+    Returns
+    -------
+    capability : (n, sectors) each
     """
     frame, free = cell_frame(robot), left_to_roll(without_first_limits(robot), asked.roll)
     reachability, solutions, most, best = np.zeros((4, len(middles), frame.sectors))
@@ -122,15 +150,36 @@ def map_capability(robot: Robot, middles: Reals, count: int, asked: AskedOrienta
 
 
 def manipulability_of(robot: Robot, q: Reals, within: Flags) -> Reals:
-    """Manipulability (m^3) of joint values (..., n), rad; where these are not ``within`` the limits it may be 0."""
+    """Yoshikawa's manipulability [2]_ at joint values.
+
+    Parameters
+    ----------
+    q : (..., n), rad or m
+    within : (...), where joint values are not within the limits, the result may be 0
+
+    Returns
+    -------
+    manipulability : (...), m^3 for six joints; see :func:`.tool_inverse.generic_manipulability`
+    """
     if wrist_partition_missing(robot) or robot.coupling is not None:
         return generic_manipulability(robot, q, within)
     return manipulability(constants_for_blocks(robot), robot.direction * q + robot.offset)
 
 
 def manipulability(arm: BlockConstants, theta: Reals) -> Reals:
-    """``|det J|`` in m^3 for the table's angles (..., 6): the product of the shoulder's, elbow's and wrist's factors.
+    """``|det J|`` of an arm with a spherical wrist: the product of the shoulder's, elbow's and wrist's factors [2]_.
 
+    Parameters
+    ----------
+    arm : constants of the arm
+    theta : (..., 6), rad, the table's angles
+
+    Returns
+    -------
+    manipulability : (...), m^3
+
+    Notes
+    -----
     The determinant is that of the Jacobian at the wrist centre, where it falls into blocks (Siciliano et al.,
     *Robotics*, section 3.3.1): axis 1 moves the wrist by its distance ahead of axis 1, axes 2 and 3 by the triangle's
     area, and the wrist turns by the volume that axes 4, 5 and 6 span.
@@ -206,13 +255,21 @@ def try_poses(
     *,
     asked: AskedOrientations,
 ) -> ClearPoses:
-    """Try poses with the tool point on the circles (or bars) of cells' middles, orientations uniform over all.
+    """Try random poses with the tool point on the circles (or bars) of cells' middles.
 
     Parameters
     ----------
-    middles : (n, 2), m, radius and height about axis 1; places : their sectors' middles (n,) and width, rad or m
-    tries : poses in each; free : which arms count as clear
-    asked : the required orientations; unless these are directions, the orientations tried are even among them
+    robot : with its own limits
+    middles : (n, 2), m, radius and height about axis 1
+    places : their sectors' middles (n,) and width, rad or m
+    tries : poses in each
+    free : which arms count as clear
+    random : the generator
+    asked : the required orientations. Directions: orientations uniform over all; else even among those required
+
+    Returns
+    -------
+    poses : (n,), how many were reached, and how many of these were clear
     """
     frame = cell_frame(robot)
     reached, clear = (np.zeros(len(middles), np.int64) for _ in range(2))

@@ -25,12 +25,12 @@ from er3a.workspace.general_arm import general_arm
 from er3a.workspace.general_proof import prove_general, unfilled_about
 from er3a.workspace.proven import SETTLED, TARGET, Cavity, SectionMap, cavities
 
-PROBES, SAMPLES = 80, 65_536
+PROBES, SAMPLES = 80, 65_536  # arcs of a void that are decided again, each from so many random joint values
 Unit = Literal["deg", "mm"]
 STEPS: dict[Unit, tuple[float, ...]] = {"deg": (15.0, 30.0, 60.0, 90.0, 180.0), "mm": (25.0, 50.0, 100.0, 200.0, 400.0)}
 """By how much a limit is widened until the void vanishes."""
 _SI: dict[Unit, float] = {"deg": np.pi / 180, "mm": 1e-3}  # rad, m
-_GONE, _SHRUNK = 0.98, 0.10
+_GONE, _SHRUNK = 0.98, 0.10  # of the void: as good as filled (2 % is at its border), and more than chance
 
 Side = Literal["lower", "upper"]
 _SIDES: tuple[Side, Side] = ("lower", "upper")
@@ -87,8 +87,20 @@ VoidCause = Disappears | SeveralLimits | Geometry
 
 
 def relaxations(robot: Robot, cavity: Cavity) -> tuple[list[Relaxed], float]:
-    """Judge a void's cells with each limit widened, the strongest first; then the ratio reached without any.
+    """Judge a void's cells with each limit widened, the strongest first; then without any limit.
 
+    Parameters
+    ----------
+    robot : with the limits that hold
+    cavity : the void
+
+    Returns
+    -------
+    single : each limit with the step that fills the void, or the largest
+    unlimited : ratio of the void that is reached without any limit
+
+    Notes
+    -----
     What the proof fills at the middles of cells counts as reached, so that a void may shrink by more.
     """
     probes, weight = _spread_probes(cavity)
@@ -164,6 +176,7 @@ def _relaxed(limit: _Limit, filled: Callable[[Robot], float]) -> Relaxed:
 
 
 def _with_wider_sum(robot: Robot, number: int, side: Side, by: float) -> Robot:
+    """The robot with a limit of a sum widened by an angle or a length, rad or m."""
     limit, others = robot.combined[number], list(robot.combined)
     lower, upper = limit.lower - by * (side == "lower"), limit.upper + by * (side == "upper")
     others[number] = CombinedLimit(limit.factors, lower, upper)
@@ -177,7 +190,17 @@ def _without_limits(robot: Robot) -> Robot:
 
 
 def cause_of(single: list[Relaxed], unlimited: float) -> VoidCause:
-    """The cause that the relaxations show; ``unlimited``: the ratio of the void that is reached without limits."""
+    """The cause of a void that widened limits show.
+
+    Parameters
+    ----------
+    single : of :func:`relaxations`, the strongest first
+    unlimited : ratio of the void that is reached without limits
+
+    Returns
+    -------
+    cause : one limit (or each of two), several limits together, or the geometry
+    """
     gone = [limit for limit in single if limit.filled >= _GONE]
     if gone:
         return Disappears(tuple(each for each in gone if (each.unit, each.by) == (gone[0].unit, gone[0].by))[:2])
@@ -189,6 +212,7 @@ def cause_of(single: list[Relaxed], unlimited: float) -> VoidCause:
 
 
 def _widened(robot: Robot, joint: int, side: Side, by: float) -> Robot:
+    """The robot with one joint's limit widened by an angle or a length, rad or m."""
     lower, upper = robot.lower.copy(), robot.upper.copy()
     if side == "upper":
         upper[joint - 1] += by
@@ -198,12 +222,13 @@ def _widened(robot: Robot, joint: int, side: Side, by: float) -> Robot:
 
 
 def _spread_probes(cavity: Cavity) -> tuple[Cavity, Reals]:
-    """Arcs all over a void, and how much each stands for: all if they are few, else drawn by how much of what is proven
+    """Arcs all over a void, and how much each counts for: all if they are few, else drawn by how much of what is proven
     empty they hold."""
     weight = cavity.volumes * cavity.empty
     if len(weight) <= PROBES:
         chosen = np.flatnonzero(weight > 0)
         return cavity.part(chosen, cavity.enclosed), weight[chosen]
+    # Systematic sampling in a random order: each arc is drawn in proportion to its weight.
     order = np.random.Generator(np.random.Philox(key=len(weight))).permutation(len(weight))
     total = np.cumsum(weight[order])
     drawn = order[np.searchsorted(total, (np.arange(PROBES) + 0.5) * (total[-1] / PROBES))]
@@ -212,8 +237,8 @@ def _spread_probes(cavity: Cavity) -> tuple[Cavity, Reals]:
 
 
 CELLS = 6000  # of the proof of each changed arm
-TURNS_DEG = (-90.0, 90.0, 180.0)
-FACTORS = (-1.0, 0.5, 2.0)
+TURNS_DEG = (-90.0, 90.0, 180.0)  # by which an offset may be wrong
+FACTORS = (-1.0, 0.5, 2.0)  # by which a length may be wrong
 INNER = (1, 2, 3, 4)  # joints 2 to 5; turning joint 1 or 6 moves no section through the reach
 # Lengths that shape the section of an arm with a spherical wrist, by their places.
 SHAPING: dict[Literal["a", "d"], tuple[int, ...]] = {"a": (0, 1, 2), "d": (3, 5)}
@@ -259,11 +284,16 @@ class SingleChange:
 
 
 def single_changes(robot: Robot, cause: VoidCause, seed: int) -> tuple[SingleChange, ...]:
-    """Single changes of a table of an arm with a spherical wrist, those that leave least first, undecided ones last.
+    """Single changes of a table of an arm with a spherical wrist, judged by the voids that they leave.
 
     Parameters
     ----------
     cause : what the limits say of the void; the limits that it names are among the changes
+    seed : of the random joint values of the proofs
+
+    Returns
+    -------
+    changes : those that leave least first, undecided ones last
     """
     found = []
     for column, joint, given, tried in (*_of_table(robot), *_of_limits(robot, cause)):
@@ -275,11 +305,23 @@ def single_changes(robot: Robot, cause: VoidCause, seed: int) -> tuple[SingleCha
 
 
 def _litres(voids: Sequence[Cavity], bound: Literal["lower", "upper"]) -> float:
+    """Volume of voids together, by their lower or upper bounds, in litres."""
     return round(1000 * sum((void.lower if bound == "lower" else void.upper) for void in voids), 3)
 
 
 def with_entry(robot: Robot, column: Column, joint: int, value: float) -> Robot:
-    """The robot with one entry changed; ``joint`` from 1, ``value`` in the column's unit."""
+    """The robot with one entry of its table, or a limit, changed.
+
+    Parameters
+    ----------
+    column : of the table, or "lower", "upper"
+    joint : from 1
+    value : in the column's unit, see ``UNITS``
+
+    Returns
+    -------
+    robot : a copy
+    """
     values = getattr(robot, column).copy()
     values[joint - 1] = value * IN_SI[UNITS[column]]
     return robot.replace(**{column: values})
@@ -312,6 +354,7 @@ def _of_limits(robot: Robot, cause: VoidCause) -> Iterator[Candidate]:
 
 
 def _named(cause: VoidCause) -> Sequence[Relaxed]:
+    """The limits that a cause names."""
     if isinstance(cause, Disappears):
         return cause.limits
     return () if cause.most is None else (cause.most,)

@@ -57,17 +57,46 @@ class CellFrame:
         return (self.bar or TURN) / self.sectors
 
     def place_of(self, sector: Integers) -> Reals:
-        """Middles of sectors: rad, or m along the bar."""
+        """Middles of sectors.
+
+        Parameters
+        ----------
+        sector : any shape, from 0
+
+        Returns
+        -------
+        place : same shape, rad about axis 1, or m along the bar
+        """
         return np.asarray(self.width * (sector + (0.5 if self.bar else 0.0)), dtype=float)
 
     def points(self, rho: Reals, place: Reals, z: Reals) -> Reals:
-        """Points (..., 3), m, in the base frame, at radii (m), places (see :meth:`place_of`) and heights (m)."""
+        """Points of cells in the base frame.
+
+        Parameters
+        ----------
+        rho : m, radius, or x across bars
+        place : rad or m, see :meth:`place_of`
+        z : m, height; the three broadcast against each other
+
+        Returns
+        -------
+        points : (..., 3), m, base frame
+        """
         x, y = (rho, place) if self.bar else (rho * np.cos(place), rho * np.sin(place))
         local: Reals = np.stack(np.broadcast_arrays(x, y, z), axis=-1)
         return local @ self.R + self.origin
 
     def holds(self, points: Reals) -> Flags:
-        """Whether points (n, 3), m, base frame, lie where cells can be."""
+        """Whether points lie where cells can be.
+
+        Parameters
+        ----------
+        points : (n, 3), m, base frame
+
+        Returns
+        -------
+        inside : (n,) bool
+        """
         x, y, z = ((points - self.origin) @ self.R.T).T
         inside: Flags = (z >= self.heights[0]) & (z <= self.heights[1])
         if self.bar:
@@ -75,14 +104,32 @@ class CellFrame:
         return np.asarray(inside & (np.hypot(x, y) <= self.reach))
 
     def distance(self, points: Reals) -> Reals:
-        """Distance (n,), m, of points (n, 3) of the base frame from axis 1; endless where it slides."""
+        """Distance of points from axis 1.
+
+        Parameters
+        ----------
+        points : (n, 3), m, base frame
+
+        Returns
+        -------
+        distance : (n,), m; infinite where joint 1 slides
+        """
         x, y, _ = ((points - self.origin) @ self.R.T).T
         return np.full(len(points), np.inf) if self.bar else np.hypot(x, y)
 
 
 @derived
 def cell_frame(robot: Robot) -> CellFrame:
-    """The frame of a robot's cells."""
+    """The frame of a robot's cells, and how far they go.
+
+    Parameters
+    ----------
+    robot : limits of joint 1 decide about sectors
+
+    Returns
+    -------
+    frame : m, base frame; one sector if joint 1 makes a full turn
+    """
     turns = not robot.slides[0] and (robot.continuous[0] or robot.upper[0] - robot.lower[0] >= FULL_TURN)
     sectors = 1 if turns else SECTORS if is_quick(robot) else _FEW_SECTORS
     arm, R, origin = general_arm(robot)
@@ -97,7 +144,16 @@ def cell_frame(robot: Robot) -> CellFrame:
 
 
 def is_quick(robot: Robot) -> bool:
-    """Whether a pose is solved within some microseconds, or else within some tenths of a millisecond."""
+    """Whether the inverse of a pose takes microseconds, rather than tenths of a millisecond.
+
+    Parameters
+    ----------
+    robot : judged by its class of arm
+
+    Returns
+    -------
+    quick : True for closed forms, also behind locked joints
+    """
     chain: ChainSolver | None = arm_solver(robot).chain
     while isinstance(chain, LockedJoint | PaddedChain):
         chain = chain.rest
@@ -105,8 +161,16 @@ def is_quick(robot: Robot) -> bool:
 
 
 def joint_1_alone(robot: Robot) -> bool:
-    """Whether joint 1 moves the first row alone and as far as itself, is the only one that does, and has limits of its
-    own."""
+    """Whether joint 1 carries around what the others reach, as rings and bars suppose.
+
+    Parameters
+    ----------
+    robot : its coupling and its limits of sums are looked at
+
+    Returns
+    -------
+    alone : joint 1 moves the first row alone and as far as itself, is the only one that does, and has limits of its own
+    """
     coupling = robot.coupling
     if any(limit.factors[0] for limit in robot.combined):
         return False
@@ -115,7 +179,16 @@ def joint_1_alone(robot: Robot) -> bool:
 
 @derived
 def without_first_limits(robot: Robot) -> Robot:
-    """The robot with joint 1 free to bring the tool to place 0 from wherever the others leave it."""
+    """The robot with joint 1 free to bring the tool to place 0 from wherever the others leave it.
+
+    Parameters
+    ----------
+    robot : with its own limits
+
+    Returns
+    -------
+    robot : a copy; joint 1 has a full turn, or on a slide the length of the bars
+    """
     lower, upper = robot.lower.copy(), robot.upper.copy()
     if robot.slides[0]:
         spare = cell_frame(robot).bar - float(upper[0] - lower[0])
@@ -129,7 +202,16 @@ def without_first_limits(robot: Robot) -> Robot:
 
 
 def places_served(robot: Robot, q_1: Reals) -> tuple[Reals, Reals]:
-    """From which place up to which (rad or m) arms that bring the tool to place 0 with joint 1 at q_1 (...,) serve."""
+    """Which places of a ring or bar an arm serves by moving joint 1 within its limits.
+
+    Parameters
+    ----------
+    q_1 : (...), rad or m, joint 1 where the arm brings the tool to place 0
+
+    Returns
+    -------
+    low, high : (...), rad or m, first and last place; 0 if joint 1 makes a full turn
+    """
     if cell_frame(robot).sectors == 1:
         return np.zeros(q_1.shape), np.zeros(q_1.shape)
     low, high = robot.lower[0] - LIMIT_TOLERANCE - q_1, robot.upper[0] + LIMIT_TOLERANCE - q_1
@@ -137,5 +219,6 @@ def places_served(robot: Robot, q_1: Reals) -> tuple[Reals, Reals]:
 
 
 def _sense(robot: Robot) -> float:
+    """The sense in which joint 1 moves along its axis or slide, +1 or -1."""
     sense = robot.direction[0] * (1.0 if robot.coupling is None else robot.coupling[0, 0])
     return float(np.sign(sense))

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from er3a.geometry.vectors import TURN
 from er3a.numerics.arrays import Integers, Reals
 
-_OPEN = 1e-9
+_OPEN = 1e-9  # of a cell's volume: less than this undecided is rounding
 MAX_LEVEL = 7
 """Cells are not split further than this: a set without volume would never be decided."""
 _ARRAYS = "cells", "unfilled", "empty", "level"
@@ -33,7 +33,7 @@ class Proof:
         that are proven empty; unused rows are NaN
     level : (n,), how often the cell was split off
     bar : m, length of the cells where they are bars along a first prismatic joint; 0 for rings. Then rho is the place
-        across the bars beside z, and azimuths are places along them, their length being a turn
+        across the bars next to z, and azimuths are places along them, their length being a turn
     """
 
     cells: Reals
@@ -43,7 +43,16 @@ class Proof:
     bar: float = 0.0
 
     def rows(self, chosen: NDArray[Any]) -> Proof:
-        """The same with some of the cells."""
+        """The same proof with some of the cells.
+
+        Parameters
+        ----------
+        chosen : mask or numbers of cells
+
+        Returns
+        -------
+        proof : in the order chosen
+        """
         return replace(self, **{name: getattr(self, name)[chosen] for name in _ARRAYS})
 
     @property
@@ -79,12 +88,23 @@ Judge = Callable[[Reals, int, Proof | None], Proof]
 
 
 def _arc_ratio(arcs: Reals) -> Reals:
+    """Sum (n,) of arcs (n, MAX_ARCS, 2) in parts of a turn."""
     ratio: Reals = np.nansum(arcs[..., 1] - arcs[..., 0], axis=1) / TURN
     return ratio
 
 
 def ring_volumes(cells: Reals, bar: float = 0.0) -> Reals:
-    """Volumes (n,) in m^3 of rings with the sections (n, 4), or of bars of that length (m)."""
+    """Volumes of rings about axis 1, or of bars.
+
+    Parameters
+    ----------
+    cells : (n, 4), m: rho_0, rho_1, z_0, z_1
+    bar : m, length of bars; 0 for rings
+
+    Returns
+    -------
+    volumes : (n,), m^3, of whole turns
+    """
     if bar > 0:
         return np.asarray((cells[:, 1] - cells[:, 0]) * (cells[:, 3] - cells[:, 2]) * bar)
     volumes: Reals = np.pi * (cells[:, 1] ** 2 - cells[:, 0] ** 2) * (cells[:, 3] - cells[:, 2])
@@ -92,14 +112,36 @@ def ring_volumes(cells: Reals, bar: float = 0.0) -> Reals:
 
 
 def in_space(rho: Reals, azimuth: Reals, z: Reals, bar: float = 0.0) -> Reals:
-    """Points (..., 3), m, of rings about axis 1, or of bars of that length (m), in their frame."""
+    """Points of rings about axis 1, or of bars, in their frame.
+
+    Parameters
+    ----------
+    rho : m, radius, or place across bars
+    azimuth : rad; along bars 2 pi is their length
+    z : m; the three broadcast against each other
+    bar : m, length of bars; 0 for rings
+
+    Returns
+    -------
+    points : (..., 3), m, in the frame about axis 1
+    """
     if bar > 0:
         return np.stack(np.broadcast_arrays(rho, azimuth * (bar / TURN), z), axis=-1)
     return np.stack(np.broadcast_arrays(rho * np.cos(azimuth), rho * np.sin(azimuth), z), axis=-1)
 
 
 def in_section(points: Reals, bar: float = 0.0) -> tuple[Reals, Reals, Reals]:
-    """Radius (m), azimuth (rad) and height (m) of points (..., 3), as :func:`in_space` takes them."""
+    """Radius, azimuth and height of points: the inverse of :func:`in_space`.
+
+    Parameters
+    ----------
+    points : (..., 3), m, in the frame about axis 1
+    bar : m, length of bars; 0 for rings
+
+    Returns
+    -------
+    rho, azimuth, z : (...), m, rad (in [-pi, pi] for rings), m
+    """
     x, y, z = np.moveaxis(points, -1, 0)
     return (x, y * (TURN / bar), z) if bar > 0 else (np.hypot(x, y), np.arctan2(y, x), z)
 
@@ -116,6 +158,10 @@ def refined(
     target : required width of the bracket, (upper - lower) / upper
     most_cells : how many cells may be examined; the first grid is always finished
     across : cells along the height of the first grid
+
+    Returns
+    -------
+    proof : cells that tile the rectangle without overlap
     """
     cells = _first_cells(reach, heights, across)
     level, looked, done, settled = 0, 0, [], np.zeros(2)
@@ -129,6 +175,7 @@ def refined(
         lower, upper = settled + reached @ volumes
         if upper - lower <= target * upper or level == MAX_LEVEL:
             split[:] = False
+        # Each split cell becomes four.
         room = max(0, most_cells - looked) // 4
         if split.sum() > room:
             # Little volume lies about the axis, but what is open there joins voids to the outside.
@@ -152,6 +199,7 @@ def _first_cells(reach: float, heights: tuple[float, float], across: int) -> Rea
 
 
 def _quarters(cells: Reals) -> Reals:
+    """Each cell (n, 4) as four (4 n, 4), one after another."""
     rho, z = cells[:, :2].mean(axis=1), cells[:, 2:].mean(axis=1)
     rows = [
         np.stack([a, b, c, d], axis=1)

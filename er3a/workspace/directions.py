@@ -16,8 +16,8 @@ from er3a.kinematics.wrist_partitioned import wrist_partition_missing, wrist_par
 from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
 
-_ON_AXIS = 1e-12
-RING = np.radians(10)
+_ON_AXIS = 1e-12  # m, and sine of an angle: rounding of tables that are exact
+RING = np.radians(10)  # rings of a cone are at most this far from each other
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,17 @@ class Roll:
 
 
 def roll_of(robot: Robot, rolls: int) -> Roll:
-    """Whether the robot's roll is free, else ``rolls`` even ones."""
+    """How the roll about the tool's direction is treated for a robot.
+
+    Parameters
+    ----------
+    robot : the roll is free if axis 6 and the wrist centre lie on the tool's z axis and the last joint moves alone
+    rolls : how many even ones to try if it is not
+
+    Returns
+    -------
+    roll : angles in rad
+    """
     if wrist_partition_missing(robot):
         last = constant_links(robot)[-1]
         axis_6, wrist = last[2, :3], -last[:3, :3].T @ last[:3, 3]
@@ -60,19 +70,38 @@ def _last_turns_alone(robot: Robot) -> bool:
 
 
 def left_to_roll(robot: Robot, roll: Roll) -> Robot:
-    """The robot with a full turn of its last joint if it is what a free roll is made of."""
+    """The robot as poses with a free roll are asked of it: with a full turn of its last joint.
+
+    Parameters
+    ----------
+    robot : with its own limits
+    roll : of :func:`roll_of`
+
+    Returns
+    -------
+    robot : the same object if the roll is not free, or not made by the last joint
+    """
     return with_full_turn(robot, robot.joints - 1) if roll.free and roll.last_joint else robot
 
 
 def with_full_turn(robot: Robot, joint: int) -> Robot:
-    """The robot with a full turn of one joint (from 0)."""
+    """The robot with a full turn of one joint, from -pi to pi.
+
+    Parameters
+    ----------
+    joint : from 0
+
+    Returns
+    -------
+    robot : a copy
+    """
     lower, upper = robot.lower.copy(), robot.upper.copy()
     lower[joint], upper[joint] = -np.pi, np.pi
     return robot.replace(lower=lower, upper=upper)
 
 
 def cone_directions(axis: Reals, half_angle: float, step: float = RING) -> Reals:
-    """Unit vectors (n, 3) of a cone: rings at most ``step`` (rad) apart, the outermost (on the cone's edge) first.
+    """Unit vectors (n, 3) of a cone: rings, the outermost (on the cone's edge) first.
 
     Each ring is its own image under quarter turns.
 
@@ -89,14 +118,34 @@ def cone_directions(axis: Reals, half_angle: float, step: float = RING) -> Reals
 
 
 def from_polar(axis: Reals, polar: Reals, around: Reals) -> Reals:
-    """Unit vectors (n, 3) at angles (n,) in rad from an axis and around it."""
+    """Unit vectors at angles from an axis and around it.
+
+    Parameters
+    ----------
+    axis : (3,), unit vector
+    polar : (n,), rad, from the axis
+    around : (n,), rad, about it, from a direction that :func:`across` chooses
+
+    Returns
+    -------
+    directions : (n, 3)
+    """
     x, y = across(axis[None])
     flat = np.cos(around)[:, None] * x + np.sin(around)[:, None] * y
     return np.sin(polar)[:, None] * flat + np.cos(polar)[:, None] * axis
 
 
 def across(directions: Reals) -> tuple[Reals, Reals]:
-    """Unit vectors x, y (n, 3) that make a right-handed frame with each direction (n, 3) as z."""
+    """Two unit vectors that make a right-handed frame with each direction as z.
+
+    Parameters
+    ----------
+    directions : (n, 3), unit vectors
+
+    Returns
+    -------
+    x, y : (n, 3) each
+    """
     helper = np.eye(3)[np.argmin(np.abs(directions), axis=1)]
     x = np.cross(helper, directions)
     x = x / np.linalg.norm(x, axis=1, keepdims=True)
@@ -104,7 +153,17 @@ def across(directions: Reals) -> tuple[Reals, Reals]:
 
 
 def tool_rotations(directions: Reals, roll: Roll) -> Reals:
-    """Orientations (n, rolls, 3, 3) of the tool frame with z along each direction (n, 3)."""
+    """Orientations of the tool frame with z along given directions, one for each roll.
+
+    Parameters
+    ----------
+    directions : (n, 3), unit vectors, base frame
+    roll : its angles (rad) turn x and y of :func:`across` about the direction
+
+    Returns
+    -------
+    rotations : (n, rolls, 3, 3)
+    """
     x, y = across(directions)
     c, s = np.cos(roll.angles)[:, None], np.sin(roll.angles)[:, None]
     rolled_x, rolled_y = c * x[:, None] + s * y[:, None], c * y[:, None] - s * x[:, None]
@@ -113,7 +172,17 @@ def tool_rotations(directions: Reals, roll: Roll) -> Reals:
 
 
 def poses(points: Reals, rotations: Reals) -> Reals:
-    """Poses (..., 4, 4) from points (..., 3) in m and rotations (..., 3, 3), broadcast against each other."""
+    """Poses from points and rotations, broadcast against each other.
+
+    Parameters
+    ----------
+    points : (..., 3), m
+    rotations : (..., 3, 3)
+
+    Returns
+    -------
+    T : (..., 4, 4)
+    """
     shape = np.broadcast_shapes(points.shape[:-1], rotations.shape[:-2])
     T = np.zeros((*shape, 4, 4))
     T[..., :3, :3], T[..., :3, 3], T[..., 3, 3] = rotations, points, 1.0

@@ -20,7 +20,7 @@ from er3a.robots.robot import Robot
 from er3a.workspace.arcs import FULL_TURN, ROUND_OFF
 
 _SPARE = 0.01  # of what is reached, left on either side of bars
-_UPRIGHT = 1e-6
+_UPRIGHT = 1e-6  # sine between the slide and the vertical, below which another direction is z
 
 
 class GeneralArm(NamedTuple):
@@ -43,7 +43,7 @@ class GeneralArm(NamedTuple):
     combined (c, m), combined_lower, combined_upper (c,) : ``combined_lower <= combined @ v <= combined_upper``
     full_turn : whether joint 1 covers a full turn
     bar : m, length of the bars along a joint 1 that slides, 0 where it turns. Then the frame has y along the slide, the
-        point stands at x from 0 to ``radii[0]`` and, with the slide at its lower limit, at y from 0 on; places along
+        point is at x from 0 to ``radii[0]`` and, with the slide at its lower limit, at y from 0 on; places along
         y are given as angles, ``bar`` being a turn, and so is the range of joint 1 (from 0)
     """
 
@@ -73,14 +73,27 @@ class GeneralArm(NamedTuple):
 
 
 def coupled(robot: Robot) -> bool:
-    """Whether joints depend on one another, or sums of them have limits."""
+    """Whether joints depend on one another, or sums of them have limits.
+
+    Returns
+    -------
+    coupled : if so, the values v of :class:`GeneralArm` are joint values instead of row values
+    """
     return robot.coupling is not None or bool(robot.combined)
 
 
 def general_arm(robot: Robot) -> tuple[GeneralArm, Reals, Reals]:
-    """The chain of a robot, and the frame about axis 1: x, y, z in the base frame as rows (3, 3), and origin (3,).
+    """The chain of a robot for the proof, and the frame about axis 1.
 
-    A joint 1 that slides along other joints makes bars; see :class:`GeneralArm`.
+    Parameters
+    ----------
+    robot : any; a joint 1 that slides along other joints makes bars, see :class:`GeneralArm`
+
+    Returns
+    -------
+    arm : in the frame about axis 1
+    R : (3, 3), rows are x, y, z of that frame in the base frame
+    origin : (3,), m, its origin in the base frame
     """
     links = constant_links(robot)
     last, tip = moving_tip(links, robot.sliding)
@@ -168,6 +181,7 @@ def _levers(links: Reals, tip: Reals, sliding: Flags, lower: Reals, upper: Reals
     for k in range(last, -1, -1):
         if sliding[k]:
             low, high, ball = low + lower[k], high + upper[k], ball + max(abs(lower[k]), abs(upper[k]))
+        # Two bounds at a time: what one gives away over a link, the other may keep.
         radius, low, high = min(radius, ball), max(low, -ball), min(high, ball)
         radii[k], heights[k] = radius, (low, high)
         R, t = links[k, :3, :3], links[k, :3, 3]
@@ -181,13 +195,13 @@ def _levers(links: Reals, tip: Reals, sliding: Flags, lower: Reals, upper: Reals
 
 @kernel
 def place(arm: GeneralArm, theta: Reals, radii: Reals, columns: Reals, frame: Reals) -> Vector:
-    """The tool point for one joint vector, with levers and derivatives.
+    """The tool point for one joint vector, with levers and derivatives. Kernel.
 
     Parameters
     ----------
     theta : (n,), rad or m
-    radii : (n,), set to the point's distance from each axis, m; 1 for prismatic joints
-    columns : (n, 3), set to the derivative of the point by each value, m
+    radii : (n,), filled with the point's distance from each axis, m; 1 for prismatic joints
+    columns : (n, 3), filled with the derivative of the point by each value, m
     frame : (3, 4), working memory
 
     Returns
@@ -223,7 +237,17 @@ def place(arm: GeneralArm, theta: Reals, radii: Reals, columns: Reals, frame: Re
 
 @kernel
 def point_of(arm: GeneralArm, theta: Reals, radii: Reals) -> Vector:
-    """The tool point for one joint vector, and its levers; see :func:`place`."""
+    """The tool point for one joint vector, and its levers. Kernel.
+
+    Parameters
+    ----------
+    theta : (n,), rad or m
+    radii : (n,), filled with the point's distance from each axis, m; 1 for prismatic joints
+
+    Returns
+    -------
+    x, y, z : m, in the frame of joint 1 before it moves
+    """
     x, y, z = arm.tip[0], arm.tip[1], arm.tip[2]
     for k in range(theta.shape[0] - 1, -1, -1):
         if arm.sliding[k]:
@@ -245,7 +269,7 @@ def point_of(arm: GeneralArm, theta: Reals, radii: Reals) -> Vector:
 
 @kernel
 def curvature(arm: GeneralArm, moves: Reals, radii: Reals) -> float:
-    """Bound (m) on the second derivative of the point along a straight line of joint values.
+    """Bound on the second derivative of the point along a straight line of joint values. Kernel.
 
     ``|d2p / dx_i dx_j|`` for i <= j is at most the distance of p from axis j if both turn [1]_, 1 if j slides and 0 if
     i does.
@@ -254,6 +278,10 @@ def curvature(arm: GeneralArm, moves: Reals, radii: Reals) -> float:
     ----------
     moves : (n,), by how much each value changes, rad or m, no less than 0
     radii : (n,), the levers at a point of the line
+
+    Returns
+    -------
+    bound : m, for the line's parameter from 0 to 1
 
     References
     ----------

@@ -40,8 +40,8 @@ from er3a.workspace.general_arm import GeneralArm, curvature, place, point_of
 from er3a.workspace.outer_sets import exclude_cells, outer_rings
 
 _ROOM, _STEPS, _PER_EDGE, _CORNERS = 0.2, 8, 5, 4
-_TINY = 1e-12
-_PER_BUCKET = 48
+_TINY = 1e-12  # determinant, in parts of the entries, below which two directions are one
+_PER_BUCKET = 48  # joint values kept for a bucket: twice as many as are tried for a ring
 
 
 class Postures(NamedTuple):
@@ -85,7 +85,17 @@ class Memory(NamedTuple):
 
 
 def postures(arm: GeneralArm, across: int, most: int) -> Postures:
-    """An empty list with capacity for this many joint values."""
+    """An empty list of joint values, in buckets of the section.
+
+    Parameters
+    ----------
+    across : buckets along radius and along height
+    most : how many joint values there is place for
+
+    Returns
+    -------
+    known : nothing in it yet
+    """
     low, high = arm.heights[0]
     size = np.array([arm.radii[0], high - low]) * (1 + 1e-9) / across + 1e-9
     following, used = np.full(most, -1, dtype=np.int64), np.zeros(1, dtype=np.int64)
@@ -95,7 +105,16 @@ def postures(arm: GeneralArm, across: int, most: int) -> Postures:
 
 
 def memory(arm: GeneralArm) -> Memory:
-    """Working memory for an arm."""
+    """Working memory for an arm, for the kernels of this module.
+
+    Parameters
+    ----------
+    arm : of n rows and m joint values
+
+    Returns
+    -------
+    memory : not initialised
+    """
     n, m = arm.drive.shape
     corners = _PER_EDGE * _CORNERS
     return Memory(
@@ -153,7 +172,15 @@ def _allowed(arm: GeneralArm, v: Reals) -> bool:
 
 @kernel
 def keep(arm: GeneralArm, known: Postures, v: Reals, rho: float, z: float, azimuth: float) -> None:
-    """Add joint values to the list, unless their bucket is full."""
+    """Add joint values to the list, unless their bucket is full. Kernel.
+
+    Parameters
+    ----------
+    known : the list, changed in place
+    v : (m,), rad or m, with joint 1 at theta 0
+    rho, z : m, where they bring the tool point
+    azimuth : rad
+    """
     i, j = int((rho - known.low[0]) / known.size[0]), int((z - known.low[1]) / known.size[1])
     i, j = min(max(i, 0), known.first.shape[0] - 1), min(max(j, 0), known.first.shape[1] - 1)
     at = known.used[0]
@@ -168,7 +195,14 @@ def keep(arm: GeneralArm, known: Postures, v: Reals, rho: float, z: float, azimu
 
 @kernel
 def sample(arm: GeneralArm, unit: Reals, known: Postures, memory: Memory) -> None:
-    """Add random joint values; unit (N, m) holds uniform numbers in (0, 1)."""
+    """Add random joint values to the list, without those that break limits of sums. Kernel.
+
+    Parameters
+    ----------
+    unit : (N, m), uniform numbers in (0, 1), stretched to the limits
+    known : the list, changed in place
+    memory : working memory
+    """
     for row in range(unit.shape[0]):
         for j in range(unit.shape[1]):
             memory.v[j] = arm.v_lower[j] + unit[row, j] * (arm.v_upper[j] - arm.v_lower[j])
@@ -293,14 +327,17 @@ def _winds(arm: GeneralArm, cell: Cell, scale: float, memory: Memory) -> bool:
         e = (c + 1) % corners
         for k in range(n):
             memory.moves[k] = abs(memory.thetas[e, k] - memory.thetas[c, k])
+        # Between two samples the image leaves its chord by an eighth of the second derivative at most.
         off = 0.125 * curvature(arm, memory.moves, memory.levers[c])
         if arm.bar == 0.0:
+            # A straight chord in space is bent in the section, where radius is a distance from the axis.
             flat = np.hypot(memory.flat[e, 0] - memory.flat[c, 0], memory.flat[e, 1] - memory.flat[c, 1])
             nearest = rho + min(memory.points[c, 0], memory.points[e, 0]) - 0.5 * flat
             off += min(flat, flat * flat / (8.0 * nearest)) if nearest > 0.0 else flat
         x_0, y_0, x_1, y_1 = memory.points[c, 0], memory.points[c, 1], memory.points[e, 0], memory.points[e, 1]
         if not _misses(x_0, y_0, x_1, y_1, w + off, h + off):
             return False
+        # Crossings of the positive half axis, counted by their sense.
         side = x_0 * y_1 - x_1 * y_0
         if y_0 <= 0.0 < y_1 and side > 0.0:
             winding += 1
@@ -421,6 +458,7 @@ def _try(arm: GeneralArm, cell: Cell, hold: float, known: Postures, memory: Memo
     azimuth = _azimuth(arm, x, y)
     if not arm.full_turn and not meets(arcs, count, arm.lower[0] + azimuth, arm.upper[0] + azimuth):
         return count
+    # The smallest line around the rectangle loses least at the border; a larger one tolerates more curvature.
     for scale in (1.25, 1.7, 2.5):
         if not _winds(arm, cell, scale, memory):
             continue
@@ -431,6 +469,7 @@ def _try(arm: GeneralArm, cell: Cell, hold: float, known: Postures, memory: Memo
         if not found:
             continue
         before = measure(arcs, count)
+        # Joint 1 carries a filled ring from its lower to its upper limit; only azimuths that all points reach count.
         count = remove(arcs, count, arm.lower[0] + high, arm.upper[0] + low, False)
         if measure(arcs, count) < before:
             keep(arm, known, memory.v, rho, z, azimuth)
@@ -448,13 +487,14 @@ def fill_cells(
     memory: Memory,
     tries: int,
 ) -> None:
-    """Take what is proven filled of rings about axis 1 out of their open arcs.
+    """Take what is proven filled of rings about axis 1 out of their open arcs. Kernel.
 
     Parameters
     ----------
     cells : (N, 4), m
-    unfilled, counts : (N, MAX_ARCS, 2), rad, and (N,); changed
+    unfilled, counts : (N, MAX_ARCS, 2), rad, and (N,); changed in place
     known : joint values to begin from; those that fill a ring are added
+    memory : working memory
     tries : how many of them are tried for each ring
     """
     for n in range(cells.shape[0]):
@@ -474,18 +514,19 @@ def fill_cells(
                         if arm.full_turn or meets(unfilled[n], counts[n], a, b):
                             tried += 1
                             copy_values(known.v[at], memory.v)
+                            # Every other try holds the point firmly in the arm's plane: fewer azimuths are lost.
                             hold = 0.0 if arm.full_turn or tried % 2 == 0 else 1e3
                             counts[n] = _try(arm, cell, hold, known, memory, unfilled[n], counts[n])
                         at = known.following[at]
             ring += 1
 
 
-SAMPLES, TRIES = 400_000, 24
-FINEST, MIN_CELL = 1000, 1e-4
+SAMPLES, TRIES = 400_000, 24  # joint values to begin from, and how many are tried for a ring
+FINEST, MIN_CELL = 1000, 1e-4  # rings across at most; m, smallest side of the section
 POINT = 1e-5
 """Edge (m) of the cell that represents a point."""
-_BUCKETS, _MAX_POSTURES = 96, 300_000
-_PORTION = 1 << 16
+_BUCKETS, _MAX_POSTURES = 96, 300_000  # of the section across; joint values kept in all of them
+_PORTION = 1 << 16  # random joint values drawn at a time
 _ACROSS = 2.5  # rings along each set after joint 1, for each cell across
 
 
@@ -521,12 +562,17 @@ def unfilled_about(arm: GeneralArm, rho: Reals, z: Reals, samples: int) -> Reals
 
 
 def prove_general(arm: GeneralArm, target: float, most_cells: int, seed: int) -> Proof:
-    """Decide the section of an arm about axis 1.
+    """Decide the section of an arm about axis 1: which rings it fills, which it leaves empty.
 
     Parameters
     ----------
-    target : required width of the bracket
+    target : required width of the bracket, (upper - lower) / upper
     most_cells : how many cells may be examined; the first grid is always finished
+    seed : of the random joint values
+
+    Returns
+    -------
+    proof : cells that tile all that the arm can reach, with their arcs
     """
     outer = outer_rings(arm, min(FINEST, int(_ACROSS * np.sqrt(most_cells))))
     known, room = _sampled(arm, SAMPLES, seed)
@@ -540,6 +586,7 @@ def prove_general(arm: GeneralArm, target: float, most_cells: int, seed: int) ->
             unfilled[:] = parents.unfilled
             counts = np.isfinite(unfilled[..., 0]).sum(axis=1)
         exclude_cells(arm, outer, cells, empty, empties)
+        # Cells that are empty all around need no attempt to fill them.
         nowhere = (empties == 1) & (empty[:, 0, 1] - empty[:, 0, 0] >= TURN)
         some = np.flatnonzero(~nowhere)
         parts = unfilled[some], counts[some]

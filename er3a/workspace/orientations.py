@@ -23,9 +23,9 @@ from er3a.workspace.cell_frame import cell_frame
 from er3a.workspace.directions import Roll, cone_directions, roll_of, tool_rotations
 
 AskedKind = Literal["directions", "tilts", "turns", "points"]
-_PARALLEL = 1e-9
-_MIN_PLANAR = 3
-_TASK_TURNS = 36
+_PARALLEL = 1e-9  # sine: rounding of tables that are exact
+_MIN_PLANAR = 3  # joints that place the tool in a plane and tilt it there
+_TASK_TURNS = 36  # about a SCARA's axes, one for each 10 deg
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,20 @@ class TiltPlane:
     tilt: float
 
     def turns(self, points: Reals) -> Reals:
-        """By how much joint 1 turns the plane to reach points (n, 3), m: (n, 2), rad, NaN where it can't."""
+        """By how much joint 1 turns the plane to reach points.
+
+        Parameters
+        ----------
+        points : (n, 3), m, base frame
+
+        Returns
+        -------
+        turns : (n, 2), rad, NaN where it can't
+
+        Notes
+        -----
+        The plane is at a constant distance from axis 1, so it meets a circle about the axis twice, once, or never.
+        """
         away = points - self.origin
         flat = self.normal - (self.normal @ self.axis) * self.axis
         a, b = away @ flat, away @ np.cross(self.axis, flat)
@@ -59,12 +72,33 @@ class TiltPlane:
         return np.asarray(np.arctan2(b, a)[:, None] + np.stack([aside, -aside], axis=1))
 
     def tilted(self, points: Reals, tilts: Reals) -> Reals:
-        """Orientations (n, asked, 2, 3, 3) at points (n, 3), m, and tilts (1 or n, asked, 2), rad, of the plane's two
-        turns."""
+        """Orientations of the tool at points, for tilts within the plane.
+
+        Parameters
+        ----------
+        points : (n, 3), m, base frame
+        tilts : (1 or n, asked, 2), rad, one for each of the plane's two turns
+
+        Returns
+        -------
+        rotations : (n, asked, 2, 3, 3); one that the arm can't take where the plane can't reach the point
+        """
         return self._rotations(*np.broadcast_arrays(self.turns(points)[:, None], tilts))
 
     def tilted_within(self, points: Reals, axis: Reals, half_angle: float, step: float) -> Reals:
-        """The same of tilts along which the tool is within ``half_angle`` of an axis, ``step`` (rad) apart."""
+        """Orientations of the tool at points along which it is within an angle of an axis.
+
+        Parameters
+        ----------
+        points : (n, 3), m, base frame
+        axis : (3,), unit vector
+        half_angle : rad
+        step : rad, between one tilt and the next at most
+
+        Returns
+        -------
+        rotations : (n, asked, 2, 3, 3), of the plane's two turns
+        """
         turns = self.turns(points)
         frames = Rotation.from_rotvec(np.nan_to_num(turns).reshape(-1, 1) * self.axis).as_matrix()
         normal, up = frames @ self.normal, frames @ self.up
@@ -105,7 +139,17 @@ class AskedOrientations:
     plane: TiltPlane | None = None
 
     def everywhere(self, points: Reals, count: int) -> Reals:
-        """All required orientations at points (n, 3), m, of place 0: (1 or n, asked, tries, 3, 3)."""
+        """All required orientations at points of place 0.
+
+        Parameters
+        ----------
+        points : (n, 3), m, base frame
+        count : of directions, turns or tilts
+
+        Returns
+        -------
+        rotations : (1 or n, asked, tries, 3, 3); an orientation counts as reached if one of its tries is
+        """
         if self.kind == "points":
             return np.eye(3)[None, None, None]
         if self.kind == "turns":
@@ -118,7 +162,7 @@ class AskedOrientations:
     def in_cone(self, points: Reals, axis: Reals, half_angle: float, step: float) -> Reals:
         """A task's orientations at points (n, 3), m: (1 or n, asked, tries, 3, 3), none if no orientation fits.
 
-        Directions within ``half_angle`` (rad) of ``axis`` (3,) are asked ``step`` (rad) apart; of a SCARA, one of the
+        Directions within ``half_angle`` (rad) of ``axis`` (3,) are asked every ``step`` (rad); of a SCARA, one of the
         turns along which its tool points so.
         """
         if self.kind == "points":
@@ -132,7 +176,17 @@ class AskedOrientations:
         return tool_rotations(cone_directions(axis, half_angle, step), self.roll)[None]
 
     def at_random(self, points: Reals, random: np.random.Generator) -> Reals:
-        """One of the turns or tilts, or of the plane's two, at each of the points (n, 3), m: (n, 3, 3)."""
+        """One random turn or tilt at each point.
+
+        Parameters
+        ----------
+        points : (n, 3), m, base frame
+        random : the generator
+
+        Returns
+        -------
+        rotations : (n, 3, 3); of tilts with one of the plane's two turns; the identity where only points are asked
+        """
         turns = 2 * np.pi * random.random(len(points))
         if self.kind == "turns":
             return self._about_axis(turns)
@@ -142,12 +196,21 @@ class AskedOrientations:
         return np.broadcast_to(np.eye(3), (len(points), 3, 3))
 
     def _about_axis(self, turns: Reals) -> Reals:
+        """The tool turned about the axis by angles (n,), rad: (n, 3, 3)."""
         return np.asarray(Rotation.from_rotvec(turns[:, None] * self.axis).as_matrix() @ self.tool)
 
 
 def asked_of(robot: Robot, rolls: int) -> AskedOrientations | None:
-    """What is asked of a robot's tool, with so many rolls where these matter; None where it is not known what its few
-    joints can do at a point."""
+    """Which orientations are asked of a robot's tool, depending on what its joints can set.
+
+    Parameters
+    ----------
+    rolls : how many to try about a direction, where they matter
+
+    Returns
+    -------
+    asked : None where it is not known what its few joints can do at a point
+    """
     axes, _, T = axes_at_zero_theta(robot)
     code, tool, axis = arm_solver(robot).chain.code, T[:3, :3], axes[0]
     none = Roll(True, (0.0,), last_joint=False)

@@ -22,8 +22,8 @@ from er3a.workspace.arcs import FULL_TURN, ROUND_OFF, Cell, remove
 from er3a.workspace.general_arm import GeneralArm
 
 Spread = tuple[float, float, float, float, float, float]
-_PIECES, _LEVELS = 64, 6
-_ARCS = 6
+_PIECES, _LEVELS = 64, 6  # of a turn that is searched, and how often a piece is halved at most
+_ARCS = 6  # of azimuth that are kept for a ring
 
 
 class Rings(NamedTuple):
@@ -46,11 +46,16 @@ class Rings(NamedTuple):
 
 
 def outer_rings(arm: GeneralArm, across: int) -> Rings:
-    """What the joints after joint 1 may reach, about axis 2; of an arm of one joint its tip.
+    """What the joints after joint 1 may reach at most, as rings about axis 2; of an arm of one joint its tip.
 
     Parameters
     ----------
+    arm : in the frame about axis 1
     across : rings along the longer side of each set
+
+    Returns
+    -------
+    rings : about axis 2, with the azimuths that are proven empty
     """
     last = len(arm.lower) - 1
     tip = arm.tip
@@ -72,6 +77,7 @@ def outer_rings(arm: GeneralArm, across: int) -> Rings:
 
 
 def _grid(arm: GeneralArm, k: int, across: int) -> Rings:
+    """Rings that cover all that the joints from k on reach, all of them empty."""
     return _at_heights(arm, k, across, *arm.heights[k])
 
 
@@ -89,6 +95,7 @@ def _at_heights(arm: GeneralArm, k: int, across: int, low: float, high: float) -
 
 
 def _summed(rings: Rings) -> Rings:
+    """The rings with sums over the first rows and columns of those that are not wholly empty."""
     whole = (rings.counts == 1) & (rings.empty[:, :, 0, 1] - rings.empty[:, :, 0, 0] >= TURN)
     reached = np.zeros((whole.shape[0] + 1, whole.shape[1] + 1), dtype=np.int64)
     reached[1:, 1:] = (~whole).cumsum(axis=0).cumsum(axis=1)
@@ -96,6 +103,7 @@ def _summed(rings: Rings) -> Rings:
 
 
 def _carried(arm: GeneralArm, k: int, rings: Rings, outer: Rings) -> Rings:
+    """Fill rings about axis k with what the joints after it reach, turned by its range."""
     low, high = (0.0, 0.0) if arm.sliding[k] else (arm.lower[k], arm.upper[k])
     _carry(np.ascontiguousarray(arm.links[k + 1]), low, high, outer, rings)
     return rings
@@ -103,6 +111,7 @@ def _carried(arm: GeneralArm, k: int, rings: Rings, outer: Rings) -> Rings:
 
 @kernel
 def _mark_tip(arm: GeneralArm, k: int, rho: float, azimuth: float, alone: bool, rings: Rings) -> None:
+    """Mark the rings that the tool point is in as the last joint moves, for the azimuths that it turns through."""
     z_0 = arm.tip[2] + (arm.lower[k] if arm.sliding[k] else 0.0)
     z_1 = arm.tip[2] + (arm.upper[k] if arm.sliding[k] else 0.0)
     a = azimuth + (0.0 if arm.sliding[k] else arm.lower[k]) - 1e-6
@@ -159,6 +168,7 @@ def _spread(L: Reals, cell: Cell, angle: float, width: float, bar: float) -> Spr
     px = L[0, 0] * x + L[1, 0] * y + L[2, 0] * height
     py = L[0, 1] * x + L[1, 1] * y + L[2, 1] * height
     pz = L[0, 2] * x + L[1, 2] * y + L[2, 2] * height
+    # How far an arc of that width falls back from its tangent, and how far it runs along it.
     sag = cell[1] * (1.0 - np.cos(width)) if width < np.pi else 2.0 * cell[1]
     d_rho, d_z = 0.5 * (cell[1] - cell[0]), 0.5 * (cell[3] - cell[2])
     d_turn = cell[1] * (np.sin(width) if width < 0.5 * np.pi else 1.0)
@@ -190,6 +200,7 @@ def _meets(L: Reals, cell: Cell, angle: float, width: float, outer: Rings, bar: 
     if i_0 > i_1 or j_0 > j_1:
         return False
     sums = outer.reached
+    # Summed areas: whether any ring of the range is not wholly empty, by four look-ups.
     total = sums[i_1 + 1, j_1 + 1] - sums[i_0, j_1 + 1] - sums[i_1 + 1, j_0] + sums[i_0, j_0]
     if total == 0:
         return False
@@ -228,14 +239,15 @@ def _meets_anywhere(L: Reals, cell: Cell, outer: Rings, levels: int) -> bool:
 def exclude(
     L: Reals, cell: Cell, ends: tuple[float, float, float], outer: Rings, arcs: Reals, count: int, flags: Flags
 ) -> int:
-    """Take the azimuths that a joint's range brings a ring or bar to out of its arcs; what is left is empty.
+    """Take the azimuths that a joint's range brings a ring or bar to out of its arcs; what is left is empty. Kernel.
 
     Parameters
     ----------
     L : (4, 4), the link after the joint
+    cell : the ring or bar, m
     ends : the joint's range, rad, and the length of bars, m (0 for rings)
     outer : the largest reach of the joints after it
-    arcs, count : the arcs that are empty so far; changed
+    arcs, count : the arcs that are empty so far; changed in place
     flags : (2, longest) bool, working memory
 
     Returns
@@ -337,12 +349,14 @@ def _remove_rest(empty: Reals, empty_count: int, arcs: Reals, count: int) -> int
 
 @kernel
 def exclude_cells(arm: GeneralArm, outer: Rings, cells: Reals, empty: Reals, counts: Integers) -> None:
-    """Azimuths of rings about axis 1, or places along bars, that are proven empty.
+    """Find azimuths of rings about axis 1, or places along bars, that are proven empty. Kernel.
 
     Parameters
     ----------
+    arm : gives joint 1's range and link
+    outer : of :func:`outer_rings`
     cells : (N, 4), m
-    empty : (N, MAX_ARCS, 2), rad, and counts (N,): arcs of the whole turn at first; set
+    empty : (N, MAX_ARCS, 2), rad, and counts (N,): arcs of the whole turn at first; changed in place
     """
     flags = np.zeros((2, _PIECES << _LEVELS), dtype=np.bool_)
     for n in range(cells.shape[0]):

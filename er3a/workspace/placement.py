@@ -33,12 +33,12 @@ from er3a.workspace.cell_frame import cell_frame
 from er3a.workspace.orientations import AskedOrientations
 from er3a.workspace.tool_inverse import all_solutions, slot_count
 
-NO = -1.0
-NOTHING = 1e-12
-_LEVEL = 1e-9
+NO = -1.0  # below any manipulability: not served
+NOTHING = 1e-12  # in place of a best measure of 0, which can't be divided by
+_LEVEL = 1e-9  # of a unit vector or m: rounding
 MIXED = -1
 """The branch of a box that no single branch serves."""
-_POSES = 50_000
+_POSES = 50_000  # solved at a time, so that their solutions stay within some hundred megabytes
 
 Free = Callable[[Reals], Flags]
 """Which arms (N, n), rad, are free of collisions, (N,)."""
@@ -59,7 +59,16 @@ class Support:
     outline: Reals
 
     def holds(self, points: Reals) -> Flags:
-        """Which points (..., 2), m, lie over it."""
+        """Which points lie over the support.
+
+        Parameters
+        ----------
+        points : (..., 2), m, x and y
+
+        Returns
+        -------
+        inside : (...) bool, the edge included; all True where it has no end
+        """
         inside = np.ones(points.shape[:-1], dtype=bool)
         for start, end in zip(self.outline, np.roll(self.outline, -1, axis=0)):
             along, away = end - start, points - start
@@ -68,7 +77,16 @@ class Support:
 
 
 def fits_on(support: Support, box: Reals) -> bool:
-    """Whether a box (3,), m, fits on a support, as given or turned by 90 deg about z."""
+    """Whether a box fits on a support, as given or turned by 90 deg about z.
+
+    Parameters
+    ----------
+    box : (3,), m, edges along x, y, z
+
+    Returns
+    -------
+    fits : by a linear programme for the place of the box's middle
+    """
     if not len(support.outline):
         return True
     edges = np.roll(support.outline, -1, axis=0) - support.outline
@@ -82,7 +100,16 @@ def fits_on(support: Support, box: Reals) -> bool:
 
 
 def supports_of(scene: Scene) -> tuple[Support, ...]:
-    """The level upper sides of a scene's boxes and upright cylinders and its level floors, the highest first."""
+    """The level upper sides of a scene's boxes and upright cylinders, and its level floors.
+
+    Parameters
+    ----------
+    scene : in the frame that the robot's base is placed in
+
+    Returns
+    -------
+    supports : the highest first
+    """
     found = []
     for solid in scene.solids:
         if isinstance(solid, Plane) and solid.normal[2] > 1 - _LEVEL:
@@ -118,7 +145,7 @@ class Task:
     lowest : m, smallest height of the box's underside; clear : m, smallest distance of its points from axis 1
     margin : rad, how far joints with less than a full turn keep within their limits, and sums of revolute joints
         within theirs; not those that slide
-    step : rad, how far directions in the cone are apart
+    step : rad, from one direction in the cone to the next
     support : the box's support, at the height of ``lowest``; None where it may be anywhere
     """
 
@@ -133,7 +160,16 @@ class Task:
 
 
 def limited_joints(robot: Robot) -> Flags:
-    """Which joints (n,) turn, but less than a full turn."""
+    """Which joints turn, but less than a full turn.
+
+    Parameters
+    ----------
+    robot : n joints
+
+    Returns
+    -------
+    limited : (n,) bool
+    """
     return (robot.upper - robot.lower < FULL_TURN) & ~robot.slides & ~robot.continuous
 
 
@@ -150,12 +186,21 @@ def _limit_margin(robot: Robot, q: Reals) -> Reals:
 
 
 def _turning_sums(robot: Robot) -> tuple[CombinedLimit, ...]:
+    """Limits of sums of which no joint slides."""
     return tuple(limit for limit in robot.combined if not robot.slides[np.flatnonzero(limit.factors)].any())
 
 
 def narrowed(robot: Robot, margin: float) -> Robot:
-    """The robot with the limits of joints that have less than a full turn, and of sums of revolute joints, drawn in by
-    ``margin`` (rad)."""
+    """The robot with its limits drawn in, so that solutions keep a distance from them.
+
+    Parameters
+    ----------
+    margin : rad, for joints with less than a full turn and for sums of revolute joints
+
+    Returns
+    -------
+    robot : a copy; a range narrower than two margins becomes its middle
+    """
     inward = np.where(limited_joints(robot), np.minimum(margin, (robot.upper - robot.lower) / 2), 0.0)
     turning = _turning_sums(robot)
     combined = tuple(_drawn_in(limit, margin) if limit in turning else limit for limit in robot.combined)
@@ -163,6 +208,7 @@ def narrowed(robot: Robot, margin: float) -> Robot:
 
 
 def _drawn_in(limit: CombinedLimit, margin: float) -> CombinedLimit:
+    """A limit of a sum, drawn in by an angle, rad, to its middle at most."""
     inward = min(margin, (limit.upper - limit.lower) / 2)
     return CombinedLimit(limit.factors, limit.lower + inward, limit.upper - inward)
 
@@ -206,25 +252,49 @@ class Places:
     limit_margin: Reals
 
     def rows(self, chosen: NDArray[Any]) -> Places:
-        """Some of the places."""
+        """Some of the places.
+
+        Parameters
+        ----------
+        chosen : mask or numbers
+
+        Returns
+        -------
+        places : in the order chosen
+        """
         return Places(*(getattr(self, part.name)[chosen] for part in fields(self)))
 
 
 def lattice_spacing(box: Reals, coarsest: float) -> Reals:
-    """Spacing (3,) in m that divides the box's height and its shorter side evenly, about as fine as required."""
+    """Spacing of a lattice that divides a box's height and its shorter side evenly.
+
+    Parameters
+    ----------
+    box : (3,), m
+    coarsest : m, about the spacing
+
+    Returns
+    -------
+    spacing : (3,), m, the same along x and y, so that the box can be turned; no less than half of ``coarsest``
+    """
     sides = np.array([min(box[:2]), min(box[:2]), box[2]])
     return np.maximum(sides / np.maximum(1, np.round(sides / coarsest)), coarsest / 2)
 
 
 def survey(robot: Robot, task: Task, asked: AskedOrientations, coarsest: float, free: Free | None = None) -> Field:
-    """Ask a lattice over the arm's reach.
+    """Find how well each point of a lattice over the arm's reach serves the task.
 
     Parameters
     ----------
     robot : with the limits that hold, see :func:`narrowed`
+    task : in the frame that the robot's base is placed in
     asked : the required orientations
     coarsest : m, about the spacing
     free : which arms count; all, unless given
+
+    Returns
+    -------
+    field : measures by point and branch
     """
     slots = slot_count(robot)
     start, spacing, shape, points, here = _lattice(robot, task, coarsest)
@@ -247,7 +317,17 @@ def survey(robot: Robot, task: Task, asked: AskedOrientations, coarsest: float, 
 
 
 def lattice_size(robot: Robot, task: Task, coarsest: float) -> int:
-    """How many points of the lattice :func:`survey` would ask."""
+    """How many points of the lattice :func:`survey` would ask.
+
+    Parameters
+    ----------
+    task : with box and support
+    coarsest : m, about the spacing
+
+    Returns
+    -------
+    count : points within reach that a box could hold
+    """
     return len(_lattice(robot, task, coarsest)[-1])
 
 
@@ -288,7 +368,9 @@ def serve(
 
     Parameters
     ----------
-    points : (n, 3), m; rotations : (k, rolls, 3, 3), or (1 or n, k, rolls, 3, 3) if they differ between points
+    points : (n, 3), m
+    rotations : (k, rolls, 3, 3), or (1 or n, k, rolls, 3, 3) if they differ between points
+    roll : whether it is left to the last joint
     free : which arms count; all, unless given
 
     Returns
@@ -315,6 +397,7 @@ def serve(
             manipulability[part] = np.minimum(manipulability[part], value)
             manipulability_any[part] = np.minimum(manipulability_any[part], value.max(axis=1))
             limit_margin[part] = np.fmin(limit_margin[part], inside)
+        # A point that no branch serves in one direction is lost; it is not asked again.
         alive = np.flatnonzero(manipulability_any > NO)
     return manipulability, manipulability_any, np.where(manipulability > NO, limit_margin, 0.0)
 
@@ -360,18 +443,35 @@ def _refuse(value: Reals, q: Reals, free: Free, best: Integers, asked: Flags) ->
 
 
 def box_points(field: Field, box: Reals, centre: Reals) -> Reals:
-    """The lattice points (n, 3), m, of a box (3,), m, with its centre (3,) where :func:`fitting_places` put it."""
+    """The lattice points of a box that :func:`fitting_places` has placed.
+
+    Parameters
+    ----------
+    box : (3,), m
+    centre : (3,), m
+
+    Returns
+    -------
+    points : (n, 3), m
+    """
     points = _lattice_points(field, box)
     return centre + (np.indices(tuple(points)).reshape(3, -1).T - (points - 1) / 2) * field.spacing
 
 
 def serving_arms(robot: Robot, points: Reals, rotations: Reals, roll: directions.Roll, slot: int, free: Free) -> Reals:
-    """The arms (m, joints), rad, that serve points along all directions: of one branch, or of the best with ``MIXED``.
+    """The arms that serve points along all directions, by one branch or by the best.
 
     Parameters
     ----------
-    points : (n, 3), m; rotations : as :func:`serve` takes them
+    points : (n, 3), m
+    rotations : as :func:`serve` takes them
+    roll : whether it is left to the last joint
+    slot : the branch, or ``MIXED`` for the best one in each direction
     free : which arms count; where none does, there is no arm
+
+    Returns
+    -------
+    q : (m, joints), rad or m
     """
     asked, rows, slots = directions.left_to_roll(robot, roll), np.arange(len(points)), slot_count(robot)
     first = np.zeros((len(points), slots), bool), np.full(len(points), np.inf)
@@ -392,7 +492,12 @@ def fitting_places(field: Field, box: Reals) -> Places:
 
     Parameters
     ----------
+    field : of :func:`survey`
     box : (3,), m
+
+    Returns
+    -------
+    places : the best first; also those turned by 90 deg, unless the box is square
     """
     found = [_places(field, box, False)]
     if abs(box[0] - box[1]) > 1e-9:
@@ -413,6 +518,7 @@ def _weighed(places: Places) -> Reals:
 
 
 def _places(field: Field, box: Reals, turned: bool) -> Places:
+    """Places of the box in one turn, by the best single branch, else by the best of all."""
     points = _lattice_points(field, box)
     any_branch = _sliding_min(field.manipulability_any, points)
     where = np.nonzero(any_branch > NO)
@@ -459,8 +565,18 @@ class BoxPlacement:
     chosen: list[int]
 
     def room(self, row: int) -> Reals:
-        """How far (3, 2), m, the box can be moved from a place along x, y and z, down and up.
+        """How far the box can be moved from a place along x, y and z.
 
+        Parameters
+        ----------
+        row : number of the place
+
+        Returns
+        -------
+        room : (3, 2), m, down and up along each axis
+
+        Notes
+        -----
         In steps of the lattice, through places of the same turn: a box between two of them lies in both together.
         """
         places = self.places
@@ -490,9 +606,16 @@ def find_places(
 
     Parameters
     ----------
-    robot : with its own limits; grid : m, about the lattice's spacing
+    robot : with its own limits
+    task : in the frame that the robot's base is placed in
+    asked : the required orientations
+    grid : m, about the lattice's spacing
     count : how many places to choose
     free : which arms count at the lattice's points; all, unless given
+
+    Returns
+    -------
+    placement : all places, and the chosen ones
     """
     robot = narrowed(robot, task.margin)
     field = survey(robot, task, asked, grid, free)
@@ -501,8 +624,17 @@ def find_places(
 
 
 def choose_places(robot: Robot, task: Task, places: Places, count: int) -> list[int]:
-    """Rows of up to ``count`` places in their order, none of which overlaps one before it, or is one before it turned
-    about axis 1."""
+    """Choose the best places that differ: none overlaps one before it, or is one before it turned about axis 1.
+
+    Parameters
+    ----------
+    places : the best first
+    count : how many at most
+
+    Returns
+    -------
+    rows : numbers of places, the best first
+    """
     rows: list[int] = []
     sizes = np.where(places.turned[:, None], task.box[[1, 0, 2]], task.box)
     left = np.ones(len(places.slot), dtype=bool)

@@ -53,14 +53,32 @@ class SectionMap:
             self.owner[a:b, c:d] = n
 
     def cell_of(self, rho: Reals, z: Reals) -> NDArray[np.int32]:
-        """Numbers (n,) of the cells that hold points of the section, ``OUTSIDE`` where none does."""
+        """Numbers of the cells that hold points of the section.
+
+        Parameters
+        ----------
+        rho, z : (n,), m, in the frame about axis 1
+
+        Returns
+        -------
+        cell : (n,), ``OUTSIDE`` where none does
+        """
         index = (np.stack([rho - self.low[0], z - self.low[1]]) // self.steps[:, None]).astype(np.int64)
         inside = ((index >= 0) & (index < np.array(self.owner.shape)[:, None])).all(axis=0)
         index = np.where(inside, index, 0)
         return np.where(inside, self.owner[index[0], index[1]], OUTSIDE)
 
     def status(self, rho: Reals, azimuth: Reals, z: Reals) -> Integers:
-        """FILLED, EMPTY or UNDECIDED for points (n,) about axis 1 (m, rad, m); outside of all cells is empty."""
+        """What is known of points.
+
+        Parameters
+        ----------
+        rho, azimuth, z : (n,), m, rad (of any turn), m, in the frame about axis 1
+
+        Returns
+        -------
+        status : (n,), FILLED, EMPTY or UNDECIDED; outside of all cells is EMPTY
+        """
         cell, azimuth = self.cell_of(rho, z), np.asarray(azimuth) % TURN
         unfilled = holds_azimuth(self.proof.unfilled[cell], azimuth)
         empty = holds_azimuth(self.proof.empty[cell], azimuth) | (cell == OUTSIDE)
@@ -86,7 +104,17 @@ class SectionMap:
 
 
 def holds_azimuth(arcs: Reals, azimuth: Reals) -> Flags:
-    """Whether azimuths (n,) in rad lie in sets of arcs (n, MAX_ARCS, 2)."""
+    """Whether azimuths lie in sets of arcs.
+
+    Parameters
+    ----------
+    arcs : (n, MAX_ARCS, 2), rad in [0, 2 pi], unused rows NaN
+    azimuth : (n,), rad in [0, 2 pi]
+
+    Returns
+    -------
+    inside : (n,) bool
+    """
     return np.asarray(((arcs[..., 0] <= azimuth[:, None]) & (azimuth[:, None] <= arcs[..., 1])).any(axis=1))
 
 
@@ -126,11 +154,31 @@ class Cavity:
         return float(self.volumes.sum())
 
     def part(self, chosen: Flags | Integers, enclosed: bool) -> Cavity:
-        """Some of its arcs."""
+        """Some of the arcs.
+
+        Parameters
+        ----------
+        chosen : mask or numbers of arcs
+        enclosed : whether filled cells cut this part off from the outside
+
+        Returns
+        -------
+        cavity : of these arcs
+        """
         return Cavity(enclosed, self.cells[chosen], self.arcs[chosen], self.empty[chosen], self.bar)
 
     def centroid(self) -> Reals:
-        """Centroid (3,) in the frame about axis 1, m, weighted by what is proven empty."""
+        """Centroid of what is proven empty.
+
+        Returns
+        -------
+        centroid : (3,), m, in the frame about axis 1
+
+        Notes
+        -----
+        The radius is that of a ring sector's centre of area: ``2/3 (b^3 - a^3) / (b^2 - a^2)``, times ``sin`` terms of
+        its arc.
+        """
         weight = self.volumes * self.empty
         low, high, z = self.arcs[:, 0], self.arcs[:, 1], self.cells[:, 2:].mean(axis=1)
         if self.bar > 0:
@@ -145,8 +193,12 @@ class Cavity:
         return centroid
 
     def box(self) -> tuple[Reals, Reals]:
-        """Lowest and highest corner (3,), m, of a box that holds all of it, what is undecided too, in the frame about
-        axis 1."""
+        """A box that holds all of the cavity, what is undecided too.
+
+        Returns
+        -------
+        low, high : (3,), m, its lowest and highest corner, in the frame about axis 1
+        """
         cells, arcs = self.cells, self.arcs
         share = np.linspace(0, 1, 49)
         azimuth = arcs[:, :1] + (arcs[:, 1:] - arcs[:, :1]) * share
@@ -157,7 +209,17 @@ class Cavity:
 
 
 def cavities(section: SectionMap) -> tuple[list[Cavity], Cavity]:
-    """Enclosed cavities, the largest first, and everything that is open to the outside."""
+    """Connected regions that are not proven filled.
+
+    Parameters
+    ----------
+    section : the map of a proof
+
+    Returns
+    -------
+    enclosed : cavities that are cut off from the outside and have a part proven empty, the largest first
+    outside : everything that is open to the outside
+    """
     proof = section.proof
     cell, slot = np.nonzero(np.isfinite(proof.unfilled[..., 0]))
     arcs = proof.unfilled[cell, slot]
@@ -197,14 +259,15 @@ def _across_zero(cell: Integers, arcs: Reals) -> Integers:
 
 
 def _empty_ratio(arcs: Reals, empty: Reals) -> Reals:
+    """Share (k,) of each arc (k, 2) that is in the proven empty ones (k, MAX_ARCS, 2)."""
     low = np.maximum(arcs[:, None, 0], empty[..., 0])
     high = np.minimum(arcs[:, None, 1], empty[..., 1])
     ratio: Reals = np.nansum(np.maximum(0, high - low), axis=1) / (arcs[:, 1] - arcs[:, 0])
     return ratio
 
 
-TARGET = 0.002
-BEYOND_ROUNDING = 1 + 1e-9
+TARGET = 0.002  # required width of the bracket, in parts of the volume
+BEYOND_ROUNDING = 1 + 1e-9  # factor on lengths, so that a bound stays one
 MIN_BOUND_M = 1e-4  # for a tool point that no joint moves
 SETTLED = 0.1  # of the volume
 CELLS = 4  # looked at for each one of the budget: they are cheap
@@ -231,32 +294,70 @@ class Proven:
         return self.proof.width <= SETTLED
 
     def in_base(self, points: Reals) -> Reals:
-        """Points (..., 3) from the frame about axis 1 to the base frame."""
+        """Points from the frame about axis 1 to the base frame.
+
+        Parameters
+        ----------
+        points : (..., 3), m
+
+        Returns
+        -------
+        points : (..., 3), m, base frame
+        """
         return points @ self.R + self.origin
 
     def in_section(self, points: Reals) -> tuple[Reals, Reals, Reals]:
-        """Distance from axis 1 (m), azimuth (rad) and height (m) of points (n, 3) in the base frame; or places across
-        and along bars."""
+        """Where points lie in the section.
+
+        Parameters
+        ----------
+        points : (n, 3), m, base frame
+
+        Returns
+        -------
+        rho, azimuth, z : (n,), m, rad, m: distance from axis 1, azimuth, height; or places across and along bars
+        """
         return in_section((points - self.origin) @ self.R.T, self.proof.bar)
 
     def count_in_empty(self, points: Reals) -> int:
-        """How many points (n, 3), m, base frame, lie where nothing is reached; more than none would refute the
-        proof."""
+        """How many points lie where nothing is reached. Of reached points, more than none would refute the proof.
+
+        Parameters
+        ----------
+        points : (n, 3), m, base frame
+
+        Returns
+        -------
+        count : those in cells and azimuths that are proven empty
+        """
         return int((self.section.status(*self.in_section(points)) == EMPTY).sum())
 
     def nowhere(self, rho: Reals, z: Reals) -> Flags:
-        """Whether nothing is reached at any azimuth (or place along bars) at radii and heights (n,), m, of the
-        section."""
+        """Whether nothing is reached at any azimuth (or place along bars) of the section.
+
+        Parameters
+        ----------
+        rho, z : (n,), m, in the frame about axis 1
+
+        Returns
+        -------
+        nowhere : (n,) bool, True outside of all cells
+        """
         cell = self.section.cell_of(rho, z)
         return np.asarray((cell == OUTSIDE) | (self.proof.empty_ratio[cell] >= 1 - 1e-12))
 
 
 def prove_robot(robot: Robot, most_cells: int, seed: int) -> Proven:
-    """Run the proof; bounds by lengths alone where the arm's build gives no more.
+    """Prove which part of space a robot reaches; by lengths alone where joint 1 does not carry the others around.
 
     Parameters
     ----------
-    most_cells : the budget, of which each cell stands for ``CELLS``
+    most_cells : the budget, of which each cell counts for ``CELLS``
+    seed : of the random joint values
+
+    Returns
+    -------
+    proven : cells, their map, and their frame
     """
     arm, R, origin = general_arm(robot)
     if not arm.carries_around:

@@ -33,13 +33,13 @@ from er3a.robots.whole_turns import whole_turns
 from er3a.workspace.cell_frame import is_quick, joint_1_alone
 from er3a.workspace.orientations import asked_of
 
-ARM_ANGLES = 8
+ARM_ANGLES = 8  # values of what a pose leaves open; of two such parameters the root of it each
 QUICK_S, COMPLETED_S, CERTAIN_S, DOUBT_S, INNER_S, GEARED_S = 4e-6, 16e-6, 3e-4, 8e-3, 1e-3, 5e-6
 """About what a pose takes: of classes in closed form, of fewer joints completed, by elimination where its readings are
-clear and where they leave doubt, besides where a joint within the arm is held, and of each slot for its turns where
+clear and where they leave doubt, also where a joint within the arm is held, and of each slot for its turns where
 gears or ball screws connect motors and joints."""
 BESIDE = np.array([1.1e-4, -0.7e-4, 0.9e-4])  # rad, about the tool's axes
-_PROBED = 24
+_PROBED = 24  # random poses that tell how often elimination leaves a doubt
 
 
 class InverseUnknown(Finding):
@@ -61,7 +61,12 @@ MapsMissing = InverseUnknown | JointOneShared | OrientationsUnknown
 
 
 def lacking_for_maps(robot: Robot) -> MapsMissing | None:
-    """Why there are no maps of what a robot's tool can do; None if there are."""
+    """Why there are no maps of what a robot's tool can do.
+
+    Returns
+    -------
+    why : None if there are
+    """
     if isinstance(arm_solver(robot).chain, Unsolved):
         return InverseUnknown()
     if not joint_1_alone(robot):
@@ -71,8 +76,16 @@ def lacking_for_maps(robot: Robot) -> MapsMissing | None:
 
 @derived
 def pose_cost(robot: Robot) -> float:
-    """About how long (s, the same on every machine) the solutions of a pose take, at one value of what it leaves
-    open: by the arm's class, and how many random poses of its own leave doubt."""
+    """About how long the solutions of a pose take, at one value of what it leaves open.
+
+    Parameters
+    ----------
+    robot : with an inverse by class
+
+    Returns
+    -------
+    cost : s, the same on every machine: by the class, and by how many random poses of the arm leave doubt
+    """
     chain: ChainSolver | None = arm_solver(robot).chain
     cost = COMPLETED_S if isinstance(chain, PaddedChain) else 0.0
     cost += 0.0 if whole_turns(robot).each else GEARED_S * slot_count(robot)
@@ -90,14 +103,32 @@ def pose_cost(robot: Robot) -> float:
 
 
 def slot_count(robot: Robot) -> int:
-    """How many slots each pose has at one value of what it leaves open."""
+    """How many slots for solutions each pose has at one value of what it leaves open.
+
+    Parameters
+    ----------
+    robot : with an inverse by class
+
+    Returns
+    -------
+    slots : 8 for six joints with a spherical wrist
+    """
     return arm_solver(robot).chain.slots
 
 
 @derived
 def redundancy_values(robot: Robot) -> Reals | None:
-    """What each pose is tried with, (k, p), rad or m: arm angles or values of joints (where they are
-    coupled, of rows); None for arms of six joints."""
+    """What each pose of an arm with more joints than it needs is tried with.
+
+    Parameters
+    ----------
+    robot : with an inverse by class
+
+    Returns
+    -------
+    values : (k, p), rad or m: arm angles, or values of joints (where they are coupled, of rows); None for arms of six
+        joints
+    """
     parameters = parameters_of(robot)
     if not parameters:
         return None
@@ -117,17 +148,37 @@ def redundancy_values(robot: Robot) -> Reals | None:
 
 
 def tried_values(robot: Robot) -> int:
-    """At how many values of what it leaves open each pose is tried."""
+    """At how many values of what it leaves open each pose is tried.
+
+    Parameters
+    ----------
+    robot : with an inverse by class
+
+    Returns
+    -------
+    count : rows of :func:`redundancy_values`; 1 for arms of six joints
+    """
     values = redundancy_values(robot)
     return 1 if values is None else len(values)
 
 
 def all_solutions(robot: Robot, T: Reals) -> tuple[Reals, Flags]:
-    """Solutions of poses (N, 4, 4): q (N, k * slots, n), rad or m, all slots of one value of what a pose leaves open
-    after those of another, and whether each is within the limits.
+    """Solutions of many poses, for maps.
 
-    Of arms solved by elimination, a pose that leaves a doubt (where a joint may be free) is asked ``BESIDE`` beside it,
-    once: to look at it alone takes some 20 ms.
+    Parameters
+    ----------
+    T : (N, 4, 4), m, base frame
+
+    Returns
+    -------
+    q : (N, k * slots, n), rad or m, NaN in empty slots; all slots of one value of what a pose leaves open after those
+        of another
+    inside : (N, k * slots) bool, whether each is within the limits
+
+    Notes
+    -----
+    Of arms solved by elimination, a pose that leaves a doubt (where a joint may be free) is asked ``BESIDE`` next to
+    it, once: to look at it alone takes some 20 ms.
     """
     values = redundancy_values(robot)
     each = [_solutions(robot, T, value) for value in ((None,) if values is None else values)]
@@ -135,6 +186,7 @@ def all_solutions(robot: Robot, T: Reals) -> tuple[Reals, Flags]:
 
 
 def _solutions(robot: Robot, T: Reals, redundancy: Reals | None) -> tuple[Reals, Flags]:
+    """:func:`all_solutions` at one value of what a pose leaves open."""
     if is_quick(robot):
         found = inverse_batch(robot, T, redundancy=redundancy)
         return found.q, found.within_limits
@@ -152,10 +204,17 @@ def _solutions(robot: Robot, T: Reals, redundancy: Reals | None) -> tuple[Reals,
 
 
 def generic_manipulability(robot: Robot, q: Reals, chosen: Flags) -> Reals:
-    """Product of the singular values of the Jacobian of what the tool has to meet, at joint values (..., n); 0 at those
-    not ``chosen``.
+    """Yoshikawa's manipulability for any arm: product of the singular values of the Jacobian of what the tool meets.
 
-    In m^3, less one m for each prismatic joint among those that place the tool point.
+    Parameters
+    ----------
+    q : (..., n), rad or m
+    chosen : (...) bool, which to compute
+
+    Returns
+    -------
+    manipulability : (...), m^3, less one m for each prismatic joint among those that place the tool point; 0 where not
+        chosen
     """
     J, found = jacobian(robot, q[chosen]), np.zeros(chosen.shape)
     mask = task_mask(robot) > 0

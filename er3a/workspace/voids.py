@@ -15,8 +15,8 @@ from er3a.workspace.causes import VoidCause, cause_of, relaxations
 from er3a.workspace.cells import in_space, ring_volumes
 from er3a.workspace.proven import Cavity, Proven, cavities
 
-_CUBE = np.ones((3, 3, 3), dtype=bool)
-MIN_BLOCKS = 8
+_CUBE = np.ones((3, 3, 3), dtype=bool)  # what a pocket must hold somewhere, in blocks
+MIN_BLOCKS = 8  # of a pocket: fewer are too small to say anything of
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,20 +48,30 @@ class Blocks:
         return volumes
 
     def points(self) -> Reals:
-        """Middles (n_rho, n_z, n_azimuth, 3) in the frame about axis 1, m."""
+        """Middles of the blocks.
+
+        Returns
+        -------
+        points : (n_rho, n_z, n_azimuth, 3), m, in the frame about axis 1
+        """
         rho, z, azimuth = ((edge[1:] + edge[:-1]) / 2 for edge in (self.rho, self.z, self.azimuth))
         rho, z, azimuth = np.meshgrid(rho, z, azimuth, indexing="ij")
         return in_space(rho, azimuth, z, self.bar)
 
 
 def blocks_of(pieces: Cavity, size: float, low: Reals, high: Reals, turns: int) -> Blocks:
-    """Sum arcs of cells up into blocks.
+    """Sum arcs of cells up into blocks of one size.
 
     Parameters
     ----------
+    pieces : the arcs
     size : edge of the blocks, m, a power of two times that of each cell
     low, high : (2,), m, corners of the section, on borders of cells
     turns : blocks around
+
+    Returns
+    -------
+    blocks : (n_rho, n_z, turns), share of each that is empty, and that is not filled
     """
     shape = np.maximum(1, np.rint((high - low) / size).astype(np.int64))
     rho, z = (low[i] + np.arange(shape[i] + 1) * size for i in (0, 1))
@@ -88,13 +98,23 @@ def blocks_of(pieces: Cavity, size: float, low: Reals, high: Reals, turns: int) 
 
 
 def pockets(blocks: Blocks, inside: Flags) -> list[Flags]:
-    """Connected sets of mostly empty blocks inside the hull, at least three blocks thick, as masks; largest first.
+    """Connected sets of mostly empty blocks inside the hull, at least three blocks thick.
 
     Parameters
     ----------
+    blocks : of what is open to the outside
     inside : (n_rho, n_z, n_azimuth), whether the block lies in the hull
+
+    Returns
+    -------
+    masks : (n_rho, n_z, n_azimuth) each, the largest first
+
+    Notes
+    -----
+    Erosion and dilation by a cube of three blocks (an opening) removes thin sheets between hull and reach.
     """
     void = (blocks.empty > 0.5) & inside
+    # Azimuths go round, and a block at the axis has itself as its inner neighbour.
     around = np.concatenate([void[:, :, -2:], void, void[:, :, :2]], axis=2)
     around = np.concatenate([around[:1], around], axis=0)
     core = scipy.ndimage.binary_erosion(around, _CUBE)
@@ -117,9 +137,15 @@ def _wraps(labels: Integers) -> list[tuple[int, int]]:
 def mesh(blocks: Blocks, mask: Flags) -> tuple[Reals, Integers]:
     """Closed surface of a set of blocks, triangles counter-clockwise as seen from outside.
 
+    Parameters
+    ----------
+    blocks : the grid
+    mask : (n_rho, n_z, n_azimuth), which blocks
+
     Returns
     -------
-    vertices : (V, 3), m, in the frame about axis 1; triangles : (F, 3)
+    vertices : (V, 3), m, in the frame about axis 1
+    triangles : (F, 3), vertex numbers
     """
     rings, faces = blocks.bar == 0, []
     for axis in range(3):
@@ -151,7 +177,7 @@ def mesh(blocks: Blocks, mask: Flags) -> tuple[Reals, Integers]:
 
 VoidKind = Literal["enclosed", "open"]
 
-_FLAT, _AT_ONCE = 1e-9, 8192
+_FLAT, _AT_ONCE = 1e-9, 8192  # thickness, in parts of the length, of a flat hull; points looked at together
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +200,16 @@ class Hull:
 
 
 def convex_hull(points: Reals) -> Hull:
-    """Hull of points (N, 3) in m."""
+    """Convex hull of points.
+
+    Parameters
+    ----------
+    points : (N, 3), m
+
+    Returns
+    -------
+    hull : in an order that depends on the points alone, not on theirs; flat ones have no triangles
+    """
     points, of = np.unique(points, axis=0, return_index=True)
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     if len(points) < 4 or spread[2] <= _FLAT * spread[0]:
@@ -196,16 +231,25 @@ def _ordered(vertices: Reals, triangles: Integers) -> Integers:
 
 
 def inside_hull(hull: Hull, points: Reals) -> Flags:
-    """Which of the points (n, 3) lie in the hull; none in a flat one."""
+    """Which points lie in a hull.
+
+    Parameters
+    ----------
+    points : (n, 3), m
+
+    Returns
+    -------
+    inside : (n,) bool, the surface excluded; none in a flat hull
+    """
     if not len(hull.planes):
         return np.zeros(len(points), dtype=bool)
     parts = np.array_split(points, len(points) // _AT_ONCE + 1)
     return np.concatenate([(part @ hull.planes[:, :3].T + hull.planes[:, 3] < 0).all(axis=1) for part in parts])
 
 
-POCKET_BLOCKS, TURNS = 64, 180
-MESH_BLOCKS, MESH_TURNS = 24, 72
-_SPECK_M3 = 1e-9
+POCKET_BLOCKS, TURNS = 64, 180  # across the section and around, on which pockets are searched
+MESH_BLOCKS, MESH_TURNS = 24, 72  # across a void and around, for its picture
+_SPECK_M3 = 1e-9  # 1 mm^3: smaller voids are not listed
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,7 +278,18 @@ class Void:
 
 
 def proven_voids(robot: Robot, proven: Proven, hull: Hull, shoulder: Reals) -> list[Void]:
-    """Voids that the proof finds inside the hull, the largest first."""
+    """Voids that the proof finds inside the hull of the reach: enclosed ones, and open pockets.
+
+    Parameters
+    ----------
+    proven : of the robot
+    hull : of sampled tool points, m, base frame
+    shoulder : (3,), m, base frame, the point of axis 1 at the height of joint 2
+
+    Returns
+    -------
+    voids : the largest first, with bounds of their volume (m^3) and their cause
+    """
     enclosed, outside = cavities(proven.section)
     found = [
         _void("enclosed", robot, proven, cavity, shoulder, _outline(proven, cavity))
@@ -252,6 +307,7 @@ def proven_voids(robot: Robot, proven: Proven, hull: Hull, shoulder: Reals) -> l
 def _void(
     kind: VoidKind, robot: Robot, proven: Proven, cavity: Cavity, shoulder: Reals, surface: tuple[Blocks, Flags]
 ) -> Void:
+    """A void with its place, cause and surface, in the base frame."""
     low, high = cavity.box()
     corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
     corners = proven.in_base(corners)
@@ -290,7 +346,16 @@ def _outline(proven: Proven, cavity: Cavity) -> tuple[Blocks, Flags]:
 
 
 def pocket_block(proven: Proven) -> float:
-    """Edge (m) of the blocks that open pockets are searched for on."""
+    """Edge of the blocks that open pockets are searched for on.
+
+    Parameters
+    ----------
+    proven : of a robot
+
+    Returns
+    -------
+    size : m, a power of two times the cells' edges, for about ``POCKET_BLOCKS`` across
+    """
     cells = proven.proof.cells
     low, high = cells[:, [0, 2]].min(axis=0), cells[:, [1, 3]].max(axis=0)
     size = float((cells[:, 1] - cells[:, 0]).max())
@@ -302,6 +367,7 @@ def pocket_block(proven: Proven) -> float:
 
 
 def _pocket_blocks(proven: Proven, outside: Cavity) -> Blocks:
+    """What is open to the outside, in blocks of :func:`pocket_block`."""
     cells, size = proven.proof.cells, pocket_block(proven)
     low, high = cells[:, [0, 2]].min(axis=0), cells[:, [1, 3]].max(axis=0)
     return blocks_of(outside, size, low, low + np.ceil((high - low) / size - 1e-6) * size, TURNS)

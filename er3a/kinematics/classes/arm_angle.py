@@ -50,10 +50,19 @@ class SphericalConstants(NamedTuple):
 
 
 def spherical_constants(axes: Reals, frame: Reals) -> tuple[SphericalConstants, Reals]:
-    """Constants for axes (3, 3) with the joints at 0, and the frame G (3, 3) after them.
+    """Constants of three revolute joints whose axes meet in one point, and the frame after them.
 
-    ``frame`` (3, 3) has the directions of the frame before them as rows, the last one axis 1. A turn R of what the
-    joints carry is ``frame R G`` in the form above; columns of G are directions in the same coordinates as the axes.
+    A turn R of what the joints carry is ``frame R G`` in the form of the module's text.
+
+    Parameters
+    ----------
+    axes : (3, 3), unit vectors with the joints at 0
+    frame : (3, 3), directions of the frame before the joints as rows, the last one axis 1
+
+    Returns
+    -------
+    constants : rad, and their cosines and sines
+    G : (3, 3), columns are directions in the same coordinates as the axes
     """
     second, third = frame @ axes[1], frame @ axes[2]
     zero_1 = float(np.arctan2(second[1], second[0])) + np.pi / 2
@@ -77,25 +86,61 @@ def spherical_constants(axes: Reals, frame: Reals) -> tuple[SphericalConstants, 
 
 
 def about_z(angle: float) -> Reals:
-    """Rotation matrix about z."""
+    """Rotation matrix about z.
+
+    Parameters
+    ----------
+    angle : rad
+
+    Returns
+    -------
+    R : (3, 3)
+    """
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
 
 
 def about_x(angle: float) -> Reals:
-    """Rotation matrix about x."""
+    """Rotation matrix about x.
+
+    Parameters
+    ----------
+    angle : rad
+
+    Returns
+    -------
+    R : (3, 3)
+    """
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
 
 
 def vector_of(array: Reals) -> Vector:
-    """A direction or point as the kernels take it."""
+    """A direction or point as the kernels take it.
+
+    Parameters
+    ----------
+    array : (3,)
+
+    Returns
+    -------
+    vector : three floats
+    """
     x, y, z = np.asarray(array).tolist()
     return x, y, z
 
 
 def rows_of_vectors(array: Reals) -> Rows:
-    """The same of three rows."""
+    """Three directions as the kernels take them.
+
+    Parameters
+    ----------
+    array : (3, 3), one in each row
+
+    Returns
+    -------
+    rows : three times three floats
+    """
     return vector_of(array[0]), vector_of(array[1]), vector_of(array[2])
 
 
@@ -103,10 +148,21 @@ def rows_of_vectors(array: Reals) -> Rows:
 def three_angles(
     k: SphericalConstants, zx: float, zy: float, zz: float, xx: float, xy: float, xz: float, sign: float
 ) -> tuple[float, float, float, float, float]:
-    """Joint angles (three) by the root with that sign of joint 2, whether there is one, and how far from singular.
+    """Angles of three joints through one point, by one of the two roots of joint 2. Kernel.
 
-    The last is the minimum of the sine of axis 3 from axis 1 and the root's distances from where both roots meet;
-    negative if axis 3 can't point there.
+    Parameters
+    ----------
+    k : of :func:`spherical_constants`
+    zx, zy, zz : where axis 3 points, the last column of the turn
+    xx, xy, xz : the turn's first column
+    sign : +1 or -1, which root
+
+    Returns
+    -------
+    x, y, z : rad, joint angles
+    valid : 1 if there is such a root, else 0
+    smallest : the minimum of the sine of axis 3 from axis 1 and the root's distances from where both roots meet;
+        negative if axis 3 can't point there
     """
     sum_s, sum_c = k.half_sum
     less_s, less_c = k.half_difference
@@ -136,9 +192,9 @@ def three_angles(
 
 
 SLOTS = 8
-BLOCK = 64
-MEETS_M = 1e-9
-NEAR = 1e-9
+BLOCK = 64  # poses; a row of 64 numbers fills whole vectors
+MEETS_M = 1e-9  # by which axes may miss a common point
+NEAR = 1e-9  # m, or about the square of half an angle: branches so near are taken to meet
 ALONG = 1e-6  # sine of the angle between S W and axis 1, below which rounding would move the arm angle by 1e-10 rad
 ONE_POINT = 1e-15  # parts of the reach: nearer S and W are known to be one point only
 OUT_OF_REACH = 1e-6  # of the squared reach, beyond what a search takes for solved
@@ -181,7 +237,16 @@ class ArmAngleArm:
 
 
 def arm_angle_arm(links: Reals) -> ArmAngleArm | None:
-    """The solver for links (8, 4, 4), or None if the chain is of another kind. Axes meet to 1e-9 m."""
+    """Recognise seven revolute joints with a spherical shoulder and a spherical wrist.
+
+    Parameters
+    ----------
+    links : (8, 4, 4), m
+
+    Returns
+    -------
+    solver : None if the chain is of another kind; axes meet to 1e-9 m
+    """
     axes, points = axes_of(links)
     (S, shoulder_miss), (W, wrist_miss) = meeting_point(axes[:3], points[:3]), meeting_point(axes[4:], points[4:])
     if not max(shoulder_miss, wrist_miss) < MEETS_M:
@@ -224,7 +289,12 @@ def arm_angle_arm(links: Reals) -> ArmAngleArm | None:
 
 
 def solve_at_arm_angle(arm: ArmAngleArm, T: Reals, psi: Reals | float) -> tuple[Reals, Flags]:
-    """All solutions for poses T (N, 4, 4), m, at arm angles psi (N,) or one, rad.
+    """All solutions for poses at arm angles [1]_.
+
+    Parameters
+    ----------
+    T : (N, 4, 4), m
+    psi : (N,) or one, rad
 
     Returns
     -------
@@ -240,7 +310,16 @@ def solve_at_arm_angle(arm: ArmAngleArm, T: Reals, psi: Reals | float) -> tuple[
 
 
 def is_out_of_reach(arm: ArmAngleArm, T: Reals) -> bool:
-    """Whether S and W of a pose (4, 4), m, are too far or near for the elbow: then no arm angle solves it."""
+    """Whether shoulder and wrist centre of a pose are too far or near for the elbow: then no arm angle solves it.
+
+    Parameters
+    ----------
+    T : (4, 4), m
+
+    Returns
+    -------
+    out : with a slack that a search takes for solved
+    """
     k = arm.constants
     W = T[:3, :3] @ np.array(k.wrist_in_tool) + T[:3, 3]
     squared = float(np.sum((W - np.array(k.shoulder)) ** 2)) - k.height**2
@@ -250,7 +329,16 @@ def is_out_of_reach(arm: ArmAngleArm, T: Reals) -> bool:
 
 
 def arm_angles_of(arm: ArmAngleArm, q: Reals) -> Reals:
-    """Arm angle (...,) in rad of joint angles (..., 7)."""
+    """Arm angles of joint angles.
+
+    Parameters
+    ----------
+    q : (..., 7), rad
+
+    Returns
+    -------
+    psi : (...), rad, in [-pi, pi]
+    """
     q = np.asarray(q, float)
     k, flat = arm.constants, q.reshape(-1, 7)
     front = poses_of(np.concatenate([arm.links[:4], np.eye(4)[None]])[:4], flat[:, :3])
@@ -272,7 +360,16 @@ def arm_angles_of(arm: ArmAngleArm, q: Reals) -> Reals:
 
 @kernel
 def solve_arm_angle_blocks(k: ArmAngleConstants, T: Reals, psi: Reals, q: Reals, singular: Flags) -> None:
-    """Fill ``q`` (N, 8, 7) and ``singular`` (N,) for poses T (N, 4, 4) and arm angles psi (N,)."""
+    """Solve poses at arm angles, block by block. Kernel.
+
+    Parameters
+    ----------
+    k : constants of the arm
+    T : (N, 4, 4), m
+    psi : (N,), rad
+    q : (N, 8, 7), filled, rad, NaN where a slot has no solution
+    singular : (N,), filled
+    """
     w, out = np.empty(44 * BLOCK), np.empty(8 * BLOCK)
     for start in range(0, T.shape[0], BLOCK):
         size = min(BLOCK, T.shape[0] - start)
@@ -305,7 +402,7 @@ def solve_arm_angle_blocks(k: ArmAngleConstants, T: Reals, psi: Reals, q: Reals,
 
 @inner_kernel
 def _turned_about_line(k: ArmAngleConstants, T: Reals, psi: Reals, start: int, size: int, w: Reals) -> None:
-    """Rows 0-8 of ``w``: n, e and n x e in the frame before axis 1; 9-14 axis 7 and the vector beside it along those;
+    """Rows 0-8 of ``w``: n, e and n x e in the frame before axis 1; 9-14 axis 7 and the vector across it along those;
     37 the distance of S and W, 38 whether the pose is singular."""
     t, u, across = k.wrist_in_tool, k.shoulder, k.across
     shortest = ONE_POINT * (k.upper_arm + k.lower_arm)
@@ -354,7 +451,7 @@ def _turned_about_line(k: ArmAngleConstants, T: Reals, psi: Reals, start: int, s
 @inner_kernel
 def _elbow(k: ArmAngleConstants, w: Reals, sign: float) -> None:
     """Joint 4 by one root (row 36, NaN if S and W are too far or near), then axis 3 before axis 1 (rows 24-29, with the
-    vector beside it) and axis 7 before axis 5 (rows 30-35)."""
+    vector across it) and axis 7 before axis 5 (rows 30-35)."""
     reach, smallest = k.upper_arm + k.lower_arm, k.upper_arm - k.lower_arm
     for i in range(BLOCK):
         distance = w[37 * BLOCK + i]
@@ -405,6 +502,7 @@ def _elbow(k: ArmAngleConstants, w: Reals, sign: float) -> None:
 
 @inner_kernel
 def _three(k: SphericalConstants, w: Reals, row: int, sign: float, out: Reals) -> None:
+    """Three joints of a block by one root into ``out``, rad in (-pi, pi], NaN without a root; marks singular poses."""
     for i in range(BLOCK):
         z, x = row * BLOCK + i, (row + 3) * BLOCK + i
         a, b, c, valid, smallest = three_angles(

@@ -26,7 +26,7 @@ from er3a.kinematics.classes.two_slides import solve_two_slides, two_slides
 from er3a.kinematics.wrist_partitioned import WristPartitionedArm, constants_of, recognised
 from er3a.numerics.arrays import Flags, Integers, Reals
 
-FULL_RANK = 1e-7
+FULL_RANK = 1e-7  # smallest singular value at some of a few random joint values; dependent joints have rounding there
 PREFERENCE = tuple(class_solvers.ARM_CLASSES)
 
 
@@ -43,6 +43,18 @@ class LockedJoint:
     parameters: tuple[class_solvers.Redundancy, ...]
 
     def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
+        """Rows of the chain with this joint at its value.
+
+        Parameters
+        ----------
+        T : (N, 4, 4), m
+        values : (N, k), rad or m, this joint's first, then those of the rest
+
+        Returns
+        -------
+        q : (N, slots, n), rad or m, NaN in empty slots
+        certainty : (N,), of the rest
+        """
         own = values[:, 0]
         q = np.full((len(T), self.slots, len(self.sliding)), np.nan)
         certainty = np.full(len(T), CERTAIN)
@@ -50,6 +62,7 @@ class LockedJoint:
         if self.rest is not None:
             q[:, :, others], certainty = self.rest.rows(self._without(T, own), values[:, 1:])
         else:
+            # A joint within the arm: each value makes another chain, with constants of its own.
             for value in np.unique(own):
                 at = own == value
                 rest = chain_solver(*held(self.links, self.sliding, self.joint, float(value)))
@@ -67,15 +80,45 @@ class LockedJoint:
         return np.asarray(step @ T if self.joint == 0 else T @ step)
 
     def values_of(self, x: Reals) -> Reals:
+        """Values of the parameters at joint values: this joint's own, then those of the rest.
+
+        Parameters
+        ----------
+        x : (..., n), rad or m
+
+        Returns
+        -------
+        values : (..., k), rad or m
+        """
         own = x[..., self.joint, None]
         if self.rest is None or not self.rest.parameters:
             return own
         return np.concatenate([own, self.rest.values_of(np.delete(x, self.joint, axis=-1))], axis=-1)
 
     def seeds(self, T: Reals) -> list[Reals]:
+        """No members of continua: self-motions of redundant arms are collected over the parameter.
+
+        Parameters
+        ----------
+        T : (4, 4), m
+
+        Returns
+        -------
+        seeds : none
+        """
         return []
 
     def names(self, x: Reals) -> tuple[class_solvers.SlotName, ...]:
+        """The rest's slot names; none if the rest differs from value to value.
+
+        Parameters
+        ----------
+        x : (n,), rad or m, the manufacturer's zero pose
+
+        Returns
+        -------
+        names : in the order of the slots
+        """
         return self.rest.names(np.delete(x, self.joint)) if self.rest is not None else ()
 
 
@@ -88,14 +131,33 @@ class Unsolved(class_solvers.WithoutParameters):
     slots: int = 16
 
     def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
+        """No rows, and no certainty about any pose.
+
+        Parameters
+        ----------
+        T : (N, 4, 4), m
+        values : not looked at
+
+        Returns
+        -------
+        q : (N, 16, n), NaN
+        certainty : (N,), CONTINUUM
+        """
         return np.full((len(T), self.slots, self.joints), np.nan), np.full(len(T), CONTINUUM)
 
 
 def chain_solver(links: Reals, sliding: Flags, pointing: Reals | None = None) -> class_solvers.ChainSolver:
-    """The solver of a chain with constant links (n + 1, 4, 4), m, whose joints are prismatic where ``sliding`` (n,)
-    says so.
+    """The solver of a chain, chosen from its geometry.
 
-    ``pointing`` (3,), in the tool's frame, is the axis about which five joints leave the tool's turn open; None: its z.
+    Parameters
+    ----------
+    links : (n + 1, 4, 4), m
+    sliding : (n,), prismatic joints
+    pointing : (3,), in the tool's frame, the axis about which five joints leave the tool's turn open; None: its z
+
+    Returns
+    -------
+    solver : ``Unsolved`` where no class applies
     """
     links, sliding = np.ascontiguousarray(links, dtype=float), np.asarray(sliding, dtype=bool)
     for recognised_as in CLOSED_FORMS:
@@ -110,6 +172,7 @@ def chain_solver(links: Reals, sliding: Flags, pointing: Reals | None = None) ->
 
 
 def _with_spherical_wrist(links: Reals, sliding: Flags) -> class_solvers.ChainSolver | None:
+    """The closed form for axes 2 and 3 parallel and a spherical wrist."""
     if len(sliding) != 6 or sliding.any():
         return None
     wrist = recognised(*axes_of(links), poses_of(links, np.zeros(6)))
@@ -121,11 +184,13 @@ def _with_spherical_wrist(links: Reals, sliding: Flags) -> class_solvers.ChainSo
 
 
 def _with_parallel_axes(links: Reals, sliding: Flags) -> class_solvers.ChainSolver | None:
+    """The closed form for axes 2, 3 and 4 parallel, 5 and 6 meeting."""
     parallel = three_parallel(links) if len(sliding) == 6 and not sliding.any() else None
     return None if parallel is None else class_solvers.ParallelAxes(parallel)
 
 
 def _with_three_slides(links: Reals, sliding: Flags) -> class_solvers.ChainSolver | None:
+    """The closed form for three slides and three joints that turn, if these have six degrees of freedom."""
     if len(sliding) != 6 or sliding.sum() != 3 or not full_rank(links, sliding):
         return None
     three = gantry(links, sliding)
@@ -133,6 +198,7 @@ def _with_three_slides(links: Reals, sliding: Flags) -> class_solvers.ChainSolve
 
 
 def _with_arm_angle(links: Reals, sliding: Flags) -> class_solvers.ChainSolver | None:
+    """The closed form for seven joints with a spherical shoulder and wrist."""
     if len(sliding) != 7 or sliding.any():
         return None
     arm = arm_angle_arm(links)
@@ -140,6 +206,7 @@ def _with_arm_angle(links: Reals, sliding: Flags) -> class_solvers.ChainSolver |
 
 
 def _as_scara(links: Reals, sliding: Flags) -> class_solvers.ChainSolver | None:
+    """The closed form for four joints of one direction, one of them a slide."""
     planar = scara(links, sliding) if len(sliding) == 4 else None
     return None if planar is None else class_solvers.ScaraSolver(planar)
 
@@ -156,6 +223,7 @@ that does is taken; what none recognises is solved by elimination, with joints h
 
 
 def _by_elimination(links: Reals, sliding: Flags) -> class_solvers.ChainSolver:
+    """The solver of any other six joints, by how many of them slide."""
     if not full_rank(links, sliding):
         return Unsolved(6, "dependent")
     if sliding.sum() == 2:
@@ -177,8 +245,18 @@ def _by_elimination(links: Reals, sliding: Flags) -> class_solvers.ChainSolver:
 
 
 def full_rank(links: Reals, sliding: Flags, at_rest: tuple[int, ...] = ()) -> bool:
-    """Whether the chain has as many degrees of freedom as joints (six at most) at random joint values; joints
-    ``at_rest`` (from 0) are 0."""
+    """Whether the chain has as many degrees of freedom as joints (six at most), by random joint values.
+
+    Parameters
+    ----------
+    links : (n + 1, 4, 4), m
+    sliding : (n,), prismatic joints
+    at_rest : joints from 0 that stay at 0
+
+    Returns
+    -------
+    full : the largest of the smallest singular values found is above ``FULL_RANK``
+    """
     random = np.random.default_rng(5)
     scaled = np.array(links, float)
     scaled[:, :3, 3] /= size_of(links)
@@ -191,6 +269,7 @@ def full_rank(links: Reals, sliding: Flags, at_rest: tuple[int, ...] = ()) -> bo
 
 
 def _jacobian(links: Reals, sliding: Flags, x: Reals) -> Reals:
+    """Jacobian (6, n) of scaled links at random joint values, for its rank."""
     n = len(sliding)
     frames = [poses_of(links[: k + 1], x[:k], sliding[:k]) for k in range(n)]
     tip = poses_of(links, x, sliding)[:3, 3]
@@ -202,7 +281,20 @@ def _jacobian(links: Reals, sliding: Flags, x: Reals) -> Reals:
 
 
 def held(links: Reals, sliding: Flags, joint: int, value: float) -> tuple[Reals, Flags]:
-    """The chain with one joint (from 0) held at a value, in rad or m."""
+    """The chain with one joint held at a value.
+
+    Parameters
+    ----------
+    links : (n + 1, 4, 4), m
+    sliding : (n,), prismatic joints
+    joint : from 0
+    value : rad or m
+
+    Returns
+    -------
+    links : (n, 4, 4), m
+    sliding : (n - 1,)
+    """
     step = poses_of(np.array([links[joint], links[joint + 1]]), np.array([value]), sliding[[joint]])
     return np.concatenate([links[:joint], step[None], links[joint + 2 :]]), np.delete(sliding, joint)
 

@@ -43,7 +43,7 @@ ArmClassCode = Literal[
 
 @dataclass(frozen=True)
 class ArmClassTraits:
-    """What is known of a class beside its solver.
+    """What is known of a class, in addition to its solver.
 
     Attributes
     ----------
@@ -118,7 +118,7 @@ SlotName = Literal[
 SLOT_NAMES: tuple[SlotName, ...] = get_args(SlotName)
 LEFT_OVER = 1e-6  # rad by which a pose may miss those that fewer than six joints can take
 RANK_LOST = 1e-6  # smallest singular value below which a joint may be free
-DOUBLE_ROOT = 1e-6  # rad or m: rows so near are one, taken apart by rounding
+DOUBLE_ROOT = 1e-6  # rad or m: rows so near are one, split by rounding
 NEAR_SINGULAR = 1e-7  # rad or parts of the reach: a closed form's row so near to its singular sets is looked at again
 
 
@@ -140,21 +140,66 @@ class ChainSolver(Protocol):
     """
 
     @property
-    def code(self) -> ArmClassCode: ...
+    def code(self) -> ArmClassCode:
+        """The class of the chain."""
 
     @property
-    def slots(self) -> int: ...
+    def slots(self) -> int:
+        """Rows that a pose has place for."""
 
     @property
-    def parameters(self) -> tuple[Redundancy, ...]: ...
+    def parameters(self) -> tuple[Redundancy, ...]:
+        """What a pose leaves open, k of them; empty for up to six joints."""
 
-    def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]: ...
+    def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
+        """All rows of poses.
 
-    def values_of(self, x: Reals) -> Reals: ...
+        Parameters
+        ----------
+        T : (N, 4, 4), m
+        values : (N, k), of the parameters, rad or m
 
-    def seeds(self, T: Reals) -> list[Reals]: ...
+        Returns
+        -------
+        q : (N, slots, n), rad or m, NaN in empty slots
+        certainty : (N,), CERTAIN, UNCERTAIN or CONTINUUM
+        """
 
-    def names(self, x: Reals) -> tuple[SlotName, ...]: ...
+    def values_of(self, x: Reals) -> Reals:
+        """Values of the parameters at joint values.
+
+        Parameters
+        ----------
+        x : (..., n), rad or m
+
+        Returns
+        -------
+        values : (..., k), rad or m
+        """
+
+    def seeds(self, T: Reals) -> list[Reals]:
+        """Members of continua of one pose that the class knows without a search.
+
+        Parameters
+        ----------
+        T : (4, 4), m
+
+        Returns
+        -------
+        seeds : arrays (j, n), rad or m
+        """
+
+    def names(self, x: Reals) -> tuple[SlotName, ...]:
+        """Names of the slots.
+
+        Parameters
+        ----------
+        x : (n,), rad or m, the manufacturer's zero pose
+
+        Returns
+        -------
+        names : in the order of the slots; empty where no sign factors separate the solutions
+        """
 
 
 class WithoutParameters:
@@ -163,13 +208,42 @@ class WithoutParameters:
     parameters: tuple[Redundancy, ...] = ()
 
     def values_of(self, x: Reals) -> Reals:
+        """Values of the parameters at joint values: none.
+
+        Parameters
+        ----------
+        x : (..., n)
+
+        Returns
+        -------
+        values : (..., 0)
+        """
         return np.empty((*x.shape[:-1], 0))
 
     def seeds(self, T: Reals) -> list[Reals]:
-        """Members (k, n) of continua of one pose (4, 4) that the class knows without a search."""
+        """Members of continua of one pose that the class knows without a search.
+
+        Parameters
+        ----------
+        T : (4, 4), m
+
+        Returns
+        -------
+        seeds : arrays (j, n), rad or m
+        """
         return []
 
     def names(self, x: Reals) -> tuple[SlotName, ...]:
+        """Names of the slots; none where no sign factors separate the solutions.
+
+        Parameters
+        ----------
+        x : (n,), rad or m, the manufacturer's zero pose
+
+        Returns
+        -------
+        names : in the order of the slots, or empty
+        """
         return ()
 
 
@@ -183,6 +257,18 @@ class SphericalWristSolver(WithoutParameters):
     slots: int = 8
 
     def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
+        """All eight branches, by the closed form.
+
+        Parameters
+        ----------
+        T : (N, 4, 4), m
+        values : not looked at
+
+        Returns
+        -------
+        q : (N, 8, 6), rad, NaN in empty slots
+        certainty : (N,), CONTINUUM where branches meet or the wrist centre is next to axis 1, else CERTAIN
+        """
         shape = len(T), 8
         q, fault, gap = np.full((*shape, 6), np.nan), np.zeros(shape, dtype=np.int8), np.zeros(shape)
         plain = for_kernel(np.ones(6)), for_kernel(np.zeros(6))
@@ -192,12 +278,22 @@ class SphericalWristSolver(WithoutParameters):
         return q, np.where(singular, CONTINUUM, CERTAIN)
 
     def _beside_axis_1(self, T: Reals) -> Reals:
-        """How far the wrist centre lies beside axis 1 (N,), in parts of the reach; next to it that joint is free."""
+        """Distance (N,) of the wrist centre from axis 1, in parts of the reach; next to it that joint is free."""
         k = self.constants
         W = T[:, :3, 3] + T[:, :3, :3] @ np.array(k.wrist_in_tool) - np.array(k.point_1)
         return np.asarray(np.linalg.norm(np.cross(W, np.array(k.axis_1)), axis=1) / k.reach)
 
     def names(self, x: Reals) -> tuple[SlotName, ...]:
+        """Names by the side of axis 1, the elbow and the wrist.
+
+        Parameters
+        ----------
+        x : (6,), rad, the manufacturer's zero pose
+
+        Returns
+        -------
+        names : eight, in the order of the slots
+        """
         k = self.constants
         w1, w2 = np.array(k.axis_1), np.array(k.axis_2)
         T = poses_of(self.links, x)
@@ -215,6 +311,18 @@ class ParallelAxes(WithoutParameters):
     slots: int = 8
 
     def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
+        """All eight branches, by the closed form.
+
+        Parameters
+        ----------
+        T : (N, 4, 4), m
+        values : not looked at
+
+        Returns
+        -------
+        q : (N, 8, 6), rad, NaN in empty slots
+        certainty : (N,), CONTINUUM where a row's Jacobian is nearly singular, else CERTAIN
+        """
         q, marked = solve_three_parallel(self.arm, T)
         certainty = np.full(len(T), CERTAIN)
         for n in np.flatnonzero(marked):
@@ -224,6 +332,16 @@ class ParallelAxes(WithoutParameters):
         return q, certainty
 
     def seeds(self, T: Reals) -> list[Reals]:
+        """Two members of each range of each four-bar, with both elbows.
+
+        Parameters
+        ----------
+        T : (4, 4), m
+
+        Returns
+        -------
+        seeds : arrays (2, 6), rad
+        """
         return [
             family.members(np.array([0.5 * (low + high), 0.25 * low + 0.75 * high]), elbow)
             for family in four_bars(self.arm, T)
@@ -232,6 +350,16 @@ class ParallelAxes(WithoutParameters):
         ]
 
     def names(self, x: Reals) -> tuple[SlotName, ...]:
+        """Names by the side of axis 1, the elbow and the wrist.
+
+        Parameters
+        ----------
+        x : (6,), rad, the manufacturer's zero pose
+
+        Returns
+        -------
+        names : eight, in the order of the slots
+        """
         axes, points = axes_of(self.arm.links)
         T = poses_of(self.arm.links, x)
         W = T[:3, 3] + T[:3, :3] @ np.array(self.arm.constants.wrist_in_tool) - points[0]
@@ -248,6 +376,18 @@ class EliminationSolver(WithoutParameters):
     slots: int = 16
 
     def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
+        """All solutions, by elimination.
+
+        Parameters
+        ----------
+        T : (N, 4, 4), m
+        values : not looked at
+
+        Returns
+        -------
+        q : (N, 16, 6), rad or m, NaN after the last
+        certainty : (N,), CERTAIN, UNCERTAIN or CONTINUUM
+        """
         found = self.solve(T)
         return found.q, found.certainty
 
@@ -262,16 +402,58 @@ class ArmAngle:
     parameters: tuple[Redundancy, ...] = (Redundancy(-1, "arm_angle"),)
 
     def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
+        """All eight branches at an arm angle.
+
+        Parameters
+        ----------
+        T : (N, 4, 4), m
+        values : (N, 1), rad
+
+        Returns
+        -------
+        q : (N, 8, 7), rad, NaN in empty slots
+        certainty : (N,), CONTINUUM at singularities of shoulder, elbow or wrist, else CERTAIN
+        """
         q, singular = solve_at_arm_angle(self.arm, T, values[:, 0])
         return q, np.where(singular, CONTINUUM, CERTAIN)
 
     def values_of(self, x: Reals) -> Reals:
+        """Arm angles of joint angles.
+
+        Parameters
+        ----------
+        x : (..., 7), rad
+
+        Returns
+        -------
+        values : (..., 1), rad
+        """
         return arm_angles_of(self.arm, x)[..., None]
 
     def seeds(self, T: Reals) -> list[Reals]:
+        """No members of continua: self-motions of redundant arms are collected over the arm angle.
+
+        Parameters
+        ----------
+        T : (4, 4), m
+
+        Returns
+        -------
+        seeds : none
+        """
         return []
 
     def names(self, x: Reals) -> tuple[SlotName, ...]:
+        """Names by the roots of shoulder, elbow and wrist.
+
+        Parameters
+        ----------
+        x : not looked at
+
+        Returns
+        -------
+        names : eight, in the order of the slots
+        """
         # slots are 4 elbow + 2 shoulder + wrist
         first = SLOT_NAMES.index("shoulder_plus_elbow_plus_wrist_plus")
         return tuple(SLOT_NAMES[first + 4 * (s // 2 % 2) + 2 * (s // 4) + s % 2] for s in range(8))
@@ -286,10 +468,32 @@ class GantrySolver(WithoutParameters):
     slots: int = 2
 
     def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
+        """Both branches of the wrist.
+
+        Parameters
+        ----------
+        T : (N, 4, 4), m
+        values : not looked at
+
+        Returns
+        -------
+        q : (N, 2, 6), rad or m, NaN in empty slots
+        certainty : (N,), CONTINUUM where both meet or the slides don't span space, else CERTAIN
+        """
         q, singular = solve_gantry(self.arm, T)
         return q, np.where(singular, CONTINUUM, CERTAIN)
 
     def names(self, x: Reals) -> tuple[SlotName, ...]:
+        """Names by the root of the wrist.
+
+        Parameters
+        ----------
+        x : not looked at
+
+        Returns
+        -------
+        names : two
+        """
         return "wrist_plus", "wrist_minus"
 
 
@@ -302,11 +506,33 @@ class ScaraSolver(WithoutParameters):
     slots: int = 2
 
     def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
+        """Both branches of the elbow.
+
+        Parameters
+        ----------
+        T : (N, 4, 4), m, whose tilt is not met
+        values : not looked at
+
+        Returns
+        -------
+        q : (N, 2, 4), rad or m, NaN in empty slots
+        certainty : (N,), CONTINUUM where both meet, else CERTAIN
+        """
         q, second = solve_scara(self.arm, T)[0], self.arm.turning[1]
         meet = np.abs(_shortest(q[:, 0, second] - q[:, 1, second])) < DOUBLE_ROOT
         return q, np.where(meet, CONTINUUM, CERTAIN)
 
     def names(self, x: Reals) -> tuple[SlotName, ...]:
+        """Names by the root of the elbow.
+
+        Parameters
+        ----------
+        x : not looked at
+
+        Returns
+        -------
+        names : two
+        """
         return "elbow_plus", "elbow_minus"
 
 
@@ -323,6 +549,18 @@ class PaddedChain(WithoutParameters):
         object.__setattr__(self, "slots", self.rest.slots)
 
     def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
+        """Rows of the completed chain that need nothing of the joints that are not there.
+
+        Parameters
+        ----------
+        T : (N, 4, 4), m
+        values : not looked at
+
+        Returns
+        -------
+        q : (N, slots, n), rad or m, NaN in empty slots
+        certainty : (N,), of the completed chain; CONTINUUM where two rows meet
+        """
         x, certainty = self.rest.rows(T, values)
         if self.code == "planar_wrist":  # what these joints would have to turn, the tool can't
             x[np.abs(_shortest(x[:, :, list(self.lacking)])).max(axis=2) > LEFT_OVER] = np.nan
@@ -335,6 +573,16 @@ class PaddedChain(WithoutParameters):
         return x, certainty
 
     def names(self, x: Reals) -> tuple[SlotName, ...]:
+        """The completed chain's slot names.
+
+        Parameters
+        ----------
+        x : (n,), rad or m, the manufacturer's zero pose
+
+        Returns
+        -------
+        names : in the order of the slots; none for arms that solve for the position alone
+        """
         if self.code == "position":  # rows that differ in the joints that are not there are one
             return ()
         full = np.zeros(6)
@@ -357,6 +605,18 @@ class LinkedRows(WithoutParameters):
     slots: int
 
     def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
+        """Solutions of the chain that the linkage can make.
+
+        Parameters
+        ----------
+        T : (N, 4, 4), m
+        values : not looked at
+
+        Returns
+        -------
+        q : (N, slots, m), rad or m, row values, NaN in empty slots
+        certainty : (N,), of the chain
+        """
         x, certainty = self.chain.rows(T, values)
         off = (x - self.start) @ self.apart.T
         off = np.abs(np.where(self.sliding, off, _shortest(off))).max(axis=2)
@@ -364,6 +624,16 @@ class LinkedRows(WithoutParameters):
         return x, certainty
 
     def names(self, x: Reals) -> tuple[SlotName, ...]:
+        """The chain's slot names.
+
+        Parameters
+        ----------
+        x : (m,), rad or m, the manufacturer's zero pose
+
+        Returns
+        -------
+        names : in the order of the slots
+        """
         return self.chain.names(x)
 
 
@@ -390,11 +660,12 @@ def _three_signs(w1: Reals, w2: Reals, zero_side: float) -> tuple[SlotName, ...]
 
 
 def _shortest(x: Reals) -> Reals:
+    """Angles in [-pi, pi], whole turns taken off."""
     return np.asarray(x - TURN * np.round(x / TURN))
 
 
 def _branches_meet(q: Reals, pairs: tuple[tuple[int, int], ...]) -> Flags:
-    """Whether two rows that differ in one root (slots apart, joint that shows it) lie within a small angle, (N,)."""
+    """Whether two rows that differ in one root (step in slots, joint that shows it) are within a small angle, (N,)."""
     meet = np.zeros(len(q), dtype=bool)
     for step, joint in pairs:
         for slot in range(8):

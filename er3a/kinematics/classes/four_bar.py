@@ -50,7 +50,16 @@ class FourBar:
     shoulders: tuple[int, ...]
 
     def nearest(self, phi: float) -> float:
-        """The turn within the intervals that is nearest to phi, whole turns aside."""
+        """The turn within the intervals that is nearest to a given one, whole turns aside.
+
+        Parameters
+        ----------
+        phi : rad
+
+        Returns
+        -------
+        phi : rad
+        """
         best, at = np.inf, phi
         for low, high in self.intervals:
             middle = 0.5 * (low + high)
@@ -63,7 +72,17 @@ class FourBar:
         return at
 
     def members(self, phi: Reals, elbow: int) -> Reals:
-        """Joint angles (..., 6) in rad at turns phi (...,) with one elbow (0 or 1); NaN outside the intervals."""
+        """Members of the four-bar's continuum.
+
+        Parameters
+        ----------
+        phi : (...), rad, turn of joints 2, 3 and 4 together
+        elbow : 0 or 1
+
+        Returns
+        -------
+        q : (..., 6), rad, in (-pi, pi]; NaN outside the intervals
+        """
         k = self.arm.constants
         phi = np.asarray(phi, float)
         c, s = np.cos(phi), np.sin(phi)
@@ -84,7 +103,11 @@ class FourBar:
 
 
 def solve_three_parallel(arm: ThreeParallel, T: Reals) -> tuple[Reals, Flags]:
-    """All solutions for poses T (N, 4, 4), m.
+    """All solutions for poses of an arm with axes 2, 3 and 4 parallel, singular ones included.
+
+    Parameters
+    ----------
+    T : (N, 4, 4), m
 
     Returns
     -------
@@ -107,9 +130,14 @@ def solve_three_parallel(arm: ThreeParallel, T: Reals) -> tuple[Reals, Flags]:
 
 
 def solve_near_reference(arm: ThreeParallel, T: Reals, x_ref: Reals) -> tuple[Reals, Reals]:
-    """All slots for poses T (N, 4, 4) with the free turn of a four-bar where a reference (N, 6) has it.
+    """All slots for poses with the free turn of a four-bar where a reference has it.
 
     Where joint 5's roots meet, so do the slots of both; each elbow has its member in them.
+
+    Parameters
+    ----------
+    T : (N, 4, 4), m
+    x_ref : (N, 6), rad, row values
 
     Returns
     -------
@@ -135,7 +163,16 @@ def solve_near_reference(arm: ThreeParallel, T: Reals, x_ref: Reals) -> tuple[Re
 
 
 def turn_of_three(arm: ThreeParallel, x: Reals) -> Reals:
-    """The turn phi (...,) of joints 2, 3 and 4 together about their direction, at joint angles (..., 6)."""
+    """The turn of joints 2, 3 and 4 together about their direction.
+
+    Parameters
+    ----------
+    x : (..., 6), rad
+
+    Returns
+    -------
+    phi : (...), rad, not wrapped
+    """
     k = arm.constants
     return np.asarray(x[..., 1] + k.sense_3 * x[..., 2] + k.sense_4 * x[..., 3] + k.zero_sum)
 
@@ -171,7 +208,16 @@ def _put_members(rows: Reals, families: tuple[FourBar, ...]) -> None:
 
 
 def four_bars(arm: ThreeParallel, T: Reals) -> tuple[FourBar, ...]:
-    """The continua of solutions of one pose T (4, 4)."""
+    """The continua of solutions of one pose.
+
+    Parameters
+    ----------
+    T : (4, 4), m
+
+    Returns
+    -------
+    families : empty where axis 6 is not parallel to axes 2, 3 and 4, or joint 1 has no root
+    """
     k = arm.constants
     p = (T[:3, :3] @ np.array(k.wrist_in_tool) + T[:3, 3] - np.array(k.place)) @ np.array(k.turn).T
     axis_6 = np.array(k.turn) @ T[:3, :3] @ np.array(k.axis_6_in_tool)

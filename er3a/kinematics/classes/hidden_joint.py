@@ -51,7 +51,14 @@ NUMBERS = 15
 
 @kernel
 def carry(K: Reals, v: Reals, out: Reals) -> None:
-    """``out`` (15,) = the numbers v (15,) of a line after the rigid motion K."""
+    """Carry a line's fifteen numbers along a rigid motion. Kernel.
+
+    Parameters
+    ----------
+    K : (4, 4), rigid
+    v : (15,), p, l, ``p x l``, ``(p . p) l - 2 (p . l) p``, ``p . p``, ``p . l``, 1
+    out : (15,), filled with those of the moved line; it must not be v
+    """
     t0, t1, t2 = K[0, 3], K[1, 3], K[2, 3]
     tt = t0 * t0 + t1 * t1 + t2 * t2
     for block in range(4):
@@ -78,7 +85,13 @@ def carry(K: Reals, v: Reals, out: Reals) -> None:
 
 @inner_kernel
 def turned_parts(v: Reals, parts: Reals) -> None:
-    """``parts`` (3, 15) with ``Rz(angle) v = cos(angle) parts[0] + sin(angle) parts[1] + parts[2]``."""
+    """Write the turn of a line about z as a linear form of cosine and sine. Kernel.
+
+    Parameters
+    ----------
+    v : (15,), numbers of the line
+    parts : (3, 15), filled: ``Rz(angle) v = cos(angle) parts[0] + sin(angle) parts[1] + parts[2]``
+    """
     parts[:, :] = 0.0
     for b in range(0, 12, 3):
         parts[0, b], parts[0, b + 1] = v[b], v[b + 1]
@@ -89,7 +102,13 @@ def turned_parts(v: Reals, parts: Reals) -> None:
 
 @inner_kernel
 def slid_parts(v: Reals, parts: Reals) -> None:
-    """``parts`` (3, 15) with ``Tz(x) v = parts[0] + x parts[1] + x^2 parts[2]``."""
+    """Write the shift of a line along z as a polynomial of the shift. Kernel.
+
+    Parameters
+    ----------
+    v : (15,), numbers of the line
+    parts : (3, 15), filled: ``Tz(x) v = parts[0] + x parts[1] + x^2 parts[2]``
+    """
     parts[:, :] = 0.0
     parts[0, :] = v
     parts[1, 2] = v[14]
@@ -100,18 +119,18 @@ def slid_parts(v: Reals, parts: Reals) -> None:
     parts[2, 12] = v[14]
 
 
-DEGREE = 8
+DEGREE = 8  # of the determinant as a trigonometric polynomial: sixteen zeros at most
 TERMS = 2 * DEGREE + 1
-SAMPLES = 20
-ARCS = 8
+SAMPLES = 20  # 17 coefficients, and three more that would vanish without rounding
+ARCS = 8  # of the circle, each with the tangent of half the angle from its own middle
 ORDER = 2 * DEGREE
-MAX_PARTS = 150
-CLOSE = 1e-13
-LOCAL_ORDER = 12
-LOCAL_NOISE = 1e-11
-LOCAL_GROWTH = 1e3
+MAX_PARTS = 150  # intervals looked at on an arc, before the reading is given up
+CLOSE = 1e-13  # rad: a step to a zero this short has reached it
+LOCAL_ORDER = 12  # of the polynomial through values on a short interval
+LOCAL_NOISE = 1e-11  # of the largest value: above what the change to Bernstein's basis makes of rounding
+LOCAL_GROWTH = 1e3  # about how much that change enlarges the noise of values (at worst 3.7e3)
 LEFT_OVER = 1 / (2**LOCAL_ORDER * factorial(LOCAL_ORDER + 1))  # of interpolation at Chebyshev's nodes
-FIRST_ANGLE = 0.1234
+FIRST_ANGLE = 0.1234  # rad: no usual joint angle is at a sample or at the border of arcs
 _HALF = np.tan(np.pi / ARCS / 2)
 
 
@@ -162,7 +181,17 @@ SAMPLE_ANGLES = FIRST_ANGLE + 2 * np.pi * np.arange(SAMPLES) / SAMPLES
 
 @inner_kernel
 def value_and_slope(terms: Reals, angle: float) -> tuple[float, float]:
-    """Value and derivative of the polynomial with coefficients 1, cos, sin, ... at an angle."""
+    """Value and derivative of a trigonometric polynomial. Kernel.
+
+    Parameters
+    ----------
+    terms : (17,) at least, coefficients 1, cos, sin, cos 2, sin 2, ...
+    angle : rad
+
+    Returns
+    -------
+    value, slope : slope per rad
+    """
     c, s = np.cos(angle), np.sin(angle)
     ck, sk, value, slope = 1.0, 0.0, terms[0], 0.0
     for k in range(1, DEGREE + 1):
@@ -194,10 +223,20 @@ def _zero_between(terms: Reals, low: float, high: float, rises: bool) -> float:
 
 @inner_kernel
 def isolate(stack: Reals, order: int, noise: float, found: Reals, count: int) -> int:
-    """Intervals of -1..1 with zeros of the polynomial whose Bernstein coefficients are ``stack[0, :order + 1]``.
+    """Find the intervals of -1..1 that hold the zeros of a polynomial in Bernstein's basis [2]_. Kernel.
 
-    Rows of ``found`` from ``count`` on are filled with low end, high end and kind: 1 or -1 for one zero where the
-    values rise or fall, 0 for a dark interval. Returns how many rows there are; -1 if more are needed than may be used.
+    Parameters
+    ----------
+    stack : (rows, order + 3), the coefficients in ``stack[0, :order + 1]``; scratch memory
+    order : degree of the polynomial
+    noise : size below which a coefficient has no sign
+    found : (n, 3), filled from row ``count`` on with low end, high end and kind: 1 or -1 for one zero where the
+        values rise or fall, 0 for a dark interval
+    count : rows that are filled already
+
+    Returns
+    -------
+    count : how many rows there are; -1 if more are needed than may be used
     """
     last = order
     stack[0, last + 1], stack[0, last + 2] = -1.0, 1.0
@@ -206,6 +245,7 @@ def isolate(stack: Reals, order: int, noise: float, found: Reals, count: int) ->
         depth -= 1
         used += 1
         b = stack[depth]
+        # Descartes' rule: the changes of sign of the coefficients bound the zeros inside.
         largest, faint, changes, sign = 0.0, 0, 0, 0.0
         for i in range(last + 1):
             size = abs(b[i])
@@ -257,9 +297,19 @@ def isolate(stack: Reals, order: int, noise: float, found: Reals, count: int) ->
 
 @kernel
 def zeros_on_circle(terms: Reals, noise: float, found: Reals, stack: Reals) -> int:
-    """Fill ``found`` (n, 3) with low end, high end and kind of all zeros of the polynomial; -1 if there is no place.
+    """Find all zeros of a trigonometric polynomial. Kernel.
 
-    Of a single zero (kind 1) both ends are the zero; kind 0 is a dark interval. ``stack`` (100, 19) is scratch memory.
+    Parameters
+    ----------
+    terms : (17,) at least, coefficients 1, cos, sin, cos 2, sin 2, ...
+    noise : of the values
+    found : (n, 3), filled with low end, high end (rad) and kind: of a single zero (1) both ends are the zero; 0 is a
+        dark interval
+    stack : (100, 19), scratch memory
+
+    Returns
+    -------
+    count : how many rows; -1 if there is no place
     """
     count = 0
     for arc in range(ARCS):
@@ -285,10 +335,22 @@ def zeros_on_circle(terms: Reals, noise: float, found: Reals, stack: Reals) -> i
 
 @inner_kernel
 def zeros_between(values: Reals, noise: float, peak: float, low: float, high: float, found: Reals, stack: Reals) -> int:
-    """The same on a short interval, from values (13,) with that noise at :data:`NODES` of it.
+    """Find all zeros on a short interval, from values at its nodes. Kernel.
 
     To the noise comes what a polynomial of degree 12 leaves of the trigonometric one, whose largest value is ``peak``:
     by Bernstein's inequality no 13th derivative exceeds ``8^13 peak``.
+
+    Parameters
+    ----------
+    values : (13,), at :data:`NODES` of the interval
+    noise : of the values
+    peak : largest value of the polynomial on the circle
+    low, high : rad, the interval
+    found, stack : as for :func:`zeros_on_circle`
+
+    Returns
+    -------
+    count : how many rows; -1 if there is no place
     """
     largest = 0.0
     for i in range(LOCAL_ORDER + 1):
@@ -325,8 +387,8 @@ def zeros_between(values: Reals, noise: float, peak: float, low: float, high: fl
 
 EQUATIONS, MONOMIALS = 6, 9
 SHIFT_4, SHIFT_5 = 0.7312, -1.1753  # angles from which halves are taken, so that no usual angle is at infinity
-ROUNDING = 2e-15
-_ALONG = (2, 5, 8, 11, 12, 13)
+ROUNDING = 2e-15  # of an elimination's pivots, about nine times the unit of rounding
+_ALONG = (2, 5, 8, 11, 12, 13)  # of the fifteen numbers those that a turn about z leaves as they are
 
 
 class Reading(NamedTuple):
@@ -376,7 +438,14 @@ def new_scratch() -> Scratch:
 def readings_of(links: Reals, sliding: Flags) -> list[Reading]:
     """All readings of the loop: twelve, or those with the prismatic joints at places 1, 4 and 5.
 
-    ``links`` (7, 4, 4) with L_0 = 1 (base in the pose), ``sliding`` (6,).
+    Parameters
+    ----------
+    links : (7, 4, 4), with L_0 = 1 (base in the pose), in parts of the chain's size
+    sliding : (6,), prismatic joints
+
+    Returns
+    -------
+    readings : forwards from each joint, then backwards
     """
     found = []
     for backwards in (False, True):
@@ -403,9 +472,16 @@ def readings_of(links: Reals, sliding: Flags) -> list[Reading]:
 
 @kernel
 def left_side(links: Reals, slides: Flags, left: Reals) -> None:
-    """Coefficients (14, 27) of the left side: rows along joint 2, then real and imaginary parts of those across it;
-    columns (cos, sin, 1) of x_3 times squares and product of cosine and sine of half x_4 times those of x_5; of a
-    prismatic joint 1, x and x^2 instead."""
+    """Fill the coefficients of the left side of a loop's equations. Kernel.
+
+    Parameters
+    ----------
+    links : (6, 4, 4), of the loop
+    slides : (6,), prismatic joints at places 1, 4 and 5
+    left : (14, 27), filled: rows along joint 2, then real and imaginary parts of those across it; columns (cos, sin,
+        1) of x_3 times squares and product of cosine and sine of half x_4 times those of x_5; of a prismatic joint
+        1, x and x^2 instead
+    """
     axis = np.zeros(NUMBERS)
     axis[5], axis[14] = 1.0, 1.0
     first, last, carried = np.empty(NUMBERS), np.empty(NUMBERS), np.empty(NUMBERS)
@@ -457,7 +533,14 @@ def _monomial(part: int, power: int, c: float, s: float, slides: bool) -> float:
 
 @kernel
 def equations_of_pose(reading: Reading, pose_link: Reals, m: Scratch) -> None:
-    """Fill ``m.equations`` (3, 6, 9) for the loop closed by the pose's link, and ``m.right``."""
+    """Fill the six equations of the loop that a pose closes, with joints 1 and 2 taken out [1]_. Kernel.
+
+    Parameters
+    ----------
+    reading : of the loop
+    pose_link : (4, 4), ``L_6 T^-1 L_0``, in parts of the chain's size
+    m : scratch memory; ``m.equations`` (3, 6, 9) and ``m.right`` (3, 15) are filled, each equation of length 1
+    """
     for i in range(6):
         m.links[i] = reading.links[i]
     if reading.sense > 0.0:
@@ -523,6 +606,7 @@ def _without_first_joint(left: Reals, slides: Flags, m: Scratch) -> None:
         norm = np.sqrt(squares)
         if norm == 0.0:
             continue
+        # Householder's reflection, away from the entry's own sign so that no digits cancel.
         if A[k, k] > 0.0:
             norm = -norm
         v = np.zeros(6)
@@ -565,6 +649,7 @@ def _without_second_joint(left: Reals, m: Scratch) -> None:
         if norm == 0.0:
             continue
         head = abs(B[k, k])
+        # The same reflection in complex numbers: the sign becomes a phase.
         phase = B[k, k] / head if head > 0.0 else 1.0 + 0.0j
         for r in range(k, 4):
             normal[k, r] = B[r, k]
@@ -578,6 +663,7 @@ def _without_second_joint(left: Reals, m: Scratch) -> None:
                 inner += np.conj(normal[k, r]) * B[r, j]
             for r in range(k, 4):
                 B[r, j] -= inner * normal[k, r]
+    # What the reflections leave in the last row: the direction orthogonal to all three columns.
     v[3] = 1.0
     for k in range(2, -1, -1):
         inner = 0.0 + 0.0j
@@ -597,7 +683,14 @@ def _without_second_joint(left: Reals, m: Scratch) -> None:
 
 @inner_kernel
 def at_angle(equations: Reals, angle: float, F: Reals) -> None:
-    """The equations (6, 9) at one value of the hidden joint."""
+    """Evaluate the six equations at one angle of the hidden joint. Kernel.
+
+    Parameters
+    ----------
+    equations : (3, 6, 9), the parts of cosine, sine and 1
+    angle : rad
+    F : (6, 9), filled
+    """
     c, s = np.cos(angle), np.sin(angle)
     for r in range(EQUATIONS):
         for j in range(MONOMIALS):
@@ -606,10 +699,19 @@ def at_angle(equations: Reals, angle: float, F: Reals) -> None:
 
 @inner_kernel
 def nine_rows(F: Reals, M: Reals) -> tuple[float, float]:
-    """``M`` (9, 9), singular where the twelve equations are, from equations F (6, 9), which it changes.
+    """Reduce the twelve equations to nine with the same zeros. Kernel.
 
-    Six rows are F; three are combinations of F without C^2 of joint 4, one power further. Returns the factor by which
-    the determinant of M is that of the twelve equations, and its smallest pivot.
+    Six rows are F; three are combinations of F without C^2 of joint 4, one power further.
+
+    Parameters
+    ----------
+    F : (6, 9), of :func:`at_angle`, changed
+    M : (9, 9), filled, singular where the twelve equations are
+
+    Returns
+    -------
+    factor : by which the determinant of M is that of the twelve equations
+    smallest : smallest pivot
     """
     for r in range(6):
         for j in range(9):
@@ -643,7 +745,16 @@ def nine_rows(F: Reals, M: Reals) -> tuple[float, float]:
 
 @kernel
 def determinant(M: Reals) -> tuple[float, float]:
-    """Determinant of M (9, 9), which it changes, and its smallest pivot."""
+    """Determinant by elimination with row pivots. Kernel.
+
+    Parameters
+    ----------
+    M : (9, 9), changed
+
+    Returns
+    -------
+    value, smallest : the determinant, and its smallest pivot
+    """
     value, smallest = 1.0, np.inf
     for k in range(9):
         pivot = k
@@ -668,7 +779,18 @@ def determinant(M: Reals) -> tuple[float, float]:
 
 @inner_kernel
 def determinant_at(equations: Reals, angle: float, F: Reals, M: Reals) -> tuple[float, float]:
-    """The determinant of the twelve equations at an angle, and about how much of it is rounding."""
+    """The determinant of the twelve equations at an angle, and about how much of it is rounding. Kernel.
+
+    Parameters
+    ----------
+    equations : (3, 6, 9)
+    angle : rad, of the hidden joint
+    F, M : (6, 9) and (9, 9), scratch memory
+
+    Returns
+    -------
+    value, rounding : the determinant, and its error by the smallest pivot
+    """
     at_angle(equations, angle, F)
     factor, smallest = nine_rows(F, M)
     value, smallest_of_nine = determinant(M)
@@ -679,9 +801,16 @@ def determinant_at(equations: Reals, angle: float, F: Reals, M: Reals) -> tuple[
 
 @kernel
 def sampled_determinant(m: Scratch) -> tuple[float, float]:
-    """Fill ``m.terms`` with the determinant's coefficients 1, cos, sin, ...; returns the largest sample and the noise.
+    """Find the determinant's coefficients as a trigonometric polynomial, from samples. Kernel.
 
-    Noise: the size of the three terms above degree 8, which are rounding only.
+    Parameters
+    ----------
+    m : scratch memory with equations; ``m.terms`` (20,) is filled with the coefficients 1, cos, sin, ...
+
+    Returns
+    -------
+    peak : the largest sample
+    noise : size of the three terms above degree 8, which are rounding only
     """
     F, M = np.empty((6, 9)), np.empty((9, 9))
     peak = 0.0

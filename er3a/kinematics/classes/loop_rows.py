@@ -30,12 +30,12 @@ from er3a.kinematics.classes.hidden_joint import (
 from er3a.numerics.arrays import Flags, Integers, Reals, for_kernel
 from er3a.numerics.jit import inner_kernel, kernel
 
-MAX_ZEROS = 48
-MAX_DARK = 64
+MAX_ZEROS = 48  # rows for zeros and for intervals that may hold one; a pose has 16 zeros at most
+MAX_DARK = 64  # dark intervals of a pose; with more the reading is given up
 WIDEST = 0.2  # rad, that a dark interval is sampled in one piece
-NARROWEST = 1e-6
-DEEPEST = 4.0
-NEAR_NULL = 1e-4
+NARROWEST = 1e-6  # rad: a dark interval this narrow is given as one possible zero
+DEEPEST = 4.0  # times that a dark interval is sampled anew within one
+NEAR_NULL = 1e-4  # of the first pivot: below, a second null vector may belong to another solution
 
 
 class LoopMemory(NamedTuple):
@@ -60,7 +60,16 @@ class LoopMemory(NamedTuple):
 
 
 def new_memory(sliding: Flags) -> LoopMemory:
-    """Memory for one thread; ``sliding`` (6,) marks prismatic joints."""
+    """Working memory of one thread.
+
+    Parameters
+    ----------
+    sliding : (6,), prismatic joints
+
+    Returns
+    -------
+    memory : for the kernels of this module and of :mod:`polish`
+    """
     return LoopMemory(
         elimination=new_scratch(),
         found=np.zeros((MAX_ZEROS, 3)),
@@ -83,9 +92,19 @@ def new_memory(sliding: Flags) -> LoopMemory:
 
 @kernel
 def hidden_angles(e: Scratch, level: float, m: LoopMemory) -> int:
-    """Fill ``m.zeros`` (48, 3) with the hidden joint's possible angles, column 2 is 0 where it is not one clear zero.
+    """Find the hidden joint's possible angles. Kernel.
 
     Dark intervals are sampled anew by determinants on them alone, whose rounding is that of their own size.
+
+    Parameters
+    ----------
+    e : with the equations and terms of a pose
+    level : noise of the polynomial
+    m : memory; ``m.zeros`` (48, 3) is filled, rad, column 2 is 0 where it is not one clear zero
+
+    Returns
+    -------
+    count : how many; -1 if there is no place
     """
     found = zeros_on_circle(e.terms, level, m.found, m.stack)
     if found < 0:
@@ -139,7 +158,19 @@ def hidden_angles(e: Scratch, level: float, m: LoopMemory) -> int:
 
 @inner_kernel
 def pairs_at(e: Scratch, angle: float, slides: Flags, m: LoopMemory) -> int:
-    """Angles of joints 4 and 5 at a zero, into ``m.pairs``: from null vectors of the nine equations."""
+    """Find the angles of joints 4 and 5 at a zero, from null vectors of the nine equations. Kernel.
+
+    Parameters
+    ----------
+    e : with the equations of a pose
+    angle : rad, of the hidden joint
+    slides : (6,), prismatic places of the loop
+    m : memory; ``m.pairs`` (12, 2) is filled, rad or parts of the size
+
+    Returns
+    -------
+    count : how many pairs
+    """
     at_angle(e.equations, angle, m.F)
     nine_rows(m.F, m.M)
     M = m.M
@@ -207,6 +238,7 @@ def _angles_of(y: Reals, slides: Flags) -> tuple[float, float]:
 
 @inner_kernel
 def _angle_of(cc: float, cs: float, ss: float) -> float:
+    """The angle whose half has the squares and product of cosine and sine nearest to these three."""
     sign = 1.0 if cc + ss >= 0.0 else -1.0
     angle: float = np.arctan2(2.0 * cs * sign, (cc - ss) * sign)
     return angle
@@ -261,8 +293,18 @@ def _pencil(Y: Reals, step: int, slides: Flags, pairs: Reals, count: int) -> int
 
 @inner_kernel
 def remaining_joints(reading: Reading, e: Scratch, m: LoopMemory) -> int:
-    """Joints 1, 2 and 6 for joints 3, 4, 5 in ``m.x[0]``; two rows of ``m.x`` where one does not determine the
-    first."""
+    """Find joints 1, 2 and 6 from joints 3, 4 and 5. Kernel.
+
+    Parameters
+    ----------
+    reading : of the loop
+    e : with both sides of the pose's equations
+    m : memory; ``m.x[0]`` (6,) holds joints 3, 4 and 5, and gets the others, rad or parts of the size
+
+    Returns
+    -------
+    count : two, with ``m.x[1]`` filled too, where the equations leave two values of joint 1; else one
+    """
     x = m.x[0]
     half_4, half_5 = 0.5 * (x[3] - SHIFT_4), 0.5 * (x[4] - SHIFT_5)
     c4, s4, c5, s5 = np.cos(half_4), np.sin(half_4), np.cos(half_5), np.sin(half_5)
@@ -328,6 +370,7 @@ def _first_shift(square: float, linear: float, alone: float, b0: float, b1: floa
 
 @inner_kernel
 def _second_and_last(e: Scratch, across: Reals, slides: Flags, x: Reals) -> None:
+    """Joint 2 by the rows across it, then joint 6 as what closes the loop, into ``x`` (6,)."""
     c, s = (x[0] * x[0], x[0]) if slides[0] else (np.cos(x[0]), np.sin(x[0]))
     re, im = 0.0, 0.0
     for b in range(4):

@@ -34,18 +34,18 @@ from er3a.numerics.fast_math import arctan2
 from er3a.numerics.jit import inner_kernel, kernel
 
 SLOTS = 8
-BLOCK = 64
+BLOCK = 64  # poses; a row of 64 numbers fills whole vectors
 NEAR = 1e-6  # rad or parts of the arm's size from where branches meet: left to the careful solver
 PARALLEL = 1e-9  # rad
-MEETS_M = 1e-9
-SOLVES = 1e-10
+MEETS_M = 1e-9  # by which axes may miss a common point, and lengths that count as none
+SOLVES = 1e-10  # residual, rad and parts of the size, up to which a polished row is kept
 
 _W, _Z6, _X6, _MARK = (
     0,
     3,
     6,
     9,
-)  # rows of a block: wrist, axis 6, a vector beside it, whether left to the careful solver
+)  # rows of a block: wrist, axis 6, a vector across it, whether left to the careful solver
 _POSE_ROWS = 10
 
 
@@ -92,9 +92,15 @@ class ThreeParallel:
 
 
 def three_parallel(links: Reals) -> ThreeParallel | None:
-    """The solver for links (7, 4, 4), or None if the chain is of another kind.
+    """Recognise six revolute joints with axes 2, 3 and 4 parallel and 5 and 6 meeting.
 
-    Tolerances: axes parallel to 1e-9 rad, meeting to 1e-9 m.
+    Parameters
+    ----------
+    links : (7, 4, 4), m
+
+    Returns
+    -------
+    solver : None if the chain is of another kind; axes are parallel to 1e-9 rad and meet to 1e-9 m
     """
     axes, points = axes_of(links)
     w = axes[1]
@@ -120,6 +126,7 @@ def _meeting(a: Reals, p: Reals, b: Reals, r: Reals) -> Reals | None:
 
 
 def _constants(links: Reals, axes: Reals, points: Reals, wrist: Reals) -> ParallelConstants:
+    """Constants of the arm from its axes with all joints at 0 (base frame, m) and W, where axes 5 and 6 meet."""
     w = axes[1]
     z = axes[0]
     x = w - (w @ z) * z
@@ -174,8 +181,16 @@ def _constants(links: Reals, axes: Reals, points: Reals, wrist: Reals) -> Parall
 
 @kernel
 def solve_parallel_blocks(k: ParallelConstants, T: Reals, slack: float, q: Reals, marked: Flags) -> None:
-    """Fill ``q`` (N, 8, 6) and ``marked`` (N,) for poses T (N, 4, 4); roots that miss by less than ``slack`` (m) are
-    taken as met."""
+    """Solve poses in closed form, block by block [1]_. Kernel.
+
+    Parameters
+    ----------
+    k : constants of the arm
+    T : (N, 4, 4), m
+    slack : m, roots that miss by less are taken as met
+    q : (N, 8, 6), filled, rad, NaN where a slot has no solution
+    marked : (N,), filled with where branches meet, for the careful solver
+    """
     pose, side, out = np.empty(_POSE_ROWS * BLOCK), np.empty(12 * BLOCK), np.empty(13 * BLOCK)
     for start in range(0, T.shape[0], BLOCK):
         size = min(BLOCK, T.shape[0] - start)
@@ -195,7 +210,7 @@ def solve_parallel_blocks(k: ParallelConstants, T: Reals, slack: float, q: Reals
 
 @inner_kernel
 def _into_frame(k: ParallelConstants, T: Reals, start: int, size: int, pose: Reals) -> None:
-    """W, axis 6 and the vector beside it in the arm's frame."""
+    """W, axis 6 and the vector across it in the arm's frame."""
     for i in range(BLOCK):
         n = start + min(i, size - 1)
         for row in range(3):
@@ -215,7 +230,7 @@ def _into_frame(k: ParallelConstants, T: Reals, start: int, size: int, pose: Rea
 
 @kernel
 def _first_joint(k: ParallelConstants, pose: Reals, side: Reals, sign: float, slack: float) -> None:
-    """Joint 1 by one root; then W in the plane, axis 6 and the vector beside it as seen from link 1, into ``side``."""
+    """Joint 1 by one root; then W in the plane, axis 6 and the vector across it as seen from link 1, into ``side``."""
     for i in range(BLOCK):
         x, y, z = pose[i], pose[BLOCK + i], pose[2 * BLOCK + i]
         across = np.sqrt(x * x + y * y)
@@ -312,8 +327,16 @@ def _wrist_and_elbow(k: ParallelConstants, pose: Reals, side: Reals, sign: float
 
 @kernel
 def polish_rows(links: Reals, size: float, T: Reals, q: Reals, apart: bool) -> None:
-    """Newton's steps on rows (N, 8, 6) near singular poses; rows that do not solve the pose and, with ``apart``, the
-    second of two that meet, become NaN."""
+    """Move rows near singular poses to solutions, by Newton's steps. Kernel.
+
+    Parameters
+    ----------
+    links : (7, 4, 4), m
+    size : m, of the chain
+    T : (N, 4, 4), m
+    q : (N, 8, 6), rad, changed in place; rows that do not solve the pose become NaN
+    apart : whether the second of two rows that meet becomes NaN, too
+    """
     scaled, pose, w, J = links.copy(), np.empty((4, 4)), np.empty((8, 4, 4)), np.empty((6, 7))
     dq, columns, sliding = np.empty(12), np.zeros(6, np.int64), np.zeros(6, np.bool_)
     scaled[:, :3, 3] /= size

@@ -14,17 +14,28 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import inner_kernel, kernel
 
 SOLVES = 1e-12  # residual, rad and parts of the chain's size
-MIN_PIVOT = 1e-9
-LARGEST_STEP = 0.7
-NEAR_FOLD = 2e-2
-PROBE = 1e-2
+MIN_PIVOT = 1e-9  # in parts of the first: a direction with less is not determined by the pose
+LARGEST_STEP = 0.7  # rad or parts of the size, within which the linear model is of use
+NEAR_FOLD = 2e-2  # last pivot's ratio, below which another root may meet this one
+PROBE = 1e-2  # rad or parts of the size, step to either side that shows the fold's curvature
 
 
 @inner_kernel
 def residual_and_jacobian(links: Reals, sliding: Flags, T: Reals, q: Reals, w: Reals, J: Reals) -> float:
-    """Fill ``J`` (6, 7), its last column the pose error; returns the error's largest component.
+    """Pose error and geometric Jacobian of a chain of six joints, lengths in parts of its size. Kernel.
 
-    ``links`` (7, 4, 4) and ``T`` (4, 4) have lengths in units of the chain's size; ``w`` (8, 4, 4) is scratch memory.
+    Parameters
+    ----------
+    links : (7, 4, 4), in units of the chain's size
+    sliding : (6,), prismatic joints
+    T : (4, 4), the pose, in units of the chain's size
+    q : (6,), rad, or parts of the size
+    w : (8, 4, 4), scratch memory
+    J : (6, 7), filled: linear rows, angular rows; the last column is the pose error
+
+    Returns
+    -------
+    largest : the error's largest component, rad and parts of the size; at least 1 beyond 90 deg
     """
     n = q.shape[0]
     frame, other = w[0], w[1]
@@ -72,7 +83,17 @@ def residual_and_jacobian(links: Reals, sliding: Flags, T: Reals, q: Reals, w: R
 
 @inner_kernel
 def eliminate(J: Reals, columns: Integers) -> float:
-    """Reduce J (6, 7) by complete pivoting; returns the ratio of the last pivot to the first."""
+    """Reduce a linear system by complete pivoting. Kernel.
+
+    Parameters
+    ----------
+    J : (6, 7), changed in place, its last column the right side
+    columns : (6,), filled with the order of the columns
+
+    Returns
+    -------
+    ratio : the last pivot to the first; 0 if one vanishes
+    """
     for k in range(6):
         columns[k] = k
     first = 0.0
@@ -130,7 +151,21 @@ def _step(J: Reals, columns: Integers, dq: Reals) -> None:
 def newton(
     links: Reals, sliding: Flags, T: Reals, q: Reals, most: int, w: Reals, J: Reals, dq: Reals, columns: Integers
 ) -> tuple[float, float]:
-    """Move q to a root; returns the residual there and the last pivot's ratio at the last step (1 if none was made)."""
+    """Move joint values to a root by Newton's steps, without steps that the pose does not determine. Kernel.
+
+    Parameters
+    ----------
+    links, sliding, T, w, J : as for :func:`residual_and_jacobian`
+    q : (6,), rad, or parts of the size, changed in place
+    most : how many steps
+    dq : (12,), scratch memory
+    columns : (6,), scratch memory
+
+    Returns
+    -------
+    residual : at the root, rad and parts of the size
+    pivot : the last pivot's ratio at the last step, 1 if none was made
+    """
     pivot, smallest = 1.0, np.inf
     best = dq[6:12]
     for _ in range(most):
@@ -169,10 +204,21 @@ def newton(
 def twin_start(
     links: Reals, sliding: Flags, T: Reals, q: Reals, start: Reals, w: Reals, J: Reals, columns: Integers
 ) -> bool:
-    """Where the other root is that meets this one at a fold, to second order; False where none is near.
+    """Find where the other root is that meets this one at a fold, to second order. Kernel.
 
     Along the direction v that changes the pose least, the eliminated error's last component is ``s t + k t^2``: zero at
     0 and at -s / k.
+
+    Parameters
+    ----------
+    links, sliding, T, w, J : as for :func:`residual_and_jacobian`
+    q : (6,), rad, or parts of the size, a root
+    start : (6,), filled
+    columns : (6,), scratch memory
+
+    Returns
+    -------
+    near : False where no other root is near
     """
     v = np.zeros(6)
     residual_and_jacobian(links, sliding, T, q, w, J)

@@ -1,7 +1,7 @@
 """Four joints with one common direction, three revolute and one prismatic in any order (SCARA): two solutions.
 
 They move a body in a plane across that direction, along it and about it; a pose is met in x, y, z and yaw, and how far
-its axis is tilted from theirs is returned beside the solutions.
+its axis is tilted from theirs is returned with the solutions.
 
 Three prismatic and three revolute joints, in any order: two solutions.
 
@@ -24,8 +24,8 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import kernel
 
 SLOTS = 2
-PARALLEL = 1e-9
-MIN_LINK_M = 1e-9
+PARALLEL = 1e-9  # rad
+MIN_LINK_M = 1e-9  # a shorter link makes two axes one
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,17 @@ class Scara:
 
 
 def scara(links: Reals, sliding: Flags) -> Scara | None:
-    """The solver for links (5, 4, 4), or None if the chain is of another kind. Axes are parallel to 1e-9 rad."""
+    """Recognise four joints of one direction, one of them prismatic.
+
+    Parameters
+    ----------
+    links : (5, 4, 4), m
+    sliding : (4,), prismatic joints
+
+    Returns
+    -------
+    solver : None if the chain is of another kind; axes are parallel to 1e-9 rad
+    """
     if len(links) != 5 or np.sum(sliding) != 1:
         return None
     axes, points = axes_of(links)
@@ -68,9 +78,16 @@ def scara(links: Reals, sliding: Flags) -> Scara | None:
 
 
 def solve_scara(arm: Scara, T: Reals) -> tuple[Reals, Reals]:
-    """Solutions q (N, 2, 4), rad and m, positive elbow first, NaN out of reach; tilt (N,) in rad.
+    """Solve poses in position and in the turn about the common direction.
 
-    Poses T (N, 4, 4) are met in position and in the turn about the common direction.
+    Parameters
+    ----------
+    T : (N, 4, 4), m
+
+    Returns
+    -------
+    q : (N, 2, 4), rad and m, positive elbow first, NaN out of reach
+    tilt : (N,), rad, by how much the pose's axis leans from the arm's, which no joint can change
     """
     T = np.asarray(T, float)
     end = (T[:, :3, 3] - arm.origin) @ arm.frame.T
@@ -100,9 +117,9 @@ def solve_scara(arm: Scara, T: Reals) -> tuple[Reals, Reals]:
 
 
 APART = 1e-9  # sine between neighbouring turning axes
-NEAR = 1e-9
+NEAR = 1e-9  # squared half tilt at which both roots are taken to meet
 SPANS = 1e-9  # determinant of three sliding directions that span space
-FLAT = 1e-8  # smallest singular value of sliding directions, in parts of the largest, by which they do span a direction
+FLAT = 1e-8  # smallest singular value of sliding directions, in parts of the largest, by which they span a direction
 REACHED = 1e-9  # m, by which slides that don't span space may miss a position
 
 
@@ -118,7 +135,17 @@ class Gantry:
 
 
 def gantry(links: Reals, sliding: Flags) -> Gantry | None:
-    """The solver for links (7, 4, 4), or None if the chain is of another kind."""
+    """Recognise three prismatic and three revolute joints whose turning axes are not parallel to their neighbours.
+
+    Parameters
+    ----------
+    links : (7, 4, 4), m
+    sliding : (6,), prismatic joints
+
+    Returns
+    -------
+    solver : None if the chain is of another kind
+    """
     if len(sliding) != 6 or sliding.sum() != 3:
         return None
     axes = axes_of(links)[0][~sliding]
@@ -131,9 +158,16 @@ def gantry(links: Reals, sliding: Flags) -> Gantry | None:
 
 
 def solve_gantry(arm: Gantry, T: Reals) -> tuple[Reals, Flags]:
-    """Solutions q (N, 2, 6), rad and m, NaN where there is none; whether both roots meet or the slides don't span.
+    """Solve poses: angles from the orientation, then shifts from the position, which is linear in them.
 
-    Where slides don't span space, only the solution with the smallest shifts is returned.
+    Parameters
+    ----------
+    T : (N, 4, 4), m
+
+    Returns
+    -------
+    q : (N, 2, 6), rad and m, NaN where there is none; where slides don't span space, with the smallest shifts
+    singular : (N,), whether both roots meet or the slides don't span
     """
     turn = np.ascontiguousarray(arm.frame @ T[:, :3, :3] @ arm.behind)
     angles, smallest = np.empty((len(T), SLOTS, 3)), np.empty(len(T))
@@ -159,6 +193,15 @@ def solve_gantry(arm: Gantry, T: Reals) -> tuple[Reals, Flags]:
 
 @kernel
 def wrist_angles(k: SphericalConstants, turn: Reals, angles: Reals, smallest: Reals) -> None:
+    """Solve three joints through one point for turns, by both roots. Kernel.
+
+    Parameters
+    ----------
+    k : of :func:`.arm_angle.spherical_constants`
+    turn : (N, 3, 3), ``frame R G``
+    angles : (N, 2, 3), filled, rad, NaN where there is no root
+    smallest : (N,), filled with how far from singular, see :func:`.arm_angle.three_angles`
+    """
     for n in range(turn.shape[0]):
         R = turn[n]
         for slot in range(SLOTS):

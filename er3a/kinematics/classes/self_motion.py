@@ -23,16 +23,16 @@ from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.jit import inner_kernel, kernel
 
 STEP = np.radians(2.0)  # largest joint move between two points of a curve
-MAX_POINTS, FEW_POINTS = 1200, 30
+MAX_POINTS, FEW_POINTS = 1200, 30  # of a traced curve (some 40 rad), and to see that it goes on
 REGULAR = 1e-6  # pivots of J J^T above this part of the largest diagonal entry
 TRUNCATED = 1e-9  # singular values below this part of the largest are no directions: rounding, not a small bend
-SOLVES = 1e-11
+SOLVES = 1e-11  # error (rad, parts of the size) at which Newton's steps may stop as soon as they gain nothing
 ON_CURVE = 2e-10  # of each component, in parts of the size: sums of three stay below the 1e-9 that rows are held to
-SOLVES_AS_ROOT = 1e-12
+SOLVES_AS_ROOT = 1e-12  # error, rad or parts of the size, that a root may have
 ABOVE_ROUNDING = 1e-15  # of the trace
-FEW_HALVINGS = 6
+FEW_HALVINGS = 6  # of a step that does not come back to the curve, to 1/32 of it
 SHORTEST = np.radians(6.0)  # what ends on both sides nearer than so is a root of high order
-PROBE = 2e-3
+PROBE = 2e-3  # rad or parts of the size: a step along the null space, which must stay on the pose
 LOST, CLOSED, OPEN = 0, 1, 2
 POSE, OPEN_ROLL, POSITION = 0, 1, 2  # tasks
 
@@ -42,7 +42,19 @@ Posed = tuple[Reals, Flags, Reals, int]
 
 @kernel
 def error_and_jacobian(posed: Posed, x: Reals, e: Reals, J: Reals) -> float:
-    """Fill the pose error ``e`` (6,) and ``J`` (6, n); returns its largest component, at least 1 beyond 90 deg."""
+    """Pose error and geometric Jacobian of a chain of any length, lengths in parts of its size. Kernel.
+
+    Parameters
+    ----------
+    posed : chain, pose and task
+    x : (n,), rad, or parts of the size
+    e : (6,), filled: position, then half the sum of the vector products of the axes
+    J : (6, n), filled: linear rows, then angular rows
+
+    Returns
+    -------
+    largest : the error's largest component; at least 1 beyond 90 deg
+    """
     links, sliding, T, task = posed
     n = x.shape[0]
     frame, other = links[0].copy(), np.empty((4, 4))
@@ -105,7 +117,18 @@ def _without_what_is_open(T: Reals, task: int, frame: Reals, e: Reals, J: Reals)
 
 @inner_kernel
 def shortest_step(J: Reals, e: Reals, out: Reals) -> bool:
-    """``out`` (n,) = the shortest x with ``J x = e`` by factors of ``J J^T``; False if J is nearly dependent."""
+    """The shortest solution of a linear system with independent rows, by Cholesky's factors of ``J J^T``. Kernel.
+
+    Parameters
+    ----------
+    J : (6, n), n of at least 6
+    e : (6,), right side
+    out : (n,), filled with the shortest x of ``J x = e``
+
+    Returns
+    -------
+    regular : False if J is nearly dependent; then ``out`` means nothing
+    """
     n = J.shape[1]
     M, y = np.empty((6, 6)), np.empty(6)
     most = 0.0
@@ -144,8 +167,20 @@ def shortest_step(J: Reals, e: Reals, out: Reals) -> bool:
 
 @kernel
 def null_share(J: Reals, v: Reals, out: Reals) -> int:
-    """``out`` (n,) = the part of v in the null space of J (6, n); returns the null space's dimension."""
+    """The part of a vector in the null space of a Jacobian. Kernel.
+
+    Parameters
+    ----------
+    J : (6, n)
+    v : (n,)
+    out : (n,), filled
+
+    Returns
+    -------
+    dimension : of the null space
+    """
     n: int = J.shape[1]
+    # Cheaper than singular values: subtract what moves the tool.
     if n > 6:
         moved = np.zeros(6)
         for r in range(6):
@@ -171,7 +206,18 @@ def null_share(J: Reals, v: Reals, out: Reals) -> int:
 
 @inner_kernel
 def onto_curve(posed: Posed, x: Reals, e: Reals, J: Reals) -> float:
-    """Minimum-norm Newton steps; returns the error that is left."""
+    """Bring joint values back onto the pose by minimum-norm Newton steps [1]_. Kernel.
+
+    Parameters
+    ----------
+    posed : chain, pose and task
+    x : (n,), rad, or parts of the size, changed in place
+    e, J : (6,) and (6, n), scratch memory
+
+    Returns
+    -------
+    error : that is left, rad and parts of the size
+    """
     smallest, step = np.inf, np.empty(x.shape[0])
     for _ in range(25):
         error = error_and_jacobian(posed, x, e, J)
@@ -198,9 +244,17 @@ def onto_curve(posed: Posed, x: Reals, e: Reals, J: Reals) -> float:
 
 @kernel
 def free_direction(posed: Posed, x: Reals, v: Reals) -> int:
-    """Fill v (n,) with a direction, of largest component 1, in which x can move with the tool at rest.
+    """Find a direction in which joints can move with the tool at rest. Kernel.
 
-    Returns the null space's dimension there, 0 if no step in any of its directions stays on the pose.
+    Parameters
+    ----------
+    posed : chain, pose and task
+    x : (n,), rad, or parts of the size, a solution
+    v : (n,), filled with the direction, of largest component 1
+
+    Returns
+    -------
+    dimension : of the null space there; 0 if no step in any of its directions stays on the pose
     """
     n: int = x.shape[0]
     e, J, y = np.empty(6), np.empty((6, n)), np.empty(n)
@@ -227,10 +281,20 @@ def free_direction(posed: Posed, x: Reals, v: Reals) -> int:
 
 @kernel
 def trace(posed: Posed, x: Reals, v: Reals, points: Reals) -> tuple[int, int]:
-    """Fill ``points`` (k, n) with joint values along the curve from x in the sense of v, not wrapped.
+    """Follow a curve of solutions [1]_. Kernel.
 
-    Returns how many, and how it ended: CLOSED (back at the start but for whole turns, the last point), OPEN (``points``
-    is full), LOST (no further step solves the pose).
+    Parameters
+    ----------
+    posed : chain, pose and task
+    x : (n,), rad, or parts of the size, where to start
+    v : (n,), the sense
+    points : (k, n), filled with joint values along the curve, not wrapped
+
+    Returns
+    -------
+    count : how many points
+    end : CLOSED (back at the start but for whole turns, the last point), OPEN (``points`` is full), LOST (no further
+        step solves the pose)
     """
     sliding, n = posed[1], x.shape[0]
     e, J, y, along, last = np.empty(6), np.empty((6, n)), np.empty(n), np.empty(n), v.copy()
@@ -286,9 +350,14 @@ def trace(posed: Posed, x: Reals, v: Reals, points: Reals) -> tuple[int, int]:
 
 @kernel
 def between(posed: Posed, points: Reals, at: Reals, out: Reals) -> None:
-    """Fill ``out`` (k, n) with the curve's points at ``at`` (k,), counted in points of the polyline.
+    """Find a curve's points between those of its polyline. Kernel.
 
-    Where nothing is found between two points it is the nearer one of them.
+    Parameters
+    ----------
+    posed : chain, pose and task
+    points : (m, n), rad, or parts of the size, the polyline
+    at : (k,), places, counted in points of the polyline
+    out : (k, n), filled; where nothing is found between two points it is the nearer one of them
     """
     n = points.shape[1]
     e, J = np.empty(6), np.empty((6, n))
@@ -327,9 +396,17 @@ def _to_rounding(posed: Posed, x: Reals, e: Reals, J: Reals) -> float:
 
 @kernel
 def roots_from_starts(posed: Posed, starts: Reals, out: Reals) -> int:
-    """Fill ``out`` (k, n) with joint values that solve the pose, one for each start (k, n) that leads to one.
+    """Search for solutions from many starts, by damped Gauss-Newton steps. Kernel.
 
-    Returns how many.
+    Parameters
+    ----------
+    posed : chain, pose and task
+    starts : (k, n), rad, or parts of the size
+    out : (k, n), filled with joint values that solve the pose, one for each start that leads to one
+
+    Returns
+    -------
+    count : how many, with repetitions
     """
     sliding, n = posed[1], starts.shape[1]
     e, J, y = np.empty(6), np.empty((6, n)), np.empty(n)
@@ -383,7 +460,20 @@ class PoseChain:
 
     @staticmethod
     def of(links: Reals, sliding: Flags, T: Reals, size: float, task: int = POSE) -> PoseChain:
-        """From links (n + 1, 4, 4) and a pose (4, 4) in m."""
+        """Scale a chain and a pose to the chain's size.
+
+        Parameters
+        ----------
+        links : (n + 1, 4, 4), m
+        sliding : (n,), prismatic joints
+        T : (4, 4), m
+        size : m, of the chain
+        task : POSE, OPEN_ROLL or POSITION
+
+        Returns
+        -------
+        chain : its methods take and give rad and m
+        """
         scaled, pose = np.array(links, float), np.array(T, float)
         scaled[:, :3, 3] /= size
         pose[:3, 3] /= size
@@ -395,30 +485,68 @@ class PoseChain:
         return self.posed[1]
 
     def _scaled(self, x: Reals) -> Reals:
+        """Joint values in rad and m as rad and parts of the size."""
         return np.ascontiguousarray(np.where(self.sliding, np.asarray(x, float) / self.size, x))
 
     def _in_m(self, x: Reals) -> Reals:
+        """Joint values in rad and parts of the size as rad and m."""
         return np.where(self.sliding, x * self.size, x)
 
     def error(self, x: Reals) -> float:
-        """Largest component of the pose error, rad and parts of the size, at joint values (n,)."""
+        """Largest component of the pose error at joint values.
+
+        Parameters
+        ----------
+        x : (n,), rad or m
+
+        Returns
+        -------
+        error : rad and parts of the size
+        """
         n = len(self.sliding)
         return error_and_jacobian(self.posed, self._scaled(x), np.empty(6), np.empty((6, n)))
 
     def smallest(self, x: Reals) -> float:
-        """Smallest singular value of the scaled Jacobian at joint values (n,)."""
+        """Smallest singular value of the scaled Jacobian at joint values.
+
+        Parameters
+        ----------
+        x : (n,), rad or m
+
+        Returns
+        -------
+        value : without unit; where it is rounding, joints may move with the tool at rest
+        """
         J = np.empty((6, len(self.sliding)))
         error_and_jacobian(self.posed, self._scaled(x), np.empty(6), J)
         return float(np.linalg.svd(J, compute_uv=False)[-1])
 
     def roots(self, starts: Reals) -> Reals:
-        """Solutions (k, n) that starts (many, n), rad and parts of the size, lead to; members of curves among them."""
+        """Solutions that starts lead to, members of curves among them.
+
+        Parameters
+        ----------
+        starts : (many, n), rad and parts of the size
+
+        Returns
+        -------
+        x : (k, n), rad and m, with repetitions
+        """
         out = np.empty_like(starts)
         count = roots_from_starts(self.posed, starts, out)
         return self._in_m(out[:count])
 
     def moves(self, x: Reals) -> bool:
-        """Whether joint values (n,) that solve the pose can move on and on with the tool at rest."""
+        """Whether joint values that solve the pose can move on and on with the tool at rest.
+
+        Parameters
+        ----------
+        x : (n,), rad or m
+
+        Returns
+        -------
+        moves : at least ``FEW_POINTS`` steps in one sense, or back to the start
+        """
         start, v = self._scaled(x), np.empty(len(x))
         if free_direction(self.posed, start, v) == 0:
             return False
@@ -426,7 +554,16 @@ class PoseChain:
         return any(trace(self.posed, start, ahead, points)[1] != LOST for ahead in (v, -v))
 
     def curve(self, x: Reals) -> TracedCurve | None:
-        """The curve through joint values (n,) that solve the pose; None if they can't move with the tool at rest."""
+        """The curve of solutions through joint values that solve the pose.
+
+        Parameters
+        ----------
+        x : (n,), rad or m
+
+        Returns
+        -------
+        curve : None if they can't move with the tool at rest
+        """
         start, v = self._scaled(x), np.empty(len(x))
         dimension = free_direction(self.posed, start, v)
         if dimension == 0:
@@ -442,6 +579,7 @@ class PoseChain:
         return TracedCurve(self._in_m(path), end == CLOSED, self._dimension(path))
 
     def _dimension(self, path: Reals) -> int:
+        """Median dimension of the null space at seven points of a path."""
         n = len(self.sliding)
         e, J, out = np.empty(6), np.empty((6, n)), np.empty(n)
         found = []
@@ -451,7 +589,17 @@ class PoseChain:
         return int(np.median(found))
 
     def members(self, curve: TracedCurve, at: Reals) -> Reals:
-        """Joint values (k, n) at places (k,) counted in the curve's points; of closed curves also beyond its ends."""
+        """Points of a traced curve at any place.
+
+        Parameters
+        ----------
+        curve : of this chain
+        at : (k,), places counted in the curve's points; of closed curves also beyond its ends
+
+        Returns
+        -------
+        x : (k, n), rad and m, not wrapped
+        """
         last = len(curve.points) - 1
         laps = np.floor(at / last) if curve.closed else np.zeros_like(at)
         inside = np.clip(at - laps * last, 0, last)
@@ -461,7 +609,17 @@ class PoseChain:
         return self._in_m(out) + laps[:, None] * lap
 
     def holds(self, curve: TracedCurve, x: Reals) -> bool:
-        """Whether joint values (n,) lie on a traced curve: beside its polyline."""
+        """Whether joint values lie on a traced curve: next to its polyline.
+
+        Parameters
+        ----------
+        curve : of this chain
+        x : (n,), rad or m
+
+        Returns
+        -------
+        on : some point of the polyline is within a step, turns aside
+        """
         away = self._scaled(x) - self._scaled(curve.points)
         away = np.where(self.sliding, away, away - TURN * np.round(away / TURN))
         return bool(np.abs(away).max(axis=1).min() < STEP)

@@ -32,12 +32,12 @@ SAME = 1e-6  # rad: nearer rows are one
 SPREAD = 1e-11  # rad
 MAYBE_SAME = 1e-2  # rad: rows nearer than this are one if what lies midway solves the pose too
 DARK = 200.0  # noise is taken as so many times what it was measured to be
-LOUD = 1e-7
-FAMILY_PEAK = 1e-25
-MAX_READINGS = 4
-TRIALS = 24
-BESIDE, NOTHING_NEW = 24, 6  # poses beside one in doubt, and after how many that bring nothing new it is left
-ASIDE = (1e-3, 1e-2, 3e-2)  # how far beside, in turn: rad and parts of the size
+LOUD = 1e-7  # of the largest sample: with more noise than this a reading is not certain
+FAMILY_PEAK = 1e-25  # largest sample below which the determinant vanishes: the arm can move
+MAX_READINGS = 4  # that were conclusive, for a pose in doubt
+TRIALS = 24  # random poses on which readings are compared
+BESIDE, NOTHING_NEW = 24, 6  # poses next to one in doubt, and after how many that bring nothing new it is left
+ASIDE = (1e-3, 1e-2, 3e-2)  # how far from it, in turn: rad and parts of the size
 
 CERTAIN, UNCERTAIN, CONTINUUM = 0, 1, 2
 STUCK = 1e-9  # last pivot below which a row may move with the tool at rest
@@ -47,13 +47,16 @@ class PreparedArm(Protocol):
     """A chain in units of its size (m), and which joints are prismatic (6,)."""
 
     @property
-    def links(self) -> Reals: ...
+    def links(self) -> Reals:
+        """(7, 4, 4), lengths in units of the size."""
 
     @property
-    def size(self) -> float: ...
+    def size(self) -> float:
+        """Length (m) that the chain is scaled with."""
 
     @property
-    def sliding(self) -> Flags: ...
+    def sliding(self) -> Flags:
+        """(6,) bool, prismatic joints."""
 
 
 _Arm = TypeVar("_Arm", bound=PreparedArm)
@@ -89,9 +92,16 @@ class RowsFound:
 
 
 def prepared(links: Reals, sliding: Flags | None = None) -> SixRevolute:
-    """The solver for a chain with constant links (7, 4, 4); readings are tried out on poses of random joints.
+    """The solver for a chain of six joints; readings are tried out on poses of random joints.
 
-    ``sliding`` (6,) marks prismatic joints; one is within what the method can do, of two no reading was left so far.
+    Parameters
+    ----------
+    links : (7, 4, 4), m
+    sliding : (6,), prismatic joints; one is within what the method can do, of two no reading was left so far
+
+    Returns
+    -------
+    solver : with the readings that are clear most often first
     """
     sliding = np.zeros(6, dtype=bool) if sliding is None else np.asarray(sliding, dtype=bool)
     size = size_of(links)
@@ -127,10 +137,20 @@ def _trial(reading: Reading, links: Reals, T: Reals, memory: LoopMemory) -> floa
 
 
 def solve_six_revolute(arm: SixRevolute, T: Reals) -> RowsFound:
-    """All solutions for poses T (N, 4, 4), m; each reading takes the poses that those before it left in doubt.
+    """All solutions for poses; each reading takes the poses that those before it left in doubt.
 
+    Parameters
+    ----------
+    T : (N, 4, 4), m
+
+    Returns
+    -------
+    found : (N, 16, 6), rad or m, with certainty
+
+    Notes
+    -----
     After ``MAX_READINGS`` that were conclusive a pose stays in doubt; those whose determinant vanishes don't count, as
-    they may do so beside special geometry where others don't.
+    they may do so next to special geometry where others don't.
     """
     return all_rows(arm, _by_readings, T)
 
@@ -156,10 +176,18 @@ def _by_readings(
 def all_rows(
     arm: _Arm, by_readings: Callable[[_Arm, Reals, LoopMemory, Reals, Integers, Integers], None], T: Reals
 ) -> RowsFound:
-    """What readings find at poses T (N, 4, 4), m, and, where they leave doubt, at poses beside these.
+    """What readings find at poses, and, where they leave doubt, at poses next to these.
 
-    ``by_readings`` takes arm, poses and memory, and fills rows (N, 16, 6), their number (N,) and certainty (N,), which
-    starts as CONTINUUM.
+    Parameters
+    ----------
+    arm : in units of its size
+    by_readings : takes arm, poses and memory, and fills rows (N, 16, 6), their number (N,) and certainty (N,), which
+        starts as CONTINUUM
+    T : (N, 4, 4), m
+
+    Returns
+    -------
+    found : (N, 16, 6), rad or m, in order of the first joint
     """
     T = np.ascontiguousarray(T, dtype=float)
     q, count = np.full((len(T), SLOTS, 6), np.nan), np.zeros(len(T), dtype=np.int64)
@@ -176,7 +204,7 @@ def all_rows(
 
 
 def _beside(certainty: Integers, T: Reals, count: Integers, size: float) -> Iterator[tuple[Integers, Reals]]:
-    """Numbers (k,) of poses in doubt, and poses (k, 4, 4) beside them, until nothing new is counted."""
+    """Numbers (k,) of poses in doubt, and poses (k, 4, 4) next to them, until nothing new is counted."""
     random, in_doubt = np.random.default_rng(3), np.flatnonzero(certainty == UNCERTAIN)
     idle = np.zeros(len(in_doubt), dtype=np.int64)
     for k in range(BESIDE):
@@ -205,9 +233,19 @@ def rows_by_reading(
     verdicts: Integers,
     moving: Flags,
 ) -> None:
-    """Add to ``q`` (N, 16, 6) and ``count`` (N,) what one reading of the loop finds at the poses with these numbers.
+    """Add what one reading of the loop finds at some poses. Kernel.
 
-    ``moving`` (N,) marks where some row may move with the tool at rest.
+    Parameters
+    ----------
+    reading : of the loop
+    links : (7, 4, 4), in units of the chain's size
+    size : m
+    T : (N, 4, 4), m
+    numbers : (k,), of the poses to look at
+    m : memory
+    q, count : (N, 16, 6), rad, or parts of the size, and (N,); rows are added
+    verdicts : (k,), filled with the reading's verdict
+    moving : (N,), set where some row may move with the tool at rest
     """
     pose, rest, pose_link = np.empty((4, 4)), np.empty((4, 4)), np.empty((4, 4))
     for i in range(numbers.shape[0]):
@@ -235,8 +273,18 @@ def followed_back(
     q: Reals,
     count: Integers,
 ) -> None:
-    """Add to ``q`` (N, 16, 6) and ``count`` (N,) what solutions (k, 16, 6) of poses beside those with these ``numbers``
-    (k,) lead to."""
+    """Add what solutions of neighbouring poses lead to. Kernel.
+
+    Parameters
+    ----------
+    links : (7, 4, 4), in units of the chain's size
+    size : m
+    T : (N, 4, 4), m
+    numbers : (k,), of the poses
+    m : memory
+    near, near_count : (k, 16, 6), rad, or parts of the size, and (k,), solutions of a pose next to each of these
+    q, count : (N, 16, 6) and (N,); rows are added
+    """
     pose = np.empty((4, 4))
     for i in range(numbers.shape[0]):
         n = numbers[i]
@@ -252,6 +300,13 @@ def followed_back(
 
 @kernel
 def in_order(q: Reals, count: Integers) -> None:
+    """Sort the rows of each pose by the first joint. Kernel.
+
+    Parameters
+    ----------
+    q : (N, 16, 6), changed in place
+    count : (N,), how many rows count
+    """
     for n in range(q.shape[0]):
         for r in range(count[n]):
             smallest = r
@@ -300,6 +355,7 @@ def _by_reading(
                     away -= 2 * np.pi * np.round(away / (2 * np.pi))
                     solved = solved or abs(away) < 1e-2
                     rows = add_row(links, pose, m, m.candidate, pivot, q, rows)
+                    # Near a fold a second root is so close that its zero may have merged with this one's.
                     if pivot < 1e-3 and twin_start(
                         links, m.sliding, pose, m.candidate, m.start, m.frames, m.J, m.columns
                     ):
@@ -316,10 +372,23 @@ def _by_reading(
 
 @kernel
 def add_row(links: Reals, pose: Reals, m: LoopMemory, found: Reals, pivot: float, q: Reals, rows: int) -> int:
-    """Add a row unless it is present.
+    """Add a row unless it is present. Kernel.
 
     Where the Jacobian's last pivot is small, rows are known to ``SPREAD / pivot`` only: a root of higher order is
     spread by that much.
+
+    Parameters
+    ----------
+    links, pose : (7, 4, 4) and (4, 4), in units of the chain's size
+    m : memory
+    found : (6,), rad, or parts of the size, wrapped in place
+    pivot : the last pivot's ratio at this row
+    q : (16, 6), rows of the pose, changed in place
+    rows : how many there are
+
+    Returns
+    -------
+    rows : how many there are then
     """
     for k in range(6):
         if not m.sliding[k]:
@@ -335,6 +404,7 @@ def add_row(links: Reals, pose: Reals, m: LoopMemory, found: Reals, pivot: float
             middle[k] = q[r, k] + 0.5 * away
         if apart < SAME or (apart < MAYBE_SAME and pivot * apart < SPREAD):
             return rows
+        # Two rows of one flat root: what lies midway solves the pose, too.
         if apart < MAYBE_SAME and residual_and_jacobian(links, m.sliding, pose, middle, m.frames, m.J) < SOLVES:
             return rows
     if rows < SLOTS:

@@ -31,9 +31,9 @@ from er3a.numerics.arrays import Flags, Reals
 MEETS = 1e-9  # of the size, by which axes miss the wrist centre; sine between neighbouring axes of the wrist
 PARALLEL = 1e-11  # of the lines' coefficients, by which they are parallel for all d
 PLACES = DEGREE = 4  # of joints 1 to 3 for one wrist centre
-NEARLY_REAL, NEARLY_MEETS = 1e-3, 1e-4  # of the size: roots and lines beside the circle that Newton's method begins at
+NEARLY_REAL, NEARLY_MEETS = 1e-3, 1e-4  # of the size: roots and lines next to the circle that Newton's method begins at
 NEAR = 1e-2  # of the size: a root that nothing so near to it solves leaves a doubt
-ROUNDS = 10
+ROUNDS = 10  # of Newton's method, always all of them
 EXACT, SOLVES = 1e-15, 1e-12  # errors of the equations
 SAME, APART = 1e-9, 1e-5  # of the size: nearer places are one; nearer than the second they may be two that meet
 REGULAR = 1e-6  # determinant of the three equations, distance from an axis: a doubt below
@@ -69,7 +69,17 @@ class SlideAndWrist:
 
 
 def slide_and_wrist(links: Reals, sliding: Flags) -> SlideAndWrist | None:
-    """The solver for links (7, 4, 4), or None if the chain is of another kind."""
+    """Recognise six joints with a spherical wrist and one slide among the first three.
+
+    Parameters
+    ----------
+    links : (7, 4, 4), m
+    sliding : (6,), prismatic joints
+
+    Returns
+    -------
+    solver : None if the chain is of another kind
+    """
     slides = np.flatnonzero(sliding)
     if len(slides) != 1 or slides[0] > 2:
         return None
@@ -109,8 +119,17 @@ def slide_and_wrist(links: Reals, sliding: Flags) -> SlideAndWrist | None:
 
 
 def solve_slide_and_wrist(arm: SlideAndWrist, otherwise: Callable[[Reals], RowsFound], T: Reals) -> RowsFound:
-    """All solutions for poses T (N, 4, 4), m, those in doubt by ``otherwise``; q (N, 16, 6) in rad and m, NaN behind
-    the last."""
+    """All solutions for poses, by a quartic of the slide [1]_; those in doubt by another solver.
+
+    Parameters
+    ----------
+    otherwise : solves poses (k, 4, 4), m, in general
+    T : (N, 4, 4), m
+
+    Returns
+    -------
+    found : (N, 16, 6), rad and m, NaN after the last
+    """
     T = np.ascontiguousarray(T, dtype=float)
     scaled = T.copy()
     scaled[:, :3, 3] /= arm.size
@@ -273,6 +292,7 @@ def _at(polynomial: Reals, d: Reals) -> Reals:
 
 
 def _slope(polynomial: Reals, d: Reals) -> Reals:
+    """Derivatives (N, k) of polynomials (N, 3) at d (N, k)."""
     _, c1, c2 = polynomial.T[:, :, None]
     return np.asarray(c1 + 2 * d * c2)
 

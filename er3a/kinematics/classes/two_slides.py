@@ -4,7 +4,7 @@ The four revolute joints must close the orientation alone, ``Rz(x_1) A_1 Rz(x_2)
 the loop of a spherical four-bar. For each x_1 two angles x_2 do so, and the other two follow from both. The position is
 linear in the slides, so they go out with one determinant [1]_: that of both sliding directions and of where the loop
 ends with both slides at 0. Its product over both angles x_2, times a power of what the roots of x_2 divide by, is a
-trigonometric polynomial in x_1; samples give it, with terms beside that would vanish without rounding, and the
+trigonometric polynomial in x_1; samples give it, with further terms that would vanish without rounding, and the
 eigenvalues of its companion matrix are its zeros. Newton's method on the chain decides what is a solution.
 
 The loop can be read from each of the four joints on in either sense; special geometry spoils some readings, and what
@@ -39,11 +39,11 @@ from er3a.kinematics.classes.six_revolute import (
 from er3a.numerics.arrays import Complexes, Flags, Integers, Reals
 from er3a.numerics.jit import inner_kernel, kernel
 
-TRIALS = 24
+TRIALS = 24  # random poses on which readings are compared
 MAX_READINGS = 3  # that are conclusive, for a pose in doubt
 NOISE = 1e-9  # of the largest sample: more, and a reading is inconclusive
 MIN_SAMPLE = 1e-20  # largest sample below which a reading vanishes for all poses
-MAX_DEGREE = 8
+MAX_DEGREE = 8  # of the trigonometric polynomial in joint 1
 FAINT = 1e-13  # of the largest coefficient: so small ones are rounding
 ACROSS = 1e-6  # sine between the axes of the two joints that follow
 ON_CIRCLE, NEAR_CIRCLE = 1e-6, 3e-2  # a zero's distance from the unit circle: real; perhaps one of several that meet
@@ -80,8 +80,17 @@ class TwoSlides:
 
 
 def two_slides(links: Reals, sliding: Flags) -> TwoSlides | None:
-    """The solver for links (7, 4, 4) two of whose joints are prismatic; None if no reading of the loop determines its
-    solutions."""
+    """The solver of six joints, two of which are prismatic; readings are tried out on poses of random joints.
+
+    Parameters
+    ----------
+    links : (7, 4, 4), m
+    sliding : (6,), prismatic joints
+
+    Returns
+    -------
+    solver : None if no reading of the loop determines its solutions
+    """
     size = size_of(links)
     scaled = np.array(links, float)
     scaled[:, :3, 3] /= size
@@ -126,7 +135,16 @@ def _arrangements(links: Reals, sliding: Flags) -> list[tuple[Integers, float, R
 
 
 def solve_two_slides(arm: TwoSlides, T: Reals) -> RowsFound:
-    """All solutions for poses T (N, 4, 4), m; q (N, 16, 6) in rad and m, NaN after the last."""
+    """All solutions for poses, by the determinant that takes both slides out [1]_.
+
+    Parameters
+    ----------
+    T : (N, 4, 4), m
+
+    Returns
+    -------
+    found : (N, 16, 6), rad and m, NaN after the last
+    """
     return all_rows(arm, _by_readings, T)
 
 
@@ -181,6 +199,7 @@ def _zeros(terms: Reals, degree: int) -> Reals:
     ascending = np.zeros((len(terms), count + 1), dtype=complex)
     ascending[:, degree] = terms[:, 0]
     for k in range(1, degree + 1):
+        # As a polynomial in z = exp(i x), of twice the degree; real zeros are on the unit circle.
         ascending[:, degree + k] = 0.5 * (terms[:, 2 * k - 1] - 1j * terms[:, 2 * k])
         ascending[:, degree - k] = np.conj(ascending[:, degree + k])
     largest = np.abs(ascending).max(axis=1, initial=0.0)
@@ -308,6 +327,7 @@ def _sampled(reading: SlideReading, loops: Reals, angles: Reals, samples: Reals)
                 continue
             root = np.sqrt(complex(square - c * c, 0.0))
             turns[0, 0], turns[0, 1] = c1, s1
+            # Both roots of x_2 together have no square root of x_1 left; the power takes away what they divide by.
             product = complex(square**reading.power, 0.0)
             for side in range(2):
                 sign = 1.0 - 2.0 * side
@@ -339,6 +359,7 @@ def _rows(
         reach = max(1.0, max(abs(poses[n, 0, 3]), max(abs(poses[n, 1, 3]), abs(poses[n, 2, 3]))))
         verdict, expected, before = CERTAIN, 0, count[n]
         for z in range(zeros.shape[1]):
+            # Zeros off the unit circle are complex angles; those near to it may be real ones that rounding has moved.
             off = abs(zeros[i, z, 1])
             if not off < NEAR_CIRCLE:
                 continue
@@ -376,6 +397,7 @@ def _rows(
             expected += off < ON_CIRCLE
             if off < CLUSTER and not solved:
                 verdict = max(verdict, UNCERTAIN)
+        # Complex solutions come in pairs, and each zero on the circle has a solution of its own.
         if count[n] % 2 == 1 or (before == 0 and count[n] < expected):
             verdict = max(verdict, UNCERTAIN)
         verdicts[i] = verdict
