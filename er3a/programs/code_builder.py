@@ -397,14 +397,6 @@ def linked(routines: Iterable[syntax.Routine]) -> dict[str, syntax.Routine]:
     return {name: replace(each, code=_linked(each.code, by_name)) for name, each in by_name.items()}
 
 
-def variables(expression: syntax.Expression) -> Iterable[str]:
-    """The variables in an expression."""
-    if isinstance(expression, syntax.Variable):
-        yield expression.name
-    for each in syntax.inner(expression):
-        yield from variables(each)
-
-
 def _plain(operation: syntax.Operation) -> bool:
     """Whether an operation is a motion to values and names alone, as most lines of long programs are."""
     return (

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from er3a.errors import InputError
 from er3a.programs import syntax
-from er3a.programs.code_builder import CodeBuilder, fault, is_no_statement, linked, mapped, variables, within
+from er3a.programs.code_builder import CodeBuilder, fault, is_no_statement, linked, mapped, within
 from er3a.programs.evaluation import variable_of
 from er3a.programs.instructions import Place
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, read_program_text
@@ -150,23 +150,10 @@ def read_rapid(source: ProgramText) -> syntax.Program:
         source.path,
         by_name,
         _entry(own.routines, by_name),
-        _in_order(data),
+        tuple(data) * 2,  # what stands after that which is made of it is known the second time
         lines=source.lines,
         constants=constants,
     )
-
-
-def _in_order(data: list[syntax.Assign]) -> tuple[syntax.Assign, ...]:
-    """Data with those first that others are made of, in whatever module they stand."""
-    found: list[syntax.Assign] = []
-    while data:
-        names = {variable_of(each.target) for each in data}
-        ready = [each.value is None or names.isdisjoint(variables(each.value)) for each in data]
-        if not any(ready):  # of each other
-            break
-        found += [each for each, is_ready in zip(data, ready) if is_ready]
-        data = [each for each, is_ready in zip(data, ready) if not is_ready]
-    return (*found, *data)
 
 
 def _entry(own: list[syntax.Routine], routines: Mapping[str, syntax.Routine]) -> str:
