@@ -1,8 +1,7 @@
-# ruff: noqa: E501
 """Robot programs: public ones with the arm alone, faults put into sound ones, and times.
 
-The public programs are no part of the project. ``PUBLIC_PROGRAMS=FOLDER make campaigns ARGS=programs`` checks those that
-``cells.yaml`` in that folder lists (:mod:`testing.public_programs`).
+The public programs are no part of the project. ``PUBLIC_PROGRAMS=FOLDER make campaigns ARGS=programs`` checks those
+that ``cells.yaml`` in that folder lists (:mod:`testing.public_programs`).
 """
 
 from __future__ import annotations
@@ -25,8 +24,8 @@ FOLDER = "PUBLIC_PROGRAMS"
 MOTIONS = (1_000, 10_000)
 HEAD = """# Robot programs
 
-Written by `make campaigns ARGS=programs` with `PUBLIC_PROGRAMS` naming a folder of public programs, which are no part of
-this project: only their numbers are here.
+Written by `make campaigns ARGS=programs` with `PUBLIC_PROGRAMS` naming a folder of public programs, which are no part
+of this project: only their numbers are here.
 """
 
 
@@ -56,8 +55,9 @@ def _public(done: list[Outcome]) -> str:
     for each in done:
         codes += each.findings
     rows = [
-        f"| {each.file.suffix.lower()} | {each.motions} | {each.given} | {each.passed} | {each.clean} | {each.failed} | "
-        f"{each.seconds:.2f} | {each.rows} | {each.error or ', '.join(code for code, _ in each.findings.most_common(2))} |"
+        f"| {each.file.suffix.lower()} | {each.motions} | {each.given} | {each.passed} | {each.clean} | {each.failed} "
+        f"| {each.seconds:.2f} | {each.rows} "
+        f"| {each.error or ', '.join(code for code, _ in each.findings.most_common(2))} |"
         for each in done
     ]
     reasons = [f"| {code.replace(' ', ' | ')} | {count} |" for code, count in codes.most_common(12)]
@@ -66,8 +66,8 @@ def _public(done: list[Outcome]) -> str:
             "## Public programs, with the robot alone\n",
             f"{summary(done)}. *In the files* are motions whose target, tool and base the program's files give; of",
             "these *pass* limits, reach, configuration, singular poses, rates and self-collision, with at most advice",
-            "about numbers; *nothing said* are those without that. Arms: URDFs of the makers' families, the machine data of",
-            "the archives, or data sheets. The first program waits for compiling no longer.\n",
+            "about numbers; *nothing said* are those without that. Arms: URDFs of the makers' families, the machine",
+            "data of the archives, or data sheets. The first program waits for compiling no longer.\n",
             "| language | motions | in the files | pass | nothing said | fail | s | lines | most frequent |",
             "|---|---|---|---|---|---|---|---|---|",
             *rows,
@@ -102,8 +102,9 @@ def _faults() -> str:
     return "\n".join(
         (
             "## Faults put into them\n",
-            f"{len(rows)} faults, one at a time (`testing/program_faults.py`): {named} named at their line, {failing} with",
-            "exit code 1. What rests on a name that other files may give, or is allowed and unwise, stays a warning.\n",
+            f"{len(rows)} faults, one at a time (`testing/program_faults.py`): {named} named at their line, {failing}",
+            "with exit code 1. What rests on a name that other files may give, or is allowed and unwise, stays a",
+            "warning.\n",
             "| file | fault | named by | exit code |",
             "|---|---|---|---|",
             *lines,

@@ -1,4 +1,3 @@
-# ruff: noqa: E501
 """Faults as people make them, put one at a time into programs that pass with robot, start and scene.
 
 The arm is the ER3A-C60 with its shapes, speeds and payload taken as documented, so that what is certain from the files
@@ -7,6 +6,7 @@ is an error. Each fault is a replacement in one text; it counts as named if a fi
 
 from __future__ import annotations
 
+import re
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -73,52 +73,79 @@ class Found:
     fails: bool
 
 
-FAULTS = (
-    Fault("a digit too many", "pick_place.dat", "X 380.00, Y 180.00", "X 3800.00, Y 180.00", "LIN XPICK"),
-    Fault("into the table", "pick_place.dat", "Y 180.00, Z 220.00", "Y 180.00, Z 22.00", "LIN XPICK"),
-    Fault("metres for mm", "pick_place.dat", "X 380.00, Y -180.00, Z 220.00", "X 0.38, Y -0.18, Z 0.22", "LIN XPLACE"),
-    Fault("a limit passed", "pick_place.src", "PTP {A1 25.35, A2 -24.84", "PTP {A1 250.35, A2 -24.84", "A1 250.35"),
-    Fault("radians for degrees", "pick_place.src", "{A1 -25.35, A2 -24.84, A3 -21.50, A4 0.00, A5 -43.65, A6 -25.35}",
-          "{A1 -0.4424, A2 -0.4335, A3 -0.3752, A4 0, A5 -0.7618, A6 -0.4424}", "A1 -0.4424"),
-    Fault("mm/s for m/s", "pick_place.src", "$VEL.CP=0.2", "$VEL.CP=200", "LIN XPICK\n"),
-    Fault("a misspelled variable", "pick_place.script", "movel(pick_p, a", "movel(pikc_p, a", "movel(pikc_p"),
-    Fault("a tool that is not given", "pick_place.src", "$TOOL=$NULLFRAME", "$TOOL=TOOL_DATA[3]", "LIN XPICK\n"),
-    Fault("an index beyond its list", "pick_place.src", "$BASE=$NULLFRAME", "DECL FRAME B[2]\n$BASE=B[3]", "$BASE=B[3]"),
-    Fault("a misspelled point", "pick_place.src", "LIN XPLACE", "LIN XPLASE", "LIN XPLASE"),
-    Fault("down for up", "pick_place.src", "LIN XPICK:{X 0, Y 0, Z -100", "LIN XPICK:{X 0, Y 0, Z 150", "Z 150"),
-    Fault("another language's word", "pick_place.src", "   LIN XPLACE", "   IF $IN[2] THEN\n   ELSEIF $IN[3] THEN\n   ENDIF\n   LIN XPLACE", "ELSEIF"),
-    Fault("a loop without an end", "pick_place.src", "ENDLOOP\n", "", ""),
-    Fault("an arm that is too small", "pick_place.src", "LIN {Z 320}", "LIN {Z 1320}", "LIN {Z 1320}"),
-    Fault("a zone larger than its line", "pick_place.src", "$APO.CDIS=10", "$APO.CDIS=90", "A6 25.35} C_DIS"),
-    Fault("a digit too many", "cell.mod", "pick:=[[380,180", "pick:=[[3800,180", "MoveL Offs(pick,0,0,10*i)"),
-    Fault("metres for mm", "cell.mod", "place:=[[380,-180,180]", "place:=[[0.38,-0.18,0.22]", "MoveL place,"),
-    Fault("the wrong work object", "cell.mod", "MoveL place,v200,fine,grip\\WObj:=plate", "MoveL place,v200,fine,grip\\WObj:=fixture", "MoveL place"),
-    Fault("the bare flange once", "cell.mod", "MoveL place,v200,fine,grip", "MoveL place,v200,fine,tool0", "MoveL place"),
-    Fault("v7000 for v700", "cell.mod", "MoveL Offs(pick,0,0,100),v200", "MoveL Offs(pick,0,0,100),v7000", "v7000"),
-    Fault("a zone larger than its line", "cell.mod", "MoveL Offs(pick,0,0,100),v200,z10", "MoveL Offs(pick,0,0,100),v200,z200", "z200"),
-    Fault("a load of 12 kg", "cell.mod", "[0.5,[0,0,50]", "[12,[0,0,50]", "MoveAbsJ home,v200,fine,grip;\n    FOR"),
-    Fault("a line to joint angles", "cell.mod", "MoveAbsJ above,", "MoveL above,", "MoveL above,"),
-    Fault("Offs along another axis", "cell.mod", "MoveJ Offs(place,0,0,100)", "MoveJ Offs(place,500,0,0)", "place,500"),
-    Fault("a sign", "cell.mod", "Offs(pick,0,0,100)", "Offs(pick,0,0,-100)", "pick,0,0,-100"),
-    Fault("a quaternion that is none", "cell.mod", "[380,-180,180],[0,1,0,0]", "[380,-180,180],[0,1,0,1]", "MoveL place"),
-    Fault("a counter that runs away", "cell.mod", "10*i", "100*i*i", "100*i*i"),
-    Fault("a joint beyond its limit", "cell.mod", "above:=[[25.35,-24.84", "above:=[[25.35,-248.4", "MoveAbsJ above"),
-    Fault("tool and work object exchanged", "cell.mod", "MoveL place,v200,fine,grip\\WObj:=plate", "MoveL place,v200,fine,plate\\WObj:=grip", "MoveL place"),
-    Fault("a missing semicolon", "cell.mod", "WaitTime 0.3;", "WaitTime 0.3", "WaitTime"),
-    Fault("mm for metres", "pick_place.script", "pick_p = p[0.3800, 0.1800, 0.2200", "pick_p = p[380.0, 180.0, 220.0", "movel(pick_p"),
-    Fault("degrees for radians", "pick_place.script", "above_pick_q = [0.4424, -0.4336, -0.3753, 0.0000, -0.7619, 0.4424]",
-          "above_pick_q = [25.35, -24.84, -21.50, 0.0, -43.65, 25.35]", "movej(above_pick_q"),
-    Fault("below the table", "pick_place.script", "place_p = p[0.3800, -0.1800, 0.2200", "place_p = p[0.3800, -0.1800, 0.0200", "movel(place_p,"),
-    Fault("five joints", "pick_place.script", "home_q = [0.0000, -0.1745,", "home_q = [-0.1745,", "movej(home_q"),
-    Fault("mm/s for m/s", "pick_place.script", "movel(pick_p, a=1.2, v=0.2)", "movel(pick_p, a=1.2, v=200)", "v=200"),
-    Fault("a line for a joint move", "pick_place.script", "movej(above_place_q, a=1.4, v=0.8", "movel([2.7,-0.4336,-0.3753,0,-0.7619,-0.4424], a=1.4, v=0.8", "movel([2.7"),
-    Fault("into the post", "pick_place.script", "above_pick_q = [0.4424,", "above_pick_q = [1.1,", "movej(above_pick_q"),
-    Fault("out of reach", "pick_place.script", "pose_trans(pick_p, p[0, 0, -0.1", "pose_trans(pick_p, p[0, 0, -1.1", "-1.1"),
-    Fault("a limit passed", "pick_place.pgm", "POINTJ(25.35, -39.05, -23.40", "POINTJ(25.35, -139.05, -23.40", "-139.05"),
-    Fault("a missing angle", "pick_place.pgm", "POINTJ(-25.35, -39.05, -23.40, 0.00, -27.56, -25.35)", "POINTJ(-25.35, -39.05, -23.40, 0.00, -27.56)", "-27.56)"),
-    Fault("a sign", "pick_place.pgm", "MLIN(POINTJ(25.35, -39.05", "MLIN(POINTJ(25.35, 39.05", "25.35, 39.05"),
-    Fault("a speed without a name", "pick_place.pgm", "-27.56, 25.35), v200,", "-27.56, 25.35), v250x,", "v250x"),
-)  # fmt: skip
+FAULT_TEXT = r"""
+pick_place.dat:
+a digit too many | X 380.00, Y 180.00 | X 3800.00, Y 180.00 | LIN XPICK
+into the table | Y 180.00, Z 220.00 | Y 180.00, Z 22.00 | LIN XPICK
+metres for mm | X 380.00, Y -180.00, Z 220.00 | X 0.38, Y -0.18, Z 0.22 | LIN XPLACE
+pick_place.src:
+a limit passed | PTP {A1 25.35, A2 -24.84 | PTP {A1 250.35, A2 -24.84 | A1 250.35
+radians for degrees | {A1 -25.35, A2 -24.84, A3 -21.50, A4 0.00, A5 -43.65, A6 -25.35} |
+  {A1 -0.4424, A2 -0.4335, A3 -0.3752, A4 0, A5 -0.7618, A6 -0.4424} | A1 -0.4424
+mm/s for m/s | $VEL.CP=0.2 | $VEL.CP=200 | LIN XPICK\n
+pick_place.script:
+a misspelled variable | movel(pick_p, a | movel(pikc_p, a | movel(pikc_p
+pick_place.src:
+a tool that is not given | $TOOL=$NULLFRAME | $TOOL=TOOL_DATA[3] | LIN XPICK\n
+an index beyond its list | $BASE=$NULLFRAME | DECL FRAME B[2]\n$BASE=B[3] | $BASE=B[3]
+a misspelled point | LIN XPLACE | LIN XPLASE | LIN XPLASE
+down for up | LIN XPICK:{X 0, Y 0, Z -100 | LIN XPICK:{X 0, Y 0, Z 150 | Z 150
+another language's word |    LIN XPLACE |    IF $IN[2] THEN\n   ELSEIF $IN[3] THEN\n   ENDIF\n   LIN XPLACE | ELSEIF
+a loop without an end | ENDLOOP\n |  |
+an arm that is too small | LIN {Z 320} | LIN {Z 1320} | LIN {Z 1320}
+a zone larger than its line | $APO.CDIS=10 | $APO.CDIS=90 | A6 25.35} C_DIS
+cell.mod:
+a digit too many | pick:=[[380,180 | pick:=[[3800,180 | MoveL Offs(pick,0,0,10*i)
+metres for mm | place:=[[380,-180,180] | place:=[[0.38,-0.18,0.22] | MoveL place,
+the wrong work object | MoveL place,v200,fine,grip\WObj:=plate | MoveL place,v200,fine,grip\WObj:=fixture |
+  MoveL place
+the bare flange once | MoveL place,v200,fine,grip | MoveL place,v200,fine,tool0 | MoveL place
+v7000 for v700 | MoveL Offs(pick,0,0,100),v200 | MoveL Offs(pick,0,0,100),v7000 | v7000
+a zone larger than its line | MoveL Offs(pick,0,0,100),v200,z10 | MoveL Offs(pick,0,0,100),v200,z200 | z200
+a load of 12 kg | [0.5,[0,0,50] | [12,[0,0,50] | MoveAbsJ home,v200,fine,grip;\n    FOR
+a line to joint angles | MoveAbsJ above, | MoveL above, | MoveL above,
+Offs along another axis | MoveJ Offs(place,0,0,100) | MoveJ Offs(place,500,0,0) | place,500
+a sign | Offs(pick,0,0,100) | Offs(pick,0,0,-100) | pick,0,0,-100
+a quaternion that is none | [380,-180,180],[0,1,0,0] | [380,-180,180],[0,1,0,1] | MoveL place
+a counter that runs away | 10*i | 100*i*i | 100*i*i
+a joint beyond its limit | above:=[[25.35,-24.84 | above:=[[25.35,-248.4 | MoveAbsJ above
+tool and work object exchanged | MoveL place,v200,fine,grip\WObj:=plate | MoveL place,v200,fine,plate\WObj:=grip |
+  MoveL place
+a missing semicolon | WaitTime 0.3; | WaitTime 0.3 | WaitTime
+pick_place.script:
+mm for metres | pick_p = p[0.3800, 0.1800, 0.2200 | pick_p = p[380.0, 180.0, 220.0 | movel(pick_p
+degrees for radians | above_pick_q = [0.4424, -0.4336, -0.3753, 0.0000, -0.7619, 0.4424] |
+  above_pick_q = [25.35, -24.84, -21.50, 0.0, -43.65, 25.35] | movej(above_pick_q
+below the table | place_p = p[0.3800, -0.1800, 0.2200 | place_p = p[0.3800, -0.1800, 0.0200 | movel(place_p,
+five joints | home_q = [0.0000, -0.1745, | home_q = [-0.1745, | movej(home_q
+mm/s for m/s | movel(pick_p, a=1.2, v=0.2) | movel(pick_p, a=1.2, v=200) | v=200
+a line for a joint move | movej(above_place_q, a=1.4, v=0.8 |
+  movel([2.7,-0.4336,-0.3753,0,-0.7619,-0.4424], a=1.4, v=0.8 | movel([2.7
+into the post | above_pick_q = [0.4424, | above_pick_q = [1.1, | movej(above_pick_q
+out of reach | pose_trans(pick_p, p[0, 0, -0.1 | pose_trans(pick_p, p[0, 0, -1.1 | -1.1
+pick_place.pgm:
+a limit passed | POINTJ(25.35, -39.05, -23.40 | POINTJ(25.35, -139.05, -23.40 | -139.05
+a missing angle | POINTJ(-25.35, -39.05, -23.40, 0.00, -27.56, -25.35) |
+  POINTJ(-25.35, -39.05, -23.40, 0.00, -27.56) | -27.56)
+a sign | MLIN(POINTJ(25.35, -39.05 | MLIN(POINTJ(25.35, 39.05 | 25.35, 39.05
+a speed without a name | -27.56, 25.35), v200, | -27.56, 25.35), v250x, | v250x
+"""
+"""Faults by file, one a line, or indented on the next: what it is, the text, what stands in its place, and a part of
+the line at which it has to be named; ``\\n`` is the end of a line."""
+
+
+def faults() -> Iterator[Fault]:
+    """The faults."""
+    file = ""
+    for line in re.sub(r"\n  +", " ", FAULT_TEXT).strip().splitlines():
+        if line.endswith(":") and "|" not in line:
+            file = line[:-1]
+            continue
+        what, old, new, at = (part.replace("\\n", "\n") for part in re.split(r" \| ?", f"{line} | | ")[:4])
+        yield Fault(what, file, old, new, at.strip("| "))
+
+
+FAULTS = tuple(faults())
 
 
 def arm() -> Robot:

@@ -1,8 +1,7 @@
-# ruff: noqa: E501
 """Programs of public repositories, checked with a fitting arm and nothing else.
 
-They stay outside the project: a folder holds ``cells.yaml``, rows of ``file`` and ``robot`` (a name of the library, or a
-file of ``_arms``), and the programs themselves.
+They stay outside the project: a folder holds ``cells.yaml``, rows of ``file`` and ``robot`` (a name of the library, or
+a file of ``_arms``), and the programs themselves.
 """
 
 from __future__ import annotations
@@ -112,7 +111,8 @@ def summary(found: list[Outcome]) -> str:
     most = max(each.rows for each in found)
     return (
         f"{len(found)} programs, {motions} motions, {given} with targets in the files, {passed} of these pass "
-        f"({share:.1f} %), {sum(each.clean for each in found)} without a word; median {median:.2f} s; at most {most} of {MOST_ROWS} lines a program"
+        f"({share:.1f} %), {sum(each.clean for each in found)} without a word; "
+        f"median {median:.2f} s; at most {most} of {MOST_ROWS} lines a program"
     )
 
 
@@ -124,8 +124,9 @@ if __name__ == "__main__":
         done.append(result)
         why = ", ".join(f"{code} {count}" for code, count in result.findings.most_common(6))
         print(
-            f"{result.clean}/{result.passed}/{result.given}/{result.motions} fail {result.failed} {result.seconds:.2f} s "
-            f"{result.rows} rows {'/'.join(result.file.parts[-2:])} {result.robot}: {result.error or why}",
+            f"{result.clean}/{result.passed}/{result.given}/{result.motions} fail {result.failed} "
+            f"{result.seconds:.2f} s {result.rows} rows {'/'.join(result.file.parts[-2:])} {result.robot}: "
+            f"{result.error or why}",
             flush=True,
         )
     print(summary(done))

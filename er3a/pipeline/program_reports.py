@@ -53,7 +53,7 @@ from er3a.program_check.check_program import (
 from er3a.program_check.program_check_findings import RANKS, Level, NotFollowed, worst_of
 from er3a.programs.instructions import Place
 from er3a.programs.languages import WITHOUT_JOINTS, not_written, read_program
-from er3a.programs.program_findings import DataFileMissing, WriteFinding
+from er3a.programs.program_findings import WriteFinding
 from er3a.programs.program_names import LanguageName
 from er3a.programs.writing import program_name
 from er3a.robots.robot import Robot
@@ -135,7 +135,7 @@ def lines_of(checked: CheckedFile, every: bool = False, verdicts: bool = False) 
 
 def _is_question(each: LocatedFinding) -> bool:
     """Whether an input answers a finding."""
-    return each.level == "caution" and isinstance(each.finding, (*NOT_FOLLOWED, DataFileMissing))
+    return each.level == "caution" and isinstance(each.finding, NOT_FOLLOWED)
 
 
 def _causes(findings: Iterable[LocatedFinding]) -> list[list[LocatedFinding]]:

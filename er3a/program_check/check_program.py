@@ -20,7 +20,6 @@ from er3a.collision.pairs import ASSUMED_MARGIN, PENETRATION_TOLERANCE, PairsUne
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import has_bare_tool, shapes_assumed
 from er3a.errors import InputError
-from er3a.geometry.transforms import rotation_angle
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import USUAL_NEAR, NearSingular
 from er3a.numerics.arrays import Reals
@@ -40,7 +39,7 @@ from er3a.program_check.motion_checks import TURN_LENGTH, AssumedRates, CheckRul
 from er3a.program_check.sanity import suspect_numbers
 from er3a.program_check.step_checks import CheckedMotion, Judge, Obstacles
 from er3a.programs.execution import Ending, Execution, RunLimits
-from er3a.programs.instructions import ArmMotion, JointTarget, Load, Pause, Place, PoseTarget, Unknown
+from er3a.programs.instructions import ArmMotion, Load, Pause, Place, PoseTarget, Unknown
 from er3a.programs.machine import execute
 from er3a.programs.program_findings import NotUnderstood
 from er3a.programs.syntax import Fixed, Move, Program
@@ -277,33 +276,23 @@ def _located(
             LocatedFinding(motion.level_of(each), each, step.place, step.calls, 1, number, moment)
             for each, moment in motion.findings.items()
         ]
-    unknown = [(step, step.instruction) for step in execution.steps if isinstance(step.instruction, Unknown)]
+    for step in execution.steps:
+        if isinstance(what := step.instruction, Unknown):
+            text = (
+                NotUnderstood(what.text, step.place) if what.stops else found_in.NotFollowed(what.text, "instruction")
+            )
+            found.append(LocatedFinding("fail" if what.stops else "caution", text, step.place, step.calls))
     found += [
-        LocatedFinding("fail", NotUnderstood(what.text, step.place), step.place, step.calls)
-        for step, what in unknown
-        if what.stops
-    ]
-    said = [
-        (step.place, step.calls, found_in.NotFollowed(what.text, "instruction"))
-        for step, what in unknown
-        if not what.stops
-    ]
-    said += [
-        (each.place, (), found_in.NotFollowed("", each.kind))
+        LocatedFinding("caution", found_in.NotFollowed("", each.kind), each.place)
         for each in execution.endings
         if each.kind != "end" and each.kind != "joins"
     ]
-    found += [LocatedFinding("caution", finding, place, calls) for place, calls, finding in said]
     found += [
         LocatedFinding("note", found_in.NotFollowed(text, "unreached"), place) for place, text in _unreached(execution)
     ]
     if obstacles is not None and obstacles.bodies.in_error:
         found.append(LocatedFinding("caution", PairsUnexamined(obstacles.bodies.in_error), top))
-    found += [*_loads(execution, robot), *_stated_elsewhere(execution, robot), *_not_set(execution)]
-    found += [
-        LocatedFinding("caution", found_in.FrameGivenTwice(each.name, each.moved_mm, each.turned_deg), each.place)
-        for each in execution.frames_twice
-    ]
+    found += [*_loads(execution, robot), *_not_set(execution)]
     found += [
         LocatedFinding(found_in.level_of(each), each, step.place, step.calls)
         for step, each in suspect_numbers(execution, robot)
@@ -354,30 +343,6 @@ def _not_set(execution: Execution) -> Iterator[LocatedFinding]:
             kind = "tool" if what.base.own else kind
             yield LocatedFinding("note", found_in.FramesFromRobotFile(kind), step.place, step.calls)
             return
-
-
-STATED_MM, STATED_DEG = 1.0, 0.5
-"""By how much a table's pose may differ from its joints, which tables often round to 0.1 deg."""
-
-
-def _stated_elsewhere(execution: Execution, robot: Robot) -> Iterator[LocatedFinding]:
-    """The row of a table whose tool is farthest from where its joints put it."""
-    rows = [
-        (step, step.instruction.target)
-        for step in execution.steps
-        if isinstance(step.instruction, ArmMotion) and isinstance(step.instruction.target, JointTarget)
-    ]
-    rows = [(step, target) for step, target in rows if target.stated is not None]
-    if not rows:
-        return
-    stated = np.stack([target.stated for _, target in rows if target.stated is not None])
-    reached = np.linalg.inv(robot.base) @ forward(robot, np.stack([target.joints for _, target in rows]))
-    moved = np.linalg.norm(stated[:, :3, 3] - reached[:, :3, 3], axis=1) * 1000
-    turned = np.nan_to_num(np.degrees(rotation_angle(stated[:, :3, :3], reached[:, :3, :3])))
-    worst = int((moved / STATED_MM + turned / STATED_DEG).argmax())
-    if moved[worst] > STATED_MM or turned[worst] > STATED_DEG:
-        other = found_in.ToolStatedElsewhere(float(moved[worst]), float(turned[worst]))
-        yield LocatedFinding("caution", other, rows[worst][0].place)
 
 
 def _which(finding: found_in.CheckFinding) -> str:
@@ -545,7 +510,7 @@ def parts_of(check: ProgramCheck, robot: Robot, source: CommandSource) -> tuple[
             if motion is not None and motion.stays:
                 rest.pop(step.place, None)
             continue
-        if motion.path is None or motion.motion.with_path:
+        if motion.path is None:
             break
         if motion.motion.kind != "joint" and not np.allclose(motion.arm.tool, robot.tool, rtol=0, atol=1e-12):
             problem = f"line {step.place.line} moves another tool than the robot's"
@@ -633,10 +598,9 @@ def _blend(motion: CheckedMotion, after: CheckedMotion) -> float:
 
 def _same_speed(motion: CheckedMotion, after: CheckedMotion) -> bool:
     """Whether two motions are to have one speed, though one may be too short to come to it."""
-    said = [(each.speed, each.turn_speed, each.turning) for each in (motion.motion, after.motion)]
-    speed, turn_speed, turning = said[0]
-    turns = turn_speed is not None or turning != (None, None)  # has a speed of its own, which may decide
-    return said[0] == said[1] and not turns and (speed is None or speed.unit != "s")
+    speed, turn_speed = motion.motion.speed, motion.motion.turn_speed  # which may decide
+    alike = turn_speed is None and after.motion.turn_speed is None and speed == after.motion.speed
+    return alike and (speed is None or speed.unit != "s")
 
 
 def _size(way: MotionPath) -> float:

@@ -36,6 +36,7 @@ WIDE_STEP = 0.15  # rad or m, of a joint between two points, beyond which there 
 SHORTEST_PART = 1e-4  # of a way, in which a joint that moves by more jumps
 NO_WAY = 1e-9  # m or rad
 HALF_TURN = math.pi - 1e-5  # rad: a controller's rounding may turn the tool either way
+SLIGHT_TURN = math.radians(1.0)  # of the tool on an arc, which way round does not matter
 SAME_ARRIVAL = 1e-4  # rad
 OVER_SPEED = 1.001  # ratio; rates are those between points
 FAR_TURN, NEAR_MOVE = math.radians(90.0), 0.05  # of a joint that jumps: it turns so far where the tool moves less
@@ -184,8 +185,7 @@ def tool_law(motion: ArmMotion, length: float, turned: float, assumed: AssumedRa
         return MotionLaw(seconds, RAMP_OF_A_DURATION)
     v = _given(motion.speed, "m/s") or assumed.tool_speed
     a = _given(motion.acceleration, "m/s2") or assumed.tool_acceleration
-    turns = [each.speed.value for each in motion.turning if each is not None and each.speed.value > 0]
-    turn_speed = motion.turn_speed or min(turns, default=v / TURN_LENGTH)
+    turn_speed = motion.turn_speed or v / TURN_LENGTH
     return law_of(max(length, turned * v / turn_speed), v, a)
 
 
@@ -250,11 +250,13 @@ def tool_path(
         return None
     if arm.joints > MOST_JOINTS:
         return found_in.NotFollowed(motion.form, "redundant")
-    if turned > HALF_TURN and not motion.with_path:
+    if turned > HALF_TURN:
         return found_in.NotFollowed(motion.form, "half_turn")
+    if motion.with_path and turned > SLIGHT_TURN:
+        return found_in.NotFollowed(motion.form, "turns_with_path")
 
     def poses(share: Reals) -> Reals:
-        found = None if via is None else arc_poses(begin, via, end, share, motion.with_path)
+        found = None if via is None else arc_poses(begin, via, end, share)
         return _line_poses(begin, end, turn, share) if found is None else found
 
     share, q, stop = _followed(arm, poses, start, _parts(length, turned))

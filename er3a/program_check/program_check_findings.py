@@ -25,12 +25,11 @@ NotFollowedReason = Literal[
     "setting",
     "tool",
     "base",
-    "spline",
+    "turns_with_path",
     "external_axes",
     "arc_angle",
     "half_turn",
     "redundant",
-    "rounds",
     "operations",
     "ways",
     "depth",
@@ -209,24 +208,9 @@ class SpeedNotGiven(Finding):
 class SuspectNumber(Finding):
     """A number that is likely a mistake: ``text`` is what it is, ``usual`` what it would be, or what others are."""
 
-    kind: Literal["metres", "radians", "speed", "impossible_speed", "tool", "base"]
+    kind: Literal["metres", "radians", "speed", "impossible_speed", "share", "tool", "base"]
     text: str
     usual: str
-
-
-class FrameGivenTwice(Finding):
-    """The program itself gives a frame that the check was given otherwise; the program's was taken."""
-
-    name: str
-    moved_mm: float
-    turned_deg: float
-
-
-class ToolStatedElsewhere(Finding):
-    """A table's pose of the tool is not where its joints put it; in the row where it is farthest away."""
-
-    moved_mm: float
-    turned_deg: float
 
 
 class FramesFromRobotFile(Finding):
@@ -271,8 +255,6 @@ CheckFinding = (
     | ClearanceNotProven
     | SpeedNotGiven
     | SuspectNumber
-    | FrameGivenTwice
-    | ToolStatedElsewhere
     | FramesFromRobotFile
     | LoadAbovePayload
 )

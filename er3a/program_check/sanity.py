@@ -53,6 +53,8 @@ def _speeds(motions: list[tuple[Step, ArmMotion]], robot: Robot) -> Iterator[tup
     slides = robot.slides.any() or not np.isfinite(robot.speed).all()
     fastest = np.inf if slides else float(robot.speed.sum()) * arm_length(robot)  # no point of the arm is faster
     for step, motion in motions:
+        if motion.speed and motion.speed.unit == "share" and motion.speed.text.endswith(" %"):
+            yield step, SuspectNumber("share", motion.speed.text, "100 %")
         if motion.speed and motion.speed.unit == "m/s" and motion.speed.value > fastest:
             kind: Literal["impossible_speed"] = "impossible_speed"
             yield step, SuspectNumber(kind, f"{1000 * motion.speed.value:g} mm/s", f"{1000 * fastest:.0f} mm/s")

@@ -52,7 +52,8 @@ FLANGE = "tool0"
 SAME_DIGITS = 6  # of joints in rad and m
 MOST_TURNS = 2 * np.pi  # rad beyond a limit, after which no arm gets there
 CHUNK = 4_000  # points whose bodies are placed at a time
-MOST_TOUCHING = 60  # points of a motion at which depths are measured
+MOST_TOUCHING = 200  # points of a motion at which depths are measured
+HALVINGS = 5  # of the part of a way in which bodies touch first
 CORNER_POINTS = 9
 
 Missing = found_in.NotFollowed
@@ -243,7 +244,8 @@ class Judge:
                 return None
             return target.joints if before is None else np.where(open_, before, target.joints)
         assert checked.base is not None
-        pose, near = checked.base @ target.pose, before if target.near is None else target.near
+        pose = checked.base @ target.pose
+        near = before if target.near is None else target.near
         reference = np.zeros(checked.arm.joints) if near is None else near
         try:
             found = inverse_batch(checked.arm, pose[None], reference)
@@ -285,8 +287,6 @@ def _say_of(checked: CheckedMotion) -> None:
     outer = {name: None for each in (motion.target, motion.via) for name, _ in getattr(each, "external", ())}
     if outer:
         checked.add(Missing(", ".join(outer), "external_axes"))
-    if motion.kind == "spline" or (motion.kind == "joint" and motion.spline_block is not None):
-        checked.add(Missing(motion.form, "spline"))
     if motion.not_followed:
         checked.add(Missing(motion.not_followed, "setting"))
 
@@ -296,8 +296,8 @@ def _key(motion: instructions.ArmMotion) -> Hashable:
     frames = tuple(
         (each.name, None if each.pose is None else each.pose.tobytes()) for each in (motion.tool, motion.base)
     )
-    rates = motion.speed, motion.turn_speed, motion.turning, motion.acceleration, motion.zone
-    said = motion.kind, motion.form, motion.spline_block is None, motion.angle, motion.not_followed, motion.with_path
+    rates = motion.speed, motion.turn_speed, motion.acceleration, motion.zone
+    said = motion.kind, motion.form, motion.angle, motion.not_followed, motion.with_path
     return said, _target_key(motion.target), _target_key(motion.via), rates, frames, motion.load
 
 
@@ -378,7 +378,7 @@ class Obstacles(ByValue):
         starts = np.searchsorted(owner[order], np.arange(len(paths) + 1))
         for number, (checked, _) in enumerate(paths):
             rows = order[starts[number] : starts[number + 1]]
-            self._judge(checked, q[rows], share[rows], d[rows], pair[rows])
+            self._judge(checked, share[rows], d[rows], pair[rows])
 
     def _moved(self, q: Reals, r: Reals) -> Reals:
         """By how much a body moves at most on straight ways in joint space between joints (k, n), m."""
@@ -391,39 +391,44 @@ class Obstacles(ByValue):
         found: Reals = np.concatenate(chords) + bulge
         return found
 
-    def _judge(self, checked: CheckedMotion, q: Reals, share: Reals, d: Reals, pair: NDArray[np.int64]) -> None:
+    def _judge(self, checked: CheckedMotion, share: Reals, d: Reals, pair: NDArray[np.int64]) -> None:
         """What is found at the points of one motion, in the order of time."""
         assert checked.path is not None
         nearest = int(np.argmin(d))
         checked.clearance = float(d[nearest])
         if d[nearest] < 0:
-            checked.add_on_way(self._touching(checked.path, q, share, np.flatnonzero(d < 0)))
+            checked.add_on_way(self._touching(checked.path, share, np.flatnonzero(d < 0)))
         elif d[nearest] < self.assumed_margin:
             near = found_in.ClearOfAssumed(
                 self.bodies.pairs[int(pair[nearest])], 1000 * checked.clearance, 1000 * self.assumed_margin
             )
             checked.add_on_way({near: float(share[nearest])})
 
-    def _touching(self, path: MotionPath, q: Reals, share: Reals, rows: NDArray[np.intp]) -> Shares:
-        kept = rows[np.unique(np.linspace(0, len(rows) - 1, MOST_TOUCHING).astype(int))]
+    def _touching(self, path: MotionPath, share: Reals, rows: NDArray[np.intp]) -> Shares:
+        """What touches at points of a way, of which ``rows`` do: from the first contact to the last, evenly."""
+        clear, first = share[max(int(rows[0]) - 1, 0)], share[int(rows[0])]
+        for _ in range(HALVINGS):
+            middle = (clear + first) / 2
+            touches_there = self.bodies.min_distance(path.at(np.array([middle])))[0][0] < 0
+            clear, first = (clear, middle) if touches_there else (middle, first)
         every = np.arange(len(self.bodies.pairs))
         touches: dict[Pair, found_in.BodiesTouch] = {}
-        for row in kept.tolist():
-            depths = -1000 * self.bodies.distances(q[row], every)
-            at = float(share[row])
+        shares = np.linspace(first, share[int(rows[-1])], MOST_TOUCHING)
+        for at, joints in zip(shares.tolist(), path.at(shares)):
+            depths = -1000 * self.bodies.distances(joints, every)
             for k in np.flatnonzero(depths > 0).tolist():
                 name = self.bodies.pairs[k]
                 when, where = float(path.law.times(np.array(at))), path.along_mm(at) if path.of_tool else None
                 enlarged = 1000 * enlarged_by(self.robot, self.scene, name.names)
-                first = touches.get(name, found_in.BodiesTouch(name, when, where, 0.0, False, enlarged))
+                before = touches.get(name, found_in.BodiesTouch(name, when, where, 0.0, False, enlarged))
                 touches[name] = found_in.BodiesTouch(
-                    name, first.t_s, first.at_mm, max(first.depth_mm, float(depths[k])), at > 1 - 1e-9, enlarged
+                    name, before.t_s, before.at_mm, max(before.depth_mm, float(depths[k])), at > 1 - 1e-9, enlarged
                 )
         if not touches:
             return {}
         given = any(isinstance(each.pair, CarriedAndSolid) for each in touches.values())  # by the scene, not the arm
         hit = found_in.MotionCollides(tuple(touches.values()), arm_shapes(self.robot).assumed and not given)
-        return {hit: float(share[kept[0]])}
+        return {hit: float(first)}
 
     def corner(self, one: CheckedMotion, other: CheckedMotion) -> None:
         """Find what the corner between two motions touches that a zone rounds, half-way to where it begins and ends."""

@@ -8,15 +8,14 @@ Calls of a program's own routines, wherever they stand in expressions, become op
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Container, Iterable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 from er3a.errors import InputError
 from er3a.programs import syntax
-from er3a.programs.evaluation import variable_of
 from er3a.programs.instructions import Aside, Place, Remark, Unknown
-from er3a.programs.program_findings import NameTwice, NotUnderstood, ProgramFinding
+from er3a.programs.lexing import MisreadError, Words
 
 MAX_NESTED = 200
 ASSIGNED = re.compile(r"(?:(?:global|local)\s+)?([A-Za-z_$][\w$]*+)[^=\"'(]*+=(?!=)")
@@ -63,8 +62,6 @@ class CodeBuilder:
         self.name, self.parameters, self.place, self.thread = name, parameters, place, thread
         self.code: list[syntax.Operation] = []
         self.blocks: list[Block] = []
-        self.settings: tuple[tuple[str, syntax.Expression], ...] = ()  # of each motion of a block
-        self.volatile: set[str] = set()  # variables that something else may set at any time
         self._labels: dict[str, int] = {}
         self._gotos: list[tuple[int, str]] = []
         self._hidden = 0
@@ -81,15 +78,9 @@ class CodeBuilder:
         """An instruction that moves nothing."""
         self.add(syntax.Fixed(place, Aside(text)))
 
-    def concurrent(self, place: Place, what: syntax.Invocation, text: str) -> None:
-        """A routine that runs concurrently with the program from here on."""
-        self.add(syntax.ConcurrentStart(place, what, text))
-
-    def unknown(
-        self, place: Place, text: str, may_move: bool = True, shapes: bool = False, stops: bool = False
-    ) -> None:
-        """An instruction that is not understood."""
-        self.add(syntax.Fixed(place, Unknown(text, may_move, shapes, stops)))
+    def unknown(self, place: Place, text: str, may_move: bool = True, stops: bool = False) -> None:
+        """An instruction that is not understood, or not followed."""
+        self.add(syntax.Fixed(place, Unknown(text, may_move, stops=stops)))
 
     def unread(self, place: Place, text: str, may_move: bool = True, folds: bool = False) -> None:
         """A statement that is not understood; what it assigns something to has no known value from here.
@@ -101,11 +92,13 @@ class CodeBuilder:
         self.unknown(place, text, may_move, stops=is_no_statement(text))
         assigned = ASSIGNED.match(text)
         if assigned is not None:
-            self.unclear(place, assigned[1].upper() if folds else assigned[1])
+            name = assigned[1].upper() if folds else assigned[1]
+            self.unclear(place, syntax.Variable(name), text)
 
-    def unclear(self, place: Place, name: str) -> None:
-        """A variable of which nothing is known from here."""
-        self.add(syntax.Assign(place, syntax.Variable(name), syntax.Constant(syntax.Unclear(name)), name))
+    def unclear(self, place: Place, target: syntax.Expression | None, text: str) -> None:
+        """A variable, field or element of which nothing is known from here."""
+        if isinstance(target, syntax.Variable | syntax.Member | syntax.Element):
+            self.add(syntax.Assign(place, target, syntax.Opaque(text), text))
 
     def inside(self, *kinds: str) -> bool:
         """Whether the innermost block is one of these."""
@@ -118,12 +111,7 @@ class CodeBuilder:
 
     def next_arm(self, place: Place, condition: syntax.Expression | None, text: str) -> None:
         """``ELSE``, or ``ELSEIF`` with its condition."""
-        block = self._innermost("if", place)
-        block.exits.append(self._jump(place))
-        self._patch(block.skips)
-        block.skips = []
-        if condition is not None:
-            self._test(place, condition, text)
+        self._next_part(self._innermost("if", place), place, condition, text)
 
     def open_while(self, place: Place, condition: syntax.Expression, text: str) -> None:
         """``WHILE condition``; a condition that is always true makes a loop for ever."""
@@ -151,8 +139,6 @@ class CodeBuilder:
         text: str,
     ) -> None:
         """``FOR name = first TO last STEP step``; the last and the step are fixed when the loop is entered."""
-        if len(self.blocks) >= MAX_NESTED:
-            self._open("for", place)
         self._hidden += 1
         limit, by = (syntax.Variable(f"%{part}{self._hidden}") for part in ("last", "step"))
         counter = syntax.Variable(name)
@@ -162,33 +148,34 @@ class CodeBuilder:
         self._open("for", place)
         self.blocks[-1].subject, self.blocks[-1].step = counter, by
         span = syntax.Binary("*", syntax.Binary("-", limit, counter), by)
-        self._test(place, syntax.Binary(">=", span, syntax.Constant(0)), text)
+        self._test(place, syntax.Binary(">=", span, syntax.Constant(0)), text, counted=True)
 
     def open_switch(self, place: Place, subject: syntax.Expression, text: str) -> None:
-        """``SWITCH subject``; functions in it are called once."""
-        if any(True for _ in _invoked(subject)):
-            self._hidden += 1
-            value = syntax.Variable(f"%subject{self._hidden}")
-            self.add(syntax.Assign(place, value, subject, text, local=True))
-            subject = value
+        """``SWITCH subject``, which is worked out once."""
+        self._hidden += 1
+        value = syntax.Variable(f"%subject{self._hidden}")
+        self.add(syntax.Assign(place, value, subject, text, local=True))
         self._open("switch", place)
-        self.blocks[-1].subject, self.blocks[-1].text = subject, text
+        self.blocks[-1].subject, self.blocks[-1].text = value, text
 
     def case(self, place: Place, values: list[syntax.Expression] | None, text: str) -> None:
         """``CASE values``, or ``DEFAULT`` for None."""
         block = self._innermost("switch", place)
+        assert block.subject is not None
+        condition: syntax.Expression | None = None
+        for value in values or ():
+            test = syntax.Binary("==", block.subject, value)
+            condition = test if condition is None else syntax.Binary("OR", condition, test)
+        self._next_part(block, place, condition, f"{block.text} {text}")
+
+    def _next_part(self, block: Block, place: Place, condition: syntax.Expression | None, text: str) -> None:
+        """The end of a part of a branch, if one is open, and the beginning of the next."""
         if block.skips or block.exits:
             block.exits.append(self._jump(place))
         self._patch(block.skips)
         block.skips = []
-        if values is None:
-            return
-        assert block.subject is not None
-        tests: list[syntax.Expression] = [syntax.Binary("==", block.subject, value) for value in values]
-        condition = tests[0]
-        for test in tests[1:]:
-            condition = syntax.Binary("OR", condition, test)
-        self._test(place, condition, f"{block.text} {text}")
+        if condition is not None:
+            self._test(place, condition, text)
 
     def close(self, kind: str, place: Place, until: syntax.Expression | None = None, text: str = "") -> None:
         """End of the innermost block, which must be of this kind."""
@@ -200,7 +187,7 @@ class CodeBuilder:
         elif block.kind in LOOPS:
             if block.kind == "for":
                 self._count(block, place)
-            self.add(syntax.GoTo(place, block.start, endless=block.kind == "loop"))
+            self.add(syntax.GoTo(place, block.start))
         if kind != "repeat":
             self._patch(block.skips)
         self._patch(block.exits)
@@ -218,7 +205,7 @@ class CodeBuilder:
             return
         if loop.kind == "for":
             self._count(loop, place)
-        self.add(syntax.GoTo(place, loop.start, endless=loop.kind == "loop"))
+        self.add(syntax.GoTo(place, loop.start))
 
     def label(self, name: str) -> None:
         """A place to go to."""
@@ -243,13 +230,15 @@ class CodeBuilder:
             place = self.code[at].place
             if name not in self._labels:
                 raise fault(place, f"there is no label '{name}'", "Name a label of this routine")
-            self.code[at] = syntax.GoTo(place, self._labels[name], endless=self._labels[name] <= at)
+            self.code[at] = syntax.GoTo(place, self._labels[name])
         code = (*self.code, syntax.Return(end))
         return syntax.Routine(self.name, self.parameters, code, self.place, self.thread)
 
     def _open(self, kind: str, place: Place, word: str = "") -> None:
         if len(self.blocks) >= MAX_NESTED:
             raise fault(place, f"more than {MAX_NESTED} blocks within each other", "Nest fewer")
+        if kind in LOOPS:
+            self.add(syntax.Enter(place))
         self.blocks.append(Block(kind, place, len(self.code), word=word or kind))
 
     def _innermost(self, word: str, place: Place) -> Block:
@@ -270,9 +259,9 @@ class CodeBuilder:
                 return block
         raise fault(place, "leaves a loop, but none is open", "Remove it")
 
-    def _test(self, place: Place, condition: syntax.Expression, text: str) -> None:
+    def _test(self, place: Place, condition: syntax.Expression, text: str, counted: bool = False) -> None:
         self.blocks[-1].skips.append(len(self.code))
-        self.add(syntax.Branch(place, condition, -1, text))
+        self.add(syntax.Branch(place, condition, -1, text, counted))
 
     def _jump(self, place: Place) -> int:
         self.add(syntax.GoTo(place, -1))
@@ -287,84 +276,125 @@ class CodeBuilder:
                 self.code[at] = replace(operation, to=len(self.code))
 
 
+Blocks = Mapping[str, tuple[str, str]]
+"""What a language's words do to blocks: an action of :func:`block`, and what it needs: the word that ends a head, the
+block that is closed, or the words within a FOR."""
+
+
+def block(builder: CodeBuilder, words: Words, place: Place, text: str, blocks: Blocks) -> bool:
+    """Begin, go on with, leave or end a block or a routine; False, with nothing done, if a statement does none of it.
+
+    Raises
+    ------
+    MisreadError
+        for a statement that can't be read
+    InputError
+        for one without which the next lines would mean something else
+    """
+    word = words.next.upper()
+    action, needs = blocks.get(word, ("", ""))
+    if not action:
+        return False
+    words.take()
+    match action:
+        case "if":
+            builder.open_if(place, words.condition(needs), text)
+        case "elif":
+            builder.next_arm(place, words.condition(needs), text)
+        case "while":
+            builder.open_while(place, words.condition(needs), text)
+        case "until":
+            builder.close("repeat", place, words.condition(needs), text)
+        case "switch":
+            builder.open_switch(place, words.condition(needs), text)
+        case "for" | "case":
+            try:
+                _counted(builder, words, place, text, needs) if action == "for" else _case(builder, words, place, text)
+            except MisreadError as error:
+                remedy = "Write a counter with its first and last value, or values after CASE"
+                raise fault(place, f"this {word} can't be read ({error})", remedy) from None
+        case "return":
+            value = None if words.kind == "end" else words.expression()
+            words.finish()
+            builder.add(syntax.Return(place, value))
+        case "label":
+            builder.label(words.name())
+        case "goto":
+            builder.goto(place, words.name())
+        case _:
+            words.accept(needs)
+            words.finish()
+            _simple(builder, place, action)
+    return True
+
+
+def _simple(builder: CodeBuilder, place: Place, action: str) -> None:
+    """A word that stands alone."""
+    match action:
+        case "else" if not builder.inside("switch"):
+            builder.next_arm(place, None, "")
+        case "else" | "default":
+            builder.case(place, None, "")
+        case "loop":
+            builder.open_loop(place)
+        case "repeat":
+            builder.open_repeat(place)
+        case "leave":
+            builder.leave_loop(place)
+        case "next":
+            builder.next_round(place)
+        case "end":
+            builder.add(syntax.Return(place, ends=True))
+        case kind if kind.startswith("close "):
+            builder.close(kind.removeprefix("close "), place)
+
+
+def _counted(builder: CodeBuilder, words: Words, place: Place, text: str, needs: str) -> None:
+    """``FOR name = first TO last STEP step``, by the words that a language has there."""
+    given, to, by, *end = needs.split()
+    name = words.name()
+    words.expect(given)
+    first = words.expression()
+    words.expect(to)
+    last = words.expression()
+    step = words.expression() if words.accept(by) else None
+    words.accept("".join(end))
+    words.finish()
+    if isinstance(step, syntax.Constant) and step.value == 0:
+        raise MisreadError(f"{by} 0")
+    builder.open_for(place, name, first, last, step, text)
+
+
+def _case(builder: CodeBuilder, words: Words, place: Place, text: str) -> None:
+    values = [words.expression()]
+    while words.accept(","):
+        values.append(words.expression())
+    words.accept(":")
+    words.finish()
+    builder.case(place, values, text)
+
+
 def fault(place: Place, problem: str, remedy: str) -> InputError:
     """An error at a place of a program."""
     return InputError(place.file, place.where, problem, remedy)
 
 
 Each = Callable[[syntax.Expression], syntax.Expression]
-Changed = Callable[[syntax.Invocation], Iterable[syntax.Expression | None]]
-"""What a function outside the program changes of its arguments, or may change."""
 
 
-def linked(
-    routines: Iterable[syntax.Routine],
-    changed: Changed = lambda call: (),
-) -> tuple[dict[str, syntax.Routine], tuple[ProgramFinding, ...]]:
-    """The routines by name, with calls of each other taken out of expressions; and the findings about the text.
+def linked(routines: Iterable[syntax.Routine]) -> dict[str, syntax.Routine]:
+    """The routines by name, with calls of each other taken out of expressions.
 
-    Of two routines with one name the later one counts; the other is kept under a name that nothing calls. What a
-    function outside the program changes of its arguments, or may change, is unclear from its call on.
+    Of two routines with one name the later one counts; the other is kept under a name that nothing calls. A function in
+    an expression that is not the program's is carried out before, for what it may do.
     """
-    found: list[ProgramFinding] = []
     by_name: dict[str, syntax.Routine] = {}
     for routine in routines:
         if routine.name in by_name:
-            found.append(NameTwice(routine.name, routine.place))
-            former = by_name[routine.name]
             hidden = f"{routine.name}@{len(by_name)}"
-            by_name[hidden] = replace(former, name=hidden)
+            by_name[hidden] = replace(by_name[routine.name], name=hidden)
         by_name[routine.name] = routine
-    linked = {name: replace(each, code=_linked(each.code, by_name, changed)) for name, each in by_name.items()}
-    return linked, tuple(found)
-
-
-def lacks_data(routines: Iterable[syntax.Routine], data: Iterable[syntax.Assign], known: Container[str]) -> bool:
-    """Whether routines use a variable that nothing of what was read gives.
-
-    Parameters
-    ----------
-    known : variables that are given elsewhere; those that begin with ``$`` or ``%`` always are
-    """
-    given = {variable_of(each.target) for each in data}
-    used: set[str] = set()
-    for routine in routines:
-        given |= {parameter.name for parameter in routine.parameters}
-        for operation in routine.code:
-            expressions = syntax.expressions_of(operation)
-            if isinstance(operation, syntax.Assign):
-                given.add(variable_of(operation.target))
-                expressions = () if operation.value is None else (operation.value,)
-            elif isinstance(operation, syntax.Move):
-                expressions = tuple(each for each in operation.arguments[:1] if each is not None)
-            used.update(name for each in expressions for name in variables(each))
-    return any(name[0] not in "$%" and name not in known for name in used - given)
-
-
-def own_names(routine: syntax.Routine) -> set[str]:
-    """Parameters and variables that a routine declares for itself."""
-    declared = (each.target for each in routine.code if isinstance(each, syntax.Assign) and each.local)
-    return {*(each.name for each in routine.parameters), *map(variable_of, declared)}
-
-
-def variables(expression: syntax.Expression) -> Iterable[str]:
-    """The variables in an expression."""
-    if isinstance(expression, syntax.Variable):
-        yield expression.name
-    for each in syntax.inner(expression):
-        yield from variables(each)
-
-
-def not_understood(code: Iterable[syntax.Operation]) -> Iterable[NotUnderstood]:
-    """What is kept in code without being understood."""
-    for operation in code:
-        if _plain(operation):
-            continue
-        if isinstance(operation, syntax.Fixed) and isinstance(operation.instruction, Unknown):
-            yield NotUnderstood(operation.instruction.text, operation.place)
-        else:
-            for expression in syntax.expressions_of(operation):
-                yield from (NotUnderstood(text, operation.place) for text in _opaque(expression))
+    return {name: replace(each, code=_linked(each.code, by_name)) for name, each in by_name.items()}
 
 
 def _plain(operation: syntax.Operation) -> bool:
@@ -376,46 +406,22 @@ def _plain(operation: syntax.Operation) -> bool:
     )
 
 
-def _opaque(expression: syntax.Expression) -> Iterable[str]:
-    if isinstance(expression, syntax.Opaque):
-        yield expression.text
-    for each in syntax.inner(expression):
-        yield from _opaque(each)
-
-
-def _linked(
-    given: tuple[syntax.Operation, ...], known: Mapping[str, syntax.Routine], changed: Changed
-) -> tuple[syntax.Operation, ...]:
-    parts = (each for operation in given if not _plain(operation) for each in syntax.expressions_of(operation))
-    outer = [each for part in parts for each in _invoked(part)]
-    if not any(each.function in known or any(changed(each)) for each in outer):
-        return given
+def _linked(given: tuple[syntax.Operation, ...], known: Container[str]) -> tuple[syntax.Operation, ...]:
     code: list[syntax.Operation] = []
     starts: list[int] = []
     for operation in given:
         starts.append(len(code))
-        calls = _Calls(known, operation.place)
-        if (
-            isinstance(operation, syntax.Doing)
-            and isinstance(operation.what, syntax.Invocation)
-            and operation.what.function in known
-        ):
-            call = operation.what
-            arguments = tuple(None if each is None else calls.out(each) for each in call.arguments)
-            keywords = tuple((name, calls.out(each)) for name, each in call.keywords)
-            last: syntax.Operation = syntax.Call(operation.place, call.function, arguments, keywords, operation.text)
-        else:
-            last = mapped(operation, calls.out)
-        outside = [each for part in syntax.expressions_of(last) if not _plain(last) for each in _invoked(part)]
-        unclear = [
-            syntax.Assign(operation.place, given, syntax.Opaque(f"{each.function}(...)"), "")
-            for each in outside
-            for given in changed(each)
-            if isinstance(given, (syntax.Variable, syntax.Member, syntax.Element))
-        ]
-        code += [*calls.found, *unclear, last]
+        if _plain(operation):
+            code.append(operation)
+            continue
+        calls = _Calls(known, operation)
+        last = mapped(operation, calls.out)
+        if isinstance(last, syntax.Doing) and last.what.function in known:
+            call = last.what
+            last = syntax.Call(last.place, call.function, call.arguments, call.keywords, last.text)
+        code += [*calls.found, last]
     starts.append(len(code))
-    return tuple(_moved(operation, starts) for operation in code)
+    return tuple(_moved(operation, starts) for operation in code) if len(code) > len(given) else tuple(code)
 
 
 def _moved(operation: syntax.Operation, starts: list[int]) -> syntax.Operation:
@@ -426,37 +432,27 @@ def _moved(operation: syntax.Operation, starts: list[int]) -> syntax.Operation:
     return operation
 
 
-def _invoked(expression: syntax.Expression) -> Iterator[syntax.Invocation]:
-    """The functions in an expression."""
-    if isinstance(expression, syntax.Invocation):
-        yield expression
-    for each in syntax.inner(expression):
-        yield from _invoked(each)
-
-
-def _calls(expression: syntax.Expression, known: Mapping[str, syntax.Routine]) -> bool:
-    if isinstance(expression, syntax.Invocation) and expression.function in known:
-        return True
-    return any(_calls(each, known) for each in syntax.inner(expression))
-
-
 class _Calls:
-    """Takes calls out of expressions, the innermost first."""
+    """Takes calls out of the expressions of an operation, the innermost first."""
 
-    def __init__(self, known: Mapping[str, syntax.Routine], place: Place):
-        self.known, self.place = known, place
-        self.found: list[syntax.Call] = []
+    def __init__(self, known: Container[str], operation: syntax.Operation):
+        self.known, self.place = known, operation.place
+        self.found: list[syntax.Operation] = []
 
     def out(self, expression: syntax.Expression) -> syntax.Expression:
-        if not _calls(expression, self.known):
+        if isinstance(expression, syntax.Constant | syntax.Variable):
             return expression
         expression = within(expression, self.out)
-        if not isinstance(expression, syntax.Invocation) or expression.function not in self.known:
+        if not isinstance(expression, syntax.Invocation):
             return expression
-        result = f"%value{len(self.found) + 1}"
         name = expression.function
-        self.found.append(syntax.Call(self.place, name, expression.arguments, expression.keywords, name, result))
-        return syntax.Variable(result)
+        if name in self.known:
+            result = f"%value{len(self.found) + 1}"
+            self.found.append(syntax.Call(self.place, name, expression.arguments, expression.keywords, name, result))
+            return syntax.Variable(result)
+        if name[0] != "%":
+            self.found.append(syntax.Doing(self.place, expression, f"{name}(...)", within=True))
+        return expression
 
 
 def within(expression: syntax.Expression, each: Each) -> syntax.Expression:
@@ -496,10 +492,8 @@ def mapped(operation: syntax.Operation, each: Each) -> syntax.Operation:
         case syntax.Waiting(of=of):
             return replace(operation, of=None if of is None else each(of))
         case syntax.Doing(what=what):
-            return replace(operation, what=each(what))
-        case syntax.ConcurrentStart(what=what):
-            mapped_what = within(what, each)
-            assert isinstance(mapped_what, syntax.Invocation)
-            return replace(operation, what=mapped_what)
+            found = within(what, each)
+            assert isinstance(found, syntax.Invocation)
+            return replace(operation, what=found)
         case _:
             return operation

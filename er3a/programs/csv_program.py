@@ -1,11 +1,10 @@
 """CSV tables of a motion over time.
 
-Columns, in this order: ``t_s`` (from 0, rising); ``q1_deg``, ``q2_deg`` ..., the joints
-(``q3_mm`` of one that slides); ``x_mm, y_mm, z_mm`` and
-``roll_deg, pitch_deg, yaw_deg``, the tool in the base frame with R = Rz(yaw) Ry(pitch) Rx(roll). The arm goes where the
-joints are; a check compares the poses with them. Poses (or their angles) and ``t_s`` may be left out; a column
-``units_checked`` that says yes in each row confirms small angles that look like radians; other columns are named as not
-understood. Lines that begin with ``#`` are comments. Columns may be separated by semicolons or tabs,
+Columns, in this order: ``t_s`` (from 0, rising); ``q1_deg``, ``q2_deg`` ..., the joints (``q3_mm`` of one that slides);
+``x_mm, y_mm, z_mm`` and ``roll_deg, pitch_deg, yaw_deg``, the tool in the base frame with
+R = Rz(yaw) Ry(pitch) Rx(roll). The arm goes where the joints are; the poses are not read. Poses and ``t_s`` may be left
+out; a column ``units_checked`` that says yes in each row confirms small angles that look like radians; other columns
+are named as not understood. Lines that begin with ``#`` are comments. Columns may be separated by semicolons or tabs,
 and numbers then be written with decimal commas.
 """
 
@@ -20,7 +19,7 @@ from itertools import pairwise
 import numpy as np
 
 from er3a.errors import DoubtfulUnit, InputError
-from er3a.geometry.transforms import rpy_of, transform
+from er3a.geometry.transforms import rpy_of
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import may_be_radians
 from er3a.programs.code_builder import CodeBuilder
@@ -92,9 +91,7 @@ def read_csv_program(source: ProgramText) -> Program:
     if twice or missing:
         problem = f"the column {twice or missing} is {'there twice' if twice else 'missing'}"
         raise InputError(source.path, f"line {kept[0][0]}", problem, f"Give {', '.join(names)} once each")
-    stated = [name for part in (POSE_COLUMNS[:3], POSE_COLUMNS[3:]) if {*part} <= {*head} for name in part]
-    stated = stated if stated[:1] == ["x_mm"] else []
-    columns = [head.index(name) for name in (*names, *stated)]
+    columns = [head.index(name) for name in names]
     timed = head.index(TIME) if TIME in head else None
     table = [
         _numbers(source, number, row, columns + ([] if timed is None else [timed]), head)
@@ -110,12 +107,11 @@ def read_csv_program(source: ProgramText) -> Program:
         place = Place(source.path, kept[i + 1][0])
         speed = Rate(values[-1] - table[i - 1][-1], "s") if timed is not None and i else None
         given = np.array(values[: len(names)])
-        pose = _stated(values[len(names) : len(names) + len(stated)])
-        target = JointTarget(np.where(slides, given / 1000, np.radians(given)), stated=pose)
+        target = JointTarget(np.where(slides, given / 1000, np.radians(given)))
         builder.add(Fixed(place, ArmMotion("joint", target, "row", speed=speed)))
     if table and not _units_checked(head, rows[1:]):
         _doubt_radians(source, np.array([values[: len(names)] for values in table])[:, ~slides], kept[1:])
-    other = [name for name in head if name not in (*names, TIME, *stated, UNITS_CHECKED)]
+    other = [name for name in head if name not in (*names, TIME, *POSE_COLUMNS, UNITS_CHECKED)]
     unread = [NotUnderstood(f"the column {name[:40]}", Place(source.path, kept[0][0])) for name in other]
     findings: tuple[ProgramFinding, ...] = (
         *unread,
@@ -163,14 +159,6 @@ def _with_points(source: ProgramText, rows: list[list[str]]) -> list[list[str]]:
         problem = f"decimal commas and points in one table ('{comma[:40]}', '{point[:40]}')"
         raise InputError(source.path, None, problem, "Write all numbers with a point")
     return [[text.replace(",", ".") for text in row] for row in rows]
-
-
-def _stated(numbers: list[float]) -> Reals | None:
-    """T_base_tool (4, 4), m, of mm and perhaps degrees; None of no numbers."""
-    if not numbers:
-        return None
-    angles = np.radians(numbers[3:]) if len(numbers) > 3 else np.full(3, np.nan)
-    return transform(np.array(numbers[:3]) / 1000, angles)
 
 
 def _numbers(source: ProgramText, line: int, row: list[str], columns: list[int], head: list[str]) -> list[float]:

@@ -10,9 +10,8 @@ import math
 import operator
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cache
-from typing import TypeGuard
 
 import numpy as np
 
@@ -21,10 +20,12 @@ from er3a.numerics.arrays import Reals
 from er3a.programs import syntax
 from er3a.programs.instructions import (
     ArmMotion,
+    Aside,
     Instruction,
     JointTarget,
     NamedFrame,
     PoseTarget,
+    Unknown,
     UnresolvedTarget,
 )
 
@@ -46,7 +47,6 @@ class Cell(ByValue):
     joints : n, number of the arm's joints
     frames : poses (4, 4), m, of tools and bases, by their names in the program
     tool, base : (4, 4), for motions whose program sets none; None if no arm is given
-    up : (3,), unit vector upwards in the frame of the robot's base, by the robot file's mounting
     """
 
     flange: Flange | None = None
@@ -55,7 +55,6 @@ class Cell(ByValue):
     frames: Mapping[str, Reals] = field(default_factory=dict)
     tool: Reals | None = None
     base: Reals | None = None
-    up: tuple[float, float, float] = (0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,30 +65,30 @@ class Position:
     ----------
     joints : (n,), rad; None where unknown
     pose : T_base_tool (4, 4), in ``base`` for ``tool``; None where it is known only through ``joints``
+    passing : whether the program may go on before the arm is there, because of a zone
     """
 
     joints: Reals | None = None
     pose: Reals | None = None
     tool: NamedFrame = NO_FRAME
     base: NamedFrame = NO_FRAME
+    passing: bool = False
 
     def after(self, motion: ArmMotion) -> Position:
         """Where the arm is after a motion."""
-        target = motion.target
-        if motion.angle is not None:
-            return Position()  # which is not followed
-        if isinstance(target, JointTarget):
-            kept = np.isnan(target.joints)
-            if not kept.any():
-                return Position(target.joints, None, motion.tool, motion.base)
-            if kept.all():
-                return self
-            if self.joints is None:
-                return Position()
-            return Position(np.where(kept, self.joints, target.joints), None, motion.tool, motion.base)
+        target, ends = motion.target, (motion.tool, motion.base, motion.zone.kind != "fine")
+        if motion.angle is not None:  # which is not followed
+            return Position()
         if isinstance(target, PoseTarget):
-            return Position(target.joints, target.pose, motion.tool, motion.base)
-        return Position()
+            return Position(target.joints, target.pose, *ends)
+        if not isinstance(target, JointTarget):
+            return Position()
+        kept = np.isnan(target.joints)
+        if kept.all():
+            return self
+        if not kept.any():
+            return Position(target.joints, None, *ends)
+        return Position() if self.joints is None else Position(np.where(kept, self.joints, target.joints), None, *ends)
 
     def seen(self, tool: NamedFrame, base: NamedFrame, flange: Flange | None) -> Reals | None:
         """T_base_tool (4, 4) for this tool and base, or None if it can't be known."""
@@ -114,7 +113,7 @@ class Position:
         frames = (self.tool, self.base) if self.pose is not None else ()
         parts = (self.joints, self.pose, *(frame.pose for frame in frames))
         words = tuple(frame.name.encode() for frame in frames)
-        return (*(b"" if part is None else part.tobytes() for part in parts), *words)
+        return (*(b"" if part is None else part.tobytes() for part in parts), *words, b"." * self.passing)
 
 
 def same(a: NamedFrame, b: NamedFrame) -> bool:
@@ -130,10 +129,6 @@ WITH_FIELDS = {"$APO": ("CDIS", "CPTP", "CORI", "CVEL")} | dict.fromkeys(("$VEL"
 SIZES = "%sizes"
 """With what the name ends under which the last index in each dimension of a declared list of KRL is kept."""
 
-STRUCTURE = "%STRUC "
-"""With what the name begins under which the types of the fields of a KRL structure are kept."""
-
-LONGEST_TEXT = 10_000
 LARGEST_WHOLE = 2**62
 
 COMPARISONS: Mapping[str, Callable[[float, float], bool]] = {
@@ -150,24 +145,23 @@ ARITHMETIC: Mapping[str, Callable[[float, float], float]] = {
     "%": operator.mod,
     "MOD": operator.mod,
     "DIV": lambda a, b: float(int(a / b)),
+    "^": math.pow,
+    "**": math.pow,
 }
-IN_DEGREES: Mapping[str, Callable[[float], float]] = {
+IN_DEGREES: Mapping[str, Callable[..., float]] = {
     "SIN": lambda x: math.sin(math.radians(x)),
     "COS": lambda x: math.cos(math.radians(x)),
     "TAN": lambda x: math.tan(math.radians(x)),
+    "ASIN": lambda x: math.degrees(math.asin(x)),
     "ACOS": lambda x: math.degrees(math.acos(x)),
+    "ATAN": lambda x: math.degrees(math.atan(x)),
+    "ATAN2": lambda y, x: math.degrees(math.atan2(y, x)),
     "SQRT": math.sqrt,
     "ABS": abs,
 }
-SAME = {"AND": "AND", "and": "AND", "&": "AND", "&&": "AND"}
-SAME |= dict.fromkeys(("OR", "or", "||"), "OR")
+LOGIC = {"AND": False, "and": False, "&": False, "&&": False} | dict.fromkeys(("OR", "or", "||"), True)
+"""Operators of two truth values, with the value of one that decides."""
 EXCLUSIVE = {"EXOR", "XOR", "xor"}
-BITWISE: Mapping[str, Callable[[int, int], int]] = {
-    "B_AND": operator.and_,
-    "B_OR": operator.or_,
-    "B_EXOR": operator.xor,
-}
-"""Bitwise operators; defined for whole numbers only."""
 
 
 class Dialect(ABC):
@@ -180,6 +174,9 @@ class Dialect(ABC):
     local_by_default : whether a routine's assignment to a name that nothing else knows makes a local variable
     whole_division : whether whole numbers are divided to a whole number; None where this is not documented
     first_index : index of a list's first element
+    harmless : functions outside of programs that neither move the arm nor set what motions use
+    reading : of these, those that leave their arguments as they are
+    by_reference : whether a function outside of the program may set what it is given
     """
 
     modal: frozenset[str] = frozenset()
@@ -187,33 +184,25 @@ class Dialect(ABC):
     local_by_default: bool = False
     whole_division: bool | None = False
     first_index: int = 1
-
-    def __init__(self, program: syntax.Program) -> None:  # noqa: B027 - most languages need nothing of it
-        """Some languages read the program's declarations."""
+    harmless: frozenset[str] = frozenset()
+    reading: frozenset[str] = frozenset()
+    by_reference: bool = False
 
     def is_signal(self, name: str) -> bool:
         """Whether an assignment to this name sets an output."""
         return False
 
     def reads_back(self, name: str) -> bool:
-        """Whether reading an output gives the value that the program set last."""
+        """Whether reading a variable gives the value that the program set last."""
         return True
 
-    def runs_on(self, name: str) -> bool:
-        """Whether a variable changes by itself after it is set, as a timer does."""
-        return False
-
-    def is_followed(self, name: str, value: syntax.Value) -> bool:
-        """Whether the effect of setting a variable to a value on motions is followed."""
+    def is_followed(self, name: str) -> bool:
+        """Whether the effect of setting a variable on motions is followed."""
         return True
 
     def typed(self, kind: str, value: syntax.Value) -> syntax.Value:
         """What a variable of a declared kind, empty for none, holds after a value is assigned to it."""
         return value
-
-    def assigned(self, old: syntax.Value, new: syntax.Value) -> syntax.Value:
-        """The value of a variable after an assignment."""
-        return new
 
     def named(self, name: str) -> bool:
         """Whether the text that is assigned to this variable is kept, as the name of a tool or base."""
@@ -223,17 +212,13 @@ class Dialect(ABC):
         """The value of a predefined name, such as a frame or the arm's position; None if there is none."""
         return None
 
-    def frame_of(self, value: syntax.Value | None) -> Reals | None:
-        """The transform (4, 4), m, of a value that is a tool or a base; None for others."""
-        return None
-
     def listed(self, kind: str, values: tuple[syntax.Value, ...]) -> syntax.Value:
         """The value of ``[...]`` or ``p[...]``."""
         return values
 
-    def product(self, left: syntax.Value, right: syntax.Value) -> syntax.Value:
-        """``left : right``, of two positions."""
-        return syntax.Unclear("a product")
+    def combined(self, sign: str, left: syntax.Value, right: syntax.Value) -> syntax.Value | None:
+        """A sum, product or the like of values that are no numbers; None if the language has none."""
+        return None
 
     @abstractmethod
     def function(self, memory: ProgramMemory, name: str, given: syntax.Invocation) -> syntax.Value:
@@ -243,13 +228,9 @@ class Dialect(ABC):
     def motion(self, memory: ProgramMemory, move: syntax.Move) -> ArmMotion:
         """The motion from the arm's position."""
 
-    @abstractmethod
     def carry_out(self, memory: ProgramMemory, doing: syntax.Doing) -> Instruction | None:
         """Execute a call of a function that the program does not define; None if it only sets variables."""
-
-    @abstractmethod
-    def harmless(self, call: syntax.Invocation) -> bool:
-        """Whether an undefined function neither moves the arm nor sets what motions use."""
+        return Aside(doing.text) if doing.what.function in self.harmless else Unknown(doing.text)
 
 
 class ProgramMemory:
@@ -260,13 +241,12 @@ class ProgramMemory:
     shared, local : values by name
     types : declared types by name
     kept : what a language caches until the next assignment
-    volatile : variables that something else may change at any time, so that their values are not known
     here : where the arm is
     cell : what is known of the cell
     """
 
-    def __init__(self, functions: Dialect, cell: Cell, volatile: frozenset[str] = frozenset()):
-        self.functions, self.cell, self.volatile = functions, cell, volatile
+    def __init__(self, functions: Dialect, cell: Cell):
+        self.functions, self.cell = functions, cell
         self.here = Position(cell.start)
         self.shared: dict[str, syntax.Value] = {}
         self.local: dict[str, syntax.Value] = {}
@@ -275,7 +255,7 @@ class ProgramMemory:
 
     def copy(self) -> ProgramMemory:
         """An independent copy."""
-        other = ProgramMemory(self.functions, self.cell, self.volatile)
+        other = ProgramMemory(self.functions, self.cell)
         other.here, other.types = self.here, self.types
         other.shared, other.local = dict(self.shared), dict(self.local)
         return other
@@ -289,8 +269,6 @@ class ProgramMemory:
 
     def read(self, name: str) -> syntax.Value | None:
         """The value of a full name, or None."""
-        if self.volatile and root(name) in self.volatile:
-            return syntax.Unclear(name)
         if name in self.local:
             return self.local[name]
         if self.local and root(name) in self.local:  # a part that was never set, not that of a shared variable
@@ -323,41 +301,19 @@ class ProgramMemory:
 
     def assign(self, target: syntax.Expression, value: syntax.Value, local: bool = False) -> None:
         """Assign a value to a variable, field or element."""
-        if isinstance(target, syntax.Member) and self._set_field(target, value):
-            return
-        if isinstance(target, syntax.Element):
-            changed = self._with_element(target, value)
+        if isinstance(target, syntax.Member | syntax.Element):
+            of = self.value(target.of)
+            changed = self._changed(of, target, value)
             if changed is not None:
                 self.assign(target.of, changed)
                 return
         key = self.key(target)
-        if key is None or (key.endswith("[]") and not isinstance(target, syntax.Variable)):
-            self.forget(variable_of(target))  # an element, but which one is not known
+        if key is None or key.endswith("[]"):  # an element, but which one is not known, or all of them
+            self.forget(variable_of(target))
             return
         if isinstance(target, syntax.Variable) and isinstance(value, syntax.Unclear):
             self.forget(key)
         self.write(key, self.typed(key, value, local), local)
-
-    def elements(self, target: syntax.Expression, name: str) -> dict[str, syntax.Value]:
-        """Elements of a whole list ``A[]`` that are kept by their full names, as those of a list ``name``."""
-        start = _whole(self.key(target))
-        if not start:
-            return {}
-        kept = self.local if root(start) in self.local else {**self.shared, **self.cell.frames}
-        found = {
-            f"{name}[{each[len(start) :]}": known(self.read(each), each) for each in kept if each.startswith(start)
-        }
-        sizes = self._sizes(root(start))
-        return found | ({name + SIZES: sizes} if sizes else {})
-
-    def take_back(self, target: syntax.Expression, name: str, local: Mapping[str, syntax.Value]) -> None:
-        """Set a variable to what a routine's own ``name`` holds at its end; all elements of a whole list ``A[]``."""
-        start = _whole(self.key(target))
-        if not start:
-            self.assign(target, known(local.get(name), name))
-            return
-        for each in [each for each in local if each.startswith(f"{name}[")]:
-            self.write(f"{start}{each[len(name) + 1 :]}", local[each])
 
     def forget(self, variable: str) -> None:
         """Make a variable unclear, with all its fields and elements."""
@@ -368,24 +324,33 @@ class ProgramMemory:
         if not any(root(name) == variable for name in (*self.local, *self.shared)):
             self.shared[variable] = syntax.Unclear(variable)
 
-    def _set_field(self, target: syntax.Member, value: syntax.Value) -> bool:
-        """Assign a field of a stored record; False if the field is stored under its full name."""
-        of, name = self.value(target.of), self.key(target)
+    def _changed(
+        self, of: syntax.Value, target: syntax.Member | syntax.Element, value: syntax.Value
+    ) -> syntax.Value | None:
+        """A record or list with one part changed; None if that part is kept under its own full name."""
+        if isinstance(target, syntax.Member):
+            if isinstance(of, syntax.Record):
+                return of.having(target.name, value)
+            unset = isinstance(self.read(self.key(target.of) or ""), syntax.Unset)
+            if unset:
+                return syntax.Record("", ((target.name, value),))
+            nested = isinstance(target.of, syntax.Member) and isinstance(self.value(target.of.of), syntax.Record)
+            kept = self.read(self.key(target.of) or "") is not None
+            return syntax.Unclear(f"{self.shown(target.of)}, partly changed") if nested or kept else None
+        if not isinstance(of, (tuple, syntax.Record)):
+            return None
+        place, values = self._place(target), _parts(of) or ()
+        if place is None or place >= len(values):  # where a controller stops
+            return syntax.Unclear(f"{self.shown(target.of)}, an element of it changed")
         if isinstance(of, syntax.Record):
-            self.assign(target.of, of.having(target.name, value))
-            return True
-        if isinstance(target.of, syntax.Member) and isinstance(self.value(target.of.of), syntax.Record):
-            self.assign(target.of, syntax.Unclear(f"{target.of.name}, partly changed"))  # the record has no such part
-            return True
-        kept = None if name is None else self.read(self.key(target.of) or "")
-        if isinstance(of, tuple):  # a list has no fields
-            self.assign(target.of, syntax.Unclear(f"{self.shown(target.of)}, partly changed"))
-            return True
-        if kept is None:
-            return False
-        first = syntax.Record("", ((target.name, value),))
-        self.assign(target.of, first if isinstance(kept, syntax.Unset) else syntax.Unclear(f"{self.shown(target.of)}"))
-        return True
+            return of.having(of.items[place][0], value)
+        return (*values[:place], value, *values[place + 1 :])
+
+    def _place(self, target: syntax.Element) -> int | None:
+        """The place of an element in its list, from 0; None where the index is none or not known."""
+        at = syntax.number(self.value(target.indices[0])) if len(target.indices) == 1 else None
+        place = None if at is None else at - self.functions.first_index
+        return None if place is None or place % 1 or place < 0 else int(place)
 
     def key(self, target: syntax.Expression) -> str | None:
         """The full name of a variable, field or element; None for others, or if an index is unclear."""
@@ -410,29 +375,16 @@ class ProgramMemory:
         """
         while isinstance(target, (syntax.Member, syntax.Element)):
             if isinstance(target, syntax.Element) and isinstance(target.of, syntax.Variable):
-                name, sizes = target.of.name, self._sizes(target.of.name)
+                name = target.of.name
+                declared = self.read(name + SIZES)
+                sizes = declared if isinstance(declared, tuple) else ()
                 found = [syntax.number(self.value(each)) for each in target.indices]
                 pairs = zip(found, sizes) if len(found) == len(sizes) else ()
-                beyond = any(each is not None and not 1 <= each <= size for each, size in pairs)
+                beyond = any(each is not None and not 1 <= each <= (syntax.number(size) or 0) for each, size in pairs)
                 if beyond and (shown := self.shown(target)) not in self.cell.frames:
-                    return f"{shown} of {name}[{','.join(map(str, sizes))}]"
+                    return f"{shown} of {name}[{','.join(map(syntax.shown, sizes))}]"
             target = target.of
         return ""
-
-    def _sizes(self, name: str) -> tuple[int, ...]:
-        """The last index in each dimension of a declared list of KRL; none where that is not known."""
-        found = (self.local if name in self.local else self.shared).get(name + SIZES)
-        found = self.functions.constant(self, name + SIZES) if found is None else found
-        return tuple(each for each in found if isinstance(each, int)) if isinstance(found, tuple) else ()
-
-    def settled(self, target: syntax.Expression) -> syntax.Expression:
-        """A variable, field or element with its indices as they are now."""
-        if isinstance(target, syntax.Member):
-            return replace(target, of=self.settled(target.of))
-        if isinstance(target, syntax.Element):
-            indices = tuple(syntax.Constant(self.value(each)) for each in target.indices)
-            return replace(target, of=self.settled(target.of), indices=indices)
-        return target
 
     def value(self, expression: syntax.Expression) -> syntax.Value:
         """The value of an expression."""
@@ -460,15 +412,9 @@ class ProgramMemory:
         of = self.value(expression.of)
         if isinstance(of, syntax.Record) and isinstance(expression, syntax.Member):
             found = of.get(expression.name)
-        elif (
-            isinstance(of, (syntax.Record, tuple))
-            and isinstance(expression, syntax.Element)
-            and len(expression.indices) == 1
-        ):
-            values = of.values() if isinstance(of, syntax.Record) else of
-            at = syntax.number(self.value(expression.indices[0]))
-            place = None if at is None else at - self.functions.first_index
-            found = values[int(place)] if place is not None and not place % 1 and 0 <= place < len(values) else None
+        elif isinstance(expression, syntax.Element) and (values := _parts(of)) is not None:
+            place = self._place(expression)
+            found = values[place] if place is not None and place < len(values) else None
         else:
             key = self.key(expression)
             found = None if key is None else self.read(key)
@@ -489,100 +435,60 @@ class ProgramMemory:
                 return f"{self.shown(of)}[{','.join(shown)}]"
         return "?"
 
-    def _with_element(self, target: syntax.Element, value: syntax.Value) -> syntax.Value | None:
-        """The list or record that an element belongs to, with that element changed; None if it belongs to none."""
-        of = self.value(target.of)
-        if isinstance(of, syntax.Solved):  # which only the arm's table gives
-            return syntax.Unclear("a changed solution of get_inverse_kin")
-        at = syntax.number(self.value(target.indices[0])) if len(target.indices) == 1 else None
-        if not isinstance(of, (tuple, syntax.Record)):
-            return None
-        if at is None or at % 1:
-            return syntax.Unclear("a list with a changed element")
-        place = int(at) - self.functions.first_index
-        values = of.values() if isinstance(of, syntax.Record) else of
-        if not 0 <= place < len(values):  # where a controller stops
-            return syntax.Unclear(f"a list of {len(values)} whose element {at:g} was set")
-        if isinstance(of, syntax.Record):
-            return of.having(of.items[place][0], value)
-        return (*of[:place], value, *of[place + 1 :])
-
     def typed(self, key: str, value: syntax.Value, local: bool = False) -> syntax.Value:
         """A value as the type of the variable is that it is assigned to."""
         name = root(key)
         own = local or name in self.local
-        return self._of_kind(str(self.local.get(f"{name}%type", "")) if own else self.types.get(name, ""), value)
-
-    def _of_kind(self, kind: str, value: syntax.Value) -> syntax.Value:
-        """A value as a type has it, with its fields as theirs."""
+        kind = str(self.local.get(f"{name}%type", "")) if own else self.types.get(name, "")
         value = self.functions.typed(kind, value)
-        shape = self.shared.get(f"{STRUCTURE}{kind}")
-        if isinstance(value, syntax.Record) and isinstance(shape, syntax.Record):
-            items = ((key, self._of_kind(str(shape.get(key) or ""), each)) for key, each in value.items)
-            return syntax.Record(value.kind, tuple(items))
-        if not isinstance(value, bool) and isinstance(value, (int, float)):
-            if kind in ("REAL", "LREAL"):
-                return float(value)
-            if kind in ("INT", "DINT", "SINT", "LINT") and isinstance(value, float):
-                if (value % 1 and self.functions.whole_division is None) or abs(value) > LARGEST_WHOLE:
-                    return syntax.Unclear(f"{value:g}, whose conversion to a whole number is not documented")
-                return int(math.copysign(math.floor(abs(value) + 0.5), value))  # KRL: from x.5 on it is x + 1
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            return value
+        if kind in ("REAL", "LREAL"):
+            return float(value)
+        if kind in ("INT", "DINT", "SINT", "LINT") and isinstance(value, float):
+            if (value % 1 and self.functions.whole_division is None) or not abs(value) < LARGEST_WHOLE:
+                return syntax.Unclear(f"{value:g}, whose conversion to a whole number is not documented")
+            return int(math.copysign(math.floor(abs(value) + 0.5), value))  # KRL: from x.5 on it is x + 1
         return value
 
     def _binary(self, expression: syntax.Binary) -> syntax.Value:
         sign, left = expression.operator, self.value(expression.left)
-        logic = SAME.get(sign)
-        if (logic == "AND" and left is False) or (logic == "OR" and left is True):
+        decides = LOGIC.get(sign)
+        if decides is not None and left is decides:
             return left
         right = self.value(expression.right)
-        if logic is not None and isinstance(right, bool):
-            if right is (logic == "OR"):
-                return right
-            if isinstance(left, bool):
-                return left
-        if sign == ":":
-            return self.functions.product(left, right)
+        if decides is not None and isinstance(right, bool) and (right is decides or isinstance(left, bool)):
+            return right if right is decides else left
         if sign in EQUAL or sign in UNEQUAL:
             same = _equal(left, right)
             return same if isinstance(same, syntax.Unclear) else same == (sign in EQUAL)
         for side in (left, right):
             if isinstance(side, syntax.Unclear):
                 return side
-        if sign in BITWISE and _is_whole(left) and _is_whole(right):
-            return BITWISE[sign](left, right)
         if sign in EXCLUSIVE and isinstance(left, bool) and isinstance(right, bool):
             return left != right
-        if sign == "+" and isinstance(left, str) and isinstance(right, str) and len(left + right) < LONGEST_TEXT:
-            return left + right
-        return self._computed(sign, left, right)
-
-    def _computed(self, sign: str, left: syntax.Value, right: syntax.Value) -> syntax.Value:
-        """A comparison, sum, product or the like of two numbers."""
         a, b = syntax.number(left), syntax.number(right)
         if a is None or b is None:
-            return syntax.Unclear(f"... {sign} ...")
+            found = self.functions.combined(sign, left, right)
+            return syntax.Unclear(f"... {sign} ...") if found is None else found
         if sign in COMPARISONS:
             return COMPARISONS[sign](a, b)
-        whole = isinstance(left, int) and isinstance(right, int)
         try:
-            found = self._combined(sign, a, b, whole)
-        except (ZeroDivisionError, OverflowError, ValueError):
-            return syntax.Unclear("a division by zero or an overflow")
-        return int(found) if whole and isinstance(found, float) and not found % 1 and sign != "/" else found
+            return self._computed(sign, a, b, isinstance(left, int) and isinstance(right, int))
+        except (ZeroDivisionError, OverflowError, ValueError, KeyError):
+            return syntax.Unclear("a division by zero, an overflow, or a root of a negative number")
 
-    def _combined(self, sign: str, a: float, b: float, whole: bool) -> syntax.Value:
+    def _computed(self, sign: str, a: float, b: float, whole: bool) -> syntax.Value:
         if sign == "/":
             if not whole or self.functions.whole_division is False:
                 return a / b
             if self.functions.whole_division is None and a % b:
                 return syntax.Unclear(f"{a:.0f}/{b:.0f}: whether such a quotient is a whole number is not documented")
             return int(a / b)
-        if sign in ("^", "**"):
-            power = a**b
-            return syntax.Unclear("a root of a negative number") if isinstance(power, complex) else power
         if sign in ("%", "MOD", "DIV") and ((min(a, b) < 0 and a % b) or (sign != "%" and (a % 1 or b % 1))):
             return syntax.Unclear(f"{a:g} {sign} {b:g}, whose value is not documented")
-        return ARITHMETIC[sign](a, b) if sign in ARITHMETIC else syntax.Unclear(f"... {sign} ...")
+        found = ARITHMETIC[sign](a, b)
+        return int(found) if whole and not found % 1 else found
 
 
 NOT_NUMBERS = ("NAN", "INF", "INFINITY")
@@ -621,8 +527,6 @@ def _equal(left: syntax.Value, right: syntax.Value) -> bool | syntax.Unclear:
     for side in (left, right):
         if isinstance(side, syntax.Unclear):
             return side
-        if isinstance(side, syntax.Solved):  # which only the arm's table gives
-            return syntax.Unclear(syntax.shown(side))
     one, other = _parts(left), _parts(right)
     if one is None or other is None or len(one) != len(other):
         alike = _sort(left) is _sort(right)  # others languages refuse, or convert
@@ -643,20 +547,9 @@ def _parts(value: syntax.Value) -> tuple[syntax.Value, ...] | None:
     return value if isinstance(value, tuple) else None
 
 
-def _whole(name: str | None) -> str:
-    """``A[`` of a whole list ``A[]``; empty for other names."""
-    return name[:-1] if name is not None and name.endswith("[]") else ""
-
-
-def _is_whole(value: syntax.Value) -> TypeGuard[int]:
-    return isinstance(value, int) and not isinstance(value, bool)
-
-
 def _unary(sign: str, value: syntax.Value) -> syntax.Value:
     if isinstance(value, syntax.Unclear):
         return value
-    if sign == "B_NOT":
-        return ~value if _is_whole(value) else syntax.Unclear(f"{sign} ...")
     if sign in ("NOT", "not", "!"):
         return not value if isinstance(value, bool) else syntax.Unclear(f"{sign} ...")
     if isinstance(value, bool) or not isinstance(value, (int, float)):
@@ -664,7 +557,7 @@ def _unary(sign: str, value: syntax.Value) -> syntax.Value:
     return -value if sign == "-" else value
 
 
-def variable_of(target: syntax.Expression) -> str:
+def variable_of(target: syntax.Expression | None) -> str:
     """The variable that an assignment changes."""
     while isinstance(target, (syntax.Member, syntax.Element)):
         target = target.of

@@ -11,7 +11,7 @@ from er3a.numerics.arrays import Reals
 from er3a.programs.instructions import ArmMotion, Decision, Instruction, Listing, Place, alike
 from er3a.programs.syntax import Program, Value
 
-EndKind = Literal["end", "joins", "rounds", "operations", "ways", "depth"]
+EndKind = Literal["end", "joins", "operations", "ways", "depth"]
 
 
 class Moved(Protocol):
@@ -33,7 +33,7 @@ class RunLimits:
     ----------
     operations : in all
     ways : at a time, by the sides of branches on what only the cell knows
-    rounds : of a loop without end whose state does not repeat
+    rounds : of a loop without end, before what it changes is unknown
     depth : of calls within calls
     assumed : patterns of names of routines (``rq_*``) that neither move the arm nor set what motions use
     assumed_values : of variables that the program does not give
@@ -75,8 +75,8 @@ class Ending:
     Attributes
     ----------
     kind : it is over; it ``joins`` what was followed before, being in a state that was met; or it was not followed on:
-        after so many rounds of a loop without end (``rounds``) or operations, on a side of a branch of too many
-        (``ways``), in too many calls within each other (``depth``)
+        after so many ``operations``, on a side of a branch of too many (``ways``), in too many calls within each other
+        (``depth``)
     step : number of its last step; -1 if it has none
     repeats_from : number of the step that follows the last, where it joins; None if no step does
     entry : the routine with which it begins
@@ -89,16 +89,6 @@ class Ending:
     entry: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class FrameTwice:
-    """A frame that the program itself gives otherwise than the cell: by how far its origin and its axes differ."""
-
-    name: str
-    place: Place
-    moved_mm: float
-    turned_deg: float
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Execution(ByValue):
     """A program that was run.
@@ -107,9 +97,8 @@ class Execution(ByValue):
     ----------
     steps : of all ways; each names the one before it
     endings : one for each way
-    open : places that may be come to on ways, or in states, that were not followed
+    open : places that may be come to on ways that were not followed
     entered : names of the routines that a way came to
-    frames_twice : frames that the program and the cell give differently; the program's were taken
     """
 
     program: Program
@@ -117,7 +106,6 @@ class Execution(ByValue):
     endings: tuple[Ending, ...]
     open: frozenset[Place] = frozenset()
     entered: frozenset[str] = frozenset()
-    frames_twice: tuple[FrameTwice, ...] = ()
 
     @property
     def complete(self) -> bool:

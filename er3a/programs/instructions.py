@@ -12,12 +12,11 @@ name       R                                                      numbers
 =========  =====================================================  ====================
 kuka       Rz(A) Ry(B) Rx(C)                                      X Y Z A B C
 efort      Rz(a) Ry(b) Rx(c)                                      x y z a b c
-staubli    Rx(rx) Ry(ry) Rz(rz)                                   x y z rx ry rz
 ur         rotation vector (rx, ry, rz)                           x y z rx ry rz
 abb        quaternion                                             x y z q1 q2 q3 q4
 =========  =====================================================  ====================
 
-Angles are in (-180, 180]. Where the middle angle is +-90 deg the last one (the first of ``staubli``) is 0.
+Angles are in (-180, 180]. Where the middle angle is +-90 deg the last one is 0.
 """
 
 from __future__ import annotations
@@ -32,13 +31,13 @@ import numpy as np
 import scipy
 
 from er3a.by_value import ByValue
-from er3a.geometry.transforms import exp_rotation, log_rotation, rotation_angle, rpy_of, transform
+from er3a.geometry.transforms import exp_rotation, log_rotation, rpy_of, transform
 from er3a.numerics.arrays import Reals
 from er3a.robots.masses import MassBody
 
 RateUnit = Literal["m/s", "m/s2", "rad/s", "rad/s2", "share", "s"]
 ZoneKind = Literal["fine", "distance", "angle", "share", "velocity", "named"]
-MotionKind = Literal["joint", "line", "arc", "spline"]
+MotionKind = Literal["joint", "line", "arc"]
 Unresolved = Literal[
     "undefined",
     "not_finite",
@@ -47,7 +46,6 @@ Unresolved = Literal[
     "external_tool",
     "not_understood",
     "too_many_joints",
-    "turns_with_arc",
 ]
 
 
@@ -119,14 +117,6 @@ RAMP_OF_A_DURATION = 1 / 3
 """Share of the time that a program gives for a motion, on the way up and on the way down."""
 
 
-@dataclass(frozen=True, slots=True)
-class Turning:
-    """The greatest speed (rad/s) and acceleration (rad/s2) of a part of the tool's turn, as a program gives them."""
-
-    speed: Rate
-    acceleration: Rate | None = None
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class NamedFrame(ByValue):
     """A tool (T_flange_tool) or base (T_robot_base) that targets refer to.
@@ -153,12 +143,10 @@ class JointTarget(ByValue):
     ----------
     external : names and values (rad or m as the controller has them, not converted) of axes beside the arm's; NaN where
         not known
-    stated : T_base_tool (4, 4), m, that a table gives beside the joints, NaN where it gives none of it
     """
 
     joints: Reals
     external: tuple[tuple[str, float], ...] = ()
-    stated: Reals | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -221,16 +209,15 @@ class ArmMotion(ByValue):
 
     Attributes
     ----------
-    kind : how the arm gets to the target: joints together, straight line, arc through ``via``, spline
+    kind : how the arm gets to the target: joints together, straight line, arc through ``via``
     form : the language's own word: ``PTP``, ``SLIN``, ``movep``, ``MJOINT``
     via : point on the arc
     angle : rad, by which the arc goes on (KRL's CA); None if it ends at the target
-    spline_block : number of the spline block that it belongs to
     speed, acceleration : None where the program keeps the controller's values
     turn_speed : rad/s, at most, of the tool's turn on a line or arc; None if the program gives none: then turns count
         as lengths do
-    turning : the same in KRL, of the turn of the tool's x axis and of that about it; None where the program gives none
-    with_path : whether an arc turns the tool with the path (:func:`turn_beside_path`), not about one axis of the base
+    with_path : whether an arc turns the tool with the path, not about one axis of the base: then one that turns it is
+        not followed
     load : what hangs on the flange, in its frame; None where the program says nothing
     not_followed : what of it is not followed, as the program has it: a setting that asks for another turn of the tool,
         coordinates that a position leaves out; empty for nothing
@@ -246,9 +233,7 @@ class ArmMotion(ByValue):
     zone: Zone = FINE
     tool: NamedFrame = field(default_factory=NamedFrame)
     base: NamedFrame = field(default_factory=NamedFrame)
-    spline_block: int | None = None
     turn_speed: float | None = None
-    turning: tuple[Turning | None, Turning | None] = (None, None)
     load: Load | None = None
     not_followed: str = ""
     with_path: bool = False
@@ -356,7 +341,7 @@ ON_A_LINE = 1e-9
 MAX_LINES = 10_000
 
 
-def arc_poses(start: Reals, via: Reals, end: Reals, shares: Reals, with_path: bool = False) -> Reals | None:
+def arc_poses(start: Reals, via: Reals, end: Reals, shares: Reals) -> Reals | None:
     """Poses (n, 4, 4) on the arc from a pose through a point to another, at shares (n,) of its angle.
 
     The tool turns evenly from the one orientation to the other, the shorter way.
@@ -364,7 +349,6 @@ def arc_poses(start: Reals, via: Reals, end: Reals, shares: Reals, with_path: bo
     Parameters
     ----------
     start, via, end : (4, 4), m
-    with_path : whether the tool turns with the path instead (:func:`turn_beside_path`)
 
     Returns
     -------
@@ -378,56 +362,9 @@ def arc_poses(start: Reals, via: Reals, end: Reals, shares: Reals, with_path: bo
     turn = (angle * shares)[:, None]
     poses = np.tile(np.eye(4), (len(shares), 1, 1))
     poses[:, :3, 3] = centre + np.cos(turn) * spoke + np.sin(turn) * np.cross(normal, spoke)
-    if with_path:
-        beside, _ = turn_beside_path(start, via, end, circle)
-        poses[:, :3, :3] = exp_rotation(turn * normal) @ exp_rotation(shares[:, None] * beside) @ start[:3, :3]
-        return poses
     rotation = log_rotation(end[:3, :3] @ start[:3, :3].T)
     poses[:, :3, :3] = exp_rotation(shares[:, None] * rotation) @ start[:3, :3]
     return poses
-
-
-SHORT_TURN = math.pi / 2
-"""A turn beside the path up to which the shorter sense is taken; in doubt if the point on the arc says otherwise."""
-NO_TURN = math.radians(1)
-
-
-def turn_beside_path(start: Reals, via: Reals, end: Reals, circle: tuple[Reals, Reals, float]) -> tuple[Reals, bool]:
-    """How the tool turns beside the path on an arc that turns it with the path, and whether the sense is in doubt.
-
-    The circle's own turn carries the tool along; beside that it turns evenly about one axis, which is carried along
-    too. Of the two senses of that turn the one is taken that passes nearer to the orientation of the arc's point.
-
-    Parameters
-    ----------
-    start, via, end : (4, 4), m, of which ``via`` is the arc's point
-    circle : as of :func:`centre_and_angle`
-
-    Returns
-    -------
-    turn : (3,), rad, rotation vector as it is at the start
-    in_doubt : whether that orientation is about as far from both
-    """
-    centre, normal, angle = circle
-    spoke, to_via = start[:3, 3] - centre, via[:3, 3] - centre
-    share = np.arctan2(normal @ np.cross(spoke, to_via), spoke @ to_via) % (2 * np.pi) / angle
-    turn = log_rotation(exp_rotation(-angle * normal) @ end[:3, :3] @ start[:3, :3].T)
-    size = float(np.linalg.norm(turn))
-    if size <= NO_TURN:
-        return turn, False
-    senses = turn, turn * (1 - 2 * np.pi / size)
-    there = (exp_rotation(share * angle * normal) @ exp_rotation(share * each) @ start[:3, :3] for each in senses)
-    off = [float(rotation_angle(via[:3, :3], each)) for each in there]
-    if size <= SHORT_TURN:
-        return turn, off[1] < off[0]
-    return senses[int(off[1] < off[0])], min(off) > max(off) / 2
-
-
-def turns_apart(start: Reals, via: Reals, end: Reals) -> float:
-    """By how much (rad) an arc that turns the tool with the path is from one that turns it about one axis."""
-    shares = np.array([0.25, 0.5, 0.75])
-    one, other = (arc_poses(start, via, end, shares, with_path) for with_path in (False, True))
-    return 0.0 if one is None or other is None else float(rotation_angle(one[:, :3, :3], other[:, :3, :3]).max())
 
 
 def centre_and_angle(start: Reals, via: Reals, end: Reals) -> tuple[Reals, Reals, float] | None:
@@ -445,7 +382,7 @@ def centre_and_angle(start: Reals, via: Reals, end: Reals) -> tuple[Reals, Reals
     return centre, normal, angle
 
 
-def chords(start: Reals, via: Reals, end: Reals, deviation: float, with_path: bool = False) -> Reals | None:
+def chords(start: Reals, via: Reals, end: Reals, deviation: float) -> Reals | None:
     """Poses (n, 4, 4) after the start, lines between which stay within ``deviation`` (m) of the arc."""
     circle = centre_and_angle(start[:3, 3], via[:3, 3], end[:3, 3])
     if circle is None:
@@ -454,7 +391,7 @@ def chords(start: Reals, via: Reals, end: Reals, deviation: float, with_path: bo
     radius = float(np.linalg.norm(start[:3, 3] - centre))
     widest = 2 * math.acos(max(1 - deviation / radius, 0.0)) if radius > 0 else angle
     count = min(max(math.ceil(angle / max(widest, 1e-6)), 1), MAX_LINES)
-    found = arc_poses(start, via, end, np.arange(1, count + 1) / count, with_path)
+    found = arc_poses(start, via, end, np.arange(1, count + 1) / count)
     if found is not None:
         found[-1] = end
     return found
@@ -468,7 +405,7 @@ def arc_length(start: Reals, via: Reals, end: Reals) -> float | None:
     return float(np.linalg.norm(start[:3, 3] - circle[0])) * circle[2]
 
 
-Convention = Literal["kuka", "efort", "staubli", "ur", "abb"]
+Convention = Literal["kuka", "efort", "ur", "abb"]
 MM = 1000.0
 
 
@@ -480,92 +417,25 @@ def pose_of(numbers: Sequence[float], convention: Convention) -> Reals:
     ValueError
         for a quaternion of no length
     """
-    if convention in ("kuka", "efort"):
-        return _turned_zyx(*numbers)
-    if convention == "ur":
-        return _turned_by_vector(*numbers)
     given = np.asarray(numbers, float)
+    if convention in ("kuka", "efort"):
+        return transform(given[:3] / MM, np.radians(given[:2:-1]))
     T = np.eye(4)
-    T[:3, 3] = given[:3] / MM
-    if convention == "abb":
-        T[:3, :3] = scipy.spatial.transform.Rotation.from_quat(given[[4, 5, 6, 3]]).as_matrix()
+    if convention == "ur":
+        T[:3, 3], T[:3, :3] = given[:3], exp_rotation(given[3:])
     else:
-        reversed_turn = transform(np.zeros(3), -np.radians(given[3:6]))  # Rz(-rz) Ry(-ry) Rx(-rx)
-        T[:3, :3] = reversed_turn[:3, :3].T
+        T[:3, 3] = given[:3] / MM
+        T[:3, :3] = scipy.spatial.transform.Rotation.from_quat(given[[4, 5, 6, 3]]).as_matrix()
     return T
 
 
 def numbers_of(T: Reals, convention: Convention) -> tuple[float, ...]:
     """Six (ABB: seven) numbers of a transform (4, 4) in m."""
     xyz = T[:3, 3] if convention == "ur" else T[:3, 3] * MM
-    turned: Sequence[float] | Reals
     if convention in ("kuka", "efort"):
         turned = np.degrees(rpy_of(T))[::-1]
     elif convention == "ur":
-        turned = _rotation_vector(T[:3, :3].tolist())
-    elif convention == "abb":
+        turned = log_rotation(T[:3, :3])
+    else:
         turned = scipy.spatial.transform.Rotation.from_matrix(T[:3, :3]).as_quat(canonical=True)[[3, 0, 1, 2]]
-    else:
-        back = np.eye(4)
-        back[:3, :3] = T[:3, :3].T
-        turned = -np.degrees(rpy_of(back))
     return tuple(float(each) + 0.0 for each in (*xyz, *turned))
-
-
-def _turned_zyx(x: float, y: float, z: float, a: float, b: float, c: float) -> Reals:
-    """As :func:`er3a.geometry.transforms.transform` for mm and degrees, many times faster for a single pose."""
-    (ca, sa), (cb, sb), (cc, sc) = _cos_sin(a), _cos_sin(b), _cos_sin(c)
-    return np.array(
-        [
-            [ca * cb, ca * sb * sc - sa * cc, ca * sb * cc + sa * sc, x / MM],
-            [sa * cb, sa * sb * sc + ca * cc, sa * sb * cc - ca * sc, y / MM],
-            [-sb, cb * sc, cb * cc, z / MM],
-            [0.0, 0.0, 0.0, 1.0],
-        ]
-    )
-
-
-def _turned_by_vector(x: float, y: float, z: float, rx: float, ry: float, rz: float) -> Reals:
-    """Rodrigues' formula for a single pose."""
-    angle = math.sqrt(rx * rx + ry * ry + rz * rz)
-    if angle > 1e-4:
-        s, v = math.sin(angle) / angle, (1 - math.cos(angle)) / (angle * angle)
-    else:
-        s, v = 1 - angle * angle / 6, 0.5 - angle * angle / 24
-    return np.array(
-        [
-            [1 - v * (ry * ry + rz * rz), v * rx * ry - s * rz, v * rx * rz + s * ry, x],
-            [v * rx * ry + s * rz, 1 - v * (rx * rx + rz * rz), v * ry * rz - s * rx, y],
-            [v * rx * rz - s * ry, v * ry * rz + s * rx, 1 - v * (rx * rx + ry * ry), z],
-            [0.0, 0.0, 0.0, 1.0],
-        ]
-    )
-
-
-def _cos_sin(degrees: float) -> tuple[float, float]:
-    """Cosine and sine, exactly 0 at right angles."""
-    angle = math.radians(degrees)
-    c, s = math.cos(angle), math.sin(angle)
-    return (0.0 if abs(c) < 1e-15 else c), (0.0 if abs(s) < 1e-15 else s)
-
-
-def _rotation_vector(R: list[list[float]]) -> tuple[float, float, float]:
-    """Rotation vector (rad) of a rotation matrix, by the quaternion whose largest part is found first."""
-    (a, b, c), (d, e, f), (g, h, i) = R
-    squares = (1 + a + e + i, 1 + a - e - i, 1 - a + e - i, 1 - a - e + i)
-    greatest = squares.index(max(squares))
-    if greatest == 0:
-        w, x, y, z = squares[0], h - f, c - g, d - b
-    elif greatest == 1:
-        w, x, y, z = h - f, squares[1], b + d, c + g
-    elif greatest == 2:
-        w, x, y, z = c - g, b + d, squares[2], f + h
-    else:
-        w, x, y, z = d - b, c + g, f + h, squares[3]
-    if w < 0:
-        w, x, y, z = -w, -x, -y, -z
-    size = math.sqrt(x * x + y * y + z * z)
-    if size == 0:
-        return 0.0, 0.0, 0.0
-    angle = 2 * math.atan2(size, w)
-    return angle * x / size, angle * y / size, angle * z / size

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from er3a.errors import InputError
-from er3a.programs.syntax import Binary, Constant, Element, Expression, Invocation, Member, Unary, Variable
+from er3a.programs.syntax import Binary, Constant, Element, Expression, Invocation, Member, Opaque, Unary, Variable
 
 DEEPEST = 40
 LONGEST = 200
@@ -24,6 +24,14 @@ NUMBER = r"(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
 
 class MisreadError(Exception):
     """A statement that does not follow the grammar; it never leaves this package."""
+
+
+class MoreError(MisreadError):
+    """Another statement follows on the line."""
+
+    def __init__(self, at: int):
+        super().__init__("another statement follows")
+        self.at = at
 
 
 @dataclass(frozen=True)
@@ -81,7 +89,7 @@ class Words:
 
     def accept(self, word: str) -> bool:
         """Pass the next word if it is this one."""
-        if self.texts[self.at] == word and self.kinds[self.at] != "text":
+        if word and self.texts[self.at] == word and self.kinds[self.at] != "text":
             self.at += 1
             return True
         return False
@@ -101,6 +109,20 @@ class Words:
         """Nothing may follow."""
         if self.kind != "end":
             raise MisreadError(f"'{self.next}' not expected")
+
+    def condition(self, end: str = "") -> Expression:
+        """A condition up to a word, which may be missing, and the end; one that is not understood is kept."""
+        start = self.at
+        try:
+            found = self.expression()
+            self.accept(end)
+            self.finish()
+        except MoreError:
+            raise
+        except MisreadError:
+            texts = self.texts[start:-1]
+            return Opaque(" ".join(texts[:-1] if texts and texts[-1] == end else texts))
+        return found
 
     def expression(self, rank: int = 1) -> Expression:
         """An expression whose operators have this rank or a higher one."""

@@ -7,19 +7,6 @@ from er3a.planning.names import PathVerdict
 from er3a.programs.instructions import Place
 
 
-class DataFileMissing(Finding, code="program_data_file_missing"):
-    """The file with the program's points (.dat, .var) is not beside it."""
-
-    file: str
-
-
-class NameTwice(Finding, code="program_name_twice"):
-    """A name is given twice; the later one counts."""
-
-    name: str
-    place: Place
-
-
 class NotUnderstood(Finding, code="program_not_understood"):
     """A piece of text that is kept, but not understood."""
 
@@ -31,7 +18,7 @@ class NothingMoves(Finding, code="program_nothing_moves"):
     """No instruction of the program moves the arm."""
 
 
-ProgramFinding = DataFileMissing | NameTwice | NotUnderstood | NothingMoves
+ProgramFinding = NotUnderstood | NothingMoves
 
 
 class ArcsSplit(Finding, code="written_arcs_split"):
@@ -42,22 +29,10 @@ class ArcsSplit(Finding, code="written_arcs_split"):
     deviation_m: float
 
 
-class ArcsTurnOtherwise(Finding, code="written_arcs_turn_otherwise"):
-    """Arcs on which the tool turns with the path were written in a language whose arcs turn it about one axis."""
-
-    arcs: int
-
-
 class ZonesDropped(Finding, code="written_zones_dropped"):
     """Zones that the language has no equal for were written as stops."""
 
     zones: int
-
-
-class SplinesAsLines(Finding, code="written_splines_as_lines"):
-    """Points of splines were written as straight lines."""
-
-    points: int
 
 
 class SpeedsEstimated(Finding, code="written_speeds_estimated"):
@@ -151,9 +126,7 @@ class WrittenBesidePoints(Finding):
 
 WriteFinding = (
     ArcsSplit
-    | ArcsTurnOtherwise
     | ZonesDropped
-    | SplinesAsLines
     | SpeedsEstimated
     | SpeedsCut
     | SpeedsRaised

@@ -38,7 +38,7 @@ class Language:
     suffixes: tuple[str, ...]
     sign: re.Pattern[str] | None
     reader: Callable[[ProgramText], Program]
-    dialect: Callable[[Program], Dialect]
+    dialect: Callable[[], Dialect]
     writer: Callable[[Listing, WriteOptions], Writer] | None
     joints: range | None
     opening: str = ""

@@ -66,24 +66,7 @@ class Record:
         return tuple(value for _, value in self.items)
 
 
-@dataclass(frozen=True, slots=True)
-class Solved:
-    """URScript's ``get_inverse_kin``: the joints of a pose, which only the arm's table gives.
-
-    Attributes
-    ----------
-    near : joints that the solution is nearest to; empty for where the arm stood, ``here``
-    tool : whose pose it is; None for the robot's own
-    here : equal for equal positions of the arm
-    """
-
-    pose: Record
-    near: Value
-    tool: Value | None = None
-    here: tuple[bytes, ...] = ()
-
-
-Value = float | int | bool | str | Unclear | Record | Solved | tuple["Value", ...]
+Value = float | int | bool | str | Unclear | Record | tuple["Value", ...]
 
 
 def number(value: Value | None) -> float | None:
@@ -111,8 +94,6 @@ def shown(value: Value) -> str:
             return text
         case Record(kind=kind, items=items):
             return f"{kind}{{{', '.join(f'{key} {shown(each)}' for key, each in items)}}}"
-        case Solved(pose=pose):
-            return f"get_inverse_kin({shown(pose)})"
         case bool():
             return "TRUE" if value else "FALSE"
         case tuple():
@@ -235,22 +216,29 @@ class Assign:
 
 
 @dataclass(frozen=True, slots=True)
+class Enter:
+    """A loop begins with the next operation."""
+
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
 class GoTo:
-    """Go on at ``to``; ``endless`` if this is the end of a loop without a condition."""
+    """Go on at ``to``."""
 
     place: Place
     to: int
-    endless: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Branch:
-    """Go on if the condition holds, else at ``otherwise``."""
+    """Go on if the condition holds, else at ``otherwise``; ``counted``: at the head of a loop that counts."""
 
     place: Place
     condition: Expression
     otherwise: int
     text: str
+    counted: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -266,27 +254,12 @@ class Call:
 
 
 @dataclass(frozen=True, slots=True)
-class ConcurrentStart:
-    """From here on a routine runs concurrently: at once (a thread), or whenever its condition holds (an interrupt)."""
-
-    place: Place
-    what: Invocation
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
 class Return:
-    """Leave the routine."""
+    """Leave the routine, or the program, if that ``ends``."""
 
     place: Place
     value: Expression | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Halt:
-    """The program is over, wherever it is."""
-
-    place: Place
+    ends: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -320,11 +293,12 @@ class Waiting:
 
 @dataclass(frozen=True, slots=True)
 class Doing:
-    """An expression that is evaluated for what it does: a call of a function that is not in the program."""
+    """A call of a function that is not in the program, for what it does; ``within``: in an expression that follows."""
 
     place: Place
-    what: Expression
+    what: Invocation
     text: str
+    within: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -335,7 +309,7 @@ class Fixed:
     instruction: Instruction
 
 
-Operation = Assign | GoTo | Branch | Call | ConcurrentStart | Return | Halt | Move | Waiting | Doing | Fixed
+Operation = Assign | Enter | GoTo | Branch | Call | Return | Move | Waiting | Doing | Fixed
 
 
 @dataclass(frozen=True, slots=True)
@@ -381,7 +355,7 @@ class Program(ByValue):
     data : declarations (of a .dat or .var file, or of global variables), carried out first
     findings : about the text
     slides : whether each joint of a table slides, its targets in m; empty of other programs
-    volatile : variables that other tasks change
+    constants : variables that nothing may change
     """
 
     language: LanguageName
@@ -393,7 +367,7 @@ class Program(ByValue):
     findings: tuple[ProgramFinding, ...] = ()
     lines: tuple[str, ...] = field(default=(), repr=False)
     slides: tuple[bool, ...] = ()
-    volatile: frozenset[str] = frozenset()
+    constants: frozenset[str] = frozenset()
 
     def operations(self) -> Iterator[Operation]:
         """All that the text holds, whether it is ever reached or not."""
@@ -436,8 +410,6 @@ def expressions_of(operation: Operation) -> tuple[Expression, ...]:
         case Waiting(of=of):
             found = (of,)
         case Doing(what=what):
-            found = (what,)
-        case ConcurrentStart(what=what):
             found = inner(what)
         case _:
             found = ()

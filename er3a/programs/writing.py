@@ -7,7 +7,7 @@ import re
 from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import scipy
@@ -17,19 +17,16 @@ from er3a.errors import PoseError
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import factors_where_defined
-from er3a.kinematics.solutions import Solutions
 from er3a.numerics.arrays import Flags, Reals
 from er3a.programs import instructions, program_findings
+from er3a.programs.evaluation import same
 from er3a.robots.masses import MassBody
 from er3a.robots.robot import Robot
 
 STEP_M, STEP_RAD = 0.02, 0.1
 MAX_STEPS = 10_000  # on a way that no arm can take
-MAX_AT_ONCE = 2_000  # motions whose joints are solved together
-MAX_ROUNDS = 10  # over them
 
 Frames = tuple[instructions.NamedFrame, instructions.NamedFrame]
-SAME_TURN = math.radians(0.01)  # by which poses on an arc may differ
 NO_SIDE = 1e-9  # m or rad, of a signed distance that is on no side
 
 
@@ -68,15 +65,6 @@ class ReadyMotion:
         if self.motion.kind == "arc" and self.via is not None:
             return instructions.arc_length(self.pose_before, self.via, self.pose)
         return float(np.linalg.norm(self.pose[:3, 3] - self.pose_before[:3, 3]))
-
-    @property
-    def turn_matters(self) -> bool:
-        """Whether the motion is an arc on which it makes a difference how the tool turns, as far as is known."""
-        if self.motion.kind != "arc":
-            return False
-        if self.pose is None or self.pose_before is None or self.via is None:
-            return True
-        return instructions.turns_apart(self.pose_before, self.via, self.pose) > SAME_TURN
 
 
 class Resolver:
@@ -120,15 +108,12 @@ class Resolver:
         if number < 0:
             return self.start
         motion, _ = self.motions[number]
-        given = (
-            motion.target.joints
-            if isinstance(motion.target, instructions.JointTarget) and motion.angle is None
-            else None
-        )
-        if given is not None and not np.isnan(given).any():
-            return given
+        target = motion.target
+        if isinstance(target, instructions.JointTarget) and motion.angle is None and not np.isnan(target.joints).any():
+            return target.joints
         while len(self._solved) <= number:
-            self._solve_next()
+            before = self.joints_after(len(self._solved) - 1)
+            self._solved.append(self._end(*self.motions[len(self._solved)], before))
         return self._solved[number]
 
     def solve(
@@ -140,61 +125,42 @@ class Resolver:
 
         The list ends after the first pose that has none, with None.
         """
-        flanges = self._flanges_of(poses, frames)
-        if self.arm is None or flanges is None:
+        tool, base = frames
+        if self.arm is None or tool.pose is None or base.pose is None:
             return [None]
         reference = np.zeros(self.arm.joints) if near is None else near
-        references = np.tile(reference, (len(flanges), 1))
-        chain: list[Reals] = []
-        for _ in range(MAX_ROUNDS):  # until each pose is solved with the joints before it as reference
-            try:
-                found = inverse_batch(self.arm, flanges, references)
-                chain = _chain(found, reference, self.arm, branch)
-            except PoseError:
-                return [None]
-            before = np.stack([reference, *chain])[: len(flanges)]
-            if np.array_equal(references[: len(before)], before):
-                break
-            references[: len(before)] = before
-        return [*chain, None] if len(chain) < len(flanges) else list(chain)
+        chain: list[Reals | None] = []
+        try:
+            found = inverse_batch(self.arm, base.pose @ poses @ np.linalg.inv(tool.pose), reference)
+        except PoseError:
+            return [None]
+        for rows in np.where((found.solved & found.within_limits)[..., None], found.q, np.inf):
+            if branch is not None:
+                met = solutions_meant(branch, self.arm, rows) & np.isfinite(rows[:, 0])
+                rows = np.where(met[:, None], rows, np.inf) if met.any() else rows
+            away = np.abs(rows - reference).max(axis=1)
+            best = int(away.argmin())
+            if not np.isfinite(away[best]):
+                return [*chain, None]
+            reference = rows[best]
+            chain.append(reference)
+        return chain
 
-    def _solve_next(self) -> None:
-        """Solve the next motion, and with it those after it that are lines and arcs to poses."""
-        first = len(self._solved)
-        motion, pose_before = self.motions[first]
-        near = self.joints_after(first - 1)
-        if motion.angle is not None:
-            self._solved.append(None)
-        elif not _is_followed(motion) or near is None or pose_before is None:
-            self._solved.append(self._end(motion, near))
-        else:
-            self._solve_ways(first, near)
-
-    def _solve_ways(self, first: int, near: Reals) -> None:
-        frames = _frames(self.motions[first][0])
-        ways: list[Reals] = []
-        for motion, pose_before in self.motions[first : first + MAX_AT_ONCE]:
-            if not _is_followed(motion) or pose_before is None or not _same(frames, _frames(motion)):
-                break
-            ways.append(_between(motion, pose_before))
-        ends = np.cumsum([len(way) for way in ways]) - 1
-        found = self.solve(np.concatenate(ways), frames, near)
-        self._solved += [found[end] for end in ends.tolist() if end < len(found)] or [None]
-        if len(found) <= ends[-1] and self._solved[-1] is not None:
-            self._solved.append(None)
-
-    def _end(self, motion: instructions.ArmMotion, before: Reals | None) -> Reals | None:
+    def _end(self, motion: instructions.ArmMotion, pose_before: Reals | None, before: Reals | None) -> Reals | None:
+        """Joints (n,) in rad at a motion's end; those of a line or arc come from following its way."""
         target = motion.target
+        if motion.angle is not None or isinstance(target, instructions.UnresolvedTarget):
+            return None
         if isinstance(target, instructions.JointTarget):
-            joints = target.joints
-            if not np.isnan(joints).any():
-                return joints
-            return None if before is None else np.where(np.isnan(joints), before, joints)
-        if not isinstance(target, instructions.PoseTarget) or target.joints is not None:
-            return getattr(target, "joints", None)
-        near = before if target.near is None else target.near
-        branch = target.branch if motion.kind == "joint" else None
-        return self.solve(target.pose[None], _frames(motion), near, branch)[0]
+            return None if before is None else np.where(np.isnan(target.joints), before, target.joints)
+        if target.joints is not None:
+            return target.joints
+        frames = (motion.tool, motion.base)
+        if motion.kind == "joint" or before is None or pose_before is None:
+            branch = target.branch if motion.kind == "joint" else None
+            near = before if target.near is None else target.near
+            return self.solve(target.pose[None], frames, near, branch)[-1]
+        return self.solve(_between(motion, pose_before), frames, before)[-1]
 
     def _pose_in(self, frames: Frames) -> Reals | None:
         """Where the tool is, in a base for a tool."""
@@ -204,8 +170,13 @@ class Resolver:
         if isinstance(last.target, instructions.JointTarget):
             joints = self.joints_after(len(self.motions) - 1)
             return None if joints is None else self._forward(joints, frames)
-        old = _frames(last)
-        return self.pose if self.pose is None or _same(old, frames) else _changed(self.pose, old, frames)
+        old, new = (last.tool.pose, last.base.pose), (frames[0].pose, frames[1].pose)
+        if self.pose is None or (same(last.tool, frames[0]) and same(last.base, frames[1])):
+            return self.pose
+        if old[0] is None or old[1] is None or new[0] is None or new[1] is None:
+            return None
+        found: Reals = np.linalg.inv(new[1]) @ old[1] @ self.pose @ np.linalg.inv(old[0]) @ new[0]
+        return found
 
     def _forward(self, joints: Reals, frames: Frames) -> Reals | None:
         tool, base = frames
@@ -213,28 +184,6 @@ class Resolver:
             return None
         found: Reals = np.linalg.inv(base.pose) @ forward(self.arm, joints) @ tool.pose
         return found
-
-    def _flanges_of(self, poses: Reals, frames: Frames) -> Reals | None:
-        tool, base = frames
-        if tool.pose is None or base.pose is None:
-            return None
-        found: Reals = base.pose @ poses @ np.linalg.inv(tool.pose)
-        return found
-
-
-def _frames(motion: instructions.ArmMotion) -> Frames:
-    return motion.tool, motion.base
-
-
-def _same(a: Frames, b: Frames) -> bool:
-    return all(one.name == other.name and one.pose is other.pose for one, other in zip(a, b))
-
-
-def _is_followed(motion: instructions.ArmMotion) -> bool:
-    """Whether the joints at a motion's end come from following its way."""
-    target = motion.target
-    given = isinstance(target, instructions.PoseTarget) and target.joints is None and target.near is None
-    return given and motion.kind != "joint" and motion.angle is None
 
 
 def solutions_meant(branch: instructions.MeantSolution, robot: Robot, rows: Reals) -> Flags:
@@ -257,22 +206,6 @@ def solutions_meant(branch: instructions.MeantSolution, robot: Robot, rows: Real
     return met
 
 
-def _chain(found: Solutions, reference: Reals, arm: Robot, branch: instructions.MeantSolution | None) -> list[Reals]:
-    """The solution of each pose that is nearest to the one before, up to the first pose that has none."""
-    chain: list[Reals] = []
-    rows = np.where((found.solved & found.within_limits)[..., None], found.q, np.inf)
-    for solutions in rows:
-        if branch is not None and (met := solutions_meant(branch, arm, solutions) & np.isfinite(solutions[:, 0])).any():
-            solutions = np.where(met[:, None], solutions, np.inf)
-        away = np.abs(solutions - reference).max(axis=1)
-        best = int(away.argmin())
-        if not np.isfinite(away[best]):
-            break
-        reference = solutions[best]
-        chain.append(reference)
-    return chain
-
-
 def with_default_frames(instruction: instructions.Instruction, robot: Robot | None) -> instructions.Instruction:
     """A motion whose tool or base is not given at all, with the robot's own tool and base."""
     if not isinstance(instruction, instructions.ArmMotion) or robot is None:
@@ -285,15 +218,6 @@ def with_default_frames(instruction: instructions.Instruction, robot: Robot | No
     return replace(instruction, tool=tool, base=base)
 
 
-def _changed(pose: Reals, old: Frames, new: Frames) -> Reals | None:
-    parts = [frame.pose for frame in (*old, *new)]
-    tool, base, new_tool, new_base = parts
-    if tool is None or base is None or new_tool is None or new_base is None:
-        return None
-    found: Reals = np.linalg.inv(new_base) @ base @ pose @ np.linalg.inv(tool) @ new_tool
-    return found
-
-
 def _between(motion: instructions.ArmMotion, start: Reals) -> Reals:
     """Poses (k, 4, 4) on the way and at its end, near enough to each other that the arm's branch is the same."""
     assert isinstance(motion.target, instructions.PoseTarget)
@@ -304,7 +228,7 @@ def _between(motion: instructions.ArmMotion, start: Reals) -> Reals:
     shares = np.arange(1, count + 1) / count
     poses = None
     if motion.kind == "arc" and isinstance(motion.via, instructions.PoseTarget):
-        poses = instructions.arc_poses(start, motion.via.pose, end, shares, motion.with_path)
+        poses = instructions.arc_poses(start, motion.via.pose, end, shares)
     if poses is None:
         poses = np.tile(np.eye(4), (count, 1, 1))
         poses[:, :3, 3] = start[:3, 3] + shares[:, None] * (end[:3, 3] - start[:3, 3])
@@ -593,9 +517,7 @@ class Writer(ABC):
 
 
 COUNTED: dict[str, Callable[[int], program_findings.WriteFinding]] = {
-    "turned": program_findings.ArcsTurnOtherwise,
     "zones": program_findings.ZonesDropped,
-    "splines": program_findings.SplinesAsLines,
     "estimated": program_findings.SpeedsEstimated,
     "cut": program_findings.SpeedsCut,
     "raised": program_findings.SpeedsRaised,
@@ -606,47 +528,44 @@ COUNTED: dict[str, Callable[[int], program_findings.WriteFinding]] = {
 }
 
 
+HEADS = {
+    "written_arcs_split": "{arcs} arc(s) as {lines} lines that stay within {mm:g} mm",
+    "written_zones_dropped": "{zones} zone(s) without equal in this language: the arm stops there",
+    "written_speeds_estimated": "{motions} duration(s) as speeds: the controller's ramps decide the time",
+    "written_speeds_cut": "{motions} speed(s) above 100 %, which was taken",
+    "written_speeds_raised": (
+        "{motions} speed(s) below the least that has a name, which was taken: FASTER than what was checked"
+    ),
+    "written_speeds_of_assumed": (
+        "{motions} speed(s) with an assumed {assumed} as 100 %, which may be far from the controller's 100 %"
+    ),
+    "written_half_turns_split": (
+        "{lines} line(s) or arc(s) that turn the tool by 180 deg in two halves, to fix the sense"
+    ),
+    "written_targets_left_out": "{motions} motion(s) left out: their targets are not known",
+    "written_tool_not_given": "set this tool or base on the controller: {name}",
+    "written_values_rounded": "{values} speed(s) or zone(s) rounded down to the next that has a name",
+    "written_unsafe": "NOT SAFE: the path {path} {verdict}; written because it was asked for",
+    "written_near_assumed": (
+        "NOT SETTLED: the path {path} is clear by {clearance_mm:.1f} mm of assumed shapes only, which may be wrong by "
+        "{margin_mm:g} mm"
+    ),
+    "written_beside_points": (
+        "NOT SETTLED: the checked path {path} rounds its corners by up to {missed} beside its points; a controller may "
+        "go to the points"
+    ),
+    "written_one_side": "{branches} branch(es) of which one side alone is written: what the others do is left out",
+    "written_external_axes_dropped": "{motions} motion(s) without their external axes",
+    "written_not_translated": "{instructions} instruction(s) of the other language as comments",
+}
+"""What the head of a file says of findings: files are read by controllers, so this is plain ASCII."""
+
+
 def head_line(finding: program_findings.WriteFinding) -> str:
-    """A finding as a line of a file's head; these files are read by controllers, so it is plain ASCII."""
-    match finding:
-        case program_findings.ArcsSplit(arcs=arcs, lines=lines, deviation_m=deviation):
-            return f"{arcs} arc(s) as {lines} lines that stay within {deviation * 1000:g} mm"
-        case program_findings.ArcsTurnOtherwise(arcs=count):
-            return f"{count} arc(s) turn the tool about one axis, and not with the path as those that were read"
-        case program_findings.ZonesDropped(zones=count):
-            return f"{count} zone(s) without equal in this language: the arm stops there"
-        case program_findings.SplinesAsLines(points=count):
-            return f"{count} point(s) of splines as straight lines"
-        case program_findings.SpeedsEstimated(motions=count):
-            return f"{count} duration(s) as speeds: the controller's ramps decide the time"
-        case program_findings.SpeedsCut(motions=count):
-            return f"{count} speed(s) above 100 %, which was taken"
-        case program_findings.SpeedsRaised(motions=count):
-            return f"{count} speed(s) below the least that has a name, which was taken: FASTER than what was checked"
-        case program_findings.SpeedsOfAssumed(motions=count, assumed=assumed):
-            return f"{count} speed(s) with an assumed {assumed} as 100 %, which may be far from the controller's 100 %"
-        case program_findings.HalfTurnsSplit(lines=count):
-            return f"{count} line(s) or arc(s) that turn the tool by 180 deg in two halves, to fix the sense"
-        case program_findings.TargetsLeftOut(motions=count):
-            return f"{count} motion(s) left out: their targets are not known"
-        case program_findings.ToolNotGiven(name=name):
-            return f"set this tool or base on the controller: {ascii_text(name)}"
-        case program_findings.ValuesRounded(values=count):
-            return f"{count} speed(s) or zone(s) rounded down to the next that has a name"
-        case program_findings.WrittenUnsafe(path=path, verdict=verdict):
-            return f"NOT SAFE: the path {ascii_text(path)} {ascii_text(verdict)}; written because it was asked for"
-        case program_findings.WrittenNearAssumed(path=path, clearance_mm=clearance, margin_mm=margin):
-            near = f"clear by {clearance:.1f} mm of assumed shapes only, which may be wrong by {margin:g} mm"
-            return f"NOT SETTLED: the path {ascii_text(path)} is {near}"
-        case program_findings.WrittenBesidePoints(path=path, missed=missed):
-            corners = f"rounds its corners by up to {missed} beside its points"
-            return f"NOT SETTLED: the checked path {ascii_text(path)} {corners}; a controller may go to the points"
-        case program_findings.OneSideWritten(branches=count):
-            return f"{count} branch(es) of which one side alone is written: what the others do is left out"
-        case program_findings.ExternalAxesDropped(motions=count):
-            return f"{count} motion(s) without their external axes"
-        case program_findings.NotTranslated(instructions=count):
-            return f"{count} instruction(s) of the other language as comments"
+    """A finding as a line of a file's head."""
+    values = {each.name: getattr(finding, each.name) for each in fields(finding)}
+    values["mm"] = 1000 * values.get("deviation_m", 0.0)
+    return ascii_text(HEADS[finding.code].format(**values))
 
 
 HEAD_LINE = re.compile(rf"(?m)^(<rem>\n<text>|[ ]*(?:;|#|!|\(\*) ){HEAD}.*?(</text>\n</rem>| \*\)|)$")

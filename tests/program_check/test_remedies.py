@@ -89,15 +89,12 @@ NONE = "[9E9,9E9,9E9,9E9,9E9,9E9]"
 DOWN = "A 0,B 0,C 180"
 POINT = f"LIN {{X 400,Y 0,Z 400,{DOWN}}}"
 FRAMED = f"DEF a( )\n$TOOL=TOOL_DATA[3]\n$BASE=$NULLFRAME\n$VEL.CP=0.05\nLIN {{X 300,Y 50,Z 400,{DOWN}}}\nEND\n"
-TABLE, ROW = "t_s,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg", "0,10,-10,-10,0,-70,0"
 TURNED = {
     "robot": load_robot("ur5e").replace(envelopes=[Envelope(k, (0.0,) * 3, (0.0,) * 3, 0.005) for k in range(1, 7)]),
     "start": np.radians([-160, -26, 42, 139, 169, -55]),
 }
 TIED = {"robot": ROBOT.replace(combined=[CombinedLimit((0, 1, 1, 0, 0, 0), *np.radians([-60, 60]))])}
 CSV = "t_s,q1_deg,q2_deg,q3_mm,q4_deg\n0,0,30,50,0\n4,10,30,{},0\n"
-GIVEN = "FRAME BASE_DATA[2]\nBASE_DATA[1]={X 0,Y 0,Z 0,A 0,B 0,C 0}"
-LIFTED = np.array([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0.1], [0, 0, 0, 1.0]])
 BESIDE = {"start": np.radians([63, -20, -61, -4, -63, -126])}
 MENDED = {
     "target_out_of_reach": (krl(f"PTP {{X 3000,Y 0,Z 400,{DOWN}}}"), krl(f"PTP {{X 400,Y 0,Z 400,{DOWN}}}")),
@@ -120,23 +117,10 @@ MENDED = {
         krl("$APO.CDIS=80", "LIN_REL {Z 40} C_DIS", "LIN_REL {Y 40}"),
         krl("$APO.CDIS=20", "LIN_REL {Z 40} C_DIS", "LIN_REL {Y 40}"),
     ),
-    "program_data_file_missing": (
-        krl("PTP XP1"),
-        (krl("PTP XP1"), {"data": "E6AXIS XP1={A1 10,A2 -10,A3 -10,A4 0,A5 -70,A6 0}"}),
-    ),
-    "tool_stated_elsewhere": (f"{TABLE},x_mm,y_mm,z_mm\n{ROW},500,0,0\n", f"{TABLE}\n{ROW}\n"),
-    "program_name_twice": (
-        krl("b( )", more="DEF b( )\nPTP {A1 5}\nEND\nDEF b( )\nPTP {A1 9}\nEND\n"),
-        krl("b( )", more="DEF b( )\nPTP {A1 9}\nEND\n"),
-    ),
     "speed_not_given": (krl("$VEL.CP=$ANIN[1]", POINT), krl(POINT)),
     "frames_from_robot_file": (
         f"DEF a( )\n$VEL.CP=0.05\nBAS(#VEL_PTP,10)\n{AT_HOME}\nLIN_REL {{Z 5}}\nEND\n",
         krl(AT_HOME, "LIN_REL {Z 5}"),
-    ),
-    "frame_given_twice": (
-        (krl("$BASE=BASE_DATA[1]", AT_HOME, "LIN_REL {Z 5}"), {"data": GIVEN, "frames": {"BASE_DATA[1]": LIFTED}}),
-        (krl("$BASE=BASE_DATA[1]", AT_HOME, "LIN_REL {Z 5}"), {"data": GIVEN}),
     ),
     "above_limit": (krl("PTP {A1 170}"), krl(f"PTP {{A1 {np.degrees(ROBOT.upper[0]):g}}}")),
     "below_limit": (krl("PTP {A1 -170}"), krl(f"PTP {{A1 {np.degrees(ROBOT.lower[0]):g}}}")),
@@ -176,19 +160,10 @@ MENDED = {
         FRAMED.replace("TOOL_DATA[3]", "$NULLFRAME").replace("BASE=$NULLFRAME", "BASE=BASE_DATA[3]"),
         FRAMED.replace("TOOL_DATA[3]", "$NULLFRAME"),
     ),
-    "not_followed.spline": (
-        krl(AT_HOME, "SPLINE", "SPL {A1 5,A2 -10,A3 -10,A4 0,A5 -70,A6 0}", "ENDSPLINE"),
-        krl(AT_HOME, "SPTP {A1 5,A2 -10,A3 -10,A4 0,A5 -70,A6 0}"),
-    ),
     "not_followed.half_turn": (
         krl(AT_HOME, "LIN_REL {A 180} #TOOL"),
         krl(AT_HOME, "LIN_REL {A 90} #TOOL", "LIN_REL {A 90} #TOOL"),
         krl(AT_HOME, "PTP_REL {A6 180}"),
-    ),
-    "not_followed.rounds": (
-        (krl("LOOP", "PTP_REL {A1 0.1}", "ENDLOOP"), {"limits": RunLimits(rounds=20)}),
-        krl("LOOP", "PTP_REL {A1 0.1}", AT_HOME, "ENDLOOP"),
-        krl("FOR i=1 TO 20", "PTP_REL {A1 0.1}", "ENDFOR"),
     ),
     "not_followed.unreached": (krl(AT_HOME, "RETURN", "PTP {A1 20}"), krl(AT_HOME)),
 }

@@ -49,7 +49,7 @@ UNKNOWN = {  # what is not known before the last motion, which depends on it
     "setting": ("$ORI_TYPE=#JOINT", LINE),
     "half of a turn": ("", "LIN_REL {C 180} #TOOL"),
     "point": ("", "PTP XP1"),
-    "spline": ("SPLINE", "SPL XP1\nENDSPLINE"),
+    "spline": ("SPLINE\nSPL XP1\nENDSPLINE", LINE),
     "axis": ("", "PTP {A1 0, E1 100}"),
     "side that is too much": ("FOR N=1 TO 100\nIF $IN[N] THEN\nM=M+N\nENDIF\nENDFOR", "PTP {A1 M}"),
     "after a side": (f"IF $IN[1] THEN\n{AXES}\nENDIF\nSTRANGE()", LINE),
@@ -90,10 +90,6 @@ OTHERS = {
         "a.script",
         "def job():\n movej([0,-1.2,1,0,1,0])\n strange()\n"
         " movel(pose_add(get_target_tcp_pose(),p[0,0,0.01,0,0,0]))\nend\n",
-    ),
-    "urscript thread": (
-        "a.script",
-        "def job():\n x=0\n thread t():\n  x=1\n end\n run t()\n movej([x,-1.2,1,0,1,0])\nend\n",
     ),
     "rapid call": (
         "a.mod",

@@ -14,7 +14,7 @@ from er3a.programs.languages import read_program
 from er3a.programs.machine import execute
 
 robomath = pytest.importorskip("robodk.robomath")
-CONVENTIONS: tuple[Convention, ...] = ("kuka", "efort", "staubli", "ur", "abb")
+CONVENTIONS: tuple[Convention, ...] = ("kuka", "efort", "ur", "abb")
 
 
 def poses(count: int = 300) -> list[np.ndarray]:
@@ -64,12 +64,6 @@ def test_ur_as_an_outsider_reads_and_writes_it():
         written = robomath.Pose_2_UR(as_outsider(T))
         back = [*(value / 1000 for value in written[:3]), *written[3:]]
         np.testing.assert_allclose(pose_of(back, "ur"), T, atol=1e-7)  # its rotation vector keeps no more digits
-
-
-def test_staubli_as_an_outsider_reads_and_writes_it():
-    for T in poses():
-        np.testing.assert_allclose(as_pose(robomath.Staubli_2_Pose(list(numbers_of(T, "staubli")))), T, atol=1e-9)
-        np.testing.assert_allclose(pose_of(robomath.Pose_2_Staubli(as_outsider(T)), "staubli"), T, atol=1e-9)
 
 
 def test_abb_as_an_outsider_writes_it():

@@ -74,4 +74,4 @@ def test_faulty_programs_can_be_read(path):
     program = read_program(path)
     execution = execute(program, load_robot("er3a_c60"))
     assert (NothingMoves() in program.findings) == (path.stem == "no_motion")
-    assert any(each.kind == "rounds" for each in execution.endings) == (path.stem == "drifting_loop")
+    assert execution.complete

@@ -397,6 +397,7 @@ def test_what_the_second_cell_is_for_is_found(seconds):
         if name != "rpl":
             assert motions[7].motion.kind == "arc"
             load = motions[8].motion.load
+        if name not in ("rpl", "rapid"):  # where what is gripped is not followed
             assert (load.mass, load.centre) == (50.0, pytest.approx(LOAD.centre, abs=1e-12))
 
 

@@ -132,9 +132,6 @@ def test_page_and_recording_are_written(study, stored, tmp_path):
     own = next(each for each in stored["er3a_c60"].results.summary.programs if each.name == fault.name)
     first = next(each for each in own.findings if each.finding.code == "motion_collides")
     assert fault.when == f"line 10, {first.motion_s:.2f} s into it (player: {first.program_s:.2f} s)"
-    down = f"{met.xyz_mm[0, 2] - first.finding.at_mm:.0f}"  # the line is vertical
-    assert fault.moments[0].place.endswith(f" mm into it, (380, 180, {down})")
-    placed = set()
     for each in listed:  # what the index links to
         name, t, place = re.fullmatch(r"programs\.html\?play=(\w+)&t=([\d.]+)#([\w.-]+)", each.address).groups()
         assert name == each.name
@@ -144,17 +141,7 @@ def test_page_and_recording_are_written(study, stored, tmp_path):
         program = next(own for own in stored["er3a_c60"].results.summary.programs if own.name == name)
         gravest = [own for own in program.findings if own.level == program.outcome]
         grave = min((own.program_s, own.finding.code) for own in gravest if own.program_s) if float(t) else (0.0, "")
-        if grave[1].startswith("too_fast"):  # seen where the joint is fastest
-            assert grave[0] - 1e-9 <= float(t)
-        else:
-            assert float(t) == round(grave[0], 9)  # the earliest that weighs most
-        for own in program.findings:  # the checker's own distance, of what it measures
-            where = f" s into it (player: {own.program_s:.2f} s)" if own.program_s is not None else None
-            (moment,) = [m for m in each.moments if where and m.when.endswith(where)][:1] or [None]
-            if moment and hasattr(own.finding, "at_mm"):
-                assert moment.place.startswith(f"{own.finding.at_mm:.0f} mm into it, (")
-                placed.add(name)
-    assert {"out_of_reach", "drifting_loop"} <= placed
+        assert float(t) == round(grave[0], 9)  # the earliest that weighs most
     summary = stored["er3a_c60"].results.summary
     program, grave = next((own, each) for own in summary.programs for each in own.findings if each.level == "fail")
     told = (replace(grave, level="caution", program_s=0.0), replace(grave, line=0, program_s=1.0))
@@ -194,21 +181,11 @@ def test_a_line_past_a_singular_pose_is_told_by_it_then_by_what_weighs_most_then
 
 
 @pytest.mark.long
-def test_a_fault_in_a_loop_names_its_round_and_each_fault_leads_to_its_moment(stored):
-    """Of the example's rounds the first ends at x = 380 mm and each further one 10 mm farther; the one that leaves the
-    reach starts at 600 mm."""
-    results = stored["er3a_c60"].results
-    found = {each.name: each for each in faults(results)}
-    worst, first = found["drifting_loop"].moments
-    program = next(each for each in results.summary.programs if each.name == "drifting_loop")
-    rounds = {each.finding.code: each.round for each in program.findings if each.round is not None}
-    assert rounds["way_out_of_reach"] == 2 + round((600 - 380) / 10)
-    assert worst.when.startswith(f"line 10, round {rounds['way_out_of_reach']}, 0.01 s into it (player: ")
-    assert first.when.startswith(f"line 10, round {rounds['way_out_of_reach'] - 1}, ")  # nearly stretched
+def test_each_fault_leads_to_its_moment(stored):
+    found = {each.name: each for each in faults(stored["er3a_c60"].results)}
     for name in ("drifting_loop", "singular_line", "outside_limits"):
         for each in found[name].moments:
             assert each.address == f"programs.html?play={name}&t={round(each.seen_s, 9)}#{name}"
-    assert not [each for each in program.findings if each.motion_s is None and each.round is not None]
 
 
 @pytest.mark.long

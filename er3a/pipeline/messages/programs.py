@@ -48,12 +48,11 @@ REASONS: dict[NotFollowedReason, str] = {
     "setting": N_("motions are not followed as it asks"),
     "tool": N_("this tool is not given"),
     "base": N_("this base is not given"),
-    "spline": N_("it was checked as straight from point to point"),
+    "turns_with_path": N_("it turns the tool with its path (CirPathMode)"),
     "external_axes": N_("these axes were taken to rest"),
     "arc_angle": N_("the arc does not end at its target"),
     "half_turn": N_("the tool turns by half a turn, either way round"),
     "redundant": N_("the arm can move along it in more ways than one"),
-    "rounds": N_("this loop without end does not come back to where it was"),
     "operations": N_("the program carries out too many instructions"),
     "ways": N_("the program has too many sides of branches that only the cell decides"),
     "depth": N_("too many calls are within each other"),
@@ -79,14 +78,10 @@ REMEDIES: dict[str, str] = {
     "pairs_unexamined": N_("Correct these shapes in the robot's file, or allow the pair there with a reason."),
     "zone_collides": N_("Make the zone smaller, or stop at the corner."),
     "clearance_not_proven": N_("Give the check more time."),
-    "tool_stated_elsewhere": N_("Make the table anew for this arm and its tool, or leave its pose columns out."),
-    "program_data_file_missing": N_("Put the data file beside the program."),
-    "program_name_twice": N_("Remove one of the two definitions."),
     "program_nothing_moves": N_("Check that this is the program to run."),
     "program_not_understood": N_("Compare this line with the controller's manual."),
     "speed_not_given": N_("Give a speed, as a number above 0, before the motion (KRL: $VEL.CP in m/s, 3 at most)."),
     "frames_from_robot_file": N_("Set tool and base in the program before its first pose."),
-    "frame_given_twice": N_("Correct the one that is wrong, or remove it from the frames."),
     "load_above_payload": N_("Carry less, or correct the load if it is wrong."),
     "suspect_number": N_("Correct it if it is a mistake."),
 }
@@ -97,9 +92,7 @@ NOT_FOLLOWED: dict[NotFollowedReason, str] = {
     "instruction": N_("Put the module that holds it beside the program; if it moves nothing, say so by --assume."),
     "tool": FRAMES,
     "base": FRAMES,
-    "spline": N_("Write straight lines of the spline (SLIN), or joint moves outside of it (SPTP)."),
     "half_turn": N_("Turn the tool in two lines by 90 deg each, or by a joint motion."),
-    "rounds": N_("Let the loop come back to where it began, or give it a fixed number of rounds."),
     "unreached": N_("Check what leads to this motion, or remove it if nothing does."),
 }
 OTHERWISE = N_("Watch this line at low speed on the controller.")
@@ -132,10 +125,6 @@ TEXTS = texts(
         "way_not_known": "the start of the motion is not known; only the target was checked",
         "configuration_guessed": "{solutions} solutions are possible, as the joints before are not known",
         "configuration_not_met": "no solution within the limits, or not the line's end, has the configuration {text}",
-        "tool_stated_elsewhere": (
-            "the table says that the tool is {moved_mm:.1f} mm and {turned_deg:.2f} deg from where its joints put it; "
-            "the joints were taken"
-        ),
         "whole_turn": "J{joint} turns by {angle_deg:.1f} deg; its nearest equivalent is {nearest_deg:.1f} deg away",
         "joint_jumps": "J{joint} turns by {angle_deg:.1f} deg while the tool moves by {moved_mm:.1f} mm",
         "clear_of_assumed": (
@@ -188,6 +177,7 @@ TEXTS = texts(
             metres="{text} may have been meant in metres: {usual}",
             radians="{text} may have been meant in radians: {usual}",
             impossible_speed="{text} is faster than any point of the arm can be ({usual})",
+            share="{text} of the joints' speed is more than there is, so that {usual} is taken",
             speed="{text} is more than ten times the program's usual {usual}",
             tool="the tool {text} is used here alone; the motions around have {usual}",
             base="the base {text} is used here alone; the motions around have {usual}",
@@ -201,12 +191,6 @@ TEXTS = texts(
                 "were taken, and the controller may have others"
             ),
         ),
-        "frame_given_twice": (
-            "the program's own {name} was taken; that of the frames given for the check is {moved_mm:.1f} mm and "
-            "{turned_deg:.2f} deg from it"
-        ),
-        "program_data_file_missing": "{file} is missing, which holds the program's points",
-        "program_name_twice": "{name} is declared twice; the later one counts",
         "program_not_understood": "not understood: {text}",
         "program_nothing_moves": "no instruction moves the arm",
         "load_above_payload": "{mass_kg:g} kg on the flange, and the arm may carry {payload_kg:g} kg",
@@ -214,11 +198,6 @@ TEXTS = texts(
             "zones",
             "{count} zone has no equivalent in this language: the arm stops there",
             "{count} zones have no equivalent in this language: the arm stops there",
-        ),
-        "written_splines_as_lines": Plural(
-            "points",
-            "{count} point of splines written as a straight line",
-            "{count} points of splines written as straight lines",
         ),
         "written_speeds_estimated": Plural(
             "motions",
@@ -275,11 +254,6 @@ TEXTS = texts(
             "arcs",
             "{count} arc written as {lines} lines that stay within {deviation:g} mm of it",
             "{count} arcs written as {lines} lines that stay within {deviation:g} mm of them",
-        ),
-        "written_arcs_turn_otherwise": Plural(
-            "arcs",
-            "{count} arc turns the tool about one axis, and not with the path as the arc that was read",
-            "{count} arcs turn the tool about one axis, and not with the path as the arcs that were read",
         ),
         "written_unsafe": "the path {path} is not safe: {verdict}",
         "written_near_assumed": (

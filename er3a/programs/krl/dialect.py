@@ -3,31 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
-from itertools import repeat
 from typing import NamedTuple
 
 import numpy as np
 
 from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, syntax
-from er3a.programs.evaluation import (
-    IN_DEGREES,
-    SIZES,
-    Dialect,
-    ProgramMemory,
-    evaluated,
-    known,
-    root,
-    unresolved,
-    variable_of,
-)
+from er3a.programs.evaluation import IN_DEGREES, SIZES, Dialect, ProgramMemory, evaluated, root, unresolved
 from er3a.robots.masses import MassBody, moved
 
 FRAME_KEYS = ("X", "Y", "Z", "A", "B", "C")
 AXIS_KEYS = ("A1", "A2", "A3", "A4", "A5", "A6")
 AXIS_KINDS = ("AXIS", "E6AXIS")
-LEFT_OUT = "left out of"
 EXTERNAL_KEYS = ("E1", "E2", "E3", "E4", "E5", "E6")
 COORDINATES = frozenset((*FRAME_KEYS, *AXIS_KEYS, *EXTERNAL_KEYS))
 POSITION_FIELDS = COORDINATES | {"S", "T"}
@@ -36,8 +25,7 @@ MOST_SPEED = 3.0  # m/s
 """What controllers take along a path at most: ``$VEL_MA.CP`` of their machine data."""
 SIGN_ZERO = 1e-7  # rad; nearer to 0 a joint's sign says nothing
 Frames = tuple[instructions.NamedFrame, instructions.NamedFrame]
-UNREAD = syntax.Unclear("")
-"""The value of a motion's arguments that are more or fewer than it has."""
+NULL = (0.0,) * 6
 
 
 def _has_axes(value: syntax.Record) -> bool:
@@ -53,9 +41,8 @@ def record_pose(value: syntax.Value | None) -> Reals | None:
     """The transform (4, 4) in m of a frame; None for anything else, and for a frame that leaves something out."""
     if not isinstance(value, syntax.Record):
         return None
-    given = [syntax.number(value.get(key)) for key in FRAME_KEYS]
-    plain = tuple(each for each in given if each is not None)
-    return instructions.pose_of(plain, "kuka") if len(plain) == 6 and syntax.finite(plain) else None
+    plain = syntax.numbers(tuple(value.get(key) for key in FRAME_KEYS))
+    return instructions.pose_of(plain, "kuka") if plain is not None and syntax.finite(plain) else None
 
 
 def frame_record(pose: Reals, kind: str = "FRAME") -> syntax.Record:
@@ -65,60 +52,56 @@ def frame_record(pose: Reals, kind: str = "FRAME") -> syntax.Record:
 
 def target(memory: ProgramMemory, value: syntax.Value, frames: Frames, said: tuple[str, bool]) -> instructions.Target:
     """What a position in a motion means; ``said`` is the line, and whether a relative position is meant by the tool."""
-    text = said[0]
-    if isinstance(value, syntax.Unclear) and value is not UNREAD:
-        return unresolved(value)
-    if not isinstance(value, syntax.Record) or not _is_position(value):
-        return instructions.UnresolvedTarget(text, "not_understood")
-    if _has_axes(value):
-        return _joints(memory, value, text)
-    return _by_fixed_tool(memory, text) or _pose(memory, value, frames, text)
-
-
-def _is_position(value: syntax.Record) -> bool:
-    """Whether a record has fields of positions alone, and not both coordinates and axes."""
-    return all(key in POSITION_FIELDS for key, _ in value.items) and not (_has_axes(value) and is_frame(value))
-
-
-def _by_fixed_tool(memory: ProgramMemory, text: str) -> instructions.UnresolvedTarget | None:
-    """That the workpiece is moved along a fixed tool, or may be; None where it is known that the tool is moved."""
-    mode = memory.read("$IPO_MODE")
-    if mode in (None, "#BASE"):
-        return None
-    if isinstance(mode, syntax.Unclear):
-        return instructions.UnresolvedTarget(f"$IPO_MODE={mode.text}", "undefined")
-    return instructions.UnresolvedTarget(text, "external_tool")
+    found = _position(memory, value, said[0])
+    if not isinstance(found, syntax.Record):
+        return found
+    if _has_axes(found):
+        here = memory.here.joints
+        return _joints(memory, found, said[0], np.full(memory.cell.joints, np.nan) if here is None else here)
+    return _pose(memory, found, frames, said[0])
 
 
 def relative(memory: ProgramMemory, value: syntax.Value, frames: Frames, said: tuple[str, bool]) -> instructions.Target:
     """A target given by its difference from where the arm is."""
     text, in_tool = said
-    if not isinstance(value, syntax.Record) or not _is_position(value):
-        if isinstance(value, syntax.Unclear) and value is not UNREAD:
-            return unresolved(value)
-        return instructions.UnresolvedTarget(text, "not_understood")
-    if _has_axes(value):
-        change = _joints(memory, value, text, missing=0.0)
+    found = _position(memory, value, text)
+    if not isinstance(found, syntax.Record):
+        return found
+    if _has_axes(found):
+        change = _joints(memory, found, text, np.zeros(memory.cell.joints))
         if not isinstance(change, instructions.JointTarget):
             return change
         if memory.here.joints is None:
             return instructions.UnresolvedTarget(text, "position_unknown")
         return instructions.JointTarget(memory.here.joints + change.joints, change.external)
-    if (fixed := _by_fixed_tool(memory, text)) is not None:
-        return fixed
-    steps = syntax.Record(value.kind, (*((key, 0.0) for key in FRAME_KEYS if value.get(key) is None), *value.items))
-    given = _components(steps, FRAME_KEYS, text)
+    given = _components(found, FRAME_KEYS, text)
     if isinstance(given, instructions.UnresolvedTarget):
         return given
-    offset, seen = record_pose(steps), memory.here.seen(*frames, memory.cell.flange)
-    if offset is None or seen is None:
+    seen = memory.here.seen(*frames, memory.cell.flange)
+    if seen is None:
         return instructions.UnresolvedTarget(text, "position_unknown")
+    offset = instructions.pose_of([each or 0.0 for each in given], "kuka")
     if in_tool:
-        return instructions.PoseTarget(seen @ offset, external=_external(value))
-    found = seen.copy()
-    found[:3, 3] += offset[:3, 3]
-    found[:3, :3] = offset[:3, :3] @ seen[:3, :3]
-    return instructions.PoseTarget(found, external=_external(value))
+        return instructions.PoseTarget(seen @ offset, external=_external(found))
+    pose = seen.copy()
+    pose[:3, 3] += offset[:3, 3]
+    pose[:3, :3] = offset[:3, :3] @ seen[:3, :3]
+    return instructions.PoseTarget(pose, external=_external(found))
+
+
+def _position(memory: ProgramMemory, value: syntax.Value, text: str) -> syntax.Record | instructions.UnresolvedTarget:
+    """A position of coordinates or axes; why it is none, or why the workpiece may be moved along a fixed tool."""
+    if isinstance(value, syntax.Unclear):
+        return unresolved(value, text)
+    fits = isinstance(value, syntax.Record) and all(key in POSITION_FIELDS for key, _ in value.items)
+    if not isinstance(value, syntax.Record) or not fits or (_has_axes(value) and is_frame(value)):
+        return instructions.UnresolvedTarget(text, "not_understood")
+    mode = memory.read("$IPO_MODE")
+    if mode in (None, "#BASE") or _has_axes(value):
+        return value
+    if isinstance(mode, syntax.Unclear):
+        return instructions.UnresolvedTarget(f"$IPO_MODE={mode.text}", "undefined")
+    return instructions.UnresolvedTarget(text, "external_tool")
 
 
 def _components(
@@ -142,32 +125,19 @@ def _components(
 
 def _external(value: syntax.Record) -> tuple[tuple[str, float], ...]:
     """Axes beside the arm that are given and not 0; NaN where the value is not known."""
-    parts = dict(value.items)
-    given = ((key, number) for key in EXTERNAL_KEYS if key in parts and (number := _of_axis(parts[key])))
-    return tuple(given)
+    given = ((key, value.get(key)) for key in EXTERNAL_KEYS)
+    known = ((key, math.nan if isinstance(each, syntax.Unclear) else syntax.number(each)) for key, each in given)
+    return tuple((key, each) for key, each in known if each)
 
 
-def _of_axis(value: syntax.Value) -> float:
-    """The value of an external axis; 0 of one that an assignment left out."""
-    if isinstance(value, syntax.Unclear):
-        return 0.0 if value.text.startswith(LEFT_OUT) else math.nan
-    return syntax.number(value) or 0.0
-
-
-def _joints(
-    memory: ProgramMemory, value: syntax.Record, text: str, missing: float | None = None
-) -> instructions.Target:
+def _joints(memory: ProgramMemory, value: syntax.Record, text: str, missing: Reals) -> instructions.Target:
     degrees = _components(value, AXIS_KEYS, text)
     if isinstance(degrees, instructions.UnresolvedTarget):
         return degrees
     count = memory.cell.joints
     if any(degrees[count:]):
         return instructions.UnresolvedTarget(text, "too_many_joints")
-    here = memory.here.joints
-    kept = np.full(count, np.nan) if here is None else here
-    if missing is not None:
-        kept = np.full(count, missing)
-    joints = [kept[i] if each is None else math.radians(each) for i, each in enumerate(degrees[:count])]
+    joints = [missing[i] if each is None else math.radians(each) for i, each in enumerate(degrees[:count])]
     return instructions.JointTarget(np.array(joints), _external(value))
 
 
@@ -180,22 +150,12 @@ def _pose(memory: ProgramMemory, value: syntax.Record, frames: Frames, text: str
         if seen is None:
             return instructions.UnresolvedTarget(text, "position_unknown")
         given = [old if each is None else each for each, old in zip(given, instructions.numbers_of(seen, "kuka"))]
-    plain = tuple(each for each in given if each is not None)
     words = ((key, value.get(key)) for key in ("S", "T"))
     given_words = ((key, each.text if isinstance(each, syntax.Unclear) else syntax.number(each)) for key, each in words)
     configuration = tuple((key, each) for key, each in given_words if each is not None)
+    pose = instructions.pose_of([each or 0.0 for each in given], "kuka")
     branch = _branch(syntax.number(value.get("T")), memory.cell.joints)
-    return instructions.PoseTarget(
-        instructions.pose_of(plain, "kuka"), configuration, external=_external(value), branch=branch
-    )
-
-
-def _posture(position: syntax.Record, joints: Reals | None, name: str) -> syntax.Record:
-    """Where the arm is with its Turn, where its joints are known; its Status depends on the arm, and is not known."""
-    turn: syntax.Value = syntax.Unclear(f"T of {name}")
-    if joints is not None:
-        turn = sum(1 << i for i, each in enumerate(joints) if each < 0)
-    return position.having("S", syntax.Unclear(f"S of {name}")).having("T", turn)
+    return instructions.PoseTarget(pose, configuration, external=_external(value), branch=branch)
 
 
 def _branch(turn: float | None, joints: int) -> instructions.MeantSolution | None:
@@ -208,17 +168,8 @@ def _branch(turn: float | None, joints: int) -> instructions.MeantSolution | Non
     )
 
 
-def tool_of(memory: ProgramMemory) -> instructions.NamedFrame:
-    """The tool that is set."""
-    return _frame(memory, "$TOOL")
-
-
-def base_of(memory: ProgramMemory) -> instructions.NamedFrame:
-    """The base that is set."""
-    return _frame(memory, "$BASE")
-
-
 def _frame(memory: ProgramMemory, variable: str) -> instructions.NamedFrame:
+    """The tool or base that is set."""
     value = memory.read(variable)
     if value is None:
         if any(f"{variable}.{key}" in memory.shared for key in FRAME_KEYS):  # a part of one that nothing gives
@@ -226,9 +177,10 @@ def _frame(memory: ProgramMemory, variable: str) -> instructions.NamedFrame:
         return instructions.NamedFrame("", memory.cell.tool if variable == "$TOOL" else memory.cell.base, own=False)
     said = memory.read(variable + "%name")
     name = said.upper() if isinstance(said, str) and said[:1] not in ("{", "") else ""
-    own, pose = memory.read(name) if name and name not in HERE else None, record_pose(value)
+    pose = record_pose(value)
     if isinstance(value, syntax.Unclear):
         name = name or value.text
+        own = memory.read(name) if name not in HERE else None
         if isinstance(own, syntax.Unclear) and not isinstance(own, syntax.Unset):  # the program or others change it
             name = f"{name}, changed" if own.text == name else f"{name}={own.text}"
     elif pose is None and is_frame(value):
@@ -239,53 +191,14 @@ def _frame(memory: ProgramMemory, variable: str) -> instructions.NamedFrame:
     return instructions.NamedFrame(name, pose)
 
 
-def set_by_bas(memory: ProgramMemory, call: syntax.Invocation) -> bool:
-    """Carry ``BAS(#COMMAND, value)`` out; False if the command is none that sets anything."""
-    values = [memory.value(each) for each in call.arguments if each is not None]
-    command = values[0] if values else ""
-    given: syntax.Value = values[1] if len(values) > 1 else syntax.Unclear("BAS")
-    match command:
-        case "#INITMOV":
-            _initial(memory)
-        case "#VEL_PTP":
-            _joint_speed(memory, given)
-        case "#ACC_PTP":
-            _all_axes(memory, "$ACC_AXIS", given)
-        case "#VEL_CP":  # which some controllers bound by DEF_VEL_CP, others by their machine data
-            memory.write("$VEL.CP", given)
-        case "#ACC_CP":
-            _line_acceleration(memory, given)
-        case "#TOOL":
-            _tool_number(memory, given)
-        case "#BASE":
-            _number(memory, "$BASE", "BASE_DATA", given)
-        case "#EX_BASE":
-            memory.write("$BASE", syntax.Unclear("BASE_DATA on an external axis"))
-            memory.shared.pop("$BASE%name", None)
-        case "#FRAMES":
-            _frames(memory)
-        case "#PTP_DAT" | "#PTP_PARAMS":
-            data = memory.read("PDAT_ACT")
-            _joint_data(memory, data)
-            if command == "#PTP_PARAMS":
-                _frames(memory)
-            _joint_speed(memory, _field(data, "VEL", "PDAT_ACT") if command == "#PTP_DAT" else given)
-        case "#CP_DAT" | "#CP_PARAMS":
-            data = memory.read("LDAT_ACT")
-            _line_data(memory, data)
-            if command == "#CP_PARAMS":
-                _frames(memory)
-            memory.write("$VEL.CP", _field(data, "VEL", "LDAT_ACT") if command == "#CP_DAT" else given)
-        case "#OUT_SYNC" | "#OUT_ASYNC":
-            memory.forget("$OUT")
-        case "#GROUP" | "#ACC_GLUE":
-            pass
-        case _:
-            return False
-    return True
+def _field(data: syntax.Value | None, name: str, kept_as: str, usual: syntax.Value | None = None) -> syntax.Value:
+    """A field of motion data; the usual where they don't have it, unclear where there is none."""
+    found = data.get(name) if isinstance(data, syntax.Record) else None
+    unclear = data.text if isinstance(data, syntax.Unclear) and data.text else f"{kept_as}.{name}"
+    return found or usual or syntax.Unclear(unclear) if found is None else found
 
 
-def _initial(memory: ProgramMemory) -> None:
+def _initial(memory: ProgramMemory, _: syntax.Value) -> None:
     """``BAS(#INITMOV,0)`` as controllers' own bas.src has it: full speed, the robot's base, tool 1, usual zones."""
     _all_axes(memory, "$ACC_AXIS", 100)
     _all_axes(memory, "$VEL_AXIS", 100)
@@ -302,19 +215,20 @@ def _initial(memory: ProgramMemory) -> None:
     memory.write("$ORI_TYPE", "#VAR")
     memory.write("$CIRC_TYPE", memory.read("DEF_CIRC_TYP") or "#BASE")
     memory.write("$IPO_MODE", "#BASE")
-    _number(memory, "$BASE", "BASE_DATA", 0)
+    _base_number(memory, 0)
     _tool_number(memory, 1)
 
 
-def _field(data: syntax.Value | None, name: str, kept_as: str) -> syntax.Value:
-    """A field of motion data; unclear where they don't have it."""
-    found = data.get(name) if isinstance(data, syntax.Record) else None
-    return syntax.Unclear(f"{kept_as}.{name}") if found is None else found
-
-
 def _joint_speed(memory: ProgramMemory, percent: syntax.Value) -> None:
+    """Of all axes, in percent; bas.src takes 100 for what is more, which is kept to be named."""
     plain = syntax.number(percent)
-    _all_axes(memory, "$VEL_AXIS", percent if plain is None else min(plain, 100.0))
+    beyond = plain is not None and plain > 100
+    _all_axes(memory, "$VEL_AXIS", syntax.Record("beyond", (("given", percent),)) if beyond else percent)
+
+
+def _line_speed(memory: ProgramMemory, speed: syntax.Value) -> None:
+    """Some controllers bound it by DEF_VEL_CP, others by their machine data."""
+    memory.write("$VEL.CP", speed)
 
 
 def _line_acceleration(memory: ProgramMemory, percent: syntax.Value) -> None:
@@ -324,60 +238,6 @@ def _line_acceleration(memory: ProgramMemory, percent: syntax.Value) -> None:
         return
     share = min(plain / 100, 1.0)
     memory.write("$ACC.CP", syntax.Record("", (("share", share),)) if full is None else share * full)
-
-
-def keep_setting(memory: ProgramMemory, name: str, expression: syntax.Expression) -> None:
-    """One item of a WITH."""
-    if not isinstance(expression, syntax.Invocation):
-        value = memory.value(expression)
-        if name in ("$VEL_AXIS[1]", "$ACC_AXIS[1]"):
-            _all_axes(memory, name[:-3], value)
-        else:
-            frame, _, part = name.partition(".")
-            if part and frame in ("$TOOL", "$BASE"):
-                old = memory.read(frame)
-                name = frame
-                value = old.having(part, value) if isinstance(old, syntax.Record) else syntax.Unclear(f"{frame}.{part}")
-            memory.write(name, value)
-            memory.shared.pop(name + "%name", None)
-        return
-    first = expression.arguments[0] if expression.arguments else None
-    given = syntax.Unclear(name) if first is None else memory.value(first)
-    match expression.function:
-        case "SVEL_CP":
-            memory.write("$VEL.CP", given)
-        case "SVEL_JOINT":
-            _all_axes(memory, "$VEL_AXIS", given)
-        case "SACC_JOINT":
-            _all_axes(memory, "$ACC_AXIS", _field(given, "ACC", name))
-        case "SACC_CP":
-            _line_acceleration(memory, _field(given, "ACC", name))
-        case "SAPO":
-            memory.write("$APO.CDIS", _field(given, "APO_DIST", name))
-        case "SAPO_PTP":
-            if _zone_data(memory, given, "#CDIS") == "#CDIS":
-                memory.write("$APO.CPTP", "#CDIS")  # 100 on the controller, so that the distance decides
-        case "STOOL2" if isinstance(given, syntax.Record):
-            _tool_data(memory, given)
-        case "SBASE":
-            _number(memory, "$BASE", "BASE_DATA", given)
-        case "SLOAD":
-            _load_number(memory, given)
-        case "SIPO_MODE":
-            memory.write("$IPO_MODE", given)
-        case "SORI_TYP" | "SORI_TYPE":
-            memory.write(name, _typed(given, "ORI_TYP", "#VAR"))
-        case "SCIRC_TYPE" | "SCIRC_TYP":
-            memory.write(name, _typed(given, "CIRC_TYP", "#BASE"))
-        case _:
-            if name in ("$TOOL", "$BASE"):
-                memory.write(name, syntax.Unclear(f"{expression.function}(...)"))
-                memory.shared.pop(name + "%name", None)
-
-
-def _typed(data: syntax.Value, name: str, usual: syntax.Value) -> syntax.Value:
-    """How motion data say that the tool turns; as usual where they don't."""
-    return data.get(name) or usual if isinstance(data, syntax.Record) else data
 
 
 def _all_axes(memory: ProgramMemory, name: str, value: syntax.Value) -> None:
@@ -397,6 +257,10 @@ def _number(memory: ProgramMemory, variable: str, array: str, given: syntax.Valu
     memory.write(variable + "%name", name)
 
 
+def _base_number(memory: ProgramMemory, given: syntax.Value) -> None:
+    _number(memory, "$BASE", "BASE_DATA", given)
+
+
 def _tool_number(memory: ProgramMemory, given: syntax.Value) -> None:
     """Tool and load by their number, as controllers' own bas.src sets both."""
     _number(memory, "$TOOL", "TOOL_DATA", given)
@@ -404,24 +268,10 @@ def _tool_number(memory: ProgramMemory, given: syntax.Value) -> None:
 
 
 def _load_number(memory: ProgramMemory, given: syntax.Value) -> None:
-    for name in _load_parts(memory):
-        del memory.shared[name]
+    memory.shared.pop("$LOAD.M", None)
     number = syntax.number(given)
     unknown = syntax.Unclear("LOAD_DATA[?]")
     memory.write("$LOAD", unknown if number is None else memory.read(f"LOAD_DATA[{number:g}]") or 0)
-
-
-def _load_parts(memory: ProgramMemory) -> list[str]:
-    """Parts of $LOAD that are set one by one, as by ``$LOAD.M=5``, where the whole is not known."""
-    return [name for name in memory.shared if name.startswith("$LOAD.")]
-
-
-def _load(memory: ProgramMemory) -> instructions.Load | None:
-    """What the program says hangs on the flange."""
-    whole, parts = memory.read("$LOAD"), _load_parts(memory)
-    if parts and not isinstance(whole, syntax.Record):
-        return instructions.UnclearLoad(", ".join(parts), syntax.number(memory.read("$LOAD.M")))
-    return load_of(whole)
 
 
 def load_of(value: syntax.Value | None) -> instructions.Load | None:
@@ -435,49 +285,45 @@ def load_of(value: syntax.Value | None) -> instructions.Load | None:
     if mass is not None and mass <= 0:
         return None
     centre = record_pose(value.get("CM"))
-    parts = [syntax.number(moments.get(key)) for key in "XYZ"] if isinstance(moments, syntax.Record) else [0.0] * 3
-    given = [each for each in parts if each is not None]
-    if mass is None or not math.isfinite(mass) or centre is None or len(given) < 3:
+    given = syntax.numbers(tuple(moments.get(key) for key in "XYZ")) if isinstance(moments, syntax.Record) else NULL[:3]
+    if mass is None or not math.isfinite(mass) or centre is None or given is None:
         return instructions.UnclearLoad("LOAD", mass)
     x, y, z = given
     return moved(MassBody(mass, inertia=(x, y, z, 0.0, 0.0, 0.0)), centre)
 
 
-def _tool_data(memory: ProgramMemory, data: syntax.Record) -> None:
+def _tool_data(memory: ProgramMemory, data: syntax.Value) -> None:
     _tool_number(memory, _field(data, "TOOL_NO", "FDAT"))
-    memory.write("$IPO_MODE", data.get("IPO_FRAME") or "#BASE")
+    memory.write("$IPO_MODE", _field(data, "IPO_FRAME", "FDAT", "#BASE"))
 
 
-def _frames(memory: ProgramMemory) -> None:
-    data = memory.read("FDAT_ACT")
-    if isinstance(data, syntax.Record):
-        _tool_data(memory, data)
-        _number(memory, "$BASE", "BASE_DATA", _field(data, "BASE_NO", "FDAT"))
-    else:
-        of = data.text if isinstance(data, syntax.Unclear) else "FDAT_ACT"
-        for variable in ("$TOOL", "$BASE"):
-            memory.write(variable, syntax.Unclear(f"{variable[1:]} of {of}"))
-            memory.shared.pop(variable + "%name", None)
+def _frames(memory: ProgramMemory, _: syntax.Value) -> None:
+    data = memory.read("FDAT_ACT") or syntax.Unclear("FDAT_ACT")
+    _tool_data(memory, data)
+    _base_number(memory, _field(data, "BASE_NO", "FDAT"))
 
 
-def _joint_data(memory: ProgramMemory, data: syntax.Value | None) -> None:
+def _joint_data(memory: ProgramMemory, speed: syntax.Value | None) -> None:
+    data = memory.read("PDAT_ACT")
     _all_axes(memory, "$ACC_AXIS", _field(data, "ACC", "PDAT_ACT"))
     _zone_data(memory, data, "#CPTP")
+    _joint_speed(memory, _field(data, "VEL", "PDAT_ACT") if speed is None else speed)
 
 
-def _line_data(memory: ProgramMemory, data: syntax.Value | None) -> None:
-    given = syntax.Unclear("LDAT_ACT") if data is None else data
-    _line_acceleration(memory, _field(given, "ACC", "LDAT_ACT"))
-    memory.write("$APO.CDIS", _field(given, "APO_DIST", "LDAT_ACT"))
-    memory.write("$ORI_TYPE", _typed(given, "ORI_TYP", "#VAR"))
-    memory.write("$CIRC_TYPE", _typed(given, "CIRC_TYP", memory.read("DEF_CIRC_TYP") or "#BASE"))
+def _line_data(memory: ProgramMemory, speed: syntax.Value | None) -> None:
+    data = memory.read("LDAT_ACT")
+    _line_acceleration(memory, _field(data, "ACC", "LDAT_ACT"))
+    memory.write("$APO.CDIS", _field(data, "APO_DIST", "LDAT_ACT"))
+    memory.write("$ORI_TYPE", _field(data, "ORI_TYP", "LDAT_ACT", "#VAR"))
+    memory.write("$CIRC_TYPE", _field(data, "CIRC_TYP", "LDAT_ACT", memory.read("DEF_CIRC_TYP") or "#BASE"))
+    _line_speed(memory, _field(data, "VEL", "LDAT_ACT") if speed is None else speed)
 
 
 def _zone_data(memory: ProgramMemory, data: syntax.Value | None, usual: str) -> syntax.Value:
     """``APO_DIST`` of a joint motion's data, in percent or mm as its mode, which is returned, says; unclear where one
     of the two is not known. The other size stays as it is, as in controllers' own bas.src."""
-    given = data.get("APO_MODE") if isinstance(data, syntax.Record) else None
-    mode, distance = given or usual, syntax.number(_field(data, "APO_DIST", "zone"))
+    mode = _field(data, "APO_MODE", "zone", usual)
+    distance = syntax.number(_field(data, "APO_DIST", "zone"))
     if distance is None or isinstance(mode, syntax.Unclear):
         for part in ("CDIS", "CPTP"):
             memory.write(f"$APO.{part}", syntax.Unclear("APO_DIST"))
@@ -488,38 +334,100 @@ def _zone_data(memory: ProgramMemory, data: syntax.Value | None, usual: str) -> 
     return mode
 
 
-KINDS: dict[str, instructions.MotionKind] = {"PTP": "joint", "LIN": "line", "CIRC": "arc", "SPL": "spline"}
+def _with_frames(memory: ProgramMemory, setting: Setting, speed: syntax.Value) -> None:
+    setting(memory, speed)
+    _frames(memory, speed)
+
+
+Setting = Callable[[ProgramMemory, syntax.Value], None]
+BAS: dict[str, Setting] = {
+    "#INITMOV": _initial,
+    "#VEL_PTP": _joint_speed,
+    "#ACC_PTP": lambda memory, given: _all_axes(memory, "$ACC_AXIS", given),
+    "#VEL_CP": _line_speed,
+    "#ACC_CP": _line_acceleration,
+    "#TOOL": _tool_number,
+    "#BASE": _base_number,
+    "#EX_BASE": lambda memory, _: memory.write("$BASE", syntax.Unclear("BASE_DATA on an external axis")),
+    "#FRAMES": _frames,
+    "#PTP_DAT": lambda memory, _: _joint_data(memory, None),
+    "#PTP_PARAMS": lambda memory, given: _with_frames(memory, _joint_data, given),
+    "#CP_DAT": lambda memory, _: _line_data(memory, None),
+    "#CP_PARAMS": lambda memory, given: _with_frames(memory, _line_data, given),
+    **dict.fromkeys(("#OUT_SYNC", "#OUT_ASYNC", "#GROUP", "#ACC_GLUE"), lambda memory, _: None),
+}
+"""What commands of BAS do, by the value after them."""
+
+
+def _joint_zone(memory: ProgramMemory, data: syntax.Value) -> None:
+    if _zone_data(memory, data, "#CDIS") == "#CDIS":
+        memory.write("$APO.CPTP", "#CDIS")  # 100 on the controller, so that the distance decides
+
+
+OF_ONE_MOTION: dict[str, Setting] = {
+    "SVEL_CP": _line_speed,
+    "SVEL_JOINT": _joint_speed,
+    "SACC_JOINT": lambda memory, data: _all_axes(memory, "$ACC_AXIS", _field(data, "ACC", "SACC_JOINT")),
+    "SACC_CP": lambda memory, data: _line_acceleration(memory, _field(data, "ACC", "SACC_CP")),
+    "SAPO": lambda memory, data: memory.write("$APO.CDIS", _field(data, "APO_DIST", "SAPO")),
+    "SAPO_PTP": _joint_zone,
+    "STOOL2": _tool_data,
+    "SBASE": _base_number,
+    "SLOAD": _load_number,
+    "SIPO_MODE": lambda memory, given: memory.write("$IPO_MODE", given),
+    "SORI_TYP": lambda memory, data: memory.write("$ORI_TYPE", _field(data, "ORI_TYP", "SORI_TYP", "#VAR")),
+    "SCIRC_TYPE": lambda memory, data: memory.write("$CIRC_TYPE", _field(data, "CIRC_TYP", "SCIRC_TYPE", "#BASE")),
+}
+"""Functions after WITH, by the value that they are given."""
+
+
+def keep_setting(memory: ProgramMemory, name: str, expression: syntax.Expression) -> None:
+    """One item of a WITH."""
+    called = expression if isinstance(expression, syntax.Invocation) else None
+    setting = OF_ONE_MOTION.get(called.function) if called else None
+    if called and setting is not None:
+        first = called.arguments[0] if called.arguments else None
+        setting(memory, syntax.Unclear(name) if first is None else memory.value(first))
+        return
+    value = memory.value(expression)
+    if name in ("$VEL_AXIS[1]", "$ACC_AXIS[1]"):
+        _all_axes(memory, name[:-3], value)
+        return
+    frame, _, part = name.partition(".")
+    if part and frame in ("$TOOL", "$BASE"):
+        old, name = memory.read(frame), frame
+        value = old.having(part, value) if isinstance(old, syntax.Record) else syntax.Unclear(f"{frame}.{part}")
+    memory.write(name, value)
+    memory.shared.pop(name + "%name", None)
+
+
+KINDS: dict[str, instructions.MotionKind] = {"PTP": "joint", "LIN": "line", "CIRC": "arc"}
 MODAL = ("$TOOL", "$BASE", "$LOAD", "$VEL", "$ACC", "$APO", "$VEL_AXIS", "$ACC_AXIS", "$IPO_MODE", "$ORI_TYPE")
 SIZES_BY_AXES = frozenset(f"{name}{SIZES}" for name in ("$VEL_AXIS", "$ACC_AXIS", "$VEL_AXIS_C", "$ACC_AXIS_C"))
 """Sizes of the system's lists with an element for each axis of the arm; external axes have lists of their own."""
-MODAL_DATA = ("PDAT_ACT", "LDAT_ACT", "FDAT_ACT", "%spline")
-TURN_RATES = ("$VEL.ORI1", "$VEL.ORI2", "$ACC.ORI1", "$ACC.ORI2")
-HARMLESS_TEXT = """
-BASISTECH_PLC_INIT BASISTECH_PLC_LOOP CAST_FROM CAST_TO CCLOSE CHECKHOME CIOCTL CLEAR_KRLMSG COPEN CREAD CWRITE
-DELETE_BACKWARD_BUFFER EB EB_ABS EK EKI_CHECK EKI_CHECKBUFFER EKI_CLEAR EKI_CLEARBUFFER EKI_CLOSE EKI_GETBOOL
-EKI_GETBOOLARRAY EKI_GETFRAME EKI_GETFRAMEARRAY EKI_GETINT EKI_GETINTARRAY EKI_GETREAL EKI_GETREALARRAY EKI_GETSTRING
-EKI_INIT EKI_LOCK EKI_OPEN EKI_SEND EKI_SETBOOL EKI_SETFRAME EKI_SETINT EKI_SETREAL EKI_SETSTRING EKI_UNLOCK EO
-ERR_CLEAR ERR_RAISE EXISTS_KRLDLG EXISTS_KRLMSG FORWARD GETVARSTATE GET_MSGBUFFER GET_SIG_INF GET_SYSTEM_DATA H50 H70
-INVERSE IR_STOPM LK MSGDIALOG MSGINFO MSGLOG MSGNOTIFY MSGQUIT MSGSTATE P00 PULSE RESET_CD_PARAMS SET_CD_PARAMS
-SET_KRLDLG SET_KRLMSG SREAD STRADD STRCLEAR STRCOMP STRCOPY STRDECLLEN STRFIND STRLEN STRTOBOOL STRTOFRAME STRTOINT
-STRTOPOS STRTOREAL STRTOSTRING SWRITE SYNC TQM_FIFO_READ TQM_INI USERSPOT USER_GRP VARSTATE VAR_STATE
-"""
-HARMLESS = frozenset(HARMLESS_TEXT.split())
-"""Functions of the controller that move nothing and set no frame."""
-EVALUATED = frozenset((*IN_DEGREES, "ATAN2", "INV_POS"))
+TURN_RATES = ("$VEL.ORI1", "$VEL.ORI2")
 READING_TEXT = """
-BAS CHECKHOME CLEAR_KRLMSG CWRITE EKI_CHECKBUFFER EKI_CLEAR EKI_CLEARBUFFER EKI_CLOSE EKI_INIT EKI_LOCK EKI_OPEN
+CHECKHOME CLEAR_KRLMSG CWRITE EKI_CHECKBUFFER EKI_CLEAR EKI_CLEARBUFFER EKI_CLOSE EKI_INIT EKI_LOCK EKI_OPEN
 EKI_SEND EKI_SETBOOL EKI_SETFRAME EKI_SETINT EKI_SETREAL EKI_SETSTRING EKI_UNLOCK EXISTS_KRLMSG MSGINFO MSGLOG MSGNOTIFY
-MSGQUIT MSGSTATE PULSE STRCOMP STRDECLLEN STRFIND STRLEN VARSTATE VAR_STATE
+MSGQUIT MSGSTATE STRCOMP STRDECLLEN STRFIND STRLEN VARSTATE VAR_STATE
 """
 READING = frozenset(READING_TEXT.split())
 """Functions of a controller that only read their arguments; others, as ``SREAD`` and ``EKI_GETREAL``, may set them."""
-OF_SETTINGS_TEXT = """
-SVEL_CP SVEL_JOINT SACC_CP SACC_JOINT SAPO SAPO_PTP STOOL STOOL2 SBASE SIPO_MODE SJERK SLOAD SGEAR_JERK SORI_TYP
-SORI_TYPE SCIRC_TYP SCIRC_TYPE SCIRC_M USE_CM_PRO_VALUES USE_CM_PRO_VALUES_ONLY
+HARMLESS_TEXT = """
+BASISTECH_PLC_INIT BASISTECH_PLC_LOOP CAST_FROM CAST_TO CCLOSE CIOCTL COPEN CREAD
+DELETE_BACKWARD_BUFFER EB EB_ABS EK EKI_GETBOOL
+EKI_GETBOOLARRAY EKI_GETFRAME EKI_GETFRAMEARRAY EKI_GETINT EKI_GETINTARRAY EKI_GETREAL EKI_GETREALARRAY EKI_GETSTRING EO
+ERR_CLEAR ERR_RAISE EXISTS_KRLDLG FORWARD GETVARSTATE GET_MSGBUFFER GET_SIG_INF GET_SYSTEM_DATA H50 H70
+INVERSE IR_STOPM LK MSGDIALOG P00 PULSE RESET_CD_PARAMS SET_CD_PARAMS
+SET_KRLDLG SET_KRLMSG SREAD STRADD STRCLEAR STRCOPY STRTOBOOL STRTOFRAME STRTOINT
+STRTOPOS STRTOREAL STRTOSTRING SWRITE SYNC TQM_FIFO_READ TQM_INI USERSPOT USER_GRP
 """
-OF_SETTINGS = frozenset(OF_SETTINGS_TEXT.split())
-"""Functions after WITH, which :func:`keep_setting` reads."""
+HARMLESS = frozenset(HARMLESS_TEXT.split()) | READING
+"""Functions of the controller that move nothing and set no frame."""
+EVALUATED = frozenset((*IN_DEGREES, "INV_POS"))
+OF_SETTINGS_TEXT = "STOOL SJERK SGEAR_JERK SORI_TYPE SCIRC_TYP SCIRC_M USE_CM_PRO_VALUES USE_CM_PRO_VALUES_ONLY"
+OF_SETTINGS = frozenset((*OF_ONE_MOTION, *OF_SETTINGS_TEXT.split()))
+"""Functions after WITH; those that :func:`keep_setting` does not read give no known value."""
 HARMLESS_VARIABLES_TEXT = """
 $ACT_BASE $ACT_TOOL $CIRC_TYPE $FILTER $LOAD_A1 $LOAD_A2 $LOAD_A3
 $ACCU_STATE $ACC_EXTAX $ACT_GROUP $ADVANCE $ANOUT $AXWORKSPACE $BWDSTART $CMD $COLLMON_TOL_PRO $CP_STATMON
@@ -534,12 +442,10 @@ make axes soft, shift paths (``$CORR_T``, ``$TECH``) or choose other postures (`
 RUNNING = ("$CYCFLAG", "$DATE", "$OV_PRO", "$SOFT_PLCBOOL", "$SOFT_PLCINT", "$SOFT_PLCREAL", "$TIMER", "$TIMER_FLAG")
 """System variables that change after they are set: watches, expressions that are evaluated again and again, what the
 PLC of the controller writes."""
-ORIENTATION_TYPES = {"$ORI_TYPE": ("#VAR", "#CONSTANT"), "$CIRC_TYPE": ("#BASE",)}
+FOLLOWED_TYPES = {"$ORI_TYPE": "#VAR", "$CIRC_TYPE": "#BASE"}
 """How the tool may turn on lines and arcs so that they are followed as they are meant."""
 HERE = ("$POS_ACT", "$POS_FOR", "$POS_ACT_MES")
 HERE_JOINTS = ("$AXIS_ACT", "$AXIS_FOR", "$AXIS_ACT_MEAS")
-WHERE_INTERRUPTED = ("$POS_INT", "$AXIS_INT")
-"""Where the arm was when an interrupt came, which is known nowhere."""
 
 
 class Settings(NamedTuple):
@@ -558,102 +464,82 @@ class KrlDialect(Dialect):
 
     frames = ("$TOOL", "$BASE")
     whole_division = True
-    modal = frozenset((*MODAL, *MODAL_DATA))
+    modal = frozenset((*MODAL, "PDAT_ACT", "LDAT_ACT", "FDAT_ACT"))
+    harmless = HARMLESS | EVALUATED | OF_SETTINGS
+    reading = READING | EVALUATED | OF_SETTINGS | {"BAS"}
+    by_reference = True
 
     def is_signal(self, name: str) -> bool:
         """Outputs."""
         return name.startswith(("$OUT[", "$ANOUT["))
 
-    def runs_on(self, name: str) -> bool:
-        """Timers, cyclic flags, the override."""
-        return root(name) in RUNNING
+    def reads_back(self, name: str) -> bool:
+        """All but timers, cyclic flags, the override."""
+        return root(name) not in RUNNING
 
-    def is_followed(self, name: str, value: syntax.Value) -> bool:
-        """Whether motions are followed as a variable asks that is set to a value."""
+    def is_followed(self, name: str) -> bool:
+        """Whether motions are followed as a variable asks."""
         return not name.startswith("$") or root(name) in HARMLESS_VARIABLES
-
-    def frame_of(self, value: syntax.Value | None) -> Reals | None:
-        """A frame's."""
-        return record_pose(value)
 
     def named(self, name: str) -> bool:
         """Tool and base keep the name of what they are set to."""
         return name in ("$TOOL", "$BASE")
 
     def typed(self, kind: str, value: syntax.Value) -> syntax.Value:
-        """Coordinates are REAL, however they are written; a field of the program's own type is what it declares."""
+        """Coordinates are REAL, however they are written; a frame has no posture."""
         if not isinstance(value, syntax.Record) or kind not in ("", *POSITION_KINDS):
             return value
-        if kind == "FRAME":
-            value = syntax.Record(value.kind, tuple(each for each in value.items if each[0] not in ("S", "T")))
         items = (
-            (key, float(each) if isinstance(each, int) and key in COORDINATES and not isinstance(each, bool) else each)
+            (key, float(each) if key in COORDINATES and isinstance(each, int) and not isinstance(each, bool) else each)
             for key, each in value.items
+            if kind != "FRAME" or key not in ("S", "T")
         )
         return syntax.Record(value.kind, tuple(items))
-
-    def assigned(self, old: syntax.Value, new: syntax.Value) -> syntax.Value:
-        """A position that leaves out what the variable had: no source says whether the controller keeps that."""
-        if (
-            not isinstance(old, syntax.Record)
-            or not isinstance(new, syntax.Record)
-            or not (is_frame(new) or _has_axes(new))
-        ):
-            return new
-        missing = tuple(
-            (key, syntax.Unclear(f"{LEFT_OUT} {syntax.shown(new)}")) for key, _ in old.items if new.get(key) is None
-        )
-        return syntax.Record(new.kind, (*new.items, *missing))
 
     def constant(self, memory: ProgramMemory, name: str) -> syntax.Value | None:
         """Frames of the controller and of the cell, and where the arm is."""
         if name in ("$NULLFRAME", "$WORLD", "$ROBROOT"):
-            return frame_record(instructions.pose_of((0.0,) * 6, "kuka"))
+            return frame_record(instructions.pose_of(NULL, "kuka"))
         if name == "$NUM_AX":
             return memory.cell.joints
         if name in SIZES_BY_AXES:
             return (max(6, memory.cell.joints),)
         if (mapped := memory.cell.frames.get(name)) is not None:
             return frame_record(mapped)
+        joints = memory.here.joints
         if name in HERE:
-            seen = memory.here.seen(tool_of(memory), base_of(memory), memory.cell.flange)
-            return None if seen is None else _posture(frame_record(seen, "E6POS"), memory.here.joints, name)
-        if name in HERE_JOINTS and memory.here.joints is not None:
-            degrees = [math.degrees(each) for each in memory.here.joints]
-            return syntax.Record("E6AXIS", tuple((f"A{i + 1}", each) for i, each in enumerate(degrees)))
+            seen = memory.here.seen(_frame(memory, "$TOOL"), _frame(memory, "$BASE"), memory.cell.flange)
+            if seen is None:
+                return None
+            turn = (
+                syntax.Unclear(f"T of {name}") if joints is None else sum(1 << i for i, q in enumerate(joints) if q < 0)
+            )
+            posture = (("S", syntax.Unclear(f"S of {name}")), ("T", turn))  # Status depends on the arm
+            return syntax.Record("E6POS", (*frame_record(seen).items, *posture))
+        if name in HERE_JOINTS and joints is not None:
+            return syntax.Record("E6AXIS", tuple((f"A{i + 1}", math.degrees(q)) for i, q in enumerate(joints)))
         return None
 
     def function(self, memory: ProgramMemory, name: str, given: syntax.Invocation) -> syntax.Value:
         """Mathematics in degrees, and inverse frames."""
         values = tuple(None if each is None else memory.value(each) for each in given.arguments)
-        if name == "INV_POS" and len(values) == 1 and is_frame(values[0]):
-            pose = record_pose(values[0])
-            if pose is not None:
-                inverse = pose.copy()
-                inverse[:3, :3] = pose[:3, :3].T
-                inverse[:3, 3] = -pose[:3, :3].T @ pose[:3, 3]
-                return frame_record(inverse)
         found: syntax.Value | None = None
-        if name == "ATAN2":
-            found = evaluated(lambda y, x: math.degrees(math.atan2(y, x)), values)
+        if name == "INV_POS" and len(values) == 1 and (pose := record_pose(values[0])) is not None:
+            found = frame_record(np.asarray(np.linalg.inv(pose), np.float64))
         elif name in IN_DEGREES:
             found = evaluated(IN_DEGREES[name], values)
         return syntax.Unclear(f"{name}(...)") if found is None else found
 
-    def product(self, left: syntax.Value, right: syntax.Value) -> syntax.Value:
+    def combined(self, sign: str, left: syntax.Value, right: syntax.Value) -> syntax.Value | None:
         """The geometric operator: ``right`` in the frame ``left``."""
-        for each in (left, right):
-            if isinstance(each, syntax.Unclear):
-                return each
         a, b = record_pose(left), record_pose(right)
-        if a is None or b is None or not isinstance(right, syntax.Record):
-            return syntax.Unclear(f"{syntax.shown(left)}:{syntax.shown(right)}")
-        found = syntax.Record(right.kind, frame_record(a @ b).items)
-        rest = [(key, value) for key, value in right.items if key not in FRAME_KEYS]
-        return syntax.Record(found.kind, (*found.items, *rest))
+        if sign != ":" or a is None or b is None or not isinstance(right, syntax.Record):
+            return None
+        rest = (pair for pair in right.items if pair[0] not in FRAME_KEYS)
+        return syntax.Record(right.kind, (*frame_record(a @ b).items, *rest))
 
     def motion(self, memory: ProgramMemory, move: syntax.Move) -> instructions.ArmMotion:
-        """PTP, LIN, CIRC and their relatives and splines."""
+        """PTP, LIN, CIRC and their relatives."""
         if not move.settings:
             return self._motion(memory, move, None)
         kept, angle, other = dict(memory.shared), None, ""
@@ -663,9 +549,8 @@ class KrlDialect(Dialect):
                 angle = math.radians(degrees) if degrees is not None else math.nan
                 continue
             keep_setting(memory, name, expression)
-            value = known(memory.read(name), name)
-            if not self.is_followed(name, value):
-                other = f"{name}={syntax.shown(value)}"
+            if not self.is_followed(name):
+                other = name
         found = self._motion(memory, move, angle)
         memory.shared = kept
         memory.kept.clear()
@@ -673,126 +558,83 @@ class KrlDialect(Dialect):
 
     def _motion(self, memory: ProgramMemory, move: syntax.Move, angle: float | None) -> instructions.ArmMotion:
         plain = move.form.removesuffix("_REL")
-        kind = KINDS[plain.removeprefix("S") if plain != "SPL" else plain]
-        tool, base, speed, acceleration, zone, load = _settings(memory, kind, move)
-        values = [self._argument(memory, each) for each in move.arguments]
-        if len(values) != (2 if kind == "arc" else 1):
-            values = [UNREAD, UNREAD]
-        left_out = () if plain != move.form else tuple(map(_left_out, repeat(memory), move.arguments, values))
-        make = relative if plain != move.form else target
+        kind, is_relative = KINDS[plain.removeprefix("S")], plain != move.form
+        settings = _settings(memory, kind, move)
+        values = [_argument(memory, each) for each in move.arguments]
         in_tool = "#TOOL" in move.words
-        made = [make(memory, value, (tool, base), (move.text, in_tool)) for value in values]
-        if kind in ("line", "arc", "spline") and memory.read("$ORI_TYPE") == "#CONSTANT":
-            made = [self._unturned(memory, each, (tool, base)) for each in made]
+        make = relative if is_relative else target
+        made = [make(memory, value, settings[:2], (move.text, in_tool)) for value in values]
+        if len(made) != (2 if kind == "arc" else 1):
+            made = [instructions.UnresolvedTarget(move.text, "not_understood")] * 2
+        said = [] if kind == "joint" else _other_turns(memory, kind)
         if kind != "joint":  # which ignores S and T
             made = [replace(each, branch=None) if isinstance(each, instructions.PoseTarget) else each for each in made]
-        said = [*left_out, self._turns(memory, kind)]
-        if plain != move.form and not in_tool:  # no public text says how angles are added to those before
-            said += [text for value in values if (text := _turned_by(value))]
-        via = made[0] if kind == "arc" else None
-        block = memory.shared.get("%spline")
+        for argument, value in zip(move.arguments, values):
+            if not is_relative:
+                said += _left_out(memory, argument, value)
+            elif not in_tool:  # no public text says how angles are added to those before
+                said += _turned_by(value)
         return instructions.ArmMotion(
             kind,
             made[-1],
             move.form,
-            via,
+            made[0] if kind == "arc" else None,
             angle if kind == "arc" else None,
-            speed,
-            acceleration,
-            zone,
-            tool,
-            base,
-            block if isinstance(block, int) and block else None,
-            not_followed="; ".join(filter(None, said)),
-            turning=(None, None) if kind == "joint" else (_turning(memory, "ORI1"), _turning(memory, "ORI2")),
-            load=load,
+            settings.speed,
+            settings.acceleration,
+            settings.zone,
+            settings.tool,
+            settings.base,
+            load=settings.load,
+            not_followed=", ".join(said),
+            turn_speed=None if kind == "joint" else _turn_speed(memory),
         )
-
-    def _turns(self, memory: ProgramMemory, kind: instructions.MotionKind) -> str:
-        """The setting of how the tool turns on lines and arcs that is not followed; empty for none."""
-        if kind == "joint":
-            return ""
-        given = ((name, memory.read(name)) for name in ORIENTATION_TYPES if kind == "arc" or name != "$CIRC_TYPE")
-        other = (
-            f"{name}={syntax.shown(value)}" for name, value in given if value and value not in ORIENTATION_TYPES[name]
-        )
-        return ", ".join(other)
-
-    def _unturned(self, memory: ProgramMemory, goal: instructions.Target, frames: Frames) -> instructions.Target:
-        """The target with the orientation that the tool has before: ``$ORI_TYPE=#CONSTANT``."""
-        if not isinstance(goal, instructions.PoseTarget):
-            return goal
-        seen = memory.here.seen(*frames, memory.cell.flange)
-        if seen is None:
-            return instructions.UnresolvedTarget("$ORI_TYPE=#CONSTANT", "position_unknown")
-        pose = goal.pose.copy()
-        pose[:3, :3] = seen[:3, :3]
-        return replace(goal, pose=pose)
-
-    def _argument(self, memory: ProgramMemory, argument: syntax.Expression | None) -> syntax.Value:
-        """A motion's argument; to go to where the arm is, wherever that is, no joint moves."""
-        if argument is None:
-            return syntax.Unclear("")
-        name = argument.name if isinstance(argument, syntax.Variable) else ""
-        lost = name in WHERE_INTERRUPTED and memory.here.joints is None and memory.here.pose is None
-        if (lost or name in HERE + HERE_JOINTS) and isinstance(memory.value(argument), syntax.Unclear):
-            return syntax.Record("E6AXIS", ())
-        return memory.value(argument)
 
     def carry_out(self, memory: ProgramMemory, doing: syntax.Doing) -> instructions.Instruction | None:
-        """Settings by BAS, ends of splines, signals by PULSE; the rest is unknown."""
+        """Settings by BAS, signals by PULSE; the rest as in all languages."""
         call = doing.what
-        assert isinstance(call, syntax.Invocation)
-        if call.function in ("%SPLINE", "%ENDSPLINE"):
-            memory.write("%spline", doing.place.line if call.function == "%SPLINE" else 0)
+        values = [memory.value(each) for each in call.arguments if each is not None]
+        if call.function == "BAS" and values and str(values[0]) in BAS:
+            memory.shared.pop("$BASE%name", None)
+            BAS[str(values[0])](memory, values[1] if len(values) > 1 else syntax.Unclear("BAS"))
             return None
-        if call.function == "BAS":
-            return None if set_by_bas(memory, call) else instructions.Unknown(doing.text)
-        if call.function == "PULSE" and call.arguments and call.arguments[0] is not None:
-            name = memory.key(call.arguments[0]) or "$OUT"
-            memory.forget("$OUT")  # which is what it was again, but nobody knows when
-            return instructions.Output(name, doing.text)
-        return instructions.Aside(doing.text) if self.harmless(call) else instructions.Unknown(doing.text)
-
-    def harmless(self, call: syntax.Invocation) -> bool:
-        """Messages, files, signals."""
+        if call.function == "PULSE" and values:
+            return instructions.Output("$OUT", doing.text)
+        if call.function == "P00":
+            memory.forget("PGNO")
         if call.function == "CWRITE" and syntax.Variable("$CMD") in call.arguments:  # commands, as to run a program
-            return False
-        return call.function in HARMLESS | EVALUATED | OF_SETTINGS
+            return instructions.Unknown(doing.text)
+        return super().carry_out(memory, doing)
 
 
-def _turned_by(value: syntax.Value) -> str:
-    """The angles of a relative position, as text; empty where it does not turn."""
+def _argument(memory: ProgramMemory, argument: syntax.Expression | None) -> syntax.Value:
+    """A motion's argument; to go to where the arm is, wherever that is, no joint moves."""
+    if argument is None:
+        return syntax.Unclear("")
+    value = memory.value(argument)
+    here = isinstance(argument, syntax.Variable) and argument.name in HERE + HERE_JOINTS
+    return syntax.Record("E6AXIS", ()) if here and isinstance(value, syntax.Unclear) else value
+
+
+def _other_turns(memory: ProgramMemory, kind: instructions.MotionKind) -> list[str]:
+    """The settings of how the tool turns on lines and arcs that are not followed."""
+    given = ((name, memory.read(name)) for name in FOLLOWED_TYPES if kind == "arc" or name != "$CIRC_TYPE")
+    return [f"{name}={syntax.shown(value)}" for name, value in given if value and value != FOLLOWED_TYPES[name]]
+
+
+def _turned_by(value: syntax.Value) -> list[str]:
+    """The angles of a relative position, as text."""
     items = value.items if isinstance(value, syntax.Record) else ()
-    turned = (
-        f"{key} {syntax.shown(part)}" for key, part in items if key in FRAME_KEYS[3:] and syntax.number(part) != 0
-    )
-    return ", ".join(turned)
+    return [f"{key} {syntax.shown(each)}" for key, each in items if key in "ABC" and syntax.number(each) != 0]
 
 
-def _left_out(memory: ProgramMemory, argument: syntax.Expression | None, value: syntax.Value) -> str:
-    """What a variable's position leaves out, which no source says where it is taken from; empty for nothing."""
+def _left_out(memory: ProgramMemory, argument: syntax.Expression | None, value: syntax.Value) -> list[str]:
+    """What a variable's position leaves out, which no source says where it is taken from."""
     held = isinstance(argument, (syntax.Variable, syntax.Member, syntax.Element))
     if not held or not isinstance(value, syntax.Record) or not value.items:
-        return ""
+        return []
     keys = AXIS_KEYS[: memory.cell.joints] if _has_axes(value) else FRAME_KEYS
-    return ", ".join(key for key in keys if value.get(key) is None)
-
-
-def changed_arguments(call: syntax.Invocation) -> tuple[syntax.Expression | None, ...]:
-    """What a function outside the program may change: all that it is given, as KRL passes by reference, but for system
-    variables that nothing sets; and the program's number by ``P00``."""
-    name = call.function
-    if name == "P00":
-        return (syntax.Variable("PGNO"),)
-    if name.startswith("%") or name in EVALUATED | OF_SETTINGS | READING:
-        return ()
-    return tuple(each for each in call.arguments if each is not None and _is_set(variable_of(each)))
-
-
-def _is_set(name: str) -> bool:
-    """Whether a variable may be set: no system variable but those that motions use, outputs and flags."""
-    return not name.startswith("$") or name in (*MODAL, "$ANOUT", "$FLAG", "$OUT")
+    return [key for key in keys if value.get(key) is None]
 
 
 def _settings(memory: ProgramMemory, kind: instructions.MotionKind, move: syntax.Move) -> Settings:
@@ -800,14 +642,13 @@ def _settings(memory: ProgramMemory, kind: instructions.MotionKind, move: syntax
     key = (kind, move.words)
     found = memory.kept.get(key)
     if not isinstance(found, Settings):
-        found = Settings(
-            tool_of(memory),
-            base_of(memory),
-            _speed(memory, kind),
-            _acceleration(memory, kind),
-            _zone(memory, kind, move.words),
-            _load(memory),
-        )
+        tool, base = _frame(memory, "$TOOL"), _frame(memory, "$BASE")
+        zone, load = _zone(memory, kind, move.words), memory.read("$LOAD")
+        part = memory.read("$LOAD.M")
+        given = load_of(load)
+        if part is not None and not isinstance(load, syntax.Record):  # of a load whose whole is not known
+            given = instructions.UnclearLoad("$LOAD.M", syntax.number(part))
+        found = Settings(tool, base, _speed(memory, kind), _acceleration(memory, kind), zone, given)
         memory.kept[key] = found
     return found
 
@@ -830,17 +671,17 @@ def _acceleration(memory: ProgramMemory, kind: instructions.MotionKind) -> instr
     return syntax.rate_of(value, "m/s2")
 
 
-def _turning(memory: ProgramMemory, part: str) -> instructions.Turning | None:
-    """How fast the tool may turn on lines and arcs, deg/s and deg/s2: ORI1 of its direction, ORI2 about that."""
-    speed = syntax.rate_of(memory.read(f"$VEL.{part}"), "rad/s", math.degrees(1.0))
-    if speed is None:
-        return None
-    return instructions.Turning(speed, syntax.rate_of(memory.read(f"$ACC.{part}"), "rad/s2", math.degrees(1.0)))
+def _turn_speed(memory: ProgramMemory) -> float | None:
+    """How fast the tool may turn on lines and arcs, rad/s: the slower of its direction and of the turn about that."""
+    given = [syntax.number(memory.read(name)) for name in TURN_RATES]
+    return min((math.radians(each) for each in given if each is not None and each > 0), default=None)
 
 
 def _axis_share(memory: ProgramMemory, name: str) -> instructions.Rate | None:
     """What is set for the axes in percent: one that is not known, else one beyond 100, else the slowest."""
     values = [memory.read(f"{name}[{axis}]") for axis in range(1, 7)]
+    if isinstance(values[0], syntax.Record):
+        return instructions.Rate(1.0, "share", f"{syntax.shown(values[0].values()[0])} %")
     given = [rate for value in values if (rate := syntax.rate_of(value, "share", 100.0)) is not None]
     if any(rate.text for rate in given):
         return next(rate for rate in given if rate.text)
@@ -852,18 +693,17 @@ def _zone(memory: ProgramMemory, kind: instructions.MotionKind, words: tuple[str
     given = [word for word in words if word.startswith("C_")]
     if not given:
         return instructions.FINE
-    word = given[0]
+    word, size = given[0], None
+    distance, joint_zone = syntax.number(memory.read("$APO.CDIS")), memory.read("$APO.CPTP")
+    joint_word = word == "C_PTP" or (word == "C_SPL" and kind == "joint")
     if kind == "joint" and {"C_ORI", "C_VEL"}.intersection(given):  # which hold on the line or arc after it
         return instructions.Zone("named", 0.0, " ".join(given))
-    distance, joint_zone = syntax.number(memory.read("$APO.CDIS")), memory.read("$APO.CPTP")
-    share = syntax.number(joint_zone)
-    if (word == "C_PTP" or (word == "C_SPL" and kind == "joint")) and share is not None:
+    if joint_word and (share := syntax.number(joint_zone)) is not None:
         return instructions.Zone("share", share / 100, word)
-    if (word in ("C_DIS", "C_SPL") or (word == "C_PTP" and joint_zone == "#CDIS")) and distance is not None:
+    if distance is not None and (word in ("C_DIS", "C_SPL") or (joint_word and joint_zone == "#CDIS")):
         return instructions.Zone("distance", distance / 1000, word)
-    angle, slow = syntax.number(memory.read("$APO.CORI")), syntax.number(memory.read("$APO.CVEL"))
-    if word == "C_ORI" and angle is not None:
-        return instructions.Zone("angle", math.radians(angle), word)
-    if word == "C_VEL" and slow is not None:
-        return instructions.Zone("velocity", slow / 100, word)
+    if word == "C_ORI" and (size := syntax.number(memory.read("$APO.CORI"))) is not None:
+        return instructions.Zone("angle", math.radians(size), word)
+    if word == "C_VEL" and (size := syntax.number(memory.read("$APO.CVEL"))) is not None:
+        return instructions.Zone("velocity", size / 100, word)
     return instructions.Zone("named", 0.0, word)

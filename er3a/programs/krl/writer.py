@@ -12,7 +12,7 @@ import numpy as np
 
 from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, writing
-from er3a.programs.krl.dialect import AXIS_KEYS, FRAME_KEYS
+from er3a.programs.krl.dialect import AXIS_KEYS, FRAME_KEYS, TURN_RATES
 from er3a.robots.masses import MassBody
 
 DIGITS = 6
@@ -66,10 +66,7 @@ class KrlWriter(writing.Writer):
         self._frame("$BASE", motion.base)
         self._speeds(ready)
         zone = self._zone(motion)
-        if motion.kind == "spline":
-            self.count["splines"] += 1
         if motion.kind == "arc":
-            self.count["turned"] += motion.with_path and ready.turn_matters
             angle = "" if motion.angle is None else f", CA {writing.fixed(math.degrees(motion.angle), DIGITS)}"
             self.lines.append(f"CIRC {via}, {target}{angle}{zone}")
         else:
@@ -120,14 +117,9 @@ class KrlWriter(writing.Writer):
             self.count["estimated"] += 1
         if motion.acceleration is not None and motion.acceleration.unit == "m/s2":
             self.set_once("$ACC.CP", f"$ACC.CP={writing.short(motion.acceleration.value)}")
-        for part, limit in zip(("ORI1", "ORI2"), motion.turning):
-            if limit is not None:
-                self._turn(f"$VEL.{part}", limit.speed)
-                self._turn(f"$ACC.{part}", limit.acceleration)
-
-    def _turn(self, name: str, rate: instructions.Rate | None) -> None:
-        if rate is not None and rate.value > 0:
-            self.set_once(name, f"{name}={writing.short(math.degrees(rate.value))}")
+        if motion.turn_speed is not None:
+            for name in TURN_RATES:
+                self.set_once(name, f"{name}={writing.short(math.degrees(motion.turn_speed))}")
 
     def _joint_speed(self, ready: writing.ReadyMotion) -> None:
         speed = ready.motion.speed

@@ -25,41 +25,26 @@ from er3a.programs.instructions import MeantSolution, numbers_of, pose_of
 from er3a.programs.syntax import Record, Unclear, Value, finite, number, numbers
 from er3a.robots.masses import MassBody
 
-Shape = tuple["str | Shape", ...]
-"""A type: its word alone, a record as its word and then pairs of a name and a shape, an array as ``[]`` and a shape."""
-
-NUM: Shape = ("NUM",)
-BOOL: Shape = ("BOOL",)
-STRING: Shape = ("STRING",)
-
-
-def record_shape(kind: str, **items: Shape) -> Shape:
-    """The shape of a record."""
-    return (kind, *((name.upper(), shape) for name, shape in items.items()))
-
-
-POS = record_shape("POS", x=NUM, y=NUM, z=NUM)  # 3 pos: mm
-ORIENT = record_shape("ORIENT", q1=NUM, q2=NUM, q3=NUM, q4=NUM)  # 3 orient: a quaternion, the scalar first
-POSE = record_shape("POSE", trans=POS, rot=ORIENT)
-CONFDATA = record_shape("CONFDATA", cf1=NUM, cf4=NUM, cf6=NUM, cfx=NUM)
-EXTJOINT = record_shape("EXTJOINT", **{f"eax_{letter}": NUM for letter in "abcdef"})
-ROBJOINT = record_shape("ROBJOINT", **{f"rax_{i}": NUM for i in range(1, 7)})
-LOADDATA = record_shape("LOADDATA", mass=NUM, cog=POS, aom=ORIENT, ix=NUM, iy=NUM, iz=NUM)
-ROBTARGET = record_shape("ROBTARGET", trans=POS, rot=ORIENT, robconf=CONFDATA, extax=EXTJOINT)
-JOINTTARGET = record_shape("JOINTTARGET", robax=ROBJOINT, extax=EXTJOINT)
-TOOLDATA = record_shape("TOOLDATA", robhold=BOOL, tframe=POSE, tload=LOADDATA)
-WOBJDATA = record_shape("WOBJDATA", robhold=BOOL, ufprog=BOOL, ufmec=STRING, uframe=POSE, oframe=POSE)
-SPEEDDATA = record_shape("SPEEDDATA", v_tcp=NUM, v_ori=NUM, v_leax=NUM, v_reax=NUM)
-ZONE_ITEMS = ("pzone_tcp", "pzone_ori", "pzone_eax", "zone_ori", "zone_leax", "zone_reax")
-ZONEDATA = record_shape("ZONEDATA", finep=BOOL, **dict.fromkeys(ZONE_ITEMS, NUM))
-SHAPES: Mapping[str, Shape] = {
-    str(shape[0]): shape
-    for shape in (
-        *(NUM, ("DNUM",), BOOL, STRING, POS, ORIENT, POSE, CONFDATA, EXTJOINT, ROBJOINT, LOADDATA, ROBTARGET),
-        *(JOINTTARGET, TOOLDATA, WOBJDATA, SPEEDDATA, ZONEDATA),
-    )
+AXES = "A B C D E F"
+SHAPES: Mapping[str, Mapping[str, str]] = {
+    "POS": dict.fromkeys("XYZ", "NUM"),  # 3 pos: mm
+    "ORIENT": dict.fromkeys(("Q1", "Q2", "Q3", "Q4"), "NUM"),  # 3 orient: a quaternion, the scalar first
+    "POSE": {"TRANS": "POS", "ROT": "ORIENT"},
+    "CONFDATA": dict.fromkeys(("CF1", "CF4", "CF6", "CFX"), "NUM"),
+    "EXTJOINT": {f"EAX_{letter}": "NUM" for letter in AXES.split()},
+    "ROBJOINT": {f"RAX_{i}": "NUM" for i in range(1, 7)},
+    "LOADDATA": {"MASS": "NUM", "COG": "POS", "AOM": "ORIENT", "IX": "NUM", "IY": "NUM", "IZ": "NUM"},
+    "ROBTARGET": {"TRANS": "POS", "ROT": "ORIENT", "ROBCONF": "CONFDATA", "EXTAX": "EXTJOINT"},
+    "JOINTTARGET": {"ROBAX": "ROBJOINT", "EXTAX": "EXTJOINT"},
+    "TOOLDATA": {"ROBHOLD": "BOOL", "TFRAME": "POSE", "TLOAD": "LOADDATA"},
+    "WOBJDATA": {"ROBHOLD": "BOOL", "UFPROG": "BOOL", "UFMEC": "STRING", "UFRAME": "POSE", "OFRAME": "POSE"},
+    "SPEEDDATA": dict.fromkeys(("V_TCP", "V_ORI", "V_LEAX", "V_REAX"), "NUM"),
+    "ZONEDATA": {
+        "FINEP": "BOOL",
+        **dict.fromkeys(("PZONE_TCP", "PZONE_ORI", "PZONE_EAX", "ZONE_ORI", "ZONE_LEAX", "ZONE_REAX"), "NUM"),
+    },
 }
-"""Types whose components are known."""
+"""Structured types: their components with the types of these. ``[]`` after a type makes an array of it."""
 
 NO_AXIS = 9e9
 """Of an external axis that is not there, or stays."""
@@ -70,16 +55,6 @@ TOOL_SPEEDS = (
 )
 """3 speeddata: v5 to v7000, mm/s; each with 500 deg/s, 5000 mm/s, 1000 deg/s."""
 TURN_SPEED, SLIDE_SPEED, AXIS_SPEED = 500.0, 5000.0, 1000.0
-TURN_SPEEDS = {"VROT1": 1, "VROT2": 2, "VROT5": 5, "VROT10": 10, "VROT20": 20, "VROT50": 50, "VROT100": 100}
-SLIDE_SPEEDS = {
-    "VLIN10": 10,
-    "VLIN20": 20,
-    "VLIN50": 50,
-    "VLIN100": 100,
-    "VLIN200": 200,
-    "VLIN500": 500,
-    "VLIN1000": 1000,
-}
 FASTEST = "VMAX"
 ZONES: Mapping[str, tuple[float, ...]] = {
     "Z0": (0.3, 0.3, 0.3, 0.03, 0.3, 0.03),
@@ -100,55 +75,42 @@ ZONES: Mapping[str, tuple[float, ...]] = {
 """3 zonedata: mm of the path, of the turn and of external axes; deg; mm; deg."""
 
 
-def typed(value: Value, shape: Shape) -> Value:
+def typed(value: Value, kind: str) -> Value:
     """A value as its declared type has it: aggregates get the names of their components; others stay as they are."""
-    if not isinstance(value, tuple) or len(shape) == 1:
+    if isinstance(value, tuple) and kind.endswith("[]"):
+        return tuple(typed(each, kind[:-2]) for each in value)
+    shape = SHAPES.get(kind)
+    values = value.values() if isinstance(value, Record) else value
+    if shape is None or not isinstance(values, tuple) or len(values) != len(shape):
         return value
-    if shape[0] == "[]":
-        assert isinstance(shape[1], tuple)
-        inside = shape[1]
-        return tuple(typed(each, inside) for each in value)
-    parts = shape[1:]
-    if len(parts) != len(value):
+    if isinstance(value, Record) and value.kind != kind:
         return value
-    items = []
-    for part, each in zip(parts, value):
-        assert isinstance(part, tuple)
-        assert isinstance(part[0], str)
-        assert isinstance(part[1], tuple)
-        items.append((part[0], typed(each, part[1])))
-    return Record(str(shape[0]), tuple(items))
+    return Record(kind, tuple((name, typed(each, part)) for (name, part), each in zip(shape.items(), values)))
 
 
-def starting(shape: Shape) -> Value | None:
+def starting(kind: str) -> Value | None:
     """What a variable holds that is declared without a value (RAPID overview, 1 Data types); None if not known."""
-    if len(shape) == 1:
-        plain_values: dict[str, Value] = {"NUM": 0, "DNUM": 0, "BOOL": False, "STRING": ""}
-        return plain_values.get(str(shape[0]))
-    parts = [starting(part[1]) for part in shape[1:] if isinstance(part, tuple) and isinstance(part[1], tuple)]
-    found = tuple(each for each in parts if each is not None)
-    return typed(found, shape) if len(found) == len(shape) - 1 and shape[0] != "[]" else None
+    plain_values: dict[str, Value] = {"NUM": 0, "DNUM": 0, "BOOL": False, "STRING": ""}
+    if kind not in SHAPES:
+        return plain_values.get(kind)
+    return typed(tuple(starting(part) or 0 for part in SHAPES[kind].values()), kind)
 
 
 def predefined(name: str) -> Value | None:
     """The value of a name that every controller has."""
     if name == "FINE":
-        return typed((True, *(0.0,) * 6), ZONEDATA)
+        return typed((True, *(0.0,) * 6), "ZONEDATA")
     if name in ZONES:
-        return typed((False, *ZONES[name]), ZONEDATA)
+        return typed((False, *ZONES[name]), "ZONEDATA")
     if name[:1] == "V" and name[1:].isdigit() and int(name[1:]) in TOOL_SPEEDS:
-        return typed((float(name[1:]), TURN_SPEED, SLIDE_SPEED, AXIS_SPEED), SPEEDDATA)
+        return typed((float(name[1:]), TURN_SPEED, SLIDE_SPEED, AXIS_SPEED), "SPEEDDATA")
     if name == FASTEST:  # how fast that is depends on the arm
         return Record("SPEEDDATA", (("FASTEST", True),))
-    if name in TURN_SPEEDS:
-        return typed((0.0, 0.0, 0.0, float(TURN_SPEEDS[name])), SPEEDDATA)
-    if name in SLIDE_SPEEDS:
-        return typed((0.0, 0.0, float(SLIDE_SPEEDS[name]), 0.0), SPEEDDATA)
     load = (0.001, (0.0, 0.0, 0.001), (1.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0)
-    values: dict[str, tuple[Value, Shape]] = {
-        "TOOL0": ((True, NULL_POSE, load), TOOLDATA),
-        "WOBJ0": ((False, True, "", NULL_POSE, NULL_POSE), WOBJDATA),
-        "LOAD0": (load, LOADDATA),
+    values: dict[str, tuple[Value, str]] = {
+        "TOOL0": ((True, NULL_POSE, load), "TOOLDATA"),
+        "WOBJ0": ((False, True, "", NULL_POSE, NULL_POSE), "WOBJDATA"),
+        "LOAD0": (load, "LOADDATA"),
     }
     if name in values:
         return typed(*values[name])
@@ -216,7 +178,7 @@ def orient_record(R: Reals) -> Record:
     """A rotation (3, 3) as an orient."""
     T = np.eye(4)
     T[:3, :3] = R
-    found = typed(numbers_of(T, "abb")[3:], ORIENT)
+    found = typed(numbers_of(T, "abb")[3:], "ORIENT")
     assert isinstance(found, Record)
     return found
 
@@ -271,8 +233,7 @@ def quarters_of(joints: Reals) -> tuple[int, ...]:
 
 def external_axes(value: Value | None) -> tuple[tuple[str, float], ...]:
     """Axes beside the arm that an extjoint moves: those that are there and not at 0; NaN where that is not known."""
-    if not isinstance(value, Record):
-        value = typed(value, EXTJOINT) if value is not None else None
+    value = typed(value, "EXTJOINT") if value is not None else None
     if isinstance(value, Unclear):
         return (("extax", math.nan),)
     if not isinstance(value, Record):

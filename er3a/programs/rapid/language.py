@@ -6,7 +6,7 @@ import re
 
 from er3a.programs.program_language import SIX_ANGLES, Language
 from er3a.programs.rapid.dialect import RapidDialect
-from er3a.programs.rapid.reader import SUFFIXES, companions, read_rapid
+from er3a.programs.rapid.reader import SUFFIXES, modules_of, read_rapid
 from er3a.programs.rapid.writer import RapidWriter
 
 SIGN = r"(?im)^\s*(?:%%%\s*$|MODULE\s+\w+|(?:LOCAL\s+)?PROC\s+\w+\s*\(|(?:CONST|PERS|VAR)\s+\w+\s+\w+.*:=\s*\[)"
@@ -19,5 +19,5 @@ RAPID = Language(
     writer=RapidWriter,
     joints=SIX_ANGLES,
     contents=".pgf",
-    companions=companions,
+    companions=modules_of,
 )

@@ -82,7 +82,6 @@ class RapidWriter(writing.Writer):
             conf = self._configuration(ready, "ConfJ" if motion.kind == "joint" else "ConfL")
             texts = [] if ready.via is None or motion.kind != "arc" else [_target_text(ready.via, conf)]
             texts.append(_target_text(ready.pose, conf))
-        self.count["splines"] += motion.kind == "spline"
         speed = self._speed(ready)
         zone = self._zone(motion)
         base = (
@@ -90,7 +89,7 @@ class RapidWriter(writing.Writer):
         )
         load = motion.load if isinstance(motion.load, MassBody) else motion.tool.load
         tool = self._frame(replace(motion.tool, load=load), "tool")
-        if ready.turn_matters:
+        if motion.kind == "arc":
             self.set_once("arcs", f"CirPathMode \\{'PathFrame' if motion.with_path else 'ObjectFrame'};")
         self._set_before(motion)
         self.lines.append(f"{form} {','.join(texts)},{speed},{zone},{tool}{base};")
@@ -147,8 +146,7 @@ class RapidWriter(writing.Writer):
         if speed.unit == "m/s":
             self.set_once("vel", "VelSet 100,5000;")
             along = speed.value * 1000
-            turns = [motion.turn_speed, *(each and each.speed.value for each in motion.turning)]
-            turn = min((math.degrees(each) for each in turns if each), default=data_types.TURN_SPEED)
+            turn = math.degrees(motion.turn_speed) if motion.turn_speed else data_types.TURN_SPEED
             if along in data_types.TOOL_SPEEDS and abs(turn - data_types.TURN_SPEED) < 1e-9:
                 return f"v{along:g}"
             return (

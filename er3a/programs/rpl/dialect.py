@@ -8,9 +8,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, syntax
-from er3a.programs.evaluation import IN_DEGREES, Dialect, ProgramMemory, root, unresolved
+from er3a.programs.evaluation import IN_DEGREES, Dialect, ProgramMemory, evaluated, unresolved
 from er3a.programs.rpl.reader import CONFIGURATION, FIELDS, JOINTS, LIBRARY_NAMES, OUTER, POSITION
 
 SPEED = re.compile(r"v(\d+(?:\.\d+)?)(perc)?$", re.IGNORECASE)
@@ -24,15 +23,11 @@ class RplDialect(Dialect):
     """RPL, as a run needs it."""
 
     whole_division = None
-    modal = frozenset((NO_BASE,))
+    harmless = SOCKETS | {*FIELDS, "OFFSET", *IN_DEGREES, *map(str.lower, IN_DEGREES)}
 
     def is_signal(self, name: str) -> bool:
         """Outputs, and what goes to the field bus."""
         return name.startswith(("io.", "fidbus."))
-
-    def reads_back(self, name: str) -> bool:
-        """Outputs; the other side of the bus, or of an input, has a say in what stands there."""
-        return name.startswith(("io.DOut", "io.AOut"))
 
     def function(self, memory: ProgramMemory, name: str, given: syntax.Invocation) -> syntax.Value:
         """Points, OFFSET, roots; no source says in which unit the angles of the others are."""
@@ -41,10 +36,9 @@ class RplDialect(Dialect):
             return _point(name, values)
         if name == "OFFSET" and values and isinstance(values[0], syntax.Record):
             return _offset(values[0], values[1:])
-        plain = syntax.numbers(tuple(values))
-        if name.upper() in ROOTS and plain is not None and len(plain) == 1 and (plain[0] >= 0 or name.upper() == "ABS"):
-            return ROOTS[name.upper()](plain[0])
-        return syntax.Unclear(f"{name}({', '.join('' if each is None else syntax.shown(each) for each in values)})")
+        found = evaluated(ROOTS[name.upper()], values) if name.upper() in ROOTS and len(values) == 1 else None
+        unclear = f"{name}({', '.join('' if each is None else syntax.shown(each) for each in values)})"
+        return syntax.Unclear(unclear) if found is None else found
 
     def motion(self, memory: ProgramMemory, move: syntax.Move) -> instructions.ArmMotion:
         """MJOINT and MLIN: target, speed, zone, tool, reference frame."""
@@ -64,22 +58,11 @@ class RplDialect(Dialect):
             move.form,
             speed=_speed(_word(memory, given[1])),
             zone=_zone(_word(memory, given[2])),
-            tool=_frame(memory, tool or "no tool", frames.get(tool)),
-            base=_frame(memory, base or NO_BASE, base_pose),
+            tool=instructions.NamedFrame(tool or "no tool", frames.get(tool)),
+            base=instructions.NamedFrame(base or NO_BASE, base_pose),
         )
 
-    def carry_out(self, memory: ProgramMemory, doing: syntax.Doing) -> instructions.Instruction | None:
-        """Functions that are known to move nothing; others are unknown."""
-        call = doing.what
-        assert isinstance(call, syntax.Invocation)
-        return instructions.Aside(doing.text) if self.harmless(call) else instructions.Unknown(doing.text)
-
-    def harmless(self, call: syntax.Invocation) -> bool:
-        """Functions of sockets, and those that are evaluated."""
-        name = call.function
-        return name in SOCKETS or name in FIELDS or name == "OFFSET" or name.upper() in IN_DEGREES
-
-    def is_followed(self, name: str, value: syntax.Value) -> bool:
+    def is_followed(self, name: str) -> bool:
         """Variables of the controller may set anything, such as the override."""
         return name.partition(".")[0] not in LIBRARY_NAMES
 
@@ -87,13 +70,6 @@ class RplDialect(Dialect):
 def _word(memory: ProgramMemory, expression: syntax.Expression | None) -> str:
     """The name of a speed, zone or tool, also where a variable of the program holds it."""
     return "" if expression is None else syntax.shown(memory.value(expression))
-
-
-def _frame(memory: ProgramMemory, name: str, pose: Reals | None) -> instructions.NamedFrame:
-    """A tool or base as the cell has it; of no known pose where the program writes to it."""
-    kept = (*memory.shared.items(), *memory.local.items())
-    changed = any(root(each) == name and not isinstance(value, syntax.Unset) for each, value in kept)
-    return instructions.NamedFrame(f"{name}, changed", None) if changed else instructions.NamedFrame(name, pose)
 
 
 def _speed(word: str) -> instructions.Rate | None:

@@ -11,10 +11,9 @@ from pathlib import Path
 
 from er3a.errors import InputError
 from er3a.programs import syntax
-from er3a.programs.code_builder import CodeBuilder, fault, lacks_data, linked
+from er3a.programs.code_builder import CodeBuilder, block, fault, linked
 from er3a.programs.instructions import Place
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, data_file_of, read_program_text
-from er3a.programs.program_findings import DataFileMissing, NameTwice, NotUnderstood, ProgramFinding
 
 RPL = Lexicon(
     re.compile(
@@ -46,10 +45,6 @@ FIELDS = {
     "EPOINTJ": JOINTS + OUTER,
     "EPOINTC": POSITION + OUTER + CONFIGURATION,
 }
-PLAIN = re.compile(
-    r"(MJOINT|MLIN)\s*\(\s*(POINT[JC]\s*\([^()]*\))\s*,\s*(\w+)\s*,\s*(\w+)\s*,\s*(\w+)\s*(?:,\s*(\w+)\s*)?\)$"
-)
-POINT = re.compile(r'\s*(POINT[JC])\s*\(([-+.,0-9eE\s]*)(?:,\s*"(\w+)"((?:\s*,\s*[-+]?\d+)*)\s*)?\)\s*$')
 WORD = re.compile(r"[^\W\d]\w*$")
 
 
@@ -72,8 +67,6 @@ def expression(text: str) -> syntax.Expression:
     """An expression by itself; one that is not understood is kept."""
     if WORD.match(text) and text.upper() not in RPL.constants and text not in RPL.right:
         return syntax.Variable(text)
-    if (point := plain_point(text)) is not None:
-        return point
     words = RplWords(text)
     try:
         found = words.expression()
@@ -90,8 +83,6 @@ def initial(text: str, kind: str) -> syntax.Expression:
 
 def plain_statement(builder: CodeBuilder, place: Place, text: str) -> None:
     """A statement that begins and ends no block; :class:`MisreadError` if it can't be read."""
-    if (plain := PLAIN.match(text)) is not None and _plain_motion(builder, place, plain):
-        return
     words = RplWords(text)
     left = words.expression()
     if words.accept(":="):
@@ -120,34 +111,6 @@ def call(builder: CodeBuilder, place: Place, left: syntax.Invocation, text: str)
         builder.add(syntax.Doing(place, left, text))
 
 
-def plain_point(text: str) -> syntax.Constant | None:
-    """A point of numbers alone, without a look at its words."""
-    match = POINT.match(text)
-    if match is None:
-        return None
-    kind, parts, configuration, turns = match.groups()
-    try:
-        values: list[syntax.Value] = [float(part) for part in parts.split(",")]
-    except ValueError:
-        return None
-    if len(values) != 6 or (configuration is not None and kind == "POINTJ"):
-        return None
-    if configuration is not None:
-        values += [configuration, *(int(turn) for turn in turns.split(",")[1:])]
-    fields = FIELDS[kind]
-    return None if len(values) > len(fields) else syntax.Constant(syntax.Record(kind, tuple(zip(fields, values))))
-
-
-def _plain_motion(builder: CodeBuilder, place: Place, plain: re.Match[str]) -> bool:
-    """A motion to a point of numbers alone."""
-    target = plain_point(plain[2])
-    if target is None:
-        return False
-    names = [syntax.Variable(name) for name in plain.groups()[2:] if name]
-    builder.add(syntax.Move(place, plain[1], (target, *names), plain.group()))
-    return True
-
-
 BREAKS = re.compile(r"\(\*(?!\s*,)|//|[\"';\n]|\b(?:THEN|DO|ELSE|REPEAT|OF)\b")
 CASE_LABEL = re.compile(r"\s*(-?\w+(?:\s*,\s*-?\w+)*)\s*:(?!=)")
 VARIABLE = re.compile(
@@ -173,41 +136,20 @@ def read_rpl(source: ProgramText) -> syntax.Program:
             builder.remark(place, text)
         else:
             _statement(builder, place, text)
-    data, findings = _variables(source)
-    routine = builder.routine(place)
-    if data_file_of(source.path, ".var") is None and lacks_data([routine], data, LIBRARY_NAMES):
-        findings.append(DataFileMissing(source.path.with_suffix(".var").name))
-    by_name, more = linked([routine])
-    findings = [*findings, *more]
-    return syntax.Program(
-        "rpl", source.path.stem, source.path, by_name, MAIN, tuple(data), tuple(findings), source.lines
-    )
+    by_name, data = linked([builder.routine(place)]), tuple(_variables(source))
+    return syntax.Program("rpl", source.path.stem, source.path, by_name, MAIN, data, lines=source.lines)
 
 
-def _variables(source: ProgramText) -> tuple[list[syntax.Assign], list[ProgramFinding]]:
+def _variables(source: ProgramText) -> Iterator[syntax.Assign]:
     """Declarations of the .var file."""
     path = data_file_of(source.path, ".var")
-    if path is None:
-        return [], []
-    data: list[syntax.Assign] = []
-    found: list[ProgramFinding] = []
-    seen: set[str] = set()
-    for number, line in enumerate(read_program_text(path).lines, 1):
-        place = Place(path, number)
-        match = VARIABLE.match(line)
-        if match is None:
-            if line.strip() and not line.strip().startswith(("(*", "//")):
-                found.append(NotUnderstood(line.strip(), place))
-            continue
-        scope, kind, name, _, first = match.groups()
-        if name in seen:
-            found.append(NameTwice(name, place))
-        seen.add(name)
-        value = initial(first, kind.upper()) if first else None
-        if scope.upper() == "INPUT":  # which the caller gives
-            value = syntax.Constant(syntax.Unclear(name))
-        data.append(syntax.Assign(place, syntax.Variable(name), value, line.strip(), kind.upper()))
-    return data, found
+    for number, line in enumerate(read_program_text(path).lines if path else (), 1):
+        if (match := VARIABLE.match(line)) is not None:
+            scope, kind, name, _, first = match.groups()
+            value = initial(first, kind.upper()) if first else None
+            if scope.upper() == "INPUT":  # which the caller gives
+                value = syntax.Constant(syntax.Unclear(name))
+            yield syntax.Assign(Place(path, number), syntax.Variable(name), value, line.strip(), kind.upper())
 
 
 def _statements(source: ProgramText) -> Iterator[tuple[Place, str, bool]]:
@@ -254,9 +196,8 @@ def _statement(builder: CodeBuilder, place: Place, text: str) -> None:
         text = text[label.end() :].strip()
     if not text:
         return
-    first = re.split(r"\W", text, maxsplit=1)[0].upper()
     try:
-        if not _block(builder, place, text, first):
+        if not block(builder, RplWords(text), place, text, BLOCKS):
             plain_statement(builder, place, text)
     except MisreadError:
         builder.unread(place, text)
@@ -264,69 +205,20 @@ def _statement(builder: CodeBuilder, place: Place, text: str) -> None:
         raise InputError(place.file, place.where, "nested too deeply", "Split this statement") from None
 
 
-def _block(builder: CodeBuilder, place: Place, text: str, first: str) -> bool:
-    """Begin or end a block, or leave one; False if the statement does neither."""
-    inner = text[len(first) :].strip()
-    match first:
-        case "IF":
-            builder.open_if(place, expression(_until(inner, "THEN", place)), text)
-        case "ELSIF":
-            builder.next_arm(place, expression(_until(inner, "THEN", place)), text)
-        case "ELSE":
-            if builder.inside("switch"):
-                builder.case(place, None, text)
-            else:
-                builder.next_arm(place, None, text)
-        case "WHILE":
-            builder.open_while(place, expression(_until(inner, "DO", place)), text)
-        case "FOR":
-            _for(builder, place, _until(inner, "DO", place), text)
-        case "REPEAT":
-            builder.open_repeat(place)
-        case "UNTIL":
-            condition = re.sub(r"\s*\bEND_REPEAT$", "", inner)
-            builder.close("repeat", place, expression(condition), text)
-        case "CASE":
-            builder.open_switch(place, expression(_until(inner, "OF", place)), text)
-        case "END_IF" | "END_WHILE" | "END_FOR" | "END_CASE":
-            kind = {"END_CASE": "switch"}.get(first, first[4:].lower())
-            builder.close(kind, place)
-        case "END_REPEAT":
-            pass
-        case "EXIT":
-            builder.leave_loop(place)
-        case "CONTINUE":
-            builder.next_round(place)
-        case "RETURN":
-            builder.add(syntax.Return(place, expression(inner) if inner else None))
-        case "GOTO":
-            builder.goto(place, inner)
-        case "LABEL":
-            builder.label(inner)
-        case _:
-            return False
-    return True
-
-
-def _until(text: str, end: str, place: Place) -> str:
-    if not text.upper().endswith(end):
-        raise fault(place, f"'{text[:60]}' lacks {end}", f"Write {end} after it")
-    return text[: -len(end)].strip()
-
-
-def _for(builder: CodeBuilder, place: Place, head: str, text: str) -> None:
-    words = RplWords(head)
-    try:
-        name = words.name()
-        words.expect(":=")
-        first = words.expression()
-        words.expect("TO")
-        last = words.expression()
-        step = words.expression() if words.accept("BY") else None
-        words.finish()
-    except MisreadError as error:
-        raise fault(place, f"this FOR can't be read ({error})", "Write FOR i := 1 TO 9 DO") from None
-    builder.open_for(place, name, first, last, step, text)
+BLOCKS = {
+    "IF": ("if", "THEN"),
+    "ELSIF": ("elif", "THEN"),
+    "WHILE": ("while", "DO"),
+    "FOR": ("for", ":= TO BY DO"),
+    "UNTIL": ("until", "END_REPEAT"),
+    "CASE": ("switch", "OF"),
+    "EXIT": ("leave", ""),
+    "CONTINUE": ("next", ""),
+    "END_REPEAT": ("nothing", ""),
+    "END_CASE": ("close switch", ""),
+    **{word: (word.lower(), "") for word in ("ELSE", "REPEAT", "RETURN", "GOTO", "LABEL")},
+    **{f"END_{word}": (f"close {word.lower()}", "") for word in ("IF", "WHILE", "FOR")},
+}
 
 
 def companions(path: Path) -> tuple[Path, ...]:

@@ -103,8 +103,6 @@ class RplWriter(Writer):
         if target is None:
             self.omit(motion)
             return
-        if motion.kind == "spline":
-            self.count["splines"] += 1
         form = "mjoint" if motion.kind == "joint" else "mlin"
         self._move(form, target, motion, self._speed(ready), motion.zone)
 
@@ -132,7 +130,7 @@ class RplWriter(Writer):
         motion = ready.motion
         poses = None
         if ready.pose is not None and ready.pose_before is not None and ready.via is not None and motion.angle is None:
-            poses = chords(ready.pose_before, ready.via, ready.pose, self.options.arc_deviation, motion.with_path)
+            poses = chords(ready.pose_before, ready.via, ready.pose, self.options.arc_deviation)
         frames = (motion.tool, motion.base)
         joints = [None] if poses is None else self.resolver.solve(poses, frames, ready.joints_before)
         targets = [_joints_text(each) for each in joints if each is not None]

@@ -6,9 +6,8 @@ Elements that are not understood are kept; a loop's body is another ``Pou`` that
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from xml.parsers import expat
 
 from er3a.errors import InputError
@@ -16,7 +15,6 @@ from er3a.programs import syntax
 from er3a.programs.code_builder import CodeBuilder, fault, linked
 from er3a.programs.instructions import Disabled, Place
 from er3a.programs.lexing import ProgramText
-from er3a.programs.program_findings import NotUnderstood
 from er3a.programs.rpl.reader import WORD, expression, initial
 
 DEEPEST_ELEMENT = 100
@@ -32,8 +30,6 @@ class XmlNode:
     attributes: dict[str, str]
     children: list[XmlNode] = field(default_factory=list)
     parts: list[str] = field(default_factory=list)
-    passed: bool = False  # whether it was read
-    asked: bool = False  # whether its attributes were
 
     @property
     def text(self) -> str:
@@ -42,21 +38,18 @@ class XmlNode:
 
     def child(self, tag: str) -> XmlNode | None:
         """The first child of a tag."""
-        found = next((each for each in self.children if each.tag == tag), None)
-        if found is not None:
-            found.passed = True
-        return found
+        return next((each for each in self.children if each.tag == tag), None)
 
     def text_of(self, tag: str) -> str:
         """The text of the first child of a tag; empty if there is none."""
         found = self.child(tag)
         return "" if found is None else found.text
 
-    def all(self, tag: str) -> list[XmlNode]:
-        """The children of a tag."""
-        found = [each for each in self.children if each.tag == tag]
-        for each in found:
-            each.passed = True
+    def all(self, *path: str) -> list[XmlNode]:
+        """The descendants along a path of tags."""
+        found = [self]
+        for tag in path:
+            found = [each for node in found for each in node.children if each.tag == tag]
         return found
 
     def below(self) -> Iterator[XmlNode]:
@@ -64,20 +57,6 @@ class XmlNode:
         for each in self.children:
             yield each
             yield from each.below()
-
-    def pass_over(self) -> None:
-        """Nothing of it needs to be read."""
-        for each in (self, *self.below()):
-            each.passed = each.asked = True
-
-    def unread(self) -> Iterator[XmlNode]:
-        """What was not read of it: elements, and those with attributes that nothing asked for, itself too."""
-        stray = self.children and self.text
-        if not self.passed or ((self.attributes or stray) and not self.asked):
-            yield self
-        else:
-            for each in self.children:
-                yield from each.unread()
 
 
 def read_xml(source: ProgramText) -> XmlNode:
@@ -118,19 +97,27 @@ def read_xml(source: ProgramText) -> XmlNode:
     try:
         parser.Parse(text.encode("utf-8", "surrogatepass"), True)
     except expat.ExpatError as error:
-        raise _no_xml(source.path, error) from None
+        problem = f"not valid XML ({expat.ErrorString(error.code)})"
+        remedy = "Correct the file, or save it on the pendant again"
+        raise InputError(source.path, f"line {error.lineno}", problem, remedy) from None
     return top.children[0]
 
 
-def _no_xml(path: Path, error: expat.ExpatError) -> InputError:
-    problem = f"not valid XML ({expat.ErrorString(error.code)})"
-    return InputError(path, f"line {error.lineno}", problem, "Correct the file, or save it on the pendant again")
-
-
 TOP = "Xpl-source"
-HEAD = ("Info", "Title", "Description", "Version", "Author")
 MAX_LOOPS = 50
 MOTION_PARTS = ("target", "speed", "zone", "tool", "refsys")
+PARTS: Mapping[str, tuple[str, ...]] = {
+    **dict.fromkeys(("mjoint", "mlin"), MOTION_PARTS),
+    "set": ("dest", "expr"),
+    "wait": ("condition", "timeout", "var"),
+    "dwell": ("expr",),
+    "end_pro": (),
+    "rem": ("text",),
+    "call": ("subroutine", "name", "args", "arg"),
+    "while": ("cond", "pouref"),
+    "for": ("var", "from", "to", "by", "pouref"),
+}
+"""The elements that are understood, with those that they hold. An element with others, or with attributes, is not."""
 
 
 def read_xpl(source: ProgramText) -> syntax.Program:
@@ -149,41 +136,19 @@ def read_xpl(source: ProgramText) -> syntax.Program:
     if top.tag != TOP or environment is None:
         problem = f"the top element is <{top.tag}>" if top.tag != TOP else "holds no <XplEnvironment>"
         raise InputError(source.path, f"line {top.line}", problem, f"An .XPL file has <{TOP}> with <XplEnvironment>")
-    top.passed = True
-    for each in (*top.all("HostEnvironment"), *(part for tag in HEAD for part in environment.all(tag))):
-        each.pass_over()
-    pous = [each for group in environment.all("Pous") for each in group.all("Pou")]
+    pous = environment.all("Pous", "Pou")
     if not pous:
         raise InputError(source.path, f"line {environment.line}", "holds no <Pou>", "Give a program with its Main")
-    readers = [_Pou(source, pou) for pou in pous]
-    routines = [reader.routine() for reader in readers]
-    by_name, findings = linked(routines)
+    by_name = linked([_Pou(source, pou).routine() for pou in pous])
     entry = next((pou for pou in pous if pou.text_of("Type").upper() == "PROGRAM"), pous[0])
-    declarations = [each for group in environment.all("VarDeclarations") for each in group.children]
-    data = tuple(
-        _declared(source, var, local=False)
-        for tag in {each.tag: None for each in declarations}
-        for group in environment.all("VarDeclarations")
-        for kind in group.all(tag)
-        for var in kind.all("Var")
-    )
-    for each in (part for reader in readers for part in reader.whole):
-        each.pass_over()
-    unread = (
-        NotUnderstood(text_of(each), Place(source.path, each.line, f"<{each.tag}>"))
-        for each in top.unread()
-        if each.attributes or any(part.text for part in (each, *each.below()))
-    )
-    found = (*findings, *unread)
-    return syntax.Program(
-        "xpl", source.path.stem, source.path, by_name, entry.text_of("Name"), data, found, source.lines
-    )
+    groups = [each for group in environment.all("VarDeclarations") for each in group.children]
+    data = tuple(_declared(source, var, local=False) for group in groups for var in group.all("Var"))
+    name = entry.text_of("Name")
+    return syntax.Program("xpl", source.path.stem, source.path, by_name, name, data, lines=source.lines)
 
 
 def _declared(source: ProgramText, var: XmlNode, local: bool) -> syntax.Assign:
     kind, name, first = var.text_of("Type"), var.text_of("Name"), var.text_of("InitValue")
-    for tag in ("Comment", "Array"):
-        var.child(tag)
     place = Place(source.path, var.line, f"Var {name}")
     value = initial(first, kind) if first else None
     return syntax.Assign(place, syntax.Variable(name), value, f"{kind} {name} := {first}", kind, local)
@@ -196,71 +161,38 @@ class _Pou:
         self.source, self.pou = source, pou
         self.name = pou.text_of("Name")
         self.place = Place(source.path, pou.line, self.name)
-        self.whole: list[XmlNode] = []  # what is named as a whole, or left out
 
     def routine(self) -> syntax.Routine:
-        interface = [
-            var
-            for group in self.pou.all("VarDeclarations")
-            for kind in group.all("VarInterface")
-            for var in kind.all("Var")
-        ]
-        for var in interface:
-            for tag in ("Type", "Comment", "Array"):
-                var.child(tag)
         parameters = tuple(
             syntax.RoutineParameter(var.text_of("Name"), var.text_of("Attrib").upper() not in ("IN", ""))
-            for var in interface
+            for var in self.pou.all("VarDeclarations", "VarInterface", "Var")
         )
         builder = CodeBuilder(self.name, parameters, self.place)
-        for group in self.pou.all("VarDeclarations"):
-            for kind in group.all("VarLocal"):
-                for var in kind.all("Var"):
-                    builder.add(_declared(self.source, var, local=True))
+        for var in self.pou.all("VarDeclarations", "VarLocal", "Var"):
+            builder.add(_declared(self.source, var, local=True))
         self._body(builder, self.pou, self.name, ())
         return builder.routine(self.place)
 
     def _body(self, builder: CodeBuilder, pou: XmlNode, path: str, within: tuple[XmlNode, ...]) -> None:
         counts: dict[str, int] = {}
-        for tag in ("Name", "Type"):
-            pou.child(tag)
-        for body in pou.all("Body"):
-            for element in body.children:
-                counts[element.tag] = counts.get(element.tag, 0) + 1
-                place = Place(self.source.path, element.line, f"{path}/{element.tag}[{counts[element.tag]}]")
-                element.passed, switch = True, element.attributes.get("disable", "false").lower()
-                element.asked = element.attributes.keys() == {"disable"} and switch in ("true", "false")
-                first, known = len(builder.code), True
-                disabled = element.asked and switch == "true"
-                if disabled:
-                    builder.add(syntax.Fixed(place, Disabled(text_of(element))))
-                    self._leave_out(element, (*within, pou))
-                elif element.tag in ("while", "for"):
-                    self._loop(builder, element, place, (*within, pou))
-                elif element.child("pouref") is not None:  # as an if, of which no file was at hand
-                    builder.unknown(place, text_of(element))
-                    self._leave_out(element, (*within, pou))
-                else:
-                    known = _element(builder, element, place)
-                    if known and any(element.unread()):
-                        del builder.code[first:]
-                if not known:
-                    self.whole.append(element)
-                elif (unread := next(element.unread(), None)) is not None and not disabled:
-                    self.whole.append(element)
-                    builder.unread(place, f"{text_of(element)} <{unread.tag}> {' '.join(_texts(unread))}")
-
-    def _leave_out(self, element: XmlNode, within: tuple[XmlNode, ...]) -> None:
-        """Nothing of an element is to be read, nor of the bodies that it names."""
-        self.whole.append(element)
-        for name in [each.text for each in element.below() if each.tag == "pouref"]:
-            body = self._named(name, within)
-            if body is not None and body not in self.whole:
-                self._leave_out(body, (*within, body))
+        for element in (each for body in pou.all("Body") for each in body.children):
+            counts[element.tag] = counts.get(element.tag, 0) + 1
+            place = Place(self.source.path, element.line, f"{path}/{element.tag}[{counts[element.tag]}]")
+            switch = element.attributes.pop("disable", "false").lower()
+            if switch == "true" and not element.attributes:
+                builder.add(syntax.Fixed(place, Disabled(text_of(element))))
+            elif switch != "false" or _is_strange(element):
+                builder.unread(place, f"{text_of(element)} {_all_text(element)}")
+            elif element.tag in ("while", "for"):
+                self._loop(builder, element, place, (*within, pou))
+            else:
+                _element(builder, element, place)
 
     def _loop(self, builder: CodeBuilder, element: XmlNode, place: Place, within: tuple[XmlNode, ...]) -> None:
+        """A loop, whose body is the nearest around it that has its name."""
         name = element.text_of("pouref")
-        body = self._named(name, within)
+        places = (*(each for pou in reversed(within) for each in pou.children), *self.pou.below())
+        body = next((each for each in places if each.tag == "Pou" and each.text_of("Name") == name), None)
         if body is None:
             raise fault(place, f"there is no <Pou> '{name}' for the loop's body", "Add it, or correct <pouref>")
         if body in within or len(within) > MAX_LOOPS:
@@ -277,50 +209,52 @@ class _Pou:
         self._body(builder, body, f"{place.element}/{name}", within)
         builder.close(element.tag, place)
 
-    def _named(self, name: str, within: tuple[XmlNode, ...]) -> XmlNode | None:
-        """The body of a loop: the nearest around that has this name."""
-        places = (*(each for pou in reversed(within) for each in pou.children), *self.pou.below())
-        found = next((each for each in places if each.tag == "Pou" and each.text_of("Name") == name), None)
-        if found is not None:
-            found.passed = True
-        return found
+
+def _is_strange(element: XmlNode) -> bool:
+    """Whether something of an element is not understood."""
+    parts = PARTS.get(element.tag)
+    inside = list(element.below())
+    return (
+        parts is None
+        or any(each.tag not in parts for each in inside)
+        or any(each.attributes or (each.children and each.text) for each in (element, *inside))
+    )
 
 
-def _element(builder: CodeBuilder, element: XmlNode, place: Place) -> bool:
-    """An element other than a loop; False if it is not understood."""
+def _element(builder: CodeBuilder, element: XmlNode, place: Place) -> None:
+    """An element other than a loop."""
     source = text_of(element)
-    if element.tag in ("mjoint", "mlin"):
-        parts = [element.child(tag) for tag in MOTION_PARTS]
-        given = tuple(None if part is None or not part.text else expression(part.text) for part in parts)
-        builder.add(syntax.Move(place, element.tag.upper(), given, source))
-    elif element.tag == "set":
-        target = expression(element.text_of("dest"))
-        builder.add(syntax.Assign(place, target, expression(element.text_of("expr")), source))
-    elif element.tag == "wait":
-        condition = element.text_of("condition")
-        builder.add(syntax.Waiting(place, "condition", expression(condition), condition))
-        element.child("timeout")
-        if flag := element.text_of("var"):  # whether it came in time
-            builder.add(syntax.Assign(place, expression(flag), syntax.Opaque(source), source))
-    elif element.tag == "end_pro":
-        builder.add(syntax.Halt(place))
-    elif element.tag == "dwell":
-        builder.add(syntax.Waiting(place, "seconds", expression(element.text_of("expr")), source))
-    elif element.tag == "rem":
-        builder.remark(place, element.text_of("text"))
-        element.pass_over()
-    elif element.tag == "call" and (routine := element.child("subroutine")) is not None:
-        name = routine.text_of("name")
-        arguments = routine.child("args")
-        texts = [] if arguments is None else [each.text for each in arguments.all("arg")]
-        while texts and not texts[-1]:
-            texts.pop()
-        given_arguments = tuple(expression(each) if each else None for each in texts)
-        builder.add(syntax.Doing(place, syntax.Invocation(name, given_arguments), source))
-    else:
-        builder.unknown(place, source)
-        return False
-    return True
+    match element.tag:
+        case "mjoint" | "mlin":
+            texts = [element.text_of(tag) for tag in MOTION_PARTS]
+            given = tuple(expression(text) if text else None for text in texts)
+            builder.add(syntax.Move(place, element.tag.upper(), given, source))
+        case "set":
+            target = expression(element.text_of("dest"))
+            builder.add(syntax.Assign(place, target, expression(element.text_of("expr")), source))
+        case "wait":
+            condition = element.text_of("condition")
+            builder.add(syntax.Waiting(place, "condition", expression(condition), condition))
+            if flag := element.text_of("var"):  # whether it came in time
+                builder.unclear(place, expression(flag), source)
+        case "end_pro":
+            builder.add(syntax.Return(place, ends=True))
+        case "dwell":
+            builder.add(syntax.Waiting(place, "seconds", expression(element.text_of("expr")), source))
+        case "rem":
+            builder.remark(place, element.text_of("text"))
+        case _:
+            arguments = tuple(expression(each) if each else None for each in _arguments(element))
+            name = "".join(each.text_of("name") for each in element.all("subroutine"))
+            builder.add(syntax.Doing(place, syntax.Invocation(name or "?", arguments), source))
+
+
+def _arguments(call: XmlNode) -> list[str]:
+    """What a routine is called with, without what is left out at the end."""
+    texts = [each.text for each in call.all("subroutine", "args", "arg")]
+    while texts and not texts[-1]:
+        texts.pop()
+    return texts
 
 
 def text_of(element: XmlNode) -> str:
@@ -343,15 +277,10 @@ def text_of(element: XmlNode) -> str:
         case "rem":
             return f"(* {inner('text')} *)"
         case "call":
-            routine = element.child("subroutine")
-            if routine is not None:
-                given = [each.text for arguments in routine.all("args") for each in arguments.all("arg") if each.text]
-                return f"{routine.text_of('name')}({', '.join(given)})"
-    return f"<{element.tag}> {' '.join(_texts(element))}"[:200]
+            name = "".join(each.text_of("name") for each in element.all("subroutine"))
+            return f"{name}({', '.join(filter(None, _arguments(element)))})"
+    return f"<{element.tag}> {_all_text(element)}"[:200]
 
 
-def _texts(element: XmlNode) -> Iterator[str]:
-    if element.text:
-        yield element.text
-    for each in element.children:
-        yield from _texts(each)
+def _all_text(element: XmlNode) -> str:
+    return " ".join(filter(None, (each.text for each in (element, *element.below()))))

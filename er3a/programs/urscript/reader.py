@@ -11,9 +11,9 @@ from collections.abc import Iterator
 
 from er3a.errors import InputError
 from er3a.programs import syntax
-from er3a.programs.code_builder import CodeBuilder, fault, linked
+from er3a.programs.code_builder import CodeBuilder, block, fault, linked
 from er3a.programs.instructions import Place
-from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, as_number
+from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, MoreError, ProgramText, Words, as_number
 
 UR = Lexicon(
     re.compile(
@@ -35,34 +35,17 @@ UR = Lexicon(
 )
 MOTIONS = frozenset(("movej", "movel", "movep", "movec"))
 LONGEST_STATEMENT = 500  # lines
-THREAD = "%thread"
-"""What a variable holds that a thread was started with, as a function."""
 CHANGED = "%changed"
 """What a list is after a method changed it, as a function of itself, the method's name and its arguments."""
 LIST_METHODS = frozenset(("append", "clear", "extend", "insert", "pop", "remove", "sort"))
 
 
-BLOCK_HEAD = re.compile(r"(?!(?:else|elif|case|default)\b)(?:.*:|(?:def|thread|sec|if|while)\b.*)$")
-BLOCK_END = re.compile(r"end\s*[:;]*")
 OPEN_END = re.compile(r"(?:\b(?:or|and|xor|not)|[-+*/%^<>=,])$")
 """With what a line ends whose statement goes on in the next."""
-PLAIN = re.compile(
-    rf"(mov[ejlp]+)\((p?)\[((?:\s*[-+]?{NUMBER}\s*,){{5}}\s*[-+]?{NUMBER}\s*)\]((?:\s*,\s*[avtr]\s*=\s*[-+]?{NUMBER})*)\s*\)$"
-)
-
-
 STATEMENT = re.compile(
     r"(?:[A-Za-z_][\w.]*\s*(?:\(|(?:\[[^]]*\]\s*)?=(?!=))|(?:end|break|continue|return|halt|if|while|global|local)\b)"
 )
 """With what a statement begins for sure."""
-
-
-class MoreError(MisreadError):
-    """Another statement follows on the line."""
-
-    def __init__(self, at: int):
-        super().__init__("another statement follows")
-        self.at = at
 
 
 class UrWords(Words):
@@ -149,17 +132,8 @@ def read_urscript(source: ProgramText) -> syntax.Program:
         for texts, brackets and blocks without an end
     """
     reader = _UrReader(source)
-    routines = reader.read()
-    by_name, findings = linked(routines, _changed_by)
-    return syntax.Program(
-        "urscript",
-        source.path.stem,
-        source.path,
-        by_name,
-        "",
-        findings=findings,
-        lines=source.lines,
-    )
+    by_name = linked(reader.read())
+    return syntax.Program("urscript", source.path.stem, source.path, by_name, "", lines=source.lines)
 
 
 class _UrReader:
@@ -168,8 +142,6 @@ class _UrReader:
         self.routines: list[syntax.Routine] = []
         self.outermost: list[str] = []
         self.open = [CodeBuilder("", (), Place(source.path, 1))]
-        self.unread: Place | None = None  # the head of the block that is not understood, while within one
-        self.within_unread = 0  # blocks open within it that begin no further in than it does
 
     def read(self) -> list[syntax.Routine]:
         """All routines; the one without a name holds what is outside of the others."""
@@ -179,8 +151,6 @@ class _UrReader:
                 self._statement(place, text)
             elif comment:
                 self.open[-1].remark(place, comment)
-        if self.unread is not None:
-            raise fault(self.unread, "this block has no end", "Close it with end")
         if len(self.open) > 1:
             builder = self.open[-1]
             if builder.blocks:
@@ -221,19 +191,6 @@ class _UrReader:
 
     def _statement(self, place: Place, text: str) -> None:
         builder = self.open[-1]
-        if self.unread is not None:
-            builder.unread(place, text)
-            if self._column(place) <= self._column(self.unread):
-                if BLOCK_END.fullmatch(text) is not None:
-                    self.within_unread -= 1
-                elif BLOCK_HEAD.match(text) is not None:
-                    self.within_unread += 1
-                if self.within_unread < 0:
-                    self.unread, self.within_unread = None, 0
-            return
-        if (plain := PLAIN.match(text)) is not None and (move := _plain_motion(place, plain)) is not None:
-            builder.add(move)
-            return
         if text.startswith("$"):
             builder.remark(place, text)
             return
@@ -243,44 +200,26 @@ class _UrReader:
             self._statement(place, text[: more.at].strip())
             self._statement(place, text[more.at :].strip())
         except MisreadError:
-            if re.match(r"(else|elif)\b", text) is not None:  # of a block that is open
+            if re.match(r"(else|elif)\b", text) or text.endswith(":"):  # of a block, which means nothing without it
                 raise fault(place, f"'{text[:60]}' can't be read", "Correct this line") from None
             builder.unread(place, text)
-            if text.endswith(":"):  # the head of a block, whose lines mean nothing without it
-                self.unread = place
         except RecursionError:
             raise InputError(place.file, place.where, "nested too deeply", "Split this line") from None
-
-    def _column(self, place: Place) -> int:
-        """How far a statement's first line is moved in."""
-        line = self.source.lines[place.line - 1].expandtabs(4)
-        return len(line) - len(line.lstrip())
 
     def _read(self, builder: CodeBuilder, words: UrWords, place: Place, text: str) -> None:
         first = words.next
         follows = words.texts[min(words.at + 1, len(words.texts) - 1)]
         if first in ("def", "thread", "sec"):
             self._begin(words, place)
-        elif first in ("if", "while", "elif", "else"):
-            words.take()
-            _block(builder, first, words, place, text)
         elif first == "end" and follows in ("", ":", ";"):
             words.take()
             words.accept(":")
             words.finish()
             self._close(builder, place)
-        elif first == "return":
-            words.take()
-            value = None if words.kind == "end" else words.expression()
-            words.finish()
-            builder.add(syntax.Return(place, value))
-        elif first in ("break", "continue") and not follows:
-            (builder.leave_loop if first == "break" else builder.next_round)(place)
-        elif first == "halt":
-            builder.add(syntax.Halt(place))
+        elif follows != "=" and block(builder, words, place, text.rstrip(":"), BLOCKS):
+            pass
         elif first == "run" and follows not in ("=", "("):
-            words.take()
-            _run(builder, words, place, text)
+            builder.unknown(place, text, may_move=False)
         elif first in ("join", "kill", "enter_critical", "exit_critical", "pass") and follows not in ("=", "("):
             words.take()
             if first in ("join", "kill"):
@@ -320,17 +259,6 @@ class _UrReader:
             self.outermost.append(builder.name)
 
 
-def _plain_motion(place: Place, plain: re.Match[str]) -> syntax.Move | None:
-    """A motion to numbers alone, without a look at its words; None if it is another call, or names one thing twice."""
-    pairs = [part.split("=") for part in plain[4].split(",")[1:]]
-    settings = {name.strip(): syntax.Constant(float(value)) for name, value in pairs}
-    if plain[1] not in MOTIONS or len(settings) < len(pairs):
-        return None
-    numbers = tuple(map(float, plain[3].split(",")))
-    target = syntax.Constant(syntax.Record("p", tuple(zip(syntax.POSE_KEYS, numbers))) if plain[2] else numbers)
-    return syntax.Move(place, plain[1], (target,), plain.group(), (), tuple(settings.items()))
-
-
 def _split(line: str, place: Place) -> tuple[str, str, int]:
     """A line without its comment, the comment, and by how many brackets it opens more than it closes."""
     kept, comment = line, ""
@@ -363,28 +291,12 @@ def _outside_texts(line: str, place: Place) -> tuple[str, str, str]:
     return line, "", "".join(bare)
 
 
-def _block(builder: CodeBuilder, first: str, words: UrWords, place: Place, text: str) -> None:
-    if first == "else":
-        words.accept(":")
-        words.finish()
-        builder.next_arm(place, None, text)
-        return
-    closed = False
-    try:
-        condition = words.expression()
-        closed = words.accept(":")
-        words.finish()
-    except MisreadError as error:
-        if closed and isinstance(error, MoreError):
-            raise
-        condition = syntax.Opaque(text.partition(" ")[2].rstrip(":"))
-    source = text.rstrip(":")
-    if first == "if":
-        builder.open_if(place, condition, source)
-    elif first == "while":
-        builder.open_while(place, condition, source)
-    else:
-        builder.next_arm(place, condition, source)
+BLOCKS = {
+    **{word.upper(): (word, ":") for word in ("if", "elif", "else", "while", "return")},
+    "BREAK": ("leave", ""),
+    "CONTINUE": ("next", ""),
+    "HALT": ("end", ""),
+}
 
 
 def _plain(builder: CodeBuilder, words: UrWords, place: Place, text: str) -> None:
@@ -392,11 +304,10 @@ def _plain(builder: CodeBuilder, words: UrWords, place: Place, text: str) -> Non
     scope = words.take() if words.next in ("global", "local") and words.kinds[words.at + 1] == "name" else ""
     left = words.expression()
     if words.accept("="):
-        started = words.next == "run" and words.texts[words.at + 1] not in ("", "(")
-        if started:
-            words.take()
-            _run(builder, words, place, text)
-        value = syntax.Invocation(THREAD, ()) if started else words.expression()
+        if words.next == "run" and words.texts[words.at + 1] not in ("", "("):  # a thread
+            builder.unknown(place, text, may_move=False)
+            return
+        value = words.expression()
         words.finish()
         if isinstance(left, syntax.Listed) and left.kind == "p":  # a variable of this name, or a pose that is no target
             left, value = syntax.Variable("p"), syntax.Opaque(text)
@@ -419,15 +330,6 @@ def _plain(builder: CodeBuilder, words: UrWords, place: Place, text: str) -> Non
         builder.add(syntax.Doing(place, left, text))
 
 
-def _run(builder: CodeBuilder, words: UrWords, place: Place, text: str) -> None:
-    """``run name(...)``: a thread."""
-    what = words.expression()
-    words.finish()
-    if not isinstance(what, syntax.Invocation):
-        raise MisreadError("no thread is named")
-    builder.concurrent(place, what, text)
-
-
 def _method(builder: CodeBuilder, call: syntax.Invocation, place: Place, text: str) -> bool:
     """A method that changes its list; False if the call is none."""
     name, _, method = call.function.partition(".")
@@ -444,18 +346,11 @@ def _method(builder: CodeBuilder, call: syntax.Invocation, place: Place, text: s
     return True
 
 
-def _changed_by(call: syntax.Invocation) -> tuple[syntax.Variable, ...]:
-    """The list that a method changes, wherever in an expression it is called."""
-    name, _, method = call.function.partition(".")
-    return (syntax.Variable(name.partition("[")[0]),) if method in LIST_METHODS else ()
-
-
 def _called(operation: syntax.Operation) -> Iterator[str]:
-    """Functions that an operation calls, or runs beside it."""
-    waiting = [
-        *syntax.expressions_of(operation),
-        *((operation.what,) if isinstance(operation, syntax.ConcurrentStart) else ()),
-    ]
+    """Functions that an operation calls."""
+    waiting = [*syntax.expressions_of(operation)]
+    if isinstance(operation, syntax.Doing):
+        waiting = [operation.what]
     while waiting:
         each = waiting.pop()
         if isinstance(each, syntax.Invocation):

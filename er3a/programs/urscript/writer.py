@@ -77,13 +77,10 @@ class UrScriptWriter(writing.Writer):
         if base.pose is None and base.name:
             self.name_tool(base.name)
         self._tool(ready)
-        if motion.kind == "spline":
-            self.count["splines"] += 1
         if motion.kind == "joint":
             form = "movej"
         elif motion.kind == "arc":
             form = "movec"
-            self.count["turned"] += motion.with_path and ready.turn_matters
         else:
             form = "movep" if motion.form == "movep" else "movel"
         via = "" if ready.via is None else f"{_pose_text(self._in_robot(ready, ready.via))}, "

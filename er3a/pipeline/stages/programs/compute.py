@@ -128,7 +128,6 @@ def _summary(entry: ProgramEntry, check: ProgramCheck, starts: Mapping[int, floa
     levels = [OUTCOMES[verdict.level] for verdict in check.verdicts]
     clear = [verdict.least_clearance_mm for verdict in check.verdicts if verdict.least_clearance_mm is not None]
     found = [each for each in check.findings if not isinstance(each.finding, PairsUnexamined)]  # the verdict says it
-    rounds = _rounds(check, starts)
     return model.ProgramSummary(
         name=entry.name,
         title=entry.title,
@@ -144,7 +143,7 @@ def _summary(entry: ProgramEntry, check: ProgramCheck, starts: Mapping[int, floa
         failed=levels.count("fail"),
         cycle=check.cycle,
         least_clearance_mm=min(clear, default=None),
-        findings=tuple(model.finding_at(each, starts, rounds) for each in found),
+        findings=tuple(model.finding_at(each, starts) for each in found),
         not_examined=tuple(sorted(_not_followed(check))),
     )
 
@@ -157,15 +156,6 @@ def _not_followed(check: ProgramCheck) -> set[int]:
     """Lines of motions that were not followed each time, and of instructions that were not."""
     lines = {each.place.line for each in check.verdicts if not each.followed}
     return lines | {each.place.line for each in check.findings if isinstance(each.finding, NotFollowed)}
-
-
-def _rounds(check: ProgramCheck, starts: Mapping[int, float]) -> dict[int, int]:
-    """Of each step of the way that is kept at which time its line is carried out there, from 1; none of lines that are
-    once."""
-    times: dict[Place, list[int]] = {}
-    for number in starts:
-        times.setdefault(check.execution.steps[number].place, []).append(number)
-    return {number: k for numbers in times.values() if len(numbers) > 1 for k, number in enumerate(numbers, 1)}
 
 
 def _lines(name: str, check: ProgramCheck) -> model.Lines:

@@ -15,7 +15,7 @@ from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.program_check.check_program import CycleTime, LocatedFinding
 from er3a.program_check.program_check_findings import CheckFinding, Level
 from er3a.programs.instructions import Place
-from er3a.programs.program_findings import NameTwice, NotUnderstood
+from er3a.programs.program_findings import NotUnderstood
 from er3a.programs.program_names import LanguageName, ProgramOutcome
 
 
@@ -63,7 +63,6 @@ class FindingAt:
     file : the name of the file that holds the line
     motion_s : s from the start of the instruction's motion, when it begins; None of what is about a motion as a whole
     program_s : the same on the clock of the table of motion; None off the way that is kept there
-    round : of a line that is carried out more than once on that way, at which time that is, from 1
     """
 
     file: str
@@ -74,18 +73,14 @@ class FindingAt:
     finding: CheckFinding
     motion_s: float | None = None
     program_s: float | None = None
-    round: int | None = None
 
 
-def finding_at(
-    each: LocatedFinding, starts: Mapping[int, float] = NO_STEPS, rounds: Mapping[int, int] = NO_STEPS
-) -> FindingAt:
+def finding_at(each: LocatedFinding, starts: Mapping[int, float] = NO_STEPS) -> FindingAt:
     """A finding of a program's check, as results hold it.
 
     Parameters
     ----------
     starts : when (s) steps of the way that is kept begin
-    rounds : of each step of that way at which time its line is carried out there, from 1; none of lines that are once
     """
     own = None if each.moment is None else float(each.moment)
     start = None if each.step is None else starts.get(each.step)
@@ -98,13 +93,12 @@ def finding_at(
         _without_path(each.finding),
         own,
         None if own is None or start is None else start + own,
-        None if each.step is None or own is None or start is None else rounds.get(each.step),
     )
 
 
 def _without_path(finding: CheckFinding) -> CheckFinding:
     """A finding whose own place names no folder of this machine."""
-    if isinstance(finding, (NameTwice, NotUnderstood)):
+    if isinstance(finding, NotUnderstood):
         return replace(finding, place=Place(None, finding.place.line, finding.place.element))
     return finding
 
@@ -164,7 +158,7 @@ class Instructions(Table):
     program: Texts = column("name of the program")
     line: Integers = column("number of the line, from 1")
     element: Texts = column("XML element, empty in text")
-    kind: Texts = column("joint, line, arc or spline; empty if never reached")
+    kind: Texts = column("joint, line or arc; empty if never reached")
     level: Texts = column("verdict: pass, note, caution or fail")
     times: Integers = column("how often it was carried out")
     duration_s: Reals = column("longest estimated duration; NaN where unknown")

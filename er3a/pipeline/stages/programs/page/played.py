@@ -110,10 +110,9 @@ def faults(results: ProgramsResults) -> list[Fault]:
         if not wrong or program.outcome == "pass":
             continue
         first, worst = wrong[0], min(wrong, key=lambda each: -RANKS[each.level])
-        rows = results.motion.take(results.motion.program == program.name)
         cause = _cause(program, first) or _cause(program, worst)
         shown = [worst] if worst.level == first.level else [worst, first]
-        moments = tuple(_moment(program, each, rows) for each in shown)
+        moments = tuple(_moment(program, each) for each in shown)
         found.append(
             Fault(
                 program.name,
@@ -144,37 +143,14 @@ def _cause(program: ProgramSummary, found: FindingAt) -> str | None:
     return next(iter(said), None)
 
 
-def _moment(program: ProgramSummary, found: FindingAt, rows: ProgramMotion) -> FaultMoment:
-    """A finding with its line, its time and its place; joints of a line that are too fast together, seen when the
-    joint is fastest."""
+def _moment(program: ProgramSummary, found: FindingAt) -> FaultMoment:
+    """A finding with its line and its time; joints of a line that are too fast together."""
     text, seen, where = say_first(found.finding), found.program_s, _where(program, found)
     row = line_id(program.name, found.line) if found.line and found in of_line(program, found.line) else ""
     if isinstance(found.finding, Pace) and seen is not None:
         text = rates_text([pace for _, pace in _paces(program, found)])
-        fastest = _fastest(found.finding.joint, rows.take((rows.line == found.line) & (rows.t_s >= seen - MOMENT)))
-        if fastest is not None and fixed(fastest, 2) != fixed(seen, 2):
-            where, seen = tr("{when}, fastest at {time} s", when=where, time=fixed(fastest, 2)), fastest
     address = "" if seen is None else address_of("programs", program.name, seen, program.name)
-    return FaultMoment(text, where, _place(found, rows), seen, row, address)
-
-
-def _fastest(joint: int, rows: ProgramMotion) -> float | None:
-    """When (s) a joint changes most between the stored poses of a line; None where there are too few."""
-    if len(rows) < 3:
-        return None
-    speed = np.abs(np.diff(rows.q_deg[:, joint - 1]) / np.maximum(np.diff(rows.t_s), MOMENT))
-    return float(rows.t_s[int(speed.argmax())])
-
-
-def _place(found: FindingAt, rows: ProgramMotion) -> str:
-    """How far into the motion of its line a finding is, and where the tool point is then; empty where not known."""
-    if found.program_s is None or found.motion_s is None or not len(rows):
-        return ""
-    t0, t1 = found.program_s - found.motion_s, found.program_s
-    moments = np.hstack([t0, rows.t_s[(t0 < rows.t_s) & (rows.t_s < t1)], t1])
-    track = np.stack([np.interp(moments, rows.t_s, values) for values in rows.xyz_mm.T], axis=1)
-    far = np.linalg.norm(np.diff(track, axis=0), axis=1).sum()
-    return tr("{far} mm into it, ({xyz})", far=fixed(far, 0), xyz=", ".join(fixed(value, 0) for value in track[-1]))
+    return FaultMoment(text, where, "", seen, row, address)
 
 
 def _where(program: ProgramSummary, found: FindingAt) -> str:
@@ -186,8 +162,6 @@ def _where(program: ProgramSummary, found: FindingAt) -> str:
         return joined([found.file, line], ", ")
     if found.program_s is None or found.motion_s is None:
         return line
-    if found.round is not None:
-        line = tr("{line}, round {round}", line=line, round=found.round)
     own, clock = fixed(found.motion_s, 2), fixed(found.program_s, 2)
     return tr("{line}, {own} s into it (player: {clock} s)", line=line, own=own, clock=clock)
 

@@ -99,8 +99,6 @@ def _remark(name: str, each: model.FindingAt) -> Markup:
     if each.motion_s is None:
         return text
     at = tr("from {time} s into this line on", time=fixed(each.motion_s, 2))
-    if each.round is not None:
-        at = tr("round {round}, {at}", round=each.round, at=at)
     if each.program_s is not None:
         at = bracketed(at, tr("player: {time} s", time=fixed(each.program_s, 2)))
     shown = escape(at) if each.program_s is None else moment(name, each.program_s, at)
