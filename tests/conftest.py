@@ -44,6 +44,7 @@ LONGEST_FILES = (
     "integration/test_killed_run.py",
     "robots/test_urdf_round_trip.py",
     "viewing/test_article.py",
+    "integration/test_sweep.py",
     "stages/test_workspace.py",
     "workspace/test_sliding_first.py",
     "test_documents.py",

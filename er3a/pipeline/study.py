@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import hashlib
+import re
 import warnings
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
-from pydantic import AfterValidator, Field, PrivateAttr, create_model, model_validator
+from pydantic import Field, PrivateAttr, create_model, model_validator
 
 from er3a.collision.scene import Scene
 from er3a.errors import DoubtfulUnit, InputError
 from er3a.files.annotations import catalogues_beside, translations_in
 from er3a.files.kept_files import sha256, shown_path
-from er3a.files.robot_file import Name, Placement, RobotFile, Text, check_placement
+from er3a.files.robot_file import NAME_PATTERN, Name, Placement, RobotFile, Text, check_placement
 from er3a.files.robot_library import LoadFields, placement_transform, read_robot, robot_of, robot_path
 from er3a.files.scene_file import load_scene
 from er3a.files.units import noted_doubts
@@ -22,21 +23,13 @@ from er3a.files.yaml_file import InputFile, StrictModel, load, read_yaml
 from er3a.pipeline.language import LANGUAGES, LanguageCode
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.registry import STAGES as REGISTRY
+from er3a.pipeline.sweeps import StageName, Sweep, Variant
 from er3a.robots.robot import Robot
 
 STAGES = tuple(REGISTRY)
 ExpectedStatus = Literal["pass", "caution", "fail", "no_reference"]
 COMPARED = ("validation", "workspace")
 SettingsT = TypeVar("SettingsT", bound=StrictModel)
-
-
-def _known_stage(name: str) -> str:
-    if name not in STAGES:
-        raise ValueError(f"there is no stage '{name}' | Known: {', '.join(STAGES)}")
-    return name
-
-
-StageName = Annotated[Text, AfterValidator(_known_stage)]
 
 
 class RobotEntry(StrictModel):
@@ -113,6 +106,7 @@ class StudyBase(InputFile):
     kind: Literal["study"]
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)]
     robots: Annotated[dict[Name, RobotEntry], Field(min_length=1)]
+    sweeps: Annotated[dict[Name, Sweep], Field(max_length=100)] = {}
     article: ArticleTables | None = None
     report: ReportSettings = ReportSettings()
     _file: Path | None = PrivateAttr(default=None)
@@ -122,6 +116,23 @@ class StudyBase(InputFile):
     def file(self) -> Path | None:
         """The file that the study was read from; None if it was made in Python."""
         return self._file
+
+    @model_validator(mode="after")
+    def _check_variant_names(self):
+        taken = set(self.robots)
+        for name, sweep in self.sweeps.items():
+            if sweep.robot not in self.robots:
+                problem = f"sweeps.{name}.robot: the study has no robot '{sweep.robot}'"
+                raise ValueError(f"{problem} | Known: {', '.join(self.robots)}")
+            for variant in sweep.variants(name):
+                if variant.name in taken:
+                    problem = f"sweeps.{name}: '{variant.name}' is the name of another robot already"
+                    raise ValueError(f"{problem} | Give the sweep another name")
+                if not re.match(NAME_PATTERN, variant.name):
+                    problem = f"sweeps.{name}: '{variant.name}' is too long for a robot's name"
+                    raise ValueError(f"{problem} | Give the sweep a shorter name")
+                taken.add(variant.name)
+        return self
 
     @model_validator(mode="after")
     def _article_names_robots_of_the_study(self):
@@ -143,42 +154,59 @@ class StudyBase(InputFile):
         return self
 
     @property
+    def variants(self) -> dict[str, Variant]:
+        """The robots that the sweeps make, by name."""
+        return {variant.name: variant for name, sweep in self.sweeps.items() for variant in sweep.variants(name)}
+
+    @property
     def names(self) -> list[str]:
-        """All robots of the study."""
-        return list(self.robots)
+        """All robots of the study, variants after those that are written in it."""
+        return [*self.robots, *self.variants]
 
     def stages(self, name: str) -> tuple[str, ...]:
         """The stages that a robot goes through."""
-        named = self.robots[name].stages
+        variant = self.variants.get(name)
+        named = self.robots[name].stages if variant is None else self.sweeps[variant.sweep].stages
         asked = STAGES if named is None else tuple(named)
         return tuple(stage for stage in asked if REGISTRY[stage].is_configured(self, name))
 
     def pages(self, name: str) -> tuple[str, ...]:
-        """The pages of a robot: its stages', and the teach panel."""
-        return (*(stage for stage in self.stages(name) if "report" in REGISTRY[stage].views), "teach")
+        """The pages of a robot: its stages', and the teach panel of one that is no variant."""
+        pages = tuple(stage for stage in self.stages(name) if "report" in REGISTRY[stage].views)
+        return pages if name in self.variants else (*pages, "teach")
 
     def entry(self, name: str) -> RobotEntry:
-        """The study's entry for a robot; :class:`InputError` if it has none."""
-        if name not in self.robots:
+        """The study's entry for a robot, for a variant that of its base; :class:`InputError` if it has none."""
+        base = self._base(name)
+        if base not in self.robots:
             raise InputError(None, f"robots.{name}", "the study has no such robot", f"Known: {', '.join(self.robots)}")
-        return self.robots[name]
+        return self.robots[base]
+
+    def _base(self, name: str) -> str:
+        variant = self.variants.get(name)
+        return variant.base if variant else name
 
     def robot_file(self, name: str) -> Path:
-        """The file of a robot; :class:`InputError` naming the entry if there is none."""
+        """The file of a robot, or of a variant's base; :class:`InputError` naming the entry if there is none."""
+        base = self._base(name)
         try:
-            return robot_path(self.entry(name).file or name)
+            return robot_path(self.entry(name).file or base)
         except InputError as error:
-            raise InputError(error.file, error.field or f"robots.{name}", error.problem, error.remedy) from None
+            raise InputError(error.file, error.field or f"robots.{base}", error.problem, error.remedy) from None
 
     def table(self, name: str) -> RobotFile:
-        """What the robot's file holds."""
-        return read_robot(self.robot_file(name))
+        """What the robot's file holds, with a variant's title and varied entry."""
+        content = read_robot(self.robot_file(name))
+        variant = self.variants.get(name)
+        return variant.table(content) if variant else content
 
     def robot(self, name: str) -> Robot:
         """The robot with the study's base and tool."""
         entry, content = self.entry(name), self.table(name)
         self._doubt(name, "base", "tool")
         base, tool = entry.base or content.base, entry.tool or content.tool
+        if variant := self.variants.get(name):
+            tool = variant.tool(tool)
         return robot_of(content).replace(name=name, base=placement_transform(base), tool=placement_transform(tool))
 
     def loads(self, name: str) -> list[LoadFields]:
@@ -189,7 +217,7 @@ class StudyBase(InputFile):
 
     def _doubt(self, name: str, *keys: str) -> None:
         """Tell again what is doubtful of a robot's entry, to those who rest on it."""
-        begins = tuple(f"robots.{name}.{key}." for key in keys)
+        begins = tuple(f"robots.{self._base(name)}.{key}." for key in keys)
         self._tell(each for each in self._doubts if each.key.startswith(begins))
 
     @staticmethod
@@ -205,7 +233,7 @@ class StudyBase(InputFile):
 
     def references(self, name: str) -> list[str]:
         """The reference sets that a robot's file names."""
-        return self.table(name).references
+        return read_robot(self.robot_file(name)).references
 
     def other_tables(self, name: str) -> list[str]:
         """Other robots of the study, with validation, that one of this robot's reference sets is about."""
@@ -243,6 +271,8 @@ class StudyBase(InputFile):
         """What of the study concerns one of its keys, for a robot; of a key without settings seed and robot alone."""
         not_counted = {"targets", "paths", "programs", "vision", "file", "scene", "expect", "tool_load", "payload"}
         entry = self.entry(name).model_dump(exclude=not_counted, exclude_none=True)
+        if variant := self.variants.get(name):
+            entry["varied"] = {variant.vary: variant.value}
         own = getattr(self, key, None)
         settings = own.model_dump() if own else {}
         if "scene" in settings:

@@ -46,7 +46,7 @@ def views(
 ):
     """Write a robot's recordings (always in English) and pages from results.
 
-    The viewer also draws each recording as a picture for its page.
+    The viewer also draws each recording as a picture for its page. For variants of a sweep the picture stays empty.
     """
     from er3a.pipeline.stages import run
     from er3a.pipeline.viewing.figures import house_style
@@ -73,12 +73,15 @@ def views(
 def _record(study: Study, robot: str, stage: str, results: Path, reports: Path) -> str:
     """Write a stage's recording and its picture; why there is no picture, if there is to be one."""
     from er3a.pipeline.stages import run
-    from er3a.pipeline.viewing.viewer import draw_preview
+    from er3a.pipeline.viewing.viewer import draw_preview, write_empty
 
     recording = reports / robot / f"{stage}.rrd"
-    picture = recording.with_suffix(".webp")
+    picture, problem = recording.with_suffix(".webp"), ""
     run.show("record", stage, study, robot, results / robot / stage, recording)
-    problem = draw_preview(recording, picture) or ""
+    if robot in study.variants:
+        write_empty(picture)
+    else:
+        problem = draw_preview(recording, picture) or ""
     write_checksum(recording)
     write_checksum(picture)
     return problem

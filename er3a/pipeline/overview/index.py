@@ -1,4 +1,7 @@
-"""The page over all robots: the index (robots x stages, verdicts and key figures)."""
+"""The page over all robots: the index (robots x stages, verdicts and key figures).
+
+Variants of a sweep are listed only in the section of their sweep.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 from scipy.spatial import ConvexHull
 
 from er3a.files.kept_files import shown_path
@@ -21,7 +25,7 @@ from er3a.pipeline.language import N_, own_title, tr
 from er3a.pipeline.messages.collision import near_shapes
 from er3a.pipeline.messages.dynamics import payload_text
 from er3a.pipeline.messages.left_out import left_out_text, say_reserved
-from er3a.pipeline.messages.numbers import at_least, at_most, fixed
+from er3a.pipeline.messages.numbers import at_least, at_most, fixed, number
 from er3a.pipeline.messages.pages import decision, next_step
 from er3a.pipeline.messages.say import bracketed, joined, say, sentence
 from er3a.pipeline.messages.validation import (
@@ -63,12 +67,13 @@ from er3a.pipeline.stages.validation.model import (
     ValidationResults,
 )
 from er3a.pipeline.stages.validation.page.evidence_section import evidence_section
-from er3a.pipeline.stages.workspace.model import WorkspaceResults, WorkspaceSummary
+from er3a.pipeline.stages.workspace.model import VoidSummary, WorkspaceResults, WorkspaceSummary
 from er3a.pipeline.stages.workspace.page.tray import MOTIONS, Placing, placing, scene_of, sound_motions
 from er3a.pipeline.study import Study
+from er3a.pipeline.sweeps import ENTRIES, entry_label
 from er3a.pipeline.verdicts import NOT_EXAMINED, StageVerdict, read_verdicts, write_junit
 from er3a.pipeline.viewing import page
-from er3a.pipeline.viewing.page import PAGES, Head, alternative_table, head_of
+from er3a.pipeline.viewing.page import PAGES, Head, alternative_table, head_of, status_word
 from er3a.robots.robot import Robot
 
 BORDER_POINT = "tool_point"
@@ -91,6 +96,105 @@ def _changed_names(changed: Sequence[str]) -> str:
     named = [tr(each) if each in (THE_SETTINGS, THE_CODE) else each for each in changed[:MAX_CHANGED]]
     more = [sentence("more", count=len(changed) - MAX_CHANGED)] if len(changed) > MAX_CHANGED else []
     return joined([*named, *more], ", ")
+
+
+@dataclass(frozen=True)
+class Point:
+    """A variant in a sweep: its value and its stages' results, by stage."""
+
+    name: str
+    value: float
+    stages: dict[str, Stored[Any]]
+
+    @property
+    def workspace(self) -> WorkspaceSummary:
+        """What the workspace stage found."""
+        return self.stages["workspace"].results.summary
+
+    @property
+    def enclosed(self) -> list[VoidSummary]:
+        """The enclosed voids that the workspace stage lists."""
+        return self.workspace.enclosed_voids
+
+    def litres(self, bound: str) -> float:
+        """The ``lower`` or ``upper`` bound of the enclosed voids' volume together, L."""
+        return 1000 * sum(getattr(void.volume_m3, bound) for void in self.enclosed)
+
+
+def sweep_sections(study: Study, results: Path, outdated: Outdated) -> list[dict[str, Any]]:
+    """What the template shows of each sweep of the study whose variants have all been computed."""
+    return [_section(study, name, results, outdated) for name in study.sweeps if _is_whole(study, name, results)]
+
+
+def _is_whole(study: Study, name: str, results: Path) -> bool:
+    variants = [variant.name for variant in study.variants.values() if variant.sweep == name]
+    return all(is_computed(results / variant / stage) for variant in variants for stage in study.stages(variant))
+
+
+def _section(study: Study, name: str, results: Path, outdated: Outdated) -> dict[str, Any]:
+    sweep = study.sweeps[name]
+    variants = [variant for variant in study.variants.values() if variant.sweep == name]
+    points = [
+        Point(v.name, v.value, {stage: read_stage(results / v.name / stage, STAGES[stage]) for stage in sweep.stages})
+        for v in variants
+    ]
+    content = study.table(sweep.robot)
+    what, unit = entry_label(ENTRIES[sweep.vary]), ENTRIES[sweep.vary].unit
+    ends = {"low": _plain(min(sweep.resolved)), "high": _plain(max(sweep.resolved))}
+    title = tr(
+        "{robot}: {what} from {low} to {high} {unit}", robot=own_title(content.title), what=what, unit=unit, **ends
+    )
+    columns, rows = _table(points, what, unit, sweep.stages)
+    return {
+        "name": name,
+        "title": title,
+        "outdated": changed_text(outdated, {variant.name for variant in variants}),
+        "columns": columns,
+        "rows": rows,
+    }
+
+
+def _plain(value: float) -> str:
+    """A varied value with the digits that it is written with."""
+    return f"{value:.9g}".replace("-", "−")
+
+
+def _table(points: list[Point], what: str, unit: str, stages: list[str]) -> tuple[list[str], list[list[Any]]]:
+    columns = [tr("variant"), bracketed(what, tr(unit)) + ">", *(tr(PAGES[stage]) for stage in stages)]
+    rows = [[point.name, _plain(point.value), *(_verdict(point, stage) for stage in stages)] for point in points]
+    if "workspace" in stages:
+        numbers = (
+            tr("reached volume, at least (m³)"),
+            tr("at most (m³)"),
+            tr("enclosed voids"),
+            tr("their volume, at least (L)"),
+            tr("open pockets"),
+            tr("greatest reach from axis 1 (mm)"),
+        )
+        columns += [f"{label}>" for label in numbers]
+        rows = [[*row, *_workspace_cells(point)] for row, point in zip(rows, points)]
+    return columns, rows
+
+
+def _workspace_cells(point: Point) -> list[str]:
+    if point.stages["workspace"].status == "not_computed":
+        return ["–"] * 6
+    summary = point.workspace
+    return [
+        at_least(summary.volume_m3.lower, "m³"),
+        at_most(summary.volume_m3.upper, "m³"),
+        str(len(point.enclosed)),
+        at_least(point.litres("lower"), "L"),
+        str(len(summary.voids) - len(point.enclosed)),
+        number(1000 * summary.reach_m.furthest_from_axis),
+    ]
+
+
+def _verdict(point: Point, stage: str) -> Markup:
+    status = point.stages[stage].status
+    return Markup('<a href="{}/{}.html"><span class="badge {}">{}</span></a>').format(
+        point.name, stage, status, status_word(status)
+    )
 
 
 CORNERS = 24  # of an arc, at most
@@ -169,6 +273,7 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         run_words=MAY_RUN,
         conventions=CONVENTIONS,
         most_faults=MAX_FAULTS,
+        sweeps=sweep_sections(study, results, outdated),
         command=page.run_command(study, "index.html"),
         provenance=Provenance(
             inputs=result_records(results, study.names),

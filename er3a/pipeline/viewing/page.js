@@ -610,7 +610,7 @@ function addContents() {
 }
 
 // Joints that a sentence names, as "(10, −20, 30, 0, 45, 0) deg" or "(10°, −20°, 300 mm, 0°)", lead to the arm in the
-// teach panel.
+// teach panel; a variant has none.
 function linkJoints(page) {
   const value = "[−-]?\\d+(?:\\.\\d+)?";
   const unit = "(?:°|\\s*mm)";
