@@ -175,7 +175,7 @@ def test_what_is_missing_damaged_or_of_an_older_version_is_made_again(small_stud
         content = bytearray(path.read_bytes())
         content[len(content) // 2] ^= 4
         path.write_bytes(bytes(content))
-    half = reports / "er3_600/collision.rrd"
+    half = reports / "er3_600/validation.rrd"
     half.write_bytes(half.read_bytes()[: half.stat().st_size // 2])
 
     told = CliRunner().invoke(app, ["view", "er3_600", "--reports", str(reports)])

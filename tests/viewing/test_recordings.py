@@ -19,7 +19,6 @@ from er3a.collision.scene import Scene, Sphere
 from er3a.files.robot_library import load_robot
 from er3a.pipeline.player.motions import Mark, PlayedEvent
 from er3a.pipeline.results import check_checksum
-from er3a.pipeline.stages.registry import STAGES as REGISTRY
 from er3a.pipeline.study import STAGES
 from er3a.pipeline.viewing import viewer
 from er3a.pipeline.viewing.arm import LABEL, TIMELINE
@@ -31,8 +30,7 @@ from tests.conftest import ROBOT, ROBOTS, ROOT
 from tests.viewing.pictures import joints_seen
 
 RERUN = Path(sys.executable).with_name("rerun")
-RECORDED = [name for name in STAGES if "record" in REGISTRY[name].views]
-RECORDINGS = [f"{robot}/{stage}.rrd" for robot in ROBOTS for stage in stages_of(robot) if stage in RECORDED]
+RECORDINGS = [f"{robot}/{stage}.rrd" for robot in ROBOTS for stage in stages_of(robot)]
 ROW = re.compile(r"^\| `(/[^`]*)` \| [^|]+ \| [^|]* \| (\w+) \|$", flags=re.MULTILINE)
 
 
@@ -52,7 +50,7 @@ def rows_for(entity: str, stage: str) -> list[str]:
     return [row for row, pattern in names.items() if re.fullmatch(pattern, entity)]
 
 
-@pytest.mark.parametrize("stage", RECORDED)
+@pytest.mark.parametrize("stage", STAGES)
 def test_recording_is_sound(small_study, stage):
     path = small_study.folder / f"reports/{ROBOT}/{stage}.rrd"
     assert subprocess.run([RERUN, "rrd", "verify", path], capture_output=True, check=False).returncode == 0
@@ -94,7 +92,7 @@ def test_each_documented_entity_is_logged(small_study):
     assert set(documented()) - found == set()
 
 
-@pytest.mark.parametrize("stage", ["inverse", "trajectory"])
+@pytest.mark.parametrize("stage", ["inverse", "trajectory", "vision"])
 def test_the_study_s_scene_is_drawn(small_study, stage):
     entities = logged(small_study.folder / f"reports/{ROBOT}/{stage}.rrd")
     scene = {"table", "post", "lamp", "floor"}
@@ -102,10 +100,10 @@ def test_the_study_s_scene_is_drawn(small_study, stage):
 
 
 def test_recordings_of_a_robot_merge_without_being_mixed(small_study, tmp_path):
-    parts = [small_study.folder / f"reports/er3_600/{stage}.rrd" for stage in RECORDED]
+    parts = [small_study.folder / f"reports/er3_600/{stage}.rrd" for stage in STAGES]
     subprocess.run([RERUN, "rrd", "merge", *parts, "-o", tmp_path / "all.rrd"], check=True, capture_output=True)
     kept = RrdReader(tmp_path / "all.rrd").recordings()
-    assert sorted(recording.application_id for recording in kept) == sorted(f"{stage} er3_600" for stage in RECORDED)
+    assert sorted(recording.application_id for recording in kept) == sorted(f"{stage} er3_600" for stage in STAGES)
 
 
 def test_bodies_are_red_and_the_contact_marked_while_they_overlap(robot, tmp_path):

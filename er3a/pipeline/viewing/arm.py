@@ -69,45 +69,52 @@ def arm_view(
     return rrb.Spatial3DView(origin="/", contents=list(contents), name=name, eye_controls=eye, overrides=hidden or None)
 
 
-def log_arm(stream: rr.RecordingStream, robot: Robot, q: np.ndarray, entity: str = "arm") -> None:
+def log_arm(stream: rr.RecordingStream, robot: Robot, q: np.ndarray, entity: str = "arm", ghost: bool = False) -> None:
     """Log the arm's shapes, standing at joint angles (6,) in rad.
+
+    Parameters
+    ----------
+    ghost : draw it translucent grey, without axes, as a further arm beside the main one
 
     An arm that has visuals is shown by them; the shapes that collisions are measured with stand beside them as
     ``checked``, below each link.
     """
     radius = 0.028 * size_of(robot)
     parts = link_parts(robot)
-    _log_visuals(stream, robot, robot.visuals, entity)
-    seen = {each.link for each in robot.visuals}
-    _log_base(stream, robot, entity, radius, plate=0 not in seen)
+    looks = () if ghost else robot.visuals
+    _log_visuals(stream, robot, looks, entity)
+    seen = {each.link for each in looks}
+    _log_base(stream, robot, entity, radius, plate=not ghost and 0 not in seen)
     for k in range(robot.rows):
         path = f"{entity}/link_{k + 1}"
         size = radius * _TAPER[min(k, len(_TAPER) - 1)]
         along = parts[k + 1, ALONG_Z, :3, 3]
         across = along + parts[k + 1, TO_NEXT_AXIS, :3, 3]
         if k + 1 not in seen:
-            _log_segments(stream, f"{path}/body", [(np.zeros(3), along), (along, across)], size * 0.75)
-        colour = (*rgb(JOINT_COLOURS[k]), 255)
+            _log_segments(stream, f"{path}/body", [(np.zeros(3), along), (along, across)], size * 0.75, ghost)
+        colour = (*rgb(BODY), 90) if ghost else (*rgb(JOINT_COLOURS[k]), 255)
         drum = rr.Cylinders3D(
             lengths=[size * 2.6],
             radii=[size],
             centers=[along / 2],
             colors=[colour],
-            fill_mode="solid",
+            fill_mode="solid" if not ghost else "transparentfillmajorwireframe",
         )
         if k + 1 not in seen:
             stream.log(f"{path}/joint", drum, static=True)
-        arrow = np.array([0, 0, robot.direction[k] * size * 3.2])
-        axis = rr.Arrows3D(origins=[along / 2], vectors=[arrow], radii=[size * 0.12], colors=[colour])
-        tip = rr.Points3D(
-            [along / 2 + LABEL_AT * arrow],
-            radii=[size * 0.1],
-            colors=[legible(JOINT_COLOURS[k])],
-            labels=[JOINT_NAMES[k]],
-            show_labels=True,
-        )
-        stream.log(f"{path}/axis", axis, tip, static=True)
-    stream.log(f"{entity}/tool", rr.TransformAxes3D(radius * 3), static=True)
+        if not ghost:
+            arrow = np.array([0, 0, robot.direction[k] * size * 3.2])
+            axis = rr.Arrows3D(origins=[along / 2], vectors=[arrow], radii=[size * 0.12], colors=[colour])
+            tip = rr.Points3D(
+                [along / 2 + LABEL_AT * arrow],
+                radii=[size * 0.1],
+                colors=[legible(JOINT_COLOURS[k])],
+                labels=[JOINT_NAMES[k]],
+                show_labels=True,
+            )
+            stream.log(f"{path}/axis", axis, tip, static=True)
+    if not ghost:
+        stream.log(f"{entity}/tool", rr.TransformAxes3D(radius * 3), static=True)
     for path, T in zip(_moving_entities(robot, entity), frames(robot, q)):
         stream.log(path, rr.Transform3D(translation=T[:3, 3], mat3x3=T[:3, :3]), static=True)
 
@@ -152,14 +159,15 @@ def _log_base(stream: rr.RecordingStream, robot: Robot, entity: str, radius: flo
 
 
 def _log_segments(
-    stream: rr.RecordingStream, entity: str, segments: list[tuple[np.ndarray, np.ndarray]], radius: float
+    stream: rr.RecordingStream, entity: str, segments: list[tuple[np.ndarray, np.ndarray]], radius: float, ghost: bool
 ) -> None:
     solid = [(start, end - start) for start, end in segments if np.linalg.norm(end - start) > 1e-6]
     if not solid:
         return
     starts = np.array([start for start, _ in solid])
     vectors = np.array([vector for _, vector in solid])
-    stream.log(entity, capsules(starts, vectors, radius, (*rgb(LINK), 255), solid=True), static=True)
+    colour = (*rgb(BODY), 60) if ghost else (*rgb(LINK), 255)
+    stream.log(entity, capsules(starts, vectors, radius, colour, solid=not ghost), static=True)
 
 
 def capsules(

@@ -367,7 +367,6 @@ def render(
             command=command,
             provenance=head.provenance if head else provenance,
             preview=_preview(output.with_suffix(".webp")),
-            recorded=head is not None and "record" in STAGES[head.stage].views,
             versions=_versions(),
             commit=_commit(),
             **context,

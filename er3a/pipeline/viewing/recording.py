@@ -113,6 +113,7 @@ class Recorded:
     views : by title, the entities below the stage that a 3-D view shows beside the arm; all in one by default
     shapes : by entity, what is to be seen all the time
     points : arrays (N, 3), m, to be in sight when the views open, besides the arm
+    ghost : a further arm, see-through, that moves along; at ``<stage>/corrected``
     now : title of the text on what is shown now
     """
 
@@ -127,6 +128,7 @@ class Recorded:
     views: Mapping[str, Sequence[str]] = field(default_factory=lambda: {"Arm": ("**",)})
     shapes: Mapping[str, Logged] = field(default_factory=dict)
     points: Sequence[Reals] = ()
+    ghost: Robot | None = None
     now: str = "Now"
 
 
@@ -142,6 +144,8 @@ def write_recording(shown: Recorded, output: Path) -> None:
         known = q[np.isfinite(q).all(axis=1)]
         home = shown.home if shown.home is not None else np.zeros(robot.joints)
         log_arm(stream, robot, known[0] if len(known) else home)
+        if shown.ghost is not None:
+            log_arm(stream, shown.ghost, home, f"{stage}/corrected", ghost=True)
         _log_scene(stream, shown)
         for entity, shape in shown.shapes.items():
             _log(stream, stage, entity, shape, static=True)
@@ -309,7 +313,9 @@ def _log_run(stream: rr.RecordingStream, shown: Recorded, run: Run, start: float
     """Log a run; returns the entities of its shapes, which go when the next one starts, as those ``before`` go now."""
     stage, times, known = shown.stage, start + run.t, np.isfinite(run.q).all(axis=1)
     if known.any():
-        send_motion(stream, shown.robot, times[known], run.q[known])
+        for robot, entity in ((shown.robot, "arm"), (shown.ghost, f"{stage}/corrected")):
+            if robot is not None:
+                send_motion(stream, robot, times[known], run.q[known], entity)
     for entity, columns in run.columns.items():
         stream.send_columns(entity[1:] if entity.startswith("/") else f"{stage}/{entity}", [seconds(times)], columns)
     for entity, values in run.curves.items():

@@ -30,5 +30,4 @@ STAGE = Stage(
     question=N_("Does the table match the manufacturer's data?"),
     settings={"validation": ValidationSettings},
     inputs=_inputs,
-    views=("report",),
 )

@@ -68,7 +68,6 @@ STAGE = Stage(
     settings={"vision": VisionSettings, "trajectory": TrajectorySettings},
     inputs=_inputs,
     is_configured=lambda study, robot: study.entry(robot).vision is not None,
-    views=("report",),
     rests_on=("validation",),
     obstacles=True,
     motions=N_("grasps"),

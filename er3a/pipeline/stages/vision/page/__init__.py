@@ -1,1 +1,1 @@
-"""Page of the stage vision: results in, view out."""
+"""Page and recording of the stage vision: results in, views out."""
