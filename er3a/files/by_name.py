@@ -105,6 +105,25 @@ def load_measurements(path: str | Path, robot: Robot | None = None) -> tuple[Mea
     return tuple(rows)
 
 
+def load_joint_values(path: str | Path, robot: Robot) -> Reals:
+    """Joint values (P, n), rad or m, of a table with the joints' columns of measured positions; its other columns may
+    be there, and are not read.
+
+    Raises
+    ------
+    InputError
+        naming file, row and column: a number missing or not finite, radians, or a value outside the joint limits
+    """
+    path, units = Path(path), ["mm" if slides else "deg" for slides in robot.slides]
+    unread = {name: replace(each, optional=True, always=False) for name, each in measurement_columns(units).items()}
+    joints = [f"q{joint}_{unit}" for joint, unit in enumerate(units, 1)]
+    table = read_csv(path, unread | dict.fromkeys(joints, _NUMBER))
+    rows = [Measurement(each["row"], tuple(each[q] for q in joints), "tool", (None, None, None)) for each in table]
+    _check_units(path, rows, units)
+    check_poses(rows, robot, path)
+    return meant(robot, np.array([row.pose for row in rows], dtype=float).reshape(-1, robot.joints))
+
+
 def _units_in(path: Path) -> list[str]:
     """Units of the joints that a header names; six angles if it names none."""
     named = {int(found[1]): found[2] for name in read_header(path) if (found := JOINT_COLUMN.fullmatch(name))}

@@ -1,4 +1,4 @@
-"""URDF in and out: serial chains of revolute and prismatic joints.
+"""URDF in and out, SRDF out: serial chains of revolute and prismatic joints.
 
 Reference: the ROS URDF specification (joint origin, axis, limit, mimic; rpy is fixed-axis roll-pitch-yaw, the same
 matrix as R = Rz(yaw) Ry(pitch) Rx(roll)).
@@ -12,9 +12,12 @@ one joint to the next.
 Nearly parallel axes have a common normal kilometres away. Between them d is 0, and the table uses Hayati's rotation
 beta about y [1]_, which needs no normal.
 
+MoveIt reads an SRDF beside the URDF: the arm's planning group, and the pairs of links not to check [2]_.
+
 References
 ----------
 .. [1] S. A. Hayati, "Robot arm geometric link parameter estimation", 22nd IEEE Conf. on Decision and Control (1983).
+.. [2] I. Sucan, S. Chitta and others, "Semantic Robot Description Format (SRDF)", ROS documentation.
 """
 
 from __future__ import annotations
@@ -30,7 +33,9 @@ import numpy as np
 import scipy
 
 from er3a.by_value import ByValue, Displayed, Sheet, shortly
+from er3a.collision.matrix import collision_matrix
 from er3a.collision.meshes import simplified
+from er3a.collision.shapes import arm_shapes
 from er3a.errors import Er3aError, InputError
 from er3a.formats import urdf_tree
 from er3a.formats.mesh_file import link_mesh
@@ -752,3 +757,45 @@ def _chain_forward(joints: Sequence[urdf_tree.UrdfJoint], values: Reals) -> Real
 
 def _words(values: Reals) -> str:
     return " ".join(repr(float(value)) for value in values)
+
+
+REASONS = {"never": "Never", "joined": "Adjacent", "allowed": "User", "overlaps": "Default", "guessed": "Default"}
+
+
+def export_srdf(robot: Robot) -> str:
+    """The arm's SRDF, for the URDF of :func:`er3a.formats.urdf.export_urdf`.
+
+    Pairs of links that are disabled: those that are proven apart in all joint vectors within the limits (Never),
+    that a joint joins (Adjacent), that the robot's file allows to touch (User), and whose shapes overlap in every
+    joint vector (Default), which is an error of the shapes: a comment names them. A comment says on what shapes the
+    pairs rest, where no document gives them.
+    """
+    root = ElementTree.Element("robot", name=robot.name)
+    if rests := assumed_pairs(robot):
+        root.append(ElementTree.Comment(f" {rests} "))
+    group = ElementTree.SubElement(root, "group", name="arm")
+    ElementTree.SubElement(group, "chain", base_link="base", tip_link="tool")
+    for row in collision_matrix(robot).rows:
+        if row.state not in REASONS:
+            continue
+        if REASONS[row.state] == "Default":
+            root.append(ElementTree.Comment(f" {row.first} and {row.second} are not checked: the shapes are in error "))
+        ElementTree.SubElement(root, "disable_collisions", link1=row.first, link2=row.second, reason=REASONS[row.state])
+    ElementTree.indent(root)
+    return '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def assumed_pairs(robot: Robot) -> str:
+    """That the pairs of an SRDF rest on shapes which no document gives; empty where one does."""
+    shapes = arm_shapes(robot)
+    if not shapes.assumed:
+        return ""
+    made = "the robot's file assumes, or gives in part" if shapes.given else "er3a guesses from the table"
+    return f"pairs are disabled by shapes that {made}: with other shapes they may meet"
+
+
+def pairs_not_checked(robot: Robot) -> tuple[str, ...]:
+    """Pairs of links that the SRDF disables because their shapes can't be right."""
+    return tuple(
+        f"{row.first} and {row.second}" for row in collision_matrix(robot).rows if REASONS.get(row.state) == "Default"
+    )

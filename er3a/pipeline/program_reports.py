@@ -8,11 +8,12 @@ References
 from __future__ import annotations
 
 import hashlib
+import json
 import math
 import os
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -112,6 +113,32 @@ def checked_file(
     missed = missed_of_program(robot, options.scene)
     found = tuple(each for each in missed if each.subject in ("uncovered_links", "own_limits"))
     return CheckedFile(file, check, missed=(*found, *left_out_of_units([*doubts, *own])))
+
+
+def accepted(baseline: Path) -> frozenset[str]:
+    """Fingerprints of findings in a SARIF log that were accepted.
+
+    Raises
+    ------
+    InputError
+        for a file that is no SARIF log
+    """
+    try:
+        log = json.loads(baseline.read_text(encoding="utf-8"))
+        results = [each for run in log["runs"] for each in run["results"]]
+        return frozenset(each["partialFingerprints"][FINGERPRINT] for each in results)
+    except (OSError, ValueError, KeyError, TypeError):
+        raise InputError(baseline, None, "is no SARIF log", "Give what --sarif has written") from None
+
+
+def without(checked: CheckedFile, silenced: frozenset[str]) -> CheckedFile:
+    """A check without the findings that were accepted, by their fingerprints."""
+    if checked.check is None or not silenced:
+        return checked
+    prints = (each["partialFingerprints"][FINGERPRINT] for each in sarif_of([checked])["runs"][0]["results"])
+    kept = tuple(each for each, mark in zip(checked.check.findings, prints) if mark not in silenced)
+    level = worst_of(each.level for each in kept)
+    return replace(checked, check=replace(checked.check, findings=kept, level=level))
 
 
 def lines_of(checked: CheckedFile, every: bool = False, verdicts: bool = False) -> list[str]:

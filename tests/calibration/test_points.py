@@ -3,6 +3,7 @@ what is no noise is said."""
 
 from __future__ import annotations
 
+import csv
 import json
 from dataclasses import replace
 from itertools import cycle
@@ -320,6 +321,11 @@ def test_the_command_tells_positions_held_back(tmp_path):
     assert text.index("mine_model.json: written; the whole model: er3a.load_calibration") < text.index("mine.yaml: wri")
     written = json.loads((tmp_path / "mine_model.json").read_text(encoding="utf-8"))
     assert written | {"output": None} == found
+    words = ["predict", str(tmp_path / "mine_model.json"), str(held), "--robot", str(MEASUREMENTS / "wam.yaml")]
+    assert f"er3a {' '.join(words).replace(str(held), 'JOINTS.csv')}" in text
+    printed = list(csv.DictReader(CliRunner().invoke(app, words).stdout.splitlines()))
+    by_command = np.array([[float(line[f"{c}_mm"]) for c in "xyz"] for line in printed])
+    assert by_command == pytest.approx(np.array([each["xyz_mm"] for each in found["held_back"]["rows"]]), abs=1e-5)
     mine, rows = load_robot(tmp_path / "mine.yaml"), load_measurements(held, robot)
     model, q = er3a.load_calibration(record, robot), np.radians([row.pose for row in rows])
     for name, T in (("xyz_mm", model.forward(q)), ("table_xyz_mm", er3a.forward(mine, q))):

@@ -76,6 +76,8 @@ def test_a_cause_is_one_line_and_what_was_accepted_is_none(tmp_path):
     assert len(done.stdout.splitlines()) <= 11
     every = check(str(tmp_path / "a.src"), "--all")
     assert len(every.stdout.splitlines()) > 60
+    again = check(str(tmp_path / "a.src"), "--baseline", str(sarif))
+    assert "[above_limit]" not in again.stdout
 
 
 def test_what_is_assumed_of_calls_and_values_is_followed(tmp_path):

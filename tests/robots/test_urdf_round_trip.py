@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pinocchio
 import pytest
-from typer.testing import CliRunner
 
 import er3a
 from er3a.collision.matrix import collision_matrix
@@ -22,9 +21,8 @@ from er3a.files.robot_library import load_robot
 from er3a.files.robot_writer import write_robot
 from er3a.formats.urdf import UrdfImport, export_urdf, import_urdf
 from er3a.kinematics.forward import forward
-from er3a.pipeline.cli import app
 from er3a.robots.masses import Load
-from er3a.robots.robot import CombinedLimit, ConvexPiece, Envelope, Robot
+from er3a.robots.robot import ConvexPiece, Envelope, Robot
 from testing.arms import placement
 from testing.fleet import UrdfFile, chain_ends, urdf_files
 
@@ -399,10 +397,3 @@ def test_what_other_readers_pass_over_is_no_obstacle(tmp_path):
     extra = '<xacro:property name="w" value="0.1"/><sensor:camera name="c"><a:b/></sensor:camera></robot>'
     left = arm_text().replace("</robot>", extra)
     assert_same(import_urdf(written(tmp_path, arm_text())).robot, import_urdf(written(tmp_path, left)).robot)
-
-
-def test_limits_on_sums_of_joints_are_told_to_be_left_out(tmp_path):
-    for combined in ((), (CombinedLimit((0.0, 1.0, 1.0, 0.0, 0.0, 0.0), -1.0, 2.0),)):
-        write_robot(load_robot("er3a_c60").replace(name="arm", combined=combined), tmp_path / "arm.yaml")
-        asked = ["export-urdf", str(tmp_path / "arm.yaml"), "--output", str(tmp_path / "arm.urdf")]
-        assert ("limits on sums of joints are left out" in CliRunner().invoke(app, asked).stderr) == bool(combined)

@@ -34,6 +34,10 @@ Assumed = Annotated[
     list[str] | None,
     typer.Option(help="what is not in the files: calls that move nothing (rq_*), or values (NAME=1)"),
 ]
+BaselineFile = Annotated[
+    Path | None, typer.Option(callback=given_files, help="a SARIF file: its findings are accepted")
+]
+
 Verdicts = Annotated[bool, typer.Option("--verdicts", help="print a line for each motion, also for those that pass")]
 Seconds = Annotated[
     float,
@@ -60,6 +64,7 @@ def check_program(
     every: Annotated[bool, typer.Option("--all", "-v", help="print each finding by itself, notes too")] = False,
     verdicts: Verdicts = False,
     sarif: Annotated[Path | None, typer.Option(help="write the findings as SARIF 2.1.0 to this file")] = None,
+    baseline: BaselineFile = None,
     seconds: Seconds = 30.0,
     fail_on: Annotated[FailOn, typer.Option(help="exit code 1 for findings of this level or worse")] = FailOn.fail,
     as_json: AsJson = False,
@@ -70,6 +75,7 @@ def check_program(
     from er3a.files.scene_file import load_scene
     from er3a.files.units import noted_doubts
     from er3a.pipeline.program_reports import (
+        accepted,
         checked_file,
         cycle_line,
         json_of,
@@ -78,6 +84,7 @@ def check_program(
         sarif_of,
         scope_line,
         shapes_line,
+        without,
     )
     from er3a.pipeline.progress import TimeBudget, shown_work, work_clock
     from er3a.program_check.check_program import CheckOptions
@@ -93,13 +100,15 @@ def check_program(
             scene=load_scene(scene) if scene else None,
             limits=RunLimits(assumed=names, assumed_values=values),
         )
+    silenced = accepted(baseline) if baseline else frozenset()
     budget, checked = TimeBudget(seconds, len(files)), []
     with shown_work("reading") as at:
         for file in files:
             at(f"{file}: checking")
             begun, end = budget.next_piece()
             own = replace(options, keep_on=_until(end, work_clock))
-            checked.append(checked_file(file, arm, own, doubts, max(end - begun, LEAST_S)))
+            found = checked_file(file, arm, own, doubts, max(end - begun, LEAST_S))
+            checked.append(without(found, silenced))
     if sarif is not None:
         _write(sarif, json.dumps(sarif_of(checked), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
     required = [each for each in require.split(",") if each]

@@ -80,18 +80,29 @@ def import_urdf(
 def export_urdf(
     robot: options.AnyRobot,
     output: Annotated[Path, typer.Option(help="the URDF to write")],
+    srdf: Annotated[
+        Path | None, typer.Option(help="also write an SRDF for MoveIt: the pairs of links not to check")
+    ] = None,
 ):
     """Write a robot as URDF."""
     from er3a.files.kept_files import write_atomically
     from er3a.files.robot_library import load_robot
+    from er3a.formats.urdf import assumed_pairs, export_srdf, pairs_not_checked
     from er3a.formats.urdf import export_urdf as urdf_text
 
     arm = load_robot(robot)
-    text = urdf_text(arm, output.with_name(f"{output.stem}_meshes"))
+    texts = {output: urdf_text(arm, output.with_name(f"{output.stem}_meshes"))}
+    if srdf is not None:
+        texts[srdf] = export_srdf(arm)
+        if rests := assumed_pairs(arm):
+            options.print_note(f"{srdf}: {rests}")
+        for pair in pairs_not_checked(arm):
+            options.print_note(f"{srdf}: {pair} overlap where no arm can; their shapes are in error, not checked")
     if arm.combined:
         options.print_note(f"{output}: limits on sums of joints are left out, as a URDF has no place for them")
-    write_atomically(output, partial(Path.write_text, data=text, encoding="utf-8"))
-    print(f"{output}: written")
+    for file, text in texts.items():
+        write_atomically(file, partial(Path.write_text, data=text, encoding="utf-8"))
+        print(f"{file}: written")
 
 
 @options.app.command(rich_help_panel=options.ROBOT_FILES)
@@ -231,6 +242,31 @@ def calibrate(
         print("\n".join(kept_lines(found, robot, output, model, contradicted=contradicted)))
     if contradicted or not found.fits:
         raise typer.Exit(1)
+
+
+@options.app.command(rich_help_panel=options.ROBOT_FILES)
+def predict(
+    model: Annotated[Path, typer.Argument(help="NAME_model.json, which er3a calibrate --output NAME.yaml writes")],
+    joints: Annotated[Path, typer.Argument(help="a CSV with the columns q1_deg ... (q3_mm of a joint that slides)")],
+    robot: Annotated[str, typer.Option(help="the robot that the calibration started from: a name or file")],
+):
+    """Print where a calibrated arm's tool is at commanded joint values, by the whole model with all its terms: a CSV
+    with position and roll, pitch and yaw."""
+    import numpy as np
+
+    from er3a.files.by_name import load_calibration, load_joint_values
+    from er3a.files.robot_library import load_robot
+    from er3a.geometry.transforms import rpy_of
+    from er3a.robots.joint_limits import shown
+
+    arm = load_robot(robot)
+    q = load_joint_values(joints, arm)
+    T = load_calibration(model, arm).forward(q)
+    names = [f"q{joint}_{'mm' if slides else 'deg'}" for joint, slides in enumerate(arm.slides, 1)]
+    print(",".join([*names, "x_mm", "y_mm", "z_mm", "roll_deg", "pitch_deg", "yaw_deg"]))
+    for values, pose in zip(shown(arm, q), T):
+        numbers = [*values, *1000 * pose[:3, 3], *np.degrees(rpy_of(pose))]
+        print(",".join(f"{number:.6f}" for number in numbers))
 
 
 @options.app.command(rich_help_panel=options.ROBOT_FILES)
