@@ -30,7 +30,10 @@ SAME_TIME = 1e-13  # share of the duration
 LOCATED = 1e-14  # share of the duration
 GAP = 5e-6  # share of the duration
 PIECES_AT_ONCE = 4096  # whose rates are computed together
-INSET = 1e-6  # share of half a piece: so near to its ends it is not compared, because accelerations may step there
+INSET = (
+    1e-3  # share of half a piece: nearer to its ends it is not compared, as accelerations may step there, and a path
+)
+# that halts is, to rounding, on its next piece already
 Stretch = tuple[float, float, float, float]
 
 

@@ -94,8 +94,9 @@ class PathFigure:
 
     def _axes(self, column: int, row: int) -> Axes:
         height = (TOP - BOTTOM) / 3
-        bottom = BOTTOM + (2 - row) * height + (0.03 if (column, row) == (1, 1) else 0.0)
-        ax = self.figure.add_axes((LEFT + column * (WIDTH + GAP), bottom, WIDTH, height - 0.03))
+        gap = 0.07 if (column, row) == (1, 2) else 0.03  # room for the label of the axis of time above the last one
+        x, y = LEFT + column * (WIDTH + GAP), BOTTOM + (2 - row) * height
+        ax = self.figure.add_axes((x, y, WIDTH, height - gap))
         ax.tick_params(labelsize=FONT, length=2)
         ax.xaxis.set_major_locator(MaxNLocator(5))
         ax.yaxis.set_major_locator(MaxNLocator(4))
