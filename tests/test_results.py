@@ -14,11 +14,15 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
+from numpy.typing import NDArray
 
 from er3a.errors import ResultError, WriteError
 from er3a.files.kept_files import half_written, sha256, write_atomically
 from er3a.files.robot_library import ROBOTS
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.code_digest import numbers_digest
 from er3a.pipeline.results import (
     CHECKSUMS,
@@ -34,6 +38,7 @@ from er3a.pipeline.results import (
     write_results,
 )
 from er3a.pipeline.study import load_study
+from er3a.pipeline.tables import Table, Texts, column, lists
 from testing.made_stage import ROWS, STAGE, SUMMARY, Hollow, MadeResults, Rows, Solid, write
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -109,6 +114,47 @@ def test_a_column_of_another_length_or_shape_is_refused():
         Rows(x_m=[1.0], count=[1, 2], label=["a"], q_deg=np.zeros((1, 6)), point_mm=np.zeros((1, 3)))
     with pytest.raises(ValueError, match="q_deg has shape"):
         Rows(x_m=[1.0], count=[1], label=["a"], q_deg=[0.0], point_mm=np.zeros((1, 3)))
+
+
+class EveryKind(Table):
+    """A column of each type of values."""
+
+    text: Texts = column("a text, or none")
+    flag: Flags = column("a flag")
+    count: Integers = column("a number")
+    t_s: Reals = column("a time")
+    small: NDArray[np.int32] = column("a short number")
+    ends_deg: Texts = lists("angles")
+
+
+MANY = EveryKind(
+    text=["α", None, "", "end"] * 5,
+    flag=[True, False, False] * 6 + [True, True],
+    count=range(20),
+    t_s=np.where(np.arange(20) == 3, np.nan, np.linspace(0, 1, 20))[::-1],
+    small=np.arange(40)[::2],
+    ends_deg=[np.arange(k % 3, dtype=float) for k in range(20)],
+)
+
+
+@pytest.mark.parametrize("table", [MANY, EveryKind.empty()])
+def test_a_file_is_as_arrow_itself_writes_its_columns(table, tmp_path):
+    """:meth:`Table.write` hands over memory; Arrow's own conversion is the judge."""
+    table.write(tmp_path / "own.parquet")
+    found = pq.read_table(tmp_path / "own.parquet")
+    values = {name: list(getattr(table, name)) for name in table.columns()}
+    wanted = pa.table({name: pa.array(values[name], found.schema.field(name).type) for name in values})
+    for name in wanted.column_names:
+        theirs = wanted[name].to_pylist()
+        assert found[name].to_pylist() == (pytest.approx(theirs, nan_ok=True) if name == "t_s" else theirs)
+        assert found[name].null_count == wanted[name].null_count
+    found.validate(full=True)
+
+
+def test_writing_a_table_loads_no_pandas(tmp_path):
+    code = "import sys; from testing.made_stage import ROWS; from pathlib import Path; ROWS.write(Path(sys.argv[1])); "
+    code += "assert 'pandas' not in sys.modules"
+    subprocess.run([sys.executable, "-c", code, str(tmp_path / "rows.parquet")], check=True, cwd=ROOT)
 
 
 def test_equal_inputs_give_equal_bytes(tmp_path, study):
