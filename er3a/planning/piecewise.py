@@ -85,7 +85,7 @@ class Pieces:
         Those that only a gap of the shortest pieces parts are one.
         """
         found: list[Stretch] = []
-        gap = GAP * (self.times[-1] - self.times[0])
+        gap = GAP * self.times[-1]
         for i in np.flatnonzero(self.range[1] > level).tolist():
             t, values = self.nodes(i)
             for k in range(len(t) - 1):
