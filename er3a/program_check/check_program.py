@@ -530,13 +530,7 @@ def parts_of(check: ProgramCheck, robot: Robot, source: CommandSource) -> tuple[
     if not groups:
         raise InputError(source.file, f"{source.field}.program", "no motion has a known start", "Give start_deg")
     whose = [{place for place, _ in group} for group in groups]
-    held = set().union(*whose)
-    found = [
-        each
-        for each in check.findings
-        if found_in.RANKS[each.level] >= found_in.RANKS["caution"]
-        and not (each.finding.code in FOUND_OF_PATHS and (each.place in held or not each.place.line))
-    ]
+    found = _beyond_paths(check, set().union(*whose))
     parts = [
         replace(
             _part([(place.line, motion) for place, motion in group]),
@@ -545,6 +539,16 @@ def parts_of(check: ProgramCheck, robot: Robot, source: CommandSource) -> tuple[
         for group, own in zip(groups, whose)
     ]
     return parts, tuple(sorted({*rest.values()} - {0}))
+
+
+def _beyond_paths(check: ProgramCheck, held: set[Place]) -> list[LocatedFinding]:
+    """What is found of at least caution, but for what a check of paths made of motions at places finds itself."""
+    return [
+        each
+        for each in check.findings
+        if found_in.RANKS[each.level] >= found_in.RANKS["caution"]
+        and not (each.finding.code in FOUND_OF_PATHS and (each.place in held or not each.place.line))
+    ]
 
 
 def _goes_on(before: CheckedMotion, motion: CheckedMotion) -> bool:
