@@ -131,6 +131,7 @@ class Extents:
     ----------
     met : whether a table that meets the requirements was found; table_meets : whether the table does
     far : tables far away that meet them, too, once these were searched for: how far such go was not
+    goes_far : whether these differ in most entries: then no search tells where any entry ends
     """
 
     def __init__(
@@ -157,6 +158,7 @@ class Extents:
             self._begin(nearer)
         self._fit_likelihood()
         self.far: list[tuple[Reals, Reals]] = []
+        self.goes_far = False
         self._ends: dict[bytes, tuple[float, float]] = {}
 
     @property
@@ -265,7 +267,8 @@ class Extents:
             low, high = min(low, 0.0), max(high, 0.0)
         off = self._off(first, low).worse(self._off(first, high))
         ends = (value + low) * first.in_unit, (value + high) * first.in_unit
-        return Extent(*ends, off, excluded, bool(self.far))
+        at_least = self.goes_far or (bool(self.far) and not off.within(self.tolerance.mm, self.tolerance.deg))
+        return Extent(*ends, off, excluded, at_least)
 
     def free_choice(self, entry: Entry) -> Extent:
         """The interval of an entry that moves no tool if others are changed with it."""
@@ -354,6 +357,7 @@ class Extents:
             if not near or not tried(*self._far_pushes(near, _distinct(best.values())[:PUSHED_FROM])):
                 break
         self.far = _distinct(best.values())
+        self.goes_far = 2 * len({n for n, _ in best}) > len(self.watched)
         return _distinct([*best.values(), *reversed_.values()])
 
     def _far_pushes(self, near: Sequence[int], places: Sequence[tuple[Reals, Reals]]) -> tuple[Reals, Reals, Flags]:
