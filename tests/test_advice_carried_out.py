@@ -112,9 +112,7 @@ ON_PAGES = {  # texts without a key that are none of the remedies above: the fir
         "Run it on the arm only when",
     ),  # likewise
     "Stop: neither table is the arm",  # likewise
-    *("To have all pages", "Its table has not been examined", "These pass without the tray"),  # runs of er3a
-    "Compare the limits with the manual",  # of what a target says itself, see turn_tool and shift_tool
-    "Validation's diagnosis of the table",  # that puts a check before it
+    *("Its table has not been examined", "These pass without the tray"),  # runs of er3a
     "Try other guesses",  # quoted from the article
     "Move the joints and watch the tool",  # the teach panel's use
 }

@@ -48,9 +48,22 @@ def of_quintic(t, duration=0.6):
 def test_samples_of_a_smooth_motion_fit_together_however_coarse(spacing):
     t = np.linspace(0, 0.6, round(0.6 / spacing) + 1)
     q, v, a = of_quintic(t)
-    assert not stated_motion(t, q, StatedRates(v, a)).step
-    assert not stated_motion(t, q, StatedRates(v, a * OPEN)).step
-    assert not stated_motion(t, q, StatedRates(v * 0, a * OPEN)).step  # a halt at each point
+    assert not stated_motion(t, q, StatedRates(v, a)).misfits
+    assert not stated_motion(t, q, StatedRates(v, a * OPEN)).misfits
+    assert not stated_motion(t, q, StatedRates(v * 0, a * OPEN)).misfits  # a halt at each point
+
+
+@pytest.mark.parametrize(("order", "factor"), [(1, 0.1), (1, -1), (1, 4), (2, 0), (2, -1), (2, 10)])
+def test_rates_that_the_points_contradict_are_named(order, factor):
+    t = np.linspace(0, 0.6, 13)
+    q, *rates = of_quintic(t)
+    stated, k = rates[order - 1], {1: 5, 2: 2}[order]  # where that rate is nearly even
+    true = stated[k, 0]
+    stated[k, 0] *= factor
+    (found,) = (each for each in stated_motion(t, q, StatedRates(*rates)).misfits if each.order == order)
+    assert (found.joint, found.t) == (0, t[k])
+    assert found.stated == pytest.approx(factor * true)
+    assert found.other == pytest.approx(true, rel=0.3)
 
 
 @pytest.mark.parametrize(
@@ -66,5 +79,17 @@ def test_samples_of_a_smooth_motion_fit_together_however_coarse(spacing):
 def test_velocities_that_step_are_named(velocities, step):
     t, q = np.array([0.0, 1.0, 2.0, 4.0]), np.array([[0.0], [1.5], [3.0], [7.0]])
     stated = np.array(velocities)[:, None]
-    found = stated_motion(t, q, StatedRates(stated, stated * OPEN)).step
-    assert (found and (found.t, found.before, found.after)) == step
+    found = stated_motion(t, q, StatedRates(stated, stated * OPEN)).misfits
+    assert [(each.t, each.stated, each.other) for each in found] == ([step] if step else [])
+
+
+@pytest.mark.parametrize("share", [0.28, 0.07])
+@pytest.mark.parametrize("factor", [0, -1])
+def test_rates_of_a_slower_joint_are_held_against_its_own(share, factor):
+    t = np.arange(5.0)
+    q = np.array([0, 0.5, 1.5, 2.5, 3])[:, None] * [1, share]
+    v = np.gradient(q, t, axis=0)
+    v[[0, -1]] = 0
+    assert not stated_motion(t, q, StatedRates(v, v * OPEN)).misfits
+    (misfit,) = stated_motion(t, q, StatedRates(v * [1, factor], v * OPEN)).misfits
+    assert (misfit.order, misfit.joint) == (1, 1)

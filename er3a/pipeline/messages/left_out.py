@@ -68,7 +68,8 @@ TEXTS = texts(
             "what these programs do at lines where their check has a doubt or a fault (er3a check-program says more)"
         ),
         "left_out.given_rates": (
-            "what a controller makes of velocities of trajectories that step (joint, time, before / after)"
+            "what a controller makes of rates of trajectories that do not go together (joint, time, the one / the "
+            "other): the file states none there, or others than its points need"
         ),
         "left_out.missed_rows": (
             "the points of tables that the motion passes beside, by up to so much: corners are rounded over half of "

@@ -138,13 +138,15 @@ def rows_missed(robot: Robot, built: Built) -> str:
     return missed_points(robot, built) if built.unasked else ""
 
 
-def speed_steps(robot: Robot, built: Built) -> tuple[str, ...]:
-    """Where the velocities that a trajectory states make one step: joint, time, before and after; else nothing."""
-    step = built.joints.step if isinstance(built.joints, StatedMotion) else None
-    if step is None:
-        return ()
-    scale, unit = (1000.0, "mm") if robot.slides[step.joint] else (float(np.degrees(1.0)), "deg")
-    return (f"J{step.joint + 1} {step.t:g} s {scale * step.before:.3g} / {scale * step.after:.3g} {unit}/s",)
+def misfits(robot: Robot, built: Built) -> tuple[str, ...]:
+    """Rates of a trajectory that do not go together: joint, time, the one and the other."""
+    found = built.joints.misfits if isinstance(built.joints, StatedMotion) else ()
+    named = []
+    for each in found:
+        scale, unit = (1000.0, "mm") if robot.slides[each.joint] else (float(np.degrees(1.0)), "deg")
+        rates = f"{scale * each.stated:.3g} / {scale * each.other:.3g} {unit}/s{'²' * (each.order == 2)}"
+        named.append(f"J{each.joint + 1} {each.t:g} s {rates}")
+    return tuple(named)
 
 
 @dataclass(frozen=True, eq=False)
@@ -449,7 +451,7 @@ def listed_motions(
             part = entry if isinstance(entry, PartOfProgram) else None
             parts: tuple[tuple[LeftOutSubject, Sequence[object]], ...] = (
                 ("program_rest", part.rest if part else ()),
-                ("given_rates", speed_steps(task.robot, motion.built) if motion else ()),
+                ("given_rates", misfits(task.robot, motion.built) if motion else ()),
                 ("missed_rows", tuple(filter(None, [motion and rows_missed(task.robot, motion.built)]))),
                 ("half_turns", motion.built.turns_open if motion and not part else ()),
             )
