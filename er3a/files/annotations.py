@@ -56,7 +56,17 @@ def translations_in(files: Iterable[Path], language: str) -> dict[str, str]:
 
 
 def catalogues_beside(files: Iterable[Path], language: str) -> list[Path]:
-    """The translation catalogues in the folders of input files, for a language."""
+    """The translation catalogues in the folders of input files, for a language.
+
+    Parameters
+    ----------
+    files : input files of any kind; only their folders count
+    language : code as in the catalogue's name, such as ``zh`` for ``zh.po``
+
+    Returns
+    -------
+    catalogues : gettext files (``.po``) that exist, one per folder at most, sorted by path
+    """
     return sorted(place for folder in {file.parent for file in files} if (place := folder / f"{language}.po").is_file())
 
 

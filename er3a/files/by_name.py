@@ -42,7 +42,17 @@ WRITE_CALIBRATION = "Write one: er3a calibrate ROBOT MEASUREMENTS.csv --json > F
 
 
 def measurement_columns(units: Sequence[str]) -> dict[str, CsvColumn]:
-    """Columns of a table of measured positions for joints in these units, deg or mm."""
+    """Columns of a table of measured positions: joint values, the measured point, and where it was.
+
+    Parameters
+    ----------
+    units : one per joint, ``deg`` for those that turn and ``mm`` for those that slide
+
+    Returns
+    -------
+    columns : by name; ``q1_deg`` .. (or ``q3_mm``) and ``point`` are required. ``x_mm``, ``y_mm``, ``z_mm`` may hold
+        empty cells; standard deviation, place and plane may also be left out as columns
+    """
     return {
         **{f"q{joint}_{unit}": _NUMBER for joint, unit in enumerate(units, 1)},
         "point": CsvColumn(str, choices=("flange", "tool")),

@@ -90,18 +90,48 @@ def read_csv(path: str | Path, columns: Mapping[str, CsvColumn], lines: Lines | 
 
 
 def read_header(path: str | Path) -> list[str]:
-    """The column names of a CSV file, [] if it is empty; :class:`InputError` if it is not CSV."""
+    """The column names of a CSV file.
+
+    Returns
+    -------
+    names : texts of the first line that is not blank, without surrounding spaces; [] for an empty file
+
+    Raises
+    ------
+    InputError
+        if the file is missing, too large or not CSV
+    """
     lines = read_lines(Path(path))
     return [name.strip() for name in lines[0][1]] if lines else []
 
 
 def is_own(path: str | Path) -> bool:
-    """Whether er3a has written a table of motion, with its remarks at the head, joints and where these put the tool."""
+    """Whether er3a has written a table of motion: it then has er3a's remarks, and columns of both joints and tool.
+
+    Returns
+    -------
+    own : whether a line begins with ``# er3a:``
+
+    Raises
+    ------
+    InputError
+        if the file is missing, too large or not text
+    """
     return OWN_HEAD.match(read_text(Path(path), MAX_BYTES)) is not None
 
 
 def read_column(path: str | Path, column: str) -> list[str]:
-    """The texts in a column of a CSV file that has been checked, [] if it has no such column."""
+    """The texts in one column of a CSV file that has been checked before.
+
+    Returns
+    -------
+    texts : one per row below the header, without surrounding spaces; [] if the file has no such column
+
+    Raises
+    ------
+    InputError
+        if the file is missing, too large or not CSV
+    """
     (_, header), *rows = read_lines(Path(path))
     names = [name.strip() for name in header]
     return [line[names.index(column)].strip() for _, line in rows] if column in names else []
@@ -127,7 +157,18 @@ def read_lines(path: Path) -> Lines:
 
 
 def check_widths(path: Path, lines: Lines) -> None:
-    """Reject a row with another number of fields than the header."""
+    """Reject a row with another number of fields than the header.
+
+    Parameters
+    ----------
+    path : named in the error
+    lines : pairs of line number and fields; the first is the header
+
+    Raises
+    ------
+    InputError
+        naming the first such row and both numbers of fields
+    """
     for number, line in lines[1:]:
         if len(line) != len(lines[0][1]):
             problem = f"{len(line)} fields where the header has {len(lines[0][1])}"

@@ -494,7 +494,17 @@ class _Heading:
 
 
 def heading_of(text: str) -> _Heading | None:
-    """What a column heading, as books print it, means; None for any other."""
+    """What a column heading of a D-H table means, as books, articles and spreadsheets print it.
+
+    Parameters
+    ----------
+    text : such as ``a_mm``, ``α(i-1)``, ``d_i [m]``, ``Link length`` or ``关节角θ(°)``
+
+    Returns
+    -------
+    heading : quantity, unit ("" where none is printed), and whether it belongs to the link before the joint (i-1), as
+        in Craig's tables; None for any other text
+    """
     if own := _OURS.fullmatch(text):
         return _Heading(own[1] or own[2], own[3] or "", False)
     plain = re.sub(r"[\s{}\\]", "", text.lower().translate(_PLAIN))
@@ -509,7 +519,16 @@ def heading_of(text: str) -> _Heading | None:
 
 
 def is_printed_table(header: list[str]) -> bool:
-    """Whether these are headings of a D-H table, printed or er3a's own."""
+    """Whether a table's headings are those of a D-H table, printed or er3a's own.
+
+    Parameters
+    ----------
+    header : column names in any order; further columns are allowed
+
+    Returns
+    -------
+    found : whether a, alpha and d are all among them
+    """
     return {"a", "alpha", "d"} <= {found.quantity for name in header if (found := heading_of(name.strip()))}
 
 
@@ -539,6 +558,13 @@ class _Table:
         self.units = {k: own.unit or self._said(k) for k, own in headings.items() if own.quantity != "joint"}
 
     def converted(self) -> PrintedTable:
+        """The table under er3a's headings, with variables taken out of the cells of theta and d.
+
+        Returns
+        -------
+        table : its lines as those of a file, the header first. Offsets and directions come from cells such as
+            ``q2-90``. The convention is modified if a and alpha belong to link i-1, and no column names another one.
+        """
         kinds = self._kinds()
         columns: dict[str, list[str]] = {"joint": self._joints(kinds)}
         offsets: list[str] = []

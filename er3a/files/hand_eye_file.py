@@ -284,7 +284,24 @@ def load_hand_eye(path: str | Path, arm: Robot | None = None) -> CalibrationSet:
 def read_calibration(
     path: str | Path, robot: Robot | None
 ) -> tuple[CalibrationSet, TimeOffset | None, SeenImages | None]:
-    """A calibration set, the offset between its streams' clocks if they have two, and its images if it has any."""
+    """Read a calibration set of a camera, with all files that it names.
+
+    Parameters
+    ----------
+    path : the YAML file; its tables and images are in the same folder or below
+    robot : takes joint angles to poses of the flange; may be None if the tables give poses
+
+    Returns
+    -------
+    samples : poses T_world_flange and T_camera_board in m, and joint values in rad or m where they were recorded
+    offset : between the clocks of the two streams, s; None for a table of samples
+    images : what was found in the pictures; None without pictures. Samples whose picture shows no board are left out.
+
+    Raises
+    ------
+    InputError
+        naming the file, and row or column, that can't be used
+    """
     path = Path(path)
     head = load(HandEyeFile, path)
     offset: TimeOffset | None = None
@@ -352,7 +369,22 @@ def check_samples(table: Path) -> str:
 
 
 def sample_rows(table: Path) -> tuple[list[dict[str, Any]], list[str]]:
-    """The samples of a table as dicts by column, with a ``row`` key (file line), and its header."""
+    """Read a table of samples, whose columns depend on how flange and board are given.
+
+    Parameters
+    ----------
+    table : CSV; joints ``q1_deg`` .., or poses ``flange_x_mm`` .. and ``target_x_mm`` .., or an ``image``
+
+    Returns
+    -------
+    rows : by column, each with the key ``row`` (line of the file); mm, deg and s as in the file
+    header : the names of all columns
+
+    Raises
+    ------
+    InputError
+        for a header without any column of samples, no rows, or a cell that can't be read
+    """
     header = read_header(table)
     columns: dict[str, CsvColumn] = {}
     for name in ("name", "image"):
@@ -498,7 +530,21 @@ def _targets_of_images(
 
 
 def grey_image(file: Path) -> NDArray[np.uint8]:
-    """A picture's grey levels (h, w)."""
+    """A picture's grey levels.
+
+    Parameters
+    ----------
+    file : in one of the formats of ``PICTURES``; colours are turned to grey
+
+    Returns
+    -------
+    levels : (h, w), 0 (black) to 255
+
+    Raises
+    ------
+    InputError
+        if there is no such file, or it is not a picture that can be read
+    """
     try:
         with Image.open(file, formats=PICTURES) as image:
             return np.asarray(image.convert("L"))

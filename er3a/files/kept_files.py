@@ -25,25 +25,58 @@ def own_or_shipped(place: str) -> Path:
     """The file or folder at a place such as ``data/robots/arm.yaml``: the study's own, otherwise er3a's.
 
     The study's folder is the current folder; all paths of a study are relative to it.
+
+    Returns
+    -------
+    path : relative to the current folder if something exists there; otherwise below er3a's root, where it may be
+        missing
     """
     own = Path(place)
     return own if own.exists() else ROOT / place
 
 
 def given_file(path: Path) -> Path:
-    """A file named by the user: their own, otherwise er3a's at a place such as ``data/paths/arm.yaml``."""
+    """A file named by the user: their own, otherwise er3a's at a place such as ``data/paths/arm.yaml``.
+
+    Parameters
+    ----------
+    path : as it was typed; only one that begins with ``data`` is looked up among er3a's files
+
+    Returns
+    -------
+    path : er3a's file if the user has none at that place; else the path as it was given, whether or not it exists
+    """
     shipped = ROOT / path
     return shipped if path.parts[:1] == ("data",) and not path.exists() and shipped.is_file() else path
 
 
 def names(folder: str, pattern: str) -> list[str]:
-    """The file stems in a folder of the study or of the project, sorted."""
+    """The names of the files in a folder of the study and of er3a together.
+
+    Parameters
+    ----------
+    folder : relative to both, such as ``data/robots``
+    pattern : of ``glob``, such as ``*.yaml``
+
+    Returns
+    -------
+    names : file names without folder and ending, each once, sorted
+    """
     places = (Path(folder), ROOT / folder)
     return sorted({path.stem for place in places for path in place.glob(pattern)})
 
 
 def view_command(robot: str | None = None) -> str:
-    """The command that shows the recordings of one robot or of all."""
+    """The command that shows recordings, as a user would type it.
+
+    Parameters
+    ----------
+    robot : name of one robot; None for the recordings of all
+
+    Returns
+    -------
+    command : ``er3a view`` where er3a is installed as a package, ``make view`` in a checkout
+    """
     if INSTALLED:
         return f"er3a view {robot}" if robot else "er3a view"
     return f"make view ROBOT={robot}" if robot else "make view"
@@ -75,17 +108,43 @@ def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
 
 
 def half_written(folder: Path) -> list[Path]:
-    """The temporary files that killed processes left below a folder."""
+    """The temporary files that killed processes left below a folder.
+
+    Returns
+    -------
+    files : sorted; those named as :func:`write_atomically` names its temporary files. Those of processes that still run
+        are among them.
+    """
     return [path for path in sorted(folder.rglob(".*")) if _TEMPORARY.fullmatch(path.name)]
 
 
 def sha256(path: Path) -> str:
-    """Checksum of a file, in hex."""
+    """Checksum of a file's bytes, SHA-256.
+
+    Returns
+    -------
+    checksum : 64 hexadecimal digits
+
+    Raises
+    ------
+    OSError
+        if the file can't be read
+    """
     return hashlib.sha256(Path(path).read_bytes()).hexdigest()
 
 
 def read_bytes(path: Path) -> bytes:
-    """A file's content; :class:`ResultError` if it is missing or can't be read."""
+    """A result file's content.
+
+    Returns
+    -------
+    content : all bytes
+
+    Raises
+    ------
+    ResultError
+        if the file is missing, or the system refuses to read it
+    """
     try:
         return Path(path).read_bytes()
     except FileNotFoundError:
@@ -95,7 +154,13 @@ def read_bytes(path: Path) -> bytes:
 
 
 def shown_path(path: Path) -> str:
-    """Path from the project's root or the study's folder, so that the summary names no machine."""
+    """A path from the project's root or the study's folder, so that results name no machine.
+
+    Returns
+    -------
+    path : with forward slashes, relative to er3a's root or else the current folder; the bare file name of a path that
+        is below neither
+    """
     resolved = Path(path).resolve()
     for root in (ROOT, Path.cwd()):
         if resolved.is_relative_to(root):

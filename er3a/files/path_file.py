@@ -443,7 +443,22 @@ class JointPath(NamedPath):
         return self
 
     def command(self, source: commands.CommandSource, robot: Robot) -> commands.Command:
-        """The path in SI units."""
+        """The path in SI units.
+
+        Parameters
+        ----------
+        source : file and field where the path was read, for errors
+        robot : its joints, of which some may slide, give the units of values and rates
+
+        Returns
+        -------
+        command : joints in rad or m, rates in rad/s or m/s, accelerations in rad/s^2 or m/s^2
+
+        Raises
+        ------
+        InputError
+            if values or rates are not as many as the joints
+        """
         return commands.JointMoveCommand(
             commands.Start(joints=_joints(robot, self.start_deg, "start_deg"), after=self.after),
             joint_values(robot, self.end_deg, "end_deg"),
@@ -471,7 +486,22 @@ class JointSequencePath(Profiled):
     blend_deg: Blend = 0.0
 
     def command(self, source: commands.CommandSource, robot: Robot) -> commands.Command:
-        """The path in SI units."""
+        """The path in SI units.
+
+        Parameters
+        ----------
+        source : file and field where the path was read, for errors
+        robot : its joints give the units of the points
+
+        Returns
+        -------
+        command : points (k, n) in rad or m, blend in rad
+
+        Raises
+        ------
+        InputError
+            if a point has not as many values as the arm has joints
+        """
         points = [joint_values(robot, row, f"points_deg[{i}]") for i, row in enumerate(self.points_deg)]
         blend = float(np.radians(self.blend_deg))
         return commands.JointSequenceCommand(np.array(points), blend, self.duration_s, self.ramp, source=source)
@@ -499,7 +529,18 @@ class ToolStart(Profiled):
         return self
 
     def start_command(self, robot: Robot) -> commands.Start:
-        """The start in SI units."""
+        """The start of a tool path in SI units.
+
+        Returns
+        -------
+        start : joints (n,) in rad or m, or a pose T_base_tool (4, 4) in m, or the name of the path before; and the
+            branch's code if one is named
+
+        Raises
+        ------
+        InputError
+            if the joint values are not as many as the robot's
+        """
         pose = self.start.pose() if self.start else None
         return commands.Start(_joints(robot, self.start_deg, "start_deg"), pose, self.after, _branch(self.start_branch))
 
@@ -529,7 +570,17 @@ class ToolMovePath(ToolStart, LineTo):
     """One line or arc of the tool."""
 
     def command(self, source: commands.CommandSource, robot: Robot) -> commands.Command:
-        """The path in SI units."""
+        """One line or arc in SI units.
+
+        Parameters
+        ----------
+        source : file and field where the path was read, for errors
+        robot : needed for a start given by joint values
+
+        Returns
+        -------
+        command : segment in m, duration in s, and the share of time of each ramp (None for the quintic)
+        """
         return commands.ToolMoveCommand(
             self.start_command(robot), self.segment(), self.duration_s, self.ramp, source=source
         )
@@ -577,7 +628,17 @@ class SequencePath(ToolStart):
         return self
 
     def command(self, source: commands.CommandSource, robot: Robot) -> commands.Command:
-        """The path in SI units."""
+        """Lines and arcs in SI units.
+
+        Parameters
+        ----------
+        source : file and field where the path was read, for errors
+        robot : needed for a start given by joint values
+
+        Returns
+        -------
+        command : segments and the blends at their ends in m, the duration of the whole in s
+        """
         segments = tuple(replace(part.segment(), blend=part.blend_mm / 1000) for part in self.segments)
         return commands.ToolSequenceCommand(
             self.start_command(robot), segments, self.duration_s, self.ramp, source=source
@@ -670,7 +731,22 @@ class PlanPath(NamedPath):
     plan: PlanEnds
 
     def command(self, source: commands.CommandSource, robot: Robot) -> commands.Command:
-        """What is to be planned."""
+        """The ends between which a motion is to be planned, in SI units.
+
+        Parameters
+        ----------
+        source : file and field where the path was read, for errors
+        robot : gives the units of ends that are joint values
+
+        Returns
+        -------
+        command : each end either joints (n,) in rad or m, or a pose T_base_tool (4, 4) in m
+
+        Raises
+        ------
+        InputError
+            if joint values are not as many as the robot's
+        """
         start, end = (
             part.pose() if isinstance(part, PoseEntry) else joint_values(robot, part, f"plan.{key}")
             for key, part in (("from", self.plan.from_), ("to", self.plan.to))

@@ -71,5 +71,14 @@ def load_pieces(path: str | Path) -> PiecesFile:
 
 
 def checksum_of(pieces: list[list[list[float]]]) -> str:
-    """Of the pieces in the file."""
+    """Checksum of convex pieces, by which a changed file is noticed.
+
+    Parameters
+    ----------
+    pieces : corners (k, 3) in mm of each piece, as plain lists
+
+    Returns
+    -------
+    checksum : SHA-256 of their JSON text, in hex
+    """
     return hashlib.sha256(json.dumps(pieces).encode()).hexdigest()

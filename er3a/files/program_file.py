@@ -26,7 +26,17 @@ class ProgramEntry(StrictModel):
     expect: ProgramOutcome | None = None
 
     def start(self, robot: Robot) -> Reals | None:
-        """Joints (n,) in rad, or m of those that slide; :class:`InputError` if they are not as many as the robot's."""
+        """The joint position before the program, in SI units.
+
+        Returns
+        -------
+        q : (n,), rad, or m of joints that slide; None if the file names none
+
+        Raises
+        ------
+        InputError
+            if the values are not as many as the robot's joints, or a joint would turn more than ten times
+        """
         return None if self.start_deg is None else joint_values(robot, self.start_deg, f"{self.name}.start_deg")
 
 

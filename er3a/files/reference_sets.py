@@ -102,7 +102,17 @@ class Format:
         return {**self.columns, **_SOURCE}
 
     def filled(self, fields: Fields) -> tuple[str, tuple[str, ...]]:
-        """The column of a line's uncertainty, and those whose digits fill it in."""
+        """Which column of a line's uncertainty can be filled in, and from what.
+
+        Parameters
+        ----------
+        fields : of one line; whether it has values in mm or in degrees decides, where a table may have either
+
+        Returns
+        -------
+        column : the name of the column of the uncertainty
+        digits : the columns whose last printed digits fill it in
+        """
         uncertainties = [name for name in self.columns if name in UNCERTAINTIES]
         return (uncertainties[-1], self.sliding_digits) if _slides(fields) else (uncertainties[0], self.digits)
 
@@ -149,7 +159,17 @@ def _orientation(fields: Fields) -> Rotation3 | None:
 
 
 def rotation_of(columns: tuple[str, ...], values: Reals) -> Reals:
-    """The rotation matrix (3, 3) nearest to an orientation that such columns give."""
+    """The rotation matrix nearest to an orientation as a document writes it.
+
+    Parameters
+    ----------
+    columns : one of the forms of ``ORIENTATIONS``
+    values : in their order: deg, the four numbers of a quaternion (w first), or a matrix by columns n, o, a
+
+    Returns
+    -------
+    R : (3, 3); roll, pitch and yaw turn about fixed x, y, z one after another, so R = Rz(yaw) Ry(pitch) Rx(roll)
+    """
     turn = scipy.spatial.transform.Rotation
     if columns == _RPY:
         found = turn.from_euler("xyz", values, degrees=True)
@@ -366,7 +386,17 @@ FORMATS: dict[str, Format] = {
 
 
 def row_of(kind: str, fields: Mapping[str, Any]) -> Row:
-    """The row that the fields of a CSV line describe."""
+    """The reference row that the fields of a CSV line describe.
+
+    Parameters
+    ----------
+    kind : the table's name without ending, a key of ``FORMATS``
+    fields : the line's values by column, as read and checked; ``row`` is the line's number
+
+    Returns
+    -------
+    row : of the kind's class, in the units of its columns
+    """
     values = FORMATS[kind].gather(dict(fields))
     values["line"] = values.pop("row")
     values["gaussian"] = values.pop(STATED_AS) == STANDARD_DEVIATION
@@ -417,7 +447,18 @@ def load_documents(path: str | Path) -> Documents:
 
 
 def check_origins(path: Path, rows: Iterable[Row], documents: Documents) -> None:
-    """Reject rows whose origin is none of the documents: :class:`InputError` naming the row."""
+    """Reject rows that come from a document which their set does not declare.
+
+    Parameters
+    ----------
+    path : the table, for the error
+    documents : of the set that the table belongs to
+
+    Raises
+    ------
+    InputError
+        naming the first such row, and the documents that are known
+    """
     for row in rows:
         if row.origin not in documents.by_name:
             problem = f"the document '{row.origin}' is not known"
@@ -425,7 +466,17 @@ def check_origins(path: Path, rows: Iterable[Row], documents: Documents) -> None
 
 
 def check_robot_origins(robot: Robot, documents: Collection[str]) -> None:
-    """Reject a robot whose values name documents that its sets don't declare; without sets it may name any."""
+    """Reject a robot whose values name documents that its reference sets don't declare.
+
+    Parameters
+    ----------
+    documents : names in the robot's sets; empty for a robot without sets, which may name any
+
+    Raises
+    ------
+    InputError
+        naming the group or entry, and the documents that are known
+    """
     named = {f"{group}.origin": source.origin for group, source in robot.sources.items() if source.origin}
     named |= {f"the origin of {entry}": name for entry, name in robot.origins.items()}
     for field, name in named.items():
@@ -500,7 +551,16 @@ def load_references(name_or_folder: str | Path, robot: Robot | None = None) -> R
 
 
 def reference_folder(name: str) -> Path:
-    """The folder of a reference set: the study's own, else the project's."""
+    """The folder of a reference set: the study's own, else er3a's.
+
+    Parameters
+    ----------
+    name : of the set, below ``data/manual_refs``
+
+    Returns
+    -------
+    folder : may be missing, if neither has a set of this name
+    """
     return own_or_shipped(f"data/manual_refs/{name}")
 
 

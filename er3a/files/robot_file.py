@@ -218,14 +218,36 @@ SLIDING = ("armature_kg", "coulomb_n", "viscous_n_s_m", "rated_n", "peak_n")
 
 
 def drive_field(key: str) -> str:
-    """The field of :class:`er3a.robots.masses.Drives` that a key of a drive's row gives: the key without its unit."""
+    """The field of :class:`er3a.robots.masses.Drives` that a key of a drive's row gives.
+
+    Parameters
+    ----------
+    key : with its unit, such as ``coulomb_n_m`` or, of a joint that slides, ``coulomb_n``
+
+    Returns
+    -------
+    field : the name without unit, such as ``coulomb``
+    """
     return next(field.name for field in fields(Drives) if key.startswith(field.name))
 
 
 def check_masses(
     inertia: Inertia | None, drives: DriveGroup | None, wrist: WristLoadGroup | None, slides: Sequence[bool]
 ) -> None:
-    """Reject links and joints the arm does not have, and units of the other type of joint: ``ValueError``."""
+    """Reject drives and wrist loads of joints that the arm does not have, and units of the other type of joint.
+
+    Parameters
+    ----------
+    inertia : not looked at here
+    drives, wrist : groups of the file; None where it has none
+    slides : for each joint, whether it slides
+
+    Raises
+    ------
+    ValueError
+        as ``field: problem | remedy``: repeated or unknown joints, moments about a joint that slides, N m of one that
+        slides or N of one that turns, a peak below the rated value
+    """
     rows: list[tuple[str, Sequence[DriveRow | WristRow]]] = [("drives", drives.rows if drives else [])]
     rows.append(("wrist_load", wrist.rows if wrist else []))
     for group, listed in rows:
@@ -255,7 +277,17 @@ def masses_of(
     wrist: WristLoadGroup | None,
     weight: Weight | None,
 ) -> Masses:
-    """The library's data of a robot's groups; ``robot`` is the arm with its table, for the frames."""
+    """The library's data of a robot's groups about masses, drives and loads.
+
+    Parameters
+    ----------
+    robot : the arm with its table, for the frames of the bodies
+    inertia, drives, wrist, weight : groups of the file; None where it has none
+
+    Returns
+    -------
+    masses : SI units, bodies in the frames that move with the joints; a weight that is not stated is NaN
+    """
     return Masses(
         links=link_masses(robot, inertia) if inertia else (),
         drives=_drives(robot, drives) if drives else None,
@@ -265,7 +297,21 @@ def masses_of(
 
 
 def link_masses(robot: Robot, inertia: Inertia) -> tuple[LinkMass, ...]:
-    """Bodies in the frames that move with the joints."""
+    """Bodies of links, taken from the frames of the file to those that move with the joints.
+
+    Parameters
+    ----------
+    robot : the arm with its table; its base does not count
+    inertia : says in which frames the bodies are: joint, D-H, or those of a URDF with their origins
+
+    Returns
+    -------
+    masses : one per row of the group; mass in kg, centre in m, inertia about it in kg m^2
+
+    Notes
+    -----
+    The frames of the file and of the joints are compared with all joints at 0, where all of them are known.
+    """
     placed = robot.replace(base=np.eye(4), masses=Masses())
     at_zero = np.array([np.eye(4), *(_at_zero(placed, constant_links(placed)[: k + 1]) for k in range(robot.rows))])
     stated = at_zero.copy()
@@ -564,7 +610,17 @@ class LinkVisual(StrictModel):
 
 
 def link_visual(visual: LinkMesh) -> dict[str, int | str]:
-    """The fields of a :class:`LinkVisual`."""
+    """The fields of a :class:`LinkVisual`, packed for a file.
+
+    Parameters
+    ----------
+    visual : corners (k, 3) in m, faces (m, 3) as indices of corners
+
+    Returns
+    -------
+    fields : the link's number; corners in mm as little-endian 32-bit floats and faces as 16-bit integers, each in
+        base64
+    """
     packed = ((1000 * visual.points).astype("<f4"), visual.faces.astype("<u2"))
     points, faces = (base64.b64encode(array.tobytes()).decode() for array in packed)
     return {"link": visual.link, "points_mm": points, "faces": faces}
@@ -594,7 +650,17 @@ class CollisionPairs(StrictModel):
         )
 
     def check(self, known: Collection[str]) -> None:
-        """Reject unknown names, and a pair that is decided twice: ``ValueError``."""
+        """Reject pairs of unknown bodies, and pairs that are decided twice.
+
+        Parameters
+        ----------
+        known : names of all bodies: base, links, and in a scene solids and carried objects
+
+        Raises
+        ------
+        ValueError
+            as ``field: problem | remedy``, for an unknown name, a body paired with itself, or a pair in both lists
+        """
         seen: set[frozenset[str]] = set()
         for key in ("allow", "watch"):
             for i, entry in enumerate(getattr(self, key)):
@@ -640,7 +706,16 @@ class RobotFile(InputFile):
         return self._surfaces
 
     def with_surfaces(self, surfaces: tuple[LinkMesh, ...]) -> RobotFile:
-        """Keep the triangles that ``envelopes.surfaces`` names."""
+        """Keep the triangles that ``envelopes.surfaces`` names, which are read from files of their own.
+
+        Parameters
+        ----------
+        surfaces : one mesh for each entry, corners in m in the frame that moves with the link's joint
+
+        Returns
+        -------
+        file : this object itself, which now holds them
+        """
         self._surfaces = surfaces
         return self
 
@@ -837,7 +912,16 @@ def _check_limit(field: str, row: JointLimitRow | CombinedLimitRow, sliding: boo
 
 
 def coupling_matrix(group: Coupling, rows: int, joints: int) -> Reals:
-    """What each row of the table moves by, per joint (rows, joints)."""
+    """What moves each row of a table, as factors of the joints.
+
+    Parameters
+    ----------
+    rows, joints : the numbers of both; a row that the group does not list moves with the joint of its number
+
+    Returns
+    -------
+    matrix : (rows, joints), so that ``matrix @ q`` are the variables of the rows
+    """
     matrix = np.eye(rows, joints)
     for row in group.rows:
         matrix[row.row - 1] = 0.0
@@ -846,8 +930,19 @@ def coupling_matrix(group: Coupling, rows: int, joints: int) -> Reals:
 
 
 def check_placement(field: str, placement: Placement | None, calibrated: bool = False) -> None:
-    """Reject a placement that is too far away, as ``ValueError`` with ``field: problem | remedy``; warn of units, but
-    not of lengths below 2 mm that were calibrated."""
+    """Reject a placement that is too far away, and warn of values that may be in metres or radians.
+
+    Parameters
+    ----------
+    field : its key in the file, for the error
+    placement : mm and deg; None passes
+    calibrated : whether lengths below 2 mm come from a calibration, which no one takes for metres
+
+    Raises
+    ------
+    ValueError
+        as ``field: problem | remedy``, for a position beyond 100 m or an impossible angle
+    """
     if placement is None:
         return
     if not calibrated:
@@ -876,8 +971,17 @@ def _check_length(field: str, value: float, calibrated: bool) -> None:
 
 
 def far_normals(rows: Sequence[tuple[float, float]]) -> bool:
-    """Whether d (mm) of a table's rows, each with its alpha (deg), is that of normals of nearly parallel axes: of many
-    metres that cancel, between rows whose axes are parallel to 1 deg."""
+    """Whether a table's d are those of far common normals of nearly parallel axes, as factory calibrations have them.
+
+    Parameters
+    ----------
+    rows : d (mm) and alpha (deg) of each row
+
+    Returns
+    -------
+    far : whether some d exceed ``FAR_NORMAL_MM``, all together cancel to less, and the axes between are parallel to 1
+        deg
+    """
     far = [k for k, (d, _) in enumerate(rows) if abs(d) > FAR_NORMAL_MM]
     if not far:
         return False

@@ -56,7 +56,18 @@ def load_robot(name_or_path: str | Path, convention: Convention = "standard") ->
 
 
 def read_table(path: Path, convention: Convention = "standard") -> robot_file.RobotFile:
-    """A robot file made from a D-H table; assumptions give a warning."""
+    """A robot file made from a D-H table; assumptions give a warning (``er3a.InputWarning``).
+
+    Parameters
+    ----------
+    path : CSV; the robot is named after it
+    convention : standard or modified D-H, unless the table itself says which
+
+    Raises
+    ------
+    InputError
+        naming row and column that can't be used
+    """
     content, notes = read_dh_table(path, robot_name(path), convention)
     if notes:
         warnings.warn(f"{path}: {'; '.join(notes)}", InputWarning, stacklevel=4)
@@ -64,7 +75,17 @@ def read_table(path: Path, convention: Convention = "standard") -> robot_file.Ro
 
 
 def read_robot(path: Path) -> robot_file.RobotFile:
-    """What a robot file holds, checked; :class:`InputError` as :func:`load_robot`."""
+    """What a robot file holds, checked, with the triangles of the STL files that it names.
+
+    Returns
+    -------
+    content : in the units of the file, mm and deg; the meshes in m
+
+    Raises
+    ------
+    InputError
+        naming file, field and remedy; also if the robot is not named as its file, or an STL file has another checksum
+    """
     content = load(robot_file.RobotFile, path)
     if content.name != path.stem:
         raise InputError(path, "name", f"'{content.name}' is not the file's name", f"Write {path.stem}")
@@ -73,7 +94,21 @@ def read_robot(path: Path) -> robot_file.RobotFile:
 
 
 def robot_path(name_or_path: str | Path) -> Path:
-    """The file that a robot's name, or a path ending in .yaml, refers to."""
+    """The file that a robot's name, or a path ending in .yaml or .yml, refers to.
+
+    Parameters
+    ----------
+    name_or_path : a name is looked up in ``data/robots`` of the study, then of er3a
+
+    Returns
+    -------
+    path : of a name a file that exists; a path is returned as it is
+
+    Raises
+    ------
+    InputError
+        for a name without a file; the names that exist are listed
+    """
     text = str(name_or_path)
     if text.endswith((".yaml", ".yml")):
         return Path(text)
@@ -86,7 +121,17 @@ def robot_path(name_or_path: str | Path) -> Path:
 
 
 def robot_of(content: robot_file.RobotFile) -> Robot:
-    """The model that a checked file describes: metres and radians."""
+    """The model of an arm that a checked file describes.
+
+    Parameters
+    ----------
+    content : in mm, deg, kg
+
+    Returns
+    -------
+    robot : in m, rad, kg; a joint without a stated speed has NaN. A table with far common normals, as calibrations of
+        nearly parallel axes give it, becomes one with Hayati's beta.
+    """
     groups = ("dh", "zero", "limits", "speeds", "coupling", "base", "flange", "tool", "envelopes", *MASS_GROUPS)
     present = {group: getattr(content, group) for group in groups if getattr(content, group) is not None}
     rows, joints = content.dh.rows, len(content.limits.rows)
@@ -132,8 +177,20 @@ def robot_of(content: robot_file.RobotFile) -> Robot:
 
 
 def with_near_rows(robot: Robot) -> Robot:
-    """The same arm as a standard table in which rows between nearly parallel axes use Hayati's beta instead of a common
-    normal far away. Base, flange and tool stay."""
+    """The same arm, with Hayati's beta in place of far common normals of nearly parallel axes.
+
+    Parameters
+    ----------
+    robot : of any convention, with d of many metres that cancel
+
+    Returns
+    -------
+    robot : with a standard table, in m and rad; base, flange and tool are those of the table before
+
+    Notes
+    -----
+    Common normals are turned over where that keeps the sign of a; offsets are wrapped to (-pi, pi].
+    """
     before = to_standard(robot)
     found, last = without_far_normals(mechanism_of(robot)), robot.rows - 1
     found = with_senses(found, np.ones(robot.rows), np.where(found.a * before.a[:last] < 0, -1.0, 1.0))
@@ -216,7 +273,16 @@ def _hull(link: int, points: Reals, margin: float) -> ConvexPiece:
 
 
 def placement_transform(placement: robot_file.Placement | None) -> np.ndarray:
-    """The (4, 4) transform of a placement in mm and degrees; the identity for None."""
+    """The transform of a placement that a file may leave out.
+
+    Parameters
+    ----------
+    placement : mm, and roll, pitch and yaw in deg
+
+    Returns
+    -------
+    T : (4, 4), m; the identity for None
+    """
     return np.eye(4) if placement is None else placement.transform()
 
 
@@ -246,7 +312,16 @@ class LoadFields(StrictModel):
 
 
 def load_of(loads: list[LoadFields]) -> Load | None:
-    """Tool and payload as one load; None without any."""
+    """Tool and payload as one load on the flange.
+
+    Parameters
+    ----------
+    loads : all in the flange's frame; wrenches are forces in N and moments in N m at the tool point
+
+    Returns
+    -------
+    load : the bodies as one rigid body (kg, m, kg m^2), the wrenches summed; None for an empty list
+    """
     if not loads:
         return None
     body = together([each.body.body for each in loads])

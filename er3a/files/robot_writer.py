@@ -36,7 +36,13 @@ from er3a.robots.robot import CombinedLimit, LinkMesh, Robot, Source
 
 
 def mass_groups(robot: Robot) -> dict[str, dict[str, Any]]:
-    """The groups of which something is known; bodies in the frames that move with the joints."""
+    """The groups of masses, drives, wrist loads and weight for a robot file, as far as they are known.
+
+    Returns
+    -------
+    groups : by key of the file (``inertia``, ``drives``, ``wrist_load``, ``weight``), in its units. Bodies are in the
+        frames that move with the joints. Sources and grades are not among them.
+    """
     masses = robot.masses
     found: dict[str, dict[str, Any]] = {}
     if masses.links:
@@ -218,7 +224,16 @@ def _shapes(robot: Robot) -> dict[str, Any]:
 
 
 def surface_files(meshes: Sequence[LinkMesh]) -> dict[Path, bytes]:
-    """The STL file of each surface by its place below the robot file's folder, named by what it holds."""
+    """The STL files of an arm's surfaces.
+
+    Parameters
+    ----------
+    meshes : corners in m, in the frame that moves with the link's joint
+
+    Returns
+    -------
+    files : content by place below the robot file's folder; names hold the link and the first 16 digits of the checksum
+    """
     contents = [(mesh.link, stl_of(mesh)) for mesh in meshes]
     return {Path("meshes", f"link_{k}_{hashlib.sha256(each).hexdigest()[:16]}.stl"): each for k, each in contents}
 
@@ -231,7 +246,17 @@ def _decided(robot: Robot, rule: str) -> list[dict[str, Any]]:
 
 
 def write_robot(robot: Robot, path: Path) -> None:
-    """Write a robot file that :func:`er3a.load_robot` reads back to the same numbers, to 1e-12 m and rad."""
+    """Write a robot file that :func:`er3a.load_robot` reads back to the same numbers, to 1e-12 m and rad.
+
+    Parameters
+    ----------
+    path : of the YAML file; STL files of surfaces are written to a folder ``meshes`` in the same folder
+
+    Raises
+    ------
+    WriteError
+        if the disk is full or permission is missing; an older file then stays as it is
+    """
     text = robot_text(robot_file(robot, path))
     for place, content in surface_files(robot.meshes).items():
         write_atomically(path.parent / place, partial(Path.write_bytes, data=content))
@@ -239,12 +264,26 @@ def write_robot(robot: Robot, path: Path) -> None:
 
 
 def robot_text(content: RobotFile) -> str:
-    """The content of a robot file as YAML, without default values."""
+    """The content of a robot file as YAML.
+
+    Returns
+    -------
+    text : mm and deg; keys whose value is the default, or nothing, are left out
+    """
     return yaml_text(content.model_dump(exclude_none=True, exclude_defaults=True))
 
 
 def yaml_text(content: dict[str, Any]) -> str:
-    """The content of a file of ours as YAML: lists of numbers in brackets, keys in their order."""
+    """The content of one of er3a's files as YAML.
+
+    Parameters
+    ----------
+    content : plain values, lists and mappings only
+
+    Returns
+    -------
+    text : lists of plain values in brackets, keys in the order given, other alphabets as they are, lines to 110 letters
+    """
     return yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=110, default_flow_style=None)
 
 

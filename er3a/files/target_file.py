@@ -156,7 +156,20 @@ class Orientation(StrictModel):
             raise ValueError(f"the orientation is given twice, as {' and '.join(forms)} | Keep one")
 
     def transform_at(self, position: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The pose (4, 4) with this orientation at a position (3,) in m."""
+        """The pose with this orientation at a position.
+
+        Parameters
+        ----------
+        position : (3,), m
+
+        Returns
+        -------
+        T : (4, 4); the rotation of a matrix is the nearest orthogonal one, by its singular values
+
+        Notes
+        -----
+        ``rpy_deg`` is R = Rz(yaw) Ry(pitch) Rx(roll), ``zyz_deg`` is R = Rz(a) Ry(b) Rz(c), a quaternion has w first.
+        """
         if self.rpy_deg is not None:
             return transform(position, np.radians(self.rpy_deg))
         if self.zyz_deg is not None:
@@ -203,7 +216,21 @@ class TargetEntry(Orientation):
         return self
 
     def target(self, robot: Robot) -> Target:
-        """The target for a robot, which is needed where the pose is given by joint angles."""
+        """The target in SI units.
+
+        Parameters
+        ----------
+        robot : places a target that is given by joint angles, and says which joints slide
+
+        Returns
+        -------
+        target : pose T_base_tool in m, reference joints in rad or m (zeros if none are given)
+
+        Raises
+        ------
+        InputError
+            if joint values are not as many as the robot's
+        """
         reference = tuple(self.q_ref_deg or (0.0,) * robot.joints)
         q_ref = joint_values(robot, reference, f"target {self.name}: q_ref_deg")
         return Target(self.name, self._pose(robot), self.note, reference, self.expect, q_ref)

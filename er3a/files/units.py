@@ -38,7 +38,17 @@ SHORTEST_PLAIN_LENGTH_MM = 2.0
 
 
 def check_millimetres(values: Sequence[float]) -> None:
-    """Reject lengths that can only be metres (all below 5, and not all zero), and any over 100 m."""
+    """Reject lengths that can't be millimetres.
+
+    Parameters
+    ----------
+    values : mm; all zero is allowed
+
+    Raises
+    ------
+    ValueError
+        as ``problem | remedy``: all below 5 mm, which can only be metres, or one over 100 m
+    """
     largest = max(abs(value) for value in values)
     shown = ", ".join(f"{value:g}" for value in values)
     if 0 < largest < METRES_BELOW_MM:
@@ -62,26 +72,56 @@ def check_degrees(values: Sequence[float], slides: bool = False) -> None:
 
 
 def doubt_degrees(values: Sequence[float], part: object = None, key: str = "", file: Path | None = None) -> None:
-    """Warn of angles that :func:`er3a.numerics.si_units.may_be_radians`."""
+    """Warn of angles that :func:`er3a.numerics.si_units.may_be_radians`.
+
+    Parameters
+    ----------
+    values : deg
+    part, key : the piece of a file's content, and the key in it, by which the warning names the place
+    file : named in the warning if it is already known
+    """
     if may_be_radians(values):
         shown, converted = (", ".join(f"{value:.6g}" for value in each) for each in (values, np.degrees(values)))
         doubt(part, key, f"[{shown}] deg", "radians", more=f": those would be {converted}", file=file)
 
 
 def doubt_millimetres(values: Sequence[float], part: object = None, key: str = "") -> None:
-    """Warn of lengths that look like metres: all below 2 mm, and not all as good as zero."""
+    """Warn of lengths that look like metres.
+
+    Parameters
+    ----------
+    values : mm; a warning is given if all are below 2 mm and one is above 0.001 mm
+    part, key : the piece of a file's content, and the key in it, by which the warning names the place
+    """
     if RESIDUE_MM < max(map(abs, values)) < SHORTEST_PLAIN_LENGTH_MM:
         doubt(part, key, f"{list(values)} mm", "metres")
 
 
 def doubt(part: object, key: str, shown: str, other: str, *, more: str = "", file: str | Path | None = None) -> None:
-    """Warn of a number whose unit is doubtful, as :class:`er3a.errors.DoubtfulUnit` takes it."""
+    """Warn of a number whose unit is doubtful, by a :class:`er3a.errors.DoubtfulUnit`.
+
+    Parameters
+    ----------
+    part, key : the piece of a file's content, and the key in it, by which the warning names the place
+    shown : the number with the unit that its key says
+    other : the unit that it may be in, in plural
+    more : added at the end of the warning
+    """
     warnings.warn(DoubtfulUnit(key, shown, other, part=part, more=more, file=file), stacklevel=3)
 
 
 @contextmanager
 def noted_doubts() -> Iterator[list[DoubtfulUnit]]:
-    """The doubts about units in what is read meanwhile, each once; they are warned of at its end."""
+    """The doubts about units in what is read meanwhile, each once; they are warned of at its end.
+
+    Returns
+    -------
+    noted : a list that fills while the block runs; warnings of other kinds pass through as before
+
+    Notes
+    -----
+    Python's ``warnings.showwarning`` is replaced meanwhile, so blocks of several threads must not overlap.
+    """
     told: set[str] = set()
     noted: list[DoubtfulUnit] = []
     show = warnings.showwarning
@@ -104,13 +144,31 @@ def noted_doubts() -> Iterator[list[DoubtfulUnit]]:
 
 
 def look_like_radians(values: Sequence[float]) -> bool:
-    """Whether two or more angles (deg) are within 0.002 of multiples of pi/2, and below 6.3."""
+    """Whether angles look like right angles and their multiples in radians.
+
+    Parameters
+    ----------
+    values : deg, as their key says
+
+    Returns
+    -------
+    found : whether two or more are below 6.3 and within 0.002 of multiples of pi/2, other than 0
+    """
     quarters = [value / (math.pi / 2) for value in values if 0 < abs(value) < RADIANS_BELOW_DEG]
     return sum(round(each) != 0 and abs(each - round(each)) * math.pi / 2 < NEAR_QUARTER for each in quarters) >= 2
 
 
 def as_degrees(slides: bool = False) -> AfterValidator:
-    """:func:`check_degrees` and :func:`doubt_degrees` for a list of angles, as part of a type."""
+    """:func:`check_degrees` and :func:`doubt_degrees` for a list of angles, as part of a pydantic type.
+
+    Parameters
+    ----------
+    slides : whether some values can be mm of joints that slide, as :func:`check_degrees` takes it
+
+    Returns
+    -------
+    validator : passes the values on as they are; ``ValueError`` for impossible angles, a warning for doubtful ones
+    """
 
     def checked(values: list[float]) -> list[float]:
         check_degrees(values, slides)
@@ -121,8 +179,22 @@ def as_degrees(slides: bool = False) -> AfterValidator:
 
 
 def joint_values(robot: Robot, values: Sequence[float], field: str) -> Reals:
-    """Written joint values as rad or m (..., n); :class:`InputError` if they are not as many as the robot's joints, or
-    a joint would turn more than ten times."""
+    """Joint values as a file writes them, in SI units.
+
+    Parameters
+    ----------
+    values : (..., n), deg, or mm of joints that slide
+    field : where they were written, for the error
+
+    Returns
+    -------
+    q : (..., n), rad or m
+
+    Raises
+    ------
+    InputError
+        if they are not as many as the robot's joints, or a joint would turn more than ten times
+    """
     given = joint_rates(robot, values, field)
     turned = np.where(robot.slides, 0.0, np.abs(given))
     if turned.max(initial=0.0) > np.radians(MAX_DEG):
@@ -133,7 +205,22 @@ def joint_values(robot: Robot, values: Sequence[float], field: str) -> Reals:
 
 
 def joint_rates(robot: Robot, values: Sequence[float], field: str) -> Reals:
-    """Written rates of joints in SI units (..., n); :class:`InputError` if they are not as many as the joints."""
+    """Velocities or accelerations of joints as a file writes them, in SI units.
+
+    Parameters
+    ----------
+    values : (..., n), deg/s or deg/s^2, with mm in place of deg for joints that slide
+    field : where they were written, for the error
+
+    Returns
+    -------
+    rates : (..., n), with rad or m
+
+    Raises
+    ------
+    InputError
+        if they are not as many as the robot's joints
+    """
     given = np.array(values, float)
     if given.shape[-1] != robot.joints:
         problem = f"{given.shape[-1]} joint values for {robot.name}, which has {robot.joints} joints"
@@ -142,7 +229,17 @@ def joint_rates(robot: Robot, values: Sequence[float], field: str) -> Reals:
 
 
 def as_millimetres(values: list[float]) -> list[float]:
-    """Values that :func:`check_millimetres` finds nothing wrong with."""
+    """Lengths that :func:`check_millimetres` finds nothing wrong with, as a pydantic validator.
+
+    Parameters
+    ----------
+    values : mm
+
+    Raises
+    ------
+    ValueError
+        as ``problem | remedy``, for values that can't be millimetres
+    """
     check_millimetres(values)
     return values
 

@@ -71,6 +71,13 @@ class _PlainLoader(Composer, yaml.CSafeLoader):
         Composer.__init__(self)  # type: ignore[no-untyped-call]
 
     def compose_node(self, parent, index):
+        """Build the next node, unless it is an alias (``*name``) or has a tag (``!name``).
+
+        Raises
+        ------
+        yaml.constructor.ConstructorError
+            with line and column of the alias or tag
+        """
         event: Any = self.peek_event()
         unsupported = "aliases (*name)" if isinstance(event, yaml.AliasEvent) else "tags (!name)"
         if isinstance(event, yaml.AliasEvent) or getattr(event, "tag", None) is not None:
@@ -78,12 +85,26 @@ class _PlainLoader(Composer, yaml.CSafeLoader):
         return super().compose_node(parent, index)
 
     def construct_yaml_float(self, node):
+        """The value of a decimal number.
+
+        Raises
+        ------
+        yaml.constructor.ConstructorError
+            for a number other than zero that is too small for a float, and would be read as 0
+        """
         value = super().construct_yaml_float(node)
         if vanished(node.value, value):
             raise yaml.constructor.ConstructorError(None, None, f"{node.value} would be read as 0", node.start_mark)
         return value
 
     def construct_mapping(self, node, deep=False):
+        """The mapping of a node, with all that is in it.
+
+        Raises
+        ------
+        yaml.constructor.ConstructorError
+            with line and column of a key that is not a text, or is given twice
+        """
         seen = set()
         for key_node, _ in node.value:
             key = self.construct_object(key_node, deep=True)
@@ -120,7 +141,17 @@ _LINE_END = re.compile("\r\n|[\n\r\x85\u2028\u2029]")  # what PyYAML counts as o
 
 
 def vanished(text: str, value: float) -> bool:
-    """Whether a number that is not written as zero is too small to be held as another."""
+    """Whether a number that is not written as zero is too small to be held as another.
+
+    Parameters
+    ----------
+    text : as it was written, with or without exponent
+    value : what it was read as
+
+    Returns
+    -------
+    vanished : True for 1e-400, False for 0.00
+    """
     return value == 0 and re.search("[1-9]", text.lower().partition("e")[0]) is not None
 
 
@@ -221,12 +252,34 @@ def _parts(part: object, place: tuple[int | str, ...] = ()) -> Iterator[tuple[tu
 
 
 def load(model: type[Model], path: str | Path) -> Model:
-    """Read and validate a YAML file."""
+    """Read and validate a YAML file.
+
+    Parameters
+    ----------
+    model : the class of the file's content
+    path : of at most ``MAX_YAML_BYTES`` bytes
+
+    Raises
+    ------
+    InputError
+        naming file, field, problem and remedy: if the file can't be read, or a value is not as the model asks
+    """
     return parse(model, read_yaml(path), path)
 
 
 def check_own_names(field: str, names: list[str]) -> None:
-    """Reject a name that an earlier entry of a list has too, as ``ValueError`` that names the entry."""
+    """Reject a name that an earlier entry of a list has too.
+
+    Parameters
+    ----------
+    field : key of the list, for the error
+    names : of its entries, in their order
+
+    Raises
+    ------
+    ValueError
+        as ``field: problem | remedy``, naming both entries
+    """
     places: dict[str, int] = {}
     for i, name in enumerate(names):
         if (first := places.setdefault(name, i)) < i:
