@@ -70,14 +70,34 @@ STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("mor
 
 
 def link_mesh(link: int, corners: Reals) -> LinkMesh:
-    """A link's surface of triangles with corners (F, 3, 3), m, to the digits that :func:`stl_of` keeps."""
+    """A link's surface from triangles, to the digits that :func:`stl_of` keeps.
+
+    Parameters
+    ----------
+    link : its number, 0 for the base
+    corners : (F, 3, 3), m, of each triangle, in the frame that moves with the link's joint
+
+    Returns
+    -------
+    mesh : with corners that are equal to single precision in mm joined to one
+    """
     rounded = (1000 * np.asarray(corners).reshape(-1, 3)).astype(np.float32).astype(float) / 1000
     points, same = np.unique(rounded, axis=0, return_inverse=True)
     return LinkMesh(link, points, same.reshape(-1, 3).astype(np.int64))
 
 
 def stl_of(mesh: LinkMesh) -> bytes:
-    """A surface as a binary STL in mm."""
+    """A surface as a binary STL file.
+
+    Parameters
+    ----------
+    mesh : corners in m
+
+    Returns
+    -------
+    content : 80 bytes of zeros, the number of triangles, then the triangles in mm; normals are 0, so readers compute
+        them
+    """
     triangles = np.zeros(len(mesh.faces), STL_TRIANGLE)
     triangles["corners"] = 1000 * mesh.points[mesh.faces]
     return bytes(80) + struct.pack("<I", len(triangles)) + triangles.tobytes()
@@ -181,7 +201,22 @@ TOO_LARGE = "Write long lists of targets or points as CSV tables"
 
 
 def read_text(path: Path, most: int = MAX_BYTES, too_large: str = TOO_LARGE) -> str:
-    """Read a UTF-8 text file of at most so many bytes, or raise :class:`InputError` (``too_large`` is its remedy)."""
+    """Read a text file that a user gave.
+
+    Parameters
+    ----------
+    most : bytes that the file may have at most
+    too_large : the remedy that the error names for a larger one
+
+    Returns
+    -------
+    text : without the byte order mark, if it has one
+
+    Raises
+    ------
+    InputError
+        if it is missing, not a plain file, unreadable, too large, or not UTF-8 (with the number of the byte)
+    """
     try:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):

@@ -290,9 +290,14 @@ def import_urdf(
 
 
 def urdf_table(path: str | Path, *, base: str | None = None, tip: str | None = None) -> tuple[Robot, tuple[str, ...]]:
-    """D-H table, limits and speeds alone of a URDF, and notes on what was assumed: no meshes are read.
+    """D-H table, limits and speeds alone of a URDF; no meshes are read.
 
     Parameters and errors are those of :func:`import_urdf`.
+
+    Returns
+    -------
+    robot : a standard table, without shapes and masses
+    notes : what was assumed or changed on the way, in words
     """
     path = Path(path)
     chain = urdf_tree.read_chain(path, base, tip, False)
@@ -303,9 +308,14 @@ def urdf_table(path: str | Path, *, base: str | None = None, tip: str | None = N
 def urdf_groups(
     path: str | Path, *, base: str | None = None, tip: str | None = None
 ) -> frozenset[Literal["envelopes", "inertia", "drives"]]:
-    """Groups beside :func:`urdf_table` for whose links and joints the URDF states anything: no meshes are read.
+    """Groups other than those of :func:`urdf_table` of which a URDF states anything; no meshes are read.
 
     Parameters and errors are those of :func:`import_urdf`.
+
+    Returns
+    -------
+    groups : envelopes if a link of the chain has a collision shape, inertia if one has a body, drives if a moving joint
+        has friction, damping or an effort
     """
     path = Path(path)
     chain, root = urdf_tree.read_chain(path, base, tip, False), urdf_tree.urdf_root(path)
@@ -350,6 +360,11 @@ def urdf_statements(path: str | Path, *, base: str | None = None, tip: str | Non
     """Axes, limits, and the flange at poses all over the limits, by the URDF's own transforms.
 
     Parameters and errors are those of :func:`import_urdf`.
+
+    Returns
+    -------
+    statements : in m and rad, in the frame of the base link. There are no axes where joints are coupled, and limits are
+        NaN where the file states none. ``half_width_m`` is the rounding of the printed digits at the flange.
     """
     path = Path(path)
     chain = urdf_tree.read_chain(path, base, tip, False)
@@ -501,8 +516,20 @@ def link_places(found: urdf_tree.UrdfChain, shift: Reals) -> urdf_tree.LinkPlace
 def link_shapes(
     path: Path, root: ElementTree.Element, robot: Robot, placed: urdf_tree.LinkPlaces
 ) -> tuple[dict[str, Any], tuple[str, ...], tuple[str, ...]]:
-    """The collision geometry of a URDF, in the frames of the links of the robot made from it, as fields of
-    :class:`Robot`, notes in words, and the links of which a shape could not be read."""
+    """The collision geometry of a URDF, in the frames of the links of the robot made from it.
+
+    Parameters
+    ----------
+    path : of the URDF, from which meshes are looked for
+    robot : made from the URDF, without shapes
+    placed : where the links are with all joints of the robot at 0
+
+    Returns
+    -------
+    fields : ``envelopes``, ``hulls`` and ``meshes`` of :class:`Robot`, in m
+    notes : what was left out or changed, in words
+    lost : links of which a shape could not be read
+    """
     zero = np.concatenate([robot.base[None], frames(robot, np.zeros(robot.joints))])
     shapes, notes, lost = list[urdf_tree.Shape](), list[str](), list[str]()
     for link in root.findall("link"):
@@ -539,7 +566,18 @@ def link_shapes(
 def link_visuals(
     path: Path, root: ElementTree.Element, robot: Robot, placed: urdf_tree.LinkPlaces
 ) -> tuple[tuple[LinkMesh, ...], tuple[str, ...]]:
-    """The visual geometry of a URDF, one surface for each link, simplified to ``DRAWN_TRIANGLES`` in all, and notes."""
+    """The visual geometry of a URDF, for pictures, in the frames of the links of the robot made from it.
+
+    Parameters
+    ----------
+    path : of the URDF, from which meshes are looked for
+    placed : where the links are with all joints of the robot at 0
+
+    Returns
+    -------
+    surfaces : one for each link that has any, m, simplified to ``DRAWN_TRIANGLES`` in all
+    notes : one at most, about geometry that could not be read
+    """
     zero = np.concatenate([robot.base[None], frames(robot, np.zeros(robot.joints))])
     parts: dict[int, list[tuple[Reals, Integers]]] = {}
     missing = dict[str, Er3aError]()
@@ -786,7 +824,16 @@ def export_srdf(robot: Robot) -> str:
 
 
 def assumed_pairs(robot: Robot) -> str:
-    """That the pairs of an SRDF rest on shapes which no document gives; empty where one does."""
+    """That the pairs of an SRDF rest on shapes which no document gives.
+
+    Parameters
+    ----------
+    robot : whose shapes may come from its file, or be guessed from its table
+
+    Returns
+    -------
+    note : one sentence; empty where a document gives all shapes
+    """
     shapes = arm_shapes(robot)
     if not shapes.assumed:
         return ""
@@ -795,7 +842,12 @@ def assumed_pairs(robot: Robot) -> str:
 
 
 def pairs_not_checked(robot: Robot) -> tuple[str, ...]:
-    """Pairs of links that the SRDF disables because their shapes can't be right."""
+    """Pairs of links that the SRDF disables because their shapes can't be right.
+
+    Returns
+    -------
+    pairs : as "first and second"; their shapes overlap at all poses, or are guessed so that they do (``REASONS``)
+    """
     return tuple(
         f"{row.first} and {row.second}" for row in collision_matrix(robot).rows if REASONS.get(row.state) == "Default"
     )

@@ -158,7 +158,16 @@ class Tree:
         return found
 
     def up_from(self, link: str) -> list[UrdfJoint]:
-        """The joints from the root to a link."""
+        """The joints from the root of the tree to a link.
+
+        Parameters
+        ----------
+        link : its name
+
+        Returns
+        -------
+        joints : in the order from the root on; empty for the root itself
+        """
         found: list[UrdfJoint] = []
         while link in self.by_child:
             found.append(self.by_child[link])
@@ -166,12 +175,32 @@ class Tree:
         return found[::-1]
 
     def onward(self, link: str) -> tuple[list[UrdfJoint], list[UrdfJoint]]:
-        """The joints at a link after which anything moves, and those after which anything moves by itself."""
+        """The joints at a link that lead on to moving ones.
+
+        Parameters
+        ----------
+        link : its name
+
+        Returns
+        -------
+        moving : joints after which, themselves included, anything moves
+        active : those of them after which anything moves by itself, and not only as a joint that it follows
+        """
         moving = [joint for joint in self.by_parent.get(link, []) if self.moves[joint.name]]
         return moving, [joint for joint in moving if self.depth[joint.name]]
 
     def hand_begins(self, moving: list[UrdfJoint], count: int) -> bool:
-        """Whether what moves after a link, after so many joints, is a gripper or a hand."""
+        """Whether what moves after a link is a gripper or a hand, and no longer the arm.
+
+        Parameters
+        ----------
+        moving : joints at the link that lead on to moving ones
+        count : independent joints before the link
+
+        Returns
+        -------
+        begins : after ``ARM_JOINTS`` joints at least, where several short chains begin, or one joint named as a gripper
+        """
         if count < ARM_JOINTS or any(self.depth[joint.name] > FINGER_JOINTS for joint in moving):
             return False
         alone = [
@@ -180,7 +209,17 @@ class Tree:
         return len(moving) > 1 or len(alone) == 1
 
     def ends(self, link: str, count: int = 0) -> list[str]:
-        """Links after a link, which has so many moving joints before it, at which an arm may end."""
+        """Links at which an arm may end, from a link on.
+
+        Parameters
+        ----------
+        link : its name
+        count : independent joints before it
+
+        Returns
+        -------
+        links : where a hand begins, or, where nothing moves any more, the end of the fixed joints
+        """
         found, todo = list[str](), [(link, count)]
         while todo:
             link, count = todo.pop()
@@ -194,9 +233,16 @@ class Tree:
         return found
 
     def back_from(self, link: str) -> list[UrdfJoint]:
-        """Fixed joints, reversed, from a frame beside an arm to the link from which the arm goes on.
+        """Fixed joints, reversed, from a frame fixed to an arm back to the link from which the arm goes on.
 
-        Empty for links that the arm is at or after.
+        Parameters
+        ----------
+        link : its name
+
+        Returns
+        -------
+        joints : with parent and child swapped and their transforms inverted; empty for links that the arm is at or
+            after
         """
         found: list[UrdfJoint] = []
         while not self.onward(link)[1] and link in self.by_child and not self.by_child[link].moves:
@@ -278,7 +324,17 @@ def _controller_base(tree: Tree, base: str) -> Iterator[str]:
 
 
 def tree_of(path: Path, snap: bool) -> Tree:
-    """The joints of a URDF; :class:`InputError` if it is none."""
+    """The joints of a URDF as a tree.
+
+    Parameters
+    ----------
+    snap : whether angles close to right ones are taken for these
+
+    Raises
+    ------
+    InputError
+        if the file is no URDF, or its joints make no tree; it names the joint
+    """
     return Tree(path, [_joint(path, element, snap) for element in urdf_root(path).findall("joint")])
 
 
@@ -564,7 +620,14 @@ def masses_from_urdf(
 
 
 def write_masses(robot: Robot, names: Sequence[str], root: ElementTree.Element) -> None:
-    """Add ``<inertial>`` to the links of a URDF whose link frames are those that move with the joints."""
+    """Add ``<inertial>`` to the links of a URDF whose link frames are those that move with the joints.
+
+    Parameters
+    ----------
+    robot : bodies in kg, m and kg m^2; that of the base is moved to the frame in which the base is placed
+    names : of the links, by number
+    root : the ``<robot>`` element, which is changed
+    """
     elements = {link.get("name"): link for link in root.findall("link")}
     for each in robot.masses.links:
         body = moved(each.body, robot.base) if each.link == 0 else each.body
@@ -575,13 +638,29 @@ def write_masses(robot: Robot, names: Sequence[str], root: ElementTree.Element) 
 
 
 def peak_torque(robot: Robot, joint: int) -> float:
-    """Peak torque or force of the drive of a joint (from 0), N m or N; 0 where it is unknown."""
+    """Peak torque or force of the drive of a joint.
+
+    Parameters
+    ----------
+    joint : counted from 0
+
+    Returns
+    -------
+    effort : N m, or N of a joint that slides; 0 where it is unknown, as URDFs write it
+    """
     drives = robot.masses.drives
     return 0.0 if drives is None or np.isnan(drives.peak[joint]) else float(drives.peak[joint])
 
 
 def write_friction(robot: Robot, joint: int, element: ElementTree.Element) -> None:
-    """Add ``<dynamics>`` to a URDF's joint, with what is known of the friction of a joint (from 0)."""
+    """Add ``<dynamics>`` to a URDF's joint, if anything of its friction is known.
+
+    Parameters
+    ----------
+    joint : counted from 0
+    element : the ``<joint>``, which is changed; ``damping`` is viscous friction in N m s/rad, ``friction`` is Coulomb's
+        in N m (N s/m and N of a joint that slides)
+    """
     drives = robot.masses.drives
     known = {} if drives is None else {"damping": drives.viscous[joint], "friction": drives.coulomb[joint]}
     written = {key: repr(float(value)) for key, value in known.items() if not np.isnan(value)}
@@ -622,7 +701,18 @@ def _changed(name: str, problem: NoBody, given: MassBody, taken: MassBody) -> st
 
 
 def drives_of(root: ElementTree.Element, names: Sequence[str]) -> Drives | None:
-    """What a URDF states of the drives of the joints ``names``; None if nothing."""
+    """What a URDF states of the drives of joints.
+
+    Parameters
+    ----------
+    root : the ``<robot>`` element
+    names : of the joints, in the arm's order
+
+    Returns
+    -------
+    drives : Coulomb and viscous friction, and the effort as peak torque (N m, or N); NaN where nothing, or a value
+        below 0, is stated. An effort of 0 is unknown. None if all is unknown.
+    """
     joints = {joint.get("name", "?"): joint for joint in root.findall("joint")}
     coulomb, viscous, effort = (
         np.array([_number(joints[name].find(tag), key, math.nan) for name in names])
@@ -762,7 +852,17 @@ def visual_surface(path: Path, name: str, visual: ElementTree.Element) -> tuple[
 
 
 def with_capsules(shapes: Sequence[Shape | CylinderOfLink]) -> list[Shape]:
-    """The shapes of one link, each cylinder as a prism, or as its capsule if a sphere of its radius is at each end."""
+    """The shapes of one link, with each cylinder as a capsule or a prism.
+
+    Parameters
+    ----------
+    shapes : m, in the link's frame
+
+    Returns
+    -------
+    shapes : a cylinder becomes its capsule if a sphere of its radius is at each end, and these spheres go; any other
+        becomes the prism around it
+    """
     found, at_ends = list[Shape](), set[int]()
     for shape in shapes:
         if isinstance(shape, CylinderOfLink):
@@ -882,7 +982,17 @@ def _mesh(
 
 
 def mesh_of(path: Path, name: str) -> Path | None:
-    """The mesh's file that a URDF names, beside it or in a package above it; None if there is none."""
+    """The mesh's file that a URDF names.
+
+    Parameters
+    ----------
+    path : of the URDF
+    name : a path relative to the URDF's folder, with or without ``file://``, or ``package://NAME/...``
+
+    Returns
+    -------
+    file : the first place where there is a file; None if there is none
+    """
     places = _in_package(path, name) if name.startswith("package://") else [path.parent / name.removeprefix("file://")]
     return next((place for place in places if place.is_file()), None)
 

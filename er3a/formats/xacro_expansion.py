@@ -24,7 +24,16 @@ INNER = re.compile(r"_|(gi|cr|ag|tb)_")  # attributes that lead from a value to 
 
 
 def main(file: str, arguments: str) -> None:
-    """Expand a file with arguments, a JSON object of texts; exit code 1 if it can't be."""
+    """Expand a xacro file and write the URDF to standard output.
+
+    Parameters
+    ----------
+    arguments : a JSON object of texts, by the names of the file's arguments
+
+    Notes
+    -----
+    If that fails, the reason is the last line on standard error, and the process ends with exit code 1.
+    """
     _limit()
     try:
         with redirect_stdout(sys.stderr):
@@ -77,7 +86,17 @@ def _expanded(path: Path, values: dict[str, str]) -> str:
 
 
 def packages_near(path: Path) -> dict[str, Path]:
-    """Packages by name: folders above the file, nearest last, and beside those; ``package.xml`` renames one."""
+    """Packages of ROS by name, as far as they can be guessed from the folders around a file.
+
+    Parameters
+    ----------
+    path : of the xacro file
+
+    Returns
+    -------
+    folders : the ``FOLDERS_UP`` folders above the file and those in them, by folder name, or by the name in their
+        ``package.xml``; of two with one name the nearer one
+    """
     found: dict[str, Path] = {}
     for above in reversed(path.resolve().parents[:FOLDERS_UP]):
         found |= {folder.name: folder for folder in (*sorted(above.glob("*/")), above)}

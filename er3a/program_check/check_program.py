@@ -189,7 +189,13 @@ class ProgramCheck(ByValue):
 
 
 def assumed_limits(robot: Robot, options: CheckOptions) -> JointLimits:
-    """Joint limits, assumed where no document gives them."""
+    """Limits of joint speeds and accelerations, assumed where no document gives them.
+
+    Returns
+    -------
+    limits : those of the options if they have any; else the robot's speeds, with 180 deg/s or 0.5 m/s for unknown ones,
+        and accelerations that reach them in ``ACCELERATION_TIME``
+    """
     assumed = np.where(robot.slides, ASSUMED_SLIDE, ASSUMED_SPEED)
     return options.joint_limits or joint_limits(robot, assumed, ACCELERATION_TIME)
 
@@ -470,7 +476,16 @@ class ProgramPart:
     found: tuple[LocatedFinding, ...] = ()
 
     def command(self, source: CommandSource) -> Command:
-        """The path, with what errors call it."""
+        """The stretch of the program as a path's command.
+
+        Parameters
+        ----------
+        source : what errors about the path name as its place
+
+        Returns
+        -------
+        command : in SI units, with this source
+        """
         return replace(self.made, source=source)
 
 

@@ -25,9 +25,21 @@ LONGEST_STEP = 0.3  # rad or m, of a joint in one step
 
 
 def continued(robot: Robot, poses: Reals, start: Reals) -> Reals:
-    """Joints (k, n), rad or m, of the first k of poses (N, 4, 4), T_world_tool in m, from joints ``start`` (n,) on.
+    """Joints along poses of the tool, by continuation from a start without a change of branch.
 
-    k is less than N where the arm does not come to a pose without leaving its branch.
+    Parameters
+    ----------
+    poses : (N, 4, 4), T_world_tool in m, near to each other
+    start : (n,), rad or m; the joints from which the first pose is solved
+
+    Returns
+    -------
+    q : (k, n), rad or m, of the first k poses. k is less than N where the arm does not come to a pose without leaving
+        its branch.
+
+    Notes
+    -----
+    Damped Gauss-Newton steps [1]_, solved to ``SOLVED``.
     """
     coupling = robot.coupling
     first = for_kernel(row_values(robot, start[None]))[0].copy()

@@ -70,7 +70,16 @@ class MotionLaw:
         return 1 / (self.duration * (1 - self.ramp))
 
     def speeds(self, share: Reals) -> Reals:
-        """Speeds (k,), in ways per s, at shares of the way (k,)."""
+        """Speeds at places of the way.
+
+        Parameters
+        ----------
+        share : (k,), of the whole way, 0 to 1
+
+        Returns
+        -------
+        speeds : (k,), whole ways per s
+        """
         ramp = self.ramp * self.duration
         near = np.minimum(share, 1 - share)
         return (
@@ -80,11 +89,29 @@ class MotionLaw:
         )
 
     def share_at(self, speed: float) -> float:
-        """Share of the way at which a speed, in ways per s, is come to first."""
+        """Where on the way a speed is reached first.
+
+        Parameters
+        ----------
+        speed : whole ways per s, at most :attr:`top`
+
+        Returns
+        -------
+        share : of the way, by v^2 / (2 a) with the ramp's acceleration a
+        """
         return speed**2 * self.ramp * self.duration / (2 * self.top)
 
     def times(self, share: Reals) -> Reals:
-        """Times (k,), s, at which shares of the way (k,) are done."""
+        """Times at which places of the way are passed.
+
+        Parameters
+        ----------
+        share : (k,), of the whole way, 0 to 1
+
+        Returns
+        -------
+        t : (k,), s after the start
+        """
         share, ramp = np.asarray(share, float), self.ramp * self.duration
         rise = self.top * ramp / 2
         early, late = (
@@ -156,16 +183,44 @@ class MotionPath(ByValue):
         return self.q[-1] if self.stop is None else None
 
     def at(self, share: Reals) -> Reals:
-        """Joints (k, n) at shares of the way (k,)."""
+        """Joints at places of the way, straight between its points.
+
+        Parameters
+        ----------
+        share : (k,), of the whole way, 0 to 1
+
+        Returns
+        -------
+        q : (k, n), rad or m
+        """
         return np.stack([np.interp(share, self.share, column) for column in self.q.T], axis=-1)
 
     def along_mm(self, share: float) -> float:
-        """Length (mm) of the tool point's path up to a share of the way."""
+        """How far the tool point has come.
+
+        Parameters
+        ----------
+        share : of the whole way, 0 to 1
+
+        Returns
+        -------
+        length : mm along the path of the tool point, rounded to 1 um
+        """
         return round(1000 * self.length * share, 3)
 
 
 def law_of(way: float, speed: float, acceleration: float) -> MotionLaw:
-    """The trapezoidal profile over a length, at a speed and an acceleration in the same unit of length."""
+    """The trapezoidal profile over a length, from rest to rest.
+
+    Parameters
+    ----------
+    way : length, in any unit
+    speed, acceleration : in the same unit per s and per s^2
+
+    Returns
+    -------
+    law : the triangular profile, with half of the time for each ramp, if the way is too short to reach the speed
+    """
     if way * acceleration >= speed * speed:
         duration = way / speed + speed / acceleration
         return MotionLaw(duration, speed / acceleration / duration)
@@ -177,9 +232,21 @@ def _given(rate: Rate | None, unit: str) -> float | None:
 
 
 def tool_law(motion: ArmMotion, length: float, turned: float, assumed: AssumedRates) -> MotionLaw:
-    """The law of a line or arc, by its path (m) or by its tool's turn (rad), whichever takes longer.
+    """The law of a line or arc, by its path or by its tool's turn, whichever takes longer.
 
-    A turn whose speed the program does not give counts as a length.
+    Parameters
+    ----------
+    length : m, of the tool point's path
+    turned : rad, of the tool
+    assumed : speed and acceleration where the program gives none
+
+    Returns
+    -------
+    law : of the duration that the program gives, or else by its speeds
+
+    Notes
+    -----
+    A turn whose speed the program does not give counts as a length of ``TURN_LENGTH`` for 1 rad.
     """
     if (seconds := _given(motion.speed, "s")) is not None:
         return MotionLaw(seconds, RAMP_OF_A_DURATION)
@@ -217,13 +284,29 @@ def joint_law(
 
 
 def is_given(motion: ArmMotion) -> bool:
-    """Whether the program gives a speed that the motion's law uses."""
+    """Whether the program gives a speed that the motion's law uses.
+
+    Returns
+    -------
+    given : for joint moves a duration, a speed or a share of the greatest; for lines and arcs a duration or the tool's
+        speed
+    """
     units = ("s", "rad/s", "share", "m/s") if motion.kind == "joint" else ("s", "m/s")
     return any(_given(motion.speed, unit) is not None for unit in units)
 
 
 def joint_path(arm: Robot, motion: ArmMotion, start: Reals, end: Reals, rules: CheckRules) -> MotionPath | None:
-    """A joint move; None if no joint moves."""
+    """The way of a joint move: all joints together, straight in joint space.
+
+    Parameters
+    ----------
+    start, end : (n,), rad or m
+
+    Returns
+    -------
+    path : points near to each other; None if no joint moves by more than ``NO_WAY``. Its length is the straight
+        distance (m) between the tool's places at both ends.
+    """
     step = end - start
     lead = float(np.abs(step).max())
     if lead < NO_WAY:
@@ -238,8 +321,18 @@ def joint_path(arm: Robot, motion: ArmMotion, start: Reals, end: Reals, rules: C
 def tool_path(
     arm: Robot, motion: ArmMotion, start: Reals, end: Reals, via: Reals | None, rules: CheckRules
 ) -> MotionPath | found_in.NotFollowed | None:
-    """A line or arc from joints (n,) to a pose, T_world_tool (4, 4) in m, by way of ``via``; None if the tool does not
-    move, a finding if it is not followed."""
+    """The way of a line or arc, followed from given joints.
+
+    Parameters
+    ----------
+    start : (n,), rad or m
+    end, via : T_world_tool (4, 4), m; a line without ``via``
+
+    Returns
+    -------
+    path : up to where the arm can't follow any more. None if the tool does not move. A finding where the way is not
+        followed: points that define no arc, a redundant arm, or a turn that could go either way.
+    """
     begin = forward(arm, start)
     turn = log_rotation(end[:3, :3] @ begin[:3, :3].T)
     turned = float(np.linalg.norm(turn))
@@ -344,7 +437,16 @@ def _proper(T: Reals) -> Reals:
 
 
 def limit_findings(arm: Robot, q: Reals) -> tuple[motion_faults.LimitCause, ...]:
-    """Joints (n,) in rad or m, and sums of them, that are beyond a limit."""
+    """Joints, and sums of joints, that are beyond a limit.
+
+    Parameters
+    ----------
+    q : (n,), rad or m
+
+    Returns
+    -------
+    causes : one for each side of a limit that is exceeded by more than ``LIMIT_TOLERANCE``
+    """
     sides = motion_faults.limit_sides(arm)
     return tuple(
         side.cause(float(side.of(q))) for side in sides if float(side.of(q)) > side.sign * side.limit + LIMIT_TOLERANCE
@@ -417,7 +519,14 @@ def _accelerates(path: MotionPath, able: Reals) -> Shares:
 
 
 def far_turns(path: MotionPath) -> list[found_in.CheckFinding]:
-    """Joints that turn by more than half a turn where less would do, or far where the tool hardly moves."""
+    """Joints that turn further than the motion needs.
+
+    Returns
+    -------
+    findings : the joint that turns most, if it turns by more than 90 deg while the tool moves less than 50 mm and turns
+        less than half as far; and joints that turn by more than 180 deg, where another turn within the limits is
+        shorter
+    """
     arm, start, step = path.arm, path.q[0], path.q[-1] - path.q[0]
     found: list[found_in.CheckFinding] = []
     turned = np.where(arm.slides, 0.0, np.abs(step))
@@ -434,7 +543,17 @@ def far_turns(path: MotionPath) -> list[found_in.CheckFinding]:
 
 
 def singular_findings(path: MotionPath, near: NearSingular) -> Shares:
-    """Where a line or arc meets a singular pose, or passes one; unbounded where a joint is too fast for any speed."""
+    """Where a line or arc meets a singular pose, or passes close to one.
+
+    Parameters
+    ----------
+    near : distances below which a pose is near-singular
+
+    Returns
+    -------
+    findings : with the share of the way of each. The pose is met, with joint speeds that stay finite, where the factor
+        changes its sign from one point to the next; else it is passed, at a distance in deg, or in mm for the shoulder.
+    """
     factors = factors_where_defined(path.arm, path.q)
     found: Shares = {}
     for kind in TYPES:
@@ -453,7 +572,16 @@ def singular_findings(path: MotionPath, near: NearSingular) -> Shares:
 
 
 def arrives_otherwise(path: MotionPath, given: Reals) -> found_in.CheckFinding | None:
-    """That a line or arc to given joints (n,) ends in others; None where it does not."""
+    """Whether a line or arc to given joints ends in other joints than these.
+
+    Parameters
+    ----------
+    given : (n,), rad or m, joints of the target
+
+    Returns
+    -------
+    finding : the joint that differs most, and by how much; None where the end is the same, or is not come to
+    """
     if path.end is None or np.abs(path.end - given).max() <= SAME_ARRIVAL:
         return None
     joint = int(np.argmax(np.abs(path.end - given)))

@@ -156,7 +156,16 @@ class MotionCollides(Finding):
         return self.touches[0].at_mm
 
     def with_touches_of(self, others: Iterable[MotionCollides]) -> MotionCollides:
-        """The same, each pair as deep as in any of the others, and followed by pairs that touch only there."""
+        """The same collision, together with what was found for other ways to the same motion.
+
+        Parameters
+        ----------
+        others : findings of the same instruction
+
+        Returns
+        -------
+        finding : each pair with its greatest depth; pairs that touch only in the others follow
+        """
         deepest: dict[Pair, BodiesTouch] = {touch.pair: touch for touch in self.touches}
         for touch in (touch for other in others for touch in other.touches):
             first = deepest.setdefault(touch.pair, touch)
@@ -271,7 +280,16 @@ WRONG = frozenset(("not_understood", "not_finite", "too_far", "too_many_joints")
 
 
 def level_of(finding: CheckFinding) -> Level:
-    """Severity of a finding: ``fail`` where the program can't be executed as written, never on a guess."""
+    """Severity of a finding: ``fail`` where the program can't be executed as written, never on a guess.
+
+    Parameters
+    ----------
+    finding : of any kind; a collision fails only with shapes that are not assumed, and bodies that overlap for certain
+
+    Returns
+    -------
+    level : ``note``, ``caution`` or ``fail``; ``caution`` for all that no rule names
+    """
     match finding:
         case MeetsSingularity(bounded=bounded):
             return "note" if bounded else "fail"
@@ -287,7 +305,16 @@ def level_of(finding: CheckFinding) -> Level:
 
 
 def gravity(finding: CheckFinding) -> float:
-    """How far a finding goes: of like ones at one instruction the greatest is the worst. 0 where it has no size."""
+    """How far a finding goes, to choose the worst of like ones.
+
+    Parameters
+    ----------
+    finding : compared only with those of its kind at the same instruction
+
+    Returns
+    -------
+    size : in the finding's own unit, the greater the worse; 0 where it has no size
+    """
     if isinstance(finding, AboveLimit | BelowLimit):
         return abs(finding.reached_deg - finding.limit_deg)
     if isinstance(finding, ClearOfAssumed):
@@ -301,5 +328,14 @@ def gravity(finding: CheckFinding) -> float:
 
 
 def worst_of(levels: Iterable[Level]) -> Level:
-    """The most severe level; ``pass`` if there are no findings."""
+    """The most severe of levels.
+
+    Parameters
+    ----------
+    levels : in any order
+
+    Returns
+    -------
+    level : ``pass`` if there are none; the order is pass, note, caution, fail
+    """
     return max(levels, key=RANKS.__getitem__, default="pass")

@@ -22,7 +22,18 @@ USUAL = 3  # motions, from which others are compared with them
 
 
 def suspect_numbers(execution: Execution, robot: Robot) -> Iterator[tuple[Step, SuspectNumber]]:
-    """Numbers that are likely mistakes, with the step of each."""
+    """Numbers of a program that are likely mistakes.
+
+    Parameters
+    ----------
+    execution : the program, run; each motion of its text counts once
+    robot : its size and speeds are the measure
+
+    Returns
+    -------
+    suspects : pairs of step and finding: targets that look like m or rad, speeds far from the others, a tool or base
+        that one motion alone has
+    """
     steps = list({step.place: step for step in execution.steps if isinstance(step.instruction, ArmMotion)}.values())
     motions = [(step, step.instruction) for step in steps if isinstance(step.instruction, ArmMotion)]
     if execution.program.language in IN_MM:

@@ -86,18 +86,38 @@ class CheckedMotion(ByValue):
     guessed: bool = False
 
     def add(self, *findings: found_in.CheckFinding) -> None:
-        """Findings about the motion as a whole."""
+        """Add findings about the motion as a whole.
+
+        Parameters
+        ----------
+        findings : each is kept once, without a moment of the motion
+        """
         for each in findings:
             self.findings.setdefault(each, None)
 
     def add_on_way(self, found: Shares) -> None:
-        """Findings with the share of the way at which each begins."""
+        """Add findings that begin somewhere on the way.
+
+        Parameters
+        ----------
+        found : findings with the share of the way (0 to 1) at which each begins; kept with the time in s. Nothing is
+            kept of a motion without a way.
+        """
         if self.path is not None:
             for each, share in found.items():
                 self.findings.setdefault(each, float(self.path.law.times(np.array(share))))
 
     def level_of(self, finding: found_in.CheckFinding) -> found_in.Level:
-        """How severe one of its findings is: never an error where the start was guessed."""
+        """How severe one of the motion's findings is.
+
+        Parameters
+        ----------
+        finding : one of :attr:`findings`
+
+        Returns
+        -------
+        level : as :func:`level_of` says, but a caution in place of a fail where the start was guessed
+        """
         level = found_in.level_of(finding)
         return "caution" if self.guessed and level == "fail" else level
 
@@ -343,7 +363,18 @@ class Obstacles(ByValue):
         return cls(holding, scene, Bodies(holding, scene), tolerance, margin)
 
     def check(self, motions: list[CheckedMotion], keep_on: Callable[[], bool]) -> None:
-        """Measure the clearance of motions, and find what touches on them."""
+        """Measure the clearance of motions, and find what touches on them; both are added to the motions.
+
+        Parameters
+        ----------
+        motions : of one arm; those without a way are passed over
+        keep_on : asked before each round; once it is False, motions with open parts get :class:`ClearanceNotProven`
+
+        Notes
+        -----
+        Parts of a way are halved until the bound of [1]_ shows them clear or touching, or bodies move by less than the
+        tolerance.
+        """
         paths = [(each, each.path) for each in motions if each.path is not None and len(each.path.q)]
         if not paths or not self.bodies.pairs:
             return
@@ -431,7 +462,17 @@ class Obstacles(ByValue):
         return {hit: float(first)}
 
     def corner(self, one: CheckedMotion, other: CheckedMotion) -> None:
-        """Find what the corner between two motions touches that a zone rounds, half-way to where it begins and ends."""
+        """Find what the corner between two motions touches that a zone rounds; what is found is added to the first.
+
+        Parameters
+        ----------
+        one, other : motions that follow each other; the zone is that of the first
+
+        Notes
+        -----
+        The corner is looked at on the chord between the ends of the zone, and on the parabola with the target as its
+        control point. Both are only looked at where the motions themselves are clear.
+        """
         zone, before, after = one.motion.zone, one.path, other.path
         if zone.kind == "fine" or before is None or after is None or before.stop is not None:
             return
@@ -453,7 +494,16 @@ class Obstacles(ByValue):
 
 
 def zone_share(zone: instructions.Zone, path: MotionPath) -> float:
-    """The share of a way that a zone may take; over one half where the zone is larger than that."""
+    """The share of a motion's way that its zone may take.
+
+    Parameters
+    ----------
+    zone : by a distance in m, a turn in rad, or a share
+
+    Returns
+    -------
+    share : over one half for a distance that is larger than half of the way; one half where the size is not known
+    """
     match zone.kind:
         case "distance" if path.length > 1e-9:
             return zone.value / path.length
