@@ -846,7 +846,8 @@ def pairs_not_checked(robot: Robot) -> tuple[str, ...]:
 
     Returns
     -------
-    pairs : as "first and second"; their shapes overlap at all poses, or are guessed so that they do (``REASONS``)
+    pairs : as "first and second". Links far from each other overlap at all joint values that were tried, or neighbours
+        have guessed shapes that overlap at many of them.
     """
     return tuple(
         f"{row.first} and {row.second}" for row in collision_matrix(robot).rows if REASONS.get(row.state) == "Default"

@@ -67,19 +67,43 @@ class CodeBuilder:
         self._hidden = 0
 
     def add(self, operation: syntax.Operation) -> None:
-        """One more operation."""
+        """Add one operation at the end of the code.
+
+        Parameters
+        ----------
+        operation : its number is that of the code's length before; jumps lead to such numbers
+        """
         self.code.append(operation)
 
     def remark(self, place: Place, text: str) -> None:
-        """A comment."""
+        """Add a comment, which writers keep.
+
+        Parameters
+        ----------
+        place : where it was read
+        text : without the language's own signs of a comment
+        """
         self.add(syntax.Fixed(place, Remark(text)))
 
     def aside(self, place: Place, text: str) -> None:
-        """An instruction that moves nothing."""
+        """Add an instruction that is known to move nothing.
+
+        Parameters
+        ----------
+        place : where it was read
+        text : as it was read; writers of the same language repeat it
+        """
         self.add(syntax.Fixed(place, Aside(text)))
 
     def unknown(self, place: Place, text: str, may_move: bool = True, stops: bool = False) -> None:
-        """An instruction that is not understood, or not followed."""
+        """Add an instruction that is not understood, or not followed.
+
+        Parameters
+        ----------
+        text : as it was read
+        may_move : whether it may move the arm, for all that is known
+        stops : whether the controller stops here, as at a text that is no statement
+        """
         self.add(syntax.Fixed(place, Unknown(text, may_move, stops=stops)))
 
     def unread(self, place: Place, text: str, may_move: bool = True, folds: bool = False) -> None:
@@ -96,25 +120,72 @@ class CodeBuilder:
             self.unclear(place, syntax.Variable(name), text)
 
     def unclear(self, place: Place, target: syntax.Expression | None, text: str) -> None:
-        """A variable, field or element of which nothing is known from here."""
+        """Make a variable, field or element unclear, because nothing is known of it from here.
+
+        Parameters
+        ----------
+        target : what is assigned to; anything else than a variable, field or element is left out
+        text : what the value was read from, for messages
+        """
         if isinstance(target, syntax.Variable | syntax.Member | syntax.Element):
             self.add(syntax.Assign(place, target, syntax.Opaque(text), text))
 
     def inside(self, *kinds: str) -> bool:
-        """Whether the innermost block is one of these."""
+        """Whether the innermost open block is one of some kinds.
+
+        Parameters
+        ----------
+        kinds : such as ``if``, ``for`` or ``switch``
+
+        Returns
+        -------
+        inside : False where no block is open
+        """
         return bool(self.blocks) and self.blocks[-1].kind in kinds
 
     def open_if(self, place: Place, condition: syntax.Expression, text: str) -> None:
-        """``IF condition``."""
+        """Begin ``IF condition``: the code goes on to the next part where the condition does not hold.
+
+        Parameters
+        ----------
+        text : the line, for messages
+
+        Raises
+        ------
+        InputError
+            if too many blocks are nested
+        """
         self._open("if", place)
         self._test(place, condition, text)
 
     def next_arm(self, place: Place, condition: syntax.Expression | None, text: str) -> None:
-        """``ELSE``, or ``ELSEIF`` with its condition."""
+        """Go on with ``ELSE``, or ``ELSEIF`` with its condition.
+
+        Parameters
+        ----------
+        condition : None of ``ELSE``
+        text : the line, for messages
+
+        Raises
+        ------
+        InputError
+            if the innermost block is no IF
+        """
         self._next_part(self._innermost("if", place), place, condition, text)
 
     def open_while(self, place: Place, condition: syntax.Expression, text: str) -> None:
-        """``WHILE condition``; a condition that is always true makes a loop for ever."""
+        """Begin ``WHILE condition``, which is tested before each round.
+
+        Parameters
+        ----------
+        condition : one that is always true makes a loop for ever
+        text : the line, for messages
+
+        Raises
+        ------
+        InputError
+            if too many blocks are nested
+        """
         if isinstance(condition, syntax.Constant) and condition.value is True:
             self._open("loop", place, "while")
             return
@@ -122,11 +193,23 @@ class CodeBuilder:
         self._test(place, condition, text)
 
     def open_loop(self, place: Place) -> None:
-        """``LOOP``."""
+        """Begin ``LOOP``, which goes on until something leaves it.
+
+        Raises
+        ------
+        InputError
+            if too many blocks are nested
+        """
         self._open("loop", place)
 
     def open_repeat(self, place: Place) -> None:
-        """``REPEAT``."""
+        """Begin ``REPEAT``, whose condition is tested after each round (:meth:`close`).
+
+        Raises
+        ------
+        InputError
+            if too many blocks are nested
+        """
         self._open("repeat", place)
 
     def open_for(
@@ -138,7 +221,19 @@ class CodeBuilder:
         step: syntax.Expression | None,
         text: str,
     ) -> None:
-        """``FOR name = first TO last STEP step``; the last and the step are fixed when the loop is entered."""
+        """Begin ``FOR name = first TO last STEP step``.
+
+        Parameters
+        ----------
+        name : of the counter
+        step : 1 if None
+        text : the line, for messages
+
+        Notes
+        -----
+        The last value and the step are fixed when the loop is entered. A round is done as long as (last - counter) *
+        step is not below 0, so that steps can be negative.
+        """
         self._hidden += 1
         limit, by = (syntax.Variable(f"%{part}{self._hidden}") for part in ("last", "step"))
         counter = syntax.Variable(name)
@@ -151,7 +246,18 @@ class CodeBuilder:
         self._test(place, syntax.Binary(">=", span, syntax.Constant(0)), text, counted=True)
 
     def open_switch(self, place: Place, subject: syntax.Expression, text: str) -> None:
-        """``SWITCH subject``, which is worked out once."""
+        """Begin ``SWITCH subject``; cases follow.
+
+        Parameters
+        ----------
+        subject : worked out once, and kept in a hidden variable
+        text : the line, for messages
+
+        Raises
+        ------
+        InputError
+            if too many blocks are nested
+        """
         self._hidden += 1
         value = syntax.Variable(f"%subject{self._hidden}")
         self.add(syntax.Assign(place, value, subject, text, local=True))
@@ -159,7 +265,18 @@ class CodeBuilder:
         self.blocks[-1].subject, self.blocks[-1].text = value, text
 
     def case(self, place: Place, values: list[syntax.Expression] | None, text: str) -> None:
-        """``CASE values``, or ``DEFAULT`` for None."""
+        """Begin ``CASE values``, or ``DEFAULT``.
+
+        Parameters
+        ----------
+        values : the case is taken where the subject is one of them; None of ``DEFAULT``
+        text : the line, for messages
+
+        Raises
+        ------
+        InputError
+            if the innermost block is no SWITCH
+        """
         block = self._innermost("switch", place)
         assert block.subject is not None
         condition: syntax.Expression | None = None
@@ -178,7 +295,18 @@ class CodeBuilder:
             self._test(place, condition, text)
 
     def close(self, kind: str, place: Place, until: syntax.Expression | None = None, text: str = "") -> None:
-        """End of the innermost block, which must be of this kind."""
+        """End the innermost block, which must be of this kind; its open jumps lead here.
+
+        Parameters
+        ----------
+        kind : the word with which it was opened
+        until : the condition that ends a REPEAT, which needs one; of no other block
+
+        Raises
+        ------
+        InputError
+            if the innermost block is another one, or none is open
+        """
         block = self._innermost(kind, place)
         if kind == "repeat":
             assert until is not None
@@ -194,11 +322,25 @@ class CodeBuilder:
         self.blocks.pop()
 
     def leave_loop(self, place: Place) -> None:
-        """``EXIT``, ``break``."""
+        """Go on after the innermost loop: ``EXIT``, ``break``.
+
+        Raises
+        ------
+        InputError
+            if no loop is open
+        """
         self._loop(place).exits.append(self._jump(place))
 
     def next_round(self, place: Place) -> None:
-        """``continue`` of a loop with its condition at the top."""
+        """Go on with the next round of the innermost loop: ``continue``.
+
+        A counter is advanced first; a REPEAT goes on at its condition.
+
+        Raises
+        ------
+        InputError
+            if no loop is open
+        """
         loop = self._loop(place)
         if loop.kind == "repeat":
             loop.skips.append(self._jump(place))
@@ -208,11 +350,21 @@ class CodeBuilder:
         self.add(syntax.GoTo(place, loop.start))
 
     def label(self, name: str) -> None:
-        """A place to go to."""
+        """Name the next operation, so that :meth:`goto` can lead to it.
+
+        Parameters
+        ----------
+        name : within the routine; of two with one name the later one counts
+        """
         self._labels[name] = len(self.code)
 
     def goto(self, place: Place, name: str) -> None:
-        """``GOTO name``."""
+        """Go on at a label, before or after this place: ``GOTO name``.
+
+        Parameters
+        ----------
+        name : looked up when the routine is finished (:meth:`routine`), which refuses one without a label
+        """
         self._gotos.append((self._jump(place), name))
 
     def routine(self, end: Place) -> syntax.Routine:
@@ -375,7 +527,17 @@ def _case(builder: CodeBuilder, words: Words, place: Place, text: str) -> None:
 
 
 def fault(place: Place, problem: str, remedy: str) -> InputError:
-    """An error at a place of a program."""
+    """An error at a place of a program, to be raised.
+
+    Parameters
+    ----------
+    problem : what is wrong
+    remedy : how to correct it
+
+    Returns
+    -------
+    error : names the place's file, line and element
+    """
     return InputError(place.file, place.where, problem, remedy)
 
 
@@ -440,6 +602,13 @@ class _Calls:
         self.found: list[syntax.Operation] = []
 
     def out(self, expression: syntax.Expression) -> syntax.Expression:
+        """An expression without calls: each is done before, and its value read from a hidden variable.
+
+        Returns
+        -------
+        expression : calls of the program's own routines are replaced. Calls of other functions stay where they are, and
+            are also done before, for what they may change.
+        """
         if isinstance(expression, syntax.Constant | syntax.Variable):
             return expression
         expression = within(expression, self.out)
@@ -456,7 +625,16 @@ class _Calls:
 
 
 def within(expression: syntax.Expression, each: Each) -> syntax.Expression:
-    """An expression with those right below it replaced."""
+    """An expression with those right below it replaced.
+
+    Parameters
+    ----------
+    each : makes the replacement of one expression
+
+    Returns
+    -------
+    expression : a copy; one that has none below it is returned as it is
+    """
     match expression:
         case syntax.Member(of=of):
             return replace(expression, of=each(of))
@@ -478,7 +656,16 @@ def within(expression: syntax.Expression, each: Each) -> syntax.Expression:
 
 
 def mapped(operation: syntax.Operation, each: Each) -> syntax.Operation:
-    """An operation with its expressions replaced."""
+    """An operation with its expressions replaced.
+
+    Parameters
+    ----------
+    each : makes the replacement of one expression; of a target that is assigned to, only of its parts such as indices
+
+    Returns
+    -------
+    operation : a copy; one without expressions is returned as it is
+    """
     match operation:
         case syntax.Assign(target=target, value=value):
             return replace(operation, target=within(target, each), value=None if value is None else each(value))

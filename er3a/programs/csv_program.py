@@ -60,7 +60,16 @@ def write_csv(
 
 
 def joint_columns(count: int) -> tuple[str, ...]:
-    """Names of the columns of so many joints."""
+    """Names of the columns of joint angles in a table of motion.
+
+    Parameters
+    ----------
+    count : of the joints, all of which turn
+
+    Returns
+    -------
+    names : ``q1_deg``, ``q2_deg`` ...
+    """
     return tuple(f"q{i}_deg" for i in range(1, count + 1))
 
 

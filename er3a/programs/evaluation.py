@@ -75,7 +75,16 @@ class Position:
     passing: bool = False
 
     def after(self, motion: ArmMotion) -> Position:
-        """Where the arm is after a motion."""
+        """Where the arm is after a motion from here.
+
+        Parameters
+        ----------
+        motion : joints of its target that are NaN stay as they are
+
+        Returns
+        -------
+        position : of which nothing is known after a target that is not known, or a motion by an angle
+        """
         target, ends = motion.target, (motion.tool, motion.base, motion.zone.kind != "fine")
         if motion.angle is not None:  # which is not followed
             return Position()
@@ -91,7 +100,17 @@ class Position:
         return Position() if self.joints is None else Position(np.where(kept, self.joints, target.joints), None, *ends)
 
     def seen(self, tool: NamedFrame, base: NamedFrame, flange: Flange | None) -> Reals | None:
-        """T_base_tool (4, 4) for this tool and base, or None if it can't be known."""
+        """The pose of the tool in a base, for a tool and base that the program names now.
+
+        Parameters
+        ----------
+        tool, base : T_flange_tool and T_robot_base, (4, 4) in m; without a pose they are compared by name
+        flange : forward kinematics from joints (n,); None without an arm
+
+        Returns
+        -------
+        T : T_base_tool (4, 4), m; None where it can't be known
+        """
         if self.pose is not None and same(tool, self.tool) and same(base, self.base):
             return self.pose
         here = self._flange(flange)
@@ -117,7 +136,16 @@ class Position:
 
 
 def same(a: NamedFrame, b: NamedFrame) -> bool:
-    """Whether two frames have the same pose, or the same name if neither pose is known."""
+    """Whether two frames are one for a program.
+
+    Parameters
+    ----------
+    a, b : with or without a pose (4, 4)
+
+    Returns
+    -------
+    same : whether all numbers of their poses are equal; the names decide if neither pose is known
+    """
     if a.pose is not None and b.pose is not None:
         return bool(np.array_equal(a.pose, b.pose))
     return a.name == b.name and a.pose is None and b.pose is None
@@ -189,47 +217,155 @@ class Dialect(ABC):
     by_reference: bool = False
 
     def is_signal(self, name: str) -> bool:
-        """Whether an assignment to this name sets an output."""
+        """Whether an assignment to a name sets an output of the controller.
+
+        Parameters
+        ----------
+        name : full, with fields and indices
+
+        Returns
+        -------
+        signal : False for all names, unless a language says otherwise
+        """
         return False
 
     def reads_back(self, name: str) -> bool:
-        """Whether reading a variable gives the value that the program set last."""
+        """Whether reading a variable gives the value that the program set last.
+
+        Parameters
+        ----------
+        name : full, with fields and indices
+
+        Returns
+        -------
+        same : False for those that the controller changes meanwhile, such as timers
+        """
         return True
 
     def is_followed(self, name: str) -> bool:
-        """Whether the effect of setting a variable on motions is followed."""
+        """Whether it is followed how setting a variable changes motions.
+
+        Parameters
+        ----------
+        name : full, with fields and indices
+
+        Returns
+        -------
+        followed : False makes the motions from there on not followed
+        """
         return True
 
     def typed(self, kind: str, value: syntax.Value) -> syntax.Value:
-        """What a variable of a declared kind, empty for none, holds after a value is assigned to it."""
+        """What a variable holds after a value is assigned to it, by its declared type.
+
+        Parameters
+        ----------
+        kind : the type's name; empty for none
+        value : as it was assigned
+
+        Returns
+        -------
+        value : as it is, unless a language converts it
+        """
         return value
 
     def named(self, name: str) -> bool:
-        """Whether the text that is assigned to this variable is kept, as the name of a tool or base."""
+        """Whether the text that is assigned to a variable is kept, as the name of a tool or base.
+
+        Parameters
+        ----------
+        name : full, with fields and indices
+
+        Returns
+        -------
+        named : False for all names, unless a language says otherwise
+        """
         return False
 
     def constant(self, memory: ProgramMemory, name: str) -> syntax.Value | None:
-        """The value of a predefined name, such as a frame or the arm's position; None if there is none."""
+        """The value of a predefined name, such as a frame or the arm's position.
+
+        Parameters
+        ----------
+        memory : for names whose value depends on where the arm is
+        name : full, with fields and indices
+
+        Returns
+        -------
+        value : in the language's own units; None if the language has no such name
+        """
         return None
 
     def listed(self, kind: str, values: tuple[syntax.Value, ...]) -> syntax.Value:
-        """The value of ``[...]`` or ``p[...]``."""
+        """The value of a list in brackets, ``[...]`` or ``p[...]``.
+
+        Parameters
+        ----------
+        kind : the letter before the bracket; empty for a plain list
+        values : of its elements
+
+        Returns
+        -------
+        value : the values themselves, unless a language has another one
+        """
         return values
 
     def combined(self, sign: str, left: syntax.Value, right: syntax.Value) -> syntax.Value | None:
-        """A sum, product or the like of values that are no numbers; None if the language has none."""
+        """A sum, product or the like of values that are no numbers, such as frames.
+
+        Parameters
+        ----------
+        sign : the operator
+        left, right : its operands
+
+        Returns
+        -------
+        value : None if the language has no such operation
+        """
         return None
 
     @abstractmethod
     def function(self, memory: ProgramMemory, name: str, given: syntax.Invocation) -> syntax.Value:
-        """The value of a function that the program does not define."""
+        """The value of a function that the program does not define.
+
+        Parameters
+        ----------
+        memory : evaluates the arguments, and says where the arm is
+        name : as :attr:`Invocation.function` has it
+        given : the call
+
+        Returns
+        -------
+        value : in the language's own units; unclear for a function that is not known
+        """
 
     @abstractmethod
     def motion(self, memory: ProgramMemory, move: syntax.Move) -> ArmMotion:
-        """The motion from the arm's position."""
+        """The motion that a motion instruction asks for, from the arm's position.
+
+        Parameters
+        ----------
+        memory : evaluates the arguments, and holds what is set for motions
+        move : the instruction
+
+        Returns
+        -------
+        motion : in SI units; a target that is not known is an :class:`UnresolvedTarget` with the reason
+        """
 
     def carry_out(self, memory: ProgramMemory, doing: syntax.Doing) -> Instruction | None:
-        """Execute a call of a function that the program does not define; None if it only sets variables."""
+        """Carry out a call of a function that the program does not define.
+
+        Parameters
+        ----------
+        memory : is changed where the function sets something
+        doing : the call
+
+        Returns
+        -------
+        instruction : what it is in the sequence; None if it only sets variables. A function that is not known may move
+            the arm.
+        """
         return Aside(doing.text) if doing.what.function in self.harmless else Unknown(doing.text)
 
 
@@ -261,14 +397,28 @@ class ProgramMemory:
         return other
 
     def lost(self, text: str) -> None:
-        """Something that is not followed may have moved the arm and set its tool and base."""
+        """Forget where the arm is and what tool and base are, which something that is not followed may have changed.
+
+        Parameters
+        ----------
+        text : of what is not followed, for messages
+        """
         self.here = Position()
         for frame in self.functions.frames:
             self.write(frame, syntax.Unclear(text))
             self.shared.pop(f"{frame}%name", None)
 
     def read(self, name: str) -> syntax.Value | None:
-        """The value of a full name, or None."""
+        """The value of a full name.
+
+        Parameters
+        ----------
+        name : with fields and indices, such as ``XP[3].X``; a routine's own variables come first
+
+        Returns
+        -------
+        value : that of the language's constant of this name where nothing was set; None if there is none either
+        """
         if name in self.local:
             return self.local[name]
         if self.local and root(name) in self.local:  # a part that was never set, not that of a shared variable
@@ -277,7 +427,13 @@ class ProgramMemory:
         return self.functions.constant(self, name) if value is None else value
 
     def write(self, name: str, value: syntax.Value, local: bool = False) -> None:
-        """Set the value of a full name."""
+        """Set the value of a full name, without conversion.
+
+        Parameters
+        ----------
+        name : with fields and indices; fields of some variables of KRL (``WITH_FIELDS``) are set with it
+        local : whether it is the routine's own, even if the routine has no such variable yet
+        """
         self.kept.clear()
         if name in WITH_FIELDS:
             unknown = tuple((field, syntax.Unclear(f"{name}.{field}")) for field in WITH_FIELDS[name])
@@ -289,7 +445,14 @@ class ProgramMemory:
             self.shared[name] = value
 
     def declare(self, name: str, kind: str, local: bool, sizes: tuple[int, ...] = ()) -> None:
-        """The type of a variable, and sizes of a list; a parameter of a routine takes them where that declares it."""
+        """Set the type of a variable.
+
+        Parameters
+        ----------
+        kind : the type's name; a parameter's value is converted to it
+        local : whether the routine that runs declares it for itself
+        sizes : last indices of a list, one for each dimension
+        """
         if sizes:
             (self.local if local else self.shared)[name + SIZES] = sizes
         if not local:
@@ -300,7 +463,13 @@ class ProgramMemory:
             self.local[name] = self.typed(name, self.local[name])
 
     def assign(self, target: syntax.Expression, value: syntax.Value, local: bool = False) -> None:
-        """Assign a value to a variable, field or element."""
+        """Assign a value to a variable, field or element, converted to its type.
+
+        Parameters
+        ----------
+        target : where an index is not known, the whole variable becomes unclear
+        local : whether the variable is the routine's own
+        """
         if isinstance(target, syntax.Member | syntax.Element):
             of = self.value(target.of)
             changed = self._changed(of, target, value)
@@ -316,7 +485,12 @@ class ProgramMemory:
         self.write(key, self.typed(key, value, local), local)
 
     def forget(self, variable: str) -> None:
-        """Make a variable unclear, with all its fields and elements."""
+        """Make a variable unclear, with all its fields and elements.
+
+        Parameters
+        ----------
+        variable : its name without fields and indices; the cell's frames of that name become unclear too
+        """
         self.kept.clear()
         for values, more in ((self.local, ()), (self.shared, self.cell.frames)):
             for name in [each for each in (*values, *more) if root(each) == variable]:
@@ -353,7 +527,17 @@ class ProgramMemory:
         return None if place is None or place % 1 or place < 0 else int(place)
 
     def key(self, target: syntax.Expression) -> str | None:
-        """The full name of a variable, field or element; None for others, or if an index is unclear."""
+        """The full name of a variable, field or element, as values are kept under it.
+
+        Parameters
+        ----------
+        target : its indices are evaluated
+
+        Returns
+        -------
+        name : such as ``XP[3].X``; None for other expressions, and where an index is unclear or beyond the list's
+            declaration
+        """
         match target:
             case syntax.Variable(name=name):
                 return name
@@ -369,9 +553,16 @@ class ProgramMemory:
         return None
 
     def outside(self, target: syntax.Expression) -> str:
-        """The element in a target that its list's declaration has not, as text; empty for none.
+        """The element in a target that its list's declaration has not.
 
-        One whose frame is given to the check counts as declared.
+        Parameters
+        ----------
+        target : indices count from 1
+
+        Returns
+        -------
+        element : as text, with the declared sizes; empty for none. One whose frame is given to the check counts as
+            declared.
         """
         while isinstance(target, (syntax.Member, syntax.Element)):
             if isinstance(target, syntax.Element) and isinstance(target.of, syntax.Variable):
@@ -387,7 +578,16 @@ class ProgramMemory:
         return ""
 
     def value(self, expression: syntax.Expression) -> syntax.Value:
-        """The value of an expression."""
+        """The value of an expression, in the language's own units.
+
+        Parameters
+        ----------
+        expression : calls of the program's own routines are not in it any more
+
+        Returns
+        -------
+        value : :class:`~er3a.programs.syntax.Unclear` where anything that it needs is unclear
+        """
         match expression:
             case syntax.Constant(value=value):
                 return value
@@ -423,7 +623,16 @@ class ProgramMemory:
         return syntax.Unclear(self.shown(expression)) if found is None else found
 
     def shown(self, target: syntax.Expression) -> str:
-        """A variable, field or element as text, with indices that are not known by their variables."""
+        """A variable, field or element as text, for messages.
+
+        Parameters
+        ----------
+        target : its indices are shown by their values, or by their variables where these are not known
+
+        Returns
+        -------
+        text : ``?`` for other expressions
+        """
         match target:
             case syntax.Variable(name=name):
                 return name
@@ -436,7 +645,18 @@ class ProgramMemory:
         return "?"
 
     def typed(self, key: str, value: syntax.Value, local: bool = False) -> syntax.Value:
-        """A value as the type of the variable is that it is assigned to."""
+        """A value as the type of the variable is that it is assigned to.
+
+        Parameters
+        ----------
+        key : the variable's full name
+        local : whether it is the routine's own
+
+        Returns
+        -------
+        value : a whole number for ``INT`` and its like, rounded from x.5 on to x + 1 as in KRL. It is unclear where the
+            language does not document its conversion.
+        """
         name = root(key)
         own = local or name in self.local
         kind = str(self.local.get(f"{name}%type", "")) if own else self.types.get(name, "")
@@ -495,7 +715,16 @@ NOT_NUMBERS = ("NAN", "INF", "INFINITY")
 
 
 def evaluated(function: Callable[..., float], values: Sequence[syntax.Value | None]) -> syntax.Value | None:
-    """A mathematical function of numbers; None of other values, and where it has none."""
+    """A mathematical function of numbers.
+
+    Parameters
+    ----------
+    values : its arguments, of any kind
+
+    Returns
+    -------
+    value : None where an argument is no number, and where the function has no value
+    """
     plain = syntax.numbers(tuple(values))
     try:
         return None if plain is None else function(*plain)
@@ -504,19 +733,47 @@ def evaluated(function: Callable[..., float], values: Sequence[syntax.Value | No
 
 
 def unresolved(value: syntax.Unclear, text: str = "") -> UnresolvedTarget:
-    """A target that is made of an unclear value; ``text``: what it is called where that has no text of its own."""
+    """A target that is made of an unclear value.
+
+    Parameters
+    ----------
+    text : what it is called where the value has no text of its own
+
+    Returns
+    -------
+    target : its reason is ``not_finite`` for NAN and INF as a text, else ``undefined``
+    """
     is_number = value.text.upper().lstrip("+-") in NOT_NUMBERS
     return UnresolvedTarget(value.text or text, "not_finite" if is_number else "undefined")
 
 
 def known(found: syntax.Value | None, name: str) -> syntax.Value:
-    """The value of a name; unclear if it has none."""
+    """The value that was found for a name, or an unclear one.
+
+    Parameters
+    ----------
+    found : None, or :class:`Unset`, where nothing was assigned to it
+    name : for messages
+
+    Returns
+    -------
+    value : unclear by this name where nothing was found
+    """
     return syntax.Unclear(name) if found is None or isinstance(found, syntax.Unset) else found
 
 
 @cache
 def root(name: str) -> str:
-    """The variable of a full name: ``XP`` of ``XP[3]`` and ``XP.X``."""
+    """The variable of a full name.
+
+    Parameters
+    ----------
+    name : with fields and indices
+
+    Returns
+    -------
+    variable : ``XP`` of ``XP[3]`` and ``XP.X``
+    """
     dot, bracket = name.find("."), name.find("[")
     ends = [at for at in (dot, bracket) if at > 0]
     return name[: min(ends)] if ends else name
@@ -558,7 +815,16 @@ def _unary(sign: str, value: syntax.Value) -> syntax.Value:
 
 
 def variable_of(target: syntax.Expression | None) -> str:
-    """The variable that an assignment changes."""
+    """The variable that an assignment changes.
+
+    Parameters
+    ----------
+    target : a variable, or a field or element of one, however deep
+
+    Returns
+    -------
+    name : empty for any other expression
+    """
     while isinstance(target, (syntax.Member, syntax.Element)):
         target = target.of
     return target.name if isinstance(target, syntax.Variable) else ""

@@ -18,7 +18,9 @@ class Moved(Protocol):
     """A motion that was solved; ``end``: joints (n,), rad or m, where it leaves the arm; None if not known."""
 
     @property
-    def end(self) -> Reals | None: ...
+    def end(self) -> Reals | None:
+        """Joints (n,), rad or m, where the motion leaves the arm; None where that is not known."""
+        ...
 
 
 Mover = Callable[[ArmMotion, "Reals | None"], Moved]
@@ -118,12 +120,26 @@ class Execution(ByValue):
         return tuple(i for i, step in enumerate(self.steps) if isinstance(step.instruction, ArmMotion))
 
     def own_line(self, step: Step) -> int:
-        """The line of the program's own file at which a step is met: the call's if it is in another module."""
+        """The line of the program's own file at which a step is met.
+
+        Returns
+        -------
+        line : from 1; of a step in another module, that of the innermost call in the own file
+        """
         chain = (*step.calls, step.place)
         return next((place.line for place in reversed(chain) if place.file == self.program.file), step.place.line)
 
     def way(self, ending: Ending) -> tuple[int, ...]:
-        """Numbers of the steps of a way, from the first."""
+        """The steps of one way through the program.
+
+        Parameters
+        ----------
+        ending : with which the way ends
+
+        Returns
+        -------
+        numbers : of the steps, from the first on
+        """
         found = []
         at = ending.step
         while at >= 0:
@@ -140,12 +156,31 @@ class Execution(ByValue):
         return max(own or self.endings, key=lambda ending: moves[ending.step])
 
     def round_from(self, ending: Ending) -> int | None:
-        """Number of the step from which a way repeats itself for ever; None if it does not."""
+        """The step from which a way repeats itself for ever.
+
+        Parameters
+        ----------
+        ending : with which the way ends
+
+        Returns
+        -------
+        number : of the step; None if the way does not repeat, or only another way's steps
+        """
         again = ending.repeats_from
         return again if again is not None and again in self.way(ending) else None
 
     def listing(self, ending: Ending | None = None) -> Listing:
-        """A way as a sequence without branches, to be written; by default :meth:`main`."""
+        """A way as a sequence without branches, to be written.
+
+        Parameters
+        ----------
+        ending : with which the way ends; by default that of :meth:`main`
+
+        Returns
+        -------
+        listing : without decisions, which are only counted; ``repeats_from`` is the first instruction of what is
+            repeated for ever. A round that the way shows twice is kept once.
+        """
         ending = ending or self.main()
         way = self.way(ending)
         again = self.round_from(ending)

@@ -112,7 +112,14 @@ class _Making:
         self.halts: dict[int, float] = {}
 
     def joints(self, points: Reals, times: Reals, zones: list[instructions.Zone]) -> None:
-        """Joint motions to points (k, n)."""
+        """Add joint motions to points.
+
+        Parameters
+        ----------
+        points : (k, n), rad
+        times : (k,), s, of each motion
+        zones : (k) of them; a point at which a timed table rests is a stop
+        """
         for i, (point, seconds, zone) in enumerate(zip(points, times, zones)):
             blend = instructions.FINE if i in self.halts else zone
             self.found.append(
@@ -121,7 +128,16 @@ class _Making:
             self._rest(i)
 
     def sizes(self, parts: tuple[commands.SegmentCommand, ...]) -> Reals:
-        """Lengths of segments (m), where a turn counts too."""
+        """Lengths of segments, as a measure of their times.
+
+        Parameters
+        ----------
+        parts : (k) of them, one after another from where the tool is
+
+        Returns
+        -------
+        lengths : (k,), m, straight between the ends; at least ``TURN_LENGTH`` for each rad of the tool's turn
+        """
         found, pose = [], self.pose
         for part in parts:
             end = self.to_robot @ part.end
@@ -133,7 +149,14 @@ class _Making:
     def segments(
         self, parts: tuple[commands.SegmentCommand, ...], timing: float | LegTimes | Reals, ends: Reals | None
     ) -> None:
-        """Lines and arcs; ``timing`` in all, or of each."""
+        """Add lines and arcs.
+
+        Parameters
+        ----------
+        parts : (k) of them, poses in the world frame, m
+        timing : s, of all together, of the parts of a leg, or (k,) of each
+        ends : (k, n), rad, joints at the end of each; None where they are not known
+        """
         times = timing if isinstance(timing, np.ndarray) else _shared(self.sizes(parts), timing)
         for i, part in enumerate(parts):
             end = self.to_robot @ part.end

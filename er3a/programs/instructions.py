@@ -324,7 +324,16 @@ class Listing:
 
 
 def alike(a: object, b: object) -> bool:
-    """Whether two instructions, or parts of them, are the same in all numbers."""
+    """Whether two instructions, or parts of them, are the same in all numbers.
+
+    Parameters
+    ----------
+    a, b : dataclasses, arrays or plain values; fields that do not count for equality are passed over
+
+    Returns
+    -------
+    alike : NaN equals NaN here
+    """
     if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
         return isinstance(a, np.ndarray) and isinstance(b, np.ndarray) and np.array_equal(a, b, equal_nan=True)
     if is_dataclass(a) and type(a) is type(b):
@@ -333,7 +342,16 @@ def alike(a: object, b: object) -> bool:
 
 
 def motions_of(instructions: Iterable[Instruction]) -> Iterable[ArmMotion]:
-    """The motions among instructions."""
+    """The motions among instructions.
+
+    Parameters
+    ----------
+    instructions : in any order
+
+    Returns
+    -------
+    motions : in the same order, made as they are asked for
+    """
     return (each for each in instructions if isinstance(each, ArmMotion))
 
 
@@ -368,7 +386,18 @@ def arc_poses(start: Reals, via: Reals, end: Reals, shares: Reals) -> Reals | No
 
 
 def centre_and_angle(start: Reals, via: Reals, end: Reals) -> tuple[Reals, Reals, float] | None:
-    """Centre (3,), unit normal (3,) and angle (rad, 0 to a full turn) of the arc through three points (3,)."""
+    """The circle through three points, from the first by the second to the third.
+
+    Parameters
+    ----------
+    start, via, end : (3,), m
+
+    Returns
+    -------
+    centre : (3,), m
+    normal : (3,), unit vector, about which the arc turns by the right-hand rule
+    angle : rad, 0 to a full turn. None for all three where the points are on a line, to ``ON_A_LINE``.
+    """
     a, b = via - start, end - start
     normal = np.cross(a, b)
     size = float(np.linalg.norm(normal))
@@ -383,7 +412,17 @@ def centre_and_angle(start: Reals, via: Reals, end: Reals) -> tuple[Reals, Reals
 
 
 def chords(start: Reals, via: Reals, end: Reals, deviation: float) -> Reals | None:
-    """Poses (n, 4, 4) after the start, lines between which stay within ``deviation`` (m) of the arc."""
+    """Lines in place of an arc.
+
+    Parameters
+    ----------
+    start, via, end : poses (4, 4), m
+    deviation : m, within which the lines stay of the arc
+
+    Returns
+    -------
+    poses : (n, 4, 4), after the start; at most ``MAX_LINES``, the last is the end. None where the points are on a line.
+    """
     circle = centre_and_angle(start[:3, 3], via[:3, 3], end[:3, 3])
     if circle is None:
         return None
@@ -398,7 +437,16 @@ def chords(start: Reals, via: Reals, end: Reals, deviation: float) -> Reals | No
 
 
 def arc_length(start: Reals, via: Reals, end: Reals) -> float | None:
-    """Length of the arc, m."""
+    """Length of the arc from a pose through a point to another.
+
+    Parameters
+    ----------
+    start, via, end : poses (4, 4), m, of which only the positions count
+
+    Returns
+    -------
+    length : m; None where the points are on a line
+    """
     circle = centre_and_angle(start[:3, 3], via[:3, 3], end[:3, 3])
     if circle is None:
         return None
@@ -430,7 +478,17 @@ def pose_of(numbers: Sequence[float], convention: Convention) -> Reals:
 
 
 def numbers_of(T: Reals, convention: Convention) -> tuple[float, ...]:
-    """Six (ABB: seven) numbers of a transform (4, 4) in m."""
+    """The numbers by which a controller writes a pose; the inverse of :func:`pose_of`.
+
+    Parameters
+    ----------
+    T : (4, 4), m
+    convention : of the table at the head of this module
+
+    Returns
+    -------
+    numbers : six, or seven for ``abb``, whose quaternion has its first number at least 0
+    """
     xyz = T[:3, 3] if convention == "ur" else T[:3, 3] * MM
     if convention in ("kuka", "efort"):
         turned = np.degrees(rpy_of(T))[::-1]

@@ -85,7 +85,13 @@ def language_of(source: ProgramText) -> LanguageName:
 def files_of(path: Path) -> tuple[Path, ...]:
     """A program's file and those that belong to it: modules that it calls, points, the controller's own data.
 
-    Of one that is in none of the languages no others are known.
+    Parameters
+    ----------
+    path : of the program
+
+    Returns
+    -------
+    files : the program's first; it alone if its text is in none of the languages
     """
     try:
         return (path, *LANGUAGES[language_of(read_program_text(path))].companions(path))
@@ -124,7 +130,16 @@ def write_program(listing: Listing, language: LanguageName, options: WriteOption
 
 
 def not_written(language: LanguageName, robot: Robot) -> str:
-    """Why a language has no joint targets for an arm; empty if it has. A table holds any joints."""
+    """Why a language has no joint targets for an arm.
+
+    Parameters
+    ----------
+    language : one of those registered; a table (CSV) holds any joints
+
+    Returns
+    -------
+    reason : in words, such as too many joints, or one that slides; empty if it has
+    """
     if LANGUAGES[language].joints is not None and robot.slides.any():
         slide = int(robot.slides.argmax()) + 1
         return f"joint {slide} of this arm slides, and joint targets are read and written as angles"
@@ -132,7 +147,16 @@ def not_written(language: LanguageName, robot: Robot) -> str:
 
 
 def titles_unwritten(languages: Iterable[LanguageName], robot: Robot) -> list[str]:
-    """Titles of those languages that have no joint targets for an arm."""
+    """Titles of those languages that have no joint targets for an arm.
+
+    Parameters
+    ----------
+    languages : by their short names
+
+    Returns
+    -------
+    titles : as people write them, such as ``KRL``, in the order given
+    """
     return [LANGUAGES[each].title for each in languages if not_written(each, robot)]
 
 

@@ -88,14 +88,33 @@ class Words:
         return word
 
     def accept(self, word: str) -> bool:
-        """Pass the next word if it is this one."""
+        """Pass the next word if it is this one.
+
+        Parameters
+        ----------
+        word : in capital letters where the language does not care; an empty one is never accepted
+
+        Returns
+        -------
+        passed : whether it was there; a quoted text is no word
+        """
         if word and self.texts[self.at] == word and self.kinds[self.at] != "text":
             self.at += 1
             return True
         return False
 
     def expect(self, word: str) -> None:
-        """Pass the next word, which must be this one."""
+        """Pass the next word, which must be this one.
+
+        Parameters
+        ----------
+        word : in capital letters where the language does not care
+
+        Raises
+        ------
+        MisreadError
+            if it is another one
+        """
         if not self.accept(word):
             raise MisreadError(f"'{word}' expected before '{self.next}'")
 
@@ -111,7 +130,21 @@ class Words:
             raise MisreadError(f"'{self.next}' not expected")
 
     def condition(self, end: str = "") -> Expression:
-        """A condition up to a word, which may be missing, and the end; one that is not understood is kept."""
+        """A condition, which goes up to the end of the statement.
+
+        Parameters
+        ----------
+        end : a word that may follow it, such as ``THEN``
+
+        Returns
+        -------
+        condition : :class:`Opaque` with its text if it is not understood
+
+        Raises
+        ------
+        MoreError
+            if another statement follows on the line
+        """
         start = self.at
         try:
             found = self.expression()
@@ -125,7 +158,21 @@ class Words:
         return found
 
     def expression(self, rank: int = 1) -> Expression:
-        """An expression whose operators have this rank or a higher one."""
+        """An expression, by the ranks of the language's operators.
+
+        Parameters
+        ----------
+        rank : the lowest of the operators that belong to it
+
+        Returns
+        -------
+        expression : operators of one rank bind from left to right
+
+        Raises
+        ------
+        MisreadError
+            if no expression begins here, or it is nested too deeply or too long
+        """
         self._depth += 1
         if self._depth > DEEPEST:
             raise MisreadError("nested too deeply")
@@ -141,7 +188,22 @@ class Words:
         return found
 
     def arguments(self, close: str = ")") -> tuple[tuple[Expression | None, ...], tuple[tuple[str, Expression], ...]]:
-        """Arguments up to the closing bracket, by place and by name; an empty place is None."""
+        """Arguments of a call up to the closing bracket, which is passed.
+
+        Parameters
+        ----------
+        close : the bracket
+
+        Returns
+        -------
+        placed : by place; None for an empty place
+        named : pairs of name and expression, in languages in which ``=`` is no operator
+
+        Raises
+        ------
+        MisreadError
+            if the bracket is missing, or a name is given twice
+        """
         placed: list[Expression | None] = []
         named: list[tuple[str, Expression]] = []
         named_next = "=" not in self.lexicon.ranks
@@ -172,7 +234,21 @@ class Words:
         return self.parts_of(Variable(name)) if value is None else Constant(value)
 
     def parts_of(self, found: Expression) -> Expression:
-        """An expression with the fields, indices and arguments after it."""
+        """An expression with the fields, indices and arguments after it.
+
+        Parameters
+        ----------
+        found : what was read before them
+
+        Returns
+        -------
+        expression : such as ``a.b[3](x)``
+
+        Raises
+        ------
+        MisreadError
+            if what follows a point is no name, or a bracket is not closed
+        """
         while self.kind == "mark":
             if self.accept("."):
                 found = Member(found, self.name())
@@ -215,7 +291,16 @@ class Words:
 
 
 def as_number(text: str) -> int | float:
-    """A number: whole if it is written without point and exponent."""
+    """The value of a number as it is written.
+
+    Parameters
+    ----------
+    text : decimal, or ``0x``, ``0o``, ``0b`` and digits
+
+    Returns
+    -------
+    value : whole if it is written without point and exponent, and has fewer than 19 digits
+    """
     if text.isascii() and text.isdigit():
         return int(text) if len(text) < 19 else float(text)
     if text[:1] == "0" and text[1:2].lower() in ("x", "o", "b"):
@@ -224,7 +309,21 @@ def as_number(text: str) -> int | float:
 
 
 def dotted(expression: Expression) -> str:
-    """The text of a name with fields, such as ``tcpip.sockopen``."""
+    """The text of a name with fields, as that of a function.
+
+    Parameters
+    ----------
+    expression : such as ``tcpip.sockopen`` or ``a[3].f``
+
+    Returns
+    -------
+    name : with ``[]`` in place of indices and ``()`` in place of arguments
+
+    Raises
+    ------
+    MisreadError
+        for an expression that is no name
+    """
     match expression:
         case Variable(name=name):
             return name
@@ -292,9 +391,17 @@ def read_program_text(path: Path) -> ProgramText:
 
 
 def data_file_of(path: Path, suffix: str) -> Path | None:
-    """The file with the same name and another suffix beside a file, however the letters of both are written.
+    """The file with the same name and another suffix in the folder of a file, however the letters of both are written.
 
     Controllers take ``HOME.src`` and ``home.dat`` for one module. One that is written as the file itself comes first.
+
+    Parameters
+    ----------
+    suffix : in small letters, such as ``.dat``
+
+    Returns
+    -------
+    path : None if there is none
     """
     for name in (path.stem + suffix, path.stem + suffix.upper(), path.stem + suffix.capitalize()):
         beside = path.with_name(name)

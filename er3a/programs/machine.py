@@ -86,7 +86,13 @@ class Way:
         return Way(frames, memory, self.entry, self.step, self.decisions, dict(self.visits))
 
     def widen(self, others: tuple[Values, ...], here: tuple[bytes, ...]) -> None:
-        """Make unknown what differs from other values, and another position."""
+        """Make unknown what differs between this way and another in the same place, so that one can go on for both.
+
+        Parameters
+        ----------
+        others : values of the other way, of the program and of each routine that runs
+        here : the key of the other's position; the arm's position is forgotten if they differ
+        """
         self.memory.kept.clear()
         for own, other in zip(self.values, others):
             for name in own.keys() | other.keys():

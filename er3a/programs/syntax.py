@@ -49,14 +49,32 @@ class Record:
         return self._hash[0]
 
     def get(self, name: str) -> Value | None:
-        """The value of a name, or None."""
+        """The value of a field.
+
+        Parameters
+        ----------
+        name : of the field
+
+        Returns
+        -------
+        value : in the language's own units; None if the record has no such field
+        """
         for key, value in self.items:
             if key == name:
                 return value
         return None
 
     def having(self, name: str, value: Value) -> Record:
-        """A copy with another value."""
+        """A copy with another value in one field.
+
+        Parameters
+        ----------
+        name : of the field; one that the record does not have is added as the last
+
+        Returns
+        -------
+        record : of the same kind
+        """
         if self.get(name) is None:
             return Record(self.kind, (*self.items, (name, value)))
         return Record(self.kind, tuple((key, value if key == name else old) for key, old in self.items))
@@ -70,25 +88,61 @@ Value = float | int | bool | str | Unclear | Record | tuple["Value", ...]
 
 
 def number(value: Value | None) -> float | None:
-    """A number, or None for anything else (a truth value is none)."""
+    """A value as a number.
+
+    Parameters
+    ----------
+    value : of any kind
+
+    Returns
+    -------
+    number : None for anything else, truth values too
+    """
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return None
     return float(value)
 
 
 def numbers(values: tuple[Value | None, ...]) -> tuple[float, ...] | None:
-    """All as numbers, or None if one is none."""
+    """Values as numbers.
+
+    Parameters
+    ----------
+    values : of any kinds
+
+    Returns
+    -------
+    numbers : as many; None if one of them is no number
+    """
     found = [number(value) for value in values]
     return tuple(value for value in found if value is not None) if None not in found else None
 
 
 def finite(values: tuple[float, ...]) -> bool:
-    """Whether no number is NaN or infinite."""
+    """Whether no number is NaN or infinite.
+
+    Parameters
+    ----------
+    values : plain numbers, any count
+
+    Returns
+    -------
+    finite : True for none at all
+    """
     return all(map(math.isfinite, values))
 
 
 def shown(value: Value) -> str:
-    """A value as text, for messages."""
+    """A value as text, for messages.
+
+    Parameters
+    ----------
+    value : an unclear one is shown by what it was read from
+
+    Returns
+    -------
+    text : numbers with up to six digits, records as ``KIND{X 1, Y 2}``, lists in brackets
+    """
     match value:
         case Unclear(text=text):
             return text
@@ -105,7 +159,18 @@ def shown(value: Value) -> str:
 
 
 def rate_of(value: Value | None, unit: RateUnit, per_unit: float = 1.0) -> Rate | None:
-    """The rate that a program gives by a value, of which ``per_unit`` make one unit; None without a value."""
+    """The speed or acceleration that a program gives by a value.
+
+    Parameters
+    ----------
+    value : in the language's own unit
+    unit : SI unit of the rate
+    per_unit : how many of the language's units make one of these, such as 1000 for mm/s and m/s
+
+    Returns
+    -------
+    rate : None without a value; one with value 0 and a text where the value is no positive number
+    """
     plain = number(value)
     if value is None or (plain is not None and plain > 0 and math.isfinite(plain)):
         return None if plain is None else Rate(plain / per_unit, unit)
@@ -376,7 +441,16 @@ class Program(ByValue):
 
 
 def inner(expression: Expression | None) -> tuple[Expression, ...]:
-    """The expressions right below one."""
+    """The expressions right below one.
+
+    Parameters
+    ----------
+    expression : None has none
+
+    Returns
+    -------
+    expressions : operands, indices, arguments or elements, in the order of the text
+    """
     match expression:
         case Member(of=of) | Unary(of=of):
             return (of,)
@@ -395,7 +469,16 @@ def inner(expression: Expression | None) -> tuple[Expression, ...]:
 
 
 def expressions_of(operation: Operation) -> tuple[Expression, ...]:
-    """The expressions that an operation evaluates."""
+    """The expressions that an operation evaluates.
+
+    Parameters
+    ----------
+    operation : jumps and fixed instructions evaluate none
+
+    Returns
+    -------
+    expressions : the outermost ones; for an assignment its target too
+    """
     match operation:
         case Assign(target=target, value=value):
             found: tuple[Expression | None, ...] = (target, value)

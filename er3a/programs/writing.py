@@ -84,7 +84,17 @@ class Resolver:
         self._solved: list[Reals | None] = []
 
     def ready(self, motion: instructions.ArmMotion) -> ReadyMotion:
-        """A motion with its start and end; the arm is at its end then."""
+        """A motion with its start and end; the arm is at its end then.
+
+        Parameters
+        ----------
+        motion : the next of the sequence
+
+        Returns
+        -------
+        ready : poses in the motion's base for its tool, m; None where they can't be known. Joints are solved only when
+            they are asked for.
+        """
         frames = (motion.tool, motion.base)
         pose_before = self._pose_in(frames)
         number = len(self.motions)
@@ -104,7 +114,17 @@ class Resolver:
         return ready
 
     def joints_after(self, number: int) -> Reals | None:
-        """Joints (n,) in rad after a motion; -1 for the start."""
+        """Joints after a motion of the sequence.
+
+        Parameters
+        ----------
+        number : of the motion, from 0; -1 for the start
+
+        Returns
+        -------
+        q : (n,), rad; None where they are not known. Motions before it are solved first, because they decide the
+            branch.
+        """
         if number < 0:
             return self.start
         motion, _ = self.motions[number]
@@ -207,7 +227,17 @@ def solutions_meant(branch: instructions.MeantSolution, robot: Robot, rows: Real
 
 
 def with_default_frames(instruction: instructions.Instruction, robot: Robot | None) -> instructions.Instruction:
-    """A motion whose tool or base is not given at all, with the robot's own tool and base."""
+    """A motion whose tool or base is not given at all, with the robot's own tool and base.
+
+    Parameters
+    ----------
+    instruction : any but a motion is returned as it is
+    robot : its tool is T_flange_tool; without a robot nothing is filled in
+
+    Returns
+    -------
+    instruction : the base that is filled in is the robot's own, T_robot_base the identity
+    """
     if not isinstance(instruction, instructions.ArmMotion) or robot is None:
         return instruction
     tool, base = instruction.tool, instruction.base
@@ -341,22 +371,53 @@ class Writer(ABC):
 
     @abstractmethod
     def files(self, head: list[str]) -> dict[str, str]:
-        """The files' texts by suffix."""
+        """The texts of all files of the program, from the lines written so far.
+
+        Parameters
+        ----------
+        head : lines for the head, without the signs of a comment
+
+        Returns
+        -------
+        files : text by suffix, such as ``.src``
+        """
 
     @abstractmethod
     def motion(self, ready: ReadyMotion) -> None:
-        """A motion."""
+        """Write a motion, and before it what has to be set for it.
+
+        Parameters
+        ----------
+        ready : with poses in m and joints in rad, as far as they are known; one that can't be written is left out by
+            :meth:`omit`
+        """
 
     @abstractmethod
     def output(self, output: instructions.Output) -> None:
-        """A signal in this language."""
+        """Write that a signal is set.
+
+        Parameters
+        ----------
+        output : read from a program in this language
+        """
 
     def line(self, text: str) -> None:
-        """A line of the program."""
+        """Add a line to the program.
+
+        Parameters
+        ----------
+        text : indented here
+        """
         self.lines.append(self.indent + text)
 
     def set_once(self, key: str, line: str) -> None:
-        """A line that sets something, unless it is set so already."""
+        """Add a line that sets something, unless it is set so already.
+
+        Parameters
+        ----------
+        key : what it sets
+        line : complete but for the indent; the same line with the same key is not repeated, except within a new loop
+        """
         if self.settings.get(key) != line:
             self.settings[key] = line
             self.line(line)
@@ -371,11 +432,21 @@ class Writer(ABC):
         self.line(self.loop[1])
 
     def comment(self, text: str) -> None:
-        """A comment of one line."""
+        """Add a comment of one line.
+
+        Parameters
+        ----------
+        text : letters other than ASCII's are written as escapes, for controllers read no others
+        """
         self.line(f"{self.remark} {ascii_text(text)}")
 
     def pause(self, pause: instructions.Pause) -> None:
-        """A wait for a time, for the operator, or for a condition in this language."""
+        """Write a wait: for a time, for the operator, or for a condition.
+
+        Parameters
+        ----------
+        pause : seconds, or a condition in this language; neither for the operator
+        """
         seconds, operator, condition = self.wait
         if pause.seconds is not None:
             self.line(seconds.format(short(pause.seconds)))
@@ -385,22 +456,47 @@ class Writer(ABC):
             self.line(operator)
 
     def verbatim(self, text: str) -> None:
-        """Text of this language."""
+        """Add text of this language as a line.
+
+        Parameters
+        ----------
+        text : without what ends a line
+        """
         self.line(text + self.ends)
 
     def set_load(self, load: MassBody | None) -> None:
-        """What hangs on the flange from here; None for what is not known. A language without a word for it names it."""
+        """Write what hangs on the flange from here on.
+
+        Parameters
+        ----------
+        load : kg, m, kg m^2, in the flange's frame; None for what is not known. A language without a word for it names
+            the load as one to be set on the controller.
+        """
         if load is not None:
             self.name_tool(f"a load of {load.mass:g} kg")
 
     def omit(self, motion: instructions.ArmMotion) -> None:
-        """A motion whose target can't be written."""
+        """Leave out a motion whose target can't be written; a comment names it, and it is counted for a finding.
+
+        Parameters
+        ----------
+        motion : with a target that is not known, or that needs the arm's table
+        """
         self.count["left out"] += 1
         text = getattr(motion.target, "text", "") or "a target that needs the arm's table"
         self.comment(f"left out: {motion.form or motion.kind} {text}")
 
     def share(self, ready: ReadyMotion) -> float | None:
-        """The speed of a joint motion as a share of the maximum, 1 at most; None if the program's is not known."""
+        """The speed of a joint motion as a share of the greatest.
+
+        Returns
+        -------
+        share : at most 1, what is above is counted as cut; None if the program's speed is not known
+
+        Notes
+        -----
+        Where nobody states a joint's greatest speed, the share is of an assumed one, which becomes a finding.
+        """
         share = self._share_asked(ready)
         if share is None:
             return None
@@ -423,7 +519,13 @@ class Writer(ABC):
         return float(moved[lead] / self._greatest_speed(lead) / seconds)
 
     def leading_joint_speed(self, ready: ReadyMotion) -> float | None:
-        """The speed of a joint motion as that of the joint that moves most, rad/s; the mean one where it has a time."""
+        """The speed of a joint motion as that of the joint that moves most.
+
+        Returns
+        -------
+        speed : rad/s; the mean one if the program gives a time. None if the program gives neither a share, a joint
+            speed nor a time, or the motion's ends are needed and not known.
+        """
         speed = ready.motion.speed
         if speed is None or speed.value <= 0 or speed.unit not in ("share", "rad/s", "s"):
             return None
@@ -453,7 +555,12 @@ class Writer(ABC):
         return speed
 
     def name_tool(self, name: str) -> None:
-        """A tool that is known by its name alone."""
+        """Name a tool, base or load that has to be set on the controller; it becomes a finding, once.
+
+        Parameters
+        ----------
+        name : by which the program knows it
+        """
         if name not in self.tools:
             self.tools.append(name)
 
@@ -562,7 +669,16 @@ HEADS = {
 
 
 def head_line(finding: program_findings.WriteFinding) -> str:
-    """A finding as a line of a file's head."""
+    """A finding as a line of a file's head, which a controller reads.
+
+    Parameters
+    ----------
+    finding : what the language could not hold, or what was assumed
+
+    Returns
+    -------
+    line : plain ASCII, in English
+    """
     values = {each.name: getattr(finding, each.name) for each in fields(finding)}
     values["mm"] = 1000 * values.get("deviation_m", 0.0)
     return ascii_text(HEADS[finding.code].format(**values))
@@ -572,7 +688,13 @@ HEAD_LINE = re.compile(rf"(?m)^(<rem>\n<text>|[ ]*(?:;|#|!|\(\*) ){HEAD}.*?(</te
 
 
 def with_head_lines(text: str, lines: Iterable[str]) -> str:
-    """The text of a written file with further lines at the beginning of its head; one without a head as it is."""
+    """The text of a written file with further lines at the beginning of its head.
+
+    Parameters
+    ----------
+    text : as a writer made it; one without a head is returned as it is
+    lines : without the signs of a comment, which are those of the first line of the head
+    """
     first = HEAD_LINE.search(text)
     if first is None:
         return text
@@ -582,36 +704,93 @@ def with_head_lines(text: str, lines: Iterable[str]) -> str:
 
 
 def program_name(name: str, longest: int) -> str:
-    """A name that every controller takes: letters, digits and underscores, a letter first."""
+    """A name that every controller takes.
+
+    Parameters
+    ----------
+    name : any text
+    longest : letters that the name may have
+
+    Returns
+    -------
+    name : ASCII letters, digits and underscores, a letter first, and no word that one of the languages reserves
+    """
     plain = re.sub(r"[^A-Za-z0-9_]+", "_", name).strip("_") or "program"
     taken = not plain[0].isalpha() or plain.lower() in RESERVED
     return (f"p{plain}" if taken else plain)[:longest]
 
 
 def ascii_text(text: str) -> str:
-    """Text without other letters than ASCII's, and in one line."""
+    r"""Text in one line, for controllers that read ASCII only.
+
+    Parameters
+    ----------
+    text : in any language
+
+    Returns
+    -------
+    text : other letters as escapes (``\u00e4``), blanks and line ends as single spaces
+    """
     return " ".join(text.encode("ascii", "backslashreplace").decode().split())
 
 
 def fixed(value: float, digits: int) -> str:
-    """A number with so many digits after the point, never -0."""
+    """A number as text with a fixed number of decimals.
+
+    Parameters
+    ----------
+    digits : after the point
+
+    Returns
+    -------
+    text : rounded; never ``-0``
+    """
     return f"{round(value, digits) + 0.0:.{digits}f}"
 
 
 def short(value: float, digits: int = 6) -> str:
-    """A number with up to so many digits after the point, at least one."""
+    """A number as text without needless zeros.
+
+    Parameters
+    ----------
+    digits : after the point, at most
+
+    Returns
+    -------
+    text : with at least one digit after the point, such as ``1.0``
+    """
     text = fixed(value, digits).rstrip("0")
     return text + "0" if text.endswith(".") else text
 
 
 def cut(value: float, digits: int = 6) -> str:
-    """The same, never more than the number: a zone of half a motion must not become larger than that."""
+    """A number as text, rounded down: a zone of half a motion must not become larger than that.
+
+    Parameters
+    ----------
+    value : at least 0
+    digits : after the point, at most
+
+    Returns
+    -------
+    text : as of :func:`short`; 1e-12 of the number above a digit is taken for rounding noise
+    """
     size: float = 10.0**digits
     return short(math.floor(value * size * (1 + 1e-12)) / size, digits)
 
 
 def principal_axes(load: MassBody) -> tuple[Reals, Reals]:
-    """The axes of a load as a pose (4, 4), m, in the flange's frame, and its moments (3,) about them, kg m^2."""
+    """The principal axes of a load, and its moments about them.
+
+    Parameters
+    ----------
+    load : inertia about its centre of mass, kg m^2, in the flange's axes
+
+    Returns
+    -------
+    pose : (4, 4), m, of the axes at the centre of mass, in the flange's frame; right-handed
+    moments : (3,), kg m^2, by the eigenvectors of the inertia; as they are given if there are no products of inertia
+    """
     moments, axes = np.linalg.eigh(load.inertia_matrix)
     if not any(load.inertia[3:]):
         moments, axes = np.array(load.inertia[:3]), np.eye(3)
@@ -626,12 +805,23 @@ ASSUMED_JOINT_SPEED, ASSUMED_SLIDE_SPEED = math.radians(100), 0.5  # rad/s, m/s,
 
 
 def tool_speed(ready: ReadyMotion) -> float | None:
-    """The speed of a line or arc, m/s; None if the program's is not known."""
+    """The speed of a line or arc.
+
+    Returns
+    -------
+    speed : m/s, by the length of the way if the program gives a time; None if it is not known
+    """
     return _by_length(ready, "m/s")
 
 
 def duration(ready: ReadyMotion) -> float | None:
-    """How long a motion takes, s, where the program gives that, or the speed of its tool."""
+    """How long a motion takes.
+
+    Returns
+    -------
+    seconds : as the program gives it, or by its tool speed and the length of the way; None if neither is known. Ramps
+        are not counted.
+    """
     return _by_length(ready, "s")
 
 

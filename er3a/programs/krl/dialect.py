@@ -33,12 +33,30 @@ def _has_axes(value: syntax.Record) -> bool:
 
 
 def is_frame(value: syntax.Value | None) -> bool:
-    """Whether a value has a coordinate of a frame."""
+    """Whether a value has a coordinate of a frame.
+
+    Parameters
+    ----------
+    value : of any kind
+
+    Returns
+    -------
+    frame : whether it is a record with X, Y, Z, A, B or C among its fields
+    """
     return isinstance(value, syntax.Record) and any(value.get(key) is not None for key in FRAME_KEYS)
 
 
 def record_pose(value: syntax.Value | None) -> Reals | None:
-    """The transform (4, 4) in m of a frame; None for anything else, and for a frame that leaves something out."""
+    """The transform of a frame.
+
+    Parameters
+    ----------
+    value : X, Y, Z in mm, and A, B, C in deg with R = Rz(A) Ry(B) Rx(C)
+
+    Returns
+    -------
+    T : (4, 4), m; None for anything else, and for a frame that leaves something out
+    """
     if not isinstance(value, syntax.Record):
         return None
     plain = syntax.numbers(tuple(value.get(key) for key in FRAME_KEYS))
@@ -46,12 +64,29 @@ def record_pose(value: syntax.Value | None) -> Reals | None:
 
 
 def frame_record(pose: Reals, kind: str = "FRAME") -> syntax.Record:
-    """A transform (4, 4) in m as a frame."""
+    """A transform as a frame of KRL; the inverse of :func:`record_pose`.
+
+    Parameters
+    ----------
+    pose : (4, 4), m
+    kind : the type's name, such as ``FRAME`` or ``E6POS``
+    """
     return syntax.Record(kind, tuple(zip(FRAME_KEYS, instructions.numbers_of(pose, "kuka"))))
 
 
 def target(memory: ProgramMemory, value: syntax.Value, frames: Frames, said: tuple[str, bool]) -> instructions.Target:
-    """What a position in a motion means; ``said`` is the line, and whether a relative position is meant by the tool."""
+    """What a position in a motion means.
+
+    Parameters
+    ----------
+    value : axes A1 .. A6 in deg, or a pose in mm and deg; what it leaves out stays as it is
+    frames : tool and base in which the pose is
+    said : the line, and whether a relative position is meant in the tool's axes, which does not count here
+
+    Returns
+    -------
+    target : in rad or m; an :class:`UnresolvedTarget` with the reason where it is not known
+    """
     found = _position(memory, value, said[0])
     if not isinstance(found, syntax.Record):
         return found
@@ -62,7 +97,18 @@ def target(memory: ProgramMemory, value: syntax.Value, frames: Frames, said: tup
 
 
 def relative(memory: ProgramMemory, value: syntax.Value, frames: Frames, said: tuple[str, bool]) -> instructions.Target:
-    """A target given by its difference from where the arm is."""
+    """A target given by its difference from where the arm is (``PTP_REL``, ``LIN_REL``).
+
+    Parameters
+    ----------
+    value : axes in deg, or mm and deg along and about the axes of the base, or of the tool
+    frames : tool and base in which the arm's pose is seen
+    said : the line, and whether the difference is in the tool's axes
+
+    Returns
+    -------
+    target : in rad or m; an :class:`UnresolvedTarget` where the position or the difference is not known
+    """
     text, in_tool = said
     found = _position(memory, value, text)
     if not isinstance(found, syntax.Record):
@@ -275,9 +321,17 @@ def _load_number(memory: ProgramMemory, given: syntax.Value) -> None:
 
 
 def load_of(value: syntax.Value | None) -> instructions.Load | None:
-    """What a LOAD says hangs on the flange; None for a mass below 0, which means unknown.
+    """What a LOAD says hangs on the flange.
 
-    ``{M kg, CM {X mm, Y, Z, A deg, B, C}, J {X kg m^2, Y, Z}}``: J about the axes of CM, through the centre of mass.
+    Parameters
+    ----------
+    value : ``{M kg, CM {X mm, Y, Z, A deg, B, C}, J {X kg m^2, Y, Z}}``: J about the axes of CM, through the centre of
+        mass
+
+    Returns
+    -------
+    load : kg, m, kg m^2, in the flange's frame; None for a mass below 0, which means unknown, and for 0. An
+        :class:`UnclearLoad` where a number is not known.
     """
     if not isinstance(value, syntax.Record):
         return instructions.UnclearLoad(value.text) if isinstance(value, syntax.Unclear) else None
@@ -382,7 +436,14 @@ OF_ONE_MOTION: dict[str, Setting] = {
 
 
 def keep_setting(memory: ProgramMemory, name: str, expression: syntax.Expression) -> None:
-    """One item of a WITH."""
+    """Carry out one item of a WITH, which holds for one motion.
+
+    Parameters
+    ----------
+    memory : is changed; whoever calls this restores it after the motion
+    name : of the variable that is set, or a name for the call
+    expression : the value, or a call such as ``SVEL_JOINT(50)``
+    """
     called = expression if isinstance(expression, syntax.Invocation) else None
     setting = OF_ONE_MOTION.get(called.function) if called else None
     if called and setting is not None:
@@ -470,23 +531,53 @@ class KrlDialect(Dialect):
     by_reference = True
 
     def is_signal(self, name: str) -> bool:
-        """Outputs."""
+        """Whether a name is an output of the controller.
+
+        Returns
+        -------
+        signal : True for ``$OUT[n]`` and ``$ANOUT[n]``
+        """
         return name.startswith(("$OUT[", "$ANOUT["))
 
     def reads_back(self, name: str) -> bool:
-        """All but timers, cyclic flags, the override."""
+        """Whether reading a variable gives the value that the program set last.
+
+        Returns
+        -------
+        same : False for timers, cyclic flags, the override and others that go on by themselves (``RUNNING``)
+        """
         return root(name) not in RUNNING
 
     def is_followed(self, name: str) -> bool:
-        """Whether motions are followed as a variable asks."""
+        """Whether motions are followed as a variable asks.
+
+        Returns
+        -------
+        followed : True for the program's own variables, and for those of the system that are known
+            (``HARMLESS_VARIABLES``)
+        """
         return not name.startswith("$") or root(name) in HARMLESS_VARIABLES
 
     def named(self, name: str) -> bool:
-        """Tool and base keep the name of what they are set to."""
+        """Whether a variable keeps the name of what it is set to.
+
+        Returns
+        -------
+        named : True for ``$TOOL`` and ``$BASE``, so that a frame that only the controller knows is called by its name
+        """
         return name in ("$TOOL", "$BASE")
 
     def typed(self, kind: str, value: syntax.Value) -> syntax.Value:
-        """Coordinates are REAL, however they are written; a frame has no posture."""
+        """What a variable of a type holds: coordinates are REAL, however they are written, and a frame has no posture.
+
+        Parameters
+        ----------
+        kind : the declared type; records of other types than positions stay as they are
+
+        Returns
+        -------
+        value : without S and T for a FRAME
+        """
         if not isinstance(value, syntax.Record) or kind not in ("", *POSITION_KINDS):
             return value
         items = (
@@ -497,7 +588,13 @@ class KrlDialect(Dialect):
         return syntax.Record(value.kind, tuple(items))
 
     def constant(self, memory: ProgramMemory, name: str) -> syntax.Value | None:
-        """Frames of the controller and of the cell, and where the arm is."""
+        """Frames of the controller and of the cell, and where the arm is.
+
+        Returns
+        -------
+        value : such as ``$NULLFRAME``, ``$POS_ACT`` (mm, deg; Status depends on the arm and is unclear) or
+            ``$AXIS_ACT`` (deg); None for other names, and where the position is not known
+        """
         if name in ("$NULLFRAME", "$WORLD", "$ROBROOT"):
             return frame_record(instructions.pose_of(NULL, "kuka"))
         if name == "$NUM_AX":
@@ -521,7 +618,12 @@ class KrlDialect(Dialect):
         return None
 
     def function(self, memory: ProgramMemory, name: str, given: syntax.Invocation) -> syntax.Value:
-        """Mathematics in degrees, and inverse frames."""
+        """The value of a function of KRL: mathematics in degrees, and ``INV_POS``.
+
+        Returns
+        -------
+        value : unclear for other functions, and for arguments that are not known
+        """
         values = tuple(None if each is None else memory.value(each) for each in given.arguments)
         found: syntax.Value | None = None
         if name == "INV_POS" and len(values) == 1 and (pose := record_pose(values[0])) is not None:
@@ -531,7 +633,12 @@ class KrlDialect(Dialect):
         return syntax.Unclear(f"{name}(...)") if found is None else found
 
     def combined(self, sign: str, left: syntax.Value, right: syntax.Value) -> syntax.Value | None:
-        """The geometric operator: ``right`` in the frame ``left``."""
+        """The geometric operator ``left : right``, the frame ``right`` in the frame ``left``.
+
+        Returns
+        -------
+        value : of the kind of ``right``, with its other fields such as S and T; None for other operators and values
+        """
         a, b = record_pose(left), record_pose(right)
         if sign != ":" or a is None or b is None or not isinstance(right, syntax.Record):
             return None
@@ -539,7 +646,17 @@ class KrlDialect(Dialect):
         return syntax.Record(right.kind, (*frame_record(a @ b).items, *rest))
 
     def motion(self, memory: ProgramMemory, move: syntax.Move) -> instructions.ArmMotion:
-        """PTP, LIN, CIRC and their relatives."""
+        """The motion of PTP, LIN, CIRC and their relatives.
+
+        Parameters
+        ----------
+        move : its settings (``WITH``, ``CA``) hold for this motion alone
+
+        Returns
+        -------
+        motion : ``not_followed`` names a setting whose effect is not followed. The angle of CA is in rad, NaN where it
+            is not known.
+        """
         if not move.settings:
             return self._motion(memory, move, None)
         kept, angle, other = dict(memory.shared), None, ""
@@ -591,7 +708,12 @@ class KrlDialect(Dialect):
         )
 
     def carry_out(self, memory: ProgramMemory, doing: syntax.Doing) -> instructions.Instruction | None:
-        """Settings by BAS, signals by PULSE; the rest as in all languages."""
+        """Carry out settings by BAS, and signals by PULSE; the rest as in all languages.
+
+        Returns
+        -------
+        instruction : None for a setting; ``CWRITE`` to ``$CMD``, which can start a program, may move the arm
+        """
         call = doing.what
         values = [memory.value(each) for each in call.arguments if each is not None]
         if call.function == "BAS" and values and str(values[0]) in BAS:

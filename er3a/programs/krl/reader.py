@@ -348,7 +348,17 @@ class _KrlReader:
         self.signals: dict[str, syntax.Expression] = {}
 
     def read_data(self, source: ProgramText) -> None:
-        """Declarations of a .dat file."""
+        """Read the declarations of a .dat file, which are carried out before the routines.
+
+        Parameters
+        ----------
+        source : lines that are not understood are kept as unknown, and only assignments are taken
+
+        Raises
+        ------
+        InputError
+            for a text without an end
+        """
         builder = CodeBuilder("", (), Place(source.path, 1))
         for number, line in enumerate(source.lines, 1):
             place = Place(source.path, number)
@@ -417,7 +427,22 @@ class _KrlReader:
 
 
 def split_comment(line: str, place: Place) -> tuple[str, str]:
-    """A line without its comment, and the comment; :class:`InputError` for a text without end."""
+    """A line without its comment, and the comment.
+
+    Parameters
+    ----------
+    line : a semicolon within quotes begins no comment
+    place : of the line, for the error
+
+    Returns
+    -------
+    text, comment : without surrounding blanks
+
+    Raises
+    ------
+    InputError
+        for a text in quotes without an end
+    """
     text, _, comment = line.partition(";")
     if '"' in text:
         parts = line.split('"')
@@ -432,5 +457,14 @@ def split_comment(line: str, place: Place) -> tuple[str, str]:
 
 
 def companions(path: Path) -> tuple[Path, ...]:
-    """What belongs to a .src file."""
+    """The files that belong to a .src file: its data, the modules that it calls, and the controller's own data.
+
+    Parameters
+    ----------
+    path : of the .src file
+
+    Returns
+    -------
+    files : those that exist
+    """
     return ControllerFiles(path, KNOWN).companions

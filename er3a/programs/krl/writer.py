@@ -33,7 +33,12 @@ class KrlWriter(writing.Writer):
         self.accelerates_fully = all(each is None or (each.unit, each.value) == ("share", 1.0) for each in given)
 
     def files(self, head: list[str]) -> dict[str, str]:
-        """The .src and the .dat file."""
+        """The .src and the .dat file, which have to be loaded together.
+
+        Returns
+        -------
+        files : the .src begins with ``BAS(#INITMOV,0)``, after the lines of the head as comments
+        """
         body = [f"; {writing.ascii_text(line)}" for line in head]
         body += ["BAS(#INITMOV,0)", *self.lines]
         lines = ["&ACCESS RVP", "&REL 1", f"DEF {self.name}( )", *body, "END", ""]
@@ -41,12 +46,22 @@ class KrlWriter(writing.Writer):
         return {".src": "\n".join(lines), ".dat": "\n".join(data)}
 
     def output(self, output: instructions.Output) -> None:
-        """``$OUT[8]=TRUE``."""
+        """Write an output, such as ``$OUT[8]=TRUE``.
+
+        Parameters
+        ----------
+        output : a value with brackets is a whole statement, such as a PULSE, and is repeated
+        """
         called = "(" in output.value
         self.lines.append(output.value if called else f"{output.name}={output.value}")
 
     def set_load(self, load: MassBody | None) -> None:
-        """``$LOAD``, with the axes of its inertia; a mass below 0 for what is not known."""
+        """Write ``$LOAD``, with the principal axes of its inertia.
+
+        Parameters
+        ----------
+        load : kg, m, kg m^2, in the flange's frame; None is written as a mass below 0, which means unknown
+        """
         pose, moments = (np.eye(4), np.zeros(3)) if load is None else writing.principal_axes(load)
         about = ",".join(
             f"{axis} {writing.short(float(each), writing.LOAD_DIGITS)}" for axis, each in zip("XYZ", moments)
@@ -55,7 +70,12 @@ class KrlWriter(writing.Writer):
         self.set_once("$LOAD", f"$LOAD={{M {mass},CM {_frame_text(pose)},J {{{about}}}}}")
 
     def motion(self, ready: writing.ReadyMotion) -> None:
-        """PTP, LIN, CIRC with what has to be set before."""
+        """Write PTP, LIN or CIRC, and before it tool, base, speeds and zone where they change.
+
+        Parameters
+        ----------
+        ready : joint motions are written by their axes; one whose target can't be written is left out
+        """
         motion = ready.motion
         target = self._target(ready)
         via = None if ready.via is None else _frame_text(ready.via)

@@ -76,7 +76,17 @@ ZONES: Mapping[str, tuple[float, ...]] = {
 
 
 def typed(value: Value, kind: str) -> Value:
-    """A value as its declared type has it: aggregates get the names of their components; others stay as they are."""
+    """A value as its declared type has it: aggregates get the names of their components.
+
+    Parameters
+    ----------
+    value : nested lists, as the text has them
+    kind : the type in capital letters, with ``[]`` for each dimension of an array
+
+    Returns
+    -------
+    value : others than aggregates of the right length stay as they are
+    """
     if isinstance(value, tuple) and kind.endswith("[]"):
         return tuple(typed(each, kind[:-2]) for each in value)
     shape = SHAPES.get(kind)
@@ -89,7 +99,16 @@ def typed(value: Value, kind: str) -> Value:
 
 
 def starting(kind: str) -> Value | None:
-    """What a variable holds that is declared without a value (RAPID overview, 1 Data types); None if not known."""
+    """What a variable holds that is declared without a value (RAPID overview, 1 Data types).
+
+    Parameters
+    ----------
+    kind : the type in capital letters
+
+    Returns
+    -------
+    value : zeros, FALSE, an empty text, or a record of these; None if the type is not known
+    """
     plain_values: dict[str, Value] = {"NUM": 0, "DNUM": 0, "BOOL": False, "STRING": ""}
     if kind not in SHAPES:
         return plain_values.get(kind)
@@ -97,7 +116,20 @@ def starting(kind: str) -> Value | None:
 
 
 def predefined(name: str) -> Value | None:
-    """The value of a name that every controller has."""
+    """The value of a name that every controller has.
+
+    Parameters
+    ----------
+    name : in capital letters, such as ``V100``, ``Z10``, ``FINE``, ``TOOL0`` or ``WOBJ0``
+
+    Returns
+    -------
+    value : in mm, mm/s, deg and deg/s, as RAPID has it; None for other names. How fast ``VMAX`` is depends on the arm.
+
+    References
+    ----------
+    Entries of ABB's manual as the head of this module cites them.
+    """
     if name == "FINE":
         return typed((True, *(0.0,) * 6), "ZONEDATA")
     if name in ZONES:
@@ -118,14 +150,32 @@ def predefined(name: str) -> Value | None:
 
 
 def part(value: Value | None, *path: str) -> Value | None:
-    """A component of a record, however deep."""
+    """A component of a record, however deep.
+
+    Parameters
+    ----------
+    path : names of components, from the outermost on
+
+    Returns
+    -------
+    value : None where a record on the way has no such component
+    """
     for name in path:
         value = value.get(name) if isinstance(value, Record) else None
     return value
 
 
 def plain(value: Value | None, count: int) -> tuple[float, ...] | None:
-    """So many finite numbers of a record or aggregate, or None."""
+    """The numbers of a record or aggregate.
+
+    Parameters
+    ----------
+    count : how many there must be
+
+    Returns
+    -------
+    numbers : None if there are more or fewer, or one is no finite number
+    """
     values = value.values() if isinstance(value, Record) else value
     if not isinstance(values, tuple) or len(values) != count:
         return None
@@ -138,7 +188,16 @@ LENGTH_TOLERANCE = 0.01
 
 
 def pose_matrix(value: Value | None) -> Reals | None:
-    """The transform (4, 4) in m of a pose; None unless its seven numbers are given and its quaternion's length is 1."""
+    """The transform of a pose.
+
+    Parameters
+    ----------
+    value : a position in mm, and a quaternion q1 .. q4, q1 the scalar
+
+    Returns
+    -------
+    T : (4, 4), m; None unless all seven numbers are given, and the quaternion's length is 1 to ``LENGTH_TOLERANCE``
+    """
     trans, rot = (part(value, "TRANS"), part(value, "ROT")) if isinstance(value, Record) else (None, None)
     if isinstance(value, tuple) and len(value) == 2:
         trans, rot = value
@@ -149,7 +208,16 @@ def pose_matrix(value: Value | None) -> Reals | None:
 
 
 def rotation_of(value: Value | None) -> Reals | None:
-    """The rotation (3, 3) of an orient; None unless its length is 1."""
+    """The rotation of an orient.
+
+    Parameters
+    ----------
+    value : a quaternion q1 .. q4, q1 the scalar
+
+    Returns
+    -------
+    R : (3, 3); None unless all numbers are given, and the length is 1 to ``LENGTH_TOLERANCE``
+    """
     quaternion = plain(value, 4)
     if quaternion is None or abs(math.hypot(*quaternion) - 1) > LENGTH_TOLERANCE:
         return None
@@ -175,7 +243,16 @@ def load_of(value: Value | None) -> MassBody | None:
 
 
 def orient_record(R: Reals) -> Record:
-    """A rotation (3, 3) as an orient."""
+    """A rotation as an orient; the inverse of :func:`rotation_of`.
+
+    Parameters
+    ----------
+    R : (3, 3)
+
+    Returns
+    -------
+    orient : Q1 .. Q4, Q1 the scalar, at least 0
+    """
     T = np.eye(4)
     T[:3, :3] = R
     found = typed(numbers_of(T, "abb")[3:], "ORIENT")
@@ -184,17 +261,41 @@ def orient_record(R: Reals) -> Record:
 
 
 def pos_record(xyz: Reals) -> Record:
-    """A position (3,) in m as a pos."""
+    """A position as a pos of RAPID.
+
+    Parameters
+    ----------
+    xyz : (3,), m
+
+    Returns
+    -------
+    pos : X, Y, Z in mm
+    """
     return Record("POS", tuple(zip("XYZ", (float(each) * 1000 for each in xyz))))
 
 
 def pose_record(T: Reals) -> Record:
-    """A transform (4, 4) in m as a pose."""
+    """A transform as a pose of RAPID; the inverse of :func:`pose_matrix`.
+
+    Parameters
+    ----------
+    T : (4, 4), m
+
+    Returns
+    -------
+    pose : TRANS in mm, ROT as a quaternion
+    """
     return Record("POSE", (("TRANS", pos_record(T[:3, 3])), ("ROT", orient_record(T[:3, :3]))))
 
 
 def moved_target(target: Record, T: Reals) -> Record:
-    """A robtarget with another pose (4, 4) in m."""
+    """A robtarget with another pose.
+
+    Parameters
+    ----------
+    target : whose configuration and external axes stay
+    T : (4, 4), m, in the work object
+    """
     return target.having("TRANS", pos_record(T[:3, 3])).having("ROT", orient_record(T[:3, :3]))
 
 
@@ -227,12 +328,30 @@ def branch_of(conf: Value | None, joints: int) -> MeantSolution | None:
 
 
 def quarters_of(joints: Reals) -> tuple[int, ...]:
-    """cf1, cf4 and cf6 of joints (6,) in rad; within the tolerance of a quarter's end the one that goes on from it."""
+    """The quarters of a turn in which axes 1, 4 and 6 are, as confdata counts them.
+
+    Parameters
+    ----------
+    joints : (6,), rad
+
+    Returns
+    -------
+    cf1, cf4, cf6 : 0 from 0 to 90 deg, -1 from -90 to 0 deg, and so on; within 1e-9 rad of its end the next quarter
+    """
     return tuple(math.floor((float(joints[axis]) + 1e-9) / QUARTER) for axis in CONFIGURED)
 
 
 def external_axes(value: Value | None) -> tuple[tuple[str, float], ...]:
-    """Axes beside the arm that an extjoint moves: those that are there and not at 0; NaN where that is not known."""
+    """Axes that do not belong to the arm, which a target moves.
+
+    Parameters
+    ----------
+    value : an extjoint; ``9E9`` is an axis that is not there
+
+    Returns
+    -------
+    axes : pairs of name and value, mm or deg, of those that are there and not at 0; NaN where a value is not known
+    """
     value = typed(value, "EXTJOINT") if value is not None else None
     if isinstance(value, Unclear):
         return (("extax", math.nan),)

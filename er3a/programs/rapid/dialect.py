@@ -49,15 +49,38 @@ class RapidDialect(Dialect):
     by_reference = True
 
     def constant(self, memory: ProgramMemory, name: str) -> syntax.Value | None:
-        """Speeds, zones, tool and work object that every controller has."""
+        """Speeds, zones, tool and work object that every controller has.
+
+        Returns
+        -------
+        value : as of :func:`er3a.programs.rapid.data_types.predefined`; None for other names
+        """
         return data_types.predefined(name)
 
     def typed(self, kind: str, value: syntax.Value) -> syntax.Value:
-        """A value with the names of its type's components."""
+        """A value with the names of its type's components.
+
+        Parameters
+        ----------
+        kind : the declared type, in capital letters
+
+        Returns
+        -------
+        value : as of :func:`er3a.programs.rapid.data_types.typed`
+        """
         return data_types.typed(value, kind)
 
     def combined(self, sign: str, left: syntax.Value, right: syntax.Value) -> syntax.Value | None:
-        """Sums of positions, a number times a position, products of turns (RAPID Reference Manual, 7.1)."""
+        """Sums of positions, a number times a position, products of turns.
+
+        Returns
+        -------
+        value : a pos in mm, or an orient; ``*`` of two positions is their cross product. None for other operands.
+
+        References
+        ----------
+        ABB, *RAPID Reference Manual*, section 7.1.
+        """
         a, b = data_types.plain(left, 3), data_types.plain(right, 3)
         scale = syntax.number(left) if a is None else syntax.number(right)
         if a is not None and b is not None and sign in "+-*":
@@ -69,7 +92,12 @@ class RapidDialect(Dialect):
         return data_types.orient_record(turn @ then) if sign == "*" and turn is not None and then is not None else None
 
     def function(self, memory: ProgramMemory, name: str, given: syntax.Invocation) -> syntax.Value:
-        """Mathematics, positions, where the arm is; what is unknown, or called otherwise, is unclear."""
+        """The value of a function of RAPID: mathematics in degrees, positions, where the arm is.
+
+        Returns
+        -------
+        value : in mm, deg and quaternions; unclear for a function that is unknown, or called with other arguments
+        """
         values = tuple(UNCLEAR if each is None else memory.value(each) for each in given.arguments)
         named = {key: memory.value(each) for key, each in given.keywords}
         found: syntax.Value | None = None
@@ -86,7 +114,13 @@ class RapidDialect(Dialect):
         return next((each for each in values if isinstance(each, syntax.Unclear)), syntax.Unclear(unclear))
 
     def motion(self, memory: ProgramMemory, move: syntax.Move) -> instructions.ArmMotion:
-        """MoveJ, MoveL, MoveC, MoveAbsJ, and those that set an output besides."""
+        """The motion of MoveJ, MoveL, MoveC and MoveAbsJ, also of those that set an output besides.
+
+        Returns
+        -------
+        motion : its target is unresolved if the tool is stationary or the arm holds the work object. ``not_followed``
+            names options that are not followed.
+        """
         kind, absolute = KINDS[move.form[4]], move.form[4] == "A"
         options = {name: memory.value(each) for name, each in move.settings}
         values = [UNCLEAR if each is None else memory.value(each) for each in move.arguments]
@@ -131,7 +165,12 @@ class RapidDialect(Dialect):
         )
 
     def carry_out(self, memory: ProgramMemory, doing: syntax.Doing) -> instructions.Instruction | None:
-        """Settings and outputs; the rest as in all languages."""
+        """Carry out settings (``ConfJ``, ``AccSet``, ``VelSet`` ...) and outputs; the rest as in all languages.
+
+        Returns
+        -------
+        instruction : None for a setting that is followed
+        """
         call = doing.what
         values = tuple(UNCLEAR if each is None else memory.value(each) for each in call.arguments)
         options = {key for key, _ in call.keywords}
@@ -202,9 +241,16 @@ def _said(conf: syntax.Value | None) -> tuple[tuple[str, float | str], ...]:
 
 
 def frame_of_tool(value: syntax.Value | None) -> tuple[Reals | None, bool]:
-    """T_flange_tool (4, 4) in m of tooldata, and whether the tool is stationary (3 tooldata: robhold).
+    """The pose of a tool, and whether it is stationary.
 
-    None where that is not known.
+    Parameters
+    ----------
+    value : tooldata (3 tooldata: robhold, tframe)
+
+    Returns
+    -------
+    T : T_flange_tool (4, 4), m; None where it is not known
+    stationary : whether the arm does not hold the tool
     """
     data = data_types.typed(value, "TOOLDATA") if value is not None else None
     held = data_types.part(data, "ROBHOLD")

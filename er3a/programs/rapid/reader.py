@@ -94,7 +94,17 @@ class RapidWords(Words):
         return syntax.Constant(values) if len(values) == len(items) else syntax.Listed("", tuple(items))
 
     def parts_of(self, found: syntax.Expression) -> syntax.Expression:
-        """As in other languages, but for elements, which stand in braces."""
+        """An expression with the fields and arguments after it, and elements in braces.
+
+        Parameters
+        ----------
+        found : what was read before them
+
+        Raises
+        ------
+        MisreadError
+            if a brace is not closed
+        """
         while True:
             found = super().parts_of(found) if self.next != "[" else found
             if not self.accept("{"):
@@ -111,7 +121,22 @@ class RapidWords(Words):
         return found
 
     def arguments(self, close: str = ")") -> Given:
-        """Arguments by place and, after a backslash, by name; a name alone is a switch."""
+        """Arguments by place and, after a backslash, by name.
+
+        Parameters
+        ----------
+        close : the bracket that ends them; empty for an instruction, which ends with its last word
+
+        Returns
+        -------
+        placed : by place
+        named : pairs of name and expression; a name alone is a switch, and True
+
+        Raises
+        ------
+        MisreadError
+            if the bracket or a comma is missing
+        """
         placed: list[syntax.Expression | None] = []
         named: list[tuple[str, syntax.Expression]] = []
         first = self.at
@@ -195,7 +220,16 @@ class _ModuleReader:
             self._part(token)
 
     def next(self, comments: bool = False) -> Token | None:
-        """The next word; comments are skipped unless requested."""
+        """The next word of the module, which is not passed.
+
+        Parameters
+        ----------
+        comments : whether a comment counts as a word; else comments before the word are passed
+
+        Returns
+        -------
+        token : None at the end of the text
+        """
         while not comments and self.at < len(self.tokens) and self.tokens[self.at].kind == "comment":
             self.at += 1
         return self.tokens[self.at] if self.at < len(self.tokens) else None
@@ -217,7 +251,16 @@ class _ModuleReader:
         return Place(self.source.path, token.line if token else 1)
 
     def text(self, tokens: list[Token]) -> str:
-        """The text of words, without comments and in one line."""
+        """The text of words, in one line and without comments.
+
+        Parameters
+        ----------
+        tokens : that follow each other
+
+        Returns
+        -------
+        text : as it was written if it is on one line; else the words with one blank between them
+        """
         if not tokens:
             return ""
         lines = self.source.text[tokens[0].start : tokens[-1].end].split("\n")
@@ -238,14 +281,32 @@ class _ModuleReader:
         return self.tokens[first : self.at]
 
     def until(self, *words: str) -> list[Token]:
-        """The words up to one of these, which is not passed."""
+        """The words up to one of some words, which is not passed.
+
+        Parameters
+        ----------
+        words : in capital letters
+
+        Returns
+        -------
+        tokens : all up to the end of the text if there is none
+        """
         first = self.at
         while self.at < len(self.tokens) and self.tokens[self.at].text not in words:
             self.at += 1
         return self.tokens[first : self.at]
 
     def head(self, *words: str) -> list[Token]:
-        """The words up to one of these, which is passed; up to a semicolon or the end of the text if there is none."""
+        """The words up to one of some words, or a semicolon, which is passed.
+
+        Parameters
+        ----------
+        words : in capital letters, such as ``THEN``
+
+        Returns
+        -------
+        tokens : all up to the end of the text if there is none
+        """
         found = self.until(*words, ";")
         self.at += 1
         return found
@@ -277,7 +338,17 @@ class _ModuleReader:
                 raise fault(place, f"the {word} that begins here has no end", f"Close it with END{word}")
 
     def declaration(self, builder: CodeBuilder, local: bool) -> None:
-        """``VAR num n{3} := [1, 2, 3];``"""
+        """Read a declaration, such as ``VAR num n{3} := [1, 2, 3];``, and add it to the code.
+
+        Parameters
+        ----------
+        local : whether it is a routine's own
+
+        Notes
+        -----
+        Without a value it holds what its type starts with, but for a PERS, whose value is in the controller. One that
+        is not understood is kept as unknown.
+        """
         place, tokens = self.place(), self.simple()
         words = RapidWords(tokens)
         try:
@@ -347,7 +418,17 @@ class _BodyReader:
         self.module, self.builder = module, builder
 
     def read(self, end: str) -> None:
-        """Instructions up to the word that ends the routine, which is not passed; its handlers are passed over."""
+        """Read a routine's instructions, and pass over its handlers (ERROR, UNDO, BACKWARD).
+
+        Parameters
+        ----------
+        end : the word that ends the routine, which is not passed
+
+        Raises
+        ------
+        InputError
+            if that word is missing, or a block in the routine has no end
+        """
         self.instructions(end)
         if self.module.word() in HANDLERS:
             self.module.until(end)
@@ -355,7 +436,17 @@ class _BodyReader:
                 raise fault(self.builder.place, f"{self.builder.name} has no {end}", f"Close it with {end}")
 
     def instructions(self, *ends: str) -> None:
-        """Instructions up to one of these words, or a handler's, which is not passed."""
+        """Read instructions up to a word that ends them, or a handler's, which is not passed.
+
+        Parameters
+        ----------
+        ends : in capital letters
+
+        Raises
+        ------
+        InputError
+            at the end of the text, or at the end of another block
+        """
         module, builder = self.module, self.builder
         while True:
             token = module.next(comments=True)
@@ -380,7 +471,17 @@ class _BodyReader:
                 self.instruction(place, module.simple())
 
     def instruction(self, place: Place, tokens: list[Token]) -> None:
-        """One instruction; one that is not understood is kept as such."""
+        """Read one instruction; one that is not understood is kept as such, and what it assigns to becomes unclear.
+
+        Parameters
+        ----------
+        tokens : up to its semicolon
+
+        Raises
+        ------
+        InputError
+            if brackets are nested too deeply
+        """
         text = self.module.text(tokens)
         words = RapidWords(tokens)
         if words.kind == "end":
@@ -395,7 +496,16 @@ class _BodyReader:
             raise InputError(place.file, place.where, "nested too deeply", "Split this line") from None
 
     def condition(self, tokens: list[Token]) -> syntax.Expression:
-        """A condition; one that is not understood is kept."""
+        """A condition, or another expression by itself.
+
+        Parameters
+        ----------
+        tokens : all of it
+
+        Returns
+        -------
+        expression : :class:`Opaque` with its text if it is not understood
+        """
         words = RapidWords(tokens)
         try:
             found = words.expression()
@@ -405,7 +515,18 @@ class _BodyReader:
         return found
 
     def close(self, place: Place, kind: str, end: str) -> None:
-        """The end of a block, which is passed."""
+        """End a block; its last word is passed.
+
+        Parameters
+        ----------
+        kind : the block's, as :class:`CodeBuilder` calls it
+        end : the word that must be there, such as ``ENDIF``
+
+        Raises
+        ------
+        InputError
+            if another word is there
+        """
         if self.module.word() != end:
             raise fault(place, f"the {end[3:]} that begins here has no end", f"Close it with {end}")
         self.builder.close(kind, self.module.place())
@@ -568,8 +689,17 @@ MAX_MODULES = 200
 
 
 def modules_of(path: Path) -> tuple[Path, ...]:
-    """The modules beside one that hold what it uses and does not define, and what these use, in the order of their
-    names. One with a routine ``main`` of its own is another program; one that is not text is left out."""
+    """The modules in a module's folder that hold what it uses and does not define, and what these use.
+
+    Parameters
+    ----------
+    path : of the module that is started
+
+    Returns
+    -------
+    files : in the order of their names. One with a routine ``main`` of its own is another program; one that is not text
+        is left out. At most ``MAX_MODULES``.
+    """
     used, given = _names(read_program_text(path))
     waiting: dict[Path, tuple[set[str], set[str]]] = {}
     for each in sorted(path.parent.iterdir()):

@@ -45,7 +45,12 @@ class RapidWriter(writing.Writer):
         self.declared: list[str] = []
 
     def files(self, head: list[str]) -> dict[str, str]:
-        """The .mod file."""
+        """The .mod file: tools, work objects and loads, then ``PROC main``.
+
+        Returns
+        -------
+        files : one text, with the lines of the head as comments
+        """
         lines = [
             f"MODULE {self.name}",
             *(f"  ! {writing.ascii_text(line)}" for line in head),
@@ -55,14 +60,30 @@ class RapidWriter(writing.Writer):
         return {".mod": "\n".join((*lines, *(f"  {line}" for line in body), "ENDMODULE", ""))}
 
     def output(self, output: instructions.Output) -> None:
-        """The instruction that was read."""
+        """Write an output by the instruction that was read.
+
+        Parameters
+        ----------
+        output : its value is the whole instruction
+        """
         self.verbatim(output.value)
 
     def set_load(self, load: MassBody | None) -> None:
-        """In the data of the tools (:meth:`_frame`)."""
+        """Write nothing here: loads are in the data of the tools (:meth:`_frame`).
+
+        Parameters
+        ----------
+        load : of the next motions, which carry it themselves
+        """
 
     def motion(self, ready: writing.ReadyMotion) -> None:
-        """MoveAbsJ, MoveJ, MoveL, MoveC with what has to be set before."""
+        """Write MoveAbsJ, MoveJ, MoveL or MoveC, and before it what has to be set.
+
+        Parameters
+        ----------
+        ready : joint motions need the joints (rad); those read from RAPID with a pose keep it. One that can't be
+            written is left out.
+        """
         motion = ready.motion
         target = motion.target
         own_pose = self.own and motion.kind == "joint" and isinstance(target, instructions.PoseTarget)

@@ -26,11 +26,22 @@ class RplDialect(Dialect):
     harmless = SOCKETS | {*FIELDS, "OFFSET", *IN_DEGREES, *map(str.lower, IN_DEGREES)}
 
     def is_signal(self, name: str) -> bool:
-        """Outputs, and what goes to the field bus."""
+        """Whether a name is an output of the controller.
+
+        Returns
+        -------
+        signal : True for ``io.`` and for what goes to the field bus, ``fidbus.``
+        """
         return name.startswith(("io.", "fidbus."))
 
     def function(self, memory: ProgramMemory, name: str, given: syntax.Invocation) -> syntax.Value:
-        """Points, OFFSET, roots; no source says in which unit the angles of the others are."""
+        """The value of a function of RPL: points, OFFSET, roots and absolute values.
+
+        Returns
+        -------
+        value : in mm and deg; unclear for others. No source says in which unit the angles of trigonometric functions
+            are.
+        """
         values = [None if each is None else memory.value(each) for each in given.arguments]
         if name in FIELDS:
             return _point(name, values)
@@ -41,7 +52,13 @@ class RplDialect(Dialect):
         return syntax.Unclear(unclear) if found is None else found
 
     def motion(self, memory: ProgramMemory, move: syntax.Move) -> instructions.ArmMotion:
-        """MJOINT and MLIN: target, speed, zone, tool, reference frame."""
+        """The motion of MJOINT and MLIN: target, speed, zone, tool, reference frame.
+
+        Returns
+        -------
+        motion : tool and frame by their names, with a pose where the cell gives one; without a frame it is the robot's
+            base
+        """
         given = [*move.arguments, *[None] * (5 - len(move.arguments))]
         point = syntax.Unclear(move.text) if given[0] is None else memory.value(given[0])
         goal = (
@@ -63,7 +80,12 @@ class RplDialect(Dialect):
         )
 
     def is_followed(self, name: str) -> bool:
-        """Variables of the controller may set anything, such as the override."""
+        """Whether motions are followed as a variable asks.
+
+        Returns
+        -------
+        followed : False for variables of the controller (``sys.`` ...), which may set anything, such as the override
+        """
         return name.partition(".")[0] not in LIBRARY_NAMES
 
 

@@ -64,7 +64,16 @@ LIBRARY_NAMES = frozenset(("io", "fidbus", "sys", "str", "log", "tcpip"))
 
 
 def expression(text: str) -> syntax.Expression:
-    """An expression by itself; one that is not understood is kept."""
+    """An expression by itself, such as an entry of a file of points.
+
+    Parameters
+    ----------
+    text : of RPL
+
+    Returns
+    -------
+    expression : :class:`Opaque` with its text if it is not understood
+    """
     if WORD.match(text) and text.upper() not in RPL.constants and text not in RPL.right:
         return syntax.Variable(text)
     words = RplWords(text)
@@ -77,12 +86,29 @@ def expression(text: str) -> syntax.Expression:
 
 
 def initial(text: str, kind: str) -> syntax.Expression:
-    """A first value: a number, or ``(x,y,z,a,b,c,2,0,0,-1)`` of a position's type."""
+    """The first value of a declared variable.
+
+    Parameters
+    ----------
+    text : a number, or ``(x,y,z,a,b,c,2,0,0,-1)`` of a position's type, in mm and deg
+    kind : the declared type
+    """
     return expression(kind + text if kind in FIELDS and text.startswith("(") else text)
 
 
 def plain_statement(builder: CodeBuilder, place: Place, text: str) -> None:
-    """A statement that begins and ends no block; :class:`MisreadError` if it can't be read."""
+    """Read a statement that begins and ends no block: an assignment or a call.
+
+    Parameters
+    ----------
+    builder : takes the operation
+    text : without the semicolon
+
+    Raises
+    ------
+    MisreadError
+        if it can't be read
+    """
     words = RplWords(text)
     left = words.expression()
     if words.accept(":="):
@@ -97,7 +123,14 @@ def plain_statement(builder: CodeBuilder, place: Place, text: str) -> None:
 
 
 def call(builder: CodeBuilder, place: Place, left: syntax.Invocation, text: str) -> None:
-    """A statement that is a call: a motion, a wait, a routine."""
+    """Read a statement that is a call: a motion, a wait, a routine.
+
+    Parameters
+    ----------
+    builder : takes the operation
+    left : the call
+    text : of the statement, for messages
+    """
     name, given = left.function.upper(), left.arguments
     if name in MOTIONS:
         builder.add(syntax.Move(place, name, given, text))
@@ -222,6 +255,15 @@ BLOCKS = {
 
 
 def companions(path: Path) -> tuple[Path, ...]:
-    """What belongs to a .pgm file: the points beside it."""
+    """The file with a program's points.
+
+    Parameters
+    ----------
+    path : of the .pgm file
+
+    Returns
+    -------
+    files : the .var file of the same name; none if there is none
+    """
     points = data_file_of(path, ".var")
     return () if points is None else (points,)

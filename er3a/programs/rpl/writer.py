@@ -52,7 +52,12 @@ class RplWriter(Writer):
         self.items: list[RplItem] = []
 
     def files(self, head: list[str]) -> dict[str, str]:
-        """The .pgm file, and the .var file, which is empty: no variable is used."""
+        """The .pgm file, and the .var file, which is empty: no variable is used.
+
+        Returns
+        -------
+        files : the lines of the head are comments of the .pgm file
+        """
         lines = [f"(* {_comment(line)} *)" for line in head]
         indent = ""
         for item in self.items:
@@ -72,11 +77,21 @@ class RplWriter(Writer):
         self.items.append(RplItem("end"))
 
     def comment(self, text: str) -> None:
-        """A comment."""
+        """Add a comment.
+
+        Parameters
+        ----------
+        text : signs that would end the comment are replaced when the file is made
+        """
         self.items.append(RplItem("rem", (("text", text),)))
 
     def pause(self, pause: Pause) -> None:
-        """DWELL, WAIT; a wait for the operator is a comment."""
+        """Write DWELL for a time, or WAIT for a condition.
+
+        Parameters
+        ----------
+        pause : a wait for the operator becomes a comment
+        """
         if pause.seconds is not None:
             self.items.append(RplItem("dwell", (("expr", short(pause.seconds)),)))
         elif pause.condition is not None:
@@ -85,16 +100,31 @@ class RplWriter(Writer):
             self.comment("wait for the operator")
 
     def output(self, output: Output) -> None:
-        """``io.DOut[8] := true;``."""
+        """Write an output, such as ``io.DOut[8] := true;``.
+
+        Parameters
+        ----------
+        output : TRUE and FALSE are written in small letters, other values as they are
+        """
         value = output.value.lower() if output.value in ("TRUE", "FALSE") else output.value
         self.items.append(RplItem("set", (("dest", output.name), ("expr", value))))
 
     def verbatim(self, text: str) -> None:
-        """A statement as it was read."""
+        """Add a statement as it was read.
+
+        Parameters
+        ----------
+        text : of RPL; blanks and line ends become single spaces
+        """
         self.items.append(RplItem("raw", (("text", " ".join(text.split())),)))
 
     def motion(self, ready: ReadyMotion) -> None:
-        """MJOINT, MLIN."""
+        """Write MJOINT or MLIN; an arc becomes lines.
+
+        Parameters
+        ----------
+        ready : targets are joints (rad) unless a pose was read from RPL; one that can't be written is left out
+        """
         motion = ready.motion
         if motion.kind == "arc":
             self._arc(ready)
@@ -202,7 +232,12 @@ class XplWriter(RplWriter):
     """Writes RPL as the controller's XML."""
 
     def files(self, head: list[str]) -> dict[str, str]:
-        """The .XPL file."""
+        """The .XPL file, with the routine Main and, where something is repeated for ever, the loop's body.
+
+        Returns
+        -------
+        files : one text; its FileId is a checksum (CRC-32) of the routines
+        """
         main: list[str] = [_element(RplItem("rem", (("text", line),))) for line in head]
         inner: list[str] = []
         into = main

@@ -37,16 +37,43 @@ class XmlNode:
         return "".join(self.parts).strip()
 
     def child(self, tag: str) -> XmlNode | None:
-        """The first child of a tag."""
+        """The first child with a tag.
+
+        Parameters
+        ----------
+        tag : without namespace
+
+        Returns
+        -------
+        node : None if there is none
+        """
         return next((each for each in self.children if each.tag == tag), None)
 
     def text_of(self, tag: str) -> str:
-        """The text of the first child of a tag; empty if there is none."""
+        """The text of the first child with a tag.
+
+        Parameters
+        ----------
+        tag : of a direct child
+
+        Returns
+        -------
+        text : empty if there is none
+        """
         found = self.child(tag)
         return "" if found is None else found.text
 
     def all(self, *path: str) -> list[XmlNode]:
-        """The descendants along a path of tags."""
+        """The descendants along a path of tags.
+
+        Parameters
+        ----------
+        path : tags from the children on; none for the element itself
+
+        Returns
+        -------
+        nodes : in the order of the file
+        """
         found = [self]
         for tag in path:
             found = [each for node in found for each in node.children if each.tag == tag]
@@ -163,6 +190,17 @@ class _Pou:
         self.place = Place(source.path, pou.line, self.name)
 
     def routine(self) -> syntax.Routine:
+        """The routine: its parameters, its own variables, and its body with all loops.
+
+        Returns
+        -------
+        routine : flat code
+
+        Raises
+        ------
+        InputError
+            for a loop without a body, or blocks nested too deeply
+        """
         parameters = tuple(
             syntax.RoutineParameter(var.text_of("Name"), var.text_of("Attrib").upper() not in ("IN", ""))
             for var in self.pou.all("VarDeclarations", "VarInterface", "Var")
@@ -258,7 +296,16 @@ def _arguments(call: XmlNode) -> list[str]:
 
 
 def text_of(element: XmlNode) -> str:
-    """An element as one line of RPL, as far as it has an equal there."""
+    """An element as one line of RPL, as far as it has an equal there.
+
+    Parameters
+    ----------
+    element : a statement
+
+    Returns
+    -------
+    text : for others the tag and all text within it, 200 letters at most
+    """
     inner = element.text_of
     match element.tag:
         case "mjoint" | "mlin":

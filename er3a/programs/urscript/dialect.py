@@ -132,11 +132,25 @@ class UrScriptDialect(Dialect):
     harmless = HARMLESS | SIGNATURES.keys() | {"struct"}
 
     def constant(self, memory: ProgramMemory, name: str) -> syntax.Value | None:
-        """Numbers of the language."""
+        """Numbers of the language.
+
+        Returns
+        -------
+        value : pi for ``MATH_PI``; None for other names
+        """
         return math.pi if name == "MATH_PI" else None
 
     def listed(self, kind: str, values: tuple[syntax.Value, ...]) -> syntax.Value:
-        """``[...]``, and ``p[...]`` with six numbers."""
+        """The value of ``[...]``, and of ``p[...]`` with six numbers.
+
+        Parameters
+        ----------
+        kind : ``p`` of a pose, empty for a list
+
+        Returns
+        -------
+        value : a pose is x, y, z in m and a rotation vector in rad; one with other than six values is unclear
+        """
         if not kind:
             return values
         if len(values) != 6:
@@ -144,7 +158,12 @@ class UrScriptDialect(Dialect):
         return syntax.Record("p", tuple(zip(syntax.POSE_KEYS, values)))
 
     def function(self, memory: ProgramMemory, name: str, given: syntax.Invocation) -> syntax.Value:
-        """Mathematics, poses, where the arm is; what is unknown, or called otherwise than known, is unclear."""
+        """The value of a function of URScript: mathematics, poses, lists, where the arm is.
+
+        Returns
+        -------
+        value : in m and rad; unclear for a function that is unknown, or called otherwise than known
+        """
         values, keywords = _given(memory, given.arguments, given.keywords)
         if name == "struct":
             return syntax.Record(name, tuple(keywords.items()))
@@ -162,7 +181,13 @@ class UrScriptDialect(Dialect):
         return unclear if found is None else found
 
     def motion(self, memory: ProgramMemory, move: syntax.Move) -> instructions.ArmMotion:
-        """movej, movel, movep, movec."""
+        """The motion of movej, movel, movep and movec.
+
+        Returns
+        -------
+        motion : speed and acceleration that are left out are the manual's defaults (``DEFAULTS``); a time of more than
+            0 takes precedence. The blend radius is a zone in m.
+        """
         kind, tool = KINDS[move.form], _tool(memory)
         values = _placed(PARAMETERS[move.form], *_given(memory, move.arguments, move.settings))
         if values is None:
@@ -197,7 +222,13 @@ class UrScriptDialect(Dialect):
         )
 
     def carry_out(self, memory: ProgramMemory, doing: syntax.Doing) -> instructions.Instruction | None:
-        """The tool, the load, outputs; the rest as in all languages."""
+        """Carry out settings of tool and load, and outputs; the rest as in all languages.
+
+        Returns
+        -------
+        instruction : None for a tool or load that is known. Servo and speed commands, which are not
+            followed, leave the arm's position unknown.
+        """
         call = doing.what
         values, keywords = _given(memory, call.arguments, call.keywords)
         if call.function == "set_tcp":

@@ -65,7 +65,16 @@ class UrWords(Words):
         super().finish()
 
     def parts_of(self, found: syntax.Expression) -> syntax.Expression:
-        """Elements of matrices, ``m[1,0]``, as those of lists of lists."""
+        """An expression with what follows it; elements of matrices, ``m[1,0]``, as those of lists of lists.
+
+        Parameters
+        ----------
+        found : what was read before them
+
+        Returns
+        -------
+        expression : with one index for each element
+        """
         made = super().parts_of(found)
         if not isinstance(made, syntax.Element) or len(made.indices) < 2:
             return made

@@ -24,7 +24,12 @@ class UrScriptWriter(writing.Writer):
     wait = ("sleep({})", 'popup("Go on?", "Program", False, False, blocking=True)', "{}")
 
     def files(self, head: list[str]) -> dict[str, str]:
-        """The .script file."""
+        """The .script file: one function, which is the program.
+
+        Returns
+        -------
+        files : the lines of the head are comments at the function's beginning
+        """
         lines = [f"def {self.name}():", *(f"  # {line}" for line in head), *self.lines, "end", ""]
         return {".script": "\n".join(lines)}
 
@@ -39,21 +44,41 @@ class UrScriptWriter(writing.Writer):
         super().end_loop()
 
     def comment(self, text: str) -> None:
-        """``# text``."""
+        """Add a comment, ``# text``.
+
+        Parameters
+        ----------
+        text : a line that begins with ``$ `` (the pendant's own marks) is kept as it is
+        """
         self.line(text if text.startswith("$ ") else f"# {text}")
 
     def output(self, output: Output) -> None:
-        """``set_digital_out(0, True)``."""
+        """Write an output, such as ``set_digital_out(0, True)``.
+
+        Parameters
+        ----------
+        output : TRUE and FALSE are written as URScript has them, other values as they are
+        """
         name, _, rest = output.name.partition("[")
         value = output.value.capitalize() if output.value in ("TRUE", "FALSE") else output.value
         self.line(f"set_{name}({rest.rstrip(']')}, {value})" if rest else f"set_{output.name}({value})")
 
     def verbatim(self, text: str) -> None:
-        """A line as it was read."""
+        """Add a line as it was read.
+
+        Parameters
+        ----------
+        text : of URScript; blanks and line ends become single spaces
+        """
         self.line(" ".join(text.split()))
 
     def set_load(self, load: MassBody | None) -> None:
-        """``set_payload``, and with an inertia ``set_target_payload``."""
+        """Write ``set_payload``, or ``set_target_payload`` for a load with an inertia.
+
+        Parameters
+        ----------
+        load : kg, m, kg m^2, in the flange's axes; None is written as a mass of 0
+        """
         load = load or MassBody(0.0)
         parts = [
             f"[{', '.join(writing.short(each, writing.LOAD_DIGITS) for each in part)}]"
@@ -67,7 +92,12 @@ class UrScriptWriter(writing.Writer):
         self.line(f"set_{'target_' if any(load.inertia) else ''}payload({given})")
 
     def motion(self, ready: writing.ReadyMotion) -> None:
-        """movej, movel, movep, movec."""
+        """Write movej, movel, movep or movec, and before it the tool where it changes.
+
+        Parameters
+        ----------
+        ready : targets are joints (rad), or poses in the robot's base; one that can't be written is left out
+        """
         motion = ready.motion
         target = self._target(ready)
         base = motion.base
